@@ -1,0 +1,107 @@
+"""The errors of Tandem, as one tree.
+
+    ServiceError
+    ├── NotFound             nothing has that name or id
+    ├── InvalidInput         a value breaks a rule: field, value, rule, choices
+    ├── Conflict             the request contradicts the present state
+    ├── SimulationError      the simulator met a state it must never meet
+    └── CheckpointMismatch   a checkpoint does not fit what it is asked to do
+
+Every error keeps its data as attributes and gives them by ``problem()``, from which the HTTP
+border builds an RFC 9457 problem.
+"""
+
+from collections.abc import Sequence
+
+
+class ServiceError(Exception):
+    """Root of every error that Tandem raises on purpose.
+
+    Args:
+        message: One sentence for people, with the value, the rule and the choices.
+    """
+
+    def __init__(self, message: str) -> None:
+        super().__init__(message)
+        self.message = message
+
+    def problem(self) -> dict[str, object]:
+        """Return the error's data, as extension members of a problem document."""
+        return {}
+
+
+class NotFound(ServiceError):
+    """Nothing has that name or id.
+
+    Args:
+        what: The noun, such as ``"preset"``.
+        name: The name that was asked for.
+        known: Names that exist, where the list is short enough to print.
+    """
+
+    def __init__(self, what: str, name: str, known: Sequence[str] = ()) -> None:
+        choices = f"; known: {', '.join(known)}" if known else ""
+        super().__init__(f"no {what} {name!r}{choices}")
+        self.what, self.name, self.known = what, name, tuple(known)
+
+    def problem(self) -> dict[str, object]:
+        """Return noun, name and the known names."""
+        return {"what": self.what, "name": self.name, "known": list(self.known)}
+
+
+class InvalidInput(ServiceError):
+    """A value breaks a rule.
+
+    Args:
+        field: Dotted path of the field, such as ``"robot.q[3]"``.
+        value: The offending value.
+        rule: The rule it breaks, as a sentence part: ``"must lie in [-3.1, 3.1] rad"``.
+        choices: Allowed values, where they can be listed.
+    """
+
+    def __init__(
+        self, field: str, value: object, rule: str, choices: Sequence[str] = ()
+    ) -> None:
+        listed = f"; choices: {', '.join(choices)}" if choices else ""
+        super().__init__(f"{field} = {value!r} {rule}{listed}")
+        self.field, self.value, self.rule = field, value, rule
+        self.choices = tuple(choices)
+
+    def problem(self) -> dict[str, object]:
+        """Return field, value, rule and choices."""
+        return {
+            "field": self.field,
+            "value": repr(self.value),
+            "rule": self.rule,
+            "choices": list(self.choices),
+        }
+
+
+class Conflict(ServiceError):
+    """The request contradicts the present state."""
+
+
+class SimulationError(ServiceError):
+    """The simulator met a state it must never meet; a bug, with the seed to reproduce it."""
+
+
+class CheckpointMismatch(ServiceError):
+    """A checkpoint does not fit what it is asked to do.
+
+    Args:
+        field: The property that differs, such as ``"cell"``.
+        expected: What is asked for.
+        actual: What the checkpoint says.
+    """
+
+    def __init__(self, field: str, expected: object, actual: object) -> None:
+        super().__init__(f"checkpoint {field} is {actual!r}, expected {expected!r}")
+        self.field, self.expected, self.actual = field, expected, actual
+
+    def problem(self) -> dict[str, object]:
+        """Return the property and both values."""
+        return {
+            "field": self.field,
+            "expected": repr(self.expected),
+            "actual": repr(self.actual),
+        }

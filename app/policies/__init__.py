@@ -1,0 +1,1 @@
+"""Learning and deciding: torch and Stable-Baselines3. Knows sim; nothing of web, api, store."""

@@ -1,0 +1,1 @@
+"""Compiled, batched kernels (numba): scalar code per environment, no allocation in loops."""

@@ -1,0 +1,128 @@
+"""What the rooms of the house hand each other: the Protocols and their data.
+
+``app.policies`` implements :class:`TaskPolicy`, ``web`` implements :class:`WorldHandle`; the
+other side sees only what is written here (numpy in, numpy out).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Vec = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Person:
+    """One person in the cell, as the 18-DoF model of METHOD 3.4."""
+
+    q: Vec
+    """Joint positions [m, rad], shape (18,), order of ``human.JOINT_NAMES``."""
+    qd: Vec
+    """Joint speeds [m/s, rad/s], shape (18,)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Candidate:
+    """One geometric task the robot may choose: bring the tool to ``position``."""
+
+    id: str
+    """Name given by the caller, unique among the candidates."""
+    position: Vec
+    """Point the tcp must reach, robot base frame [m], shape (3,)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OutsideField:
+    """One input that lies outside what the checkpoint was trained on."""
+
+    field: str
+    """Name of the input, such as ``"people[0].q.pelvis_y"``."""
+    value: float
+    """Its value, in the input's unit."""
+    low: float
+    """Least value met in training."""
+    high: float
+    """Greatest value met in training."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Decision:
+    """The critic's choice among candidates, with all that explains it (METHOD 3.1)."""
+
+    chosen: str
+    """Id of the chosen candidate."""
+    index: int
+    """Its place in the list of candidates."""
+    values: tuple[float, ...]
+    """``Q(s_i, pi(s_i))`` of every candidate, discounted reward."""
+    actions: NDArray[np.float32]
+    """The policy's action for every candidate in [-1, 1], shape (n, 5)."""
+    qd_target: Vec
+    """The joint speeds these actions ask for [rad/s], shape (n, 6)."""
+    reachable: tuple[bool, ...]
+    """Whether inverse kinematics finds a vertical-tool posture at each candidate."""
+    outside: tuple[OutsideField, ...]
+    """Fields of the state outside the training range."""
+    outside_candidates: tuple[tuple[OutsideField, ...], ...]
+    """The same for each candidate's position."""
+    checkpoint: str
+    """SHA-256 of the checkpoint that decided."""
+    elapsed_ms: float
+    """Time the decision took [ms]."""
+
+
+class TaskPolicy(Protocol):
+    """Chooses among candidates and says how to move; safe to call from several threads."""
+
+    @property
+    def checkpoint(self) -> str:
+        """SHA-256 of the checkpoint."""
+
+    @property
+    def title(self) -> str:
+        """Short text for people, such as ``"pick-td3, 2.0 M steps"``."""
+
+    @property
+    def cell(self) -> str:
+        """Name of the work cell it was trained for."""
+
+    def decide(
+        self,
+        q: Vec,
+        qd: Vec,
+        people: Sequence[Person],
+        candidates: Sequence[Candidate],
+        *,
+        previous: str | None = None,
+        time_left_s: float = 10.0,
+    ) -> Decision:
+        """Choose one candidate.
+
+        Args:
+            q: Robot joint positions [rad], shape (6,).
+            qd: Robot joint speeds [rad/s], shape (6,).
+            people: The people in the cell.
+            candidates: What may be chosen, at least one.
+            previous: The candidate chosen last, for hysteresis; None chooses afresh.
+            time_left_s: Time left to reach a candidate [s].
+
+        Raises:
+            InvalidInput: A value that no answer can be given for.
+        """
+
+
+class WorldHandle(Protocol):
+    """One live world, seen from other threads: commands in, immutable snapshots out."""
+
+    @property
+    def id(self) -> str:
+        """Name of the world in URLs."""
+
+    def submit(self, command: Any) -> None:
+        """Queue one command of ``app.sim.commands``; returns at once."""
+
+    def snapshot(self) -> Any:
+        """Return the last ``WorldSnapshot``; never waits."""
