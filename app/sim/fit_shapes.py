@@ -140,7 +140,9 @@ def fit_capsule(points: Vec, restarts: int = 3) -> tuple[Vec, Vec, float]:
         x = np.concatenate([centre - half * axis, centre + half * axis])
         for _ in range(restarts):
             x = minimize(
-                volume, x, method="Nelder-Mead",
+                volume,
+                x,
+                method="Nelder-Mead",
                 options={"maxiter": 2000, "xatol": 1e-6, "fatol": 1e-10, "adaptive": True},
             ).x
         best = x if volume(x) < volume(best) else best
@@ -150,9 +152,9 @@ def fit_capsule(points: Vec, restarts: int = 3) -> tuple[Vec, Vec, float]:
     return p0, p1, round(radius, DECIMALS)
 
 
-def fit_parts(triangles: Vec, cuts: Sequence[float], restarts: int) -> list[
-    tuple[Vec, Vec, float]
-]:
+def fit_parts(
+    triangles: Vec, cuts: Sequence[float], restarts: int
+) -> list[tuple[Vec, Vec, float]]:
     """Fit one capsule to each slab between the cuts."""
     edges = [-math.inf, *cuts, math.inf]
     return [
@@ -186,8 +188,13 @@ def main() -> None:
     for plan in PLANS:
         for name, (p0, p1, radius) in zip(plan.parts, fit_link(plan), strict=True):
             rows.append(
-                {"name": name, "link": plan.link, "p0": p0.tolist(), "p1": p1.tolist(),
-                 "radius": radius}
+                {
+                    "name": name,
+                    "link": plan.link,
+                    "p0": p0.tolist(),
+                    "p1": p1.tolist(),
+                    "radius": radius,
+                }
             )
     assert {row["link"] for row in rows} == set(LINK_NAMES)
     lines = ",\n  ".join(json.dumps(row) for row in rows)
