@@ -16,16 +16,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
-import trimesh
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.spatial import ConvexHull
 
-from app.sim.robot import LINK_NAMES, package_dir, urdf_path
+from app.sim.collision import collision_mesh
+from app.sim.ports import Vec
+from app.sim.robot import LINK_NAMES
 from app.sim.shapes import CAPSULE_FILE
-
-Vec = NDArray[np.float64]
 
 logger = logging.getLogger(__name__)
 
@@ -68,22 +65,6 @@ PLANS = (
     LinkPlan(link="wrist_2_link", parts=("wrist_2",)),
     LinkPlan(link="wrist_3_link", parts=("wrist_3",)),
 )
-
-
-def collision_mesh(link: str) -> trimesh.Trimesh:
-    """Load one link's collision mesh, in the link's frame [m]."""
-    model = pin.buildModelFromUrdf(str(urdf_path()))
-    geometry = pin.buildGeomFromUrdf(
-        model,
-        str(urdf_path()),
-        pin.GeometryType.COLLISION,
-        package_dirs=[str(package_dir())],
-    )
-    shape = geometry.geometryObjects[geometry.getGeometryId(f"{link}_0")]
-    mesh = trimesh.load(shape.meshPath, force="mesh")
-    frame = model.frames[model.getFrameId(link)]
-    mesh.apply_transform(frame.placement.inverse().act(shape.placement).homogeneous)
-    return mesh
 
 
 def segment_distance(points: Vec, p0: Vec, p1: Vec) -> Vec:

@@ -7,16 +7,15 @@ late. A capsule is the set of points within ``radius`` of the segment ``p0``-``p
 
 import json
 from dataclasses import dataclass
-from functools import cache
 from importlib import resources
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from app.sim.ports import Vec
 from app.sim.robot import LINK_NAMES
 
-Vec = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 CAPSULE_FILE = Path(str(resources.files("app.sim"))) / "shapes_data" / "ur10_capsules.json"
