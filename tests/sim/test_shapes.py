@@ -113,3 +113,20 @@ def test_capsules_are_free_of_each_other_in_all_working_postures() -> None:
 def test_loaded_capsules_cannot_be_changed() -> None:
     with pytest.raises(ValueError, match="read-only"):
         shapes.load_robot_capsules().radius[0] = 0.0
+
+
+def test_no_point_of_the_robot_is_farther_from_an_axis_than_its_lever() -> None:
+    robot, capsules = Robot(0.2), shapes.load_robot_capsules(0.2, 0.05)
+    most = shapes.levers(0.2, 0.05)
+    stretched = np.zeros((5, 6))
+    stretched[:, 3] = np.linspace(-0.7, 0.7, 5)
+    q = np.vstack([stretched, np.random.default_rng(9).uniform(-np.pi, np.pi, (1500, 6))])
+    ends = np.stack(robot_ends(robot, capsules, q))
+    for joint, axis in enumerate((2, 1, 1, 1, 2, 1)):
+        poses = np.stack([robot.link_poses(row)[joint + 1] for row in q])
+        moved = capsules.link > joint
+        offset = ends[:, :, moved] - poses[None, :, None, :3, 3]
+        across = np.cross(offset, poses[None, :, None, :3, axis])
+        reach = np.linalg.norm(across, axis=-1) + capsules.radius[moved]
+        assert reach.max() <= most[joint]
+        assert reach.max() > 0.85 * most[joint]
