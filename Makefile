@@ -27,11 +27,14 @@ RESOLVE = $(VENV)/bin/uv pip compile --quiet --no-config --universal --python-ve
 CUDA_PACKAGES := triton cuda-bindings cuda-pathfinder cuda-toolkit \
 	$(addprefix nvidia-,cublas cuda-cupti cuda-nvrtc cuda-runtime cudnn-cu13 cufft cufile curand cusolver cusparse cusparselt-cu13 nccl-cu13 nvjitlink nvshmem-cu13 nvtx)
 
-# $(call INSTALL_LOCK,file): installs exactly what the file lists, and counts along.
+# $(call INSTALL_LOCK,file): installs exactly what the file lists, and counts along. pip's
+# notes on a configured index that lacks a package are left out: another one has it.
 INSTALL_LOCK = $(PIP) install --require-hashes --no-deps --progress-bar off -r $(1) \
-	| awk -v total=$$(grep -c '==' $(1)) ' \
-		/^(Collecting|Requirement already)/ { printf "\r    %d of %d packages", ++n, total; fflush() } \
-		/^Installing/ { printf ", installing"; fflush() } END { print "" }'
+	2> >(grep -v '^WARNING: Location' >&2) \
+	| awk -v total=$$(grep -c '==' $(1)) -v every=$$(test -t 2 && echo 1 || echo 25) ' \
+		/^(Collecting|Requirement already)/ && ++n % every == 0 { \
+			printf "%s    %d of %d packages", (every > 1 && n > every ? "\n" : "\r"), n, total; fflush() } \
+		/^Installing/ { printf ", installing them"; fflush() } END { print "" }'
 
 SAY := @printf '==> %s\n'
 
