@@ -211,9 +211,7 @@ class PickBatch:
 
     def restart(self) -> NDArray[np.float32]:
         """Start the episodes numbered by ``state.episode``; return the observations."""
-        pick.reset_batch(
-            self.world, self._rules, self.arm, self.seed, self.state, self._obs
-        )
+        pick.reset_batch(self.world, self._rules, self.arm, self.seed, self.state, self._obs)
         return self._obs
 
     def step(
@@ -245,9 +243,7 @@ class PickBatch:
             self._rew,
             self._ended,
         )
-        return StepResult(
-            obs=self._obs, last_obs=self._last, rew=self._rew, ended=self._ended
-        )
+        return StepResult(obs=self._obs, last_obs=self._last, rew=self._rew, ended=self._ended)
 
     def set_goals(self, rows: NDArray[np.int64], goals: Vec) -> None:
         """Send the robots of ``rows`` to new targets [m], shape (len(rows), 3)."""
