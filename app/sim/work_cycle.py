@@ -10,6 +10,7 @@ primitives; these reaches are synthetic and stand in for it.
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -42,6 +43,7 @@ class Library:
     """Number of cubes."""
 
 
+@lru_cache(maxsize=8)
 def build_library(cell: Cell, seed: int, variants: int = 24) -> Library:
     """Make ``variants`` random postures for each place and hand of a cell.
 
