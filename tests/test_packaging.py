@@ -13,7 +13,6 @@ from packaging.utils import canonicalize_name
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 ROOMS = ("app", "jobs", "web")
-RUN_BY_HAND = ("app/sim/fit_shapes.py",)
 
 
 def pins(name: str) -> dict[str, str]:
@@ -36,11 +35,9 @@ def names_in(lines: list[str]) -> set[str]:
 
 
 def test_every_imported_package_is_declared() -> None:
-    runtime = names_in(PROJECT["project"]["dependencies"])
-    everything = runtime | names_in(PROJECT["project"]["optional-dependencies"]["dev"])
+    declared = names_in(PROJECT["project"]["dependencies"])
     owners = {**packages_distributions(), "pinocchio": ["pin"]}
     for path in (path for room in ROOMS for path in (ROOT / room).rglob("*.py")):
-        declared = everything if str(path.relative_to(ROOT)) in RUN_BY_HAND else runtime
         for root in imported_roots(path):
             packages = {canonicalize_name(name) for name in owners[root]}
             assert packages & declared, f"{path} imports {root}, which pyproject.toml lacks"
