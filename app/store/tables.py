@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 
 from sqlalchemy import (
     JSON,
+    BigInteger,
     Boolean,
     Column,
     DateTime,
@@ -60,7 +61,7 @@ jobs = Table(
     Column("id", String(36), nullable=False, unique=True),
     Column("kind", String(32), nullable=False),
     Column("preset", String(64)),
-    Column("seed", Integer, nullable=False),
+    Column("seed", BigInteger, nullable=False),
     Column("overrides", JSON, nullable=False),
     Column("spec", JSON, nullable=False),
     Column("state", String(16), nullable=False, index=True),
@@ -71,8 +72,8 @@ jobs = Table(
     Column("finished_at", UtcDateTime),
     Column("heartbeat_at", UtcDateTime),
     Column("error", Text),
-    Column("step", Integer, nullable=False, default=0),
-    Column("total_steps", Integer),
+    Column("step", BigInteger, nullable=False, default=0),
+    Column("total_steps", BigInteger),
     Column("cancel_requested", Boolean, nullable=False, default=False),
     Column("idempotency_key", String(255), unique=True),
     Column("result", JSON(none_as_null=True)),
@@ -84,7 +85,7 @@ metrics = Table(
     "metrics",
     metadata,
     _job_key(primary=True),
-    Column("step", Integer, primary_key=True, autoincrement=False),
+    Column("step", BigInteger, primary_key=True, autoincrement=False),
     Column("values", JSON, nullable=False),
     Column("at", UtcDateTime, nullable=False),
 )
@@ -95,7 +96,7 @@ events = Table(
     _job_key(primary=True),
     Column("id", Integer, primary_key=True, autoincrement=False),
     Column("kind", String(16), nullable=False),
-    Column("step", Integer),
+    Column("step", BigInteger),
     Column("data", JSON, nullable=False),
     Column("at", UtcDateTime, nullable=False),
 )
@@ -117,7 +118,7 @@ job_checkpoints = Table(
     "job_checkpoints",
     metadata,
     _job_key(primary=True),
-    Column("step", Integer, primary_key=True, autoincrement=False),
+    Column("step", BigInteger, primary_key=True, autoincrement=False),
     Column("sha256", String(64), ForeignKey("checkpoints.sha256"), nullable=False),
     Index("ix_job_checkpoints_sha256", "sha256"),
 )
@@ -126,7 +127,7 @@ resume_states = Table(
     "resume_states",
     metadata,
     _job_key(primary=True),
-    Column("step", Integer, nullable=False),
+    Column("step", BigInteger, nullable=False),
     Column("manifest", JSON, nullable=False),
     Column("tensors", LargeBinary, nullable=False),
 )
