@@ -121,7 +121,10 @@ class LocalProcess:
                 start_new_session=True,  # Ctrl-C is for the server, which then asks politely
             )
             return LocalHandle(
-                claim=claim, process=process, log=log, log_start=os.fstat(output.fileno()).st_size
+                claim=claim,
+                process=process,
+                log=log,
+                log_start=os.fstat(output.fileno()).st_size,
             )
 
     def poll(self, handle: Handle) -> Exit | None:

@@ -130,8 +130,7 @@ class Supervisor:
 
     def _tick(self) -> None:
         self._reap()
-        if self._workers:
-            self._watch()
+        self._watch()
         while len(self._workers) < self._max_running and self._start_next():
             pass
 
@@ -200,6 +199,8 @@ class Supervisor:
             if self._lost_patience(worker, now):
                 logger.warning("job %s: its worker does not react, killing it", claim.job_id)
                 self._executor.stop(worker.handle, force=True)
+        for claim in rows.keys() - self._workers.keys():  # claimed, but never started
+            self._give_back(claim)
 
     def _lost_patience(self, worker: _Worker, now: float) -> bool:
         cancelled = worker.cancel_seen

@@ -363,9 +363,7 @@ def _forget_beyond_resume(connection: sa.Connection, job_id: str) -> int:
     connection.execute(
         sa.delete(metrics).where(metrics.c.job_id == job_id, metrics.c.step > step)
     )
-    connection.execute(
-        sa.delete(events).where(events.c.job_id == job_id, events.c.step > step)
-    )
+    connection.execute(sa.delete(events).where(events.c.job_id == job_id, events.c.step > step))
     drop_job_checkpoints(connection, job_id, beyond=step)
     return step
 
