@@ -5,6 +5,7 @@ Every write of an attempt goes through one fenced UPDATE
 that lost its job, for whatever reason, can change nothing any more.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -113,9 +114,12 @@ def record_progress(
 
     Raises:
         StaleAttempt: The attempt no longer holds the job.
-        InvalidInput: The step lies not above the one recorded last.
+        InvalidInput: The step lies not above the one recorded last, or a value is not finite.
         StorageFull: No room is left.
     """
+    for name, value in values.items():
+        if value is not None and not math.isfinite(value):
+            raise InvalidInput(name, value, "must be finite, or None where not defined")
     now = datetime.now(UTC)
     changes: dict[str, Any] = {"heartbeat_at": now, "step": step}
     if total_steps is not None:

@@ -21,7 +21,7 @@ def migrate(store: Store) -> None:
         Conflict: The database was written by a newer version of Tandem.
         StorageFull: No room is left.
     """
-    config = _config()
+    config = alembic_config()
     known = {script.revision for script in ScriptDirectory.from_config(config).walk_revisions()}
     with store.writing() as connection:
         present = _revision(connection)
@@ -41,7 +41,7 @@ def check_schema(store: Store) -> None:
     Raises:
         Conflict: They are not.
     """
-    head = ScriptDirectory.from_config(_config()).get_current_head()
+    head = ScriptDirectory.from_config(alembic_config()).get_current_head()
     with store.reading() as connection:
         present = _revision(connection)
     if present != head:
@@ -51,7 +51,8 @@ def check_schema(store: Store) -> None:
         )
 
 
-def _config() -> Config:
+def alembic_config() -> Config:
+    """Return the configuration that knows where the scripts are."""
     config = Config()
     config.set_main_option("script_location", str(_SCRIPTS).replace("%", "%%"))
     return config
