@@ -1,3 +1,4 @@
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -9,10 +10,19 @@ from app.store.migrate import migrate
 from app.store.records import Claim, NewJob
 
 
-@pytest.fixture
-def store(tmp_path: Path) -> Iterator[Store]:
-    opened = Store(f"sqlite:///{tmp_path}/tandem.db")
+@pytest.fixture(scope="session")
+def migrated(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An empty database with its tables; copying it is quicker than migrating anew."""
+    path = tmp_path_factory.mktemp("migrated") / "tandem.db"
+    opened = Store(f"sqlite:///{path}")
     migrate(opened)
+    opened.close()
+    return path
+
+
+@pytest.fixture
+def store(tmp_path: Path, migrated: Path) -> Iterator[Store]:
+    opened = Store(f"sqlite:///{shutil.copy(migrated, tmp_path)}")
     yield opened
     opened.close()
 

@@ -24,7 +24,8 @@ def fill_up(store: Store, *, spare_pages: int) -> None:
 def record_until_full(store: Store, claim: Claim) -> int:
     with pytest.raises(StorageFull):
         for step in range(1, 1000):
-            attempts.record_progress(store, claim, step, {"x": 1.0 / step})
+            values = {f"x{i}": i / step for i in range(50)}
+            attempts.record_progress(store, claim, step, values)
     return len(metrics.list_metrics(store, claim.job_id))
 
 
