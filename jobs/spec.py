@@ -11,10 +11,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from app.errors import InvalidInput
-from app.policies import presets
-from app.store.records import NewJob
-
 MAX_SEED = 2**32 - 1
 """Greatest seed; every random stream accepts it."""
 

@@ -46,9 +46,7 @@ def test_one_database_has_one_server_even_from_two_folders(
 
 def test_lock_ends_with_the_process_that_held_it(store: Store, tmp_path: Path) -> None:
     arguments = [sys.executable, "-c", HOLDER, store.url, str(tmp_path)]
-    with subprocess.Popen(
-        arguments, stdin=subprocess.PIPE, stdout=subprocess.PIPE
-    ) as holder:
+    with subprocess.Popen(arguments, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as holder:
         assert holder.stdout is not None and holder.stdout.readline() == b"held\n"
         lock = ServerLock(store, tmp_path)
         with pytest.raises(Conflict, match=f"process {holder.pid}"):
