@@ -9,7 +9,7 @@ import fcntl
 import os
 from pathlib import Path
 
-from app.errors import Conflict
+from app.errors import Conflict, InvalidInput
 from app.store.engine import Store
 
 
@@ -33,13 +33,14 @@ class ServerLock:
 
         Raises:
             Conflict: Another server holds it.
+            InvalidInput: The folder cannot be written to.
         """
         if self._files:
             return
         try:
             for path in self._paths:
                 self._files.append(_lock(path))
-        except Conflict:
+        except (Conflict, InvalidInput):
             self.release()
             raise
 
@@ -50,8 +51,12 @@ class ServerLock:
 
 
 def _lock(path: Path) -> int:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+    except OSError as error:
+        rule = f"must be a folder that this process may write to ({error.strerror})"
+        raise InvalidInput("TANDEM_DATA", str(path.parent), rule) from error
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:

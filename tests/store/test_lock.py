@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from app.errors import Conflict
+from app.errors import Conflict, InvalidInput
 from app.store.engine import Store
 from app.store.lock import ServerLock
 
@@ -55,3 +55,9 @@ def test_lock_ends_with_the_process_that_held_it(store: Store, tmp_path: Path) -
         holder.wait()
     lock.acquire()
     lock.release()
+
+
+def test_folder_that_cannot_be_made_is_named(store: Store, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(InvalidInput, match=r"TANDEM_DATA = '.*file/data' must be a folder"):
+        ServerLock(store, tmp_path / "file" / "data").acquire()

@@ -6,7 +6,7 @@ from alembic import command
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 
-from app.errors import Conflict
+from app.errors import Conflict, InvalidInput
 from app.store.engine import Store
 from app.store.migrate import alembic_config, check_schema, migrate
 from app.store.tables import metadata
@@ -35,7 +35,7 @@ def test_migrations_can_be_taken_back(store: Store) -> None:
 def test_database_of_a_newer_version_is_refused(store: Store) -> None:
     with store.writing() as connection:
         connection.execute(sa.text("UPDATE alembic_version SET version_num = '9999'"))
-    with pytest.raises(Conflict, match="has schema 9999, which this version of Tandem does"):
+    with pytest.raises(Conflict, match="has schema 9999, which this version of Tandem"):
         migrate(store)
     with pytest.raises(Conflict, match="has schema 9999, this code needs"):
         check_schema(store)
@@ -45,4 +45,12 @@ def test_worker_refuses_an_empty_database(tmp_path: Path) -> None:
     store = Store(f"sqlite:///{tmp_path}/empty.db")
     with pytest.raises(Conflict, match="has schema none"):
         check_schema(store)
+    store.close()
+
+
+def test_file_that_is_no_database_is_named(tmp_path: Path) -> None:
+    (tmp_path / "tandem.db").write_text("these are my notes, not a database" * 100)
+    store = Store(f"sqlite:///{tmp_path}/tandem.db")
+    with pytest.raises(InvalidInput, match=r"tandem\.db' cannot be opened \(file is not a"):
+        migrate(store)
     store.close()
