@@ -17,7 +17,7 @@ from sqlalchemy import event
 
 from app.errors import InvalidInput
 from app.store.records import NewCheckpoint, ResumeState
-from jobs.run import main
+from jobs.attempt import main
 from jobs.worker import Worker
 
 GRID = 5
@@ -85,4 +85,4 @@ def limit_database(worker: Worker, max_pages: int | None) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main(runners={"count": count}))
+    sys.exit(main({"count": count}))
