@@ -95,7 +95,9 @@ def load(manifest: object, tensors: bytes) -> Checkpoint:
         raise InvalidInput("manifest", type(manifest).__name__, "must be a JSON object")
     for name, kind in REQUIRED.items():
         if not isinstance(manifest.get(name), kind):
-            raise InvalidInput(f"manifest.{name}", manifest.get(name), f"must be {kind.__name__}")
+            raise InvalidInput(
+                f"manifest.{name}", manifest.get(name), f"must be {kind.__name__}"
+            )
     if manifest["format"] != FORMAT:
         raise CheckpointMismatch("format", FORMAT, manifest["format"])
     if manifest["kind"] not in ("policy", "resume"):

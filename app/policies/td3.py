@@ -123,9 +123,7 @@ class PickTD3(TD3):
                 polyak_update(
                     self.critic.parameters(), self.critic_target.parameters(), self.tau
                 )
-                polyak_update(
-                    self.actor.parameters(), self.actor_target.parameters(), self.tau
-                )
+                polyak_update(self.actor.parameters(), self.actor_target.parameters(), self.tau)
 
     def _update_critics(self, data: Any) -> None:
         with torch.no_grad():
