@@ -11,7 +11,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from app.errors import InvalidInput
+from app.errors import InvalidInput, SimulationError
 from app.sim import human
 from app.sim.cells import Cell
 from app.sim.kernels import arm as arm_kernel
@@ -20,14 +20,11 @@ from app.sim.kernels.arm import Arm
 from app.sim.kernels.features import N_FEATURES
 from app.sim.kernels.reward import RewardWeights
 from app.sim.ports import Vec
-from app.sim.shapes import load_robot_capsules, self_pairs
+from app.sim.shapes import levers, load_robot_capsules, self_pairs
 from app.sim.work_cycle import build_library
 
 OUTCOMES = ("running", "success", "collision", "timeout")
 CONTACT_KINDS = ("none", "human", "cell", "self")
-LEVERS = np.array([1.45, 1.40, 0.90, 0.36, 0.29, 0.22])
-"""Farthest point of the arm with its tool from each joint's axis, at full stretch [m]."""
-
 DEFAULT_WEIGHTS = RewardWeights(
     c_d=0.5, c_th=0.5, c_c=1.0, c_step=0.02, c_v=1.0, d_v=0.1, c_s=1.0, gamma=1.0
 )
@@ -106,10 +103,16 @@ def arm_of(cell: Cell) -> Arm:
         p1=capsules.p1,
         radius=capsules.radius,
         pairs=self_pairs(capsules),
-        lever=LEVERS,
+        lever=levers(mount.tool_length, mount.tool_radius),
         pelvis_z=cell.pelvis_z,
         floor_z=cell.floor_z,
     )
+
+
+def _require_finite(name: str, values: NDArray[np.floating]) -> None:
+    """Raise SimulationError for NaN and infinity, which the contact test would pass over."""
+    if not np.isfinite(values).all():
+        raise SimulationError(f"{name} = {values.tolist()} must be finite")
 
 
 def _world_of(cell: Cell, library_seed: int) -> pick.PickWorld:
@@ -208,9 +211,7 @@ class PickBatch:
 
     def restart(self) -> NDArray[np.float32]:
         """Start the episodes numbered by ``state.episode``; return the observations."""
-        pick.reset_batch(
-            self.world, self._rules, self.arm, self.seed, self.state, self._obs
-        )
+        pick.reset_batch(self.world, self._rules, self.arm, self.seed, self.state, self._obs)
         return self._obs
 
     def step(
@@ -222,7 +223,11 @@ class PickBatch:
             act: Wanted joint speeds over their limits, in [-1, 1], shape (n_envs, 5).
             auto_reset: Start the next episode where one ended; else its row stands still.
             features: Whether observations are wanted.
+
+        Raises:
+            SimulationError: An action is NaN or infinite.
         """
+        _require_finite("act", act)
         pick.step_batch(
             self.world,
             self._rules,
@@ -238,9 +243,7 @@ class PickBatch:
             self._rew,
             self._ended,
         )
-        return StepResult(
-            obs=self._obs, last_obs=self._last, rew=self._rew, ended=self._ended
-        )
+        return StepResult(obs=self._obs, last_obs=self._last, rew=self._rew, ended=self._ended)
 
     def set_goals(self, rows: NDArray[np.int64], goals: Vec) -> None:
         """Send the robots of ``rows`` to new targets [m], shape (len(rows), 3)."""
@@ -302,7 +305,11 @@ def step_robot(arm: Arm, q: Vec, qd: Vec, act: Vec) -> tuple[Vec, Vec, Vec]:
     Returns:
         Positions [rad] and speeds [rad/s] after the period and its coefficients [rad/s^2],
         each of shape (6,).
+
+    Raises:
+        SimulationError: A number is NaN or infinite.
     """
+    _require_finite("q, qd, act", np.concatenate([q, qd, act]))
     c, q_out, qd_out = np.empty(6), np.empty(6), np.empty(6)
     pick.drive(arm, q, qd, np.asarray(act, dtype=np.float64), c, q_out, qd_out)
     return q_out, qd_out, c
@@ -318,7 +325,12 @@ def contact(arm: Arm, q0: Vec, qd0: Vec, c: Vec, human_q0: Vec, human_q1: Vec) -
         c: Coefficients of the period [rad/s^2], shape (6,).
         human_q0: The person's joints at the start [m, rad], shape (18,).
         human_q1: The person's joints at the end [m, rad], shape (18,).
+
+    Raises:
+        SimulationError: A number is NaN or infinite.
     """
+    _require_finite("q, qd, c", np.concatenate([q0, qd0, c]))
+    _require_finite("human_q", np.concatenate([human_q0, human_q1]))
     pose = arm_kernel.new_pose(len(arm.link))
     kind, link, part, d = arm_kernel.sweep(arm, q0, qd0, c, human_q0, human_q1, pose)
     names = load_robot_capsules().name
@@ -341,7 +353,9 @@ def tool_state(arm: Arm, q: Vec, qd: Vec, goal: Vec) -> tuple[float, float, floa
     return distance, tilt, speed, bool(pick.succeeded(distance, tilt, speed))
 
 
-def hand_speeds(batch: PickBatch, n_scripts: int = 200, seconds: float = 10.0) -> dict[str, float]:
+def hand_speeds(
+    batch: PickBatch, n_scripts: int = 200, seconds: float = 10.0
+) -> dict[str, float]:
     """Return how fast the person's hands are, both hands, while faster than 0.05 m/s [m/s].
 
     Args:

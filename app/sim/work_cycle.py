@@ -192,11 +192,12 @@ def reach_script(
     rng = np.random.default_rng(7)
     places = [from_station, to_station or from_station]
     postures = [
-        _at_station(cell, rng, np.array(cell.station(place).position), hand)
-        for place in places
+        _at_station(cell, rng, np.array(cell.station(place).position), hand) for place in places
     ]
     if to_station is None:
         postures[1] = postures[0]
-    way = float(np.abs(_palms(postures[1], cell.pelvis_z) - _palms(postures[0], cell.pelvis_z)).max())
+    way = float(
+        np.abs(_palms(postures[1], cell.pelvis_z) - _palms(postures[0], cell.pelvis_z)).max()
+    )
     duration = max(0.8, way / 0.5)
     return Script(np.array([delay_s]), np.array([duration]), np.array(postures))

@@ -33,7 +33,7 @@ DISTANCE_SCALE = 0.5
 FARTHEST = 3.0 * DISTANCE_SCALE
 """Clearances are looked at up to here [m]."""
 
-_SIZES = (
+SIZES = (
     ("q", 5),
     ("qd", 5),
     ("sin_q", 5),
@@ -58,7 +58,7 @@ _SIZES = (
 
 def _layout() -> dict[str, slice]:
     slices, start = {}, 0
-    for name, size in _SIZES:
+    for name, size in SIZES:
         slices[name] = slice(start, start + size)
         start += size
     return slices
@@ -66,7 +66,7 @@ def _layout() -> dict[str, slice]:
 
 LAYOUT = _layout()
 """Slice of each group of features in the observation."""
-N_FEATURES = sum(size for _, size in _SIZES)
+N_FEATURES = sum(size for _, size in SIZES)
 """Length of the observation."""
 BASE_START = LAYOUT["base"].start
 """Where the base motion starts, for the residual action."""
@@ -76,7 +76,13 @@ COARSE_P0 = np.array(
     [[0.0, -0.045, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
 )
 COARSE_P1 = np.array(
-    [[0.0, -0.045, 0.612], [0.0, 0.0, 0.57], [0.0, 0.115, 0.0], [0.0, 0.0, 0.116], [0.0, 0.17, 0.0]]
+    [
+        [0.0, -0.045, 0.612],
+        [0.0, 0.0, 0.57],
+        [0.0, 0.115, 0.0],
+        [0.0, 0.0, 0.116],
+        [0.0, 0.17, 0.0],
+    ]
 )
 COARSE_RADIUS = np.array([0.09, 0.075, 0.066, 0.066, 0.045])
 COARSE_GROUP = np.array([0, 1, 2, 2, 3], dtype=np.int64)

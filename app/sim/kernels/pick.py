@@ -152,7 +152,9 @@ def set_goal(arm: Arm, state: PickState, e: int, goal: Vec) -> None:
 
 
 @njit(cache=True)
-def _draw_candidates(world: PickWorld, rules: PickRules, state: PickState, e: int, rng: random.State) -> None:
+def _draw_candidates(
+    world: PickWorld, rules: PickRules, state: PickState, e: int, rng: random.State
+) -> None:
     n_stations = world.stations.shape[0]
     spread = rules.n_candidates_max - rules.n_candidates_min + 1
     n = rules.n_candidates_min + random.below(rng, spread)
@@ -170,7 +172,9 @@ def _draw_candidates(world: PickWorld, rules: PickRules, state: PickState, e: in
 
 
 @njit(cache=True)
-def _draw_start(world: PickWorld, rules: PickRules, arm: Arm, state: PickState, e: int, rng: random.State) -> None:
+def _draw_start(
+    world: PickWorld, rules: PickRules, arm: Arm, state: PickState, e: int, rng: random.State
+) -> None:
     """Draw the robot's start: home, a cube or a dock in equal shares, never a candidate."""
     n_stations = world.stations.shape[0]
     while True:
@@ -195,7 +199,15 @@ def _draw_start(world: PickWorld, rules: PickRules, arm: Arm, state: PickState, 
 
 
 @njit(cache=True)
-def reset_env(world: PickWorld, rules: PickRules, arm: Arm, seed: int, state: PickState, e: int, pose: Pose) -> None:
+def reset_env(
+    world: PickWorld,
+    rules: PickRules,
+    arm: Arm,
+    seed: int,
+    state: PickState,
+    e: int,
+    pose: Pose,
+) -> None:
     """Start the next episode of environment ``e``."""
     rng = np.zeros(1, dtype=np.uint64)
     random.start_stream(seed, e, state.episode[e], rng)
@@ -263,12 +275,21 @@ def drive(arm: Arm, q: Vec, qd: Vec, act: Vec, c: Vec, q_out: Vec, qd_out: Vec) 
     for j in range(CONTROLLED):
         target[j] = min(1.0, max(-1.0, act[j])) * arm.qd_max[j]
     target[5] = min(arm.qd_max[5], max(-arm.qd_max[5], -2.0 * q[5]))
-    advance(q, qd, target, arm.q_min, arm.q_max, arm.qd_max, arm.qdd_max, arm.dt, c, q_out, qd_out)
+    advance(
+        q, qd, target, arm.q_min, arm.q_max, arm.qd_max, arm.qdd_max, arm.dt, c, q_out, qd_out
+    )
 
 
 @njit(cache=True)
 def step_env(
-    world: PickWorld, rules: PickRules, arm: Arm, weights: RewardWeights, state: PickState, e: int, act: Vec, pose: Pose
+    world: PickWorld,
+    rules: PickRules,
+    arm: Arm,
+    weights: RewardWeights,
+    state: PickState,
+    e: int,
+    act: Vec,
+    pose: Pose,
 ) -> float:
     """Move environment ``e`` through one period, set its outcome, return the reward."""
     c, q1, qd1 = np.empty(6), np.empty(6), np.empty(6)
@@ -297,7 +318,9 @@ def step_env(
 
 
 @njit(cache=True)
-def observe_env(arm: Arm, state: PickState, e: int, pose: Pose, later: Pose, coarse: Vec, out: Obs) -> None:
+def observe_env(
+    arm: Arm, state: PickState, e: int, pose: Pose, later: Pose, coarse: Vec, out: Obs
+) -> None:
     """Write the observation of environment ``e``, shape (N_FEATURES,)."""
     observe(
         arm,
@@ -316,7 +339,9 @@ def observe_env(arm: Arm, state: PickState, e: int, pose: Pose, later: Pose, coa
 
 
 @njit(cache=True)
-def reset_batch(world: PickWorld, rules: PickRules, arm: Arm, seed: int, state: PickState, obs: Obs) -> None:
+def reset_batch(
+    world: PickWorld, rules: PickRules, arm: Arm, seed: int, state: PickState, obs: Obs
+) -> None:
     """Start an episode in every environment and write the observations."""
     n_robot = arm.link.shape[0]
     pose, later = new_pose(n_robot), new_pose(n_robot)
