@@ -4,6 +4,7 @@
     ├── NotFound             nothing has that name or id
     ├── InvalidInput         a value breaks a rule: field, value, rule, choices
     ├── Conflict             the request contradicts the present state
+    ├── NotReady             the service cannot answer yet, or not now
     ├── SimulationError      the simulator met a state it must never meet
     └── CheckpointMismatch   a checkpoint does not fit what it is asked to do
 
@@ -79,6 +80,10 @@ class InvalidInput(ServiceError):
 
 class Conflict(ServiceError):
     """The request contradicts the present state."""
+
+
+class NotReady(ServiceError):
+    """The service cannot answer yet, or not now; asking again later may help."""
 
 
 class SimulationError(ServiceError):
