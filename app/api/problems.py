@@ -24,6 +24,7 @@ from app.errors import (
     NotReady,
     ServiceError,
     SimulationError,
+    StorageFull,
 )
 
 logger = logging.getLogger(__name__)
@@ -37,6 +38,7 @@ STATUS: tuple[tuple[type[ServiceError], int, str], ...] = (
     (CheckpointMismatch, 409, "checkpoint-mismatch"),
     (Conflict, 409, "conflict"),
     (NotReady, 503, "not-ready"),
+    (StorageFull, 507, "storage-full"),
     (SimulationError, 500, "simulation-error"),
 )
 
