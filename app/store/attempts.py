@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 import sqlalchemy as sa
 
-from app.errors import InvalidInput, StaleAttempt
+from app.errors import InvalidInput, StaleAttempt, StorageFull
 from app.store.checkpoints import drop_job_checkpoints, insert_checkpoint
 from app.store.engine import Store
 from app.store.events import append_event
@@ -204,17 +204,23 @@ def finish(
 def fail(store: Store, claim: Claim, error: str) -> None:
     """End a job with an error that no further attempt would cure.
 
-    On a full database the room reserved for this moment is given up.
+    On a full database the room reserved for this moment is given up; the supervisor sets it
+    aside again when it next starts.
 
     Raises:
         StaleAttempt: The attempt no longer holds the job.
         StorageFull: Not even that was enough.
     """
-    with store.writing() as connection:
-        _drop_resume(connection, claim)
-        connection.execute(sa.delete(reserve))
-        _end(connection, claim, "failed", {"error": error[-MAX_ERROR:]})
-    fill_reserve(store)
+    changes = {"error": error[-MAX_ERROR:]}
+    try:
+        with store.writing() as connection:
+            _drop_resume(connection, claim)
+            _end(connection, claim, "failed", changes)
+    except StorageFull:
+        with store.writing() as connection:
+            connection.execute(sa.delete(reserve))
+            _drop_resume(connection, claim)
+            _end(connection, claim, "failed", changes)
 
 
 def crash(store: Store, claim: Claim, error: str, *, max_failures: int) -> JobRecord:
@@ -357,9 +363,7 @@ def _forget_beyond_resume(connection: sa.Connection, job_id: str) -> int:
     connection.execute(
         sa.delete(metrics).where(metrics.c.job_id == job_id, metrics.c.step > step)
     )
-    connection.execute(
-        sa.delete(events).where(events.c.job_id == job_id, events.c.step > step)
-    )
+    connection.execute(sa.delete(events).where(events.c.job_id == job_id, events.c.step > step))
     drop_job_checkpoints(connection, job_id, beyond=step)
     return step
 

@@ -149,7 +149,9 @@ def insert_checkpoint(
 def drop_job_checkpoints(connection: sa.Connection, job_id: str, *, beyond: int) -> None:
     """Forget the checkpoints a job made beyond a step, and bytes that nobody names any more."""
     mine = sa.and_(job_checkpoints.c.job_id == job_id, job_checkpoints.c.step > beyond)
-    dropped = connection.execute(sa.select(job_checkpoints.c.sha256).where(mine)).scalars().all()
+    dropped = (
+        connection.execute(sa.select(job_checkpoints.c.sha256).where(mine)).scalars().all()
+    )
     connection.execute(sa.delete(job_checkpoints).where(mine))
     unnamed = sa.and_(
         checkpoints.c.sha256.in_(dropped),

@@ -45,9 +45,7 @@ def list_events(
         if known is None:
             raise NotFound("job", job_id)
         rows = connection.execute(query).all()
-    return tuple(
-        JobEvent(id=row.id, kind=row.kind, data=_data(row), at=row.at) for row in rows
-    )
+    return tuple(JobEvent(id=row.id, kind=row.kind, data=_data(row), at=row.at) for row in rows)
 
 
 def append_event(

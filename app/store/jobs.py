@@ -132,9 +132,7 @@ def request_cancel(store: Store, job_id: str) -> JobRecord:
         return read_job(connection, job_id)
 
 
-def read_job(
-    connection: sa.Connection, job_id: str, *, for_update: bool = False
-) -> JobRecord:
+def read_job(connection: sa.Connection, job_id: str, *, for_update: bool = False) -> JobRecord:
     """Return one job inside a transaction, locking its row if it is about to change.
 
     Raises:
