@@ -11,10 +11,13 @@ import hashlib
 import hmac
 import ipaddress
 from collections.abc import Iterable
+from functools import lru_cache
 from http.cookies import CookieError, SimpleCookie
+from importlib import resources
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
+from starlette.responses import HTMLResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.api.problems import problem
@@ -33,6 +36,11 @@ HEADERS = {
     "Cross-Origin-Opener-Policy": "same-origin",
     "Cross-Origin-Resource-Policy": "same-origin",
 }
+
+
+@lru_cache(maxsize=1)
+def _sign_in_page() -> bytes:
+    return (resources.files("app.api") / "signin.html").read_bytes()
 
 
 def session_value(token: str) -> str:
@@ -79,9 +87,11 @@ class Guard:
             await send({"type": "websocket.close", "code": 1008, "reason": kind})
             return
         headers = {"WWW-Authenticate": "Bearer"} if status == 401 else None
-        answer = problem(
+        answer: Response = problem(
             status, detail, kind=kind, instance=scope["path"], data=data, headers=headers
         )
+        if status == 401 and "text/html" in Headers(scope=scope).get("accept", ""):
+            answer = HTMLResponse(_sign_in_page(), 401, headers)
         await answer(scope, receive, _with_headers(send))
 
     def refusal(

@@ -1,7 +1,6 @@
 """What the routes work with, handed over by ``app.main`` when it wires the service."""
 
 import threading
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Protocol
 
@@ -12,6 +11,7 @@ from app.api.registry import PolicyRegistry
 from app.errors import NotFound, NotReady
 from app.sim.ports import WorldHandle
 from app.store.engine import Store
+from jobs.supervisor import Supervisor
 
 
 class LiveWorld(Protocol):
@@ -53,9 +53,11 @@ class Services:
 
     store: Store
     """The database."""
+    supervisor: Supervisor
+    """Runs the jobs; is woken when one is posted."""
     policies: PolicyRegistry
     """Checkpoints as objects that decide."""
-    worlds: Mapping[str, LiveWorld]
+    worlds: dict[str, LiveWorld] = field(default_factory=dict)
     """The live worlds by id; empty until the kernels are warm."""
     readiness: Readiness = field(default_factory=Readiness)
     """Whether the service can decide."""
@@ -71,8 +73,7 @@ class Services:
         """
         found = self.worlds.get(world_id)
         if found is None:
-            if not self.worlds:
-                self.readiness.require()
+            self.readiness.require()
             raise NotFound("world", world_id, tuple(self.worlds))
         return found
 
