@@ -60,9 +60,7 @@ def create_app(settings: Settings) -> FastAPI:
             service.parts.stopping.set()
             await run_in_threadpool(service.close)
 
-    return build_app(
-        lifespan=lifespan, static=STATIC, token=settings.secret, version=VERSION
-    )
+    return build_app(lifespan=lifespan, static=STATIC, token=settings.secret, version=VERSION)
 
 
 class Service:

@@ -67,18 +67,16 @@ def load_settings(**overrides: object) -> Settings:
         if name.startswith(PREFIX) and name not in known:
             raise InvalidInput(name, os.environ[name], "is not a setting", known)
     try:
-        settings = Settings(**{k: v for k, v in overrides.items() if v is not None})  # type: ignore[arg-type]
+        return Settings(**{k: v for k, v in overrides.items() if v is not None})  # type: ignore[arg-type]
     except ValidationError as error:
         first = error.errors()[0]
         name = PREFIX + "_".join(str(part) for part in first["loc"]).upper()
         shown = "***" if name.endswith("TOKEN") else first["input"]
         raise InvalidInput(name, shown, f"is refused: {first['msg']}") from None
-    check_access(settings)
-    return settings
 
 
 def check_access(settings: Settings) -> None:
-    """Refuse settings that would open the service to strangers.
+    """Refuse to serve with settings that would open the service to strangers.
 
     Raises:
         InvalidInput: A token is missing or too short.

@@ -33,9 +33,7 @@ DESCRIPTION = (
 )
 
 
-def build_app(
-    *, lifespan: Lifespan, static: Path, token: str | None, version: str
-) -> FastAPI:
+def build_app(*, lifespan: Lifespan, static: Path, token: str | None, version: str) -> FastAPI:
     """Put the application together; its lifespan sets ``app.state.services``.
 
     Args:

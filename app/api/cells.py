@@ -18,4 +18,3 @@ async def list_all() -> CellList:
 async def get_one(name: str) -> CellPublic:
     """Return one cell."""
     return CellPublic.from_domain(load_cell(name))
-

@@ -43,7 +43,9 @@ def get_manifest(reference: str, services: ServicesDep) -> dict[str, Any]:
     "/{reference}/tensors",
     summary="Download a checkpoint's tensors",
     response_class=Response,
-    responses={200: {"content": {"application/octet-stream": {}}, "description": "safetensors"}},
+    responses={
+        200: {"content": {"application/octet-stream": {}}, "description": "safetensors"}
+    },
 )
 def get_tensors(reference: str, services: ServicesDep) -> Response:
     """Return the tensors as a safetensors file."""

@@ -7,14 +7,15 @@ the error's data; bad input always carries ``field``, ``value``, ``rule`` and ``
 import http
 import logging
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, get_args
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from pydantic import BaseModel
 from starlette.exceptions import HTTPException
+from starlette.routing import Match
 
 from app.errors import (
     CheckpointMismatch,
@@ -32,6 +33,7 @@ logger = logging.getLogger(__name__)
 MEDIA_TYPE = "application/problem+json"
 MAX_LISTED_ERRORS = 20
 MAX_VALUE_CHARACTERS = 200
+NOTHING = "nothing"
 STATUS: tuple[tuple[type[ServiceError], int, str], ...] = (
     (NotFound, 404, "not-found"),
     (InvalidInput, 422, "invalid-input"),
@@ -117,7 +119,7 @@ def service_problem(error: ServiceError, instance: str) -> ProblemResponse:
 def dotted(location: Sequence[str | int]) -> str:
     """Write a pydantic location as a path: ``("body", "robot", "q", 3)`` -> ``robot.q[3]``."""
     path = ""
-    for part in location[1:] if len(location) > 1 else location:
+    for part in location[1:] or location:
         if isinstance(part, int):
             path += f"[{part}]"
         else:
@@ -137,28 +139,56 @@ def shown(value: object) -> str:
     return text
 
 
-def validation_member(error: Mapping[str, Any], body: type[BaseModel] | None) -> dict[str, object]:
+def validation_member(
+    error: Mapping[str, Any], body: type[BaseModel] | None
+) -> dict[str, object]:
     """Say field, value, rule and choices of one validation error."""
-    location = tuple(error["loc"])
-    value = error.get("input")
-    rule = str(error["msg"])
+    kind, context = str(error["type"]), error.get("ctx", {})
+    location, value = tuple(error["loc"]), error.get("input")
+    rule = str(error["msg"]).replace("Input should be ", "must be ")
     choices: list[str] = []
-    expected = error.get("ctx", {}).get("expected")
-    if error["type"] in ("literal_error", "enum", "union_tag_invalid"):
-        text = expected or error["ctx"].get("expected_tags", "")
-        choices = [part.strip(" '") for part in text.replace(" or ", ", ").split(",")]
-    if error["type"] == "extra_forbidden":
+    if kind == "json_invalid":
+        rule = f"must be JSON: {context['error']}"
+        return _member("body", f"character {location[-1]}", rule)
+    if kind.startswith("union_tag_"):
+        return _tag_member(location, value, context)
+    if kind == "missing":
+        return _member(dotted(location), NOTHING, "is required")
+    if kind in ("model_attributes_type", "model_type", "dict_type"):
+        return _member(dotted(location), shown(value), "must be a JSON object")
+    if kind in ("literal_error", "enum"):
+        choices = _listed(context["expected"])
+        rule = "must be one of the choices"
+    elif kind == "extra_forbidden":
         rule, choices = "is not a known field", known_fields(body, location[1:-1])
-    if isinstance(value, float) and not math.isfinite(value):
+    elif kind in ("too_short", "too_long"):
+        side, bound = ("at least", "min") if kind == "too_short" else ("at most", "max")
+        rule = f"must have {side} {context[bound + '_length']} items"
+        rule += f", not {context['actual_length']}" if context.get("actual_length") else ""
+    elif isinstance(value, float) and not math.isfinite(value):
         rule = "must be a finite number"
-    if error["type"] == "json_invalid":
-        return {
-            "field": "body",
-            "value": f"character {location[-1]}",
-            "rule": f"must be JSON: {error['ctx']['error']}",
-            "choices": [],
-        }
-    return {"field": dotted(location), "value": shown(value), "rule": rule, "choices": choices}
+    return _member(dotted(location), shown(value), rule, choices)
+
+
+def _member(
+    field: str, value: str, rule: str, choices: Sequence[str] = ()
+) -> dict[str, object]:
+    return {"field": field, "value": value, "rule": rule, "choices": list(choices)}
+
+
+def _tag_member(
+    location: tuple[str | int, ...], value: object, context: Mapping[str, Any]
+) -> dict[str, object]:
+    """Say that the member which tells the kinds of a body apart is missing or unknown."""
+    field = dotted((*location, context["discriminator"].strip("'")))
+    if "tag" not in context:
+        return _member(field, NOTHING, "is required")
+    rule = "must be one of the choices"
+    return _member(field, shown(context["tag"]), rule, _listed(context["expected_tags"]))
+
+
+def _listed(expected: str) -> list[str]:
+    return [part.strip(" '") for part in expected.replace(" or ", ", ").split(",")]
 
 
 def known_fields(model: type[BaseModel] | None, path: Sequence[str | int]) -> list[str]:
@@ -167,23 +197,36 @@ def known_fields(model: type[BaseModel] | None, path: Sequence[str | int]) -> li
         if model is None or isinstance(part, int):
             continue
         field = model.model_fields.get(part)
-        model = _inner_model(field.annotation) if field else None
+        models = list(_models(field.annotation)) if field else []
+        model = models[0] if models else None
     return list(model.model_fields) if model else []
 
 
-def _inner_model(annotation: Any) -> type[BaseModel] | None:
+def _models(annotation: Any) -> Iterator[type[BaseModel]]:
+    """Yield the models named anywhere in an annotation."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    for argument in getattr(annotation, "__args__", ()):
-        found = _inner_model(argument)
-        if found:
-            return found
-    return None
+        yield annotation
+    for argument in get_args(annotation):
+        yield from _models(argument)
 
 
-def _body_model(request: Request) -> type[BaseModel] | None:
+def _without_tag(
+    error: dict[str, Any], variants: Sequence[type[BaseModel]]
+) -> tuple[dict[str, Any], type[BaseModel] | None]:
+    """Take the tag out of a location inside a tagged union; return the variant it names."""
+    location = error["loc"]
+    if len(variants) < 2 or len(location) < 2:
+        return error, variants[0] if variants else None
+    for variant in variants:
+        for field in variant.model_fields.values():
+            if location[1] in get_args(field.annotation):
+                return {**error, "loc": (location[0], *location[2:])}, variant
+    return error, None
+
+
+def _body_models(request: Request) -> list[type[BaseModel]]:
     field = getattr(request.scope.get("route"), "body_field", None)
-    return _inner_model(field.field_info.annotation) if field else None
+    return list(_models(field.field_info.annotation)) if field else []
 
 
 async def on_service_error(request: Request, error: Exception) -> ProblemResponse:
@@ -198,15 +241,16 @@ async def on_service_error(request: Request, error: Exception) -> ProblemRespons
 async def on_validation_error(request: Request, error: Exception) -> ProblemResponse:
     """Answer input that does not fit its schema."""
     assert isinstance(error, RequestValidationError)
-    body = _body_model(request)
-    found = [validation_member(one, body) for one in error.errors()[:MAX_LISTED_ERRORS]]
+    models = _body_models(request)
+    cut = [_without_tag(one, models) for one in error.errors()[:MAX_LISTED_ERRORS]]
+    found = [validation_member(one, model) for one, model in cut]
+    malformed = error.errors()[0]["type"] == "json_invalid"
     first = found[0]
-    detail = f"{first['field'] or 'body'} = {first['value']}: {first['rule']}"
-    status, kind = (400, "malformed-json") if first["field"] == "body" else (422, None)
+    given = "" if first["value"] == NOTHING else f" = {first['value']}"
     return problem(
-        status,
-        detail,
-        kind=kind or "invalid-input",
+        400 if malformed else 422,
+        f"{first['field']}{given} {first['rule']}",
+        kind="malformed-json" if malformed else "invalid-input",
         instance=request.url.path,
         data={**first, "errors": found},
     )
@@ -220,24 +264,34 @@ async def on_http_error(request: Request, error: Exception) -> ProblemResponse:
         405: f"{request.method} is not answered at {request.url.path}",
     }.get(error.status_code, str(error.detail))
     data: dict[str, object] = {}
+    headers = dict(error.headers or {})
     if error.status_code == 405:
-        allowed = (error.headers or {}).get("Allow", "")
-        data = {
-            "field": "method",
-            "value": request.method,
-            "rule": "must be one of the choices",
-            "choices": [one.strip() for one in allowed.split(",") if one.strip()],
-        }
+        choices = _methods_at(request)
+        headers["Allow"] = ", ".join(choices)
+        data = _member("method", request.method, "must be one of the choices", choices)
     return problem(
         error.status_code,
         detail,
         instance=request.url.path,
         data=data,
-        headers=error.headers,
+        headers=headers,
     )
 
 
-async def on_bug(request: Request, error: Exception) -> ProblemResponse:
+def _methods_at(request: Request) -> list[str]:
+    """List the methods that the path of a request answers, over all routes."""
+    routes = request.app.routes
+    return [
+        method
+        for method in ("GET", "POST", "PUT", "PATCH", "DELETE")
+        if any(
+            route.matches({**request.scope, "method": method})[0] is Match.FULL
+            for route in routes
+        )
+    ]
+
+
+async def on_bug(request: Request, _error: Exception) -> ProblemResponse:
     """Answer what nobody foresaw; the trace goes to the log, never to the caller."""
     return problem(
         500, "an unforeseen error; the server's log has the trace", instance=request.url.path

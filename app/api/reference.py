@@ -22,7 +22,8 @@ STYLE = """
   --line: light-dark(#dde3ea, #2c3440); --tint: light-dark(#f4f7fa, #171d25);
   --accent: light-dark(#1f5fbf, #7db2ff); }
 body { font: 15px/1.5 system-ui, sans-serif; max-width: 62rem; margin: 2rem auto;
-  padding: 0 1.2rem; background: light-dark(#fff, #10151c); color: light-dark(#1b222c, #e3e9f1) }
+  padding: 0 1.2rem; background: light-dark(#fff, #10151c);
+  color: light-dark(#1b222c, #e3e9f1) }
 h1 { font-size: 1.5rem; margin: 0 } h2 { font-size: 1.05rem; margin: 2.2rem 0 .5rem;
   text-transform: capitalize } p { margin: .3rem 0 } .faint { color: var(--faint) }
 details { border: 1px solid var(--line); border-radius: 8px; margin: .4rem 0 }

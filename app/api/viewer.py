@@ -62,7 +62,9 @@ async def page(
         "Vary": "Accept-Encoding",
     }
     if "gzip" in accept_encoding:
-        return Response(packed, media_type="text/html", headers=headers | {"Content-Encoding": "gzip"})
+        return Response(
+            packed, media_type="text/html", headers=headers | {"Content-Encoding": "gzip"}
+        )
     return Response(plain, media_type="text/html", headers=headers)
 
 

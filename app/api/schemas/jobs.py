@@ -41,7 +41,11 @@ class EvaluateJobCreate(Body):
     protocol: str = Field(max_length=64, description="name of the protocol")
     checkpoint: str = Field("pick", max_length=64, description="SHA-256 or alias")
     episodes: int | None = Field(
-        None, strict=True, ge=1, le=1_000_000, description="episodes; the protocol's own if null"
+        None,
+        strict=True,
+        ge=1,
+        le=1_000_000,
+        description="episodes; the protocol's own if null",
     )
     seed: Seed = Field(0, description="seed of the episodes")
 

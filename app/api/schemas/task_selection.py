@@ -80,8 +80,13 @@ class TaskSelectionRequest(Body):
             names = [f"people[{index}].q[{joint}]" for joint in range(len(human.JOINT_NAMES))]
             _check_limits(names, person.q, human.Q_MIN, human.Q_MAX)
         self._check_ids_are_unique()
-        return q, qd, people, tuple(
-            Candidate(id=one.id, position=np.array(one.position)) for one in self.candidates
+        return (
+            q,
+            qd,
+            people,
+            tuple(
+                Candidate(id=one.id, position=np.array(one.position)) for one in self.candidates
+            ),
         )
 
     def _known_cell(self) -> Cell:
@@ -116,9 +121,7 @@ class Outside(Answer):
     @classmethod
     def from_domain(cls, outside: OutsideField) -> Self:
         """Make it from the simulator's data."""
-        return cls(
-            field=outside.field, value=outside.value, low=outside.low, high=outside.high
-        )
+        return cls(field=outside.field, value=outside.value, low=outside.low, high=outside.high)
 
 
 class Action(Answer):
