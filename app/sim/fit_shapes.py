@@ -16,16 +16,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
-import trimesh
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.spatial import ConvexHull
 
-from app.sim.robot import LINK_NAMES, package_dir, urdf_path
+from app.sim.collision import collision_mesh
+from app.sim.ports import Vec
+from app.sim.robot import LINK_NAMES
 from app.sim.shapes import CAPSULE_FILE
-
-Vec = NDArray[np.float64]
 
 logger = logging.getLogger(__name__)
 
@@ -68,22 +65,6 @@ PLANS = (
     LinkPlan(link="wrist_2_link", parts=("wrist_2",)),
     LinkPlan(link="wrist_3_link", parts=("wrist_3",)),
 )
-
-
-def collision_mesh(link: str) -> trimesh.Trimesh:
-    """Load one link's collision mesh, in the link's frame [m]."""
-    model = pin.buildModelFromUrdf(str(urdf_path()))
-    geometry = pin.buildGeomFromUrdf(
-        model,
-        str(urdf_path()),
-        pin.GeometryType.COLLISION,
-        package_dirs=[str(package_dir())],
-    )
-    shape = geometry.geometryObjects[geometry.getGeometryId(f"{link}_0")]
-    mesh = trimesh.load(shape.meshPath, force="mesh")
-    frame = model.frames[model.getFrameId(link)]
-    mesh.apply_transform(frame.placement.inverse().act(shape.placement).homogeneous)
-    return mesh
 
 
 def segment_distance(points: Vec, p0: Vec, p1: Vec) -> Vec:
@@ -140,7 +121,9 @@ def fit_capsule(points: Vec, restarts: int = 3) -> tuple[Vec, Vec, float]:
         x = np.concatenate([centre - half * axis, centre + half * axis])
         for _ in range(restarts):
             x = minimize(
-                volume, x, method="Nelder-Mead",
+                volume,
+                x,
+                method="Nelder-Mead",
                 options={"maxiter": 2000, "xatol": 1e-6, "fatol": 1e-10, "adaptive": True},
             ).x
         best = x if volume(x) < volume(best) else best
@@ -150,9 +133,9 @@ def fit_capsule(points: Vec, restarts: int = 3) -> tuple[Vec, Vec, float]:
     return p0, p1, round(radius, DECIMALS)
 
 
-def fit_parts(triangles: Vec, cuts: Sequence[float], restarts: int) -> list[
-    tuple[Vec, Vec, float]
-]:
+def fit_parts(
+    triangles: Vec, cuts: Sequence[float], restarts: int
+) -> list[tuple[Vec, Vec, float]]:
     """Fit one capsule to each slab between the cuts."""
     edges = [-math.inf, *cuts, math.inf]
     return [
@@ -186,8 +169,13 @@ def main() -> None:
     for plan in PLANS:
         for name, (p0, p1, radius) in zip(plan.parts, fit_link(plan), strict=True):
             rows.append(
-                {"name": name, "link": plan.link, "p0": p0.tolist(), "p1": p1.tolist(),
-                 "radius": radius}
+                {
+                    "name": name,
+                    "link": plan.link,
+                    "p0": p0.tolist(),
+                    "p1": p1.tolist(),
+                    "radius": radius,
+                }
             )
     assert {row["link"] for row in rows} == set(LINK_NAMES)
     lines = ",\n  ".join(json.dumps(row) for row in rows)

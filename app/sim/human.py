@@ -301,6 +301,4 @@ def reach(
         swivel: Turn of the elbow outward [rad].
     """
     right, left = (position, None) if hand == "r" else (None, position)
-    return solve_hands(
-        q_start, pelvis_z, right=right, left=left, pelvis=pelvis, swivel=swivel
-    )
+    return solve_hands(q_start, pelvis_z, right=right, left=left, pelvis=pelvis, swivel=swivel)

@@ -61,12 +61,20 @@ def link_poses(q: Vec, rot: Vec, pos: Vec) -> None:
     c4, s4 = math.cos(q[4]), math.sin(q[4])
     for i in range(3):
         x, y = rot[4, i, 0], rot[4, i, 1]
-        rot[5, i, 0], rot[5, i, 1], rot[5, i, 2] = c4 * x + s4 * y, c4 * y - s4 * x, rot[4, i, 2]
+        rot[5, i, 0], rot[5, i, 1], rot[5, i, 2] = (
+            c4 * x + s4 * y,
+            c4 * y - s4 * x,
+            rot[4, i, 2],
+        )
     _along(rot[4], 0.0, WRIST_1_OFFSET, 0.0, pos[4], pos[5])
     c5, s5 = math.cos(q[5]), math.sin(q[5])
     for i in range(3):
         x, z = rot[5, i, 0], rot[5, i, 2]
-        rot[6, i, 0], rot[6, i, 1], rot[6, i, 2] = c5 * x - s5 * z, rot[5, i, 1], s5 * x + c5 * z
+        rot[6, i, 0], rot[6, i, 1], rot[6, i, 2] = (
+            c5 * x - s5 * z,
+            rot[5, i, 1],
+            s5 * x + c5 * z,
+        )
     _along(rot[5], 0.0, 0.0, WRIST_2_LENGTH, pos[5], pos[6])
 
 
