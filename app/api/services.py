@@ -25,6 +25,9 @@ class LiveWorld(Protocol):
     def viewer_port(self) -> int:
         """Loopback port of its 3D viewer."""
 
+    def stop(self) -> None:
+        """End world and viewer."""
+
 
 @dataclass(slots=True)
 class Readiness:
