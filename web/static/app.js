@@ -1,0 +1,126 @@
+// Tandem's one page: the live cell, what the critic thinks of it, and training.
+import { html, render, useMemo, useState } from "./vendor/htm-preact-standalone.module.js";
+import { Acting, useCheckpoints } from "./checkpoints.js";
+import { Controls } from "./controls.js";
+import { Icon, Logo } from "./icons.js";
+import { isActive, useJobs } from "./jobs.js";
+import { useCell, WORLD } from "./live.js";
+import { stationColours } from "./palette.js";
+import { SignIn } from "./signin.js";
+import { SmallPrint, Story } from "./story.js";
+import { Training } from "./training.js";
+import { Values } from "./values.js";
+
+const LINKS = {
+  connecting: ["Connecting", "quiet"],
+  warming: ["Warming up", "warn"],
+  live: ["Live", "good"],
+  lost: ["Disconnected", "bad"],
+};
+
+function App() {
+  const cell = useCell();
+  const { link, world } = cell;
+  const { jobs, error, refresh } = useJobs(link);
+  const active = (jobs ?? []).filter(isActive).length;
+  const checkpoints = useCheckpoints(link, `${world?.checkpoint}:${checkpointStamp(jobs)}`);
+  const [tab, setTab] = useState("cell");
+  const act = (sha256) => cell.send({ tag: "set-policy", checkpoint: sha256 });
+  if (link === "signin") return html`<${SignIn} />`;
+  return html`<div class="frame" data-link=${link}>
+    <header class="topbar">
+      <h1 class="brand"><${Logo} />Tandem</h1>
+      <span class="cell-title">${cell.cell?.title ?? ""}</span>
+      <span class="spacer"></span>
+      ${world && html`<${Acting} world=${world} checkpoints=${checkpoints} jobs=${jobs}
+        send=${cell.send} />`}
+      <${Link} link=${link} />
+      <a class="docs" href="/docs">API<${Icon} name="external" /></a>
+    </header>
+    ${cell.error && html`<p class="banner bad" role="alert"><${Icon} name="alert" />
+      <span>${cell.error.message}</span>
+      <button type="button" class="quiet-button" aria-label="Dismiss" onClick=${cell.dismiss}>
+        <${Icon} name="close" /></button></p>`}
+    ${link === "lost" && world && html`<p class="banner warn" role="alert">
+      <${Icon} name="alert" /><span>The server went away. Trying again …</span></p>`}
+    <main class="stage">
+      <${Scene} cell=${cell} />
+      <aside class="side">
+        <${Tabs} tab=${tab} onTab=${setTab} active=${active} />
+        <div class="panel" id="panel-cell" role="tabpanel" aria-labelledby="tab-cell"
+          hidden=${tab !== "cell"}><${Decision} cell=${cell} /></div>
+        <div class="panel" id="panel-training" role="tabpanel" aria-labelledby="tab-training"
+          hidden=${tab !== "training"}>
+          ${tab === "training" && html`<${Training} link=${link} jobs=${jobs} error=${error}
+            refresh=${refresh} acting=${world?.checkpoint} onAct=${act} />`}</div>
+      </aside>
+    </main>
+  </div>`;
+}
+
+function checkpointStamp(jobs) {
+  return (jobs ?? []).map((j) => `${j.state}${j.checkpoints ?? ""}`).join(",");
+}
+
+function Link({ link }) {
+  const [text, tone] = LINKS[link];
+  return html`<span class=${`link ${tone}`} role="status" data-role="link"><i></i>${text}</span>`;
+}
+
+function Tabs({ tab, onTab, active }) {
+  const tabs = [["cell", "Decision"], ["training", "Training"]];
+  const move = (event) => {
+    if (!["ArrowLeft", "ArrowRight"].includes(event.key)) return;
+    const next = tab === "cell" ? "training" : "cell";
+    onTab(next);
+    document.getElementById(`tab-${next}`).focus();
+  };
+  return html`<div class="tabs" role="tablist" aria-label="Panels" onKeyDown=${move}>
+    ${tabs.map(([id, label]) => html`<button key=${id} type="button" role="tab" id=${`tab-${id}`}
+      aria-selected=${String(tab === id)} aria-controls=${`panel-${id}`}
+      tabindex=${tab === id ? 0 : -1} onClick=${() => onTab(id)}>${label}
+      ${id === "training" && active > 0 && html`<b class="count"
+        aria-label=${`${active} running or waiting`}>${active}</b>`}</button>`)}
+  </div>`;
+}
+
+function useStations(cell) {
+  const stations = cell.cell?.stations ?? [];
+  return useMemo(() => {
+    const labels = new Map(stations.map((s) => [s.id, s.label ?? s.id]));
+    return { colourOf: stationColours(stations), labelOf: (id) => labels.get(id) ?? id };
+  }, [cell.cell]);
+}
+
+function Scene({ cell }) {
+  const { link, world, epoch, reason } = cell;
+  const names = useStations(cell);
+  return html`<section class="hero" aria-label="The cell">
+    <div class="viewer">
+      ${epoch > 0 && html`<iframe key=${epoch} src=${`/viewer/${WORLD}/`} data-role="viewer"
+        title="Live 3D view of robot and person"></iframe>`}
+      ${!world && html`<div class="veil" role="status">
+        <i class="spinner"></i>
+        <p><b>${link === "warming" ? "Warming up" : link === "lost"
+          ? "The server does not answer" : "Opening the cell"}</b></p>
+        <p class="faint">${link === "warming"
+          ? reason || "Compiling the simulator for this machine; only the first start takes this long."
+          : link === "lost" ? "Trying again every second." : ""}</p>
+      </div>`}
+    </div>
+    ${world && html`<${Controls} world=${world} cell=${cell.cell}
+      cases=${cell.cell?.cases ?? []} send=${cell.send} ...${names} />`}
+  </section>`;
+}
+
+function Decision({ cell }) {
+  const names = useStations(cell);
+  if (!cell.world) return html`<div class="skeleton tall" aria-busy="true"></div>`;
+  return html`<${Story} world=${cell.world} />
+    <${Values} world=${cell.world} cell=${cell.cell} history=${cell.history} ...${names} />
+    <${SmallPrint} world=${cell.world} />`;
+}
+
+const root = document.getElementById("app");
+root.replaceChildren();
+render(html`<${App} />`, root);

@@ -1,0 +1,31 @@
+// The training side: jobs with their curves, and the form that starts one.
+import { html, useEffect, useState } from "./vendor/htm-preact-standalone.module.js";
+import { Icon } from "./icons.js";
+import { JobList, isActive } from "./jobs.js";
+import { TrainForm, usePresets } from "./trainform.js";
+
+export function Training({ link, jobs, error, refresh, acting, onAct }) {
+  const presets = usePresets(link);
+  const [form, setForm] = useState(false);
+  const [open, setOpen] = useState(undefined);
+  useEffect(() => {
+    if (open === undefined && jobs?.length) setOpen((jobs.find(isActive) ?? jobs[0]).id);
+  }, [jobs]);
+  const started = (job) => {
+    setForm(false);
+    setOpen(job.id);
+    refresh();
+  };
+  return html`<div class="training">
+    ${form
+      ? html`<section class="card"><${TrainForm} ...${presets} onStarted=${started}
+          onClose=${() => setForm(false)} /></section>`
+      : jobs?.length > 0 && html`<button type="button" class="primary wide" data-action="new-job"
+          onClick=${() => setForm(true)}><${Icon} name="plus" />New training job</button>`}
+    <section class="card" aria-labelledby="jobs-title">
+      <header class="card-head"><h2 id="jobs-title">Jobs</h2></header>
+      <${JobList} jobs=${jobs} error=${error} open=${open ?? null} onOpen=${setOpen}
+        onChanged=${refresh} onAct=${onAct} acting=${acting} onNew=${() => setForm(true)} />
+    </section>
+  </div>`;
+}
