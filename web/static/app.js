@@ -101,16 +101,21 @@ function Scene({ cell }) {
         title="Live 3D view of robot and person"></iframe>`}
       ${!world && html`<div class="veil" role="status">
         <i class="spinner"></i>
-        <p><b>${link === "warming" ? "Warming up" : link === "lost"
-          ? "The server does not answer" : "Opening the cell"}</b></p>
-        <p class="faint">${link === "warming"
-          ? reason || "Compiling the simulator for this machine; only the first start takes this long."
-          : link === "lost" ? "Trying again every second." : ""}</p>
+        <p><b>${veil(link, reason)[0]}</b></p>
+        <p class="faint">${veil(link, reason)[1]}</p>
       </div>`}
     </div>
     ${world && html`<${Controls} world=${world} cell=${cell.cell}
       cases=${cell.cell?.cases ?? []} send=${cell.send} ...${names} />`}
   </section>`;
+}
+
+function veil(link, reason) {
+  if (link === "lost") return ["The server does not answer", "Trying again every second."];
+  if (link !== "warming") return ["Opening the cell", ""];
+  const doing = reason.replace(/^(warming up|starting):? */, "");
+  if (doing === reason && reason) return ["The server is not ready", reason];
+  return ["Warming up", `${doing || "starting"} …`];
 }
 
 function Decision({ cell }) {

@@ -20,14 +20,15 @@ export function Controls({ world, cell, cases, send, colourOf, labelOf }) {
       <div class="transport" role="group" aria-label="Clock">
         <button type="button" class="tool" onClick=${() =>
           send({ tag: world.paused ? "resume" : "pause" })} data-action="pause"
-          aria-pressed=${String(world.paused)}>
+          aria-label=${world.paused ? "Resume" : "Pause"}>
           <${Icon} name=${world.paused ? "play" : "pause"} filled=${world.paused} />
-          ${world.paused ? "Resume" : "Pause"}</button>
+          <span>${world.paused ? "Resume" : "Pause"}</span></button>
         <button type="button" class="tool" disabled=${!world.paused} data-action="step"
+          aria-label="Step"
           title=${world.paused ? "One decision, 0.05 s" : "Pause first"}
-          onClick=${() => send({ tag: "step" })}><${Icon} name="step" />Step</button>
-        <button type="button" class="tool" data-action="reset"
-          onClick=${() => send({ tag: "reset" })}><${Icon} name="reset" />Reset</button>
+          onClick=${() => send({ tag: "step" })}><${Icon} name="step" /><span>Step</span></button>
+        <button type="button" class="tool" data-action="reset" aria-label="Reset"
+          onClick=${() => send({ tag: "reset" })}><${Icon} name="reset" /><span>Reset</span></button>
       </div>
       ${world.mode === "manual" &&
       html`<p class="dock-hint">Drag the handles at the hips and hands in the scene.</p>`}

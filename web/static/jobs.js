@@ -14,7 +14,7 @@ const OUTCOMES = [
   { key: "collision", label: "collision", colour: "bad" },
   { key: "timeout", label: "time-out", colour: "warn" },
 ];
-const REWARD = [{ key: "reward", label: "reward", colour: "accent" }];
+const REWARD = [{ key: "reward", label: "mean reward of an episode", colour: "accent" }];
 
 /** All jobs, newest first, asked for again every two seconds while the server is there. */
 export function useJobs(link) {
@@ -54,8 +54,8 @@ export function JobList({ jobs, error, open, onOpen, onChanged, onAct, acting, o
   if (jobs.length === 0) {
     return html`<div class="empty">
       <p><b>No jobs yet.</b> A training job teaches a policy from nothing, here on this machine.</p>
-      <button type="button" class="primary" onClick=${onNew}><${Icon} name="plus" />
-        Start one</button></div>`;
+      ${onNew && html`<button type="button" class="primary" data-action="new-job" onClick=${onNew}>
+        <${Icon} name="plus" />Start one</button>`}</div>`;
   }
   return html`<ul class="jobs">
     ${jobs.map((job) => html`<${Job} key=${job.id} job=${job} open=${open === job.id}
@@ -120,16 +120,11 @@ function JobDetail({ job, onChanged, onAct, acting }) {
       : isActive(job) ? "Warming up; the first point comes after the first episodes."
         : "It ended before its first point."}</p>`}
     ${rows && rows.length > 0 && html`
-      <div class="plot-head"><span>Outcome of episodes</span>
-        <span class="legend">${OUTCOMES.map((o) => html`<span key=${o.key}>
-          <i class=${`dash ${o.colour}`}></i>${o.label}
-          <b>${format.percent(row?.[o.key])}</b></span>`)}</span></div>
+      <${Legend} lines=${OUTCOMES} row=${row} show=${(v) => format.percent(v)} />
       <${CurvePlot} rows=${rows} lines=${OUTCOMES} height=${168} unit="%" range=${[0, 1]}
         sync=${job.id} onHover=${setAt}
         label=${`Success, collision and time-out rate over ${rows.length} points`} />
-      <div class="plot-head"><span>Mean reward of an episode</span>
-        <span class="legend"><span><i class="dash accent"></i>
-          <b>${format.number(row?.reward)}</b></span></span></div>
+      <${Legend} lines=${REWARD} row=${row} show=${(v) => format.number(v)} />
       <${CurvePlot} rows=${rows} lines=${REWARD} height=${112} sync=${job.id} onHover=${setAt}
         label="Mean reward over environment steps" />
       <p class="plot-foot"><span data-points=${rows.length}>${rows.length} points</span>
@@ -144,6 +139,11 @@ function JobDetail({ job, onChanged, onAct, acting }) {
       ${isActive(job) && html`<${Cancel} job=${job} onChanged=${onChanged} />`}
     </div>
   </div>`;
+}
+
+function Legend({ lines, row, show }) {
+  return html`<p class="legend">${lines.map((l) => html`<span key=${l.key}>
+    <i class=${`dash ${l.colour}`}></i>${l.label}<b>${show(row?.[l.key])}</b></span>`)}</p>`;
 }
 
 function Speed({ job, row }) {

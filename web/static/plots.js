@@ -71,7 +71,7 @@ export function ValuePlot({ history, stamp, ids, colourOf, chosen, onHover }) {
 function valueOptions(theme, ids, colourOf, live) {
   return {
     legend: { show: false },
-    padding: [8, 10, 0, 0],
+    padding: [8, 14, 0, 0],
     cursor: { y: false, drag: { setScale: false, x: false, y: false }, points: { size: 5 } },
     scales: {
       x: { time: false, range: [-SPAN_S, 0] },
@@ -165,7 +165,7 @@ function curveOptions(theme, lines, unit, range, sync, hover) {
   const show = unit === "%" ? (v) => `${Math.round(v * 100)} %` : (v) => format.number(v);
   return {
     legend: { show: false },
-    padding: [8, 12, 0, 0],
+    padding: [8, 16, 0, 0],
     cursor: {
       y: false,
       sync: sync ? { key: sync } : undefined,

@@ -69,8 +69,8 @@ export function SmallPrint({ world }) {
   const outside = world.outside ?? [];
   return html`<section class="card small-print" aria-label="Counters and provenance">
     <dl class="tiles">
-      ${[["reached", "Goals reached"], ["contacts", "Contacts"], ["switches", "Changes of mind"]]
-        .map(([key, label]) => html`<div key=${key}>
+      ${[["reached", "Reached"], ["contacts", "Contacts"], ["timeouts", "Out of time"],
+        ["switches", "Changed mind"]].map(([key, label]) => html`<div key=${key}>
           <dt>${label}</dt><dd data-counter=${key}>${counters[key] ?? 0}</dd></div>`)}
     </dl>
     ${outside.length === 0
@@ -83,6 +83,9 @@ export function SmallPrint({ world }) {
               format.number(o.high)}`}</li>`)}
             ${outside.length > 4 && html`<li>and ${outside.length - 4} more</li>`}
           </ul></div></div>`}
+    ${world.checkpoint && html`<p class="provenance">Decided in
+      ${` ${format.number(world.elapsed_ms, 2)} ms by checkpoint `}
+      <code title=${world.checkpoint}>${format.short(world.checkpoint)}</code></p>`}
   </section>`;
 }
 

@@ -17,15 +17,16 @@ export function Training({ link, jobs, error, refresh, acting, onAct }) {
     refresh();
   };
   return html`<div class="training">
-    ${form
-      ? html`<section class="card"><${TrainForm} ...${presets} onStarted=${started}
-          onClose=${() => setForm(false)} /></section>`
-      : jobs?.length > 0 && html`<button type="button" class="primary wide" data-action="new-job"
-          onClick=${() => setForm(true)}><${Icon} name="plus" />New training job</button>`}
+    ${form && html`<section class="card"><${TrainForm} ...${presets} onStarted=${started}
+      onClose=${() => setForm(false)} /></section>`}
     <section class="card" aria-labelledby="jobs-title">
-      <header class="card-head"><h2 id="jobs-title">Jobs</h2></header>
+      <header class="card-head"><h2 id="jobs-title">Jobs</h2>
+        ${!form && jobs?.length > 0 && html`<button type="button" class="primary"
+          data-action="new-job" onClick=${() => setForm(true)}>
+          <${Icon} name="plus" />New training job</button>`}</header>
       <${JobList} jobs=${jobs} error=${error} open=${open ?? null} onOpen=${setOpen}
-        onChanged=${refresh} onAct=${onAct} acting=${acting} onNew=${() => setForm(true)} />
+        onChanged=${refresh} onAct=${onAct} acting=${acting}
+        onNew=${form ? null : () => setForm(true)} />
     </section>
   </div>`;
 }
