@@ -1,5 +1,5 @@
 // Tandem's one page: the live cell, what the critic thinks of it, and training.
-import { html, render, useMemo, useState } from "./vendor/htm-preact-standalone.module.js";
+import { html, render, useEffect, useMemo, useState } from "./vendor/htm-preact-standalone.module.js";
 import { Acting, useCheckpoints } from "./checkpoints.js";
 import { Controls } from "./controls.js";
 import { Icon, Logo } from "./icons.js";
@@ -25,6 +25,7 @@ function App() {
   const active = (jobs ?? []).filter(isActive).length;
   const checkpoints = useCheckpoints(link, `${world?.checkpoint}:${checkpointStamp(jobs)}`);
   const [tab, setTab] = useState("cell");
+  const roomy = useMedia("(min-width: 1760px)");
   const act = (sha256) => cell.send({ tag: "set-policy", checkpoint: sha256 });
   if (link === "signin") return html`<${SignIn} />`;
   return html`<div class="frame" data-link=${link}>
@@ -45,13 +46,13 @@ function App() {
       <${Icon} name="alert" /><span>The server went away. Trying again …</span></p>`}
     <main class="stage">
       <${Scene} cell=${cell} />
-      <aside class="side">
+      <aside class="side" aria-label="Decision and training">
         <${Tabs} tab=${tab} onTab=${setTab} active=${active} />
         <div class="panel" id="panel-cell" role="tabpanel" aria-labelledby="tab-cell"
-          hidden=${tab !== "cell"}><${Decision} cell=${cell} /></div>
+          data-hidden=${tab !== "cell"}><${Decision} cell=${cell} /></div>
         <div class="panel" id="panel-training" role="tabpanel" aria-labelledby="tab-training"
-          hidden=${tab !== "training"}>
-          ${tab === "training" && html`<${Training} link=${link} jobs=${jobs} error=${error}
+          data-hidden=${tab !== "training"}>
+          ${(roomy || tab === "training") && html`<${Training} link=${link} jobs=${jobs} error=${error}
             refresh=${refresh} acting=${world?.checkpoint} onAct=${act} />`}</div>
       </aside>
     </main>
@@ -60,6 +61,17 @@ function App() {
 
 function checkpointStamp(jobs) {
   return (jobs ?? []).map((j) => `${j.state}${j.checkpoints ?? ""}`).join(",");
+}
+
+function useMedia(condition) {
+  const query = useMemo(() => matchMedia(condition), [condition]);
+  const [matches, setMatches] = useState(query.matches);
+  useEffect(() => {
+    const update = () => setMatches(query.matches);
+    query.addEventListener("change", update);
+    return () => query.removeEventListener("change", update);
+  }, [query]);
+  return matches;
 }
 
 function Link({ link }) {

@@ -2,21 +2,33 @@
 
 export const SPAN_S = 20;
 
-/** Values of all candidates over the last `SPAN_S` seconds of world time. */
+/** A silence longer than this is drawn as a gap [s]. */
+const GAP_S = 2;
+
+/**
+ * Values of all candidates over the last `SPAN_S` seconds, by the clock on the wall: a paused
+ * cell still answers to a person who is dragged.
+ */
 export class History {
   constructor() {
     this.samples = [];
+    this.worldTime = 0;
   }
 
-  /** Add what a snapshot says; world time that jumps back starts afresh. */
-  add(world) {
+  /** Add what a snapshot says, which came at `t` [s]. */
+  add(world, t = performance.now() / 1000) {
     const last = this.samples.at(-1);
-    if (last && world.t_s < last.t) this.samples = [];
-    else if (last && world.t_s === last.t) this.samples.pop();
+    const broken = last && (t - last.t > GAP_S || world.t_s < this.worldTime);
+    if (broken) this.samples.push({ t: last.t + 1e-3, values: new Map(), chosen: null });
     const values = new Map(world.candidates.map((c) => [c.id, c.value]));
-    this.samples.push({ t: world.t_s, values, chosen: world.chosen });
-    const from = world.t_s - SPAN_S;
-    while (this.samples.length && this.samples[0].t < from) this.samples.shift();
+    this.samples.push({ t, values, chosen: world.chosen });
+    this.worldTime = world.t_s;
+    while (this.samples[0].t < t - SPAN_S) this.samples.shift();
+  }
+
+  /** Seconds since sample `i`, negative. */
+  age(i) {
+    return this.samples[i].t - this.samples.at(-1).t;
   }
 
   /** Ids seen in the window, in the order of `order`. */

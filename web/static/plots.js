@@ -108,9 +108,9 @@ function drawChosen(plot, { history, ids, colourOf }, theme) {
     if (!column || column[i] === null) continue;
     const x1 = plot.valToPos(x[i], "x", true);
     const y1 = plot.valToPos(column[i], "y", true);
-    if (chosen[i - 1] !== chosen[i]) {
+    if (chosen[i - 1] && chosen[i - 1] !== chosen[i]) {
       markSwitch(ctx, plot, x1, y1, colourOf(chosen[i]), theme, dpr);
-    } else if (column[i - 1] !== null) {
+    } else if (chosen[i - 1] && column[i - 1] !== null) {
       ctx.strokeStyle = colourOf(chosen[i]);
       ctx.lineWidth = 3 * dpr;
       ctx.setLineDash([]);

@@ -19,11 +19,12 @@ export function Story({ world }) {
   return html`<section class="story" aria-labelledby="story-title">
     <h2 id="story-title" class="sr">What the robot does and why</h2>
     <div class="story-top">
-      <span class=${`chip chip-${world.paused ? "quiet" : tone}`} data-status=${world.status}>
+      <span class=${`chip chip-${world.paused ? "quiet" : tone}`} data-status=${world.status}
+        role="status">
         ${world.paused ? "Paused" : text}</span>
       <span class="clock">${world.t_s.toFixed(1)} s</span>
     </div>
-    <p class="sentence" aria-live="polite">${world.message || "Waiting for the first decision."}</p>
+    <p class="sentence">${world.message || "Waiting for the first decision."}</p>
     <${Clearance} metres=${world.clearance_m} contact=${world.contact} />
   </section>`;
 }
@@ -73,10 +74,9 @@ export function SmallPrint({ world }) {
         ["switches", "Changed mind"]].map(([key, label]) => html`<div key=${key}>
           <dt>${label}</dt><dd data-counter=${key}>${counters[key] ?? 0}</dd></div>`)}
     </dl>
-    ${outside.length === 0
-      ? html`<p class="range good"><${Icon} name="check" />
-          The state lies inside what this policy was trained on.</p>`
-      : html`<div class="range warn"><${Icon} name="alert" /><div>
+    ${world.checkpoint && outside.length === 0 && html`<p class="range good"><${Icon} name="check" />
+          The state lies inside what this policy was trained on.</p>`}
+    ${outside.length > 0 && html`<div class="range warn"><${Icon} name="alert" /><div>
           Outside what this policy was trained on:
           <ul>${outside.slice(0, 4).map((o) => html`<li key=${o.field}><b>${fieldName(o.field)}</b>
             ${` ${format.number(o.value)}, trained ${format.number(o.low)} to ${

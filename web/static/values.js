@@ -7,12 +7,12 @@ import { ValuePlot } from "./plots.js";
 export function Values({ world, cell, history, colourOf, labelOf }) {
   const [at, setAt] = useState(null);
   const order = (cell?.stations ?? []).map((s) => s.id);
-  const stamp = `${world.tick}:${world.t_s}`;
+  const stamp = history.samples.at(-1)?.t ?? 0;
   const ids = useMemo(() => history.ids(order), [stamp, order.length]);
   const rows = [...world.candidates].sort((a, b) => order.indexOf(a.id) - order.indexOf(b.id));
   const chosen = rows.find((c) => c.id === world.chosen);
   const scale = useMemo(() => bounds(history, rows), [stamp]);
-  const past = at === null || at === undefined ? null : history.samples[at];
+  const past = history.samples[at] ?? null;
   return html`<section class="card" aria-labelledby="values-title">
     <header class="card-head">
       <h2 id="values-title">What each goal is worth now</h2>
@@ -34,11 +34,10 @@ export function Values({ world, cell, history, colourOf, labelOf }) {
       <span>last ${SPAN_S} s</span>
       <span class="readout" aria-hidden="true">
         ${past
-          ? html`<span class="faint">${format.number(past.t - world.t_s, 2)} s</span>
+          ? html`<span class="faint">${format.number(history.age(at), 2)} s</span>
               ${ids.filter((id) => Number.isFinite(past.values.get(id))).map((id) => html`<span
                 key=${id} class=${id === past.chosen ? "strong" : ""}>
-                <i class="swatch small" style=${{ background: colourOf(id) }}></i>
-                ${format.value(past.values.get(id))}</span>`)}`
+                <i class="swatch small" style=${{ background: colourOf(id) }}></i>${" "}${format.value(past.values.get(id))}</span>`)}`
           : html`<span class="faint"><i class="switch-mark"></i>switch of choice</span>`}
       </span>
     </div>
