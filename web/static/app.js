@@ -1,5 +1,5 @@
 // Tandem's one page: the live cell, what the critic thinks of it, and training.
-import { html, render, useEffect, useMemo, useState } from "./vendor/htm-preact-standalone.module.js";
+import { html, render, useEffect, useMemo, useRef, useState } from "./vendor/htm-preact-standalone.module.js";
 import { Acting, useCheckpoints } from "./checkpoints.js";
 import { Controls } from "./controls.js";
 import { Icon, Logo } from "./icons.js";
@@ -23,10 +23,17 @@ function App() {
   const { link, world } = cell;
   const { jobs, error, refresh } = useJobs(link);
   const active = (jobs ?? []).filter(isActive).length;
-  const checkpoints = useCheckpoints(link, `${world?.checkpoint}:${checkpointStamp(jobs)}`);
+  const checkpoints = useCheckpoints(link, `${world?.checkpoint}:${stamp(jobs)}`);
   const [tab, setTab] = useState("cell");
   const roomy = useMedia("(min-width: 1760px)");
-  const act = (sha256) => cell.send({ tag: "set-policy", checkpoint: sha256 });
+  const visited = useRef(false);
+  visited.current ||= roomy || tab === "training";
+  const acting = world?.checkpoint;
+  const training = useMemo(() => {
+    const act = (checkpoint) => cell.send({ tag: "set-policy", checkpoint });
+    return html`<${Training} link=${link} jobs=${jobs} error=${error} refresh=${refresh}
+      acting=${acting} onAct=${act} />`;
+  }, [link, jobs, error, acting]);
   if (link === "signin") return html`<${SignIn} />`;
   return html`<div class="frame" data-link=${link}>
     <header class="topbar">
@@ -52,15 +59,14 @@ function App() {
           data-hidden=${tab !== "cell"}><${Decision} cell=${cell} /></div>
         <div class="panel" id="panel-training" role="tabpanel" aria-labelledby="tab-training"
           data-hidden=${tab !== "training"}>
-          ${(roomy || tab === "training") && html`<${Training} link=${link} jobs=${jobs} error=${error}
-            refresh=${refresh} acting=${world?.checkpoint} onAct=${act} />`}</div>
+          ${visited.current && training}</div>
       </aside>
     </main>
   </div>`;
 }
 
-function checkpointStamp(jobs) {
-  return (jobs ?? []).map((j) => `${j.state}${j.checkpoints ?? ""}`).join(",");
+function stamp(jobs) {
+  return (jobs ?? []).map((j) => j.state).join(",");
 }
 
 function useMedia(condition) {

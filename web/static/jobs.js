@@ -1,5 +1,5 @@
 // Jobs: the list, and for the open one its learning curves, numbers and what can be done.
-import { html, useEffect, useRef, useState } from "./vendor/htm-preact-standalone.module.js";
+import { html, useCallback, useEffect, useRef, useState } from "./vendor/htm-preact-standalone.module.js";
 import { follow, get, post } from "./api.js";
 import * as format from "./format.js";
 import { Icon } from "./icons.js";
@@ -26,7 +26,7 @@ export function useJobs(link) {
     refresh.current = async () => {
       try {
         const page = await get("/v1/jobs?limit=50");
-        if (!over) setState({ jobs: page.items ?? page.jobs ?? page, error: null });
+        if (!over) setState({ jobs: page.items, error: null });
       } catch (error) {
         if (!over) setState((now) => ({ ...now, error }));
       }
@@ -38,7 +38,7 @@ export function useJobs(link) {
       clearInterval(timer);
     };
   }, [link]);
-  return { ...state, refresh: () => refresh.current() };
+  return { ...state, refresh: useCallback(() => refresh.current(), []) };
 }
 
 export function isActive(job) {

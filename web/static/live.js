@@ -44,7 +44,7 @@ async function watch(signal, history, setState, setEpoch) {
     await ready(signal, merge);
     try {
       const [world, cells] = await Promise.all([get(`/v1/worlds/${WORLD}`), get("/v1/cells")]);
-      const list = cells.cells ?? cells.items ?? cells;
+      const list = cells.items;
       const cell = list.find((c) => c.name === world.cell) ?? list[0] ?? null;
       history.add(world);
       merge({ world, cell, link: "live", reason: "" });

@@ -1,7 +1,7 @@
 // One colour per station, the same in the scene, the bars and the plot.
 
 const FALLBACK = [
-  "#2f6fde", "#e0662b", "#2a9d63", "#8a5cd6", "#c79a12", "#d04a8c", "#4b5563", "#1797a6",
+  "#2f6fde", "#e0662b", "#2a9d63", "#8a5cd6", "#c79a12", "#d04a8c", "#7b8794", "#1797a6",
 ];
 
 /** Colours of the candidates by id: the cell's own where it names them. */

@@ -78,9 +78,8 @@ export function SmallPrint({ world }) {
           The state lies inside what this policy was trained on.</p>`}
     ${outside.length > 0 && html`<div class="range warn"><${Icon} name="alert" /><div>
           Outside what this policy was trained on:
-          <ul>${outside.slice(0, 4).map((o) => html`<li key=${o.field}><b>${fieldName(o.field)}</b>
-            ${` ${format.number(o.value)}, trained ${format.number(o.low)} to ${
-              format.number(o.high)}`}</li>`)}
+          <ul>${outside.slice(0, 4).map(outsideText).map(([name, text]) => html`<li key=${name}>
+            <b>${name}</b> ${text}</li>`)}
             ${outside.length > 4 && html`<li>and ${outside.length - 4} more</li>`}
           </ul></div></div>`}
     ${world.checkpoint && html`<p class="provenance">Decided in
@@ -89,7 +88,19 @@ export function SmallPrint({ world }) {
   </section>`;
 }
 
-/** "people[0].q.pelvis_y" -> "person’s pelvis y". */
+/** "people[0].q.elbow_r" = 2.7 -> "person’s elbow r 155°, trained 0° to 149°". */
+export function outsideText({ field, value, low, high }) {
+  const show = inUnits(field);
+  return [fieldName(field), `${show(value)}, trained ${show(low)} to ${show(high)}`];
+}
+
+function inUnits(field) {
+  const speed = /\bqd\b/.test(field) ? "/s" : "";
+  if (/time_left/.test(field)) return (v) => `${format.number(v)} s`;
+  if (/pelvis_[xy]|position|tcp/.test(field)) return (v) => `${format.number(v)} m${speed}`;
+  return (v) => `${format.number(Math.round((v * 180) / Math.PI))}°${speed}`;
+}
+
 function fieldName(field) {
   return String(field)
     .replace(/^people\[\d+\]\.q(d?)[.[]?/, (_, d) => (d ? "person’s speed of " : "person’s "))

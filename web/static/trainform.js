@@ -10,7 +10,7 @@ export function usePresets(link) {
   useEffect(() => {
     if (link !== "live" || state.presets) return;
     get("/v1/presets").then(
-      (answer) => setState({ presets: answer.presets ?? answer.items ?? answer, error: null }),
+      (answer) => setState({ presets: answer.items, error: null }),
       (error) => setState({ presets: null, error }));
   }, [link]);
   return state;

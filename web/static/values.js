@@ -3,6 +3,7 @@ import { html, useMemo, useState } from "./vendor/htm-preact-standalone.module.j
 import * as format from "./format.js";
 import { SPAN_S } from "./history.js";
 import { ValuePlot } from "./plots.js";
+import { outsideText } from "./story.js";
 
 export function Values({ world, cell, history, colourOf, labelOf }) {
   const [at, setAt] = useState(null);
@@ -88,10 +89,7 @@ function explain({ id, value, reachable, outside = [] }, chosen, label) {
     } else if (chosen?.id === id) parts.push("The robot is going there.");
   } else parts.push(`No value for ${label} yet.`);
   if (reachable === false) parts.push("No posture with the tool pointing down reaches it.");
-  for (const o of outside) {
-    parts.push(`${o.field} = ${format.number(o.value)} lies outside the trained range ` +
-      `${format.number(o.low)} to ${format.number(o.high)}.`);
-  }
+  for (const o of outside) parts.push(`Outside training: ${outsideText(o).join(" ")}.`);
   return parts.join(" ");
 }
 
