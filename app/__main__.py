@@ -101,12 +101,11 @@ def parser() -> argparse.ArgumentParser:
 
 def run_serve(options: argparse.Namespace) -> int:
     """Start the service; the port is taken before anything else."""
-    from app.listening import address_of, listen
+    from app.listening import listen
 
     settings = load_settings(host=options.host, port=options.port, data=options.data)
     check_access(settings)
     sock = listen(settings.host, settings.port)
-    print(f"Tandem starts at {address_of(sock)} ...", flush=True)
     prepare_kernels(settings)
     from app.serving import serve
 

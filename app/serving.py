@@ -50,6 +50,7 @@ def serve(settings: Settings, sock: socket.socket, say: Say) -> None:
         Conflict: Another server uses the same database.
     """
     check_alone(settings)
+    say(f"Tandem starts: {address_of(sock)}")
     app = create_app(settings)
     told: list[str] = []
 
