@@ -91,5 +91,5 @@ def test_every_data_file_belongs_to_the_package() -> None:
     }
     for room in ROOMS:
         for path in (ROOT / room).rglob("*"):
-            if path.is_file() and path.suffix not in (".py", ".pyc"):
+            if path.is_file() and path.suffix != ".py" and path.parent.name != "__pycache__":
                 assert path in packaged, f"{path} is in no package-data pattern"

@@ -9,6 +9,7 @@ Raw meshes are surfaces: a body that lies wholly inside a link without crossing 
 found by ``hull`` only.
 """
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -100,13 +101,11 @@ def hull_of(mesh: trimesh.Trimesh) -> Any:
 
 def place_capsule(body: Any, p0: Vec, p1: Vec) -> None:
     """Move an ``fcl.Capsule``, which lies along its own z, between two points [m]."""
-    axis = p1 - p0
-    length = float(np.linalg.norm(axis))
-    z = axis / length if length > 1e-12 else np.array([0.0, 0.0, 1.0])
-    x = np.cross([0.0, 1.0, 0.0] if abs(z[1]) < 0.9 else [1.0, 0.0, 0.0], z)
-    x /= np.linalg.norm(x)
-    rotation = np.column_stack([x, np.cross(z, x), z])
-    body.setTransform(fcl.Transform(rotation, 0.5 * (p0 + p1)))
+    x, y, z = (p1 - p0 if p1[2] >= p0[2] else p0 - p1).tolist()
+    length = math.hypot(x, y, z)
+    # Quaternion (w, x, y, z) of the shortest turn from z to the axis.
+    turn = np.array((length + z, -y, x, 0.0) if length > 0.0 else (1.0, 0.0, 0.0, 0.0))
+    body.setTransform(fcl.Transform(turn / math.hypot(*turn), 0.5 * (p0 + p1)))
 
 
 def make_capsule(radius: float, p0: Vec, p1: Vec) -> Any:

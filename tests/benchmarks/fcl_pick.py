@@ -76,13 +76,10 @@ class FclPick:
         Returns:
             Observation, reward, and whether the episode ended.
         """
-        self._move(act)
+        self._q, self._qd = self._after(act)
         self._tick = (self._tick + 1) % len(self._people)
-        tcp = self._place()
-        to_person = _distance(self._all, self._crowd)
-        to_table = _distance(self._moving, self._table)
-        to_self = min(fcl.distance(self._bodies[a], self._bodies[b]) for a, b in self._pairs)
-        collision = min(to_person, to_table, to_self) <= 0.0
+        tcp = self.place(self._q)
+        collision = min(self.clearances()) <= 0.0
         distance = float(np.linalg.norm(tcp - self._target))
         reward = 0.5 * (self._distance - distance) - 1.0 * collision - 0.02
         self._distance = distance
@@ -93,7 +90,12 @@ class FclPick:
             self.reset()
         return obs, reward, ended
 
-    def _move(self, act: Array) -> None:
+    def clearances(self) -> tuple[float, float, float]:
+        """Return the distances to the person, to the table and to itself [m]."""
+        to_self = min(fcl.distance(self._bodies[a], self._bodies[b]) for a, b in self._pairs)
+        return _distance(self._all, self._crowd), _distance(self._moving, self._table), to_self
+
+    def _after(self, act: Array) -> tuple[Array, Array]:
         q_min, q_max, qd_max, acc = self._limits
         dt, q, qd = self._dt, self._q, self._qd
         step = acc * dt
@@ -106,10 +108,11 @@ class FclPick:
         low = np.maximum(np.maximum(-qd_max, -end_speed(q - q_min, -qd)), qd - step)
         wanted = np.append(act, 0.0) * qd_max
         after = np.clip(wanted, low, np.maximum(low, high))
-        self._q, self._qd = q + 0.5 * dt * (qd + after), after
+        return q + 0.5 * dt * (qd + after), after
 
-    def _place(self) -> Vec:
-        poses = self._robot.link_poses(self._q)
+    def place(self, q: Array) -> Vec:
+        """Move bodies to joints ``q`` [rad] and the person to its step; return the tcp [m]."""
+        poses = self._robot.link_poses(q)
         for body, pose in zip(self._bodies, poses[self._link] @ self._in_link, strict=True):
             body.setTransform(fcl.Transform(pose[:3, :3], pose[:3, 3]))
         for body, transform in zip(self._person, self._placed[self._tick], strict=True):
