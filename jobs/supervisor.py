@@ -15,7 +15,7 @@ from pathlib import Path
 from sqlalchemy.exc import SQLAlchemyError
 
 from app.errors import NotFound, StaleAttempt, StorageFull
-from app.store import attempts
+from app.store import attempts, endings
 from app.store.engine import Store
 from app.store.lock import ServerLock
 from app.store.migrate import migrate
@@ -92,7 +92,7 @@ class Supervisor:
         self._lock.acquire()
         try:
             migrate(self._store)
-            orphans = attempts.requeue_orphans(self._store)
+            orphans = endings.requeue_orphans(self._store)
             self._fill_reserve()
         except BaseException:
             self._lock.release()
@@ -158,7 +158,7 @@ class Supervisor:
         except OSError as error:
             reason = f"the worker could not be started: {error}"
             failures = self._patience.max_failures
-            attempts.crash(self._store, claim, reason, max_failures=failures)
+            endings.crash(self._store, claim, reason, max_failures=failures)
             return False
         self._workers[claim] = _Worker(handle=handle, heartbeat_seen=time.monotonic())
         return True
@@ -174,7 +174,7 @@ class Supervisor:
         """Make the row say how the attempt ended, if its worker has not."""
         failures = self._patience.max_failures
         try:
-            job = attempts.crash(self._store, claim, ended.reason, max_failures=failures)
+            job = endings.crash(self._store, claim, ended.reason, max_failures=failures)
         except StaleAttempt:
             return  # the worker settled it: the normal case
         logger.warning(
@@ -227,12 +227,12 @@ class Supervisor:
 
     def _give_back(self, claim: Claim) -> None:
         try:
-            attempts.give_back(self._store, claim)
+            endings.give_back(self._store, claim)
         except (StaleAttempt, NotFound):
             return  # the worker did so itself
 
     def _fill_reserve(self) -> None:
         try:
-            attempts.fill_reserve(self._store)
+            endings.fill_reserve(self._store)
         except StorageFull as error:
             logger.error("%s", error)

@@ -18,7 +18,7 @@ from typing import Any
 from sqlalchemy.exc import OperationalError
 
 from app.errors import ServiceError, StaleAttempt, StorageFull
-from app.store import attempts
+from app.store import attempts, endings, fences
 from app.store.engine import Store
 from app.store.jobs import get_job
 from app.store.records import Claim, JobRecord, NewCheckpoint, ResumeState
@@ -51,7 +51,7 @@ class Worker:
 
     def __init__(self, store: Store, claim: Claim) -> None:
         get_job(store, claim.job_id)
-        self.job: JobRecord = attempts.peek(store, claim)
+        self.job: JobRecord = fences.peek(store, claim)
         self.store = store
         self._claim = claim
         self._cancelled = threading.Event()
@@ -115,18 +115,18 @@ class Worker:
 
     def _settle(self, result: Mapping[str, Any] | None) -> None:
         if self._stop_seen and self._cancelled.is_set():
-            attempts.finish(self.store, self._claim, state="cancelled", result=result)
+            endings.finish(self.store, self._claim, state="cancelled", result=result)
             logger.info("cancelled")
         elif self._stop_seen and self._interrupted.is_set():
-            attempts.give_back(self.store, self._claim)
+            endings.give_back(self.store, self._claim)
             logger.info("interrupted: the job goes on with the next attempt")
         else:
-            attempts.finish(self.store, self._claim, result=result)
+            endings.finish(self.store, self._claim, result=result)
             logger.info("succeeded")
 
     def _fail(self, message: str) -> int:
         try:
-            attempts.fail(self.store, self._claim, message)
+            endings.fail(self.store, self._claim, message)
         except StaleAttempt as error:
             logger.warning("%s", error)
         except StorageFull as error:  # the supervisor reads this from the log's tail
@@ -139,7 +139,7 @@ class Worker:
         while not self._lost.wait(LOOK_S):
             due = time.monotonic() >= next_heartbeat
             try:
-                look = attempts.heartbeat if due else attempts.peek
+                look = attempts.heartbeat if due else fences.peek
                 job = look(self.store, self._claim)
             except StaleAttempt:
                 self._lost.set()

@@ -1,32 +1,27 @@
-"""What workers and the supervisor write: claims, progress, checkpoints, ends.
+"""What a running attempt writes: its claim, heartbeats, progress, checkpoints.
 
-Every write of an attempt goes through one fenced UPDATE
-(``WHERE id = ? AND attempt = ? AND state = 'running'``) in the same transaction: an attempt
-that lost its job, for whatever reason, can change nothing any more.
+Every write is fenced (``app.store.fences``). How attempts end is in ``app.store.endings``.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import Any, Literal
+from typing import Any
 
 import sqlalchemy as sa
 
-from app.errors import InvalidInput, StaleAttempt, StorageFull
+from app.errors import InvalidInput
 from app.store.checkpoints import drop_job_checkpoints, insert_checkpoint
 from app.store.engine import Store
 from app.store.events import append_event
+from app.store.fences import change_state, fenced_update
 from app.store.jobs import job_from_row, read_job
 from app.store.records import Claim, JobRecord, NewCheckpoint, ResumeState
-from app.store.tables import events, job_checkpoints, jobs, metrics, reserve, resume_states
+from app.store.tables import events, job_checkpoints, jobs, metrics, resume_states
 
 MAX_RESUME = 900 * 1024 * 1024
 """Largest resume state; SQLite holds blobs of at most 1e9 bytes [bytes]."""
-
-MAX_ERROR = 4000
-"""Longest error text kept with a job [characters]."""
-
-_RESERVE_BYTES = 128 * 1024
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,7 +61,7 @@ def claim_next(store: Store) -> tuple[Claim, JobRecord] | None:
             "step": max(step, 0),
         }
         data = {"attempt": attempt, "resumed_from_step": max(step, 0)}
-        _change_state(connection, job_id, "running", changes, data)
+        change_state(connection, job_id, "running", changes, data)
         return Claim(job_id=job_id, attempt=attempt), read_job(connection, job_id)
 
 
@@ -77,21 +72,8 @@ def heartbeat(store: Store, claim: Claim) -> JobRecord:
         StaleAttempt: The attempt no longer holds the job.
     """
     with store.writing() as connection:
-        _fenced(connection, claim, {"heartbeat_at": datetime.now(UTC)}, counts=False)
+        fenced_update(connection, claim, {"heartbeat_at": datetime.now(UTC)}, counts=False)
         return read_job(connection, claim.job_id)
-
-
-def peek(store: Store, claim: Claim) -> JobRecord:
-    """Return the job of a claim without writing.
-
-    Raises:
-        StaleAttempt: The attempt no longer holds the job.
-    """
-    with store.reading() as connection:
-        job = read_job(connection, claim.job_id)
-    if job.attempt != claim.attempt or job.state not in ("running", "cancelling"):
-        raise StaleAttempt(claim.job_id, claim.attempt)
-    return job
 
 
 def record_progress(
@@ -113,15 +95,18 @@ def record_progress(
 
     Raises:
         StaleAttempt: The attempt no longer holds the job.
-        InvalidInput: The step lies not above the one recorded last.
+        InvalidInput: The step lies not above the one recorded last, or a value is not finite.
         StorageFull: No room is left.
     """
+    for name, value in values.items():
+        if value is not None and not math.isfinite(value):
+            raise InvalidInput(name, value, "must be finite, or None where not defined")
     now = datetime.now(UTC)
     changes: dict[str, Any] = {"heartbeat_at": now, "step": step}
     if total_steps is not None:
         changes["total_steps"] = total_steps
     with store.writing() as connection:
-        event_id = _fenced(connection, claim, changes)
+        event_id = fenced_update(connection, claim, changes)
         mine = metrics.c.job_id == claim.job_id
         last = connection.execute(sa.select(sa.func.max(metrics.c.step)).where(mine)).scalar()
         if last is not None and step <= last:
@@ -159,7 +144,7 @@ def record_checkpoint(
         raise InvalidInput("resume.tensors", len(resume.tensors), rule)
     mine = job_checkpoints.c.job_id == claim.job_id
     with store.writing() as connection:
-        event_id = _fenced(connection, claim, {"heartbeat_at": datetime.now(UTC)})
+        event_id = fenced_update(connection, claim, {"heartbeat_at": datetime.now(UTC)})
         insert_checkpoint(connection, policy)
         connection.execute(
             sa.delete(job_checkpoints).where(mine, job_checkpoints.c.step == step)
@@ -182,101 +167,6 @@ def load_resume(store: Store, job_id: str) -> ResumeState | None:
     return ResumeState(step=row.step, manifest=row.manifest, tensors=row.tensors)
 
 
-def finish(
-    store: Store,
-    claim: Claim,
-    *,
-    state: Literal["succeeded", "cancelled"] = "succeeded",
-    result: Mapping[str, Any] | None = None,
-) -> None:
-    """End a job well, or as cancelled.
-
-    Raises:
-        StaleAttempt: The attempt no longer holds the job.
-        StorageFull: No room is left.
-    """
-    with store.writing() as connection:
-        _drop_resume(connection, claim)
-        changes = {"result": None if result is None else dict(result)}
-        _end(connection, claim, state, changes)
-
-
-def fail(store: Store, claim: Claim, error: str) -> None:
-    """End a job with an error that no further attempt would cure.
-
-    On a full database the room reserved for this moment is given up; the supervisor sets it
-    aside again when it next starts.
-
-    Raises:
-        StaleAttempt: The attempt no longer holds the job.
-        StorageFull: Not even that was enough.
-    """
-    changes = {"error": error[-MAX_ERROR:]}
-    try:
-        with store.writing() as connection:
-            _drop_resume(connection, claim)
-            _end(connection, claim, "failed", changes)
-    except StorageFull:
-        with store.writing() as connection:
-            connection.execute(sa.delete(reserve))
-            _drop_resume(connection, claim)
-            _end(connection, claim, "failed", changes)
-
-
-def crash(store: Store, claim: Claim, error: str, *, max_failures: int) -> JobRecord:
-    """Note that an attempt died; queue the job again unless that happened too often.
-
-    Args:
-        store: The database.
-        claim: The attempt that died.
-        error: Why, as far as known.
-        max_failures: The job fails with its crash number ``max_failures``.
-
-    Raises:
-        StaleAttempt: The attempt no longer holds the job.
-        StorageFull: No room is left.
-    """
-    job = peek(store, claim)
-    failures = job.failures + 1
-    if failures >= max_failures:
-        fail(store, claim, f"crashed {failures} times, the last time so: {error}")
-    else:
-        with store.writing() as connection:
-            changes = {"failures": failures, "error": error[-MAX_ERROR:]}
-            _fenced(connection, claim, {}, counts=False)
-            _requeue(connection, claim.job_id, changes)
-    with store.reading() as connection:
-        return read_job(connection, claim.job_id)
-
-
-def give_back(store: Store, claim: Claim) -> None:
-    """Queue a job again whose worker was stopped on purpose; not counted as a failure.
-
-    Raises:
-        StaleAttempt: The attempt no longer holds the job.
-    """
-    with store.writing() as connection:
-        _fenced(connection, claim, {}, counts=False)
-        _requeue(connection, claim.job_id, {})
-
-
-def requeue_orphans(store: Store) -> tuple[str, ...]:
-    """Queue again what an earlier server left running; call it while holding the data lock.
-
-    No process is looked for or killed: the raised attempt number fences off whatever may
-    still run. Nothing is counted as a failure. Jobs that were to be cancelled are cancelled.
-
-    Returns:
-        The ids of these jobs.
-    """
-    running = sa.select(jobs.c.id).where(jobs.c.state == "running").order_by(jobs.c.number)
-    with store.writing() as connection:
-        orphans = connection.execute(running).scalars().all()
-        for job_id in orphans:
-            _requeue(connection, job_id, {})
-    return tuple(orphans)
-
-
 def watch_running(store: Store) -> tuple[Watch, ...]:
     """Return the running jobs, with what a supervisor looks at."""
     query = sa.select(jobs).where(jobs.c.state == "running")
@@ -290,69 +180,6 @@ def watch_running(store: Store) -> tuple[Watch, ...]:
         )
         for job in found
     )
-
-
-def fill_reserve(store: Store) -> None:
-    """Set room aside, so that a job can be marked failed when the database is full."""
-    with store.writing() as connection:
-        if connection.execute(sa.select(reserve.c.id)).first() is None:
-            filler = bytes(_RESERVE_BYTES)
-            connection.execute(sa.insert(reserve).values(id=1, filler=filler))
-
-
-def _fenced(
-    connection: sa.Connection, claim: Claim, changes: Mapping[str, Any], *, counts: bool = True
-) -> int:
-    """Change the job's row if the claim still holds it; return the id for the event."""
-    statement = (
-        sa.update(jobs)
-        .where(jobs.c.id == claim.job_id, jobs.c.attempt == claim.attempt)
-        .where(jobs.c.state == "running")
-        .values(last_event=jobs.c.last_event + int(counts), **changes)
-        .returning(jobs.c.last_event)
-    )
-    event_id: int | None = connection.execute(statement).scalar()
-    if event_id is None:
-        raise StaleAttempt(claim.job_id, claim.attempt)
-    return event_id
-
-
-def _change_state(
-    connection: sa.Connection,
-    job_id: str,
-    state: str,
-    changes: Mapping[str, Any],
-    data: Mapping[str, Any],
-) -> None:
-    values = {**changes, "state": state, "last_event": jobs.c.last_event + 1}
-    statement = sa.update(jobs).where(jobs.c.id == job_id).values(values)
-    event_id = connection.execute(statement.returning(jobs.c.last_event)).scalar_one()
-    append_event(connection, job_id, event_id, "state", data={"state": state, **data})
-
-
-def _end(
-    connection: sa.Connection, claim: Claim, state: str, changes: Mapping[str, Any]
-) -> None:
-    _fenced(connection, claim, {}, counts=False)
-    now = datetime.now(UTC)
-    data: dict[str, Any] = {"attempt": claim.attempt}
-    if changes.get("error"):
-        data["error"] = changes["error"]
-    values = {"error": None, **changes, "finished_at": now, "heartbeat_at": now}
-    _change_state(connection, claim.job_id, state, values, data)
-
-
-def _requeue(connection: sa.Connection, job_id: str, changes: Mapping[str, Any]) -> None:
-    job = read_job(connection, job_id, for_update=True)
-    data: dict[str, Any] = {"attempt": job.attempt}
-    if job.cancel_requested:
-        values = {**changes, "finished_at": datetime.now(UTC)}
-        connection.execute(sa.delete(resume_states).where(resume_states.c.job_id == job_id))
-        _change_state(connection, job_id, "cancelled", values, data)
-        return
-    if changes.get("error"):
-        data["error"] = changes["error"]
-    _change_state(connection, job_id, "queued", changes, data)
 
 
 def _forget_beyond_resume(connection: sa.Connection, job_id: str) -> int:
@@ -377,10 +204,3 @@ def _replace_resume(connection: sa.Connection, job_id: str, resume: ResumeState)
         "tensors": resume.tensors,
     }
     connection.execute(sa.insert(resume_states).values(values))
-
-
-def _drop_resume(connection: sa.Connection, claim: Claim) -> None:
-    """Free the resume state first: on a full database this makes room for what follows."""
-    _fenced(connection, claim, {}, counts=False)
-    mine = resume_states.c.job_id == claim.job_id
-    connection.execute(sa.delete(resume_states).where(mine))

@@ -183,25 +183,20 @@ def _names(connection: sa.Connection) -> dict[str, tuple[str, ...]]:
 def _described(job_id: str | None = None) -> sa.Select[Any]:
     """Select checkpoints without tensors, each with the first job and step that made it."""
     link = job_checkpoints.alias()
-    first = sa.select(link.c.job_id).where(link.c.sha256 == checkpoints.c.sha256)
+    makes = [link.c.sha256 == checkpoints.c.sha256]
     if job_id is not None:
-        first = first.where(link.c.job_id == job_id)
-    first_job = first.order_by(link.c.step).limit(1).scalar_subquery()
-    maker = job_checkpoints.alias()
-    made = sa.and_(maker.c.sha256 == checkpoints.c.sha256, maker.c.job_id == first_job)
-    columns = (
+        makes.append(link.c.job_id == job_id)
+    first = sa.select(link.c.job_id).where(*makes).order_by(link.c.step, link.c.job_id)
+    query = sa.select(
         checkpoints.c.sha256,
         checkpoints.c.number,
         checkpoints.c.manifest,
         checkpoints.c.size,
         checkpoints.c.created_at,
-        maker.c.job_id,
-        sa.func.min(maker.c.step).label("step"),
+        first.limit(1).scalar_subquery().label("job_id"),
+        first.with_only_columns(link.c.step).limit(1).scalar_subquery().label("step"),
     )
-    query = sa.select(*columns).select_from(checkpoints.outerjoin(maker, made))
-    if job_id is not None:
-        query = query.where(maker.c.job_id == job_id)
-    return query.group_by(*columns[:-1])
+    return query if job_id is None else query.where(sa.exists().where(*makes))
 
 
 def _record(row: Any, names: dict[str, tuple[str, ...]]) -> CheckpointRecord:

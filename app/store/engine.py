@@ -108,7 +108,8 @@ def _checked_url(database_url: str) -> sa.URL:
         raise InvalidInput("database_url", database_url, rule) from error
     if url.get_backend_name() not in ("sqlite", "postgresql"):
         rule = "must name a database that Tandem knows"
-        raise InvalidInput("database_url", database_url, rule, ("sqlite", "postgresql"))
+        shown = url.render_as_string(hide_password=True)
+        raise InvalidInput("database_url", shown, rule, ("sqlite", "postgresql"))
     if url.get_backend_name() == "sqlite":
         if not url.database or url.database == ":memory:" or url.database.startswith("file:"):
             rule = "must name a file, because workers open it from their own processes"

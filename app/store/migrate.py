@@ -7,8 +7,9 @@ from alembic import command
 from alembic.config import Config
 from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
+from sqlalchemy.exc import DatabaseError
 
-from app.errors import Conflict
+from app.errors import Conflict, InvalidInput
 from app.store.engine import Store
 
 _SCRIPTS = Path(__file__).parent / "migrations"
@@ -19,20 +20,15 @@ def migrate(store: Store) -> None:
 
     Raises:
         Conflict: The database was written by a newer version of Tandem.
+        InvalidInput: It is no database, or cannot be reached.
         StorageFull: No room is left.
     """
-    config = _config()
-    known = {script.revision for script in ScriptDirectory.from_config(config).walk_revisions()}
-    with store.writing() as connection:
-        present = _revision(connection)
-        if present is not None and present not in known:
-            raise Conflict(
-                f"{store.shown_url} has schema {present}, which this version of Tandem does "
-                f"not know (it knows {', '.join(sorted(known))}): start the newer version, or "
-                "choose another TANDEM_DATA"
-            )
-        config.attributes["connection"] = connection
-        command.upgrade(config, "head")
+    try:
+        with store.writing() as connection:
+            _upgrade(connection, store.shown_url)
+    except DatabaseError as error:
+        rule = f"cannot be opened ({error.orig})"
+        raise InvalidInput("database_url", store.shown_url, rule) from error
 
 
 def check_schema(store: Store) -> None:
@@ -41,7 +37,7 @@ def check_schema(store: Store) -> None:
     Raises:
         Conflict: They are not.
     """
-    head = ScriptDirectory.from_config(_config()).get_current_head()
+    head = ScriptDirectory.from_config(alembic_config()).get_current_head()
     with store.reading() as connection:
         present = _revision(connection)
     if present != head:
@@ -51,10 +47,25 @@ def check_schema(store: Store) -> None:
         )
 
 
-def _config() -> Config:
+def alembic_config() -> Config:
+    """Return the configuration that knows where the scripts are."""
     config = Config()
     config.set_main_option("script_location", str(_SCRIPTS).replace("%", "%%"))
     return config
+
+
+def _upgrade(connection: sa.Connection, shown_url: str) -> None:
+    config = alembic_config()
+    known = {script.revision for script in ScriptDirectory.from_config(config).walk_revisions()}
+    present = _revision(connection)
+    if present is not None and present not in known:
+        raise Conflict(
+            f"{shown_url} has schema {present}, which this version of Tandem does not know (it "
+            f"knows {', '.join(sorted(known))}): start the newer version, or choose another "
+            "TANDEM_DATA"
+        )
+    config.attributes["connection"] = connection
+    command.upgrade(config, "head")
 
 
 def _revision(connection: sa.Connection) -> str | None:

@@ -1,22 +1,23 @@
 """A worker whose jobs count: deterministic, resumable, quick; the machinery around it is real.
 
-Overrides of a counting job: ``steps`` (to do), ``pace_s`` (pause per step), ``die_at`` (SIGKILL
-itself on reaching that step from below, once per attempt that starts below it), ``raise_at``
-(the same with an exception), ``deaf`` (never asks whether to stop), ``max_pages`` (size limit
-of the database in this process).
+Overrides of a counting job: ``steps`` (to do), ``hold_at`` (list: attempt n waits at the n-th
+of these steps until it is stopped or killed), ``deaf`` (it never asks whether to stop),
+``raise_at`` (raises an exception at that step), ``refuse_at`` (the same with an InvalidInput),
+``padding`` (extra bytes per checkpoint), ``max_pages`` (size limit of the database in this
+process).
 """
 
 import hashlib
-import os
-import signal
 import sys
 import time
+from collections.abc import Mapping
+from typing import Any
 
 from sqlalchemy import event
 
 from app.errors import InvalidInput
 from app.store.records import NewCheckpoint, ResumeState
-from jobs.run import main
+from jobs.attempt import main
 from jobs.worker import Worker
 
 GRID = 5
@@ -30,14 +31,14 @@ def count(worker: Worker) -> dict[str, int]:
     limit_database(worker, wish.get("max_pages"))
     resume = worker.resume()
     step, value = (0, 1 + worker.job.seed) if resume is None else load(resume)
-    while step < wish["steps"] and (wish.get("deaf") or not worker.should_stop()):
+    while step < wish["steps"] and not asked_to_stop(worker):
         step, value = step + 1, value * FACTOR % MODULUS
-        misbehave(worker, step)
-        time.sleep(wish.get("pace_s", 0.0))
+        misbehave(wish, step)
         if step % GRID == 0:
             worker.record_progress(step, {"value": value}, total_steps=wish["steps"])
         if step % CHECKPOINT_EVERY == 0:
             save(worker, step, value)
+        hold(worker, step)
     if step % CHECKPOINT_EVERY:
         save(worker, step, value)
     return {"value": value}
@@ -55,10 +56,18 @@ def save(worker: Worker, step: int, value: int) -> None:
     worker.record_checkpoint(step, policy, ResumeState(step=step, manifest={}, tensors=tensors))
 
 
-def misbehave(worker: Worker, step: int) -> None:
-    wish = worker.job.overrides
-    if step == wish.get("die_at"):
-        os.kill(os.getpid(), signal.SIGKILL)
+def asked_to_stop(worker: Worker) -> bool:
+    return not worker.job.overrides.get("deaf") and worker.should_stop()
+
+
+def hold(worker: Worker, step: int) -> None:
+    steps = worker.job.overrides.get("hold_at", [])
+    attempt = worker.job.attempt
+    while steps[attempt - 1 : attempt] == [step] and not asked_to_stop(worker):
+        time.sleep(0.01)
+
+
+def misbehave(wish: Mapping[str, Any], step: int) -> None:
     if step == wish.get("raise_at"):
         raise RuntimeError(f"deliberate crash at step {step}")
     if step == wish.get("refuse_at"):
@@ -76,4 +85,4 @@ def limit_database(worker: Worker, max_pages: int | None) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main(runners={"count": count}))
+    sys.exit(main({"count": count}))

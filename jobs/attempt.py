@@ -1,7 +1,6 @@
-"""The one entry point that runs a job: ``python -m jobs.run --job ID --attempt N``.
+"""One attempt of a job in a process of its own: arguments, settings, logging, end.
 
-Started by an executor, never by hand. Settings come from the environment; what to do comes
-from the job's row.
+``jobs.run`` is the entry point; it brings the runners.
 """
 
 import argparse
@@ -25,18 +24,13 @@ logger = logging.getLogger(__name__)
 NICENESS = 10
 """Training yields to the server and its live cell."""
 
-RUNNERS: Mapping[str, Runner] = {}
-"""How each kind of job is run."""
 
-
-def main(
-    arguments: Sequence[str] | None = None, runners: Mapping[str, Runner] = RUNNERS
-) -> int:
-    """Run one attempt of one job.
+def main(runners: Mapping[str, Runner], arguments: Sequence[str] | None = None) -> int:
+    """Run the attempt that the command line names.
 
     Args:
-        arguments: Command line; that of the process by default.
         runners: How each kind of job is run.
+        arguments: Command line; that of the process by default.
 
     Returns:
         The exit status: 0 when the job's row tells how it ended.
@@ -78,7 +72,3 @@ def _set_up_logging(job_id: str, attempt: int) -> None:
     handler.setFormatter(line)
     logging.basicConfig(level=logging.INFO, handlers=[handler])
     logging.getLogger("alembic").setLevel(logging.WARNING)
-
-
-if __name__ == "__main__":
-    sys.exit(main())
