@@ -88,7 +88,7 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("protocol")
     one.add_argument("--checkpoint", default="pick", help="alias, SHA-256 or .safetensors file")
     one.add_argument("--episodes", type=int, help="the protocol's own if not given")
-    one.add_argument("--seed", type=int, default=0)
+    one.add_argument("--seed", type=int, default=11)
     one.add_argument("--json", action="store_true")
     one = verb("bench", run_bench, "Run a benchmark of the checkout; more options go to it.")
     one.add_argument("name")
@@ -183,20 +183,20 @@ def log_progress(progress: "Progress") -> None:
 def run_evaluate(options: argparse.Namespace) -> int:
     """Run a protocol and print its rows."""
     settings = load_settings()
-    if options.episodes is not None and options.episodes < 1:
-        raise InvalidInput("--episodes", options.episodes, "must be at least 1")
     prepare_kernels(settings)
     import torch
 
-    from app.policies.evaluation.protocols import PROTOCOLS
+    from app.machine import describe
+    from app.policies.evaluation.protocols import PROTOCOLS, evaluate
 
     if options.protocol not in PROTOCOLS:
-        raise InvalidInput("PROTOCOL", options.protocol, "is unknown", tuple(PROTOCOLS))
+        raise NotFound("protocol", options.protocol, tuple(PROTOCOLS))
     checkpoint = find_checkpoint(options.checkpoint, settings)
     torch.set_num_threads(1)
-    result = PROTOCOLS[options.protocol](
-        checkpoint, episodes=options.episodes, seed=options.seed
+    result = evaluate(
+        options.protocol, checkpoint, episodes=options.episodes, seed=options.seed
     )
+    result = {**result, "machine": describe()}
     print(json.dumps(result) if options.json else table(result))
     return 0
 

@@ -8,11 +8,10 @@ from fastapi import APIRouter, Depends, Header, Query, Response
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
-from app.api.schemas.jobs import JobCreate, JobList, JobPublic, MetricsPublic
+from app.api.schemas.jobs import EvaluateJobCreate, JobCreate, JobList, JobPublic, MetricsPublic
 from app.api.services import Services, ServicesDep
 from app.store import events, jobs, metrics
 from app.store.records import JobEvent, JobRecord, JobState, MetricRow
-from jobs.spec import new_job
 
 POLL_S = 0.3
 """How often an open stream looks for news [s]."""
@@ -38,8 +37,9 @@ def create(
     ] = None,
 ) -> JobPublic:
     """Queue a training or an evaluation; ``Location`` says where to follow it."""
-    new = new_job(body.model_dump(mode="json", exclude_unset=True))
-    job = jobs.create_job(services.store, new, idempotency_key=idempotency_key)
+    if isinstance(body, EvaluateJobCreate):
+        services.policies.check(body.checkpoint)
+    job = jobs.create_job(services.store, body.to_domain(), idempotency_key=idempotency_key)
     services.supervisor.wake()
     response.headers["Location"] = f"/v1/jobs/{job.id}"
     return JobPublic.from_domain(job)

@@ -19,7 +19,7 @@ from app.store.checkpoints import (
     set_alias,
 )
 from app.store.engine import Store
-from app.store.records import NewCheckpoint
+from app.store.records import CheckpointRecord, NewCheckpoint
 
 MAX_POLICIES = 32
 DEFAULT_ALIAS = "pick"
@@ -86,16 +86,24 @@ class PolicyRegistry:
         policy = self.loaded(reference)
         if policy is not None:
             return policy
-        name = reference or DEFAULT_ALIAS
-        try:
-            record = get_checkpoint(self._store, name)
-            tensors = read_tensors(self._store, record.sha256)
-        except NotFound:
-            rule = "is no stored checkpoint: neither its SHA-256 nor an alias"
-            raise InvalidInput("checkpoint", name, rule, tuple(self._aliases)) from None
+        record = self.check(reference)
+        tensors = read_tensors(self._store, record.sha256)
         policy = self._build(record.manifest, tensors)
         with self._lock:
             self._policies[record.sha256] = policy
             while len(self._policies) > MAX_POLICIES:
                 self._policies.popitem(last=False)
         return policy
+
+    def check(self, reference: str | None) -> CheckpointRecord:
+        """Return what the store knows of a checkpoint that a caller named.
+
+        Raises:
+            InvalidInput: Nothing has that name.
+        """
+        name = reference or DEFAULT_ALIAS
+        try:
+            return get_checkpoint(self._store, name)
+        except NotFound:
+            rule = "is no stored checkpoint: neither its SHA-256 nor an alias"
+            raise InvalidInput("checkpoint", name, rule, tuple(self._aliases)) from None

@@ -107,6 +107,5 @@ def _check_names(body: CommandCreate, cell_name: str) -> None:
             if name not in stations:
                 rule = "is no station of this cell"
                 raise InvalidInput(f"ids[{index}]", name, rule, stations)
-    cases = tuple(case.id for case in CASES)
-    if isinstance(body, StartCase) and body.id not in cases:
-        raise InvalidInput("id", body.id, "is no case study of this cell", cases)
+    if isinstance(body, StartCase) and body.id not in CASES:
+        raise InvalidInput("id", body.id, "is no case study of this cell", tuple(CASES))

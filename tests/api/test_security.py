@@ -14,14 +14,14 @@ OPEN = {"/session"}
 
 @pytest.fixture(scope="module")
 def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
-    settings = Settings(
-        host="0.0.0.0", data=tmp_path_factory.mktemp("guarded"), token=TOKEN
-    )
+    settings = Settings(host="0.0.0.0", data=tmp_path_factory.mktemp("guarded"), token=TOKEN)
     with TestClient(create_app(settings), base_url="http://robot.example") as one:
         yield one
 
 
-@pytest.mark.parametrize("host", ["evil.example", "127.0.0.1.evil.example", "10.0.0.1:8000", ""])
+@pytest.mark.parametrize(
+    "host", ["evil.example", "127.0.0.1.evil.example", "10.0.0.1:8000", ""]
+)
 def test_foreign_host_is_refused_on_loopback(client: TestClient, host: str) -> None:
     answer = client.get("/healthz", headers={"Host": host})
     assert answer.status_code == 421
@@ -54,8 +54,11 @@ def test_own_origin_is_answered(client: TestClient) -> None:
 def test_foreign_page_gets_no_viewer_socket(
     client: TestClient, headers: dict[str, str]
 ) -> None:
-    with pytest.raises(WebSocketDisconnect), client.websocket_connect(
-        "/viewer/main/", subprotocols=["viser-v1.1.1"], headers=headers
+    with (
+        pytest.raises(WebSocketDisconnect),
+        client.websocket_connect(
+            "/viewer/main/", subprotocols=["viser-v1.1.1"], headers=headers
+        ),
     ):
         pass
 

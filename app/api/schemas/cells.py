@@ -32,7 +32,8 @@ class CellPublic(Answer):
     def from_domain(cls, cell: Cell) -> Self:
         """Make it from the cell's data."""
         cases = [
-            CasePublic(id=case.id, text=case.text, goals=list(case.goals)) for case in CASES
+            CasePublic(id=case.id, text=case.text, goals=list(case.goals))
+            for case in CASES.values()
         ]
         return cls(**cell.model_dump(mode="json"), cases=cases)
 

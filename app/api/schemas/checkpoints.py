@@ -26,14 +26,14 @@ class CheckpointPublic(Answer):
     @classmethod
     def from_domain(cls, record: CheckpointRecord) -> Self:
         """Make it from the store's record."""
-        preset = record.manifest.get("preset")
+        preset = record.manifest.get("preset", {})
         return cls(
             sha256=record.sha256,
             number=record.number,
             aliases=list(record.aliases),
             job_id=record.job_id,
             step=record.step,
-            preset=preset if isinstance(preset, str) else None,
+            preset=preset.get("name") if isinstance(preset, dict) else None,
             size=record.size,
             created_at=record.created_at,
             tensors=f"/v1/checkpoints/{record.sha256}/tensors",

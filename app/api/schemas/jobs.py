@@ -1,6 +1,5 @@
 """Jobs: what is posted, what is shown."""
 
-import math
 from datetime import datetime
 from typing import Annotated, Any, Literal, Self
 
@@ -8,7 +7,9 @@ from pydantic import Field
 
 from app.api.schemas.numbers import Answer, Body
 from app.errors import InvalidInput
-from app.store.records import JobRecord, MetricRow
+from app.policies.presets import PRESETS
+from app.store.records import JobRecord, MetricRow, NewJob
+from jobs.spec import new_job
 
 Seed = Annotated[int, Field(strict=True, ge=0, le=2**32 - 1)]
 
@@ -23,15 +24,15 @@ class TrainJobCreate(Body):
         default_factory=dict, description="fields of the preset with other values"
     )
 
-    def check(self) -> None:
-        """Check what a schema cannot.
+    def to_domain(self) -> NewJob:
+        """Check what a schema cannot and return the job.
 
         Raises:
-            InvalidInput: A number that is not finite.
+            InvalidInput: An unknown preset, an unknown override, one outside its bounds.
         """
-        for name, value in self.overrides.items():
-            if isinstance(value, float) and not math.isfinite(value):
-                raise InvalidInput(f"overrides.{name}", value, "must be a finite number")
+        if self.preset not in PRESETS:
+            raise InvalidInput("preset", self.preset, "is no preset", tuple(PRESETS))
+        return new_job(self.model_dump(mode="json", exclude_unset=True))
 
 
 class EvaluateJobCreate(Body):
@@ -48,6 +49,15 @@ class EvaluateJobCreate(Body):
         description="episodes; the protocol's own if null",
     )
     seed: Seed = Field(0, description="seed of the episodes")
+
+    def to_domain(self) -> NewJob:
+        """Check what a schema cannot and return the job.
+
+        Raises:
+            InvalidInput: An unknown protocol.
+        """
+        given = self.model_dump(mode="json", exclude_unset=True)
+        return new_job({**given, "checkpoint": self.checkpoint})
 
 
 JobCreate = Annotated[TrainJobCreate | EvaluateJobCreate, Field(discriminator="kind")]

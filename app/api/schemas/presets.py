@@ -1,6 +1,6 @@
 """Presets as the service shows them: what a form needs to ask for their fields."""
 
-from typing import Any, Self
+from typing import Self
 
 from pydantic import Field
 
@@ -12,19 +12,19 @@ class PresetField(Answer):
     """One number of a preset that an override may change."""
 
     name: str
-    type: str
-    default: Any
-    minimum: float | None
-    maximum: float | None
-    unit: str | None
-    help: str
+    type: str = Field(description="int or float")
+    default: int | float
+    minimum: int | float
+    maximum: int | float
+    unit: str = Field(description="empty for a plain number")
+    help: str = Field(description="what it does, for people")
 
 
 class PresetPublic(Answer):
     """One preset."""
 
     name: str
-    title: str = Field(description="what it is, for people")
+    cell: str = Field(description="work cell trained in")
     fields: list[PresetField]
 
     @classmethod
@@ -34,7 +34,7 @@ class PresetPublic(Answer):
             PresetField(**{key: getattr(one, key) for key in PresetField.model_fields})
             for one in fields(name)
         ]
-        return cls(name=name, title=PRESETS[name].title, fields=listed)
+        return cls(name=name, cell=PRESETS[name].cell, fields=listed)
 
 
 class PresetList(Answer):

@@ -50,7 +50,7 @@ class TaskSelectionRequest(Body):
     stamp: Stamp = Field(None, description="your time of the state; comes back unchanged")
     robot: RobotState
     people: list[PersonState] = Field(
-        min_length=1, max_length=1, description="the people in the cell; exactly one for now"
+        max_length=1, description="the people in the cell; one at most for now"
     )
     candidates: list[CandidateState] = Field(
         min_length=1, max_length=MAX_CANDIDATES, description="what may be chosen"
@@ -58,7 +58,7 @@ class TaskSelectionRequest(Body):
     previous: str | None = Field(
         None, max_length=128, description="id chosen last, for hysteresis; null chooses afresh"
     )
-    time_left_s: Annotated[float, Field(gt=0.0, le=3600.0)] = Field(
+    time_left_s: Annotated[float, Field(ge=0.0, le=60.0)] = Field(
         10.0, description="time left to reach the target [s]"
     )
     checkpoint: str | None = Field(

@@ -92,8 +92,8 @@ class WorldPublic(WorldLight):
     tcp: list[float] = Field(description="tool centre point [m]")
     viewer: str = Field(description="where its 3D scene is")
     state: TaskSelectionRequest | None = Field(
-        description="post it to /v1/task-selection as it is: same choice, same values; "
-        "null while there is nothing to choose"
+        description="post it to /v1/task-selection as it is: while the status is `moving`, "
+        "same choice and values; null while there is nothing to choose"
     )
 
     @classmethod
@@ -124,7 +124,7 @@ class WorldList(Answer):
 
 def decision_input(snapshot: WorldSnapshot) -> TaskSelectionRequest | None:
     """Return the request that repeats the snapshot's decision; None with nothing to choose."""
-    if not snapshot.candidates or snapshot.time_left_s <= 0.0:
+    if not snapshot.candidates:
         return None
     return TaskSelectionRequest(
         cell=snapshot.cell,
@@ -137,7 +137,7 @@ def decision_input(snapshot: WorldSnapshot) -> TaskSelectionRequest | None:
             for one in snapshot.candidates
         ],
         previous=snapshot.previous,
-        time_left_s=snapshot.time_left_s,
+        time_left_s=max(snapshot.time_left_s, 0.0),
         checkpoint=snapshot.checkpoint,
     )
 
