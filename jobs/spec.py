@@ -1,8 +1,6 @@
 """Job specs: what may be posted, checked in full before anything is queued.
 
     {"kind": "train", "preset": "pick-td3", "seed": 1, "overrides": {"total_steps": 20000}}
-    {"kind": "evaluate", "protocol": "pick-single", "episodes": 1000, "seed": 11,
-     "checkpoint": "pick"}
 
 An unknown field is an error. The body is stored unchanged with the job.
 """
@@ -11,8 +9,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from app.policies.protocols import PROTOCOLS
-
 from app.errors import InvalidInput
 from app.policies import presets
 from app.store.records import NewJob
@@ -20,12 +16,8 @@ from app.store.records import NewJob
 MAX_SEED = 2**32 - 1
 """Greatest seed; every random stream accepts it."""
 
-MAX_EPISODES = 1_000_000
-"""Longest evaluation."""
-
 _FIELDS = {
     "train": ("kind", "preset", "seed", "overrides"),
-    "evaluate": ("kind", "protocol", "episodes", "seed", "checkpoint"),
 }
 
 
@@ -39,23 +31,11 @@ class TrainSpec:
     """Seed of every random stream."""
     overrides: Mapping[str, Any]
     """Changes to the preset's fields."""
+    total_steps: int
+    """Environment steps it will take."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class EvaluateSpec:
-    """Measure a checkpoint by a protocol."""
-
-    protocol: str
-    """Name of the protocol."""
-    checkpoint: str
-    """SHA-256 or alias of the checkpoint."""
-    episodes: int | None
-    """Number of episodes; None for the protocol's own."""
-    seed: int
-    """Seed of every random stream."""
-
-
-def parse_spec(body: Mapping[str, Any]) -> TrainSpec | EvaluateSpec:
+def parse_spec(body: Mapping[str, Any]) -> TrainSpec:
     """Check a posted body.
 
     Args:
@@ -66,13 +46,13 @@ def parse_spec(body: Mapping[str, Any]) -> TrainSpec | EvaluateSpec:
         NotFound: There is no such preset.
     """
     kind = body.get("kind")
-    if kind not in _FIELDS:
+    if not isinstance(kind, str) or kind not in _FIELDS:
         raise InvalidInput("kind", kind, "must be a kind of job", tuple(_FIELDS))
     for name, value in body.items():
         if name not in _FIELDS[kind]:
             rule = f"is no field of a {kind} job"
             raise InvalidInput(name, value, rule, _FIELDS[kind])
-    return _parse_train(body) if kind == "train" else _parse_evaluate(body)
+    return _parse_train(body)
 
 
 def new_job(body: Mapping[str, Any]) -> NewJob:
@@ -83,14 +63,13 @@ def new_job(body: Mapping[str, Any]) -> NewJob:
         NotFound: There is no such preset.
     """
     spec = parse_spec(body)
-    if isinstance(spec, EvaluateSpec):
-        return NewJob(kind="evaluate", spec=body, seed=spec.seed, total_steps=spec.episodes)
     return NewJob(
         kind="train",
         spec=body,
         preset=spec.preset,
         seed=spec.seed,
         overrides=spec.overrides,
+        total_steps=spec.total_steps,
     )
 
 
@@ -99,22 +78,12 @@ def _parse_train(body: Mapping[str, Any]) -> TrainSpec:
     if not isinstance(overrides, Mapping):
         raise InvalidInput("overrides", overrides, "must be an object of preset fields")
     preset = _text(body, "preset", tuple(presets.PRESETS))
-    presets.resolve(preset, dict(overrides))
-    return TrainSpec(preset=preset, seed=_seed(body), overrides=overrides)
-
-
-def _parse_evaluate(body: Mapping[str, Any]) -> EvaluateSpec:
-    protocol = _text(body, "protocol", tuple(PROTOCOLS))
-    if protocol not in PROTOCOLS:
-        raise InvalidInput("protocol", protocol, "must name a protocol", tuple(PROTOCOLS))
-    episodes = body.get("episodes")
-    if episodes is not None:
-        _check_integer("episodes", episodes, 1, MAX_EPISODES)
-    return EvaluateSpec(
-        protocol=protocol,
-        checkpoint=_text(body, "checkpoint"),
-        episodes=episodes,
+    resolved = presets.resolve(preset, overrides)
+    return TrainSpec(
+        preset=preset,
         seed=_seed(body),
+        overrides=overrides,
+        total_steps=resolved.total_steps,
     )
 
 

@@ -128,7 +128,7 @@ def record_checkpoint(
     Args:
         store: The database.
         claim: The attempt that writes.
-        step: Steps done.
+        step: Steps done; a checkpoint of the same step is replaced.
         policy: The policy as it acts.
         resume: Replaces the job's earlier resume state.
 
@@ -142,13 +142,10 @@ def record_checkpoint(
     if resume is not None and len(resume.tensors) > MAX_RESUME:
         rule = f"bytes exceed the limit of {MAX_RESUME} bytes"
         raise InvalidInput("resume.tensors", len(resume.tensors), rule)
-    mine = job_checkpoints.c.job_id == claim.job_id
     with store.writing() as connection:
         event_id = fenced_update(connection, claim, {"heartbeat_at": datetime.now(UTC)})
+        drop_job_checkpoints(connection, claim.job_id, beyond=step - 1)
         insert_checkpoint(connection, policy)
-        connection.execute(
-            sa.delete(job_checkpoints).where(mine, job_checkpoints.c.step == step)
-        )
         link = {"job_id": claim.job_id, "step": step, "sha256": policy.sha256}
         connection.execute(sa.insert(job_checkpoints).values(link))
         if resume is not None:

@@ -139,6 +139,17 @@ def test_resume_state_is_replaced_by_each_checkpoint(store: Store, claim: Claim)
     assert attempts.load_resume(store, claim.job_id) == resume(20, b"second")
 
 
+def test_checkpoint_of_the_same_step_replaces_the_earlier(store: Store, claim: Claim) -> None:
+    attempts.record_checkpoint(store, claim, 10, policy(b"a"), resume(10))
+    attempts.record_checkpoint(store, claim, 20, policy(b"b"), resume(20))
+    attempts.record_checkpoint(store, claim, 20, policy(b"c"), resume(20))
+    kept = checkpoints.list_checkpoints(store).items
+    assert [(c.step, c.sha256) for c in kept] == [
+        (20, policy(b"c").sha256),
+        (10, policy(b"a").sha256),
+    ]
+
+
 def test_resume_state_goes_when_the_job_ends(store: Store, claim: Claim) -> None:
     attempts.record_checkpoint(store, claim, 10, policy(), resume(10))
     endings.finish(store, claim, result={"success": 0.9})
