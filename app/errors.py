@@ -6,6 +6,7 @@
     ├── Conflict             the request contradicts the present state
     │   └── StaleAttempt     a worker writes about a job that is no longer its own
     ├── StorageFull          the database or the disk has no room left
+    ├── NotReady             the service cannot answer yet, or not now
     ├── SimulationError      the simulator met a state it must never meet
     └── CheckpointMismatch   a checkpoint does not fit what it is asked to do
 
@@ -81,6 +82,10 @@ class InvalidInput(ServiceError):
 
 class Conflict(ServiceError):
     """The request contradicts the present state."""
+
+
+class NotReady(ServiceError):
+    """The service cannot answer yet, or not now; asking again later may help."""
 
 
 class StaleAttempt(Conflict):
