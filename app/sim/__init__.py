@@ -1,1 +1,1 @@
-"""The world: kinematics, human, distances, cells and scenarios. No torch, no web, no database."""
+"""The world: kinematics, human, distances, cells, scenarios. No torch, no web, no database."""

@@ -1,0 +1,38 @@
+# The service as an image: same lock as a checkout, CPU build of torch, kernels compiled.
+#
+#   docker build -t tandem .
+#   docker run -p 8000:8000 -e TANDEM_TOKEN="$(openssl rand -hex 16)" -v tandem:/data tandem
+#
+# Inside a container the server must listen on all addresses to be reached, and there it
+# refuses to start without TANDEM_TOKEN. Database, checkpoints and compiled kernels live in
+# the volume /data.
+
+FROM python:3.12-slim AS build
+RUN apt-get update -qq \
+    && apt-get install -y -qq --no-install-recommends make \
+    && rm -rf /var/lib/apt/lists/*
+WORKDIR /srv/tandem
+COPY Makefile requirements.lock ./
+ARG TORCH_INDEX=https://download.pytorch.org/whl/cpu
+RUN make .venv/runtime.stamp PYTHON=python3.12 TORCH_INDEX=$TORCH_INDEX
+
+FROM python:3.12-slim
+RUN useradd --system --uid 10001 --home-dir /data --shell /usr/sbin/nologin tandem \
+    && install -d -o tandem -g tandem /data
+WORKDIR /srv/tandem
+COPY --from=build /srv/tandem/.venv .venv
+COPY . .
+ENV PATH=/srv/tandem/.venv/bin:$PATH \
+    PYTHONUNBUFFERED=1 \
+    PYTHONDONTWRITEBYTECODE=1 \
+    TANDEM_HOST=0.0.0.0 \
+    TANDEM_PORT=8000 \
+    TANDEM_DATA=/data
+USER tandem
+# Fills /data, and with it every new volume, with the empty database and the kernels.
+RUN python -m app setup
+VOLUME /data
+EXPOSE 8000
+HEALTHCHECK --interval=10s --timeout=3s --start-period=60s --retries=3 \
+    CMD python -c "import os, urllib.request as u; u.urlopen(u.Request(f'http://127.0.0.1:{os.environ[\"TANDEM_PORT\"]}/healthz', headers={'Authorization': 'Bearer ' + os.environ.get('TANDEM_TOKEN', '')}), timeout=2)"
+CMD ["python", "-m", "app", "serve"]

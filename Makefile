@@ -1,0 +1,114 @@
+# Tandem: set-up, run, checks. `make help` lists the targets.
+#
+# Set-up lives in .venv and is redone only where its inputs changed (stamp files in .venv).
+# torch comes first and apart: on Linux x86-64 an ordinary index answers "torch" with several
+# GB of CUDA packages, so its CPU build is installed before anything that asks for torch, and
+# the lock files leave it out. The order of places: what pip is configured for (a folder of
+# wheels, an index of your own), then PyTorch's CPU index, then the default index.
+
+SHELL := /bin/bash
+.SHELLFLAGS := -o pipefail -c
+
+PYTHON ?= $(shell for p in python3.11 python3.12 python3; do \
+	$$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null \
+	&& echo $$p && break; done)
+TORCH ?= 2.13.0
+TORCH_INDEX ?= https://download.pytorch.org/whl/cpu
+UV ?= 0.13.8
+
+VENV := .venv
+PY := $(VENV)/bin/python
+PIP := $(PY) -m pip --disable-pip-version-check
+# Exact versions with the hashes of every file of each, for all platforms and Pythons; what
+# torch's CUDA build asks for stays out together with torch.
+RESOLVE = $(VENV)/bin/uv pip compile --quiet --no-config --universal --python-version 3.11 \
+	--fork-strategy fewest --generate-hashes --no-annotate --custom-compile-command "make lock" \
+	$(addprefix --no-emit-package ,torch $(CUDA_PACKAGES)) $(UPGRADE) pyproject.toml
+CUDA_PACKAGES := triton cuda-bindings cuda-pathfinder cuda-toolkit \
+	$(addprefix nvidia-,cublas cuda-cupti cuda-nvrtc cuda-runtime cudnn-cu13 cufft cufile curand cusolver cusparse cusparselt-cu13 nccl-cu13 nvjitlink nvshmem-cu13 nvtx)
+
+# $(call INSTALL_LOCK,file): installs exactly what the file lists, and counts along. pip's
+# notes on a configured index that lacks a package are left out: another one has it.
+INSTALL_LOCK = $(PIP) install --require-hashes --no-deps --progress-bar off -r $(1) \
+	2> >(grep -v '^WARNING: Location' >&2) \
+	| awk -v total=$$(grep -c '==' $(1)) -v every=$$(test -t 2 && echo 1 || echo 25) ' \
+		/^(Collecting|Requirement already)/ && ++n % every == 0 { \
+			printf "%s    %d of %d packages", (every > 1 && n > every ? "\n" : "\r"), n, total; fflush() } \
+		/^Installing/ { printf ", installing them"; fflush() } END { print "" }'
+
+SAY := @printf '==> %s\n'
+
+export PYTHONUNBUFFERED = 1
+
+.PHONY: help run setup test test-browser test-slow check format bench tables lock clean
+
+help: ## list the targets
+	@grep -E '^[a-z-]+:.*## ' Makefile | sed -E 's/:.*## /\t/' | expand -t 16
+
+run: $(VENV)/runtime.stamp ## set up what is missing, start the server, print its address
+	$(SAY) "database and compiled kernels"
+	@$(PY) -m app setup
+	@$(PY) -m app serve
+
+setup: $(VENV)/runtime.stamp ## set up without starting
+	@$(PY) -m app setup
+
+test: $(VENV)/dev.stamp ## the default tests: no network, no browser, no long training
+	@$(PY) -m pytest
+
+test-browser: $(VENV)/dev.stamp ## the page in a real Chromium
+	@$(PY) -m pytest -m browser
+
+test-slow: $(VENV)/dev.stamp ## tests that train
+	@$(PY) -m pytest -m slow
+
+check: $(VENV)/dev.stamp ## format, lint, types, layers
+	@$(PY) -m ruff format --check .
+	@$(PY) -m ruff check .
+	@$(PY) -m mypy
+	@PYTHONPATH=. $(VENV)/bin/lint-imports
+
+format: $(VENV)/dev.stamp ## rewrite the sources the way `check` wants them
+	@$(PY) -m ruff format .
+	@$(PY) -m ruff check --fix .
+
+bench: $(VENV)/dev.stamp ## every benchmark, as tables
+	@for f in tests/benchmarks/bench_*.py; do \
+		name=$$(basename $$f .py | sed 's/^bench_//; s/_/-/g'); $(PY) -m app bench $$name || exit 1; done
+
+tables: $(VENV)/dev.stamp ## write the README's tables from docs/results
+	@$(PY) docs/make_tables.py
+
+lock: $(VENV)/dev.stamp ## resolve the lock files anew (UPGRADE=--upgrade: newest versions)
+	@$(PIP) install --quiet uv==$(UV)
+	@$(RESOLVE) -o requirements.lock
+	@$(RESOLVE) --extra dev -c requirements.lock -o requirements-dev.lock
+
+clean: ## remove the virtual environment and the caches
+	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .import_linter_cache
+
+$(VENV)/created.stamp:
+	@test -n "$(PYTHON)" || { echo "Tandem needs Python 3.11 or newer; none found. Name one: make PYTHON=/path/to/python3"; exit 1; }
+	$(SAY) "virtual environment in $(VENV) ($$($(PYTHON) --version))"
+	@$(PYTHON) -m venv $(VENV)
+	@touch $@
+
+$(VENV)/torch.stamp: $(VENV)/created.stamp
+	$(SAY) "PyTorch $(TORCH): its CPU build (about 200 MB), where one is to be had"
+	@$(PIP) install --quiet --only-binary torch "torch==$(TORCH)+cpu" 2>/dev/null \
+		|| { test -n "$(TORCH_INDEX)" && $(PIP) install --quiet --retries 1 --timeout 15 --index-url $(TORCH_INDEX) "torch==$(TORCH)" 2>/dev/null; } \
+		|| { echo "    no CPU build found: the default index it is (on Linux several GB of CUDA packages)"; \
+			$(PIP) install --quiet "torch==$(TORCH)"; }
+	@$(PY) -W ignore -c 'import torch; print("    torch", torch.__version__, "(CUDA build)" if torch.version.cuda else "(CPU build)")'
+	@touch $@
+
+$(VENV)/runtime.stamp: $(VENV)/torch.stamp requirements.lock
+	$(SAY) "what the service needs, from requirements.lock (about 500 MB)"
+	@$(call INSTALL_LOCK,requirements.lock)
+	@touch $@
+
+$(VENV)/dev.stamp: $(VENV)/runtime.stamp requirements-dev.lock
+	$(SAY) "what tests and checks need, from requirements-dev.lock"
+	@$(call INSTALL_LOCK,requirements-dev.lock)
+	@$(PIP) check
+	@touch $@

@@ -1,0 +1,143 @@
+"""The checkpoint format: tensors as safetensors, everything else as a JSON manifest.
+
+Nothing here is ever unpickled: a checkpoint is data, never code. Two kinds exist: ``policy``
+(actor and critics; decides, is shipped and downloaded) and ``resume`` (also target networks and
+optimiser moments; continues an interrupted training). The id of a checkpoint is the SHA-256 of
+its canonical manifest followed by its tensors.
+"""
+
+import hashlib
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from safetensors import SafetensorError
+from safetensors.numpy import load as load_tensors
+from safetensors.numpy import save as save_tensors
+
+from app.errors import CheckpointMismatch, InvalidInput
+
+FORMAT = "tandem-checkpoint/1"
+MAX_BYTES = 16 * 1024 * 1024
+"""Largest tensors blob taken [bytes]; a database row holds it."""
+REQUIRED = {
+    "format": str,
+    "kind": str,
+    "preset": dict,
+    "seed": int,
+    "cell": str,
+    "layout": list,
+    "act_size": int,
+    "width": int,
+    "step": int,
+    "updates": int,
+    "trained_range": dict,
+}
+"""Fields every manifest has, with their JSON types."""
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """A manifest and its tensors."""
+
+    manifest: dict[str, Any]
+    """What the tensors are; JSON."""
+    tensors: bytes
+    """safetensors file."""
+
+    @cached_property
+    def sha256(self) -> str:
+        """Id of the checkpoint, 64 hexadecimal digits."""
+        digest = hashlib.sha256(canonical(self.manifest).encode())
+        digest.update(self.tensors)
+        return digest.hexdigest()
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Return the tensors by name.
+
+        Raises:
+            InvalidInput: The bytes are no safetensors file, or hold non-finite numbers.
+        """
+        try:
+            arrays = load_tensors(self.tensors)
+        except SafetensorError as error:
+            raise InvalidInput("tensors", str(error), "must be a safetensors file") from error
+        for name, array in arrays.items():
+            if not np.isfinite(array).all():
+                raise InvalidInput(f"tensors.{name}", "non-finite", "must be finite")
+        return arrays
+
+
+def canonical(manifest: Mapping[str, Any]) -> str:
+    """Return a manifest as JSON text with one spelling."""
+    return json.dumps(manifest, sort_keys=True, separators=(",", ":"), allow_nan=False)
+
+
+def pack(manifest: dict[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Checkpoint:
+    """Return a checked checkpoint of a manifest and named arrays."""
+    contiguous = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
+    return load(manifest, save_tensors(contiguous))
+
+
+def load(manifest: object, tensors: bytes) -> Checkpoint:
+    """Return a checkpoint from data that may come from anyone.
+
+    Raises:
+        InvalidInput: A field is missing, of a wrong type, or the tensors are too large.
+        CheckpointMismatch: It is of another format.
+    """
+    if not isinstance(manifest, dict):
+        raise InvalidInput("manifest", type(manifest).__name__, "must be a JSON object")
+    for name, kind in REQUIRED.items():
+        if not isinstance(manifest.get(name), kind):
+            raise InvalidInput(
+                f"manifest.{name}", manifest.get(name), f"must be {kind.__name__}"
+            )
+    if manifest["format"] != FORMAT:
+        raise CheckpointMismatch("format", FORMAT, manifest["format"])
+    if manifest["kind"] not in ("policy", "resume"):
+        raise InvalidInput("manifest.kind", manifest["kind"], "unknown", ("policy", "resume"))
+    if not 1 <= manifest["width"] <= 4096:
+        raise InvalidInput("manifest.width", manifest["width"], "must lie in [1, 4096] units")
+    _check_ranges(manifest["trained_range"])
+    if len(tensors) > MAX_BYTES:
+        raise InvalidInput("tensors", len(tensors), f"must not exceed {MAX_BYTES} bytes")
+    return Checkpoint(manifest, bytes(tensors))
+
+
+def _check_ranges(ranges: dict[str, Any]) -> None:
+    for name, entry in ranges.items():
+        fine = (
+            isinstance(entry, dict)
+            and set(entry) == {"low", "high"}
+            and isinstance(entry["low"], list)
+            and isinstance(entry["high"], list)
+            and len(entry["low"]) == len(entry["high"])
+            and all(
+                isinstance(value, int | float) and math.isfinite(value)
+                for value in entry["low"] + entry["high"]
+            )
+        )
+        if not fine:
+            raise InvalidInput(
+                f"manifest.trained_range.{name}",
+                entry,
+                "must hold two lists of finite numbers, low and high",
+            )
+
+
+def expect_layout(checkpoint: Checkpoint, layout: list[list[Any]], act_size: int) -> None:
+    """Check that a checkpoint's networks fit this program's observation and action.
+
+    Raises:
+        CheckpointMismatch: They were trained on another layout.
+    """
+    if checkpoint.manifest["layout"] != layout:
+        raise CheckpointMismatch("layout", layout, checkpoint.manifest["layout"])
+    if checkpoint.manifest["act_size"] != act_size:
+        raise CheckpointMismatch("act_size", act_size, checkpoint.manifest["act_size"])

@@ -1,0 +1,169 @@
+"""Second opinion on whole trajectories: does FCL on the raw meshes find a contact?
+
+Evaluation asks here whether the kernels missed one. To be fast enough for hundreds of episodes,
+capsule distances (plain numpy, not the kernels under test) sort out what is far apart; only
+pairs nearer than ``MARGIN`` go to the meshes.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.sim import human
+from app.sim.cells import Cell
+from app.sim.collision import BODY_NAMES, CollisionReference, Contact, Kind
+from app.sim.ports import Vec
+from app.sim.robot import LINK_NAMES, Robot
+from app.sim.shapes import TOOL, RobotCapsules, load_robot_capsules, self_pairs
+
+MARGIN = 0.03
+"""Clearance of capsules [m] above which meshes are not asked; capsules contain the meshes, so
+0 would do if both were free of mistakes."""
+
+Pairs = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trajectory:
+    """Robot and person at equal steps of time."""
+
+    q_robot: Vec
+    """Robot joint positions [rad], shape (n_steps, 6)."""
+    q_human: Vec
+    """Joint positions of the person [m, rad], shape (n_steps, 18)."""
+    dt: float
+    """Time between two rows [s]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FirstContact:
+    """Where a trajectory first touches something."""
+
+    index: int
+    """Row of the trajectory."""
+    time_s: float
+    """Time since the first row [s]."""
+    contacts: tuple[Contact, ...]
+    """All contacts in that row."""
+
+
+def segment_distances(a0: Vec, a1: Vec, b0: Vec, b1: Vec) -> Vec:
+    """Distance of the segments a0-a1 and b0-b1 [m]; shapes (..., 3) that broadcast.
+
+    Source: Ericson, Real-Time Collision Detection, section 5.1.9.
+    """
+    u, v, w = a1 - a0, b1 - b0, a0 - b0
+    uu, vv, uv = (u * u).sum(-1), (v * v).sum(-1), (u * v).sum(-1)
+    uw, vw = (u * w).sum(-1), (v * w).sum(-1)
+    scale = uu * vv - uv * uv
+    flat = scale <= 1e-16
+    s = np.where(flat, 0.0, (uv * vw - uw * vv) / np.where(flat, 1.0, scale))
+    s = np.clip(s, 0.0, 1.0)
+    t = np.clip((uv * s + vw) / np.maximum(vv, 1e-30), 0.0, 1.0)
+    s = np.clip((uv * t - uw) / np.maximum(uu, 1e-30), 0.0, 1.0)
+    gap = w + s[..., None] * u - t[..., None] * v
+    return np.asarray(np.sqrt((gap * gap).sum(-1)))
+
+
+def robot_ends(robot: Robot, capsules: RobotCapsules, q: Vec) -> tuple[Vec, Vec]:
+    """Return both end points of all capsules along a path [m], each of shape (n_steps, n, 3).
+
+    Args:
+        robot: Its kinematics.
+        capsules: Its n capsules.
+        q: Joint positions [rad], shape (n_steps, 6).
+    """
+    poses = np.stack([robot.link_poses(row) for row in q])[:, capsules.link]
+    rotation, origin = poses[..., :3, :3], poses[..., :3, 3]
+    p0 = np.einsum("tnij,nj->tni", rotation, capsules.p0) + origin
+    p1 = np.einsum("tnij,nj->tni", rotation, capsules.p1) + origin
+    return p0, p1
+
+
+class Recheck:
+    """Looks for the first contact of trajectories; not thread-safe.
+
+    Args:
+        cell: The work cell.
+        reference: What decides; FCL on raw meshes by default.
+    """
+
+    def __init__(self, cell: Cell, reference: CollisionReference | None = None) -> None:
+        self._cell = cell
+        self._reference = reference or CollisionReference(cell)
+        self._robot = Robot(cell.robot.tool_length)
+        self._capsules = load_robot_capsules(cell.robot.tool_length, cell.robot.tool_radius)
+        self._self_pairs = self_pairs(self._capsules)
+        self._body_of = [
+            TOOL if name == TOOL else LINK_NAMES[link]
+            for name, link in zip(self._capsules.name, self._capsules.link, strict=True)
+        ]
+
+    def first_contact(self, trajectory: Trajectory) -> FirstContact | None:
+        """Return the first row of a trajectory in which raw meshes touch anything."""
+        near_person, near_cell, near_self = self._near(trajectory)
+        rows = near_person.any((1, 2)) | near_cell.any(1) | near_self.any(1)
+        for index in np.flatnonzero(rows):
+            pairs = self._suspects(near_person[index], near_cell[index], near_self[index])
+            contacts = self._ask(trajectory.q_robot[index], trajectory.q_human[index], pairs)
+            if contacts:
+                return FirstContact(
+                    index=int(index), time_s=int(index) * trajectory.dt, contacts=contacts
+                )
+        return None
+
+    def _near(self, trajectory: Trajectory) -> tuple[Pairs, Pairs, Pairs]:
+        """Tell which capsules come nearer than MARGIN, for each row of the trajectory."""
+        cell, radius = self._cell, self._capsules.radius
+        a0, a1 = robot_ends(self._robot, self._capsules, trajectory.q_robot)
+        ends = np.stack(
+            [human.capsules(q, cell.pelvis_z, cell.floor_z) for q in trajectory.q_human]
+        )
+        gap = segment_distances(
+            a0[:, :, None], a1[:, :, None], ends[:, None, :, 0], ends[:, None, :, 1]
+        )
+        near_person = gap < radius[:, None] + human.CAPSULE_RADII + MARGIN
+        near_cell = np.minimum(a0[..., 2], a1[..., 2]) < radius + MARGIN
+        i, j = self._self_pairs.T
+        gap = segment_distances(a0[:, i], a1[:, i], a0[:, j], a1[:, j])
+        return near_person, near_cell, gap < radius[i] + radius[j] + MARGIN
+
+    def _suspects(
+        self, near_person: Pairs, near_cell: Pairs, near_self: Pairs
+    ) -> set[tuple[str, str, Kind]]:
+        """Return the pairs of bodies of one row that the meshes are asked about."""
+        body_of = self._body_of
+        pairs: set[tuple[str, str, Kind]] = set()
+        for capsule, part in np.argwhere(near_person):
+            pairs.add((body_of[capsule], human.CAPSULE_NAMES[part], "human"))
+        for capsule in np.flatnonzero(near_cell):
+            if body_of[capsule] != LINK_NAMES[0]:
+                pairs |= {(body_of[capsule], body, "cell") for body in ("table", "floor")}
+        for i, j in self._self_pairs[near_self]:
+            pairs.add((body_of[i], body_of[j], "self"))
+        return pairs
+
+    def _ask(
+        self, q: Vec, human_q: Vec, pairs: set[tuple[str, str, Kind]]
+    ) -> tuple[Contact, ...]:
+        if not pairs:
+            return ()
+        self._reference.place_robot(q)
+        if any(kind == "human" for _, _, kind in pairs):
+            self._reference.place_person(human_q)
+        order = sorted(pairs, key=lambda pair: (BODY_NAMES.index(pair[0]), pair[1]))
+        return tuple(
+            Contact(kind=kind, link=link, body=body)
+            for link, body, kind in order
+            if self._reference.touching(link, body)
+        )
+
+
+def recheck_trajectories(
+    cell: Cell, trajectories: Iterable[Trajectory]
+) -> list[FirstContact | None]:
+    """Return each trajectory's first contact by FCL on the raw meshes, None without one."""
+    recheck = Recheck(cell)
+    return [recheck.first_contact(trajectory) for trajectory in trajectories]

@@ -1,0 +1,203 @@
+"""The synthetic person: reaches by inverse kinematics, home -> cube -> dock and back.
+
+A *library* holds many postures per place and hand, with random stance, elbow and grip. A script
+goes through them with random pace and pauses (``kernels/script.py``). The other hand supports
+itself at the table's edge while the trunk leans.
+
+Source: METHOD 3.2 and 3.4. Deviates: the thesis replays motion capture through movement
+primitives; these reaches are synthetic and stand in for it.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.sim import human
+from app.sim.cells import Cell
+from app.sim.human import Hand
+from app.sim.kernels import random, script
+from app.sim.ports import Vec
+
+HANDS: tuple[Hand, Hand] = ("r", "l")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Library:
+    """Postures of one cell's work, read-only arrays."""
+
+    postures: Vec
+    """Joint positions [m, rad], shape (n, 18)."""
+    hands: Vec
+    """Palm positions, right then left [m], shape (n, 2, 3)."""
+    of_station: script.Index
+    """First posture and count of each place and hand, shape (n_stations + 1, 2, 2)."""
+    n_stations: int
+    """Number of stations, cubes first; the place after them is home."""
+    n_cubes: int
+    """Number of cubes."""
+
+
+def build_library(cell: Cell, seed: int, variants: int = 24) -> Library:
+    """Make ``variants`` random postures for each place and hand of a cell.
+
+    Args:
+        cell: Work cell; its cubes must come before its docks.
+        seed: Seed of stances, elbows and grips.
+        variants: Postures per place and hand.
+    """
+    rng = np.random.default_rng(seed)
+    postures: list[Vec] = []
+    of_station = np.zeros((len(cell.stations) + 1, 2, 2), dtype=np.int64)
+    for place, station in enumerate(cell.stations):
+        for column, hand in enumerate(HANDS):
+            of_station[place, column] = len(postures), variants
+            target = np.array(station.position)
+            postures.extend(_at_station(cell, rng, target, hand) for _ in range(variants))
+    of_station[-1, :] = len(postures), variants
+    postures.extend(_at_home(cell, rng) for _ in range(variants))
+    stacked = np.array(postures)
+    hands = np.array([_palms(q, cell.pelvis_z) for q in stacked])
+    for array in (stacked, hands, of_station):
+        array.setflags(write=False)
+    n_cubes = sum(station.kind == "cube" for station in cell.stations)
+    return Library(
+        postures=stacked,
+        hands=hands,
+        of_station=of_station,
+        n_stations=len(cell.stations),
+        n_cubes=n_cubes,
+    )
+
+
+def _palms(q: Vec, pelvis_z: float) -> Vec:
+    points = human.joint_points(q, pelvis_z)
+    return np.stack([points["hand_r"], points["hand_l"]])
+
+
+def _at_home(cell: Cell, rng: np.random.Generator) -> Vec:
+    x, y, yaw = cell.human.home
+    q = human.rest_posture(
+        float(np.clip(x + rng.normal(0.0, 0.2), cell.human.x_min, cell.human.x_max)),
+        float(np.clip(y + rng.uniform(-0.08, 0.15), cell.human.y_min, cell.human.y_max)),
+        yaw + rng.normal(0.0, 0.15),
+    )
+    for first in (10, 14):
+        q[first : first + 4] += rng.uniform([-0.1, 0.0, -0.2, 0.0], [0.2, 0.15, 0.2, 0.9])
+    return q
+
+
+def _at_station(cell: Cell, rng: np.random.Generator, target: Vec, hand: Hand) -> Vec:
+    """Return a posture with one palm at a station and the other at the table's edge."""
+    sign = -1.0 if hand == "r" else 1.0
+    grip = target + rng.uniform([-0.03, -0.03, -0.06], [0.03, 0.03, 0.05])
+    x = 0.8 * target[0] - sign * 0.12 + rng.normal(0.0, 0.07)
+    x = float(np.clip(x, cell.human.x_min, cell.human.x_max))
+    y = cell.human.y_min + rng.uniform(0.0, 0.12)
+    yaw = cell.human.home[2] + rng.normal(0.0, 0.12) + 0.3 * math.atan2(target[0] - x, 0.5)
+    start = human.rest_posture(x, y, yaw)
+    support = np.array([x + sign * -0.25, cell.table.y_max - 0.03, 0.06])
+    support += rng.uniform(-0.04, 0.04, 3)
+    right, left = (grip, support) if hand == "r" else (support, grip)
+    swivel = float(rng.uniform(0.0, 0.9))
+    posture = human.solve_hands(start, cell.pelvis_z, right=right, left=left, swivel=swivel)
+    return posture.q
+
+
+class Script:
+    """A fixed sequence of moves, evaluated at any time.
+
+    Args:
+        start: Start of each move [s], shape (n,).
+        duration: Duration of each move [s], shape (n,).
+        postures: Postures before, between and after the moves [m, rad], shape (n + 1, 18).
+    """
+
+    def __init__(self, start: Vec, duration: Vec, postures: Vec) -> None:
+        self._start, self._duration, self._postures = start, duration, postures
+
+    def at(self, t: float) -> tuple[Vec, Vec]:
+        """Return joint positions [m, rad] and speeds [m/s, rad/s] at ``t`` [s], (18,) each."""
+        q, qd = np.empty(18), np.empty(18)
+        n_moves = len(self._start)
+        script.script_at(t, n_moves, self._start, self._duration, self._postures, q, qd)
+        return q, qd
+
+    @property
+    def end_s(self) -> float:
+        """Time at which the last move ends [s]."""
+        return float(self._start[-1] + self._duration[-1])
+
+
+class WorkCycle:
+    """A person who works on and on; scripts follow one another without a jump.
+
+    Args:
+        cell: Work cell.
+        seed: Seed of library and scripts.
+    """
+
+    def __init__(self, cell: Cell, seed: int) -> None:
+        self._library = build_library(cell, seed)
+        self._seed = seed
+        self._block = 0
+        self._begin = 0.0
+        self._script, self._last = self._draw(-1)
+
+    def _draw(self, first: int) -> tuple[Script, int]:
+        state = np.zeros(1, dtype=np.uint64)
+        random.start_stream(self._seed, 0, self._block, state)
+        start, duration = np.zeros(script.MAX_MOVES), np.ones(script.MAX_MOVES)
+        chosen = np.zeros(script.MAX_MOVES + 1, dtype=np.int64)
+        library = self._library
+        n = script.draw_script(
+            state,
+            library.of_station,
+            library.n_stations,
+            library.n_cubes,
+            library.hands,
+            first,
+            start,
+            duration,
+            chosen,
+        )
+        postures = library.postures[chosen[: n + 1]]
+        return Script(start[:n], duration[:n], postures), int(chosen[n])
+
+    def at(self, t: float) -> tuple[Vec, Vec]:
+        """Return joint positions [m, rad] and speeds [m/s, rad/s], (18,) each.
+
+        Args:
+            t: Time [s]; must not go back beyond the script it is in.
+        """
+        while t - self._begin > self._script.end_s:
+            self._begin += self._script.end_s
+            self._block += 1
+            self._script, self._last = self._draw(self._last)
+        return self._script.at(t - self._begin)
+
+
+def reach_script(
+    cell: Cell, hand: Hand, from_station: str, to_station: str | None, delay_s: float = 0.3
+) -> Script:
+    """Return the person's script of a case study (METHOD 3.6).
+
+    Args:
+        cell: Work cell.
+        hand: The hand that works.
+        from_station: Where the palm is at first.
+        to_station: Where it moves to; None keeps it where it is.
+        delay_s: Rest before the move [s].
+    """
+    rng = np.random.default_rng(7)
+    places = [from_station, to_station or from_station]
+    postures = [
+        _at_station(cell, rng, np.array(cell.station(place).position), hand) for place in places
+    ]
+    if to_station is None:
+        postures[1] = postures[0]
+    way = float(
+        np.abs(_palms(postures[1], cell.pelvis_z) - _palms(postures[0], cell.pelvis_z)).max()
+    )
+    duration = max(0.8, way / 0.5)
+    return Script(np.array([delay_s]), np.array([duration]), np.array(postures))

@@ -1,0 +1,75 @@
+"""Write the README's result tables from ``docs/results/*.json``.
+
+Between ``<!-- begin NAME -->`` and ``<!-- end NAME -->`` the README shows the table of
+``docs/results/NAME.json``: what ``python -m app evaluate NAME --json`` or
+``python -m app bench NAME --json`` printed. Run by ``make tables``; a test compares.
+"""
+
+import json
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parent.parent
+BLOCK = re.compile(r"(<!-- begin ([a-z0-9-]+) -->\n).*?(<!-- end \2 -->)", re.DOTALL)
+Json = dict[str, Any]
+
+
+def render(readme: str, results: Path) -> str:
+    """Return the README's text with every marked table written anew.
+
+    Args:
+        readme: Text of the README.
+        results: Folder of the JSON files.
+    """
+
+    def block(match: re.Match[str]) -> str:
+        path = results / f"{match[2]}.json"
+        return f"{match[1]}{table(json.loads(path.read_text(encoding='utf-8')))}\n{match[3]}"
+
+    return BLOCK.sub(block, readme)
+
+
+def table(result: Json) -> str:
+    """Return one result as a Markdown table with the line that says how it was measured."""
+    rows: list[Json] = result["results"]
+    columns = list(dict.fromkeys(key for row in rows for key in row if key != "name"))
+    head = ["", *(key.replace("_", " ") for key in columns)]
+    lines = [head, ["---", *("---:" for _ in columns)]]
+    lines += [[f"`{row['name']}`", *(cell(row.get(key)) for key in columns)] for row in rows]
+    return "\n".join([*("| " + " | ".join(line) + " |" for line in lines), "", origin(result)])
+
+
+def cell(value: object) -> str:
+    """Return one value as text: a rate with its interval in percent, a number compactly."""
+    if isinstance(value, dict):
+        mean, low, high = (100.0 * value[key] for key in ("mean", "low", "high"))
+        return f"{mean:.1f} % ({low:.1f}-{high:.1f})"
+    if isinstance(value, float):
+        return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.3g}"
+    return "" if value is None else str(value)
+
+
+def origin(result: Json) -> str:
+    """Return the line below a table: command, seed, checkpoint, machine, commit."""
+    machine: Json = result["machine"]
+    verb = "evaluate" if "protocol" in result else "bench"
+    parts = [f"`python -m app {verb} {result.get('protocol') or result['bench']}`"]
+    parts += [f"{key} {result[key]}" for key in ("episodes", "seed") if key in result]
+    if "checkpoint" in result:
+        parts.append(f"checkpoint `{result['checkpoint'][:12]}`")
+    parts += [f"{machine['cores']} cores of {machine['cpu']}", f"commit `{machine['commit']}`"]
+    return f"<sub>{', '.join(parts)}</sub>"
+
+
+def main() -> None:
+    """Rewrite ``README.md`` in place; say which tables it holds."""
+    path = ROOT / "README.md"
+    text = path.read_text(encoding="utf-8")
+    path.write_text(render(text, ROOT / "docs" / "results"), encoding="utf-8")
+    print("tables:", ", ".join(match[2] for match in BLOCK.finditer(text)), file=sys.stderr)
+
+
+if __name__ == "__main__":
+    main()

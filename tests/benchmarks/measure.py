@@ -1,0 +1,97 @@
+"""How benchmarks measure and print: one table for people, with ``--json`` one object.
+
+Every row is timed in processor seconds of this process (``time.process_time``), in rounds that
+go through all rows in turn, so that a machine that slows down slows all of them.
+"""
+
+import argparse
+import json
+import statistics
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+from app.machine import describe
+
+Row = dict[str, object]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Subject:
+    """One thing that is measured."""
+
+    name: str
+    """Name of its row, such as ``pick/numba``."""
+    batch: int
+    """Environments or candidates handled per call."""
+    run: Callable[[], object]
+    """One call."""
+
+
+def arguments(bench: str, rounds: int = 5, seconds: float = 1.0) -> argparse.Namespace:
+    """Read ``--json``, ``--rounds``, ``--seconds`` and ``--seed`` from the command line."""
+    parser = argparse.ArgumentParser(prog=f"bench {bench}")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.add_argument("--rounds", type=int, default=rounds, help="rounds over all rows")
+    parser.add_argument("--seconds", type=float, default=seconds, help="per row and round")
+    parser.add_argument("--seed", type=int, default=11)
+    return parser.parse_args()
+
+
+def cpu_seconds_per_call(run: Callable[[], object], seconds: float) -> float:
+    """Call ``run`` for about ``seconds`` of processor time; return the mean time of a call."""
+    begin, calls = time.process_time(), 0
+    while (spent := time.process_time() - begin) < seconds:
+        run()
+        calls += 1
+    return spent / calls
+
+
+def rounds_over(subjects: Sequence[Subject], rounds: int, seconds: float) -> list[list[float]]:
+    """Return processor seconds per call of each subject in each round, after one warm-up."""
+    for subject in subjects:
+        subject.run()
+    times: list[list[float]] = [[] for _ in subjects]
+    for _ in range(rounds):
+        for subject, found in zip(subjects, times, strict=True):
+            found.append(cpu_seconds_per_call(subject.run, seconds))
+    return times
+
+
+def row(subject: Subject, values: Sequence[float], unit: str) -> Row:
+    """Make a result row: the median over the rounds with the least and the greatest."""
+    return {
+        "name": subject.name,
+        "threads": 1,
+        "batch": subject.batch,
+        "value": statistics.median(values),
+        "low": min(values),
+        "high": max(values),
+        "unit": unit,
+    }
+
+
+def report(bench: str, rows: Iterable[Row], options: argparse.Namespace) -> None:
+    """Print the rows: as a table, or with ``--json`` as one object."""
+    results = list(rows)
+    settings = {"rounds": options.rounds, "seconds": options.seconds}
+    if options.json:
+        print(
+            json.dumps(
+                {
+                    "bench": bench,
+                    "seed": options.seed,
+                    "settings": settings,
+                    "results": results,
+                    "machine": describe(),
+                }
+            )
+        )
+        return
+    machine = describe()
+    print(f"{bench}, one thread, {machine['cores']} cores of {machine['cpu']}")
+    for one in results:
+        print(
+            f"  {one['name']:<24} batch {one['batch']:<5} {one['value']:>12,.4g} {one['unit']}"
+            f"  ({one['low']:,.4g} to {one['high']:,.4g})"
+        )

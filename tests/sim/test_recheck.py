@@ -1,0 +1,61 @@
+"""The recheck finds what asking the meshes in every row finds."""
+
+import fcl
+import numpy as np
+
+from app.sim import human
+from app.sim.cells import Cell, load_cell
+from app.sim.collision import CollisionReference, make_capsule
+from app.sim.recheck import Recheck, Trajectory, recheck_trajectories, segment_distances
+from app.sim.robot import Robot
+
+
+def random_trajectory(cell: Cell, rng: np.random.Generator, n_steps: int) -> Trajectory:
+    """A straight joint move between two stations while the person moves between two reaches."""
+    limits = np.array(cell.robot.q_min), np.array(cell.robot.q_max)
+    stations = rng.choice(len(cell.stations), 4)
+    start, end, *reaches = (cell.positions()[station] for station in stations)
+    robot, rest = Robot(), human.rest_posture(*cell.human.home)
+    q0, q1 = robot.ik_vertical(start, *limits), robot.ik_vertical(end, *limits)
+    assert q0 is not None and q1 is not None
+    h0, h1 = (human.reach("r", p + [0, 0.1, 0.1], rest, cell.pelvis_z).q for p in reaches)
+    w = np.linspace(0.0, 1.0, n_steps)[:, None]
+    return Trajectory(q_robot=q0 + w * (q1 - q0), q_human=h0 + w * (h1 - h0), dt=0.01)
+
+
+def test_first_contact_is_that_of_asking_the_meshes_in_every_row() -> None:
+    cell, rng = load_cell(), np.random.default_rng(21)
+    trajectories = [random_trajectory(cell, rng, 60) for _ in range(12)]
+    reference, expected = CollisionReference(cell), []
+    for path in trajectories:
+        touching = (
+            index
+            for index, (q, human_q) in enumerate(zip(path.q_robot, path.q_human, strict=True))
+            if reference.contacts(q, human_q)
+        )
+        expected.append(next(touching, None))
+    found = recheck_trajectories(cell, trajectories)
+    assert [hit.index if hit else None for hit in found] == expected
+    assert None in expected and any(expected)
+
+
+def test_contact_with_table_and_self_are_found_without_a_person_nearby() -> None:
+    cell = load_cell()
+    away = np.tile(human.rest_posture(0.0, 1.6, -1.57), (2, 1))
+    home, flat = np.array(cell.robot.home_q), np.array([1.5, 0.1, 0.0, 0.0, 0.0, 0.0])
+    path = Trajectory(q_robot=np.array([home, flat]), q_human=away, dt=0.01)
+    hit = Recheck(cell).first_contact(path)
+    assert hit is not None and hit.index == 1 and hit.time_s == 0.01
+    assert {contact.kind for contact in hit.contacts} >= {"cell"}
+
+
+def test_segment_distances_equal_those_of_fcl() -> None:
+    rng = np.random.default_rng(22)
+    a0, a1, b0, b1 = rng.uniform(-0.5, 0.5, (4, 500, 3))
+    b1[:100] = b0[:100] + 0.7 * (a1 - a0)[:100]
+    request = fcl.DistanceRequest(gjk_solver_type=fcl.GJKSolverType.GST_INDEP)
+    gaps = segment_distances(a0, a1, b0, b1)
+    for k in np.flatnonzero(gaps > 0.03):
+        one, two = make_capsule(0.01, a0[k], a1[k]), make_capsule(0.01, b0[k], b1[k])
+        distance = fcl.distance(one, two, request, fcl.DistanceResult())
+        assert abs(distance - (gaps[k] - 0.02)) < 1e-6

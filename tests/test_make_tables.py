@@ -1,0 +1,55 @@
+from pathlib import Path
+
+from docs.make_tables import ROOT, render, table
+
+RATE = {"mean": 0.9712, "low": 0.959, "high": 0.98}
+MACHINE = {"cpu": "Some CPU", "cores": 2, "commit": "0123456789ab"}
+EVALUATION = {
+    "protocol": "pick-single",
+    "checkpoint": "f" * 64,
+    "seed": 11,
+    "episodes": 1000,
+    "results": [{"name": "policy", "n": 1000, "success": RATE, "time_s": 3.2512}],
+    "machine": MACHINE,
+}
+BENCH = {
+    "bench": "sim-steps",
+    "results": [
+        {"name": "pick/numba", "threads": 1, "value": 312345.6, "unit": "env-steps/cpu-s"},
+        {"name": "fcl/pick", "threads": 1, "value": 12.5, "unit": "env-steps/cpu-s"},
+    ],
+    "machine": MACHINE,
+}
+
+
+def test_rates_are_shown_in_percent_with_their_interval() -> None:
+    lines = table(EVALUATION).splitlines()
+    assert lines[0] == "|  | n | success | time s |"
+    assert lines[2] == "| `policy` | 1000 | 97.1 % (95.9-98.0) | 3.25 |"
+
+
+def test_line_below_a_table_says_how_it_was_measured() -> None:
+    line = table(EVALUATION).splitlines()[-1]
+    for part in ("evaluate pick-single", "seed 11", "`ffffffffffff`", "2 cores of Some CPU"):
+        assert part in line
+
+
+def test_bench_values_are_compact_numbers() -> None:
+    lines = table(BENCH).splitlines()
+    assert lines[2] == "| `pick/numba` | 1 | 312,346 | env-steps/cpu-s |"
+    assert lines[3] == "| `fcl/pick` | 1 | 12.5 | env-steps/cpu-s |"
+
+
+def test_text_outside_the_markers_stays_as_it_is(tmp_path: Path) -> None:
+    (tmp_path / "x.json").write_text(
+        '{"bench": "x", "results": [], "machine": {"cpu": "c", "cores": 1, "commit": null}}'
+    )
+    text = render("before\n<!-- begin x -->\nold\n<!-- end x -->\nafter\n", tmp_path)
+    assert text.startswith("before\n<!-- begin x -->\n|")
+    assert text.endswith("<!-- end x -->\nafter\n")
+    assert "old" not in text
+
+
+def test_readme_tables_equal_what_the_results_give() -> None:
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert render(readme, ROOT / "docs" / "results") == readme

@@ -1,0 +1,95 @@
+"""The house itself: dependencies, locks and package data say what the code needs."""
+
+import ast
+import re
+import sys
+import tomllib
+from importlib.metadata import packages_distributions
+from pathlib import Path
+
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+ROOT = Path(__file__).resolve().parent.parent
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+ROOMS = ("app", "jobs", "web")
+RUN_BY_HAND = ("app/sim/fit_shapes.py",)
+
+
+def pins(name: str) -> dict[str, str]:
+    text = (ROOT / name).read_text(encoding="utf-8")
+    return dict(re.findall(r"^([a-z0-9.-]+)==([^ ;]+)", text, re.MULTILINE))
+
+
+def imported_roots(path: Path) -> set[str]:
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name.split(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            found.add(node.module.split(".")[0])
+    return found - sys.stdlib_module_names - set(ROOMS)
+
+
+def names_in(lines: list[str]) -> set[str]:
+    return {canonicalize_name(Requirement(line).name) for line in lines}
+
+
+def test_every_imported_package_is_declared() -> None:
+    runtime = names_in(PROJECT["project"]["dependencies"])
+    everything = runtime | names_in(PROJECT["project"]["optional-dependencies"]["dev"])
+    owners = {**packages_distributions(), "pinocchio": ["pin"]}
+    for path in (path for room in ROOMS for path in (ROOT / room).rglob("*.py")):
+        declared = everything if str(path.relative_to(ROOT)) in RUN_BY_HAND else runtime
+        for root in imported_roots(path):
+            packages = {canonicalize_name(name) for name in owners[root]}
+            assert packages & declared, f"{path} imports {root}, which pyproject.toml lacks"
+
+
+def test_every_declared_package_is_locked_but_torch() -> None:
+    extras = PROJECT["project"]["optional-dependencies"]
+    runtime, everything = pins("requirements.lock"), pins("requirements-dev.lock")
+    for lines, lock in (
+        (PROJECT["project"]["dependencies"], runtime),
+        (extras["dev"], everything),
+    ):
+        for requirement in map(Requirement, lines):
+            if requirement.name != "torch":
+                assert lock[canonicalize_name(requirement.name)] in requirement.specifier
+
+
+def test_both_locks_agree() -> None:
+    assert pins("requirements.lock").items() <= pins("requirements-dev.lock").items()
+
+
+def test_locks_hold_versions_and_hashes_and_no_address() -> None:
+    line = re.compile(
+        r"#.*|[a-z0-9.-]+==[^ ]+( ; [^\\]+)? \\|    --hash=sha256:[0-9a-f]{64}( \\)?"
+    )
+    for name in ("requirements.lock", "requirements-dev.lock"):
+        for text in (ROOT / name).read_text(encoding="utf-8").splitlines():
+            assert line.fullmatch(text), text
+
+
+def test_locks_leave_torch_and_its_cuda_packages_out() -> None:
+    for name in pins("requirements-dev.lock"):
+        assert not re.match(r"torch$|triton|nvidia-|cuda-", name)
+
+
+def test_makefile_installs_the_declared_torch() -> None:
+    (torch,) = (line for line in PROJECT["project"]["dependencies"] if line.startswith("torch"))
+    assert f"TORCH ?= {torch.removeprefix('torch==')}\n" in (ROOT / "Makefile").read_text()
+
+
+def test_every_data_file_belongs_to_the_package() -> None:
+    data = PROJECT["tool"]["setuptools"]["package-data"]
+    packaged = {
+        path
+        for package, patterns in data.items()
+        for pattern in patterns
+        for path in (ROOT / package.replace(".", "/")).glob(pattern)
+    }
+    for room in ROOMS:
+        for path in (ROOT / room).rglob("*"):
+            if path.is_file() and path.suffix != ".py" and path.parent.name != "__pycache__":
+                assert path in packaged, f"{path} is in no package-data pattern"
