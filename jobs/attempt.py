@@ -15,8 +15,8 @@ from typing import Any
 
 from app.errors import InvalidInput, ServiceError
 from app.store.engine import Store
-from app.store.migrate import check_schema
 from app.store.records import Claim
+from app.store.schema import check_schema
 from jobs.worker import Runner, Worker, die_with_parent
 
 logger = logging.getLogger(__name__)
@@ -71,4 +71,3 @@ def _set_up_logging(job_id: str, attempt: int) -> None:
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(line)
     logging.basicConfig(level=logging.INFO, handlers=[handler])
-    logging.getLogger("alembic").setLevel(logging.WARNING)
