@@ -7,6 +7,7 @@
     │   └── StaleAttempt     a worker writes about a job that is no longer its own
     ├── StorageUnavailable   the database does not answer for now
     ├── StorageFull          the database or the disk has no room left
+    ├── NotReady             the service cannot answer yet, or not now
     ├── SimulationError      the simulator met a state it must never meet
     └── CheckpointMismatch   a checkpoint does not fit what it is asked to do
 
@@ -82,6 +83,10 @@ class InvalidInput(ServiceError):
 
 class Conflict(ServiceError):
     """The request contradicts the present state."""
+
+
+class NotReady(ServiceError):
+    """The service cannot answer yet, or not now; asking again later may help."""
 
 
 class StaleAttempt(Conflict):

@@ -1,0 +1,94 @@
+"""What stands still in the scene: floor, table, light, background and the first camera."""
+
+import numpy as np
+import viser
+
+from app.sim.cells import Cell
+from web.solids import block, material, painted, rod, slab
+
+TOP = material((236, 233, 226), roughness=0.55)
+EDGE = material((172, 142, 108), roughness=0.6)
+FRAME = material((178, 184, 191), metallic=0.35, roughness=0.45)
+FOOT = material((52, 55, 61), roughness=0.6)
+PLATE = material((96, 103, 112), metallic=0.5, roughness=0.4)
+
+FLOOR = (226, 230, 235)
+GRID, GRID_BOLD = (205, 211, 219), (188, 196, 206)
+SKY, HORIZON = (206, 217, 230), (238, 241, 245)
+
+
+def build(server: viser.ViserServer, cell: Cell) -> None:
+    """Add floor, table, light, background and camera to an empty scene."""
+    scene = server.scene
+    scene.set_up_direction("+z")
+    scene.world_axes.visible = False
+    scene.add_glb("/table", table_body(cell))
+    scene.add_glb("/table/trim", table_trim(cell), cast_shadow=False)
+    _floor(server, cell)
+    _light(server)
+    _camera(server, cell)
+
+
+def table_body(cell: Cell) -> bytes:
+    """Return the table's top, frame, legs and feet as binary glTF."""
+    t = cell.table
+    width, depth = t.x_max - t.x_min, t.y_max - t.y_min
+    cx, cy = 0.5 * (t.x_min + t.x_max), 0.5 * (t.y_min + t.y_max)
+    pieces = [(slab((width, depth, t.thickness), (cx, cy, -0.5 * t.thickness), 0.03, 0.003), TOP)]
+    inset, leg = 0.11, 0.07
+    xs = (t.x_min + inset, t.x_max - inset)
+    ys = (t.y_min + inset, t.y_max - inset)
+    under, floor = -t.thickness, cell.floor_z
+    for x in xs:
+        for y in ys:
+            height = under - floor - 0.03
+            pieces.append((block((leg, leg, height), (x, y, floor + 0.03 + 0.5 * height), 0.006), FRAME))
+            pieces.append((rod((x, y, floor), (x, y, floor + 0.03), 0.03), FOOT))
+        beam = (x, cy, under - 0.04)
+        pieces.append((block((0.05, ys[1] - ys[0], 0.08), beam, 0.005), FRAME))
+    for y in ys:
+        pieces.append((block((xs[1] - xs[0], 0.05, 0.08), (cx, y, under - 0.04), 0.005), FRAME))
+    return painted(pieces)
+
+
+def table_trim(cell: Cell) -> bytes:
+    """Return what is too thin to cast a shadow, as binary glTF: edge band, robot plate."""
+    t = cell.table
+    width, depth = t.x_max - t.x_min, t.y_max - t.y_min
+    center = (0.5 * (t.x_min + t.x_max), 0.5 * (t.y_min + t.y_max), -0.5 * t.thickness - 0.003)
+    band = slab((width + 0.004, depth + 0.004, t.thickness - 0.012), center, 0.032, 0.001)
+    return painted([(band, EDGE), (slab((0.3, 0.3, 0.008), (0.0, 0.0, 0.004), 0.02, 0.0015), PLATE)])
+
+
+def _floor(server: viser.ViserServer, cell: Cell) -> None:
+    server.scene.add_grid(
+        "/floor",
+        plane="xy",
+        position=(0.0, 0.4, cell.floor_z),
+        infinite_grid=True,
+        cell_size=0.25,
+        section_size=1.0,
+        cell_color=GRID,
+        section_color=GRID_BOLD,
+        cell_thickness=0.6,
+        section_thickness=1.0,
+        fade_distance=9.0,
+        fade_strength=1.4,
+        fade_from="origin",
+        shadow_opacity=0.22,
+        plane_color=FLOOR,
+        plane_opacity=1.0,
+    )
+
+
+def _light(server: viser.ViserServer) -> None:
+    server.scene.configure_default_lights(enabled=True, cast_shadow=True)
+    pass
+
+
+def _camera(server: viser.ViserServer, cell: Cell) -> None:
+    camera = server.initial_camera
+    camera.position = (2.75, -0.75, 1.5)
+    camera.look_at = (-0.05, 0.62, 0.05)
+    camera.up = (0.0, 0.0, 1.0)
+    camera.fov = np.deg2rad(42.0)
