@@ -4,6 +4,9 @@
     ├── NotFound             nothing has that name or id
     ├── InvalidInput         a value breaks a rule: field, value, rule, choices
     ├── Conflict             the request contradicts the present state
+    │   └── StaleAttempt     a worker writes about a job that is no longer its own
+    ├── StorageFull          the database or the disk has no room left
+    ├── NotReady             the service cannot answer yet, or not now
     ├── SimulationError      the simulator met a state it must never meet
     └── CheckpointMismatch   a checkpoint does not fit what it is asked to do
 
@@ -79,6 +82,49 @@ class InvalidInput(ServiceError):
 
 class Conflict(ServiceError):
     """The request contradicts the present state."""
+
+
+class NotReady(ServiceError):
+    """The service cannot answer yet, or not now; asking again later may help."""
+
+
+class StaleAttempt(Conflict):
+    """A worker writes about a job that is no longer its own: the write is refused.
+
+    Args:
+        job_id: The job.
+        attempt: The attempt that tried to write.
+    """
+
+    def __init__(self, job_id: str, attempt: int) -> None:
+        super().__init__(
+            f"attempt {attempt} no longer holds job {job_id}: it was cancelled, ended or "
+            "started again, and this write is refused"
+        )
+        self.job_id, self.attempt = job_id, attempt
+
+    def problem(self) -> dict[str, object]:
+        """Return the job and the attempt."""
+        return {"job": self.job_id, "attempt": self.attempt}
+
+
+class StorageFull(ServiceError):
+    """The database or the disk has no room left.
+
+    Args:
+        database: What is full, as a URL without its password.
+    """
+
+    def __init__(self, database: str) -> None:
+        super().__init__(
+            f"no room left in {database} (database or disk is full): free some space or point "
+            "TANDEM_DATA to a larger disk"
+        )
+        self.database = database
+
+    def problem(self) -> dict[str, object]:
+        """Return what is full."""
+        return {"database": self.database}
 
 
 class SimulationError(ServiceError):

@@ -291,7 +291,7 @@ class _Reporter(BaseCallback):
             self._begin_window()
             if step % self.run.preset.checkpoint_steps == 0:
                 self._on_checkpoint(step, *self.run.checkpoints())
-            self.stopped = self._should_stop()
+        self.stopped = self._should_stop()
         return not self.stopped
 
     def _count(self) -> None:
@@ -348,7 +348,7 @@ def train(
         on_progress: Called every ``progress_steps``.
         on_checkpoint: Called every ``checkpoint_steps`` and at the end or stop with the step,
             the policy and what resuming needs.
-        should_stop: Asked after every point of the curve.
+        should_stop: Asked after every step of the cells, so it must be cheap.
 
     Raises:
         CheckpointMismatch: ``resume`` belongs to another preset or program.

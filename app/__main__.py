@@ -1,0 +1,325 @@
+"""The command line: ``python -m app serve | setup | train | evaluate | bench | cells``.
+
+The same verbs as the HTTP interface. Results go to standard output (``--json``: one object),
+logs to standard error. Exit status 0 whatever the result says, 1 where the machine is in the
+way (port taken, database in use), 2 for a wrong call. Each verb loads only what it needs.
+"""
+
+import argparse
+import json
+import logging
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from app.errors import InvalidInput, NotFound, ServiceError
+from app.settings import Settings, check_access, load_settings
+
+if TYPE_CHECKING:
+    from app.policies.checkpoint import Checkpoint
+    from app.policies.training import Progress
+
+ROOT = Path(__file__).resolve().parent.parent
+WRONG_CALL = 2
+IN_THE_WAY = 1
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one verb.
+
+    Args:
+        arguments: Command line; that of the process by default.
+
+    Returns:
+        The exit status.
+    """
+    options, rest = parser().parse_known_args(arguments)
+    if rest and options.verb != "bench":
+        parser().error(f"unknown arguments: {' '.join(rest)}")
+    options.rest = rest
+    logging.basicConfig(
+        level=logging.INFO,
+        stream=sys.stderr,
+        format="%(asctime)s %(levelname)s %(name)s: %(message)s",
+    )
+    for chatty in ("alembic", "websockets", "uvicorn"):
+        logging.getLogger(chatty).setLevel(logging.WARNING)
+    try:
+        status: int = options.run(options)
+    except (InvalidInput, NotFound) as error:
+        print(f"tandem: {error.message}", file=sys.stderr)
+        return WRONG_CALL
+    except ServiceError as error:
+        print(f"tandem: {error.message}", file=sys.stderr)
+        return IN_THE_WAY
+    except KeyboardInterrupt:
+        return 130
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    return status
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the parser of the command line."""
+    top = argparse.ArgumentParser(prog="python -m app", description="A robot beside a person.")
+    verbs = top.add_subparsers(dest="verb", required=True, metavar="VERB")
+
+    def verb(name: str, run: Callable[[argparse.Namespace], int], text: str) -> Any:
+        added = verbs.add_parser(name, help=text, description=text)
+        added.set_defaults(run=run)
+        return added
+
+    one = verb("serve", run_serve, "Start the service.")
+    one.add_argument("--host", help="address to listen on (TANDEM_HOST)")
+    one.add_argument("--port", type=int, help="port (TANDEM_PORT)")
+    one.add_argument("--data", type=Path, help="data folder (TANDEM_DATA)")
+    verb("setup", run_setup, "Create or upgrade the database, compile the kernels.")
+    one = verb("train", run_train, "Train a policy here and now, without a server.")
+    one.add_argument("preset")
+    one.add_argument("--seed", type=int, default=0)
+    one.add_argument("--set", action="append", default=[], metavar="FIELD=VALUE", dest="sets")
+    one.add_argument("--output", type=Path, default=Path("."), help="folder of the result")
+    one.add_argument("--json", action="store_true")
+    one = verb("evaluate", run_evaluate, "Measure a checkpoint by a protocol.")
+    one.add_argument("protocol")
+    one.add_argument("--checkpoint", default="pick", help="alias, SHA-256 or .safetensors file")
+    one.add_argument("--episodes", type=int, help="the protocol's own if not given")
+    one.add_argument("--seed", type=int, default=11)
+    one.add_argument("--json", action="store_true")
+    one = verb("bench", run_bench, "Run a benchmark of the checkout; more options go to it.")
+    one.add_argument("name")
+    one = verb("cells", run_cells, "List the work cells, or check a file of one.")
+    one.add_argument("action", choices=("list", "check"))
+    one.add_argument("file", nargs="?", type=Path)
+    one.add_argument("--json", action="store_true")
+    return top
+
+
+def run_serve(options: argparse.Namespace) -> int:
+    """Start the service; the port is taken before anything else."""
+    from app.listening import listen
+
+    settings = load_settings(host=options.host, port=options.port, data=options.data)
+    check_access(settings)
+    sock = listen(settings.host, settings.port)
+    prepare_kernels(settings)
+    from app.serving import serve
+
+    serve(settings, sock, say=lambda line: print(line, flush=True))
+    return 0
+
+
+def run_setup(_options: argparse.Namespace) -> int:
+    """Create or upgrade the database and compile the kernels into their cache."""
+    settings = load_settings()
+    prepare_kernels(settings)
+    from app.store.engine import Store
+    from app.store.lock import ServerLock
+    from app.store.migrate import migrate
+
+    settings.data.mkdir(parents=True, exist_ok=True)
+    store = Store(settings.database)
+    lock = ServerLock(store, settings.data)
+    lock.acquire()
+    try:
+        migrate(store)
+    finally:
+        lock.release()
+    print(f"database: {store.shown_url}", flush=True)
+    store.close()
+    print("compiling the simulator's kernels (half a minute, once) ...", flush=True)
+    from app.warm_up import warm_up
+
+    print(f"kernels are ready ({warm_up():.1f} s)", flush=True)
+    return 0
+
+
+def run_train(options: argparse.Namespace) -> int:
+    """Train in this process and write the policy into a folder."""
+    prepare_kernels(load_settings())
+    import torch
+
+    from app.policies import presets
+    from app.policies.training import train
+
+    preset = presets.resolve(options.preset, parsed_sets(options.sets))
+    options.output.mkdir(parents=True, exist_ok=True)
+    torch.set_num_threads(1)
+
+    def keep(_step: int, policy: "Checkpoint", _resume: "Checkpoint") -> None:
+        (options.output / "policy.safetensors").write_bytes(policy.tensors)
+        (options.output / "policy.json").write_text(json.dumps(policy.manifest, indent=1))
+
+    train(
+        preset,
+        seed=options.seed,
+        resume=None,
+        on_progress=log_progress,
+        on_checkpoint=keep,
+        should_stop=lambda: False,
+    )
+    path = options.output / "policy.safetensors"
+    print(json.dumps({"checkpoint": str(path)}) if options.json else f"wrote {path}")
+    return 0
+
+
+def log_progress(progress: "Progress") -> None:
+    """Say on standard error how far a training is."""
+    logging.getLogger("app.train").info(
+        "%d of %d steps: success %.3f, collision %.3f, time-out %.3f, %.0f s left",
+        progress.step,
+        progress.total_steps,
+        progress.success,
+        progress.collision,
+        progress.timeout,
+        progress.time_left_s,
+    )
+
+
+def run_evaluate(options: argparse.Namespace) -> int:
+    """Run a protocol and print its rows."""
+    settings = load_settings()
+    prepare_kernels(settings)
+    import torch
+
+    from app.machine import describe
+    from app.policies.evaluation.protocols import PROTOCOLS, evaluate
+
+    if options.protocol not in PROTOCOLS:
+        raise NotFound("protocol", options.protocol, tuple(PROTOCOLS))
+    checkpoint = find_checkpoint(options.checkpoint, settings)
+    torch.set_num_threads(1)
+    result = evaluate(
+        options.protocol, checkpoint, episodes=options.episodes, seed=options.seed
+    )
+    result = {**result, "machine": describe()}
+    print(json.dumps(result) if options.json else table(result))
+    return 0
+
+
+def run_bench(options: argparse.Namespace) -> int:
+    """Run ``tests/benchmarks/bench_NAME.py`` of the checkout."""
+    folder = ROOT / "tests" / "benchmarks"
+    names = sorted(
+        path.stem.removeprefix("bench_").replace("_", "-") for path in folder.glob("bench_*.py")
+    )
+    if options.name not in names:
+        rule = "is no benchmark of this checkout"
+        raise InvalidInput("NAME", options.name, rule, names)
+    prepare_kernels(load_settings())
+    script = folder / f"bench_{options.name.replace('-', '_')}.py"
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    command = [sys.executable, str(script), *options.rest]
+    return subprocess.run(command, env=environment, check=False).returncode
+
+
+def run_cells(options: argparse.Namespace) -> int:
+    """List the shipped cells or check a file."""
+    from pydantic import ValidationError
+
+    from app.sim.cells import Cell, cell_names, load_cell
+
+    if options.action == "list":
+        cells = [load_cell(name) for name in cell_names()]
+        listed = [{"name": cell.name, "title": cell.title} for cell in cells]
+        lines = [f"{cell.name:20} {cell.title}" for cell in cells]
+        print(json.dumps({"cells": listed}) if options.json else "\n".join(lines))
+        return 0
+    if options.file is None:
+        raise InvalidInput("FILE", None, "must be given: cells check FILE")
+    try:
+        cell = Cell.model_validate_json(options.file.read_bytes())
+    except OSError as error:
+        raise InvalidInput(
+            "FILE", str(options.file), f"cannot be read: {error.strerror}"
+        ) from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        field = ".".join(str(part) for part in first["loc"]) or "file"
+        raise InvalidInput(field, first["input"], first["msg"]) from error
+    found = {"name": cell.name, "stations": list(cell.station_ids), "ok": True}
+    print(json.dumps(found) if options.json else f"{options.file}: {cell.name} is a good cell")
+    return 0
+
+
+def prepare_kernels(settings: Settings) -> None:
+    """Keep compiled kernels in the data folder, so that a read-only source tree works."""
+    cache = settings.data.resolve() / "kernels"
+    os.environ.setdefault("NUMBA_CACHE_DIR", str(cache))
+
+
+def find_checkpoint(reference: str, settings: Settings) -> "Checkpoint":
+    """Return a checkpoint by file, shipped alias, or SHA-256 or alias in the database.
+
+    Raises:
+        NotFound: There is none.
+    """
+    from app.policies import pretrained
+    from app.policies.checkpoint import load
+    from app.store.checkpoints import get_checkpoint, read_tensors
+    from app.store.engine import Store
+    from app.store.migrate import check_schema
+
+    path = Path(reference)
+    if path.suffix == ".safetensors":
+        if not path.is_file():
+            raise NotFound("checkpoint file", reference)
+        manifest = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
+        return load(manifest, path.read_bytes())
+    if reference in pretrained.ALIASES:
+        return pretrained.load(reference)
+    if settings.database_url is None and not (settings.data / "tandem.db").exists():
+        raise NotFound("checkpoint", reference, tuple(pretrained.ALIASES))
+    store = Store(settings.database)
+    try:
+        check_schema(store)
+        record = get_checkpoint(store, reference)
+        return load(record.manifest, read_tensors(store, record.sha256))
+    finally:
+        store.close()
+
+
+def parsed_sets(sets: Sequence[str]) -> dict[str, Any]:
+    """Read ``FIELD=VALUE`` pairs; values are JSON where they can be, text otherwise."""
+    overrides: dict[str, Any] = {}
+    for pair in sets:
+        name, sign, text = pair.partition("=")
+        if not sign:
+            raise InvalidInput("--set", pair, "must have the form FIELD=VALUE")
+        try:
+            overrides[name] = json.loads(text)
+        except ValueError:
+            overrides[name] = text
+    return overrides
+
+
+def table(result: Mapping[str, Any]) -> str:
+    """Write a protocol's result for people."""
+    rows: Sequence[Mapping[str, Any]] = result["results"]
+    columns = list(dict.fromkeys(key for row in rows for key in row))
+    lines = [columns, *([shown(row.get(key)) for key in columns] for row in rows)]
+    widths = [max(len(line[k]) for line in lines) for k in range(len(columns))]
+    texts = [
+        "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip()
+        for line in lines
+    ]
+    head = f"{result['protocol']}, seed {result['seed']}, {result['episodes']} episodes"
+    return "\n".join([head, f"checkpoint {result['checkpoint']}", "", *texts])
+
+
+def shown(value: Any) -> str:
+    """Write one value of a row: a rate with its interval, a number, or text."""
+    if isinstance(value, Mapping) and {"mean", "low", "high"} <= value.keys():
+        mean, low, high = (100.0 * value[key] for key in ("mean", "low", "high"))
+        return f"{mean:.1f} % [{low:.1f}, {high:.1f}]"
+    if isinstance(value, float):
+        return f"{value:.3g}"
+    return "" if value is None else str(value)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

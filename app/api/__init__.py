@@ -1,0 +1,1 @@
+"""HTTP and WebSocket: one router per noun, schemas, problems, security, the viewer proxy."""

@@ -1,0 +1,82 @@
+"""The HTTP application: routers, problems, guard and pages around the parts of the service."""
+
+from collections.abc import Callable
+from contextlib import AbstractAsyncContextManager
+from pathlib import Path
+
+from fastapi import FastAPI
+from starlette.responses import FileResponse
+from starlette.staticfiles import StaticFiles
+
+from app.api import (
+    cells,
+    checkpoints,
+    health,
+    jobs,
+    presets,
+    problems,
+    reference,
+    session,
+    task_selection,
+    viewer,
+    worlds,
+)
+from app.api.bodies import BodyRules
+from app.api.security import SESSION_PATH, Guard
+
+Lifespan = Callable[[FastAPI], AbstractAsyncContextManager[None]]
+
+DESCRIPTION = (
+    "A robot arm and a person share a work cell; Tandem chooses what the robot does next and "
+    "how it moves. SI units and radians; positions in the robot's base frame. Every error is a "
+    "problem document (RFC 9457)."
+)
+
+
+def build_app(*, lifespan: Lifespan, static: Path, token: str | None, version: str) -> FastAPI:
+    """Put the application together; its lifespan sets ``app.state.services``.
+
+    Args:
+        lifespan: Starts and stops the parts behind the routes.
+        static: Folder of the page.
+        token: The token that every request must prove; None on loopback.
+        version: Version of the service.
+    """
+    app = FastAPI(
+        title="Tandem",
+        version=version,
+        description=DESCRIPTION,
+        lifespan=lifespan,
+        docs_url=None,
+        redoc_url=None,
+        responses={422: {"model": problems.Problem, "description": "The input is refused"}},
+    )
+    app.state.token = token
+    problems.install(app)
+    for part in (
+        task_selection,
+        worlds,
+        jobs,
+        checkpoints,
+        presets,
+        cells,
+        health,
+        session,
+        viewer,
+        reference,
+    ):
+        app.include_router(part.router)
+    add_page(app, static)
+    app.add_middleware(BodyRules)
+    app.add_middleware(Guard, token=token, open_paths=(SESSION_PATH,))
+    return app
+
+
+def add_page(app: FastAPI, static: Path) -> None:
+    """Serve the page at ``/`` and what it loads under ``/static``."""
+
+    @app.get("/", include_in_schema=False)
+    async def index() -> FileResponse:
+        return FileResponse(static / "index.html", headers={"Cache-Control": "no-cache"})
+
+    app.mount("/static", StaticFiles(directory=static), name="static")

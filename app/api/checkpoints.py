@@ -1,0 +1,61 @@
+"""Trained policies: list them, read them, download them."""
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query
+from starlette.responses import Response
+
+from app.api.schemas.checkpoints import CheckpointList, CheckpointPublic
+from app.api.services import ServicesDep
+from app.store import checkpoints
+
+router = APIRouter(prefix="/v1/checkpoints", tags=["checkpoints"])
+
+
+@router.get("", summary="List the checkpoints")
+def list_some(
+    services: ServicesDep,
+    job_id: Annotated[str | None, Query(description="only those this job made")] = None,
+    cursor: Annotated[str | None, Query(description="next_cursor of the page before")] = None,
+    limit: Annotated[int, Query(description="length of the page, 1 to 200")] = 50,
+) -> CheckpointList:
+    """Return one page, newest first; shipped ones are among them."""
+    page = checkpoints.list_checkpoints(
+        services.store, job_id=job_id, cursor=cursor, limit=limit
+    )
+    return CheckpointList.from_domain(page)
+
+
+@router.get("/{reference}", summary="One checkpoint, by SHA-256 or alias")
+def get_one(reference: str, services: ServicesDep) -> CheckpointPublic:
+    """Return one checkpoint without its tensors."""
+    record = checkpoints.get_checkpoint(services.store, reference)
+    return CheckpointPublic.from_domain(record)
+
+
+@router.get("/{reference}/manifest", summary="A checkpoint's manifest alone")
+def get_manifest(reference: str, services: ServicesDep) -> dict[str, Any]:
+    """Return the manifest that belongs to the tensors."""
+    return dict(checkpoints.get_checkpoint(services.store, reference).manifest)
+
+
+@router.get(
+    "/{reference}/tensors",
+    summary="Download a checkpoint's tensors",
+    response_class=Response,
+    responses={
+        200: {"content": {"application/octet-stream": {}}, "description": "safetensors"}
+    },
+)
+def get_tensors(reference: str, services: ServicesDep) -> Response:
+    """Return the tensors as a safetensors file."""
+    record = checkpoints.get_checkpoint(services.store, reference)
+    name = (*record.aliases, record.sha256[:12])[0]
+    return Response(
+        checkpoints.read_tensors(services.store, record.sha256),
+        media_type="application/octet-stream",
+        headers={
+            "Content-Disposition": f'attachment; filename="{name}.safetensors"',
+            "ETag": f'"{record.sha256}"',
+        },
+    )

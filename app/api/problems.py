@@ -1,0 +1,196 @@
+"""Every error as a problem document (RFC 9457, ``application/problem+json``).
+
+Routes contain no ``try``: what they raise comes here. Members beyond the standard's five are
+the error's data; bad input always carries ``field``, ``value``, ``rule`` and ``choices``.
+"""
+
+import http
+import logging
+from collections.abc import Mapping
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse
+from pydantic import BaseModel
+from starlette.exceptions import HTTPException
+from starlette.routing import Match
+
+from app.api.validation import (
+    NOTHING,
+    body_models,
+    member,
+    validation_member,
+    without_tag,
+)
+from app.errors import (
+    CheckpointMismatch,
+    Conflict,
+    InvalidInput,
+    NotFound,
+    NotReady,
+    ServiceError,
+    SimulationError,
+    StorageFull,
+)
+
+logger = logging.getLogger(__name__)
+
+MEDIA_TYPE = "application/problem+json"
+MAX_LISTED_ERRORS = 20
+STATUS: tuple[tuple[type[ServiceError], int, str], ...] = (
+    (NotFound, 404, "not-found"),
+    (InvalidInput, 422, "invalid-input"),
+    (CheckpointMismatch, 409, "checkpoint-mismatch"),
+    (Conflict, 409, "conflict"),
+    (NotReady, 503, "not-ready"),
+    (StorageFull, 507, "storage-full"),
+    (SimulationError, 500, "simulation-error"),
+)
+
+
+class ProblemResponse(JSONResponse):
+    """A JSON answer with the media type of problems."""
+
+    media_type = MEDIA_TYPE
+
+
+class Problem(BaseModel):
+    """A problem document, as the API description shows it (RFC 9457)."""
+
+    type: str
+    title: str
+    status: int
+    detail: str
+    instance: str
+    field: str | None = None
+    value: str | None = None
+    rule: str | None = None
+    choices: list[str] | None = None
+
+
+def problem(
+    status: int,
+    detail: str,
+    *,
+    kind: str | None = None,
+    instance: str = "",
+    data: Mapping[str, object] | None = None,
+    headers: Mapping[str, str] | None = None,
+) -> ProblemResponse:
+    """Build one problem document.
+
+    Args:
+        status: HTTP status.
+        detail: One sentence about this occurrence.
+        kind: Last part of the type URI; from the status if None.
+        instance: Path of the request.
+        data: Extension members.
+        headers: Headers of the answer.
+    """
+    title = http.HTTPStatus(status).phrase
+    kind = kind or title.lower().replace(" ", "-")
+    members: dict[str, object] = {
+        "type": f"urn:tandem:problem:{kind}",
+        "title": title,
+        "status": status,
+        "detail": detail,
+        "instance": instance,
+    }
+    return ProblemResponse(
+        {**members, **(data or {})}, status, headers=dict(headers) if headers else None
+    )
+
+
+def service_problem(error: ServiceError, instance: str) -> ProblemResponse:
+    """Turn an error of the tree into its problem."""
+    status, kind = 500, "service-error"
+    for error_type, its_status, its_kind in STATUS:
+        if isinstance(error, error_type):
+            status, kind = its_status, its_kind
+            break
+    headers = {"Retry-After": "2"} if status == 503 else None
+    return problem(
+        status,
+        error.message,
+        kind=kind,
+        instance=instance,
+        data=error.problem(),
+        headers=headers,
+    )
+
+
+async def on_service_error(request: Request, error: Exception) -> ProblemResponse:
+    """Answer an error that Tandem raised on purpose."""
+    assert isinstance(error, ServiceError)
+    answer = service_problem(error, request.url.path)
+    if answer.status_code >= 500 and not isinstance(error, NotReady):
+        logger.error("%s %s: %s", request.method, request.url.path, error, exc_info=error)
+    return answer
+
+
+async def on_validation_error(request: Request, error: Exception) -> ProblemResponse:
+    """Answer input that does not fit its schema."""
+    assert isinstance(error, RequestValidationError)
+    models = body_models(request)
+    cut = [without_tag(one, models) for one in error.errors()[:MAX_LISTED_ERRORS]]
+    found = [validation_member(one, model) for one, model in cut]
+    malformed = error.errors()[0]["type"] == "json_invalid"
+    first = found[0]
+    given = "" if first["value"] == NOTHING else f" = {first['value']}"
+    return problem(
+        400 if malformed else 422,
+        f"{first['field']}{given} {first['rule']}",
+        kind="malformed-json" if malformed else "invalid-input",
+        instance=request.url.path,
+        data={**first, "errors": found},
+    )
+
+
+async def on_http_error(request: Request, error: Exception) -> ProblemResponse:
+    """Answer what the framework refuses: unknown path, wrong method, too large a body."""
+    assert isinstance(error, HTTPException)
+    detail = {
+        404: f"nothing is at {request.url.path}; /docs lists what is",
+        405: f"{request.method} is not answered at {request.url.path}",
+    }.get(error.status_code, str(error.detail))
+    data: dict[str, object] = {}
+    headers = dict(error.headers or {})
+    if error.status_code == 405:
+        choices = _methods_at(request)
+        headers["Allow"] = ", ".join(choices)
+        data = member("method", request.method, "must be one of the choices", choices)
+    return problem(
+        error.status_code,
+        detail,
+        instance=request.url.path,
+        data=data,
+        headers=headers,
+    )
+
+
+def _methods_at(request: Request) -> list[str]:
+    """List the methods that the path of a request answers, over all routes."""
+    routes = request.app.routes
+    return [
+        method
+        for method in ("GET", "POST", "PUT", "PATCH", "DELETE")
+        if any(
+            route.matches({**request.scope, "method": method})[0] is Match.FULL
+            for route in routes
+        )
+    ]
+
+
+async def on_bug(request: Request, _error: Exception) -> ProblemResponse:
+    """Answer what nobody foresaw; the trace goes to the log, never to the caller."""
+    return problem(
+        500, "an unforeseen error; the server's log has the trace", instance=request.url.path
+    )
+
+
+def install(app: FastAPI) -> None:
+    """Make ``app`` answer every error with a problem."""
+    app.add_exception_handler(ServiceError, on_service_error)
+    app.add_exception_handler(RequestValidationError, on_validation_error)
+    app.add_exception_handler(HTTPException, on_http_error)
+    app.add_exception_handler(Exception, on_bug)

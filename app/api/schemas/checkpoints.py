@@ -1,0 +1,54 @@
+"""Checkpoints as the service shows them."""
+
+from datetime import datetime
+from typing import Any, Self
+
+from pydantic import Field
+
+from app.api.schemas.numbers import Answer
+from app.store.records import CheckpointRecord, Page
+
+
+class CheckpointPublic(Answer):
+    """One stored checkpoint, without its tensors."""
+
+    sha256: str
+    number: int = Field(description="running number")
+    aliases: list[str] = Field(description="names that point to it")
+    job_id: str | None = Field(description="the job that made it; null for a shipped one")
+    step: int | None = Field(description="environment steps of that job")
+    preset: str | None
+    size: int = Field(description="length of the tensors [bytes]")
+    created_at: datetime
+    tensors: str = Field(description="where its safetensors bytes are")
+    manifest: dict[str, Any]
+
+    @classmethod
+    def from_domain(cls, record: CheckpointRecord) -> Self:
+        """Make it from the store's record."""
+        preset = record.manifest.get("preset", {})
+        return cls(
+            sha256=record.sha256,
+            number=record.number,
+            aliases=list(record.aliases),
+            job_id=record.job_id,
+            step=record.step,
+            preset=preset.get("name") if isinstance(preset, dict) else None,
+            size=record.size,
+            created_at=record.created_at,
+            tensors=f"/v1/checkpoints/{record.sha256}/tensors",
+            manifest=dict(record.manifest),
+        )
+
+
+class CheckpointList(Answer):
+    """One page of checkpoints, newest first."""
+
+    items: list[CheckpointPublic]
+    next_cursor: str | None = Field(description="pass it as `cursor` for the next page")
+
+    @classmethod
+    def from_domain(cls, page: Page[CheckpointRecord]) -> Self:
+        """Make it from the store's page."""
+        items = [CheckpointPublic.from_domain(one) for one in page.items]
+        return cls(items=items, next_cursor=page.next_cursor)

@@ -1,0 +1,178 @@
+"""``POST /v1/task-selection``: the state in, the decision out."""
+
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import Field
+
+from app.api.schemas.numbers import Answer, Body, Finite, Vector3, Vector6, Vector18
+from app.errors import InvalidInput
+from app.sim import human
+from app.sim.cells import Cell, cell_names, load_cell
+from app.sim.ports import Candidate, Decision, OutsideField, Person, Vec
+
+MAX_CANDIDATES = 1000
+LIMIT_TOLERANCE = 1e-6
+
+Stamp = Finite | Annotated[str, Field(max_length=64)] | None
+
+
+class RobotState(Body):
+    """The robot as measured."""
+
+    q: Vector6 = Field(description="joint positions [rad], base to wrist 3")
+    qd: Vector6 = Field(description="joint speeds [rad/s]")
+
+
+class PersonState(Body):
+    """One person as tracked, in the 18 joints of the body model."""
+
+    q: Vector18 = Field(description="joint positions [m, rad]: " + ", ".join(human.JOINT_NAMES))
+    qd: Vector18 = Field(description="joint speeds [m/s, rad/s]")
+
+    def to_domain(self) -> Person:
+        """Return the person as arrays."""
+        return Person(q=np.array(self.q), qd=np.array(self.qd))
+
+
+class CandidateState(Body):
+    """One task the robot may take."""
+
+    id: str = Field(min_length=1, max_length=128, description="your name for it")
+    position: Vector3 = Field(description="point the tool must reach, in `frame` [m]")
+
+
+class TaskSelectionRequest(Body):
+    """What is known at the moment of choice."""
+
+    cell: str = Field(description="name of the work cell", examples=["pick-and-place"])
+    frame: Literal["robot-base"] = Field("robot-base", description="frame of all positions")
+    stamp: Stamp = Field(None, description="your time of the state; comes back unchanged")
+    robot: RobotState
+    people: list[PersonState] = Field(
+        max_length=1, description="the people in the cell; one at most for now"
+    )
+    candidates: list[CandidateState] = Field(
+        min_length=1, max_length=MAX_CANDIDATES, description="what may be chosen"
+    )
+    previous: str | None = Field(
+        None, max_length=128, description="id chosen last, for hysteresis; null chooses afresh"
+    )
+    time_left_s: Annotated[float, Field(ge=0.0, le=60.0)] = Field(
+        10.0, description="time left to reach the target [s]"
+    )
+    checkpoint: str | None = Field(
+        None, max_length=64, description="SHA-256 or alias; the shipped policy if null"
+    )
+
+    def to_domain(self) -> tuple[Vec, Vec, tuple[Person, ...], tuple[Candidate, ...]]:
+        """Check what a schema cannot, and return q, qd, people and candidates as arrays.
+
+        Raises:
+            InvalidInput: An unknown cell, a joint outside its limits, an id given twice.
+        """
+        cell = self._known_cell()
+        q, qd = np.array(self.robot.q), np.array(self.robot.qd)
+        robot_names = [f"robot.q[{joint}]" for joint in range(6)]
+        _check_limits(robot_names, q, np.array(cell.robot.q_min), np.array(cell.robot.q_max))
+        people = tuple(person.to_domain() for person in self.people)
+        for index, person in enumerate(people):
+            names = [f"people[{index}].q[{joint}]" for joint in range(len(human.JOINT_NAMES))]
+            _check_limits(names, person.q, human.Q_MIN, human.Q_MAX)
+        self._check_ids_are_unique()
+        return (
+            q,
+            qd,
+            people,
+            tuple(
+                Candidate(id=one.id, position=np.array(one.position)) for one in self.candidates
+            ),
+        )
+
+    def _known_cell(self) -> Cell:
+        if self.cell not in cell_names():
+            raise InvalidInput("cell", self.cell, "is no known work cell", cell_names())
+        return load_cell(self.cell)
+
+    def _check_ids_are_unique(self) -> None:
+        seen: set[str] = set()
+        for index, candidate in enumerate(self.candidates):
+            if candidate.id in seen:
+                rule = "must be unique among the candidates"
+                raise InvalidInput(f"candidates[{index}].id", candidate.id, rule)
+            seen.add(candidate.id)
+
+
+def _check_limits(names: list[str], values: Vec, low: Vec, high: Vec) -> None:
+    outside = (values < low - LIMIT_TOLERANCE) | (values > high + LIMIT_TOLERANCE)
+    for joint in np.flatnonzero(outside)[:1]:
+        rule = f"must lie in [{low[joint]:g}, {high[joint]:g}], the limits of this joint"
+        raise InvalidInput(names[joint], float(values[joint]), rule)
+
+
+class Outside(Answer):
+    """One input outside what the checkpoint was trained on."""
+
+    field: str
+    value: float
+    low: float = Field(description="least value met in training")
+    high: float = Field(description="greatest value met in training")
+
+    @classmethod
+    def from_domain(cls, outside: OutsideField) -> Self:
+        """Make it from the simulator's data."""
+        return cls(field=outside.field, value=outside.value, low=outside.low, high=outside.high)
+
+
+class Action(Answer):
+    """What the policy would do now for one candidate."""
+
+    qd_target: Vector6 = Field(description="joint speeds asked for [rad/s]")
+
+
+class CandidateValue(Answer):
+    """What the critic says about one candidate."""
+
+    id: str
+    value: float = Field(description="expected discounted reward Q(s, pi(s))")
+    chosen: bool
+    reachable: bool = Field(description="whether a posture with vertical tool exists there")
+    action: Action
+    outside: list[Outside] = Field(description="how its position leaves the training range")
+
+
+class TaskSelection(Answer):
+    """The choice and all that explains it."""
+
+    chosen: str = Field(description="id of the chosen candidate")
+    candidates: list[CandidateValue]
+    state_outside: list[Outside] = Field(description="state fields outside the training range")
+    checkpoint: str = Field(description="SHA-256 of the checkpoint that decided")
+    elapsed_ms: float = Field(description="time the decision took [ms]")
+    stamp: Stamp = None
+
+    @classmethod
+    def from_domain(
+        cls, decision: Decision, candidates: tuple[Candidate, ...], stamp: Stamp
+    ) -> Self:
+        """Make it from a decision and what could be chosen."""
+        return cls(
+            chosen=decision.chosen,
+            candidates=[
+                CandidateValue(
+                    id=candidate.id,
+                    value=decision.values[index],
+                    chosen=index == decision.index,
+                    reachable=decision.reachable[index],
+                    action=Action(qd_target=decision.qd_target[index].tolist()),
+                    outside=[
+                        Outside.from_domain(o) for o in decision.outside_candidates[index]
+                    ],
+                )
+                for index, candidate in enumerate(candidates)
+            ],
+            state_outside=[Outside.from_domain(one) for one in decision.outside],
+            checkpoint=decision.checkpoint,
+            elapsed_ms=decision.elapsed_ms,
+            stamp=stamp,
+        )

@@ -1,0 +1,269 @@
+"""Live worlds: what they show, and what may be done to them."""
+
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field
+
+from app.api.schemas.numbers import Answer, Body, Finite, Vector3
+from app.api.schemas.task_selection import (
+    CandidateState,
+    Outside,
+    PersonState,
+    RobotState,
+    TaskSelectionRequest,
+)
+from app.sim import commands
+from app.sim.ports import TaskPolicy
+from app.sim.snapshot import CandidateView, WorldSnapshot
+
+
+class CandidateLive(Answer):
+    """One station the robot may choose now."""
+
+    id: str
+    position: list[float] = Field(description="point the tool must reach [m]")
+    value: float | None = Field(description="expected discounted reward; null undecided")
+    chosen: bool
+    reachable: bool | None
+    outside: list[Outside]
+
+    @classmethod
+    def from_domain(cls, view: CandidateView) -> Self:
+        """Make it from the world's view."""
+        return cls(
+            id=view.id,
+            position=view.position.tolist(),
+            value=view.value,
+            chosen=view.chosen,
+            reachable=view.reachable,
+            outside=[Outside.from_domain(one) for one in view.outside],
+        )
+
+
+class ContactPublic(Answer):
+    """The contact that ended an episode."""
+
+    kind: str
+    link: str
+    body: str
+
+
+class CountersPublic(Answer):
+    """What happened since the last reset."""
+
+    reached: int
+    contacts: int
+    timeouts: int
+    switches: int
+
+
+class WorldLight(Answer):
+    """One live world at one tick, without joint positions: ten times a second on a stream."""
+
+    id: str
+    cell: str
+    tick: int
+    t_s: float = Field(description="simulated time since the last reset [s]")
+    mode: str = Field(description="who moves the person: manual or auto")
+    paused: bool
+    status: str
+    message: str = Field(description="why, in one sentence")
+    selected: list[str] = Field(description="stations that the visitor allows")
+    candidates: list[CandidateLive]
+    chosen: str | None
+    outside: list[Outside] = Field(description="state fields outside the training range")
+    clearance_m: float | None = Field(description="least distance robot to person [m]")
+    contact: ContactPublic | None
+    checkpoint: str | None = Field(description="SHA-256 of the checkpoint that decides")
+    policy_title: str | None
+    elapsed_ms: float | None = Field(description="time the decision took [ms]")
+    case: str | None
+    counters: CountersPublic
+
+    @classmethod
+    def from_domain(cls, snapshot: WorldSnapshot) -> Self:
+        """Make it from a snapshot."""
+        return cls(**light_members(snapshot))
+
+
+class WorldPublic(WorldLight):
+    """One live world at one tick, with the state that a decision needs."""
+
+    tcp: list[float] = Field(description="tool centre point [m]")
+    viewer: str = Field(description="where its 3D scene is")
+    state: TaskSelectionRequest | None = Field(
+        description="post it to /v1/task-selection as it is: while the status is `moving`, "
+        "same choice and values; null while there is nothing to choose"
+    )
+
+    @classmethod
+    def from_domain(cls, snapshot: WorldSnapshot) -> Self:
+        """Make it from a snapshot."""
+        return cls(
+            **light_members(snapshot),
+            tcp=snapshot.tcp.tolist(),
+            viewer=f"/viewer/{snapshot.id}/",
+            state=decision_input(snapshot),
+        )
+
+
+class WorldSummary(Answer):
+    """One line of the list of worlds."""
+
+    id: str
+    cell: str
+    viewer: str
+    checkpoint: str | None
+
+
+class WorldList(Answer):
+    """All live worlds."""
+
+    items: list[WorldSummary]
+
+
+def decision_input(snapshot: WorldSnapshot) -> TaskSelectionRequest | None:
+    """Return the request that repeats the snapshot's decision; None with nothing to choose."""
+    if not snapshot.candidates:
+        return None
+    return TaskSelectionRequest(
+        cell=snapshot.cell,
+        frame="robot-base",
+        stamp=snapshot.t_s,
+        robot=RobotState(q=snapshot.robot_q.tolist(), qd=snapshot.robot_qd.tolist()),
+        people=[PersonState(q=snapshot.person_q.tolist(), qd=snapshot.person_qd.tolist())],
+        candidates=[
+            CandidateState(id=one.id, position=one.position.tolist())
+            for one in snapshot.candidates
+        ],
+        previous=snapshot.previous,
+        time_left_s=max(snapshot.time_left_s, 0.0),
+        checkpoint=snapshot.checkpoint,
+    )
+
+
+def light_members(snapshot: WorldSnapshot) -> dict[str, Any]:
+    """Return the members of :class:`WorldLight`."""
+    contact, counters = snapshot.contact, snapshot.counters
+    same = (
+        "id", "cell", "tick", "t_s", "mode", "paused", "status", "message", "chosen",
+        "clearance_m", "checkpoint", "policy_title", "elapsed_ms", "case",
+    )  # fmt: skip
+    return {name: getattr(snapshot, name) for name in same} | {
+        "selected": list(snapshot.selected),
+        "candidates": [CandidateLive.from_domain(one) for one in snapshot.candidates],
+        "outside": [Outside.from_domain(one) for one in snapshot.outside],
+        "contact": contact
+        and ContactPublic(kind=contact.kind, link=contact.link, body=contact.body),
+        "counters": CountersPublic(
+            reached=counters.reached,
+            contacts=counters.contacts,
+            timeouts=counters.timeouts,
+            switches=counters.switches,
+        ),
+    }
+
+
+class MoveHuman(Body):
+    """Ask the person to take a posture; what is null stays where it is."""
+
+    tag: Literal["move-human"]
+    pelvis: Vector3 | None = Field(None, description="pelvis x [m], y [m], yaw [rad]")
+    right: Vector3 | None = Field(None, description="point for the right hand [m]")
+    left: Vector3 | None = Field(None, description="point for the left hand [m]")
+
+    def to_domain(self) -> commands.Command:
+        """Return the world's command."""
+        return commands.MoveHuman(
+            pelvis=_triple(self.pelvis), right=_triple(self.right), left=_triple(self.left)
+        )
+
+
+class SetMode(Body):
+    """Say who moves the person."""
+
+    tag: Literal["set-mode"]
+    mode: commands.Mode
+
+    def to_domain(self) -> commands.Command:
+        """Return the world's command."""
+        return commands.SetMode(mode=self.mode)
+
+
+class Plain(Body):
+    """A command without arguments."""
+
+    tag: Literal["pause", "resume", "step", "reset"]
+
+    def to_domain(self) -> commands.Command:
+        """Return the world's command."""
+        plain: dict[str, commands.Command] = {
+            "pause": commands.Pause(),
+            "resume": commands.Resume(),
+            "step": commands.StepOnce(),
+            "reset": commands.Reset(),
+        }
+        return plain[self.tag]
+
+
+class SetCandidates(Body):
+    """Say which stations the robot may choose among."""
+
+    tag: Literal["set-candidates"]
+    ids: list[str] = Field(max_length=1000, description="station ids; empty lets it rest")
+
+    def to_domain(self) -> commands.Command:
+        """Return the world's command."""
+        return commands.SetCandidates(ids=tuple(self.ids))
+
+
+class ToggleCandidate(Body):
+    """Add a station to the candidates, or take it out."""
+
+    tag: Literal["toggle-candidate"]
+    id: str = Field(description="station id")
+
+    def to_domain(self) -> commands.Command:
+        """Return the world's command."""
+        return commands.ToggleCandidate(id=self.id)
+
+
+class StartCase(Body):
+    """Start one of the case studies."""
+
+    tag: Literal["start-case"]
+    id: str = Field(description="case-1 to case-4")
+
+    def to_domain(self) -> commands.Command:
+        """Return the world's command."""
+        return commands.StartCase(id=self.id)
+
+
+class SetPolicy(Body):
+    """Let another checkpoint decide."""
+
+    tag: Literal["set-policy"]
+    checkpoint: str | None = Field(
+        max_length=64, description="SHA-256 or alias; null lets the robot rest"
+    )
+
+    def to_domain(self, policy: TaskPolicy | None) -> commands.Command:
+        """Return the world's command with the loaded policy."""
+        return commands.SetPolicy(policy=policy)
+
+
+CommandCreate = Annotated[
+    MoveHuman | SetMode | Plain | SetCandidates | ToggleCandidate | StartCase | SetPolicy,
+    Field(discriminator="tag"),
+]
+
+
+class CommandAccepted(Answer):
+    """The command is queued; the world applies it before its next tick."""
+
+    tag: str
+    tick: int = Field(description="the world's last tick when the command was queued")
+
+
+def _triple(values: list[Finite] | None) -> tuple[float, float, float] | None:
+    return None if values is None else (values[0], values[1], values[2])

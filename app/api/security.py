@@ -1,0 +1,161 @@
+"""Who may talk to the service: one ASGI layer around every route, mount and socket.
+
+On loopback no token is asked for, but the ``Host`` must be a loopback name (a page elsewhere
+cannot rebind its own name to this machine) and an ``Origin``, where a browser sends one, must
+be this very site. With a token every request needs it: as ``Authorization: Bearer``, or, for
+browsers, whose sockets and event streams cannot carry that header, as the cookie that
+``POST /session`` gives in exchange for it.
+"""
+
+import hashlib
+import hmac
+import ipaddress
+from collections.abc import Iterable
+from functools import lru_cache
+from http.cookies import CookieError, SimpleCookie
+from importlib import resources
+from urllib.parse import urlsplit
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.responses import HTMLResponse, Response
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from app.api.problems import problem
+
+COOKIE = "tandem_session"
+SESSION_PATH = "/session"
+PAGE_POLICY = (
+    "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; "
+    "script-src 'self'; connect-src 'self'; object-src 'none'; base-uri 'none'; "
+    "form-action 'self'; frame-src 'self'; frame-ancestors 'self'"
+)
+HEADERS = {
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "SAMEORIGIN",
+    "Referrer-Policy": "same-origin",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+}
+
+
+@lru_cache(maxsize=1)
+def _sign_in_page() -> bytes:
+    return (resources.files("app.api") / "signin.html").read_bytes()
+
+
+def session_value(token: str) -> str:
+    """Return what the session cookie holds: proof of the token, not the token."""
+    return hmac.new(token.encode(), b"tandem session", hashlib.sha256).hexdigest()
+
+
+def is_loopback_name(host: str | None) -> bool:
+    """Whether a host name, without its port, can only mean this machine."""
+    if host == "localhost":
+        return True
+    try:
+        return host is not None and ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+class Guard:
+    """ASGI layer that checks Host, Origin and token, and adds the security headers.
+
+    Args:
+        app: What it protects.
+        token: The token, or None on loopback.
+        open_paths: Paths answered without the token (health checks, sign-in).
+    """
+
+    def __init__(self, app: ASGIApp, *, token: str | None, open_paths: Iterable[str]) -> None:
+        self.app = app
+        self.token = token
+        self.open_paths = frozenset(open_paths)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Let a request through, or answer it here."""
+        if scope["type"] not in ("http", "websocket"):
+            await self.app(scope, receive, send)
+            return
+        refusal = self.refusal(scope, Headers(scope=scope))
+        if refusal is None:
+            await self.app(scope, receive, _with_headers(send))
+            return
+        status, kind, detail, data = refusal
+        if scope["type"] == "websocket":
+            await receive()
+            await send({"type": "websocket.close", "code": 1008, "reason": kind})
+            return
+        headers = {"WWW-Authenticate": "Bearer"} if status == 401 else None
+        answer: Response = problem(
+            status, detail, kind=kind, instance=scope["path"], data=data, headers=headers
+        )
+        if status == 401 and "text/html" in Headers(scope=scope).get("accept", ""):
+            answer = HTMLResponse(_sign_in_page(), 401, headers)
+        await answer(scope, receive, _with_headers(send))
+
+    def refusal(
+        self, scope: Scope, headers: Headers
+    ) -> tuple[int, str, str, dict[str, object]] | None:
+        """Say why a request is refused (status, kind, detail, data), or None."""
+        host = headers.get("host", "")
+        if self.token is None and not is_loopback_name(_hostname(host)):
+            rule = "must be a loopback name: this server is open to this machine only"
+            return _refusal(421, "wrong-host", "Host", host, rule)
+        origin = headers.get("origin")
+        if origin is not None and not _same_site(origin, host):
+            rule = "must be the address of this server"
+            return _refusal(403, "wrong-origin", "Origin", origin, rule)
+        if self.token is None or scope["path"] in self.open_paths:
+            return None
+        if not self._proves_token(headers):
+            detail = "this server needs its token, as 'Authorization: Bearer ...'"
+            return 401, "token-needed", detail, {}
+        return None
+
+    def _proves_token(self, headers: Headers) -> bool:
+        assert self.token is not None
+        scheme, _, given = headers.get("authorization", "").partition(" ")
+        if scheme.lower() == "bearer":
+            return hmac.compare_digest(given.strip().encode(), self.token.encode())
+        try:
+            morsel = SimpleCookie(headers.get("cookie", "")).get(COOKIE)
+        except CookieError:
+            return False
+        if morsel is None:
+            return False
+        return hmac.compare_digest(morsel.value, session_value(self.token))
+
+
+def _refusal(
+    status: int, kind: str, field: str, value: str, rule: str
+) -> tuple[int, str, str, dict[str, object]]:
+    data: dict[str, object] = {"field": field, "value": repr(value[:200]), "rule": rule}
+    return status, kind, f"{field} {value[:200]!r} {rule}", {**data, "choices": []}
+
+
+def _hostname(host: str) -> str | None:
+    try:
+        return urlsplit(f"//{host}").hostname
+    except ValueError:
+        return None
+
+
+def _same_site(origin: str, host: str) -> bool:
+    try:
+        parts = urlsplit(origin)
+    except ValueError:
+        return False
+    return parts.scheme in ("http", "https") and parts.netloc.lower() == host.lower()
+
+
+def _with_headers(send: Send) -> Send:
+    async def send_with_headers(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            headers = MutableHeaders(scope=message)
+            for name, value in HEADERS.items():
+                headers.setdefault(name, value)
+            headers.setdefault("Content-Security-Policy", PAGE_POLICY)
+        await send(message)
+
+    return send_with_headers

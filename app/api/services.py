@@ -1,0 +1,90 @@
+"""What the routes work with, handed over by ``app.main`` when it wires the service."""
+
+import threading
+from dataclasses import dataclass, field
+from typing import Annotated, Protocol
+
+from fastapi import Depends
+from starlette.requests import HTTPConnection
+
+from app.api.registry import PolicyRegistry
+from app.errors import NotFound, NotReady
+from app.sim.ports import WorldHandle
+from app.store.engine import Store
+from jobs.supervisor import Supervisor
+
+
+class LiveWorld(Protocol):
+    """One live world and its viewer; ``web.loop.LiveCell`` is one."""
+
+    @property
+    def handle(self) -> WorldHandle:
+        """Commands in, snapshots out."""
+
+    @property
+    def viewer_port(self) -> int:
+        """Loopback port of its 3D viewer."""
+
+    def stop(self) -> None:
+        """End world and viewer."""
+
+
+@dataclass(slots=True)
+class Readiness:
+    """How far the start has come; written by one thread, read by all."""
+
+    ready: bool = False
+    """Whether the service can decide."""
+    reason: str = "starting"
+    """What it is doing, or why it cannot, for people."""
+    failed: bool = False
+    """Whether the start broke off."""
+
+    def require(self) -> None:
+        """Raise unless the service can decide.
+
+        Raises:
+            NotReady: It cannot; says why.
+        """
+        if not self.ready:
+            raise NotReady(self.reason)
+
+
+@dataclass(slots=True, kw_only=True)
+class Services:
+    """The parts behind the routes."""
+
+    store: Store
+    """The database."""
+    supervisor: Supervisor
+    """Runs the jobs; is woken when one is posted."""
+    policies: PolicyRegistry
+    """Checkpoints as objects that decide."""
+    worlds: dict[str, LiveWorld] = field(default_factory=dict)
+    """The live worlds by id; empty until the kernels are warm."""
+    readiness: Readiness = field(default_factory=Readiness)
+    """Whether the service can decide."""
+    stopping: threading.Event = field(default_factory=threading.Event)
+    """Set when the server goes down: open streams end."""
+
+    def world(self, world_id: str) -> LiveWorld:
+        """Return a live world.
+
+        Raises:
+            NotReady: Worlds start once the kernels are warm.
+            NotFound: There is no such world.
+        """
+        found = self.worlds.get(world_id)
+        if found is None:
+            self.readiness.require()
+            raise NotFound("world", world_id, tuple(self.worlds))
+        return found
+
+
+def services_of(connection: HTTPConnection) -> Services:
+    """Return the parts behind the app that answers ``connection``."""
+    services: Services = connection.app.state.services
+    return services
+
+
+ServicesDep = Annotated[Services, Depends(services_of)]

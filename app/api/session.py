@@ -1,0 +1,52 @@
+"""Signing in with a browser: the token is exchanged for a session cookie."""
+
+import hmac
+import json
+from urllib.parse import parse_qs
+
+from fastapi import APIRouter, Request
+from starlette.responses import RedirectResponse, Response
+
+from app.api.security import COOKIE, SESSION_PATH, session_value
+from app.errors import InvalidInput
+
+COOKIE_AGE_S = 30 * 24 * 3600
+
+router = APIRouter(include_in_schema=False)
+
+
+@router.post(SESSION_PATH)
+async def sign_in(request: Request) -> Response:
+    """Check the token of a form or of JSON and answer with the cookie."""
+    token: str | None = request.app.state.token
+    body = await request.body()
+    is_form = request.headers.get("content-type", "").startswith(
+        "application/x-www-form-urlencoded"
+    )
+    given = _from_form(body) if is_form else _from_json(body)
+    if token is not None and not hmac.compare_digest(given.encode(), token.encode()):
+        raise InvalidInput("token", "***", "is not the token of this server")
+    answer = RedirectResponse("/", 303) if is_form else Response(status_code=204)
+    if token is not None:
+        answer.set_cookie(
+            COOKIE,
+            session_value(token),
+            max_age=COOKIE_AGE_S,
+            httponly=True,
+            samesite="strict",
+            secure=request.url.scheme == "https",
+        )
+    return answer
+
+
+def _from_form(body: bytes) -> str:
+    fields = parse_qs(body.decode("utf-8", "replace"))
+    return fields.get("token", [""])[0]
+
+
+def _from_json(body: bytes) -> str:
+    try:
+        given = json.loads(body)["token"]
+    except (ValueError, KeyError, TypeError) as error:
+        raise InvalidInput("token", "nothing", "must be given") from error
+    return str(given)

@@ -1,0 +1,126 @@
+"""What a validation error says: field, value, rule and choices, in the caller's own terms.
+
+Pydantic's errors name places inside our models; a caller thinks in the JSON that was sent.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, get_args
+
+from pydantic import BaseModel
+from starlette.requests import Request
+
+MAX_VALUE_CHARACTERS = 200
+MAX_LISTED_ITEMS = 8
+NOTHING = "nothing"
+
+Member = dict[str, object]
+
+
+def dotted(location: Sequence[str | int]) -> str:
+    """Write a pydantic location as a path: ``("body", "robot", "q", 3)`` -> ``robot.q[3]``."""
+    path = ""
+    for part in location[1:] or location:
+        if isinstance(part, int):
+            path += f"[{part}]"
+        else:
+            path += f".{part}" if path else part
+    return path
+
+
+def shown(value: object) -> str:
+    """Write a value so that it fits a problem: long ones shortened, never a secret dump."""
+    if isinstance(value, list | tuple | dict) and len(value) > MAX_LISTED_ITEMS:
+        return f"<{type(value).__name__} of {len(value)}>"
+    if isinstance(value, bytes):
+        return f"<{len(value)} bytes>"
+    text = repr(value)
+    if len(text) > MAX_VALUE_CHARACTERS:
+        text = text[: MAX_VALUE_CHARACTERS - 3] + "..."
+    return text
+
+
+def validation_member(error: Mapping[str, Any], body: type[BaseModel] | None) -> Member:
+    """Say field, value, rule and choices of one validation error."""
+    kind, context = str(error["type"]), error.get("ctx", {})
+    location, value = tuple(error["loc"]), error.get("input")
+    rule = str(error["msg"]).replace("Input should be ", "must be ")
+    choices: list[str] = []
+    if kind == "json_invalid":
+        rule = f"must be JSON: {context['error']}"
+        return member("body", f"character {location[-1]}", rule)
+    if kind.startswith("union_tag_"):
+        return _tag_member(location, context)
+    if kind == "missing":
+        return member(dotted(location), NOTHING, "is required")
+    if kind in ("model_attributes_type", "model_type", "dict_type"):
+        return member(dotted(location), shown(value), "must be a JSON object")
+    if kind in ("literal_error", "enum"):
+        choices = _listed(context["expected"])
+        rule = "must be one of the choices"
+    elif kind == "extra_forbidden":
+        rule, choices = "is not a known field", known_fields(body, location[1:-1])
+    elif kind in ("too_short", "too_long"):
+        side, bound = ("at least", "min") if kind == "too_short" else ("at most", "max")
+        rule = f"must have {side} {context[bound + '_length']} items"
+        rule += f", not {context['actual_length']}" if context.get("actual_length") else ""
+    elif isinstance(value, float) and not math.isfinite(value):
+        rule = "must be a finite number"
+    return member(dotted(location), shown(value), rule, choices)
+
+
+def member(field: str, value: str, rule: str, choices: Sequence[str] = ()) -> Member:
+    """Return the four members that bad input always carries."""
+    return {"field": field, "value": value, "rule": rule, "choices": list(choices)}
+
+
+def _tag_member(location: tuple[str | int, ...], context: Mapping[str, Any]) -> Member:
+    """Say that the member which tells the kinds of a body apart is missing or unknown."""
+    field = dotted((*location, context["discriminator"].strip("'")))
+    if "tag" not in context:
+        return member(field, NOTHING, "is required")
+    rule = "must be one of the choices"
+    return member(field, shown(context["tag"]), rule, _listed(context["expected_tags"]))
+
+
+def _listed(expected: str) -> list[str]:
+    return [part.strip(" '") for part in expected.replace(" or ", ", ").split(",")]
+
+
+def known_fields(model: type[BaseModel] | None, path: Sequence[str | int]) -> list[str]:
+    """List the fields of the model at ``path`` inside ``model``; empty where unknown."""
+    for part in path:
+        if model is None or isinstance(part, int):
+            continue
+        field = model.model_fields.get(part)
+        models = list(_models(field.annotation)) if field else []
+        model = models[0] if models else None
+    return list(model.model_fields) if model else []
+
+
+def _models(annotation: Any) -> Iterator[type[BaseModel]]:
+    """Yield the models named anywhere in an annotation."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for argument in get_args(annotation):
+        yield from _models(argument)
+
+
+def without_tag(
+    error: dict[str, Any], variants: Sequence[type[BaseModel]]
+) -> tuple[dict[str, Any], type[BaseModel] | None]:
+    """Take the tag out of a location inside a tagged union; return the variant it names."""
+    location = error["loc"]
+    if len(variants) < 2 or len(location) < 2:
+        return error, variants[0] if variants else None
+    for variant in variants:
+        for field in variant.model_fields.values():
+            if location[1] in get_args(field.annotation):
+                return {**error, "loc": (location[0], *location[2:])}, variant
+    return error, None
+
+
+def body_models(request: Request) -> list[type[BaseModel]]:
+    """Return the models that the body of a request may have."""
+    field = getattr(request.scope.get("route"), "body_field", None)
+    return list(_models(field.field_info.annotation)) if field else []

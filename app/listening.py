@@ -1,0 +1,56 @@
+"""The socket the server listens on, taken before anything else is loaded or started."""
+
+import errno
+import ipaddress
+import socket
+
+from app.errors import Conflict, InvalidInput
+
+BACKLOG = 128
+
+
+def listen(host: str, port: int) -> socket.socket:
+    """Bind and listen.
+
+    Args:
+        host: Address or name to listen on.
+        port: Port; 0 takes any free one.
+
+    Raises:
+        Conflict: Another program listens there.
+        InvalidInput: This machine has no such address, or the port is not for us.
+    """
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(
+            host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+        )[0]
+    except socket.gaierror:
+        raise InvalidInput("TANDEM_HOST", host, "is no address of this machine") from None
+    sock = socket.socket(family, kind, protocol)
+    sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        sock.bind(address)
+        sock.listen(BACKLOG)
+    except OSError as error:
+        sock.close()
+        raise _explained(error, host, port) from None
+    return sock
+
+
+def address_of(sock: socket.socket) -> str:
+    """Return the URL of a listening socket, as a browser on this machine takes it."""
+    host, port = sock.getsockname()[:2]
+    if ipaddress.ip_address(host).is_unspecified:
+        host = "127.0.0.1"
+    return f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"
+
+
+def _explained(error: OSError, host: str, port: int) -> Conflict | InvalidInput:
+    if error.errno == errno.EADDRINUSE:
+        return Conflict(
+            f"another program already listens on {host}:{port}; stop it, or choose another "
+            "port with TANDEM_PORT"
+        )
+    if error.errno == errno.EACCES:
+        return InvalidInput("TANDEM_PORT", port, "needs rights that this user does not have")
+    return InvalidInput("TANDEM_HOST", host, f"cannot be listened on: {error.strerror}")

@@ -1,0 +1,141 @@
+"""The one place where the parts of the service are wired together.
+
+``create_app`` builds the HTTP application around a :class:`Service`, which opens the store,
+starts the supervisor, warms the compiled kernels on a thread of its own and then starts the
+live cell. Everything it opens it closes; several apps may live in one process.
+"""
+
+import logging
+import threading
+from collections.abc import AsyncIterator, Mapping
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+from fastapi import FastAPI
+from starlette.concurrency import run_in_threadpool
+
+import web
+from app.api.application import build_app
+from app.api.registry import DEFAULT_ALIAS, PolicyRegistry
+from app.api.services import Services
+from app.errors import ServiceError
+from app.policies import pretrained
+from app.policies.checkpoint import load
+from app.policies.task_choice import TaskChooser
+from app.settings import Settings, check_access
+from app.sim.cells import load_cell
+from app.sim.ports import TaskPolicy
+from app.store.engine import Store
+from app.store.records import NewCheckpoint
+from jobs.supervisor import Supervisor
+from web.loop import LiveCell
+
+logger = logging.getLogger(__name__)
+
+VERSION = "0.1.0"
+WORLD_ID = "main"
+LIVE_CELL = "pick-and-place"
+STATIC = Path(web.__file__).parent / "static"
+
+
+def create_app(settings: Settings) -> FastAPI:
+    """Return the application; its lifespan starts and stops the service.
+
+    Args:
+        settings: Where and how the service runs.
+
+    Raises:
+        InvalidInput: Settings that would open the service to strangers.
+    """
+    check_access(settings)
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        service = await run_in_threadpool(Service, settings)
+        app.state.services = service.parts
+        try:
+            yield
+        finally:
+            service.parts.stopping.set()
+            await run_in_threadpool(service.close)
+
+    return build_app(lifespan=lifespan, static=STATIC, token=settings.secret, version=VERSION)
+
+
+class Service:
+    """The running parts behind one application.
+
+    Args:
+        settings: Where and how the service runs.
+
+    Raises:
+        Conflict: Another server uses the same database.
+    """
+
+    def __init__(self, settings: Settings) -> None:
+        settings.data.mkdir(parents=True, exist_ok=True)
+        store = Store(settings.database)
+        supervisor = Supervisor(store, settings.data)
+        try:
+            supervisor.start()
+            policies = PolicyRegistry(store, build_policy)
+        except BaseException:
+            supervisor.stop()
+            store.close()
+            raise
+        self.parts = Services(store=store, supervisor=supervisor, policies=policies)
+        self._warm_up = threading.Thread(target=self._start_cell, name="warm-up", daemon=True)
+        self._warm_up.start()
+
+    def close(self) -> None:
+        """Stop the live cell and the supervisor, close the database."""
+        self.parts.stopping.set()
+        self._warm_up.join()
+        self.parts.readiness.ready = False
+        self.parts.readiness.reason = "stopping"
+        for world in self.parts.worlds.values():
+            world.stop()
+        self.parts.worlds.clear()
+        self.parts.supervisor.stop()
+        self.parts.store.close()
+
+    def _start_cell(self) -> None:
+        """Warm up and start the live cell; say in ``readiness`` how that goes."""
+        readiness = self.parts.readiness
+        try:
+            readiness.reason = "warming up: loading the shipped checkpoints"
+            publish_shipped(self.parts.policies)
+            readiness.reason = "warming up: compiling the simulator's kernels"
+            policy = self.parts.policies.load(DEFAULT_ALIAS)
+            if self.parts.stopping.is_set():
+                return
+            cell = LiveCell(load_cell(LIVE_CELL), policy)
+            cell.start()
+            self.parts.worlds[WORLD_ID] = cell
+            readiness.ready, readiness.reason = True, "ready"
+            logger.info("ready: %s decides in the live cell", policy.title)
+        except ServiceError as error:
+            readiness.failed, readiness.reason = True, error.message
+            logger.error("the live cell could not start: %s", error.message)
+        except Exception as error:
+            readiness.failed, readiness.reason = True, f"the start failed: {error}"
+            logger.exception("the live cell could not start")
+
+
+def build_policy(manifest: Mapping[str, Any], tensors: bytes) -> TaskPolicy:
+    """Make the object that decides from a checkpoint's manifest and tensors."""
+    checkpoint = load(manifest, tensors)
+    return TaskChooser(checkpoint, load_cell(checkpoint.manifest["cell"]))
+
+
+def publish_shipped(policies: PolicyRegistry) -> None:
+    """Put the checkpoints that come with the service into its store, under their aliases."""
+    for alias in pretrained.ALIASES:
+        shipped = pretrained.load(alias)
+        policies.publish(
+            alias,
+            NewCheckpoint(
+                sha256=shipped.sha256, manifest=shipped.manifest, tensors=shipped.tensors
+            ),
+        )

@@ -1,0 +1,47 @@
+"""Rules of choosing among candidates, to compare the critic's choice with (METHOD 3.6)."""
+
+import numpy as np
+
+from app.policies.evaluation.episodes import Index, Rule, View
+
+
+def critic(hysteresis: float) -> Rule:
+    """Return the critic's choice at every step; 0 is the source's rule."""
+
+    def rule(view: View) -> Index:
+        best = view.values.argmax(axis=1)
+        if view.first:
+            return best
+        rows = np.arange(len(best))
+        gain = view.values[rows, best] - view.values[rows, view.chosen]
+        return np.where(gain > hysteresis, best, view.chosen)
+
+    return rule
+
+
+def nearest(view: View) -> Index:
+    """Choose, at every step, the candidate nearest to the tcp."""
+    return view.distances.argmin(axis=1)
+
+
+def at_random(seed: int, n_episodes: int) -> Rule:
+    """Return the rule that draws one candidate at the start and keeps it."""
+    draw = np.random.default_rng(seed).random(n_episodes)
+
+    def rule(view: View) -> Index:
+        if not view.first:
+            return view.chosen
+        count = np.isfinite(view.distances).sum(axis=1)
+        return (draw[view.rows] * count).astype(np.int64)
+
+    return rule
+
+
+def fixed(place: int) -> Rule:
+    """Return the rule that keeps the candidate at ``place``, or the last one there is."""
+
+    def rule(view: View) -> Index:
+        count = np.isfinite(view.distances).sum(axis=1)
+        return np.minimum(place, count - 1)
+
+    return rule

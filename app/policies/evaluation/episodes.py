@@ -1,0 +1,208 @@
+"""Runs pick episodes to their ends under any rule of choosing among candidates.
+
+Every episode is one row of a batch that stops when it ends; episode ``k`` of a seed starts the
+same whatever rule is measured, so that rules are compared on the same cells.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.policies.evaluation.statistics import wilson
+from app.policies.task_choice import ValueNetworks
+from app.sim.cells import load_cell
+from app.sim.kernels import pick as kernel
+from app.sim.kernels.features import LAYOUT, N_FEATURES, observe_batch
+from app.sim.pick import OUTCOMES, PickBatch, PickSettings
+from app.sim.recheck import Trajectory
+
+Index = NDArray[np.int64]
+EVALUATION_LIBRARY = 1_000_003
+"""Seed of the person's postures in evaluations; training uses 0, so these were never seen."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class View:
+    """What a rule of choosing sees: all running rows at one step."""
+
+    values: NDArray[np.float32]
+    """Critic's value of every candidate, -inf where there are fewer, shape (n, k)."""
+    distances: NDArray[np.float64]
+    """Distance from tcp to each candidate, one common unit, inf where there are fewer, (n, k)."""
+    chosen: Index
+    """Candidate pursued so far, shape (n,); meaningless at the first step."""
+    first: bool
+    """Whether this is the first step."""
+    rows: Index
+    """Which rows of the batch these are, shape (n,)."""
+
+
+Rule = Callable[[View], Index]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Episodes:
+    """Outcomes of a set of episodes."""
+
+    outcome: Index
+    """Index into OUTCOMES, shape (n,)."""
+    duration_s: NDArray[np.float64]
+    """Time to the end [s], shape (n,)."""
+    switches: Index
+    """How often the choice changed, shape (n,)."""
+    trajectories: tuple[Trajectory, ...]
+    """Robot and person of the first rows, as long as each ran."""
+
+    def row(self, name: str) -> dict[str, object]:
+        """Return the result row of these episodes, rates with 95 % intervals."""
+        n = len(self.outcome)
+        counts = np.bincount(self.outcome, minlength=len(OUTCOMES))
+        won = self.outcome == kernel.SUCCESS
+        return {
+            "name": name,
+            "n": n,
+            "success": wilson(int(counts[kernel.SUCCESS]), n),
+            "collision": wilson(int(counts[kernel.COLLISION]), n),
+            "timeout": wilson(int(counts[kernel.TIMEOUT]), n),
+            "time_to_success_s": float(self.duration_s[won].mean()) if won.any() else None,
+            "switches_per_episode": float(self.switches.mean()),
+        }
+
+
+def settings_for(n_candidates: tuple[int, int], preset: dict[str, object]) -> PickSettings:
+    """Return the evaluation's settings: 10 s, start clearance 0.05 m, exact stations, unseen
+    postures of the person.
+    """
+    pace = preset.get("human_pace", 1.0)
+    return PickSettings(
+        time_limit_s=10.0,
+        start_clearance_m=0.05,
+        n_candidates=n_candidates,
+        human_pace=float(pace) if isinstance(pace, int | float) else 1.0,
+        library_seed=EVALUATION_LIBRARY,
+    )
+
+
+class Evaluator:
+    """Episodes of one seed, run as often as there are rules.
+
+    Args:
+        networks: Actor and critics.
+        cell_name: Work cell.
+        n_episodes: Number of episodes.
+        seed: Seed of the episodes.
+        settings: Starts and ends.
+    """
+
+    def __init__(
+        self,
+        networks: ValueNetworks,
+        cell_name: str,
+        n_episodes: int,
+        seed: int,
+        settings: PickSettings,
+    ) -> None:
+        self._networks = networks
+        self.batch = PickBatch(load_cell(cell_name), n_episodes, seed, settings)
+
+    def run(self, rule: Rule, n_recorded: int = 0) -> Episodes:
+        """Run all episodes under a rule; record the first ``n_recorded`` ones."""
+        batch, n = self.batch, self.batch.n_envs
+        batch.reset()
+        chosen, switches = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
+        act = np.zeros((n, 5), dtype=np.float32)
+        trace = _Trace(batch, n_recorded)
+        first = True
+        while (rows := np.flatnonzero(batch.state.outcome == kernel.RUNNING)).size:
+            actions, view = self._view(rows, chosen[rows], first)
+            choice = rule(view)
+            if not first:
+                switches[rows] += choice != chosen[rows]
+            chosen[rows], first = choice, False
+            act[rows] = actions[np.arange(len(rows)), choice]
+            stations = batch.state.candidates[rows, choice]
+            batch.set_goals(rows, batch.world.stations[stations])
+            trace.before(rows)
+            batch.step(act, auto_reset=False, features=False)
+            trace.after(rows)
+        return Episodes(
+            outcome=batch.state.outcome.copy(),
+            duration_s=batch.state.elapsed.copy(),
+            switches=switches,
+            trajectories=trace.trajectories(),
+        )
+
+    def _view(
+        self, rows: Index, chosen: Index, first: bool
+    ) -> tuple[NDArray[np.float32], View]:
+        """Return the policy's action for every candidate, (n, k, 5), and what rules see."""
+        batch, state = self.batch, self.batch.state
+        width = batch.settings.n_candidates[1]
+        stations = state.candidates[rows, :width]
+        there = stations >= 0
+        owner, place = np.nonzero(there)
+        env, station = rows[owner], stations[owner, place]
+        obs = np.empty((len(env), N_FEATURES), dtype=np.float32)
+        observe_batch(
+            batch.arm,
+            state.q[env],
+            state.qd[env],
+            state.human_q[env],
+            state.human_qd[env],
+            batch.world.stations[station],
+            batch.world.station_q[station],
+            state.time_left[env],
+            obs,
+        )
+        act, value = self._networks.act_and_value(obs)
+        actions = np.zeros((len(rows), width, act.shape[1]), dtype=np.float32)
+        values = np.full((len(rows), width), -np.inf, dtype=np.float32)
+        distances = np.full((len(rows), width), np.inf)
+        actions[owner, place], values[owner, place] = act, value
+        to_goal = obs[:, LAYOUT["goal_minus_tcp"]]
+        distances[owner, place] = np.linalg.norm(to_goal, axis=1)
+        view = View(values=values, distances=distances, chosen=chosen, first=first, rows=rows)
+        return actions, view
+
+
+class _Trace:
+    """Records robot and person of the first rows at a fifth of the control period."""
+
+    PARTS = 5
+    """Recorded poses per control period (10 ms at 20 Hz)."""
+
+    def __init__(self, batch: PickBatch, n_recorded: int) -> None:
+        self._batch, self._n = batch, n_recorded
+        self._robot: list[list[NDArray[np.float64]]] = [[] for _ in range(n_recorded)]
+        self._person: list[list[NDArray[np.float64]]] = [[] for _ in range(n_recorded)]
+
+    def before(self, rows: Index) -> None:
+        state, n = self._batch.state, self._n
+        self._rows = rows[rows < n]
+        self._q0, self._qd0 = state.q[:n].copy(), state.qd[:n].copy()
+        self._human0 = state.human_q[:n].copy()
+
+    def after(self, rows: Index) -> None:
+        """Add the period's poses; a row that collided is left out, its contact is known."""
+        state, dt = self._batch.state, self._batch.arm.dt
+        for row in self._rows:
+            if state.outcome[row] == kernel.COLLISION:
+                continue
+            c = (state.qd[row] - self._qd0[row]) / (2.0 * dt)
+            for part in range(self.PARTS):
+                x = dt * part / self.PARTS
+                q = self._q0[row] + self._qd0[row] * x + c * x * x
+                blend = part / self.PARTS
+                person = self._human0[row] + blend * (state.human_q[row] - self._human0[row])
+                self._robot[row].append(q)
+                self._person[row].append(person)
+
+    def trajectories(self) -> tuple[Trajectory, ...]:
+        dt = self._batch.arm.dt / self.PARTS
+        return tuple(
+            Trajectory(q_robot=np.array(q), q_human=np.array(person), dt=dt)
+            for q, person in zip(self._robot, self._person, strict=True)
+            if q
+        )

@@ -1,0 +1,109 @@
+"""Protocols ``pick-single`` and ``pick-choice`` (METHOD 3.6).
+
+Time-out 10 s, start clearance 0.05 m, starts mixed evenly over home, cubes and docks, person
+with postures never seen in training. The hand speeds of the person are part of the result, and
+of the first 200 episodes FCL says on the raw meshes whether the kernels missed a contact.
+"""
+
+import numpy as np
+
+from app.policies.checkpoint import Checkpoint
+from app.policies.evaluation import choice_rules
+from app.policies.evaluation.episodes import Episodes, Evaluator, settings_for
+from app.policies.task_choice import HYSTERESIS, ValueNetworks
+from app.sim.cells import load_cell
+from app.sim.kernels import pick as kernel
+from app.sim.pick import hand_speeds
+from app.sim.recheck import recheck_trajectories
+
+DEFAULT_EPISODES = 1000
+N_RECHECKED = 200
+"""Episodes whose poses go to FCL."""
+
+
+def _evaluator(
+    checkpoint: Checkpoint, n_candidates: tuple[int, int], episodes: int | None, seed: int
+) -> Evaluator:
+    manifest = checkpoint.manifest
+    settings = settings_for(n_candidates, manifest["preset"])
+    n = episodes or DEFAULT_EPISODES
+    return Evaluator(ValueNetworks(checkpoint), manifest["cell"], n, seed, settings)
+
+
+def _settings(evaluator: Evaluator) -> dict[str, object]:
+    settings, state = evaluator.batch.settings, evaluator.batch.state
+    return {
+        "time_limit_s": settings.time_limit_s,
+        "start_clearance_m": settings.start_clearance_m,
+        "starts_redrawn_share": float((state.n_redrawn > 0).mean()),
+        "candidates": list(settings.n_candidates),
+        **hand_speeds(evaluator.batch),
+    }
+
+
+def _recheck(evaluator: Evaluator, episodes: Episodes) -> dict[str, int]:
+    """Ask FCL on raw meshes about every recorded pose without a reported contact."""
+    found = recheck_trajectories(evaluator.batch.cell, episodes.trajectories)
+    return {
+        "episodes": len(episodes.trajectories),
+        "poses": sum(len(trajectory.q_robot) for trajectory in episodes.trajectories),
+        "missed_contacts": sum(contact is not None for contact in found),
+    }
+
+
+def run_single(checkpoint: Checkpoint, *, episodes: int | None, seed: int) -> dict[str, object]:
+    """Evaluate one random target per episode.
+
+    Args:
+        checkpoint: What acts.
+        episodes: Number of episodes, by default 1000.
+        seed: Seed of the episodes; use one that nothing was tuned on.
+    """
+    evaluator = _evaluator(checkpoint, (1, 1), episodes, seed)
+    outcome = evaluator.run(choice_rules.fixed(0), min(N_RECHECKED, evaluator.batch.n_envs))
+    return {
+        "settings": _settings(evaluator),
+        "results": [outcome.row("policy")],
+        "fcl_recheck": _recheck(evaluator, outcome),
+    }
+
+
+def run_choice(checkpoint: Checkpoint, *, episodes: int | None, seed: int) -> dict[str, object]:
+    """Evaluate the choice among 2-3 random targets, against other rules on the same episodes.
+
+    Args:
+        checkpoint: What acts and chooses.
+        episodes: Number of episodes, by default 1000.
+        seed: Seed of the episodes; use one that nothing was tuned on.
+    """
+    evaluator = _evaluator(checkpoint, (2, 3), episodes, seed)
+    n = evaluator.batch.n_envs
+    with_hysteresis = evaluator.run(choice_rules.critic(HYSTERESIS), min(N_RECHECKED, n))
+    rows = [
+        with_hysteresis.row("critic"),
+        evaluator.run(choice_rules.critic(0.0)).row("critic-each-step"),
+        evaluator.run(choice_rules.nearest).row("nearest"),
+        evaluator.run(choice_rules.at_random(seed, n)).row("random"),
+        _in_hindsight([evaluator.run(choice_rules.fixed(place)) for place in range(3)]),
+    ]
+    return {
+        "settings": {**_settings(evaluator), "hysteresis": HYSTERESIS},
+        "results": rows,
+        "fcl_recheck": _recheck(evaluator, with_hysteresis),
+    }
+
+
+def _in_hindsight(runs: list[Episodes]) -> dict[str, object]:
+    """Return the row of the best fixed candidate per episode, known only afterwards."""
+    ranks = {kernel.SUCCESS: 0, kernel.TIMEOUT: 1, kernel.COLLISION: 2}
+    rank = np.array([ranks.get(outcome, 0) for outcome in range(len(ranks) + 1)])
+    badness = np.stack([1e3 * rank[run.outcome] + run.duration_s for run in runs])
+    best, rows = badness.argmin(axis=0), np.arange(badness.shape[1])
+    pooled = Episodes(
+        outcome=np.stack([run.outcome for run in runs])[best, rows],
+        duration_s=np.stack([run.duration_s for run in runs])[best, rows],
+        switches=np.zeros(len(rows), dtype=np.int64),
+        trajectories=(),
+    )
+    return pooled.row("rollout")
+

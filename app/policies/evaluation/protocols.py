@@ -1,0 +1,52 @@
+"""All protocols by name, as the command line and evaluation jobs know them."""
+
+import time
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Any
+
+from app.errors import InvalidInput, NotFound
+from app.policies.checkpoint import Checkpoint
+from app.policies.evaluation import pick
+
+Protocol = Callable[..., dict[str, Any]]
+
+PROTOCOLS: Mapping[str, Protocol] = MappingProxyType(
+    {"pick-single": pick.run_single, "pick-choice": pick.run_choice}
+)
+"""Protocol by name; each takes a checkpoint, ``episodes`` and ``seed``."""
+MAX_EPISODES = 100_000
+"""Most episodes of one evaluation."""
+
+
+def evaluate(
+    name: str, checkpoint: Checkpoint, *, episodes: int | None = None, seed: int = 11
+) -> dict[str, Any]:
+    """Run a protocol and return its result, ready for JSON.
+
+    Args:
+        name: Name of the protocol.
+        checkpoint: What is evaluated.
+        episodes: Number of episodes; the protocol's own number by default.
+        seed: Seed of the episodes.
+
+    Raises:
+        NotFound: No protocol has that name.
+        InvalidInput: The number of episodes or the seed cannot be used.
+    """
+    if name not in PROTOCOLS:
+        raise NotFound("protocol", name, tuple(PROTOCOLS))
+    if episodes is not None and not 1 <= episodes <= MAX_EPISODES:
+        raise InvalidInput("episodes", episodes, f"must lie in [1, {MAX_EPISODES}]")
+    if not 0 <= seed < 2**31:
+        raise InvalidInput("seed", seed, "must lie in [0, 2^31)")
+    started = time.process_time()
+    outcome = PROTOCOLS[name](checkpoint, episodes=episodes, seed=seed)
+    return {
+        "protocol": name,
+        "checkpoint": checkpoint.sha256,
+        "seed": seed,
+        "episodes": outcome["results"][0]["n"],
+        **outcome,
+        "cpu_seconds": round(time.process_time() - started, 2),
+    }

@@ -1,0 +1,31 @@
+"""Rates with intervals, as every result carries them.
+
+Source: Wilson, *Probable inference, the law of succession, and statistical inference* (1927).
+"""
+
+import math
+
+Z95 = 1.959963984540054
+"""Quantile of the standard normal distribution for a two-sided 95 % interval."""
+
+
+def wilson(hits: int, n: int) -> dict[str, float]:
+    """Return a rate and its 95 % Wilson interval.
+
+    Args:
+        hits: Number of episodes in which it happened.
+        n: Number of episodes, at least one.
+
+    Raises:
+        ValueError: ``hits`` is not between 0 and ``n``, or ``n`` is 0.
+    """
+    if n < 1 or not 0 <= hits <= n:
+        raise ValueError(f"a rate needs 0 <= hits <= n and n >= 1, got {hits} of {n}")
+    rate = hits / n
+    spread = Z95 * math.sqrt(rate * (1.0 - rate) / n + (Z95 / (2.0 * n)) ** 2)
+    centre, scale = rate + Z95**2 / (2.0 * n), 1.0 + Z95**2 / n
+    return {
+        "mean": rate,
+        "low": max(0.0, (centre - spread) / scale),
+        "high": min(1.0, (centre + spread) / scale),
+    }

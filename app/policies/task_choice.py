@@ -1,0 +1,259 @@
+"""The critic's choice among geometric tasks (METHOD 3.1).
+
+``R_i = Q(s_i, pi(s_i))`` for every candidate, the smaller of both critics, and the best one is
+taken; with hysteresis the previous choice is kept unless another is better by a margin, which
+halves collisions by avoiding dithering. The same object decides for the HTTP route, the live
+cell and the evaluations.
+
+Source: thesis eq. (5.1)-(5.7). Deviates: hysteresis is ours; 0 gives the source's rule.
+"""
+
+import time
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from app.errors import CheckpointMismatch, InvalidInput
+from app.policies.checkpoint import Checkpoint, expect_layout
+from app.policies.networks import ResidualActor, TwinCritic
+from app.policies.training import LAYOUT
+from app.sim import human, robot
+from app.sim.cells import Cell, load_cell
+from app.sim.kernels.arm import CONTROLLED
+from app.sim.pick import arm_of, observe
+from app.sim.ports import Candidate, Decision, OutsideField, Person, Vec
+
+HYSTERESIS = 0.2
+"""By how much another candidate's value must be better before the choice changes."""
+MAX_CANDIDATES = 1000
+"""Most candidates taken at once."""
+FAR_AWAY = (0.0, 4.0, -np.pi / 2.0)
+"""Pelvis of the person assumed where nobody is there: out of everyone's reach [m, rad]."""
+
+
+class ValueNetworks:
+    """Actor and critics of a checkpoint, for inference.
+
+    Args:
+        checkpoint: A ``policy`` checkpoint.
+
+    Raises:
+        CheckpointMismatch: It was trained on another layout of observations or actions.
+    """
+
+    def __init__(self, checkpoint: Checkpoint) -> None:
+        expect_layout(checkpoint, LAYOUT, CONTROLLED)
+        width = int(checkpoint.manifest["width"])
+        self.actor, self.critic = ResidualActor(width), TwinCritic(width)
+        arrays = checkpoint.arrays()
+        for name, module in (("actor", self.actor), ("critic", self.critic)):
+            start = f"{name}."
+            tensors = {
+                key.removeprefix(start): torch.as_tensor(value)
+                for key, value in arrays.items()
+                if key.startswith(start)
+            }
+            try:
+                module.load_state_dict(tensors)
+            except RuntimeError as error:
+                raise CheckpointMismatch("tensors", f"those of {name}", str(error)) from error
+            module.eval()
+
+    def act_and_value(
+        self, obs: NDArray[np.float32]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Return actions, shape (n, 5), and values, shape (n,), of observations."""
+        with torch.inference_mode():
+            rows = torch.as_tensor(obs)
+            act = self.actor(rows)
+            return act.numpy(), self.critic.least(rows, act).numpy()
+
+
+def choose(values: NDArray[np.floating], previous: int | None, hysteresis: float) -> int:
+    """Return the index of the chosen candidate.
+
+    Args:
+        values: Value of each candidate, shape (n,).
+        previous: Index chosen last; None chooses afresh.
+        hysteresis: Margin by which another must be better.
+    """
+    best = int(np.argmax(values))
+    if previous is None or values[best] > values[previous] + hysteresis:
+        return best
+    return previous
+
+
+class TaskChooser:
+    """A :class:`~app.sim.ports.TaskPolicy` made of one checkpoint.
+
+    Args:
+        checkpoint: A ``policy`` checkpoint.
+        cell: Its work cell; by default the one it names.
+        hysteresis: Margin before the choice changes.
+
+    Raises:
+        CheckpointMismatch: The checkpoint is for another cell or layout.
+    """
+
+    def __init__(
+        self, checkpoint: Checkpoint, cell: Cell | None = None, hysteresis: float = HYSTERESIS
+    ) -> None:
+        name = str(checkpoint.manifest["cell"])
+        self._cell = cell or load_cell(name)
+        if self._cell.name != name:
+            raise CheckpointMismatch("cell", self._cell.name, name)
+        self._checkpoint, self._hysteresis = checkpoint, hysteresis
+        self._networks = ValueNetworks(checkpoint)
+        self._arm = arm_of(self._cell)
+        self._ranges = _TrainedRanges(checkpoint)
+
+    @property
+    def checkpoint(self) -> str:
+        """SHA-256 of the checkpoint."""
+        return self._checkpoint.sha256
+
+    @property
+    def title(self) -> str:
+        """Short text for people."""
+        manifest = self._checkpoint.manifest
+        return f"{manifest['preset'].get('name', 'policy')}, {manifest['step'] / 1e6:.2f} M steps"
+
+    @property
+    def cell(self) -> str:
+        """Name of the work cell it was trained for."""
+        return self._cell.name
+
+    def decide(
+        self,
+        q: Vec,
+        qd: Vec,
+        people: Sequence[Person],
+        candidates: Sequence[Candidate],
+        *,
+        previous: str | None = None,
+        time_left_s: float = 10.0,
+    ) -> Decision:
+        """Choose one candidate; see :class:`~app.sim.ports.TaskPolicy`."""
+        started = time.perf_counter()
+        q, qd = self._robot_state(q, qd)
+        person = self._person(people)
+        ids, goals = _check_candidates(candidates)
+        if not (np.isfinite(time_left_s) and 0.0 <= time_left_s <= 60.0):
+            raise InvalidInput("time_left_s", time_left_s, "must lie in [0, 60] s")
+        obs, reachable = observe(self._arm, q, qd, person.q, person.qd, goals, time_left_s)
+        act, values = self._networks.act_and_value(obs)
+        last = ids.index(previous) if previous in ids else None
+        index = choose(values, last, self._hysteresis)
+        qd_target = np.zeros((len(ids), 6))
+        qd_target[:, :CONTROLLED] = act * self._arm.qd_max[:CONTROLLED]
+        return Decision(
+            chosen=ids[index],
+            index=index,
+            values=tuple(float(value) for value in values),
+            actions=act,
+            qd_target=qd_target,
+            reachable=tuple(bool(flag) for flag in reachable),
+            outside=self._ranges.of_state(q, qd, person),
+            outside_candidates=tuple(self._ranges.of_goal(goal) for goal in goals),
+            checkpoint=self.checkpoint,
+            elapsed_ms=1e3 * (time.perf_counter() - started),
+        )
+
+    def _robot_state(self, q: Vec, qd: Vec) -> tuple[Vec, Vec]:
+        arm, slack = self._arm, 1e-6
+        q = _checked_vector("robot.q", q, 6, arm.q_min - slack, arm.q_max + slack, "rad")
+        limit = arm.qd_max + slack
+        return q, _checked_vector("robot.qd", qd, 6, -limit, limit, "rad/s")
+
+    def _person(self, people: Sequence[Person]) -> Person:
+        if not people:
+            return Person(q=human.rest_posture(*FAR_AWAY), qd=np.zeros(18))
+        if len(people) > 1:
+            raise InvalidInput(
+                "people", len(people), "must hold at most one person: this checkpoint knows one"
+            )
+        low, high = human.Q_MIN - 1e-6, human.Q_MAX + 1e-6
+        q = _checked_vector("people[0].q", people[0].q, 18, low, high, "m or rad")
+        qd_limit = np.full(18, 50.0)
+        unit = "m/s or rad/s"
+        qd = _checked_vector("people[0].qd", people[0].qd, 18, -qd_limit, qd_limit, unit)
+        return Person(q=q, qd=qd)
+
+
+class _TrainedRanges:
+    """What a checkpoint met in training, to flag what lies outside."""
+
+    SLACK = 0.02
+    """Values this far outside [m, rad or per second] are not flagged."""
+
+    def __init__(self, checkpoint: Checkpoint) -> None:
+        ranges = checkpoint.manifest["trained_range"]
+        self._low = {name: np.array(entry["low"]) for name, entry in ranges.items()}
+        self._high = {name: np.array(entry["high"]) for name, entry in ranges.items()}
+
+    def of_state(self, q: Vec, qd: Vec, person: Person) -> tuple[OutsideField, ...]:
+        return (
+            *self._outside("q", q, "robot.q", robot.JOINT_NAMES),
+            *self._outside("qd", qd, "robot.qd", robot.JOINT_NAMES),
+            *self._outside("human_q", person.q, "people[0].q", human.JOINT_NAMES),
+            *self._outside("human_qd", person.qd, "people[0].qd", human.JOINT_NAMES),
+        )
+
+    def of_goal(self, goal: Vec) -> tuple[OutsideField, ...]:
+        return self._outside("goal", goal, "position", ("x", "y", "z"))
+
+    def _outside(
+        self, key: str, values: Vec, path: str, names: Sequence[str]
+    ) -> tuple[OutsideField, ...]:
+        if key not in self._low or len(self._low[key]) != len(values):
+            return ()
+        low, high = self._low[key], self._high[key]
+        beyond = (values < low - self.SLACK) | (values > high + self.SLACK)
+        return tuple(
+            OutsideField(
+                field=f"{path}.{names[i]}",
+                value=float(values[i]),
+                low=float(low[i]),
+                high=float(high[i]),
+            )
+            for i in np.flatnonzero(beyond)
+        )
+
+
+def _checked_vector(
+    path: str, values: Vec, size: int, low: Vec, high: Vec, unit: str
+) -> NDArray[np.float64]:
+    vector = np.asarray(values, dtype=np.float64)
+    if vector.shape != (size,):
+        raise InvalidInput(path, vector.tolist(), f"must hold {size} numbers")
+    for i, value in enumerate(vector):
+        if not np.isfinite(value):
+            raise InvalidInput(f"{path}[{i}]", float(value), "must be finite")
+        if not low[i] <= value <= high[i]:
+            rule = f"must lie in [{low[i]:.4g}, {high[i]:.4g}] {unit}"
+            raise InvalidInput(f"{path}[{i}]", float(value), rule)
+    return vector
+
+
+def _check_candidates(candidates: Sequence[Candidate]) -> tuple[list[str], Vec]:
+    n = len(candidates)
+    if not 1 <= n <= MAX_CANDIDATES:
+        raise InvalidInput("candidates", n, f"must be 1 to {MAX_CANDIDATES} of them")
+    limit = np.full(3, 10.0)
+    goals = np.array(
+        [
+            _checked_vector(
+                f"candidates[{i}].position", candidate.position, 3, -limit, limit, "m"
+            )
+            for i, candidate in enumerate(candidates)
+        ]
+    )
+    ids = [candidate.id for candidate in candidates]
+    seen: set[str] = set()
+    for i, name in enumerate(ids):
+        if name in seen:
+            raise InvalidInput(f"candidates[{i}].id", name, "must be given once")
+        seen.add(name)
+    return ids, goals

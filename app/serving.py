@@ -1,0 +1,95 @@
+"""Running the application on uvicorn: one process, one worker, a quick end.
+
+One worker, because the live world and its viewer live in this process. Frames of the viewer go
+uncompressed: compressing them costs more than it saves.
+"""
+
+import socket
+from collections.abc import Callable
+from types import FrameType
+
+import uvicorn
+from fastapi import FastAPI
+
+from app.listening import address_of
+from app.main import create_app
+from app.settings import Settings
+from app.store.engine import Store
+from app.store.lock import ServerLock
+
+GRACE_S = 3
+"""How long open requests may go on once the server stops [s]."""
+
+Say = Callable[[str], None]
+
+
+class Server(uvicorn.Server):
+    """uvicorn's server, which tells open streams to end before it waits for them."""
+
+    def __init__(self, config: uvicorn.Config, app: FastAPI) -> None:
+        super().__init__(config)
+        self._app = app
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        """End the streams, then go the usual way."""
+        services = getattr(self._app.state, "services", None)
+        if services is not None:
+            services.stopping.set()
+        super().handle_exit(sig, frame)
+
+
+def serve(settings: Settings, sock: socket.socket, say: Say) -> None:
+    """Run the service until it is told to stop.
+
+    Args:
+        settings: Where and how it runs.
+        sock: Listening socket.
+        say: Told the address once it can decide, or why it cannot.
+
+    Raises:
+        Conflict: Another server uses the same database.
+    """
+    check_alone(settings)
+    say(f"Tandem starts: {address_of(sock)}")
+    app = create_app(settings)
+    told: list[str] = []
+
+    async def tell() -> None:
+        services = getattr(app.state, "services", None)
+        if services is None or told or services.stopping.is_set():
+            return
+        if services.readiness.ready:
+            told.append(f"Tandem is ready: {address_of(sock)}")
+        elif services.readiness.failed:
+            told.append(f"Tandem cannot decide: {services.readiness.reason}")
+        for line in told:
+            say(line)
+
+    config = uvicorn.Config(
+        app,
+        log_config=None,
+        access_log=False,
+        ws_per_message_deflate=False,
+        ws_max_size=64 * 1024 * 1024,
+        timeout_graceful_shutdown=GRACE_S,
+        callback_notify=tell,
+        timeout_notify=0,
+        server_header=False,
+    )
+    Server(config, app).run(sockets=[sock])
+
+
+def check_alone(settings: Settings) -> None:
+    """Make sure that no other server uses the data folder or database.
+
+    Raises:
+        Conflict: One does.
+    """
+    settings.data.mkdir(parents=True, exist_ok=True)
+    store = Store(settings.database)
+    lock = ServerLock(store, settings.data)
+    try:
+        lock.acquire()
+    finally:
+        lock.release()
+        store.close()

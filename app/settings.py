@@ -1,0 +1,94 @@
+"""Where and how the service runs: the ``TANDEM_*`` environment variables, checked at start.
+
+Only ``app.main``, ``app.__main__`` and the entry of ``jobs.run`` read this; every other part
+gets plain arguments.
+"""
+
+import ipaddress
+import os
+from pathlib import Path
+
+from pydantic import Field, SecretStr, ValidationError
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+from app.errors import InvalidInput
+
+PREFIX = "TANDEM_"
+MIN_TOKEN_LENGTH = 16
+
+
+class Settings(BaseSettings):
+    """The settings of one server, one attribute per variable."""
+
+    model_config = SettingsConfigDict(env_prefix=PREFIX, frozen=True, extra="forbid")
+
+    host: str = Field("127.0.0.1", min_length=1, description="Address to listen on.")
+    port: int = Field(8000, ge=0, le=65535, description="Port; 0 takes any free one.")
+    data: Path = Field(Path("data"), description="Folder for the database and files.")
+    database_url: str | None = Field(
+        None, min_length=1, description="SQLAlchemy URL; a SQLite file in `data` if unset."
+    )
+    token: SecretStr | None = Field(
+        None, description="Bearer token; required for any address but loopback."
+    )
+
+    @property
+    def is_loopback(self) -> bool:
+        """Whether only programs on this machine can reach the server."""
+        if self.host == "localhost":
+            return True
+        try:
+            return ipaddress.ip_address(self.host).is_loopback
+        except ValueError:
+            return False
+
+    @property
+    def database(self) -> str:
+        """The database URL that is used."""
+        return self.database_url or f"sqlite:///{self.data.resolve() / 'tandem.db'}"
+
+    @property
+    def secret(self) -> str | None:
+        """The token in plain text, None without one."""
+        return self.token.get_secret_value() if self.token else None
+
+
+def load_settings(**overrides: object) -> Settings:
+    """Read the settings from the environment and check them.
+
+    Args:
+        **overrides: Values that win over the environment (command line options).
+
+    Raises:
+        InvalidInput: A variable is unknown or breaks a rule; names it, its value, the rule.
+    """
+    known = [PREFIX + name.upper() for name in Settings.model_fields]
+    for name in sorted(os.environ):
+        if name.startswith(PREFIX) and name not in known:
+            raise InvalidInput(name, os.environ[name], "is not a setting", known)
+    try:
+        return Settings(**{k: v for k, v in overrides.items() if v is not None})  # type: ignore[arg-type]
+    except ValidationError as error:
+        first = error.errors()[0]
+        name = PREFIX + "_".join(str(part) for part in first["loc"]).upper()
+        shown = "***" if name.endswith("TOKEN") else first["input"]
+        raise InvalidInput(name, shown, f"is refused: {first['msg']}") from None
+
+
+def check_access(settings: Settings) -> None:
+    """Refuse to serve with settings that would open the service to strangers.
+
+    Raises:
+        InvalidInput: A token is missing or too short.
+    """
+    token = settings.secret
+    if token is None and not settings.is_loopback:
+        raise InvalidInput(
+            "TANDEM_HOST",
+            settings.host,
+            "is not a loopback address and needs TANDEM_TOKEN to be set",
+        )
+    if token is not None and len(token) < MIN_TOKEN_LENGTH:
+        raise InvalidInput(
+            "TANDEM_TOKEN", "***", f"must have at least {MIN_TOKEN_LENGTH} characters"
+        )

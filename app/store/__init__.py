@@ -1,0 +1,1 @@
+"""The database: jobs, curves, events, checkpoints. The only SQL of the project lives here."""

@@ -1,0 +1,203 @@
+"""What a running attempt writes: its claim, heartbeats, progress, checkpoints.
+
+Every write is fenced (``app.store.fences``). How attempts end is in ``app.store.endings``.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Any
+
+import sqlalchemy as sa
+
+from app.errors import InvalidInput
+from app.store.checkpoints import drop_job_checkpoints, insert_checkpoint
+from app.store.engine import Store
+from app.store.events import append_event
+from app.store.fences import change_state, fenced_update
+from app.store.jobs import job_from_row, read_job
+from app.store.records import Claim, JobRecord, NewCheckpoint, ResumeState
+from app.store.tables import events, job_checkpoints, jobs, metrics, resume_states
+
+MAX_RESUME = 900 * 1024 * 1024
+"""Largest resume state; SQLite holds blobs of at most 1e9 bytes [bytes]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Watch:
+    """The little that a supervisor needs to watch over a running job."""
+
+    claim: Claim
+    """The attempt that runs."""
+    cancel_requested: bool
+    """Whether somebody asked to cancel it."""
+    heartbeat_at: datetime | None
+    """Last sign of life of its worker."""
+
+
+def claim_next(store: Store) -> tuple[Claim, JobRecord] | None:
+    """Take the oldest queued job and start its next attempt.
+
+    Points of the curve and checkpoints beyond the last resume state are dropped, since the
+    new attempt will write those steps again.
+
+    Returns:
+        The claim and the job, or None if nothing is queued.
+    """
+    oldest = sa.select(jobs.c.id).where(jobs.c.state == "queued").order_by(jobs.c.number)
+    with store.writing() as connection:
+        job_id = connection.execute(oldest.limit(1).with_for_update(skip_locked=True)).scalar()
+        if job_id is None:
+            return None
+        step = _forget_beyond_resume(connection, job_id)
+        attempt = read_job(connection, job_id).attempt + 1
+        now = datetime.now(UTC)
+        changes = {
+            "state": "running",
+            "attempt": attempt,
+            "started_at": sa.func.coalesce(jobs.c.started_at, now),
+            "heartbeat_at": now,
+            "step": max(step, 0),
+        }
+        data = {"attempt": attempt, "resumed_from_step": max(step, 0)}
+        change_state(connection, job_id, "running", changes, data)
+        return Claim(job_id=job_id, attempt=attempt), read_job(connection, job_id)
+
+
+def heartbeat(store: Store, claim: Claim) -> JobRecord:
+    """Note that the worker lives and return its job, with ``cancel_requested``.
+
+    Raises:
+        StaleAttempt: The attempt no longer holds the job.
+    """
+    with store.writing() as connection:
+        fenced_update(connection, claim, {"heartbeat_at": datetime.now(UTC)}, counts=False)
+        return read_job(connection, claim.job_id)
+
+
+def record_progress(
+    store: Store,
+    claim: Claim,
+    step: int,
+    values: Mapping[str, float | None],
+    *,
+    total_steps: int | None = None,
+) -> None:
+    """Add one point to the job's curve.
+
+    Args:
+        store: The database.
+        claim: The attempt that writes.
+        step: Steps done, above every step recorded before.
+        values: Named numbers; None where not defined. No NaN, no infinity.
+        total_steps: Steps to do, where known.
+
+    Raises:
+        StaleAttempt: The attempt no longer holds the job.
+        InvalidInput: The step lies not above the one recorded last, or a value is not finite.
+        StorageFull: No room is left.
+    """
+    for name, value in values.items():
+        if value is not None and not math.isfinite(value):
+            raise InvalidInput(name, value, "must be finite, or None where not defined")
+    now = datetime.now(UTC)
+    changes: dict[str, Any] = {"heartbeat_at": now, "step": step}
+    if total_steps is not None:
+        changes["total_steps"] = total_steps
+    with store.writing() as connection:
+        event_id = fenced_update(connection, claim, changes)
+        mine = metrics.c.job_id == claim.job_id
+        last = connection.execute(sa.select(sa.func.max(metrics.c.step)).where(mine)).scalar()
+        if last is not None and step <= last:
+            raise InvalidInput("step", step, f"must lie above the last recorded step {last}")
+        row = {"job_id": claim.job_id, "step": step, "values": dict(values), "at": now}
+        connection.execute(sa.insert(metrics).values(row))
+        append_event(connection, claim.job_id, event_id, "progress", step=step)
+
+
+def record_checkpoint(
+    store: Store,
+    claim: Claim,
+    step: int,
+    policy: NewCheckpoint,
+    resume: ResumeState | None = None,
+) -> None:
+    """Store the policy of a step and, in the same transaction, what a new attempt needs.
+
+    Args:
+        store: The database.
+        claim: The attempt that writes.
+        step: Steps done; a checkpoint of the same step is replaced.
+        policy: The policy as it acts.
+        resume: Replaces the job's earlier resume state.
+
+    Raises:
+        StaleAttempt: The attempt no longer holds the job.
+        InvalidInput: Something is too large, or the steps differ.
+        StorageFull: No room is left; the earlier resume state stays.
+    """
+    if resume is not None and resume.step != step:
+        raise InvalidInput("resume.step", resume.step, f"must equal the checkpoint's {step}")
+    if resume is not None and len(resume.tensors) > MAX_RESUME:
+        rule = f"bytes exceed the limit of {MAX_RESUME} bytes"
+        raise InvalidInput("resume.tensors", len(resume.tensors), rule)
+    with store.writing() as connection:
+        event_id = fenced_update(connection, claim, {"heartbeat_at": datetime.now(UTC)})
+        drop_job_checkpoints(connection, claim.job_id, beyond=step - 1)
+        insert_checkpoint(connection, policy)
+        link = {"job_id": claim.job_id, "step": step, "sha256": policy.sha256}
+        connection.execute(sa.insert(job_checkpoints).values(link))
+        if resume is not None:
+            _replace_resume(connection, claim.job_id, resume)
+        data = {"sha256": policy.sha256}
+        append_event(connection, claim.job_id, event_id, "checkpoint", data=data, step=step)
+
+
+def load_resume(store: Store, job_id: str) -> ResumeState | None:
+    """Return what a new attempt goes on from; None to start afresh."""
+    query = sa.select(resume_states).where(resume_states.c.job_id == job_id)
+    with store.reading() as connection:
+        row = connection.execute(query).first()
+    if row is None:
+        return None
+    return ResumeState(step=row.step, manifest=row.manifest, tensors=row.tensors)
+
+
+def watch_running(store: Store) -> tuple[Watch, ...]:
+    """Return the running jobs, with what a supervisor looks at."""
+    query = sa.select(jobs).where(jobs.c.state == "running")
+    with store.reading() as connection:
+        found = [job_from_row(row) for row in connection.execute(query).mappings()]
+    return tuple(
+        Watch(
+            claim=Claim(job_id=job.id, attempt=job.attempt),
+            cancel_requested=job.cancel_requested,
+            heartbeat_at=job.heartbeat_at,
+        )
+        for job in found
+    )
+
+
+def _forget_beyond_resume(connection: sa.Connection, job_id: str) -> int:
+    """Drop what the dead attempt wrote after its last resume state; return that step."""
+    query = sa.select(resume_states.c.step).where(resume_states.c.job_id == job_id)
+    found = connection.execute(query).scalar()
+    step = -1 if found is None else int(found)
+    connection.execute(
+        sa.delete(metrics).where(metrics.c.job_id == job_id, metrics.c.step > step)
+    )
+    connection.execute(sa.delete(events).where(events.c.job_id == job_id, events.c.step > step))
+    drop_job_checkpoints(connection, job_id, beyond=step)
+    return step
+
+
+def _replace_resume(connection: sa.Connection, job_id: str, resume: ResumeState) -> None:
+    connection.execute(sa.delete(resume_states).where(resume_states.c.job_id == job_id))
+    values = {
+        "job_id": job_id,
+        "step": resume.step,
+        "manifest": dict(resume.manifest),
+        "tensors": resume.tensors,
+    }
+    connection.execute(sa.insert(resume_states).values(values))

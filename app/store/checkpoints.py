@@ -1,0 +1,212 @@
+"""Trained policies and the names that point to them.
+
+A checkpoint is a JSON manifest and safetensors bytes under its SHA-256; the store never opens
+it. Two jobs that made the same bytes share one row.
+"""
+
+import re
+from datetime import UTC, datetime
+from typing import Any
+
+import sqlalchemy as sa
+
+from app.errors import InvalidInput, NotFound
+from app.store.cursors import check_limit, decode_cursor, encode_cursor
+from app.store.engine import Store
+from app.store.records import CheckpointRecord, NewCheckpoint, Page
+from app.store.tables import aliases, checkpoints, job_checkpoints
+
+MAX_TENSORS = 16 * 1024 * 1024
+"""Largest policy that goes into the database [bytes]."""
+
+_SHA256 = re.compile(r"[0-9a-f]{64}")
+_ALIAS = re.compile(r"[a-z0-9][a-z0-9._-]{0,63}")
+
+
+def put_checkpoint(store: Store, new: NewCheckpoint) -> CheckpointRecord:
+    """Store a checkpoint that no job made, such as a shipped one; again is harmless.
+
+    Raises:
+        InvalidInput: Its id is no SHA-256 or it is too large.
+        StorageFull: No room is left.
+    """
+    with store.writing() as connection:
+        insert_checkpoint(connection, new, imported=True)
+    return get_checkpoint(store, new.sha256)
+
+
+def get_checkpoint(store: Store, reference: str) -> CheckpointRecord:
+    """Return one checkpoint, by SHA-256 or alias, without its tensors.
+
+    Raises:
+        NotFound: Nothing has that name.
+    """
+    with store.reading() as connection:
+        sha256 = _resolve(connection, reference)
+        row = connection.execute(_described().where(checkpoints.c.sha256 == sha256)).first()
+        if row is None:
+            raise NotFound("checkpoint", reference)
+        return _record(row, _names(connection))
+
+
+def read_tensors(store: Store, reference: str) -> bytes:
+    """Return the safetensors bytes of a checkpoint, by SHA-256 or alias.
+
+    Raises:
+        NotFound: Nothing has that name.
+    """
+    with store.reading() as connection:
+        sha256 = _resolve(connection, reference)
+        query = sa.select(checkpoints.c.tensors).where(checkpoints.c.sha256 == sha256)
+        tensors: bytes | None = connection.execute(query).scalar()
+    if tensors is None:
+        raise NotFound("checkpoint", reference)
+    return tensors
+
+
+def list_checkpoints(
+    store: Store, *, job_id: str | None = None, cursor: str | None = None, limit: int = 50
+) -> Page[CheckpointRecord]:
+    """Return one page of the checkpoints, newest first.
+
+    Args:
+        store: The database.
+        job_id: Only those that this job made.
+        cursor: ``next_cursor`` of the page before; None for the first.
+        limit: Length of the page, 1 to 200.
+
+    Raises:
+        InvalidInput: A cursor or limit that cannot be.
+    """
+    query = _described(job_id).order_by(checkpoints.c.number.desc())
+    query = query.limit(check_limit(limit) + 1)
+    below = decode_cursor(cursor)
+    if below is not None:
+        query = query.where(checkpoints.c.number < below)
+    with store.reading() as connection:
+        rows = connection.execute(query).all()
+        names = _names(connection)
+    items = tuple(_record(row, names) for row in rows[:limit])
+    more = len(rows) > limit
+    return Page(items=items, next_cursor=encode_cursor(items[-1].number) if more else None)
+
+
+def set_alias(store: Store, name: str, sha256: str) -> None:
+    """Let a name point to a checkpoint from now on.
+
+    Raises:
+        NotFound: There is no such checkpoint.
+        InvalidInput: The name has other than 1 to 64 of the characters ``a-z 0-9 . _ -``.
+    """
+    if not _ALIAS.fullmatch(name) or _SHA256.fullmatch(name):
+        rule = "must have 1 to 64 of the characters a-z 0-9 . _ - and start with a-z or 0-9"
+        raise InvalidInput("alias", name, rule)
+    with store.writing() as connection:
+        known = sa.select(checkpoints.c.sha256).where(checkpoints.c.sha256 == sha256)
+        if connection.execute(known).first() is None:
+            raise NotFound("checkpoint", sha256)
+        connection.execute(sa.delete(aliases).where(aliases.c.name == name))
+        values = {"name": name, "sha256": sha256, "set_at": datetime.now(UTC)}
+        connection.execute(sa.insert(aliases).values(values))
+
+
+def list_aliases(store: Store) -> dict[str, str]:
+    """Return every alias with the SHA-256 it points to."""
+    query = sa.select(aliases.c.name, aliases.c.sha256).order_by(aliases.c.name)
+    with store.reading() as connection:
+        return {row.name: row.sha256 for row in connection.execute(query)}
+
+
+def insert_checkpoint(
+    connection: sa.Connection, new: NewCheckpoint, *, imported: bool = False
+) -> None:
+    """Write a checkpoint inside a transaction, unless the same bytes are there already.
+
+    Raises:
+        InvalidInput: Its id is no SHA-256 or it is too large.
+    """
+    if not _SHA256.fullmatch(new.sha256):
+        raise InvalidInput("checkpoint", new.sha256, "must be 64 hexadecimal digits")
+    if len(new.tensors) > MAX_TENSORS:
+        rule = f"bytes exceed the limit of {MAX_TENSORS} bytes per checkpoint"
+        raise InvalidInput("checkpoint.tensors", len(new.tensors), rule)
+    same = checkpoints.c.sha256 == new.sha256
+    if connection.execute(sa.select(checkpoints.c.number).where(same)).first() is not None:
+        if imported:
+            connection.execute(sa.update(checkpoints).where(same).values(imported=True))
+        return
+    values = {
+        "sha256": new.sha256,
+        "imported": imported,
+        "manifest": dict(new.manifest),
+        "size": len(new.tensors),
+        "created_at": datetime.now(UTC),
+        "tensors": new.tensors,
+    }
+    connection.execute(sa.insert(checkpoints).values(values))
+
+
+def drop_job_checkpoints(connection: sa.Connection, job_id: str, *, beyond: int) -> None:
+    """Forget the checkpoints a job made beyond a step, and bytes that nobody names any more."""
+    mine = sa.and_(job_checkpoints.c.job_id == job_id, job_checkpoints.c.step > beyond)
+    dropped = (
+        connection.execute(sa.select(job_checkpoints.c.sha256).where(mine)).scalars().all()
+    )
+    connection.execute(sa.delete(job_checkpoints).where(mine))
+    unnamed = sa.and_(
+        checkpoints.c.sha256.in_(dropped),
+        sa.not_(checkpoints.c.imported),
+        checkpoints.c.sha256.not_in(sa.select(job_checkpoints.c.sha256)),
+        checkpoints.c.sha256.not_in(sa.select(aliases.c.sha256)),
+    )
+    connection.execute(sa.delete(checkpoints).where(unnamed))
+
+
+def _resolve(connection: sa.Connection, reference: str) -> str:
+    if _SHA256.fullmatch(reference):
+        return reference
+    names = _names(connection)
+    for sha256, known in names.items():
+        if reference in known:
+            return sha256
+    raise NotFound("checkpoint", reference, sorted(sum(names.values(), ())))
+
+
+def _names(connection: sa.Connection) -> dict[str, tuple[str, ...]]:
+    names: dict[str, tuple[str, ...]] = {}
+    query = sa.select(aliases.c.name, aliases.c.sha256).order_by(aliases.c.name)
+    for row in connection.execute(query):
+        names[row.sha256] = (*names.get(row.sha256, ()), row.name)
+    return names
+
+
+def _described(job_id: str | None = None) -> sa.Select[Any]:
+    """Select checkpoints without tensors, each with the first job and step that made it."""
+    link = job_checkpoints.alias()
+    makes = [link.c.sha256 == checkpoints.c.sha256]
+    if job_id is not None:
+        makes.append(link.c.job_id == job_id)
+    first = sa.select(link.c.job_id).where(*makes).order_by(link.c.step, link.c.job_id)
+    query = sa.select(
+        checkpoints.c.sha256,
+        checkpoints.c.number,
+        checkpoints.c.manifest,
+        checkpoints.c.size,
+        checkpoints.c.created_at,
+        first.limit(1).scalar_subquery().label("job_id"),
+        first.with_only_columns(link.c.step).limit(1).scalar_subquery().label("step"),
+    )
+    return query if job_id is None else query.where(sa.exists().where(*makes))
+
+
+def _record(row: Any, names: dict[str, tuple[str, ...]]) -> CheckpointRecord:
+    return CheckpointRecord(
+        sha256=row.sha256,
+        number=row.number,
+        job_id=row.job_id,
+        step=row.step,
+        manifest=row.manifest,
+        size=row.size,
+        created_at=row.created_at,
+        aliases=names.get(row.sha256, ()),
+    )

@@ -1,0 +1,42 @@
+"""Cursors of lists: opaque text that stands for the number of the last item shown."""
+
+import base64
+import binascii
+
+from app.errors import InvalidInput
+
+MAX_PAGE = 200
+"""Longest page of a list."""
+
+
+def encode_cursor(number: int) -> str:
+    """Return the cursor that goes on below ``number``."""
+    return base64.urlsafe_b64encode(f"n{number}".encode()).decode().rstrip("=")
+
+
+def decode_cursor(cursor: str | None) -> int | None:
+    """Return the number a cursor stands for; None for the first page.
+
+    Raises:
+        InvalidInput: The text was not made by :func:`encode_cursor`.
+    """
+    if cursor is None:
+        return None
+    try:
+        text = base64.urlsafe_b64decode(cursor + "=" * (-len(cursor) % 4)).decode()
+        number = int(text.removeprefix("n"))
+    except (binascii.Error, ValueError) as error:
+        rule = "must be a cursor that an earlier page returned"
+        raise InvalidInput("cursor", cursor, rule) from error
+    return number
+
+
+def check_limit(limit: int) -> int:
+    """Return ``limit`` if a page may be that long.
+
+    Raises:
+        InvalidInput: It lies outside [1, MAX_PAGE].
+    """
+    if not 1 <= limit <= MAX_PAGE:
+        raise InvalidInput("limit", limit, f"must lie in [1, {MAX_PAGE}]")
+    return limit

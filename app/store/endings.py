@@ -1,0 +1,158 @@
+"""How attempts end: well, cancelled, failed, crashed, interrupted, orphaned.
+
+Deaths of the server are not counted against a job; crashes of its worker are.
+"""
+
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from typing import Any, Literal
+
+import sqlalchemy as sa
+
+from app.errors import StorageFull
+from app.store.engine import Store
+from app.store.fences import change_state, fenced_update, peek
+from app.store.jobs import read_job
+from app.store.records import Claim, JobRecord
+from app.store.tables import jobs, reserve, resume_states
+
+MAX_ERROR = 4000
+"""Longest error text kept with a job [characters]."""
+
+RESERVE_BYTES = 128 * 1024
+"""Room set aside for marking a job failed in a full database [bytes]."""
+
+
+def finish(
+    store: Store,
+    claim: Claim,
+    *,
+    state: Literal["succeeded", "cancelled"] = "succeeded",
+    result: Mapping[str, Any] | None = None,
+) -> None:
+    """End a job well, or as cancelled.
+
+    Raises:
+        StaleAttempt: The attempt no longer holds the job.
+        StorageFull: No room is left.
+    """
+    with store.writing() as connection:
+        _drop_resume(connection, claim)
+        changes = {"result": None if result is None else dict(result)}
+        _end(connection, claim, state, changes)
+
+
+def fail(store: Store, claim: Claim, error: str) -> None:
+    """End a job with an error that no further attempt would cure.
+
+    On a full database the room reserved for this moment is given up; the supervisor sets it
+    aside again when it next starts.
+
+    Raises:
+        StaleAttempt: The attempt no longer holds the job.
+        StorageFull: Not even that was enough.
+    """
+    changes = {"error": error[-MAX_ERROR:]}
+    try:
+        with store.writing() as connection:
+            _drop_resume(connection, claim)
+            _end(connection, claim, "failed", changes)
+    except StorageFull:
+        with store.writing() as connection:
+            connection.execute(sa.delete(reserve))
+            _drop_resume(connection, claim)
+            _end(connection, claim, "failed", changes)
+
+
+def crash(store: Store, claim: Claim, error: str, *, max_failures: int) -> JobRecord:
+    """Note that an attempt died; queue the job again unless that happened too often.
+
+    Args:
+        store: The database.
+        claim: The attempt that died.
+        error: Why, as far as known.
+        max_failures: The job fails with its crash number ``max_failures``.
+
+    Raises:
+        StaleAttempt: The attempt no longer holds the job.
+        StorageFull: No room is left.
+    """
+    job = peek(store, claim)
+    failures = job.failures + 1
+    if failures >= max_failures:
+        fail(store, claim, f"crashed {failures} times, the last time so: {error}")
+    else:
+        with store.writing() as connection:
+            changes = {"failures": failures, "error": error[-MAX_ERROR:]}
+            fenced_update(connection, claim, {}, counts=False)
+            _requeue(connection, claim.job_id, changes)
+    with store.reading() as connection:
+        return read_job(connection, claim.job_id)
+
+
+def give_back(store: Store, claim: Claim) -> None:
+    """Queue a job again whose worker was stopped on purpose; not counted as a failure.
+
+    Raises:
+        StaleAttempt: The attempt no longer holds the job.
+    """
+    with store.writing() as connection:
+        fenced_update(connection, claim, {}, counts=False)
+        _requeue(connection, claim.job_id, {})
+
+
+def requeue_orphans(store: Store) -> tuple[str, ...]:
+    """Queue again what an earlier server left running; call it while holding the data lock.
+
+    No process is looked for or killed: the raised attempt number fences off whatever may
+    still run. Nothing is counted as a failure. Jobs that were to be cancelled are cancelled.
+
+    Returns:
+        The ids of these jobs.
+    """
+    running = sa.select(jobs.c.id).where(jobs.c.state == "running").order_by(jobs.c.number)
+    with store.writing() as connection:
+        orphans = connection.execute(running).scalars().all()
+        for job_id in orphans:
+            _requeue(connection, job_id, {})
+    return tuple(orphans)
+
+
+def fill_reserve(store: Store) -> None:
+    """Set room aside, so that a job can be marked failed when the database is full."""
+    with store.writing() as connection:
+        if connection.execute(sa.select(reserve.c.id)).first() is None:
+            filler = bytes(RESERVE_BYTES)
+            connection.execute(sa.insert(reserve).values(id=1, filler=filler))
+
+
+def _end(
+    connection: sa.Connection, claim: Claim, state: str, changes: Mapping[str, Any]
+) -> None:
+    fenced_update(connection, claim, {}, counts=False)
+    now = datetime.now(UTC)
+    data: dict[str, Any] = {"attempt": claim.attempt}
+    if changes.get("error"):
+        data["error"] = changes["error"]
+    values = {"error": None, **changes, "finished_at": now, "heartbeat_at": now}
+    change_state(connection, claim.job_id, state, values, data)
+
+
+def _requeue(connection: sa.Connection, job_id: str, changes: Mapping[str, Any]) -> None:
+    job = read_job(connection, job_id, for_update=True)
+    data: dict[str, Any] = {"attempt": job.attempt}
+    if job.cancel_requested:
+        values = {**changes, "finished_at": datetime.now(UTC)}
+        connection.execute(sa.delete(resume_states).where(resume_states.c.job_id == job_id))
+        change_state(connection, job_id, "cancelled", values, data)
+        return
+    if changes.get("error"):
+        data["error"] = changes["error"]
+    change_state(connection, job_id, "queued", changes, data)
+
+
+def _drop_resume(connection: sa.Connection, claim: Claim) -> None:
+    """Free the resume state first: on a full database this makes room for what follows."""
+    fenced_update(connection, claim, {}, counts=False)
+    mine = resume_states.c.job_id == claim.job_id
+    connection.execute(sa.delete(resume_states).where(mine))

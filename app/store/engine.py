@@ -1,0 +1,145 @@
+"""The connection to the database: SQLite by default, PostgreSQL by URL.
+
+SQLite runs with WAL, ``synchronous=FULL`` (a commit that was acknowledged survives a power
+cut), a busy timeout and foreign keys. Writers take the write lock at once (BEGIN IMMEDIATE):
+a transaction that reads first and writes later would otherwise fail under concurrency.
+"""
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import sqlalchemy as sa
+from sqlalchemy import event
+from sqlalchemy.engine import make_url
+from sqlalchemy.engine.interfaces import DBAPIConnection
+from sqlalchemy.exc import ArgumentError, NoSuchModuleError, OperationalError
+from sqlalchemy.pool import ConnectionPoolEntry
+
+from app.errors import InvalidInput, StorageFull
+
+BUSY_TIMEOUT_MS = 30_000
+"""How long a writer waits for another one; a 100 MB blob takes below one second."""
+
+WAL_SIZE_LIMIT = 64 * 1024 * 1024
+"""Size to which the write-ahead log is cut after a large blob [bytes]."""
+
+_PRAGMAS = (
+    "PRAGMA journal_mode = WAL",
+    "PRAGMA synchronous = FULL",
+    f"PRAGMA busy_timeout = {BUSY_TIMEOUT_MS}",
+    "PRAGMA foreign_keys = ON",
+    f"PRAGMA journal_size_limit = {WAL_SIZE_LIMIT}",
+)
+
+
+class Store:
+    """One database, shared by the threads of a process. Every process opens its own.
+
+    Args:
+        database_url: SQLAlchemy URL, such as ``sqlite:////var/lib/tandem/tandem.db``.
+
+    Raises:
+        InvalidInput: The URL names no database that works here.
+    """
+
+    def __init__(self, database_url: str) -> None:
+        self._url = _checked_url(database_url)
+        try:
+            self.engine = sa.create_engine(self._url, json_serializer=_to_json)
+        except (NoSuchModuleError, ModuleNotFoundError) as error:
+            rule = f"needs a database driver that is not installed ({error})"
+            raise InvalidInput("database_url", self.shown_url, rule) from error
+        if self._url.get_backend_name() == "sqlite":
+            event.listen(self.engine, "connect", _prepare_connection)
+            event.listen(self.engine, "begin", _begin)
+
+    @property
+    def url(self) -> str:
+        """The URL with its password, for child processes; SQLite paths are absolute."""
+        return self._url.render_as_string(hide_password=False)
+
+    @property
+    def shown_url(self) -> str:
+        """The URL without its password, for messages and logs."""
+        return self._url.render_as_string(hide_password=True)
+
+    @property
+    def sqlite_path(self) -> Path | None:
+        """The database file; None for other databases."""
+        is_sqlite = self._url.get_backend_name() == "sqlite"
+        return Path(self._url.database or "") if is_sqlite else None
+
+    @contextmanager
+    def reading(self) -> Iterator[sa.Connection]:
+        """Open a transaction that sees one consistent state and writes nothing."""
+        with self.engine.connect() as connection, connection.begin():
+            yield connection
+
+    @contextmanager
+    def writing(self) -> Iterator[sa.Connection]:
+        """Open a transaction that holds the write lock; commits on a normal exit.
+
+        Raises:
+            StorageFull: No room is left; nothing was written.
+        """
+        with self.engine.connect() as plain:
+            connection = plain.execution_options(tandem_writes=True)
+            try:
+                with connection.begin():
+                    yield connection
+            except OperationalError as error:
+                if _is_full(error):
+                    raise StorageFull(self.shown_url) from error
+                raise
+
+    def close(self) -> None:
+        """Close every pooled connection."""
+        self.engine.dispose()
+
+
+def _checked_url(database_url: str) -> sa.URL:
+    try:
+        url = make_url(database_url)
+    except ArgumentError as error:
+        rule = "must be a database URL, such as sqlite:////data/tandem.db"
+        raise InvalidInput("database_url", database_url, rule) from error
+    if url.get_backend_name() not in ("sqlite", "postgresql"):
+        rule = "must name a database that Tandem knows"
+        shown = url.render_as_string(hide_password=True)
+        raise InvalidInput("database_url", shown, rule, ("sqlite", "postgresql"))
+    if url.get_backend_name() == "sqlite":
+        if not url.database or url.database == ":memory:" or url.database.startswith("file:"):
+            rule = "must name a file, because workers open it from their own processes"
+            raise InvalidInput("database_url", database_url, rule)
+        path = Path(url.database).absolute()
+        if not path.parent.is_dir():
+            rule = f"must lie in a folder that exists; there is no {path.parent}"
+            raise InvalidInput("database_url", database_url, rule)
+        url = url.set(database=str(path))
+    return url
+
+
+def _to_json(value: Any) -> str:
+    return json.dumps(value, allow_nan=False, ensure_ascii=False)
+
+
+def _prepare_connection(connection: DBAPIConnection, _entry: ConnectionPoolEntry) -> None:
+    # The driver's own implicit BEGIN comes too late and is never IMMEDIATE: switch it off.
+    connection.isolation_level = None
+    cursor = connection.cursor()
+    for pragma in _PRAGMAS:
+        cursor.execute(pragma)
+    cursor.close()
+
+
+def _begin(connection: sa.Connection) -> None:
+    writes = connection.get_execution_options().get("tandem_writes", False)
+    connection.exec_driver_sql("BEGIN IMMEDIATE" if writes else "BEGIN")
+
+
+def _is_full(error: OperationalError) -> bool:
+    text = str(error.orig).lower()
+    return "disk is full" in text or "no space left" in text or "disk full" in text

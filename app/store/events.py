@@ -1,0 +1,75 @@
+"""What happened to a job, in order: the source of event streams.
+
+Ids rise strictly within a job and follow the order of commits, so a reader that asks for
+everything after the last id it saw misses nothing and sees nothing twice. When an attempt
+starts again from an earlier step, the progress beyond that step is forgotten here as in the
+curve, and the ``state`` event of the start says so (``resumed_from_step``).
+"""
+
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from typing import Any
+
+import sqlalchemy as sa
+
+from app.errors import NotFound
+from app.store.engine import Store
+from app.store.records import JobEvent
+from app.store.tables import events, jobs, metrics
+
+
+def list_events(
+    store: Store, job_id: str, *, after: int = 0, limit: int = 500
+) -> tuple[JobEvent, ...]:
+    """Return the events of a job with an id above ``after``, oldest first.
+
+    Args:
+        store: The database.
+        job_id: The job.
+        after: Id of the last event already seen (``Last-Event-ID``), 0 for all.
+        limit: At most so many; ask again with the last id for more.
+
+    Raises:
+        NotFound: There is no such job.
+    """
+    on_step = sa.and_(metrics.c.job_id == events.c.job_id, metrics.c.step == events.c.step)
+    query = (
+        sa.select(events, metrics.c["values"].label("curve"))
+        .outerjoin(metrics, sa.and_(on_step, events.c.kind == "progress"))
+        .where(events.c.job_id == job_id, events.c.id > after)
+        .order_by(events.c.id)
+        .limit(limit)
+    )
+    with store.reading() as connection:
+        known = connection.execute(sa.select(jobs.c.id).where(jobs.c.id == job_id)).first()
+        if known is None:
+            raise NotFound("job", job_id)
+        rows = connection.execute(query).all()
+    return tuple(JobEvent(id=row.id, kind=row.kind, data=_data(row), at=row.at) for row in rows)
+
+
+def append_event(
+    connection: sa.Connection,
+    job_id: str,
+    event_id: int,
+    kind: str,
+    *,
+    data: Mapping[str, Any] | None = None,
+    step: int | None = None,
+) -> None:
+    """Write one event inside the transaction that raised ``jobs.last_event`` to its id."""
+    connection.execute(
+        sa.insert(events).values(
+            job_id=job_id,
+            id=event_id,
+            kind=kind,
+            step=step,
+            data=dict(data or {}),
+            at=datetime.now(UTC),
+        )
+    )
+
+
+def _data(row: Any) -> dict[str, Any]:
+    step = {} if row.step is None else {"step": row.step}
+    return {**step, **row.data, **(row.curve or {})}

@@ -1,0 +1,190 @@
+"""Jobs as their owners see them: submit, look, cancel.
+
+    queued ──claim──> running ──> succeeded | failed
+      │ ^               │  └──cancel──> cancelling ──> cancelled
+      │ └──crash, restart of the server──┘
+      └──cancel──> cancelled
+
+What workers and the supervisor write is in ``app.store.attempts``.
+"""
+
+import uuid
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from typing import Any
+
+import sqlalchemy as sa
+from sqlalchemy.exc import IntegrityError
+
+from app.errors import Conflict, InvalidInput, NotFound
+from app.store.cursors import check_limit, decode_cursor, encode_cursor
+from app.store.engine import Store
+from app.store.events import append_event
+from app.store.records import JobRecord, JobState, NewJob, Page
+from app.store.tables import jobs
+
+MAX_KEY_LENGTH = 255
+"""Longest idempotency key."""
+
+
+def create_job(store: Store, new: NewJob, *, idempotency_key: str | None = None) -> JobRecord:
+    """Queue a job.
+
+    The same key with the same spec returns the job that is already there.
+
+    Args:
+        store: The database.
+        new: What to do.
+        idempotency_key: Name given by the caller to this submission.
+
+    Raises:
+        Conflict: The key was used for another spec.
+        InvalidInput: The key is empty or too long.
+        StorageFull: No room is left.
+    """
+    if idempotency_key is not None and not 1 <= len(idempotency_key) <= MAX_KEY_LENGTH:
+        rule = f"must have 1 to {MAX_KEY_LENGTH} characters"
+        raise InvalidInput("idempotency_key", idempotency_key, rule)
+    values = {
+        "id": str(uuid.uuid4()),
+        "kind": new.kind,
+        "preset": new.preset,
+        "seed": new.seed,
+        "overrides": dict(new.overrides or {}),
+        "spec": dict(new.spec),
+        "state": "queued",
+        "total_steps": new.total_steps,
+        "idempotency_key": idempotency_key,
+        "created_at": datetime.now(UTC),
+        "last_event": 1,
+    }
+    try:
+        with store.writing() as connection:
+            earlier = _by_key(connection, idempotency_key)
+            if earlier is None:
+                connection.execute(sa.insert(jobs).values(values))
+                data = {"state": "queued", "attempt": 0}
+                append_event(connection, str(values["id"]), 1, "state", data=data)
+    except IntegrityError:  # another server process was faster with the same key
+        with store.reading() as connection:
+            earlier = _by_key(connection, idempotency_key)
+        if earlier is None:
+            raise
+    if earlier is not None:
+        return _same_submission(earlier, new)
+    return get_job(store, str(values["id"]))
+
+
+def get_job(store: Store, job_id: str) -> JobRecord:
+    """Return one job.
+
+    Raises:
+        NotFound: There is no such job.
+    """
+    with store.reading() as connection:
+        return read_job(connection, job_id)
+
+
+def list_jobs(
+    store: Store,
+    *,
+    cursor: str | None = None,
+    limit: int = 50,
+    state: JobState | None = None,
+) -> Page[JobRecord]:
+    """Return one page of the jobs, newest first.
+
+    Args:
+        store: The database.
+        cursor: ``next_cursor`` of the page before; None for the first.
+        limit: Length of the page, 1 to 200.
+        state: Only jobs in this state.
+
+    Raises:
+        InvalidInput: A cursor or limit that cannot be.
+    """
+    query = sa.select(jobs).order_by(jobs.c.number.desc()).limit(check_limit(limit) + 1)
+    below = decode_cursor(cursor)
+    if below is not None:
+        query = query.where(jobs.c.number < below)
+    if state is not None:
+        query = query.where(_in_state(state))
+    with store.reading() as connection:
+        rows = connection.execute(query).mappings().all()
+    items = tuple(job_from_row(row) for row in rows[:limit])
+    more = len(rows) > limit
+    return Page(items=items, next_cursor=encode_cursor(items[-1].number) if more else None)
+
+
+def request_cancel(store: Store, job_id: str) -> JobRecord:
+    """Cancel a queued job at once; ask a running one to stop; leave a finished one alone.
+
+    Raises:
+        NotFound: There is no such job.
+        Conflict: The job has succeeded or failed already.
+    """
+    with store.writing() as connection:
+        job = read_job(connection, job_id, for_update=True)
+        if job.state in ("succeeded", "failed"):
+            raise Conflict(f"job {job_id} has already {job.state}: it cannot be cancelled")
+        if job.state in ("queued", "running"):
+            _cancel(connection, job)
+        return read_job(connection, job_id)
+
+
+def read_job(connection: sa.Connection, job_id: str, *, for_update: bool = False) -> JobRecord:
+    """Return one job inside a transaction, locking its row if it is about to change.
+
+    Raises:
+        NotFound: There is no such job.
+    """
+    query = sa.select(jobs).where(jobs.c.id == job_id)
+    if for_update:  # SQLite has no row locks and needs none: writers are alone there
+        query = query.with_for_update()
+    row = connection.execute(query).mappings().first()
+    if row is None:
+        raise NotFound("job", job_id)
+    return job_from_row(row)
+
+
+def job_from_row(row: Mapping[Any, Any]) -> JobRecord:
+    """Turn a row of the table into its record."""
+    fields = dict(row)
+    if fields["state"] == "running" and fields["cancel_requested"]:
+        fields["state"] = "cancelling"
+    return JobRecord(**fields)
+
+
+def _cancel(connection: sa.Connection, job: JobRecord) -> None:
+    queued = job.state == "queued"
+    changes: dict[str, Any] = {"cancel_requested": True, "last_event": job.last_event + 1}
+    if queued:
+        changes |= {"state": "cancelled", "finished_at": datetime.now(UTC)}
+    connection.execute(sa.update(jobs).where(jobs.c.id == job.id).values(changes))
+    data = {"state": "cancelled" if queued else "cancelling", "attempt": job.attempt}
+    append_event(connection, job.id, job.last_event + 1, "state", data=data)
+
+
+def _by_key(connection: sa.Connection, key: str | None) -> JobRecord | None:
+    if key is None:
+        return None
+    query = sa.select(jobs).where(jobs.c.idempotency_key == key)
+    row = connection.execute(query).mappings().first()
+    return None if row is None else job_from_row(row)
+
+
+def _same_submission(earlier: JobRecord, new: NewJob) -> JobRecord:
+    if dict(earlier.spec) != dict(new.spec):
+        raise Conflict(
+            f"idempotency key {earlier.idempotency_key!r} belongs to job {earlier.id}, which "
+            "was submitted with another body: use a new key"
+        )
+    return earlier
+
+
+def _in_state(state: JobState) -> sa.ColumnElement[bool]:
+    if state == "cancelling":
+        return sa.and_(jobs.c.state == "running", jobs.c.cancel_requested)
+    if state == "running":
+        return sa.and_(jobs.c.state == "running", sa.not_(jobs.c.cancel_requested))
+    return jobs.c.state == state

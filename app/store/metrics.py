@@ -1,0 +1,37 @@
+"""The curve of a job: one row per step of its fixed grid, never two."""
+
+import sqlalchemy as sa
+
+from app.errors import NotFound
+from app.store.engine import Store
+from app.store.records import MetricRow
+from app.store.tables import jobs
+from app.store.tables import metrics as table
+
+
+def list_metrics(
+    store: Store, job_id: str, *, after_step: int = -1, limit: int = 10_000
+) -> tuple[MetricRow, ...]:
+    """Return the points of a job's curve beyond ``after_step``, in order of steps.
+
+    Args:
+        store: The database.
+        job_id: The job.
+        after_step: The last step already known; -1 for all.
+        limit: At most so many; ask again with the last step for more.
+
+    Raises:
+        NotFound: There is no such job.
+    """
+    query = (
+        sa.select(table)
+        .where(table.c.job_id == job_id, table.c.step > after_step)
+        .order_by(table.c.step)
+        .limit(limit)
+    )
+    with store.reading() as connection:
+        known = connection.execute(sa.select(jobs.c.id).where(jobs.c.id == job_id)).first()
+        if known is None:
+            raise NotFound("job", job_id)
+        rows = connection.execute(query).mappings().all()
+    return tuple(MetricRow(step=r["step"], values=r["values"], at=r["at"]) for r in rows)

@@ -1,0 +1,72 @@
+"""Bring a database to the schema of this code, or say why that cannot be."""
+
+from pathlib import Path
+
+import sqlalchemy as sa
+from alembic import command
+from alembic.config import Config
+from alembic.migration import MigrationContext
+from alembic.script import ScriptDirectory
+from sqlalchemy.exc import DatabaseError
+
+from app.errors import Conflict, InvalidInput
+from app.store.engine import Store
+
+_SCRIPTS = Path(__file__).parent / "migrations"
+
+
+def migrate(store: Store) -> None:
+    """Create or upgrade the tables; only the holder of the data lock may call it.
+
+    Raises:
+        Conflict: The database was written by a newer version of Tandem.
+        InvalidInput: It is no database, or cannot be reached.
+        StorageFull: No room is left.
+    """
+    try:
+        with store.writing() as connection:
+            _upgrade(connection, store.shown_url)
+    except DatabaseError as error:
+        rule = f"cannot be opened ({error.orig})"
+        raise InvalidInput("database_url", store.shown_url, rule) from error
+
+
+def check_schema(store: Store) -> None:
+    """Make sure that the tables are those of this code, without changing anything.
+
+    Raises:
+        Conflict: They are not.
+    """
+    head = ScriptDirectory.from_config(alembic_config()).get_current_head()
+    with store.reading() as connection:
+        present = _revision(connection)
+    if present != head:
+        raise Conflict(
+            f"{store.shown_url} has schema {present or 'none'}, this code needs {head}: "
+            "start the server once, which upgrades it"
+        )
+
+
+def alembic_config() -> Config:
+    """Return the configuration that knows where the scripts are."""
+    config = Config()
+    config.set_main_option("script_location", str(_SCRIPTS).replace("%", "%%"))
+    return config
+
+
+def _upgrade(connection: sa.Connection, shown_url: str) -> None:
+    config = alembic_config()
+    known = {script.revision for script in ScriptDirectory.from_config(config).walk_revisions()}
+    present = _revision(connection)
+    if present is not None and present not in known:
+        raise Conflict(
+            f"{shown_url} has schema {present}, which this version of Tandem does not know (it "
+            f"knows {', '.join(sorted(known))}): start the newer version, or choose another "
+            "TANDEM_DATA"
+        )
+    config.attributes["connection"] = connection
+    command.upgrade(config, "head")
+
+
+def _revision(connection: sa.Connection) -> str | None:
+    return MigrationContext.configure(connection).get_current_revision()

@@ -1,0 +1,149 @@
+"""The tables. Migrations in ``app/store/migrations`` build exactly these (a test compares).
+
+Every table of a job hangs on ``jobs.id``. ``jobs.last_event`` numbers the events of a job: it
+is raised in the same UPDATE that fences the write, so ids follow the order of commits.
+"""
+
+from datetime import UTC, datetime
+
+from sqlalchemy import (
+    JSON,
+    BigInteger,
+    Boolean,
+    Column,
+    DateTime,
+    Dialect,
+    ForeignKey,
+    Index,
+    Integer,
+    LargeBinary,
+    MetaData,
+    String,
+    Table,
+    Text,
+    TypeDecorator,
+)
+
+metadata = MetaData(
+    naming_convention={
+        "ix": "ix_%(column_0_label)s",
+        "uq": "uq_%(table_name)s_%(column_0_name)s",
+        "fk": "fk_%(table_name)s_%(column_0_name)s_%(referred_table_name)s",
+        "pk": "pk_%(table_name)s",
+    }
+)
+
+
+class UtcDateTime(TypeDecorator[datetime]):
+    """Aware UTC times in Python, naive UTC in the database."""
+
+    impl = DateTime
+    cache_ok = True
+
+    def process_bind_param(self, value: datetime | None, dialect: Dialect) -> datetime | None:
+        """Drop the zone, after moving to UTC."""
+        return None if value is None else value.astimezone(UTC).replace(tzinfo=None)
+
+    def process_result_value(self, value: datetime | None, dialect: Dialect) -> datetime | None:
+        """Put the zone back."""
+        return None if value is None else value.replace(tzinfo=UTC)
+
+
+def _job_key(*, primary: bool) -> Column[str]:
+    target = ForeignKey("jobs.id", ondelete="CASCADE")
+    return Column("job_id", String(36), target, primary_key=primary, nullable=False)
+
+
+jobs = Table(
+    "jobs",
+    metadata,
+    Column("number", Integer, primary_key=True, autoincrement=True),
+    Column("id", String(36), nullable=False, unique=True),
+    Column("kind", String(32), nullable=False),
+    Column("preset", String(64)),
+    Column("seed", BigInteger, nullable=False),
+    Column("overrides", JSON, nullable=False),
+    Column("spec", JSON, nullable=False),
+    Column("state", String(16), nullable=False, index=True),
+    Column("attempt", Integer, nullable=False, default=0),
+    Column("failures", Integer, nullable=False, default=0),
+    Column("created_at", UtcDateTime, nullable=False),
+    Column("started_at", UtcDateTime),
+    Column("finished_at", UtcDateTime),
+    Column("heartbeat_at", UtcDateTime),
+    Column("error", Text),
+    Column("step", BigInteger, nullable=False, default=0),
+    Column("total_steps", BigInteger),
+    Column("cancel_requested", Boolean, nullable=False, default=False),
+    Column("idempotency_key", String(255), unique=True),
+    Column("result", JSON(none_as_null=True)),
+    Column("last_event", Integer, nullable=False, default=0),
+    sqlite_autoincrement=True,
+)
+
+metrics = Table(
+    "metrics",
+    metadata,
+    _job_key(primary=True),
+    Column("step", BigInteger, primary_key=True, autoincrement=False),
+    Column("values", JSON, nullable=False),
+    Column("at", UtcDateTime, nullable=False),
+)
+
+events = Table(
+    "events",
+    metadata,
+    _job_key(primary=True),
+    Column("id", Integer, primary_key=True, autoincrement=False),
+    Column("kind", String(16), nullable=False),
+    Column("step", BigInteger),
+    Column("data", JSON, nullable=False),
+    Column("at", UtcDateTime, nullable=False),
+)
+
+checkpoints = Table(
+    "checkpoints",
+    metadata,
+    Column("number", Integer, primary_key=True, autoincrement=True),
+    Column("sha256", String(64), nullable=False, unique=True),
+    Column("imported", Boolean, nullable=False),
+    Column("manifest", JSON, nullable=False),
+    Column("size", Integer, nullable=False),
+    Column("created_at", UtcDateTime, nullable=False),
+    Column("tensors", LargeBinary, nullable=False),
+    sqlite_autoincrement=True,
+)
+
+job_checkpoints = Table(
+    "job_checkpoints",
+    metadata,
+    _job_key(primary=True),
+    Column("step", BigInteger, primary_key=True, autoincrement=False),
+    Column("sha256", String(64), ForeignKey("checkpoints.sha256"), nullable=False),
+    Index("ix_job_checkpoints_sha256", "sha256"),
+)
+
+resume_states = Table(
+    "resume_states",
+    metadata,
+    _job_key(primary=True),
+    Column("step", BigInteger, nullable=False),
+    Column("manifest", JSON, nullable=False),
+    Column("tensors", LargeBinary, nullable=False),
+)
+
+aliases = Table(
+    "aliases",
+    metadata,
+    Column("name", String(64), primary_key=True),
+    Column("sha256", String(64), ForeignKey("checkpoints.sha256"), nullable=False),
+    Column("set_at", UtcDateTime, nullable=False),
+)
+
+reserve = Table(
+    "reserve",
+    metadata,
+    Column("id", Integer, primary_key=True, autoincrement=False),
+    Column("filler", LargeBinary, nullable=False),
+)
+"""Room that is given up when the database is full, so that a job can still be marked failed."""

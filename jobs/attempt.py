@@ -1,0 +1,74 @@
+"""One attempt of a job in a process of its own: arguments, settings, logging, end.
+
+``jobs.run`` is the entry point; it brings the runners.
+"""
+
+import argparse
+import faulthandler
+import logging
+import os
+import signal
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from app.errors import InvalidInput, ServiceError
+from app.store.engine import Store
+from app.store.migrate import check_schema
+from app.store.records import Claim
+from jobs.worker import Runner, Worker, die_with_parent
+
+logger = logging.getLogger(__name__)
+
+NICENESS = 10
+"""Training yields to the server and its live cell."""
+
+
+def main(runners: Mapping[str, Runner], arguments: Sequence[str] | None = None) -> int:
+    """Run the attempt that the command line names.
+
+    Args:
+        runners: How each kind of job is run.
+        arguments: Command line; that of the process by default.
+
+    Returns:
+        The exit status: 0 when the job's row tells how it ended.
+    """
+    parser = argparse.ArgumentParser(description="Run one attempt of a job.")
+    parser.add_argument("--job", required=True, help="id of the job")
+    parser.add_argument("--attempt", required=True, type=int, help="attempt that was claimed")
+    parser.add_argument("--parent", type=int, help="process to die with")
+    options = parser.parse_args(arguments)
+    if options.parent is not None:
+        die_with_parent(options.parent)
+    os.nice(NICENESS)
+    faulthandler.enable()
+    _set_up_logging(options.job, options.attempt)
+    try:
+        store = Store(os.environ["TANDEM_DATABASE_URL"])
+        check_schema(store)
+        worker = Worker(store, Claim(job_id=options.job, attempt=options.attempt))
+    except ServiceError as error:
+        logger.error("%s", error.message)
+        return os.EX_CONFIG
+    signal.signal(signal.SIGTERM, worker.interrupt)
+    logger.info("%s starts", worker.job.kind)
+    return worker.execute(_runner(worker.job.kind, runners))
+
+
+def _runner(kind: str, runners: Mapping[str, Runner]) -> Runner:
+    def refuse(_worker: Worker) -> Mapping[str, Any]:
+        raise InvalidInput("kind", kind, "must be a kind of job", sorted(runners))
+
+    return runners.get(kind, refuse)
+
+
+def _set_up_logging(job_id: str, attempt: int) -> None:
+    where = f"job={job_id} attempt={attempt}"
+    line = logging.Formatter(f"%(asctime)sZ %(levelname)s {where} %(name)s: %(message)s")
+    line.converter = time.gmtime
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(line)
+    logging.basicConfig(level=logging.INFO, handlers=[handler])
+    logging.getLogger("alembic").setLevel(logging.WARNING)

@@ -1,0 +1,104 @@
+"""Job specs: what may be posted, checked in full before anything is queued.
+
+    {"kind": "train", "preset": "pick-td3", "seed": 1, "overrides": {"total_steps": 20000}}
+
+An unknown field is an error. The body is stored unchanged with the job.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from app.errors import InvalidInput
+from app.policies import presets
+from app.store.records import NewJob
+
+MAX_SEED = 2**32 - 1
+"""Greatest seed; every random stream accepts it."""
+
+_FIELDS = {
+    "train": ("kind", "preset", "seed", "overrides"),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrainSpec:
+    """Train a policy by a preset."""
+
+    preset: str
+    """Name of the preset."""
+    seed: int
+    """Seed of every random stream."""
+    overrides: Mapping[str, Any]
+    """Changes to the preset's fields."""
+    total_steps: int
+    """Environment steps it will take."""
+
+
+def parse_spec(body: Mapping[str, Any]) -> TrainSpec:
+    """Check a posted body.
+
+    Args:
+        body: The JSON object.
+
+    Raises:
+        InvalidInput: A field is missing, unknown or breaks a rule.
+        NotFound: There is no such preset.
+    """
+    kind = body.get("kind")
+    if not isinstance(kind, str) or kind not in _FIELDS:
+        raise InvalidInput("kind", kind, "must be a kind of job", tuple(_FIELDS))
+    for name, value in body.items():
+        if name not in _FIELDS[kind]:
+            rule = f"is no field of a {kind} job"
+            raise InvalidInput(name, value, rule, _FIELDS[kind])
+    return _parse_train(body)
+
+
+def new_job(body: Mapping[str, Any]) -> NewJob:
+    """Check a posted body and make of it what the store queues.
+
+    Raises:
+        InvalidInput: A field is missing, unknown or breaks a rule.
+        NotFound: There is no such preset.
+    """
+    spec = parse_spec(body)
+    return NewJob(
+        kind="train",
+        spec=body,
+        preset=spec.preset,
+        seed=spec.seed,
+        overrides=spec.overrides,
+        total_steps=spec.total_steps,
+    )
+
+
+def _parse_train(body: Mapping[str, Any]) -> TrainSpec:
+    overrides = body.get("overrides", {})
+    if not isinstance(overrides, Mapping):
+        raise InvalidInput("overrides", overrides, "must be an object of preset fields")
+    preset = _text(body, "preset", tuple(presets.PRESETS))
+    resolved = presets.resolve(preset, overrides)
+    return TrainSpec(
+        preset=preset,
+        seed=_seed(body),
+        overrides=overrides,
+        total_steps=resolved.total_steps,
+    )
+
+
+def _text(body: Mapping[str, Any], name: str, choices: tuple[str, ...] = ()) -> str:
+    value = body.get(name)
+    if not isinstance(value, str) or not value:
+        raise InvalidInput(name, value, "must be a name", choices)
+    return value
+
+
+def _seed(body: Mapping[str, Any]) -> int:
+    return _check_integer("seed", body.get("seed", 0), 0, MAX_SEED)
+
+
+def _check_integer(name: str, value: Any, low: int, high: int) -> int:
+    if not isinstance(value, int) or isinstance(value, bool) or not low <= value <= high:
+        raise InvalidInput(name, value, f"must be an integer in [{low}, {high}]")
+    return value

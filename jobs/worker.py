@@ -1,0 +1,167 @@
+"""The worker's side of a job: one attempt in one process.
+
+A beat thread looks at the job's row twice a second: it tells the runner to stop after a
+cancel, sends heartbeats, and ends the process at once when the server is gone.
+"""
+
+import ctypes
+import logging
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Mapping
+from types import FrameType
+from typing import Any
+
+from sqlalchemy.exc import OperationalError
+
+from app.errors import ServiceError, StaleAttempt, StorageFull
+from app.store import attempts, endings, fences
+from app.store.engine import Store
+from app.store.jobs import get_job
+from app.store.records import Claim, JobRecord, NewCheckpoint, ResumeState
+
+logger = logging.getLogger(__name__)
+
+LOOK_S = 0.5
+"""Time between two looks for a cancel [s]."""
+
+HEARTBEAT_S = 5.0
+"""Time between two heartbeats [s]."""
+
+_PR_SET_PDEATHSIG = 1
+
+Runner = Callable[["Worker"], Mapping[str, Any] | None]
+"""Does the work of one kind of job; returns its result."""
+
+
+class Worker:
+    """What a runner may do for its job. Writes are fenced by the attempt.
+
+    Args:
+        store: The database, opened by this process.
+        claim: The attempt that this process is.
+
+    Raises:
+        NotFound: There is no such job.
+        StaleAttempt: The attempt does not hold the job.
+    """
+
+    def __init__(self, store: Store, claim: Claim) -> None:
+        get_job(store, claim.job_id)
+        self.job: JobRecord = fences.peek(store, claim)
+        self.store = store
+        self._claim = claim
+        self._cancelled = threading.Event()
+        self._interrupted = threading.Event()
+        self._lost = threading.Event()
+        self._stop_seen = False
+
+    def resume(self) -> ResumeState | None:
+        """Return what to go on from; None to start afresh."""
+        return attempts.load_resume(self.store, self._claim.job_id)
+
+    def record_progress(
+        self, step: int, values: Mapping[str, float | None], *, total_steps: int | None = None
+    ) -> None:
+        """Add a point to the job's curve.
+
+        Raises:
+            StaleAttempt: The job was taken away.
+            StorageFull: No room is left.
+        """
+        attempts.record_progress(self.store, self._claim, step, values, total_steps=total_steps)
+
+    def record_checkpoint(
+        self, step: int, policy: NewCheckpoint, resume: ResumeState | None
+    ) -> None:
+        """Store a policy and what a new attempt needs to go on from here.
+
+        Raises:
+            StaleAttempt: The job was taken away.
+            StorageFull: No room is left.
+        """
+        attempts.record_checkpoint(self.store, self._claim, step, policy, resume)
+
+    def should_stop(self) -> bool:
+        """Whether to write a last checkpoint and return; cheap enough for every step."""
+        stop = self._cancelled.is_set() or self._interrupted.is_set() or self._lost.is_set()
+        self._stop_seen = self._stop_seen or stop
+        return stop
+
+    def interrupt(self, _signal: int = 0, _frame: FrameType | None = None) -> None:
+        """Stop as the server does: the job goes on with the next attempt."""
+        self._interrupted.set()
+
+    def execute(self, runner: Runner) -> int:
+        """Run the job to its end and write down how it ended.
+
+        Returns:
+            The process's exit status: 0 when the job's row tells the end.
+        """
+        beat = threading.Thread(target=self._beat, name="beat", daemon=True)
+        beat.start()
+        try:
+            result = runner(self)
+            self._settle(result)
+        except StaleAttempt as error:
+            logger.warning("%s", error)
+        except ServiceError as error:
+            logger.error("the job fails: %s", error.message)
+            return self._fail(error.message)
+        return 0
+
+    def _settle(self, result: Mapping[str, Any] | None) -> None:
+        if self._stop_seen and self._cancelled.is_set():
+            endings.finish(self.store, self._claim, state="cancelled", result=result)
+            logger.info("cancelled")
+        elif self._stop_seen and self._interrupted.is_set():
+            endings.give_back(self.store, self._claim)
+            logger.info("interrupted: the job goes on with the next attempt")
+        else:
+            endings.finish(self.store, self._claim, result=result)
+            logger.info("succeeded")
+
+    def _fail(self, message: str) -> int:
+        try:
+            endings.fail(self.store, self._claim, message)
+        except StaleAttempt as error:
+            logger.warning("%s", error)
+        except StorageFull as error:  # the supervisor reads this from the log's tail
+            logger.error("%s", error.message)
+            return os.EX_IOERR
+        return 0
+
+    def _beat(self) -> None:
+        next_heartbeat = time.monotonic() + HEARTBEAT_S
+        while not self._lost.wait(LOOK_S):
+            due = time.monotonic() >= next_heartbeat
+            try:
+                look = attempts.heartbeat if due else fences.peek
+                job = look(self.store, self._claim)
+            except StaleAttempt:
+                self._lost.set()
+                return
+            except (OperationalError, StorageFull) as error:
+                logger.warning("no heartbeat this time: %s", error)
+                continue
+            if due:
+                next_heartbeat = time.monotonic() + HEARTBEAT_S
+            if job.cancel_requested:
+                self._cancelled.set()
+
+
+def die_with_parent(parent: int) -> None:
+    """Let the kernel kill this process when the server that started it dies.
+
+    Linux only; elsewhere the fence alone keeps a left-over worker from writing.
+
+    Args:
+        parent: Process id of the server.
+    """
+    if sys.platform == "linux":
+        ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:  # it died before the kernel was told
+        raise SystemExit(f"the server (process {parent}) is gone")

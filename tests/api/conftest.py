@@ -1,0 +1,43 @@
+"""One running service for the tests of this folder: real store, supervisor, policy and cell."""
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from app.main import create_app
+from app.settings import Settings
+
+ADDRESS = "http://127.0.0.1:8000"
+WARM_UP_S = 120.0
+
+
+def wait_until_ready(client: TestClient) -> None:
+    """Wait for the kernels and the live cell."""
+    give_up = time.monotonic() + WARM_UP_S
+    while (answer := client.get("/readyz")).status_code != 200:
+        assert time.monotonic() < give_up, answer.text
+        time.sleep(0.05)
+
+
+@pytest.fixture(scope="package")
+def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
+    app = create_app(Settings(data=tmp_path_factory.mktemp("data")))
+    with TestClient(app, base_url=ADDRESS) as one:
+        wait_until_ready(one)
+        yield one
+
+
+@pytest.fixture
+def cold_app_settings(tmp_path: Path) -> Settings:
+    return Settings(data=tmp_path / "data")
+
+
+@pytest.fixture
+def state(client: TestClient) -> dict[str, Any]:
+    """The live world's state, with something to choose, as it can be posted."""
+    chosen: dict[str, Any] = client.get("/v1/worlds/main").json()["state"]
+    return chosen

@@ -1,0 +1,124 @@
+from collections.abc import Iterator
+
+import pytest
+from fastapi.testclient import TestClient
+from starlette.websockets import WebSocketDisconnect
+
+from app.errors import InvalidInput
+from app.main import create_app
+from app.settings import Settings
+
+TOKEN = "a-token-of-some-length"
+OPEN = {"/session"}
+
+
+@pytest.fixture(scope="module")
+def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
+    settings = Settings(host="0.0.0.0", data=tmp_path_factory.mktemp("guarded"), token=TOKEN)
+    with TestClient(create_app(settings), base_url="http://robot.example") as one:
+        yield one
+
+
+@pytest.mark.parametrize(
+    "host", ["evil.example", "127.0.0.1.evil.example", "10.0.0.1:8000", ""]
+)
+def test_foreign_host_is_refused_on_loopback(client: TestClient, host: str) -> None:
+    answer = client.get("/healthz", headers={"Host": host})
+    assert answer.status_code == 421
+    assert answer.json()["field"] == "Host"
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1:8000", "localhost:9000", "[::1]:8000"])
+def test_loopback_names_are_answered(client: TestClient, host: str) -> None:
+    assert client.get("/healthz", headers={"Host": host}).status_code == 200
+
+
+@pytest.mark.parametrize(
+    "origin",
+    ["http://evil.example", "http://127.0.0.1:9999", "null", "http://127.0.0.1:8000.evil.com"],
+)
+def test_foreign_origin_is_refused(client: TestClient, origin: str) -> None:
+    answer = client.post("/v1/jobs", json={}, headers={"Origin": origin})
+    assert answer.status_code == 403
+    assert answer.json()["field"] == "Origin"
+
+
+def test_own_origin_is_answered(client: TestClient) -> None:
+    headers = {"Origin": "http://127.0.0.1:8000"}
+    assert client.get("/healthz", headers=headers).status_code == 200
+
+
+@pytest.mark.parametrize(
+    "headers", [{"Origin": "http://evil.example"}, {"Host": "evil.example"}]
+)
+def test_foreign_page_gets_no_viewer_socket(
+    client: TestClient, headers: dict[str, str]
+) -> None:
+    with (
+        pytest.raises(WebSocketDisconnect),
+        client.websocket_connect(
+            "/viewer/main/", subprotocols=["viser-v1.1.1"], headers=headers
+        ),
+    ):
+        pass
+
+
+def test_every_answer_carries_the_security_headers(client: TestClient) -> None:
+    for path in ("/", "/healthz", "/viewer/main/", "/v1/nothing"):
+        headers = client.get(path).headers
+        assert headers["x-content-type-options"] == "nosniff"
+        assert "frame-ancestors 'self'" in headers["content-security-policy"]
+
+
+def test_other_address_without_token_is_refused() -> None:
+    with pytest.raises(InvalidInput, match="TANDEM_HOST"):
+        create_app(Settings(host="0.0.0.0"))
+
+
+def test_every_route_asks_for_the_token(guarded: TestClient) -> None:
+    paths = set(guarded.get("/openapi.json", headers=bearer()).json()["paths"])
+    paths |= {"/", "/static/index.html", "/docs", "/openapi.json", "/viewer/main/", "/nothing"}
+    for path in paths - OPEN:
+        for method in ("GET", "POST"):
+            answer = guarded.request(method, path)
+            assert answer.status_code == 401, (method, path)
+            assert answer.headers["www-authenticate"] == "Bearer"
+
+
+def test_viewer_socket_asks_for_the_token(guarded: TestClient) -> None:
+    with pytest.raises(WebSocketDisconnect), guarded.websocket_connect("/viewer/main/"):
+        pass
+
+
+@pytest.mark.parametrize("given", ["", "Bearer", "Bearer wrong", f"Basic {TOKEN}", TOKEN])
+def test_wrong_token_is_refused(guarded: TestClient, given: str) -> None:
+    answer = guarded.get("/v1/jobs", headers={"Authorization": given})
+    assert answer.status_code == 401
+
+
+def test_bearer_token_is_answered(guarded: TestClient) -> None:
+    assert guarded.get("/v1/jobs", headers=bearer()).status_code == 200
+
+
+def test_browser_gets_a_page_to_sign_in_and_then_a_cookie(guarded: TestClient) -> None:
+    page = guarded.get("/", headers={"Accept": "text/html"})
+    assert page.status_code == 401
+    assert 'action="/session"' in page.text
+    wrong = guarded.post("/session", data={"token": "wrong"}, follow_redirects=False)
+    assert wrong.status_code == 422
+    signed = guarded.post("/session", data={"token": TOKEN}, follow_redirects=False)
+    assert signed.headers["location"] == "/"
+    assert "HttpOnly" in signed.headers["set-cookie"]
+    assert TOKEN not in signed.headers["set-cookie"]
+    assert guarded.get("/v1/jobs").status_code == 200
+    guarded.cookies.clear()
+    assert guarded.get("/v1/jobs").status_code == 401
+
+
+def test_foreign_origin_is_refused_in_spite_of_the_token(guarded: TestClient) -> None:
+    headers = {**bearer(), "Origin": "http://evil.example"}
+    assert guarded.get("/v1/jobs", headers=headers).status_code == 403
+
+
+def bearer() -> dict[str, str]:
+    return {"Authorization": f"Bearer {TOKEN}"}

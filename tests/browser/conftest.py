@@ -1,0 +1,138 @@
+"""A real server process and a real Chromium, for the tests that act as a visitor does."""
+
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import httpx
+import pytest
+from playwright.sync_api import Browser, ConsoleMessage, Page, Request, sync_playwright
+
+ROOT = Path(__file__).parents[2]
+START_S = 300.0
+"""Time a first start may take: the kernels are compiled on two busy cores [s]."""
+STEP_MS = 60_000
+"""Time one expectation may take; software rendering draws 3 to 12 frames per second [ms]."""
+FLAGS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+]
+
+OpenPage = Callable[..., Page]
+
+
+@pytest.fixture(scope="session")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """Run ``python -m app serve`` with fresh data; yields its address once it is ready."""
+    with serving(tmp_path_factory.mktemp("tandem"), free_port()) as address:
+        yield address
+
+
+@contextmanager
+def serving(data: Path, port: int) -> Iterator[str]:
+    """Start a server process, wait until it is ready, and stop it in the end."""
+    env = os.environ | {"TANDEM_DATA": str(data), "TANDEM_PORT": str(port)}
+    log = data / "server.log"
+    with log.open("wb") as sink:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "app", "serve"],
+            cwd=ROOT,
+            env=env,
+            stdout=sink,
+            stderr=subprocess.STDOUT,
+        )
+        try:
+            address = f"http://127.0.0.1:{port}"
+            wait_until_ready(address, process, log)
+            yield address
+        finally:
+            process.terminate()
+            try:
+                process.wait(20)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+
+
+def wait_until_ready(address: str, process: subprocess.Popen[bytes], log: Path) -> None:
+    """Ask ``/readyz`` until it answers 200; fail with the server's log otherwise."""
+    end = time.monotonic() + START_S
+    while time.monotonic() < end and process.poll() is None:
+        try:
+            if httpx.get(f"{address}/readyz").status_code == 200:
+                return
+        except httpx.TransportError:
+            pass
+        time.sleep(0.5)
+    pytest.fail(f"the server did not become ready:\n{log.read_text()[-4000:]}")
+
+
+def free_port() -> int:
+    """Return a port nobody listens on."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Browser]:
+    """Start the system's Chromium, headless, with software rendering."""
+    path = shutil.which("chromium") or shutil.which("chromium-browser")
+    path = path or shutil.which("google-chrome")
+    if path is None:
+        pytest.fail("no chromium, chromium-browser or google-chrome on PATH")
+    with sync_playwright() as driver:
+        running = driver.chromium.launch(executable_path=path, args=FLAGS)
+        yield running
+        running.close()
+
+
+@pytest.fixture
+def open_page(browser: Browser, server: str) -> Iterator[OpenPage]:
+    """Open Tandem's page as a visitor; ``page.problems`` lists what went wrong on it."""
+    pages: list[Page] = []
+
+    def open_it(width: int = 1400, height: int = 850) -> Page:
+        page = browser.new_page(viewport={"width": width, "height": height})
+        page.set_default_timeout(STEP_MS)
+        pages.append(page)
+        problems: list[str] = []
+        page.problems = problems  # type: ignore[attr-defined]
+        page.on("console", lambda message: problems.extend(complaint(message)))
+        page.on("pageerror", lambda error: problems.append(f"page error: {error}"))
+        page.on("requestfailed", lambda request: problems.extend(lost(request)))
+        page.goto(server)
+        page.wait_for_selector('[data-link="live"]')
+        return page
+
+    yield open_it
+    for page in pages:
+        page.close()
+
+
+def complaint(message: ConsoleMessage) -> list[str]:
+    """Return a console message that a visitor's browser should never show."""
+    if message.type != "error":
+        return []
+    return [f"{message.text} ({message.location.get('url', '')})"]
+
+
+def lost(request: Request) -> list[str]:
+    """Return a request that got no answer, unless the page itself let go of it."""
+    failure = request.failure or ""
+    return [] if "ERR_ABORTED" in failure else [f"{request.url}: {failure}"]

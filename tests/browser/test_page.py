@@ -1,0 +1,78 @@
+"""The page as a whole: it loads clean, fits, obeys the keyboard and drives the world."""
+
+from collections.abc import Callable
+
+import httpx
+import pytest
+from playwright.sync_api import Page, expect
+
+pytestmark = pytest.mark.browser
+
+PHONE = (390, 844)
+
+
+def world(server: str) -> dict:
+    found: dict = httpx.get(f"{server}/v1/worlds/main").json()
+    return found
+
+
+def test_a_visit_leaves_no_errors_in_the_console(open_page: Callable[..., Page]) -> None:
+    page = open_page()
+    page.frame_locator('[data-role="viewer"]').locator("canvas").first.wait_for()
+    page.wait_for_selector('[data-chosen="true"]')
+    page.click("#tab-training")
+    page.wait_for_selector("#jobs-title")
+    assert page.problems == []  # type: ignore[attr-defined]
+
+
+def test_page_shows_what_the_world_says(open_page: Callable[..., Page], server: str) -> None:
+    page = open_page()
+    page.click('[data-action="pause"]')
+    expect(page.locator(".story .chip")).to_have_text("Paused")
+    now = world(server)
+    shown = page.locator("[data-candidate]").evaluate_all(
+        "rows => rows.map(r => r.dataset.candidate)"
+    )
+    assert sorted(shown) == sorted(c["id"] for c in now["candidates"])
+    page.click('[data-action="pause"]')
+    expect(page.locator(".story .chip")).not_to_have_text("Paused")
+
+
+def test_goal_chips_change_the_candidates_of_the_world(
+    open_page: Callable[..., Page], server: str
+) -> None:
+    page = open_page()
+    chip = page.locator('[data-goal="cube2"]')
+    before = chip.get_attribute("aria-pressed")
+    chip.click()
+    after = "false" if before == "true" else "true"
+    expect(chip).to_have_attribute("aria-pressed", after)
+    assert ("cube2" in world(server)["selected"]) == (after == "true")
+
+
+def test_case_study_starts_from_its_button(
+    open_page: Callable[..., Page], server: str
+) -> None:
+    page = open_page()
+    page.click('[data-case="case-1"]')
+    expect(page.locator('[data-case="case-1"]')).to_have_attribute("aria-pressed", "true")
+    assert world(server)["case"] == "case-1"
+    page.click('[data-mode="auto"]')
+    expect(page.locator('[data-case="case-1"]')).to_have_attribute("aria-pressed", "false")
+
+
+def test_tabs_obey_the_arrow_keys(open_page: Callable[..., Page]) -> None:
+    page = open_page()
+    page.focus("#tab-cell")
+    page.keyboard.press("ArrowRight")
+    expect(page.locator("#tab-training")).to_have_attribute("aria-selected", "true")
+    expect(page.locator("#panel-training")).to_be_visible()
+
+
+def test_page_fits_a_phone(open_page: Callable[..., Page]) -> None:
+    page = open_page(*PHONE)
+    wide = page.evaluate("document.documentElement.scrollWidth")
+    assert wide <= PHONE[0]
+    for part in (".viewer", '[data-mode="manual"]', "[data-goal]", ".bars", "#tab-training"):
+        page.locator(part).first.scroll_into_view_if_needed()
+        expect(page.locator(part).first).to_be_visible()

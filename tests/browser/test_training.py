@@ -1,0 +1,82 @@
+"""A visitor starts a training job on the page and watches it learn."""
+
+from collections.abc import Callable
+
+import httpx
+import pytest
+from playwright.sync_api import Page, expect
+
+pytestmark = pytest.mark.browser
+
+GROWTH_MS = 240_000
+"""Time for a job to start its process, warm up and report several points [ms]."""
+
+
+def open_form(page: Page) -> None:
+    page.click("#tab-training")
+    page.click('[data-action="new-job"]')
+    page.wait_for_selector("form.train")
+
+
+def points(page: Page) -> int:
+    text = page.get_attribute("[data-points]", "data-points")
+    return int(text or 0)
+
+
+def test_posted_job_appears_and_its_curve_grows(
+    open_page: Callable[..., Page], server: str
+) -> None:
+    page = open_page()
+    open_form(page)
+    page.fill("#train-seed", "7")
+    page.click("form.train button[type=submit]")
+    job = page.wait_for_selector(".job.is-open")
+    assert job is not None
+    job_id = job.get_attribute("data-job")
+    page.wait_for_selector("[data-points]", timeout=GROWTH_MS)
+    seen = points(page)
+    page.wait_for_function(
+        "n => Number(document.querySelector('[data-points]').dataset.points) >= n + 2",
+        arg=seen,
+        timeout=GROWTH_MS,
+    )
+    stored = httpx.get(f"{server}/v1/jobs/{job_id}/metrics").json()["items"]
+    steps = [row["step"] for row in stored]
+    assert steps == sorted(set(steps))
+    assert len(steps) >= seen + 2
+    assert httpx.get(f"{server}/v1/jobs/{job_id}").json()["seed"] == 7
+    cancel(page)
+    assert page.problems == []  # type: ignore[attr-defined]
+
+
+def cancel(page: Page) -> None:
+    page.get_by_role("button", name="Cancel …").click()
+    page.get_by_role("button", name="Cancel the job").click()
+    expect(page.locator(".job.is-open")).to_have_attribute(
+        "data-state", "cancelled", timeout=GROWTH_MS
+    )
+
+
+def test_bad_input_is_explained_at_its_field(open_page: Callable[..., Page]) -> None:
+    page = open_page()
+    open_form(page)
+    page.fill("#train-seed", "minus one")
+    page.click("form.train button[type=submit]")
+    expect(page.locator("#train-seed")).to_have_attribute("aria-invalid", "true")
+    expect(page.locator("#train-seed-error")).to_contain_text("integer")
+    expect(page.locator("#train-seed")).to_be_focused()
+
+
+def test_override_out_of_range_is_explained_at_its_field(
+    open_page: Callable[..., Page], server: str
+) -> None:
+    preset = httpx.get(f"{server}/v1/presets").json()["items"][0]
+    field = next(f for f in preset["fields"] if f["maximum"] is not None)
+    page = open_page()
+    open_form(page)
+    page.evaluate("document.querySelectorAll('form.train details').forEach(d => d.open = true)")
+    page.fill(f"#train-{field['name']}", str(int(field["maximum"]) + 1000))
+    page.click("form.train button[type=submit]")
+    expect(page.locator(f"#train-{field['name']}-error")).not_to_be_empty()
+    jobs = httpx.get(f"{server}/v1/jobs").json()["items"]
+    assert all(field["name"] not in job["overrides"] for job in jobs)

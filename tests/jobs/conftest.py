@@ -1,0 +1,33 @@
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from app.store.engine import Store
+from app.store.migrate import migrate
+from jobs.executor import LocalProcess
+from jobs.supervisor import Supervisor
+from tests.jobs.machinery import PATIENCE
+from tests.jobs.supervisor_process import COUNTING
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Iterator[Store]:
+    opened = Store(f"sqlite:///{tmp_path}/tandem.db")
+    migrate(opened)
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
+def executor(store: Store, tmp_path: Path) -> LocalProcess:
+    return LocalProcess(store.url, tmp_path, COUNTING)
+
+
+@pytest.fixture
+def supervisor(store: Store, tmp_path: Path, executor: LocalProcess) -> Iterator[Supervisor]:
+    """A supervisor that runs counting jobs."""
+    started = Supervisor(store, tmp_path, executor=executor, patience=PATIENCE)
+    started.start()
+    yield started
+    started.stop()

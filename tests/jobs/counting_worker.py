@@ -1,0 +1,88 @@
+"""A worker whose jobs count: deterministic, resumable, quick; the machinery around it is real.
+
+Overrides of a counting job: ``steps`` (to do), ``hold_at`` (list: attempt n waits at the n-th
+of these steps until it is stopped or killed), ``deaf`` (it never asks whether to stop),
+``raise_at`` (raises an exception at that step), ``refuse_at`` (the same with an InvalidInput),
+``padding`` (extra bytes per checkpoint), ``max_pages`` (size limit of the database in this
+process).
+"""
+
+import hashlib
+import sys
+import time
+from collections.abc import Mapping
+from typing import Any
+
+from sqlalchemy import event
+
+from app.errors import InvalidInput
+from app.store.records import NewCheckpoint, ResumeState
+from jobs.attempt import main
+from jobs.worker import Worker
+
+GRID = 5
+CHECKPOINT_EVERY = 20
+FACTOR, MODULUS = 48271, 2**31 - 1
+
+
+def count(worker: Worker) -> dict[str, int]:
+    """Step a random-number generator ``steps`` times; progress every GRID steps."""
+    wish = worker.job.overrides
+    limit_database(worker, wish.get("max_pages"))
+    resume = worker.resume()
+    step, value = (0, 1 + worker.job.seed) if resume is None else load(resume)
+    while step < wish["steps"] and not asked_to_stop(worker):
+        step, value = step + 1, value * FACTOR % MODULUS
+        misbehave(wish, step)
+        if step % GRID == 0:
+            worker.record_progress(step, {"value": value}, total_steps=wish["steps"])
+        if step % CHECKPOINT_EVERY == 0:
+            save(worker, step, value)
+        hold(worker, step)
+    if step % CHECKPOINT_EVERY:
+        save(worker, step, value)
+    return {"value": value}
+
+
+def load(resume: ResumeState) -> tuple[int, int]:
+    return resume.step, int.from_bytes(resume.tensors[:8], "big")
+
+
+def save(worker: Worker, step: int, value: int) -> None:
+    tensors = value.to_bytes(8, "big") + bytes(worker.job.overrides.get("padding", 0))
+    manifest = {"job": worker.job.id, "step": step}
+    sha256 = hashlib.sha256(f"{manifest}".encode() + tensors).hexdigest()
+    policy = NewCheckpoint(sha256=sha256, manifest=manifest, tensors=tensors)
+    worker.record_checkpoint(step, policy, ResumeState(step=step, manifest={}, tensors=tensors))
+
+
+def asked_to_stop(worker: Worker) -> bool:
+    return not worker.job.overrides.get("deaf") and worker.should_stop()
+
+
+def hold(worker: Worker, step: int) -> None:
+    steps = worker.job.overrides.get("hold_at", [])
+    attempt = worker.job.attempt
+    while steps[attempt - 1 : attempt] == [step] and not asked_to_stop(worker):
+        time.sleep(0.01)
+
+
+def misbehave(wish: Mapping[str, Any], step: int) -> None:
+    if step == wish.get("raise_at"):
+        raise RuntimeError(f"deliberate crash at step {step}")
+    if step == wish.get("refuse_at"):
+        raise InvalidInput("refuse_at", step, "must not be reached")
+
+
+def limit_database(worker: Worker, max_pages: int | None) -> None:
+    if max_pages is None:
+        return
+    engine = worker.store.engine
+    engine.dispose()
+    event.listen(
+        engine, "connect", lambda c, _: c.execute(f"PRAGMA max_page_count = {max_pages}")
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main({"count": count}))

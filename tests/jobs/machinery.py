@@ -1,0 +1,68 @@
+"""Queue counting jobs, wait for what they reach, check what they left."""
+
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from app.store import checkpoints, jobs, metrics
+from app.store.engine import Store
+from app.store.records import JobRecord, NewJob
+from jobs.executor import PROJECT_ROOT
+from jobs.supervisor import Patience
+from tests.jobs.counting_worker import CHECKPOINT_EVERY, FACTOR, GRID, MODULUS
+
+PATIENCE = Patience(tick_s=0.05, cancel_s=1.0, shutdown_s=5.0)
+WAIT_S = 60.0
+"""Far above what anything here takes; only a hang reaches it."""
+
+
+def queue(store: Store, *, seed: int = 0, kind: str = "count", **overrides: object) -> str:
+    spec = {"kind": kind, "seed": seed, "overrides": overrides}
+    new = NewJob(kind=kind, seed=seed, overrides=overrides, spec=spec)
+    return jobs.create_job(store, new).id
+
+
+def wait_for(store: Store, job_id: str, reached: Callable[[JobRecord], bool]) -> JobRecord:
+    deadline = time.monotonic() + WAIT_S
+    while time.monotonic() < deadline:
+        job = jobs.get_job(store, job_id)
+        if reached(job):
+            return job
+        assert not job.is_final, f"ended without getting there: {job}"
+        time.sleep(0.02)
+    raise AssertionError(f"not reached within {WAIT_S} s: {job}")
+
+
+def wait_until_final(store: Store, job_id: str) -> JobRecord:
+    return wait_for(store, job_id, lambda job: job.is_final)
+
+
+def assert_counted_once(store: Store, job_id: str, *, steps: int, seed: int = 0) -> None:
+    """Every point and checkpoint of the grid is there exactly once, with the right value."""
+    value, expected = 1 + seed, {}
+    for step in range(1, steps + 1):
+        value = value * FACTOR % MODULUS
+        expected[step] = value
+    curve = {row.step: row.values["value"] for row in metrics.list_metrics(store, job_id)}
+    assert list(curve) == list(range(GRID, steps + 1, GRID))
+    assert all(expected[step] == found for step, found in curve.items())
+    made = checkpoints.list_checkpoints(store, job_id=job_id, limit=200).items
+    assert [c.step for c in reversed(made)] == list(
+        range(CHECKPOINT_EVERY, steps + 1, CHECKPOINT_EVERY)
+    )
+    assert jobs.get_job(store, job_id).result == {"value": value}
+
+
+@contextmanager
+def supervisor_process(data_dir: Path) -> Iterator["subprocess.Popen[bytes]"]:
+    """Run a supervisor in a process of its own; killed at the end."""
+    command = [sys.executable, "-m", "tests.jobs.supervisor_process", str(data_dir)]
+    with subprocess.Popen(command, cwd=PROJECT_ROOT, stdout=subprocess.PIPE) as process:
+        try:
+            assert process.stdout is not None and process.stdout.readline() == b"ready\n"
+            yield process
+        finally:
+            process.kill()

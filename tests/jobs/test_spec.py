@@ -1,0 +1,67 @@
+import math
+from typing import Any
+
+import pytest
+
+from app.errors import InvalidInput, NotFound
+from jobs.spec import MAX_SEED, TrainSpec, new_job, parse_spec
+
+TRAIN = {"kind": "train", "preset": "pick-td3", "seed": 1, "overrides": {"width": 64}}
+
+
+def test_training_becomes_a_job_with_its_body_unchanged() -> None:
+    job = new_job(TRAIN)
+    assert (job.kind, job.preset, job.seed, job.overrides) == (
+        "train",
+        "pick-td3",
+        1,
+        {"width": 64},
+    )
+    assert job.spec == TRAIN
+    assert job.total_steps == 5_120_000
+
+
+def test_seed_and_overrides_may_be_left_out() -> None:
+    spec = parse_spec({"kind": "train", "preset": "pick-td3"})
+    assert isinstance(spec, TrainSpec)
+    assert (spec.seed, spec.overrides) == (0, {})
+
+
+@pytest.mark.parametrize(
+    ("change", "field", "rule"),
+    [
+        ({"kind": "dream"}, "kind", "must be a kind of job"),
+        ({"kind": None}, "kind", "must be a kind of job"),
+        ({"kind": ["train"]}, "kind", "must be a kind of job"),
+        ({"speed": 1}, "speed", "is no field of a train job"),
+        ({"protocol": "pick-single"}, "protocol", "is no field of a train job"),
+        ({"preset": None}, "preset", "must be a name"),
+        ({"preset": 3}, "preset", "must be a name"),
+        ({"seed": -1}, "seed", "must be an integer in"),
+        ({"seed": MAX_SEED + 1}, "seed", "must be an integer in"),
+        ({"seed": 1.5}, "seed", "must be an integer in"),
+        ({"seed": True}, "seed", "must be an integer in"),
+        ({"seed": "1"}, "seed", "must be an integer in"),
+        ({"overrides": [1]}, "overrides", "must be an object"),
+        ({"overrides": {"wdith": 64}}, "overrides.wdith", "is no field of pick-td3"),
+        ({"overrides": {"width": 7}}, "overrides.width", "must lie in"),
+        ({"overrides": {"gamma": math.nan}}, "overrides.gamma", "must be finite"),
+    ],
+)
+def test_bad_training_names_field_and_rule(
+    change: dict[str, Any], field: str, rule: str
+) -> None:
+    with pytest.raises(InvalidInput, match=rule) as caught:
+        new_job(TRAIN | change)
+    assert caught.value.field == field
+
+
+def test_unknown_preset_names_the_known() -> None:
+    with pytest.raises(NotFound, match="no preset 'pick-td4'; known: pick-td3"):
+        new_job(TRAIN | {"preset": "pick-td4"})
+
+
+def test_unknown_field_names_the_choices() -> None:
+    with pytest.raises(InvalidInput) as caught:
+        new_job(TRAIN | {"speed": 1})
+    assert caught.value.choices == ("kind", "preset", "seed", "overrides")

@@ -1,0 +1,198 @@
+import os
+import re
+import signal
+import time
+from pathlib import Path
+
+import pytest
+
+from app.errors import Conflict
+from app.store import attempts, checkpoints, jobs, metrics
+from app.store.engine import Store
+from jobs.executor import LocalProcess
+from jobs.supervisor import Supervisor
+from tests.jobs.machinery import (
+    PATIENCE,
+    assert_counted_once,
+    queue,
+    supervisor_process,
+    wait_for,
+    wait_until_final,
+)
+
+
+def worker_pids(parent: int) -> list[int]:
+    """The children of a process, by /proc."""
+    found = []
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = stat.read_text().rpartition(")")[2].split()
+        except OSError:
+            continue
+        if int(fields[1]) == parent and fields[0] != "Z":
+            found.append(int(stat.parent.name))
+    return found
+
+
+def is_running(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def test_job_runs_to_its_end(store: Store, supervisor: Supervisor) -> None:
+    job_id = queue(store, seed=3, steps=40)
+    supervisor.wake()
+    job = wait_until_final(store, job_id)
+    assert (job.state, job.attempt, job.failures) == ("succeeded", 1, 0)
+    assert_counted_once(store, job_id, steps=40, seed=3)
+
+
+@pytest.mark.usefixtures("supervisor")
+def test_no_more_jobs_run_at_once_than_allowed(store: Store) -> None:
+    first = queue(store, steps=100, hold_at=[22])
+    second = queue(store, steps=20)
+    wait_for(store, first, lambda job: job.step == 20)
+    assert jobs.get_job(store, second).state == "queued"
+    jobs.request_cancel(store, first)
+    assert wait_until_final(store, second).state == "succeeded"
+
+
+@pytest.mark.usefixtures("supervisor")
+def test_killed_worker_goes_on_from_its_checkpoint(store: Store) -> None:
+    job_id = queue(store, seed=5, steps=100, hold_at=[67])
+    wait_for(store, job_id, lambda job: job.step == 65)
+    (pid,) = worker_pids(os.getpid())
+    os.kill(pid, signal.SIGKILL)
+    job = wait_until_final(store, job_id)
+    assert (job.state, job.attempt, job.failures, job.error) == ("succeeded", 2, 1, None)
+    assert_counted_once(store, job_id, steps=100, seed=5)
+
+
+@pytest.mark.usefixtures("supervisor")
+def test_job_that_always_crashes_fails_with_its_last_words(store: Store) -> None:
+    job_id = queue(store, steps=40, raise_at=25)
+    job = wait_until_final(store, job_id)
+    assert (job.state, job.attempt) == ("failed", 3)
+    assert job.error is not None and "crashed 3 times" in job.error
+    assert "RuntimeError: deliberate crash at step 25" in job.error
+    assert [c.step for c in checkpoints.list_checkpoints(store).items] == [20]
+
+
+@pytest.mark.usefixtures("supervisor")
+def test_bad_input_found_by_the_worker_fails_at_once(store: Store) -> None:
+    job = wait_until_final(store, queue(store, steps=40, refuse_at=7))
+    assert (job.state, job.attempt) == ("failed", 1)
+    assert job.error == "refuse_at = 7 must not be reached"
+
+
+@pytest.mark.usefixtures("supervisor")
+def test_unknown_kind_fails_and_names_the_known(store: Store) -> None:
+    job = wait_until_final(store, queue(store, kind="dream"))
+    assert job.state == "failed"
+    assert job.error == "kind = 'dream' must be a kind of job; choices: count"
+
+
+@pytest.mark.usefixtures("supervisor")
+def test_cancelled_job_leaves_a_last_checkpoint(store: Store) -> None:
+    job_id = queue(store, steps=100, hold_at=[27])
+    wait_for(store, job_id, lambda job: job.step == 25)
+    jobs.request_cancel(store, job_id)
+    job = wait_until_final(store, job_id)
+    newest = checkpoints.list_checkpoints(store, job_id=job_id).items[0]
+    assert (job.state, job.attempt, job.error) == ("cancelled", 1, None)
+    assert newest.step == 27
+    assert attempts.load_resume(store, job_id) is None
+
+
+@pytest.mark.usefixtures("supervisor")
+def test_deaf_worker_is_killed_after_the_grace_time(store: Store) -> None:
+    job_id = queue(store, steps=100, hold_at=[7], deaf=True)
+    wait_for(store, job_id, lambda job: job.step >= 5)
+    jobs.request_cancel(store, job_id)
+    assert wait_until_final(store, job_id).state == "cancelled"
+
+
+def test_stopped_server_queues_its_job_again_and_the_next_one_finishes_it(
+    store: Store, tmp_path: Path, executor: LocalProcess
+) -> None:
+    job_id = queue(store, steps=100, hold_at=[27])
+    first = Supervisor(store, tmp_path, executor=executor, patience=PATIENCE)
+    first.start()
+    wait_for(store, job_id, lambda job: job.step == 25)
+    first.stop()
+    job = jobs.get_job(store, job_id)
+    resume = attempts.load_resume(store, job_id)
+    assert (job.state, job.failures) == ("queued", 0)
+    assert resume is not None and resume.step == 27
+    second = Supervisor(store, tmp_path, executor=executor, patience=PATIENCE)
+    second.start()
+    assert wait_until_final(store, job_id).failures == 0
+    second.stop()
+    assert [row.step for row in metrics.list_metrics(store, job_id)] == list(range(5, 101, 5))
+
+
+def test_killed_server_takes_its_worker_along_and_the_next_one_finishes_the_job(
+    store: Store, tmp_path: Path
+) -> None:
+    job_id = queue(store, seed=9, steps=100, hold_at=[27, 51, 90])
+    pids = []
+    for goal in (25, 50, 90):
+        with supervisor_process(tmp_path) as server:
+            wait_for(store, job_id, lambda job, goal=goal: job.step == goal)
+            pids += worker_pids(server.pid)
+            server.kill()
+    with supervisor_process(tmp_path):
+        job = wait_until_final(store, job_id)
+    assert (job.state, job.attempt, job.failures) == ("succeeded", 4, 0)
+    assert_counted_once(store, job_id, steps=100, seed=9)
+    assert len(pids) == 3 and not any(map(is_running, pids))
+
+
+def test_second_server_on_one_folder_is_refused(store: Store, tmp_path: Path) -> None:
+    with supervisor_process(tmp_path) as server:
+        job_id = queue(store, steps=40)
+        with pytest.raises(Conflict, match=rf"process {server.pid}\) already uses"):
+            Supervisor(store, tmp_path).start()
+        assert wait_until_final(store, job_id).attempt == 1
+
+
+def test_full_database_fails_the_job_and_the_next_one_runs(
+    store: Store, supervisor: Supervisor
+) -> None:
+    full = queue(store, steps=10_000, padding=50_000, max_pages=200)
+    following = queue(store, steps=40)
+    job = wait_until_final(store, full)
+    assert job.state == "failed" and job.error is not None
+    assert re.match(r"no room left in sqlite:.*free some space", job.error)
+    assert wait_until_final(store, following).state == "succeeded"
+    assert supervisor.is_alive
+
+
+@pytest.mark.usefixtures("supervisor")
+def test_row_left_running_without_a_worker_is_started_again(store: Store) -> None:
+    job_id = queue(store, steps=20)
+    attempts.claim_next(store)
+    assert wait_until_final(store, job_id).state == "succeeded"
+
+
+def test_worker_that_cannot_be_started_fails_the_job(store: Store, tmp_path: Path) -> None:
+    executor = LocalProcess(store.url, tmp_path, ("/no/such/program",))
+    supervisor = Supervisor(store, tmp_path, executor=executor, patience=PATIENCE)
+    supervisor.start()
+    job = wait_until_final(store, queue(store, steps=20))
+    supervisor.stop()
+    assert job.error is not None and "could not be started" in job.error
+
+
+@pytest.mark.usefixtures("supervisor")
+def test_log_of_a_job_carries_its_id_in_each_line(store: Store, tmp_path: Path) -> None:
+    job_id = queue(store, steps=20)
+    wait_until_final(store, job_id)
+    started = time.monotonic()
+    log = tmp_path / "logs" / f"{job_id}.log"
+    while "succeeded" not in log.read_text() and time.monotonic() - started < 10:
+        time.sleep(0.02)
+    lines = log.read_text().splitlines()
+    assert lines and all(f"job={job_id} attempt=1" in line for line in lines)

@@ -1,0 +1,248 @@
+import threading
+from collections.abc import Callable
+from hashlib import sha256
+
+import pytest
+
+from app.errors import InvalidInput, StaleAttempt
+from app.store import attempts, checkpoints, endings, events, fences, jobs, metrics
+from app.store.engine import Store
+from app.store.records import Claim, NewCheckpoint, NewJob, ResumeState
+
+
+def policy(content: bytes = b"x") -> NewCheckpoint:
+    digest = sha256(content).hexdigest()
+    return NewCheckpoint(sha256=digest, manifest={"n": len(content)}, tensors=content)
+
+
+def resume(step: int, content: bytes = b"r") -> ResumeState:
+    return ResumeState(step=step, manifest={"rng": [1, 2]}, tensors=content)
+
+
+def record(store: Store, claim: Claim, *steps: int) -> None:
+    for step in steps:
+        attempts.record_progress(store, claim, step, {"reward": float(step)})
+
+
+def curve(store: Store, claim: Claim) -> list[int]:
+    return [row.step for row in metrics.list_metrics(store, claim.job_id)]
+
+
+def claim_again(store: Store) -> Claim:
+    endings.requeue_orphans(store)
+    found = attempts.claim_next(store)
+    assert found is not None
+    return found[0]
+
+
+def test_jobs_are_claimed_in_the_order_of_submission(store: Store) -> None:
+    ids = [jobs.create_job(store, NewJob(kind="count", spec={})).id for _ in range(3)]
+    claimed = [attempts.claim_next(store) for _ in range(4)]
+    assert [found and found[0].job_id for found in claimed] == [*ids, None]
+
+
+def test_one_job_is_claimed_by_one_of_many_threads(store: Store) -> None:
+    jobs.create_job(store, NewJob(kind="count", spec={}))
+    found: list[object] = []
+    threads = [
+        threading.Thread(target=lambda: found.append(attempts.claim_next(store)))
+        for _ in range(8)
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(found) == 8 and sum(claim is not None for claim in found) == 1
+
+
+def test_progress_reaches_job_and_curve(store: Store, claim: Claim) -> None:
+    attempts.record_progress(store, claim, 10, {"success": 0.5, "reward": None}, total_steps=90)
+    job = jobs.get_job(store, claim.job_id)
+    (row,) = metrics.list_metrics(store, claim.job_id)
+    assert (job.step, job.total_steps) == (10, 90)
+    assert (row.step, row.values) == (10, {"success": 0.5, "reward": None})
+
+
+@pytest.mark.parametrize("step", [10, 9])
+def test_step_that_does_not_advance_is_refused(store: Store, claim: Claim, step: int) -> None:
+    record(store, claim, 10)
+    with pytest.raises(InvalidInput, match="must lie above the last recorded step 10"):
+        record(store, claim, step)
+    assert curve(store, claim) == [10]
+
+
+def test_nan_never_reaches_the_curve(store: Store, claim: Claim) -> None:
+    with pytest.raises(InvalidInput, match="reward = nan must be finite"):
+        attempts.record_progress(store, claim, 10, {"reward": float("nan")})
+    assert curve(store, claim) == []
+
+
+STALE_WRITES: dict[str, Callable[[Store, Claim], object]] = {
+    "progress": lambda store, claim: record(store, claim, 99),
+    "checkpoint": lambda store, claim: attempts.record_checkpoint(
+        store, claim, 99, policy(), resume(99)
+    ),
+    "finish": lambda store, claim: endings.finish(store, claim, result={"stale": True}),
+    "fail": lambda store, claim: endings.fail(store, claim, "stale"),
+    "crash": lambda store, claim: endings.crash(store, claim, "stale", max_failures=3),
+    "give back": lambda store, claim: endings.give_back(store, claim),
+    "heartbeat": lambda store, claim: attempts.heartbeat(store, claim),
+    "peek": lambda store, claim: fences.peek(store, claim),
+}
+
+
+@pytest.mark.parametrize("write", STALE_WRITES.values(), ids=STALE_WRITES)
+@pytest.mark.parametrize("ending", ["taken over", "ended", "queued"])
+def test_stale_attempt_can_change_nothing(
+    store: Store, claim: Claim, write: Callable[[Store, Claim], object], ending: str
+) -> None:
+    if ending == "taken over":
+        claim_again(store)
+    elif ending == "ended":
+        endings.finish(store, claim)
+    else:
+        endings.give_back(store, claim)
+    before = jobs.get_job(store, claim.job_id)
+    with pytest.raises(StaleAttempt, match="attempt 1 no longer holds job"):
+        write(store, claim)
+    assert jobs.get_job(store, claim.job_id) == before
+    assert curve(store, claim) == []
+    assert attempts.load_resume(store, claim.job_id) is None
+    assert checkpoints.list_checkpoints(store).items == ()
+
+
+def test_new_attempt_drops_what_lies_beyond_the_last_checkpoint(
+    store: Store, claim: Claim
+) -> None:
+    record(store, claim, 5, 10)
+    attempts.record_checkpoint(store, claim, 12, policy(), resume(12))
+    record(store, claim, 15, 20)
+    second = claim_again(store)
+    assert curve(store, claim) == [5, 10]
+    assert jobs.get_job(store, claim.job_id).step == 12
+    record(store, second, 15, 20, 25)
+    assert curve(store, claim) == [5, 10, 15, 20, 25]
+
+
+def test_new_attempt_without_checkpoint_starts_afresh(store: Store, claim: Claim) -> None:
+    record(store, claim, 5, 10)
+    attempts.record_checkpoint(store, claim, 10, policy())
+    claim_again(store)
+    assert curve(store, claim) == []
+    assert checkpoints.list_checkpoints(store).items == ()
+    assert jobs.get_job(store, claim.job_id).step == 0
+
+
+def test_resume_state_is_replaced_by_each_checkpoint(store: Store, claim: Claim) -> None:
+    attempts.record_checkpoint(store, claim, 10, policy(b"a"), resume(10, b"first"))
+    attempts.record_checkpoint(store, claim, 20, policy(b"b"), resume(20, b"second"))
+    assert attempts.load_resume(store, claim.job_id) == resume(20, b"second")
+
+
+def test_checkpoint_of_the_same_step_replaces_the_earlier(store: Store, claim: Claim) -> None:
+    attempts.record_checkpoint(store, claim, 10, policy(b"a"), resume(10))
+    attempts.record_checkpoint(store, claim, 20, policy(b"b"), resume(20))
+    attempts.record_checkpoint(store, claim, 20, policy(b"c"), resume(20))
+    kept = checkpoints.list_checkpoints(store).items
+    assert [(c.step, c.sha256) for c in kept] == [
+        (20, policy(b"c").sha256),
+        (10, policy(b"a").sha256),
+    ]
+
+
+def test_resume_state_goes_when_the_job_ends(store: Store, claim: Claim) -> None:
+    attempts.record_checkpoint(store, claim, 10, policy(), resume(10))
+    endings.finish(store, claim, result={"success": 0.9})
+    job = jobs.get_job(store, claim.job_id)
+    assert attempts.load_resume(store, claim.job_id) is None
+    assert (job.state, job.result) == ("succeeded", {"success": 0.9})
+
+
+def test_checkpoint_and_resume_state_must_be_of_one_step(store: Store, claim: Claim) -> None:
+    with pytest.raises(InvalidInput, match="must equal the checkpoint's 10"):
+        attempts.record_checkpoint(store, claim, 10, policy(), resume(11))
+
+
+def test_death_of_the_server_is_no_failure_of_the_job(store: Store, claim: Claim) -> None:
+    for _ in range(10):
+        claim = claim_again(store)
+    job = jobs.get_job(store, claim.job_id)
+    assert (job.state, job.attempt, job.failures) == ("running", 11, 0)
+
+
+def test_job_fails_with_its_third_crash(store: Store, claim: Claim) -> None:
+    for _ in range(2):
+        assert endings.crash(store, claim, "boom", max_failures=3).state == "queued"
+        claim = claim_again(store)
+    job = endings.crash(store, claim, "boom: the last words", max_failures=3)
+    assert job.state == "failed" and job.error is not None
+    assert "crashed 3 times" in job.error and "the last words" in job.error
+
+
+def test_success_after_a_crash_clears_the_error(store: Store, claim: Claim) -> None:
+    endings.crash(store, claim, "boom", max_failures=3)
+    claim = claim_again(store)
+    endings.finish(store, claim)
+    job = jobs.get_job(store, claim.job_id)
+    assert (job.state, job.error, job.failures) == ("succeeded", None, 1)
+
+
+@pytest.mark.parametrize("how", ["orphan", "crash", "give back"])
+def test_job_to_be_cancelled_is_not_queued_again(store: Store, claim: Claim, how: str) -> None:
+    attempts.record_checkpoint(store, claim, 10, policy(), resume(10))
+    jobs.request_cancel(store, claim.job_id)
+    if how == "orphan":
+        endings.requeue_orphans(store)
+    elif how == "crash":
+        endings.crash(store, claim, "killed", max_failures=3)
+    else:
+        endings.give_back(store, claim)
+    assert jobs.get_job(store, claim.job_id).state == "cancelled"
+    assert attempts.load_resume(store, claim.job_id) is None
+
+
+def test_events_follow_the_commits_without_gap_or_repetition(
+    store: Store, claim: Claim
+) -> None:
+    record(store, claim, 5)
+    attempts.record_checkpoint(store, claim, 5, policy(), resume(5))
+    seen = events.list_events(store, claim.job_id)
+    record(store, claim, 10)
+    second = claim_again(store)
+    record(store, second, 10)
+    endings.finish(store, second)
+    later = events.list_events(store, claim.job_id, after=seen[-1].id)
+    kinds = [(e.kind, e.data.get("state", e.data.get("step"))) for e in (*seen, *later)]
+    assert kinds == [
+        ("state", "queued"),
+        ("state", "running"),
+        ("progress", 5),
+        ("checkpoint", 5),
+        ("state", "queued"),
+        ("state", "running"),
+        ("progress", 10),
+        ("state", "succeeded"),
+    ]
+    ids = [event.id for event in (*seen, *later)]
+    assert ids == sorted(set(ids))
+    assert later[1].data["resumed_from_step"] == 5
+    assert seen[2].data == {"step": 5, "reward": 5.0}
+
+
+def test_reader_that_saw_dropped_progress_gets_it_again_under_new_ids(
+    store: Store, claim: Claim
+) -> None:
+    record(store, claim, 5, 10)
+    last = events.list_events(store, claim.job_id)[-1].id
+    second = claim_again(store)
+    record(store, second, 5)
+    later = events.list_events(store, claim.job_id, after=last)
+    assert [e.kind for e in later] == ["state", "state", "progress"]
+    assert all(event.id > last for event in later)
+
+
+def test_events_come_in_portions(store: Store, claim: Claim) -> None:
+    record(store, claim, 1, 2, 3)
+    first = events.list_events(store, claim.job_id, limit=3)
+    rest = events.list_events(store, claim.job_id, after=first[-1].id, limit=3)
+    assert [event.id for event in (*first, *rest)] == [1, 2, 3, 4, 5]

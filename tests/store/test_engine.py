@@ -1,0 +1,148 @@
+import threading
+from pathlib import Path
+
+import pytest
+import sqlalchemy as sa
+from sqlalchemy import event
+
+from app.errors import InvalidInput, StorageFull
+from app.store import attempts, endings, jobs, metrics
+from app.store.engine import Store
+from app.store.migrate import migrate
+from app.store.records import Claim, NewCheckpoint, NewJob, ResumeState
+
+
+def fill_up(store: Store, *, spare_pages: int) -> None:
+    """Let the database grow by ``spare_pages`` and no further."""
+    with store.reading() as connection:
+        pages = connection.execute(sa.text("PRAGMA page_count")).scalar_one()
+    limit = f"PRAGMA max_page_count = {pages + spare_pages}"
+    store.close()
+    event.listen(store.engine, "connect", lambda connection, _: connection.execute(limit))
+
+
+def record_until_full(store: Store, claim: Claim) -> int:
+    with pytest.raises(StorageFull):
+        for step in range(1, 1000):
+            values = {f"x{i}": i / step for i in range(50)}
+            attempts.record_progress(store, claim, step, values)
+    return len(metrics.list_metrics(store, claim.job_id))
+
+
+def test_sqlite_is_durable_and_checks_references(store: Store) -> None:
+    with store.reading() as connection:
+        pragmas = {
+            name: connection.execute(sa.text(f"PRAGMA {name}")).scalar()
+            for name in ("journal_mode", "synchronous", "foreign_keys", "busy_timeout")
+        }
+    assert pragmas == {
+        "journal_mode": "wal",
+        "synchronous": 2,
+        "foreign_keys": 1,
+        "busy_timeout": 30_000,
+    }
+
+
+@pytest.mark.parametrize(
+    ("url", "rule"),
+    [
+        ("nonsense", "must be a database URL"),
+        ("mysql://localhost/x", "must name a database that Tandem knows"),
+        ("sqlite://", "must name a file"),
+        ("sqlite:///:memory:", "must name a file"),
+        ("sqlite:////no/such/folder/x.db", "there is no /no/such/folder"),
+    ],
+)
+def test_bad_database_url_says_what_is_wrong(url: str, rule: str) -> None:
+    with pytest.raises(InvalidInput, match=rule):
+        Store(url)
+
+
+def test_password_is_hidden_in_messages() -> None:
+    with pytest.raises(InvalidInput) as caught:
+        Store("mysql://me:secret@host/x")
+    assert "secret" not in str(caught.value)
+
+
+def test_relative_path_is_made_absolute_for_workers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    store = Store("sqlite:///tandem.db")
+    assert store.sqlite_path == tmp_path / "tandem.db"
+    assert store.url == f"sqlite:///{tmp_path}/tandem.db"
+
+
+def test_many_threads_write_and_none_is_turned_away(store: Store) -> None:
+    def submit() -> None:
+        for i in range(10):
+            jobs.create_job(store, NewJob(kind="count", spec={"i": i}))
+
+    threads = [threading.Thread(target=submit) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(jobs.list_jobs(store, limit=200).items) == 80
+
+
+def test_one_key_posted_by_many_threads_makes_one_job(store: Store) -> None:
+    found: list[str] = []
+
+    def submit() -> None:
+        new = NewJob(kind="count", spec={"a": 1})
+        found.append(jobs.create_job(store, new, idempotency_key="k").id)
+
+    threads = [threading.Thread(target=submit) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(found) == 8 and len(set(found)) == 1
+
+
+def test_full_database_refuses_and_keeps_what_it_has(store: Store, claim: Claim) -> None:
+    fill_up(store, spare_pages=10)
+    n = record_until_full(store, claim)
+    assert [row.step for row in metrics.list_metrics(store, claim.job_id)] == list(
+        range(1, n + 1)
+    )
+    assert jobs.get_job(store, claim.job_id).step == n
+
+
+def test_full_database_refuses_new_jobs_with_a_reason(store: Store) -> None:
+    fill_up(store, spare_pages=0)
+    with pytest.raises(StorageFull, match=r"no room left in sqlite:.* free some space"):
+        for i in range(1000):
+            jobs.create_job(store, NewJob(kind="count", spec={"text": "x" * 2000, "i": i}))
+
+
+def test_job_can_fail_in_a_full_database_with_room_set_aside(
+    store: Store, claim: Claim
+) -> None:
+    endings.fill_reserve(store)
+    fill_up(store, spare_pages=10)
+    record_until_full(store, claim)
+    endings.fail(store, claim, "e" * endings.MAX_ERROR)
+    job = jobs.get_job(store, claim.job_id)
+    assert (job.state, job.error) == ("failed", "e" * endings.MAX_ERROR)
+
+
+def test_full_database_keeps_the_earlier_resume_state(store: Store, claim: Claim) -> None:
+    content = bytes(range(200)) * 2000
+    policy = NewCheckpoint(sha256="0" * 64, manifest={}, tensors=b"p")
+    earlier = ResumeState(step=10, manifest={}, tensors=content)
+    attempts.record_checkpoint(store, claim, 10, policy, earlier)
+    fill_up(store, spare_pages=4)
+    with pytest.raises(StorageFull):
+        later = ResumeState(step=20, manifest={}, tensors=content * 2)
+        attempts.record_checkpoint(store, claim, 20, policy, later)
+    assert attempts.load_resume(store, claim.job_id) == earlier
+
+
+def test_reserve_is_filled_once(store: Store) -> None:
+    endings.fill_reserve(store)
+    endings.fill_reserve(store)
+    migrate(store)
+    with store.reading() as connection:
+        assert connection.execute(sa.text("SELECT count(*) FROM reserve")).scalar() == 1

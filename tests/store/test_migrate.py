@@ -1,0 +1,56 @@
+from pathlib import Path
+
+import pytest
+import sqlalchemy as sa
+from alembic import command
+from alembic.autogenerate import compare_metadata
+from alembic.migration import MigrationContext
+
+from app.errors import Conflict, InvalidInput
+from app.store.engine import Store
+from app.store.migrate import alembic_config, check_schema, migrate
+from app.store.tables import metadata
+
+
+def test_migrations_build_exactly_the_tables(store: Store) -> None:
+    with store.reading() as connection:
+        context = MigrationContext.configure(connection)
+        assert compare_metadata(context, metadata) == []
+
+
+def test_migrating_again_changes_nothing(store: Store) -> None:
+    migrate(store)
+    check_schema(store)
+
+
+def test_migrations_can_be_taken_back(store: Store) -> None:
+    config = alembic_config()
+    with store.writing() as connection:
+        config.attributes["connection"] = connection
+        command.downgrade(config, "base")
+        names = sa.inspect(connection).get_table_names()
+    assert set(names) <= {"alembic_version", "sqlite_sequence"}
+
+
+def test_database_of_a_newer_version_is_refused(store: Store) -> None:
+    with store.writing() as connection:
+        connection.execute(sa.text("UPDATE alembic_version SET version_num = '9999'"))
+    with pytest.raises(Conflict, match="has schema 9999, which this version of Tandem"):
+        migrate(store)
+    with pytest.raises(Conflict, match="has schema 9999, this code needs"):
+        check_schema(store)
+
+
+def test_worker_refuses_an_empty_database(tmp_path: Path) -> None:
+    store = Store(f"sqlite:///{tmp_path}/empty.db")
+    with pytest.raises(Conflict, match="has schema none"):
+        check_schema(store)
+    store.close()
+
+
+def test_file_that_is_no_database_is_named(tmp_path: Path) -> None:
+    (tmp_path / "tandem.db").write_text("these are my notes, not a database" * 100)
+    store = Store(f"sqlite:///{tmp_path}/tandem.db")
+    with pytest.raises(InvalidInput, match=r"tandem\.db' cannot be opened \(file is not a"):
+        migrate(store)
+    store.close()

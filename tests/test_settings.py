@@ -1,0 +1,66 @@
+from pathlib import Path
+
+import pytest
+
+from app.errors import InvalidInput
+from app.settings import Settings, check_access, load_settings
+
+
+@pytest.fixture(autouse=True)
+def no_settings(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("HOST", "PORT", "DATA", "DATABASE_URL", "TOKEN"):
+        monkeypatch.delenv(f"TANDEM_{name}", raising=False)
+
+
+def test_defaults_are_loopback_port_8000_and_a_file_in_the_data_folder() -> None:
+    settings = load_settings()
+    assert (settings.host, settings.port, settings.is_loopback) == ("127.0.0.1", 8000, True)
+    assert settings.database == f"sqlite:///{Path('data').resolve() / 'tandem.db'}"
+
+
+def test_variables_are_read(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("TANDEM_PORT", "8130")
+    monkeypatch.setenv("TANDEM_DATA", str(tmp_path))
+    monkeypatch.setenv("TANDEM_DATABASE_URL", "postgresql://db/tandem")
+    settings = load_settings()
+    assert (settings.port, settings.data) == (8130, tmp_path)
+    assert settings.database == "postgresql://db/tandem"
+
+
+def test_command_line_wins_over_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TANDEM_PORT", "8130")
+    assert load_settings(port=8131, host=None).port == 8131
+
+
+@pytest.mark.parametrize("value", ["abc", "-1", "65536", ""])
+def test_bad_port_is_refused_by_name(monkeypatch: pytest.MonkeyPatch, value: str) -> None:
+    monkeypatch.setenv("TANDEM_PORT", value)
+    with pytest.raises(InvalidInput, match="TANDEM_PORT"):
+        load_settings()
+
+
+def test_misspelt_variable_is_refused_with_the_choices(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TANDEM_PROT", "8130")
+    with pytest.raises(InvalidInput, match="TANDEM_PORT"):
+        load_settings()
+
+
+@pytest.mark.parametrize("host", ["0.0.0.0", "192.168.1.4", "::", "robot.example"])
+def test_address_that_others_reach_needs_a_token(host: str) -> None:
+    with pytest.raises(InvalidInput, match="TANDEM_TOKEN"):
+        check_access(Settings(host=host))
+
+
+def test_short_token_is_refused_and_not_shown() -> None:
+    with pytest.raises(InvalidInput, match="at least 16") as refused:
+        check_access(Settings(token="hunter2"))
+    assert "hunter2" not in str(refused.value)
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "127.0.0.9", "localhost", "::1"])
+def test_loopback_needs_no_token(host: str) -> None:
+    check_access(Settings(host=host))
+
+
+def test_token_does_not_show_in_the_settings_text() -> None:
+    assert "a-secret-of-some-length" not in repr(Settings(token="a-secret-of-some-length"))

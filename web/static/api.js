@@ -1,0 +1,128 @@
+// The service as this page uses it: JSON requests, RFC 9457 problems, resumable event streams.
+
+/** An answer that is not 2xx, with the members of its problem document. */
+export class Problem extends Error {
+  constructor(status, body) {
+    super(body?.detail || body?.title || `the server answered ${status}`);
+    this.status = status;
+    this.title = body?.title || "";
+    this.field = body?.field || null;
+    this.rule = body?.rule || null;
+    this.choices = body?.choices || [];
+    this.errors = body?.errors || [];
+  }
+}
+
+/** No answer at all: the server is away. */
+export class Unreachable extends Error {}
+
+/** Send one request; resolves to the JSON answer, throws Problem or Unreachable. */
+export async function request(path, { method = "GET", body, headers = {}, signal } = {}) {
+  let response;
+  try {
+    response = await fetch(path, {
+      method,
+      signal,
+      cache: "no-store",
+      headers: body === undefined ? headers : { "Content-Type": "application/json", ...headers },
+      body: body === undefined ? undefined : JSON.stringify(body),
+    });
+  } catch (error) {
+    if (error.name === "AbortError") throw error;
+    throw new Unreachable("the server does not answer");
+  }
+  const json = await response.json().catch(() => null);
+  if (!response.ok) throw new Problem(response.status, json);
+  return json;
+}
+
+export const get = (path, options) => request(path, options);
+export const post = (path, body = {}, headers = {}) =>
+  request(path, { method: "POST", body, headers });
+
+/**
+ * Follow a server-sent event stream, for good: after a loss it connects again and resumes
+ * after the last event it saw (Last-Event-ID). EventSource cannot do that once a server has
+ * answered an error, so the stream is read through fetch.
+ *
+ * @param {string} path
+ * @param {{onEvent: (name: string, data: any, id: string) => void,
+ *          onUp?: () => void, onDown?: (error: Error) => void, lastId?: string}} options
+ * @returns {() => void} stops following
+ */
+export function follow(path, { onEvent, onUp = () => {}, onDown = () => {}, lastId = "" }) {
+  const stop = new AbortController();
+  let id = lastId;
+  let pause = 500;
+  const run = async () => {
+    while (!stop.signal.aborted) {
+      try {
+        const headers = { Accept: "text/event-stream", ...(id && { "Last-Event-ID": id }) };
+        const response = await fetch(path, { headers, signal: stop.signal, cache: "no-store" });
+        if (response.status === 404) throw Object.assign(new Problem(404, null), { final: true });
+        if (!response.ok) throw new Problem(response.status, null);
+        onUp();
+        pause = 500;
+        const ended = await read(response.body, stop.signal, (event) => {
+          if (event.id) id = event.id;
+          if (event.data) onEvent(event.name || "message", parse(event.data), event.id);
+          return event.name === "end";
+        });
+        if (ended) return;
+        throw new Unreachable("the stream ended");
+      } catch (error) {
+        if (stop.signal.aborted || error.final) return;
+        onDown(error);
+      }
+      await wait(pause, stop.signal);
+      pause = Math.min(pause * 1.6, 4000);
+    }
+  };
+  run();
+  return () => stop.abort();
+}
+
+/** Read one response body as events until it ends; true when `handle` says it is over. */
+async function read(body, signal, handle) {
+  const reader = body.pipeThrough(new TextDecoderStream()).getReader();
+  signal.addEventListener("abort", () => reader.cancel().catch(() => {}), { once: true });
+  let rest = "";
+  for (;;) {
+    const { value, done } = await reader.read();
+    if (done) return false;
+    const blocks = (rest + value).replace(/\r\n?/g, "\n").split("\n\n");
+    rest = blocks.pop();
+    for (const block of blocks) {
+      if (handle(fields(block))) {
+        reader.cancel().catch(() => {});
+        return true;
+      }
+    }
+  }
+}
+
+function fields(block) {
+  const event = { name: "", id: "", data: "" };
+  for (const line of block.split("\n")) {
+    const [, key, text] = /^(\w+):? ?(.*)$/.exec(line) || [];
+    if (key === "event") event.name = text;
+    else if (key === "id") event.id = text;
+    else if (key === "data") event.data += (event.data && "\n") + text;
+  }
+  return event;
+}
+
+function parse(text) {
+  try {
+    return JSON.parse(text);
+  } catch {
+    return text;
+  }
+}
+
+function wait(ms, signal) {
+  return new Promise((resolve) => {
+    const timer = setTimeout(resolve, ms);
+    signal.addEventListener("abort", () => (clearTimeout(timer), resolve()), { once: true });
+  });
+}

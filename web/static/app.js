@@ -1,0 +1,150 @@
+// Tandem's one page: the live cell, what the critic thinks of it, and training.
+import { html, render, useEffect, useMemo, useRef, useState } from "./vendor/htm-preact-standalone.module.js";
+import { Acting, useCheckpoints } from "./checkpoints.js";
+import { Controls } from "./controls.js";
+import { Icon, Logo } from "./icons.js";
+import { isActive, useJobs } from "./jobs.js";
+import { useCell, WORLD } from "./live.js";
+import { goalColours } from "./palette.js";
+import { SignIn } from "./signin.js";
+import { SmallPrint, Story } from "./story.js";
+import { Training } from "./training.js";
+import { Values } from "./values.js";
+
+const LINKS = {
+  connecting: ["Connecting", "quiet"],
+  warming: ["Warming up", "warn"],
+  live: ["Live", "good"],
+  lost: ["Disconnected", "bad"],
+};
+
+function App() {
+  const cell = useCell();
+  const { link, world } = cell;
+  const { jobs, error, refresh } = useJobs(link);
+  const active = (jobs ?? []).filter(isActive).length;
+  const checkpoints = useCheckpoints(link, `${world?.checkpoint}:${stamp(jobs)}`);
+  const [tab, setTab] = useState("cell");
+  const roomy = useMedia("(min-width: 1760px)");
+  const visited = useRef(false);
+  visited.current ||= roomy || tab === "training";
+  const acting = world?.checkpoint;
+  const training = useMemo(() => {
+    const act = (checkpoint) => cell.send({ tag: "set-policy", checkpoint });
+    return html`<${Training} link=${link} jobs=${jobs} error=${error} refresh=${refresh}
+      acting=${acting} onAct=${act} />`;
+  }, [link, jobs, error, acting]);
+  if (link === "signin") return html`<${SignIn} />`;
+  return html`<div class="frame" data-link=${link}>
+    <header class="topbar">
+      <h1 class="brand"><${Logo} />Tandem</h1>
+      <span class="cell-title">${cell.cell?.title ?? ""}</span>
+      <span class="spacer"></span>
+      ${world && html`<${Acting} world=${world} checkpoints=${checkpoints} jobs=${jobs}
+        send=${cell.send} />`}
+      <${Link} link=${link} />
+      <a class="docs" href="/docs">API<${Icon} name="external" /></a>
+    </header>
+    ${cell.error && html`<p class="banner bad" role="alert"><${Icon} name="alert" />
+      <span>${cell.error.message}</span>
+      <button type="button" class="quiet-button" aria-label="Dismiss" onClick=${cell.dismiss}>
+        <${Icon} name="close" /></button></p>`}
+    ${link === "lost" && world && html`<p class="banner warn" role="alert">
+      <${Icon} name="alert" /><span>The server went away. Trying again …</span></p>`}
+    <main class="stage">
+      <${Scene} cell=${cell} />
+      <aside class="side" aria-label="Decision and training">
+        <${Tabs} tab=${tab} onTab=${setTab} active=${active} />
+        <div class="panel" id="panel-cell" role="tabpanel" aria-labelledby="tab-cell"
+          data-hidden=${tab !== "cell"}><${Decision} cell=${cell} /></div>
+        <div class="panel" id="panel-training" role="tabpanel" aria-labelledby="tab-training"
+          data-hidden=${tab !== "training"}>
+          ${visited.current && training}</div>
+      </aside>
+    </main>
+  </div>`;
+}
+
+function stamp(jobs) {
+  return (jobs ?? []).map((j) => j.state).join(",");
+}
+
+function useMedia(condition) {
+  const query = useMemo(() => matchMedia(condition), [condition]);
+  const [matches, setMatches] = useState(query.matches);
+  useEffect(() => {
+    const update = () => setMatches(query.matches);
+    query.addEventListener("change", update);
+    return () => query.removeEventListener("change", update);
+  }, [query]);
+  return matches;
+}
+
+function Link({ link }) {
+  const [text, tone] = LINKS[link];
+  return html`<span class=${`link ${tone}`} role="status" data-role="link"><i></i>${text}</span>`;
+}
+
+function Tabs({ tab, onTab, active }) {
+  const tabs = [["cell", "Decision"], ["training", "Training"]];
+  const move = (event) => {
+    if (!["ArrowLeft", "ArrowRight"].includes(event.key)) return;
+    const next = tab === "cell" ? "training" : "cell";
+    onTab(next);
+    document.getElementById(`tab-${next}`).focus();
+  };
+  return html`<div class="tabs" role="tablist" aria-label="Panels" onKeyDown=${move}>
+    ${tabs.map(([id, label]) => html`<button key=${id} type="button" role="tab" id=${`tab-${id}`}
+      aria-selected=${String(tab === id)} aria-controls=${`panel-${id}`}
+      tabindex=${tab === id ? 0 : -1} onClick=${() => onTab(id)}>${label}
+      ${id === "training" && active > 0 && html`<b class="count"
+        aria-label=${`${active} running or waiting`}>${active}</b>`}</button>`)}
+  </div>`;
+}
+
+function useGoals({ cell, world }) {
+  const stations = cell?.stations ?? [];
+  const labels = useMemo(() => new Map(stations.map((s) => [s.id, s.label])), [cell]);
+  return {
+    colourOf: goalColours(world?.candidates ?? []),
+    labelOf: (id) => labels.get(id) ?? id,
+  };
+}
+
+function Scene({ cell }) {
+  const { link, world, epoch, reason } = cell;
+  const goals = useGoals(cell);
+  return html`<section class="hero" aria-label="The cell">
+    <div class="viewer">
+      ${epoch > 0 && html`<iframe key=${epoch} src=${`/viewer/${WORLD}/`} data-role="viewer"
+        title="Live 3D view of robot and person"></iframe>`}
+      ${!world && html`<div class="veil" role="status">
+        <i class="spinner"></i>
+        <p><b>${veil(link, reason)[0]}</b></p>
+        <p class="faint">${veil(link, reason)[1]}</p>
+      </div>`}
+    </div>
+    ${world && html`<${Controls} world=${world} cell=${cell.cell}
+      cases=${cell.cell?.cases ?? []} send=${cell.send} ...${goals} />`}
+  </section>`;
+}
+
+function veil(link, reason) {
+  if (link === "lost") return ["The server does not answer", "Trying again every second."];
+  if (link !== "warming") return ["Opening the cell", ""];
+  const doing = reason.replace(/^(warming up|starting):? */, "");
+  if (doing === reason && reason) return ["The server is not ready", reason];
+  return ["Warming up", `${doing || "starting"} …`];
+}
+
+function Decision({ cell }) {
+  const goals = useGoals(cell);
+  if (!cell.world) return html`<div class="skeleton tall" aria-busy="true"></div>`;
+  return html`<${Story} world=${cell.world} />
+    <${Values} world=${cell.world} cell=${cell.cell} history=${cell.history} ...${goals} />
+    <${SmallPrint} world=${cell.world} />`;
+}
+
+const root = document.getElementById("app");
+root.replaceChildren();
+render(html`<${App} />`, root);

@@ -1,0 +1,59 @@
+// Which checkpoint acts in the cell.
+import { html, useCallback, useEffect, useState } from "./vendor/htm-preact-standalone.module.js";
+import { get } from "./api.js";
+import * as format from "./format.js";
+
+const PER_JOB = 5;
+
+/** Known checkpoints; asked for again when `stamp` changes and by `refresh`. */
+export function useCheckpoints(link, stamp) {
+  const [list, setList] = useState([]);
+  const refresh = useCallback(() => {
+    if (link !== "live") return;
+    get("/v1/checkpoints?limit=100").then((page) => setList(page.items), () => {});
+  }, [link]);
+  useEffect(refresh, [refresh, stamp]);
+  return { list, refresh };
+}
+
+export function Acting({ world, checkpoints, jobs, send }) {
+  const now = world.checkpoint;
+  const groups = grouped(checkpoints.list, jobs, now);
+  const known = groups.some((g) => g.items.some((c) => c.sha256 === now));
+  return html`<label class="acting">
+    <span>Acting</span>
+    <select value=${now ?? ""} data-role="acting" aria-label="Checkpoint that acts in the cell"
+      onFocus=${checkpoints.refresh} title=${world.policy_title ?? ""}
+      onChange=${(e) => send({ tag: "set-policy", checkpoint: e.target.value })}>
+      ${!now && html`<option value="" disabled>no policy</option>`}
+      ${now && !known && html`<option value=${now}>${world.policy_title ?? format.short(now)}</option>`}
+      ${groups.map((group) => html`<optgroup key=${group.label} label=${group.label}>
+        ${group.items.map((c) => html`<option key=${c.sha256} value=${c.sha256}>
+          ${name(c, group.job)}</option>`)}</optgroup>`)}
+    </select>
+  </label>`;
+}
+
+/** Shipped checkpoints first, then each job's newest few, and whatever acts now. */
+function grouped(list, jobs, now) {
+  const shipped = list.filter((c) => !c.job_id);
+  const byJob = new Map();
+  for (const c of list.filter((one) => one.job_id)) {
+    const items = byJob.get(c.job_id) ?? [];
+    if (items.length < PER_JOB || c.sha256 === now) byJob.set(c.job_id, [...items, c]);
+  }
+  const groups = shipped.length ? [{ label: "Shipped", items: shipped, job: null }] : [];
+  for (const [id, items] of byJob) {
+    const job = `job ${jobs?.find((j) => j.id === id)?.number ?? format.short(id)}`;
+    groups.push({ label: job[0].toUpperCase() + job.slice(1), items, job });
+  }
+  return groups;
+}
+
+function name(checkpoint, job) {
+  const { preset, step } = checkpoint;
+  const parts = [checkpoint.aliases[0] ?? job ?? preset ?? format.short(checkpoint.sha256)];
+  if (!job && preset && preset !== parts[0]) parts.push(preset);
+  if (Number.isFinite(step)) parts.push(`${format.steps(step)} steps`);
+  return parts.join(" · ");
+}

@@ -1,0 +1,64 @@
+// What a visitor can do to the cell: who moves the person, the clock, the goals, the cases.
+import { html } from "./vendor/htm-preact-standalone.module.js";
+import { Icon } from "./icons.js";
+
+const MODES = [
+  ["manual", "I move the person", "hand"],
+  ["auto", "Works by itself", "walk"],
+];
+
+export function Controls({ world, cell, cases, send, colourOf, labelOf }) {
+  return html`<section class="dock" aria-label="Controls of the cell">
+    <div class="dock-row">
+      <span class="dock-label" id="mode-label">Person</span>
+      <div class="segmented" role="radiogroup" aria-labelledby="mode-label">
+        ${MODES.map(([mode, label, icon]) => html`<button key=${mode} type="button" role="radio"
+          aria-checked=${String(world.mode === mode)} data-mode=${mode}
+          onClick=${() => send({ tag: "set-mode", mode })}>
+          <${Icon} name=${icon} />${label}</button>`)}
+      </div>
+      <div class="transport" role="group" aria-label="Clock">
+        <button type="button" class="tool" onClick=${() =>
+          send({ tag: world.paused ? "resume" : "pause" })} data-action="pause"
+          aria-label=${world.paused ? "Resume" : "Pause"}>
+          <${Icon} name=${world.paused ? "play" : "pause"} filled=${world.paused} />
+          <span>${world.paused ? "Resume" : "Pause"}</span></button>
+        <button type="button" class="tool" disabled=${!world.paused} data-action="step"
+          aria-label="Step"
+          title=${world.paused ? "One decision, 0.05 s" : "Pause first"}
+          onClick=${() => send({ tag: "step" })}><${Icon} name="step" /><span>Step</span></button>
+        <button type="button" class="tool" data-action="reset" aria-label="Reset"
+          onClick=${() => send({ tag: "reset" })}><${Icon} name="reset" /><span>Reset</span></button>
+      </div>
+      ${world.mode === "manual" &&
+      html`<p class="dock-hint">Drag the handles at the hips and hands in the scene.</p>`}
+    </div>
+    <div class="dock-row">
+      <span class="dock-label" id="goals-label">Goals</span>
+      <${Goals} world=${world} cell=${cell} send=${send} colourOf=${colourOf} labelOf=${labelOf} />
+    </div>
+    ${cases.length > 0 &&
+    html`<div class="dock-row dock-cases">
+      <span class="dock-label" id="cases-label">Cases</span>
+      <div class="cases" role="group" aria-labelledby="cases-label">
+        ${cases.map((c, i) => html`<button key=${c.id} type="button" class="case"
+          aria-pressed=${String(world.case === c.id)} data-case=${c.id}
+          onClick=${() => send({ tag: "start-case", id: c.id })}>
+          <b>${i + 1}</b><span>${c.text}</span></button>`)}
+      </div>
+    </div>`}
+  </section>`;
+}
+
+function Goals({ world, cell, send, colourOf, labelOf }) {
+  const active = new Set(world.selected ?? world.candidates.map((c) => c.id));
+  return html`<div class="goals" role="group" aria-labelledby="goals-label">
+    ${(cell?.stations ?? []).map(({ id }) => {
+      const on = active.has(id);
+      return html`<button key=${id} type="button" class="goal" aria-pressed=${String(on)}
+        data-goal=${id} onClick=${() => send({ tag: "toggle-candidate", id })}>
+        <i class="swatch" style=${on ? { background: colourOf(id) } : {}}></i>
+        ${labelOf(id)}</button>`;
+    })}
+  </div>`;
+}

@@ -1,0 +1,67 @@
+// Numbers and names as people read them. SI units come in; cm, percent and minutes go out.
+
+const MINUS = "\u2212";
+
+/** A critic's value with two decimals and a true minus sign. */
+export function value(v) {
+  if (v === null || v === undefined || !Number.isFinite(v)) return "–";
+  const text = Math.abs(v).toFixed(2);
+  return v < 0 && Number(text) !== 0 ? MINUS + text : text;
+}
+
+/** A distance in metres, in cm below one metre. */
+export function distance(metres) {
+  if (metres === null || metres === undefined || !Number.isFinite(metres)) return "–";
+  if (metres < 0) return `${MINUS}${Math.round(-metres * 100)} cm`;
+  return metres < 0.995 ? `${Math.round(metres * 100)} cm` : `${metres.toFixed(1)} m`;
+}
+
+/** A count of steps: 950, 12.4 k, 1.25 M. */
+export function steps(n) {
+  if (n === null || n === undefined) return "–";
+  if (n >= 1e6) return `${trim((n / 1e6).toFixed(2))} M`;
+  if (n >= 1e4) return `${trim((n / 1e3).toFixed(1))} k`;
+  return String(Math.round(n));
+}
+
+/** A rate in [0, 1] as percent. */
+export function percent(rate, digits = 1) {
+  if (rate === null || rate === undefined || !Number.isFinite(rate)) return "–";
+  return `${(rate * 100).toFixed(digits)} %`;
+}
+
+/** A time span in seconds: 8 s, 2 min 10 s, 1 h 05 min. */
+export function duration(seconds) {
+  if (seconds === null || seconds === undefined || !Number.isFinite(seconds)) return "–";
+  const s = Math.max(0, Math.round(seconds));
+  if (s < 60) return `${s} s`;
+  if (s < 3600) return `${Math.floor(s / 60)} min ${pad(s % 60)} s`;
+  return `${Math.floor(s / 3600)} h ${pad(Math.floor((s % 3600) / 60))} min`;
+}
+
+/** How long ago an ISO time was. */
+export function ago(iso, now = Date.now()) {
+  if (!iso) return "";
+  const seconds = (now - Date.parse(iso)) / 1000;
+  return seconds < 5 ? "just now" : `${duration(seconds).replace(/ \d\d s$/, "")} ago`;
+}
+
+/** A plain number with at most `digits` significant digits. */
+export function number(v, digits = 3) {
+  if (typeof v !== "number" || !Number.isFinite(v)) return String(v ?? "–");
+  const text = String(Number(v.toPrecision(digits)));
+  return text.replace("-", MINUS);
+}
+
+/** The first characters of a checksum or job id. */
+export function short(id) {
+  return id ? String(id).slice(0, 8) : "–";
+}
+
+function trim(text) {
+  return text.replace(/\.?0+$/, "");
+}
+
+function pad(n) {
+  return String(n).padStart(2, "0");
+}

@@ -1,0 +1,229 @@
+// Jobs: the list, and for the open one its learning curves, numbers and what can be done.
+import { html, useCallback, useEffect, useRef, useState } from "./vendor/htm-preact-standalone.module.js";
+import { follow, get, post } from "./api.js";
+import * as format from "./format.js";
+import { Icon } from "./icons.js";
+import { CurvePlot } from "./plots.js";
+
+const POLL_MS = 2000;
+const FINAL = new Set(["succeeded", "failed", "cancelled"]);
+const TONES = { queued: "quiet", running: "accent", cancelling: "warn", succeeded: "good",
+  failed: "bad", cancelled: "quiet" };
+const OUTCOMES = [
+  { key: "success", label: "success", colour: "good" },
+  { key: "collision", label: "collision", colour: "bad" },
+  { key: "timeout", label: "time-out", colour: "warn" },
+];
+const REWARD = [{ key: "reward", label: "mean reward of an episode", colour: "accent" }];
+
+/** All jobs, newest first, asked for again every two seconds while the server is there. */
+export function useJobs(link) {
+  const [state, setState] = useState({ jobs: null, error: null });
+  const refresh = useRef(() => {});
+  useEffect(() => {
+    if (link !== "live") return undefined;
+    let over = false;
+    refresh.current = async () => {
+      try {
+        const page = await get("/v1/jobs?limit=50");
+        if (!over) setState({ jobs: page.items, error: null });
+      } catch (error) {
+        if (!over) setState((now) => ({ ...now, error }));
+      }
+    };
+    refresh.current();
+    const timer = setInterval(() => document.hidden || refresh.current(), POLL_MS);
+    return () => {
+      over = true;
+      clearInterval(timer);
+    };
+  }, [link]);
+  return { ...state, refresh: useCallback(() => refresh.current(), []) };
+}
+
+export function isActive(job) {
+  return !FINAL.has(job.state);
+}
+
+export function JobList({ jobs, error, open, onOpen, onChanged, onAct, acting, onNew }) {
+  if (error && !jobs) {
+    return html`<p class="notice bad" role="alert"><${Icon} name="alert" />
+      The jobs could not be loaded: ${error.message}</p>`;
+  }
+  if (!jobs) return html`<div class="skeleton" aria-busy="true" aria-label="Loading jobs"></div>`;
+  if (jobs.length === 0) {
+    return html`<div class="empty">
+      <p><b>No jobs yet.</b> A training job teaches a policy from nothing, here on this machine.</p>
+      ${onNew && html`<button type="button" class="primary" data-action="new-job" onClick=${onNew}>
+        <${Icon} name="plus" />Start one</button>`}</div>`;
+  }
+  return html`<ul class="jobs">
+    ${jobs.map((job) => html`<${Job} key=${job.id} job=${job} open=${open === job.id}
+      onOpen=${onOpen} onChanged=${onChanged} onAct=${onAct} acting=${acting} />`)}
+  </ul>`;
+}
+
+function Job({ job, open, onOpen, onChanged, onAct, acting }) {
+  const share = progress(job);
+  return html`<li class=${`job ${open ? "is-open" : ""}`} data-job=${job.id}
+    data-state=${job.state}>
+    <button type="button" class="job-head" aria-expanded=${String(open)}
+      onClick=${() => onOpen(open ? null : job.id)}>
+      <${Icon} name="chevron" />
+      <span class="job-name">${title(job)}</span>
+      <span class=${`chip chip-${TONES[job.state] ?? "quiet"}`}>${job.state}</span>
+      <span class="job-sub">${subtitle(job)}</span>
+    </button>
+    ${isActive(job) &&
+    html`<div class="progress" role="progressbar" aria-label=${`Progress of ${title(job)}`}
+      aria-valuemin="0" aria-valuemax="100" aria-valuenow=${Math.round(share * 100)}>
+      <i style=${{ transform: `scaleX(${share})` }}></i></div>`}
+    ${open && html`<${JobDetail} job=${job} onChanged=${onChanged} onAct=${onAct}
+      acting=${acting} />`}
+  </li>`;
+}
+
+function title(job) {
+  const name = job.preset ?? job.spec?.protocol ?? job.kind;
+  return `${job.number === undefined ? format.short(job.id) : `Job ${job.number}`} · ${name}`;
+}
+
+function subtitle(job) {
+  const parts = [`seed ${job.seed}`];
+  if (isActive(job) && job.total_steps) {
+    parts.push(`${format.steps(job.step)} of ${format.steps(job.total_steps)} steps`);
+    const left = job.latest?.time_left_s ?? job.time_left_s;
+    if (job.state === "running" && Number.isFinite(left)) parts.push(`${format.duration(left)} left`);
+  } else {
+    if (job.step) parts.push(`${format.steps(job.step)} steps`);
+    parts.push(format.ago(job.finished_at ?? job.created_at));
+  }
+  if (job.attempt > 1) parts.push(`attempt ${job.attempt}`);
+  return parts.join(" · ");
+}
+
+function progress(job) {
+  return job.total_steps ? Math.min(1, (job.step ?? 0) / job.total_steps) : 0;
+}
+
+function JobDetail({ job, onChanged, onAct, acting }) {
+  const { rows, checkpoint, lost } = useCurve(job, onChanged);
+  const [at, setAt] = useState(null);
+  const row = rows?.[at ?? rows.length - 1] ?? null;
+  const readout = at !== null && at !== undefined && row;
+  return html`<div class="job-detail">
+    ${job.error && html`<p class="notice bad" role="alert"><${Icon} name="alert" />
+      <span>${job.error}</span></p>`}
+    ${!rows && html`<div class="skeleton tall" aria-busy="true" aria-label="Loading the curve"></div>`}
+    ${rows && rows.length === 0 && html`<p class="empty">${job.state === "queued"
+      ? "Waiting for its turn; one job runs at a time."
+      : isActive(job) ? "Warming up; the first point comes after the first episodes."
+        : "It ended before its first point."}</p>`}
+    ${rows && rows.length > 0 && html`
+      <${Legend} lines=${OUTCOMES} row=${row} show=${(v) => format.percent(v)} />
+      <${CurvePlot} rows=${rows} lines=${OUTCOMES} height=${168} unit="%" range=${[0, 1]}
+        sync=${job.id} onHover=${setAt}
+        label=${`Success, collision and time-out rate over ${rows.length} points`} />
+      <${Legend} lines=${REWARD} row=${row} show=${(v) => format.number(v)} />
+      <${CurvePlot} rows=${rows} lines=${REWARD} height=${112} sync=${job.id} onHover=${setAt}
+        label="Mean reward over environment steps" />
+      <p class="plot-foot"><span data-points=${rows.length}>${rows.length} points</span>
+        <span>${readout ? `at ${format.steps(row.step)} steps` : "environment steps"}</span></p>`}
+    ${lost && html`<p class="notice warn" role="status"><${Icon} name="alert" />
+      Lost the stream of this job; trying again.</p>`}
+    <${Speed} job=${job} row=${rows?.at(-1)} />
+    <div class="job-actions">
+      ${checkpoint && html`<button type="button" class="tool" disabled=${acting === checkpoint}
+        onClick=${() => onAct(checkpoint)}>
+        ${acting === checkpoint ? "Acts in the cell" : "Let it act in the cell"}</button>`}
+      ${isActive(job) && html`<${Cancel} job=${job} onChanged=${onChanged} />`}
+    </div>
+  </div>`;
+}
+
+function Legend({ lines, row, show }) {
+  return html`<p class="legend">${lines.map((l) => html`<span key=${l.key}>
+    <i class=${`dash ${l.colour}`}></i>${l.label}<b>${show(row?.[l.key])}</b></span>`)}</p>`;
+}
+
+function Speed({ job, row }) {
+  const changed = Object.entries(job.overrides ?? {});
+  return html`<dl class="facts">
+    ${row && [
+      ["Episodes", format.steps(row.episodes)],
+      ["Updates", format.steps(row.updates)],
+      ["Updates per s", format.number(row.updates_per_s)],
+      ["Steps per s", format.steps(row.steps_per_s)],
+      ["CPU time", format.duration(row.cpu_s)],
+    ].filter(([, text]) => text !== "–").map(([name, text]) => html`<div key=${name}>
+      <dt>${name}</dt><dd>${text}</dd></div>`)}
+    ${changed.map(([name, v]) => html`<div key=${name}><dt>${name}</dt>
+      <dd>${typeof v === "number" ? format.number(v, 6) : JSON.stringify(v)}</dd></div>`)}
+  </dl>`;
+}
+
+/** The curve of one job: what is stored, then what its event stream adds. */
+function useCurve(job, onChanged) {
+  const [state, setState] = useState({ rows: null, checkpoint: null, lost: false });
+  const changed = useRef(onChanged);
+  changed.current = onChanged;
+  useEffect(() => {
+    let points = new Map();
+    let checkpoint = null;
+    const show = (lost = false) => setState({ checkpoint, lost,
+      rows: [...points.values()].sort((a, b) => a.step - b.step) });
+    const onEvent = (name, data) => {
+      if (name === "progress") points.set(data.step, data);
+      else if (name === "checkpoint") checkpoint = data.sha256 ?? checkpoint;
+      else if (name === "state") {
+        if (Number.isFinite(data.resumed_from_step)) {
+          points = new Map([...points].filter(([step]) => step <= data.resumed_from_step));
+        }
+        changed.current();
+      }
+      schedule();
+    };
+    let frame = 0;
+    const schedule = () => {
+      frame = frame || requestAnimationFrame(() => {
+        frame = 0;
+        show();
+      });
+    };
+    show();
+    setState((now) => ({ ...now, rows: null }));
+    const stop = follow(`/v1/jobs/${job.id}/events`, {
+      onEvent,
+      onUp: schedule,
+      onDown: () => show(true),
+    });
+    return () => {
+      stop();
+      cancelAnimationFrame(frame);
+    };
+  }, [job.id]);
+  return state;
+}
+
+function Cancel({ job, onChanged }) {
+  const [asking, setAsking] = useState(false);
+  const [error, setError] = useState(null);
+  if (job.state === "cancelling") return html`<span class="faint">Stopping …</span>`;
+  const cancel = async () => {
+    try {
+      await post(`/v1/jobs/${job.id}/cancel`);
+      setAsking(false);
+      onChanged();
+    } catch (problem) {
+      setError(problem);
+    }
+  };
+  return html`<div class="confirm">
+    ${asking
+      ? html`<span>Cancel it? Its checkpoints stay.</span>
+          <button type="button" class="danger" onClick=${cancel}>Cancel the job</button>
+          <button type="button" class="tool" onClick=${() => setAsking(false)}>Keep going</button>`
+      : html`<button type="button" class="tool" onClick=${() => setAsking(true)}>Cancel …</button>`}
+    ${error && html`<span class="field-error" role="alert">${error.message}</span>`}
+  </div>`;
+}

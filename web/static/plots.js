@@ -1,0 +1,148 @@
+// uPlot as Preact components: the running plot of values and the learning curves.
+import { html, useEffect, useMemo, useRef, useState } from "./vendor/htm-preact-standalone.module.js";
+import * as format from "./format.js";
+import { SPAN_S } from "./history.js";
+import { drawValues } from "./valuelines.js";
+import { themeColours } from "./palette.js";
+
+const FONT = "11px Inter, system-ui, sans-serif";
+
+/** The page's colours; changes with the system's light and dark. */
+export function useTheme() {
+  const [theme, setTheme] = useState(themeColours);
+  useEffect(() => {
+    const query = matchMedia("(prefers-color-scheme: dark)");
+    const update = () => setTheme(themeColours());
+    query.addEventListener("change", update);
+    return () => query.removeEventListener("change", update);
+  }, []);
+  return theme;
+}
+
+/** One uPlot in a box that gives its width; `options` must be stable between data changes. */
+function Plot({ options, data, height, label }) {
+  const box = useRef(null);
+  const plot = useRef(null);
+  useEffect(() => {
+    const width = Math.max(120, box.current.clientWidth);
+    const drawn = new window.uPlot({ ...options, width, height }, data, box.current);
+    plot.current = drawn;
+    const observer = new ResizeObserver(() => {
+      const wide = box.current?.clientWidth;
+      if (wide > 0 && wide !== drawn.width) drawn.setSize({ width: wide, height });
+    });
+    observer.observe(box.current);
+    return () => {
+      observer.disconnect();
+      plot.current = null;
+      drawn.destroy();
+    };
+  }, [options, height]);
+  useEffect(() => plot.current?.setData(data), [data, options]);
+  return html`<div class="plot" ref=${box} role="img" aria-label=${label}></div>`;
+}
+
+function axis(theme, more) {
+  return {
+    stroke: theme.faint,
+    font: FONT,
+    grid: { stroke: theme.grid, width: 1 },
+    ticks: { show: false },
+    ...more,
+  };
+}
+
+function secondsAgo(v) {
+  return v === 0 ? "now" : `${format.number(v)} s`;
+}
+
+/** Values of all candidates over the last seconds; the chosen one is drawn thick. */
+export function ValuePlot({ history, ids, labelOf, chosen, onHover }) {
+  const theme = useTheme();
+  const live = useRef({});
+  live.current = { history, ids, labelOf, onHover };
+  const key = ids.join("|");
+  const stamp = history.samples.at(-1)?.t;
+  const options = useMemo(() => valueOptions(theme, ids, live), [key, theme]);
+  const data = useMemo(() => history.columns(ids), [stamp, key]);
+  const label = `Critic's value of ${ids.length} candidates over the last ${SPAN_S} seconds; ` +
+    `chosen now: ${chosen ? labelOf(chosen) : "none"}`;
+  return html`<${Plot} options=${options} data=${data} height=${176} label=${label} />`;
+}
+
+function valueOptions(theme, ids, live) {
+  return {
+    legend: { show: false },
+    padding: [8, 58, 0, 0],
+    cursor: { y: false, drag: { setScale: false, x: false, y: false }, points: { show: false } },
+    scales: {
+      x: { time: false, range: [-SPAN_S, 0] },
+      y: { range: (_, low, high) => padded(low, high, 0.6) },
+    },
+    axes: [
+      axis(theme, { size: 24, space: 70, values: (_, ticks) => ticks.map(secondsAgo) }),
+      axis(theme, { size: 40, space: 32, values: (_, t) => t.map((v) => format.number(v)) }),
+    ],
+    series: [{}, ...ids.map((id) => ({ label: id, paths: () => null, points: { show: false } }))],
+    hooks: {
+      draw: [(plot) => drawValues(plot, live.current, theme)],
+      setCursor: [(plot) => live.current.onHover?.(plot.cursor.idx)],
+    },
+  };
+}
+
+function padded(low, high, least) {
+  if (low === null || high === null || !Number.isFinite(low)) return [-1, 1];
+  const room = Math.max((high - low) * 0.12, (least - (high - low)) / 2, 0.02);
+  return [low - room, high + room];
+}
+
+/** Learning curves against environment steps; `lines` are {key, label, colour}. */
+export function CurvePlot({ rows, lines, height, label, unit, range, sync, onHover }) {
+  const theme = useTheme();
+  const hover = useRef(onHover);
+  hover.current = onHover;
+  const key = lines.map((l) => l.key).join("|");
+  const options = useMemo(
+    () => curveOptions(theme, lines, unit, range, sync, hover), [key, theme, unit, sync]);
+  const data = useMemo(
+    () => [rows.map((r) => r.step), ...lines.map((l) => rows.map((r) => finite(r[l.key])))],
+    [rows, key]);
+  return html`<${Plot} options=${options} data=${data} height=${height} label=${label} />`;
+}
+
+function curveOptions(theme, lines, unit, range, sync, hover) {
+  const show = unit === "%" ? (v) => `${Math.round(v * 100)} %` : (v) => format.number(v);
+  return {
+    legend: { show: false },
+    padding: [8, 16, 0, 0],
+    cursor: {
+      y: false,
+      sync: sync ? { key: sync } : undefined,
+      drag: { setScale: false, x: false, y: false },
+      points: { size: 5 },
+    },
+    scales: {
+      x: { time: false, range: (_, low, high) => [Math.min(0, low ?? 0), Math.max(high ?? 1, 1)] },
+      y: { range: range ?? ((_, low, high) => padded(low, high, 0.2)) },
+    },
+    axes: [
+      axis(theme, { size: 24, space: 64, values: (_, t) => t.map((v) => (v ? format.steps(v) : "0")) }),
+      axis(theme, { size: 46, space: 30, values: (_, ticks) => ticks.map(show) }),
+    ],
+    series: [
+      {},
+      ...lines.map((l) => ({
+        label: l.label,
+        stroke: theme[l.colour] ?? l.colour,
+        width: 1.75,
+        points: { show: (plot) => plot.data[0].length < 3, size: 5 },
+      })),
+    ],
+    hooks: { setCursor: [(plot) => hover.current?.(plot.cursor.idx)] },
+  };
+}
+
+function finite(v) {
+  return typeof v === "number" && Number.isFinite(v) ? v : null;
+}

@@ -1,0 +1,29 @@
+// Shown when the server asks for its token: the token is exchanged for a session cookie.
+import { html, useState } from "./vendor/htm-preact-standalone.module.js";
+import { post } from "./api.js";
+import { Logo } from "./icons.js";
+
+export function SignIn() {
+  const [token, setToken] = useState("");
+  const [error, setError] = useState(null);
+  const submit = async (event) => {
+    event.preventDefault();
+    try {
+      await post("/session", { token });
+      location.reload();
+    } catch (problem) {
+      setError(problem);
+    }
+  };
+  return html`<main class="signin"><form class="card" onSubmit=${submit}>
+    <h1 class="brand"><${Logo} />Tandem</h1>
+    <p>This server is protected. Its token stands in the setting TANDEM_TOKEN.</p>
+    <div class="field">
+      <label for="token">Token</label>
+      <input id="token" type="password" autocomplete="current-password" value=${token}
+        aria-invalid=${String(Boolean(error))} onInput=${(e) => setToken(e.target.value)} />
+      ${error && html`<p class="field-error" role="alert">${error.message}</p>`}
+    </div>
+    <button type="submit" class="primary wide">Open the cell</button>
+  </form></main>`;
+}

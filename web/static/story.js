@@ -1,0 +1,110 @@
+// What the robot does and why, in one sentence, and the few numbers that matter beside it.
+import { html } from "./vendor/htm-preact-standalone.module.js";
+import * as format from "./format.js";
+import { Icon } from "./icons.js";
+
+const STATUS = {
+  moving: ["On its way", "accent"],
+  reached: ["Reached", "good"],
+  contact: ["Contact", "bad"],
+  blocked: ["Waiting", "warn"],
+  "case done": ["Case done", "good"],
+  "no candidates": ["No goals", "quiet"],
+  "no policy": ["No policy", "warn"],
+};
+const CLEARANCE_SCALE_M = 1.0;
+
+export function Story({ world }) {
+  const [text, tone] = STATUS[world.status] ?? [String(world.status), "quiet"];
+  return html`<section class="story" aria-labelledby="story-title">
+    <h2 id="story-title" class="sr">What the robot does and why</h2>
+    <div class="story-top">
+      <span class=${`chip chip-${world.paused ? "quiet" : tone}`} data-status=${world.status}
+        role="status">
+        ${world.paused ? "Paused" : text}</span>
+      <span class="clock">${world.t_s.toFixed(1)} s</span>
+    </div>
+    <p class="sentence">${world.message || "Waiting for the first decision."}</p>
+    <${Clearance} metres=${world.clearance_m} contact=${world.contact} />
+  </section>`;
+}
+
+function Clearance({ metres, contact }) {
+  const known = Number.isFinite(metres);
+  const share = known ? Math.min(1, Math.max(0, metres / CLEARANCE_SCALE_M)) : 0;
+  const tone = !known ? "" : metres < 0.05 ? "bad" : metres < 0.15 ? "warn" : "good";
+  return html`<div class="clearance">
+    <span class="label">Clearance to the person</span>
+    <span class="meter" role="meter" aria-label="Clearance to the person in centimetres"
+      aria-valuemin="0" aria-valuemax=${CLEARANCE_SCALE_M * 100}
+      aria-valuenow=${Math.round(share * CLEARANCE_SCALE_M * 100)}>
+      <i class=${`meter-fill ${tone}`} style=${{ transform: `scaleX(${share})` }}></i>
+    </span>
+    <strong>${format.distance(metres)}</strong>
+    ${contactKind(contact) &&
+    html`<span class="contact-note">${contactText(contact)}</span>`}
+  </div>`;
+}
+
+function contactKind(contact) {
+  const kind = typeof contact === "string" ? contact : contact?.kind;
+  return kind && kind !== "none" ? kind : null;
+}
+
+function contactText(contact) {
+  const kind = contactKind(contact);
+  const [link, body] = [words(contact.link), words(contact.body)];
+  if (kind === "human") return `Contact: robot’s ${link || "arm"}, person’s ${body || "body"}`;
+  if (kind === "self") return "The robot touches itself";
+  return `Contact: robot’s ${link || "arm"} with the cell`;
+}
+
+function words(name) {
+  return name ? String(name).replace(/_link$/, "").replace(/_r$/, " (right)")
+    .replace(/_l$/, " (left)").replaceAll("_", " ") : "";
+}
+
+/** Counters, trained range and provenance: the small print under the plot. */
+export function SmallPrint({ world }) {
+  const counters = world.counters ?? {};
+  const outside = world.outside ?? [];
+  return html`<section class="card small-print" aria-label="Counters and provenance">
+    <dl class="tiles">
+      ${[["reached", "Reached"], ["contacts", "Contacts"], ["timeouts", "Out of time"],
+        ["switches", "Changed mind"]].map(([key, label]) => html`<div key=${key}>
+          <dt>${label}</dt><dd data-counter=${key}>${counters[key] ?? 0}</dd></div>`)}
+    </dl>
+    ${world.checkpoint && outside.length === 0 && html`<p class="range good"><${Icon} name="check" />
+          The state lies inside what this policy was trained on.</p>`}
+    ${outside.length > 0 && html`<div class="range warn"><${Icon} name="alert" /><div>
+          Outside what this policy was trained on:
+          <ul>${outside.slice(0, 4).map(outsideText).map(([name, text]) => html`<li key=${name}>
+            <b>${name}</b> ${text}</li>`)}
+            ${outside.length > 4 && html`<li>and ${outside.length - 4} more</li>`}
+          </ul></div></div>`}
+    ${world.checkpoint && html`<p class="provenance">Decided in
+      ${` ${format.number(world.elapsed_ms, 2)} ms by checkpoint `}
+      <code title=${world.checkpoint}>${format.short(world.checkpoint)}</code></p>`}
+  </section>`;
+}
+
+/** "people[0].q.elbow_r" = 2.7 -> "person’s elbow r 155°, trained 0° to 149°". */
+export function outsideText({ field, value, low, high }) {
+  const show = inUnits(field);
+  return [fieldName(field), `${show(value)}, trained ${show(low)} to ${show(high)}`];
+}
+
+function inUnits(field) {
+  const speed = /\bqd\b/.test(field) ? "/s" : "";
+  if (/time_left/.test(field)) return (v) => `${format.number(v)} s`;
+  if (/pelvis_[xy]|position|tcp/.test(field)) return (v) => `${format.number(v)} m${speed}`;
+  return (v) => `${format.number(Math.round((v * 180) / Math.PI))}°${speed}`;
+}
+
+function fieldName(field) {
+  return String(field)
+    .replace(/^people\[\d+\]\.q(d?)[.[]?/, (_, d) => (d ? "person’s speed of " : "person’s "))
+    .replace(/^robot\.q(d?)[.[]?/, (_, d) => (d ? "robot’s speed of joint " : "robot’s joint "))
+    .replace(/[\]]/g, "")
+    .replaceAll("_", " ");
+}

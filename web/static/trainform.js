@@ -1,0 +1,182 @@
+// The form that starts a training job; every field comes from GET /v1/presets.
+import { html, useEffect, useRef, useState } from "./vendor/htm-preact-standalone.module.js";
+import { get, post } from "./api.js";
+import { Icon } from "./icons.js";
+
+const FIRST_FIELDS = 4;
+
+export function usePresets(link) {
+  const [state, setState] = useState({ presets: null, error: null });
+  useEffect(() => {
+    if (link !== "live" || state.presets) return;
+    get("/v1/presets").then(
+      (answer) => setState({ presets: answer.items, error: null }),
+      (error) => setState({ presets: null, error }));
+  }, [link]);
+  return state;
+}
+
+export function TrainForm({ presets, error, onStarted, onClose }) {
+  const [name, setName] = useState(null);
+  const [texts, setTexts] = useState({});
+  const [seed, setSeed] = useState("1");
+  const [problem, setProblem] = useState(null);
+  const [busy, setBusy] = useState(false);
+  const form = useRef(null);
+  const first = useRef(null);
+  useEffect(() => first.current?.focus(), [presets !== null]);
+  const preset = presets?.find((p) => p.name === name) ?? presets?.[0] ?? null;
+
+  const submit = async (event) => {
+    event.preventDefault();
+    setBusy(true);
+    setProblem(null);
+    try {
+      const job = await post("/v1/jobs", {
+        kind: "train",
+        preset: preset.name,
+        seed: parsed(seed),
+        overrides: overrides(preset, texts),
+      }, { "Idempotency-Key": key() });
+      onStarted(job);
+    } catch (refused) {
+      setProblem(refused);
+      requestAnimationFrame(() => form.current?.querySelector("[aria-invalid=true]")?.focus());
+    }
+    setBusy(false);
+  };
+
+  if (error) {
+    return html`<p class="notice bad" role="alert"><${Icon} name="alert" />
+      The presets could not be loaded: ${error.message}</p>`;
+  }
+  if (!preset) return html`<div class="skeleton tall" aria-busy="true"></div>`;
+  const faults = faultsByField(problem, preset);
+  const fields = preset.fields ?? [];
+  const inRest = fields.slice(FIRST_FIELDS).some((f) => faults[f.name] || changed(f, texts));
+  const row = (f) => html`<${Field} key=${f.name} field=${f} text=${texts[f.name]}
+    fault=${faults[f.name]}
+    onText=${(text) => setTexts((now) => ({ ...now, [f.name]: text }))} />`;
+  return html`<form class="train" ref=${form} onSubmit=${submit} noValidate
+    aria-label="New training job">
+    <div class="train-head"><h3>New training job</h3>
+      <button type="button" class="quiet-button" aria-label="Close the form" onClick=${onClose}>
+        <${Icon} name="close" /></button></div>
+    ${faults[""] && html`<p class="notice bad" role="alert"><${Icon} name="alert" />
+      <span>${faults[""]}</span></p>`}
+    <div class="field">
+      <label for="train-preset">Preset</label>
+      <select id="train-preset" ref=${first} value=${preset.name} aria-describedby="preset-help"
+        aria-invalid=${String(Boolean(faults.preset))}
+        onChange=${(e) => { setName(e.target.value); setTexts({}); }}>
+        ${presets.map((p) => html`<option key=${p.name} value=${p.name}>${p.name}</option>`)}
+      </select>
+      <p class="field-help" id="preset-help">${preset.title ?? preset.help ?? preset.description}</p>
+      ${faults.preset && html`<p class="field-error" role="alert">${faults.preset}</p>`}
+    </div>
+    <${Field} field=${{ name: "seed", default: 1, help: "Same seed, same job: the same curve." }}
+      text=${seed} fault=${faults.seed} onText=${setSeed} />
+    ${fields.slice(0, FIRST_FIELDS).map(row)}
+    ${fields.length > FIRST_FIELDS && html`<details class="more" open=${inRest || undefined}>
+      <summary><${Icon} name="chevron" />${fields.length - FIRST_FIELDS} more settings</summary>
+      ${fields.slice(FIRST_FIELDS).map(row)}
+    </details>`}
+    <div class="train-foot">
+      <button type="submit" class="primary" disabled=${busy}>
+        ${busy ? "Starting …" : "Start training"}</button>
+      <span class="faint">Runs in its own process, beside the cell.</span>
+    </div>
+  </form>`;
+}
+
+function Field({ field, text, fault, onText }) {
+  const id = `train-${field.name}`;
+  const own = text !== undefined && changed(field, { [field.name]: text });
+  const described = [fault && `${id}-error`, `${id}-help`].filter(Boolean).join(" ");
+  return html`<div class=${`field ${own ? "is-changed" : ""}`}>
+    <label for=${id}>${label(field.name)}${field.unit && html`<span class="unit"> [${field.unit}]</span>`}</label>
+    ${isChoice(field)
+      ? html`<select id=${id} name=${field.name} value=${text ?? String(field.default)}
+          onChange=${(e) => onText(e.target.value)}>
+          ${choices(field).map((c) => html`<option key=${c} value=${c}>${c}</option>`)}</select>`
+      : html`<input id=${id} name=${field.name} type="text" inputmode="decimal" spellcheck="false"
+          autocomplete="off" value=${text ?? show(field.default)} aria-describedby=${described}
+          aria-invalid=${String(Boolean(fault))} onInput=${(e) => onText(e.target.value)} />`}
+    ${fault && html`<p class="field-error" id=${`${id}-error`} role="alert">${fault}</p>`}
+    <p class="field-help" id=${`${id}-help`}>${[field.help, rangeText(field)]
+      .filter(Boolean).join(" ")}</p>
+  </div>`;
+}
+
+function rangeText({ minimum, maximum }) {
+  const [low, high] = [minimum, maximum].map((v) => (Number.isFinite(v) ? show(v) : null));
+  if (low !== null && high !== null) return `${low} to ${high}.`;
+  if (low !== null) return `At least ${low}.`;
+  return high !== null ? `At most ${high}.` : "";
+}
+
+function isChoice(field) {
+  return field.type === "bool" || Array.isArray(field.choices);
+}
+
+function choices(field) {
+  return field.type === "bool" ? ["true", "false"] : field.choices.map(String);
+}
+
+function label(name) {
+  const text = name.replaceAll("_", " ").replaceAll(".", ": ");
+  return text[0].toUpperCase() + text.slice(1);
+}
+
+function show(v) {
+  return typeof v === "string" ? v : JSON.stringify(v);
+}
+
+/** Text as the JSON it stands for; what is no JSON goes as text, and the service says so. */
+function parsed(text) {
+  const plain = String(text).trim().replaceAll("_", "").replace(/(?<=\d)[\s\u202f](?=\d)/g, "");
+  try {
+    return JSON.parse(plain);
+  } catch {
+    return Number.isFinite(Number(plain)) && plain !== "" ? Number(plain) : String(text);
+  }
+}
+
+function changed(field, texts) {
+  const text = texts[field.name];
+  return text !== undefined && JSON.stringify(parsed(text)) !== JSON.stringify(field.default);
+}
+
+function overrides(preset, texts) {
+  const own = (preset.fields ?? []).filter((f) => changed(f, texts));
+  return Object.fromEntries(own.map((f) => [f.name, parsed(texts[f.name])]));
+}
+
+/** Where each fault of a problem belongs: by field name, "" for the form as a whole. */
+function faultsByField(problem, preset) {
+  if (!problem) return {};
+  const listed = problem.errors?.length ? problem.errors
+    : problem.field ? [problem] : [];
+  const names = new Set(["seed", "preset", ...(preset.fields ?? []).map((f) => f.name)]);
+  const faults = {};
+  for (const one of listed) {
+    const path = String(one.field ?? "");
+    const name = [path.replace(/^overrides\./, ""), path.split(".").at(-1)]
+      .find((n) => names.has(n)) ?? "";
+    const choice = one.choices?.length ? ` Choices: ${one.choices.join(", ")}.` : "";
+    faults[name] = name
+      ? `${capital(one.rule ?? problem.message)}.${choice}`.replace(/\.\.(?= |$)/, ".")
+      : problem.message;
+  }
+  if (listed.length === 0) faults[""] = problem.message;
+  return faults;
+}
+
+function capital(text) {
+  return String(text)[0].toUpperCase() + String(text).slice(1);
+}
+
+function key() {
+  return crypto.randomUUID?.() ?? `${Date.now()}-${Math.random()}`;
+}
+

@@ -1,0 +1,108 @@
+// What the critic expects from each candidate: bars, explained on hover, and a running plot.
+import { html, useMemo, useState } from "./vendor/htm-preact-standalone.module.js";
+import * as format from "./format.js";
+import { SPAN_S } from "./history.js";
+import { ValuePlot } from "./plots.js";
+import { outsideText } from "./story.js";
+
+export function Values({ world, cell, history, colourOf, labelOf }) {
+  const [at, setAt] = useState(null);
+  const order = (cell?.stations ?? []).map((s) => s.id);
+  const stamp = history.samples.at(-1)?.t ?? 0;
+  const ids = useMemo(() => history.ids(order), [stamp, order.length]);
+  const rows = [...world.candidates].sort((a, b) => order.indexOf(a.id) - order.indexOf(b.id));
+  const chosen = rows.find((c) => c.id === world.chosen);
+  const scale = useMemo(() => bounds(history, rows), [stamp]);
+  const past = history.samples[at] ?? null;
+  return html`<section class="card" aria-labelledby="values-title">
+    <header class="card-head">
+      <h2 id="values-title">What each goal is worth now</h2>
+      <span class="hint" tabindex="0" aria-describedby="values-help">critic’s value
+        <span class="tip tip-left" role="tooltip" id="values-help">The trained critic estimates, for
+          each candidate, the discounted reward the robot can expect if it goes there now: reaching
+          counts, delay and contact cost. The highest one is chosen; a small bonus for the current
+          choice keeps it from wavering.</span>
+      </span>
+    </header>
+    ${rows.length === 0
+      ? html`<p class="empty">No candidates. Pick at least one under the scene.</p>`
+      : html`<ul class="bars">
+          ${rows.map((c) => html`<${Bar} key=${c.id} candidate=${c} chosen=${chosen}
+            isChosen=${c.id === world.chosen} colour=${colourOf(c.id)} label=${labelOf(c.id)}
+            scale=${scale} />`)}
+        </ul>`}
+    <div class="plot-head">
+      <span>last ${SPAN_S} s</span>
+      <span class="readout" aria-hidden="true">${past
+        ? html`<${Readout} past=${past} age=${history.age(at)} labelOf=${labelOf} />`
+        : html`<span class="faint"><i class="switch-mark"></i>change of mind</span>`}</span>
+    </div>
+    <${ValuePlot} history=${history} ids=${ids} labelOf=${labelOf}
+      chosen=${world.chosen} onHover=${setAt} />
+  </section>`;
+}
+
+/** Under the cursor: when, what was chosen, and the best of the others. */
+function Readout({ past, age, labelOf }) {
+  const others = [...past.values].filter(([id, v]) => id !== past.chosen && Number.isFinite(v));
+  const [next] = others.sort((a, b) => b[1] - a[1]);
+  const chosen = past.values.get(past.chosen);
+  return html`<span class="faint">${format.number(age, 2)} s</span>
+    ${past.chosen && html`<span class="strong">${labelOf(past.chosen)} ${format.value(chosen)}</span>`}
+    ${next && html`<span>${labelOf(next[0])} ${format.value(next[1])}</span>`}`;
+}
+
+function Bar({ candidate, chosen, isChosen, colour, label, scale }) {
+  const { id, value, reachable } = candidate;
+  const outside = candidate.outside ?? [];
+  const known = Number.isFinite(value);
+  const zero = scale.at(0);
+  const end = known ? scale.at(value) : zero;
+  const bar = { left: `${Math.min(zero, end)}%`, width: `${Math.abs(end - zero)}%`,
+    background: colour };
+  const classes = ["bar", isChosen && "is-chosen", reachable === false && "is-unreachable"];
+  return html`<li class=${classes.filter(Boolean).join(" ")} tabindex="0" data-candidate=${id}
+    data-chosen=${isChosen ? "true" : "false"} aria-describedby=${`tip-${id}`}>
+    <span class="bar-name"><i class="swatch" style=${{ background: colour }}></i>${label}</span>
+    <span class="bar-track">
+      <i class="bar-zero" style=${{ left: `${zero}%` }}></i>
+      <i class="bar-fill" style=${bar}></i>
+    </span>
+    <span class="bar-value">${format.value(value)}</span>
+    <span class="bar-note">${note(isChosen, reachable, outside)}</span>
+    <span class="tip" role="tooltip" id=${`tip-${id}`}>${explain(candidate, chosen, label)}</span>
+  </li>`;
+}
+
+function note(isChosen, reachable, outside) {
+  if (isChosen) return html`<b class="tag tag-chosen">chosen</b>`;
+  if (reachable === false) return html`<b class="tag tag-warn">out of reach</b>`;
+  if (outside.length) return html`<b class="tag tag-warn">untrained</b>`;
+  return "";
+}
+
+function explain({ id, value, reachable, outside = [] }, chosen, label) {
+  const parts = [];
+  if (Number.isFinite(value)) {
+    parts.push(`Expected discounted reward if the robot goes for ${label} now: ` +
+      `${format.value(value)}.`);
+    if (chosen && chosen.id !== id && Number.isFinite(chosen.value)) {
+      const gap = value - chosen.value;
+      parts.push(gap < 0
+        ? `${format.value(-gap)} less than the chosen one.`
+        : `${format.value(gap)} more than the chosen one: not enough to change course yet.`);
+    } else if (chosen?.id === id) parts.push("The robot is going there.");
+  } else parts.push(`No value for ${label} yet.`);
+  if (reachable === false) parts.push("No posture with the tool pointing down reaches it.");
+  for (const o of outside) parts.push(`Outside training: ${outsideText(o).join(" ")}.`);
+  return parts.join(" ");
+}
+
+/** A steady scale for the bars: all that the plot shows, and zero. */
+function bounds(history, rows) {
+  const seen = history.samples.flatMap((s) => [...s.values.values()]);
+  const all = [...seen, ...rows.map((r) => r.value)].filter((v) => Number.isFinite(v));
+  const low = Math.min(0, Math.floor(Math.min(0, ...all) * 2) / 2);
+  const high = Math.max(low + 1, Math.ceil(Math.max(0, ...all) * 2) / 2);
+  return { at: (v) => (100 * (Math.min(high, Math.max(low, v)) - low)) / (high - low) };
+}
