@@ -6,6 +6,9 @@ import pytest
 from app.errors import InvalidInput, SimulationError
 from app.sim import human, pick
 from app.sim.cells import Cell, load_cell
+from app.sim.kernels import arm as arm_kernel
+from app.sim.kernels import features
+from app.sim.kernels import pick as kernel
 from app.sim.kernels.features import LAYOUT
 from app.sim.pick import OUTCOMES, PickBatch, PickSettings
 from app.sim.recheck import Recheck, Trajectory
@@ -174,3 +177,24 @@ def test_hands_are_fast_enough_to_be_a_problem(cell: Cell) -> None:
     speeds = pick.hand_speeds(PickBatch(cell, 1, 11, TEN_SECONDS), n_scripts=60)
     assert speeds["hand_speed_median_m_s"] >= 0.4
     assert speeds["hand_speed_p99_m_s"] >= 1.5
+
+
+def test_read_only_integer_and_strided_inputs_compile_nothing_anew(cell: Cell) -> None:
+    arm, person = pick.arm_of(cell), human.rest_posture(*cell.human.home)
+    q, zero, goals = arm.home.copy(), np.zeros(6), cell.positions()
+
+    def use() -> None:
+        pick.step_robot(arm, q, zero, zero[:5])
+        pick.contact(arm, q, zero, zero, person, person)
+        pick.observe(arm, q, zero, person, np.zeros(18), goals[::2], 10)
+        pick.tool_state(arm, q, zero, goals[0])
+        human.capsules(person, cell.pelvis_z, cell.floor_z)
+
+    use()
+    kernels = (features.observe_batch, arm_kernel.sweep, kernel.drive, kernel.tool_state)
+    before = [len(compiled.signatures) for compiled in kernels]
+    zero, goals = np.zeros(6, dtype=np.int64), goals[:, :]
+    for array in (q, person, goals):
+        array.setflags(write=False)
+    use()
+    assert [len(compiled.signatures) for compiled in kernels] == before
