@@ -358,9 +358,8 @@ def contact(arm: Arm, q0: Vec, qd0: Vec, c: Vec, human_q0: Vec, human_q1: Vec) -
 def tool_state(arm: Arm, q: Vec, qd: Vec, goal: Vec) -> tuple[float, float, float, bool]:
     """Return distance to a target [m], tilt [rad], tcp speed [m/s] and whether it succeeds."""
     pose = arm_kernel.new_pose(len(arm.link))
-    own_q = _own(q)
-    arm_kernel.place_robot(arm, own_q, pose)
-    distance, tilt, speed = pick.tool_state(arm, own_q, _own(qd), _own(goal), pose)
+    arm_kernel.place_robot(arm, _own(q), pose)
+    distance, tilt, speed = pick.tool_state(arm, _own(qd), _own(goal), pose)
     return distance, tilt, speed, bool(pick.succeeded(distance, tilt, speed))
 
 
