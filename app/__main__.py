@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from app.errors import InvalidInput, NotFound, ServiceError
 from app.settings import Settings, check_access, load_settings
+from app.sim.kernel_cache import kernel_cache
 
 if TYPE_CHECKING:
     from app.policies.checkpoint import Checkpoint
@@ -248,8 +249,7 @@ def run_cells(options: argparse.Namespace) -> int:
 
 def prepare_kernels(settings: Settings) -> None:
     """Keep compiled kernels in the data folder, so that a read-only source tree works."""
-    cache = settings.data.resolve() / "kernels"
-    os.environ.setdefault("NUMBA_CACHE_DIR", str(cache))
+    os.environ.setdefault("NUMBA_CACHE_DIR", str(kernel_cache(settings.data)))
 
 
 def find_checkpoint(reference: str, settings: Settings) -> "Checkpoint":
