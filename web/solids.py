@@ -20,7 +20,7 @@ def material(
         roughness: 0 for a mirror, 1 for chalk.
     """
     linear = [round(255.0 * (channel / 255.0) ** 2.2) for channel in color]
-    return PBRMaterial(
+    return PBRMaterial(  # type: ignore[no-untyped-call]
         baseColorFactor=(*linear, 255),
         metallicFactor=metallic,
         roughnessFactor=roughness,
@@ -39,23 +39,16 @@ def _flat(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
 
 
 def block(size: Sequence[float], center: Sequence[float], bevel: float) -> trimesh.Trimesh:
-    """Return a box with chamfered edges.
-
-    Args:
-        size: Edge lengths [m], shape (3,).
-        center: Centre [m], shape (3,).
-        bevel: Width of the chamfer [m].
-    """
-    half = 0.5 * np.asarray(size, dtype=np.float64)
-    corners = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1).T
-    points = [corners * (half - bevel * (1.0 - np.eye(3)[axis])) for axis in range(3)]
-    hull = trimesh.convex.convex_hull(np.vstack(points))
-    hull.apply_translation(center)
-    return _flat(hull)
+    """Return a box with soft edges; sizes and centre in [m], shape (3,)."""
+    return slab(size, center, 1.5 * bevel, bevel, sections=16)
 
 
 def slab(
-    size: Sequence[float], center: Sequence[float], radius: float, bevel: float
+    size: Sequence[float],
+    center: Sequence[float],
+    radius: float,
+    bevel: float,
+    sections: int = 64,
 ) -> trimesh.Trimesh:
     """Return a plate with rounded corners and chamfered edges.
 
@@ -64,9 +57,9 @@ def slab(
         center: Centre [m], shape (3,).
         radius: Radius of the four vertical edges [m].
         bevel: Width of the chamfer at top and bottom [m].
+        sections: Points around the outline, a multiple of four.
     """
-    half = 0.5 * np.asarray(size, dtype=np.float64)
-    count = 64
+    half, count = 0.5 * np.asarray(size, dtype=np.float64), sections
     angles = 2.0 * np.pi * (np.arange(count) + 0.5) / count
     outline = np.column_stack([np.cos(angles), np.sin(angles)])
     middle = np.sign(outline) * (half[:2] - radius)
@@ -99,18 +92,20 @@ def slab(
 
 def rod(start: Sequence[float], end: Sequence[float], radius: float) -> trimesh.Trimesh:
     """Return a smooth cylinder between two points [m]."""
-    return trimesh.creation.cylinder(
+    mesh = trimesh.creation.cylinder(
         radius=radius, segment=np.array([start, end], dtype=np.float64), sections=40
     )
+    assert isinstance(mesh, trimesh.Trimesh)
+    return mesh
 
 
 def painted(pieces: Sequence[tuple[trimesh.Trimesh, PBRMaterial]]) -> bytes:
     """Return meshes with their materials as one binary glTF."""
     scene = trimesh.Scene()
     for mesh, paint in pieces:
-        mesh.visual = trimesh.visual.TextureVisuals(material=paint)
+        mesh.visual = trimesh.visual.TextureVisuals(material=paint)  # type: ignore[no-untyped-call]
         scene.add_geometry(mesh)
-    data = scene.export(file_type="glb", include_normals=True)
+    data = scene.export(file_type="glb", include_normals=True)  # type: ignore[no-untyped-call]
     assert isinstance(data, bytes)
     return data
 

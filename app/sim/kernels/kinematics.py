@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from app.sim.ports import Vec
 
@@ -156,13 +157,13 @@ def ik_vertical(target: Vec, tool_length: float, q_min: Vec, q_max: Vec, out: Ve
         if out[j] < q_min[j] or out[j] > q_max[j]:
             reached = False
             out[j] = min(q_max[j], max(q_min[j], out[j]))
-    return reached
+    return bool(reached)
 
 
 @njit(cache=True)
 def ik_vertical_batch(
     targets: Vec, tool_length: float, q_min: Vec, q_max: Vec
-) -> tuple[Vec, Vec]:
+) -> tuple[Vec, NDArray[np.bool_]]:
     """Apply :func:`ik_vertical` to targets of shape (n, 3).
 
     Returns:
