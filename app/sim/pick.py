@@ -281,10 +281,10 @@ def observe(
     obs = np.empty((n, N_FEATURES), dtype=np.float32)
     features.observe_batch(
         arm,
-        np.broadcast_to(q, (n, 6)),
-        np.broadcast_to(qd, (n, 6)),
-        np.broadcast_to(human_q, (n, 18)),
-        np.broadcast_to(human_qd, (n, 18)),
+        np.tile(q, (n, 1)),
+        np.tile(qd, (n, 1)),
+        np.tile(human_q, (n, 1)),
+        np.tile(human_qd, (n, 1)),
         goals,
         q_goals,
         np.full(n, time_left_s),
