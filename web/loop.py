@@ -100,6 +100,7 @@ class LiveCell:
         id: str = "main",
     ) -> None:
         self._cell, self._host, self._port = cell, host, port
+        World(cell, policy, seed).step()  # compiles what is not in the kernels' cache yet
         self._world = World(cell, policy, seed, id)
         self.handle = LiveHandle(id, cell, self._world.snapshot())
         """Commands in, snapshots out."""

@@ -292,10 +292,10 @@ def observe(
     obs = np.empty((n, N_FEATURES), dtype=np.float32)
     features.observe_batch(
         arm,
-        _own(np.broadcast_to(q, (n, 6))),
-        _own(np.broadcast_to(qd, (n, 6))),
-        _own(np.broadcast_to(human_q, (n, 18))),
-        _own(np.broadcast_to(human_qd, (n, 18))),
+        np.tile(_own(q), (n, 1)),
+        np.tile(_own(qd), (n, 1)),
+        np.tile(_own(human_q), (n, 1)),
+        np.tile(_own(human_qd), (n, 1)),
         targets,
         q_goals,
         np.full(n, time_left_s, dtype=np.float64),
