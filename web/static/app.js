@@ -5,7 +5,7 @@ import { Controls } from "./controls.js";
 import { Icon, Logo } from "./icons.js";
 import { isActive, useJobs } from "./jobs.js";
 import { useCell, WORLD } from "./live.js";
-import { stationColours } from "./palette.js";
+import { goalColours } from "./palette.js";
 import { SignIn } from "./signin.js";
 import { SmallPrint, Story } from "./story.js";
 import { Training } from "./training.js";
@@ -102,17 +102,18 @@ function Tabs({ tab, onTab, active }) {
   </div>`;
 }
 
-function useStations(cell) {
-  const stations = cell.cell?.stations ?? [];
-  return useMemo(() => {
-    const labels = new Map(stations.map((s) => [s.id, s.label ?? s.id]));
-    return { colourOf: stationColours(stations), labelOf: (id) => labels.get(id) ?? id };
-  }, [cell.cell]);
+function useGoals({ cell, world }) {
+  const stations = cell?.stations ?? [];
+  const labels = useMemo(() => new Map(stations.map((s) => [s.id, s.label])), [cell]);
+  return {
+    colourOf: goalColours(world?.candidates ?? []),
+    labelOf: (id) => labels.get(id) ?? id,
+  };
 }
 
 function Scene({ cell }) {
   const { link, world, epoch, reason } = cell;
-  const names = useStations(cell);
+  const goals = useGoals(cell);
   return html`<section class="hero" aria-label="The cell">
     <div class="viewer">
       ${epoch > 0 && html`<iframe key=${epoch} src=${`/viewer/${WORLD}/`} data-role="viewer"
@@ -124,7 +125,7 @@ function Scene({ cell }) {
       </div>`}
     </div>
     ${world && html`<${Controls} world=${world} cell=${cell.cell}
-      cases=${cell.cell?.cases ?? []} send=${cell.send} ...${names} />`}
+      cases=${cell.cell?.cases ?? []} send=${cell.send} ...${goals} />`}
   </section>`;
 }
 
@@ -137,10 +138,10 @@ function veil(link, reason) {
 }
 
 function Decision({ cell }) {
-  const names = useStations(cell);
+  const goals = useGoals(cell);
   if (!cell.world) return html`<div class="skeleton tall" aria-busy="true"></div>`;
   return html`<${Story} world=${cell.world} />
-    <${Values} world=${cell.world} cell=${cell.cell} history=${cell.history} ...${names} />
+    <${Values} world=${cell.world} cell=${cell.cell} history=${cell.history} ...${goals} />
     <${SmallPrint} world=${cell.world} />`;
 }
 

@@ -57,8 +57,7 @@ function Goals({ world, cell, send, colourOf, labelOf }) {
       const on = active.has(id);
       return html`<button key=${id} type="button" class="goal" aria-pressed=${String(on)}
         data-goal=${id} onClick=${() => send({ tag: "toggle-candidate", id })}>
-        <i class="swatch" style=${on ? { background: colourOf(id) }
-          : { background: "none", boxShadow: `inset 0 0 0 1.5px ${colourOf(id)}` }}></i>
+        <i class="swatch" style=${on ? { background: colourOf(id) } : {}}></i>
         ${labelOf(id)}</button>`;
     })}
   </div>`;

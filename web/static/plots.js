@@ -2,6 +2,7 @@
 import { html, useEffect, useMemo, useRef, useState } from "./vendor/htm-preact-standalone.module.js";
 import * as format from "./format.js";
 import { SPAN_S } from "./history.js";
+import { drawValues } from "./valuelines.js";
 import { themeColours } from "./palette.js";
 
 const FONT = "11px Inter, system-ui, sans-serif";
@@ -56,23 +57,24 @@ function secondsAgo(v) {
 }
 
 /** Values of all candidates over the last seconds; the chosen one is drawn thick. */
-export function ValuePlot({ history, stamp, ids, colourOf, chosen, onHover }) {
+export function ValuePlot({ history, ids, labelOf, chosen, onHover }) {
   const theme = useTheme();
   const live = useRef({});
-  live.current = { history, ids, colourOf, onHover };
-  const key = ids.map((id) => id + colourOf(id)).join("|");
-  const options = useMemo(() => valueOptions(theme, ids, colourOf, live), [key, theme]);
+  live.current = { history, ids, labelOf, onHover };
+  const key = ids.join("|");
+  const stamp = history.samples.at(-1)?.t;
+  const options = useMemo(() => valueOptions(theme, ids, live), [key, theme]);
   const data = useMemo(() => history.columns(ids), [stamp, key]);
   const label = `Critic's value of ${ids.length} candidates over the last ${SPAN_S} seconds; ` +
-    `chosen now: ${chosen ?? "none"}`;
-  return html`<${Plot} options=${options} data=${data} height=${172} label=${label} />`;
+    `chosen now: ${chosen ? labelOf(chosen) : "none"}`;
+  return html`<${Plot} options=${options} data=${data} height=${176} label=${label} />`;
 }
 
-function valueOptions(theme, ids, colourOf, live) {
+function valueOptions(theme, ids, live) {
   return {
     legend: { show: false },
-    padding: [8, 14, 0, 0],
-    cursor: { y: false, drag: { setScale: false, x: false, y: false }, points: { size: 5 } },
+    padding: [8, 58, 0, 0],
+    cursor: { y: false, drag: { setScale: false, x: false, y: false }, points: { show: false } },
     scales: {
       x: { time: false, range: [-SPAN_S, 0] },
       y: { range: (_, low, high) => padded(low, high, 0.6) },
@@ -81,64 +83,12 @@ function valueOptions(theme, ids, colourOf, live) {
       axis(theme, { size: 24, space: 70, values: (_, ticks) => ticks.map(secondsAgo) }),
       axis(theme, { size: 40, space: 32, values: (_, t) => t.map((v) => format.number(v)) }),
     ],
-    series: [
-      {},
-      ...ids.map((id) => ({ label: id, stroke: colourOf(id), width: 1.25, points: { show: false } })),
-    ],
+    series: [{}, ...ids.map((id) => ({ label: id, paths: () => null, points: { show: false } }))],
     hooks: {
-      draw: [(plot) => drawChosen(plot, live.current, theme)],
+      draw: [(plot) => drawValues(plot, live.current, theme)],
       setCursor: [(plot) => live.current.onHover?.(plot.cursor.idx)],
     },
   };
-}
-
-/** Over the thin lines: a thick one along what was chosen, and a mark at each switch. */
-function drawChosen(plot, { history, ids, colourOf }, theme) {
-  const { ctx } = plot;
-  const chosen = history.chosen();
-  const [x, ...columns] = plot.data;
-  const dpr = devicePixelRatio;
-  ctx.save();
-  ctx.beginPath();
-  ctx.rect(plot.bbox.left, plot.bbox.top, plot.bbox.width, plot.bbox.height);
-  ctx.clip();
-  ctx.lineJoin = "round";
-  for (let i = 1; i < x.length && i < chosen.length; i++) {
-    const column = columns[ids.indexOf(chosen[i])];
-    if (!column || column[i] === null) continue;
-    const x1 = plot.valToPos(x[i], "x", true);
-    const y1 = plot.valToPos(column[i], "y", true);
-    if (chosen[i - 1] && chosen[i - 1] !== chosen[i]) {
-      markSwitch(ctx, plot, x1, y1, colourOf(chosen[i]), theme, dpr);
-    } else if (chosen[i - 1] && column[i - 1] !== null) {
-      ctx.strokeStyle = colourOf(chosen[i]);
-      ctx.lineWidth = 3 * dpr;
-      ctx.setLineDash([]);
-      ctx.beginPath();
-      ctx.moveTo(plot.valToPos(x[i - 1], "x", true), plot.valToPos(column[i - 1], "y", true));
-      ctx.lineTo(x1, y1);
-      ctx.stroke();
-    }
-  }
-  ctx.restore();
-}
-
-function markSwitch(ctx, plot, x, y, colour, theme, dpr) {
-  ctx.strokeStyle = theme.faint;
-  ctx.lineWidth = dpr;
-  ctx.setLineDash([2 * dpr, 3 * dpr]);
-  ctx.beginPath();
-  ctx.moveTo(x, plot.bbox.top);
-  ctx.lineTo(x, plot.bbox.top + plot.bbox.height);
-  ctx.stroke();
-  ctx.setLineDash([]);
-  ctx.fillStyle = colour;
-  ctx.strokeStyle = theme.panel;
-  ctx.lineWidth = 2 * dpr;
-  ctx.beginPath();
-  ctx.arc(x, y, 4.5 * dpr, 0, 7);
-  ctx.fill();
-  ctx.stroke();
 }
 
 function padded(low, high, least) {

@@ -33,18 +33,23 @@ export function Values({ world, cell, history, colourOf, labelOf }) {
         </ul>`}
     <div class="plot-head">
       <span>last ${SPAN_S} s</span>
-      <span class="readout" aria-hidden="true">
-        ${past
-          ? html`<span class="faint">${format.number(history.age(at), 2)} s</span>
-              ${ids.filter((id) => Number.isFinite(past.values.get(id))).map((id) => html`<span
-                key=${id} class=${id === past.chosen ? "strong" : ""}>
-                <i class="swatch small" style=${{ background: colourOf(id) }}></i>${" "}${format.value(past.values.get(id))}</span>`)}`
-          : html`<span class="faint"><i class="switch-mark"></i>switch of choice</span>`}
-      </span>
+      <span class="readout" aria-hidden="true">${past
+        ? html`<${Readout} past=${past} age=${history.age(at)} labelOf=${labelOf} />`
+        : html`<span class="faint"><i class="switch-mark"></i>change of mind</span>`}</span>
     </div>
-    <${ValuePlot} history=${history} stamp=${stamp} ids=${ids} colourOf=${colourOf}
+    <${ValuePlot} history=${history} ids=${ids} labelOf=${labelOf}
       chosen=${world.chosen} onHover=${setAt} />
   </section>`;
+}
+
+/** Under the cursor: when, what was chosen, and the best of the others. */
+function Readout({ past, age, labelOf }) {
+  const others = [...past.values].filter(([id, v]) => id !== past.chosen && Number.isFinite(v));
+  const [next] = others.sort((a, b) => b[1] - a[1]);
+  const chosen = past.values.get(past.chosen);
+  return html`<span class="faint">${format.number(age, 2)} s</span>
+    ${past.chosen && html`<span class="strong">${labelOf(past.chosen)} ${format.value(chosen)}</span>`}
+    ${next && html`<span>${labelOf(next[0])} ${format.value(next[1])}</span>`}`;
 }
 
 function Bar({ candidate, chosen, isChosen, colour, label, scale }) {

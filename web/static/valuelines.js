@@ -1,0 +1,119 @@
+// The lines of the running plot, drawn piece by piece: colour is the shortfall to the best at
+// that moment, as in the scene; thickness says chosen; a dashed rule marks a change of mind.
+import { bestOf, colourByValue } from "./palette.js";
+
+const FONT = "px Inter, system-ui, sans-serif";
+const LABEL_GAP = 13;
+const THIN = 1.6;
+const THICK = 3.4;
+
+/** Draw hook of uPlot. */
+export function drawValues(plot, { history, ids, labelOf }, theme) {
+  const { ctx, bbox } = plot;
+  const dpr = devicePixelRatio;
+  const chosen = history.chosen();
+  const [x, ...columns] = plot.data;
+  if (x.length !== chosen.length) return;
+  const at = (i, column) => [plot.valToPos(x[i], "x", true), plot.valToPos(column[i], "y", true)];
+  const best = x.map((_, i) => bestOf(columns.map((column) => column[i])));
+  ctx.save();
+  ctx.save();
+  ctx.beginPath();
+  ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+  ctx.clip();
+  markSwitches(ctx, bbox, chosen, (i) => plot.valToPos(x[i], "x", true), theme, dpr);
+  ctx.lineJoin = ctx.lineCap = "round";
+  for (const isThick of [false, true]) {
+    ctx.lineWidth = (isThick ? THICK : THIN) * dpr;
+    columns.forEach((column, k) => {
+      const wanted = (i) => (chosen[i] === ids[k]) === isThick;
+      drawPieces(ctx, column, at, (i) => colourByValue(column[i], best[i]), wanted);
+    });
+  }
+  markChoices(ctx, chosen, (i) => at(i, columns[ids.indexOf(chosen[i])]), theme, dpr);
+  ctx.restore();
+  label(ctx, plot, ids, columns, chosen.at(-1), labelOf, theme, dpr);
+  ctx.restore();
+}
+
+/** Stroke the pieces that `wanted` accepts, joining neighbours of one colour. */
+function drawPieces(ctx, column, at, colour, wanted) {
+  let pen = null;
+  const flush = () => pen && ctx.stroke();
+  for (let i = 1; i < column.length; i++) {
+    const drawn = wanted(i) && Number.isFinite(column[i]) && Number.isFinite(column[i - 1]);
+    const next = drawn ? colour(i) : null;
+    if (next !== pen) {
+      flush();
+      pen = next;
+      if (pen) {
+        ctx.strokeStyle = pen;
+        ctx.beginPath();
+        ctx.moveTo(...at(i - 1, column));
+      }
+    }
+    if (pen) ctx.lineTo(...at(i, column));
+  }
+  flush();
+}
+
+/** Indices at which another goal was chosen than before. */
+function switches(chosen) {
+  return chosen.flatMap((id, i) => (i && id && chosen[i - 1] && id !== chosen[i - 1] ? [i] : []));
+}
+
+function markSwitches(ctx, bbox, chosen, xAt, theme, dpr) {
+  ctx.strokeStyle = theme.faint;
+  ctx.lineWidth = dpr;
+  ctx.setLineDash([2 * dpr, 3 * dpr]);
+  for (const i of switches(chosen)) {
+    ctx.beginPath();
+    ctx.moveTo(xAt(i), bbox.top);
+    ctx.lineTo(xAt(i), bbox.top + bbox.height);
+    ctx.stroke();
+  }
+  ctx.setLineDash([]);
+}
+
+/** A ring where the new choice begins. */
+function markChoices(ctx, chosen, at, theme, dpr) {
+  ctx.fillStyle = theme.panel;
+  ctx.strokeStyle = theme.ink;
+  ctx.lineWidth = 1.6 * dpr;
+  for (const i of switches(chosen)) {
+    const [x, y] = at(i);
+    if (!Number.isFinite(y)) continue;
+    ctx.beginPath();
+    ctx.arc(x, y, 3.6 * dpr, 0, 7);
+    ctx.fill();
+    ctx.stroke();
+  }
+}
+
+/** Names at the right ends of the lines, pushed apart where they would overlap. */
+function label(ctx, plot, ids, columns, chosen, labelOf, theme, dpr) {
+  const { bbox } = plot;
+  const ends = ids
+    .map((id, k) => ({ id, value: columns[k].at(-1) }))
+    .filter((end) => Number.isFinite(end.value))
+    .map((end) => ({ ...end, y: plot.valToPos(end.value, "y", true) }))
+    .sort((a, b) => a.y - b.y);
+  const gap = LABEL_GAP * dpr;
+  ends.forEach((end, i) => {
+    if (i) end.y = Math.max(end.y, ends[i - 1].y + gap);
+  });
+  const over = (ends.at(-1)?.y ?? 0) - (bbox.top + bbox.height);
+  if (over > 0) {
+    for (let i = ends.length - 1, floor = bbox.top + bbox.height; i >= 0; i--) {
+      ends[i].y = Math.min(ends[i].y, floor);
+      floor = ends[i].y - gap;
+    }
+  }
+  ctx.textAlign = "left";
+  ctx.textBaseline = "middle";
+  for (const end of ends) {
+    ctx.font = `${end.id === chosen ? 650 : 450} ${11 * dpr}${FONT}`;
+    ctx.fillStyle = end.id === chosen ? theme.ink : theme.soft;
+    ctx.fillText(labelOf(end.id), bbox.left + bbox.width + 8 * dpr, end.y);
+  }
+}
