@@ -102,11 +102,12 @@ def parser() -> argparse.ArgumentParser:
 
 def run_serve(options: argparse.Namespace) -> int:
     """Start the service; the port is taken before anything else."""
-    from app.listening import listen
+    from app.listening import check_alone, listen
 
     settings = load_settings(host=options.host, port=options.port, data=options.data)
     check_access(settings)
     sock = listen(settings.host, settings.port)
+    check_alone(settings)
     prepare_kernels(settings)
     import torch
 
@@ -136,7 +137,7 @@ def run_setup(_options: argparse.Namespace) -> int:
         lock.release()
     print(f"database: {store.shown_url}", flush=True)
     store.close()
-    print("compiling the simulator's kernels (half a minute, once) ...", flush=True)
+    print("compiling the simulator's kernels (a minute or two, once) ...", flush=True)
     from app.warm_up import warm_up
 
     print(f"kernels are ready ({warm_up():.1f} s)", flush=True)
