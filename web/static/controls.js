@@ -31,7 +31,7 @@ export function Controls({ world, cell, cases, send, colourOf, labelOf }) {
           onClick=${() => send({ tag: "reset" })}><${Icon} name="reset" /><span>Reset</span></button>
       </div>
       ${world.mode === "manual" &&
-      html`<p class="dock-hint">Drag the handles at the hips and hands in the scene.</p>`}
+      html`<p class="dock-hint">Drag the handles in the scene.</p>`}
     </div>
     <div class="dock-row">
       <span class="dock-label" id="goals-label">Goals</span>
