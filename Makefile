@@ -45,13 +45,10 @@ export PYTHONUNBUFFERED = 1
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*## ' Makefile | sed -E 's/:.*## /\t/' | expand -t 16
 
-run: $(VENV)/runtime.stamp ## set up what is missing, start the server, print its address
-	$(SAY) "database and compiled kernels"
-	@$(PY) -m app setup
+run: $(VENV)/setup.stamp ## set up what is missing, start the server, print its address
 	@$(PY) -m app serve
 
-setup: $(VENV)/runtime.stamp ## set up without starting
-	@$(PY) -m app setup
+setup: $(VENV)/setup.stamp ## set up without starting
 
 test: $(VENV)/dev.stamp ## the default tests: no network, no browser, no long training
 	@$(PY) -m pytest
@@ -111,4 +108,10 @@ $(VENV)/dev.stamp: $(VENV)/runtime.stamp requirements-dev.lock
 	$(SAY) "what tests and checks need, from requirements-dev.lock"
 	@$(call INSTALL_LOCK,requirements-dev.lock)
 	@$(PIP) check
+	@touch $@
+
+# The server does this too, at every start; done here, it starts in seconds.
+$(VENV)/setup.stamp: $(VENV)/runtime.stamp $(wildcard app/sim/kernels/*.py app/store/migrations/versions/*.py)
+	$(SAY) "database and compiled kernels"
+	@$(PY) -m app setup
 	@touch $@

@@ -38,7 +38,7 @@ class Preset:
     """Work cell trained in."""
 
     total_steps: int = _number(
-        5_120_000, 1_000, 100_000_000, "env steps", "length of the training"
+        3_072_000, 1_000, 100_000_000, "env steps", "length of the training"
     )
     n_envs: int = _number(128, 8, 1024, "", "cells stepped together")
     buffer_size: int = _number(

@@ -10,6 +10,7 @@ primitives; these reaches are synthetic and stand in for it.
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -20,6 +21,10 @@ from app.sim.kernels import random, script
 from app.sim.ports import Vec
 
 HANDS: tuple[Hand, Hand] = ("r", "l")
+REACH_PACE = 0.5
+"""Mean palm speed of a single reach [m/s]."""
+SHORTEST_REACH_S = 0.8
+"""Least duration of a single reach [s]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,6 +43,7 @@ class Library:
     """Number of cubes."""
 
 
+@lru_cache(maxsize=8)
 def build_library(cell: Cell, seed: int, variants: int = 24) -> Library:
     """Make ``variants`` random postures for each place and hand of a cell.
 
@@ -178,26 +184,35 @@ class WorkCycle:
 
 
 def reach_script(
-    cell: Cell, hand: Hand, from_station: str, to_station: str | None, delay_s: float = 0.3
+    cell: Cell,
+    hand: Hand,
+    palms: tuple[Vec, Vec],
+    pelvis_x: tuple[float | None, float | None] = (None, None),
+    delay_s: float = 0.4,
 ) -> Script:
-    """Return the person's script of a case study (METHOD 3.6).
+    """Return a single reach from one point to another, both postures without chance.
 
     Args:
         cell: Work cell.
         hand: The hand that works.
-        from_station: Where the palm is at first.
-        to_station: Where it moves to; None keeps it where it is.
+        palms: Where its palm is at first and at last [m], shape (3,) each; equal to rest.
+        pelvis_x: Where the person stands at first and at last [m]; None follows the palm.
         delay_s: Rest before the move [s].
     """
-    rng = np.random.default_rng(7)
-    places = [from_station, to_station or from_station]
     postures = [
-        _at_station(cell, rng, np.array(cell.station(place).position), hand) for place in places
+        _standing_reach(cell, palm, hand, stand)
+        for palm, stand in zip(palms, pelvis_x, strict=True)
     ]
-    if to_station is None:
-        postures[1] = postures[0]
-    way = float(
-        np.abs(_palms(postures[1], cell.pelvis_z) - _palms(postures[0], cell.pelvis_z)).max()
-    )
-    duration = max(0.8, way / 0.5)
+    way = float(np.linalg.norm(np.subtract(*palms)))
+    duration = max(SHORTEST_REACH_S, way / REACH_PACE)
     return Script(np.array([delay_s]), np.array([duration]), np.array(postures))
+
+
+def _standing_reach(cell: Cell, palm: Vec, hand: Hand, pelvis_x: float | None) -> Vec:
+    sign = -1.0 if hand == "r" else 1.0
+    x = 0.8 * palm[0] - sign * 0.12 if pelvis_x is None else pelvis_x
+    x = float(np.clip(x, cell.human.x_min, cell.human.x_max))
+    start = human.rest_posture(x, cell.human.y_min + 0.03, cell.human.home[2])
+    support = np.array([x + sign * -0.25, cell.table.y_max - 0.03, 0.06])
+    right, left = (palm, support) if hand == "r" else (support, palm)
+    return human.solve_hands(start, cell.pelvis_z, right=right, left=left).q
