@@ -1,16 +1,14 @@
 """The person in the scene: the mannequin, its feet, and the simulator's capsules over it."""
 
 import numpy as np
-import trimesh
 import viser
 
 from app.sim import human
 from app.sim.cells import Cell
 from web import mannequin, skeleton
+from web.capsules_view import CapsulesView
 from web.gait import Gait
 from web.poses import Vec, orientation
-
-OVERLAY = (255, 86, 86)
 
 
 class PersonView:
@@ -26,7 +24,6 @@ class PersonView:
         self._gait = Gait(cell.floor_z)
         self._skins: list[tuple[viser.MeshSkinnedHandle, tuple[str, ...]]] = []
         self._solids: list[tuple[viser.MeshHandle, str]] = []
-        self._capsules: list[viser.MeshHandle] = []
         self._drawn: Vec | None = None
         self._scene.add_frame("/person", show_axes=False)
         bind = skeleton.bind_bones()
@@ -35,7 +32,13 @@ class PersonView:
                 self._add_skin(part, bind)
             else:
                 self._solids.append((self._add_solid(part), part.bone))
-        self._add_capsules()
+        rest = human.rest_posture(0.0, 0.0, 0.0)
+        ends = human.capsules(rest, cell.pelvis_z, cell.floor_z)
+        self._capsules = CapsulesView(server, "/person/shapes")
+        for name, radius, (start, end) in zip(
+            human.CAPSULE_NAMES, human.CAPSULE_RADII, ends, strict=True
+        ):
+            self._capsules.add(name, float(radius), float(np.linalg.norm(end - start)))
 
     def _add_skin(self, part: mannequin.Part, bind: skeleton.Bones) -> None:
         names = tuple(part.weights)
@@ -59,27 +62,6 @@ class PersonView:
             color=part.color,
         )
 
-    def _add_capsules(self) -> None:
-        self._scene.add_frame("/person/capsules", show_axes=False, visible=False)
-        ends = human.capsules(human.rest_posture(0.0, 0.0, 0.0), self._cell.pelvis_z, self._cell.floor_z)
-        for name, radius, (start, end) in zip(
-            human.CAPSULE_NAMES, human.CAPSULE_RADII, ends, strict=True
-        ):
-            length = float(np.linalg.norm(end - start))
-            mesh = trimesh.creation.capsule(height=length, radius=float(radius), count=(20, 12))
-            mesh.apply_translation((0.0, 0.0, -0.5 * length))
-            self._capsules.append(
-                self._scene.add_mesh_simple(
-                    f"/person/capsules/{name}",
-                    np.asarray(mesh.vertices),
-                    np.asarray(mesh.faces),
-                    color=OVERLAY,
-                    opacity=0.3,
-                    cast_shadow=False,
-                    receive_shadow=False,
-                )
-            )
-
     def draw(self, q: Vec, dt: float) -> None:
         """Show the person in a posture.
 
@@ -101,22 +83,8 @@ class PersonView:
         for solid, name in self._solids:
             solid.wxyz = orientation(bones[name][:3, :3])
             solid.position = bones[name][:3, 3]
-        self._draw_capsules(q)
+        self._capsules.place(human.capsules(q, self._cell.pelvis_z, self._cell.floor_z))
 
-    def _draw_capsules(self, q: Vec) -> None:
-        ends = human.capsules(q, self._cell.pelvis_z, self._cell.floor_z)
-        for handle, (start, end) in zip(self._capsules, ends, strict=True):
-            handle.position = 0.5 * (start + end)
-            handle.wxyz = orientation(_turn_onto(end - start))
-
-    def show_capsules(self, visible: bool) -> None:
-        """Show or hide the simulator's capsules."""
-        self._scene.get_handle_by_name("/person/capsules").visible = visible  # type: ignore
-
-
-def _turn_onto(direction: Vec) -> Vec:
-    """Return a rotation whose z axis points along ``direction``, shape (3, 3)."""
-    z = direction / np.linalg.norm(direction)
-    x = np.cross([0.0, 1.0, 0.0] if abs(z[1]) < 0.9 else [1.0, 0.0, 0.0], z)
-    x /= np.linalg.norm(x)
-    return np.column_stack([x, np.cross(z, x), z])
+    def show_capsules(self, visible: bool, touched: str | None) -> None:
+        """Show or hide the simulator's capsules; the one that was touched stays, red."""
+        self._capsules.show(visible, () if touched is None else (touched,))

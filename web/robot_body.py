@@ -28,8 +28,6 @@ ACCENT = material((255, 138, 52), roughness=0.5)
 
 _PAINT = {57: ALUMINIUM, 100: CAP, 118: RUBBER, 95: RUBBER, 167: STEEL, 20: RUBBER}
 """Material by the red channel of the file's own colour, which tells the parts apart."""
-_CREASE = 0.6
-"""Angle beyond which an edge stays sharp [rad]."""
 
 
 @lru_cache(maxsize=1)
@@ -48,16 +46,18 @@ def link_meshes() -> dict[str, bytes]:
 
 
 def _welded(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
-    """Return the mesh with shared vertices, shaded smoothly except at creases."""
-    points, index = np.unique(mesh.vertices.round(5), axis=0, return_inverse=True)
+    """Return the mesh with one vertex per place (0.1 mm) and direction of its surface."""
+    normals = np.asarray(mesh.vertex_normals)
+    rows = np.hstack([np.round(mesh.vertices / 2e-4), np.round(normals / 0.12)])
+    _, first, index = np.unique(rows, axis=0, return_index=True, return_inverse=True)
     faces = index.reshape(-1)[mesh.faces]
-    whole = (
-        (faces[:, 0] != faces[:, 1])
-        & (faces[:, 1] != faces[:, 2])
-        & (faces[:, 2] != faces[:, 0])
+    whole = (np.diff(np.sort(faces, axis=1), axis=1) > 0).all(axis=1)
+    return trimesh.Trimesh(
+        vertices=mesh.vertices[first],
+        faces=faces[whole],
+        vertex_normals=normals[first],
+        process=False,
     )
-    welded = trimesh.Trimesh(vertices=points, faces=faces[whole], process=False)
-    return trimesh.graph.smooth_shade(welded, angle=_CREASE, facet_minarea=None)
 
 
 @lru_cache(maxsize=4)
@@ -73,10 +73,17 @@ def gripper_body(tool_length: float, tool_radius: float) -> bytes:
         (rod((0, 0, 0), (0, 0, 0.014), 0.95 * tool_radius), STEEL),
         (rod((0, 0, 0.014), (0, 0, 0.022), 0.8 * tool_radius), ACCENT),
         (
-            block((1.9 * tool_radius, 1.3 * tool_radius, palm - 0.02), (0, 0, 0.5 * palm + 0.012), 0.006),
+            block(
+                (1.9 * tool_radius, 1.3 * tool_radius, palm - 0.02),
+                (0, 0, 0.5 * palm + 0.012),
+                0.006,
+            ),
             RUBBER,
         ),
-        (block((2.5 * tool_radius, 0.9 * tool_radius, 0.012), (0, 0, palm + 0.006), 0.003), STEEL),
+        (
+            block((2.5 * tool_radius, 0.9 * tool_radius, 0.012), (0, 0, palm + 0.006), 0.003),
+            STEEL,
+        ),
     ]
     return painted(pieces)
 

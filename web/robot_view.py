@@ -5,6 +5,8 @@ import viser
 
 from app.sim.cells import Cell
 from app.sim.robot import LINK_NAMES, Robot
+from app.sim.shapes import load_robot_capsules
+from web.capsules_view import CapsulesView
 from web.poses import Vec, orientation
 from web.robot_body import gripper_body, gripper_finger, link_meshes
 
@@ -42,6 +44,18 @@ class RobotView:
             ),
         )
 
+        self._closed = False
+        self._capsules = CapsulesView(server, "/robot/shapes")
+        self._shapes = load_robot_capsules(tool.tool_length, tool.tool_radius)
+        for name, radius, p0, p1 in zip(
+            self._shapes.name,
+            self._shapes.radius,
+            self._shapes.p0,
+            self._shapes.p1,
+            strict=True,
+        ):
+            self._capsules.add(name, float(radius), float(np.linalg.norm(p1 - p0)))
+
     def draw(self, q: Vec) -> None:
         """Show the robot at joint positions ``q`` [rad], shape (6,)."""
         if self._drawn is not None and np.array_equal(q, self._drawn):
@@ -55,8 +69,20 @@ class RobotView:
         tcp = self._robot.tcp_pose(q)
         self._tool.wxyz = orientation(tcp[:3, :3])
         self._tool.position = tcp[:3, 3] - self._robot.tool_length * tcp[:3, 2]
+        frames = poses[self._shapes.link]
+        ends = np.stack([self._shapes.p0, self._shapes.p1], axis=1)
+        self._capsules.place(
+            np.einsum("nij,nkj->nki", frames[:, :3, :3], ends) + frames[:, None, :3, 3]
+        )
+
+    def show_capsules(self, visible: bool, touched: str | None) -> None:
+        """Show or hide the simulator's capsules; those that touched stay in view, red."""
+        self._capsules.show(visible, () if touched is None else touched.split(" and "))
 
     def grip(self, closed: bool) -> None:
         """Open or close the fingers."""
+        if closed == self._closed:
+            return
+        self._closed = closed
         half = CLOSED if closed else OPEN
         self._fingers[0].position, self._fingers[1].position = (half, 0, 0), (-half, 0, 0)

@@ -12,10 +12,9 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.spatial.transform import Rotation, Slerp
 
 from app.sim import human
-from web.poses import Vec
+from web.poses import Vec, part_way
 
 Bones = dict[str, Vec]
 """T_world_bone by name, each of shape (4, 4)."""
@@ -35,9 +34,8 @@ BIND_Q.setflags(write=False)
 
 def _between(first: Vec, second: Vec, share: float) -> Vec:
     """Return a frame at ``second``'s origin, turned by a share of the way from ``first``."""
-    turns = Rotation.from_matrix(np.stack([first[:3, :3], second[:3, :3]]))
     frame = second.copy()
-    frame[:3, :3] = Slerp([0.0, 1.0], turns)(share).as_matrix()
+    frame[:3, :3] = part_way(first[:3, :3], second[:3, :3], share)
     return frame
 
 
@@ -166,9 +164,7 @@ def upper_weights(vertices: Vec) -> dict[str, Vec]:
         weights[f"elbow_{side}"] = outer * _hat(bend, 1, 3)
         weights[f"fore_{side}"] = outer * _hat(bend, 2, 3)
         arm_share += weights[f"shoulder_{side}"] + outer
-    weights.update(
-        {name: w * (1.0 - arm_share) for name, w in spine_weights(vertices).items()}
-    )
+    weights.update({name: w * (1.0 - arm_share) for name, w in spine_weights(vertices).items()})
     return weights
 
 

@@ -39,23 +39,16 @@ def _flat(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
 
 
 def block(size: Sequence[float], center: Sequence[float], bevel: float) -> trimesh.Trimesh:
-    """Return a box with chamfered edges.
-
-    Args:
-        size: Edge lengths [m], shape (3,).
-        center: Centre [m], shape (3,).
-        bevel: Width of the chamfer [m].
-    """
-    half = 0.5 * np.asarray(size, dtype=np.float64)
-    corners = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1).T
-    points = [corners * (half - bevel * (1.0 - np.eye(3)[axis])) for axis in range(3)]
-    hull = trimesh.convex.convex_hull(np.vstack(points))
-    hull.apply_translation(center)
-    return _flat(hull)
+    """Return a box with soft edges; sizes and centre in [m], shape (3,)."""
+    return slab(size, center, 1.5 * bevel, bevel, sections=16)
 
 
 def slab(
-    size: Sequence[float], center: Sequence[float], radius: float, bevel: float
+    size: Sequence[float],
+    center: Sequence[float],
+    radius: float,
+    bevel: float,
+    sections: int = 64,
 ) -> trimesh.Trimesh:
     """Return a plate with rounded corners and chamfered edges.
 
@@ -64,9 +57,9 @@ def slab(
         center: Centre [m], shape (3,).
         radius: Radius of the four vertical edges [m].
         bevel: Width of the chamfer at top and bottom [m].
+        sections: Points around the outline, a multiple of four.
     """
-    half = 0.5 * np.asarray(size, dtype=np.float64)
-    count = 64
+    half, count = 0.5 * np.asarray(size, dtype=np.float64), sections
     angles = 2.0 * np.pi * (np.arange(count) + 0.5) / count
     outline = np.column_stack([np.cos(angles), np.sin(angles)])
     middle = np.sign(outline) * (half[:2] - radius)

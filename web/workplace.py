@@ -34,7 +34,9 @@ def table_body(cell: Cell) -> bytes:
     t = cell.table
     width, depth = t.x_max - t.x_min, t.y_max - t.y_min
     cx, cy = 0.5 * (t.x_min + t.x_max), 0.5 * (t.y_min + t.y_max)
-    pieces = [(slab((width, depth, t.thickness), (cx, cy, -0.5 * t.thickness), 0.03, 0.003), TOP)]
+    pieces = [
+        (slab((width, depth, t.thickness), (cx, cy, -0.5 * t.thickness), 0.03, 0.003), TOP)
+    ]
     inset, leg = 0.11, 0.07
     xs = (t.x_min + inset, t.x_max - inset)
     ys = (t.y_min + inset, t.y_max - inset)
@@ -42,7 +44,9 @@ def table_body(cell: Cell) -> bytes:
     for x in xs:
         for y in ys:
             height = under - floor - 0.03
-            pieces.append((block((leg, leg, height), (x, y, floor + 0.03 + 0.5 * height), 0.006), FRAME))
+            pieces.append(
+                (block((leg, leg, height), (x, y, floor + 0.03 + 0.5 * height), 0.006), FRAME)
+            )
             pieces.append((rod((x, y, floor), (x, y, floor + 0.03), 0.03), FOOT))
         beam = (x, cy, under - 0.04)
         pieces.append((block((0.05, ys[1] - ys[0], 0.08), beam, 0.005), FRAME))
@@ -57,7 +61,9 @@ def table_trim(cell: Cell) -> bytes:
     width, depth = t.x_max - t.x_min, t.y_max - t.y_min
     center = (0.5 * (t.x_min + t.x_max), 0.5 * (t.y_min + t.y_max), -0.5 * t.thickness - 0.003)
     band = slab((width + 0.004, depth + 0.004, t.thickness - 0.012), center, 0.032, 0.001)
-    return painted([(band, EDGE), (slab((0.3, 0.3, 0.008), (0.0, 0.0, 0.004), 0.02, 0.0015), PLATE)])
+    return painted(
+        [(band, EDGE), (slab((0.3, 0.3, 0.008), (0.0, 0.0, 0.004), 0.02, 0.0015), PLATE)]
+    )
 
 
 def _floor(server: viser.ViserServer, cell: Cell) -> None:

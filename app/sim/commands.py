@@ -5,9 +5,13 @@ world's one owner applies them between two ticks (:meth:`app.sim.world.World.app
 command has a ``tag``, so that it can travel as JSON: ``{"tag": "toggle-candidate", "id": ...}``.
 """
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
+from app.errors import InvalidInput, NotFound
+from app.sim.cases import CASES
+from app.sim.cells import Cell
 from app.sim.ports import TaskPolicy
 
 Mode = Literal["manual", "auto"]
@@ -133,3 +137,29 @@ COMMANDS: tuple[type[Command], ...] = (
     SetPolicy,
     StartCase,
 )
+
+
+def check(command: Command, cell: Cell) -> None:
+    """Refuse a command that the world could not carry out.
+
+    Raises:
+        InvalidInput: A number is not finite, or a mode is unknown.
+        NotFound: The cell has no such station, or there is no such case study.
+    """
+    match command:
+        case MoveHuman():
+            for name in ("pelvis", "right", "left"):
+                values = getattr(command, name)
+                if values is not None and not all(map(math.isfinite, values)):
+                    raise InvalidInput(name, values, "must be finite")
+        case SetMode() if command.mode not in MODES:
+            raise InvalidInput("mode", command.mode, "is unknown", MODES)
+        case SetCandidates():
+            for name in command.ids:
+                cell.station(name)
+        case ToggleCandidate():
+            cell.station(command.id)
+        case StartCase() if command.id not in CASES:
+            raise NotFound("case", command.id, tuple(CASES))
+        case _:
+            pass

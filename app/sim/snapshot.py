@@ -12,14 +12,16 @@ from app.sim.ports import OutsideField, Vec
 
 Status = Literal[
     "moving",
-    "reached",
+    "picking",
     "contact",
     "blocked",
     "case done",
     "no candidates",
     "no policy",
 ]
-"""``blocked``: the robot waits at home because the person stands in it."""
+"""``picking``: the target is reached, the tool goes down and up again; ``blocked``: the robot
+waits at home because the person is in its way. In ``picking``, ``contact`` and ``case done`` the
+last decision stays as it was; in ``moving`` it belongs to this very state."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,6 +98,8 @@ class WorldSnapshot:
     """The person's joint positions [m, rad], shape (18,), read-only."""
     person_qd: Vec
     """The person's joint speeds [m/s, rad/s], shape (18,), read-only."""
+    gripping: bool
+    """Whether the fingers are closed."""
     selected: tuple[str, ...]
     """Stations the visitor allows; the one just reached may be missing in ``candidates``."""
     candidates: tuple[CandidateView, ...]

@@ -11,25 +11,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 from skimage.measure import marching_cubes
 
+from web.mannequin import Surface
 from web.poses import Vec
 
 Field = Callable[[Vec], Vec]
 """Maps points (..., 3) [m] to distances [m]; negative inside."""
-Faces = NDArray[np.uint32]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Surface:
-    """A triangle mesh."""
-
-    vertices: Vec
-    """Vertex positions [m], shape (n, 3)."""
-    faces: Faces
-    """Vertex indices, shape (m, 3), outward winding."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

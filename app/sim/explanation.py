@@ -1,0 +1,72 @@
+"""Says in one sentence what a live robot does and why."""
+
+from collections.abc import Callable
+
+from app.sim.ports import Decision
+from app.sim.snapshot import ContactView, Status
+
+Label = Callable[[str], str]
+"""Maps a station id to its name for people."""
+
+_BODIES = {
+    "pelvis": "the person's hips",
+    "abdomen": "the person's waist",
+    "chest": "the person's chest",
+    "head": "the person's head",
+    "upper_arm_r": "the right upper arm",
+    "upper_arm_l": "the left upper arm",
+    "forearm_r": "the right forearm",
+    "forearm_l": "the left forearm",
+    "hand_r": "the right hand",
+    "hand_l": "the left hand",
+    "leg_r": "the right leg",
+    "leg_l": "the left leg",
+    "the cell": "the table",
+    "itself": "another part of the robot",
+}
+
+
+def switched(decision: Decision, names: tuple[str, ...], before: str, label: Label) -> str:
+    """Return why the choice changed: both values side by side."""
+    old = decision.values[names.index(before)]
+    new = decision.values[decision.index]
+    return (
+        f"Changed its mind: {label(decision.chosen)} is worth {new:.2f} now, "
+        f"{label(before)} {old:.2f}."
+    )
+
+
+def going(decision: Decision, names: tuple[str, ...], label: Label) -> str:
+    """Return where the robot goes, and the value of the next best."""
+    text = f"Going to {label(decision.chosen)}, worth {decision.values[decision.index]:.2f}"
+    others = [i for i in range(len(names)) if i != decision.index]
+    if not others:
+        return text + "."
+    second = max(others, key=lambda i: decision.values[i])
+    return f"{text}; next is {label(names[second])} at {decision.values[second]:.2f}."
+
+
+def touched(contact: ContactView) -> str:
+    """Return what touched what."""
+    link = contact.link.replace("_", " ")
+    body = _BODIES.get(contact.body, contact.body)
+    return f"Contact: {link} touched {body}. The robot starts again from home."
+
+
+def resting(status: Status, goal: str | None, label: Label) -> str:
+    """Return why the robot does not go anywhere.
+
+    Args:
+        status: What the robot is doing.
+        goal: Station it is at, if any.
+        label: Names of stations.
+    """
+    return {
+        "picking": f"Reached {label(goal)}." if goal else "Reached.",
+        "blocked": "Waiting at home: the person is in the robot's way.",
+        "case done": f"The case ended at {label(goal)}."
+        if goal
+        else "Time is up in this case.",
+        "no candidates": "Nothing to do: click a cube or a dock to offer it.",
+        "no policy": "Resting: no checkpoint acts.",
+    }.get(status, "")

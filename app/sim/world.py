@@ -1,0 +1,382 @@
+"""One live cell: robot, person, candidates, clock. Pure numpy, no thread, no screen.
+
+The world advances in control periods of ``cell.robot.dt``. Each period the robot carries out
+the action decided for the state it is in, the person moves, contact is tested between the ends
+of the period too, and the policy decides anew (METHOD 3.1). A reached target is picked up (the
+tool goes down and up again, by inverse kinematics and inside the same limits), leaves the
+candidates for one turn, and the next episode goes on from there. A contact is shown for two
+seconds; then the robot starts again from home.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from app.errors import ServiceError
+from app.sim import commands, explanation, pick
+from app.sim.cases import CASES, Case
+from app.sim.cells import Cell
+from app.sim.commands import Command
+from app.sim.kernels import kinematics
+from app.sim.live_person import LivePerson
+from app.sim.ports import Candidate, Decision, Person, TaskPolicy, Vec
+from app.sim.snapshot import CandidateView, ContactView, Counters, Status, WorldSnapshot
+
+TIME_LIMIT_S = 20.0
+"""Length of an episode [s] (table 5.2)."""
+CONTACT_HOLD_S = 2.0
+"""How long a contact is shown [s]."""
+NOTE_S = 2.5
+"""How long a change of mind is told [s]."""
+PICK_HEIGHT = 0.065
+"""Height of the tcp over the table when the fingers close [m]."""
+PICK_S = (0.9, 1.3, 2.0)
+"""Times at which the tool is down, the fingers have closed, the tool is up again [s]."""
+GAIN = 3.0
+"""Joint speed per joint error while picking [1/s]."""
+NEAR_M = 0.04
+"""Clearance below which picking waits [m]."""
+
+
+class World:
+    """One live work cell.
+
+    Args:
+        cell: Work cell.
+        policy: Chooses and moves; None lets the robot rest.
+        seed: Seed of the person's work.
+        id: Name of the world in URLs.
+    """
+
+    def __init__(
+        self, cell: Cell, policy: TaskPolicy | None, seed: int, id: str = "live"
+    ) -> None:
+        self.cell, self.id = cell, id
+        self._arm, self._policy = pick.arm_of(cell), policy
+        self._person = LivePerson(cell, seed)
+        self._case: Case | None = None
+        self._selected = tuple(s.id for s in cell.stations if s.kind == "cube")
+        self._own_choice = self._selected
+        self._tick, self._paused = 0, False
+        self._reset()
+
+    # Starts and ends.
+
+    def _reset(self) -> None:
+        self._t, self._counters = 0.0, Counters()
+        self._person.start(self._case)
+        self._restart_robot()
+
+    def _restart_robot(self) -> None:
+        self._q, self._qd = self._start_q(), np.zeros(6)
+        self._held_out: str | None = None
+        self._contact: ContactView | None = None
+        self._begin_episode()
+        if self._touches_here():
+            self._status = "blocked"
+
+    def _start_q(self) -> Vec:
+        if self._case is None:
+            return np.array(self.cell.robot.home_q)
+        return self._posture_over(self._case.robot_start)
+
+    def _begin_episode(self) -> None:
+        self._status: Status = "moving"
+        self._status_s, self._time_left = 0.0, TIME_LIMIT_S
+        self._decision: Decision | None = None
+        self._goal: str | None = None
+        self._note, self._note_until = "", -1.0
+        self._decide()
+
+    def _touches_here(self) -> bool:
+        rest, person = np.zeros(6), self._person.q
+        found = pick.contact(self._arm, self._q, rest, rest, person, person)
+        self._clearance: float | None = found.clearance_m
+        return found.kind != "none"
+
+    def _posture_over(self, station: str, height: float | None = None) -> Vec:
+        position = np.array(self.cell.station(station).position)
+        if height is not None:
+            position[2] = height
+        q, arm = np.empty(6), self._arm
+        kinematics.ik_vertical(position, arm.tool_length, arm.q_min, arm.q_max, q)
+        return q
+
+    # Commands.
+
+    def apply(self, command: Command) -> None:
+        """Carry out one command.
+
+        Raises:
+            ServiceError: The command does not fit this cell; nothing has changed.
+        """
+        commands.check(command, self.cell)
+        match command:
+            case commands.MoveHuman():
+                self._leave_case()
+                self._person.drag(command)
+            case commands.SetMode():
+                self._leave_case()
+                self._person.enter(command.mode)
+            case commands.Pause():
+                self._paused = True
+            case commands.Resume():
+                self._paused = False
+            case commands.StepOnce():
+                self._paused = True
+                self._advance()
+            case commands.Reset():
+                self._reset()
+            case commands.SetCandidates():
+                self._choose_among(set(command.ids))
+            case commands.ToggleCandidate():
+                self._choose_among(set(self._selected) ^ {command.id})
+            case commands.SetPolicy():
+                self._policy = command.policy
+                self._refresh()
+            case commands.StartCase():
+                self._start_case(CASES[command.id])
+
+    def _start_case(self, case: Case) -> None:
+        self._case, self._paused = case, False
+        self._selected = tuple(n for n in self.cell.station_ids if n in case.goals)
+        self._person.enter("auto")
+        self._reset()
+
+    def _leave_case(self) -> None:
+        if self._case is None:
+            return
+        self._case, self._selected = None, self._own_choice
+        self._person.leave_case()
+        self._refresh()
+
+    def _choose_among(self, ids: set[str]) -> None:
+        self._leave_case()
+        self._selected = tuple(name for name in self.cell.station_ids if name in ids)
+        self._own_choice, self._held_out = self._selected, None
+        self._refresh()
+
+    def _refresh(self) -> None:
+        """Decide afresh after the candidates or the policy changed."""
+        if self._status == "case done":
+            self._begin_episode()
+        elif self._status == "moving":
+            self._decide()
+
+    # Time.
+
+    def step(self) -> None:
+        """Advance by one control period; while paused only a dragged person moves."""
+        if not self._paused:
+            self._advance()
+        elif self._person.mode == "manual" and self._person.move(self._arm.dt):
+            self._person.freeze()
+            self._touches_here()
+            self._refresh()
+
+    def _advance(self) -> None:
+        person_q = self._person.q
+        self._person.move(self._arm.dt)
+        self._tick += 1
+        self._t += self._arm.dt
+        self._status_s += self._arm.dt
+        if self._status in ("contact", "blocked", "case done"):
+            self._wait()
+        else:
+            self._move_robot(person_q)
+        if self._status == "moving":
+            self._decide()
+
+    def _move_robot(self, person_q: Vec) -> None:
+        q, qd, c = pick.step_robot(self._arm, self._q, self._qd, self._action())
+        found = pick.contact(self._arm, self._q, self._qd, c, person_q, self._person.q)
+        self._clearance = found.clearance_m
+        if found.kind != "none":
+            self._touch(found)
+            return
+        self._q, self._qd = q, qd
+        if self._status == "picking":
+            self._finish_pick()
+        elif self._decision is not None:
+            self._time_left -= self._arm.dt
+            self._judge(self._decision)
+
+    def _action(self) -> Vec:
+        """Return the wanted joint speeds over their limits, shape (5,)."""
+        if self._status == "picking" and self._goal is not None:
+            if self._clearance is not None and self._clearance < NEAR_M:
+                return np.zeros(5)
+            down = self._status_s < PICK_S[1]
+            posture = self._posture_over(self._goal, PICK_HEIGHT if down else None)
+            speed = GAIN * (posture - self._q) / self._arm.qd_max
+            return np.asarray(np.clip(speed[:5], -1.0, 1.0))
+        if self._decision is not None:
+            return self._decision.actions[self._decision.index].astype(np.float64)
+        return np.zeros(5)
+
+    def _judge(self, decision: Decision) -> None:
+        """See whether the episode ends at this state."""
+        target = self._offered[decision.index].position
+        if pick.tool_state(self._arm, self._q, self._qd, target)[3]:
+            self._count(reached=1)
+            self._goal, self._status, self._status_s = decision.chosen, "picking", 0.0
+        elif self._time_left <= 0.0:
+            self._count(timeouts=1)
+            self._begin_episode()
+            if self._case is not None:
+                self._status = "case done"
+
+    def _count(self, *, reached: int = 0, timeouts: int = 0, contacts: int = 0) -> None:
+        so_far = self._counters
+        self._counters = replace(
+            so_far,
+            reached=so_far.reached + reached,
+            timeouts=so_far.timeouts + timeouts,
+            contacts=so_far.contacts + contacts,
+        )
+
+    def _finish_pick(self) -> None:
+        if self._status_s < PICK_S[2]:
+            return
+        if self._case is not None:
+            self._status = "case done"
+        else:
+            self._held_out = self._goal
+            self._begin_episode()
+
+    def _touch(self, found: pick.Contact) -> None:
+        kinds = {"human": found.part, "cell": "the cell", "self": "itself"}
+        self._contact = ContactView(
+            kind="human"
+            if found.kind == "human"
+            else "cell"
+            if found.kind == "cell"
+            else "self",
+            link=found.link,
+            body=kinds[found.kind],
+        )
+        self._count(contacts=1)
+        self._qd = np.zeros(6)
+        self._status, self._status_s = "contact", 0.0
+
+    def _wait(self) -> None:
+        if self._status == "contact" and self._status_s >= CONTACT_HOLD_S:
+            if self._case is not None:
+                self._person.start(self._case)
+            self._restart_robot()
+        elif self._status == "blocked" and not self._touches_here():
+            self._begin_episode()
+
+    # Deciding.
+
+    def _candidates(self) -> tuple[Candidate, ...]:
+        names = [name for name in self._selected if name != self._held_out]
+        return tuple(
+            Candidate(id=name, position=np.array(self.cell.station(name).position))
+            for name in names or self._selected
+        )
+
+    def _decide(self) -> None:
+        """Ask the policy about this very state."""
+        before = self._decision.chosen if self._decision is not None else None
+        self._offered = self._candidates()
+        names = tuple(candidate.id for candidate in self._offered)
+        self._previous = before if before in names else None
+        self._decision = None
+        if self._policy is None or not names:
+            return
+        try:
+            decision = self._policy.decide(
+                self._q,
+                self._qd,
+                [Person(q=self._person.q, qd=self._person.qd)],
+                self._offered,
+                previous=self._previous,
+                time_left_s=self._time_left,
+            )
+        except ServiceError as error:
+            self._tell(error.message)
+            return
+        if self._previous is not None and decision.chosen != self._previous:
+            self._counters = replace(self._counters, switches=self._counters.switches + 1)
+            self._tell(explanation.switched(decision, names, self._previous, self._label))
+        self._decision = decision
+
+    # What is seen.
+
+    def _label(self, name: str) -> str:
+        return self.cell.station(name).label
+
+    def _tell(self, note: str) -> None:
+        self._note, self._note_until = note, self._t + NOTE_S
+
+    def _shown_status(self) -> Status:
+        if self._status != "moving" or self._decision is not None:
+            return self._status
+        return "no policy" if self._selected else "no candidates"
+
+    def _message(self, status: Status) -> str:
+        if status == "contact" and self._contact is not None:
+            return explanation.touched(self._contact)
+        if self._t < self._note_until and status in ("moving", "no policy"):
+            return self._note
+        if status == "moving" and self._decision is not None:
+            names = tuple(candidate.id for candidate in self._offered)
+            return explanation.going(self._decision, names, self._label)
+        return explanation.resting(status, self._goal, self._label)
+
+    def _view(self, index: int, candidate: Candidate) -> CandidateView:
+        decision = self._decision
+        return CandidateView(
+            id=candidate.id,
+            position=_frozen(candidate.position),
+            value=None if decision is None else decision.values[index],
+            chosen=decision is not None and decision.index == index,
+            reachable=None if decision is None else decision.reachable[index],
+            outside=() if decision is None else decision.outside_candidates[index],
+        )
+
+    def _tcp(self) -> Vec:
+        rotations, origins, tcp = np.empty((7, 3, 3)), np.empty((7, 3)), np.empty(3)
+        kinematics.link_poses(self._q, rotations, origins)
+        kinematics.tcp_point(rotations, origins, self._arm.tool_length, tcp)
+        return tcp
+
+    def snapshot(self) -> WorldSnapshot:
+        """Return what is known now, frozen."""
+        decision, policy, status = self._decision, self._policy, self._shown_status()
+        return WorldSnapshot(
+            id=self.id,
+            cell=self.cell.name,
+            tick=self._tick,
+            t_s=self._t,
+            mode=self._person.mode,
+            paused=self._paused,
+            status=status,
+            message=self._message(status),
+            robot_q=_frozen(self._q),
+            robot_qd=_frozen(self._qd),
+            tcp=_frozen(self._tcp()),
+            person_q=_frozen(self._person.q),
+            person_qd=_frozen(self._person.qd),
+            gripping=status == "picking" and self._status_s >= PICK_S[0],
+            selected=self._selected,
+            candidates=tuple(self._view(i, c) for i, c in enumerate(self._offered)),
+            chosen=None if decision is None else decision.chosen,
+            previous=self._previous,
+            time_left_s=self._time_left,
+            outside=() if decision is None else decision.outside,
+            clearance_m=self._clearance,
+            contact=self._contact,
+            checkpoint=None if policy is None else policy.checkpoint,
+            policy_title=None if policy is None else policy.title,
+            elapsed_ms=None if decision is None else decision.elapsed_ms,
+            case=None if self._case is None else self._case.id,
+            counters=self._counters,
+        )
+
+
+def _frozen(values: Vec) -> Vec:
+    copy = np.array(values, dtype=np.float64)
+    copy.setflags(write=False)
+    return copy

@@ -1,0 +1,85 @@
+"""The shapes the simulator sees, translucent over what is drawn; red where they touched."""
+
+from collections.abc import Collection
+
+import numpy as np
+import trimesh
+import viser
+
+from web.poses import Vec, orientation
+
+SHAPE, TOUCHED = (64, 150, 190), (224, 44, 40)
+
+
+class CapsulesView:
+    """Capsules of constant size that are placed by their ends.
+
+    Args:
+        server: Where to draw.
+        root: Name of their node in the scene.
+    """
+
+    def __init__(self, server: viser.ViserServer, root: str) -> None:
+        self._scene, self._root = server.scene, root
+        self._scene.add_frame(root, show_axes=False)
+        self._handles: dict[str, viser.MeshHandle] = {}
+        self._ends: Vec | None = None
+        self._placed = False
+
+    def add(self, name: str, radius: float, length: float) -> None:
+        """Add a capsule, hidden at first.
+
+        Args:
+            name: Its name, unique here.
+            radius: Radius [m].
+            length: Distance of its ends [m].
+        """
+        mesh = trimesh.creation.capsule(height=length, radius=radius, count=(24, 14))
+        vertices = np.asarray(mesh.vertices)
+        self._handles[name] = self._scene.add_mesh_simple(
+            f"{self._root}/{name}",
+            vertices - 0.5 * (vertices.min(axis=0) + vertices.max(axis=0)),
+            np.asarray(mesh.faces),
+            color=SHAPE,
+            opacity=0.32,
+            cast_shadow=False,
+            receive_shadow=False,
+            visible=False,
+        )
+
+    def place(self, ends: Vec) -> None:
+        """Say where the capsules are; poses are sent only while they are seen.
+
+        Args:
+            ends: End points in world [m], shape (n, 2, 3), in the order they were added.
+        """
+        self._ends, self._placed = ends, False
+
+    def show(self, visible: bool, touched: Collection[str]) -> None:
+        """Show all or none; those named ``touched`` are seen in any case, in red."""
+        for name, handle in self._handles.items():
+            hit = name in touched
+            if tuple(handle.color) != (color := TOUCHED if hit else SHAPE):
+                handle.color, handle.opacity = color, 0.65 if hit else 0.32
+            if handle.visible != (visible or hit):
+                handle.visible = visible or hit
+        if (visible or touched) and not self._placed and self._ends is not None:
+            self._send(self._ends)
+
+    def _send(self, ends: Vec) -> None:
+        self._placed = True
+        turns = orientation(_turns_onto(ends[:, 1] - ends[:, 0]))
+        for handle, turn, pair in zip(self._handles.values(), turns, ends, strict=True):
+            handle.wxyz, handle.position = turn, pair.mean(axis=0)
+
+
+def _turns_onto(directions: Vec) -> Vec:
+    """Return rotations whose z axis points along the directions, shape (n, 3, 3)."""
+    out = np.empty((len(directions), 3, 3))
+    for rotation, direction in zip(out, directions, strict=True):
+        length = float(np.linalg.norm(direction))
+        z = direction / length if length > 1e-9 else np.array([0.0, 0.0, 1.0])
+        x = np.cross([0.0, 1.0, 0.0] if abs(z[1]) < 0.9 else [1.0, 0.0, 0.0], z)
+        x /= np.linalg.norm(x)
+        rotation[:] = np.column_stack([x, np.cross(z, x), z])
+    return out

@@ -1,0 +1,172 @@
+"""The live cell: one thread that owns world and scene, and a door for everybody else.
+
+The thread drains the queue of commands, steps the world at its control rate and draws. Other
+threads (HTTP routes, viser's callbacks) only queue commands and read the last snapshot.
+
+Simulated time follows the clock on the wall: after a stall the loop catches up by at most
+``MAX_BEHIND_S`` and then lets the rest go, so that a busy machine slows the cell down instead of
+making it jump.
+"""
+
+import logging
+import queue
+import socket
+import threading
+import time
+
+import viser
+
+from app.errors import ServiceError
+from app.sim import commands
+from app.sim.cells import Cell
+from app.sim.commands import Command
+from app.sim.ports import TaskPolicy
+from app.sim.snapshot import WorldSnapshot
+from app.sim.world import World
+from web import gui
+from web.scene import CellScene
+
+logger = logging.getLogger(__name__)
+
+MAX_BEHIND_S = 0.2
+"""Lateness beyond which time is let go [s]."""
+ERROR_PAUSE_S = 1.0
+"""Rest after an unexpected error [s]."""
+
+
+class LiveHandle:
+    """What other threads may do with a live cell; see ``app.sim.ports.WorldHandle``.
+
+    Args:
+        id: Name of the world in URLs.
+        cell: Work cell, against which commands are checked.
+        first: Snapshot until the first tick.
+    """
+
+    def __init__(self, id: str, cell: Cell, first: WorldSnapshot) -> None:
+        self._id, self._cell, self._last = id, cell, first
+        self._queue: queue.SimpleQueue[Command] = queue.SimpleQueue()
+
+    @property
+    def id(self) -> str:
+        """Name of the world in URLs."""
+        return self._id
+
+    def submit(self, command: Command) -> None:
+        """Queue one command; returns at once.
+
+        Raises:
+            ServiceError: The command does not fit this cell.
+        """
+        commands.check(command, self._cell)
+        self._queue.put(command)
+
+    def snapshot(self) -> WorldSnapshot:
+        """Return the last snapshot; never waits."""
+        return self._last
+
+    def publish(self, snapshot: WorldSnapshot) -> None:
+        """Replace the last snapshot; for the owner only."""
+        self._last = snapshot
+
+    def drain(self) -> list[Command]:
+        """Take all waiting commands; for the owner only."""
+        waiting = []
+        while not self._queue.empty():
+            waiting.append(self._queue.get())
+        return waiting
+
+
+class LiveCell:
+    """One live work cell with its viewer.
+
+    Args:
+        cell: Work cell.
+        policy: Acts at first; None lets the robot rest.
+        host: Address the viewer listens on; loopback, since it has no authentication.
+        port: Port of the viewer; 0 takes a free one.
+        seed: Seed of the person's work.
+        id: Name of the world in URLs.
+    """
+
+    def __init__(
+        self,
+        cell: Cell,
+        policy: TaskPolicy | None,
+        *,
+        host: str = "127.0.0.1",
+        port: int = 0,
+        seed: int = 0,
+        id: str = "live",
+    ) -> None:
+        self._cell, self._host, self._port = cell, host, port
+        self._world = World(cell, policy, seed, id)
+        self.handle = LiveHandle(id, cell, self._world.snapshot())
+        """Commands in, snapshots out."""
+        self._stop = threading.Event()
+        self._server: viser.ViserServer | None = None
+        self._thread: threading.Thread | None = None
+
+    @property
+    def viewer_port(self) -> int:
+        """Port the viewer listens on."""
+        if self._server is None:
+            raise RuntimeError("the viewer has not been started")
+        return int(self._server.get_port())
+
+    @property
+    def server(self) -> viser.ViserServer:
+        """The viewer."""
+        if self._server is None:
+            raise RuntimeError("the viewer has not been started")
+        return self._server
+
+    def start(self) -> None:
+        """Start viewer and thread."""
+        port = self._port or _free_port(self._host)
+        self._server = viser.ViserServer(host=self._host, port=port, verbose=False)
+        scene = CellScene(self._server, self._cell, self.handle.submit)
+        gui.build(self._server, scene.overlays)
+        scene.draw(self.handle.snapshot(), 0.0)
+        self._thread = threading.Thread(
+            target=self._run, args=(scene,), name=f"world-{self.handle.id}", daemon=True
+        )
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End thread and viewer; may be called twice."""
+        self._stop.set()
+        if self._thread is not None:
+            self._thread.join(timeout=5.0)
+            self._thread = None
+        if self._server is not None:
+            self._server.stop()
+            self._server = None
+
+    def _run(self, scene: CellScene) -> None:
+        dt = self._cell.robot.dt
+        due = time.monotonic() + dt
+        while not self._stop.wait(max(due - time.monotonic(), 0.0)):
+            try:
+                self._tick(scene, dt)
+            except Exception:
+                logger.exception("the live cell failed at tick %d", self.handle.snapshot().tick)
+                self._stop.wait(ERROR_PAUSE_S)
+            due = max(due + dt, time.monotonic() - MAX_BEHIND_S)
+
+    def _tick(self, scene: CellScene, dt: float) -> None:
+        for command in self.handle.drain():
+            try:
+                self._world.apply(command)
+            except ServiceError as error:
+                logger.warning("command %s was refused: %s", command.tag, error.message)
+        self._world.step()
+        snapshot = self._world.snapshot()
+        self.handle.publish(snapshot)
+        scene.draw(snapshot, dt)
+
+
+def _free_port(host: str) -> int:
+    with socket.socket() as probe:
+        probe.bind((host, 0))
+        return int(probe.getsockname()[1])

@@ -1,0 +1,170 @@
+"""Cubes and docks in the scene: coloured by value, labelled, and clickable.
+
+Green is the best candidate; the others turn to amber and red the more the critic values them
+below it. What is no candidate is grey. A ring marks the chosen one.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+import trimesh
+import viser
+
+from app.sim.cells import Cell, Station
+from app.sim.commands import ToggleCandidate
+from app.sim.snapshot import CandidateView, WorldSnapshot
+from web.mannequin import Rgb
+from web.poses import Vec
+from web.solids import block, disc, slab, torus
+
+CUBE_SIDE, DOCK_SIDE = 0.07, 0.15
+RAMP: tuple[tuple[float, Rgb], ...] = (
+    (0.0, (38, 166, 104)),
+    (0.35, (150, 190, 62)),
+    (0.8, (240, 176, 52)),
+    (1.6, (222, 78, 62)),
+)
+"""Colour by how much less than the best a candidate is worth."""
+IDLE: Rgb = (196, 202, 210)
+UNKNOWN: Rgb = (122, 142, 166)
+MARK: Rgb = (11, 127, 119)
+HIT: Rgb = (214, 52, 46)
+
+
+def color_of(value: float | None, best: float | None) -> Rgb:
+    """Return the colour of a candidate worth ``value`` where the best is worth ``best``."""
+    if value is None or best is None:
+        return UNKNOWN
+    channels = [
+        np.interp(best - value, [x for x, _ in RAMP], [color[k] for _, color in RAMP])
+        for k in range(3)
+    ]
+    return int(channels[0]), int(channels[1]), int(channels[2])
+
+
+class StationsView:
+    """Draws the stations of one cell; used by the live cell's thread only.
+
+    Args:
+        server: Where to draw.
+        cell: Says what stands where.
+        submit: Takes the command of a click.
+    """
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        cell: Cell,
+        submit: Callable[[ToggleCandidate], None],
+    ) -> None:
+        self._scene, self._cell, self._submit = server.scene, cell, submit
+        self._bodies = {station.id: self._add_body(station) for station in cell.stations}
+        self._labels = {station.id: self._add_label(station) for station in cell.stations}
+        self._marker = self._add_marker()
+        self._values = True
+
+    def _add_body(self, station: Station) -> viser.MeshHandle:
+        x, y, _ = station.position
+        mesh = _cube() if station.kind == "cube" else _dock()
+        body = self._scene.add_mesh_simple(
+            f"/stations/{station.id}",
+            np.asarray(mesh.vertices),
+            np.asarray(mesh.faces),
+            color=IDLE,
+            flat_shading=True,
+            cast_shadow=station.kind == "cube",
+            position=(x, y, 0.0),
+        )
+        name = station.id
+
+        @body.on_click
+        async def _(_: object) -> None:
+            self._submit(ToggleCandidate(id=name))
+
+        return body
+
+    def _add_label(self, station: Station) -> viser.LabelHandle:
+        x, y, _ = station.position
+        height = CUBE_SIDE + 0.035 if station.kind == "cube" else 0.05
+        return self._scene.add_label(
+            f"/labels/{station.id}",
+            station.label,
+            position=(x, y, height),
+            anchor="bottom-center",
+            font_screen_scale=0.78,
+        )
+
+    def _add_marker(self) -> viser.FrameHandle:
+        marker = self._scene.add_frame("/chosen", show_axes=False, visible=False)
+        vertices, faces = torus(0.085, 0.0055)
+        self._scene.add_mesh_simple(
+            "/chosen/ring",
+            vertices,
+            faces,
+            color=MARK,
+            position=(0, 0, 0.006),
+            cast_shadow=False,
+        )
+        vertices, faces = disc(0.083)
+        self._scene.add_mesh_simple(
+            "/chosen/glow",
+            vertices,
+            faces,
+            color=MARK,
+            opacity=0.22,
+            position=(0.0, 0.0, 0.003),
+            cast_shadow=False,
+        )
+        return marker
+
+    def show_values(self, visible: bool) -> None:
+        """Show or hide the labels."""
+        self._values = visible
+
+    def draw(self, snapshot: WorldSnapshot) -> None:
+        """Show what the critic says."""
+        offered = {candidate.id: candidate for candidate in snapshot.candidates}
+        best = max(snapshot.values.values(), default=None)
+        for station in self._cell.stations:
+            candidate = offered.get(station.id)
+            color = IDLE if candidate is None else color_of(candidate.value, best)
+            body, label = self._bodies[station.id], self._labels[station.id]
+            if tuple(body.color) != color:
+                body.color = color
+            if label.text != (text := _text(station, candidate)):
+                label.text = text
+            if label.visible != (shown := self._values and candidate is not None):
+                label.visible = shown
+        self._mark(snapshot.chosen)
+
+    def _mark(self, chosen: str | None) -> None:
+        if self._marker.visible != (chosen is not None):
+            self._marker.visible = chosen is not None
+        if chosen is not None:
+            x, y, _ = self._cell.station(chosen).position
+            if tuple(self._marker.position[:2]) != (x, y):
+                self._marker.position = (x, y, 0.0)
+
+
+def _text(station: Station, candidate: CandidateView | None) -> str:
+    if candidate is None or candidate.value is None:
+        return station.label
+    sign = "\N{BLACK RIGHT-POINTING SMALL TRIANGLE} " if candidate.chosen else ""
+    return f"{sign}{station.label}  {candidate.value:.2f}"
+
+
+def _cube() -> trimesh.Trimesh:
+    side = CUBE_SIDE
+    return block((side, side, side), (0.0, 0.0, 0.5 * side), 0.005)
+
+
+def _dock() -> trimesh.Trimesh:
+    """Return a tray with a raised rim of four bars."""
+    side, bar = DOCK_SIDE, 0.012
+    pieces = [slab((side, side, 0.006), (0.0, 0.0, 0.003), 0.012, 0.002)]
+    for sign in (-1.0, 1.0):
+        at = sign * 0.5 * (side - bar)
+        pieces.append(block((bar, side, 0.016), (at, 0.0, 0.008), 0.002))
+        pieces.append(block((side, bar, 0.016), (0.0, at, 0.008), 0.002))
+    mesh: trimesh.Trimesh = trimesh.util.concatenate(pieces)
+    return mesh
