@@ -262,7 +262,7 @@ def find_checkpoint(reference: str, settings: Settings) -> "Checkpoint":
     from app.policies.checkpoint import load
     from app.store.checkpoints import get_checkpoint, read_tensors
     from app.store.engine import Store
-    from app.store.migrate import check_schema
+    from app.store.schema import check_schema
 
     path = Path(reference)
     if path.suffix == ".safetensors":
