@@ -21,6 +21,8 @@ GOALS = {"cube1": "right", "cube4": "left"}
 GRIP_M = 0.12
 """Where along a gizmo's arrow the mouse takes it; the arrows of the hands are 0.2 m long."""
 TRIES = 12
+SMALL = (1024, 700)
+"""A window whose scene software draws a few times per second."""
 MOVES = 10
 
 
@@ -100,7 +102,7 @@ def settle(page: Page, server: str) -> str:
 def test_dragging_a_hand_onto_the_chosen_cube_changes_the_choice(
     open_page: Callable[..., Page], server: str, unused_port: int
 ) -> None:
-    page = open_page()
+    page = open_page(*SMALL)
     page.click('[data-mode="manual"]')
     page.click('[data-action="reset"]')
     offer(page, set(GOALS))
