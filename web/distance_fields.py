@@ -114,7 +114,7 @@ class Grid:
         """
         soft = gaussian_filter(values, smooth) if smooth > 0.0 else values
         soft = np.pad(soft, 1, constant_values=float(np.abs(values).max()))
-        vertices, faces, _, _ = marching_cubes(soft, 0.0, gradient_direction="descent")
+        vertices, faces, _, _ = marching_cubes(soft, 0.0, gradient_direction="descent")  # type: ignore[no-untyped-call]
         return Surface(
             vertices=(vertices - 1.0) * self.spacing + self.low,
             faces=faces.astype(np.uint32),

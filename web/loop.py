@@ -4,8 +4,8 @@ The thread drains the queue of commands, steps the world at its control rate and
 threads (HTTP routes, viser's callbacks) only queue commands and read the last snapshot.
 
 Simulated time follows the clock on the wall: after a stall the loop catches up by at most
-``MAX_BEHIND_S`` and then lets the rest go, so that a busy machine slows the cell down instead of
-making it jump.
+``MAX_BEHIND_S`` and then lets the rest go, so that a busy machine slows the cell down instead
+of making it jump.
 """
 
 import logging
@@ -97,7 +97,7 @@ class LiveCell:
         host: str = "127.0.0.1",
         port: int = 0,
         seed: int = 0,
-        id: str = "live",
+        id: str = "main",
     ) -> None:
         self._cell, self._host, self._port = cell, host, port
         self._world = World(cell, policy, seed, id)
@@ -123,7 +123,7 @@ class LiveCell:
 
     def start(self) -> None:
         """Start viewer and thread."""
-        port = self._port or _free_port(self._host)
+        port = self._port or free_port(self._host)
         self._server = viser.ViserServer(host=self._host, port=port, verbose=False)
         scene = CellScene(self._server, self._cell, self.handle.submit)
         gui.build(self._server, scene.overlays)
@@ -166,7 +166,8 @@ class LiveCell:
         scene.draw(snapshot, dt)
 
 
-def _free_port(host: str) -> int:
+def free_port(host: str) -> int:
+    """Return a port of ``host`` that nobody listens on at the moment."""
     with socket.socket() as probe:
         probe.bind((host, 0))
         return int(probe.getsockname()[1])

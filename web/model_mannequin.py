@@ -142,7 +142,7 @@ def _hand() -> Surface:
 
 
 def _head() -> tuple[Surface, Surface]:
-    """Return head with neck, and helmet, in the head's frame: base of the neck at the origin."""
+    """Return head and helmet in the head's frame, the base of the neck at the origin."""
     skull = [
         _cone((-0.015, 0.0, -0.03), (-0.002, 0.0, 0.1), 0.056, 0.05, blend=0.03),
         _cone((0.005, 0.0, 0.2), (0.0, 0.0, 0.215), 0.105, 0.105, (0.98, 0.78, 1.0), 0.03),

@@ -20,7 +20,7 @@ def material(
         roughness: 0 for a mirror, 1 for chalk.
     """
     linear = [round(255.0 * (channel / 255.0) ** 2.2) for channel in color]
-    return PBRMaterial(
+    return PBRMaterial(  # type: ignore[no-untyped-call]
         baseColorFactor=(*linear, 255),
         metallicFactor=metallic,
         roughnessFactor=roughness,
@@ -92,18 +92,20 @@ def slab(
 
 def rod(start: Sequence[float], end: Sequence[float], radius: float) -> trimesh.Trimesh:
     """Return a smooth cylinder between two points [m]."""
-    return trimesh.creation.cylinder(
+    mesh = trimesh.creation.cylinder(
         radius=radius, segment=np.array([start, end], dtype=np.float64), sections=40
     )
+    assert isinstance(mesh, trimesh.Trimesh)
+    return mesh
 
 
 def painted(pieces: Sequence[tuple[trimesh.Trimesh, PBRMaterial]]) -> bytes:
     """Return meshes with their materials as one binary glTF."""
     scene = trimesh.Scene()
     for mesh, paint in pieces:
-        mesh.visual = trimesh.visual.TextureVisuals(material=paint)
+        mesh.visual = trimesh.visual.TextureVisuals(material=paint)  # type: ignore[no-untyped-call]
         scene.add_geometry(mesh)
-    data = scene.export(file_type="glb", include_normals=True)
+    data = scene.export(file_type="glb", include_normals=True)  # type: ignore[no-untyped-call]
     assert isinstance(data, bytes)
     return data
 

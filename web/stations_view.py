@@ -14,7 +14,6 @@ from app.sim.cells import Cell, Station
 from app.sim.commands import ToggleCandidate
 from app.sim.snapshot import CandidateView, WorldSnapshot
 from web.mannequin import Rgb
-from web.poses import Vec
 from web.solids import block, disc, slab, torus
 
 CUBE_SIDE, DOCK_SIDE = 0.07, 0.15
@@ -77,10 +76,10 @@ class StationsView:
         )
         name = station.id
 
-        @body.on_click
-        async def _(_: object) -> None:
+        async def toggle(_: object) -> None:
             self._submit(ToggleCandidate(id=name))
 
+        body.on_click(toggle)
         return body
 
     def _add_label(self, station: Station) -> viser.LabelHandle:
@@ -166,5 +165,6 @@ def _dock() -> trimesh.Trimesh:
         at = sign * 0.5 * (side - bar)
         pieces.append(block((bar, side, 0.016), (at, 0.0, 0.008), 0.002))
         pieces.append(block((side, bar, 0.016), (0.0, at, 0.008), 0.002))
-    mesh: trimesh.Trimesh = trimesh.util.concatenate(pieces)
+    mesh = trimesh.util.concatenate(pieces)
+    assert isinstance(mesh, trimesh.Trimesh)
     return mesh

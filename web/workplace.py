@@ -1,6 +1,7 @@
 """What stands still in the scene: floor, table, light, background and the first camera."""
 
-import numpy as np
+import math
+
 import viser
 
 from app.sim.cells import Cell
@@ -26,7 +27,7 @@ def build(server: viser.ViserServer, cell: Cell) -> None:
     scene.add_glb("/table/trim", table_trim(cell), cast_shadow=False)
     _floor(server, cell)
     _light(server)
-    _camera(server, cell)
+    _camera(server)
 
 
 def table_body(cell: Cell) -> bytes:
@@ -89,12 +90,11 @@ def _floor(server: viser.ViserServer, cell: Cell) -> None:
 
 def _light(server: viser.ViserServer) -> None:
     server.scene.configure_default_lights(enabled=True, cast_shadow=True)
-    pass
 
 
-def _camera(server: viser.ViserServer, cell: Cell) -> None:
+def _camera(server: viser.ViserServer) -> None:
     camera = server.initial_camera
-    camera.position = (2.75, -0.75, 1.5)
-    camera.look_at = (-0.05, 0.62, 0.05)
+    camera.position = (2.05, -0.85, 1.35)
+    camera.look_at = (-0.02, 0.66, 0.12)
     camera.up = (0.0, 0.0, 1.0)
-    camera.fov = np.deg2rad(42.0)
+    camera.fov = math.radians(40.0)

@@ -1,9 +1,9 @@
 """The networks of TD3: a residual actor and critics with layer normalisation.
 
-The actor adds to a base motion that is part of the observation: ``tanh(atanh(0.9 base) + net)``;
-its last layer starts near zero, so that the untrained policy is the straight joint move. These
-plain modules decide in the service; ``td3.py`` trains the same modules inside
-Stable-Baselines3.
+The actor adds to a base motion that is part of the observation,
+``tanh(atanh(0.9 base) + net)``; its last layer starts near zero, so that the untrained policy
+is the straight joint move. These plain modules decide in the service; ``td3.py`` trains the
+same modules inside Stable-Baselines3.
 
 Source: thesis section 5.3.4 (TD3); Lillicrap et al. 2016 and Fujimoto et al. 2018 for the
 losses. Deviates: residual action and layer normalisation are ours, they halve the time to 95 %.
@@ -30,16 +30,17 @@ class ResidualActor(nn.Module):
 
     def __init__(self, width: int) -> None:
         super().__init__()
+        last = nn.Linear(width, CONTROLLED)
+        with torch.no_grad():
+            last.weight.mul_(FIRST_RESIDUAL)
+            last.bias.zero_()
         self.net = nn.Sequential(
             nn.Linear(N_FEATURES, width),
             nn.ReLU(),
             nn.Linear(width, width),
             nn.ReLU(),
-            nn.Linear(width, CONTROLLED),
+            last,
         )
-        with torch.no_grad():
-            self.net[-1].weight.mul_(FIRST_RESIDUAL)
-            self.net[-1].bias.zero_()
 
     def forward(self, obs: torch.Tensor) -> torch.Tensor:
         """Return actions, shape (n, 5), for observations, shape (n, N_FEATURES)."""

@@ -27,7 +27,7 @@ class Preset:
     """TD3 on the pick scenario: all that a training run depends on besides its seed.
 
     The defaults are those of ``pick-td3``. Source: METHOD 3.3 and 3.5 for the form.
-    Deviates: table 5.2's values; these are the ones that learn in minutes (FACTS of the project:
+    Deviates: table 5.2's values; these are the ones that learn in minutes:
     residual action, features, n-step returns, batched cells). The source's recipe is its own
     preset.
     """
@@ -167,7 +167,7 @@ def resolve(name: str, overrides: Mapping[str, object]) -> Preset:
         InvalidInput: An unknown field, or a value outside its bounds.
     """
     known = {info.name: info for info in fields(name)}
-    checked = {}
+    checked: dict[str, Any] = {}
     for key, value in overrides.items():
         if key not in known:
             raise InvalidInput(

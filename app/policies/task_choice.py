@@ -118,7 +118,9 @@ class TaskChooser:
     def title(self) -> str:
         """Short text for people."""
         manifest = self._checkpoint.manifest
-        return f"{manifest['preset'].get('name', 'policy')}, {manifest['step'] / 1e6:.2f} M steps"
+        return (
+            f"{manifest['preset'].get('name', 'policy')}, {manifest['step'] / 1e6:.2f} M steps"
+        )
 
     @property
     def cell(self) -> str:
@@ -218,7 +220,7 @@ class _TrainedRanges:
                 low=float(low[i]),
                 high=float(high[i]),
             )
-            for i in np.flatnonzero(beyond)
+            for i in np.flatnonzero(beyond).tolist()
         )
 
 

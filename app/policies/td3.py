@@ -45,6 +45,12 @@ class _SB3Critic(ContinuousCritic):
         self.q_networks = [self.twin.q1, self.twin.q2]
 
 
+def twin_of(critic: ContinuousCritic) -> TwinCritic:
+    """Return this project's networks inside one of Stable-Baselines3's critics."""
+    assert isinstance(critic, _SB3Critic)
+    return critic.twin
+
+
 class PickPolicy(TD3Policy):
     """Builds the networks of this project instead of Stable-Baselines3's defaults."""
 
@@ -141,5 +147,5 @@ class PickTD3(TD3):
     def _update_actor(self, obs: torch.Tensor) -> None:
         loss = -self.critic.q1_forward(obs, self.actor(obs)).mean()
         self.actor.optimizer.zero_grad()
-        loss.backward()
+        loss.backward()  # type: ignore[no-untyped-call]
         self.actor.optimizer.step()

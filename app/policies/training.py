@@ -22,7 +22,7 @@ from app.errors import CheckpointMismatch, SimulationError
 from app.policies import checkpoint as formats
 from app.policies.checkpoint import Checkpoint
 from app.policies.presets import Preset
-from app.policies.td3 import PickTD3
+from app.policies.td3 import PickTD3, twin_of
 from app.policies.vecenv import PickVecEnv
 from app.sim.cells import load_cell
 from app.sim.kernels.arm import CONTROLLED
@@ -156,11 +156,12 @@ class _Run:
         return self.cpu_before + time.process_time() - self.cpu_start
 
     def _modules(self) -> dict[str, torch.nn.Module]:
+        model = self.model
         return {
-            "actor": self.model.actor.mu,
-            "critic": self.model.critic.twin,
-            "actor_target": self.model.actor_target.mu,
-            "critic_target": self.model.critic_target.twin,
+            "actor": model.actor.mu,
+            "critic": twin_of(model.critic),
+            "actor_target": model.actor_target.mu,
+            "critic_target": twin_of(model.critic_target),
         }
 
     def _optimizers(self) -> dict[str, torch.optim.Optimizer]:

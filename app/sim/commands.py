@@ -2,15 +2,16 @@
 
 The page, the HTTP interface and the tests change a world through these commands only; the
 world's one owner applies them between two ticks (:meth:`app.sim.world.World.apply`). Every
-command has a ``tag``, so that it can travel as JSON: ``{"tag": "toggle-candidate", "id": ...}``.
+command has a ``tag``, so that it can travel as JSON: ``{"tag": "toggle-candidate",
+"id": "cube1"}``.
 """
 
 import math
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-from app.errors import InvalidInput, NotFound
-from app.sim.cases import CASES
+from app.errors import InvalidInput
+from app.sim.cases import find_case
 from app.sim.cells import Cell
 from app.sim.ports import TaskPolicy
 
@@ -159,7 +160,7 @@ def check(command: Command, cell: Cell) -> None:
                 cell.station(name)
         case ToggleCandidate():
             cell.station(command.id)
-        case StartCase() if command.id not in CASES:
-            raise NotFound("case", command.id, tuple(CASES))
+        case StartCase():
+            find_case(command.id)
         case _:
             pass

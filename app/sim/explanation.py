@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from app.sim.cases import Case
 from app.sim.ports import Decision
 from app.sim.snapshot import ContactView, Status
 
@@ -21,8 +22,8 @@ _BODIES = {
     "hand_l": "the left hand",
     "leg_r": "the right leg",
     "leg_l": "the left leg",
-    "the cell": "the table",
-    "itself": "another part of the robot",
+    "table": "the table",
+    "robot": "another part of the robot",
 }
 
 
@@ -46,11 +47,20 @@ def going(decision: Decision, names: tuple[str, ...], label: Label) -> str:
     return f"{text}; next is {label(names[second])} at {decision.values[second]:.2f}."
 
 
-def touched(contact: ContactView) -> str:
-    """Return what touched what."""
+def touched(contact: ContactView, *, final: bool) -> str:
+    """Return what touched what; ``final`` where it ends a case study."""
     link = contact.link.replace("_", " ")
     body = _BODIES.get(contact.body, contact.body)
-    return f"Contact: {link} touched {body}. The robot starts again from home."
+    then = "The case ended." if final else "The robot starts again from home."
+    return f"Contact: {link} touched {body}. {then}"
+
+
+def case_ended(case: Case, goal: str | None, label: Label) -> str:
+    """Return how a case study ended, and whether that was expected."""
+    if goal is None:
+        return "Time is up in this case."
+    verdict = "as expected" if goal == case.expected else f"not at {label(case.expected)}"
+    return f"The case ended at {label(goal)}, {verdict}."
 
 
 def resting(status: Status, goal: str | None, label: Label) -> str:
@@ -64,9 +74,6 @@ def resting(status: Status, goal: str | None, label: Label) -> str:
     return {
         "picking": f"Reached {label(goal)}." if goal else "Reached.",
         "blocked": "Waiting at home: the person is in the robot's way.",
-        "case done": f"The case ended at {label(goal)}."
-        if goal
-        else "Time is up in this case.",
         "no candidates": "Nothing to do: click a cube or a dock to offer it.",
         "no policy": "Resting: no checkpoint acts.",
     }.get(status, "")

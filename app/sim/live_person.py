@@ -3,12 +3,12 @@
 Going from one to the other the person moves, it never jumps.
 """
 
-from app.sim.cases import Case
+from app.sim.cases import Case, script_of
 from app.sim.cells import Cell
 from app.sim.commands import Mode, MoveHuman
 from app.sim.dragged_person import DraggedPerson
 from app.sim.ports import Vec
-from app.sim.work_cycle import Script, WorkCycle, reach_script
+from app.sim.work_cycle import Script, WorkCycle
 
 
 class LivePerson:
@@ -38,9 +38,7 @@ class LivePerson:
 
     def _start_script(self, case: Case | None) -> None:
         self._script: WorkCycle | Script = (
-            WorkCycle(self._cell, self._seed)
-            if case is None
-            else reach_script(self._cell, case.hand, case.human_from, case.human_to)
+            WorkCycle(self._cell, self._seed) if case is None else script_of(self._cell, case)
         )
         self._t, self._joining = 0.0, False
 

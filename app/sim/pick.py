@@ -349,7 +349,7 @@ def tool_state(arm: Arm, q: Vec, qd: Vec, goal: Vec) -> tuple[float, float, floa
     """Return distance to a target [m], tilt [rad], tcp speed [m/s] and whether it succeeds."""
     pose = arm_kernel.new_pose(len(arm.link))
     arm_kernel.place_robot(arm, q, pose)
-    distance, tilt, speed = pick.tool_state(arm, q, qd, goal, pose)
+    distance, tilt, speed = pick.tool_state(arm, qd, goal, pose)
     return distance, tilt, speed, bool(pick.succeeded(distance, tilt, speed))
 
 

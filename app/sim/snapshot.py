@@ -20,8 +20,8 @@ Status = Literal[
     "no policy",
 ]
 """``picking``: the target is reached, the tool goes down and up again; ``blocked``: the robot
-waits at home because the person is in its way. In ``picking``, ``contact`` and ``case done`` the
-last decision stays as it was; in ``moving`` it belongs to this very state."""
+waits at home because the person is in its way. In ``picking``, ``contact`` and ``case done``
+the last decision stays as it was; in ``moving`` it belongs to this very state."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,12 +46,12 @@ class CandidateView:
 class ContactView:
     """The contact that ended an episode."""
 
-    kind: Literal["human", "cell", "self"]
-    """What the robot touched."""
+    kind: str
+    """What the robot touched: ``human``, ``cell`` or ``self``."""
     link: str
     """Robot link that touched."""
     body: str
-    """Body it touched."""
+    """The person's capsule that was touched, ``table`` or ``robot``."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,7 +101,7 @@ class WorldSnapshot:
     gripping: bool
     """Whether the fingers are closed."""
     selected: tuple[str, ...]
-    """Stations the visitor allows; the one just reached may be missing in ``candidates``."""
+    """Stations the visitor allows; those reached this round are missing in ``candidates``."""
     candidates: tuple[CandidateView, ...]
     """Stations the robot may choose now, in the cell's order."""
     chosen: str | None

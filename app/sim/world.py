@@ -4,7 +4,7 @@ The world advances in control periods of ``cell.robot.dt``. Each period the robo
 the action decided for the state it is in, the person moves, contact is tested between the ends
 of the period too, and the policy decides anew (METHOD 3.1). A reached target is picked up (the
 tool goes down and up again, by inverse kinematics and inside the same limits), leaves the
-candidates for one turn, and the next episode goes on from there. A contact is shown for two
+candidates until all have had their turn, and the next episode goes on from there. A contact is shown for two
 seconds; then the robot starts again from home.
 """
 
@@ -14,7 +14,7 @@ import numpy as np
 
 from app.errors import ServiceError
 from app.sim import commands, explanation, pick
-from app.sim.cases import CASES, Case
+from app.sim.cases import Case, find_case
 from app.sim.cells import Cell
 from app.sim.commands import Command
 from app.sim.kernels import kinematics
@@ -34,8 +34,8 @@ PICK_S = (0.9, 1.3, 2.0)
 """Times at which the tool is down, the fingers have closed, the tool is up again [s]."""
 GAIN = 3.0
 """Joint speed per joint error while picking [1/s]."""
-NEAR_M = 0.04
-"""Clearance below which picking waits [m]."""
+NEAR_M = 0.1
+"""Clearance below which picking is broken off, so that the policy can move away [m]."""
 
 
 class World:
@@ -49,7 +49,7 @@ class World:
     """
 
     def __init__(
-        self, cell: Cell, policy: TaskPolicy | None, seed: int, id: str = "live"
+        self, cell: Cell, policy: TaskPolicy | None, seed: int, id: str = "main"
     ) -> None:
         self.cell, self.id = cell, id
         self._arm, self._policy = pick.arm_of(cell), policy
@@ -69,19 +69,17 @@ class World:
 
     def _restart_robot(self) -> None:
         self._q, self._qd = self._start_q(), np.zeros(6)
-        self._held_out: str | None = None
+        self._done: set[str] = set()
         self._contact: ContactView | None = None
-        self._begin_episode()
-        if self._touches_here():
-            self._status = "blocked"
+        self._begin_episode("blocked" if self._touches_here() else "moving")
 
     def _start_q(self) -> Vec:
         if self._case is None:
             return np.array(self.cell.robot.home_q)
         return self._posture_over(self._case.robot_start)
 
-    def _begin_episode(self) -> None:
-        self._status: Status = "moving"
+    def _begin_episode(self, status: Status = "moving") -> None:
+        self._status: Status = status
         self._status_s, self._time_left = 0.0, TIME_LIMIT_S
         self._decision: Decision | None = None
         self._goal: str | None = None
@@ -118,6 +116,22 @@ class World:
             case commands.SetMode():
                 self._leave_case()
                 self._person.enter(command.mode)
+            case commands.Pause() | commands.Resume() | commands.StepOnce() | commands.Reset():
+                self._control_clock(command)
+            case commands.SetCandidates():
+                self._choose_among(set(command.ids))
+            case commands.ToggleCandidate():
+                self._choose_among(set(self._selected) ^ {command.id})
+            case commands.SetPolicy():
+                self._policy = command.policy
+                self._refresh()
+            case commands.StartCase():
+                self._start_case(find_case(command.id))
+
+    def _control_clock(
+        self, command: commands.Pause | commands.Resume | commands.StepOnce | commands.Reset
+    ) -> None:
+        match command:
             case commands.Pause():
                 self._paused = True
             case commands.Resume():
@@ -127,15 +141,6 @@ class World:
                 self._advance()
             case commands.Reset():
                 self._reset()
-            case commands.SetCandidates():
-                self._choose_among(set(command.ids))
-            case commands.ToggleCandidate():
-                self._choose_among(set(self._selected) ^ {command.id})
-            case commands.SetPolicy():
-                self._policy = command.policy
-                self._refresh()
-            case commands.StartCase():
-                self._start_case(CASES[command.id])
 
     def _start_case(self, case: Case) -> None:
         self._case, self._paused = case, False
@@ -153,7 +158,7 @@ class World:
     def _choose_among(self, ids: set[str]) -> None:
         self._leave_case()
         self._selected = tuple(name for name in self.cell.station_ids if name in ids)
-        self._own_choice, self._held_out = self._selected, None
+        self._own_choice, self._done = self._selected, set()
         self._refresh()
 
     def _refresh(self) -> None:
@@ -204,14 +209,12 @@ class World:
     def _action(self) -> Vec:
         """Return the wanted joint speeds over their limits, shape (5,)."""
         if self._status == "picking" and self._goal is not None:
-            if self._clearance is not None and self._clearance < NEAR_M:
-                return np.zeros(5)
             down = self._status_s < PICK_S[1]
             posture = self._posture_over(self._goal, PICK_HEIGHT if down else None)
             speed = GAIN * (posture - self._q) / self._arm.qd_max
             return np.asarray(np.clip(speed[:5], -1.0, 1.0))
         if self._decision is not None:
-            return self._decision.actions[self._decision.index].astype(np.float64)
+            return np.asarray(self._decision.actions[self._decision.index], dtype=np.float64)
         return np.zeros(5)
 
     def _judge(self, decision: Decision) -> None:
@@ -222,9 +225,7 @@ class World:
             self._goal, self._status, self._status_s = decision.chosen, "picking", 0.0
         elif self._time_left <= 0.0:
             self._count(timeouts=1)
-            self._begin_episode()
-            if self._case is not None:
-                self._status = "case done"
+            self._begin_episode("moving" if self._case is None else "case done")
 
     def _count(self, *, reached: int = 0, timeouts: int = 0, contacts: int = 0) -> None:
         so_far = self._counters
@@ -236,24 +237,27 @@ class World:
         )
 
     def _finish_pick(self) -> None:
-        if self._status_s < PICK_S[2]:
+        near = self._clearance is not None and self._clearance < NEAR_M
+        if self._status_s < PICK_S[2] and not near:
             return
         if self._case is not None:
             self._status = "case done"
         else:
-            self._held_out = self._goal
+            self._cross_off(self._goal)
             self._begin_episode()
 
+    def _cross_off(self, reached: str | None) -> None:
+        """Take a reached station out until all have had their turn."""
+        self._done.add(reached or "")
+        if self._done.issuperset(self._selected):
+            self._done = {reached or ""}
+
     def _touch(self, found: pick.Contact) -> None:
-        kinds = {"human": found.part, "cell": "the cell", "self": "itself"}
+        bodies = {"human": found.part, "cell": "table", "self": "robot"}
         self._contact = ContactView(
-            kind="human"
-            if found.kind == "human"
-            else "cell"
-            if found.kind == "cell"
-            else "self",
+            kind=found.kind,
             link=found.link,
-            body=kinds[found.kind],
+            body=bodies[found.kind],
         )
         self._count(contacts=1)
         self._qd = np.zeros(6)
@@ -261,16 +265,17 @@ class World:
 
     def _wait(self) -> None:
         if self._status == "contact" and self._status_s >= CONTACT_HOLD_S:
-            if self._case is not None:
-                self._person.start(self._case)
-            self._restart_robot()
+            if self._case is None:
+                self._restart_robot()
+            else:
+                self._status, self._goal = "case done", None
         elif self._status == "blocked" and not self._touches_here():
             self._begin_episode()
 
     # Deciding.
 
     def _candidates(self) -> tuple[Candidate, ...]:
-        names = [name for name in self._selected if name != self._held_out]
+        names = [name for name in self._selected if name not in self._done]
         return tuple(
             Candidate(id=name, position=np.array(self.cell.station(name).position))
             for name in names or self._selected
@@ -311,18 +316,22 @@ class World:
         self._note, self._note_until = note, self._t + NOTE_S
 
     def _shown_status(self) -> Status:
-        if self._status != "moving" or self._decision is not None:
-            return self._status
-        return "no policy" if self._selected else "no candidates"
+        if self._status == "moving" and self._decision is None:
+            return "no policy" if self._selected else "no candidates"
+        return self._status
 
     def _message(self, status: Status) -> str:
         if status == "contact" and self._contact is not None:
-            return explanation.touched(self._contact)
+            return explanation.touched(self._contact, final=self._case is not None)
         if self._t < self._note_until and status in ("moving", "no policy"):
             return self._note
         if status == "moving" and self._decision is not None:
             names = tuple(candidate.id for candidate in self._offered)
             return explanation.going(self._decision, names, self._label)
+        if status == "case done" and self._case is not None:
+            if self._contact is not None:
+                return explanation.touched(self._contact, final=True)
+            return explanation.case_ended(self._case, self._goal, self._label)
         return explanation.resting(status, self._goal, self._label)
 
     def _view(self, index: int, candidate: Candidate) -> CandidateView:

@@ -5,11 +5,16 @@ import numpy as np
 from app.policies.evaluation.episodes import Index, Rule, View
 
 
+def _n_candidates(view: View) -> Index:
+    count: Index = np.isfinite(view.distances).sum(axis=1)
+    return count
+
+
 def critic(hysteresis: float) -> Rule:
     """Return the critic's choice at every step; 0 is the source's rule."""
 
     def rule(view: View) -> Index:
-        best = view.values.argmax(axis=1)
+        best: Index = view.values.argmax(axis=1)
         if view.first:
             return best
         rows = np.arange(len(best))
@@ -21,7 +26,8 @@ def critic(hysteresis: float) -> Rule:
 
 def nearest(view: View) -> Index:
     """Choose, at every step, the candidate nearest to the tcp."""
-    return view.distances.argmin(axis=1)
+    choice: Index = view.distances.argmin(axis=1)
+    return choice
 
 
 def at_random(seed: int, n_episodes: int) -> Rule:
@@ -31,8 +37,7 @@ def at_random(seed: int, n_episodes: int) -> Rule:
     def rule(view: View) -> Index:
         if not view.first:
             return view.chosen
-        count = np.isfinite(view.distances).sum(axis=1)
-        return (draw[view.rows] * count).astype(np.int64)
+        return (draw[view.rows] * _n_candidates(view)).astype(np.int64)
 
     return rule
 
@@ -41,7 +46,6 @@ def fixed(place: int) -> Rule:
     """Return the rule that keeps the candidate at ``place``, or the last one there is."""
 
     def rule(view: View) -> Index:
-        count = np.isfinite(view.distances).sum(axis=1)
-        return np.minimum(place, count - 1)
+        return np.minimum(place, _n_candidates(view) - 1)
 
     return rule

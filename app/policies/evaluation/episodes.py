@@ -30,7 +30,7 @@ class View:
     values: NDArray[np.float32]
     """Critic's value of every candidate, -inf where there are fewer, shape (n, k)."""
     distances: NDArray[np.float64]
-    """Distance from tcp to each candidate, one common unit, inf where there are fewer, (n, k)."""
+    """Distance from tcp to each candidate [half m], inf where there are fewer, (n, k)."""
     chosen: Index
     """Candidate pursued so far, shape (n,); meaningless at the first step."""
     first: bool
@@ -72,8 +72,11 @@ class Episodes:
 
 
 def settings_for(n_candidates: tuple[int, int], preset: dict[str, object]) -> PickSettings:
-    """Return the evaluation's settings: 10 s, start clearance 0.05 m, exact stations, unseen
-    postures of the person.
+    """Return the evaluation's settings: 10 s, start clearance 0.05 m, unseen postures.
+
+    Args:
+        n_candidates: Fewest and most targets offered.
+        preset: The checkpoint's preset, as its manifest holds it.
     """
     pace = preset.get("human_pace", 1.0)
     return PickSettings(

@@ -11,7 +11,6 @@ from app.policies.checkpoint import Checkpoint
 from app.policies.evaluation import choice_rules
 from app.policies.evaluation.episodes import Episodes, Evaluator, settings_for
 from app.policies.task_choice import HYSTERESIS, ValueNetworks
-from app.sim.cells import load_cell
 from app.sim.kernels import pick as kernel
 from app.sim.pick import hand_speeds
 from app.sim.recheck import recheck_trajectories
@@ -106,4 +105,3 @@ def _in_hindsight(runs: list[Episodes]) -> dict[str, object]:
         trajectories=(),
     )
     return pooled.row("rollout")
-

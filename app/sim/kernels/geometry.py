@@ -9,6 +9,7 @@ import math
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from app.sim.ports import Vec
 
@@ -72,7 +73,7 @@ def pair_distance2(a: Vec, b: Vec) -> float:
     wx, wy, wz = a[0, 0] - b[0, 0], a[0, 1] - b[0, 1], a[0, 2] - b[0, 2]
     s, t = segment_parameters(ux, uy, uz, vx, vy, vz, wx, wy, wz)
     x, y, z = wx + s * ux - t * vx, wy + s * uy - t * vy, wz + s * uz - t * vz
-    return x * x + y * y + z * z
+    return float(x * x + y * y + z * z)
 
 
 @njit(cache=True, error_model="numpy")
@@ -159,7 +160,7 @@ def capsule_distance(a: Vec, radius_a: float, b: Vec, radius_b: float) -> float:
 
 @njit(cache=True)
 def place_capsules(
-    rot: Vec, pos: Vec, link: Vec, p0: Vec, p1: Vec, first: int, out: Vec
+    rot: Vec, pos: Vec, link: NDArray[np.int64], p0: Vec, p1: Vec, first: int, out: Vec
 ) -> None:
     """Write the end points of capsules tied to links.
 

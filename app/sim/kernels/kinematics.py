@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from app.sim.ports import Vec
 
@@ -101,7 +102,7 @@ def tcp_point(rot: Vec, pos: Vec, tool_length: float, out: Vec) -> None:
 
 
 @njit(cache=True)
-def tcp_jacobian(q: Vec, rot: Vec, pos: Vec, tcp: Vec, out: Vec) -> None:
+def tcp_jacobian(rot: Vec, pos: Vec, tcp: Vec, out: Vec) -> None:
     """Write the tcp's linear Jacobian [m/rad] into ``out``, shape (3, 6)."""
     for j in range(6):
         link = j + 1
@@ -156,13 +157,13 @@ def ik_vertical(target: Vec, tool_length: float, q_min: Vec, q_max: Vec, out: Ve
         if out[j] < q_min[j] or out[j] > q_max[j]:
             reached = False
             out[j] = min(q_max[j], max(q_min[j], out[j]))
-    return reached
+    return bool(reached)
 
 
 @njit(cache=True)
 def ik_vertical_batch(
     targets: Vec, tool_length: float, q_min: Vec, q_max: Vec
-) -> tuple[Vec, Vec]:
+) -> tuple[Vec, NDArray[np.bool_]]:
     """Apply :func:`ik_vertical` to targets of shape (n, 3).
 
     Returns:

@@ -1,0 +1,57 @@
+"""A policy without learning, for tests of what a policy drives: straight joint moves.
+
+It values a candidate by the way to go and by how near a hand is to it.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from app.sim import human
+from app.sim.cells import Cell
+from app.sim.kernels import kinematics
+from app.sim.pick import arm_of
+from app.sim.ports import Candidate, Decision, Person, Vec
+
+
+class StraightPolicy:
+    checkpoint = "0" * 64
+    title = "straight moves"
+
+    def __init__(self, cell: Cell) -> None:
+        self.cell = cell.name
+        self._arm, self._pelvis_z = arm_of(cell), cell.pelvis_z
+
+    def decide(
+        self,
+        q: Vec,
+        qd: Vec,
+        people: Sequence[Person],
+        candidates: Sequence[Candidate],
+        *,
+        previous: str | None = None,
+        time_left_s: float = 10.0,
+    ) -> Decision:
+        goals = np.array([candidate.position for candidate in candidates])
+        arm = self._arm
+        postures, reachable = kinematics.ik_vertical_batch(
+            goals, arm.tool_length, arm.q_min, arm.q_max
+        )
+        points = human.joint_points(people[0].q, self._pelvis_z)
+        hands = np.stack([points["hand_r"], points["hand_l"]])
+        near = np.linalg.norm(goals[:, None] - hands, axis=2).min(axis=1)
+        values = 4.0 - np.abs(postures - q).max(axis=1) - 4.0 * np.exp(-((near / 0.2) ** 2))
+        index = int(values.argmax())
+        speed = np.clip(2.5 * (postures - q), -arm.qd_max, arm.qd_max)
+        return Decision(
+            chosen=candidates[index].id,
+            index=index,
+            values=tuple(float(value) for value in values),
+            actions=(speed / arm.qd_max)[:, :5].astype(np.float32),
+            qd_target=speed,
+            reachable=tuple(bool(found) for found in reachable),
+            outside=(),
+            outside_candidates=((),) * len(candidates),
+            checkpoint=self.checkpoint,
+            elapsed_ms=0.0,
+        )

@@ -1,0 +1,97 @@
+import socket
+import time
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from app.errors import InvalidInput, NotFound
+from app.sim import commands
+from app.sim.cells import load_cell
+from tests.straight_policy import StraightPolicy
+from tests.web.viewer_client import ViewerClient
+from web.loop import LiveCell
+
+WAIT_S = 10.0
+
+
+@pytest.fixture(scope="module")
+def live() -> Iterator[LiveCell]:
+    cell = load_cell()
+    live = LiveCell(cell, StraightPolicy(cell), seed=2)
+    live.start()
+    yield live
+    live.stop()
+
+
+def wait_for(condition: Callable[[], bool]) -> None:
+    end = time.monotonic() + WAIT_S
+    while not condition():
+        assert time.monotonic() < end, "it never happened"
+        time.sleep(0.01)
+
+
+def test_world_ticks_without_any_client(live: LiveCell) -> None:
+    first = live.handle.snapshot()
+    wait_for(lambda: live.handle.snapshot().tick >= first.tick + 20)
+    assert live.handle.snapshot().t_s > first.t_s
+
+
+def test_simulated_time_never_runs_ahead_of_the_clock(live: LiveCell) -> None:
+    start, first = time.monotonic(), live.handle.snapshot().tick
+    wait_for(lambda: live.handle.snapshot().tick >= first + 15)
+    elapsed = time.monotonic() - start
+    ticks = live.handle.snapshot().tick - first
+    assert ticks * 0.05 <= elapsed + 0.3
+
+
+def test_viewer_listens_on_loopback_only(live: LiveCell) -> None:
+    assert live.server.get_host() == "127.0.0.1"
+    with socket.create_connection(("127.0.0.1", live.viewer_port), timeout=5.0):
+        pass
+
+
+def test_commands_are_carried_out_in_order(live: LiveCell) -> None:
+    live.handle.submit(commands.SetCandidates(ids=("cube1",)))
+    live.handle.submit(commands.ToggleCandidate(id="cube2"))
+    live.handle.submit(commands.ToggleCandidate(id="cube1"))
+    wait_for(lambda: live.handle.snapshot().selected == ("cube2",))
+
+
+def test_bad_commands_are_refused_at_the_door(live: LiveCell) -> None:
+    with pytest.raises(NotFound):
+        live.handle.submit(commands.ToggleCandidate(id="cube9"))
+    with pytest.raises(InvalidInput):
+        live.handle.submit(commands.MoveHuman(pelvis=(float("inf"), 0.0, 0.0)))
+
+
+def test_click_on_a_cube_toggles_it_as_candidate(live: LiveCell) -> None:
+    live.handle.submit(commands.SetCandidates(ids=("cube0",)))
+    wait_for(lambda: live.handle.snapshot().selected == ("cube0",))
+    with ViewerClient(live.viewer_port) as visitor:
+        visitor.click("/stations/cube3")
+        wait_for(lambda: live.handle.snapshot().selected == ("cube0", "cube3"))
+        visitor.click("/stations/cube0")
+        wait_for(lambda: live.handle.snapshot().selected == ("cube3",))
+
+
+def test_drag_of_a_hand_moves_the_person(live: LiveCell) -> None:
+    live.handle.submit(commands.SetMode(mode="manual"))
+    live.handle.submit(commands.MoveHuman(pelvis=(0.0, 1.3, -1.5708)))
+    wait_for(lambda: abs(live.handle.snapshot().person_q[1] - 1.3) < 0.02)
+    before = live.handle.snapshot().person_q
+    with ViewerClient(live.viewer_port) as visitor:
+        visitor.drag("/gizmos/right", [(0.1, 0.95, 0.3), (0.15, 0.9, 0.25)])
+        wait_for(lambda: abs(live.handle.snapshot().person_q[10] - before[10]) > 0.2)
+
+
+def test_stop_ends_thread_and_viewer() -> None:
+    cell = load_cell()
+    live = LiveCell(cell, None)
+    live.start()
+    port = live.viewer_port
+    live.stop()
+    live.stop()
+    tick = live.handle.snapshot().tick
+    with pytest.raises(OSError):
+        socket.create_connection(("127.0.0.1", port), timeout=1.0)
+    assert live.handle.snapshot().tick == tick

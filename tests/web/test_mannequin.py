@@ -1,0 +1,85 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.sim import human
+from app.sim.cells import load_cell
+from web import mannequin, skeleton
+from web.gait import Gait
+from web.model_mannequin import model
+
+
+def test_every_vertex_of_a_soft_part_is_held_by_its_bones() -> None:
+    bones = skeleton.bind_bones()
+    for part in mannequin.parts():
+        if part.bone is None:
+            assert np.allclose(sum(part.weights.values()), 1.0)
+            assert set(part.weights) <= set(bones)
+        else:
+            assert part.bone in bones
+
+
+def test_surfaces_are_closed_and_point_outward() -> None:
+    for part in mannequin.parts():
+        faces = part.surface.faces
+        edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+        _, uses = np.unique(edges, axis=0, return_counts=True)
+        assert (uses == 2).all(), part.name
+        a, b, c = (part.surface.vertices[faces[:, k]] for k in range(3))
+        assert np.einsum("ij,ij->i", a, np.cross(b, c)).sum() > 0.0, part.name
+
+
+def test_shipped_surfaces_are_what_the_script_models(tmp_path: Path) -> None:
+    mannequin.save(model(), tmp_path / "fresh.npz")
+    with np.load(tmp_path / "fresh.npz") as fresh:
+        for part in mannequin.parts():
+            surface = mannequin.load(part.name, fresh)
+            assert surface.vertices.shape == part.surface.vertices.shape
+            assert np.allclose(surface.vertices, part.surface.vertices, atol=1e-4)
+
+
+def test_hands_of_the_mannequin_are_where_the_simulators_hands_are() -> None:
+    cell = load_cell()
+    q = human.rest_posture(*cell.human.home)
+    target = np.array([0.1, 0.8, 0.2])
+    q = human.solve_hands(q, cell.pelvis_z, right=target).q
+    gait = Gait(cell.floor_z)
+    gait.follow(human.body_frames(q, cell.pelvis_z)["pelvis"], 0.0)
+    bones = skeleton.bones(q, cell.pelvis_z, gait.feet)
+    glove = next(part for part in mannequin.parts() if part.name == "hand_r")
+    frame = bones["hand_r"]
+    vertices = glove.surface.vertices @ frame[:3, :3].T + frame[:3, 3]
+    palm = human.joint_points(q, cell.pelvis_z)["hand_r"]
+    assert np.linalg.norm(vertices - palm, axis=1).min() < 0.04
+    assert np.linalg.norm(vertices.mean(axis=0) - palm) < 0.06
+
+
+def test_feet_stand_still_for_a_small_sway_and_step_after_a_walk() -> None:
+    gait, pelvis = Gait(0.0), np.eye(4)
+    gait.follow(pelvis, 0.0)
+    planted = {side: foot.copy() for side, foot in gait.feet.items()}
+    pelvis[0, 3] = 0.05
+    assert not gait.follow(pelvis, 0.05)
+    assert all(np.array_equal(gait.feet[side], planted[side]) for side in planted)
+    for _ in range(60):
+        pelvis[0, 3] += 0.04
+        gait.follow(pelvis, 0.05)
+    for _ in range(20):
+        gait.follow(pelvis, 0.05)
+    for foot in gait.feet.values():
+        assert abs(foot[0, 3] - pelvis[0, 3]) < 0.13
+        assert foot[2, 3] == pytest.approx(skeleton.ANKLE_HEIGHT)
+
+
+def test_legs_reach_from_hip_to_ankle_while_a_foot_swings() -> None:
+    cell = load_cell()
+    gait, q = Gait(cell.floor_z), human.rest_posture(0.0, 1.4, -1.57)
+    for _ in range(80):
+        q[0] += 0.02
+        gait.follow(human.body_frames(q, cell.pelvis_z)["pelvis"], 0.05)
+        bones = skeleton.bones(q, cell.pelvis_z, gait.feet)
+        for side in skeleton.SIDES:
+            shin = bones[f"shin_{side}"]
+            ankle = shin[:3, 3] - skeleton.SHIN * shin[:3, 2]
+            assert np.linalg.norm(ankle - bones[f"foot_{side}"][:3, 3]) < 0.06

@@ -1,0 +1,135 @@
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+import viser
+
+from app.sim import commands, human
+from app.sim.cells import Cell, load_cell
+from app.sim.commands import Command
+from app.sim.robot import LINK_NAMES, Robot
+from app.sim.world import World
+from tests.straight_policy import StraightPolicy
+from web.loop import free_port
+from web.scene import CellScene, dashes
+from web.stations_view import IDLE, RAMP, color_of
+
+
+@pytest.fixture(scope="module")
+def cell() -> Cell:
+    return load_cell()
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[viser.ViserServer]:
+    server = viser.ViserServer(host="127.0.0.1", port=free_port("127.0.0.1"), verbose=False)
+    yield server
+    server.stop()
+
+
+@pytest.fixture(scope="module")
+def queued() -> list[Command]:
+    return []
+
+
+@pytest.fixture(scope="module")
+def scene(server: viser.ViserServer, cell: Cell, queued: list[Command]) -> CellScene:
+    return CellScene(server, cell, queued.append)
+
+
+@pytest.fixture
+def world(cell: Cell) -> World:
+    return World(cell, StraightPolicy(cell), seed=2)
+
+
+def node(server: viser.ViserServer, name: str) -> viser.SceneNodeHandle:
+    handle = server.scene.get_handle_by_name(name)
+    assert handle is not None, name
+    return handle
+
+
+def test_links_are_placed_where_pinocchio_says(
+    scene: CellScene, server: viser.ViserServer, world: World, cell: Cell
+) -> None:
+    for _ in range(20):
+        world.step()
+    snapshot = world.snapshot()
+    scene.draw(snapshot, 0.05)
+    poses = Robot(cell.robot.tool_length).link_poses(snapshot.robot_q)
+    for name, pose in zip(LINK_NAMES, poses, strict=True):
+        assert np.allclose(node(server, f"/robot/{name}").position, pose[:3, 3], atol=1e-9)
+
+
+def test_chosen_station_is_ringed_and_green_and_others_are_not(
+    scene: CellScene, server: viser.ViserServer, world: World, cell: Cell
+) -> None:
+    world.apply(commands.SetCandidates(ids=("cube0", "cube4")))
+    snapshot = world.snapshot()
+    scene.draw(snapshot, 0.05)
+    assert snapshot.chosen is not None
+    x, y, _ = cell.station(snapshot.chosen).position
+    assert tuple(node(server, "/chosen").position) == (x, y, 0.0)
+    assert tuple(node(server, f"/stations/{snapshot.chosen}").color) == RAMP[0][1]
+    assert tuple(node(server, "/stations/cube2").color) == IDLE
+    text = node(server, f"/labels/{snapshot.chosen}").text
+    assert f"{snapshot.values[snapshot.chosen]:.2f}" in text
+    assert not node(server, "/labels/cube2").visible
+
+
+def test_gizmos_are_seen_in_manual_mode_only_and_sit_on_the_hands(
+    scene: CellScene, server: viser.ViserServer, world: World, cell: Cell
+) -> None:
+    scene.draw(world.snapshot(), 0.05)
+    assert not node(server, "/gizmos/right").visible
+    world.apply(commands.SetMode(mode="manual"))
+    scene.draw(world.snapshot(), 0.05)
+    palms = human.joint_points(world.snapshot().person_q, cell.pelvis_z)
+    assert node(server, "/gizmos/right").visible
+    assert np.allclose(node(server, "/gizmos/right").position, palms["hand_r"], atol=1e-3)
+
+
+def test_contact_shows_what_touched_in_red(
+    scene: CellScene, server: viser.ViserServer, world: World
+) -> None:
+    world.apply(commands.SetCandidates(ids=("cube2",)))
+    world.apply(commands.MoveHuman(pelvis=(0.0, 1.15, -1.57), right=(-0.1, 0.62, 0.2)))
+    for _ in range(300):
+        world.step()
+        if world.snapshot().status == "contact":
+            break
+    snapshot = world.snapshot()
+    assert snapshot.contact is not None
+    scene.draw(snapshot, 0.05)
+    touched = f"/person/shapes/{snapshot.contact.body}"
+    assert node(server, touched).visible
+    assert not node(server, "/person/shapes/head").visible
+
+
+def test_collision_shapes_lie_over_the_person_when_asked_for(
+    scene: CellScene, server: viser.ViserServer, world: World, cell: Cell
+) -> None:
+    scene.overlays.shapes = True
+    snapshot = world.snapshot()
+    scene.draw(snapshot, 0.05)
+    ends = human.capsules(snapshot.person_q, cell.pelvis_z, cell.floor_z)
+    for name, pair in zip(human.CAPSULE_NAMES, ends, strict=True):
+        capsule = node(server, f"/person/shapes/{name}")
+        assert capsule.visible
+        assert np.allclose(capsule.position, pair.mean(axis=0), atol=1e-9)
+    scene.overlays.shapes = False
+    scene.draw(snapshot, 0.05)
+    assert not node(server, "/person/shapes/head").visible
+
+
+def test_colour_runs_from_green_for_the_best_to_red_for_the_worst() -> None:
+    assert color_of(3.0, 3.0) == RAMP[0][1]
+    assert color_of(-9.0, 3.0) == RAMP[-1][1]
+    shades = [color_of(3.0 - x, 3.0) for x in np.linspace(0.0, 1.6, 9)]
+    assert len(set(shades)) == 9
+
+
+def test_path_runs_from_the_tool_to_the_target() -> None:
+    start, end = np.array([0.0, 0.3, 0.5]), np.array([0.3, 0.7, 0.12])
+    line = dashes(start, end)
+    assert np.linalg.norm(line[0, 0] - start) < 0.05
+    assert np.linalg.norm(line[-1, 1] - end) < 0.05
