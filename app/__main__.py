@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from app.errors import InvalidInput, NotFound, ServiceError
 from app.settings import Settings, check_access, load_settings
+from app.sim.kernel_cache import kernel_cache
 
 if TYPE_CHECKING:
     from app.policies.checkpoint import Checkpoint
@@ -101,11 +102,12 @@ def parser() -> argparse.ArgumentParser:
 
 def run_serve(options: argparse.Namespace) -> int:
     """Start the service; the port is taken before anything else."""
-    from app.listening import listen
+    from app.listening import check_alone, listen
 
     settings = load_settings(host=options.host, port=options.port, data=options.data)
     check_access(settings)
     sock = listen(settings.host, settings.port)
+    check_alone(settings)
     prepare_kernels(settings)
     import torch
 
@@ -135,7 +137,7 @@ def run_setup(_options: argparse.Namespace) -> int:
         lock.release()
     print(f"database: {store.shown_url}", flush=True)
     store.close()
-    print("compiling the simulator's kernels (half a minute, once) ...", flush=True)
+    print("compiling the simulator's kernels (a minute or two, once) ...", flush=True)
     from app.warm_up import warm_up
 
     print(f"kernels are ready ({warm_up():.1f} s)", flush=True)
@@ -252,8 +254,7 @@ def run_cells(options: argparse.Namespace) -> int:
 
 def prepare_kernels(settings: Settings) -> None:
     """Keep compiled kernels in the data folder, so that a read-only source tree works."""
-    cache = settings.data.resolve() / "kernels"
-    os.environ.setdefault("NUMBA_CACHE_DIR", str(cache))
+    os.environ.setdefault("NUMBA_CACHE_DIR", str(kernel_cache(settings.data)))
 
 
 def find_checkpoint(reference: str, settings: Settings) -> "Checkpoint":
@@ -266,7 +267,7 @@ def find_checkpoint(reference: str, settings: Settings) -> "Checkpoint":
     from app.policies.checkpoint import load
     from app.store.checkpoints import get_checkpoint, read_tensors
     from app.store.engine import Store
-    from app.store.migrate import check_schema
+    from app.store.schema import check_schema
 
     path = Path(reference)
     if path.suffix == ".safetensors":

@@ -5,6 +5,7 @@
     ├── InvalidInput         a value breaks a rule: field, value, rule, choices
     ├── Conflict             the request contradicts the present state
     │   └── StaleAttempt     a worker writes about a job that is no longer its own
+    ├── StorageUnavailable   the database does not answer for now
     ├── StorageFull          the database or the disk has no room left
     ├── NotReady             the service cannot answer yet, or not now
     ├── SimulationError      the simulator met a state it must never meet
@@ -106,6 +107,23 @@ class StaleAttempt(Conflict):
     def problem(self) -> dict[str, object]:
         """Return the job and the attempt."""
         return {"job": self.job_id, "attempt": self.attempt}
+
+
+class StorageUnavailable(ServiceError):
+    """The database does not answer for now: locked for too long, unreachable, unreadable.
+
+    Args:
+        database: Which one, as a URL without its password.
+        reason: What the database said.
+    """
+
+    def __init__(self, database: str, reason: str) -> None:
+        super().__init__(f"{database} cannot be used for now: {reason}")
+        self.database, self.reason = database, reason
+
+    def problem(self) -> dict[str, object]:
+        """Return the database and its reason."""
+        return {"database": self.database, "reason": self.reason}
 
 
 class StorageFull(ServiceError):

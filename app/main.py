@@ -110,7 +110,7 @@ class Service:
             policy = self.parts.policies.load(DEFAULT_ALIAS)
             if self.parts.stopping.is_set():
                 return
-            cell = LiveCell(load_cell(LIVE_CELL), policy)
+            cell = LiveCell(load_cell(LIVE_CELL), policy, id=WORLD_ID)
             cell.start()
             self.parts.worlds[WORLD_ID] = cell
             readiness.ready, readiness.reason = True, "ready"

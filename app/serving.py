@@ -5,7 +5,7 @@ uncompressed: compressing them costs more than it saves.
 """
 
 import socket
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from types import FrameType
 
 import uvicorn
@@ -14,11 +14,12 @@ from fastapi import FastAPI
 from app.listening import address_of
 from app.main import create_app
 from app.settings import Settings
-from app.store.engine import Store
-from app.store.lock import ServerLock
 
 GRACE_S = 3
 """How long open requests may go on once the server stops [s]."""
+
+MAX_FRAME_BYTES = 64 * 1024 * 1024
+"""Largest frame a browser may send to the viewer: a picture of its canvas."""
 
 Say = Callable[[str], None]
 
@@ -38,6 +39,27 @@ class Server(uvicorn.Server):
         super().handle_exit(sig, frame)
 
 
+def server_of(app: FastAPI, tell: Callable[[], Awaitable[None]] | None = None) -> Server:
+    """Return the server that runs an application.
+
+    Args:
+        app: The application.
+        tell: Called once a second.
+    """
+    config = uvicorn.Config(
+        app,
+        log_config=None,
+        access_log=False,
+        ws_per_message_deflate=False,
+        ws_max_size=MAX_FRAME_BYTES,
+        timeout_graceful_shutdown=GRACE_S,
+        callback_notify=tell,
+        timeout_notify=0,
+        server_header=False,
+    )
+    return Server(config, app)
+
+
 def serve(settings: Settings, sock: socket.socket, say: Say) -> None:
     """Run the service until it is told to stop.
 
@@ -45,11 +67,7 @@ def serve(settings: Settings, sock: socket.socket, say: Say) -> None:
         settings: Where and how it runs.
         sock: Listening socket.
         say: Told the address once it can decide, or why it cannot.
-
-    Raises:
-        Conflict: Another server uses the same database.
     """
-    check_alone(settings)
     say(f"Tandem starts: {address_of(sock)}")
     app = create_app(settings)
     told: list[str] = []
@@ -65,31 +83,4 @@ def serve(settings: Settings, sock: socket.socket, say: Say) -> None:
         for line in told:
             say(line)
 
-    config = uvicorn.Config(
-        app,
-        log_config=None,
-        access_log=False,
-        ws_per_message_deflate=False,
-        ws_max_size=64 * 1024 * 1024,
-        timeout_graceful_shutdown=GRACE_S,
-        callback_notify=tell,
-        timeout_notify=0,
-        server_header=False,
-    )
-    Server(config, app).run(sockets=[sock])
-
-
-def check_alone(settings: Settings) -> None:
-    """Make sure that no other server uses the data folder or database.
-
-    Raises:
-        Conflict: One does.
-    """
-    settings.data.mkdir(parents=True, exist_ok=True)
-    store = Store(settings.database)
-    lock = ServerLock(store, settings.data)
-    try:
-        lock.acquire()
-    finally:
-        lock.release()
-        store.close()
+    server_of(app, tell).run(sockets=[sock])

@@ -1,4 +1,4 @@
-"""One attempt of a job in a process of its own: arguments, settings, logging, end.
+"""One attempt of a job in a process of its own: arguments, logging, end.
 
 ``jobs.run`` is the entry point; it brings the runners.
 """
@@ -15,8 +15,8 @@ from typing import Any
 
 from app.errors import InvalidInput, ServiceError
 from app.store.engine import Store
-from app.store.migrate import check_schema
 from app.store.records import Claim
+from app.store.schema import check_schema
 from jobs.worker import Runner, Worker, die_with_parent
 
 logger = logging.getLogger(__name__)
@@ -25,11 +25,16 @@ NICENESS = 10
 """Training yields to the server and its live cell."""
 
 
-def main(runners: Mapping[str, Runner], arguments: Sequence[str] | None = None) -> int:
+def main(
+    runners: Mapping[str, Runner],
+    database_url: str,
+    arguments: Sequence[str] | None = None,
+) -> int:
     """Run the attempt that the command line names.
 
     Args:
         runners: How each kind of job is run.
+        database_url: The database that holds the job.
         arguments: Command line; that of the process by default.
 
     Returns:
@@ -46,7 +51,7 @@ def main(runners: Mapping[str, Runner], arguments: Sequence[str] | None = None) 
     faulthandler.enable()
     _set_up_logging(options.job, options.attempt)
     try:
-        store = Store(os.environ["TANDEM_DATABASE_URL"])
+        store = Store(database_url)
         check_schema(store)
         worker = Worker(store, Claim(job_id=options.job, attempt=options.attempt))
     except ServiceError as error:
@@ -71,4 +76,3 @@ def _set_up_logging(job_id: str, attempt: int) -> None:
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(line)
     logging.basicConfig(level=logging.INFO, handlers=[handler])
-    logging.getLogger("alembic").setLevel(logging.WARNING)

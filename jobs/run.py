@@ -11,13 +11,19 @@ from typing import Any
 
 import torch
 
+from app.errors import CheckpointMismatch
 from app.policies import checkpoint as formats
 from app.policies import presets
 from app.policies.checkpoint import Checkpoint
+from app.policies.evaluation.protocols import evaluate as run_protocol
 from app.policies.training import Progress
 from app.policies.training import train as train_policy
+from app.settings import load_settings
+from app.store import checkpoints
+from app.store.engine import Store
 from app.store.records import NewCheckpoint, ResumeState
 from jobs.attempt import main
+from jobs.spec import EvaluateSpec, parse_spec
 from jobs.worker import Runner, Worker
 
 
@@ -58,10 +64,32 @@ def _new(policy: Checkpoint) -> NewCheckpoint:
     return NewCheckpoint(sha256=policy.sha256, manifest=policy.manifest, tensors=policy.tensors)
 
 
-RUNNERS: Mapping[str, Runner] = {"train": train}
+def evaluate(worker: Worker) -> dict[str, Any]:
+    """Measure the job's checkpoint by its protocol."""
+    worker.end_at_once()
+    spec = parse_spec(worker.job.spec)
+    assert isinstance(spec, EvaluateSpec)
+    return run_protocol(
+        spec.protocol,
+        _stored(worker.store, spec.checkpoint),
+        episodes=spec.episodes,
+        seed=spec.seed,
+    )
+
+
+def _stored(store: Store, reference: str) -> Checkpoint:
+    record = checkpoints.get_checkpoint(store, reference)
+    tensors = checkpoints.read_tensors(store, record.sha256)
+    checkpoint = formats.load(dict(record.manifest), tensors)
+    if checkpoint.sha256 != record.sha256:
+        raise CheckpointMismatch("sha256", record.sha256, checkpoint.sha256)
+    return checkpoint
+
+
+RUNNERS: Mapping[str, Runner] = {"train": train, "evaluate": evaluate}
 """How each kind of job is run."""
 
 
 if __name__ == "__main__":
     torch.set_num_threads(1)
-    sys.exit(main(RUNNERS))
+    sys.exit(main(RUNNERS, load_settings().database))

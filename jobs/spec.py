@@ -1,6 +1,8 @@
 """Job specs: what may be posted, checked in full before anything is queued.
 
     {"kind": "train", "preset": "pick-td3", "seed": 1, "overrides": {"total_steps": 20000}}
+    {"kind": "evaluate", "protocol": "pick-single", "episodes": 1000, "seed": 11,
+     "checkpoint": "pick"}
 
 An unknown field is an error. The body is stored unchanged with the job.
 """
@@ -11,13 +13,18 @@ from typing import Any
 
 from app.errors import InvalidInput
 from app.policies import presets
+from app.policies.evaluation.protocols import MAX_EPISODES, PROTOCOLS
 from app.store.records import NewJob
 
-MAX_SEED = 2**32 - 1
+MAX_SEED = 2**31 - 1
 """Greatest seed; every random stream accepts it."""
+
+DEFAULT_CHECKPOINT = "pick"
+"""Alias of the checkpoint that is evaluated unless another is named."""
 
 _FIELDS = {
     "train": ("kind", "preset", "seed", "overrides"),
+    "evaluate": ("kind", "protocol", "episodes", "seed", "checkpoint"),
 }
 
 
@@ -35,7 +42,21 @@ class TrainSpec:
     """Environment steps it will take."""
 
 
-def parse_spec(body: Mapping[str, Any]) -> TrainSpec:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EvaluateSpec:
+    """Measure a checkpoint by a protocol."""
+
+    protocol: str
+    """Name of the protocol."""
+    checkpoint: str
+    """SHA-256 or alias of the checkpoint."""
+    episodes: int | None
+    """Number of episodes; None for the protocol's own."""
+    seed: int
+    """Seed of every random stream."""
+
+
+def parse_spec(body: Mapping[str, Any]) -> TrainSpec | EvaluateSpec:
     """Check a posted body.
 
     Args:
@@ -50,9 +71,9 @@ def parse_spec(body: Mapping[str, Any]) -> TrainSpec:
         raise InvalidInput("kind", kind, "must be a kind of job", tuple(_FIELDS))
     for name, value in body.items():
         if name not in _FIELDS[kind]:
-            rule = f"is no field of a {kind} job"
+            rule = f"is no field of a job of kind {kind}"
             raise InvalidInput(name, value, rule, _FIELDS[kind])
-    return _parse_train(body)
+    return _parse_train(body) if kind == "train" else _parse_evaluate(body)
 
 
 def new_job(body: Mapping[str, Any]) -> NewJob:
@@ -63,6 +84,8 @@ def new_job(body: Mapping[str, Any]) -> NewJob:
         NotFound: There is no such preset.
     """
     spec = parse_spec(body)
+    if isinstance(spec, EvaluateSpec):
+        return NewJob(kind="evaluate", spec=body, seed=spec.seed)
     return NewJob(
         kind="train",
         spec=body,
@@ -84,6 +107,21 @@ def _parse_train(body: Mapping[str, Any]) -> TrainSpec:
         seed=_seed(body),
         overrides=overrides,
         total_steps=resolved.total_steps,
+    )
+
+
+def _parse_evaluate(body: Mapping[str, Any]) -> EvaluateSpec:
+    protocol = _text(body, "protocol", tuple(PROTOCOLS))
+    if protocol not in PROTOCOLS:
+        raise InvalidInput("protocol", protocol, "must name a protocol", tuple(PROTOCOLS))
+    episodes = body.get("episodes")
+    if episodes is not None:
+        _check_integer("episodes", episodes, 1, MAX_EPISODES)
+    return EvaluateSpec(
+        protocol=protocol,
+        checkpoint=_text({"checkpoint": DEFAULT_CHECKPOINT, **body}, "checkpoint"),
+        episodes=episodes,
+        seed=_seed(body),
     )
 
 

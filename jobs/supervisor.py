@@ -12,9 +12,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
-from sqlalchemy.exc import SQLAlchemyError
-
-from app.errors import NotFound, StaleAttempt, StorageFull
+from app.errors import NotFound, StaleAttempt, StorageFull, StorageUnavailable
 from app.store import attempts, endings
 from app.store.engine import Store
 from app.store.lock import ServerLock
@@ -48,7 +46,7 @@ class _Worker:
     handle: Handle
     heartbeat_at: datetime | None = None
     heartbeat_seen: float
-    cancel_seen: float | None = None
+    leaving_since: float | None = None
     ended: Exit | None = None
 
 
@@ -138,7 +136,7 @@ class Supervisor:
         """Survive trouble with the database: say it once, try again at the next tick."""
         try:
             act()
-        except (StorageFull, SQLAlchemyError, OSError) as error:
+        except (StorageFull, StorageUnavailable, OSError) as error:
             if self._trouble != str(error):
                 logger.error("the supervisor cannot go on for now: %s", error)
             self._trouble = str(error)
@@ -191,11 +189,12 @@ class Supervisor:
         for claim, worker in self._workers.items():
             row = rows.get(claim)
             if row is None:  # settled, and about to exit; if it hangs there, end it
-                worker.cancel_seen = worker.cancel_seen or now
+                worker.leaving_since = worker.leaving_since or now
+            elif row.cancel_requested and worker.leaving_since is None:
+                worker.leaving_since = now
+                self._executor.stop(worker.handle, force=False)
             elif row.heartbeat_at != worker.heartbeat_at:
                 worker.heartbeat_at, worker.heartbeat_seen = row.heartbeat_at, now
-            if row is not None and row.cancel_requested:
-                worker.cancel_seen = worker.cancel_seen or now
             if self._lost_patience(worker, now):
                 logger.warning("job %s: its worker does not react, killing it", claim.job_id)
                 self._executor.stop(worker.handle, force=True)
@@ -203,8 +202,8 @@ class Supervisor:
             self._give_back(claim)
 
     def _lost_patience(self, worker: _Worker, now: float) -> bool:
-        cancelled = worker.cancel_seen
-        if cancelled is not None and now - cancelled > self._patience.cancel_s:
+        leaving = worker.leaving_since
+        if leaving is not None and now - leaving > self._patience.cancel_s:
             return True
         return now - worker.heartbeat_seen > self._patience.silence_s
 

@@ -15,9 +15,7 @@ from collections.abc import Callable, Mapping
 from types import FrameType
 from typing import Any
 
-from sqlalchemy.exc import OperationalError
-
-from app.errors import ServiceError, StaleAttempt, StorageFull
+from app.errors import ServiceError, StaleAttempt, StorageFull, StorageUnavailable
 from app.store import attempts, endings, fences
 from app.store.engine import Store
 from app.store.jobs import get_job
@@ -95,6 +93,10 @@ class Worker:
         """Stop as the server does: the job goes on with the next attempt."""
         self._interrupted.set()
 
+    def end_at_once(self) -> None:
+        """Let a cancel or a stop of the server end this process, for runners that never ask."""
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
     def execute(self, runner: Runner) -> int:
         """Run the job to its end and write down how it ended.
 
@@ -108,16 +110,19 @@ class Worker:
             self._settle(result)
         except StaleAttempt as error:
             logger.warning("%s", error)
+        except StorageUnavailable:
+            raise  # worth another attempt
         except ServiceError as error:
             logger.error("the job fails: %s", error.message)
             return self._fail(error.message)
         return 0
 
     def _settle(self, result: Mapping[str, Any] | None) -> None:
-        if self._stop_seen and self._cancelled.is_set():
+        cancelled = fences.peek(self.store, self._claim).cancel_requested
+        if self._stop_seen and cancelled:
             endings.finish(self.store, self._claim, state="cancelled", result=result)
             logger.info("cancelled")
-        elif self._stop_seen and self._interrupted.is_set():
+        elif self._stop_seen:
             endings.give_back(self.store, self._claim)
             logger.info("interrupted: the job goes on with the next attempt")
         else:
@@ -129,8 +134,8 @@ class Worker:
             endings.fail(self.store, self._claim, message)
         except StaleAttempt as error:
             logger.warning("%s", error)
-        except StorageFull as error:  # the supervisor reads this from the log's tail
-            logger.error("%s", error.message)
+        except (StorageFull, StorageUnavailable) as error:
+            logger.error("%s", error.message)  # the supervisor reads it from the log's tail
             return os.EX_IOERR
         return 0
 
@@ -144,7 +149,7 @@ class Worker:
             except StaleAttempt:
                 self._lost.set()
                 return
-            except (OperationalError, StorageFull) as error:
+            except (StorageUnavailable, StorageFull) as error:
                 logger.warning("no heartbeat this time: %s", error)
                 continue
             if due:

@@ -31,6 +31,7 @@ from app.errors import (
     ServiceError,
     SimulationError,
     StorageFull,
+    StorageUnavailable,
 )
 
 logger = logging.getLogger(__name__)
@@ -44,6 +45,7 @@ STATUS: tuple[tuple[type[ServiceError], int, str], ...] = (
     (Conflict, 409, "conflict"),
     (NotReady, 503, "not-ready"),
     (StorageFull, 507, "storage-full"),
+    (StorageUnavailable, 503, "storage-unavailable"),
     (SimulationError, 500, "simulation-error"),
 )
 

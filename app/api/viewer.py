@@ -148,11 +148,14 @@ async def pass_frames(client: WebSocket, viewer: ClientConnection) -> None:
 async def to_viewer(client: WebSocket, viewer: ClientConnection) -> None:
     """Pass on what the browser sends, but for what it must not ask."""
     while True:
-        frame = await client.receive_bytes()
-        if is_allowed(frame):
+        message = await client.receive()
+        if message["type"] == "websocket.disconnect":
+            return
+        frame = message.get("bytes")
+        if frame is not None and is_allowed(frame):
             await viewer.send(frame)
         else:
-            logger.warning("dropped a viewer frame that is not passed on")
+            logger.warning("dropped a frame from a browser that the viewer must not get")
 
 
 async def to_client(client: WebSocket, viewer: ClientConnection) -> None:

@@ -107,5 +107,6 @@ def _check_names(body: CommandCreate, cell_name: str) -> None:
             if name not in stations:
                 rule = "is no station of this cell"
                 raise InvalidInput(f"ids[{index}]", name, rule, stations)
-    if isinstance(body, StartCase) and body.id not in CASES:
-        raise InvalidInput("id", body.id, "is no case study of this cell", tuple(CASES))
+    cases = tuple(case.id for case in CASES)
+    if isinstance(body, StartCase) and body.id not in cases:
+        raise InvalidInput("id", body.id, "is no case study of this cell", cases)

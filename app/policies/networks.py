@@ -1,9 +1,9 @@
 """The networks of TD3: a residual actor and critics with layer normalisation.
 
 The actor adds to a base motion that is part of the observation,
-``tanh(atanh(0.9 base) + net)``; its last layer starts near zero, so that the untrained policy is the straight joint move. These
-plain modules decide in the service; ``td3.py`` trains the same modules inside
-Stable-Baselines3.
+``tanh(atanh(0.9 base) + net)``; its last layer starts near zero, so that the untrained policy
+is the straight joint move. These plain modules decide in the service; ``td3.py`` trains the
+same modules inside Stable-Baselines3.
 
 Source: thesis section 5.3.4 (TD3); Lillicrap et al. 2016 and Fujimoto et al. 2018 for the
 losses. Deviates: residual action and layer normalisation are ours, they halve the time to 95 %.

@@ -1,8 +1,8 @@
 """The four case studies of the critic's choice (METHOD 3.6, thesis table 5.3).
 
 The layout of the cell was chosen so that each case's geometry is what its text says;
-:func:`geometry` measures it (which goal is nearer, when each goal posture is blocked), and tests
-hold the cell to it.
+:func:`geometry` measures it (which goal is nearer, when each goal posture is blocked), and
+tests hold the cell to it.
 """
 
 from dataclasses import dataclass

@@ -9,7 +9,7 @@ ours (METHOD 3.2).
 """
 
 import json
-from functools import lru_cache
+from functools import cache
 from importlib import resources
 from typing import Annotated, Literal, Self
 
@@ -153,7 +153,7 @@ def cell_names() -> tuple[str, ...]:
     )
 
 
-@lru_cache(maxsize=None)
+@cache
 def load_cell(name: str = "pick-and-place") -> Cell:
     """Return a shipped cell.
 

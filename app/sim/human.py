@@ -114,7 +114,8 @@ def rest_posture(x: float, y: float, yaw: float) -> Vec:
 
 def _forward(q: Vec, pelvis_z: float) -> tuple[Vec, Vec]:
     points, frames = np.empty((body.N_POINTS, 3)), np.empty((body.N_FRAMES, 3, 3))
-    body.points_and_frames(np.asarray(q, dtype=np.float64), pelvis_z, points, frames)
+    # A copy: for a read-only array the kernel would be compiled anew.
+    body.points_and_frames(np.array(q, dtype=np.float64), float(pelvis_z), points, frames)
     return points, frames
 
 

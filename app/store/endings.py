@@ -142,7 +142,7 @@ def _requeue(connection: sa.Connection, job_id: str, changes: Mapping[str, Any])
     job = read_job(connection, job_id, for_update=True)
     data: dict[str, Any] = {"attempt": job.attempt}
     if job.cancel_requested:
-        values = {**changes, "finished_at": datetime.now(UTC)}
+        values = {**changes, "error": None, "finished_at": datetime.now(UTC)}
         connection.execute(sa.delete(resume_states).where(resume_states.c.job_id == job_id))
         change_state(connection, job_id, "cancelled", values, data)
         return

@@ -18,7 +18,7 @@ from sqlalchemy.engine.interfaces import DBAPIConnection
 from sqlalchemy.exc import ArgumentError, NoSuchModuleError, OperationalError
 from sqlalchemy.pool import ConnectionPoolEntry
 
-from app.errors import InvalidInput, StorageFull
+from app.errors import InvalidInput, StorageFull, StorageUnavailable
 
 BUSY_TIMEOUT_MS = 30_000
 """How long a writer waits for another one; a 100 MB blob takes below one second."""
@@ -74,8 +74,12 @@ class Store:
 
     @contextmanager
     def reading(self) -> Iterator[sa.Connection]:
-        """Open a transaction that sees one consistent state and writes nothing."""
-        with self.engine.connect() as connection, connection.begin():
+        """Open a transaction that sees one consistent state and writes nothing.
+
+        Raises:
+            StorageUnavailable: The database does not answer.
+        """
+        with self._transaction(writes=False) as connection:
             yield connection
 
     @contextmanager
@@ -84,16 +88,22 @@ class Store:
 
         Raises:
             StorageFull: No room is left; nothing was written.
+            StorageUnavailable: The database does not answer; nothing was written.
         """
-        with self.engine.connect() as plain:
-            connection = plain.execution_options(tandem_writes=True)
-            try:
+        with self._transaction(writes=True) as connection:
+            yield connection
+
+    @contextmanager
+    def _transaction(self, *, writes: bool) -> Iterator[sa.Connection]:
+        try:
+            with self.engine.connect() as plain:
+                connection = plain.execution_options(tandem_writes=writes)
                 with connection.begin():
                     yield connection
-            except OperationalError as error:
-                if _is_full(error):
-                    raise StorageFull(self.shown_url) from error
-                raise
+        except OperationalError as error:
+            if _is_full(error):
+                raise StorageFull(self.shown_url) from error
+            raise StorageUnavailable(self.shown_url, str(error.orig)) from error
 
     def close(self) -> None:
         """Close every pooled connection."""

@@ -20,31 +20,16 @@ def migrate(store: Store) -> None:
 
     Raises:
         Conflict: The database was written by a newer version of Tandem.
-        InvalidInput: It is no database, or cannot be reached.
+        InvalidInput: It is no database.
+        StorageUnavailable: It does not answer.
         StorageFull: No room is left.
     """
     try:
         with store.writing() as connection:
             _upgrade(connection, store.shown_url)
-    except DatabaseError as error:
+    except DatabaseError as error:  # such as a file that is no database
         rule = f"cannot be opened ({error.orig})"
         raise InvalidInput("database_url", store.shown_url, rule) from error
-
-
-def check_schema(store: Store) -> None:
-    """Make sure that the tables are those of this code, without changing anything.
-
-    Raises:
-        Conflict: They are not.
-    """
-    head = ScriptDirectory.from_config(alembic_config()).get_current_head()
-    with store.reading() as connection:
-        present = _revision(connection)
-    if present != head:
-        raise Conflict(
-            f"{store.shown_url} has schema {present or 'none'}, this code needs {head}: "
-            "start the server once, which upgrades it"
-        )
 
 
 def alembic_config() -> Config:

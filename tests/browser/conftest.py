@@ -17,7 +17,7 @@ from playwright.sync_api import Browser, ConsoleMessage, Page, Request, sync_pla
 ROOT = Path(__file__).parents[2]
 START_S = 300.0
 """Time a first start may take: the kernels are compiled on two busy cores [s]."""
-STEP_MS = 60_000
+STEP_MS = 180_000
 """Time one expectation may take; software rendering draws 3 to 12 frames per second [ms]."""
 FLAGS = [
     "--no-sandbox",
@@ -37,7 +37,15 @@ OpenPage = Callable[..., Page]
 
 @pytest.fixture(scope="session")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """Run ``python -m app serve`` with fresh data; yields its address once it is ready."""
+    """Run ``python -m app serve`` with fresh data; yields its address once it is ready.
+
+    While working on the page, ``BROWSER_TEST_SERVER=http://127.0.0.1:8000`` names a server that
+    runs already.
+    """
+    running = os.environ.get("BROWSER_TEST_SERVER")
+    if running:
+        yield running
+        return
     with serving(tmp_path_factory.mktemp("tandem"), free_port()) as address:
         yield address
 
@@ -87,6 +95,12 @@ def free_port() -> int:
         probe.bind(("127.0.0.1", 0))
         port: int = probe.getsockname()[1]
         return port
+
+
+@pytest.fixture
+def unused_port() -> int:
+    """A port nobody listens on."""
+    return free_port()
 
 
 @pytest.fixture(scope="session")

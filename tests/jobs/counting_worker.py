@@ -8,6 +8,7 @@ process).
 """
 
 import hashlib
+import os
 import sys
 import time
 from collections.abc import Mapping
@@ -85,4 +86,4 @@ def limit_database(worker: Worker, max_pages: int | None) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main({"count": count}))
+    sys.exit(main({"count": count}, os.environ["TANDEM_DATABASE_URL"]))

@@ -4,8 +4,9 @@ from typing import Any
 import pytest
 
 from app.errors import InvalidInput, NotFound
-from jobs.spec import MAX_SEED, TrainSpec, new_job, parse_spec
+from jobs.spec import MAX_SEED, EvaluateSpec, TrainSpec, new_job, parse_spec
 
+EVALUATE = {"kind": "evaluate", "protocol": "pick-single", "episodes": 10, "seed": 11}
 TRAIN = {"kind": "train", "preset": "pick-td3", "seed": 1, "overrides": {"width": 64}}
 
 
@@ -33,8 +34,8 @@ def test_seed_and_overrides_may_be_left_out() -> None:
         ({"kind": "dream"}, "kind", "must be a kind of job"),
         ({"kind": None}, "kind", "must be a kind of job"),
         ({"kind": ["train"]}, "kind", "must be a kind of job"),
-        ({"speed": 1}, "speed", "is no field of a train job"),
-        ({"protocol": "pick-single"}, "protocol", "is no field of a train job"),
+        ({"speed": 1}, "speed", "is no field of a job of kind train"),
+        ({"protocol": "pick-single"}, "protocol", "is no field of a job of kind train"),
         ({"preset": None}, "preset", "must be a name"),
         ({"preset": 3}, "preset", "must be a name"),
         ({"seed": -1}, "seed", "must be an integer in"),
@@ -65,3 +66,32 @@ def test_unknown_field_names_the_choices() -> None:
     with pytest.raises(InvalidInput) as caught:
         new_job(TRAIN | {"speed": 1})
     assert caught.value.choices == ("kind", "preset", "seed", "overrides")
+
+
+def test_evaluation_measures_the_shipped_checkpoint_unless_told_otherwise() -> None:
+    job = new_job(EVALUATE)
+    assert (job.kind, job.seed, job.spec) == ("evaluate", 11, EVALUATE)
+    assert parse_spec(EVALUATE) == EvaluateSpec(
+        protocol="pick-single", checkpoint="pick", episodes=10, seed=11
+    )
+
+
+@pytest.mark.parametrize(
+    ("change", "field", "rule"),
+    [
+        ({"preset": "pick-td3"}, "preset", "is no field of a job of kind evaluate"),
+        ({"protocol": "pick-everything"}, "protocol", "must name a protocol"),
+        ({"protocol": None}, "protocol", "must be a name"),
+        ({"checkpoint": 7}, "checkpoint", "must be a name"),
+        ({"checkpoint": ""}, "checkpoint", "must be a name"),
+        ({"episodes": 0}, "episodes", "must be an integer in"),
+        ({"episodes": 10**9}, "episodes", "must be an integer in"),
+        ({"episodes": 1.5}, "episodes", "must be an integer in"),
+    ],
+)
+def test_bad_evaluation_names_field_and_rule(
+    change: dict[str, Any], field: str, rule: str
+) -> None:
+    with pytest.raises(InvalidInput, match=rule) as caught:
+        new_job(EVALUATE | change)
+    assert caught.value.field == field

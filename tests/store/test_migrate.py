@@ -5,10 +5,12 @@ import sqlalchemy as sa
 from alembic import command
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
+from alembic.script import ScriptDirectory
 
 from app.errors import Conflict, InvalidInput
 from app.store.engine import Store
-from app.store.migrate import alembic_config, check_schema, migrate
+from app.store.migrate import alembic_config, migrate
+from app.store.schema import REVISION, check_schema
 from app.store.tables import metadata
 
 
@@ -16,6 +18,11 @@ def test_migrations_build_exactly_the_tables(store: Store) -> None:
     with store.reading() as connection:
         context = MigrationContext.configure(connection)
         assert compare_metadata(context, metadata) == []
+
+
+def test_workers_ask_for_the_newest_migration() -> None:
+    scripts = ScriptDirectory.from_config(alembic_config())
+    assert scripts.get_current_head() == REVISION
 
 
 def test_migrating_again_changes_nothing(store: Store) -> None:

@@ -129,12 +129,17 @@ function Scene({ cell }) {
   </section>`;
 }
 
+function capital(text) {
+  return text[0].toUpperCase() + text.slice(1);
+}
+
 function veil(link, reason) {
   if (link === "lost") return ["The server does not answer", "Trying again every second."];
   if (link !== "warming") return ["Opening the cell", ""];
   const doing = reason.replace(/^(warming up|starting):? */, "");
   if (doing === reason && reason) return ["The server is not ready", reason];
-  return ["Warming up", `${doing || "starting"} …`];
+  const patience = " The first start on a machine takes a minute or two, later ones seconds.";
+  return ["Warming up", `${capital(doing || "starting")} …${/compil/.test(doing) ? patience : ""}`];
 }
 
 function Decision({ cell }) {

@@ -51,7 +51,9 @@ function grouped(list, jobs, now) {
 }
 
 function name(checkpoint, job) {
-  const { preset, step } = checkpoint;
+  const { manifest = {} } = checkpoint;
+  const preset = checkpoint.preset ?? manifest.preset?.name;
+  const step = checkpoint.step ?? manifest.step;
   const parts = [checkpoint.aliases[0] ?? job ?? preset ?? format.short(checkpoint.sha256)];
   if (!job && preset && preset !== parts[0]) parts.push(preset);
   if (Number.isFinite(step)) parts.push(`${format.steps(step)} steps`);

@@ -1,5 +1,5 @@
 // What a visitor can do to the cell: who moves the person, the clock, the goals, the cases.
-import { html } from "./vendor/htm-preact-standalone.module.js";
+import { html, useState } from "./vendor/htm-preact-standalone.module.js";
 import { Icon } from "./icons.js";
 
 const MODES = [
@@ -31,23 +31,39 @@ export function Controls({ world, cell, cases, send, colourOf, labelOf }) {
           onClick=${() => send({ tag: "reset" })}><${Icon} name="reset" /><span>Reset</span></button>
       </div>
       ${world.mode === "manual" &&
-      html`<p class="dock-hint">Drag the handles at the hips and hands in the scene.</p>`}
+      html`<p class="dock-hint">Drag the handles in the scene.</p>`}
     </div>
     <div class="dock-row">
       <span class="dock-label" id="goals-label">Goals</span>
       <${Goals} world=${world} cell=${cell} send=${send} colourOf=${colourOf} labelOf=${labelOf} />
     </div>
-    ${cases.length > 0 &&
-    html`<div class="dock-row dock-cases">
-      <span class="dock-label" id="cases-label">Cases</span>
+    ${cases.length > 0 && html`<${Cases} cases=${cases} running=${world.case} send=${send} />`}
+  </section>`;
+}
+
+/** The case studies by title; what happens in one is told when it is pointed at or runs. */
+function Cases({ cases, running, send }) {
+  const [pointed, setPointed] = useState(null);
+  const told = cases.find((c) => c.id === (pointed ?? running));
+  const point = (id) => ({
+    onMouseEnter: () => setPointed(id),
+    onMouseLeave: () => setPointed(null),
+    onFocus: () => setPointed(id),
+    onBlur: () => setPointed(null),
+  });
+  return html`<div class="dock-row dock-cases">
+    <span class="dock-label" id="cases-label">Cases</span>
+    <div>
       <div class="cases" role="group" aria-labelledby="cases-label">
         ${cases.map((c, i) => html`<button key=${c.id} type="button" class="case"
-          aria-pressed=${String(world.case === c.id)} data-case=${c.id}
-          onClick=${() => send({ tag: "start-case", id: c.id })}>
-          <b>${i + 1}</b><span>${c.text}</span></button>`)}
+          aria-pressed=${String(running === c.id)} aria-description=${c.text} data-case=${c.id}
+          ...${point(c.id)} onClick=${() => send({ tag: "start-case", id: c.id })}>
+          <b>${i + 1}</b><span>${c.title}</span></button>`)}
       </div>
-    </div>`}
-  </section>`;
+      <p class="case-text">${told ? told.text
+        : "Four situations of the study: the person reaches in, the robot picks the better goal."}</p>
+    </div>
+  </div>`;
 }
 
 function Goals({ world, cell, send, colourOf, labelOf }) {

@@ -2,27 +2,32 @@
 
 export const SPAN_S = 20;
 
-/** A silence longer than this is drawn as a gap [s]. */
+/** A jump longer than this is drawn as a gap [s]. */
 const GAP_S = 2;
 
 /**
- * Values of all candidates over the last `SPAN_S` seconds, by the clock on the wall: a paused
- * cell still answers to a person who is dragged.
+ * Values of all candidates over the last `SPAN_S` seconds. Time is the cell's own, so that a
+ * slow browser draws no bursts; while the cell is paused it is the clock on the wall, since a
+ * paused cell still answers to a person who is dragged.
  */
 export class History {
   constructor() {
     this.samples = [];
-    this.worldTime = 0;
+    this.last = null;
   }
 
-  /** Add what a snapshot says, which came at `t` [s]. */
-  add(world, t = performance.now() / 1000) {
-    const last = this.samples.at(-1);
-    const broken = last && (t - last.t > GAP_S || world.t_s < this.worldTime);
-    if (broken) this.samples.push({ t: last.t + 1e-3, values: new Map(), chosen: null });
+  /** Add what a snapshot says, which came at `wall` [s]. */
+  add(world, wall = performance.now() / 1000) {
+    const { last } = this;
+    const cellTime = world.t_s - (last?.world ?? 0);
+    const elapsed = !last ? 0 : cellTime > 0 ? cellTime : world.paused ? wall - last.wall : 0.05;
+    if (last && (elapsed > GAP_S || cellTime < 0)) {
+      this.samples.push({ t: this.samples.at(-1).t + 1e-3, values: new Map(), chosen: null });
+    }
+    const t = (last?.t ?? 0) + Math.min(elapsed, SPAN_S);
     const values = new Map(world.candidates.map((c) => [c.id, c.value]));
     this.samples.push({ t, values, chosen: world.chosen });
-    this.worldTime = world.t_s;
+    this.last = { t, wall, world: world.t_s };
     while (this.samples[0].t < t - SPAN_S) this.samples.shift();
   }
 
@@ -42,6 +47,14 @@ export class History {
     const now = this.samples.at(-1)?.t ?? 0;
     const x = this.samples.map((s) => s.t - now);
     return [x, ...ids.map((id) => this.samples.map((s) => s.values.get(id) ?? null))];
+  }
+
+  /** Where another goal was chosen than before; `mind` where the old one was still to be had. */
+  switches() {
+    return this.samples.flatMap(({ chosen, values }, i) => {
+      const before = this.samples[i - 1]?.chosen;
+      return before && chosen && before !== chosen ? [{ i, mind: values.has(before) }] : [];
+    });
   }
 
   /** The chosen id at each sample. */

@@ -12,6 +12,7 @@ export function drawValues(plot, { history, ids, labelOf }, theme) {
   const { ctx, bbox } = plot;
   const dpr = devicePixelRatio;
   const chosen = history.chosen();
+  const switches = history.switches();
   const [x, ...columns] = plot.data;
   if (x.length !== chosen.length) return;
   const at = (i, column) => [plot.valToPos(x[i], "x", true), plot.valToPos(column[i], "y", true)];
@@ -21,7 +22,7 @@ export function drawValues(plot, { history, ids, labelOf }, theme) {
   ctx.beginPath();
   ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
   ctx.clip();
-  markSwitches(ctx, bbox, chosen, (i) => plot.valToPos(x[i], "x", true), theme, dpr);
+  markSwitches(ctx, bbox, switches, (i) => plot.valToPos(x[i], "x", true), theme, dpr);
   ctx.lineJoin = ctx.lineCap = "round";
   for (const isThick of [false, true]) {
     ctx.lineWidth = (isThick ? THICK : THIN) * dpr;
@@ -30,7 +31,7 @@ export function drawValues(plot, { history, ids, labelOf }, theme) {
       drawPieces(ctx, column, at, (i) => colourByValue(column[i], best[i]), wanted);
     });
   }
-  markChoices(ctx, chosen, (i) => at(i, columns[ids.indexOf(chosen[i])]), theme, dpr);
+  markChoices(ctx, switches, (i) => at(i, columns[ids.indexOf(chosen[i])]), theme, dpr);
   ctx.restore();
   label(ctx, plot, ids, columns, chosen.at(-1), labelOf, theme, dpr);
   ctx.restore();
@@ -57,16 +58,13 @@ function drawPieces(ctx, column, at, colour, wanted) {
   flush();
 }
 
-/** Indices at which another goal was chosen than before. */
-function switches(chosen) {
-  return chosen.flatMap((id, i) => (i && id && chosen[i - 1] && id !== chosen[i - 1] ? [i] : []));
-}
-
-function markSwitches(ctx, bbox, chosen, xAt, theme, dpr) {
+/** A dashed rule where it changed its mind: the goal it left was still to be had. */
+function markSwitches(ctx, bbox, switches, xAt, theme, dpr) {
   ctx.strokeStyle = theme.faint;
   ctx.lineWidth = dpr;
   ctx.setLineDash([2 * dpr, 3 * dpr]);
-  for (const i of switches(chosen)) {
+  for (const { i, mind } of switches) {
+    if (!mind) continue;
     ctx.beginPath();
     ctx.moveTo(xAt(i), bbox.top);
     ctx.lineTo(xAt(i), bbox.top + bbox.height);
@@ -76,11 +74,11 @@ function markSwitches(ctx, bbox, chosen, xAt, theme, dpr) {
 }
 
 /** A ring where the new choice begins. */
-function markChoices(ctx, chosen, at, theme, dpr) {
+function markChoices(ctx, switches, at, theme, dpr) {
   ctx.fillStyle = theme.panel;
   ctx.strokeStyle = theme.ink;
   ctx.lineWidth = 1.6 * dpr;
-  for (const i of switches(chosen)) {
+  for (const { i } of switches) {
     const [x, y] = at(i);
     if (!Number.isFinite(y)) continue;
     ctx.beginPath();

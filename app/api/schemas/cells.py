@@ -13,8 +13,10 @@ class CasePublic(Answer):
     """One case study of the cell."""
 
     id: str
+    title: str
     text: str = Field(description="what happens, for people")
     goals: list[str] = Field(description="stations the robot may choose")
+    expected: str = Field(description="the goal it should end at")
 
 
 class CellPublic(Answer):
@@ -32,8 +34,14 @@ class CellPublic(Answer):
     def from_domain(cls, cell: Cell) -> Self:
         """Make it from the cell's data."""
         cases = [
-            CasePublic(id=case.id, text=case.text, goals=list(case.goals))
-            for case in CASES.values()
+            CasePublic(
+                id=case.id,
+                title=case.title,
+                text=case.text,
+                goals=list(case.goals),
+                expected=case.expected,
+            )
+            for case in CASES
         ]
         return cls(**cell.model_dump(mode="json"), cases=cases)
 

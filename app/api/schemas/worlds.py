@@ -68,6 +68,7 @@ class WorldLight(Answer):
     paused: bool
     status: str
     message: str = Field(description="why, in one sentence")
+    gripping: bool = Field(description="whether the fingers are closed")
     selected: list[str] = Field(description="stations that the visitor allows")
     candidates: list[CandidateLive]
     chosen: str | None
@@ -146,8 +147,8 @@ def light_members(snapshot: WorldSnapshot) -> dict[str, Any]:
     """Return the members of :class:`WorldLight`."""
     contact, counters = snapshot.contact, snapshot.counters
     same = (
-        "id", "cell", "tick", "t_s", "mode", "paused", "status", "message", "chosen",
-        "clearance_m", "checkpoint", "policy_title", "elapsed_ms", "case",
+        "id", "cell", "tick", "t_s", "mode", "paused", "status", "message", "gripping",
+        "chosen", "clearance_m", "checkpoint", "policy_title", "elapsed_ms", "case",
     )  # fmt: skip
     return {name: getattr(snapshot, name) for name in same} | {
         "selected": list(snapshot.selected),

@@ -1,11 +1,11 @@
 """What the kernels know of the robot in its cell, and the contact test of one period, compiled.
 
-Contact between poses is found by conservative advancement: at a pose with clearance ``d`` nothing
-can touch before ``d / v`` seconds, with ``v`` a bound on how fast any two points can approach;
-so the test jumps ahead by that much, at least ``FINEST_STEP``, and reports contact when the
-clearance falls below what the finest step could hide. It can be early by about a millimetre,
-never late. Within a period the robot follows its polynomial, a person moves linearly in joint
-space.
+Contact between poses is found by conservative advancement: at a pose with clearance ``d``
+nothing can touch before ``d / v`` seconds, with ``v`` a bound on how fast any two points can
+approach; so the test jumps ahead by that much, at least ``FINEST_STEP``, and reports contact
+when the clearance falls below what the finest step could hide. It can be early by about a
+millimetre, never late. Within a period the robot follows its polynomial, a person moves
+linearly in joint space.
 """
 
 import math

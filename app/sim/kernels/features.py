@@ -133,7 +133,7 @@ def coarse_clearance(coarse: Vec, human: Vec, velocity: Vec, ahead: float) -> fl
 
 
 @njit(cache=True)
-def place_coarse(arm: Arm, q: Vec, pose: Pose, coarse: Vec) -> None:
+def place_coarse(q: Vec, pose: Pose, coarse: Vec) -> None:
     """Fill ``coarse``, shape (5, 2, 3), with the coarse capsules at ``q``; overwrites pose."""
     kinematics.link_poses(q, pose.rot, pose.pos)
     place_capsules(pose.rot, pose.pos, COARSE_LINK, COARSE_P0, COARSE_P1, 0, coarse)
@@ -160,9 +160,9 @@ def _put_joints(arm: Arm, q: Vec, qd: Vec, human_q: Vec, human_qd: Vec, out: Obs
 
 
 @njit(cache=True)
-def _put_tool(arm: Arm, q: Vec, qd: Vec, goal: Vec, pose: Pose, tcp: Vec, out: Obs) -> int:
+def _put_tool(qd: Vec, goal: Vec, pose: Pose, tcp: Vec, out: Obs) -> int:
     jacobian = np.empty((3, 6))
-    kinematics.tcp_jacobian(q, pose.rot, pose.pos, tcp, jacobian)
+    kinematics.tcp_jacobian(pose.rot, pose.pos, tcp, jacobian)
     for i in range(3):
         speed = 0.0
         for j in range(6):
@@ -258,10 +258,10 @@ def observe(
     tcp = np.empty(3)
     kinematics.tcp_point(pose.rot, pose.pos, arm.tool_length, tcp)
     _put_joints(arm, q, qd, human_q, human_qd, out)
-    _put_tool(arm, q, qd, goal, pose, tcp, out)
+    _put_tool(qd, goal, pose, tcp, out)
     k = _put_arms(pose, later, tick, tcp, goal, out)
     base = np.zeros(6)
-    widest = base_motion(arm, q, q_goal, base)
+    base_motion(arm, q, q_goal, base)
     for j in range(CONTROLLED):
         out[k + j] = q_goal[j] - q[j]
         out[k + 5 + j] = base[j]
@@ -274,7 +274,7 @@ def observe(
     place_capsules(pose.rot, pose.pos, COARSE_LINK, COARSE_P0, COARSE_P1, 0, coarse)
     out[k + 2] = _scaled(_put_nearest(coarse, pose.human, k + 4, out))
     k += 20
-    _put_look_ahead(arm, q, q_goal, base, widest, velocity, pose, later, coarse, k, out)
+    _put_look_ahead(arm, q, q_goal, base, velocity, pose, later, coarse, k, out)
 
 
 @njit(cache=True)
@@ -283,7 +283,6 @@ def _put_look_ahead(
     q: Vec,
     q_goal: Vec,
     base: Vec,
-    widest: float,
     velocity: Vec,
     pose: Pose,
     later: Pose,
@@ -299,9 +298,9 @@ def _put_look_ahead(
             way = base[j] * arm.qd_max[j] * HORIZONS[i]
             limit = abs(q_goal[j] - q[j])
             moved[j] = q[j] + min(limit, max(-limit, way))
-        place_coarse(arm, moved, later, coarse)
+        place_coarse(moved, later, coarse)
         out[k + 3 + i] = _scaled(coarse_clearance(coarse, pose.human, velocity, HORIZONS[i]))
-    place_coarse(arm, q_goal, later, coarse)
+    place_coarse(q_goal, later, coarse)
     out[k + 6] = _scaled(coarse_clearance(coarse, pose.human, velocity, 0.0))
     for i in range(3):
         out[k + 7 + i] = _scaled(coarse_clearance(coarse, pose.human, velocity, HORIZONS[i]))

@@ -102,7 +102,7 @@ def tcp_point(rot: Vec, pos: Vec, tool_length: float, out: Vec) -> None:
 
 
 @njit(cache=True)
-def tcp_jacobian(q: Vec, rot: Vec, pos: Vec, tcp: Vec, out: Vec) -> None:
+def tcp_jacobian(rot: Vec, pos: Vec, tcp: Vec, out: Vec) -> None:
     """Write the tcp's linear Jacobian [m/rad] into ``out``, shape (3, 6)."""
     for j in range(6):
         link = j + 1

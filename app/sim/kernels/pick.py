@@ -243,11 +243,11 @@ def reset_env(
 
 
 @njit(cache=True)
-def tool_state(arm: Arm, q: Vec, qd: Vec, goal: Vec, pose: Pose) -> tuple[float, float, float]:
+def tool_state(arm: Arm, qd: Vec, goal: Vec, pose: Pose) -> tuple[float, float, float]:
     """Return distance to the target [m], tilt [rad] and tcp speed [m/s] of a placed pose."""
     tcp, jacobian = np.empty(3), np.empty((3, 6))
     kinematics.tcp_point(pose.rot, pose.pos, arm.tool_length, tcp)
-    kinematics.tcp_jacobian(q, pose.rot, pose.pos, tcp, jacobian)
+    kinematics.tcp_jacobian(pose.rot, pose.pos, tcp, jacobian)
     distance2, speed2 = 0.0, 0.0
     for i in range(3):
         distance2 += (goal[i] - tcp[i]) ** 2
@@ -294,7 +294,7 @@ def step_env(
     """Move environment ``e`` through one period, set its outcome, return the reward."""
     c, q1, qd1 = np.empty(6), np.empty(6), np.empty(6)
     place(arm, state.q[e], state.human_q[e], pose)
-    d_old, tilt_old, _ = tool_state(arm, state.q[e], state.qd[e], state.goal[e], pose)
+    d_old, tilt_old, _ = tool_state(arm, state.qd[e], state.goal[e], pose)
     human_q0 = state.human_q[e].copy()
     drive(arm, state.q[e], state.qd[e], act, c, q1, qd1)
     state.elapsed[e] += arm.dt
@@ -305,7 +305,7 @@ def step_env(
     )
     state.q[e], state.qd[e], state.clearance[e] = q1, qd1, clearance
     place(arm, q1, state.human_q[e], pose)
-    d, tilt, speed = tool_state(arm, q1, qd1, state.goal[e], pose)
+    d, tilt, speed = tool_state(arm, qd1, state.goal[e], pose)
     collided = kind != NO_CONTACT
     success = not collided and succeeded(d, tilt, speed)
     if collided:

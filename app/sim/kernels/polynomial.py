@@ -1,10 +1,10 @@
 """Bounded polynomial actions of degree 2, with viability (METHOD 2.2), compiled.
 
-During one period a joint follows ``q(x) = q + qd x + c x^2``. The coefficient's interval keeps
-acceleration and speed limits, and keeps the state *viable*: with ``A`` the acceleration limit
-and ``q', v'`` the state after the period, ``v'^2/(2A) + v' dt/2 <= q_max - q'`` for ``v' >= 0``,
-mirrored below. With ``q' = q + (qd + v') dt/2`` the condition is a quadratic in ``v'``, whose
-root is the greatest admissible end speed:
+During one period a joint follows ``q(x) = q + qd x + c x^2``. The coefficient's interval
+keeps acceleration and speed limits, and keeps the state *viable*: with ``A`` the acceleration
+limit and ``q', v'`` the state after the period, ``v'^2/(2A) + v' dt/2 <= q_max - q'`` for
+``v' >= 0``, mirrored below. With ``q' = q + (qd + v') dt/2`` the condition is a quadratic in
+``v'``, whose root is the greatest admissible end speed:
 
     v'_max = -A dt + sqrt((A dt)^2 + 2 A (q_max - q) - A dt qd)
 

@@ -1,10 +1,10 @@
 """Reward of the pick scenario as named terms (METHOD 3.3), compiled.
 
-``r = c_d (d_old - gamma d) + c_th (th_old - gamma th) - c_c [collision] - c_step
-- c_v |v_tcp| [d <= d_v] + c_s [success]``; ``gamma`` is 1 where undiscounted progress is wanted.
+``r = c_d (d_old - gamma d) + c_th (th_old - gamma th) - c_c [collision] - c_step - c_v
+|v_tcp| [d <= d_v] + c_s [success]``; ``gamma`` is 1 where undiscounted progress is wanted.
 
-Deviates: (5.11) prints ``d - d_old`` and table 5.1 prints ``c_c`` and ``c_v`` as -1, which would
-reward moving away and colliding; the text asks for the signs used here.
+Deviates: (5.11) prints ``d - d_old`` and table 5.1 prints ``c_c`` and ``c_v`` as -1, which
+would reward moving away and colliding; the text asks for the signs used here.
 """
 
 from typing import NamedTuple

@@ -1,8 +1,8 @@
 """A person's movements as a script of postures and minimum-jerk moves, compiled.
 
-A script is a list of moves: move ``k`` leaves posture ``k`` at ``start[k]``, arrives at posture
-``k + 1`` after ``duration[k]``, and rests there until the next one starts. It does not depend on
-the robot, so an episode's whole human motion is fixed when the episode starts.
+A script is a list of moves: move ``k`` leaves posture ``k`` at ``start[k]``, arrives at
+posture ``k + 1`` after ``duration[k]``, and rests there until the next one starts. It does
+not depend on the robot, so an episode's whole human motion is fixed when the episode starts.
 
 Source: METHOD 3.2 (cycle home - cube - dock and back) and 3.4 (timing, pauses, starting phase,
 reversal); minimum jerk after Flash and Hogan (1985).

@@ -1,0 +1,27 @@
+"""Whether a database has the tables of this code; for workers, which never change them."""
+
+import sqlalchemy as sa
+
+from app.errors import Conflict
+from app.store.engine import Store
+
+REVISION = "0001"
+"""The newest migration."""
+
+
+def check_schema(store: Store) -> None:
+    """Make sure that the tables are those of this code, without changing anything.
+
+    Raises:
+        Conflict: They are not.
+        StorageUnavailable: The database does not answer.
+    """
+    with store.reading() as connection:
+        migrated = sa.inspect(connection).has_table("alembic_version")
+        query = sa.text("SELECT version_num FROM alembic_version")
+        present = connection.execute(query).scalar() if migrated else None
+    if present != REVISION:
+        raise Conflict(
+            f"{store.shown_url} has schema {present or 'none'}, this code needs {REVISION}: "
+            "start the server once, which upgrades it"
+        )

@@ -1,0 +1,127 @@
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+TINY = {"total_steps": 1280, "n_envs": 128, "learning_starts": 0, "progress_steps": 128}
+TRAIN = {"kind": "train", "preset": "pick-td3", "seed": 1}
+
+
+@pytest.fixture
+def queued(client: TestClient) -> dict[str, Any]:
+    """A job that was posted and cancelled at once: it costs the machine nothing."""
+    job: dict[str, Any] = client.post("/v1/jobs", json=TRAIN).json()
+    client.post(f"/v1/jobs/{job['id']}/cancel")
+    return job
+
+
+def test_posted_job_is_accepted_with_its_place(client: TestClient) -> None:
+    answer = client.post("/v1/jobs", json={**TRAIN, "overrides": {"gamma": 0.99}})
+    job = answer.json()
+    assert answer.status_code == 202
+    assert answer.headers["location"] == f"/v1/jobs/{job['id']}"
+    assert job["spec"] == {**TRAIN, "overrides": {"gamma": 0.99}}
+    cancelled = client.post(f"/v1/jobs/{job['id']}/cancel")
+    assert cancelled.status_code == 202
+    assert cancelled.json()["state"] in ("cancelling", "cancelled")
+
+
+def test_same_key_never_makes_a_second_job(client: TestClient) -> None:
+    headers = {"Idempotency-Key": "tests-1"}
+    first = client.post("/v1/jobs", json=TRAIN, headers=headers).json()
+    again = client.post("/v1/jobs", json=TRAIN, headers=headers)
+    assert again.json()["id"] == first["id"]
+    other = client.post("/v1/jobs", json={**TRAIN, "seed": 2}, headers=headers)
+    assert other.status_code == 409
+    client.post(f"/v1/jobs/{first['id']}/cancel")
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        ({"kind": "bake"}, "kind"),
+        ({"preset": "pick-td4"}, "preset"),
+        ({"overrides": {"gama": 0.9}}, "overrides.gama"),
+        ({"overrides": {"gamma": 2.0}}, "overrides.gamma"),
+        ({"overrides": {"gamma": "high"}}, "overrides.gamma"),
+        ({"seed": -1}, "seed"),
+        ({"seed": "1"}, "seed"),
+        ({"colour": "red"}, "colour"),
+    ],
+)
+def test_bad_training_is_refused_by_field(
+    client: TestClient, change: dict[str, Any], field: str
+) -> None:
+    answer = client.post("/v1/jobs", json={**TRAIN, **change})
+    assert answer.status_code == 422
+    problem = answer.json()
+    assert problem["field"] == field
+    assert problem["rule"]
+
+
+def test_override_that_is_not_finite_is_refused(client: TestClient) -> None:
+    body = '{"kind": "train", "preset": "pick-td3", "overrides": {"gamma": NaN}}'
+    answer = client.post("/v1/jobs", content=body, headers={"Content-Type": "application/json"})
+    assert answer.status_code == 422
+    assert answer.json()["field"] == "overrides.gamma"
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [({"protocol": "pick-luck"}, "protocol"), ({"checkpoint": "best"}, "checkpoint")],
+)
+def test_bad_evaluation_is_refused_by_field(
+    client: TestClient, change: dict[str, Any], field: str
+) -> None:
+    body = {"kind": "evaluate", "protocol": "pick-single", "episodes": 10, **change}
+    answer = client.post("/v1/jobs", json=body)
+    assert answer.status_code == 422
+    assert answer.json()["field"] == field
+    assert "pick" in answer.text
+
+
+def test_jobs_are_listed_in_pages_newest_first(
+    client: TestClient, queued: dict[str, Any]
+) -> None:
+    newer = client.post("/v1/jobs", json=TRAIN).json()
+    client.post(f"/v1/jobs/{newer['id']}/cancel")
+    first = client.get("/v1/jobs", params={"limit": 1}).json()
+    second = client.get("/v1/jobs", params={"limit": 1, "cursor": first["next_cursor"]}).json()
+    assert [one["id"] for one in first["items"]] == [newer["id"]]
+    assert [one["id"] for one in second["items"]] == [queued["id"]]
+
+
+@pytest.mark.parametrize(
+    ("query", "field"), [("limit=0", "limit"), ("cursor=x", "cursor"), ("state=odd", "state")]
+)
+def test_bad_query_is_refused_by_field(client: TestClient, query: str, field: str) -> None:
+    answer = client.get(f"/v1/jobs?{query}")
+    assert answer.status_code == 422
+    assert answer.json()["field"] == field
+
+
+def test_unknown_job_is_not_found_on_every_route(client: TestClient) -> None:
+    for path in ("", "/metrics", "/events"):
+        answer = client.get(f"/v1/jobs/nothing{path}")
+        assert answer.status_code == 404
+        assert answer.headers["content-type"] == "application/problem+json"
+    assert client.post("/v1/jobs/nothing/cancel").status_code == 404
+
+
+def test_stream_of_a_job_can_be_resumed_and_ends_with_it(client: TestClient) -> None:
+    job = client.post("/v1/jobs", json={**TRAIN, "overrides": TINY}).json()
+    client.post(f"/v1/jobs/{job['id']}/cancel")
+    whole = client.get(f"/v1/jobs/{job['id']}/events").text
+    assert whole.startswith("event: state\n")
+    assert "event: end\n" in whole
+    rest = client.get(f"/v1/jobs/{job['id']}/events", headers={"Last-Event-ID": "1"}).text
+    assert "id: 1\n" in whole and "id: 1\n" not in rest
+    assert "id: 2\n" in rest
+
+
+def test_presets_are_described_for_a_form(client: TestClient) -> None:
+    preset = client.get("/v1/presets").json()["items"][0]
+    assert preset["name"] == "pick-td3"
+    field = {one["name"]: one for one in preset["fields"]}["total_steps"]
+    assert field["minimum"] <= field["default"] <= field["maximum"]
+    assert field["unit"] and field["help"]

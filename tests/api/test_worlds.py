@@ -1,0 +1,116 @@
+import time
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+WORLD = "/v1/worlds/main"
+COMMANDS = f"{WORLD}/commands"
+
+
+def until(client: TestClient, holds: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
+    """Return the world's snapshot once ``holds`` says so."""
+    give_up = time.monotonic() + 20.0
+    while not holds(world := client.get(WORLD).json()):
+        assert time.monotonic() < give_up, world
+        time.sleep(0.02)
+    return world
+
+
+@pytest.fixture(autouse=True)
+def fresh(client: TestClient) -> None:
+    client.post(COMMANDS, json={"tag": "set-mode", "mode": "manual"})
+    client.post(COMMANDS, json={"tag": "reset"})
+    client.post(COMMANDS, json={"tag": "resume"})
+    until(client, lambda world: not world["paused"] and world["mode"] == "manual")
+
+
+def test_worlds_are_listed_with_their_viewer(client: TestClient) -> None:
+    listed = client.get("/v1/worlds").json()["items"]
+    assert [(one["id"], one["viewer"]) for one in listed] == [("main", "/viewer/main/")]
+
+
+def test_clock_runs_until_it_is_paused(client: TestClient) -> None:
+    start = client.get(WORLD).json()["tick"]
+    until(client, lambda world: world["tick"] > start)
+    accepted = client.post(COMMANDS, json={"tag": "pause"})
+    assert accepted.status_code == 202
+    paused = until(client, lambda world: world["paused"])
+    assert client.get(WORLD).json()["tick"] == paused["tick"]
+
+
+def test_step_advances_a_paused_world_by_one_period(client: TestClient) -> None:
+    client.post(COMMANDS, json={"tag": "pause"})
+    before = until(client, lambda world: world["paused"])
+    client.post(COMMANDS, json={"tag": "step"})
+    after = until(client, lambda world: world["tick"] > before["tick"])
+    assert after["tick"] == before["tick"] + 1
+    assert after["t_s"] - before["t_s"] == pytest.approx(0.05)
+
+
+def test_candidates_are_toggled(client: TestClient) -> None:
+    before = client.get(WORLD).json()["selected"]
+    client.post(COMMANDS, json={"tag": "toggle-candidate", "id": before[0]})
+    until(client, lambda world: before[0] not in world["selected"])
+    client.post(COMMANDS, json={"tag": "set-candidates", "ids": before})
+    until(client, lambda world: world["selected"] == before)
+
+
+def test_person_is_moved(client: TestClient) -> None:
+    pelvis = [0.3, 1.5, -1.5708]
+    client.post(COMMANDS, json={"tag": "move-human", "pelvis": pelvis})
+    moved = until(
+        client, lambda world: abs(world["state"]["people"][0]["q"][0] - pelvis[0]) < 0.02
+    )
+    assert moved["mode"] == "manual"
+
+
+def test_acting_checkpoint_is_changed(client: TestClient) -> None:
+    client.post(COMMANDS, json={"tag": "set-policy", "checkpoint": None})
+    until(client, lambda world: world["checkpoint"] is None)
+    client.post(COMMANDS, json={"tag": "set-policy", "checkpoint": "pick"})
+    until(client, lambda world: world["checkpoint"] is not None)
+
+
+def test_case_study_is_started(client: TestClient) -> None:
+    case = client.get("/v1/cells/pick-and-place").json()["cases"][0]
+    client.post(COMMANDS, json={"tag": "start-case", "id": case["id"]})
+    started = until(client, lambda world: world["case"] == case["id"])
+    assert sorted(started["selected"]) == sorted(case["goals"])
+
+
+@pytest.mark.parametrize(
+    ("command", "field"),
+    [
+        ({"tag": "fly"}, "tag"),
+        ({}, "tag"),
+        ({"tag": "set-mode", "mode": "wild"}, "mode"),
+        ({"tag": "toggle-candidate", "id": "cube9"}, "id"),
+        ({"tag": "set-candidates", "ids": ["cube0", "x"]}, "ids[1]"),
+        ({"tag": "start-case", "id": "case-9"}, "id"),
+        ({"tag": "set-policy", "checkpoint": "best"}, "checkpoint"),
+        ({"tag": "move-human", "pelvis": [0.0, 1.0]}, "pelvis"),
+        ({"tag": "pause", "why": "tea"}, "why"),
+    ],
+)
+def test_bad_command_is_refused_by_field(
+    client: TestClient, command: dict[str, Any], field: str
+) -> None:
+    answer = client.post(COMMANDS, json=command)
+    assert answer.status_code == 422
+    assert answer.json()["field"] == field
+
+
+def test_infinite_position_is_refused(client: TestClient) -> None:
+    body = '{"tag": "move-human", "right": [Infinity, 0.0, 0.3]}'
+    answer = client.post(COMMANDS, content=body, headers={"Content-Type": "application/json"})
+    assert answer.status_code == 422
+    assert answer.json()["field"] == "right[0]"
+
+
+def test_unknown_world_is_not_found(client: TestClient) -> None:
+    for path in ("", "/events"):
+        answer = client.get(f"/v1/worlds/other{path}")
+        assert answer.status_code == 404
+        assert answer.json()["known"] == ["main"]
