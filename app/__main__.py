@@ -175,14 +175,21 @@ def run_train(options: argparse.Namespace) -> int:
 
 def log_progress(progress: "Progress") -> None:
     """Say on standard error how far a training is."""
+    rates = (
+        f"{name} {rate:.3f}"
+        for name, rate in (
+            ("success", progress.success),
+            ("collision", progress.collision),
+            ("time-out", progress.timeout),
+        )
+        if rate is not None
+    )
     logging.getLogger("app.train").info(
-        "%d of %d steps: success %.3f, collision %.3f, time-out %.3f, %.0f s left",
+        "%d of %d steps, %.0f s left: %s",
         progress.step,
         progress.total_steps,
-        progress.success,
-        progress.collision,
-        progress.timeout,
         progress.time_left_s,
+        ", ".join(rates) or "no episode has ended yet",
     )
 
 

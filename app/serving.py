@@ -8,6 +8,7 @@ import socket
 from collections.abc import Awaitable, Callable
 from types import FrameType
 
+import torch
 import uvicorn
 from fastapi import FastAPI
 
@@ -69,6 +70,7 @@ def serve(settings: Settings, sock: socket.socket, say: Say) -> None:
         say: Told the address once it can decide, or why it cannot.
     """
     say(f"Tandem starts: {address_of(sock)}")
+    torch.set_num_threads(1)  # a decision is small; the other cores belong to the jobs
     app = create_app(settings)
     told: list[str] = []
 

@@ -79,7 +79,7 @@ Q_MAX = np.array([5.0, 5.0, 7.0, 1.3, 0.6, 1.0, *([0.5] * 4), *_ARM_MAX, *_ARM_M
 Q_MIN.setflags(write=False)
 Q_MAX.setflags(write=False)
 
-REST_ARM = (0.15, 0.12, 0.0, 0.35)
+REST_ARM = (0.15, 0.18, 0.0, 0.6)
 """Arm hanging relaxed: flexion, abduction, rotation, elbow [rad]."""
 FULL_REACH = body.UPPER_ARM + body.FOREARM + body.HAND
 """Shoulder to palm of a straight arm [m]."""

@@ -37,8 +37,9 @@ class Recorder:
             on_checkpoint=lambda step, policy, state: self.checkpoints.append(
                 (step, policy, state)
             ),
-            should_stop=lambda: self._stop_at is not None
-            and self.progress[-1].step >= self._stop_at,
+            should_stop=lambda: (
+                self._stop_at is not None and self.progress[-1].step >= self._stop_at
+            ),
         )
 
 

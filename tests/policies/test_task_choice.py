@@ -26,7 +26,9 @@ def person(x=0.0, y=1.45):
 
 
 def cubes(*names):
-    return [Candidate(id=name, position=np.array(CELL.station(name).position)) for name in names]
+    return [
+        Candidate(id=name, position=np.array(CELL.station(name).position)) for name in names
+    ]
 
 
 def test_the_best_value_is_chosen(chooser):

@@ -41,9 +41,7 @@ def test_the_actor_stays_frozen_while_the_critics_learn(model, tiny_preset):
     steps = tiny_preset.learning_starts + 16 * (tiny_preset.actor_frozen_updates - 1)
     model.learn(steps)
     assert 0 < model._n_updates < tiny_preset.actor_frozen_updates
-    assert all(
-        torch.equal(a, b) for a, b in zip(actor, model.actor.parameters(), strict=True)
-    )
+    assert all(torch.equal(a, b) for a, b in zip(actor, model.actor.parameters(), strict=True))
     moved = zip(target, model.critic_target.parameters(), strict=True)
     assert any(not torch.equal(a, b) for a, b in moved)
 
