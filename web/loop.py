@@ -14,6 +14,7 @@ import socket
 import threading
 import time
 
+import rich
 import viser
 
 from app.errors import ServiceError
@@ -124,6 +125,7 @@ class LiveCell:
 
     def start(self) -> None:
         """Start viewer and thread."""
+        rich.get_console().quiet = True  # viser would print its own address, past the page
         port = self._port or free_port(self._host)
         self._server = viser.ViserServer(host=self._host, port=port, verbose=False)
         scene = CellScene(self._server, self._cell, self.handle.submit)

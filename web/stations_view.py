@@ -95,7 +95,7 @@ class StationsView:
             station.label,
             position=(x, y, height),
             anchor="bottom-center",
-            font_screen_scale=0.78,
+            font_screen_scale=0.95,
         )
 
     def _add_marker(self) -> viser.FrameHandle:
@@ -158,7 +158,7 @@ def _text(station: Station, candidate: CandidateView | None) -> str:
     if candidate is None or candidate.value is None:
         return station.label
     sign = "\N{BLACK RIGHT-POINTING SMALL TRIANGLE} " if candidate.chosen else ""
-    return f"{sign}{station.label}  {candidate.value:.2f}"
+    return f"{sign}{station.label}  {candidate.value:.1f}"
 
 
 def _cube() -> trimesh.Trimesh:
