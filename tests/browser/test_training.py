@@ -58,7 +58,7 @@ def cancel(page: Page) -> None:
 
 
 def test_bad_input_is_explained_at_its_field(open_page: Callable[..., Page]) -> None:
-    page = open_page()
+    page = open_page(scene=False)
     open_form(page)
     page.fill("#train-seed", "minus one")
     page.click("form.train button[type=submit]")
@@ -72,7 +72,7 @@ def test_override_out_of_range_is_explained_at_its_field(
 ) -> None:
     preset = httpx.get(f"{server}/v1/presets").json()["items"][0]
     field = next(f for f in preset["fields"] if f["maximum"] is not None)
-    page = open_page()
+    page = open_page(scene=False)
     open_form(page)
     page.evaluate("document.querySelectorAll('form.train details').forEach(d => d.open = true)")
     page.fill(f"#train-{field['name']}", str(int(field["maximum"]) + 1000))

@@ -5,7 +5,7 @@ import { Icon } from "./icons.js";
 
 const STATUS = {
   moving: ["On its way", "accent"],
-  reached: ["Reached", "good"],
+  picking: ["Picking", "good"],
   contact: ["Contact", "bad"],
   blocked: ["Waiting", "warn"],
   "case done": ["Case done", "good"],
