@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from app.errors import InvalidInput, NotFound, ServiceError
 from app.settings import Settings, check_access, load_settings
+from app.sim.kernel_cache import kernel_cache
 
 if TYPE_CHECKING:
     from app.policies.checkpoint import Checkpoint
@@ -101,14 +102,19 @@ def parser() -> argparse.ArgumentParser:
 
 def run_serve(options: argparse.Namespace) -> int:
     """Start the service; the port is taken before anything else."""
-    from app.listening import listen
+    from app.listening import check_alone, listen
 
     settings = load_settings(host=options.host, port=options.port, data=options.data)
     check_access(settings)
     sock = listen(settings.host, settings.port)
+    check_alone(settings)
     prepare_kernels(settings)
+    import torch
+
     from app.serving import serve
 
+    # Networks this small gain nothing from more; waiting for a busy second core costs 0.3 s.
+    torch.set_num_threads(1)
     serve(settings, sock, say=lambda line: print(line, flush=True))
     return 0
 
@@ -131,7 +137,7 @@ def run_setup(_options: argparse.Namespace) -> int:
         lock.release()
     print(f"database: {store.shown_url}", flush=True)
     store.close()
-    print("compiling the simulator's kernels (half a minute, once) ...", flush=True)
+    print("compiling the simulator's kernels (a minute or two, once) ...", flush=True)
     from app.warm_up import warm_up
 
     print(f"kernels are ready ({warm_up():.1f} s)", flush=True)
@@ -169,14 +175,21 @@ def run_train(options: argparse.Namespace) -> int:
 
 def log_progress(progress: "Progress") -> None:
     """Say on standard error how far a training is."""
+    rates = (
+        f"{name} {rate:.3f}"
+        for name, rate in (
+            ("success", progress.success),
+            ("collision", progress.collision),
+            ("time-out", progress.timeout),
+        )
+        if rate is not None
+    )
     logging.getLogger("app.train").info(
-        "%d of %d steps: success %.3f, collision %.3f, time-out %.3f, %.0f s left",
+        "%d of %d steps, %.0f s left: %s",
         progress.step,
         progress.total_steps,
-        progress.success,
-        progress.collision,
-        progress.timeout,
         progress.time_left_s,
+        ", ".join(rates) or "no episode has ended yet",
     )
 
 
@@ -248,8 +261,7 @@ def run_cells(options: argparse.Namespace) -> int:
 
 def prepare_kernels(settings: Settings) -> None:
     """Keep compiled kernels in the data folder, so that a read-only source tree works."""
-    cache = settings.data.resolve() / "kernels"
-    os.environ.setdefault("NUMBA_CACHE_DIR", str(cache))
+    os.environ.setdefault("NUMBA_CACHE_DIR", str(kernel_cache(settings.data)))
 
 
 def find_checkpoint(reference: str, settings: Settings) -> "Checkpoint":

@@ -1,10 +1,13 @@
-"""The socket the server listens on, taken before anything else is loaded or started."""
+"""What a server needs for itself, checked before anything else is loaded: port and database."""
 
 import errno
 import ipaddress
 import socket
 
 from app.errors import Conflict, InvalidInput
+from app.settings import Settings
+from app.store.engine import Store
+from app.store.lock import ServerLock
 
 BACKLOG = 128
 
@@ -43,6 +46,22 @@ def address_of(sock: socket.socket) -> str:
     if ipaddress.ip_address(host).is_unspecified:
         host = "127.0.0.1"
     return f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"
+
+
+def check_alone(settings: Settings) -> None:
+    """Make sure that no other server uses the data folder or database.
+
+    Raises:
+        Conflict: One does.
+    """
+    settings.data.mkdir(parents=True, exist_ok=True)
+    store = Store(settings.database)
+    lock = ServerLock(store, settings.data)
+    try:
+        lock.acquire()
+    finally:
+        lock.release()
+        store.close()
 
 
 def _explained(error: OSError, host: str, port: int) -> Conflict | InvalidInput:

@@ -36,6 +36,8 @@ logger = logging.getLogger(__name__)
 VERSION = "0.1.0"
 WORLD_ID = "main"
 LIVE_CELL = "pick-and-place"
+STOP_S = 5.0
+"""How long a stopping service waits for kernels that are being compiled [s]."""
 STATIC = Path(web.__file__).parent / "static"
 
 
@@ -91,7 +93,7 @@ class Service:
     def close(self) -> None:
         """Stop the live cell and the supervisor, close the database."""
         self.parts.stopping.set()
-        self._warm_up.join()
+        self._warm_up.join(STOP_S)
         self.parts.readiness.ready = False
         self.parts.readiness.reason = "stopping"
         for world in self.parts.worlds.values():
@@ -108,9 +110,9 @@ class Service:
             publish_shipped(self.parts.policies)
             readiness.reason = "warming up: compiling the simulator's kernels"
             policy = self.parts.policies.load(DEFAULT_ALIAS)
+            cell = LiveCell(load_cell(LIVE_CELL), policy, id=WORLD_ID)
             if self.parts.stopping.is_set():
                 return
-            cell = LiveCell(load_cell(LIVE_CELL), policy, id=WORLD_ID)
             cell.start()
             self.parts.worlds[WORLD_ID] = cell
             readiness.ready, readiness.reason = True, "ready"

@@ -8,14 +8,13 @@ import socket
 from collections.abc import Awaitable, Callable
 from types import FrameType
 
+import torch
 import uvicorn
 from fastapi import FastAPI
 
 from app.listening import address_of
 from app.main import create_app
 from app.settings import Settings
-from app.store.engine import Store
-from app.store.lock import ServerLock
 
 GRACE_S = 3
 """How long open requests may go on once the server stops [s]."""
@@ -69,12 +68,9 @@ def serve(settings: Settings, sock: socket.socket, say: Say) -> None:
         settings: Where and how it runs.
         sock: Listening socket.
         say: Told the address once it can decide, or why it cannot.
-
-    Raises:
-        Conflict: Another server uses the same database.
     """
-    check_alone(settings)
     say(f"Tandem starts: {address_of(sock)}")
+    torch.set_num_threads(1)  # a decision is small; the other cores belong to the jobs
     app = create_app(settings)
     told: list[str] = []
 
@@ -90,19 +86,3 @@ def serve(settings: Settings, sock: socket.socket, say: Say) -> None:
             say(line)
 
     server_of(app, tell).run(sockets=[sock])
-
-
-def check_alone(settings: Settings) -> None:
-    """Make sure that no other server uses the data folder or database.
-
-    Raises:
-        Conflict: One does.
-    """
-    settings.data.mkdir(parents=True, exist_ok=True)
-    store = Store(settings.database)
-    lock = ServerLock(store, settings.data)
-    try:
-        lock.acquire()
-    finally:
-        lock.release()
-        store.close()

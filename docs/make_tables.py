@@ -1,6 +1,6 @@
-"""Write the README's result tables from ``docs/results/*.json``.
+"""Write the result tables of README and model cards from ``docs/results/*.json``.
 
-Between ``<!-- begin NAME -->`` and ``<!-- end NAME -->`` the README shows the table of
+Between ``<!-- begin NAME -->`` and ``<!-- end NAME -->`` a page shows the table of
 ``docs/results/NAME.json``: what ``python -m app evaluate NAME --json`` or
 ``python -m app bench NAME --json`` printed. Run by ``make tables``; a test compares.
 """
@@ -59,16 +59,35 @@ def origin(result: Json) -> str:
     parts += [f"{key} {result[key]}" for key in ("episodes", "seed") if key in result]
     if "checkpoint" in result:
         parts.append(f"checkpoint `{result['checkpoint'][:12]}`")
+    parts += conditions(result)
     parts += [f"{machine['cores']} cores of {machine['cpu']}", f"commit `{machine['commit']}`"]
     return f"<sub>{', '.join(parts)}</sub>"
 
 
+def conditions(result: Json) -> list[str]:
+    """Return what a result says of its people and of the second look at contacts."""
+    parts, settings = [], result.get("settings", {})
+    if "hand_speed_median_m_s" in settings:
+        median, p99 = settings["hand_speed_median_m_s"], settings["hand_speed_p99_m_s"]
+        parts.append(f"hands {median:.2f} m/s (median), {p99:.2f} m/s (p99)")
+    if recheck := result.get("fcl_recheck"):
+        missed, poses = recheck["missed_contacts"], recheck["poses"]
+        parts.append(f"FCL found {missed} missed contacts in {poses:,} poses")
+    return parts
+
+
+def pages() -> list[Path]:
+    """Return the files with tables: the README and the model cards."""
+    return [ROOT / "README.md", *sorted((ROOT / "app/policies/pretrained").glob("*.md"))]
+
+
 def main() -> None:
-    """Rewrite ``README.md`` in place; say which tables it holds."""
-    path = ROOT / "README.md"
-    text = path.read_text(encoding="utf-8")
-    path.write_text(render(text, ROOT / "docs" / "results"), encoding="utf-8")
-    print("tables:", ", ".join(match[2] for match in BLOCK.finditer(text)), file=sys.stderr)
+    """Rewrite the tables of all pages in place; say which there are."""
+    for path in pages():
+        text = path.read_text(encoding="utf-8")
+        path.write_text(render(text, ROOT / "docs" / "results"), encoding="utf-8")
+        names = ", ".join(match[2] for match in BLOCK.finditer(text))
+        print(f"{path.relative_to(ROOT)}: {names}", file=sys.stderr)
 
 
 if __name__ == "__main__":

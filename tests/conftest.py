@@ -1,14 +1,21 @@
 """Rules that hold for every test.
 
+Compiled kernels are kept where the service keeps them, apart for each version of their sources.
 Under ``CI=true`` a skip is a failure: a test that silently stops running guards nothing.
 """
 
 import os
 from collections.abc import Generator
+from pathlib import Path
 
 import pytest
 
+from app.sim.kernel_cache import kernel_cache
+
 IN_CI = os.environ.get("CI", "").lower() in ("1", "true")
+
+
+os.environ.setdefault("NUMBA_CACHE_DIR", str(kernel_cache(Path(__file__).parents[1] / "data")))
 
 
 def _fail_instead_of_skip(report: pytest.TestReport | pytest.CollectReport) -> None:

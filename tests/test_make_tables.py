@@ -1,6 +1,8 @@
 from pathlib import Path
 
-from docs.make_tables import ROOT, render, table
+import pytest
+
+from docs.make_tables import ROOT, conditions, pages, render, table
 
 RATE = {"mean": 0.9712, "low": 0.959, "high": 0.98}
 MACHINE = {"cpu": "Some CPU", "cores": 2, "commit": "0123456789ab"}
@@ -50,6 +52,20 @@ def test_text_outside_the_markers_stays_as_it_is(tmp_path: Path) -> None:
     assert "old" not in text
 
 
-def test_readme_tables_equal_what_the_results_give() -> None:
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert render(readme, ROOT / "docs" / "results") == readme
+@pytest.mark.parametrize("page", pages(), ids=lambda page: page.name)
+def test_tables_equal_what_the_results_give(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    assert render(text, ROOT / "docs" / "results") == text
+
+
+def test_conditions_name_the_people_and_the_second_look() -> None:
+    shown = conditions(
+        {
+            "settings": {"hand_speed_median_m_s": 0.41, "hand_speed_p99_m_s": 1.68},
+            "fcl_recheck": {"missed_contacts": 0, "poses": 52830, "episodes": 200},
+        }
+    )
+    assert shown == [
+        "hands 0.41 m/s (median), 1.68 m/s (p99)",
+        "FCL found 0 missed contacts in 52,830 poses",
+    ]

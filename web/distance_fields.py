@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import gaussian_filter
+from scipy.ndimage import gaussian_filter, map_coordinates
 from skimage.measure import marching_cubes
 
 from web.mannequin import Surface
@@ -105,19 +105,25 @@ class Grid:
             values[window] = smooth_min(values[window], cone.distance(points), cone.blend)
         return values
 
-    def mesh(self, values: Vec, smooth: float = 0.7) -> Surface:
+    def mesh(self, values: Vec, smooth: float = 0.7, hidden: Vec | None = None) -> Surface:
         """Return the zero surface of sampled values.
 
         Args:
             values: Distances on the grid [m].
             smooth: Width of the Gaussian that takes out the grid's steps, in grid cells.
+            hidden: Distances to what covers the surface; what lies 4 mm inside is left out.
         """
         soft = gaussian_filter(values, smooth) if smooth > 0.0 else values
         soft = np.pad(soft, 1, constant_values=float(np.abs(values).max()))
         vertices, faces, _, _ = marching_cubes(soft, 0.0, gradient_direction="descent")  # type: ignore[no-untyped-call]
+        vertices -= 1.0
+        if hidden is not None:
+            seen = map_coordinates(hidden, vertices.T, order=1, mode="nearest") > -0.004
+            faces = faces[seen[faces].any(axis=1)]
+            kept, index = np.unique(faces, return_inverse=True)
+            vertices, faces = vertices[kept], index.reshape(faces.shape)
         return Surface(
-            vertices=(vertices - 1.0) * self.spacing + self.low,
-            faces=faces.astype(np.uint32),
+            vertices=vertices * self.spacing + self.low, faces=faces.astype(np.uint32)
         )
 
 

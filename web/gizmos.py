@@ -19,6 +19,8 @@ from web.poses import Vec, upright, yaw_of
 HANDS = {"right": "hand_r", "left": "hand_l"}
 SETTLE_S = 0.6
 """How long a released gizmo stays where it was let go [s]."""
+HOLD_S = 5.0
+"""How long a held gizmo stays without moving; its visitor may have left [s]."""
 
 
 class Gizmos:
@@ -80,7 +82,7 @@ class Gizmos:
                 self._submit(MoveHuman(left=(x, y, z)))
 
     def _hold(self, name: str, phase: str) -> None:
-        self._released[name] = time.monotonic() + SETTLE_S if phase == "end" else float("inf")
+        self._released[name] = time.monotonic() + (SETTLE_S if phase == "end" else HOLD_S)
 
     def _free(self, name: str) -> bool:
         return time.monotonic() >= self._released.get(name, 0.0)

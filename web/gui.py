@@ -18,6 +18,7 @@ def build(server: viser.ViserServer, overlays: Overlays) -> None:
         show_logo=False, show_share_button=False, brand_color=BRAND, control_width="small"
     )
     gui.set_panel_label("View")
+    gui.main_panel.minimize()
     shapes = gui.add_checkbox(
         "Collision shapes",
         overlays.shapes,

@@ -14,6 +14,7 @@ import socket
 import threading
 import time
 
+import rich
 import viser
 
 from app.errors import ServiceError
@@ -100,6 +101,7 @@ class LiveCell:
         id: str = "main",
     ) -> None:
         self._cell, self._host, self._port = cell, host, port
+        World(cell, policy, seed).step()  # compiles what is not in the kernels' cache yet
         self._world = World(cell, policy, seed, id)
         self.handle = LiveHandle(id, cell, self._world.snapshot())
         """Commands in, snapshots out."""
@@ -123,6 +125,7 @@ class LiveCell:
 
     def start(self) -> None:
         """Start viewer and thread."""
+        rich.get_console().quiet = True  # viser would print its own address, past the page
         port = self._port or free_port(self._host)
         self._server = viser.ViserServer(host=self._host, port=port, verbose=False)
         scene = CellScene(self._server, self._cell, self.handle.submit)

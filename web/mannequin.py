@@ -1,4 +1,4 @@
-"""What the person looks like: ten parts, ready to be drawn.
+"""What the person looks like: eleven parts, ready to be drawn.
 
 The surfaces come from ``meshes/mannequin.npz``, written by :mod:`web.model_mannequin`; colours
 and skin weights are given here. Positions are stored as 16-bit shares of each part's box
@@ -57,6 +57,7 @@ _COLORS: Mapping[str, Rgb] = {
     "trousers": (44, 53, 70),
     "head": (214, 164, 134),
     "helmet": (250, 250, 246),
+    "glasses": (36, 44, 54),
     "hand_l": (247, 189, 74),
     "hand_r": (247, 189, 74),
     "shoe_l": (33, 34, 38),
@@ -65,6 +66,7 @@ _COLORS: Mapping[str, Rgb] = {
 _BONES = {
     "head": "head",
     "helmet": "head",
+    "glasses": "head",
     "hand_l": "hand_l",
     "hand_r": "hand_r",
     "shoe_l": "foot_l",

@@ -56,7 +56,7 @@ def _sleeves() -> list[Cone]:
             _cone(_point(shoulder), _point(biceps), 0.064, 0.053, blend=0.07),
             _cone(_point(biceps), _point(elbow), 0.053, 0.044, blend=0.03),
             _cone(_point(elbow), _point(calf), 0.044, 0.047, blend=0.03),
-            _cone(_point(calf), _point(wrist), 0.047, 0.036, blend=0.03),
+            _cone(_point(calf), _point(wrist), 0.046, 0.033, blend=0.03),
         ]
     return cones
 
@@ -69,7 +69,7 @@ def _jacket() -> Surface:
 
 def _vest() -> tuple[Surface, Surface]:
     """Return vest and reflecting stripes: the trunk, inflated and cut to shape."""
-    grid = Grid((-0.22, -0.26, -0.1), (0.22, 0.26, 0.52), 0.0115)
+    grid = Grid((-0.22, -0.26, -0.1), (0.22, 0.26, 0.52), 0.0092)
     trunk = grid.union(_trunk())
     x, y, z = np.moveaxis(grid.sample(lambda points: points), -1, 0)
     sleeve_hole = 0.155 - 0.35 * np.maximum(0.30 - z, 0.0) * -1.0
@@ -81,7 +81,7 @@ def _vest() -> tuple[Surface, Surface]:
     bands = np.minimum(np.abs(z - 0.055), np.abs(z - 0.165)) - 0.021
     straps = np.maximum(np.abs(np.abs(y) - 0.1) - 0.02, 0.165 - z)
     stripes = np.maximum(trunk - 0.0145, np.maximum(np.minimum(bands, straps), cut + 0.004))
-    return grid.mesh(vest, 0.6), grid.mesh(stripes, 0.5)
+    return grid.mesh(vest, 0.8, hidden=trunk), grid.mesh(stripes, 0.7, hidden=trunk)
 
 
 def _trousers() -> Surface:
@@ -120,7 +120,7 @@ def _hand() -> Surface:
     The palm is turned half-way between facing the body and facing back.
     """
     cones = [
-        _cone((0.0, 0.0, 0.035), (0.0, 0.0, -0.02), 0.041, 0.034, (1.0, 0.85, 1.0), 0.02),
+        _cone((0.0, 0.0, 0.04), (0.0, 0.0, -0.01), 0.048, 0.036, blend=0.02),
         _cone((0.0, 0.0, -0.03), (0.0, 0.0, -0.085), 0.034, 0.043, (1.0, 0.5, 1.0), 0.03),
         _cone((0.03, -0.004, -0.03), (0.052, -0.014, -0.075), 0.016, 0.0125, blend=0.025),
         _cone((0.052, -0.014, -0.075), (0.05, -0.026, -0.105), 0.0125, 0.0105, blend=0.01),
@@ -159,6 +159,17 @@ def _head() -> tuple[Surface, Surface]:
     return head, _helmet()
 
 
+def _glasses() -> Surface:
+    """Return safety glasses in the head's frame: a visor, bent around the face."""
+    grid = Grid((-0.06, -0.11, 0.13), (0.15, 0.11, 0.25), 0.0055)
+    x, y, z = np.moveaxis(grid.sample(lambda points: points), -1, 0)
+    shell = np.abs(np.hypot(x / 0.122, y / 0.09) - 1.0) * 0.1 - 0.006
+    nose = 0.016 - np.hypot(y, z - 0.166)
+    front = np.maximum(np.abs(z - 0.19) - 0.02, np.maximum(0.05 - x, nose))
+    temple = np.maximum(np.abs(z - 0.196) - 0.006, np.maximum(x - 0.06, -0.02 - x))
+    return grid.mesh(np.maximum(shell, np.minimum(front, temple)), 0.5)
+
+
 def _helmet() -> Surface:
     grid = Grid((-0.17, -0.15, 0.16), (0.23, 0.15, 0.39), 0.0075)
     dome = grid.union(
@@ -186,6 +197,7 @@ def model() -> dict[str, Surface]:
         "trousers": _trousers(),
         "head": head,
         "helmet": helmet,
+        "glasses": _glasses(),
         "hand_l": hand,
         "hand_r": mirrored(hand),
         "shoe_l": shoe,

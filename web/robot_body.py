@@ -8,6 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 import trimesh
+from numpy.typing import NDArray
 
 from app.sim.robot import LINK_NAMES, package_dir
 from web.solids import block, material, painted, rod
@@ -20,14 +21,18 @@ _FILES = dict(
     )
 )
 
-ALUMINIUM = material((205, 209, 214), metallic=0.45, roughness=0.4)
+Ints = NDArray[np.int64]
+
+ALUMINIUM = material((205, 209, 214), metallic=0.15, roughness=0.42)
 CAP = material((88, 152, 196), metallic=0.05, roughness=0.35)
 RUBBER = material((58, 62, 70), roughness=0.55)
-STEEL = material((150, 155, 162), metallic=0.6, roughness=0.32)
+STEEL = material((150, 155, 162), metallic=0.3, roughness=0.35)
 ACCENT = material((255, 138, 52), roughness=0.5)
 
 _PAINT = {57: ALUMINIUM, 100: CAP, 118: RUBBER, 95: RUBBER, 167: STEEL, 20: RUBBER}
 """Material by the red channel of the file's own colour, which tells the parts apart."""
+CREASE = 0.6
+"""Angle from which on an edge stays sharp [rad]."""
 
 
 @lru_cache(maxsize=1)
@@ -46,18 +51,43 @@ def link_meshes() -> dict[str, bytes]:
 
 
 def _welded(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
-    """Return the mesh with one vertex per place (0.1 mm) and direction of its surface."""
-    normals = np.asarray(mesh.vertex_normals)
-    rows = np.hstack([np.round(mesh.vertices / 2e-4), np.round(normals / 0.12)])
-    _, first, index = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+    """Return the mesh with shared vertices, shaded smoothly except at creases.
+
+    The files give every face its own vertices. Here faces that meet at less than ``CREASE``
+    form a group, and each group shares one vertex per place.
+    """
+    points, index = np.unique(mesh.vertices.round(4), axis=0, return_inverse=True)
     faces = index.reshape(-1)[mesh.faces]
-    whole = (np.diff(np.sort(faces, axis=1), axis=1) > 0).all(axis=1)
+    faces = faces[(np.diff(np.sort(faces, axis=1), axis=1) > 0).all(axis=1)]
+    solid = trimesh.Trimesh(vertices=points, faces=faces, process=False)
+    faces = np.asarray(solid.faces)
+    soft = solid.face_adjacency[solid.face_adjacency_angles < CREASE]
+    group = _groups(len(faces), soft)
+    corners = np.stack([faces.ravel(), np.repeat(group, 3)], axis=1)
+    own, corner = np.unique(corners, axis=0, return_inverse=True)
+    shared = corner.reshape(faces.shape)
+    normals = np.zeros((len(own), 3))
+    areas = solid.face_normals * solid.area_faces[:, None]
+    for column in range(3):
+        np.add.at(normals, shared[:, column], areas)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
     return trimesh.Trimesh(
-        vertices=mesh.vertices[first],
-        faces=faces[whole],
-        vertex_normals=normals[first],
-        process=False,
+        vertices=points[own[:, 0]], faces=shared, vertex_normals=normals, process=False
     )
+
+
+def _groups(n: int, pairs: Ints) -> Ints:
+    """Return the group of each of ``n`` things, joined by ``pairs``, shape (m, 2)."""
+    label = np.arange(n)
+    while True:
+        least = label[pairs].min(axis=1)
+        new = label.copy()
+        np.minimum.at(new, pairs[:, 0], least)
+        np.minimum.at(new, pairs[:, 1], least)
+        new = new[new]
+        if np.array_equal(new, label):
+            return label
+        label = new
 
 
 @lru_cache(maxsize=4)
@@ -70,8 +100,8 @@ def gripper_body(tool_length: float, tool_radius: float) -> bytes:
     """
     palm = 0.46 * tool_length
     pieces = [
-        (rod((0, 0, 0), (0, 0, 0.014), 0.95 * tool_radius), STEEL),
-        (rod((0, 0, 0.014), (0, 0, 0.022), 0.8 * tool_radius), ACCENT),
+        (rod((0, 0, 0), 0.014, 0.95 * tool_radius), STEEL),
+        (rod((0, 0, 0.014), 0.008, 0.8 * tool_radius), ACCENT),
         (
             block(
                 (1.9 * tool_radius, 1.3 * tool_radius, palm - 0.02),

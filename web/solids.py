@@ -90,13 +90,31 @@ def slab(
     return _flat(mesh)
 
 
-def rod(start: Sequence[float], end: Sequence[float], radius: float) -> trimesh.Trimesh:
-    """Return a smooth cylinder between two points [m]."""
-    mesh = trimesh.creation.cylinder(
-        radius=radius, segment=np.array([start, end], dtype=np.float64), sections=40
+def rod(base: Sequence[float], height: float, radius: float) -> trimesh.Trimesh:
+    """Return an upright cylinder on ``base`` [m], shape (3,), with a smooth side."""
+    count = 40
+    angles = 2.0 * np.pi * np.arange(count) / count
+    side = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(count)])
+    up = np.array([0.0, 0.0, 1.0])
+    low = np.asarray(base) + radius * side
+    high = low + height * up
+    i, j = np.arange(count), (np.arange(count) + 1) % count
+    caps = [
+        np.column_stack([np.full(count, 2 * count), 2 * count + i, 2 * count + j])[1:-1],
+        np.column_stack([np.full(count, 3 * count), 3 * count + j, 3 * count + i])[1:-1],
+    ]
+    walls = [
+        np.column_stack([i, j, count + j]),
+        np.column_stack([i, count + j, count + i]),
+    ]
+    return trimesh.Trimesh(
+        vertices=np.vstack([low, high, high, low]),
+        faces=np.vstack([*walls, *caps]),
+        vertex_normals=np.vstack(
+            [side, side, np.tile(up, (count, 1)), np.tile(-up, (count, 1))]
+        ),
+        process=False,
     )
-    assert isinstance(mesh, trimesh.Trimesh)
-    return mesh
 
 
 def painted(pieces: Sequence[tuple[trimesh.Trimesh, PBRMaterial]]) -> bytes:

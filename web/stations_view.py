@@ -4,6 +4,7 @@ Green is the best candidate; the others turn to amber and red the more the criti
 below it. What is no candidate is grey. A ring marks the chosen one.
 """
 
+import time
 from collections.abc import Callable
 
 import numpy as np
@@ -25,6 +26,8 @@ RAMP: tuple[tuple[float, Rgb], ...] = (
 )
 """Colour by how much less than the best a candidate is worth."""
 IDLE: Rgb = (196, 202, 210)
+PERIOD_S = 0.25
+"""Time between two drawings of values that change all the time [s]."""
 UNKNOWN: Rgb = (122, 142, 166)
 MARK: Rgb = (11, 127, 119)
 HIT: Rgb = (214, 52, 46)
@@ -61,6 +64,8 @@ class StationsView:
         self._labels = {station.id: self._add_label(station) for station in cell.stations}
         self._marker = self._add_marker()
         self._values = True
+        self._key: tuple[object, ...] = ()
+        self._next = 0.0
 
     def _add_body(self, station: Station) -> viser.MeshHandle:
         x, y, _ = station.position
@@ -90,7 +95,7 @@ class StationsView:
             station.label,
             position=(x, y, height),
             anchor="bottom-center",
-            font_screen_scale=0.78,
+            font_screen_scale=0.95,
         )
 
     def _add_marker(self) -> viser.FrameHandle:
@@ -121,7 +126,11 @@ class StationsView:
         self._values = visible
 
     def draw(self, snapshot: WorldSnapshot) -> None:
-        """Show what the critic says."""
+        """Show what the critic says; at once who is chosen, a few times a second how sure."""
+        key = (snapshot.chosen, tuple(c.id for c in snapshot.candidates), self._values)
+        if key == self._key and time.monotonic() < self._next:
+            return
+        self._key, self._next = key, time.monotonic() + PERIOD_S
         offered = {candidate.id: candidate for candidate in snapshot.candidates}
         best = max(snapshot.values.values(), default=None)
         for station in self._cell.stations:
@@ -149,7 +158,7 @@ def _text(station: Station, candidate: CandidateView | None) -> str:
     if candidate is None or candidate.value is None:
         return station.label
     sign = "\N{BLACK RIGHT-POINTING SMALL TRIANGLE} " if candidate.chosen else ""
-    return f"{sign}{station.label}  {candidate.value:.2f}"
+    return f"{sign}{station.label}  {candidate.value:.1f}"
 
 
 def _cube() -> trimesh.Trimesh:

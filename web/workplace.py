@@ -48,7 +48,7 @@ def table_body(cell: Cell) -> bytes:
             pieces.append(
                 (block((leg, leg, height), (x, y, floor + 0.03 + 0.5 * height), 0.006), FRAME)
             )
-            pieces.append((rod((x, y, floor), (x, y, floor + 0.03), 0.03), FOOT))
+            pieces.append((rod((x, y, floor), 0.03, 0.03), FOOT))
         beam = (x, cy, under - 0.04)
         pieces.append((block((0.05, ys[1] - ys[0], 0.08), beam, 0.005), FRAME))
     for y in ys:
@@ -89,12 +89,21 @@ def _floor(server: viser.ViserServer, cell: Cell) -> None:
 
 
 def _light(server: viser.ViserServer) -> None:
-    server.scene.configure_default_lights(enabled=True, cast_shadow=True)
+    """Light without an environment map: the viewer hides the scene until one is decoded."""
+    scene = server.scene
+    scene.configure_environment_map(None)
+    scene.configure_default_lights(enabled=True, cast_shadow=True)
+    scene.add_light_hemisphere(
+        "/light/sky", sky_color=(255, 255, 255), ground_color=(168, 176, 188), intensity=1.7
+    )
+    scene.add_light_directional(
+        "/light/side", color=(255, 250, 242), intensity=0.9, position=(3.0, -3.0, 2.0)
+    )
 
 
 def _camera(server: viser.ViserServer) -> None:
     camera = server.initial_camera
-    camera.position = (2.05, -0.85, 1.35)
-    camera.look_at = (-0.02, 0.66, 0.12)
+    camera.position = (2.2, -0.9, 1.36)
+    camera.look_at = (0.0, 0.68, 0.17)
     camera.up = (0.0, 0.0, 1.0)
     camera.fov = math.radians(40.0)

@@ -14,6 +14,8 @@ import logging
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
 
 import numpy as np
 from scipy.optimize import minimize
@@ -23,6 +25,9 @@ from app.sim.collision import collision_mesh
 from app.sim.ports import Vec
 from app.sim.robot import LINK_NAMES
 from app.sim.shapes import CAPSULE_FILE
+
+Fit = tuple[Vec, Vec, float]
+"""End points [m] and radius [m] of a fitted capsule."""
 
 logger = logging.getLogger(__name__)
 
@@ -96,7 +101,7 @@ def clip_slab(triangles: Vec, low: float, high: float) -> Vec:
     return np.concatenate(points)
 
 
-def fit_capsule(points: Vec, restarts: int = 3) -> tuple[Vec, Vec, float]:
+def fit_capsule(points: Vec, restarts: int = 3) -> Fit:
     """Find a capsule of (nearly) least volume around points (n, 3).
 
     Nelder-Mead over the two end points, the radius being the greatest distance of a point;
@@ -133,32 +138,30 @@ def fit_capsule(points: Vec, restarts: int = 3) -> tuple[Vec, Vec, float]:
     return p0, p1, round(radius, DECIMALS)
 
 
-def fit_parts(
-    triangles: Vec, cuts: Sequence[float], restarts: int
-) -> list[tuple[Vec, Vec, float]]:
-    """Fit one capsule to each slab between the cuts."""
-    edges = [-math.inf, *cuts, math.inf]
-    return [
-        fit_capsule(clip_slab(triangles, low, high), restarts)
-        for low, high in zip(edges[:-1], edges[1:], strict=True)
-    ]
-
-
-def total_volume(fits: Sequence[tuple[Vec, Vec, float]]) -> float:
+def total_volume(fits: Sequence[Fit]) -> float:
     """Sum of the capsules' volumes [m^3]."""
     return sum(capsule_volume(r, float(np.linalg.norm(p1 - p0))) for p0, p1, r in fits)
 
 
-def fit_link(plan: LinkPlan) -> list[tuple[Vec, Vec, float]]:
+def fit_link(plan: LinkPlan) -> list[Fit]:
     """Cover one link with ``len(plan.parts)`` capsules of least total volume."""
     triangles = np.asarray(collision_mesh(plan.link).triangles, dtype=np.float64)
+
+    @cache
+    def fit_slab(low: float, high: float, restarts: int) -> Fit:
+        return fit_capsule(clip_slab(triangles, low, high), restarts)
+
+    def fit_parts(cuts: Sequence[float], restarts: int) -> list[Fit]:
+        edges = [-math.inf, *cuts, math.inf]
+        return [fit_slab(low, high, restarts) for low, high in pairwise(edges)]
+
     cuts = [grid[len(grid) // 2] for grid in plan.cut_grid]
     for _ in range(2 if cuts else 0):
         for i, grid in enumerate(plan.cut_grid):
             trials = [[*cuts[:i], cut, *cuts[i + 1 :]] for cut in grid]
-            sums = [total_volume(fit_parts(triangles, trial, 1)) for trial in trials]
+            sums = [total_volume(fit_parts(trial, 1)) for trial in trials]
             cuts = trials[int(np.argmin(sums))]
-    fits = fit_parts(triangles, cuts, 3)
+    fits = fit_parts(cuts, 3)
     logger.info("%s: cuts %s, %.3f l", plan.link, cuts, 1e3 * total_volume(fits))
     return fits
 

@@ -79,7 +79,7 @@ Q_MAX = np.array([5.0, 5.0, 7.0, 1.3, 0.6, 1.0, *([0.5] * 4), *_ARM_MAX, *_ARM_M
 Q_MIN.setflags(write=False)
 Q_MAX.setflags(write=False)
 
-REST_ARM = (0.15, 0.12, 0.0, 0.35)
+REST_ARM = (0.15, 0.18, 0.0, 0.6)
 """Arm hanging relaxed: flexion, abduction, rotation, elbow [rad]."""
 FULL_REACH = body.UPPER_ARM + body.FOREARM + body.HAND
 """Shoulder to palm of a straight arm [m]."""
@@ -114,7 +114,8 @@ def rest_posture(x: float, y: float, yaw: float) -> Vec:
 
 def _forward(q: Vec, pelvis_z: float) -> tuple[Vec, Vec]:
     points, frames = np.empty((body.N_POINTS, 3)), np.empty((body.N_FRAMES, 3, 3))
-    body.points_and_frames(np.asarray(q, dtype=np.float64), pelvis_z, points, frames)
+    # A copy: for a read-only array the kernel would be compiled anew.
+    body.points_and_frames(np.array(q, dtype=np.float64), float(pelvis_z), points, frames)
     return points, frames
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from app.errors import InvalidInput, SimulationError
 from app.sim import human
@@ -80,9 +80,10 @@ class Contact:
     clearance_m: float
     """Distance of robot and person at the pose of contact, or at the end [m]."""
     link: str
-    """Robot capsule nearest to the person, or the ones that touch."""
+    """Robot capsule that touches, or is nearest to the person."""
     part: str
-    """Nearest capsule of the person (CAPSULE_NAMES)."""
+    """What it touches or is nearest to: a capsule of the person (CAPSULE_NAMES), ``table`` or
+    another capsule of the robot."""
 
 
 @lru_cache(maxsize=8)
@@ -113,6 +114,15 @@ def _require_finite(name: str, values: NDArray[np.floating]) -> None:
     """Raise SimulationError for NaN and infinity, which the contact test would pass over."""
     if not np.isfinite(values).all():
         raise SimulationError(f"{name} = {values.tolist()} must be finite")
+
+
+def _own(values: ArrayLike) -> Vec:
+    """Return a copy of one kind, float64, contiguous and writable.
+
+    Kernels are compiled anew for read-only, strided or integer arrays: half a minute in the
+    middle of a live cell.
+    """
+    return np.array(values, dtype=np.float64, order="C")
 
 
 def _world_of(cell: Cell, library_seed: int) -> pick.PickWorld:
@@ -228,6 +238,7 @@ class PickBatch:
             SimulationError: An action is NaN or infinite.
         """
         _require_finite("act", act)
+        wanted = np.array(act, dtype=np.float32, order="C")
         pick.step_batch(
             self.world,
             self._rules,
@@ -235,7 +246,7 @@ class PickBatch:
             self.settings.weights,
             self.seed,
             self.state,
-            act,
+            wanted,
             auto_reset,
             features,
             self._obs,
@@ -248,7 +259,7 @@ class PickBatch:
     def set_goals(self, rows: NDArray[np.int64], goals: Vec) -> None:
         """Send the robots of ``rows`` to new targets [m], shape (len(rows), 3)."""
         for row, goal in zip(rows, goals, strict=True):
-            pick.set_goal(self.arm, self.state, int(row), goal)
+            pick.set_goal(self.arm, self.state, int(row), _own(goal))
 
 
 def observe(
@@ -274,20 +285,20 @@ def observe(
     Returns:
         Observations, shape (n, N_FEATURES), and whether each target is reachable, (n,).
     """
-    n = len(goals)
+    n, targets = len(goals), _own(goals)
     q_goals, reachable = kinematics.ik_vertical_batch(
-        goals, arm.tool_length, arm.q_min, arm.q_max
+        targets, arm.tool_length, arm.q_min, arm.q_max
     )
     obs = np.empty((n, N_FEATURES), dtype=np.float32)
     features.observe_batch(
         arm,
-        np.broadcast_to(q, (n, 6)),
-        np.broadcast_to(qd, (n, 6)),
-        np.broadcast_to(human_q, (n, 18)),
-        np.broadcast_to(human_qd, (n, 18)),
-        goals,
+        np.tile(_own(q), (n, 1)),
+        np.tile(_own(qd), (n, 1)),
+        np.tile(_own(human_q), (n, 1)),
+        np.tile(_own(human_qd), (n, 1)),
+        targets,
         q_goals,
-        np.full(n, time_left_s),
+        np.full(n, time_left_s, dtype=np.float64),
         obs,
     )
     return obs, reachable
@@ -311,7 +322,7 @@ def step_robot(arm: Arm, q: Vec, qd: Vec, act: Vec) -> tuple[Vec, Vec, Vec]:
     """
     _require_finite("q, qd, act", np.concatenate([q, qd, act]))
     c, q_out, qd_out = np.empty(6), np.empty(6), np.empty(6)
-    pick.drive(arm, q, qd, np.asarray(act, dtype=np.float64), c, q_out, qd_out)
+    pick.drive(arm, _own(q), _own(qd), _own(act), c, q_out, qd_out)
     return q_out, qd_out, c
 
 
@@ -332,24 +343,23 @@ def contact(arm: Arm, q0: Vec, qd0: Vec, c: Vec, human_q0: Vec, human_q1: Vec) -
     _require_finite("q, qd, c", np.concatenate([q0, qd0, c]))
     _require_finite("human_q", np.concatenate([human_q0, human_q1]))
     pose = arm_kernel.new_pose(len(arm.link))
-    kind, link, part, d = arm_kernel.sweep(arm, q0, qd0, c, human_q0, human_q1, pose)
-    names = load_robot_capsules().name
-    touching = names[link]
-    if kind == arm_kernel.SELF_CONTACT:
-        touching = " and ".join(names[k] for k in arm.pairs[link])
-    return Contact(
-        kind=CONTACT_KINDS[kind],
-        clearance_m=d,
-        link=touching,
-        part=human.CAPSULE_NAMES[part],
+    kind, link, part, d = arm_kernel.sweep(
+        arm, _own(q0), _own(qd0), _own(c), _own(human_q0), _own(human_q1), pose
     )
+    names = load_robot_capsules().name
+    touching, other = names[link], human.CAPSULE_NAMES[part]
+    if kind == arm_kernel.SELF_CONTACT:
+        touching, other = (names[k] for k in arm.pairs[link])
+    elif kind == arm_kernel.CELL_CONTACT:
+        other = "table"
+    return Contact(kind=CONTACT_KINDS[kind], clearance_m=d, link=touching, part=other)
 
 
 def tool_state(arm: Arm, q: Vec, qd: Vec, goal: Vec) -> tuple[float, float, float, bool]:
     """Return distance to a target [m], tilt [rad], tcp speed [m/s] and whether it succeeds."""
     pose = arm_kernel.new_pose(len(arm.link))
-    arm_kernel.place_robot(arm, q, pose)
-    distance, tilt, speed = pick.tool_state(arm, qd, goal, pose)
+    arm_kernel.place_robot(arm, _own(q), pose)
+    distance, tilt, speed = pick.tool_state(arm, _own(qd), _own(goal), pose)
     return distance, tilt, speed, bool(pick.succeeded(distance, tilt, speed))
 
 

@@ -101,6 +101,7 @@ class Robot:
             Joint positions [rad], shape (6,); None where no such posture exists.
         """
         q = np.empty(6)
-        target = np.asarray(position, dtype=np.float64)
-        reached = kinematics.ik_vertical(target, self.tool_length, q_min, q_max, q)
+        # Copies: for a read-only array the kernel would be compiled anew.
+        target, low, high = (np.array(x, dtype=np.float64) for x in (position, q_min, q_max))
+        reached = kinematics.ik_vertical(target, self.tool_length, low, high, q)
         return q if reached else None

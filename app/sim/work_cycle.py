@@ -89,7 +89,7 @@ def _at_home(cell: Cell, rng: np.random.Generator) -> Vec:
         yaw + rng.normal(0.0, 0.15),
     )
     for first in (10, 14):
-        q[first : first + 4] += rng.uniform([-0.1, 0.0, -0.2, 0.0], [0.2, 0.15, 0.2, 0.9])
+        q[first : first + 4] += rng.uniform([-0.1, -0.06, -0.2, -0.25], [0.2, 0.09, 0.2, 0.65])
     return q
 
 

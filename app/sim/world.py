@@ -4,8 +4,8 @@ The world advances in control periods of ``cell.robot.dt``. Each period the robo
 the action decided for the state it is in, the person moves, contact is tested between the ends
 of the period too, and the policy decides anew (METHOD 3.1). A reached target is picked up (the
 tool goes down and up again, by inverse kinematics and inside the same limits), leaves the
-candidates until all have had their turn, and the next episode goes on from there. A contact is shown for two
-seconds; then the robot starts again from home.
+candidates until all have had their turn, and the next episode goes on from there. A contact
+is shown for two seconds; then the robot starts again from home.
 """
 
 from dataclasses import replace

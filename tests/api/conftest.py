@@ -12,7 +12,7 @@ from app.main import create_app
 from app.settings import Settings
 
 ADDRESS = "http://127.0.0.1:8000"
-WARM_UP_S = 120.0
+WARM_UP_S = 300.0
 
 
 def wait_until_ready(client: TestClient) -> None:

@@ -5,12 +5,14 @@ import threading
 import time
 from collections.abc import Iterator
 
+import httpx
 from fastapi import FastAPI
 
 from app.listening import address_of, listen
 from app.serving import Server, server_of
 
 START_S = 30.0
+WARM_UP_S = 300.0
 
 
 @contextlib.contextmanager
@@ -30,3 +32,11 @@ def running(app: FastAPI) -> Iterator[tuple[Server, str]]:
         server.handle_exit(0, None)
         thread.join(timeout=30.0)
         assert not thread.is_alive()
+
+
+def wait_until_ready(address: str) -> None:
+    """Wait for the kernels and the live cell."""
+    give_up = time.monotonic() + WARM_UP_S
+    while (answer := httpx.get(f"{address}/readyz")).status_code != 200:
+        assert time.monotonic() < give_up, answer.text
+        time.sleep(0.05)

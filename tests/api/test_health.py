@@ -25,7 +25,7 @@ def test_service_says_that_it_warms_up_and_then_decides(cold_app_settings: Setti
         assert cold.get("/v1/worlds/main").status_code == 503
         assert cold.post("/v1/task-selection", json={}).status_code in (422, 503)
         assert cold.get("/").status_code == 200
-        give_up = time.monotonic() + 120.0
+        give_up = time.monotonic() + 300.0
         while cold.get("/readyz").status_code != 200:
             assert time.monotonic() < give_up
             time.sleep(0.05)

@@ -1,6 +1,5 @@
 import json
 import threading
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -10,7 +9,7 @@ import pytest
 
 from app.main import create_app
 from app.settings import Settings
-from tests.api.live_server import running
+from tests.api.live_server import running, wait_until_ready
 
 
 @pytest.fixture(scope="module")
@@ -19,13 +18,6 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     with running(app) as (_, found):
         wait_until_ready(found)
         yield found
-
-
-def wait_until_ready(address: str) -> None:
-    give_up = time.monotonic() + 120.0
-    while httpx.get(f"{address}/readyz").status_code != 200:
-        assert time.monotonic() < give_up
-        time.sleep(0.05)
 
 
 def events(response: httpx.Response) -> Iterator[tuple[str, str, Any]]:

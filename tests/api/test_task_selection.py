@@ -1,4 +1,5 @@
 import json
+import time
 from typing import Any
 
 import pytest
@@ -34,7 +35,12 @@ def test_answer_names_the_choice_every_value_and_the_checkpoint(
 def test_state_of_a_world_gives_the_choice_and_values_that_the_world_shows(
     client: TestClient,
 ) -> None:
-    world = client.get("/v1/worlds/main").json()
+    give_up = time.monotonic() + 60.0
+    while (world := client.get("/v1/worlds/main").json())["status"] != "moving":
+        assert time.monotonic() < give_up, world
+        time.sleep(0.02)
+    assert world["state"]["robot"] == world["robot"]
+    assert world["state"]["people"] == world["people"]
     answer = client.post(URL, json=world["state"]).json()
     assert answer["chosen"] == world["chosen"]
     assert answer["checkpoint"] == world["checkpoint"]

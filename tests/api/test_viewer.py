@@ -11,8 +11,7 @@ from websockets.typing import Origin, Subprotocol
 from app.api.viewer import is_allowed
 from app.main import create_app
 from app.settings import Settings
-from tests.api.live_server import running
-from tests.api.test_streams import wait_until_ready
+from tests.api.live_server import running, wait_until_ready
 
 PROTOCOL = Subprotocol(f"viser-v{viser.__version__}")
 

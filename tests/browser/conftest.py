@@ -120,8 +120,8 @@ def browser() -> Iterator[Browser]:
 def open_page(browser: Browser, server: str) -> Iterator[OpenPage]:
     """Open Tandem's page as a visitor; ``page.problems`` lists what went wrong on it.
 
-    Software takes long to draw the scene, in the page's own thread: a test that does not look at
-    it leaves it out with ``scene=False``.
+    Software takes long to draw the scene, in the page's own thread: a test that does not look
+    at it leaves it out with ``scene=False``.
     """
     pages: list[Page] = []
     expect.set_options(timeout=STEP_MS)
@@ -136,7 +136,9 @@ def open_page(browser: Browser, server: str) -> Iterator[OpenPage]:
         page.on("pageerror", lambda error: problems.append(f"page error: {error}"))
         page.on("requestfailed", lambda request: problems.extend(lost(request)))
         if not scene:
-            page.route("**/viewer/**", lambda route: route.fulfill(body="", content_type="text/html"))
+            page.route(
+                "**/viewer/**", lambda route: route.fulfill(body="", content_type="text/html")
+            )
         page.goto(server)
         page.wait_for_selector('[data-link="live"]')
         return page

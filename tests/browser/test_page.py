@@ -50,9 +50,7 @@ def test_goal_chips_change_the_candidates_of_the_world(
     assert ("cube2" in world(server)["selected"]) == (after == "true")
 
 
-def test_case_study_starts_from_its_button(
-    open_page: Callable[..., Page], server: str
-) -> None:
+def test_case_study_starts_from_its_button(open_page: Callable[..., Page], server: str) -> None:
     page = open_page(scene=False)
     page.click('[data-case="case-1"]')
     expect(page.locator('[data-case="case-1"]')).to_have_attribute("aria-pressed", "true")

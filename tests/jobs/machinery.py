@@ -15,8 +15,8 @@ from jobs.supervisor import Patience
 from tests.jobs.counting_worker import CHECKPOINT_EVERY, FACTOR, GRID, MODULUS
 
 PATIENCE = Patience(tick_s=0.05, cancel_s=1.0, shutdown_s=5.0)
-WAIT_S = 60.0
-"""Far above what anything here takes; only a hang reaches it."""
+WAIT_S = 600.0
+"""Far above what anything takes, compiling kernels included; only a hang reaches it."""
 
 
 def queue(store: Store, *, seed: int = 0, kind: str = "count", **overrides: object) -> str:
@@ -54,6 +54,19 @@ def assert_counted_once(store: Store, job_id: str, *, steps: int, seed: int = 0)
         range(CHECKPOINT_EVERY, steps + 1, CHECKPOINT_EVERY)
     )
     assert jobs.get_job(store, job_id).result == {"value": value}
+
+
+def worker_pids(parent: int) -> list[int]:
+    """The children of a process, by /proc."""
+    found = []
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = stat.read_text().rpartition(")")[2].split()
+        except OSError:
+            continue
+        if int(fields[1]) == parent and fields[0] != "Z":
+            found.append(int(stat.parent.name))
+    return found
 
 
 @contextmanager

@@ -4,6 +4,7 @@ from typing import Any
 import pytest
 
 from app.errors import InvalidInput, NotFound
+from app.policies.presets import PRESETS
 from jobs.spec import MAX_SEED, EvaluateSpec, TrainSpec, new_job, parse_spec
 
 EVALUATE = {"kind": "evaluate", "protocol": "pick-single", "episodes": 10, "seed": 11}
@@ -19,7 +20,7 @@ def test_training_becomes_a_job_with_its_body_unchanged() -> None:
         {"width": 64},
     )
     assert job.spec == TRAIN
-    assert job.total_steps == 5_120_000
+    assert job.total_steps == PRESETS["pick-td3"].total_steps
 
 
 def test_seed_and_overrides_may_be_left_out() -> None:

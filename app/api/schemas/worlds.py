@@ -90,6 +90,10 @@ class WorldLight(Answer):
 class WorldPublic(WorldLight):
     """One live world at one tick, with the state that a decision needs."""
 
+    robot: RobotState
+    people: list[PersonState]
+    previous: str | None = Field(description="the choice one tick earlier")
+    time_left_s: float = Field(description="time left in the episode [s]")
     tcp: list[float] = Field(description="tool centre point [m]")
     viewer: str = Field(description="where its 3D scene is")
     state: TaskSelectionRequest | None = Field(
@@ -102,6 +106,10 @@ class WorldPublic(WorldLight):
         """Make it from a snapshot."""
         return cls(
             **light_members(snapshot),
+            robot=robot_of(snapshot),
+            people=people_of(snapshot),
+            previous=snapshot.previous,
+            time_left_s=snapshot.time_left_s,
             tcp=snapshot.tcp.tolist(),
             viewer=f"/viewer/{snapshot.id}/",
             state=decision_input(snapshot),
@@ -123,6 +131,16 @@ class WorldList(Answer):
     items: list[WorldSummary]
 
 
+def robot_of(snapshot: WorldSnapshot) -> RobotState:
+    """Return the robot's state, as a request carries it."""
+    return RobotState(q=snapshot.robot_q.tolist(), qd=snapshot.robot_qd.tolist())
+
+
+def people_of(snapshot: WorldSnapshot) -> list[PersonState]:
+    """Return the people's states, as a request carries them."""
+    return [PersonState(q=snapshot.person_q.tolist(), qd=snapshot.person_qd.tolist())]
+
+
 def decision_input(snapshot: WorldSnapshot) -> TaskSelectionRequest | None:
     """Return the request that repeats the snapshot's decision; None with nothing to choose."""
     if not snapshot.candidates:
@@ -131,8 +149,8 @@ def decision_input(snapshot: WorldSnapshot) -> TaskSelectionRequest | None:
         cell=snapshot.cell,
         frame="robot-base",
         stamp=snapshot.t_s,
-        robot=RobotState(q=snapshot.robot_q.tolist(), qd=snapshot.robot_qd.tolist()),
-        people=[PersonState(q=snapshot.person_q.tolist(), qd=snapshot.person_qd.tolist())],
+        robot=robot_of(snapshot),
+        people=people_of(snapshot),
         candidates=[
             CandidateState(id=one.id, position=one.position.tolist())
             for one in snapshot.candidates
@@ -147,8 +165,8 @@ def light_members(snapshot: WorldSnapshot) -> dict[str, Any]:
     """Return the members of :class:`WorldLight`."""
     contact, counters = snapshot.contact, snapshot.counters
     same = (
-        "id", "cell", "tick", "t_s", "mode", "paused", "status", "message", "gripping", "chosen",
-        "clearance_m", "checkpoint", "policy_title", "elapsed_ms", "case",
+        "id", "cell", "tick", "t_s", "mode", "paused", "status", "message", "gripping",
+        "chosen", "clearance_m", "checkpoint", "policy_title", "elapsed_ms", "case",
     )  # fmt: skip
     return {name: getattr(snapshot, name) for name in same} | {
         "selected": list(snapshot.selected),

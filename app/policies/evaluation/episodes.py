@@ -194,7 +194,7 @@ class _Trace:
             if state.outcome[row] == kernel.COLLISION:
                 continue
             c = (state.qd[row] - self._qd0[row]) / (2.0 * dt)
-            for part in range(self.PARTS):
+            for part in range(1, self.PARTS + 1):
                 x = dt * part / self.PARTS
                 q = self._q0[row] + self._qd0[row] * x + c * x * x
                 blend = part / self.PARTS

@@ -26,6 +26,6 @@ def wilson(hits: int, n: int) -> dict[str, float]:
     centre, scale = rate + Z95**2 / (2.0 * n), 1.0 + Z95**2 / n
     return {
         "mean": rate,
-        "low": max(0.0, (centre - spread) / scale),
-        "high": min(1.0, (centre + spread) / scale),
+        "low": 0.0 if hits == 0 else max(0.0, (centre - spread) / scale),
+        "high": 1.0 if hits == n else min(1.0, (centre + spread) / scale),
     }

@@ -1,0 +1,36 @@
+"""Compiling everything the simulator compiles, once, into the cache on disk.
+
+Done by set-up and by the image, so that later starts of the server, of training jobs and of
+evaluations only read what is there.
+"""
+
+import time
+
+import numpy as np
+
+from app.policies import pretrained
+from app.policies.task_choice import TaskChooser
+from app.sim.cells import load_cell
+from app.sim.commands import MoveHuman
+from app.sim.kernels.arm import CONTROLLED
+from app.sim.pick import PickBatch, PickSettings
+from app.sim.world import World
+
+N_ENVS = 8
+
+
+def warm_up() -> float:
+    """Use every kernel once; returns the time that took [s]."""
+    started = time.monotonic()
+    for alias in pretrained.ALIASES:
+        policy = TaskChooser(pretrained.load(alias))
+        cell = load_cell(policy.cell)
+        world = World(cell, policy, seed=0)
+        world.step()
+        x, y, z = cell.stations[0].position
+        world.apply(MoveHuman(right=(x, y, z + 0.1)))
+        world.step()
+        batch = PickBatch(cell, N_ENVS, seed=0, settings=PickSettings())
+        batch.reset()
+        batch.step(np.zeros((N_ENVS, CONTROLLED), dtype=np.float32))
+    return time.monotonic() - started

@@ -1,0 +1,82 @@
+"""The entry point with the real runners, in real processes."""
+
+import os
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from app.store import attempts, checkpoints, jobs, metrics
+from app.store.engine import Store
+from jobs.spec import new_job
+from jobs.supervisor import Supervisor
+from tests.jobs.machinery import PATIENCE, wait_for, wait_until_final, worker_pids
+
+TINY = {
+    "total_steps": 2048,
+    "n_envs": 8,
+    "progress_steps": 128,
+    "checkpoint_steps": 512,
+    "learning_starts": 512,
+    "buffer_size": 2000,
+    "batch_size": 16,
+    "width": 16,
+}
+"""Nothing is learned by so little; everything is run through."""
+
+
+@pytest.fixture
+def supervisor(store: Store, tmp_path: Path) -> Iterator[Supervisor]:
+    """A supervisor that runs real jobs."""
+    started = Supervisor(store, tmp_path, patience=PATIENCE)
+    started.start()
+    yield started
+    started.stop()
+
+
+def train(store: Store, **overrides: float) -> str:
+    body = {"kind": "train", "preset": "pick-td3", "seed": 4, "overrides": TINY | overrides}
+    return jobs.create_job(store, new_job(body)).id
+
+
+@pytest.mark.usefixtures("supervisor")
+def test_training_stores_its_curve_and_policies(store: Store) -> None:
+    job_id = train(store)
+    job = wait_until_final(store, job_id)
+    assert (job.state, job.error, job.attempt) == ("succeeded", None, 1)
+    assert [m.step for m in metrics.list_metrics(store, job_id)] == list(range(128, 2049, 128))
+    made = checkpoints.list_checkpoints(store, job_id=job_id).items
+    assert [c.step for c in made] == [2048, 1536, 1024, 512]
+    assert job.result == {"checkpoint": made[0].sha256, "step": 2048}
+    assert attempts.load_resume(store, job_id) is None
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("supervisor")
+def test_killed_training_goes_on_and_its_policy_can_be_evaluated(store: Store) -> None:
+    job_id = train(store, total_steps=8192)
+    wait_for(store, job_id, lambda job: job.step >= 1152)
+    (pid,) = worker_pids(os.getpid())
+    os.kill(pid, signal.SIGKILL)
+    job = wait_until_final(store, job_id)
+    assert (job.state, job.attempt) == ("succeeded", 2)
+    assert [m.step for m in metrics.list_metrics(store, job_id)] == list(range(128, 8193, 128))
+    steps = [c.step for c in checkpoints.list_checkpoints(store, job_id=job_id).items]
+    assert steps == list(range(8192, 0, -512))
+    assert job.result is not None
+    body = {"kind": "evaluate", "protocol": "pick-single", "episodes": 5, "seed": 3}
+    spec = new_job({**body, "checkpoint": job.result["checkpoint"]})
+    found = wait_until_final(store, jobs.create_job(store, spec).id)
+    assert found.result is not None
+    assert (found.result["checkpoint"], found.result["episodes"]) == (
+        spec.spec["checkpoint"],
+        5,
+    )
+
+
+@pytest.mark.usefixtures("supervisor")
+def test_evaluation_of_an_unknown_checkpoint_fails_by_name(store: Store) -> None:
+    body = {"kind": "evaluate", "protocol": "pick-single", "checkpoint": "nobody"}
+    job = wait_until_final(store, jobs.create_job(store, new_job(body)).id)
+    assert (job.state, job.error) == ("failed", "no checkpoint 'nobody'")

@@ -1,0 +1,55 @@
+"""A tiny training run, shared by the tests of this folder."""
+
+import pytest
+
+from app.policies import presets
+from app.policies.presets import Preset
+from app.policies.training import Progress, train
+
+TINY = {
+    "total_steps": 1536,
+    "n_envs": 16,
+    "buffer_size": 2000,
+    "batch_size": 32,
+    "learning_starts": 256,
+    "actor_frozen_updates": 8,
+    "width": 32,
+    "progress_steps": 256,
+    "checkpoint_steps": 512,
+}
+"""Overrides that make a training last seconds."""
+
+
+class Recorder:
+    """Keeps what a training reports; stops it at a step if asked to."""
+
+    def __init__(self, stop_at: int | None = None) -> None:
+        self.progress: list[Progress] = []
+        self.checkpoints = []
+        self._stop_at = stop_at
+
+    def run(self, preset: Preset, resume=None, seed: int = 3):
+        return train(
+            preset,
+            seed=seed,
+            resume=resume,
+            on_progress=self.progress.append,
+            on_checkpoint=lambda step, policy, state: self.checkpoints.append(
+                (step, policy, state)
+            ),
+            should_stop=lambda: (
+                self._stop_at is not None and self.progress[-1].step >= self._stop_at
+            ),
+        )
+
+
+@pytest.fixture(scope="session")
+def tiny_preset() -> Preset:
+    return presets.resolve("pick-td3", TINY)
+
+
+@pytest.fixture(scope="session")
+def tiny_run(tiny_preset):
+    recorder = Recorder()
+    recorder.result = recorder.run(tiny_preset)
+    return recorder

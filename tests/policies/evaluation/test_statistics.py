@@ -1,0 +1,24 @@
+"""Wilson intervals against published values."""
+
+import pytest
+
+from app.policies.evaluation.statistics import wilson
+
+
+def test_the_interval_matches_a_published_example():
+    """Newcombe (1998), table I: 81 of 263 gives 0.2553 to 0.3662."""
+    rate = wilson(81, 263)
+    assert rate["low"] == pytest.approx(0.2553, abs=1e-4)
+    assert rate["high"] == pytest.approx(0.3662, abs=1e-4)
+
+
+def test_extreme_rates_stay_between_zero_and_one():
+    assert wilson(0, 20)["low"] == 0.0
+    assert wilson(20, 20)["high"] == 1.0
+    assert wilson(20, 20)["low"] == pytest.approx(0.8389, abs=1e-4)
+
+
+@pytest.mark.parametrize(("hits", "n"), [(0, 0), (-1, 5), (6, 5)])
+def test_impossible_counts_are_refused(hits, n):
+    with pytest.raises(ValueError, match="0 <= hits <= n"):
+        wilson(hits, n)

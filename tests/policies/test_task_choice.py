@@ -1,0 +1,146 @@
+"""The critic's choice: what it answers, what it flags, what it refuses."""
+
+import numpy as np
+import pytest
+
+from app.errors import CheckpointMismatch, InvalidInput
+from app.policies import pretrained
+from app.policies.checkpoint import Checkpoint
+from app.policies.task_choice import TaskChooser, choose
+from app.sim import human
+from app.sim.cells import load_cell
+from app.sim.ports import Candidate, Person
+from app.sim.robot import Robot
+
+CELL = load_cell("pick-and-place")
+HOME = np.array(CELL.robot.home_q)
+
+
+@pytest.fixture(scope="module")
+def chooser():
+    return TaskChooser(pretrained.load("pick"), CELL)
+
+
+def person(x=0.0, y=1.45):
+    return Person(q=human.rest_posture(x, y, -np.pi / 2), qd=np.zeros(18))
+
+
+def cubes(*names):
+    return [
+        Candidate(id=name, position=np.array(CELL.station(name).position)) for name in names
+    ]
+
+
+def test_the_best_value_is_chosen(chooser):
+    decision = chooser.decide(HOME, np.zeros(6), [person()], cubes("cube0", "cube3", "dock1"))
+    assert decision.index == int(np.argmax(decision.values))
+    assert decision.chosen == ("cube0", "cube3", "dock1")[decision.index]
+    assert decision.reachable == (True, True, True)
+
+
+def test_the_same_state_gives_the_same_bits(chooser):
+    twice = [
+        chooser.decide(HOME, np.zeros(6), [person()], cubes("cube1", "cube4")) for _ in range(2)
+    ]
+    assert twice[0].values == twice[1].values
+    assert np.array_equal(twice[0].actions, twice[1].actions)
+
+
+def test_order_of_candidates_does_not_change_their_values(chooser):
+    one = chooser.decide(HOME, np.zeros(6), [person()], cubes("cube1", "cube4"))
+    other = chooser.decide(HOME, np.zeros(6), [person()], cubes("cube4", "cube1"))
+    assert one.values == pytest.approx(other.values[::-1], abs=1e-5)
+
+
+def test_a_hand_on_the_cube_lowers_its_value(chooser):
+    """From cube 1, a step away: with the palm on cube 2 it is worth far less."""
+    robot = Robot(CELL.robot.tool_length)
+    limits = np.array(CELL.robot.q_min), np.array(CELL.robot.q_max)
+    q = robot.ik_vertical(np.array(CELL.station("cube1").position), *limits)
+    palm = np.array(CELL.station("cube2").position)
+    start = human.rest_posture(0.1, 1.15, -np.pi / 2)
+    posture = human.reach("r", palm, start, CELL.pelvis_z)
+    free = chooser.decide(q, np.zeros(6), [person()], cubes("cube2"))
+    blocked = chooser.decide(
+        q, np.zeros(6), [Person(q=posture.q, qd=np.zeros(18))], cubes("cube2")
+    )
+    assert blocked.values[0] < free.values[0] - 0.5
+
+
+def test_hysteresis_keeps_the_previous_choice_until_another_is_clearly_better():
+    values = np.array([1.0, 1.15])
+    assert choose(values, None, 0.2) == 1
+    assert choose(values, 0, 0.2) == 0
+    assert choose(np.array([1.0, 1.3]), 0, 0.2) == 1
+
+
+def test_speeds_stay_inside_the_limits(chooser):
+    decision = chooser.decide(HOME, np.zeros(6), [person()], cubes("cube0", "cube5"))
+    assert np.all(np.abs(decision.qd_target) <= np.array(CELL.robot.qd_max))
+    assert np.all(decision.qd_target[:, 5] == 0.0)
+
+
+def test_a_candidate_out_of_reach_is_answered_and_flagged(chooser):
+    far = Candidate(id="far", position=np.array([3.0, 3.0, 0.1]))
+    decision = chooser.decide(HOME, np.zeros(6), [person()], [*cubes("cube0"), far])
+    assert decision.reachable == (True, False)
+    assert {entry.field for entry in decision.outside_candidates[1]} >= {"position.x"}
+    assert np.isfinite(decision.values[1])
+
+
+def test_a_person_beyond_training_is_flagged_with_the_range(chooser):
+    decision = chooser.decide(HOME, np.zeros(6), [person(y=2.5)], cubes("cube0"))
+    flagged = {entry.field: entry for entry in decision.outside}
+    assert flagged["people[0].q.pelvis_y"].high < 2.5
+
+
+def test_nobody_in_the_cell_is_answered(chooser):
+    decision = chooser.decide(HOME, np.zeros(6), [], cubes("cube0"))
+    assert decision.outside
+
+
+def test_the_arm_inside_the_person_is_answered(chooser):
+    decision = chooser.decide(HOME, np.zeros(6), [person(0.0, 0.3)], cubes("cube0", "cube1"))
+    assert np.isfinite(decision.values).all()
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        ({"q": np.zeros(5)}, "robot.q"),
+        ({"q": np.full(6, np.nan)}, "robot.q[0]"),
+        ({"q": np.array([0.0, 2.0, 0, 0, 0, 0])}, "robot.q[1]"),
+        ({"qd": np.array([0, 0, np.inf, 0, 0, 0])}, "robot.qd[2]"),
+        ({"qd": np.array([0, 0, 0, 0.9, 0, 0])}, "robot.qd[3]"),
+        ({"people": [person(), person(0.5)]}, "people"),
+        ({"people": [Person(q=np.zeros(17), qd=np.zeros(18))]}, "people[0].q"),
+        ({"people": [Person(q=np.full(18, 9.0), qd=np.zeros(18))]}, "people[0].q[0]"),
+        ({"candidates": []}, "candidates"),
+        ({"candidates": cubes("cube0") * 1001}, "candidates"),
+        ({"candidates": cubes("cube0", "cube0")}, "candidates[1].id"),
+        (
+            {"candidates": [Candidate(id="a", position=np.array([0, np.nan, 0]))]},
+            "candidates[0].position[1]",
+        ),
+        ({"time_left_s": -1.0}, "time_left_s"),
+    ],
+)
+def test_bad_input_names_its_field(chooser, change, field):
+    call = {
+        "q": HOME,
+        "qd": np.zeros(6),
+        "people": [person()],
+        "candidates": cubes("cube0"),
+        **change,
+    }
+    time_left = {"time_left_s": call.pop("time_left_s")} if "time_left_s" in call else {}
+    with pytest.raises(InvalidInput) as refused:
+        chooser.decide(*call.values(), **time_left)
+    assert refused.value.field == field
+
+
+def test_a_checkpoint_of_another_layout_is_refused():
+    shipped = pretrained.load("pick")
+    changed = Checkpoint({**shipped.manifest, "layout": [["q", 6]]}, shipped.tensors)
+    with pytest.raises(CheckpointMismatch, match="layout"):
+        TaskChooser(changed, CELL)

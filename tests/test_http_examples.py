@@ -1,0 +1,69 @@
+"""The commands of ``docs/http.md``, run as written against a real server."""
+
+import json
+import re
+import shutil
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.main import create_app
+from app.settings import Settings
+from tests.api.live_server import running, wait_until_ready
+
+TEXT = (Path(__file__).resolve().parent.parent / "docs" / "http.md").read_text("utf-8")
+SHELL = re.findall(r"```sh\n(.*?)```", TEXT, re.DOTALL)
+SAMPLES = [json.loads(one) for one in re.findall(r"```json\n(.*?)```", TEXT, re.DOTALL)]
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    if shutil.which("curl") is None:
+        pytest.skip("needs curl")
+    app = create_app(Settings(data=tmp_path_factory.mktemp("examples")))
+    with running(app) as (_, found):
+        wait_until_ready(found)
+        yield found
+
+
+def shell(text: str, address: str) -> str:
+    script = text.replace("http://127.0.0.1:8000", address)
+    done = subprocess.run(
+        ["bash", "-ec", script], capture_output=True, text=True, timeout=60.0, check=True
+    )
+    return done.stdout
+
+
+def shape(value: Any) -> Any:
+    """Return the names and kinds of a JSON value, without its numbers and texts."""
+    if isinstance(value, dict):
+        return {name: shape(member) for name, member in value.items()}
+    if isinstance(value, list):
+        return [shape(member) for member in value]
+    return "number" if isinstance(value, int | float) else type(value).__name__
+
+
+def test_task_selection_answers_in_the_shape_that_is_shown(address: str) -> None:
+    answer = json.loads(shell(SHELL[0], address))
+    assert shape(answer) == shape(SAMPLES[0])
+    assert answer["chosen"] in ("left", "right")
+
+
+def test_refused_job_is_the_problem_that_is_shown(address: str) -> None:
+    assert json.loads(shell(SHELL[-1], address)) == SAMPLES[1]
+
+
+def test_training_job_is_accepted_with_its_place(address: str) -> None:
+    answer = shell(SHELL[2], address)
+    assert answer.startswith("HTTP/1.1 202")
+    job = json.loads(answer.split("\n\n", 1)[1])
+    assert f"location: /v1/jobs/{job['id']}" in answer
+    shell(f"curl -sf -X POST http://127.0.0.1:8000/v1/jobs/{job['id']}/cancel", address)
+
+
+@pytest.mark.parametrize("text", [*SHELL[1:2], *SHELL[3:-1]])
+def test_command_is_answered(text: str, address: str) -> None:
+    assert shell(text.replace("curl -s ", "curl -sf "), address).startswith("{")

@@ -1,0 +1,179 @@
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import urllib.request
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from app.__main__ import main, parsed_sets, table
+from app.errors import InvalidInput
+from app.listening import address_of, listen
+
+ROOT = Path(__file__).resolve().parent.parent
+START_S = 240.0
+
+
+def environment(data: Path, **more: str) -> dict[str, str]:
+    kept = {k: v for k, v in os.environ.items() if not k.startswith("TANDEM_")}
+    return {**kept, "TANDEM_DATA": str(data), "PYTHONUNBUFFERED": "1", **more}
+
+
+def run(*arguments: str, data: Path, **more: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "app", *arguments]
+    return subprocess.run(
+        command,
+        cwd=ROOT,
+        env=environment(data, **more),
+        capture_output=True,
+        text=True,
+        timeout=START_S,
+        check=False,
+    )
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[int, Path]]:
+    """A server started as people start it; yields its port and data folder."""
+    data = tmp_path_factory.mktemp("served")
+    with listen("127.0.0.1", 0) as sock:
+        port = sock.getsockname()[1]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "app", "serve"],
+        cwd=ROOT,
+        env=environment(data, TANDEM_PORT=str(port)),
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    with process.stdout as lines:
+        for line in lines:
+            if line.startswith("Tandem is ready"):
+                assert f"http://127.0.0.1:{port}" in line
+                break
+        yield port, data
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(timeout=30.0) == -signal.SIGTERM
+
+
+def test_served_address_answers(server: tuple[int, Path]) -> None:
+    with urllib.request.urlopen(f"http://127.0.0.1:{server[0]}/healthz") as answer:
+        assert json.load(answer)["status"] == "ok"
+
+
+def test_second_server_on_the_port_says_so_in_one_line(
+    server: tuple[int, Path], tmp_path: Path
+) -> None:
+    second = run("serve", data=tmp_path / "other", TANDEM_PORT=str(server[0]))
+    assert second.returncode == 1
+    assert second.stderr.count("\n") == 1
+    assert f"another program already listens on 127.0.0.1:{server[0]}" in second.stderr
+    assert not (tmp_path / "other").exists()
+
+
+def test_second_server_on_the_database_says_so_in_one_line(server: tuple[int, Path]) -> None:
+    second = run("serve", data=server[1], TANDEM_PORT="0")
+    assert second.returncode == 1
+    assert second.stderr.count("\n") == 1
+    assert "another Tandem server" in second.stderr
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        [],
+        ["fly"],
+        ["serve", "--port", "x"],
+        ["evaluate"],
+        ["evaluate", "pick-luck"],
+        ["evaluate", "pick-single", "--episodes", "0"],
+        ["evaluate", "pick-single", "--checkpoint", "best"],
+        ["evaluate", "pick-single", "--colour", "red"],
+        ["train", "pick-td4"],
+        ["train", "pick-td3", "--set", "gamma=2"],
+        ["train", "pick-td3", "--set", "gamma"],
+        ["bench", "nothing"],
+        ["cells", "check"],
+        ["cells", "check", "nothing.json"],
+    ],
+)
+def test_wrong_call_ends_with_status_2(
+    arguments: list[str],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setenv("TANDEM_DATA", str(tmp_path))
+    try:
+        status = main(arguments)
+    except SystemExit as end:
+        status = end.code if isinstance(end.code, int) else -1
+    assert status == 2
+    assert capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("TANDEM_PORT", "no"), ("TANDEM_PROT", "8000"), ("TANDEM_TOKEN", "x")]
+)
+def test_bad_setting_stops_the_start_with_status_2(
+    name: str,
+    value: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setenv(name, value)
+    assert main(["serve"]) == 2
+    assert name in capsys.readouterr().err
+
+
+def test_evaluation_prints_one_json_object(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("TANDEM_DATA", str(tmp_path))
+    assert main(["evaluate", "pick-single", "--episodes", "8", "--seed", "3", "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert (result["protocol"], result["seed"], result["episodes"]) == ("pick-single", 3, 8)
+    assert result["results"][0]["name"] == "policy"
+    assert {"mean", "low", "high"} <= result["results"][0]["success"].keys()
+    assert result["machine"]["cores"] >= 1
+    assert "policy" in table(result)
+
+
+def test_cells_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["cells", "list", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["cells"][0]["name"] == "pick-and-place"
+
+
+def test_shipped_cell_file_is_good_and_a_broken_one_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shipped = ROOT / "app" / "sim" / "cells_data" / "pick-and-place.json"
+    assert main(["cells", "check", str(shipped)]) == 0
+    broken = json.loads(shipped.read_text(encoding="utf-8"))
+    broken["robot"]["dt"] = -1.0
+    path = tmp_path / "broken.json"
+    path.write_text(json.dumps(broken), encoding="utf-8")
+    assert main(["cells", "check", str(path)]) == 2
+    assert "robot.dt = -1.0" in capsys.readouterr().err
+
+
+def test_values_of_overrides_are_json_where_they_can_be() -> None:
+    assert parsed_sets(["gamma=0.9", "name=x"]) == {"gamma": 0.9, "name": "x"}
+    with pytest.raises(InvalidInput, match="FIELD=VALUE"):
+        parsed_sets(["gamma"])
+
+
+def test_address_of_an_open_server_is_one_that_a_browser_takes() -> None:
+    with listen("0.0.0.0", 0) as sock:
+        assert address_of(sock) == f"http://127.0.0.1:{sock.getsockname()[1]}"
+
+
+def test_address_that_is_not_ours_is_refused() -> None:
+    with pytest.raises(InvalidInput, match="TANDEM_HOST"):
+        listen("192.0.2.1", 0)
+    with socket.socket(), pytest.raises(InvalidInput, match="TANDEM_HOST"):
+        listen("no-such-host.invalid", 0)

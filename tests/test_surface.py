@@ -1,0 +1,108 @@
+"""What the README says about the surface is so: settings, routes, commands, requests."""
+
+import json
+import re
+import shlex
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fastapi import FastAPI
+from fastapi.testclient import TestClient
+from pydantic import TypeAdapter
+
+from app.__main__ import parser
+from app.api.schemas.jobs import JobCreate
+from app.api.schemas.task_selection import TaskSelectionRequest
+from app.main import create_app
+from app.settings import PREFIX, Settings
+
+ROOT = Path(__file__).resolve().parent.parent
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+METHODS = ("get", "post", "put", "patch", "delete")
+
+
+@pytest.fixture(scope="module")
+def app(tmp_path_factory: pytest.TempPathFactory) -> FastAPI:
+    return create_app(Settings(data=tmp_path_factory.mktemp("data")))
+
+
+def commands() -> Iterator[list[str]]:
+    for block in re.findall(r"```sh\n(.*?)```", README, re.DOTALL):
+        # One command runs on over ends of line that are quoted or escaped.
+        text = ""
+        for line in block.splitlines(keepends=True):
+            text += line
+            try:
+                words = shlex.split(text, comments=True)
+            except ValueError:
+                continue
+            if text.endswith("\\\n"):
+                continue
+            text = ""
+            if words:
+                yield words
+
+
+def requests() -> dict[str, Any]:
+    found = {}
+    for words in commands():
+        if words[0] == "curl":
+            (url,) = (word for word in words if word.startswith("http"))
+            found[url.removeprefix("http://127.0.0.1:8000")] = json.loads(words[-1])
+    return found
+
+
+def without_names(path: str) -> str:
+    return re.sub(r"\{[^}]*\}", "{}", path)
+
+
+def test_readme_lists_every_setting_and_no_other() -> None:
+    known = {PREFIX + name.upper() for name in Settings.model_fields}
+    assert set(re.findall(r"^\| `(TANDEM_\w+)`", README, re.MULTILINE)) == known
+    assert set(re.findall(r"TANDEM_[A-Z_]+", README)) == known
+
+
+def test_readme_lists_every_route_and_no_other(app: FastAPI) -> None:
+    paths = app.openapi()["paths"]
+    offered = {
+        (method.upper(), without_names(path))
+        for path, operations in paths.items()
+        for method in operations
+        if method in METHODS and path.startswith("/v1/")
+    }
+    told = {
+        (method, without_names(path))
+        for method, path in re.findall(r"`(GET|POST|PUT|PATCH|DELETE) (/v1/[^`]+)`", README)
+    }
+    assert told == offered
+
+
+def test_routes_named_alone_in_the_readme_exist(app: FastAPI) -> None:
+    for path in ("/healthz", "/readyz"):
+        assert f"`{path}`" in README
+        assert path in app.openapi()["paths"]
+    assert "`/docs`" in README
+    assert TestClient(app, base_url="http://127.0.0.1").get("/docs").status_code == 200
+
+
+def test_readme_commands_are_ones_that_exist() -> None:
+    targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+    for words in commands():
+        if words[0] == "make":
+            assert words[1] in targets
+        elif words[:3] == ["python", "-m", "app"]:
+            parser().parse_args(words[3:])
+        else:
+            assert words[0] in ("git", "curl", "docker")
+
+
+def test_readme_requests_are_ones_the_service_takes() -> None:
+    bodies = requests()
+    job = TypeAdapter[Any](JobCreate).validate_python(bodies["/v1/jobs"])
+    assert (job.kind, job.preset) == ("train", "pick-td3")
+    state = TaskSelectionRequest.model_validate(bodies["/v1/task-selection"])
+    _, _, people, candidates = state.to_domain()
+    assert len(people) == 1
+    assert [one.id for one in candidates] == ["left", "right"]
