@@ -342,9 +342,9 @@ def contact(arm: Arm, q0: Vec, qd0: Vec, c: Vec, human_q0: Vec, human_q1: Vec) -
     """
     _require_finite("q, qd, c", np.concatenate([q0, qd0, c]))
     _require_finite("human_q", np.concatenate([human_q0, human_q1]))
-    pose = arm_kernel.new_pose(len(arm.link))
+    before, pose = arm_kernel.new_pose(len(arm.link)), arm_kernel.new_pose(len(arm.link))
     kind, link, part, d = arm_kernel.sweep(
-        arm, _own(q0), _own(qd0), _own(c), _own(human_q0), _own(human_q1), pose
+        arm, _own(q0), _own(qd0), _own(c), _own(human_q0), _own(human_q1), before, pose
     )
     names = load_robot_capsules().name
     touching, other = names[link], human.CAPSULE_NAMES[part]

@@ -16,7 +16,13 @@ from numba import njit
 from numpy.typing import NDArray
 
 from app.sim.kernels import body, kinematics
-from app.sim.kernels.geometry import FAR, capsule_distance, place_capsules, set_clearance
+from app.sim.kernels.geometry import (
+    FAR,
+    pair_distance2,
+    place_capsules,
+    set_clearance,
+    spheres_apart,
+)
 from app.sim.ports import Vec
 
 NO_CONTACT, HUMAN_CONTACT, CELL_CONTACT, SELF_CONTACT = range(4)
@@ -135,23 +141,53 @@ def self_clearance(arm: Arm, pose: Pose) -> tuple[float, int]:
     """Return the least distance of the tested capsule pairs [m] and the pair's number."""
     best, pair = FAR, 0
     for i in range(arm.pairs.shape[0]):
-        a, b = arm.pairs[i, 0], arm.pairs[i, 1]
-        d = capsule_distance(pose.robot[a], arm.radius[a], pose.robot[b], arm.radius[b])
+        a, b = pose.robot[arm.pairs[i, 0]], pose.robot[arm.pairs[i, 1]]
+        radii = arm.radius[arm.pairs[i, 0]] + arm.radius[arm.pairs[i, 1]]
+        if spheres_apart(a, b) - radii >= best:
+            continue
+        d = math.sqrt(pair_distance2(a, b)) - radii
         if d < best:
             best, pair = d, i
     return best, pair
 
 
 @njit(cache=True)
-def robot_speed_bound(arm: Arm, qd0: Vec, qd1: Vec) -> float:
+def robot_speed_bound(arm: Arm, qd0: Vec, c: Vec, before: Vec, after: Vec) -> float:
     """Return a bound on the speed of any point of the robot in a period [m/s].
 
-    Joint speeds are linear in time within a period, so their ends bound them.
+    A point's mean velocity over the period is its chord over ``dt``, and its velocity never
+    differs from the mean by more than ``a dt / 2``, with ``a`` a bound on its acceleration:
+    ``sum |qdd_j| l_j + (sum |qd_j|) (sum |qd_j| l_j)`` for levers ``l_j`` that do not grow
+    along the chain. The ends of a capsule bound the points between them.
+
+    Args:
+        arm: Robot in its cell.
+        qd0: Joint speeds at the start [rad/s], shape (6,).
+        c: Coefficients of the period [rad/s^2], shape (6,).
+        before: Ends of the capsules at the start [m], shape (n, 2, 3).
+        after: Ends of the capsules at the end [m], shape (n, 2, 3).
     """
-    bound = 0.0
+    angular, swing, push = 0.0, 0.0, 0.0
     for j in range(6):
-        bound += max(abs(qd0[j]), abs(qd1[j])) * arm.lever[j]
-    return bound
+        fastest = max(abs(qd0[j]), abs(qd0[j] + 2.0 * c[j] * arm.dt))
+        angular += fastest
+        swing += fastest * arm.lever[j]
+        push += 2.0 * abs(c[j]) * arm.lever[j]
+    chord = longest_chord(before, after)
+    return min(swing, chord / arm.dt + 0.5 * arm.dt * (push + angular * swing))
+
+
+@njit(cache=True)
+def longest_chord(before: Vec, after: Vec) -> float:
+    """Return the farthest any capsule end moves [m]; both arguments of shape (n, 2, 3)."""
+    square = 0.0
+    for k in range(before.shape[0]):
+        for end in range(2):
+            x = after[k, end, 0] - before[k, end, 0]
+            y = after[k, end, 1] - before[k, end, 1]
+            z = after[k, end, 2] - before[k, end, 2]
+            square = max(square, x * x + y * y + z * z)
+    return math.sqrt(square)
 
 
 @njit(cache=True)
@@ -161,14 +197,7 @@ def human_speed_bound(before: Vec, after: Vec, dt: float) -> float:
     From the chords of the capsules' ends, shape (12, 2, 3), with 5 % for the arc: enough for
     turns up to one radian per period.
     """
-    square = 0.0
-    for h in range(body.N_CAPSULES):
-        for end in range(2):
-            way = 0.0
-            for i in range(3):
-                way += (after[h, end, i] - before[h, end, i]) ** 2
-            square = max(square, way)
-    return 1.05 * math.sqrt(square) / dt
+    return 1.05 * longest_chord(before, after) / dt
 
 
 @njit(cache=True)
@@ -200,9 +229,19 @@ def contact_at(
 
 @njit(cache=True)
 def sweep(
-    arm: Arm, q0: Vec, qd0: Vec, c: Vec, human_q0: Vec, human_q1: Vec, pose: Pose
+    arm: Arm,
+    q0: Vec,
+    qd0: Vec,
+    c: Vec,
+    human_q0: Vec,
+    human_q1: Vec,
+    before: Pose,
+    pose: Pose,
 ) -> tuple[int, int, int, float]:
     """Test one whole period for contact, between its ends too.
+
+    Mostly the end of the period settles it: where its clearance is more than anything can cover
+    in the period, nothing touched on the way either. Otherwise the period is walked through.
 
     Args:
         arm: Robot in its cell.
@@ -211,28 +250,47 @@ def sweep(
         c: Coefficients of the period [rad/s^2], shape (6,).
         human_q0: The person's joints at the start [m, rad], shape (18,).
         human_q1: The person's joints at the end [m, rad], shape (18,).
+        before: Work space; holds the start of the period afterwards.
         pose: Work space; holds the last pose looked at, the end of the period if no contact.
 
     Returns:
         Kind of contact, robot capsule (or self pair), human capsule, clearance to the person at
         the last pose [m].
     """
-    q, qd1, human_q = np.empty(6), np.empty(6), np.empty(18)
-    for j in range(6):
-        qd1[j] = qd0[j] + 2.0 * c[j] * arm.dt
-    place(arm, q0, human_q1, pose)
-    after = pose.human.copy()
-    place(arm, q0, human_q0, pose)
-    robot_speed = robot_speed_bound(arm, qd0, qd1)
-    human_speed = human_speed_bound(pose.human, after, arm.dt)
+    q, human_q = np.empty(6), np.empty(18)
+    place(arm, q0, human_q0, before)
+    _blend(q0, qd0, c, human_q0, human_q1, arm.dt, arm.dt, q, human_q)
+    place(arm, q, human_q, pose)
+    robot_speed = robot_speed_bound(arm, qd0, c, before.robot, pose.robot)
+    human_speed = human_speed_bound(before.human, pose.human, arm.dt)
+    kind, link, part, d, safe = contact_at(arm, pose, robot_speed, human_speed)
+    if kind == NO_CONTACT and safe >= arm.dt:
+        return kind, link, part, d
     x = 0.0
-    while True:
-        for j in range(6):
-            q[j] = q0[j] + qd0[j] * x + c[j] * x * x
-        for j in range(18):
-            human_q[j] = human_q0[j] + (human_q1[j] - human_q0[j]) * (x / arm.dt)
+    for _ in range(int(arm.dt / FINEST_STEP) + 2):
+        _blend(q0, qd0, c, human_q0, human_q1, x, arm.dt, q, human_q)
         place(arm, q, human_q, pose)
         kind, link, part, d, safe = contact_at(arm, pose, robot_speed, human_speed)
         if kind != NO_CONTACT or x >= arm.dt:
-            return kind, link, part, d
+            break
         x = min(arm.dt, x + max(safe, FINEST_STEP))
+    return kind, link, part, d
+
+
+@njit(cache=True)
+def _blend(
+    q0: Vec,
+    qd0: Vec,
+    c: Vec,
+    human_q0: Vec,
+    human_q1: Vec,
+    x: float,
+    dt: float,
+    q: Vec,
+    human_q: Vec,
+) -> None:
+    """Write robot and human joints at time ``x`` of a period of length ``dt`` [s]."""
+    for j in range(6):
+        q[j] = q0[j] + qd0[j] * x + c[j] * x * x
+    for j in range(18):
+        human_q[j] = human_q0[j] + (human_q1[j] - human_q0[j]) * (x / dt)

@@ -252,7 +252,8 @@ def observe(
     """
     tick = 1e-3
     ahead_q = human_q + tick * human_qd
-    place(arm, q, ahead_q, later)
+    body.points_and_frames(ahead_q, arm.pelvis_z, later.points, later.frames)
+    body.capsules(later.points, later.frames, arm.floor_z, later.human)
     place(arm, q, human_q, pose)
     velocity = (later.human - pose.human) / tick
     tcp = np.empty(3)

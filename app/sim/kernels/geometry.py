@@ -13,11 +13,14 @@ from numpy.typing import NDArray
 
 from app.sim.ports import Vec
 
+FAST = {"contract", "nsz", "arcp"}
+"""Freedoms given to the compiler: fused multiply-add, signs of zero, reciprocals.
+Never those that assume away NaN and infinity."""
 FAR = 1e3
 """A distance that stands for "nothing there" [m]."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=FAST)
 def segment_parameters(
     ux: float,
     uy: float,
@@ -65,7 +68,7 @@ def segment_parameters(
     return s, t
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=FAST)
 def pair_distance2(a: Vec, b: Vec) -> float:
     """Return the squared distance of two segments [m^2], each of shape (2, 3)."""
     ux, uy, uz = a[1, 0] - a[0, 0], a[1, 1] - a[0, 1], a[1, 2] - a[0, 2]
@@ -76,7 +79,7 @@ def pair_distance2(a: Vec, b: Vec) -> float:
     return float(x * x + y * y + z * z)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=FAST)
 def bounding_spheres(segments: Vec, centre: Vec, half: Vec) -> None:
     """Write centre [m], shape (n, 3), and half length [m], (n,), of segments (n, 2, 3)."""
     for k in range(segments.shape[0]):
@@ -87,7 +90,22 @@ def bounding_spheres(segments: Vec, centre: Vec, half: Vec) -> None:
         half[k] = 0.5 * math.sqrt(square)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def spheres_apart(a: Vec, b: Vec) -> float:
+    """Return the distance of the bounding spheres of two segments, shape (2, 3) each [m].
+
+    Never more than the distance of the segments; negative where the spheres overlap.
+    """
+    gap, long_a, long_b = 0.0, 0.0, 0.0
+    for i in range(3):
+        between = 0.5 * (a[0, i] + a[1, i] - b[0, i] - b[1, i])
+        gap += between * between
+        long_a += (a[1, i] - a[0, i]) ** 2
+        long_b += (b[1, i] - b[0, i]) ** 2
+    return math.sqrt(gap) - 0.5 * (math.sqrt(long_a) + math.sqrt(long_b))
+
+
+@njit(cache=True, error_model="numpy", fastmath=FAST)
 def set_clearance(
     a: Vec, radius_a: Vec, b: Vec, radius_b: Vec, first: int, last: int, cap: float
 ) -> tuple[float, int, int]:
@@ -108,7 +126,7 @@ def set_clearance(
     centre_a, half_a = np.empty((n, 3)), np.empty(n)
     bounding_spheres(a, centre_a, half_a)
     best, near_a, near_b = cap, 0, first
-    for h in range(first, last + 1):
+    for h in range(last, first - 1, -1):
         x = 0.5 * (b[h, 0, 0] + b[h, 1, 0])
         y = 0.5 * (b[h, 0, 1] + b[h, 1, 1])
         z = 0.5 * (b[h, 0, 2] + b[h, 1, 2])
@@ -126,7 +144,7 @@ def set_clearance(
     return best, near_a, near_b
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=FAST)
 def segment_nearest(a: Vec, b: Vec, out: Vec) -> float:
     """Write the vector between the nearest points of two segments; return its length [m].
 

@@ -289,22 +289,23 @@ def step_env(
     state: PickState,
     e: int,
     act: Vec,
+    before: Pose,
     pose: Pose,
 ) -> float:
     """Move environment ``e`` through one period, set its outcome, return the reward."""
     c, q1, qd1 = np.empty(6), np.empty(6), np.empty(6)
-    place(arm, state.q[e], state.human_q[e], pose)
-    d_old, tilt_old, _ = tool_state(arm, state.qd[e], state.goal[e], pose)
     human_q0 = state.human_q[e].copy()
     drive(arm, state.q[e], state.qd[e], act, c, q1, qd1)
     state.elapsed[e] += arm.dt
     state.time_left[e] -= arm.dt
     human_at(world, rules, state, e, state.elapsed[e])
     kind, _, _, clearance = sweep(
-        arm, state.q[e], state.qd[e], c, human_q0, state.human_q[e], pose
+        arm, state.q[e], state.qd[e], c, human_q0, state.human_q[e], before, pose
     )
+    d_old, tilt_old, _ = tool_state(arm, state.qd[e], state.goal[e], before)
     state.q[e], state.qd[e], state.clearance[e] = q1, qd1, clearance
-    place(arm, q1, state.human_q[e], pose)
+    if kind != NO_CONTACT:
+        place(arm, q1, state.human_q[e], pose)
     d, tilt, speed = tool_state(arm, qd1, state.goal[e], pose)
     collided = kind != NO_CONTACT
     success = not collided and succeeded(d, tilt, speed)
@@ -393,7 +394,7 @@ def step_batch(
             continue
         for j in range(CONTROLLED):
             wanted[j] = act[e, j]
-        rew[e] = step_env(world, rules, arm, weights, state, e, wanted, pose)
+        rew[e] = step_env(world, rules, arm, weights, state, e, wanted, later, pose)
         ended[e] = state.outcome[e]
         if features:
             observe_env(arm, state, e, pose, later, coarse, obs[e])

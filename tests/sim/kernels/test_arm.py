@@ -65,12 +65,12 @@ def test_sweep_is_never_later_than_the_meshes_at_millisecond_substeps(
     cell: Cell, recheck: Recheck, hurry: float
 ) -> None:
     rng, robot, arm = np.random.default_rng(61), Robot(), arm_of(cell)
-    pose = kernel.new_pose(len(arm.link))
+    before, pose = kernel.new_pose(len(arm.link)), kernel.new_pose(len(arm.link))
     verdicts = []
     for _ in range(250):
         period = Period(cell, rng, robot, hurry)
         kind, _, _, _ = kernel.sweep(
-            arm, period.q, period.qd, period.c, period.human0, period.human1, pose
+            arm, period.q, period.qd, period.c, period.human0, period.human1, before, pose
         )
         touches = recheck.first_contact(period.rows(SUBSTEPS)) is not None
         assert not (touches and kind == kernel.NO_CONTACT)
@@ -116,18 +116,25 @@ def test_clearance_is_that_of_hulls_less_what_capsules_add(cell: Cell) -> None:
 def test_speed_bound_holds_for_every_point_of_the_robot(cell: Cell) -> None:
     rng, arm = np.random.default_rng(64), arm_of(cell)
     before, after = kernel.new_pose(len(arm.link)), kernel.new_pose(len(arm.link))
+    now, soon, tick = kernel.new_pose(len(arm.link)), kernel.new_pose(len(arm.link)), 1e-5
     for _ in range(300):
         q, qd = rng.uniform(arm.q_min, arm.q_max), rng.uniform(-arm.qd_max, arm.qd_max)
+        c = rng.uniform(-0.5, 0.5, 6) * arm.qdd_max
         kernel.place_robot(arm, q, before)
-        kernel.place_robot(arm, q + 1e-5 * qd, after)
-        fastest = np.linalg.norm(after.robot - before.robot, axis=2).max() / 1e-5
-        assert fastest <= kernel.robot_speed_bound(arm, qd, qd) + 1e-4
+        kernel.place_robot(arm, q + qd * arm.dt + c * arm.dt**2, after)
+        bound = kernel.robot_speed_bound(arm, qd, c, before.robot, after.robot)
+        for x in np.linspace(0.0, arm.dt, 9):
+            kernel.place_robot(arm, q + qd * x + c * x**2, now)
+            kernel.place_robot(arm, q + qd * (x + tick) + c * (x + tick) ** 2, soon)
+            fastest = np.linalg.norm(soon.robot - now.robot, axis=2).max() / tick
+            assert fastest <= bound + 1e-4
 
 
 def test_standing_still_at_home_reports_no_contact_and_the_distance(cell: Cell) -> None:
     arm, zero = arm_of(cell), np.zeros(6)
-    human_q, pose = human.rest_posture(*cell.human.home), kernel.new_pose(len(arm.link))
-    kind, _, _, d = kernel.sweep(arm, arm.home, zero, zero, human_q, human_q, pose)
+    before, pose = kernel.new_pose(len(arm.link)), kernel.new_pose(len(arm.link))
+    human_q = human.rest_posture(*cell.human.home)
+    kind, _, _, d = kernel.sweep(arm, arm.home, zero, zero, human_q, human_q, before, pose)
     assert kind == kernel.NO_CONTACT
     hull = CollisionReference(cell, "hull").distance(arm.home, human_q).value
     assert d <= hull < d + EARLY
