@@ -20,13 +20,13 @@ class Camera:
     """The point in the middle of the picture [m]."""
     fov: float
     """Vertical field of view [rad]."""
-    left: float
+    left: float = 0.0
     """Left edge of the canvas on the page [px]."""
-    top: float
+    top: float = 0.0
     """Upper edge of the canvas on the page [px]."""
-    width: float
+    width: float = 1.0
     """Width of the canvas [px]."""
-    height: float
+    height: float = 1.0
     """Height of the canvas [px]."""
 
     def project(self, point: ArrayLike) -> tuple[float, float]:

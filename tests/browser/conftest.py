@@ -12,7 +12,7 @@ from pathlib import Path
 
 import httpx
 import pytest
-from playwright.sync_api import Browser, ConsoleMessage, Page, Request, sync_playwright
+from playwright.sync_api import Browser, ConsoleMessage, Page, Request, expect, sync_playwright
 
 ROOT = Path(__file__).parents[2]
 START_S = 300.0
@@ -118,11 +118,16 @@ def browser() -> Iterator[Browser]:
 
 @pytest.fixture
 def open_page(browser: Browser, server: str) -> Iterator[OpenPage]:
-    """Open Tandem's page as a visitor; ``page.problems`` lists what went wrong on it."""
-    pages: list[Page] = []
+    """Open Tandem's page as a visitor; ``page.problems`` lists what went wrong on it.
 
-    def open_it(width: int = 1400, height: int = 850) -> Page:
-        page = browser.new_page(viewport={"width": width, "height": height})
+    Software takes long to draw the scene, in the page's own thread: a test that does not look
+    at it leaves it out with ``scene=False``.
+    """
+    pages: list[Page] = []
+    expect.set_options(timeout=STEP_MS)
+
+    def open_it(size: tuple[int, int] = (1024, 700), *, scene: bool = True) -> Page:
+        page = browser.new_page(viewport={"width": size[0], "height": size[1]})
         page.set_default_timeout(STEP_MS)
         pages.append(page)
         problems: list[str] = []
@@ -130,6 +135,10 @@ def open_page(browser: Browser, server: str) -> Iterator[OpenPage]:
         page.on("console", lambda message: problems.extend(complaint(message)))
         page.on("pageerror", lambda error: problems.append(f"page error: {error}"))
         page.on("requestfailed", lambda request: problems.extend(lost(request)))
+        if not scene:
+            page.route(
+                "**/viewer/**", lambda route: route.fulfill(body="", content_type="text/html")
+            )
         page.goto(server)
         page.wait_for_selector('[data-link="live"]')
         return page

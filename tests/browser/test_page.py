@@ -26,7 +26,7 @@ def test_a_visit_leaves_no_errors_in_the_console(open_page: Callable[..., Page])
 
 
 def test_page_shows_what_the_world_says(open_page: Callable[..., Page], server: str) -> None:
-    page = open_page()
+    page = open_page(scene=False)
     page.click('[data-action="pause"]')
     expect(page.locator(".story .chip")).to_have_text("Paused")
     now = world(server)
@@ -41,7 +41,7 @@ def test_page_shows_what_the_world_says(open_page: Callable[..., Page], server: 
 def test_goal_chips_change_the_candidates_of_the_world(
     open_page: Callable[..., Page], server: str
 ) -> None:
-    page = open_page()
+    page = open_page(scene=False)
     chip = page.locator('[data-goal="cube2"]')
     before = chip.get_attribute("aria-pressed")
     chip.click()
@@ -51,7 +51,7 @@ def test_goal_chips_change_the_candidates_of_the_world(
 
 
 def test_case_study_starts_from_its_button(open_page: Callable[..., Page], server: str) -> None:
-    page = open_page()
+    page = open_page(scene=False)
     page.click('[data-case="case-1"]')
     expect(page.locator('[data-case="case-1"]')).to_have_attribute("aria-pressed", "true")
     assert world(server)["case"] == "case-1"
@@ -60,7 +60,7 @@ def test_case_study_starts_from_its_button(open_page: Callable[..., Page], serve
 
 
 def test_tabs_obey_the_arrow_keys(open_page: Callable[..., Page]) -> None:
-    page = open_page()
+    page = open_page(scene=False)
     page.focus("#tab-cell")
     page.keyboard.press("ArrowRight")
     expect(page.locator("#tab-training")).to_have_attribute("aria-selected", "true")
@@ -68,7 +68,7 @@ def test_tabs_obey_the_arrow_keys(open_page: Callable[..., Page]) -> None:
 
 
 def test_page_fits_a_phone(open_page: Callable[..., Page]) -> None:
-    page = open_page(*PHONE)
+    page = open_page(PHONE, scene=False)
     wide = page.evaluate("document.documentElement.scrollWidth")
     assert wide <= PHONE[0]
     for part in (".viewer", '[data-mode="manual"]', "[data-goal]", ".bars", "#tab-training"):

@@ -10,6 +10,8 @@ pytestmark = pytest.mark.browser
 
 GROWTH_MS = 240_000
 """Time for a job to start its process, warm up and report several points [ms]."""
+FINE = {"progress_steps": 5120, "checkpoint_steps": 5120}
+"""Points and checkpoints close together, so that the curve grows while one looks."""
 
 
 def open_form(page: Page) -> None:
@@ -29,10 +31,11 @@ def test_posted_job_appears_and_its_curve_grows(
     page = open_page()
     open_form(page)
     page.fill("#train-seed", "7")
+    page.click("form.train summary")
+    for name, value in FINE.items():
+        page.fill(f"#train-{name}", str(value))
     page.click("form.train button[type=submit]")
-    job = page.wait_for_selector(".job.is-open")
-    assert job is not None
-    job_id = job.get_attribute("data-job")
+    job_id = page.get_attribute(".job.is-open", "data-job")
     page.wait_for_selector("[data-points]", timeout=GROWTH_MS)
     seen = points(page)
     page.wait_for_function(
@@ -44,7 +47,8 @@ def test_posted_job_appears_and_its_curve_grows(
     steps = [row["step"] for row in stored]
     assert steps == sorted(set(steps))
     assert len(steps) >= seen + 2
-    assert httpx.get(f"{server}/v1/jobs/{job_id}").json()["seed"] == 7
+    job = httpx.get(f"{server}/v1/jobs/{job_id}").json()
+    assert (job["seed"], job["overrides"]) == (7, FINE)
     cancel(page)
     assert page.problems == []  # type: ignore[attr-defined]
 
@@ -58,7 +62,7 @@ def cancel(page: Page) -> None:
 
 
 def test_bad_input_is_explained_at_its_field(open_page: Callable[..., Page]) -> None:
-    page = open_page()
+    page = open_page(scene=False)
     open_form(page)
     page.fill("#train-seed", "minus one")
     page.click("form.train button[type=submit]")
@@ -72,7 +76,7 @@ def test_override_out_of_range_is_explained_at_its_field(
 ) -> None:
     preset = httpx.get(f"{server}/v1/presets").json()["items"][0]
     field = next(f for f in preset["fields"] if f["maximum"] is not None)
-    page = open_page()
+    page = open_page(scene=False)
     open_form(page)
     page.evaluate("document.querySelectorAll('form.train details').forEach(d => d.open = true)")
     page.fill(f"#train-{field['name']}", str(int(field["maximum"]) + 1000))

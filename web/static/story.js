@@ -5,7 +5,7 @@ import { Icon } from "./icons.js";
 
 const STATUS = {
   moving: ["On its way", "accent"],
-  reached: ["Reached", "good"],
+  picking: ["Picking", "good"],
   contact: ["Contact", "bad"],
   blocked: ["Waiting", "warn"],
   "case done": ["Case done", "good"],
@@ -25,11 +25,11 @@ export function Story({ world }) {
       <span class="clock">${world.t_s.toFixed(1)} s</span>
     </div>
     <p class="sentence">${world.message || "Waiting for the first decision."}</p>
-    <${Clearance} metres=${world.clearance_m} contact=${world.contact} />
+    <${Clearance} metres=${world.clearance_m} />
   </section>`;
 }
 
-function Clearance({ metres, contact }) {
+function Clearance({ metres }) {
   const known = Number.isFinite(metres);
   const share = known ? Math.min(1, Math.max(0, metres / CLEARANCE_SCALE_M)) : 0;
   const tone = !known ? "" : metres < 0.05 ? "bad" : metres < 0.15 ? "warn" : "good";
@@ -41,27 +41,7 @@ function Clearance({ metres, contact }) {
       <i class=${`meter-fill ${tone}`} style=${{ transform: `scaleX(${share})` }}></i>
     </span>
     <strong>${format.distance(metres)}</strong>
-    ${contactKind(contact) &&
-    html`<span class="contact-note">${contactText(contact)}</span>`}
   </div>`;
-}
-
-function contactKind(contact) {
-  const kind = typeof contact === "string" ? contact : contact?.kind;
-  return kind && kind !== "none" ? kind : null;
-}
-
-function contactText(contact) {
-  const kind = contactKind(contact);
-  const [link, body] = [words(contact.link), words(contact.body)];
-  if (kind === "human") return `Contact: robot’s ${link || "arm"}, person’s ${body || "body"}`;
-  if (kind === "self") return "The robot touches itself";
-  return `Contact: robot’s ${link || "arm"} with the cell`;
-}
-
-function words(name) {
-  return name ? String(name).replace(/_link$/, "").replace(/_r$/, " (right)")
-    .replace(/_l$/, " (left)").replaceAll("_", " ") : "";
 }
 
 /** Counters, trained range and provenance: the small print under the plot. */
