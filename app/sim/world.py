@@ -34,7 +34,7 @@ PICK_S = (0.9, 1.3, 2.0)
 """Times at which the tool is down, the fingers have closed, the tool is up again [s]."""
 GAIN = 3.0
 """Joint speed per joint error while picking [1/s]."""
-NEAR_M = 0.1
+NEAR_M = 0.25
 """Clearance below which picking is broken off, so that the policy can move away [m]."""
 
 
