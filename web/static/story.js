@@ -85,6 +85,8 @@ function fieldName(field) {
   return String(field)
     .replace(/^people\[\d+\]\.q(d?)[.[]?/, (_, d) => (d ? "person’s speed of " : "person’s "))
     .replace(/^robot\.q(d?)[.[]?/, (_, d) => (d ? "robot’s speed of joint " : "robot’s joint "))
+    .replace(/([a-z]+)_([rl])(?:_([a-z]+))?\]?$/, (_, joint, side, way) =>
+      `${side === "r" ? "right" : "left"} ${joint} ${way ?? ""}`.trim())
     .replace(/[\]]/g, "")
     .replaceAll("_", " ");
 }
