@@ -68,7 +68,7 @@ class StepOnce:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reset:
-    """Put robot, person and counters back to the start; a case study starts again."""
+    """Put robot, counters and a working person back to the start; a dragged person stays."""
 
     tag: ClassVar[str] = "reset"
 
