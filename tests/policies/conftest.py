@@ -38,7 +38,9 @@ class Recorder:
                 (step, policy, state)
             ),
             should_stop=lambda: (
-                self._stop_at is not None and self.progress[-1].step >= self._stop_at
+                self._stop_at is not None
+                and bool(self.progress)
+                and self.progress[-1].step >= self._stop_at
             ),
         )
 

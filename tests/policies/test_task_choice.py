@@ -52,19 +52,28 @@ def test_order_of_candidates_does_not_change_their_values(chooser):
     assert one.values == pytest.approx(other.values[::-1], abs=1e-5)
 
 
-def test_a_hand_on_the_cube_lowers_its_value(chooser):
-    """From cube 1, a step away: with the palm on cube 2 it is worth far less."""
-    robot = Robot(CELL.robot.tool_length)
-    limits = np.array(CELL.robot.q_min), np.array(CELL.robot.q_max)
-    q = robot.ik_vertical(np.array(CELL.station("cube1").position), *limits)
-    palm = np.array(CELL.station("cube2").position)
-    start = human.rest_posture(0.1, 1.15, -np.pi / 2)
-    posture = human.reach("r", palm, start, CELL.pelvis_z)
-    free = chooser.decide(q, np.zeros(6), [person()], cubes("cube2"))
-    blocked = chooser.decide(
-        q, np.zeros(6), [Person(q=posture.q, qd=np.zeros(18))], cubes("cube2")
+@pytest.mark.parametrize("hand", ["r", "l"])
+@pytest.mark.parametrize(
+    ("start", "taken", "free"),
+    [("cube2", "cube3", "cube1"), ("cube3", "cube2", "cube4"), ("cube4", "cube3", "cube5")],
+)
+def test_a_hand_on_one_of_two_equally_near_cubes_turns_the_choice(
+    chooser, hand, start, taken, free
+):
+    q = Robot(CELL.robot.tool_length).ik_vertical(
+        np.array(CELL.station(start).position),
+        np.array(CELL.robot.q_min),
+        np.array(CELL.robot.q_max),
     )
-    assert blocked.values[0] < free.values[0] - 0.5
+    palm = np.array(CELL.station(taken).position)
+    stand = human.rest_posture(palm[0] + (0.1 if hand == "r" else -0.1), 1.15, -np.pi / 2)
+    posture = human.reach(hand, palm, stand, CELL.pelvis_z)
+    reaching = Person(q=posture.q, qd=np.zeros(18))
+    alone = chooser.decide(q, np.zeros(6), [person()], cubes(taken, free))
+    beside = chooser.decide(q, np.zeros(6), [reaching], cubes(taken, free))
+    assert posture.reached
+    assert beside.chosen == free
+    assert beside.values[0] < alone.values[0] - 0.25
 
 
 def test_hysteresis_keeps_the_previous_choice_until_another_is_clearly_better():
