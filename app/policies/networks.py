@@ -6,7 +6,7 @@ is the straight joint move. These plain modules decide in the service; ``td3.py`
 same modules inside Stable-Baselines3.
 
 Source: thesis section 5.3.4 (TD3); Lillicrap et al. 2016 and Fujimoto et al. 2018 for the
-losses. Deviates: residual action and layer normalisation are ours, they halve the time to 95 %.
+losses. Deviates: the residual action and layer normalisation are ours.
 """
 
 import torch

@@ -1,9 +1,9 @@
 """The critic's choice among geometric tasks (METHOD 3.1).
 
 ``R_i = Q(s_i, pi(s_i))`` for every candidate, the smaller of both critics, and the best one is
-taken; with hysteresis the previous choice is kept unless another is better by a margin, which
-halves collisions by avoiding dithering. The same object decides for the HTTP route, the live
-cell and the evaluations.
+taken; with hysteresis the previous choice is kept unless another is better by a margin, so that
+the robot does not dither. The same object decides for the HTTP route and the live cell, and the
+evaluations use the same networks and values.
 
 Source: thesis eq. (5.1)-(5.7). Deviates: hysteresis is ours; 0 gives the source's rule.
 """

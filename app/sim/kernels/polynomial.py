@@ -93,35 +93,6 @@ def coefficient_for_speed(
 
 
 @njit(cache=True)
-def coefficient_for_action(
-    q: float,
-    qd: float,
-    action: float,
-    q_min: float,
-    q_max: float,
-    qd_max: float,
-    acc: float,
-    dt: float,
-) -> float:
-    """Map an action in [-1, 1] linearly onto the interval, as (4.23) does [rad/s^2].
-
-    Args:
-        q: Joint position [rad].
-        qd: Joint speed [rad/s].
-        action: -1 for the least, +1 for the greatest admissible coefficient.
-        q_min: Lower position limit [rad].
-        q_max: Upper position limit [rad].
-        qd_max: Speed limit [rad/s].
-        acc: Acceleration limit [rad/s^2].
-        dt: Period [s].
-    """
-    c_min, c_max = coefficient_interval(q, qd, q_min, q_max, qd_max, acc, dt)
-    if c_min > c_max:
-        return min(0.5 * acc, max(-0.5 * acc, -qd / (2.0 * dt)))
-    return 0.5 * (c_max + c_min) + 0.5 * action * (c_max - c_min)
-
-
-@njit(cache=True)
 def advance(
     q: Vec,
     qd: Vec,

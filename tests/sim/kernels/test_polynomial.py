@@ -114,15 +114,6 @@ def test_interval_is_never_empty_and_both_its_ends_keep_it_so(name: str) -> None
         q, qd = q + qd * limits.dt + c * limits.dt**2, qd + 2 * c * limits.dt
 
 
-def test_actions_map_linearly_onto_the_interval() -> None:
-    state = (0.3, 0.1, -1.0, 0.5, 0.5, 3.0, 0.05)
-    q, qd, *ends = state
-    low, high = polynomial.coefficient_interval(q, qd, *ends)
-    for action, expected in ((-1.0, low), (0.0, 0.5 * (low + high)), (1.0, high)):
-        c = polynomial.coefficient_for_action(q, qd, action, *ends)
-        assert c == pytest.approx(expected, abs=1e-12)
-
-
 def test_wanted_speed_is_met_exactly_where_it_is_admissible() -> None:
     c = polynomial.coefficient_for_speed(0.0, 0.1, 0.2, -1.0, 1.0, 0.5, 3.0, 0.05)
     assert 0.1 + 2 * c * 0.05 == pytest.approx(0.2, abs=1e-15)
