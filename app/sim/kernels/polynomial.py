@@ -19,12 +19,12 @@ the thesis ends an episode as *unfeasible* where this interval never empties.
 
 import math
 
-from numba import njit
 
+from app.sim.kernels.compiled import kernel
 from app.sim.ports import Vec
 
 
-@njit(cache=True)
+@kernel()
 def greatest_end_speed(room: float, qd: float, acc: float, dt: float) -> float:
     """Return the greatest speed toward a limit that is viable after one period [rad/s].
 
@@ -38,7 +38,7 @@ def greatest_end_speed(room: float, qd: float, acc: float, dt: float) -> float:
     return math.sqrt(max(root, 0.0)) - acc * dt
 
 
-@njit(cache=True)
+@kernel()
 def coefficient_interval(
     q: float, qd: float, q_min: float, q_max: float, qd_max: float, acc: float, dt: float
 ) -> tuple[float, float]:
@@ -63,7 +63,7 @@ def coefficient_interval(
     return c_min, c_max
 
 
-@njit(cache=True)
+@kernel()
 def coefficient_for_speed(
     q: float,
     qd: float,
@@ -92,7 +92,7 @@ def coefficient_for_speed(
     return min(c_max, max(c_min, (qd_target - qd) / (2.0 * dt)))
 
 
-@njit(cache=True)
+@kernel()
 def advance(
     q: Vec,
     qd: Vec,
