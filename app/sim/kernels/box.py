@@ -1,10 +1,10 @@
 """Exact distances of capsules to boxes that are turned about the vertical, compiled.
 
 In the box's own frame the squared distance of the point at fraction ``s`` of a segment is
-``sum_i max(0, |p_i(s)| - half_i)^2``: convex, and quadratic between the at most six places where
-a coordinate passes a face. Its slope is therefore continuous, never falls and is linear between
-those places, so the least distance follows from the two places around the slope's zero, without
-iteration. Tests hold this file against python-fcl and against brute force.
+``sum_i max(0, |p_i(s)| - half_i)^2``: convex, and quadratic between the places, six at most,
+where a coordinate passes a face. Its slope is therefore continuous, never falls and is linear
+between those places, so the least distance follows from the two places around the slope's zero,
+without iteration. Tests hold this file against python-fcl.
 """
 
 import math

@@ -6,7 +6,7 @@ above, the distance of a segment to the axis less ``r`` is never more than the t
 and equals it where that nearest point lies below ``top``: mostly that settles it. Otherwise the
 nearest point lies between there and the lowest point of the segment that is not below ``top``,
 where the squared distance to the disc is convex: a Newton search that keeps its bracket. Tests
-hold this file against python-fcl and against brute force.
+hold this file against python-fcl.
 """
 
 import math

@@ -35,6 +35,19 @@ def start_stream(seed: int, env: int, episode: int, state: State) -> None:
 
 
 @njit(cache=True)
+def split_stream(state: State, branch: int, child: State) -> None:
+    """Set ``child``, shape (1,), to a stream of its own; advances ``state`` by one draw.
+
+    Args:
+        state: Stream to branch off from.
+        branch: Number of the branch; different ones differ whatever ``state`` holds.
+        child: Filled.
+    """
+    state[0] = state[0] + _GOLDEN
+    child[0] = _mix(_mix(state[0]) ^ (np.uint64(branch) + _GOLDEN))
+
+
+@njit(cache=True)
 def uniform(state: State) -> float:
     """Draw from [0, 1) and advance the stream."""
     state[0] = state[0] + _GOLDEN
