@@ -9,14 +9,13 @@ without iteration. Tests hold this file against python-fcl.
 
 import math
 
-from numba import njit
-
 from app.sim.kernels.columns import RADIUS, UX, UY, UZ, X, Y, Z
+from app.sim.kernels.compiled import kernel
 from app.sim.kernels.geometry import FAR, FAST
 from app.sim.ports import Vec
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@kernel(error_model="numpy", fastmath=FAST)
 def box_clearance(robot: Vec, first: int, boxes: Vec) -> tuple[float, int, int]:
     """Return the least distance of capsules to boxes [m], the nearest capsule and its box.
 
@@ -56,7 +55,7 @@ def box_clearance(robot: Vec, first: int, boxes: Vec) -> tuple[float, int, int]:
     return best, near, which
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@kernel(error_model="numpy", fastmath=FAST)
 def _segment_to_box(
     px: float, py: float, pz: float,
     vx: float, vy: float, vz: float,
@@ -102,7 +101,7 @@ def _segment_to_box(
     return math.sqrt(x * x + y * y + z * z)
 
 
-@njit(cache=True, inline="always", error_model="numpy", fastmath=FAST)
+@kernel(inline="always", error_model="numpy", fastmath=FAST)
 def _slope(
     s: float,
     px: float, py: float, pz: float,

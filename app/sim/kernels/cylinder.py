@@ -11,9 +11,8 @@ hold this file against python-fcl.
 
 import math
 
-from numba import njit
-
 from app.sim.kernels.columns import RADIUS, UX, UY, UZ, X, Y, Z
+from app.sim.kernels.compiled import kernel
 from app.sim.kernels.geometry import FAR, FAST
 from app.sim.ports import Vec
 
@@ -25,7 +24,7 @@ _MOST_STEPS = 80
 """Steps of that search at most; halving alone needs half of them."""
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@kernel(error_model="numpy", fastmath=FAST)
 def cylinder_clearance(
     robot: Vec, first: int, x: float, y: float, r: float, top: float
 ) -> tuple[float, int]:
@@ -68,7 +67,7 @@ def cylinder_clearance(
     return best, near
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@kernel(error_model="numpy", fastmath=FAST)
 def _over_the_top(
     wx: float, wy: float, h: float, ux: float, uy: float, uz: float, end: float, r: float
 ) -> float:

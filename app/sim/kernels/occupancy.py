@@ -27,8 +27,7 @@ in the text: uniform in [v_min, v_max] and in [r_min, r_max] here, frequencies u
 import math
 from typing import NamedTuple
 
-from numba import njit
-
+from app.sim.kernels.compiled import kernel
 from app.sim.kernels.geometry import FAST
 from app.sim.kernels.random import State, split_stream, uniform
 from app.sim.ports import Vec
@@ -95,7 +94,7 @@ class WalkerState(NamedTuple):
     """Random stream of each walker, shape (n_envs, W, 1)."""
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@kernel(error_model="numpy", fastmath=FAST)
 def wave(rows: Vec, e: int, p: int, first: int, t: float) -> float:
     """Return a pseudo-random function at ``t`` [s], before it is clipped (eq. 4.1, 4.2).
 
@@ -128,7 +127,7 @@ def wave(rows: Vec, e: int, p: int, first: int, t: float) -> float:
     )
 
 
-@njit(cache=True)
+@kernel()
 def _draw_wave(stream: State, low: float, high: float, f_max: float, constants: Vec) -> None:
     """Draw a function's constants, shape (N_CONSTANTS,), for a range and a frequency [Hz]."""
     constants[FREQUENCY] = f_max * uniform(stream)
@@ -140,19 +139,19 @@ def _draw_wave(stream: State, low: float, high: float, f_max: float, constants: 
         constants[COS_1 + 2 * k] = AMPLITUDES[k] * amplitude * math.sin(phase)
 
 
-@njit(cache=True)
+@kernel()
 def _hold(value: float, constants: Vec) -> None:
     """Make a function constant."""
     constants[:] = 0.0
     constants[MIDDLE] = value
 
 
-@njit(cache=True)
+@kernel()
 def _between(stream: State, low: float, high: float) -> float:
     return low + (high - low) * uniform(stream)
 
 
-@njit(cache=True)
+@kernel()
 def start_walker(rules: WalkerRules, state: WalkerState, e: int, p: int, stream: State) -> None:
     """Draw an episode of one walker: place, gait, first target, the two functions.
 
@@ -185,7 +184,7 @@ def start_walker(rules: WalkerRules, state: WalkerState, e: int, p: int, stream:
     _set_velocity(rules.rows, state.rows, e, p, 0.0)
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@kernel(error_model="numpy", fastmath=FAST)
 def advance_walker(rules: WalkerRules, state: WalkerState, e: int, p: int, dt: float) -> None:
     """Move one walker on by one control period, never past its target.
 
@@ -216,7 +215,7 @@ def advance_walker(rules: WalkerRules, state: WalkerState, e: int, p: int, dt: f
     _set_velocity(rule, rows, e, p, t)
 
 
-@njit(cache=True)
+@kernel()
 def _arrive(rules: WalkerRules, state: WalkerState, e: int, p: int) -> None:
     """Stay at the target for good, or go on to a new one."""
     own = state.stream[e, p]
@@ -226,7 +225,7 @@ def _arrive(rules: WalkerRules, state: WalkerState, e: int, p: int) -> None:
         _new_target(rules.rows, state.rows, own, e, p)
 
 
-@njit(cache=True)
+@kernel()
 def _new_target(rule: Vec, rows: Vec, own: State, e: int, p: int) -> None:
     """Draw a target from the walking area and set the course to it."""
     x, y = rows[e, p, X], rows[e, p, Y]
@@ -238,13 +237,13 @@ def _new_target(rule: Vec, rows: Vec, own: State, e: int, p: int) -> None:
     rows[e, p, COURSE_X], rows[e, p, COURSE_Y] = per_metre * (to_x - x), per_metre * (to_y - y)
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _radius(rule: Vec, rows: Vec, e: int, p: int, t: float) -> float:
     """Return the radius at ``t`` [m]."""
     return float(min(rule[p, R_MAX], max(rule[p, R_MIN], wave(rows, e, p, RADIUS, t))))
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _set_velocity(rule: Vec, rows: Vec, e: int, p: int, t: float) -> None:
     """Write the velocity from ``t`` on, for one period."""
     speed = 0.0
