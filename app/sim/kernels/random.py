@@ -11,6 +11,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from app.sim.kernels.compiled import kernel
+
 State = NDArray[np.uint64]
 
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
@@ -32,6 +34,19 @@ def start_stream(seed: int, env: int, episode: int, state: State) -> None:
     z = _mix(np.uint64(seed) + _GOLDEN)
     z = _mix(z ^ (np.uint64(env) + _GOLDEN))
     state[0] = _mix(z ^ (np.uint64(episode) + _GOLDEN))
+
+
+@kernel()
+def split_stream(state: State, branch: int, child: State) -> None:
+    """Set ``child``, shape (1,), to a stream of its own; advances ``state`` by one draw.
+
+    Args:
+        state: Stream to branch off from.
+        branch: Number of the branch; different ones differ whatever ``state`` holds.
+        child: Filled.
+    """
+    state[0] = state[0] + _GOLDEN
+    child[0] = _mix(_mix(state[0]) ^ (np.uint64(branch) + _GOLDEN))
 
 
 @kernel()
