@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from app.errors import InvalidInput, SimulationError
 from app.sim import human
-from app.sim.cells import Cell
+from app.sim.cells import Cell, lacks_for_pick
 from app.sim.kernels import arm as arm_kernel
 from app.sim.kernels import body, features, kinematics, pick, random, script
 from app.sim.kernels.arm import Arm
@@ -127,11 +127,13 @@ def _own(values: ArrayLike) -> Vec:
 
 def _world_of(cell: Cell, library_seed: int) -> pick.PickWorld:
     mount = cell.robot
-    stations = cell.positions()
+    if (lack := lacks_for_pick(cell)) is not None:
+        raise InvalidInput("cell", cell.name, f"cannot be used for picking: it {lack}")
+    stations = np.array([station.position for station in cell.pick_stations])
     postures, reached = kinematics.ik_vertical_batch(
         stations, mount.tool_length, np.array(mount.q_min), np.array(mount.q_max)
     )
-    for station, found in zip(cell.stations, reached, strict=True):
+    for station, found in zip(cell.pick_stations, reached, strict=True):
         if not found:
             raise InvalidInput(
                 f"stations.{station.id}.position",
