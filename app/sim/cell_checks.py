@@ -14,17 +14,10 @@ import numpy as np
 
 from app.errors import Fault
 from app.sim.cell_numbers import numbers, shown
+from app.sim.cell_parts import GoalRegion, Obstacle, RobotMount, Station
+from app.sim.cell_people import Worker
 from app.sim.cell_reach import Reach, Touching
-from app.sim.cells import (
-    LIMITS,
-    MAX_TARGETS,
-    Cell,
-    GoalRegion,
-    Obstacle,
-    RobotMount,
-    Station,
-    Worker,
-)
+from app.sim.cells import LIMITS, MAX_TARGETS, Cell
 from app.sim.collision import obstacle_box, touch
 
 MIN_SPACING = 0.05

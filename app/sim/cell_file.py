@@ -15,21 +15,9 @@ from pydantic import BaseModel, ValidationError
 
 from app.errors import BadCell, Fault
 from app.sim.cell_checks import check_cell
-from app.sim.cells import (
-    LIMITS,
-    Cell,
-    ConstantWalker,
-    FixedSpeedWalker,
-    GoalRegion,
-    Obstacle,
-    RobotMount,
-    SafetySettings,
-    Station,
-    Table,
-    Walker,
-    Worker,
-    load_cell,
-)
+from app.sim.cell_parts import GoalRegion, Obstacle, RobotMount, SafetySettings, Station, Table
+from app.sim.cell_people import ConstantWalker, FixedSpeedWalker, Walker, Worker
+from app.sim.cells import LIMITS, Cell, load_cell
 
 MAX_BYTES = 256 * 1024
 """Largest file that is read [bytes]."""

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pydantic import BaseModel
 
 from app.errors import Fault
-from app.sim.cells import Each, Within
+from app.sim.cell_parts import Each, Within
 
 
 def shown(value: object) -> str:

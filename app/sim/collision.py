@@ -20,7 +20,8 @@ import pinocchio as pin
 import trimesh
 
 from app.sim import human
-from app.sim.cells import Cell, Obstacle
+from app.sim.cell_parts import Obstacle
+from app.sim.cells import Cell
 from app.sim.ports import Vec
 from app.sim.robot import LINK_NAMES, Robot, package_dir, urdf_path
 from app.sim.shapes import TOOL, tool_capsule

@@ -6,7 +6,8 @@ import pytest
 
 from app.errors import Fault
 from app.sim.cell_checks import check_cell, station_distance
-from app.sim.cells import Station, load_cell, parse_definition
+from app.sim.cell_parts import Station
+from app.sim.cells import load_cell, parse_definition
 
 Edit = Callable[[dict[str, Any]], object]
 

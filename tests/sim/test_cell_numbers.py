@@ -1,7 +1,8 @@
 import pytest
 
 from app.sim.cell_numbers import numbers, shown, unit_hint
-from app.sim.cells import Within, load_cell
+from app.sim.cell_parts import Within
+from app.sim.cells import load_cell
 
 METRES, TURN = Within(-3.0, 3.0, "m"), Within(-6.28, 6.28, "rad")
 

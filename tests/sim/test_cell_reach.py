@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 
+from app.sim.cell_parts import Obstacle
 from app.sim.cell_reach import Reach
-from app.sim.cells import Cell, Obstacle, load_cell
+from app.sim.cells import Cell, load_cell
 from app.sim.collision import CollisionReference
 from app.sim.robot import Robot
 

@@ -5,17 +5,9 @@ import pytest
 
 from app.errors import NotFound
 from app.sim.cell_checks import check_cell
+from app.sim.cell_parts import Each, Obstacle, Within
 from app.sim.cell_reach import Reach
-from app.sim.cells import (
-    Cell,
-    Each,
-    Obstacle,
-    Within,
-    cell_names,
-    lacks_for_pick,
-    load_cell,
-    parse_definition,
-)
+from app.sim.cells import Cell, cell_names, lacks_for_pick, load_cell, parse_definition
 from app.sim.collision import CollisionReference
 
 SORTING = {"sorting-e0": (10, 2, 10), "sorting-e1": (20, 3, 20)}
