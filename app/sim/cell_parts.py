@@ -9,7 +9,9 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, GetJsonSchemaHandler
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
 
 from app.sim.ports import Vec
 
@@ -28,6 +30,16 @@ class Within:
     """Greatest value."""
     unit: str
     """Unit, as written in text for people; empty for a plain number."""
+
+    def __get_pydantic_json_schema__(
+        self, core: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """Write the bounds into the JSON schema."""
+        found = handler(core)
+        for part in (found, *found.get("prefixItems", ()), *found.get("anyOf", ())):
+            if part.get("type") in ("number", "integer"):
+                part.update(minimum=self.low, maximum=self.high)
+        return found
 
 
 @dataclass(frozen=True, slots=True)

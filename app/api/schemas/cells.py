@@ -78,6 +78,9 @@ def cell_schema() -> dict[str, Any]:
                 return inlined(
                     {**parts[name], **{k: v for k, v in node.items() if k != "$ref"}}
                 )
+            if "prefixItems" in node:  # a vector; its numbers are alike
+                node = {**node, "items": node["prefixItems"][0]}
+                del node["prefixItems"]
             # The mapping of a discriminator points to the parts that are gone.
             return {k: inlined(v) for k, v in node.items() if k != "discriminator"}
         return [inlined(one) for one in node] if isinstance(node, list) else node
