@@ -8,15 +8,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from app.sim import human
+from app.sim.actions import ActionSettings
 from app.sim.cells import Cell
 from app.sim.kernels import kinematics
-from app.sim.pick import arm_of
 from app.sim.ports import Candidate, Decision, Person, Vec
+from app.sim.scene import arm_of
 
 
 class StraightPolicy:
     checkpoint = "0" * 64
     title = "straight moves"
+    action = ActionSettings()
 
     def __init__(self, cell: Cell) -> None:
         self.cell, self.cell_sha256 = cell.name, cell.sha256

@@ -10,6 +10,7 @@ Source: thesis eq. (5.1)-(5.7). Deviates: hysteresis is ours; 0 gives the source
 
 import time
 from collections.abc import Sequence
+from dataclasses import fields
 
 import numpy as np
 import torch
@@ -21,17 +22,17 @@ from app.policies.networks import ResidualActor, TwinCritic
 from app.policies.trained_cell import cell_of
 from app.policies.training import LAYOUT
 from app.sim import human, robot
+from app.sim.actions import ActionSettings
 from app.sim.cells import Cell, require_cell
 from app.sim.kernels.arm import CONTROLLED
-from app.sim.pick import arm_of, observe
+from app.sim.pick import observe
+from app.sim.scene import FAR_AWAY, arm_of, people_of
 from app.sim.ports import Candidate, Decision, OutsideField, Person, Vec
 
 HYSTERESIS = 0.2
 """By how much another candidate's value must be better before the choice changes."""
 MAX_CANDIDATES = 1000
 """Most candidates taken at once."""
-FAR_AWAY = (0.0, 4.0, -np.pi / 2.0)
-"""Pelvis of the person assumed where nobody is there: out of everyone's reach [m, rad]."""
 
 
 class ValueNetworks:
@@ -107,13 +108,20 @@ class TaskChooser:
         self._cell_sha256 = self._cell.sha256
         self._checkpoint, self._hysteresis = checkpoint, hysteresis
         self._networks = ValueNetworks(checkpoint)
-        self._arm = arm_of(self._cell)
+        self._arm, self._people = arm_of(self._cell), people_of(self._cell)
         self._ranges = _TrainedRanges(checkpoint)
 
     @property
     def checkpoint(self) -> str:
         """SHA-256 of the checkpoint."""
         return self._checkpoint.sha256
+
+    @property
+    def action(self) -> ActionSettings:
+        """What its actions mean (METHOD 2.2)."""
+        preset = self._checkpoint.manifest["preset"]
+        known = {f.name: preset.get(f"action_{f.name}", f.default) for f in fields(ActionSettings)}
+        return ActionSettings(**known)
 
     @property
     def title(self) -> str:
@@ -150,7 +158,9 @@ class TaskChooser:
         ids, goals = _check_candidates(candidates)
         if not (np.isfinite(time_left_s) and 0.0 <= time_left_s <= 60.0):
             raise InvalidInput("time_left_s", time_left_s, "must lie in [0, 60] s")
-        obs, reachable = observe(self._arm, q, qd, person.q, person.qd, goals, time_left_s)
+        obs, reachable = observe(
+            self._arm, self._people, q, qd, person.q, person.qd, goals, time_left_s
+        )
         act, values = self._networks.act_and_value(obs)
         last = ids.index(previous) if previous in ids else None
         index = choose(values, last, self._hysteresis)

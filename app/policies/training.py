@@ -84,7 +84,6 @@ class TrainResult:
 class _Ranges:
     """Least and greatest value of every state variable met in training."""
 
-    FIELDS = ("q", "qd", "human_q", "human_qd", "goal")
 
     def __init__(self, known: Mapping[str, Any] | None) -> None:
         known = known or {}
@@ -92,8 +91,15 @@ class _Ranges:
         self._high = {name: np.array(entry["high"]) for name, entry in known.items()}
 
     def look(self, batch: PickBatch) -> None:
-        for name in self.FIELDS:
-            rows = getattr(batch.state, name)
+        state, people = batch.state, batch.state.people
+        met = {
+            "q": state.q,
+            "qd": state.qd,
+            "human_q": people.q.reshape(-1, 18),
+            "human_qd": people.qd.reshape(-1, 18),
+            "goal": state.goal,
+        }
+        for name, rows in met.items():
             low, high = rows.min(axis=0), rows.max(axis=0)
             self._low[name] = np.minimum(self._low.get(name, low), low)
             self._high[name] = np.maximum(self._high.get(name, high), high)

@@ -14,7 +14,8 @@ from app.sim.cells import Cell
 from app.sim.human import Hand
 from app.sim.kernels import arm as arm_kernel
 from app.sim.kernels import kinematics
-from app.sim.pick import arm_of
+from app.sim.kernels.people import people_clearance
+from app.sim.scene import NO_CYLINDERS, arm_of, crowd_of, people_of
 from app.sim.work_cycle import Script, reach_script
 
 CASES_CELL = "pick-and-place"
@@ -161,13 +162,14 @@ def geometry(cell: Cell, case: Case) -> CaseGeometry:
     postures, _ = kinematics.ik_vertical_batch(positions, arm.tool_length, arm.q_min, arm.q_max)
     script = script_of(cell, case)
     times = np.arange(0.0, 6.0, 0.05)
-    pose = arm_kernel.new_pose(len(arm.link))
+    pose, people = arm_kernel.new_robot_pose(arm), people_of(cell)
     clearance = np.empty((3, len(times)))
     for k, t in enumerate(times):
         human_q, _ = script.at(float(t))
+        crowd = crowd_of(people, human_q[None], NO_CYLINDERS)
         for i, posture in enumerate(postures):
-            arm_kernel.place(arm, posture, human_q, pose)
-            clearance[i, k] = arm_kernel.human_clearance(arm, pose)[0]
+            arm_kernel.place_robot(arm, posture, pose)
+            clearance[i, k] = people_clearance(people, pose.columns, crowd)
     blocked = {}
     for i, name in enumerate(case.goals, start=1):
         when = times[clearance[i] < BLOCKED_BELOW]

@@ -18,12 +18,10 @@ from app.sim.kernels.columns import distances
 from app.sim.kernels.cylinder import cylinder_clearance
 from app.sim.kernels.people import Crowd, People
 from app.sim.ports import Vec
-from app.sim.scene import crowd_of, own, require_finite
+from app.sim.scene import NO_CYLINDERS, crowd_of, own, require_finite
 from app.sim.shapes import load_robot_capsules
 
 CONTACT_KINDS = ("none", "human", "cell", "self")
-NO_CYLINDERS = np.zeros((0, 3))
-"""Cylinders of a cell without walkers."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

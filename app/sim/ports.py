@@ -6,10 +6,13 @@ other side sees only what is written here (numpy in, numpy out).
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:  # the kernels need Vec first
+    from app.sim.actions import ActionSettings
 
 Vec = NDArray[np.float64]
 
@@ -80,6 +83,10 @@ class TaskPolicy(Protocol):
     @property
     def checkpoint(self) -> str:
         """SHA-256 of the checkpoint."""
+
+    @property
+    def action(self) -> "ActionSettings":
+        """What its actions mean."""
 
     @property
     def title(self) -> str:

@@ -28,6 +28,8 @@ HumanKind = Literal["worker", "walker", "constant", "fixed-speed"]
 HUMAN_KINDS: tuple[HumanKind, ...] = ("worker", "walker", "constant", "fixed-speed")
 """An 18-DoF person at work; a cylinder that walks (METHOD 2.1), with speed and radius that vary,
 that are constant per episode, or with a given speed."""
+NO_CYLINDERS = np.zeros((0, 3))
+"""Cylinders of a cell without walkers."""
 FAR_AWAY = (0.0, 4.0, -np.pi / 2.0)
 """Pelvis of the person assumed where nobody is there: out of everyone's reach [m, rad]."""
 

@@ -13,10 +13,11 @@ from dataclasses import replace
 import numpy as np
 
 from app.errors import ServiceError
-from app.sim import commands, explanation, pick
+from app.sim import commands, explanation, pick, scene
 from app.sim.cases import Case, find_case
 from app.sim.cells import Cell
 from app.sim.commands import Command
+from app.sim.contact import contact
 from app.sim.kernels import kinematics
 from app.sim.live_person import LivePerson
 from app.sim.ports import Candidate, Decision, Person, TaskPolicy, Vec
@@ -52,7 +53,9 @@ class World:
         self, cell: Cell, policy: TaskPolicy | None, seed: int, id: str = "main"
     ) -> None:
         self.cell, self.id = cell, id
-        self._arm, self._policy = pick.arm_of(cell), policy
+        self._arm, self._people = scene.arm_of(cell), scene.people_of(cell)
+        self._policy = policy
+        self._action_rule = pick.DEFAULT_ACTION if policy is None else policy.action
         self._person = LivePerson(cell, seed)
         self._case: Case | None = None
         self._selected = tuple(s.id for s in cell.stations if s.kind == "cube")
@@ -68,7 +71,7 @@ class World:
         self._restart_robot()
 
     def _restart_robot(self) -> None:
-        self._q, self._qd = self._start_q(), np.zeros(6)
+        self._q, self._qd, self._qdd = self._start_q(), np.zeros(6), np.zeros(6)
         self._done: set[str] = set()
         self._contact: ContactView | None = None
         self._begin_episode("blocked" if self._touches_here() else "moving")
@@ -87,8 +90,10 @@ class World:
         self._decide()
 
     def _touches_here(self) -> bool:
-        rest, person = np.zeros(6), self._person.q
-        found = pick.contact(self._arm, self._q, rest, rest, person, person)
+        rest, person = np.zeros(6), self._person.q[None]
+        found = contact(
+            self._arm, self._people, self._q, rest, rest, rest, (person, person)
+        )
         self._clearance: float | None = found.clearance_m
         return found.kind != "none"
 
@@ -193,13 +198,23 @@ class World:
             self._decide()
 
     def _move_robot(self, person_q: Vec) -> None:
-        q, qd, c = pick.step_robot(self._arm, self._q, self._qd, self._action())
-        found = pick.contact(self._arm, self._q, self._qd, c, person_q, self._person.q)
+        piece = pick.step_robot(
+            self._arm, self._q, self._qd, self._qdd, self._action(), self._action_rule
+        )
+        found = contact(
+            self._arm,
+            self._people,
+            self._q,
+            self._qd,
+            piece.c,
+            piece.d,
+            (person_q[None], self._person.q[None]),
+        )
         self._clearance = found.clearance_m
         if found.kind != "none":
             self._touch(found)
             return
-        self._q, self._qd = q, qd
+        self._q, self._qd, self._qdd = piece.q, piece.qd, piece.qdd
         if self._status == "picking":
             self._finish_pick()
         elif self._decision is not None:

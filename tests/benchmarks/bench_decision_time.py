@@ -51,7 +51,7 @@ def states(seed: int) -> list[State]:
         State(
             q=found.q[k].copy(),
             qd=found.qd[k].copy(),
-            person=Person(q=found.human_q[k].copy(), qd=found.human_qd[k].copy()),
+            person=Person(q=found.people.q[k, 0].copy(), qd=found.people.qd[k, 0].copy()),
         )
         for k in range(STATES)
     ]

@@ -42,7 +42,7 @@ def single(seed: int) -> Subject:
     still = np.zeros((1, 5), dtype=np.float32)
     people = np.empty((TICKS, 18))
     for tick in range(TICKS):
-        people[tick] = batch.state.human_q[0]
+        people[tick] = batch.state.people.q[0, 0]
         batch.step(still, auto_reset=False, features=False)
     env = FclPick(cell, people, batch.state.goal[0].copy())
     rng = np.random.default_rng(seed)

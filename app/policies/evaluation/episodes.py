@@ -150,10 +150,11 @@ class Evaluator:
         obs = np.empty((len(env), N_FEATURES), dtype=np.float32)
         observe_batch(
             batch.arm,
+            batch.world.people,
             state.q[env],
             state.qd[env],
-            state.human_q[env],
-            state.human_qd[env],
+            state.people.q[env, 0],
+            state.people.qd[env, 0],
             batch.world.stations[station],
             batch.world.station_q[station],
             state.time_left[env],
@@ -185,7 +186,7 @@ class _Trace:
         state, n = self._batch.state, self._n
         self._rows = rows[rows < n]
         self._q0, self._qd0 = state.q[:n].copy(), state.qd[:n].copy()
-        self._human0 = state.human_q[:n].copy()
+        self._human0 = state.people.q[:n, 0].copy()
 
     def after(self, rows: Index) -> None:
         """Add the period's poses; a row that collided is left out, its contact is known."""
@@ -198,7 +199,7 @@ class _Trace:
                 x = dt * part / self.PARTS
                 q = self._q0[row] + self._qd0[row] * x + c * x * x
                 blend = part / self.PARTS
-                person = self._human0[row] + blend * (state.human_q[row] - self._human0[row])
+                person = self._human0[row] + blend * (state.people.q[row, 0] - self._human0[row])
                 self._robot[row].append(q)
                 self._person[row].append(person)
 

@@ -139,6 +139,6 @@ class PickEnv(gymnasium.Env[Obs, Obs]):
         return {
             "outcome": OUTCOMES[int(state.outcome[0])],
             "episode": int(state.episode[0]),
-            "clearance_m": float(state.clearance[0]),
+            "clearance_m": float(state.clear[0, 0]),
             "time_left_s": float(state.time_left[0]),
         }
