@@ -395,7 +395,7 @@ def observe(
 
 
 @kernel()
-def _observe(
+def observe_rows(
     arm: Arm,
     people: People,
     q: Vec,
@@ -409,6 +409,7 @@ def _observe(
     sight: Sight,
     out: Obs,
 ) -> None:
+    """Apply :func:`observe` to n rows; ``robot`` and ``sight`` are work space."""
     for i in range(q.shape[0]):
         place_robot(arm, q[i], robot)
         observe(
@@ -441,6 +442,6 @@ def observe_batch(
 ) -> None:
     """Apply :func:`observe` to n rows; every argument but the first two has a leading axis n."""
     robot, sight = new_robot_pose(arm), new_sight(people.person)
-    _observe(
+    observe_rows(
         arm, people, q, qd, human_q, human_qd, goals, q_goals, time_left, robot, sight, out
     )
