@@ -31,7 +31,7 @@ def test_peer_moves_as_the_kernels_move() -> None:
     env, arm, rng = make_env(), arm_of(CELL), np.random.default_rng(2)
     q, qd = np.array(CELL.robot.home_q), np.zeros(6)
     for _ in range(20):
-        act = rng.uniform(-1.0, 1.0, 5)
+        act = rng.uniform(-1.0, 1.0, 5).astype(np.float32)
         obs, _, ended = env.step(act)
         piece = step_robot(arm, q, qd, np.zeros(6), act)
         q, qd = piece.q, piece.qd
