@@ -15,6 +15,7 @@ from app.sim.kernels.actions import (
     ActionRule,
     advance,
 )
+from app.sim.kernels.jerk import manoeuvre_extremes
 
 TOLERANCE = 1e-9
 N = 6
@@ -92,13 +93,17 @@ def pushes(kind: str, limit: Limits, n_steps: int, rng: np.random.Generator):
     return lambda k, _: plan[k]
 
 
-def walk(rule: ActionRule, limit: Limits, kind: str, n_steps: int, seed: int) -> Walk:
-    """Drive six joints from rest at random places."""
+def walk(
+    rule: ActionRule, limit: Limits, kind: str, n_steps: int, seed: int, start=None
+) -> Walk:
+    """Drive six joints from rest at random places, or from a start (q, qd, qdd)."""
     rng = np.random.default_rng(seed)
     push = pushes(kind, limit, n_steps, rng)
     q, qd = np.empty((n_steps + 1, N)), np.zeros((n_steps + 1, N))
     c, d, qdd = np.empty((n_steps, N)), np.empty((n_steps, N)), np.zeros(N)
     q[0] = rng.uniform(limit.q_min, limit.q_max)
+    if start is not None:
+        q[0], qd[0], qdd[:] = start
     n_empty = 0
     for k in range(n_steps):
         n_empty += advance(
@@ -158,6 +163,43 @@ def test_no_limit_is_exceeded_and_no_interval_empty_in_200_000_steps(degree: int
 def test_no_limit_is_exceeded_and_no_interval_empty_in_a_million_steps(degree: int) -> None:
     worst, n_empty, total = violations_and_empties(degree, 1_000_000)
     assert total == 1_000_000
+    assert worst <= TOLERANCE
+    assert n_empty == 0
+
+
+def reach(degree: int, qd: float, qdd: float, limit: Limits, j: int) -> tuple[float, float]:
+    """How far down and up a braking joint goes; infinite where it exceeds the speed limit."""
+    acc, most = limit.qdd_max[j], limit.qd_max[j]
+    if degree == 2:
+        stop = qd**2 / (2 * acc) + abs(qd) * limit.dt / 2
+        return min(0.0, np.sign(qd) * stop), max(0.0, np.sign(qd) * stop)
+    low, high, slow, fast = manoeuvre_extremes(qd, qdd, acc, limit.jerk_max[j], limit.dt)
+    return (low, high) if max(fast, -slow) <= most else (-np.inf, np.inf)
+
+
+def just_viable(degree: int, limit: Limits, rng: np.random.Generator) -> np.ndarray:
+    """A state (q, qd, qdd) of each joint whose braking ends at, or turns at, a limit."""
+    state = np.zeros((3, N))
+    for j in range(N):
+        motion = rng.uniform(-1, 1, 2) * (limit.qd_max[j], limit.qdd_max[j])
+        low, high = reach(degree, *motion, limit, j)
+        while high - low > limit.q_max[j] - limit.q_min[j]:
+            motion *= rng.uniform(0.2, 0.9, 2)
+            low, high = reach(degree, *motion, limit, j)
+        q = limit.q_max[j] - high if rng.random() < 0.5 else limit.q_min[j] - low
+        state[:, j] = q, *motion
+    return state
+
+
+@pytest.mark.parametrize("degree", [2, 3])
+@pytest.mark.parametrize("name", SETS)
+def test_no_limit_is_exceeded_from_states_that_are_just_viable(name: str, degree: int) -> None:
+    limit, rng, worst, n_empty = SETS[name], np.random.default_rng(41), -np.inf, 0
+    for k in range(300):
+        rule = ActionRule(degree, VIABLE, (SPEED, COEFFICIENT)[k % 2])
+        kind = ("up", "down", "ends at random", "nearest limit")[k // 2 % 4]
+        one = walk(rule, limit, kind, 12, k, just_viable(degree, limit, rng))
+        worst, n_empty = max(worst, worst_excess(one, limit)), n_empty + one.n_empty
     assert worst <= TOLERANCE
     assert n_empty == 0
 
