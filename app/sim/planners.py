@@ -3,11 +3,16 @@
 A query asks for a path of straight joint motions from one posture to any of several. Three
 planners: RRT-Connect (the first path found), RRT* (Karaman and Frazzoli 2011; the shortest path
 its time allows, as in the source's comparison) and AORRTC (Wilson et al. 2025; almost-surely
-optimal RRT-Connect). Path length is in joint space [rad], Euclidean. Whatever happens, the
-answer is a :class:`Plan` whose ``outcome`` has a name; only malformed numbers raise.
+optimal RRT-Connect). Path length is in joint space [rad], Euclidean. OMPL is asked only where
+the straight motion to the nearest goal is not free: no path is shorter than that (and AORRTC of
+2.0.1 returns paths that do not begin at the start where a goal can be reached straight).
+Whatever happens, the answer is a :class:`Plan` whose ``outcome`` has a name; only malformed
+numbers raise.
 
-Time: a plan ends within its budget of wall time, but for the one step of the planner that is
-under way. With ``max_poses`` it ends after so many poses instead, which makes plans repeatable.
+Time: the search ends before its budget of wall time is spent, so that the path can be looked at
+once more within it; only a step of OMPL that is under way, or a busy machine, makes it a few
+milliseconds longer. With ``max_poses`` it ends after so many poses instead, which makes plans
+repeatable.
 
 Seeds: OMPL keeps one seed generator per process. It is set before each plan, and all of a
 plan's random generators are made new from it, under a lock, so equal queries with equal seeds
@@ -52,7 +57,11 @@ joints.
 ``no-goal``: no posture was given, or none within the limits."""
 
 SAME = 1e-6
-"""Joint distance below which two postures are one [rad]."""
+"""Difference below which two lengths, or two positions of a joint, are one [rad]."""
+LAST_LOOK_S = 0.004
+"""Part of the budget kept to look at the path once more [s]; a quarter of it at most."""
+MOST_KEPT = 6
+"""Paths kept from while a planner runs."""
 _SEEDING = threading.Lock()
 
 
@@ -74,8 +83,6 @@ class PlanSettings:
     """How far each joint may go beyond start and goals [rad]; the cell's limits hold anyway."""
     n_joints: int = CONTROLLED
     """Joints that move, from the base on; the others stay as they are at the start."""
-    straight_first: bool = True
-    """Take the straight motion to the nearest goal where it is free: no path is shorter."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -138,12 +145,20 @@ def plan(
     usable = np.array([k for k in inside if checker.is_free(goals[k])], dtype=np.int64)
     if len(usable) == 0:
         return clock.answer("goal-in-contact")
-    nearest = usable[np.argmin(np.linalg.norm(goals[usable] - start, axis=1))]
-    if settings.straight_first and checker.edge_free(start, goals[nearest]):
-        return clock.answer("solved", np.stack([start, goals[nearest]]), goals)
+    order = usable[np.argsort(np.linalg.norm(goals[usable] - start, axis=1), kind="stable")]
+    direct = next((n for n, k in enumerate(order) if checker.edge_free(start, goals[k])), None)
+    if direct is not None:
+        straight = np.stack([start, goals[order[direct]]])
+        if direct == 0 or settings.planner == "rrt-connect":
+            return clock.answer("solved", straight, goals)
     with _SEEDING:
         ou.RNG.setSeed(seed)
-        found = _Query(checker, start, goals[usable], (low, high), settings, clock).solve()
+        nearer = goals[order[:direct]]
+        found = _Query(checker, start, nearer, (low, high), settings, clock).solve()
+    if direct is not None and (
+        found.outcome != "solved" or path_length(found.path) > path_length(straight)
+    ):
+        return clock.answer("solved", straight, goals)
     return clock.answer(found.outcome, found.path, goals, found.first_length)
 
 
@@ -176,7 +191,9 @@ class _Clock:
         """Tell whether this share of the budget is spent."""
         if self._settings.max_poses is not None:
             return self._checker.n_poses - self._n0 >= share * self._settings.max_poses
-        return time.perf_counter() - self._start >= share * self._settings.budget_s
+        budget = self._settings.budget_s
+        search = budget - min(LAST_LOOK_S, 0.25 * budget)
+        return time.perf_counter() - self._start >= share * search
 
     def answer(
         self,
@@ -230,8 +247,10 @@ class _Query:
     ) -> None:
         ou.noOutputHandler()
         self._checker, self._settings, self._clock = checker, settings, clock
+        self._start, self._goals = start, goals
         n = settings.n_joints
         self._read = _reader(start, n)
+        self._kept: list[tuple[float, Vec]] = []
         every = np.vstack([start, goals])[:, :n]
         low = np.maximum(limits[0][:n], every.min(axis=0) - settings.detour_rad)
         high = np.minimum(limits[1][:n], every.max(axis=0) + settings.detour_rad)
@@ -258,25 +277,49 @@ class _Query:
         algorithm = self._algorithm()
         algorithm.setProblemDefinition(self._problem)
         algorithm.setup()
-        clock = self._clock
-        algorithm.solve(ob.PlannerTerminationCondition(lambda: clock.over(share)))
+        algorithm.solve(ob.PlannerTerminationCondition(lambda: self._watch(share)))
         found = self._problem.getSolutionPath()
         if found is None:
             return _Found("out-of-time", np.zeros((0, 6)), 0.0)
-        path = self._rows(found)
-        first = path_length(path)
         if not self._problem.hasExactSolution():
-            return _Found("approximate", path, first)
-        if len(path) > 2:
-            over = ob.PlannerTerminationCondition(clock.over)
+            path = self._rows(found)
+            if path_length(path) <= SAME or not self._checker.path_free(path):
+                return _Found("out-of-time", np.zeros((0, 6)), 0.0)
+            return _Found("approximate", path, path_length(path))
+        self._keep(found)
+        first = self._kept[-1][0]
+        if found.getStateCount() > 2 and not self._clock.over():
+            over = ob.PlannerTerminationCondition(self._clock.over)
             og.PathSimplifier(self._info).simplify(found, over, False)
-            shorter = self._rows(found)
-            # It smooths as well, which may lengthen a path; and the budget may end inside it.
-            if path_length(shorter) < first and self._checker.path_free(shorter):
-                return _Found("solved", shorter, first)
-        if not self._checker.path_free(path):  # OMPL says otherwise; ours is the last word
-            return _Found("out-of-time", np.zeros((0, 6)), 0.0)
-        return _Found("solved", path, first)
+            self._keep(found)
+        for _, path in sorted(self._kept, key=lambda kept: kept[0]):
+            # Ours is the last word: AORRTC may also end with a path of length 0 at the start.
+            if self._reaches(path) and self._checker.path_free(path):
+                return _Found("solved", path, first)
+        return _Found("out-of-time", np.zeros((0, 6)), 0.0)
+
+    def _watch(self, share: float) -> bool:
+        """Tell whether the planner's part of the budget is spent; keep what it has found.
+
+        AORRTC shortens its paths in place, and one that the end of the budget catches in the
+        middle of that may be in contact: then an earlier one is taken.
+        """
+        if self._clock.over(share):
+            return True
+        if self._problem.hasExactSolution():
+            found = self._problem.getSolutionPath()
+            if not self._kept or abs(found.length() - self._kept[-1][0]) > SAME:
+                self._keep(found)
+        return False
+
+    def _reaches(self, path: Vec) -> bool:
+        """Tell whether a path leads from the start to a goal."""
+        ends = np.abs(path[-1] - self._goals).max(axis=1).min()
+        return bool(np.abs(path[0] - self._start).max() <= SAME and ends <= SAME)
+
+    def _keep(self, found: Any) -> None:
+        path = self._rows(found)
+        self._kept = [*self._kept[-MOST_KEPT:], (path_length(path), path)]
 
     def _algorithm(self) -> Any:
         kinds = {"rrt-connect": og.RRTConnect, "rrt-star": og.RRTstar, "aorrtc": og.AORRTC}

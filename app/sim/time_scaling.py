@@ -11,8 +11,8 @@ a bounded polynomial action (METHOD 2.2) like those of a policy. The ``b_i`` are
 
 found by lengthening the blends that are too short until none is. A blend leaves the path near
 its corner, by ``|v_i - v_{i-1}| b_i dt / 8`` at most; where that is in contact, the motion
-stops at the corner instead. A motion already under way begins with its blend: the first corner is
-where a straight stop would end.
+stops at the corner instead. A motion already under way begins with its blend: the first corner
+is where a straight stop would end.
 
 Not the time-optimal parametrisation of the path: speeds are constant along a segment and
 durations whole periods. On straight lines between few corners little is lost. TOPP-RA's wheel

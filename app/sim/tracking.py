@@ -11,7 +11,8 @@ allow:
 
 with ``o`` the present rate. A timed path can be followed at any rate below 1, since speeds
 scale with o and accelerations with o^2; the second term takes back what is lost where a period
-straddles two pieces: a few milliradians at worst. The bounded actions (``kernels/polynomial.py``) keep the limits in any case.
+straddles two pieces: a few milliradians at worst. The bounded actions
+(``kernels/polynomial.py``) keep the limits in any case.
 """
 
 import numpy as np

@@ -73,7 +73,7 @@ def cylinder_gap(a: Vec, radius: float, cylinder: Vec) -> float:
     flat2 = dx * dx + dy * dy
     s = min(1.0, max(0.0, (wx * dx + wy * dy) / flat2)) if flat2 > 1e-12 else 0.0
     if a[0, 2] + s * (a[1, 2] - a[0, 2]) <= cylinder[3]:
-        return max(0.0, math.hypot(wx - s * dx, wy - s * dy) - cylinder[2]) - radius
+        return float(max(0.0, math.hypot(wx - s * dx, wy - s * dy) - cylinder[2]) - radius)
     return _search_segment(a, cylinder) - radius
 
 
