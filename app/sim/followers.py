@@ -31,6 +31,8 @@ from app.sim.tracking import Tracker, straight_stop
 STATES = ("waiting", "following", "braking", "arrived", "lost")
 """``waiting``: no plan, at rest or braking to rest. ``braking``: slows down along a path that
 is blocked. ``lost``: farther from the path than ``lost_rad``, braking to rest."""
+AGAIN_BUDGET_S = {"once": 0.0, "when-blocked": 0.2, "every-tick": 0.02}
+"""Budget of later plans by role [s]; ours."""
 EASED = 0.005
 """Where the robot is nearer to people than the margin, a margin this much below its clearance
 holds instead [m]: it may leave, and pass by no nearer than it stands."""
@@ -44,8 +46,8 @@ class FollowSettings:
     """One of ROLES."""
     plan: PlanSettings = field(default_factory=PlanSettings)
     """How the first path is planned."""
-    again_budget_s: float = 0.2
-    """Budget of later plans [s]; 0.02 is usual for ``every-tick``."""
+    again_budget_s: float | None = None
+    """Budget of later plans [s]; that of the role (AGAIN_BUDGET_S) if None."""
     margin: float = 0.05
     """Distance at which people block the path [m]."""
     extra_margin: float = 0.02
@@ -143,6 +145,8 @@ class Follower:
     def again(self, people: Shapes, q: Vec, qd: Vec, t: float) -> None:
         """Plan from where a straight stop from a state would end; used after the budget."""
         budget = self.settings.again_budget_s
+        if budget is None:
+            budget = AGAIN_BUDGET_S[self.settings.role]
         later = replace(self.settings.plan, budget_s=budget)
         answer = self.ask(people, stopping_point(q, qd, self.limits), later)
         if answer.solved:

@@ -1,6 +1,7 @@
 """Timed paths keep the limits to rounding, in exact pieces, and stay near their path."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -26,6 +27,8 @@ from app.sim.time_scaling import (
 CELL = load_cell()
 ARM = arm_of(CELL)
 LIMITS = Limits(qd_max=ARM.qd_max, qdd_max=ARM.qdd_max, dt=ARM.dt)
+SLUGGISH = replace(LIMITS, qdd_max=0.1 * ARM.qdd_max)
+"""With a tenth of the acceleration corners are rounded widely enough to touch something."""
 
 
 def some_paths(n: int, seed: int = 0) -> list[tuple[Vec, Vec, Vec, frozenset[int]]]:
@@ -152,7 +155,7 @@ def corner_beside_a_ball() -> tuple[Checker, Vec]:
     path = np.stack([corner] * 3)
     path[0, 0] -= 0.6
     path[2, 1] -= 0.5
-    rounded = time_path(path, LIMITS).q
+    rounded = time_path(path, SLUGGISH).q
     sharp = np.vstack([np.linspace(a, b, 200) for a, b in itertools.pairwise(path)])
     tcp = Robot(ARM.tool_length).tcp_pose(corner)[:3, 3]
     rng = np.random.default_rng(0)
@@ -173,9 +176,9 @@ def corner_beside_a_ball() -> tuple[Checker, Vec]:
 def test_a_corner_that_would_touch_is_taken_with_a_stop() -> None:
     checker, path = corner_beside_a_ball()
     assert checker.path_free(path)
-    rounded = time_path(path, LIMITS)
+    rounded = time_path(path, SLUGGISH)
     assert checker.first_blocked(rounded.q, rounded.qd) < rounded.n_periods
-    timed = time_free_path(checker, path, LIMITS)
+    timed = time_free_path(checker, path, SLUGGISH)
     assert isinstance(timed, TimedPath) and timed.n_stops == 1
     assert checker.first_blocked(timed.q, timed.qd) == timed.n_periods
 
