@@ -12,6 +12,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -93,9 +94,9 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("--json", action="store_true")
     one = verb("bench", run_bench, "Run a benchmark of the checkout; more options go to it.")
     one.add_argument("name")
-    one = verb("cells", run_cells, "List the work cells, or check a file of one.")
-    one.add_argument("action", choices=("list", "check"))
-    one.add_argument("file", nargs="?", type=Path)
+    one = verb("cells", run_cells, "List, show, check, add or remove work cells.")
+    one.add_argument("action", choices=("list", "show", "check", "add", "remove"))
+    one.add_argument("target", nargs="?", metavar="FILE|NAME")
     one.add_argument("--json", action="store_true")
     return top
 
@@ -146,13 +147,16 @@ def run_setup(_options: argparse.Namespace) -> int:
 
 def run_train(options: argparse.Namespace) -> int:
     """Train in this process and write the policy into a folder."""
-    prepare_kernels(load_settings())
+    settings = load_settings()
+    prepare_kernels(settings)
     import torch
 
+    from app.cell_verbs import named_cell
     from app.policies import presets
     from app.policies.training import train
 
     preset = presets.resolve(options.preset, parsed_sets(options.sets))
+    cell = named_cell(preset.cell, settings)
     options.output.mkdir(parents=True, exist_ok=True)
     torch.set_num_threads(1)
 
@@ -167,6 +171,7 @@ def run_train(options: argparse.Namespace) -> int:
         on_progress=log_progress,
         on_checkpoint=keep,
         should_stop=lambda: False,
+        cell=cell,
     )
     path = options.output / "policy.safetensors"
     print(json.dumps({"checkpoint": str(path)}) if options.json else f"wrote {path}")
@@ -231,31 +236,21 @@ def run_bench(options: argparse.Namespace) -> int:
 
 
 def run_cells(options: argparse.Namespace) -> int:
-    """List the shipped cells or check a file."""
-    from pydantic import ValidationError
+    """List, show, check, add or remove work cells; a bad one is told with all its faults."""
+    from app.cell_verbs import run
+    from app.errors import BadCell
 
-    from app.sim.cells import Cell, cell_names, load_cell
-
-    if options.action == "list":
-        cells = [load_cell(name) for name in cell_names()]
-        listed = [{"name": cell.name, "title": cell.title} for cell in cells]
-        lines = [f"{cell.name:20} {cell.title}" for cell in cells]
-        print(json.dumps({"cells": listed}) if options.json else "\n".join(lines))
-        return 0
-    if options.file is None:
-        raise InvalidInput("FILE", None, "must be given: cells check FILE")
+    settings = load_settings()
+    prepare_kernels(settings)
     try:
-        cell = Cell.model_validate_json(options.file.read_bytes())
-    except OSError as error:
-        raise InvalidInput(
-            "FILE", str(options.file), f"cannot be read: {error.strerror}"
-        ) from error
-    except ValidationError as error:
-        first = error.errors()[0]
-        field = ".".join(str(part) for part in first["loc"]) or "file"
-        raise InvalidInput(field, first["input"], first["msg"]) from error
-    found = {"name": cell.name, "stations": list(cell.station_ids), "ok": True}
-    print(json.dumps(found) if options.json else f"{options.file}: {cell.name} is a good cell")
+        text, data = run(options.action, options.target, settings)
+    except BadCell as error:
+        for fault in error.faults:
+            print(f"{options.target}: {fault.text}", file=sys.stderr)
+        if options.json:
+            print(json.dumps({"ok": False, "faults": [asdict(one) for one in error.faults]}))
+        return WRONG_CALL
+    print(json.dumps(data) if options.json else text)
     return 0
 
 

@@ -3,6 +3,7 @@
     ServiceError
     ├── NotFound             nothing has that name or id
     ├── InvalidInput         a value breaks a rule: field, value, rule, choices
+    │   └── BadCell          a work cell has faults: all of them, each with its place
     ├── Conflict             the request contradicts the present state
     │   └── StaleAttempt     a worker writes about a job that is no longer its own
     ├── StorageUnavailable   the database does not answer for now
@@ -17,6 +18,7 @@ border builds an RFC 9457 problem.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 
 class ServiceError(Exception):
@@ -80,6 +82,55 @@ class InvalidInput(ServiceError):
             "rule": self.rule,
             "choices": list(self.choices),
         }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fault:
+    """One thing that is wrong with a work cell, for a cell engineer to mend."""
+
+    place: str
+    """Where: ``"stations.cube3.position[2]"``."""
+    value: str
+    """What stands there, as text; empty where nothing does."""
+    rule: str
+    """The rule it breaks, as a sentence part: ``"must lie in [-3, 3] m"``."""
+    hint: str = ""
+    """What is probably meant, or what would do; may be empty."""
+
+    @property
+    def text(self) -> str:
+        """One sentence."""
+        given = f" = {self.value}" if self.value else ""
+        return f"{self.place}{given} {self.rule}" + (f" ({self.hint})" if self.hint else "")
+
+
+class BadCell(InvalidInput):
+    """A work cell has faults.
+
+    Args:
+        faults: All of them, at least one.
+    """
+
+    def __init__(self, faults: Sequence[Fault]) -> None:
+        first = faults[0]
+        more = f"; and {len(faults) - 1} more" if len(faults) > 1 else ""
+        ServiceError.__init__(self, first.text + more)
+        self.field, self.value, self.rule = first.place, first.value, first.rule
+        self.choices, self.faults = (), tuple(faults)
+
+    def problem(self) -> dict[str, object]:
+        """Return the first fault's data and the list of all."""
+        errors = [
+            {
+                "field": fault.place,
+                "value": fault.value,
+                "rule": fault.rule,
+                "hint": fault.hint,
+                "choices": [],
+            }
+            for fault in self.faults
+        ]
+        return {**errors[0], "errors": errors}
 
 
 class Conflict(ServiceError):

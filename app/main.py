@@ -24,10 +24,11 @@ from app.policies import pretrained
 from app.policies.checkpoint import load
 from app.policies.task_choice import TaskChooser
 from app.settings import Settings, check_access
-from app.sim.cells import load_cell
+from app.sim.cells import Cell, load_cell
 from app.sim.ports import TaskPolicy
 from app.store.engine import Store
 from app.store.records import NewCheckpoint
+from jobs.cells import CellCatalog
 from jobs.supervisor import Supervisor
 from web.loop import LiveCell
 
@@ -86,7 +87,13 @@ class Service:
             supervisor.stop()
             store.close()
             raise
-        self.parts = Services(store=store, supervisor=supervisor, policies=policies)
+        self.parts = Services(
+            store=store,
+            supervisor=supervisor,
+            policies=policies,
+            cells=CellCatalog(store),
+            start_world=start_world,
+        )
         self._warm_up = threading.Thread(target=self._start_cell, name="warm-up", daemon=True)
         self._warm_up.start()
 
@@ -96,9 +103,10 @@ class Service:
         self._warm_up.join(STOP_S)
         self.parts.readiness.ready = False
         self.parts.readiness.reason = "stopping"
-        for world in self.parts.worlds.values():
-            world.stop()
-        self.parts.worlds.clear()
+        with self.parts.replacing:
+            for world in self.parts.worlds.values():
+                world.stop()
+            self.parts.worlds.clear()
         self.parts.supervisor.stop()
         self.parts.store.close()
 
@@ -125,10 +133,17 @@ class Service:
             logger.exception("the live cell could not start")
 
 
+def start_world(world_id: str, cell: Cell, policy: TaskPolicy | None) -> LiveCell:
+    """Start a live cell with its viewer; whoever asked stops it."""
+    live = LiveCell(cell, policy, id=world_id)
+    live.start()
+    return live
+
+
 def build_policy(manifest: Mapping[str, Any], tensors: bytes) -> TaskPolicy:
     """Make the object that decides from a checkpoint's manifest and tensors."""
     checkpoint = load(manifest, tensors)
-    return TaskChooser(checkpoint, load_cell(checkpoint.manifest["cell"]))
+    return TaskChooser(checkpoint)
 
 
 def publish_shipped(policies: PolicyRegistry) -> None:

@@ -23,6 +23,7 @@ from app.store import checkpoints
 from app.store.engine import Store
 from app.store.records import NewCheckpoint, ResumeState
 from jobs.attempt import main
+from jobs.cells import CellCatalog
 from jobs.spec import EvaluateSpec, parse_spec
 from jobs.worker import Runner, Worker
 
@@ -46,13 +47,15 @@ def train(worker: Worker) -> dict[str, Any]:
         worker.record_checkpoint(step, _new(policy), resume)
         saved.append(policy.sha256)
 
+    preset = presets.resolve(job.preset, job.overrides)
     result = train_policy(
-        presets.resolve(job.preset, job.overrides),
+        preset,
         seed=job.seed,
         resume=resume,
         on_progress=on_progress,
         on_checkpoint=on_checkpoint,
         should_stop=worker.should_stop,
+        cell=CellCatalog(worker.store).to_train_in(preset.cell),
     )
     if not saved:  # interrupted between the last checkpoint and the end
         worker.record_checkpoint(result.step, _new(result.checkpoint), None)

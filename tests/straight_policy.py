@@ -19,7 +19,7 @@ class StraightPolicy:
     title = "straight moves"
 
     def __init__(self, cell: Cell) -> None:
-        self.cell = cell.name
+        self.cell, self.cell_sha256 = cell.name, cell.sha256
         self._arm, self._pelvis_z = arm_of(cell), cell.pelvis_z
 
     def decide(

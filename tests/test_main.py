@@ -13,6 +13,7 @@ import pytest
 from app.__main__ import main, parsed_sets, table
 from app.errors import InvalidInput
 from app.listening import address_of, listen
+from tests import workshop
 
 ROOT = Path(__file__).resolve().parent.parent
 START_S = 240.0
@@ -99,6 +100,11 @@ def test_second_server_on_the_database_says_so_in_one_line(server: tuple[int, Pa
         ["bench", "nothing"],
         ["cells", "check"],
         ["cells", "check", "nothing.json"],
+        ["cells", "show"],
+        ["cells", "show", "kitchen"],
+        ["cells", "remove", "kitchen"],
+        ["cells", "add", "/"],
+        ["train", "pick-td3", "--set", "cell=kitchen"],
     ],
 )
 def test_wrong_call_ends_with_status_2(
@@ -143,22 +149,80 @@ def test_evaluation_prints_one_json_object(
     assert "policy" in table(result)
 
 
-def test_cells_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
+def test_cells_are_listed(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("TANDEM_DATA", str(tmp_path))
     assert main(["cells", "list", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["cells"][0]["name"] == "pick-and-place"
 
 
+@pytest.fixture
+def cell_file(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """A good cell of the user's own, and a data folder without a database."""
+    monkeypatch.setenv("TANDEM_DATA", str(tmp_path / "data"))
+    path = tmp_path / "workshop.json"
+    path.write_text(json.dumps(workshop.definition()), encoding="utf-8")
+    return path
+
+
 def test_shipped_cell_file_is_good_and_a_broken_one_is_named(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    cell_file: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    shipped = ROOT / "app" / "sim" / "cells_data" / "pick-and-place.json"
+    shipped = ROOT / "app" / "sim" / "cells_data" / "sorting-e1.json"
     assert main(["cells", "check", str(shipped)]) == 0
-    broken = json.loads(shipped.read_text(encoding="utf-8"))
-    broken["robot"]["dt"] = -1.0
-    path = tmp_path / "broken.json"
-    path.write_text(json.dumps(broken), encoding="utf-8")
-    assert main(["cells", "check", str(path)]) == 2
-    assert "robot.dt = -1.0" in capsys.readouterr().err
+    assert "23 stations" in capsys.readouterr().out
+    cell_file.write_text(json.dumps(workshop.definition(wheels=4)), encoding="utf-8")
+    assert main(["cells", "check", str(cell_file)]) == 2
+    assert "wheels = 4 is no known field" in capsys.readouterr().err
+
+
+def test_every_fault_of_a_cell_file_is_a_line_and_an_object(
+    cell_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cell = workshop.definition()
+    cell["robot"]["dt"], cell["robot"]["tool_length"] = -1.0, 120.0
+    cell_file.write_text(json.dumps(cell), encoding="utf-8")
+    assert main(["cells", "check", str(cell_file), "--json"]) == 2
+    printed = capsys.readouterr()
+    faults = json.loads(printed.out)["faults"]
+    assert [fault["place"] for fault in faults] == ["robot.tool_length", "robot.dt"]
+    assert "millimetres" in faults[0]["hint"]
+    assert len(printed.err.splitlines()) == 2
+
+
+@pytest.mark.parametrize("content", [b"", b"\xff", b"[" * 9999, b"{}", b"0", b"\x00" * 999])
+def test_file_that_is_no_cell_never_gives_a_traceback(
+    cell_file: Path, capsys: pytest.CaptureFixture[str], content: bytes
+) -> None:
+    cell_file.write_bytes(content)
+    assert main(["cells", "check", str(cell_file)]) == 2
+    assert "Traceback" not in capsys.readouterr().err
+
+
+def test_own_cell_is_added_shown_listed_and_removed(
+    cell_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["cells", "add", str(cell_file)]) == 0
+    assert main(["cells", "add", str(cell_file)]) == 0
+    assert "was stored already" in capsys.readouterr().out
+    assert main(["cells", "list"]) == 0
+    assert "workshop" in capsys.readouterr().out
+    assert main(["cells", "show", "workshop"]) == 0
+    assert json.loads(capsys.readouterr().out)["name"] == "workshop"
+    assert main(["cells", "remove", "workshop"]) == 0
+    assert main(["cells", "show", "workshop"]) == 2
+
+
+def test_cell_with_a_taken_name_is_refused(
+    cell_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    main(["cells", "add", str(cell_file)])
+    cell_file.write_text(json.dumps(workshop.definition(title="Changed")), encoding="utf-8")
+    assert main(["cells", "add", str(cell_file)]) == 1
+    assert "remove it first" in capsys.readouterr().err
+    assert main(["cells", "remove", "pick-and-place"]) == 1
+    assert "reserved" in capsys.readouterr().err
 
 
 def test_values_of_overrides_are_json_where_they_can_be() -> None:

@@ -110,6 +110,11 @@ class LiveCell:
         self._thread: threading.Thread | None = None
 
     @property
+    def cell(self) -> Cell:
+        """The work cell it shows."""
+        return self._cell
+
+    @property
     def viewer_port(self) -> int:
         """Port the viewer listens on."""
         if self._server is None:

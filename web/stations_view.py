@@ -11,7 +11,8 @@ import numpy as np
 import trimesh
 import viser
 
-from app.sim.cells import Cell, Station
+from app.sim.cell_parts import Station
+from app.sim.cells import Cell
 from app.sim.commands import ToggleCandidate
 from app.sim.snapshot import CandidateView, WorldSnapshot
 from web.mannequin import Rgb

@@ -2,9 +2,11 @@
 
 import math
 
+import numpy as np
 import viser
 
 from app.sim.cells import Cell
+from web.poses import orientation
 from web.solids import block, material, painted, rod, slab
 
 TOP = material((236, 233, 226), roughness=0.55)
@@ -13,6 +15,7 @@ FRAME = material((178, 184, 191), metallic=0.35, roughness=0.45)
 FOOT = material((52, 55, 61), roughness=0.6)
 PLATE = material((96, 103, 112), metallic=0.5, roughness=0.4)
 
+OBSTACLE = (150, 158, 168)
 FLOOR = (226, 230, 235)
 GRID, GRID_BOLD = (205, 211, 219), (188, 196, 206)
 SKY, HORIZON = (206, 217, 230), (238, 241, 245)
@@ -25,6 +28,7 @@ def build(server: viser.ViserServer, cell: Cell) -> None:
     scene.world_axes.visible = False
     scene.add_glb("/table", table_body(cell))
     scene.add_glb("/table/trim", table_trim(cell), cast_shadow=False)
+    _obstacles(server, cell)
     _floor(server, cell)
     _light(server)
     _camera(server)
@@ -65,6 +69,18 @@ def table_trim(cell: Cell) -> bytes:
     return painted(
         [(band, EDGE), (slab((0.3, 0.3, 0.008), (0.0, 0.0, 0.004), 0.02, 0.0015), PLATE)]
     )
+
+
+def _obstacles(server: viser.ViserServer, cell: Cell) -> None:
+    for box in cell.obstacles:
+        c, s = math.cos(box.yaw), math.sin(box.yaw)
+        server.scene.add_box(
+            f"/obstacles/{box.id}",
+            color=OBSTACLE,
+            dimensions=(2.0 * box.half_size[0], 2.0 * box.half_size[1], 2.0 * box.half_size[2]),
+            wxyz=orientation(np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])),
+            position=box.center,
+        )
 
 
 def _floor(server: viser.ViserServer, cell: Cell) -> None:

@@ -10,6 +10,7 @@ from starlette.concurrency import run_in_threadpool
 
 from app.api.schemas.jobs import EvaluateJobCreate, JobCreate, JobList, JobPublic, MetricsPublic
 from app.api.services import Services, ServicesDep
+from app.policies import presets
 from app.store import events, jobs, metrics
 from app.store.records import JobEvent, JobRecord, JobState, MetricRow
 
@@ -39,7 +40,11 @@ def create(
     """Queue a training or an evaluation; ``Location`` says where to follow it."""
     if isinstance(body, EvaluateJobCreate):
         services.policies.check(body.checkpoint)
-    job = jobs.create_job(services.store, body.to_domain(), idempotency_key=idempotency_key)
+    new = body.to_domain()
+    if new.preset is not None:
+        preset = presets.resolve(new.preset, new.overrides or {})
+        services.cells.to_train_in(preset.cell)
+    job = jobs.create_job(services.store, new, idempotency_key=idempotency_key)
     services.supervisor.wake()
     response.headers["Location"] = f"/v1/jobs/{job.id}"
     return JobPublic.from_domain(job)

@@ -1,6 +1,7 @@
 """What the routes work with, handed over by ``app.main`` when it wires the service."""
 
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Annotated, Protocol
 
@@ -9,8 +10,10 @@ from starlette.requests import HTTPConnection
 
 from app.api.registry import PolicyRegistry
 from app.errors import NotFound, NotReady
-from app.sim.ports import WorldHandle
+from app.sim.cells import Cell
+from app.sim.ports import TaskPolicy, WorldHandle
 from app.store.engine import Store
+from jobs.cells import CellCatalog
 from jobs.supervisor import Supervisor
 
 
@@ -22,11 +25,19 @@ class LiveWorld(Protocol):
         """Commands in, snapshots out."""
 
     @property
+    def cell(self) -> Cell:
+        """The work cell it shows."""
+
+    @property
     def viewer_port(self) -> int:
         """Loopback port of its 3D viewer."""
 
     def stop(self) -> None:
         """End world and viewer."""
+
+
+StartWorld = Callable[[str, Cell, TaskPolicy | None], LiveWorld]
+"""Starts a world of an id, in a cell, with a policy; the caller stops it."""
 
 
 @dataclass(slots=True)
@@ -60,10 +71,16 @@ class Services:
     """Runs the jobs; is woken when one is posted."""
     policies: PolicyRegistry
     """Checkpoints as objects that decide."""
+    cells: CellCatalog
+    """The work cells by name."""
+    start_world: StartWorld
+    """Starts a live world."""
     worlds: dict[str, LiveWorld] = field(default_factory=dict)
     """The live worlds by id; empty until the kernels are warm."""
     readiness: Readiness = field(default_factory=Readiness)
     """Whether the service can decide."""
+    replacing: threading.Lock = field(default_factory=threading.Lock)
+    """Held by whoever starts a world anew, or stops them all."""
     stopping: threading.Event = field(default_factory=threading.Event)
     """Set when the server goes down: open streams end."""
 

@@ -6,8 +6,9 @@ from fastapi import APIRouter
 from starlette.concurrency import run_in_threadpool
 
 from app.api.schemas.task_selection import TaskSelection, TaskSelectionRequest
-from app.api.services import ServicesDep
-from app.errors import CheckpointMismatch
+from app.api.services import Services, ServicesDep
+from app.errors import InvalidInput, NotFound
+from app.sim.cells import Cell, cell_names, require_cell
 
 MAX_INLINE_CANDIDATES = 32
 """More than this many are decided on a thread, so that streams and other callers go on."""
@@ -21,12 +22,12 @@ async def choose(request: TaskSelectionRequest, services: ServicesDep) -> TaskSe
     # A few candidates take about a millisecond: right here, since handing them to a thread
     # costs more than it saves.
     services.readiness.require()
-    q, qd, people, candidates = request.to_domain()
+    cell = await known_cell(request.cell, services)
+    q, qd, people, candidates = request.to_domain(cell)
     policy = services.policies.loaded(request.checkpoint)
     if policy is None:
         policy = await run_in_threadpool(services.policies.load, request.checkpoint)
-    if policy.cell != request.cell:
-        raise CheckpointMismatch("cell", request.cell, policy.cell)
+    require_cell(cell, policy.cell, policy.cell_sha256)
     decide = partial(
         policy.decide,
         q,
@@ -39,3 +40,17 @@ async def choose(request: TaskSelectionRequest, services: ServicesDep) -> TaskSe
     many = len(candidates) > MAX_INLINE_CANDIDATES
     decision = await run_in_threadpool(decide) if many else decide()
     return TaskSelection.from_domain(decision, candidates, request.stamp)
+
+
+async def known_cell(name: str, services: Services) -> Cell:
+    """Return the cell that a request names; a shipped one without waiting for the disk.
+
+    Raises:
+        InvalidInput: No cell has that name.
+    """
+    if name in cell_names():
+        return services.cells.get(name)
+    try:
+        return await run_in_threadpool(services.cells.get, name)
+    except NotFound as error:
+        raise InvalidInput("cell", name, "is no known work cell", error.known) from None

@@ -15,17 +15,23 @@ from app.api.schemas.worlds import (
     SetPolicy,
     StartCase,
     ToggleCandidate,
+    WorldCell,
     WorldLight,
     WorldList,
     WorldPublic,
     WorldSummary,
 )
-from app.api.services import LiveWorld, ServicesDep
-from app.errors import InvalidInput
-from app.sim.cases import CASES
-from app.sim.cells import load_cell
+from app.api.services import LiveWorld, Services, ServicesDep
+from app.errors import InvalidInput, NotReady
+from app.policies.trained_cell import is_for
+from app.sim.cases import cases_of
+from app.sim.cells import Cell, lacks_for_pick, require_cell
+from app.sim.ports import TaskPolicy
+from app.store.checkpoints import list_checkpoints
 
 STREAM_PERIOD_S = 0.1
+MAX_LOOKED_AT = 200
+"""Newest checkpoints that are looked through for one of a cell."""
 
 router = APIRouter(prefix="/v1/worlds", tags=["worlds"])
 
@@ -42,17 +48,7 @@ WorldDep = Annotated[LiveWorld, Depends(live_world)]
 async def list_all(services: ServicesDep) -> WorldList:
     """Return every live world; none while the service warms up."""
     snapshots = [world.handle.snapshot() for world in services.worlds.values()]
-    return WorldList(
-        items=[
-            WorldSummary(
-                id=one.id,
-                cell=one.cell,
-                viewer=f"/viewer/{one.id}/",
-                checkpoint=one.checkpoint,
-            )
-            for one in snapshots
-        ]
-    )
+    return WorldList(items=[WorldSummary.from_domain(one) for one in snapshots])
 
 
 @router.get("/{world_id}", summary="One live world, with the state a decision needs")
@@ -67,7 +63,7 @@ async def command(
 ) -> CommandAccepted:
     """Queue one command; the world applies it before its next tick."""
     snapshot = world.handle.snapshot()
-    _check_names(body, snapshot.cell)
+    _check_names(body, world.cell)
     if isinstance(body, SetPolicy):
         policy = None
         if body.checkpoint is not None:
@@ -75,6 +71,7 @@ async def command(
             if policy.cell != snapshot.cell:
                 rule = f"must decide in the cell {snapshot.cell}, not in {policy.cell}"
                 raise InvalidInput("checkpoint", body.checkpoint, rule)
+            require_cell(world.cell, policy.cell, policy.cell_sha256)
         world.handle.submit(body.to_domain(policy))
     else:
         world.handle.submit(body.to_domain())
@@ -88,9 +85,12 @@ async def command(
 )
 async def stream(world: WorldDep, services: ServicesDep) -> AsyncIterator[ServerSentEvent]:
     """Send a light snapshot whenever the world has changed, until the client leaves."""
-    last = None
+    last, world_id = None, world.handle.id
     while not services.stopping.is_set():
         snapshot = world.handle.snapshot()
+        if services.worlds.get(world_id) is not world:
+            yield ServerSentEvent(event="end", data={"reason": "the world was started anew"})
+            return
         if snapshot is not last:
             last = snapshot
             light = WorldLight.from_domain(snapshot)
@@ -98,8 +98,44 @@ async def stream(world: WorldDep, services: ServicesDep) -> AsyncIterator[Server
         await asyncio.sleep(STREAM_PERIOD_S)
 
 
-def _check_names(body: CommandCreate, cell_name: str) -> None:
-    stations = load_cell(cell_name).station_ids
+@router.put("/{world_id}/cell", summary="Start a live world anew in another cell")
+def set_cell(world_id: str, body: WorldCell, services: ServicesDep) -> WorldSummary:
+    """Stop the world and start it in a cell with a pick scenario; its streams end.
+
+    The policy is the one that is named, else the one that ships with the cell, else the newest
+    that was trained in it, else none: the robot rests.
+    """
+    services.world(world_id)
+    cell = services.cells.get(body.cell)
+    if (lack := lacks_for_pick(cell)) is not None:
+        raise InvalidInput("cell", cell.name, f"cannot be shown live: it {lack}")
+    if body.checkpoint is None:
+        policy = _policy_for(cell, services)
+    else:
+        policy = services.policies.load(body.checkpoint)
+        require_cell(cell, policy.cell, policy.cell_sha256)
+    with services.replacing:
+        if services.stopping.is_set():
+            raise NotReady("stopping")
+        new = services.start_world(world_id, cell, policy)
+        old, services.worlds[world_id] = services.worlds[world_id], new
+    old.stop()
+    return WorldSummary.from_domain(new.handle.snapshot())
+
+
+def _policy_for(cell: Cell, services: Services) -> TaskPolicy | None:
+    """Return the default policy if it was trained in the cell, else the newest that was."""
+    default = services.policies.load(None)
+    if (default.cell, default.cell_sha256) == (cell.name, cell.sha256):
+        return default
+    for record in list_checkpoints(services.store, limit=MAX_LOOKED_AT).items:
+        if is_for(record.manifest, cell):
+            return services.policies.load(record.sha256)
+    return None
+
+
+def _check_names(body: CommandCreate, cell: Cell) -> None:
+    stations = cell.station_ids
     if isinstance(body, ToggleCandidate) and body.id not in stations:
         raise InvalidInput("id", body.id, "is no station of this cell", stations)
     if isinstance(body, SetCandidates):
@@ -107,6 +143,6 @@ def _check_names(body: CommandCreate, cell_name: str) -> None:
             if name not in stations:
                 rule = "is no station of this cell"
                 raise InvalidInput(f"ids[{index}]", name, rule, stations)
-    cases = tuple(case.id for case in CASES)
+    cases = tuple(case.id for case in cases_of(cell))
     if isinstance(body, StartCase) and body.id not in cases:
         raise InvalidInput("id", body.id, "is no case study of this cell", cases)

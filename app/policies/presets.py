@@ -7,6 +7,7 @@ cheaply.
 
 import dataclasses
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -169,14 +170,24 @@ def resolve(name: str, overrides: Mapping[str, object]) -> Preset:
     known = {info.name: info for info in fields(name)}
     checked: dict[str, Any] = {}
     for key, value in overrides.items():
+        if key == "cell":
+            checked[key] = _checked_cell(value)
+            continue
         if key not in known:
             raise InvalidInput(
-                f"overrides.{key}", value, f"is no field of {name}", tuple(known)
+                f"overrides.{key}", value, f"is no field of {name}", ("cell", *known)
             )
         checked[key] = _checked(known[key], value)
     preset = dataclasses.replace(get(name), **checked)
     _check_together(preset)
     return preset
+
+
+def _checked_cell(value: object) -> str:
+    """Return the name of a cell; whether there is one of that name is for others to say."""
+    if not isinstance(value, str) or not re.fullmatch(r"[a-z][a-z0-9-]{0,63}", value):
+        raise InvalidInput("overrides.cell", value, "must be the name of a work cell")
+    return value
 
 
 def _checked(info: FieldInfo, value: object) -> int | float:

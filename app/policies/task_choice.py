@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 from app.errors import CheckpointMismatch, InvalidInput
 from app.policies.checkpoint import Checkpoint, expect_layout
 from app.policies.networks import ResidualActor, TwinCritic
+from app.policies.trained_cell import cell_of
 from app.policies.training import LAYOUT
 from app.sim import human, robot
-from app.sim.cells import Cell, load_cell
+from app.sim.cells import Cell, require_cell
 from app.sim.kernels.arm import CONTROLLED
 from app.sim.pick import arm_of, observe
 from app.sim.ports import Candidate, Decision, OutsideField, Person, Vec
@@ -90,7 +91,7 @@ class TaskChooser:
 
     Args:
         checkpoint: A ``policy`` checkpoint.
-        cell: Its work cell; by default the one it names.
+        cell: The work cell it shall decide in; by default the one it was trained in.
         hysteresis: Margin before the choice changes.
 
     Raises:
@@ -100,10 +101,10 @@ class TaskChooser:
     def __init__(
         self, checkpoint: Checkpoint, cell: Cell | None = None, hysteresis: float = HYSTERESIS
     ) -> None:
-        name = str(checkpoint.manifest["cell"])
-        self._cell = cell or load_cell(name)
-        if self._cell.name != name:
-            raise CheckpointMismatch("cell", self._cell.name, name)
+        self._cell = cell_of(checkpoint.manifest)
+        if cell is not None:
+            require_cell(cell, self._cell.name, self._cell.sha256)
+        self._cell_sha256 = self._cell.sha256
         self._checkpoint, self._hysteresis = checkpoint, hysteresis
         self._networks = ValueNetworks(checkpoint)
         self._arm = arm_of(self._cell)
@@ -126,6 +127,11 @@ class TaskChooser:
     def cell(self) -> str:
         """Name of the work cell it was trained for."""
         return self._cell.name
+
+    @property
+    def cell_sha256(self) -> str:
+        """Identity of that cell's content."""
+        return self._cell_sha256
 
     def decide(
         self,

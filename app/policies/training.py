@@ -23,8 +23,9 @@ from app.policies import checkpoint as formats
 from app.policies.checkpoint import Checkpoint
 from app.policies.presets import Preset
 from app.policies.td3 import PickTD3, twin_of
+from app.policies.trained_cell import cell_of, manifest_fields
 from app.policies.vecenv import PickVecEnv
-from app.sim.cells import load_cell
+from app.sim.cells import Cell, load_cell
 from app.sim.kernels.arm import CONTROLLED
 from app.sim.kernels.features import SIZES
 from app.sim.kernels.reward import RewardWeights
@@ -133,12 +134,12 @@ def settings_of(preset: Preset) -> PickSettings:
 class _Run:
     """One attempt at a training: model, counters and what goes into a checkpoint."""
 
-    def __init__(self, preset: Preset, seed: int, resume: Checkpoint | None) -> None:
-        self.preset, self.seed = preset, seed
+    def __init__(
+        self, preset: Preset, seed: int, resume: Checkpoint | None, cell: Cell
+    ) -> None:
+        self.preset, self.seed, self.cell = preset, seed, cell
         start = 0 if resume is None else int(resume.manifest["step"])
-        batch = PickBatch(
-            load_cell(preset.cell), preset.n_envs, seed + start, settings_of(preset)
-        )
+        batch = PickBatch(cell, preset.n_envs, seed + start, settings_of(preset))
         self.env = PickVecEnv(batch)
         self.model = PickTD3(preset, self.env, seed + start)
         self.cpu_before = 0.0
@@ -195,7 +196,7 @@ class _Run:
             "format": formats.FORMAT,
             "preset": asdict(self.preset),
             "seed": self.seed,
-            "cell": self.preset.cell,
+            **manifest_fields(self.cell),
             "layout": LAYOUT,
             "act_size": CONTROLLED,
             "width": self.preset.width,
@@ -214,6 +215,8 @@ class _Run:
             raise CheckpointMismatch("kind", "resume", resume.manifest["kind"])
         if resume.manifest["preset"] != asdict(self.preset):
             raise CheckpointMismatch("preset", asdict(self.preset), resume.manifest["preset"])
+        if cell_of(resume.manifest) != self.cell:
+            raise CheckpointMismatch("cell", self.cell.sha256, cell_of(resume.manifest).sha256)
         formats.expect_layout(resume, LAYOUT, CONTROLLED)
         arrays = resume.arrays()
         for name, module in self._modules().items():
@@ -339,6 +342,7 @@ def train(
     on_progress: Callable[[Progress], None],
     on_checkpoint: Callable[[int, Checkpoint, Checkpoint], None],
     should_stop: Callable[[], bool],
+    cell: Cell | None = None,
 ) -> TrainResult:
     """Train a preset, from the start or from where an attempt was interrupted.
 
@@ -350,12 +354,14 @@ def train(
         on_checkpoint: Called every ``checkpoint_steps`` and at the end or stop with the step,
             the policy and what resuming needs.
         should_stop: Asked after every step of the cells, so it must be cheap.
+        cell: The work cell that the preset names; by default the shipped one of that name.
 
     Raises:
-        CheckpointMismatch: ``resume`` belongs to another preset or program.
+        CheckpointMismatch: ``resume`` belongs to another preset, cell or program.
+        InvalidInput: The cell cannot be trained in.
         SimulationError: A reward was not finite.
     """
-    run = _Run(preset, seed, resume)
+    run = _Run(preset, seed, resume, cell or load_cell(preset.cell))
     if resume is not None:
         run.refill()
     reporter = _Reporter(run, on_progress, on_checkpoint, should_stop)

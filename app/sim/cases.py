@@ -17,6 +17,8 @@ from app.sim.kernels import kinematics
 from app.sim.pick import arm_of
 from app.sim.work_cycle import Script, reach_script
 
+CASES_CELL = "pick-and-place"
+"""The cell whose layout the cases were chosen for."""
 BLOCKED_BELOW = 0.0
 """A goal posture nearer to the person than this is blocked [m]."""
 
@@ -121,6 +123,11 @@ def find_case(name: str) -> Case:
         if case.id == name:
             return case
     raise NotFound("case study", name, tuple(case.id for case in CASES))
+
+
+def cases_of(cell: Cell) -> tuple[Case, ...]:
+    """Return the case studies that can be started in a cell."""
+    return CASES if cell.name == CASES_CELL else ()
 
 
 def script_of(cell: Cell, case: Case) -> Script:

@@ -1,114 +1,57 @@
-"""Work cells as data: what stands where, and the limits that hold there (ARCHITECTURE).
+"""Work cells as data: what stands where, who walks there, and the limits that hold.
 
-A cell is a JSON file that a user may write; pydantic checks it, and an error names the field,
-the value and the rule. Frame: the robot's base, x right, y toward the person, z up, table top
-at z = 0. SI units, radians.
+A cell is a JSON file that a user may write; ``cell_file.read_cell`` reads it and
+``cell_checks.check_cell`` says everything that is wrong with it. Its fields are in
+``cell_parts`` and ``cell_people``. Frame: the robot's base, x right, y toward the
+person, z up, table top at z = 0. SI units, radians.
 
-Source: thesis section 5.3.1 (``pick-and-place``); the coordinates, which it does not print, are
-ours (METHOD 3.2).
+Source: METHOD 2.1 and 2.3 (``shared-workspace``), 3.2 (``pick-and-place``), 1.1
+(``sorting-*``); coordinates that the source does not print are ours.
 """
 
+import hashlib
 import json
 from functools import cache
 from importlib import resources
-from typing import Annotated, Literal, Self
+from typing import Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, ValidationError
 
-from app.errors import NotFound
+from app.errors import CheckpointMismatch, InvalidInput, NotFound
+from app.sim.cell_parts import (
+    CellData,
+    GoalRegion,
+    Label,
+    Obstacle,
+    RobotMount,
+    SafetySettings,
+    Station,
+    Table,
+)
+from app.sim.cell_people import CylinderPerson, Person, Worker
 from app.sim.ports import Vec
 
-Six = tuple[float, float, float, float, float, float]
-Position = tuple[float, float, float]
-Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
+LIMITS = {"stations": 128, "obstacles": 32, "people": 4}
+"""Longest list of each name."""
+MAX_TARGETS = 2000
+"""Most grid points of a goal region."""
+DEFAULT_PELVIS_HEIGHT = 0.95
+"""Pelvis over the floor where a cell has no worker to say it [m]."""
 
 
-class _Data(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-
-class Table(_Data):
-    """A rectangular table top; its upper face is the plane z = 0."""
-
-    x_min: Finite = Field(description="left edge [m]")
-    x_max: Finite = Field(description="right edge [m]")
-    y_min: Finite = Field(description="edge behind the robot [m]")
-    y_max: Finite = Field(description="edge on the person's side [m]")
-    thickness: Positive = Field(description="thickness of the top [m]")
-    height: Positive = Field(description="height of the top above the floor [m]")
-
-    @model_validator(mode="after")
-    def _edges_in_order(self) -> Self:
-        if self.x_min >= self.x_max or self.y_min >= self.y_max:
-            raise ValueError("table edges must satisfy x_min < x_max and y_min < y_max")
-        return self
-
-
-class Station(_Data):
-    """A named place the robot's tool can be sent to."""
-
-    id: str = Field(pattern=r"^[a-z][a-z0-9_-]{0,31}$", description="name in requests")
-    kind: Literal["cube", "dock"] = Field(description="what stands there")
-    label: str = Field(description="name for people")
-    position: Position = Field(description="point the tcp must reach [m]")
-
-
-class RobotMount(_Data):
-    """The UR10 in this cell: home posture, limits and tool."""
-
-    home_q: Six = Field(description="home posture [rad]")
-    q_min: Six = Field(description="lower joint limits [rad]")
-    q_max: Six = Field(description="upper joint limits [rad]")
-    qd_max: Six = Field(description="joint speed limits [rad/s]")
-    qdd_max: Six = Field(description="joint acceleration limits [rad/s^2]")
-    tool_length: Positive = Field(description="from flange to tcp [m]")
-    tool_radius: Positive = Field(description="radius of the tool's capsule [m]")
-    dt: Positive = Field(description="control period [s]")
-
-    @model_validator(mode="after")
-    def _limits_in_order(self) -> Self:
-        for joint, (low, home, high) in enumerate(
-            zip(self.q_min, self.home_q, self.q_max, strict=True)
-        ):
-            if not low < home < high:
-                raise ValueError(
-                    f"home_q[{joint}] = {home} must lie inside ({low}, {high}) rad"
-                )
-        if min(self.qd_max) <= 0.0 or min(self.qdd_max) <= 0.0:
-            raise ValueError("qd_max and qdd_max must be positive")
-        return self
-
-
-class HumanArea(_Data):
-    """Where the person stands and how high the pelvis is."""
-
-    home: Position = Field(description="pelvis x, y [m] and yaw [rad] when at rest")
-    x_min: Finite = Field(description="walking area, left edge [m]")
-    x_max: Finite = Field(description="walking area, right edge [m]")
-    y_min: Finite = Field(description="walking area, edge at the table [m]")
-    y_max: Finite = Field(description="walking area, far edge [m]")
-    pelvis_height: Positive = Field(description="pelvis above the floor [m]")
-
-
-class Cell(_Data):
+class Cell(CellData):
     """One work cell."""
 
     name: str = Field(pattern=r"^[a-z][a-z0-9-]{0,63}$", description="name in requests")
-    title: str = Field(description="name for people")
+    title: Label = Field(description="name for people")
     table: Table
-    stations: tuple[Station, ...] = Field(min_length=1)
     robot: RobotMount
-    human: HumanArea
-
-    @model_validator(mode="after")
-    def _ids_are_unique(self) -> Self:
-        ids = [station.id for station in self.stations]
-        twice = sorted({name for name in ids if ids.count(name) > 1})
-        if twice:
-            raise ValueError(f"station ids must be unique, given twice: {', '.join(twice)}")
-        return self
+    stations: tuple[Station, ...] = Field(default=(), description="named places, at most 128")
+    goal_region: GoalRegion | None = Field(default=None, description="box of goals, or null")
+    obstacles: tuple[Obstacle, ...] = Field(default=(), description="fixed boxes, at most 32")
+    people: tuple[Person, ...] = Field(default=(), description="who may be there, at most 4")
+    safety: SafetySettings = SafetySettings()
 
     @property
     def floor_z(self) -> float:
@@ -116,18 +59,50 @@ class Cell(_Data):
         return -self.table.height
 
     @property
+    def workers(self) -> tuple[Worker, ...]:
+        """The people with 18 joints, in order."""
+        return tuple(person for person in self.people if isinstance(person, Worker))
+
+    @property
+    def cylinders(self) -> tuple[CylinderPerson, ...]:
+        """The people who are cylinders, in order."""
+        return tuple(person for person in self.people if not isinstance(person, Worker))
+
+    @property
+    def human(self) -> Worker:
+        """The first worker.
+
+        Raises:
+            NotFound: Nobody works in this cell.
+        """
+        for person in self.workers:
+            return person
+        raise NotFound("worker in the cell", self.name)
+
+    @property
     def pelvis_z(self) -> float:
-        """Height of the person's pelvis in the cell's frame [m]."""
-        return self.floor_z + self.human.pelvis_height
+        """Height of the first worker's pelvis in the cell's frame [m]."""
+        heights = [person.pelvis_height for person in self.workers]
+        return self.floor_z + (heights[0] if heights else DEFAULT_PELVIS_HEIGHT)
 
     @property
     def station_ids(self) -> tuple[str, ...]:
         """Names of all stations, in order."""
         return tuple(station.id for station in self.stations)
 
+    @property
+    def pick_stations(self) -> tuple[Station, ...]:
+        """The stations of the pick scenario: cubes, then docks."""
+        return self.stations_of("cube") + self.stations_of("dock")
+
+    def stations_of(self, kind: str) -> tuple[Station, ...]:
+        """Return the stations of one kind, in order."""
+        return tuple(station for station in self.stations if station.kind == kind)
+
     def positions(self) -> Vec:
         """Return the stations' positions [m], shape (n_stations, 3)."""
-        return np.array([station.position for station in self.stations], dtype=np.float64)
+        rows = [station.position for station in self.stations]
+        return np.array(rows, dtype=np.float64).reshape(-1, 3)
 
     def station(self, name: str) -> Station:
         """Return one station by id.
@@ -139,6 +114,45 @@ class Cell(_Data):
             if station.id == name:
                 return station
         raise NotFound("station", name, self.station_ids)
+
+    def definition(self) -> dict[str, Any]:
+        """Return the cell as JSON data, without fields that are not set."""
+        return self.model_dump(mode="json", exclude_none=True)
+
+    @property
+    def sha256(self) -> str:
+        """Identity of its content, 64 hexadecimal digits: any change of a field changes it."""
+        text = json.dumps(self.model_dump(mode="json"), sort_keys=True, separators=(",", ":"))
+        return hashlib.sha256(text.encode()).hexdigest()
+
+
+def require_cell(cell: Cell, name: str, sha256: str) -> None:
+    """Make sure that a policy was trained in this very cell.
+
+    Args:
+        cell: The cell it shall act in.
+        name: Name of the cell it was trained in.
+        sha256: Identity of that cell's content.
+
+    Raises:
+        CheckpointMismatch: It was trained in another cell, or before the cell was changed.
+    """
+    if name != cell.name:
+        raise CheckpointMismatch("cell", cell.name, name)
+    if sha256 != cell.sha256:
+        now, then = f"{name} as it is now ({cell.sha256[:8]})", f"{name} ({sha256[:8]})"
+        raise CheckpointMismatch("cell", now, then)
+
+
+def lacks_for_pick(cell: Cell) -> str | None:
+    """Say what a cell lacks for the pick scenario (METHOD 3.2); None where nothing."""
+    if not cell.stations_of("cube") or not cell.stations_of("dock"):
+        return "needs at least one station of kind cube and one of kind dock"
+    if len(cell.people) != 1 or not cell.workers:
+        return "needs exactly one person, of kind worker"
+    if cell.obstacles:
+        return "must have no fixed obstacles: this scenario does not see them yet"
+    return None
 
 
 def cell_names() -> tuple[str, ...]:
@@ -163,4 +177,19 @@ def load_cell(name: str = "pick-and-place") -> Cell:
     if name not in cell_names():
         raise NotFound("cell", name, cell_names())
     text = (resources.files("app.sim") / "cells_data" / f"{name}.json").read_text("utf-8")
-    return Cell.model_validate(json.loads(text))
+    return Cell.model_validate_json(text)
+
+
+def parse_definition(definition: object) -> Cell:
+    """Return a cell from JSON data that was checked when it came in.
+
+    Raises:
+        InvalidInput: It does not fit this version of the schema.
+    """
+    try:
+        return Cell.model_validate_json(json.dumps(definition))
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        place = ".".join(str(part) for part in first["loc"])
+        rule = "was stored by another version of Tandem and does not fit this one: add it anew"
+        raise InvalidInput(f"cell.{place}", first["msg"], rule) from error

@@ -20,6 +20,7 @@ import pinocchio as pin
 import trimesh
 
 from app.sim import human
+from app.sim.cell_parts import Obstacle
 from app.sim.cells import Cell
 from app.sim.ports import Vec
 from app.sim.robot import LINK_NAMES, Robot, package_dir, urdf_path
@@ -51,7 +52,8 @@ class Contact:
     link: str
     """Body of the robot, one of BODY_NAMES."""
     body: str
-    """The other one: a capsule of the person, ``table``, ``floor`` or a body of the robot."""
+    """The other one: a capsule of the person, ``table``, ``floor``, ``obstacle`` and its id, or
+    a body of the robot."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -119,6 +121,16 @@ def make_box(low: Vec, high: Vec) -> Any:
     """Return an axis-aligned box between two corners [m] as a placed fcl object."""
     transform = fcl.Transform(np.eye(3), 0.5 * (low + high))
     return fcl.CollisionObject(fcl.Box(*(high - low)), transform)
+
+
+def obstacle_box(obstacle: Obstacle, shrink: float = 0.0) -> Any:
+    """Return an obstacle as a placed fcl object, smaller by ``shrink`` [m] on every side."""
+    sides = np.maximum(2.0 * (np.array(obstacle.half_size) - shrink), 1e-6)
+    c, s = math.cos(obstacle.yaw), math.sin(obstacle.yaw)
+    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    return fcl.CollisionObject(
+        fcl.Box(*sides), fcl.Transform(turn, np.array(obstacle.center, dtype=np.float64))
+    )
 
 
 def touch(a: Any, b: Any) -> bool:
@@ -228,7 +240,8 @@ class CollisionReference:
 
 def _obstacles(cell: Cell) -> dict[str, Any]:
     table, floor = cell.table, cell.floor_z
-    return {
+    boxes = {f"obstacle {one.id}": obstacle_box(one) for one in cell.obstacles}
+    return boxes | {
         "table": make_box(
             np.array([table.x_min, table.y_min, -table.thickness]),
             np.array([table.x_max, table.y_max, 0.0]),

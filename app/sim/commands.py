@@ -10,8 +10,8 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-from app.errors import InvalidInput
-from app.sim.cases import find_case
+from app.errors import InvalidInput, NotFound
+from app.sim.cases import cases_of
 from app.sim.cells import Cell
 from app.sim.ports import TaskPolicy
 
@@ -145,7 +145,7 @@ def check(command: Command, cell: Cell) -> None:
 
     Raises:
         InvalidInput: A number is not finite, or a mode is unknown.
-        NotFound: The cell has no such station, or there is no such case study.
+        NotFound: The cell has no such station, or no such case study.
     """
     match command:
         case MoveHuman():
@@ -161,6 +161,8 @@ def check(command: Command, cell: Cell) -> None:
         case ToggleCandidate():
             cell.station(command.id)
         case StartCase():
-            find_case(command.id)
+            names = tuple(case.id for case in cases_of(cell))
+            if command.id not in names:
+                raise NotFound("case study of this cell", command.id, names)
         case _:
             pass

@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 
 from app.sim.kernels import body
+from app.sim.kernels.columns import ends_of
 from app.sim.ports import Vec
 
 Hand = Literal["r", "l"]
@@ -115,7 +116,8 @@ def rest_posture(x: float, y: float, yaw: float) -> Vec:
 def _forward(q: Vec, pelvis_z: float) -> tuple[Vec, Vec]:
     points, frames = np.empty((body.N_POINTS, 3)), np.empty((body.N_FRAMES, 3, 3))
     # A copy: for a read-only array the kernel would be compiled anew.
-    body.points_and_frames(np.array(q, dtype=np.float64), float(pelvis_z), points, frames)
+    joints, trig = np.array(q, dtype=np.float64), np.empty((3, 16))
+    body.points_and_frames(joints, float(pelvis_z), trig, points, frames)
     return points, frames
 
 
@@ -127,9 +129,9 @@ def capsules(q: Vec, pelvis_z: float, floor_z: float) -> Vec:
         pelvis_z: Height of the pelvis [m] (``Cell.pelvis_z``).
         floor_z: Height of the floor [m] (``Cell.floor_z``).
     """
-    out = np.empty((body.N_CAPSULES, 2, 3))
-    body.capsules(*_forward(q, pelvis_z), floor_z, out)
-    return out
+    out = body.capsule_columns(1, pelvis_z, floor_z)
+    body.capsules(*_forward(q, pelvis_z), floor_z, 0, out)
+    return ends_of(out, body.N_CAPSULES)
 
 
 def joint_points(q: Vec, pelvis_z: float) -> dict[str, Vec]:

@@ -6,25 +6,38 @@ same kernels, so that what was trained is what acts.
 """
 
 from dataclasses import dataclass, field
-from functools import lru_cache
+from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from app.errors import InvalidInput, SimulationError
-from app.sim import human
-from app.sim.cells import Cell
+from app.errors import InvalidInput
+from app.sim.actions import ActionSettings
+from app.sim.cells import Cell, lacks_for_pick
+from app.sim.kernels import actions, body, features, kinematics, pick, random, script
 from app.sim.kernels import arm as arm_kernel
-from app.sim.kernels import body, features, kinematics, pick, random, script
 from app.sim.kernels.arm import Arm
 from app.sim.kernels.features import N_FEATURES
+from app.sim.kernels.geometry import FAR
+from app.sim.kernels.people import People, PeopleState
 from app.sim.kernels.reward import RewardWeights
 from app.sim.ports import Vec
-from app.sim.shapes import levers, load_robot_capsules, self_pairs
-from app.sim.work_cycle import build_library
+from app.sim.scene import (
+    HumanKind,
+    arm_of,
+    kinds_of,
+    new_people_state,
+    own,
+    people_of,
+    require_finite,
+    with_people,
+)
 
-OUTCOMES = ("running", "success", "collision", "timeout")
-CONTACT_KINDS = ("none", "human", "cell", "self")
+OUTCOMES = ("running", "success", "collision", "timeout", "unfeasible")
+StartRule = Literal["clearance", "uniform"]
+DEFAULT_ACTION = ActionSettings()
+VIEWS = {"state": (pick.PLAIN, pick.N_PLAIN), "features": (pick.FEATURES, N_FEATURES)}
+"""What observations hold: the plain state of (5.8), or that and features; and their lengths."""
 DEFAULT_WEIGHTS = RewardWeights(
     c_d=0.5, c_th=0.5, c_c=1.0, c_step=0.02, c_v=1.0, d_v=0.1, c_s=1.0, gamma=1.0
 )
@@ -49,12 +62,37 @@ class PickSettings:
     """Share of episodes that start part of the way to the target."""
     n_candidates: tuple[int, int] = (1, 1)
     """Fewest and most targets offered per episode."""
+    people: tuple[HumanKind, ...] | None = None
+    """Who is in the cell, 0 to 4 people; None for the cell's own."""
     human_pace: float = 1.0
-    """Speed of the person relative to the work cycle."""
+    """Speed of the workers relative to the work cycle."""
     library_seed: int = 0
-    """Seed of the person's library of postures."""
+    """Seed of the workers' library of postures."""
+    start: StartRule = "clearance"
+    """Where people may start: ``clearance`` (``start_clearance_m`` from the robot), ``uniform``
+    (anywhere, even in contact)."""
+    action: ActionSettings = field(default=DEFAULT_ACTION)
+    """What actions mean (METHOD 2.2)."""
+    observation: Literal["features", "state"] = "features"
+    """What policies see: the plain state of (5.8), or that and more."""
     weights: RewardWeights = field(default=DEFAULT_WEIGHTS)
     """Reward coefficients (METHOD 3.3)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Piece:
+    """One control period of the robot: ``q(x) = q + qd x + c x^2 + d x^3``."""
+
+    c: Vec
+    """Second coefficients [rad/s^2], shape (6,)."""
+    d: Vec
+    """Third coefficients [rad/s^3], shape (6,)."""
+    q: Vec
+    """Joint positions at the end [rad], shape (6,)."""
+    qd: Vec
+    """Joint speeds at the end [rad/s], shape (6,)."""
+    qdd: Vec
+    """Joint accelerations at the end [rad/s^2], shape (6,)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,90 +100,37 @@ class StepResult:
     """What one batched step gave; the arrays are overwritten by the next step."""
 
     obs: NDArray[np.float32]
-    """Observations after the step, of new episodes where one ended, (n_envs, N_FEATURES)."""
+    """Observations after the step, of new episodes where one ended, (n_envs, obs_size)."""
     last_obs: NDArray[np.float32]
-    """Final observation of the rows that ended, (n_envs, N_FEATURES)."""
+    """Final observation of the rows that ended, (n_envs, obs_size)."""
     rew: NDArray[np.float32]
     """Rewards, (n_envs,)."""
     ended: NDArray[np.int64]
     """Index into OUTCOMES of episodes that ended now, 0 elsewhere, (n_envs,)."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Contact:
-    """Result of the contact test of one period."""
-
-    kind: str
-    """One of CONTACT_KINDS."""
-    clearance_m: float
-    """Distance of robot and person at the pose of contact, or at the end [m]."""
-    link: str
-    """Robot capsule that touches, or is nearest to the person."""
-    part: str
-    """What it touches or is nearest to: a capsule of the person (CAPSULE_NAMES), ``table`` or
-    another capsule of the robot."""
-
-
-@lru_cache(maxsize=8)
-def arm_of(cell: Cell) -> Arm:
-    """Return what the kernels know of a cell's robot."""
-    mount = cell.robot
-    capsules = load_robot_capsules(mount.tool_length, mount.tool_radius)
-    return Arm(
-        q_min=np.array(mount.q_min),
-        q_max=np.array(mount.q_max),
-        qd_max=np.array(mount.qd_max),
-        qdd_max=np.array(mount.qdd_max),
-        home=np.array(mount.home_q),
-        dt=mount.dt,
-        tool_length=mount.tool_length,
-        link=capsules.link,
-        p0=capsules.p0,
-        p1=capsules.p1,
-        radius=capsules.radius,
-        pairs=self_pairs(capsules),
-        lever=levers(mount.tool_length, mount.tool_radius),
-        pelvis_z=cell.pelvis_z,
-        floor_z=cell.floor_z,
-    )
-
-
-def _require_finite(name: str, values: NDArray[np.floating]) -> None:
-    """Raise SimulationError for NaN and infinity, which the contact test would pass over."""
-    if not np.isfinite(values).all():
-        raise SimulationError(f"{name} = {values.tolist()} must be finite")
-
-
-def _own(values: ArrayLike) -> Vec:
-    """Return a copy of one kind, float64, contiguous and writable.
-
-    Kernels are compiled anew for read-only, strided or integer arrays: half a minute in the
-    middle of a live cell.
-    """
-    return np.array(values, dtype=np.float64, order="C")
-
-
-def _world_of(cell: Cell, library_seed: int) -> pick.PickWorld:
-    mount = cell.robot
-    stations = cell.positions()
+def _world_of(cell: Cell, settings: PickSettings) -> pick.PickWorld:
+    if (lack := lacks_for_pick(cell)) is not None:
+        raise InvalidInput("cell", cell.name, f"cannot be used for picking: it {lack}")
+    mount, stations = cell.robot, cell.pick_stations
+    positions = np.array([station.position for station in stations]).reshape(-1, 3)
     postures, reached = kinematics.ik_vertical_batch(
-        stations, mount.tool_length, np.array(mount.q_min), np.array(mount.q_max)
+        positions, mount.tool_length, np.array(mount.q_min), np.array(mount.q_max)
     )
-    for station, found in zip(cell.stations, reached, strict=True):
+    for station, found in zip(stations, reached, strict=True):
         if not found:
             raise InvalidInput(
                 f"stations.{station.id}.position",
                 station.position,
                 "must be reachable by the robot with its tool pointing down",
             )
-    library = build_library(cell, library_seed)
+    kinds = kinds_of(cell)
     return pick.PickWorld(
-        stations=stations,
+        stations=positions,
         station_q=postures,
-        n_cubes=library.n_cubes,
-        postures=library.postures,
-        hands=library.hands,
-        of_station=library.of_station,
+        n_cubes=len(cell.stations_of("cube")),
+        arm=arm_of(cell),
+        people=people_of(cell, kinds, settings.library_seed, settings.human_pace),
     )
 
 
@@ -154,16 +139,15 @@ def _rules_of(settings: PickSettings) -> pick.PickRules:
         time_limit=settings.time_limit_s,
         short_limit=settings.short_limit_s,
         short_share=settings.short_share,
-        start_clearance=settings.start_clearance_m,
+        start_clearance=settings.start_clearance_m if settings.start == "clearance" else -FAR,
         target_jitter=settings.target_jitter_m,
         way_share=settings.way_share,
         n_candidates_min=settings.n_candidates[0],
         n_candidates_max=settings.n_candidates[1],
-        human_pace=settings.human_pace,
     )
 
 
-def _new_state(n_envs: int) -> pick.PickState:
+def _new_state(world: pick.PickWorld, people: PeopleState, n_envs: int) -> pick.PickState:
     def rows(*shape: int) -> Vec:
         return np.zeros((n_envs, *shape))
 
@@ -173,21 +157,19 @@ def _new_state(n_envs: int) -> pick.PickState:
     return pick.PickState(
         q=rows(6),
         qd=rows(6),
-        human_q=rows(18),
-        human_qd=rows(18),
+        qdd=rows(6),
+        robot=np.repeat(world.arm.columns[None], n_envs, axis=0),
+        people=people,
         goal=rows(3),
         q_goal=rows(6),
         candidates=counts(pick.MAX_CANDIDATES),
         time_left=rows(),
         elapsed=rows(),
-        phase=rows(),
-        n_moves=counts(),
-        start=rows(script.MAX_MOVES),
-        duration=rows(script.MAX_MOVES),
-        chosen=counts(script.MAX_MOVES + 1),
+        distance=rows(),
+        tilt=rows(),
         episode=counts(),
         outcome=counts(),
-        clearance=rows(),
+        clear=rows(3),
         n_redrawn=counts(),
     )
 
@@ -200,28 +182,40 @@ class PickBatch:
         n_envs: Number of cells.
         seed: Seed; episode ``k`` of cell ``e`` is fixed by (seed, e, k).
         settings: Starts, ends and rewards.
+        first_env: Number of the first cell: rows of a batch that starts at ``k`` equal rows
+            ``k`` and on of a batch that starts at 0, bit for bit.
     """
 
-    def __init__(self, cell: Cell, n_envs: int, seed: int, settings: PickSettings) -> None:
-        self.cell, self.n_envs, self.seed, self.settings = cell, n_envs, seed, settings
-        self.arm = arm_of(cell)
-        self.world = _world_of(cell, settings.library_seed)
-        self.state = _new_state(n_envs)
+    def __init__(
+        self, cell: Cell, n_envs: int, seed: int, settings: PickSettings, first_env: int = 0
+    ) -> None:
+        self.cell = cell if settings.people is None else with_people(cell, settings.people)
+        self.n_envs, self.seed, self.settings = n_envs, seed, settings
+        self.world = _world_of(self.cell, settings)
+        self.arm = self.world.arm
+        people = new_people_state(self.world.people, kinds_of(self.cell), n_envs)
+        self.state = _new_state(self.world, people, n_envs)
+        self._work = pick.new_work(self.world, self.state)
+        self._first = first_env
         self._rules = _rules_of(settings)
-        self._obs = np.zeros((n_envs, N_FEATURES), dtype=np.float32)
+        self._action = settings.action.rule()
+        self._view, self.obs_size = VIEWS[settings.observation]
+        self._obs = np.zeros((n_envs, self.obs_size), dtype=np.float32)
         self._last = np.zeros_like(self._obs)
         self._rew = np.zeros(n_envs, dtype=np.float32)
         self._ended = np.zeros(n_envs, dtype=np.int64)
 
     def reset(self, seed: int | None = None) -> NDArray[np.float32]:
-        """Start episode 0 in every cell; return observations, (n_envs, N_FEATURES)."""
+        """Start episode 0 in every cell; return observations, (n_envs, obs_size)."""
         self.seed = self.seed if seed is None else seed
         self.state.episode[:] = 0
         return self.restart()
 
     def restart(self) -> NDArray[np.float32]:
         """Start the episodes numbered by ``state.episode``; return the observations."""
-        pick.reset_batch(self.world, self._rules, self.arm, self.seed, self.state, self._obs)
+        pick.reset_batch(
+            self.world, self._rules, self.seed, self._first, self.state, self._work, self._view, self._obs
+        )
         return self._obs
 
     def step(
@@ -230,25 +224,27 @@ class PickBatch:
         """Move every cell through one control period.
 
         Args:
-            act: Wanted joint speeds over their limits, in [-1, 1], shape (n_envs, 5).
+            act: Actions in [-1, 1], shape (n_envs, 5); what they mean is in the settings.
             auto_reset: Start the next episode where one ended; else its row stands still.
             features: Whether observations are wanted.
 
         Raises:
             SimulationError: An action is NaN or infinite.
         """
-        _require_finite("act", act)
+        require_finite("act", act)
         wanted = np.array(act, dtype=np.float32, order="C")
         pick.step_batch(
             self.world,
             self._rules,
-            self.arm,
+            self._action,
             self.settings.weights,
             self.seed,
+            self._first,
             self.state,
+            self._work,
             wanted,
             auto_reset,
-            features,
+            self._view if features else pick.NO_OBS,
             self._obs,
             self._last,
             self._rew,
@@ -259,11 +255,12 @@ class PickBatch:
     def set_goals(self, rows: NDArray[np.int64], goals: Vec) -> None:
         """Send the robots of ``rows`` to new targets [m], shape (len(rows), 3)."""
         for row, goal in zip(rows, goals, strict=True):
-            pick.set_goal(self.arm, self.state, int(row), _own(goal))
+            pick.set_goal(self.world, self.state, int(row), own(goal), self._work.robot)
 
 
 def observe(
     arm: Arm,
+    people: People,
     q: Vec,
     qd: Vec,
     human_q: Vec,
@@ -274,7 +271,8 @@ def observe(
     """Return what the networks see of one state for each of n targets.
 
     Args:
-        arm: From :func:`arm_of`.
+        arm: From :func:`~app.sim.scene.arm_of`.
+        people: From :func:`~app.sim.scene.people_of`.
         q: Robot joint positions [rad], shape (6,).
         qd: Robot joint speeds [rad/s], shape (6,).
         human_q: The person's joint positions [m, rad], shape (18,).
@@ -285,17 +283,18 @@ def observe(
     Returns:
         Observations, shape (n, N_FEATURES), and whether each target is reachable, (n,).
     """
-    n, targets = len(goals), _own(goals)
+    n, targets = len(goals), own(goals)
     q_goals, reachable = kinematics.ik_vertical_batch(
         targets, arm.tool_length, arm.q_min, arm.q_max
     )
     obs = np.empty((n, N_FEATURES), dtype=np.float32)
     features.observe_batch(
         arm,
-        np.tile(_own(q), (n, 1)),
-        np.tile(_own(qd), (n, 1)),
-        np.tile(_own(human_q), (n, 1)),
-        np.tile(_own(human_qd), (n, 1)),
+        people,
+        np.tile(own(q), (n, 1)),
+        np.tile(own(qd), (n, 1)),
+        np.tile(own(human_q), (n, 1)),
+        np.tile(own(human_qd), (n, 1)),
         targets,
         q_goals,
         np.full(n, time_left_s, dtype=np.float64),
@@ -304,62 +303,51 @@ def observe(
     return obs, reachable
 
 
-def step_robot(arm: Arm, q: Vec, qd: Vec, act: Vec) -> tuple[Vec, Vec, Vec]:
+def step_robot(
+    arm: Arm, q: Vec, qd: Vec, qdd: Vec, act: Vec, action: ActionSettings = DEFAULT_ACTION
+) -> Piece:
     """Move the robot through one control period.
 
     Args:
-        arm: From :func:`arm_of`.
+        arm: From :func:`~app.sim.scene.arm_of`.
         q: Joint positions [rad], shape (6,).
         qd: Joint speeds [rad/s], shape (6,).
-        act: Wanted joint speeds over their limits, in [-1, 1], shape (5,).
-
-    Returns:
-        Positions [rad] and speeds [rad/s] after the period and its coefficients [rad/s^2],
-        each of shape (6,).
+        qdd: Joint accelerations [rad/s^2], shape (6,); only degree 3 reads them.
+        act: Action in [-1, 1], shape (5,).
+        action: What it means.
 
     Raises:
         SimulationError: A number is NaN or infinite.
     """
-    _require_finite("q, qd, act", np.concatenate([q, qd, act]))
-    c, q_out, qd_out = np.empty(6), np.empty(6), np.empty(6)
-    pick.drive(arm, _own(q), _own(qd), _own(act), c, q_out, qd_out)
-    return q_out, qd_out, c
-
-
-def contact(arm: Arm, q0: Vec, qd0: Vec, c: Vec, human_q0: Vec, human_q1: Vec) -> Contact:
-    """Test one control period for contact, between its ends too.
-
-    Args:
-        arm: From :func:`arm_of`.
-        q0: Joint positions at the start [rad], shape (6,).
-        qd0: Joint speeds at the start [rad/s], shape (6,).
-        c: Coefficients of the period [rad/s^2], shape (6,).
-        human_q0: The person's joints at the start [m, rad], shape (18,).
-        human_q1: The person's joints at the end [m, rad], shape (18,).
-
-    Raises:
-        SimulationError: A number is NaN or infinite.
-    """
-    _require_finite("q, qd, c", np.concatenate([q0, qd0, c]))
-    _require_finite("human_q", np.concatenate([human_q0, human_q1]))
-    before, pose = arm_kernel.new_pose(len(arm.link)), arm_kernel.new_pose(len(arm.link))
-    kind, link, part, d = arm_kernel.sweep(
-        arm, _own(q0), _own(qd0), _own(c), _own(human_q0), _own(human_q1), before, pose
+    require_finite("q, qd, qdd, act", np.concatenate([q, qd, qdd, act]))
+    c, d, q1, qd1, qdd1 = (np.empty(6) for _ in range(5))
+    actions.advance(
+        action.rule(),
+        own(q),
+        own(qd),
+        own(qdd),
+        np.array(act, dtype=np.float32),
+        arm.q_min,
+        arm.q_max,
+        arm.qd_max,
+        arm.qdd_max,
+        arm.jerk_max,
+        arm.dt,
+        c,
+        d,
+        q1,
+        qd1,
+        qdd1,
     )
-    names = load_robot_capsules().name
-    touching, other = names[link], human.CAPSULE_NAMES[part]
-    if kind == arm_kernel.SELF_CONTACT:
-        touching, other = (names[k] for k in arm.pairs[link])
-    elif kind == arm_kernel.CELL_CONTACT:
-        other = "table"
-    return Contact(kind=CONTACT_KINDS[kind], clearance_m=d, link=touching, part=other)
+    return Piece(c=c, d=d, q=q1, qd=qd1, qdd=qdd1)
 
 
 def tool_state(arm: Arm, q: Vec, qd: Vec, goal: Vec) -> tuple[float, float, float, bool]:
     """Return distance to a target [m], tilt [rad], tcp speed [m/s] and whether it succeeds."""
-    pose = arm_kernel.new_pose(len(arm.link))
-    arm_kernel.place_robot(arm, _own(q), pose)
-    distance, tilt, speed = pick.tool_state(arm, _own(qd), _own(goal), pose)
+    pose = arm_kernel.new_robot_pose(arm)
+    arm_kernel.place_robot(arm, own(q), pose)
+    distance, tilt = pick.distance_to(own(goal), pose), arm_kernel.robot_tilt(pose)
+    speed = arm_kernel.tcp_speed(pose, own(qd))
     return distance, tilt, speed, bool(pick.succeeded(distance, tilt, speed))
 
 
@@ -377,25 +365,26 @@ def hand_speeds(
     chosen = np.zeros(script.MAX_MOVES + 1, dtype=np.int64)
     start, duration = np.zeros(script.MAX_MOVES), np.zeros(script.MAX_MOVES)
     points, frames = np.empty((body.N_POINTS, 3)), np.empty((body.N_FRAMES, 3, 3))
-    stream, q, qd = np.zeros(1, dtype=np.uint64), np.empty(18), np.empty(18)
-    world, rates = batch.world, []
+    stream, trig = np.zeros(1, dtype=np.uint64), np.empty((3, 16))
+    q, qd = np.empty(18), np.empty(18)
+    people, rates = batch.world.people, []
     for number in range(n):
         random.start_stream(batch.seed, 1 << 20, number, stream)
         moves = script.draw_script(
             stream,
-            world.of_station,
-            len(world.stations),
-            world.n_cubes,
-            world.hands,
+            people.of_station,
+            len(people.of_station) - 1,
+            people.n_cubes,
+            people.hands,
             -1,
             start,
             duration,
             chosen,
         )
-        postures, palms = world.postures[chosen[: moves + 1]], []
+        postures, palms = people.postures[chosen[: moves + 1]], []
         for k in range(int(seconds / tick)):
             script.script_at(k * tick, moves, start, duration, postures, q, qd)
-            body.points_and_frames(q, batch.arm.pelvis_z, points, frames)
+            body.points_and_frames(q, people.pelvis_z, trig, points, frames)
             palms.append(points[[body.HAND_R, body.HAND_L]])
         rates.append(np.linalg.norm(np.diff(np.array(palms), axis=0), axis=2) / tick)
     speeds = np.concatenate([rate.ravel() for rate in rates]) * batch.settings.human_pace

@@ -89,6 +89,10 @@ class TaskPolicy(Protocol):
     def cell(self) -> str:
         """Name of the work cell it was trained for."""
 
+    @property
+    def cell_sha256(self) -> str:
+        """Identity of that cell's content (``Cell.sha256``)."""
+
     def decide(
         self,
         q: Vec,

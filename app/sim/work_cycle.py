@@ -48,14 +48,14 @@ def build_library(cell: Cell, seed: int, variants: int = 24) -> Library:
     """Make ``variants`` random postures for each place and hand of a cell.
 
     Args:
-        cell: Work cell; its cubes must come before its docks.
+        cell: Work cell.
         seed: Seed of stances, elbows and grips.
         variants: Postures per place and hand.
     """
     rng = np.random.default_rng(seed)
     postures: list[Vec] = []
-    of_station = np.zeros((len(cell.stations) + 1, 2, 2), dtype=np.int64)
-    for place, station in enumerate(cell.stations):
+    of_station = np.zeros((len(cell.pick_stations) + 1, 2, 2), dtype=np.int64)
+    for place, station in enumerate(cell.pick_stations):
         for column, hand in enumerate(HANDS):
             of_station[place, column] = len(postures), variants
             target = np.array(station.position)
@@ -66,12 +66,12 @@ def build_library(cell: Cell, seed: int, variants: int = 24) -> Library:
     hands = np.array([_palms(q, cell.pelvis_z) for q in stacked])
     for array in (stacked, hands, of_station):
         array.setflags(write=False)
-    n_cubes = sum(station.kind == "cube" for station in cell.stations)
+    n_cubes = sum(station.kind == "cube" for station in cell.pick_stations)
     return Library(
         postures=stacked,
         hands=hands,
         of_station=of_station,
-        n_stations=len(cell.stations),
+        n_stations=len(cell.pick_stations),
         n_cubes=n_cubes,
     )
 

@@ -177,6 +177,18 @@ class CheckpointRecord:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class CellRecord:
+    """A work cell of the user's own."""
+
+    name: str
+    """Its name, unique."""
+    definition: Mapping[str, Any]
+    """Its content, JSON data."""
+    created_at: datetime
+    """When it was stored."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ResumeState:
     """Everything a new attempt needs to go on from ``step``."""
 

@@ -140,6 +140,14 @@ aliases = Table(
     Column("set_at", UtcDateTime, nullable=False),
 )
 
+cells = Table(
+    "cells",
+    metadata,
+    Column("name", String(64), primary_key=True),
+    Column("definition", JSON, nullable=False),
+    Column("created_at", UtcDateTime, nullable=False),
+)
+
 reserve = Table(
     "reserve",
     metadata,

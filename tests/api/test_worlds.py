@@ -5,6 +5,8 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
+from tests import workshop
+
 WORLD = "/v1/worlds/main"
 COMMANDS = f"{WORLD}/commands"
 
@@ -114,3 +116,44 @@ def test_unknown_world_is_not_found(client: TestClient) -> None:
         answer = client.get(f"/v1/worlds/other{path}")
         assert answer.status_code == 404
         assert answer.json()["known"] == ["main"]
+
+
+def test_world_starts_anew_in_a_cell_of_the_user_s_own(client: TestClient) -> None:
+    client.post("/v1/cells", json=workshop.definition())
+    try:
+        answer = client.put(f"{WORLD}/cell", json={"cell": "workshop"})
+        assert answer.status_code == 200
+        assert (answer.json()["cell"], answer.json()["checkpoint"]) == ("workshop", None)
+        shown = until(client, lambda world: world["tick"] > 1)
+        assert (shown["status"], shown["selected"][0]) == ("no policy", "part0")
+        assert client.get("/viewer/main/").status_code == 200
+        assert client.delete("/v1/cells/workshop").status_code == 409
+        refused = client.post(COMMANDS, json={"tag": "set-policy", "checkpoint": "pick"})
+        assert refused.status_code == 422
+        assert (
+            client.post(COMMANDS, json={"tag": "start-case", "id": "case-1"}).status_code == 422
+        )
+    finally:
+        back = client.put(f"{WORLD}/cell", json={"cell": "pick-and-place"})
+    assert back.json()["checkpoint"] is not None
+    assert client.delete("/v1/cells/workshop").status_code == 204
+    until(client, lambda world: world["chosen"] is not None)
+
+
+@pytest.mark.parametrize(
+    ("body", "status"),
+    [
+        ({"cell": "kitchen"}, 404),
+        ({"cell": "sorting-e0"}, 422),
+        ({"cell": "pick-and-place", "checkpoint": "nobody"}, 422),
+        ({}, 422),
+    ],
+)
+def test_world_stays_as_it_is_when_a_cell_is_refused(
+    client: TestClient, body: dict[str, str], status: int
+) -> None:
+    before = client.get(WORLD).json()
+    assert client.put(f"{WORLD}/cell", json=body).status_code == status
+    after = client.get(WORLD).json()
+    assert (after["cell"], after["checkpoint"]) == (before["cell"], before["checkpoint"])
+    assert after["tick"] >= before["tick"]

@@ -7,10 +7,13 @@ from pathlib import Path
 
 import pytest
 
+from app.policies.trained_cell import is_for
 from app.store import attempts, checkpoints, jobs, metrics
 from app.store.engine import Store
+from jobs.cells import CellCatalog
 from jobs.spec import new_job
 from jobs.supervisor import Supervisor
+from tests import workshop
 from tests.jobs.machinery import PATIENCE, wait_for, wait_until_final, worker_pids
 
 TINY = {
@@ -35,7 +38,7 @@ def supervisor(store: Store, tmp_path: Path) -> Iterator[Supervisor]:
     started.stop()
 
 
-def train(store: Store, **overrides: float) -> str:
+def train(store: Store, **overrides: float | str) -> str:
     body = {"kind": "train", "preset": "pick-td3", "seed": 4, "overrides": TINY | overrides}
     return jobs.create_job(store, new_job(body)).id
 
@@ -50,6 +53,23 @@ def test_training_stores_its_curve_and_policies(store: Store) -> None:
     assert [c.step for c in made] == [2048, 1536, 1024, 512]
     assert job.result == {"checkpoint": made[0].sha256, "step": 2048}
     assert attempts.load_resume(store, job_id) is None
+
+
+@pytest.mark.usefixtures("supervisor")
+def test_training_in_a_cell_of_one_s_own_gives_a_policy_of_that_cell(store: Store) -> None:
+    CellCatalog(store).add(workshop.cell())
+    job = wait_until_final(store, train(store, cell="workshop", total_steps=1024))
+    assert (job.state, job.error) == ("succeeded", None)
+    assert job.result is not None
+    record = checkpoints.get_checkpoint(store, job.result["checkpoint"])
+    assert is_for(record.manifest, workshop.cell())
+
+
+@pytest.mark.usefixtures("supervisor")
+def test_training_in_a_cell_that_is_gone_fails_by_name(store: Store) -> None:
+    job = wait_until_final(store, train(store, cell="kitchen"))
+    assert job.state == "failed"
+    assert "overrides.cell = 'kitchen' is no known work cell" in (job.error or "")
 
 
 @pytest.mark.slow

@@ -37,6 +37,7 @@ export async function request(path, { method = "GET", body, headers = {}, signal
 }
 
 export const get = (path, options) => request(path, options);
+export const put = (path, body = {}) => request(path, { method: "PUT", body });
 export const post = (path, body = {}, headers = {}) =>
   request(path, { method: "POST", body, headers });
 

@@ -38,7 +38,7 @@ function App() {
   return html`<div class="frame" data-link=${link}>
     <header class="topbar">
       <h1 class="brand"><${Logo} />Tandem</h1>
-      <span class="cell-title">${cell.cell?.title ?? ""}</span>
+      <${CellTitle} cell=${cell} />
       <span class="spacer"></span>
       ${world && html`<${Acting} world=${world} checkpoints=${checkpoints} jobs=${jobs}
         send=${cell.send} />`}
@@ -63,6 +63,24 @@ function App() {
       </aside>
     </main>
   </div>`;
+}
+
+/** The cell's title; a choice where policies can act in more than one cell. */
+function CellTitle({ cell: { cell, cells, show } }) {
+  const [busy, setBusy] = useState(false);
+  const shown = cells.filter((one) => one.lacks_for_pick === null);
+  if (!cell || shown.length < 2) return html`<span class="cell-title">${cell?.title ?? ""}</span>`;
+  const change = async (event) => {
+    setBusy(true);
+    await show(event.target.value);
+    setBusy(false);
+  };
+  return html`<label class="acting cell-title">
+    <select value=${cell.name} data-role="cell" aria-label="Work cell that is shown"
+      disabled=${busy} onChange=${change}>
+      ${shown.map((one) => html`<option key=${one.name} value=${one.name}>${one.title}</option>`)}
+    </select>
+  </label>`;
 }
 
 function stamp(jobs) {

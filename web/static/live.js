@@ -1,6 +1,6 @@
 // The live cell as this page knows it: its last snapshot, its recent values, the link to it.
 import { useCallback, useEffect, useRef, useState } from "./vendor/htm-preact-standalone.module.js";
-import { follow, get, post } from "./api.js";
+import { follow, get, post, put } from "./api.js";
 import { History } from "./history.js";
 
 export const WORLD = "main";
@@ -10,12 +10,12 @@ const RETRY_MS = 1000;
  * Follow the server and its world.
  *
  * @returns {{link: "connecting"|"warming"|"live"|"lost"|"signin", reason: string, world: object|null,
- *            cell: object|null, history: History, epoch: number,
- *            send: (command: object) => Promise<void>}}
+ *            cell: object|null, cells: object[], history: History, epoch: number,
+ *            send: (command: object) => Promise<void>, show: (cell: string) => Promise<void>}}
  *   `epoch` counts how often the server was found ready: the viewer is loaded anew each time.
  */
 export function useCell() {
-  const [state, setState] = useState({ link: "connecting", reason: "", world: null, cell: null });
+  const [state, setState] = useState({ link: "connecting", reason: "", world: null, cell: null, cells: [] });
   const [epoch, setEpoch] = useState(0);
   const [error, setError] = useState(null);
   const history = useRef(new History());
@@ -26,15 +26,19 @@ export function useCell() {
     return () => stop.abort();
   }, []);
 
-  const send = useCallback(async (command) => {
+  const told = useCallback(async (request) => {
     try {
-      await post(`/v1/worlds/${WORLD}/commands`, command);
+      await request;
       setError(null);
     } catch (problem) {
       setError(problem);
     }
   }, []);
-  return { ...state, epoch, history: history.current, send, error, dismiss: () => setError(null) };
+  const send = useCallback(
+    (command) => told(post(`/v1/worlds/${WORLD}/commands`, command)), []);
+  const show = useCallback((name) => told(put(`/v1/worlds/${WORLD}/cell`, { cell: name })), []);
+  const dismiss = () => setError(null);
+  return { ...state, epoch, history: history.current, send, show, error, dismiss };
 }
 
 /** Wait until ready, then follow the world; for ever. */
@@ -45,19 +49,25 @@ async function watch(signal, history, setState, setEpoch) {
     try {
       const [world, cells] = await Promise.all([get(`/v1/worlds/${WORLD}`), get("/v1/cells")]);
       const list = cells.items;
-      const cell = list.find((c) => c.name === world.cell) ?? list[0] ?? null;
+      const cell = list.find((c) => c.name === world.cell) ?? null;
+      let anew = false;
       history.add(world);
-      merge({ world, cell, link: "live", reason: "" });
+      merge({ world, cell, cells: list, link: "live", reason: "" });
       setEpoch((n) => n + 1);
       await until(signal, (lost) =>
         follow(`/v1/worlds/${WORLD}/events`, {
           onEvent: (name, snapshot) => {
+            if (name === "end") {
+              anew = true;
+              lost();
+            }
             if (!snapshot?.candidates) return;
             history.add(snapshot);
             setState((now) => ({ ...now, world: { ...now.world, ...snapshot }, link: "live" }));
           },
           onDown: lost,
         }));
+      if (anew) continue;
       merge({ link: "lost" });
     } catch (error) {
       merge({ link: error.status === 401 ? "signin" : "lost", reason: error.message });

@@ -1,12 +1,12 @@
-"""A work cell as the service shows it."""
+"""A work cell as the service shows it, and as it takes it."""
 
 from typing import Any, Self
 
 from pydantic import Field
 
 from app.api.schemas.numbers import Answer
-from app.sim.cases import CASES
-from app.sim.cells import Cell
+from app.sim.cases import cases_of
+from app.sim.cells import Cell, cell_names, lacks_for_pick
 
 
 class CasePublic(Answer):
@@ -20,14 +20,22 @@ class CasePublic(Answer):
 
 
 class CellPublic(Answer):
-    """One work cell: the file's own content plus its case studies."""
+    """One work cell: the file's own content, its identity and its case studies."""
 
     name: str
     title: str
+    shipped: bool = Field(description="whether it came with the service")
+    sha256: str = Field(description="identity of its content")
+    lacks_for_pick: str | None = Field(
+        description="why no policy can be trained or shown in it; null where one can"
+    )
     table: dict[str, Any] = Field(description="table top [m]")
-    stations: list[dict[str, Any]] = Field(description="cubes and docks, positions [m]")
     robot: dict[str, Any] = Field(description="home, limits and tool [rad, rad/s, m]")
-    human: dict[str, Any] = Field(description="where the person stands [m, rad]")
+    stations: list[dict[str, Any]] = Field(description="named places, positions [m]")
+    goal_region: dict[str, Any] | None = Field(description="box of goals and its grid [m]")
+    obstacles: list[dict[str, Any]] = Field(description="fixed boxes [m, rad]")
+    people: list[dict[str, Any]] = Field(description="who may be there, and where [m, rad]")
+    safety: dict[str, Any] = Field(description="what safety assumes [m, m/s, s]")
     cases: list[CasePublic]
 
     @classmethod
@@ -41,12 +49,41 @@ class CellPublic(Answer):
                 goals=list(case.goals),
                 expected=case.expected,
             )
-            for case in CASES
+            for case in cases_of(cell)
         ]
-        return cls(**cell.model_dump(mode="json"), cases=cases)
+        return cls(
+            **{"goal_region": None, **cell.definition()},
+            shipped=cell.name in cell_names(),
+            sha256=cell.sha256,
+            lacks_for_pick=lacks_for_pick(cell),
+            cases=cases,
+        )
 
 
 class CellList(Answer):
     """All work cells."""
 
     items: list[CellPublic]
+
+
+def cell_schema() -> dict[str, Any]:
+    """Return the JSON schema of a cell that is posted, without references."""
+    schema = Cell.model_json_schema()
+    parts = schema.pop("$defs")
+
+    def inlined(node: Any) -> Any:
+        if isinstance(node, dict):
+            if "$ref" in node:
+                name = str(node["$ref"]).rpartition("/")[2]
+                return inlined(
+                    {**parts[name], **{k: v for k, v in node.items() if k != "$ref"}}
+                )
+            if "prefixItems" in node:  # a vector; its numbers are alike
+                node = {**node, "items": node["prefixItems"][0]}
+                del node["prefixItems"]
+            # The mapping of a discriminator points to the parts that are gone.
+            return {k: inlined(v) for k, v in node.items() if k != "discriminator"}
+        return [inlined(one) for one in node] if isinstance(node, list) else node
+
+    found: dict[str, Any] = inlined(schema)
+    return found

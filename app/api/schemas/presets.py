@@ -1,5 +1,6 @@
 """Presets as the service shows them: what a form needs to ask for their fields."""
 
+from collections.abc import Sequence
 from typing import Self
 
 from pydantic import Field
@@ -9,15 +10,16 @@ from app.policies.presets import PRESETS, fields
 
 
 class PresetField(Answer):
-    """One number of a preset that an override may change."""
+    """One value of a preset that an override may change."""
 
     name: str
-    type: str = Field(description="int or float")
-    default: int | float
-    minimum: int | float
-    maximum: int | float
+    type: str = Field(description="int, float or choice")
+    default: int | float | str
+    minimum: int | float | None = Field(description="null for a choice")
+    maximum: int | float | None = Field(description="null for a choice")
     unit: str = Field(description="empty for a plain number")
     help: str = Field(description="what it does, for people")
+    choices: list[str] | None = Field(None, description="what may be chosen; null for a number")
 
 
 class PresetPublic(Answer):
@@ -28,13 +30,31 @@ class PresetPublic(Answer):
     fields: list[PresetField]
 
     @classmethod
-    def from_name(cls, name: str) -> Self:
-        """Describe a preset by its name."""
+    def from_name(cls, name: str, cells: Sequence[str]) -> Self:
+        """Describe a preset by its name.
+
+        Args:
+            name: Name of the preset.
+            cells: Work cells it can be trained in; a field where there is a choice.
+        """
+        own = PRESETS[name].cell
+        numbers = [key for key in PresetField.model_fields if key != "choices"]
         listed = [
-            PresetField(**{key: getattr(one, key) for key in PresetField.model_fields})
-            for one in fields(name)
+            PresetField(**{key: getattr(one, key) for key in numbers}) for one in fields(name)
         ]
-        return cls(name=name, cell=PRESETS[name].cell, fields=listed)
+        if len(cells) > 1:
+            choice = PresetField(
+                name="cell",
+                type="choice",
+                default=own,
+                minimum=None,
+                maximum=None,
+                unit="",
+                help="Work cell trained in.",
+                choices=list(cells),
+            )
+            listed.insert(0, choice)
+        return cls(name=name, cell=own, fields=listed)
 
 
 class PresetList(Answer):

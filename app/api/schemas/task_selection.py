@@ -8,7 +8,7 @@ from pydantic import Field
 from app.api.schemas.numbers import Answer, Body, Finite, Vector3, Vector6, Vector18
 from app.errors import InvalidInput
 from app.sim import human
-from app.sim.cells import Cell, cell_names, load_cell
+from app.sim.cells import Cell
 from app.sim.ports import Candidate, Decision, OutsideField, Person, Vec
 
 MAX_CANDIDATES = 1000
@@ -65,13 +65,17 @@ class TaskSelectionRequest(Body):
         None, max_length=64, description="SHA-256 or alias; the shipped policy if null"
     )
 
-    def to_domain(self) -> tuple[Vec, Vec, tuple[Person, ...], tuple[Candidate, ...]]:
+    def to_domain(
+        self, cell: Cell
+    ) -> tuple[Vec, Vec, tuple[Person, ...], tuple[Candidate, ...]]:
         """Check what a schema cannot, and return q, qd, people and candidates as arrays.
 
+        Args:
+            cell: The work cell that the request names.
+
         Raises:
-            InvalidInput: An unknown cell, a joint outside its limits, an id given twice.
+            InvalidInput: A joint outside its limits, an id given twice.
         """
-        cell = self._known_cell()
         q, qd = np.array(self.robot.q), np.array(self.robot.qd)
         robot_names = [f"robot.q[{joint}]" for joint in range(6)]
         _check_limits(robot_names, q, np.array(cell.robot.q_min), np.array(cell.robot.q_max))
@@ -88,11 +92,6 @@ class TaskSelectionRequest(Body):
                 Candidate(id=one.id, position=np.array(one.position)) for one in self.candidates
             ),
         )
-
-    def _known_cell(self) -> Cell:
-        if self.cell not in cell_names():
-            raise InvalidInput("cell", self.cell, "is no known work cell", cell_names())
-        return load_cell(self.cell)
 
     def _check_ids_are_unique(self) -> None:
         seen: set[str] = set()

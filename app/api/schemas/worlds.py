@@ -124,6 +124,25 @@ class WorldSummary(Answer):
     viewer: str
     checkpoint: str | None
 
+    @classmethod
+    def from_domain(cls, snapshot: WorldSnapshot) -> Self:
+        """Make it from a snapshot."""
+        return cls(
+            id=snapshot.id,
+            cell=snapshot.cell,
+            viewer=f"/viewer/{snapshot.id}/",
+            checkpoint=snapshot.checkpoint,
+        )
+
+
+class WorldCell(Body):
+    """The cell a live world shall show from now on."""
+
+    cell: str = Field(max_length=64, description="name of a work cell with a pick scenario")
+    checkpoint: str | None = Field(
+        None, max_length=64, description="SHA-256 or alias of what decides; see above if null"
+    )
+
 
 class WorldList(Answer):
     """All live worlds."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from app.policies.evaluation.statistics import wilson
 from app.policies.task_choice import ValueNetworks
-from app.sim.cells import load_cell
+from app.sim.cells import Cell
 from app.sim.kernels import pick as kernel
 from app.sim.kernels.features import LAYOUT, N_FEATURES, observe_batch
 from app.sim.pick import OUTCOMES, PickBatch, PickSettings
@@ -93,7 +93,7 @@ class Evaluator:
 
     Args:
         networks: Actor and critics.
-        cell_name: Work cell.
+        cell: Work cell.
         n_episodes: Number of episodes.
         seed: Seed of the episodes.
         settings: Starts and ends.
@@ -102,13 +102,13 @@ class Evaluator:
     def __init__(
         self,
         networks: ValueNetworks,
-        cell_name: str,
+        cell: Cell,
         n_episodes: int,
         seed: int,
         settings: PickSettings,
     ) -> None:
         self._networks = networks
-        self.batch = PickBatch(load_cell(cell_name), n_episodes, seed, settings)
+        self.batch = PickBatch(cell, n_episodes, seed, settings)
 
     def run(self, rule: Rule, n_recorded: int = 0) -> Episodes:
         """Run all episodes under a rule; record the first ``n_recorded`` ones."""

@@ -11,6 +11,7 @@ from app.policies.checkpoint import Checkpoint
 from app.policies.evaluation import choice_rules
 from app.policies.evaluation.episodes import Episodes, Evaluator, settings_for
 from app.policies.task_choice import HYSTERESIS, ValueNetworks
+from app.policies.trained_cell import cell_of
 from app.sim.kernels import pick as kernel
 from app.sim.pick import hand_speeds
 from app.sim.recheck import recheck_trajectories
@@ -26,7 +27,7 @@ def _evaluator(
     manifest = checkpoint.manifest
     settings = settings_for(n_candidates, manifest["preset"])
     n = episodes or DEFAULT_EPISODES
-    return Evaluator(ValueNetworks(checkpoint), manifest["cell"], n, seed, settings)
+    return Evaluator(ValueNetworks(checkpoint), cell_of(manifest), n, seed, settings)
 
 
 def _settings(evaluator: Evaluator) -> dict[str, object]:

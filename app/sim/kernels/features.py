@@ -10,14 +10,35 @@ more slowly (1 % against 90 % after 2.7 k updates in trials beside the walking c
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from app.sim.kernels.compiled import kernel
 from app.sim.kernels import body, kinematics
-from app.sim.kernels.arm import CONTROLLED, Arm, Pose, new_pose, place
-from app.sim.kernels.geometry import FAR, place_capsules, segment_nearest, set_clearance
+from app.sim.kernels.arm import (
+    CONTROLLED,
+    Arm,
+    RobotPose,
+    new_robot_pose,
+    place_capsules,
+    place_robot,
+    robot_tilt,
+)
+from app.sim.kernels.columns import (
+    INVERSE,
+    UU,
+    UX,
+    UY,
+    UZ,
+    X,
+    nearest_parts,
+    new_columns,
+    padded,
+)
+from app.sim.kernels.geometry import FAR, FAST, segment_nearest
+from app.sim.kernels.people import People
 from app.sim.ports import Vec
 
 Obs = NDArray[np.float32]
@@ -75,9 +96,9 @@ COARSE_LINK = np.array([2, 3, 4, 5, 6], dtype=np.int64)
 COARSE_P0 = np.array(
     [[0.0, -0.045, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
 )
-COARSE_P1 = np.array(
+COARSE_SPAN = np.array(
     [
-        [0.0, -0.045, 0.612],
+        [0.0, 0.0, 0.612],
         [0.0, 0.0, 0.57],
         [0.0, 0.115, 0.0],
         [0.0, 0.0, 0.116],
@@ -85,13 +106,19 @@ COARSE_P1 = np.array(
     ]
 )
 COARSE_RADIUS = np.array([0.09, 0.075, 0.066, 0.066, 0.045])
-COARSE_GROUP = np.array([0, 1, 2, 2, 3], dtype=np.int64)
+COARSE_FIRST = (0, 1, 2, 4, 5)
+"""First coarse capsule of each of the four link groups, and their number."""
 N_COARSE = 5
+STILL, ALONG_BASE, AT_GOAL = 0, N_COARSE, 2 * N_COARSE
+"""First lane of the three postures looked at together: now, along the base motion, at the goal."""
+N_LANES = padded(3 * N_COARSE)
 FIRST_PART, LAST_PART = body.C_ABDOMEN, body.C_HAND_L
 """Human capsules the features look at: what stands above the table."""
+TICK = 1e-3
+"""Time by which the person is moved on to find how fast the capsules move [s]."""
 
 
-@njit(cache=True)
+@kernel(inline="always")
 def base_motion(arm: Arm, q: Vec, q_goal: Vec, out: Vec) -> float:
     """Write the straight joint move toward a posture as normalised speeds in [-1, 1].
 
@@ -104,7 +131,8 @@ def base_motion(arm: Arm, q: Vec, q_goal: Vec, out: Vec) -> float:
     for j in range(CONTROLLED):
         widest = max(widest, abs(q_goal[j] - q[j]))
     if widest < 1e-9:
-        out[:CONTROLLED] = 0.0
+        for j in range(CONTROLLED):
+            out[j] = 0.0
         return widest
     pace = min(1.0, BASE_GAIN * widest / arm.qd_max[0]) / widest
     for j in range(CONTROLLED):
@@ -112,39 +140,126 @@ def base_motion(arm: Arm, q: Vec, q_goal: Vec, out: Vec) -> float:
     return widest
 
 
-@njit(cache=True)
-def coarse_clearance(coarse: Vec, human: Vec, velocity: Vec, ahead: float) -> float:
-    """Return the clearance of coarse robot capsules to the person moved ahead in time [m].
+class Sight(NamedTuple):
+    """Work space of one observation; made once, filled again and again."""
+
+    trig: Vec
+    """Sines, cosines and more, shape (3, 16)."""
+    points: Vec
+    """The person's points now [m], shape (N_POINTS, 3)."""
+    points_later: Vec
+    """The same one ``TICK`` later [m], shape (N_POINTS, 3)."""
+    frames: Vec
+    """The person's orientations, shape (N_FRAMES, 3, 3)."""
+    now: Vec
+    """The person's capsules now, shape (9, 16)."""
+    later: Vec
+    """The same one ``TICK`` later, shape (9, 16)."""
+    moved: Vec
+    """The same at a time ahead, at constant velocity, shape (9, 16)."""
+    lanes: Vec
+    """Coarse capsules of the robot in three postures, shape (9, N_LANES)."""
+    gap: Vec
+    """Distance of each of them to the person [m], shape (N_LANES,)."""
+    part: Vec
+    """The person's capsule nearest to each, shape (N_LANES,)."""
+    rot: Vec
+    """R_world_link of a posture looked at, shape (7, 3, 3)."""
+    pos: Vec
+    """Origins of its links [m], shape (7, 3)."""
+    q: Vec
+    """Joints of a posture looked at [rad], shape (6,)."""
+    base: Vec
+    """The base motion, shape (6,)."""
+    human_q: Vec
+    """The person's joints a tick later [m, rad], shape (18,)."""
+    gap_vector: Vec
+    """From robot to person [m], shape (3,)."""
+
+
+def new_sight(person: Vec) -> Sight:
+    """Return work space; ``person`` holds the template of ``body.capsule_columns``, (9, 16)."""
+    lanes = new_columns(
+        N_LANES, np.tile(COARSE_RADIUS, 3), np.tile((COARSE_SPAN**2).sum(axis=1), 3)
+    )
+    return Sight(
+        trig=np.zeros((3, 16)),
+        points=np.zeros((body.N_POINTS, 3)),
+        points_later=np.zeros((body.N_POINTS, 3)),
+        frames=np.zeros((body.N_FRAMES, 3, 3)),
+        now=person.copy(),
+        later=person.copy(),
+        moved=person.copy(),
+        lanes=lanes,
+        gap=np.zeros(N_LANES),
+        part=np.zeros(N_LANES),
+        rot=np.zeros((7, 3, 3)),
+        pos=np.zeros((7, 3)),
+        q=np.zeros(6),
+        base=np.zeros(6),
+        human_q=np.zeros(18),
+        gap_vector=np.zeros(3),
+    )
+
+
+@kernel(inline="always")
+def see_person(people: People, human_q: Vec, human_qd: Vec, sight: Sight) -> None:
+    """Fill the person's part of ``sight``: points and capsules, now and a tick later."""
+    for j in range(18):
+        sight.human_q[j] = human_q[j] + TICK * human_qd[j]
+    body.points_and_frames(
+        sight.human_q, people.pelvis_z, sight.trig, sight.points_later, sight.frames
+    )
+    body.capsules(sight.points_later, sight.frames, people.floor_z, 0, sight.later)
+    body.points_and_frames(human_q, people.pelvis_z, sight.trig, sight.points, sight.frames)
+    body.capsules(sight.points, sight.frames, people.floor_z, 0, sight.now)
+
+
+@kernel(error_model="numpy", fastmath=FAST)
+def look_ahead(now: Vec, later: Vec, ahead: float, moved: Vec) -> None:
+    """Move capsules on at constant velocity.
 
     Args:
-        coarse: Ends of the coarse capsules [m], shape (5, 2, 3).
-        human: Ends of the person's capsules [m], shape (12, 2, 3).
-        velocity: Their velocities [m/s], shape (12, 2, 3).
+        now: Capsules as columns, shape (9, n).
+        later: The same one ``TICK`` later, shape (9, n).
         ahead: Time ahead [s].
+        moved: Filled, shape (9, n).
     """
-    moved = np.empty((body.N_CAPSULES, 2, 3))
-    for h in range(FIRST_PART, LAST_PART + 1):
-        for end in range(2):
-            for i in range(3):
-                moved[h, end, i] = human[h, end, i] + ahead * velocity[h, end, i]
-    return set_clearance(
-        coarse, COARSE_RADIUS, moved, body.RADII, FIRST_PART, LAST_PART, FARTHEST
-    )[0]
+    part = ahead / TICK
+    for row in range(X, UU):
+        for k in range(now.shape[1]):
+            moved[row, k] = now[row, k] + part * (later[row, k] - now[row, k])
+    for k in range(now.shape[1]):
+        ux, uy, uz = moved[UX, k], moved[UY, k], moved[UZ, k]
+        square = ux * ux + uy * uy + uz * uz
+        moved[UU, k] = square
+        moved[INVERSE, k] = 1.0 / (square if square > 1e-12 else 1e30)
 
 
-@njit(cache=True)
-def place_coarse(q: Vec, pose: Pose, coarse: Vec) -> None:
-    """Fill ``coarse``, shape (5, 2, 3), with the coarse capsules at ``q``; overwrites pose."""
-    kinematics.link_poses(q, pose.rot, pose.pos)
-    place_capsules(pose.rot, pose.pos, COARSE_LINK, COARSE_P0, COARSE_P1, 0, coarse)
+@kernel(inline="always")
+def _place_lanes(q: Vec, first: int, sight: Sight) -> None:
+    """Place the robot's coarse capsules at ``q`` [rad], shape (6,), from lane ``first`` on."""
+    kinematics.link_poses(q, sight.rot, sight.pos)
+    place_capsules(
+        sight.rot, sight.pos, COARSE_LINK, COARSE_P0, COARSE_SPAN, first, sight.lanes
+    )
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
+def _lane_clearance(first: int, sight: Sight) -> float:
+    """Return the clearance of one posture's lanes, in units of the scale."""
+    best = FARTHEST
+    for k in range(first, first + N_COARSE):
+        best = min(best, sight.gap[k])
+    return best / DISTANCE_SCALE
+
+
+@kernel(inline="always")
 def _scaled(d: float) -> float:
     return min(3.0, d / DISTANCE_SCALE)
 
 
-@njit(cache=True)
+@kernel(inline="always")
 def _put_joints(arm: Arm, q: Vec, qd: Vec, human_q: Vec, human_qd: Vec, out: Obs) -> int:
     for j in range(CONTROLLED):
         out[j] = q[j] / math.pi
@@ -159,10 +274,10 @@ def _put_joints(arm: Arm, q: Vec, qd: Vec, human_q: Vec, human_qd: Vec, out: Obs
     return 56
 
 
-@njit(cache=True)
-def _put_tool(qd: Vec, goal: Vec, pose: Pose, tcp: Vec, out: Obs) -> int:
-    jacobian = np.empty((3, 6))
-    kinematics.tcp_jacobian(pose.rot, pose.pos, tcp, jacobian)
+@kernel(inline="always")
+def _put_tool(qd: Vec, goal: Vec, robot: RobotPose, out: Obs) -> int:
+    jacobian, tcp = robot.jacobian, robot.tcp
+    kinematics.tcp_jacobian(robot.rot, robot.pos, tcp, jacobian)
     for i in range(3):
         speed = 0.0
         for j in range(6):
@@ -170,58 +285,51 @@ def _put_tool(qd: Vec, goal: Vec, pose: Pose, tcp: Vec, out: Obs) -> int:
         out[56 + i] = tcp[i]
         out[59 + i] = 2.0 * (goal[i] - tcp[i])
         out[62 + i] = 2.0 * speed
-        out[65 + i] = pose.rot[6, i, 1]
+        out[65 + i] = robot.rot[6, i, 1]
     return 68
 
 
-@njit(cache=True)
-def _put_arms(pose: Pose, later: Pose, tick: float, tcp: Vec, goal: Vec, out: Obs) -> int:
-    k = 68
-    elbow = pose.pos[3]
+@kernel(inline="always")
+def _put_arms(sight: Sight, robot: RobotPose, goal: Vec, out: Obs) -> int:
+    k, now, later, pos, tcp = 68, sight.points, sight.points_later, robot.pos, robot.tcp
     for point in (body.HAND_R, body.HAND_L, body.ELBOW_R, body.ELBOW_L):
         for i in range(3):
-            out[k + i] = pose.points[point, i] - tcp[i]
-            out[k + 3 + i] = pose.points[point, i] - goal[i]
-            out[k + 6 + i] = pose.points[point, i] - elbow[i]
+            out[k + i] = now[point, i] - tcp[i]
+            out[k + 3 + i] = now[point, i] - goal[i]
+            out[k + 6 + i] = now[point, i] - pos[3, i]
         k += 9
     for point in (body.HAND_R, body.HAND_L):
         for i in range(3):
-            out[k + i] = (later.points[point, i] - pose.points[point, i]) / tick
+            out[k + i] = (later[point, i] - now[point, i]) / TICK
         k += 3
     return k
 
 
-@njit(cache=True)
-def _put_nearest(coarse: Vec, human: Vec, k: int, out: Obs) -> float:
-    """Write distance and direction of the nearest human part per link group."""
-    gap, overall = np.empty(3), FAR
-    best, direction = np.full(4, FAR), np.zeros((4, 3))
-    for c in range(N_COARSE):
-        group = COARSE_GROUP[c]
-        for h in range(FIRST_PART, LAST_PART + 1):
-            length = segment_nearest(coarse[c], human[h], gap)
-            d = length - COARSE_RADIUS[c] - body.RADII[h]
-            if d < best[group]:
-                best[group] = d
-                for i in range(3):
-                    direction[group, i] = gap[i] / (length + 1e-9)
+@kernel(inline="always")
+def _put_nearest(sight: Sight, k: int, out: Obs) -> float:
+    """Write distance and direction of the nearest human part per link group.
+
+    Returns:
+        The least distance [m].
+    """
+    overall, gap, vector = FAR, sight.gap, sight.gap_vector
     for group in range(4):
-        out[k + 4 * group] = _scaled(best[group])
+        lane = COARSE_FIRST[group]
+        for c in range(COARSE_FIRST[group] + 1, COARSE_FIRST[group + 1]):
+            if gap[c] < gap[lane]:
+                lane = c
+        length = segment_nearest(sight.lanes, lane, sight.now, int(sight.part[lane]), vector)
+        out[k + 4 * group] = _scaled(gap[lane])
         for i in range(3):
-            out[k + 4 * group + 1 + i] = direction[group, i]
-        overall = min(overall, best[group])
+            out[k + 4 * group + 1 + i] = vector[i] / (length + 1e-9)
+        overall = min(overall, gap[lane])
     return overall
 
 
-@njit(cache=True)
-def _tilt(pose: Pose) -> float:
-    """Return the angle of the tool to the vertical [rad]."""
-    return math.acos(min(1.0, max(-1.0, -pose.rot[6, 2, 1])))
-
-
-@njit(cache=True)
+@kernel(inline="always")
 def observe(
     arm: Arm,
+    people: People,
     q: Vec,
     qd: Vec,
     human_q: Vec,
@@ -229,15 +337,15 @@ def observe(
     goal: Vec,
     q_goal: Vec,
     time_left: float,
-    pose: Pose,
-    later: Pose,
-    coarse: Vec,
+    robot: RobotPose,
+    sight: Sight,
     out: Obs,
 ) -> None:
-    """Write the observation of one state and one target.
+    """Write the observation of one state, one person and one target.
 
     Args:
         arm: Robot in its cell.
+        people: Shared data of the people.
         q: Joint positions [rad], shape (6,).
         qd: Joint speeds [rad/s], shape (6,).
         human_q: The person's joint positions [m, rad], shape (18,).
@@ -245,23 +353,15 @@ def observe(
         goal: Where the tcp shall be [m], shape (3,).
         q_goal: Vertical-tool posture at the goal [rad], shape (6,).
         time_left: Time left to reach it [s].
-        pose: Work space.
-        later: More work space.
-        coarse: Work space, shape (5, 2, 3).
+        robot: The robot, placed at ``q``.
+        sight: Work space.
         out: Filled, shape (N_FEATURES,).
     """
-    tick = 1e-3
-    ahead_q = human_q + tick * human_qd
-    body.points_and_frames(ahead_q, arm.pelvis_z, later.points, later.frames)
-    body.capsules(later.points, later.frames, arm.floor_z, later.human)
-    place(arm, q, human_q, pose)
-    velocity = (later.human - pose.human) / tick
-    tcp = np.empty(3)
-    kinematics.tcp_point(pose.rot, pose.pos, arm.tool_length, tcp)
+    see_person(people, human_q, human_qd, sight)
     _put_joints(arm, q, qd, human_q, human_qd, out)
-    _put_tool(qd, goal, pose, tcp, out)
-    k = _put_arms(pose, later, tick, tcp, goal, out)
-    base = np.zeros(6)
+    _put_tool(qd, goal, robot, out)
+    k = _put_arms(sight, robot, goal, out)
+    base, tcp = sight.base, robot.tcp
     base_motion(arm, q, q_goal, base)
     for j in range(CONTROLLED):
         out[k + j] = q_goal[j] - q[j]
@@ -270,46 +370,66 @@ def observe(
     out[k] = 2.0 * math.sqrt(
         (goal[0] - tcp[0]) ** 2 + (goal[1] - tcp[1]) ** 2 + (goal[2] - tcp[2]) ** 2
     )
-    out[k + 1] = _tilt(pose)
+    out[k + 1] = robot_tilt(robot)
     out[k + 3] = time_left / TIME_SCALE
-    place_capsules(pose.rot, pose.pos, COARSE_LINK, COARSE_P0, COARSE_P1, 0, coarse)
-    out[k + 2] = _scaled(_put_nearest(coarse, pose.human, k + 4, out))
+    place_capsules(
+        robot.rot, robot.pos, COARSE_LINK, COARSE_P0, COARSE_SPAN, STILL, sight.lanes
+    )
+    _place_lanes(q_goal, AT_GOAL, sight)
+    nearest_parts(sight.lanes, sight.now, FIRST_PART, LAST_PART, sight.gap, sight.part)
+    out[k + 2] = _scaled(_put_nearest(sight, k + 4, out))
     k += 20
-    _put_look_ahead(arm, q, q_goal, base, velocity, pose, later, coarse, k, out)
-
-
-@njit(cache=True)
-def _put_look_ahead(
-    arm: Arm,
-    q: Vec,
-    q_goal: Vec,
-    base: Vec,
-    velocity: Vec,
-    pose: Pose,
-    later: Pose,
-    coarse: Vec,
-    k: int,
-    out: Obs,
-) -> None:
-    for i in range(3):
-        out[k + i] = _scaled(coarse_clearance(coarse, pose.human, velocity, HORIZONS[i]))
-    moved = q.copy()
+    out[k + 6] = _lane_clearance(AT_GOAL, sight)
+    sight.q[5] = q[5]
     for i in range(3):
         for j in range(CONTROLLED):
             way = base[j] * arm.qd_max[j] * HORIZONS[i]
             limit = abs(q_goal[j] - q[j])
-            moved[j] = q[j] + min(limit, max(-limit, way))
-        place_coarse(moved, later, coarse)
-        out[k + 3 + i] = _scaled(coarse_clearance(coarse, pose.human, velocity, HORIZONS[i]))
-    place_coarse(q_goal, later, coarse)
-    out[k + 6] = _scaled(coarse_clearance(coarse, pose.human, velocity, 0.0))
-    for i in range(3):
-        out[k + 7 + i] = _scaled(coarse_clearance(coarse, pose.human, velocity, HORIZONS[i]))
+            sight.q[j] = q[j] + min(limit, max(-limit, way))
+        _place_lanes(sight.q, ALONG_BASE, sight)
+        look_ahead(sight.now, sight.later, HORIZONS[i], sight.moved)
+        nearest_parts(sight.lanes, sight.moved, FIRST_PART, LAST_PART, sight.gap, sight.part)
+        out[k + i] = _lane_clearance(STILL, sight)
+        out[k + 3 + i] = _lane_clearance(ALONG_BASE, sight)
+        out[k + 7 + i] = _lane_clearance(AT_GOAL, sight)
 
 
-@njit(cache=True)
+@kernel()
+def _observe(
+    arm: Arm,
+    people: People,
+    q: Vec,
+    qd: Vec,
+    human_q: Vec,
+    human_qd: Vec,
+    goals: Vec,
+    q_goals: Vec,
+    time_left: Vec,
+    robot: RobotPose,
+    sight: Sight,
+    out: Obs,
+) -> None:
+    for i in range(q.shape[0]):
+        place_robot(arm, q[i], robot)
+        observe(
+            arm,
+            people,
+            q[i],
+            qd[i],
+            human_q[i],
+            human_qd[i],
+            goals[i],
+            q_goals[i],
+            time_left[i],
+            robot,
+            sight,
+            out[i],
+        )
+
+
 def observe_batch(
     arm: Arm,
+    people: People,
     q: Vec,
     qd: Vec,
     human_q: Vec,
@@ -319,21 +439,8 @@ def observe_batch(
     time_left: Vec,
     out: Obs,
 ) -> None:
-    """Apply :func:`observe` to n rows; every argument has a leading axis of n."""
-    n_robot = arm.link.shape[0]
-    pose, later, coarse = new_pose(n_robot), new_pose(n_robot), np.empty((N_COARSE, 2, 3))
-    for i in range(q.shape[0]):
-        observe(
-            arm,
-            q[i],
-            qd[i],
-            human_q[i],
-            human_qd[i],
-            goals[i],
-            q_goals[i],
-            time_left[i],
-            pose,
-            later,
-            coarse,
-            out[i],
-        )
+    """Apply :func:`observe` to n rows; every argument but the first two has a leading axis n."""
+    robot, sight = new_robot_pose(arm), new_sight(people.person)
+    _observe(
+        arm, people, q, qd, human_q, human_qd, goals, q_goals, time_left, robot, sight, out
+    )

@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from app.sim.kernels.compiled import kernel
 from app.sim.ports import Vec
 
 BASE_HEIGHT = 0.1273
@@ -34,7 +35,7 @@ LATERAL = SHOULDER_OFFSET + ELBOW_OFFSET + WRIST_1_OFFSET
 """Distance of the tool's plane from the pan axis [m]."""
 
 
-@njit(cache=True)
+@kernel()
 def link_poses(q: Vec, rot: Vec, pos: Vec) -> None:
     """Write the poses of base and six links.
 
@@ -79,7 +80,7 @@ def link_poses(q: Vec, rot: Vec, pos: Vec) -> None:
     _along(rot[5], 0.0, 0.0, WRIST_2_LENGTH, pos[5], pos[6])
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _pan_then_pitch(c0: float, s0: float, pitch: float, out: Vec) -> None:
     """Write ``Rz(pan) Ry(pitch)`` into ``out``, shape (3, 3)."""
     c, s = math.cos(pitch), math.sin(pitch)
@@ -88,20 +89,20 @@ def _pan_then_pitch(c0: float, s0: float, pitch: float, out: Vec) -> None:
     out[2, 0], out[2, 1], out[2, 2] = -s, 0.0, c
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _along(rot: Vec, x: float, y: float, z: float, origin: Vec, out: Vec) -> None:
     """Write ``origin + rot (x, y, z)`` into ``out``, shape (3,)."""
     for i in range(3):
         out[i] = origin[i] + rot[i, 0] * x + rot[i, 1] * y + rot[i, 2] * z
 
 
-@njit(cache=True)
+@kernel()
 def tcp_point(rot: Vec, pos: Vec, tool_length: float, out: Vec) -> None:
     """Write the tcp [m] of poses from :func:`link_poses` into ``out``, shape (3,)."""
     _along(rot[6], 0.0, FLANGE + tool_length, 0.0, pos[6], out)
 
 
-@njit(cache=True)
+@kernel()
 def tcp_jacobian(rot: Vec, pos: Vec, tcp: Vec, out: Vec) -> None:
     """Write the tcp's linear Jacobian [m/rad] into ``out``, shape (3, 6)."""
     for j in range(6):
@@ -116,7 +117,7 @@ def tcp_jacobian(rot: Vec, pos: Vec, tcp: Vec, out: Vec) -> None:
         out[2, j] = ax * dy - ay * dx
 
 
-@njit(cache=True)
+@kernel()
 def ik_vertical(target: Vec, tool_length: float, q_min: Vec, q_max: Vec, out: Vec) -> bool:
     """Find the posture with the tool pointing down at ``target``, wrist 3 at 0.
 

@@ -8,26 +8,41 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from app.sim.kernels import kinematics, random, script
+from app.sim.kernels.compiled import kernel
+from app.sim.kernels import kinematics, random
+from app.sim.kernels.actions import ONE_STEP, ActionRule, advance
 from app.sim.kernels.arm import (
     CONTROLLED,
-    NO_CONTACT,
     Arm,
-    Pose,
-    human_clearance,
-    new_pose,
-    place,
-    sweep,
+    RobotPose,
+    keep_columns,
+    new_robot_pose,
+    place_robot,
+    robot_tilt,
+    tcp_speed,
 )
-from app.sim.kernels.features import N_COARSE, Obs, observe
-from app.sim.kernels.polynomial import advance
+from app.sim.kernels.columns import copy_rows, copy_values
+from app.sim.kernels.contact import NO_CONTACT, clearances, sweep
+from app.sim.kernels.features import Obs, Sight, new_sight, observe
+from app.sim.kernels.people import (
+    Crowd,
+    People,
+    PeopleState,
+    advance_people,
+    new_crowd,
+    place_people,
+    see_nearest,
+    start_people,
+)
 from app.sim.kernels.reward import RewardWeights, reward
 from app.sim.ports import Vec
 
-RUNNING, SUCCESS, COLLISION, TIMEOUT = range(4)
+RUNNING, SUCCESS, COLLISION, TIMEOUT, UNFEASIBLE = range(5)
+NO_OBS, PLAIN, FEATURES = range(3)
+N_PLAIN = 51
+"""Length of the plain observation: q, qd, the person's q, qd, target (5.8)."""
 SUCCESS_DISTANCE = 0.1
 """tcp to target [m], thesis 5.3.1."""
 SUCCESS_TILT = 0.2
@@ -49,12 +64,10 @@ class PickWorld(NamedTuple):
     """Vertical-tool postures at the stations [rad], shape (n_stations, 6)."""
     n_cubes: int
     """Number of cubes."""
-    postures: Vec
-    """The person's library [m, rad], shape (n_postures, 18)."""
-    hands: Vec
-    """Palms of each posture [m], shape (n_postures, 2, 3)."""
-    of_station: NDArray[np.int64]
-    """First posture and count of each place and hand, shape (n_stations + 1, 2, 2)."""
+    arm: Arm
+    """The robot in its cell."""
+    people: People
+    """The people in the cell."""
 
 
 class PickRules(NamedTuple):
@@ -76,8 +89,6 @@ class PickRules(NamedTuple):
     """Fewest targets offered."""
     n_candidates_max: int
     """Most targets offered."""
-    human_pace: float
-    """Speed of the person relative to the script."""
 
 
 class PickState(NamedTuple):
@@ -87,10 +98,12 @@ class PickState(NamedTuple):
     """Joint positions [rad], shape (n_envs, 6)."""
     qd: Vec
     """Joint speeds [rad/s], shape (n_envs, 6)."""
-    human_q: Vec
-    """The person's joints [m, rad], shape (n_envs, 18)."""
-    human_qd: Vec
-    """The person's joint speeds [m/s, rad/s], shape (n_envs, 18)."""
+    qdd: Vec
+    """Joint accelerations [rad/s^2], shape (n_envs, 6)."""
+    robot: Vec
+    """The robot's capsules at this moment, shape (n_envs, 9, n)."""
+    people: PeopleState
+    """Rows of the people."""
     goal: Vec
     """Target being pursued [m], shape (n_envs, 3)."""
     q_goal: Vec
@@ -101,57 +114,71 @@ class PickState(NamedTuple):
     """Time left [s], shape (n_envs,)."""
     elapsed: Vec
     """Time since the start [s], shape (n_envs,)."""
-    phase: Vec
-    """Time in the person's script at the start [s], shape (n_envs,)."""
-    n_moves: NDArray[np.int64]
-    """Moves in the person's script, shape (n_envs,)."""
-    start: Vec
-    """Start of each move [s], shape (n_envs, MAX_MOVES)."""
-    duration: Vec
-    """Duration of each move [s], shape (n_envs, MAX_MOVES)."""
-    chosen: NDArray[np.int64]
-    """Postures of the script, shape (n_envs, MAX_MOVES + 1)."""
+    distance: Vec
+    """tcp to target [m], shape (n_envs,)."""
+    tilt: Vec
+    """Tool axis to the vertical [rad], shape (n_envs,)."""
     episode: NDArray[np.int64]
     """Number of the present episode, shape (n_envs,)."""
     outcome: NDArray[np.int64]
     """How the present episode stands (RUNNING ...), shape (n_envs,)."""
-    clearance: Vec
-    """Distance to the person [m], shape (n_envs,)."""
+    clear: Vec
+    """Distances to people, cell and the robot itself [m], shape (n_envs, 3)."""
     n_redrawn: NDArray[np.int64]
     """Starts rejected for want of clearance, shape (n_envs,)."""
 
 
-@njit(cache=True)
-def human_at(world: PickWorld, rules: PickRules, state: PickState, e: int, t: float) -> None:
-    """Write the person's state of environment ``e`` at ``t`` [s] since its start."""
-    n = state.n_moves[e]
-    when = state.phase[e] + rules.human_pace * t
-    move = 0
-    while move + 1 < n and state.start[e, move + 1] <= when:
-        move += 1
-    pair = np.empty((2, 18))
-    pair[0] = world.postures[state.chosen[e, move]]
-    pair[1] = world.postures[state.chosen[e, move + 1]]
-    script.script_at(
-        when,
-        1,
-        state.start[e, move : move + 1],
-        state.duration[e, move : move + 1],
-        pair,
-        state.human_q[e],
-        state.human_qd[e],
+class Work(NamedTuple):
+    """Work space of one thread; made once per call of a batch, used row after row."""
+
+    robot: RobotPose
+    """A pose of the robot."""
+    crowd: Crowd
+    """A pose of the people."""
+    sight: Sight
+    """What an observation looks at."""
+    c: Vec
+    """Second coefficients of a period [rad/s^2], shape (6,)."""
+    d: Vec
+    """Third coefficients of a period [rad/s^3], shape (6,)."""
+    q: Vec
+    """Joints at the end of a period [rad], shape (6,)."""
+    qd: Vec
+    """Joint speeds at the end of a period [rad/s], shape (6,)."""
+    qdd: Vec
+    """Joint accelerations at the end of a period [rad/s^2], shape (6,)."""
+    rng: random.State
+    """Random stream of the episode that starts, shape (1,)."""
+
+
+def new_work(world: PickWorld, state: PickState) -> Work:
+    """Return work space for a batch."""
+    people = state.people
+    return Work(
+        new_robot_pose(world.arm),
+        new_crowd(world.people, people.q.shape[1], people.cylinders.shape[1]),
+        new_sight(world.people.person),
+        np.zeros(6),
+        np.zeros(6),
+        np.zeros(6),
+        np.zeros(6),
+        np.zeros(6),
+        np.zeros(1, dtype=np.uint64),
     )
-    state.human_qd[e] *= rules.human_pace
 
 
-@njit(cache=True)
-def set_goal(arm: Arm, state: PickState, e: int, goal: Vec) -> None:
-    """Give environment ``e`` a new target [m], shape (3,)."""
-    state.goal[e] = goal
+@kernel()
+def set_goal(world: PickWorld, state: PickState, e: int, goal: Vec, robot: RobotPose) -> None:
+    """Give environment ``e`` a new target [m], shape (3,); the way to it is measured anew."""
+    arm = world.arm
+    for i in range(3):
+        state.goal[e, i] = goal[i]
     kinematics.ik_vertical(goal, arm.tool_length, arm.q_min, arm.q_max, state.q_goal[e])
+    place_robot(arm, state.q[e], robot)
+    state.distance[e] = distance_to(goal, robot)
 
 
-@njit(cache=True)
+@kernel()
 def _draw_candidates(
     world: PickWorld, rules: PickRules, state: PickState, e: int, rng: random.State
 ) -> None:
@@ -171,16 +198,16 @@ def _draw_candidates(
         state.candidates[e, i] = station
 
 
-@njit(cache=True)
+@kernel()
 def _draw_start(
-    world: PickWorld, rules: PickRules, arm: Arm, state: PickState, e: int, rng: random.State
+    world: PickWorld, rules: PickRules, state: PickState, e: int, rng: random.State
 ) -> None:
     """Draw the robot's start: home, a cube or a dock in equal shares, never a candidate."""
     n_stations = world.stations.shape[0]
     while True:
         kind = random.below(rng, 3)
         if kind == 0:
-            state.q[e] = arm.home
+            copy_values(world.arm.home, state.q[e])
             break
         station = random.below(rng, world.n_cubes)
         if kind == 2:
@@ -189,180 +216,218 @@ def _draw_start(
         for i in range(MAX_CANDIDATES):
             offered = offered or state.candidates[e, i] == station
         if not offered:
-            state.q[e] = world.station_q[station]
+            copy_values(world.station_q[station], state.q[e])
             break
     if random.uniform(rng) < rules.way_share:
         u = random.uniform(rng)
         for j in range(CONTROLLED):
             state.q[e, j] += u * (state.q_goal[e, j] - state.q[e, j])
-    state.qd[e] = 0.0
+    for j in range(6):
+        state.qd[e, j], state.qdd[e, j] = 0.0, 0.0
 
 
-@njit(cache=True)
+@kernel()
 def reset_env(
     world: PickWorld,
     rules: PickRules,
-    arm: Arm,
     seed: int,
+    first_env: int,
     state: PickState,
     e: int,
-    pose: Pose,
+    work: Work,
 ) -> None:
     """Start the next episode of environment ``e``."""
-    rng = np.zeros(1, dtype=np.uint64)
-    random.start_stream(seed, e, state.episode[e], rng)
+    rng = work.rng
+    random.start_stream(seed, first_env + e, state.episode[e], rng)
     _draw_candidates(world, rules, state, e, rng)
-    goal = world.stations[state.candidates[e, 0]].copy()
+    goal = state.goal[e]
+    copy_values(world.stations[state.candidates[e, 0]], goal)
     for i in range(3):
         goal[i] += rules.target_jitter * (2.0 * random.uniform(rng) - 1.0)
-    set_goal(arm, state, e, goal)
+    arm = world.arm
+    kinematics.ik_vertical(goal, arm.tool_length, arm.q_min, arm.q_max, state.q_goal[e])
     short = random.uniform(rng) < rules.short_share
     state.time_left[e] = rules.short_limit if short else rules.time_limit
     for attempt in range(START_TRIES):
-        _draw_start(world, rules, arm, state, e, rng)
-        state.n_moves[e] = script.draw_script(
-            rng,
-            world.of_station,
-            world.stations.shape[0],
-            world.n_cubes,
-            world.hands,
-            -1,
-            state.start[e],
-            state.duration[e],
-            state.chosen[e],
-        )
-        state.phase[e] = 12.0 * random.uniform(rng)
-        human_at(world, rules, state, e, 0.0)
-        place(arm, state.q[e], state.human_q[e], pose)
-        state.clearance[e] = human_clearance(arm, pose)[0]
+        _draw_start(world, rules, state, e, rng)
+        place_robot(arm, state.q[e], work.robot)
+        start_people(world.people, state.people, e, rng, work.crowd)
+        clear = clearances(arm, world.people, work.robot, work.crowd)
+        state.clear[e, 0], state.clear[e, 1], state.clear[e, 2] = clear
         state.n_redrawn[e] = attempt
-        if state.clearance[e] >= rules.start_clearance:
+        if clear[0] >= rules.start_clearance:
             break
+    state.distance[e] = distance_to(goal, work.robot)
+    state.tilt[e] = robot_tilt(work.robot)
+    keep_columns(work.robot.columns, state.robot[e])
+    keep_columns(work.crowd.columns, state.people.columns[e])
     state.elapsed[e] = 0.0
     state.outcome[e] = RUNNING
 
 
-@njit(cache=True)
-def tool_state(arm: Arm, qd: Vec, goal: Vec, pose: Pose) -> tuple[float, float, float]:
-    """Return distance to the target [m], tilt [rad] and tcp speed [m/s] of a placed pose."""
-    tcp, jacobian = np.empty(3), np.empty((3, 6))
-    kinematics.tcp_point(pose.rot, pose.pos, arm.tool_length, tcp)
-    kinematics.tcp_jacobian(pose.rot, pose.pos, tcp, jacobian)
-    distance2, speed2 = 0.0, 0.0
-    for i in range(3):
-        distance2 += (goal[i] - tcp[i]) ** 2
-        v = 0.0
-        for j in range(6):
-            v += jacobian[i, j] * qd[j]
-        speed2 += v * v
-    tilt = math.acos(min(1.0, max(-1.0, -pose.rot[6, 2, 1])))
-    return math.sqrt(distance2), tilt, math.sqrt(speed2)
+@kernel()
+def distance_to(goal: Vec, robot: RobotPose) -> float:
+    """Return the distance of a placed robot's tcp to a target [m]."""
+    x, y, z = goal[0] - robot.tcp[0], goal[1] - robot.tcp[1], goal[2] - robot.tcp[2]
+    return math.sqrt(x * x + y * y + z * z)
 
 
-@njit(cache=True)
+@kernel()
 def succeeded(distance: float, tilt: float, speed: float) -> bool:
     """Whether the tool is where it should be, upright and at rest (thesis 5.3.1)."""
     return distance < SUCCESS_DISTANCE and tilt < SUCCESS_TILT and speed < SUCCESS_SPEED
 
 
-@njit(cache=True)
-def drive(arm: Arm, q: Vec, qd: Vec, act: Vec, c: Vec, q_out: Vec, qd_out: Vec) -> None:
-    """Move the robot through one period by an action in [-1, 1] (wanted joint speeds).
-
-    Joint six is steered to rest at 0. The caller tests the period for contact.
-    """
-    target = np.zeros(6)
-    for j in range(CONTROLLED):
-        target[j] = min(1.0, max(-1.0, act[j])) * arm.qd_max[j]
-    target[5] = min(arm.qd_max[5], max(-arm.qd_max[5], -2.0 * q[5]))
-    advance(
-        q, qd, target, arm.q_min, arm.q_max, arm.qd_max, arm.qdd_max, arm.dt, c, q_out, qd_out
-    )
-
-
-@njit(cache=True)
+@kernel(inline="always")
 def step_env(
     world: PickWorld,
-    rules: PickRules,
-    arm: Arm,
+    action: ActionRule,
     weights: RewardWeights,
     state: PickState,
     e: int,
-    act: Vec,
-    before: Pose,
-    pose: Pose,
+    act: NDArray[np.float32],
+    work: Work,
 ) -> float:
     """Move environment ``e`` through one period, set its outcome, return the reward."""
-    c, q1, qd1 = np.empty(6), np.empty(6), np.empty(6)
-    human_q0 = state.human_q[e].copy()
-    drive(arm, state.q[e], state.qd[e], act, c, q1, qd1)
+    arm, people, crowd, robot = world.arm, state.people, work.crowd, work.robot
+    copy_rows(people.q[e], crowd.q0)
+    copy_rows(people.cylinders[e], crowd.cylinders0)
+    unfeasible = advance(
+        action,
+        state.q[e],
+        state.qd[e],
+        state.qdd[e],
+        act,
+        arm.q_min,
+        arm.q_max,
+        arm.qd_max,
+        arm.qdd_max,
+        arm.jerk_max,
+        arm.dt,
+        work.c,
+        work.d,
+        work.q,
+        work.qd,
+        work.qdd,
+    )
     state.elapsed[e] += arm.dt
     state.time_left[e] -= arm.dt
-    human_at(world, rules, state, e, state.elapsed[e])
-    kind, _, _, clearance = sweep(
-        arm, state.q[e], state.qd[e], c, human_q0, state.human_q[e], before, pose
+    advance_people(world.people, people, e, state.elapsed[e], arm.dt)
+    kind, _ = sweep(
+        arm,
+        world.people,
+        state.q[e],
+        state.qd[e],
+        work.c,
+        work.d,
+        work.q,
+        people.q[e],
+        people.cylinders[e],
+        state.robot[e],
+        people.columns[e],
+        state.clear[e],
+        robot,
+        crowd,
     )
-    d_old, tilt_old, _ = tool_state(arm, state.qd[e], state.goal[e], before)
-    state.q[e], state.qd[e], state.clearance[e] = q1, qd1, clearance
+    for j in range(6):
+        state.q[e, j], state.qd[e, j], state.qdd[e, j] = work.q[j], work.qd[j], work.qdd[j]
     if kind != NO_CONTACT:
-        place(arm, q1, state.human_q[e], pose)
-    d, tilt, speed = tool_state(arm, qd1, state.goal[e], pose)
+        place_robot(arm, work.q, robot)
+        place_people(world.people, people, e, crowd)
+    keep_columns(robot.columns, state.robot[e])
+    keep_columns(crowd.columns, people.columns[e])
+    d_old, tilt_old = state.distance[e], state.tilt[e]
+    d, tilt = distance_to(state.goal[e], robot), robot_tilt(robot)
+    state.distance[e], state.tilt[e] = d, tilt
+    near = max(SUCCESS_DISTANCE, weights.d_v)
+    speed = tcp_speed(robot, work.qd) if d <= near else 0.0
     collided = kind != NO_CONTACT
     success = not collided and succeeded(d, tilt, speed)
     if collided:
         state.outcome[e] = COLLISION
     elif success:
         state.outcome[e] = SUCCESS
+    elif unfeasible and action.bounds == ONE_STEP:
+        state.outcome[e] = UNFEASIBLE
     elif state.time_left[e] <= 1e-9:
         state.outcome[e] = TIMEOUT
     return reward(d_old, d, tilt_old, tilt, speed, collided, success, weights)
 
 
-@njit(cache=True)
-def observe_env(
-    arm: Arm, state: PickState, e: int, pose: Pose, later: Pose, coarse: Vec, out: Obs
+@kernel(inline="always")
+def write_obs(
+    world: PickWorld, state: PickState, e: int, work: Work, view: int, out: Obs
 ) -> None:
-    """Write the observation of environment ``e``, shape (N_FEATURES,)."""
+    """Write the observation of environment ``e``.
+
+    With several people the nearest one is described.
+
+    Args:
+        world: Shared data.
+        state: Rows.
+        e: Environment.
+        work: Robot and people are placed in it as they are now.
+        view: NO_OBS, PLAIN (the state of (5.8), ``N_PLAIN`` numbers) or FEATURES.
+        out: Filled, shape (N_PLAIN,) or (N_FEATURES,).
+    """
+    if view == NO_OBS:
+        return
+    crowd = work.crowd
+    see_nearest(world.people, state.people, e, work.robot.columns, crowd)
+    if view == PLAIN:
+        for j in range(6):
+            out[j], out[6 + j] = state.q[e, j], state.qd[e, j]
+        for j in range(18):
+            out[12 + j], out[30 + j] = crowd.seen_q[j], crowd.seen_qd[j]
+        for i in range(3):
+            out[48 + i] = state.goal[e, i]
+        return
     observe(
-        arm,
+        world.arm,
+        world.people,
         state.q[e],
         state.qd[e],
-        state.human_q[e],
-        state.human_qd[e],
+        crowd.seen_q,
+        crowd.seen_qd,
         state.goal[e],
         state.q_goal[e],
         state.time_left[e],
-        pose,
-        later,
-        coarse,
+        work.robot,
+        work.sight,
         out,
     )
 
 
-@njit(cache=True)
+@kernel(nogil=True)
 def reset_batch(
-    world: PickWorld, rules: PickRules, arm: Arm, seed: int, state: PickState, obs: Obs
+    world: PickWorld,
+    rules: PickRules,
+    seed: int,
+    first_env: int,
+    state: PickState,
+    work: Work,
+    view: int,
+    obs: Obs,
 ) -> None:
     """Start an episode in every environment and write the observations."""
-    n_robot = arm.link.shape[0]
-    pose, later = new_pose(n_robot), new_pose(n_robot)
-    coarse = np.empty((N_COARSE, 2, 3))
     for e in range(state.q.shape[0]):
-        reset_env(world, rules, arm, seed, state, e, pose)
-        observe_env(arm, state, e, pose, later, coarse, obs[e])
+        reset_env(world, rules, seed, first_env, state, e, work)
+        write_obs(world, state, e, work, view, obs[e])
 
 
-@njit(cache=True)
+@kernel(nogil=True)
 def step_batch(
     world: PickWorld,
     rules: PickRules,
-    arm: Arm,
+    action: ActionRule,
     weights: RewardWeights,
     seed: int,
+    first_env: int,
     state: PickState,
+    work: Work,
     act: NDArray[np.float32],
     auto_reset: bool,
-    features: bool,
+    view: int,
     obs: Obs,
     last_obs: Obs,
     rew: NDArray[np.float32],
@@ -373,35 +438,30 @@ def step_batch(
     Args:
         world: Shared data.
         rules: Starts and ends.
-        arm: Robot in its cell.
+        action: What actions mean.
         weights: Reward coefficients.
         seed: Seed of the batch.
+        first_env: Number of row 0 in the random streams.
         state: Rows; changed.
+        work: Work space.
         act: Actions in [-1, 1], shape (n_envs, 5).
         auto_reset: Start the next episode at once; otherwise ended rows stay as they are.
-        features: Whether to write observations.
+        view: NO_OBS, PLAIN or FEATURES.
         obs: Filled with the observations after the step (and reset), shape (n_envs, F).
         last_obs: Filled with the final observation of rows that ended, shape (n_envs, F).
         rew: Filled with rewards, shape (n_envs,).
         ended: Filled with the outcome of rows that ended now, RUNNING elsewhere.
     """
-    n_robot = arm.link.shape[0]
-    pose, later = new_pose(n_robot), new_pose(n_robot)
-    coarse, wanted = np.empty((N_COARSE, 2, 3)), np.empty(CONTROLLED)
     for e in range(state.q.shape[0]):
         ended[e], rew[e] = RUNNING, 0.0
         if state.outcome[e] != RUNNING:
             continue
-        for j in range(CONTROLLED):
-            wanted[j] = act[e, j]
-        rew[e] = step_env(world, rules, arm, weights, state, e, wanted, later, pose)
+        rew[e] = step_env(world, action, weights, state, e, act[e], work)
         ended[e] = state.outcome[e]
-        if features:
-            observe_env(arm, state, e, pose, later, coarse, obs[e])
+        write_obs(world, state, e, work, view, obs[e])
         if ended[e] != RUNNING and auto_reset:
-            if features:
-                last_obs[e] = obs[e]
+            for i in range(obs.shape[1]):
+                last_obs[e, i] = obs[e, i]
             state.episode[e] += 1
-            reset_env(world, rules, arm, seed, state, e, pose)
-            if features:
-                observe_env(arm, state, e, pose, later, coarse, obs[e])
+            reset_env(world, rules, seed, first_env, state, e, work)
+            write_obs(world, state, e, work, view, obs[e])

@@ -8,8 +8,8 @@ would reward moving away and colliding; the text asks for the signs used here.
 """
 
 from typing import NamedTuple
+from app.sim.kernels.compiled import kernel
 
-from numba import njit
 
 
 class RewardWeights(NamedTuple):
@@ -33,19 +33,19 @@ class RewardWeights(NamedTuple):
     """Discount of the progress terms."""
 
 
-@njit(cache=True)
+@kernel()
 def progress(old: float, new: float, coefficient: float, gamma: float) -> float:
     """Return the reward for coming closer: positive when ``new`` is less than ``old``."""
     return coefficient * (old - gamma * new)
 
 
-@njit(cache=True)
+@kernel()
 def speed_near_target(speed: float, distance: float, weights: RewardWeights) -> float:
     """Return the (negative) reward for tcp speed [m/s] within ``d_v`` of the target."""
     return -weights.c_v * speed if distance <= weights.d_v else 0.0
 
 
-@njit(cache=True)
+@kernel()
 def reward(
     d_old: float,
     d: float,

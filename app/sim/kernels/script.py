@@ -11,9 +11,9 @@ reversal); minimum jerk after Flash and Hogan (1985).
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from app.sim.kernels.compiled import kernel
 from app.sim.kernels.random import State, below, normal, uniform
 from app.sim.ports import Vec
 
@@ -31,7 +31,7 @@ SHORTEST_MOVE = 0.35
 """Least duration of a move [s]."""
 
 
-@njit(cache=True)
+@kernel()
 def script_at(
     t: float, n_moves: int, start: Vec, duration: Vec, postures: Vec, q: Vec, qd: Vec
 ) -> None:
@@ -49,16 +49,35 @@ def script_at(
     move = 0
     while move + 1 < n_moves and start[move + 1] <= t:
         move += 1
-    phase = min(1.0, max(0.0, (t - start[move]) / duration[move]))
+    move_at(t, start[move], duration[move], postures[move], postures[move + 1], 1.0, q, qd)
+
+
+@kernel(error_model="numpy")
+def move_at(
+    t: float, start: float, duration: float, before: Vec, after: Vec, pace: float, q: Vec, qd: Vec
+) -> None:
+    """Write joint positions and speeds of one minimum-jerk move.
+
+    Args:
+        t: Time in the script [s].
+        start: Start of the move [s].
+        duration: Its duration [s].
+        before: Posture it leaves [m, rad], shape (18,).
+        after: Posture it arrives at [m, rad], shape (18,).
+        pace: Script's seconds per second; scales the speeds.
+        q: Filled with joint positions [m, rad], shape (18,).
+        qd: Filled with joint speeds [m/s, rad/s], shape (18,).
+    """
+    phase = min(1.0, max(0.0, (t - start) / duration))
     blend = phase * phase * phase * (10.0 + phase * (6.0 * phase - 15.0))
-    rate = 30.0 * (phase * (1.0 - phase)) ** 2 / duration[move]
+    rate = 30.0 * (phase * (1.0 - phase)) ** 2 / duration
     for j in range(18):
-        span = postures[move + 1, j] - postures[move, j]
-        q[j] = postures[move, j] + blend * span
-        qd[j] = rate * span
+        span = after[j] - before[j]
+        q[j] = before[j] + blend * span
+        qd[j] = rate * span * pace
 
 
-@njit(cache=True)
+@kernel()
 def draw_script(
     state: State,
     of_station: Index,
@@ -116,13 +135,13 @@ def draw_script(
     return n
 
 
-@njit(cache=True)
+@kernel()
 def _draw_posture(state: State, of_station: Index, place: int, hand: int) -> int:
     first, count = of_station[place, hand, 0], of_station[place, hand, 1]
     return int(first + below(state, count))
 
 
-@njit(cache=True)
+@kernel()
 def _draw_duration(state: State, hands_from: Vec, hands_to: Vec) -> float:
     """Draw a move's duration [s] from the farther hand's way and a random pace."""
     way = 0.0
@@ -135,7 +154,7 @@ def _draw_duration(state: State, hands_from: Vec, hands_to: Vec) -> float:
     return max(SHORTEST_MOVE, way / min(PACE_MAX, max(PACE_MIN, pace)))
 
 
-@njit(cache=True)
+@kernel()
 def _draw_pause(state: State, at_home: bool) -> float:
     """Draw the rest after a move [s]: short at a station, now and then long."""
     if at_home:

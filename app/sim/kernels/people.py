@@ -1,0 +1,318 @@
+"""The people of a cell, compiled: where they are, how they move on, and as what shapes.
+
+A cell holds up to four people: *workers*, 18-DoF bodies that follow a script of postures, and
+*walkers*, the vertical cylinders of METHOD 2.1. Neither reacts to the robot, so an episode's
+whole human motion is fixed when it starts. Workers become twelve capsules each, in one set of
+columns; walkers stay cylinders.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.sim.kernels.compiled import kernel
+from app.sim.kernels import body, random, script
+from app.sim.kernels.columns import copy_rows, gaps, least, longest_way
+from app.sim.kernels.cylinder import cylinder_clearance
+from app.sim.kernels.geometry import FAR
+from app.sim.kernels.occupancy import WalkerRules, WalkerState, advance_walker, start_walker
+from app.sim.ports import Vec
+
+MAX_PEOPLE = 4
+DEEPEST = 32
+"""Halvings of a period in the contact test; enough for periods of hours."""
+
+
+class People(NamedTuple):
+    """What all environments share about their people."""
+
+    pelvis_z: float
+    """Height of the workers' pelvis [m]."""
+    floor_z: float
+    """Height of the floor [m]."""
+    top_z: float
+    """Height of the walkers' tops [m]."""
+    columns: Vec
+    """Template of the workers' capsules, shape (9, n); see ``body.capsule_columns``."""
+    person: Vec
+    """Template of one person's capsules, shape (9, 16)."""
+    postures: Vec
+    """The workers' library [m, rad], shape (n_postures, 18)."""
+    hands: Vec
+    """Palms of each posture [m], shape (n_postures, 2, 3)."""
+    of_station: NDArray[np.int64]
+    """First posture and count of each place and hand, shape (n_places + 1, 2, 2)."""
+    n_cubes: int
+    """Places that are cubes; they come first."""
+    pace: float
+    """Speed of the workers relative to their scripts."""
+    walkers: WalkerRules
+    """How the walkers walk."""
+    nobody: Vec
+    """Posture of a person who stands too far away to matter [m, rad], shape (18,)."""
+
+
+class PeopleState(NamedTuple):
+    """Rows of the people of all environments; W workers, C walkers."""
+
+    q: Vec
+    """The workers' joints [m, rad], shape (n_envs, W, 18)."""
+    qd: Vec
+    """Their speeds [m/s, rad/s], shape (n_envs, W, 18)."""
+    columns: Vec
+    """Their capsules at this moment, shape (n_envs, 9, n)."""
+    phase: Vec
+    """Time in each worker's script at the start [s], shape (n_envs, W)."""
+    move: NDArray[np.int64]
+    """The move of the script each worker is in, shape (n_envs, W)."""
+    n_moves: NDArray[np.int64]
+    """Moves in each worker's script, shape (n_envs, W)."""
+    start: Vec
+    """Start of each move [s], shape (n_envs, W, MAX_MOVES)."""
+    duration: Vec
+    """Duration of each move [s], shape (n_envs, W, MAX_MOVES)."""
+    chosen: NDArray[np.int64]
+    """Postures of the scripts, shape (n_envs, W, MAX_MOVES + 1)."""
+    walkers: WalkerState
+    """The walkers, rows (n_envs, C)."""
+    cylinders: Vec
+    """The walkers' x, y and radius at this moment [m], shape (n_envs, C, 3)."""
+
+
+class Crowd(NamedTuple):
+    """Work space of one pose of all people; made once, filled again and again."""
+
+    q: Vec
+    """Joints of the workers [m, rad], shape (W, 18)."""
+    points: Vec
+    """The workers' points [m], shape (W, N_POINTS, 3)."""
+    frames: Vec
+    """The workers' orientations, shape (W, N_FRAMES, 3, 3)."""
+    trig: Vec
+    """Sines, cosines and more, shape (3, 16)."""
+    columns: Vec
+    """The workers' capsules, shape (9, n)."""
+    gap: Vec
+    """Distance of each capsule to the robot [m], shape (n,)."""
+    cylinders: Vec
+    """The walkers' x, y and radius [m], shape (C, 3)."""
+    q0: Vec
+    """The workers' joints when the period began [m, rad], shape (W, 18)."""
+    cylinders0: Vec
+    """The walkers when the period began [m], shape (C, 3)."""
+    robot_q: Vec
+    """The robot's joints between the ends of the period [rad], shape (6,)."""
+    seen_q: Vec
+    """Joints of the person a policy looks at [m, rad], shape (18,)."""
+    seen_qd: Vec
+    """Their speeds [m/s, rad/s], shape (18,)."""
+    stack_end: Vec
+    """Ends of the intervals the contact test has before it [s], shape (DEEPEST,)."""
+    stack_clear: Vec
+    """Clearances there [m], shape (DEEPEST, 3)."""
+
+
+def new_crowd(people: People, n_workers: int, n_walkers: int) -> Crowd:
+    """Return work space, not placed yet."""
+    return Crowd(
+        np.empty((n_workers, 18)),
+        np.empty((n_workers, body.N_POINTS, 3)),
+        np.empty((n_workers, body.N_FRAMES, 3, 3)),
+        np.empty((3, 16)),
+        people.columns.copy(),
+        np.empty(people.columns.shape[1]),
+        np.empty((n_walkers, 3)),
+        np.empty((n_workers, 18)),
+        np.empty((n_walkers, 3)),
+        np.empty(6),
+        np.empty(18),
+        np.empty(18),
+        np.empty(DEEPEST),
+        np.empty((DEEPEST, 3)),
+    )
+
+
+@kernel(inline="always")
+def place_workers(people: People, q: Vec, crowd: Crowd) -> None:
+    """Fill the capsules of ``crowd`` for the workers' joints [m, rad], shape (W, 18)."""
+    for w in range(q.shape[0]):
+        points, frames = crowd.points[w], crowd.frames[w]
+        body.points_and_frames(q[w], people.pelvis_z, crowd.trig, points, frames)
+        body.capsules(points, frames, people.floor_z, w * body.N_CAPSULES, crowd.columns)
+
+
+@kernel(inline="always")
+def people_clearance(people: People, robot: Vec, crowd: Crowd) -> float:
+    """Return the distance of robot and nearest person [m]; FAR where there is nobody.
+
+    Args:
+        people: Shared data.
+        robot: The robot's capsules as columns, shape (9, n).
+        crowd: Placed; ``gap`` is filled.
+    """
+    best = FAR
+    if crowd.columns.shape[1] > 0:
+        gaps(robot, crowd.columns, crowd.gap)
+        best, _ = least(crowd.gap)
+    for k in range(crowd.cylinders.shape[0]):
+        x, y, r = crowd.cylinders[k, 0], crowd.cylinders[k, 1], crowd.cylinders[k, 2]
+        d, _ = cylinder_clearance(robot, 0, x, y, r, people.top_z)
+        best = min(best, d)
+    return best
+
+
+@kernel()
+def people_speed_bound(before: Vec, after: Vec, start: Vec, end: Vec, dt: float) -> float:
+    """Return a bound on the speed of any point of the people in a period [m/s].
+
+    Workers: from the chords of the capsules' ends, with 5 % for the arc: enough for turns up to
+    one radian per period. Walkers: walking and growing.
+
+    Args:
+        before: The workers' capsules at the start, shape (9, n).
+        after: Their capsules at the end, shape (9, n).
+        start: The walkers' x, y, radius at the start [m], shape (C, 3).
+        end: The same at the end [m], shape (C, 3).
+        dt: Period [s].
+    """
+    longest = 1.05 * longest_way(before, after)
+    for k in range(start.shape[0]):
+        way = math.hypot(end[k, 0] - start[k, 0], end[k, 1] - start[k, 1])
+        longest = max(longest, way + abs(end[k, 2] - start[k, 2]))
+    return longest / dt
+
+
+@kernel(inline="always")
+def worker_at(people: People, state: PeopleState, e: int, w: int, t: float) -> None:
+    """Write the state of worker ``w`` of environment ``e`` at ``t`` [s] since its start."""
+    when, start = state.phase[e, w] + people.pace * t, state.start[e, w]
+    move, n = state.move[e, w], state.n_moves[e, w]
+    while move + 1 < n and start[move + 1] <= when:
+        move += 1
+    state.move[e, w] = move
+    chosen = state.chosen[e, w]
+    script.move_at(
+        when,
+        start[move],
+        state.duration[e, w, move],
+        people.postures[chosen[move]],
+        people.postures[chosen[move + 1]],
+        people.pace,
+        state.q[e, w],
+        state.qd[e, w],
+    )
+
+
+@kernel()
+def start_people(
+    people: People, state: PeopleState, e: int, rng: random.State, crowd: Crowd
+) -> None:
+    """Draw an episode of all people of environment ``e`` and place them."""
+    for w in range(state.q.shape[1]):
+        state.n_moves[e, w] = script.draw_script(
+            rng,
+            people.of_station,
+            people.of_station.shape[0] - 1,
+            people.n_cubes,
+            people.hands,
+            -1,
+            state.start[e, w],
+            state.duration[e, w],
+            state.chosen[e, w],
+        )
+        state.phase[e, w] = 12.0 * random.uniform(rng)
+        state.move[e, w] = 0
+        worker_at(people, state, e, w, 0.0)
+    for k in range(state.cylinders.shape[1]):
+        start_walker(people.walkers, state.walkers, e, k, rng)
+        _keep_cylinder(state, e, k)
+    place_people(people, state, e, crowd)
+
+
+@kernel(inline="always")
+def advance_people(people: People, state: PeopleState, e: int, t: float, dt: float) -> None:
+    """Move the people of environment ``e`` on by one period.
+
+    Args:
+        people: Shared data.
+        state: Rows; the joints and cylinders of row ``e`` are written.
+        e: Environment.
+        t: Time since the start, after the period [s].
+        dt: Period [s].
+    """
+    for w in range(state.q.shape[1]):
+        worker_at(people, state, e, w, t)
+    for k in range(state.cylinders.shape[1]):
+        advance_walker(people.walkers, state.walkers, e, k, dt)
+        _keep_cylinder(state, e, k)
+
+
+@kernel(inline="always")
+def _keep_cylinder(state: PeopleState, e: int, k: int) -> None:
+    state.cylinders[e, k, 0] = state.walkers.x[e, k]
+    state.cylinders[e, k, 1] = state.walkers.y[e, k]
+    state.cylinders[e, k, 2] = state.walkers.r[e, k]
+
+
+@kernel(inline="always")
+def place_people(people: People, state: PeopleState, e: int, crowd: Crowd) -> None:
+    """Fill ``crowd`` with the people of environment ``e`` as they are now."""
+    place_workers(people, state.q[e], crowd)
+    copy_rows(state.cylinders[e], crowd.cylinders)
+
+
+@kernel()
+def nearest_person(people: People, robot: Vec, crowd: Crowd) -> int:
+    """Return the person nearest to the robot: workers first, then walkers; -1 for nobody.
+
+    Args:
+        people: Shared data.
+        robot: The robot's capsules as columns, shape (9, n).
+        crowd: The people, placed.
+    """
+    n_workers, n_walkers = crowd.q.shape[0], crowd.cylinders.shape[0]
+    if n_workers + n_walkers < 2:
+        return n_workers + n_walkers - 1
+    best, nearest = FAR, 0
+    if n_workers > 0:
+        gaps(robot, crowd.columns, crowd.gap)
+    for w in range(n_workers):
+        d, _ = least(crowd.gap[w * body.N_CAPSULES : (w + 1) * body.N_CAPSULES])
+        if d < best:
+            best, nearest = d, w
+    for k in range(n_walkers):
+        x, y, r = crowd.cylinders[k, 0], crowd.cylinders[k, 1], crowd.cylinders[k, 2]
+        d, _ = cylinder_clearance(robot, 0, x, y, r, people.top_z)
+        if d < best:
+            best, nearest = d, n_workers + k
+    return nearest
+
+
+@kernel(inline="always")
+def see_nearest(people: People, state: PeopleState, e: int, robot: Vec, crowd: Crowd) -> None:
+    """Write joints of the nearest person of environment ``e`` into ``crowd.seen_q, seen_qd``.
+
+    A walker is seen as a person who stands in the cylinder, facing the robot's base; nobody, as
+    one who stands too far away to matter. So a policy for one 18-DoF person works beside any.
+
+    Args:
+        people: Shared data.
+        state: Rows of the people.
+        e: Environment.
+        robot: The robot's capsules as columns, shape (9, n).
+        crowd: The people, placed as they are now.
+    """
+    who, n_workers = nearest_person(people, robot, crowd), state.q.shape[1]
+    if 0 <= who < n_workers:
+        for j in range(18):
+            crowd.seen_q[j], crowd.seen_qd[j] = state.q[e, who, j], state.qd[e, who, j]
+        return
+    for j in range(18):
+        crowd.seen_q[j], crowd.seen_qd[j] = people.nobody[j], 0.0
+    if who >= 0:
+        x, y = state.cylinders[e, who - n_workers, 0], state.cylinders[e, who - n_workers, 1]
+        crowd.seen_q[0], crowd.seen_q[1], crowd.seen_q[2] = x, y, math.atan2(-y, -x)
+        crowd.seen_qd[0] = state.walkers.vx[e, who - n_workers]
+        crowd.seen_qd[1] = state.walkers.vy[e, who - n_workers]

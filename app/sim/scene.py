@@ -1,0 +1,206 @@
+"""What the compiled kernels know of a work cell: its robot and its people.
+
+The kernels take plain tuples of arrays (``kernels/arm.py``, ``kernels/people.py``); this file
+makes them from a :class:`~app.sim.cells.Cell`.
+"""
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from app.errors import InvalidInput, SimulationError
+from app.sim import human
+from app.sim.cells import Cell
+from app.sim.kernels import body, people, script
+from app.sim.kernels.arm import Arm
+from app.sim.kernels.columns import new_columns
+from app.sim.kernels.people import MAX_PEOPLE, People, PeopleState
+from app.sim.occupancy import walker_rules, walker_state
+from app.sim.ports import Vec
+from app.sim.shapes import levers, load_robot_capsules, self_pairs
+from app.sim.work_cycle import build_library
+
+HumanKind = Literal["worker", "walker", "constant", "fixed-speed"]
+HUMAN_KINDS: tuple[HumanKind, ...] = ("worker", "walker", "constant", "fixed-speed")
+"""An 18-DoF person at work; a cylinder that walks (METHOD 2.1), with speed and radius that vary,
+that are constant per episode, or with a given speed."""
+FAR_AWAY = (0.0, 4.0, -np.pi / 2.0)
+"""Pelvis of the person assumed where nobody is there: out of everyone's reach [m, rad]."""
+
+
+def require_finite(name: str, values: NDArray[np.floating]) -> None:
+    """Raise SimulationError for NaN and infinity, which the contact test would pass over."""
+    if not np.isfinite(values).all():
+        raise SimulationError(f"{name} = {values.tolist()} must be finite")
+
+
+def own(values: ArrayLike) -> Vec:
+    """Return a copy of one kind, float64, contiguous and writable.
+
+    Kernels are compiled anew for read-only, strided or integer arrays: half a minute in the
+    middle of a live cell.
+    """
+    return np.array(values, dtype=np.float64, order="C")
+
+
+def check_people(kinds: Sequence[str]) -> None:
+    """Check a list of people.
+
+    Raises:
+        InvalidInput: An unknown kind, or more people than a cell holds.
+    """
+    for kind in kinds:
+        if kind not in HUMAN_KINDS:
+            raise InvalidInput("people", kind, "must be a kind of person", HUMAN_KINDS)
+    if len(kinds) > MAX_PEOPLE:
+        raise InvalidInput("people", list(kinds), f"must be at most {MAX_PEOPLE}")
+
+
+def kinds_of(cell: Cell) -> tuple[HumanKind, ...]:
+    """Return the kinds of a cell's people, workers first, as the kernels number them."""
+    return tuple(person.kind for person in (*cell.workers, *cell.cylinders))
+
+
+def with_people(cell: Cell, kinds: Sequence[HumanKind]) -> Cell:
+    """Return a cell with other people in it.
+
+    Who the cell already describes is taken over, in order and as often as asked for; other
+    kinds walk, with the constants of METHOD 2.1, where the cell's people may be.
+
+    Raises:
+        InvalidInput: An unknown kind, too many people, or a worker where the cell has none.
+    """
+    check_people(kinds)
+    found = {kind: [p for p in cell.people if p.kind == kind] for kind in HUMAN_KINDS}
+    people = []
+    for kind in kinds:
+        known = found[kind]
+        if not known and kind == "worker":
+            raise InvalidInput(
+                "people", kind, f"must be described in the cell {cell.name}: it has no worker"
+            )
+        if known:
+            people.append(known[sum(p.kind == kind for p in people) % len(known)])
+        else:
+            people.append(walker_beside(cell, kind))
+    return cell.model_copy(update={"people": tuple(people)})
+
+
+def n_workers(kinds: Sequence[HumanKind]) -> int:
+    """Return how many of the people are 18-DoF workers."""
+    return sum(kind == "worker" for kind in kinds)
+
+
+@lru_cache(maxsize=8)
+def arm_of(cell: Cell) -> Arm:
+    """Return what the kernels know of a cell's robot."""
+    mount = cell.robot
+    capsules = load_robot_capsules(mount.tool_length, mount.tool_radius)
+    pairs, span = self_pairs(capsules), capsules.p1 - capsules.p0
+    return Arm(
+        q_min=np.array(mount.q_min),
+        q_max=np.array(mount.q_max),
+        qd_max=np.array(mount.qd_max),
+        qdd_max=np.array(mount.qdd_max),
+        jerk_max=np.array(mount.jerk_max),
+        home=np.array(mount.home_q),
+        dt=mount.dt,
+        tool_length=mount.tool_length,
+        link=own_index(capsules.link),
+        p0=own(capsules.p0),
+        span=own(span),
+        columns=new_columns(len(capsules.link), capsules.radius, (span**2).sum(axis=1)),
+        first=own_index(pairs[:, 0]),
+        second=own_index(pairs[:, 1]),
+        lever=levers(mount.tool_length, mount.tool_radius),
+        boxes=boxes_of(cell),
+    )
+
+
+def own_index(values: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return a contiguous, writable copy of integers."""
+    return np.array(values, dtype=np.int64, order="C")
+
+
+def boxes_of(cell: Cell) -> Vec:
+    """Return a cell's fixed obstacles: centre, half sizes [m], yaw [rad], shape (n, 7)."""
+    rows = [(*box.center, *box.half_size, box.yaw) for box in cell.obstacles]
+    return np.array(rows, dtype=np.float64).reshape(-1, 7)
+
+
+def people_of(
+    cell: Cell, kinds: Sequence[HumanKind] = ("worker",), library_seed: int = 0, pace: float = 1.0
+) -> People:
+    """Return what the kernels know of a cell's people.
+
+    Args:
+        cell: Work cell.
+        kinds: Who is in it, 0 to 4 people.
+        library_seed: Seed of the workers' library of postures.
+        pace: Speed of the workers relative to the work cycle.
+    """
+    check_people(kinds)
+    workers = n_workers(kinds)
+    template = body.capsule_columns(workers, cell.pelvis_z, cell.floor_z)
+    postures, hands = np.zeros((1, 18)), np.zeros((1, 2, 3))
+    of_station, n_cubes = np.zeros((1, 2, 2), dtype=np.int64), 0
+    if workers:
+        library = build_library(cell, library_seed)
+        postures, hands = own(library.postures), own(library.hands)
+        of_station, n_cubes = own_index(library.of_station), library.n_cubes
+    return People(
+        pelvis_z=cell.pelvis_z,
+        floor_z=cell.floor_z,
+        top_z=cell.floor_z + max([p.height for p in cell.cylinders], default=2.0),
+        columns=template,
+        person=body.capsule_columns(1, cell.pelvis_z, cell.floor_z),
+        postures=postures,
+        hands=hands,
+        of_station=of_station,
+        n_cubes=n_cubes,
+        pace=pace,
+        walkers=walker_rules(cell, [kind for kind in kinds if kind != "worker"]),
+        nobody=human.rest_posture(*FAR_AWAY),
+    )
+
+
+def new_people_state(shared: People, kinds: Sequence[HumanKind], n_envs: int) -> PeopleState:
+    """Return rows for the people of ``n_envs`` cells, not started yet."""
+    workers, walkers = n_workers(kinds), len(kinds) - n_workers(kinds)
+
+    def rows(*shape: int) -> Vec:
+        return np.zeros((n_envs, *shape))
+
+    def counts(*shape: int) -> NDArray[np.int64]:
+        return np.zeros((n_envs, *shape), dtype=np.int64)
+
+    return PeopleState(
+        q=rows(workers, 18),
+        qd=rows(workers, 18),
+        columns=np.repeat(shared.columns[None], n_envs, axis=0),
+        phase=rows(workers),
+        move=counts(workers),
+        n_moves=counts(workers),
+        start=rows(workers, script.MAX_MOVES),
+        duration=rows(workers, script.MAX_MOVES),
+        chosen=counts(workers, script.MAX_MOVES + 1),
+        walkers=walker_state(n_envs, walkers),
+        cylinders=rows(walkers, 3),
+    )
+
+
+def crowd_of(shared: People, human_q: Vec, cylinders: Vec) -> people.Crowd:
+    """Return people placed as shapes.
+
+    Args:
+        shared: From :func:`people_of`.
+        human_q: The workers' joints [m, rad], shape (W, 18).
+        cylinders: The walkers' x, y and radius [m], shape (C, 3).
+    """
+    crowd = people.new_crowd(shared, len(human_q), len(cylinders))
+    people.place_workers(shared, own(human_q), crowd)
+    crowd.cylinders[:] = cylinders
+    return crowd

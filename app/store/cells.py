@@ -1,0 +1,102 @@
+"""Work cells of the user's own, as JSON under their names; the store never opens them.
+
+A stored cell never changes: another one of the same name is refused until the first is removed,
+so that what a job trains in is what its name meant when it was posted.
+"""
+
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from typing import Any
+
+import sqlalchemy as sa
+
+from app.errors import Conflict, NotFound
+from app.store.engine import Store
+from app.store.records import CellRecord
+from app.store.tables import cells, jobs
+
+MAX_CELLS = 200
+"""Most cells that are kept."""
+
+
+def put_cell(store: Store, name: str, definition: Mapping[str, Any]) -> bool:
+    """Store a cell; the same one again is harmless.
+
+    Args:
+        store: The database.
+        name: Name of the cell.
+        definition: Its content, JSON data.
+
+    Returns:
+        Whether it is new.
+
+    Raises:
+        Conflict: Another cell has that name, or there are too many.
+        StorageFull: No room is left.
+    """
+    with store.writing() as connection:
+        known = {row.name: row.definition for row in connection.execute(sa.select(cells))}
+        if name in known:
+            if known[name] == definition:
+                return False
+            raise Conflict(
+                f"a cell named {name!r} with other content is stored: remove it first, or "
+                "choose another name"
+            )
+        if len(known) >= MAX_CELLS:
+            raise Conflict(f"{MAX_CELLS} cells are stored, no more are kept: remove one first")
+        values = {
+            "name": name,
+            "definition": dict(definition),
+            "created_at": datetime.now(UTC),
+        }
+        connection.execute(sa.insert(cells).values(values))
+    return True
+
+
+def get_cell(store: Store, name: str) -> CellRecord:
+    """Return one cell.
+
+    Raises:
+        NotFound: No cell has that name.
+    """
+    query = sa.select(cells).where(cells.c.name == name)
+    with store.reading() as connection:
+        row = connection.execute(query).mappings().first()
+    if row is None:
+        raise NotFound("cell", name)
+    return CellRecord(**row)
+
+
+def list_cells(store: Store) -> tuple[CellRecord, ...]:
+    """Return all cells, by name."""
+    with store.reading() as connection:
+        rows = connection.execute(sa.select(cells).order_by(cells.c.name)).mappings().all()
+    return tuple(CellRecord(**row) for row in rows)
+
+
+def remove_cell(store: Store, name: str) -> None:
+    """Remove a cell; what was trained in it carries a copy and stays.
+
+    Raises:
+        NotFound: No cell has that name.
+        Conflict: A job that waits or runs trains in it.
+    """
+    with store.writing() as connection:
+        if (
+            connection.execute(sa.select(cells.c.name).where(cells.c.name == name)).first()
+            is None
+        ):
+            raise NotFound("cell", name)
+        waiting = sa.select(jobs.c.id, jobs.c.overrides).where(
+            jobs.c.state.in_(("queued", "running"))
+        )
+        users = [
+            row.id for row in connection.execute(waiting) if row.overrides.get("cell") == name
+        ]
+        if users:
+            raise Conflict(
+                f"cell {name!r} is in use by job {users[0]}, which has not ended: cancel the "
+                "job first"
+            )
+        connection.execute(sa.delete(cells).where(cells.c.name == name))

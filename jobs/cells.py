@@ -1,0 +1,90 @@
+"""Every work cell by name: the shipped ones and the user's own, from the database."""
+
+import logging
+
+from app.errors import Conflict, InvalidInput, NotFound
+from app.sim.cells import Cell, cell_names, lacks_for_pick, load_cell, parse_definition
+from app.store.cells import get_cell, list_cells, put_cell, remove_cell
+from app.store.engine import Store
+
+logger = logging.getLogger(__name__)
+
+
+class CellCatalog:
+    """Finds cells by name; safe to use from any thread.
+
+    Args:
+        store: Where the user's cells are kept.
+    """
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+
+    def get(self, name: str) -> Cell:
+        """Return a cell.
+
+        Raises:
+            NotFound: No cell has that name.
+            InvalidInput: The stored cell does not fit this version.
+        """
+        if name in cell_names():
+            return load_cell(name)
+        try:
+            return parse_definition(get_cell(self._store, name).definition)
+        except NotFound:
+            raise NotFound("cell", name, self.names()) from None
+
+    def names(self) -> tuple[str, ...]:
+        """Return the names of all cells, shipped ones first."""
+        return (*cell_names(), *(record.name for record in list_cells(self._store)))
+
+    def all(self) -> list[Cell]:
+        """Return all cells, shipped ones first; those that do not fit are left out."""
+        found = [load_cell(name) for name in cell_names()]
+        for record in list_cells(self._store):
+            try:
+                found.append(parse_definition(record.definition))
+            except InvalidInput as error:
+                logger.warning("cell %s is left out: %s", record.name, error.message)
+        return found
+
+    def to_train_in(self, name: str) -> Cell:
+        """Return a cell that policies can be trained in.
+
+        Raises:
+            InvalidInput: No cell has that name, or it lacks something.
+        """
+        try:
+            cell = self.get(name)
+        except NotFound:
+            rule = "is no known work cell"
+            raise InvalidInput("overrides.cell", name, rule, self.names()) from None
+        if (lack := lacks_for_pick(cell)) is not None:
+            raise InvalidInput("overrides.cell", name, f"cannot be trained in: it {lack}")
+        return cell
+
+    def add(self, cell: Cell) -> bool:
+        """Keep a checked cell of the user's own.
+
+        Returns:
+            Whether it is new; the same one again is harmless.
+
+        Raises:
+            Conflict: The name is taken.
+        """
+        self._require_own(cell.name)
+        return put_cell(self._store, cell.name, cell.definition())
+
+    def remove(self, name: str) -> None:
+        """Forget a cell of the user's own.
+
+        Raises:
+            NotFound: No cell has that name.
+            Conflict: It is shipped, or a job that has not ended trains in it.
+        """
+        self._require_own(name)
+        remove_cell(self._store, name)
+
+    def _require_own(self, name: str) -> None:
+        if name in cell_names():
+            raise Conflict(f"the cell {name!r} is shipped with Tandem: its name is reserved")

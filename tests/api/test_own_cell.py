@@ -1,0 +1,98 @@
+"""A cell of the user's own through the whole service: stored, trained in, deciding, shown."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from app.policies import presets
+from app.policies.training import train
+from app.store.checkpoints import put_checkpoint
+from app.store.records import NewCheckpoint
+from tests import workshop
+
+TINY = {
+    "total_steps": 1024,
+    "n_envs": 16,
+    "buffer_size": 2000,
+    "batch_size": 32,
+    "learning_starts": 256,
+    "width": 32,
+    "progress_steps": 256,
+    "checkpoint_steps": 512,
+    "cell": "workshop",
+}
+"""Nothing is learned by so little; everything is run through."""
+
+
+@pytest.fixture(scope="module")
+def checkpoint(client: TestClient) -> str:
+    """A policy that was trained in the own cell, in the store of the service."""
+    made = train(
+        presets.resolve("pick-td3", TINY),
+        seed=2,
+        resume=None,
+        on_progress=lambda _: None,
+        on_checkpoint=lambda *_: None,
+        should_stop=lambda: False,
+        cell=workshop.cell(),
+    ).checkpoint
+    new = NewCheckpoint(sha256=made.sha256, manifest=made.manifest, tensors=made.tensors)
+    put_checkpoint(client.app.state.services.store, new)  # type: ignore[attr-defined]
+    return made.sha256
+
+
+@pytest.fixture
+def own(client: TestClient) -> Iterator[None]:
+    client.post("/v1/cells", json=workshop.definition()).raise_for_status()
+    yield
+    client.delete("/v1/cells/workshop")
+
+
+def asked(state: dict[str, Any], checkpoint: str | None, cell: str) -> dict[str, Any]:
+    candidates = [{"id": "part2", "position": [0.2, 0.62, 0.12]}]
+    changes = {"cell": cell, "checkpoint": checkpoint, "candidates": candidates}
+    return {**state, **changes, "previous": None}
+
+
+@pytest.mark.usefixtures("own")
+def test_policy_decides_in_its_own_cell_and_in_no_other(
+    client: TestClient, state: dict[str, Any], checkpoint: str
+) -> None:
+    answer = client.post("/v1/task-selection", json=asked(state, checkpoint, "workshop"))
+    assert answer.status_code == 200
+    assert (answer.json()["chosen"], answer.json()["checkpoint"]) == ("part2", checkpoint)
+    for reference, cell in ((checkpoint, "pick-and-place"), (None, "workshop")):
+        refused = client.post("/v1/task-selection", json=asked(state, reference, cell))
+        assert refused.status_code == 409
+        assert refused.json()["field"] == "cell"
+
+
+def test_unknown_cell_of_a_request_names_the_known(
+    client: TestClient, state: dict[str, Any]
+) -> None:
+    answer = client.post("/v1/task-selection", json=asked(state, None, "garage"))
+    assert answer.status_code == 422
+    assert "pick-and-place" in answer.json()["choices"]
+
+
+def test_policy_refuses_its_cell_once_that_has_changed(
+    client: TestClient, state: dict[str, Any], checkpoint: str
+) -> None:
+    changed = workshop.definition(title="With another title")
+    client.post("/v1/cells", json=changed).raise_for_status()
+    answer = client.post("/v1/task-selection", json=asked(state, checkpoint, "workshop"))
+    client.delete("/v1/cells/workshop")
+    assert answer.status_code == 409
+    assert "workshop as it is now" in answer.json()["detail"]
+
+
+@pytest.mark.usefixtures("own")
+def test_live_world_shows_the_own_cell_with_the_policy_trained_there(
+    client: TestClient, checkpoint: str
+) -> None:
+    shown = client.put("/v1/worlds/main/cell", json={"cell": "workshop"})
+    back = client.put("/v1/worlds/main/cell", json={"cell": "pick-and-place"})
+    assert (shown.json()["cell"], shown.json()["checkpoint"]) == ("workshop", checkpoint)
+    assert back.json()["cell"] == "pick-and-place"

@@ -1,0 +1,60 @@
+import pytest
+
+from app.errors import Conflict, InvalidInput, NotFound
+from app.sim.cells import cell_names, load_cell
+from app.store.cells import put_cell
+from app.store.engine import Store
+from jobs.cells import CellCatalog
+from tests import workshop
+
+
+@pytest.fixture
+def catalog(store: Store) -> CellCatalog:
+    return CellCatalog(store)
+
+
+def test_cell_of_the_user_s_own_is_found_beside_the_shipped_ones(catalog: CellCatalog) -> None:
+    own = workshop.cell()
+    assert catalog.add(own)
+    assert catalog.get("workshop") == own
+    assert catalog.get("pick-and-place") == load_cell("pick-and-place")
+    assert catalog.names() == (*cell_names(), "workshop")
+    assert [cell.name for cell in catalog.all()] == [*cell_names(), "workshop"]
+
+
+def test_same_cell_again_is_not_new(catalog: CellCatalog) -> None:
+    catalog.add(workshop.cell())
+    assert not catalog.add(workshop.cell())
+    with pytest.raises(Conflict, match="remove it first"):
+        catalog.add(workshop.cell(title="Another one"))
+
+
+def test_names_of_shipped_cells_are_reserved(catalog: CellCatalog) -> None:
+    with pytest.raises(Conflict, match="reserved"):
+        catalog.add(workshop.cell(name="pick-and-place"))
+    with pytest.raises(Conflict, match="reserved"):
+        catalog.remove("pick-and-place")
+
+
+def test_unknown_cell_names_the_known_ones(catalog: CellCatalog) -> None:
+    catalog.add(workshop.cell())
+    with pytest.raises(NotFound, match=r"no cell 'kitchen'; known: .*workshop"):
+        catalog.get("kitchen")
+
+
+def test_cell_to_train_in_must_have_what_the_scenario_needs(catalog: CellCatalog) -> None:
+    catalog.add(workshop.cell())
+    assert catalog.to_train_in("workshop").name == "workshop"
+    with pytest.raises(InvalidInput, match=r"overrides\.cell = 'sorting-e0' cannot be trained"):
+        catalog.to_train_in("sorting-e0")
+    with pytest.raises(InvalidInput, match=r"overrides\.cell = 'kitchen' is no known"):
+        catalog.to_train_in("kitchen")
+
+
+def test_stored_cell_that_no_longer_fits_hides_no_other(
+    catalog: CellCatalog, store: Store
+) -> None:
+    put_cell(store, "old", {"name": "old", "wheels": 4})
+    assert [cell.name for cell in catalog.all()] == list(cell_names())
+    with pytest.raises(InvalidInput, match="another version of Tandem"):
+        catalog.get("old")
