@@ -5,7 +5,7 @@ a policy meet the same robot, table and people. All that touches the kernels sta
 :class:`Checker`.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,27 +16,38 @@ from app.sim.cells import Cell
 from app.sim.kernels import arm as arm_kernel
 from app.sim.kernels import free
 from app.sim.kernels.arm import Arm
+from app.sim.kernels.columns import N_ROWS, columns_of, padded
 from app.sim.ports import Vec
 
 CELL_MARGIN = 0.002
-"""Distance that plans keep from the table and of the robot from itself [m]; ours."""
+"""Distance that plans keep from the cell and of the robot from itself [m]; ours."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shapes:
     """Where people are at one moment, of any kind and number."""
 
-    ends: Vec
-    """Ends of their capsules [m], shape (m, 2, 3)."""
-    radius: Vec
-    """Radii of their capsules [m], shape (m,)."""
+    columns: Vec
+    """Their capsules, shape (9, m); see ``kernels/columns.py``."""
     cylinders: Vec
     """Upright cylinders on the floor: x, y, radius, top [m], shape (n, 4)."""
 
 
 def no_people() -> Shapes:
     """Return an empty cell."""
-    return Shapes(ends=np.zeros((0, 2, 3)), radius=np.zeros(0), cylinders=np.zeros((0, 4)))
+    return Shapes(columns=np.zeros((N_ROWS, 0)), cylinders=np.zeros((0, 4)))
+
+
+def capsule_shapes(ends: Vec, radius: Vec) -> Shapes:
+    """Return people given by capsules.
+
+    Args:
+        ends: Ends of the capsules [m], shape (m, 2, 3).
+        radius: Their radii [m], shape (m,).
+    """
+    return Shapes(
+        columns=columns_of(ends, radius, padded(len(radius))), cylinders=np.zeros((0, 4))
+    )
 
 
 def shapes_of(
@@ -59,12 +70,11 @@ def shapes_of(
     for name, rows, width in (("human_qs", qs, 18), ("cylinders", tubes, 4)):
         if rows.ndim != 2 or rows.shape[1] != width or not np.isfinite(rows).all():
             raise InvalidInput(name, rows.tolist(), f"must be finite, of shape (n, {width})")
-    ends = [human.capsules(q, cell.pelvis_z, cell.floor_z) for q in qs]
-    return Shapes(
-        ends=np.concatenate(ends) if ends else np.zeros((0, 2, 3)),
-        radius=np.tile(np.array(human.CAPSULE_RADII, dtype=np.float64), len(qs)),
-        cylinders=tubes,
-    )
+    if len(qs) == 0:
+        return Shapes(columns=np.zeros((N_ROWS, 0)), cylinders=tubes)
+    ends = np.concatenate([human.capsules(q, cell.pelvis_z, cell.floor_z) for q in qs])
+    workers = capsule_shapes(ends, np.tile(human.CAPSULE_RADII, len(qs)))
+    return replace(workers, cylinders=tubes)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,8 +83,8 @@ class Clearance:
 
     people: float
     """To the nearest person."""
-    table: float
-    """Of the moving links to the table's plane."""
+    cell: float
+    """Of the moving links to table and obstacles."""
     own: float
     """Of the robot to itself."""
 
@@ -85,10 +95,10 @@ class Checker:
     Not thread-safe: it owns a work space and counts what it looks at.
 
     Args:
-        arm: From ``pick.arm_of``.
+        arm: From ``scene.arm_of``.
         people: Where people are.
         margin: Distance to keep from people [m].
-        cell_margin: Distance to keep from the table and of the robot from itself [m].
+        cell_margin: Distance to keep from the cell and of the robot from itself [m].
     """
 
     def __init__(
@@ -96,9 +106,16 @@ class Checker:
     ) -> None:
         self.arm, self.people, self.margin, self.cell_margin = arm, people, margin, cell_margin
         self._around = free.Around(
-            people.ends, people.radius, people.cylinders, float(margin), float(cell_margin)
+            people.columns,
+            np.empty(people.columns.shape[1]),
+            people.cylinders,
+            float(margin),
+            float(cell_margin),
+            np.empty(6),
+            np.empty(6),
+            np.empty(6),
         )
-        self._pose = arm_kernel.new_pose(len(arm.link))
+        self._pose = arm_kernel.new_robot_pose(arm)
         self.n_poses = 0
 
     def is_free(self, q: Vec) -> bool:
@@ -109,8 +126,8 @@ class Checker:
     def clearance(self, q: Vec) -> Clearance:
         """Return the distances at ``q`` [rad], shape (6,)."""
         self.n_poses += 1
-        people, table, own = free.gaps_at(self.arm, q, self._around, self._pose)
-        return Clearance(people=people, table=table, own=own)
+        people, cell, own = free.gaps_at(self.arm, q, self._around, self._pose)
+        return Clearance(people=people, cell=cell, own=own)
 
     def edge_free(self, q0: Vec, q1: Vec) -> bool:
         """Tell whether the straight joint motion between two positions [rad] is free."""

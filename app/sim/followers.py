@@ -92,7 +92,7 @@ class Follower:
     """A planner that acts like a policy: state and people in, wanted joint speeds out.
 
     Args:
-        arm: From ``pick.arm_of``.
+        arm: From ``scene.arm_of``.
         goals: Postures to reach one of [rad], shape (k, 6).
         settings: Role, margins, budgets.
         seed: Seed of the first plan; each later one adds 1.

@@ -40,7 +40,7 @@ def goal_postures(
     """Return postures whose tcp lies at a target, of any tilt up to a bound.
 
     Args:
-        arm: From ``pick.arm_of``.
+        arm: From ``scene.arm_of``.
         target: Where the tcp shall be [m], shape (3,).
         rng: Draws the starts of the search, and points near the target.
         n_starts: Random starts; the first one is the cell's home.

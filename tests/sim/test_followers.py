@@ -15,9 +15,9 @@ from app.sim.collision import CollisionReference
 from app.sim.followers import ROLES, Follower, FollowSettings
 from app.sim.goal_postures import vertical_posture
 from app.sim.kernels import polynomial
-from app.sim.pick import arm_of
 from app.sim.planners import PLANNERS, PlanSettings
 from app.sim.ports import Vec
+from app.sim.scene import arm_of
 
 CELL = load_cell()
 ARM = arm_of(CELL)

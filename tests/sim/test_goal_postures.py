@@ -4,8 +4,8 @@ import numpy as np
 
 from app.sim.cells import load_cell
 from app.sim.goal_postures import APART, goal_postures, vertical_posture
-from app.sim.pick import arm_of
 from app.sim.robot import Robot
+from app.sim.scene import arm_of
 
 CELL = load_cell()
 ARM = arm_of(CELL)

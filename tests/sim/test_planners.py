@@ -11,9 +11,9 @@ from app.sim.cells import load_cell
 from app.sim.checker import Checker, Shapes, no_people, shapes_of
 from app.sim.collision import CollisionReference
 from app.sim.goal_postures import goal_postures, vertical_posture
-from app.sim.pick import arm_of
 from app.sim.planners import PLANNERS, PlanSettings, plan
 from app.sim.ports import Vec
+from app.sim.scene import arm_of
 
 CELL = load_cell()
 ARM = arm_of(CELL)

@@ -8,13 +8,13 @@ import pytest
 
 from app.errors import InvalidInput
 from app.sim.cells import load_cell
-from app.sim.checker import Checker, Shapes, no_people
+from app.sim.checker import Checker, capsule_shapes, no_people
 from app.sim.goal_postures import vertical_posture
 from app.sim.kernels.polynomial import coefficient_interval
-from app.sim.pick import arm_of
 from app.sim.planners import planning_limits
 from app.sim.ports import Vec
 from app.sim.robot import Robot
+from app.sim.scene import arm_of
 from app.sim.time_scaling import (
     Limits,
     TimedPath,
@@ -162,9 +162,7 @@ def corner_beside_a_ball() -> tuple[Checker, Vec]:
     for _ in range(100):
         way = rng.normal(size=3)
         ball = tcp + 0.15 * way / np.linalg.norm(way)
-        people = Shapes(
-            ends=np.array([[ball, ball]]), radius=np.array([0.03]), cylinders=np.zeros((0, 4))
-        )
+        people = capsule_shapes(np.array([[ball, ball]]), np.array([0.03]))
         checker = Checker(ARM, people, 0.0, 0.0)
         near = min(checker.clearance(q).people for q in rounded)
         far = min(checker.clearance(q).people for q in sharp)

@@ -6,8 +6,8 @@ import numpy as np
 
 from app.sim.cells import load_cell
 from app.sim.kernels import polynomial
-from app.sim.pick import arm_of
 from app.sim.ports import Vec
+from app.sim.scene import arm_of
 from app.sim.time_scaling import Limits, time_path
 from app.sim.tracking import Tracker, straight_stop
 

@@ -2,126 +2,65 @@
 
 What a planner asks thousands of times. People stand still here: capsules and upright cylinders
 at one moment. *Slack* is the clearance beyond what is asked for: distance to people less their
-margin, distance to the table and of the robot to itself less another. A pose is free when its
+margin, distance to the cell and of the robot to itself less another. A pose is free when its
 slack is more than half of RESOLUTION; a motion is free when poses no farther apart than
 RESOLUTION, or than the slack at the last one allows, are free. Between two such poses no point
 moves farther than half the resolution from the nearer of both, so a free motion has slack above
 zero everywhere: the test can be early by half a millimetre, never late.
 """
 
-import math
 from typing import NamedTuple
 
-import numpy as np
-from numba import njit
-
-from app.sim.kernels.arm import (
-    Arm,
-    Pose,
-    place_robot,
-    self_clearance,
-    table_clearance,
-)
-from app.sim.kernels.geometry import FAR, set_clearance
+from app.sim.kernels.arm import Arm, RobotPose, cell_clearance, place_robot, self_clearance
+from app.sim.kernels.columns import gaps, least
+from app.sim.kernels.compiled import kernel
+from app.sim.kernels.cylinder import cylinder_clearance
+from app.sim.kernels.geometry import FAR
 from app.sim.ports import Vec
 
 RESOLUTION = 1e-3
 """Farthest that any point of the robot moves between two poses of a walked motion [m]."""
-GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
-"""The share of an interval that golden section search keeps."""
-SEARCH_STEPS = 32
-"""Steps of that search: 2e-7 of the segment's length are left."""
 
 
 class Around(NamedTuple):
-    """People at one moment, and the distances to keep."""
+    """People at one moment, the distances to keep, and work space."""
 
-    ends: Vec
-    """Ends of the capsules [m], shape (m, 2, 3)."""
-    radius: Vec
-    """Radii of the capsules [m], shape (m,)."""
+    columns: Vec
+    """The people's capsules, shape (9, m)."""
+    gap: Vec
+    """Work space: distance of each capsule to the robot [m], shape (m,)."""
     cylinders: Vec
     """Upright cylinders that stand on the floor: x, y, radius, top [m], shape (n, 4)."""
     margin: float
     """Distance to keep from people [m]."""
     cell_margin: float
-    """Distance to keep from the table and of the robot from itself [m]."""
+    """Distance to keep from the cell and of the robot from itself [m]."""
+    q: Vec
+    """Work space: a position on the way [rad], shape (6,)."""
+    qd: Vec
+    """Work space: speeds of a motion [rad/s], shape (6,)."""
+    c: Vec
+    """Work space: coefficients of a motion [rad/s^2], shape (6,)."""
 
 
-@njit(cache=True)
-def above_cylinder(x: float, y: float, z: float, cylinder: Vec) -> float:
-    """Return the distance of a point to a cylinder that stands on the floor [m], 0 inside."""
-    out = max(0.0, math.hypot(x - cylinder[0], y - cylinder[1]) - cylinder[2])
-    return float(math.hypot(out, max(0.0, z - cylinder[3])))
-
-
-@njit(cache=True)
-def cylinder_gap(a: Vec, radius: float, cylinder: Vec) -> float:
-    """Return the distance of a capsule to a cylinder that stands on the floor [m].
-
-    Where the segment is nearest to the cylinder's axis and below its top, that place is nearest
-    to the cylinder too; else the distance to a convex body is convex along the segment, and a
-    search finds its least value. ``-radius`` where the segment meets the cylinder.
-
-    Args:
-        a: Ends of the capsule's segment [m], shape (2, 3).
-        radius: The capsule's radius [m].
-        cylinder: x, y, radius, top [m], shape (4,).
-    """
-    dx, dy = a[1, 0] - a[0, 0], a[1, 1] - a[0, 1]
-    wx, wy = cylinder[0] - a[0, 0], cylinder[1] - a[0, 1]
-    flat2 = dx * dx + dy * dy
-    s = min(1.0, max(0.0, (wx * dx + wy * dy) / flat2)) if flat2 > 1e-12 else 0.0
-    if a[0, 2] + s * (a[1, 2] - a[0, 2]) <= cylinder[3]:
-        return float(max(0.0, math.hypot(wx - s * dx, wy - s * dy) - cylinder[2]) - radius)
-    return _search_segment(a, cylinder) - radius
-
-
-@njit(cache=True)
-def _search_segment(a: Vec, cylinder: Vec) -> float:
-    """Return the least distance of a segment to a cylinder [m] by golden section search."""
-    dx, dy, dz = a[1, 0] - a[0, 0], a[1, 1] - a[0, 1], a[1, 2] - a[0, 2]
-    low, high = 0.0, 1.0
-    s, t = 1.0 - GOLDEN, GOLDEN
-    ds = above_cylinder(a[0, 0] + s * dx, a[0, 1] + s * dy, a[0, 2] + s * dz, cylinder)
-    dt = above_cylinder(a[0, 0] + t * dx, a[0, 1] + t * dy, a[0, 2] + t * dz, cylinder)
-    for _ in range(SEARCH_STEPS):
-        if ds <= dt:
-            high, t, dt = t, s, ds
-            s = high - GOLDEN * (high - low)
-            ds = above_cylinder(a[0, 0] + s * dx, a[0, 1] + s * dy, a[0, 2] + s * dz, cylinder)
-        else:
-            low, s, ds = s, t, dt
-            t = low + GOLDEN * (high - low)
-            dt = above_cylinder(a[0, 0] + t * dx, a[0, 1] + t * dy, a[0, 2] + t * dz, cylinder)
-    first = above_cylinder(a[0, 0], a[0, 1], a[0, 2], cylinder)
-    last = above_cylinder(a[1, 0], a[1, 1], a[1, 2], cylinder)
-    return min(ds, dt, first, last)
-
-
-@njit(cache=True)
-def people_gap(arm: Arm, around: Around, pose: Pose) -> float:
+@kernel()
+def people_gap(around: Around, pose: RobotPose) -> float:
     """Return the distance of the placed robot to people [m]; FAR without any."""
     best = FAR
-    if around.radius.shape[0] > 0:
-        best, _, _ = set_clearance(
-            pose.robot,
-            arm.radius,
-            around.ends,
-            around.radius,
-            0,
-            around.radius.shape[0] - 1,
-            FAR,
-        )
-    for n in range(around.cylinders.shape[0]):
-        for k in range(arm.radius.shape[0]):
-            best = min(best, cylinder_gap(pose.robot[k], arm.radius[k], around.cylinders[n]))
+    if around.columns.shape[1] > 0:
+        gaps(pose.columns, around.columns, around.gap)
+        best, _ = least(around.gap)
+    for k in range(around.cylinders.shape[0]):
+        x, y = around.cylinders[k, 0], around.cylinders[k, 1]
+        r, top = around.cylinders[k, 2], around.cylinders[k, 3]
+        d, _ = cylinder_clearance(pose.columns, 0, x, y, r, top)
+        best = min(best, d)
     return best
 
 
-@njit(cache=True)
-def gaps_at(arm: Arm, q: Vec, around: Around, pose: Pose) -> tuple[float, float, float]:
-    """Return the distances to people, to the table and of the robot to itself [m].
+@kernel()
+def gaps_at(arm: Arm, q: Vec, around: Around, pose: RobotPose) -> tuple[float, float, float]:
+    """Return the distances to people, to the cell and of the robot to itself [m].
 
     Args:
         arm: Robot in its cell.
@@ -130,35 +69,35 @@ def gaps_at(arm: Arm, q: Vec, around: Around, pose: Pose) -> tuple[float, float,
         pose: Work space.
     """
     place_robot(arm, q, pose)
-    people = people_gap(arm, around, pose)
-    table, _ = table_clearance(arm, pose)
+    people = people_gap(around, pose)
+    cell, _, _ = cell_clearance(arm, pose.columns)
     own, _ = self_clearance(arm, pose)
-    return people, table, own
+    return people, cell, own
 
 
-@njit(cache=True)
-def slack_at(arm: Arm, q: Vec, around: Around, pose: Pose) -> float:
+@kernel()
+def slack_at(arm: Arm, q: Vec, around: Around, pose: RobotPose) -> float:
     """Return how far any point of the robot may move before something is too near [m].
 
     Of two parts of the robot that approach each other both move, so their slack counts half.
     """
-    people, table, own = gaps_at(arm, q, around, pose)
+    people, cell, own = gaps_at(arm, q, around, pose)
     return min(
         people - around.margin,
-        table - around.cell_margin,
+        cell - around.cell_margin,
         0.5 * (own - around.cell_margin),
     )
 
 
-@njit(cache=True)
-def free_at(arm: Arm, q: Vec, around: Around, pose: Pose) -> bool:
+@kernel()
+def free_at(arm: Arm, q: Vec, around: Around, pose: RobotPose) -> bool:
     """Tell whether a pose is free."""
     return bool(slack_at(arm, q, around, pose) > 0.5 * RESOLUTION)
 
 
-@njit(cache=True)
+@kernel()
 def motion_free(
-    arm: Arm, q0: Vec, qd0: Vec, c: Vec, duration: float, around: Around, pose: Pose
+    arm: Arm, q0: Vec, qd0: Vec, c: Vec, duration: float, around: Around, pose: RobotPose
 ) -> tuple[bool, int]:
     """Tell whether ``q0 + qd0 x + c x^2`` is free for all x from 0 to ``duration``.
 
@@ -176,8 +115,7 @@ def motion_free(
     Returns:
         Whether it is free, and the number of poses looked at.
     """
-    q = np.empty(6)
-    speed = 0.0
+    q, speed = around.q, 0.0
     for j in range(6):
         fastest = max(abs(qd0[j]), abs(qd0[j] + 2.0 * c[j] * duration))
         speed += fastest * arm.lever[j]
@@ -200,15 +138,17 @@ def motion_free(
     return True, looked
 
 
-@njit(cache=True)
-def edge_free(arm: Arm, q0: Vec, q1: Vec, around: Around, pose: Pose) -> tuple[bool, int]:
+@kernel()
+def edge_free(arm: Arm, q0: Vec, q1: Vec, around: Around, pose: RobotPose) -> tuple[bool, int]:
     """Tell whether the straight joint motion from ``q0`` to ``q1`` is free; see motion_free."""
-    return motion_free(arm, q0, q1 - q0, np.zeros(6), 1.0, around, pose)
+    for j in range(6):
+        around.qd[j], around.c[j] = q1[j] - q0[j], 0.0
+    return motion_free(arm, q0, around.qd, around.c, 1.0, around, pose)
 
 
-@njit(cache=True)
+@kernel()
 def first_blocked(
-    arm: Arm, q: Vec, qd: Vec, dt: float, first: int, around: Around, pose: Pose
+    arm: Arm, q: Vec, qd: Vec, dt: float, first: int, around: Around, pose: RobotPose
 ) -> int:
     """Return the first period of a timed path that is not free, or their number if all are.
 
@@ -221,16 +161,17 @@ def first_blocked(
         around: People.
         pose: Work space.
     """
-    n = len(q) - 1
+    n = int(q.shape[0]) - 1
     for k in range(first, n):
-        c = (qd[k + 1] - qd[k]) / (2.0 * dt)
-        free, _ = motion_free(arm, q[k], qd[k], c, dt, around, pose)
+        for j in range(6):
+            around.c[j] = (qd[k + 1, j] - qd[k, j]) / (2.0 * dt)
+        free, _ = motion_free(arm, q[k], qd[k], around.c, dt, around, pose)
         if not free:
             return k
     return n
 
 
-@njit(cache=True)
+@kernel()
 def _along(q0: Vec, qd0: Vec, c: Vec, x: float, q: Vec) -> None:
     """Write the position at time ``x`` of a motion into ``q``, shape (6,)."""
     for j in range(6):
