@@ -25,7 +25,6 @@ from app.sim.ports import Vec
 from app.sim.scene import (
     HumanKind,
     arm_of,
-    kinds_of,
     new_people_state,
     own,
     people_of,
@@ -124,13 +123,12 @@ def _world_of(cell: Cell, settings: PickSettings) -> pick.PickWorld:
                 station.position,
                 "must be reachable by the robot with its tool pointing down",
             )
-    kinds = kinds_of(cell)
     return pick.PickWorld(
         stations=positions,
         station_q=postures,
         n_cubes=len(cell.stations_of("cube")),
         arm=arm_of(cell),
-        people=people_of(cell, kinds, settings.library_seed, settings.human_pace),
+        people=people_of(cell, settings.library_seed, settings.human_pace),
     )
 
 
@@ -193,7 +191,7 @@ class PickBatch:
         self.n_envs, self.seed, self.settings = n_envs, seed, settings
         self.world = _world_of(self.cell, settings)
         self.arm = self.world.arm
-        people = new_people_state(self.world.people, kinds_of(self.cell), n_envs)
+        people = new_people_state(self.cell, self.world.people, n_envs)
         self.state = _new_state(self.world, people, n_envs)
         self._work = pick.new_work(self.world, self.state)
         self._first = first_env

@@ -13,12 +13,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from app.errors import InvalidInput, SimulationError
 from app.sim import human
+from app.sim.cell_people import ConstantWalker, CylinderPerson, FixedSpeedWalker, Walker
 from app.sim.cells import Cell
 from app.sim.kernels import body, people, script
 from app.sim.kernels.arm import Arm
 from app.sim.kernels.columns import new_columns
 from app.sim.kernels.people import MAX_PEOPLE, People, PeopleState
-from app.sim.occupancy import walker_rules, walker_state
+from app.sim.occupancy import WalkerSettings, walker_rules, walker_state
 from app.sim.ports import Vec
 from app.sim.shapes import levers, load_robot_capsules, self_pairs
 from app.sim.work_cycle import build_library
@@ -85,13 +86,37 @@ def with_people(cell: Cell, kinds: Sequence[HumanKind]) -> Cell:
         if known:
             people.append(known[sum(p.kind == kind for p in people) % len(known)])
         else:
-            people.append(walker_beside(cell, kind))
+            people.append(_cylinder_of(cell, kind))
     return cell.model_copy(update={"people": tuple(people)})
 
 
-def n_workers(kinds: Sequence[HumanKind]) -> int:
-    """Return how many of the people are 18-DoF workers."""
-    return sum(kind == "worker" for kind in kinds)
+def _cylinder_of(cell: Cell, kind: HumanKind) -> CylinderPerson:
+    """Return a cylinder of a kind that walks where a cell's first person may be."""
+    where = cell.people[0] if cell.people else WalkerSettings()
+    area = {name: getattr(where, name) for name in ("x_min", "x_max", "y_min", "y_max")}
+    if kind == "walker":
+        return Walker(kind=kind, **area)
+    if kind == "constant":
+        return ConstantWalker(kind=kind, **area)
+    return FixedSpeedWalker(kind="fixed-speed", speed=0.5, **area)
+
+
+_WALKER_FIELDS = {
+    "speed_min": "v_min",
+    "speed_max": "v_max",
+    "radius_min": "r_min",
+    "radius_max": "r_max",
+    "speed_frequency_max": "f_speed_max",
+    "radius_frequency_max": "f_radius_max",
+    "target_tolerance": "tolerance",
+    "speed": "fixed_speed",
+}
+
+
+def walker_settings(person: CylinderPerson) -> WalkerSettings:
+    """Return how a cell's cylinder walks."""
+    values = person.model_dump(exclude={"height"})
+    return WalkerSettings(**{_WALKER_FIELDS.get(name, name): v for name, v in values.items()})
 
 
 @lru_cache(maxsize=8)
@@ -131,19 +156,15 @@ def boxes_of(cell: Cell) -> Vec:
     return np.array(rows, dtype=np.float64).reshape(-1, 7)
 
 
-def people_of(
-    cell: Cell, kinds: Sequence[HumanKind] = ("worker",), library_seed: int = 0, pace: float = 1.0
-) -> People:
+def people_of(cell: Cell, library_seed: int = 0, pace: float = 1.0) -> People:
     """Return what the kernels know of a cell's people.
 
     Args:
-        cell: Work cell.
-        kinds: Who is in it, 0 to 4 people.
+        cell: Work cell with 0 to 4 people.
         library_seed: Seed of the workers' library of postures.
         pace: Speed of the workers relative to the work cycle.
     """
-    check_people(kinds)
-    workers = n_workers(kinds)
+    workers = len(cell.workers)
     template = body.capsule_columns(workers, cell.pelvis_z, cell.floor_z)
     postures, hands = np.zeros((1, 18)), np.zeros((1, 2, 3))
     of_station, n_cubes = np.zeros((1, 2, 2), dtype=np.int64), 0
@@ -162,14 +183,14 @@ def people_of(
         of_station=of_station,
         n_cubes=n_cubes,
         pace=pace,
-        walkers=walker_rules(cell, [kind for kind in kinds if kind != "worker"]),
+        walkers=walker_rules([walker_settings(person) for person in cell.cylinders]),
         nobody=human.rest_posture(*FAR_AWAY),
     )
 
 
-def new_people_state(shared: People, kinds: Sequence[HumanKind], n_envs: int) -> PeopleState:
+def new_people_state(cell: Cell, shared: People, n_envs: int) -> PeopleState:
     """Return rows for the people of ``n_envs`` cells, not started yet."""
-    workers, walkers = n_workers(kinds), len(kinds) - n_workers(kinds)
+    workers, walkers = len(cell.workers), len(cell.cylinders)
 
     def rows(*shape: int) -> Vec:
         return np.zeros((n_envs, *shape))

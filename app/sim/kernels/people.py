@@ -17,7 +17,17 @@ from app.sim.kernels import body, random, script
 from app.sim.kernels.columns import copy_rows, gaps, least, longest_way
 from app.sim.kernels.cylinder import cylinder_clearance
 from app.sim.kernels.geometry import FAR
-from app.sim.kernels.occupancy import WalkerRules, WalkerState, advance_walker, start_walker
+from app.sim.kernels.occupancy import (
+    VX,
+    VY,
+    R,
+    WalkerRules,
+    WalkerState,
+    X,
+    Y,
+    advance_walker,
+    start_walker,
+)
 from app.sim.ports import Vec
 
 MAX_PEOPLE = 4
@@ -251,9 +261,9 @@ def advance_people(people: People, state: PeopleState, e: int, t: float, dt: flo
 
 @kernel(inline="always")
 def _keep_cylinder(state: PeopleState, e: int, k: int) -> None:
-    state.cylinders[e, k, 0] = state.walkers.x[e, k]
-    state.cylinders[e, k, 1] = state.walkers.y[e, k]
-    state.cylinders[e, k, 2] = state.walkers.r[e, k]
+    rows = state.walkers.rows
+    state.cylinders[e, k, 0], state.cylinders[e, k, 1] = rows[e, k, X], rows[e, k, Y]
+    state.cylinders[e, k, 2] = rows[e, k, R]
 
 
 @kernel(inline="always")
@@ -312,7 +322,7 @@ def see_nearest(people: People, state: PeopleState, e: int, robot: Vec, crowd: C
     for j in range(18):
         crowd.seen_q[j], crowd.seen_qd[j] = people.nobody[j], 0.0
     if who >= 0:
-        x, y = state.cylinders[e, who - n_workers, 0], state.cylinders[e, who - n_workers, 1]
+        rows, k = state.walkers.rows, who - n_workers
+        x, y = rows[e, k, X], rows[e, k, Y]
         crowd.seen_q[0], crowd.seen_q[1], crowd.seen_q[2] = x, y, math.atan2(-y, -x)
-        crowd.seen_qd[0] = state.walkers.vx[e, who - n_workers]
-        crowd.seen_qd[1] = state.walkers.vy[e, who - n_workers]
+        crowd.seen_qd[0], crowd.seen_qd[1] = rows[e, k, VX], rows[e, k, VY]
