@@ -14,6 +14,7 @@ from app.sim.goal_postures import goal_postures, vertical_posture
 from app.sim.planners import PLANNERS, PlanSettings, plan
 from app.sim.ports import Vec
 from app.sim.scene import arm_of
+from app.sim.time_scaling import Limits, time_free_path
 
 CELL = load_cell()
 ARM = arm_of(CELL)
@@ -165,6 +166,23 @@ def test_one_of_several_goals_is_reached_and_named() -> None:
     answer = plan(checker, station("cube5"), goals, PlanSettings(max_poses=20_000))
     assert answer.solved
     np.testing.assert_allclose(answer.path[-1, :5], goals[answer.goal, :5], atol=1e-12)
+
+
+def test_a_cylinder_in_the_shared_workspace_is_planned_round_within_its_limits() -> None:
+    cell = load_cell("shared-workspace")
+    arm, rng = arm_of(cell), np.random.default_rng(0)
+    goals = goal_postures(arm, np.array([-0.4, 0.7, 0.3]), rng)
+    people = shapes_of(cell, None, np.array([[0.0, 0.6, 0.2, cell.floor_z + 2.0]]))
+    checker = Checker(arm, people, MARGIN)
+    start = goal_postures(arm, np.array([0.4, 0.7, 0.3]), rng)
+    start = start[[checker.is_free(q) for q in start]][0]
+    answer = plan(checker, start, goals, PlanSettings(max_poses=20_000))
+    assert answer.solved and len(answer.path) > 2
+    limits = Limits(qd_max=arm.qd_max, qdd_max=arm.qdd_max, dt=arm.dt)
+    timed = time_free_path(checker, answer.path, limits)
+    assert timed is not None
+    assert np.all(np.abs(timed.qd) <= arm.qd_max + 1e-9)
+    assert np.all(np.abs(np.diff(timed.qd, axis=0)) <= arm.qdd_max * arm.dt + 1e-9)
 
 
 def test_joints_that_stay_do_not_move() -> None:
