@@ -9,13 +9,14 @@ from app.policies.presets import PRESETS, fields
 
 
 class PresetField(Answer):
-    """One number of a preset that an override may change."""
+    """One field of a preset that an override may change."""
 
     name: str
-    type: str = Field(description="int or float")
-    default: int | float
-    minimum: int | float
-    maximum: int | float
+    type: str = Field(description="int, float or choice")
+    default: int | float | str
+    minimum: int | float | None = Field(description="null for a choice")
+    maximum: int | float | None = Field(description="null for a choice")
+    choices: list[str] | None = Field(description="allowed names; null for a number")
     unit: str = Field(description="empty for a plain number")
     help: str = Field(description="what it does, for people")
 
