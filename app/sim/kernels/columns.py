@@ -34,7 +34,7 @@ def padded(n: int) -> int:
 
 
 def new_columns(n: int, radius: Vec, length2: Vec | None = None) -> Vec:
-    """Return a set of ``n`` columns, those beyond ``len(radius)`` nowhere.
+    """Return a set of ``n`` columns, all nowhere until they are placed.
 
     Args:
         n: Number of columns, at least ``len(radius)``.
@@ -42,7 +42,7 @@ def new_columns(n: int, radius: Vec, length2: Vec | None = None) -> Vec:
         length2: Squares of their lengths [m^2], shape (k,), where they never change.
     """
     out = np.zeros((N_ROWS, n))
-    out[X:UX, len(radius) :] = NOWHERE
+    out[X:UX] = NOWHERE
     out[RADIUS, : len(radius)] = radius
     if length2 is not None:
         out[UU, : len(radius)] = length2
