@@ -25,7 +25,7 @@ from app.sim import human, robot
 from app.sim.actions import ActionSettings
 from app.sim.cells import Cell, require_cell
 from app.sim.kernels.arm import CONTROLLED
-from app.sim.pick import observe
+from app.sim.pick import observe, step_robot
 from app.sim.ports import Candidate, Decision, OutsideField, Person, Vec
 from app.sim.scene import FAR_AWAY, arm_of, people_of
 
@@ -162,8 +162,7 @@ class TaskChooser:
         act, values = self._networks.act_and_value(obs)
         last = ids.index(previous) if previous in ids else None
         index = choose(values, last, self._hysteresis)
-        qd_target = np.zeros((len(ids), 6))
-        qd_target[:, :CONTROLLED] = act * self._arm.qd_max[:CONTROLLED]
+        qd_target = self._speeds(q, qd, act)
         return Decision(
             chosen=ids[index],
             index=index,
@@ -176,6 +175,17 @@ class TaskChooser:
             checkpoint=self.checkpoint,
             elapsed_ms=1e3 * (time.perf_counter() - started),
         )
+
+    def _speeds(self, q: Vec, qd: Vec, act: NDArray[np.float32]) -> Vec:
+        """Return the joint speeds that actions, shape (n, 5), ask for [rad/s], shape (n, 6)."""
+        if self.action.meaning == "coefficient":
+            pieces = (
+                step_robot(self._arm, q, qd, np.zeros(6), row, self.action) for row in act
+            )
+            return np.stack([piece.qd for piece in pieces])
+        speeds = np.zeros((len(act), 6))
+        speeds[:, :CONTROLLED] = act * self._arm.qd_max[:CONTROLLED]
+        return speeds
 
     def _robot_state(self, q: Vec, qd: Vec) -> tuple[Vec, Vec]:
         arm, slack = self._arm, 1e-6

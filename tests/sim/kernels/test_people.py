@@ -154,7 +154,12 @@ def test_rows_of_a_later_batch_are_those_of_a_wider_one() -> None:
 
 
 def test_obstacles_of_a_cell_are_hit() -> None:
-    box = {"id": "post", "label": "Post", "center": (0.0, 0.45, 0.2), "half_size": (0.4, 0.1, 0.2)}
+    box = {
+        "id": "post",
+        "label": "Post",
+        "center": (0.0, 0.45, 0.2),
+        "half_size": (0.4, 0.1, 0.2),
+    }
     data = CELL.definition() | {"obstacles": [box]}
     cell = parse_definition(data)
     batch = PickBatch(cell, 4, 1, PickSettings(people=()))
