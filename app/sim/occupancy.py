@@ -46,7 +46,7 @@ WALKER_KINDS: dict[WalkerKind, int] = {
 
 
 AUTHORS_WALK: dict[str, Any] = {"apart": 0.5, "inside": 1.0, "hurried": True, "p_go_on": 0.01}
-"""What the authors' public code does besides METHOD 2.1, as fields of :class:`WalkerSettings`."""
+"""What the authors' public code does besides METHOD 2.1, as fields of the settings."""
 
 _RANGES = (("v_min", "v_max"), ("r_min", "r_max"), ("x_min", "x_max"), ("y_min", "y_max"))
 

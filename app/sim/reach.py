@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from app.errors import InvalidInput
 from app.sim.actions import ActionSettings
-from app.sim.cell_parts import GoalRegion
+from app.sim.cell_parts import GoalRegion, Station
+from app.sim.cell_people import Worker
 from app.sim.cells import Cell
 from app.sim.kernels import reach
 from app.sim.kernels.geometry import FAR
@@ -66,7 +67,8 @@ class ReachSettings:
     goals: GoalRule = "grid"
     """Where goals are drawn from: the grid points of the cell's goal region, or all of it."""
     people: tuple[HumanKind, ...] | None = None
-    """Who is in the cell, 0 to 4 people; None for the cell's own."""
+    """Who is in the cell, 0 to 4 people; None for the cell's own. A worker whom the cell does
+    not describe stands at the table (:func:`with_workplace`)."""
     start: StartRule = "clearance"
     """Where people may start: ``clearance`` (``start_clearance_m`` from the robot), ``uniform``
     (anywhere, even in contact), ``authors`` (anywhere, and they walk as in the authors' code:
@@ -107,7 +109,7 @@ def stated_rules(cell: Cell, settings: ReachSettings) -> dict[str, Any]:
         cell: Work cell.
         settings: Starts and ends.
     """
-    chosen = cell if settings.people is None else with_people(cell, settings.people)
+    chosen = _with_people(cell, settings)
     stated: dict[str, Any] = {
         "cell": cell.name,
         "people": list(kinds_of(chosen)),
@@ -121,6 +123,47 @@ def stated_rules(cell: Cell, settings: ReachSettings) -> dict[str, Any]:
     if settings.start == "authors":
         stated["walk"] = dict(AUTHORS_WALK)
     return stated
+
+
+def with_workplace(cell: Cell) -> Cell:
+    """Return a cell with a worker who reaches for its goals, where it describes none.
+
+    The worker stands at the far edge of the table, as far from it as in ``pick-and-place``, and
+    goes by the work cycle of METHOD 3.2: from goals of the lowest layer, except the row nearest
+    to the robot, to the two ends of that row.
+    """
+    targets = goal_region_of(cell).targets()
+    lowest = targets[targets[:, 2] == targets[:, 2].min()]
+    near = lowest[lowest[:, 1] == lowest[:, 1].min()]
+    far = lowest[lowest[:, 1] > lowest[:, 1].min()]
+    edge, aside = cell.table.y_max + 0.17, 0.7
+    worker = Worker(
+        home=(0.0, edge + 0.33, -0.5 * math.pi),
+        x_min=-aside,
+        x_max=aside,
+        y_min=edge,
+        y_max=edge + 0.58,
+        pelvis_height=0.95,
+    )
+    places = [("cube", point) for point in far] + [("dock", point) for point in near[[0, -1]]]
+    stations = tuple(
+        Station(
+            id=f"goal{number}",
+            kind="cube" if kind == "cube" else "dock",
+            label=f"Goal {number}",
+            position=(float(point[0]), float(point[1]), float(point[2])),
+        )
+        for number, (kind, point) in enumerate(places)
+    )
+    return cell.model_copy(update={"people": (*cell.people, worker), "stations": stations})
+
+
+def _with_people(cell: Cell, settings: ReachSettings) -> Cell:
+    if settings.people is None:
+        return cell
+    if "worker" in settings.people and not cell.workers:
+        cell = with_workplace(cell)
+    return with_people(cell, settings.people)
 
 
 def goal_region_of(cell: Cell) -> GoalRegion:
@@ -204,7 +247,7 @@ class ReachBatch:
     def __init__(
         self, cell: Cell, n_envs: int, seed: int, settings: ReachSettings, first_env: int = 0
     ) -> None:
-        self.cell = cell if settings.people is None else with_people(cell, settings.people)
+        self.cell = _with_people(cell, settings)
         self.n_envs, self.seed, self.settings = n_envs, seed, settings
         self.world = _world_of(self.cell, settings)
         self.arm = self.world.arm

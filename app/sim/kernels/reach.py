@@ -368,7 +368,9 @@ def reset_batch(
 
 
 @kernel(nogil=True)
-def observe_env(world: ReachWorld, state: ReachState, e: int, work: Work, view: int, out: Obs) -> None:
+def observe_env(
+    world: ReachWorld, state: ReachState, e: int, work: Work, view: int, out: Obs
+) -> None:
     """Write the observation of environment ``e`` as it is now; ``work`` need not be placed."""
     place_robot(world.arm, state.q[e], work.robot)
     place_people(world.people, state.people, e, work.crowd)
