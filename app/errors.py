@@ -9,6 +9,7 @@
     ├── StorageUnavailable   the database does not answer for now
     ├── StorageFull          the database or the disk has no room left
     ├── NotReady             the service cannot answer yet, or not now
+    ├── MissingPackage       an optional library is not installed
     ├── SimulationError      the simulator met a state it must never meet
     └── CheckpointMismatch   a checkpoint does not fit what it is asked to do
 
@@ -194,6 +195,24 @@ class StorageFull(ServiceError):
     def problem(self) -> dict[str, object]:
         """Return what is full."""
         return {"database": self.database}
+
+
+class MissingPackage(ServiceError):
+    """An optional library is not installed on this machine.
+
+    Args:
+        package: Its name.
+        what: What needs it, such as ``"planning"``.
+        remedy: What to do about it.
+    """
+
+    def __init__(self, package: str, what: str, remedy: str) -> None:
+        super().__init__(f"{what} needs the package {package!r}: {remedy}")
+        self.package, self.what, self.remedy = package, what, remedy
+
+    def problem(self) -> dict[str, object]:
+        """Return the package, what needs it and the remedy."""
+        return {"package": self.package, "what": self.what, "remedy": self.remedy}
 
 
 class SimulationError(ServiceError):

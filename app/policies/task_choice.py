@@ -10,7 +10,6 @@ Source: thesis eq. (5.1)-(5.7). Deviates: hysteresis is ours; 0 gives the source
 
 import time
 from collections.abc import Sequence
-from dataclasses import fields
 
 import numpy as np
 import torch
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 from app.errors import CheckpointMismatch, InvalidInput
 from app.policies.checkpoint import Checkpoint, expect_layout
 from app.policies.networks import ResidualActor, TwinCritic
+from app.policies.presets import action_of
 from app.policies.trained_cell import cell_of
 from app.policies.training import LAYOUT
 from app.sim import human, robot
@@ -26,8 +26,8 @@ from app.sim.actions import ActionSettings
 from app.sim.cells import Cell, require_cell
 from app.sim.kernels.arm import CONTROLLED
 from app.sim.pick import observe
-from app.sim.scene import FAR_AWAY, arm_of, people_of
 from app.sim.ports import Candidate, Decision, OutsideField, Person, Vec
+from app.sim.scene import FAR_AWAY, arm_of, people_of
 
 HYSTERESIS = 0.2
 """By how much another candidate's value must be better before the choice changes."""
@@ -119,9 +119,7 @@ class TaskChooser:
     @property
     def action(self) -> ActionSettings:
         """What its actions mean (METHOD 2.2)."""
-        preset = self._checkpoint.manifest["preset"]
-        known = {f.name: preset.get(f"action_{f.name}", f.default) for f in fields(ActionSettings)}
-        return ActionSettings(**known)
+        return action_of(self._checkpoint.manifest["preset"])
 
     @property
     def title(self) -> str:

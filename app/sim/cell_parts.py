@@ -6,12 +6,11 @@ Each field says its unit in its description and the values it may have in its an
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema
 
 from app.sim.ports import Vec
 
@@ -32,7 +31,7 @@ class Within:
     """Unit, as written in text for people; empty for a plain number."""
 
     def __get_pydantic_json_schema__(
-        self, core: CoreSchema, handler: GetJsonSchemaHandler
+        self, core: Any, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
         """Write the bounds into the JSON schema."""
         found = handler(core)
@@ -117,13 +116,13 @@ class Station(CellData):
         description="point the tcp must reach; a cluster's lowest level [m]"
     )
     failure_probability: Annotated[float | None, Within(0.0, 0.999, "")] = Field(
-        default=None, description="chance that a pick from this clutter cell fails, below 1 []"
+        default=None, description="chance that a pick from this clutter cell fails, below 1"
     )
     colour: Literal["red", "green", "blue"] | None = Field(
         default=None, description="colour of the blocks of a cluster"
     )
     levels: Annotated[int | None, Within(1, 64, "")] = Field(
-        default=None, description="levels of a cluster []"
+        default=None, description="levels of a cluster"
     )
     level_height: Annotated[float | None, Within(0.002, 0.3, "m")] = Field(
         default=None, description="height of one level of a cluster [m]"

@@ -50,8 +50,8 @@ class _Cylinder(_Walking):
     target_tolerance: Annotated[float, Within(0.001, 1.0, "m")] = Field(
         default=0.1, description="distance at which a target counts as reached [m]"
     )
-    p_still: Share = Field(default=0.05, description="chance to stand still a whole episode []")
-    p_stay: Share = Field(default=0.1, description="chance to stay at a target it reached []")
+    p_still: Share = Field(default=0.05, description="chance to stand still a whole episode")
+    p_stay: Share = Field(default=0.1, description="chance to stay at a target it reached")
 
 
 class Walker(_Cylinder):

@@ -212,7 +212,14 @@ class PickBatch:
     def restart(self) -> NDArray[np.float32]:
         """Start the episodes numbered by ``state.episode``; return the observations."""
         pick.reset_batch(
-            self.world, self._rules, self.seed, self._first, self.state, self._work, self._view, self._obs
+            self.world,
+            self._rules,
+            self.seed,
+            self._first,
+            self.state,
+            self._work,
+            self._view,
+            self._obs,
         )
         return self._obs
 

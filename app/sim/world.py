@@ -17,7 +17,7 @@ from app.sim import commands, explanation, pick, scene
 from app.sim.cases import Case, find_case
 from app.sim.cells import Cell
 from app.sim.commands import Command
-from app.sim.contact import contact
+from app.sim.contact import Contact, contact
 from app.sim.kernels import kinematics
 from app.sim.live_person import LivePerson
 from app.sim.ports import Candidate, Decision, Person, TaskPolicy, Vec
@@ -91,9 +91,7 @@ class World:
 
     def _touches_here(self) -> bool:
         rest, person = np.zeros(6), self._person.q[None]
-        found = contact(
-            self._arm, self._people, self._q, rest, rest, rest, (person, person)
-        )
+        found = contact(self._arm, self._people, self._q, rest, rest, rest, (person, person))
         self._clearance: float | None = found.clearance_m
         return found.kind != "none"
 
@@ -267,7 +265,7 @@ class World:
         if self._done.issuperset(self._selected):
             self._done = {reached or ""}
 
-    def _touch(self, found: pick.Contact) -> None:
+    def _touch(self, found: Contact) -> None:
         bodies = {"human": found.part, "cell": "table", "self": "robot"}
         self._contact = ContactView(
             kind=found.kind,

@@ -43,6 +43,16 @@ def test_world_streams_light_snapshots_as_time_goes_on(address: str) -> None:
     assert {"chosen", "candidates", "message", "clearance_m"} <= seen[0][2].keys()
 
 
+def test_stream_of_a_world_ends_when_it_is_started_anew(address: str) -> None:
+    with httpx.stream("GET", f"{address}/v1/worlds/main/events", timeout=60.0) as response:
+        stream = events(response)
+        next(stream)
+        world = f"{address}/v1/worlds/main"
+        httpx.put(f"{world}/cell", json={"cell": "pick-and-place"}, timeout=60.0)
+        assert [name for name, _, _ in stream][-1] == "end"
+    assert httpx.get(world).json()["tick"] >= 0
+
+
 def test_job_streams_its_curve_without_gap_or_duplicate_and_then_ends(address: str) -> None:
     overrides = {
         "total_steps": 1280,

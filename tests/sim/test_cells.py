@@ -38,8 +38,9 @@ def test_every_bounded_number_says_its_unit() -> None:
     for model in models(Cell):
         for name, field in model.model_fields.items():
             for rule in field.metadata:
-                if isinstance(rule, Within | Each):
-                    assert "[" in (field.description or ""), (model, name)
+                parts = rule.parts if isinstance(rule, Each) else (rule,)
+                units = {part.unit for part in parts if isinstance(part, Within)} - {""}
+                assert all(f"[{unit}]" in field.description for unit in units), (model, name)
 
 
 def test_cell_of_the_source_stays_what_policies_were_trained_in() -> None:

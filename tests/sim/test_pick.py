@@ -6,12 +6,14 @@ import pytest
 from app.errors import InvalidInput, SimulationError
 from app.sim import human, pick
 from app.sim.cells import Cell, load_cell
-from app.sim.kernels import arm as arm_kernel
-from app.sim.kernels import features
+from app.sim.contact import contact
+from app.sim.kernels import actions, features
+from app.sim.kernels import contact as contact_kernel
 from app.sim.kernels import pick as kernel
 from app.sim.kernels.features import LAYOUT
 from app.sim.pick import OUTCOMES, PickBatch, PickSettings
 from app.sim.recheck import Recheck, Trajectory
+from app.sim.scene import arm_of, people_of
 
 TEN_SECONDS = PickSettings(time_limit_s=10.0)
 
@@ -65,7 +67,7 @@ def test_limits_hold_through_whole_episodes(cell: Cell) -> None:
 def test_starts_keep_the_required_clearance_from_the_person(cell: Cell) -> None:
     batch = PickBatch(cell, 400, 7, PickSettings(start_clearance_m=0.05))
     obs = batch.reset()
-    assert (batch.state.clearance >= 0.05).all()
+    assert (batch.state.clear[:, 0] >= 0.05).all()
     assert np.isfinite(obs).all()
     assert (batch.state.outcome == OUTCOMES.index("running")).all()
 
@@ -102,12 +104,12 @@ def test_meshes_find_no_contact_that_the_kernels_missed(cell: Cell) -> None:
     obs, state = batch.reset(), batch.state
     paths: list[list[tuple[np.ndarray, ...]]] = [[] for _ in range(24)]
     for _ in range(200):
-        before = state.q.copy(), state.qd.copy(), state.human_q.copy()
+        before = state.q.copy(), state.qd.copy(), state.people.q[:, 0].copy()
         running = np.flatnonzero(state.outcome == 0)
         obs = batch.step(obs[:, LAYOUT["base"]].copy(), auto_reset=False).obs
         for e in running:
             paths[e].append(
-                (*(b[e] for b in before), state.qd[e].copy(), state.human_q[e].copy())
+                (*(b[e] for b in before), state.qd[e].copy(), state.people.q[e, 0].copy())
             )
     recheck, x = Recheck(cell), np.arange(5)[:, None] / 5
     for e, path in enumerate(paths):
@@ -116,7 +118,7 @@ def test_meshes_find_no_contact_that_the_kernels_missed(cell: Cell) -> None:
             q.append(q0 + cell.robot.dt * (qd0 * x + 0.5 * (qd1 - qd0) * x**2))
             person.append(human0 + (human1 - human0) * x)
         q_robot = np.concatenate([*q, state.q[e : e + 1]])
-        q_human = np.concatenate([*person, state.human_q[e : e + 1]])
+        q_human = np.concatenate([*person, state.people.q[e]])
         hit = recheck.first_contact(Trajectory(q_robot=q_robot, q_human=q_human, dt=0.01))
         assert hit is None or OUTCOMES[state.outcome[e]] == "collision"
     assert {OUTCOMES[outcome] for outcome in state.outcome} >= {"success", "collision"}
@@ -125,43 +127,45 @@ def test_meshes_find_no_contact_that_the_kernels_missed(cell: Cell) -> None:
 def test_single_state_functions_do_what_the_batch_does(cell: Cell) -> None:
     batch = PickBatch(cell, 6, 13, TEN_SECONDS)
     batch.reset()
-    state = batch.state
+    state, people = batch.state, batch.world.people
     for act in random_actions(40, 6):
-        q, qd, person = state.q.copy(), state.qd.copy(), state.human_q.copy()
+        q, qd, person = state.q.copy(), state.qd.copy(), state.people.q.copy()
         result = batch.step(act, auto_reset=False)
         for e in np.flatnonzero(state.outcome == 0):
-            q1, qd1, c = pick.step_robot(batch.arm, q[e], qd[e], act[e])
-            np.testing.assert_array_equal(q1, state.q[e])
-            np.testing.assert_array_equal(qd1, state.qd[e])
-            hit = pick.contact(batch.arm, q[e], qd[e], c, person[e], state.human_q[e])
-            assert hit.kind == "none" and hit.clearance_m == state.clearance[e]
+            piece = pick.step_robot(batch.arm, q[e], qd[e], np.zeros(6), act[e])
+            np.testing.assert_array_equal(piece.q, state.q[e])
+            np.testing.assert_array_equal(piece.qd, state.qd[e])
+            hit = contact(
+                batch.arm, people, q[e], qd[e], piece.c, piece.d, (person[e], state.people.q[e])
+            )
+            assert hit.kind == "none" and hit.clearance_m == state.clear[e, 0]
             seen, _ = pick.observe(
-                batch.arm, q1, qd1, state.human_q[e], state.human_qd[e],
-                state.goal[e : e + 1], state.time_left[e],
+                batch.arm, people, piece.q, piece.qd, state.people.q[e, 0],
+                state.people.qd[e, 0], state.goal[e : e + 1], state.time_left[e],
             )  # fmt: skip
             np.testing.assert_array_equal(seen[0], result.obs[e])
 
 
 def test_person_at_the_tool_is_a_contact_with_both_names(cell: Cell) -> None:
-    arm, zero = pick.arm_of(cell), np.zeros(6)
+    arm, people, zero = arm_of(cell), people_of(cell), np.zeros(6)
     rest = human.rest_posture(*cell.human.home)
     q = PickBatch(cell, 1, 0, TEN_SECONDS).world.station_q[3]
     grip = np.array(cell.stations[3].position) + [0.0, 0.04, 0.06]
-    person = human.reach("r", grip, rest, cell.pelvis_z).q
-    contact = pick.contact(arm, q, zero, zero, person, person)
-    assert contact.kind == "human"
-    assert contact.part in ("hand_r", "forearm_r")
+    person = human.reach("r", grip, rest, cell.pelvis_z).q[None]
+    found = contact(arm, people, q, zero, zero, zero, (person, person))
+    assert found.kind == "human"
+    assert found.part in ("hand_r", "forearm_r")
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_numbers_that_are_not_finite_are_errors_not_silence(cell: Cell, value: float) -> None:
-    arm, zero = pick.arm_of(cell), np.zeros(6)
-    person = human.rest_posture(*cell.human.home)
-    person[3] = value
+    arm, people, zero = arm_of(cell), people_of(cell), np.zeros(6)
+    person = human.rest_posture(*cell.human.home)[None]
+    person[0, 3] = value
     with pytest.raises(SimulationError, match="finite"):
-        pick.contact(arm, arm.home, zero, zero, person, person)
+        contact(arm, people, arm.home, zero, zero, zero, (person, person))
     with pytest.raises(SimulationError, match="finite"):
-        pick.step_robot(arm, arm.home, zero, np.full(5, value))
+        pick.step_robot(arm, arm.home, zero, zero, np.full(5, value))
     with pytest.raises(SimulationError, match="finite"):
         PickBatch(cell, 1, 0, TEN_SECONDS).step(np.full((1, 5), value, dtype=np.float32))
 
@@ -180,18 +184,19 @@ def test_hands_are_fast_enough_to_be_a_problem(cell: Cell) -> None:
 
 
 def test_read_only_integer_and_strided_inputs_compile_nothing_anew(cell: Cell) -> None:
-    arm, person = pick.arm_of(cell), human.rest_posture(*cell.human.home)
+    arm, people = arm_of(cell), people_of(cell)
+    person = human.rest_posture(*cell.human.home)
     q, zero, goals = arm.home.copy(), np.zeros(6), cell.positions()
 
     def use() -> None:
-        pick.step_robot(arm, q, zero, zero[:5])
-        pick.contact(arm, q, zero, zero, person, person)
-        pick.observe(arm, q, zero, person, np.zeros(18), goals[::2], 10)
+        pick.step_robot(arm, q, zero, zero, zero[:5])
+        contact(arm, people, q, zero, zero, zero, (person[None], person[None]))
+        pick.observe(arm, people, q, zero, person, np.zeros(18), goals[::2], 10)
         pick.tool_state(arm, q, zero, goals[0])
         human.capsules(person, cell.pelvis_z, cell.floor_z)
 
     use()
-    kernels = (features.observe_batch, arm_kernel.sweep, kernel.drive, kernel.tool_state)
+    kernels = (features.observe_rows, contact_kernel.sweep, actions.advance, kernel.distance_to)
     before = [len(compiled.signatures) for compiled in kernels]
     zero, goals = np.zeros(6, dtype=np.int64), goals[:, :]
     for array in (q, person, goals):

@@ -190,7 +190,9 @@ def least(values: Vec) -> tuple[float, int]:
 
 
 @kernel(error_model="numpy", fastmath=FAST)
-def pair_distances(a: Vec, first: NDArray[np.int64], second: NDArray[np.int64], out: Vec) -> None:
+def pair_distances(
+    a: Vec, first: NDArray[np.int64], second: NDArray[np.int64], out: Vec
+) -> None:
     """Write the distances of chosen pairs of columns of one set [m].
 
     Args:
@@ -217,7 +219,11 @@ def longest_way(before: Vec, after: Vec) -> float:
     """Return the farthest any end of a set's capsules moved [m]; both of shape (9, n)."""
     longest = 0.0
     for k in range(before.shape[1]):
-        x, y, z = after[X, k] - before[X, k], after[Y, k] - before[Y, k], after[Z, k] - before[Z, k]
+        x, y, z = (
+            after[X, k] - before[X, k],
+            after[Y, k] - before[Y, k],
+            after[Z, k] - before[Z, k],
+        )
         ux = x + after[UX, k] - before[UX, k]
         uy = y + after[UY, k] - before[UY, k]
         uz = z + after[UZ, k] - before[UZ, k]

@@ -7,8 +7,6 @@ of ``FINEST_STEP``, where contact is reported. Mostly the end of the period sett
 period the robot follows its polynomial, workers move linearly in joint space, walkers linearly.
 """
 
-
-from app.sim.kernels.compiled import kernel
 from app.sim.kernels.arm import (
     Arm,
     RobotPose,
@@ -18,6 +16,7 @@ from app.sim.kernels.arm import (
     self_clearance,
 )
 from app.sim.kernels.columns import copy_rows
+from app.sim.kernels.compiled import kernel
 from app.sim.kernels.people import (
     Crowd,
     People,

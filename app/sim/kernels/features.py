@@ -15,7 +15,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from app.sim.kernels.compiled import kernel
 from app.sim.kernels import body, kinematics
 from app.sim.kernels.arm import (
     CONTROLLED,
@@ -37,6 +36,7 @@ from app.sim.kernels.columns import (
     new_columns,
     padded,
 )
+from app.sim.kernels.compiled import kernel
 from app.sim.kernels.geometry import FAR, FAST, segment_nearest
 from app.sim.kernels.people import People
 from app.sim.ports import Vec
@@ -110,7 +110,7 @@ COARSE_FIRST = (0, 1, 2, 4, 5)
 """First coarse capsule of each of the four link groups, and their number."""
 N_COARSE = 5
 STILL, ALONG_BASE, AT_GOAL = 0, N_COARSE, 2 * N_COARSE
-"""First lane of the three postures looked at together: now, along the base motion, at the goal."""
+"""First lane of three postures looked at together: now, along the base motion, at the goal."""
 N_LANES = padded(3 * N_COARSE)
 FIRST_PART, LAST_PART = body.C_ABDOMEN, body.C_HAND_L
 """Human capsules the features look at: what stands above the table."""
@@ -395,7 +395,7 @@ def observe(
 
 
 @kernel()
-def _observe(
+def observe_rows(
     arm: Arm,
     people: People,
     q: Vec,
@@ -409,6 +409,7 @@ def _observe(
     sight: Sight,
     out: Obs,
 ) -> None:
+    """Apply :func:`observe` to n rows; ``robot`` and ``sight`` are work space."""
     for i in range(q.shape[0]):
         place_robot(arm, q[i], robot)
         observe(
@@ -439,8 +440,8 @@ def observe_batch(
     time_left: Vec,
     out: Obs,
 ) -> None:
-    """Apply :func:`observe` to n rows; every argument but the first two has a leading axis n."""
+    """Apply :func:`observe` to n rows; all arguments but two have a leading axis of n."""
     robot, sight = new_robot_pose(arm), new_sight(people.person)
-    _observe(
+    observe_rows(
         arm, people, q, qd, human_q, human_qd, goals, q_goals, time_left, robot, sight, out
     )

@@ -6,26 +6,26 @@ period to period. With the limits ``A`` of acceleration and ``J`` of jerk, the a
 are an interval. Its ends are the last jerks after which a braking manoeuvre still comes to rest
 inside all limits; they are found by bisection on what that manoeuvre exceeds.
 
-**The manoeuvre** is a feedback law, the shortest stop of the sampled joint. With ``s = J T`` and
+**The manoeuvre** is a feedback law, the sampled joint's shortest stop. With ``s = J T`` and
 
     y = qd + qdd T/2                            speed half a period ahead
     F(a) = a + (a - s) + (a - 2s) + ...         while positive; odd in a
 
-the next acceleration is ``G(y) = F^-1(-y/T)``, from which a ramp by ``s`` a period comes to rest
-exactly, clipped to ``[-A, A]`` and to ``qdd -+ s``. It is a ramp of ``n`` full steps, ``h``
-periods at the acceleration limit and a ramp to zero: how far and how fast the joint goes, also
-inside the periods, has a closed form. With ``qd - qd_target`` for ``qd`` the same law settles at
-a wanted speed.
+the next acceleration is ``G(y) = F^-1(-y/T)``, from which a ramp by ``s`` a period comes to
+rest exactly, clipped to ``[-A, A]`` and to ``qdd -+ s``. It is a ramp of ``n`` full steps,
+``h`` periods at the acceleration limit and a ramp to zero: how far and how fast the joint goes,
+also inside the periods, has a closed form. With ``qd - qd_target`` for ``qd`` the same law
+settles at a wanted speed.
 
 **Why it holds.** The ``y`` of successive periods are the control points of uniform B-splines,
-quadratic for ``qd(t)`` and cubic for ``q(t)``, whose weights are positive; and under the law the
-greater of two states (in ``q``, ``qd - qdd T/2`` and ``qdd``) stays the greater for ever. A
-greater jerk gives such a state: so limits above bound ``j`` from above, limits below from below,
-and all between is admissible. One period into the manoeuvre the law gives its own tail, so its
-first jerk is admissible from every viable state: the interval is never empty, and the last
-verified manoeuvre is at hand as the fallback without being stored. At rest inside its limits a
-joint is viable. Coming to rest before a limit is a little more cautious than need be: a stop
-that swings back from the limit would be shorter.
+quadratic for ``qd(t)`` and cubic for ``q(t)``, whose weights are positive; and under the law
+the greater of two states (in ``q``, ``qd - qdd T/2`` and ``qdd``) stays the greater for ever. A
+greater jerk gives such a state: so limits above bound ``j`` from above, limits below bound it
+from below, and all between is admissible. One period on, the law gives the manoeuvre's own
+tail, so its first jerk is admissible from every viable state: the interval is never empty, and
+the last verified manoeuvre is at hand as the fallback without being stored. At rest inside its
+limits a joint is viable. To come to rest before a limit is a little more cautious than need be:
+a stop that swings back from it would be shorter.
 
 Source: METHOD 2.2; the law is the sampled time-optimal one of R. Zanasi, C. Guarino Lo Bianco
 and A. Tonielli, "Nonlinear filters for the generation of smooth trajectories", Automatica 36,
@@ -224,7 +224,9 @@ def manoeuvre_extremes(
 def period_extremes(
     qd: float, qdd: float, jerk: float, dt: float
 ) -> tuple[float, float, float, float]:
-    """Return least and greatest displacement [rad] and speed [rad/s] inside one period.
+    """Return least and greatest displacement [rad] and speed [rad/s] after the start.
+
+    The start itself does not count: no jerk can change it.
 
     Args:
         qd: Speed at the start [rad/s].
@@ -234,12 +236,11 @@ def period_extremes(
     """
     qd_end = qd + dt * (qdd + 0.5 * dt * jerk)
     end = dt * (qd + dt * (0.5 * qdd + dt * jerk / 6.0))
-    low, high = min(0.0, end), max(0.0, end)
-    slowest, fastest = min(qd, qd_end), max(qd, qd_end)
+    low, high, slowest, fastest = end, end, qd_end, qd_end
     if qdd * (qdd + dt * jerk) < 0.0:
         turn = qd - 0.5 * qdd * qdd / jerk
         slowest, fastest = min(slowest, turn), max(fastest, turn)
-    if slowest < 0.0 < fastest:
+    if min(qd, slowest) < 0.0 < max(qd, fastest):
         root = math.sqrt(max(qdd * qdd - 2.0 * jerk * qd, 0.0))
         s = -(qdd + math.copysign(root, qdd))  # the roots of qd(x): 2 qd/s and s/jerk
         for k in range(2):
@@ -306,10 +307,10 @@ def farthest_jerk(
         qdd: Joint acceleration [rad/s^2].
         to: Limits.
     """
-    good, bad, e_good = braking, wanted, e_braking
-    weight_good, weight_bad, last = e_braking, e_wanted, 0
+    good, bad = braking, wanted
+    weight_good, weight_bad, last = min(e_braking, -SLACK), e_wanted, 0
     for k in range(MAX_SEARCH):
-        if e_good > -SLACK or abs(bad - good) <= JERK_RESOLUTION * to.jerk_max:
+        if abs(bad - good) <= JERK_RESOLUTION * to.jerk_max:
             break
         share = 0.5 if k % 3 == 2 else weight_good / (weight_good - weight_bad)
         j = good + min(0.999, max(0.001, share)) * (bad - good)
@@ -317,7 +318,7 @@ def farthest_jerk(
         if e <= 0.0:
             if last > 0:
                 weight_bad *= 0.5
-            good, e_good, weight_good, last = j, e, e, 1
+            good, weight_good, last = j, e, 1
         else:
             if last < 0:
                 weight_good *= 0.5

@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from app.sim.kernels.compiled import kernel
 from app.sim.kernels import body, random, script
 from app.sim.kernels.columns import copy_rows, gaps, least, longest_way
+from app.sim.kernels.compiled import kernel
 from app.sim.kernels.cylinder import cylinder_clearance
 from app.sim.kernels.geometry import FAR
 from app.sim.kernels.occupancy import (
@@ -284,7 +284,7 @@ def nearest_person(people: People, robot: Vec, crowd: Crowd) -> int:
     """
     n_workers, n_walkers = crowd.q.shape[0], crowd.cylinders.shape[0]
     if n_workers + n_walkers < 2:
-        return n_workers + n_walkers - 1
+        return int(n_workers + n_walkers - 1)
     best, nearest = FAR, 0
     if n_workers > 0:
         gaps(robot, crowd.columns, crowd.gap)

@@ -9,12 +9,13 @@ from app.policies.evaluation import choice_rules
 from app.policies.evaluation.episodes import Evaluator, View, settings_for
 from app.policies.evaluation.protocols import evaluate
 from app.policies.task_choice import ValueNetworks
+from app.sim.cells import load_cell
 
 
 @pytest.fixture(scope="module")
 def evaluator():
     networks = ValueNetworks(pretrained.load("pick"))
-    return Evaluator(networks, "pick-and-place", 24, 99, settings_for((2, 3), {}))
+    return Evaluator(networks, load_cell("pick-and-place"), 24, 99, settings_for((2, 3), {}))
 
 
 def view(values, chosen, first=False):

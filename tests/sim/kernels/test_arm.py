@@ -1,140 +1,45 @@
-"""The contact test may be early, never late: held against FCL on the raw meshes."""
+"""Bounds and clearances of the robot in its cell, against finite differences."""
 
 import numpy as np
 import pytest
 
-from app.sim import human
-from app.sim.cells import Cell, load_cell
-from app.sim.collision import CollisionReference
+from app.sim.cells import load_cell
 from app.sim.kernels import arm as kernel
-from app.sim.pick import arm_of
-from app.sim.recheck import Recheck, Trajectory
+from app.sim.kernels.columns import ends_of
 from app.sim.robot import Robot
-
-SUBSTEPS = 50
-"""Rows per period of 50 ms: the referee looks every millisecond."""
-EARLY = 0.03
-"""How far a reported contact may be from the meshes [m]: what capsules add to them."""
+from app.sim.scene import arm_of
 
 
-@pytest.fixture(scope="module")
-def cell() -> Cell:
-    return load_cell()
-
-
-@pytest.fixture(scope="module")
-def recheck(cell: Cell) -> Recheck:
-    return Recheck(cell)
-
-
-class Period:
-    """One control period: robot state and coefficients, person before and after."""
-
-    def __init__(
-        self, cell: Cell, rng: np.random.Generator, robot: Robot, hurry: float
-    ) -> None:
-        mount = cell.robot
-        limits = np.array(mount.q_min), np.array(mount.q_max)
-        speed, dt = np.array(mount.qd_max), mount.dt
-        target = rng.uniform([-0.7, 0.4, 0.05], [0.7, 0.85, 0.4])
-        q = robot.ik_vertical(target, *limits)
-        assert q is not None
-        self.q = np.clip(q + rng.normal(0.0, 0.15, 6), *limits)
-        self.qd = rng.uniform(-speed, speed)
-        end = np.clip(self.qd + rng.uniform(-1, 1, 6) * mount.qdd_max * dt, -speed, speed)
-        self.c, self.dt = (end - self.qd) / (2 * dt), dt
-        rest = human.rest_posture(rng.uniform(-0.5, 0.5), rng.uniform(1.12, 1.3), -1.57)
-        hand, near = rng.choice(["r", "l"]), robot.tcp_pose(self.q)[:3, 3]
-        target = near + rng.normal(0.0, 0.15, 3)
-        self.human0 = human.reach(hand, target, rest, cell.pelvis_z).q
-        step = rng.normal(size=18) * hurry * dt
-        self.human1 = np.clip(self.human0 + step, human.Q_MIN, human.Q_MAX)
-
-    def rows(self, n: int) -> Trajectory:
-        """The period as the robot and the person really move, n + 1 rows."""
-        x = np.linspace(0.0, self.dt, n + 1)[:, None]
-        return Trajectory(
-            q_robot=self.q + self.qd * x + self.c * x**2,
-            q_human=self.human0 + (self.human1 - self.human0) * x / self.dt,
-            dt=self.dt / n,
-        )
-
-
-@pytest.mark.parametrize("hurry", [1.0, 3.0, 10.0])
-def test_sweep_is_never_later_than_the_meshes_at_millisecond_substeps(
-    cell: Cell, recheck: Recheck, hurry: float
-) -> None:
-    rng, robot, arm = np.random.default_rng(61), Robot(), arm_of(cell)
-    before, pose = kernel.new_pose(len(arm.link)), kernel.new_pose(len(arm.link))
-    verdicts = []
-    for _ in range(250):
-        period = Period(cell, rng, robot, hurry)
-        kind, _, _, _ = kernel.sweep(
-            arm, period.q, period.qd, period.c, period.human0, period.human1, before, pose
-        )
-        touches = recheck.first_contact(period.rows(SUBSTEPS)) is not None
-        assert not (touches and kind == kernel.NO_CONTACT)
-        verdicts.append((kind != kernel.NO_CONTACT, touches))
-    reported, touching = np.mean(verdicts, axis=0)
-    assert 0.1 < touching <= reported < touching + 0.2
-
-
-def test_pose_test_reports_every_contact_of_the_meshes_in_random_postures(cell: Cell) -> None:
-    rng, arm, reference = np.random.default_rng(62), arm_of(cell), CollisionReference(cell)
-    pose, kinds = kernel.new_pose(len(arm.link)), {"human": 0, "cell": 0, "self": 0}
-    for _ in range(1500):
-        q = rng.uniform(arm.q_min, arm.q_max)
-        human_q = rng.uniform(human.Q_MIN, human.Q_MAX)
-        human_q[:3] = rng.uniform([-0.7, 0.6, -np.pi], [0.7, 1.7, np.pi])
-        kernel.place(arm, q, human_q, pose)
-        below = {
-            "human": kernel.human_clearance(arm, pose)[0] <= 0.0,
-            "cell": kernel.table_clearance(arm, pose)[0] <= 0.0,
-            "self": kernel.self_clearance(arm, pose)[0] <= 0.0,
-        }
-        for contact in reference.contacts(q, human_q):
-            kinds[contact.kind] += 1
-            assert below[contact.kind], contact
-    assert min(kinds.values()) > 50
-
-
-def test_clearance_is_that_of_hulls_less_what_capsules_add(cell: Cell) -> None:
-    rng, robot, arm = np.random.default_rng(63), Robot(), arm_of(cell)
-    reference, pose = CollisionReference(cell, "hull"), kernel.new_pose(len(arm.link))
-    gaps = []
-    for _ in range(150):
-        period = Period(cell, rng, robot, 1.0)
-        kernel.place(arm, period.q, period.human0, pose)
-        clearance = kernel.human_clearance(arm, pose)[0]
-        if clearance > 0.0:
-            gaps.append(reference.distance(period.q, period.human0).value - clearance)
-    assert len(gaps) > 50
-    assert min(gaps) > -0.02
-    assert np.mean(gaps) < EARLY
-
-
-def test_speed_bound_holds_for_every_point_of_the_robot(cell: Cell) -> None:
-    rng, arm = np.random.default_rng(64), arm_of(cell)
-    before, after = kernel.new_pose(len(arm.link)), kernel.new_pose(len(arm.link))
-    now, soon, tick = kernel.new_pose(len(arm.link)), kernel.new_pose(len(arm.link)), 1e-5
+@pytest.mark.parametrize("degree", [2, 3])
+def test_speed_bound_holds_for_every_point_of_the_robot(degree: int) -> None:
+    rng, arm = np.random.default_rng(64), arm_of(load_cell())
+    before, after = kernel.new_robot_pose(arm), kernel.new_robot_pose(arm)
+    now, soon, tick = kernel.new_robot_pose(arm), kernel.new_robot_pose(arm), 1e-5
     for _ in range(300):
         q, qd = rng.uniform(arm.q_min, arm.q_max), rng.uniform(-arm.qd_max, arm.qd_max)
         c = rng.uniform(-0.5, 0.5, 6) * arm.qdd_max
+        d = rng.uniform(-1, 1, 6) * arm.jerk_max / 6.0 * (degree == 3)
+
+        def at(x: float) -> np.ndarray:
+            return q + x * (qd + x * (c + x * d))  # noqa: B023
+
         kernel.place_robot(arm, q, before)
-        kernel.place_robot(arm, q + qd * arm.dt + c * arm.dt**2, after)
-        bound = kernel.robot_speed_bound(arm, qd, c, before.robot, after.robot)
+        kernel.place_robot(arm, at(arm.dt), after)
+        bound = kernel.robot_speed_bound(arm, qd, c, d, before.columns, after.columns)
         for x in np.linspace(0.0, arm.dt, 9):
-            kernel.place_robot(arm, q + qd * x + c * x**2, now)
-            kernel.place_robot(arm, q + qd * (x + tick) + c * (x + tick) ** 2, soon)
-            fastest = np.linalg.norm(soon.robot - now.robot, axis=2).max() / tick
-            assert fastest <= bound + 1e-4
+            kernel.place_robot(arm, at(x), now)
+            kernel.place_robot(arm, at(x + tick), soon)
+            way = ends_of(soon.columns, 12) - ends_of(now.columns, 12)
+            assert np.linalg.norm(way, axis=2).max() / tick <= bound + 1e-4
 
 
-def test_standing_still_at_home_reports_no_contact_and_the_distance(cell: Cell) -> None:
-    arm, zero = arm_of(cell), np.zeros(6)
-    before, pose = kernel.new_pose(len(arm.link)), kernel.new_pose(len(arm.link))
-    human_q = human.rest_posture(*cell.human.home)
-    kind, _, _, d = kernel.sweep(arm, arm.home, zero, zero, human_q, human_q, before, pose)
-    assert kind == kernel.NO_CONTACT
-    hull = CollisionReference(cell, "hull").distance(arm.home, human_q).value
-    assert d <= hull < d + EARLY
+def test_tool_speed_and_tilt_are_those_of_pinocchio() -> None:
+    rng, arm, robot = np.random.default_rng(65), arm_of(load_cell()), Robot()
+    pose = kernel.new_robot_pose(arm)
+    for _ in range(50):
+        q, qd = rng.uniform(-3, 3, 6), rng.uniform(-1, 1, 6)
+        kernel.place_robot(arm, q, pose)
+        speed = np.linalg.norm((robot.jacobian(q) @ qd)[:3])
+        assert kernel.tcp_speed(pose, qd) == pytest.approx(speed, abs=1e-6)
+        down = -robot.tcp_pose(q)[2, 2]
+        assert np.cos(kernel.robot_tilt(pose)) == pytest.approx(down, abs=1e-6)

@@ -7,6 +7,7 @@ from app.sim import human, pick
 from app.sim.cells import Cell, load_cell
 from app.sim.kernels.features import DISTANCE_SCALE, LAYOUT, N_FEATURES
 from app.sim.robot import Robot
+from app.sim.scene import arm_of, people_of
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +28,9 @@ def state(cell: Cell) -> dict[str, np.ndarray]:
 
 
 def seen(cell: Cell, **changes: np.ndarray) -> np.ndarray:
-    return pick.observe(pick.arm_of(cell), **(state(cell) | changes), time_left_s=7.0)[0]
+    return pick.observe(
+        arm_of(cell), people_of(cell), **(state(cell) | changes), time_left_s=7.0
+    )[0]
 
 
 def test_layout_covers_the_observation_without_gap_or_overlap() -> None:

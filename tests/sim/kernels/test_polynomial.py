@@ -1,117 +1,125 @@
-"""Limits hold whatever is asked for: invariants over random and adversarial actions."""
+"""Intervals of degree 2 by hand, by brute force, and as the source prints them."""
 
 import numpy as np
 import pytest
 
 from app.sim.kernels import polynomial
 
-TOLERANCE = 1e-9
-N_ROBOTS, N_STEPS = 200, 500
-PUSHES = ("random", "up", "down", "nearest limit", "away then back", "flip each step")
+Q_MIN, Q_MAX, V, A, DT = -2.0, 2.0, 1.0, 5.0, 0.02
+LIMITS = (Q_MIN, Q_MAX, V, A, DT)
 
 
-class Limits:
-    """One joint's limits, repeated for many joints."""
-
-    def __init__(self, span: float, speed: float, acc: float, dt: float) -> None:
-        n = 6 * N_ROBOTS
-        self.low, self.high = np.full(n, -span), np.full(n, 0.7 * span)
-        self.speed, self.acc, self.dt = np.full(n, speed), np.full(n, acc), dt
-
-
-CASES = {
-    "pick-and-place": Limits(6.2, 0.5, 3.0, 0.05),
-    "narrow": Limits(0.15, 0.5, 3.0, 0.05),
-    "fast": Limits(0.5, 3.2, 5.0, 0.02),
-    "weak brakes": Limits(1.0, 2.0, 0.4, 0.1),
-    "strong brakes": Limits(0.3, 0.4, 60.0, 0.05),
-}
+def random_states(n: int, seed: int) -> np.ndarray:
+    """Positions and speeds, half of them close to a limit, as rows (q, qd)."""
+    rng = np.random.default_rng(seed)
+    near = rng.choice([Q_MIN, Q_MAX], n) + rng.uniform(-0.05, 0.05, n)
+    q = np.where(rng.random(n) < 0.5, rng.uniform(Q_MIN, Q_MAX, n), near.clip(Q_MIN, Q_MAX))
+    return np.column_stack([q, rng.uniform(-V, V, n)])
 
 
-def viable_states(limits: Limits, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Random states from which every joint can still stop, many of them just so."""
-    q = rng.uniform(limits.low, limits.high)
-    edge = rng.random(q.shape) < 0.5
-    q[edge] = np.where(rng.random(edge.sum()) < 0.5, limits.low[edge], limits.high[edge])
-    q[edge] *= 1 - rng.uniform(0, 0.05, edge.sum())
-    acc_dt = limits.acc * limits.dt
-
-    def stoppable(room: np.ndarray) -> np.ndarray:
-        return -0.5 * acc_dt + np.sqrt(0.25 * acc_dt**2 + 2 * limits.acc * room)
-
-    most = np.minimum(limits.speed, stoppable(limits.high - q))
-    least = np.maximum(-limits.speed, -stoppable(q - limits.low))
-    share = rng.choice([0.0, 1.0, 0.5, rng.random()], q.shape)
-    return q, least + share * (most - least)
+def keeps_limits(q: float, qd: float, c: np.ndarray) -> np.ndarray:
+    """Whether coefficients keep every limit in this period, by 401 samples of it."""
+    x = np.linspace(0, DT, 401)[:, None]
+    at, speed, slack = q + qd * x + c * x**2, qd + 2 * c * x, 1e-9
+    return (
+        (at <= Q_MAX + slack).all(0)
+        & (at >= Q_MIN - slack).all(0)
+        & (abs(speed) <= V + slack).all(0)
+        & (2 * abs(c) <= A + slack)
+    )
 
 
-def push(kind: str, q: np.ndarray, limits: Limits, step: int, rng: np.random.Generator):
-    """What an actor asks for, as a share of the speed limit."""
-    if kind == "up":
-        return np.ones_like(q)
-    if kind == "down":
-        return -np.ones_like(q)
-    if kind == "nearest limit":
-        return np.where(q > 0.5 * (limits.low + limits.high), 1.0, -1.0)
-    if kind == "away then back":
-        return np.where((np.arange(len(q)) * 7 + step) % 40 < 20, 1.0, -1.0)
-    if kind == "flip each step":
-        return np.full_like(q, 1.0 if step % 2 else -1.0)
-    return rng.uniform(-1, 1, q.shape)
+def test_free_joint_is_bound_by_acceleration_and_speed_alone() -> None:
+    for interval in (
+        polynomial.coefficient_interval,
+        polynomial.coefficient_interval_one_step,
+    ):
+        assert interval(0.0, 0.0, *LIMITS) == (-2.5, 2.5)
+        assert interval(0.0, 0.96, *LIMITS) == pytest.approx((-2.5, 1.0))
+        assert interval(0.0, -0.96, *LIMITS) == pytest.approx((-1.0, 2.5))
 
 
-def excess(value: np.ndarray, low: np.ndarray, high: np.ndarray) -> float:
-    return float(np.maximum(value - high, low - value).max())
+def test_viable_end_is_the_greatest_speed_from_which_full_braking_stops_in_time() -> None:
+    # the hand result: v' with v'^2/(2A) + v' dt/2 = room left after the period
+    q, qd = 1.95, 0.6
+    c = polynomial.coefficient_interval(q, qd, *LIMITS)[1]
+    v, room = qd + 2 * c * DT, Q_MAX - (q + qd * DT + c * DT**2)
+    assert v**2 / (2 * A) + v * DT / 2 == pytest.approx(room, abs=1e-15)
+    assert -2.5 < c < 2.5
 
 
-def turning_points(q: np.ndarray, qd: np.ndarray, c: np.ndarray, dt: float) -> np.ndarray:
-    """Joint positions at the extreme inside the period; at its start where there is none."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        x = -qd / (2 * c)
-    inside = (x > 0) & (x < dt)
-    return np.where(inside, q - qd**2 / (4 * np.where(inside, c, 1.0)), q)
+def test_one_step_bounds_by_hand() -> None:
+    bound = polynomial.one_step_position_bound
+    assert bound(0.03, 1.0, DT) == pytest.approx((0.03 - 0.02) / 0.0004)  # at the end
+    assert bound(0.01, 1.0, DT) == pytest.approx(-25.0)  # where both bounds meet
+    assert bound(0.005, 1.0, DT) == pytest.approx(-50.0)  # at the turning point
+    assert bound(0.0, 1.0, DT) == -np.inf  # at the limit only standing or leaving
+    assert bound(0.0, 0.0, DT) == 0.0
 
 
-@pytest.mark.parametrize("kind", PUSHES)
-@pytest.mark.parametrize("name", CASES)
-def test_no_limit_is_ever_exceeded_from_viable_states(name: str, kind: str) -> None:
-    limits, rng = CASES[name], np.random.default_rng(51)
-    q, qd = viable_states(limits, rng)
-    c, q1, qd1 = np.empty_like(q), np.empty_like(q), np.empty_like(q)
-    worst = -np.inf
-    for step in range(N_STEPS):
-        target = push(kind, q, limits, step, rng) * limits.speed
-        polynomial.advance(
-            q, qd, target, limits.low, limits.high, limits.speed, limits.acc, limits.dt,
-            c, q1, qd1,
-        )  # fmt: skip
-        worst = max(
-            worst,
-            excess(q1, limits.low, limits.high),
-            excess(turning_points(q, qd, c, limits.dt), limits.low, limits.high),
-            excess(qd1, -limits.speed, limits.speed),
-            excess(2 * c, -limits.acc, limits.acc),
-        )
-        q, q1, qd, qd1 = q1, q, qd1, qd
-    assert N_ROBOTS * N_STEPS == 100_000
-    assert worst <= TOLERANCE
+def test_one_step_interval_is_all_that_brute_force_admits() -> None:
+    c = np.linspace(-A / 2, A / 2, 2001)
+    checked = empty = 0
+    for q, qd in random_states(400, 11):
+        low, high = polynomial.coefficient_interval_one_step(q, qd, *LIMITS)
+        kept = keeps_limits(q, qd, c)
+        clear = (abs(c - low) > 1e-3) & (abs(c - high) > 1e-3)
+        np.testing.assert_array_equal(kept[clear], ((c > low) & (c < high))[clear])
+        checked, empty = checked + kept.any(), empty + (low > high)
+    assert checked > 300
+    assert empty > 10
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_interval_is_never_empty_and_both_its_ends_keep_it_so(name: str) -> None:
-    limits, rng = CASES[name], np.random.default_rng(52)
-    q, qd = viable_states(limits, rng)
-    ends = (limits.low[0], limits.high[0], limits.speed[0], limits.acc[0], limits.dt)
-    for _ in range(60):
-        interval = np.array(
-            [
-                polynomial.coefficient_interval(*state, *ends)
-                for state in zip(q, qd, strict=True)
-            ]
-        )
-        assert (interval[:, 0] <= interval[:, 1]).all()
-        c = np.where(rng.random(len(q)) < 0.5, interval[:, 0], interval[:, 1])
-        q, qd = q + qd * limits.dt + c * limits.dt**2, qd + 2 * c * limits.dt
+def test_viable_interval_lies_within_the_one_step_interval() -> None:
+    n_viable = 0
+    for q, qd in random_states(5_000, 12):
+        room = Q_MAX - q if qd > 0 else q - Q_MIN
+        if qd**2 / (2 * A) + abs(qd) * DT / 2 <= room:
+            n_viable += 1
+            low, high = polynomial.coefficient_interval(q, qd, *LIMITS)
+            assert low <= high + 1e-9
+            low1, high1 = polynomial.coefficient_interval_one_step(q, qd, *LIMITS)
+            assert low1 <= low + 1e-9
+            assert high <= high1 + 1e-9
+    assert n_viable > 3_000
+
+
+def test_swapped_max_and_min_as_printed_exceed_limits() -> None:
+    """(4.21) and (4.22): the greatest upper and the least lower bound of 20,000 states."""
+    rng, exceeded, mended, n_empty = np.random.default_rng(13), 0, 0, 0
+    for q, qd in rng.uniform((Q_MIN, -V), (Q_MAX, V), (20_000, 2)):
+        upper = np.array([(Q_MAX - qd * DT - q) / DT**2, (V - qd) / (2 * DT), A / 2])
+        lower = np.array([(Q_MIN - qd * DT - q) / DT**2, (-V - qd) / (2 * DT), -A / 2])
+        share = rng.random()
+        printed = lower.min() + share * (upper.max() - lower.min())
+        exceeded += abs(qd + 2 * printed * DT) > V + 1e-9 or 2 * abs(printed) > A + 1e-9
+        low, high = lower.max(), upper.min()
+        if low > high:
+            n_empty += 1
+            continue
+        ours = low + share * (high - low)
+        mended += abs(qd + 2 * ours * DT) > V + 1e-9 or 2 * abs(ours) > A + 1e-9
+    assert exceeded > 0.999 * 20_000
+    assert mended == 0
+    assert 0 < n_empty < 400
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_turning_point_as_printed_exceeds_the_position_limit(side: float) -> None:
+    """(4.17) and (4.21) with ``q^2 - 2 qd^2`` in place of ``qd^2``."""
+    q, qd, room = 0.0, 0.1, 0.0006  # room < qd dt/2 = 0.001
+    printed = -(q**2 - 2 * qd**2) / (4 * room)
+    mended = polynomial.one_step_position_bound(room, qd, DT)
+    highest = {}
+    for name, c in (("printed", min(A / 2, printed)), ("mended", mended)):
+        x = np.linspace(0, DT, 10_001)
+        highest[name] = (q + qd * x + c * x**2).max()
+    assert highest["printed"] > room + 1e-3
+    assert highest["mended"] == pytest.approx(room, abs=1e-9)
+    low, high = polynomial.coefficient_interval_one_step(
+        q, side * qd, -room, room, V, 100.0, DT
+    )
+    assert (high if side > 0 else -low) == pytest.approx(mended)
 
 
 def test_wanted_speed_is_met_exactly_where_it_is_admissible() -> None:
@@ -119,8 +127,25 @@ def test_wanted_speed_is_met_exactly_where_it_is_admissible() -> None:
     assert 0.1 + 2 * c * 0.05 == pytest.approx(0.2, abs=1e-15)
 
 
+def test_wanted_speed_is_clipped_into_the_interval_or_brakes_where_that_is_empty() -> None:
+    rng = np.random.default_rng(14)
+    for q, qd in random_states(5_000, 14):
+        q, qd, target = q + rng.choice([0.0, 0.01, -0.01]), 1.2 * qd, rng.uniform(-V, V)
+        low, high = polynomial.coefficient_interval(q, qd, *LIMITS)
+        wanted = (target - qd) / (2 * DT)
+        expected = min(high, max(low, wanted)) if low <= high else polynomial.brake(qd, A, DT)
+        c = polynomial.coefficient_for_speed(q, qd, target, *LIMITS)
+        assert c == pytest.approx(expected, abs=1e-11), (q, qd, target)
+
+
 def test_joint_beyond_its_limit_brakes_as_hard_as_it_may() -> None:
     c = polynomial.coefficient_for_speed(1.2, 0.5, 0.5, -1.0, 1.0, 0.5, 3.0, 0.05)
-    assert c == -1.5
+    assert c == pytest.approx(-1.5)
     c = polynomial.coefficient_for_speed(1.2, 0.03, 0.5, -1.0, 1.0, 0.5, 3.0, 0.05)
     assert 0.03 + 2 * c * 0.05 == pytest.approx(0.0, abs=1e-15)
+
+
+def test_an_action_maps_onto_the_interval() -> None:
+    assert [polynomial.coefficient_of(a, -1.0, 3.0) for a in (-1.0, 0.0, 0.5, 1.0)] == [
+        -1.0, 1.0, 2.0, 3.0,
+    ]  # fmt: skip
