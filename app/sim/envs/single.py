@@ -73,7 +73,7 @@ class SingleEnv(gymnasium.Env[Obs, Obs]):
         state = self._rows.state
         return {
             "outcome": OUTCOMES[int(state.outcome[0])],
-            "episode": int(state.episode[0]),
+            "episode_number": int(state.episode[0]),
             "clearance_m": float(state.clear[0, 0]),
             "time_left_s": float(state.time_left[0]),
         }

@@ -21,7 +21,7 @@ class BatchVectorEnv(VectorEnv[Obs, Obs, NDArray[Any]]):
     Where an episode ends, the next one starts within the same step: the observation returned is
     already the new episode's first, the last one is in ``infos["final_obs"]`` (an array of
     objects, None elsewhere), outcome and number of the episode in ``infos["final_info"]``;
-    ``infos["_final_obs"]`` marks the rows. ``outcome``, ``episode``, ``clearance_m`` and
+    ``infos["_final_obs"]`` marks the rows. ``outcome``, ``episode_number``, ``clearance_m`` and
     ``time_left_s`` tell of the episodes that run now.
 
     Args:
@@ -97,7 +97,7 @@ class BatchVectorEnv(VectorEnv[Obs, Obs, NDArray[Any]]):
         for row in np.flatnonzero(done):
             final_obs[row] = last[row].copy()
         episode = np.where(done, self._rows.state.episode - 1, 0)
-        final: dict[str, Any] = {"outcome": outcome, "episode": episode}
+        final: dict[str, Any] = {"outcome": outcome, "episode_number": episode}
         for name in tuple(final):
             final[f"_{name}"] = done.copy()
         infos["final_obs"], infos["_final_obs"] = final_obs, done.copy()
@@ -107,7 +107,7 @@ class BatchVectorEnv(VectorEnv[Obs, Obs, NDArray[Any]]):
         state = self._rows.state
         infos: dict[str, Any] = {
             "outcome": NAMES[state.outcome],
-            "episode": state.episode.copy(),
+            "episode_number": state.episode.copy(),
             "clearance_m": state.clear[:, 0].copy(),
             "time_left_s": state.time_left.copy(),
         }
