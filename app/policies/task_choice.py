@@ -26,8 +26,8 @@ from app.sim.actions import ActionSettings
 from app.sim.cells import Cell, require_cell
 from app.sim.kernels.arm import CONTROLLED
 from app.sim.pick import observe
-from app.sim.scene import FAR_AWAY, arm_of, people_of
 from app.sim.ports import Candidate, Decision, OutsideField, Person, Vec
+from app.sim.scene import FAR_AWAY, arm_of, people_of
 
 HYSTERESIS = 0.2
 """By how much another candidate's value must be better before the choice changes."""

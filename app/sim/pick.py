@@ -109,8 +109,6 @@ class StepResult:
 
 
 def _world_of(cell: Cell, settings: PickSettings) -> pick.PickWorld:
-    if (lack := lacks_for_pick(cell)) is not None:
-        raise InvalidInput("cell", cell.name, f"cannot be used for picking: it {lack}")
     mount, stations = cell.robot, cell.pick_stations
     positions = np.array([station.position for station in stations]).reshape(-1, 3)
     postures, reached = kinematics.ik_vertical_batch(
@@ -187,6 +185,8 @@ class PickBatch:
     def __init__(
         self, cell: Cell, n_envs: int, seed: int, settings: PickSettings, first_env: int = 0
     ) -> None:
+        if (lack := lacks_for_pick(cell)) is not None:
+            raise InvalidInput("cell", cell.name, f"cannot be used for picking: it {lack}")
         self.cell = cell if settings.people is None else with_people(cell, settings.people)
         self.n_envs, self.seed, self.settings = n_envs, seed, settings
         self.world = _world_of(self.cell, settings)
@@ -212,7 +212,14 @@ class PickBatch:
     def restart(self) -> NDArray[np.float32]:
         """Start the episodes numbered by ``state.episode``; return the observations."""
         pick.reset_batch(
-            self.world, self._rules, self.seed, self._first, self.state, self._work, self._view, self._obs
+            self.world,
+            self._rules,
+            self.seed,
+            self._first,
+            self.state,
+            self._work,
+            self._view,
+            self._obs,
         )
         return self._obs
 

@@ -7,12 +7,13 @@ from app.errors import InvalidInput, SimulationError
 from app.sim import human, pick
 from app.sim.cells import Cell, load_cell
 from app.sim.contact import contact
-from app.sim.kernels import actions, contact as contact_kernel, features
+from app.sim.kernels import actions, features
+from app.sim.kernels import contact as contact_kernel
 from app.sim.kernels import pick as kernel
 from app.sim.kernels.features import LAYOUT
 from app.sim.pick import OUTCOMES, PickBatch, PickSettings
 from app.sim.recheck import Recheck, Trajectory
-from app.sim.scene import arm_of, people_of, with_people
+from app.sim.scene import arm_of, people_of
 
 TEN_SECONDS = PickSettings(time_limit_s=10.0)
 

@@ -6,10 +6,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from app.sim.kernels.compiled import kernel
 from app.sim.kernels import kinematics
 from app.sim.kernels.box import box_clearance
 from app.sim.kernels.columns import RADIUS, UX, UZ, X, Z, least, longest_way, pair_distances
+from app.sim.kernels.compiled import kernel
 from app.sim.kernels.geometry import FAR, FAST
 from app.sim.ports import Vec
 

@@ -11,8 +11,8 @@ import math
 
 import numpy as np
 
-from app.sim.kernels.compiled import kernel
 from app.sim.kernels.columns import new_columns, padded
+from app.sim.kernels.compiled import kernel
 from app.sim.kernels.trig import sines
 from app.sim.ports import Vec
 

@@ -8,7 +8,6 @@ period the robot follows its polynomial, workers move linearly in joint space, w
 """
 
 
-from app.sim.kernels.compiled import kernel
 from app.sim.kernels.arm import (
     Arm,
     RobotPose,
@@ -18,6 +17,7 @@ from app.sim.kernels.arm import (
     self_clearance,
 )
 from app.sim.kernels.columns import copy_rows
+from app.sim.kernels.compiled import kernel
 from app.sim.kernels.people import (
     Crowd,
     People,

@@ -15,7 +15,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from app.sim.kernels.compiled import kernel
 from app.sim.kernels import body, kinematics
 from app.sim.kernels.arm import (
     CONTROLLED,
@@ -37,6 +36,7 @@ from app.sim.kernels.columns import (
     new_columns,
     padded,
 )
+from app.sim.kernels.compiled import kernel
 from app.sim.kernels.geometry import FAR, FAST, segment_nearest
 from app.sim.kernels.people import People
 from app.sim.ports import Vec

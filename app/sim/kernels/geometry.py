@@ -6,7 +6,6 @@ of capsules are in ``columns.py``.
 
 import math
 
-
 from app.sim.kernels.compiled import kernel
 from app.sim.ports import Vec
 

@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from app.sim.kernels.compiled import kernel
 from app.sim.kernels import body, random, script
 from app.sim.kernels.columns import copy_rows, gaps, least, longest_way
+from app.sim.kernels.compiled import kernel
 from app.sim.kernels.cylinder import cylinder_clearance
 from app.sim.kernels.geometry import FAR
 from app.sim.kernels.occupancy import (

@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from app.sim.kernels.compiled import kernel
 from app.sim.kernels import kinematics, random
 from app.sim.kernels.actions import ONE_STEP, ActionRule, advance
 from app.sim.kernels.arm import (
@@ -24,6 +23,7 @@ from app.sim.kernels.arm import (
     tcp_speed,
 )
 from app.sim.kernels.columns import copy_rows, copy_values
+from app.sim.kernels.compiled import kernel
 from app.sim.kernels.contact import NO_CONTACT, clearances, sweep
 from app.sim.kernels.features import Obs, Sight, new_sight, observe
 from app.sim.kernels.people import (

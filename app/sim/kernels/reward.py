@@ -8,8 +8,8 @@ would reward moving away and colliding; the text asks for the signs used here.
 """
 
 from typing import NamedTuple
-from app.sim.kernels.compiled import kernel
 
+from app.sim.kernels.compiled import kernel
 
 
 class RewardWeights(NamedTuple):
