@@ -8,12 +8,13 @@ cheaply.
 import dataclasses
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
 from app.errors import InvalidInput, NotFound
+from app.sim.actions import BOUNDS, MEANINGS, ActionSettings
 
 
 def _number(default: float, low: float, high: float, unit: str, text: str) -> Any:
@@ -21,6 +22,11 @@ def _number(default: float, low: float, high: float, unit: str, text: str) -> An
     return field(
         default=default, metadata={"low": low, "high": high, "unit": unit, "help": text}
     )
+
+
+def _choice(default: str, choices: Iterable[str], text: str) -> Any:
+    """Declare a field that takes one of several names, with its explanation."""
+    return field(default=default, metadata={"choices": tuple(choices), "help": text})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,6 +89,16 @@ class Preset:
     way_share: float = _number(0.15, 0.0, 1.0, "", "episodes that start on the way")
     human_pace: float = _number(1.0, 0.2, 2.0, "", "speed of the person, 1 = as cycled")
 
+    action_degree: int = _number(
+        2, 2, 3, "", "degree of the motion in a period: 2 limits acceleration, 3 also jerk"
+    )
+    action_bounds: str = _choice(
+        "viable", BOUNDS, "viable never exceeds a limit; one-step is the source's (degree 2)"
+    )
+    action_meaning: str = _choice(
+        "speed", MEANINGS, "what an action is: a wanted joint speed or a place in the interval"
+    )
+
     c_d: float = _number(1.0, 0.0, 10.0, "1/m", "reward for progress toward the target")
     c_th: float = _number(0.25, 0.0, 10.0, "1/rad", "reward for an upright tool")
     c_c: float = _number(5.0, 0.0, 100.0, "", "cost of a collision")
@@ -98,6 +114,23 @@ class Preset:
         512_000, 128, 10_000_000, "env steps", "steps between two checkpoints"
     )
 
+    @property
+    def action(self) -> ActionSettings:
+        """How the scenario reads actions."""
+        return ActionSettings(
+            degree=self.action_degree, bounds=self.action_bounds, meaning=self.action_meaning
+        )
+
+
+def action_of(preset: Mapping[str, Any]) -> ActionSettings:
+    """Return what actions mean to a checkpoint, from the preset in its manifest."""
+    known = ActionSettings()
+    return ActionSettings(
+        degree=preset.get("action_degree", known.degree),
+        bounds=preset.get("action_bounds", known.bounds),
+        meaning=preset.get("action_meaning", known.meaning),
+    )
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FieldInfo:
@@ -106,13 +139,15 @@ class FieldInfo:
     name: str
     """Name of the field."""
     type: str
-    """``"int"`` or ``"float"``."""
-    default: float
+    """``"int"``, ``"float"`` or ``"choice"``."""
+    default: float | str
     """Value in the preset."""
-    minimum: float
-    """Least allowed value."""
-    maximum: float
-    """Greatest allowed value."""
+    minimum: float | None
+    """Least allowed value; None for a choice."""
+    maximum: float | None
+    """Greatest allowed value; None for a choice."""
+    choices: tuple[str, ...] | None
+    """Allowed names; None for a number."""
     unit: str
     """Unit; empty for a plain number."""
     help: str
@@ -141,19 +176,22 @@ def fields(name: str) -> list[FieldInfo]:
         NotFound: No preset has that name.
     """
     preset = get(name)
-    return [
-        FieldInfo(
-            name=entry.name,
-            type="int" if isinstance(getattr(preset, entry.name), int) else "float",
-            default=getattr(preset, entry.name),
-            minimum=entry.metadata["low"],
-            maximum=entry.metadata["high"],
-            unit=entry.metadata["unit"],
-            help=entry.metadata["help"],
-        )
-        for entry in dataclasses.fields(preset)
-        if entry.metadata
-    ]
+    return [_info(entry, preset) for entry in dataclasses.fields(preset) if entry.metadata]
+
+
+def _info(entry: "dataclasses.Field[Any]", preset: Preset) -> FieldInfo:
+    default, choices = getattr(preset, entry.name), entry.metadata.get("choices")
+    number = "int" if isinstance(default, int) else "float"
+    return FieldInfo(
+        name=entry.name,
+        type="choice" if choices else number,
+        default=default,
+        minimum=entry.metadata.get("low"),
+        maximum=entry.metadata.get("high"),
+        choices=choices,
+        unit=entry.metadata.get("unit", ""),
+        help=entry.metadata["help"],
+    )
 
 
 def resolve(name: str, overrides: Mapping[str, object]) -> Preset:
@@ -190,8 +228,12 @@ def _checked_cell(value: object) -> str:
     return value
 
 
-def _checked(info: FieldInfo, value: object) -> int | float:
+def _checked(info: FieldInfo, value: object) -> int | float | str:
     path = f"overrides.{info.name}"
+    if info.minimum is None or info.maximum is None:
+        if not isinstance(value, str) or value not in (info.choices or ()):
+            raise InvalidInput(path, value, "must be one of the choices", info.choices or ())
+        return value
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise InvalidInput(path, value, "must be a number")
     if not math.isfinite(value):
@@ -223,6 +265,12 @@ def _check_together(preset: Preset) -> None:
             raise InvalidInput(
                 f"overrides.{name}", value, f"must be a multiple of {of} = {unit}, say {near}"
             )
+    if preset.action_degree == 3 and preset.action_bounds != "viable":
+        raise InvalidInput(
+            "overrides.action_bounds",
+            preset.action_bounds,
+            "must be viable with action_degree = 3",
+        )
     if preset.buffer_size < 16 * preset.n_envs:
         raise InvalidInput(
             "overrides.buffer_size",

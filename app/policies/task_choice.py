@@ -10,7 +10,6 @@ Source: thesis eq. (5.1)-(5.7). Deviates: hysteresis is ours; 0 gives the source
 
 import time
 from collections.abc import Sequence
-from dataclasses import fields
 
 import numpy as np
 import torch
@@ -19,13 +18,14 @@ from numpy.typing import NDArray
 from app.errors import CheckpointMismatch, InvalidInput
 from app.policies.checkpoint import Checkpoint, expect_layout
 from app.policies.networks import ResidualActor, TwinCritic
+from app.policies.presets import action_of
 from app.policies.trained_cell import cell_of
 from app.policies.training import LAYOUT
 from app.sim import human, robot
 from app.sim.actions import ActionSettings
 from app.sim.cells import Cell, require_cell
 from app.sim.kernels.arm import CONTROLLED
-from app.sim.pick import observe
+from app.sim.pick import observe, step_robot
 from app.sim.ports import Candidate, Decision, OutsideField, Person, Vec
 from app.sim.scene import FAR_AWAY, arm_of, people_of
 
@@ -119,9 +119,7 @@ class TaskChooser:
     @property
     def action(self) -> ActionSettings:
         """What its actions mean (METHOD 2.2)."""
-        preset = self._checkpoint.manifest["preset"]
-        known = {f.name: preset.get(f"action_{f.name}", f.default) for f in fields(ActionSettings)}
-        return ActionSettings(**known)
+        return action_of(self._checkpoint.manifest["preset"])
 
     @property
     def title(self) -> str:
@@ -164,8 +162,7 @@ class TaskChooser:
         act, values = self._networks.act_and_value(obs)
         last = ids.index(previous) if previous in ids else None
         index = choose(values, last, self._hysteresis)
-        qd_target = np.zeros((len(ids), 6))
-        qd_target[:, :CONTROLLED] = act * self._arm.qd_max[:CONTROLLED]
+        qd_target = self._speeds(q, qd, act)
         return Decision(
             chosen=ids[index],
             index=index,
@@ -178,6 +175,17 @@ class TaskChooser:
             checkpoint=self.checkpoint,
             elapsed_ms=1e3 * (time.perf_counter() - started),
         )
+
+    def _speeds(self, q: Vec, qd: Vec, act: NDArray[np.float32]) -> Vec:
+        """Return the joint speeds that actions, shape (n, 5), ask for [rad/s], shape (n, 6)."""
+        if self.action.meaning == "coefficient":
+            pieces = (
+                step_robot(self._arm, q, qd, np.zeros(6), row, self.action) for row in act
+            )
+            return np.stack([piece.qd for piece in pieces])
+        speeds = np.zeros((len(act), 6))
+        speeds[:, :CONTROLLED] = act * self._arm.qd_max[:CONTROLLED]
+        return speeds
 
     def _robot_state(self, q: Vec, qd: Vec) -> tuple[Vec, Vec]:
         arm, slack = self._arm, 1e-6

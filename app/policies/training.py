@@ -84,7 +84,6 @@ class TrainResult:
 class _Ranges:
     """Least and greatest value of every state variable met in training."""
 
-
     def __init__(self, known: Mapping[str, Any] | None) -> None:
         known = known or {}
         self._low = {name: np.array(entry["low"]) for name, entry in known.items()}
@@ -124,6 +123,7 @@ def settings_of(preset: Preset) -> PickSettings:
         target_jitter_m=preset.target_jitter_m,
         way_share=preset.way_share,
         human_pace=preset.human_pace,
+        action=preset.action,
         weights=RewardWeights(
             c_d=preset.c_d,
             c_th=preset.c_th,

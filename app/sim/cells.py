@@ -144,15 +144,22 @@ def require_cell(cell: Cell, name: str, sha256: str) -> None:
         raise CheckpointMismatch("cell", now, then)
 
 
-def lacks_for_pick(cell: Cell) -> str | None:
-    """Say what a cell lacks for the pick scenario (METHOD 3.2); None where nothing."""
+def lacks_stations(cell: Cell) -> str | None:
+    """Say what a cell lacks to be simulated as a pick scenario; None where nothing."""
     if not cell.stations_of("cube") or not cell.stations_of("dock"):
         return "needs at least one station of kind cube and one of kind dock"
-    if len(cell.people) != 1 or not cell.workers:
-        return "needs exactly one person, of kind worker"
-    if cell.obstacles:
-        return "must have no fixed obstacles: this scenario does not see them yet"
     return None
+
+
+def lacks_for_pick(cell: Cell) -> str | None:
+    """Say what a cell lacks to train, decide and be shown (METHOD 3.2); None where nothing.
+
+    The simulator takes 0 to 4 people of any kind; the shipped policies know one worker. Fixed
+    obstacles are not observed: they never move, so a policy learns where they are.
+    """
+    if len(cell.people) != 1 or not cell.workers:
+        return lacks_stations(cell) or "needs exactly one person, of kind worker"
+    return lacks_stations(cell)
 
 
 def cell_names() -> tuple[str, ...]:

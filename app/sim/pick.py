@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from app.errors import InvalidInput
 from app.sim.actions import ActionSettings
-from app.sim.cells import Cell, lacks_for_pick
+from app.sim.cells import Cell, lacks_stations
 from app.sim.kernels import actions, body, features, kinematics, pick, random, script
 from app.sim.kernels import arm as arm_kernel
 from app.sim.kernels.arm import Arm
@@ -109,6 +109,8 @@ class StepResult:
 
 
 def _world_of(cell: Cell, settings: PickSettings) -> pick.PickWorld:
+    if (lack := lacks_stations(cell)) is not None:
+        raise InvalidInput("cell", cell.name, f"cannot be used for picking: it {lack}")
     mount, stations = cell.robot, cell.pick_stations
     positions = np.array([station.position for station in stations]).reshape(-1, 3)
     postures, reached = kinematics.ik_vertical_batch(

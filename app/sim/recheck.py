@@ -96,6 +96,8 @@ class Recheck:
         self._robot = Robot(cell.robot.tool_length)
         self._capsules = load_robot_capsules(cell.robot.tool_length, cell.robot.tool_radius)
         self._self_pairs = self_pairs(self._capsules)
+        boxes = (f"obstacle {box.id}" for box in cell.obstacles)
+        self._standing = ("table", "floor", *boxes)
         self._body_of = [
             TOOL if name == TOOL else LINK_NAMES[link]
             for name, link in zip(self._capsules.name, self._capsules.link, strict=True)
@@ -126,6 +128,10 @@ class Recheck:
         )
         near_person = gap < radius[:, None] + human.CAPSULE_RADII + MARGIN
         near_cell = np.minimum(a0[..., 2], a1[..., 2]) < radius + MARGIN
+        for box in cell.obstacles:
+            away = np.linalg.norm(0.5 * (a0 + a1) - box.center, axis=-1)
+            half = 0.5 * np.linalg.norm(a1 - a0, axis=-1) + np.linalg.norm(box.half_size)
+            near_cell |= away < half + radius + MARGIN
         i, j = self._self_pairs.T
         gap = segment_distances(a0[:, i], a1[:, i], a0[:, j], a1[:, j])
         return near_person, near_cell, gap < radius[i] + radius[j] + MARGIN
@@ -140,7 +146,7 @@ class Recheck:
             pairs.add((body_of[capsule], human.CAPSULE_NAMES[part], "human"))
         for capsule in np.flatnonzero(near_cell):
             if body_of[capsule] != LINK_NAMES[0]:
-                pairs |= {(body_of[capsule], body, "cell") for body in ("table", "floor")}
+                pairs |= {(body_of[capsule], body, "cell") for body in self._standing}
         for i, j in self._self_pairs[near_self]:
             pairs.add((body_of[i], body_of[j], "self"))
         return pairs

@@ -13,7 +13,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from app.errors import InvalidInput, SimulationError
 from app.sim import human
-from app.sim.cell_people import ConstantWalker, CylinderPerson, FixedSpeedWalker, Walker
+from app.sim.cell_people import (
+    ConstantWalker,
+    CylinderPerson,
+    FixedSpeedWalker,
+    Walker,
+    Worker,
+)
 from app.sim.cells import Cell
 from app.sim.kernels import body, people, script
 from app.sim.kernels.arm import Arm
@@ -26,8 +32,8 @@ from app.sim.work_cycle import build_library
 
 HumanKind = Literal["worker", "walker", "constant", "fixed-speed"]
 HUMAN_KINDS: tuple[HumanKind, ...] = ("worker", "walker", "constant", "fixed-speed")
-"""An 18-DoF person at work; a cylinder that walks (METHOD 2.1), with speed and radius that vary,
-that are constant per episode, or with a given speed."""
+"""An 18-DoF person at work; a cylinder that walks (METHOD 2.1), with speed and radius that
+vary, that are constant per episode, or with a given speed."""
 NO_CYLINDERS = np.zeros((0, 3))
 """Cylinders of a cell without walkers."""
 FAR_AWAY = (0.0, 4.0, -np.pi / 2.0)
@@ -78,7 +84,7 @@ def with_people(cell: Cell, kinds: Sequence[HumanKind]) -> Cell:
     """
     check_people(kinds)
     found = {kind: [p for p in cell.people if p.kind == kind] for kind in HUMAN_KINDS}
-    people = []
+    people: list[Worker | CylinderPerson] = []
     for kind in kinds:
         known = found[kind]
         if not known and kind == "worker":

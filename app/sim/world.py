@@ -91,9 +91,7 @@ class World:
 
     def _touches_here(self) -> bool:
         rest, person = np.zeros(6), self._person.q[None]
-        found = contact(
-            self._arm, self._people, self._q, rest, rest, rest, (person, person)
-        )
+        found = contact(self._arm, self._people, self._q, rest, rest, rest, (person, person))
         self._clearance: float | None = found.clearance_m
         return found.kind != "none"
 

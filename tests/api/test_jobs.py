@@ -125,3 +125,12 @@ def test_presets_are_described_for_a_form(client: TestClient) -> None:
     field = {one["name"]: one for one in preset["fields"]}["total_steps"]
     assert field["minimum"] <= field["default"] <= field["maximum"]
     assert field["unit"] and field["help"]
+
+
+def test_a_preset_lists_the_names_that_a_choice_takes(client: TestClient) -> None:
+    preset = client.get("/v1/presets").json()["items"][0]
+    fields = {one["name"]: one for one in preset["fields"]}
+    assert fields["action_bounds"]["choices"] == ["viable", "one-step"]
+    assert fields["action_bounds"]["default"] == "viable"
+    assert fields["action_meaning"]["minimum"] is None
+    assert fields["action_degree"]["choices"] is None

@@ -8,11 +8,15 @@ import pytest
 
 from app.errors import InvalidInput, NotFound
 from app.policies import presets
+from app.sim.actions import ActionSettings
 
 
 def test_every_default_lies_inside_its_own_bounds():
     for info in presets.fields("pick-td3"):
-        assert info.minimum <= info.default <= info.maximum, info.name
+        if info.type == "choice":
+            assert info.default in info.choices, info.name
+        else:
+            assert info.minimum <= info.default <= info.maximum, info.name
 
 
 def test_resolving_without_overrides_gives_the_preset():
@@ -37,6 +41,10 @@ def test_an_unknown_preset_names_the_known_ones():
         ({"checkpoint_steps": 1_280}, "overrides.checkpoint_steps"),
         ({"buffer_size": 2_000}, "overrides.buffer_size"),
         ({"time_limit_s": 5.0}, "overrides.short_limit_s"),
+        ({"action_degree": 4}, "overrides.action_degree"),
+        ({"action_bounds": "none"}, "overrides.action_bounds"),
+        ({"action_meaning": 1}, "overrides.action_meaning"),
+        ({"action_degree": 3, "action_bounds": "one-step"}, "overrides.action_bounds"),
         ({"total_steps": 12_800, "progress_steps": 12_800}, "overrides.learning_starts"),
     ],
 )
@@ -53,3 +61,14 @@ def test_presets_load_no_learning_library():
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     )
     assert ran.stdout.strip() == "False"
+
+
+def test_default_action_is_the_viable_speed_of_degree_two():
+    assert presets.get("pick-td3").action == ActionSettings()
+
+
+def test_overrides_choose_the_action():
+    chosen = {"action_bounds": "one-step", "action_meaning": "coefficient"}
+    action = presets.resolve("pick-td3", chosen).action
+    assert action == ActionSettings(bounds="one-step", meaning="coefficient")
+    assert presets.resolve("pick-td3", {"action_degree": 3}).action.degree == 3

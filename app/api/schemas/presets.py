@@ -19,7 +19,7 @@ class PresetField(Answer):
     maximum: int | float | None = Field(description="null for a choice")
     unit: str = Field(description="empty for a plain number")
     help: str = Field(description="what it does, for people")
-    choices: list[str] | None = Field(None, description="what may be chosen; null for a number")
+    choices: Sequence[str] | None = Field(description="what may be chosen; null for a number")
 
 
 class PresetPublic(Answer):
@@ -38,9 +38,10 @@ class PresetPublic(Answer):
             cells: Work cells it can be trained in; a field where there is a choice.
         """
         own = PRESETS[name].cell
-        numbers = [key for key in PresetField.model_fields if key != "choices"]
+        keys = PresetField.model_fields
         listed = [
-            PresetField(**{key: getattr(one, key) for key in numbers}) for one in fields(name)
+            PresetField.model_validate({key: getattr(one, key) for key in keys})
+            for one in fields(name)
         ]
         if len(cells) > 1:
             choice = PresetField(

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.policies.evaluation.statistics import wilson
+from app.policies.presets import action_of
 from app.policies.task_choice import ValueNetworks
 from app.sim.cells import Cell
 from app.sim.kernels import pick as kernel
@@ -85,6 +86,7 @@ def settings_for(n_candidates: tuple[int, int], preset: dict[str, object]) -> Pi
         n_candidates=n_candidates,
         human_pace=float(pace) if isinstance(pace, int | float) else 1.0,
         library_seed=EVALUATION_LIBRARY,
+        action=action_of(preset),
     )
 
 
@@ -199,7 +201,9 @@ class _Trace:
                 x = dt * part / self.PARTS
                 q = self._q0[row] + self._qd0[row] * x + c * x * x
                 blend = part / self.PARTS
-                person = self._human0[row] + blend * (state.people.q[row, 0] - self._human0[row])
+                person = self._human0[row] + blend * (
+                    state.people.q[row, 0] - self._human0[row]
+                )
                 self._robot[row].append(q)
                 self._person[row].append(person)
 

@@ -5,6 +5,8 @@ with postures never seen in training. The hand speeds of the person are part of 
 of the first 200 episodes FCL says on the raw meshes whether the kernels missed a contact.
 """
 
+from dataclasses import asdict
+
 import numpy as np
 
 from app.policies.checkpoint import Checkpoint
@@ -15,6 +17,7 @@ from app.policies.trained_cell import cell_of
 from app.sim.kernels import pick as kernel
 from app.sim.pick import hand_speeds
 from app.sim.recheck import recheck_trajectories
+from app.sim.scene import kinds_of
 
 DEFAULT_EPISODES = 1000
 N_RECHECKED = 200
@@ -34,7 +37,10 @@ def _settings(evaluator: Evaluator) -> dict[str, object]:
     settings, state = evaluator.batch.settings, evaluator.batch.state
     return {
         "time_limit_s": settings.time_limit_s,
+        "people": list(kinds_of(evaluator.batch.cell)),
+        "start": settings.start,
         "start_clearance_m": settings.start_clearance_m,
+        "action": asdict(settings.action),
         "starts_redrawn_share": float((state.n_redrawn > 0).mean()),
         "candidates": list(settings.n_candidates),
         **hand_speeds(evaluator.batch),

@@ -6,10 +6,15 @@ follows ``q(x) = q + qd x + c x^2 + d x^3``, ``0 <= x <= dt``.
 
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from app.sim.kernels import jerk, polynomial
 from app.sim.kernels.compiled import kernel
 from app.sim.kernels.jerk import Limits
 from app.sim.ports import Vec
+
+Action = NDArray[np.floating]
 
 VIABLE, ONE_STEP = range(2)
 """Bounds: recursively feasible, or the source's for this period alone (degree 2)."""
@@ -33,7 +38,7 @@ class ActionRule(NamedTuple):
 
 
 @kernel(error_model="numpy", inline="always")
-def wanted_speed(j: int, q: float, qd_max: float, act: Vec) -> float:
+def wanted_speed(j: int, q: float, qd_max: float, act: Action) -> float:
     """Return the speed wanted of a joint [rad/s]; joints without action are held at 0."""
     if j < act.shape[0]:
         return float(min(1.0, max(-1.0, act[j])) * qd_max)
@@ -116,7 +121,7 @@ def advance(
     q: Vec,
     qd: Vec,
     qdd: Vec,
-    act: Vec,
+    act: Action,
     q_min: Vec,
     q_max: Vec,
     qd_max: Vec,
@@ -133,39 +138,38 @@ def advance(
 
     Args:
         rule: How actions are read.
-        q: Joint positions [rad], shape (n,).
-        qd: Joint speeds [rad/s], shape (n,).
-        qdd: Joint accelerations [rad/s^2], shape (n,); read by degree 3 alone.
-        act: Actions, clipped to [-1, 1], shape (m,), m <= n; further joints are held at 0.
-        q_min: Lower position limits [rad], shape (n,).
-        q_max: Upper position limits [rad], shape (n,).
-        qd_max: Speed limits [rad/s], shape (n,).
-        qdd_max: Acceleration limits [rad/s^2], shape (n,).
-        jerk_max: Jerk limits [rad/s^3], shape (n,); read by degree 3 alone.
+        q: Joint positions [rad], shape (6,).
+        qd: Joint speeds [rad/s], shape (6,).
+        qdd: Joint accelerations [rad/s^2], shape (6,); read by degree 3 alone.
+        act: Actions, clipped to [-1, 1], shape (n,), n <= 6; further joints are held at 0.
+        q_min: Lower position limits [rad], shape (6,).
+        q_max: Upper position limits [rad], shape (6,).
+        qd_max: Speed limits [rad/s], shape (6,).
+        qdd_max: Acceleration limits [rad/s^2], shape (6,).
+        jerk_max: Jerk limits [rad/s^3], shape (6,); read by degree 3 alone.
         dt: Period [s].
-        c: Filled with the coefficients of x^2 [rad/s^2], shape (n,).
-        d: Filled with the coefficients of x^3 [rad/s^3], shape (n,); 0 for degree 2.
-        q_out: Filled with the positions after the period [rad], shape (n,); may be ``q``.
-        qd_out: Filled with the speeds after the period [rad/s], shape (n,); may be ``qd``.
-        qdd_out: Filled with the accelerations at its end [rad/s^2], shape (n,); may be ``qdd``.
+        c: Filled with the coefficients of x^2 [rad/s^2], shape (6,).
+        d: Filled with the coefficients of x^3 [rad/s^3], shape (6,); 0 for degree 2.
+        q_out: Filled with positions after the period [rad], shape (6,); may be ``q``.
+        qd_out: Filled with speeds after the period [rad/s], shape (6,); may be ``qd``.
+        qdd_out: Filled with accelerations at its end [rad/s^2], shape (6,); may be ``qdd``.
 
     Returns:
-        Whether a joint's interval was empty: *unfeasible*. That joint brakes; the one-step
-        bounds then exceed limits. Viable bounds are never empty but from states outside limits.
+        Whether a joint's interval was empty: *unfeasible*; that joint brakes. Viable bounds
+        never are, but from a state that was not viable already.
     """
-    empty, per_2dt = False, 0.5 / dt
+    per_2dt, empty = 0.5 / dt, False
     plain = (rule.degree == 2) & (rule.bounds == VIABLE) & (rule.meaning == SPEED)
     for j in range(N_JOINTS):
-        q_j, qd_j = q[j], qd[j]
+        q_j, qd_j, d_j = q[j], qd[j], 0.0
         target = wanted_speed(j, q_j, qd_max[j], act)
         if plain:
             c_j, none = polynomial.viable_coefficient_for_speed(
                 q_j, qd_j, target, q_min[j], q_max[j], qd_max[j], qdd_max[j], dt, per_2dt
             )
-            d_j = 0.0
         else:
-            to = Limits(q_min[j], q_max[j], qd_max[j], qdd_max[j], jerk_max[j], dt)
             held = j >= act.shape[0]
+            to = Limits(q_min[j], q_max[j], qd_max[j], qdd_max[j], jerk_max[j], dt)
             c_j, d_j, none = other_piece(rule, target, held, q_j, qd_j, qdd[j], to)
         empty |= none
         c[j], d[j], qdd_out[j] = c_j, d_j, 2.0 * c_j + 6.0 * d_j * dt

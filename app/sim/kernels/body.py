@@ -83,9 +83,7 @@ N_FRAMES = 6
 
 
 @kernel(inline="always")
-def _turn(
-    ca: float, sa: float, cb: float, sb: float, cc: float, sc: float, out: Vec
-) -> None:
+def _turn(ca: float, sa: float, cb: float, sb: float, cc: float, sc: float, out: Vec) -> None:
     """Write ``Ry(a) Rx(b) Rz(c)``, from cosines and sines, into ``out``, shape (3, 3)."""
     out[0, 0], out[0, 1], out[0, 2] = ca * cc + sa * sb * sc, sa * sb * cc - ca * sc, sa * cb
     out[1, 0], out[1, 1], out[1, 2] = cb * sc, cb * cc, -sb

@@ -34,7 +34,7 @@ def padded(n: int) -> int:
 
 
 def new_columns(n: int, radius: Vec, length2: Vec | None = None) -> Vec:
-    """Return a set of ``n`` columns, those beyond ``len(radius)`` nowhere.
+    """Return a set of ``n`` columns, all nowhere until they are placed.
 
     Args:
         n: Number of columns, at least ``len(radius)``.
@@ -42,7 +42,7 @@ def new_columns(n: int, radius: Vec, length2: Vec | None = None) -> Vec:
         length2: Squares of their lengths [m^2], shape (k,), where they never change.
     """
     out = np.zeros((N_ROWS, n))
-    out[X:UX, len(radius) :] = NOWHERE
+    out[X:UX] = NOWHERE
     out[RADIUS, : len(radius)] = radius
     if length2 is not None:
         out[UU, : len(radius)] = length2
@@ -190,7 +190,9 @@ def least(values: Vec) -> tuple[float, int]:
 
 
 @kernel(error_model="numpy", fastmath=FAST)
-def pair_distances(a: Vec, first: NDArray[np.int64], second: NDArray[np.int64], out: Vec) -> None:
+def pair_distances(
+    a: Vec, first: NDArray[np.int64], second: NDArray[np.int64], out: Vec
+) -> None:
     """Write the distances of chosen pairs of columns of one set [m].
 
     Args:
@@ -217,7 +219,11 @@ def longest_way(before: Vec, after: Vec) -> float:
     """Return the farthest any end of a set's capsules moved [m]; both of shape (9, n)."""
     longest = 0.0
     for k in range(before.shape[1]):
-        x, y, z = after[X, k] - before[X, k], after[Y, k] - before[Y, k], after[Z, k] - before[Z, k]
+        x, y, z = (
+            after[X, k] - before[X, k],
+            after[Y, k] - before[Y, k],
+            after[Z, k] - before[Z, k],
+        )
         ux = x + after[UX, k] - before[UX, k]
         uy = y + after[UY, k] - before[UY, k]
         uz = z + after[UZ, k] - before[UZ, k]

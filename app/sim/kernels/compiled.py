@@ -16,7 +16,8 @@ R = TypeVar("R")
 
 def kernel(**options: Any) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """Return numba's decorator for a kernel that makes no arrays; ``options`` are njit's."""
-    decorate: Callable[[Callable[P, R]], Callable[P, R]] = njit(
+    compile_with: Any = njit  # its types do not know _nrt
+    decorate: Callable[[Callable[P, R]], Callable[P, R]] = compile_with(
         cache=True, _nrt=False, **options
     )
     return decorate

@@ -7,7 +7,6 @@ of ``FINEST_STEP``, where contact is reported. Mostly the end of the period sett
 period the robot follows its polynomial, workers move linearly in joint space, walkers linearly.
 """
 
-
 from app.sim.kernels.arm import (
     Arm,
     RobotPose,

@@ -110,7 +110,7 @@ COARSE_FIRST = (0, 1, 2, 4, 5)
 """First coarse capsule of each of the four link groups, and their number."""
 N_COARSE = 5
 STILL, ALONG_BASE, AT_GOAL = 0, N_COARSE, 2 * N_COARSE
-"""First lane of the three postures looked at together: now, along the base motion, at the goal."""
+"""First lane of three postures looked at together: now, along the base motion, at the goal."""
 N_LANES = padded(3 * N_COARSE)
 FIRST_PART, LAST_PART = body.C_ABDOMEN, body.C_HAND_L
 """Human capsules the features look at: what stands above the table."""
@@ -440,7 +440,7 @@ def observe_batch(
     time_left: Vec,
     out: Obs,
 ) -> None:
-    """Apply :func:`observe` to n rows; every argument but the first two has a leading axis n."""
+    """Apply :func:`observe` to n rows; all arguments but two have a leading axis of n."""
     robot, sight = new_robot_pose(arm), new_sight(people.person)
     observe_rows(
         arm, people, q, qd, human_q, human_qd, goals, q_goals, time_left, robot, sight, out

@@ -284,7 +284,7 @@ def nearest_person(people: People, robot: Vec, crowd: Crowd) -> int:
     """
     n_workers, n_walkers = crowd.q.shape[0], crowd.cylinders.shape[0]
     if n_workers + n_walkers < 2:
-        return n_workers + n_walkers - 1
+        return int(n_workers + n_walkers - 1)
     best, nearest = FAR, 0
     if n_workers > 0:
         gaps(robot, crowd.columns, crowd.gap)

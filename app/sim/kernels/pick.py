@@ -255,7 +255,7 @@ def reset_env(
         clear = clearances(arm, world.people, work.robot, work.crowd)
         state.clear[e, 0], state.clear[e, 1], state.clear[e, 2] = clear
         state.n_redrawn[e] = attempt
-        if clear[0] >= rules.start_clearance:
+        if clear[0] >= rules.start_clearance and min(clear[1], clear[2]) > 0.0:
             break
     state.distance[e] = distance_to(goal, work.robot)
     state.tilt[e] = robot_tilt(work.robot)

@@ -54,7 +54,14 @@ def script_at(
 
 @kernel(error_model="numpy")
 def move_at(
-    t: float, start: float, duration: float, before: Vec, after: Vec, pace: float, q: Vec, qd: Vec
+    t: float,
+    start: float,
+    duration: float,
+    before: Vec,
+    after: Vec,
+    pace: float,
+    q: Vec,
+    qd: Vec,
 ) -> None:
     """Write joint positions and speeds of one minimum-jerk move.
 

@@ -38,7 +38,10 @@ def distance(a: np.ndarray, radius_a: float, b: np.ndarray, radius_b: float) -> 
     """Distance of two capsules, by the kernel for sets."""
     out = np.empty(1)
     columns.distances(
-        columns_of(a[None], np.array([radius_a])), 0, columns_of(b[None], np.array([radius_b])), out
+        columns_of(a[None], np.array([radius_a])),
+        0,
+        columns_of(b[None], np.array([radius_b])),
+        out,
     )
     return float(out[0])
 

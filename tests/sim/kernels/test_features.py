@@ -28,7 +28,9 @@ def state(cell: Cell) -> dict[str, np.ndarray]:
 
 
 def seen(cell: Cell, **changes: np.ndarray) -> np.ndarray:
-    return pick.observe(arm_of(cell), people_of(cell), **(state(cell) | changes), time_left_s=7.0)[0]
+    return pick.observe(
+        arm_of(cell), people_of(cell), **(state(cell) | changes), time_left_s=7.0
+    )[0]
 
 
 def test_layout_covers_the_observation_without_gap_or_overlap() -> None:
