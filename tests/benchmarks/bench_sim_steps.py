@@ -1,37 +1,56 @@
-"""Environment steps per processor second: the batched kernels beside one environment on FCL.
+"""Environment steps per processor second: the batched kernels beside what is usual.
 
     python -m app bench sim-steps [--json]
 
-``pick/numba`` steps without observations, ``pick/numba-features`` as training does, with all of
-them, and ``fcl/pick`` is the single environment of ``fcl_pick.py``. All act at random; episodes
-that end start anew.
+pick/numba           18-DoF person, exact distances of all capsule pairs, plain observations
+pick/numba-features  the same with every feature, as it is trained
+fcl/pick             one environment on Pinocchio and python-fcl, see ``fcl_pick.py``
+mujoco/pick          MuJoCo: kinematics and ``mj_geomDistance`` of the same pairs
+mujoco/pick-sensors  MuJoCo: the same distances by sensors, all in one call
+mujoco/pick-contacts MuJoCo: kinematics and ``mj_collision``, who touches but not how far
+
+The environments act at random, and episodes that end start anew. MuJoCo is posed along an
+episode recorded from the kernels and does less than they do, see ``mujoco_pick.py``. The column
+*slower* says how many times as many steps ``pick/numba`` makes.
 """
 
 import itertools
+from collections.abc import Iterator
 
 import numpy as np
 
 from app.sim.cells import load_cell
 from app.sim.pick import PickBatch, PickSettings
+from app.sim.ports import Vec
 from tests.benchmarks.fcl_pick import FclPick
-from tests.benchmarks.measure import Subject, arguments, report, rounds_over, row
+from tests.benchmarks.measure import (
+    Row,
+    Subject,
+    arguments,
+    report,
+    rounds_over,
+    row,
+    row_without,
+)
+from tests.benchmarks.mujoco_pick import INSTALLED, WAYS, MujocoPick
 
 BENCH = "sim-steps"
 BATCH = 128
 TICKS = 400
 """Steps of the person's motion that the FCL environment goes through."""
+MOMENTS = 1024
+"""Moments of the recorded episodes that MuJoCo goes through."""
+MUJOCO = {way: f"mujoco/pick-{way}" for way in WAYS} | {"distances": "mujoco/pick"}
+UNIT = "env-steps/cpu-s"
 
 
-def batched(name: str, seed: int, *, features: bool) -> Subject:
+def batched(name: str, settings: PickSettings, seed: int) -> Subject:
     """Return the batched scenario, one call a step of all environments."""
-    batch = PickBatch(load_cell(), BATCH, seed, PickSettings())
+    batch = PickBatch(load_cell(), BATCH, seed, settings)
     batch.reset()
     rng = np.random.default_rng(seed)
-    acts = rng.uniform(-1.0, 1.0, (64, BATCH, 5)).astype(np.float32)
-    turn = itertools.cycle(acts)
-    return Subject(
-        name=name, batch=BATCH, run=lambda: batch.step(next(turn), features=features)
-    )
+    turn = itertools.cycle(rng.uniform(-1.0, 1.0, (64, BATCH, 5)).astype(np.float32))
+    return Subject(name=name, batch=BATCH, run=lambda: batch.step(next(turn)))
 
 
 def single(seed: int) -> Subject:
@@ -51,19 +70,53 @@ def single(seed: int) -> Subject:
     return Subject(name="fcl/pick", batch=1, run=lambda: env.step(next(turn)))
 
 
+def recorded(seed: int) -> tuple[Vec, Vec]:
+    """Return the joints of robot, (MOMENTS, 6), and person, (MOMENTS, 18), acting at random."""
+    batch = PickBatch(load_cell(), 1, seed, PickSettings(observation="state"))
+    batch.reset()
+    rng = np.random.default_rng(seed)
+    q, human_q = np.empty((MOMENTS, 6)), np.empty((MOMENTS, 18))
+    for tick in range(MOMENTS):
+        q[tick], human_q[tick] = batch.state.q[0], batch.state.people.q[0, 0]
+        batch.step(rng.uniform(-1.0, 1.0, (1, 5)).astype(np.float32))
+    return q, human_q
+
+
+def mujoco_peers(seed: int) -> Iterator[Subject]:
+    """Yield MuJoCo's ways to measure, where it is installed."""
+    if INSTALLED:
+        q, human_q = recorded(seed)
+        for way, name in MUJOCO.items():
+            peer = MujocoPick(load_cell(), q, human_q, way)
+            yield Subject(name=name, batch=1, run=peer.step)
+
+
+def measured(subjects: list[Subject], rounds: int, seconds: float) -> list[Row]:
+    """Return a row for every subject, peers with how many times slower they are."""
+    times = rounds_over(subjects, rounds, seconds)
+    rows = [
+        row(subject, [subject.batch / spent for spent in found], UNIT)
+        for subject, found in zip(subjects, times, strict=True)
+    ]
+    for one in rows:
+        if "/pick" in one["name"]:
+            one["slower"] = rows[0]["value"] / one["value"]
+    return rows
+
+
 def main() -> None:
     """Measure and print."""
     options = arguments(BENCH)
+    plain = PickSettings(observation="state")
     subjects = [
-        batched("pick/numba", options.seed, features=False),
-        batched("pick/numba-features", options.seed, features=True),
+        batched("pick/numba", plain, options.seed),
+        batched("pick/numba-features", PickSettings(), options.seed),
         single(options.seed),
+        *mujoco_peers(options.seed),
     ]
-    times = rounds_over(subjects, options.rounds, options.seconds)
-    rows = [
-        row(subject, [subject.batch / spent for spent in found], "env-steps/cpu-s")
-        for subject, found in zip(subjects, times, strict=True)
-    ]
+    rows = measured(subjects, options.rounds, options.seconds)
+    if not INSTALLED:
+        rows += [row_without(name, "MuJoCo is not installed") for name in MUJOCO.values()]
     report(BENCH, rows, options)
 
 

@@ -6,6 +6,7 @@ go through all rows in turn, so that a machine that slows down slows all of them
 
 import argparse
 import json
+import os
 import statistics
 import time
 from collections.abc import Callable, Iterable, Sequence
@@ -58,12 +59,23 @@ def rounds_over(subjects: Sequence[Subject], rounds: int, seconds: float) -> lis
     return times
 
 
-def row(subject: Subject, values: Sequence[float], unit: str) -> Row:
-    """Make a result row: the median over the rounds with the least and the greatest."""
+def row(
+    subject: Subject, values: Sequence[float], unit: str, threads: int = 1, **more: object
+) -> Row:
+    """Make a result row: the median over the rounds with the least and the greatest.
+
+    Args:
+        subject: What was measured.
+        values: Its value in each round.
+        unit: Their unit.
+        threads: Threads that ran at once.
+        **more: Further columns.
+    """
     return {
         "name": subject.name,
-        "threads": 1,
+        "threads": threads,
         "batch": subject.batch,
+        **more,
         "value": statistics.median(values),
         "low": min(values),
         "high": max(values),
@@ -71,10 +83,19 @@ def row(subject: Subject, values: Sequence[float], unit: str) -> Row:
     }
 
 
+def row_without(name: str, reason: str) -> Row:
+    """Make the row of something that could not be measured: it is said, not left out."""
+    return {"name": name, "value": None, "note": reason}
+
+
 def report(bench: str, rows: Iterable[Row], options: argparse.Namespace) -> None:
     """Print the rows: as a table, or with ``--json`` as one object."""
     results = list(rows)
-    settings = {"rounds": options.rounds, "seconds": options.seconds}
+    settings = {
+        "rounds": options.rounds,
+        "seconds": options.seconds,
+        "load": round(os.getloadavg()[0], 2),
+    }
     if options.json:
         print(
             json.dumps(
@@ -89,8 +110,11 @@ def report(bench: str, rows: Iterable[Row], options: argparse.Namespace) -> None
         )
         return
     machine = describe()
-    print(f"{bench}, one thread, {machine['cores']} cores of {machine['cpu']}")
+    print(f"{bench}, {machine['cores']} cores of {machine['cpu']}, load {settings['load']}")
     for one in results:
+        if one["value"] is None:
+            print(f"  {one['name']:<24} {one['note']}")
+            continue
         print(
             f"  {one['name']:<24} batch {one['batch']:<5} {one['value']:>12,.4g} {one['unit']}"
             f"  ({one['low']:,.4g} to {one['high']:,.4g})"
