@@ -5,6 +5,7 @@ functions below it do the same for one state, for the live cell and for deciding
 same kernels, so that what was trained is what acts.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -16,7 +17,8 @@ from app.sim.actions import ActionSettings
 from app.sim.cells import Cell, lacks_stations
 from app.sim.kernels import actions, body, features, kinematics, pick, random, script
 from app.sim.kernels import arm as arm_kernel
-from app.sim.kernels.arm import Arm
+from app.sim.kernels.arm import CONTROLLED, Arm
+from app.sim.kernels.compiled import direct
 from app.sim.kernels.features import N_FEATURES
 from app.sim.kernels.geometry import FAR
 from app.sim.kernels.people import People, PeopleState
@@ -29,6 +31,7 @@ from app.sim.scene import (
     own,
     people_of,
     require_finite,
+    require_shape,
     with_people,
 )
 
@@ -202,6 +205,7 @@ class PickBatch:
         self._last = np.zeros_like(self._obs)
         self._rew = np.zeros(n_envs, dtype=np.float32)
         self._ended = np.zeros(n_envs, dtype=np.int64)
+        self._step: Callable[..., None] | None = None
 
     def reset(self, seed: int | None = None) -> NDArray[np.float32]:
         """Start episode 0 in every cell; return observations, (n_envs, obs_size)."""
@@ -234,11 +238,13 @@ class PickBatch:
             features: Whether observations are wanted.
 
         Raises:
+            InvalidInput: The actions have another shape.
             SimulationError: An action is NaN or infinite.
         """
+        require_shape("act", act, (self.n_envs, CONTROLLED))
         require_finite("act", act)
         wanted = np.array(act, dtype=np.float32, order="C")
-        pick.step_batch(
+        arguments = (
             self.world,
             self._rules,
             self._action,
@@ -255,6 +261,9 @@ class PickBatch:
             self._rew,
             self._ended,
         )
+        if self._step is None:
+            self._step = direct(pick.step_batch, arguments)
+        self._step(*arguments)
         return StepResult(obs=self._obs, last_obs=self._last, rew=self._rew, ended=self._ended)
 
     def set_goals(self, rows: NDArray[np.int64], goals: Vec) -> None:
