@@ -104,10 +104,10 @@ def _listed(settings: Settings) -> Printed:
 
 
 def _described(cell: Cell, what: str) -> Printed:
-    targets = [] if cell.goal_region is None else cell.goal_region.targets()
+    n_targets = 0 if cell.goal_region is None else len(cell.goal_region.targets())
     counted = (
         (len(cell.stations), "station", "stations"),
-        (len(targets), "grid target", "grid targets"),
+        (n_targets, "grid target", "grid targets"),
         (len(cell.obstacles), "obstacle", "obstacles"),
         (len(cell.people), "person", "people"),
     )

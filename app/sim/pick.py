@@ -19,6 +19,7 @@ from app.sim.kernels import actions, body, features, kinematics, pick, random, s
 from app.sim.kernels import arm as arm_kernel
 from app.sim.kernels.arm import CONTROLLED, Arm
 from app.sim.kernels.compiled import direct
+from app.sim.kernels.episode import FEATURES, NO_OBS, PLAIN, distance_to
 from app.sim.kernels.features import N_FEATURES
 from app.sim.kernels.geometry import FAR
 from app.sim.kernels.people import People, PeopleState
@@ -38,7 +39,7 @@ from app.sim.scene import (
 OUTCOMES = ("running", "success", "collision", "timeout", "unfeasible")
 StartRule = Literal["clearance", "uniform"]
 DEFAULT_ACTION = ActionSettings()
-VIEWS = {"state": (pick.PLAIN, pick.N_PLAIN), "features": (pick.FEATURES, N_FEATURES)}
+VIEWS = {"state": (PLAIN, pick.N_PLAIN), "features": (FEATURES, N_FEATURES)}
 """What observations hold: the plain state of (5.8), or that and features; and their lengths."""
 DEFAULT_WEIGHTS = RewardWeights(
     c_d=0.5, c_th=0.5, c_c=1.0, c_step=0.02, c_v=1.0, d_v=0.1, c_s=1.0, gamma=1.0
@@ -255,7 +256,7 @@ class PickBatch:
             self._work,
             wanted,
             auto_reset,
-            self._view if features else pick.NO_OBS,
+            self._view if features else NO_OBS,
             self._obs,
             self._last,
             self._rew,
@@ -360,7 +361,7 @@ def tool_state(arm: Arm, q: Vec, qd: Vec, goal: Vec) -> tuple[float, float, floa
     """Return distance to a target [m], tilt [rad], tcp speed [m/s] and whether it succeeds."""
     pose = arm_kernel.new_robot_pose(arm)
     arm_kernel.place_robot(arm, own(q), pose)
-    distance, tilt = pick.distance_to(own(goal), pose), arm_kernel.robot_tilt(pose)
+    distance, tilt = distance_to(own(goal), pose), arm_kernel.robot_tilt(pose)
     speed = arm_kernel.tcp_speed(pose, own(qd))
     return distance, tilt, speed, bool(pick.succeeded(distance, tilt, speed))
 

@@ -19,6 +19,7 @@ from app.sim.cell_people import Worker
 from app.sim.cells import Cell
 from app.sim.kernels import reach
 from app.sim.kernels.compiled import direct
+from app.sim.kernels.episode import FEATURES, NO_OBS, PLAIN
 from app.sim.kernels.geometry import FAR
 from app.sim.kernels.people import People, PeopleState
 from app.sim.kernels.reach_features import N_FEATURES, N_STATE
@@ -44,7 +45,7 @@ N_ACT = 6
 StartRule = Literal["clearance", "uniform", "authors"]
 GoalRule = Literal["grid", "box"]
 ViewName = Literal["features", "state"]
-VIEWS = {"state": (reach.PLAIN, N_STATE), "features": (reach.FEATURES, N_FEATURES)}
+VIEWS = {"state": (PLAIN, N_STATE), "features": (FEATURES, N_FEATURES)}
 """What observations hold: the plain state (4.30), or that and features; and their lengths."""
 THESIS_WEIGHTS = ReachWeights(
     c_d=1.0, c_p=0.0, gamma=1.0, c_a=0.1, c_step=0.0, c_c=5.0, c_s=20.0
@@ -315,7 +316,7 @@ class ReachBatch:
             self._work,
             wanted,
             auto_reset,
-            self._view if features else reach.NO_OBS,
+            self._view if features else NO_OBS,
             self._obs,
             self._last,
             self._rew,
