@@ -187,8 +187,6 @@ class PickBatch:
     def __init__(
         self, cell: Cell, n_envs: int, seed: int, settings: PickSettings, first_env: int = 0
     ) -> None:
-        if (lack := lacks_for_pick(cell)) is not None:
-            raise InvalidInput("cell", cell.name, f"cannot be used for picking: it {lack}")
         self.cell = cell if settings.people is None else with_people(cell, settings.people)
         self.n_envs, self.seed, self.settings = n_envs, seed, settings
         self.world = _world_of(self.cell, settings)

@@ -14,9 +14,9 @@ import pytest
 
 from app.sim import human
 from app.sim.cells import load_cell
-from app.sim.collision import make_capsule, touch
+from app.sim.collision import make_capsule
 from app.sim.kernels.arm import new_robot_pose, place_robot
-from app.sim.kernels.columns import distances, gaps, least
+from app.sim.kernels.columns import distances
 from app.sim.kernels.people import new_crowd, people_clearance, place_workers
 from app.sim.recheck import robot_ends, segment_distances
 from app.sim.robot import Robot
