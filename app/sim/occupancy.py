@@ -7,7 +7,7 @@ constants given there.
 import math
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass, fields
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +44,9 @@ WALKER_KINDS: dict[WalkerKind, int] = {
 }
 """Speed and radius by METHOD 2.1; both constant per episode; a given speed."""
 
+
+AUTHORS_WALK: dict[str, Any] = {"apart": 0.5, "inside": 1.0, "hurried": True, "p_go_on": 0.01}
+"""What the authors' public code does besides METHOD 2.1, as fields of the settings."""
 
 _RANGES = (("v_min", "v_max"), ("r_min", "r_max"), ("x_min", "x_max"), ("y_min", "y_max"))
 
@@ -86,6 +89,14 @@ class WalkerSettings:
     """Probability of staying for good at a target that was reached."""
     fixed_speed: float = 0.5
     """Speed of kind ``fixed-speed`` [m/s]; the limits of the speed do not apply to it."""
+    apart: float = 0.0
+    """Least way to a new target [m]."""
+    inside: float = 0.0
+    """Targets lie this many radii inside the walking area."""
+    hurried: bool = False
+    """Whether the first period is never slower than ``v_min``."""
+    p_go_on: float = 0.0
+    """Probability, per period, of walking on after having stayed at a target."""
 
     def __post_init__(self) -> None:
         if self.kind not in WALKER_KINDS:
@@ -104,7 +115,7 @@ class WalkerSettings:
                 raise InvalidInput(low, least, f"must be at most {high} = {greatest}")
         if self.r_min == 0.0:
             raise InvalidInput("r_min", self.r_min, "must be positive")
-        for name in ("p_still", "p_stay"):
+        for name in ("p_still", "p_stay", "p_go_on"):
             if getattr(self, name) > 1.0:
                 raise InvalidInput(name, getattr(self, name), "must lie in [0, 1]")
 

@@ -115,6 +115,49 @@ def test_fixed_speed_passes_by_both_limits_of_the_speed(speed: float) -> None:
         assert np.all(one.gait == WALKING)
 
 
+def test_authors_targets_are_apart_and_a_radius_inside_the_area() -> None:
+    settings = WalkerSettings(p_still=0.0, p_stay=0.0, apart=0.5, inside=1.0)
+    for one in walks(settings, 40, 20.0):
+        new = np.flatnonzero(np.any(np.diff(one.target, axis=0) != 0.0, axis=1)) + 1
+        for k in (0, *new):
+            assert np.linalg.norm(one.target[k] - one.position[k]) >= 0.5
+            # The radius of the period before is the one the target was drawn with.
+            r = one.radius[k if k == 0 else k - 1]
+            assert -2.0 + r <= one.target[k, 0] <= 1.0 - r
+            assert 0.5 + r <= one.target[k, 1] <= 2.0 - r
+
+
+def test_area_too_small_for_the_margin_leaves_its_middle() -> None:
+    narrow = {"x_min": 0.0, "x_max": 0.4, "r_min": 0.3, "r_max": 0.5, "p_still": 0.0}
+    one = walk(WalkerSettings(**narrow, inside=1.0, apart=5.0), 1, 5.0)
+    np.testing.assert_allclose(one.target[:, 0], 0.2)
+
+
+def test_hurried_walker_is_never_slower_than_v_min_in_the_first_period() -> None:
+    def first(hurried: bool) -> np.ndarray:
+        settings = WalkerSettings(p_still=0.0, hurried=hurried)
+        return np.array([speeds(walk(settings, 5, 0.02, episode=k))[0] for k in range(300)])
+
+    as_drawn, quick = first(False), first(True)
+    stood = as_drawn == 0.0
+    assert stood.any()
+    np.testing.assert_allclose(quick[stood], 0.3)
+    np.testing.assert_array_equal(quick[~stood], as_drawn[~stood])
+
+
+def test_walker_goes_on_after_it_stayed_with_the_given_chance_per_period() -> None:
+    settings = WalkerSettings(p_still=0.0, p_stay=1.0, p_go_on=0.01)
+    stays, leaves = 0, 0
+    for one in walks(settings, 60, 40.0):
+        staying = one.gait == STAYING
+        stays += int(staying[:-1].sum())
+        leaves += int((staying[:-1] & (one.gait[1:] == WALKING)).sum())
+    assert leaves / stays == pytest.approx(0.01, abs=0.002)
+    for_good = WalkerSettings(p_still=0.0, p_stay=1.0)
+    for one in walks(for_good, 20, 20.0):
+        assert not np.any((one.gait[:-1] == STAYING) & (one.gait[1:] == WALKING))
+
+
 def test_same_key_gives_the_same_bits_and_another_one_does_not() -> None:
     def key(seed: int, env: int, episode: int) -> bytes:
         return walk(DEFAULT, seed, 5.0, env=env, episode=episode).position.tobytes()
@@ -155,6 +198,8 @@ def test_starts_are_uniform_in_the_area() -> None:
         ("r_min", 0.0),
         ("x_max", -3.0),
         ("p_stay", 1.1),
+        ("p_go_on", 1.1),
+        ("apart", -0.1),
         ("p_still", -0.1),
         ("tolerance", float("nan")),
         ("fixed_speed", float("inf")),

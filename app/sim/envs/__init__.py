@@ -1,5 +1,30 @@
-"""Gymnasium environments; importing this package registers their ids."""
+"""Gymnasium environments; importing this package registers their ids, single and batched."""
 
 import gymnasium
 
-gymnasium.register(id="tandem/Pick-v0", entry_point="app.sim.envs.pick:PickEnv")
+_PEOPLE = {
+    "Pick": None,
+    "PickWalker": ("walker",),
+    "PickConstant": ("constant",),
+    "PickFixedSpeed": ("fixed-speed",),
+    "PickAlone": (),
+    "Reach": None,
+    "ReachWorker": ("worker",),
+    "ReachConstant": ("constant",),
+    "ReachFixedSpeed": ("fixed-speed",),
+    "ReachAlone": (),
+}
+"""Ids and who is in the cell; None for the cell's own people."""
+
+IDS = tuple(f"tandem/{name}-v0" for name in _PEOPLE)
+"""All registered ids."""
+
+for _name, _people in _PEOPLE.items():
+    _scenario = "Pick" if _name.startswith("Pick") else "Reach"
+    _entry = f"app.sim.envs.{_scenario.lower()}:{_scenario}"
+    gymnasium.register(
+        id=f"tandem/{_name}-v0",
+        entry_point=f"{_entry}Env",
+        vector_entry_point=f"{_entry}VectorEnv",
+        kwargs={} if _people is None else {"people": _people},
+    )

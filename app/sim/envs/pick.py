@@ -1,36 +1,41 @@
-"""The pick scenario as a Gymnasium environment, a thin view of one row of ``PickBatch``."""
+"""The pick scenario as Gymnasium environments: one cell, or a batch."""
 
+from collections.abc import Sequence
 from typing import Any
 
-import gymnasium
-import numpy as np
-from gymnasium import spaces
-from gymnasium.error import ResetNeeded
-from numpy.typing import NDArray
-
-from app.sim.cells import Cell, load_cell
+from app.sim.cells import Cell
+from app.sim.envs.rows import cell_of, settings_with
+from app.sim.envs.single import SingleEnv
+from app.sim.envs.vector import BatchVectorEnv
 from app.sim.kernels.arm import CONTROLLED
-from app.sim.kernels.features import N_FEATURES
-from app.sim.pick import OUTCOMES, PickBatch, PickSettings
-
-Obs = NDArray[np.float32]
-
-OBS_BOUND = 100.0
-"""Bound of the observation space; features are scaled to a few units."""
+from app.sim.pick import PickBatch, PickSettings
+from app.sim.scene import HumanKind
 
 
-class PickEnv(gymnasium.Env[Obs, Obs]):
-    """A UR10 reaches for cubes and docks beside a person who works at the same table.
+class PickEnv(SingleEnv):
+    """A UR10 reaches for cubes and docks beside people; as a rule, one who works there too.
+
+    | id | who is there |
+    |----|--------------|
+    | ``tandem/Pick-v0`` | the cell's own person: an 18-DoF worker at the same table |
+    | ``tandem/PickWalker-v0`` | a cylinder that walks, speed and radius vary (METHOD 2.1) |
+    | ``tandem/PickConstant-v0`` | a cylinder with speed and radius constant per episode |
+    | ``tandem/PickFixedSpeed-v0`` | a cylinder that walks at 0.5 m/s |
+    | ``tandem/PickAlone-v0`` | nobody |
+
+    ``people=("worker", "walker")`` makes any mix of up to four. ``gymnasium.make_vec`` gives
+    the batched :class:`PickVectorEnv`.
 
     ## Task
     Bring the tool within 0.1 m of the target, its axis within 0.2 rad of the vertical, slower
-    than 0.1 m/s, without touching the person, the table or itself.
+    than 0.1 m/s, without touching a person, the table or itself.
 
     ## Action space
     ``Box(-1, 1, (5,), float32)``: wanted speeds of the first five joints at the end of the
     control period (0.05 s), as shares of their limits (0.5 rad/s). They are clipped to what a
     second-degree polynomial can reach without leaving position, speed and acceleration limits,
-    now or later; no action breaks a limit. The sixth joint is held at 0.
+    now or later; no action breaks a limit. The sixth joint is held at 0. ``settings.action``
+    chooses other meanings (METHOD 2.2).
 
     | index | joint          | limits of the joint [rad] |
     |-------|----------------|---------------------------|
@@ -57,88 +62,73 @@ class PickEnv(gymnasium.Env[Obs, Obs]):
     | look_ahead_still, look_ahead_base | 2 x 3 | clearances in 0.25, 0.5 and 1 s |
     | goal_clearance | 4 | clearance of the target's posture now and then |
 
+    Of several people the nearest is seen; a cylinder as a person who stands in it, nobody as
+    one far away. ``PickSettings(observation="state")`` gives the plain state (5.8), 51 numbers:
+    q, qd of the robot (2 x 6) and the person (2 x 18) [rad, rad/s, m, m/s], target [m].
+
     ## Reward
     ``c_d (d_old - gamma d) + c_th (th_old - gamma th) - c_c [collision] - c_step
     - c_v |v_tcp| [d <= d_v] + c_s [success]``; ``PickSettings.weights`` holds the coefficients.
 
     ## Start
     The robot rests at home, a cube or a dock in equal shares; the target is another station,
-    drawn uniformly; the person is at a random time of a random script of reaches. Starts nearer
-    to the person than ``start_clearance_m`` (0.05 m) are drawn again.
+    drawn uniformly; a worker is at a random time of a random script of reaches, a cylinder
+    anywhere in its area. Starts nearer to a person than ``start_clearance_m`` (0.05 m) are
+    drawn again, unless ``settings.start`` is ``uniform``.
 
     ## End
-    Success, collision and time-out (20 s) all *terminate*: the time left is observed, so a
-    time-out is part of the task. ``truncated`` is never set. ``info["outcome"]`` names the end.
+    Success, collision and time-out (20 s) *terminate*: the time left is observed, so a time-out
+    is part of the task. Where it is not (``observation="state"``), a time-out *truncates*.
+    ``info["outcome"]`` names the end; one-step bounds add *unfeasible*.
 
     ## Randomness
-    Episode ``k`` after ``reset(seed=s)`` is fixed by (s, k) and equals episode ``k`` of row 0
-    of a ``PickBatch`` with that seed, bit for bit.
+    Target, start and the people's motion. Episode ``k`` after ``reset(seed=s)`` is fixed by
+    (s, first_env, k) and equals episode ``k`` of row ``first_env`` of a ``PickVectorEnv`` with
+    that seed, bit for bit.
 
     Args:
         cell: Name of a shipped work cell, or a work cell.
         settings: Starts, ends and rewards.
+        people: Who is in the cell, 0 to 4 kinds of person; None for the settings'.
+        first_env: Which row of a vector environment this one equals.
 
     Source: thesis section 5.3. Deviates: features are added to the raw state (5.8), actions are
     wanted speeds instead of coefficients (``kernels/features.py``, ``kernels/reward.py``).
     """
 
-    metadata = {"render_modes": [], "render_fps": 20}
+    metadata: dict[str, Any] = {"render_modes": [], "render_fps": 20}
 
     def __init__(
-        self, cell: str | Cell = "pick-and-place", settings: PickSettings | None = None
+        self,
+        cell: str | Cell = "pick-and-place",
+        settings: PickSettings | None = None,
+        people: Sequence[HumanKind] | None = None,
+        first_env: int = 0,
     ) -> None:
-        chosen = load_cell(cell) if isinstance(cell, str) else cell
-        self.batch = PickBatch(chosen, 1, 0, settings or PickSettings())
-        self.action_space = spaces.Box(-1.0, 1.0, (CONTROLLED,), np.float32)
-        self.observation_space = spaces.Box(-OBS_BOUND, OBS_BOUND, (N_FEATURES,), np.float32)
-        self._running = False
-        self._seeded = False
+        chosen = settings_with(settings or PickSettings(), people)
+        self.batch = PickBatch(cell_of(cell), 1, 0, chosen, first_env)
+        super().__init__(self.batch, CONTROLLED, sees_time=chosen.observation == "features")
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Obs, dict[str, Any]]:
-        """Start episode 0 of a seed, or the next episode where no seed is given.
 
-        Args:
-            seed: Seed of this and the following episodes.
-            options: ``{"episode": k}`` starts episode ``k`` instead.
-        """
-        super().reset(seed=seed)
-        if seed is None and not self._seeded:
-            seed = int(self.np_random.integers(2**31))
-        if seed is not None:
-            self.batch.seed, self._seeded = seed, True
-            self.batch.state.episode[:] = 0
-        else:
-            self.batch.state.episode[:] += 1
-        if options and "episode" in options:
-            self.batch.state.episode[:] = int(options["episode"])
-        self._running = True
-        return self.batch.restart()[0].copy(), self._info()
+class PickVectorEnv(BatchVectorEnv):
+    """Many cells of :class:`PickEnv`, stepped together; see there for spaces and rules.
 
-    def step(self, action: Obs) -> tuple[Obs, float, bool, bool, dict[str, Any]]:
-        """Move through one control period.
+    Args:
+        num_envs: Number of cells.
+        cell: Name of a shipped work cell, or a work cell.
+        settings: Starts, ends and rewards.
+        people: Who is in each cell, 0 to 4 kinds of person; None for the settings'.
+        first_env: Number of the first cell.
+    """
 
-        Args:
-            action: Wanted joint speeds over their limits, in [-1, 1], shape (5,).
-
-        Raises:
-            ResetNeeded: The episode has ended.
-            SimulationError: The action is NaN or infinite.
-        """
-        if not self._running:
-            raise ResetNeeded("the episode has ended: call reset() before the next step()")
-        act = np.asarray(action, dtype=np.float32).reshape(1, CONTROLLED)
-        result = self.batch.step(act, auto_reset=False)
-        terminated = bool(result.ended[0])
-        self._running = not terminated
-        return result.obs[0].copy(), float(result.rew[0]), terminated, False, self._info()
-
-    def _info(self) -> dict[str, Any]:
-        state = self.batch.state
-        return {
-            "outcome": OUTCOMES[int(state.outcome[0])],
-            "episode": int(state.episode[0]),
-            "clearance_m": float(state.clear[0, 0]),
-            "time_left_s": float(state.time_left[0]),
-        }
+    def __init__(
+        self,
+        num_envs: int = 1,
+        cell: str | Cell = "pick-and-place",
+        settings: PickSettings | None = None,
+        people: Sequence[HumanKind] | None = None,
+        first_env: int = 0,
+    ) -> None:
+        chosen = settings_with(settings or PickSettings(), people)
+        self.batch = PickBatch(cell_of(cell), num_envs, 0, chosen, first_env)
+        super().__init__(self.batch, CONTROLLED, sees_time=chosen.observation == "features")

@@ -22,6 +22,7 @@ Deviates: the authors' public code draws the constants of the speed anew at ever
 is not the continuous function that the text describes, and uses 0.1 for the third amplitude;
 this is the printed function, drawn once per episode. ``a`` is "a random value within the range"
 in the text: uniform in [v_min, v_max] and in [r_min, r_max] here, frequencies uniform from 0.
+What else that code does is there to be chosen, in the rules APART to P_GO_ON, off by default.
 """
 
 import math
@@ -40,7 +41,7 @@ WALKING, STAYING, STILL = range(3)
 AMPLITUDES = (0.5, 0.3, 0.2)
 """Shares of the three sines, eq. (4.1), (4.2)."""
 
-N_RULES = 15
+N_RULES = 19
 (
     KIND,
     V_MIN,
@@ -57,11 +58,19 @@ N_RULES = 15
     P_STILL,
     P_STAY,
     FIXED,
+    APART,
+    INSIDE,
+    HURRIED,
+    P_GO_ON,
 ) = range(N_RULES)
 """Rules of a walker: its kind; least and greatest walking speed [m/s] and radius [m]; greatest
 frequencies [Hz]; walking area [m]; distance at which a target counts as reached [m];
 probabilities of standing still for a whole episode and of staying for good at a target that was
-reached; speed of kind FIXED_SPEED [m/s]."""
+reached; speed of kind FIXED_SPEED [m/s]. Then the authors' code: least way to a new target [m];
+targets lie this many radii inside the area; whether (1 or 0) the first period is never slower
+than V_MIN; probability, per period, of walking on after having stayed at a target."""
+TARGET_TRIES = 64
+"""Targets drawn before the last one is taken however near it is."""
 
 N_CONSTANTS = 8
 FREQUENCY, MIDDLE, SIN_1, COS_1, SIN_3, COS_3, SIN_4, COS_4 = range(N_CONSTANTS)
@@ -178,10 +187,13 @@ def start_walker(rules: WalkerRules, state: WalkerState, e: int, p: int, stream:
         _hold(_between(own, rule[R_MIN], rule[R_MAX]), radius)
     elif rule[KIND] == FIXED_SPEED:
         _hold(rule[FIXED], speed)
-    _new_target(rules.rows, state.rows, own, e, p)
     row[TIME], row[GROWTH] = 0.0, 0.0
     row[R] = _radius(rules.rows, state.rows, e, p, 0.0)
+    _new_target(rules.rows, state.rows, own, e, p)
     _set_velocity(rules.rows, state.rows, e, p, 0.0)
+    stands = row[VX] == 0.0 and row[VY] == 0.0
+    if rule[HURRIED] > 0.0 and stands and row[GAIT] == WALKING and rule[KIND] != FIXED_SPEED:
+        row[VX], row[VY] = rule[V_MIN] * row[COURSE_X], rule[V_MIN] * row[COURSE_Y]
 
 
 @kernel(error_model="numpy", fastmath=FAST)
@@ -207,6 +219,8 @@ def advance_walker(rules: WalkerRules, state: WalkerState, e: int, p: int, dt: f
         rows[e, p, LEFT] = left
         if left <= rule[p, TOLERANCE]:
             _arrive(rules, state, e, p)
+    elif rows[e, p, GAIT] == STAYING and rule[p, P_GO_ON] > 0.0:
+        _go_on(rules, state, e, p)
     t = rows[e, p, TIME] + dt
     r = _radius(rule, rows, e, p, t)
     rows[e, p, GROWTH] = (r - rows[e, p, R]) / dt
@@ -226,12 +240,32 @@ def _arrive(rules: WalkerRules, state: WalkerState, e: int, p: int) -> None:
 
 
 @kernel()
+def _go_on(rules: WalkerRules, state: WalkerState, e: int, p: int) -> None:
+    """Perhaps leave the target at which the walker stays."""
+    own = state.stream[e, p]
+    if uniform(own) < rules.rows[p, P_GO_ON]:
+        state.rows[e, p, GAIT] = WALKING
+        _new_target(rules.rows, state.rows, own, e, p)
+
+
+@kernel()
+def _drawn_inside(own: State, low: float, high: float, margin: float) -> float:
+    """Draw from a range less a margin at both ends, or from its middle where none is left."""
+    margin = min(margin, 0.5 * (high - low))
+    return _between(own, low + margin, high - margin)
+
+
+@kernel()
 def _new_target(rule: Vec, rows: Vec, own: State, e: int, p: int) -> None:
     """Draw a target from the walking area and set the course to it."""
-    x, y = rows[e, p, X], rows[e, p, Y]
-    to_x = _between(own, rule[p, X_MIN], rule[p, X_MAX])
-    to_y = _between(own, rule[p, Y_MIN], rule[p, Y_MAX])
-    left = math.hypot(to_x - x, to_y - y)
+    x, y, margin = rows[e, p, X], rows[e, p, Y], rule[p, INSIDE] * rows[e, p, R]
+    to_x, to_y, left = x, y, 0.0
+    for _ in range(TARGET_TRIES):
+        to_x = _drawn_inside(own, rule[p, X_MIN], rule[p, X_MAX], margin)
+        to_y = _drawn_inside(own, rule[p, Y_MIN], rule[p, Y_MAX], margin)
+        left = math.hypot(to_x - x, to_y - y)
+        if left >= rule[p, APART]:
+            break
     per_metre = 1.0 / left if left > 0.0 else 0.0
     rows[e, p, TARGET_X], rows[e, p, TARGET_Y], rows[e, p, LEFT] = to_x, to_y, left
     rows[e, p, COURSE_X], rows[e, p, COURSE_Y] = per_metre * (to_x - x), per_metre * (to_y - y)

@@ -55,7 +55,7 @@ def test_every_episode_can_be_started_again_by_its_number() -> None:
     third = [env.reset()[0] for _ in range(3)][-1]
     again, info = PickEnv().reset(seed=3, options={"episode": 3})
     np.testing.assert_array_equal(again, third)
-    assert info["episode"] == 3
+    assert info["episode_number"] == 3
 
 
 def test_unseeded_environments_differ() -> None:

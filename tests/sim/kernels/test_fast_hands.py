@@ -1,7 +1,12 @@
 """A hand that flies past the arm at 2.5 m/s is found at every millisecond, or before.
 
+<<<<<<< HEAD
 At that speed a hand crosses 125 mm in one period of 50 ms. It may be clear of the arm at both
 ends of the period, and a test of poses alone would let it pass.
+=======
+At that speed a hand crosses 125 mm in one period of 50 ms: mostly it is clear of the arm at
+both ends of the period, and a test of poses alone would let it pass through.
+>>>>>>> core
 """
 
 from typing import NamedTuple

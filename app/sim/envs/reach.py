@@ -1,0 +1,149 @@
+"""The reach scenario as Gymnasium environments: one cell, or a batch."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from app.sim.cells import Cell
+from app.sim.envs.rows import cell_of, settings_with
+from app.sim.envs.single import SingleEnv
+from app.sim.envs.vector import BatchVectorEnv
+from app.sim.reach import N_ACT, ReachBatch, ReachSettings
+from app.sim.scene import HumanKind
+
+
+class ReachEnv(SingleEnv):
+    """A UR10 reaches goals over a table that people walk around and through.
+
+    | id | who is there |
+    |----|--------------|
+    | ``tandem/Reach-v0`` | a cylinder that walks, speed and radius vary (METHOD 2.1) |
+    | ``tandem/ReachConstant-v0`` | a cylinder with speed and radius constant per episode |
+    | ``tandem/ReachFixedSpeed-v0`` | a cylinder that walks at 0.5 m/s |
+    | ``tandem/ReachWorker-v0`` | an 18-DoF worker who stands at the table and reaches over it |
+    | ``tandem/ReachAlone-v0`` | nobody |
+
+    ``people=("worker", "walker")`` makes any mix of up to four. ``gymnasium.make_vec`` gives
+    the batched :class:`ReachVectorEnv`.
+
+    ## Task
+    Bring the tcp within 0.1 m of the goal without touching a person, the table or itself. How
+    the tool is turned and how fast it is do not matter.
+
+    ## Action space
+    ``Box(-1, 1, (6,), float32)``: wanted speeds of the joints at the end of the control period
+    (0.02 s), as shares of their limits (1 rad/s). They are clipped to what a second-degree
+    polynomial can reach without leaving position, speed and acceleration limits, now or later;
+    no action breaks a limit. ``settings.action`` chooses other meanings (METHOD 2.2).
+
+    | index | joint          | limits of the joint [rad] |
+    |-------|----------------|---------------------------|
+    | 0     | shoulder pan   | -3.1 .. 3.1               |
+    | 1     | shoulder lift  | -3.3 .. 0.2               |
+    | 2     | elbow          | -2.8 .. 2.8               |
+    | 3     | wrist 1        | -6.2 .. 6.2               |
+    | 4     | wrist 2        | -6.2 .. 6.2               |
+    | 5     | wrist 3        | -6.2 .. 6.2               |
+
+    ## Observation space
+    ``Box(-100, 100, (N_FEATURES,), float32)``; ``app.sim.kernels.reach_features.LAYOUT`` gives
+    the slice of each group, in this order:
+
+    | group | size | content |
+    |-------|------|---------|
+    | q, qd | 2 x 6 | joints: angle / pi, speed / limit |
+    | human | 5 | the person's x, y - 1.25, vx, vy, radius [m, m/s] |
+    | goal | 3 | [m] |
+    | sin_q, cos_q | 2 x 6 | of the joints |
+    | tcp | 3 | [m] |
+    | goal_minus_tcp | 3 | twice the way to the goal [m] |
+    | tcp_velocity | 3 | [m/s] |
+    | human_minus_tcp, _elbow, _goal | 3 x 2 | the person's axis from each [m] |
+    | clearance | 1 | distance of robot and people [0.5 m], at most 3 |
+    | look_ahead | 3 | the same in 0.25, 0.5, 1 s: robot still, people at constant velocity |
+    | distance | 1 | twice the distance of tcp and goal [m] |
+    | time_left | 1 | [2.5 s] |
+
+    Of several people the nearest is seen; a worker as the cylinder about the pelvis that
+    contains the body, nobody as one far away. Clearances are those of all, exact.
+
+    ``ReachSettings(observation="state")`` gives the plain state (4.30), 20 numbers:
+
+    | index | content | unit |
+    |-------|---------|------|
+    | 0..5 | q | rad |
+    | 6..11 | qd | rad/s |
+    | 12, 13 | the person's x, y | m |
+    | 14, 15 | vx, vy | m/s |
+    | 16 | r | m |
+    | 17..19 | goal x, y, z | m |
+
+    ## Reward
+    ``c_p (d_old - gamma d) - c_d d - c_a |c| - c_step - c_c [collision] + c_s [success]``, with
+    ``d`` the distance of tcp and goal [m], ``c`` the period's second coefficients [rad/s^2];
+    ``ReachSettings.weights`` holds the coefficients: ``THESIS_WEIGHTS`` (c_d 1, c_a 0.1, c_c 5,
+    c_s 20) or, to learn with, ``PROGRESS_WEIGHTS`` (c_p 1, c_step 0.004, c_c 4, c_s 4).
+
+    ## Start
+    The robot rests at home; the goal is one of the 54 points of the cell's grid, or anywhere in
+    its box (``goals="box"``). Cylinders start anywhere in their area, workers at a random time
+    of a random script of reaches. ``start="clearance"`` draws people again who are nearer than
+    0.05 m; ``"uniform"`` does not; ``"authors"`` does not either, and they walk as in the
+    authors' code.
+
+    ## End
+    Success and collision *terminate*; so does a time-out (5 s) where the time left is observed,
+    otherwise (``observation="state"``) it *truncates*. With ``collision_ends=False`` an episode
+    goes on after a collision, but counts as one at its end. ``info["outcome"]`` names the end;
+    one-step bounds add *unfeasible*.
+
+    ## Randomness
+    Goal, start and the people's motion. Episode ``k`` after ``reset(seed=s)`` is fixed by
+    (s, first_env, k) and equals episode ``k`` of row ``first_env`` of a ``ReachVectorEnv`` with
+    that seed, bit for bit.
+
+    Args:
+        cell: Name of a shipped work cell with a goal region, or a work cell.
+        settings: Starts, ends and rewards.
+        people: Who is in the cell, 0 to 4 kinds of person; None for the settings'.
+        first_env: Which row of a vector environment this one equals.
+
+    Source: thesis chapter 4, METHOD 2.1 to 2.3. Deviates: features are added to the raw state
+    (4.30), actions are wanted speeds instead of coefficients, no action is *unfeasible*.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": [], "render_fps": 50}
+
+    def __init__(
+        self,
+        cell: str | Cell = "shared-workspace",
+        settings: ReachSettings | None = None,
+        people: Sequence[HumanKind] | None = None,
+        first_env: int = 0,
+    ) -> None:
+        chosen = settings_with(settings or ReachSettings(), people)
+        self.batch = ReachBatch(cell_of(cell), 1, 0, chosen, first_env)
+        super().__init__(self.batch, N_ACT, sees_time=chosen.observation == "features")
+
+
+class ReachVectorEnv(BatchVectorEnv):
+    """Many cells of :class:`ReachEnv`, stepped together; see there for spaces and rules.
+
+    Args:
+        num_envs: Number of cells.
+        cell: Name of a shipped work cell with a goal region, or a work cell.
+        settings: Starts, ends and rewards.
+        people: Who is in each cell, 0 to 4 kinds of person; None for the settings'.
+        first_env: Number of the first cell.
+    """
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        cell: str | Cell = "shared-workspace",
+        settings: ReachSettings | None = None,
+        people: Sequence[HumanKind] | None = None,
+        first_env: int = 0,
+    ) -> None:
+        chosen = settings_with(settings or ReachSettings(), people)
+        self.batch = ReachBatch(cell_of(cell), num_envs, 0, chosen, first_env)
+        super().__init__(self.batch, N_ACT, sees_time=chosen.observation == "features")

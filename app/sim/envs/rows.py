@@ -1,0 +1,95 @@
+"""What single and vector environments ask of a batch of cells."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Protocol, TypeVar, cast
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from app.sim.cells import Cell, load_cell
+from app.sim.pick import OUTCOMES, PickSettings, StepResult
+from app.sim.ports import Vec
+from app.sim.reach import ReachSettings
+from app.sim.scene import HumanKind
+
+Obs = NDArray[np.float32]
+Settings = TypeVar("Settings", PickSettings, ReachSettings)
+
+OBS_BOUND = 100.0
+"""Bound of the observation spaces; nothing observed comes near it."""
+TIMEOUT = OUTCOMES.index("timeout")
+
+
+class State(Protocol):
+    """Rows of a batch that are told in ``info``."""
+
+    @property
+    def episode(self) -> NDArray[np.int64]:
+        """Numbers of the present episodes, shape (n_envs,)."""
+
+    @property
+    def outcome(self) -> NDArray[np.int64]:
+        """How they stand, index into OUTCOMES, shape (n_envs,)."""
+
+    @property
+    def clear(self) -> Vec:
+        """Distances to people, cell and the robot itself [m], shape (n_envs, 3)."""
+
+    @property
+    def time_left(self) -> Vec:
+        """Time left [s], shape (n_envs,)."""
+
+
+class Batch(Protocol):
+    """Cells that are stepped together; ``PickBatch`` and ``ReachBatch`` are such."""
+
+    seed: int
+    n_envs: int
+    obs_size: int
+
+    @property
+    def state(self) -> State:
+        """Rows of the cells."""
+
+    def restart(self) -> Obs:
+        """Start the episodes numbered by ``state.episode``."""
+
+    def step(self, act: Obs, *, auto_reset: bool = True) -> StepResult:
+        """Move every cell through one control period."""
+
+
+def cell_of(cell: str | Cell) -> Cell:
+    """Return a work cell given by name or as it is."""
+    return load_cell(cell) if isinstance(cell, str) else cell
+
+
+def settings_with(settings: Settings, people: Sequence[HumanKind] | None) -> Settings:
+    """Return settings with other people, or as they are where ``people`` is None."""
+    return settings if people is None else replace(settings, people=tuple(people))
+
+
+def _box(bound: float, n: int) -> spaces.Space[Obs]:
+    return cast("spaces.Space[Obs]", spaces.Box(-bound, bound, (n,), np.float32))
+
+
+def act_space(n_act: int) -> spaces.Space[Obs]:
+    """Return the space of one cell's actions."""
+    return _box(1.0, n_act)
+
+
+def obs_space(batch: Batch) -> spaces.Space[Obs]:
+    """Return the space of one cell's observations."""
+    return _box(OBS_BOUND, batch.obs_size)
+
+
+def next_episode(batch: Batch, seed: int | None, episode: int | None) -> None:
+    """Number the episodes that start now: 0 of a new seed, the next of the same, or any."""
+    if seed is not None:
+        batch.seed = seed
+        batch.state.episode[:] = 0
+    else:
+        batch.state.episode[:] += 1
+    if episode is not None:
+        batch.state.episode[:] = episode

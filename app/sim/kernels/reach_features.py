@@ -1,0 +1,301 @@
+"""Observations of the reach scenario: the plain state, or that and features, compiled.
+
+The plain state is (4.30): q, qd, human x, y, vx, vy, r, target x, y, z. The features are that,
+normalised, and more: relative to target and person, with clearances extrapolated at constant
+velocity. All follow from positions and velocities of the moment and the time left; no hidden
+history. ``LAYOUT`` names every slice.
+
+A policy sees one person as a vertical cylinder, the nearest one: a walker as it is, a worker as
+the cylinder about the pelvis that contains the capsules, nobody as one too far away to matter.
+Clearances are exact, to the real shapes of all people.
+
+Source: (4.30). Deviates: features are added to it, since the raw state learned far more slowly
+(1 % against 90 % after 2.7 k updates in trials).
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.sim.kernels import body, kinematics
+from app.sim.kernels.arm import Arm, RobotPose
+from app.sim.kernels.columns import RADIUS, UX, UY, X, Y, gaps, least
+from app.sim.kernels.compiled import kernel
+from app.sim.kernels.cylinder import cylinder_clearance
+from app.sim.kernels.features import HORIZONS, Sight, look_ahead, new_sight, see_person
+from app.sim.kernels.geometry import FAR
+from app.sim.kernels.occupancy import VX, VY, R
+from app.sim.kernels.occupancy import X as WALKER_X
+from app.sim.kernels.occupancy import Y as WALKER_Y
+from app.sim.kernels.people import Crowd, People, PeopleState, nearest_person
+from app.sim.ports import Vec
+
+Obs = NDArray[np.float32]
+
+N_STATE = 20
+"""Length of the plain state (4.30)."""
+NOBODY = (0.0, 4.0, 0.0, 0.0, 0.2)
+"""x, y [m], vx, vy [m/s], r [m] of the person assumed where nobody is there."""
+CENTER_Y = 1.25
+"""Middle of the walking area, from which the person's y is counted [m]."""
+SCALE = 0.5
+"""Clearances are given in units of this and cut at three units [m]."""
+TIME_SCALE = 2.5
+"""Time left is given in units of this [s]."""
+
+SIZES = (
+    ("q", 6),
+    ("qd", 6),
+    ("human", 5),
+    ("goal", 3),
+    ("sin_q", 6),
+    ("cos_q", 6),
+    ("tcp", 3),
+    ("goal_minus_tcp", 3),
+    ("tcp_velocity", 3),
+    ("human_minus_tcp", 2),
+    ("human_minus_elbow", 2),
+    ("human_minus_goal", 2),
+    ("clearance", 1),
+    ("look_ahead", 3),
+    ("distance", 1),
+    ("time_left", 1),
+)
+
+
+def _layout() -> dict[str, slice]:
+    slices, start = {}, 0
+    for name, size in SIZES:
+        slices[name] = slice(start, start + size)
+        start += size
+    return slices
+
+
+LAYOUT = _layout()
+"""Slice of each group of features in the observation."""
+N_FEATURES = sum(size for _, size in SIZES)
+"""Length of the observation."""
+
+
+class ReachSight(NamedTuple):
+    """Work space of one observation; made once, filled again and again."""
+
+    person: Sight
+    """A worker's shape now and ahead."""
+    gap: Vec
+    """Distance of each of a worker's capsules to the robot [m], shape (16,)."""
+    seen: Vec
+    """The person a policy sees: x, y [m], vx, vy [m/s], r [m], shape (5,)."""
+    ahead: Vec
+    """Clearance at each time ahead [m], shape (3,)."""
+
+
+def new_reach_sight(people: People) -> ReachSight:
+    """Return work space."""
+    width = people.person.shape[1]
+    return ReachSight(new_sight(people.person), np.zeros(width), np.zeros(5), np.zeros(3))
+
+
+@kernel()
+def enclosing_radius(columns: Vec, first: int, n: int, x: float, y: float) -> float:
+    """Return the radius of the upright cylinder about an axis that contains capsules [m].
+
+    Args:
+        columns: Capsules as columns, shape (9, m).
+        first: First column to contain.
+        n: Number of columns.
+        x: Axis [m].
+        y: Axis [m].
+    """
+    widest = 0.0
+    for k in range(first, first + n):
+        dx, dy = columns[X, k] - x, columns[Y, k] - y
+        start = math.hypot(dx, dy)
+        end = math.hypot(dx + columns[UX, k], dy + columns[UY, k])
+        widest = max(widest, max(start, end) + columns[RADIUS, k])
+    return widest
+
+
+@kernel(inline="always")
+def see_cylinder(
+    people: People, state: PeopleState, e: int, robot: Vec, crowd: Crowd, seen: Vec
+) -> None:
+    """Write the nearest person of environment ``e`` as a cylinder.
+
+    Args:
+        people: Shared data.
+        state: Rows of the people.
+        e: Environment.
+        robot: The robot's capsules as columns, shape (9, n).
+        crowd: The people, placed as they are now.
+        seen: Filled with x, y [m], vx, vy [m/s], r [m], shape (5,).
+    """
+    who, n_workers = nearest_person(people, robot, crowd), state.q.shape[1]
+    if who < 0:
+        for i in range(5):
+            seen[i] = NOBODY[i]
+    elif who < n_workers:
+        seen[0], seen[1] = state.q[e, who, 0], state.q[e, who, 1]
+        seen[2], seen[3] = state.qd[e, who, 0], state.qd[e, who, 1]
+        n = body.N_CAPSULES
+        seen[4] = enclosing_radius(crowd.columns, who * n, n, seen[0], seen[1])
+    else:
+        rows, k = state.walkers.rows, who - n_workers
+        seen[0], seen[1] = rows[e, k, WALKER_X], rows[e, k, WALKER_Y]
+        seen[2], seen[3], seen[4] = rows[e, k, VX], rows[e, k, VY], rows[e, k, R]
+
+
+@kernel(inline="always")
+def put_state(q: Vec, qd: Vec, seen: Vec, goal: Vec, out: Obs) -> None:
+    """Write the plain state (4.30), shape (N_STATE,)."""
+    for j in range(6):
+        out[j], out[6 + j] = q[j], qd[j]
+    for i in range(5):
+        out[12 + i] = seen[i]
+    for i in range(3):
+        out[17 + i] = goal[i]
+
+
+@kernel(inline="always")
+def clearances_ahead(
+    people: People, state: PeopleState, e: int, robot: Vec, sight: ReachSight
+) -> None:
+    """Write the clearance of the robot as it stands to all people at ``HORIZONS``.
+
+    Args:
+        people: Shared data.
+        state: Rows of the people, who go on at constant velocity.
+        e: Environment.
+        robot: The robot's capsules as columns, shape (9, n).
+        sight: Work space; ``ahead`` is filled.
+    """
+    person, ahead = sight.person, sight.ahead
+    for i in range(3):
+        ahead[i] = FAR
+    for w in range(state.q.shape[1]):
+        see_person(people, state.q[e, w], state.qd[e, w], person)
+        for i in range(3):
+            look_ahead(person.now, person.later, HORIZONS[i], person.moved)
+            gaps(robot, person.moved, sight.gap)
+            ahead[i] = min(ahead[i], least(sight.gap)[0])
+    rows = state.walkers.rows
+    for k in range(rows.shape[1]):
+        for i in range(3):
+            x = rows[e, k, WALKER_X] + HORIZONS[i] * rows[e, k, VX]
+            y = rows[e, k, WALKER_Y] + HORIZONS[i] * rows[e, k, VY]
+            d, _ = cylinder_clearance(robot, 0, x, y, rows[e, k, R], people.top_z)
+            ahead[i] = min(ahead[i], d)
+
+
+@kernel(inline="always")
+def _scaled(d: float) -> float:
+    return min(3.0, d / SCALE)
+
+
+@kernel()
+def put_features(
+    q: Vec,
+    qd: Vec,
+    qd_max: Vec,
+    seen: Vec,
+    goal: Vec,
+    rot: Vec,
+    pos: Vec,
+    tcp: Vec,
+    jacobian: Vec,
+    clearance: float,
+    ahead: Vec,
+    time_left: float,
+    out: Obs,
+) -> None:
+    """Write the features of one state.
+
+    Args:
+        q: Joint positions [rad], shape (6,).
+        qd: Joint speeds [rad/s], shape (6,).
+        qd_max: Speed limits [rad/s], shape (6,).
+        seen: The person seen: x, y [m], vx, vy [m/s], r [m], shape (5,).
+        goal: Where the tcp shall be [m], shape (3,).
+        rot: R_world_link, shape (7, 3, 3).
+        pos: Origins of the links [m], shape (7, 3).
+        tcp: Tool centre point [m], shape (3,).
+        jacobian: Work space, shape (3, 6).
+        clearance: Distance of robot and people [m].
+        ahead: The same ahead [m], shape (3,).
+        time_left: Time left [s].
+        out: Filled, shape (N_FEATURES,).
+    """
+    for j in range(6):
+        out[j], out[6 + j] = q[j] / math.pi, qd[j] / qd_max[j]
+        out[20 + j], out[26 + j] = math.sin(q[j]), math.cos(q[j])
+    for i in range(5):
+        out[12 + i] = seen[i]
+    out[13] = seen[1] - CENTER_Y
+    kinematics.tcp_jacobian(rot, pos, tcp, jacobian)
+    square = 0.0
+    for i in range(3):
+        speed, way = 0.0, goal[i] - tcp[i]
+        for j in range(6):
+            speed += jacobian[i, j] * qd[j]
+        square += way * way
+        out[17 + i], out[32 + i] = goal[i], tcp[i]
+        out[35 + i], out[38 + i] = 2.0 * way, speed
+        out[48 + i] = _scaled(ahead[i])
+    for i in range(2):
+        out[41 + i] = seen[i] - tcp[i]
+        out[43 + i] = seen[i] - pos[3, i]
+        out[45 + i] = seen[i] - goal[i]
+    out[47] = _scaled(clearance)
+    out[51] = 2.0 * math.sqrt(square)
+    out[52] = time_left / TIME_SCALE
+
+
+@kernel(inline="always")
+def observe(
+    arm: Arm,
+    people: People,
+    state: PeopleState,
+    e: int,
+    q: Vec,
+    qd: Vec,
+    goal: Vec,
+    clearance: float,
+    time_left: float,
+    robot: RobotPose,
+    sight: ReachSight,
+    out: Obs,
+) -> None:
+    """Write the features of environment ``e``; ``sight.seen`` is filled already.
+
+    Args:
+        arm: Robot in its cell.
+        people: Shared data of the people.
+        state: Rows of the people.
+        e: Environment.
+        q: Joint positions [rad], shape (6,).
+        qd: Joint speeds [rad/s], shape (6,).
+        goal: Where the tcp shall be [m], shape (3,).
+        clearance: Distance of robot and people [m].
+        time_left: Time left [s].
+        robot: The robot, placed at ``q``.
+        sight: Work space.
+        out: Filled, shape (N_FEATURES,).
+    """
+    clearances_ahead(people, state, e, robot.columns, sight)
+    put_features(
+        q,
+        qd,
+        arm.qd_max,
+        sight.seen,
+        goal,
+        robot.rot,
+        robot.pos,
+        robot.tcp,
+        robot.jacobian,
+        clearance,
+        sight.ahead,
+        time_left,
+        out,
+    )

@@ -1,0 +1,339 @@
+"""The reach scenario of thesis chapter 4: a robot reaches goals beside people who walk about.
+
+:class:`ReachBatch` steps many cells at once in compiled kernels (``kernels/reach.py``).
+Source: METHOD 2.1 to 2.3.
+"""
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.errors import InvalidInput
+from app.sim.actions import ActionSettings
+from app.sim.cell_parts import GoalRegion, Station
+from app.sim.cell_people import Worker
+from app.sim.cells import Cell
+from app.sim.kernels import reach
+from app.sim.kernels.geometry import FAR
+from app.sim.kernels.people import People, PeopleState
+from app.sim.kernels.reach_features import N_FEATURES, N_STATE
+from app.sim.kernels.reach_reward import ReachWeights
+from app.sim.occupancy import AUTHORS_WALK, walker_rules
+from app.sim.pick import StepResult
+from app.sim.ports import Vec
+from app.sim.scene import (
+    HumanKind,
+    arm_of,
+    kinds_of,
+    new_people_state,
+    own,
+    people_of,
+    require_finite,
+    walker_settings,
+    with_people,
+)
+
+N_ACT = 6
+"""Joints a policy moves: all of them."""
+StartRule = Literal["clearance", "uniform", "authors"]
+GoalRule = Literal["grid", "box"]
+ViewName = Literal["features", "state"]
+VIEWS = {"state": (reach.PLAIN, N_STATE), "features": (reach.FEATURES, N_FEATURES)}
+"""What observations hold: the plain state (4.30), or that and features; and their lengths."""
+THESIS_WEIGHTS = ReachWeights(
+    c_d=1.0, c_p=0.0, gamma=1.0, c_a=0.1, c_step=0.0, c_c=5.0, c_s=20.0
+)
+"""The source's coefficients (METHOD 2.3)."""
+PROGRESS_WEIGHTS = ReachWeights(
+    c_d=0.0, c_p=1.0, gamma=1.0, c_a=0.0, c_step=0.004, c_c=4.0, c_s=4.0
+)
+"""Progress instead of distance: learned to 95 % within minutes in trials."""
+DEFAULT_ACTION = ActionSettings()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReachSettings:
+    """How episodes of the scenario start and end.
+
+    Raises:
+        InvalidInput: An unknown rule, or a time that is not positive and finite.
+    """
+
+    time_limit_s: float = 5.0
+    """Longest episode [s]."""
+    goals: GoalRule = "grid"
+    """Where goals are drawn from: the grid points of the cell's goal region, or all of it."""
+    people: tuple[HumanKind, ...] | None = None
+    """Who is in the cell, 0 to 4 people; None for the cell's own. A worker whom the cell does
+    not describe stands at the table (:func:`with_workplace`)."""
+    start: StartRule = "clearance"
+    """Where people may start: ``clearance`` (``start_clearance_m`` from the robot), ``uniform``
+    (anywhere, even in contact), ``authors`` (anywhere, and they walk as in the authors' code:
+    targets at least 0.5 m away and a radius inside the area, the first period never slower than
+    v_min, a chance of 0.01 per period to walk on after having stayed at a target)."""
+    start_clearance_m: float = 0.05
+    """Least distance of robot and people at the start under the rule ``clearance`` [m]."""
+    collision_ends: bool = True
+    """Whether a collision ends the episode. If not, it goes on until the goal is reached or
+    time is up, and then counts as a collision, not as a success."""
+    human_pace: float = 1.0
+    """Speed of workers relative to their work cycle."""
+    library_seed: int = 0
+    """Seed of the workers' library of postures."""
+    action: ActionSettings = field(default=DEFAULT_ACTION)
+    """What actions mean (METHOD 2.2)."""
+    observation: ViewName = "features"
+    """What policies see: the plain state (4.30), or that and more."""
+    weights: ReachWeights = field(default=THESIS_WEIGHTS)
+    """Reward coefficients (METHOD 2.3)."""
+
+    def __post_init__(self) -> None:
+        choices = (("goals", GoalRule), ("start", StartRule), ("observation", ViewName))
+        for name, known in choices:
+            value = getattr(self, name)
+            if value not in get_args(known):
+                raise InvalidInput(name, value, "must name a rule", get_args(known))
+        if not (math.isfinite(self.time_limit_s) and self.time_limit_s > 0.0):
+            raise InvalidInput("time_limit_s", self.time_limit_s, "must be positive")
+        if not math.isfinite(self.start_clearance_m):
+            raise InvalidInput("start_clearance_m", self.start_clearance_m, "must be finite")
+
+
+def stated_rules(cell: Cell, settings: ReachSettings) -> dict[str, Any]:
+    """Return the rules that move results by points, to be printed with every number.
+
+    Args:
+        cell: Work cell.
+        settings: Starts and ends.
+    """
+    chosen = _with_people(cell, settings)
+    stated: dict[str, Any] = {
+        "cell": cell.name,
+        "people": list(kinds_of(chosen)),
+        "start": settings.start,
+        "collision_ends": settings.collision_ends,
+        "goals": settings.goals,
+        "time_limit_s": settings.time_limit_s,
+    }
+    if settings.start == "clearance":
+        stated["start_clearance_m"] = settings.start_clearance_m
+    if settings.start == "authors":
+        stated["walk"] = dict(AUTHORS_WALK)
+    return stated
+
+
+def with_workplace(cell: Cell) -> Cell:
+    """Return a cell with a worker who reaches for its goals, where it describes none.
+
+    The worker stands at the far edge of the table, as far from it as in ``pick-and-place``, and
+    goes by the work cycle of METHOD 3.2: from goals of the lowest layer, except the row nearest
+    to the robot, to the two ends of that row.
+    """
+    targets = goal_region_of(cell).targets()
+    lowest = targets[targets[:, 2] == targets[:, 2].min()]
+    near = lowest[lowest[:, 1] == lowest[:, 1].min()]
+    far = lowest[lowest[:, 1] > lowest[:, 1].min()]
+    edge, aside = cell.table.y_max + 0.17, 0.7
+    worker = Worker(
+        home=(0.0, edge + 0.33, -0.5 * math.pi),
+        x_min=-aside,
+        x_max=aside,
+        y_min=edge,
+        y_max=edge + 0.58,
+        pelvis_height=0.95,
+    )
+    places = [("cube", point) for point in far] + [("dock", point) for point in near[[0, -1]]]
+    stations = tuple(
+        Station(
+            id=f"goal{number}",
+            kind="cube" if kind == "cube" else "dock",
+            label=f"Goal {number}",
+            position=(float(point[0]), float(point[1]), float(point[2])),
+        )
+        for number, (kind, point) in enumerate(places)
+    )
+    return cell.model_copy(update={"people": (*cell.people, worker), "stations": stations})
+
+
+def _with_people(cell: Cell, settings: ReachSettings) -> Cell:
+    if settings.people is None:
+        return cell
+    if "worker" in settings.people and not cell.workers:
+        cell = with_workplace(cell)
+    return with_people(cell, settings.people)
+
+
+def goal_region_of(cell: Cell) -> GoalRegion:
+    """Return where a cell's goals are.
+
+    Raises:
+        InvalidInput: The cell has no goal region.
+    """
+    if cell.goal_region is None:
+        raise InvalidInput("cell", cell.name, "cannot be used for reaching: no goal_region")
+    return cell.goal_region
+
+
+def _people_of(cell: Cell, settings: ReachSettings) -> People:
+    people = people_of(cell, settings.library_seed, settings.human_pace)
+    if settings.start != "authors":
+        return people
+    walkers = [replace(walker_settings(person), **AUTHORS_WALK) for person in cell.cylinders]
+    return people._replace(walkers=walker_rules(walkers))
+
+
+def _world_of(cell: Cell, settings: ReachSettings) -> reach.ReachWorld:
+    region = goal_region_of(cell)
+    middle, half = np.array(region.center), 0.5 * np.array(region.size)
+    return reach.ReachWorld(
+        targets=own(region.targets()),
+        low=middle - half,
+        high=middle + half,
+        arm=arm_of(cell),
+        people=_people_of(cell, settings),
+    )
+
+
+def _rules_of(settings: ReachSettings) -> reach.ReachRules:
+    return reach.ReachRules(
+        time_limit=settings.time_limit_s,
+        start_clearance=settings.start_clearance_m if settings.start == "clearance" else -FAR,
+        anywhere=settings.goals == "box",
+        collision_ends=settings.collision_ends,
+    )
+
+
+def _new_state(world: reach.ReachWorld, people: PeopleState, n_envs: int) -> reach.ReachState:
+    def rows(*shape: int) -> Vec:
+        return np.zeros((n_envs, *shape))
+
+    def counts() -> NDArray[np.int64]:
+        return np.zeros(n_envs, dtype=np.int64)
+
+    return reach.ReachState(
+        q=rows(6),
+        qd=rows(6),
+        qdd=rows(6),
+        robot=np.repeat(world.arm.columns[None], n_envs, axis=0),
+        people=people,
+        goal=rows(3),
+        target=counts(),
+        time_left=rows(),
+        elapsed=rows(),
+        distance=rows(),
+        touched=counts(),
+        episode=counts(),
+        outcome=counts(),
+        clear=rows(3),
+        n_redrawn=counts(),
+    )
+
+
+class ReachBatch:
+    """Many independent reach cells, stepped together by one thread.
+
+    Args:
+        cell: Work cell with a goal region.
+        n_envs: Number of cells.
+        seed: Seed; episode ``k`` of cell ``e`` is fixed by (seed, e, k).
+        settings: Starts, ends and rewards.
+        first_env: Number of the first cell: rows of a batch that starts at ``k`` equal rows
+            ``k`` and on of a batch that starts at 0, bit for bit.
+    """
+
+    def __init__(
+        self, cell: Cell, n_envs: int, seed: int, settings: ReachSettings, first_env: int = 0
+    ) -> None:
+        self.cell = _with_people(cell, settings)
+        self.n_envs, self.seed, self.settings = n_envs, seed, settings
+        self.world = _world_of(self.cell, settings)
+        self.arm = self.world.arm
+        people = new_people_state(self.cell, self.world.people, n_envs)
+        self.state = _new_state(self.world, people, n_envs)
+        self._work = reach.new_work(self.world, self.state)
+        self._first = first_env
+        self._rules = _rules_of(settings)
+        self._action = settings.action.rule()
+        self._view, self.obs_size = VIEWS[settings.observation]
+        self._obs = np.zeros((n_envs, self.obs_size), dtype=np.float32)
+        self._last = np.zeros_like(self._obs)
+        self._rew = np.zeros(n_envs, dtype=np.float32)
+        self._ended = np.zeros(n_envs, dtype=np.int64)
+
+    def reset(self, seed: int | None = None) -> NDArray[np.float32]:
+        """Start episode 0 in every cell; return observations, (n_envs, obs_size)."""
+        self.seed = self.seed if seed is None else seed
+        self.state.episode[:] = 0
+        return self.restart()
+
+    def restart(self) -> NDArray[np.float32]:
+        """Start the episodes numbered by ``state.episode``; return the observations."""
+        reach.reset_batch(
+            self.world,
+            self._rules,
+            self.seed,
+            self._first,
+            self.state,
+            self._work,
+            self._view,
+            self._obs,
+        )
+        return self._obs
+
+    def step(
+        self, act: NDArray[np.float32], *, auto_reset: bool = True, features: bool = True
+    ) -> StepResult:
+        """Move every cell through one control period.
+
+        Args:
+            act: Actions in [-1, 1], shape (n_envs, 6); what they mean is in the settings.
+            auto_reset: Start the next episode where one ended; else its row stands still.
+            features: Whether observations are wanted.
+
+        Raises:
+            SimulationError: An action is NaN or infinite.
+        """
+        require_finite("act", act)
+        wanted = np.array(act, dtype=np.float32, order="C")
+        reach.step_batch(
+            self.world,
+            self._rules,
+            self._action,
+            self.settings.weights,
+            self.seed,
+            self._first,
+            self.state,
+            self._work,
+            wanted,
+            auto_reset,
+            self._view if features else reach.NO_OBS,
+            self._obs,
+            self._last,
+            self._rew,
+            self._ended,
+        )
+        return StepResult(obs=self._obs, last_obs=self._last, rew=self._rew, ended=self._ended)
+
+    def set_goals(self, rows: NDArray[np.int64], goals: Vec) -> NDArray[np.float32]:
+        """Send the robots of ``rows`` to other goals, until their episodes end.
+
+        Args:
+            rows: Cells, shape (n,).
+            goals: Where their tcp shall be [m], shape (n, 3).
+
+        Returns:
+            Observations of all cells, (n_envs, obs_size).
+
+        Raises:
+            SimulationError: A number is NaN or infinite.
+        """
+        require_finite("goals", np.asarray(goals, dtype=np.float64))
+        for row, goal in zip(rows, goals, strict=True):
+            reach.set_goal(self.world, self.state, int(row), own(goal), self._work.robot)
+            reach.observe_env(
+                self.world, self.state, int(row), self._work, self._view, self._obs[row]
+            )
+        return self._obs

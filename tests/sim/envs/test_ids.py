@@ -1,0 +1,106 @@
+"""Every registered id passes both checkers, and equals rows of its batch bit for bit."""
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+from app.sim.envs import IDS
+from app.sim.envs.single import SingleEnv
+from app.sim.envs.vector import BatchVectorEnv
+from app.sim.pick import PickSettings
+from app.sim.reach import ReachSettings
+
+PEOPLE = {
+    "tandem/Pick-v0": ("worker",),
+    "tandem/PickWalker-v0": ("walker",),
+    "tandem/PickConstant-v0": ("constant",),
+    "tandem/PickFixedSpeed-v0": ("fixed-speed",),
+    "tandem/PickAlone-v0": (),
+    "tandem/Reach-v0": ("walker",),
+    "tandem/ReachWorker-v0": ("worker",),
+    "tandem/ReachConstant-v0": ("constant",),
+    "tandem/ReachFixedSpeed-v0": ("fixed-speed",),
+    "tandem/ReachAlone-v0": (),
+}
+MIX = {"people": ("worker", "walker", "constant", "fixed-speed")}
+
+
+def short(env_id: str, observation: str) -> PickSettings | ReachSettings:
+    """Settings with episodes of 1 s, so that a test sees several."""
+    settings = PickSettings if "Pick" in env_id else ReachSettings
+    return settings(time_limit_s=1.0, observation=observation)
+
+
+def actions(n_steps: int, n_envs: int, size: int) -> np.ndarray:
+    """Held for ten periods each, so that the robot gets about."""
+    held = np.random.default_rng(71).uniform(-1, 1, (n_steps // 10 + 1, n_envs, size))
+    return np.repeat(held, 10, axis=0)[:n_steps].astype(np.float32)
+
+
+def assert_single_equals_row(
+    env_id: str, observation: str, row: int, **keywords: object
+) -> int:
+    """Compare one environment with a row of three; return the episodes seen."""
+    settings = short(env_id, observation)
+    many = gymnasium.make_vec(env_id, 3, settings=settings, **keywords)
+    one = gymnasium.make(env_id, settings=settings, first_env=row, **keywords)
+    (expected, _), (obs, _) = many.reset(seed=9), one.reset(seed=9)
+    size = many.single_action_space.shape[0]
+    n_episodes = 0
+    for act in actions(180, 3, size):
+        np.testing.assert_array_equal(obs, expected[row])
+        expected, rews, terminated, truncated, infos = many.step(act)
+        obs, rew, over, late, info = one.step(act[row])
+        assert (rew, over, late) == (rews[row], terminated[row], truncated[row])
+        if over or late:
+            np.testing.assert_array_equal(obs, infos["final_obs"][row])
+            assert infos["final_info"]["outcome"][row] == info["outcome"]
+            assert (
+                infos["final_info"]["episode_number"][row]
+                == info["episode_number"]
+                == n_episodes
+            )
+            obs, info = one.reset()
+            n_episodes += 1
+        assert info == {key: infos[key][row] for key in info}
+    return n_episodes
+
+
+def test_table_of_ids_is_complete() -> None:
+    assert set(IDS) == set(PEOPLE)
+
+
+@pytest.mark.parametrize("env_id", IDS)
+def test_id_names_who_is_there(env_id: str) -> None:
+    env = gymnasium.make(env_id).unwrapped
+    assert isinstance(env, SingleEnv)
+    assert tuple(person.kind for person in env.batch.cell.people) == PEOPLE[env_id]
+
+
+@pytest.mark.parametrize("env_id", IDS)
+def test_environment_passes_gymnasiums_check(env_id: str) -> None:
+    check_env(gymnasium.make(env_id).unwrapped, skip_render_check=True)
+
+
+@pytest.mark.parametrize("env_id", IDS)
+def test_environment_passes_stable_baselines3s_check(env_id: str) -> None:
+    checker = pytest.importorskip("stable_baselines3.common.env_checker")
+    checker.check_env(gymnasium.make(env_id).unwrapped)
+
+
+@pytest.mark.parametrize("env_id", IDS)
+def test_make_vec_gives_the_batch(env_id: str) -> None:
+    assert isinstance(gymnasium.make_vec(env_id, 3), BatchVectorEnv)
+
+
+@pytest.mark.parametrize("env_id", IDS)
+def test_single_environment_equals_its_row_of_a_batch_bit_for_bit(env_id: str) -> None:
+    assert assert_single_equals_row(env_id, "features", row=1) >= 3
+
+
+@pytest.mark.parametrize("env_id", ["tandem/Pick-v0", "tandem/Reach-v0"])
+def test_any_mix_of_people_equals_its_row_of_a_batch_bit_for_bit(env_id: str) -> None:
+    assert assert_single_equals_row(env_id, "state", row=2, **MIX) >= 3
+    env = gymnasium.make(env_id, **MIX).unwrapped
+    assert len(env.batch.cell.people) == 4
