@@ -1,5 +1,6 @@
-"""What ``docs/world.md`` shows, measured: numbers for ``docs/results/world.json``, arrays for
-the pictures. Everything is seeded; run by ``make_world_page.py``.
+"""What ``docs/world.md`` shows, measured: numbers for its JSON, arrays for its pictures.
+
+Everything is seeded. Run by ``make_world_page.py``.
 """
 
 from dataclasses import dataclass
@@ -21,6 +22,7 @@ from app.sim.robot import Robot
 from app.sim.scene import arm_of
 from app.sim.shapes import TOOL, load_robot_capsules
 from tests.sim.configurations import CHUNK, N, configurations
+from tests.sim.fast_hands import HAND_SPEED, passes
 from tests.sim.mesh_gap import FARTHEST, Gap, gaps
 
 Json = dict[str, Any]
@@ -30,6 +32,8 @@ EPISODES, PERIODS, HOLD = 40, 250, 15
 """Random episodes whose limits are watched, periods of each, periods an action is held."""
 PER_PERIOD = 8
 """Places in a period at which speeds and accelerations are looked at."""
+PASSES = 400
+"""Hands that fly past the arm."""
 HEIGHTS = (0.05, 0.12, 0.30, 0.35, 0.45)
 """Heights over the table of the maps of reach [m]."""
 EXTENT, GRID = (-1.4, 1.4, -0.8, 1.4), 0.02
@@ -51,6 +55,7 @@ def references() -> Json:
         pairs = max(pairs, np.abs(case.d - case.expected).max())
         overlaps += int(case.clearance < 0.0)
     return {
+        "capsules": len(capsules.name),
         "configurations": N,
         "pairs": N * case.d.size,
         "fcl_pairs": CHUNK * case.d.size + N,
@@ -77,6 +82,23 @@ def mesh_gap(seed: int) -> tuple[Json, list[Gap]]:
             "min_mm": float(gap.min()),
         }
     return numbers, found
+
+
+def fast_hands(seed: int) -> Json:
+    """Return how many hands that fly past the arm are found, and how many too late."""
+    found = list(passes(load_cell(), PASSES, seed))
+    touching = [one for one in found if one.touching is not None]
+    late = [one.reported is None or one.reported > one.touching + 1e-3 for one in touching]
+    return {
+        "speed_m_s": HAND_SPEED,
+        "periods": len(found),
+        "touching": len(touching),
+        "clear_at_ends": sum(one.clear_at_ends for one in touching),
+        "late": sum(late),
+        "only_capsules": sum(
+            one.touching is None and one.reported is not None for one in found
+        ),
+    }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,7 +145,8 @@ def episode(arm: Arm, degree: int, seed: int) -> Episode:
 def limits(seed: int) -> tuple[Json, Arm, dict[int, Episode]]:
     """Return how near random episodes come to the limits, and one of each degree."""
     arm = arm_of(load_cell("shared-workspace"))
-    numbers: Json = {"cell": "shared-workspace", "episodes": EPISODES, "periods": PERIODS}
+    numbers: Json = {"cell": "shared-workspace", "dt_s": arm.dt}
+    numbers |= {"episodes": EPISODES, "periods": PERIODS}
     shown = {}
     for degree in (2, 3):
         worst = {"q_over_rad": -np.inf, "qd_share": 0.0, "qdd_share": 0.0, "jerk_share": 0.0}
@@ -159,6 +182,7 @@ def walker(seed: int, seconds: float = 15.0) -> tuple[Json, Walk, WalkerSettings
     numbers = {
         "walks": len(many),
         "seconds": seconds,
+        "bounds_m_s": [settings.v_min, settings.v_max],
         "speed_m_s": [float(speed[speed > 0.0].min()), float(speed.max())],
         "standing_share": float((speed == 0.0).mean()),
         "radius_m": [float(radius.min()), float(radius.max())],

@@ -1,4 +1,7 @@
-"""The pictures of ``docs/world.md``: one look, units on every axis. Run by ``make_world_page.py``."""
+"""The pictures of ``docs/world.md``: one look, units on every axis.
+
+Run by ``make_world_page.py``.
+"""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -21,7 +24,7 @@ from tests.sim.mesh_gap import Gap
 BLUE, ORANGE, GREEN, RED, GREY = "#2563a8", "#d97706", "#2a9d6f", "#b3261e", "#8a8f98"
 LIGHT = "#e6e8eb"
 LIFT = 1
-"""The joint whose limits are drawn: the shoulder's lift, which comes to the end of its range."""
+"""The joint whose limits are drawn: the shoulder's lift, which comes to its range's end."""
 STYLE = {
     "font.size": 9.0,
     "axes.titlesize": 10.0,
@@ -65,7 +68,10 @@ def mesh_gap(found: Sequence[Gap]) -> Figure:
     tool = np.array([one.nearest == TOOL for one in found])
     capsules = 1e3 * np.array([one.capsules for one in found])
     meshes = 1e3 * np.array([one.meshes for one in found])
-    for mask, colour, label in ((~tool, BLUE, "a link is nearest"), (tool, ORANGE, "the tool is")):
+    for mask, colour, label in (
+        (~tool, BLUE, "a link is nearest"),
+        (tool, ORANGE, "the tool is"),
+    ):
         left.plot(meshes[mask], capsules[mask], ".", ms=2.5, color=colour, label=label)
     top = max(meshes.max(), capsules.max())
     left.plot([0, top], [0, top], color=GREY, lw=0.9, label="equal")
@@ -82,7 +88,7 @@ def mesh_gap(found: Sequence[Gap]) -> Figure:
     right.hist(gap, bins=np.arange(0.0, gap.max() + 1.0, 1.0), color=BLUE, alpha=0.85)
     marks = (
         (gap.mean(), "mean", RED, -2),
-        (np.percentile(gap, 95), "95 % are below", GREY, -2),
+        (np.percentile(gap, 95), "95 %", GREY, -2),
         (gap.max(), "greatest", GREY, -40),
     )
     for value, name, colour, down in marks:
@@ -128,7 +134,11 @@ def limits(arm: Arm, shown: dict[int, Episode]) -> Figure:
         kind = "acceleration-limited" if degree == 2 else "jerk-limited"
         axes[0, column].set_title(f"Degree {degree}, {kind}")
         axes[-1, column].set(xlabel="time [s]", xlim=(0.0, one.time[-1]))
-    lines = ((BLUE, "shoulder lift", "-"), ("#c5cad1", "the other joints", "-"), (RED, "limit", "--"))
+    lines = (
+        (BLUE, "shoulder lift", "-"),
+        ("#c5cad1", "the other joints", "-"),
+        (RED, "limit", "--"),
+    )
     handles = [Line2D([], [], color=colour, label=text, ls=ls) for colour, text, ls in lines]
     figure.legend(handles=handles, ncols=3, loc="outside lower center")
     return figure
@@ -149,12 +159,12 @@ def walker(one: Walk, rules: WalkerSettings) -> Figure:
     x, y = one.position.T
     size = (rules.x_max - rules.x_min, rules.y_max - rules.y_min)
     plan.add_patch(Rectangle((rules.x_min, rules.y_min), *size, fill=False, ec=RED, ls="--"))
-    for k in range(0, len(x), 100):
+    for k in range(0, len(x), 75):
         circle = Circle((x[k], y[k]), one.radius[k], fc=BLUE, alpha=0.10, ec=BLUE, lw=0.6)
         plan.add_patch(circle)
     plan.plot(x, y, color=BLUE)
     plan.plot(x[0], y[0], "o", color=GREEN, ms=6)
-    plan.annotate("start", (x[0], y[0]), xytext=(6, 6), textcoords="offset points")
+    plan.annotate("start", (x[0], y[0]), xytext=(8, -4), textcoords="offset points")
     plan.plot(0.0, 0.0, "s", color="#4b5563", ms=8)
     plan.annotate("robot", (0.0, 0.0), xytext=(8, -3), textcoords="offset points")
     plan.annotate(
@@ -165,7 +175,7 @@ def walker(one: Walk, rules: WalkerSettings) -> Figure:
         color=RED,
     )
     plan.set(
-        title="Way, seen from above; a circle every 2 s",
+        title="Way, seen from above; a circle every 1.5 s",
         xlabel="x [m]",
         ylabel="y [m]",
         aspect="equal",
@@ -191,7 +201,7 @@ MARKS = {
     "dock": ("D", "dock"),
     "clutter": ("o", "clutter cell"),
     "cluster": ("^", "cluster (tower)"),
-    "goal": ("P", "training goal"),
+    "goal": ("v", "training goal"),
 }
 SHOWN = (
     # Height [m], cell, kinds of places drawn, title.
@@ -206,12 +216,13 @@ SHOWN = (
 
 def reach(maps: Sequence[ReachMap]) -> Figure:
     """Draw where the tool can point down, at several heights, with the cells' places."""
-    figure, axes = panels(2, 3, 6.0, sharex=True, sharey=True)
+    figure, axes = panels(2, 3, 5.4, sharex=True, sharey=True)
     fastest = max(float(np.nanmax(one.slowest)) for one in maps)
     by_height = {one.z: one for one in maps}
     for axis, (z, name, kinds, title) in zip(axes.flat, SHOWN, strict=True):
         one, cell = by_height[z], load_cell(name)
         options = {"origin": "lower", "extent": EXTENT, "zorder": 1, "vmin": 0.0}
+        options["interpolation"] = "nearest"
         blocked = np.where(one.blocked, 0.5, np.nan)
         axis.imshow(blocked, cmap="Reds", vmax=1.0, **options)
         image = axis.imshow(one.slowest, cmap="viridis", vmax=fastest, **options)
@@ -233,7 +244,9 @@ def reach(maps: Sequence[ReachMap]) -> Figure:
     bar.set_label("tcp speed in its slowest direction,\njoints at 1 rad/s [m/s]")
     bar.outline.set_visible(False)
     white = {"mfc": "white", "mec": "black", "color": "none"}
-    handles = [Line2D([], [], marker=mark, label=text, **white) for mark, text in MARKS.values()]
+    handles = [
+        Line2D([], [], marker=mark, label=text, **white) for mark, text in MARKS.values()
+    ]
     handles.append(Line2D([], [], color="black", lw=1.1, label="table"))
     handles.append(Rectangle((0, 0), 1, 1, fc="#fb7252", label="touches table or itself"))
     figure.legend(handles=handles, ncols=7, loc="outside lower center", columnspacing=1.2)
@@ -266,7 +279,9 @@ def scaling(rows: Sequence[dict[str, Any]]) -> Figure:
             [row["us_per_step"] for row in found],
             "o-",
             color=colour,
-            label="18-DoF workers, 12 capsules each" if kind == "workers" else "walking cylinders",
+            label="18-DoF workers, 12 capsules each"
+            if kind == "workers"
+            else "walking cylinders",
         )
     axes[0, 0].set(
         title="People, robot of 12 capsules",
@@ -278,7 +293,10 @@ def scaling(rows: Sequence[dict[str, Any]]) -> Figure:
     axes[0, 0].legend(loc="upper left")
     found = [row for row in rows if row["name"].startswith("pick/capsules-")]
     axes[0, 1].plot(
-        [row["pairs"] for row in found], [row["us_per_step"] for row in found], "o-", color=GREEN
+        [row["pairs"] for row in found],
+        [row["us_per_step"] for row in found],
+        "o-",
+        color=GREEN,
     )
     for row in found:
         axes[0, 1].annotate(
@@ -287,6 +305,9 @@ def scaling(rows: Sequence[dict[str, Any]]) -> Figure:
             xytext=(5, -12),
             textcoords="offset points",
         )
-    axes[0, 1].set(title="Capsules of the robot, one worker", xlabel="exact distances per pose [pairs of capsules]")
+    axes[0, 1].set(
+        title="Capsules of the robot, one worker",
+        xlabel="exact distances per pose [pairs of capsules]",
+    )
     axes[0, 1].margins(x=0.15)
     return figure
