@@ -4,8 +4,8 @@
     python docs/make_world_page.py --page   write the text again, from ``docs/results``
 
 Writes ``docs/results/world.json``, ``docs/img/world/*.png`` and the page: the text of
-``docs/world.template.md`` with those numbers and the tables of ``docs/results``; a test compares.
-Everything is seeded; takes about half a minute. Benchmarks are not run:
+``docs/world.template.md`` with those numbers and with tables from ``docs/results``. A test
+compares. Everything is seeded; takes about half a minute. Benchmarks are not run:
 ``python -m app bench sim-steps --json > docs/results/sim-steps.json``, and ``sim-scaling``.
 """
 
