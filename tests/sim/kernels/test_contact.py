@@ -132,7 +132,8 @@ def test_sweep_beside_walkers_is_never_later_than_poses_every_millisecond(cell: 
             arm, people, period.q, period.qd, period.c, zero, (nobody, nobody), (before, after)
         )
         touches = False
-        for part, q in zip(np.linspace(0, 1, SUBSTEPS + 1), period.rows(SUBSTEPS).q_robot):
+        parts = np.linspace(0.0, 1.0, SUBSTEPS + 1)
+        for part, q in zip(parts, period.rows(SUBSTEPS).q_robot, strict=True):
             free = clearance(arm, people, q, nobody, before + part * (after - before))
             touches = touches or min(free.people_m, free.cell_m, free.self_m) <= 0.0
         assert not (touches and found.kind == "none")
