@@ -18,6 +18,7 @@ from app.api.schemas.task_selection import TaskSelectionRequest
 from app.main import create_app
 from app.settings import PREFIX, Settings
 from app.sim.cells import load_cell
+from app.sim.envs import IDS
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -107,3 +108,17 @@ def test_readme_requests_are_ones_the_service_takes() -> None:
     _, _, people, candidates = state.to_domain(load_cell(state.cell))
     assert len(people) == 1
     assert [one.id for one in candidates] == ["left", "right"]
+
+
+def test_readme_names_every_environment_and_its_python_runs() -> None:
+    rows = re.findall(r"^\| (`tandem/[^|]*)\|", README, re.MULTILINE)
+    names = {
+        name.split("/")[-1].removesuffix("-v0")
+        for name in re.findall(r"`([^`]+)`", "".join(rows))
+    }
+    assert names == {one.split("/")[1].removesuffix("-v0") for one in IDS}
+    (block,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+    found: dict[str, Any] = {}
+    exec(block, found)
+    assert len(found["env"].reset(seed=1)[0]) > 0
+    assert found["batch"].reset(seed=1)[0].shape[0] == 128
