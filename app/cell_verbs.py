@@ -104,10 +104,14 @@ def _listed(settings: Settings) -> Printed:
 
 
 def _described(cell: Cell, what: str) -> Printed:
-    parts = [f"{len(cell.stations)} stations"]
-    if cell.goal_region is not None:
-        parts.append(f"{len(cell.goal_region.targets())} grid targets")
-    parts += [f"{len(cell.obstacles)} obstacles", f"{len(cell.people)} people"]
+    n_targets = 0 if cell.goal_region is None else len(cell.goal_region.targets())
+    counted = (
+        (len(cell.stations), "station", "stations"),
+        (n_targets, "grid target", "grid targets"),
+        (len(cell.obstacles), "obstacle", "obstacles"),
+        (len(cell.people), "person", "people"),
+    )
+    parts = [f"{n} {one if n == 1 else more}" for n, one, more in counted if n]
     lack = lacks_for_pick(cell)
     lines = [f"{cell.name} {what}: {', '.join(parts)}"]
     if lack is not None:

@@ -5,6 +5,7 @@ functions below it do the same for one state, for the live cell and for deciding
 same kernels, so that what was trained is what acts.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -16,7 +17,9 @@ from app.sim.actions import ActionSettings
 from app.sim.cells import Cell, lacks_stations
 from app.sim.kernels import actions, body, features, kinematics, pick, random, script
 from app.sim.kernels import arm as arm_kernel
-from app.sim.kernels.arm import Arm
+from app.sim.kernels.arm import CONTROLLED, Arm
+from app.sim.kernels.compiled import direct
+from app.sim.kernels.episode import FEATURES, NO_OBS, PLAIN, distance_to
 from app.sim.kernels.features import N_FEATURES
 from app.sim.kernels.geometry import FAR
 from app.sim.kernels.people import People, PeopleState
@@ -29,13 +32,14 @@ from app.sim.scene import (
     own,
     people_of,
     require_finite,
+    require_shape,
     with_people,
 )
 
 OUTCOMES = ("running", "success", "collision", "timeout", "unfeasible")
 StartRule = Literal["clearance", "uniform"]
 DEFAULT_ACTION = ActionSettings()
-VIEWS = {"state": (pick.PLAIN, pick.N_PLAIN), "features": (pick.FEATURES, N_FEATURES)}
+VIEWS = {"state": (PLAIN, pick.N_PLAIN), "features": (FEATURES, N_FEATURES)}
 """What observations hold: the plain state of (5.8), or that and features; and their lengths."""
 DEFAULT_WEIGHTS = RewardWeights(
     c_d=0.5, c_th=0.5, c_c=1.0, c_step=0.02, c_v=1.0, d_v=0.1, c_s=1.0, gamma=1.0
@@ -202,6 +206,7 @@ class PickBatch:
         self._last = np.zeros_like(self._obs)
         self._rew = np.zeros(n_envs, dtype=np.float32)
         self._ended = np.zeros(n_envs, dtype=np.int64)
+        self._step: Callable[..., None] | None = None
 
     def reset(self, seed: int | None = None) -> NDArray[np.float32]:
         """Start episode 0 in every cell; return observations, (n_envs, obs_size)."""
@@ -234,11 +239,13 @@ class PickBatch:
             features: Whether observations are wanted.
 
         Raises:
+            InvalidInput: The actions have another shape.
             SimulationError: An action is NaN or infinite.
         """
+        require_shape("act", act, (self.n_envs, CONTROLLED))
         require_finite("act", act)
         wanted = np.array(act, dtype=np.float32, order="C")
-        pick.step_batch(
+        arguments = (
             self.world,
             self._rules,
             self._action,
@@ -249,12 +256,15 @@ class PickBatch:
             self._work,
             wanted,
             auto_reset,
-            self._view if features else pick.NO_OBS,
+            self._view if features else NO_OBS,
             self._obs,
             self._last,
             self._rew,
             self._ended,
         )
+        if self._step is None:
+            self._step = direct(pick.step_batch, arguments)
+        self._step(*arguments)
         return StepResult(obs=self._obs, last_obs=self._last, rew=self._rew, ended=self._ended)
 
     def set_goals(self, rows: NDArray[np.int64], goals: Vec) -> None:
@@ -351,7 +361,7 @@ def tool_state(arm: Arm, q: Vec, qd: Vec, goal: Vec) -> tuple[float, float, floa
     """Return distance to a target [m], tilt [rad], tcp speed [m/s] and whether it succeeds."""
     pose = arm_kernel.new_robot_pose(arm)
     arm_kernel.place_robot(arm, own(q), pose)
-    distance, tilt = pick.distance_to(own(goal), pose), arm_kernel.robot_tilt(pose)
+    distance, tilt = distance_to(own(goal), pose), arm_kernel.robot_tilt(pose)
     speed = arm_kernel.tcp_speed(pose, own(qd))
     return distance, tilt, speed, bool(pick.succeeded(distance, tilt, speed))
 

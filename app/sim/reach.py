@@ -5,6 +5,7 @@ Source: METHOD 2.1 to 2.3.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, get_args
 
@@ -17,6 +18,8 @@ from app.sim.cell_parts import GoalRegion, Station
 from app.sim.cell_people import Worker
 from app.sim.cells import Cell
 from app.sim.kernels import reach
+from app.sim.kernels.compiled import direct
+from app.sim.kernels.episode import FEATURES, NO_OBS, PLAIN
 from app.sim.kernels.geometry import FAR
 from app.sim.kernels.people import People, PeopleState
 from app.sim.kernels.reach_features import N_FEATURES, N_STATE
@@ -32,6 +35,7 @@ from app.sim.scene import (
     own,
     people_of,
     require_finite,
+    require_shape,
     walker_settings,
     with_people,
 )
@@ -41,7 +45,7 @@ N_ACT = 6
 StartRule = Literal["clearance", "uniform", "authors"]
 GoalRule = Literal["grid", "box"]
 ViewName = Literal["features", "state"]
-VIEWS = {"state": (reach.PLAIN, N_STATE), "features": (reach.FEATURES, N_FEATURES)}
+VIEWS = {"state": (PLAIN, N_STATE), "features": (FEATURES, N_FEATURES)}
 """What observations hold: the plain state (4.30), or that and features; and their lengths."""
 THESIS_WEIGHTS = ReachWeights(
     c_d=1.0, c_p=0.0, gamma=1.0, c_a=0.1, c_step=0.0, c_c=5.0, c_s=20.0
@@ -262,6 +266,7 @@ class ReachBatch:
         self._last = np.zeros_like(self._obs)
         self._rew = np.zeros(n_envs, dtype=np.float32)
         self._ended = np.zeros(n_envs, dtype=np.int64)
+        self._step: Callable[..., None] | None = None
 
     def reset(self, seed: int | None = None) -> NDArray[np.float32]:
         """Start episode 0 in every cell; return observations, (n_envs, obs_size)."""
@@ -294,11 +299,13 @@ class ReachBatch:
             features: Whether observations are wanted.
 
         Raises:
+            InvalidInput: The actions have another shape.
             SimulationError: An action is NaN or infinite.
         """
+        require_shape("act", act, (self.n_envs, N_ACT))
         require_finite("act", act)
         wanted = np.array(act, dtype=np.float32, order="C")
-        reach.step_batch(
+        arguments = (
             self.world,
             self._rules,
             self._action,
@@ -309,12 +316,15 @@ class ReachBatch:
             self._work,
             wanted,
             auto_reset,
-            self._view if features else reach.NO_OBS,
+            self._view if features else NO_OBS,
             self._obs,
             self._last,
             self._rew,
             self._ended,
         )
+        if self._step is None:
+            self._step = direct(reach.step_batch, arguments)
+        self._step(*arguments)
         return StepResult(obs=self._obs, last_obs=self._last, rew=self._rew, ended=self._ended)
 
     def set_goals(self, rows: NDArray[np.int64], goals: Vec) -> NDArray[np.float32]:
@@ -328,10 +338,14 @@ class ReachBatch:
             Observations of all cells, (n_envs, obs_size).
 
         Raises:
+            InvalidInput: There is no such cell, or the goals have another shape.
             SimulationError: A number is NaN or infinite.
         """
+        require_shape("goals", np.asarray(goals), (len(rows), 3))
         require_finite("goals", np.asarray(goals, dtype=np.float64))
         for row, goal in zip(rows, goals, strict=True):
+            if not 0 <= row < self.n_envs:
+                raise InvalidInput("rows", int(row), f"must be one of {self.n_envs} cells")
             reach.set_goal(self.world, self.state, int(row), own(goal), self._work.robot)
             reach.observe_env(
                 self.world, self.state, int(row), self._work, self._view, self._obs[row]

@@ -6,7 +6,7 @@ makes them from a :class:`~app.sim.cells.Cell`.
 
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -44,6 +44,12 @@ def require_finite(name: str, values: NDArray[np.floating]) -> None:
     """Raise SimulationError for NaN and infinity, which the contact test would pass over."""
     if not np.isfinite(values).all():
         raise SimulationError(f"{name} = {values.tolist()} must be finite")
+
+
+def require_shape(name: str, values: NDArray[Any], shape: tuple[int, ...]) -> None:
+    """Raise InvalidInput for an array of another shape: kernels would read beyond its end."""
+    if values.shape != shape:
+        raise InvalidInput(name, values.shape, f"must have the shape {shape}")
 
 
 def own(values: ArrayLike) -> Vec:

@@ -28,6 +28,7 @@ from app.sim.kernels import pick
 from app.sim.kernels.arm import FIRST_OVER_TABLE, Arm
 from app.sim.kernels.body import N_CAPSULES
 from app.sim.kernels.columns import new_columns
+from app.sim.kernels.episode import PLAIN
 from app.sim.pick import DEFAULT_ACTION, DEFAULT_WEIGHTS, PickBatch, PickSettings
 from app.sim.scene import HumanKind, own, own_index
 from app.sim.shapes import load_robot_capsules
@@ -132,12 +133,12 @@ def with_robot(pieces: int, seed: int) -> tuple[Subject, Row]:
     obs = np.zeros((BATCH, pick.N_PLAIN), dtype=np.float32)
     last, rew = np.zeros_like(obs), np.zeros(BATCH, dtype=np.float32)
     ended, turn = np.zeros(BATCH, dtype=np.int64), acts(BATCH, seed)
-    pick.reset_batch(world, rules, seed, 0, state, work, pick.PLAIN, obs)
+    pick.reset_batch(world, rules, seed, 0, state, work, PLAIN, obs)
 
     def step() -> None:
         pick.step_batch(
             world, rules, action, DEFAULT_WEIGHTS, seed, 0, state, work, next(turn), True,
-            pick.PLAIN, obs, last, rew, ended,
+            PLAIN, obs, last, rew, ended,
         )  # fmt: skip
 
     name = f"pick/capsules-{len(arm.link)}"

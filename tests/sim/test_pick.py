@@ -9,7 +9,6 @@ from app.sim.cells import Cell, load_cell
 from app.sim.contact import contact
 from app.sim.kernels import actions, features
 from app.sim.kernels import contact as contact_kernel
-from app.sim.kernels import pick as kernel
 from app.sim.kernels.features import LAYOUT
 from app.sim.pick import OUTCOMES, PickBatch, PickSettings
 from app.sim.recheck import Recheck, Trajectory
@@ -196,7 +195,7 @@ def test_read_only_integer_and_strided_inputs_compile_nothing_anew(cell: Cell) -
         human.capsules(person, cell.pelvis_z, cell.floor_z)
 
     use()
-    kernels = (features.observe_rows, contact_kernel.sweep, actions.advance, kernel.distance_to)
+    kernels = (features.observe_rows, contact_kernel.sweep, actions.advance)
     before = [len(compiled.signatures) for compiled in kernels]
     zero, goals = np.zeros(6, dtype=np.int64), goals[:, :]
     for array in (q, person, goals):

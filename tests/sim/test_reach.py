@@ -285,3 +285,19 @@ def test_numbers_that_are_not_finite_are_errors(cell: Cell, value: float) -> Non
         batch.step(np.full((1, 6), value, dtype=np.float32))
     with pytest.raises(SimulationError, match="finite"):
         batch.set_goals(np.array([0]), np.full((1, 3), value))
+
+
+@pytest.mark.parametrize("shape", [(1, 6), (2, 5), (12,), (3, 6)])
+def test_actions_of_another_shape_are_refused(cell: Cell, shape: tuple[int, ...]) -> None:
+    batch = ReachBatch(cell, 2, 0, ReachSettings())
+    batch.reset()
+    with pytest.raises(InvalidInput, match="shape"):
+        batch.step(np.zeros(shape, dtype=np.float32))
+
+
+def test_goals_for_cells_that_are_not_there_are_refused(cell: Cell) -> None:
+    batch = ReachBatch(cell, 2, 0, ReachSettings())
+    batch.reset()
+    for rows, goals in (([2], np.zeros((1, 3))), ([-1], np.zeros((1, 3))), ([0], np.zeros(3))):
+        with pytest.raises(InvalidInput):
+            batch.set_goals(np.array(rows), goals)

@@ -14,7 +14,7 @@ from app.policies.evaluation.statistics import wilson
 from app.policies.presets import action_of
 from app.policies.task_choice import ValueNetworks
 from app.sim.cells import Cell
-from app.sim.kernels import pick as kernel
+from app.sim.kernels import episode as kernel
 from app.sim.kernels.features import LAYOUT, N_FEATURES, observe_batch
 from app.sim.pick import OUTCOMES, PickBatch, PickSettings
 from app.sim.recheck import Trajectory
@@ -61,12 +61,14 @@ class Episodes:
         n = len(self.outcome)
         counts = np.bincount(self.outcome, minlength=len(OUTCOMES))
         won = self.outcome == kernel.SUCCESS
+        unfeasible = int(counts[kernel.UNFEASIBLE])
         return {
             "name": name,
             "n": n,
             "success": wilson(int(counts[kernel.SUCCESS]), n),
             "collision": wilson(int(counts[kernel.COLLISION]), n),
             "timeout": wilson(int(counts[kernel.TIMEOUT]), n),
+            **({"unfeasible": wilson(unfeasible, n)} if unfeasible else {}),
             "time_to_success_s": float(self.duration_s[won].mean()) if won.any() else None,
             "switches_per_episode": float(self.switches.mean()),
         }
@@ -188,6 +190,7 @@ class _Trace:
         state, n = self._batch.state, self._n
         self._rows = rows[rows < n]
         self._q0, self._qd0 = state.q[:n].copy(), state.qd[:n].copy()
+        self._qdd0 = state.qdd[:n].copy()
         self._human0 = state.people.q[:n, 0].copy()
 
     def after(self, rows: Index) -> None:
@@ -197,9 +200,13 @@ class _Trace:
             if state.outcome[row] == kernel.COLLISION:
                 continue
             c = (state.qd[row] - self._qd0[row]) / (2.0 * dt)
+            d = np.zeros(6)
+            if self._batch.settings.action.degree == 3:
+                c = 0.5 * self._qdd0[row]
+                d = (state.qdd[row] - self._qdd0[row]) / (6.0 * dt)
             for part in range(1, self.PARTS + 1):
                 x = dt * part / self.PARTS
-                q = self._q0[row] + self._qd0[row] * x + c * x * x
+                q = self._q0[row] + x * (self._qd0[row] + x * (c + x * d))
                 blend = part / self.PARTS
                 person = self._human0[row] + blend * (
                     state.people.q[row, 0] - self._human0[row]

@@ -14,8 +14,8 @@ from app.policies.evaluation import choice_rules
 from app.policies.evaluation.episodes import Episodes, Evaluator, settings_for
 from app.policies.task_choice import HYSTERESIS, ValueNetworks
 from app.policies.trained_cell import cell_of
-from app.sim.kernels import pick as kernel
-from app.sim.pick import hand_speeds
+from app.sim.kernels import episode as kernel
+from app.sim.pick import OUTCOMES, hand_speeds
 from app.sim.recheck import recheck_trajectories
 from app.sim.scene import kinds_of
 
@@ -101,8 +101,8 @@ def run_choice(checkpoint: Checkpoint, *, episodes: int | None, seed: int) -> di
 
 def _in_hindsight(runs: list[Episodes]) -> dict[str, object]:
     """Return the row of the best fixed candidate per episode, known only afterwards."""
-    ranks = {kernel.SUCCESS: 0, kernel.TIMEOUT: 1, kernel.COLLISION: 2}
-    rank = np.array([ranks.get(outcome, 0) for outcome in range(len(ranks) + 1)])
+    rank = np.zeros(len(OUTCOMES))
+    rank[[kernel.TIMEOUT, kernel.UNFEASIBLE, kernel.COLLISION]] = 1, 2, 3
     badness = np.stack([1e3 * rank[run.outcome] + run.duration_s for run in runs])
     best, rows = badness.argmin(axis=0), np.arange(badness.shape[1])
     pooled = Episodes(

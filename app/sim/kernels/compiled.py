@@ -8,7 +8,7 @@ kernel can make no arrays: what it works on is made by its caller, once per batc
 from collections.abc import Callable
 from typing import Any, ParamSpec, TypeVar
 
-from numba import njit
+from numba import njit, typeof
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -21,3 +21,20 @@ def kernel(**options: Any) -> Callable[[Callable[P, R]], Callable[P, R]]:
         cache=True, _nrt=False, **options
     )
     return decorate
+
+
+def direct(compiled: Callable[..., R], arguments: tuple[Any, ...]) -> Callable[..., R]:
+    """Return a kernel compiled for arguments of these types, without looking at types again.
+
+    At every ordinary call numba works out the types of all arguments anew; for tuples of a
+    hundred arrays that takes five times as long as the rest of the call. What is returned
+    checks nothing: an array of another type or layout is read as if it were of this one.
+
+    Args:
+        compiled: Kernel.
+        arguments: What it will be called with.
+    """
+    dispatcher: Any = compiled
+    kind_of: Any = typeof
+    entry: Callable[..., R] = dispatcher.compile(tuple(kind_of(value) for value in arguments))
+    return entry

@@ -4,14 +4,13 @@ Every environment is a row of the arrays in :class:`PickState`. An episode is fi
 environment, episode): target, start, the person's script and its phase; stepping draws nothing.
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.sim.kernels import kinematics, random
-from app.sim.kernels.actions import ONE_STEP, ActionRule, advance
+from app.sim.kernels.actions import ONE_STEP, ActionRule
 from app.sim.kernels.arm import (
     CONTROLLED,
     Arm,
@@ -22,37 +21,42 @@ from app.sim.kernels.arm import (
     robot_tilt,
     tcp_speed,
 )
-from app.sim.kernels.columns import copy_rows, copy_values
+from app.sim.kernels.columns import copy_values
 from app.sim.kernels.compiled import kernel
-from app.sim.kernels.contact import NO_CONTACT, clearances, sweep
+from app.sim.kernels.contact import clearances
+from app.sim.kernels.episode import (
+    COLLISION,
+    NO_OBS,
+    PLAIN,
+    RUNNING,
+    START_TRIES,
+    SUCCESS,
+    SUCCESS_DISTANCE,
+    TIMEOUT,
+    UNFEASIBLE,
+    distance_to,
+    move,
+)
 from app.sim.kernels.features import Obs, Sight, new_sight, observe
 from app.sim.kernels.people import (
     Crowd,
     People,
     PeopleState,
-    advance_people,
     new_crowd,
-    place_people,
     see_nearest,
     start_people,
 )
 from app.sim.kernels.reward import RewardWeights, reward
 from app.sim.ports import Vec
 
-RUNNING, SUCCESS, COLLISION, TIMEOUT, UNFEASIBLE = range(5)
-NO_OBS, PLAIN, FEATURES = range(3)
 N_PLAIN = 51
 """Length of the plain observation: q, qd, the person's q, qd, target (5.8)."""
-SUCCESS_DISTANCE = 0.1
-"""tcp to target [m], thesis 5.3.1."""
 SUCCESS_TILT = 0.2
 """Tool axis to the vertical [rad], thesis 5.3.1."""
 SUCCESS_SPEED = 0.1
 """tcp speed [m/s], thesis 5.3.1."""
 MAX_CANDIDATES = 3
 """Most targets an episode offers (METHOD 3.6)."""
-START_TRIES = 200
-"""Starts drawn before the last one is taken whatever its clearance."""
 
 
 class PickWorld(NamedTuple):
@@ -266,13 +270,6 @@ def reset_env(
 
 
 @kernel()
-def distance_to(goal: Vec, robot: RobotPose) -> float:
-    """Return the distance of a placed robot's tcp to a target [m]."""
-    x, y, z = goal[0] - robot.tcp[0], goal[1] - robot.tcp[1], goal[2] - robot.tcp[2]
-    return math.sqrt(x * x + y * y + z * z)
-
-
-@kernel()
 def succeeded(distance: float, tilt: float, speed: float) -> bool:
     """Whether the tool is where it should be, upright and at rest (thesis 5.3.1)."""
     return distance < SUCCESS_DISTANCE and tilt < SUCCESS_TILT and speed < SUCCESS_SPEED
@@ -289,59 +286,13 @@ def step_env(
     work: Work,
 ) -> float:
     """Move environment ``e`` through one period, set its outcome, return the reward."""
-    arm, people, crowd, robot = world.arm, state.people, work.crowd, work.robot
-    copy_rows(people.q[e], crowd.q0)
-    copy_rows(people.cylinders[e], crowd.cylinders0)
-    unfeasible = advance(
-        action,
-        state.q[e],
-        state.qd[e],
-        state.qdd[e],
-        act,
-        arm.q_min,
-        arm.q_max,
-        arm.qd_max,
-        arm.qdd_max,
-        arm.jerk_max,
-        arm.dt,
-        work.c,
-        work.d,
-        work.q,
-        work.qd,
-        work.qdd,
-    )
-    state.elapsed[e] += arm.dt
-    state.time_left[e] -= arm.dt
-    advance_people(world.people, people, e, state.elapsed[e], arm.dt)
-    kind, _ = sweep(
-        arm,
-        world.people,
-        state.q[e],
-        state.qd[e],
-        work.c,
-        work.d,
-        work.q,
-        people.q[e],
-        people.cylinders[e],
-        state.robot[e],
-        people.columns[e],
-        state.clear[e],
-        robot,
-        crowd,
-    )
-    for j in range(6):
-        state.q[e, j], state.qd[e, j], state.qdd[e, j] = work.q[j], work.qd[j], work.qdd[j]
-    if kind != NO_CONTACT:
-        place_robot(arm, work.q, robot)
-        place_people(world.people, people, e, crowd)
-    keep_columns(robot.columns, state.robot[e])
-    keep_columns(crowd.columns, people.columns[e])
+    collided, unfeasible = move(world.arm, world.people, action, state, e, act, work)
+    robot = work.robot
     d_old, tilt_old = state.distance[e], state.tilt[e]
     d, tilt = distance_to(state.goal[e], robot), robot_tilt(robot)
     state.distance[e], state.tilt[e] = d, tilt
     near = max(SUCCESS_DISTANCE, weights.d_v)
     speed = tcp_speed(robot, work.qd) if d <= near else 0.0
-    collided = kind != NO_CONTACT
     success = not collided and succeeded(d, tilt, speed)
     if collided:
         state.outcome[e] = COLLISION

@@ -11,23 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.sim.kernels import random
-from app.sim.kernels.actions import ONE_STEP, ActionRule, advance
+from app.sim.kernels.actions import ONE_STEP, ActionRule
 from app.sim.kernels.arm import Arm, RobotPose, keep_columns, new_robot_pose, place_robot
-from app.sim.kernels.columns import copy_rows, copy_values
+from app.sim.kernels.columns import copy_values
 from app.sim.kernels.compiled import kernel
-from app.sim.kernels.contact import NO_CONTACT, clearances, sweep
-from app.sim.kernels.people import (
-    Crowd,
-    People,
-    PeopleState,
-    advance_people,
-    new_crowd,
-    people_clearance,
-    place_people,
-    start_people,
-)
-from app.sim.kernels.pick import (
+from app.sim.kernels.contact import clearances
+from app.sim.kernels.episode import (
     COLLISION,
+    NO_OBS,
+    PLAIN,
     RUNNING,
     START_TRIES,
     SUCCESS,
@@ -35,6 +27,16 @@ from app.sim.kernels.pick import (
     TIMEOUT,
     UNFEASIBLE,
     distance_to,
+    move,
+)
+from app.sim.kernels.people import (
+    Crowd,
+    People,
+    PeopleState,
+    new_crowd,
+    people_clearance,
+    place_people,
+    start_people,
 )
 from app.sim.kernels.reach_features import (
     Obs,
@@ -47,7 +49,6 @@ from app.sim.kernels.reach_features import (
 from app.sim.kernels.reach_reward import ReachWeights, reward
 from app.sim.ports import Vec
 
-NO_OBS, PLAIN, FEATURES = range(3)
 NO_TARGET = -1
 """Number of a goal that is none of the targets."""
 
@@ -248,59 +249,13 @@ def step_env(
     work: Work,
 ) -> float:
     """Move environment ``e`` through one period, set its outcome, return the reward."""
-    arm, people, crowd, robot = world.arm, state.people, work.crowd, work.robot
-    copy_rows(people.q[e], crowd.q0)
-    copy_rows(people.cylinders[e], crowd.cylinders0)
-    unfeasible = advance(
-        action,
-        state.q[e],
-        state.qd[e],
-        state.qdd[e],
-        act,
-        arm.q_min,
-        arm.q_max,
-        arm.qd_max,
-        arm.qdd_max,
-        arm.jerk_max,
-        arm.dt,
-        work.c,
-        work.d,
-        work.q,
-        work.qd,
-        work.qdd,
-    )
-    state.elapsed[e] += arm.dt
-    state.time_left[e] -= arm.dt
-    advance_people(world.people, people, e, state.elapsed[e], arm.dt)
-    kind, _ = sweep(
-        arm,
-        world.people,
-        state.q[e],
-        state.qd[e],
-        work.c,
-        work.d,
-        work.q,
-        people.q[e],
-        people.cylinders[e],
-        state.robot[e],
-        people.columns[e],
-        state.clear[e],
-        robot,
-        crowd,
-    )
-    for j in range(6):
-        state.q[e, j], state.qd[e, j], state.qdd[e, j] = work.q[j], work.qd[j], work.qdd[j]
-    collided = kind != NO_CONTACT
+    collided, unfeasible = move(world.arm, world.people, action, state, e, act, work)
     if collided:
         state.touched[e] += 1
-        place_robot(arm, work.q, robot)
-        place_people(world.people, people, e, crowd)
         if not rules.collision_ends:
-            clear = clearances(arm, world.people, robot, crowd)
+            clear = clearances(world.arm, world.people, work.robot, work.crowd)
             state.clear[e, 0], state.clear[e, 1], state.clear[e, 2] = clear
-    keep_columns(robot.columns, state.robot[e])
-    keep_columns(crowd.columns, people.columns[e])
-    d_old, d = state.distance[e], distance_to(state.goal[e], robot)
+    d_old, d = state.distance[e], distance_to(state.goal[e], work.robot)
     state.distance[e] = d
     state.outcome[e] = outcome_of(
         collided,

@@ -30,6 +30,7 @@ from app.sim.kernels.occupancy import VX, VY, R
 from app.sim.kernels.occupancy import X as WALKER_X
 from app.sim.kernels.occupancy import Y as WALKER_Y
 from app.sim.kernels.people import Crowd, People, PeopleState, nearest_person
+from app.sim.kernels.trig import sine_cosine
 from app.sim.ports import Vec
 
 Obs = NDArray[np.float32]
@@ -194,7 +195,7 @@ def _scaled(d: float) -> float:
     return min(3.0, d / SCALE)
 
 
-@kernel()
+@kernel(error_model="numpy")
 def put_features(
     q: Vec,
     qd: Vec,
@@ -229,7 +230,7 @@ def put_features(
     """
     for j in range(6):
         out[j], out[6 + j] = q[j] / math.pi, qd[j] / qd_max[j]
-        out[20 + j], out[26 + j] = math.sin(q[j]), math.cos(q[j])
+        out[20 + j], out[26 + j] = sine_cosine(q[j])
     for i in range(5):
         out[12 + i] = seen[i]
     out[13] = seen[1] - CENTER_Y
