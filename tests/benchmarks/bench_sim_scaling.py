@@ -169,18 +169,19 @@ def side_by_side(runs: list[Callable[[], object]], seconds: float) -> tuple[floa
 
 def by_threads(seed: int, rounds: int, seconds: float) -> Iterator[Row]:
     """Yield rows of one and two threads, each with its own part of a batch."""
-    for batch in (BATCH, 8 * BATCH):
-        runs = {n: parts_of(batch, n, seed) for n in (1, 2)}
-        found: dict[int, list[tuple[float, float]]] = {1: [], 2: []}
-        for _, n in itertools.product(range(4 * rounds), (1, 2)):
-            rate, cores = side_by_side(runs[n], 0.5 * seconds)
-            found[n].append((cores, rate * batch / n))
-        for n in (1, 2):
-            kept = sorted(found[n])[-rounds:]
-            subject = Subject(name=f"pick/threads-{n}/{batch}", batch=batch, run=runs[n][0])
-            cores = statistics.mean(one[0] for one in kept)
-            values = [one[1] for one in kept]
-            yield row(subject, values, "env-steps/s", threads=n, people=1, cores=cores)
+    cases = [(batch, n) for batch in (BATCH, 8 * BATCH) for n in (1, 2)]
+    runs = {case: parts_of(*case, seed) for case in cases}
+    found: dict[tuple[int, int], list[tuple[float, float]]] = {case: [] for case in cases}
+    for _, (batch, n) in itertools.product(range(4 * rounds), cases):
+        rate, cores = side_by_side(runs[batch, n], 0.5 * seconds)
+        found[batch, n].append((cores, rate * batch / n))
+    for batch, n in cases:
+        kept = sorted(found[batch, n])[-rounds:]
+        run = runs[batch, n][0]
+        subject = Subject(name=f"pick/threads-{n}/{batch}", batch=batch, run=run)
+        cores = statistics.mean(one[0] for one in kept)
+        values = [one[1] for one in kept]
+        yield row(subject, values, "env-steps/s", threads=n, people=1, cores=cores)
 
 
 def parts_of(batch: int, n: int, seed: int) -> list[Callable[[], object]]:
@@ -195,6 +196,7 @@ def parts_of(batch: int, n: int, seed: int) -> list[Callable[[], object]]:
 def main() -> None:
     """Measure and print."""
     options = arguments(BENCH)
+    by_clock = list(by_threads(options.seed, options.rounds, options.seconds))
     found = list(beside_people(options.seed))
     found += [with_robot(pieces, options.seed) for pieces in (0, 1, 2, 3)]
     subjects = [subject for subject, _ in found]
@@ -209,8 +211,7 @@ def main() -> None:
         )
         for (subject, columns), spents in zip(found, times, strict=True)
     ]
-    rows += by_threads(options.seed, options.rounds, options.seconds)
-    report(BENCH, rows, options)
+    report(BENCH, rows + by_clock, options)
 
 
 if __name__ == "__main__":
