@@ -40,7 +40,7 @@ SAY := @printf '==> %s\n'
 
 export PYTHONUNBUFFERED = 1
 
-.PHONY: help run setup test test-browser test-slow check format bench tables lock clean
+.PHONY: help run setup test test-browser test-slow check format bench tables world lock clean
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*## ' Makefile | sed -E 's/:.*## /\t/' | expand -t 16
@@ -73,8 +73,12 @@ bench: $(VENV)/dev.stamp ## every benchmark, as tables
 	@for f in tests/benchmarks/bench_*.py; do \
 		name=$$(basename $$f .py | sed 's/^bench_//; s/_/-/g'); $(PY) -m app bench $$name || exit 1; done
 
-tables: $(VENV)/dev.stamp ## write the README's tables from docs/results
+tables: $(VENV)/dev.stamp ## write the tables of README and docs/world.md from docs/results
 	@$(PY) docs/make_tables.py
+	@$(PY) docs/make_world_page.py --page
+
+world: $(VENV)/dev.stamp ## measure and draw docs/world.md anew
+	@$(PY) docs/make_world_page.py
 
 lock: $(VENV)/dev.stamp ## resolve the lock files anew (UPGRADE=--upgrade: newest versions)
 	@$(PIP) install --quiet uv==$(UV)

@@ -4,6 +4,8 @@
 
 pick/numba           18-DoF person, exact distances of all capsule pairs, plain observations
 pick/numba-features  the same with every feature, as it is trained
+reach/numba          a walking cylinder, the goal box of METHOD 2.3, plain observations
+reach/numba-features the same with every feature
 fcl/pick             one environment on Pinocchio and python-fcl, see ``fcl_pick.py``
 mujoco/pick          MuJoCo: kinematics and ``mj_geomDistance`` of the same pairs
 mujoco/pick-sensors  MuJoCo: the same distances by sensors, all in one call
@@ -11,7 +13,7 @@ mujoco/pick-contacts MuJoCo: kinematics and ``mj_collision``, who touches but no
 
 The environments act at random, and episodes that end start anew. MuJoCo is posed along an
 episode recorded from the kernels and does less than they do, see ``mujoco_pick.py``. The column
-*slower* says how many times as many steps ``pick/numba`` makes.
+*slower* of the pick scenario's rows says how many times as many steps ``pick/numba`` makes.
 """
 
 import itertools
@@ -22,6 +24,7 @@ import numpy as np
 from app.sim.cells import load_cell
 from app.sim.pick import PickBatch, PickSettings
 from app.sim.ports import Vec
+from app.sim.reach import ReachBatch, ReachSettings
 from tests.benchmarks.fcl_pick import FclPick
 from tests.benchmarks.measure import (
     Row,
@@ -44,13 +47,22 @@ MUJOCO = {way: f"mujoco/pick-{way}" for way in WAYS} | {"distances": "mujoco/pic
 UNIT = "env-steps/cpu-s"
 
 
-def batched(name: str, settings: PickSettings, seed: int) -> Subject:
-    """Return the batched scenario, one call a step of all environments."""
-    batch = PickBatch(load_cell(), BATCH, seed, settings)
+def batched(name: str, batch: PickBatch | ReachBatch, n_joints: int, seed: int) -> Subject:
+    """Return a batched scenario, one call a step of all environments."""
     batch.reset()
     rng = np.random.default_rng(seed)
-    turn = itertools.cycle(rng.uniform(-1.0, 1.0, (64, BATCH, 5)).astype(np.float32))
+    turn = itertools.cycle(rng.uniform(-1.0, 1.0, (64, BATCH, n_joints)).astype(np.float32))
     return Subject(name=name, batch=BATCH, run=lambda: batch.step(next(turn)))
+
+
+def scenarios(seed: int) -> Iterator[Subject]:
+    """Yield both scenarios, with plain observations and with every feature."""
+    cell, other = load_cell(), load_cell("shared-workspace")
+    for name, seen in (("numba", "state"), ("numba-features", "features")):
+        pick = PickBatch(cell, BATCH, seed, PickSettings(observation=seen))
+        yield batched(f"pick/{name}", pick, 5, seed)
+        reach = ReachBatch(other, BATCH, seed, ReachSettings(observation=seen))
+        yield batched(f"reach/{name}", reach, 6, seed)
 
 
 def single(seed: int) -> Subject:
@@ -107,10 +119,8 @@ def measured(subjects: list[Subject], rounds: int, seconds: float) -> list[Row]:
 def main() -> None:
     """Measure and print."""
     options = arguments(BENCH)
-    plain = PickSettings(observation="state")
     subjects = [
-        batched("pick/numba", plain, options.seed),
-        batched("pick/numba-features", PickSettings(), options.seed),
+        *scenarios(options.seed),
         single(options.seed),
         *mujoco_peers(options.seed),
     ]

@@ -1,9 +1,8 @@
-"""The 18-DoF person written a second time, in plain numpy, as the reference for the kernels.
+"""The 18-DoF person a second time, in plain numpy: the reference for the kernels.
 
-A tree of homogeneous transforms from METHOD 3.4 and the numbers of the body
-(``kernels/body.py`` gives them, and nothing else is taken from there). A clavicle is a bar that
-turns about the torso's z by protraction and then lifts by elevation; it carries the shoulder's
-place, not its orientation.
+A tree of homogeneous transforms from METHOD 3.4; ``kernels/body.py`` gives the lengths, and
+nothing else is taken from there. A clavicle is a bar that turns about the torso's z by
+protraction and then lifts by elevation; it carries the shoulder's place, not its orientation.
 """
 
 import numpy as np

@@ -9,7 +9,7 @@ from app.sim.collision import CollisionReference
 from app.sim.contact import clearance, contact
 from app.sim.recheck import Recheck, Trajectory
 from app.sim.robot import Robot
-from app.sim.scene import NO_CYLINDERS, arm_of, people_of
+from app.sim.scene import NO_CYLINDERS, arm_of, people_of, with_people
 
 SUBSTEPS = 50
 """Rows per period of 50 ms: the referee looks every millisecond."""
@@ -117,3 +117,26 @@ def test_standing_still_at_home_reports_no_contact_and_the_distance(cell: Cell) 
     assert found.kind == "none"
     hull = CollisionReference(cell, "hull").distance(arm.home, human_q[0]).value
     assert found.clearance_m <= hull < found.clearance_m + EARLY
+
+
+def test_sweep_beside_walkers_is_never_later_than_poses_every_millisecond(cell: Cell) -> None:
+    cell = with_people(cell, ("walker", "walker"))
+    rng, robot, arm, people = np.random.default_rng(66), Robot(), arm_of(cell), people_of(cell)
+    nobody, zero, verdicts = np.zeros((0, 18)), np.zeros(6), []
+    for _ in range(300):
+        period = Period(cell, rng, robot, 1.0)
+        at = np.column_stack([rng.uniform(-0.9, 0.9, 2), rng.uniform(0.5, 1.6, 2)])
+        before = np.column_stack([at, rng.uniform(0.2, 0.5, 2)])
+        after = before + rng.uniform(-1.0, 1.0, (2, 3)) * [0.1, 0.1, 0.03]
+        found = contact(
+            arm, people, period.q, period.qd, period.c, zero, (nobody, nobody), (before, after)
+        )
+        touches = False
+        parts = np.linspace(0.0, 1.0, SUBSTEPS + 1)
+        for part, q in zip(parts, period.rows(SUBSTEPS).q_robot, strict=True):
+            free = clearance(arm, people, q, nobody, before + part * (after - before))
+            touches = touches or min(free.people_m, free.cell_m, free.self_m) <= 0.0
+        assert not (touches and found.kind == "none")
+        verdicts.append((found.kind != "none", touches))
+    reported, touching = np.mean(verdicts, axis=0)
+    assert 0.1 < touching <= reported < touching + 0.02

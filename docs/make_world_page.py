@@ -1,0 +1,147 @@
+"""Measure, draw and write ``docs/world.md``: what one needs to see to believe the simulator.
+
+    python docs/make_world_page.py          measure, draw and write
+    python docs/make_world_page.py --page   write the text again, from ``docs/results``
+
+Writes ``docs/results/world.json``, ``docs/img/world/*.png`` and the page: the text of
+``docs/world.template.md`` with those numbers and with tables from ``docs/results``. A test
+compares. Everything is seeded; takes about half a minute. Benchmarks are not run:
+``python -m app bench sim-steps --json > docs/results/sim-steps.json``, and ``sim-scaling``.
+"""
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT))
+
+from app.machine import describe  # noqa: E402 - the line above lets it be found
+from docs import world_measures, world_plots  # noqa: E402
+from docs.make_tables import render  # noqa: E402
+
+SEED = 11
+RESULTS, IMAGES = ROOT / "docs/results", ROOT / "docs/img/world"
+PAGE, TEMPLATE = ROOT / "docs/world.md", ROOT / "docs/world.template.md"
+SHARES = ("qd_share", "qdd_share", "jerk_share")
+Json = dict[str, Any]
+
+
+def values(world: Json, scaling: Json) -> Json:
+    """Return the numbers of the page, from the results' JSON and nothing else."""
+    machine, gap, limits, walk = (world[key] for key in ("machine", "gap", "limits", "walker"))
+    degrees = [limits["degree_2"], limits["degree_3"]]
+    costs = {row["name"]: row.get("us_per_step", 0.0) for row in scaling["results"]}
+    nobody = costs["pick/workers-0"]
+    shares = ", ".join(f"{100.0 * share:.0f}" for share in world["reach"]["table_share"])
+    return {
+        "seed": world["seed"],
+        "cpu": f"{machine['cores']} cores of {machine['cpu']}",
+        "commit": machine["commit"],
+        "n_capsules": world["references"]["capsules"],
+        "gap_n": gap["links"]["n"],
+        "gap_all": gap["all"]["n"],
+        "gap_near": gap["nearer_than_m"],
+        "gap_mean": gap["links"]["mean_mm"],
+        "gap_p95": gap["links"]["p95_mm"],
+        "gap_max": gap["links"]["max_mm"],
+        "gap_min": gap["links"]["min_mm"],
+        "gap_mean_all": gap["all"]["mean_mm"],
+        "hand_speed": world["fast_hands"]["speed_m_s"],
+        "hand_periods": world["fast_hands"]["periods"],
+        "hand_touching": world["fast_hands"]["touching"],
+        "hand_late": world["fast_hands"]["late"] or "None",
+        "hand_between": world["fast_hands"]["clear_at_ends"],
+        "hand_early": world["fast_hands"]["only_capsules"],
+        "ends": world["references"]["capsule_ends_m"],
+        "distances": world["references"]["distances_m"],
+        **{
+            key: world["references"][key]
+            for key in ("configurations", "overlapping", "pairs", "fcl_pairs")
+        },
+        "limits_cell": limits["cell"],
+        "dt_ms": 1e3 * limits["dt_s"],
+        "episodes": limits["episodes"],
+        "over": max(0.0, *(one["q_over_rad"] for one in degrees)),
+        "excess": max(0.0, *(one[name] - 1.0 for one in degrees for name in SHARES)),
+        "walk_s": walk["seconds"],
+        "walks": walk["walks"],
+        "v_min": walk["bounds_m_s"][0],
+        "v_max": walk["bounds_m_s"][1],
+        "v_low": walk["speed_m_s"][0],
+        "v_high": walk["speed_m_s"][1],
+        "standing": 100.0 * walk["standing_share"],
+        "r_low": walk["radius_m"][0],
+        "r_high": walk["radius_m"][1],
+        "override": "",
+        "heights": ", ".join(f"{z:g}" for z in world["reach"]["heights_m"]),
+        "table_share": shares,
+        "reach_cell": world["reach"]["cell"],
+        "worker_us": (costs["pick/workers-4"] - nobody) / 4.0,
+        "walker_us": (costs["pick/walkers-4"] - nobody) / 4.0,
+    }
+
+
+def page(results: Path) -> str:
+    """Return the page's text.
+
+    Args:
+        results: Folder of the JSON files.
+    """
+    read = {
+        name: json.loads((results / f"{name}.json").read_text(encoding="utf-8"))
+        for name in ("world", "sim-scaling")
+    }
+    text = TEMPLATE.read_text(encoding="utf-8")
+    return render(text.format(**values(read["world"], read["sim-scaling"])), results)
+
+
+def measure_and_draw() -> Json:
+    """Write the pictures; return the numbers."""
+    gap, postures = world_measures.mesh_gap(SEED)
+    world_plots.save(world_plots.mesh_gap, IMAGES / "mesh-gap.png", postures)
+    limits, *shown = world_measures.limits(SEED)
+    world_plots.save(world_plots.limits, IMAGES / "limits.png", *shown)
+    walker, *shown = world_measures.walker(SEED)
+    world_plots.save(world_plots.walker, IMAGES / "walker.png", *shown)
+    reach, maps = world_measures.reach()
+    world_plots.save(world_plots.reach, IMAGES / "reach.png", maps)
+    return {
+        "page": "world",
+        "seed": SEED,
+        "references": world_measures.references(),
+        "gap": gap,
+        "fast_hands": world_measures.fast_hands(SEED),
+        "limits": limits,
+        "walker": walker,
+        "reach": reach,
+        "machine": describe(),
+    }
+
+
+def draw_scaling() -> None:
+    """Draw what ``bench sim-scaling`` measured."""
+    scaling = json.loads((RESULTS / "sim-scaling.json").read_text(encoding="utf-8"))
+    world_plots.save(world_plots.scaling, IMAGES / "scaling.png", scaling["results"])
+
+
+def main() -> None:
+    """Measure, draw, write."""
+    parser = argparse.ArgumentParser(description="Write docs/world.md.")
+    parser.add_argument(
+        "--page", action="store_true", help="from docs/results, measuring nothing"
+    )
+    if not parser.parse_args().page:
+        text = json.dumps(measure_and_draw(), indent=1) + "\n"
+        (RESULTS / "world.json").write_text(text, encoding="utf-8")
+    draw_scaling()
+    PAGE.write_text(page(RESULTS), encoding="utf-8")
+    print(
+        f"{PAGE.relative_to(ROOT)}, {len(list(IMAGES.glob('*.png')))} pictures", file=sys.stderr
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,248 @@
+"""What ``docs/world.md`` shows, measured: numbers for its JSON, arrays for its pictures.
+
+Everything is seeded. Run by ``make_world_page.py``.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from app.sim.actions import ActionSettings
+from app.sim.cell_reach import Reach
+from app.sim.cells import Cell, load_cell
+from app.sim.kernels.arm import Arm, new_robot_pose, place_robot
+from app.sim.kernels.columns import ends_of
+from app.sim.kernels.kinematics import tcp_jacobian
+from app.sim.kernels.occupancy import WALKING
+from app.sim.occupancy import Walk, WalkerSettings, walk
+from app.sim.pick import step_robot
+from app.sim.recheck import robot_ends
+from app.sim.robot import Robot
+from app.sim.scene import arm_of
+from app.sim.shapes import TOOL, load_robot_capsules
+from tests.sim.configurations import CHUNK, N, configurations
+from tests.sim.fast_hands import HAND_SPEED, passes
+from tests.sim.mesh_gap import FARTHEST, Gap, gaps
+
+Json = dict[str, Any]
+POSTURES = 2000
+"""Working postures drawn for the gap of capsules and meshes."""
+EPISODES, PERIODS, HOLD = 40, 250, 15
+"""Random episodes whose limits are watched, periods of each, periods an action is held."""
+PER_PERIOD = 8
+"""Places in a period at which speeds and accelerations are looked at."""
+PASSES = 400
+"""Hands that fly past the arm."""
+HEIGHTS = (0.05, 0.12, 0.30, 0.35, 0.45)
+"""Heights over the table of the maps of reach [m]."""
+EXTENT, GRID = (-1.4, 1.4, -0.8, 1.4), 0.02
+"""Edges of these maps, x from, to, y from, to, and their mesh [m]."""
+
+
+def references() -> Json:
+    """Return how far the kernels are from Pinocchio and from plain numpy at most."""
+    arm, robot, capsules = arm_of(load_cell()), Robot(), load_robot_capsules()
+    pose, links = new_robot_pose(arm), 0.0
+    q = np.random.default_rng(52).uniform(arm.q_min, arm.q_max, (N, 6))
+    p0, p1 = robot_ends(robot, capsules, q)
+    for row, start, end in zip(q, p0, p1, strict=True):
+        place_robot(arm, row, pose)
+        found = ends_of(pose.columns, len(capsules.name))
+        links = max(links, np.abs(found[:, 0] - start).max(), np.abs(found[:, 1] - end).max())
+    pairs, overlaps = 0.0, 0
+    for case in configurations():
+        pairs = max(pairs, np.abs(case.d - case.expected).max())
+        overlaps += int(case.clearance < 0.0)
+    return {
+        "capsules": len(capsules.name),
+        "configurations": N,
+        "pairs": N * case.d.size,
+        "fcl_pairs": CHUNK * case.d.size + N,
+        "overlapping": overlaps,
+        "capsule_ends_m": float(links),
+        "distances_m": float(pairs),
+    }
+
+
+def mesh_gap(seed: int) -> tuple[Json, list[Gap]]:
+    """Return what capsules add to raw meshes [mm], and every posture looked at."""
+    cell = load_cell()
+    found = gaps(cell, arm_of(cell), POSTURES, seed)
+    groups = {"all": found, "links": [one for one in found if one.nearest != TOOL]}
+    numbers: Json = {"drawn": POSTURES, "nearer_than_m": FARTHEST}
+    for name, group in groups.items():
+        gap = np.array([1e3 * (one.meshes - one.capsules) for one in group])
+        numbers[name] = {
+            "n": len(gap),
+            "mean_mm": float(gap.mean()),
+            "median_mm": float(np.median(gap)),
+            "p95_mm": float(np.percentile(gap, 95)),
+            "max_mm": float(gap.max()),
+            "min_mm": float(gap.min()),
+        }
+    return numbers, found
+
+
+def fast_hands(seed: int) -> Json:
+    """Return how many hands that fly past the arm are found, and how many too late."""
+    found = list(passes(load_cell(), PASSES, seed))
+    touching = [one for one in found if one.touching is not None]
+    late = [one.reported is None or one.reported > one.touching + 1e-3 for one in touching]
+    return {
+        "speed_m_s": HAND_SPEED,
+        "periods": len(found),
+        "touching": len(touching),
+        "clear_at_ends": sum(one.clear_at_ends for one in touching),
+        "late": sum(late),
+        "only_capsules": sum(
+            one.touching is None and one.reported is not None for one in found
+        ),
+    }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Episode:
+    """One episode of random actions, looked at many times in each period."""
+
+    time: np.ndarray
+    """Time [s], shape (n,)."""
+    q: np.ndarray
+    """Joint positions [rad], shape (n, 6)."""
+    qd: np.ndarray
+    """Speeds [rad/s], shape (n, 6)."""
+    qdd: np.ndarray
+    """Accelerations [rad/s^2], shape (n, 6)."""
+    jerk: np.ndarray
+    """Jerks [rad/s^3], shape (n, 6); 0 inside the periods of degree 2."""
+
+
+def episode(arm: Arm, degree: int, seed: int) -> Episode:
+    """Return an episode in which each joint is pushed one way for a while, then another."""
+    rng, action = np.random.default_rng(seed), ActionSettings(degree=degree)
+    q, qd, qdd = arm.home.copy(), np.zeros(6), np.zeros(6)
+    x = (np.arange(PER_PERIOD) + 1.0)[:, None] * (arm.dt / PER_PERIOD)
+    rows: list[tuple[np.ndarray, ...]] = []
+    for period in range(PERIODS):
+        if period % HOLD == 0:
+            act = rng.choice([-1.0, 1.0, rng.uniform(-1.0, 1.0)], 6)
+        piece = step_robot(arm, q, qd, qdd, act, action)
+        c, d = piece.c, piece.d
+        rows.append(
+            (
+                period * arm.dt + x[:, 0],
+                q + x * (qd + x * (c + x * d)),
+                qd + x * (2.0 * c + 3.0 * x * d),
+                2.0 * c + 6.0 * x * d,
+                np.tile(6.0 * d, (PER_PERIOD, 1)),
+            )
+        )
+        q, qd, qdd = piece.q, piece.qd, piece.qdd
+    joined = [np.concatenate(parts) for parts in zip(*rows, strict=True)]
+    return Episode(time=joined[0], q=joined[1], qd=joined[2], qdd=joined[3], jerk=joined[4])
+
+
+def limits(seed: int) -> tuple[Json, Arm, dict[int, Episode]]:
+    """Return how near random episodes come to the limits, and one of each degree."""
+    arm = arm_of(load_cell("shared-workspace"))
+    numbers: Json = {"cell": "shared-workspace", "dt_s": arm.dt}
+    numbers |= {"episodes": EPISODES, "periods": PERIODS}
+    shown = {}
+    for degree in (2, 3):
+        worst = {"q_over_rad": -np.inf, "qd_share": 0.0, "qdd_share": 0.0, "jerk_share": 0.0}
+        for number in range(EPISODES):
+            one = episode(arm, degree, seed + number)
+            shown.setdefault(degree, one)
+            over = np.maximum(one.q - arm.q_max, arm.q_min - one.q).max()
+            worst["q_over_rad"] = max(worst["q_over_rad"], float(over))
+            pairs = (("qd", arm.qd_max), ("qdd", arm.qdd_max), ("jerk", arm.jerk_max))
+            for name, limit in pairs:
+                share = float((np.abs(getattr(one, name)) / limit).max())
+                worst[f"{name}_share"] = max(worst[f"{name}_share"], share)
+        numbers[f"degree_{degree}"] = worst
+    return numbers, arm, shown
+
+
+def walker(seed: int, seconds: float = 15.0) -> tuple[Json, Walk, WalkerSettings]:
+    """Return what the cylinder keeps to over many walks, and one that shows it all.
+
+    The walk returned is the first that never stays and is both clipped and stands at times.
+    """
+    settings = WalkerSettings()
+    many = [walk(settings, seed, seconds, episode=k) for k in range(200)]
+    speeds = [np.hypot(*one.velocity.T) for one in many]
+    shown = next(
+        one
+        for one, speed in zip(many, speeds, strict=True)
+        if (one.gait == WALKING).all() and speed.min() == 0.0 and speed.max() > 0.999
+    )
+    speed = np.concatenate(speeds)
+    radius = np.concatenate([one.radius for one in many])
+    place = np.concatenate([one.position for one in many])
+    numbers = {
+        "walks": len(many),
+        "seconds": seconds,
+        "bounds_m_s": [settings.v_min, settings.v_max],
+        "speed_m_s": [float(speed[speed > 0.0].min()), float(speed.max())],
+        "standing_share": float((speed == 0.0).mean()),
+        "radius_m": [float(radius.min()), float(radius.max())],
+        "x_m": [float(place[:, 0].min()), float(place[:, 0].max())],
+        "y_m": [float(place[:, 1].min()), float(place[:, 1].max())],
+    }
+    return numbers, shown, settings
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReachMap:
+    """Where the tool can point down at one height."""
+
+    z: float
+    """Height over the table [m]."""
+    slowest: np.ndarray
+    """How fast the tcp moves in its slowest direction per joint speed [m/rad], shape (ny, nx);
+    NaN where it cannot be."""
+    blocked: np.ndarray
+    """Where a posture exists but touches table or robot, shape (ny, nx)."""
+
+
+def grid() -> tuple[np.ndarray, np.ndarray]:
+    """Return the middles of the maps' meshes along x and y [m]."""
+    left, right, near, far = EXTENT
+    xs = np.arange(left + 0.5 * GRID, right, GRID)
+    return xs, np.arange(near + 0.5 * GRID, far, GRID)
+
+
+def reach_map(cell: Cell, z: float) -> ReachMap:
+    """Return where the robot of a cell reaches at a height, the tool pointing down."""
+    reach, arm, robot = Reach(cell), arm_of(cell), Robot(cell.robot.tool_length)
+    pose = new_robot_pose(arm)
+    xs, ys = grid()
+    slowest = np.full((len(ys), len(xs)), np.nan)
+    blocked = np.zeros(slowest.shape, dtype=bool)
+    for i, j in np.ndindex(slowest.shape):
+        point = np.array([xs[j], ys[i], z])
+        found = reach.tool_down(point).q
+        if found is None:
+            blocked[i, j] = robot.ik_vertical(point, arm.q_min, arm.q_max) is not None
+            continue
+        place_robot(arm, found, pose)
+        tcp_jacobian(pose.rot, pose.pos, pose.tcp, pose.jacobian)
+        slowest[i, j] = np.linalg.svd(pose.jacobian, compute_uv=False)[-1]
+    return ReachMap(z=z, slowest=slowest, blocked=blocked)
+
+
+def reach() -> tuple[Json, list[ReachMap]]:
+    """Return the maps at all heights, the area reached and the share of the table's top."""
+    cell = load_cell()
+    maps, table, (xs, ys) = [reach_map(cell, z) for z in HEIGHTS], cell.table, grid()
+    over = (xs >= table.x_min) & (xs <= table.x_max)
+    over = over & ((ys >= table.y_min) & (ys <= table.y_max))[:, None]
+    there = [np.isfinite(one.slowest) for one in maps]
+    numbers = {
+        "cell": cell.name,
+        "grid_m": GRID,
+        "heights_m": list(HEIGHTS),
+        "area_m2": [float(one.sum()) * GRID**2 for one in there],
+        "table_share": [float(one[over].mean()) for one in there],
+    }
+    return numbers, maps
