@@ -205,11 +205,12 @@ def run_evaluate(options: argparse.Namespace) -> int:
     import torch
 
     from app.machine import describe
-    from app.policies.evaluation.protocols import PROTOCOLS, evaluate
+    from app.policies.evaluation.protocols import PROTOCOLS, WITHOUT_CHECKPOINT, evaluate
 
     if options.protocol not in PROTOCOLS:
         raise NotFound("protocol", options.protocol, tuple(PROTOCOLS))
-    checkpoint = find_checkpoint(options.checkpoint, settings)
+    none = options.protocol in WITHOUT_CHECKPOINT
+    checkpoint = None if none else find_checkpoint(options.checkpoint, settings)
     torch.set_num_threads(1)
     result = evaluate(
         options.protocol, checkpoint, episodes=options.episodes, seed=options.seed
@@ -315,7 +316,8 @@ def table(result: Mapping[str, Any]) -> str:
         for line in lines
     ]
     head = f"{result['protocol']}, seed {result['seed']}, {result['episodes']} episodes"
-    return "\n".join([head, f"checkpoint {result['checkpoint']}", "", *texts])
+    tested = [f"checkpoint {result['checkpoint']}"] if "checkpoint" in result else []
+    return "\n".join([head, *tested, "", *texts])
 
 
 def shown(value: Any) -> str:

@@ -7,32 +7,39 @@ from typing import Any
 
 from app.errors import InvalidInput, NotFound
 from app.policies.checkpoint import Checkpoint
-from app.policies.evaluation import pick
+from app.policies.evaluation import pick, safety
 
 Protocol = Callable[..., dict[str, Any]]
 
 PROTOCOLS: Mapping[str, Protocol] = MappingProxyType(
-    {"pick-single": pick.run_single, "pick-choice": pick.run_choice}
+    {
+        "pick-single": pick.run_single,
+        "pick-choice": pick.run_choice,
+        "safety-ssm": safety.run_safety,
+    }
 )
 """Protocol by name; each takes a checkpoint, ``episodes`` and ``seed``."""
+WITHOUT_CHECKPOINT = frozenset({"safety-ssm"})
+"""Protocols in which no policy takes part."""
 MAX_EPISODES = 100_000
 """Most episodes of one evaluation."""
 
 
 def evaluate(
-    name: str, checkpoint: Checkpoint, *, episodes: int | None = None, seed: int = 11
+    name: str, checkpoint: Checkpoint | None, *, episodes: int | None = None, seed: int = 11
 ) -> dict[str, Any]:
     """Run a protocol and return its result, ready for JSON.
 
     Args:
         name: Name of the protocol.
-        checkpoint: What is evaluated.
+        checkpoint: What is evaluated; None only where no policy takes part.
         episodes: Number of episodes; the protocol's own number by default.
         seed: Seed of the episodes.
 
     Raises:
         NotFound: No protocol has that name.
-        InvalidInput: The number of episodes or the seed cannot be used.
+        InvalidInput: The number of episodes or the seed cannot be used, or there is no
+            checkpoint.
     """
     if name not in PROTOCOLS:
         raise NotFound("protocol", name, tuple(PROTOCOLS))
@@ -40,13 +47,20 @@ def evaluate(
         raise InvalidInput("episodes", episodes, f"must lie in [1, {MAX_EPISODES}]")
     if not 0 <= seed < 2**31:
         raise InvalidInput("seed", seed, "must lie in [0, 2^31)")
+    if checkpoint is None and name not in WITHOUT_CHECKPOINT:
+        raise InvalidInput("checkpoint", None, f"must name a checkpoint for {name}")
+    tested = {} if name in WITHOUT_CHECKPOINT else _identity(checkpoint)
     started = time.process_time()
     outcome = PROTOCOLS[name](checkpoint, episodes=episodes, seed=seed)
     return {
         "protocol": name,
-        "checkpoint": checkpoint.sha256,
+        **tested,
         "seed": seed,
         "episodes": outcome["results"][0]["n"],
         **outcome,
         "cpu_seconds": round(time.process_time() - started, 2),
     }
+
+
+def _identity(checkpoint: Checkpoint | None) -> dict[str, str]:
+    return {} if checkpoint is None else {"checkpoint": checkpoint.sha256}
