@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from app.machine import describe  # noqa: E402 - the line above lets it be found
-from docs import world_measures, world_plots  # noqa: E402
+from docs import world_measures, world_override, world_plots  # noqa: E402
 from docs.make_tables import render  # noqa: E402
 
 SEED = 11
@@ -75,12 +75,28 @@ def values(world: Json, scaling: Json) -> Json:
         "standing": 100.0 * walk["standing_share"],
         "r_low": walk["radius_m"][0],
         "r_high": walk["radius_m"][1],
-        "override": "",
+        **visit_values(world["visit"]),
         "heights": ", ".join(f"{z:g}" for z in world["reach"]["heights_m"]),
         "table_share": shares,
         "reach_cell": world["reach"]["cell"],
         "worker_us": (costs["pick/workers-4"] - nobody) / 4.0,
         "walker_us": (costs["pick/walkers-4"] - nobody) / 4.0,
+    }
+
+
+def visit_values(visit: Json) -> Json:
+    """Return the numbers of the section on a person who walks in."""
+    settings = visit["settings"]
+    return {
+        "visit_cell": visit["cell"],
+        "visit_speed": visit["person_peak_m_s"],
+        "v_h": settings["human_speed [m/s]"],
+        "reaction": settings["reaction_time [s]"],
+        "protective": settings["protective_distance [m]"],
+        "below_half": visit["below_half_s"],
+        "stopped": visit["stopped_s"],
+        "moving": visit["least_separation_moving_m"],
+        "resting": visit["least_separation_m"],
     }
 
 
@@ -106,6 +122,8 @@ def measure_and_draw() -> Json:
     world_plots.save(world_plots.limits, IMAGES / "limits.png", *shown)
     walker, *shown = world_measures.walker(SEED)
     world_plots.save(world_plots.walker, IMAGES / "walker.png", *shown)
+    visit, seen = world_override.visit()
+    world_plots.save(world_override.draw, IMAGES / "override.png", seen)
     reach, maps = world_measures.reach()
     world_plots.save(world_plots.reach, IMAGES / "reach.png", maps)
     return {
@@ -116,6 +134,7 @@ def measure_and_draw() -> Json:
         "fast_hands": world_measures.fast_hands(SEED),
         "limits": limits,
         "walker": walker,
+        "visit": visit,
         "reach": reach,
         "machine": describe(),
     }
