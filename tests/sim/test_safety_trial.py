@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from app.errors import InvalidInput
+from app.sim.actions import ActionSettings
 from app.sim.safety import SafetySettings
 from app.sim.safety_trial import MODES, POLICIES, TrialSettings, run_trial
 
@@ -37,6 +38,17 @@ def test_outside_the_assumptions_robots_in_motion_are_met(place):
     fast = run_trial(replace(place, human_speed=2.5), 200, seed=7)
     assert fast.n_moving > 20
     assert 2.4 < fast.fastest_person <= 2.5
+
+
+@PLACES
+def test_people_three_percent_faster_than_assumed_are_enough_to_be_met_in_motion(place):
+    """So the trial is hard and the rule no more cautious than it must be."""
+    assert run_trial(replace(place, human_speed=1.65), 500, seed=7).n_moving > 10
+
+
+def test_jerk_limited_policies_are_stopped_in_time_too():
+    cubic = replace(WALKER, action=ActionSettings(degree=3))
+    assert run_trial(cubic, 300, seed=4).n_moving == 0
 
 
 @PLACES

@@ -137,3 +137,22 @@ def test_what_is_executed_keeps_speed_acceleration_and_continuity():
         assert pose == pytest.approx(space.q, abs=1e-15)
         assert speed == pytest.approx(space.qd, abs=1e-15)
     assert seen == {"stop", "full", "scaled"}
+
+
+def test_joint_limits_hold_whatever_is_commanded_and_whoever_appears():
+    rng, space = np.random.default_rng(8), watch.new_watch(ARM, 8, 0)
+    rule, closest, rates = watch.Safety(0.4, 0.0, 0.02, np.zeros(8)), np.inf, []
+    q, qd, none = np.array(ARM.home), np.zeros(6), np.zeros(6)
+    for k in range(3000):
+        if k % 40 == 0:
+            sign = rng.choice([-1.0, 1.0], 6)
+        target = np.clip(sign * ARM.qd_max, qd - ARM.qdd_max * 0.05, qd + ARM.qdd_max * 0.05)
+        c = 0.5 * (target - qd) / ARM.dt
+        rates.append(
+            ssm.decide(ARM, rule, 0.0, spheres(rng), NO_CYLINDERS, q, qd, c, none, space)
+        )
+        q, qd = space.q.copy(), space.qd.copy()
+        closest = min(closest, (ARM.q_max - q).min(), (q - ARM.q_min).min())
+        assert (np.abs(qd) <= ARM.qd_max + 1e-9).all()
+    assert -1e-9 <= closest < 0.05
+    assert 0.05 < np.mean(np.array(rates) == 0.0) < 0.95
