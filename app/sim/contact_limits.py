@@ -9,6 +9,8 @@ counts. The speed is relative; as usual only the robot's is counted, as if the p
 
 Source: ISO/TS 15066:2016, annex A: table A.2 (forces, pressures, factors of transient contact)
 and A.3 (masses, stiffnesses), eq. (A.3) to (A.6). The limits are those of the onset of pain.
+Before anybody relies on a figure it is to be checked against the text of the standard, which is
+not freely available.
 """
 
 import math
