@@ -23,9 +23,9 @@ from app.sim.kernels import body
 from app.sim.keypoints import K
 from app.sim.ports import Vec
 
-POLE_WEIGHT = 0.03
-"""Distance of the elbow from the line shoulder - wrist below which its seen direction counts
-less than its last one [m]: with a nearly straight arm it is all noise."""
+POLE_MEMORY = 0.04
+"""Distance of the elbow from the line shoulder - wrist below which its last direction counts
+too, the more the nearer [m]: with a nearly straight arm the seen one is all noise."""
 _SHORTEST = math.sqrt(
     body.UPPER_ARM**2
     + body.FOREARM**2
@@ -61,7 +61,7 @@ def joint_angles(points: Vec, q_before: Vec, pelvis_z: float) -> tuple[Vec, Mask
     torso = human.body_frames(q, pelvis_z)["torso"][:3, :3]
     for first, hand, side in ((6, "r", -1.0), (8, "l", 1.0)):
         shoulder = torso.T @ (points[K[f"shoulder_{hand}"]] - points[K["neck"]])
-        if np.isnan(shoulder).any():
+        if not np.linalg.norm(shoulder) > 1e-6:  # NaN, or all in one place.
             held[first : first + 2] = True
             continue
         q[first] = math.atan2(shoulder[0], max(side * shoulder[1], 1e-6))
@@ -83,7 +83,7 @@ def _either(point: Vec, right: Vec, left: Vec) -> Vec:
 
 
 def _across(points: Vec, part: str, middle: str) -> Vec:
-    """Return the direction from right to left of a pair, from its middle where one is missing."""
+    """Return the way from right to left of a pair, or from its middle where one is missing."""
     right, left, center = (points[K[name]] for name in (f"{part}_r", f"{part}_l", middle))
     for vector in (left - right, left - center, center - right):
         if not np.isnan(vector).any():
@@ -115,7 +115,7 @@ def _place_trunk(q: Vec, held: Mask, points: Vec, spine: Vec) -> None:
         held[2] = True
         if not np.isnan(shoulders).any():  # The hips are hidden: the trunk keeps its twist.
             q[2] = _near(math.atan2(-shoulders[0], shoulders[1]) - q[5], q[2])
-    if np.isnan(spine).any():
+    if not np.linalg.norm(spine) > 1e-6:  # NaN, or all in one place.
         held[3:6] = True
         return
     c, s = math.cos(q[2]), math.sin(q[2])
@@ -170,11 +170,12 @@ def _arm(
 def _pole(line: Vec, elbow: Vec, last: Vec, torso: Vec) -> Vec:
     """Return the unit vector, normal to ``line``, toward which the elbow points."""
     pole = elbow - (elbow @ line) * line
+    weight = max(0.0, POLE_MEMORY - float(np.linalg.norm(pole)))
     for other in (last, -torso[:, 0], -torso[:, 2]):
         across = other - (other @ line) * line
         size = np.linalg.norm(across)
         if size > 1e-6:
-            pole = pole + POLE_WEIGHT * across / size
+            pole = pole + weight * across / size
             break
     if np.linalg.norm(pole) < 1e-9:  # Seen and last direction are opposite and equal.
         pole = np.cross(line, torso[:, 1] if abs(line @ torso[:, 1]) < 0.9 else torso[:, 2])

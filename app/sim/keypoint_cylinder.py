@@ -17,7 +17,9 @@ stand below the hips (tables hide them as a rule).
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
+from app.errors import InvalidInput
 from app.sim.keypoints import BODY_25, N_KEYPOINTS, K
 from app.sim.ports import Vec
 
@@ -29,12 +31,18 @@ RADIUS_FACTOR = 1.1
 class CylinderSettings:
     """What is ours about the safety cylinder."""
 
-    flesh_margin: float = 0.12
-    """Added to the radius and to the top [m]. Our body has 0.15 m of flesh around the chest
-    and 0.195 m of hand beyond the wrist; the factor 1.1 gives the rest."""
+    flesh_margin: float = 0.15
+    """Added to the radius and to the top [m]. Around exact key-points of a person at work,
+    0.133 m hold the whole surface of our body: crown and fingertips ask for most."""
     growth: float = 1.6
     """Speed at which the radius grows while nothing is seen and the hold time is over [m/s];
     walking speed of ISO 13855."""
+
+    def __post_init__(self) -> None:
+        for name in ("flesh_margin", "growth"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value >= 0.0):
+                raise InvalidInput(name, value, "must be finite and not negative")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,7 +61,7 @@ class SafetyCylinder:
     """Velocity of the axis [m/s], shape (2,)."""
 
     def contains(self, points: Vec) -> bool:
-        """Return whether all points [m], shape (n, 3), are beside the axis and below the top."""
+        """Return whether no point [m], shape (n, 3), is beyond the radius or above the top."""
         away = np.linalg.norm(points[:, :2] - self.center, axis=1)
         return bool((away <= self.radius).all() and (points[:, 2] <= self.top).all())
 
@@ -124,7 +132,7 @@ def safety_cylinder(
     Source: METHOD 2.8. Deviates: see the head of this file.
     """
     settings = settings or CylinderSettings()
-    seen = np.isfinite(points).all(axis=1)
+    seen = np.asarray(np.isfinite(points).all(axis=1))
     if not seen.any():
         return None
     corners = bounding_box(points[seen])
@@ -141,13 +149,13 @@ def safety_cylinder(
     )
 
 
-def _unseen_reach(points: Vec, seen: Vec, center: Vec) -> tuple[float, float]:
+def _unseen_reach(points: Vec, seen: NDArray[np.bool_], center: Vec) -> tuple[float, float]:
     """Return how far from the axis and how high unseen arms and heads may be [m]."""
     unseen = [k for k in _BOUNDED if not seen[k]]
     if not unseen:
         return 0.0, -np.inf
     there = np.flatnonzero(seen)
-    ways = _WAYS[np.ix_(unseen, there)]
+    ways = _WAYS[unseen][:, there]
     if not np.isfinite(ways).any():  # Only legs are seen: the whole person is above them.
         ways = np.full_like(ways, _WAYS[K["wrist_r"], K["mid_hip"]] + 1.0)
     away = np.linalg.norm(points[there, :2] - center, axis=1)

@@ -8,18 +8,19 @@ white acceleration:
     Q = a^2 [dt^4/4, dt^3/2; dt^3/2, dt^2].
 
 The three axes of a point share one covariance. A measurement farther from the prediction than
-``gate + max_speed dt`` is refused: the point then counts as unseen, and is taken anew once the
-hold time is over.
+``gate + max_speed dt``, with dt since it was last offered, is refused: the point then counts as
+unseen, and is taken anew once the hold time is over.
 
 Source: Bar-Shalom et al., Estimation with Applications to Tracking and Navigation (2001),
 ch. 6; the forgetting speed is Singer's idea (1970) one order lower.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
+from app.errors import InvalidInput
 from app.sim.ports import Vec
 
 
@@ -29,7 +30,7 @@ class FilterSettings:
 
     noise: float = 0.02
     """Standard deviation of a measurement at confidence 1, per axis [m]."""
-    acceleration: float = 4.0
+    acceleration: float = 2.5
     """Standard deviation of the driving acceleration, per axis [m/s^2]."""
     memory_s: float = 0.4
     """Time constant tau of the speed [s]."""
@@ -39,6 +40,12 @@ class FilterSettings:
     """Distance from the prediction at which a measurement is refused at once [m]."""
     max_speed: float = 4.0
     """Speed that widens the gate with the time since the point was seen [m/s]."""
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            value = getattr(self, item.name)
+            if not (np.isfinite(value) and value > 0.0):
+                raise InvalidInput(item.name, value, "must be finite and greater than 0")
 
 
 class PointFilter:
@@ -55,6 +62,7 @@ class PointFilter:
         """Time of the last update [s]."""
         self.seen_at = np.full(n, -np.inf)
         """When each point was last seen [s], shape (n,)."""
+        self._offered_at = np.full(n, -np.inf)
         self._p, self._v = np.full((n, 3), np.nan), np.zeros((n, 3))
         self._cov = np.zeros((n, 3))  # of position, position and speed, speed
 
@@ -76,8 +84,11 @@ class PointFilter:
         e = float(np.exp(-max(t - self.t, 0.0) / tau))
         return e, tau * (1.0 - e)
 
-    def refused(self, t: float, points: Vec) -> NDArray[np.bool_]:
+    def refuse(self, t: float, points: Vec) -> NDArray[np.bool_]:
         """Return which measurements are too far from where they were expected, shape (n,).
+
+        The gate widens while a point is unseen, not while it is refused: who stays where
+        nobody can have got to is not believed for waiting.
 
         Args:
             t: Time [s].
@@ -85,8 +96,10 @@ class PointFilter:
         """
         away = np.linalg.norm(points - self.at(t)[0], axis=1)
         with np.errstate(invalid="ignore"):
-            reach = self.settings.gate + self.settings.max_speed * (t - self.seen_at)
-            return np.asarray(away > reach)
+            since = t - np.maximum(self._offered_at, self.seen_at)
+            too_far = np.asarray(away > self.settings.gate + self.settings.max_speed * since)
+        self._offered_at[np.isfinite(points).all(axis=1)] = t
+        return too_far
 
     def update(self, t: float, points: Vec, confidences: Vec) -> None:
         """Take one frame in.

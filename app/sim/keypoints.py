@@ -66,7 +66,7 @@ _ANKLE, _HEEL, _BIG_TOE, _SMALL_TOE = (
     (0.17, 1, 0.02),
     (0.13, -1, 0.02),
 )
-"""Foot under the hip: forward [m], side toward the other foot (1 or -1), above the floor [m]."""
+"""Foot under the hip: forward [m], toward the other foot (1 or -1), above the floor [m]."""
 _HALF_FOOT = 0.035
 """Half the distance of big and small toe [m]."""
 
@@ -100,7 +100,10 @@ class Keypoints:
 
 
 def check_keypoints(
-    keypoints: ArrayLike, confidences: ArrayLike | None = None, min_confidence: float = 0.1
+    keypoints: ArrayLike,
+    confidences: ArrayLike | None = None,
+    min_confidence: float = 0.1,
+    place: str = "",
 ) -> Keypoints:
     """Check one frame of one person as it comes from outside.
 
@@ -111,21 +114,23 @@ def check_keypoints(
         keypoints: Order of BODY_25, cell's frame [m], shape (25, 3).
         confidences: Trust in each in [0, 1], shape (25,); 1 where None.
         min_confidence: Trust below which a key-point counts as missing.
+        place: Put before the field's name in errors, such as ``"people[1]."``.
 
     Raises:
         InvalidInput: Not numbers, another shape, infinite, confidences outside [0, 1], or not
             a person in metres.
     """
-    points = _numbers("keypoints", keypoints, (N_KEYPOINTS, 3))
+    points = _numbers(f"{place}keypoints", keypoints, (N_KEYPOINTS, 3))
     trust = np.ones(N_KEYPOINTS)
     if confidences is not None:
-        trust = np.nan_to_num(_numbers("confidences", confidences, (N_KEYPOINTS,)), nan=0.0)
+        given = _numbers(f"{place}confidences", confidences, (N_KEYPOINTS,))
+        trust = np.nan_to_num(given, nan=0.0)
         if trust.min() < 0.0 or trust.max() > 1.0:
             wrong = trust[(trust < 0.0) | (trust > 1.0)]
-            raise InvalidInput("confidences", float(wrong[0]), "must lie in [0, 1]")
+            raise InvalidInput(f"{place}confidences", float(wrong[0]), "must lie in [0, 1]")
     missing = ~np.isfinite(points).all(axis=1) | (points == 0.0).all(axis=1)
     missing |= trust < max(min_confidence, 1e-6)
-    strays = _strays(points, ~missing)
+    strays = _strays(points, ~missing, place)
     missing[strays] = True
     points[missing], trust[missing] = np.nan, 0.0
     return Keypoints(
@@ -146,7 +151,7 @@ def _numbers(field: str, values: ArrayLike, shape: tuple[int, ...]) -> Vec:
     return array
 
 
-def _strays(points: Vec, seen: NDArray[np.bool_]) -> NDArray[np.int64]:
+def _strays(points: Vec, seen: NDArray[np.bool_], place: str) -> NDArray[np.int64]:
     """Return the indices of key-points far from the others, after a check of the unit."""
     there = np.flatnonzero(seen)
     if len(there) == 0:
@@ -156,7 +161,7 @@ def _strays(points: Vec, seen: NDArray[np.bool_]) -> NDArray[np.int64]:
         rule = (
             f"must be within {FARTHEST_M:g} m of the robot, in metres (are these millimetres?)"
         )
-        raise InvalidInput("keypoints", largest, rule)
+        raise InvalidInput(f"{place}keypoints", largest, rule)
     away = np.linalg.norm(points[there] - np.median(points[there], axis=0), axis=1)
     if len(there) < _ENOUGH:
         return np.zeros(0, dtype=np.int64)
@@ -166,8 +171,8 @@ def _strays(points: Vec, seen: NDArray[np.bool_]) -> NDArray[np.int64]:
             f"is the median distance of the key-points from their middle; a person's lies in "
             f"[{least:g}, {most:g}] m (other units?)"
         )
-        raise InvalidInput("keypoints", round(size, 4), rule)
-    return there[away > STRAY_M]
+        raise InvalidInput(f"{place}keypoints", round(size, 4), rule)
+    return np.asarray(there[away > STRAY_M])
 
 
 def keypoints_of(q: Vec, pelvis_z: float, floor_z: float) -> Vec:
@@ -233,7 +238,7 @@ def faces_backward(points: Vec, group: Group) -> bool:
         points: Key-points [m], shape (25, 3), NaN where missing.
         group: ``"arms"`` or ``"legs"``; the face itself is never contradicted.
     """
-    if group == "face":
+    if group == "face":  # Nose and ears decide, and they say nothing about themselves.
         return False
     if group == "arms":
         across = points[K["shoulder_l"]] - points[K["shoulder_r"]]

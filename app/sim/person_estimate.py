@@ -10,7 +10,7 @@ How it degrades, each step named in the estimate:
 
 - a key-point missing: carried on for ``hold_s``; then the joints it decides keep their angles
   (``held``) and the cylinder widens to where it can be;
-- arms, legs or face with sides exchanged: exchanged back (``arms-swapped``, ...); if that goes
+- arms or legs with sides exchanged: exchanged back (``arms-swapped``, ...); if that goes
   on for ``swap_s``, the group starts anew, judged by the way the person faces
   (``sides-restarted``);
 - most key-points farther away than a person moves: the frame is refused (``jump``); after
@@ -19,13 +19,10 @@ How it degrades, each step named in the estimate:
   speed and the joints rest;
 - the model fits the key-points badly: ``misfit`` (a person of another size, a bad tracker).
 
-Several people: :class:`PeopleEstimator` gives each frame's people to the tracks they continue,
-so exchanged people are put right and named (``people-swapped``).
+Several people: ``people_estimate.py``.
 """
 
-import itertools
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -59,7 +56,6 @@ Flag = Literal[
     "never-seen",
     "arms-swapped",
     "legs-swapped",
-    "face-swapped",
     "sides-restarted",
     "people-swapped",
     "outliers",
@@ -68,14 +64,9 @@ Flag = Literal[
     "stale",
     "misfit",
 ]
-_SWAPPED: dict[Group, Flag] = {
-    "arms": "arms-swapped",
-    "legs": "legs-swapped",
-    "face": "face-swapped",
-}
-_FITTED = tuple(
-    ["neck", *(f"{part}_{s}" for part in ("shoulder", "elbow", "wrist") for s in "rl")]
-)
+_SWAPPED: dict[Group, Flag] = {"arms": "arms-swapped", "legs": "legs-swapped"}
+"""Groups whose sides are judged; eyes and ears are too near each other, and decide nothing."""
+_FITTED = ("neck", *(f"{part}_{s}" for part in ("shoulder", "elbow", "wrist") for s in "rl"))
 """Key-points that are joints of the model, besides the pelvis, whose height is given."""
 _STEP_S = 0.005
 """Step of the derivative of the joint angles [s]."""
@@ -98,7 +89,13 @@ class EstimatorSettings:
     misfit: float = 0.10
     """Median distance of the model's joints from the key-points that is named [m]."""
     qd_max: float = 8.0
-    """Bound of estimated joint speeds [rad/s, m/s]; faster ones are noise near a singularity."""
+    """Bound of estimated joint speeds [rad/s, m/s]; faster is noise near a singularity."""
+
+    def __post_init__(self) -> None:
+        for name in ("min_confidence", "stale_s", "swap_s", "misfit", "qd_max"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise InvalidInput(name, value, "must be finite and not negative")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -139,6 +136,8 @@ class PersonEstimator:
     """
 
     def __init__(self, pelvis_z: float, settings: EstimatorSettings | None = None) -> None:
+        if not math.isfinite(pelvis_z):
+            raise InvalidInput("pelvis_z", pelvis_z, "must be finite")
         self.settings = settings or EstimatorSettings()
         self._pelvis_z = pelvis_z
         self._points = PointFilter(N_KEYPOINTS, self.settings.filter)
@@ -169,11 +168,12 @@ class PersonEstimator:
         frame = check_keypoints(keypoints, confidences, self.settings.min_confidence)
         flags: list[Flag] = []
         points, trust = self._put_sides_right(t, frame.points, frame.confidences, flags)
-        refused = self._points.refused(t, points)
-        n_refused, n_seen = int(refused.sum()), int((trust > 0.0).sum())
+        refused = self._points.refuse(t, points)
+        n_refused = int(refused.sum())
+        n_judged = int((self._points.known(t) & (trust > 0.0)).sum())
         if n_refused:
-            flags.append("jump" if 2 * n_refused > n_seen else "outliers")
-        # One jump refuses all: what happens to lie near belongs to the same wrong person.
+            flags.append("jump" if 2 * n_refused > n_judged else "outliers")
+        # A jump refuses all: what happens to lie near belongs to the same wrong person.
         drop = np.ones_like(refused) if "jump" in flags else refused
         points[drop], trust[drop] = np.nan, 0.0
         anew = math.isfinite(self._seen_at) and not self._points.known(t).any()
@@ -191,8 +191,9 @@ class PersonEstimator:
     ) -> tuple[Vec, Vec]:
         """Return key-points and trust with exchanged sides exchanged back."""
         expected = self._points.at(t)[0]
-        for group, members in GROUPS.items():
-            known = np.isfinite(expected[list(members)]).any()
+        for group, flag in _SWAPPED.items():
+            members = GROUPS[group]
+            known = bool(np.isfinite(expected[list(members)]).any())
             since = self._swapped_at.get(group, t)
             if known and t - since > self.settings.swap_s:
                 self._points.forget(list(members))
@@ -210,7 +211,7 @@ class PersonEstimator:
             if known:
                 self._swapped_at.setdefault(group, t)
             points, trust = swap_sides(points, group), swap_sides(trust, group)
-            flags.append(_SWAPPED[group])
+            flags.append(flag)
         return points, trust
 
     def _remember(self, t: float) -> None:
@@ -224,7 +225,10 @@ class PersonEstimator:
         if self._q is not None or not held[:5].any():
             self._q = q
         corners = bounding_box(points[known])
-        self._center.update(t, 0.5 * (corners[:1] + corners[7:]), np.ones(1))
+        center = 0.5 * (corners[:1] + corners[7:])
+        if self._center.refuse(t, center).any():
+            self._center.forget([0])
+        self._center.update(t, center, np.ones(1))
         self._cylinder = safety_cylinder(
             points, self._center.at(t)[1][0, :2], self.settings.cylinder
         )
@@ -291,86 +295,3 @@ class PersonEstimator:
             return safety_cylinder(points, np.nan_to_num(velocity), self.settings.cylinder)
         growth = self.settings.cylinder.growth * max(0.0, age - hold)
         return replace(self._cylinder.after(0.0, growth), velocity=np.zeros(2))
-
-
-def match_people(expected: Sequence[Vec], seen: Sequence[Vec], gate: float) -> list[int | None]:
-    """Return for every track which of the people seen continues it, or None.
-
-    The assignment with the most matches counts, of those the one with the least sum of median
-    distances; all are tried (4 people: at most 209).
-
-    Args:
-        expected: Key-points expected of each track [m], shape (25, 3) each, NaN unknown.
-        seen: Key-points of each person seen [m], shape (25, 3) each, NaN missing.
-        gate: Median distance beyond which a person is no continuation [m].
-    """
-    cost = np.full((len(expected), len(seen)), np.inf)
-    for i, track in enumerate(expected):
-        for j, person in enumerate(seen):
-            away = np.linalg.norm(track - person, axis=1)
-            if np.isfinite(away).any():
-                distance = float(np.nanmedian(away))
-                cost[i, j] = distance if distance <= gate else np.inf
-    choices: list[int | None] = [*range(len(seen)), *[None] * len(expected)]
-    best: list[int | None] = [None] * len(expected)
-    least = (math.inf, math.inf)
-    for order in set(itertools.permutations(choices, len(expected))):
-        costs = [cost[i, j] for i, j in enumerate(order) if j is not None]
-        score = (-len(costs), float(sum(costs)))
-        if math.isfinite(score[1]) and score < least:
-            best, least = list(order), score
-    return best
-
-
-class PeopleEstimator:
-    """The estimates of several people whose frames come together, in any order.
-
-    Args:
-        n_people: Most people at once.
-        pelvis_z: Height of the pelvis in the cell [m].
-        settings: Noise, margins and times, the same for all.
-    """
-
-    def __init__(
-        self, n_people: int, pelvis_z: float, settings: EstimatorSettings | None = None
-    ) -> None:
-        self.settings = settings or EstimatorSettings()
-        self._tracks = [PersonEstimator(pelvis_z, self.settings) for _ in range(n_people)]
-        self._order: list[int | None] = [None] * n_people
-
-    def update(
-        self, t: float, people: Sequence[tuple[ArrayLike, ArrayLike | None]]
-    ) -> tuple[PersonEstimate, ...]:
-        """Take one frame of all people in and return the estimate of each track.
-
-        Args:
-            t: When the frame was taken [s].
-            people: Key-points and confidences of each person seen, as for
-                :meth:`PersonEstimator.update`; in the tracker's order.
-
-        Raises:
-            InvalidInput: As for one person, and more people than tracks; nothing is taken in.
-        """
-        n = len(self._tracks)
-        if len(people) > n:
-            raise InvalidInput("people", len(people), f"must be at most {n}")
-        frames = [check_keypoints(*p, self.settings.min_confidence) for p in people]
-        limits = self.settings.filter
-        gate = limits.gate + limits.max_speed * limits.hold_s
-        order = match_people(
-            [track.expected(t) for track in self._tracks], [f.points for f in frames], gate
-        )
-        free = [j for j, frame in enumerate(frames) if j not in order and frame.seen.any()]
-        for i, track in enumerate(self._tracks):
-            if free and order[i] is None and np.isnan(track.expected(t)).all():
-                order[i] = free.pop(0)
-        nobody = np.full((N_KEYPOINTS, 3), np.nan)
-        estimates = []
-        for i, (track, j) in enumerate(zip(self._tracks, order, strict=True)):
-            points, trust = (nobody, None) if j is None else people[j]
-            estimate = track.update(t, points, trust)
-            if None not in (j, self._order[i]) and j != self._order[i]:
-                estimate = replace(estimate, flags=(*estimate.flags, "people-swapped"))
-            estimates.append(estimate)
-            self._order[i] = self._order[i] if j is None else j
-        return tuple(estimates)

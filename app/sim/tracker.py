@@ -127,7 +127,7 @@ class Tracker:
                 points = swap_sides(points, group)
         if lost < settings.lost:
             return None
-        trust = np.isfinite(points).all(axis=1).astype(np.float64)
+        trust = np.asarray(np.isfinite(points).all(axis=1), dtype=np.float64)
         return Frame(t=t, delivered=t + settings.latency_s, keypoints=points, confidences=trust)
 
     def _loss_rates(self) -> tuple[float, float]:
