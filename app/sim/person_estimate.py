@@ -1,0 +1,297 @@
+"""From a stream of key-points to a person: safety cylinder and 18 joint angles with speeds.
+
+Per frame: check (``keypoints.py``), put confused sides right, refuse what nobody can do, filter
+every key-point (``keypoint_filter.py``), then both closed forms on the filtered points:
+``keypoint_cylinder.py`` and ``keypoint_angles.py``. Joint speeds are the derivative of the
+second along the filtered speeds. Nothing looks ahead; :meth:`PersonEstimator.at` tells the
+estimate at any later time, so latency is bridged by the filter's own prediction.
+
+How it degrades, each step named in the estimate:
+
+- a key-point missing: carried on for ``hold_s``; then the joints it decides keep their angles
+  (``held``) and the cylinder widens to where it can be;
+- arms or legs with sides exchanged: exchanged back (``arms-swapped``, ...); if that goes
+  on for ``swap_s``, the group starts anew, judged by the way the person faces
+  (``sides-restarted``);
+- most key-points farther away than a person moves: the frame is refused (``jump``); after
+  ``hold_s`` without a credible frame the person is taken anew (``restarted``);
+- nothing seen for ``stale_s``: ``stale``; after ``hold_s`` the last cylinder grows at walking
+  speed and the joints rest;
+- the model fits the key-points badly: ``misfit`` (a person of another size, a bad tracker).
+
+Several people: ``people_estimate.py``.
+"""
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from app.errors import InvalidInput
+from app.sim import human
+from app.sim.keypoint_angles import joint_angles
+from app.sim.keypoint_cylinder import (
+    CylinderSettings,
+    SafetyCylinder,
+    bounding_box,
+    safety_cylinder,
+)
+from app.sim.keypoint_filter import FilterSettings, PointFilter
+from app.sim.keypoints import (
+    BODY_25,
+    GROUPS,
+    N_KEYPOINTS,
+    Group,
+    K,
+    check_keypoints,
+    faces_backward,
+    swap_sides,
+    swapped_against,
+)
+from app.sim.ports import Person, Vec
+
+Flag = Literal[
+    "never-seen",
+    "arms-swapped",
+    "legs-swapped",
+    "sides-restarted",
+    "people-swapped",
+    "outliers",
+    "jump",
+    "restarted",
+    "stale",
+    "misfit",
+]
+_SWAPPED: dict[Group, Flag] = {"arms": "arms-swapped", "legs": "legs-swapped"}
+"""Groups whose sides are judged; eyes and ears are too near each other, and decide nothing."""
+_FITTED = ("neck", *(f"{part}_{s}" for part in ("shoulder", "elbow", "wrist") for s in "rl"))
+"""Key-points that are joints of the model, besides the pelvis, whose height is given."""
+_STEP_S = 0.005
+"""Step of the derivative of the joint angles [s]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EstimatorSettings:
+    """Noise, margins and times of the estimate."""
+
+    filter: FilterSettings = field(default_factory=FilterSettings)
+    """Noise of state and measurement, hold time."""
+    cylinder: CylinderSettings = field(default_factory=CylinderSettings)
+    """Flesh margin and growth."""
+    min_confidence: float = 0.1
+    """Trust below which a key-point counts as missing."""
+    stale_s: float = 0.25
+    """Age of the newest credible key-point from which an estimate is stale [s]."""
+    swap_s: float = 0.5
+    """Time for which sides are exchanged back before the group starts anew [s]."""
+    misfit: float = 0.10
+    """Median distance of the model's joints from the key-points that is named [m]."""
+    qd_max: float = 8.0
+    """Bound of estimated joint speeds [rad/s, m/s]; faster is noise near a singularity."""
+
+    def __post_init__(self) -> None:
+        for name in ("min_confidence", "stale_s", "swap_s", "misfit", "qd_max"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise InvalidInput(name, value, "must be finite and not negative")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PersonEstimate:
+    """What is known of one person at one time."""
+
+    t: float
+    """Time the estimate is for [s]."""
+    age_s: float
+    """Time since the newest credible key-point [s]; inf where there was none."""
+    cylinder: SafetyCylinder | None
+    """Safety cylinder of METHOD 2.8; None where nothing was ever seen."""
+    person: Person | None
+    """Joint angles and speeds; None until pelvis and trunk were seen together once."""
+    held: tuple[str, ...]
+    """Joints that keep their last angle because their key-points are missing."""
+    missing: tuple[str, ...]
+    """Key-points unseen for longer than the hold time."""
+    strays: tuple[str, ...]
+    """Key-points of the last frame that lay far from all others."""
+    misfit_m: float
+    """Median distance of the model's joints from the filtered key-points [m]; NaN unknown."""
+    flags: tuple[Flag, ...]
+    """How the estimate is degraded; empty where it is not."""
+
+    @property
+    def stale(self) -> bool:
+        """Whether nothing credible was seen lately."""
+        return "stale" in self.flags or "never-seen" in self.flags
+
+
+class PersonEstimator:
+    """The estimate of one person from a stream of frames.
+
+    Args:
+        pelvis_z: Height of the pelvis in the cell [m] (``Cell.pelvis_z``).
+        settings: Noise, margins and times.
+    """
+
+    def __init__(self, pelvis_z: float, settings: EstimatorSettings | None = None) -> None:
+        if not math.isfinite(pelvis_z):
+            raise InvalidInput("pelvis_z", pelvis_z, "must be finite")
+        self.settings = settings or EstimatorSettings()
+        self._pelvis_z = pelvis_z
+        self._points = PointFilter(N_KEYPOINTS, self.settings.filter)
+        self._center = PointFilter(1, self.settings.filter)
+        self._t, self._seen_at = -math.inf, -math.inf
+        self._swapped_at: dict[Group, float] = {}
+        self._q: Vec | None = None
+        self._cylinder: SafetyCylinder | None = None
+        self._flags: tuple[Flag, ...] = ()
+        self._strays: tuple[str, ...] = ()
+
+    def update(
+        self, t: float, keypoints: ArrayLike, confidences: ArrayLike | None = None
+    ) -> PersonEstimate:
+        """Take one frame in and return the estimate at its time.
+
+        Args:
+            t: When the frame was taken [s]; later than the one before.
+            keypoints: Order of BODY_25, cell's frame [m], shape (25, 3); NaN where missing.
+            confidences: Trust in each in [0, 1], shape (25,); 1 where None.
+
+        Raises:
+            InvalidInput: See :func:`~app.sim.keypoints.check_keypoints`; or ``t`` is not later
+                than the last. The estimate is then as if the frame had not come.
+        """
+        if not math.isfinite(t) or t <= self._t:
+            raise InvalidInput("t", t, f"must be finite and later than {self._t:g} s")
+        frame = check_keypoints(keypoints, confidences, self.settings.min_confidence)
+        flags: list[Flag] = []
+        points, trust = self._put_sides_right(t, frame.points, frame.confidences, flags)
+        refused = self._points.refuse(t, points)
+        n_refused = int(refused.sum())
+        n_judged = int((self._points.known(t) & (trust > 0.0)).sum())
+        if n_refused:
+            flags.append("jump" if 2 * n_refused > n_judged else "outliers")
+        # A jump refuses all: what happens to lie near belongs to the same wrong person.
+        drop = np.ones_like(refused) if "jump" in flags else refused
+        points[drop], trust[drop] = np.nan, 0.0
+        anew = math.isfinite(self._seen_at) and not self._points.known(t).any()
+        if (trust > 0.0).any():
+            if anew:
+                flags.append("restarted")
+            self._seen_at = t
+        self._points.update(t, points, trust)
+        self._t, self._flags, self._strays = t, tuple(flags), frame.strays
+        self._remember(t)
+        return self.at(t)
+
+    def _put_sides_right(
+        self, t: float, points: Vec, trust: Vec, flags: list[Flag]
+    ) -> tuple[Vec, Vec]:
+        """Return key-points and trust with exchanged sides exchanged back."""
+        expected = self._points.at(t)[0]
+        for group, flag in _SWAPPED.items():
+            members = GROUPS[group]
+            known = bool(np.isfinite(expected[list(members)]).any())
+            since = self._swapped_at.get(group, t)
+            if known and t - since > self.settings.swap_s:
+                self._points.forget(list(members))
+                del self._swapped_at[group]
+                flags.append("sides-restarted")
+                known = False
+            if known:
+                swapped = swapped_against(points, expected, group)
+            else:
+                swapped = faces_backward(points, group)
+            if not swapped:
+                if np.isfinite(points[list(members)]).any():
+                    self._swapped_at.pop(group, None)
+                continue
+            if known:
+                self._swapped_at.setdefault(group, t)
+            points, trust = swap_sides(points, group), swap_sides(trust, group)
+            flags.append(flag)
+        return points, trust
+
+    def _remember(self, t: float) -> None:
+        """Keep what the next estimates build on: joint angles, the last cylinder."""
+        points = self._points.at(t)[0]
+        known = np.isfinite(points).all(axis=1)
+        if not known.any():
+            return
+        before = human.rest_posture(0.0, 0.0, 0.0) if self._q is None else self._q
+        q, held = joint_angles(points, before, self._pelvis_z)
+        if self._q is not None or not held[:5].any():
+            self._q = q
+        corners = bounding_box(points[known])
+        center = 0.5 * (corners[:1] + corners[7:])
+        if self._center.refuse(t, center).any():
+            self._center.forget([0])
+        self._center.update(t, center, np.ones(1))
+        self._cylinder = safety_cylinder(
+            points, self._center.at(t)[1][0, :2], self.settings.cylinder
+        )
+
+    def expected(self, t: float) -> Vec:
+        """Return where the key-points are expected at ``t`` [m], (25, 3), NaN where unknown."""
+        return self._points.at(t)[0]
+
+    def at(self, t: float) -> PersonEstimate:
+        """Return the estimate at ``t`` [s], not earlier than the last frame; changes nothing.
+
+        Raises:
+            InvalidInput: ``t`` is earlier than the last frame, or not finite.
+        """
+        if not math.isfinite(t) or t < self._t:
+            raise InvalidInput("t", t, f"must be finite and not earlier than {self._t:g} s")
+        flags, age = list(self._flags), t - self._seen_at
+        points, speeds = self._points.at(t)
+        known = np.isfinite(points).all(axis=1)
+        person, held, misfit = self._person(points, speeds)
+        if self._cylinder is None:
+            flags.append("never-seen")
+        elif age > self.settings.stale_s:
+            flags.append("stale")
+        if misfit > self.settings.misfit:
+            flags.append("misfit")
+        return PersonEstimate(
+            t=t,
+            age_s=age,
+            cylinder=self._cylinder_at(t, points, age),
+            person=person,
+            held=tuple(human.JOINT_NAMES[int(j)] for j in np.flatnonzero(held)),
+            missing=tuple(BODY_25[int(k)] for k in np.flatnonzero(~known)),
+            strays=self._strays,
+            misfit_m=misfit,
+            flags=tuple(flags),
+        )
+
+    def _person(
+        self, points: Vec, speeds: Vec
+    ) -> tuple[Person | None, NDArray[np.bool_], float]:
+        """Return joint angles and speeds, which are held, and how badly they fit [m]."""
+        if self._q is None:
+            return None, np.ones(18, dtype=np.bool_), math.nan
+        q, held = joint_angles(points, self._q, self._pelvis_z)
+        ahead, _ = joint_angles(points + _STEP_S * speeds, q, self._pelvis_z)
+        behind, _ = joint_angles(points - _STEP_S * speeds, q, self._pelvis_z)
+        change = ahead - behind
+        change[2] = (change[2] + math.pi) % (2.0 * math.pi) - math.pi
+        qd = np.clip(change / (2.0 * _STEP_S), -self.settings.qd_max, self.settings.qd_max)
+        qd[held] = 0.0
+        joints = human.joint_points(q, self._pelvis_z)
+        away = [float(np.linalg.norm(points[K[name]] - joints[name])) for name in _FITTED]
+        there = [d for d in away if math.isfinite(d)]
+        return Person(q=q, qd=qd), held, float(np.median(there)) if there else math.nan
+
+    def _cylinder_at(self, t: float, points: Vec, age: float) -> SafetyCylinder | None:
+        """Return the cylinder at ``t``: around what is known, else the last one, grown."""
+        if self._cylinder is None:
+            return None
+        hold = self.settings.filter.hold_s
+        if np.isfinite(points).any():
+            velocity = self._center.at(t)[1][0, :2]
+            return safety_cylinder(points, np.nan_to_num(velocity), self.settings.cylinder)
+        growth = self.settings.cylinder.growth * max(0.0, age - hold)
+        return replace(self._cylinder.after(0.0, growth), velocity=np.zeros(2))

@@ -1,0 +1,278 @@
+"""From noisy, incomplete key-points to a person: the numbers, and how it degrades."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from app.errors import InvalidInput
+from app.sim import human
+from app.sim.keypoint_cylinder import safety_cylinder
+from app.sim.keypoints import K, swap_sides
+from app.sim.person_estimate import (
+    EstimatorSettings,
+    PersonEstimate,
+    PersonEstimator,
+)
+from app.sim.tracker import Tracker, TrackerSettings, follow
+from tests.sim.tracked_person import CELL, motion, seen, work
+
+DT = 1.0 / 30.0
+NOBODY = np.full((25, 3), np.nan)
+
+
+@dataclass(frozen=True)
+class Errors:
+    center: list[float]
+    contains: list[bool]
+    wrist: list[float]
+    velocity: list[float]
+    qd: list[np.ndarray]
+
+
+@lru_cache(maxsize=4)
+def errors(settings: TrackerSettings) -> Errors:
+    """Compare three people at work for 12 s with what a tracker makes of them."""
+    found = Errors([], [], [], [], [])
+    for seed in (1, 2, 3):
+        times, q, qd = work(seed, 12.0)
+        tracker = Tracker(settings, seed, CELL.pelvis_z, CELL.floor_z)
+        estimator = PersonEstimator(CELL.pelvis_z)
+        estimates = follow(motion(seed, 12.0), times, tracker, estimator)
+        for k, estimate in enumerate(estimates):
+            if k * DT >= settings.latency_s + 0.1:
+                compare(estimate, q[k], qd[k], found)
+    return found
+
+
+def compare(estimate: PersonEstimate, q: np.ndarray, qd: np.ndarray, found: Errors) -> None:
+    assert estimate.person is not None and estimate.cylinder is not None
+    true, before, after = (safety_cylinder(seen(q + s * qd)) for s in (0.0, -0.01, 0.01))
+    assert true is not None and before is not None and after is not None
+    body = human.joint_points(q, CELL.pelvis_z)
+    fitted = human.joint_points(estimate.person.q, CELL.pelvis_z)
+    velocity = (after.center - before.center) / 0.02
+    found.center.append(float(np.linalg.norm(estimate.cylinder.center - true.center)))
+    found.contains.append(estimate.cylinder.contains(np.array(list(body.values()))))
+    found.wrist.extend(
+        float(np.linalg.norm(body[name] - fitted[name])) for name in ("wrist_r", "wrist_l")
+    )
+    found.velocity.append(float(np.linalg.norm(velocity - estimate.cylinder.velocity)))
+    found.qd.append(np.abs(estimate.person.qd - qd))
+
+
+NOISY = TrackerSettings(noise=0.02, missing=0.2, latency_s=0.0)
+LATE = TrackerSettings(noise=0.02, missing=0.2, missing_s=0.2, lost=0.1, latency_s=0.1)
+
+
+def test_center_of_noisy_incomplete_people_is_within_50_mm() -> None:
+    assert np.median(errors(NOISY).center) <= 0.05
+    assert np.percentile(errors(NOISY).center, 95) <= 0.06
+
+
+def test_cylinder_of_noisy_incomplete_people_contains_them_in_95_percent_of_frames() -> None:
+    assert np.mean(errors(NOISY).contains) >= 0.95
+
+
+def test_wrists_of_noisy_incomplete_people_are_within_40_mm() -> None:
+    assert np.median(errors(NOISY).wrist) <= 0.04
+    assert np.percentile(errors(NOISY).wrist, 95) <= 0.07
+
+
+def test_late_frames_and_long_gaps_keep_to_the_same_numbers() -> None:
+    found = errors(LATE)
+    assert np.median(found.center) <= 0.05
+    assert np.mean(found.contains) >= 0.95
+    assert np.median(found.wrist) <= 0.05
+
+
+def test_speeds_of_a_person_seen_exactly_are_the_true_ones() -> None:
+    found = errors(TrackerSettings(noise=0.0, missing=0.0, latency_s=0.0))
+    assert np.median(found.qd) < 0.05
+    assert np.percentile(found.velocity, 50) < 0.08
+
+
+def test_speeds_of_noisy_people_are_noise_of_a_fraction_of_a_radian() -> None:
+    found = errors(NOISY)
+    assert np.median(found.qd) < 0.4
+    assert np.median(found.velocity) < 0.15
+
+
+def tracked(n: int = 30, seed: int = 1) -> tuple[PersonEstimator, np.ndarray]:
+    """An estimator that has seen the first frames of a person at work, and the motion."""
+    q, estimator = work(seed, 12.0)[1], PersonEstimator(CELL.pelvis_z)
+    for k in range(n):
+        assert estimator.update(k * DT, seen(q[k])).flags == ()
+    return estimator, q
+
+
+def test_before_anything_is_seen_there_is_nobody_and_it_is_said() -> None:
+    estimator = PersonEstimator(CELL.pelvis_z)
+    for estimate in (estimator.at(0.0), estimator.update(1.0, NOBODY)):
+        assert estimate.cylinder is None and estimate.person is None
+        assert estimate.flags == ("never-seen",) and estimate.stale
+        assert estimate.age_s == np.inf
+
+
+def test_all_missing_is_carried_on_then_held_then_grown_and_named() -> None:
+    estimator, _ = tracked(30)
+    last = 29 * DT
+    before = estimator.at(last)
+    soon = estimator.update(last + 0.1, NOBODY)
+    assert soon.flags == () and soon.held == ()
+    late = estimator.update(last + 0.4, NOBODY)
+    assert late.stale and late.age_s == pytest.approx(0.4)
+    gone = estimator.update(last + 1.5, NOBODY)
+    assert gone.stale and set(gone.held) == set(human.JOINT_NAMES) and len(gone.missing) == 25
+    assert (
+        before.cylinder is not None and gone.cylinder is not None and late.cylinder is not None
+    )
+    assert gone.cylinder.radius == pytest.approx(before.cylinder.radius + 1.6, abs=0.05)
+    assert gone.person is not None and (gone.person.qd == 0.0).all()
+
+
+def test_a_person_who_comes_back_after_long_is_taken_anew() -> None:
+    estimator, q = tracked(30)
+    estimate = estimator.update(60 * DT, seen(q[60]))
+    assert estimate.flags == ("restarted",) and not estimate.stale
+    assert estimate.person is not None
+    joints = human.joint_points(estimate.person.q, CELL.pelvis_z)
+    assert np.linalg.norm(joints["wrist_r"] - seen(q[60])[K["wrist_r"]]) < 1e-6
+
+
+def test_a_limb_unseen_for_long_is_held_and_the_cylinder_widens() -> None:
+    estimator, q = tracked(30)
+    for k in range(30, 60):
+        points = seen(q[k])
+        points[[K["elbow_r"], K["wrist_r"]]] = np.nan
+        estimate = estimator.update(k * DT, points)
+        arm = human.joint_points(q[k], CELL.pelvis_z)
+        assert estimate.cylinder is not None
+        assert estimate.cylinder.contains(np.array([arm["wrist_r"], arm["elbow_r"]]))
+    assert estimate.missing == ("elbow_r", "wrist_r")
+    assert {"elbow_r", "shoulder_r_flex"} <= set(estimate.held)
+    assert "elbow_l" not in estimate.held
+
+
+@pytest.mark.parametrize(
+    ("group", "flag"), [("arms", "arms-swapped"), ("legs", "legs-swapped")]
+)
+def test_exchanged_sides_are_exchanged_back_and_named(group: str, flag: str) -> None:
+    (one, q), (other, _) = tracked(30), tracked(30)
+    right = one.update(30 * DT, seen(q[30]))
+    wrong = other.update(30 * DT, swap_sides(seen(q[30]), group))
+    assert wrong.flags == (flag,)
+    assert right.person is not None and wrong.person is not None
+    np.testing.assert_allclose(wrong.person.q, right.person.q)
+
+
+def test_exchanged_sides_in_the_first_frame_are_seen_by_the_way_the_person_faces() -> None:
+    q = work(1, 12.0)[1][0]
+    estimate = PersonEstimator(CELL.pelvis_z).update(0.0, swap_sides(seen(q), "arms"))
+    assert estimate.flags == ("arms-swapped",)
+    assert estimate.person is not None
+    np.testing.assert_allclose(estimate.person.q, q, atol=0.05)
+
+
+def test_sides_taken_wrong_at_first_are_put_right_when_that_goes_on() -> None:
+    q, estimator = human.rest_posture(0.0, 1.2, -1.5), PersonEstimator(CELL.pelvis_z)
+    faceless = seen(q)
+    faceless[[K[name] for name in ("nose", "ear_r", "ear_l")]] = np.nan
+    first = estimator.update(0.0, swap_sides(faceless, "arms"))
+    assert "arms-swapped" not in first.flags
+    flags = [estimator.update(k * DT, seen(q)).flags for k in range(1, 40)]
+    assert "arms-swapped" in flags[0] and sum("sides-restarted" in each for each in flags) == 1
+    assert flags[-1] == ()
+    person = estimator.at(40 * DT).person
+    assert person is not None
+    np.testing.assert_allclose(person.q, q, atol=0.1)
+
+
+def test_another_person_in_place_of_this_one_is_refused_and_then_taken_anew() -> None:
+    estimator, q = tracked(30)
+    away = np.array([0.8, 0.5, 0.0])
+    before, flags = estimator.at(29 * DT), []
+    for k in range(30, 50):
+        estimate = estimator.update(k * DT, seen(q[30]) + away)
+        flags.append(estimate.flags)
+        if "jump" in estimate.flags:
+            assert estimate.cylinder is not None and before.cylinder is not None
+            moved = estimate.cylinder.center - before.cylinder.center
+            assert np.linalg.norm(moved) < 0.1
+    assert flags[0] == ("jump",) and flags[-1] == ()
+    assert sum("restarted" in each for each in flags) == 1
+    found = estimator.at(50 * DT).cylinder
+    true = safety_cylinder(seen(q[30]) + away)
+    assert found is not None and true is not None
+    assert np.linalg.norm(found.center - true.center) < 1e-6
+    assert np.linalg.norm(found.velocity) < 0.1
+
+
+def test_one_keypoint_that_leaps_is_an_outlier_and_moves_nothing() -> None:
+    (one, q), (other, _) = tracked(30), tracked(30)
+    points, without = seen(q[30]), seen(q[30])
+    points[K["wrist_l"]] += [0.0, -0.7, 0.0]
+    without[K["wrist_l"]] = np.nan
+    leap, missing = one.update(30 * DT, points), other.update(30 * DT, without)
+    assert leap.flags == ("outliers",)
+    assert leap.person is not None and missing.person is not None
+    np.testing.assert_array_equal(leap.person.q, missing.person.q)
+
+
+def test_a_person_the_model_does_not_fit_is_named() -> None:
+    points = seen(human.rest_posture(0.0, 1.2, -1.5))
+    root = points[K["mid_hip"]]
+    estimate = PersonEstimator(CELL.pelvis_z).update(0.0, root + 1.6 * (points - root))
+    assert "misfit" in estimate.flags and estimate.misfit_m > 0.1
+
+
+@pytest.mark.parametrize("t", [np.nan, np.inf, 29 * DT, 0.0])
+def test_a_frame_without_a_later_time_is_refused(t: float) -> None:
+    estimator, q = tracked(30)
+    with pytest.raises(InvalidInput, match="later"):
+        estimator.update(t, seen(q[30]))
+
+
+def test_a_refused_frame_leaves_no_trace() -> None:
+    (one, q), (other, _) = tracked(30), tracked(30)
+    for wrong in (1000.0 * seen(q[30]), np.zeros((3, 25)), np.full((25, 3), np.inf)):
+        with pytest.raises(InvalidInput):
+            one.update(30 * DT, wrong)
+    a, b = one.update(31 * DT, seen(q[31])), other.update(31 * DT, seen(q[31]))
+    assert a.flags == b.flags == ()
+    assert a.person is not None and b.person is not None
+    np.testing.assert_array_equal(a.person.q, b.person.q)
+
+
+def test_the_past_cannot_be_asked_for() -> None:
+    estimator, _ = tracked(30)
+    for t in (0.0, np.nan):
+        with pytest.raises(InvalidInput, match="earlier"):
+            estimator.at(t)
+
+
+def test_any_finite_frames_give_a_finite_estimate() -> None:
+    rng, estimator, taken = np.random.default_rng(8), PersonEstimator(CELL.pelvis_z), 0
+    for k in range(200):
+        points = rng.uniform(-0.9, 0.9, (25, 3))
+        points[rng.random(25) < rng.random()] = np.nan
+        try:
+            estimate = estimator.update(k * DT, points)
+        except InvalidInput as error:
+            assert error.field == "keypoints"
+            continue
+        taken += 1
+        if estimate.person is not None:
+            assert (
+                np.isfinite(estimate.person.q).all() and np.isfinite(estimate.person.qd).all()
+            )
+        assert estimate.cylinder is None or np.isfinite(estimate.cylinder.radius)
+    assert taken > 150
+
+
+def test_settings_without_sense_are_refused_by_name() -> None:
+    with pytest.raises(InvalidInput, match="stale_s"):
+        EstimatorSettings(stale_s=np.nan)
+    with pytest.raises(InvalidInput, match="pelvis_z"):
+        PersonEstimator(np.nan)

@@ -1,0 +1,38 @@
+"""A person at work, seen by a camera: what the tests of key-points and tracker share."""
+
+from collections.abc import Callable
+from functools import lru_cache
+
+import numpy as np
+
+from app.sim.cells import load_cell
+from app.sim.keypoints import keypoints_of
+from app.sim.work_cycle import WorkCycle
+
+CELL = load_cell()
+RATE_HZ = 30.0
+
+
+@lru_cache(maxsize=8)
+def work(seed: int, seconds: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Times [s], joint positions and speeds of the work cycle at 30 Hz."""
+    cycle, times = WorkCycle(CELL, seed), np.arange(round(seconds * RATE_HZ) + 1) / RATE_HZ
+    q, qd = zip(*(cycle.at(t) for t in times), strict=True)
+    return times, np.array(q), np.array(qd)
+
+
+def motion(seed: int, seconds: float) -> Callable[[float], np.ndarray]:
+    """The same as a function of time, linear between the samples."""
+    times, q, _ = work(seed, seconds)
+
+    def at(t: float) -> np.ndarray:
+        k = min(int(t * RATE_HZ + 1e-9), len(times) - 2)
+        part = t * RATE_HZ - k
+        return (1.0 - part) * q[k] + part * q[k + 1]
+
+    return at
+
+
+def seen(q: np.ndarray) -> np.ndarray:
+    """Exact key-points of a posture [m], shape (25, 3)."""
+    return keypoints_of(q, CELL.pelvis_z, CELL.floor_z)
