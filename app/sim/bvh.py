@@ -219,11 +219,12 @@ def check_dt(dt: float, place: str) -> float:
     """
     if MIN_DT <= dt <= MAX_DT:
         return dt
-    hint = ""
+    guesses = []
     if MIN_DT <= dt / 1000.0 <= MAX_DT:
-        hint = f"looks like milliseconds: in s that is {dt / 1000.0:g}"
-    elif dt > 0.0 and MIN_DT <= 1.0 / dt <= MAX_DT:
-        hint = f"looks like frames per second: in s that is {1.0 / dt:g}"
+        guesses.append(f"milliseconds: in s that is {dt / 1000.0:g}")
+    if dt > 0.0 and MIN_DT <= 1.0 / dt <= MAX_DT:
+        guesses.append(f"frames per second: in s that is {1.0 / dt:g}")
+    hint = f"looks like {' or '.join(guesses)}" if guesses else ""
     raise _bad(place, f"{dt:g}", f"must lie in [{MIN_DT}, {MAX_DT}] s between frames", hint)
 
 

@@ -72,9 +72,9 @@ def clean_runs(times: Vec, glitches: Sequence[Glitch]) -> tuple[tuple[int, int],
     """
     good = np.ones(len(times), dtype=bool)
     for one in glitches:
-        from_time, to_time = times[one.first] - MARGIN, times[one.last] + MARGIN
-        inside = (times >= from_time) & (times <= to_time)
-        good[inside] = False
+        after, before = times - times[one.first], times[one.last] - times
+        # Half a nanosecond more, so that rounding does not decide about a frame.
+        good[(np.minimum(after, before)) >= -(MARGIN + 0.5e-9)] = False
     edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(int)))
     runs = edges.reshape(-1, 2) - np.array([0, 1])
     return tuple((int(a), int(b)) for a, b in runs if times[b] - times[a] >= MIN_RUN)
