@@ -89,33 +89,55 @@ def read_bvh(text: str) -> Bvh:
     return Bvh(joints=joints, dt=dt, values=values, first_line=first_line)
 
 
-def forward(bvh: Bvh) -> Vec:
-    """Return the positions of all joints [the file's unit], shape (n, n_joints, 3).
+def forward(bvh: Bvh, wanted: Sequence[int]) -> Vec:
+    """Return the positions of some joints [the file's unit], shape (n, len(wanted), 3).
 
     A joint with position channels stands where they say, in its parent's frame; its offset
     counts only where it has none (as in most readers; of the root, offsets are zero).
+
+    Args:
+        bvh: The file.
+        wanted: Indices of joints.
     """
-    n, column = len(bvh.values), 0
-    positions = np.empty((n, len(bvh.joints), 3))
-    rotations: list[Vec] = []
+    needed = _with_ancestors(bvh, wanted)
+    places: dict[int, Vec] = {}
+    turns: dict[int, Vec] = {}
+    column = 0
     for k, joint in enumerate(bvh.joints):
-        local = np.tile(np.asarray(joint.offset), (n, 1))
-        turn = np.tile(np.eye(3), (n, 1, 1))
-        for name in joint.channels:
-            axis, value = "XYZ".index(name[0]), bvh.values[:, column]
-            column += 1
-            if name.endswith("position"):
-                local[:, axis] = value
-            else:
-                turn = turn @ axis_turns(axis, np.radians(value))
-        if joint.parent < 0:
-            positions[:, k], parent_turn = local, None
+        first, column = column, column + len(joint.channels)
+        if k not in needed:
+            continue
+        local, turn = _local(joint, bvh.values[:, first:column])
+        if joint.parent >= 0:
+            above = turns[joint.parent]
+            local = places[joint.parent] + np.einsum("nij,nj->ni", above, local)
+            turn = above if turn is None else above @ turn
+        elif turn is None:
+            turn = np.tile(np.eye(3), (len(local), 1, 1))
+        places[k], turns[k] = local, turn
+    return np.stack([places[k] for k in wanted], axis=1)
+
+
+def _with_ancestors(bvh: Bvh, wanted: Sequence[int]) -> set[int]:
+    needed: set[int] = set()
+    for k in wanted:
+        while k >= 0 and k not in needed:
+            needed.add(k)
+            k = bvh.joints[k].parent
+    return needed
+
+
+def _local(joint: BvhJoint, values: Vec) -> tuple[Vec, Vec | None]:
+    """Return place and rotation of a joint in its parent; None where it never turns."""
+    place, turn = np.tile(np.asarray(joint.offset), (len(values), 1)), None
+    for name, value in zip(joint.channels, values.T, strict=True):
+        axis = "XYZ".index(name[0])
+        if name.endswith("position"):
+            place[:, axis] = value
         else:
-            parent_turn = rotations[joint.parent]
-            moved = np.einsum("nij,nj->ni", parent_turn, local)
-            positions[:, k] = positions[:, joint.parent] + moved
-        rotations.append(turn if parent_turn is None else parent_turn @ turn)
-    return positions
+            more = axis_turns(axis, np.radians(value))
+            turn = more if turn is None else turn @ more
+    return place, turn
 
 
 def axis_turns(axis: int, angle: Vec) -> Vec:
@@ -151,59 +173,49 @@ def read_rows(
         value = f"<{max(len(lines), n_rows or 0)} frames>"
         raise _bad("frames", value, f"must be at most {MAX_FRAMES}", "cut the file into parts")
     faults: list[Fault] = []
-    rows: list[list[str]] = []
-    for number, line in lines:
+    values = np.zeros((len(lines), n_columns))
+    for k, (number, line) in enumerate(lines):
         words = line.split(separator)
-        if len(words) != n_columns and len(faults) < MAX_FAULTS:
+        if len(words) != n_columns:
             rule = f"must hold {n_columns} numbers, {what}"
             faults.append(Fault(place=f"line {number}", value=f"<{len(words)}>", rule=rule))
-        rows.append(words)
-    if n_rows is not None and len(lines) != n_rows:
+        else:
+            try:
+                values[k] = list(map(float, words))
+            except ValueError:
+                values[k] = np.nan
+        if not (np.abs(values[k]) <= MAX_NUMBER).all():
+            faults.extend(_bad_words(words, number))
+        if len(faults) >= MAX_FAULTS:
+            break
+    if not faults and n_rows is not None and len(lines) != n_rows:
         rule = f"must be the {n_rows} that the head of the file promises"
         hint = "the file is cut off" if len(lines) < n_rows else ""
         place = f"frames, last line {lines[-1][0]}" if lines else "frames"
         faults.append(Fault(place=place, value=f"<{len(lines)}>", rule=rule, hint=hint))
     if faults:
-        raise BadMotion(faults)
-    if len(rows) < 2:
-        raise _bad("frames", f"<{len(rows)}>", "must be at least 2", "one frame is no motion")
-    return _numbers(rows, [number for number, _ in lines])
-
-
-def _numbers(rows: list[list[str]], numbers: list[int]) -> Vec:
-    try:
-        values = np.array(rows, dtype=np.float64)
-    except ValueError:
-        faults = [
-            Fault(place=f"line {line}, number {k + 1}", value=shown(word), rule=rule)
-            for line, words in zip(numbers, rows, strict=True)
-            for k, word in enumerate(words)
-            if (rule := _number_rule(word))
-        ]
-        raise BadMotion(faults[:MAX_FAULTS]) from None
-    sound = np.abs(values) <= MAX_NUMBER
-    if not sound.all():
-        found = np.argwhere(~sound)[:MAX_FAULTS]
-        rule = f"must be a finite number of at most {MAX_NUMBER:g}"
-        raise BadMotion(
-            [
-                Fault(
-                    place=f"line {numbers[i]}, number {j + 1}",
-                    value=shown(rows[i][j]),
-                    rule=rule,
-                )
-                for i, j in found
-            ]
-        )
+        raise BadMotion(faults[:MAX_FAULTS])
+    if len(values) < 2:
+        raise _bad("frames", f"<{len(values)}>", "must be at least 2", "one frame is no motion")
     return values
 
 
+def _bad_words(words: Sequence[str], line: int) -> Iterator[Fault]:
+    for k, word in enumerate(words):
+        rule = _number_rule(word)
+        if rule:
+            yield Fault(place=f"line {line}, number {k + 1}", value=shown(word), rule=rule)
+
+
 def _number_rule(word: str) -> str:
+    """Return the rule that a word breaks; empty where it is a sound number."""
     try:
-        float(word)
+        value = float(word)
     except ValueError:
         return "must be a number"
-    return ""
+    if abs(value) <= MAX_NUMBER:
+        return ""
+    return f"must be a finite number of at most {MAX_NUMBER:g}"
 
 
 def shown(text: str) -> str:
@@ -237,10 +249,11 @@ def _frame_lines(head: list[tuple[int, str]], n_lines: int) -> tuple[int, float]
         if not rest.startswith(name):
             raise _bad(line, shown(rest), f'must be "{name}" with a number')
         word = rest[len(name) :].strip()
-        if _number_rule(word):
-            raise _bad(line, shown(word), "must be a number")
+        rule = _number_rule(word)
+        if rule:
+            raise _bad(line, shown(word), rule)
         found.append(float(word))
-    if not 0 <= found[0] <= 1e9 or found[0] != int(found[0]):
+    if found[0] < 0.0 or found[0] != int(found[0]):
         raise _bad(texts[0][0], f"{found[0]:g}", "must be a whole number of frames")
     return int(found[0]), check_dt(found[1], f"line {texts[1][0]}, Frame Time")
 
@@ -321,8 +334,8 @@ class _Tree:
 
     def _number(self) -> float:
         word = self._next("a number")
-        if _number_rule(word) or not abs(float(word)) <= MAX_NUMBER:
-            rule = f"must be a finite number of at most {MAX_NUMBER:g}"
+        rule = _number_rule(word)
+        if rule:
             raise _bad(self._line, shown(word), rule)
         return float(word)
 

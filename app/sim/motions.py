@@ -39,7 +39,7 @@ from app.sim.ports import Vec
 from app.sim.skeletons import body_track
 from app.sim.track_angles import body_angles
 
-MAX_BYTES = 64 * 1024 * 1024
+MAX_BYTES = 32 * 1024 * 1024
 """Largest file that is read [bytes]."""
 FORMATS = (".bvh", ".mot", ".sto", ".csv")
 """Endings of the names of files that can be read."""
@@ -58,7 +58,10 @@ class Motion:
     q: Vec
     """Joint positions [m, rad], shape (n, 18); continuous, not clipped to joint limits."""
     pelvis_z: Vec
-    """Height of the pelvis above its height in standing [m], shape (n,)."""
+    """Height of the pelvis above its height in standing [m], shape (n,).
+
+    Standing is the 95th percentile of the file's clean frames; our own tables state it.
+    """
     size: BodySize
     """Lengths of the recorded person."""
     first_frame: int
@@ -146,7 +149,8 @@ def read_motion(content: bytes, file_name: str) -> ImportedMotion:
     name = PurePath(file_name).stem[:100]
     origin = f"{PurePath(file_name).name[:100]} ({digest})"
     pieces = [_converted(track, angles, size, span) for span in spans]
-    found = _Pieces(track, size, spans, pieces)
+    # Our own tables count the height from standing; elsewhere that is the 95th percentile.
+    found = _Pieces(track, size, spans, pieces, 0.0 if ending == ".csv" else None)
     return ImportedMotion(
         name=name,
         format=ending[1:],
@@ -207,16 +211,19 @@ class _Pieces:
         size: BodySize,
         spans: Sequence[tuple[int, int]],
         pieces: Sequence[tuple[Vec, Vec]],
+        standing: float | None,
     ) -> None:
         self._track, self._size, self._spans = track, size, spans
         self._q = np.concatenate([q for q, _ in pieces])
         self._height = np.concatenate([height for _, height in pieces])
         self._points = np.concatenate([track.points[a : b + 1] for a, b in spans])
-        self._standing = float(np.percentile(self._height, 95.0))
+        if standing is None:
+            standing = float(np.percentile(self._height, 95.0))
+        self._standing = standing
         self._pieces = pieces
 
     def motions(self, name: str, origin: str) -> tuple[Motion, ...]:
-        """Return the runs; the pelvis's height counts from standing, its 95th percentile."""
+        """Return the runs; the pelvis's height counts from standing."""
         return tuple(
             Motion(
                 name=name,
@@ -263,7 +270,7 @@ def _converted(
 
 def _text(content: bytes) -> str:
     if len(content) > MAX_BYTES:
-        rule = f"must have at most {MAX_BYTES} bytes (64 MB)"
+        rule = f"must have at most {MAX_BYTES} bytes (32 MB)"
         raise _bad("file", f"<{len(content)} bytes>", rule, "cut it into parts")
     try:
         text = content.decode("utf-8-sig")

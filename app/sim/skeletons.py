@@ -19,7 +19,9 @@ from app.sim.body_track import (
     TRACK_NAMES,
     WRIST_R,
     BodyTrack,
+    measure,
     trunk_frame,
+    unit,
 )
 from app.sim.bvh import Bvh, forward
 from app.sim.ports import Vec
@@ -34,10 +36,20 @@ UNITS: Mapping[str, float] = {
 """Lengths that skeletons are written in [m]."""
 MIN_ARM, MAX_ARM = 0.40, 0.75
 """Shoulder to wrist of a person [m]; the ranges of the units do not overlap."""
+LENGTHS: Mapping[str, tuple[float, float]] = {
+    "trunk": (0.25, 0.80),
+    "clavicle": (0.05, 0.35),
+    "upper_arm": (0.15, 0.50),
+    "forearm": (0.15, 0.45),
+}
+"""Segments of people [m], with room for markers that are no joint centres."""
 MAX_TILT = np.radians(30.0)
 """Lean of the trunk in a rest pose above which that pose is not taken for upright [rad]."""
 MAX_DEGREES_IN_RADIANS = 6.2832
 """A file none of whose angles exceeds this is one in radians, or nobody moves in it."""
+
+MAX_BACKWARD = 0.3
+"""Mean of the elbows' backward bend, from -1 to 1, above which sides are mixed up."""
 
 _CENTRE = {
     "pelvis": ("hips", "hip", "pelvis", "root"),
@@ -83,20 +95,20 @@ def body_track(bvh: Bvh) -> tuple[BodyTrack, str]:
     """
     roles = skeleton_joints([joint.name for joint in bvh.joints])
     _require_degrees(bvh)
-    everything = forward(bvh)
     chosen = [roles[name] for name in TRACK_NAMES]
-    points = everything[:, chosen]
-    unit = length_unit(points)
+    points = forward(bvh, chosen)
+    found = length_unit(points)
     up = _up_axis(points)
-    points = UNITS[unit] * _z_up(points, up)
-    _require_a_place(points)
+    points = UNITS[found] * _z_up(points, up)
+    _require_a_body(points)
+    _require_elbows(points)
     rest = _z_up(_rest(bvh)[None, chosen], up)
     hips = None
     if "hip_r" in roles and "hip_l" in roles:
-        across = everything[:, roles["hip_l"]] - everything[:, roles["hip_r"]]
-        hips = UNITS[unit] * _z_up(across, up)
+        right, left = forward(bvh, [roles["hip_r"], roles["hip_l"]]).transpose(1, 0, 2)
+        hips = UNITS[found] * _z_up(left - right, up)
     times: Vec = np.asarray(bvh.dt * np.arange(len(points)))
-    return BodyTrack(times=times, points=points, upright=_upright(rest), hips=hips), unit
+    return BodyTrack(times=times, points=points, upright=_upright(rest), hips=hips), found
 
 
 def length_unit(points: Vec) -> str:
@@ -188,7 +200,13 @@ def _upright(rest: Vec) -> Vec:
     return np.asarray(heading @ frame)
 
 
-def _require_a_place(points: Vec) -> None:
+def _require_a_body(points: Vec) -> None:
+    """Refuse a person whose parts are no person's, who is far away, or who never moves."""
+    for name, length in measure(points).lengths().items():
+        low, high = LENGTHS[name.removesuffix("_r").removesuffix("_l")]
+        if not low <= length <= high:
+            rule = f"must be {low} to {high} m long, by the unit that the right arm has"
+            raise BadMotion([Fault(place=name, value=f"{length:.3f} m", rule=rule)])
     far = float(np.abs(points[:, PELVIS]).max())
     if far > 100.0:
         rule = "must lie within 100 m of the file's origin, in the unit of the skeleton"
@@ -197,3 +215,22 @@ def _require_a_place(points: Vec) -> None:
         raise BadMotion([Fault(place="pelvis", value=value, rule=rule, hint=hint)])
     if not np.isfinite(points).all() or np.ptp(points[:, ELBOW_R], axis=0).max() <= 0.0:
         raise BadMotion([Fault(place="frames", value="", rule="show nobody who moves")])
+
+
+def _require_elbows(points: Vec) -> None:
+    """Refuse a person whose elbows bend backward: seen in a mirror, or sides mixed up.
+
+    The elbow's axis points to the right of a person whose arms hang or are raised to the front;
+    with arms to the sides it is square to the line across the shoulders.
+    """
+    across = unit(points[:, SHOULDER_L] - points[:, SHOULDER_R])
+    backward = 0.0
+    for shoulder in (SHOULDER_R, SHOULDER_L):
+        segments = unit(np.diff(points[:, shoulder : shoulder + 3], axis=1))
+        normal = np.cross(segments[:, 0], segments[:, 1])
+        backward += 0.5 * float(np.einsum("ni,ni->n", normal, across).mean())
+    if backward > MAX_BACKWARD:
+        rule = f"must be at most {MAX_BACKWARD} of what elbows can bend"
+        hint = "left and right are mixed up, or the file shows a mirror image"
+        place = "elbows, bent backward"
+        raise BadMotion([Fault(place=place, value=f"{backward:.2f}", rule=rule, hint=hint)])

@@ -97,6 +97,16 @@ def test_person_who_hangs_head_down_is_refused() -> None:
     assert "must point up, along y or z" in fault(text)
 
 
+def test_body_with_an_arm_of_no_length_is_refused() -> None:
+    text = bvh_text(working(10)).replace("OFFSET 0.0 -290.0", "OFFSET 0.0 0.0", 1)
+    assert fault(text).startswith("upper_arm_l = 0.000 m must be 0.15 to 0.5 m long")
+
+
+def test_person_whose_sides_are_mixed_up_is_refused() -> None:
+    text = bvh_text(working(10)).replace("left_", "x_").replace("right_", "left_")
+    assert "left and right are mixed up" in fault(text.replace("x_", "right_"))
+
+
 def test_frozen_file_is_refused() -> None:
     q = np.tile(working(1), (10, 1))
     assert "show nobody who moves" in fault(bvh_text(q))
