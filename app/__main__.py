@@ -1,4 +1,4 @@
-"""The command line: ``python -m app serve | setup | train | evaluate | bench | cells``.
+"""The command line: ``python -m app VERB``; ``--help`` lists the verbs.
 
 The same verbs as the HTTP interface. Results go to standard output (``--json``: one object),
 logs to standard error. Exit status 0 whatever the result says, 1 where the machine is in the
@@ -97,6 +97,10 @@ def parser() -> argparse.ArgumentParser:
     one = verb("cells", run_cells, "List, show, check, add or remove work cells.")
     one.add_argument("action", choices=("list", "show", "check", "add", "remove"))
     one.add_argument("target", nargs="?", metavar="FILE|NAME")
+    one.add_argument("--json", action="store_true")
+    one = verb("motions", run_motions, "Import a file of recorded human motion and measure it.")
+    one.add_argument("action", choices=("import",))
+    one.add_argument("file", type=Path, metavar="FILE", help=".bvh, .mot, .sto or .csv")
     one.add_argument("--json", action="store_true")
     return top
 
@@ -250,6 +254,24 @@ def run_cells(options: argparse.Namespace) -> int:
             print(f"{options.target}: {fault.text}", file=sys.stderr)
         if options.json:
             print(json.dumps({"ok": False, "faults": [asdict(one) for one in error.faults]}))
+        return WRONG_CALL
+    print(json.dumps(data) if options.json else text)
+    return 0
+
+
+def run_motions(options: argparse.Namespace) -> int:
+    """Import recorded motion; a bad file is told with all its faults."""
+    prepare_kernels(load_settings())
+    from app.errors import BadMotion
+    from app.motion_verbs import faulty, import_motion
+
+    try:
+        text, data = import_motion(options.file)
+    except BadMotion as error:
+        for fault in error.faults:
+            print(f"{options.file}: {fault.text}", file=sys.stderr)
+        if options.json:
+            print(json.dumps(faulty(error)))
         return WRONG_CALL
     print(json.dumps(data) if options.json else text)
     return 0

@@ -3,7 +3,8 @@
     ServiceError
     ├── NotFound             nothing has that name or id
     ├── InvalidInput         a value breaks a rule: field, value, rule, choices
-    │   └── BadCell          a work cell has faults: all of them, each with its place
+    │   ├── BadCell          a work cell has faults: all of them, each with its place
+    │   └── BadMotion        a motion file has faults: each with its place
     ├── Conflict             the request contradicts the present state
     │   └── StaleAttempt     a worker writes about a job that is no longer its own
     ├── StorageUnavailable   the database does not answer for now
@@ -86,10 +87,10 @@ class InvalidInput(ServiceError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fault:
-    """One thing that is wrong with a work cell, for a cell engineer to mend."""
+    """One thing that is wrong with a work cell or a file, for its author to mend."""
 
     place: str
-    """Where: ``"stations.cube3.position[2]"``."""
+    """Where: ``"stations.cube3.position[2]"``, ``"line 57"``."""
     value: str
     """What stands there, as text; empty where nothing does."""
     rule: str
@@ -104,8 +105,8 @@ class Fault:
         return f"{self.place}{given} {self.rule}" + (f" ({self.hint})" if self.hint else "")
 
 
-class BadCell(InvalidInput):
-    """A work cell has faults.
+class _Faulty(InvalidInput):
+    """Something that people wrote has faults.
 
     Args:
         faults: All of them, at least one.
@@ -131,6 +132,14 @@ class BadCell(InvalidInput):
             for fault in self.faults
         ]
         return {**errors[0], "errors": errors}
+
+
+class BadCell(_Faulty):
+    """A work cell has faults: all of them, at least one."""
+
+
+class BadMotion(_Faulty):
+    """A file of human motion has faults: at least one, each with its line or column."""
 
 
 class Conflict(ServiceError):

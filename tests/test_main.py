@@ -104,6 +104,10 @@ def test_second_server_on_the_database_says_so_in_one_line(server: tuple[int, Pa
         ["cells", "show", "kitchen"],
         ["cells", "remove", "kitchen"],
         ["cells", "add", "/"],
+        ["motions"],
+        ["motions", "import"],
+        ["motions", "import", "nobody.bvh"],
+        ["motions", "import", "/"],
         ["train", "pick-td3", "--set", "cell=kitchen"],
     ],
 )

@@ -1,0 +1,151 @@
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.errors import BadMotion
+from app.sim.body_track import BodySize, model_points
+from app.sim.glitches import MAX_SPEED
+from app.sim.human import Q_MAX
+from app.sim.motions import MAX_BYTES, beyond_limits, placed, read_motion
+from tests.sim.recorded_person import CMU, bvh_text, csv_text, working
+
+ROOT = Path(__file__).resolve().parents[2]
+CLIPS = sorted(Path(os.environ.get("MOCAP_CLIPS", ROOT.parent / "mocap")).glob("**/*.bvh"))
+"""Recorded clips, which are not part of the checkout; found beside it or where one says."""
+
+
+def with_leap(frames: slice) -> str:
+    """A clip of 4 s in which the right wrist leaps at some frames."""
+    lines = bvh_text(working(200)).splitlines()
+    start = lines.index("Frame Time: 0.02") + 1
+    for k in range(start, len(lines))[frames]:
+        words = lines[k].split()
+        column = 3 + 3 * 9  # the right elbow's first angle
+        words[column : column + 3] = ["170", "0", "0"]
+        lines[k] = " ".join(words)
+    return "\n".join(lines)
+
+
+def test_angles_of_a_known_person_are_found_in_a_bvh_file() -> None:
+    q, height = working(200), 0.95 - 0.1 * np.sin(np.linspace(0.0, 3.0, 200))
+    found = read_motion(bvh_text(q, height, CMU).encode(), "someone.bvh")
+    (run,) = found.runs
+    points = model_points(run.q, run.pelvis_z, run.size)
+    truth = model_points(q, height - np.percentile(height, 95.0), BodySize())
+    assert np.abs(points - truth).max() < 1e-3
+    assert found.wrists.p99 < 1e-3 and found.elbows.worst < 1e-6
+    assert (found.name, found.unit, found.n_frames) == ("someone", "mm", 200)
+    assert found.glitches == ()
+
+
+def test_angles_of_a_table_come_back_as_they_are() -> None:
+    q = working(200)
+    found = read_motion(csv_text(q).encode(), "someone.csv")
+    np.testing.assert_allclose(found.runs[0].q, q, atol=1e-8)
+    assert found.wrists.worst == 0.0
+
+
+def test_table_of_a_crouching_person_keeps_its_pelvis_height() -> None:
+    low = csv_text(working(200)).replace("\n", ",-0.3\n").replace("degrees,-0.3", "degrees")
+    low = low.replace("elbow_l,-0.3", "elbow_l,pelvis_z")
+    (run,) = read_motion(low.encode(), "low.csv").runs
+    np.testing.assert_allclose(run.pelvis_z, -0.3)
+
+
+def test_error_without_the_pelvis_height_is_how_far_the_person_ducks() -> None:
+    height = np.where(np.arange(200) < 100, 0.95, 0.95 - 0.002 * (np.arange(200) - 100))
+    found = read_motion(bvh_text(working(200), height).encode(), "someone.bvh")
+    assert found.wrists_at_fixed_height.worst == pytest.approx(0.198, abs=2e-3)
+
+
+def test_person_of_another_size_keeps_the_angles_and_the_difference_is_told() -> None:
+    text = bvh_text(working(200), unit=0.001 / 1.1)  # read as mm: a tenth larger
+    found = read_motion(text.encode(), "someone.bvh")
+    assert found.size.forearm_r == pytest.approx(0.286)
+    np.testing.assert_allclose(
+        found.runs[0].q[:, [13, 17]], working(200)[:, [13, 17]], atol=1e-4
+    )
+    assert 0.02 < found.fixed_body.p50 < 0.2
+
+
+def test_leap_is_cut_out_and_the_runs_say_where_they_stand() -> None:
+    found = read_motion(with_leap(slice(100, 103)).encode(), "leap.bvh")
+    assert len(found.glitches) == 1
+    assert "wrist_r" in found.glitches[0].parts
+    first, second = found.runs
+    assert first.first_frame == 0 and 103 < second.first_frame < 110
+    assert found.n_clean == len(first.times) + len(second.times) < 200
+    assert second.times[0] == 0.0
+    assert f"frames {second.first_frame} to 199" in second.source
+    assert found.wrists.worst < 1e-3
+
+
+def test_clip_that_leaps_all_the_time_has_no_clean_run() -> None:
+    with pytest.raises(BadMotion, match="has no run of 1 s without a glitch .* first: .*_r at"):
+        read_motion(with_leap(slice(0, 200, 20)).encode(), "leap.bvh")
+
+
+def test_clip_of_half_a_second_is_too_short() -> None:
+    with pytest.raises(BadMotion, match="has no run of 1 s without a glitch .too short"):
+        read_motion(bvh_text(working(25)).encode(), "short.bvh")
+
+
+@pytest.mark.parametrize(
+    ("content", "name", "text"),
+    [
+        (b"", "a.bvh", "file = <0 bytes> is empty"),
+        (b" \n", "a.csv", "is empty"),
+        (b"\xff\xfe", "a.bvh", "byte 0xff at 0"),
+        (b"x", "a.c3d", "must end with .bvh, .mot, .sto, .csv"),
+        (b"x", "a", "must end with"),
+        (b"\x00" * 50, "a.bvh", "has no line MOTION"),
+        (b"x", "a.mot", "has no line endheader"),
+        (b" " * (MAX_BYTES + 1), "a.bvh", "must have at most 33554432 bytes"),
+    ],
+)
+def test_what_is_no_motion_is_a_named_fault(content: bytes, name: str, text: str) -> None:
+    with pytest.raises(BadMotion) as caught:
+        read_motion(content, name)
+    assert text in caught.value.faults[0].text
+
+
+def test_motion_is_moved_to_where_it_shall_begin() -> None:
+    (run,) = read_motion(csv_text(working(100)).encode(), "a.csv").runs
+    moved = placed(run, 0.5, -0.2, 1.0)
+    np.testing.assert_allclose(moved.q[0, :3], [0.5, -0.2, 1.0])
+    before, after = (
+        model_points(one.q, one.pelvis_z, one.size)[:, [1, 4]] for one in (run, moved)
+    )
+    gap = [np.linalg.norm(one[:, 1] - one[:, 0], axis=1) for one in (before, after)]
+    np.testing.assert_allclose(gap[0], gap[1])
+    np.testing.assert_allclose(
+        np.linalg.norm(moved.q[-1, :2] - moved.q[0, :2]),
+        np.linalg.norm(run.q[-1, :2] - run.q[0, :2]),
+    )
+
+
+def test_arrays_of_a_motion_cannot_be_written_to() -> None:
+    (run,) = read_motion(csv_text(working(100)).encode(), "a.csv").runs
+    with pytest.raises(ValueError, match="read-only"):
+        replace(run).q[0, 0] = 1.0
+
+
+def test_joints_beyond_their_limits_are_named_with_share_and_distance() -> None:
+    q = working(100)
+    q[:25, 13] = Q_MAX[13] + 0.2
+    assert beyond_limits(q) == {"elbow_r": (pytest.approx(0.25), pytest.approx(0.2))}
+
+
+if CLIPS:  # without clips there is no test to skip
+
+    @pytest.mark.parametrize("path", CLIPS, ids=lambda path: f"{path.parent.name}/{path.name}")
+    def test_wrists_of_a_recorded_clip_are_met_within_a_centimetre(path: Path) -> None:
+        found = read_motion(path.read_bytes(), path.name)
+        assert found.unit == "mm"
+        assert found.wrists.p99 < 0.01
+        assert found.elbows.worst < 1e-6
+        assert all(one.speed > MAX_SPEED for one in found.glitches)
+        assert all(np.isfinite(run.q).all() for run in found.runs)
