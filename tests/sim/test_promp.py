@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from movement_primitives.promp import ProMP as Oracle
 
 from app.errors import InvalidInput
 from app.sim.ports import Vec
@@ -24,6 +23,7 @@ from app.sim.promp import (
     speeds,
     usual_width,
 )
+from tests.sim import make_promp_reference as reference
 from tests.sim.demonstrations import reaches
 
 Z = np.linspace(0.0, 1.0, 41)
@@ -35,21 +35,11 @@ def promp() -> ProMP:
     return fit(*reaches())
 
 
-def oracle_of(promp: ProMP) -> Oracle:
-    """The package's primitive with our fitted weights."""
-    peer = Oracle(promp.n_joints, promp.n_basis)
-    return peer.from_weight_distribution(promp.mean.ravel().copy(), promp.cov.copy())
-
-
-def oracle_width(n_basis: int) -> float:
-    """The package's width: neighbours overlap by 0.7."""
-    return math.sqrt(-1.0 / (8.0 * n_basis**2 * math.log(0.7)))
-
-
-def blocks(cov: Vec, n_joints: int) -> Vec:
-    """Covariance at each phase, out of the package's matrix over joints and phases."""
-    grid = cov.reshape(n_joints, len(Z), n_joints, len(Z))
-    return np.einsum("jtkt->tjk", grid)
+@pytest.fixture(scope="module")
+def peer() -> dict[str, Vec]:
+    """What the package movement_primitives gives for the same primitive."""
+    with np.load(reference.FILE, allow_pickle=False) as file:
+        return dict(file)
 
 
 def test_basis_sums_to_one_and_peaks_at_its_centres() -> None:
@@ -130,30 +120,28 @@ def test_moments_are_those_of_many_draws(promp: ProMP) -> None:
         np.testing.assert_allclose(off, 0.0, atol=0.06)
 
 
-def test_moments_agree_with_the_package_movement_primitives() -> None:
-    promp = fit(*reaches(), width=oracle_width(12))
-    peer = oracle_of(promp)
-    mean, cov = moments(promp, Z)
-    np.testing.assert_allclose(mean, peer.mean_trajectory(Z.copy()), atol=1e-12)
-    np.testing.assert_allclose(cov, blocks(peer.cov_trajectory(Z.copy()), 18), atol=1e-12)
-    mean, cov = speed_moments(promp, Z, RATE)
-    np.testing.assert_allclose(mean, peer.mean_velocities(Z.copy()), atol=1e-11)
-    np.testing.assert_allclose(cov, blocks(peer.cov_velocities(Z.copy()), 18), atol=1e-11)
+def test_moments_agree_with_the_package_movement_primitives(peer: dict[str, Vec]) -> None:
+    promp, phases = reference.primitive(), reference.Z
+    mean, cov = moments(promp, phases)
+    np.testing.assert_allclose(mean, peer["mean"], atol=1e-9)
+    np.testing.assert_allclose(cov, peer["cov"], atol=1e-9)
+    mean, cov = speed_moments(promp, phases, np.full(len(phases), 1.0))
+    np.testing.assert_allclose(mean, peer["mean_speed"], atol=1e-8)
+    np.testing.assert_allclose(cov, peer["cov_speed"], atol=1e-8)
 
 
-@pytest.mark.parametrize("variance", [1e-6, 1e-4, 1e-2])
-def test_conditioning_agrees_with_the_package_movement_primitives(variance: float) -> None:
-    promp = fit(*reaches(), width=oracle_width(12))
-    peer, rng = oracle_of(promp), np.random.default_rng(5)
-    for phase in (0.0, 0.45, 1.0):
-        target = moments(promp, np.array([phase]))[0][0] + rng.normal(0.0, 0.1, 18)
-        noise = variance * np.eye(18)
-        peer = peer.condition_position(target, y_cov=noise, t=phase)
-        rows = np.kron(np.eye(18), basis(np.array([phase]), 12, promp.width))
+@pytest.mark.parametrize("k", range(len(reference.VARIANCES)))
+def test_conditioning_agrees_with_the_package_movement_primitives(
+    peer: dict[str, Vec], k: int
+) -> None:
+    start = promp = reference.primitive()
+    noise = reference.VARIANCES[k] * np.eye(18)
+    for phase, target in reference.via_points(start):
+        rows = np.kron(np.eye(18), basis(np.array([phase]), reference.N_BASIS, promp.width))
         promp = observe(promp, rows, target, noise)
-    mean, cov = moments(promp, Z)
-    np.testing.assert_allclose(mean, peer.mean_trajectory(Z.copy()), atol=1e-6)
-    np.testing.assert_allclose(cov, blocks(peer.cov_trajectory(Z.copy()), 18), atol=1e-8)
+    mean, cov = moments(promp, reference.Z)
+    np.testing.assert_allclose(mean, peer[f"mean_{k}"], atol=1e-6)
+    np.testing.assert_allclose(cov, peer[f"cov_{k}"], atol=1e-8)
 
 
 def test_observations_together_and_one_by_one_are_the_same(promp: ProMP) -> None:
