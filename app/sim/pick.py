@@ -5,7 +5,6 @@ functions below it do the same for one state, for the live cell and for deciding
 same kernels, so that what was trained is what acts.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -14,12 +13,12 @@ from numpy.typing import NDArray
 
 from app.errors import InvalidInput
 from app.sim.actions import ActionSettings
+from app.sim.batch import CellBatch
 from app.sim.cells import Cell, lacks_stations
 from app.sim.kernels import actions, body, features, kinematics, pick, random, script
 from app.sim.kernels import arm as arm_kernel
 from app.sim.kernels.arm import CONTROLLED, Arm
-from app.sim.kernels.compiled import direct
-from app.sim.kernels.episode import FEATURES, NO_OBS, PLAIN, distance_to
+from app.sim.kernels.episode import FEATURES, PLAIN, distance_to
 from app.sim.kernels.features import N_FEATURES
 from app.sim.kernels.geometry import FAR
 from app.sim.kernels.people import People, PeopleState
@@ -32,7 +31,6 @@ from app.sim.scene import (
     own,
     people_of,
     require_finite,
-    require_shape,
     with_people,
 )
 
@@ -96,20 +94,6 @@ class Piece:
     """Joint speeds at the end [rad/s], shape (6,)."""
     qdd: Vec
     """Joint accelerations at the end [rad/s^2], shape (6,)."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class StepResult:
-    """What one batched step gave; the arrays are overwritten by the next step."""
-
-    obs: NDArray[np.float32]
-    """Observations after the step, of new episodes where one ended, (n_envs, obs_size)."""
-    last_obs: NDArray[np.float32]
-    """Final observation of the rows that ended, (n_envs, obs_size)."""
-    rew: NDArray[np.float32]
-    """Rewards, (n_envs,)."""
-    ended: NDArray[np.int64]
-    """Index into OUTCOMES of episodes that ended now, 0 elsewhere, (n_envs,)."""
 
 
 def _world_of(cell: Cell, settings: PickSettings) -> pick.PickWorld:
@@ -176,7 +160,7 @@ def _new_state(world: pick.PickWorld, people: PeopleState, n_envs: int) -> pick.
     )
 
 
-class PickBatch:
+class PickBatch(CellBatch):
     """Many independent pick cells, stepped together by one thread.
 
     Args:
@@ -192,80 +176,26 @@ class PickBatch:
         self, cell: Cell, n_envs: int, seed: int, settings: PickSettings, first_env: int = 0
     ) -> None:
         self.cell = cell if settings.people is None else with_people(cell, settings.people)
-        self.n_envs, self.seed, self.settings = n_envs, seed, settings
-        self.world = _world_of(self.cell, settings)
+        self.settings, self.world = settings, _world_of(self.cell, settings)
         self.arm = self.world.arm
         people = new_people_state(self.cell, self.world.people, n_envs)
         self.state = _new_state(self.world, people, n_envs)
-        self._work = pick.new_work(self.world, self.state)
-        self._first = first_env
-        self._rules = _rules_of(settings)
-        self._action = settings.action.rule()
-        self._view, self.obs_size = VIEWS[settings.observation]
-        self._obs = np.zeros((n_envs, self.obs_size), dtype=np.float32)
-        self._last = np.zeros_like(self._obs)
-        self._rew = np.zeros(n_envs, dtype=np.float32)
-        self._ended = np.zeros(n_envs, dtype=np.int64)
-        self._step: Callable[..., None] | None = None
-
-    def reset(self, seed: int | None = None) -> NDArray[np.float32]:
-        """Start episode 0 in every cell; return observations, (n_envs, obs_size)."""
-        self.seed = self.seed if seed is None else seed
-        self.state.episode[:] = 0
-        return self.restart()
-
-    def restart(self) -> NDArray[np.float32]:
-        """Start the episodes numbered by ``state.episode``; return the observations."""
-        pick.reset_batch(
-            self.world,
-            self._rules,
-            self.seed,
-            self._first,
-            self.state,
-            self._work,
-            self._view,
-            self._obs,
+        super().__init__(
+            pick,
+            (
+                self.world,
+                _rules_of(settings),
+                settings.action.rule(),
+                settings.weights,
+                self.state,
+                pick.new_work(self.world, self.state),
+            ),
+            n_envs=n_envs,
+            n_act=CONTROLLED,
+            seed=seed,
+            first_env=first_env,
+            view=VIEWS[settings.observation],
         )
-        return self._obs
-
-    def step(
-        self, act: NDArray[np.float32], *, auto_reset: bool = True, features: bool = True
-    ) -> StepResult:
-        """Move every cell through one control period.
-
-        Args:
-            act: Actions in [-1, 1], shape (n_envs, 5); what they mean is in the settings.
-            auto_reset: Start the next episode where one ended; else its row stands still.
-            features: Whether observations are wanted.
-
-        Raises:
-            InvalidInput: The actions have another shape.
-            SimulationError: An action is NaN or infinite.
-        """
-        require_shape("act", act, (self.n_envs, CONTROLLED))
-        require_finite("act", act)
-        wanted = np.array(act, dtype=np.float32, order="C")
-        arguments = (
-            self.world,
-            self._rules,
-            self._action,
-            self.settings.weights,
-            self.seed,
-            self._first,
-            self.state,
-            self._work,
-            wanted,
-            auto_reset,
-            self._view if features else NO_OBS,
-            self._obs,
-            self._last,
-            self._rew,
-            self._ended,
-        )
-        if self._step is None:
-            self._step = direct(pick.step_batch, arguments)
-        self._step(*arguments)
-        return StepResult(obs=self._obs, last_obs=self._last, rew=self._rew, ended=self._ended)
 
     def set_goals(self, rows: NDArray[np.int64], goals: Vec) -> None:
         """Send the robots of ``rows`` to new targets [m], shape (len(rows), 3)."""

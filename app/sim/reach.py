@@ -5,7 +5,6 @@ Source: METHOD 2.1 to 2.3.
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, get_args
 
@@ -14,18 +13,17 @@ from numpy.typing import NDArray
 
 from app.errors import InvalidInput
 from app.sim.actions import ActionSettings
+from app.sim.batch import CellBatch
 from app.sim.cell_parts import GoalRegion, Station
 from app.sim.cell_people import Worker
 from app.sim.cells import Cell
 from app.sim.kernels import reach
-from app.sim.kernels.compiled import direct
-from app.sim.kernels.episode import FEATURES, NO_OBS, PLAIN
+from app.sim.kernels.episode import FEATURES, PLAIN
 from app.sim.kernels.geometry import FAR
 from app.sim.kernels.people import People, PeopleState
 from app.sim.kernels.reach_features import N_FEATURES, N_STATE
 from app.sim.kernels.reach_reward import ReachWeights
 from app.sim.occupancy import AUTHORS_WALK, walker_rules
-from app.sim.pick import StepResult
 from app.sim.ports import Vec
 from app.sim.scene import (
     HumanKind,
@@ -236,7 +234,7 @@ def _new_state(world: reach.ReachWorld, people: PeopleState, n_envs: int) -> rea
     )
 
 
-class ReachBatch:
+class ReachBatch(CellBatch):
     """Many independent reach cells, stepped together by one thread.
 
     Args:
@@ -252,80 +250,26 @@ class ReachBatch:
         self, cell: Cell, n_envs: int, seed: int, settings: ReachSettings, first_env: int = 0
     ) -> None:
         self.cell = _with_people(cell, settings)
-        self.n_envs, self.seed, self.settings = n_envs, seed, settings
-        self.world = _world_of(self.cell, settings)
+        self.settings, self.world = settings, _world_of(self.cell, settings)
         self.arm = self.world.arm
         people = new_people_state(self.cell, self.world.people, n_envs)
         self.state = _new_state(self.world, people, n_envs)
-        self._work = reach.new_work(self.world, self.state)
-        self._first = first_env
-        self._rules = _rules_of(settings)
-        self._action = settings.action.rule()
-        self._view, self.obs_size = VIEWS[settings.observation]
-        self._obs = np.zeros((n_envs, self.obs_size), dtype=np.float32)
-        self._last = np.zeros_like(self._obs)
-        self._rew = np.zeros(n_envs, dtype=np.float32)
-        self._ended = np.zeros(n_envs, dtype=np.int64)
-        self._step: Callable[..., None] | None = None
-
-    def reset(self, seed: int | None = None) -> NDArray[np.float32]:
-        """Start episode 0 in every cell; return observations, (n_envs, obs_size)."""
-        self.seed = self.seed if seed is None else seed
-        self.state.episode[:] = 0
-        return self.restart()
-
-    def restart(self) -> NDArray[np.float32]:
-        """Start the episodes numbered by ``state.episode``; return the observations."""
-        reach.reset_batch(
-            self.world,
-            self._rules,
-            self.seed,
-            self._first,
-            self.state,
-            self._work,
-            self._view,
-            self._obs,
+        super().__init__(
+            reach,
+            (
+                self.world,
+                _rules_of(settings),
+                settings.action.rule(),
+                settings.weights,
+                self.state,
+                reach.new_work(self.world, self.state),
+            ),
+            n_envs=n_envs,
+            n_act=N_ACT,
+            seed=seed,
+            first_env=first_env,
+            view=VIEWS[settings.observation],
         )
-        return self._obs
-
-    def step(
-        self, act: NDArray[np.float32], *, auto_reset: bool = True, features: bool = True
-    ) -> StepResult:
-        """Move every cell through one control period.
-
-        Args:
-            act: Actions in [-1, 1], shape (n_envs, 6); what they mean is in the settings.
-            auto_reset: Start the next episode where one ended; else its row stands still.
-            features: Whether observations are wanted.
-
-        Raises:
-            InvalidInput: The actions have another shape.
-            SimulationError: An action is NaN or infinite.
-        """
-        require_shape("act", act, (self.n_envs, N_ACT))
-        require_finite("act", act)
-        wanted = np.array(act, dtype=np.float32, order="C")
-        arguments = (
-            self.world,
-            self._rules,
-            self._action,
-            self.settings.weights,
-            self.seed,
-            self._first,
-            self.state,
-            self._work,
-            wanted,
-            auto_reset,
-            self._view if features else NO_OBS,
-            self._obs,
-            self._last,
-            self._rew,
-            self._ended,
-        )
-        if self._step is None:
-            self._step = direct(reach.step_batch, arguments)
-        self._step(*arguments)
-        return StepResult(obs=self._obs, last_obs=self._last, rew=self._rew, ended=self._ended)
 
     def set_goals(self, rows: NDArray[np.int64], goals: Vec) -> NDArray[np.float32]:
         """Send the robots of ``rows`` to other goals, until their episodes end.

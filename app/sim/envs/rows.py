@@ -8,8 +8,9 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from app.sim.batch import StepResult
 from app.sim.cells import Cell, load_cell
-from app.sim.pick import OUTCOMES, PickSettings, StepResult
+from app.sim.pick import OUTCOMES, PickSettings
 from app.sim.ports import Vec
 from app.sim.reach import ReachSettings
 from app.sim.scene import HumanKind

@@ -1,0 +1,126 @@
+"""Many cells of one scenario, stepped together by one thread.
+
+What the batches of both scenarios share: buffers, restarts and steps around the compiled
+kernels of ``kernels/pick.py`` and ``kernels/reach.py``, which take the same arguments.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.sim.kernels.compiled import direct
+from app.sim.kernels.episode import NO_OBS
+from app.sim.scene import require_finite, require_shape
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StepResult:
+    """What one batched step gave; the arrays are overwritten by the next step."""
+
+    obs: NDArray[np.float32]
+    """Observations after the step, of new episodes where one ended, (n_envs, obs_size)."""
+    last_obs: NDArray[np.float32]
+    """Final observation of the rows that ended, (n_envs, obs_size)."""
+    rew: NDArray[np.float32]
+    """Rewards, (n_envs,)."""
+    ended: NDArray[np.int64]
+    """Index into OUTCOMES of episodes that ended now, 0 elsewhere, (n_envs,)."""
+
+
+class CellBatch:
+    """Restarts and steps the rows of a scenario.
+
+    Args:
+        kernel: The scenario's kernels: ``reset_batch`` and ``step_batch``.
+        shared: World, rules, action rule, reward weights, rows and work space, as they take
+            them.
+        n_envs: Number of cells.
+        n_act: Numbers per action.
+        seed: Seed; episode ``k`` of cell ``e`` is fixed by (seed, e, k).
+        first_env: Number of the first cell in the random streams.
+        view: What observations hold, and how many numbers they are.
+    """
+
+    def __init__(
+        self,
+        kernel: ModuleType,
+        shared: tuple[Any, Any, Any, Any, Any, Any],
+        *,
+        n_envs: int,
+        n_act: int,
+        seed: int,
+        first_env: int,
+        view: tuple[int, int],
+    ) -> None:
+        self.n_envs, self.seed = n_envs, seed
+        self._kernel, self._n_act, self._first = kernel, n_act, first_env
+        self._world, self._rules, self._action, self._weights, self._rows, self._work = shared
+        self._view, self.obs_size = view
+        self._obs = np.zeros((n_envs, self.obs_size), dtype=np.float32)
+        self._last = np.zeros_like(self._obs)
+        self._rew = np.zeros(n_envs, dtype=np.float32)
+        self._ended = np.zeros(n_envs, dtype=np.int64)
+        self._step: Callable[..., None] | None = None
+
+    def reset(self, seed: int | None = None) -> NDArray[np.float32]:
+        """Start episode 0 in every cell; return observations, (n_envs, obs_size)."""
+        self.seed = self.seed if seed is None else seed
+        self._rows.episode[:] = 0
+        return self.restart()
+
+    def restart(self) -> NDArray[np.float32]:
+        """Start the episodes numbered by ``state.episode``; return the observations."""
+        self._kernel.reset_batch(
+            self._world,
+            self._rules,
+            self.seed,
+            self._first,
+            self._rows,
+            self._work,
+            self._view,
+            self._obs,
+        )
+        return self._obs
+
+    def step(
+        self, act: NDArray[np.float32], *, auto_reset: bool = True, features: bool = True
+    ) -> StepResult:
+        """Move every cell through one control period.
+
+        Args:
+            act: Actions in [-1, 1], shape (n_envs, n_act); what they mean is in the settings.
+            auto_reset: Start the next episode where one ended; else its row stands still.
+            features: Whether observations are wanted.
+
+        Raises:
+            InvalidInput: The actions have another shape.
+            SimulationError: An action is NaN or infinite.
+        """
+        require_shape("act", act, (self.n_envs, self._n_act))
+        require_finite("act", act)
+        wanted = np.array(act, dtype=np.float32, order="C")
+        arguments = (
+            self._world,
+            self._rules,
+            self._action,
+            self._weights,
+            self.seed,
+            self._first,
+            self._rows,
+            self._work,
+            wanted,
+            auto_reset,
+            self._view if features else NO_OBS,
+            self._obs,
+            self._last,
+            self._rew,
+            self._ended,
+        )
+        if self._step is None:
+            self._step = direct(self._kernel.step_batch, arguments)
+        self._step(*arguments)
+        return StepResult(obs=self._obs, last_obs=self._last, rew=self._rew, ended=self._ended)
