@@ -38,6 +38,7 @@ from app.sim.kernels.columns import (
 )
 from app.sim.kernels.compiled import kernel
 from app.sim.kernels.geometry import FAR, FAST, segment_nearest
+from app.sim.kernels.layout import slices_of
 from app.sim.kernels.people import People
 from app.sim.ports import Vec
 
@@ -76,16 +77,7 @@ SIZES = (
     ("goal_clearance", 4),
 )
 
-
-def _layout() -> dict[str, slice]:
-    slices, start = {}, 0
-    for name, size in SIZES:
-        slices[name] = slice(start, start + size)
-        start += size
-    return slices
-
-
-LAYOUT = _layout()
+LAYOUT = slices_of(SIZES)
 """Slice of each group of features in the observation."""
 N_FEATURES = sum(size for _, size in SIZES)
 """Length of the observation."""

@@ -15,8 +15,7 @@ in it: x, y, vx, vy, r tell where the axis is one period later.
 
 The three sines need one sine and one cosine: with those of ``w t`` the ones of its multiples
 are products, and ``a sin(k w t + p) = (a cos p) sin(k w t) + (a sin p) cos(k w t)``. A walker
-is one row of one array: a tuple of twenty arrays costs three times as much, in counting
-references.
+is one row of one array, so that a state is handed on as a whole.
 
 Deviates: the authors' public code draws the constants of the speed anew at every step, which
 is not the continuous function that the text describes, and uses 0.1 for the third amplitude;

@@ -133,7 +133,7 @@ class PickState(NamedTuple):
 
 
 class Work(NamedTuple):
-    """Work space of one thread; made once per call of a batch, used row after row."""
+    """Work space of one thread; made once per batch, used row after row."""
 
     robot: RobotPose
     """A pose of the robot."""

@@ -26,6 +26,7 @@ from app.sim.kernels.compiled import kernel
 from app.sim.kernels.cylinder import cylinder_clearance
 from app.sim.kernels.features import HORIZONS, Sight, look_ahead, new_sight, see_person
 from app.sim.kernels.geometry import FAR
+from app.sim.kernels.layout import slices_of
 from app.sim.kernels.occupancy import VX, VY, R
 from app.sim.kernels.occupancy import X as WALKER_X
 from app.sim.kernels.occupancy import Y as WALKER_Y
@@ -65,16 +66,7 @@ SIZES = (
     ("time_left", 1),
 )
 
-
-def _layout() -> dict[str, slice]:
-    slices, start = {}, 0
-    for name, size in SIZES:
-        slices[name] = slice(start, start + size)
-        start += size
-    return slices
-
-
-LAYOUT = _layout()
+LAYOUT = slices_of(SIZES)
 """Slice of each group of features in the observation."""
 N_FEATURES = sum(size for _, size in SIZES)
 """Length of the observation."""

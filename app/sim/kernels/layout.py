@@ -1,0 +1,12 @@
+"""Where each group of features stands in an observation."""
+
+from collections.abc import Iterable
+
+
+def slices_of(sizes: Iterable[tuple[str, int]]) -> dict[str, slice]:
+    """Return the slice of each group, from names and sizes in order."""
+    slices, start = {}, 0
+    for name, size in sizes:
+        slices[name] = slice(start, start + size)
+        start += size
+    return slices
