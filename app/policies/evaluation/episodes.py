@@ -18,6 +18,7 @@ from app.sim.kernels import episode as kernel
 from app.sim.kernels.features import LAYOUT, N_FEATURES, observe_batch
 from app.sim.pick import OUTCOMES, PickBatch, PickSettings
 from app.sim.recheck import Trajectory
+from app.sim.worker_motion import WorkSettings
 
 Index = NDArray[np.int64]
 EVALUATION_LIBRARY = 1_000_003
@@ -108,8 +109,9 @@ def settings_for(n_candidates: tuple[int, int], preset: dict[str, object]) -> Pi
         time_limit_s=10.0,
         start_clearance_m=0.05,
         n_candidates=n_candidates,
-        human_pace=float(pace) if isinstance(pace, int | float) else 1.0,
-        library_seed=EVALUATION_LIBRARY,
+        work=WorkSettings(
+            seed=EVALUATION_LIBRARY, pace=float(pace) if isinstance(pace, int | float) else 1.0
+        ),
         action=action_of(preset),
     )
 
