@@ -20,7 +20,7 @@ from app.policies.checkpoint import Checkpoint, expect_layout
 from app.policies.networks import ResidualActor, TwinCritic
 from app.policies.presets import action_of
 from app.policies.trained_cell import cell_of
-from app.policies.training import LAYOUT
+from app.policies.training import LAYOUTS
 from app.sim import human, robot
 from app.sim.actions import ActionSettings
 from app.sim.cells import Cell, require_cell
@@ -46,9 +46,13 @@ class ValueNetworks:
     """
 
     def __init__(self, checkpoint: Checkpoint) -> None:
-        expect_layout(checkpoint, LAYOUT, CONTROLLED)
+        kind = checkpoint.manifest["preset"].get("observation", "features")
+        expect_layout(checkpoint, LAYOUTS.get(kind, LAYOUTS["features"]), CONTROLLED)
         width = int(checkpoint.manifest["width"])
-        self.actor, self.critic = ResidualActor(width), TwinCritic(width)
+        self.n_obs = sum(size for _, size in checkpoint.manifest["layout"])
+        """Length of the observations."""
+        self.actor = ResidualActor(width, self.n_obs)
+        self.critic = TwinCritic(width, self.n_obs)
         arrays = checkpoint.arrays()
         for name, module in (("actor", self.actor), ("critic", self.critic)):
             start = f"{name}."
@@ -157,7 +161,15 @@ class TaskChooser:
         if not (np.isfinite(time_left_s) and 0.0 <= time_left_s <= 60.0):
             raise InvalidInput("time_left_s", time_left_s, "must lie in [0, 60] s")
         obs, reachable = observe(
-            self._arm, self._people, q, qd, person.q, person.qd, goals, time_left_s
+            self._arm,
+            self._people,
+            q,
+            qd,
+            person.q,
+            person.qd,
+            goals,
+            time_left_s,
+            n_obs=self._networks.n_obs,
         )
         act, values = self._networks.act_and_value(obs)
         last = ids.index(previous) if previous in ids else None
