@@ -29,6 +29,7 @@ from app.sim.ports import TaskPolicy
 from app.store.engine import Store
 from app.store.records import NewCheckpoint
 from jobs.cells import CellCatalog
+from jobs.motions import MotionCatalog
 from jobs.supervisor import Supervisor
 from web.loop import LiveCell
 
@@ -92,6 +93,7 @@ class Service:
             supervisor=supervisor,
             policies=policies,
             cells=CellCatalog(store),
+            motions=MotionCatalog(store),
             start_world=start_world,
         )
         self._warm_up = threading.Thread(target=self._start_cell, name="warm-up", daemon=True)
