@@ -22,7 +22,7 @@ class StraightPolicy:
 
     def __init__(self, cell: Cell) -> None:
         self.cell, self.cell_sha256 = cell.name, cell.sha256
-        self._arm, self._pelvis_z = arm_of(cell), cell.pelvis_z
+        self._arm, self._size = arm_of(cell), cell.body
 
     def decide(
         self,
@@ -39,7 +39,7 @@ class StraightPolicy:
         postures, reachable = kinematics.ik_vertical_batch(
             goals, arm.tool_length, arm.q_min, arm.q_max
         )
-        points = human.joint_points(people[0].q, self._pelvis_z)
+        points = human.joint_points(people[0].q, self._size)
         hands = np.stack([points["hand_r"], points["hand_l"]])
         near = np.linalg.norm(goals[:, None] - hands, axis=2).min(axis=1)
         values = 4.0 - np.abs(postures - q).max(axis=1) - 4.0 * np.exp(-((near / 0.2) ** 2))

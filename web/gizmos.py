@@ -96,7 +96,7 @@ class Gizmos:
         if not manual:
             self._released.clear()
             return
-        points = human.joint_points(snapshot.person_q, self._cell.pelvis_z)
+        points = human.joint_points(snapshot.person_q, self._cell.body)
         if self._free("pelvis"):
             _move(self._pelvis, points["pelvis"], upright(float(snapshot.person_q[2])))
         for name, gizmo in self._hands.items():

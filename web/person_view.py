@@ -33,7 +33,7 @@ class PersonView:
             else:
                 self._solids.append((self._add_solid(part), part.bone))
         rest = human.rest_posture(0.0, 0.0, 0.0)
-        ends = human.capsules(rest, cell.pelvis_z, cell.floor_z)
+        ends = human.capsules(rest, cell.body, cell.floor_z)
         self._capsules = CapsulesView(server, "/person/shapes")
         for name, radius, (start, end) in zip(
             human.CAPSULE_NAMES, human.CAPSULE_RADII, ends, strict=True
@@ -69,12 +69,12 @@ class PersonView:
             q: Joint positions [m, rad], shape (18,).
             dt: Time since the last call [s], for the steps of the feet.
         """
-        pelvis = human.body_frames(q, self._cell.pelvis_z)["pelvis"]
+        pelvis = human.body_frames(q, self._cell.body)["pelvis"]
         walking = self._gait.follow(pelvis, dt)
         if not walking and self._drawn is not None and np.array_equal(q, self._drawn):
             return
         self._drawn = q.copy()
-        bones = skeleton.bones(q, self._cell.pelvis_z, self._gait.feet)
+        bones = skeleton.bones(q, self._cell.body, self._gait.feet)
         for skin, names in self._skins:
             frames = np.stack([bones[name] for name in names])
             turns = orientation(frames[:, :3, :3])
@@ -83,7 +83,7 @@ class PersonView:
         for solid, name in self._solids:
             solid.wxyz = orientation(bones[name][:3, :3])
             solid.position = bones[name][:3, 3]
-        self._capsules.place(human.capsules(q, self._cell.pelvis_z, self._cell.floor_z))
+        self._capsules.place(human.capsules(q, self._cell.body, self._cell.floor_z))
 
     def show_capsules(self, visible: bool, touched: str | None) -> None:
         """Show or hide the simulator's capsules; the one that was touched stays, red."""

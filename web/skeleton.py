@@ -14,6 +14,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from app.sim import human
+from app.sim.body_size import MEDIAN
 from web.poses import Vec, part_way
 
 Bones = dict[str, Vec]
@@ -90,21 +91,21 @@ def _pointing(origin: Vec, tip: Vec, forward: Vec) -> Vec:
     return frame
 
 
-def bones(q: Vec, pelvis_z: float, feet: Mapping[str, Vec]) -> Bones:
+def bones(q: Vec, size: Vec, feet: Mapping[str, Vec]) -> Bones:
     """Return every bone's pose.
 
     Args:
         q: Joint positions [m, rad], shape (18,).
-        pelvis_z: Height of the pelvis [m].
+        size: The person's size [m], shape (12,) (``Cell.body``).
         feet: T_world_foot by side, ``"r"`` and ``"l"``.
     """
-    body = human.body_frames(q, pelvis_z)
+    body = human.body_frames(q, size)
     pelvis, torso = body["pelvis"], body["torso"]
     out = {"pelvis": pelvis, "torso": torso}
     out["spine_1"] = _between(pelvis, torso, 1.0 / 3.0)
     out["spine_2"] = _between(pelvis, torso, 2.0 / 3.0)
     head = _between(pelvis, torso, 0.6)
-    head[:3, 3] = human.joint_points(q, pelvis_z)["neck"]
+    head[:3, 3] = human.joint_points(q, size)["neck"]
     out["head"] = head
     for side in SIDES:
         upper, fore = body[f"upper_arm_{side}"], body[f"forearm_{side}"]
@@ -123,7 +124,7 @@ def bones(q: Vec, pelvis_z: float, feet: Mapping[str, Vec]) -> Bones:
 def bind_bones() -> Bones:
     """Return the bones in the pose the mannequin is modelled in, pelvis at the origin."""
     feet = rest_feet(np.eye(4), -PELVIS_HEIGHT)
-    return bones(BIND_Q, 0.0, feet)
+    return bones(BIND_Q, MEDIAN.vector(-MEDIAN.pelvis), feet)
 
 
 def _ramp(x: Vec, low: float, high: float) -> Vec:

@@ -24,6 +24,7 @@ import numpy as np
 
 from app.errors import InvalidInput
 from app.sim import human
+from app.sim.body_size import MEDIAN
 from app.sim.human import Hand
 from app.sim.phase import min_jerk, read
 from app.sim.ports import Vec
@@ -201,7 +202,7 @@ def _turned(q: Vec, hand: Hand, turn: float, points: PointsOf, before: Vec) -> V
     arm = q[10:14] if hand == "r" else q[14:18]
     if turn == 0.0:
         return arm
-    named, frames = points(q), human.body_frames(q, 0.0)
+    named, frames = points(q), human.body_frames(q, MEDIAN.vector(0.0))
     line = named[f"hand_{hand}"] - named[f"shoulder_{hand}"]
     torso, upper = frames["torso"][:3, :3], frames[f"upper_arm_{hand}"][:3, :3]
     r = torso.T @ _about(line / np.linalg.norm(line), turn) @ upper

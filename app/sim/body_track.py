@@ -1,17 +1,16 @@
 """Joint centres of a recorded person, frame by frame, and the body measured from them.
 
-A :class:`BodyTrack` is what every importer of positions delivers, in metres, z up; a
-:class:`BodySize` holds the lengths of the 18-DoF model's segments for one person, and
-:func:`model_points` is the model's forward kinematics for any such lengths and many frames at
-once (the compiled ``kernels/body.py`` has the lengths of the simulator's person built in).
+A :class:`BodyTrack` is what every importer of positions delivers, in metres, z up;
+:func:`measure` finds the person's lengths in it, and :func:`model_points` is the model's
+forward kinematics for any lengths and many frames at once, with a pelvis that rises and falls.
 """
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from app.sim.body_size import BodySize
 from app.sim.bvh import axis_turns
-from app.sim.kernels import body
 from app.sim.ports import Vec
 
 TRACK_NAMES = (
@@ -30,30 +29,6 @@ ARM_POINTS = (ELBOW_R, WRIST_R, ELBOW_L, WRIST_L)
 """The points by which the error of an import is measured."""
 SIDES = {"r": -1.0, "l": 1.0}
 """Sign of the body's lateral axis (y, to the left) on either side."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BodySize:
-    """Lengths of the segments of the 18-DoF model [m]."""
-
-    trunk: float = body.NECK_HEIGHT
-    """Pelvis to the base of the neck."""
-    clavicle_r: float = body.CLAVICLE
-    """Base of the neck to the right shoulder."""
-    clavicle_l: float = body.CLAVICLE
-    """Base of the neck to the left shoulder."""
-    upper_arm_r: float = body.UPPER_ARM
-    """Right shoulder to elbow."""
-    upper_arm_l: float = body.UPPER_ARM
-    """Left shoulder to elbow."""
-    forearm_r: float = body.FOREARM
-    """Right elbow to wrist."""
-    forearm_l: float = body.FOREARM
-    """Left elbow to wrist."""
-
-    def lengths(self) -> dict[str, float]:
-        """Return the lengths by name [m]."""
-        return asdict(self)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,7 +8,10 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from app.sim.body_size import BodySize, percentile_body
 from app.sim.cell_parts import TURN, CellData, Each, Length, Radius, Share, Speed, Three, Within
+
+Percentile = Annotated[float, Within(1.0, 99.0, "percentile")]
 
 
 class _Walking(CellData):
@@ -35,8 +38,20 @@ class Worker(_Walking):
         ),
     ] = Field(description="pelvis x, y [m] and yaw [rad] when at rest")
     pelvis_height: Annotated[float, Within(0.4, 1.4, "m")] = Field(
-        description="pelvis above the floor [m]"
+        description="pelvis above the floor, of a person of median stature [m]"
     )
+    stature: Percentile = Field(default=50.0, description="stature, percentile of adults")
+    arms: Percentile = Field(
+        default=50.0, description="length of the arms at that stature, percentile"
+    )
+    shoulders: Percentile = Field(
+        default=50.0, description="width of the shoulders at that stature, percentile"
+    )
+
+    @property
+    def size(self) -> BodySize:
+        """How large the person is."""
+        return percentile_body(self.stature, self.arms, self.shoulders, self.pelvis_height)
 
 
 class _Cylinder(_Walking):

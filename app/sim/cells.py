@@ -19,6 +19,7 @@ import numpy as np
 from pydantic import Field, ValidationError
 
 from app.errors import CheckpointMismatch, InvalidInput, NotFound
+from app.sim.body_size import MEDIAN
 from app.sim.cell_parts import (
     CellData,
     GoalRegion,
@@ -36,8 +37,6 @@ LIMITS = {"stations": 128, "obstacles": 32, "people": 4}
 """Longest list of each name."""
 MAX_TARGETS = 2000
 """Most grid points of a goal region."""
-DEFAULT_PELVIS_HEIGHT = 0.95
-"""Pelvis over the floor where a cell has no worker to say it [m]."""
 
 
 class Cell(CellData):
@@ -80,10 +79,11 @@ class Cell(CellData):
         raise NotFound("worker in the cell", self.name)
 
     @property
-    def pelvis_z(self) -> float:
-        """Height of the first worker's pelvis in the cell's frame [m]."""
-        heights = [person.pelvis_height for person in self.workers]
-        return self.floor_z + (heights[0] if heights else DEFAULT_PELVIS_HEIGHT)
+    def body(self) -> Vec:
+        """Size of the first worker as kernels take it [m], shape (12,); median where none."""
+        for person in self.workers:
+            return person.size.vector(self.floor_z)
+        return MEDIAN.vector(self.floor_z)
 
     @property
     def station_ids(self) -> tuple[str, ...]:

@@ -72,8 +72,8 @@ def shapes_of(
             raise InvalidInput(name, rows.tolist(), f"must be finite, of shape (n, {width})")
     if len(qs) == 0:
         return Shapes(columns=np.zeros((N_ROWS, 0)), cylinders=tubes)
-    ends = np.concatenate([human.capsules(q, cell.pelvis_z, cell.floor_z) for q in qs])
-    workers = capsule_shapes(ends, np.tile(human.CAPSULE_RADII, len(qs)))
+    ends = np.concatenate([human.capsules(q, cell.body, cell.floor_z) for q in qs])
+    workers = capsule_shapes(ends, np.tile(human.capsule_radii(cell.body), len(qs)))
     return replace(workers, cylinders=tubes)
 
 

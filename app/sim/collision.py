@@ -155,14 +155,19 @@ class CollisionReference:
         }
         self._tool = tool_capsule(cell.robot.tool_length, cell.robot.tool_radius)
         self._bodies[TOOL] = make_capsule(cell.robot.tool_radius, *self._tool)
-        ends = human.capsules(np.zeros(18), cell.pelvis_z, cell.floor_z)
+        self._obstacles = _obstacles(cell)
+        self.set_person(cell.body)
+
+    def set_person(self, size: Vec) -> None:
+        """Exchange the person for one of another size [m], shape (12,)."""
+        self._size = size
+        ends = human.capsules(np.zeros(18), size, self._cell.floor_z)
         self._person = {
             name: make_capsule(radius, p0, p1)
             for name, radius, (p0, p1) in zip(
-                human.CAPSULE_NAMES, human.CAPSULE_RADII, ends, strict=True
+                human.CAPSULE_NAMES, human.capsule_radii(size), ends, strict=True
             )
         }
-        self._obstacles = _obstacles(cell)
 
     def place_robot(self, q: Vec) -> None:
         """Move the robot's bodies to joint positions ``q`` [rad], shape (6,)."""
@@ -174,7 +179,7 @@ class CollisionReference:
 
     def place_person(self, human_q: Vec) -> None:
         """Move the person's capsules to joint positions ``human_q``, shape (18,)."""
-        ends = human.capsules(human_q, self._cell.pelvis_z, self._cell.floor_z)
+        ends = human.capsules(human_q, self._size, self._cell.floor_z)
         for body, (p0, p1) in zip(self._person.values(), ends, strict=True):
             place_capsule(body, p0, p1)
 

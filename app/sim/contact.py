@@ -13,7 +13,7 @@ from app.sim.kernels import arm as arm_kernel
 from app.sim.kernels import contact as kernel
 from app.sim.kernels import people as people_kernel
 from app.sim.kernels.arm import Arm
-from app.sim.kernels.body import N_CAPSULES
+from app.sim.kernels.body import N_CAPSULES, PELVIS_Z
 from app.sim.kernels.columns import distances
 from app.sim.kernels.cylinder import cylinder_clearance
 from app.sim.kernels.people import Crowd, People
@@ -53,7 +53,14 @@ class Clearance:
     """Of its own links to each other [m]."""
 
 
-def clearance(arm: Arm, people: People, q: Vec, human_q: Vec, cylinders: Vec) -> Clearance:
+def clearance(
+    arm: Arm,
+    people: People,
+    q: Vec,
+    human_q: Vec,
+    cylinders: Vec,
+    sizes: Vec | None = None,
+) -> Clearance:
     """Return the distances of the robot at ``q``.
 
     Args:
@@ -62,10 +69,11 @@ def clearance(arm: Arm, people: People, q: Vec, human_q: Vec, cylinders: Vec) ->
         q: Joint positions [rad], shape (6,).
         human_q: The workers' joints [m, rad], shape (W, 18).
         cylinders: The walkers' x, y and radius [m], shape (C, 3).
+        sizes: The workers' sizes [m], shape (W, body.N_SIZE); None for the cell's person.
     """
     robot = arm_kernel.new_robot_pose(arm)
     arm_kernel.place_robot(arm, own(q), robot)
-    crowd = crowd_of(people, human_q, cylinders)
+    crowd = crowd_of(people, human_q, cylinders, sizes)
     to_people, to_cell, to_self = kernel.clearances(arm, people, robot, crowd)
     return Clearance(people_m=to_people, cell_m=to_cell, self_m=to_self)
 
@@ -79,6 +87,7 @@ def contact(
     d: Vec,
     human_q: tuple[Vec, Vec],
     cylinders: tuple[Vec, Vec] = (NO_CYLINDERS, NO_CYLINDERS),
+    sizes: Vec | None = None,
 ) -> Contact:
     """Test one control period for contact, between its ends too.
 
@@ -91,6 +100,7 @@ def contact(
         d: Third coefficients of the period [rad/s^3], shape (6,).
         human_q: The workers' joints at start and end [m, rad], shape (W, 18) each.
         cylinders: The walkers' x, y, radius at start and end [m], shape (C, 3) each.
+        sizes: The workers' sizes [m], shape (W, body.N_SIZE); None for the cell's person.
 
     Raises:
         SimulationError: A number is NaN or infinite.
@@ -101,7 +111,8 @@ def contact(
     q0, qd0, c, d = own(q0), own(qd0), own(c), own(d)
     robot = arm_kernel.new_robot_pose(arm)
     arm_kernel.place_robot(arm, q0, robot)
-    crowd = crowd_of(people, human_q[0], cylinders[0])
+    crowd = crowd_of(people, human_q[0], cylinders[0], sizes)
+    crowd.pelvis_z[:] = crowd.size[:, PELVIS_Z]
     crowd.q0[:], crowd.cylinders0[:] = human_q[0], cylinders[0]
     clear = np.array(kernel.clearances(arm, people, robot, crowd))
     kind, x = kernel.sweep(

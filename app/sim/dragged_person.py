@@ -58,7 +58,7 @@ class DraggedPerson:
                 self._hands[hand] = np.array(point)
         posture = human.solve_hands(
             self._target,
-            self._cell.pelvis_z,
+            self._cell.body,
             right=self._hands.get("r"),
             left=self._hands.get("l"),
             pelvis=pelvis,

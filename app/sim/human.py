@@ -71,6 +71,7 @@ POINT_NAMES = (
 FRAME_NAMES = ("pelvis", "torso", "upper_arm_r", "forearm_r", "upper_arm_l", "forearm_l")
 FRAME_ORIGINS = ("pelvis", "pelvis", "shoulder_r", "elbow_r", "shoulder_l", "elbow_l")
 CAPSULE_RADII = body.RADII
+"""Radii of the median person's capsules [m]."""
 
 _ARM_MIN, _ARM_MAX = (-1.2, -0.8, -2.2, 0.0), (3.0, 2.6, 2.2, 2.6)
 Q_MIN = np.array([-5.0, -5.0, -7.0, -0.4, -0.6, -1.0, *([-0.5] * 4), *_ARM_MIN, *_ARM_MIN])
@@ -82,10 +83,8 @@ Q_MAX.setflags(write=False)
 
 REST_ARM = (0.15, 0.18, 0.0, 0.6)
 """Arm hanging relaxed: flexion, abduction, rotation, elbow [rad]."""
-FULL_REACH = body.UPPER_ARM + body.FOREARM + body.HAND
-"""Shoulder to palm of a straight arm [m]."""
-EASY_REACH = 0.92 * FULL_REACH
-"""Distance beyond which the torso helps the arm [m]."""
+EASY_REACH = 0.92
+"""Share of an arm's length beyond which the torso helps."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -113,39 +112,51 @@ def rest_posture(x: float, y: float, yaw: float) -> Vec:
     return q
 
 
-def _forward(q: Vec, pelvis_z: float) -> tuple[Vec, Vec]:
+def arm_lengths(size: Vec, hand: str) -> tuple[float, float]:
+    """Return the lengths of an arm [m]: shoulder to elbow, elbow to palm."""
+    side = 0 if hand == "r" else 1
+    fore = size[body.FOREARM_R + side] + size[body.HAND]
+    return float(size[body.UPPER_ARM_R + side]), float(fore)
+
+
+def _forward(q: Vec, size: Vec) -> tuple[Vec, Vec]:
     points, frames = np.empty((body.N_POINTS, 3)), np.empty((body.N_FRAMES, 3, 3))
     # A copy: for a read-only array the kernel would be compiled anew.
     joints, trig = np.array(q, dtype=np.float64), np.empty((3, 16))
-    body.points_and_frames(joints, float(pelvis_z), trig, points, frames)
+    body.points_and_frames(joints, np.array(size, dtype=np.float64), trig, points, frames)
     return points, frames
 
 
-def capsules(q: Vec, pelvis_z: float, floor_z: float) -> Vec:
+def capsules(q: Vec, size: Vec, floor_z: float) -> Vec:
     """Return the capsules' end points [m], shape (12, 2, 3), order of CAPSULE_NAMES.
 
     Args:
         q: Joint positions [m, rad], shape (18,).
-        pelvis_z: Height of the pelvis [m] (``Cell.pelvis_z``).
+        size: The person's size [m], shape (12,) (``BodySize.vector``, ``Cell.body``).
         floor_z: Height of the floor [m] (``Cell.floor_z``).
     """
-    out = body.capsule_columns(1, pelvis_z, floor_z)
-    body.capsules(*_forward(q, pelvis_z), floor_z, 0, out)
+    out = body.capsule_columns(1)
+    body.capsules(*_forward(q, size), np.array(size, dtype=np.float64), floor_z, 0, out)
     return ends_of(out, body.N_CAPSULES)
 
 
-def joint_points(q: Vec, pelvis_z: float) -> dict[str, Vec]:
+def capsule_radii(size: Vec) -> Vec:
+    """Return the radii of a person's capsules [m], shape (12,), order of CAPSULE_NAMES."""
+    return np.asarray(size[body.GIRTH] * CAPSULE_RADII)
+
+
+def joint_points(q: Vec, size: Vec) -> dict[str, Vec]:
     """Return the joint centres by name (POINT_NAMES) [m], each of shape (3,)."""
-    points, _ = _forward(q, pelvis_z)
+    points, _ = _forward(q, size)
     return dict(zip(POINT_NAMES, points, strict=True))
 
 
-def body_frames(q: Vec, pelvis_z: float) -> dict[str, Vec]:
+def body_frames(q: Vec, size: Vec) -> dict[str, Vec]:
     """Return T_world_body by name (FRAME_NAMES), each of shape (4, 4).
 
     The origin is the joint nearest the pelvis; arms hang along the frame's -z.
     """
-    points, rotations = _forward(q, pelvis_z)
+    points, rotations = _forward(q, size)
     frames = {}
     for name, origin, rotation in zip(FRAME_NAMES, FRAME_ORIGINS, rotations, strict=True):
         frame = np.eye(4)
@@ -156,7 +167,7 @@ def body_frames(q: Vec, pelvis_z: float) -> dict[str, Vec]:
 
 def solve_hands(
     q_now: Vec,
-    pelvis_z: float,
+    size: Vec,
     *,
     right: Vec | None = None,
     left: Vec | None = None,
@@ -170,7 +181,7 @@ def solve_hands(
 
     Args:
         q_now: Present joint positions [m, rad], shape (18,).
-        pelvis_z: Height of the pelvis [m].
+        size: The person's size [m], shape (12,) (``BodySize.vector``).
         right: Where the right palm shall be [m], shape (3,).
         left: Where the left palm shall be [m], shape (3,).
         pelvis: Pelvis x [m], y [m], yaw [rad]; as it is where None.
@@ -181,14 +192,14 @@ def solve_hands(
         q[:3] = pelvis
     targets = {"r": right, "l": left}
     if right is not None or left is not None:
-        q[3:6] = _lean(q, pelvis_z, targets)
+        q[3:6] = _lean(q, size, targets)
     reached = True
     for hand, target in targets.items():
         if target is not None:
             first = 10 if hand == "r" else 14
-            q[first : first + 4] = _solve_arm(q, pelvis_z, hand, target, swivel)
+            q[first : first + 4] = _solve_arm(q, size, hand, target, swivel)
     q = np.clip(q, Q_MIN, Q_MAX)
-    points = joint_points(q, pelvis_z)
+    points = joint_points(q, size)
     for hand, target in targets.items():
         if target is not None:
             error = np.linalg.norm(points[f"hand_{hand}"] - target)
@@ -196,15 +207,15 @@ def solve_hands(
     return Posture(q=q, reached=reached)
 
 
-def _lean(q: Vec, pelvis_z: float, targets: dict[str, Vec | None]) -> Vec:
+def _lean(q: Vec, size: Vec, targets: dict[str, Vec | None]) -> Vec:
     """Return abdomen angles [rad], shape (3,), that bring the shoulders near their targets.
 
     Bends the trunk just far enough: bisection on one lean factor along the direction of the
-    farthest target, so that its shoulder comes within EASY_REACH.
+    farthest target, so that its shoulder comes within EASY_REACH of the arm's length.
     """
     neutral = q.copy()
     neutral[3:6] = 0.0
-    points = joint_points(neutral, pelvis_z)
+    points = joint_points(neutral, size)
     c, s = math.cos(q[2]), math.sin(q[2])
     best = np.zeros(3)
     for hand, target in targets.items():
@@ -221,19 +232,19 @@ def _lean(q: Vec, pelvis_z: float, targets: dict[str, Vec | None]) -> Vec:
                 0.25 * sign + 0.5 * math.sin(heading),
             ]
         )
-        angles = _lean_factor(neutral, pelvis_z, hand, target, direction) * direction
+        angles = _lean_factor(neutral, size, hand, target, direction) * direction
         if np.abs(angles).max() > np.abs(best).max():
             best = angles
     return np.clip(best, Q_MIN[3:6], Q_MAX[3:6])
 
 
-def _lean_factor(q: Vec, pelvis_z: float, hand: str, target: Vec, direction: Vec) -> float:
-    trial = q.copy()
+def _lean_factor(q: Vec, size: Vec, hand: str, target: Vec, direction: Vec) -> float:
+    trial, easy = q.copy(), EASY_REACH * sum(arm_lengths(size, hand))
 
     def gap(factor: float) -> float:
         trial[3:6] = np.clip(factor * direction, Q_MIN[3:6], Q_MAX[3:6])
-        shoulder = joint_points(trial, pelvis_z)[f"shoulder_{hand}"]
-        return float(np.linalg.norm(target - shoulder)) - EASY_REACH
+        shoulder = joint_points(trial, size)[f"shoulder_{hand}"]
+        return float(np.linalg.norm(target - shoulder)) - easy
 
     if gap(0.0) <= 0.0:
         return 0.0
@@ -244,19 +255,19 @@ def _lean_factor(q: Vec, pelvis_z: float, hand: str, target: Vec, direction: Vec
     return high
 
 
-def _solve_arm(q: Vec, pelvis_z: float, hand: str, target: Vec, swivel: float) -> Vec:
+def _solve_arm(q: Vec, size: Vec, hand: str, target: Vec, swivel: float) -> Vec:
     """Return flexion, abduction, rotation, elbow [rad] that bring the palm to ``target``."""
-    points, frames = _forward(q, pelvis_z)
+    points, frames = _forward(q, size)
     torso = frames[body.F_TORSO]
     shoulder = points[POINT_NAMES.index(f"shoulder_{hand}")]
     side = -1.0 if hand == "r" else 1.0
-    fore = body.FOREARM + body.HAND
+    upper, fore = arm_lengths(size, hand)
     offset = target - shoulder
     distance = float(np.linalg.norm(offset))
     line = offset / distance if distance > 1e-6 else -torso[:, 2]
-    span = min(max(distance, 0.16), FULL_REACH - 1e-4)
-    along = (body.UPPER_ARM**2 - fore**2 + span**2) / (2.0 * span)
-    across = math.sqrt(max(body.UPPER_ARM**2 - along**2, 0.0))
+    span = min(max(distance, 0.16), upper + fore - 1e-4)
+    along = (upper**2 - fore**2 + span**2) / (2.0 * span)
+    across = math.sqrt(max(upper**2 - along**2, 0.0))
     pole = _elbow_pole(torso, line, side, swivel)
     elbow = along * line + across * pole
     fore_direction = span * line - elbow
@@ -288,7 +299,7 @@ def reach(
     hand: Hand,
     position: Vec,
     q_start: Vec,
-    pelvis_z: float,
+    size: Vec,
     *,
     pelvis: tuple[float, float, float] | None = None,
     swivel: float = 0.35,
@@ -299,9 +310,9 @@ def reach(
         hand: ``"r"`` or ``"l"``.
         position: Where the palm shall be [m], shape (3,).
         q_start: Joint positions to start from [m, rad], shape (18,).
-        pelvis_z: Height of the pelvis [m].
+        size: The person's size [m], shape (12,) (``BodySize.vector``).
         pelvis: Pelvis x [m], y [m], yaw [rad]; as it is where None.
         swivel: Turn of the elbow outward [rad].
     """
     right, left = (position, None) if hand == "r" else (None, position)
-    return solve_hands(q_start, pelvis_z, right=right, left=left, pelvis=pelvis, swivel=swivel)
+    return solve_hands(q_start, size, right=right, left=left, pelvis=pelvis, swivel=swivel)

@@ -26,24 +26,17 @@ from app.sim.ports import Vec
 POLE_MEMORY = 0.04
 """Distance of the elbow from the line shoulder - wrist below which its last direction counts
 too, the more the nearer [m]: with a nearly straight arm the seen one is all noise."""
-_SHORTEST = math.sqrt(
-    body.UPPER_ARM**2
-    + body.FOREARM**2
-    + 2.0 * body.UPPER_ARM * body.FOREARM * math.cos(human.Q_MAX[13])
-)
-_LONGEST = body.UPPER_ARM + body.FOREARM - 1e-4
-"""Distances of the wrist from the shoulder that the elbow allows [m]."""
 
 Mask = NDArray[np.bool_]
 
 
-def joint_angles(points: Vec, q_before: Vec, pelvis_z: float) -> tuple[Vec, Mask]:
+def joint_angles(points: Vec, q_before: Vec, size: Vec) -> tuple[Vec, Mask]:
     """Return the joint positions that fit key-points best, limb by limb.
 
     Args:
         points: Key-points [m], shape (25, 3), NaN where missing.
         q_before: The last joint positions [m, rad], shape (18,).
-        pelvis_z: Height of the pelvis in the cell [m].
+        size: The person's size [m], shape (12,) (``Cell.body``).
 
     Returns:
         Joint positions inside their limits [m, rad] and which of them were held because their
@@ -58,7 +51,7 @@ def joint_angles(points: Vec, q_before: Vec, pelvis_z: float) -> tuple[Vec, Mask
         q[:2] = hip[:2]
     _place_trunk(q, held, points, neck - hip)
     q[:6] = np.clip(q[:6], human.Q_MIN[:6], human.Q_MAX[:6])
-    torso = human.body_frames(q, pelvis_z)["torso"][:3, :3]
+    torso = human.body_frames(q, size)["torso"][:3, :3]
     for first, hand, side in ((6, "r", -1.0), (8, "l", 1.0)):
         shoulder = torso.T @ (points[K[f"shoulder_{hand}"]] - points[K["neck"]])
         if not np.linalg.norm(shoulder) > 1e-6:  # NaN, or all in one place.
@@ -67,13 +60,14 @@ def joint_angles(points: Vec, q_before: Vec, pelvis_z: float) -> tuple[Vec, Mask
         q[first] = math.atan2(shoulder[0], max(side * shoulder[1], 1e-6))
         q[first + 1] = math.asin(np.clip(shoulder[2] / np.linalg.norm(shoulder), -1.0, 1.0))
     q[6:10] = np.clip(q[6:10], human.Q_MIN[6:10], human.Q_MAX[6:10])
-    joints = human.joint_points(q, pelvis_z)
+    joints = human.joint_points(q, size)
     for first, hand in ((10, "r"), (14, "l")):
         last = joints[f"elbow_{hand}"] - joints[f"shoulder_{hand}"]
         elbow = points[K[f"elbow_{hand}"]] - joints[f"shoulder_{hand}"]
         wrist = points[K[f"wrist_{hand}"]] - joints[f"shoulder_{hand}"]
-        arm = slice(first, first + 4)
-        q[arm], held[arm] = _arm(q[arm], torso, hand, elbow, wrist, last)
+        arm, side = slice(first, first + 4), 0 if hand == "r" else 1
+        lengths = float(size[body.UPPER_ARM_R + side]), float(size[body.FOREARM_R + side])
+        q[arm], held[arm] = _arm(q[arm], torso, hand, lengths, elbow, wrist, last)
     return np.clip(q, human.Q_MIN, human.Q_MAX), held
 
 
@@ -132,7 +126,13 @@ def _place_trunk(q: Vec, held: Mask, points: Vec, spine: Vec) -> None:
 
 
 def _arm(
-    before: Vec, torso: Vec, hand: str, elbow: Vec, wrist: Vec, last: Vec
+    before: Vec,
+    torso: Vec,
+    hand: str,
+    lengths: tuple[float, float],
+    elbow: Vec,
+    wrist: Vec,
+    last: Vec,
 ) -> tuple[Vec, Mask]:
     """Return flexion, abduction, rotation, elbow [rad] and which are held, (4,) each.
 
@@ -140,6 +140,7 @@ def _arm(
         before: The last angles [rad], shape (4,).
         torso: Orientation of the trunk, shape (3, 3).
         hand: ``"r"`` or ``"l"``.
+        lengths: Shoulder to elbow and elbow to wrist [m].
         elbow: From the model's shoulder to the seen elbow [m], shape (3,), NaN where missing.
         wrist: The same to the wrist.
         last: The same to the elbow at the last angles.
@@ -154,16 +155,18 @@ def _arm(
         return _angles(z, None, before, side), held
     distance = float(np.linalg.norm(wrist))
     line = wrist / distance if distance > 1e-6 else -torso[:, 2]
-    span = min(max(distance, _SHORTEST), _LONGEST)
-    along = (body.UPPER_ARM**2 - body.FOREARM**2 + span**2) / (2.0 * span)
+    a, b = lengths
+    shortest = math.sqrt(a**2 + b**2 + 2.0 * a * b * math.cos(human.Q_MAX[13]))
+    span = min(max(distance, shortest), a + b - 1e-4)
+    along = (a**2 - b**2 + span**2) / (2.0 * span)
     pole = _pole(line, elbow if seen_elbow else last, last, torso)
-    upper = along * line + math.sqrt(max(body.UPPER_ARM**2 - along**2, 0.0)) * pole
+    upper = along * line + math.sqrt(max(a**2 - along**2, 0.0)) * pole
     fore = span * line - upper
     z = -upper / np.linalg.norm(upper)
     x = fore - (fore @ z) * z
     x /= np.linalg.norm(x)
     q = _angles(torso.T @ z, torso.T @ x, before, side)
-    q[3] = math.acos(np.clip(-(fore @ z) / body.FOREARM, -1.0, 1.0))
+    q[3] = math.acos(np.clip(-(fore @ z) / b, -1.0, 1.0))
     return q, np.array([False, False, not seen_elbow, False])
 
 

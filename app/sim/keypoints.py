@@ -7,8 +7,8 @@ and named.
 
 :func:`keypoints_of` gives the key-points of our 18-DoF person. Shoulders, elbows, wrists, neck
 and mid-hip are joints of the model. The model has no face, knees or feet, so these are placed
-by proportion: the face rigid on the torso (the model's head does not turn), the hips
-``HIP_WIDTH`` to either side of the pelvis, and under each hip a straight upright leg, as its
+by proportion: the face rigid on the torso (the model's head does not turn), the hips half their
+distance to either side of the pelvis, and under each hip a straight upright leg, as its
 capsule, with the knee half-way and the foot pointing where the pelvis faces.
 
 Source: Cao et al., OpenPose (2019), output format BODY_25; METHOD 2.8.
@@ -175,17 +175,17 @@ def _strays(points: Vec, seen: NDArray[np.bool_], place: str) -> NDArray[np.int6
     return np.asarray(there[away > STRAY_M])
 
 
-def keypoints_of(q: Vec, pelvis_z: float, floor_z: float) -> Vec:
+def keypoints_of(q: Vec, size: Vec, floor_z: float) -> Vec:
     """Return the key-points of our person [m], shape (25, 3), order of BODY_25.
 
     Args:
         q: Joint positions [m, rad], shape (18,).
-        pelvis_z: Height of the pelvis [m].
+        size: The person's size [m], shape (12,) (``Cell.body``).
         floor_z: Height of the floor [m].
 
     Deviates: face, knees and feet are no joints of the model; see the head of this file.
     """
-    joints, frames = human.joint_points(q, pelvis_z), human.body_frames(q, pelvis_z)
+    joints, frames = human.joint_points(q, size), human.body_frames(q, size)
     torso, pelvis = frames["torso"][:3, :3], frames["pelvis"][:3, :3]
     out = np.empty((N_KEYPOINTS, 3))
     out[K["neck"]], out[K["mid_hip"]] = joints["neck"], joints["pelvis"]
@@ -194,7 +194,7 @@ def keypoints_of(q: Vec, pelvis_z: float, floor_z: float) -> Vec:
     for hand, side in (("r", -1.0), ("l", 1.0)):
         for part in ("shoulder", "elbow", "wrist"):
             out[K[f"{part}_{hand}"]] = joints[f"{part}_{hand}"]
-        hip = joints["pelvis"] + side * body.HIP_WIDTH * pelvis[:, 1]
+        hip = joints["pelvis"] + side * size[body.HIP] * pelvis[:, 1]
         out[K[f"hip_{hand}"]] = hip
         feet = {"ankle": _ANKLE, "heel": _HEEL, "big_toe": _BIG_TOE, "small_toe": _SMALL_TOE}
         for part, (forward, inward, up) in feet.items():

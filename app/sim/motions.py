@@ -19,13 +19,13 @@ from pathlib import PurePath
 import numpy as np
 
 from app.errors import BadMotion, Fault
+from app.sim.body_size import BodySize
 from app.sim.body_track import (
     ELBOW_L,
     ELBOW_R,
     PELVIS,
     WRIST_L,
     WRIST_R,
-    BodySize,
     BodyTrack,
     measure,
     model_points,

@@ -57,17 +57,17 @@ class PeopleEstimator:
 
     Args:
         n_people: Most people at once, at most four.
-        pelvis_z: Height of the pelvis in the cell [m].
+        size: The person's size [m], shape (12,) (``Cell.body``).
         settings: Noise, margins and times, the same for all.
     """
 
     def __init__(
-        self, n_people: int, pelvis_z: float, settings: EstimatorSettings | None = None
+        self, n_people: int, size: Vec, settings: EstimatorSettings | None = None
     ) -> None:
         if not 1 <= n_people <= MAX_PEOPLE:
             raise InvalidInput("n_people", n_people, f"must lie in [1, {MAX_PEOPLE}]")
         self.settings = settings or EstimatorSettings()
-        self._tracks = [PersonEstimator(pelvis_z, self.settings) for _ in range(n_people)]
+        self._tracks = [PersonEstimator(size, self.settings) for _ in range(n_people)]
         self._order: list[int | None] = [None] * n_people
 
     def update(

@@ -31,6 +31,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from app.errors import InvalidInput
 from app.sim import human
+from app.sim.kernels.body import N_SIZE
 from app.sim.keypoint_angles import joint_angles
 from app.sim.keypoint_cylinder import (
     CylinderSettings,
@@ -131,15 +132,16 @@ class PersonEstimator:
     """The estimate of one person from a stream of frames.
 
     Args:
-        pelvis_z: Height of the pelvis in the cell [m] (``Cell.pelvis_z``).
+        size: The person's size [m], shape (12,) (``Cell.body``).
         settings: Noise, margins and times.
     """
 
-    def __init__(self, pelvis_z: float, settings: EstimatorSettings | None = None) -> None:
-        if not math.isfinite(pelvis_z):
-            raise InvalidInput("pelvis_z", pelvis_z, "must be finite")
+    def __init__(self, size: Vec, settings: EstimatorSettings | None = None) -> None:
+        if np.shape(size) != (N_SIZE,) or not np.isfinite(size).all():
+            rule = f"must be {N_SIZE} finite numbers"
+            raise InvalidInput("size", np.asarray(size).tolist(), rule)
         self.settings = settings or EstimatorSettings()
-        self._pelvis_z = pelvis_z
+        self._size = size
         self._points = PointFilter(N_KEYPOINTS, self.settings.filter)
         self._center = PointFilter(1, self.settings.filter)
         self._t, self._seen_at = -math.inf, -math.inf
@@ -221,7 +223,7 @@ class PersonEstimator:
         if not known.any():
             return
         before = human.rest_posture(0.0, 0.0, 0.0) if self._q is None else self._q
-        q, held = joint_angles(points, before, self._pelvis_z)
+        q, held = joint_angles(points, before, self._size)
         if self._q is not None or not held[:5].any():
             self._q = q
         corners = bounding_box(points[known])
@@ -273,14 +275,14 @@ class PersonEstimator:
         """Return joint angles and speeds, which are held, and how badly they fit [m]."""
         if self._q is None:
             return None, np.ones(18, dtype=np.bool_), math.nan
-        q, held = joint_angles(points, self._q, self._pelvis_z)
-        ahead, _ = joint_angles(points + _STEP_S * speeds, q, self._pelvis_z)
-        behind, _ = joint_angles(points - _STEP_S * speeds, q, self._pelvis_z)
+        q, held = joint_angles(points, self._q, self._size)
+        ahead, _ = joint_angles(points + _STEP_S * speeds, q, self._size)
+        behind, _ = joint_angles(points - _STEP_S * speeds, q, self._size)
         change = ahead - behind
         change[2] = (change[2] + math.pi) % (2.0 * math.pi) - math.pi
         qd = np.clip(change / (2.0 * _STEP_S), -self.settings.qd_max, self.settings.qd_max)
         qd[held] = 0.0
-        joints = human.joint_points(q, self._pelvis_z)
+        joints = human.joint_points(q, self._size)
         away = [float(np.linalg.norm(points[K[name]] - joints[name])) for name in _FITTED]
         there = [d for d in away if math.isfinite(d)]
         return Person(q=q, qd=qd), held, float(np.median(there)) if there else math.nan

@@ -212,6 +212,7 @@ def observe(
     human_qd: Vec,
     goals: Vec,
     time_left_s: float,
+    size: Vec | None = None,
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
     """Return what the networks see of one state for each of n targets.
 
@@ -224,6 +225,7 @@ def observe(
         human_qd: The person's joint speeds [m/s, rad/s], shape (18,).
         goals: Targets [m], shape (n, 3).
         time_left_s: Time left [s].
+        size: The person's size [m], shape (body.N_SIZE,); None for the cell's person.
 
     Returns:
         Observations, shape (n, N_FEATURES), and whether each target is reachable, (n,).
@@ -235,11 +237,12 @@ def observe(
     obs = np.empty((n, N_FEATURES), dtype=np.float32)
     features.observe_batch(
         arm,
-        people,
+        people.floor_z,
         np.tile(own(q), (n, 1)),
         np.tile(own(qd), (n, 1)),
         np.tile(own(human_q), (n, 1)),
         np.tile(own(human_qd), (n, 1)),
+        np.tile(own(people.bodies[0] if size is None else size), (n, 1)),
         targets,
         q_goals,
         np.full(n, time_left_s, dtype=np.float64),
@@ -317,8 +320,8 @@ def hand_speeds(
         random.start_stream(batch.seed, 1 << 20, number, stream)
         moves = script.draw_script(
             stream,
-            people.of_station,
-            len(people.of_station) - 1,
+            people.of_station[0],
+            people.of_station.shape[1] - 1,
             people.n_cubes,
             people.hands,
             -1,
@@ -329,7 +332,7 @@ def hand_speeds(
         postures, palms = people.postures[chosen[: moves + 1]], []
         for k in range(int(seconds / tick)):
             script.script_at(k * tick, moves, start, duration, postures, q, qd)
-            body.points_and_frames(q, people.pelvis_z, trig, points, frames)
+            body.points_and_frames(q, people.bodies[0], trig, points, frames)
             palms.append(points[[body.HAND_R, body.HAND_L]])
         rates.append(np.linalg.norm(np.diff(np.array(palms), axis=0), axis=2) / tick)
     speeds = np.concatenate([rate.ravel() for rate in rates]) * batch.settings.human_pace

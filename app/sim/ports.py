@@ -25,6 +25,8 @@ class Person:
     """Joint positions [m, rad], shape (18,), order of ``human.JOINT_NAMES``."""
     qd: Vec
     """Joint speeds [m/s, rad/s], shape (18,)."""
+    size: Vec | None = None
+    """Lengths of the body [m], shape (12,) (``BodySize.vector``); None for the cell's person."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

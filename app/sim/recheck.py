@@ -121,7 +121,7 @@ class Recheck:
         cell, radius = self._cell, self._capsules.radius
         a0, a1 = robot_ends(self._robot, self._capsules, trajectory.q_robot)
         ends = np.stack(
-            [human.capsules(q, cell.pelvis_z, cell.floor_z) for q in trajectory.q_human]
+            [human.capsules(q, cell.body, cell.floor_z) for q in trajectory.q_human]
         )
         gap = segment_distances(
             a0[:, :, None], a1[:, :, None], ends[:, None, :, 0], ends[:, None, :, 1]

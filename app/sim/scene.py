@@ -178,20 +178,18 @@ def people_of(cell: Cell, library_seed: int = 0, pace: float = 1.0) -> People:
         library_seed: Seed of the workers' library of postures.
         pace: Speed of the workers relative to the work cycle.
     """
-    workers = len(cell.workers)
-    template = body.capsule_columns(workers, cell.pelvis_z, cell.floor_z)
+    workers, bodies = len(cell.workers), own(cell.body[None])
     postures, hands = np.zeros((1, 18)), np.zeros((1, 2, 3))
-    of_station, n_cubes = np.zeros((1, 2, 2), dtype=np.int64), 0
+    of_station, n_cubes = np.zeros((1, 1, 2, 2), dtype=np.int64), 0
     if workers:
         library = build_library(cell, library_seed)
         postures, hands = own(library.postures), own(library.hands)
-        of_station, n_cubes = own_index(library.of_station), library.n_cubes
+        of_station, n_cubes = own_index(library.of_station[None]), library.n_cubes
     return People(
-        pelvis_z=cell.pelvis_z,
+        bodies=bodies,
         floor_z=cell.floor_z,
         top_z=cell.floor_z + max([p.height for p in cell.cylinders], default=2.0),
-        columns=template,
-        person=body.capsule_columns(1, cell.pelvis_z, cell.floor_z),
+        columns=body.capsule_columns(workers),
         postures=postures,
         hands=hands,
         of_station=of_station,
@@ -215,6 +213,8 @@ def new_people_state(cell: Cell, shared: People, n_envs: int) -> PeopleState:
     return PeopleState(
         q=rows(workers, 18),
         qd=rows(workers, 18),
+        body=counts(workers),
+        size=np.broadcast_to(shared.bodies[0], (n_envs, workers, body.N_SIZE)).copy(),
         columns=np.repeat(shared.columns[None], n_envs, axis=0),
         phase=rows(workers),
         move=counts(workers),
@@ -227,15 +227,20 @@ def new_people_state(cell: Cell, shared: People, n_envs: int) -> PeopleState:
     )
 
 
-def crowd_of(shared: People, human_q: Vec, cylinders: Vec) -> people.Crowd:
+def crowd_of(
+    shared: People, human_q: Vec, cylinders: Vec, sizes: Vec | None = None
+) -> people.Crowd:
     """Return people placed as shapes.
 
     Args:
         shared: From :func:`people_of`.
         human_q: The workers' joints [m, rad], shape (W, 18).
         cylinders: The walkers' x, y and radius [m], shape (C, 3).
+        sizes: The workers' sizes [m], shape (W, body.N_SIZE); None for the cell's person.
     """
     crowd = people.new_crowd(shared, len(human_q), len(cylinders))
+    if sizes is not None:
+        crowd.size[:] = sizes
     people.place_workers(shared, own(human_q), crowd)
     crowd.cylinders[:] = cylinders
     return crowd

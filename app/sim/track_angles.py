@@ -16,13 +16,13 @@ joints are; so skeletons of any convention of axes give the same angles.
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
+from app.sim.body_size import BodySize
 from app.sim.body_track import (
     NECK,
     PELVIS,
     SHOULDER_L,
     SHOULDER_R,
     SIDES,
-    BodySize,
     BodyTrack,
     trunk_frame,
     unit,

@@ -75,7 +75,7 @@ class Tracker:
     Args:
         settings: How good it is.
         seed: Seed of noise and losses.
-        pelvis_z: Height of the pelvis in the cell [m].
+        size: The person's size [m], shape (12,) (``Cell.body``).
         floor_z: Height of the floor in the cell [m].
         start: Time of the first frame [s].
     """
@@ -84,13 +84,13 @@ class Tracker:
         self,
         settings: TrackerSettings,
         seed: int | Sequence[int],
-        pelvis_z: float,
+        size: Vec,
         floor_z: float,
         start: float = 0.0,
     ) -> None:
         self.settings = settings
         self._rng = np.random.default_rng(seed)
-        self._pelvis_z, self._floor_z, self._start = pelvis_z, floor_z, start
+        self._size, self._floor_z, self._start = size, floor_z, start
         self._n_taken = 0
         self._missing = self._rng.random(N_KEYPOINTS) < settings.missing
         self._waiting: list[Frame] = []
@@ -117,7 +117,7 @@ class Tracker:
     def _take(self, t: float, q: Vec) -> Frame | None:
         """Return one frame, or None where it is lost; always draws alike."""
         settings, rng = self.settings, self._rng
-        points = keypoints_of(q, self._pelvis_z, self._floor_z)
+        points = keypoints_of(q, self._size, self._floor_z)
         points += settings.noise * rng.standard_normal(points.shape)
         draw, lost, swapped = rng.random(N_KEYPOINTS), rng.random(), rng.random()
         self._missing = draw < np.where(self._missing, *self._loss_rates())

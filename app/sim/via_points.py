@@ -77,9 +77,9 @@ class PointVia:
 Via = JointVia | PointVia
 
 
-def points_of(pelvis_z: float) -> PointsOf:
+def points_of(size: Vec) -> PointsOf:
     """Return the kinematics of a person whose pelvis is at a height [m]."""
-    return partial(human.joint_points, pelvis_z=pelvis_z)
+    return partial(human.joint_points, size=size)
 
 
 def require_vias(vias: Sequence[Via]) -> None:

@@ -63,7 +63,7 @@ def build_library(cell: Cell, seed: int, variants: int = 24) -> Library:
     of_station[-1, :] = len(postures), variants
     postures.extend(_at_home(cell, rng) for _ in range(variants))
     stacked = np.array(postures)
-    hands = np.array([_palms(q, cell.pelvis_z) for q in stacked])
+    hands = np.array([_palms(q, cell.body) for q in stacked])
     for array in (stacked, hands, of_station):
         array.setflags(write=False)
     n_cubes = sum(station.kind == "cube" for station in cell.pick_stations)
@@ -76,8 +76,8 @@ def build_library(cell: Cell, seed: int, variants: int = 24) -> Library:
     )
 
 
-def _palms(q: Vec, pelvis_z: float) -> Vec:
-    points = human.joint_points(q, pelvis_z)
+def _palms(q: Vec, size: Vec) -> Vec:
+    points = human.joint_points(q, size)
     return np.stack([points["hand_r"], points["hand_l"]])
 
 
@@ -106,7 +106,7 @@ def _at_station(cell: Cell, rng: np.random.Generator, target: Vec, hand: Hand) -
     support += rng.uniform(-0.04, 0.04, 3)
     right, left = (grip, support) if hand == "r" else (support, grip)
     swivel = float(rng.uniform(0.0, 0.9))
-    posture = human.solve_hands(start, cell.pelvis_z, right=right, left=left, swivel=swivel)
+    posture = human.solve_hands(start, cell.body, right=right, left=left, swivel=swivel)
     return posture.q
 
 
@@ -215,4 +215,4 @@ def _standing_reach(cell: Cell, palm: Vec, hand: Hand, pelvis_x: float | None) -
     start = human.rest_posture(x, cell.human.y_min + 0.03, cell.human.home[2])
     support = np.array([x + sign * -0.25, cell.table.y_max - 0.03, 0.06])
     right, left = (palm, support) if hand == "r" else (support, palm)
-    return human.solve_hands(start, cell.pelvis_z, right=right, left=left).q
+    return human.solve_hands(start, cell.body, right=right, left=left).q

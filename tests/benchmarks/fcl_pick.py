@@ -123,7 +123,7 @@ class FclPick:
 
     @staticmethod
     def _person_at(cell: Cell, q: Vec) -> list[Any]:
-        ends = human.capsules(q, cell.pelvis_z, cell.floor_z)
+        ends = human.capsules(q, cell.body, cell.floor_z)
         return [
             make_capsule(radius, p0, p1)
             for radius, (p0, p1) in zip(human.CAPSULE_RADII, ends, strict=True)

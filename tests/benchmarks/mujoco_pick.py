@@ -112,7 +112,7 @@ def _scene(cell: Cell, capsules: RobotCapsules, pairs: list[tuple[str, str]], wa
             + _geoms(capsules, joint + 1, way)
         )
     robot += "</body>" * len(JOINTS)
-    ends = human.capsules(np.zeros(18), cell.pelvis_z, cell.floor_z)
+    ends = human.capsules(np.zeros(18), cell.body, cell.floor_z)
     half = 0.5 * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     touchable = _touchable(0, 1, way)
     person = "".join(
@@ -157,7 +157,7 @@ def _numbers(values: Sequence[float]) -> str:
 
 def _mocap_poses(cell: Cell, q: Vec) -> tuple[Vec, Vec]:
     """Return middles [m], shape (12, 3), and quaternions w, x, y, z of a person's capsules."""
-    ends = human.capsules(q, cell.pelvis_z, cell.floor_z)
+    ends = human.capsules(q, cell.body, cell.floor_z)
     span = ends[:, 1] - ends[:, 0]
     span *= np.where(span[:, 2:] < 0.0, -1.0, 1.0)
     length = np.linalg.norm(span, axis=1)

@@ -64,7 +64,7 @@ def state(server: str) -> dict:
 def hand(server: str, name: str) -> np.ndarray:
     """Return where a hand is, as the service says [m]."""
     q = np.array(state(server)["state"]["people"][0]["q"])
-    return np.array(human.joint_points(q, CELL.pelvis_z)[f"hand_{name[0]}"])
+    return np.array(human.joint_points(q, CELL.body)[f"hand_{name[0]}"])
 
 
 def drag(page: Page, camera: Camera, start: np.ndarray, way: np.ndarray) -> None:

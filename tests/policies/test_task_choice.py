@@ -67,7 +67,7 @@ def test_a_hand_on_one_of_two_equally_near_cubes_turns_the_choice(
     )
     palm = np.array(CELL.station(taken).position)
     stand = human.rest_posture(palm[0] + (0.1 if hand == "r" else -0.1), 1.15, -np.pi / 2)
-    posture = human.reach(hand, palm, stand, CELL.pelvis_z)
+    posture = human.reach(hand, palm, stand, CELL.body)
     reaching = Person(q=posture.q, qd=np.zeros(18))
     alone = chooser.decide(q, np.zeros(6), [person()], cubes(taken, free))
     beside = chooser.decide(q, np.zeros(6), [reaching], cubes(taken, free))

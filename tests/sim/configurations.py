@@ -48,7 +48,7 @@ def chunk(number: int) -> Iterator[Case]:
     human_q = rng.uniform(human.Q_MIN, human.Q_MAX, (CHUNK, 18))
     human_q[:, :3] = rng.uniform([-0.7, 0.0, -np.pi], [0.7, 1.7, np.pi], (CHUNK, 3))
     robot_at = np.stack(robot_ends(Robot(), load_robot_capsules(), q), axis=2)
-    person_at = capsule_ends(human_q, CELL.pelvis_z, CELL.floor_z)
+    person_at = capsule_ends(human_q, CELL.human.size, CELL.floor_z)
     expected = segment_distances(
         robot_at[:, :, None, 0],
         robot_at[:, :, None, 1],

@@ -74,15 +74,15 @@ def draw(cell: Cell, rng: np.random.Generator, robot: Robot) -> Period | None:
     )
     # The finger tips graze the side that faces the person: only so can a hand be clear of the
     # link before and after, with the forearm behind it.
-    side = human.joint_points(stand, cell.pelvis_z)["neck"] - near + rng.normal(0.0, 0.05, 3)
+    side = human.joint_points(stand, cell.body)["neck"] - near + rng.normal(0.0, 0.05, 3)
     side /= np.linalg.norm(side)
     way = np.cross(side, rng.normal(size=3))
     way *= 0.5 * HAND_SPEED * dt / np.linalg.norm(way)
     graze = rng.uniform(0.7, 1.05) * (capsules.radius[k] + HAND_RADIUS)
-    middle = near + (graze + body.HAND_TIP - body.HAND) * side
+    middle = near + (graze + body.HAND_TIP - body.MEDIAN_HAND) * side
     hand, swivel = rng.choice(["r", "l"]), rng.uniform(0.0, 0.9)
     ends = [
-        human.reach(hand, middle + sign * way, stand, cell.pelvis_z, swivel=swivel)
+        human.reach(hand, middle + sign * way, stand, cell.body, swivel=swivel)
         for sign in (-1.0, 1.0)
     ]
     if not all(one.reached for one in ends):
@@ -103,7 +103,7 @@ def rows(case: Period, dt: float) -> Trajectory:
 
 def palm_speed(cell: Cell, case: Period) -> float:
     """Mean speed of the faster palm [m/s]."""
-    ends = [human.joint_points(q, cell.pelvis_z) for q in (case.before, case.after)]
+    ends = [human.joint_points(q, cell.body) for q in (case.before, case.after)]
     way = [np.linalg.norm(ends[1][name] - ends[0][name]) for name in ("hand_r", "hand_l")]
     return float(max(way)) / cell.robot.dt
 

@@ -108,7 +108,7 @@ def gaps(cell: Cell, arm: Arm, n: int, seed: int) -> list[Gap]:
     p0, p1 = robot_ends(robot, capsules, q)
     found = []
     for k in range(n):
-        person = human.capsules(human_q[k], cell.pelvis_z, cell.floor_z)
+        person = human.capsules(human_q[k], cell.body, cell.floor_z)
         d = segment_distances(p0[k, :, None], p1[k, :, None], person[:, 0], person[:, 1])
         d = d - capsules.radius[:, None] - human.CAPSULE_RADII
         if not 0.0 < d.min() < FARTHEST:

@@ -1,19 +1,24 @@
 """The 18-DoF person a second time, in plain numpy: the reference for the kernels.
 
-A tree of homogeneous transforms from METHOD 3.4; ``kernels/body.py`` gives the lengths, and
-nothing else is taken from there. A clavicle is a bar that turns about the torso's z by
-protraction and then lifts by elevation; it carries the shoulder's place, not its orientation.
+A tree of homogeneous transforms from METHOD 3.4 for a person of any size; nothing is taken from
+``kernels/body.py`` but the order of the capsules and their radii. A clavicle is a bar that
+turns about the torso's z by protraction and then lifts by elevation; it carries the shoulder's
+place, not its orientation.
 """
 
 import numpy as np
 
+from app.sim.body_size import BodySize
 from app.sim.kernels import body
 
-PELVIS_HALF, CHEST_HALF, CHEST_HEIGHT, ABDOMEN = 0.06, 0.07, 0.30, 0.24
-"""Half widths of the capsules of pelvis and chest, height of the chest's, length of the
-abdomen's [m]."""
-HEAD_START, CROWN = (0.01, 0.06), (0.02, 0.22)
-"""Ends of the head's capsule above the base of the neck: forward, up [m]."""
+PELVIS_HALF, CHEST_HALF = 0.06, 0.07
+"""Half widths of the median person's capsules of pelvis and chest [m]."""
+CHEST_HEIGHT, ABDOMEN = 0.30 / 0.44, 0.24 / 0.44
+"""Height of the chest's capsule and length of the abdomen's, of the trunk's length."""
+HEAD_START, CROWN = (0.01, 0.06 / 0.17), (0.02, 0.22 / 0.17)
+"""Ends of the head's capsule above the base of the neck: forward [m], up [head's height]."""
+HAND_TIP = 0.15 / 0.09
+"""Wrist to the end of the hand's capsule, of the way to the palm."""
 HIP_DROP = 0.05
 """How far the legs begin below the pelvis [m]."""
 
@@ -40,41 +45,44 @@ def at(pose: np.ndarray, x: float, y: float, z: float) -> np.ndarray:
     return (pose @ np.array([x, y, z, 1.0]))[:, :3]
 
 
-def frames(q: np.ndarray, pelvis_z: float) -> dict[str, np.ndarray]:
+def frames(q: np.ndarray, size: BodySize, floor_z: float) -> dict[str, np.ndarray]:
     """T_world_body of the bodies for joints ``q``, shape (n, 18); each of shape (n, 4, 4)."""
     pelvis = turn("z", q[:, 2])
-    pelvis[:, :2, 3], pelvis[:, 2, 3] = q[:, :2], pelvis_z
+    pelvis[:, :2, 3], pelvis[:, 2, 3] = q[:, :2], floor_z + size.pelvis
     torso = pelvis @ turn("y", q[:, 3]) @ turn("x", q[:, 4]) @ turn("z", q[:, 5])
-    found = {"pelvis": pelvis, "torso": torso}
+    found, lengths = {"pelvis": pelvis, "torso": torso}, size.lengths()
     for hand, side, clavicle, arm in (("r", -1.0, 6, 10), ("l", 1.0, 8, 14)):
-        bar = torso @ shift(0.0, 0.0, body.NECK_HEIGHT)
+        bar = torso @ shift(0.0, 0.0, size.trunk)
         bar = bar @ turn("z", -side * q[:, clavicle]) @ turn("x", side * q[:, clavicle + 1])
         upper = torso.copy()
-        upper[:, :3, 3] = at(bar, 0.0, side * body.CLAVICLE, 0.0)
+        upper[:, :3, 3] = at(bar, 0.0, side * lengths[f"clavicle_{hand}"], 0.0)
         upper = upper @ turn("y", -q[:, arm]) @ turn("x", side * q[:, arm + 1])
         upper = upper @ turn("z", q[:, arm + 2])
-        fore = upper @ shift(0.0, 0.0, -body.UPPER_ARM) @ turn("y", -q[:, arm + 3])
+        elbow = shift(0.0, 0.0, -lengths[f"upper_arm_{hand}"])
+        fore = upper @ elbow @ turn("y", -q[:, arm + 3])
         found[f"upper_arm_{hand}"], found[f"forearm_{hand}"] = upper, fore
     return found
 
 
-def capsule_ends(q: np.ndarray, pelvis_z: float, floor_z: float) -> np.ndarray:
+def capsule_ends(q: np.ndarray, size: BodySize, floor_z: float) -> np.ndarray:
     """Ends of the twelve capsules [m], shape (n, 12, 2, 3), order of ``CAPSULE_NAMES``."""
-    pose = frames(q, pelvis_z)
+    pose, lengths = frames(q, size, floor_z), size.lengths()
     pelvis, torso = pose["pelvis"], pose["torso"]
-    neck, out = body.NECK_HEIGHT, {}
-    out[body.C_PELVIS] = [at(pelvis, 0, y, 0) for y in (PELVIS_HALF, -PELVIS_HALF)]
-    out[body.C_ABDOMEN] = [at(torso, 0, 0, z) for z in (0, ABDOMEN)]
-    out[body.C_CHEST] = [at(torso, 0, y, CHEST_HEIGHT) for y in (CHEST_HALF, -CHEST_HALF)]
-    out[body.C_HEAD] = [at(torso, x, 0, neck + z) for x, z in (HEAD_START, CROWN)]
+    neck, head, thick, out = size.trunk, size.head, size.girth, {}
+    half, wide = thick * PELVIS_HALF, thick * CHEST_HALF
+    out[body.C_PELVIS] = [at(pelvis, 0, y, 0) for y in (half, -half)]
+    out[body.C_ABDOMEN] = [at(torso, 0, 0, z) for z in (0, neck * ABDOMEN)]
+    out[body.C_CHEST] = [at(torso, 0, y, neck * CHEST_HEIGHT) for y in (wide, -wide)]
+    out[body.C_HEAD] = [at(torso, x, 0, neck + head * z) for x, z in (HEAD_START, CROWN)]
     for k, hand in enumerate("rl"):
         upper, fore = pose[f"upper_arm_{hand}"], pose[f"forearm_{hand}"]
-        wrist, tip = -body.FOREARM, -body.FOREARM - body.HAND_TIP
-        out[body.C_UPPER_ARM_R + k] = [at(upper, 0, 0, z) for z in (0, -body.UPPER_ARM)]
+        wrist, elbow = -lengths[f"forearm_{hand}"], -lengths[f"upper_arm_{hand}"]
+        tip = wrist - size.hand * HAND_TIP
+        out[body.C_UPPER_ARM_R + k] = [at(upper, 0, 0, z) for z in (0, elbow)]
         out[body.C_FOREARM_R + k] = [at(fore, 0, 0, z) for z in (0, wrist)]
         out[body.C_HAND_R + k] = [at(fore, 0, 0, z) for z in (wrist, tip)]
-        hip = at(pelvis, 0, (2 * k - 1) * body.HIP_WIDTH, -HIP_DROP)
+        hip = at(pelvis, 0, (2 * k - 1) * size.hip, -HIP_DROP)
         foot = hip.copy()
-        foot[:, 2] = floor_z + body.RADII[body.C_LEG_R]
+        foot[:, 2] = floor_z + thick * body.RADII[body.C_LEG_R]
         out[body.C_LEG_R + k] = [hip, foot]
     return np.stack([np.stack(out[k], axis=1) for k in range(body.N_CAPSULES)], axis=1)

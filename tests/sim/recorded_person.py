@@ -5,8 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from app.sim.body_size import MEDIAN
 from app.sim.human import JOINT_NAMES, rest_posture
-from app.sim.kernels import body
 from app.sim.ports import Vec
 
 TUM = {
@@ -119,13 +119,13 @@ def bvh_text(
 
     joint("hips", "", (0.0, 0.0, 0.0), 0)
     joint("spine", "", (0.0, 0.0, 0.0), 1)
-    joint("neck", "", (0.0, 0.0, body.NECK_HEIGHT), 2)
+    joint("neck", "", (0.0, 0.0, MEDIAN.trunk), 2)
     close(2)
     for side, sign in (("left", 1.0), ("right", -1.0)):
-        joint("collar", side, (0.0, 0.0, body.NECK_HEIGHT), 2)
-        joint("shoulder", side, (0.0, sign * body.CLAVICLE, 0.0), 3)
-        joint("elbow", side, (0.0, 0.0, -body.UPPER_ARM), 4)
-        joint("wrist", side, (0.0, 0.0, -body.FOREARM), 5)
+        joint("collar", side, (0.0, 0.0, MEDIAN.trunk), 2)
+        joint("shoulder", side, (0.0, sign * MEDIAN.clavicle_r, 0.0), 3)
+        joint("elbow", side, (0.0, 0.0, -MEDIAN.upper_arm_r), 4)
+        joint("wrist", side, (0.0, 0.0, -MEDIAN.forearm_r), 5)
         lines.extend(["      End Site", "      {", "        OFFSET 0 0 0", "      }"])
         for depth in (5, 4, 3, 2):
             close(depth)

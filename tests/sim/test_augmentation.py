@@ -23,7 +23,7 @@ from app.sim.ports import Vec
 from app.sim.via_points import points_of
 from tests.sim.demonstrations import reaches
 
-POINTS = points_of(load_cell().pelvis_z)
+POINTS = points_of(load_cell().body)
 DT = 1.0 / 60.0
 
 

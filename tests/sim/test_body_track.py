@@ -1,6 +1,7 @@
 import numpy as np
 
-from app.sim.body_track import TRACK_NAMES, BodySize, measure, model_points, trunk_frame
+from app.sim.body_size import BodySize
+from app.sim.body_track import TRACK_NAMES, measure, model_points, trunk_frame
 from app.sim.human import Q_MAX, Q_MIN, joint_points
 
 

@@ -29,7 +29,7 @@ def fcl_distance(q: Vec, human_q: Vec, tube: Vec) -> float:
     centre = np.array([tube[0], tube[1], 0.5 * (tube[3] + low)])
     shape = fcl.Cylinder(tube[2], tube[3] - low)
     others = [fcl.CollisionObject(shape, fcl.Transform(centre))]
-    ends = human.capsules(human_q, CELL.pelvis_z, CELL.floor_z)
+    ends = human.capsules(human_q, CELL.body, CELL.floor_z)
     for radius, (p0, p1) in zip(human.CAPSULE_RADII, ends, strict=True):
         others.append(make_capsule(float(radius), p0, p1))
     links = [make_capsule(float(r), *e) for r, e in zip(radii, robot, strict=True)]

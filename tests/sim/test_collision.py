@@ -51,7 +51,7 @@ def test_hand_at_the_tool_is_reported_with_both_names(
     q = Robot().ik_vertical(np.array([0.1, 0.7, 0.12]), *limits)
     assert q is not None
     rest = human.rest_posture(*cell.human.home)
-    posture = human.reach("r", np.array([0.1, 0.74, 0.18]), rest, cell.pelvis_z)
+    posture = human.reach("r", np.array([0.1, 0.74, 0.18]), rest, cell.body)
     assert Contact(kind="human", link="tool", body="hand_r") in raw.contacts(q, posture.q)
 
 

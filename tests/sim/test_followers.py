@@ -31,7 +31,7 @@ def station(name: str) -> Vec:
 
 def posture_at(palm: tuple[float, float, float]) -> Vec:
     rest = human.rest_posture(*CELL.human.home)
-    return human.reach("r", np.array(palm), rest, CELL.pelvis_z).q
+    return human.reach("r", np.array(palm), rest, CELL.body).q
 
 
 def reaching_to(palm: tuple[float, float, float]) -> Shapes:

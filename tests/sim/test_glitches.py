@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from app.sim.body_track import ELBOW_L, WRIST_L, WRIST_R, BodySize, model_points
+from app.sim.body_size import BodySize
+from app.sim.body_track import ELBOW_L, WRIST_L, WRIST_R, model_points
 from app.sim.glitches import MARGIN, MAX_SPEED, clean_runs, find_glitches
 from app.sim.ports import Vec
 from tests.sim.recorded_person import working

@@ -42,7 +42,7 @@ def test_cylinder_holds_all_keypoints_and_the_whole_surface_of_the_body() -> Non
             points = seen(q)
             found = safety_cylinder(points)
             assert found is not None and found.contains(points)
-            ends = human.capsules(q, CELL.pelvis_z, CELL.floor_z)
+            ends = human.capsules(q, CELL.body, CELL.floor_z)
             radii = human.CAPSULE_RADII[:, None]
             away = np.linalg.norm(ends[:, :, :2] - found.center, axis=2) + radii
             assert away.max() <= found.radius
@@ -67,7 +67,7 @@ def test_one_keypoint_alone_bounds_the_whole_person(names: list[str]) -> None:
         members = [K[name] for name in names]
         partial[members] = seen(q)[members]
         found = safety_cylinder(partial)
-        points = np.array(list(human.joint_points(q, CELL.pelvis_z).values()))
+        points = np.array(list(human.joint_points(q, CELL.body).values()))
         assert found is not None and found.contains(points)
 
 

@@ -24,7 +24,7 @@ def someone() -> np.ndarray:
 
 def test_joints_of_the_model_are_its_keypoints() -> None:
     q = work(1, 12.0)[1][200]
-    points, joints = seen(q), human.joint_points(q, CELL.pelvis_z)
+    points, joints = seen(q), human.joint_points(q, CELL.body)
     names = [f"{part}_{s}" for part in ("shoulder", "elbow", "wrist") for s in "rl"]
     for name in ["neck", *names]:
         np.testing.assert_array_equal(points[K[name]], joints[name])

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from app.errors import BadMotion
-from app.sim.body_track import BodySize, model_points
+from app.sim.body_size import BodySize
+from app.sim.body_track import model_points
 from app.sim.glitches import MAX_SPEED
 from app.sim.human import Q_MAX
 from app.sim.motions import MAX_BYTES, beyond_limits, placed, read_motion

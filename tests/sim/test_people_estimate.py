@@ -13,7 +13,7 @@ DT = 1.0 / 30.0
 def two_people() -> tuple[PeopleEstimator, np.ndarray, np.ndarray]:
     """Two people tracked for a second, 0.9 m apart."""
     one, other = work(1, 12.0)[1], work(2, 12.0)[1] + np.eye(18)[0] * 0.9
-    people = PeopleEstimator(2, CELL.pelvis_z)
+    people = PeopleEstimator(2, CELL.body)
     for k in range(30):
         for estimate in people.update(k * DT, [seen(one[k]), seen(other[k])]):
             assert estimate.flags == ()
@@ -40,7 +40,7 @@ def test_one_of_two_people_missing_is_stale_and_the_other_goes_on() -> None:
 
 def test_a_new_person_takes_the_free_track() -> None:
     one, other = work(1, 12.0)[1], work(2, 12.0)[1] + np.eye(18)[0] * 0.9
-    people = PeopleEstimator(2, CELL.pelvis_z)
+    people = PeopleEstimator(2, CELL.body)
     first, second = people.update(0.0, [seen(one[0])])
     assert first.flags == () and second.flags == ("never-seen",)
     first, second = people.update(DT, [seen(other[1]), seen(one[1])])
@@ -64,4 +64,4 @@ def test_wrong_people_are_refused_by_place_and_leave_no_trace() -> None:
 @pytest.mark.parametrize("n", [0, 5])
 def test_more_people_than_a_cell_holds_are_refused(n: int) -> None:
     with pytest.raises(InvalidInput, match="n_people"):
-        PeopleEstimator(n, CELL.pelvis_z)
+        PeopleEstimator(n, CELL.body)

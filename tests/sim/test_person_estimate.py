@@ -37,8 +37,8 @@ def errors(settings: TrackerSettings) -> Errors:
     found = Errors([], [], [], [], [])
     for seed in (1, 2, 3):
         times, q, qd = work(seed, 12.0)
-        tracker = Tracker(settings, seed, CELL.pelvis_z, CELL.floor_z)
-        estimator = PersonEstimator(CELL.pelvis_z)
+        tracker = Tracker(settings, seed, CELL.body, CELL.floor_z)
+        estimator = PersonEstimator(CELL.body)
         estimates = follow(motion(seed, 12.0), times, tracker, estimator)
         for k, estimate in enumerate(estimates):
             if k * DT >= settings.latency_s + 0.1:
@@ -50,8 +50,8 @@ def compare(estimate: PersonEstimate, q: np.ndarray, qd: np.ndarray, found: Erro
     assert estimate.person is not None and estimate.cylinder is not None
     true, before, after = (safety_cylinder(seen(q + s * qd)) for s in (0.0, -0.01, 0.01))
     assert true is not None and before is not None and after is not None
-    body = human.joint_points(q, CELL.pelvis_z)
-    fitted = human.joint_points(estimate.person.q, CELL.pelvis_z)
+    body = human.joint_points(q, CELL.body)
+    fitted = human.joint_points(estimate.person.q, CELL.body)
     velocity = (after.center - before.center) / 0.02
     found.center.append(float(np.linalg.norm(estimate.cylinder.center - true.center)))
     found.contains.append(estimate.cylinder.contains(np.array(list(body.values()))))
@@ -101,14 +101,14 @@ def test_speeds_of_noisy_people_are_noise_of_a_fraction_of_a_radian() -> None:
 
 def tracked(n: int = 30, seed: int = 1) -> tuple[PersonEstimator, np.ndarray]:
     """An estimator that has seen the first frames of a person at work, and the motion."""
-    q, estimator = work(seed, 12.0)[1], PersonEstimator(CELL.pelvis_z)
+    q, estimator = work(seed, 12.0)[1], PersonEstimator(CELL.body)
     for k in range(n):
         assert estimator.update(k * DT, seen(q[k])).flags == ()
     return estimator, q
 
 
 def test_before_anything_is_seen_there_is_nobody_and_it_is_said() -> None:
-    estimator = PersonEstimator(CELL.pelvis_z)
+    estimator = PersonEstimator(CELL.body)
     for estimate in (estimator.at(0.0), estimator.update(1.0, NOBODY)):
         assert estimate.cylinder is None and estimate.person is None
         assert estimate.flags == ("never-seen",) and estimate.stale
@@ -137,7 +137,7 @@ def test_a_person_who_comes_back_after_long_is_taken_anew() -> None:
     estimate = estimator.update(60 * DT, seen(q[60]))
     assert estimate.flags == ("restarted",) and not estimate.stale
     assert estimate.person is not None
-    joints = human.joint_points(estimate.person.q, CELL.pelvis_z)
+    joints = human.joint_points(estimate.person.q, CELL.body)
     assert np.linalg.norm(joints["wrist_r"] - seen(q[60])[K["wrist_r"]]) < 1e-6
 
 
@@ -147,7 +147,7 @@ def test_a_limb_unseen_for_long_is_held_and_the_cylinder_widens() -> None:
         points = seen(q[k])
         points[[K["elbow_r"], K["wrist_r"]]] = np.nan
         estimate = estimator.update(k * DT, points)
-        arm = human.joint_points(q[k], CELL.pelvis_z)
+        arm = human.joint_points(q[k], CELL.body)
         assert estimate.cylinder is not None
         assert estimate.cylinder.contains(np.array([arm["wrist_r"], arm["elbow_r"]]))
     assert estimate.missing == ("elbow_r", "wrist_r")
@@ -169,14 +169,14 @@ def test_exchanged_sides_are_exchanged_back_and_named(group: str, flag: str) -> 
 
 def test_exchanged_sides_in_the_first_frame_are_seen_by_the_way_the_person_faces() -> None:
     q = work(1, 12.0)[1][0]
-    estimate = PersonEstimator(CELL.pelvis_z).update(0.0, swap_sides(seen(q), "arms"))
+    estimate = PersonEstimator(CELL.body).update(0.0, swap_sides(seen(q), "arms"))
     assert estimate.flags == ("arms-swapped",)
     assert estimate.person is not None
     np.testing.assert_allclose(estimate.person.q, q, atol=0.05)
 
 
 def test_sides_taken_wrong_at_first_are_put_right_when_that_goes_on() -> None:
-    q, estimator = human.rest_posture(0.0, 1.2, -1.5), PersonEstimator(CELL.pelvis_z)
+    q, estimator = human.rest_posture(0.0, 1.2, -1.5), PersonEstimator(CELL.body)
     faceless = seen(q)
     faceless[[K[name] for name in ("nose", "ear_r", "ear_l")]] = np.nan
     first = estimator.update(0.0, swap_sides(faceless, "arms"))
@@ -223,7 +223,7 @@ def test_one_keypoint_that_leaps_is_an_outlier_and_moves_nothing() -> None:
 def test_a_person_the_model_does_not_fit_is_named() -> None:
     points = seen(human.rest_posture(0.0, 1.2, -1.5))
     root = points[K["mid_hip"]]
-    estimate = PersonEstimator(CELL.pelvis_z).update(0.0, root + 1.6 * (points - root))
+    estimate = PersonEstimator(CELL.body).update(0.0, root + 1.6 * (points - root))
     assert "misfit" in estimate.flags and estimate.misfit_m > 0.1
 
 
@@ -253,7 +253,7 @@ def test_the_past_cannot_be_asked_for() -> None:
 
 
 def test_any_finite_frames_give_a_finite_estimate() -> None:
-    rng, estimator, taken = np.random.default_rng(8), PersonEstimator(CELL.pelvis_z), 0
+    rng, estimator, taken = np.random.default_rng(8), PersonEstimator(CELL.body), 0
     for k in range(200):
         points = rng.uniform(-0.9, 0.9, (25, 3))
         points[rng.random(25) < rng.random()] = np.nan
@@ -274,5 +274,5 @@ def test_any_finite_frames_give_a_finite_estimate() -> None:
 def test_settings_without_sense_are_refused_by_name() -> None:
     with pytest.raises(InvalidInput, match="stale_s"):
         EstimatorSettings(stale_s=np.nan)
-    with pytest.raises(InvalidInput, match="pelvis_z"):
+    with pytest.raises(InvalidInput, match="size"):
         PersonEstimator(np.nan)

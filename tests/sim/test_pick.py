@@ -150,7 +150,7 @@ def test_person_at_the_tool_is_a_contact_with_both_names(cell: Cell) -> None:
     rest = human.rest_posture(*cell.human.home)
     q = PickBatch(cell, 1, 0, TEN_SECONDS).world.station_q[3]
     grip = np.array(cell.stations[3].position) + [0.0, 0.04, 0.06]
-    person = human.reach("r", grip, rest, cell.pelvis_z).q[None]
+    person = human.reach("r", grip, rest, cell.body).q[None]
     found = contact(arm, people, q, zero, zero, zero, (person, person))
     assert found.kind == "human"
     assert found.part in ("hand_r", "forearm_r")
@@ -192,7 +192,7 @@ def test_read_only_integer_and_strided_inputs_compile_nothing_anew(cell: Cell) -
         contact(arm, people, q, zero, zero, zero, (person[None], person[None]))
         pick.observe(arm, people, q, zero, person, np.zeros(18), goals[::2], 10)
         pick.tool_state(arm, q, zero, goals[0])
-        human.capsules(person, cell.pelvis_z, cell.floor_z)
+        human.capsules(person, cell.body, cell.floor_z)
 
     use()
     kernels = (features.observe_rows, contact_kernel.sweep, actions.advance)

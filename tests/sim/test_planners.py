@@ -28,7 +28,7 @@ def station(name: str) -> Vec:
 def reaching_person() -> Vec:
     """A person whose hand lies on the straight joint way from cube5 to cube0."""
     rest = human.rest_posture(*CELL.human.home)
-    return human.reach("r", np.array([-0.1, 0.7, 0.2]), rest, CELL.pelvis_z).q
+    return human.reach("r", np.array([-0.1, 0.7, 0.2]), rest, CELL.body).q
 
 
 def in_the_way() -> Shapes:

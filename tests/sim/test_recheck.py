@@ -18,7 +18,7 @@ def random_trajectory(cell: Cell, rng: np.random.Generator, n_steps: int) -> Tra
     robot, rest = Robot(), human.rest_posture(*cell.human.home)
     q0, q1 = robot.ik_vertical(start, *limits), robot.ik_vertical(end, *limits)
     assert q0 is not None and q1 is not None
-    h0, h1 = (human.reach("r", p + [0, 0.1, 0.1], rest, cell.pelvis_z).q for p in reaches)
+    h0, h1 = (human.reach("r", p + [0, 0.1, 0.1], rest, cell.body).q for p in reaches)
     w = np.linspace(0.0, 1.0, n_steps)[:, None]
     return Trajectory(q_robot=q0 + w * (q1 - q0), q_human=h0 + w * (h1 - h0), dt=0.01)
 

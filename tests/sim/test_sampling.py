@@ -12,7 +12,7 @@ from app.sim.via_points import SLACK, JointVia, PointVia, Via, condition, miss, 
 from tests.sim.demonstrations import reaches
 
 CELL = load_cell()
-POINTS = points_of(CELL.pelvis_z)
+POINTS = points_of(CELL.body)
 CUBES = np.array([station.position for station in CELL.stations_of("cube")])
 ARM = ("shoulder_r_flex", "elbow_r")
 

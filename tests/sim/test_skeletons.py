@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from app.errors import BadMotion
-from app.sim.body_track import BodySize, model_points
+from app.sim.body_size import BodySize
+from app.sim.body_track import model_points
 from app.sim.bvh import read_bvh
 from app.sim.skeletons import UNITS, body_track, skeleton_joints
 from tests.sim.recorded_person import SKELETONS, TUM, bvh_text, working

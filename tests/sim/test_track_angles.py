@@ -1,15 +1,8 @@
 import numpy as np
 import pytest
 
-from app.sim.body_track import (
-    ELBOW_R,
-    NECK,
-    PELVIS,
-    WRIST_R,
-    BodySize,
-    BodyTrack,
-    model_points,
-)
+from app.sim.body_size import BodySize
+from app.sim.body_track import ELBOW_R, NECK, PELVIS, WRIST_R, BodyTrack, model_points
 from app.sim.human import Q_MAX, Q_MIN
 from app.sim.kernels import body
 from app.sim.ports import Vec

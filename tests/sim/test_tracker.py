@@ -12,7 +12,7 @@ EXACT = TrackerSettings(noise=0.0, missing=0.0, latency_s=0.0)
 
 
 def frames(settings: TrackerSettings, seed: int = 4, end: float = 10.0) -> tuple[Frame, ...]:
-    tracker = Tracker(settings, seed, CELL.pelvis_z, CELL.floor_z)
+    tracker = Tracker(settings, seed, CELL.body, CELL.floor_z)
     return tracker.frames(end, motion(1, 12.0))
 
 
@@ -25,7 +25,7 @@ def test_an_exact_tracker_says_what_is_there() -> None:
 
 def test_frames_come_after_the_latency_each_once_whatever_the_worlds_step() -> None:
     settings = TrackerSettings(latency_s=0.1)
-    tracker = Tracker(settings, 4, CELL.pelvis_z, CELL.floor_z)
+    tracker = Tracker(settings, 4, CELL.body, CELL.floor_z)
     got = []
     for t in np.arange(0, 201) * 0.05:
         new = tracker.frames(t, motion(1, 12.0))
@@ -62,9 +62,9 @@ def test_same_seed_disturbs_alike_and_another_does_not() -> None:
 
 
 def test_what_was_seen_comes_back_as_the_person_who_was_there() -> None:
-    tracker = Tracker(EXACT, 4, CELL.pelvis_z, CELL.floor_z)
+    tracker = Tracker(EXACT, 4, CELL.body, CELL.floor_z)
     times, truth = np.arange(201) * 0.05, motion(1, 12.0)
-    estimator = PersonEstimator(CELL.pelvis_z)
+    estimator = PersonEstimator(CELL.body)
     errors = []
     for t, estimate in zip(times, follow(truth, times, tracker, estimator), strict=True):
         assert estimate.person is not None and estimate.t == t and not estimate.stale
@@ -73,8 +73,8 @@ def test_what_was_seen_comes_back_as_the_person_who_was_there() -> None:
 
 
 def test_a_tracker_that_delivers_nothing_leaves_the_person_unseen() -> None:
-    tracker = Tracker(TrackerSettings(lost=1.0), 4, CELL.pelvis_z, CELL.floor_z)
-    estimator = PersonEstimator(CELL.pelvis_z)
+    tracker = Tracker(TrackerSettings(lost=1.0), 4, CELL.body, CELL.floor_z)
+    estimator = PersonEstimator(CELL.body)
     for estimate in follow(motion(1, 12.0), [0.0, 0.5, 1.0], tracker, estimator):
         assert estimate.stale and estimate.flags == ("never-seen",)
         assert estimate.person is None and estimate.cylinder is None

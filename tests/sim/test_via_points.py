@@ -19,7 +19,7 @@ from app.sim.via_points import (
 from tests.sim.demonstrations import reaches
 
 CELL = load_cell()
-POINTS = points_of(CELL.pelvis_z)
+POINTS = points_of(CELL.body)
 CUBES = np.array([station.position for station in CELL.stations_of("cube")])
 ARM = ("shoulder_r_flex", "elbow_r")
 

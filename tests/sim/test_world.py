@@ -40,7 +40,7 @@ def until(world: World, status: str, limit: int = 400) -> WorldSnapshot:
 
 
 def palm(snapshot: WorldSnapshot, cell: Cell, hand: str) -> np.ndarray:
-    return human.joint_points(snapshot.person_q, cell.pelvis_z)[f"hand_{hand}"]
+    return human.joint_points(snapshot.person_q, cell.body)[f"hand_{hand}"]
 
 
 def test_robot_reaches_a_candidate_and_the_next_episode_offers_the_others(world: World) -> None:

@@ -35,4 +35,4 @@ def motion(seed: int, seconds: float) -> Callable[[float], np.ndarray]:
 
 def seen(q: np.ndarray) -> np.ndarray:
     """Exact key-points of a posture [m], shape (25, 3)."""
-    return keypoints_of(q, CELL.pelvis_z, CELL.floor_z)
+    return keypoints_of(q, CELL.body, CELL.floor_z)

@@ -45,14 +45,14 @@ def test_hands_of_the_mannequin_are_where_the_simulators_hands_are() -> None:
     cell = load_cell()
     q = human.rest_posture(*cell.human.home)
     target = np.array([0.1, 0.8, 0.2])
-    q = human.solve_hands(q, cell.pelvis_z, right=target).q
+    q = human.solve_hands(q, cell.body, right=target).q
     gait = Gait(cell.floor_z)
-    gait.follow(human.body_frames(q, cell.pelvis_z)["pelvis"], 0.0)
-    bones = skeleton.bones(q, cell.pelvis_z, gait.feet)
+    gait.follow(human.body_frames(q, cell.body)["pelvis"], 0.0)
+    bones = skeleton.bones(q, cell.body, gait.feet)
     glove = next(part for part in mannequin.parts() if part.name == "hand_r")
     frame = bones["hand_r"]
     vertices = glove.surface.vertices @ frame[:3, :3].T + frame[:3, 3]
-    palm = human.joint_points(q, cell.pelvis_z)["hand_r"]
+    palm = human.joint_points(q, cell.body)["hand_r"]
     assert np.linalg.norm(vertices - palm, axis=1).min() < 0.04
     assert np.linalg.norm(vertices.mean(axis=0) - palm) < 0.06
 
@@ -79,8 +79,8 @@ def test_legs_reach_from_hip_to_ankle_while_a_foot_swings() -> None:
     gait, q = Gait(cell.floor_z), human.rest_posture(0.0, 1.4, -1.57)
     for _ in range(80):
         q[0] += 0.02
-        gait.follow(human.body_frames(q, cell.pelvis_z)["pelvis"], 0.05)
-        bones = skeleton.bones(q, cell.pelvis_z, gait.feet)
+        gait.follow(human.body_frames(q, cell.body)["pelvis"], 0.05)
+        bones = skeleton.bones(q, cell.body, gait.feet)
         for side in skeleton.SIDES:
             shin = bones[f"shin_{side}"]
             ankle = shin[:3, 3] - skeleton.SHIN * shin[:3, 2]

@@ -83,7 +83,7 @@ def test_gizmos_are_seen_in_manual_mode_only_and_sit_on_the_hands(
     assert not node(server, "/gizmos/right").visible
     world.apply(commands.SetMode(mode="manual"))
     scene.draw(world.snapshot(), 0.05)
-    palms = human.joint_points(world.snapshot().person_q, cell.pelvis_z)
+    palms = human.joint_points(world.snapshot().person_q, cell.body)
     assert node(server, "/gizmos/right").visible
     assert np.allclose(node(server, "/gizmos/right").position, palms["hand_r"], atol=1e-3)
 
@@ -111,7 +111,7 @@ def test_collision_shapes_lie_over_the_person_when_asked_for(
     scene.overlays.shapes = True
     snapshot = world.snapshot()
     scene.draw(snapshot, 0.05)
-    ends = human.capsules(snapshot.person_q, cell.pelvis_z, cell.floor_z)
+    ends = human.capsules(snapshot.person_q, cell.body, cell.floor_z)
     for name, pair in zip(human.CAPSULE_NAMES, ends, strict=True):
         capsule = node(server, f"/person/shapes/{name}")
         assert capsule.visible

@@ -154,11 +154,12 @@ class Evaluator:
         obs = np.empty((len(env), N_FEATURES), dtype=np.float32)
         observe_batch(
             batch.arm,
-            batch.world.people,
+            batch.world.people.floor_z,
             state.q[env],
             state.qd[env],
             state.people.q[env, 0],
             state.people.qd[env, 0],
+            state.people.size[env, 0],
             batch.world.stations[station],
             batch.world.station_q[station],
             state.time_left[env],

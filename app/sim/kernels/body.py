@@ -1,4 +1,4 @@
-"""Forward kinematics and capsules of the 18-DoF human, compiled.
+"""Forward kinematics and capsules of the 18-DoF human of any size, compiled.
 
 Tree: pelvis (x, y, yaw) - abdomen (flexion, side bend, twist) - clavicles (protraction,
 elevation) - shoulders (flexion, abduction, rotation) - elbows. Body axes: x forward, y left,
@@ -7,31 +7,40 @@ turns by ``Ry(-flex) Rx(-+abduct) Rz(rotate)`` (right, left), the forearm by ``R
 Joint order: ``app.sim.human.JOINT_NAMES``. Source: METHOD 3.4, thesis fig. 5.2.
 """
 
-import math
-
 import numpy as np
 
-from app.sim.kernels.columns import new_columns, padded
+from app.sim.kernels.columns import INVERSE, RADIUS, UU, new_columns, padded
 from app.sim.kernels.compiled import kernel
 from app.sim.kernels.trig import sines
 from app.sim.ports import Vec
 
-NECK_HEIGHT = 0.44
-"""Pelvis to the base of the neck along the torso [m]; the clavicles start here."""
-CLAVICLE = 0.18
-"""Length of a clavicle [m]."""
-HEAD_HEIGHT = 0.17
-"""Base of the neck to the centre of the head [m]."""
-UPPER_ARM = 0.29
-"""Shoulder to elbow [m]."""
-FOREARM = 0.26
-"""Elbow to wrist [m]."""
-HAND = 0.09
-"""Wrist to the middle of the palm [m]; "hand" means this point."""
+N_SIZE = 12
+(
+    PELVIS_Z,
+    TRUNK,
+    CLAVICLE_R,
+    CLAVICLE_L,
+    UPPER_ARM_R,
+    UPPER_ARM_L,
+    FOREARM_R,
+    FOREARM_L,
+    HAND,
+    HEAD_UP,
+    HIP,
+    GIRTH,
+) = range(N_SIZE)
+"""Entries of a person's *size* [m]: height of the pelvis in the cell's frame; pelvis to the
+base of the neck, along the torso; base of the neck to shoulder; shoulder to elbow; elbow to
+wrist; wrist to the middle of the palm, which "hand" means; base of the neck to the centre of
+the head; half the distance of the hips; and the body's thickness, 1 for the median person."""
+
+MEDIAN_TRUNK = 0.44
+MEDIAN_HAND = 0.09
+MEDIAN_HEAD = 0.17
 HAND_TIP = 0.15
-"""Wrist to the end of the hand's capsule [m], without its rounding."""
-HIP_WIDTH = 0.09
-"""Half the distance of the hips [m]."""
+"""Wrist to the end of the median hand's capsule [m], without its rounding."""
+HIP_DROP = 0.05
+"""How far the legs begin below the pelvis [m]."""
 
 N_POINTS = 14
 (
@@ -69,6 +78,7 @@ N_CAPSULES = 12
 
 RADII = np.array([0.14, 0.14, 0.15, 0.11, 0.055, 0.055, 0.045, 0.045, 0.045, 0.045, 0.09, 0.09])
 RADII.setflags(write=False)
+"""Radii of the median person's capsules [m]."""
 
 
 N_FRAMES = 6
@@ -106,12 +116,12 @@ def _along(rot: Vec, x: float, y: float, z: float, origin: Vec, out: Vec) -> Non
 
 
 @kernel()
-def points_and_frames(q: Vec, pelvis_z: float, trig: Vec, points: Vec, frames: Vec) -> None:
+def points_and_frames(q: Vec, size: Vec, trig: Vec, points: Vec, frames: Vec) -> None:
     """Write joint centres and body orientations.
 
     Args:
         q: Joint positions [m, rad], shape (18,).
-        pelvis_z: Height of the pelvis [m].
+        size: The person's size [m], shape (N_SIZE,).
         trig: Work space, shape (3, 16).
         points: Filled with the points named above [m], shape (N_POINTS, 3).
         frames: Filled with R_world_body, shape (N_FRAMES, 3, 3).
@@ -122,28 +132,35 @@ def points_and_frames(q: Vec, pelvis_z: float, trig: Vec, points: Vec, frames: V
     pelvis[0, 0], pelvis[0, 1], pelvis[0, 2] = c[0], -s[0], 0.0
     pelvis[1, 0], pelvis[1, 1], pelvis[1, 2] = s[0], c[0], 0.0
     pelvis[2, 0], pelvis[2, 1], pelvis[2, 2] = 0.0, 0.0, 1.0
-    points[PELVIS, 0], points[PELVIS, 1], points[PELVIS, 2] = q[0], q[1], pelvis_z
+    points[PELVIS, 0], points[PELVIS, 1], points[PELVIS, 2] = q[0], q[1], size[PELVIS_Z]
     scratch = trig[2, :9].reshape((3, 3))
     _turn(c[1], s[1], c[2], s[2], c[3], s[3], scratch)
     _times(pelvis, scratch, torso)
     origin = points[PELVIS]
-    _along(torso, 0.0, 0.0, 0.12, origin, points[WAIST])
-    _along(torso, 0.0, 0.0, 0.30, origin, points[CHEST])
-    _along(torso, 0.0, 0.0, NECK_HEIGHT, origin, points[NECK])
-    _along(torso, 0.02, 0.0, NECK_HEIGHT + HEAD_HEIGHT, origin, points[HEAD])
-    _along(torso, 0.02, 0.0, NECK_HEIGHT + HEAD_HEIGHT + 0.05, origin, points[CROWN])
+    trunk, head = size[TRUNK], size[TRUNK] + size[HEAD_UP]
+    _along(torso, 0.0, 0.0, trunk * (0.12 / MEDIAN_TRUNK), origin, points[WAIST])
+    _along(torso, 0.0, 0.0, trunk * (0.30 / MEDIAN_TRUNK), origin, points[CHEST])
+    _along(torso, 0.0, 0.0, trunk, origin, points[NECK])
+    _along(torso, 0.02, 0.0, head, origin, points[HEAD])
+    crown = trunk + size[HEAD_UP] * (0.22 / MEDIAN_HEAD)
+    _along(torso, 0.02, 0.0, crown, origin, points[CROWN])
     for arm in range(2):
         side = -1.0 if arm == 0 else 1.0
         clavicle, first = 4 + 2 * arm, 8 + 4 * arm
         shoulder = SHOULDER_R if arm == 0 else SHOULDER_L
         upper = frames[F_UPPER_ARM_R if arm == 0 else F_UPPER_ARM_L]
         fore = frames[F_FOREARM_R if arm == 0 else F_FOREARM_L]
-        level = CLAVICLE * c[clavicle + 1]
+        bar, upper_arm, forearm = (
+            size[CLAVICLE_R + arm],
+            size[UPPER_ARM_R + arm],
+            size[FOREARM_R + arm],
+        )
+        level = bar * c[clavicle + 1]
         _along(
             torso,
             level * s[clavicle],
             side * level * c[clavicle],
-            CLAVICLE * s[clavicle + 1],
+            bar * s[clavicle + 1],
             points[NECK],
             points[shoulder],
         )
@@ -157,13 +174,15 @@ def points_and_frames(q: Vec, pelvis_z: float, trig: Vec, points: Vec, frames: V
             scratch,
         )
         _times(torso, scratch, upper)
-        _along(upper, 0.0, 0.0, -UPPER_ARM, points[shoulder], points[shoulder + 1])
+        _along(upper, 0.0, 0.0, -upper_arm, points[shoulder], points[shoulder + 1])
         ce, se = c[first + 3], s[first + 3]
         for i in range(3):
             x, z = upper[i, 0], upper[i, 2]
             fore[i, 0], fore[i, 1], fore[i, 2] = ce * x + se * z, upper[i, 1], ce * z - se * x
-        _along(fore, 0.0, 0.0, -FOREARM, points[shoulder + 1], points[shoulder + 2])
-        _along(fore, 0.0, 0.0, -FOREARM - HAND, points[shoulder + 1], points[shoulder + 3])
+        _along(fore, 0.0, 0.0, -forearm, points[shoulder + 1], points[shoulder + 2])
+        _along(
+            fore, 0.0, 0.0, -forearm - size[HAND], points[shoulder + 1], points[shoulder + 3]
+        )
 
 
 @kernel(inline="always")
@@ -183,25 +202,27 @@ def _across(out: Vec, k: int, origin: Vec, rot: Vec, half: float) -> None:
 
 
 @kernel()
-def capsules(points: Vec, frames: Vec, floor_z: float, first: int, out: Vec) -> None:
+def capsules(points: Vec, frames: Vec, size: Vec, floor_z: float, first: int, out: Vec) -> None:
     """Write the person's twelve capsules into columns ``first`` and on.
-
-    Rows ``X`` to ``UZ`` are written; lengths and radii never change (:func:`capsule_columns`).
 
     Args:
         points: From :func:`points_and_frames` [m].
         frames: From :func:`points_and_frames`.
+        size: The person's size [m], shape (N_SIZE,).
         floor_z: Height of the floor [m].
         first: Column of the first capsule.
         out: Capsules as columns, shape (9, n).
     """
     pelvis, torso, top = frames[F_PELVIS], frames[F_TORSO], points[PELVIS]
-    _across(out, first + C_PELVIS, top, pelvis, 0.06)
-    _across(out, first + C_CHEST, points[CHEST], torso, 0.07)
+    girth, hip = size[GIRTH], size[HIP]
+    _across(out, first + C_PELVIS, top, pelvis, 0.06 * girth)
+    _across(out, first + C_CHEST, points[CHEST], torso, 0.07 * girth)
+    abdomen, neck = size[TRUNK] * (0.24 / MEDIAN_TRUNK), size[HEAD_UP] * (0.06 / MEDIAN_HEAD)
+    tip = size[HAND] * (HAND_TIP / MEDIAN_HAND)
     for i in range(3):
         out[i, first + C_ABDOMEN] = top[i]
-        out[3 + i, first + C_ABDOMEN] = 0.24 * torso[i, 2]
-        start = points[NECK, i] + 0.01 * torso[i, 0] + 0.06 * torso[i, 2]
+        out[3 + i, first + C_ABDOMEN] = abdomen * torso[i, 2]
+        start = points[NECK, i] + 0.01 * torso[i, 0] + neck * torso[i, 2]
         out[i, first + C_HEAD] = start
         out[3 + i, first + C_HEAD] = points[CROWN, i] - start
     for arm in range(2):
@@ -210,28 +231,27 @@ def capsules(points: Vec, frames: Vec, floor_z: float, first: int, out: Vec) -> 
         _between(out, first + C_UPPER_ARM_R + arm, points, shoulder, shoulder + 1)
         _between(out, first + C_FOREARM_R + arm, points, shoulder + 1, shoulder + 2)
         hand, leg = first + C_HAND_R + arm, first + C_LEG_R + arm
-        side = -HIP_WIDTH if arm == 0 else HIP_WIDTH
+        side = -hip if arm == 0 else hip
         for i in range(3):
             out[i, hand] = points[shoulder + 2, i]
-            out[3 + i, hand] = -HAND_TIP * fore[i, 2]
+            out[3 + i, hand] = -tip * fore[i, 2]
             out[i, leg] = top[i] + side * pelvis[i, 1]
             out[3 + i, leg] = 0.0
-        out[2, leg] = top[2] - 0.05
-        out[5, leg] = floor_z + RADII[C_LEG_R] - out[2, leg]
+        out[2, leg] = top[2] - HIP_DROP
+        out[5, leg] = floor_z + girth * RADII[C_LEG_R] - out[2, leg]
+    for part in range(N_CAPSULES):
+        k = first + part
+        x, y, z = out[3, k], out[4, k], out[5, k]
+        out[UU, k] = x * x + y * y + z * z
+        out[RADIUS, k] = girth * RADII[part]
+        out[INVERSE, k] = 1.0 / max(out[UU, k], 1e-12)
 
 
-def capsule_columns(n_people: int, pelvis_z: float, floor_z: float) -> Vec:
-    """Return the capsules of people as columns: radii and lengths set, places not yet.
+def capsule_columns(n_people: int) -> Vec:
+    """Return the capsules of people as columns, all nowhere until they are placed.
 
     Args:
         n_people: Number of people; each has twelve columns, then come columns nowhere.
-        pelvis_z: Height of the pelvis [m].
-        floor_z: Height of the floor [m].
     """
-    leg = pelvis_z - 0.05 - floor_z - RADII[C_LEG_R]
-    head = math.hypot(0.01, HEAD_HEIGHT - 0.01)
-    length = np.array(
-        [0.12, 0.24, 0.14, head, *2 * [UPPER_ARM], *2 * [FOREARM], *2 * [HAND_TIP], leg, leg]
-    )
     n = padded(n_people * N_CAPSULES)
-    return new_columns(n, np.tile(RADII, n_people), np.tile(length**2, n_people))
+    return new_columns(n, np.tile(RADII, n_people))

@@ -15,6 +15,7 @@ from app.sim.kernels.arm import (
     robot_speed_bound,
     self_clearance,
 )
+from app.sim.kernels.body import PELVIS_Z
 from app.sim.kernels.columns import copy_rows
 from app.sim.kernels.compiled import kernel
 from app.sim.kernels.people import (
@@ -90,13 +91,16 @@ def sweep(
         clear: Clearances at the start, from :func:`clearances` [m], shape (3,); afterwards
             those at the last pose looked at.
         robot: Work space; holds the last pose looked at, the end of the period if no contact.
-        crowd: Work space, likewise; ``q0`` and ``cylinders0`` hold the people at the start.
+        crowd: Work space, likewise; ``q0``, ``cylinders0`` and ``pelvis_z[0]`` hold the people
+            at the start, ``size`` their sizes at the end.
 
     Returns:
         Kind of contact, and the time in the period at which it was found [s].
     """
     place_robot(arm, q1, robot)
     place_workers(people, human_q1, crowd)
+    for w in range(human_q1.shape[0]):
+        crowd.pelvis_z[1, w] = crowd.size[w, PELVIS_Z]
     copy_rows(cylinders1, crowd.cylinders)
     robot_speed = robot_speed_bound(arm, qd0, c, d, robot0, robot.columns)
     approach = robot_speed + people_speed_bound(
@@ -183,6 +187,8 @@ def _place_at(
     for w in range(human_q1.shape[0]):
         for j in range(18):
             crowd.q[w, j] = crowd.q0[w, j] + part * (human_q1[w, j] - crowd.q0[w, j])
+        rise = crowd.pelvis_z[1, w] - crowd.pelvis_z[0, w]
+        crowd.size[w, PELVIS_Z] = crowd.pelvis_z[0, w] + part * rise
     place_workers(people, crowd.q, crowd)
     for k in range(cylinders1.shape[0]):
         for i in range(3):

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from app.sim.kernels.actions import ActionRule, advance
 from app.sim.kernels.arm import Arm, RobotPose, keep_columns, place_robot
+from app.sim.kernels.body import PELVIS_Z
 from app.sim.kernels.columns import copy_rows
 from app.sim.kernels.compiled import kernel
 from app.sim.kernels.contact import NO_CONTACT, sweep
@@ -91,6 +92,8 @@ def move(
     people, crowd, robot = state.people, work.crowd, work.robot
     copy_rows(people.q[e], crowd.q0)
     copy_rows(people.cylinders[e], crowd.cylinders0)
+    for w in range(people.q.shape[1]):
+        crowd.pelvis_z[0, w] = people.size[e, w, PELVIS_Z]
     unfeasible = advance(
         action, state.q[e], state.qd[e], state.qdd[e], act,
         arm.q_min, arm.q_max, arm.qd_max, arm.qdd_max, arm.jerk_max, arm.dt,
@@ -99,6 +102,7 @@ def move(
     state.elapsed[e] += arm.dt
     state.time_left[e] -= arm.dt
     advance_people(everybody, people, e, state.elapsed[e], arm.dt)
+    copy_rows(people.size[e], crowd.size)
     kind, _ = sweep(
         arm, everybody, state.q[e], state.qd[e], work.c, work.d, work.q,
         people.q[e], people.cylinders[e], state.robot[e], people.columns[e], state.clear[e],

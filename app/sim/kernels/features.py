@@ -27,6 +27,7 @@ from app.sim.kernels.arm import (
 )
 from app.sim.kernels.columns import (
     INVERSE,
+    RADIUS,
     UU,
     UX,
     UY,
@@ -39,7 +40,6 @@ from app.sim.kernels.columns import (
 from app.sim.kernels.compiled import kernel
 from app.sim.kernels.geometry import FAR, FAST, segment_nearest
 from app.sim.kernels.layout import slices_of
-from app.sim.kernels.people import People
 from app.sim.ports import Vec
 
 Obs = NDArray[np.float32]
@@ -169,8 +169,9 @@ class Sight(NamedTuple):
     """From robot to person [m], shape (3,)."""
 
 
-def new_sight(person: Vec) -> Sight:
-    """Return work space; ``person`` holds the template of ``body.capsule_columns``, (9, 16)."""
+def new_sight() -> Sight:
+    """Return work space, nothing seen yet."""
+    person = body.capsule_columns(1)
     lanes = new_columns(
         N_LANES, np.tile(COARSE_RADIUS, 3), np.tile((COARSE_SPAN**2).sum(axis=1), 3)
     )
@@ -195,16 +196,14 @@ def new_sight(person: Vec) -> Sight:
 
 
 @kernel(inline="always")
-def see_person(people: People, human_q: Vec, human_qd: Vec, sight: Sight) -> None:
+def see_person(floor_z: float, human_q: Vec, human_qd: Vec, size: Vec, sight: Sight) -> None:
     """Fill the person's part of ``sight``: points and capsules, now and a tick later."""
     for j in range(18):
         sight.human_q[j] = human_q[j] + TICK * human_qd[j]
-    body.points_and_frames(
-        sight.human_q, people.pelvis_z, sight.trig, sight.points_later, sight.frames
-    )
-    body.capsules(sight.points_later, sight.frames, people.floor_z, 0, sight.later)
-    body.points_and_frames(human_q, people.pelvis_z, sight.trig, sight.points, sight.frames)
-    body.capsules(sight.points, sight.frames, people.floor_z, 0, sight.now)
+    body.points_and_frames(sight.human_q, size, sight.trig, sight.points_later, sight.frames)
+    body.capsules(sight.points_later, sight.frames, size, floor_z, 0, sight.later)
+    body.points_and_frames(human_q, size, sight.trig, sight.points, sight.frames)
+    body.capsules(sight.points, sight.frames, size, floor_z, 0, sight.now)
 
 
 @kernel(error_model="numpy", fastmath=FAST)
@@ -224,7 +223,7 @@ def look_ahead(now: Vec, later: Vec, ahead: float, moved: Vec) -> None:
     for k in range(now.shape[1]):
         ux, uy, uz = moved[UX, k], moved[UY, k], moved[UZ, k]
         square = ux * ux + uy * uy + uz * uz
-        moved[UU, k] = square
+        moved[UU, k], moved[RADIUS, k] = square, now[RADIUS, k]
         moved[INVERSE, k] = 1.0 / (square if square > 1e-12 else 1e30)
 
 
@@ -321,11 +320,12 @@ def _put_nearest(sight: Sight, k: int, out: Obs) -> float:
 @kernel(inline="always")
 def observe(
     arm: Arm,
-    people: People,
+    floor_z: float,
     q: Vec,
     qd: Vec,
     human_q: Vec,
     human_qd: Vec,
+    size: Vec,
     goal: Vec,
     q_goal: Vec,
     time_left: float,
@@ -337,11 +337,12 @@ def observe(
 
     Args:
         arm: Robot in its cell.
-        people: Shared data of the people.
+        floor_z: Height of the floor [m].
         q: Joint positions [rad], shape (6,).
         qd: Joint speeds [rad/s], shape (6,).
         human_q: The person's joint positions [m, rad], shape (18,).
         human_qd: The person's joint speeds [m/s, rad/s], shape (18,).
+        size: The person's size [m], shape (body.N_SIZE,).
         goal: Where the tcp shall be [m], shape (3,).
         q_goal: Vertical-tool posture at the goal [rad], shape (6,).
         time_left: Time left to reach it [s].
@@ -349,7 +350,7 @@ def observe(
         sight: Work space.
         out: Filled, shape (N_FEATURES,).
     """
-    see_person(people, human_q, human_qd, sight)
+    see_person(floor_z, human_q, human_qd, size, sight)
     _put_joints(arm, q, qd, human_q, human_qd, out)
     _put_tool(qd, goal, robot, out)
     k = _put_arms(sight, robot, goal, out)
@@ -389,11 +390,12 @@ def observe(
 @kernel()
 def observe_rows(
     arm: Arm,
-    people: People,
+    floor_z: float,
     q: Vec,
     qd: Vec,
     human_q: Vec,
     human_qd: Vec,
+    sizes: Vec,
     goals: Vec,
     q_goals: Vec,
     time_left: Vec,
@@ -406,11 +408,12 @@ def observe_rows(
         place_robot(arm, q[i], robot)
         observe(
             arm,
-            people,
+            floor_z,
             q[i],
             qd[i],
             human_q[i],
             human_qd[i],
+            sizes[i],
             goals[i],
             q_goals[i],
             time_left[i],
@@ -422,18 +425,20 @@ def observe_rows(
 
 def observe_batch(
     arm: Arm,
-    people: People,
+    floor_z: float,
     q: Vec,
     qd: Vec,
     human_q: Vec,
     human_qd: Vec,
+    sizes: Vec,
     goals: Vec,
     q_goals: Vec,
     time_left: Vec,
     out: Obs,
 ) -> None:
     """Apply :func:`observe` to n rows; all arguments but two have a leading axis of n."""
-    robot, sight = new_robot_pose(arm), new_sight(people.person)
+    robot, sight = new_robot_pose(arm), new_sight()
     observe_rows(
-        arm, people, q, qd, human_q, human_qd, goals, q_goals, time_left, robot, sight, out
-    )
+        arm, floor_z, q, qd, human_q, human_qd, sizes, goals, q_goals, time_left, robot, sight,
+        out,
+    )  # fmt: skip

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.sim.kernels import body, random, script
-from app.sim.kernels.columns import copy_rows, gaps, least, longest_way
+from app.sim.kernels.columns import copy_rows, copy_values, gaps, least, longest_way
 from app.sim.kernels.compiled import kernel
 from app.sim.kernels.cylinder import cylinder_clearance
 from app.sim.kernels.geometry import FAR
@@ -38,22 +38,20 @@ DEEPEST = 32
 class People(NamedTuple):
     """What all environments share about their people."""
 
-    pelvis_z: float
-    """Height of the workers' pelvis [m]."""
+    bodies: Vec
+    """Sizes of which each worker's is drawn [m], shape (n_bodies, body.N_SIZE)."""
     floor_z: float
     """Height of the floor [m]."""
     top_z: float
     """Height of the walkers' tops [m]."""
     columns: Vec
     """Template of the workers' capsules, shape (9, n); see ``body.capsule_columns``."""
-    person: Vec
-    """Template of one person's capsules, shape (9, 16)."""
     postures: Vec
     """The workers' library [m, rad], shape (n_postures, 18)."""
     hands: Vec
     """Palms of each posture [m], shape (n_postures, 2, 3)."""
     of_station: NDArray[np.int64]
-    """First posture and count of each place and hand, shape (n_places + 1, 2, 2)."""
+    """First posture and count of each body, place and hand, (n_bodies, n_places + 1, 2, 2)."""
     n_cubes: int
     """Places that are cubes; they come first."""
     pace: float
@@ -71,6 +69,10 @@ class PeopleState(NamedTuple):
     """The workers' joints [m, rad], shape (n_envs, W, 18)."""
     qd: Vec
     """Their speeds [m/s, rad/s], shape (n_envs, W, 18)."""
+    body: NDArray[np.int64]
+    """Which of the bodies each worker has, shape (n_envs, W)."""
+    size: Vec
+    """Their sizes [m], shape (n_envs, W, body.N_SIZE)."""
     columns: Vec
     """Their capsules at this moment, shape (n_envs, 9, n)."""
     phase: Vec
@@ -96,6 +98,10 @@ class Crowd(NamedTuple):
 
     q: Vec
     """Joints of the workers [m, rad], shape (W, 18)."""
+    size: Vec
+    """Their sizes [m], shape (W, body.N_SIZE)."""
+    pelvis_z: Vec
+    """Heights of their pelvis when the period began and when it ends [m], shape (2, W)."""
     points: Vec
     """The workers' points [m], shape (W, N_POINTS, 3)."""
     frames: Vec
@@ -118,6 +124,8 @@ class Crowd(NamedTuple):
     """Joints of the person a policy looks at [m, rad], shape (18,)."""
     seen_qd: Vec
     """Their speeds [m/s, rad/s], shape (18,)."""
+    seen_size: Vec
+    """That person's size [m], shape (body.N_SIZE,)."""
     stack_end: Vec
     """Ends of the intervals the contact test has before it [s], shape (DEEPEST,)."""
     stack_clear: Vec
@@ -128,6 +136,8 @@ def new_crowd(people: People, n_workers: int, n_walkers: int) -> Crowd:
     """Return work space, not placed yet."""
     return Crowd(
         np.empty((n_workers, 18)),
+        np.tile(people.bodies[0], (n_workers, 1)),
+        np.zeros((2, n_workers)),
         np.empty((n_workers, body.N_POINTS, 3)),
         np.empty((n_workers, body.N_FRAMES, 3, 3)),
         np.empty((3, 16)),
@@ -139,6 +149,7 @@ def new_crowd(people: People, n_workers: int, n_walkers: int) -> Crowd:
         np.empty(6),
         np.empty(18),
         np.empty(18),
+        people.bodies[0].copy(),
         np.empty(DEEPEST),
         np.empty((DEEPEST, 3)),
     )
@@ -146,11 +157,15 @@ def new_crowd(people: People, n_workers: int, n_walkers: int) -> Crowd:
 
 @kernel(inline="always")
 def place_workers(people: People, q: Vec, crowd: Crowd) -> None:
-    """Fill the capsules of ``crowd`` for the workers' joints [m, rad], shape (W, 18)."""
+    """Fill the capsules of ``crowd`` for the workers' joints [m, rad], shape (W, 18).
+
+    Their sizes are those of ``crowd.size``.
+    """
     for w in range(q.shape[0]):
-        points, frames = crowd.points[w], crowd.frames[w]
-        body.points_and_frames(q[w], people.pelvis_z, crowd.trig, points, frames)
-        body.capsules(points, frames, people.floor_z, w * body.N_CAPSULES, crowd.columns)
+        points, frames, size = crowd.points[w], crowd.frames[w], crowd.size[w]
+        body.points_and_frames(q[w], size, crowd.trig, points, frames)
+        first = w * body.N_CAPSULES
+        body.capsules(points, frames, size, people.floor_z, first, crowd.columns)
 
 
 @kernel(inline="always")
@@ -221,10 +236,13 @@ def start_people(
 ) -> None:
     """Draw an episode of all people of environment ``e`` and place them."""
     for w in range(state.q.shape[1]):
+        who = random.below(rng, people.bodies.shape[0]) if people.bodies.shape[0] > 1 else 0
+        state.body[e, w] = who
+        copy_values(people.bodies[who], state.size[e, w])
         state.n_moves[e, w] = script.draw_script(
             rng,
-            people.of_station,
-            people.of_station.shape[0] - 1,
+            people.of_station[who],
+            people.of_station.shape[1] - 1,
             people.n_cubes,
             people.hands,
             -1,
@@ -269,6 +287,7 @@ def _keep_cylinder(state: PeopleState, e: int, k: int) -> None:
 @kernel(inline="always")
 def place_people(people: People, state: PeopleState, e: int, crowd: Crowd) -> None:
     """Fill ``crowd`` with the people of environment ``e`` as they are now."""
+    copy_rows(state.size[e], crowd.size)
     place_workers(people, state.q[e], crowd)
     copy_rows(state.cylinders[e], crowd.cylinders)
 
@@ -302,7 +321,7 @@ def nearest_person(people: People, robot: Vec, crowd: Crowd) -> int:
 
 @kernel(inline="always")
 def see_nearest(people: People, state: PeopleState, e: int, robot: Vec, crowd: Crowd) -> None:
-    """Write joints of the nearest person of environment ``e`` into ``crowd.seen_q, seen_qd``.
+    """Write the nearest person of environment ``e`` into ``crowd.seen_q``, ``_qd``, ``_size``.
 
     A walker is seen as a person who stands in the cylinder, facing the robot's base; nobody, as
     one who stands too far away to matter. So a policy for one 18-DoF person works beside any.
@@ -318,7 +337,9 @@ def see_nearest(people: People, state: PeopleState, e: int, robot: Vec, crowd: C
     if 0 <= who < n_workers:
         for j in range(18):
             crowd.seen_q[j], crowd.seen_qd[j] = state.q[e, who, j], state.qd[e, who, j]
+        copy_values(state.size[e, who], crowd.seen_size)
         return
+    copy_values(people.bodies[0], crowd.seen_size)
     for j in range(18):
         crowd.seen_q[j], crowd.seen_qd[j] = people.nobody[j], 0.0
     if who >= 0:

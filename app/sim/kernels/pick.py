@@ -161,7 +161,7 @@ def new_work(world: PickWorld, state: PickState) -> Work:
     return Work(
         new_robot_pose(world.arm),
         new_crowd(world.people, people.q.shape[1], people.cylinders.shape[1]),
-        new_sight(world.people.person),
+        new_sight(),
         np.zeros(6),
         np.zeros(6),
         np.zeros(6),
@@ -335,11 +335,12 @@ def write_obs(
         return
     observe(
         world.arm,
-        world.people,
+        world.people.floor_z,
         state.q[e],
         state.qd[e],
         crowd.seen_q,
         crowd.seen_qd,
+        crowd.seen_size,
         state.goal[e],
         state.q_goal[e],
         state.time_left[e],

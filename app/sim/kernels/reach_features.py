@@ -85,10 +85,10 @@ class ReachSight(NamedTuple):
     """Clearance at each time ahead [m], shape (3,)."""
 
 
-def new_reach_sight(people: People) -> ReachSight:
+def new_reach_sight() -> ReachSight:
     """Return work space."""
-    width = people.person.shape[1]
-    return ReachSight(new_sight(people.person), np.zeros(width), np.zeros(5), np.zeros(3))
+    sight = new_sight()
+    return ReachSight(sight, np.zeros(sight.now.shape[1]), np.zeros(5), np.zeros(3))
 
 
 @kernel()
@@ -168,7 +168,7 @@ def clearances_ahead(
     for i in range(3):
         ahead[i] = FAR
     for w in range(state.q.shape[1]):
-        see_person(people, state.q[e, w], state.qd[e, w], person)
+        see_person(people.floor_z, state.q[e, w], state.qd[e, w], state.size[e, w], person)
         for i in range(3):
             look_ahead(person.now, person.later, HORIZONS[i], person.moved)
             gaps(robot, person.moved, sight.gap)

@@ -46,7 +46,7 @@ class Period:
         rest = human.rest_posture(rng.uniform(-0.5, 0.5), rng.uniform(1.12, 1.3), -1.57)
         hand, near = rng.choice(["r", "l"]), robot.tcp_pose(self.q)[:3, 3]
         target = near + rng.normal(0.0, 0.15, 3)
-        self.human0 = human.reach(hand, target, rest, cell.pelvis_z).q
+        self.human0 = human.reach(hand, target, rest, cell.body).q
         step = rng.normal(size=18) * hurry * dt
         self.human1 = np.clip(self.human0 + step, human.Q_MIN, human.Q_MAX)
 

@@ -52,8 +52,8 @@ def test_tool_and_target_are_where_pinocchio_has_them(cell: Cell) -> None:
 
 def test_hand_velocities_are_the_derivatives_of_the_hands(cell: Cell) -> None:
     at, step = state(cell), 1e-6
-    before = human.joint_points(at["human_q"], cell.pelvis_z)
-    after = human.joint_points(at["human_q"] + step * at["human_qd"], cell.pelvis_z)
+    before = human.joint_points(at["human_q"], cell.body)
+    after = human.joint_points(at["human_q"] + step * at["human_qd"], cell.body)
     speeds = [(after[hand] - before[hand]) / step for hand in ("hand_r", "hand_l")]
     row = seen(cell)[0, LAYOUT["hand_velocities"]]
     np.testing.assert_allclose(row, np.concatenate(speeds), atol=0.01)

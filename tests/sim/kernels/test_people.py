@@ -110,7 +110,7 @@ def test_contact_names_the_person_that_is_touched() -> None:
     away = human.rest_posture(0.0, 4.0, -1.57)
     q = PickBatch(CELL, 1, 0, PickSettings()).world.station_q[3]
     grip = np.array(cell.stations[3].position) + [0.0, 0.04, 0.06]
-    near = human.reach("r", grip, human.rest_posture(*cell.human.home), cell.pelvis_z).q
+    near = human.reach("r", grip, human.rest_posture(*cell.human.home), cell.body).q
     far, by = np.array([[3.0, 3.0, 0.3]]), np.array([[0.1, 0.9, 0.3]])
     both = np.stack([away, near])
     found = contact(arm, people, q, zero, zero, zero, (both, both), (far, far))
