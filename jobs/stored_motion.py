@@ -17,6 +17,7 @@ from safetensors.numpy import save as save_tensors
 
 from app.errors import InvalidInput
 from app.sim.body_size import BodySize
+from app.sim.body_track import MEASURED
 from app.sim.motions import ImportedMotion, Motion, Spread
 from app.store.records import MotionRecord, NewMotion
 
@@ -28,10 +29,11 @@ _SPREADS = ("wrists", "elbows", "pelvis", "wrists_at_fixed_height", "fixed_body"
 
 def summary_of(found: ImportedMotion) -> dict[str, Any]:
     """Return measures and errors of an import as JSON data."""
+    lengths = found.size.lengths()
     return {
         "format": found.format,
         "unit": found.unit,
-        "body_m": found.size.lengths(),
+        "body_m": {name: lengths[name] for name in MEASURED},
         "error_mm": {name: _mm(getattr(found, name)) for name in _SPREADS},
         "clean_frames": found.n_clean,
         "n_glitches": len(found.glitches),

@@ -12,6 +12,7 @@ import numpy as np
 from app.errors import BadMotion, Fault
 from app.sim.body_track import (
     ELBOW_R,
+    MEASURED,
     NECK,
     PELVIS,
     SHOULDER_L,
@@ -202,7 +203,9 @@ def _upright(rest: Vec) -> Vec:
 
 def _require_a_body(points: Vec) -> None:
     """Refuse a person whose parts are no person's, who is far away, or who never moves."""
-    for name, length in measure(points).lengths().items():
+    lengths = measure(points).lengths()
+    for name in MEASURED:
+        length = lengths[name]
         low, high = LENGTHS[name.removesuffix("_r").removesuffix("_l")]
         if not low <= length <= high:
             rule = f"must be {low} to {high} m long, by the unit that the right arm has"
