@@ -69,7 +69,7 @@ class MotionItem(Answer):
     clean_frames: int = Field(description="frames of all clean runs")
     n_glitches: int = Field(description="faults that were cut out")
     body_m: dict[str, float] = Field(
-        description="lengths of the recorded person [m]; the median's where only angles are given"
+        description="lengths of the recorded person [m]; the median's for files of angles"
     )
     error_mm: ErrorPublic = Field(description="error of the import [mm]")
     beyond_limits: dict[str, BeyondPublic] = Field(
