@@ -27,6 +27,9 @@ class Person:
     """Joint speeds [m/s, rad/s], shape (18,)."""
     size: Vec | None = None
     """Lengths of the body [m], shape (12,) (``BodySize.vector``); None: the cell's person."""
+    cylinder: Vec | None = None
+    """x, y and radius [m], shape (3,), of the cylinder that is all that is known of this person
+    (``seen_people.standing_in``); then distances count to it. None: a body of 18 joints."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
