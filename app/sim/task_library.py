@@ -27,9 +27,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from app.errors import InvalidInput
 from app.sim import human, promp
 from app.sim.body_size import BodySize, percentile_body
-from app.sim.cells import Cell
+from app.sim.cells import Cell, lacks_stations
 from app.sim.demonstrations import draw_node
 from app.sim.ports import Vec
 from app.sim.primitives import HANDS, HOME, legs_of, place_of, primitive_for
@@ -115,7 +116,13 @@ def task_library(
         augmentation: Whether samples are drawn from the primitives, and durations spread; if
             not, the samples are the demonstrations as they are, and durations their mean.
         variants: Nodes for each person, place and hand.
+
+    Raises:
+        InvalidInput: The cell has no cube or no dock, so there is no task.
+        NotFound: Nobody works in the cell.
     """
+    if (lack := lacks_stations(cell)) is not None:
+        raise InvalidInput("cell", cell.name, f"has no tasks for a worker: it {lack}")
     sizes = people_sizes(cell) if bodies is None else bodies
     vectors = np.array([size.vector(cell.floor_z) for size in sizes])
     rng = np.random.default_rng(seed)
@@ -194,14 +201,6 @@ def _legs(
             gains.append(ends_gain(one))
             durations.append((float(np.log(one.duration_s)), spread))
             first += n
-    if not gains:  # a cell without stations: its worker stays at home
-        n_basis = promp.N_BASIS
-        return (
-            np.zeros((0, 18, n_basis)),
-            np.zeros((0, 18 * n_basis, 36)),
-            legs,
-            np.zeros((0, 2)),
-        )
     return np.concatenate(samples), np.array(gains), legs, np.array(durations)
 
 
