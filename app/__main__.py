@@ -98,9 +98,11 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("action", choices=("list", "show", "check", "add", "remove"))
     one.add_argument("target", nargs="?", metavar="FILE|NAME")
     one.add_argument("--json", action="store_true")
-    one = verb("motions", run_motions, "Import a file of recorded human motion and measure it.")
-    one.add_argument("action", choices=("import",))
-    one.add_argument("file", type=Path, metavar="FILE", help=".bvh, .mot, .sto or .csv")
+    one = verb("motions", run_motions, "Import a recorded human motion; list, show, remove.")
+    one.add_argument("action", choices=("import", "list", "show", "remove"))
+    one.add_argument("target", nargs="?", metavar="FILE|NAME", help=".bvh, .mot, .sto or .csv")
+    one.add_argument("--keep", action="store_true", help="store what is imported")
+    one.add_argument("--name", help="name to store it under; the file's by default")
     one.add_argument("--json", action="store_true")
     return top
 
@@ -260,16 +262,18 @@ def run_cells(options: argparse.Namespace) -> int:
 
 
 def run_motions(options: argparse.Namespace) -> int:
-    """Import recorded motion; a bad file is told with all its faults."""
-    prepare_kernels(load_settings())
+    """Import, list, show or remove motions; a bad file is told with all its faults."""
+    settings = load_settings()
+    prepare_kernels(settings)
     from app.errors import BadMotion
-    from app.motion_verbs import faulty, import_motion
+    from app.motion_verbs import faulty, run
 
+    keep, name = options.keep, options.name
     try:
-        text, data = import_motion(options.file)
+        text, data = run(options.action, options.target, settings, keep=keep, name=name)
     except BadMotion as error:
         for fault in error.faults:
-            print(f"{options.file}: {fault.text}", file=sys.stderr)
+            print(f"{options.target}: {fault.text}", file=sys.stderr)
         if options.json:
             print(json.dumps(faulty(error)))
         return WRONG_CALL

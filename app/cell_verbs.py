@@ -4,23 +4,19 @@ Each function returns what is to be printed; the entry point prints it.
 """
 
 import json
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from app.errors import Conflict, InvalidInput, NotFound
+from app.database import has_database, opened
+from app.errors import InvalidInput, NotFound
 from app.settings import Settings
 from app.sim.cell_file import MAX_BYTES, read_cell
 from app.sim.cells import Cell, cell_names, lacks_for_pick, load_cell
-from app.store.engine import Store
-from app.store.lock import ServerLock
-from app.store.migrate import migrate
-from app.store.schema import check_schema
 from jobs.cells import CellCatalog
 
 Printed = tuple[str, dict[str, Any]]
 """Text for people, and the same as data."""
+NOUN = "cell of your own"
 
 
 def run(action: str, target: str | None, settings: Settings) -> Printed:
@@ -47,10 +43,10 @@ def run(action: str, target: str | None, settings: Settings) -> Printed:
         return json.dumps(cell.definition(), indent=2), cell.definition()
     if action == "add":
         cell = read_file(Path(target))
-        with _store(settings, create=True) as store:
+        with opened(settings, NOUN, create=True) as store:
             new = CellCatalog(store).add(cell)
         return _described(cell, "is stored" if new else "was stored already")
-    with _store(settings) as store:
+    with opened(settings, NOUN) as store:
         CellCatalog(store).remove(target)
     return f"{target} is removed", {"name": target, "removed": True}
 
@@ -79,16 +75,16 @@ def named_cell(name: str, settings: Settings) -> Cell:
     """
     if name in cell_names():
         return load_cell(name)
-    if not _has_database(settings):
+    if not has_database(settings):
         raise NotFound("cell", name, cell_names())
-    with _store(settings) as store:
+    with opened(settings, NOUN) as store:
         return CellCatalog(store).get(name)
 
 
 def _listed(settings: Settings) -> Printed:
     cells = [load_cell(name) for name in cell_names()]
-    if _has_database(settings):
-        with _store(settings) as store:
+    if has_database(settings):
+        with opened(settings, NOUN) as store:
             cells = CellCatalog(store).all()
     rows = [
         {
@@ -124,32 +120,3 @@ def _described(cell: Cell, what: str) -> Printed:
         "lacks_for_pick": lack,
     }
     return "\n".join(lines), found
-
-
-def _has_database(settings: Settings) -> bool:
-    return settings.database_url is not None or (settings.data / "tandem.db").exists()
-
-
-@contextmanager
-def _store(settings: Settings, *, create: bool = False) -> Iterator[Store]:
-    """Open the database; with ``create`` one that is not there yet is made."""
-    if create:
-        settings.data.mkdir(parents=True, exist_ok=True)
-    elif not _has_database(settings):
-        raise NotFound("cell of your own: there is no database at", settings.database)
-    store = Store(settings.database)
-    try:
-        try:
-            check_schema(store)
-        except Conflict:
-            if not create:
-                raise
-            lock = ServerLock(store, settings.data)
-            lock.acquire()
-            try:
-                migrate(store)
-            finally:
-                lock.release()
-        yield store
-    finally:
-        store.close()

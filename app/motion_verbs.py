@@ -1,20 +1,68 @@
-"""The verb ``motions`` of the command line: import a file of recorded human motion.
+"""The verb ``motions`` of the command line: import, list, show and remove human motions.
 
-Returns what is to be printed; the entry point prints it.
+Each function returns what is to be printed; the entry point prints it.
 """
 
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from app.database import has_database, opened
 from app.errors import BadMotion, Fault, InvalidInput
-from app.sim.glitches import Glitch
-from app.sim.motions import MAX_BYTES, ImportedMotion, Spread, read_motion
+from app.settings import Settings
+from app.sim.motions import MAX_BYTES, read_motion
+from app.store.records import MotionRecord
+from jobs.motions import MotionCatalog
+from jobs.stored_motion import detail_of, summary_of
 
 Printed = tuple[str, dict[str, Any]]
 """Text for people, and the same as data."""
 MAX_LINES = 12
 """Most glitches, and most runs, that are told to people; the data has all."""
+NOUN = "stored motion"
+
+
+def run(
+    action: str,
+    target: str | None,
+    settings: Settings,
+    *,
+    keep: bool = False,
+    name: str | None = None,
+) -> Printed:
+    """Carry out one action.
+
+    Args:
+        action: ``import``, ``list``, ``show`` or ``remove``.
+        target: A file (``import``) or a motion's name (``show``, ``remove``).
+        settings: Where the database is.
+        keep: Whether an imported motion is stored.
+        name: Name under which; made from the file's name if None.
+
+    Raises:
+        BadMotion: The file is no sound motion; carries every fault.
+        ServiceError: It cannot be done.
+    """
+    if name is not None and not keep:
+        raise InvalidInput("--name", name, "is the name of a motion that is kept: add --keep")
+    if keep and action != "import":
+        raise InvalidInput("--keep", action, "goes with import only")
+    if action == "list":
+        return _listed(settings)
+    if target is None:
+        noun = "FILE" if action == "import" else "NAME"
+        raise InvalidInput(noun, None, f"must be given: motions {action} {noun}")
+    if action == "import":
+        path = Path(target)
+        return keep_motion(path, settings, name) if keep else import_motion(path)
+    with opened(settings, NOUN) as store:
+        motions = MotionCatalog(store)
+        if action == "show":
+            data = _data_of(motions.record(target))
+            return _told(data), data
+        motions.remove(target)
+    return f"{target} is removed", {"name": target, "removed": True}
 
 
 def import_motion(path: Path) -> Printed:
@@ -24,72 +72,98 @@ def import_motion(path: Path) -> Printed:
         BadMotion: It is no sound motion; carries every fault.
         InvalidInput: The file cannot be read.
     """
-    try:
-        with path.open("rb") as file:
-            content = file.read(MAX_BYTES + 1)
-    except OSError as error:
-        raise InvalidInput("FILE", str(path), f"cannot be read: {error.strerror}") from error
-    found = read_motion(content, path.name)
-    return _told(found), _data(found)
-
-
-def _told(found: ImportedMotion) -> str:
-    lengths = ", ".join(
-        f"{name.replace('_', ' ')} {1000.0 * length:.0f}"
-        for name, length in found.size.lengths().items()
-    )
-    lines = [
-        f"{found.name}: {found.n_frames} frames, {found.duration:.2f} s, "
-        f"{found.format} in {found.unit}",
-        f"body [mm]: {lengths}",
-        "error [mm]                           p50     p99   worst",
-        _row("wrists", found.wrists),
-        _row("elbows", found.elbows),
-        _row("pelvis", found.pelvis),
-        _row("wrists, pelvis at one height", found.wrists_at_fixed_height),
-        _row("wrists of the simulator's body", found.fixed_body),
-        f"{len(found.glitches)} glitches",
-        *_short([_glitch(one) for one in found.glitches]),
-        f"{len(found.runs)} clean runs, {found.n_clean} frames",
-        *_short([_run(k, found) for k in range(len(found.runs))]),
-    ]
-    for name, (share, farthest) in found.beyond_limits.items():
-        text = f"{name} beyond its limits in {100.0 * share:.1f} % of the frames"
-        lines.append(f"{text}, by {farthest:.2f} rad at most")
-    return "\n".join(lines)
-
-
-def _data(found: ImportedMotion) -> dict[str, Any]:
-    return {
+    found = read_motion(_content(path), path.name)
+    data = {
         "ok": True,
         "name": found.name,
-        "format": found.format,
-        "unit": found.unit,
         "frames": found.n_frames,
         "duration_s": found.duration,
-        "body_m": found.size.lengths(),
-        "error_mm": {
-            "wrists": _mm(found.wrists),
-            "elbows": _mm(found.elbows),
-            "pelvis": _mm(found.pelvis),
-            "wrists_at_fixed_height": _mm(found.wrists_at_fixed_height),
-            "fixed_body": _mm(found.fixed_body),
-        },
-        "glitches": [asdict(one) for one in found.glitches],
-        "clean_runs": [
-            {
-                "first": run.first_frame,
-                "last": run.first_frame + len(run.times) - 1,
-                "duration_s": float(run.times[-1]),
-            }
-            for run in found.runs
-        ],
-        "clean_frames": found.n_clean,
-        "beyond_limits": {
-            name: {"share": share, "farthest_rad": farthest}
-            for name, (share, farthest) in found.beyond_limits.items()
-        },
+        **summary_of(found),
+        **detail_of(found),
     }
+    return _told(data), data
+
+
+def keep_motion(path: Path, settings: Settings, name: str | None) -> Printed:
+    """Read a file, store its motion and tell what is in it.
+
+    Raises:
+        BadMotion: It is no sound motion; carries every fault.
+        InvalidInput: The file cannot be read, or the name is none.
+        Conflict: Another file has that name, or there are too many motions.
+    """
+    content = _content(path)
+    with opened(settings, NOUN, create=True) as store:
+        record, new = MotionCatalog(store).add(content, path.name, name)
+    data = {**_data_of(record), "new": new}
+    stored = "is stored" if new else "was stored already"
+    return f"{_told(data)}\n{stored} as {record.name}", data
+
+
+def _content(path: Path) -> bytes:
+    try:
+        with path.open("rb") as file:
+            return file.read(MAX_BYTES + 1)
+    except OSError as error:
+        raise InvalidInput("FILE", str(path), f"cannot be read: {error.strerror}") from error
+
+
+def _listed(settings: Settings) -> Printed:
+    found: tuple[MotionRecord, ...] = ()
+    if has_database(settings):
+        with opened(settings, NOUN) as store:
+            found = MotionCatalog(store).all()
+    lines = [
+        f"{one.name:24} {one.duration:8.2f} s, {one.n_runs} clean runs, wrists p99 "
+        f"{one.summary['error_mm']['wrists']['p99']:.2f} mm"
+        for one in found
+    ]
+    data = {"motions": [_data_of(one) for one in found]}
+    return "\n".join(lines) or "no motion is stored", data
+
+
+def _data_of(record: MotionRecord) -> dict[str, Any]:
+    detail = record.detail or {}
+    return {
+        "ok": True,
+        "name": record.name,
+        "file_name": record.file_name,
+        "sha256": record.sha256,
+        "frames": record.n_frames,
+        "duration_s": record.duration,
+        "n_runs": record.n_runs,
+        **record.summary,
+        **{part: detail[part] for part in ("glitches", "clean_runs") if part in detail},
+    }
+
+
+def _told(found: Mapping[str, Any]) -> str:
+    """Write what an import found, from its data."""
+    lengths = ", ".join(
+        f"{name.replace('_', ' ')} {1000.0 * length:.0f}"
+        for name, length in found["body_m"].items()
+    )
+    error = found["error_mm"]
+    runs, glitches = found["clean_runs"], found["glitches"]
+    lines = [
+        f"{found['name']}: {found['frames']} frames, {found['duration_s']:.2f} s, "
+        f"{found['format']} in {found['unit']}",
+        f"body [mm]: {lengths}",
+        "error [mm]                           p50     p99   worst",
+        _row("wrists", error["wrists"]),
+        _row("elbows", error["elbows"]),
+        _row("pelvis", error["pelvis"]),
+        _row("wrists, pelvis at one height", error["wrists_at_fixed_height"]),
+        _row("wrists of the simulator's body", error["fixed_body"]),
+        f"{found['n_glitches']} glitches",
+        *_short([_glitch(one) for one in glitches]),
+        f"{len(runs)} clean runs, {found['clean_frames']} frames",
+        *_short([_run(one) for one in runs]),
+    ]
+    for name, beyond in found["beyond_limits"].items():
+        text = f"{name} beyond its limits in {100.0 * beyond['share']:.1f} % of the frames"
+        lines.append(f"{text}, by {beyond['farthest_rad']:.2f} rad at most")
+    return "\n".join(lines)
 
 
 def faulty(error: BadMotion) -> dict[str, Any]:
@@ -98,24 +172,19 @@ def faulty(error: BadMotion) -> dict[str, Any]:
     return {"ok": False, "faults": [asdict(one) for one in faults]}
 
 
-def _row(what: str, spread: Spread) -> str:
-    numbers = (f"{1000.0 * one:8.2f}" for one in (spread.p50, spread.p99, spread.worst))
+def _row(what: str, spread: Mapping[str, float]) -> str:
+    numbers = (f"{spread[key]:8.2f}" for key in ("p50", "p99", "worst"))
     return f"  {what:30}{''.join(numbers)}"
 
 
-def _mm(spread: Spread) -> dict[str, float]:
-    return {name: 1000.0 * value for name, value in asdict(spread).items()}
+def _glitch(one: Mapping[str, Any]) -> str:
+    parts = one["parts"]
+    also = f" (also {', '.join(parts[1:])})" if len(parts) > 1 else ""
+    return f"  frames {one['first']} to {one['last']}: {one['reason']}{also}"
 
 
-def _glitch(one: Glitch) -> str:
-    also = f" (also {', '.join(one.parts[1:])})" if len(one.parts) > 1 else ""
-    return f"  frames {one.first} to {one.last}: {one.reason}{also}"
-
-
-def _run(k: int, found: ImportedMotion) -> str:
-    run = found.runs[k]
-    last = run.first_frame + len(run.times) - 1
-    return f"  frames {run.first_frame} to {last}: {run.times[-1]:.2f} s"
+def _run(one: Mapping[str, Any]) -> str:
+    return f"  frames {one['first']} to {one['last']}: {one['duration_s']:.2f} s"
 
 
 def _short(lines: list[str]) -> list[str]:

@@ -50,3 +50,60 @@ def test_file_that_is_not_there_is_a_wrong_call(
 ) -> None:
     assert main(["motions", "import", str(clip.with_name("nobody.bvh"))]) == 2
     assert "cannot be read: No such file" in capsys.readouterr().err
+
+
+def test_kept_motion_is_listed_shown_and_removed(
+    clip: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["motions", "list"]) == 0
+    assert "no motion is stored" in capsys.readouterr().out
+    assert main(["motions", "import", str(clip), "--keep"]) == 0
+    told = capsys.readouterr().out
+    assert told.endswith("is stored as someone\n")
+    assert main(["motions", "import", str(clip), "--keep", "--json"]) == 0
+    assert not json.loads(capsys.readouterr().out)["new"]
+    assert main(["motions", "list"]) == 0
+    assert "1 clean runs, wrists p99 0.0" in capsys.readouterr().out
+    assert main(["motions", "show", "someone"]) == 0
+    assert told.startswith(capsys.readouterr().out.strip())
+    assert main(["motions", "remove", "someone"]) == 0
+    assert main(["motions", "show", "someone"]) == 2
+    assert "no motion 'someone'" in capsys.readouterr().err
+
+
+def test_kept_motion_can_be_given_a_name(
+    clip: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["motions", "import", str(clip), "--keep", "--name", "reach-1"]) == 0
+    capsys.readouterr()
+    assert main(["motions", "list", "--json"]) == 0
+    (found,) = json.loads(capsys.readouterr().out)["motions"]
+    assert (found["name"], found["file_name"]) == ("reach-1", "someone.bvh")
+
+
+def test_other_file_under_a_taken_name_is_refused(
+    clip: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    main(["motions", "import", str(clip), "--keep"])
+    clip.write_text(bvh_text(working(200, seed=1)), encoding="utf-8")
+    assert main(["motions", "import", str(clip), "--keep"]) == 1
+    assert "from another file is stored: remove it first" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["import", "{clip}", "--name", "a"], "add --keep"),
+        (["import", "{clip}", "--keep", "--name", "A"], "1 to 64 of the characters"),
+        (["list", "--keep"], "goes with import only"),
+        (["show"], "must be given: motions show NAME"),
+        (["import"], "must be given: motions import FILE"),
+        (["remove", "someone"], "there is no database at"),
+    ],
+)
+def test_wrong_call_is_told(
+    clip: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], text: str
+) -> None:
+    given = [one.replace("{clip}", str(clip)) for one in arguments]
+    assert main(["motions", *given]) == 2
+    assert text in capsys.readouterr().err

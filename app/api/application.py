@@ -13,6 +13,7 @@ from app.api import (
     checkpoints,
     health,
     jobs,
+    motions,
     presets,
     problems,
     reference,
@@ -62,6 +63,7 @@ def build_app(*, lifespan: Lifespan, static: Path, token: str | None, version: s
         checkpoints,
         presets,
         cells,
+        motions,
         health,
         session,
         viewer,
@@ -69,7 +71,7 @@ def build_app(*, lifespan: Lifespan, static: Path, token: str | None, version: s
     ):
         app.include_router(part.router)
     add_page(app, static)
-    app.add_middleware(BodyRules)
+    app.add_middleware(BodyRules, files=motions.FILES)
     app.add_middleware(Guard, token=token, open_paths=(SESSION_PATH,))
     return app
 

@@ -15,7 +15,11 @@ from app.sim.cells import Cell
 from app.sim.ports import TaskPolicy, WorldHandle
 from app.store.engine import Store
 from jobs.cells import CellCatalog
+from jobs.motions import MotionCatalog
 from jobs.supervisor import Supervisor
+
+MAX_UPLOADS = 4
+"""Most files that are taken in at once; each is held in memory."""
 
 
 class LiveWorld(Protocol):
@@ -74,6 +78,8 @@ class Services:
     """Checkpoints as objects that decide."""
     cells: CellCatalog
     """The work cells by name."""
+    motions: MotionCatalog
+    """The imported human motions by name."""
     start_world: StartWorld
     """Starts a live world."""
     worlds: dict[str, LiveWorld] = field(default_factory=dict)
@@ -84,6 +90,10 @@ class Services:
     """Whether the service can decide."""
     replacing: threading.Lock = field(default_factory=threading.Lock)
     """Held by whoever starts a world anew, or stops them all."""
+    uploads: threading.BoundedSemaphore = field(
+        default_factory=lambda: threading.BoundedSemaphore(MAX_UPLOADS)
+    )
+    """Held by whoever posts a file."""
     stopping: threading.Event = field(default_factory=threading.Event)
     """Set when the server goes down: open streams end."""
 

@@ -20,7 +20,7 @@ from app.policies.checkpoint import Checkpoint, expect_layout
 from app.policies.networks import ResidualActor, TwinCritic
 from app.policies.presets import action_of
 from app.policies.trained_cell import cell_of
-from app.policies.training import LAYOUT
+from app.policies.training import LAYOUTS
 from app.sim import human, robot
 from app.sim.actions import ActionSettings
 from app.sim.cells import Cell, require_cell
@@ -50,9 +50,13 @@ class ValueNetworks:
     """
 
     def __init__(self, checkpoint: Checkpoint) -> None:
-        expect_layout(checkpoint, LAYOUT, CONTROLLED)
+        kind = checkpoint.manifest["preset"].get("observation", "features")
+        expect_layout(checkpoint, LAYOUTS.get(kind, LAYOUTS["features"]), CONTROLLED)
         width = int(checkpoint.manifest["width"])
-        self.actor, self.critic = ResidualActor(width), TwinCritic(width)
+        self.n_obs = sum(size for _, size in checkpoint.manifest["layout"])
+        """Length of the observations."""
+        self.actor = ResidualActor(width, self.n_obs)
+        self.critic = TwinCritic(width, self.n_obs)
         arrays = checkpoint.arrays()
         for name, module in (("actor", self.actor), ("critic", self.critic)):
             start = f"{name}."
@@ -174,6 +178,7 @@ class TaskChooser:
             goals,
             time_left_s,
             person.size,
+            self._networks.n_obs,
         )
         act, values = self._networks.act_and_value(obs)
         last = ids.index(previous) if previous in ids else None

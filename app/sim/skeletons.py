@@ -203,7 +203,8 @@ def _upright(rest: Vec) -> Vec:
 def _require_a_body(points: Vec) -> None:
     """Refuse a person whose parts are no person's, who is far away, or who never moves."""
     for name, length in measure(points).lengths().items():
-        low, high = LENGTHS[name.removesuffix("_r").removesuffix("_l")]
+        # Lengths that no joint centre tells are the median person's.
+        low, high = LENGTHS.get(name.removesuffix("_r").removesuffix("_l"), (0.0, np.inf))
         if not low <= length <= high:
             rule = f"must be {low} to {high} m long, by the unit that the right arm has"
             raise BadMotion([Fault(place=name, value=f"{length:.3f} m", rule=rule)])

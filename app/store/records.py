@@ -189,6 +189,58 @@ class CellRecord:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class NewMotion:
+    """An imported motion to be stored; the store never opens it."""
+
+    name: str
+    """Its name, unique."""
+    sha256: str
+    """Of the file that it was imported from."""
+    file_name: str
+    """Name of that file."""
+    n_runs: int
+    """Clean runs."""
+    n_frames: int
+    """Frames of the file."""
+    duration: float
+    """Of the file [s]."""
+    summary: Mapping[str, Any]
+    """What a list shows of it: measures and errors."""
+    detail: Mapping[str, Any]
+    """What is said of each run and each glitch."""
+    tensors: bytes
+    """The runs, as safetensors bytes."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotionRecord:
+    """A stored motion, without its runs."""
+
+    number: int
+    """Running number, in the order of storing; never given twice."""
+    name: str
+    """Its name, unique."""
+    sha256: str
+    """Of the file that it was imported from."""
+    file_name: str
+    """Name of that file."""
+    n_runs: int
+    """Clean runs."""
+    n_frames: int
+    """Frames of the file."""
+    duration: float
+    """Of the file [s]."""
+    summary: Mapping[str, Any]
+    """What a list shows of it: measures and errors."""
+    detail: Mapping[str, Any] | None = None
+    """What is said of each run and each glitch; None in lists."""
+    size: int
+    """Length of the runs [bytes]."""
+    created_at: datetime
+    """When it was stored."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ResumeState:
     """Everything a new attempt needs to go on from ``step``."""
 

@@ -13,6 +13,7 @@ from sqlalchemy import (
     Column,
     DateTime,
     Dialect,
+    Float,
     ForeignKey,
     Index,
     Integer,
@@ -146,6 +147,24 @@ cells = Table(
     Column("name", String(64), primary_key=True),
     Column("definition", JSON, nullable=False),
     Column("created_at", UtcDateTime, nullable=False),
+)
+
+motions = Table(
+    "motions",
+    metadata,
+    Column("number", Integer, primary_key=True, autoincrement=True),
+    Column("name", String(64), nullable=False, unique=True),
+    Column("sha256", String(64), nullable=False),
+    Column("file_name", String(255), nullable=False),
+    Column("n_runs", Integer, nullable=False),
+    Column("n_frames", Integer, nullable=False),
+    Column("duration", Float, nullable=False),
+    Column("summary", JSON, nullable=False),
+    Column("detail", JSON, nullable=False),
+    Column("size", Integer, nullable=False),
+    Column("created_at", UtcDateTime, nullable=False),
+    Column("tensors", LargeBinary, nullable=False),
+    sqlite_autoincrement=True,
 )
 
 reserve = Table(

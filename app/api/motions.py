@@ -1,0 +1,79 @@
+"""Imported human motions: post a file, see what is in it, list and remove."""
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query, Request, Response
+from starlette.concurrency import run_in_threadpool
+
+from app.api.bodies import FILE_TYPES
+from app.api.schemas.motions import MotionItem, MotionList, MotionPublic
+from app.api.services import MAX_UPLOADS, Services, ServicesDep
+from app.errors import NotReady
+from app.sim.motions import FORMATS, MAX_BYTES
+from app.store.records import MotionRecord
+
+router = APIRouter(prefix="/v1/motions", tags=["motions"])
+
+FILES = {router.prefix: MAX_BYTES}
+"""Path to which a file is posted, and the largest one [bytes]."""
+BODY: dict[str, Any] = {
+    "requestBody": {
+        "required": True,
+        "content": {
+            kind: {"schema": {"type": "string", "format": "binary"}} for kind in FILE_TYPES
+        },
+    }
+}
+"""The body is the file itself."""
+
+
+@router.get("", summary="List the imported motions")
+def list_all(services: ServicesDep) -> MotionList:
+    """Return every stored motion with its measures and the error of its import."""
+    return MotionList(items=[MotionItem.from_domain(one) for one in services.motions.all()])
+
+
+@router.get("/{name}", summary="One imported motion")
+def get_one(name: str, services: ServicesDep) -> MotionPublic:
+    """Return one motion with its clean runs and the glitches that were cut out."""
+    return MotionPublic.from_domain(services.motions.record(name))
+
+
+@router.post("", status_code=201, summary="Import a recorded motion", openapi_extra=BODY)
+async def create(
+    request: Request,
+    services: ServicesDep,
+    response: Response,
+    file_name: Annotated[
+        str, Query(description=f"name of the file; ends with {', '.join(FORMATS)}")
+    ],
+    name: Annotated[
+        str | None,
+        Query(description="name of the motion, a-z 0-9 -; made from the file's if missing"),
+    ] = None,
+) -> MotionPublic:
+    """Import the file that is the body, and keep it; the same one again answers 200."""
+    record, new = await _taken_in(request, services, file_name, name)
+    if not new:
+        response.status_code = 200
+    response.headers["Location"] = f"{router.prefix}/{record.name}"
+    return MotionPublic.from_domain(record)
+
+
+@router.delete("/{name}", status_code=204, summary="Remove an imported motion")
+def remove(name: str, services: ServicesDep) -> None:
+    """Forget a motion."""
+    services.motions.remove(name)
+
+
+async def _taken_in(
+    request: Request, services: Services, file_name: str, name: str | None
+) -> tuple[MotionRecord, bool]:
+    """Read the body and have it imported while a thread waits, a few at a time."""
+    if not services.uploads.acquire(blocking=False):
+        raise NotReady(f"{MAX_UPLOADS} files are being imported: post again in a moment")
+    try:
+        content = await request.body()
+        return await run_in_threadpool(services.motions.add, content, file_name, name)
+    finally:
+        services.uploads.release()

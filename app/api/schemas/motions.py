@@ -1,0 +1,118 @@
+"""Imported human motions as the service shows them."""
+
+from datetime import datetime
+from typing import Any, Self
+
+from pydantic import Field
+
+from app.api.schemas.numbers import Answer
+from app.store.records import MotionRecord
+
+
+class SpreadPublic(Answer):
+    """How an error is spread over the clean frames."""
+
+    p50: float = Field(description="half of the frames are better [mm]")
+    p99: float = Field(description="one frame of a hundred is worse [mm]")
+    worst: float = Field(description="the largest [mm]")
+
+
+class ErrorPublic(Answer):
+    """How far points of the model lie from the file's own; 0 where the file holds angles."""
+
+    wrists: SpreadPublic = Field(description="wrists, with the recorded lengths [mm]")
+    elbows: SpreadPublic = Field(description="elbows, with the recorded lengths [mm]")
+    pelvis: SpreadPublic = Field(description="pelvis, which gives way to the neck [mm]")
+    wrists_at_fixed_height: SpreadPublic = Field(
+        description="wrists where the pelvis's height is not carried along [mm]"
+    )
+    fixed_body: SpreadPublic = Field(description="wrists of the median person's body [mm]")
+
+
+class BeyondPublic(Answer):
+    """A joint that leaves the model's limits; its angles are kept as they were recorded."""
+
+    share: float = Field(description="share of the clean frames, 0 to 1")
+    farthest_rad: float = Field(description="by how much at most [rad]")
+
+
+class RunPublic(Answer):
+    """One clean run, between two glitches."""
+
+    first: int = Field(description="its first frame in the file, from 0")
+    last: int = Field(description="its last frame")
+    duration_s: float = Field(description="how long it takes [s]")
+
+
+class GlitchPublic(Answer):
+    """Frames that were cut out."""
+
+    first: int = Field(description="first frame of the fault, from 0")
+    last: int = Field(description="last frame of the fault")
+    parts: list[str] = Field(description="points that were too fast, the fastest first")
+    speed: float = Field(description="highest speed [m/s]; 0 for a hole in the times")
+    reason: str = Field(description="what is wrong, for people")
+
+
+class MotionItem(Answer):
+    """One stored motion, in short."""
+
+    name: str
+    file_name: str = Field(description="name of the file it was imported from")
+    sha256: str = Field(description="of that file")
+    created_at: datetime
+    format: str = Field(description="bvh, mot, sto or csv")
+    unit: str = Field(description="unit of the file's lengths, as it was found")
+    frames: int = Field(description="frames of the file")
+    duration_s: float = Field(description="of the file [s]")
+    n_runs: int = Field(description="clean runs")
+    clean_frames: int = Field(description="frames of all clean runs")
+    n_glitches: int = Field(description="faults that were cut out")
+    body_m: dict[str, float] = Field(
+        description="lengths of the recorded person [m]; the median's for files of angles"
+    )
+    error_mm: ErrorPublic = Field(description="error of the import [mm]")
+    beyond_limits: dict[str, BeyondPublic] = Field(
+        description="joints that leave the model's limits, by name"
+    )
+
+    @classmethod
+    def from_domain(cls, record: MotionRecord) -> Self:
+        """Make it from the store's record."""
+        return cls(**_members(record))
+
+
+class MotionPublic(MotionItem):
+    """One stored motion with each run and glitch."""
+
+    clean_runs: list[RunPublic]
+    glitches: list[GlitchPublic] = Field(description="the first 1000")
+
+    @classmethod
+    def from_domain(cls, record: MotionRecord) -> Self:
+        """Make it from the store's record, which carries its detail."""
+        assert record.detail is not None
+        return cls(
+            **_members(record),
+            clean_runs=record.detail["clean_runs"],
+            glitches=record.detail["glitches"],
+        )
+
+
+class MotionList(Answer):
+    """All stored motions, by name."""
+
+    items: list[MotionItem]
+
+
+def _members(record: MotionRecord) -> dict[str, Any]:
+    return {
+        **record.summary,
+        "name": record.name,
+        "file_name": record.file_name,
+        "sha256": record.sha256,
+        "created_at": record.created_at,
+        "frames": record.n_frames,
+        "duration_s": record.duration,
+        "n_runs": record.n_runs,
+    }

@@ -1,0 +1,162 @@
+"""An imported motion as it is stored, and back.
+
+The runs are a safetensors file, which holds numbers and nothing else: the frames of all runs
+one after the other in ``times``, ``q`` and ``pelvis_z``, and ``lengths`` and ``first_frames``
+with a number per run. Names, measures and errors are JSON beside them.
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from safetensors import SafetensorError
+from safetensors.numpy import load as load_tensors
+from safetensors.numpy import save as save_tensors
+
+from app.errors import InvalidInput
+from app.sim.body_size import BodySize
+from app.sim.body_track import MEASURED
+from app.sim.motions import ImportedMotion, Motion, Spread
+from app.store.records import MotionRecord, NewMotion
+
+MAX_GLITCHES = 1000
+"""Most glitches of a motion that are kept with their place; all are counted."""
+
+_SPREADS = ("wrists", "elbows", "pelvis", "wrists_at_fixed_height", "fixed_body")
+
+
+def summary_of(found: ImportedMotion) -> dict[str, Any]:
+    """Return measures and errors of an import as JSON data."""
+    lengths = found.size.lengths()
+    return {
+        "format": found.format,
+        "unit": found.unit,
+        "body_m": {name: lengths[name] for name in MEASURED},
+        "error_mm": {name: _mm(getattr(found, name)) for name in _SPREADS},
+        "clean_frames": found.n_clean,
+        "n_glitches": len(found.glitches),
+        "beyond_limits": {
+            name: {"share": share, "farthest_rad": farthest}
+            for name, (share, farthest) in found.beyond_limits.items()
+        },
+    }
+
+
+def detail_of(found: ImportedMotion) -> dict[str, Any]:
+    """Return the runs and glitches of an import as JSON data."""
+    return {
+        "glitches": [asdict(one) for one in found.glitches],
+        "clean_runs": [
+            {
+                "first": run.first_frame,
+                "last": run.first_frame + len(run.times) - 1,
+                "duration_s": float(run.times[-1]),
+            }
+            for run in found.runs
+        ],
+    }
+
+
+def packed(found: ImportedMotion, name: str, file_name: str, sha256: str) -> NewMotion:
+    """Return an import as it is stored.
+
+    Args:
+        found: The import.
+        name: Name under which it is stored.
+        file_name: Name of its file.
+        sha256: Of its file.
+    """
+    detail = detail_of(found)
+    detail["glitches"] = detail["glitches"][:MAX_GLITCHES]
+    detail["recorded"] = {
+        "name": found.name,
+        "size": asdict(found.size),
+        "sources": [run.source for run in found.runs],
+    }
+    tensors = save_tensors(
+        {
+            "times": np.concatenate([run.times for run in found.runs]),
+            "q": np.concatenate([run.q for run in found.runs]),
+            "pelvis_z": np.concatenate([run.pelvis_z for run in found.runs]),
+            "lengths": np.array([len(run.times) for run in found.runs], dtype=np.int64),
+            "first_frames": np.array([run.first_frame for run in found.runs], dtype=np.int64),
+        }
+    )
+    return NewMotion(
+        name=name,
+        sha256=sha256,
+        file_name=file_name,
+        n_runs=len(found.runs),
+        n_frames=found.n_frames,
+        duration=found.duration,
+        summary=summary_of(found),
+        detail=detail,
+        tensors=tensors,
+    )
+
+
+def unpacked(record: MotionRecord, tensors: bytes) -> tuple[Motion, ...]:
+    """Return the runs of a stored motion, arrays read-only.
+
+    Args:
+        record: What is known of it, with its detail.
+        tensors: Its safetensors bytes.
+
+    Raises:
+        InvalidInput: They do not fit this version.
+    """
+    try:
+        recorded = (record.detail or {})["recorded"]
+        name, sources = str(recorded["name"]), [str(one) for one in recorded["sources"]]
+        size = _size(recorded["size"])
+        arrays = _arrays(tensors, len(sources))
+    except (SafetensorError, KeyError, TypeError, ValueError) as error:
+        rule = "was stored by another version of Tandem and does not fit this one: post it anew"
+        raise InvalidInput("motion", record.name, rule) from error
+    stops = np.cumsum(arrays["lengths"])
+    spans = [slice(stop - n, stop) for stop, n in zip(stops, arrays["lengths"], strict=True)]
+    return tuple(
+        Motion(
+            name=name,
+            source=source,
+            times=arrays["times"][span],
+            q=arrays["q"][span],
+            pelvis_z=arrays["pelvis_z"][span],
+            size=size,
+            first_frame=int(first),
+        )
+        for source, span, first in zip(sources, spans, arrays["first_frames"], strict=True)
+    )
+
+
+def _arrays(tensors: bytes, n_runs: int) -> dict[str, NDArray[Any]]:
+    """Return the arrays of a stored motion, of the right shapes and finite."""
+    arrays = load_tensors(tensors)
+    n = len(arrays["times"])
+    expected: dict[str, tuple[tuple[int, ...], type]] = {
+        "times": ((n,), np.float64),
+        "q": ((n, 18), np.float64),
+        "pelvis_z": ((n,), np.float64),
+        "lengths": ((n_runs,), np.int64),
+        "first_frames": ((n_runs,), np.int64),
+    }
+    for name, (shape, kind) in expected.items():
+        array = arrays[name]
+        if array.shape != shape or array.dtype != kind or not np.isfinite(array).all():
+            raise ValueError(name)
+        array.setflags(write=False)
+    if (arrays["lengths"] < 2).any() or arrays["lengths"].sum() != n:
+        raise ValueError("lengths")
+    return arrays
+
+
+def _size(lengths: Mapping[str, float]) -> BodySize:
+    """Return a body from its stored lengths; those it did not have then are the median's."""
+    known = {entry.name for entry in fields(BodySize)}
+    return BodySize(**{name: float(one) for name, one in lengths.items() if name in known})
+
+
+def _mm(spread: Spread) -> dict[str, float]:
+    return {name: 1000.0 * value for name, value in asdict(spread).items()}

@@ -1,0 +1,219 @@
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from app.api.services import MAX_UPLOADS
+from app.sim.human import Q_MAX
+from app.sim.motions import MAX_BYTES
+from tests.sim.recorded_person import bvh_text, csv_text, working
+from tests.sim.test_motions import with_leap
+
+CLIP = bvh_text(working(200)).encode()
+FILE = {"Content-Type": "application/octet-stream"}
+
+
+def post(client: TestClient, content: bytes, **asked: str) -> Any:
+    return client.post("/v1/motions", params=asked, content=content, headers=FILE)
+
+
+@pytest.fixture
+def posted(client: TestClient) -> Iterator[dict[str, Any]]:
+    """The answer to a motion that was posted; the motion is removed again."""
+    answer = post(client, with_leap(slice(100, 103)).encode(), file_name="Leap 1.bvh")
+    assert answer.status_code == 201
+    assert answer.headers["Location"] == "/v1/motions/leap-1"
+    yield answer.json()
+    client.delete("/v1/motions/leap-1")
+
+
+def test_without_motions_the_list_is_empty(client: TestClient) -> None:
+    assert client.get("/v1/motions").json() == {"items": []}
+
+
+def test_posted_motion_says_what_was_found(posted: dict[str, Any]) -> None:
+    assert (posted["name"], posted["file_name"]) == ("leap-1", "Leap 1.bvh")
+    assert (posted["format"], posted["unit"], posted["frames"]) == ("bvh", "mm", 200)
+    assert posted["duration_s"] == pytest.approx(3.98)
+    first, second = posted["clean_runs"]
+    assert (first["first"], second["last"], posted["n_runs"]) == (0, 199, 2)
+    assert first["duration_s"] == pytest.approx(0.02 * first["last"])
+    n_clean = sum(run["last"] - run["first"] + 1 for run in posted["clean_runs"])
+    assert posted["clean_frames"] == n_clean < 200
+    (glitch,) = posted["glitches"]
+    assert "wrist_r" in glitch["parts"] and glitch["speed"] > 3.0
+    assert 0.0 <= posted["error_mm"]["wrists"]["p99"] < 1.0
+    assert posted["body_m"]["forearm_r"] == pytest.approx(0.26)
+
+
+def test_posted_motion_is_kept_listed_and_removed(
+    client: TestClient, posted: dict[str, Any]
+) -> None:
+    assert client.get("/v1/motions/leap-1").json() == posted
+    (item,) = client.get("/v1/motions").json()["items"]
+    assert item == {k: v for k, v in posted.items() if k not in ("clean_runs", "glitches")}
+    assert client.delete("/v1/motions/leap-1").status_code == 204
+    assert client.get("/v1/motions/leap-1").status_code == 404
+    assert client.delete("/v1/motions/leap-1").status_code == 404
+
+
+def test_runs_of_a_posted_motion_are_there_for_the_service(
+    client: TestClient, posted: dict[str, Any]
+) -> None:
+    services = client.app.state.services  # type: ignore[attr-defined]
+    runs = services.motions.get(posted["name"])
+    assert [run.first_frame for run in runs] == [run["first"] for run in posted["clean_runs"]]
+    assert all(run.q.shape == (len(run.times), 18) for run in runs)
+
+
+def test_joints_beyond_their_limits_are_told(client: TestClient) -> None:
+    q = working(100)
+    q[:, 13] = Q_MAX[13] + 0.2
+    answer = post(client, csv_text(q).encode(), file_name="bent.csv")
+    client.delete("/v1/motions/bent")
+    beyond = answer.json()["beyond_limits"]["elbow_r"]
+    assert beyond == {"share": 1.0, "farthest_rad": pytest.approx(0.2, abs=1e-6)}
+
+
+def test_same_file_again_is_fine_and_another_one_a_conflict(
+    client: TestClient, posted: dict[str, Any]
+) -> None:
+    content = with_leap(slice(100, 103)).encode()
+    again = post(client, content, file_name="Leap 1.bvh")
+    assert (again.status_code, again.json()) == (200, posted)
+    other = post(client, CLIP, file_name="leap-1.bvh")
+    assert other.status_code == 409
+    assert "'leap-1' from another file is stored: remove it first" in other.json()["detail"]
+    named = post(client, CLIP, file_name="leap-1.bvh", name="leap-2")
+    client.delete("/v1/motions/leap-2")
+    assert named.status_code == 201
+
+
+def test_unknown_motion_is_not_found_with_the_known_ones(
+    client: TestClient, posted: dict[str, Any]
+) -> None:
+    for name in ("walk", "..%2Fleap-1", "%00"):
+        answer = client.get(f"/v1/motions/{name}")
+        assert answer.status_code == 404
+    assert client.get("/v1/motions/walk").json()["known"] == [posted["name"]]
+
+
+TWICE = CLIP.replace(b"Frames: 200", b"Frames: 300")
+BAD_NUMBER = CLIP.rpartition(b" ")[0] + b" north\n"
+IN_RADIANS = csv_text(working(100), degrees=False).replace("radians", "degrees").encode()
+
+
+@pytest.mark.parametrize(
+    ("content", "file_name", "field", "rule"),
+    [
+        (b"", "a.bvh", "file", "is empty"),
+        (b"\n \n", "a.csv", "file", "is empty"),
+        (b"\xff\xfe", "a.bvh", "file", "must be text in UTF-8"),
+        (b"\x80\x04K\x01.", "a.csv", "file", "must be text in UTF-8"),
+        (b"\x00" * 5000, "a.bvh", "line 1", "has no line MOTION"),
+        (CLIP, "a.c3d", "file name", "must end with .bvh, .mot, .sto, .csv"),
+        (CLIP, "a", "file name", "must end with"),
+        (CLIP, "a.csv", "angles", "must be declared in the first line"),
+        (CLIP[: len(CLIP) // 2], "a.bvh", "line ", "must hold"),
+        (CLIP[:400], "a.bvh", "line ", "has no line MOTION"),
+        (TWICE, "a.bvh", "frames, last line ", "must be the 300 that the head"),
+        (BAD_NUMBER, "a.bvh", "line ", "must be a number"),
+        (IN_RADIANS, "a.csv", "column ", "radians"),
+        (bvh_text(working(25)).encode(), "a.bvh", "frames", "has no run of 1 s"),
+        (CLIP, "a\n.bvh", "file_name", "characters that can be shown"),
+        (CLIP, "", "file_name", "must name a file"),
+        (CLIP, "动作.bvh", "name", "must be given"),
+    ],
+)
+def test_file_that_is_no_motion_is_named_with_place_and_rule(
+    client: TestClient, content: bytes, file_name: str, field: str, rule: str
+) -> None:
+    answer = post(client, content, file_name=file_name)
+    problem = answer.json()
+    assert answer.status_code == 422, problem
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert problem["field"].startswith(field)
+    assert rule in problem["rule"] + str(problem.get("errors", ""))
+    assert {"value", "choices"} <= problem.keys()
+    assert client.get("/v1/motions").json() == {"items": []}
+
+
+def test_unit_that_is_nobody_s_is_named(client: TestClient) -> None:
+    content = bvh_text(working(200), unit=0.000_001).encode()
+    answer = post(client, content, file_name="tiny.bvh")
+    assert answer.status_code == 422
+    assert "unit" in answer.json()["detail"]
+
+
+def test_name_that_cannot_be_one_is_refused(client: TestClient) -> None:
+    answer = post(client, CLIP, file_name="a.bvh", name="A b")
+    assert (answer.status_code, answer.json()["field"]) == (422, "name")
+
+
+def test_file_name_is_asked_for(client: TestClient) -> None:
+    answer = client.post("/v1/motions", content=CLIP, headers=FILE)
+    assert answer.status_code == 422
+    assert (answer.json()["field"], answer.json()["rule"]) == ("file_name", "is required")
+
+
+def test_file_over_the_limit_is_refused(client: TestClient) -> None:
+    length = {**FILE, "Content-Length": str(MAX_BYTES + 1)}
+    answer = client.post("/v1/motions?file_name=a.bvh", content=b"x", headers=length)
+    assert answer.status_code == 413
+    assert (answer.json()["field"], str(MAX_BYTES) in answer.json()["rule"]) == ("body", True)
+    chunks = (b" " * (1 << 20) for _ in range(33))
+    answer = client.post("/v1/motions?file_name=a.bvh", content=chunks, headers=FILE)
+    assert answer.status_code == 413
+
+
+def test_file_over_the_limit_of_json_is_read(client: TestClient) -> None:
+    answer = post(client, b" " * (2 << 20), file_name="a.bvh")
+    assert (answer.status_code, answer.json()["rule"]) == (422, "is empty")
+
+
+def test_form_is_no_file(client: TestClient) -> None:
+    answer = client.post("/v1/motions?file_name=a.bvh", files={"file": CLIP})
+    assert answer.status_code == 415
+    assert answer.json()["field"] == "Content-Type"
+    assert "application/octet-stream" in answer.json()["choices"]
+
+
+def test_file_of_no_stated_type_is_taken(client: TestClient) -> None:
+    answer = client.post("/v1/motions?file_name=plain.bvh", content=CLIP)
+    client.delete("/v1/motions/plain")
+    assert "content-type" not in answer.request.headers
+    assert answer.status_code == 201
+
+
+def test_only_so_many_files_are_taken_in_at_once(client: TestClient) -> None:
+    uploads = client.app.state.services.uploads  # type: ignore[attr-defined]
+    for _ in range(MAX_UPLOADS):
+        assert uploads.acquire(blocking=False)
+    try:
+        answer = post(client, CLIP, file_name="late.bvh")
+    finally:
+        uploads.release(MAX_UPLOADS)
+    assert answer.status_code == 503
+    assert answer.headers["Retry-After"] == "2"
+    assert "4 files are being imported" in answer.json()["detail"]
+
+
+def test_refused_files_leave_room_for_the_next(client: TestClient) -> None:
+    for _ in range(MAX_UPLOADS + 1):
+        assert post(client, b"", file_name="a.bvh").status_code == 422
+    chunks = (b" " * (1 << 20) for _ in range(33))
+    client.post("/v1/motions?file_name=a.bvh", content=chunks, headers=FILE)
+    uploads = client.app.state.services.uploads  # type: ignore[attr-defined]
+    for _ in range(MAX_UPLOADS):
+        assert uploads.acquire(blocking=False)
+    uploads.release(MAX_UPLOADS)
+
+
+def test_description_of_the_api_tells_the_units(client: TestClient) -> None:
+    api = client.get("/openapi.json").json()
+    body = api["paths"]["/v1/motions"]["post"]["requestBody"]["content"]
+    assert set(body) == {"application/octet-stream", "text/plain", "text/csv"}
+    fields = api["components"]["schemas"]["MotionPublic"]["properties"]
+    assert "[mm]" in fields["error_mm"]["description"]
+    assert "[m]" in fields["body_m"]["description"]

@@ -1,0 +1,222 @@
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sqlalchemy as sa
+
+from app.errors import BadMotion, Conflict, InvalidInput, NotFound
+from app.sim.motions import Motion, read_motion
+from app.store.engine import Store
+from app.store.motions import put_motion
+from app.store.records import NewMotion
+from app.store.tables import motions as table
+from jobs import motions as motions_module
+from jobs.import_process import import_here
+from jobs.motions import MotionCatalog
+from jobs.stored_motion import packed
+from tests.sim.recorded_person import bvh_text, csv_text, working
+from tests.sim.test_motions import CLIPS, with_leap
+
+CLIP = csv_text(working(100)).encode()
+
+
+@pytest.fixture
+def catalog(store: Store) -> MotionCatalog:
+    return MotionCatalog(store)
+
+
+def same(a: tuple[Motion, ...], b: tuple[Motion, ...]) -> bool:
+    """Whether runs are the same to the last bit, in all that they say."""
+    return len(a) == len(b) and all(
+        np.array_equal(getattr(one, part), getattr(other, part))
+        for one, other in zip(a, b, strict=True)
+        for part in Motion.__slots__
+    )
+
+
+def test_runs_come_back_as_they_were_imported(store: Store, catalog: MotionCatalog) -> None:
+    content = with_leap(slice(100, 103)).encode()
+    _, new = catalog.add(content, "leap.bvh")
+    found = read_motion(content, "leap.bvh")
+    assert new and len(found.runs) == 2
+    assert same(catalog.get("leap"), found.runs)
+    assert same(MotionCatalog(store).get("leap"), found.runs)
+
+
+def test_record_says_what_was_found(catalog: MotionCatalog) -> None:
+    record, _ = catalog.add(bvh_text(working(200)).encode(), "some one.bvh")
+    assert (record.name, record.n_runs, record.n_frames) == ("some-one", 1, 200)
+    assert record.summary["error_mm"]["wrists"]["p99"] < 1.0
+    assert record.summary["body_m"]["forearm_r"] == pytest.approx(0.26)
+    assert record.detail is not None
+    assert record.detail["clean_runs"][0]["last"] == 199
+    assert catalog.all() == (replace(record, detail=None),)
+
+
+def test_same_file_again_is_not_new_and_is_not_imported_again(
+    store: Store,
+) -> None:
+    calls: list[str] = []
+
+    def counted(content: bytes, file_name: str, name: str, sha256: str) -> NewMotion:
+        calls.append(file_name)
+        return import_here(content, file_name, name, sha256)
+
+    catalog = MotionCatalog(store, counted)
+    first, _ = catalog.add(CLIP, "nod.csv")
+    assert catalog.add(CLIP, "Nod.csv") == (first, False)
+    assert calls == ["nod.csv"]
+
+
+def test_same_file_with_a_wrong_ending_is_refused_all_the_same(catalog: MotionCatalog) -> None:
+    catalog.add(CLIP, "nod.csv")
+    with pytest.raises(BadMotion, match="must end with"):
+        catalog.add(CLIP, "nod.txt")
+
+
+def test_another_file_under_the_name_is_a_conflict(catalog: MotionCatalog) -> None:
+    catalog.add(CLIP, "nod.csv")
+    other = csv_text(working(100, seed=1)).encode()
+    with pytest.raises(Conflict, match="'nod' from another file"):
+        catalog.add(other, "nod.csv")
+    assert catalog.add(other, "nod.csv", "nod-2")[1]
+    assert catalog.names() == ("nod", "nod-2")
+
+
+def test_arrays_of_a_stored_motion_cannot_be_written_to(catalog: MotionCatalog) -> None:
+    catalog.add(CLIP, "nod.csv")
+    (run,) = catalog.get("nod")
+    for array in (run.times, run.q, run.pelvis_z):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 1.0
+
+
+def test_motion_is_kept_in_memory_until_another_takes_its_name(
+    store: Store, catalog: MotionCatalog
+) -> None:
+    catalog.add(CLIP, "nod.csv")
+    runs = catalog.get("nod")
+    assert catalog.get("nod") is runs
+    elsewhere = MotionCatalog(store)
+    elsewhere.remove("nod")
+    other = csv_text(working(120, seed=1)).encode()
+    elsewhere.add(other, "nod.csv")
+    assert same(catalog.get("nod"), read_motion(other, "nod.csv").runs)
+
+
+def test_memory_is_given_back_beyond_so_many_frames(
+    catalog: MotionCatalog, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(motions_module, "MAX_CACHED_FRAMES", 150)
+    for name in ("a", "b"):
+        catalog.add(CLIP, "nod.csv", name)
+    first, second = catalog.get("a"), catalog.get("b")
+    assert catalog.get("b") is second
+    assert catalog.get("a") is not first
+
+
+def test_unknown_motion_names_the_known_ones(catalog: MotionCatalog) -> None:
+    catalog.add(CLIP, "nod.csv")
+    for ask in (catalog.get, catalog.record, catalog.remove):
+        for name in ("walk", "../nod", "nod\n", ""):
+            with pytest.raises(NotFound, match="known: nod"):
+                ask(name)
+
+
+@pytest.mark.parametrize(
+    ("file_name", "name"),
+    [
+        ("Clip 3.bvh", "clip-3"),
+        ("/tmp/0.csv", "0"),
+        ("__a__b..c.mot", "a-b-c"),
+        ("x" * 80 + ".bvh", "x" * 64),
+        ("größe.bvh", "gr-e"),
+    ],
+)
+def test_name_is_made_from_the_file_s(file_name: str, name: str) -> None:
+    assert motions_module.motion_name(file_name) == name
+
+
+def test_file_without_letters_needs_a_name(catalog: MotionCatalog) -> None:
+    with pytest.raises(InvalidInput, match="name = '' must be given: the file's name has none"):
+        catalog.add(CLIP, "动作.csv")
+    assert catalog.add(CLIP, "动作.csv", "gesture")[0].file_name == "动作.csv"
+
+
+@pytest.mark.parametrize("name", ["", "-a", "A", "a b", "a/b", "a\n", "x" * 65, "."])
+def test_name_that_cannot_be_one_is_refused(catalog: MotionCatalog, name: str) -> None:
+    with pytest.raises(InvalidInput, match="1 to 64 of the characters a-z 0-9 -"):
+        catalog.add(CLIP, "nod.csv", name)
+
+
+@pytest.mark.parametrize(
+    ("file_name", "rule"),
+    [
+        ("", "must name a file"),
+        ("/", "must name a file"),
+        ("a\x00.csv", "characters that can be shown"),
+        ("\udcff.csv", "characters that can be shown"),
+        ("x" * 256, "at most 255 characters, not 256"),
+    ],
+)
+def test_file_name_that_cannot_be_one_is_refused(
+    catalog: MotionCatalog, file_name: str, rule: str
+) -> None:
+    with pytest.raises(InvalidInput, match=rule):
+        catalog.add(CLIP, file_name)
+
+
+def test_bad_file_leaves_nothing_behind(catalog: MotionCatalog) -> None:
+    with pytest.raises(BadMotion):
+        catalog.add(CLIP[:300], "nod.csv")
+    assert catalog.names() == ()
+
+
+@pytest.mark.parametrize(
+    "tensors",
+    [b"", b"\x80\x04K\x01.", b"\xff" * 8 + b"{}", b"\x02\x00\x00\x00\x00\x00\x00\x00{}"],
+    ids=["empty", "pickle", "huge header", "no arrays"],
+)
+def test_stored_bytes_that_are_no_runs_are_named(
+    store: Store, catalog: MotionCatalog, tensors: bytes
+) -> None:
+    new = packed(read_motion(CLIP, "nod.csv"), "nod", "nod.csv", "a" * 64)
+    put_motion(store, replace(new, tensors=tensors))
+    with pytest.raises(InvalidInput, match="motion = 'nod' was stored by another version"):
+        catalog.get("nod")
+
+
+def test_stored_body_of_another_version_is_read_as_far_as_it_is_known(
+    store: Store, catalog: MotionCatalog
+) -> None:
+    found = read_motion(CLIP, "nod.csv")
+    new = packed(found, "nod", "nod.csv", "a" * 64)
+    size = {**asdict(found.size), "tail": 0.7, "trunk": 0.5}
+    del size["forearm_l"]
+    recorded = {**new.detail["recorded"], "size": size}
+    put_motion(store, replace(new, detail={**new.detail, "recorded": recorded}))
+    (run,) = catalog.get("nod")
+    assert run.size == replace(found.size, trunk=0.5)
+
+
+def test_stored_runs_that_do_not_add_up_are_named(store: Store, catalog: MotionCatalog) -> None:
+    record, _ = catalog.add(CLIP, "nod.csv")
+    assert record.detail is not None
+    recorded = {**record.detail["recorded"], "sources": ["a", "b"]}
+    with store.writing() as connection:
+        changed = {"detail": {**record.detail, "recorded": recorded}}
+        connection.execute(sa.update(table).values(changed))
+    with pytest.raises(InvalidInput, match="post it anew"):
+        catalog.get("nod")
+
+
+if CLIPS:  # without clips there is no test to skip
+
+    @pytest.mark.parametrize("path", CLIPS, ids=lambda path: f"{path.parent.name}/{path.name}")
+    def test_recorded_clip_comes_back_as_it_was_imported(
+        catalog: MotionCatalog, path: Path
+    ) -> None:
+        catalog.add(path.read_bytes(), path.name)
+        (name,) = catalog.names()
+        assert same(catalog.get(name), read_motion(path.read_bytes(), path.name).runs)
