@@ -10,6 +10,8 @@ the table and do not see one another, so they may stand in each other's place.
 ``pick-courtesy``: people who give way to the arm, from not at all (the source's) to fully, and
 how far the same policy leans on it.
 
+Beside every row stands how often the same people touch a robot that never moves.
+
 Source: METHOD 3.4 and 4 (several people; a model whose dimensions are known; a human that
 reacts).
 """
@@ -18,16 +20,21 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from app.errors import InvalidInput
 from app.policies.checkpoint import Checkpoint
 from app.policies.evaluation import choice_rules
 from app.policies.evaluation.episodes import Evaluator, settings_for
 from app.policies.evaluation.pick import settings_of
+from app.policies.evaluation.statistics import wilson
 from app.policies.task_choice import HYSTERESIS, ValueNetworks
 from app.policies.trained_cell import cell_of
 from app.sim.body_size import percentile_body
+from app.sim.kernels.arm import CONTROLLED
+from app.sim.kernels.episode import COLLISION, RUNNING
 from app.sim.motions import Motion
-from app.sim.pick import PickSettings
+from app.sim.pick import PickBatch, PickSettings
 from app.sim.scene import HumanKind
 from app.sim.worker_motion import WorkSettings, at_the_table
 
@@ -52,10 +59,8 @@ class _Bench:
         """Return the result row of some settings, and what it states of its episodes."""
         evaluator = Evaluator(self._networks, self.cell, self._n, self._seed, settings)
         row = evaluator.run(choice_rules.critic(HYSTERESIS)).row(name)
-        stated = settings_of(evaluator)
-        # A start that stays in reach of somebody is no fault of the policy: told apart.
-        row["starts_redrawn_share"] = stated["starts_redrawn_share"]
-        return row, stated
+        row["touched_at_rest"] = _touched_at_rest(evaluator.batch)
+        return row, settings_of(evaluator)
 
     def all(self, rows: Mapping[str, PickSettings]) -> dict[str, Any]:
         """Return the result of several rows."""
@@ -67,6 +72,15 @@ class _Bench:
             },
             "results": [row for row, _ in done.values()],
         }
+
+
+def _touched_at_rest(batch: PickBatch) -> dict[str, float]:
+    """Return how often people touch a robot that stays where it starts: how bold they are."""
+    batch.reset()
+    rest = np.zeros((batch.n_envs, CONTROLLED), dtype=np.float32)
+    while (batch.state.outcome == RUNNING).any():
+        batch.step(rest, auto_reset=False, features=False)
+    return wilson(int((batch.state.outcome == COLLISION).sum()), batch.n_envs)
 
 
 def _sized(work: WorkSettings, percentile: float, pelvis: float) -> WorkSettings:
