@@ -21,7 +21,7 @@ from app.sim.kernels.people import People, Tracks
 from app.sim.kernels.repertoire import Repertoire
 from app.sim.motions import Motion, placed
 from app.sim.ports import Vec
-from app.sim.task_library import task_library
+from app.sim.task_library import VARIANTS, task_library
 from app.sim.work_cycle import build_library
 
 WorkMotion = Literal["library", "reaches", "recorded"]
@@ -52,6 +52,8 @@ class WorkSettings:
     augmentation: bool = True
     """Whether primitives are sampled and varied (METHOD 3.4); if not, the library's
     demonstrations are replayed as they are."""
+    variants: int = VARIANTS
+    """Postures for each body, place and hand of the library."""
     recorded: tuple[Motion, ...] = ()
     """The runs drawn from, for ``recorded``, placed in the cell."""
 
@@ -100,7 +102,11 @@ def with_work(shared: People, cell: Cell, settings: WorkSettings) -> People:
 
 def _with_library(shared: People, cell: Cell, settings: WorkSettings) -> People:
     library = task_library(
-        cell, settings.seed, settings.bodies, augmentation=settings.augmentation
+        cell,
+        settings.seed,
+        settings.bodies,
+        augmentation=settings.augmentation,
+        variants=settings.variants,
     )
     # Copies: for read-only arrays the kernels would be compiled anew.
     return shared._replace(
