@@ -21,6 +21,8 @@ from app.sim.kernels import random, script
 from app.sim.ports import Vec
 
 HANDS: tuple[Hand, Hand] = ("r", "l")
+VARIANTS = 24
+"""Random postures per place and hand."""
 REACH_PACE = 0.5
 """Mean palm speed of a single reach [m/s]."""
 SHORTEST_REACH_S = 0.8
@@ -44,7 +46,7 @@ class Library:
 
 
 @lru_cache(maxsize=8)
-def build_library(cell: Cell, seed: int, variants: int = 24) -> Library:
+def build_library(cell: Cell, seed: int, variants: int = VARIANTS) -> Library:
     """Make ``variants`` random postures for each place and hand of a cell.
 
     Args:
@@ -141,10 +143,11 @@ class WorkCycle:
     Args:
         cell: Work cell.
         seed: Seed of library and scripts.
+        variants: Postures per place and hand.
     """
 
-    def __init__(self, cell: Cell, seed: int) -> None:
-        self._library = build_library(cell, seed)
+    def __init__(self, cell: Cell, seed: int, variants: int = VARIANTS) -> None:
+        self._library = build_library(cell, seed, variants)
         self._seed = seed
         self._block = 0
         self._begin = 0.0

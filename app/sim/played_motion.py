@@ -1,0 +1,96 @@
+"""A recorded motion, played in a cell at the pace it was recorded.
+
+The run is put down so that it begins at a person's home, facing the table; from there its path
+is kept in metres, wherever it leads. Angles beyond the model's limits are clipped, and counted.
+"""
+
+import math
+
+import numpy as np
+
+from app.sim.cell_people import Worker
+from app.sim.human import Q_MAX, Q_MIN
+from app.sim.motions import Motion, placed
+from app.sim.ports import Vec
+from app.sim.snapshot import MotionView
+
+YAW = 2
+"""Place of the pelvis's yaw, which has no limit while a motion is played."""
+HALF_SPAN_S = 0.025
+"""Half of the time over which speeds are taken [s]."""
+
+
+class PlayedMotion:
+    """One run of a recorded motion in a cell.
+
+    Args:
+        motion: The run.
+        worker: Whose home it begins at, and whose walking area it may leave.
+        name: Name of the stored motion.
+        run: Which of its runs, from 0.
+        n_runs: How many it has.
+    """
+
+    def __init__(
+        self, motion: Motion, worker: Worker, name: str, run: int = 0, n_runs: int = 1
+    ) -> None:
+        self.size = motion.size
+        """Lengths of the recorded person."""
+        self.duration = float(motion.times[-1])
+        """Of the run [s]."""
+        self._name, self._run, self._n_runs = name, run, n_runs
+        path = placed(motion, *worker.home).q
+        self._times, self._rise = motion.times, motion.pelvis_z
+        self._q = np.clip(path, Q_MIN, Q_MAX)
+        self._q[:, YAW] = path[:, YAW]
+        clipped = np.abs(self._q - path)[:, YAW + 1 :].max(axis=1) > 1e-6
+        self._clipped_share = float(clipped.mean())
+        self._outside_share = float(np.mean([is_outside(q, worker) for q in self._q]))
+
+    def at(self, t: float) -> tuple[Vec, Vec]:
+        """Return joint positions [m, rad] and speeds [m/s, rad/s] at ``t`` [s], (18,) each."""
+        start = max(t - HALF_SPAN_S, 0.0)
+        end = min(max(t, 0.0) + HALF_SPAN_S, self.duration)
+        span = max(end - start, 1e-9)
+        return self._between(t), (self._between(end) - self._between(start)) / span
+
+    def rise_at(self, t: float) -> float:
+        """Return the height of the pelvis above standing at ``t`` [s] [m]."""
+        return float(np.interp(t, self._times, self._rise))
+
+    def _between(self, t: float) -> Vec:
+        k = int(np.searchsorted(self._times, t, side="right")) - 1
+        k = min(max(k, 0), len(self._times) - 2)
+        share = (t - self._times[k]) / (self._times[k + 1] - self._times[k])
+        share = min(max(float(share), 0.0), 1.0)
+        return np.asarray(self._q[k] + share * (self._q[k + 1] - self._q[k]))
+
+    def turn_near(self, yaw: float) -> None:
+        """Turn the whole run by full turns so that it begins with a yaw near ``yaw`` [rad]."""
+        full = 2.0 * math.pi
+        self._q[:, YAW] += full * round((yaw - self._q[0, YAW]) / full)
+
+    def view(self, t: float) -> MotionView:
+        """Return what is known of it at ``t`` [s]."""
+        return MotionView(
+            name=self._name,
+            run=self._run,
+            n_runs=self._n_runs,
+            t_s=min(t, self.duration),
+            duration_s=self.duration,
+            outside_share=self._outside_share,
+            clipped_share=self._clipped_share,
+        )
+
+
+def is_outside(q: Vec, worker: Worker, slack: float = 0.02) -> bool:
+    """Whether a pelvis lies outside a person's walking area by more than ``slack`` [m].
+
+    Args:
+        q: Joint positions [m, rad], shape (18,).
+        worker: Whose area.
+        slack: Distance that is not minded [m].
+    """
+    x, y = float(q[0]), float(q[1])
+    inside_x = worker.x_min - slack <= x <= worker.x_max + slack
+    return not (inside_x and worker.y_min - slack <= y <= worker.y_max + slack)
