@@ -30,6 +30,7 @@ from app.sim.kernels.arm import CONTROLLED
 from app.sim.kernels.features import SIZES
 from app.sim.kernels.reward import RewardWeights
 from app.sim.pick import PickBatch, PickSettings
+from app.sim.worker_motion import WorkSettings
 
 LAYOUT = [[name, size] for name, size in SIZES]
 """Names and sizes of the observation's groups, as manifests carry them."""
@@ -122,7 +123,7 @@ def settings_of(preset: Preset) -> PickSettings:
         start_clearance_m=preset.start_clearance_m,
         target_jitter_m=preset.target_jitter_m,
         way_share=preset.way_share,
-        human_pace=preset.human_pace,
+        work=WorkSettings(pace=preset.human_pace),
         action=preset.action,
         weights=RewardWeights(
             c_d=preset.c_d,

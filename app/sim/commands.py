@@ -19,8 +19,8 @@ from app.sim.motions import Motion
 from app.sim.ports import TaskPolicy
 
 Mode = Literal["manual", "auto", "still", "recorded"]
-"""Who moves a person: the visitor; the work cycle, or a case study; nobody: the person stands at
-home; a recorded motion."""
+"""Who moves a person: the visitor; the work cycle or a case study; nobody, so that the person
+stands at home; or a recorded motion."""
 PlainMode = Literal["manual", "auto", "still"]
 PLAIN_MODES: tuple[PlainMode, ...] = ("manual", "auto", "still")
 """Modes that need nothing else; ``recorded`` comes with :class:`SetMotion`."""
@@ -64,7 +64,7 @@ class SetMode:
 class SetMotion:
     """Let a person move as one was recorded; the person has the recorded lengths at first.
 
-    Over HTTP the command carries the motion's name; the service finds it and queues this object.
+    Over HTTP the command carries the motion's name; the service finds it and queues this one.
     """
 
     tag: ClassVar[str] = "set-motion"

@@ -118,10 +118,8 @@ def contact(
     crowd = crowd_of(people, human_q[0], cylinders[0], before)
     crowd.pelvis_z[:] = crowd.size[:, PELVIS_Z]
     crowd.q0[:], crowd.cylinders0[:] = human_q[0], cylinders[0]
-    clear, columns0 = (
-        np.array(kernel.clearances(arm, people, robot, crowd)),
-        crowd.columns.copy(),
-    )
+    clear = np.array(kernel.clearances(arm, people, robot, crowd))
+    columns0 = crowd.columns.copy()
     if after is not None:
         crowd.size[:] = after
     kind, x = kernel.sweep(

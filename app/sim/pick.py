@@ -15,13 +15,20 @@ from app.errors import InvalidInput
 from app.sim.actions import ActionSettings
 from app.sim.batch import CellBatch
 from app.sim.cells import Cell, lacks_stations
-from app.sim.kernels import actions, body, features, kinematics, pick, random, script
+from app.sim.kernels import actions, body, features, kinematics, pick, random
 from app.sim.kernels import arm as arm_kernel
 from app.sim.kernels.arm import CONTROLLED, Arm
 from app.sim.kernels.episode import FEATURES, PLAIN, distance_to
 from app.sim.kernels.features import N_FEATURES
 from app.sim.kernels.geometry import FAR
-from app.sim.kernels.people import People, PeopleState
+from app.sim.kernels.people import (
+    People,
+    PeopleState,
+    advance_people,
+    new_crowd,
+    place_people,
+    start_people,
+)
 from app.sim.kernels.reward import RewardWeights
 from app.sim.ports import Vec
 from app.sim.scene import (
@@ -33,6 +40,7 @@ from app.sim.scene import (
     require_finite,
     with_people,
 )
+from app.sim.worker_motion import USUAL, WorkSettings
 
 OUTCOMES = ("running", "success", "collision", "timeout", "unfeasible")
 StartRule = Literal["clearance", "uniform"]
@@ -65,10 +73,8 @@ class PickSettings:
     """Fewest and most targets offered per episode."""
     people: tuple[HumanKind, ...] | None = None
     """Who is in the cell, 0 to 4 people; None for the cell's own."""
-    human_pace: float = 1.0
-    """Speed of the workers relative to the work cycle."""
-    library_seed: int = 0
-    """Seed of the workers' library of postures."""
+    work: WorkSettings = field(default=USUAL)
+    """What the workers do: their motion, sizes and courtesy."""
     start: StartRule = "clearance"
     """Where people may start: ``clearance`` (``start_clearance_m`` from the robot), ``uniform``
     (anywhere, even in contact)."""
@@ -116,7 +122,7 @@ def _world_of(cell: Cell, settings: PickSettings) -> pick.PickWorld:
         station_q=postures,
         n_cubes=len(cell.stations_of("cube")),
         arm=arm_of(cell),
-        people=people_of(cell, settings.library_seed, settings.human_pace),
+        people=people_of(cell, settings.work),
     )
 
 
@@ -302,40 +308,27 @@ def tool_state(arm: Arm, q: Vec, qd: Vec, goal: Vec) -> tuple[float, float, floa
 def hand_speeds(
     batch: PickBatch, n_scripts: int = 200, seconds: float = 10.0
 ) -> dict[str, float]:
-    """Return how fast the person's hands are, both hands, while faster than 0.05 m/s [m/s].
+    """Return how fast the workers' hands are, both hands, while faster than 0.05 m/s [m/s].
 
     Args:
         batch: The scenario whose person is meant.
         n_scripts: Scripts looked at.
         seconds: Time looked at per script [s].
     """
-    n, tick = n_scripts, 0.01
-    chosen = np.zeros(script.MAX_MOVES + 1, dtype=np.int64)
-    start, duration = np.zeros(script.MAX_MOVES), np.zeros(script.MAX_MOVES)
-    points, frames = np.empty((body.N_POINTS, 3)), np.empty((body.N_FRAMES, 3, 3))
-    stream, trig = np.zeros(1, dtype=np.uint64), np.empty((3, 16))
-    q, qd = np.empty(18), np.empty(18)
-    people, rates = batch.world.people, []
-    for number in range(n):
+    people, tick = batch.world.people._replace(courtesy=0.0), 0.01
+    state = new_people_state(batch.cell, people, 1)
+    crowd = new_crowd(people, state.q.shape[1], state.cylinders.shape[1])
+    stream, rates = np.zeros(1, dtype=np.uint64), []
+    for number in range(n_scripts):
         random.start_stream(batch.seed, 1 << 20, number, stream)
-        moves = script.draw_script(
-            stream,
-            people.of_station[0],
-            people.of_station.shape[1] - 1,
-            people.n_cubes,
-            people.hands,
-            -1,
-            start,
-            duration,
-            chosen,
-        )
-        postures, palms = people.postures[chosen[: moves + 1]], []
-        for k in range(int(seconds / tick)):
-            script.script_at(k * tick, moves, start, duration, postures, q, qd)
-            body.points_and_frames(q, people.bodies[0], trig, points, frames)
-            palms.append(points[[body.HAND_R, body.HAND_L]])
-        rates.append(np.linalg.norm(np.diff(np.array(palms), axis=0), axis=2) / tick)
-    speeds = np.concatenate([rate.ravel() for rate in rates]) * batch.settings.human_pace
+        start_people(people, state, 0, stream, crowd)
+        palms = []
+        for _ in range(int(seconds / tick)):
+            advance_people(people, state, 0, batch.arm.columns, tick, crowd.away)
+            place_people(people, state, 0, crowd)
+            palms.append(crowd.points[:, [body.HAND_R, body.HAND_L]].copy())
+        rates.append(np.linalg.norm(np.diff(np.array(palms), axis=0), axis=-1) / tick)
+    speeds = np.concatenate([rate.ravel() for rate in rates])
     moving = speeds[speeds > 0.05]
     return {
         "hand_speed_median_m_s": float(np.median(moving)),

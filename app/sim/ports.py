@@ -26,7 +26,7 @@ class Person:
     qd: Vec
     """Joint speeds [m/s, rad/s], shape (18,)."""
     size: Vec | None = None
-    """Lengths of the body [m], shape (12,) (``BodySize.vector``); None for the cell's person."""
+    """Lengths of the body [m], shape (12,) (``BodySize.vector``); None: the cell's person."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -130,22 +130,59 @@ def fit(
     weights, squares = [], []
     for motion, phase in zip(motions, phases, strict=True):
         phi = basis(phase, n_basis, width)
-        gram = phi.T @ phi / len(phi) + ridge * np.eye(n_basis)
-        found = np.linalg.solve(gram, phi.T @ motion / len(phi))
-        weights.append(found.T)
-        squares.append(np.mean((motion - phi @ found) ** 2, axis=0))
-    stacked = np.array(weights)
-    away = (stacked - stacked.mean(axis=0)).reshape(len(stacked), -1)
-    cov = away.T @ away / max(len(stacked) - 1, 1)
-    cov += np.kron(np.eye(stacked.shape[1]), _floor(n_basis, floor))
+        found = weights_of(motion, phi, ridge)
+        weights.append(found)
+        squares.append(np.mean((motion - phi @ found.T) ** 2, axis=0))
+    return of_weights(
+        np.array(weights),
+        durations,
+        width=width,
+        floor=floor,
+        residual=np.sqrt(np.mean(squares, axis=0)),
+    )
+
+
+def weights_of(motion: Vec, phi: Vec, ridge: float = RIDGE) -> Vec:
+    """Return the weights of one motion by ridge regression, shape (n_joints, n_basis).
+
+    Args:
+        motion: Positions [m, rad], shape (T, n_joints).
+        phi: Basis at its samples, shape (T, n_basis).
+        ridge: lambda of the regression, per sample.
+    """
+    gram = phi.T @ phi / len(phi) + ridge * np.eye(phi.shape[1])
+    return np.asarray(np.linalg.solve(gram, phi.T @ motion / len(phi)).T)
+
+
+def of_weights(
+    weights: Vec,
+    durations: Vec,
+    *,
+    width: float | None = None,
+    floor: float = FLOOR,
+    residual: Vec | None = None,
+) -> ProMP:
+    """Return the primitive of demonstrations whose weights are known.
+
+    Args:
+        weights: Weights of each demonstration, shape (n, n_joints, n_basis).
+        durations: How long each took [s], shape (n,).
+        width: Width of the Gaussians [phase]; None: :func:`usual_width`.
+        floor: Standard deviation added to every weight, smoothly along the phase [m, rad].
+        residual: What the regression left [m, rad], shape (n_joints,); None: nothing.
+    """
+    n, n_joints, n_basis = weights.shape
+    away = (weights - weights.mean(axis=0)).reshape(n, -1)
+    cov = away.T @ away / max(n - 1, 1)
+    cov += np.kron(np.eye(n_joints), _floor(n_basis, floor))
     logs = np.log(np.asarray(durations, dtype=np.float64))
     return ProMP(
-        mean=stacked.mean(axis=0),
+        mean=weights.mean(axis=0),
         cov=cov,
-        width=width,
+        width=usual_width(n_basis) if width is None else width,
         duration_s=float(np.exp(logs.mean())),
-        duration_spread=float(logs.std(ddof=1)) if len(logs) > 1 else 0.0,
-        residual=np.sqrt(np.mean(squares, axis=0)),
+        duration_spread=float(logs.std(ddof=1)) if n > 1 else 0.0,
+        residual=np.zeros(n_joints) if residual is None else np.array(residual),
     )
 
 

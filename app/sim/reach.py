@@ -37,6 +37,7 @@ from app.sim.scene import (
     walker_settings,
     with_people,
 )
+from app.sim.worker_motion import USUAL, WorkSettings
 
 N_ACT = 6
 """Joints a policy moves: all of them."""
@@ -81,10 +82,8 @@ class ReachSettings:
     collision_ends: bool = True
     """Whether a collision ends the episode. If not, it goes on until the goal is reached or
     time is up, and then counts as a collision, not as a success."""
-    human_pace: float = 1.0
-    """Speed of workers relative to their work cycle."""
-    library_seed: int = 0
-    """Seed of the workers' library of postures."""
+    work: WorkSettings = field(default=USUAL)
+    """What the workers do: their motion, sizes and courtesy."""
     action: ActionSettings = field(default=DEFAULT_ACTION)
     """What actions mean (METHOD 2.2)."""
     observation: ViewName = "features"
@@ -180,7 +179,7 @@ def goal_region_of(cell: Cell) -> GoalRegion:
 
 
 def _people_of(cell: Cell, settings: ReachSettings) -> People:
-    people = people_of(cell, settings.library_seed, settings.human_pace)
+    people = people_of(cell, settings.work)
     if settings.start != "authors":
         return people
     walkers = [replace(walker_settings(person), **AUTHORS_WALK) for person in cell.cylinders]

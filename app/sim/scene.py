@@ -25,10 +25,11 @@ from app.sim.kernels import body, people, script
 from app.sim.kernels.arm import Arm
 from app.sim.kernels.columns import new_columns
 from app.sim.kernels.people import MAX_PEOPLE, People, PeopleState
+from app.sim.kernels.repertoire import new_legs, no_repertoire
 from app.sim.occupancy import WalkerSettings, walker_rules, walker_state
 from app.sim.ports import Vec
 from app.sim.shapes import levers, load_robot_capsules, self_pairs
-from app.sim.work_cycle import build_library
+from app.sim.worker_motion import NO_TRACKS, WorkSettings, with_work
 
 HumanKind = Literal["worker", "walker", "constant", "fixed-speed"]
 HUMAN_KINDS: tuple[HumanKind, ...] = ("worker", "walker", "constant", "fixed-speed")
@@ -170,34 +171,33 @@ def boxes_of(cell: Cell) -> Vec:
     return np.array(rows, dtype=np.float64).reshape(-1, 7)
 
 
-def people_of(cell: Cell, library_seed: int = 0, pace: float = 1.0) -> People:
+def people_of(cell: Cell, work: WorkSettings | None = None) -> People:
     """Return what the kernels know of a cell's people.
 
     Args:
         cell: Work cell with 0 to 4 people.
-        library_seed: Seed of the workers' library of postures.
-        pace: Speed of the workers relative to the work cycle.
+        work: What the workers do; None where they only stand where they are put.
     """
-    workers, bodies = len(cell.workers), own(cell.body[None])
-    postures, hands = np.zeros((1, 18)), np.zeros((1, 2, 3))
-    of_station, n_cubes = np.zeros((1, 1, 2, 2), dtype=np.int64), 0
-    if workers:
-        library = build_library(cell, library_seed)
-        postures, hands = own(library.postures), own(library.hands)
-        of_station, n_cubes = own_index(library.of_station[None]), library.n_cubes
-    return People(
-        bodies=bodies,
+    workers = len(cell.workers)
+    shared = People(
+        bodies=own(cell.body[None]),
         floor_z=cell.floor_z,
         top_z=cell.floor_z + max([p.height for p in cell.cylinders], default=2.0),
         columns=body.capsule_columns(workers),
-        postures=postures,
-        hands=hands,
-        of_station=of_station,
-        n_cubes=n_cubes,
-        pace=pace,
+        postures=np.zeros((1, 18)),
+        hands=np.zeros((1, 2, 3)),
+        of_station=np.zeros((1, 1, 2, 2), dtype=np.int64),
+        n_cubes=0,
+        source=people.REACHES,
+        repertoire=no_repertoire(),
+        tracks=NO_TRACKS,
+        limits=np.stack([human.Q_MIN, human.Q_MAX]),
+        courtesy=0.0,
+        pace=1.0,
         walkers=walker_rules([walker_settings(person) for person in cell.cylinders]),
         nobody=human.rest_posture(*FAR_AWAY),
     )
+    return with_work(shared, cell, work) if workers and work is not None else shared
 
 
 def new_people_state(cell: Cell, shared: People, n_envs: int) -> PeopleState:
@@ -216,7 +216,11 @@ def new_people_state(cell: Cell, shared: People, n_envs: int) -> PeopleState:
         body=counts(workers),
         size=np.broadcast_to(shared.bodies[0], (n_envs, workers, body.N_SIZE)).copy(),
         columns=np.repeat(shared.columns[None], n_envs, axis=0),
-        phase=rows(workers),
+        clock=rows(workers),
+        near=rows(workers),
+        lean=rows(workers, 4),
+        track=counts(workers),
+        legs=new_legs(n_envs, workers),
         move=counts(workers),
         n_moves=counts(workers),
         start=rows(workers, script.MAX_MOVES),

@@ -15,6 +15,7 @@ from functools import lru_cache
 import numpy as np
 
 from app.sim import human
+from app.sim.body_size import BodySize
 from app.sim.cells import Cell
 from app.sim.human import Hand
 from app.sim.kernels import random, script
@@ -38,7 +39,7 @@ class Library:
     hands: Vec
     """Palm positions, right then left [m], shape (n, 2, 3)."""
     of_station: script.Index
-    """First posture and count of each place and hand, shape (n_stations + 1, 2, 2)."""
+    """First posture and count of each body, place and hand, (n_bodies, n_places, 2, 2)."""
     n_stations: int
     """Number of stations, cubes first; the place after them is home."""
     n_cubes: int
@@ -46,32 +47,41 @@ class Library:
 
 
 @lru_cache(maxsize=8)
-def build_library(cell: Cell, seed: int, variants: int = VARIANTS) -> Library:
-    """Make ``variants`` random postures for each place and hand of a cell.
+def build_library(
+    cell: Cell, seed: int, bodies: tuple[BodySize, ...] | None = None, variants: int = VARIANTS
+) -> Library:
+    """Make ``variants`` random postures for each body, place and hand of a cell.
 
     Args:
         cell: Work cell.
         seed: Seed of stances, elbows and grips.
+        bodies: Sizes of the people; None for the cell's own.
         variants: Postures per place and hand.
     """
     rng = np.random.default_rng(seed)
+    sizes = [size.vector(cell.floor_z) for size in bodies or (cell.human.size,)]
     postures: list[Vec] = []
-    of_station = np.zeros((len(cell.pick_stations) + 1, 2, 2), dtype=np.int64)
-    for place, station in enumerate(cell.pick_stations):
-        for column, hand in enumerate(HANDS):
-            of_station[place, column] = len(postures), variants
-            target = np.array(station.position)
-            postures.extend(_at_station(cell, rng, target, hand) for _ in range(variants))
-    of_station[-1, :] = len(postures), variants
-    postures.extend(_at_home(cell, rng) for _ in range(variants))
-    stacked = np.array(postures)
-    hands = np.array([_palms(q, cell.body) for q in stacked])
-    for array in (stacked, hands, of_station):
+    hands: list[Vec] = []
+    of_station = np.zeros((len(sizes), len(cell.pick_stations) + 1, 2, 2), dtype=np.int64)
+    for size, index in zip(sizes, of_station, strict=True):
+        begin = len(postures)
+        for place, station in enumerate(cell.pick_stations):
+            for column, hand in enumerate(HANDS):
+                index[place, column] = len(postures), variants
+                target = np.array(station.position)
+                postures.extend(
+                    _at_station(cell, size, rng, target, hand) for _ in range(variants)
+                )
+        index[-1, :] = len(postures), variants
+        postures.extend(_at_home(cell, rng) for _ in range(variants))
+        hands.extend(_palms(q, size) for q in postures[begin:])
+    stacked, palms = np.array(postures), np.array(hands)
+    for array in (stacked, palms, of_station):
         array.setflags(write=False)
     n_cubes = sum(station.kind == "cube" for station in cell.pick_stations)
     return Library(
         postures=stacked,
-        hands=hands,
+        hands=palms,
         of_station=of_station,
         n_stations=len(cell.pick_stations),
         n_cubes=n_cubes,
@@ -95,7 +105,9 @@ def _at_home(cell: Cell, rng: np.random.Generator) -> Vec:
     return q
 
 
-def _at_station(cell: Cell, rng: np.random.Generator, target: Vec, hand: Hand) -> Vec:
+def _at_station(
+    cell: Cell, size: Vec, rng: np.random.Generator, target: Vec, hand: Hand
+) -> Vec:
     """Return a posture with one palm at a station and the other at the table's edge."""
     sign = -1.0 if hand == "r" else 1.0
     grip = target + rng.uniform([-0.03, -0.03, -0.06], [0.03, 0.03, 0.05])
@@ -108,7 +120,7 @@ def _at_station(cell: Cell, rng: np.random.Generator, target: Vec, hand: Hand) -
     support += rng.uniform(-0.04, 0.04, 3)
     right, left = (grip, support) if hand == "r" else (support, grip)
     swivel = float(rng.uniform(0.0, 0.9))
-    posture = human.solve_hands(start, cell.body, right=right, left=left, swivel=swivel)
+    posture = human.solve_hands(start, size, right=right, left=left, swivel=swivel)
     return posture.q
 
 
@@ -147,7 +159,7 @@ class WorkCycle:
     """
 
     def __init__(self, cell: Cell, seed: int, variants: int = VARIANTS) -> None:
-        self._library = build_library(cell, seed, variants)
+        self._library = build_library(cell, seed, variants=variants)
         self._seed = seed
         self._block = 0
         self._begin = 0.0
@@ -161,7 +173,7 @@ class WorkCycle:
         library = self._library
         n = script.draw_script(
             state,
-            library.of_station,
+            library.of_station[0],
             library.n_stations,
             library.n_cubes,
             library.hands,

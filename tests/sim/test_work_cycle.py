@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from app.sim import human
+from app.sim.body_size import MEDIAN, percentile_body
 from app.sim.cells import load_cell
 from app.sim.kernels import random
 from app.sim.work_cycle import WorkCycle, build_library
@@ -33,14 +34,15 @@ def test_same_seed_works_alike_and_another_seed_does_not() -> None:
     assert not np.array_equal(one.at(8.0)[0], three.at(8.0)[0])
 
 
-def test_library_reaches_the_stations_inside_the_limits() -> None:
+@pytest.mark.parametrize("stature", [5.0, 50.0, 95.0])
+def test_library_reaches_the_stations_inside_the_limits(stature: float) -> None:
     cell = load_cell()
-    library = build_library(cell, 0)
+    library = build_library(cell, 0, (MEDIAN, percentile_body(stature)))
     assert (library.postures >= human.Q_MIN).all() and (library.postures <= human.Q_MAX).all()
     misses = []
     for place, station in enumerate(cell.stations):
         for column in range(2):
-            first, count = library.of_station[place, column]
+            first, count = library.of_station[1, place, column]
             palms = library.hands[first : first + count, column]
             misses.extend(np.linalg.norm(palms - station.position, axis=1))
     assert np.median(misses) < 0.08

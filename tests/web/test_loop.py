@@ -80,7 +80,7 @@ def test_drag_of_a_hand_moves_the_person(live: LiveCell) -> None:
     wait_for(lambda: abs(live.handle.snapshot().person_q[1] - 1.3) < 0.02)
     before = live.handle.snapshot().person_q
     with ViewerClient(live.viewer_port) as visitor:
-        visitor.drag("/gizmos/right", [(0.1, 0.95, 0.3), (0.15, 0.9, 0.25)])
+        visitor.drag("/gizmos/0/right", [(0.1, 0.95, 0.3), (0.15, 0.9, 0.25)])
         wait_for(lambda: abs(live.handle.snapshot().person_q[10] - before[10]) > 0.2)
 
 

@@ -18,6 +18,7 @@ from app.sim.kernels import episode as kernel
 from app.sim.kernels.features import LAYOUT, N_FEATURES, observe_batch
 from app.sim.pick import OUTCOMES, PickBatch, PickSettings
 from app.sim.recheck import Trajectory
+from app.sim.worker_motion import WorkSettings
 
 Index = NDArray[np.int64]
 EVALUATION_LIBRARY = 1_000_003
@@ -41,6 +42,28 @@ class View:
 
 
 Rule = Callable[[View], Index]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sight:
+    """The person as the policy sees them, one per running row."""
+
+    q: NDArray[np.float64]
+    """Joint positions [m, rad], shape (n, 18)."""
+    qd: NDArray[np.float64]
+    """Joint speeds [m/s, rad/s], shape (n, 18)."""
+    size: NDArray[np.float64]
+    """Size [m], shape (n, 12)."""
+
+
+Seen = Callable[[PickBatch, Index], Sight]
+"""What stands between the batch and the policy: asked once per step, for the running rows."""
+
+
+def seen_exactly(batch: PickBatch, rows: Index) -> Sight:
+    """Return the first worker of each row as they are."""
+    people = batch.state.people
+    return Sight(q=people.q[rows, 0], qd=people.qd[rows, 0], size=people.size[rows, 0])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,8 +109,9 @@ def settings_for(n_candidates: tuple[int, int], preset: dict[str, object]) -> Pi
         time_limit_s=10.0,
         start_clearance_m=0.05,
         n_candidates=n_candidates,
-        human_pace=float(pace) if isinstance(pace, int | float) else 1.0,
-        library_seed=EVALUATION_LIBRARY,
+        work=WorkSettings(
+            seed=EVALUATION_LIBRARY, pace=float(pace) if isinstance(pace, int | float) else 1.0
+        ),
         action=action_of(preset),
     )
 
@@ -114,8 +138,15 @@ class Evaluator:
         self._networks = networks
         self.batch = PickBatch(cell, n_episodes, seed, settings)
 
-    def run(self, rule: Rule, n_recorded: int = 0) -> Episodes:
-        """Run all episodes under a rule; record the first ``n_recorded`` ones."""
+    def run(self, rule: Rule, n_recorded: int = 0, seen: Seen = seen_exactly) -> Episodes:
+        """Run all episodes under a rule; record the first ``n_recorded`` ones.
+
+        Args:
+            rule: Chooses among the candidates.
+            n_recorded: Rows whose poses are kept.
+            seen: The person the policy sees instead of the true one; made anew for every run
+                where it remembers what it saw.
+        """
         batch, n = self.batch, self.batch.n_envs
         batch.reset()
         chosen, switches = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
@@ -123,7 +154,7 @@ class Evaluator:
         trace = _Trace(batch, n_recorded)
         first = True
         while (rows := np.flatnonzero(batch.state.outcome == kernel.RUNNING)).size:
-            actions, view = self._view(rows, chosen[rows], first)
+            actions, view = self._view(rows, chosen[rows], first, seen)
             choice = rule(view)
             if not first:
                 switches[rows] += choice != chosen[rows]
@@ -142,7 +173,7 @@ class Evaluator:
         )
 
     def _view(
-        self, rows: Index, chosen: Index, first: bool
+        self, rows: Index, chosen: Index, first: bool, seen: Seen
     ) -> tuple[NDArray[np.float32], View]:
         """Return the policy's action for every candidate, (n, k, 5), and what rules see."""
         batch, state = self.batch, self.batch.state
@@ -151,15 +182,16 @@ class Evaluator:
         there = stations >= 0
         owner, place = np.nonzero(there)
         env, station = rows[owner], stations[owner, place]
+        sight = seen(batch, rows)
         obs = np.empty((len(env), N_FEATURES), dtype=np.float32)
         observe_batch(
             batch.arm,
             batch.world.people.floor_z,
             state.q[env],
             state.qd[env],
-            state.people.q[env, 0],
-            state.people.qd[env, 0],
-            state.people.size[env, 0],
+            sight.q[owner],
+            sight.qd[owner],
+            sight.size[owner],
             batch.world.stations[station],
             batch.world.station_q[station],
             state.time_left[env],

@@ -12,7 +12,14 @@ from app.sim.kernels.body import PELVIS_Z
 from app.sim.kernels.columns import copy_rows
 from app.sim.kernels.compiled import kernel
 from app.sim.kernels.contact import NO_CONTACT, sweep
-from app.sim.kernels.people import Crowd, People, PeopleState, advance_people, place_people
+from app.sim.kernels.people import (
+    Crowd,
+    People,
+    PeopleState,
+    advance_people,
+    keep_distances,
+    place_people,
+)
 from app.sim.ports import Vec
 
 RUNNING, SUCCESS, COLLISION, TIMEOUT, UNFEASIBLE = range(5)
@@ -101,7 +108,7 @@ def move(
     )  # fmt: skip
     state.elapsed[e] += arm.dt
     state.time_left[e] -= arm.dt
-    advance_people(everybody, people, e, state.elapsed[e], arm.dt)
+    advance_people(everybody, people, e, state.robot[e], arm.dt, crowd.away)
     copy_rows(people.size[e], crowd.size)
     kind, _ = sweep(
         arm, everybody, state.q[e], state.qd[e], work.c, work.d, work.q,
@@ -113,6 +120,8 @@ def move(
     if kind != NO_CONTACT:
         place_robot(arm, work.q, robot)
         place_people(everybody, people, e, crowd)
+    if everybody.courtesy > 0.0:
+        keep_distances(people, e, crowd)
     keep_columns(robot.columns, state.robot[e])
     keep_columns(crowd.columns, people.columns[e])
     return kind != NO_CONTACT, unfeasible

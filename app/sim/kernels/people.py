@@ -1,9 +1,13 @@
 """The people of a cell, compiled: where they are, how they move on, and as what shapes.
 
-A cell holds up to four people: *workers*, 18-DoF bodies that follow a script of postures, and
-*walkers*, the vertical cylinders of METHOD 2.1. Neither reacts to the robot, so an episode's
-whole human motion is fixed when it starts. Workers become twelve capsules each, in one set of
-columns; walkers stay cylinders.
+A cell holds up to four people: *workers*, 18-DoF bodies, and *walkers*, the vertical cylinders
+of METHOD 2.1. Workers become twelve capsules each, in one set of columns; walkers stay
+cylinders. A worker's motion comes from one of three sources: synthetic reaches
+(``script.py``), task primitives (``repertoire.py``) or recorded tracks.
+
+People do not react to the robot, so that an episode's whole human motion is fixed when it
+starts; unless they are courteous (METHOD 4): then a worker slows and leans away as the arm
+comes close (``courtesy.py``).
 """
 
 import math
@@ -15,6 +19,7 @@ from numpy.typing import NDArray
 from app.sim.kernels import body, random, script
 from app.sim.kernels.columns import copy_rows, copy_values, gaps, least, longest_way
 from app.sim.kernels.compiled import kernel
+from app.sim.kernels.courtesy import closeness, give_way
 from app.sim.kernels.cylinder import cylinder_clearance
 from app.sim.kernels.geometry import FAR
 from app.sim.kernels.occupancy import (
@@ -28,11 +33,28 @@ from app.sim.kernels.occupancy import (
     advance_walker,
     start_walker,
 )
+from app.sim.kernels.repertoire import Legs, Repertoire, condition, draw_legs, follow, law
 from app.sim.ports import Vec
 
+REACHES, LIBRARY, RECORDED = range(3)
+"""Where a worker's motion comes from."""
 MAX_PEOPLE = 4
 DEEPEST = 32
 """Halvings of a period in the contact test; enough for periods of hours."""
+
+
+class Tracks(NamedTuple):
+    """Recorded motion of workers."""
+
+    rows: Vec
+    """Samples of all tracks, one after the other: joints [m, rad], and by how much the pelvis
+    is higher than in standing [m], shape (n, 19)."""
+    spans: NDArray[np.int64]
+    """First sample, number of samples and body (-1: any) of each track, shape (n_tracks, 3)."""
+    dt: float
+    """Step between samples [s]."""
+    needed: float
+    """How long a track should go on after the start of an episode [s]."""
 
 
 class People(NamedTuple):
@@ -54,6 +76,16 @@ class People(NamedTuple):
     """First posture and count of each body, place and hand, (n_bodies, n_places + 1, 2, 2)."""
     n_cubes: int
     """Places that are cubes; they come first."""
+    source: int
+    """Where the workers' motion comes from: REACHES, LIBRARY or RECORDED."""
+    repertoire: Repertoire
+    """What they can do, for LIBRARY."""
+    tracks: Tracks
+    """Recorded motion, for RECORDED."""
+    limits: Vec
+    """Lower and upper joint limits of a worker [m, rad], shape (2, 18)."""
+    courtesy: float
+    """How much the workers give way to the arm, from 0 to 1."""
     pace: float
     """Speed of the workers relative to their scripts."""
     walkers: WalkerRules
@@ -75,8 +107,16 @@ class PeopleState(NamedTuple):
     """Their sizes [m], shape (n_envs, W, body.N_SIZE)."""
     columns: Vec
     """Their capsules at this moment, shape (n_envs, 9, n)."""
-    phase: Vec
-    """Time in each worker's script at the start [s], shape (n_envs, W)."""
+    clock: Vec
+    """Time in each worker's script or track [s], shape (n_envs, W)."""
+    near: Vec
+    """Each worker's distance to the robot as the contact test last saw it [m], (n_envs, W)."""
+    lean: Vec
+    """How far each worker leans away, ``courtesy.give_way`` [rad, rad/s], (n_envs, W, 4)."""
+    track: NDArray[np.int64]
+    """Track of each worker, for RECORDED, shape (n_envs, W)."""
+    legs: Legs
+    """The legs of their scripts, for LIBRARY."""
     move: NDArray[np.int64]
     """The move of the script each worker is in, shape (n_envs, W)."""
     n_moves: NDArray[np.int64]
@@ -120,6 +160,8 @@ class Crowd(NamedTuple):
     """The walkers when the period began [m], shape (C, 3)."""
     robot_q: Vec
     """The robot's joints between the ends of the period [rad], shape (6,)."""
+    away: Vec
+    """How far a leg's sample is from its two ends [m, rad], shape (36,)."""
     seen_q: Vec
     """Joints of the person a policy looks at [m, rad], shape (18,)."""
     seen_qd: Vec
@@ -147,6 +189,7 @@ def new_crowd(people: People, n_workers: int, n_walkers: int) -> Crowd:
         np.empty((n_workers, 18)),
         np.empty((n_walkers, 3)),
         np.empty(6),
+        np.empty(36),
         np.empty(18),
         np.empty(18),
         people.bodies[0].copy(),
@@ -210,24 +253,95 @@ def people_speed_bound(before: Vec, after: Vec, start: Vec, end: Vec, dt: float)
 
 
 @kernel(inline="always")
-def worker_at(people: People, state: PeopleState, e: int, w: int, t: float) -> None:
-    """Write the state of worker ``w`` of environment ``e`` at ``t`` [s] since its start."""
-    when, start = state.phase[e, w] + people.pace * t, state.start[e, w]
+def worker_at(
+    people: People, state: PeopleState, e: int, w: int, when: float, rate: float, away: Vec
+) -> None:
+    """Write joints, speeds and height of worker ``w`` of environment ``e``.
+
+    Args:
+        people: Shared data.
+        state: Rows; what the worker's place in the script needs is kept there too.
+        e: Environment.
+        w: Worker.
+        when: Time in its script or track [s].
+        rate: Script's seconds per second; scales the speeds.
+        away: Work space, shape (36,).
+    """
+    if people.source == RECORDED:
+        _track_at(people, state, e, w, when, rate)
+        return
+    start, duration = state.start[e, w], state.duration[e, w]
     move, n = state.move[e, w], state.n_moves[e, w]
     while move + 1 < n and start[move + 1] <= when:
         move += 1
     state.move[e, w] = move
-    chosen = state.chosen[e, w]
-    script.move_at(
-        when,
-        start[move],
-        state.duration[e, w, move],
-        people.postures[chosen[move]],
-        people.postures[chosen[move + 1]],
-        people.pace,
-        state.q[e, w],
-        state.qd[e, w],
-    )
+    chosen, q, qd = state.chosen[e, w], state.q[e, w], state.qd[e, w]
+    before, after = people.postures[chosen[move]], people.postures[chosen[move + 1]]
+    if people.source == REACHES:
+        script.move_at(when, start[move], duration[move], before, after, rate, q, qd)
+        return
+    legs, shared = state.legs, people.repertoire
+    weights = legs.weights[e, w]
+    if legs.ready[e, w] != move:
+        sample, gain = legs.sample[e, w, move], shared.gain[legs.primitive[e, w, move]]
+        condition(shared.samples[sample], gain, before, after, away, weights)
+        legs.ready[e, w] = move
+    stop = legs.stop[e, w, move]
+    phase, speed = law(when - start[move], duration[move], stop[0], stop[1])
+    follow(weights, phase, rate * speed, people.limits[0], people.limits[1], q, qd)
+
+
+@kernel(inline="always")
+def _track_at(
+    people: People, state: PeopleState, e: int, w: int, when: float, rate: float
+) -> None:
+    """Write a worker's state on its track; past the end it stands still."""
+    tracks, span = people.tracks, people.tracks.spans[state.track[e, w]]
+    last = float(span[1] - 1)
+    at = max(0.0, when / tracks.dt)
+    moving = at < last
+    at = min(at, last)
+    k = min(int(at), max(span[1] - 2, 0))
+    part, first = at - k, span[0] + k
+    after = tracks.rows[first + 1 if span[1] > 1 else first]
+    before, speed = tracks.rows[first], rate / tracks.dt if moving else 0.0
+    for j in range(18):
+        way = after[j] - before[j]
+        state.q[e, w, j], state.qd[e, w, j] = before[j] + part * way, speed * way
+    rise = before[18] + part * (after[18] - before[18])
+    standing = people.bodies[state.body[e, w], body.PELVIS_Z]
+    state.size[e, w, body.PELVIS_Z] = standing + rise
+
+
+@kernel(inline="always")
+def _draw_work(people: People, state: PeopleState, e: int, w: int, rng: random.State) -> None:
+    """Draw what worker ``w`` of environment ``e`` does, and where in it the episode begins."""
+    who = random.below(rng, people.bodies.shape[0]) if people.bodies.shape[0] > 1 else 0
+    if people.source == RECORDED:
+        track = random.below(rng, people.tracks.spans.shape[0])
+        state.track[e, w], span = track, people.tracks.spans[track]
+        spare = people.tracks.dt * (span[1] - 1) - people.tracks.needed
+        state.clock[e, w] = max(0.0, spare) * random.uniform(rng)
+        who = span[2] if span[2] >= 0 else who
+    elif people.source == LIBRARY:
+        legs = state.legs
+        state.n_moves[e, w] = draw_legs(
+            rng, people.repertoire, people.of_station[who], people.n_cubes, -1,
+            state.start[e, w], state.duration[e, w], state.chosen[e, w],
+            legs.primitive[e, w], legs.sample[e, w], legs.stop[e, w],
+        )  # fmt: skip
+        state.clock[e, w] = 12.0 * random.uniform(rng) if people.repertoire.varied else 0.0
+        legs.ready[e, w] = -1
+    else:
+        state.n_moves[e, w] = script.draw_script(
+            rng, people.of_station[who], people.of_station.shape[1] - 1, people.n_cubes,
+            people.hands, -1, state.start[e, w], state.duration[e, w], state.chosen[e, w],
+        )  # fmt: skip
+        state.clock[e, w] = 12.0 * random.uniform(rng)
+    state.body[e, w], state.move[e, w], state.near[e, w] = who, 0, FAR
+    copy_values(people.bodies[who], state.size[e, w])
+    for i in range(4):
+        state.lean[e, w, i] = 0.0
 
 
 @kernel()
@@ -236,23 +350,8 @@ def start_people(
 ) -> None:
     """Draw an episode of all people of environment ``e`` and place them."""
     for w in range(state.q.shape[1]):
-        who = random.below(rng, people.bodies.shape[0]) if people.bodies.shape[0] > 1 else 0
-        state.body[e, w] = who
-        copy_values(people.bodies[who], state.size[e, w])
-        state.n_moves[e, w] = script.draw_script(
-            rng,
-            people.of_station[who],
-            people.of_station.shape[1] - 1,
-            people.n_cubes,
-            people.hands,
-            -1,
-            state.start[e, w],
-            state.duration[e, w],
-            state.chosen[e, w],
-        )
-        state.phase[e, w] = 12.0 * random.uniform(rng)
-        state.move[e, w] = 0
-        worker_at(people, state, e, w, 0.0)
+        _draw_work(people, state, e, w, rng)
+        worker_at(people, state, e, w, state.clock[e, w], people.pace, crowd.away)
     for k in range(state.cylinders.shape[1]):
         start_walker(people.walkers, state.walkers, e, k, rng)
         _keep_cylinder(state, e, k)
@@ -260,21 +359,42 @@ def start_people(
 
 
 @kernel(inline="always")
-def advance_people(people: People, state: PeopleState, e: int, t: float, dt: float) -> None:
+def advance_people(
+    people: People, state: PeopleState, e: int, robot: Vec, dt: float, away: Vec
+) -> None:
     """Move the people of environment ``e`` on by one period.
 
     Args:
         people: Shared data.
         state: Rows; the joints and cylinders of row ``e`` are written.
         e: Environment.
-        t: Time since the start, after the period [s].
+        robot: The robot's capsules when the period begins, shape (9, n).
         dt: Period [s].
+        away: Work space, shape (36,).
     """
     for w in range(state.q.shape[1]):
-        worker_at(people, state, e, w, t)
+        rate = people.pace
+        if people.courtesy > 0.0:
+            rate *= 1.0 - people.courtesy * closeness(state.near[e, w])
+        state.clock[e, w] += rate * dt
+        worker_at(people, state, e, w, state.clock[e, w], rate, away)
+        if people.courtesy > 0.0:
+            strength = people.courtesy * closeness(state.near[e, w])
+            give_way(
+                state.q[e, w], state.qd[e, w], state.lean[e, w], strength, robot,
+                people.limits[0], people.limits[1], dt,
+            )  # fmt: skip
     for k in range(state.cylinders.shape[1]):
         advance_walker(people.walkers, state.walkers, e, k, dt)
         _keep_cylinder(state, e, k)
+
+
+@kernel(inline="always")
+def keep_distances(state: PeopleState, e: int, crowd: Crowd) -> None:
+    """Remember how near each worker of environment ``e`` came, from ``crowd.gap``."""
+    for w in range(state.q.shape[1]):
+        part = crowd.gap[w * body.N_CAPSULES : (w + 1) * body.N_CAPSULES]
+        state.near[e, w], _ = least(part)
 
 
 @kernel(inline="always")

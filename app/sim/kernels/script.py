@@ -117,7 +117,7 @@ def draw_script(
         Number of moves.
     """
     hand = 0 if uniform(state) < 0.6 else 1
-    now = first if first >= 0 else _draw_posture(state, of_station, n_stations, hand)
+    now = first if first >= 0 else draw_posture(state, of_station, n_stations, hand)
     chosen[0] = now
     t, n = 0.2 + 1.5 * uniform(state), 0
     while n + 3 <= MAX_MOVES:
@@ -132,18 +132,19 @@ def draw_script(
                 place = cube if (leg == 0) != reverse else dock
             elif skip_home:
                 break
-            then = _draw_posture(state, of_station, place, hand)
+            then = draw_posture(state, of_station, place, hand)
             start[n] = t
             duration[n] = _draw_duration(state, hands[now], hands[then])
             chosen[n + 1] = then
-            t += duration[n] + _draw_pause(state, place == n_stations)
+            t += duration[n] + draw_pause(state, place == n_stations)
             now = then
             n += 1
     return n
 
 
 @kernel()
-def _draw_posture(state: State, of_station: Index, place: int, hand: int) -> int:
+def draw_posture(state: State, of_station: Index, place: int, hand: int) -> int:
+    """Draw one of the postures of a place and hand from ``of_station``, (n_places, 2, 2)."""
     first, count = of_station[place, hand, 0], of_station[place, hand, 1]
     return int(first + below(state, count))
 
@@ -162,7 +163,7 @@ def _draw_duration(state: State, hands_from: Vec, hands_to: Vec) -> float:
 
 
 @kernel()
-def _draw_pause(state: State, at_home: bool) -> float:
+def draw_pause(state: State, at_home: bool) -> float:
     """Draw the rest after a move [s]: short at a station, now and then long."""
     if at_home:
         return 0.3 + 2.2 * uniform(state)

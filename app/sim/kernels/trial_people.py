@@ -21,6 +21,7 @@ from app.sim.kernels import body, random
 from app.sim.kernels.arm import CONTROLLED, Arm
 from app.sim.kernels.columns import (
     INVERSE,
+    RADIUS,
     UU,
     UX,
     UY,
@@ -163,7 +164,9 @@ def place_workers_at(people: People, work: TrialWork, step: float) -> None:
     """Write the workers' capsules ``step`` seconds on in their scripts into ``columns1``."""
     state, out = work.state, work.columns1
     for w in range(work.time.shape[0]):
-        worker_at(people, state, 0, w, work.time[w] + step)
+        when = state.clock[0, w] + people.pace * (work.time[w] + step)
+        worker_at(people, state, 0, w, when, people.pace, work.crowd.away)
+    copy_rows(state.size[0], work.crowd.size)
     place_workers(people, state.q[0], work.crowd)
     copy_rows(work.crowd.columns, out)
     for w in range(work.time.shape[0]):
@@ -181,6 +184,7 @@ def blend(a: Vec, b: Vec, part: float, out: Vec) -> None:
     for k in range(a.shape[1]):
         uu = out[UX, k] ** 2 + out[UY, k] ** 2 + out[UZ, k] ** 2
         out[UU, k], out[INVERSE, k] = uu, 1.0 / uu if uu > 1e-12 else 0.0
+        out[RADIUS, k] = b[RADIUS, k]
 
 
 @kernel(error_model="numpy", inline="always")

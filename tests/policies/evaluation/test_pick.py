@@ -1,12 +1,14 @@
 """The protocols: same episodes for every rule, complete rows, stated people."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from app.errors import InvalidInput, NotFound
 from app.policies import pretrained
 from app.policies.evaluation import choice_rules
-from app.policies.evaluation.episodes import Evaluator, View, settings_for
+from app.policies.evaluation.episodes import Evaluator, View, seen_exactly, settings_for
 from app.policies.evaluation.protocols import evaluate
 from app.policies.task_choice import ValueNetworks
 from app.sim.cells import load_cell
@@ -76,3 +78,20 @@ def test_an_unknown_protocol_names_the_known_ones():
 def test_no_episodes_is_refused():
     with pytest.raises(InvalidInput, match="episodes"):
         evaluate("pick-single", pretrained.load("pick"), episodes=0)
+
+
+def test_what_stands_between_is_asked_for_running_rows_only_and_changes_what_happens(evaluator):
+    running = []
+
+    def nobody(batch, rows):
+        running.append(batch.state.outcome[rows])
+        sight = seen_exactly(batch, rows)
+        q = sight.q.copy()
+        q[:, :2] = 100.0
+        return replace(sight, q=q, qd=np.zeros_like(q))
+
+    blind = evaluator.run(choice_rules.critic(0.2), seen=nobody)
+    assert not np.concatenate(running).any()
+    assert not np.array_equal(
+        blind.duration_s, evaluator.run(choice_rules.critic(0.2)).duration_s
+    )

@@ -1,0 +1,159 @@
+"""What the workers of a cell do: their motion, sizes and manners, as settings and as data.
+
+Three sources of motion. ``library``: task primitives (``task_library.py``), the usual one;
+``reaches``: the first, synthetic reaches (``work_cycle.py``), kept as a variant; ``recorded``:
+imported motion (``motions.py``), placed in the cell. On top come how large the workers are and
+how far they give way to the arm.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.errors import InvalidInput
+from app.sim import human
+from app.sim.body_size import BodySize
+from app.sim.cells import Cell
+from app.sim.kernels import people
+from app.sim.kernels.people import People, Tracks
+from app.sim.kernels.repertoire import no_repertoire
+from app.sim.motions import Motion, placed
+from app.sim.ports import Vec
+from app.sim.work_cycle import build_library
+
+WorkMotion = Literal["library", "reaches", "recorded"]
+MOTIONS: tuple[WorkMotion, ...] = ("library", "reaches", "recorded")
+TRACK_DT = 0.02
+"""Step to which recorded motion is brought [s]; 50 Hz, above what people's hands hold."""
+NEEDED_S = 20.0
+"""How long a track should go on after an episode's start: a longest episode [s]."""
+NO_TRACKS = Tracks(np.zeros((1, 19)), np.array([[0, 1, -1]]), TRACK_DT, 0.0)
+"""The tracks of workers who follow none."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorkSettings:
+    """What the workers of a cell do."""
+
+    motion: WorkMotion = "reaches"
+    """Where their motion comes from."""
+    seed: int = 0
+    """Seed of their postures and of the samples of their primitives."""
+    pace: float = 1.0
+    """Speed relative to their scripts."""
+    courtesy: float = 0.0
+    """How far they give way to the arm, from 0 (they do not see it) to 1."""
+    bodies: tuple[BodySize, ...] | None = None
+    """Sizes drawn from, each episode anew; None for the cell's own person."""
+    augmentation: bool = True
+    """Whether primitives are sampled and varied (METHOD 3.4), or demonstrations replayed."""
+    recorded: tuple[Motion, ...] = ()
+    """The runs drawn from, for ``recorded``, placed in the cell."""
+
+    def __post_init__(self) -> None:
+        if self.motion not in MOTIONS:
+            raise InvalidInput("motion", self.motion, "must be a source of motion", MOTIONS)
+        if not 0.0 <= self.courtesy <= 1.0:
+            raise InvalidInput("courtesy", self.courtesy, "must lie in [0, 1]")
+        if not (np.isfinite(self.pace) and self.pace > 0.0):
+            raise InvalidInput("pace", self.pace, "must be above 0")
+        if self.motion == "recorded" and not self.recorded:
+            raise InvalidInput("recorded", 0, "must hold at least one run of recorded motion")
+
+
+USUAL = WorkSettings()
+
+
+def bodies_of(cell: Cell, settings: WorkSettings) -> Vec:
+    """Return the sizes drawn from [m], shape (n_bodies, 12)."""
+    if settings.bodies is None:
+        return np.array(cell.body[None])
+    return np.stack([size.vector(cell.floor_z) for size in settings.bodies])
+
+
+def with_work(shared: People, cell: Cell, settings: WorkSettings) -> People:
+    """Return shared data of people whose workers do what the settings say.
+
+    Args:
+        shared: People who do nothing yet.
+        cell: Work cell with at least one worker.
+        settings: What they do.
+    """
+    limits = np.stack([human.Q_MIN, human.Q_MAX])
+    bodies = bodies_of(cell, settings)
+    shared = shared._replace(
+        pace=settings.pace, courtesy=settings.courtesy, limits=limits, bodies=bodies
+    )
+    if settings.motion == "recorded":
+        tracks, lengths = tracks_of(settings.recorded, cell.floor_z)
+        return shared._replace(source=people.RECORDED, tracks=tracks, bodies=lengths)
+    sizes = settings.bodies or (cell.human.size,)
+    library = build_library(cell, settings.seed, sizes)
+    return shared._replace(
+        source=people.REACHES,
+        repertoire=no_repertoire(),
+        postures=np.array(library.postures),
+        hands=np.array(library.hands),
+        of_station=np.array(library.of_station),
+        n_cubes=library.n_cubes,
+    )
+
+
+def tracks_of(motions: Sequence[Motion], floor_z: float) -> tuple[Tracks, Vec]:
+    """Return recorded runs as the kernels play them, and the sizes of who was recorded.
+
+    Joints outside the model's limits are held at them.
+
+    Args:
+        motions: Runs, placed in the cell (``motions.placed``).
+        floor_z: Height of the cell's floor [m].
+
+    Returns:
+        Tracks, and sizes [m], shape (n_tracks, 12).
+    """
+    rows: list[Vec] = []
+    spans: list[tuple[int, int, int]] = []
+    first = 0
+    for number, motion in enumerate(motions):
+        n = max(2, int(motion.times[-1] / TRACK_DT) + 1)
+        at = np.minimum(np.arange(n) * TRACK_DT, motion.times[-1])
+        values = np.column_stack([np.clip(motion.q, human.Q_MIN, human.Q_MAX), motion.pelvis_z])
+        rows.append(
+            np.stack([np.interp(at, motion.times, column) for column in values.T], axis=1)
+        )
+        spans.append((first, n, number))
+        first += n
+    tracks = Tracks(
+        np.ascontiguousarray(np.concatenate(rows)),
+        np.array(spans, dtype=np.int64),
+        TRACK_DT,
+        NEEDED_S,
+    )
+    return tracks, np.stack([motion.size.vector(floor_z) for motion in motions])
+
+
+def at_the_table(motion: Motion, cell: Cell) -> Motion:
+    """Return a recorded run placed as if it had been made at the cell's table.
+
+    The person's middle over the run stands at the worker's home and looks where it looks.
+    """
+    x, y, yaw = cell.human.home
+    mean_yaw = float(np.median(motion.q[:, 2]))
+    turned = placed(motion, 0.0, 0.0, yaw + float(motion.q[0, 2]) - mean_yaw)
+    middle = np.median(turned.q[:, :2], axis=0)
+    return placed(
+        turned,
+        x - float(middle[0] - turned.q[0, 0]),
+        y - float(middle[1] - turned.q[0, 1]),
+        float(turned.q[0, 2]),
+    )
+
+
+def stays_within(motion: Motion, cell: Cell) -> NDArray[np.bool_]:
+    """Return for each sample whether the pelvis is where a worker may be, shape (n,)."""
+    person, q = cell.human, motion.q
+    inside_x = (q[:, 0] >= person.x_min) & (q[:, 0] <= person.x_max)
+    return np.asarray(inside_x & (q[:, 1] >= person.y_min) & (q[:, 1] <= person.y_max))
