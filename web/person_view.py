@@ -32,11 +32,7 @@ class PersonView:
         self._skins: list[tuple[viser.MeshSkinnedHandle, tuple[str, ...]]] = []
         self._drawn: tuple[Vec, Vec] | None = None
         self._frame = self._scene.add_frame(self._root, show_axes=False)
-        self._solids = [
-            (self._add_solid(part), part.bone)
-            for part in mannequin.parts()
-            if part.bone is not None
-        ]
+        self._solids: list[tuple[viser.MeshHandle, str]] = []
         self._capsules = CapsulesView(server, f"{self._root}/shapes")
         self._lengths = self._fitted = _lengths(person.size)
         self._fit(person)
@@ -45,19 +41,11 @@ class PersonView:
         """Take the person out of the scene."""
         self._frame.remove()
 
-    def _add_solid(self, part: mannequin.Part) -> viser.MeshHandle:
-        return self._scene.add_mesh_simple(
-            f"{self._root}/{part.name}",
-            part.surface.vertices,
-            part.surface.faces,
-            color=part.color,
-        )
-
     def _fit(self, person: Seen) -> None:
         """Give the mannequin the person's size."""
         self._fitted = _lengths(person.size)
-        for skin, _ in self._skins:
-            skin.remove()
+        for handle, _ in (*self._skins, *self._solids):
+            handle.remove()
         bind = skeleton.bind_bones(person.size)
         self._skins = [
             self._add_skin(part, person.size, bind)
@@ -65,8 +53,11 @@ class PersonView:
             if part.bone is None
         ]
         scale = skeleton.scales(person.size)
-        for solid, bone in self._solids:
-            solid.scale = float(scale[bone][0])
+        self._solids = [
+            (self._add_solid(part, scale[part.bone]), part.bone)
+            for part in mannequin.parts()
+            if part.bone is not None
+        ]
         upright = human.rest_posture(0.0, 0.0, 0.0)
         ends = human.capsules(upright, person.size, self._cell.floor_z)
         radii = human.capsule_radii(person.size)
@@ -90,6 +81,14 @@ class PersonView:
             color=mannequin.color_of(part, self._id),
         )
         return handle, names
+
+    def _add_solid(self, part: mannequin.Part, scale: Vec) -> viser.MeshHandle:
+        return self._scene.add_mesh_simple(
+            f"{self._root}/{part.name}",
+            part.surface.vertices * scale,
+            part.surface.faces,
+            color=part.color,
+        )
 
     def draw(self, person: Seen, dt: float) -> None:
         """Show the person in a posture.

@@ -114,11 +114,13 @@ class LivePerson:
 
     def play(self, command: SetMotion) -> None:
         """Move as recorded, from the beginning of the run, with the recorded lengths."""
-        area = self._place.human.model_copy(
-            update={name: getattr(self._cell.human, name) for name in _AREA}
-        )
         self._played = PlayedMotion(
-            command.motion, area, command.name, command.run, command.n_runs
+            command.motion,
+            self._place,
+            self._cell.human,
+            command.name,
+            command.run,
+            command.n_runs,
         )
         self.mode = "recorded"
         self.body.become(self._played.size)
@@ -165,16 +167,14 @@ class LivePerson:
         if self.mode in ("auto", "recorded") and not self._joining:
             self._t += dt
             self._limbs.place(*self._occupation(self._t))
-            self._carry_pelvis(dt)
-            if self._played is not None and self._t >= self._played.duration:
-                self._end_run()
+            self._carry_on(dt)
             return True
         if self._joining:
             self._limbs.aim(self._occupation(self._t)[0])
         rose = self.body.rise_to(self._rise(), dt)
         moved = self._limbs.follow(dt)
-        there = self._limbs.arrived and abs(self.body.rise - self._rise()) < THERE_M
-        self._joining = self._joining and not there
+        there = self.body.settled and abs(self.body.rise - self._rise()) < THERE_M
+        self._joining = self._joining and not (there and self._limbs.arrived)
         return moved or rose or grew
 
     def glide(self, dt: float) -> bool:
@@ -190,14 +190,13 @@ class LivePerson:
             self._begin_work()
         return True
 
-    def _carry_pelvis(self, dt: float) -> None:
-        if self.mode == "recorded":
-            self.body.rise = self._rise()
-        else:
+    def _carry_on(self, dt: float) -> None:
+        """Raise or lower the pelvis; at its end a run goes back to its beginning."""
+        if self.mode != "recorded" or self._played is None:
             self.body.rise_to(0.0, dt)
-
-    def _end_run(self) -> None:
-        if self.mode == "recorded":
+            return
+        self.body.rise = self._rise()
+        if self._t >= self._played.duration:
             self._join_run()
 
     def _occupation(self, t: float) -> tuple[Vec, Vec]:
@@ -240,9 +239,6 @@ class LivePerson:
             clearance_m=clearance_m,
             nearest=nearest,
         )
-
-
-_AREA = ("x_min", "x_max", "y_min", "y_max")
 
 
 def frozen(values: Vec) -> Vec:

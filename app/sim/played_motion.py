@@ -1,18 +1,22 @@
 """A recorded motion, played in a cell at the pace it was recorded.
 
-The run is put down so that it begins at a person's home, facing the table; from there its path
-is kept in metres, wherever it leads. Angles beyond the model's limits are clipped, and counted.
+The run is put down with its middle at a person's home, looking at the table
+(``worker_motion.at_the_table``); its path is kept in metres, wherever it leads. Angles beyond
+the model's limits are clipped; how often, and by how much that moves the wrists, is told.
 """
 
 import math
 
 import numpy as np
 
+from app.sim.body_track import WRIST_L, WRIST_R, model_points
 from app.sim.cell_people import Worker
+from app.sim.cells import Cell
 from app.sim.human import Q_MAX, Q_MIN
-from app.sim.motions import Motion, placed
+from app.sim.motions import Motion
 from app.sim.ports import Vec
 from app.sim.snapshot import MotionView
+from app.sim.worker_motion import at_the_table
 
 YAW = 2
 """Place of the pelvis's yaw, which has no limit while a motion is played."""
@@ -25,26 +29,38 @@ class PlayedMotion:
 
     Args:
         motion: The run.
-        worker: Whose home it begins at, and whose walking area it may leave.
+        place: The cell with the home at which it is played.
+        worker: Whose walking area it may leave.
         name: Name of the stored motion.
         run: Which of its runs, from 0.
         n_runs: How many it has.
     """
 
     def __init__(
-        self, motion: Motion, worker: Worker, name: str, run: int = 0, n_runs: int = 1
+        self,
+        motion: Motion,
+        place: Cell,
+        worker: Worker,
+        name: str,
+        run: int = 0,
+        n_runs: int = 1,
     ) -> None:
         self.size = motion.size
         """Lengths of the recorded person."""
         self.duration = float(motion.times[-1])
         """Of the run [s]."""
         self._name, self._run, self._n_runs = name, run, n_runs
-        path = placed(motion, *worker.home).q
+        path = at_the_table(motion, place).q
         self._times, self._rise = motion.times, motion.pelvis_z
         self._q = np.clip(path, Q_MIN, Q_MAX)
         self._q[:, YAW] = path[:, YAW]
         clipped = np.abs(self._q - path)[:, YAW + 1 :].max(axis=1) > 1e-6
         self._clipped_share = float(clipped.mean())
+        wrists = [
+            model_points(q, motion.pelvis_z, motion.size)[:, [WRIST_R, WRIST_L]]
+            for q in (path, self._q)
+        ]
+        self._clipped_m = float(np.linalg.norm(wrists[1] - wrists[0], axis=2).max())
         self._outside_share = float(np.mean([is_outside(q, worker) for q in self._q]))
 
     def at(self, t: float) -> tuple[Vec, Vec]:
@@ -80,6 +96,7 @@ class PlayedMotion:
             duration_s=self.duration,
             outside_share=self._outside_share,
             clipped_share=self._clipped_share,
+            clipped_m=self._clipped_m,
         )
 
 

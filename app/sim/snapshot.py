@@ -97,6 +97,8 @@ class MotionView:
     """Share of its frames whose pelvis lies outside the walking area."""
     clipped_share: float
     """Share of its frames with an angle that was clipped to a joint's limit."""
+    clipped_m: float
+    """By how much that moves a wrist at most [m]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

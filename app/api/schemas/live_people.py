@@ -38,6 +38,7 @@ class MotionLive(Answer):
     duration_s: float = Field(description="length of the run [s]")
     outside_share: float = Field(description="share of its path outside the walking area")
     clipped_share: float = Field(description="share of frames clipped to joint limits")
+    clipped_m: float = Field(description="by how much that moves a wrist at most [m]")
 
     @classmethod
     def from_domain(cls, view: MotionView) -> Self:
