@@ -29,6 +29,7 @@ from app.sim.ports import TaskPolicy
 from app.store.engine import Store
 from app.store.records import NewCheckpoint
 from jobs.cells import CellCatalog
+from jobs.import_process import ImportProcess
 from jobs.motions import MotionCatalog
 from jobs.supervisor import Supervisor
 from web.loop import LiveCell
@@ -88,12 +89,13 @@ class Service:
             supervisor.stop()
             store.close()
             raise
+        self._imports = ImportProcess()
         self.parts = Services(
             store=store,
             supervisor=supervisor,
             policies=policies,
             cells=CellCatalog(store),
-            motions=MotionCatalog(store),
+            motions=MotionCatalog(store, self._imports),
             start_world=start_world,
         )
         self._warm_up = threading.Thread(target=self._start_cell, name="warm-up", daemon=True)
@@ -102,6 +104,7 @@ class Service:
     def close(self) -> None:
         """Stop the live cell and the supervisor, close the database."""
         self.parts.stopping.set()
+        self._imports.stop()
         self._warm_up.join(STOP_S)
         self.parts.readiness.ready = False
         self.parts.readiness.reason = "stopping"

@@ -97,7 +97,7 @@ class LocalProcess:
             **os.environ,
             "TANDEM_DATA": str(data_dir.absolute()),
             "TANDEM_DATABASE_URL": database_url,
-            "PYTHONPATH": _search_path(os.environ),
+            "PYTHONPATH": search_path(os.environ),
             "PYTHONUNBUFFERED": "1",
             # One job trains on one core; it must not crowd out the server.
             "OMP_NUM_THREADS": "1",
@@ -149,7 +149,8 @@ def _tail(handle: LocalHandle) -> str:
         return log.read().decode(errors="replace").strip()
 
 
-def _search_path(environment: Mapping[str, str]) -> str:
+def search_path(environment: Mapping[str, str]) -> str:
+    """Return the ``PYTHONPATH`` by which a child finds this project."""
     earlier = environment.get("PYTHONPATH")
     return os.pathsep.join([str(PROJECT_ROOT), *([earlier] if earlier else [])])
 

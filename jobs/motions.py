@@ -4,19 +4,24 @@ import hashlib
 import re
 import threading
 from collections import OrderedDict
+from collections.abc import Callable
 from pathlib import PurePath
 
 from app.errors import InvalidInput, NotFound
-from app.sim.motions import Motion, read_motion
+from app.sim.motions import Motion
 from app.store import motions as kept
 from app.store.engine import Store
-from app.store.records import MotionRecord
-from jobs.stored_motion import packed, unpacked
+from app.store.records import MotionRecord, NewMotion
+from jobs.import_process import import_here
+from jobs.stored_motion import unpacked
 
 MAX_CACHED_FRAMES = 500_000
 """Frames of the motions that stay in memory (80 MB); the newest always stays."""
 MAX_FILE_NAME = 255
 """Longest file name [characters]."""
+
+Importer = Callable[[bytes, str, str, str], NewMotion]
+"""Turns a file, its name, the motion's name and the file's SHA-256 into what is stored."""
 
 _NAME = re.compile(r"[a-z0-9][a-z0-9-]{0,63}")
 
@@ -26,10 +31,12 @@ class MotionCatalog:
 
     Args:
         store: Where the motions are kept.
+        importer: Imports files.
     """
 
-    def __init__(self, store: Store) -> None:
+    def __init__(self, store: Store, importer: Importer = import_here) -> None:
         self._store = store
+        self._import = importer
         self._lock = threading.Lock()
         self._importing = threading.Lock()
         self._cached: OrderedDict[int, tuple[Motion, ...]] = OrderedDict()
@@ -104,8 +111,7 @@ class MotionCatalog:
         if same is not None and ending == f".{same.summary['format']}":
             return same, False
         with self._importing:  # one at a time: its memory is a multiple of the file's
-            found = read_motion(content, file_name)
-            new = packed(found, name, file_name, sha256)
+            new = self._import(content, file_name, name, sha256)
         is_new = kept.put_motion(self._store, new)
         return kept.get_motion(self._store, name), is_new
 

@@ -69,7 +69,7 @@ def remove(name: str, services: ServicesDep) -> None:
 async def _taken_in(
     request: Request, services: Services, file_name: str, name: str | None
 ) -> tuple[MotionRecord, bool]:
-    """Read the body and import it on a thread, a few at a time."""
+    """Read the body and have it imported while a thread waits, a few at a time."""
     if not services.uploads.acquire(blocking=False):
         raise NotReady(f"{MAX_UPLOADS} files are being imported: post again in a moment")
     try:

@@ -26,16 +26,17 @@ class ResidualActor(nn.Module):
 
     Args:
         width: Units per hidden layer.
+        n_obs: Length of observations.
     """
 
-    def __init__(self, width: int) -> None:
+    def __init__(self, width: int, n_obs: int = N_FEATURES) -> None:
         super().__init__()
         last = nn.Linear(width, CONTROLLED)
         with torch.no_grad():
             last.weight.mul_(FIRST_RESIDUAL)
             last.bias.zero_()
         self.net = nn.Sequential(
-            nn.Linear(N_FEATURES, width),
+            nn.Linear(n_obs, width),
             nn.ReLU(),
             nn.Linear(width, width),
             nn.ReLU(),
@@ -43,7 +44,7 @@ class ResidualActor(nn.Module):
         )
 
     def forward(self, obs: torch.Tensor) -> torch.Tensor:
-        """Return actions, shape (n, 5), for observations, shape (n, N_FEATURES)."""
+        """Return actions, shape (n, 5), for observations, shape (n, n_obs)."""
         base = obs[:, BASE_START : BASE_START + CONTROLLED]
         return torch.tanh(self.net(obs) + torch.atanh(BASE_WEIGHT * base.clamp(-1.0, 1.0)))
 
@@ -53,11 +54,12 @@ class QNetwork(nn.Sequential):
 
     Args:
         width: Units per hidden layer.
+        n_obs: Length of observations.
     """
 
-    def __init__(self, width: int) -> None:
+    def __init__(self, width: int, n_obs: int = N_FEATURES) -> None:
         super().__init__(
-            nn.Linear(N_FEATURES + CONTROLLED, width),
+            nn.Linear(n_obs + CONTROLLED, width),
             nn.LayerNorm(width),
             nn.ReLU(),
             nn.Linear(width, width),
@@ -72,15 +74,16 @@ class TwinCritic(nn.Module):
 
     Args:
         width: Units per hidden layer.
+        n_obs: Length of observations.
     """
 
-    def __init__(self, width: int) -> None:
+    def __init__(self, width: int, n_obs: int = N_FEATURES) -> None:
         super().__init__()
-        self.q1 = QNetwork(width)
-        self.q2 = QNetwork(width)
+        self.q1 = QNetwork(width, n_obs)
+        self.q2 = QNetwork(width, n_obs)
 
     def forward(self, obs: torch.Tensor, act: torch.Tensor) -> tuple[torch.Tensor, ...]:
-        """Return both values, shape (n, 1) each, of (n, N_FEATURES) and (n, 5)."""
+        """Return both values, shape (n, 1) each, of (n, n_obs) and (n, 5)."""
         both = torch.cat([obs, act], dim=1)
         return self.q1(both), self.q2(both)
 

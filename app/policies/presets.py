@@ -29,6 +29,11 @@ def _choice(default: str, choices: Iterable[str], text: str) -> Any:
     return field(default=default, metadata={"choices": tuple(choices), "help": text})
 
 
+MOTIONS = ("library", "reaches")
+AUGMENTATIONS = ("sampled", "replayed")
+OBSERVATIONS = ("features", "body")
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Preset:
     """TD3 on the pick scenario: all that a training run depends on besides its seed.
@@ -87,7 +92,19 @@ class Preset:
         0.04, 0.0, 0.2, "m", "half width of the box around a station for targets"
     )
     way_share: float = _number(0.15, 0.0, 1.0, "", "episodes that start on the way")
+    human_motion: str = _choice(
+        "library", MOTIONS, "what the person does: task primitives or the first reaches"
+    )
+    augmentation: str = _choice(
+        "sampled", AUGMENTATIONS, "primitives sampled and varied, or demonstrations replayed"
+    )
     human_pace: float = _number(1.0, 0.2, 2.0, "", "speed of the person, 1 = as cycled")
+    human_courtesy: float = _number(
+        0.0, 0.0, 1.0, "", "how far the person gives way to the arm; 0 does not see it"
+    )
+    observation: str = _choice(
+        "features", OBSERVATIONS, "what the networks see: features, or the body's size too"
+    )
 
     action_degree: int = _number(
         2, 2, 3, "", "degree of the motion in a period: 2 limits acceleration, 3 also jerk"

@@ -20,7 +20,7 @@ from app.policies.checkpoint import Checkpoint, expect_layout
 from app.policies.networks import ResidualActor, TwinCritic
 from app.policies.presets import action_of
 from app.policies.trained_cell import cell_of
-from app.policies.training import LAYOUT
+from app.policies.training import LAYOUTS
 from app.sim import human, robot
 from app.sim.actions import ActionSettings
 from app.sim.cells import Cell, require_cell
@@ -28,11 +28,15 @@ from app.sim.kernels.arm import CONTROLLED
 from app.sim.pick import observe, step_robot
 from app.sim.ports import Candidate, Decision, OutsideField, Person, Vec
 from app.sim.scene import FAR_AWAY, arm_of, people_of
+from app.sim.seen_people import checked_people, checked_vector, nearest_index
 
 HYSTERESIS = 0.2
 """By how much another candidate's value must be better before the choice changes."""
 MAX_CANDIDATES = 1000
 """Most candidates taken at once."""
+
+_NOBODY = Person(q=human.rest_posture(*FAR_AWAY), qd=np.zeros(18))
+"""Who is seen where nobody is."""
 
 
 class ValueNetworks:
@@ -46,9 +50,13 @@ class ValueNetworks:
     """
 
     def __init__(self, checkpoint: Checkpoint) -> None:
-        expect_layout(checkpoint, LAYOUT, CONTROLLED)
+        kind = checkpoint.manifest["preset"].get("observation", "features")
+        expect_layout(checkpoint, LAYOUTS.get(kind, LAYOUTS["features"]), CONTROLLED)
         width = int(checkpoint.manifest["width"])
-        self.actor, self.critic = ResidualActor(width), TwinCritic(width)
+        self.n_obs = sum(size for _, size in checkpoint.manifest["layout"])
+        """Length of the observations."""
+        self.actor = ResidualActor(width, self.n_obs)
+        self.critic = TwinCritic(width, self.n_obs)
         arrays = checkpoint.arrays()
         for name, module in (("actor", self.actor), ("critic", self.critic)):
             start = f"{name}."
@@ -149,15 +157,28 @@ class TaskChooser:
         previous: str | None = None,
         time_left_s: float = 10.0,
     ) -> Decision:
-        """Choose one candidate; see :class:`~app.sim.ports.TaskPolicy`."""
+        """Choose one candidate; see :class:`~app.sim.ports.TaskPolicy`.
+
+        The checkpoint knows one person: it sees the one nearest to the robot, in the person's
+        own size (``seen_people.py``). The others count for nothing in this choice.
+        """
         started = time.perf_counter()
         q, qd = self._robot_state(q, qd)
-        person = self._person(people)
+        seen, person = self._nearest(q, people)
         ids, goals = _check_candidates(candidates)
         if not (np.isfinite(time_left_s) and 0.0 <= time_left_s <= 60.0):
             raise InvalidInput("time_left_s", time_left_s, "must lie in [0, 60] s")
         obs, reachable = observe(
-            self._arm, self._people, q, qd, person.q, person.qd, goals, time_left_s
+            self._arm,
+            self._people,
+            q,
+            qd,
+            person.q,
+            person.qd,
+            goals,
+            time_left_s,
+            person.size,
+            self._networks.n_obs,
         )
         act, values = self._networks.act_and_value(obs)
         last = ids.index(previous) if previous in ids else None
@@ -170,10 +191,11 @@ class TaskChooser:
             actions=act,
             qd_target=qd_target,
             reachable=tuple(bool(flag) for flag in reachable),
-            outside=self._ranges.of_state(q, qd, person),
+            outside=self._ranges.of_state(q, qd, person, seen),
             outside_candidates=tuple(self._ranges.of_goal(goal) for goal in goals),
             checkpoint=self.checkpoint,
             elapsed_ms=1e3 * (time.perf_counter() - started),
+            seen=seen,
         )
 
     def _speeds(self, q: Vec, qd: Vec, act: NDArray[np.float32]) -> Vec:
@@ -189,23 +211,15 @@ class TaskChooser:
 
     def _robot_state(self, q: Vec, qd: Vec) -> tuple[Vec, Vec]:
         arm, slack = self._arm, 1e-6
-        q = _checked_vector("robot.q", q, 6, arm.q_min - slack, arm.q_max + slack, "rad")
+        q = checked_vector("robot.q", q, 6, arm.q_min - slack, arm.q_max + slack, "rad")
         limit = arm.qd_max + slack
-        return q, _checked_vector("robot.qd", qd, 6, -limit, limit, "rad/s")
+        return q, checked_vector("robot.qd", qd, 6, -limit, limit, "rad/s")
 
-    def _person(self, people: Sequence[Person]) -> Person:
-        if not people:
-            return Person(q=human.rest_posture(*FAR_AWAY), qd=np.zeros(18))
-        if len(people) > 1:
-            raise InvalidInput(
-                "people", len(people), "must hold at most one person: this checkpoint knows one"
-            )
-        low, high = human.Q_MIN - 1e-6, human.Q_MAX + 1e-6
-        q = _checked_vector("people[0].q", people[0].q, 18, low, high, "m or rad")
-        qd_limit = np.full(18, 50.0)
-        unit = "m/s or rad/s"
-        qd = _checked_vector("people[0].qd", people[0].qd, 18, -qd_limit, qd_limit, unit)
-        return Person(q=q, qd=qd)
+    def _nearest(self, q: Vec, people: Sequence[Person]) -> tuple[int | None, Person]:
+        """Return which person is seen and that person; someone far away where nobody is."""
+        known = checked_people(people)
+        index = nearest_index(self._arm, self._people, q, known)
+        return index, _NOBODY if index is None else known[index]
 
 
 class _TrainedRanges:
@@ -219,12 +233,15 @@ class _TrainedRanges:
         self._low = {name: np.array(entry["low"]) for name, entry in ranges.items()}
         self._high = {name: np.array(entry["high"]) for name, entry in ranges.items()}
 
-    def of_state(self, q: Vec, qd: Vec, person: Person) -> tuple[OutsideField, ...]:
+    def of_state(
+        self, q: Vec, qd: Vec, person: Person, index: int | None
+    ) -> tuple[OutsideField, ...]:
+        path = f"people[{index or 0}]"
         return (
             *self._outside("q", q, "robot.q", robot.JOINT_NAMES),
             *self._outside("qd", qd, "robot.qd", robot.JOINT_NAMES),
-            *self._outside("human_q", person.q, "people[0].q", human.JOINT_NAMES),
-            *self._outside("human_qd", person.qd, "people[0].qd", human.JOINT_NAMES),
+            *self._outside("human_q", person.q, f"{path}.q", human.JOINT_NAMES),
+            *self._outside("human_qd", person.qd, f"{path}.qd", human.JOINT_NAMES),
         )
 
     def of_goal(self, goal: Vec) -> tuple[OutsideField, ...]:
@@ -248,21 +265,6 @@ class _TrainedRanges:
         )
 
 
-def _checked_vector(
-    path: str, values: Vec, size: int, low: Vec, high: Vec, unit: str
-) -> NDArray[np.float64]:
-    vector = np.asarray(values, dtype=np.float64)
-    if vector.shape != (size,):
-        raise InvalidInput(path, vector.tolist(), f"must hold {size} numbers")
-    for i, value in enumerate(vector):
-        if not np.isfinite(value):
-            raise InvalidInput(f"{path}[{i}]", float(value), "must be finite")
-        if not low[i] <= value <= high[i]:
-            rule = f"must lie in [{low[i]:.4g}, {high[i]:.4g}] {unit}"
-            raise InvalidInput(f"{path}[{i}]", float(value), rule)
-    return vector
-
-
 def _check_candidates(candidates: Sequence[Candidate]) -> tuple[list[str], Vec]:
     n = len(candidates)
     if not 1 <= n <= MAX_CANDIDATES:
@@ -270,7 +272,7 @@ def _check_candidates(candidates: Sequence[Candidate]) -> tuple[list[str], Vec]:
     limit = np.full(3, 10.0)
     goals = np.array(
         [
-            _checked_vector(
+            checked_vector(
                 f"candidates[{i}].position", candidate.position, 3, -limit, limit, "m"
             )
             for i, candidate in enumerate(candidates)

@@ -31,7 +31,7 @@ class _SB3Actor(Actor):
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
-        self.mu = ResidualActor(self.net_arch[0])  # type: ignore[assignment]
+        self.mu = ResidualActor(self.net_arch[0], self.features_dim)  # type: ignore[assignment]
 
 
 class _SB3Critic(ContinuousCritic):
@@ -41,7 +41,7 @@ class _SB3Critic(ContinuousCritic):
         super().__init__(*args, **kwargs)
         for index in range(self.n_critics):
             delattr(self, f"qf{index}")
-        self.twin = TwinCritic(kwargs["net_arch"][0])
+        self.twin = TwinCritic(kwargs["net_arch"][0], kwargs["features_dim"])
         self.q_networks = [self.twin.q1, self.twin.q2]
 
 

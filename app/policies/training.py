@@ -27,13 +27,16 @@ from app.policies.trained_cell import cell_of, manifest_fields
 from app.policies.vecenv import PickVecEnv
 from app.sim.cells import Cell, load_cell
 from app.sim.kernels.arm import CONTROLLED
-from app.sim.kernels.features import SIZES
+from app.sim.kernels.features import BODY_SIZES, SIZES
 from app.sim.kernels.reward import RewardWeights
 from app.sim.pick import PickBatch, PickSettings
 from app.sim.worker_motion import WorkSettings
 
-LAYOUT = [[name, size] for name, size in SIZES]
-"""Names and sizes of the observation's groups, as manifests carry them."""
+LAYOUTS = {
+    "features": [[name, size] for name, size in SIZES],
+    "body": [[name, size] for name, size in BODY_SIZES],
+}
+"""Names and sizes of the groups of each kind of observation, as manifests carry them."""
 REFILL_STEPS = 51_200
 """Environment steps that refill the replay memory after an interruption."""
 RANGE_EVERY = 8
@@ -114,6 +117,22 @@ class _Ranges:
         }
 
 
+def work_of(preset: Mapping[str, Any], seed: int = 0) -> WorkSettings:
+    """Return what the workers do under a preset, as a manifest holds it.
+
+    Args:
+        preset: Fields of the preset; one from before task primitives has no ``human_motion``.
+        seed: Seed of their postures and samples.
+    """
+    return WorkSettings(
+        motion=preset.get("human_motion", "library"),
+        seed=seed,
+        pace=preset.get("human_pace", 1.0),
+        courtesy=preset.get("human_courtesy", 0.0),
+        augmentation=preset.get("augmentation", "sampled") == "sampled",
+    )
+
+
 def settings_of(preset: Preset) -> PickSettings:
     """Return the scenario's settings of a preset."""
     return PickSettings(
@@ -123,7 +142,8 @@ def settings_of(preset: Preset) -> PickSettings:
         start_clearance_m=preset.start_clearance_m,
         target_jitter_m=preset.target_jitter_m,
         way_share=preset.way_share,
-        work=WorkSettings(pace=preset.human_pace),
+        work=work_of(asdict(preset)),
+        observation="body" if preset.observation == "body" else "features",
         action=preset.action,
         weights=RewardWeights(
             c_d=preset.c_d,
@@ -204,7 +224,7 @@ class _Run:
             "preset": asdict(self.preset),
             "seed": self.seed,
             **manifest_fields(self.cell),
-            "layout": LAYOUT,
+            "layout": LAYOUTS[self.preset.observation],
             "act_size": CONTROLLED,
             "width": self.preset.width,
             "step": self.step,
@@ -224,7 +244,7 @@ class _Run:
             raise CheckpointMismatch("preset", asdict(self.preset), resume.manifest["preset"])
         if cell_of(resume.manifest) != self.cell:
             raise CheckpointMismatch("cell", self.cell.sha256, cell_of(resume.manifest).sha256)
-        formats.expect_layout(resume, LAYOUT, CONTROLLED)
+        formats.expect_layout(resume, LAYOUTS[self.preset.observation], CONTROLLED)
         arrays = resume.arrays()
         for name, module in self._modules().items():
             module.load_state_dict(_under(arrays, name))

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
 from app.sim.kernels.arm import CONTROLLED
-from app.sim.kernels.features import N_FEATURES
 from app.sim.pick import OUTCOMES, PickBatch
 
 
@@ -33,7 +32,7 @@ class PickVecEnv(VecEnv):
         self.render_mode = None
         super().__init__(
             batch.n_envs,
-            spaces.Box(-np.inf, np.inf, (N_FEATURES,), np.float32),
+            spaces.Box(-np.inf, np.inf, (batch.obs_size,), np.float32),
             spaces.Box(-1.0, 1.0, (CONTROLLED,), np.float32),
         )
 

@@ -18,7 +18,7 @@ plane by 0.8, 1.3, 2.0 rad; pelvis moves by 0, 0.07, 0.31 m and turns by 0.01, 0
 
 Source: METHOD 3.2 and 3.4. Deviates: the source records people; these demonstrations are
 synthetic, with those numbers as a guide. Bow and the spread of the pace are taken over, the
-median pace is that of ``kernels/script.py``. Elbows are turned out less, because ours hang lower
+median pace is that of ``kernels/script.py``. Elbows are turned out less: ours hang lower
 over the table, and hands are lifted more, because there are cubes on it.
 """
 
@@ -49,7 +49,7 @@ LARGEST_STEP = 0.25
 """Largest change of a joint from one phase to the next [rad]."""
 OVER_TABLE = 0.015
 """Least height of palms, wrists and elbows over the table [m]."""
-TRIES = 60
+NODE_TRIES, TRIES = 20, 40
 """Draws after which a posture or a motion is given up."""
 
 _LOW_POINTS = (
@@ -147,7 +147,7 @@ def draw_node(
         that was tried, whose palm may fall short of the place.
     """
     style = draw_style(rng) if style is None else style
-    for _ in range(TRIES):
+    for _ in range(NODE_TRIES):
         if target is None:
             node, reached = _home(cell, size, style, rng)
         else:

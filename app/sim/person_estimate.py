@@ -23,7 +23,7 @@ Several people: ``people_estimate.py``.
 """
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -32,7 +32,7 @@ from numpy.typing import ArrayLike, NDArray
 from app.errors import InvalidInput
 from app.sim import human
 from app.sim.kernels.body import N_SIZE
-from app.sim.keypoint_angles import joint_angles
+from app.sim.keypoint_angles import joint_angles, joint_motion
 from app.sim.keypoint_cylinder import (
     CylinderSettings,
     SafetyCylinder,
@@ -69,8 +69,6 @@ _SWAPPED: dict[Group, Flag] = {"arms": "arms-swapped", "legs": "legs-swapped"}
 """Groups whose sides are judged; eyes and ears are too near each other, and decide nothing."""
 _FITTED = ("neck", *(f"{part}_{s}" for part in ("shoulder", "elbow", "wrist") for s in "rl"))
 """Key-points that are joints of the model, besides the pelvis, whose height is given."""
-_STEP_S = 0.005
-"""Step of the derivative of the joint angles [s]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -147,14 +145,21 @@ class PersonEstimator:
         self._t, self._seen_at = -math.inf, -math.inf
         self._swapped_at: dict[Group, float] = {}
         self._q: Vec | None = None
-        self._cylinder: SafetyCylinder | None = None
+        self._last_points: Vec | None = None
         self._flags: tuple[Flag, ...] = ()
         self._strays: tuple[str, ...] = ()
 
     def update(
         self, t: float, keypoints: ArrayLike, confidences: ArrayLike | None = None
     ) -> PersonEstimate:
-        """Take one frame in and return the estimate at its time.
+        """Take one frame in and return the estimate at its time; see :meth:`take`."""
+        self.take(t, keypoints, confidences)
+        return self.at(t)
+
+    def take(
+        self, t: float, keypoints: ArrayLike, confidences: ArrayLike | None = None
+    ) -> None:
+        """Take one frame in.
 
         Args:
             t: When the frame was taken [s]; later than the one before.
@@ -186,7 +191,6 @@ class PersonEstimator:
         self._points.update(t, points, trust)
         self._t, self._flags, self._strays = t, tuple(flags), frame.strays
         self._remember(t)
-        return self.at(t)
 
     def _put_sides_right(
         self, t: float, points: Vec, trust: Vec, flags: list[Flag]
@@ -231,13 +235,15 @@ class PersonEstimator:
         if self._center.refuse(t, center).any():
             self._center.forget([0])
         self._center.update(t, center, np.ones(1))
-        self._cylinder = safety_cylinder(
-            points, self._center.at(t)[1][0, :2], self.settings.cylinder
-        )
+        self._last_points = points
 
     def expected(self, t: float) -> Vec:
         """Return where the key-points are expected at ``t`` [m], (25, 3), NaN where unknown."""
         return self._points.at(t)[0]
+
+    def _require_now(self, t: float) -> None:
+        if not math.isfinite(t) or t < self._t:
+            raise InvalidInput("t", t, f"must be finite and not earlier than {self._t:g} s")
 
     def at(self, t: float) -> PersonEstimate:
         """Return the estimate at ``t`` [s], not earlier than the last frame; changes nothing.
@@ -245,13 +251,12 @@ class PersonEstimator:
         Raises:
             InvalidInput: ``t`` is earlier than the last frame, or not finite.
         """
-        if not math.isfinite(t) or t < self._t:
-            raise InvalidInput("t", t, f"must be finite and not earlier than {self._t:g} s")
+        self._require_now(t)
         flags, age = list(self._flags), t - self._seen_at
         points, speeds = self._points.at(t)
         known = np.isfinite(points).all(axis=1)
         person, held, misfit = self._person(points, speeds)
-        if self._cylinder is None:
+        if self._last_points is None:
             flags.append("never-seen")
         elif age > self.settings.stale_s:
             flags.append("stale")
@@ -269,31 +274,36 @@ class PersonEstimator:
             flags=tuple(flags),
         )
 
+    def person_at(self, t: float) -> Person | None:
+        """Return joint angles and speeds alone at ``t`` [s], as :meth:`at` has them."""
+        self._require_now(t)
+        if self._q is None:
+            return None
+        points, speeds = self._points.at(t)
+        q, qd, _ = joint_motion(points, speeds, self._q, self._size, self.settings.qd_max)
+        return Person(q=q, qd=qd, size=self._size)
+
     def _person(
         self, points: Vec, speeds: Vec
     ) -> tuple[Person | None, NDArray[np.bool_], float]:
         """Return joint angles and speeds, which are held, and how badly they fit [m]."""
         if self._q is None:
             return None, np.ones(18, dtype=np.bool_), math.nan
-        q, held = joint_angles(points, self._q, self._size)
-        ahead, _ = joint_angles(points + _STEP_S * speeds, q, self._size)
-        behind, _ = joint_angles(points - _STEP_S * speeds, q, self._size)
-        change = ahead - behind
-        change[2] = (change[2] + math.pi) % (2.0 * math.pi) - math.pi
-        qd = np.clip(change / (2.0 * _STEP_S), -self.settings.qd_max, self.settings.qd_max)
-        qd[held] = 0.0
+        q, qd, held = joint_motion(points, speeds, self._q, self._size, self.settings.qd_max)
         joints = human.joint_points(q, self._size)
         away = [float(np.linalg.norm(points[K[name]] - joints[name])) for name in _FITTED]
         there = [d for d in away if math.isfinite(d)]
-        return Person(q=q, qd=qd), held, float(np.median(there)) if there else math.nan
+        person = Person(q=q, qd=qd, size=self._size)
+        return person, held, float(np.median(there)) if there else math.nan
 
     def _cylinder_at(self, t: float, points: Vec, age: float) -> SafetyCylinder | None:
         """Return the cylinder at ``t``: around what is known, else the last one, grown."""
-        if self._cylinder is None:
+        if self._last_points is None:
             return None
-        hold = self.settings.filter.hold_s
+        settings = self.settings.cylinder
         if np.isfinite(points).any():
             velocity = self._center.at(t)[1][0, :2]
-            return safety_cylinder(points, np.nan_to_num(velocity), self.settings.cylinder)
-        growth = self.settings.cylinder.growth * max(0.0, age - hold)
-        return replace(self._cylinder.after(0.0, growth), velocity=np.zeros(2))
+            return safety_cylinder(points, np.nan_to_num(velocity), settings)
+        last = safety_cylinder(self._last_points, None, settings)
+        growth = settings.growth * max(0.0, age - self.settings.filter.hold_s)
+        return None if last is None else last.after(0.0, growth)

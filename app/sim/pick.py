@@ -19,7 +19,7 @@ from app.sim.kernels import actions, body, features, kinematics, pick, random
 from app.sim.kernels import arm as arm_kernel
 from app.sim.kernels.arm import CONTROLLED, Arm
 from app.sim.kernels.episode import FEATURES, PLAIN, distance_to
-from app.sim.kernels.features import N_FEATURES
+from app.sim.kernels.features import N_FEATURES, N_WITH_BODY
 from app.sim.kernels.geometry import FAR
 from app.sim.kernels.people import (
     People,
@@ -45,8 +45,13 @@ from app.sim.worker_motion import USUAL, WorkSettings
 OUTCOMES = ("running", "success", "collision", "timeout", "unfeasible")
 StartRule = Literal["clearance", "uniform"]
 DEFAULT_ACTION = ActionSettings()
-VIEWS = {"state": (PLAIN, pick.N_PLAIN), "features": (FEATURES, N_FEATURES)}
-"""What observations hold: the plain state of (5.8), or that and features; and their lengths."""
+VIEWS = {
+    "state": (PLAIN, pick.N_PLAIN),
+    "features": (FEATURES, N_FEATURES),
+    "body": (FEATURES, N_WITH_BODY),
+}
+"""What observations hold, and their lengths: the plain state of (5.8); that and features; those
+and the person's size."""
 DEFAULT_WEIGHTS = RewardWeights(
     c_d=0.5, c_th=0.5, c_c=1.0, c_step=0.02, c_v=1.0, d_v=0.1, c_s=1.0, gamma=1.0
 )
@@ -80,8 +85,9 @@ class PickSettings:
     (anywhere, even in contact)."""
     action: ActionSettings = field(default=DEFAULT_ACTION)
     """What actions mean (METHOD 2.2)."""
-    observation: Literal["features", "state"] = "features"
-    """What policies see: the plain state of (5.8), or that and more."""
+    observation: Literal["features", "state", "body"] = "features"
+    """What policies see: the plain state of (5.8), that and features, or the person's size
+    too."""
     weights: RewardWeights = field(default=DEFAULT_WEIGHTS)
     """Reward coefficients (METHOD 3.3)."""
 
@@ -219,6 +225,7 @@ def observe(
     goals: Vec,
     time_left_s: float,
     size: Vec | None = None,
+    n_obs: int = N_FEATURES,
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
     """Return what the networks see of one state for each of n targets.
 
@@ -232,15 +239,16 @@ def observe(
         goals: Targets [m], shape (n, 3).
         time_left_s: Time left [s].
         size: The person's size [m], shape (body.N_SIZE,); None for the cell's person.
+        n_obs: N_FEATURES, or N_WITH_BODY for networks that see the person's size.
 
     Returns:
-        Observations, shape (n, N_FEATURES), and whether each target is reachable, (n,).
+        Observations, shape (n, n_obs), and whether each target is reachable, (n,).
     """
     n, targets = len(goals), own(goals)
     q_goals, reachable = kinematics.ik_vertical_batch(
         targets, arm.tool_length, arm.q_min, arm.q_max
     )
-    obs = np.empty((n, N_FEATURES), dtype=np.float32)
+    obs = np.empty((n, n_obs), dtype=np.float32)
     features.observe_batch(
         arm,
         people.floor_z,

@@ -27,6 +27,9 @@ class Person:
     """Joint speeds [m/s, rad/s], shape (18,)."""
     size: Vec | None = None
     """Lengths of the body [m], shape (12,) (``BodySize.vector``); None: the cell's person."""
+    cylinder: Vec | None = None
+    """x, y and radius [m], shape (3,), of the cylinder that is all that is known of this person
+    (``seen_people.standing_in``); then distances count to it. None: a body of 18 joints."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,6 +80,8 @@ class Decision:
     """SHA-256 of the checkpoint that decided."""
     elapsed_ms: float
     """Time the decision took [ms]."""
+    seen: int | None = None
+    """Which of the people a policy for one person saw: the nearest; None for nobody."""
 
 
 class TaskPolicy(Protocol):
@@ -117,7 +122,8 @@ class TaskPolicy(Protocol):
         Args:
             q: Robot joint positions [rad], shape (6,).
             qd: Robot joint speeds [rad/s], shape (6,).
-            people: The people in the cell.
+            people: The people in the cell, at most four. A policy that knows one person sees
+                the one nearest to the robot.
             candidates: What may be chosen, at least one.
             previous: The candidate chosen last, for hysteresis; None chooses afresh.
             time_left_s: Time left to reach a candidate [s].

@@ -37,7 +37,7 @@ from app.sim.scene import (
     walker_settings,
     with_people,
 )
-from app.sim.worker_motion import USUAL, WorkSettings
+from app.sim.worker_motion import REACHING, WorkSettings
 
 N_ACT = 6
 """Joints a policy moves: all of them."""
@@ -82,7 +82,7 @@ class ReachSettings:
     collision_ends: bool = True
     """Whether a collision ends the episode. If not, it goes on until the goal is reached or
     time is up, and then counts as a collision, not as a success."""
-    work: WorkSettings = field(default=USUAL)
+    work: WorkSettings = field(default=REACHING)
     """What the workers do: their motion, sizes and courtesy."""
     action: ActionSettings = field(default=DEFAULT_ACTION)
     """What actions mean (METHOD 2.2)."""

@@ -32,7 +32,7 @@ from app.sim.kernels.trial_people import Trial, new_trial_work
 from app.sim.ports import Vec
 from app.sim.safety import SafetySettings, rule_of
 from app.sim.scene import HumanKind, arm_of, new_people_state, people_of, with_people
-from app.sim.worker_motion import USUAL
+from app.sim.worker_motion import REACHING
 
 POLICIES = ("smooth", "constant", "goals", "bang-bang")
 MODES = ("script", "straight", "zig-zag", "tease")
@@ -142,7 +142,7 @@ def run_trial(
     if not settings.people:
         raise InvalidInput("people", [], "must name at least one person")
     cell = _cell_of(settings)
-    arm, people = arm_of(cell), people_of(cell, USUAL)
+    arm, people = arm_of(cell), people_of(cell, REACHING)
     state = new_people_state(cell, people, 1)
     crowd = new_crowd(people, len(cell.workers), len(cell.cylinders))
     n_late = ceil(settings.true_delay / arm.dt - 1e-9)

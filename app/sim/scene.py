@@ -242,6 +242,8 @@ def crowd_of(
         cylinders: The walkers' x, y and radius [m], shape (C, 3).
         sizes: The workers' sizes [m], shape (W, body.N_SIZE); None for the cell's person.
     """
+    if len(human_q) * body.N_CAPSULES > shared.columns.shape[1]:  # more than the cell's own
+        shared = shared._replace(columns=body.capsule_columns(len(human_q)))
     crowd = people.new_crowd(shared, len(human_q), len(cylinders))
     if sizes is not None:
         crowd.size[:] = sizes

@@ -12,7 +12,6 @@ import numpy as np
 from app.errors import BadMotion, Fault
 from app.sim.body_track import (
     ELBOW_R,
-    MEASURED,
     NECK,
     PELVIS,
     SHOULDER_L,
@@ -203,10 +202,9 @@ def _upright(rest: Vec) -> Vec:
 
 def _require_a_body(points: Vec) -> None:
     """Refuse a person whose parts are no person's, who is far away, or who never moves."""
-    lengths = measure(points).lengths()
-    for name in MEASURED:
-        length = lengths[name]
-        low, high = LENGTHS[name.removesuffix("_r").removesuffix("_l")]
+    for name, length in measure(points).lengths().items():
+        # Lengths that no joint centre tells are the median person's.
+        low, high = LENGTHS.get(name.removesuffix("_r").removesuffix("_l"), (0.0, np.inf))
         if not low <= length <= high:
             rule = f"must be {low} to {high} m long, by the unit that the right arm has"
             raise BadMotion([Fault(place=name, value=f"{length:.3f} m", rule=rule)])

@@ -29,6 +29,7 @@ from app.sim.body_track import (
 )
 from app.sim.bvh import axis_turns
 from app.sim.human import Q_MAX, Q_MIN
+from app.sim.kernels import joint_angles
 from app.sim.ports import Vec
 
 MIN_BEND = np.radians(5.0)
@@ -63,18 +64,24 @@ def body_angles(track: BodyTrack, size: BodySize) -> tuple[Vec, Vec]:
         clavicle, arm = (6, 10) if hand == "r" else (8, 14)
         shoulder = SHOULDER_R if hand == "r" else SHOULDER_L
         inside = np.einsum("nji,nkj->nki", torso, _segments(points, shoulder))
-        q[:, clavicle] = np.arctan2(inside[:, 0, 0], side * inside[:, 0, 1])
-        q[:, clavicle + 1] = np.arcsin(np.clip(inside[:, 0, 2], -1.0, 1.0))
+        protract = np.empty((len(q), 2))
+        joint_angles.clavicles_to_angles(_own(inside[:, 0]), side, protract)
+        q[:, clavicle : clavicle + 2] = protract
         q[:, arm : arm + 4] = _arm(inside[:, 1], inside[:, 2], side, rate_hz, arm)
     return q, pelvis[:, 2]
 
 
 def euler_angles(turns: Vec) -> Vec:
     """Return a, b, c [rad] of ``Ry(a) Rx(b) Rz(c)``, shape (n, 3), ``|b| <= pi/2``."""
-    a = np.unwrap(np.arctan2(turns[:, 0, 2], turns[:, 2, 2]))
-    b = -np.arcsin(np.clip(turns[:, 1, 2], -1.0, 1.0))
-    c = np.unwrap(np.arctan2(turns[:, 1, 0], turns[:, 1, 1]))
-    return np.stack([a, b, c], axis=1)
+    angles = np.empty((len(turns), 3))
+    joint_angles.turns_to_angles(_own(turns), angles)
+    angles[:, ::2] = np.unwrap(angles[:, ::2], axis=0)
+    return angles
+
+
+def _own(values: Vec) -> Vec:
+    """Return a copy as kernels take it: contiguous and writable."""
+    return np.array(values, dtype=np.float64, order="C")
 
 
 def _heading(across: Vec) -> Vec:
@@ -83,7 +90,7 @@ def _heading(across: Vec) -> Vec:
     good = level > 0.2 * np.linalg.norm(across, axis=1)
     if not good.any():
         good[:] = True
-    yaw = np.unwrap(np.arctan2(-across[good, 0], across[good, 1]))
+    yaw = np.unwrap(joint_angles.headings(across[good]))
     yaw -= 2.0 * np.pi * np.round(yaw[0] / (2.0 * np.pi))
     frames = np.arange(len(across))
     return np.asarray(np.interp(frames, frames[good], yaw))
@@ -109,19 +116,9 @@ def _arm(upper: Vec, fore: Vec, side: float, rate_hz: float, first: int) -> Vec:
         np.linalg.norm(np.cross(upper, fore), axis=1), np.einsum("ni,ni->n", upper, fore)
     )
     toward = np.cross(_elbow_normal(upper, fore, bend, rate_hz), upper)
-    flex = np.arctan2(upper[:, 0], -upper[:, 2])
-    lift = np.arcsin(np.clip(upper[:, 1], -1.0, 1.0))
-    hanging = euler_turns_of(flex, lift)
-    local = np.einsum("nji,nj->ni", hanging, toward)
-    rotate = np.arctan2(local[:, 1], local[:, 0])
-    shoulder = _one_branch(np.stack([flex, side * lift, rotate], axis=1), first)
-    return np.column_stack([shoulder, bend])
-
-
-def euler_turns_of(flex: Vec, lift: Vec) -> Vec:
-    """Return the frame of an upper arm before its rotation, shape (n, 3, 3)."""
-    turns: Vec = axis_turns(1, -flex) @ axis_turns(0, lift)
-    return turns
+    shoulder = np.empty((len(bend), 3))
+    joint_angles.arms_to_angles(_own(upper), _own(toward), side, shoulder)
+    return np.column_stack([_one_branch(shoulder, first), bend])
 
 
 def _elbow_normal(upper: Vec, fore: Vec, bend: Vec, rate_hz: float) -> Vec:

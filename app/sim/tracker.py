@@ -156,5 +156,5 @@ def follow(
     """
     for t in times:
         for frame in tracker.frames(t, motion):
-            estimator.update(frame.t, frame.keypoints, frame.confidences)
+            estimator.take(frame.t, frame.keypoints, frame.confidences)
         yield estimator.at(t)

@@ -19,9 +19,10 @@ from app.sim.body_size import BodySize
 from app.sim.cells import Cell
 from app.sim.kernels import people
 from app.sim.kernels.people import People, Tracks
-from app.sim.kernels.repertoire import no_repertoire
+from app.sim.kernels.repertoire import Repertoire
 from app.sim.motions import Motion, placed
 from app.sim.ports import Vec
+from app.sim.task_library import task_library
 from app.sim.work_cycle import build_library
 
 WorkMotion = Literal["library", "reaches", "recorded"]
@@ -38,7 +39,7 @@ NO_TRACKS = Tracks(np.zeros((1, 19)), np.array([[0, 1, -1]]), TRACK_DT, 0.0)
 class WorkSettings:
     """What the workers of a cell do."""
 
-    motion: WorkMotion = "reaches"
+    motion: WorkMotion = "library"
     """Where their motion comes from."""
     seed: int = 0
     """Seed of their postures and of the samples of their primitives."""
@@ -47,9 +48,11 @@ class WorkSettings:
     courtesy: float = 0.0
     """How far they give way to the arm, from 0 (they do not see it) to 1."""
     bodies: tuple[BodySize, ...] | None = None
-    """Sizes drawn from, each episode anew; None for the cell's own person."""
+    """Sizes drawn from, each episode anew; None for those of the library
+    (``task_library.BODIES``), and in synthetic reaches for the cell's own person."""
     augmentation: bool = True
-    """Whether primitives are sampled and varied (METHOD 3.4), or demonstrations replayed."""
+    """Whether primitives are sampled and varied (METHOD 3.4); if not, the library's
+    demonstrations are replayed as they are."""
     recorded: tuple[Motion, ...] = ()
     """The runs drawn from, for ``recorded``, placed in the cell."""
 
@@ -65,13 +68,9 @@ class WorkSettings:
 
 
 USUAL = WorkSettings()
-
-
-def bodies_of(cell: Cell, settings: WorkSettings) -> Vec:
-    """Return the sizes drawn from [m], shape (n_bodies, 12)."""
-    if settings.bodies is None:
-        return np.array(cell.body[None])
-    return np.stack([size.vector(cell.floor_z) for size in settings.bodies])
+"""The library's people."""
+REACHING = WorkSettings(motion="reaches")
+"""The first people: synthetic reaches of the cell's own person."""
 
 
 def with_work(shared: People, cell: Cell, settings: WorkSettings) -> People:
@@ -82,23 +81,43 @@ def with_work(shared: People, cell: Cell, settings: WorkSettings) -> People:
         cell: Work cell with at least one worker.
         settings: What they do.
     """
-    limits = np.stack([human.Q_MIN, human.Q_MAX])
-    bodies = bodies_of(cell, settings)
-    shared = shared._replace(
-        pace=settings.pace, courtesy=settings.courtesy, limits=limits, bodies=bodies
-    )
+    shared = shared._replace(pace=settings.pace, courtesy=settings.courtesy)
     if settings.motion == "recorded":
         tracks, lengths = tracks_of(settings.recorded, cell.floor_z)
         return shared._replace(source=people.RECORDED, tracks=tracks, bodies=lengths)
+    if settings.motion == "library":
+        return _with_library(shared, cell, settings)
     sizes = settings.bodies or (cell.human.size,)
     library = build_library(cell, settings.seed, sizes)
     return shared._replace(
         source=people.REACHES,
-        repertoire=no_repertoire(),
+        bodies=np.stack([size.vector(cell.floor_z) for size in sizes]),
         postures=np.array(library.postures),
         hands=np.array(library.hands),
         of_station=np.array(library.of_station),
         n_cubes=library.n_cubes,
+    )
+
+
+def _with_library(shared: People, cell: Cell, settings: WorkSettings) -> People:
+    library = task_library(
+        cell, settings.seed, settings.bodies, augmentation=settings.augmentation
+    )
+    # Copies: for read-only arrays the kernels would be compiled anew.
+    return shared._replace(
+        source=people.LIBRARY,
+        bodies=np.array(library.bodies),
+        postures=np.array(library.postures),
+        hands=np.array(library.hands),
+        of_station=np.array(library.of_station),
+        n_cubes=library.n_cubes,
+        repertoire=Repertoire(
+            samples=np.ascontiguousarray(library.samples),
+            gain=np.array(library.gain),
+            legs=np.array(library.legs),
+            duration=np.array(library.duration),
+            varied=settings.augmentation,
+        ),
     )
 
 

@@ -5,6 +5,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.api.services import MAX_UPLOADS
+from app.sim.human import Q_MAX
 from app.sim.motions import MAX_BYTES
 from tests.sim.recorded_person import bvh_text, csv_text, working
 from tests.sim.test_motions import with_leap
@@ -68,12 +69,11 @@ def test_runs_of_a_posted_motion_are_there_for_the_service(
 
 def test_joints_beyond_their_limits_are_told(client: TestClient) -> None:
     q = working(100)
-    q[:25, 13] = 3.0
+    q[:, 13] = Q_MAX[13] + 0.2
     answer = post(client, csv_text(q).encode(), file_name="bent.csv")
     client.delete("/v1/motions/bent")
     beyond = answer.json()["beyond_limits"]["elbow_r"]
-    assert beyond["share"] == pytest.approx(0.25)
-    assert beyond["farthest_rad"] > 0.1
+    assert beyond == {"share": 1.0, "farthest_rad": pytest.approx(0.2, abs=1e-6)}
 
 
 def test_same_file_again_is_fine_and_another_one_a_conflict(
@@ -100,7 +100,7 @@ def test_unknown_motion_is_not_found_with_the_known_ones(
 
 
 TWICE = CLIP.replace(b"Frames: 200", b"Frames: 300")
-BAD_NUMBER = CLIP.replace(CLIP.splitlines()[-1], b"x " + CLIP.splitlines()[-1][2:])
+BAD_NUMBER = CLIP.rpartition(b" ")[0] + b" north\n"
 IN_RADIANS = csv_text(working(100), degrees=False).replace("radians", "degrees").encode()
 
 
@@ -119,7 +119,7 @@ IN_RADIANS = csv_text(working(100), degrees=False).replace("radians", "degrees")
         (CLIP[:400], "a.bvh", "line ", "has no line MOTION"),
         (TWICE, "a.bvh", "frames, last line ", "must be the 300 that the head"),
         (BAD_NUMBER, "a.bvh", "line ", "must be a number"),
-        (IN_RADIANS, "a.csv", "angles", "radians"),
+        (IN_RADIANS, "a.csv", "column ", "radians"),
         (bvh_text(working(25)).encode(), "a.bvh", "frames", "has no run of 1 s"),
         (CLIP, "a\n.bvh", "file_name", "characters that can be shown"),
         (CLIP, "", "file_name", "must name a file"),

@@ -9,8 +9,10 @@ from app.errors import BadMotion, Conflict, InvalidInput, NotFound
 from app.sim.motions import Motion, read_motion
 from app.store.engine import Store
 from app.store.motions import put_motion
+from app.store.records import NewMotion
 from app.store.tables import motions as table
 from jobs import motions as motions_module
+from jobs.import_process import import_here
 from jobs.motions import MotionCatalog
 from jobs.stored_motion import packed
 from tests.sim.recorded_person import bvh_text, csv_text, working
@@ -53,13 +55,18 @@ def test_record_says_what_was_found(catalog: MotionCatalog) -> None:
 
 
 def test_same_file_again_is_not_new_and_is_not_imported_again(
-    catalog: MotionCatalog, monkeypatch: pytest.MonkeyPatch
+    store: Store,
 ) -> None:
-    first, _ = catalog.add(CLIP, "nod.csv")
     calls: list[str] = []
-    monkeypatch.setattr(motions_module, "read_motion", lambda _, name: calls.append(name))
+
+    def counted(content: bytes, file_name: str, name: str, sha256: str) -> NewMotion:
+        calls.append(file_name)
+        return import_here(content, file_name, name, sha256)
+
+    catalog = MotionCatalog(store, counted)
+    first, _ = catalog.add(CLIP, "nod.csv")
     assert catalog.add(CLIP, "Nod.csv") == (first, False)
-    assert calls == []
+    assert calls == ["nod.csv"]
 
 
 def test_same_file_with_a_wrong_ending_is_refused_all_the_same(catalog: MotionCatalog) -> None:

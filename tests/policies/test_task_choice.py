@@ -1,5 +1,7 @@
 """The critic's choice: what it answers, what it flags, what it refuses."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from app.policies import pretrained
 from app.policies.checkpoint import Checkpoint
 from app.policies.task_choice import TaskChooser, choose
 from app.sim import human
+from app.sim.body_size import percentile_body
 from app.sim.cells import load_cell
 from app.sim.ports import Candidate, Person
 from app.sim.robot import Robot
@@ -103,6 +106,36 @@ def test_a_person_beyond_training_is_flagged_with_the_range(chooser):
     assert flagged["people[0].q.pelvis_y"].high < 2.5
 
 
+def test_of_several_people_the_nearest_is_seen_in_any_order(chooser):
+    near, far, others = person(0.2, 1.15), person(-1.5, 1.6), [person(2.5, 2.5), person(3, 3)]
+    offered = cubes("cube0", "cube3", "cube5")
+    alone = chooser.decide(HOME, np.zeros(6), [near], offered)
+    for people in ([near, far], [far, near], [*others, far, near]):
+        decision = chooser.decide(HOME, np.zeros(6), people, offered)
+        assert decision.values == alone.values
+        assert people[decision.seen] is near
+
+
+def test_fields_outside_training_name_the_person_who_is_seen(chooser):
+    people = [person(4.5, 4.5), person(0.0, 2.5)]
+    decision = chooser.decide(HOME, np.zeros(6), people, cubes("cube0"))
+    assert decision.seen == 1
+    named = {entry.field for entry in decision.outside}
+    assert "people[1].q.pelvis_y" in named
+    assert not any(field.startswith("people[0]") for field in named)
+
+
+def test_the_size_of_the_person_counts(chooser):
+    near = person(0.0, 1.1)
+    tall = replace(near, size=percentile_body(99.0, 99.0, 99.0).vector(CELL.floor_z))
+    same = replace(near, size=CELL.body)
+    offered = cubes("cube2", "cube3")
+    values = [
+        chooser.decide(HOME, np.zeros(6), [one], offered).values for one in (near, same, tall)
+    ]
+    assert values[0] == values[1] != values[2]
+
+
 def test_nobody_in_the_cell_is_answered(chooser):
     decision = chooser.decide(HOME, np.zeros(6), [], cubes("cube0"))
     assert decision.outside
@@ -121,8 +154,9 @@ def test_the_arm_inside_the_person_is_answered(chooser):
         ({"q": np.array([0.0, 2.0, 0, 0, 0, 0])}, "robot.q[1]"),
         ({"qd": np.array([0, 0, np.inf, 0, 0, 0])}, "robot.qd[2]"),
         ({"qd": np.array([0, 0, 0, 0.9, 0, 0])}, "robot.qd[3]"),
-        ({"people": [person(), person(0.5)]}, "people"),
+        ({"people": [person()] * 5}, "people"),
         ({"people": [Person(q=np.zeros(17), qd=np.zeros(18))]}, "people[0].q"),
+        ({"people": [person(), Person(q=np.full(18, 9.0), qd=np.zeros(18))]}, "people[1].q[0]"),
         ({"people": [Person(q=np.full(18, 9.0), qd=np.zeros(18))]}, "people[0].q[0]"),
         ({"candidates": []}, "candidates"),
         ({"candidates": cubes("cube0") * 1001}, "candidates"),

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from app.policies.evaluation.statistics import wilson
 from app.policies.presets import action_of
 from app.policies.task_choice import ValueNetworks
+from app.policies.training import work_of
 from app.sim.cells import Cell
 from app.sim.kernels import episode as kernel
-from app.sim.kernels.features import LAYOUT, N_FEATURES, observe_batch
+from app.sim.kernels.features import LAYOUT, observe_batch
 from app.sim.pick import OUTCOMES, PickBatch, PickSettings
 from app.sim.recheck import Trajectory
-from app.sim.worker_motion import WorkSettings
 
 Index = NDArray[np.int64]
 EVALUATION_LIBRARY = 1_000_003
@@ -104,14 +104,11 @@ def settings_for(n_candidates: tuple[int, int], preset: dict[str, object]) -> Pi
         n_candidates: Fewest and most targets offered.
         preset: The checkpoint's preset, as its manifest holds it.
     """
-    pace = preset.get("human_pace", 1.0)
     return PickSettings(
         time_limit_s=10.0,
         start_clearance_m=0.05,
         n_candidates=n_candidates,
-        work=WorkSettings(
-            seed=EVALUATION_LIBRARY, pace=float(pace) if isinstance(pace, int | float) else 1.0
-        ),
+        work=work_of(preset, EVALUATION_LIBRARY),
         action=action_of(preset),
     )
 
@@ -183,7 +180,7 @@ class Evaluator:
         owner, place = np.nonzero(there)
         env, station = rows[owner], stations[owner, place]
         sight = seen(batch, rows)
-        obs = np.empty((len(env), N_FEATURES), dtype=np.float32)
+        obs = np.empty((len(env), self._networks.n_obs), dtype=np.float32)
         observe_batch(
             batch.arm,
             batch.world.people.floor_z,

@@ -24,16 +24,18 @@ N_RECHECKED = 200
 """Episodes whose poses go to FCL."""
 
 
-def _evaluator(
+def evaluator_of(
     checkpoint: Checkpoint, n_candidates: tuple[int, int], episodes: int | None, seed: int
 ) -> Evaluator:
+    """Return the episodes of a checkpoint; by default 1000."""
     manifest = checkpoint.manifest
     settings = settings_for(n_candidates, manifest["preset"])
     n = episodes or DEFAULT_EPISODES
     return Evaluator(ValueNetworks(checkpoint), cell_of(manifest), n, seed, settings)
 
 
-def _settings(evaluator: Evaluator) -> dict[str, object]:
+def settings_of(evaluator: Evaluator) -> dict[str, object]:
+    """Return what a result states of its episodes."""
     settings, state = evaluator.batch.settings, evaluator.batch.state
     return {
         "time_limit_s": settings.time_limit_s,
@@ -65,10 +67,10 @@ def run_single(checkpoint: Checkpoint, *, episodes: int | None, seed: int) -> di
         episodes: Number of episodes, by default 1000.
         seed: Seed of the episodes; use one that nothing was tuned on.
     """
-    evaluator = _evaluator(checkpoint, (1, 1), episodes, seed)
+    evaluator = evaluator_of(checkpoint, (1, 1), episodes, seed)
     outcome = evaluator.run(choice_rules.fixed(0), min(N_RECHECKED, evaluator.batch.n_envs))
     return {
-        "settings": _settings(evaluator),
+        "settings": settings_of(evaluator),
         "results": [outcome.row("policy")],
         "fcl_recheck": _recheck(evaluator, outcome),
     }
@@ -82,7 +84,7 @@ def run_choice(checkpoint: Checkpoint, *, episodes: int | None, seed: int) -> di
         episodes: Number of episodes, by default 1000.
         seed: Seed of the episodes; use one that nothing was tuned on.
     """
-    evaluator = _evaluator(checkpoint, (2, 3), episodes, seed)
+    evaluator = evaluator_of(checkpoint, (2, 3), episodes, seed)
     n = evaluator.batch.n_envs
     with_hysteresis = evaluator.run(choice_rules.critic(HYSTERESIS), min(N_RECHECKED, n))
     rows = [
@@ -93,7 +95,7 @@ def run_choice(checkpoint: Checkpoint, *, episodes: int | None, seed: int) -> di
         _in_hindsight([evaluator.run(choice_rules.fixed(place)) for place in range(3)]),
     ]
     return {
-        "settings": {**_settings(evaluator), "hysteresis": HYSTERESIS},
+        "settings": {**settings_of(evaluator), "hysteresis": HYSTERESIS},
         "results": rows,
         "fcl_recheck": _recheck(evaluator, with_hysteresis),
     }

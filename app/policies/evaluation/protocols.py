@@ -7,7 +7,7 @@ from typing import Any
 
 from app.errors import InvalidInput, NotFound
 from app.policies.checkpoint import Checkpoint
-from app.policies.evaluation import pick, safety
+from app.policies.evaluation import pick, safety, tracker
 
 Protocol = Callable[..., dict[str, Any]]
 
@@ -15,6 +15,7 @@ PROTOCOLS: Mapping[str, Protocol] = MappingProxyType(
     {
         "pick-single": pick.run_single,
         "pick-choice": pick.run_choice,
+        "pick-tracker": tracker.run_tracker,
         "safety-ssm": safety.run_safety,
     }
 )

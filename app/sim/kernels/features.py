@@ -3,7 +3,8 @@
 Normalised to a few units, relative to target and person, with a straight-line base motion,
 nearest distances of four link groups, and clearances extrapolated at constant velocity. All
 follow from the state that a caller can send (METHOD 3.3: q, qd of robot and person, target) and
-the time left; no hidden history. ``LAYOUT`` names every slice.
+the time left; no hidden history. ``LAYOUT`` names every slice. The person's size is in them
+through where hands, elbows and capsules are; with BODY_SIZES it is told outright (METHOD 4).
 
 Source: (5.8) for the raw state. Deviates: features are added to it, since raw state learned far
 more slowly (1 % against 90 % after 2.7 k updates in trials beside the walking cylinder).
@@ -81,6 +82,10 @@ LAYOUT = slices_of(SIZES)
 """Slice of each group of features in the observation."""
 N_FEATURES = sum(size for _, size in SIZES)
 """Length of the observation."""
+BODY_SIZES = (*SIZES, ("body", body.N_SIZE))
+"""The same with the person's size, for a policy that sees it."""
+N_WITH_BODY = N_FEATURES + body.N_SIZE
+"""Length of that observation."""
 BASE_START = LAYOUT["base"].start
 """Where the base motion starts, for the residual action."""
 
@@ -348,8 +353,11 @@ def observe(
         time_left: Time left to reach it [s].
         robot: The robot, placed at ``q``.
         sight: Work space.
-        out: Filled, shape (N_FEATURES,).
+        out: Filled, shape (N_FEATURES,) or (N_WITH_BODY,).
     """
+    if out.shape[0] > N_FEATURES:
+        for i in range(body.N_SIZE):
+            out[N_FEATURES + i] = size[i]
     see_person(floor_z, human_q, human_qd, size, sight)
     _put_joints(arm, q, qd, human_q, human_qd, out)
     _put_tool(qd, goal, robot, out)

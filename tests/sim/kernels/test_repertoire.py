@@ -27,11 +27,9 @@ def promp() -> ProMP:
     return fit(motions, np.full(8, 1.5))
 
 
-def gain_of_ends(promp: ProMP) -> np.ndarray:
-    rows = np.concatenate(
-        [np.kron(np.eye(18), row) for row in basis(ENDS, N_BASIS, promp.width)]
-    )
-    return gain(promp, rows, np.zeros((36, 36)))
+def rows_of_ends(promp: ProMP) -> np.ndarray:
+    phi = basis(ENDS, N_BASIS, promp.width)
+    return np.concatenate([np.kron(np.eye(18), row) for row in phi])
 
 
 def test_positions_and_speeds_are_those_of_the_primitive(promp: ProMP) -> None:
@@ -56,9 +54,8 @@ def test_a_joint_held_at_its_limit_has_no_speed(promp: ProMP) -> None:
 def test_a_leg_meets_both_postures_and_is_the_conditioned_primitive(promp: ProMP) -> None:
     rng, out, away = np.random.default_rng(6), np.empty((18, N_BASIS)), np.empty(36)
     q, qd = np.empty(18), np.empty(18)
-    rows = np.concatenate(
-        [np.kron(np.eye(18), row) for row in basis(ENDS, N_BASIS, promp.width)]
-    )
+    rows = rows_of_ends(promp)
+    k = gain(promp, rows, np.zeros((36, 36)))
     for _ in range(10):
         ends = rng.normal(0.0, 0.4, (2, 18))
         condition(promp.mean, k, ends[0], ends[1], away, out)

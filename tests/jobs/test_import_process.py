@@ -1,0 +1,60 @@
+import threading
+import time
+
+import pytest
+
+from app.errors import BadMotion, InvalidInput, NotReady, SimulationError
+from jobs import import_process
+from jobs.import_process import ImportProcess, import_here
+from tests.sim.recorded_person import csv_text, working
+
+CLIP = csv_text(working(100)).encode()
+ASKED = ("nod.csv", "nod", "a" * 64)
+
+
+def test_process_of_its_own_finds_the_same_as_this_one() -> None:
+    assert ImportProcess()(CLIP, *ASKED) == import_here(CLIP, *ASKED)
+
+
+def test_faults_come_back_whole() -> None:
+    with pytest.raises(BadMotion) as here:
+        import_here(CLIP[:-3000], "动 作.bvh", "nod", "a" * 64)
+    with pytest.raises(BadMotion) as apart:
+        ImportProcess()(CLIP[:-3000], "动 作.bvh", "nod", "a" * 64)
+    assert apart.value.faults == here.value.faults
+
+
+def test_import_that_takes_too_long_is_ended_and_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(import_process, "MAX_IMPORT_S", 0.05)
+    with pytest.raises(InvalidInput, match=r"takes more than 0\.05 s to import"):
+        ImportProcess()(CLIP, *ASKED)
+
+
+def test_process_that_dies_is_told_and_its_last_words_are_logged(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setenv("PYTHONHOME", "/nowhere")  # no interpreter starts from there
+    with pytest.raises(SimulationError, match=r"'nod\.csv' ended without an answer"):
+        ImportProcess()(CLIP, *ASKED)
+    assert "encodings" in caplog.text
+
+
+def test_stopping_ends_what_runs_and_refuses_more() -> None:
+    imports = ImportProcess()
+    raised: list[BaseException] = []
+
+    def ask() -> None:
+        try:
+            imports(CLIP, *ASKED)
+        except NotReady as error:
+            raised.append(error)
+
+    thread = threading.Thread(target=ask)
+    thread.start()
+    while not imports._running:
+        time.sleep(0.005)
+    imports.stop()
+    thread.join(timeout=30.0)
+    assert not thread.is_alive() and len(raised) == 1
+    with pytest.raises(NotReady):
+        imports(CLIP, *ASKED)
