@@ -17,6 +17,7 @@ from starlette.concurrency import run_in_threadpool
 
 import web
 from app.api.application import build_app
+from app.api.known_people import warm_up
 from app.api.registry import DEFAULT_ALIAS, PolicyRegistry
 from app.api.services import Services
 from app.errors import ServiceError
@@ -123,6 +124,7 @@ class Service:
             publish_shipped(self.parts.policies)
             readiness.reason = "warming up: compiling the simulator's kernels"
             policy = self.parts.policies.load(DEFAULT_ALIAS)
+            warm_up(load_cell(LIVE_CELL))
             cell = LiveCell(load_cell(LIVE_CELL), policy, id=WORLD_ID)
             if self.parts.stopping.is_set():
                 return

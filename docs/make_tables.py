@@ -77,8 +77,9 @@ def conditions(result: Json) -> list[str]:
 
 
 def pages() -> list[Path]:
-    """Return the files with tables: the README and the model cards."""
-    return [ROOT / "README.md", *sorted((ROOT / "app/policies/pretrained").glob("*.md"))]
+    """Return the files with tables: the README, the pages on people and the model cards."""
+    cards = sorted((ROOT / "app/policies/pretrained").glob("*.md"))
+    return [ROOT / "README.md", *sorted((ROOT / "docs").glob("people*.md")), *cards]
 
 
 def main() -> None:

@@ -19,6 +19,7 @@ from app.api import (
     reference,
     session,
     task_selection,
+    trackers,
     viewer,
     worlds,
 )
@@ -56,6 +57,7 @@ def build_app(*, lifespan: Lifespan, static: Path, token: str | None, version: s
     problems.install(app)
     for part in (
         task_selection,
+        trackers,
         worlds,
         jobs,
         checkpoints,

@@ -9,6 +9,7 @@ from fastapi import Depends
 from starlette.requests import HTTPConnection
 
 from app.api.registry import PolicyRegistry
+from app.api.tracker_sessions import TrackerSessions
 from app.errors import NotFound, NotReady
 from app.sim.cells import Cell
 from app.sim.ports import TaskPolicy, WorldHandle
@@ -83,6 +84,8 @@ class Services:
     """Starts a live world."""
     worlds: dict[str, LiveWorld] = field(default_factory=dict)
     """The live worlds by id; empty until the kernels are warm."""
+    trackers: TrackerSessions = field(default_factory=TrackerSessions)
+    """The trackers that are listened to."""
     readiness: Readiness = field(default_factory=Readiness)
     """Whether the service can decide."""
     replacing: threading.Lock = field(default_factory=threading.Lock)

@@ -5,6 +5,7 @@ from functools import partial
 from fastapi import APIRouter
 from starlette.concurrency import run_in_threadpool
 
+from app.api.known_people import known_people, take_time
 from app.api.schemas.task_selection import TaskSelection, TaskSelectionRequest
 from app.api.services import Services, ServicesDep
 from app.errors import InvalidInput, NotFound
@@ -19,11 +20,11 @@ router = APIRouter(prefix="/v1/task-selection", tags=["deciding"])
 @router.post("", summary="Choose what the robot does next")
 async def choose(request: TaskSelectionRequest, services: ServicesDep) -> TaskSelection:
     """Return the chosen candidate, every candidate's value and what the policy would do."""
-    # A few candidates take about a millisecond: right here, since handing them to a thread
-    # costs more than it saves.
+    # A few candidates beside people in joint angles take about a millisecond: right here,
+    # since handing them to a thread costs more than it saves.
     services.readiness.require()
     cell = await known_cell(request.cell, services)
-    q, qd, people, candidates = request.to_domain(cell)
+    q, qd, candidates = request.to_domain(cell)
     policy = services.policies.loaded(request.checkpoint)
     if policy is None:
         policy = await run_in_threadpool(services.policies.load, request.checkpoint)
@@ -32,14 +33,19 @@ async def choose(request: TaskSelectionRequest, services: ServicesDep) -> TaskSe
         policy.decide,
         q,
         qd,
-        people,
-        candidates,
+        candidates=candidates,
         previous=request.previous,
         time_left_s=request.time_left_s,
     )
-    many = len(candidates) > MAX_INLINE_CANDIDATES
-    decision = await run_in_threadpool(decide) if many else decide()
-    return TaskSelection.from_domain(decision, candidates, request.stamp)
+
+    def answer() -> TaskSelection:
+        people = known_people(request.people, cell, services.trackers)
+        decision = decide([one.person for one in people])
+        uses = [one.use(i == decision.seen) for i, one in enumerate(people)]
+        return TaskSelection.from_domain(decision, candidates, uses, request.stamp)
+
+    long = len(candidates) > MAX_INLINE_CANDIDATES or take_time(request.people)
+    return await run_in_threadpool(answer) if long else answer()
 
 
 async def known_cell(name: str, services: Services) -> Cell:

@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, get_args
 
-from pydantic import BaseModel
+from pydantic import BaseModel, Tag
 from starlette.requests import Request
 
 MAX_VALUE_CHARACTERS = 200
@@ -43,8 +43,10 @@ def shown(value: object) -> str:
 def validation_member(error: Mapping[str, Any], body: type[BaseModel] | None) -> Member:
     """Say field, value, rule and choices of one validation error."""
     kind, context = str(error["type"]), error.get("ctx", {})
-    location, value = tuple(error["loc"]), error.get("input")
+    place, inside, way = without_inner_tags(error["loc"], body)
+    location, value = tuple(place), error.get("input")
     rule = str(error["msg"]).replace("Input should be ", "must be ")
+    rule = rule.replace("an instance of Sequence", "a valid list")
     choices: list[str] = []
     if kind == "json_invalid":
         rule = f"must be JSON: {context['error']}"
@@ -59,7 +61,7 @@ def validation_member(error: Mapping[str, Any], body: type[BaseModel] | None) ->
         choices = _listed(context["expected"])
         rule = "must be one of the choices"
     elif kind == "extra_forbidden":
-        rule, choices = "is not a known field", known_fields(body, location[1:-1])
+        rule, choices = "is not a known field", known_fields(inside, way[:-1])
     elif kind in ("too_short", "too_long"):
         side, bound = ("at least", "min") if kind == "too_short" else ("at most", "max")
         rule = f"must have {side} {context[bound + '_length']} items"
@@ -96,6 +98,43 @@ def known_fields(model: type[BaseModel] | None, path: Sequence[str | int]) -> li
         models = list(_models(field.annotation)) if field else []
         model = models[0] if models else None
     return list(model.model_fields) if model else []
+
+
+def _tagged(annotation: Any) -> dict[str, type[BaseModel]]:
+    """Return the models of the union that an annotation holds, by their tags."""
+    found: dict[str, type[BaseModel]] = {}
+    tags = [one.tag for one in get_args(annotation) if isinstance(one, Tag)]
+    for argument in get_args(annotation):
+        if tags and isinstance(argument, type) and issubclass(argument, BaseModel):
+            found[tags[0]] = argument
+        found |= _tagged(argument)
+    return found
+
+
+def without_inner_tags(
+    location: Sequence[str | int], model: type[BaseModel] | None
+) -> tuple[list[str | int], type[BaseModel] | None, list[str | int]]:
+    """Take the tags of unions inside a body out of a location; callers never sent them.
+
+    Args:
+        location: Where the error is, ``body`` first.
+        model: The body's.
+
+    Returns:
+        The location; the model that the last tag meant, or the body's; the way from there.
+    """
+    place, way = list(location[:1]), list[str | int]()
+    variants = dict[str, type[BaseModel]]()
+    for part in location[1:]:
+        if isinstance(part, str) and part in variants:
+            model, way, variants = variants[part], [], {}
+            continue
+        place.append(part)
+        way.append(part)
+        if isinstance(part, str):
+            field = model.model_fields.get(part) if model else None
+            variants = _tagged(field.annotation) if field else {}
+    return place, model, way
 
 
 def _models(annotation: Any) -> Iterator[type[BaseModel]]:

@@ -18,6 +18,7 @@ from app.sim.kernels import people as people_kernel
 from app.sim.kernels.arm import Arm
 from app.sim.kernels.body import N_SIZE, PELVIS_Z
 from app.sim.kernels.people import MAX_PEOPLE, People
+from app.sim.person_estimate import PersonEstimate
 from app.sim.ports import Person, Vec
 from app.sim.scene import crowd_of, own
 
@@ -26,7 +27,9 @@ _QD_LIMIT = np.full(18, 50.0)
 _SIZE_LOW, _SIZE_HIGH = np.full(N_SIZE, 0.01), np.full(N_SIZE, 3.0)
 _SIZE_LOW[PELVIS_Z] = -10.0  # counted from the cell's origin
 _CYLINDER_LOW = np.array([human.Q_MIN[0], human.Q_MIN[1], 0.01])
-_CYLINDER_HIGH = np.array([human.Q_MAX[0], human.Q_MAX[1], 5.0])
+WIDEST = 5.0
+"""Greatest radius of a cylinder [m]."""
+_CYLINDER_HIGH = np.array([human.Q_MAX[0], human.Q_MAX[1], WIDEST])
 
 
 def standing_in(x: float, y: float, vx: float, vy: float, r: float) -> Person:
@@ -44,6 +47,20 @@ def standing_in(x: float, y: float, vx: float, vy: float, r: float) -> Person:
     return Person(
         q=human.rest_posture(x, y, math.atan2(-y, -x)), qd=qd, cylinder=np.array([x, y, r])
     )
+
+
+def as_person(estimate: PersonEstimate) -> Person | None:
+    """Return the person that an estimate is seen as; None where nobody was ever seen.
+
+    Where pelvis and trunk were never seen together there are no joint angles; then the person
+    is as good as their safety cylinder.
+    """
+    cylinder = estimate.cylinder
+    if estimate.person is not None or cylinder is None:
+        return estimate.person
+    x, y = np.clip(cylinder.center, human.Q_MIN[:2], human.Q_MAX[:2]).tolist()
+    vx, vy = cylinder.velocity.tolist()
+    return standing_in(x, y, vx, vy, min(cylinder.radius, WIDEST))
 
 
 def checked_people(people: Sequence[Person]) -> tuple[Person, ...]:

@@ -88,13 +88,23 @@ def row_without(name: str, reason: str) -> Row:
     return {"name": name, "value": None, "note": reason}
 
 
-def report(bench: str, rows: Iterable[Row], options: argparse.Namespace) -> None:
-    """Print the rows: as a table, or with ``--json`` as one object."""
+def report(
+    bench: str, rows: Iterable[Row], options: argparse.Namespace, **stated: object
+) -> None:
+    """Print the rows: as a table, or with ``--json`` as one object.
+
+    Args:
+        bench: Name of the benchmark.
+        rows: Its rows.
+        options: From :func:`arguments`.
+        **stated: What else the result says of how it was measured.
+    """
     results = list(rows)
     settings = {
         "rounds": options.rounds,
         "seconds": options.seconds,
         "load": round(os.getloadavg()[0], 2),
+        **stated,
     }
     if options.json:
         print(

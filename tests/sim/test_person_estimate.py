@@ -1,8 +1,5 @@
 """From noisy, incomplete key-points to a person: the numbers, and how it degrades."""
 
-from dataclasses import dataclass
-from functools import lru_cache
-
 import numpy as np
 import pytest
 
@@ -12,54 +9,14 @@ from app.sim.keypoint_cylinder import safety_cylinder
 from app.sim.keypoints import K, swap_sides
 from app.sim.person_estimate import (
     EstimatorSettings,
-    PersonEstimate,
     PersonEstimator,
 )
-from app.sim.tracker import Tracker, TrackerSettings, follow
-from tests.sim.tracked_person import CELL, motion, seen, work
+from app.sim.tracker import TrackerSettings
+from tests.sim.tracked_person import CELL, seen, work
+from tests.sim.tracker_errors import errors
 
 DT = 1.0 / 30.0
 NOBODY = np.full((25, 3), np.nan)
-
-
-@dataclass(frozen=True)
-class Errors:
-    center: list[float]
-    contains: list[bool]
-    wrist: list[float]
-    velocity: list[float]
-    qd: list[np.ndarray]
-
-
-@lru_cache(maxsize=4)
-def errors(settings: TrackerSettings) -> Errors:
-    """Compare three people at work for 12 s with what a tracker makes of them."""
-    found = Errors([], [], [], [], [])
-    for seed in (1, 2, 3):
-        times, q, qd = work(seed, 12.0)
-        tracker = Tracker(settings, seed, CELL.body, CELL.floor_z)
-        estimator = PersonEstimator(CELL.body)
-        estimates = follow(motion(seed, 12.0), times, tracker, estimator)
-        for k, estimate in enumerate(estimates):
-            if k * DT >= settings.latency_s + 0.1:
-                compare(estimate, q[k], qd[k], found)
-    return found
-
-
-def compare(estimate: PersonEstimate, q: np.ndarray, qd: np.ndarray, found: Errors) -> None:
-    assert estimate.person is not None and estimate.cylinder is not None
-    true, before, after = (safety_cylinder(seen(q + s * qd)) for s in (0.0, -0.01, 0.01))
-    assert true is not None and before is not None and after is not None
-    body = human.joint_points(q, CELL.body)
-    fitted = human.joint_points(estimate.person.q, CELL.body)
-    velocity = (after.center - before.center) / 0.02
-    found.center.append(float(np.linalg.norm(estimate.cylinder.center - true.center)))
-    found.contains.append(estimate.cylinder.contains(np.array(list(body.values()))))
-    found.wrist.extend(
-        float(np.linalg.norm(body[name] - fitted[name])) for name in ("wrist_r", "wrist_l")
-    )
-    found.velocity.append(float(np.linalg.norm(velocity - estimate.cylinder.velocity)))
-    found.qd.append(np.abs(estimate.person.qd - qd))
 
 
 NOISY = TrackerSettings(noise=0.02, missing=0.2, latency_s=0.0)
@@ -78,6 +35,24 @@ def test_cylinder_of_noisy_incomplete_people_contains_them_in_95_percent_of_fram
 def test_wrists_of_noisy_incomplete_people_are_within_40_mm() -> None:
     assert np.median(errors(NOISY).wrist) <= 0.04
     assert np.percentile(errors(NOISY).wrist, 95) <= 0.07
+
+
+@pytest.mark.parametrize("percentile", [5.0, 95.0])
+def test_small_and_large_people_of_known_size_keep_to_the_numbers(percentile: float) -> None:
+    found = errors(NOISY, percentile)
+    assert np.median(found.center) <= 0.05
+    assert np.mean(found.contains) >= 0.95 and np.mean(found.surface) >= 0.95
+    assert np.median(found.wrist) <= 0.04
+
+
+@pytest.mark.parametrize("percentile", [5.0, 95.0])
+def test_small_and_large_people_taken_for_the_median_keep_to_the_numbers(
+    percentile: float,
+) -> None:
+    found = errors(NOISY, percentile, assumed=50.0)
+    assert np.median(found.center) <= 0.05
+    assert np.mean(found.contains) >= 0.95
+    assert np.median(found.wrist) <= 0.04
 
 
 def test_late_frames_and_long_gaps_keep_to_the_same_numbers() -> None:

@@ -5,7 +5,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from app.sim.cells import load_cell
+from app.sim.cells import Cell, load_cell
 from app.sim.keypoints import keypoints_of
 from app.sim.work_cycle import WorkCycle
 
@@ -14,16 +14,29 @@ RATE_HZ = 30.0
 
 
 @lru_cache(maxsize=8)
-def work(seed: int, seconds: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def cell_of(percentile: float) -> Cell:
+    """The cell with a worker of a percentile of stature, arms and shoulders."""
+    sizes = dict.fromkeys(("stature", "arms", "shoulders"), percentile)
+    worker = CELL.workers[0].model_copy(update=sizes)
+    return CELL.model_copy(update={"people": (worker,)})
+
+
+@lru_cache(maxsize=8)
+def work(
+    seed: int, seconds: float, percentile: float = 50.0
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Times [s], joint positions and speeds of the work cycle at 30 Hz."""
-    cycle, times = WorkCycle(CELL, seed), np.arange(round(seconds * RATE_HZ) + 1) / RATE_HZ
+    cell = CELL if percentile == 50.0 else cell_of(percentile)
+    cycle, times = WorkCycle(cell, seed), np.arange(round(seconds * RATE_HZ) + 1) / RATE_HZ
     q, qd = zip(*(cycle.at(t) for t in times), strict=True)
     return times, np.array(q), np.array(qd)
 
 
-def motion(seed: int, seconds: float) -> Callable[[float], np.ndarray]:
+def motion(
+    seed: int, seconds: float, percentile: float = 50.0
+) -> Callable[[float], np.ndarray]:
     """The same as a function of time, linear between the samples."""
-    times, q, _ = work(seed, seconds)
+    times, q, _ = work(seed, seconds, percentile)
 
     def at(t: float) -> np.ndarray:
         k = min(int(t * RATE_HZ + 1e-9), len(times) - 2)

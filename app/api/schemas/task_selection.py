@@ -1,15 +1,18 @@
 """``POST /v1/task-selection``: the state in, the decision out."""
 
+from collections.abc import Sequence
 from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import Field
 
-from app.api.schemas.numbers import Answer, Body, Finite, Vector3, Vector6, Vector18
+from app.api.schemas.numbers import Answer, Body, Finite, Vector3, Vector6
+from app.api.schemas.people import PersonInput, PersonUse
+from app.api.schemas.people import PersonState as PersonState
 from app.errors import InvalidInput
 from app.sim import human
 from app.sim.cells import Cell
-from app.sim.ports import Candidate, Decision, OutsideField, Person, Vec
+from app.sim.ports import Candidate, Decision, OutsideField, Vec
 
 MAX_CANDIDATES = 1000
 LIMIT_TOLERANCE = 1e-6
@@ -22,17 +25,6 @@ class RobotState(Body):
 
     q: Vector6 = Field(description="joint positions [rad], base to wrist 3")
     qd: Vector6 = Field(description="joint speeds [rad/s]")
-
-
-class PersonState(Body):
-    """One person as tracked, in the 18 joints of the body model."""
-
-    q: Vector18 = Field(description="joint positions [m, rad]: " + ", ".join(human.JOINT_NAMES))
-    qd: Vector18 = Field(description="joint speeds [m/s, rad/s]")
-
-    def to_domain(self) -> Person:
-        """Return the person as arrays."""
-        return Person(q=np.array(self.q), qd=np.array(self.qd))
 
 
 class CandidateState(Body):
@@ -49,8 +41,10 @@ class TaskSelectionRequest(Body):
     frame: Literal["robot-base"] = Field("robot-base", description="frame of all positions")
     stamp: Stamp = Field(None, description="your time of the state; comes back unchanged")
     robot: RobotState
-    people: list[PersonState] = Field(
-        max_length=1, description="the people in the cell; one at most for now"
+    people: Sequence[PersonInput] = Field(
+        max_length=4,
+        description="the people in the cell, each by joint angles, key-points, a cylinder or a "
+        "tracker; a policy that knows one person sees the one nearest to the robot",
     )
     candidates: list[CandidateState] = Field(
         min_length=1, max_length=MAX_CANDIDATES, description="what may be chosen"
@@ -65,10 +59,10 @@ class TaskSelectionRequest(Body):
         None, max_length=64, description="SHA-256 or alias; the shipped policy if null"
     )
 
-    def to_domain(
-        self, cell: Cell
-    ) -> tuple[Vec, Vec, tuple[Person, ...], tuple[Candidate, ...]]:
-        """Check what a schema cannot, and return q, qd, people and candidates as arrays.
+    def to_domain(self, cell: Cell) -> tuple[Vec, Vec, tuple[Candidate, ...]]:
+        """Check what a schema cannot, and return q, qd and candidates as arrays.
+
+        The people need more than the request: ``app/api/known_people.py``.
 
         Args:
             cell: The work cell that the request names.
@@ -79,15 +73,14 @@ class TaskSelectionRequest(Body):
         q, qd = np.array(self.robot.q), np.array(self.robot.qd)
         robot_names = [f"robot.q[{joint}]" for joint in range(6)]
         _check_limits(robot_names, q, np.array(cell.robot.q_min), np.array(cell.robot.q_max))
-        people = tuple(person.to_domain() for person in self.people)
-        for index, person in enumerate(people):
-            names = [f"people[{index}].q[{joint}]" for joint in range(len(human.JOINT_NAMES))]
-            _check_limits(names, person.q, human.Q_MIN, human.Q_MAX)
+        for index, person in enumerate(self.people):
+            if isinstance(person, PersonState):
+                names = [f"people[{index}].q[{j}]" for j in range(len(human.JOINT_NAMES))]
+                _check_limits(names, np.array(person.q), human.Q_MIN, human.Q_MAX)
         self._check_ids_are_unique()
         return (
             q,
             qd,
-            people,
             tuple(
                 Candidate(id=one.id, position=np.array(one.position)) for one in self.candidates
             ),
@@ -145,6 +138,7 @@ class TaskSelection(Answer):
 
     chosen: str = Field(description="id of the chosen candidate")
     candidates: list[CandidateValue]
+    people: list[PersonUse] = Field(description="what was made of each person")
     state_outside: list[Outside] = Field(description="state fields outside the training range")
     checkpoint: str = Field(description="SHA-256 of the checkpoint that decided")
     elapsed_ms: float = Field(description="time the decision took [ms]")
@@ -152,9 +146,13 @@ class TaskSelection(Answer):
 
     @classmethod
     def from_domain(
-        cls, decision: Decision, candidates: tuple[Candidate, ...], stamp: Stamp
+        cls,
+        decision: Decision,
+        candidates: tuple[Candidate, ...],
+        people: list[PersonUse],
+        stamp: Stamp,
     ) -> Self:
-        """Make it from a decision and what could be chosen."""
+        """Make it from a decision, what could be chosen and what was made of the people."""
         return cls(
             chosen=decision.chosen,
             candidates=[
@@ -170,6 +168,7 @@ class TaskSelection(Answer):
                 )
                 for index, candidate in enumerate(candidates)
             ],
+            people=people,
             state_outside=[Outside.from_domain(one) for one in decision.outside],
             checkpoint=decision.checkpoint,
             elapsed_ms=decision.elapsed_ms,

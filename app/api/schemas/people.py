@@ -1,0 +1,228 @@
+"""People in a request, by whatever is known of them (METHOD 2.8), and what was made of it.
+
+An entry is told apart by its members: ``q`` (joint angles), ``keypoints`` (BODY_25), ``r`` (a
+cylinder) or ``tracker`` (somebody whom a tracker of ``/v1/trackers`` follows).
+"""
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import Discriminator, Field, Tag
+
+from app.api.schemas.numbers import Answer, Body, Finite, Vector3, Vector18
+from app.errors import InvalidInput
+from app.sim import human
+from app.sim.body_size import NAMES, PERCENTILES, percentile_body
+from app.sim.cells import Cell
+from app.sim.kernels.body import N_SIZE
+from app.sim.keypoints import BODY_25, N_KEYPOINTS
+from app.sim.person_estimate import PersonEstimate
+from app.sim.ports import Person, Vec
+from app.sim.seen_people import WIDEST
+
+Source = Literal["joint-angles", "keypoints", "cylinder", "tracker"]
+Speeds = Literal["given", "zero", "estimated"]
+Percentile = Annotated[float, Field(ge=PERCENTILES[0], le=PERCENTILES[1])]
+Speed = Annotated[float, Field(ge=-50.0, le=50.0)]
+Keypoint = Annotated[list[Finite], Field(min_length=3, max_length=4)] | None
+Velocity = Vector3 | None
+Lengths = Annotated[list[Finite], Field(min_length=N_SIZE, max_length=N_SIZE)]
+ORDER = ", ".join(BODY_25)
+
+
+class BodyPercentiles(Body):
+    """A person's size, as percentiles of adults."""
+
+    stature: Percentile = Field(50.0, description="percentile of the stature")
+    arms: Percentile = Field(50.0, description="of the arms' length, at that stature")
+    shoulders: Percentile = Field(50.0, description="of the shoulders' width, at that stature")
+
+    def size(self, cell: Cell) -> Vec:
+        """Return the lengths of this person in a cell [m], shape (12,)."""
+        workers = cell.workers
+        pelvis = workers[0].pelvis_height if workers else 0.95
+        body = percentile_body(self.stature, self.arms, self.shoulders, pelvis)
+        return body.vector(cell.floor_z)
+
+
+class PersonState(Body):
+    """One person as tracked, in the 18 joints of the body model."""
+
+    q: Vector18 = Field(description="joint positions [m, rad]: " + ", ".join(human.JOINT_NAMES))
+    qd: Vector18 = Field(description="joint speeds [m/s, rad/s]")
+    body: Annotated[
+        BodyPercentiles | None,
+        Field(description="the person's size; the cell's person if null"),
+    ] = None
+    size: Annotated[
+        Lengths | None,
+        Field(
+            description=f"lengths in place of percentiles [m]: {', '.join(NAMES)} (1: median)"
+        ),
+    ] = None
+
+    def to_domain(self, cell: Cell, place: str) -> Person:
+        """Return the person as arrays.
+
+        Raises:
+            InvalidInput: Both ``body`` and ``size`` are given.
+        """
+        if self.size is not None and self.body is not None:
+            raise InvalidInput(f"{place}size", "given", "must be left out beside `body`")
+        size = None if self.body is None else self.body.size(cell)
+        if self.size is not None:
+            size = np.array(self.size)
+        return Person(q=np.array(self.q), qd=np.array(self.qd), size=size)
+
+
+class KeypointsSeen(Body):
+    """One person in one frame of a tracker of key-points."""
+
+    keypoints: Annotated[
+        list[Keypoint], Field(min_length=N_KEYPOINTS, max_length=N_KEYPOINTS)
+    ] = Field(
+        description="[x, y, z] in m, in the robot's base frame, or [x, y, z, confidence] with "
+        f"a confidence in [0, 1]; null where missing. In the order of BODY_25: {ORDER}"
+    )
+
+    def points(self, place: str) -> tuple[Vec, Vec]:
+        """Return key-points [m], (25, 3), NaN where missing, and confidences, (25,).
+
+        Args:
+            place: Path of this person, for errors.
+
+        Raises:
+            InvalidInput: A confidence outside [0, 1].
+        """
+        points, trust = np.full((N_KEYPOINTS, 3), np.nan), np.zeros(N_KEYPOINTS)
+        for k, point in enumerate(self.keypoints):
+            if point is None:
+                continue
+            points[k], trust[k] = point[:3], point[3] if len(point) == 4 else 1.0
+            if not 0.0 <= trust[k] <= 1.0:
+                field = f"{place}keypoints[{k}][3]"
+                raise InvalidInput(field, float(trust[k]), "is a confidence, in [0, 1]")
+        return points, trust
+
+
+class KeypointsPerson(KeypointsSeen):
+    """One person by the key-points of a single frame; nothing is remembered."""
+
+    velocities: (
+        Annotated[list[Velocity], Field(min_length=N_KEYPOINTS, max_length=N_KEYPOINTS)] | None
+    ) = Field(
+        None,
+        description="velocities of the key-points [m/s], null where unknown; taken as zero",
+    )
+    body: BodyPercentiles | None = Field(
+        None, description="the person's size; the cell's person if null"
+    )
+
+    def speeds(self) -> Vec | None:
+        """Return the velocities [m/s], (25, 3), NaN where unknown; None where none is given."""
+        if self.velocities is None:
+            return None
+        return np.array([[np.nan] * 3 if v is None else v for v in self.velocities])
+
+
+class CylinderPerson(Body):
+    """One person of whom only an upright cylinder is known (METHOD 2.8).
+
+    Seen as a person of the cell's size who stands in it and faces the robot's base.
+    """
+
+    x: Annotated[float, Field(ge=-5.0, le=5.0)] = Field(description="axis [m]")
+    y: Annotated[float, Field(ge=-5.0, le=5.0)] = Field(description="axis [m]")
+    vx: Speed = Field(description="velocity [m/s]")
+    vy: Speed = Field(description="velocity [m/s]")
+    r: Annotated[float, Field(ge=0.01, le=WIDEST)] = Field(description="radius [m]")
+
+
+class TrackedPerson(Body):
+    """Somebody whom a tracker of `/v1/trackers` follows."""
+
+    tracker: str = Field(max_length=64, description="id of the tracker")
+    person: Annotated[int, Field(ge=0, le=3)] = Field(description="which of its people")
+    t: Finite | None = Field(
+        None,
+        description="time to tell the person for, on the clock of its frames [s], not earlier "
+        "than the newest one; that of the newest one if null",
+    )
+
+
+_MARKS: dict[str, Source] = {
+    "q": "joint-angles",
+    "qd": "joint-angles",
+    "keypoints": "keypoints",
+    "tracker": "tracker",
+    "r": "cylinder",
+    "x": "cylinder",
+}
+
+
+def source_of(entry: Any) -> Source | None:
+    """Return how an entry describes its person, by the members it has."""
+    if isinstance(entry, Mapping):
+        return next((_MARKS[name] for name in _MARKS if name in entry), None)
+    kinds: dict[type, Source] = {
+        PersonState: "joint-angles",
+        KeypointsPerson: "keypoints",
+        CylinderPerson: "cylinder",
+        TrackedPerson: "tracker",
+    }
+    return kinds.get(type(entry))
+
+
+PersonInput = Annotated[
+    Annotated[PersonState, Tag("joint-angles")]
+    | Annotated[KeypointsPerson, Tag("keypoints")]
+    | Annotated[CylinderPerson, Tag("cylinder")]
+    | Annotated[TrackedPerson, Tag("tracker")],
+    Discriminator(
+        source_of,
+        custom_error_type="person_source",
+        custom_error_message="must be a person, by `q` and `qd`, by `keypoints`, by a cylinder "
+        "`x`, `y`, `vx`, `vy`, `r`, or by `tracker` and `person`",
+    ),
+]
+
+
+class PersonUse(Answer):
+    """What was made of one person of the request."""
+
+    by: Source
+    seen: bool = Field(description="whether this one was seen by the policy: the nearest")
+    as_cylinder: bool = Field(
+        description="whether no joint angles are known: seen as standing in a cylinder"
+    )
+    speeds: Speeds = Field(description="where the speeds are from; zero: nothing is known")
+    flags: list[str] = Field(description="how the estimate is degraded; empty where it is not")
+    held: list[str] = Field(description="joints taken at rest or as before: nothing shows them")
+    missing: list[str] = Field(description="key-points that are not known")
+    strays: list[str] = Field(description="key-points dropped: too far from all others")
+    age_s: float | None = Field(
+        description="time since the newest credible key-point [s]; null without key-points"
+    )
+
+    @classmethod
+    def from_domain(
+        cls,
+        source: Source,
+        seen: bool,
+        speeds: Speeds,
+        person: Person,
+        estimate: PersonEstimate | None,
+    ) -> Self:
+        """Make it from what was decided with; ``estimate`` where there were key-points."""
+        return cls(
+            by=source,
+            seen=seen,
+            as_cylinder=person.cylinder is not None,
+            speeds=speeds,
+            flags=[] if estimate is None else list(estimate.flags),
+            held=[] if estimate is None else list(estimate.held),
+            missing=[] if estimate is None else list(estimate.missing),
+            strays=[] if estimate is None else list(estimate.strays),
+            age_s=None if estimate is None else estimate.age_s,
+        )

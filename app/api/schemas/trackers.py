@@ -1,0 +1,135 @@
+"""Trackers of key-points: frames in, estimates of people out."""
+
+from typing import Annotated, Self
+
+import numpy as np
+from pydantic import Field
+
+from app.api.schemas.numbers import Answer, Body
+from app.api.schemas.people import BodyPercentiles, KeypointsSeen
+from app.api.tracker_sessions import IDLE_S, TrackerSession
+from app.sim.keypoint_cylinder import SafetyCylinder
+from app.sim.person_estimate import PersonEstimate
+
+Time = Annotated[float, Field(ge=-1e10, le=1e10)]
+
+
+class TrackerCreate(Body):
+    """A tracker to be listened to."""
+
+    cell: str = Field(description="name of the work cell", examples=["pick-and-place"])
+    n_people: Annotated[int, Field(ge=1, le=4)] = Field(1, description="most people at once")
+    body: BodyPercentiles | None = Field(
+        None, description="size of these people; the cell's person if null"
+    )
+
+
+class TrackerPublic(Answer):
+    """One tracker that is listened to."""
+
+    id: str
+    cell: str
+    n_people: int
+    n_frames: int = Field(description="frames taken in")
+    t: float | None = Field(description="time of its newest frame [s]")
+    idle_limit_s: float = Field(description="unused for so long it ends [s]")
+
+    @classmethod
+    def from_domain(cls, session: TrackerSession) -> Self:
+        """Make it from a session."""
+        return cls(
+            id=session.id,
+            cell=session.cell,
+            n_people=session.n_people,
+            n_frames=session.n_frames,
+            t=session.t,
+            idle_limit_s=IDLE_S,
+        )
+
+
+class TrackerList(Answer):
+    """All trackers that are listened to."""
+
+    items: list[TrackerPublic]
+
+
+class FrameCreate(Body):
+    """One frame of all people, in any order."""
+
+    t: Time = Field(description="when the frame was taken, on the tracker's clock, rising [s]")
+    people: list[KeypointsSeen] = Field(
+        max_length=4, description="whom the frame shows; nobody: an empty list"
+    )
+
+
+class CylinderPublic(Answer):
+    """The safety cylinder of METHOD 2.8."""
+
+    center: list[float] = Field(description="x, y of the axis [m]")
+    radius: float = Field(description="radius with factor and flesh margin [m]")
+    bottom: float = Field(description="lowest point of what is seen [m]")
+    top: float = Field(description="highest point with the flesh margin [m]")
+    velocity: list[float] = Field(description="velocity of the axis [m/s]")
+
+    @classmethod
+    def from_domain(cls, cylinder: SafetyCylinder) -> Self:
+        """Make it from the estimate's."""
+        return cls(
+            center=cylinder.center.tolist(),
+            radius=cylinder.radius,
+            bottom=cylinder.bottom,
+            top=cylinder.top,
+            velocity=cylinder.velocity.tolist(),
+        )
+
+
+class EstimatePublic(Answer):
+    """What is known of one person."""
+
+    person: int = Field(description="which of the tracker's people")
+    q: list[float] | None = Field(description="joint positions [m, rad]; null: not known yet")
+    qd: list[float] | None = Field(description="joint speeds [m/s, rad/s]")
+    cylinder: CylinderPublic | None = Field(description="null where nobody was ever seen")
+    age_s: float | None = Field(
+        description="time since the newest credible key-point [s]; null where there was none"
+    )
+    stale: bool = Field(description="whether nothing credible was seen lately")
+    flags: list[str] = Field(description="how the estimate is degraded; empty where it is not")
+    held: list[str] = Field(description="joints that keep their angle: nothing shows them")
+    missing: list[str] = Field(description="key-points unseen for longer than the hold time")
+    strays: list[str] = Field(description="key-points dropped: too far from all others")
+    misfit_m: float | None = Field(
+        description="median distance of the model's joints from the key-points [m]"
+    )
+
+    @classmethod
+    def from_domain(cls, index: int, estimate: PersonEstimate) -> Self:
+        """Make it from the estimate."""
+        person, cylinder = estimate.person, estimate.cylinder
+        return cls(
+            person=index,
+            q=None if person is None else person.q.tolist(),
+            qd=None if person is None else person.qd.tolist(),
+            cylinder=None if cylinder is None else CylinderPublic.from_domain(cylinder),
+            age_s=estimate.age_s if np.isfinite(estimate.age_s) else None,
+            stale=estimate.stale,
+            flags=list(estimate.flags),
+            held=list(estimate.held),
+            missing=list(estimate.missing),
+            strays=list(estimate.strays),
+            misfit_m=estimate.misfit_m if np.isfinite(estimate.misfit_m) else None,
+        )
+
+
+class EstimatesPublic(Answer):
+    """What is known of a tracker's people at one time."""
+
+    tracker: str
+    t: float = Field(description="time the estimates are for [s]")
+    people: list[EstimatePublic]
+
+    @classmethod
+    def from_domain(cls, tracker: str, t: float, estimates: tuple[PersonEstimate, ...]) -> Self:
+        """Make it from the estimates of all people."""
+        people = [EstimatePublic.from_domain(i, one) for i, one in enumerate(estimates)]
+        return cls(tracker=tracker, t=t, people=people)

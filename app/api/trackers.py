@@ -1,0 +1,79 @@
+"""Trackers of key-points, listened to frame by frame (METHOD 2.8)."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Response
+from starlette.concurrency import run_in_threadpool
+
+from app.api.schemas.trackers import (
+    EstimatesPublic,
+    FrameCreate,
+    TrackerCreate,
+    TrackerList,
+    TrackerPublic,
+)
+from app.api.services import ServicesDep
+from app.api.task_selection import known_cell
+
+router = APIRouter(prefix="/v1/trackers", tags=["trackers"])
+
+
+@router.post("", status_code=201, summary="Listen to a tracker")
+async def create(
+    body: TrackerCreate, services: ServicesDep, response: Response
+) -> TrackerPublic:
+    """Open a tracker; its people can then be named in /v1/task-selection."""
+    services.readiness.require()
+    cell = await known_cell(body.cell, services)
+    size = cell.body if body.body is None else body.body.size(cell)
+    session = services.trackers.open(cell.name, body.n_people, size)
+    response.headers["Location"] = f"/v1/trackers/{session.id}"
+    return TrackerPublic.from_domain(session)
+
+
+@router.get("", summary="List the trackers")
+async def list_all(services: ServicesDep) -> TrackerList:
+    """Return every tracker that is listened to."""
+    return TrackerList(
+        items=[TrackerPublic.from_domain(one) for one in services.trackers.all()]
+    )
+
+
+@router.post("/{tracker_id}/frames", summary="Hand one frame over")
+async def take_frame(
+    tracker_id: str, body: FrameCreate, services: ServicesDep
+) -> EstimatesPublic:
+    """Take one frame of all people in and return what is known of each at its time.
+
+    Who is who is found out from where people were, so their order means nothing; what is
+    missing, held, exchanged or not credible is named.
+    """
+    session = services.trackers.get(tracker_id)
+    seen = [one.points(f"people[{i}].") for i, one in enumerate(body.people)]
+    points, trust = [one[0] for one in seen], [one[1] for one in seen]
+    estimates = await run_in_threadpool(session.take, body.t, points, trust)
+    return EstimatesPublic.from_domain(tracker_id, body.t, estimates)
+
+
+@router.get("/{tracker_id}", summary="What is known of a tracker's people")
+async def get_one(
+    tracker_id: str,
+    services: ServicesDep,
+    t: Annotated[
+        float | None,
+        Query(
+            allow_inf_nan=False,
+            description="time to tell them for [s]; that of the newest frame if left out",
+        ),
+    ] = None,
+) -> EstimatesPublic:
+    """Return the estimates at a time not earlier than the newest frame."""
+    session = services.trackers.get(tracker_id)
+    at, estimates = await run_in_threadpool(session.estimates, t)
+    return EstimatesPublic.from_domain(tracker_id, at, estimates)
+
+
+@router.delete("/{tracker_id}", status_code=204, summary="Listen to a tracker no longer")
+async def remove(tracker_id: str, services: ServicesDep) -> None:
+    """Forget a tracker and what it told."""
+    services.trackers.close(tracker_id)

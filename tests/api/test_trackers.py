@@ -1,0 +1,181 @@
+"""Streams of key-points over HTTP: who is followed, what is named, what is refused."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+
+from tests.api.test_task_selection import URL, refused
+from tests.sim.tracked_person import CELL, RATE_HZ, seen, work
+
+TRACKERS = "/v1/trackers"
+FIRST, SECOND = work(1, 12.0), work(2, 12.0)
+APART = np.array([1.6, 0.0, 0.0])
+
+
+@pytest.fixture
+def tracker(client: TestClient) -> Iterator[str]:
+    made = client.post(TRACKERS, json={"cell": "pick-and-place", "n_people": 2})
+    assert made.status_code == 201, made.text
+    place = made.headers["location"]
+    assert place == f"{TRACKERS}/{made.json()['id']}"
+    yield place
+    client.delete(place)
+
+
+def points(q: np.ndarray, offset: np.ndarray | float = 0.0) -> list[Any]:
+    found: list[Any] = (seen(q) + offset).tolist()
+    return found
+
+
+def frame(t: float, *people: list[Any]) -> dict[str, Any]:
+    return {"t": t, "people": [{"keypoints": one} for one in people]}
+
+
+def fed(client: TestClient, tracker: str, n: int) -> dict[str, Any]:
+    """Hand over the first frames of two people; return the last answer."""
+    for k in range(n):
+        both = points(FIRST[1][k]), points(SECOND[1][k], APART)
+        answer = client.post(f"{tracker}/frames", json=frame(k / RATE_HZ, *both))
+        assert answer.status_code == 200, answer.text
+    found: dict[str, Any] = answer.json()
+    return found
+
+
+def test_two_people_are_followed_with_angles_speeds_and_cylinders(
+    client: TestClient, tracker: str
+) -> None:
+    people = fed(client, tracker, 20)["people"]
+    for person, (_, q, qd), offset in zip(people, (FIRST, SECOND), (0.0, 1.6), strict=True):
+        assert person["flags"] == [] and not person["stale"]
+        assert person["q"][0] == pytest.approx(q[19][0] + offset, abs=0.02)
+        assert np.abs(np.array(person["q"][10:]) - q[19][10:]).max() < 0.25
+        assert np.median(np.abs(np.array(person["qd"]) - qd[19])) < 0.3
+        away = np.array(person["cylinder"]["center"]) - person["q"][:2]
+        assert np.linalg.norm(away) < 0.4 and 0.2 < person["cylinder"]["radius"] < 1.2
+
+
+def test_exchanged_people_keep_their_places_and_it_is_named(
+    client: TestClient, tracker: str
+) -> None:
+    before = fed(client, tracker, 10)["people"]
+    other = frame(10 / RATE_HZ, points(SECOND[1][10], APART), points(FIRST[1][10]))
+    after = client.post(f"{tracker}/frames", json=other).json()["people"]
+    for one, two in zip(before, after, strict=True):
+        assert "people-swapped" in two["flags"]
+        assert two["q"][0] == pytest.approx(one["q"][0], abs=0.05)
+
+
+def test_nobody_seen_goes_stale_and_that_is_said(client: TestClient, tracker: str) -> None:
+    fed(client, tracker, 10)
+    gone = client.post(f"{tracker}/frames", json=frame(2.0)).json()["people"]
+    assert all(one["stale"] and "stale" in one["flags"] for one in gone)
+    assert all(one["age_s"] == pytest.approx(2.0 - 9 / RATE_HZ) for one in gone)
+    assert gone[0]["cylinder"]["radius"] > 1.5
+
+
+def test_before_anybody_is_seen_there_is_nobody(client: TestClient, tracker: str) -> None:
+    person = client.post(f"{tracker}/frames", json=frame(0.0)).json()["people"][0]
+    assert person["flags"] == ["never-seen"]
+    assert person["q"] is person["cylinder"] is person["age_s"] is None
+
+
+def test_estimates_of_a_later_time_are_predicted(client: TestClient, tracker: str) -> None:
+    last = fed(client, tracker, 40)
+    later = client.get(tracker, params={"t": last["t"] + 0.1}).json()
+    one, two = (answer["people"][1] for answer in (last, later))
+    assert two["age_s"] == pytest.approx(0.1)
+    assert np.abs(np.array(two["q"]) - one["q"]).max() > 0.02
+    assert client.get(tracker).json()["people"] == last["people"]
+
+
+def test_followed_people_can_be_named_in_a_decision(
+    client: TestClient, tracker: str, state: dict[str, Any]
+) -> None:
+    known = fed(client, tracker, 20)["people"]
+    identity = tracker.rpartition("/")[2]
+    named = [{"tracker": identity, "person": i} for i in range(2)]
+    answer = client.post(URL, json={**state, "people": named}).json()
+    by_hand = [{"q": one["q"], "qd": one["qd"], "size": CELL.body.tolist()} for one in known]
+    same = client.post(URL, json={**state, "people": by_hand}).json()
+    assert [one["by"] for one in answer["people"]] == ["tracker"] * 2
+    assert [one["speeds"] for one in answer["people"]] == ["estimated"] * 2
+    assert [one["value"] for one in answer["candidates"]] == [
+        one["value"] for one in same["candidates"]
+    ]
+
+
+@pytest.mark.parametrize(
+    ("change", "field", "rule"),
+    [
+        ({"person": 3}, "people[0].person", "must be less than 2"),
+        ({"t": 0.0}, "people[0].t", "after the newest"),
+        ({"person": 1}, "people[0].person", "never been seen"),
+    ],
+)
+def test_somebody_who_is_not_followed_is_refused(
+    client: TestClient,
+    tracker: str,
+    state: dict[str, Any],
+    change: dict[str, Any],
+    field: str,
+    rule: str,
+) -> None:
+    client.post(f"{tracker}/frames", json=frame(1.0, points(FIRST[1][0])))
+    person = {"tracker": tracker.rpartition("/")[2], "person": 0, **change}
+    problem = refused(client, {**state, "people": [person]})
+    assert problem["field"] == field and rule in problem["rule"]
+
+
+@pytest.mark.parametrize(
+    ("body", "field", "rule"),
+    [
+        (frame(0.3, points(FIRST[1][0])), "t", "later than"),
+        (
+            frame(9.0, (1000.0 * seen(FIRST[1][0])).tolist()),
+            "people[0].keypoints",
+            "millimetres",
+        ),
+        (frame(9.0, *[points(FIRST[1][0])] * 3), "people", "at most 2"),
+        (frame(9.0, *[points(FIRST[1][0])] * 5), "people", "at most 4"),
+        (frame(9.0, points(FIRST[1][0])[:20]), "people[0].keypoints", "at least 25"),
+        ({"people": []}, "t", "is required"),
+        ({"t": 1e300, "people": []}, "t", "less than"),
+    ],
+)
+def test_a_frame_that_cannot_be_is_refused_and_leaves_no_trace(
+    client: TestClient, tracker: str, body: dict[str, Any], field: str, rule: str
+) -> None:
+    before = fed(client, tracker, 12)
+    answer = client.post(f"{tracker}/frames", json=body)
+    assert answer.status_code == 422
+    assert answer.json()["field"] == field and rule in answer.json()["rule"]
+    assert client.get(tracker).json()["people"] == before["people"]
+
+
+def test_a_deleted_tracker_is_gone(client: TestClient) -> None:
+    place = client.post(TRACKERS, json={"cell": "pick-and-place"}).headers["location"]
+    assert place.rpartition("/")[2] in [
+        one["id"] for one in client.get(TRACKERS).json()["items"]
+    ]
+    assert client.delete(place).status_code == 204
+    for answer in (client.get(place), client.delete(place)):
+        assert answer.status_code == 404
+    assert client.post(f"{place}/frames", json=frame(0.0)).status_code == 404
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        ({"cell": "kitchen"}, "cell"),
+        ({"n_people": 5}, "n_people"),
+        ({"n_people": 0}, "n_people"),
+    ],
+)
+def test_a_tracker_that_cannot_be_is_refused(
+    client: TestClient, change: dict[str, Any], field: str
+) -> None:
+    answer = client.post(TRACKERS, json={"cell": "pick-and-place", **change})
+    assert answer.status_code == 422 and answer.json()["field"] == field
