@@ -136,11 +136,13 @@ def fitted(part: Part, size: Vec) -> Vec:
         part: A soft part.
         size: The person's size [m], shape (12,).
     """
-    median, own, scale = skeleton.bind_bones(), skeleton.bind_bones(size), skeleton.scales(size)
+    median, own = skeleton.bind_bones(), skeleton.bind_bones(size)
+    right, left = skeleton.scales(size, "r"), skeleton.scales(size, "l")
     out = np.zeros_like(part.surface.vertices)
     for name, weights in part.weights.items():
         before, after = median[name], own[name]
         local = (part.surface.vertices - before[:3, 3]) @ before[:3, :3]
-        moved = (local * scale[name]) @ after[:3, :3].T + after[:3, 3]
+        scale = np.where(local[:, 1:2] < 0.0, right[name], left[name])
+        moved = (local * scale) @ after[:3, :3].T + after[:3, 3]
         out += weights[:, None] * moved
     return out

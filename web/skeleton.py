@@ -143,15 +143,16 @@ def bind_bones(size: Vec = MEDIAN_SIZE) -> Bones:
     return bones(BIND_Q, here, rest_feet(np.eye(4), -PELVIS_HEIGHT * girth, girth))
 
 
-def scales(size: Vec) -> dict[str, Vec]:
+def scales(size: Vec, shoulder: str = "r") -> dict[str, Vec]:
     """Return by how much a person's skin is larger along each bone's axes, shape (3,) each.
 
     Args:
         size: The person's size [m], shape (12,).
+        shoulder: Side of the trunk, ``"r"`` or ``"l"``: its width is that of this shoulder.
     """
     ratio = size / np.where(MEDIAN_SIZE == 0.0, 1.0, MEDIAN_SIZE)
     girth, trunk = float(ratio[lengths.GIRTH]), float(ratio[lengths.TRUNK])
-    wide = 0.5 * float(ratio[lengths.CLAVICLE_R] + ratio[lengths.CLAVICLE_L])
+    wide = float(ratio[lengths.CLAVICLE_R + SIDES.index(shoulder)])
     hip = float(ratio[lengths.HIP])
     out = {
         name: np.array([girth, hip + share * (wide - hip), trunk])

@@ -1,8 +1,7 @@
 """What is known about a live world at one tick, frozen, for any thread to read.
 
-Robot, the nearest person, ``previous`` and ``time_left_s`` are exactly the inputs of the
-decision beside them: sending them to ``POST /v1/task-selection`` gives the same choice and the
-same values.
+Robot, people, ``previous`` and ``time_left_s`` are exactly the inputs of the decision beside
+them: sending them to ``POST /v1/task-selection`` gives the same choice and the same values.
 """
 
 from dataclasses import dataclass

@@ -2,11 +2,11 @@
 
 The world advances in control periods of ``cell.robot.dt``. Each period the robot carries out
 the action decided for the state it is in, the people move, contact is tested between the ends
-of the period too, and the policy decides anew (METHOD 3.1). Of several people it sees the
-nearest. A reached target is picked up (the
-tool goes down and up again, by inverse kinematics and inside the same limits), leaves the
-candidates until all have had their turn, and the next episode goes on from there. A contact
-is shown for two seconds; then the robot starts again from home.
+of the period too, and the policy decides anew (METHOD 3.1); one that knows a single person sees
+the nearest. A reached target is picked up (the tool goes down and up again, by inverse
+kinematics and inside the same limits), leaves the candidates until all have had their turn, and
+the next episode goes on from there. A contact is shown for two seconds; then the robot starts
+again from home.
 """
 
 from dataclasses import replace
@@ -22,7 +22,7 @@ from app.sim.contact import Contact, contact, worker_distances
 from app.sim.kernels import body, kinematics
 from app.sim.live_people import LivePeople
 from app.sim.live_person import frozen
-from app.sim.ports import Candidate, Decision, Person, TaskPolicy, Vec
+from app.sim.ports import Candidate, Decision, TaskPolicy, Vec
 from app.sim.snapshot import (
     CandidateView,
     ContactView,
@@ -350,7 +350,7 @@ class World:
             decision = self._policy.decide(
                 self._q,
                 self._qd,
-                self._seen(),
+                [person.seen() for person in self._live],
                 self._offered,
                 previous=self._previous,
                 time_left_s=self._time_left,
@@ -362,15 +362,6 @@ class World:
             self._counters = replace(self._counters, switches=self._counters.switches + 1)
             self._tell(explanation.switched(decision, names, self._previous, self._label))
         self._decision = decision
-
-    def _seen(self) -> list[Person]:
-        """Return the people the policy is shown: the nearest to the robot, if any."""
-        nearest = self._nearest()
-        return [] if nearest is None else [self._live[nearest].seen()]
-
-    def _nearest(self) -> int | None:
-        distances = self._distances()
-        return min(distances, key=lambda id: distances[id], default=None)
 
     def _distances(self) -> dict[int, float]:
         """Return the distance of the robot to each person by id [m]."""

@@ -125,7 +125,9 @@ def test_empty_cell_has_no_clearance_and_the_robot_works(world: World) -> None:
     assert run(world, 1).clearance_m is not None
 
 
-def test_policy_is_shown_the_nearest_person(world: World, cell: Cell) -> None:
+def test_nearest_person_is_named_and_distances_are_those_of_each_alone(
+    world: World, cell: Cell
+) -> None:
     world.apply(commands.AddPerson())
     world.apply(commands.MoveHuman(person=0, pelvis=(0.0, 2.4, -1.57)))
     snapshot = run(world, 60)

@@ -167,9 +167,11 @@ def robot_of(snapshot: WorldSnapshot) -> RobotState:
 
 
 def people_of(snapshot: WorldSnapshot) -> list[PersonState]:
-    """Return whom the policy saw, the nearest person, as a request carries people."""
-    seen = snapshot.nearest
-    return [] if seen is None else [PersonState(q=seen.q.tolist(), qd=seen.qd.tolist())]
+    """Return the people's states, as a request carries them."""
+    return [
+        PersonState(q=one.q.tolist(), qd=one.qd.tolist(), size=one.size.tolist())
+        for one in snapshot.people
+    ]
 
 
 def decision_input(snapshot: WorldSnapshot) -> TaskSelectionRequest | None:
