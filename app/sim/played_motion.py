@@ -20,6 +20,8 @@ from app.sim.worker_motion import at_the_table
 
 YAW = 2
 """Place of the pelvis's yaw, which has no limit while a motion is played."""
+FASTEST = 50.0
+"""Greatest speed of a joint that is told, and that a policy takes [m/s, rad/s]."""
 HALF_SPAN_S = 0.025
 """Half of the time over which speeds are taken [s]."""
 
@@ -64,11 +66,16 @@ class PlayedMotion:
         self._outside_share = float(np.mean([is_outside(q, worker) for q in self._q]))
 
     def at(self, t: float) -> tuple[Vec, Vec]:
-        """Return joint positions [m, rad] and speeds [m/s, rad/s] at ``t`` [s], (18,) each."""
+        """Return joint positions [m, rad] and speeds [m/s, rad/s] at ``t`` [s], (18,) each.
+
+        Speeds are held within ``FASTEST``: where a shoulder's axes line up, its angles turn
+        faster than any joint, though the arm does not.
+        """
         start = max(t - HALF_SPAN_S, 0.0)
         end = min(max(t, 0.0) + HALF_SPAN_S, self.duration)
         span = max(end - start, 1e-9)
-        return self._between(t), (self._between(end) - self._between(start)) / span
+        speed = (self._between(end) - self._between(start)) / span
+        return self._between(t), np.clip(speed, -FASTEST, FASTEST)
 
     def rise_at(self, t: float) -> float:
         """Return the height of the pelvis above standing at ``t`` [s] [m]."""

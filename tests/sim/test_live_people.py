@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from app.sim.cells import Cell, load_cell
 from app.sim.contact import clearance
 from app.sim.kernels.body import PELVIS_Z, capsule_columns
 from app.sim.live_people import LivePeople, place_of
+from app.sim.played_motion import PlayedMotion
 from app.sim.scene import NO_CYLINDERS, arm_of, people_of
 from app.sim.snapshot import PersonView, WorldSnapshot
 from app.sim.world import World
@@ -261,6 +264,15 @@ def test_angles_beyond_limits_are_clipped_and_counted(world: World) -> None:
     for _ in range(39):
         assert (run(world, 1).people[0].q <= human.Q_MAX + 1e-9).all()
     assert play(world).people[0].motion.clipped_share == 0.0  # type: ignore[union-attr]
+
+
+def test_speeds_of_a_recording_stay_within_what_a_policy_takes(cell: Cell) -> None:
+    motion = recorded()
+    q = motion.q.copy()
+    q[50:, 10] += 3.5
+    played = PlayedMotion(replace(motion, q=q), cell, cell.human, "jerk")
+    fastest = max(np.abs(played.at(0.01 * k)[1]).max() for k in range(200))
+    assert fastest == 50.0
 
 
 def test_recorded_motion_stands_while_paused(world: World) -> None:
