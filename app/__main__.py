@@ -88,6 +88,9 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("--json", action="store_true")
     one = verb("evaluate", run_evaluate, "Measure a checkpoint by a protocol.")
     one.add_argument("protocol")
+    one.add_argument(
+        "motions", nargs="*", type=Path, metavar="FILE", help="recorded motion (pick-mocap)"
+    )
     one.add_argument("--checkpoint", default="pick", help="alias, SHA-256 or .safetensors file")
     one.add_argument("--episodes", type=int, help="the protocol's own if not given")
     one.add_argument("--seed", type=int, default=11)
@@ -211,6 +214,7 @@ def run_evaluate(options: argparse.Namespace) -> int:
     import torch
 
     from app.machine import describe
+    from app.motion_verbs import runs_of
     from app.policies.evaluation.protocols import PROTOCOLS, WITHOUT_CHECKPOINT, evaluate
 
     if options.protocol not in PROTOCOLS:
@@ -219,7 +223,11 @@ def run_evaluate(options: argparse.Namespace) -> int:
     checkpoint = None if none else find_checkpoint(options.checkpoint, settings)
     torch.set_num_threads(1)
     result = evaluate(
-        options.protocol, checkpoint, episodes=options.episodes, seed=options.seed
+        options.protocol,
+        checkpoint,
+        episodes=options.episodes,
+        seed=options.seed,
+        motions=runs_of(options.motions),
     )
     result = {**result, "machine": describe()}
     print(json.dumps(result) if options.json else table(result))

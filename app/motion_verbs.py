@@ -3,15 +3,15 @@
 Each function returns what is to be printed; the entry point prints it.
 """
 
-from collections.abc import Mapping
-from dataclasses import asdict
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 from app.database import has_database, opened
 from app.errors import BadMotion, Fault, InvalidInput
 from app.settings import Settings
-from app.sim.motions import MAX_BYTES, read_motion
+from app.sim.motions import MAX_BYTES, Motion, read_motion
 from app.store.records import MotionRecord
 from jobs.motions import MotionCatalog
 from jobs.stored_motion import detail_of, summary_of
@@ -98,6 +98,22 @@ def keep_motion(path: Path, settings: Settings, name: str | None) -> Printed:
     data = {**_data_of(record), "new": new}
     stored = "is stored" if new else "was stored already"
     return f"{_told(data)}\n{stored} as {record.name}", data
+
+
+def runs_of(paths: Sequence[Path]) -> tuple[Motion, ...]:
+    """Return the clean runs of files; those of one name are told apart by their folder's.
+
+    Raises:
+        BadMotion: One is no sound motion; carries every fault.
+        InvalidInput: One cannot be read.
+    """
+    stems = [path.stem for path in paths]
+    runs: list[Motion] = []
+    for path in paths:
+        name = path.stem if stems.count(path.stem) == 1 else f"{path.parent.name}-{path.stem}"
+        found = read_motion(_content(path), path.name)
+        runs.extend(replace(run, name=name) for run in found.runs)
+    return tuple(runs)
 
 
 def _content(path: Path) -> bytes:

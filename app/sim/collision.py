@@ -177,8 +177,13 @@ class CollisionReference:
         p0, p1 = (poses[-1, :3, :3] @ end + poses[-1, :3, 3] for end in self._tool)
         place_capsule(self._bodies[TOOL], p0, p1)
 
-    def place_person(self, human_q: Vec) -> None:
-        """Move the person's capsules to joint positions ``human_q``, shape (18,)."""
+    def place_person(self, human_q: Vec, size: Vec | None = None) -> None:
+        """Move the person's capsules to joint positions ``human_q``, shape (18,).
+
+        Another size [m], shape (12,), exchanges the person first (:meth:`set_person`).
+        """
+        if size is not None and not np.array_equal(size, self._size):
+            self.set_person(size)
         ends = human.capsules(human_q, self._size, self._cell.floor_z)
         for body, (p0, p1) in zip(self._person.values(), ends, strict=True):
             place_capsule(body, p0, p1)

@@ -15,7 +15,7 @@ from app.errors import InvalidInput
 from app.sim.actions import ActionSettings
 from app.sim.batch import CellBatch
 from app.sim.cells import Cell, lacks_stations
-from app.sim.kernels import actions, body, features, kinematics, pick, random
+from app.sim.kernels import actions, features, kinematics, pick
 from app.sim.kernels import arm as arm_kernel
 from app.sim.kernels.arm import CONTROLLED, Arm
 from app.sim.kernels.episode import FEATURES, PLAIN, distance_to
@@ -24,10 +24,8 @@ from app.sim.kernels.geometry import FAR
 from app.sim.kernels.people import (
     People,
     PeopleState,
-    advance_people,
     new_crowd,
-    place_people,
-    start_people,
+    record_palms,
 )
 from app.sim.kernels.reward import RewardWeights
 from app.sim.ports import Vec
@@ -325,19 +323,19 @@ def hand_speeds(
     """
     people, tick = batch.world.people._replace(courtesy=0.0), 0.01
     state = new_people_state(batch.cell, people, 1)
-    crowd = new_crowd(people, state.q.shape[1], state.cylinders.shape[1])
-    stream, rates = np.zeros(1, dtype=np.uint64), []
+    n_workers = state.q.shape[1]
+    crowd = new_crowd(people, n_workers, state.cylinders.shape[1])
+    palms, rng = np.zeros((int(seconds / tick), n_workers, 2, 3)), np.zeros(1, dtype=np.uint64)
+    rates = []
     for number in range(n_scripts):
-        random.start_stream(batch.seed, 1 << 20, number, stream)
-        start_people(people, state, 0, stream, crowd)
-        palms = []
-        for _ in range(int(seconds / tick)):
-            advance_people(people, state, 0, batch.arm.columns, tick, crowd.away)
-            place_people(people, state, 0, crowd)
-            palms.append(crowd.points[:, [body.HAND_R, body.HAND_L]].copy())
-        rates.append(np.linalg.norm(np.diff(np.array(palms), axis=0), axis=-1) / tick)
-    speeds = np.concatenate([rate.ravel() for rate in rates])
+        record_palms(
+            people, state, batch.seed, number, rng, batch.arm.columns, tick, crowd, palms
+        )
+        rates.append(np.linalg.norm(np.diff(palms, axis=0), axis=-1).ravel() / tick)
+    speeds = np.concatenate(rates)
     moving = speeds[speeds > 0.05]
+    if not moving.size:  # Nobody works there, or nobody moves.
+        return {}
     return {
         "hand_speed_median_m_s": float(np.median(moving)),
         "hand_speed_p99_m_s": float(np.percentile(moving, 99)),

@@ -335,6 +335,51 @@ def draw_weights(
     return promp.mean + away.reshape(n, promp.n_joints, promp.n_basis)
 
 
+def draw_like(weights: Vec, n: int, rng: np.random.Generator, floor: float = FLOOR) -> Vec:
+    """Draw weights from the primitive of given demonstrations, (n, n_joints, n_basis).
+
+    The same distribution as :func:`draw_weights` of :func:`of_weights`, without its covariance:
+    normal multiples of the demonstrations' differences from their mean, and of the floor.
+
+    Args:
+        weights: Weights of each demonstration, shape (m, n_joints, n_basis).
+        n: Number of draws.
+        rng: Source of chance.
+        floor: Standard deviation of the floor [m, rad].
+    """
+    mean = weights.mean(axis=0)
+    away = (weights - mean) / np.sqrt(max(len(weights) - 1, 1))
+    sizes, directions = np.linalg.eigh(_floor(weights.shape[-1], floor))
+    root = directions * np.sqrt(np.clip(sizes, 0.0, None))
+    # einsum: BLAS would share this little work out to threads, and wait for them.
+    drawn = np.einsum("nm,mjk->njk", rng.standard_normal((n, len(weights))), away)
+    return np.asarray(mean + drawn + rng.standard_normal(drawn.shape) @ root.T)
+
+
+def gain_of_ends(weights: Vec, floor: float = FLOOR, width: float | None = None) -> Vec:
+    """Return K of an exact condition on all joints at both ends, (n_weights, 2 n_joints).
+
+    Equal to :func:`gain` of :func:`of_weights` with rows of all joints at z = 0, then at
+    z = 1, without the covariance of the weights.
+
+    Args:
+        weights: Weights of each demonstration, shape (m, n_joints, n_basis).
+        floor: Standard deviation of the floor [m, rad].
+        width: Width of the Gaussians [phase]; None: :func:`usual_width`.
+    """
+    m, n_joints, n_basis = weights.shape
+    phi = basis(np.array([0.0, 1.0]), n_basis, usual_width(n_basis) if width is None else width)
+    away = (weights - weights.mean(axis=0)) / np.sqrt(max(m - 1, 1))
+    ends = np.swapaxes(away @ phi.T, 1, 2).reshape(m, -1)
+    ground = _floor(n_basis, floor)
+    along, alike = ground @ phi.T, phi @ ground @ phi.T
+    spread = np.einsum("mw,me->we", away.reshape(m, -1), ends)
+    total = ends.T @ ends + np.kron(alike, np.eye(n_joints)) + EXACT * np.eye(2 * n_joints)
+    for joint in range(n_joints):
+        spread[joint * n_basis : (joint + 1) * n_basis, joint::n_joints] += along
+    return np.asarray(np.linalg.solve(total, spread.T).T)
+
+
 def draw_durations(promp: ProMP, n: int, rng: np.random.Generator) -> Vec:
     """Draw execution times like those of the demonstrations [s], log-normal, shape (n,)."""
     return np.asarray(promp.duration_s * np.exp(promp.duration_spread * rng.standard_normal(n)))

@@ -35,6 +35,12 @@ class Trajectory:
     """Joint positions of the person [m, rad], shape (n_steps, 18)."""
     dt: float
     """Time between two rows [s]."""
+    sizes: Vec | None = None
+    """The person's size in each row [m], shape (n_steps, 12); None: the cell's person."""
+
+    def size(self, row: int, cell: Cell) -> Vec:
+        """Return the person's size in one row [m], shape (12,)."""
+        return np.asarray(cell.body if self.sizes is None else self.sizes[row])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,7 +115,10 @@ class Recheck:
         rows = near_person.any((1, 2)) | near_cell.any(1) | near_self.any(1)
         for index in np.flatnonzero(rows):
             pairs = self._suspects(near_person[index], near_cell[index], near_self[index])
-            contacts = self._ask(trajectory.q_robot[index], trajectory.q_human[index], pairs)
+            size = trajectory.size(int(index), self._cell)
+            contacts = self._ask(
+                trajectory.q_robot[index], trajectory.q_human[index], size, pairs
+            )
             if contacts:
                 return FirstContact(
                     index=int(index), time_s=int(index) * trajectory.dt, contacts=contacts
@@ -121,12 +130,16 @@ class Recheck:
         cell, radius = self._cell, self._capsules.radius
         a0, a1 = robot_ends(self._robot, self._capsules, trajectory.q_robot)
         ends = np.stack(
-            [human.capsules(q, cell.body, cell.floor_z) for q in trajectory.q_human]
+            [
+                human.capsules(q, trajectory.size(row, cell), cell.floor_z)
+                for row, q in enumerate(trajectory.q_human)
+            ]
         )
+        thick = human.capsule_radii(trajectory.size(0, cell))
         gap = segment_distances(
             a0[:, :, None], a1[:, :, None], ends[:, None, :, 0], ends[:, None, :, 1]
         )
-        near_person = gap < radius[:, None] + human.CAPSULE_RADII + MARGIN
+        near_person = gap < radius[:, None] + thick + MARGIN
         near_cell = np.minimum(a0[..., 2], a1[..., 2]) < radius + MARGIN
         for box in cell.obstacles:
             away = np.linalg.norm(0.5 * (a0 + a1) - box.center, axis=-1)
@@ -152,13 +165,13 @@ class Recheck:
         return pairs
 
     def _ask(
-        self, q: Vec, human_q: Vec, pairs: set[tuple[str, str, Kind]]
+        self, q: Vec, human_q: Vec, size: Vec, pairs: set[tuple[str, str, Kind]]
     ) -> tuple[Contact, ...]:
         if not pairs:
             return ()
         self._reference.place_robot(q)
         if any(kind == "human" for _, _, kind in pairs):
-            self._reference.place_person(human_q)
+            self._reference.place_person(human_q, size)
         order = sorted(pairs, key=lambda pair: (BODY_NAMES.index(pair[0]), pair[1]))
         return tuple(
             Contact(kind=kind, link=link, body=body)

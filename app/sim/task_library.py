@@ -27,15 +27,22 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from app.errors import InvalidInput
 from app.sim import human, promp
-from app.sim.body_size import BodySize, percentile_body
-from app.sim.cells import Cell
+from app.sim.body_size import MEDIAN, BodySize, percentile_body
+from app.sim.cells import Cell, lacks_stations
 from app.sim.demonstrations import draw_node
 from app.sim.ports import Vec
-from app.sim.primitives import HANDS, HOME, legs_of, place_of, primitive_for
-from app.sim.promp import ProMP
-from app.sim.sampling import sample
-from app.sim.via_points import JointVia, joint_rows, points_of
+from app.sim.primitives import (
+    HANDS,
+    HOME,
+    TaskPrimitive,
+    legs_of,
+    place_of,
+    primitive_for,
+)
+from app.sim.sampling import GRID, sample
+from app.sim.via_points import points_of
 
 Index = NDArray[np.int64]
 
@@ -52,6 +59,8 @@ VARIANTS = 10
 """Node postures for each person, place and hand."""
 GAIN_FLOOR = 0.05
 """Standard deviation of the floor of the Sigma of which K is made [m, rad]."""
+ROUNDS = 10
+"""Rounds of draws in which samples inside the limits are looked for."""
 N_SAMPLES = 24
 """Samples of each primitive and direction."""
 
@@ -115,7 +124,13 @@ def task_library(
         augmentation: Whether samples are drawn from the primitives, and durations spread; if
             not, the samples are the demonstrations as they are, and durations their mean.
         variants: Nodes for each person, place and hand.
+
+    Raises:
+        InvalidInput: The cell has no cube or no dock, so there is no task.
+        NotFound: Nobody works in the cell.
     """
+    if (lack := lacks_stations(cell)) is not None:
+        raise InvalidInput("cell", cell.name, f"has no tasks for a worker: it {lack}")
     sizes = people_sizes(cell) if bodies is None else bodies
     vectors = np.array([size.vector(cell.floor_z) for size in sizes])
     rng = np.random.default_rng(seed)
@@ -177,39 +192,46 @@ def _legs(
     first = 0
     for leg in legs_of(cell):
         found = primitive_for(cell, leg)
-        forth = found.primitive()
-        drawn = found.weights
-        if augmentation:
-            drawn = sample(forth, 2 * n_samples, rng, points_of(cell.body))
-        n = len(drawn) // 2 if augmentation else len(drawn)
-        spread = forth.duration_spread if augmentation else 0.0
+        logs = np.log(found.durations)
+        some = draw_samples(found, 2 * n_samples, rng) if augmentation else found.weights
+        n = n_samples if augmentation else len(some)
+        spread = float(logs.std(ddof=1)) if augmentation else 0.0
         start, end, column = order[leg.start], order[leg.end], HANDS.index(leg.hand)
-        broad = promp.of_weights(found.weights, found.durations, floor=GAIN_FLOOR)
-        for way, one, some in (
-            ((start, end), broad, drawn[:n]),
-            ((end, start), promp.reversed_primitive(broad), drawn[-n:, :, ::-1]),
+        for way, known, drawn in (
+            ((start, end), found.weights, some[:n]),
+            ((end, start), found.weights[..., ::-1], some[-n:, :, ::-1]),
         ):
             legs[(*way, column)] = len(gains), first, n
-            samples.append(some)
-            gains.append(ends_gain(one))
-            durations.append((float(np.log(one.duration_s)), spread))
+            samples.append(drawn)
+            gains.append(promp.gain_of_ends(known, GAIN_FLOOR))
+            durations.append((float(logs.mean()), spread))
             first += n
-    if not gains:  # a cell without stations: its worker stays at home
-        n_basis = promp.N_BASIS
-        return (
-            np.zeros((0, 18, n_basis)),
-            np.zeros((0, 18 * n_basis, 36)),
-            legs,
-            np.zeros((0, 2)),
-        )
     return np.concatenate(samples), np.array(gains), legs, np.array(durations)
 
 
-def ends_gain(one: ProMP) -> Vec:
-    """Return K of an exact condition on all joints at both ends, shape (216, 36)."""
-    nowhere = np.zeros(one.n_joints)
-    rows = [joint_rows(one, JointVia(phase=phase, q=nowhere)) for phase in (0.0, 1.0)]
-    return promp.gain(one, np.concatenate(rows), np.zeros((36, 36)))
+def draw_samples(found: TaskPrimitive, n: int, rng: np.random.Generator) -> Vec:
+    """Draw weights that keep the joint limits, shape (n, 18, n_basis).
+
+    Draws beyond the limits are rejected, as by ``sampling.sample``; what is missing after some
+    rounds is left to that.
+
+    Args:
+        found: Primitive.
+        n: Number of draws.
+        rng: Source of chance.
+    """
+    phi = promp.basis(GRID, promp.N_BASIS, promp.usual_width(promp.N_BASIS))
+    kept: list[Vec] = []
+    for _ in range(ROUNDS):
+        drawn = promp.draw_like(found.weights, n, rng)
+        q = phi @ np.swapaxes(drawn, 1, 2)
+        inside = ((q >= human.Q_MIN) & (q <= human.Q_MAX)).all(axis=(1, 2))
+        kept.extend(drawn[inside])
+        if len(kept) >= n:
+            return np.array(kept[:n])
+    points = points_of(MEDIAN.vector(0.0))  # no via points, so nobody's size matters
+    rest = sample(found.primitive(), n - len(kept), rng, points)
+    return np.array([*kept, *rest])
 
 
 def leg_weights(library: TaskLibrary, primitive: int, sample: int, ends: Vec) -> Vec:

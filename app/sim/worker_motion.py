@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from app.errors import InvalidInput
 from app.sim import human
@@ -22,15 +21,15 @@ from app.sim.kernels.people import People, Tracks
 from app.sim.kernels.repertoire import Repertoire
 from app.sim.motions import Motion, placed
 from app.sim.ports import Vec
-from app.sim.task_library import task_library
+from app.sim.task_library import VARIANTS, task_library
 from app.sim.work_cycle import build_library
 
 WorkMotion = Literal["library", "reaches", "recorded"]
 MOTIONS: tuple[WorkMotion, ...] = ("library", "reaches", "recorded")
 TRACK_DT = 0.02
 """Step to which recorded motion is brought [s]; 50 Hz, above what people's hands hold."""
-NEEDED_S = 20.0
-"""How long a track should go on after an episode's start: a longest episode [s]."""
+NEEDED_S = 10.0
+"""How long a track should go on after an episode's start: an evaluation's episode [s]."""
 NO_TRACKS = Tracks(np.zeros((1, 19)), np.array([[0, 1, -1]]), TRACK_DT, 0.0)
 """The tracks of workers who follow none."""
 
@@ -53,6 +52,8 @@ class WorkSettings:
     augmentation: bool = True
     """Whether primitives are sampled and varied (METHOD 3.4); if not, the library's
     demonstrations are replayed as they are."""
+    variants: int = VARIANTS
+    """Postures for each body, place and hand of the library."""
     recorded: tuple[Motion, ...] = ()
     """The runs drawn from, for ``recorded``, placed in the cell."""
 
@@ -101,7 +102,11 @@ def with_work(shared: People, cell: Cell, settings: WorkSettings) -> People:
 
 def _with_library(shared: People, cell: Cell, settings: WorkSettings) -> People:
     library = task_library(
-        cell, settings.seed, settings.bodies, augmentation=settings.augmentation
+        cell,
+        settings.seed,
+        settings.bodies,
+        augmentation=settings.augmentation,
+        variants=settings.variants,
     )
     # Copies: for read-only arrays the kernels would be compiled anew.
     return shared._replace(
@@ -157,22 +162,17 @@ def tracks_of(motions: Sequence[Motion], floor_z: float) -> tuple[Tracks, Vec]:
 def at_the_table(motion: Motion, cell: Cell) -> Motion:
     """Return a recorded run placed as if it had been made at the cell's table.
 
-    The person's middle over the run stands at the worker's home and looks where it looks.
+    The median of where the person looked is where the cell's worker looks; seen along the
+    table, the median place is the worker's home; where the pelvis came nearest to the table is
+    where a worker stands nearest to it.
     """
-    x, y, yaw = cell.human.home
-    mean_yaw = float(np.median(motion.q[:, 2]))
-    turned = placed(motion, 0.0, 0.0, yaw + float(motion.q[0, 2]) - mean_yaw)
-    middle = np.median(turned.q[:, :2], axis=0)
+    home_x, _, yaw = cell.human.home
+    start = float(motion.q[0, 2])
+    turned = placed(motion, 0.0, 0.0, yaw + start - float(np.median(motion.q[:, 2])))
+    x, y = turned.q[:, 0], turned.q[:, 1]
     return placed(
         turned,
-        x - float(middle[0] - turned.q[0, 0]),
-        y - float(middle[1] - turned.q[0, 1]),
+        home_x + float(x[0] - np.median(x)),
+        cell.human.y_min + float(y[0] - y.min()),
         float(turned.q[0, 2]),
     )
-
-
-def stays_within(motion: Motion, cell: Cell) -> NDArray[np.bool_]:
-    """Return for each sample whether the pelvis is where a worker may be, shape (n,)."""
-    person, q = cell.human, motion.q
-    inside_x = (q[:, 0] >= person.x_min) & (q[:, 0] <= person.x_max)
-    return np.asarray(inside_x & (q[:, 1] >= person.y_min) & (q[:, 1] <= person.y_max))

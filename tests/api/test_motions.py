@@ -1,4 +1,5 @@
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
@@ -88,6 +89,15 @@ def test_same_file_again_is_fine_and_another_one_a_conflict(
     named = post(client, CLIP, file_name="leap-1.bvh", name="leap-2")
     client.delete("/v1/motions/leap-2")
     assert named.status_code == 201
+
+
+def test_same_file_posted_by_two_at_once_is_stored_once(client: TestClient) -> None:
+    with ThreadPoolExecutor(2) as pool:
+        both = [pool.submit(post, client, CLIP, file_name="twice.bvh") for _ in range(2)]
+        answers = [one.result() for one in both]
+    client.delete("/v1/motions/twice")
+    assert sorted(one.status_code for one in answers) == [200, 201]
+    assert answers[0].json() == answers[1].json()
 
 
 def test_unknown_motion_is_not_found_with_the_known_ones(

@@ -12,7 +12,7 @@ def reaches(n: int = 20, seed: int = 5, hz: float = 60.0) -> tuple[list[Vec], Ve
     """Return n motions of unlike length, shape (T_i, 18), and their durations [s]."""
     rng = np.random.default_rng(seed)
     library = build_library(load_cell(), seed, variants=n)
-    home, cube = library.of_station[-1, 0, 0], library.of_station[1, 0, 0]
+    home, cube = library.of_station[0, [-1, 1], 0, 0]
     motions, durations = [], rng.uniform(0.8, 1.8, n)
     for i, duration in enumerate(durations):
         x = np.linspace(0.0, 1.0, int(duration * hz) + 1)

@@ -13,10 +13,14 @@ from app.sim.promp import (
     basis,
     basis_slope,
     draw_durations,
+    draw_like,
     draw_weights,
     fit,
+    gain,
+    gain_of_ends,
     moments,
     observe,
+    of_weights,
     positions,
     reversed_primitive,
     speed_moments,
@@ -155,6 +159,24 @@ def test_observations_together_and_one_by_one_are_the_same(promp: ProMP) -> None
         )
     np.testing.assert_allclose(together.mean, singly.mean, atol=1e-8)
     np.testing.assert_allclose(together.cov, singly.cov, atol=1e-9)
+
+
+def test_draws_like_demonstrations_are_draws_from_their_primitive() -> None:
+    rng = np.random.default_rng(4)
+    weights = rng.normal(0.0, 0.2, (7, 2, 4))
+    known = of_weights(weights, np.ones(7), floor=0.1)
+    drawn = draw_like(weights, 40_000, rng, floor=0.1).reshape(-1, 8)
+    np.testing.assert_allclose(drawn.mean(axis=0), known.mean.ravel(), atol=5e-3)
+    np.testing.assert_allclose(np.cov(drawn.T), known.cov, atol=3e-3)
+
+
+def test_gain_of_both_ends_is_the_gain_of_the_whole_covariance() -> None:
+    weights = np.random.default_rng(5).normal(0.0, 0.3, (9, 3, 12))
+    known = of_weights(weights, np.ones(9), floor=0.03)
+    phi = basis(np.array([0.0, 1.0]), 12, known.width)
+    rows = np.concatenate([np.kron(np.eye(3), row) for row in phi])
+    expected = gain(known, rows, np.zeros((6, 6)))
+    np.testing.assert_allclose(gain_of_ends(weights, 0.03), expected, atol=1e-9)
 
 
 def test_reversed_primitive_is_that_of_reversed_demonstrations(promp: ProMP) -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from app.errors import NotFound
+from app.errors import InvalidInput, NotFound
 from app.sim import human, promp
 from app.sim.body_size import BodySize
 from app.sim.cells import Cell, load_cell
@@ -186,13 +186,11 @@ def test_stations_of_ones_own_are_served_by_the_nearest_primitives(cell: Cell) -
     assert np.mean([motion.beyond > 1e-3 for motion in motions]) < 0.02
 
 
-def test_worker_without_stations_has_a_home_and_no_legs() -> None:
-    library = task_library(load_cell("sorting-e0"), 0)
-    assert library.n_stations == 0 and (library.legs[..., 0] == -1).all()
-    assert library.of_station[:, 0, 0, 1].min() > 0
-    assert library.samples.shape == (0, 18, promp.N_BASIS)
+def test_cell_without_cubes_and_docks_is_refused() -> None:
+    with pytest.raises(InvalidInput, match="sorting-e0.*at least one station of kind cube"):
+        task_library(load_cell("sorting-e0"), 0)
 
 
-def test_cell_without_a_worker_is_refused() -> None:
+def test_cell_without_a_worker_is_refused(cell: Cell) -> None:
     with pytest.raises(NotFound, match="worker"):
-        task_library(load_cell("shared-workspace"), 0)
+        task_library(cell.model_copy(update={"people": ()}), 0)

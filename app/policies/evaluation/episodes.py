@@ -17,6 +17,7 @@ from app.policies.training import work_of
 from app.sim.cells import Cell
 from app.sim.kernels import episode as kernel
 from app.sim.kernels.features import LAYOUT, observe_batch
+from app.sim.kernels.people import new_crowd, see_rows
 from app.sim.pick import OUTCOMES, PickBatch, PickSettings
 from app.sim.recheck import Trajectory
 
@@ -61,9 +62,14 @@ Seen = Callable[[PickBatch, Index], Sight]
 
 
 def seen_exactly(batch: PickBatch, rows: Index) -> Sight:
-    """Return the first worker of each row as they are."""
-    people = batch.state.people
-    return Sight(q=people.q[rows, 0], qd=people.qd[rows, 0], size=people.size[rows, 0])
+    """Return the person nearest to each row's robot, as they are; far away for nobody."""
+    shared, state, n = batch.world.people, batch.state, len(rows)
+    seen = Sight(
+        q=np.empty((n, 18)), qd=np.empty((n, 18)), size=np.empty((n, shared.bodies.shape[1]))
+    )
+    crowd = new_crowd(shared, state.people.q.shape[1], state.people.cylinders.shape[1])
+    see_rows(shared, state.people, state.robot, rows, crowd, seen.q, seen.qd, seen.size)
+    return seen
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,7 +83,7 @@ class Episodes:
     switches: Index
     """How often the choice changed, shape (n,)."""
     trajectories: tuple[Trajectory, ...]
-    """Robot and person of the first rows, as long as each ran."""
+    """Robot and each worker of the first rows, as long as each ran."""
 
     def row(self, name: str) -> dict[str, object]:
         """Return the result row of these episodes, rates with 95 % intervals."""
@@ -206,7 +212,7 @@ class Evaluator:
 
 
 class _Trace:
-    """Records robot and person of the first rows at a fifth of the control period."""
+    """Records robot and workers of the first rows at a fifth of the control period."""
 
     PARTS = 5
     """Recorded poses per control period (10 ms at 20 Hz)."""
@@ -214,14 +220,16 @@ class _Trace:
     def __init__(self, batch: PickBatch, n_recorded: int) -> None:
         self._batch, self._n = batch, n_recorded
         self._robot: list[list[NDArray[np.float64]]] = [[] for _ in range(n_recorded)]
-        self._person: list[list[NDArray[np.float64]]] = [[] for _ in range(n_recorded)]
+        self._workers: list[list[NDArray[np.float64]]] = [[] for _ in range(n_recorded)]
+        self._sizes: list[list[NDArray[np.float64]]] = [[] for _ in range(n_recorded)]
 
     def before(self, rows: Index) -> None:
         state, n = self._batch.state, self._n
         self._rows = rows[rows < n]
         self._q0, self._qd0 = state.q[:n].copy(), state.qd[:n].copy()
         self._qdd0 = state.qdd[:n].copy()
-        self._human0 = state.people.q[:n, 0].copy()
+        self._human0 = state.people.q[:n].copy()
+        self._size0 = state.people.size[:n].copy()
 
     def after(self, rows: Index) -> None:
         """Add the period's poses; a row that collided is left out, its contact is known."""
@@ -235,19 +243,25 @@ class _Trace:
                 c = 0.5 * self._qdd0[row]
                 d = (state.qdd[row] - self._qdd0[row]) / (6.0 * dt)
             for part in range(1, self.PARTS + 1):
-                x = dt * part / self.PARTS
+                x, blend = dt * part / self.PARTS, part / self.PARTS
                 q = self._q0[row] + x * (self._qd0[row] + x * (c + x * d))
-                blend = part / self.PARTS
-                person = self._human0[row] + blend * (
-                    state.people.q[row, 0] - self._human0[row]
-                )
                 self._robot[row].append(q)
-                self._person[row].append(person)
+                before, now = self._human0[row], state.people.q[row]
+                self._workers[row].append(before + blend * (now - before))
+                before, now = self._size0[row], state.people.size[row]
+                self._sizes[row].append(before + blend * (now - before))
 
     def trajectories(self) -> tuple[Trajectory, ...]:
+        """Return one trajectory for each worker of each recorded row."""
         dt = self._batch.arm.dt / self.PARTS
         return tuple(
-            Trajectory(q_robot=np.array(q), q_human=np.array(person), dt=dt)
-            for q, person in zip(self._robot, self._person, strict=True)
+            Trajectory(
+                q_robot=np.array(q),
+                q_human=np.array(workers)[:, w],
+                sizes=np.array(sizes)[:, w],
+                dt=dt,
+            )
+            for q, workers, sizes in zip(self._robot, self._workers, self._sizes, strict=True)
             if q
+            for w in range(workers[0].shape[0])
         )

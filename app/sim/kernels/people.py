@@ -467,3 +467,71 @@ def see_nearest(people: People, state: PeopleState, e: int, robot: Vec, crowd: C
         x, y = rows[e, k, X], rows[e, k, Y]
         crowd.seen_q[0], crowd.seen_q[1], crowd.seen_q[2] = x, y, math.atan2(-y, -x)
         crowd.seen_qd[0], crowd.seen_qd[1] = rows[e, k, VX], rows[e, k, VY]
+
+
+@kernel()
+def see_rows(
+    people: People,
+    state: PeopleState,
+    robots: Vec,
+    rows: NDArray[np.int64],
+    crowd: Crowd,
+    q: Vec,
+    qd: Vec,
+    size: Vec,
+) -> None:
+    """Apply :func:`see_nearest` to some environments.
+
+    Args:
+        people: Shared data.
+        state: Rows of the people.
+        robots: The robots' capsules, shape (n_envs, 9, n).
+        rows: Which environments, shape (k,).
+        crowd: Work space.
+        q: Filled with the joints of the person seen [m, rad], shape (k, 18).
+        qd: Filled with the speeds [m/s, rad/s], shape (k, 18).
+        size: Filled with the sizes [m], shape (k, body.N_SIZE).
+    """
+    for k in range(rows.shape[0]):
+        e = rows[k]
+        place_people(people, state, e, crowd)
+        see_nearest(people, state, e, robots[e], crowd)
+        copy_values(crowd.seen_q, q[k])
+        copy_values(crowd.seen_qd, qd[k])
+        copy_values(crowd.seen_size, size[k])
+
+
+@kernel()
+def record_palms(
+    people: People,
+    state: PeopleState,
+    seed: int,
+    script_number: int,
+    rng: random.State,
+    robot: Vec,
+    dt: float,
+    crowd: Crowd,
+    palms: Vec,
+) -> None:
+    """Write where the workers' palms are over a time that begins like an episode.
+
+    Args:
+        people: Shared data.
+        state: Rows; row 0 is used.
+        seed: Seed of the stream.
+        script_number: Number of the stream.
+        rng: Work space for it, shape (1,).
+        robot: The robot's capsules, shape (9, n), for people who mind it.
+        dt: Time between samples [s].
+        crowd: Work space.
+        palms: Filled [m], shape (n_samples, W, 2, 3).
+    """
+    random.start_stream(seed, 1 << 20, script_number, rng)
+    start_people(people, state, 0, rng, crowd)
+    for k in range(palms.shape[0]):
+        advance_people(people, state, 0, robot, dt, crowd.away)
+        place_people(people, state, 0, crowd)
+        for w in range(palms.shape[1]):
+            for i in range(3):
+                palms[k, w, 0, i] = crowd.points[w, body.HAND_R, i]
+                palms[k, w, 1, i] = crowd.points[w, body.HAND_L, i]
