@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from app.sim import human
+from app.sim.body_size import percentile_body
 from app.sim.cases import Case, script_of
 from app.sim.cells import Cell
 from app.sim.commands import Mode, MoveHuman, SetBody, SetMotion
@@ -17,9 +18,10 @@ from app.sim.live_body import LiveBody
 from app.sim.played_motion import PlayedMotion, is_outside
 from app.sim.ports import Person, Vec
 from app.sim.snapshot import PersonView
-from app.sim.work_cycle import VARIANTS, WorkCycle
+from app.sim.task_cycle import TaskCycle
+from app.sim.task_library import VARIANTS
 
-FEWER_VARIANTS = 8
+FEWER_VARIANTS = 4
 """Postures per place and hand of a person who is not the cell's own: soon made."""
 THERE_M = 0.005
 """Height of the pelvis from which on it counts as arrived [m]."""
@@ -145,14 +147,13 @@ class LivePerson:
         self._work = self._new_work()
         self._t, self._joining = 0.0, self.mode == "auto"
 
-    def _new_work(self) -> WorkCycle:
-        worker, names = self._place.human, ("stature", "arms", "shoulders")
-        as_large = dict(zip(names, self.body.percentiles, strict=True))
-        cell = self._place
-        if any(getattr(worker, name) != value for name, value in as_large.items()):
-            cell = cell.model_copy(update={"people": (worker.model_copy(update=as_large),)})
-        own = cell == self._cell
-        return WorkCycle(cell, self._seed, VARIANTS if own else FEWER_VARIANTS)
+    def _new_work(self) -> TaskCycle:
+        worker = self._place.human
+        stature, arms, shoulders = self.body.percentiles
+        size = percentile_body(stature, arms, shoulders, worker.pelvis_height)
+        own = self._place == self._cell and size == worker.size
+        variants = VARIANTS if own else FEWER_VARIANTS
+        return TaskCycle(self._place, self._seed, size, variants)
 
     def _join_run(self) -> None:
         self._t, self._joining = 0.0, True
@@ -186,7 +187,7 @@ class LivePerson:
             return False
         if self.mode == "manual":
             self._limbs.drag(MoveHuman(), self.size)
-        elif self.mode == "auto" and self.body.settled and isinstance(self._work, WorkCycle):
+        elif self.mode == "auto" and self.body.settled and isinstance(self._work, TaskCycle):
             self._begin_work()
         return True
 

@@ -1,8 +1,8 @@
 """A recorded motion, played in a cell at the pace it was recorded.
 
-The run is put down with its middle at a person's home, looking at the table
-(``worker_motion.at_the_table``); its path is kept in metres, wherever it leads. Angles beyond
-the model's limits are clipped; how often, and by how much that moves the wrists, is told.
+The run is put down at a person's place at the table (``worker_motion.at_the_table``); its path
+is kept in metres, wherever it leads. Angles beyond the model's limits are clipped; how often,
+and by how much that moves the wrists, is told.
 """
 
 import math

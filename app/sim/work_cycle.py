@@ -22,8 +22,6 @@ from app.sim.kernels import random, script
 from app.sim.ports import Vec
 
 HANDS: tuple[Hand, Hand] = ("r", "l")
-VARIANTS = 24
-"""Random postures per place and hand."""
 REACH_PACE = 0.5
 """Mean palm speed of a single reach [m/s]."""
 SHORTEST_REACH_S = 0.8
@@ -48,7 +46,7 @@ class Library:
 
 @lru_cache(maxsize=8)
 def build_library(
-    cell: Cell, seed: int, bodies: tuple[BodySize, ...] | None = None, variants: int = VARIANTS
+    cell: Cell, seed: int, bodies: tuple[BodySize, ...] | None = None, variants: int = 24
 ) -> Library:
     """Make ``variants`` random postures for each body, place and hand of a cell.
 
@@ -155,11 +153,10 @@ class WorkCycle:
     Args:
         cell: Work cell.
         seed: Seed of library and scripts.
-        variants: Postures per place and hand.
     """
 
-    def __init__(self, cell: Cell, seed: int, variants: int = VARIANTS) -> None:
-        self._library = build_library(cell, seed, variants=variants)
+    def __init__(self, cell: Cell, seed: int) -> None:
+        self._library = build_library(cell, seed)
         self._seed = seed
         self._block = 0
         self._begin = 0.0

@@ -203,7 +203,7 @@ def test_size_changes_while_the_clock_stands(world: World) -> None:
     assert after.people[0].size[PELVIS_Z] > before.people[0].size[PELVIS_Z] + 0.05
 
 
-def test_recorded_motion_is_played_about_home_at_its_own_pace_and_size_of_path(
+def test_recorded_motion_is_played_at_the_table_at_its_own_pace_and_size_of_path(
     world: World, cell: Cell
 ) -> None:
     start = play(world).people[0]
@@ -215,8 +215,9 @@ def test_recorded_motion_is_played_about_home_at_its_own_pace_and_size_of_path(
         times.append(now.motion.t_s)
     ways = np.linalg.norm(np.array(places) - places[0], axis=1)
     assert ways.max() == pytest.approx(0.3, abs=0.01)
-    x, y, yaw = cell.human.home
-    assert np.median(places, axis=0) == pytest.approx([x, y], abs=0.02)
+    x, _, yaw = cell.human.home
+    assert np.median(places, axis=0)[0] == pytest.approx(x, abs=0.02)
+    assert np.min(places, axis=0)[1] == pytest.approx(cell.human.y_min, abs=0.02)
     assert np.median(yaws) == pytest.approx(yaw, abs=0.05)
     assert np.allclose(np.diff(times), DT)
 
@@ -269,7 +270,7 @@ def test_angles_beyond_limits_are_clipped_and_counted(world: World) -> None:
 def test_speeds_of_a_recording_stay_within_what_a_policy_takes(cell: Cell) -> None:
     motion = recorded()
     q = motion.q.copy()
-    q[50:, 10] += 3.5
+    q[50:, 2] += 3.0
     played = PlayedMotion(replace(motion, q=q), cell, cell.human, "jerk")
     fastest = max(np.abs(played.at(0.01 * k)[1]).max() for k in range(200))
     assert fastest == 50.0
