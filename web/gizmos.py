@@ -102,9 +102,9 @@ class Gizmos:
         if not manual:
             self._released.clear()
             return
-        points = human.joint_points(person.q, person.size)
+        points = human.joint_points(person.posture, person.size)
         if self._free("pelvis"):
-            _move(self._pelvis, points["pelvis"], upright(float(person.q[2])))
+            _move(self._pelvis, points["pelvis"], upright(float(person.posture[2])))
         for name, gizmo in self._hands.items():
             if self._free(name):
                 _move(gizmo, points[HANDS[name]])

@@ -98,7 +98,7 @@ class PersonView:
             dt: Time since the last call [s], for the steps of the feet.
         """
         self._follow_size(person)
-        q, size = person.q, person.size
+        q, size = person.posture, person.size
         pelvis = human.body_frames(q, size)["pelvis"]
         walking = self._gait.follow(pelvis, dt, float(size[GIRTH]))
         if not walking and self._drawn is not None:

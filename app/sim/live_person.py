@@ -71,9 +71,13 @@ class LivePerson:
         return self.body.size
 
     def seen(self) -> Person:
-        """Return the person as a policy sees it, the yaw within half a turn of home."""
+        """Return the person as a policy sees it, inside the joint limits.
+
+        The yaw lies within half a turn of home's.
+        """
         q, full = self._limbs.q.copy(), 2.0 * math.pi
         q[2] -= full * round((q[2] - self._cell.human.home[2]) / full)
+        q = np.clip(q, human.Q_MIN, human.Q_MAX)
         return Person(q=q, qd=self._limbs.qd, size=self.size)
 
     # What the person does.
@@ -231,6 +235,7 @@ class LivePerson:
             id=self.id,
             mode=self.mode,
             q=frozen(seen.q),
+            posture=frozen(self._limbs.q),
             qd=frozen(seen.qd),
             size=frozen(self.size),
             body=self.body.view(),

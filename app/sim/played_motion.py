@@ -1,8 +1,9 @@
 """A recorded motion, played in a cell at the pace it was recorded.
 
 The run is put down at a person's place at the table (``worker_motion.at_the_table``); its path
-is kept in metres, wherever it leads. Angles beyond the model's limits are clipped; how often,
-and by how much that moves the wrists, is told.
+is kept in metres, wherever it leads, and the body is where it was recorded, even where that
+takes an angle beyond the model's limits. Policies are told angles inside the limits; how often
+that differs, and by how much at the wrists, is told.
 """
 
 import math
@@ -54,13 +55,14 @@ class PlayedMotion:
         self._name, self._run, self._n_runs = name, run, n_runs
         path = at_the_table(motion, place).q
         self._times, self._rise = motion.times, motion.pelvis_z
-        self._q = np.clip(path, Q_MIN, Q_MAX)
-        self._q[:, YAW] = path[:, YAW]
-        clipped = np.abs(self._q - path)[:, YAW + 1 :].max(axis=1) > 1e-6
+        self._q = path.copy()
+        told = np.clip(path, Q_MIN, Q_MAX)
+        told[:, YAW] = path[:, YAW]
+        clipped = np.abs(told - path)[:, YAW + 1 :].max(axis=1) > 1e-6
         self._clipped_share = float(clipped.mean())
         wrists = [
             model_points(q, motion.pelvis_z, motion.size)[:, [WRIST_R, WRIST_L]]
-            for q in (path, self._q)
+            for q in (path, told)
         ]
         self._clipped_m = float(np.linalg.norm(wrists[1] - wrists[0], axis=2).max())
         self._outside_share = float(np.mean([is_outside(q, worker) for q in self._q]))

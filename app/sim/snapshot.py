@@ -95,9 +95,9 @@ class MotionView:
     outside_share: float
     """Share of its frames whose pelvis lies outside the walking area."""
     clipped_share: float
-    """Share of its frames with an angle that was clipped to a joint's limit."""
+    """Share of its frames with an angle beyond a joint's limit; policies are told the limit."""
     clipped_m: float
-    """By how much that moves a wrist at most [m]."""
+    """How far a wrist told so is from the true one at most [m]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,7 +109,10 @@ class PersonView:
     mode: Mode
     """Who moves the person."""
     q: Vec
-    """Joint positions [m, rad], shape (18,), read-only; yaw within half a turn of home's."""
+    """Joint positions inside their limits, as policies are told them [m, rad], shape (18,),
+    read-only; yaw within half a turn of home's."""
+    posture: Vec
+    """Where the body is [m, rad], shape (18,), read-only: recorded people leave the limits."""
     qd: Vec
     """Joint speeds [m/s, rad/s], shape (18,), read-only."""
     size: Vec

@@ -257,13 +257,17 @@ def test_recorded_path_that_leaves_the_area_is_told(world: World) -> None:
     assert 0.2 < seen[0].motion.outside_share < 0.8
 
 
-def test_angles_beyond_limits_are_clipped_and_counted(world: World) -> None:
+def test_body_is_where_it_was_recorded_and_policies_are_told_the_limits(world: World) -> None:
     start = play(world, shoulder=3.5).people[0]
     assert start.motion is not None
     assert 0.05 < start.motion.clipped_share < 0.5
     assert 0.1 < start.motion.clipped_m < 0.4
+    beyond = 0.0
     for _ in range(39):
-        assert (run(world, 1).people[0].q <= human.Q_MAX + 1e-9).all()
+        person = run(world, 1).people[0]
+        assert (person.q <= human.Q_MAX + 1e-9).all()
+        beyond = max(beyond, float((person.posture - human.Q_MAX)[3:].max()))
+    assert beyond > 0.3
     assert play(world).people[0].motion.clipped_share == 0.0  # type: ignore[union-attr]
 
 

@@ -127,8 +127,8 @@ function Progress({ person, motion }) {
     motion.outside_share > 0.001 &&
       `${percent(motion.outside_share)} of the path leaves the walking area.`,
     motion.clipped_share > 0.001 &&
-      `${percent(motion.clipped_share)} of the frames bend a joint beyond its limit; there it stops,
-      and a wrist is up to ${format.distance(motion.clipped_m)} from where it was.`,
+      `${percent(motion.clipped_share)} of the frames bend a joint beyond the model's limit; the
+      policy is told the limit, with a wrist up to ${format.distance(motion.clipped_m)} off.`,
   ].filter(Boolean);
   return html`<span class="played"><i style=${{ transform: `scaleX(${share})` }}></i></span>
     <span class="played-text" data-role="progress">${person.joining

@@ -37,8 +37,12 @@ class MotionLive(Answer):
     t_s: float = Field(description="how far it has come [s]")
     duration_s: float = Field(description="length of the run [s]")
     outside_share: float = Field(description="share of its path outside the walking area")
-    clipped_share: float = Field(description="share of frames clipped to joint limits")
-    clipped_m: float = Field(description="by how much that moves a wrist at most [m]")
+    clipped_share: float = Field(
+        description="share of frames with an angle beyond a joint limit; policies are told the limit"
+    )
+    clipped_m: float = Field(
+        description="how far a wrist told so is from the true one at most [m]"
+    )
 
     @classmethod
     def from_domain(cls, view: MotionView) -> Self:
