@@ -38,7 +38,7 @@ class MotionLive(Answer):
     duration_s: float = Field(description="length of the run [s]")
     outside_share: float = Field(description="share of its path outside the walking area")
     clipped_share: float = Field(
-        description="share of frames with an angle beyond a joint limit; policies are told the limit"
+        description="share of frames with an angle beyond a joint limit, told as the limit"
     )
     clipped_m: float = Field(
         description="how far a wrist told so is from the true one at most [m]"
