@@ -190,6 +190,7 @@ def people_of(cell: Cell, work: WorkSettings | None = None) -> People:
         n_cubes=0,
         source=people.REACHES,
         track_share=0.0,
+        absent_share=0.0,
         repertoire=no_repertoire(),
         tracks=NO_TRACKS,
         limits=np.stack([human.Q_MIN, human.Q_MAX]),
