@@ -31,6 +31,7 @@ from app.sim.kernels.features import BODY_SIZES, SIZES
 from app.sim.kernels.people import ABSENT
 from app.sim.kernels.reward import RewardWeights
 from app.sim.pick import PickBatch, PickSettings
+from app.sim.scene import HumanKind
 from app.sim.worker_motion import WorkSettings
 
 LAYOUTS = {
@@ -135,6 +136,7 @@ def work_of(preset: Mapping[str, Any], seed: int = 0) -> WorkSettings:
 
 def settings_of(preset: Preset) -> PickSettings:
     """Return the scenario's settings of a preset."""
+    worker: HumanKind = "worker"
     return PickSettings(
         time_limit_s=preset.time_limit_s,
         short_limit_s=preset.short_limit_s,
@@ -142,7 +144,7 @@ def settings_of(preset: Preset) -> PickSettings:
         start_clearance_m=preset.start_clearance_m,
         target_jitter_m=preset.target_jitter_m,
         way_share=preset.way_share,
-        people=None if preset.n_people == 1 else ("worker",) * preset.n_people,
+        people=None if preset.n_people == 1 else (worker,) * preset.n_people,
         work=work_of(asdict(preset)),
         observation="body" if preset.observation == "body" else "features",
         action=preset.action,

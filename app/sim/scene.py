@@ -221,7 +221,7 @@ def new_people_state(cell: Cell, shared: People, n_envs: int) -> PeopleState:
         clock=rows(workers),
         near=rows(workers),
         lean=rows(workers, 4),
-        track=counts(workers),
+        track=counts(workers) + people.SCRIPTED,
         legs=new_legs(n_envs, workers),
         move=counts(workers),
         n_moves=counts(workers),
