@@ -69,9 +69,7 @@ def evaluate(
     tested = {} if name in WITHOUT_CHECKPOINT else _identity(checkpoint)
     started = time.process_time()
     more = {"motions": motions} if name in WITH_MOTIONS else {}
-    outcome = PROTOCOLS[name](
-        checkpoint, episodes=episodes, seed=seed, on_row=on_row, **more
-    )
+    outcome = PROTOCOLS[name](checkpoint, episodes=episodes, seed=seed, on_row=on_row, **more)
     return {
         "protocol": name,
         **tested,
@@ -82,7 +80,9 @@ def evaluate(
     }
 
 
-def check_motions(name: str, given: Sequence[str], field: str = "motions", how: str = "") -> None:
+def check_motions(
+    name: str, given: Sequence[str], field: str = "motions", how: str = ""
+) -> None:
     """Check that motions are given where a protocol takes them, and nowhere else.
 
     Args:

@@ -65,9 +65,9 @@ class PickEnv(SingleEnv):
     Of several people the nearest is seen; a cylinder as a person who stands in it, nobody as
     one far away. ``PickSettings(observation="state")`` gives the plain state (5.8), 51 numbers:
     q, qd of the robot (2 x 6) and the person (2 x 18) [rad, rad/s, m, m/s], target [m].
-    ``PickSettings(observation="body")`` adds the size of the person seen to the features: 12
-    lengths [m] (``app.sim.body_size.NAMES``; the first is the height of the pelvis, without unit
-    the last, the girth), in all ``N_WITH_BODY`` numbers, groups as in ``BODY_SIZES``.
+    ``PickSettings(observation="body")`` adds the size of the person seen to the features, 12
+    numbers: ``app.sim.body_size.NAMES`` [m], the pelvis's height as it is now, and the girth;
+    in all ``N_WITH_BODY``, groups as in ``features.BODY_SIZES``.
 
     ## Reward
     ``c_d (d_old - gamma d) + c_th (th_old - gamma th) - c_c [collision] - c_step
