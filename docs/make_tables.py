@@ -77,9 +77,9 @@ def conditions(result: Json) -> list[str]:
 
 
 def pages() -> list[Path]:
-    """Return the files with tables: the README, the pages on people and the model cards."""
+    """Return the files with tables: the README, the page on trackers and the model cards."""
     cards = sorted((ROOT / "app/policies/pretrained").glob("*.md"))
-    return [ROOT / "README.md", *sorted((ROOT / "docs").glob("people*.md")), *cards]
+    return [ROOT / "README.md", ROOT / "docs/people-tracker.md", *cards]
 
 
 def main() -> None:

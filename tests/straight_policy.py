@@ -39,9 +39,12 @@ class StraightPolicy:
         postures, reachable = kinematics.ik_vertical_batch(
             goals, arm.tool_length, arm.q_min, arm.q_max
         )
-        points = human.joint_points(people[0].q, self._size)
-        hands = np.stack([points["hand_r"], points["hand_l"]])
-        near = np.linalg.norm(goals[:, None] - hands, axis=2).min(axis=1)
+        hands = [np.full(3, np.inf)]
+        for person in people:
+            size = self._size if person.size is None else person.size
+            points = human.joint_points(person.q, size)
+            hands += [points["hand_r"], points["hand_l"]]
+        near = np.linalg.norm(goals[:, None] - np.stack(hands), axis=2).min(axis=1)
         values = 4.0 - np.abs(postures - q).max(axis=1) - 4.0 * np.exp(-((near / 0.2) ** 2))
         index = int(values.argmax())
         speed = np.clip(2.5 * (postures - q), -arm.qd_max, arm.qd_max)

@@ -8,11 +8,13 @@ import viser
 
 from web.poses import Vec, orientation
 
+STIFF_M = 1e-3
+"""Change of a capsule's length that is not shown [m]."""
 SHAPE, TOUCHED = (64, 150, 190), (224, 44, 40)
 
 
 class CapsulesView:
-    """Capsules of constant size that are placed by their ends.
+    """Capsules that are placed by their ends; one that changes its length is stretched.
 
     Args:
         server: Where to draw.
@@ -23,8 +25,15 @@ class CapsulesView:
         self._scene, self._root = server.scene, root
         self._scene.add_frame(root, show_axes=False)
         self._handles: dict[str, viser.MeshHandle] = {}
+        self._sizes: list[tuple[float, float]] = []
         self._ends: Vec | None = None
         self._placed = False
+
+    def clear(self) -> None:
+        """Take all capsules away."""
+        for handle in self._handles.values():
+            handle.remove()
+        self._handles, self._sizes, self._ends = {}, [], None
 
     def add(self, name: str, radius: float, length: float) -> None:
         """Add a capsule, hidden at first.
@@ -34,6 +43,7 @@ class CapsulesView:
             radius: Radius [m].
             length: Distance of its ends [m].
         """
+        self._sizes.append((radius, length))
         mesh = trimesh.creation.capsule(height=length, radius=radius, count=(24, 14))
         vertices = np.asarray(mesh.vertices)
         self._handles[name] = self._scene.add_mesh_simple(
@@ -69,8 +79,14 @@ class CapsulesView:
     def _send(self, ends: Vec) -> None:
         self._placed = True
         turns = orientation(_turns_onto(ends[:, 1] - ends[:, 0]))
-        for handle, turn, pair in zip(self._handles.values(), turns, ends, strict=True):
+        handles = zip(self._handles.values(), self._sizes, turns, ends, strict=True)
+        for handle, (radius, length), turn, pair in handles:
             handle.wxyz, handle.position = turn, pair.mean(axis=0)
+            now = float(np.linalg.norm(pair[1] - pair[0]))
+            stretch = (now + 2.0 * radius) / (length + 2.0 * radius)
+            scale = (1.0, 1.0, stretch if abs(now - length) > STIFF_M else 1.0)
+            if handle.scale != scale:
+                handle.scale = scale
 
 
 def _turns_onto(directions: Vec) -> Vec:

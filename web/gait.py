@@ -34,22 +34,27 @@ class Gait:
         self._planted: dict[str, Vec] = {}
         self._swing: dict[str, float] = {}
 
-    def follow(self, pelvis: Vec, dt: float) -> bool:
+    def follow(self, pelvis: Vec, dt: float, girth: float = 1.0) -> bool:
         """Move the feet after the pelvis.
 
         Args:
             pelvis: T_world_pelvis, shape (4, 4).
             dt: Time since the last call [s].
+            girth: Size of the legs relative to the median person's.
 
         Returns:
             Whether a foot moved.
         """
-        goal = rest_feet(pelvis, self._floor_z)
+        goal = rest_feet(pelvis, self._floor_z, girth)
         if not self.feet:
             self.feet = goal
             self._planted = {side: foot.copy() for side, foot in goal.items()}
             return True
         moved = False
+        for side in set(SIDES) - set(self._swing):
+            if self.feet[side][2, 3] != goal[side][2, 3]:  # soles stay on the floor
+                self.feet[side][2, 3] = self._planted[side][2, 3] = goal[side][2, 3]
+                moved = True
         offsets = {side: self._offset(side, goal[side]) for side in SIDES}
         for side in sorted(SIDES, key=lambda name: -offsets[name]):
             if side in self._swing:

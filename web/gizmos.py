@@ -1,4 +1,4 @@
-"""Handles on the person: pelvis and both hands, for a visitor to drag in manual mode.
+"""Handles on a person: pelvis and both hands, for a visitor to drag in manual mode.
 
 Callbacks run on viser's event loop and only queue a command. A gizmo that is not held follows
 the body it belongs to, so that it shows what was reached.
@@ -11,9 +11,8 @@ import numpy as np
 import viser
 
 from app.sim import human
-from app.sim.cells import Cell
 from app.sim.commands import MoveHuman
-from app.sim.snapshot import WorldSnapshot
+from app.sim.snapshot import PersonView
 from web.poses import Vec, upright, yaw_of
 
 HANDS = {"right": "hand_r", "left": "hand_l"}
@@ -24,22 +23,23 @@ HOLD_S = 5.0
 
 
 class Gizmos:
-    """Three gizmos; poses are written by the live cell's thread only.
+    """Three gizmos of one person; poses are written by the live cell's thread only.
 
     Args:
         server: Where to draw.
-        cell: Says how high the pelvis is.
+        person: Id of the person.
         submit: Takes the command of a drag.
     """
 
     def __init__(
-        self, server: viser.ViserServer, cell: Cell, submit: Callable[[MoveHuman], None]
+        self, server: viser.ViserServer, person: int, submit: Callable[[MoveHuman], None]
     ) -> None:
-        self._cell, self._submit = cell, submit
-        scene = server.scene
+        self._person, self._submit = person, submit
+        scene, root = server.scene, f"/gizmos/{person}"
+        self._frame = scene.add_frame(root, show_axes=False)
         self._released: dict[str, float] = {}
         self._pelvis = scene.add_transform_controls(
-            "/gizmos/pelvis",
+            f"{root}/pelvis",
             scale=0.34,
             line_width=3.0,
             active_axes=(True, True, False),
@@ -49,7 +49,7 @@ class Gizmos:
         )
         self._hands = {
             name: scene.add_transform_controls(
-                f"/gizmos/{name}",
+                f"{root}/{name}",
                 scale=0.2,
                 line_width=2.5,
                 disable_rotations=True,
@@ -66,7 +66,9 @@ class Gizmos:
         async def _(event: viser.TransformControlsEvent) -> None:
             self._hold("pelvis", event.phase)
             x, y, _ = (float(value) for value in self._pelvis.position)
-            self._submit(MoveHuman(pelvis=(x, y, yaw_of(self._pelvis.wxyz))))
+            self._submit(
+                MoveHuman(person=self._person, pelvis=(x, y, yaw_of(self._pelvis.wxyz)))
+            )
 
         for name, gizmo in self._hands.items():
             self._listen_to_hand(name, gizmo)
@@ -77,9 +79,9 @@ class Gizmos:
             self._hold(name, event.phase)
             x, y, z = (float(value) for value in gizmo.position)
             if name == "right":
-                self._submit(MoveHuman(right=(x, y, z)))
+                self._submit(MoveHuman(person=self._person, right=(x, y, z)))
             else:
-                self._submit(MoveHuman(left=(x, y, z)))
+                self._submit(MoveHuman(person=self._person, left=(x, y, z)))
 
     def _hold(self, name: str, phase: str) -> None:
         self._released[name] = time.monotonic() + (SETTLE_S if phase == "end" else HOLD_S)
@@ -87,18 +89,22 @@ class Gizmos:
     def _free(self, name: str) -> bool:
         return time.monotonic() >= self._released.get(name, 0.0)
 
-    def draw(self, snapshot: WorldSnapshot) -> None:
+    def remove(self) -> None:
+        """Take the gizmos out of the scene."""
+        self._frame.remove()
+
+    def draw(self, person: PersonView) -> None:
         """Show the gizmos in manual mode, each where its body is."""
-        manual = snapshot.mode == "manual"
+        manual = person.mode == "manual"
         for gizmo in (self._pelvis, *self._hands.values()):
             if gizmo.visible != manual:
                 gizmo.visible = manual
         if not manual:
             self._released.clear()
             return
-        points = human.joint_points(snapshot.person_q, self._cell.body)
+        points = human.joint_points(person.posture, person.size)
         if self._free("pelvis"):
-            _move(self._pelvis, points["pelvis"], upright(float(snapshot.person_q[2])))
+            _move(self._pelvis, points["pelvis"], upright(float(person.posture[2])))
         for name, gizmo in self._hands.items():
             if self._free(name):
                 _move(gizmo, points[HANDS[name]])

@@ -47,6 +47,9 @@ class LiveHandle:
     def __init__(self, id: str, cell: Cell, first: WorldSnapshot) -> None:
         self._id, self._cell, self._last = id, cell, first
         self._queue: queue.SimpleQueue[Command] = queue.SimpleQueue()
+        self._lock = threading.Lock()
+        # Who will be there once all that waits is done.
+        self._people = tuple(person.id for person in first.people)
 
     @property
     def id(self) -> str:
@@ -59,8 +62,10 @@ class LiveHandle:
         Raises:
             ServiceError: The command does not fit this cell.
         """
-        commands.check(command, self._cell)
-        self._queue.put(command)
+        with self._lock:
+            commands.check(command, self._cell, self._people)
+            self._people = commands.people_after(command, self._people)
+            self._queue.put(command)
 
     def snapshot(self) -> WorldSnapshot:
         """Return the last snapshot; never waits."""
@@ -86,7 +91,7 @@ class LiveCell:
         policy: Acts at first; None lets the robot rest.
         host: Address the viewer listens on; loopback, since it has no authentication.
         port: Port of the viewer; 0 takes a free one.
-        seed: Seed of the person's work.
+        seed: Seed of the people's work.
         id: Name of the world in URLs.
     """
 

@@ -1,8 +1,8 @@
 """What the person looks like: eleven parts, ready to be drawn.
 
 The surfaces come from ``meshes/mannequin.npz``, written by :mod:`web.model_mannequin`; colours
-and skin weights are given here. Positions are stored as 16-bit shares of each part's box
-(steps below 0.03 mm).
+and skin weights are given here, and the surfaces for people of other sizes (:func:`fitted`).
+Positions are stored as 16-bit shares of each part's box (steps below 0.03 mm).
 """
 
 from collections.abc import Callable, Mapping
@@ -63,6 +63,9 @@ _COLORS: Mapping[str, Rgb] = {
     "shoe_l": (33, 34, 38),
     "shoe_r": (33, 34, 38),
 }
+VESTS: tuple[Rgb, ...] = ((255, 116, 32), (196, 214, 48), (72, 164, 232), (232, 104, 168))
+"""Colours of the vests by which people are told apart, in the order of their ids; the same as
+VESTS in ``web/static/palette.js``."""
 _BONES = {
     "head": "head",
     "helmet": "head",
@@ -116,3 +119,30 @@ def parts() -> tuple[Part, ...]:
         )
         for name, surface in surfaces.items()
     )
+
+
+def color_of(part: Part, person: int) -> Rgb:
+    """Return the colour of a part of the person of an id."""
+    return VESTS[person % len(VESTS)] if part.name == "vest" else part.color
+
+
+def fitted(part: Part, size: Vec) -> Vec:
+    """Return a soft part's vertices for a person of another size [m], shape (n, 3).
+
+    Each vertex is moved and scaled with its bones, weighted as when they move: what joins two
+    bones stays joined.
+
+    Args:
+        part: A soft part.
+        size: The person's size [m], shape (12,).
+    """
+    median, own = skeleton.bind_bones(), skeleton.bind_bones(size)
+    right, left = skeleton.scales(size, "r"), skeleton.scales(size, "l")
+    out = np.zeros_like(part.surface.vertices)
+    for name, weights in part.weights.items():
+        before, after = median[name], own[name]
+        local = (part.surface.vertices - before[:3, 3]) @ before[:3, :3]
+        scale = np.where(local[:, 1:2] < 0.0, right[name], left[name])
+        moved = (local * scale) @ after[:3, :3].T + after[:3, 3]
+        out += weights[:, None] * moved
+    return out

@@ -1,14 +1,19 @@
-"""The person in the scene: the mannequin, its feet, and the simulator's capsules over it."""
+"""One person in the scene: the mannequin, its feet, and the simulator's capsules over it."""
 
 import numpy as np
 import viser
 
 from app.sim import human
 from app.sim.cells import Cell
+from app.sim.kernels.body import GIRTH, PELVIS_Z
+from app.sim.snapshot import PersonView as Seen
 from web import mannequin, skeleton
 from web.capsules_view import CapsulesView
 from web.gait import Gait
 from web.poses import Vec, orientation
+
+SAME_M = 1e-4
+"""Lengths that differ by less are the same [m]."""
 
 
 class PersonView:
@@ -16,65 +21,91 @@ class PersonView:
 
     Args:
         server: Where to draw.
-        cell: Where the floor is and how high the pelvis.
+        cell: Where the floor is.
+        person: Who is drawn.
     """
 
-    def __init__(self, server: viser.ViserServer, cell: Cell) -> None:
-        self._scene, self._cell = server.scene, cell
+    def __init__(self, server: viser.ViserServer, cell: Cell, person: Seen) -> None:
+        self._scene, self._cell, self._id = server.scene, cell, person.id
+        self._root = f"/people/{person.id}"
         self._gait = Gait(cell.floor_z)
         self._skins: list[tuple[viser.MeshSkinnedHandle, tuple[str, ...]]] = []
+        self._drawn: tuple[Vec, Vec] | None = None
+        self._frame = self._scene.add_frame(self._root, show_axes=False)
         self._solids: list[tuple[viser.MeshHandle, str]] = []
-        self._drawn: Vec | None = None
-        self._scene.add_frame("/person", show_axes=False)
-        bind = skeleton.bind_bones()
-        for part in mannequin.parts():
-            if part.bone is None:
-                self._add_skin(part, bind)
-            else:
-                self._solids.append((self._add_solid(part), part.bone))
-        rest = human.rest_posture(0.0, 0.0, 0.0)
-        ends = human.capsules(rest, cell.body, cell.floor_z)
-        self._capsules = CapsulesView(server, "/person/shapes")
-        for name, radius, (start, end) in zip(
-            human.CAPSULE_NAMES, human.CAPSULE_RADII, ends, strict=True
-        ):
-            self._capsules.add(name, float(radius), float(np.linalg.norm(end - start)))
+        self._capsules = CapsulesView(server, f"{self._root}/shapes")
+        self._lengths = self._fitted = _lengths(person.size)
+        self._fit(person)
 
-    def _add_skin(self, part: mannequin.Part, bind: skeleton.Bones) -> None:
+    def remove(self) -> None:
+        """Take the person out of the scene."""
+        self._frame.remove()
+
+    def _fit(self, person: Seen) -> None:
+        """Give the mannequin the person's size."""
+        self._fitted = _lengths(person.size)
+        for handle, _ in (*self._skins, *self._solids):
+            handle.remove()
+        bind = skeleton.bind_bones(person.size)
+        self._skins = [
+            self._add_skin(part, person.size, bind)
+            for part in mannequin.parts()
+            if part.bone is None
+        ]
+        scale = skeleton.scales(person.size)
+        self._solids = [
+            (self._add_solid(part, scale[part.bone]), part.bone)
+            for part in mannequin.parts()
+            if part.bone is not None
+        ]
+        upright = human.rest_posture(0.0, 0.0, 0.0)
+        ends = human.capsules(upright, person.size, self._cell.floor_z)
+        radii = human.capsule_radii(person.size)
+        self._capsules.clear()
+        for name, radius, (start, end) in zip(human.CAPSULE_NAMES, radii, ends, strict=True):
+            self._capsules.add(name, float(radius), float(np.linalg.norm(end - start)))
+        self._drawn = None
+
+    def _add_skin(
+        self, part: mannequin.Part, size: Vec, bind: skeleton.Bones
+    ) -> tuple[viser.MeshSkinnedHandle, tuple[str, ...]]:
         names = tuple(part.weights)
         frames = np.stack([bind[name] for name in names])
         handle = self._scene.add_mesh_skinned(
-            f"/person/{part.name}",
-            part.surface.vertices,
+            f"{self._root}/{part.name}",
+            mannequin.fitted(part, size),
             part.surface.faces,
             bone_wxyzs=orientation(frames[:, :3, :3]),
             bone_positions=frames[:, :3, 3],
             skin_weights=np.stack([part.weights[name] for name in names], axis=1),
-            color=part.color,
+            color=mannequin.color_of(part, self._id),
         )
-        self._skins.append((handle, names))
+        return handle, names
 
-    def _add_solid(self, part: mannequin.Part) -> viser.MeshHandle:
+    def _add_solid(self, part: mannequin.Part, scale: Vec) -> viser.MeshHandle:
         return self._scene.add_mesh_simple(
-            f"/person/{part.name}",
-            part.surface.vertices,
+            f"{self._root}/{part.name}",
+            part.surface.vertices * scale,
             part.surface.faces,
             color=part.color,
         )
 
-    def draw(self, q: Vec, dt: float) -> None:
+    def draw(self, person: Seen, dt: float) -> None:
         """Show the person in a posture.
 
         Args:
-            q: Joint positions [m, rad], shape (18,).
+            person: What is known of it.
             dt: Time since the last call [s], for the steps of the feet.
         """
-        pelvis = human.body_frames(q, self._cell.body)["pelvis"]
-        walking = self._gait.follow(pelvis, dt)
-        if not walking and self._drawn is not None and np.array_equal(q, self._drawn):
-            return
-        self._drawn = q.copy()
-        bones = skeleton.bones(q, self._cell.body, self._gait.feet)
+        self._follow_size(person)
+        q, size = person.posture, person.size
+        pelvis = human.body_frames(q, size)["pelvis"]
+        walking = self._gait.follow(pelvis, dt, float(size[GIRTH]))
+        if not walking and self._drawn is not None:
+            if np.array_equal(q, self._drawn[0]) and np.array_equal(size, self._drawn[1]):
+                return
+        self._drawn = q.copy(), size.copy()
+        bones = skeleton.bones(q, size, self._gait.feet)
         for skin, names in self._skins:
             frames = np.stack([bones[name] for name in names])
             turns = orientation(frames[:, :3, :3])
@@ -83,8 +114,24 @@ class PersonView:
         for solid, name in self._solids:
             solid.wxyz = orientation(bones[name][:3, :3])
             solid.position = bones[name][:3, 3]
-        self._capsules.place(human.capsules(q, self._cell.body, self._cell.floor_z))
+        self._capsules.place(human.capsules(q, size, self._cell.floor_z))
+
+    def _follow_size(self, person: Seen) -> None:
+        """Fit the skin once the size stands still; until then the bones alone move."""
+        lengths, before = _lengths(person.size), self._lengths
+        self._lengths = lengths
+        if _same(lengths, before) and not _same(lengths, self._fitted):
+            self._fit(person)
 
     def show_capsules(self, visible: bool, touched: str | None) -> None:
         """Show or hide the simulator's capsules; the one that was touched stays, red."""
         self._capsules.show(visible, () if touched is None else (touched,))
+
+
+def _lengths(size: Vec) -> Vec:
+    """Return a size without the pelvis's height, which changes as the person moves."""
+    return np.delete(size, PELVIS_Z)
+
+
+def _same(a: Vec, b: Vec) -> bool:
+    return bool(np.abs(a - b).max() < SAME_M)

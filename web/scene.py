@@ -13,8 +13,7 @@ from app.sim.cells import Cell
 from app.sim.commands import Command
 from app.sim.snapshot import WorldSnapshot
 from web import workplace
-from web.gizmos import Gizmos
-from web.person_view import PersonView
+from web.people_view import PeopleView
 from web.poses import Vec
 from web.robot_view import RobotView
 from web.stations_view import MARK, StationsView
@@ -53,9 +52,8 @@ class CellScene:
         with server.atomic():
             workplace.build(server, cell)
             self._robot = RobotView(server, cell)
-            self._person = PersonView(server, cell)
             self._stations = StationsView(server, cell, submit)
-            self._gizmos = Gizmos(server, cell, submit)
+            self._people = PeopleView(server, cell, submit)
             self._path = server.scene.add_line_segments(
                 "/path",
                 np.zeros((PATH_DASHES, 2, 3)),
@@ -77,11 +75,9 @@ class CellScene:
             self._robot.draw(snapshot.robot_q)
             self._robot.grip(snapshot.gripping)
             self._robot.show_capsules(self.overlays.shapes, touched.link if touched else None)
-            self._person.draw(snapshot.person_q, dt)
-            self._person.show_capsules(self.overlays.shapes, touched.body if touched else None)
+            self._people.draw(snapshot, dt, shapes=self.overlays.shapes)
             self._stations.show_values(self.overlays.values)
             self._stations.draw(snapshot)
-            self._gizmos.draw(snapshot)
             self._draw_path(snapshot)
 
     def _draw_path(self, snapshot: WorldSnapshot) -> None:

@@ -5,7 +5,9 @@ against each other a bone turns half-way (two along the spine), which keeps elbo
 and waist round. Legs follow the feet that :mod:`web.gait` puts on the floor.
 
 Frames: in the bind pose the pelvis is the origin, x forward, y left, z up, as in
-``app.sim.human``.
+``app.sim.human``. The mannequin is modelled as the median person; for another one its skin is
+scaled bone by bone (:func:`scales`), along the bone as its length and across it as the girth.
+Legs are as long as the girth says, which goes with the stature.
 """
 
 import math
@@ -15,6 +17,7 @@ import numpy as np
 
 from app.sim import human
 from app.sim.body_size import MEDIAN
+from app.sim.kernels import body as lengths
 from web.poses import Vec, part_way
 
 Bones = dict[str, Vec]
@@ -23,9 +26,15 @@ Bones = dict[str, Vec]
 PELVIS_HEIGHT = 0.95
 """Height of the pelvis the mannequin is modelled with [m]."""
 HIP_SIDE, HIP_DROP = 0.09, 0.05
+"""Half the distance of the hips and how far they lie below the pelvis, at girth 1 [m]."""
 THIGH, SHIN = 0.42, 0.42
+"""Lengths of the median person's legs [m]."""
 ANKLE_HEIGHT = 0.09
+"""Of the median person's ankle above the sole [m]."""
 SIDES = ("r", "l")
+MEDIAN_SIZE = MEDIAN.vector(-MEDIAN.pelvis)
+MEDIAN_SIZE.setflags(write=False)
+"""Size of the median person with the pelvis at height 0, shape (12,)."""
 
 BIND_Q = np.zeros(18)
 BIND_Q[[11, 15]] = 1.05
@@ -40,19 +49,20 @@ def _between(first: Vec, second: Vec, share: float) -> Vec:
     return frame
 
 
-def rest_feet(pelvis: Vec, floor_z: float) -> dict[str, Vec]:
+def rest_feet(pelvis: Vec, floor_z: float, girth: float = 1.0) -> dict[str, Vec]:
     """Return T_world_foot of both feet under the pelvis; the origin is the ankle.
 
     Args:
         pelvis: T_world_pelvis, shape (4, 4).
         floor_z: Height of the floor [m].
+        girth: Size of the legs relative to the median person's.
     """
     feet = {}
     for side in SIDES:
         sign = -1.0 if side == "r" else 1.0
         foot = pelvis @ _turned(0.12 * sign)
-        foot[:3, 3] = pelvis[:3, 3] + pelvis[:3, :3] @ [-0.01, sign * 0.105, 0.0]
-        foot[2, 3] = floor_z + ANKLE_HEIGHT
+        foot[:3, 3] = pelvis[:3, 3] + pelvis[:3, :3] @ [-0.01, sign * 0.105 * girth, 0.0]
+        foot[2, 3] = floor_z + ANKLE_HEIGHT * girth
         feet[side] = foot
     return feet
 
@@ -63,20 +73,21 @@ def _turned(yaw: float) -> Vec:
     return frame
 
 
-def _leg(pelvis: Vec, foot: Vec, side: str) -> tuple[Vec, Vec]:
+def _leg(pelvis: Vec, foot: Vec, side: str, size: Vec) -> tuple[Vec, Vec]:
     """Return thigh and shin frames that connect hip and ankle, the knee to the front."""
-    sign = -1.0 if side == "r" else 1.0
-    hip = pelvis[:3, 3] + pelvis[:3, :3] @ [0.0, sign * HIP_SIDE, -HIP_DROP]
+    sign, girth = -1.0 if side == "r" else 1.0, float(size[lengths.GIRTH])
+    thigh, shin = THIGH * girth, SHIN * girth
+    hip = pelvis[:3, 3] + pelvis[:3, :3] @ [0.0, sign * size[lengths.HIP], -HIP_DROP * girth]
     ankle = foot[:3, 3]
     line = ankle - hip
     distance = float(np.linalg.norm(line))
-    span = min(distance, THIGH + SHIN - 1e-4)
+    span = min(distance, thigh + shin - 1e-4)
     line = line / distance
     forward = 0.5 * (pelvis[:3, 0] + foot[:3, 0])
     forward = forward - (forward @ line) * line
     forward /= np.linalg.norm(forward)
-    along = (THIGH**2 - SHIN**2 + span**2) / (2.0 * span)
-    knee = hip + along * line + math.sqrt(max(THIGH**2 - along**2, 0.0)) * forward
+    along = (thigh**2 - shin**2 + span**2) / (2.0 * span)
+    knee = hip + along * line + math.sqrt(max(thigh**2 - along**2, 0.0)) * forward
     return _pointing(hip, knee, forward), _pointing(knee, ankle, forward)
 
 
@@ -107,24 +118,62 @@ def bones(q: Vec, size: Vec, feet: Mapping[str, Vec]) -> Bones:
     head = _between(pelvis, torso, 0.6)
     head[:3, 3] = human.joint_points(q, size)["neck"]
     out["head"] = head
-    for side in SIDES:
+    for index, side in enumerate(SIDES):
         upper, fore = body[f"upper_arm_{side}"], body[f"forearm_{side}"]
         out[f"upper_{side}"], out[f"fore_{side}"] = upper, fore
         out[f"shoulder_{side}"] = _between(torso, upper, 0.5)
         out[f"shoulder_{side}"][:3, 3] = upper[:3, 3]
         out[f"elbow_{side}"] = _between(upper, fore, 0.5)
         hand = fore.copy()
-        hand[:3, 3] = fore[:3, 3] - 0.26 * fore[:3, 2]
+        hand[:3, 3] = fore[:3, 3] - size[lengths.FOREARM_R + index] * fore[:3, 2]
         out[f"hand_{side}"] = hand
-        out[f"thigh_{side}"], out[f"shin_{side}"] = _leg(pelvis, feet[side], side)
+        out[f"thigh_{side}"], out[f"shin_{side}"] = _leg(pelvis, feet[side], side, size)
         out[f"foot_{side}"] = feet[side]
     return out
 
 
-def bind_bones() -> Bones:
-    """Return the bones in the pose the mannequin is modelled in, pelvis at the origin."""
-    feet = rest_feet(np.eye(4), -PELVIS_HEIGHT)
-    return bones(BIND_Q, MEDIAN.vector(-MEDIAN.pelvis), feet)
+def bind_bones(size: Vec = MEDIAN_SIZE) -> Bones:
+    """Return the bones in the pose the mannequin is modelled in, pelvis at the origin.
+
+    Args:
+        size: The person's size [m], shape (12,); the median person's by default.
+    """
+    here, girth = size.copy(), float(size[lengths.GIRTH])
+    here[lengths.PELVIS_Z] = 0.0
+    return bones(BIND_Q, here, rest_feet(np.eye(4), -PELVIS_HEIGHT * girth, girth))
+
+
+def scales(size: Vec, shoulder: str = "r") -> dict[str, Vec]:
+    """Return by how much a person's skin is larger along each bone's axes, shape (3,) each.
+
+    Args:
+        size: The person's size [m], shape (12,).
+        shoulder: Side of the trunk, ``"r"`` or ``"l"``: its width is that of this shoulder.
+    """
+    ratio = size / np.where(MEDIAN_SIZE == 0.0, 1.0, MEDIAN_SIZE)
+    girth, trunk = float(ratio[lengths.GIRTH]), float(ratio[lengths.TRUNK])
+    wide = float(ratio[lengths.CLAVICLE_R + SIDES.index(shoulder)])
+    hip = float(ratio[lengths.HIP])
+    out = {
+        name: np.array([girth, hip + share * (wide - hip), trunk])
+        for name, share in (
+            ("pelvis", 0.0),
+            ("spine_1", 1 / 3),
+            ("spine_2", 2 / 3),
+            ("torso", 1.0),
+        )
+    }
+    out["head"] = np.full(3, float(ratio[lengths.HEAD_UP]))
+    for index, side in enumerate(SIDES):
+        upper = float(ratio[lengths.UPPER_ARM_R + index])
+        fore = float(ratio[lengths.FOREARM_R + index])
+        out[f"shoulder_{side}"] = np.full(3, girth)
+        for name, along in (("upper", upper), ("elbow", 0.5 * (upper + fore)), ("fore", fore)):
+            out[f"{name}_{side}"] = np.array([girth, girth, along])
+        out[f"hand_{side}"] = np.full(3, float(ratio[lengths.HAND]))
+        for name in ("thigh", "shin", "foot"):
+            out[f"{name}_{side}"] = np.full(3, girth)
+    return out
 
 
 def _ramp(x: Vec, low: float, high: float) -> Vec:

@@ -9,9 +9,11 @@ from fastapi.sse import EventSourceResponse, ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
 from app.api.schemas.worlds import (
+    MAX_CHOICES,
     CommandAccepted,
     CommandCreate,
     SetCandidates,
+    SetMotion,
     SetPolicy,
     StartCase,
     ToggleCandidate,
@@ -26,6 +28,7 @@ from app.errors import InvalidInput, NotReady
 from app.policies.trained_cell import is_for
 from app.sim.cases import cases_of
 from app.sim.cells import Cell, lacks_for_pick, require_cell
+from app.sim.motions import Motion
 from app.sim.ports import TaskPolicy
 from app.store.checkpoints import list_checkpoints
 
@@ -73,6 +76,9 @@ async def command(
                 raise InvalidInput("checkpoint", body.checkpoint, rule)
             require_cell(world.cell, policy.cell, policy.cell_sha256)
         world.handle.submit(body.to_domain(policy))
+    elif isinstance(body, SetMotion):
+        runs = await run_in_threadpool(_runs_of, body.name, services)
+        world.handle.submit(body.to_domain(runs))
     else:
         world.handle.submit(body.to_domain())
     return CommandAccepted(tag=body.tag, tick=snapshot.tick)
@@ -132,6 +138,13 @@ def _policy_for(cell: Cell, services: Services) -> TaskPolicy | None:
         if is_for(record.manifest, cell):
             return services.policies.load(record.sha256)
     return None
+
+
+def _runs_of(name: str, services: Services) -> tuple[Motion, ...]:
+    """Return the clean runs of a stored motion."""
+    if name not in (known := services.motions.names()):
+        raise InvalidInput("name", name, "is no stored motion", known[:MAX_CHOICES])
+    return services.motions.get(name)
 
 
 def _check_names(body: CommandCreate, cell: Cell) -> None:

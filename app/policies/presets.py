@@ -98,6 +98,9 @@ class Preset:
     augmentation: str = _choice(
         "sampled", AUGMENTATIONS, "primitives sampled and varied, or demonstrations replayed"
     )
+    human_roaming: float = _number(
+        0.0, 0.0, 1.0, "", "share of people who do anything but the task"
+    )
     human_pace: float = _number(1.0, 0.2, 2.0, "", "speed of the person, 1 = as cycled")
     human_courtesy: float = _number(
         0.0, 0.0, 1.0, "", "how far the person gives way to the arm; 0 does not see it"

@@ -129,6 +129,7 @@ def work_of(preset: Mapping[str, Any], seed: int = 0) -> WorkSettings:
         seed=seed,
         pace=preset.get("human_pace", 1.0),
         courtesy=preset.get("human_courtesy", 0.0),
+        roaming=preset.get("human_roaming", 0.0),
         augmentation=preset.get("augmentation", "sampled") == "sampled",
     )
 

@@ -7,16 +7,27 @@ command has a ``tag``, so that it can travel as JSON: ``{"tag": "toggle-candidat
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 from app.errors import InvalidInput, NotFound
+from app.sim.body_size import PERCENTILES
 from app.sim.cases import cases_of
-from app.sim.cells import Cell
+from app.sim.cells import LIMITS, Cell
+from app.sim.motions import Motion
 from app.sim.ports import TaskPolicy
 
-Mode = Literal["manual", "auto"]
-MODES: tuple[Mode, ...] = ("manual", "auto")
+Mode = Literal["manual", "auto", "still", "recorded"]
+"""Who moves a person: the visitor; the work cycle or a case study; nobody, so that the person
+stands at home; or a recorded motion."""
+PlainMode = Literal["manual", "auto", "still"]
+PLAIN_MODES: tuple[PlainMode, ...] = ("manual", "auto", "still")
+"""Modes that need nothing else; ``recorded`` comes with :class:`SetMotion`."""
+MAX_PEOPLE = LIMITS["people"]
+"""Most people in a live cell."""
+FIRST = 0
+"""Id of the person who is meant where none is named."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,6 +39,8 @@ class MoveHuman:
     """
 
     tag: ClassVar[str] = "move-human"
+    person: int = FIRST
+    """Id of the person."""
     pelvis: tuple[float, float, float] | None = None
     """Position and yaw of the pelvis: x [m], y [m], yaw [rad]."""
     right: tuple[float, float, float] | None = None
@@ -38,16 +51,71 @@ class MoveHuman:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetMode:
-    """Say who moves the person: the visitor (``manual``) or the work cycle (``auto``)."""
+    """Say who moves a person: the visitor, the work cycle or nobody; leaves a case study."""
 
     tag: ClassVar[str] = "set-mode"
-    mode: Mode
-    """The new mode; leaves a running case study."""
+    mode: PlainMode
+    """The new mode."""
+    person: int = FIRST
+    """Id of the person."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetMotion:
+    """Let a person move as one was recorded; the person has the recorded lengths at first.
+
+    Over HTTP the command carries the motion's name; the service finds it and queues this one.
+    """
+
+    tag: ClassVar[str] = "set-motion"
+    motion: Motion
+    """The run that is played, again and again."""
+    name: str
+    """Name of the stored motion."""
+    run: int = 0
+    """Which of its runs, from 0."""
+    n_runs: int = 1
+    """How many it has."""
+    person: int = FIRST
+    """Id of the person."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetBody:
+    """Give a person another size; it is there after half a second. What is None stays."""
+
+    tag: ClassVar[str] = "set-body"
+    stature: float | None = None
+    """Percentile of adults, in PERCENTILES."""
+    arms: float | None = None
+    """Percentile of the arms' length at that stature."""
+    shoulders: float | None = None
+    """Percentile of the shoulders' width at that stature."""
+    recorded: bool = False
+    """Whether the recorded person's lengths hold while a recorded motion is played."""
+    person: int = FIRST
+    """Id of the person."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AddPerson:
+    """Let another person come in, who works at a part of the table; the others move up."""
+
+    tag: ClassVar[str] = "add-person"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RemovePerson:
+    """Let a person leave; the others keep their ids."""
+
+    tag: ClassVar[str] = "remove-person"
+    person: int
+    """Id of the person."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pause:
-    """Stop the clock; the person can still be dragged and the values follow."""
+    """Stop the clock; people can still be dragged and the values follow."""
 
     tag: ClassVar[str] = "pause"
 
@@ -68,7 +136,7 @@ class StepOnce:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reset:
-    """Put robot, counters and a working person back to the start; a dragged person stays."""
+    """Put robot, counters and people back to the start; who is dragged stays."""
 
     tag: ClassVar[str] = "reset"
 
@@ -106,7 +174,7 @@ class SetPolicy:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StartCase:
-    """Start one of the four case studies of the source's table 5.3."""
+    """Start one of the four case studies of the source's table 5.3; one person stays."""
 
     tag: ClassVar[str] = "start-case"
     id: str
@@ -116,6 +184,10 @@ class StartCase:
 Command = (
     MoveHuman
     | SetMode
+    | SetMotion
+    | SetBody
+    | AddPerson
+    | RemovePerson
     | Pause
     | Resume
     | StepOnce
@@ -129,6 +201,10 @@ Command = (
 COMMANDS: tuple[type[Command], ...] = (
     MoveHuman,
     SetMode,
+    SetMotion,
+    SetBody,
+    AddPerson,
+    RemovePerson,
     Pause,
     Resume,
     StepOnce,
@@ -140,21 +216,21 @@ COMMANDS: tuple[type[Command], ...] = (
 )
 
 
-def check(command: Command, cell: Cell) -> None:
+def check(command: Command, cell: Cell, people: Sequence[int]) -> None:
     """Refuse a command that the world could not carry out.
 
+    Args:
+        command: What shall be done.
+        cell: Where.
+        people: Ids of the people who are there.
+
     Raises:
-        InvalidInput: A number is not finite, or a mode is unknown.
+        InvalidInput: A number or mode out of range, nobody of that id, or no room.
         NotFound: The cell has no such station, or no such case study.
     """
     match command:
-        case MoveHuman():
-            for name in ("pelvis", "right", "left"):
-                values = getattr(command, name)
-                if values is not None and not all(map(math.isfinite, values)):
-                    raise InvalidInput(name, values, "must be finite")
-        case SetMode() if command.mode not in MODES:
-            raise InvalidInput("mode", command.mode, "is unknown", MODES)
+        case MoveHuman() | SetMode() | SetMotion() | SetBody() | RemovePerson() | AddPerson():
+            _check_person(command, people)
         case SetCandidates():
             for name in command.ids:
                 cell.station(name)
@@ -166,3 +242,53 @@ def check(command: Command, cell: Cell) -> None:
                 raise NotFound("case study of this cell", command.id, names)
         case _:
             pass
+
+
+def _check_person(
+    command: MoveHuman | SetMode | SetMotion | SetBody | RemovePerson | AddPerson,
+    people: Sequence[int],
+) -> None:
+    if isinstance(command, AddPerson):
+        if len(people) >= MAX_PEOPLE:
+            raise InvalidInput("people", len(people), f"are {MAX_PEOPLE} at most")
+        return
+    if command.person not in people:
+        rule = "is nobody in this cell" if people else "is nobody: the cell is empty"
+        raise InvalidInput("person", command.person, rule, [str(one) for one in people])
+    if isinstance(command, MoveHuman):
+        for name in ("pelvis", "right", "left"):
+            values = getattr(command, name)
+            if values is not None and not all(map(math.isfinite, values)):
+                raise InvalidInput(name, values, "must be finite")
+    elif isinstance(command, SetMode) and command.mode not in PLAIN_MODES:
+        raise InvalidInput("mode", command.mode, "cannot be set", PLAIN_MODES)
+    elif isinstance(command, SetBody):
+        _check_percentiles(command)
+
+
+def _check_percentiles(command: SetBody) -> None:
+    low, high = PERCENTILES
+    for name in ("stature", "arms", "shoulders"):
+        value = getattr(command, name)
+        if value is not None and not low <= value <= high:
+            rule = f"must be a percentile in [{low:g}, {high:g}]"
+            raise InvalidInput(name, value, rule)
+
+
+def people_after(command: Command, people: tuple[int, ...]) -> tuple[int, ...]:
+    """Return the ids of the people who are there after a command, in order.
+
+    Args:
+        command: What is done; it fits, see :func:`check`.
+        people: Ids of the people who are there before.
+    """
+    match command:
+        case AddPerson():
+            free = next(id for id in range(MAX_PEOPLE) if id not in people)
+            return tuple(sorted((*people, free)))
+        case RemovePerson():
+            return tuple(id for id in people if id != command.person)
+        case StartCase():
+            return (FIRST,)
+        case _:
+            return people

@@ -14,7 +14,7 @@ from app.sim.kernels import contact as kernel
 from app.sim.kernels import people as people_kernel
 from app.sim.kernels.arm import Arm
 from app.sim.kernels.body import N_CAPSULES, PELVIS_Z
-from app.sim.kernels.columns import distances
+from app.sim.kernels.columns import distances, gaps
 from app.sim.kernels.cylinder import cylinder_clearance
 from app.sim.kernels.people import Crowd, People
 from app.sim.ports import Vec
@@ -39,6 +39,8 @@ class Contact:
     part: str
     """What it touches or is nearest to: a capsule of a worker (CAPSULE_NAMES), ``walker``,
     ``table``, ``obstacle``, another capsule of the robot, or ``nobody``."""
+    worker: int | None = None
+    """The worker whose capsule that is, from 0."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,7 +89,7 @@ def contact(
     d: Vec,
     human_q: tuple[Vec, Vec],
     cylinders: tuple[Vec, Vec] = (NO_CYLINDERS, NO_CYLINDERS),
-    sizes: Vec | None = None,
+    sizes: Vec | tuple[Vec, Vec] | None = None,
 ) -> Contact:
     """Test one control period for contact, between its ends too.
 
@@ -100,21 +102,26 @@ def contact(
         d: Third coefficients of the period [rad/s^3], shape (6,).
         human_q: The workers' joints at start and end [m, rad], shape (W, 18) each.
         cylinders: The walkers' x, y, radius at start and end [m], shape (C, 3) each.
-        sizes: The workers' sizes [m], shape (W, body.N_SIZE); None for the cell's person.
+        sizes: The workers' sizes [m], shape (W, body.N_SIZE), or those at start and end where
+            pelvis or lengths change; None for the cell's person.
 
     Raises:
         SimulationError: A number is NaN or infinite.
     """
+    before, after = sizes if isinstance(sizes, tuple) else (sizes, sizes)
     require_finite("q, qd, c, d", np.concatenate([q0, qd0, c, d]))
     require_finite("human_q", np.concatenate(human_q))
     require_finite("cylinders", np.concatenate(cylinders))
     q0, qd0, c, d = own(q0), own(qd0), own(c), own(d)
     robot = arm_kernel.new_robot_pose(arm)
     arm_kernel.place_robot(arm, q0, robot)
-    crowd = crowd_of(people, human_q[0], cylinders[0], sizes)
+    crowd = crowd_of(people, human_q[0], cylinders[0], before)
     crowd.pelvis_z[:] = crowd.size[:, PELVIS_Z]
     crowd.q0[:], crowd.cylinders0[:] = human_q[0], cylinders[0]
     clear = np.array(kernel.clearances(arm, people, robot, crowd))
+    columns0 = crowd.columns.copy()
+    if after is not None:
+        crowd.size[:] = after
     kind, x = kernel.sweep(
         arm,
         people,
@@ -126,39 +133,65 @@ def contact(
         own(human_q[1]),
         own(cylinders[1]),
         robot.columns.copy(),
-        crowd.columns.copy(),
+        columns0,
         clear,
         robot,
         crowd,
     )
-    link, part = _who(arm, people, kind, robot, crowd)
+    link, part, worker = _who(arm, people, kind, robot, crowd)
     return Contact(
-        kind=CONTACT_KINDS[kind], clearance_m=float(clear[0]), time_s=x, link=link, part=part
+        kind=CONTACT_KINDS[kind],
+        clearance_m=float(clear[0]),
+        time_s=x,
+        link=link,
+        part=part,
+        worker=worker,
     )
+
+
+def worker_distances(arm: Arm, people: People, q: Vec, human_q: Vec, sizes: Vec) -> Vec:
+    """Return the distance of the robot at ``q`` to each worker [m], shape (W,).
+
+    Args:
+        arm: Robot in its cell.
+        people: Shared data of W workers.
+        q: Joint positions [rad], shape (6,).
+        human_q: The workers' joints [m, rad], shape (W, 18).
+        sizes: Their sizes [m], shape (W, body.N_SIZE).
+    """
+    n_workers = len(human_q)
+    if n_workers == 0:
+        return np.zeros(0)
+    robot = arm_kernel.new_robot_pose(arm)
+    arm_kernel.place_robot(arm, own(q), robot)
+    crowd = crowd_of(people, human_q, NO_CYLINDERS, sizes)
+    gaps(robot.columns, crowd.columns, crowd.gap)
+    parts = crowd.gap[: n_workers * N_CAPSULES].reshape(n_workers, N_CAPSULES)
+    return np.asarray(parts.min(axis=1))
 
 
 def _who(
     arm: Arm, people: People, kind: int, robot: arm_kernel.RobotPose, crowd: Crowd
-) -> tuple[str, str]:
-    """Return the names of the capsule and of what it touches or is nearest to."""
+) -> tuple[str, str, int | None]:
+    """Return the names of the capsule and of what it touches or is nearest to, and of whom."""
     names = load_robot_capsules().name
     if kind == kernel.SELF_CONTACT:
         _, pair = arm_kernel.self_clearance(arm, robot)
-        return names[arm.first[pair]], names[arm.second[pair]]
+        return names[arm.first[pair]], names[arm.second[pair]], None
     if kind == kernel.CELL_CONTACT:
         _, link, box = arm_kernel.cell_clearance(arm, robot.columns)
-        return names[link], "table" if box < 0 else "obstacle"
+        return names[link], "table" if box < 0 else "obstacle", None
     who = people_kernel.nearest_person(people, robot.columns, crowd)
     if who < 0:
-        return names[-1], "nobody"
+        return names[-1], "nobody", None
     if who >= len(crowd.q):
         x, y, r = crowd.cylinders[who - len(crowd.q)]
         _, link = cylinder_clearance(robot.columns, 0, x, y, r, people.top_z)
-        return names[link], "walker"
+        return names[link], "walker", None
     best, link, part = np.inf, 0, 0
     for k in range(len(names)):
         distances(robot.columns, k, crowd.columns, crowd.gap)
         near = int(np.argmin(crowd.gap))
         if crowd.gap[near] < best:
             best, link, part = float(crowd.gap[near]), k, near
-    return names[link], human.CAPSULE_NAMES[part % N_CAPSULES]
+    return names[link], human.CAPSULE_NAMES[part % N_CAPSULES], part // N_CAPSULES

@@ -45,8 +45,13 @@ class DraggedPerson:
         """Follow a posture [m, rad], shape (18,)."""
         self._target = np.array(q)
 
-    def drag(self, command: MoveHuman) -> None:
-        """Take what was dragged as the new target; dragged hands stay where they were put."""
+    def drag(self, command: MoveHuman, size: Vec) -> None:
+        """Take what was dragged as the new target; dragged hands stay where they were put.
+
+        Args:
+            command: What was dragged.
+            size: The person's size [m], shape (12,).
+        """
         pelvis = (
             self._walkable(command.pelvis)
             if command.pelvis is not None
@@ -58,7 +63,7 @@ class DraggedPerson:
                 self._hands[hand] = np.array(point)
         posture = human.solve_hands(
             self._target,
-            self._cell.body,
+            size,
             right=self._hands.get("r"),
             left=self._hands.get("l"),
             pelvis=pelvis,

@@ -73,7 +73,7 @@ def resting(status: Status, goal: str | None, label: Label) -> str:
     """
     return {
         "picking": f"Reached {label(goal)}." if goal else "Reached.",
-        "blocked": "Waiting at home: the person is in the robot's way.",
+        "blocked": "Waiting at home: a person is in the robot's way.",
         "no candidates": "Nothing to do: click a cube or a dock to offer it.",
         "no policy": "Resting: no checkpoint acts here. Choose one, or train one in this cell.",
     }.get(status, "")

@@ -189,6 +189,7 @@ def people_of(cell: Cell, work: WorkSettings | None = None) -> People:
         of_station=np.zeros((1, 1, 2, 2), dtype=np.int64),
         n_cubes=0,
         source=people.REACHES,
+        track_share=0.0,
         repertoire=no_repertoire(),
         tracks=NO_TRACKS,
         limits=np.stack([human.Q_MIN, human.Q_MAX]),

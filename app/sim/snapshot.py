@@ -1,6 +1,6 @@
 """What is known about a live world at one tick, frozen, for any thread to read.
 
-Robot, person, ``previous`` and ``time_left_s`` are exactly the inputs of the decision beside
+Robot, people, ``previous`` and ``time_left_s`` are exactly the inputs of the decision beside
 them: sending them to ``POST /v1/task-selection`` gives the same choice and the same values.
 """
 
@@ -20,7 +20,7 @@ Status = Literal[
     "no policy",
 ]
 """``picking``: the target is reached, the tool goes down and up again; ``blocked``: the robot
-waits at home because the person is in its way. In ``picking``, ``contact`` and ``case done``
+waits at home because a person is in its way. In ``picking``, ``contact`` and ``case done``
 the last decision stays as it was; in ``moving`` it belongs to this very state."""
 
 
@@ -52,6 +52,83 @@ class ContactView:
     """Robot link that touched."""
     body: str
     """The person's capsule that was touched, ``table`` or ``robot``."""
+    person: int | None = None
+    """Id of the person who was touched."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BodyView:
+    """How large a person is, or is becoming within half a second."""
+
+    stature: float
+    """Percentile of the stature that was asked for last."""
+    arms: float
+    """Percentile of the arms' length, likewise."""
+    shoulders: float
+    """Percentile of the shoulders' width, likewise."""
+    recorded: bool
+    """Whether a recorded person's lengths hold instead of the percentiles."""
+    stature_m: float
+    """Height of the head's top above the floor, standing upright [m]."""
+    trunk_m: float
+    """Pelvis to the base of the neck [m]."""
+    arm_m: float
+    """Shoulder to palm [m], mean of both."""
+    shoulders_m: float
+    """From shoulder joint to shoulder joint [m]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotionView:
+    """A recorded motion that is being played."""
+
+    name: str
+    """Name of the stored motion."""
+    run: int
+    """Which of its runs, from 0."""
+    n_runs: int
+    """How many clean runs it has."""
+    t_s: float
+    """How far it has come [s]."""
+    duration_s: float
+    """Length of the run [s]."""
+    outside_share: float
+    """Share of its frames whose pelvis lies outside the walking area."""
+    clipped_share: float
+    """Share of its frames with an angle beyond a joint's limit; policies are told the limit."""
+    clipped_m: float
+    """How far a wrist told so is from the true one at most [m]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PersonView:
+    """One person in a live cell."""
+
+    id: int
+    """Number of the person, kept as long as the person is there; the first is 0."""
+    mode: Mode
+    """Who moves the person."""
+    q: Vec
+    """Joint positions inside their limits, as policies are told them [m, rad], shape (18,),
+    read-only; yaw within half a turn of home's."""
+    posture: Vec
+    """Where the body is [m, rad], shape (18,), read-only: recorded people leave the limits."""
+    qd: Vec
+    """Joint speeds [m/s, rad/s], shape (18,), read-only."""
+    size: Vec
+    """Size at this moment [m], shape (12,), read-only; the pelvis as high as it is now."""
+    body: BodyView
+    """How large the person is."""
+    motion: MotionView | None
+    """What is played in mode ``recorded``."""
+    joining: bool
+    """Whether the person is on the way to where work, motion or rest begin."""
+    outside_area: bool
+    """Whether the pelvis lies outside the walking area now."""
+    clearance_m: float
+    """Distance of the robot to this person [m]."""
+    nearest: bool
+    """Whether nobody is nearer to the robot: the one a policy for one person sees."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,8 +157,6 @@ class WorldSnapshot:
     """Control periods since the world was made; never goes back."""
     t_s: float
     """Simulated time since the last reset [s]."""
-    mode: Mode
-    """Who moves the person."""
     paused: bool
     """Whether the clock stands still."""
     status: Status
@@ -94,10 +169,8 @@ class WorldSnapshot:
     """Robot joint speeds [rad/s], shape (6,), read-only."""
     tcp: Vec
     """Tool centre point, robot base frame [m], shape (3,), read-only."""
-    person_q: Vec
-    """The person's joint positions [m, rad], shape (18,), read-only."""
-    person_qd: Vec
-    """The person's joint speeds [m/s, rad/s], shape (18,), read-only."""
+    people: tuple[PersonView, ...]
+    """The people in the cell, 0 to 4, in the order of their ids."""
     gripping: bool
     """Whether the fingers are closed."""
     selected: tuple[str, ...]
@@ -113,7 +186,7 @@ class WorldSnapshot:
     outside: tuple[OutsideField, ...]
     """Fields of the state outside what the checkpoint was trained on."""
     clearance_m: float | None
-    """Least distance between robot and person [m]; None when it was not computed."""
+    """Least distance between robot and people [m]; None where nobody is there."""
     contact: ContactView | None
     """The contact that is shown at the moment."""
     checkpoint: str | None
@@ -131,3 +204,23 @@ class WorldSnapshot:
     def values(self) -> dict[str, float]:
         """The critic's value per candidate id."""
         return {c.id: c.value for c in self.candidates if c.value is not None}
+
+    @property
+    def nearest(self) -> PersonView | None:
+        """The person nearest to the robot; None where nobody is there."""
+        return next((person for person in self.people if person.nearest), None)
+
+    @property
+    def mode(self) -> Mode | None:
+        """Who moves the first person; None where nobody is there."""
+        return self.people[0].mode if self.people else None
+
+    @property
+    def person_q(self) -> Vec:
+        """The first person's joint positions [m, rad], shape (18,)."""
+        return self.people[0].q
+
+    @property
+    def person_qd(self) -> Vec:
+        """The first person's joint speeds [m/s, rad/s], shape (18,)."""
+        return self.people[0].qd

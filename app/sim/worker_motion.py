@@ -2,19 +2,19 @@
 
 Three sources of motion. ``library``: task primitives (``task_library.py``), the usual one;
 ``reaches``: the first, synthetic reaches (``work_cycle.py``), kept as a variant; ``recorded``:
-imported motion (``motions.py``), placed in the cell. On top come how large the workers are and
-how far they give way to the arm.
+imported motion (``motions.py``), placed in the cell. A share of the workers may roam instead
+(``roaming.py``). On top come how large the workers are and how far they give way to the arm.
 """
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
 
 from app.errors import InvalidInput
-from app.sim import human
 from app.sim.body_size import BodySize
 from app.sim.cells import Cell
 from app.sim.kernels import people
@@ -22,6 +22,7 @@ from app.sim.kernels.people import People, Tracks
 from app.sim.kernels.repertoire import Repertoire
 from app.sim.motions import Motion, placed
 from app.sim.ports import Vec
+from app.sim.roaming import roaming
 from app.sim.task_library import VARIANTS, task_library
 from app.sim.work_cycle import build_library
 
@@ -31,6 +32,8 @@ TRACK_DT = 0.02
 """Step to which recorded motion is brought [s]; 50 Hz, above what people's hands hold."""
 NEEDED_S = 10.0
 """How long a track should go on after an episode's start: an evaluation's episode [s]."""
+N_ROAMERS = 24
+"""Motions that roamers draw from, a minute each."""
 NO_TRACKS = Tracks(np.zeros((1, 19)), np.array([[0, 1, -1]]), TRACK_DT, 0.0)
 """The tracks of workers who follow none."""
 
@@ -47,6 +50,8 @@ class WorkSettings:
     """Speed relative to their scripts."""
     courtesy: float = 0.0
     """How far they give way to the arm, from 0 (they do not see it) to 1."""
+    roaming: float = 0.0
+    """Share of the workers who roam instead of working, drawn each episode anew."""
     bodies: tuple[BodySize, ...] | None = None
     """Sizes drawn from, each episode anew; None for those of the library
     (``task_library.BODIES``), and in synthetic reaches for the cell's own person."""
@@ -63,6 +68,8 @@ class WorkSettings:
             raise InvalidInput("motion", self.motion, "must be a source of motion", MOTIONS)
         if not 0.0 <= self.courtesy <= 1.0:
             raise InvalidInput("courtesy", self.courtesy, "must lie in [0, 1]")
+        if not 0.0 <= self.roaming <= 1.0:
+            raise InvalidInput("roaming", self.roaming, "must lie in [0, 1]")
         if not (np.isfinite(self.pace) and self.pace > 0.0):
             raise InvalidInput("pace", self.pace, "must be above 0")
         if self.bodies is not None and not self.bodies:
@@ -88,7 +95,11 @@ def with_work(shared: People, cell: Cell, settings: WorkSettings) -> People:
     shared = shared._replace(pace=settings.pace, courtesy=settings.courtesy)
     if settings.motion == "recorded":
         tracks, lengths = tracks_of(settings.recorded, cell.floor_z)
-        return shared._replace(source=people.RECORDED, tracks=tracks, bodies=lengths)
+        return shared._replace(tracks=tracks, track_share=1.0, bodies=lengths)
+    if settings.roaming > 0.0:
+        tracks, _ = tracks_of(roamers(cell, settings.seed), cell.floor_z)
+        tracks.spans[:, 2] = -1  # Anybody may roam.
+        shared = shared._replace(tracks=tracks, track_share=settings.roaming)
     if settings.motion == "library":
         return _with_library(shared, cell, settings)
     sizes = settings.bodies or (cell.human.size,)
@@ -129,10 +140,16 @@ def _with_library(shared: People, cell: Cell, settings: WorkSettings) -> People:
     )
 
 
+@lru_cache(maxsize=4)
+def roamers(cell: Cell, seed: int) -> tuple[Motion, ...]:
+    """Return the motions of a cell's roamers."""
+    return roaming(cell, cell.human.size, seed, N_ROAMERS)
+
+
 def tracks_of(motions: Sequence[Motion], floor_z: float) -> tuple[Tracks, Vec]:
     """Return recorded runs as the kernels play them, and the sizes of who was recorded.
 
-    Joints outside the model's limits are held at them.
+    Joints may leave the model's limits: the body is where it was recorded.
 
     Args:
         motions: Runs, placed in the cell (``motions.placed``).
@@ -148,7 +165,7 @@ def tracks_of(motions: Sequence[Motion], floor_z: float) -> tuple[Tracks, Vec]:
         # The last frame is kept; a hair more than a whole number of steps is that number.
         n = max(2, math.ceil(motion.times[-1] / TRACK_DT - 1e-6) + 1)
         at = np.minimum(np.arange(n) * TRACK_DT, motion.times[-1])
-        values = np.column_stack([np.clip(motion.q, human.Q_MIN, human.Q_MAX), motion.pelvis_z])
+        values = np.column_stack([motion.q, motion.pelvis_z])
         rows.append(
             np.stack([np.interp(at, motion.times, column) for column in values.T], axis=1)
         )

@@ -1,11 +1,12 @@
-"""One live cell: robot, person, candidates, clock. Pure numpy, no thread, no screen.
+"""One live cell: robot, people, candidates, clock. Pure numpy, no thread, no screen.
 
 The world advances in control periods of ``cell.robot.dt``. Each period the robot carries out
-the action decided for the state it is in, the person moves, contact is tested between the ends
-of the period too, and the policy decides anew (METHOD 3.1). A reached target is picked up (the
-tool goes down and up again, by inverse kinematics and inside the same limits), leaves the
-candidates until all have had their turn, and the next episode goes on from there. A contact
-is shown for two seconds; then the robot starts again from home.
+the action decided for the state it is in, the people move, contact is tested between the ends
+of the period too, and the policy decides anew (METHOD 3.1); one that knows a single person sees
+the nearest. A reached target is picked up (the tool goes down and up again, by inverse
+kinematics and inside the same limits), leaves the candidates until all have had their turn, and
+the next episode goes on from there. A contact is shown for two seconds; then the robot starts
+again from home.
 """
 
 from dataclasses import replace
@@ -17,11 +18,19 @@ from app.sim import commands, explanation, pick, scene
 from app.sim.cases import Case, find_case
 from app.sim.cells import Cell
 from app.sim.commands import Command
-from app.sim.contact import Contact, contact
-from app.sim.kernels import kinematics
-from app.sim.live_person import LivePerson
-from app.sim.ports import Candidate, Decision, Person, TaskPolicy, Vec
-from app.sim.snapshot import CandidateView, ContactView, Counters, Status, WorldSnapshot
+from app.sim.contact import Contact, contact, worker_distances
+from app.sim.kernels import body, kinematics
+from app.sim.live_people import LivePeople
+from app.sim.live_person import frozen
+from app.sim.ports import Candidate, Decision, TaskPolicy, Vec
+from app.sim.snapshot import (
+    CandidateView,
+    ContactView,
+    Counters,
+    PersonView,
+    Status,
+    WorldSnapshot,
+)
 
 TIME_LIMIT_S = 20.0
 """Length of an episode [s] (table 5.2)."""
@@ -45,7 +54,7 @@ class World:
     Args:
         cell: Work cell.
         policy: Chooses and moves; None lets the robot rest.
-        seed: Seed of the person's work.
+        seed: Seed of the people's work.
         id: Name of the world in URLs.
     """
 
@@ -54,9 +63,9 @@ class World:
     ) -> None:
         self.cell, self.id = cell, id
         self._arm, self._people = scene.arm_of(cell), scene.people_of(cell)
+        self._live = LivePeople(cell, seed)
         self._policy = policy
         self._action_rule = pick.DEFAULT_ACTION if policy is None else policy.action
-        self._person = LivePerson(cell, seed)
         self._case: Case | None = None
         self._selected = tuple(s.id for s in cell.stations if s.kind == "cube")
         self._own_choice = self._selected
@@ -67,7 +76,8 @@ class World:
 
     def _reset(self) -> None:
         self._t, self._counters = 0.0, Counters()
-        self._person.start(self._case)
+        for person in self._live:
+            person.start(self._case)
         self._restart_robot()
 
     def _restart_robot(self) -> None:
@@ -90,10 +100,23 @@ class World:
         self._decide()
 
     def _touches_here(self) -> bool:
-        rest, person = np.zeros(6), self._person.q[None]
-        found = contact(self._arm, self._people, self._q, rest, rest, rest, (person, person))
-        self._clearance: float | None = found.clearance_m
-        return found.kind != "none"
+        rest = np.zeros(6)
+        return self._found(rest, rest, rest, self._live.q, self._live.sizes).kind != "none"
+
+    def _found(self, qd: Vec, c: Vec, d: Vec, human_q: Vec, sizes: Vec) -> Contact:
+        """Test a period that began with the robot here and the people as they were then."""
+        found = contact(
+            self._arm,
+            self._people._replace(columns=body.capsule_columns(len(self._live))),
+            self._q,
+            qd,
+            c,
+            d,
+            (human_q, self._live.q),
+            sizes=(sizes, self._live.sizes),
+        )
+        self._clearance = found.clearance_m if len(self._live) else None
+        return found
 
     def _posture_over(self, station: str, height: float | None = None) -> Vec:
         position = np.array(self.cell.station(station).position)
@@ -111,14 +134,18 @@ class World:
         Raises:
             ServiceError: The command does not fit this cell; nothing has changed.
         """
-        commands.check(command, self.cell)
+        commands.check(command, self.cell, self._live.ids)
         match command:
-            case commands.MoveHuman():
+            case (
+                commands.MoveHuman()
+                | commands.SetMode()
+                | commands.SetMotion()
+                | commands.SetBody()
+                | commands.AddPerson()
+                | commands.RemovePerson()
+            ):
                 self._leave_case()
-                self._person.drag(command)
-            case commands.SetMode():
-                self._leave_case()
-                self._person.enter(command.mode)
+                self._change_people(command)
             case commands.Pause() | commands.Resume() | commands.StepOnce() | commands.Reset():
                 self._control_clock(command)
             case commands.SetCandidates():
@@ -130,6 +157,29 @@ class World:
                 self._refresh()
             case commands.StartCase():
                 self._start_case(find_case(command.id))
+
+    def _change_people(
+        self,
+        command: commands.MoveHuman
+        | commands.SetMode
+        | commands.SetMotion
+        | commands.SetBody
+        | commands.AddPerson
+        | commands.RemovePerson,
+    ) -> None:
+        match command:
+            case commands.MoveHuman():
+                self._live[command.person].drag(command)
+            case commands.SetMode():
+                self._live[command.person].enter(command.mode)
+            case commands.SetMotion():
+                self._live[command.person].play(command)
+            case commands.SetBody():
+                self._live[command.person].grow(command)
+            case commands.AddPerson() | commands.RemovePerson():
+                self._live.change(command)
+                self._touches_here()
+                self._refresh()
 
     def _control_clock(
         self, command: commands.Pause | commands.Resume | commands.StepOnce | commands.Reset
@@ -148,14 +198,15 @@ class World:
     def _start_case(self, case: Case) -> None:
         self._case, self._paused = case, False
         self._selected = tuple(n for n in self.cell.station_ids if n in case.goals)
-        self._person.enter("auto")
+        self._live.only_first()
         self._reset()
 
     def _leave_case(self) -> None:
         if self._case is None:
             return
         self._case, self._selected = None, self._own_choice
-        self._person.leave_case()
+        for person in self._live:
+            person.leave_case()
         self._refresh()
 
     def _choose_among(self, ids: set[str]) -> None:
@@ -174,41 +225,32 @@ class World:
     # Time.
 
     def step(self) -> None:
-        """Advance by one control period; while paused only a dragged person moves."""
+        """Advance by one control period; while paused only dragged people move."""
         if not self._paused:
             self._advance()
-        elif self._person.mode == "manual" and self._person.move(self._arm.dt):
-            self._person.freeze()
+        elif self._live.move_while_paused(self._arm.dt):
             self._touches_here()
             self._refresh()
 
     def _advance(self) -> None:
-        person_q = self._person.q
-        self._person.move(self._arm.dt)
+        before = self._live.q, self._live.sizes
+        self._live.move(self._arm.dt)
         self._tick += 1
         self._t += self._arm.dt
         self._status_s += self._arm.dt
         if self._status in ("contact", "blocked", "case done"):
             self._wait()
         else:
-            self._move_robot(person_q)
+            self._move_robot(*before)
         if self._status == "moving":
             self._decide()
 
-    def _move_robot(self, person_q: Vec) -> None:
+    def _move_robot(self, human_q: Vec, sizes: Vec) -> None:
+        """Carry out the action, the people having moved from ``human_q`` with ``sizes``."""
         piece = pick.step_robot(
             self._arm, self._q, self._qd, self._qdd, self._action(), self._action_rule
         )
-        found = contact(
-            self._arm,
-            self._people,
-            self._q,
-            self._qd,
-            piece.c,
-            piece.d,
-            (person_q[None], self._person.q[None]),
-        )
-        self._clearance = found.clearance_m
+        found = self._found(self._qd, piece.c, piece.d, human_q, sizes)
         if found.kind != "none":
             self._touch(found)
             return
@@ -271,6 +313,7 @@ class World:
             kind=found.kind,
             link=found.link,
             body=bodies[found.kind],
+            person=None if found.worker is None else self._live.ids[found.worker],
         )
         self._count(contacts=1)
         self._qd = np.zeros(6)
@@ -307,7 +350,7 @@ class World:
             decision = self._policy.decide(
                 self._q,
                 self._qd,
-                [Person(q=self._person.q, qd=self._person.qd)],
+                [person.seen() for person in self._live],
                 self._offered,
                 previous=self._previous,
                 time_left_s=self._time_left,
@@ -319,6 +362,17 @@ class World:
             self._counters = replace(self._counters, switches=self._counters.switches + 1)
             self._tell(explanation.switched(decision, names, self._previous, self._label))
         self._decision = decision
+
+    def _distances(self) -> dict[int, float]:
+        """Return the distance of the robot to each person by id [m]."""
+        found = worker_distances(
+            self._arm,
+            self._people._replace(columns=body.capsule_columns(len(self._live))),
+            self._q,
+            self._live.q,
+            self._live.sizes,
+        )
+        return dict(zip(self._live.ids, found.tolist(), strict=True))
 
     # What is seen.
 
@@ -351,11 +405,19 @@ class World:
         decision = self._decision
         return CandidateView(
             id=candidate.id,
-            position=_frozen(candidate.position),
+            position=frozen(candidate.position),
             value=None if decision is None else decision.values[index],
             chosen=decision is not None and decision.index == index,
             reachable=None if decision is None else decision.reachable[index],
             outside=() if decision is None else decision.outside_candidates[index],
+        )
+
+    def _views(self) -> tuple[PersonView, ...]:
+        distances = self._distances()
+        nearest = min(distances, key=lambda id: distances[id], default=None)
+        return tuple(
+            person.view(distances[person.id], nearest=person.id == nearest)
+            for person in self._live
         )
 
     def _tcp(self) -> Vec:
@@ -372,15 +434,13 @@ class World:
             cell=self.cell.name,
             tick=self._tick,
             t_s=self._t,
-            mode=self._person.mode,
             paused=self._paused,
             status=status,
             message=self._message(status),
-            robot_q=_frozen(self._q),
-            robot_qd=_frozen(self._qd),
-            tcp=_frozen(self._tcp()),
-            person_q=_frozen(self._person.q),
-            person_qd=_frozen(self._person.qd),
+            robot_q=frozen(self._q),
+            robot_qd=frozen(self._qd),
+            tcp=frozen(self._tcp()),
+            people=self._views(),
             gripping=status == "picking" and self._status_s >= PICK_S[0],
             selected=self._selected,
             candidates=tuple(self._view(i, c) for i, c in enumerate(self._offered)),
@@ -396,9 +456,3 @@ class World:
             case=None if self._case is None else self._case.id,
             counters=self._counters,
         )
-
-
-def _frozen(values: Vec) -> Vec:
-    copy = np.array(values, dtype=np.float64)
-    copy.setflags(write=False)
-    return copy

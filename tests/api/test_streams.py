@@ -43,6 +43,14 @@ def test_world_streams_light_snapshots_as_time_goes_on(address: str) -> None:
     assert {"chosen", "candidates", "message", "clearance_m"} <= seen[0][2].keys()
 
 
+def test_stream_tells_of_the_people_without_their_joints(address: str) -> None:
+    with httpx.stream("GET", f"{address}/v1/worlds/main/events") as response:
+        _, _, data = next(events(response))
+    (person,) = data["people"]
+    assert (person["id"], person["mode"], person["body"]["stature"]) == (0, "auto", 50.0)
+    assert "q" not in person
+
+
 def test_stream_of_a_world_ends_when_it_is_started_anew(address: str) -> None:
     with httpx.stream("GET", f"{address}/v1/worlds/main/events", timeout=60.0) as response:
         stream = events(response)

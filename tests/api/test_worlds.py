@@ -6,6 +6,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from tests import workshop
+from tests.sim.recorded_person import csv_text, working
 
 WORLD = "/v1/worlds/main"
 COMMANDS = f"{WORLD}/commands"
@@ -82,9 +83,64 @@ def test_case_study_is_started(client: TestClient) -> None:
     assert sorted(started["selected"]) == sorted(case["goals"])
 
 
+def test_second_person_works_and_the_state_repeats_the_choice(client: TestClient) -> None:
+    client.post(COMMANDS, json={"tag": "add-person"})
+    client.post(COMMANDS, json={"tag": "set-body", "person": 1, "stature": 95, "arms": 20})
+    try:
+        world = until(client, lambda now: len(now["people"]) == 2 and now["status"] == "moving")
+        assert [one["id"] for one in world["people"]] == [0, 1]
+        assert sum(one["nearest"] for one in world["people"]) == 1
+        body = world["people"][1]["body"]
+        assert (body["stature"], body["arms"], body["shoulders"]) == (95, 20, 50)
+        assert body["stature_m"] == pytest.approx(1.87, abs=0.01)
+        assert len(world["state"]["people"]) == 2
+        asked = client.post("/v1/task-selection", json=world["state"]).json()
+        assert asked["chosen"] == world["chosen"]
+        values = {one["id"]: one["value"] for one in world["candidates"]}
+        assert {one["id"]: one["value"] for one in asked["candidates"]} == values
+    finally:
+        client.post(COMMANDS, json={"tag": "remove-person", "person": 1})
+        client.post(COMMANDS, json={"tag": "set-body", "stature": 50})
+    until(client, lambda now: len(now["people"]) == 1)
+
+
+def test_imported_motion_is_played(client: TestClient) -> None:
+    posted = client.post(
+        "/v1/motions",
+        params={"file_name": "played.csv"},
+        content=csv_text(working()),
+        headers={"Content-Type": "text/csv"},
+    )
+    assert posted.status_code == 201
+    try:
+        client.post(COMMANDS, json={"tag": "set-motion", "name": "played"})
+        moving = until(
+            client, lambda now: (now["people"][0]["motion"] or {}).get("t_s", 0) > 0.3
+        )
+        assert moving["mode"] == "recorded"
+        motion = moving["people"][0]["motion"]
+        assert (motion["name"], motion["run"], motion["n_runs"]) == ("played", 0, 1)
+        assert motion["duration_s"] == pytest.approx(3.98)
+        assert moving["people"][0]["body"]["recorded"]
+        refused = client.post(COMMANDS, json={"tag": "set-motion", "name": "played", "run": 4})
+        assert (refused.status_code, refused.json()["field"]) == (422, "run")
+        unknown = client.post(COMMANDS, json={"tag": "set-motion", "name": "unknown"}).json()
+        assert (unknown["field"], unknown["choices"]) == ("name", ["played"])
+    finally:
+        client.delete("/v1/motions/played")
+
+
 @pytest.mark.parametrize(
     ("command", "field"),
     [
+        ({"tag": "set-mode", "mode": "recorded"}, "mode"),
+        ({"tag": "set-mode", "mode": "auto", "person": 1}, "person"),
+        ({"tag": "move-human", "person": -1}, "person"),
+        ({"tag": "remove-person"}, "person"),
+        ({"tag": "set-body", "stature": 100}, "stature"),
+        ({"tag": "set-body", "arms": 0.5}, "arms"),
+        ({"tag": "set-motion", "name": "nothing-there"}, "name"),
+        ({"tag": "set-motion", "name": "x", "run": -1}, "run"),
         ({"tag": "fly"}, "tag"),
         ({}, "tag"),
         ({"tag": "set-mode", "mode": "wild"}, "mode"),

@@ -3,6 +3,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from app.errors import BadMotion
+from app.sim.body_size import MEDIAN
 from app.sim.human import body_frames
 from app.sim.opensim import COORDINATES, read_opensim
 from app.sim.ports import Vec
@@ -34,7 +35,7 @@ def test_every_body_is_turned_as_opensim_turns_it(degrees: bool) -> None:
     track = read_opensim(opensim_text(angles, degrees=degrees))
     for k in range(20):
         a = {name: float(column[k]) for name, column in angles.items()}
-        frames = body_frames(track.q[k], 0.0)
+        frames = body_frames(track.q[k], MEDIAN.vector(0.0))
         trunk = [a[f"pelvis_{name}"] for name in ("tilt", "list", "rotation")]
         back = [a[f"lumbar_{name}"] for name in ("extension", "bending", "rotation")]
         torso = Rotation.from_euler("ZXY", trunk) * Rotation.from_euler("ZXY", back)

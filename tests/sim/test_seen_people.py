@@ -36,7 +36,14 @@ def test_the_person_seen_is_the_one_whom_a_batch_sees() -> None:
         x, y, r = state.people.cylinders[e, 0]
         assert (x, y) == (walker[X], walker[Y])
         people = [
-            *(Person(q=state.people.q[e, w], qd=state.people.qd[e, w]) for w in range(2)),
+            *(
+                Person(
+                    q=state.people.q[e, w],
+                    qd=state.people.qd[e, w],
+                    size=state.people.size[e, w],
+                )
+                for w in range(2)
+            ),
             standing_in(x, y, walker[VX], walker[VY], r),
         ]
         index = nearest_index(batch.arm, batch.world.people, state.q[e], people)
@@ -51,6 +58,7 @@ def test_the_person_seen_is_the_one_whom_a_batch_sees() -> None:
             people[index].qd,
             state.goal[e][None],
             state.time_left[e],
+            people[index].size,
         )
         assert found.shape == (1, N_FEATURES)
         np.testing.assert_allclose(found[0], obs[e], atol=1e-5)

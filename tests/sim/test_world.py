@@ -69,7 +69,7 @@ def test_decision_in_a_snapshot_is_the_one_for_its_own_state(world: World, cell:
     again = StraightPolicy(cell).decide(
         snapshot.robot_q,
         snapshot.robot_qd,
-        [Person(q=snapshot.person_q, qd=snapshot.person_qd)],
+        [Person(q=one.q, qd=one.qd, size=one.size) for one in snapshot.people],
         [Candidate(id=c.id, position=c.position) for c in snapshot.candidates],
         previous=snapshot.previous,
         time_left_s=snapshot.time_left_s,

@@ -2,10 +2,11 @@ import socket
 import time
 from collections.abc import Callable, Iterator
 
+import numpy as np
 import pytest
 
 from app.errors import InvalidInput, NotFound
-from app.sim import commands
+from app.sim import commands, human
 from app.sim.cells import load_cell
 from tests.straight_policy import StraightPolicy
 from tests.web.viewer_client import ViewerClient
@@ -62,6 +63,18 @@ def test_bad_commands_are_refused_at_the_door(live: LiveCell) -> None:
         live.handle.submit(commands.ToggleCandidate(id="cube9"))
     with pytest.raises(InvalidInput):
         live.handle.submit(commands.MoveHuman(pelvis=(float("inf"), 0.0, 0.0)))
+    with pytest.raises(InvalidInput, match="person"):
+        live.handle.submit(commands.SetBody(person=3, stature=40.0))
+
+
+def test_person_can_be_changed_as_soon_as_it_was_added(live: LiveCell) -> None:
+    live.handle.submit(commands.AddPerson())
+    live.handle.submit(commands.SetBody(person=1, stature=90.0))
+    wait_for(lambda: live.handle.snapshot().people[-1].body.stature == 90.0)
+    live.handle.submit(commands.RemovePerson(person=1))
+    with pytest.raises(InvalidInput, match="nobody"):
+        live.handle.submit(commands.SetMode(person=1, mode="still"))
+    wait_for(lambda: len(live.handle.snapshot().people) == 1)
 
 
 def test_click_on_a_cube_toggles_it_as_candidate(live: LiveCell) -> None:
@@ -77,11 +90,16 @@ def test_click_on_a_cube_toggles_it_as_candidate(live: LiveCell) -> None:
 def test_drag_of_a_hand_moves_the_person(live: LiveCell) -> None:
     live.handle.submit(commands.SetMode(mode="manual"))
     live.handle.submit(commands.MoveHuman(pelvis=(0.0, 1.3, -1.5708)))
-    wait_for(lambda: abs(live.handle.snapshot().person_q[1] - 1.3) < 0.02)
-    before = live.handle.snapshot().person_q
+    wait_for(lambda: abs(live.handle.snapshot().people[0].q[1] - 1.3) < 0.02)
+
+    def away() -> float:
+        person = live.handle.snapshot().people[0]
+        palm = human.joint_points(person.q, person.size)["hand_r"]
+        return float(np.linalg.norm(palm - [-0.15, 0.9, 0.25]))
+
     with ViewerClient(live.viewer_port) as visitor:
-        visitor.drag("/gizmos/right", [(0.1, 0.95, 0.3), (0.15, 0.9, 0.25)])
-        wait_for(lambda: abs(live.handle.snapshot().person_q[10] - before[10]) > 0.2)
+        visitor.drag("/gizmos/0/right", [(-0.1, 0.95, 0.3), (-0.15, 0.9, 0.25)])
+        wait_for(lambda: away() < 0.03)
 
 
 def test_stop_ends_thread_and_viewer() -> None:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from app.sim import human
+from app.sim.body_size import MEDIAN, BodySize, percentile_body
 from app.sim.cells import load_cell
 from web import mannequin, skeleton
 from web.gait import Gait
@@ -85,3 +86,81 @@ def test_legs_reach_from_hip_to_ankle_while_a_foot_swings() -> None:
             shin = bones[f"shin_{side}"]
             ankle = shin[:3, 3] - skeleton.SHIN * shin[:3, 2]
             assert np.linalg.norm(ankle - bones[f"foot_{side}"][:3, 3]) < 0.06
+
+
+SIZES = {
+    "small": percentile_body(5.0),
+    "tall": percentile_body(95.0),
+    "tall, short arms, broad": percentile_body(95.0, 5.0, 95.0),
+    "recorded": BodySize(trunk=0.5, upper_arm_r=0.33, upper_arm_l=0.31, clavicle_r=0.15),
+}
+
+
+def edges(faces: np.ndarray) -> np.ndarray:
+    return np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+
+
+def test_skin_of_the_median_person_is_the_model_itself() -> None:
+    for part in mannequin.parts():
+        if part.bone is None:
+            skin = mannequin.fitted(part, MEDIAN.vector(-0.75))
+            assert np.allclose(skin, part.surface.vertices, atol=1e-9), part.name
+
+
+@pytest.mark.parametrize("name", SIZES)
+def test_skin_of_another_size_is_stretched_evenly_and_nowhere_torn(name: str) -> None:
+    size = SIZES[name].vector(-0.75)
+    for part in mannequin.parts():
+        if part.bone is not None:
+            continue
+        ends = edges(part.surface.faces)
+        before = part.surface.vertices[ends]
+        after = mannequin.fitted(part, size)[ends]
+        longer = np.linalg.norm(after[:, 1] - after[:, 0], axis=1)
+        longer -= 2.0 * np.linalg.norm(before[:, 1] - before[:, 0], axis=1)
+        assert longer.max() < 1e-3, part.name
+
+
+@pytest.mark.parametrize("name", SIZES)
+def test_sleeves_and_trousers_end_at_wrists_and_ankles_of_any_size(name: str) -> None:
+    size = SIZES[name].vector(0.0)
+    bind, median = skeleton.bind_bones(size), skeleton.bind_bones()
+    ends = {"jacket": ("hand_r", "hand_l"), "trousers": ("foot_r", "foot_l")}
+    for part in mannequin.parts():
+        for bone in ends.get(part.name, ()):
+            gaps = [
+                np.linalg.norm(vertices - bones[bone][:3, 3], axis=1).min()
+                for vertices, bones in (
+                    (part.surface.vertices, median),
+                    (mannequin.fitted(part, size), bind),
+                )
+            ]
+            assert gaps[1] == pytest.approx(gaps[0], rel=0.2, abs=0.01)
+
+
+@pytest.mark.parametrize(("name", "expected"), [("small", 1.57), ("tall", 1.87)])
+def test_mannequin_is_as_tall_as_the_person(name: str, expected: float) -> None:
+    cell = load_cell()
+    size = SIZES[name].vector(cell.floor_z)
+    q, gait = human.rest_posture(*cell.human.home), Gait(cell.floor_z)
+    girth = SIZES[name].girth
+    gait.follow(human.body_frames(q, size)["pelvis"], 0.0, girth)
+    bones = skeleton.bones(q, size, gait.feet)
+    parts = {part.name: part.surface.vertices for part in mannequin.parts()}
+    crown = parts["head"] * skeleton.scales(size)["head"] + bones["head"][:3, 3]
+    sole = parts["shoe_r"] * girth + bones["foot_r"][:3, 3]
+    assert sole[:, 2].min() == pytest.approx(cell.floor_z, abs=0.01)
+    assert crown[:, 2].max() - cell.floor_z == pytest.approx(expected, abs=0.03)
+
+
+def test_soles_stay_on_the_floor_while_the_person_grows() -> None:
+    gait, pelvis = Gait(0.0), np.eye(4)
+    gait.follow(pelvis, 0.0, 1.0)
+    assert gait.follow(pelvis, 0.05, 1.1)
+    for foot in gait.feet.values():
+        assert foot[2, 3] == pytest.approx(1.1 * skeleton.ANKLE_HEIGHT)
+
+
+def test_people_wear_vests_of_different_colours() -> None:
+    vest = next(part for part in mannequin.parts() if part.name == "vest")
+    assert len({mannequin.color_of(vest, id) for id in range(4)}) == 4

@@ -80,12 +80,12 @@ def test_gizmos_are_seen_in_manual_mode_only_and_sit_on_the_hands(
     scene: CellScene, server: viser.ViserServer, world: World, cell: Cell
 ) -> None:
     scene.draw(world.snapshot(), 0.05)
-    assert not node(server, "/gizmos/right").visible
+    assert not node(server, "/gizmos/0/right").visible
     world.apply(commands.SetMode(mode="manual"))
     scene.draw(world.snapshot(), 0.05)
     palms = human.joint_points(world.snapshot().person_q, cell.body)
-    assert node(server, "/gizmos/right").visible
-    assert np.allclose(node(server, "/gizmos/right").position, palms["hand_r"], atol=1e-3)
+    assert node(server, "/gizmos/0/right").visible
+    assert np.allclose(node(server, "/gizmos/0/right").position, palms["hand_r"], atol=1e-3)
 
 
 def test_contact_shows_what_touched_in_red(
@@ -100,9 +100,9 @@ def test_contact_shows_what_touched_in_red(
     snapshot = world.snapshot()
     assert snapshot.contact is not None
     scene.draw(snapshot, 0.05)
-    touched = f"/person/shapes/{snapshot.contact.body}"
+    touched = f"/people/0/shapes/{snapshot.contact.body}"
     assert node(server, touched).visible
-    assert not node(server, "/person/shapes/head").visible
+    assert not node(server, "/people/0/shapes/head").visible
 
 
 def test_collision_shapes_lie_over_the_person_when_asked_for(
@@ -113,12 +113,12 @@ def test_collision_shapes_lie_over_the_person_when_asked_for(
     scene.draw(snapshot, 0.05)
     ends = human.capsules(snapshot.person_q, cell.body, cell.floor_z)
     for name, pair in zip(human.CAPSULE_NAMES, ends, strict=True):
-        capsule = node(server, f"/person/shapes/{name}")
+        capsule = node(server, f"/people/0/shapes/{name}")
         assert capsule.visible
         assert np.allclose(capsule.position, pair.mean(axis=0), atol=1e-9)
     scene.overlays.shapes = False
     scene.draw(snapshot, 0.05)
-    assert not node(server, "/person/shapes/head").visible
+    assert not node(server, "/people/0/shapes/head").visible
 
 
 def test_colour_runs_from_green_for_the_best_to_red_for_the_worst() -> None:
@@ -133,3 +133,37 @@ def test_path_runs_from_the_tool_to_the_target() -> None:
     line = dashes(start, end)
     assert np.linalg.norm(line[0, 0] - start) < 0.05
     assert np.linalg.norm(line[-1, 1] - end) < 0.05
+
+
+def test_two_people_are_drawn_and_one_who_leaves_is_taken_out(
+    scene: CellScene, server: viser.ViserServer, world: World
+) -> None:
+    world.apply(commands.AddPerson())
+    world.apply(commands.SetMode(mode="manual", person=1))
+    scene.draw(world.snapshot(), 0.05)
+    vests = {tuple(node(server, f"/people/{id}/vest").color) for id in (0, 1)}
+    assert len(vests) == 2
+    assert node(server, "/gizmos/1/right").visible
+    assert not node(server, "/gizmos/0/right").visible
+    world.apply(commands.RemovePerson(person=1))
+    scene.draw(world.snapshot(), 0.05)
+    assert server.scene.get_handle_by_name("/people/1/vest") is None
+    assert server.scene.get_handle_by_name("/gizmos/1/right") is None
+
+
+def test_mannequin_and_capsules_grow_with_the_person(
+    scene: CellScene, server: viser.ViserServer, world: World
+) -> None:
+    scene.draw(world.snapshot(), 0.05)
+    before = np.ptp(node(server, "/people/0/head").vertices[:, 2])
+    sleeves = np.ptp(node(server, "/people/0/jacket").vertices[:, 1])
+    world.apply(commands.SetBody(stature=95.0))
+    for _ in range(14):
+        world.step()
+        scene.draw(world.snapshot(), 0.05)
+    person = world.snapshot().people[0]
+    assert np.ptp(node(server, "/people/0/head").vertices[:, 2]) > 1.07 * before
+    assert np.ptp(node(server, "/people/0/jacket").vertices[:, 1]) > 1.07 * sleeves
+    forearm = np.ptp(node(server, "/people/0/shapes/forearm_r").vertices[:, 2])
+    girth = human.capsule_radii(person.size)[human.CAPSULE_NAMES.index("forearm_r")]
+    assert forearm == pytest.approx(person.size[6] + 2.0 * girth, abs=2e-3)

@@ -9,7 +9,7 @@ from web.solids import block, disc, rod, slab, torus
 
 WITHOUT_EXTRAS = """
 import sys
-sys.modules["scipy"] = sys.modules["skimage"] = None
+sys.modules["skimage"] = None
 from app.sim.cells import load_cell
 from web import mannequin, robot_body, stations_view, workplace
 cell = load_cell()

@@ -1,22 +1,11 @@
-// What a visitor can do to the cell: who moves the person, the clock, the goals, the cases.
+// What a visitor can do to the cell: the people, the clock, the goals, the cases.
 import { html, useState } from "./vendor/htm-preact-standalone.module.js";
 import { Icon } from "./icons.js";
-
-const MODES = [
-  ["manual", "I move the person", "hand"],
-  ["auto", "Works by itself", "walk"],
-];
+import { People } from "./people.js";
 
 export function Controls({ world, cell, cases, send, colourOf, labelOf }) {
   return html`<section class="dock" aria-label="Controls of the cell">
-    <div class="dock-row">
-      <span class="dock-label" id="mode-label">Person</span>
-      <div class="segmented" role="radiogroup" aria-labelledby="mode-label">
-        ${MODES.map(([mode, label, icon]) => html`<button key=${mode} type="button" role="radio"
-          aria-checked=${String(world.mode === mode)} data-mode=${mode}
-          onClick=${() => send({ tag: "set-mode", mode })}>
-          <${Icon} name=${icon} />${label}</button>`)}
-      </div>
+    <${People} world=${world} send=${send}>
       <div class="transport" role="group" aria-label="Clock">
         <button type="button" class="tool" onClick=${() =>
           send({ tag: world.paused ? "resume" : "pause" })} data-action="pause"
@@ -30,9 +19,7 @@ export function Controls({ world, cell, cases, send, colourOf, labelOf }) {
         <button type="button" class="tool" data-action="reset" aria-label="Reset"
           onClick=${() => send({ tag: "reset" })}><${Icon} name="reset" /><span>Reset</span></button>
       </div>
-      ${world.mode === "manual" &&
-      html`<p class="dock-hint">Drag the handles in the scene.</p>`}
-    </div>
+    </${People}>
     <div class="dock-row">
       <span class="dock-label" id="goals-label">Goals</span>
       <${Goals} world=${world} cell=${cell} send=${send} colourOf=${colourOf} labelOf=${labelOf} />

@@ -11,6 +11,9 @@ const RAMP = [
 const UNKNOWN = "rgb(122 142 166)";
 const IDLE = "rgb(196 202 210)";
 
+/** Colours of the people's vests, by id; the same as VESTS in web/mannequin.py. */
+export const VESTS = ["rgb(255 116 32)", "rgb(196 214 48)", "rgb(72 164 232)", "rgb(232 104 168)"];
+
 /** Colour of a goal worth `value` where the best is worth `best`. */
 export function colourByValue(value, best) {
   if (!Number.isFinite(value) || !Number.isFinite(best)) return UNKNOWN;

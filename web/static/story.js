@@ -2,6 +2,7 @@
 import { html } from "./vendor/htm-preact-standalone.module.js";
 import * as format from "./format.js";
 import { Icon } from "./icons.js";
+import { nameOf } from "./people.js";
 
 const STATUS = {
   moving: ["On its way", "accent"],
@@ -25,17 +26,19 @@ export function Story({ world }) {
       <span class="clock">${world.t_s.toFixed(1)} s</span>
     </div>
     <p class="sentence">${world.message || "Waiting for the first decision."}</p>
-    <${Clearance} metres=${world.clearance_m} />
+    <${Clearance} metres=${world.clearance_m} people=${world.people ?? []} />
   </section>`;
 }
 
-function Clearance({ metres }) {
+function Clearance({ metres, people }) {
+  const nearest = people.length > 1 && people.find((one) => one.nearest);
+  const whom = nearest ? nameOf(nearest.id) : "the person";
   const known = Number.isFinite(metres);
   const share = known ? Math.min(1, Math.max(0, metres / CLEARANCE_SCALE_M)) : 0;
   const tone = !known ? "" : metres < 0.05 ? "bad" : metres < 0.15 ? "warn" : "good";
   return html`<div class="clearance">
-    <span class="label">Clearance to the person</span>
-    <span class="meter" role="meter" aria-label="Clearance to the person in centimetres"
+    <span class="label">${people.length ? `Clearance to ${whom}` : "Nobody is in the cell"}</span>
+    <span class="meter" role="meter" aria-label="Clearance to the nearest person in centimetres"
       aria-valuemin="0" aria-valuemax=${CLEARANCE_SCALE_M * 100}
       aria-valuenow=${Math.round(share * CLEARANCE_SCALE_M * 100)}>
       <i class=${`meter-fill ${tone}`} style=${{ transform: `scaleX(${share})` }}></i>

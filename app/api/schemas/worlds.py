@@ -4,6 +4,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field
 
+from app.api.schemas.live_people import PersonLight, PersonLive
 from app.api.schemas.numbers import Answer, Body, Finite, Vector3
 from app.api.schemas.task_selection import (
     CandidateState,
@@ -12,9 +13,16 @@ from app.api.schemas.task_selection import (
     RobotState,
     TaskSelectionRequest,
 )
+from app.errors import InvalidInput
 from app.sim import commands
+from app.sim.body_size import PERCENTILES
+from app.sim.motions import Motion
 from app.sim.ports import TaskPolicy
 from app.sim.snapshot import CandidateView, WorldSnapshot
+
+MAX_CHOICES = 20
+"""Most choices that an error lists."""
+Percentile = Annotated[float, Field(ge=PERCENTILES[0], le=PERCENTILES[1])]
 
 
 class CandidateLive(Answer):
@@ -46,6 +54,7 @@ class ContactPublic(Answer):
     kind: str
     link: str
     body: str
+    person: int | None = Field(description="id of the person who was touched")
 
 
 class CountersPublic(Answer):
@@ -64,7 +73,8 @@ class WorldLight(Answer):
     cell: str
     tick: int
     t_s: float = Field(description="simulated time since the last reset [s]")
-    mode: str = Field(description="who moves the person: manual or auto")
+    mode: str | None = Field(description="who moves the first person; null: nobody is there")
+    people: tuple[PersonLight, ...] = Field(description="0 to 4, in the order of their ids")
     paused: bool
     status: str
     message: str = Field(description="why, in one sentence")
@@ -73,7 +83,7 @@ class WorldLight(Answer):
     candidates: list[CandidateLive]
     chosen: str | None
     outside: list[Outside] = Field(description="state fields outside the training range")
-    clearance_m: float | None = Field(description="least distance robot to person [m]")
+    clearance_m: float | None = Field(description="least distance robot to people [m]")
     contact: ContactPublic | None
     checkpoint: str | None = Field(description="SHA-256 of the checkpoint that decides")
     policy_title: str | None
@@ -91,7 +101,7 @@ class WorldPublic(WorldLight):
     """One live world at one tick, with the state that a decision needs."""
 
     robot: RobotState
-    people: list[PersonState]
+    people: tuple[PersonLive, ...] = Field(description="0 to 4, in the order of their ids")
     previous: str | None = Field(description="the choice one tick earlier")
     time_left_s: float = Field(description="time left in the episode [s]")
     tcp: list[float] = Field(description="tool centre point [m]")
@@ -104,10 +114,11 @@ class WorldPublic(WorldLight):
     @classmethod
     def from_domain(cls, snapshot: WorldSnapshot) -> Self:
         """Make it from a snapshot."""
+        members = light_members(snapshot)
+        members["people"] = tuple(PersonLive.from_domain(one) for one in snapshot.people)
         return cls(
-            **light_members(snapshot),
+            **members,
             robot=robot_of(snapshot),
-            people=people_of(snapshot),
             previous=snapshot.previous,
             time_left_s=snapshot.time_left_s,
             tcp=snapshot.tcp.tolist(),
@@ -157,7 +168,10 @@ def robot_of(snapshot: WorldSnapshot) -> RobotState:
 
 def people_of(snapshot: WorldSnapshot) -> list[PersonState]:
     """Return the people's states, as a request carries them."""
-    return [PersonState(q=snapshot.person_q.tolist(), qd=snapshot.person_qd.tolist())]
+    return [
+        PersonState(q=one.q.tolist(), qd=one.qd.tolist(), size=one.size.tolist())
+        for one in snapshot.people
+    ]
 
 
 def decision_input(snapshot: WorldSnapshot) -> TaskSelectionRequest | None:
@@ -188,11 +202,14 @@ def light_members(snapshot: WorldSnapshot) -> dict[str, Any]:
         "chosen", "clearance_m", "checkpoint", "policy_title", "elapsed_ms", "case",
     )  # fmt: skip
     return {name: getattr(snapshot, name) for name in same} | {
+        "people": tuple(PersonLight.from_domain(one) for one in snapshot.people),
         "selected": list(snapshot.selected),
         "candidates": [CandidateLive.from_domain(one) for one in snapshot.candidates],
         "outside": [Outside.from_domain(one) for one in snapshot.outside],
         "contact": contact
-        and ContactPublic(kind=contact.kind, link=contact.link, body=contact.body),
+        and ContactPublic(
+            kind=contact.kind, link=contact.link, body=contact.body, person=contact.person
+        ),
         "counters": CountersPublic(
             reached=counters.reached,
             contacts=counters.contacts,
@@ -202,10 +219,14 @@ def light_members(snapshot: WorldSnapshot) -> dict[str, Any]:
     }
 
 
+Who = Annotated[int, Field(description="id of the person; the first is 0")]
+
+
 class MoveHuman(Body):
-    """Ask the person to take a posture; what is null stays where it is."""
+    """Ask a person to take a posture; what is null stays where it is."""
 
     tag: Literal["move-human"]
+    person: Who = commands.FIRST
     pelvis: Vector3 | None = Field(None, description="pelvis x [m], y [m], yaw [rad]")
     right: Vector3 | None = Field(None, description="point for the right hand [m]")
     left: Vector3 | None = Field(None, description="point for the left hand [m]")
@@ -213,25 +234,95 @@ class MoveHuman(Body):
     def to_domain(self) -> commands.Command:
         """Return the world's command."""
         return commands.MoveHuman(
-            pelvis=_triple(self.pelvis), right=_triple(self.right), left=_triple(self.left)
+            person=self.person,
+            pelvis=_triple(self.pelvis),
+            right=_triple(self.right),
+            left=_triple(self.left),
         )
 
 
 class SetMode(Body):
-    """Say who moves the person."""
+    """Say who moves a person."""
 
     tag: Literal["set-mode"]
-    mode: commands.Mode
+    mode: commands.PlainMode
+    person: Who = commands.FIRST
 
     def to_domain(self) -> commands.Command:
         """Return the world's command."""
-        return commands.SetMode(mode=self.mode)
+        return commands.SetMode(mode=self.mode, person=self.person)
+
+
+class SetMotion(Body):
+    """Let a person move as recorded, again and again."""
+
+    tag: Literal["set-motion"]
+    name: str = Field(max_length=64, description="name of a stored motion")
+    run: int = Field(0, ge=0, description="which of its clean runs, from 0")
+    person: Who = commands.FIRST
+
+    def to_domain(self, runs: tuple[Motion, ...]) -> commands.Command:
+        """Return the world's command.
+
+        Args:
+            runs: The motion's clean runs.
+
+        Raises:
+            InvalidInput: The motion has no such run.
+        """
+        if self.run >= len(runs):
+            choices = [str(run) for run in range(min(len(runs), MAX_CHOICES))]
+            rule = f"is no run of this motion: it has {len(runs)}, counted from 0"
+            raise InvalidInput("run", self.run, rule, choices)
+        return commands.SetMotion(
+            motion=runs[self.run],
+            name=self.name,
+            run=self.run,
+            n_runs=len(runs),
+            person=self.person,
+        )
+
+
+class SetBody(Body):
+    """Give a person another size; what is null stays as it is."""
+
+    tag: Literal["set-body"]
+    stature: Percentile | None = Field(None, description="percentile of adults")
+    arms: Percentile | None = Field(None, description="of the arms' length at that stature")
+    shoulders: Percentile | None = Field(
+        None, description="of the shoulders' width at that stature"
+    )
+    recorded: bool = Field(
+        False, description="take the recorded person's lengths while a motion is played"
+    )
+    person: Who = commands.FIRST
+
+    def to_domain(self) -> commands.Command:
+        """Return the world's command."""
+        return commands.SetBody(
+            stature=self.stature,
+            arms=self.arms,
+            shoulders=self.shoulders,
+            recorded=self.recorded,
+            person=self.person,
+        )
+
+
+class RemovePerson(Body):
+    """Let a person leave."""
+
+    tag: Literal["remove-person"]
+    person: Who
+
+    def to_domain(self) -> commands.Command:
+        """Return the world's command."""
+        return commands.RemovePerson(person=self.person)
 
 
 class Plain(Body):
     """A command without arguments."""
 
-    tag: Literal["pause", "resume", "step", "reset"]
+    tag: Literal["pause", "resume", "step", "reset", "add-person"]
 
     def to_domain(self) -> commands.Command:
         """Return the world's command."""
@@ -240,6 +331,7 @@ class Plain(Body):
             "resume": commands.Resume(),
             "step": commands.StepOnce(),
             "reset": commands.Reset(),
+            "add-person": commands.AddPerson(),
         }
         return plain[self.tag]
 
@@ -291,7 +383,16 @@ class SetPolicy(Body):
 
 
 CommandCreate = Annotated[
-    MoveHuman | SetMode | Plain | SetCandidates | ToggleCandidate | StartCase | SetPolicy,
+    MoveHuman
+    | SetMode
+    | SetMotion
+    | SetBody
+    | RemovePerson
+    | Plain
+    | SetCandidates
+    | ToggleCandidate
+    | StartCase
+    | SetPolicy,
     Field(discriminator="tag"),
 ]
 

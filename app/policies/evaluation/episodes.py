@@ -4,8 +4,9 @@ Every episode is one row of a batch that stops when it ends; episode ``k`` of a 
 same whatever rule is measured, so that rules are compared on the same cells.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,13 +14,13 @@ from numpy.typing import NDArray
 from app.policies.evaluation.statistics import wilson
 from app.policies.presets import action_of
 from app.policies.task_choice import ValueNetworks
-from app.policies.training import work_of
 from app.sim.cells import Cell
 from app.sim.kernels import episode as kernel
 from app.sim.kernels.features import LAYOUT, observe_batch
 from app.sim.kernels.people import new_crowd, see_rows
 from app.sim.pick import OUTCOMES, PickBatch, PickSettings
 from app.sim.recheck import Trajectory
+from app.sim.worker_motion import WorkSettings
 
 Index = NDArray[np.int64]
 EVALUATION_LIBRARY = 1_000_003
@@ -103,8 +104,11 @@ class Episodes:
         }
 
 
-def settings_for(n_candidates: tuple[int, int], preset: dict[str, object]) -> PickSettings:
-    """Return the evaluation's settings: 10 s, start clearance 0.05 m, unseen postures.
+def settings_for(n_candidates: tuple[int, int], preset: Mapping[str, Any]) -> PickSettings:
+    """Return the evaluation's settings: 10 s, start clearance 0.05 m, the library's people.
+
+    Their postures and samples were never seen in training, and they mind no robot, whatever
+    people the checkpoint was trained beside.
 
     Args:
         n_candidates: Fewest and most targets offered.
@@ -114,7 +118,7 @@ def settings_for(n_candidates: tuple[int, int], preset: dict[str, object]) -> Pi
         time_limit_s=10.0,
         start_clearance_m=0.05,
         n_candidates=n_candidates,
-        work=work_of(preset, EVALUATION_LIBRARY),
+        work=WorkSettings(seed=EVALUATION_LIBRARY, pace=float(preset.get("human_pace", 1.0))),
         action=action_of(preset),
     )
 

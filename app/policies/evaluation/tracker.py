@@ -33,7 +33,7 @@ from app.sim.pick import PickBatch
 from app.sim.ports import Vec
 from app.sim.tracker import Tracker, TrackerSettings
 
-DEFAULT_EPISODES = 400
+DEFAULT_EPISODES = 300
 RATE_HZ = 30.0
 LOOKED_S = 0.4
 """Time for which the tracker has looked before its first frame counts [s]. The person is taken
@@ -171,7 +171,7 @@ def run_tracker(
 
     Args:
         checkpoint: What acts and chooses.
-        episodes: Number of episodes per row, by default 400.
+        episodes: Number of episodes per row, by default 300.
         seed: Seed of the episodes and of the disturbances.
         on_row: Told of each row once it is known.
     """

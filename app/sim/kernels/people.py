@@ -2,8 +2,8 @@
 
 A cell holds up to four people: *workers*, 18-DoF bodies, and *walkers*, the vertical cylinders
 of METHOD 2.1. Workers become twelve capsules each, in one set of columns; walkers stay
-cylinders. A worker's motion comes from one of three sources: synthetic reaches
-(``script.py``), task primitives (``repertoire.py``) or recorded tracks.
+cylinders. A worker either follows a script, of synthetic reaches (``script.py``) or
+task primitives (``repertoire.py``), or a track: recorded motion, or any other given by samples.
 
 People do not react to the robot, so that an episode's whole human motion is fixed when it
 starts; unless they are courteous (METHOD 4): then a worker slows and leans away as the arm
@@ -36,15 +36,15 @@ from app.sim.kernels.occupancy import (
 from app.sim.kernels.repertoire import Legs, Repertoire, condition, draw_legs, follow, law
 from app.sim.ports import Vec
 
-REACHES, LIBRARY, RECORDED = range(3)
-"""Where a worker's motion comes from."""
+REACHES, LIBRARY = range(2)
+"""What a worker's script is made of."""
 MAX_PEOPLE = 4
 DEEPEST = 32
 """Halvings of a period in the contact test; enough for periods of hours."""
 
 
 class Tracks(NamedTuple):
-    """Recorded motion of workers."""
+    """Motion of workers given by samples."""
 
     rows: Vec
     """Samples of all tracks, one after the other: joints [m, rad], and by how much the pelvis
@@ -77,11 +77,13 @@ class People(NamedTuple):
     n_cubes: int
     """Places that are cubes; they come first."""
     source: int
-    """Where the workers' motion comes from: REACHES, LIBRARY or RECORDED."""
+    """What the workers' scripts are made of: REACHES or LIBRARY."""
     repertoire: Repertoire
     """What they can do, for LIBRARY."""
     tracks: Tracks
-    """Recorded motion, for RECORDED."""
+    """What workers without a script do."""
+    track_share: float
+    """Chance that a worker follows a track in an episode."""
     limits: Vec
     """Lower and upper joint limits of a worker [m, rad], shape (2, 18)."""
     courtesy: float
@@ -114,7 +116,7 @@ class PeopleState(NamedTuple):
     lean: Vec
     """How far each worker leans away, ``courtesy.give_way`` [rad, rad/s], (n_envs, W, 4)."""
     track: NDArray[np.int64]
-    """Track of each worker, for RECORDED, shape (n_envs, W)."""
+    """Track of each worker, -1 for those who follow a script, shape (n_envs, W)."""
     legs: Legs
     """The legs of their scripts, for LIBRARY."""
     move: NDArray[np.int64]
@@ -267,7 +269,7 @@ def worker_at(
         rate: Script's seconds per second; scales the speeds.
         away: Work space, shape (36,).
     """
-    if people.source == RECORDED:
+    if state.track[e, w] >= 0:
         _track_at(people, state, e, w, when, rate)
         return
     start, duration = state.start[e, w], state.duration[e, w]
@@ -317,7 +319,8 @@ def _track_at(
 def _draw_work(people: People, state: PeopleState, e: int, w: int, rng: random.State) -> None:
     """Draw what worker ``w`` of environment ``e`` does, and where in it the episode begins."""
     who = random.below(rng, people.bodies.shape[0]) if people.bodies.shape[0] > 1 else 0
-    if people.source == RECORDED:
+    state.track[e, w] = -1
+    if people.track_share > 0.0 and random.uniform(rng) < people.track_share:
         track = random.below(rng, people.tracks.spans.shape[0])
         state.track[e, w], span = track, people.tracks.spans[track]
         spare = people.tracks.dt * (span[1] - 1) - people.tracks.needed

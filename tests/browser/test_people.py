@@ -1,0 +1,58 @@
+"""A visitor adds a person, makes one taller, and lets one move as recorded."""
+
+from collections.abc import Callable, Iterator
+
+import httpx
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.browser.test_drag import state, until
+from tests.sim.recorded_person import csv_text, working
+
+pytestmark = pytest.mark.browser
+
+LIMIT_S = 60.0
+
+
+@pytest.fixture
+def one_person(server: str) -> Iterator[str]:
+    """The server, whose cell has one median person at work afterwards too."""
+    yield server
+    commands = f"{server}/v1/worlds/main/commands"
+    for other in state(server)["people"][1:]:
+        httpx.post(commands, json={"tag": "remove-person", "person": other["id"]})
+    httpx.post(commands, json={"tag": "set-body", "stature": 50})
+    httpx.post(commands, json={"tag": "set-mode", "mode": "auto"})
+    httpx.delete(f"{server}/v1/motions/visit")
+
+
+def test_visitor_adds_a_person_changes_its_size_and_plays_a_recording(
+    open_page: Callable[..., Page], one_person: str
+) -> None:
+    server = one_person
+    page = open_page(scene=False)
+    page.click('[data-mode="recorded"]')
+    expect(page.locator('[data-role="empty-motions"]')).to_contain_text("motions import")
+    page.click('[data-action="add-person"]')
+    page.click('[data-person="1"]')
+    page.click('[data-action="size"]')
+    page.locator('[data-size="stature"] input').fill("95")
+    expect(page.locator('[data-role="stature-text"]')).to_have_text("1.87 m")
+    now = until(server, lambda world: world["people"][1]["size"][11] > 1.08, LIMIT_S)
+    assert [one["body"]["stature"] for one in now["people"]] == [50.0, 95.0]
+    posted = httpx.post(
+        f"{server}/v1/motions",
+        params={"file_name": "visit.csv"},
+        content=csv_text(working()),
+        headers={"Content-Type": "text/csv"},
+    )
+    assert posted.status_code == 201
+    page.click('[data-person="0"]')
+    page.click('[data-mode="recorded"]')
+    page.locator('[data-role="motion"]').select_option("visit")
+    expect(page.locator('[data-role="progress"]')).to_contain_text("of 4.0 s")
+    playing = until(
+        server, lambda world: (world["people"][0]["motion"] or {}).get("t_s", 0) > 0.3, LIMIT_S
+    )
+    assert [one["mode"] for one in playing["people"]] == ["recorded", "auto"]
+    assert page.problems == []  # type: ignore[attr-defined]

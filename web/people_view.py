@@ -1,0 +1,53 @@
+"""The people in the scene: whoever comes is drawn, whoever leaves is taken out."""
+
+from collections.abc import Callable
+
+import viser
+
+from app.sim.cells import Cell
+from app.sim.commands import MoveHuman
+from app.sim.snapshot import WorldSnapshot
+from web.gizmos import Gizmos
+from web.person_view import PersonView
+
+
+class PeopleView:
+    """Draws everyone, each with handles; used by the live cell's thread only.
+
+    Args:
+        server: Where to draw.
+        cell: Work cell.
+        submit: Takes the command of a drag.
+    """
+
+    def __init__(
+        self, server: viser.ViserServer, cell: Cell, submit: Callable[[MoveHuman], None]
+    ) -> None:
+        self._server, self._cell, self._submit = server, cell, submit
+        self._drawn: dict[int, tuple[PersonView, Gizmos]] = {}
+
+    def draw(self, snapshot: WorldSnapshot, dt: float, *, shapes: bool) -> None:
+        """Show the people of a snapshot.
+
+        Args:
+            snapshot: What to show.
+            dt: Time since the last call [s].
+            shapes: Whether the capsules that the simulator sees are shown.
+        """
+        here = {person.id for person in snapshot.people}
+        for id in self._drawn.keys() - here:
+            view, gizmos = self._drawn.pop(id)
+            view.remove()
+            gizmos.remove()
+        contact = snapshot.contact if snapshot.status == "contact" else None
+        for person in snapshot.people:
+            if person.id not in self._drawn:
+                self._drawn[person.id] = (
+                    PersonView(self._server, self._cell, person),
+                    Gizmos(self._server, person.id, self._submit),
+                )
+            view, gizmos = self._drawn[person.id]
+            view.draw(person, dt)
+            touched = contact is not None and contact.person == person.id
+            view.show_capsules(shapes, contact.body if contact and touched else None)
+            gizmos.draw(person)

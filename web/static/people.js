@@ -1,0 +1,223 @@
+// The people in the cell: who is there, who moves each, what is played, how large each is.
+import { html, useCallback, useEffect, useState } from "./vendor/htm-preact-standalone.module.js";
+import { get } from "./api.js";
+import * as format from "./format.js";
+import { Icon } from "./icons.js";
+import { VESTS } from "./palette.js";
+
+const MAX_PEOPLE = 4;
+const MODES = [
+  ["manual", "By hand", "hand", "You drag the handles in the scene"],
+  ["auto", "Work cycle", "walk", "Reaches for cubes and docks, on and on"],
+  ["recorded", "Recording", "film", "Moves as somebody was recorded"],
+  ["still", "Stands", "stand", "Goes home and rests"],
+];
+const SLIDERS = [
+  ["stature", "Stature", (body) => metres(body.stature_m)],
+  ["arms", "Arms", (body) => format.distance(body.arm_m)],
+  ["shoulders", "Shoulders", (body) => format.distance(body.shoulders_m)],
+];
+const PERCENTILES = [1, 99];
+const SEND_MS = 150;
+
+export const nameOf = (id) => `Person ${id + 1}`;
+
+/** Two rows: everyone with the clock beside them, and the one who is picked. */
+export function People({ world, send, children }) {
+  const people = world.people ?? [];
+  const [picked, setPicked] = useState(0);
+  const person = people.find((one) => one.id === picked) ?? people[0] ?? null;
+  const [sized, setSized] = useState(false);
+  const tracked = people.length > 1 && people.find((one) => one.nearest);
+  return html`<div class="dock-row">
+      <span class="dock-label" id="people-label">People</span>
+      <div class="people" role="group" aria-labelledby="people-label">
+        ${people.map(({ id }) => html`<button key=${id} type="button" class="goal who"
+          aria-pressed=${String(id === person?.id)} data-person=${id}
+          onClick=${() => setPicked(id)}>
+          <i class="swatch" style=${{ background: VESTS[id] }}></i>${nameOf(id)}</button>`)}
+        ${people.length < MAX_PEOPLE && html`<button type="button" class="goal add"
+          data-action="add-person" onClick=${() => send({ tag: "add-person" })}>
+          <${Icon} name="plus" />Add</button>`}
+      </div>
+      ${tracked && html`<p class="dock-hint" title="This policy knows one person at a time.">
+        The policy sees the nearest: ${nameOf(tracked.id)}.</p>`}
+      <span class="spacer"></span>
+      ${children}
+    </div>
+    ${!person && html`<div class="dock-row"><span class="dock-label"></span>
+      <p class="dock-hint">Nobody is in the cell.</p></div>`}
+    ${person && html`<${Mover} key=${person.id} person=${person} send=${send}
+      sized=${sized} onSized=${() => setSized(!sized)} />`}
+    ${person && sized && html`<${Size} key=${`size-${person.id}`} person=${person} send=${send} />`}`;
+}
+
+/** Who moves a person; with a recording, which one and how far it is. */
+function Mover({ person, send, sized, onSized }) {
+  const { id, mode } = person;
+  const [open, setOpen] = useState(false);
+  const { list, error, refresh } = useMotions();
+  const playing = mode === "recorded";
+  const shown = playing || open;
+  useEffect(() => {
+    if (shown) refresh();
+  }, [shown, refresh]);
+  const pick = (wanted) => {
+    setOpen(wanted === "recorded");
+    if (wanted !== "recorded") send({ tag: "set-mode", person: id, mode: wanted });
+    else if (list?.length && !playing) send(playOf(id, list[0].name));
+    else refresh();
+  };
+  const on = (one) => (open && !playing ? one === "recorded" : one === mode);
+  return html`<div class="dock-row">
+      <span class="dock-label" id="mode-label">Moved by</span>
+      <div class="segmented" role="radiogroup" aria-labelledby="mode-label">
+        ${MODES.map(([one, label, icon, title]) => html`<button key=${one} type="button"
+          role="radio" aria-checked=${String(on(one))} data-mode=${one} title=${title}
+          onClick=${() => pick(one)}><${Icon} name=${icon} />${label}</button>`)}
+      </div>
+      ${mode === "manual" && !open && html`<p class="dock-hint">Drag the handles in the scene.</p>`}
+      <span class="spacer"></span>
+      <div class="transport" role="group" aria-label=${`${nameOf(id)} in the cell`}>
+        <button type="button" class="tool" aria-expanded=${String(sized)} data-action="size"
+          aria-label="Size" onClick=${onSized}><${Icon} name="ruler" /><span>Size</span></button>
+        <button type="button" class="tool" data-action="remove-person"
+          aria-label=${`Remove ${nameOf(id)}`} title=${`${nameOf(id)} leaves the cell`}
+          onClick=${() => send({ tag: "remove-person", person: id })}>
+          <${Icon} name="close" /><span>Remove</span></button>
+      </div>
+    </div>
+    ${shown && html`<${Recording} person=${person} list=${list} error=${error} send=${send} />`}`;
+}
+
+/** Stored recordings to choose from, and the one that plays; or how to import one. */
+function Recording({ person, list, error, send }) {
+  const { id, motion } = person;
+  if (error) return html`<${Note}>The recordings cannot be listed: ${error}</${Note}>`;
+  if (list === null) return html`<${Note}>Looking for recordings …</${Note}>`;
+  if (list.length === 0 && !motion) {
+    return html`<${Note} role="empty-motions">No recordings yet. Import one with
+      ${" "}<code>python -m app motions import FILE --keep</code>, or post it to
+      ${" "}<code>/v1/motions</code>.</${Note}>`;
+  }
+  const known = list.some((one) => one.name === motion?.name);
+  return html`<div class="dock-row recording">
+    <span class="dock-label" id="motion-label">Recording</span>
+    <select aria-labelledby="motion-label" data-role="motion" value=${motion?.name ?? ""}
+      onChange=${(e) => send(playOf(id, e.target.value))}>
+      ${!motion && html`<option value="" disabled>Choose one</option>`}
+      ${motion && !known && html`<option value=${motion.name}>${motion.name} (removed)</option>`}
+      ${list.map((one) => html`<option key=${one.name} value=${one.name}>
+        ${one.name} (${seconds(one.duration_s)})</option>`)}
+    </select>
+    ${motion && motion.n_runs > 1 && html`<select aria-label="Run of the recording"
+      data-role="run" value=${motion.run} disabled=${!known}
+      onChange=${(e) => send(playOf(id, motion.name, Number(e.target.value)))}>
+      ${Array.from({ length: motion.n_runs }, (_, run) => html`<option key=${run} value=${run}>
+        run ${run + 1} of ${motion.n_runs}</option>`)}
+    </select>`}
+    ${motion && html`<${Progress} person=${person} motion=${motion} />`}
+  </div>`;
+}
+
+function Progress({ person, motion }) {
+  const share = motion.duration_s > 0 ? Math.min(1, motion.t_s / motion.duration_s) : 0;
+  const notes = [
+    person.outside_area && "Outside the walking area now.",
+    motion.outside_share > 0.001 &&
+      `${percent(motion.outside_share)} of the path leaves the walking area.`,
+    motion.clipped_share > 0.001 &&
+      `${percent(motion.clipped_share)} of the frames bend a joint beyond the model's limit; the
+      policy is told the limit, with a wrist up to ${format.distance(motion.clipped_m)} off.`,
+  ].filter(Boolean);
+  return html`<span class="played"><i style=${{ transform: `scaleX(${share})` }}></i></span>
+    <span class="played-text" data-role="progress">${person.joining
+      ? "on the way to the start"
+      : `${motion.t_s.toFixed(1)} of ${seconds(motion.duration_s)}`}</span>
+    ${notes.length > 0 && html`<span class="hint" tabindex="0" data-role="motion-notes">
+      ${person.outside_area ? "outside the area" : "notes"}
+      <span class="tip tip-up" role="tooltip">${notes.join(" ")}</span></span>`}`;
+}
+
+/** Sliders in percentiles of adults, with the centimetres they come to. */
+function Size({ person, send }) {
+  const { id, body, mode } = person;
+  const [local, setLocal] = useState({});
+  const change = useThrottled((name, value) =>
+    send({ tag: "set-body", person: id, [name]: value }));
+  useEffect(() => {
+    if (Object.entries(local).every(([name, value]) => body[name] === value)) setLocal({});
+  }, [body.stature, body.arms, body.shoulders]);
+  const recorded = body.recorded && Object.keys(local).length === 0;
+  return html`<div class="dock-row sizes">
+    <span class="dock-label">Size</span>
+    ${SLIDERS.map(([name, label, shown]) => html`<label key=${name} class="size" data-size=${name}>
+      <span><span>${label}${recorded ? "" : ` ${Math.round(local[name] ?? body[name])} %`}</span>
+        <b data-role=${`${name}-text`}>${shown(body)}</b></span>
+      <input type="range" min=${PERCENTILES[0]} max=${PERCENTILES[1]} step="1"
+        class=${recorded ? "is-idle" : ""}
+        value=${local[name] ?? body[name]}
+        aria-label=${`${label}, percentile of adults`}
+        aria-valuetext=${`${Math.round(local[name] ?? body[name])} percent, ${shown(body)}`}
+        onInput=${(e) => {
+          const value = Number(e.target.value);
+          setLocal((now) => ({ ...now, [name]: value }));
+          change(name, value);
+        }} /></label>`)}
+    ${mode === "recorded" && html`<button type="button" class="tool" aria-pressed=${String(recorded)}
+      data-action="recorded-size" title="Take the lengths of the person who was recorded"
+      onClick=${() => {
+        setLocal({});
+        send({ tag: "set-body", person: id, recorded: !recorded });
+      }}>${recorded ? html`<${Icon} name="check" />` : ""}As recorded</button>`}
+  </div>`;
+}
+
+function Note({ children, role }) {
+  return html`<div class="dock-row"><span class="dock-label">Recording</span>
+    <p class="dock-hint" data-role=${role}>${children}</p></div>`;
+}
+
+/** The stored recordings; null until they are known. */
+function useMotions() {
+  const [found, setFound] = useState({ list: null, error: null });
+  const refresh = useCallback(() => {
+    get("/v1/motions").then(
+      (answer) => setFound({ list: answer.items, error: null }),
+      (problem) => setFound({ list: null, error: problem.message }));
+  }, []);
+  useEffect(refresh, [refresh]);
+  return { ...found, refresh };
+}
+
+/** Calls `act(name, value)` at most every SEND_MS, and with each name's last value in the end. */
+function useThrottled(act) {
+  const [gate] = useState(() => ({ timer: null, waiting: new Map(), act }));
+  gate.act = act;
+  const flush = () => {
+    const waiting = [...gate.waiting];
+    gate.waiting.clear();
+    gate.timer = waiting.length ? setTimeout(flush, SEND_MS) : null;
+    waiting.forEach(([name, value]) => gate.act(name, value));
+  };
+  return (name, value) => {
+    gate.waiting.set(name, value);
+    if (gate.timer === null) flush();
+  };
+}
+
+function playOf(person, name, run = 0) {
+  return { tag: "set-motion", person, name, run };
+}
+
+function metres(length) {
+  return `${length.toFixed(2)} m`;
+}
+
+function seconds(duration) {
+  return `${duration.toFixed(1)} s`;
+}
+
+function percent(share) {
+  return share < 0.01 ? "Less than 1 %" : format.percent(share, 0);
+}
