@@ -208,17 +208,33 @@ def log_progress(progress: "Progress") -> None:
 
 
 def run_evaluate(options: argparse.Namespace) -> int:
-    """Run a protocol and print its rows."""
+    """Run a protocol and print its rows; a bad motion file is told with all its faults."""
     settings = load_settings()
     prepare_kernels(settings)
     import torch
 
+    from app.errors import BadMotion
     from app.machine import describe
-    from app.motion_verbs import runs_of
-    from app.policies.evaluation.protocols import PROTOCOLS, WITHOUT_CHECKPOINT, evaluate
+    from app.motion_verbs import faulty, runs_of
+    from app.policies.evaluation.protocols import (
+        PROTOCOLS,
+        WITHOUT_CHECKPOINT,
+        check_motions,
+        evaluate,
+    )
 
     if options.protocol not in PROTOCOLS:
         raise NotFound("protocol", options.protocol, tuple(PROTOCOLS))
+    files = [str(path) for path in options.motions]
+    check_motions(options.protocol, files, "FILE", f"evaluate {options.protocol} FILE ...")
+    try:
+        motions = runs_of(options.motions)
+    except BadMotion as error:
+        for fault in error.faults:
+            print(fault.text, file=sys.stderr)
+        if options.json:
+            print(json.dumps(faulty(error)))
+        return WRONG_CALL
     none = options.protocol in WITHOUT_CHECKPOINT
     checkpoint = None if none else find_checkpoint(options.checkpoint, settings)
     torch.set_num_threads(1)
@@ -227,7 +243,7 @@ def run_evaluate(options: argparse.Namespace) -> int:
         checkpoint,
         episodes=options.episodes,
         seed=options.seed,
-        motions=runs_of(options.motions),
+        motions=motions,
     )
     result = {**result, "machine": describe()}
     print(json.dumps(result) if options.json else table(result))

@@ -104,15 +104,22 @@ def runs_of(paths: Sequence[Path]) -> tuple[Motion, ...]:
     """Return the clean runs of files; those of one name are told apart by their folder's.
 
     Raises:
-        BadMotion: One is no sound motion; carries every fault.
+        BadMotion: Some are no sound motion; carries every fault of every file, with its path.
         InvalidInput: One cannot be read.
     """
     stems = [path.stem for path in paths]
     runs: list[Motion] = []
+    faults: list[Fault] = []
     for path in paths:
         name = path.stem if stems.count(path.stem) == 1 else f"{path.parent.name}-{path.stem}"
-        found = read_motion(_content(path), path.name)
+        try:
+            found = read_motion(_content(path), path.name)
+        except BadMotion as error:
+            faults += [replace(one, place=f"{path}: {one.place}") for one in error.faults]
+            continue
         runs.extend(replace(run, name=name) for run in found.runs)
+    if faults:
+        raise BadMotion(faults)
     return tuple(runs)
 
 

@@ -4,7 +4,8 @@ import hashlib
 import re
 import threading
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import PurePath
 
 from app.errors import InvalidInput, NotFound
@@ -83,6 +84,27 @@ class MotionCatalog:
             while len(self._cached) > 1 and self._n_cached() > MAX_CACHED_FRAMES:
                 self._cached.popitem(last=False)
         return runs
+
+    def check(self, names: Sequence[str]) -> None:
+        """Check that motions are stored which a caller named.
+
+        Raises:
+            InvalidInput: One is not; names its place and the stored ones.
+        """
+        known = self.names()
+        for place, name in enumerate(names):
+            if name not in known:
+                rule = "is no stored motion" if known else "is no stored motion: there is none"
+                raise InvalidInput(f"motions[{place}]", name, rule, known)
+
+    def runs_of(self, names: Sequence[str]) -> tuple[Motion, ...]:
+        """Return the runs of several motions, each called as it is stored.
+
+        Raises:
+            InvalidInput: One is not stored, or does not fit this version.
+        """
+        self.check(names)
+        return tuple(replace(run, name=name) for name in names for run in self.get(name))
 
     def add(
         self, content: bytes, file_name: str, name: str | None = None

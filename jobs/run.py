@@ -16,6 +16,7 @@ from app.policies import checkpoint as formats
 from app.policies import presets
 from app.policies.checkpoint import Checkpoint
 from app.policies.evaluation.protocols import evaluate as run_protocol
+from app.policies.evaluation.rows import Row
 from app.policies.training import Progress
 from app.policies.training import train as train_policy
 from app.settings import load_settings
@@ -24,6 +25,7 @@ from app.store.engine import Store
 from app.store.records import NewCheckpoint, ResumeState
 from jobs.attempt import main
 from jobs.cells import CellCatalog
+from jobs.motions import MotionCatalog
 from jobs.spec import EvaluateSpec, parse_spec
 from jobs.worker import Runner, Worker
 
@@ -68,16 +70,27 @@ def _new(policy: Checkpoint) -> NewCheckpoint:
 
 
 def evaluate(worker: Worker) -> dict[str, Any]:
-    """Measure the job's checkpoint by its protocol."""
+    """Measure the job's checkpoint by its protocol; a step is a row of the result."""
     worker.end_at_once()
     spec = parse_spec(worker.job.spec)
     assert isinstance(spec, EvaluateSpec)
+
+    def on_row(done: int, total: int, row: Row) -> None:
+        worker.record_progress(done, _rates(row), total_steps=total)
+
     return run_protocol(
         spec.protocol,
         _stored(worker.store, spec.checkpoint),
         episodes=spec.episodes,
         seed=spec.seed,
+        motions=MotionCatalog(worker.store).runs_of(spec.motions),
+        on_row=on_row,
     )
+
+
+def _rates(row: Row) -> dict[str, float | None]:
+    """Return the rates of a row by name, without their intervals."""
+    return {name: one["mean"] for name, one in row.items() if isinstance(one, Mapping)}
 
 
 def _stored(store: Store, reference: str) -> Checkpoint:

@@ -3,8 +3,10 @@
     {"kind": "train", "preset": "pick-td3", "seed": 1, "overrides": {"total_steps": 20000}}
     {"kind": "evaluate", "protocol": "pick-single", "episodes": 1000, "seed": 11,
      "checkpoint": "pick"}
+    {"kind": "evaluate", "protocol": "pick-mocap", "motions": ["wave", "walk"]}
 
-An unknown field is an error. The body is stored unchanged with the job.
+An unknown field is an error. Motions are names of stored ones, never paths. The body is stored
+unchanged with the job.
 """
 
 from collections.abc import Mapping
@@ -13,7 +15,7 @@ from typing import Any
 
 from app.errors import InvalidInput
 from app.policies import presets
-from app.policies.evaluation.protocols import MAX_EPISODES, PROTOCOLS
+from app.policies.evaluation.protocols import MAX_EPISODES, PROTOCOLS, check_motions
 from app.store.records import NewJob
 
 MAX_SEED = 2**31 - 1
@@ -22,9 +24,12 @@ MAX_SEED = 2**31 - 1
 DEFAULT_CHECKPOINT = "pick"
 """Alias of the checkpoint that is evaluated unless another is named."""
 
+MAX_MOTIONS = 32
+"""Most stored motions of one evaluation."""
+
 _FIELDS = {
     "train": ("kind", "preset", "seed", "overrides"),
-    "evaluate": ("kind", "protocol", "episodes", "seed", "checkpoint"),
+    "evaluate": ("kind", "protocol", "episodes", "seed", "checkpoint", "motions"),
 }
 
 
@@ -54,6 +59,8 @@ class EvaluateSpec:
     """Number of episodes; None for the protocol's own."""
     seed: int
     """Seed of every random stream."""
+    motions: tuple[str, ...] = ()
+    """Names of stored motions, for the protocols that take some."""
 
 
 def parse_spec(body: Mapping[str, Any]) -> TrainSpec | EvaluateSpec:
@@ -122,7 +129,24 @@ def _parse_evaluate(body: Mapping[str, Any]) -> EvaluateSpec:
         checkpoint=_text({"checkpoint": DEFAULT_CHECKPOINT, **body}, "checkpoint"),
         episodes=episodes,
         seed=_seed(body),
+        motions=_motions(body, protocol),
     )
+
+
+def _motions(body: Mapping[str, Any], protocol: str) -> tuple[str, ...]:
+    """Return the names of the motions; whether they are stored is for others to say."""
+    names = body.get("motions", ())
+    if not isinstance(names, list | tuple):
+        raise InvalidInput("motions", names, "must be a list of names of stored motions")
+    if len(names) > MAX_MOTIONS:
+        raise InvalidInput("motions", len(names), f"must be at most {MAX_MOTIONS} names")
+    for place, name in enumerate(names):
+        if not isinstance(name, str) or not name:
+            raise InvalidInput(f"motions[{place}]", name, "must be the name of a stored motion")
+        if name in names[:place]:
+            raise InvalidInput(f"motions[{place}]", name, "must be named once")
+    check_motions(protocol, names)
+    return tuple(names)
 
 
 def _text(body: Mapping[str, Any], name: str, choices: tuple[str, ...] = ()) -> str:

@@ -14,6 +14,7 @@ from app.__main__ import main, parsed_sets, table
 from app.errors import InvalidInput
 from app.listening import address_of, listen
 from tests import workshop
+from tests.sim.recorded_person import csv_text, working
 
 ROOT = Path(__file__).resolve().parent.parent
 START_S = 240.0
@@ -151,6 +152,53 @@ def test_evaluation_prints_one_json_object(
     assert {"mean", "low", "high"} <= result["results"][0]["success"].keys()
     assert result["machine"]["cores"] >= 1
     assert "policy" in table(result)
+
+
+@pytest.fixture
+def clip(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """A good motion file, and a data folder without a database."""
+    monkeypatch.setenv("TANDEM_DATA", str(tmp_path / "data"))
+    path = tmp_path / "wave.csv"
+    path.write_text(csv_text(working(100)), encoding="utf-8")
+    return path
+
+
+def test_evaluation_beside_recorded_people_has_a_row_for_them(
+    clip: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["evaluate", "pick-mocap", str(clip), "--episodes", "4", "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert [row["name"] for row in result["results"]] == ["library", "recorded"]
+    assert result["settings"]["motions"][0]["source"].startswith("wave.csv (")
+
+
+def test_motion_files_are_asked_for_and_refused_by_protocol(
+    clip: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["evaluate", "pick-mocap"]) == 2
+    assert "FILE = [] must hold at least one" in (told := capsys.readouterr().err)
+    assert "evaluate pick-mocap FILE ..." in told
+    assert main(["evaluate", "pick-single", str(clip)]) == 2
+    told = capsys.readouterr().err
+    assert "wave.csv'] must not be given to pick-single" in told and "pick-mocap" in told
+    assert main(["evaluate", "pick-mocap", str(clip.with_name("none.csv"))]) == 2
+    assert "cannot be read: No such file" in capsys.readouterr().err
+
+
+def test_every_fault_of_every_bad_motion_file_is_told(
+    clip: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    torn, wrong = clip.with_name("torn.csv"), clip.with_name("wrong.txt")
+    torn.write_text(clip.read_text()[:300], encoding="utf-8")
+    wrong.write_text("x", encoding="utf-8")
+    files = [str(path) for path in (torn, clip, wrong)]
+    assert main(["evaluate", "pick-mocap", *files, "--json"]) == 2
+    printed = capsys.readouterr()
+    faults = json.loads(printed.out)["faults"]
+    lines = printed.err.splitlines()
+    assert len(lines) == len(faults) >= 2
+    assert lines[0].startswith(f"{torn}: ") and lines[-1].startswith(f"{wrong}: file name")
+    assert [fault["place"].split(": ")[0] for fault in faults][-1] == str(wrong)
 
 
 def test_cells_are_listed(

@@ -41,6 +41,8 @@ def create(
     if isinstance(body, EvaluateJobCreate):
         services.policies.check(body.checkpoint)
     new = body.to_domain()
+    if isinstance(body, EvaluateJobCreate):
+        services.motions.check(body.motions)
     if new.preset is not None:
         preset = presets.resolve(new.preset, new.overrides or {})
         services.cells.to_train_in(preset.cell)

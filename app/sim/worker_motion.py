@@ -6,6 +6,7 @@ imported motion (``motions.py``), placed in the cell. A share of the workers may
 (``roaming.py``). On top come how large the workers are and how far they give way to the arm.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -72,6 +73,8 @@ class WorkSettings:
                 raise InvalidInput(name, getattr(self, name), "must lie in [0, 1]")
         if not (np.isfinite(self.pace) and self.pace > 0.0):
             raise InvalidInput("pace", self.pace, "must be above 0")
+        if self.bodies is not None and not self.bodies:
+            raise InvalidInput("bodies", 0, "must hold at least one size, or be None")
         if self.motion == "recorded" and not self.recorded:
             raise InvalidInput("recorded", 0, "must hold at least one run of recorded motion")
 
@@ -162,7 +165,8 @@ def tracks_of(motions: Sequence[Motion], floor_z: float) -> tuple[Tracks, Vec]:
     spans: list[tuple[int, int, int]] = []
     first = 0
     for number, motion in enumerate(motions):
-        n = max(2, int(motion.times[-1] / TRACK_DT) + 1)
+        # The last frame is kept; a hair more than a whole number of steps is that number.
+        n = max(2, math.ceil(motion.times[-1] / TRACK_DT - 1e-6) + 1)
         at = np.minimum(np.arange(n) * TRACK_DT, motion.times[-1])
         values = np.column_stack([motion.q, motion.pelvis_z])
         rows.append(

@@ -3,6 +3,8 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
+from tests.sim.recorded_person import csv_text, working
+
 TINY = {"total_steps": 1280, "n_envs": 128, "learning_starts": 0, "progress_steps": 128}
 TRAIN = {"kind": "train", "preset": "pick-td3", "seed": 1}
 
@@ -78,6 +80,51 @@ def test_bad_evaluation_is_refused_by_field(
     assert answer.status_code == 422
     assert answer.json()["field"] == field
     assert "pick" in answer.text
+
+
+@pytest.fixture(scope="module")
+def wave(client: TestClient) -> str:
+    """A stored motion."""
+    content = csv_text(working(100)).encode()
+    client.post(
+        "/v1/motions?file_name=wave.csv&name=wave-of-jobs",
+        content=content,
+        headers={"Content-Type": "text/csv"},
+    ).raise_for_status()
+    return "wave-of-jobs"
+
+
+@pytest.mark.parametrize(
+    ("change", "field", "text"),
+    [
+        ({}, "motions", "at least one motion"),
+        ({"motions": []}, "motions", "at least one motion"),
+        ({"motions": ["nobody"]}, "motions[0]", "wave-of-jobs"),
+        ({"motions": ["wave-of-jobs", "../../etc/passwd"]}, "motions[1]", "wave-of-jobs"),
+        ({"motions": ["wave-of-jobs"] * 2}, "motions[1]", "named once"),
+        ({"motions": [f"m{k}" for k in range(33)]}, "motions", "32"),
+        ({"motions": ["x" * 65]}, "motions[0]", "64"),
+        ({"motions": "wave-of-jobs"}, "motions", "list"),
+        ({"motions": ["wave-of-jobs"], "protocol": "pick-people"}, "motions", "pick-mocap"),
+    ],
+)
+def test_bad_motions_are_refused_by_field(
+    client: TestClient, wave: str, change: dict[str, Any], field: str, text: str
+) -> None:
+    body = {"kind": "evaluate", "protocol": "pick-mocap", "episodes": 2, **change}
+    answer = client.post("/v1/jobs", json=body)
+    assert answer.status_code == 422 and wave
+    assert answer.json()["field"] == field
+    assert text in answer.text
+
+
+def test_evaluation_beside_a_stored_motion_is_accepted(client: TestClient, wave: str) -> None:
+    body = {"kind": "evaluate", "protocol": "pick-mocap", "motions": [wave], "episodes": 2}
+    answer = client.post("/v1/jobs", json=body)
+    job = answer.json()
+    assert answer.status_code == 202
+    assert job["spec"] == {**body, "checkpoint": "pick"}
+    client.post(f"/v1/jobs/{job['id']}/cancel")
 
 
 def test_jobs_are_listed_in_pages_newest_first(

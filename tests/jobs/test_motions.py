@@ -124,6 +124,26 @@ def test_unknown_motion_names_the_known_ones(catalog: MotionCatalog) -> None:
                 ask(name)
 
 
+def test_runs_of_several_motions_are_called_as_they_are_stored(catalog: MotionCatalog) -> None:
+    catalog.add(CLIP, "nod.csv", "first")
+    catalog.add(csv_text(working(120, seed=1)).encode(), "nod.csv", "second")
+    found = catalog.runs_of(("second", "first"))
+    assert [(run.name, len(run.times)) for run in found] == [("second", 120), ("first", 100)]
+    assert catalog.runs_of(()) == ()
+
+
+def test_motions_that_are_not_stored_are_named_with_their_place(catalog: MotionCatalog) -> None:
+    with pytest.raises(InvalidInput, match=r"motions\[0\] = 'a' is no stored motion: there is"):
+        catalog.check(["a"])
+    catalog.add(CLIP, "nod.csv")
+    catalog.check(["nod"])
+    for name in ("walk", "../nod", "nod.csv", "nod\n"):
+        for ask in (catalog.check, catalog.runs_of):
+            with pytest.raises(InvalidInput) as caught:
+                ask(["nod", name])
+            assert (caught.value.field, caught.value.choices) == ("motions[1]", ("nod",))
+
+
 @pytest.mark.parametrize(
     ("file_name", "name"),
     [

@@ -7,14 +7,18 @@ from pathlib import Path
 
 import pytest
 
+from app.policies import pretrained
 from app.policies.trained_cell import is_for
 from app.store import attempts, checkpoints, jobs, metrics
 from app.store.engine import Store
+from app.store.records import NewCheckpoint
 from jobs.cells import CellCatalog
+from jobs.motions import MotionCatalog
 from jobs.spec import new_job
 from jobs.supervisor import Supervisor
 from tests import workshop
 from tests.jobs.machinery import PATIENCE, wait_for, wait_until_final, worker_pids
+from tests.sim.recorded_person import csv_text, working
 
 TINY = {
     "total_steps": 2048,
@@ -100,3 +104,39 @@ def test_evaluation_of_an_unknown_checkpoint_fails_by_name(store: Store) -> None
     body = {"kind": "evaluate", "protocol": "pick-single", "checkpoint": "nobody"}
     job = wait_until_final(store, jobs.create_job(store, new_job(body)).id)
     assert (job.state, job.error) == ("failed", "no checkpoint 'nobody'")
+
+
+@pytest.mark.usefixtures("supervisor")
+def test_evaluation_beside_stored_motions_tells_row_by_row(
+    store: Store, tmp_path: Path
+) -> None:
+    motions = MotionCatalog(store)
+    for name, seed in (("nods", 0), ("waves", 1)):
+        motions.add(csv_text(working(100, seed=seed)).encode(), "clip.csv", name)
+    policy = pretrained.load("pick")
+    new = NewCheckpoint(sha256=policy.sha256, manifest=policy.manifest, tensors=policy.tensors)
+    checkpoints.put_checkpoint(store, new)
+    body = {"kind": "evaluate", "protocol": "pick-mocap", "checkpoint": policy.sha256}
+    spec = new_job({**body, "episodes": 4, "motions": ["waves", "nods"]})
+    job = wait_until_final(store, jobs.create_job(store, spec).id)
+    assert (job.state, job.error) == ("succeeded", None)
+    assert job.result is not None
+    names = [row["name"] for row in job.result["results"]]
+    assert names == ["library", "recorded", "recorded nods", "recorded waves"]
+    assert (job.step, job.total_steps) == (4, 4)
+    points = metrics.list_metrics(store, job.id)
+    assert [point.step for point in points] == [1, 2, 3, 4]
+    for point, row in zip(points, job.result["results"], strict=True):
+        assert point.values["success"] == row["success"]["mean"]
+
+
+@pytest.mark.usefixtures("supervisor")
+def test_evaluation_beside_a_motion_that_is_gone_fails_by_name(store: Store) -> None:
+    policy = pretrained.load("pick")
+    new = NewCheckpoint(sha256=policy.sha256, manifest=policy.manifest, tensors=policy.tensors)
+    checkpoints.put_checkpoint(store, new)
+    body = {"kind": "evaluate", "protocol": "pick-mocap", "motions": ["waves"]}
+    spec = new_job({**body, "checkpoint": policy.sha256, "episodes": 4})
+    job = wait_until_final(store, jobs.create_job(store, spec).id)
+    assert job.state == "failed"
+    assert "motions[0] = 'waves' is no stored motion" in (job.error or "")

@@ -1,4 +1,5 @@
 import math
+import re
 from typing import Any
 
 import pytest
@@ -96,3 +97,45 @@ def test_bad_evaluation_names_field_and_rule(
     with pytest.raises(InvalidInput, match=rule) as caught:
         new_job(EVALUATE | change)
     assert caught.value.field == field
+
+
+MOCAP = {"kind": "evaluate", "protocol": "pick-mocap", "motions": ["wave", "walk"]}
+
+
+def test_evaluation_beside_recorded_people_names_stored_motions() -> None:
+    assert new_job(MOCAP).spec == MOCAP
+    spec = parse_spec(MOCAP)
+    assert isinstance(spec, EvaluateSpec)
+    assert spec.motions == ("wave", "walk")
+    assert parse_spec(EVALUATE | {"motions": []}) == parse_spec(EVALUATE)
+
+
+@pytest.mark.parametrize(
+    ("change", "field", "rule"),
+    [
+        ({"motions": []}, "motions", "must hold at least one motion for pick-mocap"),
+        ({"motions": "wave"}, "motions", "must be a list of names"),
+        ({"motions": {"wave": 1}}, "motions", "must be a list of names"),
+        ({"motions": None}, "motions", "must be a list of names"),
+        ({"motions": ["wave", 3]}, r"motions\[1\]", "must be the name of a stored motion"),
+        ({"motions": [""]}, r"motions\[0\]", "must be the name of a stored motion"),
+        ({"motions": ["a", "b", "a"]}, r"motions\[2\]", "must be named once"),
+        ({"motions": [str(k) for k in range(33)]}, "motions", "must be at most 32 names"),
+        (
+            {"protocol": "pick-single"},
+            "motions",
+            "must not be given to pick-single.*pick-mocap",
+        ),
+    ],
+)
+def test_bad_motions_of_an_evaluation_name_field_and_rule(
+    change: dict[str, Any], field: str, rule: str
+) -> None:
+    with pytest.raises(InvalidInput, match=rule) as caught:
+        new_job(MOCAP | change)
+    assert re.fullmatch(field, caught.value.field)
+
+
+def test_evaluation_beside_recorded_people_without_motions_is_refused() -> None:
+    with pytest.raises(InvalidInput, match="must hold at least one motion for pick-mocap"):
+        new_job({"kind": "evaluate", "protocol": "pick-mocap"})

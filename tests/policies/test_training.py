@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from app.errors import CheckpointMismatch
-from tests.policies.conftest import Recorder
+from app.policies import presets
+from app.policies.task_choice import TaskChooser, ValueNetworks
+from app.policies.training import LAYOUTS
+from app.sim import human
+from app.sim.body_size import percentile_body
+from app.sim.cells import load_cell
+from app.sim.kernels.features import N_FEATURES, N_WITH_BODY
+from app.sim.ports import Candidate, Person
+from tests.policies.conftest import TINY, Recorder
 
 
 def test_the_curve_lies_on_the_grid_and_counts_updates(tiny_run):
@@ -63,3 +71,47 @@ def test_a_policy_checkpoint_does_not_resume(tiny_preset, tiny_run):
     _, policy, _ = tiny_run.checkpoints[0]
     with pytest.raises(CheckpointMismatch, match="kind"):
         Recorder().run(tiny_preset, resume=policy)
+
+
+@pytest.fixture(scope="module")
+def body_policy():
+    """A policy that is told the size of the person, hardly trained."""
+    preset = presets.resolve("pick-td3", {**TINY, "total_steps": 512, "observation": "body"})
+    return Recorder().run(preset).checkpoint
+
+
+def test_a_policy_that_is_told_the_size_decides_by_it(body_policy, tiny_run):
+    networks = ValueNetworks(body_policy)
+    assert networks.n_obs == N_WITH_BODY
+    assert ValueNetworks(tiny_run.result.checkpoint).n_obs == N_FEATURES
+    assert body_policy.manifest["layout"][-1] == ["body", 12]
+    obs = np.random.default_rng(4).normal(0.0, 0.3, N_WITH_BODY).astype(np.float32)
+    obs = np.stack([obs, obs])
+    obs[1, N_FEATURES:] += 0.1
+    act, value = networks.act_and_value(obs)
+    assert value[0] != value[1] and not np.array_equal(act[0], act[1])
+
+
+def test_a_policy_that_is_told_the_size_decides_beside_small_and_large_people(body_policy):
+    cell, chooser, values = load_cell(), TaskChooser(body_policy), []
+    q, rest = np.array(cell.robot.home_q), human.rest_posture(*cell.human.home)
+    candidates = [Candidate(id=s.id, position=s.position) for s in cell.stations[:3]]
+    for share in (50.0, 95.0):
+        size = percentile_body(share).vector(cell.floor_z)
+        person = Person(q=rest, qd=np.zeros(18), size=size)
+        decision = chooser.decide(q, np.zeros(6), [person], candidates)
+        assert decision.chosen in {one.id for one in candidates}
+        values.append(decision.values)
+    assert np.isfinite(values).all() and values[0] != values[1]
+
+
+@pytest.mark.parametrize("kind", ["features", "body"])
+def test_a_checkpoint_of_another_layout_is_refused(body_policy, tiny_run, kind):
+    policy = {"features": body_policy, "body": tiny_run.result.checkpoint}[kind]
+    other = {**policy.manifest, "layout": LAYOUTS[kind]}
+    with pytest.raises(CheckpointMismatch, match="layout"):
+        ValueNetworks(dataclasses.replace(policy, manifest=other))
+    # Who lies about both still has tensors of the wrong width.
+    preset = {**policy.manifest["preset"], "observation": kind}
+    with pytest.raises(CheckpointMismatch, match="tensors"):
+        ValueNetworks(dataclasses.replace(policy, manifest={**other, "preset": preset}))

@@ -1,9 +1,12 @@
 """The recheck finds what asking the meshes in every row finds."""
 
+from dataclasses import replace
+
 import fcl
 import numpy as np
 
 from app.sim import human
+from app.sim.body_size import percentile_body
 from app.sim.cells import Cell, load_cell
 from app.sim.collision import CollisionReference, make_capsule
 from app.sim.recheck import Recheck, Trajectory, recheck_trajectories, segment_distances
@@ -47,6 +50,20 @@ def test_contact_with_table_and_self_are_found_without_a_person_nearby() -> None
     hit = Recheck(cell).first_contact(path)
     assert hit is not None and hit.index == 1 and hit.time_s == 0.01
     assert {contact.kind for contact in hit.contacts} >= {"cell"}
+
+
+def test_contact_of_a_person_of_another_size_is_found() -> None:
+    cell = load_cell()
+    home, tall = np.array(cell.robot.home_q), percentile_body(99.0, 90.0).vector(cell.floor_z)
+    at_tool = np.array([0.0, 0.34, 0.58])
+    q = human.reach("r", at_tool, human.rest_posture(*cell.human.home), tall).q
+    path = Trajectory(q_robot=np.tile(home, (3, 1)), q_human=np.tile(q, (3, 1)), dt=0.01)
+    recheck = Recheck(cell)
+    assert recheck.first_contact(path) is None
+    sizes = np.stack([cell.body, tall, tall])
+    hit = recheck.first_contact(replace(path, sizes=sizes))
+    assert hit is not None and hit.index == 1
+    assert {contact.body for contact in hit.contacts} <= {"hand_r", "forearm_r"}
 
 
 def test_segment_distances_equal_those_of_fcl() -> None:

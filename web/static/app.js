@@ -32,8 +32,8 @@ function App() {
   const training = useMemo(() => {
     const act = (checkpoint) => cell.send({ tag: "set-policy", checkpoint });
     return html`<${Training} link=${link} jobs=${jobs} error=${error} refresh=${refresh}
-      acting=${acting} onAct=${act} />`;
-  }, [link, jobs, error, acting]);
+      cell=${cell.cell?.name} acting=${acting} onAct=${act} />`;
+  }, [link, jobs, error, acting, cell.cell?.name]);
   if (link === "signin") return html`<${SignIn} />`;
   return html`<div class="frame" data-link=${link}>
     <header class="topbar">

@@ -78,8 +78,10 @@ function Job({ job, open, onOpen, onChanged, onAct, acting }) {
     html`<div class="progress" role="progressbar" aria-label=${`Progress of ${title(job)}`}
       aria-valuemin="0" aria-valuemax="100" aria-valuenow=${Math.round(share * 100)}>
       <i style=${{ transform: `scaleX(${share})` }}></i></div>`}
-    ${open && html`<${JobDetail} job=${job} onChanged=${onChanged} onAct=${onAct}
-      acting=${acting} />`}
+    ${open && (job.kind === "evaluate"
+      ? html`<${Evaluation} job=${job} onChanged=${onChanged} />`
+      : html`<${JobDetail} job=${job} onChanged=${onChanged} onAct=${onAct}
+          acting=${acting} />`)}
   </li>`;
 }
 
@@ -90,12 +92,13 @@ function title(job) {
 
 function subtitle(job) {
   const parts = [`seed ${job.seed}`];
+  const unit = job.kind === "evaluate" ? "rows" : "steps";
   if (isActive(job) && job.total_steps) {
-    parts.push(`${format.steps(job.step)} of ${format.steps(job.total_steps)} steps`);
+    parts.push(`${format.steps(job.step)} of ${format.steps(job.total_steps)} ${unit}`);
     const left = job.latest?.time_left_s ?? job.time_left_s;
     if (job.state === "running" && Number.isFinite(left)) parts.push(`${format.duration(left)} left`);
   } else {
-    if (job.step) parts.push(`${format.steps(job.step)} steps`);
+    if (job.step) parts.push(`${format.steps(job.step)} ${unit}`);
     parts.push(format.ago(job.finished_at ?? job.created_at));
   }
   if (job.attempt > 1) parts.push(`attempt ${job.attempt}`);
@@ -138,6 +141,26 @@ function JobDetail({ job, onChanged, onAct, acting }) {
         ${acting === checkpoint ? "Acts in the cell" : "Let it act in the cell"}</button>`}
       ${isActive(job) && html`<${Cancel} job=${job} onChanged=${onChanged} />`}
     </div>
+  </div>`;
+}
+
+/** An evaluation has no curve: its rows, once all are known. */
+function Evaluation({ job, onChanged }) {
+  const rows = job.result?.results ?? [];
+  const rates = (row) => OUTCOMES.filter(({ key }) => row[key])
+    .map(({ key, label }) => `${format.percent(row[key].mean)} ${label}`).join(" · ");
+  return html`<div class="job-detail">
+    ${job.error && html`<p class="notice bad" role="alert"><${Icon} name="alert" />
+      <span>${job.error}</span></p>`}
+    ${rows.length === 0 && !job.error && html`<p class="empty">${job.state === "queued"
+      ? "Waiting for its turn; one job runs at a time."
+      : isActive(job) ? "The rows are shown once all are known."
+        : "It ended without a result."}</p>`}
+    ${rows.length > 0 && html`<dl class="facts">${rows.map((row) => html`<div key=${row.name}>
+      <dt>${row.name}, ${format.steps(row.n)} episodes</dt><dd>${rates(row)
+        || `${format.steps(row.contacts)} contacts`}</dd></div>`)}</dl>`}
+    ${isActive(job) && html`<div class="job-actions">
+      <${Cancel} job=${job} onChanged=${onChanged} /></div>`}
   </div>`;
 }
 

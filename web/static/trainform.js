@@ -16,9 +16,10 @@ export function usePresets(link) {
   return state;
 }
 
-export function TrainForm({ presets, error, onStarted, onClose }) {
+/** The form; `cell` is the name of the cell that is shown: what is trained is for it. */
+export function TrainForm({ presets, error, cell, onStarted, onClose }) {
   const [name, setName] = useState(null);
-  const [texts, setTexts] = useState({});
+  const [typed, setTyped] = useState({});
   const [seed, setSeed] = useState("1");
   const [problem, setProblem] = useState(null);
   const [busy, setBusy] = useState(false);
@@ -26,6 +27,7 @@ export function TrainForm({ presets, error, onStarted, onClose }) {
   const first = useRef(null);
   useEffect(() => first.current?.focus(), [presets !== null]);
   const preset = presets?.find((p) => p.name === name) ?? presets?.[0] ?? null;
+  const texts = { ...shownCell(preset, cell), ...typed };
 
   const submit = async (event) => {
     event.preventDefault();
@@ -56,7 +58,7 @@ export function TrainForm({ presets, error, onStarted, onClose }) {
   const inRest = fields.slice(FIRST_FIELDS).some((f) => faults[f.name] || changed(f, texts));
   const row = (f) => html`<${Field} key=${f.name} field=${f} text=${texts[f.name]}
     fault=${faults[f.name]}
-    onText=${(text) => setTexts((now) => ({ ...now, [f.name]: text }))} />`;
+    onText=${(text) => setTyped((now) => ({ ...now, [f.name]: text }))} />`;
   return html`<form class="train" ref=${form} onSubmit=${submit} noValidate
     aria-label="New training job">
     <div class="train-head"><h3>New training job</h3>
@@ -68,7 +70,7 @@ export function TrainForm({ presets, error, onStarted, onClose }) {
       <label for="train-preset">Preset</label>
       <select id="train-preset" ref=${first} value=${preset.name} aria-describedby="preset-help"
         aria-invalid=${String(Boolean(faults.preset))}
-        onChange=${(e) => { setName(e.target.value); setTexts({}); }}>
+        onChange=${(e) => { setName(e.target.value); setTyped({}); }}>
         ${presets.map((p) => html`<option key=${p.name} value=${p.name}>${p.name}</option>`)}
       </select>
       <p class="field-help" id="preset-help">${preset.title ?? preset.help ?? preset.description}</p>
@@ -103,9 +105,21 @@ function Field({ field, text, fault, onText }) {
           autocomplete="off" value=${text ?? show(field.default)} aria-describedby=${described}
           aria-invalid=${String(Boolean(fault))} onInput=${(e) => onText(e.target.value)} />`}
     ${fault && html`<p class="field-error" id=${`${id}-error`} role="alert">${fault}</p>`}
-    <p class="field-help" id=${`${id}-help`}>${[field.help, rangeText(field)]
-      .filter(Boolean).join(" ")}</p>
+    <p class="field-help" id=${`${id}-help`}>${helpText(field)}</p>
   </div>`;
+}
+
+/** The cell that is shown, as if it had been chosen, where the preset can be trained in it. */
+function shownCell(preset, cell) {
+  const field = preset?.fields?.find((f) => f.name === "cell");
+  return field?.choices?.includes(cell) ? { cell } : {};
+}
+
+/** Sentences: what the field does, and its range. */
+function helpText(field) {
+  const help = String(field.help ?? "").trim();
+  const sentence = help && `${capital(help)}${/[.!?]$/.test(help) ? "" : "."}`;
+  return [sentence, rangeText(field)].filter(Boolean).join(" ");
 }
 
 function rangeText({ minimum, maximum }) {

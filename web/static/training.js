@@ -4,7 +4,7 @@ import { Icon } from "./icons.js";
 import { JobList, isActive } from "./jobs.js";
 import { TrainForm, usePresets } from "./trainform.js";
 
-export function Training({ link, jobs, error, refresh, acting, onAct }) {
+export function Training({ link, cell, jobs, error, refresh, acting, onAct }) {
   const presets = usePresets(link);
   const [form, setForm] = useState(false);
   const [open, setOpen] = useState(undefined);
@@ -17,7 +17,7 @@ export function Training({ link, jobs, error, refresh, acting, onAct }) {
     refresh();
   };
   return html`<div class="training">
-    ${form && html`<section class="card"><${TrainForm} ...${presets} onStarted=${started}
+    ${form && html`<section class="card"><${TrainForm} ...${presets} cell=${cell} onStarted=${started}
       onClose=${() => setForm(false)} /></section>`}
     <section class="card" aria-labelledby="jobs-title">
       <header class="card-head"><h2 id="jobs-title">Jobs</h2>

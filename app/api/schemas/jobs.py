@@ -9,7 +9,7 @@ from app.api.schemas.numbers import Answer, Body
 from app.errors import InvalidInput
 from app.policies.presets import PRESETS
 from app.store.records import JobRecord, MetricRow, NewJob
-from jobs.spec import new_job
+from jobs.spec import MAX_MOTIONS, new_job
 
 Seed = Annotated[int, Field(strict=True, ge=0, le=2**32 - 1)]
 
@@ -49,12 +49,17 @@ class EvaluateJobCreate(Body):
         description="episodes; the protocol's own if null",
     )
     seed: Seed = Field(0, description="seed of the episodes")
+    motions: list[Annotated[str, Field(max_length=64)]] = Field(
+        default_factory=list,
+        max_length=MAX_MOTIONS,
+        description="names of GET /v1/motions, for pick-mocap",
+    )
 
     def to_domain(self) -> NewJob:
         """Check what a schema cannot and return the job.
 
         Raises:
-            InvalidInput: An unknown protocol.
+            InvalidInput: An unknown protocol, or motions that do not go with it.
         """
         given = self.model_dump(mode="json", exclude_unset=True)
         return new_job({**given, "checkpoint": self.checkpoint})

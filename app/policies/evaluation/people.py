@@ -27,6 +27,7 @@ from app.policies.checkpoint import Checkpoint
 from app.policies.evaluation import choice_rules
 from app.policies.evaluation.episodes import Evaluator, settings_for
 from app.policies.evaluation.pick import settings_of
+from app.policies.evaluation.rows import OnRow, untold
 from app.policies.evaluation.statistics import wilson
 from app.policies.task_choice import HYSTERESIS, ValueNetworks
 from app.policies.trained_cell import cell_of
@@ -42,6 +43,8 @@ DEFAULT_EPISODES = 1000
 CANDIDATES = (2, 3)
 COURTESIES = (0.0, 0.5, 1.0)
 """Strengths compared."""
+MAX_RECORDED_S = 36_000
+"""Most recorded motion of one evaluation [s]; the tracks of so much are 274 MB."""
 SMALL, LARGE = 5.0, 95.0
 """Percentiles of stature compared; arms and shoulders go with it."""
 
@@ -49,11 +52,13 @@ SMALL, LARGE = 5.0, 95.0
 class _Bench:
     """Evaluates one checkpoint under varied settings, on episodes of one seed."""
 
-    def __init__(self, checkpoint: Checkpoint, episodes: int | None, seed: int) -> None:
+    def __init__(
+        self, checkpoint: Checkpoint, episodes: int | None, seed: int, on_row: OnRow
+    ) -> None:
         self._networks = ValueNetworks(checkpoint)
         self.cell = cell_of(checkpoint.manifest)
         self.usual = settings_for(CANDIDATES, checkpoint.manifest["preset"])
-        self._n, self._seed = episodes or DEFAULT_EPISODES, seed
+        self._n, self._seed, self._on_row = episodes or DEFAULT_EPISODES, seed, on_row
 
     def row(self, name: str, settings: PickSettings) -> tuple[dict[str, Any], dict[str, Any]]:
         """Return the result row of some settings, and what it states of its episodes."""
@@ -64,7 +69,10 @@ class _Bench:
 
     def all(self, rows: Mapping[str, PickSettings]) -> dict[str, Any]:
         """Return the result of several rows."""
-        done = {name: self.row(name, settings) for name, settings in rows.items()}
+        done: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {}
+        for name, settings in rows.items():
+            done[name] = self.row(name, settings)
+            self._on_row(len(done), len(rows), done[name][0])
         return {
             "settings": {
                 "hysteresis": HYSTERESIS,
@@ -87,15 +95,18 @@ def _sized(work: WorkSettings, percentile: float, pelvis: float) -> WorkSettings
     return replace(work, bodies=(percentile_body(percentile, pelvis=pelvis),))
 
 
-def run_people(checkpoint: Checkpoint, *, episodes: int | None, seed: int) -> dict[str, Any]:
+def run_people(
+    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = untold
+) -> dict[str, Any]:
     """Evaluate beside 0 to 4 people and people of several sizes.
 
     Args:
         checkpoint: What acts and chooses.
         episodes: Number of episodes of each row, by default 1000.
         seed: Seed of the episodes.
+        on_row: Told of each row once it is known.
     """
-    bench = _Bench(checkpoint, episodes, seed)
+    bench = _Bench(checkpoint, episodes, seed, on_row)
     usual, pelvis = bench.usual, bench.cell.human.pelvis_height
     small, large = (_sized(usual.work, share, pelvis) for share in (SMALL, LARGE))
 
@@ -113,15 +124,18 @@ def run_people(checkpoint: Checkpoint, *, episodes: int | None, seed: int) -> di
     return bench.all(rows)
 
 
-def run_courtesy(checkpoint: Checkpoint, *, episodes: int | None, seed: int) -> dict[str, Any]:
+def run_courtesy(
+    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = untold
+) -> dict[str, Any]:
     """Evaluate beside people who give way to the arm by 0, one half and fully.
 
     Args:
         checkpoint: What acts and chooses.
         episodes: Number of episodes of each row, by default 1000.
         seed: Seed of the episodes.
+        on_row: Told of each row once it is known.
     """
-    bench = _Bench(checkpoint, episodes, seed)
+    bench = _Bench(checkpoint, episodes, seed, on_row)
     usual = bench.usual
 
     def beside(strength: float) -> PickSettings:
@@ -136,6 +150,7 @@ def run_mocap(
     episodes: int | None,
     seed: int,
     motions: Sequence[Motion] = (),
+    on_row: OnRow = untold,
 ) -> dict[str, Any]:
     """Evaluate beside recorded people, with the library's people as the first row.
 
@@ -143,14 +158,19 @@ def run_mocap(
         checkpoint: What acts and chooses.
         episodes: Number of episodes of each row, by default 1000.
         seed: Seed of the episodes.
-        motions: Clean runs of recorded motion.
+        motions: Clean runs of recorded motion; those of one name are evaluated together.
+        on_row: Told of each row once it is known.
 
     Raises:
-        InvalidInput: There is no motion.
+        InvalidInput: There is no motion, or too much.
     """
+    seconds = sum(float(motion.times[-1]) for motion in motions)
     if not motions:
         raise InvalidInput("motions", 0, "must hold at least one run of recorded motion")
-    bench = _Bench(checkpoint, episodes, seed)
+    if seconds > MAX_RECORDED_S:
+        rule = f"s of recorded motion are too much: at most {MAX_RECORDED_S} s at a time"
+        raise InvalidInput("motions", round(seconds), rule)
+    bench = _Bench(checkpoint, episodes, seed, on_row)
     usual = bench.usual
     placed = tuple(at_the_table(motion, bench.cell) for motion in motions)
 

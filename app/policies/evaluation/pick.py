@@ -5,13 +5,15 @@ with postures never seen in training. The hand speeds of the person are part of 
 of the first 200 episodes FCL says on the raw meshes whether the kernels missed a contact.
 """
 
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 
 import numpy as np
 
 from app.policies.checkpoint import Checkpoint
 from app.policies.evaluation import choice_rules
-from app.policies.evaluation.episodes import Episodes, Evaluator, settings_for
+from app.policies.evaluation.episodes import Episodes, Evaluator, Rule, settings_for
+from app.policies.evaluation.rows import OnRow, untold
 from app.policies.task_choice import HYSTERESIS, ValueNetworks
 from app.policies.trained_cell import cell_of
 from app.sim.kernels import episode as kernel
@@ -22,6 +24,12 @@ from app.sim.scene import kinds_of
 DEFAULT_EPISODES = 1000
 N_RECHECKED = 200
 """Episodes whose poses go to FCL."""
+OTHER_RULES: Mapping[str, Callable[[int, int], Rule]] = {
+    "critic-each-step": lambda _seed, _n: choice_rules.critic(0.0),
+    "nearest": lambda _seed, _n: choice_rules.nearest,
+    "random": choice_rules.at_random,
+}
+"""What the critic's choice is compared with: rule by name, from seed and number of episodes."""
 
 
 def evaluator_of(
@@ -59,41 +67,49 @@ def _recheck(evaluator: Evaluator, episodes: Episodes) -> dict[str, int]:
     }
 
 
-def run_single(checkpoint: Checkpoint, *, episodes: int | None, seed: int) -> dict[str, object]:
+def run_single(
+    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = untold
+) -> dict[str, object]:
     """Evaluate one random target per episode.
 
     Args:
         checkpoint: What acts.
         episodes: Number of episodes, by default 1000.
         seed: Seed of the episodes; use one that nothing was tuned on.
+        on_row: Told of the row once it is known.
     """
     evaluator = evaluator_of(checkpoint, (1, 1), episodes, seed)
     outcome = evaluator.run(choice_rules.fixed(0), min(N_RECHECKED, evaluator.batch.n_envs))
+    row = outcome.row("policy")
+    on_row(1, 1, row)
     return {
         "settings": settings_of(evaluator),
-        "results": [outcome.row("policy")],
+        "results": [row],
         "fcl_recheck": _recheck(evaluator, outcome),
     }
 
 
-def run_choice(checkpoint: Checkpoint, *, episodes: int | None, seed: int) -> dict[str, object]:
+def run_choice(
+    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = untold
+) -> dict[str, object]:
     """Evaluate the choice among 2-3 random targets, against other rules on the same episodes.
 
     Args:
         checkpoint: What acts and chooses.
         episodes: Number of episodes, by default 1000.
         seed: Seed of the episodes; use one that nothing was tuned on.
+        on_row: Told of each row once it is known.
     """
     evaluator = evaluator_of(checkpoint, (2, 3), episodes, seed)
     n = evaluator.batch.n_envs
     with_hysteresis = evaluator.run(choice_rules.critic(HYSTERESIS), min(N_RECHECKED, n))
-    rows = [
-        with_hysteresis.row("critic"),
-        evaluator.run(choice_rules.critic(0.0)).row("critic-each-step"),
-        evaluator.run(choice_rules.nearest).row("nearest"),
-        evaluator.run(choice_rules.at_random(seed, n)).row("random"),
-        _in_hindsight([evaluator.run(choice_rules.fixed(place)) for place in range(3)]),
-    ]
+    rows = [with_hysteresis.row("critic")]
+    on_row(1, 2 + len(OTHER_RULES), rows[-1])
+    for name, rule in OTHER_RULES.items():
+        rows.append(evaluator.run(rule(seed, n)).row(name))
+        on_row(len(rows), 2 + len(OTHER_RULES), rows[-1])
+    rows.append(_in_hindsight([evaluator.run(choice_rules.fixed(k)) for k in range(3)]))
+    on_row(len(rows), len(rows), rows[-1])
     return {
         "settings": {**settings_of(evaluator), "hysteresis": HYSTERESIS},
         "results": rows,

@@ -8,6 +8,7 @@ from typing import Any
 from app.errors import InvalidInput, NotFound
 from app.policies.checkpoint import Checkpoint
 from app.policies.evaluation import people, pick, safety, tracker
+from app.policies.evaluation.rows import OnRow, untold
 from app.sim.motions import Motion
 
 Protocol = Callable[..., dict[str, Any]]
@@ -23,7 +24,7 @@ PROTOCOLS: Mapping[str, Protocol] = MappingProxyType(
         "safety-ssm": safety.run_safety,
     }
 )
-"""Protocol by name; each takes a checkpoint, ``episodes`` and ``seed``."""
+"""Protocol by name; each takes a checkpoint, ``episodes``, ``seed`` and ``on_row``."""
 WITH_MOTIONS = frozenset({"pick-mocap"})
 """Protocols that take recorded motion."""
 WITHOUT_CHECKPOINT = frozenset({"safety-ssm"})
@@ -39,6 +40,7 @@ def evaluate(
     episodes: int | None = None,
     seed: int = 11,
     motions: Sequence[Motion] = (),
+    on_row: OnRow = untold,
 ) -> dict[str, Any]:
     """Run a protocol and return its result, ready for JSON.
 
@@ -48,11 +50,12 @@ def evaluate(
         episodes: Number of episodes; the protocol's own number by default.
         seed: Seed of the episodes.
         motions: Runs of recorded motion, for the protocols in WITH_MOTIONS.
+        on_row: Told of each row of the result once it is known.
 
     Raises:
         NotFound: No protocol has that name.
-        InvalidInput: The number of episodes or the seed cannot be used, or there is no
-            checkpoint.
+        InvalidInput: The number of episodes or the seed cannot be used, there is no
+            checkpoint, or there are motions where none are taken or none where some are.
     """
     if name not in PROTOCOLS:
         raise NotFound("protocol", name, tuple(PROTOCOLS))
@@ -62,10 +65,11 @@ def evaluate(
         raise InvalidInput("seed", seed, "must lie in [0, 2^31)")
     if checkpoint is None and name not in WITHOUT_CHECKPOINT:
         raise InvalidInput("checkpoint", None, f"must name a checkpoint for {name}")
+    check_motions(name, [motion.name for motion in motions])
     tested = {} if name in WITHOUT_CHECKPOINT else _identity(checkpoint)
     started = time.process_time()
     more = {"motions": motions} if name in WITH_MOTIONS else {}
-    outcome = PROTOCOLS[name](checkpoint, episodes=episodes, seed=seed, **more)
+    outcome = PROTOCOLS[name](checkpoint, episodes=episodes, seed=seed, on_row=on_row, **more)
     return {
         "protocol": name,
         **tested,
@@ -74,6 +78,28 @@ def evaluate(
         **outcome,
         "cpu_seconds": round(time.process_time() - started, 2),
     }
+
+
+def check_motions(
+    name: str, given: Sequence[str], field: str = "motions", how: str = ""
+) -> None:
+    """Check that motions are given where a protocol takes them, and nowhere else.
+
+    Args:
+        name: Name of the protocol.
+        given: Names of the motions.
+        field: What the caller calls them.
+        how: How they are given, for the message.
+
+    Raises:
+        InvalidInput: There are some where none are taken, or none.
+    """
+    if name in WITH_MOTIONS and not given:
+        told = f": {how}" if how else ""
+        raise InvalidInput(field, [], f"must hold at least one motion for {name}{told}")
+    if name not in WITH_MOTIONS and given:
+        rule = f"must not be given to {name}, which takes no recorded motion"
+        raise InvalidInput(field, list(given[:3]), rule, sorted(WITH_MOTIONS))
 
 
 def _identity(checkpoint: Checkpoint | None) -> dict[str, str]:

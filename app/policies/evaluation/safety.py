@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from app.policies.checkpoint import Checkpoint
+from app.policies.evaluation.rows import OnRow, untold
 from app.policies.evaluation.statistics import wilson
 from app.sim.cells import load_cell
 from app.sim.safety import SafetySettings, safety_settings
@@ -93,7 +94,11 @@ def stated(trial: TrialSettings) -> Mapping[str, Any]:
 
 
 def run_safety(
-    _checkpoint: Checkpoint | None, *, episodes: int | None, seed: int
+    _checkpoint: Checkpoint | None,
+    *,
+    episodes: int | None,
+    seed: int,
+    on_row: OnRow = untold,
 ) -> dict[str, Any]:
     """Run all rows.
 
@@ -102,10 +107,12 @@ def run_safety(
         episodes: Number of episodes inside the assumptions, by default 100,000; every other
             row runs a tenth of that.
         seed: Seed of the episodes.
+        on_row: Told of each row once it is known.
     """
     n_inside = episodes or DEFAULT_EPISODES
     rows, settings = [], {}
-    for name, row_trials in trials().items():
+    planned = trials()
+    for name, row_trials in planned.items():
         n = n_inside if name == "inside" else max(1, n_inside // OUTSIDE_SHARE)
         shares = [len(part) for part in np.array_split(np.arange(n), len(row_trials))]
         results = [
@@ -114,5 +121,6 @@ def run_safety(
             if share
         ]
         rows.append(_row(name, results))
+        on_row(len(rows), len(planned), rows[-1])
         settings[name] = [stated(trial) for trial in row_trials]
     return {"settings": settings, "results": rows}

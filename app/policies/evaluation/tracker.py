@@ -25,6 +25,7 @@ from app.policies.checkpoint import Checkpoint
 from app.policies.evaluation import choice_rules
 from app.policies.evaluation.episodes import Index, Seen, Sight, seen_exactly
 from app.policies.evaluation.pick import evaluator_of, settings_of
+from app.policies.evaluation.rows import OnRow, untold
 from app.policies.task_choice import HYSTERESIS
 from app.sim import human
 from app.sim.person_estimate import PersonEstimator
@@ -164,7 +165,7 @@ class ThroughTracker:
 
 
 def run_tracker(
-    checkpoint: Checkpoint, *, episodes: int | None, seed: int
+    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = untold
 ) -> dict[str, object]:
     """Evaluate the choice among 2-3 random targets beside people seen by a tracker.
 
@@ -172,6 +173,7 @@ def run_tracker(
         checkpoint: What acts and chooses.
         episodes: Number of episodes per row, by default 300.
         seed: Seed of the episodes and of the disturbances.
+        on_row: Told of each row once it is known.
     """
     evaluator = evaluator_of(checkpoint, (2, 3), episodes or DEFAULT_EPISODES, seed)
     rule, results = choice_rules.critic(HYSTERESIS), []
@@ -183,6 +185,7 @@ def run_tracker(
         row["wrist_error_median_mm"] = 1e3 * float(np.median(errors))
         row["wrist_error_p95_mm"] = 1e3 * float(np.percentile(errors, 95))
         results.append(row)
+        on_row(len(results), len(looks), row)
     return {
         "settings": {
             **settings_of(evaluator),

@@ -65,6 +65,9 @@ class PickEnv(SingleEnv):
     Of several people the nearest is seen; a cylinder as a person who stands in it, nobody as
     one far away. ``PickSettings(observation="state")`` gives the plain state (5.8), 51 numbers:
     q, qd of the robot (2 x 6) and the person (2 x 18) [rad, rad/s, m, m/s], target [m].
+    ``PickSettings(observation="body")`` adds the size of the person seen to the features, 12
+    numbers: ``app.sim.body_size.NAMES`` [m], the pelvis's height as it is now, and the girth;
+    in all ``N_WITH_BODY``, groups as in ``features.BODY_SIZES``.
 
     ## Reward
     ``c_d (d_old - gamma d) + c_th (th_old - gamma th) - c_c [collision] - c_step
@@ -107,7 +110,7 @@ class PickEnv(SingleEnv):
     ) -> None:
         chosen = settings_with(settings or PickSettings(), people)
         self.batch = PickBatch(cell_of(cell), 1, 0, chosen, first_env)
-        super().__init__(self.batch, CONTROLLED, sees_time=chosen.observation == "features")
+        super().__init__(self.batch, CONTROLLED, sees_time=chosen.observation != "state")
 
 
 class PickVectorEnv(BatchVectorEnv):
@@ -131,4 +134,4 @@ class PickVectorEnv(BatchVectorEnv):
     ) -> None:
         chosen = settings_with(settings or PickSettings(), people)
         self.batch = PickBatch(cell_of(cell), num_envs, 0, chosen, first_env)
-        super().__init__(self.batch, CONTROLLED, sees_time=chosen.observation == "features")
+        super().__init__(self.batch, CONTROLLED, sees_time=chosen.observation != "state")

@@ -5,11 +5,14 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
+from app.sim.cells import load_cell
 from app.sim.envs import IDS
 from app.sim.envs.single import SingleEnv
 from app.sim.envs.vector import BatchVectorEnv
 from app.sim.pick import PickSettings
 from app.sim.reach import ReachSettings
+from app.sim.worker_motion import WorkSettings
+from tests.sim.working_people import recorded_work
 
 PEOPLE = {
     "tandem/Pick-v0": ("worker",),
@@ -39,16 +42,19 @@ def actions(n_steps: int, n_envs: int, size: int) -> np.ndarray:
 
 
 def assert_single_equals_row(
-    env_id: str, observation: str, row: int, **keywords: object
+    env_id: str,
+    settings: PickSettings | ReachSettings,
+    row: int,
+    n_steps: int = 180,
+    **keywords: object,
 ) -> int:
     """Compare one environment with a row of three; return the episodes seen."""
-    settings = short(env_id, observation)
     many = gymnasium.make_vec(env_id, 3, settings=settings, **keywords)
     one = gymnasium.make(env_id, settings=settings, first_env=row, **keywords)
     (expected, _), (obs, _) = many.reset(seed=9), one.reset(seed=9)
     size = many.single_action_space.shape[0]
     n_episodes = 0
-    for act in actions(180, 3, size):
+    for act in actions(n_steps, 3, size):
         np.testing.assert_array_equal(obs, expected[row])
         expected, rews, terminated, truncated, infos = many.step(act)
         obs, rew, over, late, info = one.step(act[row])
@@ -96,11 +102,24 @@ def test_make_vec_gives_the_batch(env_id: str) -> None:
 
 @pytest.mark.parametrize("env_id", IDS)
 def test_single_environment_equals_its_row_of_a_batch_bit_for_bit(env_id: str) -> None:
-    assert assert_single_equals_row(env_id, "features", row=1) >= 3
+    assert assert_single_equals_row(env_id, short(env_id, "features"), row=1) >= 3
 
 
 @pytest.mark.parametrize("env_id", ["tandem/Pick-v0", "tandem/Reach-v0"])
 def test_any_mix_of_people_equals_its_row_of_a_batch_bit_for_bit(env_id: str) -> None:
-    assert assert_single_equals_row(env_id, "state", row=2, **MIX) >= 3
+    assert assert_single_equals_row(env_id, short(env_id, "state"), row=2, **MIX) >= 3
     env = gymnasium.make(env_id, **MIX).unwrapped
     assert len(env.batch.cell.people) == 4
+
+
+@pytest.mark.parametrize("people", ["library", "recorded", "courteous", "three"])
+def test_whatever_people_do_a_single_environment_equals_its_row_bit_for_bit(
+    people: str,
+) -> None:
+    work = {
+        "recorded": recorded_work(load_cell()),
+        "courteous": WorkSettings(courtesy=1.0),
+    }.get(people, WorkSettings())
+    settings = PickSettings(time_limit_s=1.0, observation="body", work=work)
+    who = {"people": ("worker",) * 3} if people == "three" else {}
+    assert assert_single_equals_row("tandem/Pick-v0", settings, 2, 90, **who) >= 3

@@ -8,9 +8,12 @@ from gymnasium.utils.env_checker import check_env
 
 import app.sim.envs  # noqa: F401  (registers the ids)
 from app.errors import NotFound, SimulationError
+from app.sim.body_size import MEDIAN, percentile_body
 from app.sim.cells import load_cell
-from app.sim.envs.pick import PickEnv
+from app.sim.envs.pick import PickEnv, PickVectorEnv
+from app.sim.kernels.features import N_FEATURES, N_WITH_BODY
 from app.sim.pick import PickBatch, PickSettings
+from app.sim.worker_motion import WorkSettings
 
 
 def actions(n: int) -> np.ndarray:
@@ -83,3 +86,42 @@ def test_nan_action_is_refused() -> None:
 def test_unknown_cell_is_refused_with_the_known_ones() -> None:
     with pytest.raises(NotFound, match="pick-and-place"):
         PickEnv("no-such-cell")
+
+
+BODY = PickSettings(observation="body")
+
+
+def test_environment_that_tells_the_size_passes_both_checks() -> None:
+    env = PickEnv(settings=BODY)
+    assert env.observation_space.shape == (N_WITH_BODY,)
+    check_env(env, skip_render_check=True)
+    pytest.importorskip("stable_baselines3.common.env_checker").check_env(env)
+
+
+@pytest.mark.parametrize("size", [MEDIAN, percentile_body(95.0), percentile_body(5.0, 40.0)])
+def test_observation_ends_with_the_size_of_the_person(size) -> None:
+    work = WorkSettings(bodies=(size,))
+    env = PickEnv(settings=PickSettings(observation="body", work=work))
+    plain = PickEnv(settings=PickSettings(work=work))
+    (obs, _), (known, _) = env.reset(seed=2), plain.reset(seed=2)
+    floor_z = env.batch.cell.floor_z
+    for act in actions(3):
+        np.testing.assert_array_equal(obs[N_FEATURES:], size.vector(floor_z).astype(np.float32))
+        np.testing.assert_array_equal(obs[:N_FEATURES], known)
+        obs, known = env.step(act)[0], plain.step(act)[0]
+
+
+@pytest.mark.parametrize(
+    ("observation", "late"), [("features", False), ("body", False), ("state", True)]
+)
+def test_time_out_truncates_only_where_the_time_left_is_not_observed(
+    observation: str, late: bool
+) -> None:
+    settings = PickSettings(time_limit_s=0.05, observation=observation)
+    one, many = (kind(settings=settings, people=()) for kind in (PickEnv, PickVectorEnv))
+    one.reset(seed=1)
+    many.reset(seed=1)
+    still = np.zeros(5, dtype=np.float32)
+    assert one.step(still)[2:4] == (not late, late)
+    terminated, truncated = many.step(still[None])[2:4]
+    assert (terminated[0], truncated[0]) == (not late, late)
