@@ -108,7 +108,7 @@ def test_evaluation_of_an_unknown_checkpoint_fails_by_name(store: Store) -> None
 
 @pytest.mark.usefixtures("supervisor")
 def test_evaluation_beside_stored_motions_tells_row_by_row(
-    store: Store, tmp_path: Path
+    store: Store,
 ) -> None:
     motions = MotionCatalog(store)
     for name, seed in (("nods", 0), ("waves", 1)):
