@@ -73,7 +73,7 @@ bench: $(VENV)/dev.stamp ## every benchmark, as tables
 	@for f in tests/benchmarks/bench_*.py; do \
 		name=$$(basename $$f .py | sed 's/^bench_//; s/_/-/g'); $(PY) -m app bench $$name || exit 1; done
 
-tables: $(VENV)/dev.stamp ## write the tables of README and docs/world.md from docs/results
+tables: $(VENV)/dev.stamp ## write the tables of README, docs and model cards from docs/results
 	@$(PY) docs/make_tables.py
 	@$(PY) docs/make_world_page.py --page
 

@@ -1,8 +1,10 @@
-"""Write the result tables of README and model cards from ``docs/results/*.json``.
+"""Write the result tables of README, pages and model cards from ``docs/results/*.json``.
 
 Between ``<!-- begin NAME -->`` and ``<!-- end NAME -->`` a page shows the table of
 ``docs/results/NAME.json``: what ``python -m app evaluate NAME --json`` or
-``python -m app bench NAME --json`` printed. Run by ``make tables``; a test compares.
+``python -m app bench NAME --json`` printed, or what the script named in its ``command`` wrote.
+A result without rows is not a table: its section is written by a script of its own. Run by
+``make tables``; a test compares.
 """
 
 import json
@@ -25,8 +27,8 @@ def render(readme: str, results: Path) -> str:
     """
 
     def block(match: re.Match[str]) -> str:
-        path = results / f"{match[2]}.json"
-        return f"{match[1]}{table(json.loads(path.read_text(encoding='utf-8')))}\n{match[3]}"
+        found = json.loads((results / f"{match[2]}.json").read_text(encoding="utf-8"))
+        return f"{match[1]}{table(found)}\n{match[3]}" if "results" in found else match[0]
 
     return BLOCK.sub(block, readme)
 
@@ -42,10 +44,13 @@ def table(result: Json) -> str:
 
 
 def cell(value: object) -> str:
-    """Return one value as text: a rate with its interval in percent, a number compactly."""
+    """Return one value as text: rates in percent, with their interval; a number compactly."""
     if isinstance(value, dict):
         mean, low, high = (100.0 * value[key] for key in ("mean", "low", "high"))
-        return f"{mean:.1f} % ({low:.1f}-{high:.1f})"
+        to = "-" if low >= 0.0 else " to "
+        return f"{mean:.1f} % ({low:.1f}{to}{high:.1f})"
+    if isinstance(value, list):
+        return ", ".join(f"{100.0 * one:.1f}" for one in value)
     if isinstance(value, float):
         return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.3g}"
     return "" if value is None else str(value)
@@ -55,7 +60,9 @@ def origin(result: Json) -> str:
     """Return the line below a table: command, seed, checkpoint, machine, commit."""
     machine: Json = result["machine"]
     verb = "evaluate" if "protocol" in result else "bench"
-    parts = [f"`python -m app {verb} {result.get('protocol') or result['bench']}`"]
+    usual = f"python -m app {verb} {result.get('protocol') or result.get('bench')}"
+    usual += " FILE ..." if "motions" in result.get("settings", {}) else ""
+    parts = [f"`{result.get('command', usual)}`"]
     parts += [f"{key} {result[key]}" for key in ("episodes", "seed") if key in result]
     if "checkpoint" in result:
         parts.append(f"checkpoint `{result['checkpoint'][:12]}`")
@@ -70,6 +77,9 @@ def conditions(result: Json) -> list[str]:
     if "hand_speed_median_m_s" in settings:
         median, p99 = settings["hand_speed_median_m_s"], settings["hand_speed_p99_m_s"]
         parts.append(f"hands {median:.2f} m/s (median), {p99:.2f} m/s (p99)")
+    if motions := settings.get("motions"):
+        seconds = sum(one["seconds"] for one in motions)
+        parts.append(f"{len(motions)} recorded runs of {seconds:.0f} s together")
     if recheck := result.get("fcl_recheck"):
         missed, poses = recheck["missed_contacts"], recheck["poses"]
         parts.append(f"FCL found {missed} missed contacts in {poses:,} poses")
@@ -77,9 +87,10 @@ def conditions(result: Json) -> list[str]:
 
 
 def pages() -> list[Path]:
-    """Return the files with tables: the README, the page on trackers and the model cards."""
+    """Return the files with tables: the README, pages about people and the model cards."""
     cards = sorted((ROOT / "app/policies/pretrained").glob("*.md"))
-    return [ROOT / "README.md", ROOT / "docs/people-tracker.md", *cards]
+    names = ("people", "people-tracker", "motions")
+    return [ROOT / "README.md", *(ROOT / f"docs/{name}.md" for name in names), *cards]
 
 
 def main() -> None:

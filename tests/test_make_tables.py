@@ -69,3 +69,25 @@ def test_conditions_name_the_people_and_the_second_look() -> None:
         "hands 0.41 m/s (median), 1.68 m/s (p99)",
         "FCL found 0 missed contacts in 52,830 poses",
     ]
+
+
+def test_result_without_rows_leaves_its_section_to_its_own_script(tmp_path: Path) -> None:
+    (tmp_path / "x.json").write_text('{"page": "people"}')
+    text = "<!-- begin x -->\nwritten elsewhere\n<!-- end x -->\n"
+    assert render(text, tmp_path) == text
+
+
+def test_rates_of_seeds_and_a_difference_below_zero_are_shown() -> None:
+    rows = [
+        {"name": "a", "by": [0.981, 1.0], "more": {"mean": 0.01, "low": -0.02, "high": 0.04}}
+    ]
+    lines = table({"command": "python x.py", "results": rows, "machine": MACHINE}).splitlines()
+    assert lines[2] == "| `a` | 98.1, 100.0 | 1.0 % (-2.0 to 4.0) |"
+    assert lines[-1].startswith("<sub>`python x.py`, 2 cores")
+
+
+def test_recorded_people_are_counted_below_the_table() -> None:
+    motions = [{"source": "a", "seconds": 12.0}, {"source": "b", "seconds": 8.4}]
+    assert conditions({"settings": {"motions": motions}}) == [
+        "2 recorded runs of 20 s together"
+    ]

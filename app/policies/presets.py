@@ -98,6 +98,10 @@ class Preset:
     augmentation: str = _choice(
         "sampled", AUGMENTATIONS, "primitives sampled and varied, or demonstrations replayed"
     )
+    n_people: int = _number(1, 1, 4, "", "people in a cell; the policy sees the nearest")
+    human_absent: float = _number(
+        0.0, 0.0, 1.0, "", "share of people who are not there in an episode"
+    )
     human_roaming: float = _number(
         0.0, 0.0, 1.0, "", "share of people who do anything but the task"
     )

@@ -230,6 +230,7 @@ class _TrainedRanges:
 
     def __init__(self, checkpoint: Checkpoint) -> None:
         ranges = checkpoint.manifest["trained_range"]
+        self._met_nobody = checkpoint.manifest["preset"].get("human_absent", 0.0) > 0.0
         self._low = {name: np.array(entry["low"]) for name, entry in ranges.items()}
         self._high = {name: np.array(entry["high"]) for name, entry in ranges.items()}
 
@@ -237,9 +238,14 @@ class _TrainedRanges:
         self, q: Vec, qd: Vec, person: Person, index: int | None
     ) -> tuple[OutsideField, ...]:
         path = f"people[{index or 0}]"
-        return (
+        alone = (
             *self._outside("q", q, "robot.q", robot.JOINT_NAMES),
             *self._outside("qd", qd, "robot.qd", robot.JOINT_NAMES),
+        )
+        if index is None and self._met_nobody:
+            return alone
+        return (
+            *alone,
             *self._outside("human_q", person.q, f"{path}.q", human.JOINT_NAMES),
             *self._outside("human_qd", person.qd, f"{path}.qd", human.JOINT_NAMES),
         )

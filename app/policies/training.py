@@ -28,8 +28,10 @@ from app.policies.vecenv import PickVecEnv
 from app.sim.cells import Cell, load_cell
 from app.sim.kernels.arm import CONTROLLED
 from app.sim.kernels.features import BODY_SIZES, SIZES
+from app.sim.kernels.people import ABSENT
 from app.sim.kernels.reward import RewardWeights
 from app.sim.pick import PickBatch, PickSettings
+from app.sim.scene import HumanKind
 from app.sim.worker_motion import WorkSettings
 
 LAYOUTS = {
@@ -95,13 +97,10 @@ class _Ranges:
 
     def look(self, batch: PickBatch) -> None:
         state, people = batch.state, batch.state.people
-        met = {
-            "q": state.q,
-            "qd": state.qd,
-            "human_q": people.q.reshape(-1, 18),
-            "human_qd": people.qd.reshape(-1, 18),
-            "goal": state.goal,
-        }
+        there = people.track != ABSENT
+        met = {"q": state.q, "qd": state.qd, "goal": state.goal}
+        if there.any():
+            met |= {"human_q": people.q[there], "human_qd": people.qd[there]}
         for name, rows in met.items():
             low, high = rows.min(axis=0), rows.max(axis=0)
             self._low[name] = np.minimum(self._low.get(name, low), low)
@@ -130,12 +129,14 @@ def work_of(preset: Mapping[str, Any], seed: int = 0) -> WorkSettings:
         pace=preset.get("human_pace", 1.0),
         courtesy=preset.get("human_courtesy", 0.0),
         roaming=preset.get("human_roaming", 0.0),
+        absent=preset.get("human_absent", 0.0),
         augmentation=preset.get("augmentation", "sampled") == "sampled",
     )
 
 
 def settings_of(preset: Preset) -> PickSettings:
     """Return the scenario's settings of a preset."""
+    worker: HumanKind = "worker"
     return PickSettings(
         time_limit_s=preset.time_limit_s,
         short_limit_s=preset.short_limit_s,
@@ -143,6 +144,7 @@ def settings_of(preset: Preset) -> PickSettings:
         start_clearance_m=preset.start_clearance_m,
         target_jitter_m=preset.target_jitter_m,
         way_share=preset.way_share,
+        people=None if preset.n_people == 1 else (worker,) * preset.n_people,
         work=work_of(asdict(preset)),
         observation="body" if preset.observation == "body" else "features",
         action=preset.action,

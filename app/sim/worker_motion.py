@@ -52,6 +52,8 @@ class WorkSettings:
     """How far they give way to the arm, from 0 (they do not see it) to 1."""
     roaming: float = 0.0
     """Share of the workers who roam instead of working, drawn each episode anew."""
+    absent: float = 0.0
+    """Share of the workers who are not there, drawn each episode anew."""
     bodies: tuple[BodySize, ...] | None = None
     """Sizes drawn from, each episode anew; None for those of the library
     (``task_library.BODIES``), and in synthetic reaches for the cell's own person."""
@@ -66,10 +68,9 @@ class WorkSettings:
     def __post_init__(self) -> None:
         if self.motion not in MOTIONS:
             raise InvalidInput("motion", self.motion, "must be a source of motion", MOTIONS)
-        if not 0.0 <= self.courtesy <= 1.0:
-            raise InvalidInput("courtesy", self.courtesy, "must lie in [0, 1]")
-        if not 0.0 <= self.roaming <= 1.0:
-            raise InvalidInput("roaming", self.roaming, "must lie in [0, 1]")
+        for name in ("courtesy", "roaming", "absent"):
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise InvalidInput(name, getattr(self, name), "must lie in [0, 1]")
         if not (np.isfinite(self.pace) and self.pace > 0.0):
             raise InvalidInput("pace", self.pace, "must be above 0")
         if self.bodies is not None and not self.bodies:
@@ -92,7 +93,9 @@ def with_work(shared: People, cell: Cell, settings: WorkSettings) -> People:
         cell: Work cell with at least one worker.
         settings: What they do.
     """
-    shared = shared._replace(pace=settings.pace, courtesy=settings.courtesy)
+    shared = shared._replace(
+        pace=settings.pace, courtesy=settings.courtesy, absent_share=settings.absent
+    )
     if settings.motion == "recorded":
         tracks, lengths = tracks_of(settings.recorded, cell.floor_z)
         return shared._replace(tracks=tracks, track_share=1.0, bodies=lengths)

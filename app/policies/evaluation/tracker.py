@@ -13,7 +13,7 @@ own tracker and estimator, and the tracker has looked for a while before the epi
 ``100ms-noise-missing``   100 ms, 20 mm noise per axis, 20 % of the key-points missing
 ========================  ==================================================================
 
-Source: METHOD 2.8 (30 Hz). Noise, share and latencies are ours, as in ``docs/people.md``.
+Source: METHOD 2.8 (30 Hz). Noise, share and latencies are ours.
 """
 
 from collections.abc import Callable

@@ -38,6 +38,8 @@ from app.sim.ports import Vec
 
 REACHES, LIBRARY = range(2)
 """What a worker's script is made of."""
+SCRIPTED, ABSENT = -1, -2
+"""In place of a track's number: a worker who follows a script, one who is not there."""
 MAX_PEOPLE = 4
 DEEPEST = 32
 """Halvings of a period in the contact test; enough for periods of hours."""
@@ -84,6 +86,8 @@ class People(NamedTuple):
     """What workers without a script do."""
     track_share: float
     """Chance that a worker follows a track in an episode."""
+    absent_share: float
+    """Chance that a worker is not there in an episode."""
     limits: Vec
     """Lower and upper joint limits of a worker [m, rad], shape (2, 18)."""
     courtesy: float
@@ -116,7 +120,7 @@ class PeopleState(NamedTuple):
     lean: Vec
     """How far each worker leans away, ``courtesy.give_way`` [rad, rad/s], (n_envs, W, 4)."""
     track: NDArray[np.int64]
-    """Track of each worker, -1 for those who follow a script, shape (n_envs, W)."""
+    """Track of each worker, SCRIPTED or ABSENT, shape (n_envs, W)."""
     legs: Legs
     """The legs of their scripts, for LIBRARY."""
     move: NDArray[np.int64]
@@ -269,6 +273,10 @@ def worker_at(
         rate: Script's seconds per second; scales the speeds.
         away: Work space, shape (36,).
     """
+    if state.track[e, w] == ABSENT:
+        for j in range(18):
+            state.q[e, w, j], state.qd[e, w, j] = people.nobody[j], 0.0
+        return
     if state.track[e, w] >= 0:
         _track_at(people, state, e, w, when, rate)
         return
@@ -319,8 +327,10 @@ def _track_at(
 def _draw_work(people: People, state: PeopleState, e: int, w: int, rng: random.State) -> None:
     """Draw what worker ``w`` of environment ``e`` does, and where in it the episode begins."""
     who = random.below(rng, people.bodies.shape[0]) if people.bodies.shape[0] > 1 else 0
-    state.track[e, w] = -1
-    if people.track_share > 0.0 and random.uniform(rng) < people.track_share:
+    state.track[e, w] = SCRIPTED
+    if people.absent_share > 0.0 and random.uniform(rng) < people.absent_share:
+        state.track[e, w] = ABSENT
+    elif people.track_share > 0.0 and random.uniform(rng) < people.track_share:
         track = random.below(rng, people.tracks.spans.shape[0])
         state.track[e, w], span = track, people.tracks.spans[track]
         spare = people.tracks.dt * (span[1] - 1) - people.tracks.needed

@@ -1,0 +1,50 @@
+"""What ``docs/motion_plots.py`` measures, on a clip with a known fault."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from docs.motion_plots import Course, course, name_of, row, shown_of
+from tests.sim.test_motions import with_leap
+
+
+@pytest.fixture(scope="module")
+def clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("someone") / "0.bvh"
+    path.write_text(with_leap(slice(100, 102)), encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def found(clip: Path) -> Course:
+    return course(clip)
+
+
+def test_row_names_the_fault_and_its_speed(clip: Path) -> None:
+    shown = row(clip)
+    assert shown["name"] == name_of(clip)
+    assert shown["glitches"].startswith("1 (`wrist_r` ")
+    assert shown["frames"] == 200 and 150 < shown["clean"] < 198
+
+
+def test_errors_are_those_of_the_clean_frames_alone(found: Course) -> None:
+    (glitch,) = found.glitches
+    wrist = found.errors["right wrist"]
+    assert np.isnan(wrist[glitch.first : glitch.last + 1]).all()
+    assert 0.0 <= np.nanmax(wrist) < 1.0
+    assert np.isfinite(wrist[[0, -1]]).all()
+
+
+def test_frames_beside_a_glitch_are_told_as_dropped(found: Course) -> None:
+    (glitch,) = found.glitches
+    before, after = found.dropped
+    assert before[1] < found.times[glitch.first] < found.times[glitch.last] < after[0]
+
+
+def test_clip_that_is_drawn_has_a_glitch(found: Course, tmp_path: Path) -> None:
+    clean = tmp_path / "clean.bvh"
+    clean.write_text(with_leap(slice(0, 0)), encoding="utf-8")
+    other = course(clean)
+    assert other.glitches == ()
+    assert shown_of([other, found]) is found
