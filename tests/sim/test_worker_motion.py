@@ -49,11 +49,13 @@ def test_tracks_hold_the_positions_at_their_samples(cell: Cell) -> None:
     assert sizes.shape == (2, 12)
 
 
-def test_tracks_leave_the_limits_of_the_model_where_the_recording_does(cell: Cell) -> None:
+def test_a_recorded_joint_may_leave_its_limits(cell: Cell) -> None:
     q = working(60)
-    q[:, 13] = human.Q_MAX[13] + 0.4
-    tracks, _ = tracks_of((run_of(q),), cell.floor_z)
-    np.testing.assert_allclose(tracks.rows[:, 13], human.Q_MAX[13] + 0.4)
+    q[:, 13] = 4.0
+    work = WorkSettings(motion="recorded", recorded=(at_the_table(run_of(q), cell),))
+    state = batch_of(cell, work, 4).state.people
+    assert human.Q_MAX[13] < 4.0
+    np.testing.assert_array_equal(state.q[:, 0, 13], 4.0)
 
 
 def test_tracks_carry_who_was_recorded_and_how_high_the_pelvis_is(cell: Cell) -> None:
