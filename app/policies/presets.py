@@ -50,7 +50,7 @@ class Preset:
     """Work cell trained in."""
 
     total_steps: int = _number(
-        3_072_000, 1_000, 100_000_000, "env steps", "length of the training"
+        4_608_000, 1_000, 100_000_000, "env steps", "length of the training"
     )
     n_envs: int = _number(128, 8, 1024, "", "cells stepped together")
     buffer_size: int = _number(
@@ -98,12 +98,12 @@ class Preset:
     augmentation: str = _choice(
         "sampled", AUGMENTATIONS, "primitives sampled and varied, or demonstrations replayed"
     )
-    n_people: int = _number(1, 1, 4, "", "people in a cell; the policy sees the nearest")
+    n_people: int = _number(2, 1, 4, "", "people in a cell; the policy sees the nearest")
     human_absent: float = _number(
-        0.0, 0.0, 1.0, "", "share of people who are not there in an episode"
+        0.35, 0.0, 1.0, "", "share of people who are not there in an episode"
     )
     human_roaming: float = _number(
-        0.0, 0.0, 1.0, "", "share of people who do anything but the task"
+        0.2, 0.0, 1.0, "", "share of people who do anything but the task"
     )
     human_pace: float = _number(1.0, 0.2, 2.0, "", "speed of the person, 1 = as cycled")
     human_courtesy: float = _number(

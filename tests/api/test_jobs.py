@@ -1,3 +1,4 @@
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -83,7 +84,7 @@ def test_bad_evaluation_is_refused_by_field(
 
 
 @pytest.fixture(scope="module")
-def wave(client: TestClient) -> str:
+def wave(client: TestClient) -> Iterator[str]:
     """A stored motion."""
     content = csv_text(working(100)).encode()
     client.post(
@@ -91,7 +92,8 @@ def wave(client: TestClient) -> str:
         content=content,
         headers={"Content-Type": "text/csv"},
     ).raise_for_status()
-    return "wave-of-jobs"
+    yield "wave-of-jobs"
+    client.delete("/v1/motions/wave-of-jobs").raise_for_status()
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,9 @@ from app.sim.body_size import BodySize, percentile_body
 from app.sim.cells import Cell, load_cell
 from app.sim.contact import clearance
 from app.sim.kernels.body import PELVIS_Z
+from app.sim.kernels.episode import COLLISION
+from app.sim.kernels.features import LAYOUT
+from app.sim.kernels.people import ABSENT
 from app.sim.pick import OUTCOMES, PickBatch, PickSettings
 from app.sim.scene import arm_of, people_of
 from app.sim.worker_motion import TRACK_DT, WorkSettings, at_the_table, tracks_of
@@ -46,12 +49,13 @@ def test_tracks_hold_the_positions_at_their_samples(cell: Cell) -> None:
     assert sizes.shape == (2, 12)
 
 
-def test_tracks_hold_joints_at_the_limits_of_the_model(cell: Cell) -> None:
+def test_a_recorded_joint_may_leave_its_limits(cell: Cell) -> None:
     q = working(60)
-    q[:, 13], q[:, 0], q[:, 2] = 4.0, 30.0, -7.0
-    tracks, _ = tracks_of((run_of(q),), cell.floor_z)
-    assert (tracks.rows[:, 13] == human.Q_MAX[13]).all()
-    np.testing.assert_allclose(tracks.rows[:, [0, 2]], [[human.Q_MAX[0], -7.0]] * 60)
+    q[:, 13] = 4.0
+    work = WorkSettings(motion="recorded", recorded=(at_the_table(run_of(q), cell),))
+    state = batch_of(cell, work, 4).state.people
+    assert human.Q_MAX[13] < 4.0
+    np.testing.assert_array_equal(state.q[:, 0, 13], 4.0)
 
 
 def test_tracks_carry_who_was_recorded_and_how_high_the_pelvis_is(cell: Cell) -> None:
@@ -249,3 +253,25 @@ def test_settings_that_cannot_be_are_refused_by_name(
     with pytest.raises(InvalidInput) as caught:
         WorkSettings(**settings)  # type: ignore[arg-type]
     assert caught.value.field == field
+
+
+def test_the_asked_share_of_people_is_not_there_and_is_never_touched() -> None:
+    settings = PickSettings(people=("worker",) * 2, work=WorkSettings(absent=0.35))
+    batch = PickBatch(load_cell(), 400, 5, settings)
+    batch.reset()
+    absent = batch.state.people.track == ABSENT
+    assert abs(absent.mean() - 0.35) < 4.0 * np.sqrt(0.35 * 0.65 / 800)
+    rest, alone = np.zeros((400, 5), dtype=np.float32), absent.all(axis=1)
+    for _ in range(200):
+        batch.step(rest, auto_reset=False, features=False)
+    assert alone.sum() > 20
+    assert (batch.state.outcome[alone] != COLLISION).all()
+    assert (batch.state.outcome[~alone] == COLLISION).mean() > 0.1
+    assert (batch.state.people.q[absent] == batch.world.people.nobody).all()
+
+
+def test_who_is_not_there_looks_like_nobody_in_an_empty_cell() -> None:
+    away = PickBatch(load_cell(), 4, 5, PickSettings(work=WorkSettings(absent=1.0)))
+    empty = PickBatch(load_cell(), 4, 5, PickSettings(people=()))
+    person = slice(LAYOUT["human_q"].start, LAYOUT["human_qd"].stop)
+    np.testing.assert_allclose(away.reset()[:, person], empty.reset()[:, person])

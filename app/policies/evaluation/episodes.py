@@ -63,13 +63,18 @@ Seen = Callable[[PickBatch, Index], Sight]
 
 
 def seen_exactly(batch: PickBatch, rows: Index) -> Sight:
-    """Return the person nearest to each row's robot, as they are; far away for nobody."""
+    """Return the person nearest to each row's robot, as they are; far away for nobody.
+
+    Angles beyond the model's limits, which recorded people have, are told as the limit, as the
+    live cell tells them.
+    """
     shared, state, n = batch.world.people, batch.state, len(rows)
     seen = Sight(
         q=np.empty((n, 18)), qd=np.empty((n, 18)), size=np.empty((n, shared.bodies.shape[1]))
     )
     crowd = new_crowd(shared, state.people.q.shape[1], state.people.cylinders.shape[1])
     see_rows(shared, state.people, state.robot, rows, crowd, seen.q, seen.qd, seen.size)
+    np.clip(seen.q[:, 3:], shared.limits[0, 3:], shared.limits[1, 3:], out=seen.q[:, 3:])
     return seen
 
 

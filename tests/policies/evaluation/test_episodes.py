@@ -7,11 +7,14 @@ from app.policies import pretrained
 from app.policies.evaluation import choice_rules
 from app.policies.evaluation.episodes import Evaluator, seen_exactly, settings_for
 from app.policies.task_choice import ValueNetworks
+from app.sim import human
 from app.sim.body_size import percentile_body
 from app.sim.cells import load_cell
 from app.sim.contact import clearance
 from app.sim.pick import PickBatch, PickSettings
-from app.sim.worker_motion import WorkSettings
+from app.sim.worker_motion import WorkSettings, at_the_table
+from tests.sim.recorded_person import working
+from tests.sim.working_people import run_of
 
 NO_WALKERS = np.zeros((0, 3))
 
@@ -42,6 +45,19 @@ def test_nobody_is_seen_as_somebody_far_away():
     sight = seen_exactly(batch, np.arange(2))
     np.testing.assert_array_equal(sight.q, np.tile(batch.world.people.nobody, (2, 1)))
     assert sight.q[0, 1] > 3.0 and not sight.qd.any()
+
+
+def test_an_angle_beyond_its_limit_is_told_as_the_limit():
+    cell, q = load_cell(), working(60)
+    q[:, 13], q[:, 3] = 4.0, 0.3
+    run = at_the_table(run_of(q), cell)
+    work = WorkSettings(motion="recorded", recorded=(run,))
+    batch = PickBatch(cell, 3, 7, PickSettings(work=work))
+    batch.reset()
+    sight = seen_exactly(batch, np.arange(3))
+    np.testing.assert_array_equal(sight.q[:, 13], human.Q_MAX[13])
+    others = np.delete(sight.q, 13, axis=1)
+    np.testing.assert_array_equal(others, np.delete(batch.state.people.q[:, 0], 13, axis=1))
 
 
 @pytest.fixture(scope="module")
