@@ -1,6 +1,7 @@
 """Measure what augmentation buys: the same training with and without it, three seeds each.
 
-    SETS="--set total_steps=1024000 --set augmentation=sampled"
+    SETS="--set total_steps=1024000 --set augmentation=sampled
+        --set n_people=1 --set human_absent=0 --set human_roaming=0"
     python -m app train pick-td3 --seed 21 $SETS --output FOLDER/sampled-21
 
 and so on for ``replayed`` and seeds 22 and 23; then

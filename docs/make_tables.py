@@ -3,8 +3,8 @@
 Between ``<!-- begin NAME -->`` and ``<!-- end NAME -->`` a page shows the table of
 ``docs/results/NAME.json``: what ``python -m app evaluate NAME --json`` or
 ``python -m app bench NAME --json`` printed, or what the script named in its ``command`` wrote.
-A result without rows is not a table: its section is written by a script of its own. Run by
-``make tables``; a test compares.
+A result without rows is not a table: its section is written by a script of its own. What has no
+result yet stays as it is, and a test names it. Run by ``make tables``; a test compares.
 """
 
 import json
@@ -27,7 +27,10 @@ def render(readme: str, results: Path) -> str:
     """
 
     def block(match: re.Match[str]) -> str:
-        found = json.loads((results / f"{match[2]}.json").read_text(encoding="utf-8"))
+        path = results / f"{match[2]}.json"
+        if not path.exists():
+            return match[0]
+        found = json.loads(path.read_text(encoding="utf-8"))
         return f"{match[1]}{table(found)}\n{match[3]}" if "results" in found else match[0]
 
     return BLOCK.sub(block, readme)

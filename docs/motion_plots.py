@@ -154,7 +154,7 @@ def row(path: Path) -> Json:
         "wrists_p50_p99_worst_mm": _spread(found.wrists, 2),
         "at_one_height_mm": _spread(found.wrists_at_fixed_height, 0),
         "pelvis_mm": _spread(found.pelvis, 0),
-        "simulator_s_body_mm": _spread(found.fixed_body, 0),
+        "simulator_person_mm": _spread(found.fixed_body, 0),
     }
 
 

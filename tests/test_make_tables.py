@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from docs.make_tables import ROOT, conditions, pages, render, table
+from docs.make_tables import BLOCK, ROOT, conditions, pages, render, table
 
 RATE = {"mean": 0.9712, "low": 0.959, "high": 0.98}
 MACHINE = {"cpu": "Some CPU", "cores": 2, "commit": "0123456789ab"}
@@ -56,6 +56,14 @@ def test_text_outside_the_markers_stays_as_it_is(tmp_path: Path) -> None:
 def test_tables_equal_what_the_results_give(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     assert render(text, ROOT / "docs" / "results") == text
+
+
+@pytest.mark.parametrize("page", pages(), ids=lambda page: page.name)
+def test_every_table_has_its_result(page: Path) -> None:
+    names = {match[2] for match in BLOCK.finditer(page.read_text(encoding="utf-8"))}
+    assert {
+        name for name in names if not (ROOT / f"docs/results/{name}.json").exists()
+    } == set()
 
 
 def test_conditions_name_the_people_and_the_second_look() -> None:

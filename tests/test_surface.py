@@ -105,8 +105,8 @@ def test_readme_requests_are_ones_the_service_takes() -> None:
     job = TypeAdapter[Any](JobCreate).validate_python(bodies["/v1/jobs"])
     assert (job.kind, job.preset) == ("train", "pick-td3")
     state = TaskSelectionRequest.model_validate(bodies["/v1/task-selection"])
-    _, _, people, candidates = state.to_domain(load_cell(state.cell))
-    assert len(people) == 1
+    _, _, candidates = state.to_domain(load_cell(state.cell))
+    assert len(state.people) == 1
     assert [one.id for one in candidates] == ["left", "right"]
 
 
