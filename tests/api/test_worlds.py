@@ -86,8 +86,13 @@ def test_case_study_is_started(client: TestClient) -> None:
 def test_second_person_works_and_the_state_repeats_the_choice(client: TestClient) -> None:
     client.post(COMMANDS, json={"tag": "add-person"})
     client.post(COMMANDS, json={"tag": "set-body", "person": 1, "stature": 95, "arms": 20})
+
+    def there(now: dict[str, Any]) -> bool:
+        tall = len(now["people"]) == 2 and now["people"][1]["body"]["stature"] == 95
+        return tall and now["status"] == "moving"
+
     try:
-        world = until(client, lambda now: len(now["people"]) == 2 and now["status"] == "moving")
+        world = until(client, there)
         assert [one["id"] for one in world["people"]] == [0, 1]
         assert sum(one["nearest"] for one in world["people"]) == 1
         body = world["people"][1]["body"]
