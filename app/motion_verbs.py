@@ -101,17 +101,17 @@ def keep_motion(path: Path, settings: Settings, name: str | None) -> Printed:
 
 
 def runs_of(paths: Sequence[Path]) -> tuple[Motion, ...]:
-    """Return the clean runs of files; those of one name are told apart by their folder's.
+    """Return the clean runs of files; where two have one name, all are named by folder too.
 
     Raises:
         BadMotion: Some are no sound motion; carries every fault of every file, with its path.
         InvalidInput: One cannot be read.
     """
-    stems = [path.stem for path in paths]
+    alike = len({path.stem for path in paths}) < len(paths)
     runs: list[Motion] = []
     faults: list[Fault] = []
     for path in paths:
-        name = path.stem if stems.count(path.stem) == 1 else f"{path.parent.name}-{path.stem}"
+        name = f"{path.parent.name}-{path.stem}" if alike else path.stem
         try:
             found = read_motion(_content(path), path.name)
         except BadMotion as error:
