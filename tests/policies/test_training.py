@@ -76,7 +76,7 @@ def test_a_policy_checkpoint_does_not_resume(tiny_preset, tiny_run):
 @pytest.fixture(scope="module")
 def body_policy():
     """A policy that is told the size of the person, hardly trained."""
-    preset = presets.resolve("pick-td3", {**TINY, "total_steps": 512, "observation": "body"})
+    preset = presets.resolve("pick-td3", {**TINY, "total_steps": 1024, "observation": "body"})
     return Recorder().run(preset).checkpoint
 
 
