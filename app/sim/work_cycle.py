@@ -4,8 +4,11 @@ A *library* holds many postures per place and hand, with random stance, elbow an
 goes through them with random pace and pauses (``kernels/script.py``). The other hand supports
 itself at the table's edge while the trunk leans.
 
+These were the first people; now they are a variant (``WorkSettings(motion="reaches")``), and
+:func:`reach_script` makes the case studies' single reaches.
+
 Source: METHOD 3.2 and 3.4. Deviates: the thesis replays motion capture through movement
-primitives; these reaches are synthetic and stand in for it.
+primitives; these reaches are synthetic (``task_library.py`` has the primitives).
 """
 
 import math
@@ -18,7 +21,7 @@ from app.sim import human
 from app.sim.body_size import BodySize
 from app.sim.cells import Cell
 from app.sim.human import Hand
-from app.sim.kernels import random, script
+from app.sim.kernels import script
 from app.sim.ports import Vec
 
 HANDS: tuple[Hand, Hand] = ("r", "l")
@@ -140,59 +143,6 @@ class Script:
         n_moves = len(self._start)
         script.script_at(t, n_moves, self._start, self._duration, self._postures, q, qd)
         return q, qd
-
-    @property
-    def end_s(self) -> float:
-        """Time at which the last move ends [s]."""
-        return float(self._start[-1] + self._duration[-1])
-
-
-class WorkCycle:
-    """A person who works on and on; scripts follow one another without a jump.
-
-    Args:
-        cell: Work cell.
-        seed: Seed of library and scripts.
-    """
-
-    def __init__(self, cell: Cell, seed: int) -> None:
-        self._library = build_library(cell, seed)
-        self._seed = seed
-        self._block = 0
-        self._begin = 0.0
-        self._script, self._last = self._draw(-1)
-
-    def _draw(self, first: int) -> tuple[Script, int]:
-        state = np.zeros(1, dtype=np.uint64)
-        random.start_stream(self._seed, 0, self._block, state)
-        start, duration = np.zeros(script.MAX_MOVES), np.ones(script.MAX_MOVES)
-        chosen = np.zeros(script.MAX_MOVES + 1, dtype=np.int64)
-        library = self._library
-        n = script.draw_script(
-            state,
-            library.of_station[0],
-            library.n_stations,
-            library.n_cubes,
-            library.hands,
-            first,
-            start,
-            duration,
-            chosen,
-        )
-        postures = library.postures[chosen[: n + 1]]
-        return Script(start[:n], duration[:n], postures), int(chosen[n])
-
-    def at(self, t: float) -> tuple[Vec, Vec]:
-        """Return joint positions [m, rad] and speeds [m/s, rad/s], (18,) each.
-
-        Args:
-            t: Time [s]; must not go back beyond the script it is in.
-        """
-        while t - self._begin > self._script.end_s:
-            self._begin += self._script.end_s
-            self._block += 1
-            self._script, self._last = self._draw(self._last)
-        return self._script.at(t - self._begin)
 
 
 def reach_script(

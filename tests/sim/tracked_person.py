@@ -7,7 +7,7 @@ import numpy as np
 
 from app.sim.cells import Cell, load_cell
 from app.sim.keypoints import keypoints_of
-from app.sim.work_cycle import WorkCycle
+from tests.sim.reaching_person import ReachingPerson
 
 CELL = load_cell()
 RATE_HZ = 30.0
@@ -27,7 +27,7 @@ def work(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Times [s], joint positions and speeds of the work cycle at 30 Hz."""
     cell = CELL if percentile == 50.0 else cell_of(percentile)
-    cycle, times = WorkCycle(cell, seed), np.arange(round(seconds * RATE_HZ) + 1) / RATE_HZ
+    cycle, times = ReachingPerson(cell, seed), np.arange(round(seconds * RATE_HZ) + 1) / RATE_HZ
     q, qd = zip(*(cycle.at(t) for t in times), strict=True)
     return times, np.array(q), np.array(qd)
 

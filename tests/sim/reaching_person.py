@@ -1,0 +1,57 @@
+"""A person of the first, synthetic reaches at any time: what tests of trackers look at."""
+
+import numpy as np
+
+from app.sim.cells import Cell
+from app.sim.kernels import random, script
+from app.sim.ports import Vec
+from app.sim.work_cycle import Script, build_library
+
+
+class ReachingPerson:
+    """A person who works on and on; scripts follow one another without a jump.
+
+    Args:
+        cell: Work cell.
+        seed: Seed of library and scripts.
+    """
+
+    def __init__(self, cell: Cell, seed: int) -> None:
+        self._library = build_library(cell, seed)
+        self._seed = seed
+        self._block = 0
+        self._begin = 0.0
+        self._script, self._last = self._draw(-1)
+
+    def _draw(self, first: int) -> tuple[Script, int]:
+        state = np.zeros(1, dtype=np.uint64)
+        random.start_stream(self._seed, 0, self._block, state)
+        start, duration = np.zeros(script.MAX_MOVES), np.ones(script.MAX_MOVES)
+        chosen = np.zeros(script.MAX_MOVES + 1, dtype=np.int64)
+        library = self._library
+        n = script.draw_script(
+            state,
+            library.of_station[0],
+            library.n_stations,
+            library.n_cubes,
+            library.hands,
+            first,
+            start,
+            duration,
+            chosen,
+        )
+        postures = library.postures[chosen[: n + 1]]
+        self._end = float(start[n - 1] + duration[n - 1])
+        return Script(start[:n], duration[:n], postures), int(chosen[n])
+
+    def at(self, t: float) -> tuple[Vec, Vec]:
+        """Return joint positions [m, rad] and speeds [m/s, rad/s], (18,) each.
+
+        Args:
+            t: Time [s]; must not go back beyond the script it is in.
+        """
+        while t - self._begin > self._end:
+            self._begin += self._end
+            self._block += 1
+            self._script, self._last = self._draw(self._last)
+        return self._script.at(t - self._begin)
