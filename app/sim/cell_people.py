@@ -40,12 +40,12 @@ class Worker(_Walking):
     pelvis_height: Annotated[float, Within(0.4, 1.4, "m")] = Field(
         description="pelvis above the floor, of a person of median stature [m]"
     )
-    stature: Percentile = Field(default=50.0, description="stature, percentile of adults")
+    stature: Percentile = Field(default=50.0, description="stature among adults [percentile]")
     arms: Percentile = Field(
-        default=50.0, description="length of the arms at that stature, percentile"
+        default=50.0, description="length of the arms at that stature [percentile]"
     )
     shoulders: Percentile = Field(
-        default=50.0, description="width of the shoulders at that stature, percentile"
+        default=50.0, description="width of the shoulders at that stature [percentile]"
     )
 
     @property

@@ -138,7 +138,15 @@ def test_the_size_of_the_person_counts(chooser):
 
 def test_nobody_in_the_cell_is_answered(chooser):
     decision = chooser.decide(HOME, np.zeros(6), [], cubes("cube0"))
-    assert decision.outside
+    assert (decision.seen, decision.outside) == (None, ())  # It was trained beside nobody too.
+
+
+def test_a_policy_that_never_met_nobody_says_so():
+    checkpoint = pretrained.load("pick")
+    preset = {**checkpoint.manifest["preset"], "human_absent": 0.0}
+    always_beside = replace(checkpoint, manifest={**checkpoint.manifest, "preset": preset})
+    decision = TaskChooser(always_beside).decide(HOME, np.zeros(6), [], cubes("cube0"))
+    assert {one.field for one in decision.outside} >= {"people[0].q.pelvis_y"}
 
 
 def test_the_arm_inside_the_person_is_answered(chooser):

@@ -1,15 +1,16 @@
 import numpy as np
 
-from app.sim.body_size import BodySize
+from app.sim.body_size import BodySize, percentile_body
 from app.sim.body_track import TRACK_NAMES, measure, model_points, trunk_frame
 from app.sim.human import Q_MAX, Q_MIN, joint_points
 
 
 def test_points_are_those_of_the_compiled_person() -> None:
     q = np.random.default_rng(1).uniform(Q_MIN, Q_MAX, (20, 18))
-    found = model_points(q, np.full(20, 0.3), BodySize())
+    size = percentile_body(80.0, 20.0, 60.0, pelvis=0.3)
+    found = model_points(q, np.full(20, size.pelvis), size)
     for points, one in zip(found, q, strict=True):
-        expected = joint_points(one, 0.3)
+        expected = joint_points(one, size.vector(0.0))
         np.testing.assert_allclose(points, [expected[name] for name in TRACK_NAMES], atol=1e-9)
 
 

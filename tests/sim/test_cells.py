@@ -9,6 +9,7 @@ from app.sim.cell_parts import Each, Obstacle, Within
 from app.sim.cell_reach import Reach
 from app.sim.cells import Cell, cell_names, lacks_for_pick, load_cell, parse_definition
 from app.sim.collision import CollisionReference
+from app.sim.kernels.body import PELVIS_Z
 
 SORTING = {"sorting-e0": (10, 2, 10), "sorting-e1": (20, 3, 20)}
 
@@ -48,7 +49,7 @@ def test_cell_of_the_source_stays_what_policies_were_trained_in() -> None:
     assert cell.station("cube3").position == (0.10, 0.70, 0.12)
     assert cell.robot.home_q == (0.9927, -2.3261, 2.0802, -1.3249, -1.5708, 0.0)
     assert (cell.robot.dt, cell.robot.qd_max[0], cell.robot.qdd_max[0]) == (0.05, 0.5, 3.0)
-    assert (cell.floor_z, cell.pelvis_z) == (-0.75, pytest.approx(0.2))
+    assert (cell.floor_z, cell.body[PELVIS_Z]) == (-0.75, pytest.approx(0.2))
     assert cell.human.home == (0.0, 1.45, -1.5708)
     assert cell.pick_stations == cell.stations
 

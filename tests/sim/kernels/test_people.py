@@ -32,8 +32,10 @@ def person_clearances(batch: PickBatch, e: int) -> list[float]:
     """Clearance of each person alone, workers first."""
     people, q = batch.state.people, batch.state.q[e]
     alone = [
-        clearance(batch.arm, batch.world.people, q, row[None], np.zeros((0, 3))).people_m
-        for row in people.q[e]
+        clearance(
+            batch.arm, batch.world.people, q, row[None], np.zeros((0, 3)), size[None]
+        ).people_m
+        for row, size in zip(people.q[e], people.size[e], strict=True)
     ]
     return alone + [
         clearance(batch.arm, batch.world.people, q, np.zeros((0, 18)), row[None]).people_m
