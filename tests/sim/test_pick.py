@@ -135,7 +135,14 @@ def test_single_state_functions_do_what_the_batch_does(cell: Cell) -> None:
             np.testing.assert_array_equal(piece.q, state.q[e])
             np.testing.assert_array_equal(piece.qd, state.qd[e])
             hit = contact(
-                batch.arm, people, q[e], qd[e], piece.c, piece.d, (person[e], state.people.q[e])
+                batch.arm,
+                people,
+                q[e],
+                qd[e],
+                piece.c,
+                piece.d,
+                (person[e], state.people.q[e]),
+                sizes=state.people.size[e],
             )
             assert hit.kind == "none" and hit.clearance_m == state.clear[e, 0]
             seen, _ = pick.observe(
