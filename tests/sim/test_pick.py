@@ -118,7 +118,9 @@ def test_meshes_find_no_contact_that_the_kernels_missed(cell: Cell) -> None:
             person.append(human0 + (human1 - human0) * x)
         q_robot = np.concatenate([*q, state.q[e : e + 1]])
         q_human = np.concatenate([*person, state.people.q[e]])
-        hit = recheck.first_contact(Trajectory(q_robot=q_robot, q_human=q_human, dt=0.01))
+        sizes = np.repeat(state.people.size[e], len(q_human), axis=0)
+        path = Trajectory(q_robot=q_robot, q_human=q_human, dt=0.01, sizes=sizes)
+        hit = recheck.first_contact(path)
         assert hit is None or OUTCOMES[state.outcome[e]] == "collision"
     assert {OUTCOMES[outcome] for outcome in state.outcome} >= {"success", "collision"}
 
@@ -148,6 +150,7 @@ def test_single_state_functions_do_what_the_batch_does(cell: Cell) -> None:
             seen, _ = pick.observe(
                 batch.arm, people, piece.q, piece.qd, state.people.q[e, 0],
                 state.people.qd[e, 0], state.goal[e : e + 1], state.time_left[e],
+                state.people.size[e, 0],
             )  # fmt: skip
             np.testing.assert_array_equal(seen[0], result.obs[e])
 
