@@ -48,14 +48,12 @@ def give_way(
         lean: Lean forward and to the left [rad] and the rates of both [rad/s], shape (4,);
             carried from period to period.
         strength: Courtesy times closeness, from 0 to 1.
-        robot: The robot's capsules, shape (9, n); the tool is the last one that is there.
+        robot: The robot's capsules, shape (9, n); the last one is the tool.
         q_min: Lower joint limits [m, rad], shape (18,).
         q_max: Upper joint limits [m, rad], shape (18,).
         dt: Period [s].
     """
     tool = robot.shape[1] - 1
-    while tool > 0 and robot[X, tool] > 1e3:
-        tool -= 1
     x, y = q[0] - robot[X, tool], q[1] - robot[Y, tool]
     length = math.sqrt(x * x + y * y)
     c, s = math.cos(q[YAW]), math.sin(q[YAW])

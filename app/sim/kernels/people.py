@@ -386,13 +386,11 @@ def advance_people(
         away: Work space, shape (36,).
     """
     for w in range(state.q.shape[1]):
-        rate = people.pace
-        if people.courtesy > 0.0:
-            rate *= 1.0 - people.courtesy * closeness(state.near[e, w])
+        strength = people.courtesy * closeness(state.near[e, w])
+        rate = people.pace * (1.0 - strength)
         state.clock[e, w] += rate * dt
         worker_at(people, state, e, w, state.clock[e, w], rate, away)
         if people.courtesy > 0.0:
-            strength = people.courtesy * closeness(state.near[e, w])
             give_way(
                 state.q[e, w], state.qd[e, w], state.lean[e, w], strength, robot,
                 people.limits[0], people.limits[1], dt,
