@@ -1,9 +1,9 @@
 """The state of the sorting task as integers, and its moves (METHOD 1.1 and 1.2).
 
-An object is a *code*: 0 is the null object that fills every free place, ``1 + colour * n_sizes
-+ size`` an object, sizes from the smallest. Objects of one code are twins: goals ask for a code,
-never for one certain object. There are ``K`` clutter cells and one tower per colour, with ``K``
-levels each; towers have no gaps. Any object may stand on any tower.
+An object is a *code*: 0 is the null object that fills every free place, others are ``1 +
+colour * n_sizes + size``, sizes from the smallest. Objects of one code are twins: goals ask for
+a code, never for one certain object. There are ``K`` clutter cells and one tower per colour,
+with ``K`` levels each; towers have no gaps. Any object may stand on any tower.
 
 A position is a number: ``k`` a clutter cell, ``K + c`` the top of tower ``c``. Moves are
 numbered without gaps, so that a network's outputs are the moves:
@@ -12,7 +12,7 @@ numbered without gaps, so that a network's outputs are the moves:
 |---|---|
 | ``k * C + c`` | clutter cell ``k`` to tower ``c`` |
 | ``K * C + c * K + k`` | top of tower ``c`` to clutter cell ``k`` |
-| ``2 * K * C + c * C + d`` | top of tower ``c`` to tower ``d``; ``c == d`` is the *stuck* move |
+| ``2 * K * C + c * C + d`` | top of tower ``c`` to ``d``; ``c == d`` is the *stuck* move |
 
 Source: thesis eq. (3.7)-(3.17). Deviates: tower to tower is a move (METHOD 1.2), and colours
 never count the null colour (METHOD 1.1).
