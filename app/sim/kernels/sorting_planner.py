@@ -235,9 +235,10 @@ def _look_ahead(task: Task, work: PlannerWork) -> int:
     p, now = work.progress, work.now
     chosen = _choose(now, task, p)
     n_cells, n_towers = len(now.clutter), len(now.heights)
-    if chosen < n_cells * n_towers:
+    moves = n_cells * n_towers
+    if not moves <= chosen < 2 * moves:
         return chosen
-    best = _try(chosen, np.inf, task, work)
+    best = np.inf
     index = state_number(p)
     left = p.table[index] - 1
     for c in range(n_towers):
@@ -245,7 +246,20 @@ def _look_ahead(task: Task, work: PlannerWork) -> int:
         removed = index + (p.below[c, p.at[c]] - p.at[c]) * p.stride[c]
         if top == 0 or p.table[removed] != left:
             continue
-        for n in range(CELLS_TRIED + 1):
+        waits = False
+        for d in range(n_towers):
+            if waits or d == c or p.want[d, p.at[d]] == top:
+                continue
+            if ties_on_tower(removed, d, top, p):
+                waits = True
+                action = 2 * n_cells * n_towers + c * n_towers + d
+                attempts = _try(action, best, task, work)
+                if attempts < best - 1e-9:
+                    chosen, best = action, attempts
+        if waits:
+            continue
+        lowest = 0 if still_wanted(top, task.goal, task.goal_heights, p) > 0 else CELLS_TRIED
+        for n in range(lowest, CELLS_TRIED + 1):
             k = _nth_free(n, now.clutter, task.fail)
             if k < 0:
                 continue
@@ -253,12 +267,6 @@ def _look_ahead(task: Task, work: PlannerWork) -> int:
             attempts = _try(action, best, task, work)
             if attempts < best - 1e-9:
                 chosen, best = action, attempts
-        for d in range(n_towers):
-            if d != c and p.want[d, p.at[d]] != top and ties_on_tower(removed, d, top, p):
-                action = 2 * n_cells * n_towers + c * n_towers + d
-                attempts = _try(action, best, task, work)
-                if attempts < best - 1e-9:
-                    chosen, best = action, attempts
     return chosen
 
 
