@@ -23,7 +23,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from app.policies.replay import PrioritisedReplay, ReplaySamples
-from app.policies.sorting_networks import PrintedNetwork, SharedNetwork
+from app.policies.sorting_networks import NETWORKS, PrintedNetwork, SharedNetwork
 from app.policies.sorting_preset import SortingPreset
 from app.policies.sorting_vecenv import SortingVecEnv
 from app.sim.sorting import SortingBatch
@@ -35,9 +35,7 @@ Demonstrator = Callable[[NDArray[np.bool_]], NDArray[np.int64]]
 
 def network_of(preset: SortingPreset, shape: SortingShape) -> SharedNetwork | PrintedNetwork:
     """Return a new network as a preset describes it."""
-    if preset.network == "shared":
-        return SharedNetwork(shape, preset.width)
-    return PrintedNetwork(shape, preset.width)
+    return NETWORKS[preset.network](shape, preset.width)
 
 
 class _SB3QNetwork(QNetwork):

@@ -14,6 +14,9 @@ puts all others out of the question, in exploration, targets and prediction alik
 Source: METHOD 1.4; Wang et al., *Dueling network architectures* (2016).
 """
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
@@ -213,3 +216,9 @@ def _histogram(codes: Tensor, n: int) -> Tensor:
     counts = codes.new_zeros((*codes.shape[:2], n), dtype=torch.float32)
     counts.scatter_add_(2, codes, (codes > 0).float())
     return counts / 2.0
+
+
+NETWORKS: Mapping[str, type[SharedNetwork] | type[PrintedNetwork]] = MappingProxyType(
+    {"shared": SharedNetwork, "printed": PrintedNetwork}
+)
+"""Networks by the name that presets give them."""
