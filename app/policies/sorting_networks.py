@@ -195,8 +195,8 @@ class PrintedNetwork(nn.Module):
         places = torch.cat([clutter, towers.flatten(1), goal.flatten(1)], dim=1)
         hidden = self.body(torch.cat([self.one_hot[places].flatten(1), fail], dim=1))
         advantage = self.advantage(hidden)
-        value: Tensor = self.value(hidden)
-        return value + advantage - advantage.mean(dim=1, keepdim=True)
+        values: Tensor = self.value(hidden) + advantage - advantage.mean(dim=1, keepdim=True)
+        return values
 
 
 def _relative_codes(shape: SortingShape) -> Tensor:
