@@ -29,8 +29,8 @@ from app.policies.sorting_vecenv import SortingVecEnv
 from app.sim.sorting import SortingBatch
 from app.sim.sorting_state import SortingShape
 
-Demonstrator = Callable[[NDArray[np.bool_]], NDArray[np.int64]]
-"""Given the rows that are asked for, shape (n_envs,), returns its actions, shape (n_envs,)."""
+Demonstrator = Callable[[], NDArray[np.int64]]
+"""Returns what it would do in every row as it is now, shape (n_envs,)."""
 
 
 def network_of(preset: SortingPreset, shape: SortingShape) -> SharedNetwork | PrintedNetwork:
@@ -156,7 +156,7 @@ class SortingDQN(DQN):
             actions = np.where(at_random, actions, values.argmax(dim=1).numpy())
         shown = self._shown & ~at_random
         if self._demonstrator is not None and shown.any():
-            actions = np.where(shown, self._demonstrator(shown), actions)
+            actions = np.where(shown, self._demonstrator(), actions)
         self.memory.shown[:] = shown
         return actions, actions
 
