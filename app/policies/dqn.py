@@ -23,24 +23,19 @@ from torch import Tensor
 from torch.nn import functional
 
 from app.policies.replay import PrioritisedReplay, ReplaySamples
-from app.policies.sorting_networks import PrintedNetwork, SharedNetwork
+from app.policies.sorting_networks import NETWORKS, PrintedNetwork, SharedNetwork
 from app.policies.sorting_preset import SortingPreset
 from app.policies.sorting_vecenv import SortingVecEnv
 from app.sim.sorting import SortingBatch
 from app.sim.sorting_state import SortingShape
 
-NEVER = -1e9
-"""Value of a move that is not valid."""
-
-Demonstrator = Callable[[NDArray[np.bool_]], NDArray[np.int64]]
-"""Given the rows that are asked for, shape (n_envs,), returns its actions, shape (n_envs,)."""
+Demonstrator = Callable[[], NDArray[np.int64]]
+"""Returns what it would do in every row as it is now, shape (n_envs,)."""
 
 
 def network_of(preset: SortingPreset, shape: SortingShape) -> SharedNetwork | PrintedNetwork:
     """Return a new network as a preset describes it."""
-    if preset.network == "shared":
-        return SharedNetwork(shape, preset.width)
-    return PrintedNetwork(shape, preset.width)
+    return NETWORKS[preset.network](shape, preset.width)
 
 
 class _SB3QNetwork(QNetwork):
@@ -51,13 +46,11 @@ class _SB3QNetwork(QNetwork):
     ) -> None:
         super().__init__(*args, **{**kwargs, "net_arch": [1]})
         self.q_net = network_of(preset, shape)  # type: ignore[assignment]
-        self._masked = preset.mask == "valid"
 
     def forward(self, obs: PyTorchObs) -> Tensor:
-        """Return the values of all moves, of invalid ones ``NEVER``, (B, n_actions)."""
-        values: Tensor
-        values, valid = self.q_net(obs)
-        return values.masked_fill(~valid, NEVER) if self._masked else values
+        """Return the values of all moves, (B, n_actions)."""
+        values: Tensor = self.q_net(obs)
+        return values
 
 
 class SortingDQNPolicy(DQNPolicy):
@@ -119,7 +112,11 @@ class SortingDQN(DQN):
             exploration_final_eps=preset.eps_end,
             exploration_fraction=preset.eps_share,
             max_grad_norm=preset.max_grad_norm,
-            policy_kwargs={"preset": preset, "shape": env.batch.shape},
+            policy_kwargs={
+                "preset": preset,
+                "shape": env.batch.shape,
+                "optimizer_kwargs": {"fused": True},
+            },
             seed=seed,
             device="cpu",
         )
@@ -146,7 +143,7 @@ class SortingDQN(DQN):
         n_envs: int = 1,
     ) -> tuple[NDArray[Any], NDArray[Any]]:
         """Act greedily, at random among the moves, or as the demonstrator, row by row."""
-        masked = self.preset.mask == "valid"
+        masked = self.preset.network == "shared"
         moves = self._tasks.action_masks()
         chance = 1.0 if self.num_timesteps < learning_starts else self.exploration_rate
         at_random = self._random.random(n_envs) < chance
@@ -159,7 +156,7 @@ class SortingDQN(DQN):
             actions = np.where(at_random, actions, values.argmax(dim=1).numpy())
         shown = self._shown & ~at_random
         if self._demonstrator is not None and shown.any():
-            actions = np.where(shown, self._demonstrator(shown), actions)
+            actions = np.where(shown, self._demonstrator(), actions)
         self.memory.shown[:] = shown
         return actions, actions
 

@@ -8,7 +8,6 @@ from app.sim.kernels.sorting_reward import SortingWeights
 from app.sim.sorting import SortingSettings
 
 NETWORKS = ("shared", "printed")
-MASKS = ("valid", "none")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,10 +48,11 @@ class SortingPreset:
     max_grad_norm: float = number(10.0, 0.01, 1000.0, "", "greatest norm of a gradient")
 
     network: str = choice(
-        "shared", NETWORKS, "weights shared over towers, or the source's two plain layers"
+        "shared",
+        NETWORKS,
+        "weights shared over towers, valid moves only; or the source's two plain layers",
     )
     width: int = number(128, 16, 1024, "units", "width of the hidden layers")
-    mask: str = choice("valid", MASKS, "moves that are explored, valued and taken")
     eps_start: float = number(1.0, 0.0, 1.0, "", "share of random moves at the start")
     eps_end: float = number(0.02, 0.0, 1.0, "", "share of random moves in the end")
     eps_share: float = number(
@@ -172,7 +172,6 @@ def _printed(name: str, cell: str, total_steps: int) -> SortingPreset:
         target_every=500,
         network="printed",
         width=128,
-        mask="none",
         eps_start=1.0,
         eps_end=0.05,
         eps_share=1.0,

@@ -13,13 +13,14 @@ import torch
 from numpy.typing import NDArray
 
 from app.policies.checkpoint import Checkpoint
-from app.policies.dqn import SortingDQN
+from app.policies.dqn import Demonstrator, SortingDQN
 from app.policies.progress import Progress
 from app.policies.reporter import Reporter
 from app.policies.run import Parts, TrainingRun
 from app.policies.sorting_preset import SortingPreset
 from app.policies.sorting_vecenv import SortingVecEnv
 from app.sim.cells import Cell
+from app.sim.kernels.sorting_planner import new_work, plan_rows
 from app.sim.sorting import OUTCOMES, SortingBatch, SortingSettings, batch_in
 from app.sim.sorting_state import SortingShape
 
@@ -55,7 +56,8 @@ def start(
     batch = batch_in(cell, preset.n_envs, seed + first, preset.settings(0.0))
     env = SortingVecEnv(batch)
 
-    model = SortingDQN(preset, env, seed + first)
+    demonstrator = demonstrator_of(batch) if preset.demo_share else None
+    model = SortingDQN(preset, env, seed + first, demonstrator)
     parts = Parts(
         policy={"q": model.q_net.q_net},
         targets={"q_target": model.q_net_target.q_net},
@@ -65,6 +67,22 @@ def start(
         trained_range=dict,
     )
     return TrainingRun(preset, seed, cell, model, env, parts, resume), model
+
+
+def demonstrator_of(batch: SortingBatch) -> Demonstrator:
+    """Return what shows the moves of the exact planner in the rows of a batch."""
+    rows, shape = batch.rows, batch.shape
+    work = new_work(shape.n_cells, shape.n_colours, shape.n_sizes)
+    best, fewest = np.zeros((2, batch.n_envs), dtype=np.int64)
+
+    def demonstrate() -> NDArray[np.int64]:
+        plan_rows(
+            rows.clutter, rows.towers, rows.heights, rows.goal, rows.goal_heights,
+            rows.fail, work, best, fewest,
+        )  # fmt: skip
+        return best
+
+    return demonstrate
 
 
 class SortingReporter(Reporter):
