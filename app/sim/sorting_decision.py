@@ -10,15 +10,27 @@ import time
 
 import numpy as np
 
-from app.sim.ports import SortingValues
+from app.sim.kernels.sorting_planner import new_work
+from app.sim.kernels.sorting_progress import most_states
+from app.sim.kernels.sorting_ranking import attempts_by_move
+from app.sim.ports import SortingValues, Vec
 from app.sim.sorting import apply, observe, valid_moves
 from app.sim.sorting_planner import Plan, solve
 from app.sim.sorting_ports import OutsideGoal, RankedMove, SortingDecision, Why
-from app.sim.sorting_state import NULL, Codes, Move, SortingShape, SortingState
+from app.sim.sorting_state import (
+    NULL,
+    Codes,
+    Move,
+    SortingShape,
+    SortingState,
+    empty_state,
+)
 from app.sim.sorting_watch import SortingWatch, look, note_move, state_key
 
 MAX_PLANNED = 400_000
-"""Most steps of the dynamic programme that ranking by the planner may take."""
+"""Most states that the planner may look at to value every move: some milliseconds."""
+MAX_AT_ONCE = 4_000
+"""Most states of a task for which a decision takes a moment: ``sorting-e1`` has fewer."""
 
 
 def decide(
@@ -117,35 +129,64 @@ def rank_by_planner(
     the fewest moves come before the others.
     """
     valid = valid_actions(state, shape)
-    fewest = frozenset(plan.first)
-    if len(valid) * plan_size(state) > MAX_PLANNED:
+    attempts = attempts_by_action(state, shape, valid)
+    if attempts is None:
+        fewest = frozenset(plan.first)
         order = sorted(valid, key=lambda one: (one != plan.best, one not in fewest, one))
         return _ranked(order, {}, shape, plan)
-    values: dict[int, float] = {}
-    for action in valid:
-        move = shape.move_of(action)
-        after = solve(apply(state, shape, move), shape).attempts
-        values[action] = -(1.0 / (1.0 - failure_of(state, move)) + after)
+    values = {one: -float(value) for one, value in zip(valid, attempts, strict=True)}
     order = sorted(valid, key=lambda one: (one != plan.best, -values[one], one))
     return _ranked(order, values, shape, plan)
 
 
-def plan_size(state: SortingState) -> int:
-    """Return how many states the exact planner's dynamic programme has here.
+def attempts_by_action(
+    state: SortingState, shape: SortingShape, actions: list[int]
+) -> Vec | None:
+    """Return the attempts that the planner expects to the goal, by the move that comes first.
 
-    Per tower: the objects to remove above what is right already, then those to build.
+    Args:
+        state: A state that ``check_state`` accepts.
+        shape: Its shape.
+        actions: Valid moves by their numbers.
+
+    Returns:
+        Expected attempts, shape (n,); None where finding them would take too long.
     """
-    same = np.cumprod(state.towers == state.goal, axis=1).astype(bool) & (state.goal != NULL)
-    right = same.sum(axis=1)
-    remove = (state.towers != NULL).sum(axis=1) - right
-    build = (state.goal != NULL).sum(axis=1) - right
-    return int(np.prod(remove + build + 1, dtype=np.float64))
+    moves = [shape.move_of(action) for action in actions]
+    attempts = np.zeros(len(actions))
+    written = attempts_by_move(
+        state.clutter.copy(),
+        state.towers.copy(),
+        np.count_nonzero(state.towers, axis=1),
+        state.goal,
+        np.count_nonzero(state.goal, axis=1),
+        state.fail,
+        np.array([(move.pick, move.place) for move in moves], dtype=np.int64).reshape(-1, 2),
+        MAX_PLANNED,
+        new_work(shape.n_cells, shape.n_colours, shape.n_sizes),
+        np.zeros(shape.n_actions, dtype=np.bool_),
+        attempts,
+    )
+    return attempts if written else None
+
+
+def takes_time(shape: SortingShape) -> bool:
+    """Return whether a decision may take more than a moment."""
+    return most_states(shape.n_cells, shape.n_colours) > MAX_AT_ONCE
 
 
 def valid_actions(state: SortingState, shape: SortingShape) -> list[int]:
     """Return the moves that change something, by their numbers."""
     found: list[int] = np.flatnonzero(valid_moves(state, shape)).tolist()
     return found
+
+
+def warm_up() -> None:
+    """Compile what a decision needs, before the first one."""
+    shape = SortingShape(n_cells=2, n_colours=1)
+    state = empty_state(shape)
+    state.clutter[0] = state.goal[0, 0] = shape.code(0, 0)
+    decide(None, state, shape)
 
 
 def _trusted(

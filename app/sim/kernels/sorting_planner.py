@@ -304,7 +304,7 @@ def follow_plan(goal: Bytes, goal_heights: Ints, fail: Vec, work: PlannerWork) -
     return attempts
 
 
-@kernel()
+@kernel(nogil=True)
 def plan_state(
     clutter: Bytes,
     towers: Bytes,
