@@ -10,7 +10,7 @@ import time
 
 import numpy as np
 
-from app.sim.kernels.sorting_planner import new_work
+from app.sim.kernels.sorting_planner import Objects, Task, new_work
 from app.sim.kernels.sorting_progress import most_states
 from app.sim.kernels.sorting_ranking import attempts_by_move
 from app.sim.ports import SortingValues, Vec
@@ -154,17 +154,13 @@ def attempts_by_action(
     """
     moves = [shape.move_of(action) for action in actions]
     attempts = np.zeros(len(actions))
+    heights = np.count_nonzero(state.towers, axis=1)
     written = attempts_by_move(
-        state.clutter.copy(),
-        state.towers.copy(),
-        np.count_nonzero(state.towers, axis=1),
-        state.goal,
-        np.count_nonzero(state.goal, axis=1),
-        state.fail,
+        Objects(state.clutter.copy(), state.towers.copy(), heights),
+        Task(state.goal, np.count_nonzero(state.goal, axis=1), state.fail),
         np.array([(move.pick, move.place) for move in moves], dtype=np.int64).reshape(-1, 2),
         MAX_PLANNED,
         new_work(shape.n_cells, shape.n_colours, shape.n_sizes),
-        np.zeros(shape.n_actions, dtype=np.bool_),
         attempts,
     )
     return attempts if written else None
