@@ -84,13 +84,17 @@ class SortingPreset:
         4.0, 1.0, 100.0, "attempts per cell", "length at which episodes are cut off"
     )
 
-    demo_share: float = number(
-        0.0, 0.0, 0.9, "", "share of the tasks in which the exact planner acts"
+    advice_share: float = number(
+        0.0,
+        0.0,
+        1.0,
+        "",
+        "share of a minibatch in which the exact planner marks the best moves",
     )
-    demo_margin: float = number(
-        0.1, 0.0, 10.0, "", "by how much its moves shall be worth more than others (DQfD)"
+    advice_margin: float = number(
+        0.05, 0.0, 10.0, "", "by how much one of them shall be worth more than others (DQfD)"
     )
-    demo_weight: float = number(1.0, 0.0, 100.0, "", "weight of that in the loss")
+    advice_weight: float = number(1.0, 0.0, 100.0, "", "weight of that in the loss")
 
     c_move: float = number(0.05, 0.0, 10.0, "", "cost of an attempt")
     c_empty: float = number(0.3, 0.0, 10.0, "", "cost of picking where nothing is")
@@ -195,7 +199,7 @@ SORTING_PRESETS = (
         name="sorting-e1-dqn",
         cell="sorting-e1",
         total_steps=2_560_000,
-        demo_share=0.25,
+        advice_share=0.25,
     ),
     SortingPreset(name="sorting-e1-dqn-pure", cell="sorting-e1", total_steps=2_560_000),
     _printed("sorting-e0-thesis", "sorting-e0", 2_000_000),

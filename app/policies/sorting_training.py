@@ -13,16 +13,17 @@ import torch
 from numpy.typing import NDArray
 
 from app.policies.checkpoint import Checkpoint
-from app.policies.dqn import Demonstrator, SortingDQN
+from app.policies.dqn import Adviser, SortingDQN
 from app.policies.progress import Progress
 from app.policies.reporter import Reporter
 from app.policies.run import Parts, TrainingRun
 from app.policies.sorting_preset import SortingPreset
 from app.policies.sorting_vecenv import SortingVecEnv
 from app.sim.cells import Cell
-from app.sim.kernels.sorting_planner import new_work, plan_rows
+from app.sim.kernels.sorting import FAILURE_SCALE
+from app.sim.kernels.sorting_planner import mark_rows, new_work
 from app.sim.sorting import OUTCOMES, SortingBatch, SortingSettings, batch_in
-from app.sim.sorting_state import SortingShape
+from app.sim.sorting_state import NULL, SortingShape
 
 CURVE_SEED = 1_000_003
 """Seed of the episodes behind a point of the curve; no evaluation uses it."""
@@ -56,8 +57,8 @@ def start(
     batch = batch_in(cell, preset.n_envs, seed + first, preset.settings(0.0))
     env = SortingVecEnv(batch)
 
-    demonstrator = demonstrator_of(batch) if preset.demo_share else None
-    model = SortingDQN(preset, env, seed + first, demonstrator)
+    adviser = adviser_of(batch.shape) if preset.advice_share else None
+    model = SortingDQN(preset, env, seed + first, adviser)
     parts = Parts(
         policy={"q": model.q_net.q_net},
         targets={"q_target": model.q_net_target.q_net},
@@ -69,20 +70,23 @@ def start(
     return TrainingRun(preset, seed, cell, model, env, parts, resume), model
 
 
-def demonstrator_of(batch: SortingBatch) -> Demonstrator:
-    """Return what shows the moves of the exact planner in the rows of a batch."""
-    rows, shape = batch.rows, batch.shape
-    work = new_work(shape.n_cells, shape.n_colours, shape.n_sizes)
-    best, fewest = np.zeros((2, batch.n_envs), dtype=np.int64)
+def adviser_of(shape: SortingShape) -> Adviser:
+    """Return what marks the moves with which plans of the fewest moves begin."""
+    k, c = shape.n_cells, shape.n_colours
+    work = new_work(k, c, shape.n_sizes)
 
-    def demonstrate() -> NDArray[np.int64]:
-        plan_rows(
-            rows.clutter, rows.towers, rows.heights, rows.goal, rows.goal_heights,
-            rows.fail, work, best, fewest,
-        )  # fmt: skip
-        return best
+    def advise(obs: NDArray[np.uint8]) -> NDArray[np.bool_]:
+        n, codes = len(obs), obs.astype(np.int8)
+        clutter = np.ascontiguousarray(codes[:, :k])
+        towers = np.ascontiguousarray(codes[:, k : k + c * k].reshape(n, c, k))
+        goal = np.ascontiguousarray(codes[:, k + c * k : k + 2 * c * k].reshape(n, c, k))
+        heights, wanted = (towers != NULL).sum(axis=2), (goal != NULL).sum(axis=2)
+        first = np.zeros((n, shape.n_actions), dtype=np.bool_)
+        fail = obs[:, k + 2 * c * k :] / FAILURE_SCALE
+        mark_rows(clutter, towers, heights, goal, wanted, fail, work, first)
+        return first
 
-    return demonstrate
+    return advise
 
 
 class SortingReporter(Reporter):

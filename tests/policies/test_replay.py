@@ -102,12 +102,3 @@ def test_without_alpha_all_are_drawn_evenly():
     buffer.update(np.arange(16), np.arange(16) * 5.0)
     counts = np.bincount(buffer.draw(1600, 0.4).indices, minlength=16)
     assert (np.abs(counts - 100) <= 1).all()
-
-
-def test_demonstrations_are_marked():
-    buffer = memory()
-    buffer.shown[:] = [False, True]
-    for t in range(4):
-        add(buffer, t)
-    sample = buffer.draw(64, 0.4)
-    assert (sample.shown.numpy() == (sample.indices % N_ENVS == 1)).all()
