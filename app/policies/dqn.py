@@ -9,7 +9,7 @@ The double target is ``r + gamma^n Q_target(s', argmax_a Q_online(s', a))``.
 
 Source: van Hasselt, Guez, Silver, *Deep reinforcement learning with double Q-learning* (2016);
 Hester et al., *Deep Q-learning from demonstrations* (2018); METHOD 1.4 with its corrections.
-Deviates: demonstrations mark sets of moves, in the states the learner meets (as in Ross, Gordon,
+Deviates: advice marks sets of moves, in the states the learner meets (as in Ross, Gordon,
 Bagnell, *A reduction of imitation learning to no-regret online learning*, 2011).
 """
 
