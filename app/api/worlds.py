@@ -26,6 +26,7 @@ from app.api.schemas.worlds import (
 )
 from app.api.services import LiveWorld, Services, ServicesDep
 from app.errors import InvalidInput, NotReady
+from app.policies.checkpoint import CHOOSING, purpose_of
 from app.policies.trained_cell import is_for
 from app.sim.cases import cases_of
 from app.sim.cells import Cell, lacks_for_pick, require_cell
@@ -140,7 +141,8 @@ def _policy_for(cell: Cell, services: Services) -> TaskPolicy | None:
     if (default.cell, default.cell_sha256) == (cell.name, cell.sha256):
         return default
     for record in list_checkpoints(services.store, limit=MAX_LOOKED_AT).items:
-        if is_for(record.manifest, cell):
+        chooses = purpose_of(record.manifest) == CHOOSING
+        if chooses and is_for(record.manifest, cell):
             return services.policies.load(record.sha256)
     return None
 
