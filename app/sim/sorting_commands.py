@@ -14,7 +14,7 @@ from app.sim.ports import SortingValues
 from app.sim.sorting_cell import is_sorting
 from app.sim.sorting_state import SIZE_NAMES
 from app.sim.sorting_table import Block, SortingTable
-from app.sim.sorting_tests import TESTS, sorting_test
+from app.sim.sorting_tests import TESTS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -142,11 +142,6 @@ def check_sorting(command: SortingCommand, cell: Cell) -> None:
 def _require(field: str, word: str, words: tuple[str, ...], rule: str) -> None:
     if word not in words:
         raise InvalidInput(field, word, rule, words)
-
-
-def test_fits(command: StartTest, table: SortingTable) -> bool:
-    """Whether a table is large enough for a test."""
-    return sorting_test(command.id).fits(table.shape)
 
 
 def carry_out(command: object, table: SortingTable) -> Block | None:
