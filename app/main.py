@@ -145,9 +145,11 @@ class Service:
             logger.exception("the live cell could not start")
 
 
-def start_world(world_id: str, cell: Cell, policy: TaskPolicy | None) -> LiveCell:
+def start_world(
+    world_id: str, cell: Cell, policy: TaskPolicy | None, sorter: SortingValues | None = None
+) -> LiveCell:
     """Start a live cell with its viewer; whoever asked stops it."""
-    live = LiveCell(cell, policy, id=world_id)
+    live = LiveCell(cell, policy, id=world_id, sorter=sorter)
     live.start()
     return live
 

@@ -41,8 +41,8 @@ class LiveWorld(Protocol):
         """End world and viewer."""
 
 
-StartWorld = Callable[[str, Cell, TaskPolicy | None], LiveWorld]
-"""Starts a world of an id, in a cell, with a policy; the caller stops it."""
+StartWorld = Callable[[str, Cell, TaskPolicy | None, SortingValues | None], LiveWorld]
+"""Starts a world of an id, in a cell, with a policy and a sorter; the caller stops it."""
 
 
 @dataclass(slots=True)
