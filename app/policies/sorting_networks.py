@@ -26,6 +26,9 @@ from app.sim.sorting_state import SortingShape
 
 NEVER = -1e9
 """Value of a move that changes nothing."""
+BACK_SLOPE = 0.3
+"""By how much a free cell that fails always can be worth more or less than one that never does:
+an object put there costs more attempts to fetch, if it is fetched at all."""
 WINDOW = 4
 """Objects of a tower, on and over the seam of what is in place, that are seen one by one."""
 
@@ -158,7 +161,8 @@ class SharedNetwork(nn.Module):
         per_cell = kind.transpose(1, 2)
         risk = functional.softplus(slope).gather(2, per_cell) * fail[:, None]
         place = (gain.gather(2, per_cell) - risk).transpose(1, 2)
-        free = back[:, :, :1] + back[:, :, 1:] * fail[:, None]
+        preference = BACK_SLOPE * torch.tanh(back[:, :, 1:])
+        free = back[:, :, :1] + preference * fail[:, None]
         # Column j of a tower is the tower j colours further.
         order = torch.arange(n_towers, device=out.device)
         order = (order[None, :] - order[:, None]) % n_towers

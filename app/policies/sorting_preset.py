@@ -60,13 +60,16 @@ class SortingPreset:
     )
 
     solved_episodes: float = number(
-        0.5, 0.0, 1.0, "", "share of episodes that start partly solved at first, e_s"
+        0.3, 0.0, 1.0, "", "share of episodes that start partly solved at first, e_s"
     )
     solved_share: float = number(
         0.8, 0.0, 1.0, "", "share of their goal that is done at first, g_s"
     )
+    even_share: float = number(
+        0.5, 0.0, 1.0, "", "share of episodes whose sizes are drawn evenly, not triangular"
+    )
     disturbed_share: float = number(
-        0.4, 0.0, 1.0, "", "share of episodes with junk on towers and goals partly built"
+        0.6, 0.0, 1.0, "", "share of episodes with junk on towers and goals partly built"
     )
     human_rate: float = number(
         0.02, 0.0, 1.0, "per attempt", "how often a person adds, removes, moves or asks anew"
@@ -134,6 +137,7 @@ class SortingPreset:
             disturbed_share=self.disturbed_share,
             solved_episodes=left * self.solved_episodes,
             solved_share=left * self.solved_share,
+            even_share=self.even_share,
             human_rate=self.human_rate,
             localisation_rate=self.localisation_rate,
             random_map_share=self.random_map_share,
@@ -175,6 +179,8 @@ def _printed(name: str, cell: str, total_steps: int) -> SortingPreset:
         eps_start=1.0,
         eps_end=0.05,
         eps_share=1.0,
+        solved_episodes=0.5,
+        even_share=0.0,
         disturbed_share=0.0,
         human_rate=0.0,
         random_map_share=0.0,
