@@ -22,7 +22,6 @@ from typing import Any
 
 import numpy as np
 
-from app.errors import InvalidInput
 from app.policies.evaluation.rows import OnRow, untold
 from app.policies.evaluation.sorting_episodes import (
     HORIZON_FACTOR,
@@ -41,8 +40,6 @@ from app.sim.ports import Vec
 from app.sim.sorting import SortingBatch, SortingSettings
 from app.sim.sorting_state import SortingShape
 
-MAX_PER_PAIR = 10_000
-"""Most episodes of a pair."""
 STARTS: Mapping[str, float] = {"clean": 0.0, "disturbed": 1.0}
 """Share of disturbed starts by the kind of row."""
 WHO = ("", "-handover", "-planner")
@@ -168,13 +165,8 @@ def grid(
             300 for more.
         seed: Seed of the episodes; use one that nothing was tuned on.
         on_row: Told of each row once it is known.
-
-    Raises:
-        InvalidInput: More episodes per pair than are run.
     """
     per_pair = episodes or episodes_for(shape)
-    if per_pair > MAX_PER_PAIR:
-        raise InvalidInput("episodes", per_pair, f"must be at most {MAX_PER_PAIR} per pair")
     pairs, least, choose = pairs_of(shape), least_success(shape), greedy(values)
     rows: list[dict[str, Any]] = []
     for start, disturbed in STARTS.items():

@@ -150,7 +150,11 @@ def _carry_out(action: int, objects: Objects, task: Task, work: PlannerWork) -> 
         code = objects.clutter[action // n_towers]
         objects.clutter[action // n_towers] = 0
     else:
-        c = (action - moves) // n_cells if action < 2 * moves else (action - 2 * moves) // n_towers
+        c = (
+            (action - moves) // n_cells
+            if action < 2 * moves
+            else (action - 2 * moves) // n_towers
+        )
         objects.heights[c] -= 1
         code = objects.towers[c, objects.heights[c]]
         objects.towers[c, objects.heights[c]] = 0
