@@ -91,7 +91,7 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument(
         "motions", nargs="*", type=Path, metavar="FILE", help="recorded motion (pick-mocap)"
     )
-    one.add_argument("--checkpoint", default="pick", help="alias, SHA-256 or .safetensors file")
+    one.add_argument("--checkpoint", help="alias, SHA-256 or .safetensors file")
     one.add_argument("--episodes", type=int, help="the protocol's own if not given")
     one.add_argument("--seed", type=int, default=11)
     one.add_argument("--json", action="store_true")
@@ -220,6 +220,7 @@ def run_evaluate(options: argparse.Namespace) -> int:
         PROTOCOLS,
         WITHOUT_CHECKPOINT,
         check_motions,
+        default_checkpoint,
         evaluate,
     )
 
@@ -236,7 +237,8 @@ def run_evaluate(options: argparse.Namespace) -> int:
             print(json.dumps(faulty(error)))
         return WRONG_CALL
     none = options.protocol in WITHOUT_CHECKPOINT
-    checkpoint = None if none else find_checkpoint(options.checkpoint, settings)
+    wanted = options.checkpoint or default_checkpoint(options.protocol)
+    checkpoint = None if none else find_checkpoint(wanted, settings)
     torch.set_num_threads(1)
     result = evaluate(
         options.protocol,
@@ -358,7 +360,9 @@ def parsed_sets(sets: Sequence[str]) -> dict[str, Any]:
 def table(result: Mapping[str, Any]) -> str:
     """Write a protocol's result for people."""
     rows: Sequence[Mapping[str, Any]] = result["results"]
-    columns = list(dict.fromkeys(key for row in rows for key in row))
+    columns = list(
+        dict.fromkeys(key for row in rows for key in row if not isinstance(row[key], list))
+    )
     lines = [columns, *([shown(row.get(key)) for key in columns] for row in rows)]
     widths = [max(len(line[k]) for line in lines) for k in range(len(columns))]
     texts = [

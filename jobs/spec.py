@@ -15,14 +15,16 @@ from typing import Any
 
 from app.errors import InvalidInput
 from app.policies import presets
-from app.policies.evaluation.protocols import MAX_EPISODES, PROTOCOLS, check_motions
+from app.policies.evaluation.protocols import (
+    PROTOCOLS,
+    check_motions,
+    default_checkpoint,
+    most_episodes,
+)
 from app.store.records import NewJob
 
 MAX_SEED = 2**31 - 1
 """Greatest seed; every random stream accepts it."""
-
-DEFAULT_CHECKPOINT = "pick"
-"""Alias of the checkpoint that is evaluated unless another is named."""
 
 MAX_MOTIONS = 32
 """Most stored motions of one evaluation."""
@@ -123,10 +125,10 @@ def _parse_evaluate(body: Mapping[str, Any]) -> EvaluateSpec:
         raise InvalidInput("protocol", protocol, "must name a protocol", tuple(PROTOCOLS))
     episodes = body.get("episodes")
     if episodes is not None:
-        _check_integer("episodes", episodes, 1, MAX_EPISODES)
+        _check_integer("episodes", episodes, 1, most_episodes(protocol))
     return EvaluateSpec(
         protocol=protocol,
-        checkpoint=_text({"checkpoint": DEFAULT_CHECKPOINT, **body}, "checkpoint"),
+        checkpoint=_text({"checkpoint": default_checkpoint(protocol), **body}, "checkpoint"),
         episodes=episodes,
         seed=_seed(body),
         motions=_motions(body, protocol),

@@ -1,13 +1,16 @@
 """DQN on Stable-Baselines3, with what it lacks added at its extension points.
 
 Double Q-learning, dueling networks, prioritised replay with n-step returns in one buffer, masks
-of valid moves in exploration, targets and prediction, and demonstrations of the exact planner
-with a margin loss.
+of valid moves in exploration, targets and prediction, and advice: in a part of each minibatch
+the exact planner marks every move that is best in the states met, and a margin loss asks that
+one of them be worth more than all others.
 
 The double target is ``r + gamma^n Q_target(s', argmax_a Q_online(s', a))``.
 
 Source: van Hasselt, Guez, Silver, *Deep reinforcement learning with double Q-learning* (2016);
 Hester et al., *Deep Q-learning from demonstrations* (2018); METHOD 1.4 with its corrections.
+Deviates: advice marks sets of moves, in the states the learner meets (as in Ross, Gordon,
+Bagnell, *A reduction of imitation learning to no-regret online learning*, 2011).
 """
 
 from collections.abc import Callable
@@ -22,25 +25,20 @@ from stable_baselines3.dqn.policies import DQNPolicy, QNetwork
 from torch import Tensor
 from torch.nn import functional
 
-from app.policies.replay import PrioritisedReplay, ReplaySamples
-from app.policies.sorting_networks import PrintedNetwork, SharedNetwork
+from app.policies.replay import PrioritisedReplay
+from app.policies.sorting_networks import NETWORKS, NEVER, PrintedNetwork, SharedNetwork
 from app.policies.sorting_preset import SortingPreset
 from app.policies.sorting_vecenv import SortingVecEnv
 from app.sim.sorting import SortingBatch
 from app.sim.sorting_state import SortingShape
 
-NEVER = -1e9
-"""Value of a move that is not valid."""
-
-Demonstrator = Callable[[NDArray[np.bool_]], NDArray[np.int64]]
-"""Given the rows that are asked for, shape (n_envs,), returns its actions, shape (n_envs,)."""
+Adviser = Callable[[NDArray[np.uint8]], NDArray[np.bool_]]
+"""Marks the best moves of observations, shape (n, obs_size): shape (n, n_actions)."""
 
 
 def network_of(preset: SortingPreset, shape: SortingShape) -> SharedNetwork | PrintedNetwork:
     """Return a new network as a preset describes it."""
-    if preset.network == "shared":
-        return SharedNetwork(shape, preset.width)
-    return PrintedNetwork(shape, preset.width)
+    return NETWORKS[preset.network](shape, preset.width)
 
 
 class _SB3QNetwork(QNetwork):
@@ -51,13 +49,11 @@ class _SB3QNetwork(QNetwork):
     ) -> None:
         super().__init__(*args, **{**kwargs, "net_arch": [1]})
         self.q_net = network_of(preset, shape)  # type: ignore[assignment]
-        self._masked = preset.mask == "valid"
 
     def forward(self, obs: PyTorchObs) -> Tensor:
-        """Return the values of all moves, of invalid ones ``NEVER``, (B, n_actions)."""
-        values: Tensor
-        values, valid = self.q_net(obs)
-        return values.masked_fill(~valid, NEVER) if self._masked else values
+        """Return the values of all moves, (B, n_actions)."""
+        values: Tensor = self.q_net(obs)
+        return values
 
 
 class SortingDQNPolicy(DQNPolicy):
@@ -77,13 +73,13 @@ class SortingDQNPolicy(DQNPolicy):
 
 
 class SortingDQN(DQN):
-    """Double, dueling, prioritised, masked DQN that may look on as the planner works.
+    """Double, dueling, prioritised, masked DQN that may ask for advice.
 
     Args:
         preset: Hyper-parameters.
         env: The batched task.
         seed: Seed of networks, replay and exploration.
-        demonstrator: Chooses actions in a share of the rows; needed where the preset has one.
+        adviser: Marks best moves; needed where the preset takes advice.
     """
 
     def __init__(
@@ -91,13 +87,11 @@ class SortingDQN(DQN):
         preset: SortingPreset,
         env: SortingVecEnv,
         seed: int,
-        demonstrator: Demonstrator | None = None,
+        adviser: Adviser | None = None,
     ) -> None:
         start, end = preset.lr_start, preset.lr_end
-        self.preset, self._tasks, self._demonstrator = preset, env, demonstrator
+        self.preset, self._tasks, self._adviser = preset, env, adviser
         self._random = np.random.default_rng(seed)
-        n_shown = round(preset.demo_share * env.num_envs) if demonstrator else 0
-        self._shown = np.arange(env.num_envs) >= env.num_envs - n_shown
         super().__init__(
             SortingDQNPolicy,
             env,
@@ -119,7 +113,11 @@ class SortingDQN(DQN):
             exploration_final_eps=preset.eps_end,
             exploration_fraction=preset.eps_share,
             max_grad_norm=preset.max_grad_norm,
-            policy_kwargs={"preset": preset, "shape": env.batch.shape},
+            policy_kwargs={
+                "preset": preset,
+                "shape": env.batch.shape,
+                "optimizer_kwargs": {"fused": True},
+            },
             seed=seed,
             device="cpu",
         )
@@ -145,8 +143,8 @@ class SortingDQN(DQN):
         action_noise: Any = None,
         n_envs: int = 1,
     ) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Act greedily, at random among the moves, or as the demonstrator, row by row."""
-        masked = self.preset.mask == "valid"
+        """Act greedily or at random among the moves, row by row."""
+        masked = self.preset.network == "shared"
         moves = self._tasks.action_masks()
         chance = 1.0 if self.num_timesteps < learning_starts else self.exploration_rate
         at_random = self._random.random(n_envs) < chance
@@ -157,10 +155,6 @@ class SortingDQN(DQN):
             with torch.no_grad():
                 values = self.q_net(torch.as_tensor(self._last_obs))
             actions = np.where(at_random, actions, values.argmax(dim=1).numpy())
-        shown = self._shown & ~at_random
-        if self._demonstrator is not None and shown.any():
-            actions = np.where(shown, self._demonstrator(shown), actions)
-        self.memory.shown[:] = shown
         return actions, actions
 
     def train(self, gradient_steps: int, batch_size: int = 100) -> None:
@@ -179,14 +173,17 @@ class SortingDQN(DQN):
         drawn = self.memory.draw(batch_size, beta)
         with torch.no_grad():
             following = self.q_net(drawn.next_observations).argmax(dim=1, keepdim=True)
-            best = self.q_net_target(drawn.next_observations).gather(1, following)[:, 0]
-            target = drawn.rewards + drawn.discounts * best
+            there = self.q_net_target(drawn.next_observations).gather(1, following)[:, 0]
+            target = drawn.rewards + drawn.discounts * there
         values = self.q_net(drawn.observations)
         taken = values.gather(1, drawn.actions[:, None])[:, 0]
         error = functional.smooth_l1_loss(taken, target, reduction="none")
         loss = (drawn.weights * error).mean()
-        if self._shown.any():
-            loss = loss + self.preset.demo_weight * self._margin_loss(values, taken, drawn)
+        if self._adviser is not None:
+            n = round(self.preset.advice_share * batch_size)
+            best = self._adviser(drawn.observations[:n].numpy())
+            short = margin_loss(values[:n], torch.as_tensor(best), self.preset.advice_margin)
+            loss = loss + self.preset.advice_weight * short
         self.policy.optimizer.zero_grad()
         loss.backward()  # type: ignore[no-untyped-call]
         torch.nn.utils.clip_grad_norm_(self.policy.parameters(), self.max_grad_norm)
@@ -194,10 +191,16 @@ class SortingDQN(DQN):
         with torch.no_grad():
             self.memory.update(drawn.indices, (taken - target).abs().numpy())
 
-    def _margin_loss(self, values: Tensor, taken: Tensor, drawn: ReplaySamples) -> Tensor:
-        """Return by how much shown moves fall short of being best by the margin."""
-        others = values + self.preset.demo_margin
-        others = others.scatter(1, drawn.actions[:, None], taken[:, None])
-        short: Tensor = (others.amax(dim=1) - taken) * drawn.shown
-        n_shown: Tensor = drawn.shown.sum().clamp(min=1)
-        return short.sum() / n_shown
+
+def margin_loss(values: Tensor, best: Tensor, margin: float) -> Tensor:
+    """Return by how much the best moves fall short of all others by a margin, on average.
+
+    Args:
+        values: Values of all moves, (n, n_actions).
+        best: Which are best, (n, n_actions); at least one in every row.
+        margin: By how much they shall be worth more.
+    """
+    of_best = values.masked_fill(~best, NEVER).amax(dim=1)
+    of_others = (values + margin).masked_fill(best, NEVER).amax(dim=1)
+    short: Tensor = functional.relu(of_others - of_best).mean()
+    return short

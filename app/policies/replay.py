@@ -39,8 +39,6 @@ class ReplaySamples(NamedTuple):
     """What the value there is multiplied by; 0 where the episode terminated, (B,)."""
     weights: torch.Tensor
     """Importance weights, the greatest 1, (B,)."""
-    shown: torch.Tensor
-    """Whether a demonstrator chose the action, (B,)."""
     indices: Ints
     """Places in the buffer, for :meth:`PrioritisedReplay.update`, (B,)."""
 
@@ -133,7 +131,7 @@ def sum_returns(
 
 
 class PrioritisedReplay(ReplayBuffer):
-    """Stable-Baselines3's buffer, with priorities, n-step returns and marked demonstrations.
+    """Stable-Baselines3's buffer, with priorities and n-step returns.
 
     Args:
         buffer_size: Transitions it holds.
@@ -169,9 +167,6 @@ class PrioritisedReplay(ReplayBuffer):
         self._greatest = 1.0
         self._rng = np.zeros(1, dtype=np.uint64)
         random.start_stream(seed, 0, 0, self._rng)
-        self._shown = np.zeros((self.buffer_size, n_envs), dtype=np.bool_)
-        self.shown = np.zeros(n_envs, dtype=np.bool_)
-        """Which of the actions added next a demonstrator chose, shape (n_envs,)."""
 
     def add(
         self,
@@ -184,7 +179,6 @@ class PrioritisedReplay(ReplayBuffer):
     ) -> None:
         """Add one transition per environment, with the greatest priority so far."""
         leaves = self.pos * self.n_envs + np.arange(self.n_envs)
-        self._shown[self.pos] = self.shown
         super().add(obs, next_obs, action, reward, done, infos)
         set_priorities(self._tree, leaves, np.full(self.n_envs, self._greatest))
 
@@ -212,7 +206,6 @@ class PrioritisedReplay(ReplayBuffer):
             next_observations=torch.as_tensor(self.next_observations[last, envs]),
             discounts=torch.as_tensor(discounts, dtype=torch.float32),
             weights=torch.as_tensor(weights / weights.max(), dtype=torch.float32),
-            shown=torch.as_tensor(self._shown[rows, envs]),
             indices=leaves,
         )
 

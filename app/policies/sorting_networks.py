@@ -8,10 +8,14 @@ says value and slope per type and tower, and never prefers the riskier of two tw
 
 :class:`PrintedNetwork` is the source's: one-hot numbers through two layers of 128 (table 3.1).
 
-Both are dueling: ``Q = V + A - mean A`` over the moves that are valid.
+Both are dueling: ``Q = V + A - mean A``; ours takes the mean over the moves that are valid and
+puts all others out of the question, in exploration, targets and prediction alike.
 
 Source: METHOD 1.4; Wang et al., *Dueling network architectures* (2016).
 """
+
+from collections.abc import Mapping
+from types import MappingProxyType
 
 import torch
 from torch import Tensor, nn
@@ -20,6 +24,11 @@ from torch.nn import functional
 from app.sim.kernels.sorting import FAILURE_SCALE
 from app.sim.sorting_state import SortingShape
 
+NEVER = -1e9
+"""Value of a move that changes nothing."""
+BACK_SLOPE = 0.3
+"""By how much a free cell that fails always can be worth more or less than one that never does:
+an object put there costs more attempts to fetch, if it is fetched at all."""
 WINDOW = 4
 """Objects of a tower, on and over the seam of what is in place, that are seen one by one."""
 
@@ -93,8 +102,8 @@ class SharedNetwork(nn.Module):
         self.head = nn.Linear(width, 2 * n_types + 2 + n_colours)
         self.value = nn.Linear(width, 1)
 
-    def forward(self, obs: Tensor) -> tuple[Tensor, Tensor]:
-        """Return the values of all moves and which are valid, each (B, n_actions)."""
+    def forward(self, obs: Tensor) -> Tensor:
+        """Return the values of all moves, NEVER where nothing changes, (B, n_actions)."""
         clutter, towers, goal, fail = self.view(obs)
         n, n_towers, _ = towers.shape
         seen = self.tower(self._features(clutter, towers, goal, fail))
@@ -105,7 +114,7 @@ class SharedNetwork(nn.Module):
         valid = valid_moves(clutter, towers)
         advantage = self._advantages(self.head(joint), clutter, fail)
         value = self.value(joint).mean(dim=1)
-        return dueling(value, advantage, valid), valid
+        return dueling(value, advantage, valid).masked_fill(~valid, NEVER)
 
     def _features(self, clutter: Tensor, towers: Tensor, goal: Tensor, fail: Tensor) -> Tensor:
         """Return what every tower sees, (B, C, n_in)."""
@@ -152,7 +161,8 @@ class SharedNetwork(nn.Module):
         per_cell = kind.transpose(1, 2)
         risk = functional.softplus(slope).gather(2, per_cell) * fail[:, None]
         place = (gain.gather(2, per_cell) - risk).transpose(1, 2)
-        free = back[:, :, :1] + back[:, :, 1:] * fail[:, None]
+        preference = BACK_SLOPE * torch.tanh(back[:, :, 1:])
+        free = back[:, :, :1] + preference * fail[:, None]
         # Column j of a tower is the tower j colours further.
         order = torch.arange(n_towers, device=out.device)
         order = (order[None, :] - order[:, None]) % n_towers
@@ -168,6 +178,9 @@ class PrintedNetwork(nn.Module):
         width: Width of the hidden layers.
     """
 
+    one_hot: Tensor
+    """Rows of the identity, (n_types + 1, n_types + 1)."""
+
     def __init__(self, shape: SortingShape, width: int) -> None:
         super().__init__()
         self.shape, self.view = shape, SortingView(shape)
@@ -178,16 +191,16 @@ class PrintedNetwork(nn.Module):
         )
         self.advantage = nn.Linear(width, shape.n_actions)
         self.value = nn.Linear(width, 1)
+        self.register_buffer("one_hot", torch.eye(shape.n_types + 1), persistent=False)
 
-    def forward(self, obs: Tensor) -> tuple[Tensor, Tensor]:
-        """Return the values of all moves and which are valid, each (B, n_actions)."""
+    def forward(self, obs: Tensor) -> Tensor:
+        """Return the values of all moves, (B, n_actions); it knows nothing of valid ones."""
         clutter, towers, goal, fail = self.view(obs)
         places = torch.cat([clutter, towers.flatten(1), goal.flatten(1)], dim=1)
-        seen = functional.one_hot(places, self.shape.n_types + 1).flatten(1).float()
-        hidden = self.body(torch.cat([seen, fail], dim=1))
-        everything = torch.ones_like(self.advantage.bias, dtype=torch.bool).expand(len(obs), -1)
-        values = dueling(self.value(hidden), self.advantage(hidden), everything)
-        return values, valid_moves(clutter, towers)
+        hidden = self.body(torch.cat([self.one_hot[places].flatten(1), fail], dim=1))
+        advantage = self.advantage(hidden)
+        values: Tensor = self.value(hidden) + advantage - advantage.mean(dim=1, keepdim=True)
+        return values
 
 
 def _relative_codes(shape: SortingShape) -> Tensor:
@@ -207,3 +220,9 @@ def _histogram(codes: Tensor, n: int) -> Tensor:
     counts = codes.new_zeros((*codes.shape[:2], n), dtype=torch.float32)
     counts.scatter_add_(2, codes, (codes > 0).float())
     return counts / 2.0
+
+
+NETWORKS: Mapping[str, type[SharedNetwork] | type[PrintedNetwork]] = MappingProxyType(
+    {"shared": SharedNetwork, "printed": PrintedNetwork}
+)
+"""Networks by the name that presets give them."""

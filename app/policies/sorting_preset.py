@@ -8,7 +8,6 @@ from app.sim.kernels.sorting_reward import SortingWeights
 from app.sim.sorting import SortingSettings
 
 NETWORKS = ("shared", "printed")
-MASKS = ("valid", "none")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,10 +48,11 @@ class SortingPreset:
     max_grad_norm: float = number(10.0, 0.01, 1000.0, "", "greatest norm of a gradient")
 
     network: str = choice(
-        "shared", NETWORKS, "weights shared over towers, or the source's two plain layers"
+        "shared",
+        NETWORKS,
+        "weights shared over towers, valid moves only; or the source's two plain layers",
     )
     width: int = number(128, 16, 1024, "units", "width of the hidden layers")
-    mask: str = choice("valid", MASKS, "moves that are explored, valued and taken")
     eps_start: float = number(1.0, 0.0, 1.0, "", "share of random moves at the start")
     eps_end: float = number(0.02, 0.0, 1.0, "", "share of random moves in the end")
     eps_share: float = number(
@@ -60,13 +60,16 @@ class SortingPreset:
     )
 
     solved_episodes: float = number(
-        0.5, 0.0, 1.0, "", "share of episodes that start partly solved at first, e_s"
+        0.3, 0.0, 1.0, "", "share of episodes that start partly solved at first, e_s"
     )
     solved_share: float = number(
         0.8, 0.0, 1.0, "", "share of their goal that is done at first, g_s"
     )
+    even_share: float = number(
+        0.5, 0.0, 1.0, "", "share of episodes whose sizes are drawn evenly, not triangular"
+    )
     disturbed_share: float = number(
-        0.4, 0.0, 1.0, "", "share of episodes with junk on towers and goals partly built"
+        0.6, 0.0, 1.0, "", "share of episodes with junk on towers and goals partly built"
     )
     human_rate: float = number(
         0.02, 0.0, 1.0, "per attempt", "how often a person adds, removes, moves or asks anew"
@@ -81,13 +84,17 @@ class SortingPreset:
         4.0, 1.0, 100.0, "attempts per cell", "length at which episodes are cut off"
     )
 
-    demo_share: float = number(
-        0.0, 0.0, 0.9, "", "share of the tasks in which the exact planner acts"
+    advice_share: float = number(
+        0.0,
+        0.0,
+        1.0,
+        "",
+        "share of a minibatch in which the exact planner marks the best moves",
     )
-    demo_margin: float = number(
-        0.1, 0.0, 10.0, "", "by how much its moves shall be worth more than others (DQfD)"
+    advice_margin: float = number(
+        0.05, 0.0, 10.0, "", "by how much one of them shall be worth more than others (DQfD)"
     )
-    demo_weight: float = number(1.0, 0.0, 100.0, "", "weight of that in the loss")
+    advice_weight: float = number(1.0, 0.0, 100.0, "", "weight of that in the loss")
 
     c_move: float = number(0.05, 0.0, 10.0, "", "cost of an attempt")
     c_empty: float = number(0.3, 0.0, 10.0, "", "cost of picking where nothing is")
@@ -134,6 +141,7 @@ class SortingPreset:
             disturbed_share=self.disturbed_share,
             solved_episodes=left * self.solved_episodes,
             solved_share=left * self.solved_share,
+            even_share=self.even_share,
             human_rate=self.human_rate,
             localisation_rate=self.localisation_rate,
             random_map_share=self.random_map_share,
@@ -172,10 +180,11 @@ def _printed(name: str, cell: str, total_steps: int) -> SortingPreset:
         target_every=500,
         network="printed",
         width=128,
-        mask="none",
         eps_start=1.0,
         eps_end=0.05,
         eps_share=1.0,
+        solved_episodes=0.5,
+        even_share=0.0,
         disturbed_share=0.0,
         human_rate=0.0,
         random_map_share=0.0,
@@ -190,7 +199,7 @@ SORTING_PRESETS = (
         name="sorting-e1-dqn",
         cell="sorting-e1",
         total_steps=2_560_000,
-        demo_share=0.25,
+        advice_share=0.25,
     ),
     SortingPreset(name="sorting-e1-dqn-pure", cell="sorting-e1", total_steps=2_560_000),
     _printed("sorting-e0-thesis", "sorting-e0", 2_000_000),

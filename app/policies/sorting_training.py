@@ -13,15 +13,17 @@ import torch
 from numpy.typing import NDArray
 
 from app.policies.checkpoint import Checkpoint
-from app.policies.dqn import SortingDQN
+from app.policies.dqn import Adviser, SortingDQN
 from app.policies.progress import Progress
 from app.policies.reporter import Reporter
 from app.policies.run import Parts, TrainingRun
 from app.policies.sorting_preset import SortingPreset
 from app.policies.sorting_vecenv import SortingVecEnv
 from app.sim.cells import Cell
+from app.sim.kernels.sorting import FAILURE_SCALE
+from app.sim.kernels.sorting_planner import mark_rows, new_work
 from app.sim.sorting import OUTCOMES, SortingBatch, SortingSettings, batch_in
-from app.sim.sorting_state import SortingShape
+from app.sim.sorting_state import NULL, SortingShape
 
 CURVE_SEED = 1_000_003
 """Seed of the episodes behind a point of the curve; no evaluation uses it."""
@@ -55,7 +57,8 @@ def start(
     batch = batch_in(cell, preset.n_envs, seed + first, preset.settings(0.0))
     env = SortingVecEnv(batch)
 
-    model = SortingDQN(preset, env, seed + first)
+    adviser = adviser_of(batch.shape) if preset.advice_share else None
+    model = SortingDQN(preset, env, seed + first, adviser)
     parts = Parts(
         policy={"q": model.q_net.q_net},
         targets={"q_target": model.q_net_target.q_net},
@@ -65,6 +68,25 @@ def start(
         trained_range=dict,
     )
     return TrainingRun(preset, seed, cell, model, env, parts, resume), model
+
+
+def adviser_of(shape: SortingShape) -> Adviser:
+    """Return what marks the moves with which plans of the fewest moves begin."""
+    k, c = shape.n_cells, shape.n_colours
+    work = new_work(k, c, shape.n_sizes)
+
+    def advise(obs: NDArray[np.uint8]) -> NDArray[np.bool_]:
+        n, codes = len(obs), obs.astype(np.int8)
+        clutter = np.ascontiguousarray(codes[:, :k])
+        towers = np.ascontiguousarray(codes[:, k : k + c * k].reshape(n, c, k))
+        goal = np.ascontiguousarray(codes[:, k + c * k : k + 2 * c * k].reshape(n, c, k))
+        heights, wanted = (towers != NULL).sum(axis=2), (goal != NULL).sum(axis=2)
+        first = np.zeros((n, shape.n_actions), dtype=np.bool_)
+        fail = obs[:, k + 2 * c * k :] / FAILURE_SCALE
+        mark_rows(clutter, towers, heights, goal, wanted, fail, work, first)
+        return first
+
+    return advise
 
 
 class SortingReporter(Reporter):

@@ -1,7 +1,7 @@
 """What the rooms of the house hand each other: the Protocols and their data.
 
-``app.policies`` implements :class:`TaskPolicy`, ``web`` implements :class:`WorldHandle`; the
-other side sees only what is written here (numpy in, numpy out).
+``app.policies`` implements :class:`TaskPolicy` and :class:`SortingValues`, ``web`` implements
+:class:`WorldHandle`; the other side sees only what is written here (numpy in, numpy out).
 """
 
 from collections.abc import Sequence
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:  # the kernels need Vec first
     from app.sim.actions import ActionSettings
+    from app.sim.sorting_state import SortingShape
 
 Vec = NDArray[np.float64]
 
@@ -130,6 +131,43 @@ class TaskPolicy(Protocol):
 
         Raises:
             InvalidInput: A value that no answer can be given for.
+        """
+
+
+class SortingValues(Protocol):
+    """A learned policy as its values of all moves; safe to call from several threads.
+
+    It was trained on goals that have each tower of its own colour, the largest at the bottom.
+    """
+
+    @property
+    def checkpoint(self) -> str:
+        """SHA-256 of the checkpoint."""
+
+    @property
+    def title(self) -> str:
+        """Short text for people, such as ``"sorting-e0-dqn, 2.0 M steps"``."""
+
+    @property
+    def cell(self) -> str:
+        """Name of the work cell it was trained for."""
+
+    @property
+    def cell_sha256(self) -> str:
+        """Identity of that cell's content (``Cell.sha256``)."""
+
+    @property
+    def shape(self) -> "SortingShape":
+        """The tasks it knows."""
+
+    def values(self, obs: NDArray[np.uint8]) -> NDArray[np.float32]:
+        """Return Q of every move, valid or not.
+
+        Args:
+            obs: States as ``sorting.observe`` gives them, shape (n, obs_size).
+
+        Returns:
+            Expected discounted rewards, shape (n, n_actions).
         """
 
 

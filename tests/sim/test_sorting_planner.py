@@ -38,7 +38,9 @@ def random_tasks(n: int, seed: int, most: int) -> list[tuple[SortingState, Sorti
             n_sizes=int(rng.integers(1, 3)),
         )
         n_objects = int(rng.integers(1, shape.n_cells + 1))
-        tasks.append((random_task(shape, rng, n_objects, float(rng.choice([0, 0.5, 0.9]))), shape))
+        tasks.append(
+            (random_task(shape, rng, n_objects, float(rng.choice([0, 0.5, 0.9]))), shape)
+        )
     return tasks
 
 

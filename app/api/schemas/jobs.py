@@ -7,6 +7,7 @@ from pydantic import Field
 
 from app.api.schemas.numbers import Answer, Body
 from app.errors import InvalidInput
+from app.policies.evaluation.protocols import default_checkpoint
 from app.policies.presets import PRESETS
 from app.store.records import JobRecord, MetricRow, NewJob
 from jobs.spec import MAX_MOTIONS, new_job
@@ -40,7 +41,9 @@ class EvaluateJobCreate(Body):
 
     kind: Literal["evaluate"]
     protocol: str = Field(max_length=64, description="name of the protocol")
-    checkpoint: str = Field("pick", max_length=64, description="SHA-256 or alias")
+    checkpoint: str | None = Field(
+        None, max_length=64, description="SHA-256 or alias; the protocol's own if null"
+    )
     episodes: int | None = Field(
         None,
         strict=True,
@@ -62,7 +65,8 @@ class EvaluateJobCreate(Body):
             InvalidInput: An unknown protocol, or motions that do not go with it.
         """
         given = self.model_dump(mode="json", exclude_unset=True)
-        return new_job({**given, "checkpoint": self.checkpoint})
+        checkpoint = self.checkpoint or default_checkpoint(self.protocol)
+        return new_job({**given, "checkpoint": checkpoint})
 
 
 JobCreate = Annotated[TrainJobCreate | EvaluateJobCreate, Field(discriminator="kind")]

@@ -7,8 +7,9 @@ from typing import Any
 
 from app.errors import InvalidInput, NotFound
 from app.policies.checkpoint import Checkpoint
-from app.policies.evaluation import people, pick, safety, tracker
+from app.policies.evaluation import people, pick, safety, sorting, tracker
 from app.policies.evaluation.rows import OnRow, untold
+from app.policies.sorting_policy import is_sorting
 from app.sim.motions import Motion
 
 Protocol = Callable[..., dict[str, Any]]
@@ -22,6 +23,8 @@ PROTOCOLS: Mapping[str, Protocol] = MappingProxyType(
         "pick-courtesy": people.run_courtesy,
         "pick-mocap": people.run_mocap,
         "safety-ssm": safety.run_safety,
+        "sorting-grid": sorting.run_grid,
+        "sorting-tests": sorting.run_tests,
     }
 )
 """Protocol by name; each takes a checkpoint, ``episodes``, ``seed`` and ``on_row``."""
@@ -29,8 +32,12 @@ WITH_MOTIONS = frozenset({"pick-mocap"})
 """Protocols that take recorded motion."""
 WITHOUT_CHECKPOINT = frozenset({"safety-ssm"})
 """Protocols in which no policy takes part."""
+OF_SORTING = frozenset({"sorting-grid", "sorting-tests"})
+"""Protocols of policies that sort; all others are of policies that reach."""
 MAX_EPISODES = 100_000
 """Most episodes of one evaluation."""
+MAX_SORTING_EPISODES = 10_000
+"""Most episodes of one pair or one test of the sorting task."""
 
 
 def evaluate(
@@ -55,17 +62,20 @@ def evaluate(
     Raises:
         NotFound: No protocol has that name.
         InvalidInput: The number of episodes or the seed cannot be used, there is no
-            checkpoint, or there are motions where none are taken or none where some are.
+            checkpoint, it is of another scenario, or there are motions where none are taken
+            or none where some are.
     """
     if name not in PROTOCOLS:
         raise NotFound("protocol", name, tuple(PROTOCOLS))
-    if episodes is not None and not 1 <= episodes <= MAX_EPISODES:
-        raise InvalidInput("episodes", episodes, f"must lie in [1, {MAX_EPISODES}]")
+    most = most_episodes(name)
+    if episodes is not None and not 1 <= episodes <= most:
+        raise InvalidInput("episodes", episodes, f"must lie in [1, {most}]")
     if not 0 <= seed < 2**31:
         raise InvalidInput("seed", seed, "must lie in [0, 2^31)")
     if checkpoint is None and name not in WITHOUT_CHECKPOINT:
         raise InvalidInput("checkpoint", None, f"must name a checkpoint for {name}")
     check_motions(name, [motion.name for motion in motions])
+    _check_task(name, checkpoint)
     tested = {} if name in WITHOUT_CHECKPOINT else _identity(checkpoint)
     started = time.process_time()
     more = {"motions": motions} if name in WITH_MOTIONS else {}
@@ -78,6 +88,29 @@ def evaluate(
         **outcome,
         "cpu_seconds": round(time.process_time() - started, 2),
     }
+
+
+def default_checkpoint(name: str) -> str:
+    """Return the alias of the checkpoint that a protocol measures unless another is named."""
+    return "sorting-e0" if name in OF_SORTING else "pick"
+
+
+def most_episodes(name: str) -> int:
+    """Return how many episodes a protocol runs at most; for sorting, of each pair or test."""
+    return MAX_SORTING_EPISODES if name in OF_SORTING else MAX_EPISODES
+
+
+def _check_task(name: str, checkpoint: Checkpoint | None) -> None:
+    """Check that a checkpoint is of the scenario that a protocol measures."""
+    if checkpoint is None or name in WITHOUT_CHECKPOINT:
+        return
+    if is_sorting(checkpoint) != (name in OF_SORTING):
+        wanted = "a policy that sorts" if name in OF_SORTING else "a policy that picks"
+        known = sorted(set(PROTOCOLS) - WITHOUT_CHECKPOINT - OF_SORTING)
+        if is_sorting(checkpoint):
+            known = sorted(OF_SORTING)
+        found = checkpoint.manifest["preset"].get("name") or checkpoint.sha256[:12]
+        raise InvalidInput("checkpoint", found, f"must be {wanted} for {name}", known)
 
 
 def check_motions(

@@ -5,6 +5,9 @@ Source: Wilson, *Probable inference, the law of succession, and statistical infe
 
 import math
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 Z95 = 1.959963984540054
 """Quantile of the standard normal distribution for a two-sided 95 % interval."""
 
@@ -29,3 +32,17 @@ def wilson(hits: int, n: int) -> dict[str, float]:
         "low": 0.0 if hits == 0 else max(0.0, (centre - spread) / scale),
         "high": 1.0 if hits == n else min(1.0, (centre + spread) / scale),
     }
+
+
+def mean_of(values: ArrayLike) -> dict[str, float] | None:
+    """Return a mean and its 95 % interval, by the normal approximation; None without values.
+
+    Args:
+        values: One number per episode, shape (n,).
+    """
+    x = np.asarray(values, dtype=np.float64)
+    if len(x) == 0:
+        return None
+    mean = float(x.mean())
+    spread = Z95 * float(x.std(ddof=1)) / math.sqrt(len(x)) if len(x) > 1 else 0.0
+    return {"mean": mean, "low": mean - spread, "high": mean + spread}

@@ -150,7 +150,11 @@ def _carry_out(action: int, objects: Objects, task: Task, work: PlannerWork) -> 
         code = objects.clutter[action // n_towers]
         objects.clutter[action // n_towers] = 0
     else:
-        c = (action - moves) // n_cells if action < 2 * moves else (action - 2 * moves) // n_towers
+        c = (
+            (action - moves) // n_cells
+            if action < 2 * moves
+            else (action - 2 * moves) // n_towers
+        )
         objects.heights[c] -= 1
         code = objects.towers[c, objects.heights[c]]
         objects.towers[c, objects.heights[c]] = 0
@@ -284,7 +288,7 @@ def _next_action(size: int, task: Task, work: PlannerWork) -> int:
     return _look_ahead(task, work)
 
 
-@kernel()
+@kernel(nogil=True)
 def plan_state(objects: Objects, task: Task, work: PlannerWork) -> tuple[int, float]:
     """Plan one state to its end.
 
@@ -350,3 +354,34 @@ def plan_rows(
             fewest[e] = p.table[state_number(p)]
             _copy(objects, work.now)
             best[e] = _next_action(size, task, work)
+
+
+@kernel(nogil=True)
+def mark_rows(
+    clutter: Bytes,
+    towers: Bytes,
+    heights: Ints,
+    goal: Bytes,
+    goal_heights: Ints,
+    fail: Vec,
+    work: PlannerWork,
+    first: NDArray[np.bool_],
+) -> None:
+    """Mark the moves with which plans of the fewest moves begin, for every row of a batch.
+
+    Args:
+        clutter: Objects in the cells, shape (n, K).
+        towers: Objects on the towers, lowest first, shape (n, C, K).
+        heights: Objects per tower, shape (n, C).
+        goal: What the towers shall be, shape (n, C, K).
+        goal_heights: Objects per tower there, shape (n, C).
+        fail: Failure probabilities of the cells, shape (n, K).
+        work: Work space of the shape.
+        first: Marks, shape (n, actions), written; all false where solved or unsolvable.
+    """
+    for e in range(len(clutter)):
+        for action in range(first.shape[1]):
+            first[e, action] = False
+        objects = Objects(clutter[e], towers[e], heights[e])
+        if _lay_out(objects, Task(goal[e], goal_heights[e], fail[e]), work) > 0:
+            mark_first(clutter[e], work.progress, first[e])

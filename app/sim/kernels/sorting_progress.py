@@ -109,7 +109,9 @@ def _stands(codes: Bytes, lowest: int, end: int, code: int) -> bool:
 
 
 @kernel()
-def _lends(a: int, towers: Bytes, heights: Ints, goal: Bytes, goal_heights: Ints, p: Progress) -> bool:
+def _lends(
+    a: int, towers: Bytes, heights: Ints, goal: Bytes, goal_heights: Ints, p: Progress
+) -> bool:
     """Tell whether tower ``a`` might lend its object at level ``cut`` (module docstring)."""
     code = goal[a, p.cut[a]]
     for b in range(len(p.cut)):
@@ -122,7 +124,9 @@ def _lends(a: int, towers: Bytes, heights: Ints, goal: Bytes, goal_heights: Ints
 
 
 @kernel()
-def _find_cuts(towers: Bytes, heights: Ints, goal: Bytes, goal_heights: Ints, p: Progress) -> None:
+def _find_cuts(
+    towers: Bytes, heights: Ints, goal: Bytes, goal_heights: Ints, p: Progress
+) -> None:
     """Write matching levels and cuts.
 
     Cuts rise from 0 as long as one's object has no tower to go to or none to come from: what
