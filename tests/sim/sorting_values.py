@@ -44,7 +44,9 @@ class Model:
 class _Table:
     """A batch whose rows are put into any states."""
 
-    def __init__(self, task: SortingState, shape: SortingShape, weights: SortingWeights) -> None:
+    def __init__(
+        self, task: SortingState, shape: SortingShape, weights: SortingWeights
+    ) -> None:
         settings = SortingSettings(weights=weights, horizon_factor=1e6)
         self.batch = SortingBatch(shape, np.zeros(shape.n_cells), STEP, 0, settings)
         self.batch.reset()
@@ -98,9 +100,7 @@ def model_of(task: SortingState, shape: SortingShape, weights: SortingWeights) -
     assert weights.empty == weights.stuck
     failed = np.broadcast_to(distance[:, None] - weights.move - weights.fail, rew.shape)
     solved = (codes[:, shape.n_cells :] == task.goal.ravel()).all(axis=1)
-    return Model(
-        codes=codes, after=after, rew=rew, failed_rew=failed, fail=fail, solved=solved
-    )
+    return Model(codes=codes, after=after, rew=rew, failed_rew=failed, fail=fail, solved=solved)
 
 
 def values(model: Model, gamma: float) -> Floats:
@@ -191,9 +191,7 @@ def _attempts_of(model: Model, policy: Ints) -> Floats:
     return attempts
 
 
-def _has_safer_twin(
-    model: Model, shape: SortingShape, fail: Floats
-) -> NDArray[np.bool_]:
+def _has_safer_twin(model: Model, shape: SortingShape, fail: Floats) -> NDArray[np.bool_]:
     """Return which actions pick an object whose twin lies in a safer cell, shape (n, A)."""
     risky = np.zeros(model.after.shape, dtype=np.bool_)
     clutter = model.codes[:, : shape.n_cells]

@@ -53,7 +53,9 @@ def states(batch: SortingBatch) -> list[SortingState]:
 
 def counts(batch: SortingBatch) -> np.ndarray:
     """Objects of each code, a row per task."""
-    found = [code_counts(s.clutter, SHAPE) + code_counts(s.towers, SHAPE) for s in states(batch)]
+    found = [
+        code_counts(s.clutter, SHAPE) + code_counts(s.towers, SHAPE) for s in states(batch)
+    ]
     return np.array(found)[:, 1:]
 
 
@@ -63,9 +65,7 @@ def test_objects_are_conserved_and_towers_have_no_gaps() -> None:
     before, rng = counts(batch), np.random.default_rng(1)
     for _ in range(100):
         batch.step(rng.integers(SHAPE.n_actions, size=64), auto_reset=False)
-        np.testing.assert_array_equal(
-            batch.rows.heights, (batch.rows.towers != 0).sum(axis=2)
-        )
+        np.testing.assert_array_equal(batch.rows.heights, (batch.rows.towers != 0).sum(axis=2))
     np.testing.assert_array_equal(counts(batch), before)
     for state in states(batch):
         check_state(state, SHAPE)
@@ -258,8 +258,12 @@ def test_a_localisation_failure_moves_another_object_and_says_so() -> None:
     np.testing.assert_array_equal(batch.rows.clutter[rows, cells], before[rows, cells])
     gone = (before != 0) & (batch.rows.clutter == 0)
     assert (gone.sum(axis=1) == 1).all() and (batch.rows.failures == 1).all()
-    place = np.array([np.flatnonzero(np.flatnonzero(b) == np.flatnonzero(g)[0])[0]
-                      for b, g in zip(before, gone, strict=True)])
+    place = np.array(
+        [
+            np.flatnonzero(np.flatnonzero(b) == np.flatnonzero(g)[0])[0]
+            for b, g in zip(before, gone, strict=True)
+        ]
+    )
     assert set(place) == {0, 1, 3, 4}
 
 

@@ -15,9 +15,7 @@ from tests.sim.sorting_values import judged, model_of, moves_to_go, values
 GAMMAS = (0.92, 0.95, 0.99)
 
 
-def tasks(
-    shape: SortingShape, n: int, seed: int, n_objects: int
-) -> list[SortingState]:
+def tasks(shape: SortingShape, n: int, seed: int, n_objects: int) -> list[SortingState]:
     """Tasks with twins, junk and goals of any towers, none of them solved."""
     rng, found = np.random.default_rng(seed), []
     while len(found) < n:

@@ -31,7 +31,9 @@ def test_environment_passes_stable_baselines3s_check(env_id: str) -> None:
     checker.check_env(gymnasium.make(env_id).unwrapped)
 
 
-@pytest.mark.parametrize(("env_id", "n_actions"), list(zip(SORTING_IDS, (44, 129), strict=True)))
+@pytest.mark.parametrize(
+    ("env_id", "n_actions"), list(zip(SORTING_IDS, (44, 129), strict=True))
+)
 def test_ids_make_tasks_of_their_size(env_id: str, n_actions: int) -> None:
     assert gymnasium.make(env_id).action_space.n == n_actions
     many = gymnasium.make_vec(env_id, 3)
@@ -148,7 +150,10 @@ def test_plain_environment_gives_the_same_transitions_and_rewards(
         result = batch.step(acts, auto_reset=False)
         for e, env in enumerate(plain):
             if fails and acts[e] < shape.n_cells * shape.n_colours:
-                if env.clutter[acts[e] // shape.n_colours] and batch.rows.failures[e] == failures[e]:
+                if (
+                    env.clutter[acts[e] // shape.n_colours]
+                    and batch.rows.failures[e] == failures[e]
+                ):
                     continue  # the one in a hundred that did not fail
             _, rew, over, late, _ = env.step(acts[e])
             now = batch.state_of(e)

@@ -17,7 +17,7 @@ NULL_CODE, SMALL_RED, LARGE_RED, LARGE_BLUE = 0, 1, 3, 6
 
 
 def scene(fail: float = 0.0) -> SortingState:
-    """A large red block in cell 0, a small one on the red tower, where the large one belongs."""
+    """A large red block in cell 0, a small one on the red tower, where it belongs."""
     state = empty_state(SHAPE)
     state.clutter[:2] = LARGE_RED, LARGE_BLUE
     state.towers[0, 0] = SMALL_RED
@@ -83,7 +83,9 @@ def test_a_failed_pick_pays_for_the_failure_and_changes_nothing() -> None:
     failed = batch.rows.failures == 1
     assert failed.sum() > 50
     np.testing.assert_allclose(result.rew[failed], -ODD.move - ODD.fail, rtol=1e-6)
-    np.testing.assert_array_equal(batch.rows.clutter[failed], np.tile(state.clutter, (failed.sum(), 1)))
+    np.testing.assert_array_equal(
+        batch.rows.clutter[failed], np.tile(state.clutter, (failed.sum(), 1))
+    )
     np.testing.assert_array_equal(batch.rows.moves, ~failed)
 
 
@@ -96,7 +98,6 @@ def test_the_goal_pays_its_bonus_once_reached() -> None:
     state.towers[0, :2] = LARGE_RED, NULL_CODE
     state.clutter[0] = SMALL_RED
     assert paid(state, Move(0, 4)) == pytest.approx(ODD.success - ODD.move)
-
 
 
 @pytest.mark.parametrize(
