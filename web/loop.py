@@ -139,7 +139,7 @@ class LiveCell:
         port = self._port or free_port(self._host)
         self._server = viser.ViserServer(host=self._host, port=port, verbose=False)
         scene = CellScene(self._server, self._cell, self.handle.submit)
-        gui.build(self._server, scene.overlays)
+        gui.build(self._server, scene.overlays, self._cell)
         scene.draw(self.handle.snapshot(), 0.0)
         self._thread = threading.Thread(
             target=self._run, args=(scene,), name=f"world-{self.handle.id}", daemon=True
