@@ -8,6 +8,7 @@ from fastapi import APIRouter, Depends
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
+from app.api.schemas.live_sorting import SetSorter
 from app.api.schemas.worlds import (
     MAX_CHOICES,
     CommandAccepted,
@@ -76,6 +77,10 @@ async def command(
                 raise InvalidInput("checkpoint", body.checkpoint, rule)
             require_cell(world.cell, policy.cell, policy.cell_sha256)
         world.handle.submit(body.to_domain(policy))
+    elif isinstance(body, SetSorter):
+        if body.checkpoint is not None:
+            raise InvalidInput("checkpoint", body.checkpoint, "is no sorter: none is stored")
+        world.handle.submit(body.to_domain(None))
     elif isinstance(body, SetMotion):
         runs = await run_in_threadpool(_runs_of, body.name, services)
         world.handle.submit(body.to_domain(runs))

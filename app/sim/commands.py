@@ -17,6 +17,10 @@ from app.sim.cases import cases_of
 from app.sim.cells import LIMITS, Cell
 from app.sim.motions import Motion
 from app.sim.ports import TaskPolicy
+from app.sim.sorting_commands import (
+    SORTING_COMMANDS,
+    SortingCommand,
+)
 
 Mode = Literal["manual", "auto", "still", "recorded"]
 """Who moves a person: the visitor; the work cycle or a case study; nobody, so that the person
@@ -196,6 +200,7 @@ Command = (
     | ToggleCandidate
     | SetPolicy
     | StartCase
+    | SortingCommand
 )
 
 COMMANDS: tuple[type[Command], ...] = (
@@ -213,6 +218,7 @@ COMMANDS: tuple[type[Command], ...] = (
     ToggleCandidate,
     SetPolicy,
     StartCase,
+    *SORTING_COMMANDS,
 )
 
 

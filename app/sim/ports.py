@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:  # the kernels need Vec first
     from app.sim.actions import ActionSettings
+    from app.sim.sorting_state import SortingShape
 
 Vec = NDArray[np.float64]
 
@@ -130,6 +131,37 @@ class TaskPolicy(Protocol):
 
         Raises:
             InvalidInput: A value that no answer can be given for.
+        """
+
+
+class SortingValues(Protocol):
+    """Values the moves of a sorting task; safe to call from several threads."""
+
+    @property
+    def checkpoint(self) -> str:
+        """SHA-256 of the checkpoint."""
+
+    @property
+    def title(self) -> str:
+        """Short text for people, such as ``"sorting-e0-dqn, 0.5 M steps"``."""
+
+    @property
+    def cell(self) -> str:
+        """Name of the work cell it was trained for."""
+
+    @property
+    def cell_sha256(self) -> str:
+        """Identity of that cell's content (``Cell.sha256``)."""
+
+    @property
+    def shape(self) -> "SortingShape":
+        """How large a task it knows."""
+
+    def values(self, obs: NDArray[np.uint8]) -> NDArray[np.float32]:
+        """Return the value of every move, valid or not, shape (n, n_actions).
+
+        Args:
+            obs: Observations, shape (n, obs_size).
         """
 
 

@@ -9,6 +9,7 @@ from typing import Literal
 
 from app.sim.commands import Mode
 from app.sim.ports import OutsideField, Vec
+from app.sim.sorting_view import SortingView
 
 Status = Literal[
     "moving",
@@ -18,10 +19,13 @@ Status = Literal[
     "case done",
     "no candidates",
     "no policy",
+    "solved",
 ]
 """``picking``: the target is reached, the tool goes down and up again; ``blocked``: the robot
 waits at home because a person is in its way. In ``picking``, ``contact`` and ``case done``
-the last decision stays as it was; in ``moving`` it belongs to this very state."""
+the last decision stays as it was; in ``moving`` it belongs to this very state. In a sorting
+cell ``picking`` is ``grasp`` and ``place``, and ``solved`` says that every tower is as the goal
+asks."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -199,6 +203,8 @@ class WorldSnapshot:
     """Id of the running case study."""
     counters: Counters
     """What happened since the last reset."""
+    sorting: SortingView | None = None
+    """The sorting task; None in a cell without one."""
 
     @property
     def values(self) -> dict[str, float]:

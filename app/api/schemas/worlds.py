@@ -5,6 +5,16 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field
 
 from app.api.schemas.live_people import PersonLight, PersonLive
+from app.api.schemas.live_sorting import (
+    AddObject,
+    MoveObject,
+    RemoveObject,
+    SetGoal,
+    SetSorter,
+    SortingLive,
+    StartTest,
+    ToggleGoal,
+)
 from app.api.schemas.numbers import Answer, Body, Finite, Vector3
 from app.api.schemas.task_selection import (
     CandidateState,
@@ -90,6 +100,7 @@ class WorldLight(Answer):
     elapsed_ms: float | None = Field(description="time the decision took [ms]")
     case: str | None
     counters: CountersPublic
+    sorting: SortingLive | None = Field(description="the sorting task; null without one")
 
     @classmethod
     def from_domain(cls, snapshot: WorldSnapshot) -> Self:
@@ -216,6 +227,9 @@ def light_members(snapshot: WorldSnapshot) -> dict[str, Any]:
             timeouts=counters.timeouts,
             switches=counters.switches,
         ),
+        "sorting": None
+        if snapshot.sorting is None
+        else SortingLive.from_domain(snapshot.sorting),
     }
 
 
@@ -392,7 +406,14 @@ CommandCreate = Annotated[
     | SetCandidates
     | ToggleCandidate
     | StartCase
-    | SetPolicy,
+    | SetPolicy
+    | AddObject
+    | RemoveObject
+    | MoveObject
+    | SetGoal
+    | ToggleGoal
+    | StartTest
+    | SetSorter,
     Field(discriminator="tag"),
 ]
 

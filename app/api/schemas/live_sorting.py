@@ -1,0 +1,217 @@
+"""The sorting task of a live world: what it shows, and what may be done to it."""
+
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field
+
+from app.api.schemas.numbers import Answer, Body
+from app.sim import commands, sorting_commands
+from app.sim.ports import SortingValues
+from app.sim.sorting_view import GoalBlockView, MoveView, PieceView, SortingView
+
+MAX_TOWERS = 5
+"""Most towers that a goal names."""
+Name = Annotated[str, Field(max_length=64)]
+"""Name of a colour, a size, a station, a block or a test."""
+
+
+class PieceLive(Answer):
+    """One block."""
+
+    id: str
+    colour: str
+    size: str
+    place: str = Field(description="id of the station it is on, or `held`")
+    level: int = Field(description="level on a tower, 0 the lowest")
+    position: list[float] = Field(description="centre [m]")
+    half_size: list[float] = Field(description="half of length, width and height [m]")
+    held: bool = Field(description="whether it hangs at the magnet")
+    in_goal: bool = Field(description="whether the goal asks for it")
+
+    @classmethod
+    def from_domain(cls, view: PieceView) -> Self:
+        """Make it from the world's view."""
+        same = ("id", "colour", "size", "place", "level", "held", "in_goal")
+        return cls(
+            **{name: getattr(view, name) for name in same},
+            position=view.position.tolist(),
+            half_size=view.half_size.tolist(),
+        )
+
+
+class GoalBlockLive(Answer):
+    """One block that the goal asks for."""
+
+    tower: str
+    level: int
+    colour: str
+    size: str
+    position: list[float] = Field(description="centre [m]")
+    half_size: list[float] = Field(description="half of length, width and height [m]")
+    done: bool = Field(description="whether such a block stands there, on nothing wrong")
+
+    @classmethod
+    def from_domain(cls, view: GoalBlockView) -> Self:
+        """Make it from the world's view."""
+        same = ("tower", "level", "colour", "size", "done")
+        return cls(
+            **{name: getattr(view, name) for name in same},
+            position=view.position.tolist(),
+            half_size=view.half_size.tolist(),
+        )
+
+
+class MoveLive(Answer):
+    """One move that the sorter may choose."""
+
+    pick: str = Field(description="station a block is taken from")
+    place: str = Field(description="station it is put on")
+    piece: str | None = Field(description="id of the block")
+    value: float | None = Field(description="the sorter's value; null where it has none")
+    best: bool = Field(description="begins a shortest plan, says the exact planner")
+
+    @classmethod
+    def from_domain(cls, view: MoveView) -> Self:
+        """Make it from the world's view."""
+        return cls(**{name: getattr(view, name) for name in cls.model_fields})
+
+
+class SortingCountersPublic(Answer):
+    """What the sorter did since the task began."""
+
+    moves: int
+    attempts: int = Field(description="grasps tried, the failed ones included")
+    failures: int
+    hand_overs: int = Field(description="times at which the exact planner took over")
+
+
+class SortingLive(Answer):
+    """The sorting task at one tick."""
+
+    pieces: list[PieceLive]
+    goal: list[GoalBlockLive] = Field(description="tower by tower from the lowest level")
+    failure: list[float] = Field(description="chance that a grasp fails, by clutter cell")
+    colours: list[str] = Field(description="colours, in the order of the towers")
+    sizes: list[str] = Field(description="sizes, from the smallest")
+    move: MoveLive | None = Field(description="the move that is carried out")
+    phase: str = Field(description="idle, approach, grasp, carry or place")
+    decided_by: str | None = Field(description="policy or planner")
+    twins: list[str] = Field(description="blocks that the sorter calls equal")
+    ranked: list[MoveLive] = Field(description="the best valid moves, best first")
+    moves_to_go: int = Field(description="fewest moves to the goal")
+    attempts_to_go: float = Field(description="expected grasps, failed ones included")
+    counters: SortingCountersPublic
+    sorter: str | None = Field(description="SHA-256 of the sorter; null: the planner alone")
+    sorter_title: str | None
+    test: str | None = Field(description="id of the running test")
+    solved: bool
+
+    @classmethod
+    def from_domain(cls, view: SortingView) -> Self:
+        """Make it from the world's view."""
+        same = (
+            "phase", "decided_by", "moves_to_go", "attempts_to_go", "sorter", "sorter_title",
+            "test", "solved",
+        )  # fmt: skip
+        counters = SortingCountersPublic.model_fields
+        members: dict[str, Any] = {name: getattr(view, name) for name in same}
+        for name in ("failure", "colours", "sizes", "twins"):
+            members[name] = list(getattr(view, name))
+        return cls(
+            **members,
+            pieces=[PieceLive.from_domain(one) for one in view.pieces],
+            goal=[GoalBlockLive.from_domain(one) for one in view.goal],
+            move=None if view.move is None else MoveLive.from_domain(view.move),
+            ranked=[MoveLive.from_domain(one) for one in view.ranked],
+            counters=SortingCountersPublic(
+                **{name: getattr(view.counters, name) for name in counters}
+            ),
+        )
+
+
+class AddObject(Body):
+    """Put another block into a sorting cell."""
+
+    tag: Literal["add-object"]
+    colour: Name
+    size: Name
+    at: Name | None = Field(
+        None, description="free clutter cell or tower; null takes the first free cell"
+    )
+
+    def to_domain(self) -> commands.Command:
+        """Return the world's command."""
+        return sorting_commands.AddObject(colour=self.colour, size=self.size, at=self.at)
+
+
+class RemoveObject(Body):
+    """Take a block out; a goal that nothing else meets shrinks."""
+
+    tag: Literal["remove-object"]
+    id: Name = Field(description="id of the block")
+
+    def to_domain(self) -> commands.Command:
+        """Return the world's command."""
+        return sorting_commands.RemoveObject(id=self.id)
+
+
+class MoveObject(Body):
+    """Put a block elsewhere, as a person would."""
+
+    tag: Literal["move-object"]
+    id: Name = Field(description="id of the block")
+    to: Name = Field(description="free clutter cell, or tower")
+
+    def to_domain(self) -> commands.Command:
+        """Return the world's command."""
+        return sorting_commands.MoveObject(id=self.id, to=self.to)
+
+
+class SetGoal(Body):
+    """Say what the towers shall be; those not named shall be empty."""
+
+    tag: Literal["set-goal"]
+    towers: dict[Name, Annotated[list[Name], Field(max_length=64)]] = Field(
+        max_length=MAX_TOWERS, description="sizes from the bottom, by tower"
+    )
+
+    def to_domain(self) -> commands.Command:
+        """Return the world's command."""
+        return sorting_commands.SetGoal(
+            towers={tower: tuple(sizes) for tower, sizes in self.towers.items()}
+        )
+
+
+class ToggleGoal(Body):
+    """Put a block into the goal, or take it out."""
+
+    tag: Literal["toggle-goal"]
+    id: Name = Field(description="id of a block, or a kind such as `red-large`")
+
+    def to_domain(self) -> commands.Command:
+        """Return the world's command."""
+        return sorting_commands.ToggleGoal(id=self.id)
+
+
+class StartTest(Body):
+    """Start one of the six sorting tests."""
+
+    tag: Literal["start-test"]
+    id: Name = Field(description="test-1 to test-6")
+
+    def to_domain(self) -> commands.Command:
+        """Return the world's command."""
+        return sorting_commands.StartTest(id=self.id)
+
+
+class SetSorter(Body):
+    """Let another sorter choose the moves."""
+
+    tag: Literal["set-sorter"]
+    checkpoint: str | None = Field(
+        max_length=64, description="SHA-256 or alias; null: the exact planner alone"
+    )
+
+    def to_domain(self, sorter: SortingValues | None) -> commands.Command:
+        """Return the world's command with the loaded sorter."""
+        return sorting_commands.SetSorter(sorter=sorter)
