@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import viser
 
-from app.sim.commands import ToggleGoal
+from app.sim.sorting_commands import ToggleGoal
 from app.sim.sorting_view import PieceView
 from web.poses import Vec
 from web.sorting_bodies import BLOCKS, block_body

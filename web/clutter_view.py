@@ -38,7 +38,8 @@ class ClutterView:
         stations = [one for one in cell.stations if one.kind == "clutter"]
         points = np.array([one.position[:2] for one in stations])
         width, depth = _spacing(points[:, 0]), _spacing(points[:, 1])
-        scene.add_glb("/clutter", tray(points, height, 0.5 * max(width, depth) + 0.002))
+        body = tray(points, height, 0.5 * max(width, depth) + 0.002)
+        scene.add_glb("/clutter", body, cast_shadow=False)
         mesh = tile(width - GAP, depth - GAP)
         self._tiles, self._labels = [], []
         for index, (x, y) in enumerate(points.tolist()):

@@ -9,7 +9,7 @@ import numpy as np
 import viser
 
 from app.sim.cells import Cell
-from app.sim.commands import ToggleGoal
+from app.sim.sorting_commands import ToggleGoal
 from app.sim.snapshot import WorldSnapshot
 from app.sim.sorting_view import SortingView
 from web.arc import Arc

@@ -27,7 +27,9 @@ class TowersView:
             if station.kind == "cluster" and station.colour is not None:
                 x, y, _ = station.position
                 plate = tower_plate(BLOCKS[station.colour], height)
-                self._scene.add_glb(f"/towers/{station.id}", plate, position=(x, y, 0.0))
+                self._scene.add_glb(
+                    f"/towers/{station.id}", plate, position=(x, y, 0.0), cast_shadow=False
+                )
         self._ghosts: dict[tuple[str, int], tuple[Kind, viser.MeshHandle]] = {}
 
     def draw(self, goal: tuple[GoalBlockView, ...], *, ghosts: bool) -> None:
