@@ -1,7 +1,7 @@
 """What the rooms of the house hand each other: the Protocols and their data.
 
-``app.policies`` implements :class:`TaskPolicy`, ``web`` implements :class:`WorldHandle`; the
-other side sees only what is written here (numpy in, numpy out).
+``app.policies`` implements :class:`TaskPolicy` and :class:`SortingValues`, ``web`` implements
+:class:`WorldHandle`; the other side sees only what is written here (numpy in, numpy out).
 """
 
 from collections.abc import Sequence
@@ -135,7 +135,10 @@ class TaskPolicy(Protocol):
 
 
 class SortingValues(Protocol):
-    """Values the moves of a sorting task; safe to call from several threads."""
+    """A learned policy as its values of all moves; safe to call from several threads.
+
+    It was trained on goals that have each tower of its own colour, the largest at the bottom.
+    """
 
     @property
     def checkpoint(self) -> str:
@@ -143,7 +146,7 @@ class SortingValues(Protocol):
 
     @property
     def title(self) -> str:
-        """Short text for people, such as ``"sorting-e0-dqn, 0.5 M steps"``."""
+        """Short text for people, such as ``"sorting-e0-dqn, 2.0 M steps"``."""
 
     @property
     def cell(self) -> str:
@@ -155,13 +158,16 @@ class SortingValues(Protocol):
 
     @property
     def shape(self) -> "SortingShape":
-        """How large a task it knows."""
+        """The tasks it knows."""
 
     def values(self, obs: NDArray[np.uint8]) -> NDArray[np.float32]:
-        """Return the value of every move, valid or not, shape (n, n_actions).
+        """Return Q of every move, valid or not.
 
         Args:
-            obs: Observations, shape (n, obs_size).
+            obs: States as ``sorting.observe`` gives them, shape (n, obs_size).
+
+        Returns:
+            Expected discounted rewards, shape (n, n_actions).
         """
 
 
