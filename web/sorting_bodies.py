@@ -79,7 +79,11 @@ def tower_plate(color: Rgb, height: float) -> bytes:
         height: Its top over the table [m].
     """
     side, top = PLATE_SIDE, 0.004
-    soft = (round(0.72 * color[0] + 66), round(0.72 * color[1] + 66), round(0.72 * color[2] + 66))
+    soft = (
+        round(0.72 * color[0] + 66),
+        round(0.72 * color[1] + 66),
+        round(0.72 * color[2] + 66),
+    )
     return painted(
         [
             (slab((side, side, height), (0.0, 0.0, 0.5 * height), 0.02, 0.002), RIM),

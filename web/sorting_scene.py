@@ -9,8 +9,8 @@ import numpy as np
 import viser
 
 from app.sim.cells import Cell
-from app.sim.sorting_commands import ToggleGoal
 from app.sim.snapshot import WorldSnapshot
+from app.sim.sorting_commands import ToggleGoal
 from app.sim.sorting_view import SortingView
 from web.arc import Arc
 from web.blocks_view import BlocksView
@@ -52,9 +52,7 @@ class SortingScene:
         self._rings = {name: _add_ring(server, name) for name in ("pick", "place")}
         self._arc = Arc(server, "/move", lift=ARC_LIFT)
 
-    def draw(
-        self, snapshot: WorldSnapshot, *, chances: bool, ghosts: bool, path: bool
-    ) -> None:
+    def draw(self, snapshot: WorldSnapshot, *, chances: bool, ghosts: bool, path: bool) -> None:
         """Show a snapshot; sends only what changed.
 
         Args:

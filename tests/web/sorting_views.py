@@ -74,9 +74,7 @@ def a_view(
         replace(goal_block(cell, "blue", 0, "large"), done=True),
         goal_block(cell, "blue", 1, "medium"),
     )
-    move = MoveView(
-        pick=pieces[0].place, place="red", piece=pieces[0].id, value=0.8, best=True
-    )
+    move = MoveView(pick=pieces[0].place, place="red", piece=pieces[0].id, value=0.8, best=True)
     stations = [one for one in cell.stations if one.kind == "clutter"]
     return SortingView(
         pieces=tuple(pieces),

@@ -75,7 +75,9 @@ def test_failures_grow_darker_and_never_look_like_a_block() -> None:
     light = [sum(color) for _, color in FAILURES]
     assert light == sorted(light, reverse=True)
     for chance in np.linspace(0.0, 1.0, 50):
-        gaps = [np.abs(np.subtract(failure_color(chance), one)).max() for one in BLOCKS.values()]
+        gaps = [
+            np.abs(np.subtract(failure_color(chance), one)).max() for one in BLOCKS.values()
+        ]
         assert min(gaps) > 40
 
 
