@@ -109,6 +109,7 @@ def test_goal_editor_says_why_a_block_cannot_be_asked_for(
 
 def test_sorting_page_fits_a_phone(open_page: Callable[..., Page], sorting: str) -> None:
     page = open_page(PHONE, scene=False)
+    assert state(sorting)["cell"] == "sorting-e0"
     assert page.evaluate("document.documentElement.scrollWidth") <= PHONE[0]
     for part in ('[data-role="cell"]', "[data-case]", ".towers", ".plan", ".shelf", ".tiles"):
         page.locator(part).first.scroll_into_view_if_needed()
