@@ -22,7 +22,7 @@ from app.sim.kernel_cache import kernel_cache
 
 if TYPE_CHECKING:
     from app.policies.checkpoint import Checkpoint
-    from app.policies.training import Progress
+    from app.policies.progress import Progress
 
 ROOT = Path(__file__).resolve().parent.parent
 WRONG_CALL = 2

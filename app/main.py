@@ -18,15 +18,17 @@ from starlette.concurrency import run_in_threadpool
 import web
 from app.api.application import build_app
 from app.api.known_people import warm_up
-from app.api.registry import DEFAULT_ALIAS, PolicyRegistry
+from app.api.registry import DEFAULT_ALIAS, SORTERS, CheckpointNames, PolicyRegistry
 from app.api.services import Services
 from app.errors import ServiceError
 from app.policies import pretrained
-from app.policies.checkpoint import load
+from app.policies.checkpoint import CHOOSING, SORTING, load, require_purpose
+from app.policies.sorting_policy import SortingPolicy
 from app.policies.task_choice import TaskChooser
 from app.settings import Settings, check_access
 from app.sim.cells import Cell, load_cell
-from app.sim.ports import TaskPolicy
+from app.sim.ports import SortingValues, TaskPolicy
+from app.sim.sorting_decision import warm_up as warm_up_sorting
 from app.store.engine import Store
 from app.store.records import NewCheckpoint
 from jobs.cells import CellCatalog
@@ -85,7 +87,7 @@ class Service:
         supervisor = Supervisor(store, settings.data)
         try:
             supervisor.start()
-            policies = PolicyRegistry(store, build_policy)
+            names = CheckpointNames(store)
         except BaseException:
             supervisor.stop()
             store.close()
@@ -94,7 +96,9 @@ class Service:
         self.parts = Services(
             store=store,
             supervisor=supervisor,
-            policies=policies,
+            checkpoints=names,
+            policies=PolicyRegistry(names, build_policy, DEFAULT_ALIAS),
+            sorters=PolicyRegistry(names, build_sorter, SORTERS[0]),
             cells=CellCatalog(store),
             motions=MotionCatalog(store, self._imports),
             start_world=start_world,
@@ -121,10 +125,11 @@ class Service:
         readiness = self.parts.readiness
         try:
             readiness.reason = "warming up: loading the shipped checkpoints"
-            publish_shipped(self.parts.policies)
+            publish_shipped(self.parts.checkpoints)
             readiness.reason = "warming up: compiling the simulator's kernels"
             policy = self.parts.policies.load(DEFAULT_ALIAS)
             warm_up(load_cell(LIVE_CELL))
+            warm_up_sorting()
             cell = LiveCell(load_cell(LIVE_CELL), policy, id=WORLD_ID)
             if self.parts.stopping.is_set():
                 return
@@ -140,24 +145,34 @@ class Service:
             logger.exception("the live cell could not start")
 
 
-def start_world(world_id: str, cell: Cell, policy: TaskPolicy | None) -> LiveCell:
+def start_world(
+    world_id: str, cell: Cell, policy: TaskPolicy | None, sorter: SortingValues | None = None
+) -> LiveCell:
     """Start a live cell with its viewer; whoever asked stops it."""
-    live = LiveCell(cell, policy, id=world_id)
+    live = LiveCell(cell, policy, id=world_id, sorter=sorter)
     live.start()
     return live
 
 
 def build_policy(manifest: Mapping[str, Any], tensors: bytes) -> TaskPolicy:
-    """Make the object that decides from a checkpoint's manifest and tensors."""
+    """Make the object that chooses tasks from a checkpoint's manifest and tensors."""
     checkpoint = load(manifest, tensors)
+    require_purpose(checkpoint, CHOOSING)
     return TaskChooser(checkpoint)
 
 
-def publish_shipped(policies: PolicyRegistry) -> None:
+def build_sorter(manifest: Mapping[str, Any], tensors: bytes) -> SortingValues:
+    """Make the object that values sorting moves from a checkpoint's manifest and tensors."""
+    checkpoint = load(manifest, tensors)
+    require_purpose(checkpoint, SORTING)
+    return SortingPolicy(checkpoint)
+
+
+def publish_shipped(names: CheckpointNames) -> None:
     """Put the checkpoints that come with the service into its store, under their aliases."""
     for alias in pretrained.ALIASES:
         shipped = pretrained.load(alias)
-        policies.publish(
+        names.publish(
             alias,
             NewCheckpoint(
                 sha256=shipped.sha256, manifest=shipped.manifest, tensors=shipped.tensors

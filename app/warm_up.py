@@ -9,7 +9,9 @@ import time
 import numpy as np
 
 from app.policies import pretrained
+from app.policies.checkpoint import SORTING, purpose_of
 from app.policies.task_choice import TaskChooser
+from app.sim import sorting_decision
 from app.sim.cells import load_cell
 from app.sim.commands import MoveHuman
 from app.sim.kernels.arm import CONTROLLED
@@ -23,7 +25,10 @@ def warm_up() -> float:
     """Use every kernel once; returns the time that took [s]."""
     started = time.monotonic()
     for alias in pretrained.ALIASES:
-        policy = TaskChooser(pretrained.load(alias))
+        checkpoint = pretrained.load(alias)
+        if purpose_of(checkpoint.manifest) == SORTING:
+            continue
+        policy = TaskChooser(checkpoint)
         cell = load_cell(policy.cell)
         world = World(cell, policy, seed=0)
         world.step()
@@ -33,4 +38,5 @@ def warm_up() -> float:
         batch = PickBatch(cell, N_ENVS, seed=0, settings=PickSettings())
         batch.reset()
         batch.step(np.zeros((N_ENVS, CONTROLLED), dtype=np.float32))
+    sorting_decision.warm_up()
     return time.monotonic() - started

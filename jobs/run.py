@@ -17,7 +17,7 @@ from app.policies import presets
 from app.policies.checkpoint import Checkpoint
 from app.policies.evaluation.protocols import evaluate as run_protocol
 from app.policies.evaluation.rows import Row
-from app.policies.training import Progress
+from app.policies.progress import Progress
 from app.policies.training import train as train_policy
 from app.settings import load_settings
 from app.store import checkpoints

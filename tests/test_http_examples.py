@@ -17,8 +17,9 @@ from tests.api.live_server import running, wait_until_ready
 TEXT = (Path(__file__).resolve().parent.parent / "docs" / "http.md").read_text("utf-8")
 SHELL = re.findall(r"```sh\n(.*?)```", TEXT, re.DOTALL)
 JOB = next(k for k, text in enumerate(SHELL) if "my-first-job" in text)
-"""The example that posts a job; the first and the last have tests of their own, too."""
-OTHERS = [text for k, text in enumerate(SHELL[:-1]) if k not in (0, JOB)]
+"""The example that posts a job; the first, SORT and the last have tests of their own, too."""
+SORT = next(k for k, text in enumerate(SHELL) if "/v1/sorting" in text)
+OTHERS = [text for k, text in enumerate(SHELL[:-1]) if k not in (0, JOB, SORT)]
 SAMPLES = [json.loads(one) for one in re.findall(r"```json\n(.*?)```", TEXT, re.DOTALL)]
 
 
@@ -55,8 +56,17 @@ def test_task_selection_answers_in_the_shape_that_is_shown(address: str) -> None
     assert answer["chosen"] in ("left", "right")
 
 
+def test_sorting_answers_as_is_shown_but_for_the_moves_left_out(address: str) -> None:
+    answer, shown = json.loads(shell(SHELL[SORT], address)), SAMPLES[1]
+    assert [one for one in shown["moves"] if one in answer["moves"]] == shown["moves"]
+    left_out = ("moves", "elapsed_ms")
+    assert {name: answer[name] for name in answer if name not in left_out} == {
+        name: shown[name] for name in shown if name not in left_out
+    }
+
+
 def test_refused_job_is_the_problem_that_is_shown(address: str) -> None:
-    assert json.loads(shell(SHELL[-1], address)) == SAMPLES[1]
+    assert json.loads(shell(SHELL[-1], address)) == SAMPLES[-1]
 
 
 def test_training_job_is_accepted_with_its_place(address: str) -> None:

@@ -22,9 +22,10 @@ from app.errors import ServiceError
 from app.sim import commands
 from app.sim.cells import Cell
 from app.sim.commands import Command
-from app.sim.ports import TaskPolicy
+from app.sim.live_world import check_on_table, new_world
+from app.sim.ports import SortingValues, TaskPolicy
 from app.sim.snapshot import WorldSnapshot
-from app.sim.world import World
+from app.sim.sorting_commands import SORTING_COMMANDS
 from web import gui
 from web.scene import CellScene
 
@@ -51,6 +52,8 @@ class LiveHandle:
         self._lock = threading.Lock()
         # Who will be there once all that waits is done.
         self._people = tuple(person.id for person in first.people)
+        # Changes of the table that no snapshot shows yet: those that wait, those in work.
+        self._unseen = [0, 0]
 
     @property
     def id(self) -> str:
@@ -65,6 +68,10 @@ class LiveHandle:
         """
         with self._lock:
             commands.check(command, self._cell, self._people)
+            if isinstance(command, SORTING_COMMANDS):
+                if not any(self._unseen):
+                    check_on_table(command, self._cell, self._last)
+                self._unseen[0] += 1
             self._people = commands.people_after(command, self._people)
             self._queue.put(command)
 
@@ -74,13 +81,17 @@ class LiveHandle:
 
     def publish(self, snapshot: WorldSnapshot) -> None:
         """Replace the last snapshot; for the owner only."""
-        self._last = snapshot
+        with self._lock:
+            self._last = snapshot
+            self._unseen[1] = 0
 
     def drain(self) -> list[Command]:
         """Take all waiting commands; for the owner only."""
         waiting = []
-        while not self._queue.empty():
-            waiting.append(self._queue.get())
+        with self._lock:
+            while not self._queue.empty():
+                waiting.append(self._queue.get())
+            self._unseen = [0, self._unseen[0] + self._unseen[1]]
         return waiting
 
 
@@ -94,6 +105,7 @@ class LiveCell:
         port: Port of the viewer; 0 takes a free one.
         seed: Seed of the people's work.
         id: Name of the world in URLs.
+        sorter: Values the moves of a sorting cell; None leaves them to the exact planner.
     """
 
     def __init__(
@@ -105,10 +117,12 @@ class LiveCell:
         port: int = 0,
         seed: int = 0,
         id: str = "main",
+        sorter: SortingValues | None = None,
     ) -> None:
         self._cell, self._host, self._port = cell, host, port
-        World(cell, policy, seed).step()  # compiles what is not in the kernels' cache yet
-        self._world = World(cell, policy, seed, id)
+        # The first one compiles what is not in the kernels' cache yet.
+        new_world(cell, policy, seed, id, sorter).step()
+        self._world = new_world(cell, policy, seed, id, sorter)
         self.handle = LiveHandle(id, cell, self._world.snapshot())
         """Commands in, snapshots out."""
         self._speed = 1

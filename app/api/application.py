@@ -18,6 +18,7 @@ from app.api import (
     problems,
     reference,
     session,
+    sorting,
     task_selection,
     trackers,
     viewer,
@@ -57,6 +58,7 @@ def build_app(*, lifespan: Lifespan, static: Path, token: str | None, version: s
     problems.install(app)
     for part in (
         task_selection,
+        sorting,
         trackers,
         worlds,
         jobs,

@@ -39,7 +39,7 @@ def create(
 ) -> JobPublic:
     """Queue a training or an evaluation; ``Location`` says where to follow it."""
     if isinstance(body, EvaluateJobCreate):
-        services.policies.check(body.checkpoint)
+        services.checkpoints.check(body.checkpoint)
     new = body.to_domain()
     if isinstance(body, EvaluateJobCreate):
         services.motions.check(body.motions)

@@ -1,16 +1,16 @@
 """Checkpoints as objects that decide, kept once loaded.
 
-The live world and ``POST /v1/task-selection`` get the very same :class:`TaskPolicy` objects
-from here, so that one state gives one choice.
+A registry holds objects of one kind: those that choose tasks (``ports.TaskPolicy``) and those
+that sort (``ports.SortingValues``) each have their own, over the same names. Live worlds and
+the routes that decide get the very same objects from here, so that one state gives one choice.
 """
 
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, Generic, Protocol, TypeVar
 
 from app.errors import InvalidInput, NotFound
-from app.sim.ports import TaskPolicy
 from app.store.checkpoints import (
     get_checkpoint,
     list_aliases,
@@ -22,29 +22,41 @@ from app.store.engine import Store
 from app.store.records import CheckpointRecord, NewCheckpoint
 
 MAX_POLICIES = 32
+"""Most objects that a registry keeps."""
 DEFAULT_ALIAS = "pick"
+"""The policy that chooses tasks where none is named."""
+SORTERS = ("sorting-e0", "sorting-e1")
+"""The shipped policies that sort; each goes by the name of its work cell."""
 
-Build = Callable[[Mapping[str, Any], bytes], TaskPolicy]
+
+class Loaded(Protocol):
+    """What a registry holds."""
+
+    @property
+    def checkpoint(self) -> str:
+        """SHA-256 of the checkpoint it was made of."""
 
 
-class PolicyRegistry:
-    """The policies that are loaded; safe to use from any thread.
+P = TypeVar("P", bound=Loaded)
+Build = Callable[[Mapping[str, Any], bytes], P]
+"""Makes an object that decides from a manifest and safetensors bytes."""
+
+
+class CheckpointNames:
+    """The aliases of stored checkpoints, in memory; safe to use from any thread.
 
     Args:
         store: Where checkpoints are kept.
-        build: Makes a policy from a manifest and safetensors bytes.
     """
 
-    def __init__(self, store: Store, build: Build) -> None:
-        self._store = store
-        self._build = build
-        self._lock = threading.Lock()
-        self._policies: OrderedDict[str, TaskPolicy] = OrderedDict()
+    def __init__(self, store: Store) -> None:
+        self.store = store
+        """Where checkpoints are kept."""
         self._aliases: dict[str, str] = list_aliases(store)
 
     def publish(self, alias: str, checkpoint: NewCheckpoint) -> None:
         """Store a checkpoint that came with the service and point its alias to it."""
-        put_checkpoint(self._store, checkpoint)
+        put_checkpoint(self.store, checkpoint)
         self.point(alias, checkpoint.sha256)
 
     def point(self, alias: str, sha256: str) -> None:
@@ -55,25 +67,53 @@ class PolicyRegistry:
             InvalidInput: The alias is no name.
         """
         if self._aliases.get(alias) != sha256:
-            set_alias(self._store, alias, sha256)
-            with self._lock:
-                self._aliases = list_aliases(self._store)
+            set_alias(self.store, alias, sha256)
+            self._aliases = list_aliases(self.store)
 
     @property
     def aliases(self) -> Mapping[str, str]:
         """The SHA-256 behind every alias."""
         return self._aliases
 
-    def loaded(self, reference: str | None) -> TaskPolicy | None:
+    def check(self, name: str) -> CheckpointRecord:
+        """Return what the store knows of a checkpoint that a caller named.
+
+        Raises:
+            InvalidInput: Nothing has that name.
+        """
+        try:
+            return get_checkpoint(self.store, name)
+        except NotFound:
+            rule = "is no stored checkpoint: neither its SHA-256 nor an alias"
+            raise InvalidInput("checkpoint", name, rule, tuple(self._aliases)) from None
+
+
+class PolicyRegistry(Generic[P]):
+    """The policies of one kind that are loaded; safe to use from any thread.
+
+    Args:
+        names: The stored checkpoints.
+        build: Makes a policy from a manifest and safetensors bytes; refuses other kinds.
+        default: Alias of the policy that is meant where none is named.
+    """
+
+    def __init__(self, names: CheckpointNames, build: Build[P], default: str) -> None:
+        self._names = names
+        self._build = build
+        self._default = default
+        self._lock = threading.Lock()
+        self._policies: OrderedDict[str, P] = OrderedDict()
+
+    def loaded(self, reference: str | None) -> P | None:
         """Return a policy by SHA-256 or alias if it is in memory; never waits for a disk."""
-        sha256 = self._aliases.get(reference or DEFAULT_ALIAS, reference)
+        sha256 = self._names.aliases.get(reference or self._default, reference)
         with self._lock:
             policy = self._policies.get(sha256 or "")
             if policy is not None:
                 self._policies.move_to_end(policy.checkpoint)
             return policy
 
-    def load(self, reference: str | None) -> TaskPolicy:
+    def load(self, reference: str | None) -> P:
         """Return a policy by SHA-256 or alias, reading it from the store if need be.
 
         Args:
@@ -81,29 +121,16 @@ class PolicyRegistry:
 
         Raises:
             InvalidInput: Nothing has that name.
-            CheckpointMismatch: It is no policy that chooses tasks.
+            CheckpointMismatch: It is a policy of another kind.
         """
         policy = self.loaded(reference)
         if policy is not None:
             return policy
-        record = self.check(reference)
-        tensors = read_tensors(self._store, record.sha256)
+        record = self._names.check(reference or self._default)
+        tensors = read_tensors(self._names.store, record.sha256)
         policy = self._build(record.manifest, tensors)
         with self._lock:
             self._policies[record.sha256] = policy
             while len(self._policies) > MAX_POLICIES:
                 self._policies.popitem(last=False)
         return policy
-
-    def check(self, reference: str | None) -> CheckpointRecord:
-        """Return what the store knows of a checkpoint that a caller named.
-
-        Raises:
-            InvalidInput: Nothing has that name.
-        """
-        name = reference or DEFAULT_ALIAS
-        try:
-            return get_checkpoint(self._store, name)
-        except NotFound:
-            rule = "is no stored checkpoint: neither its SHA-256 nor an alias"
-            raise InvalidInput("checkpoint", name, rule, tuple(self._aliases)) from None

@@ -8,11 +8,11 @@ from typing import Annotated, Protocol
 from fastapi import Depends
 from starlette.requests import HTTPConnection
 
-from app.api.registry import PolicyRegistry
+from app.api.registry import CheckpointNames, PolicyRegistry
 from app.api.tracker_sessions import TrackerSessions
 from app.errors import NotFound, NotReady
 from app.sim.cells import Cell
-from app.sim.ports import TaskPolicy, WorldHandle
+from app.sim.ports import SortingValues, TaskPolicy, WorldHandle
 from app.store.engine import Store
 from jobs.cells import CellCatalog
 from jobs.motions import MotionCatalog
@@ -41,8 +41,8 @@ class LiveWorld(Protocol):
         """End world and viewer."""
 
 
-StartWorld = Callable[[str, Cell, TaskPolicy | None], LiveWorld]
-"""Starts a world of an id, in a cell, with a policy; the caller stops it."""
+StartWorld = Callable[[str, Cell, TaskPolicy | None, SortingValues | None], LiveWorld]
+"""Starts a world of an id, in a cell, with a policy and a sorter; the caller stops it."""
 
 
 @dataclass(slots=True)
@@ -74,8 +74,12 @@ class Services:
     """The database."""
     supervisor: Supervisor
     """Runs the jobs; is woken when one is posted."""
-    policies: PolicyRegistry
-    """Checkpoints as objects that decide."""
+    checkpoints: CheckpointNames
+    """The stored checkpoints by name."""
+    policies: PolicyRegistry[TaskPolicy]
+    """Those that choose tasks, as objects that decide."""
+    sorters: PolicyRegistry[SortingValues]
+    """Those that sort."""
     cells: CellCatalog
     """The work cells by name."""
     motions: MotionCatalog

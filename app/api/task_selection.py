@@ -8,8 +8,9 @@ from starlette.concurrency import run_in_threadpool
 from app.api.known_people import known_people, take_time
 from app.api.schemas.task_selection import TaskSelection, TaskSelectionRequest
 from app.api.services import Services, ServicesDep
+from app.api.world_policies import require_mover
 from app.errors import InvalidInput, NotFound
-from app.sim.cells import Cell, cell_names, require_cell
+from app.sim.cells import Cell, cell_names
 
 MAX_INLINE_CANDIDATES = 32
 """More than this many are decided on a thread, so that streams and other callers go on."""
@@ -28,7 +29,7 @@ async def choose(request: TaskSelectionRequest, services: ServicesDep) -> TaskSe
     policy = services.policies.loaded(request.checkpoint)
     if policy is None:
         policy = await run_in_threadpool(services.policies.load, request.checkpoint)
-    require_cell(cell, policy.cell, policy.cell_sha256)
+    require_mover(policy, cell, services)
     decide = partial(
         policy.decide,
         q,

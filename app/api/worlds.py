@@ -25,17 +25,14 @@ from app.api.schemas.worlds import (
     WorldSummary,
 )
 from app.api.services import LiveWorld, Services, ServicesDep
+from app.api.world_policies import mover_for, require_mover, require_sorter, sorter_for
 from app.errors import InvalidInput, NotReady
-from app.policies.trained_cell import is_for
 from app.sim.cases import cases_of
-from app.sim.cells import Cell, lacks_for_pick, require_cell
+from app.sim.cells import Cell
+from app.sim.live_world import lacks_for_live
 from app.sim.motions import Motion
-from app.sim.ports import TaskPolicy
-from app.store.checkpoints import list_checkpoints
 
 STREAM_PERIOD_S = 0.1
-MAX_LOOKED_AT = 200
-"""Newest checkpoints that are looked through for one of a cell."""
 
 router = APIRouter(prefix="/v1/worlds", tags=["worlds"])
 
@@ -72,15 +69,14 @@ async def command(
         policy = None
         if body.checkpoint is not None:
             policy = await run_in_threadpool(services.policies.load, body.checkpoint)
-            if policy.cell != snapshot.cell:
-                rule = f"must decide in the cell {snapshot.cell}, not in {policy.cell}"
-                raise InvalidInput("checkpoint", body.checkpoint, rule)
-            require_cell(world.cell, policy.cell, policy.cell_sha256)
+            require_mover(policy, world.cell, services)
         world.handle.submit(body.to_domain(policy))
     elif isinstance(body, SetSorter):
+        sorter = None
         if body.checkpoint is not None:
-            raise InvalidInput("checkpoint", body.checkpoint, "is no sorter: none is stored")
-        world.handle.submit(body.to_domain(None))
+            sorter = await run_in_threadpool(services.sorters.load, body.checkpoint)
+            require_sorter(sorter, world.cell)
+        world.handle.submit(body.to_domain(sorter))
     elif isinstance(body, SetMotion):
         runs = await run_in_threadpool(_runs_of, body.name, services)
         world.handle.submit(body.to_domain(runs))
@@ -111,38 +107,34 @@ async def stream(world: WorldDep, services: ServicesDep) -> AsyncIterator[Server
 
 @router.put("/{world_id}/cell", summary="Start a live world anew in another cell")
 def set_cell(world_id: str, body: WorldCell, services: ServicesDep) -> WorldSummary:
-    """Stop the world and start it in a cell with a pick scenario; its streams end.
+    """Stop the world and start it in a cell to pick and place or to sort in; its streams end.
 
     The policy is the one that is named, else the one that ships with the cell, else the newest
-    that was trained in it, else none: the robot rests.
+    that was trained in it, else none: the robot rests. In a sorting cell the shipped policy may
+    act where the cell differs from its own in nothing but stations; the sorter is the one that
+    is named, else the one that ships with the cell, else the exact planner.
     """
     services.world(world_id)
     cell = services.cells.get(body.cell)
-    if (lack := lacks_for_pick(cell)) is not None:
+    if (lack := lacks_for_live(cell)) is not None:
         raise InvalidInput("cell", cell.name, f"cannot be shown live: it {lack}")
     if body.checkpoint is None:
-        policy = _policy_for(cell, services)
+        policy = mover_for(cell, services)
     else:
         policy = services.policies.load(body.checkpoint)
-        require_cell(cell, policy.cell, policy.cell_sha256)
+        require_mover(policy, cell, services)
+    if body.sorter is None:
+        sorter = sorter_for(cell, services)
+    else:
+        sorter = services.sorters.load(body.sorter)
+        require_sorter(sorter, cell)
     with services.replacing:
         if services.stopping.is_set():
             raise NotReady("stopping")
-        new = services.start_world(world_id, cell, policy)
+        new = services.start_world(world_id, cell, policy, sorter)
         old, services.worlds[world_id] = services.worlds[world_id], new
     old.stop()
     return WorldSummary.from_domain(new.handle.snapshot())
-
-
-def _policy_for(cell: Cell, services: Services) -> TaskPolicy | None:
-    """Return the default policy if it was trained in the cell, else the newest that was."""
-    default = services.policies.load(None)
-    if (default.cell, default.cell_sha256) == (cell.name, cell.sha256):
-        return default
-    for record in list_checkpoints(services.store, limit=MAX_LOOKED_AT).items:
-        if is_for(record.manifest, cell):
-            return services.policies.load(record.sha256)
-    return None
 
 
 def _runs_of(name: str, services: Services) -> tuple[Motion, ...]:

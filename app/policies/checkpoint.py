@@ -25,6 +25,8 @@ from app.errors import CheckpointMismatch, InvalidInput
 FORMAT = "tandem-checkpoint/1"
 MAX_BYTES = 16 * 1024 * 1024
 """Largest tensors blob taken [bytes]; a database row holds it."""
+CHOOSING, SORTING = "choosing tasks", "sorting"
+"""What policies are for."""
 REQUIRED = {
     "format": str,
     "kind": str,
@@ -141,3 +143,19 @@ def expect_layout(checkpoint: Checkpoint, layout: list[list[Any]], act_size: int
         raise CheckpointMismatch("layout", layout, checkpoint.manifest["layout"])
     if checkpoint.manifest["act_size"] != act_size:
         raise CheckpointMismatch("act_size", act_size, checkpoint.manifest["act_size"])
+
+
+def purpose_of(manifest: Mapping[str, Any]) -> str:
+    """Return what a checkpoint's policy is for: it sorts if it sees towers."""
+    groups = [entry[0] for entry in manifest["layout"] if isinstance(entry, list) and entry]
+    return SORTING if "towers" in groups else CHOOSING
+
+
+def require_purpose(checkpoint: Checkpoint, purpose: str) -> None:
+    """Make sure that a checkpoint's policy is for what it is asked to do.
+
+    Raises:
+        CheckpointMismatch: It is for something else.
+    """
+    if (actual := purpose_of(checkpoint.manifest)) != purpose:
+        raise CheckpointMismatch("purpose", purpose, actual)

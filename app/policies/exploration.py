@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from app.policies.presets import Preset
+from app.policies.pick_preset import PickPreset
 from app.sim.kernels.arm import CONTROLLED
 from app.sim.kernels.features import BASE_GAIN
 from app.sim.pick import PickBatch
@@ -32,7 +32,7 @@ class Exploration:
         rng: Random numbers.
     """
 
-    def __init__(self, preset: Preset, batch: PickBatch, rng: np.random.Generator) -> None:
+    def __init__(self, preset: PickPreset, batch: PickBatch, rng: np.random.Generator) -> None:
         self._batch, self._rng = batch, rng
         n = batch.n_envs
         self.n_greedy = max(1, round(preset.greedy_share * n))

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from app.errors import CheckpointMismatch, InvalidInput
 from app.policies.checkpoint import Checkpoint, expect_layout
 from app.policies.networks import ResidualActor, TwinCritic
-from app.policies.presets import action_of
+from app.policies.pick_preset import action_of
+from app.policies.pick_training import LAYOUTS
 from app.policies.trained_cell import cell_of
-from app.policies.training import LAYOUTS
 from app.sim import human, robot
 from app.sim.actions import ActionSettings
 from app.sim.cells import Cell, require_cell

@@ -22,7 +22,7 @@ from torch.nn import functional
 
 from app.policies.exploration import Exploration
 from app.policies.networks import ResidualActor, TwinCritic
-from app.policies.presets import Preset
+from app.policies.pick_preset import PickPreset
 from app.policies.vecenv import PickVecEnv
 
 
@@ -76,7 +76,7 @@ class PickTD3(TD3):
         seed: Seed of networks, replay and exploration.
     """
 
-    def __init__(self, preset: Preset, env: PickVecEnv, seed: int) -> None:
+    def __init__(self, preset: PickPreset, env: PickVecEnv, seed: int) -> None:
         start, end = preset.lr_start, preset.lr_end
         self.preset = preset
         self.exploration = Exploration(preset, env.batch, np.random.default_rng(seed))

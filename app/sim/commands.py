@@ -17,10 +17,8 @@ from app.sim.cases import cases_of
 from app.sim.cells import LIMITS, Cell
 from app.sim.motions import Motion
 from app.sim.ports import TaskPolicy
-from app.sim.sorting_commands import (
-    SORTING_COMMANDS,
-    SortingCommand,
-)
+from app.sim.sorting_cell import is_sorting
+from app.sim.sorting_commands import SORTING_COMMANDS, SortingCommand, check_sorting
 
 Mode = Literal["manual", "auto", "still", "recorded"]
 """Who moves a person: the visitor; the work cycle or a case study; nobody, so that the person
@@ -245,11 +243,14 @@ def check(command: Command, cell: Cell, people: Sequence[int]) -> None:
 
     Raises:
         InvalidInput: A number or mode out of range, nobody of that id, or no room.
-        NotFound: The cell has no such station, or no such case study.
+        NotFound: The cell has no such station, case study or test.
     """
     match command:
         case MoveHuman() | SetMode() | SetMotion() | SetBody() | RemovePerson() | AddPerson():
             _check_person(command, people)
+        case SetCandidates() | ToggleCandidate() | StartCase() if is_sorting(cell):
+            rule = f"needs a pick-and-place cell: {cell.name} is a sorting cell"
+            raise InvalidInput("tag", command.tag, rule)
         case SetCandidates():
             for name in command.ids:
                 cell.station(name)
@@ -264,7 +265,8 @@ def check(command: Command, cell: Cell, people: Sequence[int]) -> None:
             if command.id not in names:
                 raise NotFound("case study of this cell", command.id, names)
         case _:
-            pass
+            if isinstance(command, SORTING_COMMANDS):
+                check_sorting(command, cell)
 
 
 def _check_person(

@@ -32,7 +32,9 @@ class LiveArm:
         """What the kernels know of it."""
         self.clearance_m: float | None = None
         """Least distance to people, as last tested [m]; None where nobody is."""
-        self._people, self._action = people_of(cell), action
+        self.action = action
+        """What the actions of its policy mean."""
+        self._people = people_of(cell)
         self.put(self.home)
 
     @property
@@ -59,7 +61,15 @@ class LiveArm:
         found = self._test(rest, rest, rest, people, people.q, people.sizes)
         return found.kind != "none"
 
-    def advance(self, act: Vec, people: LivePeople, human_q: Vec, sizes: Vec) -> Contact:
+    def advance(
+        self,
+        act: Vec,
+        people: LivePeople,
+        human_q: Vec,
+        sizes: Vec,
+        *,
+        straight: bool = False,
+    ) -> Contact:
         """Carry out one action, unless something is touched: then stay at the start.
 
         Args:
@@ -67,8 +77,10 @@ class LiveArm:
             people: The people, as they are at the end of the period.
             human_q: Their joints at its start [m, rad], shape (n, 18).
             sizes: Their sizes then [m], shape (n, N_SIZE).
+            straight: Whether the action comes from :meth:`toward`, not from the policy.
         """
-        piece = pick.step_robot(self.arm, self.q, self.qd, self.qdd, act, self._action)
+        rule = pick.DEFAULT_ACTION if straight else self.action
+        piece = pick.step_robot(self.arm, self.q, self.qd, self.qdd, act, rule)
         found = self._test(self.qd, piece.c, piece.d, people, human_q, sizes)
         if found.kind == "none":
             self.q, self.qd, self.qdd = piece.q, piece.qd, piece.qdd

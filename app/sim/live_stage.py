@@ -109,6 +109,11 @@ class LiveStage:
 
     # The robot.
 
+    def use(self, policy: TaskPolicy | None) -> None:
+        """Let another policy choose and move."""
+        self.policy = policy
+        self.robot.action = pick.DEFAULT_ACTION if policy is None else policy.action
+
     def touches_here(self) -> bool:
         """Whether the robot touches anything where it is."""
         return self.robot.touches(self.people)

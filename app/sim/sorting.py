@@ -47,6 +47,8 @@ class SortingSettings:
     """Share of episodes that start partly solved (e_s of METHOD 1.4)."""
     solved_share: float = 0.0
     """Share of their goal that is done (g_s)."""
+    even_share: float = 0.0
+    """Share of episodes whose K_E and K_G are drawn evenly, not triangular."""
     human_rate: float = 0.0
     """Chance per attempt that a person interferes."""
     localisation_rate: float = 0.0
@@ -178,6 +180,7 @@ class SortingBatch:
             disturbed_share=of.disturbed_share,
             solved_episodes=of.solved_episodes,
             solved_share=of.solved_share,
+            even_share=of.even_share,
             human_rate=of.human_rate,
             localisation_rate=of.localisation_rate,
             random_map_share=of.random_map_share,

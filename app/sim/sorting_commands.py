@@ -8,7 +8,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
+from app.errors import InvalidInput, NotFound
+from app.sim.cells import Cell
 from app.sim.ports import SortingValues
+from app.sim.sorting_cell import is_sorting
+from app.sim.sorting_state import SIZE_NAMES
+from app.sim.sorting_table import Block, SortingTable
+from app.sim.sorting_tests import TESTS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,3 +103,66 @@ SORTING_COMMANDS: tuple[type[SortingCommand], ...] = (
     StartTest,
     SetSorter,
 )
+
+
+def check_sorting(command: SortingCommand, cell: Cell) -> None:
+    """Refuse a command whose words the cell does not know, whatever lies on its table.
+
+    Raises:
+        InvalidInput: Nothing can be sorted here, or a word is not known.
+        NotFound: There is no such test.
+    """
+    if not is_sorting(cell):
+        raise InvalidInput("tag", command.tag, f"needs a sorting cell: {cell.name} is none")
+    colours = tuple(one.colour or one.id for one in cell.stations_of("cluster"))
+    towers = tuple(one.id for one in cell.stations_of("cluster"))
+    sizes = SIZE_NAMES[3]
+    places = (*(one.id for one in cell.stations_of("clutter")), *towers)
+    match command:
+        case AddObject():
+            _require("colour", command.colour, colours, "is no colour of this cell")
+            _require("size", command.size, sizes, "is no size")
+            if command.at is not None:
+                _require("at", command.at, places, "is no clutter cell or tower of this cell")
+        case MoveObject():
+            _require("to", command.to, places, "is no clutter cell or tower of this cell")
+        case SetGoal():
+            for tower, wanted in command.towers.items():
+                _require("towers", tower, towers, "is no tower of this cell")
+                for level, size in enumerate(wanted):
+                    _require(f"towers.{tower}[{level}]", size, sizes, "is no size")
+        case StartTest():
+            names = tuple(one.name for one in TESTS)
+            if command.id not in names:
+                raise NotFound("sorting test", command.id, names)
+        case _:
+            pass
+
+
+def _require(field: str, word: str, words: tuple[str, ...], rule: str) -> None:
+    if word not in words:
+        raise InvalidInput(field, word, rule, words)
+
+
+def carry_out(command: object, table: SortingTable) -> Block | None:
+    """Change blocks or goal as a command says; return a block that the goal lost with it.
+
+    Raises:
+        InvalidInput: It does not fit what is on the table; nothing has changed.
+    """
+    match command:
+        case AddObject():
+            table.add(command.colour, command.size, command.at)
+        case MoveObject():
+            table.move(command.id, command.to)
+        case SetGoal():
+            table.set_goal(command.towers)
+        case ToggleGoal():
+            table.toggle_goal(command.id)
+        case RemoveObject():
+            before = table.goal.copy()
+            gone = table.remove(command.id)
+            return gone if (table.goal != before).any() else None
+        case _:
+            pass
+    return None

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.errors import InvalidInput
-from app.sim.kernels.sorting_planner import PlannerWork, new_work, plan_state
+from app.sim.kernels.sorting_planner import Objects, PlannerWork, Task, new_work, plan_state
 from app.sim.ports import Vec
 from app.sim.sorting_state import NULL, Move, SortingShape, SortingState, missing
 
@@ -40,24 +40,16 @@ class Plan:
 def _solve(state: SortingState, shape: SortingShape) -> tuple[Plan, PlannerWork]:
     """Return what is known of a state, and the work space that holds the plan."""
     work = new_work(shape.n_cells, shape.n_colours, shape.n_sizes)
-    first = np.zeros(shape.n_actions, dtype=np.bool_)
-    moves, attempts = plan_state(
-        state.clutter,
-        state.towers,
-        np.count_nonzero(state.towers, axis=1),
-        state.goal,
-        np.count_nonzero(state.goal, axis=1),
-        state.fail,
-        work,
-        first,
-    )
+    heights = np.count_nonzero(state.towers, axis=1)
+    task = Task(state.goal, np.count_nonzero(state.goal, axis=1), state.fail)
+    moves, attempts = plan_state(Objects(state.clutter, state.towers, heights), task, work)
     if moves < 0:
         raise _cannot_be_met(state, shape)
     best = int(work.actions[0])
     plan = Plan(
         moves=moves,
         attempts=attempts,
-        first=tuple(np.flatnonzero(first).tolist()),
+        first=tuple(np.flatnonzero(work.first).tolist()),
         best=best if best >= 0 else None,
     )
     return plan, work

@@ -13,11 +13,19 @@ from app.sim.sorting_watch import SortingWatch
 By = Literal["policy", "planner"]
 """Who decided."""
 Why = Literal[
-    "policy", "asked", "no-policy", "other-shape", "untrained-goal", "repeated", "patience"
+    "policy",
+    "solved",
+    "asked",
+    "no-policy",
+    "other-shape",
+    "untrained-goal",
+    "repeated",
+    "patience",
 ]
 """Why it was the policy, or the planner; :data:`REASONS` says it in a sentence."""
 REASONS: dict[Why, str] = {
     "policy": "The policy's values choose.",
+    "solved": "The goal is reached: there is nothing to move.",
     "asked": "The exact planner was asked for.",
     "no-policy": "No policy decides here, so the exact planner does.",
     "other-shape": "The policy was trained for another number of cells, colours or sizes.",
@@ -36,8 +44,8 @@ class RankedMove:
     move: Move
     """From where to where."""
     value: float | None
-    """Policy: Q, expected discounted reward. Planner: minus the attempts expected to the goal if
-    this move comes first; None where the task is too large to work that out for every move."""
+    """Policy: Q, expected discounted reward. Planner: minus the attempts expected to the goal
+    if this move comes first; None where the task is too large to say so for every move."""
     fewest: bool
     """Whether a plan of the fewest moves begins with it."""
 

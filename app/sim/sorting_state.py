@@ -223,5 +223,5 @@ def check_state(state: SortingState, shape: SortingShape) -> None:
         raise InvalidInput("objects", state.n_objects, f"must be at most {k}")
     lack = missing(state, shape)
     if lack.any():
-        codes = np.flatnonzero(lack).tolist()
-        raise InvalidInput("goal", codes, "must be met by the objects: these codes are missing")
+        rule = "must be met by the objects: these codes are missing"
+        raise InvalidInput("goal", np.flatnonzero(lack).tolist(), rule)

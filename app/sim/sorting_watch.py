@@ -11,9 +11,9 @@ was meant to give; the next state then tells what happened:
 | any other | a person, or another object moved than meant | begins anew |
 
 States are compared with their goal and failure map: a change of these is a person's, too. The
-planner also takes over after :data:`PATIENCE` times the expected attempts. It then decides until
-the goal is reached or the record begins anew. The record is small and travels in JSON: who asks
-gets it with the answer and hands it back with the next question.
+planner also takes over after :data:`PATIENCE` times the expected attempts. It then decides
+until the goal is reached or the record begins anew. The record is small and travels in JSON:
+who asks gets it with the answer and hands it back with the next question.
 
 Source: ours (the method has no such rule); expected attempts are the exact planner's.
 """

@@ -9,8 +9,6 @@ the next episode goes on from there. A contact is shown for two seconds; then th
 again from home.
 """
 
-from typing import Protocol
-
 import numpy as np
 
 from app.sim import commands, explanation
@@ -25,19 +23,6 @@ PICK_HEIGHT = 0.065
 """Height of the tcp over the table when the fingers close [m]."""
 PICK_S = (0.9, 1.3, 2.0)
 """Times at which the tool is down, the fingers have closed, the tool is up again [s]."""
-
-
-class LiveWorld(Protocol):
-    """One live cell of any scenario."""
-
-    def apply(self, command: Command) -> None:
-        """Carry out one command."""
-
-    def step(self) -> None:
-        """Advance by one control period."""
-
-    def snapshot(self) -> WorldSnapshot:
-        """Return what is known now, frozen."""
 
 
 class World:
@@ -121,7 +106,7 @@ class World:
             case commands.ToggleCandidate():
                 self._choose_among(set(self._selected) ^ {command.id})
             case commands.SetPolicy():
-                self._stage.policy = command.policy
+                self._stage.use(command.policy)
                 self._refresh()
             case commands.StartCase():
                 self._start_case(find_case(command.id))
@@ -188,7 +173,10 @@ class World:
     def _move_robot(self, human_q: Vec, sizes: Vec) -> None:
         """Carry out the action, the people having moved from ``human_q`` with ``sizes``."""
         stage = self._stage
-        found = stage.robot.advance(self._action(), stage.people, human_q, sizes)
+        straight = stage.status == "picking"
+        found = stage.robot.advance(
+            self._action(), stage.people, human_q, sizes, straight=straight
+        )
         if found.kind != "none":
             stage.note_contact(found)
         elif stage.status == "picking":

@@ -3,8 +3,9 @@
 import pytest
 
 from app.policies import presets
-from app.policies.presets import Preset
-from app.policies.training import Progress, train
+from app.policies.pick_preset import PickPreset
+from app.policies.progress import Progress
+from app.policies.training import train
 
 TINY = {
     "total_steps": 1536,
@@ -28,7 +29,7 @@ class Recorder:
         self.checkpoints = []
         self._stop_at = stop_at
 
-    def run(self, preset: Preset, resume=None, seed: int = 3):
+    def run(self, preset: PickPreset, resume=None, seed: int = 3):
         return train(
             preset,
             seed=seed,
@@ -46,7 +47,7 @@ class Recorder:
 
 
 @pytest.fixture(scope="session")
-def tiny_preset() -> Preset:
+def tiny_preset() -> PickPreset:
     return presets.resolve("pick-td3", TINY)
 
 

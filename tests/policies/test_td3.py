@@ -5,8 +5,8 @@ import pytest
 import torch
 
 from app.policies.networks import ResidualActor, TwinCritic
+from app.policies.pick_training import settings_of
 from app.policies.td3 import PickTD3, twin_of
-from app.policies.training import settings_of
 from app.policies.vecenv import PickVecEnv
 from app.sim.cells import load_cell
 from app.sim.kernels.features import LAYOUT, N_FEATURES

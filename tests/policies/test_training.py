@@ -7,8 +7,8 @@ import pytest
 
 from app.errors import CheckpointMismatch
 from app.policies import presets
+from app.policies.pick_training import LAYOUTS
 from app.policies.task_choice import TaskChooser, ValueNetworks
-from app.policies.training import LAYOUTS
 from app.sim import human
 from app.sim.body_size import percentile_body
 from app.sim.cells import load_cell

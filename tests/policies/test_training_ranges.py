@@ -1,6 +1,6 @@
 """What a checkpoint says of the states it met."""
 
-from app.policies.training import _Ranges
+from app.policies.pick_training import _Ranges
 from app.sim.cells import load_cell
 from app.sim.pick import PickBatch, PickSettings
 from app.sim.worker_motion import WorkSettings

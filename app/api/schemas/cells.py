@@ -7,6 +7,7 @@ from pydantic import Field
 from app.api.schemas.numbers import Answer
 from app.sim.cases import cases_of
 from app.sim.cells import Cell, cell_names, lacks_for_pick
+from app.sim.live_world import lacks_for_live, tests_of
 
 
 class CasePublic(Answer):
@@ -19,6 +20,14 @@ class CasePublic(Answer):
     expected: str = Field(description="the goal it should end at")
 
 
+class SortingTestPublic(Answer):
+    """One sorting test that can be started in a live cell."""
+
+    id: str
+    title: str
+    text: str = Field(description="what happens, for people")
+
+
 class CellPublic(Answer):
     """One work cell: the file's own content, its identity and its case studies."""
 
@@ -29,6 +38,9 @@ class CellPublic(Answer):
     lacks_for_pick: str | None = Field(
         description="why no policy can be trained or shown in it; null where one can"
     )
+    lacks_for_live: str | None = Field(
+        description="why it cannot be shown live; null where it can"
+    )
     table: dict[str, Any] = Field(description="table top [m]")
     robot: dict[str, Any] = Field(description="home, limits and tool [rad, rad/s, m]")
     stations: list[dict[str, Any]] = Field(description="named places, positions [m]")
@@ -37,6 +49,7 @@ class CellPublic(Answer):
     people: list[dict[str, Any]] = Field(description="who may be there, and where [m, rad]")
     safety: dict[str, Any] = Field(description="what safety assumes [m, m/s, s]")
     cases: list[CasePublic]
+    sorting_tests: list[SortingTestPublic]
 
     @classmethod
     def from_domain(cls, cell: Cell) -> Self:
@@ -56,7 +69,12 @@ class CellPublic(Answer):
             shipped=cell.name in cell_names(),
             sha256=cell.sha256,
             lacks_for_pick=lacks_for_pick(cell),
+            lacks_for_live=lacks_for_live(cell),
             cases=cases,
+            sorting_tests=[
+                SortingTestPublic(id=one.name, title=one.title, text=one.text)
+                for one in tests_of(cell)
+            ],
         )
 
 

@@ -161,9 +161,12 @@ class WorldSummary(Answer):
 class WorldCell(Body):
     """The cell a live world shall show from now on."""
 
-    cell: str = Field(max_length=64, description="name of a work cell with a pick scenario")
+    cell: str = Field(max_length=64, description="name of a cell to pick and place or sort in")
     checkpoint: str | None = Field(
         None, max_length=64, description="SHA-256 or alias of what decides; see above if null"
+    )
+    sorter: str | None = Field(
+        None, max_length=64, description="SHA-256 or alias of what sorts; see above if null"
     )
 
 

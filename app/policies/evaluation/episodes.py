@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.policies.evaluation.statistics import wilson
-from app.policies.presets import action_of
+from app.policies.pick_preset import action_of
 from app.policies.task_choice import ValueNetworks
 from app.sim.cells import Cell
 from app.sim.kernels import episode as kernel

@@ -16,7 +16,14 @@ _PEOPLE = {
 }
 """Ids and who is in the cell; None for the cell's own people."""
 
-IDS = tuple(f"tandem/{name}-v0" for name in _PEOPLE)
+_SORTING = {"SortingE0": "sorting-e0", "SortingE1": "sorting-e1"}
+"""Ids of the sorting task and their work cells."""
+
+PEOPLE_IDS = tuple(f"tandem/{name}-v0" for name in _PEOPLE)
+"""Registered ids of the robot beside people."""
+SORTING_IDS = tuple(f"tandem/{name}-v0" for name in _SORTING)
+"""Registered ids of the sorting task."""
+IDS = (*PEOPLE_IDS, *SORTING_IDS)
 """All registered ids."""
 
 for _name, _people in _PEOPLE.items():
@@ -27,4 +34,12 @@ for _name, _people in _PEOPLE.items():
         entry_point=f"{_entry}Env",
         vector_entry_point=f"{_entry}VectorEnv",
         kwargs={} if _people is None else {"people": _people},
+    )
+
+for _name, _cell in _SORTING.items():
+    gymnasium.register(
+        id=f"tandem/{_name}-v0",
+        entry_point="app.sim.envs.sorting:SortingEnv",
+        vector_entry_point="app.sim.envs.sorting:SortingVectorEnv",
+        kwargs={"cell": _cell},
     )

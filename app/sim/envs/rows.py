@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Protocol, TypeVar, cast
+from typing import Any, Protocol, TypeVar, cast
 
 import numpy as np
 from gymnasium import spaces
@@ -43,10 +43,15 @@ class State(Protocol):
         """Time left [s], shape (n_envs,)."""
 
 
-class Batch(Protocol):
-    """Cells that are stepped together; ``PickBatch`` and ``ReachBatch`` are such."""
+class Seeded(Protocol):
+    """Whatever draws its episodes from a seed."""
 
     seed: int
+
+
+class Batch(Seeded, Protocol):
+    """Cells that are stepped together; ``PickBatch`` and ``ReachBatch`` are such."""
+
     n_envs: int
     obs_size: int
 
@@ -85,12 +90,43 @@ def obs_space(batch: Batch) -> spaces.Space[Obs]:
     return _box(OBS_BOUND, batch.obs_size)
 
 
-def next_episode(batch: Batch, seed: int | None, episode: int | None) -> None:
+def next_episode(
+    batch: Seeded, episodes: NDArray[np.int64], seed: int | None, episode: int | None
+) -> None:
     """Number the episodes that start now: 0 of a new seed, the next of the same, or any."""
     if seed is not None:
         batch.seed = seed
-        batch.state.episode[:] = 0
+        episodes[:] = 0
     else:
-        batch.state.episode[:] += 1
+        episodes[:] += 1
     if episode is not None:
-        batch.state.episode[:] = episode
+        episodes[:] = episode
+
+
+def add_final(
+    infos: dict[str, Any],
+    last: NDArray[Any],
+    done: NDArray[np.bool_],
+    outcome: NDArray[Any],
+    episode: NDArray[np.int64],
+) -> None:
+    """Tell in ``infos`` how the episodes ended that ended now, as Gymnasium does.
+
+    Args:
+        infos: What is told; changed.
+        last: Final observations of the rows that ended, shape (n_envs, obs_size).
+        done: Which rows ended, shape (n_envs,).
+        outcome: Their names of outcomes, shape (n_envs,).
+        episode: Numbers of the episodes that run now, shape (n_envs,).
+    """
+    final_obs = np.full(done.size, None, dtype=object)
+    for row in np.flatnonzero(done):
+        final_obs[row] = last[row].copy()
+    final: dict[str, Any] = {
+        "outcome": np.where(done, outcome, None),
+        "episode_number": np.where(done, episode - 1, 0),
+    }
+    for name in tuple(final):
+        final[f"_{name}"] = done.copy()
+    infos["final_obs"], infos["_final_obs"] = final_obs, done.copy()
+    infos["final_info"], infos["_final_info"] = final, done.copy()

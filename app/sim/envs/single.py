@@ -39,7 +39,8 @@ class SingleEnv(gymnasium.Env[Obs, Obs]):
         if seed is None and not self._seeded:
             seed = int(self.np_random.integers(2**31))
         self._seeded = True
-        next_episode(self._rows, seed, (options or {}).get("episode"))
+        episode = (options or {}).get("episode")
+        next_episode(self._rows, self._rows.state.episode, seed, episode)
         self._running = True
         return self._rows.restart()[0].copy(), self._info()
 

@@ -8,7 +8,15 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from app.sim.envs.rows import TIMEOUT, Batch, Obs, act_space, next_episode, obs_space
+from app.sim.envs.rows import (
+    TIMEOUT,
+    Batch,
+    Obs,
+    act_space,
+    add_final,
+    next_episode,
+    obs_space,
+)
 from app.sim.pick import OUTCOMES
 
 NAMES = np.array(OUTCOMES, dtype=object)
@@ -59,7 +67,8 @@ class BatchVectorEnv(VectorEnv[Obs, Obs, NDArray[Any]]):
         if seed is None and not self._seeded:
             seed = int(self.np_random.integers(2**31))
         self._seeded = True
-        next_episode(self._rows, seed, (options or {}).get("episode"))
+        episode = (options or {}).get("episode")
+        next_episode(self._rows, self._rows.state.episode, seed, episode)
         return self._rows.restart().copy(), self._info()
 
     def step(self, actions: Obs) -> Steps:
@@ -80,28 +89,10 @@ class BatchVectorEnv(VectorEnv[Obs, Obs, NDArray[Any]]):
         late = (result.ended == TIMEOUT) & (not self._sees_time)
         infos = self._info()
         if done.any():
-            self._add_final(infos, result.last_obs, result.ended, done)
+            add_final(
+                infos, result.last_obs, done, NAMES[result.ended], self._rows.state.episode
+            )
         return result.obs.copy(), result.rew.astype(np.float64), done & ~late, late, infos
-
-    def _add_final(
-        self,
-        infos: dict[str, Any],
-        last: Obs,
-        ended: NDArray[np.int64],
-        done: NDArray[np.bool_],
-    ) -> None:
-        """Tell how the episodes ended that ended now."""
-        outcome = NAMES[ended]
-        outcome[~done] = None
-        final_obs = np.full(self.num_envs, None, dtype=object)
-        for row in np.flatnonzero(done):
-            final_obs[row] = last[row].copy()
-        episode = np.where(done, self._rows.state.episode - 1, 0)
-        final: dict[str, Any] = {"outcome": outcome, "episode_number": episode}
-        for name in tuple(final):
-            final[f"_{name}"] = done.copy()
-        infos["final_obs"], infos["_final_obs"] = final_obs, done.copy()
-        infos["final_info"], infos["_final_info"] = final, done.copy()
 
     def _info(self) -> dict[str, Any]:
         state = self._rows.state

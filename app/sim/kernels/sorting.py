@@ -48,6 +48,8 @@ class SortingRules(NamedTuple):
     """Share of episodes that start partly solved, e_s of METHOD 1.4."""
     solved_share: float
     """Share of their goal that is done, g_s of METHOD 1.4."""
+    even_share: float
+    """Share of episodes whose K_E and K_G are drawn evenly."""
     human_rate: float
     """Chance per attempt that a person interferes."""
     localisation_rate: float

@@ -1,18 +1,12 @@
-"""Exact plans of the sorting task: all best next moves, the least risky one, whole plans, compiled.
+"""Exact plans of the sorting task: next moves for batches, whole plans with their risk, compiled.
 
-The fewest moves from every state come from :mod:`app.sim.kernels.sorting_progress`. A pick from
-cell ``k`` fails with probability ``fail[k]`` and leaves everything as it is, so it takes ``1 /
-(1 - fail[k])`` attempts on average, and a plan's expected attempts are the sum over its picks;
-picks from towers do not fail. Fewest moves come first; among such plans expected attempts are
-kept low by rules, in this order:
-
-1. tower to tower, where the object is wanted: nothing is risked;
-2. clutter to tower, the least risky twin of all that are wanted: it frees a good cell;
-3. tower to a tower where the object waits, where that costs no move: its next pick is safe;
-4. tower to clutter: of the removals the one whose object will be picked again at the least
-   risk, into the best free cell; into the worst one if it will not be picked again.
-
-How near this comes to the fewest expected attempts is measured by ``docs/planner_nearness.py``.
+A pick from cell ``k`` fails with probability ``fail[k]`` and leaves everything as it is, so it
+takes ``1 / (1 - fail[k])`` attempts on average, and a plan's expected attempts are the sum over
+its picks; picks from towers do not fail. Fewest moves come first. Of the plans with the fewest
+moves one with few expected attempts is found by rules (:mod:`app.sim.kernels.sorting_rules`)
+and by looking ahead: wherever the rules put an object aside that will be wanted again, each
+other way to put one aside is tried, the rules finish the plan, and the best one is taken.
+``docs/planner_nearness.py`` measures how near that comes to the fewest expected attempts.
 """
 
 from typing import NamedTuple
@@ -26,16 +20,45 @@ from app.sim.kernels.sorting_progress import (
     Ints,
     Progress,
     fill,
-    in_clutter,
     lay_out,
     new_progress,
     state_number,
     ties_on_tower,
 )
+from app.sim.kernels.sorting_rules import (
+    NONE,
+    choose,
+    mark_first,
+    still_wanted,
+)
 from app.sim.ports import Vec
 
-NONE = -1
-"""No action: solved, or the goal cannot be met."""
+MOST_STATES = 20_000
+"""Tasks with more states are planned by the rules alone: looking ahead would take seconds."""
+CELLS_TRIED = 3
+"""How many of the best free cells are tried for an object put aside, besides the worst one."""
+
+
+class Objects(NamedTuple):
+    """Where the objects are, while a plan is followed."""
+
+    clutter: Bytes
+    """Objects in the cells, shape (K,)."""
+    towers: Bytes
+    """Objects on the towers, lowest first, shape (C, K)."""
+    heights: Ints
+    """Objects per tower, shape (C,)."""
+
+
+class Task(NamedTuple):
+    """What is asked for, and at which risk."""
+
+    goal: Bytes
+    """What the towers shall be, shape (C, K)."""
+    goal_heights: Ints
+    """Objects per tower there, shape (C,)."""
+    fail: Vec
+    """Failure probabilities of the cells, shape (K,)."""
 
 
 class PlannerWork(NamedTuple):
@@ -45,305 +68,243 @@ class PlannerWork(NamedTuple):
     """States of the task."""
     at: Ints
     """Work space of sweeps, shape (C,)."""
-    clutter: Bytes
-    """Objects in the cells while a plan is followed, shape (K,)."""
-    towers: Bytes
-    """Objects on the towers meanwhile, shape (C, K)."""
-    heights: Ints
-    """Objects per tower meanwhile, shape (C,)."""
+    now: Objects
+    """Where the objects are on the plan that is followed."""
+    trial: Objects
+    """Where they are on a plan that is tried."""
+    first: NDArray[np.bool_]
+    """Marks of the actions with which some shortest plan begins, shape (n_actions,)."""
     actions: Ints
-    """The plan that was followed, shape (4 K + 1,)."""
+    """The plan that was followed, then -1, shape (4 K + 1,)."""
 
 
-def new_work(n_cells: int, n_colours: int, n_sizes: int) -> PlannerWork:
-    """Return work space for tasks of a shape: 25 kB for K = 20, C = 3; 10 MB for K = 40, C = 5."""
-    return PlannerWork(
-        progress=new_progress(n_cells, n_colours, n_sizes),
-        at=np.zeros(n_colours, dtype=np.int64),
+def _new_objects(n_cells: int, n_colours: int) -> Objects:
+    """Return work space for the objects of a task."""
+    return Objects(
         clutter=np.zeros(n_cells, dtype=np.int8),
         towers=np.zeros((n_colours, n_cells), dtype=np.int8),
         heights=np.zeros(n_colours, dtype=np.int64),
+    )
+
+
+def new_work(n_cells: int, n_colours: int, n_sizes: int) -> PlannerWork:
+    """Return work space for tasks of a shape: 30 kB for K = 20, C = 3; 10 MB for K = 40, C = 5."""
+    return PlannerWork(
+        progress=new_progress(n_cells, n_colours, n_sizes),
+        at=np.zeros(n_colours, dtype=np.int64),
+        now=_new_objects(n_cells, n_colours),
+        trial=_new_objects(n_cells, n_colours),
+        first=np.zeros(n_colours * (2 * n_cells + n_colours), dtype=np.bool_),
         actions=np.zeros(4 * n_cells + 1, dtype=np.int64),
     )
 
 
 @kernel()
-def safest_cell(code: int, clutter: Bytes, fail: Vec) -> int:
-    """Return the least risky cell that holds a code (0: a free one), -1 where none does."""
-    best = -1
-    for k in range(len(clutter)):
-        if clutter[k] == code and (best < 0 or fail[k] < fail[best]):
-            best = k
-    return best
+def _copy(source: Objects, target: Objects) -> None:
+    """Copy where the objects are."""
+    for k in range(len(source.clutter)):
+        target.clutter[k] = source.clutter[k]
+    for c in range(len(source.heights)):
+        target.heights[c] = source.heights[c]
+        for level in range(len(source.clutter)):
+            target.towers[c, level] = source.towers[c, level]
 
 
 @kernel()
-def _worst_free(clutter: Bytes, fail: Vec) -> int:
-    """Return the most risky free cell, -1 where none is free."""
-    worst = -1
-    for k in range(len(clutter)):
-        if clutter[k] == 0 and (worst < 0 or fail[k] > fail[worst]):
-            worst = k
-    return worst
+def _lay_out(objects: Objects, task: Task, work: PlannerWork) -> int:
+    """Write the states of a task and the fewest moves from them; return their number."""
+    size = lay_out(
+        objects.clutter,
+        objects.towers,
+        objects.heights,
+        task.goal,
+        task.goal_heights,
+        work.progress,
+    )
+    if size > 0:
+        fill(size, work.at, work.progress)
+    return size
 
 
 @kernel()
-def _still_wanted(code: int, goal: Bytes, goal_heights: Ints, p: Progress) -> int:
-    """Return how many objects of a code the towers still lack."""
-    count = 0
-    for c in range(len(p.at)):
-        level = p.match[c] if p.at[c] < p.junk[c] else p.at[c] - p.junk[c] + p.cut[c]
-        for j in range(level, goal_heights[c]):
-            count += goal[c, j] == code
-    return count
+def _locate(objects: Objects, task: Task, p: Progress) -> None:
+    """Write the towers' progress."""
+    for c in range(len(objects.heights)):
+        height, level = objects.heights[c], 0
+        while level < height and objects.towers[c, level] == task.goal[c, level]:
+            level += 1
+        p.at[c] = p.junk[c] + (height - p.cut[c] if level == height else p.match[c] - height)
 
 
 @kernel()
-def _next_risk(code: int, wanted: int, clutter: Bytes, fail: Vec, free: int) -> float:
-    """Return the risk that one object more in the clutter adds, -1 where it adds none.
-
-    With ``wanted`` picks to come, the object in the cell ``free`` and its twins serve them from
-    the least risky on: what counts is the last one's risk.
-    """
-    if wanted == 0:
-        return -1.0
-    last = -1.0
-    for _ in range(wanted):
-        following = 2.0
-        for k in range(len(clutter)):
-            if (k == free or clutter[k] == code) and last < fail[k] < following:
-                following = fail[k]
-        if following > 1.0:
-            break
-        last = following
-    return last
-
-
-@kernel()
-def _cell_for(code: int, wanted: int, clutter: Bytes, fail: Vec) -> int:
-    """Return the cell for an object that is removed: the best one if it will be picked there."""
-    free = safest_cell(0, clutter, fail)
-    if free < 0:
-        return -1
-    safer = 0
-    for k in range(len(clutter)):
-        safer += clutter[k] == code and fail[k] <= fail[free]
-    return free if wanted > safer else _worst_free(clutter, fail)
-
-
-@kernel()
-def _transfer(index: int, p: Progress) -> int:
-    """Return a tower-to-tower move of a shortest plan as ``c * C + d``, -1 where none is."""
-    n_towers = len(p.at)
-    for c in range(n_towers):
-        top = p.top[c, p.at[c]]
-        if top == 0:
-            continue
-        removed = index + (p.below[c, p.at[c]] - p.at[c]) * p.stride[c]
-        for d in range(n_towers):
-            if d != c and p.want[d, p.at[d]] == top:
-                if p.table[removed + p.stride[d]] == p.table[index] - 1:
-                    return c * n_towers + d
-    return NONE
-
-
-@kernel()
-def _placement(index: int, clutter: Bytes, fail: Vec, p: Progress) -> int:
-    """Return the least risky placement of a shortest plan as ``k * C + c``, -1 where none is."""
-    n_towers = len(p.at)
-    best, least = NONE, 2.0
-    for c in range(n_towers):
-        want = p.want[c, p.at[c]]
-        if want == 0 or p.table[index + p.stride[c]] != p.table[index] - 1:
-            continue
-        k = safest_cell(want, clutter, fail)
-        if k >= 0 and fail[k] < least:
-            best, least = k * n_towers + c, fail[k]
-    return best
-
-
-@kernel()
-def _removal(
-    index: int, clutter: Bytes, goal: Bytes, goal_heights: Ints, fail: Vec, p: Progress
-) -> int:
-    """Return the least risky removal of a shortest plan as an action, -1 where none is."""
-    n_cells, n_towers = len(clutter), len(p.at)
-    best, least = NONE, 2.0
-    free = safest_cell(0, clutter, fail)
-    for c in range(n_towers):
-        top = p.top[c, p.at[c]]
-        removed = index + (p.below[c, p.at[c]] - p.at[c]) * p.stride[c]
-        if top == 0 or free < 0 or p.table[removed] != p.table[index] - 1:
-            continue
-        for d in range(n_towers):
-            if d != c and p.want[d, p.at[d]] != top and ties_on_tower(removed, d, top, p):
-                return 2 * n_cells * n_towers + c * n_towers + d
-        wanted = _still_wanted(top, goal, goal_heights, p)
-        risk = _next_risk(top, wanted, clutter, fail, free)
-        if risk < least:
-            k = _cell_for(top, wanted, clutter, fail)
-            best, least = n_cells * n_towers + c * n_cells + k, risk
-    return best
-
-
-@kernel()
-def choose(clutter: Bytes, goal: Bytes, goal_heights: Ints, fail: Vec, p: Progress) -> int:
-    """Return the next action of the plan, -1 at the goal.
-
-    Args:
-        clutter: Objects in the cells, shape (K,).
-        goal: What the towers shall be, shape (C, K).
-        goal_heights: Objects per tower there, shape (C,).
-        fail: Failure probabilities of the cells, shape (K,).
-        p: The states, ``table`` filled, the towers at ``at``.
-    """
-    index = state_number(p)
-    if p.table[index] == 0:
-        return NONE
-    n_cells, n_towers = len(clutter), len(p.at)
-    action = _transfer(index, p)
-    if action >= 0:
-        return 2 * n_cells * n_towers + action
-    action = _placement(index, clutter, fail, p)
-    if action >= 0:
-        return action
-    return _removal(index, clutter, goal, goal_heights, fail, p)
-
-
-@kernel()
-def mark_first(clutter: Bytes, p: Progress, first: NDArray[np.bool_]) -> None:
-    """Mark every action with which some shortest plan begins.
-
-    Args:
-        clutter: Objects in the cells, shape (K,).
-        p: The states, ``table`` filled, the towers at ``at``.
-        first: Marks, shape (n_actions,), written.
-    """
-    n_cells, n_towers = len(clutter), len(p.at)
-    index = state_number(p)
-    left = p.table[index] - 1
-    for action in range(len(first)):
-        first[action] = False
-    for c in range(n_towers):
-        want, top = p.want[c, p.at[c]], p.top[c, p.at[c]]
-        if want != 0 and p.table[index + p.stride[c]] == left:
-            for k in range(n_cells):
-                first[k * n_towers + c] = clutter[k] == want
-        if top == 0:
-            continue
-        removed = index + (p.below[c, p.at[c]] - p.at[c]) * p.stride[c]
-        for k in range(n_cells):
-            free = clutter[k] == 0 and p.table[removed] == left
-            first[n_cells * n_towers + c * n_cells + k] = free
-        for d in range(n_towers):
-            if d == c:
-                continue
-            if p.want[d, p.at[d]] == top:
-                best = p.table[removed + p.stride[d]] == left
-            else:
-                best = p.table[removed] == left and ties_on_tower(removed, d, top, p)
-            first[2 * n_cells * n_towers + c * n_towers + d] = best
-
-
-@kernel()
-def _carry_out(action: int, goal: Bytes, goal_heights: Ints, work: PlannerWork) -> None:
-    """Carry an action out on the work space's objects, and note the towers' progress."""
-    p, n_cells, n_towers = work.progress, len(work.clutter), len(work.heights)
-    if action < n_cells * n_towers:
-        k, d = action // n_towers, action % n_towers
-        code = work.clutter[k]
-        work.clutter[k] = 0
-    else:
-        rest = action - n_cells * n_towers
-        to_clutter = rest < n_cells * n_towers
-        rest -= 0 if to_clutter else n_cells * n_towers
-        c = rest // n_cells if to_clutter else rest // n_towers
-        d = -1 if to_clutter else rest % n_towers
-        work.heights[c] -= 1
-        code = work.towers[c, work.heights[c]]
-        work.towers[c, work.heights[c]] = 0
-        p.at[c] = p.below[c, p.at[c]]
-        if to_clutter:
-            work.clutter[rest % n_cells] = code
-    if d < 0:
-        return
-    work.towers[d, work.heights[d]] = code
-    work.heights[d] += 1
-    if p.want[d, p.at[d]] == code:
-        p.at[d] += 1
-        return
-    size = lay_out(work.clutter, work.towers, work.heights, goal, goal_heights, p)
-    fill(size, work.at, p)
-
-
-@kernel()
-def follow_plan(goal: Bytes, goal_heights: Ints, fail: Vec, work: PlannerWork) -> float:
-    """Carry the plan out on the work space's objects; ``work.actions`` holds it.
-
-    Args:
-        goal: What the towers shall be, shape (C, K).
-        goal_heights: Objects per tower there, shape (C,).
-        fail: Failure probabilities of the cells, shape (K,).
-        work: Work space: objects and states, ``table`` filled.
+def _carry_out(action: int, objects: Objects, task: Task, work: PlannerWork) -> bool:
+    """Carry an action out, and note the towers' progress.
 
     Returns:
-        Expected attempts. ``work.actions`` ends with -1.
+        Whether the states had to be written anew: an object waits on a tower.
     """
-    attempts, count = 0.0, 0
-    n_towers = len(work.heights)
-    while count < len(work.actions) - 1:
-        action = choose(work.clutter, goal, goal_heights, fail, work.progress)
-        work.actions[count] = action
-        if action < 0:
-            return attempts
-        from_cell = action < len(fail) * n_towers
-        attempts += 1.0 / (1.0 - fail[action // n_towers]) if from_cell else 1.0
-        _carry_out(action, goal, goal_heights, work)
-        count += 1
-    work.actions[count] = NONE
+    p, n_cells, n_towers = work.progress, len(objects.clutter), len(objects.heights)
+    moves = n_cells * n_towers
+    d = action % n_towers
+    if action < moves:
+        code = objects.clutter[action // n_towers]
+        objects.clutter[action // n_towers] = 0
+    else:
+        c = (action - moves) // n_cells if action < 2 * moves else (action - 2 * moves) // n_towers
+        objects.heights[c] -= 1
+        code = objects.towers[c, objects.heights[c]]
+        objects.towers[c, objects.heights[c]] = 0
+        p.at[c] = p.below[c, p.at[c]]
+        if action < 2 * moves:
+            objects.clutter[(action - moves) % n_cells] = code
+            return False
+        d = (action - 2 * moves) % n_towers
+    objects.towers[d, objects.heights[d]] = code
+    objects.heights[d] += 1
+    if p.want[d, p.at[d]] == code:
+        p.at[d] += 1
+        return False
+    _lay_out(objects, task, work)
+    return True
+
+
+@kernel()
+def _attempts(action: int, task: Task) -> float:
+    """Return the expected attempts of an action."""
+    k = action // len(task.goal)
+    return 1.0 / (1.0 - task.fail[k]) if k < len(task.fail) else 1.0
+
+
+@kernel()
+def _choose(objects: Objects, task: Task, p: Progress) -> int:
+    """Return the next action by the rules, -1 at the goal."""
+    return choose(objects.clutter, task.goal, task.goal_heights, task.fail, p)
+
+
+@kernel()
+def _try(action: int, best: float, task: Task, work: PlannerWork) -> float:
+    """Return the expected attempts from an action to the goal, by the rules after it.
+
+    Args:
+        action: First action, from where the objects are now.
+        best: Expected attempts that would have to be less for it to be taken.
+        task: What is asked for.
+        work: Work space; its states fit where the objects are now, and do so again.
+    """
+    p = work.progress
+    _copy(work.now, work.trial)
+    attempts, anew = 0.0, False
+    while action >= 0 and attempts < best:
+        attempts += _attempts(action, task)
+        anew = _carry_out(action, work.trial, task, work) or anew
+        action = _choose(work.trial, task, p)
+    if anew:
+        _lay_out(work.now, task, work)
+    else:
+        _locate(work.now, task, p)
     return attempts
 
 
 @kernel()
-def plan_state(
-    clutter: Bytes,
-    towers: Bytes,
-    heights: Ints,
-    goal: Bytes,
-    goal_heights: Ints,
-    fail: Vec,
-    work: PlannerWork,
-    first: NDArray[np.bool_],
-) -> tuple[int, float]:
+def _nth_free(n: int, clutter: Bytes, fail: Vec) -> int:
+    """Return the n-th best free cell, the worst for ``n = CELLS_TRIED``; -1 where none is."""
+    found = -1
+    for k in range(len(clutter)):
+        if clutter[k] != 0:
+            continue
+        before = 0
+        after = 0
+        for j in range(len(clutter)):
+            if clutter[j] == 0 and j != k:
+                less = fail[j] < fail[k] or (fail[j] == fail[k] and j < k)
+                before += less
+                after += not less
+        if (n < CELLS_TRIED and before == n) or (n == CELLS_TRIED and after == 0):
+            found = k
+    return found
+
+
+@kernel()
+def _look_ahead(task: Task, work: PlannerWork) -> int:
+    """Return the next action of the plan, -1 at the goal.
+
+    Args:
+        task: What is asked for.
+        work: Work space; its states fit where the objects are now.
+    """
+    p, now = work.progress, work.now
+    chosen = _choose(now, task, p)
+    n_cells, n_towers = len(now.clutter), len(now.heights)
+    if chosen < n_cells * n_towers:
+        return chosen
+    best = _try(chosen, np.inf, task, work)
+    index = state_number(p)
+    left = p.table[index] - 1
+    for c in range(n_towers):
+        top = p.top[c, p.at[c]]
+        removed = index + (p.below[c, p.at[c]] - p.at[c]) * p.stride[c]
+        if top == 0 or p.table[removed] != left:
+            continue
+        for n in range(CELLS_TRIED + 1):
+            k = _nth_free(n, now.clutter, task.fail)
+            if k < 0:
+                continue
+            action = n_cells * n_towers + c * n_cells + k
+            attempts = _try(action, best, task, work)
+            if attempts < best - 1e-9:
+                chosen, best = action, attempts
+        for d in range(n_towers):
+            if d != c and p.want[d, p.at[d]] != top and ties_on_tower(removed, d, top, p):
+                action = 2 * n_cells * n_towers + c * n_towers + d
+                attempts = _try(action, best, task, work)
+                if attempts < best - 1e-9:
+                    chosen, best = action, attempts
+    return chosen
+
+
+@kernel()
+def _next_action(size: int, task: Task, work: PlannerWork) -> int:
+    """Return the next action of the plan, -1 at the goal.
+
+    Args:
+        size: Number of states.
+        task: What is asked for.
+        work: Work space; its states fit where the objects are now.
+    """
+    if size > MOST_STATES:
+        return _choose(work.now, task, work.progress)
+    return _look_ahead(task, work)
+
+
+@kernel(nogil=True)
+def plan_state(objects: Objects, task: Task, work: PlannerWork) -> tuple[int, float]:
     """Plan one state to its end.
 
     Args:
-        clutter: Objects in the cells, shape (K,).
-        towers: Objects on the towers, lowest first, shape (C, K).
-        heights: Objects per tower, shape (C,).
-        goal: What the towers shall be, shape (C, K).
-        goal_heights: Objects per tower there, shape (C,).
-        fail: Failure probabilities of the cells, shape (K,).
-        work: Work space; ``actions`` holds the plan, ends with -1.
-        first: Marks of the actions with which some shortest plan begins, written.
+        objects: Where the objects are.
+        task: What is asked for.
+        work: Work space; ``first`` and ``actions`` are written.
 
     Returns:
         Fewest moves, and expected attempts of the plan; -1 and 0 where the goal cannot be met.
     """
     p = work.progress
-    size = lay_out(clutter, towers, heights, goal, goal_heights, p)
+    size = _lay_out(objects, task, work)
     if size == 0:
         return NONE, 0.0
-    fill(size, work.at, p)
-    mark_first(clutter, p, first)
+    mark_first(objects.clutter, p, work.first)
     fewest = p.table[state_number(p)]
-    for k in range(len(clutter)):
-        work.clutter[k] = clutter[k]
-    for c in range(len(heights)):
-        work.heights[c] = heights[c]
-        for level in range(len(clutter)):
-            work.towers[c, level] = towers[c, level]
-    return fewest, follow_plan(goal, goal_heights, fail, work)
+    _copy(objects, work.now)
+    attempts, count = 0.0, 0
+    while count < len(work.actions):
+        action = _next_action(size, task, work)
+        work.actions[count] = action
+        if action < 0:
+            break
+        attempts += _attempts(action, task)
+        _carry_out(action, work.now, task, work)
+        count += 1
+    return fewest, attempts
 
 
 @kernel(nogil=True)
@@ -374,8 +335,10 @@ def plan_rows(
     p = work.progress
     for e in range(len(clutter)):
         best[e], fewest[e] = NONE, NONE
-        size = lay_out(clutter[e], towers[e], heights[e], goal[e], goal_heights[e], p)
+        objects = Objects(clutter[e], towers[e], heights[e])
+        task = Task(goal[e], goal_heights[e], fail[e])
+        size = _lay_out(objects, task, work)
         if size > 0:
-            fill(size, work.at, p)
             fewest[e] = p.table[state_number(p)]
-            best[e] = choose(clutter[e], goal[e], goal_heights[e], fail[e], p)
+            _copy(objects, work.now)
+            best[e] = _next_action(size, task, work)

@@ -81,7 +81,7 @@ def distance_cost(
         n_sizes: Number of sizes.
         weights: Coefficients.
     """
-    total = 0.0
+    total: float = 0.0
     for c in range(towers.shape[0]):
         for k in range(towers.shape[1]):
             there, wanted = int(towers[c, k]), int(goal[c, k])
@@ -92,7 +92,7 @@ def distance_cost(
                 total += weights.colour
             if null or (there - 1) % n_sizes != (wanted - 1) % n_sizes:
                 total += weights.size
-    return weights.distance * total / towers.shape[1]
+    return float(weights.distance * total / towers.shape[1])
 
 
 @kernel(inline="always")

@@ -6,7 +6,9 @@ among the types; the goal is some of them, each on the tower of its colour, the 
 bottom. A share of episodes starts with the goal partly done (the curriculum), another share
 disturbed: the goal partly built and objects standing on towers where they may not belong.
 
-Source: thesis section 3.4.2. Deviates: disturbed starts are ours.
+Source: thesis section 3.4.2. Deviates: disturbed starts are ours, and so is the share of
+episodes whose sizes are drawn evenly, without which small goals among many objects are hardly
+ever met.
 """
 
 import math
@@ -33,6 +35,12 @@ TRIES = 50
 def triangular(rng: random.State, n: int) -> int:
     """Draw from 1 to ``n``; the chance grows linearly and is greatest at ``n``."""
     return min(n, 1 + int(math.sqrt(random.uniform(rng)) * n))
+
+
+@kernel()
+def _size(rng: random.State, n: int, even: bool) -> int:
+    """Draw from 1 to ``n``, evenly or triangular."""
+    return 1 + random.below(rng, n) if even else triangular(rng, n)
 
 
 @kernel()
@@ -158,10 +166,11 @@ def start_row(rows: SortingRows, rules: SortingRules, seed: int, row: int, e: in
     random.start_stream(seed, row, rows.episode[e], rng)
     _draw_map(rows, rules, e, rng)
     n_objects, n_goal = rows.fixed_objects[e], rows.fixed_goal[e]
+    even = random.uniform(rng) < rules.even_share
     if n_objects == 0:
-        n_objects = max(triangular(rng, rows.clutter.shape[1]), n_goal)
+        n_objects = max(_size(rng, rows.clutter.shape[1], even), n_goal)
     if n_goal == 0:
-        n_goal = triangular(rng, n_objects)
+        n_goal = _size(rng, n_objects, even)
     for code in range(there.shape[0]):
         there[code] = 0
     for _ in range(n_objects):

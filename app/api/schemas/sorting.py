@@ -1,0 +1,342 @@
+"""``POST /v1/sorting``: objects and goal in, the next move out."""
+
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Self
+
+import numpy as np
+from pydantic import BeforeValidator, Field
+
+from app.api.schemas.numbers import Answer, Body, Finite
+from app.api.schemas.task_selection import Stamp
+from app.errors import InvalidInput
+from app.sim.ports import SortingValues, Vec
+from app.sim.sorting import SortingSettings
+from app.sim.sorting_names import NamedObject, SortingNames, fail_with, state_from_names
+from app.sim.sorting_ports import REASONS, By, RankedMove, SortingDecision, Why
+from app.sim.sorting_state import (
+    MAX_CELLS,
+    MAX_COLOURS,
+    MAX_SIZES,
+    NULL,
+    SIZE_NAMES,
+    Move,
+    SortingShape,
+    SortingState,
+)
+from app.sim.sorting_watch import MAX_SEEN, HandOver, SortingWatch
+
+Word = Annotated[str, Field(min_length=1, max_length=64)]
+Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]{0,31}$")]
+Key = Annotated[str, Field(pattern=r"^[0-9a-f]{16}$")]
+
+
+class SortingLayout(Body):
+    """A sorting task without a work cell: its clutter cells are ``cell0``, ``cell1``, ..."""
+
+    n_cells: int = Field(
+        ge=1, le=MAX_CELLS, description="clutter cells: most objects, and levels of a tower"
+    )
+    colours: list[Name] = Field(
+        min_length=1, max_length=MAX_COLOURS, description="colours; each names a tower"
+    )
+    sizes: list[Name] = Field(
+        list(SIZE_NAMES[3]),
+        min_length=1,
+        max_length=MAX_SIZES,
+        description="sizes, from the smallest",
+    )
+
+
+class SortingObject(Body):
+    """One object and where it is."""
+
+    colour: Word = Field(description="colour, as the cell's towers have them")
+    size: Word = Field(description="`small`, `medium` or `large` in a work cell")
+    at: Word = Field(description="id of the clutter cell or of the tower it is on")
+    level: int | None = Field(
+        None, ge=0, lt=MAX_CELLS, description="level on a tower, 0 the lowest; null elsewhere"
+    )
+    id: Word | None = Field(None, description="your name for it; comes back with the move")
+
+    def to_domain(self) -> NamedObject:
+        """Return it as the simulator's data."""
+        return NamedObject(
+            colour=self.colour, size=self.size, at=self.at, level=self.level, id=self.id
+        )
+
+
+class GoalObject(Body):
+    """One object that a tower shall have."""
+
+    size: Word
+    colour: Word | None = Field(None, description="colour; the tower's own if null")
+
+
+def _from_size(value: object) -> object:
+    return {"size": value} if isinstance(value, str) else value
+
+
+GoalEntry = Annotated[
+    GoalObject, BeforeValidator(_from_size, json_schema_input_type=Word | GoalObject)
+]
+
+
+class SortingRecord(Body):
+    """What decides when the exact planner takes over: from the answer before, unchanged."""
+
+    checkpoint: str = Field(
+        pattern=r"^[0-9a-f]{64}$", description="SHA-256 of the policy that is watched"
+    )
+    last: Key = Field(description="key of the state decided in last")
+    expected: Key = Field(description="key of the state that the move was to give")
+    can_fail: bool = Field(description="whether its pick can fail")
+    seen: list[Key] = Field(max_length=MAX_SEEN, description="keys of the states met")
+    attempts: int = Field(ge=0, le=1_000_000, description="moves tried since the task began")
+    budget: Finite = Field(
+        ge=0.0, le=1e6, description="attempts after which the planner takes over"
+    )
+    handed_over: HandOver | None = Field(description="why the planner decides, or null")
+
+    def to_domain(self) -> SortingWatch:
+        """Return it as the simulator's data."""
+        return SortingWatch(**{**dict(self), "seen": tuple(self.seen)})
+
+    @classmethod
+    def from_domain(cls, watch: SortingWatch) -> Self:
+        """Make it from the simulator's data."""
+        return cls(
+            checkpoint=watch.checkpoint,
+            last=watch.last,
+            expected=watch.expected,
+            can_fail=watch.can_fail,
+            seen=list(watch.seen),
+            attempts=watch.attempts,
+            budget=watch.budget,
+            handed_over=watch.handed_over,
+        )
+
+
+class SortingRequest(Body):
+    """A sorting task as it is at this moment."""
+
+    cell: str | None = Field(
+        None,
+        max_length=64,
+        description="name of the work cell whose stations the objects are on; or `layout`",
+        examples=["sorting-e0"],
+    )
+    layout: SortingLayout | None = Field(
+        None, description="a task without a work cell, in place of `cell`"
+    )
+    objects: list[SortingObject] = Field(
+        max_length=MAX_CELLS,
+        description="every object there is, at most one per clutter cell of the task",
+    )
+    goal: dict[str, Annotated[list[GoalEntry], Field(max_length=MAX_CELLS)]] = Field(
+        max_length=MAX_COLOURS,
+        description="by tower, from the bottom: a size, of the tower's own colour, or a size "
+        "and a colour. Towers that are not named shall be empty; objects that no tower asks "
+        "for belong into the clutter",
+    )
+    failure_map: dict[str, Finite] = Field(
+        default_factory=dict,
+        max_length=MAX_CELLS,
+        description="chance that a pick from a clutter cell fails, 0 to 0.99, by cell; those "
+        "that are not named keep the work cell's, or 0",
+    )
+    watch: SortingRecord | None = Field(
+        None, description="`watch` of the answer before, in the same task; null at its start"
+    )
+    decider: By = Field("policy", description="who decides: a policy, or the exact planner")
+    checkpoint: str | None = Field(
+        None,
+        max_length=64,
+        description="SHA-256 or alias of a policy that sorts; if null the one that is shipped "
+        "for the cell, else the exact planner",
+    )
+    stamp: Stamp = Field(None, description="your time of the state; comes back unchanged")
+
+    def to_domain(self, names: SortingNames, fail: Vec) -> SortingState:
+        """Check what a schema cannot, and return the state.
+
+        Args:
+            names: The words of the task.
+            fail: The cell's own failure probabilities, shape (K,).
+
+        Raises:
+            InvalidInput: It cannot be, with the field.
+        """
+        if self.decider == "planner" and self.checkpoint is not None:
+            rule = "must be null where the planner is to decide"
+            raise InvalidInput("checkpoint", self.checkpoint, rule)
+        goal = {
+            tower: [(one.colour, one.size) for one in wanted]
+            for tower, wanted in self.goal.items()
+        }
+        objects = [one.to_domain() for one in self.objects]
+        return state_from_names(names, objects, goal, fail_with(names, fail, self.failure_map))
+
+
+class SortingPlace(Answer):
+    """Where an object is picked or placed."""
+
+    station: str = Field(description="id of the clutter cell or tower")
+    level: int | None = Field(description="level on a tower, 0 the lowest; null in the clutter")
+
+
+class SortingMove(Answer):
+    """One move: pick the object here, place it there."""
+
+    pick: SortingPlace
+    place: SortingPlace
+    object: str | None = Field(description="your id of the object, or null")
+    colour: str
+    size: str
+
+
+class SortingValue(SortingMove):
+    """One valid move with its value."""
+
+    value: float | None = Field(
+        description="policy: Q, expected discounted reward; planner: minus the attempts "
+        "expected to the goal if this move comes first, null where the task is too large for "
+        "working that out for every move"
+    )
+    fewest: bool = Field(description="whether a plan of the fewest moves begins with it")
+
+
+class OutsideTraining(Answer):
+    """One input outside what the policy was trained on."""
+
+    field: str
+    value: str
+    rule: str = Field(description="what held in training")
+
+
+class SortingAnswer(Answer):
+    """The next move and all that explains it."""
+
+    solved: bool = Field(description="whether every tower is as the goal asks")
+    move: SortingMove | None = Field(description="the next move; null when solved")
+    by: By = Field(description="who decided")
+    why: Why = Field(description="why it was the policy or the planner, in a word")
+    because: str = Field(description="the same in a sentence")
+    moves: list[SortingValue] = Field(description="all valid moves, the chosen one first")
+    fewest_moves: int = Field(description="moves to the goal at least, if no pick fails")
+    expected_attempts: float = Field(
+        description="attempts to the goal that the exact planner expects, failed picks included"
+    )
+    outside: list[OutsideTraining] = Field(description="inputs outside the policy's training")
+    watch: SortingRecord | None = Field(
+        description="hand it back with the next state of this task, so that the planner can "
+        "take over from a policy that goes in circles; null when there is nothing to watch"
+    )
+    checkpoint: str | None = Field(description="SHA-256 of the policy; null without one")
+    elapsed_ms: float = Field(description="time the decision took [ms]")
+    stamp: Stamp = None
+
+    @classmethod
+    def from_domain(
+        cls,
+        decision: SortingDecision,
+        state: SortingState,
+        request: SortingRequest,
+        names: SortingNames,
+        outside: Sequence[OutsideTraining],
+    ) -> Self:
+        """Make it from a decision, the state it was made in and the words of both."""
+        ids = {(one.at, one.level): one.id for one in request.objects}
+        moves = [_valued(one, state, names, ids) for one in decision.ranked]
+        watch = decision.watch
+        return cls(
+            solved=decision.solved,
+            move=_move(decision.move, state, names, ids) if decision.move else None,
+            by=decision.by,
+            why=decision.why,
+            because=REASONS[decision.why],
+            moves=moves,
+            fewest_moves=decision.fewest_moves,
+            expected_attempts=decision.expected_attempts,
+            outside=list(outside),
+            watch=None if watch is None else SortingRecord.from_domain(watch),
+            checkpoint=decision.checkpoint,
+            elapsed_ms=decision.elapsed_ms,
+            stamp=request.stamp,
+        )
+
+
+Ids = Mapping[tuple[str, int | None], str | None]
+"""The caller's names of objects, by station and level."""
+
+
+def outside_of(
+    decision: SortingDecision,
+    state: SortingState,
+    names: SortingNames,
+    policy: SortingValues | None,
+    own: Vec,
+) -> list[OutsideTraining]:
+    """Return what lies outside what the policy was trained on; nothing without a policy.
+
+    Args:
+        decision: The decision.
+        state: The state it was made in.
+        names: The words of the task.
+        policy: The policy that was asked.
+        own: The cell's own failure probabilities, shape (K,).
+    """
+    if policy is None:
+        return []
+    found = [
+        OutsideTraining(
+            field=f"goal.{names.towers[one.tower]}[{one.level}]",
+            value=names.kind(int(state.goal[one.tower, one.level])),
+            rule=one.rule,
+        )
+        for one in decision.outside
+    ]
+    if policy.shape != names.shape:
+        value, trained = _size_of(names.shape), _size_of(policy.shape)
+        rule = f"was {trained} in training"
+        found.append(OutsideTraining(field="cell", value=value, rule=rule))
+    most = max(SortingSettings().failure_max, float(own.max()))
+    for k in np.flatnonzero(state.fail > most).tolist():
+        field, value = f"failure_map.{names.cells[k]}", f"{state.fail[k]:g}"
+        rule = f"was at most {most:g} in training"
+        found.append(OutsideTraining(field=field, value=value, rule=rule))
+    return found
+
+
+def _size_of(shape: SortingShape) -> str:
+    return f"{shape.n_cells} cells, {shape.n_colours} colours, {shape.n_sizes} sizes"
+
+
+def _move(move: Move, state: SortingState, names: SortingNames, ids: Ids) -> SortingMove:
+    pick = _place(move.pick, state, names, top=True)
+    tower = move.pick - names.shape.n_cells
+    code = int(state.clutter[move.pick] if tower < 0 else state.towers[tower, pick.level or 0])
+    return SortingMove(
+        pick=pick,
+        place=_place(move.place, state, names, top=False),
+        object=ids.get((pick.station, pick.level)),
+        colour=names.colours[names.shape.colour_of(code)],
+        size=names.sizes[names.shape.size_of(code)],
+    )
+
+
+def _place(
+    position: int, state: SortingState, names: SortingNames, *, top: bool
+) -> SortingPlace:
+    """Return a position in words; of a tower the level on top, or the free one above it."""
+    tower = position - names.shape.n_cells
+    if tower < 0:
+        return SortingPlace(station=names.cells[position], level=None)
+    height = int((state.towers[tower] != NULL).sum())
+    return SortingPlace(station=names.towers[tower], level=height - 1 if top else height)
+
+
+def _valued(
+    one: RankedMove, state: SortingState, names: SortingNames, ids: Ids
+) -> SortingValue:
+    move = _move(one.move, state, names, ids)
+    return SortingValue(**dict(move), value=one.value, fewest=one.fewest)

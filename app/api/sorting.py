@@ -1,0 +1,79 @@
+"""The next sorting move, for other programs (thesis chapter 3, METHOD 1)."""
+
+from functools import partial
+
+import numpy as np
+from fastapi import APIRouter
+from starlette.concurrency import run_in_threadpool
+
+from app.api.registry import SORTERS
+from app.api.schemas.sorting import SortingAnswer, SortingRequest, outside_of
+from app.api.services import Services, ServicesDep
+from app.api.task_selection import known_cell
+from app.errors import InvalidInput
+from app.sim.ports import SortingValues, Vec
+from app.sim.sorting import fail_of
+from app.sim.sorting_decision import decide, takes_time
+from app.sim.sorting_names import SortingNames, names_of, plain_names
+
+router = APIRouter(prefix="/v1/sorting", tags=["deciding"])
+
+
+@router.post("", summary="Choose the next move of a sorting task")
+async def next_move(request: SortingRequest, services: ServicesDep) -> SortingAnswer:
+    """Return the next move, who chose it and why, and every valid move with its value.
+
+    Nothing is remembered between two calls: goal and objects may change at any time. Whoever
+    carries the moves out hands `watch` back, so that the exact planner can take over from a
+    policy that goes in circles.
+    """
+    # A policy decides in less than a millisecond: right here, as for a task selection.
+    services.readiness.require()
+    names, own = await _task_of(request, services)
+    state = request.to_domain(names, own)
+    policy = await _policy_of(request, services)
+    choose = partial(
+        decide,
+        policy,
+        state,
+        names.shape,
+        None if request.watch is None else request.watch.to_domain(),
+        ask_planner=request.decider == "planner",
+    )
+    long = takes_time(names.shape)
+    decision = await run_in_threadpool(choose) if long else choose()
+    outside = outside_of(decision, state, names, policy, own)
+    return SortingAnswer.from_domain(decision, state, request, names, outside)
+
+
+async def _task_of(request: SortingRequest, services: Services) -> tuple[SortingNames, Vec]:
+    """Return the words of the task that a request names, and its failure probabilities."""
+    layout = request.layout
+    if (request.cell is None) == (layout is None):
+        rule = "must be given where `layout` is not, and only there"
+        raise InvalidInput("cell", request.cell, rule)
+    if layout is not None:
+        names = plain_names(layout.n_cells, layout.colours, layout.sizes)
+        return names, np.zeros(layout.n_cells)
+    assert request.cell is not None
+    cell = await known_cell(request.cell, services)
+    return names_of(cell), fail_of(cell)
+
+
+async def _policy_of(request: SortingRequest, services: Services) -> SortingValues | None:
+    """Return the policy that is named, or shipped for the cell; None where the planner decides.
+
+    Raises:
+        InvalidInput: Nothing has that name.
+        CheckpointMismatch: It does not sort.
+    """
+    shipped = request.cell if request.cell in SORTERS else None
+    if shipped is not None and shipped not in services.checkpoints.aliases:
+        shipped = None
+    name = request.checkpoint or shipped
+    if name is None or request.decider == "planner":
+        return None
+    policy = services.sorters.loaded(name)
+    if policy is None:
+        policy = await run_in_threadpool(services.sorters.load, name)
+    return policy

@@ -1,0 +1,78 @@
+"""Which checkpoints may act in a live world: one that moves the arm, one that sorts.
+
+A policy moves the arm in the cell it was trained in, and in sorting cells that differ from it
+in nothing but their stations (``sorting_cell.same_workspace``).
+"""
+
+from app.api.registry import SORTERS
+from app.api.services import Services
+from app.errors import CheckpointMismatch, NotFound
+from app.policies.checkpoint import CHOOSING, purpose_of
+from app.policies.trained_cell import is_for
+from app.sim.cells import Cell, require_cell
+from app.sim.ports import SortingValues, TaskPolicy
+from app.sim.sorting import shape_of
+from app.sim.sorting_cell import is_sorting, require_workspace
+from app.store.checkpoints import list_checkpoints
+
+MAX_LOOKED_AT = 200
+"""Newest checkpoints that are looked through for one of a cell."""
+
+
+def require_mover(policy: TaskPolicy, cell: Cell, services: Services) -> None:
+    """Make sure that a policy may move the arm in a cell.
+
+    Raises:
+        CheckpointMismatch: It was trained elsewhere, or before a cell was changed.
+    """
+    if policy.cell == cell.name or not is_sorting(cell):
+        require_cell(cell, policy.cell, policy.cell_sha256)
+        return
+    try:
+        trained = services.cells.get(policy.cell)
+    except NotFound:
+        raise CheckpointMismatch("cell", cell.name, policy.cell) from None
+    require_cell(trained, policy.cell, policy.cell_sha256)
+    require_workspace(cell, trained)
+
+
+def may_move(policy: TaskPolicy, cell: Cell, services: Services) -> bool:
+    """Whether a policy may move the arm in a cell."""
+    try:
+        require_mover(policy, cell, services)
+    except CheckpointMismatch:
+        return False
+    return True
+
+
+def mover_for(cell: Cell, services: Services) -> TaskPolicy | None:
+    """Return the newest policy of a cell; the default one goes first where it may act."""
+    default = services.policies.load(None)
+    if default.cell == cell.name and may_move(default, cell, services):
+        return default
+    for record in list_checkpoints(services.store, limit=MAX_LOOKED_AT).items:
+        chooses = purpose_of(record.manifest) == CHOOSING
+        if chooses and is_for(record.manifest, cell):
+            return services.policies.load(record.sha256)
+    return default if may_move(default, cell, services) else None
+
+
+def require_sorter(sorter: SortingValues, cell: Cell) -> None:
+    """Make sure that a sorter knows tasks as large as a cell's.
+
+    Raises:
+        InvalidInput: Nothing can be sorted in the cell.
+        CheckpointMismatch: It sorts tasks of another size.
+    """
+    here, known = shape_of(cell), sorter.shape
+    if here != known:
+        text = "{0.n_cells} cells, {0.n_colours} colours, {0.n_sizes} sizes"
+        raise CheckpointMismatch("shape", text.format(here), text.format(known))
+
+
+def sorter_for(cell: Cell, services: Services) -> SortingValues | None:
+    """Return the shipped sorter of a cell; None leaves its moves to the exact planner."""
+    if cell.name not in SORTERS or cell.name not in services.checkpoints.aliases:
+        return None
+    sorter = services.sorters.load(cell.name)
+    return sorter if is_sorting(cell) and sorter.shape == shape_of(cell) else None

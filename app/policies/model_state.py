@@ -1,0 +1,62 @@
+"""What a checkpoint holds of a model under training: networks, optimisers, versions."""
+
+import platform
+from collections.abc import Mapping
+from importlib.metadata import version
+from typing import Any
+
+import torch
+from numpy.typing import NDArray
+
+
+def weights_of(modules: Mapping[str, torch.nn.Module]) -> dict[str, NDArray[Any]]:
+    """Return the tensors of networks as ``network.tensor``."""
+    return {
+        f"{name}.{key}": tensor.numpy()
+        for name, module in modules.items()
+        for key, tensor in module.state_dict().items()
+    }
+
+
+def moments_of(optimizers: Mapping[str, torch.optim.Optimizer]) -> dict[str, NDArray[Any]]:
+    """Return the moments of optimisers as ``optimizer.index.moment``."""
+    return {
+        f"{name}.{index}.{key}": tensor.numpy()
+        for name, optimizer in optimizers.items()
+        for index, moments in optimizer.state_dict()["state"].items()
+        for key, tensor in moments.items()
+    }
+
+
+def restore(
+    arrays: Mapping[str, NDArray[Any]],
+    modules: Mapping[str, torch.nn.Module],
+    optimizers: Mapping[str, torch.optim.Optimizer],
+) -> None:
+    """Put tensors and moments of a checkpoint back where they came from."""
+    for name, module in modules.items():
+        module.load_state_dict(under(arrays, name))
+    for name, optimizer in optimizers.items():
+        state: dict[int, dict[str, torch.Tensor]] = {}
+        for key, tensor in under(arrays, name).items():
+            index, moment = key.split(".", 1)
+            state.setdefault(int(index), {})[moment] = tensor
+        optimizer.load_state_dict({**optimizer.state_dict(), "state": state})
+
+
+def under(arrays: Mapping[str, NDArray[Any]], prefix: str) -> dict[str, torch.Tensor]:
+    """Return the tensors whose names start with ``prefix.``, without it."""
+    start = f"{prefix}."
+    return {
+        key.removeprefix(start): torch.as_tensor(value)
+        for key, value in arrays.items()
+        if key.startswith(start)
+    }
+
+
+def versions() -> dict[str, str]:
+    """Return the versions that a training depends on."""
+    return {
+        "python": platform.python_version(),
+        **{name: version(name) for name in ("torch", "stable-baselines3", "numba")},
+    }

@@ -1,0 +1,203 @@
+"""Training on the pick scenario: settings, model, checkpoints and what its curve counts."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.policies.checkpoint import Checkpoint
+from app.policies.pick_preset import PickPreset
+from app.policies.progress import Progress
+from app.policies.reporter import Reporter
+from app.policies.run import Parts, TrainingRun
+from app.policies.td3 import PickTD3, twin_of
+from app.policies.vecenv import PickVecEnv
+from app.sim.cells import Cell
+from app.sim.kernels.arm import CONTROLLED
+from app.sim.kernels.features import BODY_SIZES, SIZES
+from app.sim.kernels.people import ABSENT
+from app.sim.kernels.reward import RewardWeights
+from app.sim.pick import PickBatch, PickSettings
+from app.sim.scene import HumanKind
+from app.sim.worker_motion import WorkSettings
+
+LAYOUTS = {
+    "features": [[name, size] for name, size in SIZES],
+    "body": [[name, size] for name, size in BODY_SIZES],
+}
+"""Names and sizes of the groups of each kind of observation, as manifests carry them."""
+RANGE_EVERY = 8
+"""Vector steps between two looks at the range of the states."""
+
+
+class _Ranges:
+    """Least and greatest value of every state variable met in training."""
+
+    def __init__(self, known: Mapping[str, Any] | None) -> None:
+        known = known or {}
+        self._low = {name: np.array(entry["low"]) for name, entry in known.items()}
+        self._high = {name: np.array(entry["high"]) for name, entry in known.items()}
+
+    def look(self, batch: PickBatch) -> None:
+        state, people = batch.state, batch.state.people
+        there = people.track != ABSENT
+        met = {"q": state.q, "qd": state.qd, "goal": state.goal}
+        if there.any():
+            met |= {"human_q": people.q[there], "human_qd": people.qd[there]}
+        for name, rows in met.items():
+            low, high = rows.min(axis=0), rows.max(axis=0)
+            self._low[name] = np.minimum(self._low.get(name, low), low)
+            self._high[name] = np.maximum(self._high.get(name, high), high)
+
+    def as_json(self) -> dict[str, dict[str, list[float]]]:
+        return {
+            name: {
+                "low": [round(float(value), 5) for value in self._low[name]],
+                "high": [round(float(value), 5) for value in self._high[name]],
+            }
+            for name in self._low
+        }
+
+
+def work_of(preset: Mapping[str, Any], seed: int = 0) -> WorkSettings:
+    """Return what the workers do under a preset, as a manifest holds it.
+
+    Args:
+        preset: Fields of the preset; one from before task primitives has no ``human_motion``.
+        seed: Seed of their postures and samples.
+    """
+    return WorkSettings(
+        motion=preset.get("human_motion", "library"),
+        seed=seed,
+        pace=preset.get("human_pace", 1.0),
+        courtesy=preset.get("human_courtesy", 0.0),
+        roaming=preset.get("human_roaming", 0.0),
+        absent=preset.get("human_absent", 0.0),
+        augmentation=preset.get("augmentation", "sampled") == "sampled",
+    )
+
+
+def settings_of(preset: PickPreset) -> PickSettings:
+    """Return the scenario's settings of a preset."""
+    worker: HumanKind = "worker"
+    return PickSettings(
+        time_limit_s=preset.time_limit_s,
+        short_limit_s=preset.short_limit_s,
+        short_share=preset.short_share,
+        start_clearance_m=preset.start_clearance_m,
+        target_jitter_m=preset.target_jitter_m,
+        way_share=preset.way_share,
+        people=None if preset.n_people == 1 else (worker,) * preset.n_people,
+        work=work_of(asdict(preset)),
+        observation="body" if preset.observation == "body" else "features",
+        action=preset.action,
+        weights=RewardWeights(
+            c_d=preset.c_d,
+            c_th=preset.c_th,
+            c_c=preset.c_c,
+            c_step=preset.c_step,
+            c_v=preset.c_v,
+            d_v=preset.d_v,
+            c_s=preset.c_s,
+            gamma=1.0,
+        ),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Watched:
+    """What the curve of a training on the pick scenario is counted from."""
+
+    n_greedy: int
+    """Cells without exploration, the first ones."""
+    env: PickVecEnv
+    """All cells."""
+    ranges: _Ranges
+    """Range of the states."""
+
+
+def start(
+    preset: PickPreset,
+    seed: int,
+    resume: Checkpoint | None,
+    cell: Cell,
+) -> tuple[TrainingRun, Watched]:
+    """Return a run of the preset, from the start or from a checkpoint, and what it counts.
+
+    Args:
+        preset: All hyper-parameters.
+        seed: Seed of everything random.
+        resume: The last ``resume`` checkpoint of an interrupted attempt.
+        cell: Work cell trained in.
+    """
+    first = 0 if resume is None else int(resume.manifest["step"])
+    env = PickVecEnv(PickBatch(cell, preset.n_envs, seed + first, settings_of(preset)))
+    model = PickTD3(preset, env, seed + first)
+    ranges = _Ranges(resume.manifest["trained_range"] if resume else None)
+    parts = Parts(
+        policy={"actor": model.actor.mu, "critic": twin_of(model.critic)},
+        targets={
+            "actor_target": model.actor_target.mu,
+            "critic_target": twin_of(model.critic_target),
+        },
+        optimizers={
+            "actor_adam": model.actor.optimizer,
+            "critic_adam": model.critic.optimizer,
+        },
+        layout=LAYOUTS[preset.observation],
+        act_size=CONTROLLED,
+        trained_range=ranges.as_json,
+    )
+    run = TrainingRun(preset, seed, cell, model, env, parts, resume)
+    return run, Watched(n_greedy=model.exploration.n_greedy, env=env, ranges=ranges)
+
+
+class PickReporter(Reporter):
+    """Counts the episodes of the cells without exploration.
+
+    Args:
+        run: The attempt.
+        on_progress: Takes the points of the curve.
+        on_checkpoint: Takes the step, the policy and what resuming needs.
+        should_stop: Asked after every step.
+        watched: What is counted.
+    """
+
+    def __init__(
+        self,
+        run: TrainingRun,
+        on_progress: Callable[[Progress], None],
+        on_checkpoint: Callable[[int, Checkpoint, Checkpoint], None],
+        should_stop: Callable[[], bool],
+        watched: Watched,
+    ) -> None:
+        super().__init__(run, on_progress, on_checkpoint, should_stop)
+        self._watched = watched
+        self._returns = np.zeros(run.preset.n_envs)
+        self._counts, self._total_return = np.zeros(4, dtype=np.int64), 0.0
+
+    def watch(self, rewards: NDArray[np.floating]) -> None:
+        """Count episodes that ended; look at the range of the states now and then."""
+        n, ended = self._watched.n_greedy, self._watched.env.ended
+        self._returns += rewards
+        finished = ended[:n] > 0
+        self._counts += np.bincount(ended[:n][finished], minlength=4)
+        self._total_return += float(self._returns[:n][finished].sum())
+        self._returns[ended > 0] = 0.0
+        if (self.num_timesteps // len(rewards)) % RANGE_EVERY == 0:
+            self._watched.ranges.look(self._watched.env.batch)
+
+    def rates(self) -> dict[str, Any]:
+        """Return how the episodes since the last point ended."""
+        episodes, total = int(self._counts.sum()), self._total_return
+        shares = [None] * 4 if episodes == 0 else [c / episodes for c in self._counts.tolist()]
+        self._counts, self._total_return = np.zeros(4, dtype=np.int64), 0.0
+        return {
+            "episodes": episodes,
+            "success": shares[1],
+            "collision": shares[2],
+            "timeout": shares[3],
+            "reward": total / episodes if episodes else None,
+        }

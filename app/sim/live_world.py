@@ -1,0 +1,87 @@
+"""The live world of a cell: sorting where there is something to sort, else pick and place."""
+
+from typing import Protocol
+
+from app.errors import InvalidInput
+from app.sim import sorting_commands
+from app.sim.cells import Cell, lacks_for_pick
+from app.sim.commands import Command
+from app.sim.ports import SortingValues, TaskPolicy
+from app.sim.snapshot import WorldSnapshot
+from app.sim.sorting import shape_of
+from app.sim.sorting_cell import is_sorting, lacks_for_sorting
+from app.sim.sorting_commands import SORTING_COMMANDS
+from app.sim.sorting_sight import table_of
+from app.sim.sorting_tests import TESTS, SortingTest
+from app.sim.sorting_world import SortingWorld
+from app.sim.world import World
+
+
+class LiveWorld(Protocol):
+    """One live cell of any scenario."""
+
+    def apply(self, command: Command) -> None:
+        """Carry out one command.
+
+        Raises:
+            ServiceError: The command does not fit this cell; nothing has changed.
+        """
+
+    def step(self) -> None:
+        """Advance by one control period; while paused only dragged people move."""
+
+    def snapshot(self) -> WorldSnapshot:
+        """Return what is known now, frozen."""
+
+
+def new_world(
+    cell: Cell,
+    policy: TaskPolicy | None,
+    seed: int,
+    id: str = "main",
+    sorter: SortingValues | None = None,
+) -> LiveWorld:
+    """Return the world of a cell.
+
+    Args:
+        cell: Work cell that :func:`lacks_for_live` accepts.
+        policy: Moves the arm; None lets the robot rest.
+        seed: Seed of people and tasks.
+        id: Name of the world in URLs.
+        sorter: Values the moves of a sorting cell; None leaves them to the exact planner.
+    """
+    if is_sorting(cell):
+        return SortingWorld(cell, policy, seed, id, sorter)
+    return World(cell, policy, seed, id)
+
+
+def lacks_for_live(cell: Cell) -> str | None:
+    """Say what a cell lacks to be shown live; None where nothing."""
+    return lacks_for_sorting(cell) if is_sorting(cell) else lacks_for_pick(cell)
+
+
+def tests_of(cell: Cell) -> tuple[SortingTest, ...]:
+    """Return the sorting tests that can be started in a cell."""
+    if not is_sorting(cell) or lacks_for_sorting(cell) is not None:
+        return ()
+    shape = shape_of(cell)
+    return tuple(one for one in TESTS if one.fits(shape))
+
+
+def check_on_table(command: Command, cell: Cell, snapshot: WorldSnapshot) -> None:
+    """Refuse a command that does not fit the blocks and the goal of a snapshot.
+
+    The world may have gone on since; it looks again.
+
+    Raises:
+        InvalidInput: No such block, a taken place, too many blocks, or a goal they cannot meet.
+    """
+    if snapshot.sorting is None or not isinstance(command, SORTING_COMMANDS):
+        return
+    if isinstance(command, sorting_commands.StartTest):
+        names = tuple(one.name for one in tests_of(cell))
+        if command.id not in names:
+            rule = "needs more cells or colours than this cell has"
+            raise InvalidInput("id", command.id, rule, names)
+    else:
+        sorting_commands.carry_out(command, table_of(cell, snapshot.sorting))

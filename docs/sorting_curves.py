@@ -1,0 +1,71 @@
+"""Trains presets of the sorting task and keeps what their learning curves need.
+
+    python docs/sorting_curves.py sorting-e0-dqn --seed 1 --output runs/e0-1 [--set FIELD=VALUE]
+
+The folder then holds ``curve.jsonl``, a line per point (steps, updates, CPU seconds, success,
+return of greedy episodes), and a policy per checkpoint, from which ``evaluate sorting-grid``
+makes the source's curves over all pairs. A folder that already holds a part is gone on with.
+"""
+
+import argparse
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+import torch
+
+from app.__main__ import parsed_sets
+from app.policies import checkpoint as formats
+from app.policies import presets
+from app.policies.checkpoint import Checkpoint
+from app.policies.progress import Progress
+from app.policies.training import train
+
+
+def main() -> None:
+    """Train one preset with one seed."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("preset")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--output", type=Path, required=True)
+    parser.add_argument("--set", action="append", default=[], dest="sets")
+    options = parser.parse_args()
+    preset = presets.resolve(options.preset, parsed_sets(options.sets))
+    folder: Path = options.output
+    folder.mkdir(parents=True, exist_ok=True)
+    torch.set_num_threads(1)
+
+    def on_progress(point: Progress) -> None:
+        with (folder / "curve.jsonl").open("a", encoding="utf-8") as file:
+            file.write(json.dumps({"preset": preset.name, **asdict(point)}) + "\n")
+
+    def on_checkpoint(step: int, policy: Checkpoint, state: Checkpoint) -> None:
+        write(policy, folder / f"step-{step:09d}")
+        write(state, folder / "resume")
+
+    train(
+        preset,
+        seed=options.seed,
+        resume=read(folder / "resume"),
+        on_progress=on_progress,
+        on_checkpoint=on_checkpoint,
+        should_stop=lambda: False,
+    )
+
+
+def write(checkpoint: Checkpoint, path: Path) -> None:
+    """Write tensors and manifest side by side; the manifest last."""
+    path.with_suffix(".safetensors").write_bytes(checkpoint.tensors)
+    path.with_suffix(".json").write_text(json.dumps(checkpoint.manifest), encoding="utf-8")
+
+
+def read(path: Path) -> Checkpoint | None:
+    """Return a checkpoint, or None where none was written."""
+    if not path.with_suffix(".json").exists():
+        return None
+    manifest = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
+    return formats.load(manifest, path.with_suffix(".safetensors").read_bytes())
+
+
+if __name__ == "__main__":
+    main()
