@@ -1,6 +1,5 @@
 // Tandem's one page: the live cell, what the critic thinks of it, and training.
 import { html, render, useEffect, useMemo, useRef, useState } from "./vendor/htm-preact-standalone.module.js";
-import { sorts } from "./blockshape.js";
 import { Acting, useCheckpoints } from "./checkpoints.js";
 import { Controls } from "./controls.js";
 import { Icon, Logo } from "./icons.js";
@@ -70,7 +69,7 @@ function App() {
 /** The cell's title; a choice where more than one can be shown live. */
 function CellTitle({ cell: { cell, cells, show } }) {
   const [busy, setBusy] = useState(false);
-  const shown = cells.filter((one) => one.lacks_for_pick === null || sorts(one));
+  const shown = cells.filter((one) => one.lacks_for_live === null);
   if (!cell || shown.length < 2) return html`<span class="cell-title">${cell?.title ?? ""}</span>`;
   const change = async (event) => {
     setBusy(true);

@@ -5,12 +5,6 @@ import { BLOCK_INK, BLOCKS } from "./palette.js";
 const LETTERS = { tiny: "XS", small: "S", medium: "M", large: "L", huge: "XL" };
 const NARROWEST = 0.46;
 
-/** A cell that has somewhere to sort from and somewhere to sort to. */
-export function sorts(cell) {
-  const kinds = new Set((cell?.stations ?? []).map((one) => one.kind));
-  return kinds.has("clutter") && kinds.has("cluster");
-}
-
 export const kindOf = ({ colour, size }) => `${colour}-${size}`;
 export const nameOf = ({ colour, size }) => `${size} ${colour} block`;
 
