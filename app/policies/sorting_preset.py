@@ -107,7 +107,7 @@ class SortingPreset:
     c_success: float = number(1.0, 0.0, 100.0, "", "bonus of a goal that is met")
 
     progress_steps: int = number(
-        25_600, 1, 10_000_000, "env steps", "steps between two points of the curve"
+        12_800, 1, 10_000_000, "env steps", "steps between two points of the curve"
     )
     checkpoint_steps: int = number(
         256_000, 1, 10_000_000, "env steps", "steps between two checkpoints"
