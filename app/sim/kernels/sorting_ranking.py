@@ -1,11 +1,11 @@
 """What every valid move of the sorting task is worth to the exact planner, compiled.
 
 A move that comes first costs ``1 / (1 - p)`` attempts, ``p`` the failure probability of its
-pick, and then what the plan from the state it gives costs.
+pick, and then what a plan by the rules from the state it gives costs.
 """
 
 from app.sim.kernels.compiled import kernel
-from app.sim.kernels.sorting_planner import Objects, PlannerWork, Task, plan_state
+from app.sim.kernels.sorting_planner import Objects, PlannerWork, Task, rough_plan
 from app.sim.kernels.sorting_progress import Ints, lay_out
 from app.sim.ports import Vec
 
@@ -60,7 +60,7 @@ def attempts_by_move(
     for i in range(len(moves)):
         pick, place = moves[i, 0], moves[i, 1]
         _shift(pick, place, objects)
-        _, after = plan_state(objects, task, work)
+        _, after = rough_plan(objects, task, work)
         _shift(place, pick, objects)
         risk = task.fail[pick] if pick < len(task.fail) else 0.0
         attempts[i] = after + 1.0 / (1.0 - risk)
