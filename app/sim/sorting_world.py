@@ -7,10 +7,12 @@ cell's probability, drawn from (seed, task, attempt). After every attempt, and w
 changed blocks, goal or sorter, the sorter decides anew; a block at the magnet goes on, goes
 elsewhere, or back to where it counts (``sorting_table.py``).
 
-A person nearer than NEAR_M breaks inverse kinematics off, and the policy goes on. A motion that
-takes longer than TIME_LIMIT_S begins again, for another block if one is as good; from less than
-SHORT_WAY_M it is then ended by inverse kinematics. After a contact the robot starts again from
-home, and a held block falls back to where it counts. Blocks and towers are no obstacles.
+A person nearer than NEAR_M breaks inverse kinematics off: the robot draws back toward home until
+there is ROOM_M, and the policy begins again; it was trained to reach, not to wait at a target.
+With nothing to do the robot goes home. A motion that takes longer than TIME_LIMIT_S begins
+again, for another block if one is as good; from less than SHORT_WAY_M it is then ended by
+inverse kinematics. After a contact the robot starts again from home, and a held block falls
+back to where it counts. Blocks and towers are no obstacles.
 
 Source: METHOD 1.2, 1.5, 3.1 and section 4 (real pick and place instead of reaching).
 """
@@ -29,7 +31,7 @@ from app.sim.ports import Candidate, SortingValues, TaskPolicy, Vec
 from app.sim.snapshot import Counters, Status, WorldSnapshot
 from app.sim.sorting import SortingBatch, SortingSettings
 from app.sim.sorting_cell import APPROACH_M, above, reaching_cell
-from app.sim.sorting_explanation import DONE, NO_GOAL, Teller
+from app.sim.sorting_explanation import DONE, MAKES_ROOM, NO_GOAL, Teller
 from app.sim.sorting_sight import Sight, view_of
 from app.sim.sorting_state import NULL, Move
 from app.sim.sorting_table import Block, SortingTable, grasp_point
@@ -48,6 +50,10 @@ DOWN_S, HOLD_S, UP_S = 4.0, 0.3, 2.0
 """Longest way down, rest of the magnet at a block, longest way up [s]."""
 SHORT_WAY_M = 0.35
 """Distance from which a motion that took too long is ended by inverse kinematics [m]."""
+ROOM_M = 0.35
+"""Clearance from which on a robot that drew back goes on [m]."""
+HOME_RAD = 0.02
+"""Joint error at which the robot counts as at home [rad]."""
 TASK_SEED = 7919
 """Between the seeds of two tasks."""
 
@@ -92,6 +98,7 @@ class SortingWorld:
         self._sorter = LiveSorter(sorter)
         self._choice: Choice | None = None
         self._descent: Descent | None = None
+        self._drawing_back = False
         self._n_tasks = 0
         self._reset()
 
@@ -244,14 +251,17 @@ class SortingWorld:
     def _move_robot(self, human_q: Vec, sizes: Vec) -> None:
         """Carry out the action, the people having moved from ``human_q`` with ``sizes``."""
         stage, descent = self._stage, self._descent
+        straight = descent is not None or self._goes_home
         found = stage.robot.advance(
-            self._action(), stage.people, human_q, sizes, straight=descent is not None
+            self._action(), stage.people, human_q, sizes, straight=straight
         )
         if found.kind != "none":
-            self._descent = None
+            self._descent, self._drawing_back = None, False
             stage.note_contact(found)
         elif descent is not None:
             self._follow(descent)
+        elif self._drawing_back:
+            self._look_for_room()
         elif stage.decision is not None:
             stage.time_left -= stage.robot.dt
             self._judge(stage.decision.index)
@@ -261,9 +271,27 @@ class SortingWorld:
         stage = self._stage
         if self._descent is not None:
             return stage.robot.toward(stage.robot.posture_at(self._aim(self._descent))[0])
+        if self._goes_home:
+            return stage.robot.toward(stage.robot.home)
         if stage.decision is not None:
             return np.asarray(stage.decision.actions[stage.decision.index], dtype=np.float64)
         return np.zeros(5)
+
+    @property
+    def _goes_home(self) -> bool:
+        """Whether the robot goes home, or toward it to make room."""
+        return self._drawing_back or (self._choice is None and self._stage.policy is not None)
+
+    def _draw_back(self) -> None:
+        self._begin_motion()
+        self._drawing_back = True
+
+    def _look_for_room(self) -> None:
+        """Begin the motion again where there is room, or nowhere else to go."""
+        robot = self._stage.robot
+        room = robot.clearance_m is None or robot.clearance_m > ROOM_M
+        if room or np.abs(robot.q - robot.home).max() < HOME_RAD:
+            self._begin_motion()
 
     def _aim(self, descent: Descent) -> Vec:
         """Return where the tcp shall go now: down in a funnel, or up."""
@@ -281,7 +309,7 @@ class SortingWorld:
         self._begin_motion(status)
 
     def _begin_motion(self, status: Status = "moving") -> None:
-        self._descent = None
+        self._descent, self._drawing_back = None, False
         self._stage.enter(status)
         self._stage.begin_motion()
         self._decide()
@@ -292,9 +320,12 @@ class SortingWorld:
         target = stage.offered[index]
         late = stage.time_left <= 0.0
         short = np.linalg.norm(stage.robot.tcp() - target.position) < SHORT_WAY_M
-        if not stage.near and (stage.robot.reached(target.position) or (late and short)):
-            stage.count(reached=1)
-            self._go_down(target.id)
+        if stage.robot.reached(target.position) or (late and short):
+            if stage.near:
+                self._draw_back()
+            else:
+                stage.count(reached=1)
+                self._go_down(target.id)
         elif late:
             self._give_up()
 
@@ -328,8 +359,10 @@ class SortingWorld:
         stage = self._stage
         age, tcp = stage.status_s - descent.since, stage.robot.tcp()
         if descent.step == "down":
-            if stage.near or age > DOWN_S:
-                self._begin_motion()  # The policy moves away, and comes back.
+            if stage.near:
+                self._draw_back()
+            elif age > DOWN_S:
+                self._begin_motion()
             elif np.linalg.norm(tcp - descent.point) < AT_M:
                 self._touch_down(descent)
         elif descent.step == "hold":
@@ -453,6 +486,8 @@ class SortingWorld:
             return explanation.touched(stage.contact, final=False)
         if stage.note is not None and status != "blocked":
             return stage.note
+        if self._drawing_back and status == "moving":
+            return MAKES_ROOM
         if status in ("moving", "picking") and self._choice is not None:
             return self._teller.doing(self._phase, self._choice, self._sorter)
         if status == "solved":
