@@ -7,8 +7,8 @@ cell's probability, drawn from (seed, task, attempt). After every attempt, and w
 changed blocks, goal or sorter, the sorter decides anew; a block at the magnet goes on, goes
 elsewhere, or back to where it counts (``sorting_table.py``).
 
-A person nearer than NEAR_M breaks inverse kinematics off: the robot draws back toward home until
-there is ROOM_M, and the policy begins again; it was trained to reach, not to wait at a target.
+A person nearer than NEAR_M breaks inverse kinematics off: the robot draws back toward home
+until there is ROOM_M; the policy was trained to reach a target, not to wait at it.
 With nothing to do the robot goes home. A motion that takes longer than TIME_LIMIT_S begins
 again, for another block if one is as good; from less than SHORT_WAY_M it is then ended by
 inverse kinematics. After a contact the robot starts again from home, and a held block falls
@@ -17,7 +17,7 @@ back to where it counts. Blocks and towers are no obstacles.
 Source: METHOD 1.2, 1.5, 3.1 and section 4 (real pick and place instead of reaching).
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -29,47 +29,21 @@ from app.sim.live_sorter import Choice, LiveSorter
 from app.sim.live_stage import CONTACT_HOLD_S, LiveStage
 from app.sim.ports import Candidate, SortingValues, TaskPolicy, Vec
 from app.sim.snapshot import Counters, Status, WorldSnapshot
-from app.sim.sorting import SortingBatch, SortingSettings
-from app.sim.sorting_cell import APPROACH_M, above, reaching_cell
+from app.sim.sorting_cell import above, reaching_cell
+from app.sim.sorting_descent import Descent
 from app.sim.sorting_explanation import DONE, MAKES_ROOM, NO_GOAL, Teller
 from app.sim.sorting_sight import Sight, view_of
 from app.sim.sorting_state import NULL, Move
 from app.sim.sorting_table import Block, SortingTable, grasp_point
-from app.sim.sorting_trial import SortingTrial
+from app.sim.sorting_trial import SortingTrial, random_task
 from app.sim.sorting_view import Phase, SortingCounters
 
-N_BLOCKS = 6
-"""Blocks of a random task."""
-AT_M = 0.004
-"""Distance at which the tool counts as down [m]."""
-UP_M = 0.02
-"""Distance below the point of approach at which it counts as up again [m]."""
-FUNNEL = 2.0
-"""On its way down the tool stays this many times its sideways error above the point."""
-DOWN_S, HOLD_S, UP_S = 4.0, 0.3, 2.0
-"""Longest way down, rest of the magnet at a block, longest way up [s]."""
 SHORT_WAY_M = 0.35
 """Distance from which a motion that took too long is ended by inverse kinematics [m]."""
 ROOM_M = 0.35
 """Clearance from which on a robot that drew back goes on [m]."""
 HOME_RAD = 0.02
 """Joint error at which the robot counts as at home [rad]."""
-TASK_SEED = 7919
-"""Between the seeds of two tasks."""
-
-
-@dataclass(slots=True)
-class Descent:
-    """A way down to a block or a place and up again."""
-
-    point: Vec
-    """Where the tcp is when the magnet touches [m], shape (3,)."""
-    phase: Phase
-    """``grasp`` or ``place``."""
-    step: str = "down"
-    """``down``, ``hold`` or ``up``."""
-    since: float = 0.0
-    """Time in the status at which the step began [s]."""
 
 
 class SortingWorld:
@@ -109,12 +83,9 @@ class SortingWorld:
         self._stage.t, self._stage.counters = 0.0, Counters()
         for person in self._stage.people:
             person.start(None)
-        shape, seed = self._table.shape, self._seed + TASK_SEED * self._n_tasks
-        settings = SortingSettings(n_objects=min(N_BLOCKS, shape.n_cells))
-        batch = SortingBatch(shape, self._table.fail, 1, seed, settings)
-        batch.reset()
+        start = random_task(self._table.shape, self._table.fail, self._seed, self._n_tasks)
         self._begin_task(None)
-        self._table.adopt(batch.state_of(0))
+        self._table.adopt(start)
         self._stage.forget_note()
         self._restart_robot()
 
@@ -207,7 +178,7 @@ class SortingWorld:
             if self._is_same(descent, old, new):
                 return
         self._choice = None
-        self._rise(descent)
+        descent.begin("up", self._stage.status_s)
 
     def _is_same(self, descent: Descent, old: Choice, new: Choice | None) -> bool:
         if new is None or new.move.place != old.move.place or old.block not in new.twins:
@@ -270,7 +241,8 @@ class SortingWorld:
         """Return the wanted joint speeds over their limits, shape (5,)."""
         stage = self._stage
         if self._descent is not None:
-            return stage.robot.toward(stage.robot.posture_at(self._aim(self._descent))[0])
+            aim = self._descent.aim(stage.robot.tcp())
+            return stage.robot.toward(stage.robot.posture_at(aim)[0])
         if self._goes_home:
             return stage.robot.toward(stage.robot.home)
         if stage.decision is not None:
@@ -292,13 +264,6 @@ class SortingWorld:
         room = robot.clearance_m is None or robot.clearance_m > ROOM_M
         if room or np.abs(robot.q - robot.home).max() < HOME_RAD:
             self._begin_motion()
-
-    def _aim(self, descent: Descent) -> Vec:
-        """Return where the tcp shall go now: down in a funnel, or up."""
-        if descent.step == "up":
-            return above(descent.point)
-        aside = float(np.linalg.norm((self._stage.robot.tcp() - descent.point)[:2]))
-        return above(descent.point, min(APPROACH_M, FUNNEL * max(aside - AT_M, 0.0)))
 
     # Halves of a move.
 
@@ -357,32 +322,27 @@ class SortingWorld:
     def _follow(self, descent: Descent) -> None:
         """Go on with a way down and up."""
         stage = self._stage
-        age, tcp = stage.status_s - descent.since, stage.robot.tcp()
-        if descent.step == "down":
-            if stage.near:
-                self._draw_back()
-            elif age > DOWN_S:
-                self._begin_motion()
-            elif np.linalg.norm(tcp - descent.point) < AT_M:
-                self._touch_down(descent)
-        elif descent.step == "hold":
-            if age >= HOLD_S:
-                self._rise(descent)
-        elif stage.near or age > UP_S or tcp[2] > descent.point[2] + APPROACH_M - UP_M:
+        tcp, over = stage.robot.tcp(), descent.is_over(stage.robot.tcp(), stage.status_s)
+        if descent.step == "down" and stage.near:
+            self._draw_back()
+        elif descent.step == "down" and descent.is_down(tcp):
+            self._touch_down(descent)
+        elif descent.step == "down" and over:
+            self._begin_motion()
+        elif descent.step == "hold" and over:
+            descent.begin("up", stage.status_s)
+        elif descent.step == "up" and (over or stage.near):
             self._after_rise()
-
-    def _rise(self, descent: Descent) -> None:
-        descent.step, descent.since = "up", self._stage.status_s
 
     def _touch_down(self, descent: Descent) -> None:
         """Let the magnet close or open; it may miss."""
-        descent.step, descent.since = "hold", self._stage.status_s
-        choice, table = self._choice, self._table
+        descent.begin("hold", self._stage.status_s)
+        choice = self._choice
         assert choice is not None
         if descent.phase == "grasp":
             self._grasp(choice)
             return
-        table.drop(choice.move.place)
+        self._table.drop(choice.move.place)
         if not choice.back:
             self._count(moves=1)
             self._sorter.end_attempt()

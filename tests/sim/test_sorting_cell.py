@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from app.errors import CheckpointMismatch
+from app.sim import live_world
 from app.sim.cells import lacks_for_pick, load_cell
 from app.sim.kernels import kinematics
-from app.sim import live_world
 from app.sim.live_world import lacks_for_live, new_world
 from app.sim.scene import arm_of
 from app.sim.sorting_cell import (
