@@ -26,7 +26,7 @@ from app.sim import commands, explanation, sorting_commands
 from app.sim.cells import Cell
 from app.sim.commands import Command
 from app.sim.live_sorter import Choice, LiveSorter
-from app.sim.live_stage import CONTACT_HOLD_S, LiveStage
+from app.sim.live_stage import CONTACT_HOLD_S, LiveStage, PeopleCommand
 from app.sim.ports import Candidate, SortingValues, TaskPolicy, Vec
 from app.sim.snapshot import Counters, Status, WorldSnapshot
 from app.sim.sorting_cell import above, reaching_cell
@@ -34,7 +34,7 @@ from app.sim.sorting_descent import Descent
 from app.sim.sorting_explanation import DONE, MAKES_ROOM, NO_GOAL, Teller
 from app.sim.sorting_sight import Sight, view_of
 from app.sim.sorting_state import NULL, Move
-from app.sim.sorting_table import Block, SortingTable, grasp_point
+from app.sim.sorting_table import SortingTable
 from app.sim.sorting_trial import SortingTrial, random_task
 from app.sim.sorting_view import Phase, SortingCounters
 
@@ -115,17 +115,11 @@ class SortingWorld:
         """
         stage = self._stage
         commands.check(command, self.cell, stage.people.ids)
+        if isinstance(command, PeopleCommand):
+            stage.change_people(command)
+            self._refresh()
+            return
         match command:
-            case (
-                commands.MoveHuman()
-                | commands.SetMode()
-                | commands.SetMotion()
-                | commands.SetBody()
-                | commands.AddPerson()
-                | commands.RemovePerson()
-            ):
-                stage.change_people(command)
-                self._refresh()
             case commands.Pause() | commands.Resume():
                 stage.paused = isinstance(command, commands.Pause)
             case commands.StepOnce():
@@ -184,10 +178,10 @@ class SortingWorld:
         if new is None or new.move.place != old.move.place or old.block not in new.twins:
             return False
         if descent.phase == "grasp":
-            point = self._point_of(old.block)
+            point = self._table.point_of(old.block)
             return point is not None and np.array_equal(point, descent.point)
         return self._table.held is not None and np.array_equal(
-            self._point_at(new.move.place), descent.point
+            self._table.point_at(new.move.place), descent.point
         )
 
     # Time.
@@ -310,12 +304,12 @@ class SortingWorld:
         table, choice = self._table, self._choice
         assert choice is not None
         if table.held is not None:
-            descent = Descent(self._point_at(choice.move.place), "place")
+            descent = Descent(self._table.point_at(choice.move.place), "place")
         else:
             block = next(one for one in choice.twins if one.id == name)
             pick, level = table.place_of(block)
             self._choice = replace(choice, block=block, move=Move(pick, choice.move.place))
-            descent = Descent(grasp_point(self.cell, table, pick, level), "grasp")
+            descent = Descent(table.point(pick, level), "grasp")
         self._descent = descent
         self._stage.enter("picking")
 
@@ -344,7 +338,7 @@ class SortingWorld:
             return
         self._table.drop(choice.move.place)
         if not choice.back:
-            self._count(moves=1)
+            self._counts = replace(self._counts, moves=self._counts.moves + 1)
             self._sorter.end_attempt()
 
     def _grasp(self, choice: Choice) -> None:
@@ -352,11 +346,11 @@ class SortingWorld:
         self._sorter.note_attempt(table, choice.move)
         rng = np.random.default_rng((self._seed, self._n_tasks, self._counts.attempts))
         risk = float(table.fail[pick]) if pick < table.shape.n_cells else 0.0
-        self._count(attempts=1)
+        self._counts = replace(self._counts, attempts=self._counts.attempts + 1)
         if rng.random() >= risk:
             table.lift(pick)
             return
-        self._count(failures=1)
+        self._counts = replace(self._counts, failures=self._counts.failures + 1)
         self._sorter.end_attempt()
         self._stage.tell(self._teller.missed(choice.block, risk))
 
@@ -365,15 +359,6 @@ class SortingWorld:
             self._begin_motion()
         else:
             self._think()
-
-    def _count(self, *, moves: int = 0, attempts: int = 0, failures: int = 0) -> None:
-        so_far = self._counts
-        self._counts = replace(
-            so_far,
-            moves=so_far.moves + moves,
-            attempts=so_far.attempts + attempts,
-            failures=so_far.failures + failures,
-        )
 
     def _let_interfere(self) -> None:
         """Let the running test's person do what is due."""
@@ -396,26 +381,15 @@ class SortingWorld:
             return "idle"
         return "carry" if self._table.held is not None else "approach"
 
-    def _point_at(self, position: int) -> Vec:
-        """Return where the tcp puts the next block at a position [m], shape (3,)."""
-        level = self._table.level_at(position)
-        return grasp_point(self.cell, self._table, position, level)
-
-    def _point_of(self, block: Block) -> Vec | None:
-        """Return where the tcp takes a block [m], shape (3,); None where it is gone."""
-        if block not in self._table.blocks or block == self._table.held:
-            return None
-        return grasp_point(self.cell, self._table, *self._table.place_of(block))
-
     def _candidates(self) -> tuple[Candidate, ...]:
         choice, table = self._choice, self._table
         if choice is None:
             return ()
         if table.held is not None:
             name = table.names.stations[choice.move.place]
-            point = above(self._point_at(choice.move.place))
+            point = above(self._table.point_at(choice.move.place))
             return (Candidate(id=name, position=point),)
-        points = [(one.id, self._point_of(one)) for one in choice.twins]
+        points = [(one.id, self._table.point_of(one)) for one in choice.twins]
         return tuple(
             Candidate(id=id, position=above(point)) for id, point in points if point is not None
         )
@@ -461,7 +435,6 @@ class SortingWorld:
         stage, status = self._stage, self._shown_status()
         closing = self._descent is not None and self._descent.step == "hold"
         sight = Sight(
-            cell=self.cell,
             table=self._table,
             sorter=self._sorter,
             choice=self._choice,

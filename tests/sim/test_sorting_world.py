@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.errors import InvalidInput, NotFound
+from app.errors import InvalidInput
 from app.policies import pretrained
 from app.policies.task_choice import TaskChooser
 from app.sim import commands
@@ -276,6 +276,7 @@ def test_robot_rests_without_a_policy() -> None:
         (ToggleGoal(id="blue-small"), "id"),
         (SetGoal(towers={"red": ("large", "large")}), "towers"),
         (SetGoal(towers={"green": ()}), "towers"),
+        (StartTest(id="test-7"), "id"),
         (commands.ToggleCandidate(id="cell0"), "tag"),
     ],
 )
@@ -291,8 +292,3 @@ def test_command_that_does_not_fit_is_named_and_changes_nothing(
     after = world.snapshot().sorting
     assert [one.id for one in after.pieces] == [one.id for one in before.pieces]
     assert after.goal == before.goal
-
-
-def test_unknown_test_is_not_found() -> None:
-    with pytest.raises(NotFound, match="test-7"):
-        empty_world().apply(StartTest(id="test-7"))
