@@ -243,7 +243,7 @@ def check(command: Command, cell: Cell, people: Sequence[int]) -> None:
 
     Raises:
         InvalidInput: A number or mode out of range, nobody of that id, or no room.
-        NotFound: The cell has no such station, case study or test.
+        NotFound: The cell has no such station, or no such case study.
     """
     match command:
         case MoveHuman() | SetMode() | SetMotion() | SetBody() | RemovePerson() | AddPerson():

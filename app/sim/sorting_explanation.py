@@ -7,6 +7,7 @@ from app.sim.sorting_table import Block, SortingTable
 from app.sim.sorting_view import Phase
 
 NO_GOAL = "Nothing to do: click blocks to put them into the goal."
+MAKES_ROOM = "Makes room: a person is near where the robot wants to work."
 DONE = "Done: every tower is as the goal asks."
 
 

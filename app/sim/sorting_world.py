@@ -7,15 +7,17 @@ cell's probability, drawn from (seed, task, attempt). After every attempt, and w
 changed blocks, goal or sorter, the sorter decides anew; a block at the magnet goes on, goes
 elsewhere, or back to where it counts (``sorting_table.py``).
 
-A person nearer than NEAR_M breaks inverse kinematics off, and the policy goes on. A motion that
-takes longer than TIME_LIMIT_S begins again, for another block if one is as good; from less than
-SHORT_WAY_M it is then ended by inverse kinematics. After a contact the robot starts again from
-home, and a held block falls back to where it counts. Blocks and towers are no obstacles.
+A person nearer than NEAR_M breaks inverse kinematics off: the robot draws back toward home
+until there is ROOM_M; the policy was trained to reach a target, not to wait at it.
+With nothing to do the robot goes home. A motion that takes longer than TIME_LIMIT_S begins
+again, for another block if one is as good; from less than SHORT_WAY_M it is then ended by
+inverse kinematics. After a contact the robot starts again from home, and a held block falls
+back to where it counts. Blocks and towers are no obstacles.
 
 Source: METHOD 1.2, 1.5, 3.1 and section 4 (real pick and place instead of reaching).
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -24,46 +26,24 @@ from app.sim import commands, explanation, sorting_commands
 from app.sim.cells import Cell
 from app.sim.commands import Command
 from app.sim.live_sorter import Choice, LiveSorter
-from app.sim.live_stage import CONTACT_HOLD_S, LiveStage
+from app.sim.live_stage import CONTACT_HOLD_S, LiveStage, PeopleCommand
 from app.sim.ports import Candidate, SortingValues, TaskPolicy, Vec
 from app.sim.snapshot import Counters, Status, WorldSnapshot
-from app.sim.sorting import SortingBatch, SortingSettings
-from app.sim.sorting_cell import APPROACH_M, above, reaching_cell
-from app.sim.sorting_explanation import DONE, NO_GOAL, Teller
+from app.sim.sorting_cell import above, reaching_cell
+from app.sim.sorting_descent import Descent
+from app.sim.sorting_explanation import DONE, MAKES_ROOM, NO_GOAL, Teller
 from app.sim.sorting_sight import Sight, view_of
 from app.sim.sorting_state import NULL, Move
-from app.sim.sorting_table import Block, SortingTable, grasp_point
-from app.sim.sorting_trial import SortingTrial
+from app.sim.sorting_table import SortingTable
+from app.sim.sorting_trial import SortingTrial, random_task
 from app.sim.sorting_view import Phase, SortingCounters
 
-N_BLOCKS = 6
-"""Blocks of a random task."""
-AT_M = 0.004
-"""Distance at which the tool counts as down [m]."""
-UP_M = 0.02
-"""Distance below the point of approach at which it counts as up again [m]."""
-FUNNEL = 2.0
-"""On its way down the tool stays this many times its sideways error above the point."""
-DOWN_S, HOLD_S, UP_S = 4.0, 0.3, 2.0
-"""Longest way down, rest of the magnet at a block, longest way up [s]."""
 SHORT_WAY_M = 0.35
 """Distance from which a motion that took too long is ended by inverse kinematics [m]."""
-TASK_SEED = 7919
-"""Between the seeds of two tasks."""
-
-
-@dataclass(slots=True)
-class Descent:
-    """A way down to a block or a place and up again."""
-
-    point: Vec
-    """Where the tcp is when the magnet touches [m], shape (3,)."""
-    phase: Phase
-    """``grasp`` or ``place``."""
-    step: str = "down"
-    """``down``, ``hold`` or ``up``."""
-    since: float = 0.0
-    """Time in the status at which the step began [s]."""
+ROOM_M = 0.35
+"""Clearance from which on a robot that drew back goes on [m]."""
+HOME_RAD = 0.02
+"""Joint error at which the robot counts as at home [rad]."""
 
 
 class SortingWorld:
@@ -92,6 +72,7 @@ class SortingWorld:
         self._sorter = LiveSorter(sorter)
         self._choice: Choice | None = None
         self._descent: Descent | None = None
+        self._drawing_back = False
         self._n_tasks = 0
         self._reset()
 
@@ -102,12 +83,9 @@ class SortingWorld:
         self._stage.t, self._stage.counters = 0.0, Counters()
         for person in self._stage.people:
             person.start(None)
-        shape, seed = self._table.shape, self._seed + TASK_SEED * self._n_tasks
-        settings = SortingSettings(n_objects=min(N_BLOCKS, shape.n_cells))
-        batch = SortingBatch(shape, self._table.fail, 1, seed, settings)
-        batch.reset()
+        start = random_task(self._table.shape, self._table.fail, self._seed, self._n_tasks)
         self._begin_task(None)
-        self._table.adopt(batch.state_of(0))
+        self._table.adopt(start)
         self._stage.forget_note()
         self._restart_robot()
 
@@ -137,17 +115,11 @@ class SortingWorld:
         """
         stage = self._stage
         commands.check(command, self.cell, stage.people.ids)
+        if isinstance(command, PeopleCommand):
+            stage.change_people(command)
+            self._refresh()
+            return
         match command:
-            case (
-                commands.MoveHuman()
-                | commands.SetMode()
-                | commands.SetMotion()
-                | commands.SetBody()
-                | commands.AddPerson()
-                | commands.RemovePerson()
-            ):
-                stage.change_people(command)
-                self._refresh()
             case commands.Pause() | commands.Resume():
                 stage.paused = isinstance(command, commands.Pause)
             case commands.StepOnce():
@@ -200,16 +172,16 @@ class SortingWorld:
             if self._is_same(descent, old, new):
                 return
         self._choice = None
-        self._rise(descent)
+        descent.begin("up", self._stage.status_s)
 
     def _is_same(self, descent: Descent, old: Choice, new: Choice | None) -> bool:
         if new is None or new.move.place != old.move.place or old.block not in new.twins:
             return False
         if descent.phase == "grasp":
-            point = self._point_of(old.block)
+            point = self._table.point_of(old.block)
             return point is not None and np.array_equal(point, descent.point)
         return self._table.held is not None and np.array_equal(
-            self._point_at(new.move.place), descent.point
+            self._table.point_at(new.move.place), descent.point
         )
 
     # Time.
@@ -244,14 +216,17 @@ class SortingWorld:
     def _move_robot(self, human_q: Vec, sizes: Vec) -> None:
         """Carry out the action, the people having moved from ``human_q`` with ``sizes``."""
         stage, descent = self._stage, self._descent
+        straight = descent is not None or self._goes_home
         found = stage.robot.advance(
-            self._action(), stage.people, human_q, sizes, straight=descent is not None
+            self._action(), stage.people, human_q, sizes, straight=straight
         )
         if found.kind != "none":
-            self._descent = None
+            self._descent, self._drawing_back = None, False
             stage.note_contact(found)
         elif descent is not None:
             self._follow(descent)
+        elif self._drawing_back:
+            self._look_for_room()
         elif stage.decision is not None:
             stage.time_left -= stage.robot.dt
             self._judge(stage.decision.index)
@@ -260,17 +235,29 @@ class SortingWorld:
         """Return the wanted joint speeds over their limits, shape (5,)."""
         stage = self._stage
         if self._descent is not None:
-            return stage.robot.toward(stage.robot.posture_at(self._aim(self._descent))[0])
+            aim = self._descent.aim(stage.robot.tcp())
+            return stage.robot.toward(stage.robot.posture_at(aim)[0])
+        if self._goes_home:
+            return stage.robot.toward(stage.robot.home)
         if stage.decision is not None:
             return np.asarray(stage.decision.actions[stage.decision.index], dtype=np.float64)
         return np.zeros(5)
 
-    def _aim(self, descent: Descent) -> Vec:
-        """Return where the tcp shall go now: down in a funnel, or up."""
-        if descent.step == "up":
-            return above(descent.point)
-        aside = float(np.linalg.norm((self._stage.robot.tcp() - descent.point)[:2]))
-        return above(descent.point, min(APPROACH_M, FUNNEL * max(aside - AT_M, 0.0)))
+    @property
+    def _goes_home(self) -> bool:
+        """Whether the robot goes home, or toward it to make room."""
+        return self._drawing_back or (self._choice is None and self._stage.policy is not None)
+
+    def _draw_back(self) -> None:
+        self._begin_motion()
+        self._drawing_back = True
+
+    def _look_for_room(self) -> None:
+        """Begin the motion again where there is room, or nowhere else to go."""
+        robot = self._stage.robot
+        room = robot.clearance_m is None or robot.clearance_m > ROOM_M
+        if room or np.abs(robot.q - robot.home).max() < HOME_RAD:
+            self._begin_motion()
 
     # Halves of a move.
 
@@ -281,7 +268,7 @@ class SortingWorld:
         self._begin_motion(status)
 
     def _begin_motion(self, status: Status = "moving") -> None:
-        self._descent = None
+        self._descent, self._drawing_back = None, False
         self._stage.enter(status)
         self._stage.begin_motion()
         self._decide()
@@ -292,9 +279,12 @@ class SortingWorld:
         target = stage.offered[index]
         late = stage.time_left <= 0.0
         short = np.linalg.norm(stage.robot.tcp() - target.position) < SHORT_WAY_M
-        if not stage.near and (stage.robot.reached(target.position) or (late and short)):
-            stage.count(reached=1)
-            self._go_down(target.id)
+        if stage.robot.reached(target.position) or (late and short):
+            if stage.near:
+                self._draw_back()
+            else:
+                stage.count(reached=1)
+                self._go_down(target.id)
         elif late:
             self._give_up()
 
@@ -314,44 +304,41 @@ class SortingWorld:
         table, choice = self._table, self._choice
         assert choice is not None
         if table.held is not None:
-            descent = Descent(self._point_at(choice.move.place), "place")
+            descent = Descent(self._table.point_at(choice.move.place), "place")
         else:
             block = next(one for one in choice.twins if one.id == name)
             pick, level = table.place_of(block)
             self._choice = replace(choice, block=block, move=Move(pick, choice.move.place))
-            descent = Descent(grasp_point(self.cell, table, pick, level), "grasp")
+            descent = Descent(table.point(pick, level), "grasp")
         self._descent = descent
         self._stage.enter("picking")
 
     def _follow(self, descent: Descent) -> None:
         """Go on with a way down and up."""
         stage = self._stage
-        age, tcp = stage.status_s - descent.since, stage.robot.tcp()
-        if descent.step == "down":
-            if stage.near or age > DOWN_S:
-                self._begin_motion()  # The policy moves away, and comes back.
-            elif np.linalg.norm(tcp - descent.point) < AT_M:
-                self._touch_down(descent)
-        elif descent.step == "hold":
-            if age >= HOLD_S:
-                self._rise(descent)
-        elif stage.near or age > UP_S or tcp[2] > descent.point[2] + APPROACH_M - UP_M:
+        tcp, over = stage.robot.tcp(), descent.is_over(stage.robot.tcp(), stage.status_s)
+        if descent.step == "down" and stage.near:
+            self._draw_back()
+        elif descent.step == "down" and descent.is_down(tcp):
+            self._touch_down(descent)
+        elif descent.step == "down" and over:
+            self._begin_motion()
+        elif descent.step == "hold" and over:
+            descent.begin("up", stage.status_s)
+        elif descent.step == "up" and (over or stage.near):
             self._after_rise()
-
-    def _rise(self, descent: Descent) -> None:
-        descent.step, descent.since = "up", self._stage.status_s
 
     def _touch_down(self, descent: Descent) -> None:
         """Let the magnet close or open; it may miss."""
-        descent.step, descent.since = "hold", self._stage.status_s
-        choice, table = self._choice, self._table
+        descent.begin("hold", self._stage.status_s)
+        choice = self._choice
         assert choice is not None
         if descent.phase == "grasp":
             self._grasp(choice)
             return
-        table.drop(choice.move.place)
+        self._table.drop(choice.move.place)
         if not choice.back:
-            self._count(moves=1)
+            self._counts = replace(self._counts, moves=self._counts.moves + 1)
             self._sorter.end_attempt()
 
     def _grasp(self, choice: Choice) -> None:
@@ -359,11 +346,11 @@ class SortingWorld:
         self._sorter.note_attempt(table, choice.move)
         rng = np.random.default_rng((self._seed, self._n_tasks, self._counts.attempts))
         risk = float(table.fail[pick]) if pick < table.shape.n_cells else 0.0
-        self._count(attempts=1)
+        self._counts = replace(self._counts, attempts=self._counts.attempts + 1)
         if rng.random() >= risk:
             table.lift(pick)
             return
-        self._count(failures=1)
+        self._counts = replace(self._counts, failures=self._counts.failures + 1)
         self._sorter.end_attempt()
         self._stage.tell(self._teller.missed(choice.block, risk))
 
@@ -372,15 +359,6 @@ class SortingWorld:
             self._begin_motion()
         else:
             self._think()
-
-    def _count(self, *, moves: int = 0, attempts: int = 0, failures: int = 0) -> None:
-        so_far = self._counts
-        self._counts = replace(
-            so_far,
-            moves=so_far.moves + moves,
-            attempts=so_far.attempts + attempts,
-            failures=so_far.failures + failures,
-        )
 
     def _let_interfere(self) -> None:
         """Let the running test's person do what is due."""
@@ -403,26 +381,15 @@ class SortingWorld:
             return "idle"
         return "carry" if self._table.held is not None else "approach"
 
-    def _point_at(self, position: int) -> Vec:
-        """Return where the tcp puts the next block at a position [m], shape (3,)."""
-        level = self._table.level_at(position)
-        return grasp_point(self.cell, self._table, position, level)
-
-    def _point_of(self, block: Block) -> Vec | None:
-        """Return where the tcp takes a block [m], shape (3,); None where it is gone."""
-        if block not in self._table.blocks or block == self._table.held:
-            return None
-        return grasp_point(self.cell, self._table, *self._table.place_of(block))
-
     def _candidates(self) -> tuple[Candidate, ...]:
         choice, table = self._choice, self._table
         if choice is None:
             return ()
         if table.held is not None:
             name = table.names.stations[choice.move.place]
-            point = above(self._point_at(choice.move.place))
+            point = above(self._table.point_at(choice.move.place))
             return (Candidate(id=name, position=point),)
-        points = [(one.id, self._point_of(one)) for one in choice.twins]
+        points = [(one.id, self._table.point_of(one)) for one in choice.twins]
         return tuple(
             Candidate(id=id, position=above(point)) for id, point in points if point is not None
         )
@@ -453,6 +420,8 @@ class SortingWorld:
             return explanation.touched(stage.contact, final=False)
         if stage.note is not None and status != "blocked":
             return stage.note
+        if self._drawing_back and status == "moving":
+            return MAKES_ROOM
         if status in ("moving", "picking") and self._choice is not None:
             return self._teller.doing(self._phase, self._choice, self._sorter)
         if status == "solved":
@@ -466,7 +435,6 @@ class SortingWorld:
         stage, status = self._stage, self._shown_status()
         closing = self._descent is not None and self._descent.step == "hold"
         sight = Sight(
-            cell=self.cell,
             table=self._table,
             sorter=self._sorter,
             choice=self._choice,
