@@ -6,12 +6,14 @@ concerns the picture.
 
 import viser
 
+from app.sim.cells import Cell
 from web.scene import Overlays
+from web.sorting_scene import sorts
 
 BRAND = (11, 127, 119)
 
 
-def build(server: viser.ViserServer, overlays: Overlays) -> None:
+def build(server: viser.ViserServer, overlays: Overlays, cell: Cell) -> None:
     """Add the panel; its boxes write ``overlays``, which the drawing thread reads."""
     gui = server.gui
     gui.configure_theme(
@@ -24,20 +26,52 @@ def build(server: viser.ViserServer, overlays: Overlays) -> None:
         overlays.shapes,
         hint="The capsules with which the simulator measures distances.",
     )
-    values = gui.add_checkbox(
-        "Values", overlays.values, hint="What the critic expects at each candidate."
-    )
-    path = gui.add_checkbox(
-        "Target line", overlays.path, hint="From the tool to the chosen candidate."
-    )
 
     @shapes.on_update
     async def _(_: object) -> None:
         overlays.shapes = shapes.value
 
+    if sorts(cell):
+        _build_sorting(server, overlays)
+    else:
+        _build_choice(server, overlays)
+
+
+def _build_choice(server: viser.ViserServer, overlays: Overlays) -> None:
+    values = server.gui.add_checkbox(
+        "Values", overlays.values, hint="What the critic expects at each candidate."
+    )
+    path = server.gui.add_checkbox(
+        "Target line", overlays.path, hint="From the tool to the chosen candidate."
+    )
+
     @values.on_update
     async def _(_: object) -> None:
         overlays.values = values.value
+
+    @path.on_update
+    async def _(_: object) -> None:
+        overlays.path = path.value
+
+
+def _build_sorting(server: viser.ViserServer, overlays: Overlays) -> None:
+    chances = server.gui.add_checkbox(
+        "Failure figures", overlays.chances, hint="How often a grasp fails in each cell."
+    )
+    ghosts = server.gui.add_checkbox(
+        "Goal", overlays.ghosts, hint="The blocks that the towers still lack."
+    )
+    path = server.gui.add_checkbox(
+        "Move", overlays.path, hint="From where the block is taken to where it goes."
+    )
+
+    @chances.on_update
+    async def _(_: object) -> None:
+        overlays.chances = chances.value
+
+    @ghosts.on_update
+    async def _(_: object) -> None:
+        overlays.ghosts = ghosts.value
 
     @path.on_update
     async def _(_: object) -> None:

@@ -5,7 +5,7 @@ threads (HTTP routes, viser's callbacks) only queue commands and read the last s
 
 Simulated time follows the clock on the wall: after a stall the loop catches up by at most
 ``MAX_BEHIND_S`` and then lets the rest go, so that a busy machine slows the cell down instead
-of making it jump.
+of making it jump. A visitor may let it run faster: then several steps are one picture.
 """
 
 import logging
@@ -13,6 +13,7 @@ import queue
 import socket
 import threading
 import time
+from dataclasses import replace
 
 import rich
 import viser
@@ -124,6 +125,7 @@ class LiveCell:
         self._world = new_world(cell, policy, seed, id, sorter)
         self.handle = LiveHandle(id, cell, self._world.snapshot())
         """Commands in, snapshots out."""
+        self._speed = 1
         self._stop = threading.Event()
         self._server: viser.ViserServer | None = None
         self._thread: threading.Thread | None = None
@@ -153,7 +155,7 @@ class LiveCell:
         port = self._port or free_port(self._host)
         self._server = viser.ViserServer(host=self._host, port=port, verbose=False)
         scene = CellScene(self._server, self._cell, self.handle.submit)
-        gui.build(self._server, scene.overlays)
+        gui.build(self._server, scene.overlays, self._cell)
         scene.draw(self.handle.snapshot(), 0.0)
         self._thread = threading.Thread(
             target=self._run, args=(scene,), name=f"world-{self.handle.id}", daemon=True
@@ -184,13 +186,21 @@ class LiveCell:
     def _tick(self, scene: CellScene, dt: float) -> None:
         for command in self.handle.drain():
             try:
-                self._world.apply(command)
+                self._obey(command)
             except ServiceError as error:
                 logger.warning("command %s was refused: %s", command.tag, error.message)
-        self._world.step()
-        snapshot = self._world.snapshot()
+        for _ in range(self._speed):
+            self._world.step()
+        snapshot = replace(self._world.snapshot(), speed=self._speed)
         self.handle.publish(snapshot)
-        scene.draw(snapshot, dt)
+        scene.draw(snapshot, dt * self._speed)
+
+    def _obey(self, command: Command) -> None:
+        """Carry out a command: the clock's speed is the loop's own, all else the world's."""
+        if isinstance(command, commands.SetSpeed):
+            self._speed = command.factor
+        else:
+            self._world.apply(command)
 
 
 def free_port(host: str) -> int:

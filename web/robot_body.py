@@ -128,3 +128,24 @@ def gripper_finger(tool_length: float) -> bytes:
         (block((0.006, 0.026, 0.03), (-0.002, 0, tip - 0.016), 0.002), RUBBER),
     ]
     return painted(pieces)
+
+
+@lru_cache(maxsize=4)
+def magnet_body(tool_length: float, tool_radius: float) -> bytes:
+    """Return a round lifting magnet in the frame of ``tool0``, as binary glTF.
+
+    Args:
+        tool_length: From flange to the magnet's face along z [m].
+        tool_radius: Radius of the simulator's tool capsule [m].
+    """
+    face = 0.022
+    neck = tool_length - face - 0.022
+    return painted(
+        [
+            (rod((0, 0, 0), 0.014, 0.95 * tool_radius), STEEL),
+            (rod((0, 0, 0.014), 0.008, 0.8 * tool_radius), ACCENT),
+            (rod((0, 0, 0.022), neck, 0.5 * tool_radius), RUBBER),
+            (rod((0, 0, tool_length - face), face - 0.003, 0.9 * tool_radius), RUBBER),
+            (rod((0, 0, tool_length - 0.003), 0.003, 0.7 * tool_radius), STEEL),
+        ]
+    )

@@ -1,4 +1,4 @@
-"""The robot in the scene: link meshes placed from Pinocchio, and the gripper."""
+"""The robot in the scene: link meshes placed from Pinocchio, and the gripper or magnet."""
 
 import numpy as np
 import viser
@@ -8,8 +8,11 @@ from app.sim.robot import LINK_NAMES, Robot
 from app.sim.shapes import load_robot_capsules
 from web.capsules_view import CapsulesView
 from web.poses import Vec, orientation
-from web.robot_body import gripper_body, gripper_finger, link_meshes
+from web.robot_body import gripper_body, gripper_finger, link_meshes, magnet_body
+from web.solids import torus
 
+OFF, ON = (120, 126, 134), (38, 196, 182)
+"""Colour of the magnet's ring."""
 OPEN, CLOSED = 0.044, 0.036
 """Half the distance of the fingers [m]; a cube's side lies between."""
 
@@ -32,18 +35,12 @@ class RobotView:
             scene.add_glb(f"/robot/{name}", link_meshes()[name]) for name in LINK_NAMES
         ]
         self._tool = scene.add_frame("/robot/tool", show_axes=False)
-        scene.add_glb("/robot/tool/body", gripper_body(tool.tool_length, tool.tool_radius))
-        finger = gripper_finger(tool.tool_length)
-        self._fingers = (
-            scene.add_glb("/robot/tool/finger_a", finger, position=(OPEN, 0.0, 0.0)),
-            scene.add_glb(
-                "/robot/tool/finger_b",
-                finger,
-                position=(-OPEN, 0.0, 0.0),
-                wxyz=(0.0, 0.0, 0.0, 1.0),
-            ),
-        )
-
+        self._fingers: tuple[viser.GlbHandle, ...] = ()
+        self._lamp: viser.MeshHandle | None = None
+        if any(station.kind == "clutter" for station in cell.stations):
+            self._lamp = self._add_magnet(scene, cell)
+        else:
+            self._fingers = self._add_gripper(scene, cell)
         self._closed = False
         self._capsules = CapsulesView(server, "/robot/shapes")
         self._shapes = load_robot_capsules(tool.tool_length, tool.tool_radius)
@@ -55,6 +52,32 @@ class RobotView:
             strict=True,
         ):
             self._capsules.add(name, float(radius), float(np.linalg.norm(p1 - p0)))
+
+    def _add_gripper(
+        self, scene: viser.SceneApi, cell: Cell
+    ) -> tuple[viser.GlbHandle, viser.GlbHandle]:
+        length = cell.robot.tool_length
+        scene.add_glb("/robot/tool/body", gripper_body(length, cell.robot.tool_radius))
+        finger, turned = gripper_finger(length), (0.0, 0.0, 0.0, 1.0)
+        return (
+            scene.add_glb("/robot/tool/finger_a", finger, position=(OPEN, 0.0, 0.0)),
+            scene.add_glb(
+                "/robot/tool/finger_b", finger, position=(-OPEN, 0.0, 0.0), wxyz=turned
+            ),
+        )
+
+    def _add_magnet(self, scene: viser.SceneApi, cell: Cell) -> viser.MeshHandle:
+        length, radius = cell.robot.tool_length, cell.robot.tool_radius
+        scene.add_glb("/robot/tool/body", magnet_body(length, radius))
+        vertices, faces = torus(0.8 * radius, 0.004)
+        return scene.add_mesh_simple(
+            "/robot/tool/lamp",
+            vertices,
+            faces,
+            color=OFF,
+            cast_shadow=False,
+            position=(0.0, 0.0, length - 0.022),
+        )
 
     def draw(self, q: Vec) -> None:
         """Show the robot at joint positions ``q`` [rad], shape (6,)."""
@@ -80,9 +103,13 @@ class RobotView:
         self._capsules.show(visible, () if touched is None else touched.split(" and "))
 
     def grip(self, closed: bool) -> None:
-        """Open or close the fingers."""
+        """Open or close the fingers, or switch the magnet."""
         if closed == self._closed:
             return
         self._closed = closed
+        if self._lamp is not None:
+            self._lamp.color = ON if closed else OFF
+            return
         half = CLOSED if closed else OPEN
-        self._fingers[0].position, self._fingers[1].position = (half, 0, 0), (-half, 0, 0)
+        for finger, side in zip(self._fingers, (half, -half), strict=True):
+            finger.position = (side, 0, 0)

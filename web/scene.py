@@ -13,12 +13,12 @@ from app.sim.cells import Cell
 from app.sim.commands import Command
 from app.sim.snapshot import WorldSnapshot
 from web import workplace
+from web.arc import Arc
 from web.people_view import PeopleView
-from web.poses import Vec
 from web.robot_view import RobotView
-from web.stations_view import MARK, StationsView
+from web.sorting_scene import SortingScene, sorts
+from web.stations_view import StationsView
 
-PATH_DASHES = 14
 PATH_LIFT = 0.12
 """Height of the dashed path's arc over the straight line [m]."""
 
@@ -32,7 +32,11 @@ class Overlays:
     values: bool = True
     """The labels at the stations."""
     path: bool = True
-    """The dashed line from tool to target."""
+    """The dashed line from tool to target, or along the way of a block."""
+    chances: bool = True
+    """The figures of the failure map."""
+    ghosts: bool = True
+    """The blocks that the goal asks for."""
 
 
 class CellScene:
@@ -54,14 +58,8 @@ class CellScene:
             self._robot = RobotView(server, cell)
             self._stations = StationsView(server, cell, submit)
             self._people = PeopleView(server, cell, submit)
-            self._path = server.scene.add_line_segments(
-                "/path",
-                np.zeros((PATH_DASHES, 2, 3)),
-                MARK,
-                thickness=0.006,
-                visible=False,
-            )
-        self._path_key: tuple[object, ...] = ()
+            self._sorting = SortingScene(server, cell, submit) if sorts(cell) else None
+            self._path = Arc(server, "/path", lift=PATH_LIFT)
 
     def draw(self, snapshot: WorldSnapshot, dt: float) -> None:
         """Show a snapshot; sends only what changed.
@@ -78,26 +76,18 @@ class CellScene:
             self._people.draw(snapshot, dt, shapes=self.overlays.shapes)
             self._stations.show_values(self.overlays.values)
             self._stations.draw(snapshot)
-            self._draw_path(snapshot)
+            if self._sorting is not None:
+                self._sorting.draw(
+                    snapshot,
+                    chances=self.overlays.chances,
+                    ghosts=self.overlays.ghosts,
+                    path=self.overlays.path,
+                )
+            else:
+                self._draw_path(snapshot)
 
     def _draw_path(self, snapshot: WorldSnapshot) -> None:
-        going = snapshot.status == "moving" and snapshot.chosen is not None
-        shown = going and self.overlays.path
-        if self._path.visible != shown:
-            self._path.visible = shown
-        if not shown or snapshot.chosen is None:
+        if snapshot.status != "moving" or snapshot.chosen is None or not self.overlays.path:
+            self._path.hide()
             return
-        key = (snapshot.chosen, *np.round(snapshot.tcp, 3).tolist())
-        if key != self._path_key:
-            self._path_key = key
-            target = np.array(self._cell.station(snapshot.chosen).position)
-            self._path.points = dashes(snapshot.tcp, target).astype(np.float32)
-
-
-def dashes(start: Vec, end: Vec) -> Vec:
-    """Return the dashes of an arc from ``start`` to ``end`` [m], (PATH_DASHES, 2, 3)."""
-    ends = (np.arange(PATH_DASHES)[:, None] + np.array([0.15, 0.75])) / PATH_DASHES
-    line = start + ends[..., None] * (end - start)
-    lift = min(PATH_LIFT, 0.35 * float(np.linalg.norm(end - start)))
-    line[..., 2] += 4.0 * lift * ends * (1.0 - ends)
-    return np.asarray(line)
+        self._path.show(snapshot.tcp, np.array(self._cell.station(snapshot.chosen).position))

@@ -61,8 +61,9 @@ class StationsView:
         submit: Callable[[ToggleCandidate], None],
     ) -> None:
         self._scene, self._cell, self._submit = server.scene, cell, submit
-        self._bodies = {station.id: self._add_body(station) for station in cell.stations}
-        self._labels = {station.id: self._add_label(station) for station in cell.stations}
+        self._stations = [one for one in cell.stations if one.kind in ("cube", "dock")]
+        self._bodies = {station.id: self._add_body(station) for station in self._stations}
+        self._labels = {station.id: self._add_label(station) for station in self._stations}
         self._marker = self._add_marker()
         self._values = True
         self._key: tuple[object, ...] = ()
@@ -134,7 +135,7 @@ class StationsView:
         self._key, self._next = key, time.monotonic() + PERIOD_S
         offered = {candidate.id: candidate for candidate in snapshot.candidates}
         best = max(snapshot.values.values(), default=None)
-        for station in self._cell.stations:
+        for station in self._stations:
             candidate = offered.get(station.id)
             color = IDLE if candidate is None else color_of(candidate.value, best)
             body, label = self._bodies[station.id], self._labels[station.id]
@@ -144,7 +145,7 @@ class StationsView:
                 label.text = text
             if label.visible != (shown := self._values and candidate is not None):
                 label.visible = shown
-        self._mark(snapshot.chosen)
+        self._mark(snapshot.chosen if snapshot.chosen in self._bodies else None)
 
     def _mark(self, chosen: str | None) -> None:
         if self._marker.visible != (chosen is not None):

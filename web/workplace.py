@@ -31,7 +31,7 @@ def build(server: viser.ViserServer, cell: Cell) -> None:
     _obstacles(server, cell)
     _floor(server, cell)
     _light(server)
-    _camera(server)
+    _camera(server, cell)
 
 
 def table_body(cell: Cell) -> bytes:
@@ -117,9 +117,12 @@ def _light(server: viser.ViserServer) -> None:
     )
 
 
-def _camera(server: viser.ViserServer) -> None:
+def _camera(server: viser.ViserServer, cell: Cell) -> None:
+    """Look at the people's hands; where blocks are sorted, from higher up and nearer."""
     camera = server.initial_camera
-    camera.position = (2.2, -0.9, 1.36)
-    camera.look_at = (0.0, 0.68, 0.17)
+    if any(station.kind == "clutter" for station in cell.stations):
+        camera.position, camera.look_at = (2.0, -0.82, 1.5), (0.02, 0.58, 0.12)
+    else:
+        camera.position, camera.look_at = (2.2, -0.9, 1.36), (0.0, 0.68, 0.17)
     camera.up = (0.0, 0.0, 1.0)
     camera.fov = math.radians(40.0)

@@ -28,6 +28,8 @@ PLAIN_MODES: tuple[PlainMode, ...] = ("manual", "auto", "still")
 """Modes that need nothing else; ``recorded`` comes with :class:`SetMotion`."""
 MAX_PEOPLE = LIMITS["people"]
 """Most people in a live cell."""
+SPEEDS = (1, 2, 4, 8)
+"""How many times faster than the clock on the wall a live world can run."""
 FIRST = 0
 """Id of the person who is meant where none is named."""
 
@@ -137,6 +139,15 @@ class StepOnce:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class SetSpeed:
+    """Let the clock run faster than the one on the wall; whoever steps the world obeys it."""
+
+    tag: ClassVar[str] = "set-speed"
+    factor: int
+    """Simulated seconds per second, one of SPEEDS; a busy machine may not hold it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Reset:
     """Put robot, counters and people back to the start; who is dragged stays."""
 
@@ -193,6 +204,7 @@ Command = (
     | Pause
     | Resume
     | StepOnce
+    | SetSpeed
     | Reset
     | SetCandidates
     | ToggleCandidate
@@ -211,6 +223,7 @@ COMMANDS: tuple[type[Command], ...] = (
     Pause,
     Resume,
     StepOnce,
+    SetSpeed,
     Reset,
     SetCandidates,
     ToggleCandidate,
@@ -243,6 +256,10 @@ def check(command: Command, cell: Cell, people: Sequence[int]) -> None:
                 cell.station(name)
         case ToggleCandidate():
             cell.station(command.id)
+        case SetSpeed():
+            if command.factor not in SPEEDS:
+                choices = [str(one) for one in SPEEDS]
+                raise InvalidInput("factor", command.factor, "cannot be run at", choices)
         case StartCase():
             names = tuple(case.id for case in cases_of(cell))
             if command.id not in names:

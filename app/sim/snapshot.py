@@ -203,6 +203,8 @@ class WorldSnapshot:
     """Id of the running case study."""
     counters: Counters
     """What happened since the last reset."""
+    speed: int = 1
+    """Simulated seconds per second that were asked for last."""
     sorting: SortingView | None = None
     """The sorting task; None in a cell without one."""
 

@@ -125,8 +125,9 @@ def rank_by_planner(
 ) -> tuple[RankedMove, ...]:
     """Return the valid moves by the attempts expected if they come first, the plan's own first.
 
-    Without values, where working them out would take too long, the moves that begin a plan of
-    the fewest moves come before the others.
+    After any other move the planner's rules are followed, without looking ahead. Where even
+    that would take too long there are no values: the moves that begin a plan of the fewest
+    moves come before the others.
     """
     valid = valid_actions(state, shape)
     attempts = attempts_by_action(state, shape, valid)
@@ -135,6 +136,8 @@ def rank_by_planner(
         order = sorted(valid, key=lambda one: (one != plan.best, one not in fewest, one))
         return _ranked(order, {}, shape, plan)
     values = {one: -float(value) for one, value in zip(valid, attempts, strict=True)}
+    assert plan.best is not None
+    values[plan.best] = -plan.attempts
     order = sorted(valid, key=lambda one: (one != plan.best, -values[one], one))
     return _ranked(order, values, shape, plan)
 

@@ -4,8 +4,15 @@
 
 ``candidates-3`` is the live cell's case, ``candidates-1000`` the most a request may hold. What
 is timed is ``TaskPolicy.decide`` with the shipped checkpoint, as the service calls it: inverse
-kinematics, features, both networks. Clock time, of one thread: the median over all calls, with
-the least and the 99th percentile beside it.
+kinematics, features, both networks.
+
+``sorting`` is one move of ``sorting-e1`` by its shipped checkpoint, ``sorting-planner`` one by
+the exact planner, both as ``sorting_decision.decide`` gives them to the service: with the plan
+behind the expected attempts, all moves ranked and the hand-over watched. Half of the tasks are
+disturbed.
+
+Clock time, of one thread: the median over all calls, with the least and the 99th percentile
+beside it.
 """
 
 import itertools
@@ -17,14 +24,20 @@ import numpy as np
 import torch
 
 from app.policies import pretrained
+from app.policies.sorting_policy import SortingPolicy
 from app.policies.task_choice import TaskChooser
-from app.sim.cells import load_cell
+from app.sim.cells import Cell, load_cell
 from app.sim.pick import PickBatch, PickSettings
-from app.sim.ports import Candidate, Person, TaskPolicy, Vec
-from tests.benchmarks.measure import Row, arguments, report
+from app.sim.ports import Candidate, Person, SortingValues, TaskPolicy, Vec
+from app.sim.sorting import SortingSettings, batch_in, shape_of
+from app.sim.sorting_decision import decide
+from app.sim.sorting_state import SortingState
+from tests.benchmarks.measure import Row, arguments, report, row_without
 
 BENCH = "decision-time"
 STATES = 64
+SORTING_CELL = "sorting-e1"
+"""The larger of the shipped sorting tasks; its policy goes by the same name."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,8 +92,13 @@ def measured(policy: TaskPolicy, n: int, seed: int, seconds: float) -> Row:
     """Return the row of ``n`` candidates."""
     list(calls_ms(policy, n, seed, 0.2))
     times = np.fromiter(calls_ms(policy, n, seed, seconds), dtype=np.float64)
+    return summary(f"candidates-{n}", n, times)
+
+
+def summary(name: str, n: int, times: Vec) -> Row:
+    """Return the row of decisions that took these times [ms]."""
     return {
-        "name": f"candidates-{n}",
+        "name": name,
         "threads": 1,
         "batch": n,
         "value": float(np.median(times)),
@@ -90,6 +108,38 @@ def measured(policy: TaskPolicy, n: int, seed: int, seconds: float) -> Row:
     }
 
 
+def sorting_states(cell: Cell, seed: int) -> list[SortingState]:
+    """Return sorting tasks as episodes start them, half of them disturbed."""
+    batch = batch_in(cell, STATES, seed, SortingSettings(disturbed_share=0.5))
+    batch.reset()
+    return [batch.state_of(e) for e in range(STATES)]
+
+
+def sorter(alias: str) -> SortingValues | None:
+    """Return a shipped policy that sorts; None where it is not shipped yet."""
+    return SortingPolicy(pretrained.load(alias)) if alias in pretrained.ALIASES else None
+
+
+def sorting_ms(
+    policy: SortingValues | None, cell: Cell, seed: int, seconds: float
+) -> Iterator[float]:
+    """Yield the time of each decision about a move for ``seconds`` [ms]."""
+    shape, turn = shape_of(cell), itertools.cycle(sorting_states(cell, seed))
+    ends = time.perf_counter() + seconds
+    while (begin := time.perf_counter()) < ends:
+        decide(policy, next(turn), shape)
+        yield 1e3 * (time.perf_counter() - begin)
+
+
+def measured_sorting(
+    name: str, policy: SortingValues | None, cell: Cell, seed: int, seconds: float
+) -> Row:
+    """Return the row of sorting moves; a policy of None is the exact planner."""
+    list(sorting_ms(policy, cell, seed, 0.2))
+    times = np.fromiter(sorting_ms(policy, cell, seed, seconds), dtype=np.float64)
+    return summary(name, 1, times)
+
+
 def main() -> None:
     """Measure and print."""
     options = arguments(BENCH)
@@ -97,6 +147,12 @@ def main() -> None:
     policy = TaskChooser(pretrained.load("pick"), load_cell())
     seconds = options.rounds * options.seconds
     rows = [measured(policy, n, options.seed, seconds) for n in (3, 1000)]
+    cell, sorting = load_cell(SORTING_CELL), sorter(SORTING_CELL)
+    if sorting is None:
+        rows.append(row_without("sorting", f"no checkpoint {SORTING_CELL} is shipped"))
+    else:
+        rows.append(measured_sorting("sorting", sorting, cell, options.seed, seconds))
+    rows.append(measured_sorting("sorting-planner", None, cell, options.seed, seconds))
     report(BENCH, rows, options)
 
 

@@ -10,6 +10,9 @@ fcl/pick             one environment on Pinocchio and python-fcl, see ``fcl_pick
 mujoco/pick          MuJoCo: kinematics and ``mj_geomDistance`` of the same pairs
 mujoco/pick-sensors  MuJoCo: the same distances by sensors, all in one call
 mujoco/pick-contacts MuJoCo: kinematics and ``mj_collision``, who touches but not how far
+sorting-e0/numba     sorting 10 objects of two colours, random valid moves
+sorting-e1/numba     20 objects of three colours
+gymnasium/sorting-e0 one plain environment of the same task, see ``plain_sorting.py``
 
 The environments act at random, and episodes that end start anew. MuJoCo is posed along an
 episode recorded from the kernels and does less than they do, see ``mujoco_pick.py``. The column
@@ -26,6 +29,7 @@ from app.sim.cells import load_cell
 from app.sim.pick import PickBatch, PickSettings
 from app.sim.ports import Vec
 from app.sim.reach import ReachBatch, ReachSettings
+from tests.benchmarks import sorting_steps
 from tests.benchmarks.fcl_pick import FclPick
 from tests.benchmarks.measure import (
     Row,
@@ -64,6 +68,13 @@ def scenarios(seed: int) -> Iterator[Subject]:
         yield batched(f"pick/{name}", pick, 5, seed)
         reach = ReachBatch(other, BATCH, seed, ReachSettings(observation=seen))
         yield batched(f"reach/{name}", reach, 6, seed)
+
+
+def sorting(seed: int) -> Iterator[Subject]:
+    """Yield the sorting tasks, and a plain environment of one of them."""
+    for name in ("sorting-e0", "sorting-e1"):
+        yield sorting_steps.batched(f"{name}/numba", name, seed)
+    yield sorting_steps.gymnasium_alone("gymnasium/sorting-e0", "sorting-e0", seed)
 
 
 def single(seed: int) -> Subject:
@@ -128,6 +139,7 @@ def main() -> None:
         *scenarios(options.seed),
         single(options.seed),
         *mujoco_peers(options.seed),
+        *sorting(options.seed),
     ]
     rows = measured(subjects, options.rounds, options.seconds)
     if not INSTALLED:

@@ -17,22 +17,29 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.sim.sorting_state import NULL, SortingShape, SortingState
+import numpy as np
+
+from app.sim.sorting_state import NULL, Codes, SortingShape, SortingState, code_counts
 
 DOMAIN = Path(__file__).with_name("sorting.pddl")
-PLANNERS = {
+PACKAGES = {
     "pyperplan": "pyperplan",
     "fast-downward": "up_fast_downward",
     "fast-downward-opt": "up_fast_downward",
 }
-"""Planners, and the package each comes with."""
+"""Planners, and the module each comes in."""
 MEMORY = 6 * 2**30
 """Bytes a planner's process may take."""
 PATIENCE = 4.0
 """A planner is ended after so many times its processor seconds by the clock."""
+
+
+OUT_OF_TIME = (-signal.SIGKILL, -signal.SIGXCPU, 21, 23)
+"""How a planner ends whose time is over; 21 and 23 are Fast Downward's."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,37 +56,37 @@ class Found:
 
 def installed(planner: str) -> bool:
     """Return whether a planner's package is there."""
-    return importlib.util.find_spec(PLANNERS[planner]) is not None
+    return importlib.util.find_spec(PACKAGES[planner]) is not None
 
 
 def problem(state: SortingState, shape: SortingShape) -> str:
-    """Return an instance in PDDL: every object by itself, the goal by codes."""
-    levels, codes = range(shape.n_cells + 1), range(1, shape.n_types + 1)
-    facts, n = ["(free-hand)"], 0
-    for code in state.clutter[state.clutter != NULL]:
-        facts += [f"(clutter o{n})", f"(looks o{n} c{code})"]
-        n += 1
-    for tower, row in enumerate(state.towers):
-        for level, code in enumerate(row[row != NULL]):
-            facts += [f"(on o{n} t{tower} l{level})", f"(looks o{n} c{code})"]
-            facts.append(f"(shows t{tower} l{level} c{code})")
-            n += 1
-    facts += [f"(height t{t} l{h})" for t, h in enumerate(state.heights)]
-    facts += [f"(next l{level} l{level + 1})" for level in levels[:-1]]
-    wanted = [f"(height t{t} l{(row != NULL).sum()})" for t, row in enumerate(state.goal)]
-    for tower, row in enumerate(state.goal):
-        wanted += [f"(shows t{tower} l{k} c{c})" for k, c in enumerate(row[row != NULL])]
+    """Return an instance in PDDL; codes that no object has are left out."""
+    spare = code_counts(state.clutter, shape)
+    there = np.flatnonzero(spare + code_counts(state.towers, shape))
+    codes = [int(code) for code in there if code != NULL]
+    numbers = range(shape.n_cells + 1)
+    facts = ["(free-hand)", *(f"(spare c{code} n{spare[code]})" for code in codes)]
+    facts += [f"(next n{n} n{n + 1})" for n in numbers[:-1]]
     return "\n".join(
         [
             "(define (problem instance) (:domain sorting) (:objects",
-            " ".join(f"o{k}" for k in range(n)) + " - object-to-sort",
-            " ".join(f"t{k}" for k in range(shape.n_colours)) + " - tower",
-            " ".join(f"l{k}" for k in levels) + " - level",
-            " ".join(f"c{k}" for k in codes) + " - code)",
-            "(:init " + " ".join(facts) + ")",
-            "(:goal (and " + " ".join(wanted) + ")))",
+            " ".join(f"c{code}" for code in codes) + " - code",
+            " ".join(f"t{tower}" for tower in range(shape.n_colours)) + " - tower",
+            " ".join(f"n{n}" for n in numbers) + " - number)",
+            "(:init " + " ".join(facts + _facts(state.towers)) + ")",
+            "(:goal (and " + " ".join(_facts(state.goal)) + ")))",
         ]
     )
+
+
+def _facts(towers: Codes) -> list[str]:
+    """Return what is true of towers."""
+    facts = []
+    for tower, row in enumerate(towers):
+        codes = row[row != NULL]
+        facts.append(f"(height t{tower} n{len(codes)})")
+        facts += [f"(shows t{tower} n{level} c{code})" for level, code in enumerate(codes)]
+    return facts
 
 
 def plan(planner: str, state: SortingState, shape: SortingShape, cap_s: float) -> Found:
@@ -90,7 +97,7 @@ def plan(planner: str, state: SortingState, shape: SortingShape, cap_s: float) -
         begin, code = _children_s(), _run(_command(planner, place), place, cap_s)
         spent = _children_s() - begin
         answers = sorted(place.glob("*.soln")) + sorted(place.glob("sas_plan*"))
-        if spent >= cap_s or code in (-signal.SIGKILL, -signal.SIGXCPU):
+        if spent >= cap_s or code in OUT_OF_TIME:
             return Found(moves=None, cpu_s=spent, note=f"no plan in {cap_s:g} s")
         if not answers:
             return Found(moves=None, cpu_s=spent, note=f"ended with {code}, without a plan")
@@ -105,32 +112,27 @@ def replayed(steps: list[list[str]], state: SortingState) -> int:
     Raises:
         ValueError: It breaks a rule or does not reach the goal.
     """
-    there = [int(code) for code in state.clutter if code != NULL]
-    clutter = {f"o{k}": code for k, code in enumerate(there)}
-    towers: list[list[tuple[str, int]]] = []
-    n = len(there)
-    for row in state.towers:
-        codes = [int(code) for code in row if code != NULL]
-        towers.append([(f"o{n + k}", code) for k, code in enumerate(codes)])
-        n += len(codes)
-    held: tuple[str, int] | None = None
-    for name, thing, *more in steps:
-        tower = towers[int(more[1][1:])] if more else []
-        if name.startswith("take") and held is None:
-            held = tower.pop() if more else (thing, clutter.pop(thing))
-        elif name == "put-on-tower" and held is not None:
-            tower.append(held)
-            held = None
-        elif name == "put-in-clutter" and held is not None:
-            clutter[held[0]] = held[1]
-            held = None
+    clutter = Counter(f"c{code}" for code in state.clutter if code != NULL)
+    towers = [[f"c{code}" for code in row if code != NULL] for row in state.towers]
+    wanted = [[f"c{code}" for code in row if code != NULL] for row in state.goal]
+    held = None
+    for name, code, *more in steps:
+        tower = towers[int(more[0][1:])] if name.endswith("tower") else []
+        if name.startswith("take") == (held is not None):
+            raise ValueError(f"{name} {code} with {held} in the hand")
+        if name == "take-from-clutter":
+            clutter[code] -= 1
+            held = code
+        elif name == "take-from-tower":
+            held = tower.pop() if tower else None
+        elif name == "put-on-tower":
+            tower.append(code)
         else:
-            raise ValueError(f"{name} with {held} in the hand")
-        if held is not None and held[0] != thing:
-            raise ValueError(f"{thing} is not on top of its tower")
-    reached = [[code for _, code in tower] for tower in towers]
-    wanted = [[int(code) for code in row if code != NULL] for row in state.goal]
-    if held is not None or reached != wanted:
+            clutter[code] += 1
+        if min(clutter.values()) < 0 or held != code:
+            raise ValueError(f"there is no {code} to {name}")
+        held = held if name.startswith("take") else None
+    if held is not None or towers != wanted:
         raise ValueError("the plan does not reach the goal")
     return len(steps) // 2
 
@@ -139,11 +141,11 @@ def _command(planner: str, place: Path) -> list[str]:
     """Return how a planner is started on the problem in a folder."""
     files = [str(DOMAIN), str(place / "problem.pddl")]
     if planner == "pyperplan":
-        return ["/tmp/pv/bin/python", "-m", "pyperplan", "-H", "hff", "-s", "gbf", *files]
+        return [sys.executable, "-m", "pyperplan", "-H", "hff", "-s", "gbf", *files]
     spec = importlib.util.find_spec("up_fast_downward")
     assert spec is not None and spec.submodule_search_locations
     driver = Path(spec.submodule_search_locations[0]) / "downward" / "fast-downward.py"
-    start = ["/tmp/pv/bin/python", str(driver), "--plan-file", str(place / "sas_plan")]
+    start = [sys.executable, str(driver), "--plan-file", str(place / "sas_plan")]
     if planner == "fast-downward":
         return [*start, "--alias", "lama-first", *files]
     return [*start, *files, "--search", "astar(lmcut())"]

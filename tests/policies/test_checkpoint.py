@@ -67,3 +67,14 @@ def test_a_range_with_a_word_in_it_is_refused(shipped):
 
 def test_a_shipped_checkpoint_is_small_and_has_a_card(shipped):
     assert len(shipped.tensors) < 4 * 1024 * 1024
+
+
+def test_policy_for_another_purpose_is_refused(shipped):
+    formats.require_purpose(shipped, formats.CHOOSING)
+    with pytest.raises(CheckpointMismatch, match="purpose is 'choosing tasks'"):
+        formats.require_purpose(shipped, formats.SORTING)
+
+
+@pytest.mark.parametrize("layout", [[["clutter", 4], ["towers", 8]], [[], "x", ["towers", 1]]])
+def test_policy_that_sees_towers_sorts(shipped, layout):
+    assert formats.purpose_of({**shipped.manifest, "layout": layout}) == formats.SORTING

@@ -113,3 +113,24 @@ def test_stop_ends_thread_and_viewer() -> None:
     with pytest.raises(OSError):
         socket.create_connection(("127.0.0.1", port), timeout=1.0)
     assert live.handle.snapshot().tick == tick
+
+
+def test_faster_clock_takes_so_many_steps_between_two_pictures(live: LiveCell) -> None:
+    live.handle.submit(commands.SetSpeed(factor=4))
+    wait_for(lambda: live.handle.snapshot().speed == 4)
+    first = live.handle.snapshot().tick
+    seen = set[int]()
+
+    def look() -> bool:
+        seen.add(live.handle.snapshot().tick)
+        return len(seen) >= 5
+
+    wait_for(look)
+    live.handle.submit(commands.SetSpeed(factor=1))
+    wait_for(lambda: live.handle.snapshot().speed == 1)
+    assert {(tick - first) % 4 for tick in seen} == {0}
+
+
+def test_clock_does_not_run_at_any_speed(live: LiveCell) -> None:
+    with pytest.raises(InvalidInput, match="factor"):
+        live.handle.submit(commands.SetSpeed(factor=3))

@@ -10,8 +10,9 @@ from app.sim.commands import Command
 from app.sim.robot import LINK_NAMES, Robot
 from app.sim.world import World
 from tests.straight_policy import StraightPolicy
+from web.arc import dashes
 from web.loop import free_port
-from web.scene import CellScene, dashes
+from web.scene import PATH_LIFT, CellScene
 from web.stations_view import IDLE, RAMP, color_of
 
 
@@ -130,7 +131,7 @@ def test_colour_runs_from_green_for_the_best_to_red_for_the_worst() -> None:
 
 def test_path_runs_from_the_tool_to_the_target() -> None:
     start, end = np.array([0.0, 0.3, 0.5]), np.array([0.3, 0.7, 0.12])
-    line = dashes(start, end)
+    line = dashes(start, end, PATH_LIFT)
     assert np.linalg.norm(line[0, 0] - start) < 0.05
     assert np.linalg.norm(line[-1, 1] - end) < 0.05
 

@@ -7,6 +7,7 @@ import { isActive, useJobs } from "./jobs.js";
 import { useCell, WORLD } from "./live.js";
 import { goalColours } from "./palette.js";
 import { SignIn } from "./signin.js";
+import { SortingDecision } from "./sorting.js";
 import { SmallPrint, Story } from "./story.js";
 import { Training } from "./training.js";
 import { Values } from "./values.js";
@@ -65,10 +66,10 @@ function App() {
   </div>`;
 }
 
-/** The cell's title; a choice where policies can act in more than one cell. */
+/** The cell's title; a choice where more than one can be shown live. */
 function CellTitle({ cell: { cell, cells, show } }) {
   const [busy, setBusy] = useState(false);
-  const shown = cells.filter((one) => one.lacks_for_pick === null);
+  const shown = cells.filter((one) => one.lacks_for_live === null);
   if (!cell || shown.length < 2) return html`<span class="cell-title">${cell?.title ?? ""}</span>`;
   const change = async (event) => {
     setBusy(true);
@@ -163,6 +164,9 @@ function veil(link, reason) {
 function Decision({ cell }) {
   const goals = useGoals(cell);
   if (!cell.world) return html`<div class="skeleton tall" aria-busy="true"></div>`;
+  if (cell.world.sorting && cell.cell) {
+    return html`<${SortingDecision} world=${cell.world} cell=${cell.cell} send=${cell.send} />`;
+  }
   return html`<${Story} world=${cell.world} />
     <${Values} world=${cell.world} cell=${cell.cell} history=${cell.history} ...${goals} />
     <${SmallPrint} world=${cell.world} />`;

@@ -1,7 +1,10 @@
 // What a visitor can do to the cell: the people, the clock, the goals, the cases.
-import { html, useState } from "./vendor/htm-preact-standalone.module.js";
+import { html } from "./vendor/htm-preact-standalone.module.js";
 import { Icon } from "./icons.js";
 import { People } from "./people.js";
+import { Presets } from "./presets.js";
+
+const SPEEDS = [1, 2, 4, 8];
 
 export function Controls({ world, cell, cases, send, colourOf, labelOf }) {
   return html`<section class="dock" aria-label="Controls of the cell">
@@ -18,39 +21,26 @@ export function Controls({ world, cell, cases, send, colourOf, labelOf }) {
           onClick=${() => send({ tag: "step" })}><${Icon} name="step" /><span>Step</span></button>
         <button type="button" class="tool" data-action="reset" aria-label="Reset"
           onClick=${() => send({ tag: "reset" })}><${Icon} name="reset" /><span>Reset</span></button>
+        <select value=${world.speed} data-role="speed" aria-label="Speed of the clock"
+          title="How fast the clock runs"
+          onChange=${(e) => send({ tag: "set-speed", factor: Number(e.target.value) })}>
+          ${SPEEDS.map((one) => html`<option key=${one} value=${one}>${one}×</option>`)}
+        </select>
       </div>
     </${People}>
-    <div class="dock-row">
-      <span class="dock-label" id="goals-label">Goals</span>
-      <${Goals} world=${world} cell=${cell} send=${send} colourOf=${colourOf} labelOf=${labelOf} />
-    </div>
-    ${cases.length > 0 && html`<${Cases} cases=${cases} running=${world.case} send=${send} />`}
+    ${world.sorting
+      ? html`<${Presets} label="Tests" items=${cell?.sorting_tests ?? []} tag="start-test"
+          running=${world.sorting.test} send=${send}
+          hint="Six tests of the study: the cell is laid out anew and the robot sorts." />`
+      : html`<div class="dock-row">
+          <span class="dock-label" id="goals-label">Goals</span>
+          <${Goals} world=${world} cell=${cell} send=${send} colourOf=${colourOf}
+            labelOf=${labelOf} />
+        </div>
+        ${cases.length > 0 && html`<${Presets} label="Cases" items=${cases} tag="start-case"
+          running=${world.case} send=${send}
+          hint="Four situations of the study: the person reaches in, the robot picks the better goal." />`}`}
   </section>`;
-}
-
-/** The case studies by title; what happens in one is told when it is pointed at or runs. */
-function Cases({ cases, running, send }) {
-  const [pointed, setPointed] = useState(null);
-  const told = cases.find((c) => c.id === (pointed ?? running));
-  const point = (id) => ({
-    onMouseEnter: () => setPointed(id),
-    onMouseLeave: () => setPointed(null),
-    onFocus: () => setPointed(id),
-    onBlur: () => setPointed(null),
-  });
-  return html`<div class="dock-row dock-cases">
-    <span class="dock-label" id="cases-label">Cases</span>
-    <div>
-      <div class="cases" role="group" aria-labelledby="cases-label">
-        ${cases.map((c, i) => html`<button key=${c.id} type="button" class="case"
-          aria-pressed=${String(running === c.id)} aria-description=${c.text} data-case=${c.id}
-          ...${point(c.id)} onClick=${() => send({ tag: "start-case", id: c.id })}>
-          <b>${i + 1}</b><span>${c.title}</span></button>`)}
-      </div>
-      <p class="case-text">${told ? told.text
-        : "Four situations of the study: the person reaches in, the robot picks the better goal."}</p>
-    </div>
-  </div>`;
 }
 
 function Goals({ world, cell, send, colourOf, labelOf }) {

@@ -14,13 +14,45 @@ const IDLE = "rgb(196 202 210)";
 /** Colours of the people's vests, by id; the same as VESTS in web/mannequin.py. */
 export const VESTS = ["rgb(255 116 32)", "rgb(196 214 48)", "rgb(72 164 232)", "rgb(232 104 168)"];
 
+/** Colours of sorted blocks, and of what is written on them; as BLOCKS in web/sorting_bodies.py. */
+export const BLOCKS = { red: "rgb(205 58 62)", green: "rgb(112 184 92)", blue: "rgb(52 104 196)" };
+const DARK_INK = "rgb(15 21 26)";
+export const BLOCK_INK = { red: "white", green: DARK_INK, blue: "white" };
+
+/** Chance that a grasp fails -> colour of its cell; as FAILURES in web/sorting_bodies.py. */
+const FAILURES = [
+  [0.0, [240, 237, 229]],
+  [0.2, [243, 217, 164]],
+  [0.4, [226, 166, 92]],
+  [0.7, [176, 108, 48]],
+  [1.0, [112, 62, 24]],
+];
+const LIGHT_ON_FAILURE = 0.6;
+
 /** Colour of a goal worth `value` where the best is worth `best`. */
 export function colourByValue(value, best) {
   if (!Number.isFinite(value) || !Number.isFinite(best)) return UNKNOWN;
-  const gap = Math.min(Math.max(best - value, 0), RAMP.at(-1)[0]);
-  const i = Math.max(1, RAMP.findIndex(([x]) => gap <= x));
-  const [[x0, from], [x1, to]] = [RAMP[i - 1], RAMP[i]];
-  const share = (gap - x0) / (x1 - x0);
+  return along(RAMP, best - value);
+}
+
+/** Colour of a cell where grasps fail with this chance, and of what is written on it. */
+export function failureColours(chance) {
+  const ink = chance < LIGHT_ON_FAILURE ? DARK_INK : "white";
+  return { background: along(FAILURES, chance), ink };
+}
+
+/** The failure map's colours from 0 to `chance` as a gradient to the right. */
+export function failureGradient(chance) {
+  const stops = Array.from({ length: 9 }, (_, i) => along(FAILURES, (i / 8) * chance));
+  return `linear-gradient(to right, ${stops.join(", ")})`;
+}
+
+/** Colour at `x` of a ramp of [x, [r, g, b]]; its ends beyond them. */
+function along(ramp, x) {
+  const at = Math.min(Math.max(x, ramp[0][0]), ramp.at(-1)[0]);
+  const i = Math.max(1, ramp.findIndex(([stop]) => at <= stop));
+  const [[x0, from], [x1, to]] = [ramp[i - 1], ramp[i]];
+  const share = (at - x0) / (x1 - x0);
   return `rgb(${from.map((c, k) => Math.round(c + share * (to[k] - c))).join(" ")})`;
 }
 

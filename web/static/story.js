@@ -12,11 +12,13 @@ const STATUS = {
   "case done": ["Case done", "good"],
   "no candidates": ["No goals", "quiet"],
   "no policy": ["No policy", "warn"],
+  solved: ["Goal reached", "good"],
 };
 const CLEARANCE_SCALE_M = 1.0;
 
-export function Story({ world }) {
-  const [text, tone] = STATUS[world.status] ?? [String(world.status), "quiet"];
+/** `chip` says what the status is called where its own name is too coarse. */
+export function Story({ world, chip = null }) {
+  const [text, tone] = chip ?? STATUS[world.status] ?? [String(world.status), "quiet"];
   return html`<section class="story" aria-labelledby="story-title">
     <h2 id="story-title" class="sr">What the robot does and why</h2>
     <div class="story-top">

@@ -86,6 +86,7 @@ class WorldLight(Answer):
     mode: str | None = Field(description="who moves the first person; null: nobody is there")
     people: tuple[PersonLight, ...] = Field(description="0 to 4, in the order of their ids")
     paused: bool
+    speed: int = Field(description="simulated seconds per second that were asked for last")
     status: str
     message: str = Field(description="why, in one sentence")
     gripping: bool = Field(description="whether the fingers are closed")
@@ -212,8 +213,8 @@ def light_members(snapshot: WorldSnapshot) -> dict[str, Any]:
     """Return the members of :class:`WorldLight`."""
     contact, counters = snapshot.contact, snapshot.counters
     same = (
-        "id", "cell", "tick", "t_s", "mode", "paused", "status", "message", "gripping",
-        "chosen", "clearance_m", "checkpoint", "policy_title", "elapsed_ms", "case",
+        "id", "cell", "tick", "t_s", "mode", "paused", "speed", "status", "message",
+        "gripping", "chosen", "clearance_m", "checkpoint", "policy_title", "elapsed_ms", "case",
     )  # fmt: skip
     return {name: getattr(snapshot, name) for name in same} | {
         "people": tuple(PersonLight.from_domain(one) for one in snapshot.people),
@@ -353,6 +354,17 @@ class Plain(Body):
         return plain[self.tag]
 
 
+class SetSpeed(Body):
+    """Let the clock run faster than the one on the wall."""
+
+    tag: Literal["set-speed"]
+    factor: Literal[1, 2, 4, 8] = Field(description="simulated seconds per second")
+
+    def to_domain(self) -> commands.Command:
+        """Return the world's command."""
+        return commands.SetSpeed(factor=self.factor)
+
+
 class SetCandidates(Body):
     """Say which stations the robot may choose among."""
 
@@ -406,6 +418,7 @@ CommandCreate = Annotated[
     | SetBody
     | RemovePerson
     | Plain
+    | SetSpeed
     | SetCandidates
     | ToggleCandidate
     | StartCase

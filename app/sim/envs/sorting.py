@@ -77,7 +77,7 @@ class SortingEnv(gymnasium.Env[Obs, np.int64]):
     | ``0..K-1`` | clutter cells | ``C S`` |
     | ``K..K+CK-1`` | towers, each from its lowest level | ``C S`` |
     | ``K+CK..K+2CK-1`` | the goal's towers, likewise | ``C S`` |
-    | ``K+2CK..2K+2CK-1`` | failure probability of a pick from each clutter cell, times 250 | 250 |
+    | ``K+2CK..2K+2CK-1`` | failure probability of a pick from each cell, times 250 | 250 |
 
     Code 0 is no object, others are ``1 + colour S + size``, sizes from the smallest.
 

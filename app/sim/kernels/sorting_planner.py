@@ -239,9 +239,10 @@ def _look_ahead(task: Task, work: PlannerWork) -> int:
     p, now = work.progress, work.now
     chosen = _choose(now, task, p)
     n_cells, n_towers = len(now.clutter), len(now.heights)
-    if chosen < n_cells * n_towers:
+    moves = n_cells * n_towers
+    if not moves <= chosen < 2 * moves:
         return chosen
-    best = _try(chosen, np.inf, task, work)
+    best = np.inf
     index = state_number(p)
     left = p.table[index] - 1
     for c in range(n_towers):
@@ -249,7 +250,20 @@ def _look_ahead(task: Task, work: PlannerWork) -> int:
         removed = index + (p.below[c, p.at[c]] - p.at[c]) * p.stride[c]
         if top == 0 or p.table[removed] != left:
             continue
-        for n in range(CELLS_TRIED + 1):
+        waits = False
+        for d in range(n_towers):
+            if waits or d == c or p.want[d, p.at[d]] == top:
+                continue
+            if ties_on_tower(removed, d, top, p):
+                waits = True
+                action = 2 * n_cells * n_towers + c * n_towers + d
+                attempts = _try(action, best, task, work)
+                if attempts < best - 1e-9:
+                    chosen, best = action, attempts
+        if waits:
+            continue
+        lowest = 0 if still_wanted(top, task.goal, task.goal_heights, p) > 0 else CELLS_TRIED
+        for n in range(lowest, CELLS_TRIED + 1):
             k = _nth_free(n, now.clutter, task.fail)
             if k < 0:
                 continue
@@ -257,12 +271,6 @@ def _look_ahead(task: Task, work: PlannerWork) -> int:
             attempts = _try(action, best, task, work)
             if attempts < best - 1e-9:
                 chosen, best = action, attempts
-        for d in range(n_towers):
-            if d != c and p.want[d, p.at[d]] != top and ties_on_tower(removed, d, top, p):
-                action = 2 * n_cells * n_towers + c * n_towers + d
-                attempts = _try(action, best, task, work)
-                if attempts < best - 1e-9:
-                    chosen, best = action, attempts
     return chosen
 
 
@@ -309,6 +317,25 @@ def plan_state(objects: Objects, task: Task, work: PlannerWork) -> tuple[int, fl
         _carry_out(action, work.now, task, work)
         count += 1
     return fewest, attempts
+
+
+@kernel()
+def attempts_by_rules(objects: Objects, task: Task, work: PlannerWork) -> float:
+    """Return the expected attempts from where the objects are, by the rules alone.
+
+    Args:
+        objects: Where the objects are.
+        task: What is asked for; the objects can meet it.
+        work: Work space, overwritten.
+    """
+    _lay_out(objects, task, work)
+    _copy(objects, work.now)
+    attempts, action = 0.0, _choose(work.now, task, work.progress)
+    while action >= 0:
+        attempts += _attempts(action, task)
+        _carry_out(action, work.now, task, work)
+        action = _choose(work.now, task, work.progress)
+    return attempts
 
 
 @kernel(nogil=True)

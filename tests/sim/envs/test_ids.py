@@ -1,4 +1,4 @@
-"""Every registered id with people passes both checkers, and equals rows of its batch bit for bit."""
+"""Every id with people passes both checkers, and equals rows of its batch bit for bit."""
 
 import gymnasium
 import numpy as np

@@ -4,16 +4,31 @@ import re
 from pathlib import Path
 
 from web.mannequin import VESTS
+from web.sorting_bodies import BLOCKS, FAILURES
 from web.stations_view import RAMP
 
 PALETTE = Path(__file__).parents[3] / "web" / "static" / "palette.js"
 STOP = re.compile(r"\[([\d.]+), \[(\d+), (\d+), (\d+)\]\]")
 
 
+def ramp(name: str) -> tuple[tuple[float, tuple[int, int, int]], ...]:
+    """Return a ramp of the page by its name."""
+    text = PALETTE.read_text().split(f"const {name} = [")[1].split("];")[0]
+    return tuple((float(x), (int(r), int(g), int(b))) for x, r, g, b in STOP.findall(text))
+
+
 def test_page_and_scene_use_one_ramp_of_colours() -> None:
-    stops = STOP.findall(PALETTE.read_text())
-    page = tuple((float(x), (int(r), int(g), int(b))) for x, r, g, b in stops)
-    assert page == RAMP
+    assert ramp("RAMP") == RAMP
+
+
+def test_page_and_scene_use_one_ramp_of_failures() -> None:
+    assert ramp("FAILURES") == FAILURES
+
+
+def test_blocks_have_one_colour_on_page_and_in_the_scene() -> None:
+    line = next(one for one in PALETTE.read_text().splitlines() if "const BLOCKS" in one)
+    found = re.findall(r"(\w+): \"rgb\((\d+) (\d+) (\d+)\)\"", line)
+    assert {name: (int(r), int(g), int(b)) for name, r, g, b in found} == BLOCKS
 
 
 def test_people_have_the_colours_of_their_vests() -> None:

@@ -1,0 +1,116 @@
+"""A visitor says what shall be sorted, and changes it while the robot works."""
+
+from collections.abc import Callable, Iterator
+
+import httpx
+import pytest
+from playwright.sync_api import Page, expect
+
+from app.sim.cells import load_cell
+from tests.browser.test_drag import state, tell
+
+pytestmark = pytest.mark.browser
+
+PHONE = (390, 844)
+BLOCKS = {
+    "cell5": "red-large",
+    "cell6": "red-small",
+    "cell9": "blue-medium",
+    "cell4": "blue-large",
+}
+"""What lies where at first; grasps hardly fail in these cells."""
+SPEED = "8"
+"""The clock runs as fast as the machine holds it."""
+STEP_MS = 150_000
+
+
+def show(server: str, cell: str) -> None:
+    answer = httpx.put(f"{server}/v1/worlds/main/cell", json={"cell": cell}, timeout=120.0)
+    assert answer.status_code == 200, answer.text
+
+
+@pytest.fixture
+def sorting(server: str) -> Iterator[str]:
+    """The server with the sorting cell: four blocks, no goal, a person who stands still."""
+    show(server, "sorting-e0")
+    there = [{"tag": "remove-object", "id": one["id"]} for one in task(server)["pieces"]]
+    tell(
+        server, {"tag": "set-mode", "mode": "still"}, {"tag": "set-goal", "towers": {}}, *there
+    )
+    for cell, kind in BLOCKS.items():
+        colour, size = kind.split("-")
+        tell(server, {"tag": "add-object", "colour": colour, "size": size, "at": cell})
+    yield server
+    show(server, load_cell().name)
+
+
+def task(server: str) -> dict:
+    found: dict = state(server)["sorting"]
+    return found
+
+
+def towers(server: str) -> dict[str, list[str]]:
+    """Return the sizes that stand on each tower, from the bottom."""
+    found: dict[str, list[str]] = {"red": [], "blue": []}
+    for one in sorted(task(server)["pieces"], key=lambda piece: piece["level"]):
+        if one["place"] in found:
+            found[one["place"]].append(f"{one['colour']}-{one['size']}")
+    return found
+
+
+def expect_chip(page: Page, text: str) -> None:
+    expect(page.locator(".story .chip")).to_have_text(text, timeout=STEP_MS)
+
+
+def test_robot_reaches_a_goal_set_by_clicks_and_then_a_longer_one(
+    open_page: Callable[..., Page], sorting: str
+) -> None:
+    page = open_page(scene=False)
+    page.locator('[data-role="speed"]').select_option(SPEED)
+    for kind in ("red-small", "red-large", "blue-medium"):
+        page.click(f'[data-goal-add="{kind}"]')
+    expect_chip(page, "Goal reached")
+    assert towers(sorting) == {"red": ["red-large", "red-small"], "blue": ["blue-medium"]}
+    before = state(sorting)
+    page.click('[data-goal-add="blue-large"]')
+    expect(page.locator(".story .chip")).not_to_have_text("Goal reached", timeout=STEP_MS)
+    page.click('[data-cell="cell7"]')
+    page.click('[data-add="red-medium"]')
+    page.click('[data-goal-add="red-medium"]')
+    expect(page.locator('[data-role="goal-text"]')).to_contain_text("of 5 blocks")
+    expect_chip(page, "Goal reached")
+    assert towers(sorting) == {
+        "red": ["red-large", "red-medium", "red-small"],
+        "blue": ["blue-large", "blue-medium"],
+    }
+    after = state(sorting)
+    assert after["t_s"] > before["t_s"]
+    assert after["sorting"]["counters"]["moves"] > before["sorting"]["counters"]["moves"]
+    assert page.problems == []  # type: ignore[attr-defined]
+
+
+def test_goal_editor_says_why_a_block_cannot_be_asked_for(
+    open_page: Callable[..., Page], sorting: str
+) -> None:
+    page = open_page(PHONE, scene=False)
+    page.click('[data-action="pause"]')
+    offer = page.locator('[data-goal-add="red-large"]')
+    offer.click()
+    expect(offer).to_be_disabled()
+    expect(offer).to_have_attribute(
+        "title", "The large red block is in the goal: add another below"
+    )
+    page.click('[data-add="red-large"]')
+    expect(offer).to_be_enabled()
+    page.click('[data-goal-block="red-0"]')
+    expect(page.locator('[data-role="goal-text"]')).to_contain_text("No goal yet")
+    assert task(sorting)["goal"] == []
+
+
+def test_sorting_page_fits_a_phone(open_page: Callable[..., Page], sorting: str) -> None:
+    page = open_page(PHONE, scene=False)
+    assert state(sorting)["cell"] == "sorting-e0"
+    assert page.evaluate("document.documentElement.scrollWidth") <= PHONE[0]
+    for part in ('[data-role="cell"]', "[data-case]", ".towers", ".plan", ".shelf", ".tiles"):
+        page.locator(part).first.scroll_into_view_if_needed()
+        expect(page.locator(part).first).to_be_visible()

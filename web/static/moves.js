@@ -1,0 +1,96 @@
+// The sorter's moves: the one that is carried out, who decided it, and the ranking behind it.
+import { html } from "./vendor/htm-preact-standalone.module.js";
+import { Block, capital, nameOf, placeName } from "./blockshape.js";
+import * as format from "./format.js";
+
+const PHASES = {
+  approach: "on the way to it",
+  grasp: "grasping",
+  carry: "carrying",
+  place: "putting down",
+};
+
+export function Moves({ sorting, cell }) {
+  const { move, ranked } = sorting;
+  const values = ranked.map((one) => one.value).filter((v) => Number.isFinite(v));
+  const [low, high] = [Math.min(...values), Math.max(...values)];
+  const share = (v) => (high > low ? 0.12 + (0.88 * (v - low)) / (high - low) : 1);
+  const isChosen = (one) => move && one.pick === move.pick && one.place === move.place;
+  return html`<section class="card" aria-labelledby="moves-title">
+    <header class="card-head">
+      <h2 id="moves-title">Next move</h2>
+      <${Decider} sorting=${sorting} />
+    </header>
+    ${ranked.length === 0
+      ? html`<p class="empty" data-role="no-moves">${idle(sorting)}</p>`
+      : html`<ol class="ranks">
+          ${ranked.map((one) => html`<${Rank} key=${`${one.pick}-${one.place}`} move=${one}
+            sorting=${sorting} cell=${cell} chosen=${isChosen(one)}
+            share=${Number.isFinite(one.value) ? share(one.value) : 0} />`)}
+        </ol>`}
+    ${sorting.twins.length > 1 && html`<p class="faint twins">${sorting.twins.length} equal blocks
+      would do; the motion’s critic chose which.</p>`}
+  </section>`;
+}
+
+function idle(sorting) {
+  if (sorting.goal.length === 0) return "Nothing to do: there is no goal.";
+  return sorting.solved ? "Nothing to do: the goal is reached." : "No move is being weighed.";
+}
+
+function Decider({ sorting }) {
+  const { decided_by: by, phase, sorter, counters } = sorting;
+  if (!by) return html`<span class="faint">${sorter ? "learned policy" : "exact planner"}</span>`;
+  const over = by === "planner" && sorter !== null;
+  const text = by === "policy" ? "by the policy" : over ? "handed over to the planner" : "by the planner";
+  const help = by === "policy"
+    ? "The learned policy valued every move and chose the best."
+    : over
+      ? "The policy went in a circle or took too long, so the exact planner took over."
+      : "No learned sorter acts here: the exact planner finds the fewest moves.";
+  return html`<span class=${over ? "hint is-over" : "hint"} tabindex="0" data-role="decider"
+    data-by=${by} aria-describedby="decider-help">${text}${PHASES[phase] ? `, ${PHASES[phase]}` : ""}
+    <span class="tip tip-left" role="tooltip" id="decider-help">${help}${counters.hand_overs > 0
+      ? ` It has happened ${counters.hand_overs === 1 ? "once" : `${counters.hand_overs} times`}.`
+      : ""}</span></span>`;
+}
+
+function Rank({ move, sorting, cell, chosen, share }) {
+  const piece = sorting.pieces.find((one) => one.id === move.piece);
+  const from = capital(placeName(cell, move.pick));
+  const to = placeName(cell, move.place);
+  const what = piece ? nameOf(piece) : "block";
+  const why = move.best ? "It begins a shortest plan." : "It makes the plan longer.";
+  return html`<li class=${chosen ? "rank is-chosen" : "rank"} data-rank=${`${move.pick}-${move.place}`}
+    data-chosen=${String(chosen)} title=${why}>
+    <span class="sr">${what}</span>
+    ${piece ? html`<${Block} ...${piece} sizes=${sorting.sizes} />` : html`<span></span>`}
+    <span class="rank-way">${from} <i aria-hidden="true">→</i><span class="sr">to</span> ${to}</span>
+    <span class="bar-track" aria-hidden="true">
+      <i class="bar-fill" style=${{ left: 0, width: `${100 * share}%` }}></i></span>
+    <span class="bar-value">${format.value(move.value)}</span>
+    <span class="bar-note">${chosen ? html`<b class="tag tag-chosen">chosen</b>`
+      : move.best ? html`<b class="tag">shortest</b>` : ""}</span>
+  </li>`;
+}
+
+/** Attempts, failures, moves, hand-overs, and who decides. */
+export function SortingSmallPrint({ world }) {
+  const { counters, sorter, sorter_title: title } = world.sorting;
+  const shown = [["attempts", "Grasps"], ["failures", "Failed"], ["moves", "Moves"],
+    ["hand_overs", "Hand-overs"]];
+  return html`<section class="card small-print" aria-label="Counters and provenance">
+    <dl class="tiles">
+      ${shown.map(([key, label]) => html`<div key=${key}>
+        <dt>${label}</dt><dd data-counter=${key}>${counters[key]}</dd></div>`)}
+    </dl>
+    <p class="range">${sorter
+      ? html`<span>Moves are chosen by ${title ?? "checkpoint"}
+          ${" "}<code title=${sorter}>${format.short(sorter)}</code>.</span>`
+      : html`<span>Moves are chosen by the exact planner: no sorter is loaded.</span>`}</p>
+    <p class="range">${world.checkpoint
+      ? html`<span>Motions between them by ${world.policy_title ?? "checkpoint"}
+          ${" "}<code title=${world.checkpoint}>${format.short(world.checkpoint)}</code>.</span>`
+      : html`<span>No policy moves the arm.</span>`}</p>
+  </section>`;
+}

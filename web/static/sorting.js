@@ -1,0 +1,37 @@
+// The sorting task as the page shows it: what the robot does, the goal, the blocks, the moves.
+import { html, useEffect, useState } from "./vendor/htm-preact-standalone.module.js";
+import { Blocks } from "./blocks.js";
+import { GoalEditor } from "./goaleditor.js";
+import { Moves, SortingSmallPrint } from "./moves.js";
+import { Story } from "./story.js";
+
+const PHASES = {
+  approach: ["On its way", "accent"],
+  grasp: ["Grasping", "accent"],
+  carry: ["Carrying", "accent"],
+  place: ["Putting down", "accent"],
+};
+
+export function SortingDecision({ world, cell, send }) {
+  const { sorting } = world;
+  const [picked, setPicked] = useState(null);
+  const there = picked === null || cell.stations.some((one) => one.id === picked)
+    || sorting.pieces.some((one) => one.id === picked);
+  useEffect(() => {
+    if (!there) setPicked(null);
+  }, [there]);
+  const pick = (id) => setPicked(id === picked ? null : id);
+  const shared = { sorting, cell, send, picked, onPick: pick };
+  return html`<${Story} world=${world} chip=${chip(world)} />
+    <${GoalEditor} ...${shared} />
+    <${Blocks} ...${shared} />
+    <${Moves} sorting=${sorting} cell=${cell} />
+    <${SortingSmallPrint} world=${world} />`;
+}
+
+/** What the story's chip says where the world's status is too coarse for sorting. */
+function chip({ status, sorting }) {
+  if (sorting.solved) return ["Goal reached", "good"];
+  if (status === "moving" || status === "picking") return PHASES[sorting.phase] ?? null;
+  return sorting.goal.length === 0 && status === "no candidates" ? ["No goal", "quiet"] : null;
+}
