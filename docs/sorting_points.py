@@ -1,0 +1,128 @@
+"""Collect learning curves of the sorting task, by the source's protocol (METHOD 1.5).
+
+    python docs/sorting_points.py RUN ... [--stock CELL=FILE.jsonl] [--episodes N]
+
+A RUN is a folder that ``docs/sorting_curves.py`` wrote. Each of its policies plays every pair
+(K_E, K_G), greedily and without hand-over: 500 episodes of each on e0, 100 on e1, unless
+``--episodes`` says otherwise. ``--stock`` takes what ``tests/benchmarks/stock_dqn.py`` wrote.
+Writes ``docs/results/sorting_curves.json``, which ``docs/sorting_plots.py`` draws; curves of
+other runs in it stay, those of the same preset and seed are replaced.
+
+A curve has ``played``, the points told while training (sizes drawn as in training), and
+``pairs``, one point per stored policy.
+"""
+
+import argparse
+import json
+import sys
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import torch
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT))
+
+from app.machine import describe  # noqa: E402 - the line above lets it be found
+from app.policies.checkpoint import load  # noqa: E402
+from app.policies.evaluation.sorting_curve import curve_episodes, curve_point  # noqa: E402
+from app.policies.sorting_policy import SortingPolicy  # noqa: E402
+from app.policies.trained_cell import cell_of  # noqa: E402
+from app.sim.sorting import fail_of  # noqa: E402
+
+RESULTS = ROOT / "docs/results/sorting_curves.json"
+SEED = 77
+"""Seed of the episodes; training uses none such."""
+STOCK = "stock Stable-Baselines3 DQN"
+Json = dict[str, Any]
+
+
+def lines(path: Path) -> list[Json]:
+    """Return the objects of a file with one per line."""
+    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines() if line]
+
+
+def curve_of_run(folder: Path, episodes: int | None) -> Json:
+    """Return the curve of a training: its points, and its policies on every pair."""
+    told = lines(folder / "curve.jsonl")
+    spent = {one["step"]: one["cpu_s"] for one in told}
+    pairs, named = [], {}
+    for path in sorted(folder.glob("step-*.json")):
+        manifest = json.loads(path.read_text(encoding="utf-8"))
+        checkpoint = load(manifest, path.with_suffix(".safetensors").read_bytes())
+        policy, fail = SortingPolicy(checkpoint), fail_of(cell_of(manifest))
+        n = episodes or curve_episodes(policy.shape)
+        point = curve_point(policy.values, policy.shape, fail, n, SEED)
+        named = {
+            "task": manifest["cell"],
+            "name": manifest["preset"]["name"],
+            "seed": manifest["seed"],
+            "episodes_per_pair": n,
+        }
+        step = manifest["step"]
+        pairs.append({"step": step, "cpu_s": spent.get(step), **asdict(point)})
+    if not pairs:
+        raise SystemExit(f"{folder} holds no policy: step-*.json")
+    return {**named, "played": [_played(one) for one in told], "pairs": pairs}
+
+
+def _played(point: Json) -> Json:
+    return {
+        "step": point["step"],
+        "cpu_s": point["cpu_s"],
+        "success": point["success"],
+        "mean_return": point["reward"],
+    }
+
+
+def curve_of_stock(cell: str, path: Path) -> Json:
+    """Return the curve of the stock learner; its points count other episodes than ours."""
+    told = [
+        {
+            "step": one["env_steps"],
+            "cpu_s": one["cpu_s"],
+            "success": one["success"],
+            "mean_return": one["return"],
+        }
+        for one in lines(path)
+    ]
+    return {"task": cell, "name": STOCK, "seed": None, "played": told, "pairs": []}
+
+
+def merged(found: list[Json], new: list[Json]) -> list[Json]:
+    """Return curves with those of the same task, name and seed replaced, in order."""
+
+    def key(one: Json) -> tuple[str, str, int]:
+        return one["task"], one["name"], one["seed"] or 0
+
+    by_key = {key(one): one for one in [*found, *new]}
+    return [by_key[one] for one in sorted(by_key)]
+
+
+def main() -> None:
+    """Evaluate runs and write the curves."""
+    parser = argparse.ArgumentParser(description="Collect learning curves of sorting.")
+    parser.add_argument("runs", nargs="*", type=Path, metavar="RUN")
+    parser.add_argument("--stock", action="append", default=[], metavar="CELL=FILE")
+    parser.add_argument("--episodes", type=int, help="per pair; the source's by default")
+    options = parser.parse_args()
+    torch.set_num_threads(1)
+    new = [curve_of_run(folder, options.episodes) for folder in options.runs]
+    for one in options.stock:
+        cell, _, file = one.partition("=")
+        new.append(curve_of_stock(cell, Path(file)))
+    found = (
+        json.loads(RESULTS.read_text(encoding="utf-8"))["curves"] if RESULTS.exists() else []
+    )
+    result = {
+        "command": "python docs/sorting_points.py RUN ...",
+        "seed": SEED,
+        "curves": merged(found, new),
+        "machine": describe(),
+    }
+    RESULTS.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,104 @@
+"""Who plays the sorting task in tests: as well as can be, badly in a known way, untrained."""
+
+from collections.abc import Callable
+from dataclasses import asdict
+from itertools import count
+
+import numpy as np
+import torch
+
+from app.policies import presets
+from app.policies.checkpoint import FORMAT, Checkpoint, pack
+from app.policies.sorting_networks import NETWORKS
+from app.policies.sorting_training import layout_of
+from app.sim.cells import load_cell
+from app.sim.kernels.sorting import FAILURE_SCALE
+from app.sim.sorting import shape_of
+from app.sim.sorting_planner import solve
+from app.sim.sorting_state import NULL, SortingShape, SortingState
+
+Choice = Callable[[SortingState, SortingShape], int]
+
+
+def state_in(obs, shape: SortingShape) -> SortingState:
+    """Return the state that an observation shows."""
+    k, c = shape.n_cells, shape.n_colours
+    clutter, towers, goal, fail = np.split(obs, np.cumsum([k, c * k, c * k]))
+    return SortingState(
+        clutter=clutter.astype(np.int8),
+        towers=towers.astype(np.int8).reshape(c, k),
+        goal=goal.astype(np.int8).reshape(c, k),
+        fail=fail / FAILURE_SCALE,
+    )
+
+
+def values_of(choice: Choice, shape: SortingShape):
+    """Return values that are greatest for what a rule chooses."""
+
+    def values(obs):
+        q = np.zeros((len(obs), shape.n_actions), dtype=np.float32)
+        for row, one in zip(q, obs, strict=True):
+            row[choice(state_in(one, shape), shape)] = 1.0
+        return q
+
+    return values
+
+
+def exactly(state: SortingState, shape: SortingShape) -> int:
+    """Choose as the exact planner does."""
+    best = solve(state, shape).best
+    assert best is not None
+    return best
+
+
+def riskily(state: SortingState, shape: SortingShape) -> int:
+    """Choose as the exact planner does, but always the riskiest twin."""
+    move = shape.move_of(exactly(state, shape))
+    if move.pick >= shape.n_cells:
+        return shape.action_of(move)
+    twins = np.flatnonzero(state.clutter == state.clutter[move.pick])
+    cell = int(twins[state.fail[twins].argmax()])
+    return cell * shape.n_colours + move.place - shape.n_cells
+
+
+def in_circles(state: SortingState, shape: SortingShape) -> int:
+    """Move one object to and fro between two towers."""
+    c = int(state.heights.argmax())
+    if state.heights[c] == 0:
+        return int(np.flatnonzero(state.clutter != NULL)[0]) * shape.n_colours
+    other = (c + 1) % shape.n_colours
+    return 2 * shape.n_cells * shape.n_colours + c * shape.n_colours + other
+
+
+def at_random(shape: SortingShape, seed: int):
+    """Return values that are drawn anew for every question."""
+    calls = count()
+
+    def values(obs):
+        rng = np.random.default_rng((seed, next(calls)))
+        return rng.random((len(obs), shape.n_actions)).astype(np.float32)
+
+    return values
+
+
+def untrained(cell: str = "sorting-e0") -> Checkpoint:
+    """Return a sorting policy that has learned nothing."""
+    preset = presets.get("sorting-e0-dqn")
+    shape = shape_of(load_cell(cell))
+    torch.manual_seed(1)
+    network = NETWORKS[preset.network](shape, 16)
+    manifest = {
+        "format": FORMAT,
+        "kind": "policy",
+        "preset": asdict(preset),
+        "seed": 1,
+        "cell": cell,
+        "layout": layout_of(shape),
+        "act_size": shape.n_actions,
+        "width": 16,
+        "step": 0,
+        "updates": 0,
+        "trained_range": {},
+    }
+    arrays = {f"q.{name}": one.numpy() for name, one in network.state_dict().items()}
+    return pack(manifest, arrays)
