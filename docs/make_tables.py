@@ -14,7 +14,11 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
-BLOCK = re.compile(r"(<!-- begin ([a-z0-9-]+) -->\n).*?(<!-- end \2 -->)", re.DOTALL)
+sys.path.insert(0, str(ROOT))
+
+from docs.sorting_tables import is_sorting, lines_of  # noqa: E402 - found by the line above
+
+BLOCK = re.compile(r"(<!-- begin ([a-z0-9_-]+) -->\n).*?(<!-- end \2 -->)", re.DOTALL)
 Json = dict[str, Any]
 
 
@@ -38,11 +42,18 @@ def render(readme: str, results: Path) -> str:
 
 def table(result: Json) -> str:
     """Return one result as a Markdown table with the line that says how it was measured."""
+    if is_sorting(result):
+        head, *rest = lines_of(result)
+        return _markdown([head, ["---", *("---:" for _ in head[1:])], *rest], result)
     rows: list[Json] = result["results"]
     columns = list(dict.fromkeys(key for row in rows for key in row if key != "name"))
     head = ["", *(key.replace("_", " ") for key in columns)]
     lines = [head, ["---", *("---:" for _ in columns)]]
     lines += [[f"`{row['name']}`", *(cell(row.get(key)) for key in columns)] for row in rows]
+    return _markdown(lines, result)
+
+
+def _markdown(lines: list[list[str]], result: Json) -> str:
     return "\n".join([*("| " + " | ".join(line) + " |" for line in lines), "", origin(result)])
 
 
@@ -65,6 +76,8 @@ def origin(result: Json) -> str:
     verb = "evaluate" if "protocol" in result else "bench"
     usual = f"python -m app {verb} {result.get('protocol') or result.get('bench')}"
     usual += " FILE ..." if "motions" in result.get("settings", {}) else ""
+    if is_sorting(result) and (trained := result["settings"]["cell"]) != "sorting-e0":
+        usual += f" --checkpoint {trained}"
     parts = [f"`{result.get('command', usual)}`"]
     parts += [f"{key} {result[key]}" for key in ("episodes", "seed") if key in result]
     if "checkpoint" in result:
@@ -90,9 +103,14 @@ def conditions(result: Json) -> list[str]:
 
 
 def pages() -> list[Path]:
-    """Return the files with tables: the README, pages about people and the model cards."""
+    """Return the files with tables: the README, pages and model cards.
+
+    The page about sorting is one of them once the first of its results is there.
+    """
     cards = sorted((ROOT / "app/policies/pretrained").glob("*.md"))
-    names = ("people", "people-tracker", "motions")
+    names = ["people", "people-tracker", "motions"]
+    if list((ROOT / "docs/results").glob("sorting_grid_*.json")):
+        names.append("sorting")
     return [ROOT / "README.md", *(ROOT / f"docs/{name}.md" for name in names), *cards]
 
 

@@ -112,7 +112,9 @@ def main() -> None:
     for one in options.stock:
         cell, _, file = one.partition("=")
         new.append(curve_of_stock(cell, Path(file)))
-    found = json.loads(RESULTS.read_text(encoding="utf-8"))["curves"] if RESULTS.exists() else []
+    found = (
+        json.loads(RESULTS.read_text(encoding="utf-8"))["curves"] if RESULTS.exists() else []
+    )
     result = {
         "command": "python docs/sorting_points.py RUN ...",
         "seed": SEED,

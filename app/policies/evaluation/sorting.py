@@ -29,7 +29,8 @@ def run_grid(
     """
     policy = SortingPolicy(checkpoint)
     fail = fail_of(cell_of(checkpoint.manifest))
-    return grid(policy.values, policy.shape, fail, episodes, seed, on_row)
+    found = grid(policy.values, policy.shape, fail, episodes, seed, on_row)
+    return {**found, "settings": {"cell": policy.cell, **found["settings"]}}
 
 
 def run_tests(
@@ -45,4 +46,5 @@ def run_tests(
     """
     policy = SortingPolicy(checkpoint)
     fail = fail_of(cell_of(checkpoint.manifest))
-    return trials(policy.values, policy.shape, fail, episodes, seed, on_row)
+    found = trials(policy.values, policy.shape, fail, episodes, seed, on_row)
+    return {**found, "settings": {"cell": policy.cell, **found["settings"]}}

@@ -350,25 +350,6 @@ def plan_state(objects: Objects, task: Task, work: PlannerWork) -> tuple[int, fl
     return fewest, attempts
 
 
-@kernel()
-def attempts_by_rules(objects: Objects, task: Task, work: PlannerWork) -> float:
-    """Return the expected attempts from where the objects are, by the rules alone.
-
-    Args:
-        objects: Where the objects are.
-        task: What is asked for; the objects can meet it.
-        work: Work space, overwritten.
-    """
-    _lay_out(objects, task, work)
-    _copy(objects, work.now)
-    attempts, action = 0.0, _choose(work.now, task, work.progress)
-    while action >= 0:
-        attempts += _attempts(action, task)
-        _carry_out(action, work.now, task, work)
-        action = _choose(work.now, task, work.progress)
-    return attempts
-
-
 @kernel(nogil=True)
 def rough_plan(objects: Objects, task: Task, work: PlannerWork) -> tuple[int, float]:
     """Plan one state by the rules alone: as many moves, sometimes a few more attempts.

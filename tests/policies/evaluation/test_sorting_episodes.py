@@ -27,9 +27,7 @@ FAIL = np.linspace(0.0, 0.4, 6)
 
 
 def batch_of(n: int, fail=FAIL, **settings) -> SortingBatch:
-    batch = SortingBatch(
-        SHAPE, fail, n, 5, SortingSettings(horizon_factor=ENDLESS, **settings)
-    )
+    batch = SortingBatch(SHAPE, fail, n, 5, SortingSettings(horizon_factor=ENDLESS, **settings))
     batch.reset()
     return batch
 

@@ -110,9 +110,7 @@ def test_episodes_are_the_same_however_they_are_cut_into_batches(monkeypatch):
 
 def test_rows_are_told_in_order_and_the_planner_needs_no_hand_over():
     told = []
-    found = grid(
-        values_of(exactly, SHAPE), SHAPE, FAIL, 3, 5, lambda *what: told.append(what)
-    )
+    found = grid(values_of(exactly, SHAPE), SHAPE, FAIL, 3, 5, lambda *what: told.append(what))
     names = [f"{a}{b}" for a in ("clean", "disturbed") for b in ("", "-handover", "-planner")]
     assert [row["name"] for row in found["results"]] == names
     assert [(done, total) for done, total, _ in told] == [(k + 1, 6) for k in range(6)]
