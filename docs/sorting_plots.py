@@ -2,9 +2,9 @@
 
     python docs/sorting_plots.py
 
-Writes ``docs/img/sorting/grid-e0.png`` and ``grid-e1.png``, heat maps of success and return over
-all pairs (K_E, K_G) as in the source's fig. 3.2, and ``curves-e0.png``, ``curves-e1.png``, learning
-curves as in its fig. 3.1. What has no result yet is not drawn.
+Writes ``docs/img/sorting/grid-e0.png`` and ``grid-e1.png``, heat maps of success and return
+over all pairs (K_E, K_G) as in the source's fig. 3.2, and ``curves-e0.png``, ``curves-e1.png``,
+learning curves as in its fig. 3.1. What has no result yet is not drawn.
 """
 
 import json
@@ -43,7 +43,7 @@ Grid = NDArray[np.float64]
 
 
 def grids(row: Json) -> tuple[Grid, Grid]:
-    """Return success and return of a row by (K_G - 1, K_E - 1), not a number where no pair is."""
+    """Return success and return of a row by (K_G - 1, K_E - 1); NaN where no pair is."""
     size = max(one["n_objects"] for one in row["pairs"])
     success, returns = np.full((size, size), np.nan), np.full((size, size), np.nan)
     for one in row["pairs"]:
@@ -107,10 +107,11 @@ def _name_misses(axis: Axes, grid: Grid) -> None:
             fontsize=4.6 if small else 7.5,
             color="white" if value < 0.5 * (1.0 + FLOOR) - 0.01 else "#1f2937",
         )
+    perfect, pairs = int((grid == 1.0).sum()), int(np.isfinite(grid).sum())
     axis.text(
         0.03,
         0.97,
-        f"{int((grid == 1.0).sum())} of {int(np.isfinite(grid).sum())} pairs\nwithout a failure",
+        f"{perfect} of {pairs} pairs\nwithout a failure",
         transform=axis.transAxes,
         va="top",
         color="#374151",
