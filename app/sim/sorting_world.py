@@ -279,7 +279,7 @@ class SortingWorld:
         table, choice = self._table, self._choice
         assert choice is not None
         if table.held is not None:
-            descent = Descent(self._table.point_at(choice.move.place), "place")
+            descent = Descent(table.point_at(choice.move.place), "place")
         else:
             block, move = next(one for one in choice.options if one[0].id == name)
             self._choice = replace(choice, block=block, move=move)
@@ -354,6 +354,14 @@ class SortingWorld:
             return "idle"
         return "carry" if self._table.held is not None else "approach"
 
+    def _chosen(self) -> Choice | None:
+        """Return the move with the block that the critic goes for now."""
+        choice, decision = self._choice, self._stage.decision
+        if choice is None or decision is None or self._phase != "approach":
+            return choice
+        found = [one for one in choice.options if one[0].id == decision.chosen]
+        return replace(choice, block=found[0][0], move=found[0][1]) if found else choice
+
     def _candidates(self) -> tuple[Candidate, ...]:
         choice, table = self._choice, self._table
         if choice is None:
@@ -393,8 +401,8 @@ class SortingWorld:
             return explanation.touched(stage.contact, final=False)
         if stage.note is not None and status != "blocked":
             return stage.note
-        if status in ("moving", "picking") and self._choice is not None:
-            return self._teller.doing(self._phase, self._choice, self._sorter)
+        if status in ("moving", "picking") and (chosen := self._chosen()) is not None:
+            return self._teller.doing(self._phase, chosen, self._sorter)
         if status == "solved":
             return DONE
         if status == "no candidates":
@@ -408,7 +416,7 @@ class SortingWorld:
         sight = Sight(
             table=self._table,
             sorter=self._sorter,
-            choice=self._choice,
+            choice=self._chosen(),
             phase=self._phase,
             counters=replace(self._counts, hand_overs=self._sorter.hand_overs),
             test=None if self._trial is None else self._trial.name,
