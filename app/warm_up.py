@@ -16,6 +16,7 @@ from app.sim.cells import load_cell
 from app.sim.commands import MoveHuman
 from app.sim.kernels.arm import CONTROLLED
 from app.sim.pick import PickBatch, PickSettings
+from app.sim.sorting import batch_in
 from app.sim.world import World
 
 N_ENVS = 8
@@ -38,5 +39,9 @@ def warm_up() -> float:
         batch = PickBatch(cell, N_ENVS, seed=0, settings=PickSettings())
         batch.reset()
         batch.step(np.zeros((N_ENVS, CONTROLLED), dtype=np.float32))
+    tasks = batch_in(load_cell("sorting-e0"), N_ENVS, seed=0)
+    tasks.reset()
+    tasks.masks()
+    tasks.step(np.zeros(N_ENVS, dtype=np.int64))
     sorting_decision.warm_up()
     return time.monotonic() - started

@@ -121,7 +121,7 @@ def _camera(server: viser.ViserServer, cell: Cell) -> None:
     """Look at the people's hands; where blocks are sorted, from higher up and nearer."""
     camera = server.initial_camera
     if any(station.kind == "clutter" for station in cell.stations):
-        camera.position, camera.look_at = (2.0, -0.82, 1.5), (0.02, 0.58, 0.12)
+        camera.position, camera.look_at = (2.14, -0.88, 1.58), (-0.02, 0.58, 0.1)
     else:
         camera.position, camera.look_at = (2.2, -0.9, 1.36), (0.0, 0.68, 0.17)
     camera.up = (0.0, 0.0, 1.0)

@@ -52,6 +52,7 @@ class CheckpointNames:
     def __init__(self, store: Store) -> None:
         self.store = store
         """Where checkpoints are kept."""
+        self._lock = threading.Lock()
         self._aliases: dict[str, str] = list_aliases(store)
 
     def publish(self, alias: str, checkpoint: NewCheckpoint) -> None:
@@ -68,7 +69,8 @@ class CheckpointNames:
         """
         if self._aliases.get(alias) != sha256:
             set_alias(self.store, alias, sha256)
-            self._aliases = list_aliases(self.store)
+            with self._lock:
+                self._aliases = list_aliases(self.store)
 
     @property
     def aliases(self) -> Mapping[str, str]:

@@ -67,10 +67,9 @@ async def _policy_of(request: SortingRequest, services: Services) -> SortingValu
         InvalidInput: Nothing has that name.
         CheckpointMismatch: It does not sort.
     """
-    shipped = request.cell if request.cell in SORTERS else None
-    if shipped is not None and shipped not in services.checkpoints.aliases:
-        shipped = None
-    name = request.checkpoint or shipped
+    name = request.checkpoint
+    if name is None and request.cell in SORTERS:
+        name = request.cell if request.cell in services.checkpoints.aliases else None
     if name is None or request.decider == "planner":
         return None
     policy = services.sorters.loaded(name)

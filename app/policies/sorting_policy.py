@@ -8,7 +8,13 @@ import torch
 from numpy.typing import NDArray
 
 from app.errors import CheckpointMismatch, InvalidInput
-from app.policies.checkpoint import Checkpoint, expect_layout
+from app.policies.checkpoint import (
+    SORTING,
+    Checkpoint,
+    expect_layout,
+    purpose_of,
+    require_purpose,
+)
 from app.policies.model_state import under
 from app.policies.sorting_networks import NETWORKS
 from app.policies.sorting_training import layout_of
@@ -18,8 +24,8 @@ from app.sim.sorting_state import SortingShape
 
 
 def is_sorting(checkpoint: Checkpoint) -> bool:
-    """Tell whether a checkpoint sorts: its preset names the network of one that does."""
-    return checkpoint.manifest["preset"].get("network") in NETWORKS
+    """Tell whether a checkpoint sorts."""
+    return purpose_of(checkpoint.manifest) == SORTING
 
 
 class SortingPolicy:
@@ -33,18 +39,17 @@ class SortingPolicy:
     """
 
     def __init__(self, checkpoint: Checkpoint) -> None:
-        if not is_sorting(checkpoint):
-            known = sorted(NETWORKS)
-            found = checkpoint.manifest["preset"].get("network", "none")
-            raise CheckpointMismatch("preset.network", known, found)
+        require_purpose(checkpoint, SORTING)
+        kind = str(checkpoint.manifest["preset"].get("network"))
+        if kind not in NETWORKS:
+            raise CheckpointMismatch("preset.network", sorted(NETWORKS), kind)
         cell = cell_of(checkpoint.manifest)
         self._checkpoint, self._cell = checkpoint, (cell.name, cell.sha256)
         self.shape: SortingShape = shape_of(cell)
         """Size of the tasks it knows."""
         expect_layout(checkpoint, layout_of(self.shape), self.shape.n_actions)
         manifest = checkpoint.manifest
-        network = NETWORKS[manifest["preset"]["network"]]
-        self._network = network(self.shape, int(manifest["width"]))
+        self._network = NETWORKS[kind](self.shape, int(manifest["width"]))
         try:
             self._network.load_state_dict(under(checkpoint.arrays(), "q"))
         except RuntimeError as error:

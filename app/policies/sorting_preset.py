@@ -16,7 +16,7 @@ class SortingPreset:
 
     The defaults are those of ``sorting-e0-dqn``. Double, dueling and prioritised as in the
     source. Deviates: network, mask, n-step returns, disturbed starts, people in the training
-    and demonstrations of the exact planner are ours; the source's recipe has its own presets.
+    and the advice of the exact planner are ours; the source's recipe has its own presets.
     """
 
     name: str = "sorting-e0-dqn"
@@ -85,7 +85,7 @@ class SortingPreset:
     )
 
     advice_share: float = number(
-        0.0,
+        0.25,
         0.0,
         1.0,
         "",
@@ -107,7 +107,7 @@ class SortingPreset:
     c_success: float = number(1.0, 0.0, 100.0, "", "bonus of a goal that is met")
 
     progress_steps: int = number(
-        51_200, 1, 10_000_000, "env steps", "steps between two points of the curve"
+        12_800, 1, 10_000_000, "env steps", "steps between two points of the curve"
     )
     checkpoint_steps: int = number(
         256_000, 1, 10_000_000, "env steps", "steps between two checkpoints"
@@ -180,6 +180,7 @@ def _printed(name: str, cell: str, total_steps: int) -> SortingPreset:
         target_every=500,
         network="printed",
         width=128,
+        advice_share=0.0,
         eps_start=1.0,
         eps_end=0.05,
         eps_share=1.0,
@@ -198,10 +199,19 @@ SORTING_PRESETS = (
     SortingPreset(
         name="sorting-e1-dqn",
         cell="sorting-e1",
-        total_steps=2_560_000,
-        advice_share=0.25,
+        total_steps=2_048_000,
     ),
-    SortingPreset(name="sorting-e1-dqn-pure", cell="sorting-e1", total_steps=2_560_000),
+    SortingPreset(
+        name="sorting-e1-dqn-pure",
+        cell="sorting-e1",
+        total_steps=2_560_000,
+        batch_size=384,
+        width=192,
+        solved_episodes=0.2,
+        disturbed_share=0.7,
+        human_rate=0.0,
+        advice_share=0.0,
+    ),
     _printed("sorting-e0-thesis", "sorting-e0", 2_000_000),
     _printed("sorting-e1-thesis", "sorting-e1", 8_000_000),
 )

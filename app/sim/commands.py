@@ -243,7 +243,7 @@ def check(command: Command, cell: Cell, people: Sequence[int]) -> None:
 
     Raises:
         InvalidInput: A number or mode out of range, nobody of that id, or no room.
-        NotFound: The cell has no such station, case study or test.
+        NotFound: The cell has no such station, or no such case study.
     """
     match command:
         case MoveHuman() | SetMode() | SetMotion() | SetBody() | RemovePerson() | AddPerson():
@@ -257,9 +257,7 @@ def check(command: Command, cell: Cell, people: Sequence[int]) -> None:
         case ToggleCandidate():
             cell.station(command.id)
         case SetSpeed():
-            if command.factor not in SPEEDS:
-                choices = [str(one) for one in SPEEDS]
-                raise InvalidInput("factor", command.factor, "cannot be run at", choices)
+            _check_speed(command)
         case StartCase():
             names = tuple(case.id for case in cases_of(cell))
             if command.id not in names:
@@ -267,6 +265,12 @@ def check(command: Command, cell: Cell, people: Sequence[int]) -> None:
         case _:
             if isinstance(command, SORTING_COMMANDS):
                 check_sorting(command, cell)
+
+
+def _check_speed(command: SetSpeed) -> None:
+    if command.factor not in SPEEDS:
+        choices = [str(one) for one in SPEEDS]
+        raise InvalidInput("factor", command.factor, "is no speed of the clock", choices)
 
 
 def _check_person(

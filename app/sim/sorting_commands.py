@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from app.errors import InvalidInput, NotFound
+from app.errors import InvalidInput
 from app.sim.cells import Cell
 from app.sim.ports import SortingValues
 from app.sim.sorting_cell import is_sorting
@@ -110,7 +110,6 @@ def check_sorting(command: SortingCommand, cell: Cell) -> None:
 
     Raises:
         InvalidInput: Nothing can be sorted here, or a word is not known.
-        NotFound: There is no such test.
     """
     if not is_sorting(cell):
         raise InvalidInput("tag", command.tag, f"needs a sorting cell: {cell.name} is none")
@@ -134,7 +133,7 @@ def check_sorting(command: SortingCommand, cell: Cell) -> None:
         case StartTest():
             names = tuple(one.name for one in TESTS)
             if command.id not in names:
-                raise NotFound("sorting test", command.id, names)
+                raise InvalidInput("id", command.id, "is no sorting test", names)
         case _:
             pass
 

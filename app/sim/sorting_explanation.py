@@ -75,8 +75,8 @@ class Teller:
     def _twin(self, choice: Choice) -> str:
         """Return what is said about blocks like the one that is taken."""
         table = self._table
-        if len(choice.twins) > 1:
-            return f" Of {len(choice.twins)} alike it is the easier one to reach now."
+        if len(choice.options) > 1:
+            return f" Of {len(choice.options)} that are as good it is the easiest to reach now."
         if choice.move.pick >= table.shape.n_cells:
             return ""
         least = table.fail[choice.move.pick]

@@ -20,7 +20,7 @@ import numpy as np
 from app.errors import InvalidInput
 from app.sim.kernels.sorting_planner import Objects, PlannerWork, Task, new_work, plan_state
 from app.sim.ports import Vec
-from app.sim.sorting_state import NULL, Move, SortingShape, SortingState, missing
+from app.sim.sorting_state import Move, SortingShape, SortingState, missing
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,7 +11,7 @@ from app.sim.ports import Vec
 from app.sim.sorting_cell import above, half_size
 from app.sim.sorting_ports import RankedMove
 from app.sim.sorting_state import NULL, Move
-from app.sim.sorting_table import Block, SortingTable, grasp_point
+from app.sim.sorting_table import Block, SortingTable
 from app.sim.sorting_view import (
     HELD,
     MAX_RANKED,
@@ -28,10 +28,8 @@ from app.sim.sorting_view import (
 class Sight:
     """What a view is made of."""
 
-    cell: Cell
-    """Sorting cell."""
     table: SortingTable
-    """Its blocks and goal."""
+    """Blocks and goal."""
     sorter: LiveSorter
     """Who decides, with the last decision."""
     choice: Choice | None
@@ -61,7 +59,7 @@ def view_of(sight: Sight) -> SortingView:
         move=None if choice is None else _current(sight, choice),
         phase=sight.phase,
         decided_by=None if choice is None or decision is None else decision.by,
-        twins=() if choice is None else tuple(one.id for one in choice.twins),
+        twins=() if choice is None else tuple(block.id for block, _ in choice.options),
         ranked=tuple(_ranked(table, one) for one in ranked),
         moves_to_go=0 if decision is None else decision.fewest_moves,
         attempts_to_go=0.0 if decision is None else decision.expected_attempts,
@@ -90,13 +88,13 @@ def table_of(cell: Cell, view: SortingView) -> SortingTable:
 def _piece(sight: Sight, block: Block) -> PieceView:
     table = sight.table
     size = table.shape.size_of(block.code)
-    half = half_size(sight.cell, size, table.shape.n_sizes)
+    half = half_size(table.cell, size, table.shape.n_sizes)
     held = block == table.held
     place, level, top = HELD, 0, sight.tcp
     if not held:
         position, level = table.place_of(block)
         place = table.names.stations[position]
-        top = grasp_point(sight.cell, table, position, level)
+        top = table.point(position, level)
     return PieceView(
         id=block.id,
         colour=table.names.colours[table.shape.colour_of(block.code)],
@@ -120,8 +118,8 @@ def _goal(sight: Sight) -> tuple[GoalBlockView, ...]:
             there = table.towers[c][level].code if level < len(table.towers[c]) else NULL
             good = good and there == code
             size = table.shape.size_of(code)
-            half = half_size(sight.cell, size, table.shape.n_sizes)
-            top = grasp_point(sight.cell, table, table.shape.n_cells + c, level)
+            half = half_size(table.cell, size, table.shape.n_sizes)
+            top = table.point(table.shape.n_cells + c, level)
             found.append(
                 GoalBlockView(
                     tower=table.names.towers[c],

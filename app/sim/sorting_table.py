@@ -39,6 +39,8 @@ class SortingTable:
     """
 
     def __init__(self, cell: Cell) -> None:
+        self.cell = cell
+        """Where it stands."""
         self.names = names_of(cell)
         """The words of the task."""
         self.shape = self.names.shape
@@ -121,6 +123,20 @@ class SortingTable:
         """Whether a block can be put at a position."""
         k = self.shape.n_cells
         return position >= k or self.clutter[position] is None
+
+    def point(self, position: int, level: int) -> Vec:
+        """Return where the tcp touches the top of a block at a position and level [m], (3,)."""
+        return np.asarray(self.cell.station(self.names.stations[position]).points()[level])
+
+    def point_at(self, position: int) -> Vec:
+        """Return where the tcp puts the next block at a position [m], shape (3,)."""
+        return self.point(position, self.level_at(position))
+
+    def point_of(self, block: Block) -> Vec | None:
+        """Return where the tcp takes a block [m], shape (3,); None where it is not."""
+        if block not in self.blocks or block == self.held:
+            return None
+        return self.point(*self.place_of(block))
 
     # What the robot does.
 
@@ -227,6 +243,12 @@ class SortingTable:
         self.goal = own_towers_only
         self._wanted = tuple(one for one in self._wanted if one not in there) + tuple(now)
         self._changed()
+
+    def begin(self, state: SortingState) -> None:
+        """Begin with a state, all blocks new."""
+        self.clutter = [None] * self.shape.n_cells
+        self.towers = [[] for _ in range(self.shape.n_colours)]
+        self.adopt(state)
 
     def adopt(self, state: SortingState) -> None:
         """Make the table what a state says; blocks that stay where they were keep their ids."""
@@ -369,11 +391,6 @@ class SortingTable:
                 counts[codes[id]] -= 1
                 wanted.append(id)
         self._wanted = tuple(wanted)
-
-
-def grasp_point(cell: Cell, table: SortingTable, position: int, level: int) -> Vec:
-    """Return where the tcp touches the top of a block at a position and level [m], (3,)."""
-    return np.asarray(cell.station(table.names.stations[position]).points()[level])
 
 
 def _index(field: str, word: str, words: tuple[str, ...]) -> int:

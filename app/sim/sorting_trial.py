@@ -1,4 +1,6 @@
-"""One of the six sorting tests in a live cell: its start, and its person, who acts by itself.
+"""What a live sorting cell begins with: a random task, or one of the six tests.
+
+A test's person acts without a visitor.
 
 Source: METHOD 1.5; ``sorting_tests.py``.
 """
@@ -9,11 +11,31 @@ import numpy as np
 
 from app.errors import InvalidInput
 from app.sim.ports import Vec
+from app.sim.sorting import SortingBatch, SortingSettings
 from app.sim.sorting_state import SortingShape, SortingState
 from app.sim.sorting_tests import sorting_test
 
+N_BLOCKS = 6
+"""Blocks of a random task."""
+TASK_SEED = 7919
+"""Between the seeds of two tasks."""
 PAUSE_S = 1.5
 """How long a reached goal is shown before the person acts [s]."""
+
+
+def random_task(shape: SortingShape, fail: Vec, seed: int, number: int) -> SortingState:
+    """Draw blocks in the clutter and a goal for some of them, as episodes are drawn.
+
+    Args:
+        shape: Size of the task.
+        fail: Failure probabilities of the clutter cells, shape (K,).
+        seed: Seed of the world.
+        number: Tasks begun before.
+    """
+    settings = SortingSettings(n_objects=min(N_BLOCKS, shape.n_cells))
+    batch = SortingBatch(shape, fail, 1, seed + TASK_SEED * number, settings)
+    batch.reset()
+    return batch.state_of(0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,15 +7,16 @@ cell's probability, drawn from (seed, task, attempt). After every attempt, and w
 changed blocks, goal or sorter, the sorter decides anew; a block at the magnet goes on, goes
 elsewhere, or back to where it counts (``sorting_table.py``).
 
-A person nearer than NEAR_M breaks inverse kinematics off, and the policy goes on. A motion that
-takes longer than TIME_LIMIT_S begins again, for another block if one is as good; from less than
-SHORT_WAY_M it is then ended by inverse kinematics. After a contact the robot starts again from
-home, and a held block falls back to where it counts. Blocks and towers are no obstacles.
+A person nearer than NEAR_M breaks inverse kinematics off, and the policy goes on.
+With nothing to do the robot goes home. A motion that takes longer than TIME_LIMIT_S begins
+again, for another block if one is as good; from less than SHORT_WAY_M it is then ended by
+inverse kinematics. After a contact the robot starts again from home, and a held block falls
+back to where it counts. Blocks and towers are no obstacles.
 
 Source: METHOD 1.2, 1.5, 3.1 and section 4 (real pick and place instead of reaching).
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -24,46 +25,20 @@ from app.sim import commands, explanation, sorting_commands
 from app.sim.cells import Cell
 from app.sim.commands import Command
 from app.sim.live_sorter import Choice, LiveSorter
-from app.sim.live_stage import CONTACT_HOLD_S, LiveStage
+from app.sim.live_stage import CONTACT_HOLD_S, LiveStage, PeopleCommand
 from app.sim.ports import Candidate, SortingValues, TaskPolicy, Vec
 from app.sim.snapshot import Counters, Status, WorldSnapshot
-from app.sim.sorting import SortingBatch, SortingSettings
-from app.sim.sorting_cell import APPROACH_M, above, reaching_cell
+from app.sim.sorting_cell import above, reaching_cell
+from app.sim.sorting_descent import Descent
 from app.sim.sorting_explanation import DONE, NO_GOAL, Teller
 from app.sim.sorting_sight import Sight, view_of
-from app.sim.sorting_state import NULL, Move
-from app.sim.sorting_table import Block, SortingTable, grasp_point
-from app.sim.sorting_trial import SortingTrial
+from app.sim.sorting_state import NULL
+from app.sim.sorting_table import SortingTable
+from app.sim.sorting_trial import SortingTrial, random_task
 from app.sim.sorting_view import Phase, SortingCounters
 
-N_BLOCKS = 6
-"""Blocks of a random task."""
-AT_M = 0.004
-"""Distance at which the tool counts as down [m]."""
-UP_M = 0.02
-"""Distance below the point of approach at which it counts as up again [m]."""
-FUNNEL = 2.0
-"""On its way down the tool stays this many times its sideways error above the point."""
-DOWN_S, HOLD_S, UP_S = 4.0, 0.3, 2.0
-"""Longest way down, rest of the magnet at a block, longest way up [s]."""
 SHORT_WAY_M = 0.35
 """Distance from which a motion that took too long is ended by inverse kinematics [m]."""
-TASK_SEED = 7919
-"""Between the seeds of two tasks."""
-
-
-@dataclass(slots=True)
-class Descent:
-    """A way down to a block or a place and up again."""
-
-    point: Vec
-    """Where the tcp is when the magnet touches [m], shape (3,)."""
-    phase: Phase
-    """``grasp`` or ``place``."""
-    step: str = "down"
-    """``down``, ``hold`` or ``up``."""
-    since: float = 0.0
-    """Time in the status at which the step began [s]."""
 
 
 class SortingWorld:
@@ -92,7 +67,7 @@ class SortingWorld:
         self._sorter = LiveSorter(sorter)
         self._choice: Choice | None = None
         self._descent: Descent | None = None
-        self._n_tasks = 0
+        self._n_tasks = self._version = 0
         self._reset()
 
     # Starts and ends.
@@ -102,12 +77,9 @@ class SortingWorld:
         self._stage.t, self._stage.counters = 0.0, Counters()
         for person in self._stage.people:
             person.start(None)
-        shape, seed = self._table.shape, self._seed + TASK_SEED * self._n_tasks
-        settings = SortingSettings(n_objects=min(N_BLOCKS, shape.n_cells))
-        batch = SortingBatch(shape, self._table.fail, 1, seed, settings)
-        batch.reset()
+        start = random_task(self._table.shape, self._table.fail, self._seed, self._n_tasks)
         self._begin_task(None)
-        self._table.adopt(batch.state_of(0))
+        self._table.begin(start)
         self._stage.forget_note()
         self._restart_robot()
 
@@ -137,17 +109,11 @@ class SortingWorld:
         """
         stage = self._stage
         commands.check(command, self.cell, stage.people.ids)
+        if isinstance(command, PeopleCommand):
+            stage.change_people(command)
+            self._refresh()
+            return
         match command:
-            case (
-                commands.MoveHuman()
-                | commands.SetMode()
-                | commands.SetMotion()
-                | commands.SetBody()
-                | commands.AddPerson()
-                | commands.RemovePerson()
-            ):
-                stage.change_people(command)
-                self._refresh()
             case commands.Pause() | commands.Resume():
                 stage.paused = isinstance(command, commands.Pause)
             case commands.StepOnce():
@@ -180,7 +146,7 @@ class SortingWorld:
         trial = SortingTrial(name, (self._seed, self._n_tasks))
         state = trial.start(self._table.shape, self._table.fail)
         self._begin_task(trial)
-        self._table.adopt(state)
+        self._table.begin(state)
         self._stage.paused = False
         self._stage.tell(trial.text)
         self._changed()
@@ -198,18 +164,19 @@ class SortingWorld:
         if old is not None:
             new = self._sorter.choose(self._table, old.move)
             if self._is_same(descent, old, new):
+                self._version = self._table.version
                 return
         self._choice = None
-        self._rise(descent)
+        descent.begin("up", self._stage.status_s)
 
     def _is_same(self, descent: Descent, old: Choice, new: Choice | None) -> bool:
-        if new is None or new.move.place != old.move.place or old.block not in new.twins:
+        if new is None or (old.block, old.move) not in new.options:
             return False
         if descent.phase == "grasp":
-            point = self._point_of(old.block)
+            point = self._table.point_of(old.block)
             return point is not None and np.array_equal(point, descent.point)
         return self._table.held is not None and np.array_equal(
-            self._point_at(new.move.place), descent.point
+            self._table.point_at(new.move.place), descent.point
         )
 
     # Time.
@@ -244,8 +211,9 @@ class SortingWorld:
     def _move_robot(self, human_q: Vec, sizes: Vec) -> None:
         """Carry out the action, the people having moved from ``human_q`` with ``sizes``."""
         stage, descent = self._stage, self._descent
+        straight = descent is not None or stage.decision is None
         found = stage.robot.advance(
-            self._action(), stage.people, human_q, sizes, straight=descent is not None
+            self._action(), stage.people, human_q, sizes, straight=straight
         )
         if found.kind != "none":
             self._descent = None
@@ -260,17 +228,13 @@ class SortingWorld:
         """Return the wanted joint speeds over their limits, shape (5,)."""
         stage = self._stage
         if self._descent is not None:
-            return stage.robot.toward(stage.robot.posture_at(self._aim(self._descent))[0])
+            aim = self._descent.aim(stage.robot.tcp())
+            return stage.robot.toward(stage.robot.posture_at(aim)[0])
+        if self._choice is None and stage.policy is not None:
+            return stage.robot.toward(stage.robot.home)
         if stage.decision is not None:
             return np.asarray(stage.decision.actions[stage.decision.index], dtype=np.float64)
         return np.zeros(5)
-
-    def _aim(self, descent: Descent) -> Vec:
-        """Return where the tcp shall go now: down in a funnel, or up."""
-        if descent.step == "up":
-            return above(descent.point)
-        aside = float(np.linalg.norm((self._stage.robot.tcp() - descent.point)[:2]))
-        return above(descent.point, min(APPROACH_M, FUNNEL * max(aside - AT_M, 0.0)))
 
     # Halves of a move.
 
@@ -278,6 +242,7 @@ class SortingWorld:
         """Decide on the next move and begin its motion."""
         kept = self._choice.move if self._choice is not None else None
         self._choice = self._sorter.choose(self._table, kept)
+        self._version = self._table.version
         self._begin_motion(status)
 
     def _begin_motion(self, status: Status = "moving") -> None:
@@ -314,44 +279,38 @@ class SortingWorld:
         table, choice = self._table, self._choice
         assert choice is not None
         if table.held is not None:
-            descent = Descent(self._point_at(choice.move.place), "place")
+            descent = Descent(table.point_at(choice.move.place), "place")
         else:
-            block = next(one for one in choice.twins if one.id == name)
-            pick, level = table.place_of(block)
-            self._choice = replace(choice, block=block, move=Move(pick, choice.move.place))
-            descent = Descent(grasp_point(self.cell, table, pick, level), "grasp")
+            block, move = next(one for one in choice.options if one[0].id == name)
+            self._choice = replace(choice, block=block, move=move)
+            descent = Descent(table.point(*table.place_of(block)), "grasp")
         self._descent = descent
         self._stage.enter("picking")
 
     def _follow(self, descent: Descent) -> None:
         """Go on with a way down and up."""
         stage = self._stage
-        age, tcp = stage.status_s - descent.since, stage.robot.tcp()
-        if descent.step == "down":
-            if stage.near or age > DOWN_S:
-                self._begin_motion()  # The policy moves away, and comes back.
-            elif np.linalg.norm(tcp - descent.point) < AT_M:
-                self._touch_down(descent)
-        elif descent.step == "hold":
-            if age >= HOLD_S:
-                self._rise(descent)
-        elif stage.near or age > UP_S or tcp[2] > descent.point[2] + APPROACH_M - UP_M:
+        tcp, over = stage.robot.tcp(), descent.is_over(stage.robot.tcp(), stage.status_s)
+        if descent.step == "down" and not stage.near and descent.is_down(tcp):
+            self._touch_down(descent)
+        elif descent.step == "down" and (over or stage.near):
+            self._begin_motion()
+        elif descent.step == "hold" and over:
+            descent.begin("up", stage.status_s)
+        elif descent.step == "up" and (over or stage.near):
             self._after_rise()
-
-    def _rise(self, descent: Descent) -> None:
-        descent.step, descent.since = "up", self._stage.status_s
 
     def _touch_down(self, descent: Descent) -> None:
         """Let the magnet close or open; it may miss."""
-        descent.step, descent.since = "hold", self._stage.status_s
-        choice, table = self._choice, self._table
+        descent.begin("hold", self._stage.status_s)
+        choice = self._choice
         assert choice is not None
         if descent.phase == "grasp":
             self._grasp(choice)
             return
-        table.drop(choice.move.place)
+        self._table.drop(choice.move.place)
         if not choice.back:
-            self._count(moves=1)
+            self._counts = replace(self._counts, moves=self._counts.moves + 1)
             self._sorter.end_attempt()
 
     def _grasp(self, choice: Choice) -> None:
@@ -359,28 +318,20 @@ class SortingWorld:
         self._sorter.note_attempt(table, choice.move)
         rng = np.random.default_rng((self._seed, self._n_tasks, self._counts.attempts))
         risk = float(table.fail[pick]) if pick < table.shape.n_cells else 0.0
-        self._count(attempts=1)
+        self._counts = replace(self._counts, attempts=self._counts.attempts + 1)
         if rng.random() >= risk:
             table.lift(pick)
             return
-        self._count(failures=1)
+        self._counts = replace(self._counts, failures=self._counts.failures + 1)
         self._sorter.end_attempt()
         self._stage.tell(self._teller.missed(choice.block, risk))
 
     def _after_rise(self) -> None:
-        if self._table.held is not None and self._choice is not None:
+        same = self._version == self._table.version
+        if self._table.held is not None and self._choice is not None and same:
             self._begin_motion()
         else:
             self._think()
-
-    def _count(self, *, moves: int = 0, attempts: int = 0, failures: int = 0) -> None:
-        so_far = self._counts
-        self._counts = replace(
-            so_far,
-            moves=so_far.moves + moves,
-            attempts=so_far.attempts + attempts,
-            failures=so_far.failures + failures,
-        )
 
     def _let_interfere(self) -> None:
         """Let the running test's person do what is due."""
@@ -403,16 +354,13 @@ class SortingWorld:
             return "idle"
         return "carry" if self._table.held is not None else "approach"
 
-    def _point_at(self, position: int) -> Vec:
-        """Return where the tcp puts the next block at a position [m], shape (3,)."""
-        level = self._table.level_at(position)
-        return grasp_point(self.cell, self._table, position, level)
-
-    def _point_of(self, block: Block) -> Vec | None:
-        """Return where the tcp takes a block [m], shape (3,); None where it is gone."""
-        if block not in self._table.blocks or block == self._table.held:
-            return None
-        return grasp_point(self.cell, self._table, *self._table.place_of(block))
+    def _chosen(self) -> Choice | None:
+        """Return the move with the block that the critic goes for now."""
+        choice, decision = self._choice, self._stage.decision
+        if choice is None or decision is None or self._phase != "approach":
+            return choice
+        found = [one for one in choice.options if one[0].id == decision.chosen]
+        return replace(choice, block=found[0][0], move=found[0][1]) if found else choice
 
     def _candidates(self) -> tuple[Candidate, ...]:
         choice, table = self._choice, self._table
@@ -420,9 +368,9 @@ class SortingWorld:
             return ()
         if table.held is not None:
             name = table.names.stations[choice.move.place]
-            point = above(self._point_at(choice.move.place))
+            point = above(self._table.point_at(choice.move.place))
             return (Candidate(id=name, position=point),)
-        points = [(one.id, self._point_of(one)) for one in choice.twins]
+        points = [(block.id, table.point_of(block)) for block, _ in choice.options]
         return tuple(
             Candidate(id=id, position=above(point)) for id, point in points if point is not None
         )
@@ -453,8 +401,8 @@ class SortingWorld:
             return explanation.touched(stage.contact, final=False)
         if stage.note is not None and status != "blocked":
             return stage.note
-        if status in ("moving", "picking") and self._choice is not None:
-            return self._teller.doing(self._phase, self._choice, self._sorter)
+        if status in ("moving", "picking") and (chosen := self._chosen()) is not None:
+            return self._teller.doing(self._phase, chosen, self._sorter)
         if status == "solved":
             return DONE
         if status == "no candidates":
@@ -466,10 +414,9 @@ class SortingWorld:
         stage, status = self._stage, self._shown_status()
         closing = self._descent is not None and self._descent.step == "hold"
         sight = Sight(
-            cell=self.cell,
             table=self._table,
             sorter=self._sorter,
-            choice=self._choice,
+            choice=self._chosen(),
             phase=self._phase,
             counters=replace(self._counts, hand_overs=self._sorter.hand_overs),
             test=None if self._trial is None else self._trial.name,

@@ -9,6 +9,7 @@ def test_shipped_checkpoint_is_listed_with_its_alias(client: TestClient) -> None
     shipped = [one for one in listed if "pick" in one["aliases"]]
     assert len(shipped) == 1
     assert shipped[0]["preset"] == "pick-td3"
+    assert shipped[0]["purpose"] == "choosing tasks"
     assert client.get("/v1/checkpoints/pick").json()["sha256"] == shipped[0]["sha256"]
 
 

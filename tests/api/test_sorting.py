@@ -135,6 +135,18 @@ def test_policy_decides_by_its_greatest_value(client: TestClient, sorter: str) -
     assert by_alias["moves"] == answer["moves"]
 
 
+def test_shipped_policy_of_the_cell_decides_where_none_is_named(client: TestClient) -> None:
+    shipped = client.get("/v1/checkpoints/sorting-e0").json()["sha256"]
+    task, deciders = TASK, []
+    for _ in range(4):
+        answer = asked(client, task)
+        assert answer["checkpoint"] == shipped
+        deciders.append(answer["by"])
+        task = {**carried_out(task, answer["move"]), "watch": answer["watch"]}
+    assert asked(client, task)["solved"]
+    assert deciders == ["policy"] * 4
+
+
 @pytest.mark.usefixtures("sorter")
 def test_planner_takes_over_and_the_goal_is_reached(client: TestClient) -> None:
     task: dict[str, Any] = {**TASK, "checkpoint": ALIAS}
@@ -328,15 +340,28 @@ def test_record_that_was_tampered_with_is_refused(
 
 
 def test_policy_that_sorts_is_refused_where_tasks_are_chosen(
-    client: TestClient, sorter: str, state: dict[str, Any]
+    client: TestClient, sorter: str
 ) -> None:
-    answer = client.post("/v1/task-selection", json={**state, "checkpoint": sorter})
+    body = {
+        "cell": "pick-and-place",
+        "robot": {"q": [0.99, -2.33, 2.08, -1.32, -1.57, 0], "qd": [0.0] * 6},
+        "people": [],
+        "candidates": [{"id": "left", "position": [-0.5, 0.7, 0.12]}],
+        "checkpoint": sorter,
+    }
+    answer = client.post("/v1/task-selection", json=body)
     assert answer.status_code == 409
     assert (
         answer.json()["detail"] == "checkpoint purpose is 'sorting', expected 'choosing tasks'"
     )
+
+
+def test_policy_that_sorts_is_refused_as_the_one_that_moves_an_arm(
+    client: TestClient, sorter: str
+) -> None:
     command = {"tag": "set-policy", "checkpoint": sorter}
-    assert client.post("/v1/worlds/main/commands", json=command).status_code == 409
+    answer = client.post("/v1/worlds/main/commands", json=command)
+    assert (answer.status_code, answer.json()["field"]) == (409, "purpose")
 
 
 def test_policy_that_chooses_tasks_is_refused_where_moves_are(client: TestClient) -> None:

@@ -52,6 +52,16 @@ def test_step_advances_a_paused_world_by_one_period(client: TestClient) -> None:
     assert after["t_s"] - before["t_s"] == pytest.approx(0.05)
 
 
+def test_clock_runs_faster_when_asked_and_not_at_any_speed(client: TestClient) -> None:
+    client.post(COMMANDS, json={"tag": "set-speed", "factor": 2})
+    until(client, lambda world: world["speed"] == 2)
+    client.post(COMMANDS, json={"tag": "set-speed", "factor": 1})
+    until(client, lambda world: world["speed"] == 1)
+    refused = client.post(COMMANDS, json={"tag": "set-speed", "factor": 3})
+    assert refused.status_code == 422
+    assert "factor" in refused.text
+
+
 def test_candidates_are_toggled(client: TestClient) -> None:
     before = client.get(WORLD).json()["selected"]
     client.post(COMMANDS, json={"tag": "toggle-candidate", "id": before[0]})

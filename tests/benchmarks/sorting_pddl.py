@@ -129,7 +129,7 @@ def replayed(steps: list[list[str]], state: SortingState) -> int:
             tower.append(code)
         else:
             clutter[code] += 1
-        if min(clutter.values()) < 0 or held != code:
+        if min(clutter.values(), default=0) < 0 or held != code:
             raise ValueError(f"there is no {code} to {name}")
         held = held if name.startswith("take") else None
     if held is not None or towers != wanted:

@@ -1,4 +1,4 @@
-"""Brute force on small sorting tasks: every state, every move, by the rules of METHOD 1.2 alone.
+"""Brute force on small sorting tasks: every state and move, by the rules of METHOD 1.2 alone.
 
 Nothing here knows of towers' progress. A state is ``(clutter, towers)`` as tuples of codes.
 """
@@ -95,39 +95,43 @@ def first_moves(state: SortingState, shape: SortingShape) -> tuple[int, tuple[in
 
 
 def fewest_attempts(
-    state: SortingState, shape: SortingShape, distance: dict[Key, int] | None = None
+    state: SortingState,
+    shape: SortingShape,
+    to_go: dict[Key, int],
+    fewest_moves: bool = True,
 ) -> float:
-    """Fewest expected attempts to the goal, by value iteration in the order of Dijkstra.
+    """Fewest expected attempts to the goal, a shortest path by A*.
 
     A failed pick changes nothing, so a pick from cell k is an edge of length ``1 / (1 -
-    fail[k])``.
+    fail[k])``, and moves to go are a lower bound of attempts to go.
 
     Args:
         state: Where it starts.
         shape: Its shape.
-        distance: Fewest moves of states (``moves_to_go``): only plans with the fewest moves
-            are looked at; None: all plans.
+        to_go: Fewest moves of states, by ``moves_to_go``.
+        fewest_moves: Look only at plans with the fewest moves.
     """
-    goal, k, c = goal_of(state), shape.n_cells, shape.n_colours
+    goal, moves = goal_of(state), shape.n_cells * shape.n_colours
     cost = 1.0 / (1.0 - state.fail)
+    far = max(to_go.values()) + 1
     best, done = {key_of(state): 0.0}, set()
     line = [(0.0, key_of(state))]
     while line:
-        spent, key = heapq.heappop(line)
+        _, key = heapq.heappop(line)
         if key in done:
             continue
         if key[1] == goal:
-            return spent
+            return best[key]
         done.add(key)
+        here = to_go.get(_least(key), far)
         for action, after in moves_from(key, shape):
-            if distance is not None:
-                to_go = distance[_least(key)] - 1
-                if distance.get(_least(after), to_go + 1) != to_go:
-                    continue
-            total = spent + (float(cost[action // c]) if action < k * c else 1.0)
-            if total < best.get(after, np.inf):
-                best[after] = total
-                heapq.heappush(line, (total, after))
+            there = to_go.get(_least(after), far)
+            if fewest_moves and there != here - 1:
+                continue
+            spent = best[key] + (cost[action // shape.n_colours] if action < moves else 1.0)
+            if spent < best.get(after, np.inf):
+                best[after] = float(spent)
+                heapq.heappush(line, (float(spent) + there, after))
     raise AssertionError("no plan")
 
 

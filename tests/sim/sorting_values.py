@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from app.sim.kernels.sorting import RUNNING
+from app.sim.kernels.sorting import RUNNING, SUCCESS
 from app.sim.kernels.sorting_reward import SortingWeights
 from app.sim.sorting import SortingBatch, SortingSettings
 from app.sim.sorting_state import SortingShape, SortingState
@@ -65,7 +65,7 @@ class _Table:
             rows.clutter[:n] = codes[part, : self._k]
             rows.towers[:n] = codes[part, self._k :].reshape(n, *self._levels)
             rows.heights[:n] = (rows.towers[:n] != 0).sum(axis=2)
-            rows.outcome[:] = RUNNING
+            rows.outcome[:], rows.outcome[:n] = SUCCESS, RUNNING
             result = self.batch.step(np.full(STEP, action), auto_reset=False)
             after[part] = np.hstack([rows.clutter[:n], rows.towers[:n].reshape(n, -1)])
             rew[part] = result.rew[:n]

@@ -68,4 +68,3 @@ def test_best_policy_takes_fewest_moves_in_every_state_of_larger_tasks(
     for task in tasks(shape, 10, 34, shape.n_cells):
         verdict = judged(model_of(task, shape, SortingWeights()), shape, task.fail, gamma)
         assert verdict.fewest == verdict.safest_twin == verdict.n
-        assert verdict.worst_attempts < 1.05

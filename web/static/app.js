@@ -57,7 +57,8 @@ function App() {
       <aside class="side" aria-label="Decision and training">
         <${Tabs} tab=${tab} onTab=${setTab} active=${active} />
         <div class="panel" id="panel-cell" role="tabpanel" aria-labelledby="tab-cell"
-          data-hidden=${tab !== "cell"}><${Decision} cell=${cell} /></div>
+          data-hidden=${tab !== "cell"}><${Decision} cell=${cell}
+            checkpoints=${checkpoints} jobs=${jobs} /></div>
         <div class="panel" id="panel-training" role="tabpanel" aria-labelledby="tab-training"
           data-hidden=${tab !== "training"}>
           ${visited.current && training}</div>
@@ -161,11 +162,12 @@ function veil(link, reason) {
   return ["Warming up", `${capital(doing || "starting")} …${/compil/.test(doing) ? patience : ""}`];
 }
 
-function Decision({ cell }) {
+function Decision({ cell, checkpoints, jobs }) {
   const goals = useGoals(cell);
   if (!cell.world) return html`<div class="skeleton tall" aria-busy="true"></div>`;
   if (cell.world.sorting && cell.cell) {
-    return html`<${SortingDecision} world=${cell.world} cell=${cell.cell} send=${cell.send} />`;
+    return html`<${SortingDecision} world=${cell.world} cell=${cell.cell} send=${cell.send}
+      checkpoints=${checkpoints} jobs=${jobs} />`;
   }
   return html`<${Story} world=${cell.world} />
     <${Values} world=${cell.world} cell=${cell.cell} history=${cell.history} ...${goals} />

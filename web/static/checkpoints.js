@@ -1,9 +1,11 @@
-// Which checkpoint acts in the cell.
+// Which checkpoint acts in the cell, and which one chooses the moves where blocks are sorted.
 import { html, useCallback, useEffect, useState } from "./vendor/htm-preact-standalone.module.js";
 import { get } from "./api.js";
 import * as format from "./format.js";
 
 const PER_JOB = 5;
+const CHOOSING = "choosing tasks";
+const SORTING = "sorting";
 
 /** Known checkpoints; asked for again when `stamp` changes and by `refresh`. */
 export function useCheckpoints(link, stamp) {
@@ -18,7 +20,7 @@ export function useCheckpoints(link, stamp) {
 
 export function Acting({ world, checkpoints, jobs, send }) {
   const now = world.checkpoint;
-  const groups = grouped(checkpoints.list, jobs, now);
+  const groups = grouped(checkpoints.list.filter((c) => c.purpose === CHOOSING), jobs, now);
   const known = groups.some((g) => g.items.some((c) => c.sha256 === now));
   return html`<label class="acting">
     <span>Acting</span>
@@ -32,6 +34,23 @@ export function Acting({ world, checkpoints, jobs, send }) {
           ${name(c, group.job)}</option>`)}</optgroup>`)}
     </select>
   </label>`;
+}
+
+/** Who chooses the moves: a sorter that was trained for this cell, or the exact planner. */
+export function Sorter({ sorting, cell, checkpoints, jobs, send }) {
+  const now = sorting.sorter;
+  const mine = checkpoints.list.filter((c) => c.purpose === SORTING && c.manifest.cell === cell.name);
+  const groups = grouped(mine, jobs, now);
+  const known = mine.some((c) => c.sha256 === now);
+  return html`<label class="sorter"><span>Moves are chosen by</span>
+    <select value=${now ?? ""} data-role="sorter" onFocus=${checkpoints.refresh}
+      onChange=${(e) => send({ tag: "set-sorter", checkpoint: e.target.value || null })}>
+      <option value="">the exact planner</option>
+      ${now && !known && html`<option value=${now}>${sorting.sorter_title ?? format.short(now)}</option>`}
+      ${groups.map((group) => html`<optgroup key=${group.label} label=${group.label}>
+        ${group.items.map((c) => html`<option key=${c.sha256} value=${c.sha256}>
+          ${name(c, group.job)}</option>`)}</optgroup>`)}
+    </select></label>`;
 }
 
 /** Shipped checkpoints first, then each job's newest few, and whatever acts now. */

@@ -1,6 +1,7 @@
 // The sorter's moves: the one that is carried out, who decided it, and the ranking behind it.
 import { html } from "./vendor/htm-preact-standalone.module.js";
 import { Block, capital, nameOf, placeName } from "./blockshape.js";
+import { Sorter } from "./checkpoints.js";
 import * as format from "./format.js";
 
 const PHASES = {
@@ -47,7 +48,7 @@ function Decider({ sorting }) {
     ? "The learned policy valued every move and chose the best."
     : over
       ? "The policy went in a circle or took too long, so the exact planner took over."
-      : "No learned sorter acts here: the exact planner finds the fewest moves.";
+      : "No learned sorter acts here: the exact planner finds the fewest moves. A move’s value is minus the grasps it expects.";
   return html`<span class=${over ? "hint is-over" : "hint"} tabindex="0" data-role="decider"
     data-by=${by} aria-describedby="decider-help">${text}${PHASES[phase] ? `, ${PHASES[phase]}` : ""}
     <span class="tip tip-left" role="tooltip" id="decider-help">${help}${counters.hand_overs > 0
@@ -60,7 +61,8 @@ function Rank({ move, sorting, cell, chosen, share }) {
   const from = capital(placeName(cell, move.pick));
   const to = placeName(cell, move.place);
   const what = piece ? nameOf(piece) : "block";
-  const why = move.best ? "It begins a shortest plan." : "It makes the plan longer.";
+  const why = [worth(move.value, sorting.decided_by),
+    move.best ? "It begins a shortest plan." : "It makes the plan longer."].join(" ");
   return html`<li class=${chosen ? "rank is-chosen" : "rank"} data-rank=${`${move.pick}-${move.place}`}
     data-chosen=${String(chosen)} title=${why}>
     <span class="sr">${what}</span>
@@ -74,9 +76,17 @@ function Rank({ move, sorting, cell, chosen, share }) {
   </li>`;
 }
 
+/** The planner values a move by the grasps it leads to, the policy by reward. */
+function worth(value, by) {
+  if (!Number.isFinite(value)) return "";
+  return by === "planner"
+    ? `${format.number(-value, 2)} grasps to the goal are expected if it comes first.`
+    : `Expected discounted reward if it comes first: ${format.value(value)}.`;
+}
+
 /** Attempts, failures, moves, hand-overs, and who decides. */
-export function SortingSmallPrint({ world }) {
-  const { counters, sorter, sorter_title: title } = world.sorting;
+export function SortingSmallPrint({ world, cell, checkpoints, jobs, send }) {
+  const { counters } = world.sorting;
   const shown = [["attempts", "Grasps"], ["failures", "Failed"], ["moves", "Moves"],
     ["hand_overs", "Hand-overs"]];
   return html`<section class="card small-print" aria-label="Counters and provenance">
@@ -84,13 +94,12 @@ export function SortingSmallPrint({ world }) {
       ${shown.map(([key, label]) => html`<div key=${key}>
         <dt>${label}</dt><dd data-counter=${key}>${counters[key]}</dd></div>`)}
     </dl>
-    <p class="range">${sorter
-      ? html`<span>Moves are chosen by ${title ?? "checkpoint"}
-          ${" "}<code title=${sorter}>${format.short(sorter)}</code>.</span>`
-      : html`<span>Moves are chosen by the exact planner: no sorter is loaded.</span>`}</p>
+    <${Sorter} sorting=${world.sorting} cell=${cell} checkpoints=${checkpoints} jobs=${jobs}
+      send=${send} />
     <p class="range">${world.checkpoint
       ? html`<span>Motions between them by ${world.policy_title ?? "checkpoint"}
-          ${" "}<code title=${world.checkpoint}>${format.short(world.checkpoint)}</code>.</span>`
+          ${" "}<code title=${world.checkpoint}>${format.short(world.checkpoint)}</code>, which also
+          chooses among equal blocks.</span>`
       : html`<span>No policy moves the arm.</span>`}</p>
   </section>`;
 }

@@ -12,7 +12,7 @@ const PHASES = {
   place: ["Putting down", "accent"],
 };
 
-export function SortingDecision({ world, cell, send }) {
+export function SortingDecision({ world, cell, send, checkpoints, jobs }) {
   const { sorting } = world;
   const [picked, setPicked] = useState(null);
   const there = picked === null || cell.stations.some((one) => one.id === picked)
@@ -26,7 +26,8 @@ export function SortingDecision({ world, cell, send }) {
     <${GoalEditor} ...${shared} />
     <${Blocks} ...${shared} />
     <${Moves} sorting=${sorting} cell=${cell} />
-    <${SortingSmallPrint} world=${world} />`;
+    <${SortingSmallPrint} world=${world} cell=${cell} checkpoints=${checkpoints} jobs=${jobs}
+      send=${send} />`;
 }
 
 /** What the story's chip says where the world's status is too coarse for sorting. */

@@ -6,6 +6,7 @@ from typing import Any, Self
 from pydantic import Field
 
 from app.api.schemas.numbers import Answer
+from app.policies.checkpoint import purpose_of
 from app.store.records import CheckpointRecord, Page
 
 
@@ -18,6 +19,7 @@ class CheckpointPublic(Answer):
     job_id: str | None = Field(description="the job that made it; null for a shipped one")
     step: int | None = Field(description="environment steps of that job")
     preset: str | None
+    purpose: str = Field(description="`choosing tasks` or `sorting`")
     size: int = Field(description="length of the tensors [bytes]")
     created_at: datetime
     tensors: str = Field(description="where its safetensors bytes are")
@@ -34,6 +36,7 @@ class CheckpointPublic(Answer):
             job_id=record.job_id,
             step=record.step,
             preset=preset.get("name") if isinstance(preset, dict) else None,
+            purpose=purpose_of(record.manifest),
             size=record.size,
             created_at=record.created_at,
             tensors=f"/v1/checkpoints/{record.sha256}/tensors",

@@ -1,4 +1,4 @@
-"""Exact plans of the sorting task: next moves for batches, whole plans with their risk, compiled.
+"""Exact plans of the sorting task: next moves for batches, whole plans and risk, compiled.
 
 A pick from cell ``k`` fails with probability ``fail[k]`` and leaves everything as it is, so it
 takes ``1 / (1 - fail[k])`` attempts on average, and a plan's expected attempts are the sum over
@@ -30,11 +30,14 @@ from app.sim.kernels.sorting_rules import (
     choose,
     mark_first,
     still_wanted,
+    worst_free,
 )
 from app.sim.ports import Vec
 
 MOST_STATES = 20_000
 """Tasks with more states are planned by the rules alone: looking ahead would take seconds."""
+LESS = 1e-9
+"""Attempts by which a plan must be better to be preferred."""
 CELLS_TRIED = 3
 """How many of the best free cells are tried for an object put aside, besides the worst one."""
 
@@ -88,7 +91,7 @@ def _new_objects(n_cells: int, n_colours: int) -> Objects:
 
 
 def new_work(n_cells: int, n_colours: int, n_sizes: int) -> PlannerWork:
-    """Return work space for tasks of a shape: 30 kB for K = 20, C = 3; 10 MB for K = 40, C = 5."""
+    """Return work space: 30 kB for K = 20, C = 3; 10 MB for K = 40, C = 5."""
     return PlannerWork(
         progress=new_progress(n_cells, n_colours, n_sizes),
         at=np.zeros(n_colours, dtype=np.int64),
@@ -210,22 +213,62 @@ def _try(action: int, best: float, task: Task, work: PlannerWork) -> float:
 
 
 @kernel()
-def _nth_free(n: int, clutter: Bytes, fail: Vec) -> int:
-    """Return the n-th best free cell, the worst for ``n = CELLS_TRIED``; -1 where none is."""
+def _next_free(last: int, clutter: Bytes, fail: Vec) -> int:
+    """Return the next free cell by risk after ``last`` (-1: the best), -1 after the worst."""
     found = -1
     for k in range(len(clutter)):
-        if clutter[k] != 0:
+        if clutter[k] != 0 or k == last:
             continue
-        before = 0
-        after = 0
-        for j in range(len(clutter)):
-            if clutter[j] == 0 and j != k:
-                less = fail[j] < fail[k] or (fail[j] == fail[k] and j < k)
-                before += less
-                after += not less
-        if (n < CELLS_TRIED and before == n) or (n == CELLS_TRIED and after == 0):
+        later = last < 0 or fail[k] > fail[last] or (fail[k] == fail[last] and k > last)
+        if later and (found < 0 or fail[k] < fail[found]):
             found = k
     return found
+
+
+@kernel()
+def _try_cells(c: int, best: float, task: Task, work: PlannerWork) -> tuple[int, float]:
+    """Try to put the top of a tower into the best free cells, and into the worst one.
+
+    Args:
+        c: The tower.
+        best: Expected attempts that would have to be less.
+        task: What is asked for.
+        work: Work space; its states fit where the objects are now.
+
+    Returns:
+        The best such action, -1 where none is better, and the expected attempts then.
+    """
+    now, n_cells = work.now, len(work.now.clutter)
+    base = n_cells * len(now.heights) + c * n_cells
+    chosen, k = NONE, -1
+    for n in range(CELLS_TRIED + 1):
+        if n < CELLS_TRIED:
+            k = _next_free(k, now.clutter, task.fail)
+        elif k >= 0:
+            worst = worst_free(now.clutter, task.fail)
+            k = worst if worst != k else -1
+        if k < 0:
+            break
+        attempts = _try(base + k, best, task, work)
+        if attempts < best - LESS:
+            chosen, best = base + k, attempts
+    return chosen, best
+
+
+@kernel()
+def _waiting(c: int, removed: int, p: Progress) -> int:
+    """Return a tower where the top of another may wait at no cost, -1 where none is.
+
+    Args:
+        c: The other tower.
+        removed: State after a removal to the clutter instead, on a shortest plan.
+        p: The states, ``table`` filled, the towers at ``at``.
+    """
+    top = p.top[c, p.at[c]]
+    for d in range(len(p.at)):
+        if d != c and p.want[d, p.at[d]] != top and ties_on_tower(removed, d, top, p):
+            return d
+    return -1
 
 
 @kernel()
@@ -242,35 +285,23 @@ def _look_ahead(task: Task, work: PlannerWork) -> int:
     moves = n_cells * n_towers
     if not moves <= chosen < 2 * moves:
         return chosen
-    best = np.inf
-    index = state_number(p)
-    left = p.table[index] - 1
+    top = p.top[(chosen - moves) // n_cells, p.at[(chosen - moves) // n_cells]]
+    if still_wanted(top, task.goal, task.goal_heights, p) == 0:
+        return chosen
+    best, index = np.inf, state_number(p)
     for c in range(n_towers):
         top = p.top[c, p.at[c]]
         removed = index + (p.below[c, p.at[c]] - p.at[c]) * p.stride[c]
-        if top == 0 or p.table[removed] != left:
+        if top == 0 or p.table[removed] != p.table[index] - 1:
             continue
-        waits = False
-        for d in range(n_towers):
-            if waits or d == c or p.want[d, p.at[d]] == top:
-                continue
-            if ties_on_tower(removed, d, top, p):
-                waits = True
-                action = 2 * n_cells * n_towers + c * n_towers + d
-                attempts = _try(action, best, task, work)
-                if attempts < best - 1e-9:
-                    chosen, best = action, attempts
-        if waits:
-            continue
-        lowest = 0 if still_wanted(top, task.goal, task.goal_heights, p) > 0 else CELLS_TRIED
-        for n in range(lowest, CELLS_TRIED + 1):
-            k = _nth_free(n, now.clutter, task.fail)
-            if k < 0:
-                continue
-            action = n_cells * n_towers + c * n_cells + k
+        d = _waiting(c, removed, p)
+        if d < 0:
+            action, attempts = _try_cells(c, best, task, work)
+        else:
+            action = 2 * moves + c * n_towers + d
             attempts = _try(action, best, task, work)
-            if attempts < best - 1e-9:
-                chosen, best = action, attempts
+        if attempts < best - LESS:
+            chosen, best = action, attempts
     return chosen
 
 
@@ -319,23 +350,25 @@ def plan_state(objects: Objects, task: Task, work: PlannerWork) -> tuple[int, fl
     return fewest, attempts
 
 
-@kernel()
-def attempts_by_rules(objects: Objects, task: Task, work: PlannerWork) -> float:
-    """Return the expected attempts from where the objects are, by the rules alone.
+@kernel(nogil=True)
+def rough_plan(objects: Objects, task: Task, work: PlannerWork) -> tuple[int, float]:
+    """Plan one state by the rules alone: as many moves, sometimes a few more attempts.
 
     Args:
         objects: Where the objects are.
-        task: What is asked for; the objects can meet it.
-        work: Work space, overwritten.
+        task: What is asked for.
+        work: Work space.
+
+    Returns:
+        Fewest moves, and expected attempts of the plan; -1 and 0 where the goal cannot be met.
     """
-    _lay_out(objects, task, work)
+    p = work.progress
+    if _lay_out(objects, task, work) == 0:
+        return NONE, 0.0
     _copy(objects, work.now)
-    attempts, action = 0.0, _choose(work.now, task, work.progress)
-    while action >= 0:
-        attempts += _attempts(action, task)
-        _carry_out(action, work.now, task, work)
-        action = _choose(work.now, task, work.progress)
-    return attempts
+    action = _choose(work.now, task, p)
+    fewest = p.table[state_number(p)]
+    return fewest, _try(action, np.inf, task, work) if action >= 0 else 0.0
 
 
 @kernel(nogil=True)

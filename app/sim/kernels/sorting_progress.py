@@ -1,4 +1,4 @@
-"""The sorting task as progress of its towers, and the fewest moves from every progress, compiled.
+"""The sorting task as progress of its towers, and the fewest moves from there, compiled.
 
 A tower matches its goal up to level ``m``; what stands above must go, top first, and then the
 goal is built, lowest level first. So a tower is described by one number, its *progress*: the
@@ -13,14 +13,14 @@ state lead
 and the fewest moves to the goal are shortest paths over all states, by sweeps from the goal.
 
 **Why nothing else is needed.** An object put where the goal does not want it might as well lie
-in the clutter, where it covers nothing: no plan with such a move is shorter (some are as short,
-see :func:`ties_on_tower`). One thing more can shorten a plan: to take apart what *matches*. With
-towers ``a = X``, ``b`` empty, ``e = X W V`` and goals ``a = X``, ``b = X V W``, the object of
-``a`` is given to ``b`` and replaced at the end by that of ``e``: four moves, not five. In a
-shortest plan the lowest object so taken from ``a`` goes straight onto another tower ``b``, and
-its twin comes straight from a third tower ``e`` (else leaving it alone is shorter). ``cut`` is
-the lowest level for which such ``b`` and ``e`` exist; mostly there are none, ``cut`` is ``m``,
-states follow one another in one order and one sweep is enough.
+in the clutter, where it covers nothing: no plan with such a move is shorter (some are as
+short, see :func:`ties_on_tower`). One thing more can shorten a plan: to take apart what
+*matches*. With towers ``a = X``, ``b`` empty, ``e = X W V`` and goals ``a = X``, ``b = X V W``
+the object of ``a`` is given to ``b`` and replaced at the end by that of ``e``: four moves, not
+five. In a shortest plan the lowest object so taken from ``a`` goes straight onto another tower
+``b``, and its twin comes straight from a third tower ``e`` (else leaving it alone is shorter).
+``cut`` is the lowest level for which such ``b`` and ``e`` exist; mostly there are none, ``cut``
+is ``m``, states follow one another in one order and one sweep is enough.
 
 Source: METHOD 1.2; the fewest moves are held against breadth-first search in the tests.
 """
@@ -185,6 +185,30 @@ def _lay_tower(c: int, tower: Bytes, goal: Bytes, goal_height: int, p: Progress)
 
 
 @kernel()
+def _can_be_met(
+    clutter: Bytes, towers: Bytes, heights: Ints, goal: Bytes, goal_heights: Ints, total: Ints
+) -> bool:
+    """Count the objects of each code; tell whether they are enough and not too many."""
+    for x in range(len(total)):
+        total[x] = 0
+    for code in clutter:
+        total[code] += 1
+    n_objects = len(clutter) - total[0]
+    for c in range(len(towers)):
+        n_objects += heights[c]
+        for level in range(heights[c]):
+            total[towers[c, level]] += 1
+    for x in range(1, len(total)):
+        lack = -total[x]
+        for c in range(len(goal)):
+            for level in range(goal_heights[c]):
+                lack += goal[c, level] == x
+        if lack > 0:
+            return False
+    return bool(n_objects <= len(clutter))
+
+
+@kernel()
 def lay_out(
     clutter: Bytes, towers: Bytes, heights: Ints, goal: Bytes, goal_heights: Ints, p: Progress
 ) -> int:
@@ -201,30 +225,11 @@ def lay_out(
     Returns:
         Number of states; 0 where the goal cannot be met, or there are more than K objects.
     """
-    n_towers, n_cells = towers.shape
-    _find_cuts(towers, heights, goal, goal_heights, p)
-    total = p.left[n_towers]
-    for x in range(len(total)):
-        total[x] = 0
-    n_objects = 0
-    for code in clutter:
-        total[code] += 1
-        n_objects += code != 0
-    for c in range(n_towers):
-        n_objects += heights[c]
-        for level in range(heights[c]):
-            total[towers[c, level]] += 1
-        for level in range(goal_heights[c]):
-            total[goal[c, level]] -= 1
-    size = 1 if n_objects <= n_cells else 0
-    for x in range(1, len(total)):
-        if total[x] < 0:
-            size = 0
-    if size == 0:
+    n_towers, size = len(towers), 1
+    if not _can_be_met(clutter, towers, heights, goal, goal_heights, p.left[n_towers]):
         return 0
+    _find_cuts(towers, heights, goal, goal_heights, p)
     for c in range(n_towers):
-        for level in range(goal_heights[c]):
-            total[goal[c, level]] += 1
         _lay_tower(c, towers[c], goal[c], goal_heights[c], p)
         p.stride[c] = size
         size *= p.n[c]
@@ -312,7 +317,7 @@ def state_number(p: Progress) -> int:
 def in_clutter(index: int, code: int, p: Progress) -> int:
     """Return how many objects of a code lie in the clutter in a state."""
     n_towers = len(p.n)
-    count = p.left[n_towers, code]
+    count: int = p.left[n_towers, code]
     for c in range(n_towers):
         count -= p.held[c, index // p.stride[c] % p.n[c], code]
     return count

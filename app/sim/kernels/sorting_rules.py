@@ -5,8 +5,7 @@ rules prefer, in this order:
 
 1. tower to tower, where the object is wanted: nothing is risked;
 2. clutter to tower, the least risky twin of all that are wanted: it frees a good cell;
-3. tower to a tower where the object waits, where that costs no move: its next pick is safe;
-4. tower to clutter: of the removals the one whose object will be picked again at the least
+3. tower to clutter: of the removals the one whose object will be picked again at the least
    risk, into the best free cell; into the worst one if it will not be picked again.
 """
 
@@ -38,7 +37,7 @@ def safest_cell(code: int, clutter: Bytes, fail: Vec) -> int:
 
 
 @kernel()
-def _worst_free(clutter: Bytes, fail: Vec) -> int:
+def worst_free(clutter: Bytes, fail: Vec) -> int:
     """Return the most risky free cell, -1 where none is free."""
     worst = -1
     for k in range(len(clutter)):
@@ -65,30 +64,29 @@ def _next_risk(code: int, wanted: int, clutter: Bytes, fail: Vec, free: int) -> 
     With ``wanted`` picks to come, the object in the cell ``free`` and its twins serve them from
     the least risky on: what counts is the last one's risk.
     """
-    if wanted == 0:
-        return -1.0
     last = -1.0
-    for _ in range(wanted):
-        following = 2.0
-        for k in range(len(clutter)):
-            if (k == free or clutter[k] == code) and last < fail[k] < following:
-                following = fail[k]
-        if following > 1.0:
-            break
-        last = following
+    for k in range(len(clutter)):
+        if k != free and clutter[k] != code:
+            continue
+        safer = 0
+        for j in range(len(clutter)):
+            if j == free or clutter[j] == code:
+                safer += fail[j] < fail[k]
+        if safer < wanted and fail[k] > last:
+            last = fail[k]
     return last
 
 
 @kernel()
 def _cell_for(code: int, wanted: int, clutter: Bytes, fail: Vec) -> int:
-    """Return the cell for an object that is removed: the best one if it will be picked there."""
+    """Return the cell for a removed object: the best one if it will be picked there."""
     free = safest_cell(0, clutter, fail)
     if free < 0:
         return -1
     safer = 0
     for k in range(len(clutter)):
         safer += clutter[k] == code and fail[k] <= fail[free]
-    return free if wanted > safer else _worst_free(clutter, fail)
+    return free if wanted > safer else worst_free(clutter, fail)
 
 
 @kernel()
@@ -109,7 +107,7 @@ def _transfer(index: int, p: Progress) -> int:
 
 @kernel()
 def _placement(index: int, clutter: Bytes, fail: Vec, p: Progress) -> int:
-    """Return the least risky placement of a shortest plan as ``k * C + c``, -1 where none is."""
+    """Return the least risky placement of a shortest plan as ``k * C + c``, -1 if none is."""
     n_towers = len(p.at)
     best, least = NONE, 2.0
     for c in range(n_towers):

@@ -1,0 +1,64 @@
+"""Live sorting cells with given blocks, nobody in the robot's way."""
+
+from collections.abc import Callable, Mapping, Sequence
+
+from app.sim import commands
+from app.sim.cells import load_cell
+from app.sim.ports import SortingValues, TaskPolicy
+from app.sim.snapshot import WorldSnapshot
+from app.sim.sorting_commands import AddObject, RemoveObject, SetGoal
+from app.sim.sorting_world import SortingWorld
+from tests.straight_policy import StraightPolicy
+
+LOOK = 3
+"""Ticks between two looks."""
+Goal = Mapping[str, Sequence[str]]
+
+
+def empty_world(
+    policy: TaskPolicy | None = None, seed: int = 1, sorter: SortingValues | None = None
+) -> SortingWorld:
+    """Return a world without blocks, whose person stands back."""
+    cell = load_cell("sorting-e0")
+    world = SortingWorld(cell, policy or StraightPolicy(cell), seed, sorter=sorter)
+    world.apply(commands.MoveHuman(pelvis=(0.0, 2.4, -1.57)))
+    world.apply(SetGoal(towers={}))
+    for piece in world.snapshot().sorting.pieces:
+        world.apply(RemoveObject(id=piece.id))
+    for _ in range(40):
+        world.step()
+    return world
+
+
+def lay(world: SortingWorld, blocks: Mapping[str, str], goal: Goal) -> dict[str, str]:
+    """Add blocks (kind by place) and set the goal; return the blocks' ids by place."""
+    for place, kind in blocks.items():
+        colour, size = kind.split("-")
+        world.apply(AddObject(colour=colour, size=size, at=place))
+    world.apply(SetGoal(towers={name: tuple(sizes) for name, sizes in goal.items()}))
+    return {one.place: one.id for one in world.snapshot().sorting.pieces}
+
+
+def until(
+    world: SortingWorld, holds: Callable[[WorldSnapshot], bool], limit: int = 3000
+) -> WorldSnapshot:
+    """Step until ``holds``; return the snapshot of then."""
+    for _ in range(limit // LOOK):
+        for _ in range(LOOK):
+            world.step()
+        if holds(snapshot := world.snapshot()):
+            return snapshot
+    raise AssertionError(f"it never happened: {snapshot.message}")
+
+
+def solved(snapshot: WorldSnapshot) -> bool:
+    return snapshot.status == "solved"
+
+
+def towers(snapshot: WorldSnapshot) -> dict[str, list[str]]:
+    """Return the kinds on the towers from the bottom."""
+    found: dict[str, list[str]] = {"red": [], "blue": []}
+    for one in sorted(snapshot.sorting.pieces, key=lambda piece: piece.level):
+        if one.place in found:
+            found[one.place].append(f"{one.colour}-{one.size}")
+    return found
