@@ -106,7 +106,7 @@ def nearness(n_tasks: int, seed: int) -> Json:
 def times(n_cells: int, n_colours: int, on_towers: float, seed: int) -> Json:
     """Return the CPU time of plans of one size [ms]."""
     shape, rng = SortingShape(n_cells=n_cells, n_colours=n_colours), np.random.default_rng(seed)
-    n = 200 if n_cells < 40 else 20
+    n = 200 if n_cells < 40 else 10
     states = [random_task(shape, rng, n_cells, on_towers) for _ in range(n)]
     goals = [(state.goal != 0).sum(axis=1) for state in states]
     rows = [
