@@ -2,9 +2,9 @@
 
     python docs/sorting_plots.py
 
-Writes ``docs/img/sorting/grid-e0.png`` and ``grid-e1.png``, heat maps of success and return over
-all pairs (K_E, K_G) as in the source's fig. 3.2, and ``curves-e0.png``, ``curves-e1.png``, learning
-curves as in its fig. 3.1. What has no result yet is not drawn.
+Writes ``docs/img/sorting/grid-e0.png`` and ``grid-e1.png``, heat maps of success and return
+over all pairs (K_E, K_G) as in the source's fig. 3.2, and ``curves-e0.png``, ``curves-e1.png``,
+learning curves as in its fig. 3.1. What has no result yet is not drawn.
 """
 
 import json
@@ -28,8 +28,8 @@ from docs.world_plots import BLUE, GREEN, GREY, ORANGE, RED, panels, save  # noq
 
 RESULTS, IMAGES = ROOT / "docs/results", ROOT / "docs/img/sorting"
 TASKS = ("e0", "e1")
-STARTS = {"clean": "everything in the clutter", "disturbed": "junk on towers, goals begun"}
-"""Rows of the heat maps, in words."""
+STARTS = ("clean", "disturbed")
+"""Rows of the result that are drawn, one below the other."""
 FLOOR = 0.95
 """Success that has the warmest colour, or less."""
 MISSES = LinearSegmentedColormap.from_list(
@@ -43,7 +43,7 @@ Grid = NDArray[np.float64]
 
 
 def grids(row: Json) -> tuple[Grid, Grid]:
-    """Return success and return of a row by (K_G - 1, K_E - 1), not a number where no pair is."""
+    """Return success and return of a row by (K_G - 1, K_E - 1); NaN where no pair is."""
     size = max(one["n_objects"] for one in row["pairs"])
     success, returns = np.full((size, size), np.nan), np.full((size, size), np.nan)
     for one in row["pairs"]:
@@ -59,10 +59,12 @@ def heat_maps(result: Json) -> Figure:
     returns = np.stack([both[1] for both in found.values()])
     spread = Normalize(float(np.nanmin(returns)), float(np.nanmax(returns)))
     figure, axes = panels(2, 2, 8.4)
-    for k, (name, told) in enumerate(STARTS.items()):
-        mean = 100.0 * rows[name]["success"]["mean"]
-        left = f"{name.capitalize()}: success {mean:.2f} %"
-        maps = ((left, MISSES, Normalize(FLOOR, 1.0)), (told, colormaps["cividis"], spread))
+    for k, name in enumerate(STARTS):
+        starts, mean = f"{name.capitalize()} starts", 100.0 * rows[name]["success"]["mean"]
+        maps = (
+            (f"{starts}: success {mean:.2f} %", MISSES, Normalize(FLOOR, 1.0)),
+            (f"{starts}: return", colormaps["cividis"], spread),
+        )
         for column, (title, colours, norm) in enumerate(maps):
             image = _heat_map(axes[k, column], found[name][column], colours, norm)
             axes[k, column].set_title(title)
@@ -90,7 +92,7 @@ def _scale(figure: Figure, image: Any, success: bool, where: Json) -> None:
     bar.set_label("success rate" if success else "mean return per episode, not discounted")
     bar.outline.set_visible(False)
     if success:
-        bar.ax.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
+        bar.ax.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))
 
 
 def _name_misses(axis: Axes, grid: Grid) -> None:
@@ -101,16 +103,17 @@ def _name_misses(axis: Axes, grid: Grid) -> None:
         axis.text(
             k_e + 1,
             k_g + 1,
-            f"{100.0 * value:.1f}".removesuffix(".0"),
+            f"{np.floor(1000.0 * value + 1e-6) / 10.0:.1f}",
             ha="center",
             va="center",
             fontsize=4.6 if small else 7.5,
             color="white" if value < 0.5 * (1.0 + FLOOR) - 0.01 else "#1f2937",
         )
+    perfect, pairs = int((grid == 1.0).sum()), int(np.isfinite(grid).sum())
     axis.text(
         0.03,
         0.97,
-        f"{int((grid == 1.0).sum())} of {int(np.isfinite(grid).sum())} pairs\nwithout a failure",
+        f"{perfect} of {pairs} pairs\nwithout a failure",
         transform=axis.transAxes,
         va="top",
         color="#374151",
@@ -137,10 +140,11 @@ def curves(found: Sequence[Json]) -> Figure:
     for axis in (steps, seconds):
         axis.axhline(0.9, color=RED, lw=0.8, ls=":")
         axis.set(ylim=(0.0, 1.02))
-        axis.yaxis.set_major_formatter(PercentFormatter(1.0))
+        axis.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))
     steps.set(xscale="log", xlabel="environment steps", title="Success over steps")
     seconds.set(xscale="log", xlabel="CPU time of the training [s]", title="... and over time")
     rewards.set(xscale="log", xlabel="environment steps", title="Return per episode")
+    seconds.xaxis.set_major_formatter(FuncFormatter(lambda value, _place: f"{value:,.0f}"))
     for axis in (steps, rewards):
         axis.xaxis.set_major_formatter(FuncFormatter(_short))
     figure.legend(loc="outside lower center", ncols=min(4, len(named)))

@@ -14,6 +14,7 @@ from app.__main__ import main, parsed_sets, table
 from app.errors import InvalidInput
 from app.listening import address_of, listen
 from tests import workshop
+from tests.policies.evaluation.sorting_players import untrained
 from tests.sim.recorded_person import csv_text, working
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -152,6 +153,32 @@ def test_evaluation_prints_one_json_object(
     assert {"mean", "low", "high"} <= result["results"][0]["success"].keys()
     assert result["machine"]["cores"] >= 1
     assert "policy" in table(result)
+
+
+def test_sorting_of_a_policy_file_prints_one_json_object_and_a_table_without_pairs(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("TANDEM_DATA", str(tmp_path))
+    policy, path = untrained(), tmp_path / "policy.safetensors"
+    path.write_bytes(policy.tensors)
+    path.with_suffix(".json").write_text(json.dumps(policy.manifest))
+    call = ["evaluate", "sorting-grid", "--checkpoint", str(path), "--episodes", "1"]
+    assert main([*call, "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert (result["protocol"], result["episodes"]) == ("sorting-grid", 1)
+    assert result["checkpoint"] == policy.sha256
+    row = result["results"][0]
+    assert (row["name"], row["n"], len(row["pairs"])) == ("clean", 55, 55)
+    assert {"mean", "low", "high"} <= row["worst_pair"].keys()
+    assert "pairs_below" in table(result) and "'n_goal'" not in table(result)
+
+
+def test_a_policy_that_picks_cannot_be_measured_at_sorting(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("TANDEM_DATA", str(tmp_path))
+    assert main(["evaluate", "sorting-grid", "--checkpoint", "pick", "--episodes", "1"]) == 2
+    assert "must be a policy that sorts for sorting-grid" in capsys.readouterr().err
 
 
 @pytest.fixture

@@ -43,7 +43,7 @@ class ClutterView:
         mesh = tile(width - GAP, depth - GAP)
         self._tiles, self._labels = [], []
         for index, (x, y) in enumerate(points.tolist()):
-            body = scene.add_mesh_simple(
+            surface = scene.add_mesh_simple(
                 f"/clutter/{index}",
                 np.asarray(mesh.vertices),
                 np.asarray(mesh.faces),
@@ -61,7 +61,7 @@ class ClutterView:
                 depth_test=True,
                 visible=False,
             )
-            self._tiles.append(body)
+            self._tiles.append(surface)
             self._labels.append(label)
         self._shown: tuple[tuple[float, ...], bool] | None = None
 
@@ -70,9 +70,9 @@ class ClutterView:
         if (failure, chances) == self._shown:
             return
         self._shown = failure, chances
-        for body, label, chance in zip(self._tiles, self._labels, failure, strict=True):
-            if tuple(body.color) != (color := failure_color(chance)):
-                body.color = color
+        for surface, label, chance in zip(self._tiles, self._labels, failure, strict=True):
+            if tuple(surface.color) != (color := failure_color(chance)):
+                surface.color = color
             if label.text != (text := f"{100.0 * chance:.0f} %"):
                 label.text = text
             if label.visible != chances:

@@ -38,7 +38,7 @@ def create(
     ] = None,
 ) -> JobPublic:
     """Queue a training or an evaluation; ``Location`` says where to follow it."""
-    if isinstance(body, EvaluateJobCreate):
+    if isinstance(body, EvaluateJobCreate) and body.checkpoint is not None:
         services.checkpoints.check(body.checkpoint)
     new = body.to_domain()
     if isinstance(body, EvaluateJobCreate):

@@ -204,7 +204,7 @@ SORTING_PRESETS = (
     SortingPreset(
         name="sorting-e1-dqn-pure",
         cell="sorting-e1",
-        total_steps=2_560_000,
+        total_steps=2_048_000,
         batch_size=384,
         width=192,
         solved_episodes=0.2,

@@ -1,8 +1,9 @@
 """Who chooses the moves of a live sorting cell: the sorter's policy, watched, or the planner.
 
-A decision is made anew whenever an attempt is over or a person changed something. Twins are
-blocks of one code in clutter cells whose grasps fail about as often (ALIKE): the sorter calls
-them equal, so the motion policy's critic may take any of them.
+A decision is made anew whenever an attempt is over or a person changed something. Where the
+sorter calls moves equal the motion policy's critic may take any of them: twins in clutter cells
+whose grasps fail about as often (ALIKE), and other first moves of shortest plans that are worth
+as much (MARGIN).
 
 Source: METHOD 1.4, 3.1 and 4 (the critic's values used for the symbolic choice as well).
 """
@@ -19,6 +20,8 @@ from app.sim.sorting_watch import SortingWatch, note_move, state_key
 
 ALIKE = 0.02
 """Difference of failure probabilities up to which twins count as equal."""
+MARGIN = 0.01
+"""Difference up to which moves are worth as much: of Q, or of the planner's attempts."""
 HAND_OVER: tuple[Why, ...] = ("repeated", "patience")
 """Reasons that mean that the planner took over from a policy that may decide here."""
 
@@ -31,8 +34,8 @@ class Choice:
     """From where to where."""
     block: Block
     """The block that is meant."""
-    twins: tuple[Block, ...]
-    """Blocks that may be taken as well as it, itself included, in the order of their cells."""
+    options: tuple[tuple[Block, Move], ...]
+    """Blocks that may be taken as well, each with its move; itself first."""
     back: bool = False
     """Whether a held block is only put back where it counts."""
 
@@ -94,7 +97,10 @@ class LiveSorter:
         move = self._move_of(decision)
         block = table.top(move.pick)
         assert block is not None
-        return Choice(move=move, block=block, twins=_twins(table, move, block))
+        options = (
+            {block: move} | _twins(table, move, block) | self._equal(table, decision, move)
+        )
+        return Choice(move=move, block=block, options=tuple(options.items()))
 
     def _decide(self, table: SortingTable) -> SortingDecision:
         if self._attempted:  # Otherwise the same question is asked again.
@@ -106,6 +112,20 @@ class LiveSorter:
             self.hand_overs += 1
         return decision
 
+    def _equal(
+        self, table: SortingTable, decision: SortingDecision, move: Move
+    ) -> dict[Block, Move]:
+        """Return other blocks whose moves begin a shortest plan and are worth as much."""
+        values = {one.move: one.value for one in decision.ranked if one.fewest}
+        best, found = values.get(move), dict[Block, Move]()
+        for other, value in values.items():
+            block = table.top(other.pick)
+            if block is None or other.pick in (move.pick, *self._avoid):
+                continue
+            if best is not None and value is not None and abs(value - best) <= MARGIN:
+                found.setdefault(block, other)
+        return found
+
     def _move_of(self, decision: SortingDecision) -> Move:
         """Return the best move, or one as short in place of one that was not reached."""
         others = [
@@ -115,15 +135,16 @@ class LiveSorter:
         return others[0].move if best.move.pick in self._avoid and others else best.move
 
 
-def _twins(table: SortingTable, move: Move, block: Block) -> tuple[Block, ...]:
+def _twins(table: SortingTable, move: Move, block: Block) -> dict[Block, Move]:
+    """Return blocks like the one in a clutter cell that fail about as often."""
     if move.pick >= table.shape.n_cells:
-        return (block,)
+        return {}
     fail = table.fail[move.pick]
-    return tuple(
-        one
+    return {
+        one: Move(k, move.place)
         for k, one in enumerate(table.clutter)
         if one is not None and one.code == block.code and abs(table.fail[k] - fail) <= ALIKE
-    )
+    }
 
 
 def _for_held(table: SortingTable, decision: SortingDecision, kept: Move | None) -> Choice:
@@ -132,7 +153,8 @@ def _for_held(table: SortingTable, decision: SortingDecision, kept: Move | None)
     assert block is not None
 
     def going(place: int, *, back: bool = False) -> Choice:
-        return Choice(move=Move(seat, place), block=block, twins=(block,), back=back)
+        move = Move(seat, place)
+        return Choice(move=move, block=block, options=((block, move),), back=back)
 
     own = [one for one in decision.ranked if one.move.pick == seat]
     if kept is not None and _is_fewest(own, kept.place):

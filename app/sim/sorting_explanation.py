@@ -7,7 +7,6 @@ from app.sim.sorting_table import Block, SortingTable
 from app.sim.sorting_view import Phase
 
 NO_GOAL = "Nothing to do: click blocks to put them into the goal."
-MAKES_ROOM = "Makes room: a person is near where the robot wants to work."
 DONE = "Done: every tower is as the goal asks."
 
 
@@ -76,8 +75,8 @@ class Teller:
     def _twin(self, choice: Choice) -> str:
         """Return what is said about blocks like the one that is taken."""
         table = self._table
-        if len(choice.twins) > 1:
-            return f" Of {len(choice.twins)} alike it is the easier one to reach now."
+        if len(choice.options) > 1:
+            return f" Of {len(choice.options)} that are as good it is the easiest to reach now."
         if choice.move.pick >= table.shape.n_cells:
             return ""
         least = table.fail[choice.move.pick]

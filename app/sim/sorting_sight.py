@@ -59,7 +59,7 @@ def view_of(sight: Sight) -> SortingView:
         move=None if choice is None else _current(sight, choice),
         phase=sight.phase,
         decided_by=None if choice is None or decision is None else decision.by,
-        twins=() if choice is None else tuple(one.id for one in choice.twins),
+        twins=() if choice is None else tuple(block.id for block, _ in choice.options),
         ranked=tuple(_ranked(table, one) for one in ranked),
         moves_to_go=0 if decision is None else decision.fewest_moves,
         attempts_to_go=0.0 if decision is None else decision.expected_attempts,

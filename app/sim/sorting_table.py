@@ -244,6 +244,12 @@ class SortingTable:
         self._wanted = tuple(one for one in self._wanted if one not in there) + tuple(now)
         self._changed()
 
+    def begin(self, state: SortingState) -> None:
+        """Begin with a state, all blocks new."""
+        self.clutter = [None] * self.shape.n_cells
+        self.towers = [[] for _ in range(self.shape.n_colours)]
+        self.adopt(state)
+
     def adopt(self, state: SortingState) -> None:
         """Make the table what a state says; blocks that stay where they were keep their ids."""
         for k, code in enumerate(state.clutter.tolist()):

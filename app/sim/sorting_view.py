@@ -115,7 +115,7 @@ class SortingView:
     decided_by: Decider | None
     """Who chose it; None while nothing is carried out."""
     twins: tuple[str, ...]
-    """Ids of the pieces that the sorter calls equal; among two or more the critic chose."""
+    """Ids of the pieces whose moves the sorter calls equal; of two or more the critic chose."""
     ranked: tuple[MoveView, ...]
     """The best valid moves, best first, at most MAX_RANKED."""
     moves_to_go: int

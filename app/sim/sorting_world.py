@@ -7,8 +7,7 @@ cell's probability, drawn from (seed, task, attempt). After every attempt, and w
 changed blocks, goal or sorter, the sorter decides anew; a block at the magnet goes on, goes
 elsewhere, or back to where it counts (``sorting_table.py``).
 
-A person nearer than NEAR_M breaks inverse kinematics off: the robot draws back toward home
-until there is ROOM_M; the policy was trained to reach a target, not to wait at it.
+A person nearer than NEAR_M breaks inverse kinematics off, and the policy goes on.
 With nothing to do the robot goes home. A motion that takes longer than TIME_LIMIT_S begins
 again, for another block if one is as good; from less than SHORT_WAY_M it is then ended by
 inverse kinematics. After a contact the robot starts again from home, and a held block falls
@@ -31,19 +30,15 @@ from app.sim.ports import Candidate, SortingValues, TaskPolicy, Vec
 from app.sim.snapshot import Counters, Status, WorldSnapshot
 from app.sim.sorting_cell import above, reaching_cell
 from app.sim.sorting_descent import Descent
-from app.sim.sorting_explanation import DONE, MAKES_ROOM, NO_GOAL, Teller
+from app.sim.sorting_explanation import DONE, NO_GOAL, Teller
 from app.sim.sorting_sight import Sight, view_of
-from app.sim.sorting_state import NULL, Move
+from app.sim.sorting_state import NULL
 from app.sim.sorting_table import SortingTable
 from app.sim.sorting_trial import SortingTrial, random_task
 from app.sim.sorting_view import Phase, SortingCounters
 
 SHORT_WAY_M = 0.35
 """Distance from which a motion that took too long is ended by inverse kinematics [m]."""
-ROOM_M = 0.35
-"""Clearance from which on a robot that drew back goes on [m]."""
-HOME_RAD = 0.02
-"""Joint error at which the robot counts as at home [rad]."""
 
 
 class SortingWorld:
@@ -72,8 +67,7 @@ class SortingWorld:
         self._sorter = LiveSorter(sorter)
         self._choice: Choice | None = None
         self._descent: Descent | None = None
-        self._drawing_back = False
-        self._n_tasks = 0
+        self._n_tasks = self._version = 0
         self._reset()
 
     # Starts and ends.
@@ -85,7 +79,7 @@ class SortingWorld:
             person.start(None)
         start = random_task(self._table.shape, self._table.fail, self._seed, self._n_tasks)
         self._begin_task(None)
-        self._table.adopt(start)
+        self._table.begin(start)
         self._stage.forget_note()
         self._restart_robot()
 
@@ -152,7 +146,7 @@ class SortingWorld:
         trial = SortingTrial(name, (self._seed, self._n_tasks))
         state = trial.start(self._table.shape, self._table.fail)
         self._begin_task(trial)
-        self._table.adopt(state)
+        self._table.begin(state)
         self._stage.paused = False
         self._stage.tell(trial.text)
         self._changed()
@@ -170,12 +164,13 @@ class SortingWorld:
         if old is not None:
             new = self._sorter.choose(self._table, old.move)
             if self._is_same(descent, old, new):
+                self._version = self._table.version
                 return
         self._choice = None
         descent.begin("up", self._stage.status_s)
 
     def _is_same(self, descent: Descent, old: Choice, new: Choice | None) -> bool:
-        if new is None or new.move.place != old.move.place or old.block not in new.twins:
+        if new is None or (old.block, old.move) not in new.options:
             return False
         if descent.phase == "grasp":
             point = self._table.point_of(old.block)
@@ -216,17 +211,15 @@ class SortingWorld:
     def _move_robot(self, human_q: Vec, sizes: Vec) -> None:
         """Carry out the action, the people having moved from ``human_q`` with ``sizes``."""
         stage, descent = self._stage, self._descent
-        straight = descent is not None or self._goes_home
+        straight = descent is not None or stage.decision is None
         found = stage.robot.advance(
             self._action(), stage.people, human_q, sizes, straight=straight
         )
         if found.kind != "none":
-            self._descent, self._drawing_back = None, False
+            self._descent = None
             stage.note_contact(found)
         elif descent is not None:
             self._follow(descent)
-        elif self._drawing_back:
-            self._look_for_room()
         elif stage.decision is not None:
             stage.time_left -= stage.robot.dt
             self._judge(stage.decision.index)
@@ -237,27 +230,11 @@ class SortingWorld:
         if self._descent is not None:
             aim = self._descent.aim(stage.robot.tcp())
             return stage.robot.toward(stage.robot.posture_at(aim)[0])
-        if self._goes_home:
+        if self._choice is None and stage.policy is not None:
             return stage.robot.toward(stage.robot.home)
         if stage.decision is not None:
             return np.asarray(stage.decision.actions[stage.decision.index], dtype=np.float64)
         return np.zeros(5)
-
-    @property
-    def _goes_home(self) -> bool:
-        """Whether the robot goes home, or toward it to make room."""
-        return self._drawing_back or (self._choice is None and self._stage.policy is not None)
-
-    def _draw_back(self) -> None:
-        self._begin_motion()
-        self._drawing_back = True
-
-    def _look_for_room(self) -> None:
-        """Begin the motion again where there is room, or nowhere else to go."""
-        robot = self._stage.robot
-        room = robot.clearance_m is None or robot.clearance_m > ROOM_M
-        if room or np.abs(robot.q - robot.home).max() < HOME_RAD:
-            self._begin_motion()
 
     # Halves of a move.
 
@@ -265,10 +242,11 @@ class SortingWorld:
         """Decide on the next move and begin its motion."""
         kept = self._choice.move if self._choice is not None else None
         self._choice = self._sorter.choose(self._table, kept)
+        self._version = self._table.version
         self._begin_motion(status)
 
     def _begin_motion(self, status: Status = "moving") -> None:
-        self._descent, self._drawing_back = None, False
+        self._descent = None
         self._stage.enter(status)
         self._stage.begin_motion()
         self._decide()
@@ -279,12 +257,9 @@ class SortingWorld:
         target = stage.offered[index]
         late = stage.time_left <= 0.0
         short = np.linalg.norm(stage.robot.tcp() - target.position) < SHORT_WAY_M
-        if stage.robot.reached(target.position) or (late and short):
-            if stage.near:
-                self._draw_back()
-            else:
-                stage.count(reached=1)
-                self._go_down(target.id)
+        if not stage.near and (stage.robot.reached(target.position) or (late and short)):
+            stage.count(reached=1)
+            self._go_down(target.id)
         elif late:
             self._give_up()
 
@@ -304,12 +279,11 @@ class SortingWorld:
         table, choice = self._table, self._choice
         assert choice is not None
         if table.held is not None:
-            descent = Descent(self._table.point_at(choice.move.place), "place")
+            descent = Descent(table.point_at(choice.move.place), "place")
         else:
-            block = next(one for one in choice.twins if one.id == name)
-            pick, level = table.place_of(block)
-            self._choice = replace(choice, block=block, move=Move(pick, choice.move.place))
-            descent = Descent(table.point(pick, level), "grasp")
+            block, move = next(one for one in choice.options if one[0].id == name)
+            self._choice = replace(choice, block=block, move=move)
+            descent = Descent(table.point(*table.place_of(block)), "grasp")
         self._descent = descent
         self._stage.enter("picking")
 
@@ -317,11 +291,9 @@ class SortingWorld:
         """Go on with a way down and up."""
         stage = self._stage
         tcp, over = stage.robot.tcp(), descent.is_over(stage.robot.tcp(), stage.status_s)
-        if descent.step == "down" and stage.near:
-            self._draw_back()
-        elif descent.step == "down" and descent.is_down(tcp):
+        if descent.step == "down" and not stage.near and descent.is_down(tcp):
             self._touch_down(descent)
-        elif descent.step == "down" and over:
+        elif descent.step == "down" and (over or stage.near):
             self._begin_motion()
         elif descent.step == "hold" and over:
             descent.begin("up", stage.status_s)
@@ -355,7 +327,8 @@ class SortingWorld:
         self._stage.tell(self._teller.missed(choice.block, risk))
 
     def _after_rise(self) -> None:
-        if self._table.held is not None and self._choice is not None:
+        same = self._version == self._table.version
+        if self._table.held is not None and self._choice is not None and same:
             self._begin_motion()
         else:
             self._think()
@@ -381,6 +354,14 @@ class SortingWorld:
             return "idle"
         return "carry" if self._table.held is not None else "approach"
 
+    def _chosen(self) -> Choice | None:
+        """Return the move with the block that the critic goes for now."""
+        choice, decision = self._choice, self._stage.decision
+        if choice is None or decision is None or self._phase != "approach":
+            return choice
+        found = [one for one in choice.options if one[0].id == decision.chosen]
+        return replace(choice, block=found[0][0], move=found[0][1]) if found else choice
+
     def _candidates(self) -> tuple[Candidate, ...]:
         choice, table = self._choice, self._table
         if choice is None:
@@ -389,7 +370,7 @@ class SortingWorld:
             name = table.names.stations[choice.move.place]
             point = above(self._table.point_at(choice.move.place))
             return (Candidate(id=name, position=point),)
-        points = [(one.id, self._table.point_of(one)) for one in choice.twins]
+        points = [(block.id, table.point_of(block)) for block, _ in choice.options]
         return tuple(
             Candidate(id=id, position=above(point)) for id, point in points if point is not None
         )
@@ -420,10 +401,8 @@ class SortingWorld:
             return explanation.touched(stage.contact, final=False)
         if stage.note is not None and status != "blocked":
             return stage.note
-        if self._drawing_back and status == "moving":
-            return MAKES_ROOM
-        if status in ("moving", "picking") and self._choice is not None:
-            return self._teller.doing(self._phase, self._choice, self._sorter)
+        if status in ("moving", "picking") and (chosen := self._chosen()) is not None:
+            return self._teller.doing(self._phase, chosen, self._sorter)
         if status == "solved":
             return DONE
         if status == "no candidates":
@@ -437,7 +416,7 @@ class SortingWorld:
         sight = Sight(
             table=self._table,
             sorter=self._sorter,
-            choice=self._choice,
+            choice=self._chosen(),
             phase=self._phase,
             counters=replace(self._counts, hand_overs=self._sorter.hand_overs),
             test=None if self._trial is None else self._trial.name,

@@ -135,6 +135,18 @@ def test_policy_decides_by_its_greatest_value(client: TestClient, sorter: str) -
     assert by_alias["moves"] == answer["moves"]
 
 
+def test_shipped_policy_of_the_cell_decides_where_none_is_named(client: TestClient) -> None:
+    shipped = client.get("/v1/checkpoints/sorting-e0").json()["sha256"]
+    task, deciders = TASK, []
+    for _ in range(4):
+        answer = asked(client, task)
+        assert answer["checkpoint"] == shipped
+        deciders.append(answer["by"])
+        task = {**carried_out(task, answer["move"]), "watch": answer["watch"]}
+    assert asked(client, task)["solved"]
+    assert deciders == ["policy"] * 4
+
+
 @pytest.mark.usefixtures("sorter")
 def test_planner_takes_over_and_the_goal_is_reached(client: TestClient) -> None:
     task: dict[str, Any] = {**TASK, "checkpoint": ALIAS}

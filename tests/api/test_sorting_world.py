@@ -21,11 +21,15 @@ def sorting_cell(client: TestClient) -> Iterator[None]:
 
 @pytest.fixture(autouse=True)
 def at_rest(client: TestClient) -> None:
-    """Hold the clock and empty the goal, so that blocks stay where they are."""
+    """Draw a new task and empty its goal, so that blocks stay where they are."""
+    before = pieces(client.get(WORLD).json())
     send(client, tag="resume")
     send(client, tag="reset")
     send(client, tag="set-goal", towers={})
-    until(client, lambda world: world["sorting"]["goal"] == [])
+    until(
+        client,
+        lambda now: now["sorting"]["goal"] == [] and not before.keys() & pieces(now).keys(),
+    )
 
 
 def send(client: TestClient, **command: Any) -> Any:

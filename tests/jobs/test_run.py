@@ -18,6 +18,7 @@ from jobs.spec import new_job
 from jobs.supervisor import Supervisor
 from tests import workshop
 from tests.jobs.machinery import PATIENCE, wait_for, wait_until_final, worker_pids
+from tests.policies.evaluation.sorting_players import untrained
 from tests.sim.recorded_person import csv_text, working
 
 TINY = {
@@ -140,3 +141,24 @@ def test_evaluation_beside_a_motion_that_is_gone_fails_by_name(store: Store) -> 
     job = wait_until_final(store, jobs.create_job(store, spec).id)
     assert job.state == "failed"
     assert "motions[0] = 'waves' is no stored motion" in (job.error or "")
+
+
+@pytest.mark.usefixtures("supervisor")
+def test_evaluation_of_sorting_tells_row_by_row_and_refuses_a_policy_that_picks(
+    store: Store,
+) -> None:
+    ids = []
+    for policy in (untrained(), pretrained.load("pick")):
+        stored = NewCheckpoint(
+            sha256=policy.sha256, manifest=policy.manifest, tensors=policy.tensors
+        )
+        checkpoints.put_checkpoint(store, stored)
+        body = {"kind": "evaluate", "protocol": "sorting-tests", "episodes": 2}
+        spec = new_job({**body, "checkpoint": policy.sha256})
+        ids.append(jobs.create_job(store, spec).id)
+    sorts, picks = (wait_until_final(store, one) for one in ids)
+    assert (sorts.state, sorts.error, sorts.step) == ("succeeded", None, 12)
+    assert sorts.result is not None
+    assert len(metrics.list_metrics(store, sorts.id)) == len(sorts.result["results"]) == 12
+    assert picks.state == "failed"
+    assert "must be a policy that sorts for sorting-tests" in (picks.error or "")

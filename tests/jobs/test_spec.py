@@ -139,3 +139,22 @@ def test_bad_motions_of_an_evaluation_name_field_and_rule(
 def test_evaluation_beside_recorded_people_without_motions_is_refused() -> None:
     with pytest.raises(InvalidInput, match="must hold at least one motion for pick-mocap"):
         new_job({"kind": "evaluate", "protocol": "pick-mocap"})
+
+
+@pytest.mark.parametrize(
+    ("protocol", "checkpoint"),
+    [("pick-single", "pick"), ("sorting-grid", "sorting-e0"), ("sorting-tests", "sorting-e0")],
+)
+def test_a_protocol_measures_its_own_policy_unless_another_is_named(
+    protocol: str, checkpoint: str
+) -> None:
+    spec = parse_spec({"kind": "evaluate", "protocol": protocol})
+    assert isinstance(spec, EvaluateSpec)
+    assert (spec.protocol, spec.checkpoint) == (protocol, checkpoint)
+
+
+def test_episodes_of_a_pair_are_fewer_than_those_of_a_whole_protocol() -> None:
+    body = {"kind": "evaluate", "protocol": "sorting-grid", "episodes": 10_001}
+    with pytest.raises(InvalidInput, match=r"\[1, 10000\]"):
+        parse_spec(body)
+    parse_spec({**body, "protocol": "pick-single"})

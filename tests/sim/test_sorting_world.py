@@ -106,6 +106,17 @@ def test_place_that_somebody_fills_while_the_robot_puts_a_block_down_is_not_used
     assert len(set(places)) == len(places) == 3
 
 
+def test_goal_that_changes_while_the_tool_rises_with_a_block_is_followed() -> None:
+    world = empty_world()
+    ids = lay(world, {"cell5": "red-large", "cell9": "blue-small"}, {"red": ("large",)})
+    until(world, lambda now: any(one.held for one in now.sorting.pieces))
+    assert world.snapshot().sorting.phase == "grasp"
+    world.apply(MoveObject(id=ids["cell9"], to="red"))
+    world.apply(SetGoal(towers={"blue": ("small",), "red": ("large",)}))
+    end = until(world, solved)
+    assert towers(end) == {"red": ["red-large"], "blue": ["blue-small"]}
+
+
 def test_grasps_fail_as_often_as_the_cell_says() -> None:
     attempts = failures = 0
     for seed in range(3):
@@ -237,14 +248,32 @@ def test_contact_lets_a_held_block_fall_back_where_it_came_from() -> None:
     assert after.sorting.counters.moves == 0
 
 
-def test_robot_draws_back_from_a_hand_at_its_target_and_comes_again() -> None:
+def test_nothing_is_grasped_while_a_hand_is_near() -> None:
     world = empty_world()
     lay(world, {"cell5": "red-large"}, {"red": ("large",)})
     world.apply(commands.MoveHuman(pelvis=(-0.5, 1.12, -1.57)))
     world.apply(commands.MoveHuman(right=(-0.55, 0.78, 0.1), left=(-0.5, 0.85, 0.1)))
-    until(world, lambda now: now.message.startswith("Makes room"))
+    for _ in range(200):
+        world.step()
+    now = world.snapshot()
+    assert now.clearance_m < 0.25
+    assert now.sorting.counters.attempts == 0
     world.apply(commands.MoveHuman(pelvis=(0.0, 2.4, -1.57)))
     assert towers(until(world, solved))["red"] == ["red-large"]
+
+
+def test_critic_may_choose_which_tower_comes_first() -> None:
+    world = empty_world()
+    ids = lay(
+        world,
+        {"cell5": "red-large", "cell9": "blue-large"},
+        {"red": ("large",), "blue": ("large",)},
+    )
+    going = until(world, phase("approach"))
+    assert set(going.sorting.twins) == set(ids.values())
+    end = until(world, solved)
+    assert towers(end) == {"red": ["red-large"], "blue": ["blue-large"]}
+    assert end.sorting.counters.moves == 2
 
 
 def test_robot_goes_home_with_nothing_to_do() -> None:

@@ -123,7 +123,7 @@ def add_final(
     for row in np.flatnonzero(done):
         final_obs[row] = last[row].copy()
     final: dict[str, Any] = {
-        "outcome": np.where(done, outcome, None),
+        "outcome": np.where(done, outcome.astype(object), np.array(None, dtype=object)),
         "episode_number": np.where(done, episode - 1, 0),
     }
     for name in tuple(final):

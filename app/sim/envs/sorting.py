@@ -1,6 +1,6 @@
 """The sorting task as Gymnasium environments: one task, or a batch."""
 
-from typing import Any
+from typing import Any, cast
 
 import gymnasium
 import numpy as np
@@ -21,11 +21,12 @@ Acts = NDArray[np.int64]
 Steps = tuple[Obs, NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]
 
 
-def _obs_space(shape: SortingShape) -> spaces.Box:
+def _obs_space(shape: SortingShape) -> spaces.Space[Obs]:
     """Return the space of one task's observations."""
     high = np.full(shape.obs_size, shape.n_types, dtype=np.uint8)
     high[-shape.n_cells :] = FAILURE_SCALE
-    return spaces.Box(np.zeros_like(high), high, dtype=np.uint8)
+    box = spaces.Box(np.zeros_like(high), high, dtype=np.uint8)
+    return cast("spaces.Space[Obs]", box)
 
 
 def _tell(batch: SortingBatch) -> dict[str, Any]:
@@ -166,7 +167,8 @@ class SortingEnv(gymnasium.Env[Obs, np.int64]):
 
     def action_masks(self) -> NDArray[np.bool_]:
         """Return which moves would change something, shape (n_actions,)."""
-        return self.batch.masks()[0].copy()
+        mask: NDArray[np.bool_] = self.batch.masks()[0].copy()
+        return mask
 
     def _info(self) -> dict[str, Any]:
         told = {name: rows[0] for name, rows in _tell(self.batch).items()}

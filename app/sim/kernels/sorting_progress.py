@@ -317,7 +317,7 @@ def state_number(p: Progress) -> int:
 def in_clutter(index: int, code: int, p: Progress) -> int:
     """Return how many objects of a code lie in the clutter in a state."""
     n_towers = len(p.n)
-    count = p.left[n_towers, code]
+    count: int = p.left[n_towers, code]
     for c in range(n_towers):
         count -= p.held[c, index // p.stride[c] % p.n[c], code]
     return count
