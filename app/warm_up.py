@@ -15,11 +15,13 @@ from app.sim import sorting_decision
 from app.sim.cells import load_cell
 from app.sim.commands import MoveHuman
 from app.sim.kernels.arm import CONTROLLED
+from app.sim.live_world import new_world
 from app.sim.pick import PickBatch, PickSettings
 from app.sim.sorting import batch_in
 from app.sim.world import World
 
 N_ENVS = 8
+SORTING_CELL = "sorting-e0"
 
 
 def warm_up() -> float:
@@ -39,7 +41,8 @@ def warm_up() -> float:
         batch = PickBatch(cell, N_ENVS, seed=0, settings=PickSettings())
         batch.reset()
         batch.step(np.zeros((N_ENVS, CONTROLLED), dtype=np.float32))
-    tasks = batch_in(load_cell("sorting-e0"), N_ENVS, seed=0)
+        new_world(load_cell(SORTING_CELL), policy, seed=0).step()
+    tasks = batch_in(load_cell(SORTING_CELL), N_ENVS, seed=0)
     tasks.reset()
     tasks.masks()
     tasks.step(np.zeros(N_ENVS, dtype=np.int64))
