@@ -3,8 +3,8 @@
     python docs/sorting_tiny.py [--seed 3]
 
 writes ``docs/results/sorting_tiny.json`` and the tables of ``docs/sorting-tiny.md``. The task
-has two clutter cells, two colours and two sizes; its states are counted out from many starts, so
-that all values can be written down.
+has two clutter cells, two colours and two sizes; its states are counted out from many starts,
+so that all values can be written down.
 """
 
 import argparse
