@@ -37,7 +37,10 @@ def main() -> None:
 
     def on_progress(point: Progress) -> None:
         with (folder / "curve.jsonl").open("a", encoding="utf-8") as file:
-            file.write(json.dumps({"preset": preset.name, **asdict(point)}) + "\n")
+            file.write(
+                json.dumps({"preset": preset.name, "seed": options.seed, **asdict(point)})
+                + "\n"
+            )
 
     def on_checkpoint(step: int, policy: Checkpoint, state: Checkpoint) -> None:
         write(policy, folder / f"step-{step:09d}")

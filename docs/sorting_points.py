@@ -2,7 +2,7 @@
 
     python docs/sorting_points.py RUN ... [--stock CELL=FILE.jsonl] [--episodes N]
 
-A RUN is a folder that ``docs/sorting_curves.py`` wrote. Each of its policies plays every pair
+A RUN is a folder that ``docs/sorting_curves.py`` wrote. Each policy in it plays every pair
 (K_E, K_G), greedily and without hand-over: 500 episodes of each on e0, 100 on e1, unless
 ``--episodes`` says otherwise. ``--stock`` takes what ``tests/benchmarks/stock_dqn.py`` wrote.
 Writes ``docs/results/sorting_curves.json``, which ``docs/sorting_plots.py`` draws; curves of
@@ -25,6 +25,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from app.machine import describe  # noqa: E402 - the line above lets it be found
+from app.policies import presets  # noqa: E402
 from app.policies.checkpoint import load  # noqa: E402
 from app.policies.evaluation.sorting_curve import curve_episodes, curve_point  # noqa: E402
 from app.policies.sorting_policy import SortingPolicy  # noqa: E402
@@ -47,7 +48,10 @@ def curve_of_run(folder: Path, episodes: int | None) -> Json:
     """Return the curve of a training: its points, and its policies on every pair."""
     told = lines(folder / "curve.jsonl")
     spent = {one["step"]: one["cpu_s"] for one in told}
-    pairs, named = [], {}
+    first = told[0]
+    cell = presets.get(first["preset"]).cell
+    named = {"task": cell, "name": first["preset"], "seed": first.get("seed", 1)}
+    pairs = []
     for path in sorted(folder.glob("step-*.json")):
         manifest = json.loads(path.read_text(encoding="utf-8"))
         checkpoint = load(manifest, path.with_suffix(".safetensors").read_bytes())
@@ -62,8 +66,6 @@ def curve_of_run(folder: Path, episodes: int | None) -> Json:
         }
         step = manifest["step"]
         pairs.append({"step": step, "cpu_s": spent.get(step), **asdict(point)})
-    if not pairs:
-        raise SystemExit(f"{folder} holds no policy: step-*.json")
     return {**named, "played": [_played(one) for one in told], "pairs": pairs}
 
 

@@ -11,8 +11,8 @@ from web.poses import Vec, orientation
 from web.robot_body import gripper_body, gripper_finger, link_meshes, magnet_body
 from web.solids import torus
 
-OFF, ON = (120, 126, 134), (38, 196, 182)
-"""Colour of the magnet's ring."""
+LAMP = (38, 196, 182)
+"""Colour of the ring that is seen while the magnet is on."""
 OPEN, CLOSED = 0.044, 0.036
 """Half the distance of the fingers [m]; a cube's side lies between."""
 
@@ -74,9 +74,10 @@ class RobotView:
             "/robot/tool/lamp",
             vertices,
             faces,
-            color=OFF,
+            color=LAMP,
             cast_shadow=False,
             position=(0.0, 0.0, length - 0.022),
+            visible=False,
         )
 
     def draw(self, q: Vec) -> None:
@@ -108,7 +109,7 @@ class RobotView:
             return
         self._closed = closed
         if self._lamp is not None:
-            self._lamp.color = ON if closed else OFF
+            self._lamp.visible = closed
             return
         half = CLOSED if closed else OPEN
         for finger, side in zip(self._fingers, (half, -half), strict=True):

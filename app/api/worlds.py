@@ -25,7 +25,13 @@ from app.api.schemas.worlds import (
     WorldSummary,
 )
 from app.api.services import LiveWorld, Services, ServicesDep
-from app.api.world_policies import mover_for, require_mover, require_sorter, sorter_for
+from app.api.world_policies import (
+    may_move,
+    mover_for,
+    require_mover,
+    require_sorter,
+    sorter_for,
+)
 from app.errors import InvalidInput, NotReady
 from app.sim.cases import cases_of
 from app.sim.cells import Cell
@@ -69,6 +75,9 @@ async def command(
         policy = None
         if body.checkpoint is not None:
             policy = await run_in_threadpool(services.policies.load, body.checkpoint)
+            if policy.cell != snapshot.cell and not may_move(policy, world.cell, services):
+                rule = f"must decide in the cell {snapshot.cell}, not in {policy.cell}"
+                raise InvalidInput("checkpoint", body.checkpoint, rule)
             require_mover(policy, world.cell, services)
         world.handle.submit(body.to_domain(policy))
     elif isinstance(body, SetSorter):

@@ -72,7 +72,7 @@ def problem(state: SortingState, shape: SortingShape) -> str:
             "(define (problem instance) (:domain sorting) (:objects",
             " ".join(f"c{code}" for code in codes) + " - code",
             " ".join(f"t{tower}" for tower in range(shape.n_colours)) + " - tower",
-            " ".join(f"n{n}" for n in numbers) + " - number)",
+            " ".join(f"n{n}" for n in numbers) + " - level)",
             "(:init " + " ".join(facts + _facts(state.towers)) + ")",
             "(:goal (and " + " ".join(_facts(state.goal)) + ")))",
         ]
@@ -97,6 +97,9 @@ def plan(planner: str, state: SortingState, shape: SortingShape, cap_s: float) -
         begin, code = _children_s(), _run(_command(planner, place), place, cap_s)
         spent = _children_s() - begin
         answers = sorted(place.glob("*.soln")) + sorted(place.glob("sas_plan*"))
+        if code == -signal.SIGKILL and spent < 0.9 * cap_s:
+            note = f"stopped by the clock after {spent:.0f} s of processor time"
+            return Found(moves=None, cpu_s=spent, note=note)
         if spent >= cap_s or code in OUT_OF_TIME:
             return Found(moves=None, cpu_s=spent, note=f"no plan in {cap_s:g} s")
         if not answers:

@@ -12,7 +12,7 @@ export function Blocks({ sorting, cell, send, picked, onPick }) {
   return html`<section class="card" aria-labelledby="blocks-title">
     <header class="card-head">
       <h2 id="blocks-title">Blocks</h2>
-      <span class="faint">${sorting.pieces.length} of ${plural(cells.length, "place")} used</span>
+      <span class="faint">${sorting.pieces.length} of at most ${cells.length}</span>
     </header>
     <${Plan} cells=${cells} sorting=${sorting} picked=${picked} onPick=${onPick} />
     <${Legend} failure=${sorting.failure} />

@@ -57,7 +57,8 @@ function Decider({ sorting }) {
 }
 
 function Rank({ move, sorting, cell, chosen, share }) {
-  const piece = sorting.pieces.find((one) => one.id === move.piece);
+  const id = move.piece ?? (chosen ? sorting.move.piece : null);
+  const piece = sorting.pieces.find((one) => one.id === id);
   const from = capital(placeName(cell, move.pick));
   const to = placeName(cell, move.place);
   const what = piece ? nameOf(piece) : "block";

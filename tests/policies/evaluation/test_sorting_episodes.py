@@ -92,13 +92,13 @@ def test_a_policy_in_circles_runs_out_of_attempts():
     lost = ~found.success
     assert lost.mean() > 0.9
     assert (found.attempts[lost] == 4 * SHAPE.n_cells).all()
-    assert found.repeated[lost].all()
+    assert found.handed_over[lost].all() and found.repeated[lost].any()
 
 
 def test_with_hand_over_the_planner_ends_what_went_in_circles():
     found = played(in_circles, n=30, obey=True, n_objects=4)
     assert found.success.all()
-    assert found.handed_over.sum() == found.repeated.sum() > 20
+    assert found.handed_over.sum() > 20 and found.repeated.any()
     assert (found.moves[found.repeated] > found.fewest[found.repeated]).all()
 
 
