@@ -3,7 +3,10 @@
 import logging
 
 from app.errors import Conflict, InvalidInput, NotFound
+from app.policies.presets import Preset
+from app.policies.sorting_preset import SortingPreset
 from app.sim.cells import Cell, cell_names, lacks_for_pick, load_cell, parse_definition
+from app.sim.sorting_cell import lacks_for_tasks
 from app.store.cells import get_cell, list_cells, put_cell, remove_cell
 from app.store.engine import Store
 
@@ -48,18 +51,20 @@ class CellCatalog:
                 logger.warning("cell %s is left out: %s", record.name, error.message)
         return found
 
-    def to_train_in(self, name: str) -> Cell:
-        """Return a cell that policies can be trained in.
+    def to_train_in(self, preset: Preset) -> Cell:
+        """Return the cell that a preset names, if it can be trained in by that preset.
 
         Raises:
             InvalidInput: No cell has that name, or it lacks something.
         """
+        name, sorts = preset.cell, isinstance(preset, SortingPreset)
         try:
             cell = self.get(name)
         except NotFound:
             rule = "is no known work cell"
             raise InvalidInput("overrides.cell", name, rule, self.names()) from None
-        if (lack := lacks_for_pick(cell)) is not None:
+        lack = lacks_for_tasks(cell) if sorts else lacks_for_pick(cell)
+        if lack is not None:
             raise InvalidInput("overrides.cell", name, f"cannot be trained in: it {lack}")
         return cell
 

@@ -57,7 +57,7 @@ def train(worker: Worker) -> dict[str, Any]:
         on_progress=on_progress,
         on_checkpoint=on_checkpoint,
         should_stop=worker.should_stop,
-        cell=CellCatalog(worker.store).to_train_in(preset.cell),
+        cell=CellCatalog(worker.store).to_train_in(preset),
     )
     if not saved:  # interrupted between the last checkpoint and the end
         worker.record_checkpoint(result.step, _new(result.checkpoint), None)

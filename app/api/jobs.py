@@ -45,7 +45,7 @@ def create(
         services.motions.check(body.motions)
     if new.preset is not None:
         preset = presets.resolve(new.preset, new.overrides or {})
-        services.cells.to_train_in(preset.cell)
+        services.cells.to_train_in(preset)
     job = jobs.create_job(services.store, new, idempotency_key=idempotency_key)
     services.supervisor.wake()
     response.headers["Location"] = f"/v1/jobs/{job.id}"

@@ -30,13 +30,21 @@ def is_sorting(cell: Cell) -> bool:
     return bool(cell.stations_of("clutter")) and bool(cell.stations_of("cluster"))
 
 
+def lacks_for_tasks(cell: Cell) -> str | None:
+    """Say what a cell lacks to be trained to sort in; None where nothing."""
+    if not is_sorting(cell):
+        return "needs at least one station of kind clutter and one of kind cluster"
+    clutter, towers = cell.stations_of("clutter"), cell.stations_of("cluster")
+    if len(clutter) > MAX_CELLS or len(towers) > MAX_COLOURS:
+        return f"has more than {MAX_CELLS} clutter cells or {MAX_COLOURS} clusters"
+    return None
+
+
 def lacks_for_sorting(cell: Cell) -> str | None:
     """Say what a cell lacks to be shown as a live sorting cell; None where nothing."""
     clutter, towers = cell.stations_of("clutter"), cell.stations_of("cluster")
-    if not is_sorting(cell):
-        return "needs at least one station of kind clutter and one of kind cluster"
-    if len(clutter) > MAX_CELLS or len(towers) > MAX_COLOURS:
-        return f"has more than {MAX_CELLS} clutter cells or {MAX_COLOURS} clusters"
+    if (lack := lacks_for_tasks(cell)) is not None:
+        return lack
     if len(cell.people) != 1 or not cell.workers:
         return "needs exactly one person, of kind worker"
     if any(one.colour is None or one.level_height is None for one in towers):

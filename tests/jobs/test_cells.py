@@ -1,6 +1,7 @@
 import pytest
 
 from app.errors import Conflict, InvalidInput, NotFound
+from app.policies.presets import resolve
 from app.sim.cells import cell_names, load_cell
 from app.store.cells import put_cell
 from app.store.engine import Store
@@ -44,11 +45,15 @@ def test_unknown_cell_names_the_known_ones(catalog: CellCatalog) -> None:
 
 def test_cell_to_train_in_must_have_what_the_scenario_needs(catalog: CellCatalog) -> None:
     catalog.add(workshop.cell())
-    assert catalog.to_train_in("workshop").name == "workshop"
-    with pytest.raises(InvalidInput, match=r"overrides\.cell = 'sorting-e0' cannot be trained"):
-        catalog.to_train_in("sorting-e0")
-    with pytest.raises(InvalidInput, match=r"overrides\.cell = 'kitchen' is no known"):
-        catalog.to_train_in("kitchen")
+    for preset, fits, other in (
+        ("pick-td3", "workshop", "sorting-e0"),
+        ("sorting-e0-dqn", "sorting-e1", "pick-and-place"),
+    ):
+        assert catalog.to_train_in(resolve(preset, {"cell": fits})).name == fits
+        with pytest.raises(InvalidInput, match=rf"overrides\.cell = '{other}' cannot be"):
+            catalog.to_train_in(resolve(preset, {"cell": other}))
+        with pytest.raises(InvalidInput, match=r"overrides\.cell = 'kitchen' is no known"):
+            catalog.to_train_in(resolve(preset, {"cell": "kitchen"}))
 
 
 def test_stored_cell_that_no_longer_fits_hides_no_other(
