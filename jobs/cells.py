@@ -13,6 +13,12 @@ from app.store.engine import Store
 logger = logging.getLogger(__name__)
 
 
+def lacks_for_training(preset: Preset, cell: Cell) -> str | None:
+    """Say what a cell lacks to train a preset in; None where nothing."""
+    sorts = isinstance(preset, SortingPreset)
+    return lacks_for_tasks(cell) if sorts else lacks_for_pick(cell)
+
+
 class CellCatalog:
     """Finds cells by name; safe to use from any thread.
 
@@ -57,14 +63,13 @@ class CellCatalog:
         Raises:
             InvalidInput: No cell has that name, or it lacks something.
         """
-        name, sorts = preset.cell, isinstance(preset, SortingPreset)
+        name = preset.cell
         try:
             cell = self.get(name)
         except NotFound:
             rule = "is no known work cell"
             raise InvalidInput("overrides.cell", name, rule, self.names()) from None
-        lack = lacks_for_tasks(cell) if sorts else lacks_for_pick(cell)
-        if lack is not None:
+        if (lack := lacks_for_training(preset, cell)) is not None:
             raise InvalidInput("overrides.cell", name, f"cannot be trained in: it {lack}")
         return cell
 

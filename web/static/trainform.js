@@ -26,7 +26,8 @@ export function TrainForm({ presets, error, cell, onStarted, onClose }) {
   const form = useRef(null);
   const first = useRef(null);
   useEffect(() => first.current?.focus(), [presets !== null]);
-  const preset = presets?.find((p) => p.name === name) ?? presets?.[0] ?? null;
+  const preset = presets?.find((p) => p.name === name)
+    ?? presets?.find((p) => p.cell === cell) ?? presets?.[0] ?? null;
   const texts = { ...shownCell(preset, cell), ...typed };
 
   const submit = async (event) => {
