@@ -1,7 +1,7 @@
 ; The sorting task of METHOD 1.1 and 1.2 for classical planners.
 ;
-; Twins are counted, not named, and a move is a take and a put: of three ways to write the task
-; this one was planned fastest. Which clutter cell an object lies in is left out: there are as
+; Twins are counted, not named, and a move is a take and a put, which kept problems of ten objects
+; smallest of the ways tried. Which clutter cell an object lies in is left out: there are as
 ; many cells as objects, so a free one never lacks, and only the risk of a pick depends on it.
 ; Failed picks are left out as well: they change nothing, so the action is tried again; a plan
 ; knows of no risk, and no twin is better than the other.

@@ -74,7 +74,7 @@ def problem(state: SortingState, shape: SortingShape) -> str:
             " ".join(f"t{tower}" for tower in range(shape.n_colours)) + " - tower",
             " ".join(f"n{n}" for n in numbers) + " - level)",
             "(:init " + " ".join(facts + _facts(state.towers)) + ")",
-            "(:goal (and " + " ".join(_facts(state.goal)) + ")))",
+            "(:goal (and (free-hand) " + " ".join(_facts(state.goal)) + ")))",
         ]
     )
 

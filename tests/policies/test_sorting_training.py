@@ -73,7 +73,7 @@ def test_a_policy_gives_the_values_of_the_trained_network(small_run):
 
 def test_a_policy_that_moves_is_no_policy_that_sorts(tiny_run):
     assert not is_sorting(tiny_run.result.checkpoint)
-    with pytest.raises(CheckpointMismatch, match="network"):
+    with pytest.raises(CheckpointMismatch, match="purpose is .choosing tasks."):
         SortingPolicy(tiny_run.result.checkpoint)
 
 
