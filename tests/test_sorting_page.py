@@ -100,7 +100,8 @@ def run(tmp_path: Path) -> Path:
     policy = untrained()
     (folder / "step-000000000.json").write_text(json.dumps(policy.manifest))
     (folder / "step-000000000.safetensors").write_bytes(policy.tensors)
-    points = [{"step": k, "cpu_s": 2.0 + k, "success": 0.1, "reward": -1.0} for k in (0, 5)]
+    told = {"preset": "sorting-e0-dqn", "seed": 1, "success": 0.1, "reward": -1.0}
+    points = [{**told, "step": k, "cpu_s": 2.0 + k} for k in (0, 5)]
     (folder / "curve.jsonl").write_text("".join(f"{json.dumps(one)}\n" for one in points))
     return folder
 
