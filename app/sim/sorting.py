@@ -125,6 +125,17 @@ def new_rows(shape: SortingShape, n_envs: int, fail: Vec) -> kernel.SortingRows:
     )
 
 
+def _check_sizes(settings: SortingSettings, shape: SortingShape) -> None:
+    """Raise InvalidInput where more objects are asked for than there are, or fit."""
+    most = settings.n_objects or shape.n_cells
+    for name, value, limit in (
+        ("n_objects", settings.n_objects, shape.n_cells),
+        ("n_goal", settings.n_goal, most),
+    ):
+        if not 0 <= value <= limit:
+            raise InvalidInput(name, value, f"must lie in [0, {limit}]")
+
+
 class SortingBatch:
     """Many sorting tasks, stepped together by one thread.
 
@@ -137,7 +148,7 @@ class SortingBatch:
         first_env: Number of the first row in the random streams.
 
     Raises:
-        InvalidInput: The failure map does not fit the shape.
+        InvalidInput: The failure map or the fixed sizes do not fit the shape.
     """
 
     def __init__(
@@ -157,6 +168,7 @@ class SortingBatch:
         self.rows = new_rows(shape, n_envs, fail)
         """Rows of all tasks."""
         self.settings = settings or SortingSettings()
+        _check_sizes(self.settings, shape)
         """Starts, disturbances, rewards and ends; may be replaced between two steps."""
         self.rows.fixed_objects[:] = self.settings.n_objects
         self.rows.fixed_goal[:] = self.settings.n_goal

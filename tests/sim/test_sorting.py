@@ -298,3 +298,10 @@ def test_a_failure_map_that_no_plan_survives_is_refused(bad: float) -> None:
 def test_unknown_actions_are_refused(act: int) -> None:
     with pytest.raises(InvalidInput, match="act"):
         batch_of(2).step(np.array([0, act]))
+
+
+@pytest.mark.parametrize(("n_objects", "n_goal"), [(3, 5), (11, 1), (0, 11), (-1, 0)])
+def test_more_objects_than_fit_are_refused(n_objects: int, n_goal: int) -> None:
+    settings = SortingSettings(n_objects=n_objects, n_goal=n_goal)
+    with pytest.raises(InvalidInput, match="n_objects|n_goal"):
+        batch_in(load_cell("sorting-e0"), 1, 0, settings)
