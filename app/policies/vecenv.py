@@ -1,8 +1,4 @@
-"""The batched pick scenario as Stable-Baselines3's VecEnv.
-
-Every end of an episode is a true end: the time left is observed and a time-out gives no more
-reward, so nothing is ever marked as truncated.
-"""
+"""Batched scenarios as Stable-Baselines3's VecEnv."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -14,10 +10,58 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from app.sim.kernels.arm import CONTROLLED
 from app.sim.pick import OUTCOMES, PickBatch
+from app.sim.sorting import SortingBatch
 
 
-class PickVecEnv(VecEnv):
+class BatchVecEnv(VecEnv):
+    """What the VecEnvs of all scenarios share: their rows are one batch.
+
+    Args:
+        batch: The rows.
+        observation_space: Space of one row's observations.
+        action_space: Space of one row's actions.
+    """
+
+    def __init__(
+        self,
+        batch: PickBatch | SortingBatch,
+        observation_space: spaces.Space[Any],
+        action_space: spaces.Space[Any],
+    ) -> None:
+        self._rows_of: PickBatch | SortingBatch = batch
+        self.render_mode = None
+        super().__init__(batch.n_envs, observation_space, action_space)
+
+    def close(self) -> None:
+        """Nothing to close."""
+
+    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
+        """Return an attribute of the batch, once per row."""
+        return [getattr(self._rows_of, attr_name, None)] * len(self._rows(indices))
+
+    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+        """Rows share one batch: single attributes cannot be set."""
+        raise NotImplementedError(f"cannot set {attr_name} of rows that share one batch")
+
+    def env_method(
+        self, method_name: str, *method_args: Any, indices: Any = None, **method_kwargs: Any
+    ) -> list[Any]:
+        """Rows share one batch: there is no environment to call."""
+        raise NotImplementedError(f"rows share one batch, no method {method_name} per row")
+
+    def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
+        """Rows are never wrapped."""
+        return [False] * len(self._rows(indices))
+
+    def _rows(self, indices: None | int | Sequence[int]) -> Sequence[int]:
+        return list(self._get_indices(indices))
+
+
+class PickVecEnv(BatchVecEnv):
     """One :class:`PickBatch`, seen by Stable-Baselines3.
+
+    Every end of an episode is a true end: the time left is observed and a time-out gives no
+    more reward, so nothing is ever marked as truncated.
 
     Args:
         batch: The scenario.
@@ -29,9 +73,8 @@ class PickVecEnv(VecEnv):
         """Outcome of the episodes that ended in the last step, 0 elsewhere."""
         self._actions = np.zeros((batch.n_envs, CONTROLLED), dtype=np.float32)
         self._infos: list[dict[str, Any]] = [{} for _ in range(batch.n_envs)]
-        self.render_mode = None
         super().__init__(
-            batch.n_envs,
+            batch,
             spaces.Box(-np.inf, np.inf, (batch.obs_size,), np.float32),
             spaces.Box(-1.0, 1.0, (CONTROLLED,), np.float32),
         )
@@ -57,27 +100,3 @@ class PickVecEnv(VecEnv):
                 "outcome": OUTCOMES[self.ended[row]],
             }
         return result.obs.copy(), result.rew.copy(), self.ended > 0, infos
-
-    def close(self) -> None:
-        """Nothing to close."""
-
-    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """Return an attribute of the batch, once per row."""
-        return [getattr(self.batch, attr_name, None)] * len(self._rows(indices))
-
-    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Rows share one batch: single attributes cannot be set."""
-        raise NotImplementedError(f"cannot set {attr_name} of rows that share one batch")
-
-    def env_method(
-        self, method_name: str, *method_args: Any, indices: Any = None, **method_kwargs: Any
-    ) -> list[Any]:
-        """Rows share one batch: there is no environment to call."""
-        raise NotImplementedError(f"rows share one batch, no method {method_name} per row")
-
-    def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
-        """Rows are never wrapped."""
-        return [False] * len(self._rows(indices))
-
-    def _rows(self, indices: None | int | Sequence[int]) -> Sequence[int]:
-        return list(self._get_indices(indices))
