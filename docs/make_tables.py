@@ -76,7 +76,7 @@ def origin(result: Json) -> str:
     verb = "evaluate" if "protocol" in result else "bench"
     usual = f"python -m app {verb} {result.get('protocol') or result.get('bench')}"
     usual += " FILE ..." if "motions" in result.get("settings", {}) else ""
-    if is_sorting(result) and (trained := result["settings"]["cell"]) != "sorting-e0":
+    if (trained := result.get("settings", {}).get("cell", "")) == "sorting-e1":
         usual += f" --checkpoint {trained}"
     parts = [f"`{result.get('command', usual)}`"]
     parts += [f"{key} {result[key]}" for key in ("episodes", "seed") if key in result]

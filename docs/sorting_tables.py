@@ -38,14 +38,21 @@ TESTS: Mapping[str, str] = {
 """Measures of the six tests and what the table calls them."""
 
 
+NO_POLICY = "no policy is trained for this size"
+"""What the bench notes where no checkpoint fits."""
+
+
 def is_sorting(result: Json) -> bool:
-    """Tell whether a result is of a protocol of the sorting task."""
-    return str(result.get("protocol", "")).startswith("sorting-")
+    """Tell whether a result is of a protocol or of the bench of the sorting task."""
+    protocol = str(result.get("protocol", ""))
+    return protocol.startswith("sorting-") or result.get("bench") == "sorting"
 
 
 def lines_of(result: Json) -> list[list[str]]:
     """Return the table of a result, the head first."""
     rows: list[Json] = result["results"]
+    if result.get("bench") == "sorting":
+        return decisions(rows)
     if result["protocol"] != "sorting-grid":
         head = ["", *TESTS.values()]
         return [
@@ -61,6 +68,37 @@ def lines_of(result: Json) -> list[list[str]]:
             for key, text in GRID.items()
         ),
     ]
+
+
+def decisions(rows: list[Json]) -> list[list[str]]:
+    """Return what decisions cost: a line per size, a column for each who decides."""
+    cells: dict[str, dict[str, str]] = {}
+    for row in rows:
+        who, size = row["name"].split("/")
+        cells.setdefault(size, {})[who] = decision(row)
+    deciders = list(dict.fromkeys(row["name"].split("/")[0] for row in rows))
+    lines = [
+        [named(size), *(found.get(who, "") for who in deciders)]
+        for size, found in cells.items()
+    ]
+    return [["", *(f"`{who}`" for who in deciders)], *lines]
+
+
+def named(size: str) -> str:
+    """Return the size in a row's name, such as ``20-3-disturbed``, in words."""
+    cells, colours, *disturbed = size.split("-")
+    return f"K = {cells}, {colours} colours" + (", disturbed" if disturbed else "")
+
+
+def decision(row: Json) -> str:
+    """Return one time, and by how many moves the plan is too long; or why there is none."""
+    if row.get("value") is None:
+        note = str(row.get("note", ""))
+        return "" if note == NO_POLICY or note.startswith("not tried") else note
+    value = float(row["value"])
+    digits = 3 if value < 1.0 else 0
+    extra = row.get("over")
+    return f"{value:,.{digits}f}" + (f" (+{extra:g})" if extra else "")
 
 
 def shown(row: Json, key: str) -> str:
