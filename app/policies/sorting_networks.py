@@ -16,6 +16,7 @@ Source: METHOD 1.4; Wang et al., *Dueling network architectures* (2016).
 
 from collections.abc import Mapping
 from types import MappingProxyType
+from typing import Any
 
 import torch
 from torch import Tensor, nn
@@ -31,6 +32,12 @@ BACK_SLOPE = 0.3
 an object put there costs more attempts to fetch, if it is fetched at all."""
 WINDOW = 4
 """Objects of a tower, on and over the seam of what is in place, that are seen one by one."""
+
+
+def layout_of(shape: SortingShape) -> list[list[Any]]:
+    """Return names and sizes of the groups of an observation."""
+    k, c = shape.n_cells, shape.n_colours
+    return [["clutter", k], ["towers", c * k], ["goal", c * k], ["fail", k]]
 
 
 class SortingView(nn.Module):

@@ -16,8 +16,7 @@ from app.policies.checkpoint import (
     require_purpose,
 )
 from app.policies.model_state import under
-from app.policies.sorting_networks import NETWORKS
-from app.policies.sorting_training import layout_of
+from app.policies.sorting_networks import NETWORKS, layout_of
 from app.policies.trained_cell import cell_of
 from app.sim.sorting import Obs, shape_of
 from app.sim.sorting_state import SortingShape

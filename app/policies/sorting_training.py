@@ -17,6 +17,7 @@ from app.policies.dqn import Adviser, SortingDQN
 from app.policies.progress import Progress
 from app.policies.reporter import Reporter
 from app.policies.run import Parts, TrainingRun
+from app.policies.sorting_networks import layout_of
 from app.policies.sorting_preset import SortingPreset
 from app.policies.sorting_vecenv import SortingVecEnv
 from app.sim.cells import Cell
@@ -31,12 +32,6 @@ FADE = 0.8
 """Share of the training over which the curriculum fades."""
 FADE_EVERY = 16
 """Steps of all tasks between two looks at the curriculum."""
-
-
-def layout_of(shape: SortingShape) -> list[list[Any]]:
-    """Return names and sizes of the groups of an observation."""
-    k, c = shape.n_cells, shape.n_colours
-    return [["clutter", k], ["towers", c * k], ["goal", c * k], ["fail", k]]
 
 
 def start(

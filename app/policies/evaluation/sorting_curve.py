@@ -55,11 +55,3 @@ def curve_point(
         mean_return=float(found.rewards.mean()),
         return_sd=float(found.rewards.std()),
     )
-
-
-def grid_success(
-    values: Values, shape: SortingShape, fail: Vec, episodes_per_pair: int, seed: int
-) -> tuple[float, float]:
-    """Return success rate and mean return over all pairs, for use while training."""
-    point = curve_point(values, shape, fail, episodes_per_pair, seed)
-    return point.success, point.mean_return

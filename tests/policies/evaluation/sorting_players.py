@@ -9,8 +9,7 @@ import torch
 
 from app.policies import presets
 from app.policies.checkpoint import FORMAT, Checkpoint, pack
-from app.policies.sorting_networks import NETWORKS
-from app.policies.sorting_training import layout_of
+from app.policies.sorting_networks import NETWORKS, layout_of
 from app.sim.cells import load_cell
 from app.sim.kernels.sorting import FAILURE_SCALE
 from app.sim.sorting import shape_of

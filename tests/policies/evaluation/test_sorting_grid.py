@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from app.policies.evaluation.sorting_curve import curve_point, grid_success
+from app.policies.evaluation.sorting_curve import curve_point
 from app.policies.evaluation.sorting_episodes import SortingEpisodes, run_episodes
 from app.policies.evaluation.sorting_grid import grid, row_of, share
 from app.policies.evaluation.sorting_pairs import CHUNK, grid_batches, pairs_of
@@ -139,5 +139,3 @@ def test_the_curve_counts_every_pair_alike():
     assert point.success == 1.0 and lost.success < 0.5
     assert point.mean_return > 0.0 > lost.mean_return
     assert 0.0 < point.return_sd < lost.return_sd
-    both = grid_success(values_of(exactly, SHAPE), SHAPE, FAIL, 4, 9)
-    assert both == (point.success, point.mean_return)
