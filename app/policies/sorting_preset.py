@@ -99,10 +99,10 @@ class SortingPreset:
     c_move: float = number(0.05, 0.0, 10.0, "", "cost of an attempt")
     c_empty: float = number(0.3, 0.0, 10.0, "", "cost of picking where nothing is")
     c_stuck: float = number(0.3, 0.0, 10.0, "", "cost of putting an object back")
-    c_fail: float = number(0.05, 0.0, 10.0, "", "cost of a failed pick")
-    c_back: float = number(0.05, 0.0, 10.0, "", "cost of a move from a tower to the clutter")
+    c_fail: float = number(0.01, 0.0, 10.0, "", "cost of a failed pick")
+    c_back: float = number(0.01, 0.0, 10.0, "", "cost of a move from a tower to the clutter")
     c_distance: float = number(
-        0.1, 0.0, 10.0, "", "cost per attempt, of all levels differing from the goal"
+        0.01, 0.0, 10.0, "", "cost per attempt, of all levels differing from the goal"
     )
     c_success: float = number(1.0, 0.0, 100.0, "", "bonus of a goal that is met")
 
