@@ -163,7 +163,9 @@ class SortingPreset:
 
 
 def _printed(name: str, cell: str, total_steps: int) -> SortingPreset:
-    """Return table 3.1 with an update every fourth attempt, which is not printed."""
+    """Return table 3.1; what it does not print is an update every fourth attempt, and a reward
+    in which parking, failures and distance cost as much as a move.
+    """
     return SortingPreset(
         name=name,
         cell=cell,
@@ -184,6 +186,9 @@ def _printed(name: str, cell: str, total_steps: int) -> SortingPreset:
         eps_start=1.0,
         eps_end=0.05,
         eps_share=1.0,
+        c_fail=0.05,
+        c_back=0.05,
+        c_distance=0.1,
         solved_episodes=0.5,
         even_share=0.0,
         disturbed_share=0.0,
