@@ -40,6 +40,8 @@ N_STATE = 20
 """Length of the plain state (4.30)."""
 NOBODY = (0.0, 4.0, 0.0, 0.0, 0.2)
 """x, y [m], vx, vy [m/s], r [m] of the person assumed where nobody is there."""
+EVERYBODY = -1
+"""In place of a person's number: all of them."""
 CENTER_Y = 1.25
 """Middle of the walking area, from which the person's y is counted [m]."""
 SCALE = 0.5
@@ -112,20 +114,17 @@ def enclosing_radius(columns: Vec, first: int, n: int, x: float, y: float) -> fl
 
 
 @kernel(inline="always")
-def see_cylinder(
-    people: People, state: PeopleState, e: int, robot: Vec, crowd: Crowd, seen: Vec
-) -> None:
-    """Write the nearest person of environment ``e`` as a cylinder.
+def show_person(state: PeopleState, e: int, who: int, crowd: Crowd, seen: Vec) -> None:
+    """Write one person of environment ``e`` as a cylinder.
 
     Args:
-        people: Shared data.
         state: Rows of the people.
         e: Environment.
-        robot: The robot's capsules as columns, shape (9, n).
+        who: The person: workers first, then walkers; below 0 for nobody.
         crowd: The people, placed as they are now.
         seen: Filled with x, y [m], vx, vy [m/s], r [m], shape (5,).
     """
-    who, n_workers = nearest_person(people, robot, crowd), state.q.shape[1]
+    n_workers = state.q.shape[1]
     if who < 0:
         for i in range(5):
             seen[i] = NOBODY[i]
@@ -141,6 +140,23 @@ def see_cylinder(
 
 
 @kernel(inline="always")
+def see_cylinder(
+    people: People, state: PeopleState, e: int, robot: Vec, crowd: Crowd, seen: Vec
+) -> None:
+    """Write the nearest person of environment ``e`` as a cylinder.
+
+    Args:
+        people: Shared data.
+        state: Rows of the people.
+        e: Environment.
+        robot: The robot's capsules as columns, shape (9, n).
+        crowd: The people, placed as they are now.
+        seen: Filled with x, y [m], vx, vy [m/s], r [m], shape (5,).
+    """
+    show_person(state, e, nearest_person(people, robot, crowd), crowd, seen)
+
+
+@kernel(inline="always")
 def put_state(q: Vec, qd: Vec, seen: Vec, goal: Vec, out: Obs) -> None:
     """Write the plain state (4.30), shape (N_STATE,)."""
     for j in range(6):
@@ -153,21 +169,25 @@ def put_state(q: Vec, qd: Vec, seen: Vec, goal: Vec, out: Obs) -> None:
 
 @kernel(inline="always")
 def clearances_ahead(
-    people: People, state: PeopleState, e: int, robot: Vec, sight: ReachSight
+    people: People, state: PeopleState, e: int, who: int, robot: Vec, sight: ReachSight
 ) -> None:
-    """Write the clearance of the robot as it stands to all people at ``HORIZONS``.
+    """Write the clearance of the robot as it stands to people at ``HORIZONS``.
 
     Args:
         people: Shared data.
         state: Rows of the people, who go on at constant velocity.
         e: Environment.
+        who: The one person that counts, or EVERYBODY.
         robot: The robot's capsules as columns, shape (9, n).
         sight: Work space; ``ahead`` is filled.
     """
     person, ahead = sight.person, sight.ahead
     for i in range(3):
         ahead[i] = FAR
-    for w in range(state.q.shape[1]):
+    n_workers = state.q.shape[1]
+    for w in range(n_workers):
+        if who != EVERYBODY and who != w:
+            continue
         see_person(people.floor_z, state.q[e, w], state.qd[e, w], state.size[e, w], person)
         for i in range(3):
             look_ahead(person.now, person.later, HORIZONS[i], person.moved)
@@ -175,6 +195,8 @@ def clearances_ahead(
             ahead[i] = min(ahead[i], least(sight.gap)[0])
     rows = state.walkers.rows
     for k in range(rows.shape[1]):
+        if who != EVERYBODY and who != n_workers + k:
+            continue
         for i in range(3):
             x = rows[e, k, WALKER_X] + HORIZONS[i] * rows[e, k, VX]
             y = rows[e, k, WALKER_Y] + HORIZONS[i] * rows[e, k, VY]
@@ -246,6 +268,48 @@ def put_features(
 
 
 @kernel(inline="always")
+def describe(
+    arm: Arm,
+    q: Vec,
+    qd: Vec,
+    goal: Vec,
+    clearance: float,
+    time_left: float,
+    robot: RobotPose,
+    sight: ReachSight,
+    out: Obs,
+) -> None:
+    """Write the features of a state; ``sight.seen`` and ``sight.ahead`` are filled already.
+
+    Args:
+        arm: Robot in its cell.
+        q: Joint positions [rad], shape (6,).
+        qd: Joint speeds [rad/s], shape (6,).
+        goal: Where the tcp shall be [m], shape (3,).
+        clearance: Distance of robot and people [m].
+        time_left: Time left [s].
+        robot: The robot, placed at ``q``.
+        sight: What is seen of the people.
+        out: Filled, shape (N_FEATURES,).
+    """
+    put_features(
+        q,
+        qd,
+        arm.qd_max,
+        sight.seen,
+        goal,
+        robot.rot,
+        robot.pos,
+        robot.tcp,
+        robot.jacobian,
+        clearance,
+        sight.ahead,
+        time_left,
+        out,
+    )
+
+
+@kernel(inline="always")
 def observe(
     arm: Arm,
     people: People,
@@ -276,19 +340,5 @@ def observe(
         sight: Work space.
         out: Filled, shape (N_FEATURES,).
     """
-    clearances_ahead(people, state, e, robot.columns, sight)
-    put_features(
-        q,
-        qd,
-        arm.qd_max,
-        sight.seen,
-        goal,
-        robot.rot,
-        robot.pos,
-        robot.tcp,
-        robot.jacobian,
-        clearance,
-        sight.ahead,
-        time_left,
-        out,
-    )
+    clearances_ahead(people, state, e, EVERYBODY, robot.columns, sight)
+    describe(arm, q, qd, goal, clearance, time_left, robot, sight, out)
