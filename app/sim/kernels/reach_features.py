@@ -52,11 +52,10 @@ SCALE = 0.5
 TIME_SCALE = 2.5
 """Time left is given in units of this [s]."""
 
+STATE_SIZES = (("q", 6), ("qd", 6), ("human", 5), ("goal", 3))
+"""Groups of the plain state (4.30)."""
 SIZES = (
-    ("q", 6),
-    ("qd", 6),
-    ("human", 5),
-    ("goal", 3),
+    *STATE_SIZES,
     ("sin_q", 6),
     ("cos_q", 6),
     ("tcp", 3),
@@ -76,6 +75,8 @@ LAYOUT = slices_of(SIZES)
 """Slice of each group of features in the observation."""
 N_FEATURES = sum(size for _, size in SIZES)
 """Length of the observation."""
+BASE_START = LAYOUT["base"].start
+"""Where the base motion starts, for the residual action."""
 
 
 class ReachSight(NamedTuple):
