@@ -57,7 +57,8 @@ class CellBatch:
         view: tuple[int, int],
     ) -> None:
         self.n_envs, self.seed = n_envs, seed
-        self._kernel, self._n_act, self._first = kernel, n_act, first_env
+        self.n_act = n_act
+        self._kernel, self._first = kernel, first_env
         self._world, self._rules, self._action, self._weights, self._rows, self._work = shared
         self._view, self.obs_size = view
         self._obs = np.zeros((n_envs, self.obs_size), dtype=np.float32)
@@ -65,6 +66,11 @@ class CellBatch:
         self._rew = np.zeros(n_envs, dtype=np.float32)
         self._ended = np.zeros(n_envs, dtype=np.int64)
         self._step: Callable[..., None] | None = None
+
+    @property
+    def obs(self) -> NDArray[np.float32]:
+        """Observations as they were last written, (n_envs, obs_size)."""
+        return self._obs
 
     def reset(self, seed: int | None = None) -> NDArray[np.float32]:
         """Start episode 0 in every cell; return observations, (n_envs, obs_size)."""
@@ -100,7 +106,7 @@ class CellBatch:
             InvalidInput: The actions have another shape.
             SimulationError: An action is NaN or infinite.
         """
-        require_shape("act", act, (self.n_envs, self._n_act))
+        require_shape("act", act, (self.n_envs, self.n_act))
         require_finite("act", act)
         wanted = np.array(act, dtype=np.float32, order="C")
         arguments = (
