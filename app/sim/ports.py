@@ -4,7 +4,7 @@
 :class:`WorldHandle`; the other side sees only what is written here (numpy in, numpy out).
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:  # the kernels need Vec first
     from app.sim.actions import ActionSettings
+    from app.sim.reach import GoalRule, ViewName
     from app.sim.sorting_state import SortingShape
 
 Vec = NDArray[np.float64]
@@ -132,6 +133,49 @@ class TaskPolicy(Protocol):
         Raises:
             InvalidInput: A value that no answer can be given for.
         """
+
+
+class ReachActor(Protocol):
+    """A learned policy that moves the arm to a goal; safe to call from several threads."""
+
+    @property
+    def checkpoint(self) -> str:
+        """SHA-256 of the checkpoint."""
+
+    @property
+    def view(self) -> "ViewName":
+        """What it observes: ``"features"`` or the plain ``"state"`` (4.30)."""
+
+    @property
+    def action(self) -> "ActionSettings":
+        """What its actions mean."""
+
+    @property
+    def goals(self) -> "GoalRule":
+        """Where its goals were drawn from in training: ``"grid"``, ``"halton"``, ``"box"``."""
+
+    @property
+    def targets(self) -> Vec | None:
+        """Its training targets [m], shape (n, 3); None where goals were drawn from a box."""
+
+    @property
+    def title(self) -> str:
+        """Short text for people, such as ``"reach-td3, 2.0 M steps"``."""
+
+    @property
+    def cell(self) -> str:
+        """Name of the work cell it was trained for."""
+
+    @property
+    def cell_sha256(self) -> str:
+        """Identity of that cell's content (``Cell.sha256``)."""
+
+    @property
+    def trained_range(self) -> Mapping[str, Mapping[str, Sequence[float]]]:
+        """Least and greatest value met in training, ``low`` and ``high``, by variable."""
+
+    def acts(self, obs: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return actions in [-1, 1], shape (n, 6), for observations, shape (n, obs_size)."""
 
 
 class SortingValues(Protocol):
