@@ -1,7 +1,8 @@
 """What the rooms of the house hand each other: the Protocols and their data.
 
-``app.policies`` implements :class:`TaskPolicy` and :class:`SortingValues`, ``web`` implements
-:class:`WorldHandle`; the other side sees only what is written here (numpy in, numpy out).
+``app.policies`` implements :class:`TaskPolicy`, :class:`ReachActor` and
+:class:`SortingValues`, ``web`` implements :class:`WorldHandle`; the other side sees only what
+is written here (numpy in, numpy out).
 """
 
 from collections.abc import Mapping, Sequence
@@ -136,31 +137,15 @@ class TaskPolicy(Protocol):
 
 
 class ReachActor(Protocol):
-    """A learned policy that moves the arm to a goal; safe to call from several threads."""
+    """Brings the tcp to a goal beside people; safe to call from several threads."""
 
     @property
     def checkpoint(self) -> str:
         """SHA-256 of the checkpoint."""
 
     @property
-    def view(self) -> "ViewName":
-        """What it observes: ``"features"`` or the plain ``"state"`` (4.30)."""
-
-    @property
-    def action(self) -> "ActionSettings":
-        """What its actions mean."""
-
-    @property
-    def goals(self) -> "GoalRule":
-        """Where its goals were drawn from in training: ``"grid"``, ``"halton"``, ``"box"``."""
-
-    @property
-    def targets(self) -> Vec | None:
-        """Its training targets [m], shape (n, 3); None where goals were drawn from a box."""
-
-    @property
     def title(self) -> str:
-        """Short text for people, such as ``"reach-td3, 2.0 M steps"``."""
+        """Short text for people, such as ``"reach-td3, 7.7 M steps"``."""
 
     @property
     def cell(self) -> str:
@@ -171,11 +156,34 @@ class ReachActor(Protocol):
         """Identity of that cell's content (``Cell.sha256``)."""
 
     @property
+    def view(self) -> "ViewName":
+        """What it sees."""
+
+    @property
+    def action(self) -> "ActionSettings":
+        """What its actions mean."""
+
+    @property
+    def goals(self) -> "GoalRule":
+        """Where the goals of its training were drawn from."""
+
+    @property
+    def targets(self) -> Vec | None:
+        """The goals it was trained on [m], shape (n, 3); None for a whole box."""
+
+    @property
     def trained_range(self) -> Mapping[str, Mapping[str, Sequence[float]]]:
-        """Least and greatest value met in training, ``low`` and ``high``, by variable."""
+        """Least (``low``) and greatest (``high``) value of each state variable in training."""
 
     def acts(self, obs: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return actions in [-1, 1], shape (n, 6), for observations, shape (n, obs_size)."""
+        """Return actions in [-1, 1].
+
+        Args:
+            obs: Observations of :attr:`view`, as ``ReachBatch`` gives them, shape (n, F).
+
+        Returns:
+            Actions, shape (n, 6).
+        """
 
 
 class SortingValues(Protocol):

@@ -6,10 +6,9 @@ from types import MappingProxyType
 from typing import Any
 
 from app.errors import InvalidInput, NotFound
-from app.policies.checkpoint import Checkpoint
+from app.policies.checkpoint import CHOOSING, REACHING, SORTING, Checkpoint, task_of
 from app.policies.evaluation import people, pick, safety, sorting, tracker
 from app.policies.evaluation.rows import OnRow, untold
-from app.policies.sorting_policy import is_sorting
 from app.sim.motions import Motion
 
 Protocol = Callable[..., dict[str, Any]]
@@ -33,7 +32,9 @@ WITH_MOTIONS = frozenset({"pick-mocap"})
 WITHOUT_CHECKPOINT = frozenset({"safety-ssm"})
 """Protocols in which no policy takes part."""
 OF_SORTING = frozenset({"sorting-grid", "sorting-tests"})
-"""Protocols of policies that sort; all others are of policies that reach."""
+"""Protocols of policies that sort."""
+OF_REACHING = frozenset[str]()
+"""Protocols of policies that reach goals; all others are of policies that choose and pick."""
 MAX_EPISODES = 100_000
 """Most episodes of one evaluation."""
 MAX_SORTING_EPISODES = 10_000
@@ -100,17 +101,32 @@ def most_episodes(name: str) -> int:
     return MAX_SORTING_EPISODES if name in OF_SORTING else MAX_EPISODES
 
 
+_POLICIES = {
+    CHOOSING: "a policy that picks",
+    REACHING: "a policy that reaches goals",
+    SORTING: "a policy that sorts",
+}
+
+
+def _task_measured(name: str) -> str:
+    """Return what the policies that a protocol measures are for."""
+    if name in OF_SORTING:
+        return SORTING
+    return REACHING if name in OF_REACHING else CHOOSING
+
+
 def _check_task(name: str, checkpoint: Checkpoint | None) -> None:
     """Check that a checkpoint is of the scenario that a protocol measures."""
     if checkpoint is None or name in WITHOUT_CHECKPOINT:
         return
-    if is_sorting(checkpoint) != (name in OF_SORTING):
-        wanted = "a policy that sorts" if name in OF_SORTING else "a policy that picks"
-        known = sorted(set(PROTOCOLS) - WITHOUT_CHECKPOINT - OF_SORTING)
-        if is_sorting(checkpoint):
-            known = sorted(OF_SORTING)
+    wanted, actual = _task_measured(name), task_of(checkpoint)
+    if wanted != actual:
         found = checkpoint.manifest["preset"].get("name") or checkpoint.sha256[:12]
-        raise InvalidInput("checkpoint", found, f"must be {wanted} for {name}", known)
+        fitting = set(PROTOCOLS) - WITHOUT_CHECKPOINT
+        known = sorted(one for one in fitting if _task_measured(one) == actual)
+        raise InvalidInput(
+            "checkpoint", found, f"must be {_POLICIES[wanted]} for {name}", known
+        )
 
 
 def check_motions(
