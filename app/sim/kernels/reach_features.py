@@ -47,11 +47,10 @@ SCALE = 0.5
 TIME_SCALE = 2.5
 """Time left is given in units of this [s]."""
 
+STATE_SIZES = (("q", 6), ("qd", 6), ("human", 5), ("goal", 3))
+"""Groups of the plain state (4.30)."""
 SIZES = (
-    ("q", 6),
-    ("qd", 6),
-    ("human", 5),
-    ("goal", 3),
+    *STATE_SIZES,
     ("sin_q", 6),
     ("cos_q", 6),
     ("tcp", 3),
