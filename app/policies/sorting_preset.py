@@ -163,8 +163,10 @@ class SortingPreset:
 
 
 def _printed(name: str, cell: str, total_steps: int) -> SortingPreset:
-    """Return table 3.1; what it does not print is an update every fourth attempt, and a reward
-    in which parking, failures and distance cost as much as a move.
+    """Return table 3.1.
+
+    What it does not print: an update every fourth attempt, and a reward in which parking and
+    failures cost as much as a move.
     """
     return SortingPreset(
         name=name,

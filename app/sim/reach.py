@@ -311,3 +311,11 @@ class ReachBatch(CellBatch):
                 self.world, self.state, int(row), self._work, self._view, self._obs[row]
             )
         return self._obs
+
+    def observe(self) -> NDArray[np.float32]:
+        """Measure distances to people and write all observations anew, (n_envs, obs_size).
+
+        For whoever changes rows from outside.
+        """
+        reach.observe_batch(self.world, self.state, self._work, self._view, self._obs)
+        return self._obs

@@ -7,8 +7,20 @@ from typing import Any
 
 from app.errors import InvalidInput, NotFound
 from app.policies.checkpoint import Checkpoint
-from app.policies.evaluation import people, pick, safety, sorting, tracker
+from app.policies.evaluation import (
+    people,
+    pick,
+    reach_people,
+    reach_random,
+    reach_smoothness,
+    reach_targets,
+    reach_tracker,
+    safety,
+    sorting,
+    tracker,
+)
 from app.policies.evaluation.rows import OnRow, untold
+from app.policies.reach_policy import is_reach
 from app.policies.sorting_policy import is_sorting
 from app.sim.motions import Motion
 
@@ -25,6 +37,13 @@ PROTOCOLS: Mapping[str, Protocol] = MappingProxyType(
         "safety-ssm": safety.run_safety,
         "sorting-grid": sorting.run_grid,
         "sorting-tests": sorting.run_tests,
+        "reach-targets": reach_targets.run_targets,
+        "reach-random": reach_random.run_random,
+        "reach-constant": reach_people.run_constant,
+        "reach-speeds": reach_people.run_speeds,
+        "reach-smoothness": reach_smoothness.run_smoothness,
+        "reach-people": reach_people.run_people,
+        "reach-tracker": reach_tracker.run_tracker,
     }
 )
 """Protocol by name; each takes a checkpoint, ``episodes``, ``seed`` and ``on_row``."""
@@ -32,12 +51,19 @@ WITH_MOTIONS = frozenset({"pick-mocap"})
 """Protocols that take recorded motion."""
 WITHOUT_CHECKPOINT = frozenset({"safety-ssm"})
 """Protocols in which no policy takes part."""
-OF_SORTING = frozenset({"sorting-grid", "sorting-tests"})
-"""Protocols of policies that sort; all others are of policies that reach."""
+OF_SORTING = frozenset(name for name in PROTOCOLS if name.startswith("sorting-"))
+"""Protocols of policies that sort."""
+OF_REACHING = frozenset(name for name in PROTOCOLS if name.startswith("reach-"))
+"""Protocols of policies that reach goals beside walking people; what is left picks."""
 MAX_EPISODES = 100_000
 """Most episodes of one evaluation."""
 MAX_SORTING_EPISODES = 10_000
 """Most episodes of one pair or one test of the sorting task."""
+FEWER_EPISODES: Mapping[str, int] = MappingProxyType(
+    {**dict.fromkeys(OF_SORTING, MAX_SORTING_EPISODES), "reach-targets": 2_000}
+    | {"reach-smoothness": 5_000}
+)
+"""Most episodes of protocols that count them per pair or target, or keep whole paths."""
 
 
 def evaluate(
@@ -90,27 +116,37 @@ def evaluate(
     }
 
 
+def task_of(name: str) -> str:
+    """Return what the policies of a protocol do: ``"sort"``, ``"reach"`` or ``"pick"``."""
+    if name in OF_SORTING:
+        return "sort"
+    return "reach" if name in OF_REACHING else "pick"
+
+
 def default_checkpoint(name: str) -> str:
     """Return the alias of the checkpoint that a protocol measures unless another is named."""
-    return "sorting-e0" if name in OF_SORTING else "pick"
+    return {"sort": "sorting-e0", "reach": "reach", "pick": "pick"}[task_of(name)]
 
 
 def most_episodes(name: str) -> int:
-    """Return how many episodes a protocol runs at most; for sorting, of each pair or test."""
-    return MAX_SORTING_EPISODES if name in OF_SORTING else MAX_EPISODES
+    """Return how many episodes a protocol runs at most; of each pair, test or target."""
+    return FEWER_EPISODES.get(name, MAX_EPISODES)
 
 
 def _check_task(name: str, checkpoint: Checkpoint | None) -> None:
     """Check that a checkpoint is of the scenario that a protocol measures."""
     if checkpoint is None or name in WITHOUT_CHECKPOINT:
         return
-    if is_sorting(checkpoint) != (name in OF_SORTING):
-        wanted = "a policy that sorts" if name in OF_SORTING else "a policy that picks"
-        known = sorted(set(PROTOCOLS) - WITHOUT_CHECKPOINT - OF_SORTING)
-        if is_sorting(checkpoint):
-            known = sorted(OF_SORTING)
+    does = "pick"
+    if is_sorting(checkpoint) or is_reach(checkpoint):
+        does = "sort" if is_sorting(checkpoint) else "reach"
+    if does != task_of(name):
+        others = set(PROTOCOLS) - WITHOUT_CHECKPOINT
+        known = sorted(other for other in others if task_of(other) == does)
         found = checkpoint.manifest["preset"].get("name") or checkpoint.sha256[:12]
-        raise InvalidInput("checkpoint", found, f"must be {wanted} for {name}", known)
+        wanted = {"sort": "sorts", "reach": "reaches", "pick": "picks"}[task_of(name)]
+        rule = f"must be a policy that {wanted} for {name}"
+        raise InvalidInput("checkpoint", found, rule, known)
 
 
 def check_motions(
