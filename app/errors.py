@@ -4,7 +4,8 @@
     ├── NotFound             nothing has that name or id
     ├── InvalidInput         a value breaks a rule: field, value, rule, choices
     │   ├── BadCell          a work cell has faults: all of them, each with its place
-    │   └── BadMotion        a motion file has faults: each with its place
+    │   ├── BadMotion        a motion file has faults: each with its place
+    │   └── GoalOutside      a goal lies beyond what can be answered for: axes and by how much
     ├── Conflict             the request contradicts the present state
     │   └── StaleAttempt     a worker writes about a job that is no longer its own
     ├── StorageUnavailable   the database does not answer for now
@@ -20,6 +21,7 @@ border builds an RFC 9457 problem.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 
 class ServiceError(Exception):
@@ -140,6 +142,47 @@ class BadCell(_Faulty):
 
 class BadMotion(_Faulty):
     """A file of human motion has faults: at least one, each with its line or column."""
+
+
+class Beyond(Protocol):
+    """One coordinate that lies outside its range; ``app.sim.ports.OutsideField`` is one."""
+
+    @property
+    def field(self) -> str: ...  # noqa: D102
+    @property
+    def value(self) -> float: ...  # noqa: D102
+    @property
+    def low(self) -> float: ...  # noqa: D102
+    @property
+    def high(self) -> float: ...  # noqa: D102
+
+
+class GoalOutside(InvalidInput):
+    """A goal lies outside the targets that an answer is made from.
+
+    Args:
+        field: Path of the goal.
+        value: The goal [m].
+        beyond: The coordinates that lie outside, at least one.
+    """
+
+    def __init__(self, field: str, value: Sequence[float], beyond: Sequence[Beyond]) -> None:
+        self.beyond = tuple(
+            {
+                "axis": one.field.rpartition(".")[2],
+                "by_m": one.low - one.value if one.value < one.low else one.value - one.high,
+                "low": one.low,
+                "high": one.high,
+            }
+            for one in beyond
+        )
+        part = "{by_m:.3g} m outside along {axis}, which must lie in [{low:g}, {high:g}] m"
+        told = [part.format(**one) for one in self.beyond]
+        super().__init__(field, list(value), "lies " + "; ".join(told))
+
+    def problem(self) -> dict[str, object]:
+        """Return field, value and rule, and each axis with how far outside it is [m]."""
+        return {**super().problem(), "outside": [dict(one) for one in self.beyond]}
 
 
 class Conflict(ServiceError):

@@ -130,6 +130,8 @@ class Service:
             policy = self.parts.policies.load(DEFAULT_ALIAS)
             warm_up(load_cell(LIVE_CELL))
             warm_up_sorting()
+            for name in SORTERS:
+                warm_up_sorting(self.parts.sorters.load(name))
             cell = LiveCell(load_cell(LIVE_CELL), policy, id=WORLD_ID)
             if self.parts.stopping.is_set():
                 return

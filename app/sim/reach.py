@@ -17,6 +17,7 @@ from app.sim.batch import CellBatch
 from app.sim.cell_parts import GoalRegion, Station
 from app.sim.cell_people import Worker
 from app.sim.cells import Cell
+from app.sim.goal_sets import N_HALTON, halton_targets
 from app.sim.kernels import reach
 from app.sim.kernels.episode import FEATURES, PLAIN
 from app.sim.kernels.geometry import FAR
@@ -42,7 +43,7 @@ from app.sim.worker_motion import REACHING, WorkSettings
 N_ACT = 6
 """Joints a policy moves: all of them."""
 StartRule = Literal["clearance", "uniform", "authors"]
-GoalRule = Literal["grid", "box"]
+GoalRule = Literal["grid", "halton", "box"]
 ViewName = Literal["features", "state"]
 VIEWS = {"state": (PLAIN, N_STATE), "features": (FEATURES, N_FEATURES)}
 """What observations hold: the plain state (4.30), or that and features; and their lengths."""
@@ -68,7 +69,10 @@ class ReachSettings:
     time_limit_s: float = 5.0
     """Longest episode [s]."""
     goals: GoalRule = "grid"
-    """Where goals are drawn from: the grid points of the cell's goal region, or all of it."""
+    """Where goals are drawn from: the grid points of the cell's goal region, the points of a
+    Halton set in it, or all of it."""
+    n_halton: int = N_HALTON
+    """Points of the Halton set; read where ``goals`` is ``halton``."""
     people: tuple[HumanKind, ...] | None = None
     """Who is in the cell, 0 to 4 people; None for the cell's own. A worker whom the cell does
     not describe stands at the table (:func:`with_workplace`)."""
@@ -119,6 +123,8 @@ def stated_rules(cell: Cell, settings: ReachSettings) -> dict[str, Any]:
         "goals": settings.goals,
         "time_limit_s": settings.time_limit_s,
     }
+    if settings.goals == "halton":
+        stated["n_halton"] = settings.n_halton
     if settings.start == "clearance":
         stated["start_clearance_m"] = settings.start_clearance_m
     if settings.start == "authors":
@@ -178,6 +184,17 @@ def goal_region_of(cell: Cell) -> GoalRegion:
     return cell.goal_region
 
 
+def targets_of(region: GoalRegion, settings: ReachSettings) -> Vec:
+    """Return the numbered goals of a region [m], shape (n, 3); the grid's for the rule ``box``.
+
+    Raises:
+        InvalidInput: A Halton set has too few or too many points, or its box no volume.
+    """
+    if settings.goals == "halton":
+        return halton_targets(region, settings.n_halton)
+    return region.targets()
+
+
 def _people_of(cell: Cell, settings: ReachSettings) -> People:
     people = people_of(cell, settings.work)
     if settings.start != "authors":
@@ -190,7 +207,7 @@ def _world_of(cell: Cell, settings: ReachSettings) -> reach.ReachWorld:
     region = goal_region_of(cell)
     middle, half = np.array(region.center), 0.5 * np.array(region.size)
     return reach.ReachWorld(
-        targets=own(region.targets()),
+        targets=own(targets_of(region, settings)),
         low=middle - half,
         high=middle + half,
         arm=arm_of(cell),
@@ -293,4 +310,12 @@ class ReachBatch(CellBatch):
             reach.observe_env(
                 self.world, self.state, int(row), self._work, self._view, self._obs[row]
             )
+        return self._obs
+
+    def observe(self) -> NDArray[np.float32]:
+        """Measure distances to people and write all observations anew, (n_envs, obs_size).
+
+        For whoever changes rows from outside.
+        """
+        reach.observe_batch(self.world, self.state, self._work, self._view, self._obs)
         return self._obs

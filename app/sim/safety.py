@@ -29,6 +29,7 @@ from app.sim.kernels.cylinder import cylinder_clearance
 from app.sim.ports import Vec
 from app.sim.robot import LINK_NAMES
 from app.sim.scene import own, require_finite
+from app.sim.separation import separation_of
 
 UNITS = {
     "human_speed": "m/s",
@@ -260,7 +261,7 @@ class SafetyLayer:
             separation = float(watch.gap[watch_kernel.NOW, column])
             nearest = self._nearest_link(column, people)
             link = LINK_NAMES[arm.link[nearest]]
-            required = self._required(nearest, qd, t_stop, age)
+            required = separation_of(arm, self.settings, qd, nearest, age).required
             person = column // body.N_CAPSULES
             part = column % body.N_CAPSULES
             if column >= n_columns:
@@ -291,12 +292,3 @@ class SafetyLayer:
             return int(least(out)[1])
         x, y, r, top = people.cylinders[column - people.columns.shape[1]]
         return int(cylinder_clearance(robot, 0, x, y, r, top)[1])
-
-    def _required(self, capsule: int, qd: Vec, t_stop: float, age: float) -> float:
-        """Return the standard's S_p for a link as fast as its joints could make it [m]."""
-        arm, settings = self.arm, self.settings
-        joints = slice(0, int(arm.link[capsule]))
-        v_r = float(np.abs(qd[joints]) @ arm.lever[joints])
-        t_r = arm.dt + settings.lead + age
-        way = v_r * t_r + 0.5 * v_r * t_stop
-        return settings.human_speed * (t_r + t_stop) + way + settings.margin

@@ -6,9 +6,22 @@ from types import MappingProxyType
 from typing import Any
 
 from app.errors import InvalidInput, NotFound
-from app.policies.checkpoint import CHOOSING, REACHING, SORTING, Checkpoint, task_of
-from app.policies.evaluation import people, pick, safety, sorting, tracker
+from app.policies.checkpoint import Checkpoint
+from app.policies.evaluation import (
+    people,
+    pick,
+    reach_people,
+    reach_random,
+    reach_smoothness,
+    reach_targets,
+    reach_tracker,
+    safety,
+    sorting,
+    tracker,
+)
 from app.policies.evaluation.rows import OnRow, untold
+from app.policies.reach_policy import is_reach
+from app.policies.sorting_policy import is_sorting
 from app.sim.motions import Motion
 
 Protocol = Callable[..., dict[str, Any]]
@@ -24,6 +37,13 @@ PROTOCOLS: Mapping[str, Protocol] = MappingProxyType(
         "safety-ssm": safety.run_safety,
         "sorting-grid": sorting.run_grid,
         "sorting-tests": sorting.run_tests,
+        "reach-targets": reach_targets.run_targets,
+        "reach-random": reach_random.run_random,
+        "reach-constant": reach_people.run_constant,
+        "reach-speeds": reach_people.run_speeds,
+        "reach-smoothness": reach_smoothness.run_smoothness,
+        "reach-people": reach_people.run_people,
+        "reach-tracker": reach_tracker.run_tracker,
     }
 )
 """Protocol by name; each takes a checkpoint, ``episodes``, ``seed`` and ``on_row``."""
@@ -31,14 +51,19 @@ WITH_MOTIONS = frozenset({"pick-mocap"})
 """Protocols that take recorded motion."""
 WITHOUT_CHECKPOINT = frozenset({"safety-ssm"})
 """Protocols in which no policy takes part."""
-OF_SORTING = frozenset({"sorting-grid", "sorting-tests"})
+OF_SORTING = frozenset(name for name in PROTOCOLS if name.startswith("sorting-"))
 """Protocols of policies that sort."""
-OF_REACHING = frozenset[str]()
-"""Protocols of policies that reach goals; all others are of policies that choose and pick."""
+OF_REACHING = frozenset(name for name in PROTOCOLS if name.startswith("reach-"))
+"""Protocols of policies that reach goals beside walking people; what is left picks."""
 MAX_EPISODES = 100_000
 """Most episodes of one evaluation."""
 MAX_SORTING_EPISODES = 10_000
 """Most episodes of one pair or one test of the sorting task."""
+FEWER_EPISODES: Mapping[str, int] = MappingProxyType(
+    {**dict.fromkeys(OF_SORTING, MAX_SORTING_EPISODES), "reach-targets": 2_000}
+    | {"reach-smoothness": 5_000}
+)
+"""Most episodes of protocols that count them per pair or target, or keep whole paths."""
 
 
 def evaluate(
@@ -91,42 +116,37 @@ def evaluate(
     }
 
 
+def task_of(name: str) -> str:
+    """Return what the policies of a protocol do: ``"sort"``, ``"reach"`` or ``"pick"``."""
+    if name in OF_SORTING:
+        return "sort"
+    return "reach" if name in OF_REACHING else "pick"
+
+
 def default_checkpoint(name: str) -> str:
     """Return the alias of the checkpoint that a protocol measures unless another is named."""
-    return "sorting-e0" if name in OF_SORTING else "pick"
+    return {"sort": "sorting-e0", "reach": "reach", "pick": "pick"}[task_of(name)]
 
 
 def most_episodes(name: str) -> int:
-    """Return how many episodes a protocol runs at most; for sorting, of each pair or test."""
-    return MAX_SORTING_EPISODES if name in OF_SORTING else MAX_EPISODES
-
-
-_POLICIES = {
-    CHOOSING: "a policy that picks",
-    REACHING: "a policy that reaches goals",
-    SORTING: "a policy that sorts",
-}
-
-
-def _task_measured(name: str) -> str:
-    """Return what the policies that a protocol measures are for."""
-    if name in OF_SORTING:
-        return SORTING
-    return REACHING if name in OF_REACHING else CHOOSING
+    """Return how many episodes a protocol runs at most; of each pair, test or target."""
+    return FEWER_EPISODES.get(name, MAX_EPISODES)
 
 
 def _check_task(name: str, checkpoint: Checkpoint | None) -> None:
     """Check that a checkpoint is of the scenario that a protocol measures."""
     if checkpoint is None or name in WITHOUT_CHECKPOINT:
         return
-    wanted, actual = _task_measured(name), task_of(checkpoint)
-    if wanted != actual:
+    does = "pick"
+    if is_sorting(checkpoint) or is_reach(checkpoint):
+        does = "sort" if is_sorting(checkpoint) else "reach"
+    if does != task_of(name):
+        others = set(PROTOCOLS) - WITHOUT_CHECKPOINT
+        known = sorted(other for other in others if task_of(other) == does)
         found = checkpoint.manifest["preset"].get("name") or checkpoint.sha256[:12]
-        fitting = set(PROTOCOLS) - WITHOUT_CHECKPOINT
-        known = sorted(one for one in fitting if _task_measured(one) == actual)
-        raise InvalidInput(
-            "checkpoint", found, f"must be {_POLICIES[wanted]} for {name}", known
-        )
+        wanted = {"sort": "sorts", "reach": "reaches", "pick": "picks"}[task_of(name)]
+        rule = f"must be a policy that {wanted} for {name}"
+        raise InvalidInput("checkpoint", found, rule, known)
 
 
 def check_motions(

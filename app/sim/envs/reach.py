@@ -84,8 +84,9 @@ class ReachEnv(SingleEnv):
     c_s 20) or, to learn with, ``PROGRESS_WEIGHTS`` (c_p 1, c_step 0.004, c_c 4, c_s 4).
 
     ## Start
-    The robot rests at home; the goal is one of the 54 points of the cell's grid, or anywhere in
-    its box (``goals="box"``). Cylinders start anywhere in their area, workers at a random time
+    The robot rests at home; the goal is one of the 54 points of the cell's grid, one of the
+    ``n_halton`` points of a Halton set (``goals="halton"``), or anywhere in the box of both
+    (``goals="box"``). Cylinders start anywhere in their area, workers at a random time
     of a random script of reaches. ``start="clearance"`` draws people again who are nearer than
     0.05 m; ``"uniform"`` does not; ``"authors"`` does not either, and they walk as in the
     authors' code.

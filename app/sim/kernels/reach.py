@@ -333,6 +333,19 @@ def observe_env(
 
 
 @kernel(nogil=True)
+def observe_batch(
+    world: ReachWorld, state: ReachState, work: Work, view: int, obs: Obs
+) -> None:
+    """Measure all distances to people and write all observations anew, as rows are now."""
+    for e in range(state.q.shape[0]):
+        place_robot(world.arm, state.q[e], work.robot)
+        place_people(world.people, state.people, e, work.crowd)
+        clear = people_clearance(world.people, work.robot.columns, work.crowd)
+        state.clear[e, 0] = clear
+        write_obs(world, state, e, work, view, obs[e])
+
+
+@kernel(nogil=True)
 def step_batch(
     world: ReachWorld,
     rules: ReachRules,
