@@ -24,31 +24,36 @@ FIRST_RESIDUAL = 0.05
 
 
 class ResidualActor(nn.Module):
-    """Maps observations to actions in [-1, 1].
+    """Maps observations to actions in [-1, 1], on top of a base motion among what it sees.
 
     Args:
         width: Units per hidden layer.
         n_obs: Length of observations.
+        n_act: Numbers of an action.
+        base: Where in an observation the base motion starts.
+        layers: Hidden layers.
     """
 
-    def __init__(self, width: int, n_obs: int = N_FEATURES) -> None:
+    def __init__(
+        self,
+        width: int,
+        n_obs: int = N_FEATURES,
+        n_act: int = CONTROLLED,
+        base: int = BASE_START,
+        layers: int = 2,
+    ) -> None:
         super().__init__()
-        last = nn.Linear(width, CONTROLLED)
+        last = nn.Linear(width, n_act)
         with torch.no_grad():
             last.weight.mul_(FIRST_RESIDUAL)
             last.bias.zero_()
-        self.net = nn.Sequential(
-            nn.Linear(n_obs, width),
-            nn.ReLU(),
-            nn.Linear(width, width),
-            nn.ReLU(),
-            last,
-        )
+        self.net = nn.Sequential(*hidden(n_obs, width, layers), last)
+        self.base = slice(base, base + n_act)
 
     def forward(self, obs: torch.Tensor) -> torch.Tensor:
-        """Return actions, shape (n, 5), for observations, shape (n, n_obs)."""
-        base = obs[:, BASE_START : BASE_START + CONTROLLED]
-        return torch.tanh(self.net(obs) + torch.atanh(BASE_WEIGHT * base.clamp(-1.0, 1.0)))
+        """Return actions, shape (n, n_act), for observations, shape (n, n_obs)."""
+        base = obs[:, self.base].clamp(-1.0, 1.0)
+        return torch.tanh(self.net(obs) + torch.atanh(BASE_WEIGHT * base))
 
 
 class PlainActor(nn.Module):

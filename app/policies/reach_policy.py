@@ -18,11 +18,12 @@ from app.policies.checkpoint import (
     require_purpose,
     task_of,
 )
-from app.policies.reach_preset import action_of
+from app.policies.networks import BASE_WEIGHT
+from app.policies.reach_preset import ACTORS, action_of
 from app.policies.trained_cell import cell_of
 from app.sim.actions import ActionSettings
 from app.sim.goal_sets import MOST_HALTON, N_HALTON, halton_targets
-from app.sim.kernels.reach_features import SIZES, STATE_SIZES
+from app.sim.kernels.reach_features import BASE_START, SIZES, STATE_SIZES
 from app.sim.ports import Vec
 from app.sim.reach import N_ACT, GoalRule, ViewName, goal_region_of
 
@@ -74,6 +75,7 @@ class ReachPolicy:
         self.n_obs = sum(size for _, size in manifest["layout"])
         """Length of an observation."""
         self._layers = _layers_of(checkpoint.arrays(), self.n_obs)
+        self._residual = _named(preset, "actor", ACTORS) == "residual"
 
     @property
     def checkpoint(self) -> str:
@@ -123,6 +125,9 @@ class ReachPolicy:
         weight, bias = self._layers[-1]
         rows = rows @ weight
         rows += bias
+        if self._residual:
+            base = np.clip(obs[:, BASE_START : BASE_START + N_ACT], -1.0, 1.0)
+            rows += np.arctanh(np.float32(BASE_WEIGHT) * base)
         return cast(NDArray[np.float32], np.tanh(rows, out=rows))
 
 

@@ -10,6 +10,8 @@ from app.sim.actions import BOUNDS, MEANINGS, ActionSettings
 from app.sim.goal_sets import MOST_HALTON, N_HALTON
 from app.sim.reach import GoalRule, StartRule, ViewName
 
+ACTORS = ("residual", "plain")
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReachPreset:
@@ -51,6 +53,9 @@ class ReachPreset:
     )
     width: int = number(256, 16, 1024, "units", "width of the hidden layers")
     layers: int = number(2, 1, 12, "", "hidden layers")
+    actor: str = choice(
+        "residual", ACTORS, "acts on top of the straight way to the goal, or on its own"
+    )
     critic_norm: str = choice("layer", ("layer", "none"), "normalisation in the critics")
     n_critics: int = number(2, 1, 10, "", "critics; the least value counts")
     alpha: float = number(0.0, 0.0, 1.0, "", "exponent of replay priorities; 0 draws evenly")
@@ -131,6 +136,10 @@ class ReachPreset:
                 self.action_bounds,
                 "must be viable with action_degree = 3",
             )
+        if self.actor == "residual" and self.observation == "state":
+            raise InvalidInput(
+                "overrides.actor", self.actor, "must be plain with observation = state"
+            )
         check_learning(self.learning_starts, self.total_steps, self.buffer_size, self.n_envs)
 
 
@@ -154,6 +163,7 @@ THESIS = ReachPreset(
     actor_frozen_updates=0,
     width=400,
     layers=10,
+    actor="plain",
     critic_norm="none",
     n_critics=1,
     alpha=0.6,

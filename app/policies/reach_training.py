@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from app.policies.checkpoint import Checkpoint
 from app.policies.exploration import Explorer, LadderNoise, OUNoise
-from app.policies.networks import Critics, PlainActor
+from app.policies.networks import Critics, PlainActor, ResidualActor
 from app.policies.progress import Progress
 from app.policies.ranges import Ranges
 from app.policies.reach_policy import LAYOUTS
@@ -26,6 +26,7 @@ from app.policies.td3 import BatchTD3, Extras, Networks, critics_of
 from app.policies.vecenv import CellVecEnv
 from app.sim.cells import Cell
 from app.sim.kernels.occupancy import VX, VY, R, X, Y
+from app.sim.kernels.reach_features import BASE_START
 from app.sim.kernels.reach_reward import ReachWeights
 from app.sim.pick import OUTCOMES
 from app.sim.ports import Vec
@@ -80,8 +81,14 @@ def _explorer(preset: ReachPreset, batch: ReachBatch, seed: int) -> Explorer:
 
 def _networks(preset: ReachPreset, n_obs: int) -> Networks:
     width, layers = preset.width, preset.layers
+
+    def actor() -> ResidualActor | PlainActor:
+        if preset.actor == "residual":
+            return ResidualActor(width, n_obs, N_ACT, BASE_START, layers)
+        return PlainActor(width, n_obs, N_ACT, layers)
+
     return Networks(
-        actor=lambda: PlainActor(width, n_obs, N_ACT, layers),
+        actor=actor,
         critic=lambda: Critics(
             width, n_obs, N_ACT, preset.n_critics, layers, preset.critic_norm == "layer"
         ),

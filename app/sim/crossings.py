@@ -237,9 +237,7 @@ def _walk(cell: Cell, home: Vec, seed: int, number: int) -> Crossing:
         there, course = _across(home, goal, rng)
         dt = cell.robot.dt
         times = dt * np.arange(math.ceil((arrival + dwell + FAR / speed) / dt) + 1)
-        way = np.where(
-            times < arrival, times - arrival, np.maximum(0.0, times - arrival - dwell)
-        )
+        way = np.where(times < arrival, times - arrival, np.maximum(0.0, times - arrival - dwell))
         track = np.empty((len(times), 3))
         track[:, :2] = there + speed * way[:, None] * course
         track[:, 2] = radius

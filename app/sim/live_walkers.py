@@ -40,7 +40,6 @@ from app.sim.kernels.occupancy import (
     VY,
     WALKING,
     R,
-    WalkerRules,
     X,
     Y,
     advance_walker,
@@ -83,7 +82,6 @@ UPRIGHT = BodyView(
     shoulders_m=MEDIAN.clavicle_r + MEDIAN.clavicle_l,
 )
 """The size of the mannequin inside a cylinder."""
-
 
 class LiveWalkers:
     """The people of one live reach cell; row ``id`` of each array is that person's.

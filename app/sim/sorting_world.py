@@ -24,9 +24,9 @@ from app.errors import ServiceError
 from app.sim import commands, explanation, sorting_commands
 from app.sim.cells import Cell
 from app.sim.commands import Command
-from app.sim.live_sorter import Choice, LiveSorter
 from app.sim.live_arm import Bodies
 from app.sim.live_people import LivePeople
+from app.sim.live_sorter import Choice, LiveSorter
 from app.sim.live_stage import CONTACT_HOLD_S, LiveStage, PeopleCommand
 from app.sim.ports import Candidate, SortingValues, TaskPolicy, Vec
 from app.sim.snapshot import Counters, Status, WorldSnapshot
@@ -214,7 +214,9 @@ class SortingWorld:
         """Carry out the action, the people having moved from where they were."""
         stage, descent = self._stage, self._descent
         straight = descent is not None or stage.decision is None
-        found = stage.robot.advance(self._action(), stage.people, before, straight=straight)
+        found = stage.robot.advance(
+            self._action(), stage.people, before, straight=straight
+        )
         if found.kind != "none":
             self._descent = None
             stage.note_contact(found)

@@ -19,7 +19,6 @@ from app.sim.ports import ReachActor
 from app.sim.reach import ReachBatch, ReachSettings, goal_region_of
 from tests.policies.untrained import untrained_reach
 
-
 SEEN = {"observation": "features"}
 
 
