@@ -4,8 +4,16 @@ import logging
 
 from app.errors import Conflict, InvalidInput, NotFound
 from app.policies.presets import Preset
+from app.policies.reach_preset import ReachPreset
 from app.policies.sorting_preset import SortingPreset
-from app.sim.cells import Cell, cell_names, lacks_for_pick, load_cell, parse_definition
+from app.sim.cells import (
+    Cell,
+    cell_names,
+    lacks_for_pick,
+    lacks_for_reach,
+    load_cell,
+    parse_definition,
+)
 from app.sim.sorting_cell import lacks_for_tasks
 from app.store.cells import get_cell, list_cells, put_cell, remove_cell
 from app.store.engine import Store
@@ -15,8 +23,9 @@ logger = logging.getLogger(__name__)
 
 def lacks_for_training(preset: Preset, cell: Cell) -> str | None:
     """Say what a cell lacks to train a preset in; None where nothing."""
-    sorts = isinstance(preset, SortingPreset)
-    return lacks_for_tasks(cell) if sorts else lacks_for_pick(cell)
+    if isinstance(preset, SortingPreset):
+        return lacks_for_tasks(cell)
+    return lacks_for_reach(cell) if isinstance(preset, ReachPreset) else lacks_for_pick(cell)
 
 
 class CellCatalog:

@@ -25,7 +25,7 @@ from app.errors import CheckpointMismatch, InvalidInput
 FORMAT = "tandem-checkpoint/1"
 MAX_BYTES = 16 * 1024 * 1024
 """Largest tensors blob taken [bytes]; a database row holds it."""
-CHOOSING, SORTING = "choosing tasks", "sorting"
+CHOOSING, REACHING, SORTING = "choosing tasks", "reaching goals", "sorting"
 """What policies are for."""
 REQUIRED = {
     "format": str,
@@ -146,9 +146,19 @@ def expect_layout(checkpoint: Checkpoint, layout: list[list[Any]], act_size: int
 
 
 def purpose_of(manifest: Mapping[str, Any]) -> str:
-    """Return what a checkpoint's policy is for: it sorts if it sees towers."""
+    """Return what a checkpoint's policy is for, by what it sees.
+
+    It sorts if it sees towers, and reaches goals if people are cylinders to it.
+    """
     groups = [entry[0] for entry in manifest["layout"] if isinstance(entry, list) and entry]
-    return SORTING if "towers" in groups else CHOOSING
+    if "towers" in groups:
+        return SORTING
+    return REACHING if "human" in groups else CHOOSING
+
+
+def task_of(checkpoint: Checkpoint) -> str:
+    """Return what a checkpoint's policy is for."""
+    return purpose_of(checkpoint.manifest)
 
 
 def require_purpose(checkpoint: Checkpoint, purpose: str) -> None:

@@ -1,13 +1,15 @@
-"""The networks of TD3: a residual actor and critics with layer normalisation.
+"""The networks of TD3: actors, and critics with layer normalisation.
 
-The actor adds to a base motion that is part of the observation,
+The residual actor adds to a base motion that is part of the observation,
 ``tanh(atanh(0.9 base) + net)``; its last layer starts near zero, so that the untrained policy
-is the straight joint move. These plain modules decide in the service; ``td3.py`` trains the
-same modules inside Stable-Baselines3.
+is the straight joint move. The plain actor has no base: untrained, it holds still. These plain
+modules decide in the service; ``td3.py`` trains the same modules inside Stable-Baselines3.
 
 Source: thesis section 5.3.4 (TD3); Lillicrap et al. 2016 and Fujimoto et al. 2018 for the
 losses. Deviates: the residual action and layer normalisation are ours.
 """
+
+from functools import reduce
 
 import torch
 from torch import nn
@@ -22,31 +24,70 @@ FIRST_RESIDUAL = 0.05
 
 
 class ResidualActor(nn.Module):
-    """Maps observations to actions in [-1, 1].
+    """Maps observations to actions in [-1, 1], on top of a base motion among what it sees.
 
     Args:
         width: Units per hidden layer.
         n_obs: Length of observations.
+        n_act: Numbers of an action.
+        base: Where in an observation the base motion starts.
+        layers: Hidden layers.
     """
 
-    def __init__(self, width: int, n_obs: int = N_FEATURES) -> None:
+    def __init__(
+        self,
+        width: int,
+        n_obs: int = N_FEATURES,
+        n_act: int = CONTROLLED,
+        base: int = BASE_START,
+        layers: int = 2,
+    ) -> None:
         super().__init__()
-        last = nn.Linear(width, CONTROLLED)
+        last = nn.Linear(width, n_act)
         with torch.no_grad():
             last.weight.mul_(FIRST_RESIDUAL)
             last.bias.zero_()
-        self.net = nn.Sequential(
-            nn.Linear(n_obs, width),
-            nn.ReLU(),
-            nn.Linear(width, width),
-            nn.ReLU(),
-            last,
-        )
+        self.net = nn.Sequential(*hidden(n_obs, width, layers), last)
+        self.base = slice(base, base + n_act)
 
     def forward(self, obs: torch.Tensor) -> torch.Tensor:
-        """Return actions, shape (n, 5), for observations, shape (n, n_obs)."""
-        base = obs[:, BASE_START : BASE_START + CONTROLLED]
-        return torch.tanh(self.net(obs) + torch.atanh(BASE_WEIGHT * base.clamp(-1.0, 1.0)))
+        """Return actions, shape (n, n_act), for observations, shape (n, n_obs)."""
+        base = obs[:, self.base].clamp(-1.0, 1.0)
+        return torch.tanh(self.net(obs) + torch.atanh(BASE_WEIGHT * base))
+
+
+class PlainActor(nn.Module):
+    """Maps observations to actions in [-1, 1], with no motion to start from.
+
+    Args:
+        width: Units per hidden layer.
+        n_obs: Numbers it sees, the first ones of an observation.
+        n_act: Numbers of an action.
+        layers: Hidden layers.
+    """
+
+    def __init__(self, width: int, n_obs: int, n_act: int, layers: int = 2) -> None:
+        super().__init__()
+        self.n_obs = n_obs
+        self.net = nn.Sequential(*hidden(n_obs, width, layers), nn.Linear(width, n_act))
+        with torch.no_grad():
+            self.net[-1].weight.mul_(FIRST_RESIDUAL)  # type: ignore[operator]
+            self.net[-1].bias.zero_()  # type: ignore[operator]
+
+    def forward(self, obs: torch.Tensor) -> torch.Tensor:
+        """Return actions, shape (n, n_act), for observations, shape (n, n_obs or more)."""
+        return torch.tanh(self.net(obs[:, : self.n_obs]))
+
+
+def hidden(n_in: int, width: int, layers: int, normed: bool = False) -> list[nn.Module]:
+    """Return hidden layers of rectified units, each normalised or none."""
+    made: list[nn.Module] = []
+    for layer in range(layers):
+        made.append(nn.Linear(width if layer else n_in, width))
+        if normed:
+            made.append(nn.LayerNorm(width))
+        made.append(nn.ReLU())
+    return made
 
 
 class QNetwork(nn.Sequential):
@@ -55,39 +96,58 @@ class QNetwork(nn.Sequential):
     Args:
         width: Units per hidden layer.
         n_obs: Length of observations.
+        n_act: Numbers of an action.
+        layers: Hidden layers.
+        normed: Whether they are normalised.
     """
 
-    def __init__(self, width: int, n_obs: int = N_FEATURES) -> None:
-        super().__init__(
-            nn.Linear(n_obs + CONTROLLED, width),
-            nn.LayerNorm(width),
-            nn.ReLU(),
-            nn.Linear(width, width),
-            nn.LayerNorm(width),
-            nn.ReLU(),
-            nn.Linear(width, 1),
-        )
+    def __init__(
+        self,
+        width: int,
+        n_obs: int = N_FEATURES,
+        n_act: int = CONTROLLED,
+        layers: int = 2,
+        normed: bool = True,
+    ) -> None:
+        super().__init__(*hidden(n_obs + n_act, width, layers, normed), nn.Linear(width, 1))
 
 
-class TwinCritic(nn.Module):
-    """The two value functions of TD3.
+class Critics(nn.Module):
+    """The value functions ``q1``, ``q2``, ...: two of them in TD3, one in DDPG.
 
     Args:
         width: Units per hidden layer.
         n_obs: Length of observations.
+        n_act: Numbers of an action.
+        n_critics: Number of value functions.
+        layers: Hidden layers of each.
+        normed: Whether they are normalised.
     """
 
-    def __init__(self, width: int, n_obs: int = N_FEATURES) -> None:
+    def __init__(
+        self,
+        width: int,
+        n_obs: int = N_FEATURES,
+        n_act: int = CONTROLLED,
+        n_critics: int = 2,
+        layers: int = 2,
+        normed: bool = True,
+    ) -> None:
         super().__init__()
-        self.q1 = QNetwork(width, n_obs)
-        self.q2 = QNetwork(width, n_obs)
+        self.n_critics = n_critics
+        for number in range(1, n_critics + 1):
+            self.add_module(f"q{number}", QNetwork(width, n_obs, n_act, layers, normed))
 
     def forward(self, obs: torch.Tensor, act: torch.Tensor) -> tuple[torch.Tensor, ...]:
-        """Return both values, shape (n, 1) each, of (n, n_obs) and (n, 5)."""
+        """Return all values, shape (n, 1) each, of (n, n_obs) and (n, n_act)."""
         both = torch.cat([obs, act], dim=1)
-        return self.q1(both), self.q2(both)
+        return tuple(q(both) for q in self.children())
 
     def least(self, obs: torch.Tensor, act: torch.Tensor) -> torch.Tensor:
-        """Return the smaller of both values, shape (n,): the cautious estimate."""
-        q1, q2 = self.forward(obs, act)
-        return torch.minimum(q1, q2).squeeze(1)
+        """Return the smallest of all values, shape (n,): the cautious estimate."""
+        return reduce(torch.minimum, self.forward(obs, act)).squeeze(1)
+
+    def first(self, obs: torch.Tensor, act: torch.Tensor) -> torch.Tensor:
+        """Return the first value, shape (n, 1), which an actor climbs."""
+        value: torch.Tensor = next(self.children())(torch.cat([obs, act], dim=1))
+        return value

@@ -8,18 +8,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.policies.checkpoint import Checkpoint
+from app.policies.exploration import OptionNoise
+from app.policies.networks import Critics, ResidualActor
 from app.policies.pick_preset import PickPreset
 from app.policies.progress import Progress
+from app.policies.ranges import Ranges
 from app.policies.reporter import Reporter
 from app.policies.run import Parts, TrainingRun
-from app.policies.td3 import PickTD3, twin_of
-from app.policies.vecenv import PickVecEnv
+from app.policies.td3 import BatchTD3, Networks, critics_of
+from app.policies.vecenv import CellVecEnv
 from app.sim.cells import Cell
 from app.sim.kernels.arm import CONTROLLED
 from app.sim.kernels.features import BODY_SIZES, SIZES
 from app.sim.kernels.people import ABSENT
 from app.sim.kernels.reward import RewardWeights
 from app.sim.pick import PickBatch, PickSettings
+from app.sim.ports import Vec
 from app.sim.scene import HumanKind
 from app.sim.worker_motion import WorkSettings
 
@@ -32,33 +36,14 @@ RANGE_EVERY = 8
 """Vector steps between two looks at the range of the states."""
 
 
-class _Ranges:
-    """Least and greatest value of every state variable met in training."""
-
-    def __init__(self, known: Mapping[str, Any] | None) -> None:
-        known = known or {}
-        self._low = {name: np.array(entry["low"]) for name, entry in known.items()}
-        self._high = {name: np.array(entry["high"]) for name, entry in known.items()}
-
-    def look(self, batch: PickBatch) -> None:
-        state, people = batch.state, batch.state.people
-        there = people.track != ABSENT
-        met = {"q": state.q, "qd": state.qd, "goal": state.goal}
-        if there.any():
-            met |= {"human_q": people.q[there], "human_qd": people.qd[there]}
-        for name, rows in met.items():
-            low, high = rows.min(axis=0), rows.max(axis=0)
-            self._low[name] = np.minimum(self._low.get(name, low), low)
-            self._high[name] = np.maximum(self._high.get(name, high), high)
-
-    def as_json(self) -> dict[str, dict[str, list[float]]]:
-        return {
-            name: {
-                "low": [round(float(value), 5) for value in self._low[name]],
-                "high": [round(float(value), 5) for value in self._high[name]],
-            }
-            for name in self._low
-        }
+def states_met(batch: PickBatch) -> dict[str, Vec]:
+    """Return the states that all cells are in."""
+    state, people = batch.state, batch.state.people
+    there = people.track != ABSENT
+    met = {"q": state.q, "qd": state.qd, "goal": state.goal}
+    if there.any():
+        met |= {"human_q": people.q[there], "human_qd": people.qd[there]}
+    return met
 
 
 def work_of(preset: Mapping[str, Any], seed: int = 0) -> WorkSettings:
@@ -112,9 +97,11 @@ class Watched:
 
     n_greedy: int
     """Cells without exploration, the first ones."""
-    env: PickVecEnv
+    batch: PickBatch
     """All cells."""
-    ranges: _Ranges
+    env: CellVecEnv
+    """The same, as they are trained on."""
+    ranges: Ranges
     """Range of the states."""
 
 
@@ -133,14 +120,24 @@ def start(
         cell: Work cell trained in.
     """
     first = 0 if resume is None else int(resume.manifest["step"])
-    env = PickVecEnv(PickBatch(cell, preset.n_envs, seed + first, settings_of(preset)))
-    model = PickTD3(preset, env, seed + first)
-    ranges = _Ranges(resume.manifest["trained_range"] if resume else None)
+    batch = PickBatch(cell, preset.n_envs, seed + first, settings_of(preset))
+    env, rng = CellVecEnv(batch), np.random.default_rng(seed + first)
+    model = BatchTD3(
+        preset,
+        env,
+        seed + first,
+        exploration=OptionNoise(preset, batch, rng),
+        networks=Networks(
+            actor=lambda: ResidualActor(preset.width, batch.obs_size),
+            critic=lambda: Critics(preset.width, batch.obs_size),
+        ),
+    )
+    ranges = Ranges(resume.manifest["trained_range"] if resume else None)
     parts = Parts(
-        policy={"actor": model.actor.mu, "critic": twin_of(model.critic)},
+        policy={"actor": model.actor.mu, "critic": critics_of(model.critic)},
         targets={
             "actor_target": model.actor_target.mu,
-            "critic_target": twin_of(model.critic_target),
+            "critic_target": critics_of(model.critic_target),
         },
         optimizers={
             "actor_adam": model.actor.optimizer,
@@ -151,7 +148,8 @@ def start(
         trained_range=ranges.as_json,
     )
     run = TrainingRun(preset, seed, cell, model, env, parts, resume)
-    return run, Watched(n_greedy=model.exploration.n_greedy, env=env, ranges=ranges)
+    n_greedy = model.exploration.n_greedy
+    return run, Watched(n_greedy=n_greedy, batch=batch, env=env, ranges=ranges)
 
 
 class PickReporter(Reporter):
@@ -187,7 +185,7 @@ class PickReporter(Reporter):
         self._total_return += float(self._returns[:n][finished].sum())
         self._returns[ended > 0] = 0.0
         if (self.num_timesteps // len(rewards)) % RANGE_EVERY == 0:
-            self._watched.ranges.look(self._watched.env.batch)
+            self._watched.ranges.look(states_met(self._watched.batch))
 
     def rates(self) -> dict[str, Any]:
         """Return how the episodes since the last point ended."""

@@ -3,7 +3,7 @@
 A training job names a preset, a seed and overrides. Overrides are checked here, field by field;
 this module imports no learning library, so that the service can check and describe presets
 cheaply. What a preset holds is said where its class is: ``pick_preset.py``,
-``sorting_preset.py``.
+``reach_preset.py``, ``sorting_preset.py``.
 """
 
 import dataclasses
@@ -15,12 +15,13 @@ from typing import Any
 from app.errors import InvalidInput, NotFound
 from app.policies.pick_preset import PickPreset
 from app.policies.preset_fields import FieldInfo, checked, describe
+from app.policies.reach_preset import REACH_PRESETS, ReachPreset
 from app.policies.sorting_preset import SORTING_PRESETS, SortingPreset
 
-Preset = PickPreset | SortingPreset
+Preset = PickPreset | ReachPreset | SortingPreset
 
 PRESETS: Mapping[str, Preset] = MappingProxyType(
-    {"pick-td3": PickPreset(), **{one.name: one for one in SORTING_PRESETS}}
+    {one.name: one for one in (PickPreset(), *REACH_PRESETS, *SORTING_PRESETS)}
 )
 """Every preset by name."""
 

@@ -30,7 +30,7 @@ class ReplaySamples(NamedTuple):
     observations: torch.Tensor
     """(B, obs_size)."""
     actions: torch.Tensor
-    """(B,), integers."""
+    """(B,) integers of a discrete action, or (B, n_act)."""
     rewards: torch.Tensor
     """Discounted sums of rewards, (B,)."""
     next_observations: torch.Tensor
@@ -201,13 +201,18 @@ class PrioritisedReplay(ReplayBuffer):
         weights = (size * self.n_envs * chances) ** -beta
         return ReplaySamples(
             observations=torch.as_tensor(self.observations[rows, envs]),
-            actions=torch.as_tensor(self.actions[rows, envs, 0].astype(np.int64)),
+            actions=torch.as_tensor(self._actions_of(rows, envs)),
             rewards=torch.as_tensor(returns, dtype=torch.float32),
             next_observations=torch.as_tensor(self.next_observations[last, envs]),
             discounts=torch.as_tensor(discounts, dtype=torch.float32),
             weights=torch.as_tensor(weights / weights.max(), dtype=torch.float32),
             indices=leaves,
         )
+
+    def _actions_of(self, rows: Ints, envs: Ints) -> NDArray[Any]:
+        if isinstance(self.action_space, spaces.Discrete):
+            return np.asarray(self.actions[rows, envs, 0].astype(np.int64))
+        return np.asarray(self.actions[rows, envs])
 
     def update(self, indices: Ints, errors: NDArray[np.floating]) -> None:
         """Set priorities by temporal-difference errors.

@@ -158,9 +158,7 @@ class SharedNetwork(nn.Module):
         ]
         return torch.cat(parts, dim=2)
 
-    def _advantages(
-        self, out: Tensor, clutter: Tensor, towers: Tensor, fail: Tensor
-    ) -> Tensor:
+    def _advantages(self, out: Tensor, clutter: Tensor, towers: Tensor, fail: Tensor) -> Tensor:
         """Turn what the towers say, (B, C, outputs), into advantages of all moves.
 
         A tower's gain from an object is one number, wherever the object comes from; one that

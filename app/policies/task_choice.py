@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from app.errors import CheckpointMismatch, InvalidInput
 from app.policies.checkpoint import Checkpoint, expect_layout
-from app.policies.networks import ResidualActor, TwinCritic
+from app.policies.networks import Critics, ResidualActor
 from app.policies.pick_preset import action_of
 from app.policies.pick_training import LAYOUTS
 from app.policies.trained_cell import cell_of
@@ -56,7 +56,7 @@ class ValueNetworks:
         self.n_obs = sum(size for _, size in checkpoint.manifest["layout"])
         """Length of the observations."""
         self.actor = ResidualActor(width, self.n_obs)
-        self.critic = TwinCritic(width, self.n_obs)
+        self.critic = Critics(width, self.n_obs)
         arrays = checkpoint.arrays()
         for name, module in (("actor", self.actor), ("critic", self.critic)):
             start = f"{name}."

@@ -1,16 +1,19 @@
 """TD3 on Stable-Baselines3, with what it lacks added at its extension points.
 
-Own networks (residual actor, normalised critics), exploration over batched rows in place of one
-action noise, and an actor that stays frozen until the critics mean something. Replay with
-n-step returns is Stable-Baselines3's own.
+Own networks, exploration over batched rows in place of one action noise, and an actor that may
+stay frozen until the critics mean something. One class serves every scenario that moves the
+arm, and DDPG too: that is TD3 with one critic, no delay and no noise on targets. Replay with
+n-step returns is Stable-Baselines3's own, or ``replay.py`` where it is prioritised.
 
 Source: Fujimoto, van Hoof, Meger, *Addressing function approximation error in actor-critic
-methods* (2018); thesis section 2.7.2.
+methods* (2018); Lillicrap et al., *Continuous control with deep reinforcement learning* (2016);
+thesis sections 2.7.2 and 4.4.
 """
 
-from typing import Any
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
 
-import numpy as np
 import torch
 from numpy.typing import NDArray
 from stable_baselines3 import TD3
@@ -18,70 +21,172 @@ from stable_baselines3.common.policies import ContinuousCritic
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.common.utils import polyak_update
 from stable_baselines3.td3.policies import Actor, TD3Policy
+from torch import Tensor, nn
 from torch.nn import functional
 
-from app.policies.exploration import Exploration
-from app.policies.networks import ResidualActor, TwinCritic
-from app.policies.pick_preset import PickPreset
-from app.policies.vecenv import PickVecEnv
+from app.policies.exploration import Explorer
+from app.policies.networks import Critics
+from app.policies.replay import Ints, PrioritisedReplay
+from app.policies.vecenv import CellVecEnv
+
+
+class TD3Numbers(Protocol):
+    """The hyper-parameters of TD3; ``PickPreset`` and ``ReachPreset`` say what they are."""
+
+    @property
+    def buffer_size(self) -> int: ...  # noqa: D102
+    @property
+    def batch_size(self) -> int: ...  # noqa: D102
+    @property
+    def learning_starts(self) -> int: ...  # noqa: D102
+    @property
+    def lr_start(self) -> float: ...  # noqa: D102
+    @property
+    def lr_end(self) -> float: ...  # noqa: D102
+    @property
+    def gamma(self) -> float: ...  # noqa: D102
+    @property
+    def n_steps(self) -> int: ...  # noqa: D102
+    @property
+    def tau(self) -> float: ...  # noqa: D102
+    @property
+    def policy_delay(self) -> int: ...  # noqa: D102
+    @property
+    def target_noise(self) -> float: ...  # noqa: D102
+    @property
+    def target_noise_clip(self) -> float: ...  # noqa: D102
+    @property
+    def actor_frozen_updates(self) -> int: ...  # noqa: D102
+    @property
+    def width(self) -> int: ...  # noqa: D102
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Networks:
+    """How the networks of a training are made."""
+
+    actor: Callable[[], nn.Module]
+    """Returns a new actor."""
+    critic: Callable[[], Critics]
+    """Returns new critics."""
+    fused: bool = False
+    """Whether Adam's steps are fused: the same formula, rounded otherwise, in less time."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Extras:
+    """What a training may have beyond plain TD3; nothing by default."""
+
+    update_every: int = 1
+    """Vector steps per update."""
+    actor_lr_ratio: float = 1.0
+    """Learning rate of the actor over that of the critics."""
+    alpha: float = 0.0
+    """Exponent of replay priorities; 0 draws evenly."""
+    beta: float = 1.0
+    """Exponent of the importance weights at the start; it grows to 1."""
+
+
+PLAIN = Extras()
+
+
+class Minibatch(NamedTuple):
+    """What one update learns from, ``B`` n-step transitions."""
+
+    obs: Tensor
+    """(B, obs_size)."""
+    act: Tensor
+    """(B, n_act)."""
+    rewards: Tensor
+    """Discounted sums of rewards, (B, 1)."""
+    next_obs: Tensor
+    """Where the sums end, (B, obs_size)."""
+    discounts: Tensor
+    """What the value there is multiplied by; 0 where the episode ended, (B, 1)."""
+    weights: Tensor | None = None
+    """Importance weights, (B, 1); None: all equal."""
+    indices: Ints | None = None
+    """Places in a prioritised replay memory, (B,)."""
 
 
 class _SB3Actor(Actor):
-    """Stable-Baselines3's actor with :class:`ResidualActor` in place of its own network."""
+    """Stable-Baselines3's actor with one of ours in place of its own network."""
 
-    def __init__(self, *args: Any, **kwargs: Any) -> None:
+    def __init__(self, *args: Any, networks: Networks, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
-        self.mu = ResidualActor(self.net_arch[0], self.features_dim)  # type: ignore[assignment]
+        self.mu = networks.actor()  # type: ignore[assignment]
 
 
 class _SB3Critic(ContinuousCritic):
-    """Stable-Baselines3's critic with :class:`TwinCritic` in place of its own networks."""
+    """Stable-Baselines3's critic with :class:`Critics` in place of its own networks."""
 
-    def __init__(self, *args: Any, **kwargs: Any) -> None:
+    def __init__(self, *args: Any, networks: Networks, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         for index in range(self.n_critics):
             delattr(self, f"qf{index}")
-        self.twin = TwinCritic(kwargs["net_arch"][0], kwargs["features_dim"])
-        self.q_networks = [self.twin.q1, self.twin.q2]
+        self.own = networks.critic()
+        self.q_networks = list(self.own.children())
 
 
-def twin_of(critic: ContinuousCritic) -> TwinCritic:
+def critics_of(critic: ContinuousCritic) -> Critics:
     """Return this project's networks inside one of Stable-Baselines3's critics."""
     assert isinstance(critic, _SB3Critic)
-    return critic.twin
+    return critic.own
 
 
-class PickPolicy(TD3Policy):
+class OwnPolicy(TD3Policy):
     """Builds the networks of this project instead of Stable-Baselines3's defaults."""
 
+    def __init__(self, *args: Any, networks: Networks, **kwargs: Any) -> None:
+        self._networks = networks
+        super().__init__(*args, **kwargs)
+
     def make_actor(self, features_extractor: BaseFeaturesExtractor | None = None) -> Actor:
-        """Return the residual actor."""
+        """Return an actor of ours."""
         kwargs = self._update_features_extractor(self.actor_kwargs, features_extractor)
-        return _SB3Actor(**kwargs).to(self.device)
+        return _SB3Actor(**kwargs, networks=self._networks).to(self.device)
 
     def make_critic(
         self, features_extractor: BaseFeaturesExtractor | None = None
     ) -> ContinuousCritic:
-        """Return the twin critics."""
+        """Return critics of ours."""
         kwargs = self._update_features_extractor(self.critic_kwargs, features_extractor)
-        return _SB3Critic(**kwargs).to(self.device)
+        return _SB3Critic(**kwargs, networks=self._networks).to(self.device)
 
 
-class PickTD3(TD3):
+class BatchTD3(TD3):
     """TD3 with row-wise exploration and a frozen start of the actor.
 
     Args:
         preset: Hyper-parameters.
         env: The batched scenario.
-        seed: Seed of networks, replay and exploration.
+        seed: Seed of networks and replay.
+        exploration: Changes the actions that are tried.
+        networks: How actor and critics are made.
+        extras: What goes beyond plain TD3.
     """
 
-    def __init__(self, preset: PickPreset, env: PickVecEnv, seed: int) -> None:
+    def __init__(
+        self,
+        preset: TD3Numbers,
+        env: CellVecEnv,
+        seed: int,
+        *,
+        exploration: Explorer,
+        networks: Networks,
+        extras: Extras = PLAIN,
+    ) -> None:
         start, end = preset.lr_start, preset.lr_end
-        self.preset = preset
-        self.exploration = Exploration(preset, env.batch, np.random.default_rng(seed))
+        self.preset, self.exploration, self.extras = preset, exploration, extras
+        replay: dict[str, Any] = {"n_steps": preset.n_steps}
+        if extras.alpha > 0.0:
+            own = {"gamma": preset.gamma, "alpha": extras.alpha, "seed": seed}
+            replay = {
+                "replay_buffer_class": PrioritisedReplay,
+                "replay_buffer_kwargs": {**replay, **own},
+            }
         super().__init__(
-            PickPolicy,
+            OwnPolicy,
             env,
             learning_rate=lambda remaining: end * (start / end) ** remaining,
             buffer_size=preset.buffer_size,
@@ -91,19 +196,23 @@ class PickTD3(TD3):
             gamma=preset.gamma,
             train_freq=1,
             gradient_steps=1,
-            n_steps=preset.n_steps,
             policy_delay=preset.policy_delay,
             target_policy_noise=preset.target_noise,
             target_noise_clip=preset.target_noise_clip,
-            policy_kwargs={"net_arch": [preset.width, preset.width]},
+            policy_kwargs={
+                "net_arch": [preset.width, preset.width],
+                "networks": networks,
+                "optimizer_kwargs": {"fused": True} if networks.fused else {},
+            },
             seed=seed,
             device="cpu",
+            **replay,
         )
 
     def _sample_action(
         self, learning_starts: int, action_noise: Any = None, n_envs: int = 1
     ) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Return actions and what to store; the untrained policy is the base motion."""
+        """Return actions and what to store; the untrained policy explores like any other."""
         assert self._last_obs is not None
         with torch.inference_mode():
             act = self.actor(torch.as_tensor(self._last_obs)).numpy()
@@ -116,36 +225,82 @@ class PickTD3(TD3):
         Deviates: Stable-Baselines3's loop, where a frozen actor would freeze the target critics
         with it.
         """
+        if self.num_timesteps // self.n_envs % self.extras.update_every:
+            return
         self.policy.set_training_mode(True)
         self._update_learning_rate([self.actor.optimizer, self.critic.optimizer])
+        for group in self.actor.optimizer.param_groups:
+            group["lr"] *= self.extras.actor_lr_ratio
         for _ in range(gradient_steps):
             self._n_updates += 1
-            assert self.replay_buffer is not None
-            data = self.replay_buffer.sample(batch_size)
+            data = self._draw(batch_size)
             self._update_critics(data)
             if self._n_updates % self.policy_delay == 0:
                 if self._n_updates > self.preset.actor_frozen_updates:
-                    self._update_actor(data.observations)
+                    self._update_actor(data.obs)
                 polyak_update(
                     self.critic.parameters(), self.critic_target.parameters(), self.tau
                 )
                 polyak_update(self.actor.parameters(), self.actor_target.parameters(), self.tau)
 
-    def _update_critics(self, data: Any) -> None:
+    def _draw(self, batch_size: int) -> Minibatch:
+        memory = self.replay_buffer
+        if isinstance(memory, PrioritisedReplay):
+            done = 1.0 - self._current_progress_remaining
+            beta = self.extras.beta + done * (1.0 - self.extras.beta)
+            drawn = memory.draw(batch_size, beta)
+            return Minibatch(
+                obs=drawn.observations,
+                act=drawn.actions,
+                rewards=drawn.rewards.unsqueeze(1),
+                next_obs=drawn.next_observations,
+                discounts=drawn.discounts.unsqueeze(1),
+                weights=drawn.weights.unsqueeze(1),
+                indices=drawn.indices,
+            )
+        assert memory is not None
+        data = memory.sample(batch_size)
+        discounts = self.gamma if data.discounts is None else data.discounts
+        return Minibatch(
+            obs=data.observations,
+            act=data.actions,
+            rewards=data.rewards,
+            next_obs=data.next_observations,
+            discounts=(1.0 - data.dones) * discounts,
+        )
+
+    def _update_critics(self, data: Minibatch) -> None:
         with torch.no_grad():
-            noise = torch.randn_like(data.actions) * self.target_policy_noise
+            noise = torch.randn_like(data.act) * self.target_policy_noise
             noise = noise.clamp(-self.target_noise_clip, self.target_noise_clip)
-            act = (self.actor_target(data.next_observations) + noise).clamp(-1.0, 1.0)
-            q1, q2 = self.critic_target(data.next_observations, act)
-            target = data.rewards + (1.0 - data.dones) * data.discounts * torch.minimum(q1, q2)
-        q1, q2 = self.critic(data.observations, data.actions)
-        loss = functional.mse_loss(q1, target) + functional.mse_loss(q2, target)
+            act = (self.actor_target(data.next_obs) + noise).clamp(-1.0, 1.0)
+            least = critics_of(self.critic_target).least(data.next_obs, act).unsqueeze(1)
+            target = data.rewards + data.discounts * least
+        values = critics_of(self.critic)(data.obs, data.act)
+        loss = sum_of_errors(values, target, data.weights)
         self.critic.optimizer.zero_grad()
         loss.backward()  # type: ignore[no-untyped-call]
         self.critic.optimizer.step()
+        if data.indices is not None:
+            with torch.no_grad():
+                errors = torch.stack([(value - target).abs() for value in values]).mean(dim=0)
+            assert isinstance(self.replay_buffer, PrioritisedReplay)
+            self.replay_buffer.update(data.indices, errors.squeeze(1).numpy())
 
-    def _update_actor(self, obs: torch.Tensor) -> None:
-        loss = -self.critic.q1_forward(obs, self.actor(obs)).mean()
+    def _update_actor(self, obs: Tensor) -> None:
+        loss = -critics_of(self.critic).first(obs, self.actor(obs)).mean()
         self.actor.optimizer.zero_grad()
         loss.backward()  # type: ignore[no-untyped-call]
         self.actor.optimizer.step()
+
+
+def sum_of_errors(values: tuple[Tensor, ...], target: Tensor, weights: Tensor | None) -> Tensor:
+    """Return the squared errors of all critics, (B, 1) each, each averaged, summed up."""
+    if weights is None:
+        losses = [functional.mse_loss(value, target) for value in values]
+    else:
+        losses = [(weights * (value - target) ** 2).mean() for value in values]
+    total = losses[0]
+    for loss in losses[1:]:
+        total = total + loss
+    return total

@@ -3,15 +3,17 @@
 Stable-Baselines3's ``learn`` drives; a callback counts on a fixed grid of environment steps,
 reports progress, hands out checkpoints and listens for a stop. A run that is resumed refills
 its replay memory with the policy it had before it updates again; those steps are not counted.
-What is particular to a scenario is in ``pick_training.py`` and ``sorting_training.py``.
+What is particular to a scenario is in ``pick_training.py``, ``reach_training.py`` and
+``sorting_training.py``.
 """
 
 from collections.abc import Callable
 
-from app.policies import pick_training, sorting_training
+from app.policies import pick_training, reach_training, sorting_training
 from app.policies.checkpoint import Checkpoint
 from app.policies.presets import Preset
 from app.policies.progress import Progress, TrainResult
+from app.policies.reach_preset import ReachPreset
 from app.policies.reporter import Reporter
 from app.policies.sorting_preset import SortingPreset
 from app.sim.cells import Cell, load_cell
@@ -50,6 +52,9 @@ def train(
     if isinstance(preset, SortingPreset):
         run, model = sorting_training.start(preset, seed, resume, place)
         reporter = sorting_training.SortingReporter(run, *calls, model)
+    elif isinstance(preset, ReachPreset):
+        run, reached = reach_training.start(preset, seed, resume, place)
+        reporter = reach_training.ReachReporter(run, *calls, reached)
     else:
         run, watched = pick_training.start(preset, seed, resume, place)
         reporter = pick_training.PickReporter(run, *calls, watched)

@@ -8,8 +8,9 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
-from app.sim.kernels.arm import CONTROLLED
+from app.sim.kernels.episode import TIMEOUT
 from app.sim.pick import OUTCOMES, PickBatch
+from app.sim.reach import ReachBatch
 from app.sim.sorting import SortingBatch
 
 
@@ -24,11 +25,11 @@ class BatchVecEnv(VecEnv):
 
     def __init__(
         self,
-        batch: PickBatch | SortingBatch,
+        batch: PickBatch | ReachBatch | SortingBatch,
         observation_space: spaces.Space[Any],
         action_space: spaces.Space[Any],
     ) -> None:
-        self._rows_of: PickBatch | SortingBatch = batch
+        self._rows_of: PickBatch | ReachBatch | SortingBatch = batch
         self.render_mode = None
         super().__init__(batch.n_envs, observation_space, action_space)
 
@@ -57,26 +58,29 @@ class BatchVecEnv(VecEnv):
         return list(self._get_indices(indices))
 
 
-class PickVecEnv(BatchVecEnv):
-    """One :class:`PickBatch`, seen by Stable-Baselines3.
+class CellVecEnv(BatchVecEnv):
+    """One :class:`PickBatch` or :class:`ReachBatch`, seen by Stable-Baselines3.
 
-    Every end of an episode is a true end: the time left is observed and a time-out gives no
-    more reward, so nothing is ever marked as truncated.
+    Where the time left is observed, every end of an episode is a true end: a time-out gives no
+    more reward, so nothing is marked as truncated.
 
     Args:
         batch: The scenario.
+        sees_time: Whether observations tell the time left; if not, time-outs are marked as
+            truncated, and values go on beyond them.
     """
 
-    def __init__(self, batch: PickBatch) -> None:
+    def __init__(self, batch: PickBatch | ReachBatch, sees_time: bool = True) -> None:
         self.batch = batch
         self.ended = np.zeros(batch.n_envs, dtype=np.int64)
         """Outcome of the episodes that ended in the last step, 0 elsewhere."""
-        self._actions = np.zeros((batch.n_envs, CONTROLLED), dtype=np.float32)
+        self._sees_time = sees_time
+        self._actions = np.zeros((batch.n_envs, batch.n_act), dtype=np.float32)
         self._infos: list[dict[str, Any]] = [{} for _ in range(batch.n_envs)]
         super().__init__(
             batch,
             spaces.Box(-np.inf, np.inf, (batch.obs_size,), np.float32),
-            spaces.Box(-1.0, 1.0, (CONTROLLED,), np.float32),
+            spaces.Box(-1.0, 1.0, (batch.n_act,), np.float32),
         )
 
     def reset(self) -> NDArray[np.float32]:
@@ -84,7 +88,7 @@ class PickVecEnv(BatchVecEnv):
         return self.batch.reset().copy()
 
     def step_async(self, actions: NDArray[np.float32]) -> None:
-        """Keep the actions, shape (n_envs, 5), for the next step_wait."""
+        """Keep the actions, shape (n_envs, n_act), for the next step_wait."""
         self._actions = np.asarray(actions, dtype=np.float32)
 
     def step_wait(
@@ -99,4 +103,6 @@ class PickVecEnv(BatchVecEnv):
                 "terminal_observation": result.last_obs[row].copy(),
                 "outcome": OUTCOMES[self.ended[row]],
             }
+            if not self._sees_time and self.ended[row] == TIMEOUT:
+                infos[row]["TimeLimit.truncated"] = True
         return result.obs.copy(), result.rew.copy(), self.ended > 0, infos

@@ -57,7 +57,8 @@ class CellBatch:
         view: tuple[int, int],
     ) -> None:
         self.n_envs, self.seed = n_envs, seed
-        self._kernel, self._n_act, self._first = kernel, n_act, first_env
+        self.n_act = n_act
+        self._kernel, self._first = kernel, first_env
         self._world, self._rules, self._action, self._weights, self._rows, self._work = shared
         self._view, self.obs_size = view
         self._obs = np.zeros((n_envs, self.obs_size), dtype=np.float32)
@@ -105,7 +106,7 @@ class CellBatch:
             InvalidInput: The actions have another shape.
             SimulationError: An action is NaN or infinite.
         """
-        require_shape("act", act, (self.n_envs, self._n_act))
+        require_shape("act", act, (self.n_envs, self.n_act))
         require_finite("act", act)
         wanted = np.array(act, dtype=np.float32, order="C")
         arguments = (

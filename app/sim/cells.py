@@ -162,6 +162,15 @@ def lacks_for_pick(cell: Cell) -> str | None:
     return lacks_stations(cell)
 
 
+def lacks_for_reach(cell: Cell) -> str | None:
+    """Say what a cell lacks to train a policy that reaches goals; None where nothing.
+
+    Who walks is for the preset to say: where the cell has no walker, people walk where its
+    first person may be.
+    """
+    return "needs a goal_region" if cell.goal_region is None else None
+
+
 def cell_names() -> tuple[str, ...]:
     """Return the names of the shipped cells."""
     folder = resources.files("app.sim") / "cells_data"

@@ -76,9 +76,9 @@ class Somebody(Protocol):
 class People(Everyone, Protocol):
     """The people of a live cell, as a stage moves them."""
 
-    def __iter__(self) -> Iterator[Somebody]: ...  # noqa: D105
+    def __iter__(self) -> Iterator[Somebody]: ...
 
-    def __getitem__(self, id: int) -> Somebody: ...  # noqa: D105
+    def __getitem__(self, id: int) -> Somebody: ...
 
     def move(self, dt: float) -> None:
         """Move everyone for ``dt`` [s]."""

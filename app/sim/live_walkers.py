@@ -40,7 +40,6 @@ from app.sim.kernels.occupancy import (
     VY,
     WALKING,
     R,
-    WalkerRules,
     X,
     Y,
     advance_walker,

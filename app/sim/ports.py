@@ -1,10 +1,11 @@
 """What the rooms of the house hand each other: the Protocols and their data.
 
-``app.policies`` implements :class:`TaskPolicy` and :class:`SortingValues`, ``web`` implements
-:class:`WorldHandle`; the other side sees only what is written here (numpy in, numpy out).
+``app.policies`` implements :class:`TaskPolicy`, :class:`ReachActor` and
+:class:`SortingValues`, ``web`` implements :class:`WorldHandle`; the other side sees only what
+is written here (numpy in, numpy out).
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:  # the kernels need Vec first
     from app.sim.actions import ActionSettings
+    from app.sim.reach import GoalRule, ViewName
     from app.sim.sorting_state import SortingShape
 
 Vec = NDArray[np.float64]
@@ -131,6 +133,56 @@ class TaskPolicy(Protocol):
 
         Raises:
             InvalidInput: A value that no answer can be given for.
+        """
+
+
+class ReachActor(Protocol):
+    """Brings the tcp to a goal beside people; safe to call from several threads."""
+
+    @property
+    def checkpoint(self) -> str:
+        """SHA-256 of the checkpoint."""
+
+    @property
+    def title(self) -> str:
+        """Short text for people, such as ``"reach-td3, 7.7 M steps"``."""
+
+    @property
+    def cell(self) -> str:
+        """Name of the work cell it was trained for."""
+
+    @property
+    def cell_sha256(self) -> str:
+        """Identity of that cell's content (``Cell.sha256``)."""
+
+    @property
+    def view(self) -> "ViewName":
+        """What it sees."""
+
+    @property
+    def action(self) -> "ActionSettings":
+        """What its actions mean."""
+
+    @property
+    def goals(self) -> "GoalRule":
+        """Where the goals of its training were drawn from."""
+
+    @property
+    def targets(self) -> Vec | None:
+        """The goals it was trained on [m], shape (n, 3); None for a whole box."""
+
+    @property
+    def trained_range(self) -> Mapping[str, Mapping[str, Sequence[float]]]:
+        """Least (``low``) and greatest (``high``) value of each state variable in training."""
+
+    def acts(self, obs: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return actions in [-1, 1].
+
+        Args:
+            obs: Observations of :attr:`view`, as ``ReachBatch`` gives them, shape (n, F).
+
+        Returns:
+            Actions, shape (n, 6).
         """
 
 

@@ -18,11 +18,11 @@ from app.sim.cell_parts import GoalRegion, Station
 from app.sim.cell_people import Worker
 from app.sim.cells import Cell
 from app.sim.goal_sets import N_HALTON, halton_targets
-from app.sim.kernels import reach
+from app.sim.kernels import reach, reach_views
 from app.sim.kernels.episode import FEATURES, PLAIN
 from app.sim.kernels.geometry import FAR
 from app.sim.kernels.people import People, PeopleState
-from app.sim.kernels.reach_features import N_FEATURES, N_STATE
+from app.sim.kernels.reach_features import EVERYBODY, N_FEATURES, N_STATE
 from app.sim.kernels.reach_reward import ReachWeights
 from app.sim.occupancy import AUTHORS_WALK, walker_rules
 from app.sim.ports import Vec
@@ -32,6 +32,7 @@ from app.sim.scene import (
     kinds_of,
     new_people_state,
     own,
+    own_index,
     people_of,
     require_finite,
     require_shape,
@@ -203,15 +204,22 @@ def _people_of(cell: Cell, settings: ReachSettings) -> People:
     return people._replace(walkers=walker_rules(walkers))
 
 
-def _world_of(cell: Cell, settings: ReachSettings) -> reach.ReachWorld:
+def world_of(cell: Cell, people: People, targets: Vec) -> reach.ReachWorld:
+    """Return what the kernels know of a cell and its people.
+
+    Args:
+        cell: Work cell with a goal region.
+        people: From :func:`~app.sim.scene.people_of`.
+        targets: Goals that episodes draw from [m], shape (n, 3).
+    """
     region = goal_region_of(cell)
     middle, half = np.array(region.center), 0.5 * np.array(region.size)
     return reach.ReachWorld(
-        targets=own(targets_of(region, settings)),
+        targets=own(targets),
         low=middle - half,
         high=middle + half,
         arm=arm_of(cell),
-        people=_people_of(cell, settings),
+        people=people,
     )
 
 
@@ -224,7 +232,9 @@ def _rules_of(settings: ReachSettings) -> reach.ReachRules:
     )
 
 
-def _new_state(world: reach.ReachWorld, people: PeopleState, n_envs: int) -> reach.ReachState:
+def new_state(world: reach.ReachWorld, people: PeopleState, n_envs: int) -> reach.ReachState:
+    """Return rows for ``n_envs`` cells, not started yet."""
+
     def rows(*shape: int) -> Vec:
         return np.zeros((n_envs, *shape))
 
@@ -266,10 +276,12 @@ class ReachBatch(CellBatch):
         self, cell: Cell, n_envs: int, seed: int, settings: ReachSettings, first_env: int = 0
     ) -> None:
         self.cell = _with_people(cell, settings)
-        self.settings, self.world = settings, _world_of(self.cell, settings)
+        targets = targets_of(goal_region_of(self.cell), settings)
+        self.settings = settings
+        self.world = world_of(self.cell, _people_of(self.cell, settings), targets)
         self.arm = self.world.arm
         people = new_people_state(self.cell, self.world.people, n_envs)
-        self.state = _new_state(self.world, people, n_envs)
+        self.state = new_state(self.world, people, n_envs)
         super().__init__(
             reach,
             (
@@ -312,6 +324,66 @@ class ReachBatch(CellBatch):
             )
         return self._obs
 
+    def observe_goals(
+        self, rows: NDArray[np.int64], goals: Vec, who: int | None = None
+    ) -> NDArray[np.float32]:
+        """Return what a policy would observe in some cells if their goals were others.
+
+        Args:
+            rows: Cells, shape (k,).
+            goals: Where each tcp shall be [m], shape (k, n, 3).
+            who: The person who is there alone, workers first; None for all as they are.
+
+        Returns:
+            Observations, (k, n, obs_size); equal, bit for bit, to the ordinary one where the
+            goal is the cell's own and nobody is left out.
+
+        Raises:
+            InvalidInput: There is no such cell or person, or the goals have another shape.
+        """
+        shape = (len(rows), np.shape(goals)[1] if np.ndim(goals) == 3 else 0, 3)
+        require_shape("goals", np.asarray(goals), shape)
+        out = np.empty((*shape[:2], self.obs_size), dtype=np.float32)
+        alone = EVERYBODY if who is None else who
+        if who is not None and not 0 <= who < self.n_people:
+            raise InvalidInput("who", who, f"must be one of {self.n_people} people")
+        reach_views.observe_rows(
+            self.world,
+            self.state,
+            self._checked(rows),
+            self._work,
+            self._view,
+            alone,
+            own(goals),
+            out,
+        )
+        return out
+
+    def person_distances(self, rows: NDArray[np.int64]) -> Vec:
+        """Return the distances of robot and people in some cells [m], shape (k, n_people).
+
+        Args:
+            rows: Cells, shape (k,).
+
+        Raises:
+            InvalidInput: There is no such cell.
+        """
+        out = np.empty((len(rows), self.n_people))
+        checked = self._checked(rows)
+        reach_views.distances_of_rows(self.world, self.state, checked, self._work, out)
+        return out
+
+    @property
+    def n_people(self) -> int:
+        """People in each cell; workers come first."""
+        return len(self.cell.people)
+
+    def _checked(self, rows: NDArray[np.int64]) -> NDArray[np.int64]:
+        numbers = own_index(np.asarray(rows, dtype=np.int64))
+        wrong = numbers[(numbers < 0) | (numbers >= self.n_envs)]
+        if wrong.size:
+            raise InvalidInput("rows", int(wrong[0]), f"must be one of {self.n_envs} cells")
+        return numbers
     def observe(self) -> NDArray[np.float32]:
         """Measure distances to people and write all observations anew, (n_envs, obs_size).
 

@@ -24,9 +24,9 @@ from app.errors import ServiceError
 from app.sim import commands, explanation, sorting_commands
 from app.sim.cells import Cell
 from app.sim.commands import Command
-from app.sim.live_sorter import Choice, LiveSorter
 from app.sim.live_arm import Bodies
 from app.sim.live_people import LivePeople
+from app.sim.live_sorter import Choice, LiveSorter
 from app.sim.live_stage import CONTACT_HOLD_S, LiveStage, PeopleCommand
 from app.sim.ports import Candidate, SortingValues, TaskPolicy, Vec
 from app.sim.snapshot import Counters, Status, WorldSnapshot

@@ -63,3 +63,12 @@ def test_stored_cell_that_no_longer_fits_hides_no_other(
     assert [cell.name for cell in catalog.all()] == list(cell_names())
     with pytest.raises(InvalidInput, match="another version of Tandem"):
         catalog.get("old")
+
+
+def test_reach_presets_train_where_there_are_goals_to_reach(catalog: CellCatalog) -> None:
+    preset = resolve("reach-td3", {})
+    assert catalog.to_train_in(preset).name == "shared-workspace"
+    with pytest.raises(InvalidInput, match="it needs a goal_region"):
+        catalog.to_train_in(resolve("reach-td3", {"cell": "pick-and-place"}))
+    with pytest.raises(InvalidInput, match="it needs"):
+        catalog.to_train_in(resolve("pick-td3", {"cell": "shared-workspace"}))

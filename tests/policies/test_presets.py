@@ -11,8 +11,9 @@ from app.policies import presets
 from app.sim.actions import ActionSettings
 
 
-def test_every_default_lies_inside_its_own_bounds():
-    for info in presets.fields("pick-td3"):
+@pytest.mark.parametrize("name", presets.PRESETS)
+def test_every_default_lies_inside_its_own_bounds(name):
+    for info in presets.fields(name):
         if info.type == "choice":
             assert info.default in info.choices, info.name
         else:

@@ -1,24 +1,25 @@
 """What a checkpoint says of the states it met."""
 
-from app.policies.pick_training import _Ranges
+from app.policies.pick_training import states_met
+from app.policies.ranges import Ranges
 from app.sim.cells import load_cell
 from app.sim.pick import PickBatch, PickSettings
 from app.sim.worker_motion import WorkSettings
 
 
 def test_people_who_are_not_there_widen_no_range() -> None:
-    ranges, work = _Ranges(None), WorkSettings(absent=0.5)
+    ranges, work = Ranges(None), WorkSettings(absent=0.5)
     batch = PickBatch(load_cell(), 64, 1, PickSettings(work=work))
     batch.reset()
-    ranges.look(batch)
+    ranges.look(states_met(batch))
     known = ranges.as_json()
     assert known["human_q"]["high"][1] < 2.5 < batch.state.people.q[:, 0, 1].max()
     assert set(known) == {"q", "qd", "goal", "human_q", "human_qd"}
 
 
 def test_a_cell_in_which_nobody_is_ever_met_has_no_range_of_people() -> None:
-    ranges, work = _Ranges(None), WorkSettings(absent=1.0)
+    ranges, work = Ranges(None), WorkSettings(absent=1.0)
     batch = PickBatch(load_cell(), 8, 1, PickSettings(work=work))
     batch.reset()
-    ranges.look(batch)
+    ranges.look(states_met(batch))
     assert set(ranges.as_json()) == {"q", "qd", "goal"}

@@ -6,7 +6,7 @@ from types import MappingProxyType
 from typing import Any
 
 from app.errors import InvalidInput, NotFound
-from app.policies.checkpoint import Checkpoint
+from app.policies.checkpoint import CHOOSING, REACHING, SORTING, Checkpoint, task_of
 from app.policies.evaluation import (
     people,
     pick,
@@ -20,8 +20,6 @@ from app.policies.evaluation import (
     tracker,
 )
 from app.policies.evaluation.rows import OnRow, untold
-from app.policies.reach_policy import is_reach
-from app.policies.sorting_policy import is_sorting
 from app.sim.motions import Motion
 
 Protocol = Callable[..., dict[str, Any]]
@@ -116,16 +114,9 @@ def evaluate(
     }
 
 
-def task_of(name: str) -> str:
-    """Return what the policies of a protocol do: ``"sort"``, ``"reach"`` or ``"pick"``."""
-    if name in OF_SORTING:
-        return "sort"
-    return "reach" if name in OF_REACHING else "pick"
-
-
 def default_checkpoint(name: str) -> str:
     """Return the alias of the checkpoint that a protocol measures unless another is named."""
-    return {"sort": "sorting-e0", "reach": "reach", "pick": "pick"}[task_of(name)]
+    return {SORTING: "sorting-e0", REACHING: "reach", CHOOSING: "pick"}[_task_measured(name)]
 
 
 def most_episodes(name: str) -> int:
@@ -133,20 +124,32 @@ def most_episodes(name: str) -> int:
     return FEWER_EPISODES.get(name, MAX_EPISODES)
 
 
+_POLICIES = {
+    CHOOSING: "a policy that picks",
+    REACHING: "a policy that reaches goals",
+    SORTING: "a policy that sorts",
+}
+
+
+def _task_measured(name: str) -> str:
+    """Return what the policies that a protocol measures are for."""
+    if name in OF_SORTING:
+        return SORTING
+    return REACHING if name in OF_REACHING else CHOOSING
+
+
 def _check_task(name: str, checkpoint: Checkpoint | None) -> None:
     """Check that a checkpoint is of the scenario that a protocol measures."""
     if checkpoint is None or name in WITHOUT_CHECKPOINT:
         return
-    does = "pick"
-    if is_sorting(checkpoint) or is_reach(checkpoint):
-        does = "sort" if is_sorting(checkpoint) else "reach"
-    if does != task_of(name):
-        others = set(PROTOCOLS) - WITHOUT_CHECKPOINT
-        known = sorted(other for other in others if task_of(other) == does)
+    wanted, actual = _task_measured(name), task_of(checkpoint)
+    if wanted != actual:
         found = checkpoint.manifest["preset"].get("name") or checkpoint.sha256[:12]
-        wanted = {"sort": "sorts", "reach": "reaches", "pick": "picks"}[task_of(name)]
-        rule = f"must be a policy that {wanted} for {name}"
-        raise InvalidInput("checkpoint", found, rule, known)
+        fitting = set(PROTOCOLS) - WITHOUT_CHECKPOINT
+        known = sorted(one for one in fitting if _task_measured(one) == actual)
+        raise InvalidInput(
+            "checkpoint", found, f"must be {_POLICIES[wanted]} for {name}", known
+        )
 
 
 def check_motions(

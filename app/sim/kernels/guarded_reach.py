@@ -102,7 +102,9 @@ def put_on_track(state: ReachState, e: int, guard: Guard, dt: float) -> None:
 
 
 @kernel()
-def begin_episode(world: ReachWorld, state: ReachState, e: int, guard: Guard, work: Work) -> None:
+def begin_episode(
+    world: ReachWorld, state: ReachState, e: int, guard: Guard, work: Work
+) -> None:
     """Clear the account of environment ``e`` and put its person on the track, if there is one."""
     for k in range(N_ACCOUNT):
         guard.account[e, k] = 0.0
@@ -137,9 +139,7 @@ def _people_after(
     if guard.tracks.shape[0] > 0:
         put_on_track(state, e, guard, arm.dt)
     else:
-        advance_people(
-            world.people, state.people, e, state.robot[e], arm.dt, work.crowd.away
-        )
+        advance_people(world.people, state.people, e, state.robot[e], arm.dt, work.crowd.away)
     place_people(world.people, state.people, e, work.crowd)
     keep_columns(work.crowd.columns, state.people.columns[e])
     copy_rows(work.crowd.columns, trial.columns1)

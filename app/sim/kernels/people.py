@@ -424,6 +424,24 @@ def place_people(people: People, state: PeopleState, e: int, crowd: Crowd) -> No
 
 
 @kernel()
+def person_clearance(people: People, robot: Vec, crowd: Crowd, who: int) -> float:
+    """Return the distance of robot and one person [m]: workers first, then walkers.
+
+    Args:
+        people: Shared data.
+        robot: The robot's capsules as columns, shape (9, n).
+        crowd: The people, placed; for a worker ``gap`` is filled already.
+        who: The person.
+    """
+    k = who - crowd.q.shape[0]
+    if k < 0:
+        part = crowd.gap[who * body.N_CAPSULES : (who + 1) * body.N_CAPSULES]
+        return float(least(part)[0])
+    x, y, r = crowd.cylinders[k, 0], crowd.cylinders[k, 1], crowd.cylinders[k, 2]
+    return float(cylinder_clearance(robot, 0, x, y, r, people.top_z)[0])
+
+
+@kernel()
 def nearest_person(people: People, robot: Vec, crowd: Crowd) -> int:
     """Return the person nearest to the robot: workers first, then walkers; -1 for nobody.
 
@@ -438,15 +456,10 @@ def nearest_person(people: People, robot: Vec, crowd: Crowd) -> int:
     best, nearest = FAR, 0
     if n_workers > 0:
         gaps(robot, crowd.columns, crowd.gap)
-    for w in range(n_workers):
-        d, _ = least(crowd.gap[w * body.N_CAPSULES : (w + 1) * body.N_CAPSULES])
+    for who in range(n_workers + n_walkers):
+        d = person_clearance(people, robot, crowd, who)
         if d < best:
-            best, nearest = d, w
-    for k in range(n_walkers):
-        x, y, r = crowd.cylinders[k, 0], crowd.cylinders[k, 1], crowd.cylinders[k, 2]
-        d, _ = cylinder_clearance(robot, 0, x, y, r, people.top_z)
-        if d < best:
-            best, nearest = d, n_workers + k
+            best, nearest = d, who
     return nearest
 
 

@@ -145,7 +145,7 @@ def new_work(world: ReachWorld, state: ReachState) -> Work:
     return Work(
         new_robot_pose(world.arm),
         new_crowd(world.people, people.q.shape[1], people.cylinders.shape[1]),
-        new_reach_sight(),
+        new_reach_sight(world.arm),
         np.zeros(6),
         np.zeros(6),
         np.zeros(6),

@@ -6,6 +6,7 @@ from app.errors import InvalidInput
 from app.policies import pretrained
 from app.policies.evaluation.protocols import (
     MAX_SORTING_EPISODES,
+    OF_REACHING,
     OF_SORTING,
     PROTOCOLS,
     WITH_MOTIONS,
@@ -14,6 +15,7 @@ from app.policies.evaluation.protocols import (
     most_episodes,
 )
 from tests.policies.evaluation.sorting_players import untrained
+from tests.policies.untrained import untrained_reach
 from tests.sim.recorded_person import working
 from tests.sim.working_people import run_of
 
@@ -58,6 +60,21 @@ def test_a_policy_that_sorts_is_no_policy_that_picks():
         evaluate("pick-single", untrained(), episodes=1)
     assert (found.value.field, found.value.value) == ("checkpoint", "sorting-e0-dqn")
     assert set(found.value.choices) == OF_SORTING
+
+
+@pytest.mark.parametrize("name", ["pick-single", "sorting-grid"])
+def test_a_policy_that_reaches_neither_picks_nor_sorts(name):
+    with pytest.raises(InvalidInput, match=f"must be a policy that .* for {name}") as found:
+        evaluate(name, untrained_reach(width=16), episodes=1)
+    assert (found.value.field, found.value.value) == ("checkpoint", "reach-td3")
+    assert set(found.value.choices) == OF_REACHING
+
+
+@pytest.mark.parametrize("name", sorted(OF_REACHING))
+def test_a_policy_that_picks_reaches_no_goals(name):
+    with pytest.raises(InvalidInput, match="must be a policy that reaches goals for") as found:
+        evaluate(name, pretrained.load("pick"), episodes=1)
+    assert not set(found.value.choices) & (OF_REACHING | OF_SORTING)
 
 
 def test_every_protocol_has_a_checkpoint_and_a_most_number_of_episodes_of_its_own():

@@ -1,0 +1,173 @@
+"""A trained policy of the reach scenario, for inference.
+
+Its network is read from the checkpoint's tensors and run by numpy: eight states cost less than
+any library's overhead. Source: METHOD 2.2 to 2.4; the tensors are data, see ``checkpoint.py``.
+"""
+
+from collections.abc import Mapping
+from typing import Any, cast, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.errors import CheckpointMismatch, InvalidInput
+from app.policies.checkpoint import (
+    REACHING,
+    Checkpoint,
+    expect_layout,
+    require_purpose,
+    task_of,
+)
+from app.policies.networks import BASE_WEIGHT
+from app.policies.reach_preset import ACTORS, action_of
+from app.policies.trained_cell import cell_of
+from app.sim.actions import ActionSettings
+from app.sim.goal_sets import MOST_HALTON, N_HALTON, halton_targets
+from app.sim.kernels.reach_features import BASE_START, SIZES, STATE_SIZES
+from app.sim.ports import Vec
+from app.sim.reach import N_ACT, GoalRule, ViewName, goal_region_of
+
+LAYOUTS = {
+    "features": [[name, size] for name, size in SIZES],
+    "state": [[name, size] for name, size in STATE_SIZES],
+}
+"""Names and sizes of the groups of each kind of observation, as manifests carry them."""
+MAX_LAYERS = 16
+"""Most layers of a network taken from a checkpoint."""
+
+Layer = tuple[NDArray[np.float32], NDArray[np.float32]]
+
+
+def is_reach(checkpoint: Checkpoint) -> bool:
+    """Tell whether a checkpoint's policy reaches goals beside people."""
+    return task_of(checkpoint) == REACHING
+
+
+class ReachPolicy:
+    """Says how to move toward a goal; safe to call from several threads.
+
+    Args:
+        checkpoint: A ``policy`` checkpoint of a reach preset.
+
+    Raises:
+        CheckpointMismatch: It is for another task, network or layout.
+        InvalidInput: Its preset names an unknown rule.
+    """
+
+    def __init__(self, checkpoint: Checkpoint) -> None:
+        require_purpose(checkpoint, REACHING)
+        manifest = checkpoint.manifest
+        preset, cell = manifest["preset"], cell_of(manifest)
+        self._checkpoint, self._cell = checkpoint, (cell.name, cell.sha256)
+        self.view = cast(ViewName, _named(preset, "observation", get_args(ViewName)))
+        """What it sees."""
+        expect_layout(checkpoint, LAYOUTS[self.view], N_ACT)
+        self.goals = cast(GoalRule, _named(preset, "goals", get_args(GoalRule)))
+        """Where the goals of its training were drawn from."""
+        self.action: ActionSettings = action_of(preset)
+        """What its actions mean (METHOD 2.2)."""
+        self.targets: Vec | None = None
+        """The goals it was trained on [m], shape (n, 3); None for a whole box."""
+        if self.goals == "grid":
+            self.targets = goal_region_of(cell).targets()
+        elif self.goals == "halton":
+            self.targets = halton_targets(goal_region_of(cell), _n_halton(preset))
+        self.n_obs = sum(size for _, size in manifest["layout"])
+        """Length of an observation."""
+        self._layers = _layers_of(checkpoint.arrays(), self.n_obs)
+        self._residual = _named(preset, "actor", ACTORS) == "residual"
+
+    @property
+    def checkpoint(self) -> str:
+        """SHA-256 of the checkpoint."""
+        return self._checkpoint.sha256
+
+    @property
+    def title(self) -> str:
+        """Short text for people."""
+        manifest = self._checkpoint.manifest
+        name = manifest["preset"].get("name", "policy")
+        return f"{name}, {manifest['step'] / 1e6:.2f} M steps"
+
+    @property
+    def cell(self) -> str:
+        """Name of the work cell it was trained for."""
+        return self._cell[0]
+
+    @property
+    def cell_sha256(self) -> str:
+        """Identity of that cell's content."""
+        return self._cell[1]
+
+    @property
+    def trained_range(self) -> Mapping[str, Mapping[str, list[float]]]:
+        """Least and greatest value of each state variable met in training."""
+        ranges: Mapping[str, Mapping[str, list[float]]] = self._checkpoint.manifest[
+            "trained_range"
+        ]
+        return ranges
+
+    def acts(self, obs: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return actions in [-1, 1], shape (n, 6), of observations, shape (n, n_obs).
+
+        Raises:
+            InvalidInput: They have another shape.
+        """
+        if obs.ndim != 2 or obs.shape[1] != self.n_obs:
+            raise InvalidInput(
+                "obs", list(obs.shape), f"must have the shape ['n', {self.n_obs}]"
+            )
+        rows = obs
+        for weight, bias in self._layers[:-1]:
+            rows = rows @ weight
+            rows += bias
+            np.maximum(rows, 0.0, out=rows)
+        weight, bias = self._layers[-1]
+        rows = rows @ weight
+        rows += bias
+        if self._residual:
+            base = np.clip(obs[:, BASE_START : BASE_START + N_ACT], -1.0, 1.0)
+            rows += np.arctanh(np.float32(BASE_WEIGHT) * base)
+        return cast(NDArray[np.float32], np.tanh(rows, out=rows))
+
+
+def _named(preset: Mapping[str, Any], field: str, choices: tuple[str, ...]) -> str:
+    """Return a choice that a manifest's preset names."""
+    value = preset.get(field)
+    if value not in choices:
+        raise InvalidInput(f"manifest.preset.{field}", value, "must be a known rule", choices)
+    return str(value)
+
+
+def _n_halton(preset: Mapping[str, Any]) -> int:
+    """Return the number of points of the Halton set that a manifest's preset names."""
+    n = preset.get("n_halton", N_HALTON)
+    if not isinstance(n, int) or not 1 <= n <= MOST_HALTON:
+        rule = f"must be a number in [1, {MOST_HALTON}]"
+        raise InvalidInput("manifest.preset.n_halton", n, rule)
+    return n
+
+
+def _layers_of(arrays: Mapping[str, NDArray[Any]], n_obs: int) -> tuple[Layer, ...]:
+    """Return weights, shape (n_in, n_out), and biases of the actor, layer by layer.
+
+    Raises:
+        CheckpointMismatch: Its tensors do not make a network from observations to actions.
+    """
+    layers: list[Layer] = []
+    n_in = n_obs
+    for number in range(MAX_LAYERS):
+        weight = arrays.get(f"actor.net.{2 * number}.weight")
+        bias = arrays.get(f"actor.net.{2 * number}.bias")
+        if weight is None or bias is None:
+            break
+        if weight.ndim != 2 or weight.shape[1] != n_in or bias.shape != weight.shape[:1]:
+            found = f"{list(weight.shape)} and {list(bias.shape)}"
+            name = f"tensors.actor.net.{2 * number}"
+            raise CheckpointMismatch(name, f"[n, {n_in}] and [n]", found)
+        n_in = len(bias)
+        rows = np.ascontiguousarray(weight.T, dtype=np.float32)
+        layers.append((rows, bias.astype(np.float32)))
+    if not layers or n_in != N_ACT:
+        raise CheckpointMismatch("tensors", f"an actor of {N_ACT} numbers", "none such")
+    return tuple(layers)

@@ -1,0 +1,233 @@
+"""Training on the reach scenario: settings, model, checkpoints and what its curve counts.
+
+A point of the curve is played for it alone: greedy episodes from the preset's own starts, the
+same ones at every point. The CPU time that takes is not counted as training.
+"""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from app.policies.checkpoint import Checkpoint
+from app.policies.exploration import Explorer, LadderNoise, OUNoise
+from app.policies.networks import Critics, PlainActor, ResidualActor
+from app.policies.progress import Progress
+from app.policies.ranges import Ranges
+from app.policies.reach_policy import LAYOUTS
+from app.policies.reach_preset import ReachPreset
+from app.policies.reporter import Reporter
+from app.policies.run import Parts, TrainingRun
+from app.policies.td3 import BatchTD3, Extras, Networks, critics_of
+from app.policies.vecenv import CellVecEnv
+from app.sim.cells import Cell
+from app.sim.kernels.occupancy import VX, VY, R, X, Y
+from app.sim.kernels.reach_features import BASE_START
+from app.sim.kernels.reach_reward import ReachWeights
+from app.sim.pick import OUTCOMES
+from app.sim.ports import Vec
+from app.sim.reach import N_ACT, ReachBatch, ReachSettings
+from app.sim.scene import HumanKind
+
+CURVE_SEED = 1_000_003
+"""Seed of the episodes behind a point of the curve; no evaluation uses it."""
+RANGE_EVERY = 8
+"""Vector steps between two looks at the range of the states."""
+
+
+def settings_of(preset: ReachPreset) -> ReachSettings:
+    """Return the scenario's settings of a preset."""
+    walker: HumanKind = "walker"
+    return ReachSettings(
+        time_limit_s=preset.time_limit_s,
+        goals=preset.goals,  # type: ignore[arg-type]
+        n_halton=preset.n_halton,
+        people=(walker,) * preset.n_people,
+        start=preset.start,  # type: ignore[arg-type]
+        start_clearance_m=preset.start_clearance_m,
+        collision_ends=preset.collision == "ends",
+        action=preset.action,
+        observation=preset.observation,  # type: ignore[arg-type]
+        weights=ReachWeights(
+            c_d=preset.c_d,
+            c_p=preset.c_p,
+            gamma=1.0,
+            c_a=preset.c_a,
+            c_step=preset.c_step,
+            c_c=preset.c_c,
+            c_s=preset.c_s,
+        ),
+    )
+
+
+def _explorer(preset: ReachPreset, batch: ReachBatch, seed: int) -> Explorer:
+    rng = np.random.default_rng(seed)
+    if preset.noise == "ou":
+        return OUNoise(batch.n_envs, N_ACT, preset.ou_theta, preset.ou_sigma, rng)
+    return LadderNoise(
+        batch.n_envs,
+        N_ACT,
+        batch.arm.dt,
+        sigma_max=preset.sigma_max,
+        time_s=preset.noise_time_s,
+        greedy_share=preset.greedy_share,
+        rng=rng,
+    )
+
+
+def _networks(preset: ReachPreset, n_obs: int) -> Networks:
+    width, layers = preset.width, preset.layers
+
+    def actor() -> ResidualActor | PlainActor:
+        if preset.actor == "residual":
+            return ResidualActor(width, n_obs, N_ACT, BASE_START, layers)
+        return PlainActor(width, n_obs, N_ACT, layers)
+
+    return Networks(
+        actor=actor,
+        critic=lambda: Critics(
+            width, n_obs, N_ACT, preset.n_critics, layers, preset.critic_norm == "layer"
+        ),
+        fused=True,
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Watched:
+    """What the curve of a training on the reach scenario is counted from."""
+
+    batch: ReachBatch
+    """All cells."""
+    actor: torch.nn.Module
+    """The policy."""
+    ranges: Ranges
+    """Range of the states."""
+
+
+def start(
+    preset: ReachPreset,
+    seed: int,
+    resume: Checkpoint | None,
+    cell: Cell,
+) -> tuple[TrainingRun, Watched]:
+    """Return a run of the preset, from the start or from a checkpoint, and what it counts.
+
+    Args:
+        preset: All hyper-parameters.
+        seed: Seed of everything random.
+        resume: The last ``resume`` checkpoint of an interrupted attempt.
+        cell: Work cell trained in.
+
+    Raises:
+        InvalidInput: The cell has no goal region.
+    """
+    first = 0 if resume is None else int(resume.manifest["step"])
+    batch = ReachBatch(cell, preset.n_envs, seed + first, settings_of(preset))
+    env = CellVecEnv(batch, sees_time=preset.observation == "features")
+    model = BatchTD3(
+        preset,
+        env,
+        seed + first,
+        exploration=_explorer(preset, batch, seed + first),
+        networks=_networks(preset, batch.obs_size),
+        extras=Extras(
+            update_every=preset.update_every,
+            actor_lr_ratio=preset.actor_lr_ratio,
+            alpha=preset.alpha,
+            beta=preset.beta,
+        ),
+    )
+    ranges = Ranges(resume.manifest["trained_range"] if resume else None)
+    parts = Parts(
+        policy={"actor": model.actor.mu, "critic": critics_of(model.critic)},
+        targets={
+            "actor_target": model.actor_target.mu,
+            "critic_target": critics_of(model.critic_target),
+        },
+        optimizers={
+            "actor_adam": model.actor.optimizer,
+            "critic_adam": model.critic.optimizer,
+        },
+        layout=LAYOUTS[preset.observation],
+        act_size=N_ACT,
+        trained_range=ranges.as_json,
+    )
+    run = TrainingRun(preset, seed, cell, model, env, parts, resume)
+    return run, Watched(batch=batch, actor=model.actor.mu, ranges=ranges)
+
+
+class ReachReporter(Reporter):
+    """Plays the episodes behind the curve.
+
+    Args:
+        run: The attempt.
+        on_progress: Takes the points of the curve.
+        on_checkpoint: Takes the step, the policy and what resuming needs.
+        should_stop: Asked after every step.
+        watched: What is counted.
+    """
+
+    def __init__(
+        self,
+        run: TrainingRun,
+        on_progress: Callable[[Progress], None],
+        on_checkpoint: Callable[[int, Checkpoint, Checkpoint], None],
+        should_stop: Callable[[], bool],
+        watched: Watched,
+    ) -> None:
+        super().__init__(run, on_progress, on_checkpoint, should_stop)
+        self._run, self._watched, preset = run, watched, run.preset
+        assert isinstance(preset, ReachPreset)
+        n = preset.progress_episodes
+        self._played = ReachBatch(run.cell, n, CURVE_SEED, settings_of(preset))
+
+    def watch(self, rewards: NDArray[np.floating]) -> None:
+        """Look at the range of the states now and then."""
+        if (self.num_timesteps // len(rewards)) % RANGE_EVERY == 0:
+            self._watched.ranges.look(states_met(self._watched.batch))
+
+    def rates(self) -> dict[str, Any]:
+        """Return how greedy episodes end now."""
+        began = time.process_time()
+        ended, returns = play(self._watched.actor, self._played)
+        self._run.leave_out(time.process_time() - began)
+        shares = {name: float((ended == k).mean()) for k, name in enumerate(OUTCOMES)}
+        return {
+            "episodes": len(ended),
+            **{name: shares[name] for name in ("success", "collision", "timeout")},
+            "reward": float(returns.mean()),
+        }
+
+
+def states_met(batch: ReachBatch) -> dict[str, Vec]:
+    """Return the states that all cells are in."""
+    state = batch.state
+    met = {"q": state.q, "qd": state.qd, "goal": state.goal}
+    walkers = state.people.walkers.rows
+    if walkers.shape[1]:
+        met["human"] = walkers[:, :, [X, Y, VX, VY, R]].reshape(-1, 5)
+    return met
+
+
+def play(
+    actor: torch.nn.Module, batch: ReachBatch
+) -> tuple[NDArray[np.int64], NDArray[np.floating]]:
+    """Play one greedy episode in every row of a batch.
+
+    Returns:
+        Outcomes and undiscounted returns, each (n_envs,).
+    """
+    obs = batch.reset().copy()
+    ended, returns = np.zeros(batch.n_envs, dtype=np.int64), np.zeros(batch.n_envs)
+    act = np.zeros((batch.n_envs, N_ACT), dtype=np.float32)
+    while (live := np.flatnonzero(ended == 0)).size:
+        with torch.inference_mode():
+            act[live] = actor(torch.as_tensor(obs[live])).numpy()
+        result = batch.step(act, auto_reset=False)
+        obs, returns = result.obs.copy(), returns + result.rew
+        ended = np.where(result.ended > 0, result.ended, ended)
+    return ended, returns

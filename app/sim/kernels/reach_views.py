@@ -1,0 +1,164 @@
+"""The reach scenario seen for other goals, or beside one of its people alone, compiled.
+
+A policy between training targets is asked for several goals of one state, and beside several
+people once for each of them. What the goal does not change, the poses and what is seen of the
+people, is worked out once per state.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.sim.kernels.arm import place_robot
+from app.sim.kernels.columns import gaps
+from app.sim.kernels.compiled import kernel
+from app.sim.kernels.episode import PLAIN
+from app.sim.kernels.people import nearest_person, person_clearance, place_people
+from app.sim.kernels.reach import ReachState, ReachWorld, Work
+from app.sim.kernels.reach_features import (
+    EVERYBODY,
+    Obs,
+    clearances_ahead,
+    describe,
+    put_state,
+    show_person,
+)
+from app.sim.ports import Vec
+
+Indices = NDArray[np.int64]
+
+
+@kernel(inline="always")
+def _place(world: ReachWorld, state: ReachState, e: int, work: Work) -> None:
+    """Place robot and people of environment ``e``, and fill the workers' distances."""
+    place_robot(world.arm, state.q[e], work.robot)
+    place_people(world.people, state.people, e, work.crowd)
+    if state.people.q.shape[1] > 0:
+        gaps(work.robot.columns, work.crowd.columns, work.crowd.gap)
+
+
+@kernel(inline="always")
+def _look(
+    world: ReachWorld, state: ReachState, e: int, work: Work, view: int, who: int
+) -> float:
+    """Fill what is seen of the people of environment ``e``; return their distance [m]."""
+    _place(world, state, e, work)
+    robot, crowd, sight = work.robot, work.crowd, work.sight
+    seen, clearance = who, state.clear[e, 0]
+    if who == EVERYBODY:
+        seen = nearest_person(world.people, robot.columns, crowd)
+    elif crowd.q.shape[0] + crowd.cylinders.shape[0] > 1:
+        clearance = person_clearance(world.people, robot.columns, crowd, who)
+    show_person(state.people, e, seen, crowd, sight.seen)
+    if view != PLAIN:
+        clearances_ahead(world.people, state.people, e, who, robot.columns, sight)
+    return clearance
+
+
+@kernel(inline="always")
+def _write(
+    world: ReachWorld,
+    state: ReachState,
+    e: int,
+    work: Work,
+    view: int,
+    clearance: float,
+    goal: Vec,
+    out: Obs,
+) -> None:
+    """Write what was looked at as the observation for one goal [m], shape (3,)."""
+    q, qd, sight = state.q[e], state.qd[e], work.sight
+    if view == PLAIN:
+        put_state(q, qd, sight.seen, goal, out)
+        return
+    time_left = state.time_left[e]
+    top = world.people.top_z
+    describe(world.arm, top, q, qd, goal, clearance, time_left, work.robot, sight, out)
+
+
+@kernel(nogil=True)
+def observe_goals(
+    world: ReachWorld, state: ReachState, e: int, work: Work, view: int, goals: Vec, out: Obs
+) -> None:
+    """Write the observations of environment ``e`` for other goals.
+
+    Args:
+        world: Shared data.
+        state: Rows.
+        e: Environment.
+        work: Work space; need not be placed.
+        view: PLAIN (4.30) or FEATURES.
+        goals: Where the tcp shall be [m], shape (n, 3).
+        out: Filled, shape (n, N_STATE) or (n, N_FEATURES).
+    """
+    clearance = _look(world, state, e, work, view, EVERYBODY)
+    for k in range(goals.shape[0]):
+        _write(world, state, e, work, view, clearance, goals[k], out[k])
+
+
+@kernel(nogil=True)
+def observe_person(
+    world: ReachWorld, state: ReachState, e: int, work: Work, view: int, who: int, out: Obs
+) -> None:
+    """Write the observation of environment ``e`` as if one of its people were there alone.
+
+    Args:
+        world: Shared data.
+        state: Rows.
+        e: Environment.
+        work: Work space; need not be placed.
+        view: PLAIN (4.30) or FEATURES.
+        who: The person: workers first, then walkers.
+        out: Filled, shape (N_STATE,) or (N_FEATURES,).
+    """
+    clearance = _look(world, state, e, work, view, who)
+    _write(world, state, e, work, view, clearance, state.goal[e], out)
+
+
+@kernel(nogil=True)
+def observe_rows(
+    world: ReachWorld,
+    state: ReachState,
+    rows: Indices,
+    work: Work,
+    view: int,
+    who: int,
+    goals: Vec,
+    out: Obs,
+) -> None:
+    """Write the observations of some environments, each for its own goals.
+
+    Args:
+        world: Shared data.
+        state: Rows.
+        rows: Which environments, shape (k,).
+        work: Work space.
+        view: PLAIN (4.30) or FEATURES.
+        who: EVERYBODY as ordinarily, the nearest seen and all counted; or the one person who
+            is there alone.
+        goals: Where each tcp shall be [m], shape (k, n, 3).
+        out: Filled, shape (k, n, N_STATE) or (k, n, N_FEATURES).
+    """
+    for k in range(rows.shape[0]):
+        e = rows[k]
+        clearance = _look(world, state, e, work, view, who)
+        for i in range(goals.shape[1]):
+            _write(world, state, e, work, view, clearance, goals[k, i], out[k, i])
+
+
+@kernel(nogil=True)
+def distances_of_rows(
+    world: ReachWorld, state: ReachState, rows: Indices, work: Work, out: Vec
+) -> None:
+    """Write the distances of robot and people of some environments.
+
+    Args:
+        world: Shared data.
+        state: Rows.
+        rows: Which environments, shape (k,).
+        work: Work space.
+        out: Filled [m], workers first, then walkers, shape (k, n_people).
+    """
+    for k in range(rows.shape[0]):
+        _place(world, state, rows[k], work)
+        for who in range(out.shape[1]):
+            out[k, who] = person_clearance(world.people, work.robot.columns, work.crowd, who)

@@ -1,0 +1,133 @@
+"""Training on the reach scenario: its curve, its checkpoints, and going on with one."""
+
+import numpy as np
+import pytest
+import torch
+
+from app.errors import CheckpointMismatch, InvalidInput
+from app.policies import presets
+from app.policies.reach_policy import ReachPolicy
+from app.policies.reach_training import play, settings_of, states_met
+from app.policies.vecenv import CellVecEnv
+from app.sim.cells import load_cell
+from app.sim.reach import THESIS_WEIGHTS, ReachBatch, ReachSettings
+from tests.policies.conftest import Recorder
+
+TINY = {
+    "total_steps": 1536,
+    "n_envs": 16,
+    "buffer_size": 2000,
+    "batch_size": 32,
+    "learning_starts": 256,
+    "actor_frozen_updates": 8,
+    "width": 32,
+    "progress_steps": 256,
+    "progress_episodes": 8,
+    "checkpoint_steps": 512,
+}
+
+
+@pytest.fixture(scope="module")
+def preset():
+    return presets.resolve("reach-td3", TINY)
+
+
+@pytest.fixture(scope="module")
+def ran(preset):
+    recorder = Recorder()
+    recorder.result = recorder.run(preset)
+    return recorder
+
+
+def test_a_point_of_the_curve_plays_its_own_episodes(ran):
+    assert [point.step for point in ran.progress] == [256, 512, 768, 1024, 1280, 1536]
+    for point in ran.progress:
+        assert point.episodes == 8
+        assert point.success + point.collision + point.timeout == pytest.approx(1.0)
+
+
+def test_the_same_seed_trains_the_same_bits(preset, ran):
+    again = Recorder().run(preset)
+    assert again.checkpoint.tensors == ran.result.checkpoint.tensors
+
+
+def test_a_stopped_run_goes_on_where_it_was(preset, ran):
+    stopped = Recorder(stop_at=768)
+    assert stopped.run(preset).stopped
+    step, _, state = stopped.checkpoints[-1]
+    resumed = Recorder()
+    resumed.run(preset, resume=state)
+    steps = [point.step for point in stopped.progress + resumed.progress]
+    assert (step, steps) == (768, [point.step for point in ran.progress])
+
+
+def test_a_checkpoint_of_another_task_does_not_resume(preset, tiny_run):
+    with pytest.raises(CheckpointMismatch, match="preset"):
+        Recorder().run(preset, resume=tiny_run.checkpoints[0][2])
+
+
+def test_what_was_trained_decides_as_a_policy(preset, ran):
+    policy = ReachPolicy(ran.result.checkpoint)
+    batch = ReachBatch(load_cell("shared-workspace"), 4, 2, settings_of(preset))
+    assert np.abs(policy.acts(batch.reset())).max() <= 1.0
+    ranges = policy.trained_range
+    assert set(ranges) == {"q", "qd", "goal", "human"}
+    assert ranges["human"]["low"][4] >= 0.2 and ranges["human"]["high"][4] <= 0.5
+
+
+def test_the_reward_of_what_is_played_is_that_of_the_batch(preset):
+    batch = ReachBatch(load_cell("shared-workspace"), 6, 7, settings_of(preset))
+    still = torch.nn.Linear(batch.obs_size, 6)
+    torch.nn.init.zeros_(still.weight)
+    torch.nn.init.zeros_(still.bias)
+    ended, returns = play(still, batch)
+    assert set(ended.tolist()) <= {2, 3}
+    steps = np.rint(batch.state.elapsed / batch.arm.dt)
+    collided = ended == 2
+    np.testing.assert_allclose(returns, -0.004 * steps - 4.0 * collided, atol=1e-4)
+
+
+@pytest.mark.parametrize(("sees_time", "cut"), [(True, False), (False, True)])
+def test_only_where_time_is_not_seen_is_a_time_out_no_true_end(sees_time, cut):
+    settings = ReachSettings(time_limit_s=0.04, people=())
+    env = CellVecEnv(ReachBatch(load_cell("shared-workspace"), 2, 1, settings), sees_time)
+    env.reset()
+    for _ in range(2):
+        _, _, done, infos = env.step(np.zeros((2, 6), dtype=np.float32))
+    assert done.all()
+    assert [info.get("TimeLimit.truncated", False) for info in infos] == [cut, cut]
+    assert "terminal_observation" in infos[0]
+
+
+def test_without_people_there_is_no_range_of_them():
+    settings = settings_of(presets.resolve("reach-td3", {**TINY, "n_people": 0}))
+    batch = ReachBatch(load_cell("shared-workspace"), 2, 1, settings)
+    batch.reset()
+    assert set(states_met(batch)) == {"q", "qd", "goal"}
+
+
+def test_the_thesis_preset_is_table_4_2():
+    preset = presets.get("reach-ddpg-thesis")
+    settings = settings_of(preset)
+    assert settings.weights == THESIS_WEIGHTS
+    assert (settings.observation, settings.collision_ends) == ("state", False)
+    assert (settings.action.bounds, settings.action.meaning) == ("one-step", "coefficient")
+    assert (preset.layers, preset.width, preset.batch_size) == (10, 400, 128)
+    assert preset.lr_start * preset.actor_lr_ratio == pytest.approx(1e-3)
+    preset.check()
+
+
+@pytest.mark.parametrize(
+    ("overrides", "field"),
+    [
+        ({"goals": "moon"}, "overrides.goals"),
+        ({"n_people": 5}, "overrides.n_people"),
+        ({"gamma": 1.0}, "overrides.gamma"),
+        ({"action_degree": 3, "action_bounds": "one-step"}, "overrides.action_bounds"),
+        ({"learning_starts": 900_000, "total_steps": 512_000}, "overrides.learning_starts"),
+    ],
+)
+def test_a_bad_override_is_refused_by_name(overrides, field):
+    with pytest.raises(InvalidInput) as refused:
+        presets.resolve("reach-td3", overrides)
+    assert refused.value.field == field

@@ -1,0 +1,50 @@
+"""Checkpoints of policies that have learned nothing, for tests of what stands around them."""
+
+from dataclasses import asdict
+
+import torch
+
+from app.policies import checkpoint as formats
+from app.policies import presets
+from app.policies.checkpoint import Checkpoint
+from app.policies.model_state import weights_of
+from app.policies.networks import PlainActor
+from app.policies.reach_policy import LAYOUTS
+from app.policies.reach_preset import ReachPreset
+from app.policies.trained_cell import manifest_fields
+from app.sim.cells import Cell, load_cell
+from app.sim.reach import N_ACT
+
+
+def untrained_reach(seed: int = 0, cell: Cell | None = None, **overrides: object) -> Checkpoint:
+    """Return a ``policy`` checkpoint of ``reach-td3`` whose actor is random.
+
+    Args:
+        seed: Seed of its weights.
+        cell: Work cell; the preset's own by default.
+        overrides: Fields of the preset, such as ``goals="box"`` or ``width=32``.
+    """
+    preset = presets.resolve("reach-td3", overrides)
+    assert isinstance(preset, ReachPreset)
+    layout = LAYOUTS[preset.observation]
+    generator = torch.random.get_rng_state()
+    torch.manual_seed(seed)
+    n_obs = sum(size for _, size in layout)
+    actor = PlainActor(preset.width, n_obs, N_ACT, preset.layers)
+    with torch.no_grad():
+        actor.net[-1].weight.mul_(40.0)
+    torch.random.set_rng_state(generator)
+    manifest = {
+        "format": formats.FORMAT,
+        "kind": "policy",
+        "preset": asdict(preset),
+        "seed": seed,
+        **manifest_fields(cell or load_cell(preset.cell)),
+        "layout": layout,
+        "act_size": N_ACT,
+        "width": preset.width,
+        "step": 0,
+        "updates": 0,
+        "trained_range": {},
+    }
+    return formats.pack(manifest, weights_of({"actor": actor}))
