@@ -18,13 +18,22 @@ from starlette.concurrency import run_in_threadpool
 import web
 from app.api.application import build_app
 from app.api.known_people import warm_up
-from app.api.registry import DEFAULT_ALIAS, SORTERS, CheckpointNames, PolicyRegistry
+from app.api.registry import (
+    DEFAULT_ALIAS,
+    REACH_ALIAS,
+    SORTERS,
+    CheckpointNames,
+    PolicyRegistry,
+)
 from app.api.services import Services
 from app.errors import ServiceError
 from app.policies import pretrained
 from app.policies.checkpoint import CHOOSING, SORTING, load, require_purpose
+from app.policies.motion_decision import MotionDecider
+from app.policies.reach_policy import ReachPolicy
 from app.policies.sorting_policy import SortingPolicy
 from app.policies.task_choice import TaskChooser
+from app.policies.trained_cell import cell_of
 from app.settings import Settings, check_access
 from app.sim.cells import Cell, load_cell
 from app.sim.ports import SortingValues, TaskPolicy
@@ -99,6 +108,7 @@ class Service:
             checkpoints=names,
             policies=PolicyRegistry(names, build_policy, DEFAULT_ALIAS),
             sorters=PolicyRegistry(names, build_sorter, SORTERS[0]),
+            movers=PolicyRegistry(names, build_mover, REACH_ALIAS),
             cells=CellCatalog(store),
             motions=MotionCatalog(store, self._imports),
             start_world=start_world,
@@ -132,6 +142,8 @@ class Service:
             warm_up_sorting()
             for name in SORTERS:
                 warm_up_sorting(self.parts.sorters.load(name))
+            if REACH_ALIAS in self.parts.checkpoints.aliases:
+                self.parts.movers.load(REACH_ALIAS)
             cell = LiveCell(load_cell(LIVE_CELL), policy, id=WORLD_ID)
             if self.parts.stopping.is_set():
                 return
@@ -168,6 +180,14 @@ def build_sorter(manifest: Mapping[str, Any], tensors: bytes) -> SortingValues:
     checkpoint = load(manifest, tensors)
     require_purpose(checkpoint, SORTING)
     return SortingPolicy(checkpoint)
+
+
+def build_mover(manifest: Mapping[str, Any], tensors: bytes) -> MotionDecider:
+    """Make the object that moves to goals from a checkpoint's manifest and tensors."""
+    actor = ReachPolicy(load(manifest, tensors))
+    decider = MotionDecider(actor, cell_of(manifest))
+    decider.warm_up()
+    return decider
 
 
 def publish_shipped(names: CheckpointNames) -> None:

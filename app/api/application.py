@@ -13,6 +13,7 @@ from app.api import (
     checkpoints,
     health,
     jobs,
+    motion,
     motions,
     presets,
     problems,
@@ -59,6 +60,7 @@ def build_app(*, lifespan: Lifespan, static: Path, token: str | None, version: s
     for part in (
         task_selection,
         sorting,
+        motion,
         trackers,
         worlds,
         jobs,

@@ -6,7 +6,8 @@ the error's data; bad input always carries ``field``, ``value``, ``rule`` and ``
 
 import http
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
@@ -135,17 +136,29 @@ async def on_service_error(request: Request, error: Exception) -> ProblemRespons
 async def on_validation_error(request: Request, error: Exception) -> ProblemResponse:
     """Answer input that does not fit its schema."""
     assert isinstance(error, RequestValidationError)
-    models = body_models(request)
-    cut = [without_tag(one, models) for one in error.errors()[:MAX_LISTED_ERRORS]]
+    return validation_problem(error.errors(), body_models(request), request.url.path)
+
+
+def validation_problem(
+    errors: Sequence[dict[str, Any]], models: Sequence[type[BaseModel]], instance: str
+) -> ProblemResponse:
+    """Turn what a schema refused into its problem.
+
+    Args:
+        errors: Pydantic's, with locations that begin with ``body``; at least one.
+        models: The models that the body may have.
+        instance: Path of the request.
+    """
+    cut = [without_tag(one, models) for one in errors[:MAX_LISTED_ERRORS]]
     found = [validation_member(one, model) for one, model in cut]
-    malformed = error.errors()[0]["type"] == "json_invalid"
+    malformed = errors[0]["type"] == "json_invalid"
     first = found[0]
     given = "" if first["value"] == NOTHING else f" = {first['value']}"
     return problem(
         400 if malformed else 422,
         f"{first['field']}{given} {first['rule']}",
         kind="malformed-json" if malformed else "invalid-input",
-        instance=request.url.path,
+        instance=instance,
         data={**first, "errors": found},
     )
 

@@ -11,6 +11,7 @@ from starlette.requests import HTTPConnection
 from app.api.registry import CheckpointNames, PolicyRegistry
 from app.api.tracker_sessions import TrackerSessions
 from app.errors import NotFound, NotReady
+from app.policies.motion_decision import MotionDecider
 from app.sim.cells import Cell
 from app.sim.ports import SortingValues, TaskPolicy, WorldHandle
 from app.store.engine import Store
@@ -20,6 +21,8 @@ from jobs.supervisor import Supervisor
 
 MAX_UPLOADS = 4
 """Most files that are taken in at once; each is held in memory."""
+MAX_STREAMS = 16
+"""Most sockets that ask for motion at once."""
 
 
 class LiveWorld(Protocol):
@@ -80,6 +83,8 @@ class Services:
     """Those that choose tasks, as objects that decide."""
     sorters: PolicyRegistry[SortingValues]
     """Those that sort."""
+    movers: PolicyRegistry[MotionDecider]
+    """Those that move the arm to goals."""
     cells: CellCatalog
     """The work cells by name."""
     motions: MotionCatalog
@@ -98,6 +103,10 @@ class Services:
         default_factory=lambda: threading.BoundedSemaphore(MAX_UPLOADS)
     )
     """Held by whoever posts a file."""
+    motion_streams: threading.BoundedSemaphore = field(
+        default_factory=lambda: threading.BoundedSemaphore(MAX_STREAMS)
+    )
+    """Held by every open socket that asks for motion."""
     stopping: threading.Event = field(default_factory=threading.Event)
     """Set when the server goes down: open streams end."""
 

@@ -22,6 +22,7 @@ from app.policies.networks import BASE_WEIGHT
 from app.policies.reach_preset import ACTORS, action_of
 from app.policies.trained_cell import cell_of
 from app.sim.actions import ActionSettings
+from app.sim.goal_sets import MOST_HALTON, N_HALTON, halton_targets
 from app.sim.kernels.reach_features import BASE_START, SIZES, STATE_SIZES
 from app.sim.ports import Vec
 from app.sim.reach import N_ACT, GoalRule, ViewName, goal_region_of
@@ -69,6 +70,8 @@ class ReachPolicy:
         """The goals it was trained on [m], shape (n, 3); None for a whole box."""
         if self.goals == "grid":
             self.targets = goal_region_of(cell).targets()
+        elif self.goals == "halton":
+            self.targets = halton_targets(goal_region_of(cell), _n_halton(preset))
         self.n_obs = sum(size for _, size in manifest["layout"])
         """Length of an observation."""
         self._layers = _layers_of(checkpoint.arrays(), self.n_obs)
@@ -134,6 +137,15 @@ def _named(preset: Mapping[str, Any], field: str, choices: tuple[str, ...]) -> s
     if value not in choices:
         raise InvalidInput(f"manifest.preset.{field}", value, "must be a known rule", choices)
     return str(value)
+
+
+def _n_halton(preset: Mapping[str, Any]) -> int:
+    """Return the number of points of the Halton set that a manifest's preset names."""
+    n = preset.get("n_halton", N_HALTON)
+    if not isinstance(n, int) or not 1 <= n <= MOST_HALTON:
+        rule = f"must be a number in [1, {MOST_HALTON}]"
+        raise InvalidInput("manifest.preset.n_halton", n, rule)
+    return n
 
 
 def _layers_of(arrays: Mapping[str, NDArray[Any]], n_obs: int) -> tuple[Layer, ...]:

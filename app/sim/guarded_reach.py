@@ -49,7 +49,7 @@ class GuardedRuns:
     """What happened in n episodes under the safety layer; arrays of shape (n,)."""
 
     arrived: NDArray[np.bool_]
-    """Whether the tcp came within 0.1 m of the goal, untouched and in time."""
+    """Whether the tcp came within 0.1 m of the goal in time."""
     seconds: Vec
     """How long the episode was [s]."""
     stopped_s: Vec
@@ -81,11 +81,13 @@ class GuardedReach(ReachBatch):
         cell: Work cell with a goal region.
         n_envs: Number of cells.
         seed: Seed; see :class:`~app.sim.reach.ReachBatch`.
-        settings: Starts, ends and rewards; a collision always ends the episode.
+        settings: Starts, ends and rewards; a collision ends the episode.
         safety: What the safety layer assumes.
         tracks: Cylinder of each cell's only person at the ends of periods: x, y, radius [m],
             shape (n_envs, n + 1, 3); None where people walk by themselves.
         guarded: Whether the layer acts.
+        rest_ends: Whether a person who walks into a robot at rest ends the episode; a link in
+            motion that is touched always does.
         horizon_s: Most time left that policies are shown [s].
         first_env: Number of the first cell.
 
@@ -104,6 +106,7 @@ class GuardedReach(ReachBatch):
         *,
         tracks: Vec | None = None,
         guarded: bool = True,
+        rest_ends: bool = True,
         horizon_s: float = HORIZON_S,
         first_env: int = 0,
     ) -> None:
@@ -116,6 +119,7 @@ class GuardedReach(ReachBatch):
         self._guard = Guard(
             safety=rule_of(safety, *shape),
             guarded=guarded,
+            rest_ends=rest_ends,
             horizon=horizon_s,
             tracks=np.zeros((0, 1, 3)) if tracks is None else own(tracks),
             period=np.zeros(n_envs, dtype=np.int64),

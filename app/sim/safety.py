@@ -29,7 +29,6 @@ from app.sim.kernels.cylinder import cylinder_clearance
 from app.sim.ports import Vec
 from app.sim.robot import LINK_NAMES
 from app.sim.scene import own, require_finite
-from app.sim.separation import separation_of
 
 UNITS = {
     "human_speed": "m/s",
@@ -168,6 +167,74 @@ class SafetyDecision:
         return there, speeds
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SeparationTerms:
+    """S_p of the standard for one person and one link, term by term (METHOD 2.7).
+
+    ``S_p = v_h (T_r + T_s) + v_r T_r + B + C + Z_d + Z_r`` and the protective distance.
+    """
+
+    link: str
+    """The link."""
+    separation: float
+    """Distance as seen [m]."""
+    human_speed: float
+    """v_h [m/s]."""
+    robot_speed: float
+    """v_r, the link as fast as its joints could make it [m/s]."""
+    reaction_time: float
+    """T_r, with the control period, the tracker's delay and the data's age [s]."""
+    stop_time: float
+    """T_s [s]."""
+    braking: float
+    """B, the way of the link in the stop [m]."""
+    intrusion: float
+    """C [m]."""
+    person_uncertainty: float
+    """Z_d [m]."""
+    robot_uncertainty: float
+    """Z_r [m]."""
+    protective_distance: float
+    """Least distance to anyone, on top [m]."""
+
+    @property
+    def required(self) -> float:
+        """S_p and the protective distance [m]."""
+        way = self.human_speed * (self.reaction_time + self.stop_time)
+        way += self.robot_speed * self.reaction_time + self.braking + self.intrusion
+        uncertain = self.person_uncertainty + self.robot_uncertainty
+        return way + uncertain + self.protective_distance
+
+
+def powers_of_time(q: Vec, qd: Vec, c: Vec, d: Vec, drop: float) -> Vec:
+    """Return a scaled motion as polynomials in time, ascending, shape (6, 7).
+
+    ``q + qd s + c s^2 + d s^3`` at ``s = t - drop t^2/2``, written out in powers of ``t``: the
+    seven coefficients of each joint, from ``t^0`` to ``t^6``. They hold until the motion rests
+    at ``t = 1/drop``.
+
+    Args:
+        q: Joint positions at the start [rad], shape (6,).
+        qd: Joint speeds at the start [rad/s], shape (6,).
+        c: Second coefficients of the path [rad/s^2], shape (6,).
+        d: Third coefficients of the path [rad/s^3], shape (6,).
+        drop: What the rate loses per second [1/s].
+    """
+    k = drop
+    return np.stack(
+        [
+            q,
+            qd,
+            c - 0.5 * k * qd,
+            d - k * c,
+            0.25 * k**2 * c - 1.5 * k * d,
+            0.75 * k**2 * d,
+            -0.125 * k**3 * d,
+        ],
+        axis=1,
+    )
+
+
 def contact_speeds(settings: SafetySettings, n_columns: int, n_cylinders: int) -> Vec:
     """Return the speed at which each part of the people may be touched [m/s].
 
@@ -253,19 +320,14 @@ class SafetyLayer:
         self, chosen: float, q: Vec, qd: Vec, people: Shapes, age: float
     ) -> SafetyDecision:
         """Return the decision the work space holds, with what set it."""
-        watch, arm, n_columns = self._watch, self.arm, self._shape[0]
+        watch, arm = self._watch, self.arm
         t_stop = override.stop_time(qd, arm.qdd_max)
         person = part = link = separation = required = None
         column = int(watch.why[watch_kernel.WHO])
         if chosen < 1.0 and column >= 0:
-            separation = float(watch.gap[watch_kernel.NOW, column])
-            nearest = self._nearest_link(column, people)
-            link = LINK_NAMES[arm.link[nearest]]
-            required = separation_of(arm, self.settings, qd, nearest, age).required
-            person = column // body.N_CAPSULES
-            part = column % body.N_CAPSULES
-            if column >= n_columns:
-                part, person = None, n_columns // body.N_CAPSULES + column - n_columns
+            terms = self._terms_of(column, qd, people, t_stop, age)
+            link, separation, required = terms.link, terms.separation, terms.required
+            person, part = self._numbered(column)
         return SafetyDecision(
             override=float(chosen),
             c=watch.c.copy(),
@@ -282,6 +344,58 @@ class SafetyLayer:
             lacking=max(0.0, float(watch.why[watch_kernel.SLACK])) if chosen < 1.0 else 0.0,
             stop_time=t_stop,
             stop_distance=float(0.5 * t_stop * (np.abs(qd) @ arm.lever)),
+        )
+
+    def terms(
+        self, decision: SafetyDecision, qd: Vec, people: Shapes, age: float = 0.0
+    ) -> tuple[int, SeparationTerms] | None:
+        """Return whom S_p is told for, and its terms, right after :meth:`decide`.
+
+        It is told for who set the override, or for the nearest where nobody did; None where
+        nobody is there.
+
+        Args:
+            decision: What was decided last.
+            qd: Joint speeds then [rad/s], shape (6,).
+            people: As seen then.
+            age: How old they were beyond the tracker's delay [s].
+        """
+        gap = self._watch.gap[watch_kernel.NOW]
+        if not gap.size:
+            return None
+        column = int(self._watch.why[watch_kernel.WHO])
+        if decision.person is None:
+            column = int(np.argmin(gap))
+        terms = self._terms_of(column, qd, people, decision.stop_time, age)
+        return self._numbered(column)[0], terms
+
+    def _numbered(self, column: int) -> tuple[int, int | None]:
+        """Return a column's person, workers first, and the part; no part for a cylinder."""
+        n_columns = self._shape[0]
+        if column >= n_columns:
+            return n_columns // body.N_CAPSULES + column - n_columns, None
+        return column // body.N_CAPSULES, column % body.N_CAPSULES
+
+    def _terms_of(
+        self, column: int, qd: Vec, people: Shapes, t_stop: float, age: float
+    ) -> SeparationTerms:
+        """Return S_p of the link nearest to a part of the people."""
+        arm, settings = self.arm, self.settings
+        nearest = self._nearest_link(column, people)
+        joints = slice(0, int(arm.link[nearest]))
+        v_r = float(np.abs(qd[joints]) @ arm.lever[joints])
+        return SeparationTerms(
+            link=LINK_NAMES[arm.link[nearest]],
+            separation=float(self._watch.gap[watch_kernel.NOW, column]),
+            human_speed=settings.human_speed,
+            robot_speed=v_r,
+            reaction_time=arm.dt + settings.lead + age,
+            stop_time=t_stop,
+            braking=0.5 * v_r * t_stop,
+            intrusion=settings.intrusion_distance,
+            person_uncertainty=settings.person_uncertainty,
+            robot_uncertainty=settings.robot_uncertainty,
+            protective_distance=settings.protective_distance,
         )
 
     def _nearest_link(self, column: int, people: Shapes) -> int:

@@ -14,9 +14,12 @@ from app.policies.networks import PlainActor
 from app.policies.reach_policy import ReachPolicy, is_reach
 from app.sim.actions import ActionSettings
 from app.sim.cells import load_cell
+from app.sim.goal_sets import halton_targets
 from app.sim.ports import ReachActor
 from app.sim.reach import ReachBatch, ReachSettings, goal_region_of
 from tests.policies.untrained import untrained_reach
+
+SEEN = {"observation": "features"}
 
 
 @pytest.fixture(scope="module")
@@ -53,6 +56,8 @@ def test_it_says_what_it_is(checkpoint):
     assert policy.action == ActionSettings()
     np.testing.assert_array_equal(policy.targets, goal_region_of(cell).targets())
     assert ReachPolicy(untrained_reach(width=16, goals="box")).targets is None
+    halton = ReachPolicy(untrained_reach(width=16, goals="halton", n_halton=30)).targets
+    np.testing.assert_array_equal(halton, halton_targets(goal_region_of(cell), 30))
 
 
 @pytest.mark.parametrize("view", ["features", "state"])
@@ -81,7 +86,8 @@ def test_a_policy_of_another_task_is_refused():
     [
         ({"act_size": 5}, "act_size"),
         ({"layout": [["human", 5]]}, "layout"),
-        ({"preset": {"observation": "features", "goals": "moon"}}, "manifest.preset.goals"),
+        ({"preset": {**SEEN, "goals": "moon"}}, "manifest.preset.goals"),
+        ({"preset": {**SEEN, "goals": "halton", "n_halton": "1"}}, "n_halton"),
         ({"preset": {"goals": "grid"}}, "manifest.preset.observation"),
     ],
 )

@@ -28,7 +28,7 @@ from app.sim.kernels.people import advance_people, place_people
 from app.sim.kernels.reach import ReachRules, ReachState, ReachWorld, Work, reset_env, write_obs
 from app.sim.kernels.reach_features import Obs
 from app.sim.kernels.reach_reward import ReachWeights, reward
-from app.sim.kernels.safety_trial import first_contact, touching_speed
+from app.sim.kernels.safety_trial import MOVING, first_contact, touching_speed
 from app.sim.kernels.ssm import decide
 from app.sim.kernels.trial_people import TrialWork, people_speed
 from app.sim.kernels.watch import NOW, Safety, place_node
@@ -51,7 +51,7 @@ N_ACCOUNT = 10
 the robot stands, for whatever reason; the way of the joints [rad] and of the tcp [m]; NO_TOUCH,
 PERSON or CELL; speed of the touching link [m/s]; greatest speed of any person [m/s]."""
 NO_TOUCH, PERSON, CELL = range(3)
-"""What touched the robot at the end of an episode."""
+"""What touched the robot in an episode; at its end, where that ends it."""
 AT_REST = 1e-3
 """Joints slower than this stand [rad/s]."""
 
@@ -63,6 +63,9 @@ class Guard(NamedTuple):
     """What the safety layer assumes."""
     guarded: bool
     """Whether the layer acts; without it, pieces are executed as commanded."""
+    rest_ends: bool
+    """Whether a person who walks into a robot at rest ends the episode; if not, it is noted, and
+    the episode goes on."""
     horizon: float
     """Most time left that a policy is shown [s]."""
     tracks: Vec
@@ -171,7 +174,7 @@ def _execute(world: ReachWorld, state: ReachState, e: int, guard: Guard, work: W
 
 @kernel(error_model="numpy")
 def _touch(world: ReachWorld, guard: Guard, e: int) -> bool:
-    """Tell whether people touch the robot in the period, and note how fast the link is."""
+    """Note whether people touch the robot, and how fast the link is; tell if that is the end."""
     arm, trial, account = world.arm, guard.trial, guard.account[e]
     account[FASTEST] = max(account[FASTEST], people_speed(trial, arm.dt))
     if trial.cylinders0.shape[0] + trial.columns0.shape[1] == 0:
@@ -180,8 +183,9 @@ def _touch(world: ReachWorld, guard: Guard, e: int) -> bool:
     when, part = first_contact(arm, trial)
     if when < 0.0:
         return False
-    account[CONTACT], account[SPEED] = PERSON, touching_speed(arm, part, trial)
-    return True
+    speed = touching_speed(arm, part, trial)
+    account[CONTACT], account[SPEED] = PERSON, max(account[SPEED], speed)
+    return guard.rest_ends or speed > MOVING
 
 
 @kernel(error_model="numpy")

@@ -1,0 +1,175 @@
+"""The next piece of motion toward a goal, for other programs (thesis chapter 4, METHOD 2).
+
+``POST /v1/motion`` answers one state. The socket ``/v1/motion/stream`` takes the same requests
+as text messages, one after the other, and gives the same answers in their order: for loops at
+50 Hz. What cannot be answered is answered by a problem, and the socket lives on.
+"""
+
+import asyncio
+import json
+import logging
+from functools import partial
+from typing import Any
+
+from fastapi import APIRouter
+from pydantic import ValidationError
+from starlette.concurrency import run_in_threadpool
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from app.api.known_people import known_people, take_time
+from app.api.problems import problem, service_problem, validation_problem
+from app.api.registry import REACH_ALIAS
+from app.api.schemas.motion import MotionAnswer, MotionRequest
+from app.api.services import Services, ServicesDep, services_of
+from app.api.task_selection import known_cell
+from app.errors import NotShipped, ServiceError
+from app.policies.motion_decision import MotionDecider
+from app.sim.cells import Cell, require_cell
+from app.sim.safety import safety_settings
+
+logger = logging.getLogger(__name__)
+
+PATH = "/v1/motion"
+MAX_MESSAGE = 1 << 16
+"""Longest message taken on a socket [characters]."""
+MAX_STAMP, MAX_TIME = 64, 1e18
+"""Longest text and greatest number that a stamp in a problem may be."""
+LOOK_S = 0.2
+"""How often an idle socket looks whether the server stops [s]."""
+REMEDY = (
+    "train one (POST /v1/jobs, kind `train`, a preset that reaches goals) and name its "
+    "checkpoint in `checkpoint`"
+)
+
+router = APIRouter(prefix=PATH, tags=["deciding"])
+
+
+@router.post("", summary="Decide how the robot moves next")
+async def move(request: MotionRequest, services: ServicesDep) -> MotionAnswer:
+    """Return the next polynomial piece of every joint, the override and what set it.
+
+    Nothing is remembered between two calls: state, people and goal may change at any time. For
+    loops, `/v1/motion/stream` takes the same over a WebSocket.
+    """
+    return await answer(request, services)
+
+
+async def answer(request: MotionRequest, services: Services) -> MotionAnswer:
+    """Return the answer to one request.
+
+    Raises:
+        ServiceError: There is none; says why.
+    """
+    services.readiness.require()
+    cell = await known_cell(request.cell, services)
+    decider = await _decider(request.checkpoint, services)
+    require_cell(cell, decider.actor.cell, decider.actor.cell_sha256)
+    decided = partial(_decided, request, cell, decider, services)
+    # A decision takes less than a millisecond: right here, as for a task selection.
+    if take_time(request.people):
+        return await run_in_threadpool(decided)
+    return decided()
+
+
+async def _decider(name: str | None, services: Services) -> MotionDecider:
+    """Return the policy that is named, or the shipped one.
+
+    Raises:
+        NotShipped: None is named and none is shipped.
+        InvalidInput: Nothing has that name.
+        CheckpointMismatch: It does not reach goals.
+    """
+    if name is None and REACH_ALIAS not in services.checkpoints.aliases:
+        raise NotShipped("checkpoint that reaches goals", REACH_ALIAS, REMEDY)
+    found = services.movers.loaded(name)
+    return found or await run_in_threadpool(services.movers.load, name)
+
+
+def _decided(
+    request: MotionRequest, cell: Cell, decider: MotionDecider, services: Services
+) -> MotionAnswer:
+    people = known_people(request.people, cell, services.trackers)
+    ages = [one.estimate.age_s for one in people if one.estimate is not None]
+    question = request.to_domain(
+        [one.person for one in people], safety_settings(cell), max(ages, default=0.0)
+    )
+    decision = decider.decide(question)
+    uses = [one.use(i == decision.seen) for i, one in enumerate(people)]
+    return MotionAnswer.from_domain(decision, question, uses, cell.robot.dt, request.stamp)
+
+
+@router.websocket("/stream")
+async def stream(client: WebSocket) -> None:
+    """Answer requests, one message each, until the caller leaves or the server stops."""
+    services = services_of(client)
+    if not services.motion_streams.acquire(blocking=False):
+        await client.close(1013, "too many sockets ask for motion already")
+        return
+    try:
+        await client.accept()
+        await _serve(client, services)
+    except WebSocketDisconnect:
+        logger.debug("a socket that asked for motion has left")
+    finally:
+        services.motion_streams.release()
+
+
+async def _serve(client: WebSocket, services: Services) -> None:
+    """Take messages and answer them in their order."""
+    while not services.stopping.is_set():
+        incoming = asyncio.ensure_future(client.receive())
+        while not incoming.done() and not services.stopping.is_set():
+            await asyncio.wait((incoming,), timeout=LOOK_S)
+        if not incoming.done():
+            incoming.cancel()
+            break
+        message = incoming.result()
+        if message["type"] == "websocket.disconnect":
+            return
+        await client.send_text(await reply(message, services))
+    await client.close(1001, "the server stops")
+
+
+async def reply(message: dict[str, Any], services: Services) -> str:
+    """Return the answer to one message as JSON: a :class:`MotionAnswer` or a problem.
+
+    Args:
+        message: As ASGI hands it over.
+        services: The parts behind the routes.
+    """
+    path, text = f"{PATH}/stream", message.get("text")
+    stamp: dict[str, object] = {}
+    try:
+        if text is None or len(text) > MAX_MESSAGE:
+            rule = f"a message must be JSON text of at most {MAX_MESSAGE} characters"
+            refused = problem(413 if text else 400, rule, instance=path)
+        else:
+            body = json.loads(text)
+            stamp = _stamp_of(body)
+            found = await answer(MotionRequest.model_validate(body), services)
+            return found.model_dump_json()
+    except ValidationError as error:
+        wrong = [
+            {**dict(one), "loc": ("body", *one["loc"])}
+            for one in error.errors(include_url=False)
+        ]
+        refused = validation_problem(wrong, [MotionRequest], path)
+    except (ValueError, RecursionError) as error:
+        detail = f"a message must be JSON: {error}"
+        refused = problem(400, detail, kind="malformed-json", instance=path)
+    except ServiceError as error:
+        refused = service_problem(error, path)
+    except Exception:
+        logger.exception("a message on %s could not be answered", path)
+        detail = "an unforeseen error; the server's log has the trace"
+        refused = problem(500, detail, instance=path)
+    content: dict[str, object] = json.loads(bytes(refused.body))
+    return json.dumps(content | stamp)
+
+
+def _stamp_of(body: object) -> dict[str, object]:
+    """Return the caller's stamp where it is one, so that a problem can be told apart."""
+    stamp = body.get("stamp") if isinstance(body, dict) else None
+    is_text = isinstance(stamp, str) and len(stamp) <= MAX_STAMP
+    is_time = isinstance(stamp, int | float) and -MAX_TIME < stamp < MAX_TIME
+    return {"stamp": stamp} if is_text or is_time else {}

@@ -1,0 +1,313 @@
+"""The next piece of motion toward a goal beside people (METHOD 2.2, 2.4, 2.7).
+
+State, people and goal in, one polynomial per joint out: the policy's action, interpolated
+between its training targets where the goal lies between them, turned into the piece that keeps
+every limit, and the override at which speed and separation monitoring lets it run. Nothing is
+remembered from one call to the next: the speeds hold all that the next period needs.
+"""
+
+import threading
+import time
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from app.errors import InvalidInput
+from app.policies.interpolation import Interpolation, interpolates
+from app.policies.movers import person_weights
+from app.sim import human
+from app.sim.cell_reach import LONGEST_REACH, SHOULDER
+from app.sim.cells import Cell, require_cell
+from app.sim.checker import Shapes
+from app.sim.kernels import actions
+from app.sim.motion_ports import (
+    BESIDES,
+    WAYS,
+    Met,
+    MotionDecision,
+    MotionQuestion,
+    TargetWeight,
+    Way,
+)
+from app.sim.motion_state import Stage
+from app.sim.pick import Piece
+from app.sim.ports import OutsideField, Person, ReachActor, Vec
+from app.sim.reach import goal_region_of
+from app.sim.safety import SafetyDecision, SafetyLayer, SafetySettings, SeparationTerms
+from app.sim.scene import FAR_AWAY, arm_of
+from app.sim.seen_people import checked_people, checked_vector, standing_in
+
+SLACK = 1e-6
+"""How far outside a limit a measured joint may be."""
+RANGE_SLACK = 0.02
+"""Inputs this far outside what was met in training are not flagged [m, rad or per second]."""
+LONGEST_S = 60.0
+"""Longest time left to reach a goal [s]."""
+_FAR = np.full(3, 10.0)
+HUMAN = ("x", "y", "vx", "vy", "r")
+"""What a policy sees of a person."""
+RANGES: Mapping[str, Sequence[str]] = {
+    "q": tuple(f"robot.q[{j}]" for j in range(6)),
+    "qd": tuple(f"robot.qd[{j}]" for j in range(6)),
+    "goal": ("goal.x", "goal.y", "goal.z"),
+}
+"""Variables of a manifest's ``trained_range`` and what messages call their numbers."""
+
+Seen = tuple[int | None, Vec]
+"""A person, bodies first, or None for nobody, and the cylinder a policy saw, shape (5,)."""
+Told = tuple[SafetyDecision | None, int | None, SeparationTerms | None]
+
+
+class MotionDecider:
+    """Says how to move by one policy; safe to call from several threads.
+
+    Args:
+        actor: The policy.
+        cell: The cell it was trained in.
+
+    Raises:
+        CheckpointMismatch: It was trained in another cell.
+        InvalidInput: The cell has no goals.
+    """
+
+    def __init__(self, actor: ReachActor, cell: Cell) -> None:
+        require_cell(cell, actor.cell, actor.cell_sha256)
+        self.actor, self.cell, self.arm = actor, cell, arm_of(cell)
+        self._between = Interpolation(actor) if interpolates(actor) else None
+        self._rule = actor.action.rule()
+        self._ranges = {
+            name: (np.array(entry["low"]), np.array(entry["high"]))
+            for name, entry in actor.trained_range.items()
+        }
+        self._stages: dict[tuple[int, int], Stage] = {}
+        self._layer = SafetyLayer(self.arm, SafetySettings())
+        self._busy = threading.Lock()
+
+    @property
+    def checkpoint(self) -> str:
+        """SHA-256 of the checkpoint."""
+        return self.actor.checkpoint
+
+    def decide(self, question: MotionQuestion) -> MotionDecision:
+        """Return the next piece of motion.
+
+        Raises:
+            InvalidInput: A number that no answer can be given for; somebody inside the robot,
+                unless monitoring stops it.
+            GoalOutside: Interpolation is asked for a goal outside the training targets.
+        """
+        started = time.perf_counter()
+        q, qd, qdd, goal = self._numbers(question)
+        people = checked_people(question.people)
+        way = self._way(question.way)
+        order = _bodies_first(people)
+        known = [people[i] for i in order]
+        with self._busy:
+            stage = self._stage(known)
+            stage.put(q, qd, known, question.time_left_s)
+            apart = stage.apart.copy()
+            if question.safety is None:
+                _require_apart(apart, order)
+            act, targets, weights, seen = self._act(stage, question, goal, way)
+            piece, unfeasible = self._piece(q, qd, qdd, act)
+            safe, terms_of, terms = self._monitored(question, q, qd, piece, stage.shapes, order)
+            outside = [one for who, what in seen for one in self._human(who, what, order)]
+            clearance, distance = stage.clear.tolist(), float(np.linalg.norm(stage.tcp - goal))
+        place = np.argsort(order)
+        return MotionDecision(
+            act=act,
+            piece=piece,
+            unfeasible=unfeasible,
+            way=way,
+            targets=targets,
+            met=tuple(Met(separation=float(apart[i]), weight=float(weights[i])) for i in place),
+            seen=order[int(apart.argmin())] if order else None,
+            safe=safe,
+            terms=terms,
+            terms_of=terms_of,
+            clearance=(clearance[0], clearance[1], clearance[2]),
+            distance=distance,
+            beyond_reach=self._beyond_reach(goal),
+            outside=(*self._outside(q, qd, goal), *outside),
+            checkpoint=self.checkpoint,
+            elapsed_ms=1e3 * (time.perf_counter() - started),
+        )
+
+    def warm_up(self) -> None:
+        """Compile what a decision needs, before the first one is asked for."""
+        q, goal = self.arm.home.copy(), np.array(goal_region_of(self.cell).center)
+        people = (
+            Person(q=human.rest_posture(*FAR_AWAY), qd=np.zeros(18)),
+            standing_in(-1.5, 2.0, 0.0, 0.0, 0.3),
+        )
+        qdd = np.zeros(6)
+        for seen in ((), people[:1], people[1:]):
+            self.decide(
+                MotionQuestion(
+                    q=q,
+                    qd=np.zeros(6),
+                    qdd=qdd,
+                    goal=goal,
+                    people=seen,
+                    safety=SafetySettings(),
+                )
+            )
+
+    def _numbers(self, question: MotionQuestion) -> tuple[Vec, Vec, Vec, Vec]:
+        """Return q, qd, qdd and goal once they keep their rules."""
+        arm, given = self.arm, question.qdd
+        q_min, q_max = arm.q_min - SLACK, arm.q_max + SLACK
+        q = checked_vector("robot.q", question.q, 6, q_min, q_max, "rad")
+        qd_max, qdd_max = arm.qd_max + SLACK, arm.qdd_max + SLACK
+        qd = checked_vector("robot.qd", question.qd, 6, -qd_max, qd_max, "rad/s")
+        if given is None and self.actor.action.degree == 3:
+            rule = "must be given: this policy limits jerk, which needs the accelerations"
+            raise InvalidInput("robot.qdd", None, rule)
+        qdd = np.zeros(6)
+        if given is not None:
+            qdd = checked_vector("robot.qdd", given, 6, -qdd_max, qdd_max, "rad/s^2")
+        goal = checked_vector("goal", question.goal, 3, -_FAR, _FAR, "m")
+        for name, value in (("time_left_s", question.time_left_s), ("age_s", question.age_s)):
+            if not 0.0 <= value <= LONGEST_S:
+                raise InvalidInput(name, value, f"must lie in [0, {LONGEST_S:g}] s")
+        if question.beside not in BESIDES:
+            raise InvalidInput("beside", question.beside, "must name a rule", BESIDES)
+        return q, qd, qdd, goal
+
+    def _way(self, asked: Way | None) -> Way:
+        if asked is None:
+            return "direct" if self._between is None else "interpolated"
+        if asked not in WAYS:
+            raise InvalidInput("way", asked, "must name a way", WAYS)
+        if asked == "interpolated" and self._between is None:
+            rule = "needs training targets, and this policy was trained on all of a box"
+            raise InvalidInput("way", asked, rule, ("direct",))
+        return asked
+
+    def _stage(self, people: Sequence[Person]) -> Stage:
+        n_bodies = sum(person.cylinder is None for person in people)
+        kinds = (n_bodies, len(people) - n_bodies)
+        if kinds not in self._stages:
+            self._stages[kinds] = Stage(self.cell, *kinds, self.actor.view)
+        return self._stages[kinds]
+
+    def _act(
+        self, stage: Stage, question: MotionQuestion, goal: Vec, way: Way
+    ) -> tuple[Vec, tuple[TargetWeight, ...], Vec, list[Seen]]:
+        """Return action, targets, weights of the people and who was seen, as what."""
+        apart = stage.apart
+        places, shares = goal[None], np.ones(1)
+        if way == "interpolated":
+            assert self._between is not None
+            mix, around = self._between.around(goal[None])
+            used = mix.weights[0] > 0.0
+            places, shares = around[0, used], mix.weights[0, used]
+        asked: list[int | None] = [None]
+        weights = np.zeros(len(apart))
+        if question.beside == "averaged" and len(apart) > 1:
+            asked, weights = list(range(len(apart))), person_weights(apart[None])[0]
+        elif len(apart):
+            weights[apart.argmin()] = 1.0
+        seen: list[Seen] = []
+        obs = np.empty((len(asked), len(places), stage.obs_size), dtype=np.float32)
+        for row, who in enumerate(asked):
+            obs[row] = stage.observe(places, who)
+            number = who if who is not None or not len(apart) else int(apart.argmin())
+            seen.append((number, stage.seen.copy()))
+        acts = self.actor.acts(obs.reshape(-1, stage.obs_size))
+        beside = weights if len(asked) > 1 else np.ones(1)
+        act = np.outer(beside, shares).ravel() @ acts.astype(np.float64)
+        targets = tuple(
+            TargetWeight(position=(p[0], p[1], p[2]), weight=w)
+            for p, w in zip(places.tolist(), shares.tolist(), strict=True)
+        )
+        return act, targets if way == "interpolated" else (), weights, seen
+
+    def _piece(self, q: Vec, qd: Vec, qdd: Vec, act: Vec) -> tuple[Piece, bool]:
+        """Return the commanded piece, and whether a joint had to brake for want of one."""
+        arm = self.arm
+        c, d, q1, qd1, qdd1 = np.empty((5, 6))
+        empty = actions.advance(
+            self._rule, q, qd, qdd, act.astype(np.float32), arm.q_min, arm.q_max, arm.qd_max,
+            arm.qdd_max, arm.jerk_max, arm.dt, c, d, q1, qd1, qdd1,
+        )  # fmt: skip
+        return Piece(c=c, d=d, q=q1, qd=qd1, qdd=qdd1), bool(empty)
+
+    def _monitored(
+        self,
+        question: MotionQuestion,
+        q: Vec,
+        qd: Vec,
+        piece: Piece,
+        people: Shapes,
+        order: Sequence[int],
+    ) -> Told:
+        """Return what monitoring executes, and the terms for one person."""
+        settings = question.safety
+        if settings is None:
+            return None, None, None
+        if settings != self._layer.settings:
+            self._layer = SafetyLayer(self.arm, settings)
+        safe = self._layer.decide(q, qd, piece.c, piece.d, people, question.age_s)
+        told = self._layer.terms(safe, qd, people, question.age_s)
+        if told is None:
+            return safe, None, None
+        return safe, order[told[0]], told[1]
+
+    def _beyond_reach(self, goal: Vec) -> float:
+        """Return by how much a goal is farther away than the arm is long [m]."""
+        longest = LONGEST_REACH + max(self.arm.tool_length - 0.12, 0.0)
+        return max(0.0, float(np.linalg.norm(goal - SHOULDER)) - longest)
+
+    def _outside(self, q: Vec, qd: Vec, goal: Vec) -> tuple[OutsideField, ...]:
+        """Return what of robot and goal lies outside the training range."""
+        values = {"q": q, "qd": qd, "goal": goal}
+        return tuple(
+            one
+            for key, names in RANGES.items()
+            for one in self._beyond(key, values[key], names)
+        )
+
+    def _human(
+        self, who: int | None, seen: Vec, order: Sequence[int]
+    ) -> tuple[OutsideField, ...]:
+        """Return what of a person, or of nobody, lies outside the training range."""
+        if who is None:
+            met = self._beyond("human", seen, HUMAN)
+            nobody = OutsideField(field="people", value=0.0, low=1.0, high=4.0)
+            return (nobody,) if met else ()
+        return self._beyond("human", seen, [f"people[{order[who]}].{name}" for name in HUMAN])
+
+    def _beyond(self, key: str, values: Vec, names: Sequence[str]) -> tuple[OutsideField, ...]:
+        low, high = self._ranges.get(key, (values, values))
+        if low.shape != values.shape:
+            return ()
+        beyond = (values < low - RANGE_SLACK) | (values > high + RANGE_SLACK)
+        return tuple(
+            OutsideField(
+                field=names[i],
+                value=float(values[i]),
+                low=float(low[i]),
+                high=float(high[i]),
+            )
+            for i in np.flatnonzero(beyond).tolist()
+        )
+
+
+def _bodies_first(people: Sequence[Person]) -> list[int]:
+    """Return the numbers of people with joint angles, then of cylinders."""
+    return sorted(range(len(people)), key=lambda i: people[i].cylinder is not None)
+
+
+def _require_apart(apart: Vec, order: Sequence[int]) -> None:
+    """Raise where somebody is inside the robot.
+
+    Raises:
+        InvalidInput: Somebody is.
+    """
+    for i in np.flatnonzero(apart <= 0.0)[:1]:
+        rule = (
+            "is the distance to the robot in m: this person is inside it; with `safety` the "
+            "answer would be a stop"
+        )
+        raise InvalidInput(f"people[{order[i]}]", round(float(apart[i]), 4), rule)
