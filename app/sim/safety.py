@@ -29,7 +29,6 @@ from app.sim.kernels.cylinder import cylinder_clearance
 from app.sim.ports import Vec
 from app.sim.robot import LINK_NAMES
 from app.sim.scene import own, require_finite
-from app.sim.separation import separation_of
 
 UNITS = {
     "human_speed": "m/s",

@@ -58,7 +58,7 @@ WITHOUT_CHECKPOINT = frozenset({"safety-ssm"})
 OF_SORTING = frozenset(name for name in PROTOCOLS if name.startswith("sorting-"))
 """Protocols of policies that sort."""
 OF_REACHING = frozenset(name for name in PROTOCOLS if name.startswith("reach-"))
-"""Protocols of policies that reach goals beside walking people; what is left picks."""
+"""Protocols of policies that reach goals; all others are of policies that choose and pick."""
 MAX_EPISODES = 100_000
 """Most episodes of one evaluation."""
 MAX_SORTING_EPISODES = 10_000

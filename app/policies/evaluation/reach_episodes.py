@@ -71,7 +71,7 @@ class ReachEpisodes:
         return {
             "name": name,
             **self.rates(),
-            "time_to_goal_s": times.mean() if len(times) else None,
+            "time_to_goal_s": float(times.mean()) if len(times) else None,
             "time_to_goal_median_s": spread[0],
             "time_to_goal_p95_s": spread[1],
         }

@@ -26,23 +26,35 @@ from app.policies.evaluation.reach_bench import ReachBench
 from app.policies.evaluation.reach_episodes import ReachEpisodes
 from app.policies.evaluation.rows import OnRow, untold
 from app.policies.evaluation.statistics import wilson
-from app.sim.kernels.episode import COLLISION
+from app.sim.kernels.episode import COLLISION, SUCCESS
 from app.sim.ports import Vec
 from app.sim.reach import StartRule
 
 PER_TARGET = 100
 """Episodes of each target (METHOD 2.6)."""
 STARTS: tuple[StartRule, ...] = ("clearance", "uniform", "authors")
+END_STEP_S = 0.1
+"""Intervals in which ends are counted [s]."""
 N_WORST = 5
 """Targets that are named as the worst."""
 Json = dict[str, Any]
 
 
-def by_target(episodes: ReachEpisodes, targets: Vec) -> list[Json]:
-    """Return how the episodes of each target ended."""
+def by_target(episodes: ReachEpisodes, targets: Vec, base_height: float) -> list[Json]:
+    """Return how the episodes of each target ended.
+
+    Args:
+        episodes: Episodes with goals among the targets.
+        targets: In the robot's base frame [m], shape (n, 3).
+        base_height: Of the robot's base above the floor [m].
+    """
     of_target = (episodes.goals[:, None] == targets).all(axis=2)
     return [
-        {"goal": goal.tolist(), **episodes.rates(of_target[:, number])}
+        {
+            "goal": np.round(goal, 6).tolist(),
+            "height_m": round(float(goal[2]) + base_height, 6),
+            **episodes.rates(of_target[:, number]),
+        }
         for number, goal in enumerate(targets)
     ]
 
@@ -50,7 +62,20 @@ def by_target(episodes: ReachEpisodes, targets: Vec) -> list[Json]:
 def worst_of(cells: list[Json]) -> list[Json]:
     """Return the targets with the fewest successes, the worst first."""
     ranked = sorted(cells, key=lambda cell: cell["success"]["mean"])
-    return [{"goal": cell["goal"], **cell["success"]} for cell in ranked[:N_WORST]]
+    return [
+        {"goal": cell["goal"], "height_m": cell["height_m"], **cell["success"]}
+        for cell in ranked[:N_WORST]
+    ]
+
+
+def ends_over_time(episodes: ReachEpisodes) -> Json:
+    """Return how many episodes ended by success and by collision in each interval of time."""
+    edges = np.arange(0.0, episodes.limit_s + 1e-9, END_STEP_S)
+    counts = {
+        name: np.histogram(episodes.duration_s[episodes.outcome == end], edges)[0].tolist()
+        for name, end in (("success", SUCCESS), ("collision", COLLISION))
+    }
+    return {"step_s": END_STEP_S, **counts}
 
 
 def reached_after_contact(episodes: ReachEpisodes) -> dict[str, float]:
@@ -77,12 +102,13 @@ def run_targets(
     for start in STARTS:
         settings = replace(bench.usual, start=start, collision_ends=start != "authors")
         played = bench.play(settings, goals)
-        cells = by_target(played, bench.targets)
+        cells = by_target(played, bench.targets, bench.cell.table.height)
         row = {
             **played.row(start),
             "begun_in_contact": played.begun_in_contact(),
             "starts_redrawn": float(np.mean(played.redrawn > 0)),
             "worst": worst_of(cells),
+            "ends": ends_over_time(played),
             "targets": cells,
         }
         if not settings.collision_ends:

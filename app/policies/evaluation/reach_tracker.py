@@ -30,7 +30,7 @@ from app.policies.evaluation.reach_episodes import N_ENVS
 from app.policies.evaluation.rows import OnRow, untold
 from app.policies.movers import Mover, mover_of
 from app.sim.cylinder_tracker import CylinderTracker, CylinderTrackerSettings
-from app.sim.kernels.occupancy import VX, VY, R, X, Y
+from app.sim.kernels.occupancy import GROWTH, VX, VY, R, X, Y
 from app.sim.ports import Vec
 from app.sim.reach import ReachBatch
 
@@ -91,9 +91,7 @@ class ThroughTracker:
         rows = state.people.walkers.rows
         true = rows[:, :, [X, Y, R]]
         fresh = np.flatnonzero(t == 0.0)
-        velocity = np.zeros((len(fresh), *true.shape[1:]))
-        velocity[:, :, :2] = rows[fresh][:, :, [VX, VY]]
-        self._tracker.start(fresh, true[fresh], velocity)
+        self._tracker.start(fresh, true[fresh], rows[fresh][:, :, [VX, VY, GROWTH]])
         later = np.flatnonzero(t > 0.0)
         self._tracker.look(later, t[later], true[later])
         seen, change = self._tracker.seen(self._every, predicted=self._row.predicted)
@@ -106,7 +104,7 @@ class ThroughTracker:
         people, clear = batch.state.people, batch.state.clear
         kept = people.walkers.rows.copy(), people.cylinders.copy(), clear.copy()
         people.walkers.rows[:, :, [X, Y, R]] = seen
-        people.walkers.rows[:, :, [VX, VY]] = change[:, :, :2]
+        people.walkers.rows[:, :, [VX, VY, GROWTH]] = change
         people.cylinders[:] = seen
         batch.observe()
         act = self._mover.acts(batch)
