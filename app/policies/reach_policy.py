@@ -21,6 +21,7 @@ from app.policies.checkpoint import (
 from app.policies.reach_preset import action_of
 from app.policies.trained_cell import cell_of
 from app.sim.actions import ActionSettings
+from app.sim.goal_sets import halton_targets
 from app.sim.kernels.reach_features import SIZES, STATE_SIZES
 from app.sim.ports import Vec
 from app.sim.reach import N_ACT, GoalRule, ViewName, goal_region_of
@@ -68,6 +69,8 @@ class ReachPolicy:
         """The goals it was trained on [m], shape (n, 3); None for a whole box."""
         if self.goals == "grid":
             self.targets = goal_region_of(cell).targets()
+        if self.goals == "halton":
+            self.targets = halton_targets(goal_region_of(cell), _n_halton(preset))
         self.n_obs = sum(size for _, size in manifest["layout"])
         """Length of an observation."""
         self._layers = _layers_of(checkpoint.arrays(), self.n_obs)
@@ -129,6 +132,14 @@ def _named(preset: Mapping[str, Any], field: str, choices: tuple[str, ...]) -> s
     if value not in choices:
         raise InvalidInput(f"manifest.preset.{field}", value, "must be a known rule", choices)
     return str(value)
+
+
+def _n_halton(preset: Mapping[str, Any]) -> int:
+    """Return the size of the Halton set that a manifest's preset names."""
+    value = preset.get("n_halton")
+    if not isinstance(value, int):
+        raise InvalidInput("manifest.preset.n_halton", value, "must be a whole number")
+    return value
 
 
 def _layers_of(arrays: Mapping[str, NDArray[Any]], n_obs: int) -> tuple[Layer, ...]:

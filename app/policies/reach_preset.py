@@ -7,6 +7,7 @@ from typing import Any, get_args
 from app.errors import InvalidInput
 from app.policies.preset_fields import check_learning, check_rounds, choice, number
 from app.sim.actions import BOUNDS, MEANINGS, ActionSettings
+from app.sim.goal_sets import MOST_HALTON, N_HALTON
 from app.sim.reach import GoalRule, StartRule, ViewName
 
 
@@ -68,6 +69,9 @@ class ReachPreset:
 
     time_limit_s: float = number(5.0, 1.0, 60.0, "s", "longest episode")
     goals: str = choice("grid", get_args(GoalRule), "where goals are drawn from")
+    n_halton: int = number(
+        N_HALTON, 8, MOST_HALTON, "goals", "size of the Halton set, where that is the rule"
+    )
     start: str = choice("clearance", get_args(StartRule), "where people may start")
     start_clearance_m: float = number(
         0.05, 0.0, 0.5, "m", "least distance of robot and person at the start"

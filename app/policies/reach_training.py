@@ -44,6 +44,7 @@ def settings_of(preset: ReachPreset) -> ReachSettings:
     return ReachSettings(
         time_limit_s=preset.time_limit_s,
         goals=preset.goals,  # type: ignore[arg-type]
+        n_halton=preset.n_halton,
         people=(walker,) * preset.n_people,
         start=preset.start,  # type: ignore[arg-type]
         start_clearance_m=preset.start_clearance_m,
