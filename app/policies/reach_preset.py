@@ -103,7 +103,7 @@ class ReachPreset:
     time_limit_s: float = number(5.0, 1.0, 60.0, "s", "longest episode")
     goals: str = choice("grid", get_args(GoalRule), "where goals are drawn from")
     n_halton: int = number(
-        N_HALTON, 1, MOST_HALTON, "", "points of the Halton set, for goals = halton"
+        N_HALTON, 8, MOST_HALTON, "", "points of the Halton set, for goals = halton"
     )
     start: str = choice("clearance", get_args(StartRule), "where people may start")
     start_clearance_m: float = number(
