@@ -173,10 +173,12 @@ class GuardedReach(ReachBatch):
                 on tracks.
             SimulationError: An action is NaN or infinite.
         """
-        require_shape("act", act, (self.n_envs, self._n_act))
+        require_shape("act", act, (self.n_envs, self.n_act))
         require_finite("act", act)
         if auto_reset and self.n_tracks:
-            raise InvalidInput("auto_reset", auto_reset, "must be false where people have tracks")
+            raise InvalidInput(
+                "auto_reset", auto_reset, "must be false where people have tracks"
+            )
         guarded_reach.step_batch(
             self.world,
             self._rules,

@@ -19,7 +19,8 @@ from app.policies.evaluation.reach_episodes import (
     target_goals,
 )
 from app.policies.evaluation.rows import OnRow
-from app.policies.movers import Mover, mover_of
+from app.policies.interpolation import interpolates
+from app.policies.movers import How, Mover, mover_of
 from app.policies.reach_policy import ReachPolicy
 from app.policies.trained_cell import cell_of
 from app.sim.cells import Cell
@@ -30,15 +31,9 @@ from app.sim.reach import ReachSettings, goal_region_of, stated_rules
 Json = dict[str, Any]
 
 
-def goal_ways(actor: ReachPolicy) -> tuple[str, ...]:
+def goal_ways(actor: ReachPolicy) -> tuple[How, ...]:
     """Return the ways of asking a policy for goals between those it was trained on."""
-    return ("direct",) if actor.targets is None else ("direct", "interpolated")
-
-
-def people_ways(actor: ReachPolicy) -> tuple[str, ...]:
-    """Return the ways of asking a policy about several people; ``direct`` sees the nearest."""
-    del actor
-    return ("direct", "averaged")
+    return ("direct", "interpolated") if interpolates(actor) else ("direct",)
 
 
 class ReachBench:
@@ -86,7 +81,7 @@ class ReachBench:
         self,
         settings: ReachSettings,
         goals: Vec,
-        how: str = "direct",
+        how: How = "direct",
         *,
         cell: Cell | None = None,
         mover: Mover | None = None,
@@ -103,7 +98,7 @@ class ReachBench:
         asked = mover or mover_of(self.actor, how)
         return play(cell or self.cell, settings, asked, goals, self._seed)
 
-    def recheck(self, settings: ReachSettings, goals: Vec, how: str = "direct") -> None:
+    def recheck(self, settings: ReachSettings, goals: Vec, how: How = "direct") -> None:
         """Ask FCL about the poses of the first episodes; the result will say what it found."""
         asked = mover_of(self.actor, how)
         self._recheck = recheck_contacts(self.cell, settings, asked, goals, self._seed)
@@ -113,7 +108,7 @@ class ReachBench:
         row: Json,
         settings: ReachSettings,
         goals: str,
-        how: str = "direct",
+        how: How = "direct",
         *,
         cell: Cell | None = None,
         **more: Any,

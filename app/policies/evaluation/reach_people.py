@@ -1,7 +1,7 @@
 """Protocols ``reach-people``, ``reach-constant`` and ``reach-speeds``: other people.
 
-``reach-people``: nobody to four walking cylinders, without training anew, by each way in which
-the checkpoint can be asked about several people. Nobody and one person are the same by all.
+``reach-people``: nobody to four walking cylinders, without training anew, the nearest seen and
+all averaged. Nobody and one person are the same by both.
 ``reach-constant``: speed and radius constant in each episode, beside the usual person.
 ``reach-speeds``: a person of 0.25, 0.5 and 1.0 m/s; the speed's limits do not apply, else
 0.25 m/s would be standing still (METHOD 2.1).
@@ -15,9 +15,9 @@ from dataclasses import replace
 from typing import Any
 
 from app.policies.checkpoint import Checkpoint
-from app.policies.evaluation.reach_bench import ReachBench, people_ways
+from app.policies.evaluation.reach_bench import ReachBench
 from app.policies.evaluation.rows import OnRow, untold
-from app.policies.reach_policy import ReachPolicy
+from app.policies.movers import How
 from app.sim.cell_people import FixedSpeedWalker
 from app.sim.cells import Cell
 from app.sim.kernels.people import MAX_PEOPLE
@@ -26,6 +26,8 @@ DEFAULT_EPISODES = 1000
 """METHOD 2.6."""
 TARGET_EPISODES = 5400
 """Episodes of each row of ``reach-constant``: as many as ``reach-targets`` plays."""
+WAYS: tuple[How, ...] = ("direct", "averaged")
+"""Ways of asking a policy about several people; ``direct`` sees the nearest."""
 SPEEDS = (0.25, 0.5, 1.0)
 """Of people [m/s] (METHOD 2.6)."""
 
@@ -41,8 +43,7 @@ def run_people(
         seed: Seed of the episodes.
         on_row: Told of each row once it is known.
     """
-    ways = people_ways(ReachPolicy(checkpoint))
-    rows = [(n, how) for n in range(MAX_PEOPLE + 1) for how in (ways if n > 1 else ways[:1])]
+    rows = [(n, how) for n in range(MAX_PEOPLE + 1) for how in (WAYS if n > 1 else WAYS[:1])]
     bench = ReachBench(checkpoint, seed, len(rows), on_row)
     goals = bench.target_goals(episodes or DEFAULT_EPISODES)
     for n, how in rows:
@@ -52,7 +53,7 @@ def run_people(
         row = played.row(name)
         row["starts_redrawn"] = float((played.redrawn > 0).mean())
         bench.add(row, settings, "grid", how)
-    bench.recheck(replace(bench.usual, people=("walker",) * 2), goals, ways[0])
+    bench.recheck(replace(bench.usual, people=("walker",) * 2), goals)
     return bench.result()
 
 
