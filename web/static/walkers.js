@@ -28,8 +28,6 @@ export function WalkerMover({ person, name, world, send }) {
         ${SPEEDS.map(([value, label]) => html`<option key=${value} value=${value}>${label}</option>`)}
         ${!known && html`<option value=${String(speed)}>${speed} m/s</option>`}
       </select></label>
-    ${mode === "manual" && html`<p class="dock-hint">Drag the handle in the scene.</p>`}
-    <span class="spacer"></span>
     <div class="transport" role="group" aria-label=${`${name} in the cell`}>
       <button type="button" class="tool" data-action="remove-person" aria-label=${`Remove ${name}`}
         title=${`${name} leaves the cell`} onClick=${() => send({ tag: "remove-person", person: id })}>
