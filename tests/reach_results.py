@@ -75,7 +75,10 @@ def targets(seed: int = 5) -> Json:
     hits = np.histogram(rng.gamma(4.0, 0.4, 60), np.arange(0.0, 5.01, 0.1))[0].tolist()
     more: Json = {
         "worst": named,
-        "ends": {"step_s": 0.1, "success": ends, "collision": hits},
+        "ends": [
+            {"until_s": 0.1 * (k + 1), "success": won, "collision": hit}
+            for k, (won, hit) in enumerate(zip(ends, hits, strict=True))
+        ],
         "targets": cells,
     }
     rows = [

@@ -117,7 +117,7 @@ def test_each_square_of_the_heat_maps_is_its_target() -> None:
         for y in (0.6, 0.8, 1.0)
     ]  # fmt: skip
     np.testing.assert_allclose(mesh, expected)
-    assert figure.axes[1].get_title(loc="left").startswith("z = 1.0 m")
+    assert figure.axes[1].get_title().startswith("z = 1.0 m")
 
 
 def test_presets_have_colours_of_their_own() -> None:

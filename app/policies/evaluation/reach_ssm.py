@@ -268,7 +268,9 @@ def random_row(name: str, parts: Sequence[GuardedRuns]) -> Json:
 def joined(parts: Sequence[GuardedRuns]) -> GuardedRuns:
     """Return several sets of runs as one."""
     names = GuardedRuns.__dataclass_fields__
-    values: Any = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+    values: Any = {
+        name: np.concatenate([getattr(part, name) for part in parts]) for name in names
+    }
     return GuardedRuns(**values)
 
 
@@ -363,7 +365,9 @@ def run_ssm(
         comparison = Comparison(cell, crossed, settings, safety, seed)
         courses = compare(comparison, mover, rows, suffix)
         result["paired"] |= {
-            f"policy against {name}{suffix}": against(courses["policy"].runs, courses[name].runs)
+            f"policy against {name}{suffix}": against(
+                courses["policy"].runs, courses[name].runs
+            )
             for name in PLANNERS
         }
         if not suffix:
