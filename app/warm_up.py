@@ -9,8 +9,11 @@ import time
 import numpy as np
 
 from app.policies import pretrained
-from app.policies.checkpoint import SORTING, purpose_of
+from app.policies.checkpoint import REACHING, SORTING, purpose_of
+from app.policies.motion_decision import MotionDecider
+from app.policies.reach_policy import ReachPolicy
 from app.policies.task_choice import TaskChooser
+from app.policies.trained_cell import cell_of
 from app.sim import sorting_decision
 from app.sim.cells import load_cell
 from app.sim.commands import MoveHuman
@@ -30,6 +33,9 @@ def warm_up() -> float:
     for alias in pretrained.ALIASES:
         checkpoint = pretrained.load(alias)
         if purpose_of(checkpoint.manifest) == SORTING:
+            continue
+        if purpose_of(checkpoint.manifest) == REACHING:
+            MotionDecider(ReachPolicy(checkpoint), cell_of(checkpoint.manifest)).warm_up()
             continue
         policy = TaskChooser(checkpoint)
         cell = load_cell(policy.cell)

@@ -279,10 +279,13 @@ class MotionDecider:
         return self._beyond("human", seen, [f"people[{order[who]}].{name}" for name in HUMAN])
 
     def _beyond(self, key: str, values: Vec, names: Sequence[str]) -> tuple[OutsideField, ...]:
-        low, high = self._ranges.get(key, (values, values))
-        if low.shape != values.shape:
+        found = self._ranges.get(key)
+        if found is None or found[0].shape != values.shape:
             return ()
+        low, high = found
         beyond = (values < low - RANGE_SLACK) | (values > high + RANGE_SLACK)
+        if not beyond.any():
+            return ()
         return tuple(
             OutsideField(
                 field=names[i],

@@ -264,6 +264,9 @@ def check(command: Command, cell: Cell, people: Sequence[int]) -> None:
                 cell.station(name)
         case ToggleCandidate():
             cell.station(command.id)
+        case SetPolicy() if is_reaching(cell) and command.policy is not None:
+            rule = "needs a policy that reaches goals: this one chooses tasks"
+            raise InvalidInput("checkpoint", command.policy.checkpoint, rule)
         case SetSpeed():
             _check_speed(command)
         case StartCase():

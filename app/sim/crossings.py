@@ -240,7 +240,9 @@ def _walk(cell: Cell, home: Vec, seed: int, number: int) -> Crossing:
         there, course = _across(home, goal, rng)
         dt = cell.robot.dt
         times = dt * np.arange(math.ceil((arrival + dwell + FAR / speed) / dt) + 1)
-        way = np.where(times < arrival, times - arrival, np.maximum(0.0, times - arrival - dwell))
+        way = np.where(
+            times < arrival, times - arrival, np.maximum(0.0, times - arrival - dwell)
+        )
         track = np.empty((len(times), 3))
         track[:, :2] = there + speed * way[:, None] * course
         track[:, 2] = radius
@@ -315,7 +317,7 @@ def _goal(cell: Cell, rng: np.random.Generator) -> Vec:
 def _across(
     home: Vec, goal: Vec, rng: np.random.Generator, place: tuple[float, float] = PLACE
 ) -> tuple[Vec, Vec]:
-    """Draw where the segment is crossed [m], shape (2,), and the course there, a unit vector."""
+    """Draw where the segment is crossed [m], shape (2,), and the course, a unit vector."""
     way = goal[:2] - home[:2]
     there = home[:2] + rng.uniform(*place) * way
     side = 1.0 if rng.uniform() < 0.5 else -1.0
@@ -340,4 +342,7 @@ def _clear_of_home(cell: Cell, track: Vec) -> bool:
     rows = np.hstack([every, np.full((len(every), 1), top)])
     first = Checker(arm, shapes_of(cell, None, rows[:1])).clearance(home).people
     near = rows[np.hypot(rows[:, 0], rows[:, 1]) < 2.0]
-    return first >= AT_START and Checker(arm, shapes_of(cell, None, near)).clearance(home).people >= CLEAR
+    return (
+        first >= AT_START
+        and Checker(arm, shapes_of(cell, None, near)).clearance(home).people >= CLEAR
+    )

@@ -1,4 +1,4 @@
-"""Planners where a policy stands, under the same safety layer and limits (METHOD 2.6, last row).
+"""Planners where a policy stands, under the same safety layer and limits (METHOD 2.6).
 
 Each row of a :class:`~app.sim.guarded_reach.GuardedReach` is driven by one
 :class:`~app.sim.followers.Follower` to postures whose tcp lies within reach of success around
@@ -18,7 +18,7 @@ from app.sim.kernels.episode import RUNNING
 from app.sim.ports import Vec
 
 GOAL_SPREAD = 0.08
-"""How far from the goal a planner's postures may have the tcp [m]; success counts within 0.1."""
+"""How far from the goal a planner's postures have the tcp [m]; success counts within 0.1."""
 
 
 def postures_of(arm: Arm, goals: Vec, seed: int) -> list[Vec]:

@@ -176,7 +176,9 @@ class GuardedReach(ReachBatch):
         require_shape("act", act, (self.n_envs, self._n_act))
         require_finite("act", act)
         if auto_reset and self.n_tracks:
-            raise InvalidInput("auto_reset", auto_reset, "must be false where people have tracks")
+            raise InvalidInput(
+                "auto_reset", auto_reset, "must be false where people have tracks"
+            )
         guarded_reach.step_batch(
             self.world,
             self._rules,

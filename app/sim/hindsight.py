@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.sim.goal_postures import goal_postures
+from app.sim.kernels.arm import Arm
 from app.sim.kernels.episode import COLLISION, RUNNING, SUCCESS, SUCCESS_DISTANCE
 from app.sim.ports import Vec
 from app.sim.reach import ReachBatch
@@ -64,19 +65,37 @@ class Replays:
     """Least time to the goal [s]; infinity where none came, shape (n,)."""
 
 
-def copy_rows(source: Any, rows: Index, target: Any) -> None:
-    """Copy rows of a state, a tuple of arrays or of such tuples, onto the first rows of another.
+def copy_rows(source: Any, rows: Index, target: Any, first: int = 0) -> None:
+    """Copy rows of a state, a tuple of arrays or of such tuples, into another.
 
     Args:
         source: From where.
         rows: Rows of the source, shape (k,).
-        target: Of the same kind, with k rows or more.
+        target: Of the same kind.
+        first: Row of the target where the copies begin.
     """
     for old, new in zip(source, target, strict=True):
         if isinstance(old, tuple):
-            copy_rows(old, rows, new)
+            copy_rows(old, rows, new, first)
         else:
-            new[: len(rows)] = old[rows]
+            new[first : first + len(rows)] = old[rows]
+
+
+def draw_detours(arm: Arm, rng: np.random.Generator, k: int) -> tuple[Vec, Vec]:
+    """Draw where replays go first [rad], shape (k, 6), and until when [s], shape (k,)."""
+    kind, home = rng.uniform(size=k), np.repeat(np.array(arm.home)[None], k, axis=0)
+    near = home + rng.uniform(-1.0, 1.0, (k, 6)) * NEARBY
+    low, high = np.maximum(arm.q_min, -np.pi), np.minimum(arm.q_max, np.pi)
+    anywhere = rng.uniform(low, high, (k, 6))
+    anywhere[:, 5] = near[:, 5] = home[:, 5]
+    first = np.where((kind < AT_HOME + NEAR_HOME)[:, None], near, anywhere)
+    first = np.where((kind < AT_HOME)[:, None], home, first)
+    return np.clip(first, arm.q_min, arm.q_max), rng.uniform(0.0, LONGEST_WAIT, k)
+
+
+def toward(arm: Arm, q: Vec, aim: Vec) -> NDArray[np.float32]:
+    """Return actions, shares of the speed limits, that lead straight to postures [rad]."""
+    return np.clip(GAIN * (aim - q) / arm.qd_max, -1.0, 1.0).astype(np.float32)
 
 
 class Hindsight:
@@ -84,9 +103,8 @@ class Hindsight:
 
     Args:
         batch: Rows at the start of their episodes; not changed.
-        targets: Goals that its rows may have [m], shape (k, 3); postures are sought for each
-            goal once.
         seed: Seed of the search.
+        n_copies: Rows of the batch that replays are played in.
     """
 
     def __init__(self, batch: ReachBatch, seed: int, n_copies: int = N_COPIES) -> None:
@@ -112,10 +130,18 @@ class Hindsight:
         """Return the episodes in which no replay has reached the goal yet."""
         return np.flatnonzero(self.replays.reached == 0)
 
-    def scripted(self, episodes: Index, n_each: int) -> None:
-        """Play scripted replays of some episodes, ``n_each`` of each."""
+    def scripted(self, episodes: Index, n_each: int, *, at_once: bool = False) -> None:
+        """Play scripted replays of some episodes, ``n_each`` of each.
+
+        Args:
+            episodes: Which.
+            n_each: Replays of each.
+            at_once: Whether all go to the goal at once.
+        """
         for rows in self._parts(episodes, n_each):
-            first, until = self._detours(len(rows))
+            first, until = draw_detours(self._arm, self._rng, len(rows))
+            if at_once:
+                until[:] = 0.0
             last = self._at_goal(rows)
             self._play(rows, lambda batch, k: np.zeros(0), first, until, last)
 
@@ -128,12 +154,14 @@ class Hindsight:
             acts: The policy: actions of all rows from a batch.
         """
         for rows in self._parts(episodes, n_each):
-            first, until = self._detours(len(rows))
+            first, until = draw_detours(self._arm, self._rng, len(rows))
             until[self._rng.uniform(size=len(rows)) < 0.5] = 0.0
             sigma = self._rng.choice(SIGMAS, size=len(rows))[:, None]
             noise = np.zeros((len(rows), 6))
 
-            def policy(batch: ReachBatch, k: int, noise: Vec = noise, sigma: Vec = sigma) -> Vec:
+            def policy(
+                batch: ReachBatch, k: int, noise: Vec = noise, sigma: Vec = sigma
+            ) -> Vec:
                 fresh = self._rng.normal(size=noise.shape)
                 noise[:] = CORRELATION * noise + np.sqrt(1.0 - CORRELATION**2) * fresh
                 return acts(batch)[:k] + sigma * noise
@@ -144,7 +172,9 @@ class Hindsight:
         """Play every episode once as a policy does by itself."""
         for rows in self._parts(np.arange(self.n), 1):
             none = np.zeros(len(rows))
-            self._play(rows, lambda batch, k: acts(batch)[:k], self._home(len(rows)), none, None)
+            self._play(
+                rows, lambda batch, k: acts(batch)[:k], self._home(len(rows)), none, None
+            )
 
     def _home(self, k: int) -> Vec:
         return np.repeat(np.array(self._arm.home)[None], k, axis=0)
@@ -154,18 +184,6 @@ class Hindsight:
         every = np.repeat(episodes, n_each)
         n = self._copies.n_envs
         return [every[k : k + n] for k in range(0, len(every), n)]
-
-    def _detours(self, k: int) -> tuple[Vec, Vec]:
-        """Draw where replays go first [rad], shape (k, 6), and until when [s], shape (k,)."""
-        rng, arm = self._rng, self._arm
-        kind, home = rng.uniform(size=k), self._home(k)
-        near = home + rng.uniform(-1.0, 1.0, (k, 6)) * NEARBY
-        low, high = np.maximum(arm.q_min, -np.pi), np.minimum(arm.q_max, np.pi)
-        anywhere = rng.uniform(low, high, (k, 6))
-        anywhere[:, 5] = near[:, 5] = home[:, 5]
-        first = np.where((kind < AT_HOME + NEAR_HOME)[:, None], near, anywhere)
-        first = np.where((kind < AT_HOME)[:, None], home, first)
-        return np.clip(first, arm.q_min, arm.q_max), rng.uniform(0.0, LONGEST_WAIT, k)
 
     def _at_goal(self, rows: Index) -> Vec:
         """Draw a posture at the goal of each replay [rad], shape (k, 6)."""
@@ -189,7 +207,7 @@ class Hindsight:
         act, t = np.zeros((batch.n_envs, 6), dtype=np.float32), 0.0
         while (batch.state.outcome[:k] == RUNNING).any():
             aim = first if last is None else np.where((t < until)[:, None], first, last)
-            act[:k] = np.clip(GAIN * (aim - batch.state.q[:k]) / self._arm.qd_max, -1.0, 1.0)
+            act[:k] = toward(self._arm, batch.state.q[:k], aim)
             if last is None:
                 free = t >= until
                 act[:k][free] = np.clip(policy(batch, k), -1.0, 1.0)[free]

@@ -49,8 +49,8 @@ class LiveGoal:
 
     def _drawn(self) -> Vec:
         if self.anywhere:
-            return self._rng.uniform(self._low, self._high)
-        return self.targets[self._rng.integers(len(self.targets))].copy()
+            return np.asarray(self._rng.uniform(self._low, self._high))
+        return np.array(self.targets[self._rng.integers(len(self.targets))])
 
     def put(self, position: tuple[float, float, float]) -> None:
         """Put it elsewhere [m]."""

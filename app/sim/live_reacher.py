@@ -16,6 +16,7 @@ from app.sim.live_arm import GAIN, LiveArm
 from app.sim.ports import Vec
 from app.sim.reach import ReachBatch, ReachSettings
 from app.sim.reach_ports import ReachPilot
+from app.sim.scene import HumanKind
 
 TIME_LIMIT_S = 5.0
 """Time to reach a goal [s] (METHOD 2.3)."""
@@ -75,8 +76,9 @@ class LiveReacher:
         """Return the batch with its one row as the live cell is."""
         n = len(walkers)
         if self._batch is None or self._batch.state.people.walkers.rows.shape[1] != n:
+            people: tuple[HumanKind, ...] = tuple("walker" for _ in range(n))
             settings = ReachSettings(
-                people=("walker",) * n,
+                people=people,
                 time_limit_s=TIME_LIMIT_S,
                 observation=pilot.view,
                 action=pilot.action,

@@ -83,6 +83,7 @@ UPRIGHT = BodyView(
 )
 """The size of the mannequin inside a cylinder."""
 
+
 class LiveWalkers:
     """The people of one live reach cell; row ``id`` of each array is that person's.
 

@@ -59,7 +59,8 @@ class Stage:
     @property
     def clear(self) -> Vec:
         """Distances to people, cell and the robot itself [m], shape (3,)."""
-        return self._state.clear[0]
+        clear: Vec = self._state.clear[0]
+        return clear
 
     @property
     def tcp(self) -> Vec:
@@ -132,4 +133,5 @@ class Stage:
         if not self._calls:
             self._calls[0] = direct(reach_views.observe_rows, arguments)
         self._calls[0](*arguments)
-        return out[0]
+        found: NDArray[np.float32] = out[0]
+        return found

@@ -111,9 +111,7 @@ class ReachWorld:
         stage = self._stage
         commands.check(command, self.cell, stage.people.ids)
         match command:
-            case (
-                commands.Pause() | commands.Resume() | commands.StepOnce() | commands.Reset()
-            ):
+            case commands.Pause() | commands.Resume() | commands.StepOnce() | commands.Reset():
                 self._control_clock(command)
             case _ if isinstance(command, PeopleCommand):
                 stage.people.robot_q = stage.robot.q
@@ -262,9 +260,7 @@ class ReachWorld:
         if stage.status == "moving":
             clear = robot.clearance_m if robot.clearance_m is not None else FAR
             left = min(stage.time_left, TIME_LIMIT_S)
-            act = self._reacher.act(
-                robot, stage.people.rows, self._goal.position, clear, left
-            )
+            act = self._reacher.act(robot, stage.people.rows, self._goal.position, clear, left)
             wanted = robot.piece(act, straight=self._reacher.pilot is None)
         else:
             wanted = robot.piece(np.zeros(6), straight=True)

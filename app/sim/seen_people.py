@@ -131,7 +131,10 @@ def checked_vector(path: str, values: Vec, size: int, low: Vec, high: Vec, unit:
     vector = np.asarray(values, dtype=np.float64)
     if vector.shape != (size,):
         raise InvalidInput(path, vector.tolist(), f"must hold {size} numbers")
-    for i in np.flatnonzero(~((low <= vector) & (vector <= high)))[:1]:
+    inside = (low <= vector) & (vector <= high)
+    if inside.all():
+        return vector
+    for i in np.flatnonzero(~inside)[:1]:
         field, value = f"{path}[{i}]", float(vector[i])
         if not math.isfinite(value):
             raise InvalidInput(field, value, "must be finite")

@@ -1,8 +1,8 @@
 """The protective separation distance of the standard, term by term, and as a zone on the floor.
 
-S_p = v_h (T_r + T_s) + (v_r T_r + B) + (C + Z_d + Z_r + protective distance), for each capsule of
-the robot as fast as its joints could make it. ``safety.py`` decides by the poses themselves, not
-by this sum; this is what it is compared with, and what people are shown.
+S_p = v_h (T_r + T_s) + (v_r T_r + B) + (C + Z_d + Z_r + protective distance), for each capsule
+of the robot as fast as its joints could make it. ``safety.py`` decides by the poses themselves,
+not by this sum; the sum is what people are shown.
 
 Source: METHOD 2.7; ISO/TS 15066:2016, 5.5.4.
 """

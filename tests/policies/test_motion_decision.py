@@ -94,8 +94,11 @@ def test_people_may_come_in_any_order() -> None:
     for beside in ("nearest", "averaged"):
         first = one.decide(replace(asked, beside=beside))
         second = one.decide(replace(turned, beside=beside))
-        np.testing.assert_array_equal(first.act, second.act)
-        assert first.met == second.met[::-1] and first.seen == 2 - second.seen
+        np.testing.assert_allclose(first.act, second.act, atol=1e-12)
+        for here, there in zip(first.met, second.met[::-1], strict=True):
+            assert here.separation == there.separation
+            assert here.weight == pytest.approx(there.weight, abs=1e-12)
+        assert first.seen == 2 - second.seen
 
 
 def test_averaged_is_what_the_mover_does() -> None:

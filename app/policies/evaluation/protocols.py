@@ -10,9 +10,11 @@ from app.policies.checkpoint import CHOOSING, REACHING, SORTING, Checkpoint, tas
 from app.policies.evaluation import (
     people,
     pick,
+    reach_ceiling,
     reach_people,
     reach_random,
     reach_smoothness,
+    reach_ssm,
     reach_targets,
     reach_tracker,
     safety,
@@ -42,11 +44,15 @@ PROTOCOLS: Mapping[str, Protocol] = MappingProxyType(
         "reach-smoothness": reach_smoothness.run_smoothness,
         "reach-people": reach_people.run_people,
         "reach-tracker": reach_tracker.run_tracker,
+        "reach-ssm": reach_ssm.run_ssm,
+        "reach-ceiling": reach_ceiling.run_ceiling,
     }
 )
 """Protocol by name; each takes a checkpoint, ``episodes``, ``seed`` and ``on_row``."""
 WITH_MOTIONS = frozenset({"pick-mocap"})
 """Protocols that take recorded motion."""
+WITH_OR_WITHOUT_MOTIONS = frozenset({"reach-ssm"})
+"""Protocols that may be given recorded motion."""
 WITHOUT_CHECKPOINT = frozenset({"safety-ssm"})
 """Protocols in which no policy takes part."""
 OF_SORTING = frozenset(name for name in PROTOCOLS if name.startswith("sorting-"))
@@ -59,7 +65,7 @@ MAX_SORTING_EPISODES = 10_000
 """Most episodes of one pair or one test of the sorting task."""
 FEWER_EPISODES: Mapping[str, int] = MappingProxyType(
     {**dict.fromkeys(OF_SORTING, MAX_SORTING_EPISODES), "reach-targets": 2_000}
-    | {"reach-smoothness": 5_000}
+    | {"reach-smoothness": 5_000, "reach-ssm": 20_000, "reach-ceiling": 200}
 )
 """Most episodes of protocols that count them per pair or target, or keep whole paths."""
 
@@ -80,7 +86,7 @@ def evaluate(
         checkpoint: What is evaluated; None only where no policy takes part.
         episodes: Number of episodes; the protocol's own number by default.
         seed: Seed of the episodes.
-        motions: Runs of recorded motion, for the protocols in WITH_MOTIONS.
+        motions: Runs of recorded motion, for the protocols that take them.
         on_row: Told of each row of the result once it is known.
 
     Raises:
@@ -102,7 +108,7 @@ def evaluate(
     _check_task(name, checkpoint)
     tested = {} if name in WITHOUT_CHECKPOINT else _identity(checkpoint)
     started = time.process_time()
-    more = {"motions": motions} if name in WITH_MOTIONS else {}
+    more = {"motions": motions} if name in WITH_MOTIONS | WITH_OR_WITHOUT_MOTIONS else {}
     outcome = PROTOCOLS[name](checkpoint, episodes=episodes, seed=seed, on_row=on_row, **more)
     return {
         "protocol": name,
@@ -169,9 +175,10 @@ def check_motions(
     if name in WITH_MOTIONS and not given:
         told = f": {how}" if how else ""
         raise InvalidInput(field, [], f"must hold at least one motion for {name}{told}")
-    if name not in WITH_MOTIONS and given:
+    taking = WITH_MOTIONS | WITH_OR_WITHOUT_MOTIONS
+    if name not in taking and given:
         rule = f"must not be given to {name}, which takes no recorded motion"
-        raise InvalidInput(field, list(given[:3]), rule, sorted(WITH_MOTIONS))
+        raise InvalidInput(field, list(given[:3]), rule, sorted(taking))
 
 
 def _identity(checkpoint: Checkpoint | None) -> dict[str, str]:

@@ -15,13 +15,16 @@ distance of the source's comparison.
 ``planner-alone``    a planned path with nobody there
 ``planner-bare``     a path planned for nobody, followed without a safety layer: how often these
                      people would be hit
+``hindsight``        the soonest untouched one of N_HINDSIGHT scripted replays of each crossing:
+                     what could have been done at least by who knew the person's way
 ===================  ========================================================================
 
-The time to the goal is that of the runs which arrive. ``time_capped_s`` is over all runs, and
-counts those that do not arrive (touched, or not there in CAP_S) as CAP_S. A run ends where
-anybody touches the robot, be it at rest: people here give way to nothing. ``below_half_s``
-includes the time at 0, ``stopped_s``. Planners arrive, like policies, once the tcp is within
-0.1 m of the goal.
+The time to the goal is that of the runs which arrive; ``time_capped_s`` is over all runs and
+counts those not there in CAP_S as CAP_S. People give way to nothing, so they may walk into a
+robot that the layer holds: such a run is counted (``contacts_at_rest``), and goes on once they
+have passed; ``time_untouched_s`` leaves it out. A link touched in motion ends the run.
+``below_half_s`` includes the time at 0, ``stopped_s``. Planners arrive, like policies, once the
+tcp is within 0.1 m of the goal.
 
 ``random`` is another trial: random goals and people who walk about (METHOD 2.1) for RANDOM_S,
 with the policy under the layer, and ``random-still`` the same beside a robot that stays at
@@ -36,22 +39,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.policies.checkpoint import Checkpoint
+from app.policies.evaluation.reach_episodes import N_ENVS, random_goals
 from app.policies.evaluation.rows import OnRow, untold
 from app.policies.evaluation.statistics import mean_of, wilson
 from app.policies.movers import Mover, mover_of
 from app.policies.reach_policy import ReachPolicy
 from app.policies.trained_cell import cell_of
+from app.sim.actions import ActionSettings
 from app.sim.cells import Cell, load_cell
 from app.sim.crossings import N_CROSSINGS, SEED, CrossingSet, crossings, recorded_crossings
 from app.sim.followers import FollowSettings
 from app.sim.guarded_planner import drive_planner, postures_of
 from app.sim.guarded_reach import HORIZON_S, GuardedReach, GuardedRuns
-from app.sim.kernels.episode import RUNNING
+from app.sim.hindsight import draw_detours, toward
+from app.sim.kernels.episode import RUNNING, TIMEOUT
 from app.sim.motions import Motion
 from app.sim.planners import PlanSettings
 from app.sim.ports import Vec
-from app.sim.reach import ReachSettings
+from app.sim.reach import ReachSettings, goal_region_of
 from app.sim.safety import SafetySettings, safety_settings
+from app.sim.scene import arm_of
 
 Json = dict[str, Any]
 CAP_S = 20.0
@@ -59,10 +66,10 @@ CAP_S = 20.0
 RANDOM_EPISODES = 10_000
 RANDOM_S = 25.0
 """Longest random episode [s], the longer one of METHOD 2.6."""
-RANDOM_ROWS = 500
-"""Rows of a batch of random episodes."""
 N_RECORDED = 60
 """Crossings made from recordings."""
+N_HINDSIGHT = 64
+"""Scripted replays of each crossing."""
 MARGIN = 0.35
 """Distance to people that planners keep [m]: chosen for them, see docs/reach-ssm.md."""
 PLANNERS: Mapping[str, FollowSettings] = {
@@ -103,6 +110,7 @@ def course_row(name: str, runs: GuardedRuns) -> Json:
         "arrived": wilson(int(arrived.sum()), n),
         "time_s": _spread(runs.seconds[arrived]),
         "time_capped_s": _spread(capped),
+        "time_untouched_s": _spread(runs.seconds[arrived & ~runs.touched_at_rest]),
         "below_half_s": _spread(runs.below_half_s),
         "stopped_s": _spread(runs.stopped_s),
         "standing_s": _spread(runs.standing_s),
@@ -136,10 +144,11 @@ def _spread(values: NDArray[np.floating]) -> dict[str, float] | None:
 def against(one: GuardedRuns, other: GuardedRuns) -> Json:
     """Return how much sooner ``one`` arrives than ``other``, run by run.
 
-    ``both``: over the runs in which both arrive; ``all``: over all, those that do not arrive
-    counted as CAP_S. ``share`` is the saving as a share of the other's mean time.
+    ``all``: over all runs, those that do not arrive counted as CAP_S; ``untouched``: over those
+    in which both arrive and neither is touched. ``share`` is the saving as a share of the
+    other's mean time.
     """
-    both = one.arrived & other.arrived
+    untouched = one.arrived & other.arrived & ~one.touched_at_rest & ~other.touched_at_rest
     times = [np.where(runs.arrived, runs.seconds, CAP_S) for runs in (one, other)]
 
     def saving(which: NDArray[np.bool_]) -> Json | None:
@@ -150,7 +159,8 @@ def against(one: GuardedRuns, other: GuardedRuns) -> Json:
         share = {key: value / scale for key, value in (less or {}).items()}
         return {"n": int(which.sum()), "saved_s": less, "share": share}
 
-    return {"both": saving(both), "all": saving(np.ones(len(both), dtype=np.bool_))}
+    every = np.ones(len(untouched), dtype=np.bool_)
+    return {"all": saving(every), "untouched": saving(untouched)}
 
 
 def drive(batch: GuardedReach, mover: Mover) -> Course:
@@ -207,10 +217,34 @@ class Comparison:
             self.safety,
             tracks=None if alone else self.crossed.tracks,
             guarded=guarded,
+            rest_ends=False,
         )
         batch.reset()
         batch.set_goals(np.arange(n), self.crossed.goals)
         return batch
+
+    def copies(self, number: int, n: int) -> GuardedReach:
+        """Return a batch of ``n`` rows at the start of one crossing; actions mean speeds."""
+        one = np.repeat(self.crossed.tracks[number][None], n, axis=0)
+        batch = GuardedReach(
+            self.cell,
+            n,
+            self.seed,
+            replace(self._settings, action=ActionSettings()),
+            self.safety,
+            tracks=one,
+            rest_ends=False,
+        )
+        batch.reset()
+        goals = np.repeat(self.crossed.goals[number][None], n, axis=0)
+        batch.set_goals(np.arange(n), goals)
+        return batch
+
+    def postures(self) -> list[Vec]:
+        """Return the postures at each goal that planners and replays choose among."""
+        if self._postures is None:
+            self._postures = postures_of(arm_of(self.cell), self.crossed.goals, self.seed)
+        return self._postures
 
     def policy(self, mover: Mover, *, alone: bool = False) -> Course:
         """Run a policy over all crossings."""
@@ -226,26 +260,64 @@ class Comparison:
     ) -> Course:
         """Run a planner over all crossings."""
         batch = self.batch(alone=alone, guarded=guarded)
-        if self._postures is None:
-            self._postures = postures_of(batch.arm, self.crossed.goals, self.seed)
         overrides, _ = drive_planner(
-            batch, self._postures, settings, self.seed + 1, blind=blind
+            batch, self.postures(), settings, self.seed + 1, blind=blind
         )
         return Course(runs=batch.runs(), overrides=overrides)
+
+
+def best_replays(comparison: Comparison, n_each: int, rng: np.random.Generator) -> GuardedRuns:
+    """Return the soonest untouched replay of each crossing, under the safety layer.
+
+    Where no replay is both untouched and there in time, the first one stands for all.
+
+    Args:
+        comparison: Crossings.
+        n_each: Replays of each.
+        rng: Draws them.
+    """
+    postures, parts = comparison.postures(), []
+    for number, some in enumerate(postures):
+        batch = comparison.copies(number, n_each)
+        first, until = draw_detours(batch.arm, rng, n_each)
+        until[0] = 0.0
+        last = some[rng.integers(len(some), size=n_each)]
+        k = 0
+        while (batch.state.outcome == RUNNING).any():
+            aim = np.where((k * batch.arm.dt < until)[:, None], first, last)
+            batch.step(toward(batch.arm, batch.state.q, aim), auto_reset=False, features=False)
+            k += 1
+        runs = batch.runs()
+        good = runs.arrived & ~runs.touched_at_rest
+        parts.append(
+            picked(runs, np.argmin(np.where(good, runs.seconds, np.inf), keepdims=True))
+        )
+    return joined(parts)
 
 
 def random_runs(
     cell: Cell, settings: ReachSettings, safety: SafetySettings, mover: Mover, n: int, seed: int
 ) -> list[GuardedRuns]:
-    """Run random episodes (METHOD 2.1, goals anywhere in the box) under the safety layer."""
-    settings = replace(settings, goals="box", time_limit_s=RANDOM_S)
-    found = []
-    for first in range(0, n, RANDOM_ROWS):
-        rows = min(RANDOM_ROWS, n - first)
-        batch = GuardedReach(cell, rows, seed, settings, safety, first_env=first)
-        batch.reset()
-        found.append(drive(batch, mover).runs)
+    """Run the episodes of ``reach-random`` under the safety layer."""
+    settings = replace(settings, time_limit_s=RANDOM_S)
+    batch = GuardedReach(cell, N_ENVS, seed, settings, safety)
+    goals, found = random_goals(*goal_box(cell), n, seed), []
+    for number, first in enumerate(range(0, n, N_ENVS)):
+        some = goals[first : first + N_ENVS]
+        batch.state.episode[:] = number
+        batch.restart()
+        batch.set_goals(np.arange(len(some)), some)
+        batch.state.outcome[len(some) :] = TIMEOUT  # nobody asks about these rows
+        runs = drive(batch, mover).runs
+        found.append(picked(runs, np.arange(len(some))))
     return found
+
+
+def goal_box(cell: Cell) -> tuple[Vec, Vec]:
+    """Return the lower and the upper corner of a cell's goal box [m], shape (3,) each."""
+    region = goal_region_of(cell)
+    middle, half = np.array(region.center), 0.5 * np.array(region.size)
+    return middle - half, middle + half
 
 
 def random_row(name: str, parts: Sequence[GuardedRuns]) -> Json:
@@ -271,6 +343,13 @@ def joined(parts: Sequence[GuardedRuns]) -> GuardedRuns:
     values: Any = {
         name: np.concatenate([getattr(part, name) for part in parts]) for name in names
     }
+    return GuardedRuns(**values)
+
+
+def picked(runs: GuardedRuns, which: NDArray[np.int64]) -> GuardedRuns:
+    """Return some of some runs."""
+    names = GuardedRuns.__dataclass_fields__
+    values: Any = {name: getattr(runs, name)[which] for name in names}
     return GuardedRuns(**values)
 
 
@@ -330,6 +409,8 @@ def compare(
     for name, job in jobs.items():
         courses[name] = job()
         rows.add(course_row(name + suffix, courses[name].runs))
+    best = best_replays(comparison, N_HINDSIGHT, np.random.default_rng(comparison.seed))
+    rows.add(course_row("hindsight" + suffix, best))
     return courses
 
 
@@ -359,7 +440,7 @@ def run_ssm(
     sets = {"": crossings(cell, n)}
     if motions:
         sets[" recorded"] = recorded_crossings(cell, motions, min(N_RECORDED, n_random))
-    rows = _Rows(len(sets) * (len(PLANNERS) + 4) + 2, on_row)
+    rows = _Rows(len(sets) * (len(PLANNERS) + 5) + 2, on_row)
     result: Json = {"paired": {}}
     for suffix, crossed in sets.items():
         comparison = Comparison(cell, crossed, settings, safety, seed)
@@ -402,6 +483,6 @@ def measure_planners(n: int = N_CROSSINGS, seed: int = 11, on_row: OnRow = untol
     comparison = Comparison(
         cell, crossings(cell, n), ReachSettings(), safety_settings(cell), seed
     )
-    rows = _Rows(len(PLANNERS) + 2, on_row)
+    rows = _Rows(len(PLANNERS) + 3, on_row)
     compare(comparison, None, rows)
     return {"settings": stated(comparison.safety, n, ()), "results": rows.rows}

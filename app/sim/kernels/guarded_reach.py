@@ -64,8 +64,8 @@ class Guard(NamedTuple):
     guarded: bool
     """Whether the layer acts; without it, pieces are executed as commanded."""
     rest_ends: bool
-    """Whether a person who walks into a robot at rest ends the episode; if not, it is noted, and
-    the episode goes on."""
+    """Whether a person who walks into a robot at rest ends the episode; if not, that is noted,
+    and the episode goes on."""
     horizon: float
     """Most time left that a policy is shown [s]."""
     tracks: Vec
@@ -105,7 +105,7 @@ def put_on_track(state: ReachState, e: int, guard: Guard, dt: float) -> None:
 def begin_episode(
     world: ReachWorld, state: ReachState, e: int, guard: Guard, work: Work
 ) -> None:
-    """Clear the account of environment ``e`` and put its person on the track, if there is one."""
+    """Clear the account of environment ``e`` and put its person on the track, if any."""
     for k in range(N_ACCOUNT):
         guard.account[e, k] = 0.0
     guard.override[e], guard.period[e] = 1.0, 0
@@ -174,7 +174,7 @@ def _execute(world: ReachWorld, state: ReachState, e: int, guard: Guard, work: W
 
 @kernel(error_model="numpy")
 def _touch(world: ReachWorld, guard: Guard, e: int) -> bool:
-    """Note whether people touch the robot, and how fast the link is; tell if that is the end."""
+    """Note whether people touch the robot, and how fast the link is; tell if it ends here."""
     arm, trial, account = world.arm, guard.trial, guard.account[e]
     account[FASTEST] = max(account[FASTEST], people_speed(trial, arm.dt))
     if trial.cylinders0.shape[0] + trial.columns0.shape[1] == 0:
