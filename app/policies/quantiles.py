@@ -107,7 +107,7 @@ class _QuantileLoss(torch.autograd.Function):
         return torch.tensor(loss, dtype=torch.float32)
 
     @staticmethod
-    def backward(ctx: Any, above: Tensor) -> tuple[Tensor, None, None]:  # type: ignore[override]
+    def backward(ctx: Any, above: Tensor) -> tuple[Tensor, None, None]:
         return above * ctx.saved_tensors[0], None, None
 
 
