@@ -28,6 +28,8 @@ def results(tmp_path: Path) -> Path:
         "reach-people": made.people(),
         "reach-speeds": made.speeds(),
         "reach-tracker": made.tracker(),
+        "reach-ceiling": made.ceiling(),
+        "reach-ssm": made.ssm(),
         "reach-smoothness": made.smoothness(),
         "reach-smoothness.jerk": made.smoothness(3),
         "reach_curves": made.curves(),
@@ -80,6 +82,14 @@ def test_smoothness_is_a_line_per_measure(results: Path) -> None:
     assert found["speed jumps by at most [rad/s]"] == ["4.4e-14", "4.4e-14"]
 
 
+def test_times_under_the_safety_layer_have_their_spread_and_no_row_is_empty() -> None:
+    head, policy, random = lines_of([made.ssm()])
+    assert policy[head.index("time [s]")] == "4.10 ± 0.90"
+    assert random[head.index("at the goal")].startswith("96.00 %")
+    assert random[head.index("time [s]")] == ""
+    assert "FILE" not in table(made.ssm())
+
+
 def test_results_of_other_tasks_are_left_to_others() -> None:
     assert not is_reach({"protocol": "pick-single"})
     assert is_reach({"protocol": "reach-targets"})
@@ -93,7 +103,8 @@ def test_every_picture_of_the_page_is_drawn(
     monkeypatch.setattr(reach_plots, "IMAGES", images)
     reach_plots.main()
     shown = set(re.findall(r"\]\(img/reach/([a-z-]+\.png)\)", PAGE))
-    assert {path.name for path in images.glob("*.png")} == shown
+    of_ssm = {"override.png", "arrivals.png"}  # drawn by reach_ssm_plots.py
+    assert {path.name for path in images.glob("*.png")} == shown - of_ssm
     assert all(path.stat().st_size > 10_000 for path in images.glob("*.png"))
 
 
@@ -117,7 +128,7 @@ def test_each_square_of_the_heat_maps_is_its_target() -> None:
         for y in (0.6, 0.8, 1.0)
     ]  # fmt: skip
     np.testing.assert_allclose(mesh, expected)
-    assert figure.axes[1].get_title(loc="left").startswith("z = 1.0 m")
+    assert figure.axes[1].get_title().startswith("z = 1.0 m")
 
 
 def test_presets_have_colours_of_their_own() -> None:
