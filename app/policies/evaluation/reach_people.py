@@ -15,7 +15,7 @@ from dataclasses import replace
 from typing import Any
 
 from app.policies.checkpoint import Checkpoint
-from app.policies.evaluation.reach_bench import ReachBench
+from app.policies.evaluation.reach_bench import ReachBench, walker_of
 from app.policies.evaluation.rows import OnRow, untold
 from app.policies.movers import How
 from app.sim.cell_people import FixedSpeedWalker
@@ -98,8 +98,12 @@ def run_speeds(
 
 
 def at_speed(cell: Cell, speed: float) -> Cell:
-    """Return a cell with one cylinder that walks at a given speed [m/s], else as its own."""
-    walker = cell.cylinders[0]
+    """Return a cell with one cylinder that walks at a given speed [m/s], else as its own.
+
+    Raises:
+        InvalidInput: The cell has none.
+    """
+    walker = walker_of(cell)
     kept = set(FixedSpeedWalker.model_fields) & set(type(walker).model_fields) - {
         "kind",
         "speed",
