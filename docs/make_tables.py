@@ -10,13 +10,15 @@ result yet stays as it is, and a test names it. Run by ``make tables``; a test c
 import json
 import re
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from docs.sorting_tables import is_sorting, lines_of  # noqa: E402 - found by the line above
+from docs import reach_tables  # noqa: E402 - found by the line above
+from docs.sorting_tables import is_sorting, lines_of  # noqa: E402
 
 BLOCK = re.compile(r"(<!-- begin ([a-z0-9_-]+) -->\n).*?(<!-- end \2 -->)", re.DOTALL)
 Json = dict[str, Any]
@@ -35,13 +37,24 @@ def render(readme: str, results: Path) -> str:
         if not path.exists():
             return match[0]
         found = json.loads(path.read_text(encoding="utf-8"))
-        return f"{match[1]}{table(found)}\n{match[3]}" if "results" in found else match[0]
+        if "results" not in found:
+            return match[0]
+        others = reach_tables.siblings(path) if reach_tables.is_reach(found) else []
+        return f"{match[1]}{table(found, others)}\n{match[3]}"
 
     return BLOCK.sub(block, readme)
 
 
-def table(result: Json) -> str:
-    """Return one result as a Markdown table with the line that says how it was measured."""
+def table(result: Json, others: Sequence[Json] = ()) -> str:
+    """Return one result as a Markdown table with the line that says how it was measured.
+
+    Args:
+        result: What a protocol or a benchmark printed.
+        others: Results of other checkpoints that belong in the same table.
+    """
+    if reach_tables.is_reach(result):
+        head, *rest = reach_tables.lines_of([result, *others])
+        return _markdown([head, ["---", *("---:" for _ in head[1:])], *rest], result)
     if is_sorting(result):
         head, *rest = lines_of(result)
         return _markdown([head, ["---", *("---:" for _ in head[1:])], *rest], result)
@@ -105,12 +118,15 @@ def conditions(result: Json) -> list[str]:
 def pages() -> list[Path]:
     """Return the files with tables: the README, pages and model cards.
 
-    The page about sorting is one of them once the first of its results is there.
+    The pages about sorting and reaching are among them once the first of their results is
+    there.
     """
     cards = sorted((ROOT / "app/policies/pretrained").glob("*.md"))
     names = ["people", "people-tracker", "motions"]
     if list((ROOT / "docs/results").glob("sorting_grid_*.json")):
         names.append("sorting")
+    if (ROOT / "docs/results/reach-targets.json").exists():
+        names.append("reach")
     return [ROOT / "README.md", *(ROOT / f"docs/{name}.md" for name in names), *cards]
 
 

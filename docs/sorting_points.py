@@ -2,7 +2,7 @@
 
     python docs/sorting_points.py RUN ... [--stock CELL=FILE.jsonl] [--episodes N]
 
-A RUN is a folder that ``docs/sorting_curves.py`` wrote. Each policy in it plays every pair
+A RUN is a folder that ``docs/training_curves.py`` wrote. Each policy in it plays every pair
 (K_E, K_G), greedily and without hand-over: 500 episodes of each on e0, 100 on e1, unless
 ``--episodes`` says otherwise. ``--stock`` takes what ``tests/benchmarks/stock_dqn.py`` wrote.
 Writes ``docs/results/sorting_curves.json``, which ``docs/sorting_plots.py`` draws; curves of

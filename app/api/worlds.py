@@ -37,6 +37,9 @@ from app.sim.cases import cases_of
 from app.sim.cells import Cell
 from app.sim.live_world import lacks_for_live
 from app.sim.motions import Motion
+from app.sim.ports import SortingValues, TaskPolicy
+from app.sim.reach_commands import is_reaching
+from app.sim.reach_ports import ReachPilot
 
 STREAM_PERIOD_S = 0.1
 
@@ -127,6 +130,8 @@ def set_cell(world_id: str, body: WorldCell, services: ServicesDep) -> WorldSumm
     cell = services.cells.get(body.cell)
     if (lack := lacks_for_live(cell)) is not None:
         raise InvalidInput("cell", cell.name, f"cannot be shown live: it {lack}")
+    if is_reaching(cell):
+        return _replace_world(world_id, cell, None, None, None, services)
     if body.checkpoint is None:
         policy = mover_for(cell, services)
     else:
@@ -137,10 +142,22 @@ def set_cell(world_id: str, body: WorldCell, services: ServicesDep) -> WorldSumm
     else:
         sorter = services.sorters.load(body.sorter)
         require_sorter(sorter, cell)
+    return _replace_world(world_id, cell, policy, sorter, None, services)
+
+
+def _replace_world(
+    world_id: str,
+    cell: Cell,
+    policy: TaskPolicy | None,
+    sorter: SortingValues | None,
+    pilot: ReachPilot | None,
+    services: Services,
+) -> WorldSummary:
+    """Start the world of an id anew, and stop the one that was there."""
     with services.replacing:
         if services.stopping.is_set():
             raise NotReady("stopping")
-        new = services.start_world(world_id, cell, policy, sorter)
+        new = services.start_world(world_id, cell, policy, sorter, pilot)
         old, services.worlds[world_id] = services.worlds[world_id], new
     old.stop()
     return WorldSummary.from_domain(new.handle.snapshot())

@@ -18,11 +18,12 @@ from app.policies.checkpoint import (
     require_purpose,
     task_of,
 )
-from app.policies.reach_preset import action_of
+from app.policies.networks import BASE_WEIGHT
+from app.policies.reach_preset import ACTORS, action_of
 from app.policies.trained_cell import cell_of
 from app.sim.actions import ActionSettings
-from app.sim.goal_sets import halton_targets
-from app.sim.kernels.reach_features import SIZES, STATE_SIZES
+from app.sim.goal_sets import MOST_HALTON, N_HALTON, halton_targets
+from app.sim.kernels.reach_features import BASE_START, SIZES, STATE_SIZES
 from app.sim.ports import Vec
 from app.sim.reach import N_ACT, GoalRule, ViewName, goal_region_of
 
@@ -69,11 +70,12 @@ class ReachPolicy:
         """The goals it was trained on [m], shape (n, 3); None for a whole box."""
         if self.goals == "grid":
             self.targets = goal_region_of(cell).targets()
-        if self.goals == "halton":
+        elif self.goals == "halton":
             self.targets = halton_targets(goal_region_of(cell), _n_halton(preset))
         self.n_obs = sum(size for _, size in manifest["layout"])
         """Length of an observation."""
         self._layers = _layers_of(checkpoint.arrays(), self.n_obs)
+        self._residual = _named(preset, "actor", ACTORS) == "residual"
 
     @property
     def checkpoint(self) -> str:
@@ -123,6 +125,9 @@ class ReachPolicy:
         weight, bias = self._layers[-1]
         rows = rows @ weight
         rows += bias
+        if self._residual:
+            base = np.clip(obs[:, BASE_START : BASE_START + N_ACT], -1.0, 1.0)
+            rows += np.arctanh(np.float32(BASE_WEIGHT) * base)
         return cast(NDArray[np.float32], np.tanh(rows, out=rows))
 
 
@@ -135,11 +140,12 @@ def _named(preset: Mapping[str, Any], field: str, choices: tuple[str, ...]) -> s
 
 
 def _n_halton(preset: Mapping[str, Any]) -> int:
-    """Return the size of the Halton set that a manifest's preset names."""
-    value = preset.get("n_halton")
-    if not isinstance(value, int):
-        raise InvalidInput("manifest.preset.n_halton", value, "must be a whole number")
-    return value
+    """Return the number of points of the Halton set that a manifest's preset names."""
+    n = preset.get("n_halton", N_HALTON)
+    if not isinstance(n, int) or not 1 <= n <= MOST_HALTON:
+        rule = f"must be a number in [1, {MOST_HALTON}]"
+        raise InvalidInput("manifest.preset.n_halton", n, rule)
+    return n
 
 
 def _layers_of(arrays: Mapping[str, NDArray[Any]], n_obs: int) -> tuple[Layer, ...]:

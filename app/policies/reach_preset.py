@@ -10,6 +10,15 @@ from app.sim.actions import BOUNDS, MEANINGS, ActionSettings
 from app.sim.goal_sets import MOST_HALTON, N_HALTON
 from app.sim.reach import GoalRule, StartRule, ViewName
 
+ACTORS = ("residual", "plain")
+CRITICS = ("mean", "quantiles")
+SIGHTS = ("observation", "future")
+PRECISIONS = ("float32", "bfloat16")
+MAX_BYTES = 16 * 1024 * 1024
+"""Size of the networks that a checkpoint holds [bytes]."""
+MOST_SEEN = 160
+"""Most numbers that a network sees, its smaller parts included."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReachPreset:
@@ -51,8 +60,29 @@ class ReachPreset:
     )
     width: int = number(256, 16, 1024, "units", "width of the hidden layers")
     layers: int = number(2, 1, 12, "", "hidden layers")
+    actor: str = choice(
+        "residual", ACTORS, "acts on top of the straight way to the goal, or on its own"
+    )
     critic_norm: str = choice("layer", ("layer", "none"), "normalisation in the critics")
     n_critics: int = number(2, 1, 10, "", "critics; the least value counts")
+    critic: str = choice(
+        "mean",
+        CRITICS,
+        "what critics say: the mean return, or quantiles, cut in targets",
+    )
+    n_quantiles: int = number(25, 2, 100, "", "quantiles per critic, for critic = quantiles")
+    dropped_quantiles: int = number(
+        2, 0, 99, "", "highest quantiles per critic that targets leave out"
+    )
+    critic_sees: str = choice(
+        "observation", SIGHTS, "what critics see: as the actor, or also where people will be"
+    )
+    ema: float = number(
+        0.0, 0.0, 0.99999, "", "what an update leaves of the actor's averaged weights; 0: none"
+    )
+    precision: str = choice(
+        "float32", PRECISIONS, "products in training; bfloat16 is faster on some processors"
+    )
     alpha: float = number(0.0, 0.0, 1.0, "", "exponent of replay priorities; 0 draws evenly")
     beta: float = number(0.4, 0.0, 1.0, "", "exponent of importance weights at the start")
 
@@ -64,13 +94,16 @@ class ReachPreset:
     greedy_share: float = number(
         0.05, 0.0, 1.0, "", "share of cells without ladder noise; at least one"
     )
+    option_rate: float = number(
+        0.0, 0.0, 0.5, "per step", "how often a random option starts in half the cells"
+    )
     ou_theta: float = number(0.3, 0.0, 1.0, "per step", "pull of Ornstein-Uhlenbeck noise")
     ou_sigma: float = number(0.15, 0.0, 2.0, "", "push of Ornstein-Uhlenbeck noise")
 
     time_limit_s: float = number(5.0, 1.0, 60.0, "s", "longest episode")
     goals: str = choice("grid", get_args(GoalRule), "where goals are drawn from")
     n_halton: int = number(
-        N_HALTON, 8, MOST_HALTON, "goals", "size of the Halton set, where that is the rule"
+        N_HALTON, 8, MOST_HALTON, "", "points of the Halton set, for goals = halton"
     )
     start: str = choice("clearance", get_args(StartRule), "where people may start")
     start_clearance_m: float = number(
@@ -131,7 +164,41 @@ class ReachPreset:
                 self.action_bounds,
                 "must be viable with action_degree = 3",
             )
+        if self.actor == "residual" and self.observation == "state":
+            raise InvalidInput(
+                "overrides.actor", self.actor, "must be plain with observation = state"
+            )
+        if self.dropped_quantiles >= self.n_quantiles:
+            raise InvalidInput(
+                "overrides.dropped_quantiles",
+                self.dropped_quantiles,
+                f"must be below n_quantiles = {self.n_quantiles}",
+            )
+        if self.observation == "state" and self.critic_sees == "future":
+            raise InvalidInput(
+                "overrides.critic_sees",
+                self.critic_sees,
+                "must be observation with observation = state: its time-outs are no true ends",
+            )
+        _check_size(self)
         check_learning(self.learning_starts, self.total_steps, self.buffer_size, self.n_envs)
+
+
+def _check_size(preset: ReachPreset) -> None:
+    """Check that the networks fit into a checkpoint.
+
+    Raises:
+        InvalidInput: They are too large.
+    """
+    per_network = preset.width * ((preset.layers - 1) * preset.width + MOST_SEEN)
+    size = 4 * (1 + preset.n_critics) * per_network
+    if size > MAX_BYTES:
+        raise InvalidInput(
+            "overrides.width",
+            preset.width,
+            f"makes networks of {size / 2**20:.0f} MB with layers = {preset.layers} and "
+            f"n_critics = {preset.n_critics}; must stay below {MAX_BYTES // 2**20} MB",
+        )
 
 
 THESIS = ReachPreset(
@@ -154,6 +221,7 @@ THESIS = ReachPreset(
     actor_frozen_updates=0,
     width=400,
     layers=10,
+    actor="plain",
     critic_norm="none",
     n_critics=1,
     alpha=0.6,

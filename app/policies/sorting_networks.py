@@ -119,7 +119,7 @@ class SharedNetwork(nn.Module):
         order = (order[:, None] + order[None, :]) % n_towers
         joint = self.joint(seen[:, order].flatten(2))
         valid = valid_moves(clutter, towers)
-        advantage = self._advantages(self.head(joint), clutter, fail)
+        advantage = self._advantages(self.head(joint), clutter, towers, fail)
         value = self.value(joint).mean(dim=1)
         return dueling(value, advantage, valid).masked_fill(~valid, NEVER)
 
@@ -158,8 +158,12 @@ class SharedNetwork(nn.Module):
         ]
         return torch.cat(parts, dim=2)
 
-    def _advantages(self, out: Tensor, clutter: Tensor, fail: Tensor) -> Tensor:
-        """Turn what the towers say, (B, C, outputs), into advantages of all moves."""
+    def _advantages(self, out: Tensor, clutter: Tensor, towers: Tensor, fail: Tensor) -> Tensor:
+        """Turn what the towers say, (B, C, outputs), into advantages of all moves.
+
+        A tower's gain from an object is one number, wherever the object comes from; one that
+        comes from another tower cannot fail, and what that tower gains by it is added.
+        """
         n, n_towers, _ = out.shape
         n_types = self.shape.n_types
         gain, slope, back, across = torch.split(out, [n_types, n_types, 2, n_towers], dim=2)
@@ -174,6 +178,10 @@ class SharedNetwork(nn.Module):
         order = torch.arange(n_towers, device=out.device)
         order = (order[None, :] - order[:, None]) % n_towers
         over = across.gather(2, order.expand(n, -1, -1))
+        # (B, C from, C to): relative type of each top, as the tower it goes to counts colours.
+        top = towers.gather(2, ((towers > 0).sum(dim=2, keepdim=True) - 1).clamp(min=0))
+        top_kind = (self.relative.T[top.squeeze(2)] - 1).clamp(min=0)
+        over = over + gain.gather(2, top_kind.transpose(1, 2)).transpose(1, 2)
         return torch.cat([place.flatten(1), free.flatten(1), over.flatten(1)], dim=1)
 
 

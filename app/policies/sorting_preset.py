@@ -99,10 +99,10 @@ class SortingPreset:
     c_move: float = number(0.05, 0.0, 10.0, "", "cost of an attempt")
     c_empty: float = number(0.3, 0.0, 10.0, "", "cost of picking where nothing is")
     c_stuck: float = number(0.3, 0.0, 10.0, "", "cost of putting an object back")
-    c_fail: float = number(0.05, 0.0, 10.0, "", "cost of a failed pick")
-    c_back: float = number(0.05, 0.0, 10.0, "", "cost of a move from a tower to the clutter")
+    c_fail: float = number(0.01, 0.0, 10.0, "", "cost of a failed pick")
+    c_back: float = number(0.01, 0.0, 10.0, "", "cost of a move from a tower to the clutter")
     c_distance: float = number(
-        0.1, 0.0, 10.0, "", "cost per attempt, of all levels differing from the goal"
+        0.01, 0.0, 10.0, "", "cost per attempt, of all levels differing from the goal"
     )
     c_success: float = number(1.0, 0.0, 100.0, "", "bonus of a goal that is met")
 
@@ -163,7 +163,11 @@ class SortingPreset:
 
 
 def _printed(name: str, cell: str, total_steps: int) -> SortingPreset:
-    """Return table 3.1 with an update every fourth attempt, which is not printed."""
+    """Return table 3.1.
+
+    What it does not print: an update every fourth attempt, and a reward in which parking and
+    failures cost as much as a move.
+    """
     return SortingPreset(
         name=name,
         cell=cell,
@@ -184,6 +188,9 @@ def _printed(name: str, cell: str, total_steps: int) -> SortingPreset:
         eps_start=1.0,
         eps_end=0.05,
         eps_share=1.0,
+        c_fail=0.05,
+        c_back=0.05,
+        c_distance=0.1,
         solved_episodes=0.5,
         even_share=0.0,
         disturbed_share=0.0,
@@ -200,6 +207,8 @@ SORTING_PRESETS = (
         name="sorting-e1-dqn",
         cell="sorting-e1",
         total_steps=2_048_000,
+        advice_share=0.5,
+        advice_margin=0.1,
     ),
     SortingPreset(
         name="sorting-e1-dqn-pure",

@@ -67,6 +67,11 @@ class CellBatch:
         self._ended = np.zeros(n_envs, dtype=np.int64)
         self._step: Callable[..., None] | None = None
 
+    @property
+    def obs(self) -> NDArray[np.float32]:
+        """Observations as they were last written, (n_envs, obs_size)."""
+        return self._obs
+
     def reset(self, seed: int | None = None) -> NDArray[np.float32]:
         """Start episode 0 in every cell; return observations, (n_envs, obs_size)."""
         self.seed = self.seed if seed is None else seed

@@ -52,8 +52,8 @@ class Contact:
     link: str
     """Body of the robot, one of BODY_NAMES."""
     body: str
-    """The other one: a capsule of the person, ``table``, ``floor``, ``obstacle`` and its id, or
-    a body of the robot."""
+    """The other one: a capsule of the person, ``walker`` and the number of a cylinder,
+    ``table``, ``floor``, ``obstacle`` and its id, or a body of the robot."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,6 +133,19 @@ def obstacle_box(obstacle: Obstacle, shrink: float = 0.0) -> Any:
     )
 
 
+def make_cylinder(x: float, y: float, radius: float, low: float, high: float) -> Any:
+    """Return an upright cylinder between two heights [m] as a placed fcl object."""
+    middle = np.array([x, y, 0.5 * (low + high)])
+    return fcl.CollisionObject(
+        fcl.Cylinder(radius, high - low), fcl.Transform(np.eye(3), middle)
+    )
+
+
+def walker_name(number: int) -> str:
+    """Return what a walking cylinder is called in a contact."""
+    return f"walker {number}"
+
+
 def touch(a: Any, b: Any) -> bool:
     """Tell whether two fcl objects touch."""
     return bool(fcl.collide(a, b, fcl.CollisionRequest(), fcl.CollisionResult()))
@@ -156,6 +169,7 @@ class CollisionReference:
         self._tool = tool_capsule(cell.robot.tool_length, cell.robot.tool_radius)
         self._bodies[TOOL] = make_capsule(cell.robot.tool_radius, *self._tool)
         self._obstacles = _obstacles(cell)
+        self._walkers: dict[str, Any] = {}
         self.set_person(cell.body)
 
     def set_person(self, size: Vec) -> None:
@@ -187,6 +201,18 @@ class CollisionReference:
         ends = human.capsules(human_q, self._size, self._cell.floor_z)
         for body, (p0, p1) in zip(self._person.values(), ends, strict=True):
             place_capsule(body, p0, p1)
+
+    def place_walkers(self, cylinders: Vec) -> None:
+        """Put the cell's walking cylinders at x, y with a radius [m], shape (C, 3).
+
+        As in the kernels they stand on the floor, all as high as the highest of the cell.
+        """
+        low = self._cell.floor_z
+        high = low + max([one.height for one in self._cell.cylinders], default=2.0)
+        self._walkers = {
+            walker_name(k): make_cylinder(x, y, r, low, high)
+            for k, (x, y, r) in enumerate(cylinders.tolist())
+        }
 
     def contacts(self, q: Vec, human_q: Vec | None = None) -> list[Contact]:
         """Return everything the robot touches, itself included.
@@ -229,9 +255,10 @@ class CollisionReference:
 
         Args:
             link: A body of the robot, one of BODY_NAMES.
-            body: A capsule of the person, ``table``, ``floor`` or a body of the robot.
+            body: A capsule of the person, a walking cylinder, ``table``, ``floor`` or a body of
+                the robot.
         """
-        for group in (self._person, self._obstacles, self._bodies):
+        for group in (self._person, self._walkers, self._obstacles, self._bodies):
             if body in group:
                 return touch(self._bodies[link], group[body])
         raise KeyError(body)

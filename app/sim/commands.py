@@ -17,6 +17,7 @@ from app.sim.cases import cases_of
 from app.sim.cells import LIMITS, Cell
 from app.sim.motions import Motion
 from app.sim.ports import TaskPolicy
+from app.sim.reach_commands import REACH_COMMANDS, ReachCommand, check_reaching, is_reaching
 from app.sim.sorting_cell import is_sorting
 from app.sim.sorting_commands import SORTING_COMMANDS, SortingCommand, check_sorting
 
@@ -211,6 +212,7 @@ Command = (
     | SetPolicy
     | StartCase
     | SortingCommand
+    | ReachCommand
 )
 
 COMMANDS: tuple[type[Command], ...] = (
@@ -230,6 +232,7 @@ COMMANDS: tuple[type[Command], ...] = (
     SetPolicy,
     StartCase,
     *SORTING_COMMANDS,
+    *REACH_COMMANDS,
 )
 
 
@@ -248,14 +251,22 @@ def check(command: Command, cell: Cell, people: Sequence[int]) -> None:
     match command:
         case MoveHuman() | SetMode() | SetMotion() | SetBody() | RemovePerson() | AddPerson():
             _check_person(command, people)
+            if is_reaching(cell):
+                _check_cylinder(command, cell)
         case SetCandidates() | ToggleCandidate() | StartCase() if is_sorting(cell):
             rule = f"needs a pick-and-place cell: {cell.name} is a sorting cell"
+            raise InvalidInput("tag", command.tag, rule)
+        case SetCandidates() | ToggleCandidate() | StartCase() if is_reaching(cell):
+            rule = f"needs a pick-and-place cell: {cell.name} has goals to reach instead"
             raise InvalidInput("tag", command.tag, rule)
         case SetCandidates():
             for name in command.ids:
                 cell.station(name)
         case ToggleCandidate():
             cell.station(command.id)
+        case SetPolicy() if is_reaching(cell) and command.policy is not None:
+            rule = "needs a policy that reaches goals: this one chooses tasks"
+            raise InvalidInput("checkpoint", command.policy.checkpoint, rule)
         case SetSpeed():
             _check_speed(command)
         case StartCase():
@@ -265,6 +276,8 @@ def check(command: Command, cell: Cell, people: Sequence[int]) -> None:
         case _:
             if isinstance(command, SORTING_COMMANDS):
                 check_sorting(command, cell)
+            elif isinstance(command, REACH_COMMANDS):
+                check_reaching(command, cell)
 
 
 def _check_speed(command: SetSpeed) -> None:
@@ -293,6 +306,17 @@ def _check_person(
         raise InvalidInput("mode", command.mode, "cannot be set", PLAIN_MODES)
     elif isinstance(command, SetBody):
         _check_percentiles(command)
+
+
+def _check_cylinder(command: Command, cell: Cell) -> None:
+    """Refuse what can be done only to a person with joints."""
+    rule = f"needs a person with joints: those of {cell.name} are walking cylinders"
+    if isinstance(command, SetMotion | SetBody):
+        raise InvalidInput("tag", command.tag, rule)
+    if isinstance(command, MoveHuman):
+        for name in ("right", "left"):
+            if (value := getattr(command, name)) is not None:
+                raise InvalidInput(name, value, rule)
 
 
 def _check_percentiles(command: SetBody) -> None:

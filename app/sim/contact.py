@@ -41,6 +41,8 @@ class Contact:
     ``table``, ``obstacle``, another capsule of the robot, or ``nobody``."""
     worker: int | None = None
     """The worker whose capsule that is, from 0."""
+    walker: int | None = None
+    """The walker that is, from 0."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -138,7 +140,7 @@ def contact(
         robot,
         crowd,
     )
-    link, part, worker = _who(arm, people, kind, robot, crowd)
+    link, part, worker, walker = _who(arm, people, kind, robot, crowd)
     return Contact(
         kind=CONTACT_KINDS[kind],
         clearance_m=float(clear[0]),
@@ -146,6 +148,7 @@ def contact(
         link=link,
         part=part,
         worker=worker,
+        walker=walker,
     )
 
 
@@ -170,28 +173,51 @@ def worker_distances(arm: Arm, people: People, q: Vec, human_q: Vec, sizes: Vec)
     return np.asarray(parts.min(axis=1))
 
 
+def walker_distances(arm: Arm, people: People, q: Vec, cylinders: Vec) -> Vec:
+    """Return the distance of the robot at ``q`` to each walking cylinder [m], shape (C,).
+
+    Args:
+        arm: Robot in its cell.
+        people: Shared data; says how high the cylinders are.
+        q: Joint positions [rad], shape (6,).
+        cylinders: x, y and radius of each [m], shape (C, 3).
+    """
+    robot = arm_kernel.new_robot_pose(arm)
+    arm_kernel.place_robot(arm, own(q), robot)
+    return np.array(
+        [
+            cylinder_clearance(robot.columns, 0, x, y, r, people.top_z)[0]
+            for x, y, r in cylinders
+        ]
+    )
+
+
 def _who(
     arm: Arm, people: People, kind: int, robot: arm_kernel.RobotPose, crowd: Crowd
-) -> tuple[str, str, int | None]:
-    """Return the names of the capsule and of what it touches or is nearest to, and of whom."""
+) -> tuple[str, str, int | None, int | None]:
+    """Return the names of the capsule and of what it touches or is nearest to, and of whom.
+
+    Whom is a worker or a walker.
+    """
     names = load_robot_capsules().name
     if kind == kernel.SELF_CONTACT:
         _, pair = arm_kernel.self_clearance(arm, robot)
-        return names[arm.first[pair]], names[arm.second[pair]], None
+        return names[arm.first[pair]], names[arm.second[pair]], None, None
     if kind == kernel.CELL_CONTACT:
         _, link, box = arm_kernel.cell_clearance(arm, robot.columns)
-        return names[link], "table" if box < 0 else "obstacle", None
+        return names[link], "table" if box < 0 else "obstacle", None, None
     who = people_kernel.nearest_person(people, robot.columns, crowd)
     if who < 0:
-        return names[-1], "nobody", None
+        return names[-1], "nobody", None, None
     if who >= len(crowd.q):
-        x, y, r = crowd.cylinders[who - len(crowd.q)]
+        walker = who - len(crowd.q)
+        x, y, r = crowd.cylinders[walker]
         _, link = cylinder_clearance(robot.columns, 0, x, y, r, people.top_z)
-        return names[link], "walker", None
+        return names[link], "walker", None, walker
     best, link, part = np.inf, 0, 0
     for k in range(len(names)):
         distances(robot.columns, k, crowd.columns, crowd.gap)
         near = int(np.argmin(crowd.gap))
         if crowd.gap[near] < best:
             best, link, part = float(crowd.gap[near]), k, near
-    return names[link], human.CAPSULE_NAMES[part % N_CAPSULES], part // N_CAPSULES
+    return names[link], human.CAPSULE_NAMES[part % N_CAPSULES], part // N_CAPSULES, None

@@ -4,19 +4,43 @@ One control period at a time: an action through the same kernels as training and
 then a test for contact between the ends of the period too.
 """
 
+from typing import NamedTuple, Protocol
+
 import numpy as np
 
 from app.sim import pick
 from app.sim.actions import ActionSettings
 from app.sim.cells import Cell
-from app.sim.contact import Contact, contact, worker_distances
+from app.sim.contact import Contact, contact, walker_distances, worker_distances
 from app.sim.kernels import body, kinematics
-from app.sim.live_people import LivePeople
 from app.sim.ports import Vec
 from app.sim.scene import arm_of, people_of
 
 GAIN = 3.0
 """Joint speed per joint error on the way to a posture [1/s]."""
+
+
+class Bodies(NamedTuple):
+    """Where people are at one moment."""
+
+    q: Vec
+    """Joints of those who have some [m, rad], shape (W, 18)."""
+    sizes: Vec
+    """Their sizes [m], shape (W, N_SIZE)."""
+    cylinders: Vec
+    """x, y and radius of those who are cylinders [m], shape (C, 3)."""
+
+
+class Everyone(Protocol):
+    """The people of a live cell, workers first."""
+
+    @property
+    def ids(self) -> tuple[int, ...]:
+        """Ids of the people who are there, in order."""
+
+    @property
+    def bodies(self) -> Bodies:
+        """Where they are."""
 
 
 class LiveArm:
@@ -55,64 +79,67 @@ class LiveArm:
         """Stand still at once, as after a contact."""
         self.qd = np.zeros(6)
 
-    def touches(self, people: LivePeople) -> bool:
+    def touches(self, people: Everyone) -> bool:
         """Whether it touches anything where it is; the clearance is measured anew."""
-        rest = np.zeros(6)
-        found = self._test(rest, rest, rest, people, people.q, people.sizes)
-        return found.kind != "none"
+        rest, here = np.zeros(6), people.bodies
+        return self._test(rest, rest, rest, here, here).kind != "none"
 
     def advance(
         self,
         act: Vec,
-        people: LivePeople,
-        human_q: Vec,
-        sizes: Vec,
+        people: Everyone,
+        before: Bodies,
         *,
         straight: bool = False,
     ) -> Contact:
         """Carry out one action, unless something is touched: then stay at the start.
 
         Args:
-            act: Action in [-1, 1], shape (5,).
+            act: Action in [-1, 1], shape (5,) or (6,).
             people: The people, as they are at the end of the period.
-            human_q: Their joints at its start [m, rad], shape (n, 18).
-            sizes: Their sizes then [m], shape (n, N_SIZE).
+            before: Where they were at its start.
             straight: Whether the action comes from :meth:`toward`, not from the policy.
         """
+        return self.follow(self.piece(act, straight=straight), people, before)
+
+    def piece(self, act: Vec, *, straight: bool = False) -> pick.Piece:
+        """Return what an action asks for in the period to come; see :meth:`advance`."""
         rule = pick.DEFAULT_ACTION if straight else self.action
-        piece = pick.step_robot(self.arm, self.q, self.qd, self.qdd, act, rule)
-        found = self._test(self.qd, piece.c, piece.d, people, human_q, sizes)
+        return pick.step_robot(self.arm, self.q, self.qd, self.qdd, act, rule)
+
+    def follow(self, piece: pick.Piece, people: Everyone, before: Bodies) -> Contact:
+        """Carry out a piece of motion, unless something is touched; see :meth:`advance`."""
+        found = self._test(self.qd, piece.c, piece.d, before, people.bodies)
         if found.kind == "none":
             self.q, self.qd, self.qdd = piece.q, piece.qd, piece.qdd
         return found
 
-    def _test(
-        self, qd: Vec, c: Vec, d: Vec, people: LivePeople, human_q: Vec, sizes: Vec
-    ) -> Contact:
+    def _test(self, qd: Vec, c: Vec, d: Vec, before: Bodies, after: Bodies) -> Contact:
         """Test a period that began with the robot here and the people as they were then."""
         found = contact(
             self.arm,
-            self._people._replace(columns=body.capsule_columns(len(people))),
+            self._people._replace(columns=body.capsule_columns(len(after.q))),
             self.q,
             qd,
             c,
             d,
-            (human_q, people.q),
-            sizes=(sizes, people.sizes),
+            (before.q, after.q),
+            (before.cylinders, after.cylinders),
+            sizes=(before.sizes, after.sizes),
         )
-        self.clearance_m = found.clearance_m if len(people) else None
+        anybody = len(after.q) + len(after.cylinders) > 0
+        self.clearance_m = found.clearance_m if anybody else None
         return found
 
-    def distances(self, people: LivePeople) -> dict[int, float]:
+    def distances(self, people: Everyone) -> dict[int, float]:
         """Return the distance to each person by id [m]."""
-        found = worker_distances(
-            self.arm,
-            self._people._replace(columns=body.capsule_columns(len(people))),
-            self.q,
-            people.q,
-            people.sizes,
-        )
-        return dict(zip(people.ids, found.tolist(), strict=True))
+        here = people.bodies
+        shared = self._people._replace(columns=body.capsule_columns(len(here.q)))
+        found = [
+            *worker_distances(self.arm, shared, self.q, here.q, here.sizes).tolist(),
+            *walker_distances(self.arm, shared, self.q, here.cylinders).tolist(),
+        ]
+        return dict(zip(people.ids, found, strict=True))
 
     def posture_at(self, point: Vec) -> tuple[Vec, bool]:
         """Return the posture with the tool pointing down at a point, and whether it is exact.

@@ -17,8 +17,10 @@ from app.sim.cells import Cell
 from app.sim.commands import FIRST, Command, people_after
 from app.sim.dragged_person import STEP_BACK
 from app.sim.kernels.body import N_SIZE
+from app.sim.live_arm import Bodies
 from app.sim.live_person import LivePerson
 from app.sim.ports import Vec
+from app.sim.scene import NO_CYLINDERS
 
 ROOM = 0.7
 """Distance of two homes that leaves room for shoulders and elbows [m]."""
@@ -63,6 +65,11 @@ class LivePeople:
     def sizes(self) -> Vec:
         """Sizes of all [m], shape (n, N_SIZE)."""
         return np.array([one.size for one in self]).reshape(-1, N_SIZE)
+
+    @property
+    def bodies(self) -> Bodies:
+        """Where they are; nobody is a cylinder."""
+        return Bodies(self.q, self.sizes, NO_CYLINDERS)
 
     def only_first(self) -> LivePerson:
         """Leave the first person alone, as the cell describes it, and return it."""

@@ -4,17 +4,17 @@ The worlds (``world.py`` pick and place, ``sorting_world.py`` sorting) say what 
 do; here is how it is carried out and seen. Pure numpy, no thread, no screen.
 """
 
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
+from typing import Any, Generic, Protocol, TypeVar
 
 from app.errors import ServiceError
 from app.sim import commands, pick
 from app.sim.cells import Cell
 from app.sim.contact import Contact
-from app.sim.live_arm import LiveArm
-from app.sim.live_people import LivePeople
+from app.sim.live_arm import Bodies, Everyone, LiveArm
 from app.sim.live_person import frozen
-from app.sim.ports import Candidate, Decision, TaskPolicy, Vec
+from app.sim.ports import Candidate, Decision, Person, TaskPolicy
 from app.sim.snapshot import (
     CandidateView,
     ContactView,
@@ -47,22 +47,62 @@ ClockCommand = commands.Pause | commands.Resume | commands.StepOnce | commands.R
 _BODIES = {"cell": "table", "self": "robot"}
 
 
-class LiveStage:
+class Somebody(Protocol):
+    """One person of a live cell."""
+
+    @property
+    def id(self) -> int:
+        """Number of the person."""
+
+    def seen(self) -> Person:
+        """Return the person as a policy sees it."""
+
+    def drag(self, command: commands.MoveHuman) -> None:
+        """Aim at a dragged posture."""
+
+    def enter(self, mode: commands.Mode) -> None:
+        """Change who moves the person."""
+
+    def play(self, command: commands.SetMotion) -> None:
+        """Move as recorded."""
+
+    def grow(self, command: commands.SetBody) -> None:
+        """Become as large as asked for."""
+
+    def view(self, clearance_m: float, *, nearest: bool) -> PersonView:
+        """Return what is known of the person."""
+
+
+class People(Everyone, Protocol):
+    """The people of a live cell, as a stage moves them."""
+
+    def __iter__(self) -> Iterator[Somebody]: ...
+
+    def __getitem__(self, id: int) -> Somebody: ...
+
+    def move(self, dt: float) -> None:
+        """Move everyone for ``dt`` [s]."""
+
+    def change(self, command: commands.Command) -> None:
+        """Let people come and leave as a command says."""
+
+
+P = TypeVar("P", bound=People)
+
+
+class LiveStage(Generic[P]):
     """Clock, people and robot of one live cell.
 
     Args:
         cell: Work cell.
         policy: Chooses and moves; None lets the robot rest.
-        seed: Seed of the people's work.
         id: Name of the world in URLs.
-        work: The cell as the people see it who work there; None for the same.
+        people: The people in it.
     """
 
-    def __init__(
-        self, cell: Cell, policy: TaskPolicy | None, seed: int, id: str, work: Cell | None
-    ) -> None:
+    def __init__(self, cell: Cell, policy: TaskPolicy | None, id: str, people: P) -> None:
         self.cell, self.id, self.policy = cell, id, policy
-        self.people = LivePeople(work or cell, seed)
+        self.people = people
         self.robot = LiveArm(cell, pick.DEFAULT_ACTION if policy is None else policy.action)
         self.paused = False
         self.status: Status = "moving"
@@ -94,9 +134,9 @@ class LiveStage:
                 self.people.change(command)
                 self.robot.touches(self.people)
 
-    def pass_period(self) -> tuple[Vec, Vec]:
+    def pass_period(self) -> Bodies:
         """Let one control period go by for people and clock; return where people were."""
-        before = self.people.q, self.people.sizes
+        before = self.people.bodies
         self.people.move(self.robot.dt)
         self.tick += 1
         self.t += self.robot.dt
@@ -130,11 +170,20 @@ class LiveStage:
             kind=found.kind,
             link=found.link,
             body=found.part if found.kind == "human" else _BODIES[found.kind],
-            person=None if found.worker is None else self.people.ids[found.worker],
+            person=self._whom(found),
         )
         self.count(contacts=1)
         self.robot.halt()
         self.enter("contact")
+
+    def _whom(self, found: Contact) -> int | None:
+        """Return the id of the person who was touched."""
+        if found.kind != "human":
+            return None
+        index = found.worker
+        if found.walker is not None:
+            index = len(self.people.bodies.q) + found.walker
+        return None if index is None else self.people.ids[index]
 
     def count(
         self, *, reached: int = 0, timeouts: int = 0, contacts: int = 0, switches: int = 0

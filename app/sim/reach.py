@@ -384,3 +384,10 @@ class ReachBatch(CellBatch):
         if wrong.size:
             raise InvalidInput("rows", int(wrong[0]), f"must be one of {self.n_envs} cells")
         return numbers
+    def observe(self) -> NDArray[np.float32]:
+        """Measure distances to people and write all observations anew, (n_envs, obs_size).
+
+        For whoever changes rows from outside.
+        """
+        reach.observe_batch(self.world, self.state, self._work, self._view, self._obs)
+        return self._obs

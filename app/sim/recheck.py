@@ -7,13 +7,14 @@ pairs nearer than ``MARGIN`` go to the meshes.
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.sim import human
 from app.sim.cells import Cell
-from app.sim.collision import BODY_NAMES, CollisionReference, Contact, Kind
+from app.sim.collision import BODY_NAMES, CollisionReference, Contact, Kind, walker_name
 from app.sim.ports import Vec
 from app.sim.robot import LINK_NAMES, Robot
 from app.sim.shapes import TOOL, RobotCapsules, load_robot_capsules, self_pairs
@@ -32,11 +33,20 @@ class Trajectory:
     q_robot: Vec
     """Robot joint positions [rad], shape (n_steps, 6)."""
     q_human: Vec
-    """Joint positions of the person [m, rad], shape (n_steps, 18)."""
+    """Joint positions of the person [m, rad], shape (n_steps, 18); far away where there is
+    none with joints."""
     dt: float
     """Time between two rows [s]."""
     sizes: Vec | None = None
     """The person's size in each row [m], shape (n_steps, 12); None: the cell's person."""
+    cylinders: Vec | None = None
+    """x, y and radius of the upright cylinders who walk about [m], shape (n_steps, C, 3); None
+    without any."""
+
+    @property
+    def walkers(self) -> Vec:
+        """The cylinders, shape (n_steps, C, 3), also where there are none."""
+        return np.zeros((len(self.q_robot), 0, 3)) if self.cylinders is None else self.cylinders
 
     def size(self, row: int, cell: Cell) -> Vec:
         """Return the person's size in one row [m], shape (12,)."""
@@ -53,6 +63,19 @@ class FirstContact:
     """Time since the first row [s]."""
     contacts: tuple[Contact, ...]
     """All contacts in that row."""
+
+
+class _Near(NamedTuple):
+    """What comes nearer than MARGIN in each row."""
+
+    person: Pairs
+    """Capsules of robot and person, shape (n_steps, n, m)."""
+    cell: Pairs
+    """Capsules of the robot and what stands in the cell, shape (n_steps, n)."""
+    itself: Pairs
+    """Pairs of the robot's capsules, shape (n_steps, n_pairs)."""
+    walkers: Pairs
+    """Capsules of the robot and cylinders, shape (n_steps, n, C)."""
 
 
 def segment_distances(a0: Vec, a1: Vec, b0: Vec, b1: Vec) -> Vec:
@@ -111,21 +134,19 @@ class Recheck:
 
     def first_contact(self, trajectory: Trajectory) -> FirstContact | None:
         """Return the first row of a trajectory in which raw meshes touch anything."""
-        near_person, near_cell, near_self = self._near(trajectory)
-        rows = near_person.any((1, 2)) | near_cell.any(1) | near_self.any(1)
-        for index in np.flatnonzero(rows):
-            pairs = self._suspects(near_person[index], near_cell[index], near_self[index])
-            size = trajectory.size(int(index), self._cell)
-            contacts = self._ask(
-                trajectory.q_robot[index], trajectory.q_human[index], size, pairs
-            )
+        near = self._near(trajectory)
+        rows = near.person.any((1, 2)) | near.cell.any(1) | near.itself.any(1)
+        rows |= near.walkers.any((1, 2))
+        for index in np.flatnonzero(rows).tolist():
+            pairs = self._suspects(_Near(*(part[index] for part in near)))
+            contacts = self._ask(trajectory, index, pairs)
             if contacts:
                 return FirstContact(
-                    index=int(index), time_s=int(index) * trajectory.dt, contacts=contacts
+                    index=index, time_s=index * trajectory.dt, contacts=contacts
                 )
         return None
 
-    def _near(self, trajectory: Trajectory) -> tuple[Pairs, Pairs, Pairs]:
+    def _near(self, trajectory: Trajectory) -> _Near:
         """Tell which capsules come nearer than MARGIN, for each row of the trajectory."""
         cell, radius = self._cell, self._capsules.radius
         a0, a1 = robot_ends(self._robot, self._capsules, trajectory.q_robot)
@@ -147,31 +168,43 @@ class Recheck:
             near_cell |= away < half + radius + MARGIN
         i, j = self._self_pairs.T
         gap = segment_distances(a0[:, i], a1[:, i], a0[:, j], a1[:, j])
-        return near_person, near_cell, gap < radius[i] + radius[j] + MARGIN
+        near_self = gap < radius[i] + radius[j] + MARGIN
+        return _Near(near_person, near_cell, near_self, self._near_walkers(trajectory, a0, a1))
 
-    def _suspects(
-        self, near_person: Pairs, near_cell: Pairs, near_self: Pairs
-    ) -> set[tuple[str, str, Kind]]:
+    def _near_walkers(self, trajectory: Trajectory, a0: Vec, a1: Vec) -> Pairs:
+        """Tell which capsules come near which cylinder, seen from above; height is left out."""
+        flat, walkers = np.array([1.0, 1.0, 0.0]), trajectory.walkers
+        axes = (walkers * flat)[:, None]
+        gap = segment_distances((a0 * flat)[:, :, None], (a1 * flat)[:, :, None], axes, axes)
+        return np.asarray(
+            gap < self._capsules.radius[:, None] + walkers[:, None, :, 2] + MARGIN
+        )
+
+    def _suspects(self, near: _Near) -> set[tuple[str, str, Kind]]:
         """Return the pairs of bodies of one row that the meshes are asked about."""
         body_of = self._body_of
         pairs: set[tuple[str, str, Kind]] = set()
-        for capsule, part in np.argwhere(near_person):
+        for capsule, part in np.argwhere(near.person):
             pairs.add((body_of[capsule], human.CAPSULE_NAMES[part], "human"))
-        for capsule in np.flatnonzero(near_cell):
+        for capsule, who in np.argwhere(near.walkers):
+            pairs.add((body_of[capsule], walker_name(int(who)), "human"))
+        for capsule in np.flatnonzero(near.cell):
             if body_of[capsule] != LINK_NAMES[0]:
                 pairs |= {(body_of[capsule], body, "cell") for body in self._standing}
-        for i, j in self._self_pairs[near_self]:
+        for i, j in self._self_pairs[near.itself]:
             pairs.add((body_of[i], body_of[j], "self"))
         return pairs
 
     def _ask(
-        self, q: Vec, human_q: Vec, size: Vec, pairs: set[tuple[str, str, Kind]]
+        self, trajectory: Trajectory, row: int, pairs: set[tuple[str, str, Kind]]
     ) -> tuple[Contact, ...]:
         if not pairs:
             return ()
-        self._reference.place_robot(q)
+        self._reference.place_robot(trajectory.q_robot[row])
         if any(kind == "human" for _, _, kind in pairs):
-            self._reference.place_person(human_q, size)
+            size = trajectory.size(row, self._cell)
+            self._reference.place_person(trajectory.q_human[row], size)
+            self._reference.place_walkers(trajectory.walkers[row])
         order = sorted(pairs, key=lambda pair: (BODY_NAMES.index(pair[0]), pair[1]))
         return tuple(
             Contact(kind=kind, link=link, body=body)

@@ -9,6 +9,7 @@ from typing import Literal
 
 from app.sim.commands import Mode
 from app.sim.ports import OutsideField, Vec
+from app.sim.reach_view import ReachView
 from app.sim.sorting_view import SortingView
 
 Status = Literal[
@@ -20,12 +21,13 @@ Status = Literal[
     "no candidates",
     "no policy",
     "solved",
+    "reached",
 ]
 """``picking``: the target is reached, the tool goes down and up again; ``blocked``: the robot
 waits at home because a person is in its way. In ``picking``, ``contact`` and ``case done``
 the last decision stays as it was; in ``moving`` it belongs to this very state. In a sorting
 cell ``picking`` is ``grasp`` and ``place``, and ``solved`` says that every tower is as the goal
-asks."""
+asks. In a reach cell ``reached`` says that the tool is at the goal."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,6 +107,24 @@ class MotionView:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class CylinderView:
+    """A person of whom no more than an upright cylinder is known."""
+
+    x: float
+    """Axis, robot base frame [m]."""
+    y: float
+    """The same."""
+    vx: float
+    """Velocity in the period to come [m/s]."""
+    vy: float
+    """The same."""
+    radius: float
+    """Radius [m]."""
+    height: float
+    """Height above the floor [m]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class PersonView:
     """One person in a live cell."""
 
@@ -133,6 +153,8 @@ class PersonView:
     """Distance of the robot to this person [m]."""
     nearest: bool
     """Whether nobody is nearer to the robot: the one a policy for one person sees."""
+    cylinder: CylinderView | None = None
+    """What counts for contact in a reach cell; posture and size are then only a picture."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -207,6 +229,8 @@ class WorldSnapshot:
     """Simulated seconds per second that were asked for last."""
     sorting: SortingView | None = None
     """The sorting task; None in a cell without one."""
+    reach: ReachView | None = None
+    """Goal, safety layer and outcomes of a reach cell; None in other cells."""
 
     @property
     def values(self) -> dict[str, float]:

@@ -27,8 +27,8 @@ from app.sim.sorting_state import (
 )
 from app.sim.sorting_watch import SortingWatch, look, note_move, state_key
 
-MAX_PLANNED = 400_000
-"""Most states that the planner may look at to value every move: some milliseconds."""
+MAX_PLANNED = 20_000
+"""Most states that the planner may look at to value every move: about a millisecond."""
 MAX_AT_ONCE = 4_000
 """Most states of a task for which a decision takes a moment: ``sorting-e1`` has fewer."""
 
@@ -180,12 +180,12 @@ def valid_actions(state: SortingState, shape: SortingShape) -> list[int]:
     return found
 
 
-def warm_up() -> None:
-    """Compile what a decision needs, before the first one."""
-    shape = SortingShape(n_cells=2, n_colours=1)
+def warm_up(policy: SortingValues | None = None) -> None:
+    """Compile what a decision needs, before the first one; a policy decides once for that."""
+    shape = SortingShape(n_cells=2, n_colours=1) if policy is None else policy.shape
     state = empty_state(shape)
     state.clutter[0] = state.goal[0, 0] = shape.code(0, 0)
-    decide(None, state, shape)
+    decide(policy, state, shape)
 
 
 def _trusted(

@@ -24,6 +24,8 @@ from app.errors import ServiceError
 from app.sim import commands, explanation, sorting_commands
 from app.sim.cells import Cell
 from app.sim.commands import Command
+from app.sim.live_arm import Bodies
+from app.sim.live_people import LivePeople
 from app.sim.live_sorter import Choice, LiveSorter
 from app.sim.live_stage import CONTACT_HOLD_S, LiveStage, PeopleCommand
 from app.sim.ports import Candidate, SortingValues, TaskPolicy, Vec
@@ -61,7 +63,7 @@ class SortingWorld:
         sorter: SortingValues | None = None,
     ) -> None:
         self.cell, self.id, self._seed = cell, id, seed
-        self._stage = LiveStage(cell, policy, seed, id, reaching_cell(cell))
+        self._stage = LiveStage(cell, policy, id, LivePeople(reaching_cell(cell), seed))
         self._table = SortingTable(cell)
         self._teller = Teller(cell, self._table)
         self._sorter = LiveSorter(sorter)
@@ -196,7 +198,7 @@ class SortingWorld:
         if stage.status in ("contact", "blocked"):
             self._wait()
         else:
-            self._move_robot(*before)
+            self._move_robot(before)
         if stage.status == "moving":
             self._let_interfere()
             self._decide()
@@ -208,13 +210,11 @@ class SortingWorld:
         elif stage.status == "blocked" and not stage.touches_here():
             self._think()
 
-    def _move_robot(self, human_q: Vec, sizes: Vec) -> None:
-        """Carry out the action, the people having moved from ``human_q`` with ``sizes``."""
+    def _move_robot(self, before: Bodies) -> None:
+        """Carry out the action, the people having moved from where they were."""
         stage, descent = self._stage, self._descent
         straight = descent is not None or stage.decision is None
-        found = stage.robot.advance(
-            self._action(), stage.people, human_q, sizes, straight=straight
-        )
+        found = stage.robot.advance(self._action(), stage.people, before, straight=straight)
         if found.kind != "none":
             self._descent = None
             stage.note_contact(found)

@@ -15,6 +15,8 @@ from app.sim import commands, explanation
 from app.sim.cases import Case, find_case
 from app.sim.cells import Cell
 from app.sim.commands import Command
+from app.sim.live_arm import Bodies
+from app.sim.live_people import LivePeople
 from app.sim.live_stage import CONTACT_HOLD_S, ClockCommand, LiveStage
 from app.sim.ports import Candidate, Decision, TaskPolicy, Vec
 from app.sim.snapshot import Counters, Status, WorldSnapshot
@@ -39,7 +41,7 @@ class World:
         self, cell: Cell, policy: TaskPolicy | None, seed: int, id: str = "main"
     ) -> None:
         self.cell, self.id = cell, id
-        self._stage = LiveStage(cell, policy, seed, id, None)
+        self._stage = LiveStage(cell, policy, id, LivePeople(cell, seed))
         self._case: Case | None = None
         self._selected = tuple(s.id for s in cell.stations if s.kind == "cube")
         self._own_choice = self._selected
@@ -166,17 +168,15 @@ class World:
         if self._stage.status in ("contact", "blocked", "case done"):
             self._wait()
         else:
-            self._move_robot(*before)
+            self._move_robot(before)
         if self._stage.status == "moving":
             self._decide()
 
-    def _move_robot(self, human_q: Vec, sizes: Vec) -> None:
-        """Carry out the action, the people having moved from ``human_q`` with ``sizes``."""
+    def _move_robot(self, before: Bodies) -> None:
+        """Carry out the action, the people having moved from where they were."""
         stage = self._stage
         straight = stage.status == "picking"
-        found = stage.robot.advance(
-            self._action(), stage.people, human_q, sizes, straight=straight
-        )
+        found = stage.robot.advance(self._action(), stage.people, before, straight=straight)
         if found.kind != "none":
             stage.note_contact(found)
         elif stage.status == "picking":

@@ -8,7 +8,7 @@ import numpy as np
 from app.sim import human
 from app.sim.body_size import percentile_body
 from app.sim.cells import Cell, load_cell
-from app.sim.collision import CollisionReference, make_capsule
+from app.sim.collision import BODY_NAMES, CollisionReference, make_capsule
 from app.sim.recheck import Recheck, Trajectory, recheck_trajectories, segment_distances
 from app.sim.robot import Robot
 
@@ -76,3 +76,47 @@ def test_segment_distances_equal_those_of_fcl() -> None:
         one, two = make_capsule(0.01, a0[k], a1[k]), make_capsule(0.01, b0[k], b1[k])
         distance = fcl.distance(one, two, request, fcl.DistanceResult())
         assert abs(distance - (gaps[k] - 0.02)) < 1e-6
+
+
+def walked_into(x: np.ndarray, radius: float) -> Trajectory:
+    """The robot at home, and a cylinder that comes along x at the robot's y."""
+    home = np.array(load_cell("shared-workspace").robot.home_q)
+    cylinders = np.stack([x, np.zeros(len(x)), np.full(len(x), radius)], axis=1)[:, None]
+    return Trajectory(
+        q_robot=np.tile(home, (len(x), 1)),
+        q_human=np.tile(human.rest_posture(0.0, 4.0, -1.57), (len(x), 1)),
+        cylinders=cylinders,
+        dt=0.01,
+    )
+
+
+def test_first_contact_of_a_cylinder_is_that_of_asking_the_meshes_in_every_row() -> None:
+    cell = load_cell("shared-workspace")
+    path = walked_into(np.linspace(1.6, 0.1, 60), 0.3)
+    reference, touching = CollisionReference(cell), []
+    reference.place_robot(path.q_robot[0])
+    for row in path.walkers:
+        reference.place_walkers(row)
+        touching.append(any(reference.touching(link, "walker 0") for link in BODY_NAMES))
+    hit = Recheck(cell).first_contact(path)
+    assert hit is not None and hit.index == touching.index(True) > 10
+    assert {(contact.kind, contact.body) for contact in hit.contacts} == {("human", "walker 0")}
+
+
+def test_contact_with_the_second_of_two_cylinders_is_found() -> None:
+    path = walked_into(np.linspace(3.0, 0.1, 30), 0.3)
+    away = path.walkers + [0.0, 3.0, 0.0]
+    alone = Recheck(load_cell("shared-workspace")).first_contact(path)
+    both = replace(path, cylinders=np.concatenate([away, path.walkers], axis=1))
+    hit = Recheck(load_cell("shared-workspace")).first_contact(both)
+    assert alone is not None and hit is not None and hit.index == alone.index
+    assert {contact.body for contact in hit.contacts} == {"walker 1"}
+
+
+def test_a_cylinder_counts_only_as_high_as_it_is() -> None:
+    cell = load_cell("shared-workspace")
+    low = cell.cylinders[0].model_copy(update={"height": 0.5})  # below the table
+    short = cell.model_copy(update={"people": (low,)})
+    path = walked_into(np.array([0.1]), 0.3)
+    assert Recheck(cell).first_contact(path) is not None
+    assert Recheck(short).first_contact(path) is None

@@ -4,6 +4,7 @@ import { get } from "./api.js";
 import * as format from "./format.js";
 import { Icon } from "./icons.js";
 import { VESTS } from "./palette.js";
+import { WalkerMover } from "./walkers.js";
 
 const MAX_PEOPLE = 4;
 const MODES = [
@@ -47,9 +48,11 @@ export function People({ world, send, children }) {
     </div>
     ${!person && html`<div class="dock-row"><span class="dock-label"></span>
       <p class="dock-hint">Nobody is in the cell.</p></div>`}
-    ${person && html`<${Mover} key=${person.id} person=${person} send=${send}
+    ${person?.cylinder && html`<${WalkerMover} key=${person.id} person=${person}
+      name=${nameOf(person.id)} world=${world} send=${send} />`}
+    ${person && !person.cylinder && html`<${Mover} key=${person.id} person=${person} send=${send}
       sized=${sized} onSized=${() => setSized(!sized)} />`}
-    ${person && sized && html`<${Size} key=${`size-${person.id}`} person=${person} send=${send} />`}`;
+    ${person && !person.cylinder && sized && html`<${Size} key=${`size-${person.id}`} person=${person} send=${send} />`}`;
 }
 
 /** Who moves a person; with a recording, which one and how far it is. */

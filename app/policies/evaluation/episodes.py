@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from app.policies.evaluation.recorded import Trace
 from app.policies.evaluation.statistics import wilson
 from app.policies.pick_preset import action_of
 from app.policies.task_choice import ValueNetworks
@@ -163,7 +164,7 @@ class Evaluator:
         batch.reset()
         chosen, switches = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
         act = np.zeros((n, 5), dtype=np.float32)
-        trace = _Trace(batch, n_recorded)
+        trace = Trace(batch, n_recorded)
         first = True
         while (rows := np.flatnonzero(batch.state.outcome == kernel.RUNNING)).size:
             actions, view = self._view(rows, chosen[rows], first, seen)
@@ -176,7 +177,7 @@ class Evaluator:
             batch.set_goals(rows, batch.world.stations[stations])
             trace.before(rows)
             batch.step(act, auto_reset=False, features=False)
-            trace.after(rows)
+            trace.after()
         return Episodes(
             outcome=batch.state.outcome.copy(),
             duration_s=batch.state.elapsed.copy(),
@@ -218,59 +219,3 @@ class Evaluator:
         distances[owner, place] = np.linalg.norm(to_goal, axis=1)
         view = View(values=values, distances=distances, chosen=chosen, first=first, rows=rows)
         return actions, view
-
-
-class _Trace:
-    """Records robot and workers of the first rows at a fifth of the control period."""
-
-    PARTS = 5
-    """Recorded poses per control period (10 ms at 20 Hz)."""
-
-    def __init__(self, batch: PickBatch, n_recorded: int) -> None:
-        self._batch, self._n = batch, n_recorded
-        self._robot: list[list[NDArray[np.float64]]] = [[] for _ in range(n_recorded)]
-        self._workers: list[list[NDArray[np.float64]]] = [[] for _ in range(n_recorded)]
-        self._sizes: list[list[NDArray[np.float64]]] = [[] for _ in range(n_recorded)]
-
-    def before(self, rows: Index) -> None:
-        state, n = self._batch.state, self._n
-        self._rows = rows[rows < n]
-        self._q0, self._qd0 = state.q[:n].copy(), state.qd[:n].copy()
-        self._qdd0 = state.qdd[:n].copy()
-        self._human0 = state.people.q[:n].copy()
-        self._size0 = state.people.size[:n].copy()
-
-    def after(self, rows: Index) -> None:
-        """Add the period's poses; a row that collided is left out, its contact is known."""
-        state, dt = self._batch.state, self._batch.arm.dt
-        for row in self._rows:
-            if state.outcome[row] == kernel.COLLISION:
-                continue
-            c = (state.qd[row] - self._qd0[row]) / (2.0 * dt)
-            d = np.zeros(6)
-            if self._batch.settings.action.degree == 3:
-                c = 0.5 * self._qdd0[row]
-                d = (state.qdd[row] - self._qdd0[row]) / (6.0 * dt)
-            for part in range(1, self.PARTS + 1):
-                x, blend = dt * part / self.PARTS, part / self.PARTS
-                q = self._q0[row] + x * (self._qd0[row] + x * (c + x * d))
-                self._robot[row].append(q)
-                before, now = self._human0[row], state.people.q[row]
-                self._workers[row].append(before + blend * (now - before))
-                before, now = self._size0[row], state.people.size[row]
-                self._sizes[row].append(before + blend * (now - before))
-
-    def trajectories(self) -> tuple[Trajectory, ...]:
-        """Return one trajectory for each worker of each recorded row."""
-        dt = self._batch.arm.dt / self.PARTS
-        return tuple(
-            Trajectory(
-                q_robot=np.array(q),
-                q_human=np.array(workers)[:, w],
-                sizes=np.array(sizes)[:, w],
-                dt=dt,
-            )
-            for q, workers, sizes in zip(self._robot, self._workers, self._sizes, strict=True)
-            if q
-            for w in range(workers[0].shape[0])
-        )

@@ -13,12 +13,12 @@ import numpy as np
 from app.policies.checkpoint import Checkpoint
 from app.policies.evaluation import choice_rules
 from app.policies.evaluation.episodes import Episodes, Evaluator, Rule, settings_for
+from app.policies.evaluation.recorded import recheck
 from app.policies.evaluation.rows import OnRow, untold
 from app.policies.task_choice import HYSTERESIS, ValueNetworks
 from app.policies.trained_cell import cell_of
 from app.sim.kernels import episode as kernel
 from app.sim.pick import OUTCOMES, hand_speeds
-from app.sim.recheck import recheck_trajectories
 from app.sim.scene import kinds_of
 
 DEFAULT_EPISODES = 1000
@@ -57,16 +57,6 @@ def settings_of(evaluator: Evaluator) -> dict[str, object]:
     }
 
 
-def _recheck(evaluator: Evaluator, episodes: Episodes) -> dict[str, int]:
-    """Ask FCL on raw meshes about every recorded pose without a reported contact."""
-    found = recheck_trajectories(evaluator.batch.cell, episodes.trajectories)
-    return {
-        "episodes": len(episodes.trajectories),
-        "poses": sum(len(trajectory.q_robot) for trajectory in episodes.trajectories),
-        "missed_contacts": sum(contact is not None for contact in found),
-    }
-
-
 def run_single(
     checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = untold
 ) -> dict[str, object]:
@@ -85,7 +75,7 @@ def run_single(
     return {
         "settings": settings_of(evaluator),
         "results": [row],
-        "fcl_recheck": _recheck(evaluator, outcome),
+        "fcl_recheck": recheck(evaluator.batch.cell, outcome.trajectories),
     }
 
 
@@ -113,7 +103,7 @@ def run_choice(
     return {
         "settings": {**settings_of(evaluator), "hysteresis": HYSTERESIS},
         "results": rows,
-        "fcl_recheck": _recheck(evaluator, with_hysteresis),
+        "fcl_recheck": recheck(evaluator.batch.cell, with_hysteresis.trajectories),
     }
 
 

@@ -7,7 +7,20 @@ from typing import Any
 
 from app.errors import InvalidInput, NotFound
 from app.policies.checkpoint import CHOOSING, REACHING, SORTING, Checkpoint, task_of
-from app.policies.evaluation import people, pick, safety, sorting, tracker
+from app.policies.evaluation import (
+    people,
+    pick,
+    reach_ceiling,
+    reach_people,
+    reach_random,
+    reach_smoothness,
+    reach_ssm,
+    reach_targets,
+    reach_tracker,
+    safety,
+    sorting,
+    tracker,
+)
 from app.policies.evaluation.rows import OnRow, untold
 from app.sim.motions import Motion
 
@@ -24,21 +37,37 @@ PROTOCOLS: Mapping[str, Protocol] = MappingProxyType(
         "safety-ssm": safety.run_safety,
         "sorting-grid": sorting.run_grid,
         "sorting-tests": sorting.run_tests,
+        "reach-targets": reach_targets.run_targets,
+        "reach-random": reach_random.run_random,
+        "reach-constant": reach_people.run_constant,
+        "reach-speeds": reach_people.run_speeds,
+        "reach-smoothness": reach_smoothness.run_smoothness,
+        "reach-people": reach_people.run_people,
+        "reach-tracker": reach_tracker.run_tracker,
+        "reach-ssm": reach_ssm.run_ssm,
+        "reach-ceiling": reach_ceiling.run_ceiling,
     }
 )
 """Protocol by name; each takes a checkpoint, ``episodes``, ``seed`` and ``on_row``."""
 WITH_MOTIONS = frozenset({"pick-mocap"})
 """Protocols that take recorded motion."""
+WITH_OR_WITHOUT_MOTIONS = frozenset({"reach-ssm"})
+"""Protocols that may be given recorded motion."""
 WITHOUT_CHECKPOINT = frozenset({"safety-ssm"})
 """Protocols in which no policy takes part."""
-OF_SORTING = frozenset({"sorting-grid", "sorting-tests"})
+OF_SORTING = frozenset(name for name in PROTOCOLS if name.startswith("sorting-"))
 """Protocols of policies that sort."""
-OF_REACHING = frozenset[str]()
+OF_REACHING = frozenset(name for name in PROTOCOLS if name.startswith("reach-"))
 """Protocols of policies that reach goals; all others are of policies that choose and pick."""
 MAX_EPISODES = 100_000
 """Most episodes of one evaluation."""
 MAX_SORTING_EPISODES = 10_000
 """Most episodes of one pair or one test of the sorting task."""
+FEWER_EPISODES: Mapping[str, int] = MappingProxyType(
+    {**dict.fromkeys(OF_SORTING, MAX_SORTING_EPISODES), "reach-targets": 2_000}
+    | {"reach-smoothness": 5_000, "reach-ssm": 20_000, "reach-ceiling": 200}
+)
+"""Most episodes of protocols that count them per pair or target, or keep whole paths."""
 
 
 def evaluate(
@@ -57,7 +86,7 @@ def evaluate(
         checkpoint: What is evaluated; None only where no policy takes part.
         episodes: Number of episodes; the protocol's own number by default.
         seed: Seed of the episodes.
-        motions: Runs of recorded motion, for the protocols in WITH_MOTIONS.
+        motions: Runs of recorded motion, for the protocols that take them.
         on_row: Told of each row of the result once it is known.
 
     Raises:
@@ -79,7 +108,7 @@ def evaluate(
     _check_task(name, checkpoint)
     tested = {} if name in WITHOUT_CHECKPOINT else _identity(checkpoint)
     started = time.process_time()
-    more = {"motions": motions} if name in WITH_MOTIONS else {}
+    more = {"motions": motions} if name in WITH_MOTIONS | WITH_OR_WITHOUT_MOTIONS else {}
     outcome = PROTOCOLS[name](checkpoint, episodes=episodes, seed=seed, on_row=on_row, **more)
     return {
         "protocol": name,
@@ -93,12 +122,12 @@ def evaluate(
 
 def default_checkpoint(name: str) -> str:
     """Return the alias of the checkpoint that a protocol measures unless another is named."""
-    return "sorting-e0" if name in OF_SORTING else "pick"
+    return {SORTING: "sorting-e0", REACHING: "reach", CHOOSING: "pick"}[_task_measured(name)]
 
 
 def most_episodes(name: str) -> int:
-    """Return how many episodes a protocol runs at most; for sorting, of each pair or test."""
-    return MAX_SORTING_EPISODES if name in OF_SORTING else MAX_EPISODES
+    """Return how many episodes a protocol runs at most; of each pair, test or target."""
+    return FEWER_EPISODES.get(name, MAX_EPISODES)
 
 
 _POLICIES = {
@@ -146,9 +175,10 @@ def check_motions(
     if name in WITH_MOTIONS and not given:
         told = f": {how}" if how else ""
         raise InvalidInput(field, [], f"must hold at least one motion for {name}{told}")
-    if name not in WITH_MOTIONS and given:
+    taking = WITH_MOTIONS | WITH_OR_WITHOUT_MOTIONS
+    if name not in taking and given:
         rule = f"must not be given to {name}, which takes no recorded motion"
-        raise InvalidInput(field, list(given[:3]), rule, sorted(WITH_MOTIONS))
+        raise InvalidInput(field, list(given[:3]), rule, sorted(taking))
 
 
 def _identity(checkpoint: Checkpoint | None) -> dict[str, str]:

@@ -145,7 +145,7 @@ def new_work(world: ReachWorld, state: ReachState) -> Work:
     return Work(
         new_robot_pose(world.arm),
         new_crowd(world.people, people.q.shape[1], people.cylinders.shape[1]),
-        new_reach_sight(),
+        new_reach_sight(world.arm),
         np.zeros(6),
         np.zeros(6),
         np.zeros(6),
@@ -330,6 +330,19 @@ def observe_env(
     place_robot(world.arm, state.q[e], work.robot)
     place_people(world.people, state.people, e, work.crowd)
     write_obs(world, state, e, work, view, out)
+
+
+@kernel(nogil=True)
+def observe_batch(
+    world: ReachWorld, state: ReachState, work: Work, view: int, obs: Obs
+) -> None:
+    """Measure all distances to people and write all observations anew, as rows are now."""
+    for e in range(state.q.shape[0]):
+        place_robot(world.arm, state.q[e], work.robot)
+        place_people(world.people, state.people, e, work.crowd)
+        clear = people_clearance(world.people, work.robot.columns, work.crowd)
+        state.clear[e, 0] = clear
+        write_obs(world, state, e, work, view, obs[e])
 
 
 @kernel(nogil=True)

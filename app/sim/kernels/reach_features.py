@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from app.sim.kernels import body, kinematics
+from app.sim.kernels import body, kinematics, reach_prospect
 from app.sim.kernels.arm import Arm, RobotPose
 from app.sim.kernels.columns import RADIUS, UX, UY, X, Y, gaps, least
 from app.sim.kernels.compiled import kernel
@@ -27,10 +27,11 @@ from app.sim.kernels.cylinder import cylinder_clearance
 from app.sim.kernels.features import HORIZONS, Sight, look_ahead, new_sight, see_person
 from app.sim.kernels.geometry import FAR
 from app.sim.kernels.layout import slices_of
-from app.sim.kernels.occupancy import VX, VY, R
+from app.sim.kernels.occupancy import GROWTH, VX, VY, R
 from app.sim.kernels.occupancy import X as WALKER_X
 from app.sim.kernels.occupancy import Y as WALKER_Y
 from app.sim.kernels.people import Crowd, People, PeopleState, nearest_person
+from app.sim.kernels.reach_prospect import Prospect, new_prospect, put_prospect
 from app.sim.kernels.trig import sine_cosine
 from app.sim.ports import Vec
 
@@ -38,8 +39,10 @@ Obs = NDArray[np.float32]
 
 N_STATE = 20
 """Length of the plain state (4.30)."""
-NOBODY = (0.0, 4.0, 0.0, 0.0, 0.2)
-"""x, y [m], vx, vy [m/s], r [m] of the person assumed where nobody is there."""
+N_SEEN = 6
+"""Numbers by which a person is seen: x, y [m], vx, vy [m/s], r [m] and its growth [m/s]."""
+NOBODY = (0.0, 4.0, 0.0, 0.0, 0.2, 0.0)
+"""The person assumed where nobody is there."""
 EVERYBODY = -1
 """In place of a person's number: all of them."""
 CENTER_Y = 1.25
@@ -65,12 +68,15 @@ SIZES = (
     ("look_ahead", 3),
     ("distance", 1),
     ("time_left", 1),
+    *reach_prospect.SIZES,
 )
 
 LAYOUT = slices_of(SIZES)
 """Slice of each group of features in the observation."""
 N_FEATURES = sum(size for _, size in SIZES)
 """Length of the observation."""
+BASE_START = LAYOUT["base"].start
+"""Where the base motion starts, for the residual action."""
 
 
 class ReachSight(NamedTuple):
@@ -81,15 +87,19 @@ class ReachSight(NamedTuple):
     gap: Vec
     """Distance of each of a worker's capsules to the robot [m], shape (16,)."""
     seen: Vec
-    """The person a policy sees: x, y [m], vx, vy [m/s], r [m], shape (5,)."""
+    """The person a policy sees: x, y [m], vx, vy [m/s], r [m], growth [m/s], shape (6,)."""
     ahead: Vec
     """Clearance at each time ahead [m], shape (3,)."""
+    prospect: Prospect
+    """Where the base motion leads."""
 
 
-def new_reach_sight() -> ReachSight:
+def new_reach_sight(arm: Arm) -> ReachSight:
     """Return work space."""
     sight = new_sight()
-    return ReachSight(sight, np.zeros(sight.now.shape[1]), np.zeros(5), np.zeros(3))
+    return ReachSight(
+        sight, np.zeros(sight.now.shape[1]), np.zeros(N_SEEN), np.zeros(3), new_prospect(arm)
+    )
 
 
 @kernel()
@@ -121,21 +131,23 @@ def show_person(state: PeopleState, e: int, who: int, crowd: Crowd, seen: Vec) -
         e: Environment.
         who: The person: workers first, then walkers; below 0 for nobody.
         crowd: The people, placed as they are now.
-        seen: Filled with x, y [m], vx, vy [m/s], r [m], shape (5,).
+        seen: Filled with x, y [m], vx, vy [m/s], r [m], growth [m/s], shape (6,).
     """
     n_workers = state.q.shape[1]
     if who < 0:
-        for i in range(5):
+        for i in range(N_SEEN):
             seen[i] = NOBODY[i]
     elif who < n_workers:
         seen[0], seen[1] = state.q[e, who, 0], state.q[e, who, 1]
         seen[2], seen[3] = state.qd[e, who, 0], state.qd[e, who, 1]
         n = body.N_CAPSULES
         seen[4] = enclosing_radius(crowd.columns, who * n, n, seen[0], seen[1])
+        seen[5] = 0.0
     else:
         rows, k = state.walkers.rows, who - n_workers
         seen[0], seen[1] = rows[e, k, WALKER_X], rows[e, k, WALKER_Y]
-        seen[2], seen[3], seen[4] = rows[e, k, VX], rows[e, k, VY], rows[e, k, R]
+        seen[2], seen[3] = rows[e, k, VX], rows[e, k, VY]
+        seen[4], seen[5] = rows[e, k, R], rows[e, k, GROWTH]
 
 
 @kernel(inline="always")
@@ -150,7 +162,7 @@ def see_cylinder(
         e: Environment.
         robot: The robot's capsules as columns, shape (9, n).
         crowd: The people, placed as they are now.
-        seen: Filled with x, y [m], vx, vy [m/s], r [m], shape (5,).
+        seen: Filled with x, y [m], vx, vy [m/s], r [m], growth [m/s], shape (6,).
     """
     show_person(state, e, nearest_person(people, robot, crowd), crowd, seen)
 
@@ -230,7 +242,7 @@ def put_features(
         q: Joint positions [rad], shape (6,).
         qd: Joint speeds [rad/s], shape (6,).
         qd_max: Speed limits [rad/s], shape (6,).
-        seen: The person seen: x, y [m], vx, vy [m/s], r [m], shape (5,).
+        seen: The person seen: x, y [m], vx, vy [m/s], r [m], growth [m/s], shape (6,).
         goal: Where the tcp shall be [m], shape (3,).
         rot: R_world_link, shape (7, 3, 3).
         pos: Origins of the links [m], shape (7, 3).
@@ -269,6 +281,7 @@ def put_features(
 @kernel(inline="always")
 def describe(
     arm: Arm,
+    top_z: float,
     q: Vec,
     qd: Vec,
     goal: Vec,
@@ -282,6 +295,7 @@ def describe(
 
     Args:
         arm: Robot in its cell.
+        top_z: Height of people's tops [m].
         q: Joint positions [rad], shape (6,).
         qd: Joint speeds [rad/s], shape (6,).
         goal: Where the tcp shall be [m], shape (3,).
@@ -306,6 +320,8 @@ def describe(
         time_left,
         out,
     )
+    start = N_FEATURES - reach_prospect.N_PROSPECT
+    put_prospect(arm, top_z, q, qd, sight.seen, goal, robot, sight.prospect, start, out)
 
 
 @kernel(inline="always")
@@ -340,4 +356,4 @@ def observe(
         out: Filled, shape (N_FEATURES,).
     """
     clearances_ahead(people, state, e, EVERYBODY, robot.columns, sight)
-    describe(arm, q, qd, goal, clearance, time_left, robot, sight, out)
+    describe(arm, people.top_z, q, qd, goal, clearance, time_left, robot, sight, out)

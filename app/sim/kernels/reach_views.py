@@ -71,7 +71,8 @@ def _write(
         put_state(q, qd, sight.seen, goal, out)
         return
     time_left = state.time_left[e]
-    describe(world.arm, q, qd, goal, clearance, time_left, work.robot, sight, out)
+    top = world.people.top_z
+    describe(world.arm, top, q, qd, goal, clearance, time_left, work.robot, sight, out)
 
 
 @kernel(nogil=True)

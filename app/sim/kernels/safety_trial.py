@@ -112,7 +112,7 @@ def link_speed(arm: Arm, watch: Watch, node: int, k: int, qd: Vec) -> float:
 
 
 @kernel(error_model="numpy", inline="always")
-def _touching(arm: Arm, j: int, work: TrialWork) -> float:
+def touching_speed(arm: Arm, j: int, work: TrialWork) -> float:
     """Return the speed of the fastest link that touches part ``j`` of the people [m/s].
 
     With a cylinder the fastest of all links counts.
@@ -232,7 +232,7 @@ def _step(
     when, part = first_contact(arm, work)
     if when >= 0.0:
         out[CONTACT], out[ALLOWED] = 1.0, safety.contact_speed[part]
-        out[SPEED] = _touching(arm, part, work)
+        out[SPEED] = touching_speed(arm, part, work)
         return True
     copy_rows(work.columns1, work.columns0)
     copy_rows(work.cylinders1, work.cylinders0)

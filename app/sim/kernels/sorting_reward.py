@@ -25,11 +25,11 @@ class SortingWeights(NamedTuple):
     """Cost of picking where nothing is."""
     stuck: float = 0.3
     """Cost of putting an object back where it was, or where no room is."""
-    fail: float = 0.05
+    fail: float = 0.01
     """Cost of a pick that failed, or moved another object than was meant."""
-    back: float = 0.05
+    back: float = 0.01
     """Cost of sending an object from a tower back to the clutter."""
-    distance: float = 0.1
+    distance: float = 0.01
     """Cost per share of the levels, of K, that differ from the goal after the attempt."""
     success: float = 1.0
     """Bonus when every tower is as the goal asks."""

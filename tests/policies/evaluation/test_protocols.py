@@ -72,7 +72,7 @@ def test_a_policy_that_reaches_neither_picks_nor_sorts(name):
 
 @pytest.mark.parametrize("name", sorted(OF_REACHING))
 def test_a_policy_that_picks_reaches_no_goals(name):
-    with pytest.raises(InvalidInput, match="must be a policy that reaches goals") as found:
+    with pytest.raises(InvalidInput, match="must be a policy that reaches goals for") as found:
         evaluate(name, pretrained.load("pick"), episodes=1)
     assert not set(found.value.choices) & (OF_REACHING | OF_SORTING)
 

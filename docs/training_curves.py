@@ -1,10 +1,10 @@
-"""Trains presets of the sorting task and keeps what their learning curves need.
+"""Trains a preset and keeps what its learning curve needs.
 
-    python docs/sorting_curves.py sorting-e0-dqn --seed 1 --output runs/e0-1 [--set FIELD=VALUE]
+    python docs/training_curves.py sorting-e0-dqn --seed 1 --output runs/e0-1 [--set F=VALUE]
 
 The folder then holds ``curve.jsonl``, a line per point (steps, updates, CPU seconds, success,
-return of greedy episodes), and a policy per checkpoint, from which ``evaluate sorting-grid``
-makes the source's curves over all pairs. A folder that already holds a part is gone on with.
+return of greedy episodes), and a policy per checkpoint, of which ``sorting_points.py`` and
+``reach_points.py`` make curves. A folder that already holds a part is gone on with.
 """
 
 import argparse

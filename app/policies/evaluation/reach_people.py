@@ -1,0 +1,109 @@
+"""Protocols ``reach-people``, ``reach-constant`` and ``reach-speeds``: other people.
+
+``reach-people``: nobody to four walking cylinders, without training anew, the nearest seen and
+all averaged. Nobody and one person are the same by both.
+``reach-constant``: speed and radius constant in each episode, beside the usual person.
+``reach-speeds``: a person of 0.25, 0.5 and 1.0 m/s; the speed's limits do not apply, else
+0.25 m/s would be standing still (METHOD 2.1).
+
+All go round the grid's targets, with the same goals in every row.
+
+Source: thesis 4.4.2; METHOD 2.6, and 4 for several people.
+"""
+
+from dataclasses import replace
+from typing import Any
+
+from app.policies.checkpoint import Checkpoint
+from app.policies.evaluation.reach_bench import ReachBench
+from app.policies.evaluation.rows import OnRow, untold
+from app.policies.movers import How
+from app.sim.cell_people import FixedSpeedWalker
+from app.sim.cells import Cell
+from app.sim.kernels.people import MAX_PEOPLE
+
+DEFAULT_EPISODES = 1000
+"""METHOD 2.6."""
+TARGET_EPISODES = 5400
+"""Episodes of each row of ``reach-constant``: as many as ``reach-targets`` plays."""
+WAYS: tuple[How, ...] = ("direct", "averaged")
+"""Ways of asking a policy about several people; ``direct`` sees the nearest."""
+SPEEDS = (0.25, 0.5, 1.0)
+"""Of people [m/s] (METHOD 2.6)."""
+
+
+def run_people(
+    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = untold
+) -> dict[str, Any]:
+    """Evaluate beside nobody to four walkers.
+
+    Args:
+        checkpoint: What acts.
+        episodes: Number of episodes of each row, by default 1000.
+        seed: Seed of the episodes.
+        on_row: Told of each row once it is known.
+    """
+    rows = [(n, how) for n in range(MAX_PEOPLE + 1) for how in (WAYS if n > 1 else WAYS[:1])]
+    bench = ReachBench(checkpoint, seed, len(rows), on_row)
+    goals = bench.target_goals(episodes or DEFAULT_EPISODES)
+    for n, how in rows:
+        settings = replace(bench.usual, people=("walker",) * n)
+        played = bench.play(settings, goals, how)
+        name = f"{n}-people" + (f"-{how}" if n > 1 else "")
+        row = played.row(name)
+        row["starts_redrawn"] = float((played.redrawn > 0).mean())
+        bench.add(row, settings, "grid", how)
+    bench.recheck(replace(bench.usual, people=("walker",) * 2), goals)
+    return bench.result()
+
+
+def run_constant(
+    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = untold
+) -> dict[str, Any]:
+    """Evaluate beside people whose speed and radius are constant in each episode.
+
+    Args:
+        checkpoint: What acts.
+        episodes: Number of episodes of each row, by default 5400.
+        seed: Seed of the episodes.
+        on_row: Told of each row once it is known.
+    """
+    bench = ReachBench(checkpoint, seed, 2, on_row)
+    goals = bench.target_goals(episodes or TARGET_EPISODES)
+    for kind in ("walker", "constant"):
+        settings = replace(bench.usual, people=(kind,))
+        bench.add(bench.play(settings, goals).row(kind), settings, "grid")
+    return bench.result()
+
+
+def run_speeds(
+    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = untold
+) -> dict[str, Any]:
+    """Evaluate beside people of a given speed.
+
+    Args:
+        checkpoint: What acts.
+        episodes: Number of episodes of each row, by default 1000.
+        seed: Seed of the episodes.
+        on_row: Told of each row once it is known.
+    """
+    bench = ReachBench(checkpoint, seed, len(SPEEDS), on_row)
+    goals = bench.target_goals(episodes or DEFAULT_EPISODES)
+    settings = replace(bench.usual, people=("fixed-speed",))
+    for speed in SPEEDS:
+        cell = at_speed(bench.cell, speed)
+        row = bench.play(settings, goals, cell=cell).row(f"{speed:g}-m-s")
+        bench.add(row, settings, "grid", cell=cell, speed_m_s=speed)
+    return bench.result()
+
+
+def at_speed(cell: Cell, speed: float) -> Cell:
+    """Return a cell with one cylinder that walks at a given speed [m/s], else as its own."""
+    walker = cell.cylinders[0]
+    kept = set(FixedSpeedWalker.model_fields) & set(type(walker).model_fields) - {
+        "kind",
+        "speed",
+    }
+    fields = {name: getattr(walker, name) for name in kept}
+    person = FixedSpeedWalker(kind="fixed-speed", speed=speed, **fields)
+    return cell.model_copy(update={"people": (person,)})

@@ -1,0 +1,118 @@
+"""Protocol ``reach-targets``: every training target of the source, beside one walking person.
+
+54 targets x 100 episodes in each row, the same people and goals but for how people may start:
+
+=============  =============================================================================
+``clearance``  at least 0.05 m from the robot; what all other protocols use
+``uniform``    anywhere; some episodes begin in contact, which no policy can help
+``authors``    as in the authors' public code: anywhere, they walk a little differently, and
+               an episode goes on after a contact
+=============  =============================================================================
+
+An episode with a contact is no success in any row; ``reached_after_contact`` is the share that
+came to the goal all the same.
+
+Source: thesis 4.4.1, figs 4.5 and 4.6; METHOD 2.6. Deviates: the source does not say how its
+people may start.
+"""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from app.policies.checkpoint import Checkpoint
+from app.policies.evaluation.reach_bench import ReachBench
+from app.policies.evaluation.reach_episodes import ReachEpisodes
+from app.policies.evaluation.rows import OnRow, untold
+from app.policies.evaluation.statistics import wilson
+from app.sim.kernels.episode import COLLISION, SUCCESS
+from app.sim.ports import Vec
+from app.sim.reach import StartRule
+
+PER_TARGET = 100
+"""Episodes of each target (METHOD 2.6)."""
+STARTS: tuple[StartRule, ...] = ("clearance", "uniform", "authors")
+END_STEP_S = 0.1
+"""Intervals in which ends are counted [s]."""
+N_WORST = 5
+"""Targets that are named as the worst."""
+Json = dict[str, Any]
+
+
+def by_target(episodes: ReachEpisodes, targets: Vec, base_height: float) -> list[Json]:
+    """Return how the episodes of each target ended.
+
+    Args:
+        episodes: Episodes with goals among the targets.
+        targets: In the robot's base frame [m], shape (n, 3).
+        base_height: Of the robot's base above the floor [m].
+    """
+    of_target = (episodes.goals[:, None] == targets).all(axis=2)
+    return [
+        {
+            "goal": np.round(goal, 6).tolist(),
+            "height_m": round(float(goal[2]) + base_height, 6),
+            **episodes.rates(of_target[:, number]),
+        }
+        for number, goal in enumerate(targets)
+    ]
+
+
+def worst_of(cells: list[Json]) -> list[Json]:
+    """Return the targets with the fewest successes, the worst first."""
+    ranked = sorted(cells, key=lambda cell: cell["success"]["mean"])
+    return [
+        {"goal": cell["goal"], "height_m": cell["height_m"], **cell["success"]}
+        for cell in ranked[:N_WORST]
+    ]
+
+
+def ends_over_time(episodes: ReachEpisodes) -> Json:
+    """Return how many episodes ended by success and by collision in each interval of time."""
+    edges = np.arange(0.0, episodes.limit_s + 1e-9, END_STEP_S)
+    counts = {
+        name: np.histogram(episodes.duration_s[episodes.outcome == end], edges)[0].tolist()
+        for name, end in (("success", SUCCESS), ("collision", COLLISION))
+    }
+    return {"step_s": END_STEP_S, **counts}
+
+
+def reached_after_contact(episodes: ReachEpisodes) -> dict[str, float]:
+    """Return the share of episodes that came to the goal although there was a contact."""
+    early = episodes.duration_s < episodes.limit_s - 1e-6
+    reached = (episodes.outcome == COLLISION) & early
+    return wilson(int(reached.sum()), len(reached))
+
+
+def run_targets(
+    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = untold
+) -> Json:
+    """Evaluate on all targets of the grid, under three rules of starting.
+
+    Args:
+        checkpoint: What acts.
+        episodes: Number of episodes of each target, by default 100.
+        seed: Seed of the episodes; use one that nothing was tuned on.
+        on_row: Told of each row once it is known.
+    """
+    bench = ReachBench(checkpoint, seed, len(STARTS), on_row)
+    per_target = episodes or PER_TARGET
+    goals = bench.target_goals(per_target * len(bench.targets))
+    for start in STARTS:
+        settings = replace(bench.usual, start=start, collision_ends=start != "authors")
+        played = bench.play(settings, goals)
+        cells = by_target(played, bench.targets, bench.cell.table.height)
+        row = {
+            **played.row(start),
+            "begun_in_contact": played.begun_in_contact(),
+            "starts_redrawn": float(np.mean(played.redrawn > 0)),
+            "worst": worst_of(cells),
+            "ends": ends_over_time(played),
+            "targets": cells,
+        }
+        if not settings.collision_ends:
+            row["reached_after_contact"] = reached_after_contact(played)
+        bench.add(row, settings, "grid")
+    bench.recheck(bench.usual, goals)
+    return {"episodes": per_target, **bench.result(targets=len(bench.targets))}

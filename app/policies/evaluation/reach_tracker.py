@@ -1,0 +1,136 @@
+"""Protocol ``reach-tracker``: what a policy loses when it sees people through a tracker.
+
+Every row plays the same episodes round the grid's targets; contacts are with the true people,
+and only what the policy sees differs: cylinders measured at 30 Hz, filtered and predicted to
+now (``app/sim/cylinder_tracker.py``).
+
+========================  ==================================================================
+``exact``                 the true state
+``30hz``                  measured at 30 Hz, handed over at once
+``100ms``                 handed over 100 ms late
+``100ms-noise``           and 20 mm of noise on x, y and radius of every frame
+``200ms-noise``           the same, 200 ms late
+``100ms-not-predicted``   the newest frame taken for now
+========================  ==================================================================
+
+Source: METHOD 2.8 (30 Hz). Noise, latencies and filter are ours. Deviates: its cylinder comes
+from a body's key-points; the people of this scenario are cylinders themselves, and are measured
+as such.
+"""
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.policies.checkpoint import Checkpoint
+from app.policies.evaluation.reach_bench import ReachBench
+from app.policies.evaluation.reach_episodes import N_ENVS
+from app.policies.evaluation.rows import OnRow, untold
+from app.policies.movers import Mover, mover_of
+from app.sim.cylinder_tracker import CylinderTracker, CylinderTrackerSettings
+from app.sim.kernels.occupancy import GROWTH, VX, VY, R, X, Y
+from app.sim.ports import Vec
+from app.sim.reach import ReachBatch
+
+DEFAULT_EPISODES = 5400
+"""As many as ``reach-targets`` plays."""
+THINNEST = 0.05
+"""Least radius that is ever seen [m]."""
+RATE_HZ = 30.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrackedRow:
+    """How one row of the result sees people."""
+
+    tracker: CylinderTrackerSettings
+    """How good the tracker is."""
+    predicted: bool = True
+    """Whether people are predicted to now, or taken as in the newest frame."""
+
+
+def _late(latency_s: float, noise: float = 0.0) -> CylinderTrackerSettings:
+    return CylinderTrackerSettings(rate_hz=RATE_HZ, latency_s=latency_s, noise=noise)
+
+
+ROWS = {
+    "30hz": TrackedRow(tracker=_late(0.0)),
+    "100ms": TrackedRow(tracker=_late(0.1)),
+    "100ms-noise": TrackedRow(tracker=_late(0.1, 0.02)),
+    "200ms-noise": TrackedRow(tracker=_late(0.2, 0.02)),
+    "100ms-not-predicted": TrackedRow(tracker=_late(0.1), predicted=False),
+}
+"""The rows beside ``exact``."""
+
+
+class ThroughTracker:
+    """Asks another mover about people as a tracker knows them; made anew for every run.
+
+    Args:
+        mover: Who moves the robots.
+        row: How people are seen.
+        n_envs: Rows of the batch.
+        n_people: Cylinders in each.
+        seed: Seed of the disturbances.
+    """
+
+    def __init__(
+        self, mover: Mover, row: TrackedRow, n_envs: int, n_people: int, seed: int
+    ) -> None:
+        self._mover, self._row = mover, row
+        self._tracker = CylinderTracker(row.tracker, n_envs, n_people, seed)
+        self._every = np.arange(n_envs)
+        self.errors: list[Vec] = []
+        """Distance of seen and true axes at every step of every row [m]."""
+
+    def acts(self, batch: ReachBatch) -> NDArray[np.float32]:
+        """Return the actions of all rows, shape (n_envs, 6)."""
+        state, t = batch.state, batch.state.elapsed
+        rows = state.people.walkers.rows
+        true = rows[:, :, [X, Y, R]]
+        fresh = np.flatnonzero(t == 0.0)
+        self._tracker.start(fresh, true[fresh], rows[fresh][:, :, [VX, VY, GROWTH]])
+        later = np.flatnonzero(t > 0.0)
+        self._tracker.look(later, t[later], true[later])
+        seen, change = self._tracker.seen(self._every, predicted=self._row.predicted)
+        seen[:, :, 2] = np.maximum(seen[:, :, 2], THINNEST)
+        self.errors.append(np.linalg.norm(seen[:, :, :2] - true[:, :, :2], axis=2).ravel())
+        return self._ask(batch, seen, change)
+
+    def _ask(self, batch: ReachBatch, seen: Vec, change: Vec) -> NDArray[np.float32]:
+        """Ask about people elsewhere, and put them back where they are."""
+        people, clear = batch.state.people, batch.state.clear
+        kept = people.walkers.rows.copy(), people.cylinders.copy(), clear.copy()
+        people.walkers.rows[:, :, [X, Y, R]] = seen
+        people.walkers.rows[:, :, [VX, VY, GROWTH]] = change
+        people.cylinders[:] = seen
+        batch.observe()
+        act = self._mover.acts(batch)
+        people.walkers.rows[:], people.cylinders[:], clear[:] = kept
+        return act
+
+
+def run_tracker(
+    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = untold
+) -> dict[str, Any]:
+    """Evaluate round all targets beside people seen by a tracker.
+
+    Args:
+        checkpoint: What acts.
+        episodes: Number of episodes of each row, by default 5400.
+        seed: Seed of the episodes and of the disturbances.
+        on_row: Told of each row once it is known.
+    """
+    bench = ReachBench(checkpoint, seed, 1 + len(ROWS), on_row)
+    goals = bench.target_goals(episodes or DEFAULT_EPISODES)
+    n_people = len(bench.cell.cylinders)
+    bench.add(bench.play(bench.usual, goals).row("exact"), bench.usual, "grid")
+    for name, tracked in ROWS.items():
+        mover = ThroughTracker(mover_of(bench.actor, "direct"), tracked, N_ENVS, n_people, seed)
+        row = bench.play(bench.usual, goals, mover=mover).row(name)
+        median, p95 = np.percentile(1e3 * np.concatenate(mover.errors), [50, 95]).tolist()
+        row |= {"axis_error_median_mm": median, "axis_error_p95_mm": p95}
+        bench.add(row, bench.usual, "grid", tracker=asdict(tracked))
+    return bench.result()

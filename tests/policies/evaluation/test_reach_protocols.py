@@ -1,0 +1,132 @@
+"""The protocols of the reach scenario, run with policies that have learned nothing."""
+
+import json
+
+import numpy as np
+import pytest
+
+from app.policies.evaluation import reach_episodes
+from app.policies.evaluation.protocols import OF_REACHING, evaluate
+from app.policies.evaluation.reach_people import SPEEDS, at_speed
+from app.policies.evaluation.reach_random import RINGS
+from app.policies.evaluation.reach_targets import STARTS
+from app.policies.evaluation.reach_tracker import ROWS
+from app.sim.cells import load_cell
+from tests.policies.untrained import untrained_reach
+
+N = 24
+MEASURED = sorted(name for name in OF_REACHING if name in {
+    "reach-targets", "reach-random", "reach-constant", "reach-speeds", "reach-smoothness",
+    "reach-people", "reach-tracker",
+})  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def few_rows(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(reach_episodes, "N_ENVS", N)
+    monkeypatch.setattr(reach_episodes, "N_RECHECKED", 2)
+
+
+def run(name: str, episodes: int = N, **overrides: object) -> tuple[dict, list]:
+    told: list = []
+    policy = untrained_reach(width=16, **overrides)
+    result = evaluate(
+        name, policy, episodes=episodes, seed=5, on_row=lambda *what: told.append(what)
+    )
+    return result, told
+
+
+@pytest.mark.parametrize("name", MEASURED)
+def test_a_result_is_json_and_states_the_rules_of_each_row(name: str) -> None:
+    result, told = run(name, 1 if name == "reach-targets" else N)
+    rows = json.loads(json.dumps(result, allow_nan=False))["results"]
+    assert [one for _, _, one in told] == result["results"]
+    assert [(done, total) for done, total, _ in told] == [
+        (k + 1, len(rows)) for k in range(len(rows))
+    ]
+    stated = result["settings"]["rows"]
+    assert list(stated) == [row["name"] for row in rows]
+    for row in rows:
+        rules = stated[row["name"]]
+        assert {"cell", "people", "start", "collision_ends", "goals", "time_limit_s"} <= set(
+            rules
+        )
+        assert row["n"] == (54 if name == "reach-targets" else N)
+    assert result["checkpoint"] == untrained_reach(width=16).sha256
+
+
+def test_every_target_is_counted_under_each_rule_of_starting() -> None:
+    result, _ = run("reach-targets", 2)
+    assert result["episodes"] == 2
+    assert [row["name"] for row in result["results"]] == list(STARTS)
+    for row in result["results"]:
+        goals = {tuple(cell["goal"]) for cell in row["targets"]}
+        assert len(goals) == 54
+        assert all(cell["n"] == 2 for cell in row["targets"])
+        assert {cell["height_m"] for cell in row["targets"]} == {0.8, 1.0, 1.2}
+        hits = sum(cell["collision"]["mean"] for cell in row["targets"]) / 54
+        assert hits == pytest.approx(row["collision"]["mean"])
+        assert row["worst"][0]["mean"] == min(
+            cell["success"]["mean"] for cell in row["targets"]
+        )
+        ends = row["ends"]
+        assert sum(ends["success"]) == round(row["success"]["mean"] * 108)
+        assert sum(ends["collision"]) == round(row["collision"]["mean"] * 108)
+    first, uniform, authors = result["results"]
+    assert first["begun_in_contact"]["mean"] == 0.0 and first["starts_redrawn"] > 0.0
+    assert uniform["starts_redrawn"] == 0.0
+    assert "reached_after_contact" in authors
+    assert result["fcl_recheck"]["missed_contacts"] == 0
+
+
+def test_random_goals_are_reached_by_every_way_the_policy_allows() -> None:
+    on_grid, _ = run("reach-random", goals="grid")
+    in_box, _ = run("reach-random", goals="box")
+    assert [row["name"] for row in in_box["results"]] == ["targets", "direct", "direct-25s"]
+    assert [row["name"] for row in on_grid["results"]][3:] == [
+        "interpolated",
+        "interpolated-25s",
+    ]
+    direct = in_box["results"][1]
+    assert sum(one["n"] for one in direct["between"]) == N
+    assert all(
+        RINGS[0] <= one["low_m"] < one["high_m"] <= RINGS[-1] for one in direct["between"]
+    )
+    limits = [rules["time_limit_s"] for rules in on_grid["settings"]["rows"].values()]
+    assert limits == [5.0, 5.0, 25.0, 5.0, 25.0]
+
+
+def test_zero_to_four_walkers_are_there() -> None:
+    result, _ = run("reach-people", 12)
+    people = [len(one["people"]) for one in result["settings"]["rows"].values()]
+    assert sorted(set(people)) == [0, 1, 2, 3, 4]
+    assert (
+        result["results"][0]["collision"]["mean"] <= result["results"][-1]["collision"]["mean"]
+    )
+
+
+def test_people_of_a_given_speed_walk_at_it() -> None:
+    cell = load_cell("shared-workspace")
+    for speed in SPEEDS:
+        (person,) = at_speed(cell, speed).cylinders
+        own = cell.cylinders[0]
+        assert (person.kind, person.speed) == ("fixed-speed", speed)
+        assert (person.x_min, person.height, person.p_still) == (
+            own.x_min, own.height, own.p_still,
+        )  # fmt: skip
+
+
+def test_a_row_per_tracker_stands_beside_the_exact_state() -> None:
+    result, _ = run("reach-tracker")
+    names = [row["name"] for row in result["results"]]
+    assert names == ["exact", *ROWS]
+    errors = [row["axis_error_median_mm"] for row in result["results"][1:]]
+    assert np.all(np.diff(errors[:4]) > 0.0)
+
+
+def test_a_jerk_limited_policy_is_measured_as_such() -> None:
+    result, _ = run("reach-smoothness", action_degree=3)
+    (row,) = result["results"]
+    assert row["name"] == "degree-3"
+    assert row["jerk_rad_s3"] <= row["jerk_limit_rad_s3"] + 1e-6
+    assert result["settings"]["action"]["degree"] == 3

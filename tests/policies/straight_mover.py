@@ -1,0 +1,23 @@
+"""A mover without learning: straight joint moves to a posture at the goal, seeing nobody."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.sim.kernels.kinematics import ik_vertical_batch
+from app.sim.reach import ReachBatch
+
+
+class Straight:
+    """Moves every robot straight to its goal, whoever stands in the way."""
+
+    def __init__(self, gain: float = 3.0) -> None:
+        self._gain = gain
+        self.looked: list[np.ndarray] = []
+
+    def acts(self, batch: ReachBatch) -> NDArray[np.float32]:
+        mount = batch.cell.robot
+        posture, _ = ik_vertical_batch(
+            batch.state.goal, mount.tool_length, np.array(mount.q_min), np.array(mount.q_max)
+        )
+        self.looked.append(batch.state.people.walkers.rows[:, 0, :5].copy())
+        return np.clip(self._gain * (posture - batch.state.q), -1, 1).astype(np.float32)
