@@ -403,3 +403,23 @@ def test_only_so_many_sockets_are_open_at_once(client: TestClient) -> None:
     with client.websocket_connect(SOCKET) as one:
         one.send_json(TASK)
         assert one.receive_json()["way"] == "interpolated"
+
+
+def test_a_stopping_server_ends_its_sockets(client: TestClient) -> None:
+    stopping = client.app.state.services.stopping  # type: ignore[attr-defined]
+    with client.websocket_connect(SOCKET) as one:
+        one.send_json(TASK)
+        assert one.receive_json()["way"] == "interpolated"
+        stopping.set()
+        try:
+            assert one.receive()["code"] == 1001
+        finally:
+            stopping.clear()
+
+
+def test_growth_of_a_cylinder_is_seen(client: TestClient) -> None:
+    acts = [
+        asked(client, people=[{**WALKER, "growth": growth}])["act"] for growth in (0.0, 0.3)
+    ]
+    assert acts[0] != acts[1]
+    assert refused(client, people=[{**WALKER, "growth": 9}])["field"] == "people[0].growth"
