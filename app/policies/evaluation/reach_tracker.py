@@ -85,8 +85,8 @@ class ThroughTracker:
         rows = state.people.walkers.rows
         true = rows[:, :, [X, Y, R]]
         if self._tracker is None:
-            settings = self._row.tracker
-            self._tracker = CylinderTracker(settings, *true.shape[:2], self._seed)
+            n, n_people = true.shape[:2]
+            self._tracker = CylinderTracker(self._row.tracker, n, n_people, self._seed)
         fresh = np.flatnonzero(t == 0.0)
         self._tracker.start(fresh, true[fresh], rows[fresh][:, :, [VX, VY, GROWTH]])
         later, every = np.flatnonzero(t > 0.0), np.arange(batch.n_envs)
