@@ -94,6 +94,9 @@ class ReachPreset:
     greedy_share: float = number(
         0.05, 0.0, 1.0, "", "share of cells without ladder noise; at least one"
     )
+    option_rate: float = number(
+        0.0, 0.0, 0.5, "per step", "how often a random option starts in half the cells"
+    )
     ou_theta: float = number(0.3, 0.0, 1.0, "per step", "pull of Ornstein-Uhlenbeck noise")
     ou_sigma: float = number(0.15, 0.0, 2.0, "", "push of Ornstein-Uhlenbeck noise")
 

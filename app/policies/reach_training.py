@@ -14,7 +14,7 @@ import torch
 from numpy.typing import NDArray
 
 from app.policies.checkpoint import Checkpoint
-from app.policies.exploration import Explorer, LadderNoise, OUNoise
+from app.policies.exploration import Explorer, LadderNoise, OptionNoise, OUNoise
 from app.policies.networks import Critics, PlainActor, ResidualActor
 from app.policies.progress import Progress
 from app.policies.quantiles import QuantileCritics
@@ -26,6 +26,7 @@ from app.policies.run import Parts, TrainingRun
 from app.policies.td3 import BatchTD3, Extras, Networks, critics_of
 from app.policies.vecenv import CellVecEnv, Foresight
 from app.sim.cells import Cell
+from app.sim.kernels.kinematics import ik_vertical_batch
 from app.sim.kernels.occupancy import VX, VY, R, X, Y
 from app.sim.kernels.reach_features import BASE_START
 from app.sim.kernels.reach_reward import ReachWeights
@@ -65,11 +66,12 @@ def settings_of(preset: ReachPreset) -> ReachSettings:
     )
 
 
-def _explorer(preset: ReachPreset, batch: ReachBatch, seed: int) -> Explorer:
+def explorer_of(preset: ReachPreset, batch: ReachBatch, seed: int) -> Explorer:
+    """Return what changes actions so that other ones are tried."""
     rng = np.random.default_rng(seed)
     if preset.noise == "ou":
         return OUNoise(batch.n_envs, N_ACT, preset.ou_theta, preset.ou_sigma, rng)
-    return LadderNoise(
+    ladder = LadderNoise(
         batch.n_envs,
         N_ACT,
         batch.arm.dt,
@@ -78,6 +80,11 @@ def _explorer(preset: ReachPreset, batch: ReachBatch, seed: int) -> Explorer:
         greedy_share=preset.greedy_share,
         rng=rng,
     )
+    if preset.option_rate == 0.0:
+        return ladder
+    arm, targets = batch.arm, batch.world.targets
+    postures, _ = ik_vertical_batch(targets, arm.tool_length, arm.q_min, arm.q_max)
+    return OptionNoise(ladder, batch, postures, preset.option_rate, rng)
 
 
 def networks_of(preset: ReachPreset, n_obs: int, n_critic: int) -> Networks:
@@ -136,7 +143,7 @@ def start(
         preset,
         env,
         seed + first,
-        exploration=_explorer(preset, batch, seed + first),
+        exploration=explorer_of(preset, batch, seed + first),
         networks=networks_of(preset, batch.obs_size, env.n_seen),
         extras=Extras(
             update_every=preset.update_every,

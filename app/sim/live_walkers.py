@@ -162,7 +162,8 @@ class LiveWalkers:
 
     def move_while_paused(self, dt: float) -> bool:
         """Move whoever is dragged; return whether anybody moved."""
-        return any([one.after(dt) for one in self if one.mode == "manual"])
+        moved = [one.after(dt) for one in self if one.mode == "manual"]
+        return any(moved)
 
     def set_speed(self, speed: float | None) -> None:
         """Let all walk with one speed [m/s], or as METHOD 2.1 says."""

@@ -19,7 +19,7 @@ class SafetyLive(Answer):
     link: str | None = Field(description="link that is nearest to that person")
     separation: float | None = Field(description="their distance [m]")
     required: float | None = Field(
-        description="protective separation distance S_p of that link [m], sum of the three terms"
+        description="protective separation distance S_p of that link [m], sum of three terms"
     )
     person_way: float | None = Field(description="v_h (T_r + T_s) [m]")
     robot_way: float | None = Field(description="v_r T_r + B [m]")
