@@ -375,6 +375,7 @@ def example_of(courses: Mapping[str, Course], dt: float) -> Json:
         "override": {
             name: np.round(course.overrides[number], 4).tolist()
             for name, course in courses.items()
+            if course.overrides
         },
     }
 
@@ -411,7 +412,19 @@ def compare(
         rows.add(course_row(name + suffix, courses[name].runs))
     best = best_replays(comparison, N_HINDSIGHT, np.random.default_rng(comparison.seed))
     rows.add(course_row("hindsight" + suffix, best))
+    courses["hindsight"] = Course(runs=best, overrides=[])
     return courses
+
+
+def seconds_of(courses: Mapping[str, Course]) -> dict[str, list[float | None]]:
+    """Return when each run of each row arrived [s]; None where it did not."""
+    return {
+        name: [
+            round(float(seconds), 2) if arrived else None
+            for seconds, arrived in zip(course.runs.seconds, course.runs.arrived, strict=True)
+        ]
+        for name, course in courses.items()
+    }
 
 
 def run_ssm(
@@ -452,6 +465,7 @@ def run_ssm(
             for name in PLANNERS
         }
         if not suffix:
+            result["seconds"] = seconds_of(courses)
             result["example"] = example_of(courses, cell.robot.dt)
     still: Any = _Still()
     for name, moved in (("random", mover), ("random-still", still)):
