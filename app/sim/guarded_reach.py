@@ -173,7 +173,7 @@ class GuardedReach(ReachBatch):
                 on tracks.
             SimulationError: An action is NaN or infinite.
         """
-        require_shape("act", act, (self.n_envs, self._n_act))
+        require_shape("act", act, (self.n_envs, self.n_act))
         require_finite("act", act)
         if auto_reset and self.n_tracks:
             raise InvalidInput(
