@@ -119,15 +119,18 @@ class _Zone:
         self._edge = server.scene.add_line_segments(
             "/zone/edge", np.zeros((3, 2, 3)), OFF, thickness=0.016, visible=False
         )
+        self._key: tuple[object, ...] = ()
 
     def draw(self, view: ReachView, *, visible: bool) -> None:
         """Show the zone of this state."""
         for part in (self._area, self._edge):
             if part.visible != visible:
                 part.visible = visible
-        if not visible:
-            return
         color, outline = override_color(view.safety), view.safety.zone
+        key = (color, *np.round(outline[::9], 3).ravel().tolist())
+        if not visible or key == self._key:
+            return
+        self._key = key
         vertices, faces = _fan(outline, self._z)
         if len(faces) != len(self._area.faces):
             self._area.faces = faces.astype(np.uint32)
@@ -178,7 +181,7 @@ class _Trail:
     def __init__(self, server: viser.ViserServer) -> None:
         self._points: deque[tuple[Vec, Rgb]] = deque(maxlen=N_TRAIL + 1)
         self._lines = server.scene.add_line_segments(
-            "/trail", np.zeros((N_TRAIL, 2, 3)), MARK, thickness=0.008, visible=False
+            "/trail", np.zeros((N_TRAIL, 2, 3)), MARK, thickness=0.012, visible=False
         )
         self._sent = 0
         self._n = 0
@@ -201,9 +204,11 @@ class _Trail:
         if not seen or self._sent == self._n:
             return
         self._sent = self._n
-        places = np.array([place for place, _ in self._points])
-        colors = np.array([color for _, color in self._points], dtype=np.float64)
-        fresh = np.linspace(0.15, 1.0, len(colors))[:, None]
+        first = [self._points[0]] * (N_TRAIL + 1 - len(self._points))
+        noted = [*first, *self._points]
+        places = np.array([place for place, _ in noted])
+        colors = np.array([color for _, color in noted], dtype=np.float64)
+        fresh = np.linspace(0.25, 1.0, len(colors))[:, None]
         faded = (fresh * colors + (1.0 - fresh) * np.array(BACK)).astype(np.uint8)
         self._lines.points = np.stack([places[:-1], places[1:]], axis=1).astype(np.float32)
         self._lines.colors = np.stack([faded[:-1], faded[1:]], axis=1)

@@ -139,6 +139,8 @@ def set_cell(world_id: str, body: WorldCell, services: ServicesDep) -> WorldSumm
     if (lack := lacks_for_live(cell)) is not None:
         raise InvalidInput("cell", cell.name, f"cannot be shown live: it {lack}")
     if is_reaching(cell):
+        if body.sorter is not None:
+            require_sorter(services.sorters.load(body.sorter), cell)
         reference = body.checkpoint
         pilot = pilot_of(reference, cell, services) if reference else pilot_for(cell, services)
         return _replace_world(world_id, cell, None, None, pilot, services)

@@ -42,7 +42,8 @@ function Safety({ world, history }) {
         <span class="tip tip-left" role="tooltip" id="safety-help">The robot must be able to stop
           before a person walking at ${safety.human_speed.toFixed(1)} m/s could reach it. The layer
           looks at the very path ahead; the sum S_p is the standard’s bound for it, so near the
-          limit the two differ a little, and a robot that moves away may be faster.
+          limit the two differ a little, and a robot that moves away may be faster. S_p adds what
+          the person and the robot may cover until it rests, and a distance to keep free.
           Not a certified safety function.</span>
       </span>
     </header>
@@ -83,9 +84,9 @@ function Terms({ safety, people }) {
   }
   const whom = people.length > 1 ? nameOf(person) : "Person";
   const rows = [
-    ["walk", "the person’s way until it rests", walk],
-    ["way", "the robot’s way until then", way],
-    ["margin", "protective distance", margin],
+    ["walk", "person’s way", walk],
+    ["way", "robot’s way", way],
+    ["margin", "to keep free", margin],
   ];
   return html`<dl class="terms">
     <div class=${separation < required ? "terms-top is-short" : "terms-top"}>

@@ -4,20 +4,29 @@ import { Icon } from "./icons.js";
 
 const GOAL_MODES = [
   ["jump", "Jumps on", "As soon as it is reached there is another one"],
-  ["follow", "Follows me", "It stays where you drag it"],
+  ["follow", "Follows me", "It stays where you drag it: take the arrows in the scene"],
 ];
 const SAFETY = [
   [true, "On", "The robot obeys the safety layer"],
   [false, "Off", "See what happens without"],
 ];
-const WAYS = {
-  direct: ["Direct", "The policy is asked about this very goal"],
-  interpolated: ["Interpolated", "The policy is asked about the targets around the goal"],
-  averaged: ["All people", "The policy is asked about each person, the near ones count more"],
-};
+const BETWEEN = [
+  [true, "On", "The policy is asked about the targets around the goal, and their mean is taken"],
+  [false, "Off", "The policy is asked about this very goal"],
+];
+const BESIDE = [
+  [false, "the nearest", "The policy sees the nearest person"],
+  [true, "everyone", "The policy is asked beside each person alone; the nearer one counts more"],
+];
 
 export function ReachControls({ world, send }) {
   const { goal_mode: mode, safety, way, ways } = world.reach;
+  const between = way.includes("interpolated");
+  const averaged = way.includes("averaged");
+  const ask = (all, mixed) => {
+    const wanted = [all && "averaged", mixed && "interpolated"].filter(Boolean).join("-") || "direct";
+    send({ tag: "set-way", way: wanted });
+  };
   return html`<div class="dock-row dock-wrap">
     <span class="dock-label" id="goal-label">Goal</span>
     <${Segmented} labelledby="goal-label" name="goal-mode" value=${mode} items=${GOAL_MODES}
@@ -27,12 +36,14 @@ export function ReachControls({ world, send }) {
     <span class="dock-pair"><span class="dock-label dock-label-free" id="layer-label">Safety layer</span>
       <${Segmented} labelledby="layer-label" name="safety" value=${safety.on} items=${SAFETY}
         onPick=${(on) => send({ tag: "set-safety", on })} /></span>
-    ${ways.length > 1 && html`<span class="dock-pair">
-      <span class="dock-label dock-label-free" id="way-label">Policy asked</span>
-      <${Segmented} labelledby="way-label" name="way" value=${way}
-        items=${ways.map((one) => [one, ...(WAYS[one] ?? [one, ""])])}
-        onPick=${(one) => send({ tag: "set-way", way: one })} /></span>`}
-    <p class="dock-hint">Drag the arrows at the goal in the scene.</p>
+    ${ways.includes("interpolated") && html`<span class="dock-pair">
+      <span class="dock-label dock-label-free" id="between-label">Interpolation</span>
+      <${Segmented} labelledby="between-label" name="between" value=${between} items=${BETWEEN}
+        onPick=${(one) => ask(averaged, one)} /></span>`}
+    ${ways.includes("averaged") && world.people.length > 1 && html`<span class="dock-pair">
+      <span class="dock-label dock-label-free" id="beside-label">Policy sees</span>
+      <${Segmented} labelledby="beside-label" name="beside" value=${averaged} items=${BESIDE}
+        onPick=${(one) => ask(one, between)} /></span>`}
   </div>`;
 }
 

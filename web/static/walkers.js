@@ -7,7 +7,7 @@ const MODES = [
   ["auto", "Walks", "walk", "From one random place to the next"],
   ["still", "Stands", "stand", "Stays where it is"],
 ];
-const SPEEDS = [["", "varies, 0.3 to 1 m/s"], ["0.25", "0.25 m/s"], ["0.5", "0.5 m/s"], ["1", "1 m/s"],
+const SPEEDS = [["", "varies"], ["0.25", "0.25 m/s"], ["0.5", "0.5 m/s"], ["1", "1 m/s"],
   ["1.6", "1.6 m/s"]];
 
 export function WalkerMover({ person, name, world, send }) {
@@ -22,14 +22,12 @@ export function WalkerMover({ person, name, world, send }) {
         onClick=${() => send({ tag: "set-mode", person: id, mode: one })}>
         <${Icon} name=${icon} />${label}</button>`)}
     </div>
-    <label class="dock-pair"><span class="dock-label dock-label-free">Walking speed</span>
-      <select data-role="walk-speed" value=${String(speed ?? "")} title="Of all people"
+    <label class="dock-pair"><span class="dock-label dock-label-free">Speed</span>
+      <select data-role="walk-speed" value=${String(speed ?? "")} title="How fast all people walk; as in training it varies between 0.3 and 1 m/s"
         onChange=${(e) => send({ tag: "set-walk", speed: e.target.value === "" ? null : Number(e.target.value) })}>
         ${SPEEDS.map(([value, label]) => html`<option key=${value} value=${value}>${label}</option>`)}
         ${!known && html`<option value=${String(speed)}>${speed} m/s</option>`}
       </select></label>
-    ${mode === "manual" && html`<p class="dock-hint">Drag the handle in the scene.</p>`}
-    <span class="spacer"></span>
     <div class="transport" role="group" aria-label=${`${name} in the cell`}>
       <button type="button" class="tool" data-action="remove-person" aria-label=${`Remove ${name}`}
         title=${`${name} leaves the cell`} onClick=${() => send({ tag: "remove-person", person: id })}>
