@@ -37,6 +37,7 @@ from app.policies.trained_cell import cell_of
 from app.settings import Settings, check_access
 from app.sim.cells import Cell, load_cell
 from app.sim.ports import SortingValues, TaskPolicy
+from app.sim.reach_ports import ReachPilot
 from app.sim.sorting_decision import warm_up as warm_up_sorting
 from app.store.engine import Store
 from app.store.records import NewCheckpoint
@@ -160,10 +161,14 @@ class Service:
 
 
 def start_world(
-    world_id: str, cell: Cell, policy: TaskPolicy | None, sorter: SortingValues | None = None
+    world_id: str,
+    cell: Cell,
+    policy: TaskPolicy | None,
+    sorter: SortingValues | None = None,
+    pilot: ReachPilot | None = None,
 ) -> LiveCell:
     """Start a live cell with its viewer; whoever asked stops it."""
-    live = LiveCell(cell, policy, id=world_id, sorter=sorter)
+    live = LiveCell(cell, policy, id=world_id, sorter=sorter, pilot=pilot)
     live.start()
     return live
 

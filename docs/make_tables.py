@@ -88,7 +88,7 @@ def origin(result: Json) -> str:
     machine: Json = result["machine"]
     verb = "evaluate" if "protocol" in result else "bench"
     usual = f"python -m app {verb} {result.get('protocol') or result.get('bench')}"
-    usual += " FILE ..." if "motions" in result.get("settings", {}) else ""
+    usual += " FILE ..." if result.get("settings", {}).get("motions") else ""
     if (trained := result.get("settings", {}).get("cell", "")) == "sorting-e1":
         usual += f" --checkpoint {trained}"
     parts = [f"`{result.get('command', usual)}`"]
@@ -106,7 +106,8 @@ def conditions(result: Json) -> list[str]:
     if "hand_speed_median_m_s" in settings:
         median, p99 = settings["hand_speed_median_m_s"], settings["hand_speed_p99_m_s"]
         parts.append(f"hands {median:.2f} m/s (median), {p99:.2f} m/s (p99)")
-    if motions := settings.get("motions"):
+    motions = settings.get("motions", ())
+    if motions and isinstance(motions[0], dict):
         seconds = sum(one["seconds"] for one in motions)
         parts.append(f"{len(motions)} recorded runs of {seconds:.0f} s together")
     if recheck := result.get("fcl_recheck"):

@@ -75,7 +75,7 @@ def read_all(name: str) -> list[Json]:
     return [] if first is None else [first, *siblings(RESULTS / f"{name}.json")]
 
 
-def percent(axis: Any, decimals: int = 0) -> None:
+def percent(axis: Any, decimals: int | None = None) -> None:
     """Label an axis in percent."""
     axis.set_major_formatter(PercentFormatter(1.0, decimals=decimals, symbol=" %"))
 
@@ -155,7 +155,7 @@ def _layer(
 
 def start_rules(result: Json) -> Figure:
     """Draw how episodes end under each rule of starting, and when, under the first."""
-    figure, axes = panels(1, 2, 3.0, width_ratios=(1.0, 1.15))
+    figure, axes = panels(1, 2, 3.1, width_ratios=(1.0, 1.15))
     left, right = axes[0]
     rows = result["results"][::-1]
     names = {"clearance": "0.05 m away", "uniform": "anywhere", "authors": "authors' code"}
@@ -177,20 +177,22 @@ def start_rules(result: Json) -> Figure:
     handles = [left.barh(0, 0, color=RED), left.barh(0, 0, color=GREY)]
     handles += left.plot([], [], "|", color=INK, ms=9, mew=2)
     names_of = ["collision", "time-over", "begins in contact"]
-    left.legend(handles, names_of, loc="upper right", fontsize=8)
+    below = {"loc": "upper center", "bbox_to_anchor": (0.45, -0.1), "ncols": 3}
+    left.legend(handles, names_of, fontsize=8, columnspacing=1.2, **below)
     _ends(right, result["results"][0])
     return figure
 
 
 def _ends(axis: Axes, row: Json) -> None:
-    ends = row["ends"]
-    step, n = ends["step_s"], row["n"]
-    middle = step * (np.arange(len(ends["success"])) + 0.5)
+    ends, n = row["ends"], row["n"]
+    step = ends[0]["until_s"]
+    middle = [one["until_s"] - 0.5 * step for one in ends]
     for kind, colour, label in (
         ("success", GREEN, "at the goal"),
         ("collision", RED, "collision"),
     ):
-        axis.bar(middle, np.array(ends[kind]) / n, width=step, color=colour, label=label)
+        shares = [one[kind] / n for one in ends]
+        axis.bar(middle, shares, width=step, color=colour, label=label)
     mean, p95 = row["time_to_goal_s"], row["time_to_goal_p95_s"]
     if mean is not None:
         axis.axvline(mean, color=INK, lw=1.0)
@@ -244,7 +246,7 @@ def between_targets(results: Sequence[Json]) -> Figure:
     left.grid(False, axis="y")
     right.set(title="... by how far they are from the grid", ylabel="success")
     right.set(xlabel="goal to the nearest target [mm]")
-    percent(right.yaxis, 1)
+    percent(right.yaxis)
     return figure
 
 
@@ -306,7 +308,7 @@ def _speeds(axis: Axes, result: Json) -> None:
     axis.set(title="Their speed", xlabel="[m/s]", ylim=(0.0, 1.2 * max(most, 1e-3)))
     axis.grid(False, axis="x")
     axis.tick_params(axis="x", length=0)
-    percent(axis.yaxis, 1)
+    percent(axis.yaxis)
 
 
 def _trackers(axis: Axes, result: Json) -> None:

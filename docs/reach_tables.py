@@ -51,8 +51,31 @@ COLUMNS: Mapping[str, Mapping[str, str]] = {
         "rms_acceleration_rad_s2": "RMS acceleration [rad/s²]",
         "success": "success",
     },
+    "reach-ceiling": {
+        "n": "episodes",
+        "solvable": "solvable",
+        "never": "shown to be impossible",
+        "undecided": "undecided",
+        "doomed": "every replay collided",
+        "replays": "replays",
+    },
+    "reach-ssm": {
+        "n": "runs",
+        "arrived": "at the goal",
+        "time_s": "time [s]",
+        "time_capped_s": "... of all runs [s]",
+        "below_half_s": "override below 50 % [s]",
+        "stopped_s": "at 0 [s]",
+        "never_stopped": "never at 0",
+        "joint_way_rad": "joints' way [rad]",
+        "tool_way_m": "tool's way [m]",
+        "contacts_moving": "contacts, robot moving",
+        "contacts_at_rest": "... at rest",
+    },
 }
 """Measures of each protocol and what its table calls them."""
+INSTEAD = {"arrived": "success"}
+"""What stands for a measure in rows that call it otherwise."""
 TURNED = frozenset({"reach-smoothness"})
 """Protocols of few rows and many measures: a line per measure."""
 DIFFERENCES = frozenset({"against_targets"})
@@ -87,7 +110,7 @@ def lines_of(results: Sequence[Json]) -> list[list[str]]:
     columns = COLUMNS[results[0]["protocol"]]
     several = len(results) > 1
     rows = [(policy_of(result), row) for result in results for row in result["results"]]
-    there = [key for key in columns if any(row.get(key) is not None for _, row in rows)]
+    there = [key for key in columns if any(value_of(row, key) is not None for _, row in rows)]
     head = ["", *(["policy"] if several else []), *(columns[key] for key in there)]
     lines = [
         [f"`{row['name']}`", *([who] if several else []), *(shown(row, key) for key in there)]
@@ -98,9 +121,15 @@ def lines_of(results: Sequence[Json]) -> list[list[str]]:
     return [head, *lines]
 
 
+def value_of(row: Json, key: str) -> Any:
+    """Return a measure of a row, or what stands for it; None where it has none."""
+    value = row.get(key)
+    return row.get(INSTEAD[key]) if value is None and key in INSTEAD else value
+
+
 def shown(row: Json, key: str) -> str:
     """Return one value of a row as text."""
-    value = row.get(key)
+    value = value_of(row, key)
     if value is None:
         return ""
     if key == "worst":
@@ -109,6 +138,8 @@ def shown(row: Json, key: str) -> str:
         return f"{100.0 * worst['mean']:.0f} % at ({x:.1f}, {y:.1f}, {worst['height_m']:.1f})"
     if key == "starts_redrawn":
         return f"{100.0 * value:.1f} %"
+    if isinstance(value, dict) and "sd" in value:
+        return f"{value['mean']:.2f} ± {value['sd']:.2f}"
     if isinstance(value, dict):
         mean, low, high = (100.0 * value[name] for name in ("mean", "low", "high"))
         if key in DIFFERENCES:

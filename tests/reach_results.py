@@ -75,7 +75,10 @@ def targets(seed: int = 5) -> Json:
     hits = np.histogram(rng.gamma(4.0, 0.4, 60), np.arange(0.0, 5.01, 0.1))[0].tolist()
     more: Json = {
         "worst": named,
-        "ends": {"step_s": 0.1, "success": ends, "collision": hits},
+        "ends": [
+            {"until_s": 0.1 * (k + 1), "success": won, "collision": hit}
+            for k, (won, hit) in enumerate(zip(ends, hits, strict=True))
+        ],
         "targets": cells,
     }
     rows = [
@@ -179,3 +182,32 @@ def curves() -> Json:
             ]
             found.append({"name": name, "seed": seed, "played": points, "targets": []})
     return {"curves": found, "seed": 77, "machine": MACHINE}
+
+
+def ceiling() -> Json:
+    one = {
+        "name": "ceiling",
+        "n": 5400,
+        "solvable": wilson(5330, 5400),
+        "never": wilson(8, 5400),
+        "undecided": wilson(62, 5400),
+        "replays": 123456,
+        "worst_targets": [{"goal": [0.1, 1.0, 0.1], "solvable": 0.9}],
+    }
+    return result("reach-ceiling", [one])
+
+
+def ssm() -> Json:
+    time = {"mean": 4.1, "low": 4.0, "high": 4.2, "sd": 0.9}
+    contacts = {"contacts_moving": 0, "contacts_at_rest": 2}
+    policy = {
+        "name": "policy",
+        "n": 200,
+        "arrived": wilson(199, 200),
+        "time_s": time,
+        **contacts,
+    }
+    random = {"name": "random", "n": 10000, "success": wilson(9600, 10000), **contacts}
+    made = result("reach-ssm", [policy, random])
+    made["settings"]["motions"] = []
+    return made

@@ -23,16 +23,22 @@ HOLD_S = 5.0
 
 
 class Gizmos:
-    """Three gizmos of one person; poses are written by the live cell's thread only.
+    """Gizmos of one person; poses are written by the live cell's thread only.
 
     Args:
         server: Where to draw.
         person: Id of the person.
         submit: Takes the command of a drag.
+        jointed: Whether the person has hands, and a side to turn.
     """
 
     def __init__(
-        self, server: viser.ViserServer, person: int, submit: Callable[[MoveHuman], None]
+        self,
+        server: viser.ViserServer,
+        person: int,
+        submit: Callable[[MoveHuman], None],
+        *,
+        jointed: bool = True,
     ) -> None:
         self._person, self._submit = person, submit
         scene, root = server.scene, f"/gizmos/{person}"
@@ -43,6 +49,7 @@ class Gizmos:
             scale=0.34,
             line_width=3.0,
             active_axes=(True, True, False),
+            disable_rotations=not jointed,
             depth_test=False,
             opacity=0.9,
             visible=False,
@@ -57,7 +64,7 @@ class Gizmos:
                 opacity=0.9,
                 visible=False,
             )
-            for name in HANDS
+            for name in (HANDS if jointed else ())
         }
         self._listen()
 

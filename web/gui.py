@@ -7,6 +7,7 @@ concerns the picture.
 import viser
 
 from app.sim.cells import Cell
+from app.sim.reach_commands import is_reaching
 from web.scene import Overlays
 from web.sorting_scene import sorts
 
@@ -33,6 +34,8 @@ def build(server: viser.ViserServer, overlays: Overlays, cell: Cell) -> None:
 
     if sorts(cell):
         _build_sorting(server, overlays)
+    elif is_reaching(cell):
+        _build_reach(server, overlays)
     else:
         _build_choice(server, overlays)
 
@@ -52,6 +55,30 @@ def _build_choice(server: viser.ViserServer, overlays: Overlays) -> None:
     @path.on_update
     async def _(_: object) -> None:
         overlays.path = path.value
+
+
+def _build_reach(server: viser.ViserServer, overlays: Overlays) -> None:
+    zone = server.gui.add_checkbox(
+        "Separation zone",
+        overlays.zone,
+        hint="Where a person is nearer than the rule asks for.",
+    )
+    trail = server.gui.add_checkbox("Trail", overlays.trail, hint="Where the tool has been.")
+    targets = server.gui.add_checkbox(
+        "Targets", overlays.targets, hint="The goals that policies are trained on."
+    )
+
+    @zone.on_update
+    async def _(_: object) -> None:
+        overlays.zone = zone.value
+
+    @trail.on_update
+    async def _(_: object) -> None:
+        overlays.trail = trail.value
+
+    @targets.on_update
+    async def _(_: object) -> None:
+        overlays.targets = targets.value
 
 
 def _build_sorting(server: viser.ViserServer, overlays: Overlays) -> None:

@@ -24,6 +24,8 @@ from app.sim.cells import Cell
 from app.sim.commands import Command
 from app.sim.live_world import check_on_table, new_world
 from app.sim.ports import SortingValues, TaskPolicy
+from app.sim.reach_commands import SetWay
+from app.sim.reach_ports import ReachPilot
 from app.sim.snapshot import WorldSnapshot
 from app.sim.sorting_commands import SORTING_COMMANDS
 from web import gui
@@ -35,6 +37,8 @@ MAX_BEHIND_S = 0.2
 """Lateness beyond which time is let go [s]."""
 ERROR_PAUSE_S = 1.0
 """Rest after an unexpected error [s]."""
+PICTURE_S = 0.04
+"""Least time between two pictures [s]: a slow visitor would fall behind without bound."""
 
 
 class LiveHandle:
@@ -68,6 +72,8 @@ class LiveHandle:
         """
         with self._lock:
             commands.check(command, self._cell, self._people)
+            if isinstance(command, SetWay):
+                check_on_table(command, self._cell, self._last)
             if isinstance(command, SORTING_COMMANDS):
                 if not any(self._unseen):
                     check_on_table(command, self._cell, self._last)
@@ -106,6 +112,7 @@ class LiveCell:
         seed: Seed of the people's work.
         id: Name of the world in URLs.
         sorter: Values the moves of a sorting cell; None leaves them to the exact planner.
+        pilot: Moves the arm of a reach cell; None goes straight.
     """
 
     def __init__(
@@ -118,14 +125,16 @@ class LiveCell:
         seed: int = 0,
         id: str = "main",
         sorter: SortingValues | None = None,
+        pilot: ReachPilot | None = None,
     ) -> None:
         self._cell, self._host, self._port = cell, host, port
         # The first one compiles what is not in the kernels' cache yet.
-        new_world(cell, policy, seed, id, sorter).step()
-        self._world = new_world(cell, policy, seed, id, sorter)
+        new_world(cell, policy, seed, id, sorter, pilot).step()
+        self._world = new_world(cell, policy, seed, id, sorter, pilot)
         self.handle = LiveHandle(id, cell, self._world.snapshot())
         """Commands in, snapshots out."""
         self._speed = 1
+        self._turn, self._undrawn_s = 0, 0.0
         self._stop = threading.Event()
         self._server: viser.ViserServer | None = None
         self._thread: threading.Thread | None = None
@@ -193,7 +202,11 @@ class LiveCell:
             self._world.step()
         snapshot = replace(self._world.snapshot(), speed=self._speed)
         self.handle.publish(snapshot)
-        scene.draw(snapshot, dt * self._speed)
+        self._turn += 1
+        self._undrawn_s += dt * self._speed
+        if self._turn % max(1, round(PICTURE_S / dt)) == 0:
+            scene.draw(snapshot, self._undrawn_s)
+            self._undrawn_s = 0.0
 
     def _obey(self, command: Command) -> None:
         """Carry out a command: the clock's speed is the loop's own, all else the world's."""

@@ -44,7 +44,12 @@ class PeopleView:
             if person.id not in self._drawn:
                 self._drawn[person.id] = (
                     PersonView(self._server, self._cell, person),
-                    Gizmos(self._server, person.id, self._submit),
+                    Gizmos(
+                        self._server,
+                        person.id,
+                        self._submit,
+                        jointed=person.cylinder is None,
+                    ),
                 )
             view, gizmos = self._drawn[person.id]
             view.draw(person, dt)

@@ -11,10 +11,12 @@ import viser
 
 from app.sim.cells import Cell
 from app.sim.commands import Command
+from app.sim.reach_commands import is_reaching
 from app.sim.snapshot import WorldSnapshot
 from web import workplace
 from web.arc import Arc
 from web.people_view import PeopleView
+from web.reach_scene import ReachScene
 from web.robot_view import RobotView
 from web.sorting_scene import SortingScene, sorts
 from web.stations_view import StationsView
@@ -37,6 +39,12 @@ class Overlays:
     """The figures of the failure map."""
     ghosts: bool = True
     """The blocks that the goal asks for."""
+    zone: bool = True
+    """Where people make the robot slow down."""
+    trail: bool = True
+    """Where the tool has been."""
+    targets: bool = True
+    """The goals that policies are trained on."""
 
 
 class CellScene:
@@ -59,6 +67,7 @@ class CellScene:
             self._stations = StationsView(server, cell, submit)
             self._people = PeopleView(server, cell, submit)
             self._sorting = SortingScene(server, cell, submit) if sorts(cell) else None
+            self._reach = ReachScene(server, cell, submit) if is_reaching(cell) else None
             self._path = Arc(server, "/path", lift=PATH_LIFT)
 
     def draw(self, snapshot: WorldSnapshot, dt: float) -> None:
@@ -82,6 +91,13 @@ class CellScene:
                     chances=self.overlays.chances,
                     ghosts=self.overlays.ghosts,
                     path=self.overlays.path,
+                )
+            elif self._reach is not None:
+                self._reach.draw(
+                    snapshot,
+                    zone=self.overlays.zone,
+                    trail=self.overlays.trail,
+                    targets=self.overlays.targets,
                 )
             else:
                 self._draw_path(snapshot)

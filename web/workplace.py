@@ -6,6 +6,7 @@ import numpy as np
 import viser
 
 from app.sim.cells import Cell
+from app.sim.reach_commands import is_reaching
 from web.poses import orientation
 from web.solids import block, material, painted, rod, slab
 
@@ -118,10 +119,12 @@ def _light(server: viser.ViserServer) -> None:
 
 
 def _camera(server: viser.ViserServer, cell: Cell) -> None:
-    """Look at the people's hands; where blocks are sorted, from higher up and nearer."""
+    """Look at the people's hands; at blocks from nearer, at walkers from farther off."""
     camera = server.initial_camera
     if any(station.kind == "clutter" for station in cell.stations):
         camera.position, camera.look_at = (2.14, -0.88, 1.58), (-0.02, 0.58, 0.1)
+    elif is_reaching(cell):
+        camera.position, camera.look_at = (2.9, -2.0, 2.2), (-0.25, 0.75, 0.0)
     else:
         camera.position, camera.look_at = (2.2, -0.9, 1.36), (0.0, 0.68, 0.17)
     camera.up = (0.0, 0.0, 1.0)

@@ -8,6 +8,7 @@ as text messages, one after the other, and gives the same answers in their order
 import asyncio
 import json
 import logging
+from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
@@ -82,7 +83,9 @@ async def _decider(name: str | None, services: Services) -> MotionDecider:
     if name is None and REACH_ALIAS not in services.checkpoints.aliases:
         raise NotShipped("checkpoint that reaches goals", REACH_ALIAS, REMEDY)
     found = services.movers.loaded(name)
-    return found or await run_in_threadpool(services.movers.load, name)
+    if found is None:
+        found = await run_in_threadpool(services.movers.load, name)
+    return found
 
 
 def _decided(
@@ -130,7 +133,7 @@ async def _serve(client: WebSocket, services: Services) -> None:
     await client.close(1001, "the server stops")
 
 
-async def reply(message: dict[str, Any], services: Services) -> str:
+async def reply(message: Mapping[str, Any], services: Services) -> str:
     """Return the answer to one message as JSON: a :class:`MotionAnswer` or a problem.
 
     Args:

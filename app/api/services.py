@@ -14,6 +14,7 @@ from app.errors import NotFound, NotReady
 from app.policies.motion_decision import MotionDecider
 from app.sim.cells import Cell
 from app.sim.ports import SortingValues, TaskPolicy, WorldHandle
+from app.sim.reach_ports import ReachPilot
 from app.store.engine import Store
 from jobs.cells import CellCatalog
 from jobs.motions import MotionCatalog
@@ -44,8 +45,11 @@ class LiveWorld(Protocol):
         """End world and viewer."""
 
 
-StartWorld = Callable[[str, Cell, TaskPolicy | None, SortingValues | None], LiveWorld]
-"""Starts a world of an id, in a cell, with a policy and a sorter; the caller stops it."""
+StartWorld = Callable[
+    [str, Cell, TaskPolicy | None, SortingValues | None, ReachPilot | None], LiveWorld
+]
+"""Starts a world of an id, in a cell, with what chooses tasks, sorts and reaches there; the
+caller stops it."""
 
 
 @dataclass(slots=True)

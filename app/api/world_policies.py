@@ -1,13 +1,14 @@
-"""Which checkpoints may act in a live world: one that moves the arm, one that sorts.
+"""Which checkpoints may act in a live world: one that moves the arm, sorts or reaches.
 
 A policy moves the arm in the cell it was trained in, and in sorting cells that differ from it
 in nothing but their stations (``sorting_cell.same_workspace``).
 """
 
-from app.api.registry import SORTERS
+from app.api.registry import REACH_ALIAS, SORTERS
 from app.api.services import Services
 from app.errors import CheckpointMismatch, NotFound
-from app.policies.checkpoint import CHOOSING, purpose_of
+from app.policies.checkpoint import CHOOSING, REACHING, purpose_of
+from app.policies.reach_pilot import ReachPilot
 from app.policies.trained_cell import is_for
 from app.sim.cells import Cell, require_cell
 from app.sim.ports import SortingValues, TaskPolicy
@@ -76,3 +77,28 @@ def sorter_for(cell: Cell, services: Services) -> SortingValues | None:
         return None
     sorter = services.sorters.load(cell.name)
     return sorter if is_sorting(cell) and sorter.shape == shape_of(cell) else None
+
+
+def pilot_of(reference: str, cell: Cell, services: Services) -> ReachPilot:
+    """Return the reach policy that is named, ready to act in a cell.
+
+    Raises:
+        InvalidInput: Nothing has that name.
+        CheckpointMismatch: It does not reach goals, or was trained elsewhere.
+    """
+    actor = services.movers.load(reference).actor
+    require_cell(cell, actor.cell, actor.cell_sha256)
+    return ReachPilot(actor)
+
+
+def pilot_for(cell: Cell, services: Services) -> ReachPilot | None:
+    """Return the reach policy of a cell: the shipped one, else the newest trained in it."""
+    if REACH_ALIAS in services.checkpoints.aliases:
+        actor = services.movers.load(REACH_ALIAS).actor
+        if (actor.cell, actor.cell_sha256) == (cell.name, cell.sha256):
+            return ReachPilot(actor)
+    for record in list_checkpoints(services.store, limit=MAX_LOOKED_AT).items:
+        reaches = purpose_of(record.manifest) == REACHING
+        if reaches and is_for(record.manifest, cell):
+            return ReachPilot(services.movers.load(record.sha256).actor)
+    return None

@@ -28,6 +28,8 @@ from app.api.services import LiveWorld, Services, ServicesDep
 from app.api.world_policies import (
     may_move,
     mover_for,
+    pilot_for,
+    pilot_of,
     require_mover,
     require_sorter,
     sorter_for,
@@ -37,6 +39,9 @@ from app.sim.cases import cases_of
 from app.sim.cells import Cell
 from app.sim.live_world import lacks_for_live
 from app.sim.motions import Motion
+from app.sim.ports import SortingValues, TaskPolicy
+from app.sim.reach_commands import SetPilot, is_reaching
+from app.sim.reach_ports import ReachPilot
 
 STREAM_PERIOD_S = 0.1
 
@@ -71,7 +76,12 @@ async def command(
     """Queue one command; the world applies it before its next tick."""
     snapshot = world.handle.snapshot()
     _check_names(body, world.cell)
-    if isinstance(body, SetPolicy):
+    if isinstance(body, SetPolicy) and is_reaching(world.cell):
+        pilot = None
+        if body.checkpoint is not None:
+            pilot = await run_in_threadpool(pilot_of, body.checkpoint, world.cell, services)
+        world.handle.submit(SetPilot(pilot=pilot))
+    elif isinstance(body, SetPolicy):
         policy = None
         if body.checkpoint is not None:
             policy = await run_in_threadpool(services.policies.load, body.checkpoint)
@@ -116,17 +126,24 @@ async def stream(world: WorldDep, services: ServicesDep) -> AsyncIterator[Server
 
 @router.put("/{world_id}/cell", summary="Start a live world anew in another cell")
 def set_cell(world_id: str, body: WorldCell, services: ServicesDep) -> WorldSummary:
-    """Stop the world and start it in a cell to pick and place or to sort in; its streams end.
+    """Stop the world and start it in a cell to pick and place, sort or reach in; streams end.
 
     The policy is the one that is named, else the one that ships with the cell, else the newest
     that was trained in it, else none: the robot rests. In a sorting cell the shipped policy may
     act where the cell differs from its own in nothing but stations; the sorter is the one that
-    is named, else the one that ships with the cell, else the exact planner.
+    is named, else the one that ships with the cell, else the exact planner. In a cell with
+    goals to reach and no policy the robot goes straight to them.
     """
     services.world(world_id)
     cell = services.cells.get(body.cell)
     if (lack := lacks_for_live(cell)) is not None:
         raise InvalidInput("cell", cell.name, f"cannot be shown live: it {lack}")
+    if is_reaching(cell):
+        if body.sorter is not None:
+            require_sorter(services.sorters.load(body.sorter), cell)
+        reference = body.checkpoint
+        pilot = pilot_of(reference, cell, services) if reference else pilot_for(cell, services)
+        return _replace_world(world_id, cell, None, None, pilot, services)
     if body.checkpoint is None:
         policy = mover_for(cell, services)
     else:
@@ -137,10 +154,22 @@ def set_cell(world_id: str, body: WorldCell, services: ServicesDep) -> WorldSumm
     else:
         sorter = services.sorters.load(body.sorter)
         require_sorter(sorter, cell)
+    return _replace_world(world_id, cell, policy, sorter, None, services)
+
+
+def _replace_world(
+    world_id: str,
+    cell: Cell,
+    policy: TaskPolicy | None,
+    sorter: SortingValues | None,
+    pilot: ReachPilot | None,
+    services: Services,
+) -> WorldSummary:
+    """Start the world of an id anew, and stop the one that was there."""
     with services.replacing:
         if services.stopping.is_set():
             raise NotReady("stopping")
-        new = services.start_world(world_id, cell, policy, sorter)
+        new = services.start_world(world_id, cell, policy, sorter, pilot)
         old, services.worlds[world_id] = services.worlds[world_id], new
     old.stop()
     return WorldSummary.from_domain(new.handle.snapshot())

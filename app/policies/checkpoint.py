@@ -24,7 +24,9 @@ from app.errors import CheckpointMismatch, InvalidInput
 
 FORMAT = "tandem-checkpoint/1"
 MAX_BYTES = 16 * 1024 * 1024
-"""Largest tensors blob taken [bytes]; a database row holds it."""
+"""Largest tensors blob of a policy [bytes]; a database row holds it."""
+MAX_RESUME_BYTES = 4 * MAX_BYTES
+"""The same of what resumes a training: target networks and two moments come to the networks."""
 CHOOSING, REACHING, SORTING = "choosing tasks", "reaching goals", "sorting"
 """What policies are for."""
 REQUIRED = {
@@ -107,8 +109,9 @@ def load(manifest: object, tensors: bytes) -> Checkpoint:
     if not 1 <= manifest["width"] <= 4096:
         raise InvalidInput("manifest.width", manifest["width"], "must lie in [1, 4096] units")
     _check_ranges(manifest["trained_range"])
-    if len(tensors) > MAX_BYTES:
-        raise InvalidInput("tensors", len(tensors), f"must not exceed {MAX_BYTES} bytes")
+    most = MAX_RESUME_BYTES if manifest["kind"] == "resume" else MAX_BYTES
+    if len(tensors) > most:
+        raise InvalidInput("tensors", len(tensors), f"must not exceed {most} bytes")
     return Checkpoint(manifest, bytes(tensors))
 
 

@@ -3,7 +3,8 @@
 Row by row the noise grows from none (the first rows, which act as the policy does) to
 ``sigma_max``; it is an AR(1) process, so that motions stay smooth. In every second noisy row,
 now and then an *option* takes over for 4 to 29 steps: hold still, go home, go to a posture
-nearby, go to another station. Options meet people in places the policy alone would not seek.
+nearby, go to where another task would be. Options meet people in places the policy alone would
+not seek.
 
 Deviates: the thesis explores by parameter-space noise (section 5.3.4) and by an
 Ornstein-Uhlenbeck process (table 4.2), which is here too, the same in every row.
@@ -15,12 +16,12 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from app.policies.pick_preset import PickPreset
-from app.sim.kernels.arm import CONTROLLED
 from app.sim.kernels.features import BASE_GAIN
 from app.sim.pick import PickBatch
+from app.sim.ports import Vec
+from app.sim.reach import ReachBatch
 
-HOLD, HOME, NEARBY, STATION = range(4)
+HOLD, HOME, NEARBY, ELSEWHERE = range(4)
 OPTION_STEPS = (4, 30)
 """Shortest length of an option and the end of the range."""
 
@@ -100,35 +101,34 @@ class OUNoise:
 
 
 class OptionNoise:
-    """Ladder noise and random options of the pick scenario.
+    """Ladder noise, and random options in every second noisy row.
 
     Args:
-        preset: Gives noise and option rates.
+        noise: The noise.
         batch: The cells that are stepped.
+        postures: Where options may lead besides home [rad], shape (n, 6).
+        rate: Chance per period that an option starts.
         rng: Random numbers.
     """
 
-    def __init__(self, preset: PickPreset, batch: PickBatch, rng: np.random.Generator) -> None:
-        self._batch, self._rng = batch, rng
-        n = batch.n_envs
-        self._noise = LadderNoise(
-            n,
-            CONTROLLED,
-            batch.arm.dt,
-            sigma_max=preset.sigma_max,
-            time_s=preset.noise_time_s,
-            greedy_share=preset.greedy_share,
-            rng=rng,
-        )
-        self.n_greedy = self._noise.n_greedy
-        rows = np.arange(n)
+    def __init__(
+        self,
+        noise: LadderNoise,
+        batch: PickBatch | ReachBatch,
+        postures: Vec,
+        rate: float,
+        rng: np.random.Generator,
+    ) -> None:
+        self._noise, self._batch, self._rng = noise, batch, rng
+        self._postures, self._rate = postures, rate
+        self.n_greedy = noise.n_greedy
+        rows = np.arange(batch.n_envs)
         self._may_option = (rows >= self.n_greedy) & (rows % 2 == 0)
-        self._rate = preset.option_rate
-        self._left = np.zeros(n, dtype=np.int64)
-        self._goal = np.zeros((n, CONTROLLED))
+        self._left = np.zeros(batch.n_envs, dtype=np.int64)
+        self._goal = np.zeros((batch.n_envs, batch.n_act))
 
     def apply(self, act: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return the actions to take, shape (n_envs, 5), given the policy's."""
+        """Return the actions to take, shape (n_envs, n_act), given the policy's."""
         noisy = self._noise.apply(act)
         self._start_options()
         active = self._left > 0
@@ -144,20 +144,20 @@ class OptionNoise:
             self._goal[row] = self._draw_goal(int(row))
             self._left[row] = self._rng.integers(*OPTION_STEPS)
 
-    def _draw_goal(self, row: int) -> NDArray[np.float64]:
-        q = self._batch.state.q[row, :CONTROLLED]
+    def _draw_goal(self, row: int) -> Vec:
+        n = self._batch.n_act
+        q = self._batch.state.q[row, :n]
         kind = self._rng.integers(4)
         if kind == HOLD:
             return q.copy()
         if kind == HOME:
-            return self._batch.arm.home[:CONTROLLED]
+            return self._batch.arm.home[:n]
         if kind == NEARBY:
-            return q + self._rng.normal(0.0, 0.3, CONTROLLED)
-        stations = self._batch.world.station_q
-        return np.asarray(stations[self._rng.integers(len(stations)), :CONTROLLED])
+            return q + self._rng.normal(0.0, 0.3, n)
+        return self._postures[self._rng.integers(len(self._postures)), :n]
 
-    def _toward_goals(self) -> NDArray[np.float64]:
-        away = self._goal - self._batch.state.q[:, :CONTROLLED]
+    def _toward_goals(self) -> Vec:
+        away = self._goal - self._batch.state.q[:, : self._batch.n_act]
         widest = np.maximum(np.abs(away).max(axis=1, keepdims=True), 1e-9)
         pace = np.minimum(1.0, BASE_GAIN * widest / self._batch.arm.qd_max[0])
         return np.asarray(away / widest * pace)

@@ -141,7 +141,8 @@ def person_weights(distances: Vec) -> Vec:
         Weights, which sum to one in every row, shape (n, n_people).
     """
     weight: Vec = np.maximum(distances, NEAREST_M) ** -POWER
-    return weight / weight.sum(axis=1, keepdims=True)
+    shares: Vec = weight / weight.sum(axis=1, keepdims=True)
+    return shares
 
 
 def mover_of(actor: ReachActor, how: How | None = None) -> Mover:

@@ -13,6 +13,7 @@ from functools import reduce
 
 import torch
 from torch import nn
+from torch.nn import functional
 
 from app.sim.kernels.arm import CONTROLLED
 from app.sim.kernels.features import BASE_START, N_FEATURES
@@ -28,7 +29,7 @@ class ResidualActor(nn.Module):
 
     Args:
         width: Units per hidden layer.
-        n_obs: Length of observations.
+        n_obs: Numbers it sees, the first ones of an observation.
         n_act: Numbers of an action.
         base: Where in an observation the base motion starts.
         layers: Hidden layers.
@@ -48,12 +49,12 @@ class ResidualActor(nn.Module):
             last.weight.mul_(FIRST_RESIDUAL)
             last.bias.zero_()
         self.net = nn.Sequential(*hidden(n_obs, width, layers), last)
-        self.base = slice(base, base + n_act)
+        self.n_obs, self.base = n_obs, slice(base, base + n_act)
 
     def forward(self, obs: torch.Tensor) -> torch.Tensor:
-        """Return actions, shape (n, n_act), for observations, shape (n, n_obs)."""
+        """Return actions, shape (n, n_act), for observations, shape (n, n_obs or more)."""
         base = obs[:, self.base].clamp(-1.0, 1.0)
-        return torch.tanh(self.net(obs) + torch.atanh(BASE_WEIGHT * base))
+        return torch.tanh(self.net(obs[:, : self.n_obs]) + torch.atanh(BASE_WEIGHT * base))
 
 
 class PlainActor(nn.Module):
@@ -91,7 +92,7 @@ def hidden(n_in: int, width: int, layers: int, normed: bool = False) -> list[nn.
 
 
 class QNetwork(nn.Sequential):
-    """Maps (observation, action) to one value.
+    """Maps (observation, action) to one value, or several.
 
     Args:
         width: Units per hidden layer.
@@ -99,6 +100,7 @@ class QNetwork(nn.Sequential):
         n_act: Numbers of an action.
         layers: Hidden layers.
         normed: Whether they are normalised.
+        n_values: Values.
     """
 
     def __init__(
@@ -108,8 +110,10 @@ class QNetwork(nn.Sequential):
         n_act: int = CONTROLLED,
         layers: int = 2,
         normed: bool = True,
+        n_values: int = 1,
     ) -> None:
-        super().__init__(*hidden(n_obs + n_act, width, layers, normed), nn.Linear(width, 1))
+        last = hidden(n_obs + n_act, width, layers, normed)
+        super().__init__(*last, nn.Linear(width, n_values))
 
 
 class Critics(nn.Module):
@@ -122,6 +126,7 @@ class Critics(nn.Module):
         n_critics: Number of value functions.
         layers: Hidden layers of each.
         normed: Whether they are normalised.
+        n_values: Values that each says.
     """
 
     def __init__(
@@ -132,11 +137,13 @@ class Critics(nn.Module):
         n_critics: int = 2,
         layers: int = 2,
         normed: bool = True,
+        n_values: int = 1,
     ) -> None:
         super().__init__()
         self.n_critics = n_critics
         for number in range(1, n_critics + 1):
-            self.add_module(f"q{number}", QNetwork(width, n_obs, n_act, layers, normed))
+            q = QNetwork(width, n_obs, n_act, layers, normed, n_values)
+            self.add_module(f"q{number}", q)
 
     def forward(self, obs: torch.Tensor, act: torch.Tensor) -> tuple[torch.Tensor, ...]:
         """Return all values, shape (n, 1) each, of (n, n_obs) and (n, n_act)."""
@@ -147,7 +154,34 @@ class Critics(nn.Module):
         """Return the smallest of all values, shape (n,): the cautious estimate."""
         return reduce(torch.minimum, self.forward(obs, act)).squeeze(1)
 
+    def targets(self, obs: torch.Tensor, act: torch.Tensor) -> torch.Tensor:
+        """Return the values that targets are made of, shape (n, 1): the smallest."""
+        return self.least(obs, act).unsqueeze(1)
+
     def first(self, obs: torch.Tensor, act: torch.Tensor) -> torch.Tensor:
         """Return the first value, shape (n, 1), which an actor climbs."""
         value: torch.Tensor = next(self.children())(torch.cat([obs, act], dim=1))
         return value
+
+    def loss(
+        self,
+        obs: torch.Tensor,
+        act: torch.Tensor,
+        target: torch.Tensor,
+        weights: torch.Tensor | None,
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        """Return the sum of all squared errors' means, and errors of each row, (n,).
+
+        Args:
+            obs: Observations, (n, n_obs).
+            act: Actions, (n, n_act).
+            target: What they should say, (n, 1).
+            weights: Importance weights, (n, 1); None: all equal.
+        """
+        values = [value.float() for value in self.forward(obs, act)]
+        if weights is None:
+            losses = [functional.mse_loss(value, target) for value in values]
+        else:
+            losses = [(weights * (value - target) ** 2).mean() for value in values]
+        errors = torch.stack([(value.detach() - target).abs() for value in values])
+        return reduce(torch.add, losses), errors.mean(dim=0).squeeze(1)

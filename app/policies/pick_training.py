@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.policies.checkpoint import Checkpoint
-from app.policies.exploration import OptionNoise
+from app.policies.exploration import LadderNoise, OptionNoise
 from app.policies.networks import Critics, ResidualActor
 from app.policies.pick_preset import PickPreset
 from app.policies.progress import Progress
@@ -122,11 +122,20 @@ def start(
     first = 0 if resume is None else int(resume.manifest["step"])
     batch = PickBatch(cell, preset.n_envs, seed + first, settings_of(preset))
     env, rng = CellVecEnv(batch), np.random.default_rng(seed + first)
+    noise = LadderNoise(
+        batch.n_envs,
+        CONTROLLED,
+        batch.arm.dt,
+        sigma_max=preset.sigma_max,
+        time_s=preset.noise_time_s,
+        greedy_share=preset.greedy_share,
+        rng=rng,
+    )
     model = BatchTD3(
         preset,
         env,
         seed + first,
-        exploration=OptionNoise(preset, batch, rng),
+        exploration=OptionNoise(noise, batch, batch.world.station_q, preset.option_rate, rng),
         networks=Networks(
             actor=lambda: ResidualActor(preset.width, batch.obs_size),
             critic=lambda: Critics(preset.width, batch.obs_size),

@@ -11,6 +11,13 @@ from app.sim.goal_sets import MOST_HALTON, N_HALTON
 from app.sim.reach import GoalRule, StartRule, ViewName
 
 ACTORS = ("residual", "plain")
+CRITICS = ("mean", "quantiles")
+SIGHTS = ("observation", "future")
+PRECISIONS = ("float32", "bfloat16")
+MAX_BYTES = 16 * 1024 * 1024
+"""Size of the networks that a checkpoint holds [bytes]."""
+MOST_SEEN = 160
+"""Most numbers that a network sees, its smaller parts included."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,7 +35,7 @@ class ReachPreset:
     """Work cell trained in."""
 
     total_steps: int = number(
-        7_680_000, 1_000, 100_000_000, "env steps", "length of the training"
+        2_560_000, 1_000, 100_000_000, "env steps", "length of the training"
     )
     n_envs: int = number(128, 1, 1024, "", "cells stepped together")
     buffer_size: int = number(
@@ -40,16 +47,16 @@ class ReachPreset:
     )
     update_every: int = number(1, 1, 1000, "", "steps of all cells per update")
     lr_start: float = number(5e-4, 1e-6, 1e-2, "", "learning rate at the start")
-    lr_end: float = number(5e-5, 1e-7, 1e-2, "", "learning rate at the end")
+    lr_end: float = number(2e-5, 1e-7, 1e-2, "", "learning rate at the end")
     actor_lr_ratio: float = number(1.0, 0.01, 100.0, "", "actor's learning rate over critics'")
-    gamma: float = number(0.985, 0.5, 0.9999, "per step", "discount")
-    n_steps: int = number(3, 1, 20, "steps", "length of n-step returns")
+    gamma: float = number(0.99, 0.5, 0.9999, "per step", "discount")
+    n_steps: int = number(5, 1, 20, "steps", "length of n-step returns")
     tau: float = number(0.005, 1e-4, 1.0, "", "target update factor")
-    policy_delay: int = number(2, 1, 10, "updates", "critic updates per actor update")
+    policy_delay: int = number(1, 1, 10, "updates", "critic updates per actor update")
     target_noise: float = number(0.1, 0.0, 1.0, "", "smoothing noise on target actions")
     target_noise_clip: float = number(0.25, 0.0, 1.0, "", "bound of the smoothing noise")
     actor_frozen_updates: int = number(
-        300, 0, 1_000_000, "updates", "critic updates before the actor learns"
+        1_000, 0, 1_000_000, "updates", "critic updates before the actor learns"
     )
     width: int = number(256, 16, 1024, "units", "width of the hidden layers")
     layers: int = number(2, 1, 12, "", "hidden layers")
@@ -58,6 +65,24 @@ class ReachPreset:
     )
     critic_norm: str = choice("layer", ("layer", "none"), "normalisation in the critics")
     n_critics: int = number(2, 1, 10, "", "critics; the least value counts")
+    critic: str = choice(
+        "mean",
+        CRITICS,
+        "what critics say: the mean return, or quantiles, cut in targets",
+    )
+    n_quantiles: int = number(25, 2, 100, "", "quantiles per critic, for critic = quantiles")
+    dropped_quantiles: int = number(
+        2, 0, 99, "", "highest quantiles per critic that targets leave out"
+    )
+    critic_sees: str = choice(
+        "observation", SIGHTS, "what critics see: as the actor, or also where people will be"
+    )
+    ema: float = number(
+        0.999, 0.0, 0.99999, "", "what an update leaves of the actor's averaged weights; 0: none"
+    )
+    precision: str = choice(
+        "float32", PRECISIONS, "products in training; bfloat16 is faster on some processors"
+    )
     alpha: float = number(0.0, 0.0, 1.0, "", "exponent of replay priorities; 0 draws evenly")
     beta: float = number(0.4, 0.0, 1.0, "", "exponent of importance weights at the start")
 
@@ -69,13 +94,16 @@ class ReachPreset:
     greedy_share: float = number(
         0.05, 0.0, 1.0, "", "share of cells without ladder noise; at least one"
     )
+    option_rate: float = number(
+        0.0, 0.0, 0.5, "per step", "how often a random option starts in half the cells"
+    )
     ou_theta: float = number(0.3, 0.0, 1.0, "per step", "pull of Ornstein-Uhlenbeck noise")
     ou_sigma: float = number(0.15, 0.0, 2.0, "", "push of Ornstein-Uhlenbeck noise")
 
     time_limit_s: float = number(5.0, 1.0, 60.0, "s", "longest episode")
     goals: str = choice("grid", get_args(GoalRule), "where goals are drawn from")
     n_halton: int = number(
-        N_HALTON, 1, MOST_HALTON, "", "points of the Halton set, for goals = halton"
+        N_HALTON, 8, MOST_HALTON, "", "points of the Halton set, for goals = halton"
     )
     start: str = choice("clearance", get_args(StartRule), "where people may start")
     start_clearance_m: float = number(
@@ -102,18 +130,18 @@ class ReachPreset:
     c_d: float = number(0.0, 0.0, 10.0, "1/m", "cost of the distance to the goal")
     c_p: float = number(1.0, 0.0, 10.0, "1/m", "reward for progress toward the goal")
     c_a: float = number(0.0, 0.0, 10.0, "s^2/rad", "cost of accelerating")
-    c_step: float = number(0.004, 0.0, 1.0, "", "cost of a control period")
+    c_step: float = number(0.003, 0.0, 1.0, "", "cost of a control period")
     c_c: float = number(4.0, 0.0, 100.0, "", "cost of a collision")
     c_s: float = number(4.0, 0.0, 100.0, "", "bonus of a success")
 
     progress_steps: int = number(
-        51_200, 100, 1_000_000, "env steps", "steps between two points of the curve"
+        153_600, 100, 1_000_000, "env steps", "steps between two points of the curve"
     )
     progress_episodes: int = number(
-        540, 1, 10_000, "episodes", "episodes played for a point of the curve"
+        1_080, 1, 10_000, "episodes", "episodes played for a point of the curve"
     )
     checkpoint_steps: int = number(
-        512_000, 100, 10_000_000, "env steps", "steps between two checkpoints"
+        614_400, 100, 10_000_000, "env steps", "steps between two checkpoints"
     )
 
     @property
@@ -140,7 +168,37 @@ class ReachPreset:
             raise InvalidInput(
                 "overrides.actor", self.actor, "must be plain with observation = state"
             )
+        if self.dropped_quantiles >= self.n_quantiles:
+            raise InvalidInput(
+                "overrides.dropped_quantiles",
+                self.dropped_quantiles,
+                f"must be below n_quantiles = {self.n_quantiles}",
+            )
+        if self.observation == "state" and self.critic_sees == "future":
+            raise InvalidInput(
+                "overrides.critic_sees",
+                self.critic_sees,
+                "must be observation with observation = state: its time-outs are no true ends",
+            )
+        _check_size(self)
         check_learning(self.learning_starts, self.total_steps, self.buffer_size, self.n_envs)
+
+
+def _check_size(preset: ReachPreset) -> None:
+    """Check that the networks fit into a checkpoint.
+
+    Raises:
+        InvalidInput: They are too large.
+    """
+    per_network = preset.width * ((preset.layers - 1) * preset.width + MOST_SEEN)
+    size = 4 * (1 + preset.n_critics) * per_network
+    if size > MAX_BYTES:
+        raise InvalidInput(
+            "overrides.width",
+            preset.width,
+            f"makes networks of {size / 2**20:.0f} MB with layers = {preset.layers} and "
+            f"n_critics = {preset.n_critics}; must stay below {MAX_BYTES // 2**20} MB",
+        )
 
 
 THESIS = ReachPreset(
@@ -164,6 +222,7 @@ THESIS = ReachPreset(
     width=400,
     layers=10,
     actor="plain",
+    ema=0.0,
     critic_norm="none",
     n_critics=1,
     alpha=0.6,

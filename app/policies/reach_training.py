@@ -14,17 +14,19 @@ import torch
 from numpy.typing import NDArray
 
 from app.policies.checkpoint import Checkpoint
-from app.policies.exploration import Explorer, LadderNoise, OUNoise
+from app.policies.exploration import Explorer, LadderNoise, OptionNoise, OUNoise
 from app.policies.networks import Critics, PlainActor, ResidualActor
 from app.policies.progress import Progress
+from app.policies.quantiles import QuantileCritics
 from app.policies.ranges import Ranges
 from app.policies.reach_policy import LAYOUTS
 from app.policies.reach_preset import ReachPreset
 from app.policies.reporter import Reporter
 from app.policies.run import Parts, TrainingRun
 from app.policies.td3 import BatchTD3, Extras, Networks, critics_of
-from app.policies.vecenv import CellVecEnv
+from app.policies.vecenv import CellVecEnv, Foresight
 from app.sim.cells import Cell
+from app.sim.kernels.kinematics import ik_vertical_batch
 from app.sim.kernels.occupancy import VX, VY, R, X, Y
 from app.sim.kernels.reach_features import BASE_START
 from app.sim.kernels.reach_reward import ReachWeights
@@ -64,11 +66,12 @@ def settings_of(preset: ReachPreset) -> ReachSettings:
     )
 
 
-def _explorer(preset: ReachPreset, batch: ReachBatch, seed: int) -> Explorer:
+def explorer_of(preset: ReachPreset, batch: ReachBatch, seed: int) -> Explorer:
+    """Return what changes actions so that other ones are tried."""
     rng = np.random.default_rng(seed)
     if preset.noise == "ou":
         return OUNoise(batch.n_envs, N_ACT, preset.ou_theta, preset.ou_sigma, rng)
-    return LadderNoise(
+    ladder = LadderNoise(
         batch.n_envs,
         N_ACT,
         batch.arm.dt,
@@ -77,23 +80,30 @@ def _explorer(preset: ReachPreset, batch: ReachBatch, seed: int) -> Explorer:
         greedy_share=preset.greedy_share,
         rng=rng,
     )
+    if preset.option_rate == 0.0:
+        return ladder
+    arm, targets = batch.arm, batch.world.targets
+    postures, _ = ik_vertical_batch(targets, arm.tool_length, arm.q_min, arm.q_max)
+    return OptionNoise(ladder, batch, postures, preset.option_rate, rng)
 
 
-def _networks(preset: ReachPreset, n_obs: int) -> Networks:
-    width, layers = preset.width, preset.layers
+def networks_of(preset: ReachPreset, n_obs: int, n_critic: int) -> Networks:
+    """Return what makes an actor that sees ``n_obs`` numbers and critics that see more."""
+    width, layers, normed = preset.width, preset.layers, preset.critic_norm == "layer"
 
     def actor() -> ResidualActor | PlainActor:
         if preset.actor == "residual":
             return ResidualActor(width, n_obs, N_ACT, BASE_START, layers)
         return PlainActor(width, n_obs, N_ACT, layers)
 
-    return Networks(
-        actor=actor,
-        critic=lambda: Critics(
-            width, n_obs, N_ACT, preset.n_critics, layers, preset.critic_norm == "layer"
-        ),
-        fused=True,
-    )
+    def critic() -> Critics:
+        n = preset.n_critics
+        if preset.critic == "mean":
+            return Critics(width, n_critic, N_ACT, n, layers, normed)
+        quantiles = preset.n_quantiles, preset.dropped_quantiles
+        return QuantileCritics(width, n_critic, N_ACT, n, layers, normed, *quantiles)
+
+    return Networks(actor=actor, critic=critic, fused=True)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -127,26 +137,30 @@ def start(
     """
     first = 0 if resume is None else int(resume.manifest["step"])
     batch = ReachBatch(cell, preset.n_envs, seed + first, settings_of(preset))
-    env = CellVecEnv(batch, sees_time=preset.observation == "features")
+    foresight = Foresight(batch) if preset.critic_sees == "future" else None
+    env = CellVecEnv(batch, preset.observation == "features", foresight)
     model = BatchTD3(
         preset,
         env,
         seed + first,
-        exploration=_explorer(preset, batch, seed + first),
-        networks=_networks(preset, batch.obs_size),
+        exploration=explorer_of(preset, batch, seed + first),
+        networks=networks_of(preset, batch.obs_size, env.n_seen),
         extras=Extras(
             update_every=preset.update_every,
             actor_lr_ratio=preset.actor_lr_ratio,
             alpha=preset.alpha,
             beta=preset.beta,
+            ema=preset.ema,
+            bfloat16=preset.precision == "bfloat16",
         ),
     )
     ranges = Ranges(resume.manifest["trained_range"] if resume else None)
     parts = Parts(
-        policy={"actor": model.actor.mu, "critic": critics_of(model.critic)},
+        policy={"actor": model.decider, "critic": critics_of(model.critic)},
         targets={
             "actor_target": model.actor_target.mu,
             "critic_target": critics_of(model.critic_target),
+            **({} if model.averaged is None else {"actor_learned": model.actor.mu}),
         },
         optimizers={
             "actor_adam": model.actor.optimizer,
@@ -157,7 +171,7 @@ def start(
         trained_range=ranges.as_json,
     )
     run = TrainingRun(preset, seed, cell, model, env, parts, resume)
-    return run, Watched(batch=batch, actor=model.actor.mu, ranges=ranges)
+    return run, Watched(batch=batch, actor=model.decider, ranges=ranges)
 
 
 class ReachReporter(Reporter):

@@ -207,6 +207,8 @@ SORTING_PRESETS = (
         name="sorting-e1-dqn",
         cell="sorting-e1",
         total_steps=2_048_000,
+        advice_share=0.5,
+        advice_margin=0.1,
     ),
     SortingPreset(
         name="sorting-e1-dqn-pure",

@@ -11,6 +11,7 @@ thesis sections 2.7.2 and 4.4.
 """
 
 from collections.abc import Callable
+from copy import deepcopy
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
@@ -22,7 +23,6 @@ from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.common.utils import polyak_update
 from stable_baselines3.td3.policies import Actor, TD3Policy
 from torch import Tensor, nn
-from torch.nn import functional
 
 from app.policies.exploration import Explorer
 from app.policies.networks import Critics
@@ -85,6 +85,10 @@ class Extras:
     """Exponent of replay priorities; 0 draws evenly."""
     beta: float = 1.0
     """Exponent of the importance weights at the start; it grows to 1."""
+    ema: float = 0.0
+    """Share of the actor's averaged weights that one update leaves; 0 keeps none."""
+    bfloat16: bool = False
+    """Whether networks are trained with products in bfloat16; weights stay float32."""
 
 
 PLAIN = Extras()
@@ -208,6 +212,13 @@ class BatchTD3(TD3):
             device="cpu",
             **replay,
         )
+        self.averaged = deepcopy(self.actor.mu) if extras.ema > 0.0 else None
+        """The actor with averaged weights, if they are kept."""
+
+    @property
+    def decider(self) -> nn.Module:
+        """The actor that checkpoints and curves are made of."""
+        return self.actor.mu if self.averaged is None else self.averaged
 
     def _sample_action(
         self, learning_starts: int, action_noise: Any = None, n_envs: int = 1
@@ -270,37 +281,35 @@ class BatchTD3(TD3):
         )
 
     def _update_critics(self, data: Minibatch) -> None:
-        with torch.no_grad():
+        critics = critics_of(self.critic)
+        with torch.no_grad(), self._precision():
             noise = torch.randn_like(data.act) * self.target_policy_noise
             noise = noise.clamp(-self.target_noise_clip, self.target_noise_clip)
             act = (self.actor_target(data.next_obs) + noise).clamp(-1.0, 1.0)
-            least = critics_of(self.critic_target).least(data.next_obs, act).unsqueeze(1)
-            target = data.rewards + data.discounts * least
-        values = critics_of(self.critic)(data.obs, data.act)
-        loss = sum_of_errors(values, target, data.weights)
+            values = critics_of(self.critic_target).targets(data.next_obs, act).float()
+        target = data.rewards + data.discounts * values
+        with self._precision():
+            loss, errors = critics.loss(data.obs, data.act, target, data.weights)
         self.critic.optimizer.zero_grad()
         loss.backward()  # type: ignore[no-untyped-call]
         self.critic.optimizer.step()
         if data.indices is not None:
-            with torch.no_grad():
-                errors = torch.stack([(value - target).abs() for value in values]).mean(dim=0)
             assert isinstance(self.replay_buffer, PrioritisedReplay)
-            self.replay_buffer.update(data.indices, errors.squeeze(1).numpy())
+            self.replay_buffer.update(data.indices, errors.numpy())
 
     def _update_actor(self, obs: Tensor) -> None:
-        loss = -critics_of(self.critic).first(obs, self.actor(obs)).mean()
+        critics = critics_of(self.critic)
+        critics.requires_grad_(False)
+        with self._precision():
+            loss = -critics.first(obs, self.actor(obs)).mean()
         self.actor.optimizer.zero_grad()
         loss.backward()  # type: ignore[no-untyped-call]
         self.actor.optimizer.step()
+        critics.requires_grad_(True)
+        if self.averaged is not None:
+            learned = (self._n_updates - self.preset.actor_frozen_updates) / self.policy_delay
+            decay = min(self.extras.ema, learned / (learned + 9.0))
+            polyak_update(self.actor.mu.parameters(), self.averaged.parameters(), 1.0 - decay)
 
-
-def sum_of_errors(values: tuple[Tensor, ...], target: Tensor, weights: Tensor | None) -> Tensor:
-    """Return the squared errors of all critics, (B, 1) each, each averaged, summed up."""
-    if weights is None:
-        losses = [functional.mse_loss(value, target) for value in values]
-    else:
-        losses = [(weights * (value - target) ** 2).mean() for value in values]
-    total = losses[0]
-    for loss in losses[1:]:
-        total = total + loss
-    return total
+    def _precision(self) -> torch.autocast:
+        return torch.autocast("cpu", torch.bfloat16, enabled=self.extras.bfloat16)

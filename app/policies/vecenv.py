@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
 from app.sim.kernels.episode import TIMEOUT
+from app.sim.kernels.foresight import N_AHEAD, look_ahead_of_walkers
+from app.sim.kernels.occupancy import WalkerState
 from app.sim.pick import OUTCOMES, PickBatch
 from app.sim.reach import ReachBatch
 from app.sim.sorting import SortingBatch
@@ -58,6 +60,28 @@ class BatchVecEnv(VecEnv):
         return list(self._get_indices(indices))
 
 
+class Foresight:
+    """Where the walkers of a batch will be, for critics.
+
+    Args:
+        batch: The scenario.
+    """
+
+    def __init__(self, batch: ReachBatch) -> None:
+        people = batch.state.people.walkers
+        self._rules, self._dt, self._walkers = batch.world.people.walkers, batch.arm.dt, people
+        self._copy = WalkerState(people.rows.copy(), people.stream.copy())
+        n_envs, n_walkers = people.rows.shape[:2]
+        self.size = n_walkers * N_AHEAD
+        """Numbers per row."""
+        self._ahead = np.zeros((n_envs, self.size))
+
+    def after(self, obs: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return observations with the future behind them, shape (n_envs, F + size)."""
+        look_ahead_of_walkers(self._rules, self._walkers, self._copy, self._dt, self._ahead)
+        return np.concatenate([obs, self._ahead], axis=1, dtype=np.float32)
+
+
 class CellVecEnv(BatchVecEnv):
     """One :class:`PickBatch` or :class:`ReachBatch`, seen by Stable-Baselines3.
 
@@ -68,10 +92,21 @@ class CellVecEnv(BatchVecEnv):
         batch: The scenario.
         sees_time: Whether observations tell the time left; if not, time-outs are marked as
             truncated, and values go on beyond them.
+        foresight: What critics see behind an observation; None: nothing. Final observations
+            have zeros there.
     """
 
-    def __init__(self, batch: PickBatch | ReachBatch, sees_time: bool = True) -> None:
-        self.batch = batch
+    def __init__(
+        self,
+        batch: PickBatch | ReachBatch,
+        sees_time: bool = True,
+        foresight: Foresight | None = None,
+    ) -> None:
+        self.batch, self._foresight = batch, foresight
+        beyond = 0 if foresight is None else foresight.size
+        self.n_seen = batch.obs_size + beyond
+        """Numbers that critics see."""
+        self._nothing = np.zeros(beyond, dtype=np.float32)
         self.ended = np.zeros(batch.n_envs, dtype=np.int64)
         """Outcome of the episodes that ended in the last step, 0 elsewhere."""
         self._sees_time = sees_time
@@ -79,13 +114,13 @@ class CellVecEnv(BatchVecEnv):
         self._infos: list[dict[str, Any]] = [{} for _ in range(batch.n_envs)]
         super().__init__(
             batch,
-            spaces.Box(-np.inf, np.inf, (batch.obs_size,), np.float32),
+            spaces.Box(-np.inf, np.inf, (self.n_seen,), np.float32),
             spaces.Box(-1.0, 1.0, (batch.n_act,), np.float32),
         )
 
     def reset(self) -> NDArray[np.float32]:
         """Start episode 0 of every cell."""
-        return self.batch.reset().copy()
+        return self._with_future(self.batch.reset())
 
     def step_async(self, actions: NDArray[np.float32]) -> None:
         """Keep the actions, shape (n_envs, n_act), for the next step_wait."""
@@ -100,9 +135,12 @@ class CellVecEnv(BatchVecEnv):
         infos = self._infos.copy()
         for row in np.flatnonzero(self.ended):
             infos[row] = {
-                "terminal_observation": result.last_obs[row].copy(),
+                "terminal_observation": np.concatenate([result.last_obs[row], self._nothing]),
                 "outcome": OUTCOMES[self.ended[row]],
             }
             if not self._sees_time and self.ended[row] == TIMEOUT:
                 infos[row]["TimeLimit.truncated"] = True
-        return result.obs.copy(), result.rew.copy(), self.ended > 0, infos
+        return self._with_future(result.obs), result.rew.copy(), self.ended > 0, infos
+
+    def _with_future(self, obs: NDArray[np.float32]) -> NDArray[np.float32]:
+        return obs.copy() if self._foresight is None else self._foresight.after(obs)

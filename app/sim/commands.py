@@ -248,33 +248,44 @@ def check(command: Command, cell: Cell, people: Sequence[int]) -> None:
         InvalidInput: A number or mode out of range, nobody of that id, or no room.
         NotFound: The cell has no such station, or no such case study.
     """
+    if isinstance(command, SORTING_COMMANDS):
+        check_sorting(command, cell)
+        return
+    if isinstance(command, REACH_COMMANDS):
+        check_reaching(command, cell)
+        return
     match command:
         case MoveHuman() | SetMode() | SetMotion() | SetBody() | RemovePerson() | AddPerson():
             _check_person(command, people)
             if is_reaching(cell):
                 _check_cylinder(command, cell)
-        case SetCandidates() | ToggleCandidate() | StartCase() if is_sorting(cell):
-            rule = f"needs a pick-and-place cell: {cell.name} is a sorting cell"
-            raise InvalidInput("tag", command.tag, rule)
-        case SetCandidates() | ToggleCandidate() | StartCase() if is_reaching(cell):
-            rule = f"needs a pick-and-place cell: {cell.name} has goals to reach instead"
-            raise InvalidInput("tag", command.tag, rule)
+        case SetCandidates() | ToggleCandidate() | StartCase():
+            _check_stations(command, cell)
+        case SetPolicy() if is_reaching(cell) and command.policy is not None:
+            rule = "needs a policy that reaches goals: this one chooses tasks"
+            raise InvalidInput("checkpoint", command.policy.checkpoint, rule)
+        case SetSpeed():
+            _check_speed(command)
+        case _:
+            pass
+
+
+def _check_stations(command: SetCandidates | ToggleCandidate | StartCase, cell: Cell) -> None:
+    rule = f"needs a pick-and-place cell: {cell.name}"
+    if is_sorting(cell):
+        raise InvalidInput("tag", command.tag, f"{rule} is a sorting cell")
+    if is_reaching(cell):
+        raise InvalidInput("tag", command.tag, f"{rule} has goals to reach instead")
+    match command:
         case SetCandidates():
             for name in command.ids:
                 cell.station(name)
         case ToggleCandidate():
             cell.station(command.id)
-        case SetSpeed():
-            _check_speed(command)
         case StartCase():
             names = tuple(case.id for case in cases_of(cell))
             if command.id not in names:
                 raise NotFound("case study of this cell", command.id, names)
-        case _:
-            if isinstance(command, SORTING_COMMANDS):
-                check_sorting(command, cell)
-            elif isinstance(command, REACH_COMMANDS):
-                check_reaching(command, cell)
 
 
 def _check_speed(command: SetSpeed) -> None:

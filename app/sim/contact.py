@@ -185,7 +185,10 @@ def walker_distances(arm: Arm, people: People, q: Vec, cylinders: Vec) -> Vec:
     robot = arm_kernel.new_robot_pose(arm)
     arm_kernel.place_robot(arm, own(q), robot)
     return np.array(
-        [cylinder_clearance(robot.columns, 0, *row, people.top_z)[0] for row in cylinders]
+        [
+            cylinder_clearance(robot.columns, 0, x, y, r, people.top_z)[0]
+            for x, y, r in cylinders
+        ]
     )
 
 

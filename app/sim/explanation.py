@@ -22,6 +22,7 @@ _BODIES = {
     "hand_l": "the left hand",
     "leg_r": "the right leg",
     "leg_l": "the left leg",
+    "walker": "the person",
     "table": "the table",
     "robot": "another part of the robot",
 }

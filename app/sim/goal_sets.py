@@ -117,12 +117,13 @@ class GoalCells(Protocol):
         """
 
 
-def _inside(targets: Vec, goals: Vec, field: str) -> Vec:
+def _inside(low: Vec, high: Vec, goals: Vec, field: str) -> Vec:
     """Return goals moved into the targets' box from as far as rounding puts them."""
     points = np.array(goals, dtype=np.float64, ndmin=2)
     if points.ndim != 2 or points.shape[1] != 3:
         raise InvalidInput(field, list(np.shape(goals)), "must have the shape [n, 3]")
-    low, high = targets.min(axis=0), targets.max(axis=0)
+    if ((points >= low) & (points <= high)).all():
+        return points
     held = np.clip(points, low, high)
     # Written so that NaN is refused too.
     wrong = np.flatnonzero(~(np.abs(held - points) <= SLACK).all(axis=1))
@@ -168,6 +169,7 @@ class GridCells:
     def __init__(self, targets: Vec) -> None:
         self.targets = np.array(targets, dtype=np.float64)
         """The grid's points [m], shape (n_targets, 3)."""
+        self._low, self._high = self.targets.min(axis=0), self.targets.max(axis=0)
         self._x, self._y, self._z = (np.unique(self.targets[:, i]) for i in range(3))
         planes = np.meshgrid(self._x, self._y, self._z, indexing="ij")
         points = np.stack(planes, axis=-1).reshape(-1, 3)
@@ -177,7 +179,7 @@ class GridCells:
 
     def mix(self, goals: Vec, field: str = "goal") -> GoalMix:
         """Return the corners of each goal's box and trilinear weights; see GoalCells."""
-        inside = _inside(self.targets, goals, field)
+        inside = _inside(self._low, self._high, goals, field)
         which = np.empty((len(inside), N_BOX), dtype=np.int64)
         weights = np.empty((len(inside), N_BOX))
         box_weights(self._x, self._y, self._z, inside, which, weights)
@@ -198,6 +200,7 @@ class HaltonCells:
         self.targets = np.array(targets, dtype=np.float64)
         """The points [m], shape (n_targets, 3)."""
         low, high = self.targets.min(axis=0), self.targets.max(axis=0)
+        self._low, self._high = low, high
         at_corner = ((self.targets == low) | (self.targets == high)).all(axis=1)
         if at_corner.sum() != N_CORNERS or not (low < high).all():
             rule = "must have the 8 corners of their box among them, once each"
@@ -212,7 +215,7 @@ class HaltonCells:
 
     def mix(self, goals: Vec, field: str = "goal") -> GoalMix:
         """Return the corners of each goal's tetrahedron and its weights; see GoalCells."""
-        inside = _inside(self.targets, goals, field)
+        inside = _inside(self._low, self._high, goals, field)
         which = np.empty((len(inside), N_SIMPLEX), dtype=np.int64)
         weights = np.empty((len(inside), N_SIMPLEX))
         simplex_weights(self.corners, self._inverse, self._last, inside, which, weights)

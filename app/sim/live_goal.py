@@ -24,11 +24,11 @@ class LiveGoal:
 
     def __init__(self, cell: Cell, seed: int) -> None:
         self.targets = goal_region_of(cell).targets()
-        """The goals that policies are trained on [m], shape (n, 3)."""
+        """The cell's targets [m], shape (n, 3)."""
+        self.among: Vec | None = None
+        """Goals it jumps among [m], shape (n, 3); None for any point of the region."""
         self.mode: GoalMode = "jump"
         """Where the goal is next."""
-        self.anywhere = False
-        """Whether it jumps to any point of the region, not to a target."""
         self._low, self._high = goal_box(cell)
         self._seed = seed
         self.restart()
@@ -48,9 +48,9 @@ class LiveGoal:
         self.position = new
 
     def _drawn(self) -> Vec:
-        if self.anywhere:
-            return self._rng.uniform(self._low, self._high)
-        return self.targets[self._rng.integers(len(self.targets))].copy()
+        if self.among is None:
+            return np.asarray(self._rng.uniform(self._low, self._high))
+        return np.array(self.among[self._rng.integers(len(self.among))])
 
     def put(self, position: tuple[float, float, float]) -> None:
         """Put it elsewhere [m]."""

@@ -1,8 +1,9 @@
 """What moves the robot of a live reach cell: a policy, or a straight way to a posture.
 
-The policy sees what it saw in training: the row of a :class:`~app.sim.reach.ReachBatch` is filled
-with robot, people and goal as they are, and observed. Without a policy the robot goes straight in
-joint space to the posture with its tool pointing down at the goal, whoever stands in the way.
+The policy sees what it saw in training: the row of a :class:`~app.sim.reach.ReachBatch` is
+filled with robot, people and goal as they are, and observed. Without a policy the robot goes
+straight in joint space to the posture with its tool pointing down at the goal, whoever stands
+in the way.
 """
 
 import time
@@ -16,10 +17,10 @@ from app.sim.live_arm import GAIN, LiveArm
 from app.sim.ports import Vec
 from app.sim.reach import ReachBatch, ReachSettings
 from app.sim.reach_ports import ReachPilot
+from app.sim.scene import HumanKind
 
 TIME_LIMIT_S = 5.0
 """Time to reach a goal [s] (METHOD 2.3)."""
-_ROW = np.zeros(1, dtype=np.int64)
 
 
 class LiveReacher:
@@ -39,7 +40,7 @@ class LiveReacher:
     def use(self, pilot: ReachPilot | None) -> None:
         """Let another policy move."""
         self.pilot = pilot
-        self.way = "" if pilot is None else pilot.ways[0]
+        self.way = "" if pilot is None else usual_way(pilot)
         self.elapsed_ms = None
         self._batch: ReachBatch | None = None
 
@@ -64,7 +65,7 @@ class LiveReacher:
             return straight(robot.arm, robot.q, robot.posture_at(goal)[0])
         started = time.perf_counter()
         batch = self._filled(self.pilot, robot, walkers, clear_m, time_left)
-        batch.set_goals(_ROW, goal[None])
+        batch.state.goal[0] = goal
         act = np.asarray(self.pilot.acts(batch, self.way)[0], dtype=np.float64)
         self.elapsed_ms = 1e3 * (time.perf_counter() - started)
         return np.clip(act, -1.0, 1.0)
@@ -75,8 +76,9 @@ class LiveReacher:
         """Return the batch with its one row as the live cell is."""
         n = len(walkers)
         if self._batch is None or self._batch.state.people.walkers.rows.shape[1] != n:
+            people: tuple[HumanKind, ...] = tuple("walker" for _ in range(n))
             settings = ReachSettings(
-                people=("walker",) * n,
+                people=people,
                 time_limit_s=TIME_LIMIT_S,
                 observation=pilot.view,
                 action=pilot.action,
@@ -91,6 +93,11 @@ class LiveReacher:
         state.clear[0, 0], state.time_left[0] = clear_m, left
         state.elapsed[0] = TIME_LIMIT_S - left
         return self._batch
+
+
+def usual_way(pilot: ReachPilot) -> str:
+    """Return how a policy is asked at first: between its targets where it can be."""
+    return "interpolated" if "interpolated" in pilot.ways else pilot.ways[0]
 
 
 def straight(arm: Arm, q: Vec, posture: Vec) -> Vec:

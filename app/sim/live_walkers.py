@@ -83,6 +83,7 @@ UPRIGHT = BodyView(
 )
 """The size of the mannequin inside a cylinder."""
 
+
 class LiveWalkers:
     """The people of one live reach cell; row ``id`` of each array is that person's.
 
@@ -161,7 +162,8 @@ class LiveWalkers:
 
     def move_while_paused(self, dt: float) -> bool:
         """Move whoever is dragged; return whether anybody moved."""
-        return any([one.after(dt) for one in self if one.mode == "manual"])
+        moved = [one.after(dt) for one in self if one.mode == "manual"]
+        return any(moved)
 
     def set_speed(self, speed: float | None) -> None:
         """Let all walk with one speed [m/s], or as METHOD 2.1 says."""

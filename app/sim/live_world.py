@@ -1,4 +1,4 @@
-"""The live world of a cell: sorting where there is something to sort, else pick and place."""
+"""The live world of a cell: sorting, reaching or pick and place, whatever it has things for."""
 
 from typing import Protocol
 
@@ -7,6 +7,9 @@ from app.sim import sorting_commands
 from app.sim.cells import Cell, lacks_for_pick
 from app.sim.commands import Command
 from app.sim.ports import SortingValues, TaskPolicy
+from app.sim.reach_commands import SetWay, is_reaching, lacks_for_reaching
+from app.sim.reach_ports import ReachPilot
+from app.sim.reach_world import ReachWorld, check_way
 from app.sim.snapshot import WorldSnapshot
 from app.sim.sorting import shape_of
 from app.sim.sorting_cell import is_sorting, lacks_for_sorting
@@ -40,6 +43,7 @@ def new_world(
     seed: int,
     id: str = "main",
     sorter: SortingValues | None = None,
+    pilot: ReachPilot | None = None,
 ) -> LiveWorld:
     """Return the world of a cell.
 
@@ -49,7 +53,10 @@ def new_world(
         seed: Seed of people and tasks.
         id: Name of the world in URLs.
         sorter: Values the moves of a sorting cell; None leaves them to the exact planner.
+        pilot: Moves the arm of a reach cell; None goes straight.
     """
+    if is_reaching(cell):
+        return ReachWorld(cell, pilot, seed, id)
     if is_sorting(cell):
         return SortingWorld(cell, policy, seed, id, sorter)
     return World(cell, policy, seed, id)
@@ -57,6 +64,8 @@ def new_world(
 
 def lacks_for_live(cell: Cell) -> str | None:
     """Say what a cell lacks to be shown live; None where nothing."""
+    if is_reaching(cell):
+        return lacks_for_reaching(cell)
     return lacks_for_sorting(cell) if is_sorting(cell) else lacks_for_pick(cell)
 
 
@@ -69,13 +78,16 @@ def tests_of(cell: Cell) -> tuple[SortingTest, ...]:
 
 
 def check_on_table(command: Command, cell: Cell, snapshot: WorldSnapshot) -> None:
-    """Refuse a command that does not fit the blocks and the goal of a snapshot.
+    """Refuse a command that does not fit the blocks, the goal or the policy of a snapshot.
 
     The world may have gone on since; it looks again.
 
     Raises:
-        InvalidInput: No such block, a taken place, too many blocks, or a goal they cannot meet.
+        InvalidInput: No such block, a taken place, too many blocks, a goal they cannot meet, or
+            no such way to ask the policy.
     """
+    if snapshot.reach is not None and isinstance(command, SetWay):
+        check_way(command.way, snapshot.reach.ways)
     if snapshot.sorting is None or not isinstance(command, SORTING_COMMANDS):
         return
     if isinstance(command, sorting_commands.StartTest):

@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from app.sim.ports import Vec
+
 if TYPE_CHECKING:  # the batch needs the ports first
     from app.sim.actions import ActionSettings
     from app.sim.reach import GoalRule, ReachBatch, ViewName
@@ -39,11 +41,15 @@ class ReachPilot(Protocol):
 
     @property
     def goals(self) -> "GoalRule":
-        """Which goals it was trained on."""
+        """Where the goals of its training were drawn from."""
+
+    @property
+    def targets(self) -> Vec | None:
+        """The goals it was trained on [m], shape (n, 3); None for a whole box."""
 
     @property
     def ways(self) -> tuple[str, ...]:
-        """How it can be asked, the usual way first: ``direct``, ``interpolated``."""
+        """How it can be asked, ``direct`` among them; see ``app.policies.movers``."""
 
     def acts(self, batch: "ReachBatch", way: str) -> NDArray[np.float32]:
         """Return the actions for every environment of a batch, shape (n_envs, 6).

@@ -7,9 +7,9 @@ training did not see, and neither did it see goals that move.
 
 Between what the policy wants and what is executed stands the safety layer (METHOD 2.7). It can
 be switched off, to see what the policy does alone; then a contact is shown for two seconds and
-the robot starts again from home. With the layer, nobody is met while the robot moves, inside its
-assumptions; whoever walks into it while it stands is counted apart, and it waits until they have
-gone on. Since the layer makes the robot wait, it then has the longer time limit of METHOD 2.6.
+the robot starts again from home. With the layer nobody is met while the robot moves, inside
+its assumptions; whoever walks into it while it stands is counted apart, and it waits until
+they have gone on. Since it makes the robot wait, it comes with the longer time of METHOD 2.6.
 
 Source: METHOD 2.1 to 2.3, 2.6, 2.7.
 """
@@ -37,8 +37,8 @@ from app.sim.ports import Vec
 from app.sim.reach_commands import ReachCommand
 from app.sim.reach_ports import ReachPilot
 from app.sim.reach_view import ReachCounters, ReachView, SafetyView
-from app.sim.safety import SafetyDecision, SafetyLayer, safety_settings
-from app.sim.separation import nearest_cylinder, separation_of, zone
+from app.sim.safety import SafetyDecision, SafetyLayer, SeparationTerms, safety_settings
+from app.sim.separation_zone import separation_zone
 from app.sim.snapshot import Counters, Status, WorldSnapshot
 
 LONG_LIMIT_S = 25.0
@@ -73,7 +73,7 @@ class ReachWorld:
         self._layer = SafetyLayer(self._stage.robot.arm, safety_settings(cell))
         self._top = cell.floor_z + self._stage.people.height
         self._obeys = True
-        self._goal.anywhere = self._is_anywhere()
+        self._goal.among = self._goals_drawn()
         self._reset()
 
     # Starts and ends.
@@ -111,9 +111,7 @@ class ReachWorld:
         stage = self._stage
         commands.check(command, self.cell, stage.people.ids)
         match command:
-            case (
-                commands.Pause() | commands.Resume() | commands.StepOnce() | commands.Reset()
-            ):
+            case commands.Pause() | commands.Resume() | commands.StepOnce() | commands.Reset():
                 self._control_clock(command)
             case _ if isinstance(command, PeopleCommand):
                 stage.people.robot_q = stage.robot.q
@@ -151,7 +149,7 @@ class ReachWorld:
             case reach_commands.SetWay():
                 check_way(command.way, self._reacher.ways)
                 self._reacher.way = command.way
-                self._goal.anywhere = self._is_anywhere()
+                self._goal.among = self._goals_drawn()
             case reach_commands.SetWalk():
                 self._stage.people.set_speed(command.speed)
             case reach_commands.SetPilot():
@@ -160,14 +158,13 @@ class ReachWorld:
 
     def _use(self, pilot: ReachPilot | None) -> None:
         self._reacher.use(pilot)
-        self._goal.anywhere = self._is_anywhere()
+        self._goal.among = self._goals_drawn()
         self._follow_goal()
 
-    def _is_anywhere(self) -> bool:
-        """Whether goals are drawn between the targets too."""
-        pilot = self._reacher.pilot
-        trained_there = pilot is not None and pilot.goals == "box"
-        return pilot is None or trained_there or self._reacher.way != pilot.ways[0]
+    def _goals_drawn(self) -> Vec | None:
+        """Return the goals to draw from: those the policy was trained on, or None for any."""
+        pilot, way = self._reacher.pilot, self._reacher.way
+        return None if pilot is None or "interpolated" in way else pilot.targets
 
     def _follow_goal(self) -> None:
         """Give the robot all its time again, unless it stands at the goal or cannot move."""
@@ -262,9 +259,7 @@ class ReachWorld:
         if stage.status == "moving":
             clear = robot.clearance_m if robot.clearance_m is not None else FAR
             left = min(stage.time_left, TIME_LIMIT_S)
-            act = self._reacher.act(
-                robot, stage.people.rows, self._goal.position, clear, left
-            )
+            act = self._reacher.act(robot, stage.people.rows, self._goal.position, clear, left)
             wanted = robot.piece(act, straight=self._reacher.pilot is None)
         else:
             wanted = robot.piece(np.zeros(6), straight=True)
@@ -279,23 +274,25 @@ class ReachWorld:
 
     def _seen(self, told: SafetyDecision, shapes: Shapes) -> SafetyView:
         """Return the layer's decision with the terms of S_p."""
-        arm, settings, robot = self._layer.arm, self._layer.settings, self._stage.robot
-        near = nearest_cylinder(arm, robot.q, shapes.cylinders)
-        terms = None if near is None else separation_of(arm, settings, robot.qd, near.capsule)
+        layer, robot = self._layer, self._stage.robot
+        found = layer.terms(told, robot.qd, shapes)
+        who, terms = (None, None) if found is None else found
         return SafetyView(
             on=self._obeys,
             override=told.override if self._obeys else 1.0,
             advised=told.override,
-            person=None if near is None else self._stage.people.ids[near.index],
-            link=None if near is None else near.link,
-            separation=None if near is None else near.distance,
-            required=None if terms is None else terms.required,
-            person_way=None if terms is None else terms.person_way,
-            robot_way=None if terms is None else terms.robot_way,
-            margin=settings.margin,
-            human_speed=settings.human_speed,
+            person=None if who is None else self._stage.people.ids[who],
+            link=terms.link if terms else None,
+            separation=terms.separation if terms else None,
+            required=terms.required if terms else None,
+            person_way=_person_way(terms) if terms else None,
+            robot_way=terms.robot_speed * terms.reaction_time + terms.braking
+            if terms
+            else None,
+            margin=layer.settings.margin,
+            human_speed=layer.settings.human_speed,
             stop_time=told.stop_time,
-            zone=frozen(zone(arm, settings, robot.q, robot.qd)),
+            zone=frozen(separation_zone(layer.arm, layer.settings, robot.q, robot.qd)),
         )
 
     # What is seen.
@@ -353,6 +350,11 @@ def check_way(way: str, ways: tuple[str, ...]) -> None:
     if way not in ways:
         rule = "is no way to ask this policy" if ways else "needs a policy: none acts here"
         raise InvalidInput("way", way, rule, ways)
+
+
+def _person_way(terms: SeparationTerms) -> float:
+    """Return what a person covers until the robot rests [m]."""
+    return terms.human_speed * (terms.reaction_time + terms.stop_time)
 
 
 def _stands(qd: Vec) -> bool:

@@ -214,9 +214,7 @@ class SortingWorld:
         """Carry out the action, the people having moved from where they were."""
         stage, descent = self._stage, self._descent
         straight = descent is not None or stage.decision is None
-        found = stage.robot.advance(
-            self._action(), stage.people, before, straight=straight
-        )
+        found = stage.robot.advance(self._action(), stage.people, before, straight=straight)
         if found.kind != "none":
             self._descent = None
             stage.note_contact(found)

@@ -176,9 +176,7 @@ class World:
         """Carry out the action, the people having moved from where they were."""
         stage = self._stage
         straight = stage.status == "picking"
-        found = stage.robot.advance(
-            self._action(), stage.people, before, straight=straight
-        )
+        found = stage.robot.advance(self._action(), stage.people, before, straight=straight)
         if found.kind != "none":
             stage.note_contact(found)
         elif stage.status == "picking":

@@ -215,7 +215,7 @@ def test_world_starts_anew_in_a_cell_of_the_user_s_own(client: TestClient) -> No
     ("body", "status"),
     [
         ({"cell": "kitchen"}, 404),
-        ({"cell": "shared-workspace"}, 422),
+        ({"cell": "shared-workspace", "checkpoint": "nobody"}, 422),
         ({"cell": "pick-and-place", "checkpoint": "nobody"}, 422),
         ({}, 422),
     ],

@@ -11,6 +11,8 @@ kinematics, features, both networks.
 ``sorting_decision.decide`` gives them to the service: with the plan behind the expected
 attempts, all moves ranked and the hand-over watched. Half of the tasks are disturbed.
 
+``motion-...`` is the next piece of motion toward a goal; see ``motion_decisions.py``.
+
 Clock time, of one thread: the median over all calls, with the least and the 99th percentile
 beside it.
 """
@@ -33,6 +35,7 @@ from app.sim.sorting import SortingSettings, batch_in, shape_of
 from app.sim.sorting_decision import decide
 from app.sim.sorting_state import SortingState
 from tests.benchmarks.measure import Row, arguments, report, row_without
+from tests.benchmarks.motion_decisions import motion_times
 
 BENCH = "decision-time"
 STATES = 64
@@ -151,6 +154,8 @@ def main() -> None:
         rows.append(row_without("sorting", "no checkpoint that sorts is shipped"))
     largest = SORTING_CELLS[0]
     rows.append(measured_sorting("sorting-planner", None, largest, options.seed, seconds))
+    times, which = motion_times(options.seed, 3.0 * seconds)
+    rows += [{**summary(name, 1, found), "policy": which} for name, found in times.items()]
     report(BENCH, rows, options)
 
 

@@ -59,6 +59,15 @@ def test_non_finite_weights_are_refused(shipped):
         formats.pack(shipped.manifest, arrays).arrays()
 
 
+def test_what_resumes_a_training_may_be_larger_than_a_policy(shipped):
+    large = bytes(formats.MAX_BYTES + 1)
+    with pytest.raises(InvalidInput, match=f"must not exceed {formats.MAX_BYTES} bytes"):
+        formats.load(shipped.manifest, large)
+    formats.load({**shipped.manifest, "kind": "resume"}, large)
+    with pytest.raises(InvalidInput, match=f"must not exceed {formats.MAX_RESUME_BYTES} bytes"):
+        formats.load({**shipped.manifest, "kind": "resume"}, bytes(4 * len(large)))
+
+
 def test_a_range_with_a_word_in_it_is_refused(shipped):
     ranges = {"q": {"low": [0.0], "high": ["much"]}}
     with pytest.raises(InvalidInput, match="trained_range.q"):

@@ -13,7 +13,7 @@ from app.sim import human
 from app.sim.actions import ActionSettings
 from app.sim.cells import load_cell
 from app.sim.goal_sets import halton_targets
-from app.sim.kernels.occupancy import VX, VY, R, X, Y
+from app.sim.kernels.occupancy import GROWTH, VX, VY, R, X, Y
 from app.sim.motion_ports import MotionDecision, MotionQuestion
 from app.sim.ports import Person
 from app.sim.reach import ReachBatch, ReachSettings
@@ -54,7 +54,7 @@ def told(batch: ReachBatch, e: int) -> MotionQuestion:
         Person(q=q.copy(), qd=qd.copy()) for q, qd in zip(rows.q[e], rows.qd[e], strict=True)
     ]
     for walker in rows.walkers.rows[e]:
-        people.append(standing_in(*walker[[X, Y, VX, VY, R]]))
+        people.append(standing_in(*walker[[X, Y, VX, VY, R, GROWTH]]))
     return MotionQuestion(
         q=state.q[e].copy(),
         qd=state.qd[e].copy(),
@@ -94,8 +94,11 @@ def test_people_may_come_in_any_order() -> None:
     for beside in ("nearest", "averaged"):
         first = one.decide(replace(asked, beside=beside))
         second = one.decide(replace(turned, beside=beside))
-        np.testing.assert_array_equal(first.act, second.act)
-        assert first.met == second.met[::-1] and first.seen == 2 - second.seen
+        np.testing.assert_allclose(first.act, second.act, atol=1e-12)
+        for here, there in zip(first.met, second.met[::-1], strict=True):
+            assert here.separation == there.separation
+            assert here.weight == pytest.approx(there.weight, abs=1e-12)
+        assert first.seen == 2 - second.seen
 
 
 def test_averaged_is_what_the_mover_does() -> None:

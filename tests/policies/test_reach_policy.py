@@ -8,10 +8,10 @@ import torch
 
 from app.errors import CheckpointMismatch, InvalidInput
 from app.policies import checkpoint as formats
-from app.policies import pretrained
+from app.policies import presets, pretrained
 from app.policies.model_state import under
-from app.policies.networks import PlainActor
 from app.policies.reach_policy import ReachPolicy, is_reach
+from app.policies.reach_training import networks_of
 from app.sim.actions import ActionSettings
 from app.sim.cells import load_cell
 from app.sim.goal_sets import halton_targets
@@ -32,11 +32,12 @@ def changed(checkpoint, **fields):
     return formats.load({**checkpoint.manifest, **fields}, checkpoint.tensors)
 
 
-@pytest.mark.parametrize("layers", [2, 5])
-def test_it_acts_as_the_network_that_was_trained(layers):
-    checkpoint = untrained_reach(seed=4, width=48, layers=layers)
+@pytest.mark.parametrize(("layers", "kind"), [(2, "residual"), (5, "plain")])
+def test_it_acts_as_the_network_that_was_trained(layers, kind):
+    checkpoint = untrained_reach(seed=4, width=48, layers=layers, actor=kind)
     policy = ReachPolicy(checkpoint)
-    actor = PlainActor(48, policy.n_obs, 6, layers)
+    preset = presets.resolve("reach-td3", {"width": 48, "layers": layers, "actor": kind})
+    actor = networks_of(preset, policy.n_obs, policy.n_obs).actor()
     actor.load_state_dict(under(checkpoint.arrays(), "actor"))
     obs = np.random.default_rng(1).normal(size=(300, policy.n_obs)).astype(np.float32)
     with torch.no_grad():
@@ -60,9 +61,9 @@ def test_it_says_what_it_is(checkpoint):
     np.testing.assert_array_equal(halton, halton_targets(goal_region_of(cell), 30))
 
 
-@pytest.mark.parametrize("view", ["features", "state"])
-def test_it_moves_the_robot_of_a_batch(view):
-    policy = ReachPolicy(untrained_reach(width=16, observation=view))
+@pytest.mark.parametrize(("view", "actor"), [("features", "residual"), ("state", "plain")])
+def test_it_moves_the_robot_of_a_batch(view, actor):
+    policy = ReachPolicy(untrained_reach(width=16, observation=view, actor=actor))
     batch = ReachBatch(
         load_cell("shared-workspace"), 3, 1, ReachSettings(observation=policy.view)
     )

@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from app.errors import CheckpointMismatch, InvalidInput
-from app.policies import presets
+from app.policies import presets, reach_training
 from app.policies.reach_policy import ReachPolicy
 from app.policies.reach_training import play, settings_of, states_met
 from app.policies.vecenv import CellVecEnv
@@ -124,6 +124,12 @@ def test_the_thesis_preset_is_table_4_2():
         ({"n_people": 5}, "overrides.n_people"),
         ({"gamma": 1.0}, "overrides.gamma"),
         ({"action_degree": 3, "action_bounds": "one-step"}, "overrides.action_bounds"),
+        ({"width": 1024, "layers": 8}, "overrides.width"),
+        (
+            {"critic_sees": "future", "observation": "state", "actor": "plain"},
+            "overrides.critic_sees",
+        ),
+        ({"dropped_quantiles": 25}, "overrides.dropped_quantiles"),
         ({"learning_starts": 900_000, "total_steps": 512_000}, "overrides.learning_starts"),
     ],
 )
@@ -131,3 +137,55 @@ def test_a_bad_override_is_refused_by_name(overrides, field):
     with pytest.raises(InvalidInput) as refused:
         presets.resolve("reach-td3", overrides)
     assert refused.value.field == field
+
+
+@pytest.mark.parametrize(
+    "option",
+    [
+        {"critic": "quantiles", "n_quantiles": 8},
+        {"critic_sees": "future"},
+        {"precision": "bfloat16"},
+        {"alpha": 0.5, "n_steps": 3},
+        {"n_critics": 3, "layers": 3},
+        {"goals": "halton", "n_people": 2},
+    ],
+)
+def test_every_option_trains_and_moves_the_actor(option):
+    short = {**TINY, "total_steps": 1024, "checkpoint_steps": 256, **option}
+    recorder = Recorder()
+    recorder.run(presets.resolve("reach-td3", short))
+    before, after = recorder.checkpoints[0][1].arrays(), recorder.checkpoints[-1][1].arrays()
+    assert all(np.isfinite(array).all() for array in after.values())
+    assert not np.array_equal(before["actor.net.0.weight"], after["actor.net.0.weight"])
+    ReachPolicy(recorder.checkpoints[-1][1])
+
+
+def test_averaged_weights_are_what_is_shown_and_kept():
+    preset = presets.resolve("reach-td3", {**TINY, "ema": 0.99})
+    stopped = Recorder(stop_at=768)
+    stopped.run(preset)
+    _, policy, state = stopped.checkpoints[-1]
+    shown, arrays = policy.arrays()["actor.net.0.weight"], state.arrays()
+    assert np.array_equal(shown, arrays["actor.net.0.weight"])
+    assert not np.array_equal(shown, arrays["actor_learned.net.0.weight"])
+    resumed = Recorder()
+    resumed.run(preset, resume=state)
+    assert resumed.progress[-1].step == preset.total_steps
+
+
+def test_critics_that_see_the_future_stand_beside_an_actor_that_does_not(preset):
+    ahead = presets.resolve("reach-td3", {**TINY, "critic_sees": "future"})
+    run, _ = reach_training.start(ahead, 1, None, load_cell("shared-workspace"))
+    plain, _ = reach_training.start(preset, 1, None, load_cell("shared-workspace"))
+    shapes = [
+        {name: array.shape for name, array in one.checkpoints()[0].arrays().items()}
+        for one in (run, plain)
+    ]
+    assert shapes[0]["actor.net.0.weight"] == shapes[1]["actor.net.0.weight"]
+    assert shapes[0]["critic.q1.0.weight"][1] == shapes[1]["critic.q1.0.weight"][1] + 12
+    env = run.model.get_env()
+    obs = env.reset()
+    with torch.no_grad():
+        act = run.model.actor(torch.as_tensor(obs))
+        obs[:, -12:] += 1.0
+        assert torch.equal(act, run.model.actor(torch.as_tensor(obs)))

@@ -12,6 +12,7 @@ from app.policies.run import TrainingRun
 from app.policies.td3 import BatchTD3, critics_of
 from app.sim.cells import load_cell
 from app.sim.kernels.features import LAYOUT, N_FEATURES
+from app.sim.reach import ReachBatch
 
 
 def model_of(run: TrainingRun) -> BatchTD3:
@@ -123,6 +124,22 @@ def test_the_plain_actor_sees_the_first_numbers_and_holds_still_at_first():
     act = actor(obs)
     assert act.shape == (50, 6) and act.abs().max() < 0.1
     assert torch.equal(act, actor(obs[:, :7]))
+
+
+def test_options_take_over_in_every_second_noisy_row():
+    preset = presets.resolve("reach-td3", {"n_envs": 16, "option_rate": 0.5, "sigma_max": 0.0})
+    cell = load_cell("shared-workspace")
+    batch = ReachBatch(cell, 16, 1, reach_training.settings_of(preset))
+    batch.reset()
+    explorer = reach_training.explorer_of(preset, batch, 3)
+    still = np.zeros((16, 6), dtype=np.float32)
+    changed = np.zeros(16, dtype=bool)
+    for _ in range(60):
+        taken = explorer.apply(still)
+        assert np.abs(taken).max() <= 1.0
+        changed |= taken.any(axis=1)
+        batch.step(taken)
+    assert changed.tolist() == [row >= explorer.n_greedy and row % 2 == 0 for row in range(16)]
 
 
 def test_ornstein_uhlenbeck_noise_settles_where_push_and_pull_balance():

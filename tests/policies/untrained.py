@@ -8,9 +8,9 @@ from app.policies import checkpoint as formats
 from app.policies import presets
 from app.policies.checkpoint import Checkpoint
 from app.policies.model_state import weights_of
-from app.policies.networks import PlainActor
 from app.policies.reach_policy import LAYOUTS
 from app.policies.reach_preset import ReachPreset
+from app.policies.reach_training import networks_of
 from app.policies.trained_cell import manifest_fields
 from app.sim.cells import Cell, load_cell
 from app.sim.reach import N_ACT
@@ -27,10 +27,10 @@ def untrained_reach(seed: int = 0, cell: Cell | None = None, **overrides: object
     preset = presets.resolve("reach-td3", overrides)
     assert isinstance(preset, ReachPreset)
     layout = LAYOUTS[preset.observation]
+    n_obs = sum(size for _, size in layout)
     generator = torch.random.get_rng_state()
     torch.manual_seed(seed)
-    n_obs = sum(size for _, size in layout)
-    actor = PlainActor(preset.width, n_obs, N_ACT, preset.layers)
+    actor = networks_of(preset, n_obs, n_obs).actor()
     with torch.no_grad():
         actor.net[-1].weight.mul_(40.0)
     torch.random.set_rng_state(generator)

@@ -11,7 +11,7 @@ from app.sim.checker import Shapes, capsule_shapes, no_people, shapes_of
 from app.sim.kernels import body
 from app.sim.kernels.columns import distances
 from app.sim.robot import Robot
-from app.sim.safety import SafetyLayer, SafetySettings, safety_settings
+from app.sim.safety import SafetyLayer, SafetySettings, powers_of_time, safety_settings
 from app.sim.scene import arm_of
 
 CELL = load_cell("pick-and-place")
@@ -235,3 +235,37 @@ def test_an_assumption_that_is_no_size_is_refused(value):
 def test_people_at_nan_are_refused():
     with pytest.raises(SimulationError, match="people"):
         SafetyLayer(ARM, BARE).decide(REST, NONE, NONE, NONE, ball(np.full(3, np.nan)))
+
+
+def test_terms_are_for_who_set_it_and_else_for_the_nearest():
+    layer = SafetyLayer(ARM, SafetySettings())
+    for distance, stopped in ((0.2, True), (2.0, False)):
+        people = ahead(distance)
+        decision = layer.decide(REST, PAN, NONE, NONE, people, 0.1)
+        person, terms = layer.terms(decision, PAN, people, 0.1)
+        assert (decision.override == 0.0) is stopped and person == 0
+        assert terms.separation == layer._watch.gap[0].min()
+        assert terms.reaction_time == pytest.approx(0.05 + 0.1 + 0.1)
+        assert terms.braking == pytest.approx(0.5 * terms.robot_speed * terms.stop_time)
+        if stopped:
+            assert (terms.link, terms.required) == (decision.link, decision.required)
+            assert terms.separation == decision.separation
+    alone = layer.decide(REST, PAN, NONE, NONE, no_people())
+    assert layer.terms(alone, PAN, no_people()) is None
+
+
+def test_scaled_motion_written_out_in_time_is_the_motion():
+    rng = np.random.default_rng(5)
+    layer = SafetyLayer(ARM, SafetySettings())
+    for drop in (0.0, 3.0, 20.0):
+        q, qd, c, d = rng.uniform(-1, 1, (4, 6))
+        decision = replace(
+            layer.decide(REST, NONE, NONE, NONE, no_people()), c=c, d=d, drop=drop
+        )
+        powers = powers_of_time(q, qd, c, d, drop)
+        for t in (0.0, 0.01, 0.05):
+            expected, speeds = decision.at(q, qd, t)
+            series = t ** np.arange(7)
+            np.testing.assert_allclose(powers @ series, expected, atol=1e-12)
+            slope = powers[:, 1:] @ (np.arange(1, 7) * series[:6])
+            np.testing.assert_allclose(slope, speeds, atol=1e-12)

@@ -6,6 +6,7 @@ import { Icon, Logo } from "./icons.js";
 import { isActive, useJobs } from "./jobs.js";
 import { useCell, WORLD } from "./live.js";
 import { goalColours } from "./palette.js";
+import { ReachDecision } from "./reach.js";
 import { SignIn } from "./signin.js";
 import { SortingDecision } from "./sorting.js";
 import { SmallPrint, Story } from "./story.js";
@@ -169,6 +170,7 @@ function Decision({ cell, checkpoints, jobs }) {
     return html`<${SortingDecision} world=${cell.world} cell=${cell.cell} send=${cell.send}
       checkpoints=${checkpoints} jobs=${jobs} />`;
   }
+  if (cell.world.reach) return html`<${ReachDecision} world=${cell.world} />`;
   return html`<${Story} world=${cell.world} />
     <${Values} world=${cell.world} cell=${cell.cell} history=${cell.history} ...${goals} />
     <${SmallPrint} world=${cell.world} />`;

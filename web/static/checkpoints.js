@@ -5,6 +5,7 @@ import * as format from "./format.js";
 
 const PER_JOB = 5;
 const CHOOSING = "choosing tasks";
+const REACHING = "reaching goals";
 const SORTING = "sorting";
 
 /** Known checkpoints; asked for again when `stamp` changes and by `refresh`. */
@@ -20,14 +21,16 @@ export function useCheckpoints(link, stamp) {
 
 export function Acting({ world, checkpoints, jobs, send }) {
   const now = world.checkpoint;
-  const groups = grouped(checkpoints.list.filter((c) => c.purpose === CHOOSING), jobs, now);
+  const purpose = world.reach ? REACHING : CHOOSING;
+  const groups = grouped(checkpoints.list.filter((c) => c.purpose === purpose), jobs, now);
   const known = groups.some((g) => g.items.some((c) => c.sha256 === now));
   return html`<label class="acting">
     <span>Acting</span>
     <select value=${now ?? ""} data-role="acting" aria-label="Checkpoint that acts in the cell"
       onFocus=${checkpoints.refresh} title=${world.policy_title ?? ""}
-      onChange=${(e) => send({ tag: "set-policy", checkpoint: e.target.value })}>
-      ${!now && html`<option value="" disabled>no policy</option>`}
+      onChange=${(e) => send({ tag: "set-policy", checkpoint: e.target.value || null })}>
+      ${world.reach && html`<option value="">straight to the goal</option>`}
+      ${!now && !world.reach && html`<option value="" disabled>no policy</option>`}
       ${now && !known && html`<option value=${now}>${world.policy_title ?? format.short(now)}</option>`}
       ${groups.map((group) => html`<optgroup key=${group.label} label=${group.label}>
         ${group.items.map((c) => html`<option key=${c.sha256} value=${c.sha256}>

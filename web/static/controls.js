@@ -3,6 +3,7 @@ import { html } from "./vendor/htm-preact-standalone.module.js";
 import { Icon } from "./icons.js";
 import { People } from "./people.js";
 import { Presets } from "./presets.js";
+import { ReachControls } from "./reachcontrols.js";
 
 const SPEEDS = [1, 2, 4, 8];
 
@@ -17,7 +18,7 @@ export function Controls({ world, cell, cases, send, colourOf, labelOf }) {
           <span>${world.paused ? "Resume" : "Pause"}</span></button>
         <button type="button" class="tool" disabled=${!world.paused} data-action="step"
           aria-label="Step"
-          title=${world.paused ? "One decision, 0.05 s" : "Pause first"}
+          title=${world.paused ? "One decision" : "Pause first"}
           onClick=${() => send({ tag: "step" })}><${Icon} name="step" /><span>Step</span></button>
         <button type="button" class="tool" data-action="reset" aria-label="Reset"
           onClick=${() => send({ tag: "reset" })}><${Icon} name="reset" /><span>Reset</span></button>
@@ -28,7 +29,8 @@ export function Controls({ world, cell, cases, send, colourOf, labelOf }) {
         </select>
       </div>
     </${People}>
-    ${world.sorting
+    ${world.reach ? html`<${ReachControls} world=${world} send=${send} />`
+      : world.sorting
       ? html`<${Presets} label="Tests" items=${cell?.sorting_tests ?? []} tag="start-test"
           running=${world.sorting.test} send=${send}
           hint="Six tests of the study: the cell is laid out anew and the robot sorts." />`

@@ -29,10 +29,25 @@ const FAILURES = [
 ];
 const LIGHT_ON_FAILURE = 0.6;
 
+/** Override -> colour; the same as OVERRIDES in web/reach_scene.py. */
+export const OVERRIDES = [
+  [0.0, [214, 52, 46]],
+  [0.5, [240, 176, 52]],
+  [1.0, [38, 166, 104]],
+];
+
+/** The terms of the protective separation distance; as in reach.css. */
+export const TERMS = { walk: "rgb(240 176 92)", way: "rgb(104 150 210)", margin: "rgb(160 172 184)" };
+
 /** Colour of a goal worth `value` where the best is worth `best`. */
 export function colourByValue(value, best) {
   if (!Number.isFinite(value) || !Number.isFinite(best)) return UNKNOWN;
   return along(RAMP, best - value);
+}
+
+/** Colour of a robot that goes at this share of its speed. */
+export function overrideColour(override) {
+  return along(OVERRIDES, override);
 }
 
 /** Colour of a cell where grasps fail with this chance, and of what is written on it. */

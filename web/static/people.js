@@ -4,6 +4,7 @@ import { get } from "./api.js";
 import * as format from "./format.js";
 import { Icon } from "./icons.js";
 import { VESTS } from "./palette.js";
+import { WalkerMover } from "./walkers.js";
 
 const MAX_PEOPLE = 4;
 const MODES = [
@@ -40,16 +41,18 @@ export function People({ world, send, children }) {
           data-action="add-person" onClick=${() => send({ tag: "add-person" })}>
           <${Icon} name="plus" />Add</button>`}
       </div>
-      ${tracked && html`<p class="dock-hint" title="This policy knows one person at a time.">
+      ${tracked && !world.reach?.way.includes("averaged") && html`<p class="dock-hint" title="This policy knows one person at a time.">
         The policy sees the nearest: ${nameOf(tracked.id)}.</p>`}
       <span class="spacer"></span>
       ${children}
     </div>
     ${!person && html`<div class="dock-row"><span class="dock-label"></span>
       <p class="dock-hint">Nobody is in the cell.</p></div>`}
-    ${person && html`<${Mover} key=${person.id} person=${person} send=${send}
+    ${person?.cylinder && html`<${WalkerMover} key=${person.id} person=${person}
+      name=${nameOf(person.id)} world=${world} send=${send} />`}
+    ${person && !person.cylinder && html`<${Mover} key=${person.id} person=${person} send=${send}
       sized=${sized} onSized=${() => setSized(!sized)} />`}
-    ${person && sized && html`<${Size} key=${`size-${person.id}`} person=${person} send=${send} />`}`;
+    ${person && !person.cylinder && sized && html`<${Size} key=${`size-${person.id}`} person=${person} send=${send} />`}`;
 }
 
 /** Who moves a person; with a recording, which one and how far it is. */

@@ -20,7 +20,7 @@ export function useTheme() {
 }
 
 /** One uPlot in a box that gives its width; `options` must be stable between data changes. */
-function Plot({ options, data, height, label }) {
+export function Plot({ options, data, height, label }) {
   const box = useRef(null);
   const plot = useRef(null);
   useEffect(() => {
@@ -42,7 +42,7 @@ function Plot({ options, data, height, label }) {
   return html`<div class="plot" ref=${box} role="img" aria-label=${label}></div>`;
 }
 
-function axis(theme, more) {
+export function axis(theme, more) {
   return {
     stroke: theme.faint,
     font: FONT,
@@ -52,7 +52,7 @@ function axis(theme, more) {
   };
 }
 
-function secondsAgo(v) {
+export function secondsAgo(v) {
   return v === 0 ? "now" : `${format.number(v)} s`;
 }
 

@@ -13,6 +13,7 @@ const STATUS = {
   "no candidates": ["No goals", "quiet"],
   "no policy": ["No policy", "warn"],
   solved: ["Goal reached", "good"],
+  reached: ["Goal reached", "good"],
 };
 const CLEARANCE_SCALE_M = 1.0;
 

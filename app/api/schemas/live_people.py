@@ -7,7 +7,7 @@ from pydantic import Field
 from app.api.schemas.numbers import Answer
 from app.sim import human
 from app.sim.body_size import NAMES
-from app.sim.snapshot import BodyView, MotionView, PersonView
+from app.sim.snapshot import BodyView, CylinderView, MotionView, PersonView
 
 
 class BodyPublic(Answer):
@@ -50,6 +50,22 @@ class MotionLive(Answer):
         return cls(**{name: getattr(view, name) for name in cls.model_fields})
 
 
+class CylinderLive(Answer):
+    """A person of whom no more than an upright cylinder is known."""
+
+    x: float = Field(description="axis [m]")
+    y: float = Field(description="axis [m]")
+    vx: float = Field(description="velocity in the period to come [m/s]")
+    vy: float = Field(description="velocity in the period to come [m/s]")
+    radius: float = Field(description="radius [m]")
+    height: float = Field(description="height above the floor [m]")
+
+    @classmethod
+    def from_domain(cls, view: CylinderView) -> Self:
+        """Make it from the world's view."""
+        return cls(**{name: getattr(view, name) for name in cls.model_fields})
+
+
 class PersonLight(Answer):
     """One person, without joint positions."""
 
@@ -61,6 +77,9 @@ class PersonLight(Answer):
     outside_area: bool = Field(description="the pelvis is outside the walking area")
     clearance_m: float = Field(description="distance of the robot [m]")
     nearest: bool = Field(description="nobody is nearer to the robot; whom the policy sees")
+    cylinder: CylinderLive | None = Field(
+        description="what counts for contact in a reach cell, where the posture is a picture"
+    )
 
     @classmethod
     def from_domain(cls, view: PersonView) -> Self:
@@ -90,4 +109,5 @@ def _light(view: PersonView) -> dict[str, Any]:
     return {name: getattr(view, name) for name in same} | {
         "body": BodyPublic.from_domain(view.body),
         "motion": view.motion and MotionLive.from_domain(view.motion),
+        "cylinder": view.cylinder and CylinderLive.from_domain(view.cylinder),
     }

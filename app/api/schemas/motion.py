@@ -33,22 +33,24 @@ class SafetyInput(Body):
     """What speed and separation monitoring assumes; what is null is as the cell says."""
 
     human_speed: Annotated[float, Field(ge=0.0, le=10.0)] | None = Field(
-        None, description="greatest speed of any point of a person, v_h [m/s]"
+        default=None, description="greatest speed of any point of a person, v_h [m/s]"
     )
     reaction_time: Seconds | None = Field(
-        None, description="from a decision to its effect, a part of T_r [s]"
+        default=None, description="from a decision to its effect, a part of T_r [s]"
     )
     tracker_delay: Seconds | None = Field(
-        None, description="age of what the tracker says when it says it, a part of T_r [s]"
+        default=None,
+        description="age of what the tracker says when it says it, a part of T_r [s]",
     )
-    intrusion_distance: Metres | None = Field(None, description="C [m]")
-    person_uncertainty: Metres | None = Field(None, description="Z_d [m]")
-    robot_uncertainty: Metres | None = Field(None, description="Z_r [m]")
+    intrusion_distance: Metres | None = Field(default=None, description="C [m]")
+    person_uncertainty: Metres | None = Field(default=None, description="Z_d [m]")
+    robot_uncertainty: Metres | None = Field(default=None, description="Z_r [m]")
     protective_distance: Metres | None = Field(
-        None, description="least distance to anyone while the robot moves, on top [m]"
+        default=None, description="least distance to anyone while the robot moves, on top [m]"
     )
     pfl: bool | None = Field(
-        None, description="whether people may be touched, as slowly as their parts allow"
+        default=None,
+        description="whether people may be touched, as slowly as their parts allow",
     )
 
     def to_domain(self, own: SafetySettings) -> SafetySettings:

@@ -5,6 +5,15 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field
 
 from app.api.schemas.live_people import PersonLight, PersonLive
+from app.api.schemas.live_reach import (
+    MoveGoal,
+    NewGoal,
+    ReachLive,
+    SetGoalMode,
+    SetSafety,
+    SetWalk,
+    SetWay,
+)
 from app.api.schemas.live_sorting import (
     AddObject,
     MoveObject,
@@ -102,6 +111,9 @@ class WorldLight(Answer):
     case: str | None
     counters: CountersPublic
     sorting: SortingLive | None = Field(description="the sorting task; null without one")
+    reach: ReachLive | None = Field(
+        description="goal, safety layer and outcomes of a reach cell; null in other cells"
+    )
 
     @classmethod
     def from_domain(cls, snapshot: WorldSnapshot) -> Self:
@@ -161,7 +173,9 @@ class WorldSummary(Answer):
 class WorldCell(Body):
     """The cell a live world shall show from now on."""
 
-    cell: str = Field(max_length=64, description="name of a cell to pick and place or sort in")
+    cell: str = Field(
+        max_length=64, description="name of a cell to pick and place, sort or reach in"
+    )
     checkpoint: str | None = Field(
         None, max_length=64, description="SHA-256 or alias of what decides; see above if null"
     )
@@ -234,6 +248,7 @@ def light_members(snapshot: WorldSnapshot) -> dict[str, Any]:
         "sorting": None
         if snapshot.sorting is None
         else SortingLive.from_domain(snapshot.sorting),
+        "reach": None if snapshot.reach is None else ReachLive.from_domain(snapshot.reach),
     }
 
 
@@ -429,7 +444,13 @@ CommandCreate = Annotated[
     | SetGoal
     | ToggleGoal
     | StartTest
-    | SetSorter,
+    | SetSorter
+    | MoveGoal
+    | NewGoal
+    | SetGoalMode
+    | SetSafety
+    | SetWay
+    | SetWalk,
     Field(discriminator="tag"),
 ]
 

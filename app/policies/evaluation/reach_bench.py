@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from app.errors import InvalidInput
 from app.policies.checkpoint import Checkpoint
 from app.policies.evaluation.reach_episodes import (
     TOLD_S,
@@ -19,9 +20,11 @@ from app.policies.evaluation.reach_episodes import (
     target_goals,
 )
 from app.policies.evaluation.rows import OnRow
-from app.policies.movers import Mover, mover_of
+from app.policies.interpolation import interpolates
+from app.policies.movers import How, Mover, mover_of
 from app.policies.reach_policy import ReachPolicy
 from app.policies.trained_cell import cell_of
+from app.sim.cell_people import CylinderPerson
 from app.sim.cells import Cell
 from app.sim.kernels.episode import SUCCESS_DISTANCE
 from app.sim.ports import Vec
@@ -30,15 +33,21 @@ from app.sim.reach import ReachSettings, goal_region_of, stated_rules
 Json = dict[str, Any]
 
 
-def goal_ways(actor: ReachPolicy) -> tuple[str, ...]:
+def goal_ways(actor: ReachPolicy) -> tuple[How, ...]:
     """Return the ways of asking a policy for goals between those it was trained on."""
-    return ("direct",) if actor.targets is None else ("direct", "interpolated")
+    return ("direct", "interpolated") if interpolates(actor) else ("direct",)
 
 
-def people_ways(actor: ReachPolicy) -> tuple[str, ...]:
-    """Return the ways of asking a policy about several people; ``direct`` sees the nearest."""
-    del actor
-    return ("direct", "averaged")
+def walker_of(cell: Cell) -> CylinderPerson:
+    """Return the first person of a cell who walks about as a cylinder.
+
+    Raises:
+        InvalidInput: There is none.
+    """
+    if not cell.cylinders:
+        rule = "must have been trained in a cell with somebody who walks about"
+        raise InvalidInput("checkpoint", cell.name, rule)
+    return cell.cylinders[0]
 
 
 class ReachBench:
@@ -86,7 +95,7 @@ class ReachBench:
         self,
         settings: ReachSettings,
         goals: Vec,
-        how: str = "direct",
+        how: How = "direct",
         *,
         cell: Cell | None = None,
         mover: Mover | None = None,
@@ -103,7 +112,7 @@ class ReachBench:
         asked = mover or mover_of(self.actor, how)
         return play(cell or self.cell, settings, asked, goals, self._seed)
 
-    def recheck(self, settings: ReachSettings, goals: Vec, how: str = "direct") -> None:
+    def recheck(self, settings: ReachSettings, goals: Vec, how: How = "direct") -> None:
         """Ask FCL about the poses of the first episodes; the result will say what it found."""
         asked = mover_of(self.actor, how)
         self._recheck = recheck_contacts(self.cell, settings, asked, goals, self._seed)
@@ -113,7 +122,7 @@ class ReachBench:
         row: Json,
         settings: ReachSettings,
         goals: str,
-        how: str = "direct",
+        how: How = "direct",
         *,
         cell: Cell | None = None,
         **more: Any,

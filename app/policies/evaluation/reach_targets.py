@@ -68,14 +68,15 @@ def worst_of(cells: list[Json]) -> list[Json]:
     ]
 
 
-def ends_over_time(episodes: ReachEpisodes) -> Json:
+def ends_over_time(episodes: ReachEpisodes) -> list[Json]:
     """Return how many episodes ended by success and by collision in each interval of time."""
-    edges = np.arange(0.0, episodes.limit_s + 1e-9, END_STEP_S)
-    counts = {
-        name: np.histogram(episodes.duration_s[episodes.outcome == end], edges)[0].tolist()
-        for name, end in (("success", SUCCESS), ("collision", COLLISION))
-    }
-    return {"step_s": END_STEP_S, **counts}
+    edges = np.arange(0.0, episodes.limit_s + 0.5 * END_STEP_S, END_STEP_S)
+    times = [episodes.duration_s[episodes.outcome == end] for end in (SUCCESS, COLLISION)]
+    won, hit = (np.histogram(part - 1e-9, edges)[0].tolist() for part in times)
+    return [
+        {"until_s": round(float(until), 6), "success": one, "collision": other}
+        for until, one, other in zip(edges[1:], won, hit, strict=True)
+    ]
 
 
 def reached_after_contact(episodes: ReachEpisodes) -> dict[str, float]:

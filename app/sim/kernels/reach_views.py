@@ -51,7 +51,7 @@ def _look(
     show_person(state.people, e, seen, crowd, sight.seen)
     if view != PLAIN:
         clearances_ahead(world.people, state.people, e, who, robot.columns, sight)
-    return clearance
+    return float(clearance)
 
 
 @kernel(inline="always")

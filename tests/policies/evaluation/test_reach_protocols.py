@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from app.errors import InvalidInput
 from app.policies.evaluation import reach_episodes
 from app.policies.evaluation.protocols import OF_REACHING, evaluate
 from app.policies.evaluation.reach_people import SPEEDS, at_speed
@@ -52,6 +53,7 @@ def test_a_result_is_json_and_states_the_rules_of_each_row(name: str) -> None:
             rules
         )
         assert row["n"] == (54 if name == "reach-targets" else N)
+        assert all("mean" in one for one in row.values() if isinstance(one, dict))
     assert result["checkpoint"] == untrained_reach(width=16).sha256
 
 
@@ -70,8 +72,8 @@ def test_every_target_is_counted_under_each_rule_of_starting() -> None:
             cell["success"]["mean"] for cell in row["targets"]
         )
         ends = row["ends"]
-        assert sum(ends["success"]) == round(row["success"]["mean"] * 108)
-        assert sum(ends["collision"]) == round(row["collision"]["mean"] * 108)
+        for kind in ("success", "collision"):
+            assert sum(one[kind] for one in ends) == round(row[kind]["mean"] * 108)
     first, uniform, authors = result["results"]
     assert first["begun_in_contact"]["mean"] == 0.0 and first["starts_redrawn"] > 0.0
     assert uniform["starts_redrawn"] == 0.0
@@ -130,3 +132,11 @@ def test_a_jerk_limited_policy_is_measured_as_such() -> None:
     assert row["name"] == "degree-3"
     assert row["jerk_rad_s3"] <= row["jerk_limit_rad_s3"] + 1e-6
     assert result["settings"]["action"]["degree"] == 3
+
+
+@pytest.mark.parametrize("name", ["reach-speeds", "reach-tracker"])
+def test_a_cell_where_nobody_walks_is_refused(name: str) -> None:
+    cell = load_cell("shared-workspace").model_copy(update={"name": "empty", "people": ()})
+    with pytest.raises(InvalidInput, match="somebody who walks about") as caught:
+        evaluate(name, untrained_reach(width=16, cell=cell), episodes=2)
+    assert (caught.value.field, caught.value.value) == ("checkpoint", "empty")

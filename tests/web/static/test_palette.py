@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 from web.mannequin import VESTS
+from web.reach_scene import OVERRIDES
 from web.sorting_bodies import BLOCKS, FAILURES
 from web.stations_view import RAMP
 
@@ -35,3 +36,15 @@ def test_people_have_the_colours_of_their_vests() -> None:
     line = next(one for one in PALETTE.read_text().splitlines() if "const VESTS" in one)
     found = re.findall(r"rgb\((\d+) (\d+) (\d+)\)", line)
     assert tuple((int(r), int(g), int(b)) for r, g, b in found) == VESTS
+
+
+def test_page_and_scene_use_one_ramp_of_overrides() -> None:
+    assert ramp("OVERRIDES") == OVERRIDES
+
+
+def test_terms_of_the_separation_have_one_colour_in_plot_and_legend() -> None:
+    line = next(one for one in PALETTE.read_text().splitlines() if "const TERMS" in one)
+    style = (PALETTE.parent / "reach.css").read_text()
+    plotted = dict(re.findall(r"(\w+): \"(rgb\([\d ]+\))\"", line))
+    assert plotted == dict(re.findall(r"--term-(\w+): (rgb\([\d ]+\))", style))
+    assert len(plotted) == 3

@@ -1,0 +1,140 @@
+"""The live world in a reach cell, over HTTP."""
+
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from app.api.registry import REACH_ALIAS
+from app.api.services import Services
+from app.store.checkpoints import put_checkpoint
+from app.store.records import NewCheckpoint
+from tests.policies.untrained import untrained_reach
+
+WORLD = "/v1/worlds/main"
+COMMANDS = f"{WORLD}/commands"
+
+
+@pytest.fixture(scope="module", autouse=True)
+def reach_cell(client: TestClient) -> Iterator[None]:
+    shown = client.put(f"{WORLD}/cell", json={"cell": "shared-workspace"})
+    assert shown.status_code == 200, shown.text
+    send(client, tag="set-policy", checkpoint=None)
+    yield
+    client.put(f"{WORLD}/cell", json={"cell": "pick-and-place"}).raise_for_status()
+
+
+def send(client: TestClient, **command: Any) -> Any:
+    return client.post(COMMANDS, json=command)
+
+
+def until(client: TestClient, holds: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
+    give_up = time.monotonic() + 60.0
+    while not holds(world := client.get(WORLD).json()):
+        assert time.monotonic() < give_up, world["message"]
+        time.sleep(0.02)
+    return world
+
+
+def test_world_shows_goal_safety_layer_and_cylinders(client: TestClient) -> None:
+    world = client.get(WORLD).json()
+    reach, person = world["reach"], world["people"][0]
+    assert (world["cell"], world["sorting"], world["candidates"]) == (
+        "shared-workspace",
+        None,
+        [],
+    )
+    assert reach["tolerance"] == 0.1
+    assert (reach["ways"], world["checkpoint"]) == ([], None)
+    safety = reach["safety"]
+    total = safety["person_way"] + safety["robot_way"] + safety["margin"]
+    assert safety["required"] == pytest.approx(total)
+    assert 0.2 <= person["cylinder"]["radius"] <= 0.5
+    assert world["state"] is None
+
+
+def test_goal_safety_and_people_are_changed(client: TestClient) -> None:
+    send(client, tag="set-goal-mode", mode="follow")
+    assert send(client, tag="move-goal", position=[0.5, 0.6, 0.1]).status_code == 202
+    send(client, tag="set-safety", on=False)
+    send(client, tag="set-walk", speed=0.25)
+    send(client, tag="add-person")
+    now = until(client, lambda one: one["reach"]["walk_speed"] == 0.25)
+    until(client, lambda one: len(one["people"]) == 2)
+    assert now["reach"]["goal"] == [0.5, 0.6, 0.1]
+    assert (now["reach"]["goal_mode"], now["reach"]["safety"]["on"]) == ("follow", False)
+    send(client, tag="remove-person", person=1)
+    send(client, tag="set-safety", on=True)
+    send(client, tag="set-walk", speed=None)
+    until(client, lambda one: len(one["people"]) == 1)
+    send(client, tag="new-goal")
+    until(client, lambda one: one["reach"]["goal"] != [0.5, 0.6, 0.1])
+
+
+def test_policy_is_named_and_asked_in_its_ways(client: TestClient) -> None:
+    services: Services = client.app.state.services  # type: ignore[attr-defined]
+    made = untrained_reach(width=32)
+    put_checkpoint(
+        services.store,
+        NewCheckpoint(sha256=made.sha256, manifest=made.manifest, tensors=made.tensors),
+    )
+    assert send(client, tag="set-policy", checkpoint=made.sha256).status_code == 202
+    acting = until(client, lambda one: one["checkpoint"] == made.sha256)
+    assert acting["reach"]["way"] == "interpolated"
+    assert "averaged" in acting["reach"]["ways"]
+    assert send(client, tag="set-way", way="direct").status_code == 202
+    until(client, lambda one: one["reach"]["way"] == "direct")
+    refused = send(client, tag="set-way", way="sideways").json()
+    assert (refused["field"], refused["choices"]) == ("way", acting["reach"]["ways"])
+    send(client, tag="set-policy", checkpoint=None)
+    until(client, lambda one: one["checkpoint"] is None)
+
+
+@pytest.mark.parametrize(
+    ("command", "field"),
+    [
+        ({"tag": "move-goal", "position": [0.0, 1.3, 0.3]}, "position.y"),
+        ({"tag": "move-goal", "position": [0.0, 0.8]}, "position"),
+        ({"tag": "move-goal"}, "position"),
+        ({"tag": "set-goal-mode", "mode": "run"}, "mode"),
+        ({"tag": "set-safety", "on": "perhaps"}, "on"),
+        ({"tag": "set-walk", "speed": -1.0}, "speed"),
+        ({"tag": "set-way", "way": "direct"}, "way"),
+        ({"tag": "set-body", "stature": 50.0}, "tag"),
+        ({"tag": "move-human", "left": [0.0, 0.0, 0.0]}, "left"),
+        ({"tag": "toggle-goal", "id": "red-large"}, "tag"),
+        ({"tag": "set-candidates", "ids": []}, "tag"),
+        ({"tag": "set-policy", "checkpoint": "nobody"}, "checkpoint"),
+    ],
+)
+def test_bad_command_is_refused_by_field(
+    client: TestClient, command: dict[str, Any], field: str
+) -> None:
+    refused = client.post(COMMANDS, json=command)
+    assert (refused.status_code, refused.json()["field"]) == (422, field)
+
+
+def test_goal_outside_says_which_axis_and_by_how_much(client: TestClient) -> None:
+    refused = send(client, tag="move-goal", position=[0.9, 0.8, 0.3]).json()
+    assert refused["field"] == "position.x"
+    assert "0.4 m outside" in refused["rule"]
+
+
+def test_policy_that_chooses_tasks_cannot_reach(client: TestClient) -> None:
+    refused = send(client, tag="set-policy", checkpoint="pick")
+    assert refused.status_code in (409, 422)
+    put = client.put(f"{WORLD}/cell", json={"cell": "shared-workspace", "checkpoint": "pick"})
+    assert put.status_code in (409, 422)
+
+
+def test_reach_commands_need_a_reach_cell(client: TestClient) -> None:
+    client.put(f"{WORLD}/cell", json={"cell": "pick-and-place"}).raise_for_status()
+    refused = send(client, tag="set-safety", on=False)
+    assert (refused.status_code, refused.json()["field"]) == (422, "tag")
+    shown = client.put(f"{WORLD}/cell", json={"cell": "shared-workspace"})
+    assert shown.status_code == 200
+    known = client.get("/v1/checkpoints").json()["items"]
+    shipped = any(REACH_ALIAS in one["aliases"] for one in known)
+    assert (shown.json()["checkpoint"] is not None) or not shipped

@@ -1,0 +1,122 @@
+"""A visitor opens the reach cell, sees the robot reach, and gets in its way."""
+
+from collections.abc import Callable, Iterator
+
+import httpx
+import numpy as np
+import pytest
+import viser
+from playwright.sync_api import Page, expect
+
+from app.sim.cells import load_cell
+from tests.browser.camera import Camera
+from tests.browser.test_drag import VIEWER, on_canvas, state, tell, until
+from web import workplace
+
+pytestmark = pytest.mark.browser
+
+CELL = load_cell("shared-workspace")
+PHONE = (390, 844)
+LIMIT_S = 120.0
+GRIP_M = 0.15
+"""Where along the arrow of the goal's handle the mouse takes it; it is 0.26 m long."""
+
+
+@pytest.fixture
+def reaching(server: str) -> Iterator[str]:
+    """The server with the reach cell, one person, the clock running."""
+    world = f"{server}/v1/worlds/main/cell"
+    shown = httpx.put(world, json={"cell": CELL.name}, timeout=300.0)
+    assert shown.status_code == 200, shown.text
+    yield server
+    httpx.put(world, json={"cell": load_cell().name}, timeout=300.0).raise_for_status()
+
+
+def camera_of(port: int) -> Camera:
+    """Return the camera every visitor of the cell starts with, from a scene of its own."""
+    server = viser.ViserServer(host="127.0.0.1", port=port, verbose=False)
+    workplace.build(server, CELL)
+    first = server.initial_camera
+    camera = Camera(
+        position=tuple(first.position), look_at=tuple(first.look_at), fov=float(first.fov)
+    )
+    server.stop()
+    return camera
+
+
+def override(page: Page) -> float:
+    shown = page.locator('[data-role="override"]').get_attribute("data-override")
+    return float(shown or "nan")
+
+
+def test_visitor_opens_the_cell_sees_it_reach_and_gets_in_its_way(
+    open_page: Callable[..., Page], server: str
+) -> None:
+    page = open_page(scene=False)
+    page.locator('[data-role="cell"]').select_option(CELL.name)
+    page.wait_for_selector('[data-role="override"]')
+    page.click('[data-mode="manual"]')
+    tell(server, {"tag": "move-human", "pelvis": [-2.0, 2.0, 0.0]})
+    page.locator('[data-role="speed"]').select_option("4")
+    expect(page.locator('[data-counter="reached"]')).not_to_have_text("0")
+    now = until(server, lambda one: one["reach"]["safety"]["override"] == 1.0, LIMIT_S)
+    assert now["counters"]["reached"] > 0
+    x, y, _ = now["tcp"]
+    tell(server, {"tag": "move-human", "pelvis": [x, y + 0.3, 0.0]})
+    expect(page.locator('[data-status="moving"]')).to_have_text("Stopped")
+    expect(page.locator(".sentence")).to_contain_text("Stopped: person")
+    expect(page.locator('[data-role="override"]')).to_have_attribute("data-override", "0.000")
+    page.click('[data-choice="safety:false"]')
+    expect(page.locator('[data-role="override"]')).to_contain_text("layer off")
+    page.click('[data-choice="safety:true"]')
+    page.click('[data-action="remove-person"]')
+    expect(page.locator('[data-role="override"]')).to_have_attribute("data-override", "1.000")
+    assert state(server)["people"] == []
+    assert page.problems == []  # type: ignore[attr-defined]
+    page.locator('[data-role="cell"]').select_option(load_cell().name)
+    page.wait_for_selector("[data-candidate]")
+
+
+def test_goal_is_dragged_by_its_arrow(
+    open_page: Callable[..., Page], reaching: str, unused_port: int
+) -> None:
+    tell(
+        reaching,
+        {"tag": "remove-person", "person": 0},
+        {"tag": "set-goal-mode", "mode": "follow"},
+        {"tag": "move-goal", "position": [0.1, 0.7, 0.15]},
+        {"tag": "pause"},
+    )
+    page = open_page()
+    page.frame_locator(VIEWER).locator("canvas").first.wait_for()
+    camera = camera_of(unused_port)
+    for _ in range(4):
+        view = on_canvas(page, camera)
+        start = np.array(state(reaching)["reach"]["goal"])
+        up = np.array([0.0, 0.0, 1.0])
+        (x0, y0), (x1, y1) = (
+            view.project(start + GRIP_M * up),
+            view.project(start + (GRIP_M + 0.2) * up),
+        )
+        page.mouse.move(x0, y0)
+        page.wait_for_timeout(600)
+        page.mouse.down()
+        for share in np.linspace(0.1, 1.0, 8):
+            page.mouse.move(x0 + share * (x1 - x0), y0 + share * (y1 - y0))
+            page.wait_for_timeout(150)
+        page.mouse.up()
+        page.wait_for_timeout(1500)
+        moved = np.array(state(reaching)["reach"]["goal"]) - start
+        if moved[2] > 0.1:
+            break
+    assert moved[2] > 0.1
+    assert np.allclose(moved[:2], 0.0, atol=0.02)
+
+
+def test_reach_page_fits_a_phone(open_page: Callable[..., Page], reaching: str) -> None:
+    page = open_page(PHONE, scene=False)
+    assert state(reaching)["cell"] == CELL.name
+    assert page.evaluate("document.documentElement.scrollWidth") <= PHONE[0]
+    for part in ('[data-choice="safety:true"]', ".gauge", ".terms", ".tiles"):
+        page.locator(part).first.scroll_into_view_if_needed()
+        expect(page.locator(part).first).to_be_visible()

@@ -1,0 +1,80 @@
+import numpy as np
+import pytest
+
+from app.policies.movers import mover_of
+from app.policies.reach_pilot import ReachPilot
+from app.policies.reach_policy import ReachPolicy
+from app.sim import commands
+from app.sim.cells import load_cell
+from app.sim.live_reacher import LiveReacher
+from app.sim.reach import ReachBatch, ReachSettings
+from app.sim.reach_commands import SetPilot, SetWay
+from app.sim.reach_world import ReachWorld
+from tests.policies.untrained import untrained_reach
+
+CELL = load_cell("shared-workspace")
+
+
+@pytest.fixture(scope="module")
+def policy() -> ReachPolicy:
+    return ReachPolicy(untrained_reach(width=32))
+
+
+def test_policy_without_targets_cannot_be_interpolated() -> None:
+    pilot = ReachPilot(ReachPolicy(untrained_reach(width=32, goals="box")))
+    assert pilot.ways == ("direct", "averaged")
+
+
+def test_live_state_is_seen_as_the_batch_sees_it(policy: ReachPolicy) -> None:
+    pilot = ReachPilot(policy)
+    batch = ReachBatch(CELL, 1, 11, ReachSettings(observation=policy.view))
+    batch.reset()
+    for _ in range(5):
+        batch.step(np.full((1, 6), 0.3, dtype=np.float32))
+    world = ReachWorld(CELL, pilot, seed=1)
+    robot, reacher = world._stage.robot, LiveReacher(CELL, pilot)
+    state = batch.state
+    robot.q, robot.qd, robot.qdd = state.q[0], state.qd[0], state.qdd[0]
+    for way in pilot.ways:
+        reacher.way = way
+        act = reacher.act(
+            robot,
+            state.people.walkers.rows[0],
+            state.goal[0],
+            float(state.clear[0, 0]),
+            float(state.time_left[0]),
+        )
+        assert np.allclose(act, mover_of(policy, way).acts(batch)[0], atol=1e-6)
+
+
+def test_policy_moves_the_robot_of_a_live_cell_with_any_number_of_people(
+    policy: ReachPolicy,
+) -> None:
+    pilot = ReachPilot(policy)
+    world = ReachWorld(CELL, None, seed=1)
+    world.apply(SetPilot(pilot=pilot))
+    shown = world.snapshot()
+    assert (shown.checkpoint, shown.reach.way) == (pilot.checkpoint, "interpolated")
+    assert shown.reach.ways == pilot.ways
+    world.apply(commands.AddPerson())
+    world.apply(SetWay(way="averaged-interpolated"))
+    world.step()
+    for id in (0, 1):
+        world.apply(commands.RemovePerson(person=id))
+        world.step()
+    after = world.snapshot()
+    assert after.people == ()
+    assert not np.array_equal(after.robot_q, shown.robot_q)
+    assert after.elapsed_ms > 0.0
+
+
+def test_goals_jump_among_the_targets_unless_the_policy_is_interpolated(
+    policy: ReachPolicy,
+) -> None:
+    world = ReachWorld(CELL, ReachPilot(policy), seed=1)
+    on_target = []
+    for way in ("direct", "interpolated"):
+        world.apply(SetWay(way=way))
+        world._goal.jump()
+        on_target.append(world.snapshot().reach.on_target)
+    assert on_target == [True, False]

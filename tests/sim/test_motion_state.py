@@ -1,0 +1,70 @@
+"""A state that somebody tells is seen as in training."""
+
+import numpy as np
+import pytest
+
+from app.sim.cells import load_cell
+from app.sim.kernels.occupancy import GROWTH, VX, VY, R, X, Y
+from app.sim.motion_state import Stage
+from app.sim.ports import Person
+from app.sim.reach import ReachBatch, ReachSettings
+from app.sim.seen_people import standing_in
+
+CELL = load_cell("shared-workspace")
+
+
+def driven(people: tuple[str, ...], view: str) -> ReachBatch:
+    batch = ReachBatch(CELL, 5, 2, ReachSettings(people=people, observation=view))
+    batch.reset()
+    rng = np.random.default_rng(8)
+    for _ in range(20):
+        batch.step(rng.uniform(-1, 1, (5, 6)).astype(np.float32))
+    return batch
+
+
+def people_of(batch: ReachBatch, e: int) -> list[Person]:
+    rows = batch.state.people
+    bodies = [Person(q=q, qd=qd) for q, qd in zip(rows.q[e], rows.qd[e], strict=True)]
+    return bodies + [standing_in(*w[[X, Y, VX, VY, R, GROWTH]]) for w in rows.walkers.rows[e]]
+
+
+@pytest.mark.parametrize("view", ["features", "state"])
+@pytest.mark.parametrize("people", [(), ("walker",), ("worker", "walker", "constant")])
+def test_observations_and_distances_are_those_of_the_batch(
+    people: tuple[str, ...], view: str
+) -> None:
+    batch, n_bodies = driven(people, view), people.count("worker")
+    stage = Stage(CELL, n_bodies, len(people) - n_bodies, view)
+    rows, state = np.arange(5), batch.state
+    goals = np.random.default_rng(4).uniform(-1, 1, (5, 3, 3))
+    for who in (None, *range(len(people))):
+        expected = batch.observe_goals(rows, goals, who)
+        for e in rows:
+            stage.put(state.q[e], state.qd[e], people_of(batch, e), state.time_left[e])
+            found = stage.observe(goals[e], who)
+            np.testing.assert_allclose(found, expected[e], atol=2e-7)
+            np.testing.assert_allclose(stage.clear, state.clear[e], atol=1e-12)
+    np.testing.assert_allclose(
+        stage.apart, batch.person_distances(np.array([4]))[0], atol=1e-12
+    )
+
+
+def test_a_persons_own_size_counts() -> None:
+    stage, q = Stage(CELL, 1, 0, "features"), np.array(CELL.robot.home_q)
+    batch = driven(("worker",), "features")
+    (one,) = people_of(batch, 0)
+    stage.put(q, np.zeros(6), [one], 5.0)
+    ordinary = stage.apart[0]
+    large = Person(q=one.q, qd=one.qd, size=CELL.body * 1.3)
+    stage.put(q, np.zeros(6), [large], 5.0)
+    assert stage.apart[0] != ordinary
+
+
+def test_shapes_are_the_people_with_the_height_of_the_cell() -> None:
+    stage = Stage(CELL, 0, 2, "state")
+    people = [standing_in(0.1, 1.2, 0.0, 0.0, 0.3), standing_in(-1.0, 1.5, 0.0, 0.0, 0.4)]
+    stage.put(np.array(CELL.robot.home_q), np.zeros(6), people, 5.0)
+    top = CELL.floor_z + CELL.cylinders[0].height
+    np.testing.assert_allclose(
+        stage.shapes.cylinders, [[0.1, 1.2, 0.3, top], [-1.0, 1.5, 0.4, top]]
+    )

@@ -1,0 +1,133 @@
+// A reach cell as the page shows it: what the robot does, how fast it may go and why, outcomes.
+import { html, useRef } from "./vendor/htm-preact-standalone.module.js";
+import * as format from "./format.js";
+import { Icon } from "./icons.js";
+import { overrideColour } from "./palette.js";
+import { nameOf } from "./people.js";
+import { OverridePlot, SeparationPlot } from "./reachplots.js";
+import { SAFETY_SPAN_S, SafetyHistory } from "./safetyhistory.js";
+import { Story } from "./story.js";
+
+const SLOW = 0.995;
+const ARC = 2 * Math.PI * 40 * 0.75;
+const LINKS = { base_link: "base", shoulder_link: "shoulder", upper_arm_link: "upper arm",
+  forearm_link: "forearm", wrist_1_link: "wrist", wrist_2_link: "wrist", wrist_3_link: "tool" };
+
+export function ReachDecision({ world }) {
+  const history = useRef(new SafetyHistory()).current;
+  history.add(world);
+  return html`<${Story} world=${world} chip=${chip(world)} />
+    ${!world.checkpoint && html`<div class="notice warn" data-role="no-pilot"><${Icon} name="alert" />
+      <span>No trained policy acts here. The robot goes straight to the goal and does not see
+        people; only the safety layer does. Train <b>reach-td3</b> under Training, or choose a
+        checkpoint above.</span></div>`}
+    <${Safety} world=${world} history=${history} />
+    <${Outcomes} world=${world} />`;
+}
+
+/** What the story's chip says where the world's status is too coarse. */
+function chip({ status, reach: { safety } }) {
+  if (status === "reached") return ["Goal reached", "good"];
+  if (status !== "moving" || !safety.on || safety.override >= SLOW) return null;
+  return safety.override <= 0 ? ["Stopped", "bad"] : ["Slowed down", "warn"];
+}
+
+/** The safety layer: rate, separation against what is needed, both over time. */
+function Safety({ world, history }) {
+  const { safety } = world.reach;
+  return html`<section class="card" aria-labelledby="safety-title">
+    <header class="card-head">
+      <h2 id="safety-title">How fast it may go</h2>
+      <span class="hint" tabindex="0" aria-describedby="safety-help">speed and separation
+        <span class="tip tip-left" role="tooltip" id="safety-help">The robot must be able to stop
+          before a person walking at ${safety.human_speed.toFixed(1)} m/s could reach it. The layer
+          looks at the very path ahead; the sum S_p is the standard’s bound for it, so near the
+          limit the two differ a little, and a robot that moves away may be faster. S_p adds what
+          the person and the robot may cover until it rests, and a distance to keep free.
+          Not a certified safety function.</span>
+      </span>
+    </header>
+    <div class="safety">
+      <${Gauge} safety=${safety} />
+      <${Terms} safety=${safety} people=${world.people ?? []} />
+    </div>
+    <div class="plot-head"><span>Override, last ${SAFETY_SPAN_S} s</span>
+      ${!safety.on && html`<span class="faint"><i class="dash-mark"></i>what the layer would set</span>`}
+    </div>
+    <${OverridePlot} history=${history} on=${safety.on} />
+    <div class="plot-head"><span>Distance to the nearest person, and what is needed</span></div>
+    <${SeparationPlot} history=${history} />
+  </section>`;
+}
+
+/** The override as three quarters of a ring. */
+function Gauge({ safety }) {
+  const { on, override, advised } = safety;
+  const percent = Math.round(override * 100);
+  return html`<div class="gauge" role="meter" aria-label="Override in percent" aria-valuemin="0"
+    aria-valuemax="100" aria-valuenow=${percent} data-role="override" data-override=${override.toFixed(3)}>
+    <svg viewBox="0 0 100 100" aria-hidden="true">
+      <circle cx="50" cy="50" r="40" class="gauge-back" stroke-dasharray=${`${ARC} 400`} />
+      ${override > 0 && html`<circle cx="50" cy="50" r="40" class="gauge-fill"
+        stroke=${on ? overrideColour(override) : "var(--ink-3)"}
+        stroke-dasharray=${`${ARC * override} 400`} />`}
+    </svg>
+    <b>${percent}<small> %</small></b>
+    <span>${on ? "of its speed" : `layer off, would be ${Math.round(advised * 100)} %`}</span>
+  </div>`;
+}
+
+function Terms({ safety, people }) {
+  const { person, link, separation, required, person_way: walk, robot_way: way, margin } = safety;
+  if (person === null) {
+    return html`<p class="empty">Nobody is in the cell. Add a person below the scene.</p>`;
+  }
+  const whom = people.length > 1 ? nameOf(person) : "Person";
+  const rows = [
+    ["walk", "person’s way", walk],
+    ["way", "robot’s way", way],
+    ["margin", "to keep free", margin],
+  ];
+  return html`<dl class="terms">
+    <div class=${separation < required ? "terms-top is-short" : "terms-top"}>
+      <dt>${whom} to ${LINKS[link] ?? "robot"}</dt>
+      <dd data-role="separation">${metres(Math.max(0, separation))}</dd></div>
+    <div class="terms-top"><dt>Needed, S<sub>p</sub></dt><dd data-role="required">${metres(required)}</dd></div>
+    ${rows.map(([key, label, value]) => html`<div key=${key}><dt><i class=${`term term-${key}`}></i>${label}</dt>
+      <dd>${metres(value)}</dd></div>`)}
+  </dl>`;
+}
+
+/** Outcome counters and provenance. */
+function Outcomes({ world }) {
+  const { counters, reach } = world;
+  const more = reach.counters;
+  const tiles = [
+    ["reached", "Reached", counters.reached],
+    ["contacts", "Contacts", counters.contacts],
+    ["touched", "Walked into it", more.touched],
+    ["timeouts", "Out of time", counters.timeouts],
+  ];
+  const share = (seconds) => (more.moving_s > 0 ? format.percent(seconds / more.moving_s, 0) : "–");
+  return html`<section class="card small-print" aria-label="Outcomes and provenance">
+    <dl class="tiles">
+      ${tiles.map(([key, label, value]) => html`<div key=${key}>
+        <dt>${label}</dt><dd data-counter=${key}>${value}</dd></div>`)}
+    </dl>
+    <dl class="facts">
+      <div><dt>Mean time to a goal</dt><dd>${counters.reached
+        ? `${(more.reaching_s / counters.reached).toFixed(1)} s` : "–"}</dd></div>
+      <div><dt>Below half speed</dt><dd>${share(more.slowed_s)}</dd></div>
+      <div><dt>Stopped</dt><dd>${share(more.stopped_s)}</dd></div>
+    </dl>
+    <p class="range"><${Icon} name="alert" /><span>“Walked into it”: somebody met the robot while it
+      stood still. People here do not look where they go.</span></p>
+    ${world.checkpoint && html`<p class="provenance">Decided in
+      ${` ${format.number(world.elapsed_ms, 2)} ms by checkpoint `}
+      <code title=${world.checkpoint}>${format.short(world.checkpoint)}</code></p>`}
+  </section>`;
+}
+
+function metres(value) {
+  return Number.isFinite(value) ? `${value.toFixed(2)} m` : "–";
+}

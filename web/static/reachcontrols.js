@@ -1,0 +1,57 @@
+// What a visitor can do to a reach cell besides people and clock: goal, safety layer, policy.
+import { html } from "./vendor/htm-preact-standalone.module.js";
+import { Icon } from "./icons.js";
+
+const GOAL_MODES = [
+  ["jump", "Jumps on", "As soon as it is reached there is another one"],
+  ["follow", "Follows me", "It stays where you drag it: take the arrows in the scene"],
+];
+const SAFETY = [
+  [true, "On", "The robot obeys the safety layer"],
+  [false, "Off", "See what happens without"],
+];
+const BETWEEN = [
+  [true, "On", "The policy is asked about the targets around the goal, and their mean is taken"],
+  [false, "Off", "The policy is asked about this very goal"],
+];
+const BESIDE = [
+  [false, "the nearest", "The policy sees the nearest person"],
+  [true, "everyone", "The policy is asked beside each person alone; the nearer one counts more"],
+];
+
+export function ReachControls({ world, send }) {
+  const { goal_mode: mode, safety, way, ways } = world.reach;
+  const between = way.includes("interpolated");
+  const averaged = way.includes("averaged");
+  const ask = (all, mixed) => {
+    const wanted = [all && "averaged", mixed && "interpolated"].filter(Boolean).join("-") || "direct";
+    send({ tag: "set-way", way: wanted });
+  };
+  return html`<div class="dock-row dock-wrap">
+    <span class="dock-label" id="goal-label">Goal</span>
+    <${Segmented} labelledby="goal-label" name="goal-mode" value=${mode} items=${GOAL_MODES}
+      onPick=${(one) => send({ tag: "set-goal-mode", mode: one })} />
+    <button type="button" class="tool" data-action="new-goal" title="Draw another goal"
+      onClick=${() => send({ tag: "new-goal" })}><${Icon} name="reset" />New goal</button>
+    <span class="dock-pair"><span class="dock-label dock-label-free" id="layer-label">Safety layer</span>
+      <${Segmented} labelledby="layer-label" name="safety" value=${safety.on} items=${SAFETY}
+        onPick=${(on) => send({ tag: "set-safety", on })} /></span>
+    ${ways.includes("interpolated") && html`<span class="dock-pair">
+      <span class="dock-label dock-label-free" id="between-label">Interpolation</span>
+      <${Segmented} labelledby="between-label" name="between" value=${between} items=${BETWEEN}
+        onPick=${(one) => ask(averaged, one)} /></span>`}
+    ${ways.includes("averaged") && world.people.length > 1 && html`<span class="dock-pair">
+      <span class="dock-label dock-label-free" id="beside-label">Policy sees</span>
+      <${Segmented} labelledby="beside-label" name="beside" value=${averaged} items=${BESIDE}
+        onPick=${(one) => ask(one, between)} /></span>`}
+  </div>`;
+}
+
+/** A choice of one; `items` are [value, label, title]. */
+export function Segmented({ labelledby, name, value, items, onPick }) {
+  return html`<div class="segmented" role="radiogroup" aria-labelledby=${labelledby}>
+    ${items.map(([one, label, title]) => html`<button key=${String(one)} type="button" role="radio"
+      aria-checked=${String(one === value)} data-choice=${`${name}:${one}`} title=${title}
+      onClick=${() => onPick(one)}>${label}</button>`)}
+  </div>`;
+}

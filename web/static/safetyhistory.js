@@ -1,0 +1,42 @@
+// The last seconds of override and separation, for the running plots of a reach cell.
+
+export const SAFETY_SPAN_S = 20;
+
+/** A jump longer than this is drawn as a gap [s]. */
+const GAP_S = 2;
+const KEYS = ["override", "advised", "separation", "required", "person_way", "robot_way", "margin"];
+
+export class SafetyHistory {
+  constructor() {
+    this.samples = [];
+    this.tick = -1;
+  }
+
+  /** Add what a snapshot says, once. */
+  add({ tick, t_s: t, reach: { safety } }) {
+    if (tick === this.tick) return;
+    const last = this.samples.at(-1);
+    if (tick < this.tick || (last && t < last.t)) this.samples = [];
+    else if (last && t - last.t > GAP_S) this.samples.push({ t: last.t + 1e-3 });
+    this.tick = tick;
+    this.samples.push({ t, ...Object.fromEntries(KEYS.map((key) => [key, safety[key]])) });
+    while (this.samples[0].t < t - SAFETY_SPAN_S) this.samples.shift();
+  }
+
+  get now() {
+    return this.samples.at(-1)?.t ?? 0;
+  }
+
+  /** Columns for uPlot: seconds before now (negative), then one per function of a sample. */
+  columns(functions) {
+    const { now } = this;
+    return [
+      this.samples.map((one) => one.t - now),
+      ...functions.map((f) => this.samples.map((one) => finite(f(one)))),
+    ];
+  }
+}
+
+function finite(v) {
+  return typeof v === "number" && Number.isFinite(v) ? v : null;
+}
