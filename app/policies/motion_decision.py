@@ -44,7 +44,7 @@ RANGE_SLACK = 0.02
 LONGEST_S = 60.0
 """Longest time left to reach a goal [s]."""
 _FAR = np.full(3, 10.0)
-HUMAN = ("x", "y", "vx", "vy", "r")
+HUMAN = ("x", "y", "vx", "vy", "r", "growth")
 """What a policy sees of a person."""
 RANGES: Mapping[str, Sequence[str]] = {
     "q": tuple(f"robot.q[{j}]" for j in range(6)),
@@ -54,7 +54,7 @@ RANGES: Mapping[str, Sequence[str]] = {
 """Variables of a manifest's ``trained_range`` and what messages call their numbers."""
 
 Seen = tuple[int | None, Vec]
-"""A person, bodies first, or None for nobody, and the cylinder a policy saw, shape (5,)."""
+"""A person, bodies first, or None for nobody, and the cylinder a policy saw, shape (6,)."""
 Told = tuple[SafetyDecision | None, int | None, SeparationTerms | None]
 
 
@@ -280,9 +280,10 @@ class MotionDecider:
 
     def _beyond(self, key: str, values: Vec, names: Sequence[str]) -> tuple[OutsideField, ...]:
         found = self._ranges.get(key)
-        if found is None or found[0].shape != values.shape:
+        if found is None or len(found[0]) > len(values):
             return ()
         low, high = found
+        values = values[: len(low)]
         beyond = (values < low - RANGE_SLACK) | (values > high + RANGE_SLACK)
         if not beyond.any():
             return ()

@@ -35,7 +35,7 @@ class ReachPreset:
     """Work cell trained in."""
 
     total_steps: int = number(
-        7_680_000, 1_000, 100_000_000, "env steps", "length of the training"
+        2_560_000, 1_000, 100_000_000, "env steps", "length of the training"
     )
     n_envs: int = number(128, 1, 1024, "", "cells stepped together")
     buffer_size: int = number(
@@ -47,16 +47,16 @@ class ReachPreset:
     )
     update_every: int = number(1, 1, 1000, "", "steps of all cells per update")
     lr_start: float = number(5e-4, 1e-6, 1e-2, "", "learning rate at the start")
-    lr_end: float = number(5e-5, 1e-7, 1e-2, "", "learning rate at the end")
+    lr_end: float = number(2e-5, 1e-7, 1e-2, "", "learning rate at the end")
     actor_lr_ratio: float = number(1.0, 0.01, 100.0, "", "actor's learning rate over critics'")
-    gamma: float = number(0.985, 0.5, 0.9999, "per step", "discount")
-    n_steps: int = number(3, 1, 20, "steps", "length of n-step returns")
+    gamma: float = number(0.99, 0.5, 0.9999, "per step", "discount")
+    n_steps: int = number(5, 1, 20, "steps", "length of n-step returns")
     tau: float = number(0.005, 1e-4, 1.0, "", "target update factor")
-    policy_delay: int = number(2, 1, 10, "updates", "critic updates per actor update")
+    policy_delay: int = number(1, 1, 10, "updates", "critic updates per actor update")
     target_noise: float = number(0.1, 0.0, 1.0, "", "smoothing noise on target actions")
     target_noise_clip: float = number(0.25, 0.0, 1.0, "", "bound of the smoothing noise")
     actor_frozen_updates: int = number(
-        300, 0, 1_000_000, "updates", "critic updates before the actor learns"
+        1_000, 0, 1_000_000, "updates", "critic updates before the actor learns"
     )
     width: int = number(256, 16, 1024, "units", "width of the hidden layers")
     layers: int = number(2, 1, 12, "", "hidden layers")
@@ -78,7 +78,11 @@ class ReachPreset:
         "observation", SIGHTS, "what critics see: as the actor, or also where people will be"
     )
     ema: float = number(
-        0.0, 0.0, 0.99999, "", "what an update leaves of the actor's averaged weights; 0: none"
+        0.999,
+        0.0,
+        0.99999,
+        "",
+        "what an update leaves of the averaged actor; 0: no average",
     )
     precision: str = choice(
         "float32", PRECISIONS, "products in training; bfloat16 is faster on some processors"
@@ -130,18 +134,18 @@ class ReachPreset:
     c_d: float = number(0.0, 0.0, 10.0, "1/m", "cost of the distance to the goal")
     c_p: float = number(1.0, 0.0, 10.0, "1/m", "reward for progress toward the goal")
     c_a: float = number(0.0, 0.0, 10.0, "s^2/rad", "cost of accelerating")
-    c_step: float = number(0.004, 0.0, 1.0, "", "cost of a control period")
+    c_step: float = number(0.003, 0.0, 1.0, "", "cost of a control period")
     c_c: float = number(4.0, 0.0, 100.0, "", "cost of a collision")
     c_s: float = number(4.0, 0.0, 100.0, "", "bonus of a success")
 
     progress_steps: int = number(
-        51_200, 100, 1_000_000, "env steps", "steps between two points of the curve"
+        153_600, 100, 1_000_000, "env steps", "steps between two points of the curve"
     )
     progress_episodes: int = number(
-        540, 1, 10_000, "episodes", "episodes played for a point of the curve"
+        1_080, 1, 10_000, "episodes", "episodes played for a point of the curve"
     )
     checkpoint_steps: int = number(
-        512_000, 100, 10_000_000, "env steps", "steps between two checkpoints"
+        614_400, 100, 10_000_000, "env steps", "steps between two checkpoints"
     )
 
     @property
@@ -222,6 +226,7 @@ THESIS = ReachPreset(
     width=400,
     layers=10,
     actor="plain",
+    ema=0.0,
     critic_norm="none",
     n_critics=1,
     alpha=0.6,

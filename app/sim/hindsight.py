@@ -203,7 +203,6 @@ class Hindsight:
         batch.reset()
         batch.state.outcome[:] = COLLISION  # rows that are not needed stand still
         copy_rows(self._batch.state, rows, batch.state)
-        batch.observe()
         act, t = np.zeros((batch.n_envs, 6), dtype=np.float32), 0.0
         while (batch.state.outcome[:k] == RUNNING).any():
             aim = first if last is None else np.where((t < until)[:, None], first, last)
@@ -211,7 +210,7 @@ class Hindsight:
             if last is None:
                 free = t >= until
                 act[:k][free] = np.clip(policy(batch, k), -1.0, 1.0)[free]
-            batch.step(act, auto_reset=False, features=last is None)
+            batch.step(act, auto_reset=False, features=False)
             t += self._arm.dt
         self._count(rows, batch)
 

@@ -15,7 +15,7 @@ from app.sim.cells import Cell
 from app.sim.checker import Shapes
 from app.sim.kernels import motion, reach, reach_views
 from app.sim.kernels.compiled import direct
-from app.sim.kernels.occupancy import VX, VY, R, X, Y
+from app.sim.kernels.occupancy import GROWTH, VX, VY, R, X, Y
 from app.sim.kernels.reach_features import EVERYBODY
 from app.sim.ports import Person, Vec
 from app.sim.reach import VIEWS, ViewName, new_state, with_workplace, world_of
@@ -69,7 +69,7 @@ class Stage:
 
     @property
     def seen(self) -> Vec:
-        """The person observed last: x, y [m], vx, vy [m/s], r [m], shape (5,)."""
+        """The person observed last: x, y [m], vx, vy [m/s], r [m], growth [m/s], shape (6,)."""
         return self._work.sight.seen
 
     @property
@@ -100,7 +100,7 @@ class Stage:
                 continue
             walker = rows.walkers.rows[0, i - first]
             walker[X], walker[Y], walker[R] = person.cylinder
-            walker[VX], walker[VY] = person.qd[:2]
+            walker[VX], walker[VY], walker[GROWTH] = *person.qd[:2], person.growth
             rows.cylinders[0, i - first] = person.cylinder
         self._take_in(*self._shared)
 

@@ -33,6 +33,8 @@ class Person:
     cylinder: Vec | None = None
     """x, y and radius [m], shape (3,), of the cylinder that is all that is known of this person
     (``seen_people.standing_in``); then distances count to it. None: a body of 18 joints."""
+    growth: float = 0.0
+    """How fast the radius of that cylinder grows [m/s]; 0 where nothing is known of it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

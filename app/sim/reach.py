@@ -384,6 +384,7 @@ class ReachBatch(CellBatch):
         if wrong.size:
             raise InvalidInput("rows", int(wrong[0]), f"must be one of {self.n_envs} cells")
         return numbers
+
     def observe(self) -> NDArray[np.float32]:
         """Measure distances to people and write all observations anew, (n_envs, obs_size).
 

@@ -29,10 +29,14 @@ _SIZE_LOW[PELVIS_Z] = -10.0  # counted from the cell's origin
 _CYLINDER_LOW = np.array([human.Q_MIN[0], human.Q_MIN[1], 0.01])
 WIDEST = 5.0
 """Greatest radius of a cylinder [m]."""
+FASTEST_GROWTH = 5.0
+"""Greatest speed at which the radius of a cylinder changes [m/s]."""
 _CYLINDER_HIGH = np.array([human.Q_MAX[0], human.Q_MAX[1], WIDEST])
 
 
-def standing_in(x: float, y: float, vx: float, vy: float, r: float) -> Person:
+def standing_in(
+    x: float, y: float, vx: float, vy: float, r: float, growth: float = 0.0
+) -> Person:
     """Return the person that a cylinder is seen as.
 
     Args:
@@ -41,11 +45,15 @@ def standing_in(x: float, y: float, vx: float, vy: float, r: float) -> Person:
         vx: Its velocity [m/s].
         vy: The same.
         r: Its radius [m].
+        growth: How fast the radius grows [m/s].
     """
     qd = np.zeros(18)
     qd[:2] = vx, vy
     return Person(
-        q=human.rest_posture(x, y, math.atan2(-y, -x)), qd=qd, cylinder=np.array([x, y, r])
+        q=human.rest_posture(x, y, math.atan2(-y, -x)),
+        qd=qd,
+        cylinder=np.array([x, y, r]),
+        growth=growth,
     )
 
 
@@ -81,11 +89,15 @@ def _checked(person: Person, path: str) -> Person:
     if cylinder is not None:
         low, high = _CYLINDER_LOW, _CYLINDER_HIGH
         cylinder = checked_vector(f"{path}.cylinder", cylinder, 3, low, high, "m")
+    if not abs(person.growth) <= FASTEST_GROWTH:
+        rule = f"must lie in [-{FASTEST_GROWTH:g}, {FASTEST_GROWTH:g}] m/s"
+        raise InvalidInput(f"{path}.growth", person.growth, rule)
     return Person(
         q=checked_vector(f"{path}.q", person.q, 18, _Q_LOW, _Q_HIGH, "m or rad"),
         qd=checked_vector(f"{path}.qd", person.qd, 18, -_QD_LIMIT, _QD_LIMIT, "m/s or rad/s"),
         size=size,
         cylinder=cylinder,
+        growth=person.growth,
     )
 
 

@@ -23,7 +23,7 @@ from app.policies import pretrained
 from app.policies.motion_decision import MotionDecider
 from app.policies.reach_policy import ReachPolicy
 from app.policies.trained_cell import cell_of
-from app.sim.kernels.occupancy import VX, VY, R, X, Y
+from app.sim.kernels.occupancy import GROWTH, VX, VY, R, X, Y
 from app.sim.motion_ports import MotionQuestion
 from app.sim.ports import Vec
 from app.sim.reach import VIEWS, ReachBatch, ReachSettings
@@ -53,7 +53,10 @@ def questions(one: MotionDecider, seed: int) -> list[MotionQuestion]:
     rng = np.random.default_rng(seed)
     for _ in range(40):
         batch.step(rng.uniform(-1.0, 1.0, (STATES, 6)).astype(np.float32), features=False)
-    state, walkers = batch.state, batch.state.people.walkers.rows[:, 0, [X, Y, VX, VY, R]]
+    state, walkers = (
+        batch.state,
+        batch.state.people.walkers.rows[:, 0, [X, Y, VX, VY, R, GROWTH]],
+    )
     return [
         MotionQuestion(
             q=state.q[e].copy(),

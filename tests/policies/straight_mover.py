@@ -19,5 +19,6 @@ class Straight:
         posture, _ = ik_vertical_batch(
             batch.state.goal, mount.tool_length, np.array(mount.q_min), np.array(mount.q_max)
         )
-        self.looked.append(batch.state.people.walkers.rows[:, 0, :5].copy())
+        if batch.state.people.walkers.rows.shape[1]:
+            self.looked.append(batch.state.people.walkers.rows[:, 0, :5].copy())
         return np.clip(self._gain * (posture - batch.state.q), -1, 1).astype(np.float32)

@@ -6,6 +6,7 @@ import pytest
 from app.errors import GoalOutside, InvalidInput
 from app.policies.interpolation import Interpolation, interpolates
 from app.sim.goal_sets import GoalMix
+from app.sim.kernels.reach_features import N_FEATURES
 from tests.policies.reach_actor import RandomActor
 
 
@@ -19,8 +20,8 @@ def test_targets_around_a_goal_come_with_their_positions(goals: str, n_corners: 
 
 def test_targets_without_weight_are_not_asked_for() -> None:
     between = Interpolation(RandomActor())
-    obs = np.full((1, 8, 53), np.nan, dtype=np.float32)
-    obs[0, 2] = np.linspace(-1, 1, 53)
+    obs = np.full((1, 8, N_FEATURES), np.nan, dtype=np.float32)
+    obs[0, 2] = np.linspace(-1, 1, N_FEATURES)
     weights = np.zeros((1, 8))
     weights[0, 2] = 1.0
     mix = GoalMix(which=np.arange(8)[None], weights=weights)

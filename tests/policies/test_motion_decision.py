@@ -13,7 +13,7 @@ from app.sim import human
 from app.sim.actions import ActionSettings
 from app.sim.cells import load_cell
 from app.sim.goal_sets import halton_targets
-from app.sim.kernels.occupancy import VX, VY, R, X, Y
+from app.sim.kernels.occupancy import GROWTH, VX, VY, R, X, Y
 from app.sim.motion_ports import MotionDecision, MotionQuestion
 from app.sim.ports import Person
 from app.sim.reach import ReachBatch, ReachSettings
@@ -54,7 +54,7 @@ def told(batch: ReachBatch, e: int) -> MotionQuestion:
         Person(q=q.copy(), qd=qd.copy()) for q, qd in zip(rows.q[e], rows.qd[e], strict=True)
     ]
     for walker in rows.walkers.rows[e]:
-        people.append(standing_in(*walker[[X, Y, VX, VY, R]]))
+        people.append(standing_in(*walker[[X, Y, VX, VY, R, GROWTH]]))
     return MotionQuestion(
         q=state.q[e].copy(),
         qd=state.qd[e].copy(),

@@ -4,18 +4,19 @@ import numpy as np
 import pytest
 import torch
 
-from app.policies.quantiles import QuantileCritics
+from app.policies.quantiles import QuantileCritics, quantile_loss
 
 
 def test_targets_leave_out_the_highest_quantiles_of_all_critics():
     torch.manual_seed(0)
     critics = QuantileCritics(16, 4, 2, n_critics=3, n_quantiles=5, dropped=2)
     obs, act = torch.randn(7, 4), torch.randn(7, 2)
-    everything = torch.cat(critics(obs, act), dim=1)
-    kept = critics.targets(obs, act)
+    with torch.no_grad():
+        everything = torch.cat(critics(obs, act), dim=1)
+        kept = critics.targets(obs, act)
     assert everything.shape == (7, 15) and kept.shape == (7, 9)
-    assert torch.equal(kept, everything.sort(dim=1).values[:, :9])
-    assert torch.allclose(critics.first(obs, act)[:, 0], everything.mean(dim=1))
+    assert torch.equal(kept.sort(dim=1).values, everything.sort(dim=1).values[:, :9])
+    assert torch.allclose(critics.first(obs, act).detach()[:, 0], everything.mean(dim=1))
 
 
 def test_quantiles_of_a_known_distribution_are_learned():
@@ -45,3 +46,19 @@ def test_weights_scale_the_loss_of_their_rows():
     alone, _ = critics.loss(obs[:1], act[:1], target[:1], None)
     assert even.item() == pytest.approx(plain.item(), rel=1e-6)
     assert first.item() == pytest.approx(alone.item() / 6.0, rel=1e-5)
+
+
+def test_loss_and_gradient_are_those_of_the_printed_formula():
+    torch.manual_seed(3)
+    said = (3.0 * torch.randn(40, 7)).requires_grad_()
+    target, shares = 3.0 * torch.randn(40, 11), torch.rand(40)
+    levels = (torch.arange(7) + 0.5) / 7
+    error = target[:, None, :] - said[:, :, None]
+    huber = torch.where(error.abs() > 1.0, error.abs() - 0.5, 0.5 * error**2)
+    tilted = (levels[None, :, None] - (error < 0.0).float()).abs() * huber
+    printed = (shares * tilted.mean(dim=(1, 2))).sum()
+    expected = torch.autograd.grad(printed, said)[0]
+    loss = quantile_loss(said, target, shares)
+    found = torch.autograd.grad(loss, said)[0]
+    assert loss.item() == pytest.approx(printed.item(), rel=1e-5)
+    torch.testing.assert_close(found, expected, rtol=1e-4, atol=1e-6)

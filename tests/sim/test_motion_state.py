@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from app.sim.cells import load_cell
-from app.sim.kernels.occupancy import VX, VY, R, X, Y
+from app.sim.kernels.occupancy import GROWTH, VX, VY, R, X, Y
 from app.sim.motion_state import Stage
 from app.sim.ports import Person
 from app.sim.reach import ReachBatch, ReachSettings
@@ -25,7 +25,7 @@ def driven(people: tuple[str, ...], view: str) -> ReachBatch:
 def people_of(batch: ReachBatch, e: int) -> list[Person]:
     rows = batch.state.people
     bodies = [Person(q=q, qd=qd) for q, qd in zip(rows.q[e], rows.qd[e], strict=True)]
-    return bodies + [standing_in(*w[[X, Y, VX, VY, R]]) for w in rows.walkers.rows[e]]
+    return bodies + [standing_in(*w[[X, Y, VX, VY, R, GROWTH]]) for w in rows.walkers.rows[e]]
 
 
 @pytest.mark.parametrize("view", ["features", "state"])

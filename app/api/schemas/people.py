@@ -19,7 +19,7 @@ from app.sim.kernels.body import N_SIZE
 from app.sim.keypoints import BODY_25, N_KEYPOINTS
 from app.sim.person_estimate import PersonEstimate
 from app.sim.ports import Person, Vec
-from app.sim.seen_people import WIDEST
+from app.sim.seen_people import FASTEST_GROWTH, WIDEST
 
 Source = Literal["joint-angles", "keypoints", "cylinder", "tracker"]
 Speeds = Literal["given", "zero", "estimated"]
@@ -137,6 +137,9 @@ class CylinderPerson(Body):
     vx: Speed = Field(description="velocity [m/s]")
     vy: Speed = Field(description="velocity [m/s]")
     r: Annotated[float, Field(ge=0.01, le=WIDEST)] = Field(description="radius [m]")
+    growth: Annotated[float, Field(ge=-FASTEST_GROWTH, le=FASTEST_GROWTH)] = Field(
+        0.0, description="how fast the radius grows [m/s]; read by policies that move the arm"
+    )
 
 
 class TrackedPerson(Body):

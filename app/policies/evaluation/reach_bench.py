@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from app.errors import InvalidInput
 from app.policies.checkpoint import Checkpoint
 from app.policies.evaluation.reach_episodes import (
     TOLD_S,
@@ -23,6 +24,7 @@ from app.policies.interpolation import interpolates
 from app.policies.movers import How, Mover, mover_of
 from app.policies.reach_policy import ReachPolicy
 from app.policies.trained_cell import cell_of
+from app.sim.cell_people import CylinderPerson
 from app.sim.cells import Cell
 from app.sim.kernels.episode import SUCCESS_DISTANCE
 from app.sim.ports import Vec
@@ -34,6 +36,18 @@ Json = dict[str, Any]
 def goal_ways(actor: ReachPolicy) -> tuple[How, ...]:
     """Return the ways of asking a policy for goals between those it was trained on."""
     return ("direct", "interpolated") if interpolates(actor) else ("direct",)
+
+
+def walker_of(cell: Cell) -> CylinderPerson:
+    """Return the first person of a cell who walks about as a cylinder.
+
+    Raises:
+        InvalidInput: There is none.
+    """
+    if not cell.cylinders:
+        rule = "must have been trained in a cell with somebody who walks about"
+        raise InvalidInput("checkpoint", cell.name, rule)
+    return cell.cylinders[0]
 
 
 class ReachBench:

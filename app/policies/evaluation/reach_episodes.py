@@ -1,8 +1,8 @@
 """Runs reach episodes to their ends under any mover, and counts how they ended.
 
-Episode ``i`` of a seed is played by row ``i mod n_envs`` of a batch as its number ``i //
-n_envs``: its people and their whole motion, and its goal, are the same whoever moves the robot,
-whatever the time limit, and however many episodes are played (as long as the rows are as many).
+Episode ``i`` of a seed is played by row ``i mod N_ENVS`` of a batch as its number ``i //
+N_ENVS``: its people and their whole motion, and its goal, are the same whoever moves the robot,
+whatever the time limit, and however many episodes are played.
 
 Source: METHOD 2.3 and 2.6.
 """
@@ -23,7 +23,7 @@ from app.sim.reach import ReachBatch, ReachSettings
 
 Index = NDArray[np.int64]
 N_ENVS = 500
-"""Rows of a batch: which person an episode meets hangs on it, so it is never varied."""
+"""Most rows of a batch: which person an episode meets hangs on it, so it is never varied."""
 TOLD_S = 5.0
 """Most time left that a policy is told [s]: what episodes of training have. In longer episodes
 it is told this much until no more is left."""
@@ -110,7 +110,7 @@ class _Play:
         self._outcome, self._redrawn = np.zeros((2, n), dtype=np.int64)
         self._duration, self._start = np.zeros((2, n))
         batch.reset()
-        self._begin(np.arange(min(n, rows)))
+        self._begin(np.arange(rows))
 
     def _begin(self, rows: Index) -> None:
         """Give rows that just started their goals, and note how they start."""
@@ -164,7 +164,8 @@ def play(
         goals: Goal of each episode [m], shape (n, 3).
         seed: Seed of the episodes.
     """
-    return _Play(ReachBatch(cell, N_ENVS, seed, settings), mover, goals).to_the_end()
+    batch = ReachBatch(cell, min(N_ENVS, len(goals)), seed, settings)
+    return _Play(batch, mover, goals).to_the_end()
 
 
 def recheck_contacts(

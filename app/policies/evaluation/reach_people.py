@@ -15,12 +15,13 @@ from dataclasses import replace
 from typing import Any
 
 from app.policies.checkpoint import Checkpoint
-from app.policies.evaluation.reach_bench import ReachBench
+from app.policies.evaluation.reach_bench import ReachBench, walker_of
 from app.policies.evaluation.rows import OnRow, untold
 from app.policies.movers import How
 from app.sim.cell_people import FixedSpeedWalker
 from app.sim.cells import Cell
 from app.sim.kernels.people import MAX_PEOPLE
+from app.sim.scene import HumanKind
 
 DEFAULT_EPISODES = 1000
 """METHOD 2.6."""
@@ -28,6 +29,8 @@ TARGET_EPISODES = 5400
 """Episodes of each row of ``reach-constant``: as many as ``reach-targets`` plays."""
 WAYS: tuple[How, ...] = ("direct", "averaged")
 """Ways of asking a policy about several people; ``direct`` sees the nearest."""
+KINDS: tuple[HumanKind, ...] = ("walker", "constant")
+"""Who walks: as usual, and with one speed and radius per episode."""
 SPEEDS = (0.25, 0.5, 1.0)
 """Of people [m/s] (METHOD 2.6)."""
 
@@ -47,13 +50,13 @@ def run_people(
     bench = ReachBench(checkpoint, seed, len(rows), on_row)
     goals = bench.target_goals(episodes or DEFAULT_EPISODES)
     for n, how in rows:
-        settings = replace(bench.usual, people=("walker",) * n)
+        settings = replace(bench.usual, people=KINDS[:1] * n)
         played = bench.play(settings, goals, how)
         name = f"{n}-people" + (f"-{how}" if n > 1 else "")
         row = played.row(name)
         row["starts_redrawn"] = float((played.redrawn > 0).mean())
         bench.add(row, settings, "grid", how)
-    bench.recheck(replace(bench.usual, people=("walker",) * 2), goals)
+    bench.recheck(replace(bench.usual, people=KINDS[:1] * 2), goals)
     return bench.result()
 
 
@@ -70,7 +73,7 @@ def run_constant(
     """
     bench = ReachBench(checkpoint, seed, 2, on_row)
     goals = bench.target_goals(episodes or TARGET_EPISODES)
-    for kind in ("walker", "constant"):
+    for kind in KINDS:
         settings = replace(bench.usual, people=(kind,))
         bench.add(bench.play(settings, goals).row(kind), settings, "grid")
     return bench.result()
@@ -98,8 +101,12 @@ def run_speeds(
 
 
 def at_speed(cell: Cell, speed: float) -> Cell:
-    """Return a cell with one cylinder that walks at a given speed [m/s], else as its own."""
-    walker = cell.cylinders[0]
+    """Return a cell with one cylinder that walks at a given speed [m/s], else as its own.
+
+    Raises:
+        InvalidInput: The cell has none.
+    """
+    walker = walker_of(cell)
     kept = set(FixedSpeedWalker.model_fields) & set(type(walker).model_fields) - {
         "kind",
         "speed",

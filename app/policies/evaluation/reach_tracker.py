@@ -25,8 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.policies.checkpoint import Checkpoint
-from app.policies.evaluation.reach_bench import ReachBench
-from app.policies.evaluation.reach_episodes import N_ENVS
+from app.policies.evaluation.reach_bench import ReachBench, walker_of
 from app.policies.evaluation.rows import OnRow, untold
 from app.policies.movers import Mover, mover_of
 from app.sim.cylinder_tracker import CylinderTracker, CylinderTrackerSettings
@@ -71,17 +70,12 @@ class ThroughTracker:
     Args:
         mover: Who moves the robots.
         row: How people are seen.
-        n_envs: Rows of the batch.
-        n_people: Cylinders in each.
         seed: Seed of the disturbances.
     """
 
-    def __init__(
-        self, mover: Mover, row: TrackedRow, n_envs: int, n_people: int, seed: int
-    ) -> None:
-        self._mover, self._row = mover, row
-        self._tracker = CylinderTracker(row.tracker, n_envs, n_people, seed)
-        self._every = np.arange(n_envs)
+    def __init__(self, mover: Mover, row: TrackedRow, seed: int) -> None:
+        self._mover, self._row, self._seed = mover, row, seed
+        self._tracker: CylinderTracker | None = None
         self.errors: list[Vec] = []
         """Distance of seen and true axes at every step of every row [m]."""
 
@@ -90,11 +84,14 @@ class ThroughTracker:
         state, t = batch.state, batch.state.elapsed
         rows = state.people.walkers.rows
         true = rows[:, :, [X, Y, R]]
+        if self._tracker is None:
+            n, n_people = true.shape[:2]
+            self._tracker = CylinderTracker(self._row.tracker, n, n_people, self._seed)
         fresh = np.flatnonzero(t == 0.0)
         self._tracker.start(fresh, true[fresh], rows[fresh][:, :, [VX, VY, GROWTH]])
-        later = np.flatnonzero(t > 0.0)
+        later, every = np.flatnonzero(t > 0.0), np.arange(batch.n_envs)
         self._tracker.look(later, t[later], true[later])
-        seen, change = self._tracker.seen(self._every, predicted=self._row.predicted)
+        seen, change = self._tracker.seen(every, predicted=self._row.predicted)
         seen[:, :, 2] = np.maximum(seen[:, :, 2], THINNEST)
         self.errors.append(np.linalg.norm(seen[:, :, :2] - true[:, :, :2], axis=2).ravel())
         return self._ask(batch, seen, change)
@@ -122,13 +119,16 @@ def run_tracker(
         episodes: Number of episodes of each row, by default 5400.
         seed: Seed of the episodes and of the disturbances.
         on_row: Told of each row once it is known.
+
+    Raises:
+        InvalidInput: Nobody walks about in the checkpoint's cell.
     """
     bench = ReachBench(checkpoint, seed, 1 + len(ROWS), on_row)
+    walker_of(bench.cell)
     goals = bench.target_goals(episodes or DEFAULT_EPISODES)
-    n_people = len(bench.cell.cylinders)
     bench.add(bench.play(bench.usual, goals).row("exact"), bench.usual, "grid")
     for name, tracked in ROWS.items():
-        mover = ThroughTracker(mover_of(bench.actor, "direct"), tracked, N_ENVS, n_people, seed)
+        mover = ThroughTracker(mover_of(bench.actor, "direct"), tracked, seed)
         row = bench.play(bench.usual, goals, mover=mover).row(name)
         median, p95 = np.percentile(1e3 * np.concatenate(mover.errors), [50, 95]).tolist()
         row |= {"axis_error_median_mm": median, "axis_error_p95_mm": p95}

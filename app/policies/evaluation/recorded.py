@@ -104,15 +104,15 @@ class Trace:
             if not q:
                 continue
             joints, sizes, cylinders = (np.array(part) for part in zip(*people, strict=True))
-            if joints.shape[1] == 0:
+            sized = joints.shape[1] > 0
+            if not sized:
                 joints = np.tile(human.rest_posture(*FAR_AWAY), (len(q), 1, 1))
-                sizes = None
             for w in range(joints.shape[1]):
                 found.append(
                     Trajectory(
                         q_robot=np.array(q),
                         q_human=joints[:, w],
-                        sizes=None if sizes is None else sizes[:, w],
+                        sizes=sizes[:, w] if sized else None,
                         cylinders=cylinders if w == 0 else None,
                         dt=self._batch.arm.dt / self._parts,
                     )

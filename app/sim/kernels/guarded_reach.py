@@ -21,11 +21,25 @@ from app.sim.kernels.arm import keep_columns, place_robot
 from app.sim.kernels.columns import copy_rows
 from app.sim.kernels.compiled import kernel
 from app.sim.kernels.contact import clearances
-from app.sim.kernels.episode import COLLISION, RUNNING, SUCCESS, SUCCESS_DISTANCE, TIMEOUT
+from app.sim.kernels.episode import (
+    COLLISION,
+    NO_OBS,
+    RUNNING,
+    SUCCESS,
+    SUCCESS_DISTANCE,
+    TIMEOUT,
+)
 from app.sim.kernels.episode import distance_to as tcp_distance
 from app.sim.kernels.occupancy import GAIT, GROWTH, STAYING, TIME, VX, VY, R, X, Y
 from app.sim.kernels.people import advance_people, place_people
-from app.sim.kernels.reach import ReachRules, ReachState, ReachWorld, Work, reset_env, write_obs
+from app.sim.kernels.reach import (
+    ReachRules,
+    ReachState,
+    ReachWorld,
+    Work,
+    observe_env,
+    reset_env,
+)
 from app.sim.kernels.reach_features import Obs
 from app.sim.kernels.reach_reward import ReachWeights, reward
 from app.sim.kernels.safety_trial import MOVING, first_contact, touching_speed
@@ -265,6 +279,15 @@ def command(
     )  # fmt: skip
 
 
+@kernel(error_model="numpy")
+def _look(
+    world: ReachWorld, state: ReachState, e: int, work: Work, view: int, obs: Obs
+) -> None:
+    """Write the observation of environment ``e`` where one is wanted."""
+    if view != NO_OBS:
+        observe_env(world, state, e, work, view, obs[e])
+
+
 @kernel(nogil=True, error_model="numpy")
 def begin_batch(
     world: ReachWorld, state: ReachState, guard: Guard, work: Work, view: int, obs: Obs
@@ -272,9 +295,7 @@ def begin_batch(
     """Begin the episode of every environment that was just reset, and write observations."""
     for e in range(state.q.shape[0]):
         begin_episode(world, state, e, guard, work)
-        place_robot(world.arm, state.q[e], work.robot)
-        place_people(world.people, state.people, e, work.crowd)
-        write_obs(world, state, e, work, view, obs[e])
+        _look(world, state, e, work, view, obs)
 
 
 @kernel(nogil=True, error_model="numpy")
@@ -304,7 +325,7 @@ def step_batch(
         command(world, action, state, e, act[e], work)
         rew[e] = guarded_period(world, rules, weights, state, e, guard, work)
         ended[e] = state.outcome[e]
-        write_obs(world, state, e, work, view, obs[e])
+        _look(world, state, e, work, view, obs)
         if ended[e] != RUNNING:
             for k in range(N_ACCOUNT):
                 guard.closed[e, k] = guard.account[e, k]
@@ -314,7 +335,7 @@ def step_batch(
             state.episode[e] += 1
             reset_env(world, rules, seed, first_env, state, e, work)
             begin_episode(world, state, e, guard, work)
-            write_obs(world, state, e, work, view, obs[e])
+            _look(world, state, e, work, view, obs)
 
 
 @kernel(nogil=True, error_model="numpy")

@@ -42,7 +42,7 @@ def test_every_stage_solves_as_much_or_more():
     ceiling.run(Straight())
     solved = [row["solved"]["mean"] for row in ceiling.rows]
     assert solved == sorted(solved)
-    assert solved[-1] > solved[0] + 0.1
+    assert solved[-1] > solved[0] + 0.05
     assert [row["name"] for row in ceiling.rows] == [row["name"] for _, _, row in told]
     never = np.zeros(54, dtype=bool)
     row = verdict(ceiling.search, never, TARGETS, goals)

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from app.errors import InvalidInput
 from app.policies.evaluation import reach_episodes
 from app.policies.evaluation.protocols import OF_REACHING, evaluate
 from app.policies.evaluation.reach_people import SPEEDS, at_speed
@@ -131,3 +132,11 @@ def test_a_jerk_limited_policy_is_measured_as_such() -> None:
     assert row["name"] == "degree-3"
     assert row["jerk_rad_s3"] <= row["jerk_limit_rad_s3"] + 1e-6
     assert result["settings"]["action"]["degree"] == 3
+
+
+@pytest.mark.parametrize("name", ["reach-speeds", "reach-tracker"])
+def test_a_cell_where_nobody_walks_is_refused(name: str) -> None:
+    cell = load_cell("shared-workspace").model_copy(update={"name": "empty", "people": ()})
+    with pytest.raises(InvalidInput, match="somebody who walks about") as caught:
+        evaluate(name, untrained_reach(width=16, cell=cell), episodes=2)
+    assert (caught.value.field, caught.value.value) == ("checkpoint", "empty")

@@ -1,5 +1,7 @@
 """Policies and planners are compared on equal terms, and every run is counted."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -16,6 +18,7 @@ from app.policies.evaluation.reach_ssm import (
 )
 from app.sim.cells import load_cell
 from app.sim.crossings import crossings
+from app.sim.planners import PlanSettings
 from app.sim.reach import ReachSettings
 from app.sim.safety import safety_settings
 from tests.policies.straight_mover import Straight
@@ -58,11 +61,12 @@ def test_with_nobody_there_it_is_never_slowed(comparison):
     assert course_row("alone", runs)["never_stopped"]["mean"] == 1.0
 
 
-def test_hindsight_is_untouched_and_no_later_than_the_straight_way(comparison, straight):
+def test_hindsight_takes_the_soonest_run_that_nobody_touches(comparison, straight):
     best = best_replays(comparison, 12, np.random.default_rng(2))
-    assert best.arrived.sum() >= 5
-    assert not best.touched_at_rest[best.arrived].any()
-    assert best.seconds[best.arrived].mean() < straight.runs.seconds.mean()
+    alone = comparison.policy(Straight(), alone=True).runs
+    assert best.arrived.all() and not best.touched_at_rest.any()
+    assert straight.runs.touched_at_rest.any()
+    assert (best.seconds > 0.7 * alone.seconds).all()
 
 
 def test_a_saving_is_paired_and_counts_who_does_not_arrive(straight):
@@ -75,10 +79,14 @@ def test_a_saving_is_paired_and_counts_who_does_not_arrive(straight):
 
 def test_the_protocol_runs_policy_planners_recordings_and_random_episodes(monkeypatch):
     monkeypatch.setattr(reach_ssm, "N_HINDSIGHT", 4)
-    few = {name: PLANNERS[name] for name in ("rrt-star-once", "every-tick")}
+    short = PlanSettings(planner="rrt-star", budget_s=0.02)
+    few = {
+        name: replace(PLANNERS[name], plan=short) for name in ("rrt-star-once", "every-tick")
+    }
     monkeypatch.setattr(reach_ssm, "PLANNERS", few)
-    monkeypatch.setattr(reach_ssm, "CAP_S", 6.0)
-    monkeypatch.setattr(reach_ssm, "RANDOM_S", 3.0)
+    monkeypatch.setattr(reach_ssm, "ALONE", few["rrt-star-once"])
+    monkeypatch.setattr(reach_ssm, "CAP_S", 3.0)
+    monkeypatch.setattr(reach_ssm, "RANDOM_S", 0.5)
     told = []
     result = evaluate(
         "reach-ssm",

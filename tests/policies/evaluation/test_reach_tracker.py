@@ -34,7 +34,7 @@ def watched(row: TrackedRow | None, steps: int = 40) -> tuple[Watching, np.ndarr
     batch = ReachBatch(load_cell("shared-workspace"), N, 5, ReachSettings())
     batch.reset()
     watching, true = Watching(), []
-    mover = watching if row is None else ThroughTracker(watching, row, N, 1, 5)
+    mover = watching if row is None else ThroughTracker(watching, row, 5)
     for _ in range(steps):
         true.append(batch.state.people.walkers.rows[:, 0][:, [X, Y, VX, VY, R]].copy())
         act = mover.acts(batch)
