@@ -14,6 +14,7 @@ from app.sim.cells import Cell
 from app.sim.reach import goal_region_of
 from app.sim.reach_commands import MoveGoal, goal_box
 from app.sim.reach_view import ReachView, SafetyView
+from app.sim.separation_zone import N_DIRECTIONS
 from app.sim.snapshot import WorldSnapshot
 from web.arc import Arc
 from web.goal_gizmo import GoalGizmo
@@ -111,7 +112,11 @@ class _Zone:
             cast_shadow=False, receive_shadow=False, visible=False,
         )  # fmt: skip
         self._edge = server.scene.add_line_segments(
-            "/zone/edge", np.zeros((3, 2, 3)), OFF, thickness=0.016, visible=False
+            "/zone/edge",
+            np.zeros((N_DIRECTIONS, 2, 3)),
+            OFF,
+            thickness=0.016,
+            visible=False,
         )
         self._key: tuple[object, ...] = ()
 

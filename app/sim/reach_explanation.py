@@ -35,9 +35,9 @@ def slowed(safety: SafetyView, n_people: int) -> str | None:
     if not safety.on or safety.override >= FULL or safety.separation is None:
         return None
     verb = "Stopped" if safety.override <= 0.0 else f"Slowed to {100 * safety.override:.0f} %"
-    who = "person" if n_people < 2 else f"person {(safety.person or 0) + 1}"
+    who = "the person" if n_people < 2 else f"person {(safety.person or 0) + 1}"
     gap, need = safety.separation, safety.required or 0.0
-    place = f"{who} {max(gap, 0.0):.2f} m from the {link_name(safety.link)}"
+    place = f"{who} is {max(gap, 0.0):.2f} m from the {link_name(safety.link)}"
     if gap <= 0.0:
         return f"{verb}: {who} touches the {link_name(safety.link)}; the robot stands still."
     if gap < need:

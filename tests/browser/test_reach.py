@@ -64,7 +64,7 @@ def test_visitor_opens_the_cell_sees_it_reach_and_gets_in_its_way(
     x, y, _ = now["tcp"]
     tell(server, {"tag": "move-human", "pelvis": [x, y + 0.3, 0.0]})
     expect(page.locator('[data-status="moving"]')).to_have_text("Stopped")
-    expect(page.locator(".sentence")).to_contain_text("Stopped: person")
+    expect(page.locator(".sentence")).to_contain_text("Stopped: the person")
     expect(page.locator('[data-role="override"]')).to_have_attribute("data-override", "0.000")
     page.click('[data-choice="safety:false"]')
     expect(page.locator('[data-role="override"]')).to_contain_text("layer off")
