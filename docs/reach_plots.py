@@ -18,7 +18,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import Colormap, LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
-from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, PercentFormatter
+from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
 from numpy.typing import NDArray
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -75,9 +75,9 @@ def read_all(name: str) -> list[Json]:
     return [] if first is None else [first, *siblings(RESULTS / f"{name}.json")]
 
 
-def percent(axis: Any, decimals: int | None = None) -> None:
-    """Label an axis in percent."""
-    axis.set_major_formatter(PercentFormatter(1.0, decimals=decimals, symbol=" %"))
+def percent(axis: Any) -> None:
+    """Label an axis in percent, with as many decimals as its ticks need."""
+    axis.set_major_formatter(FuncFormatter(lambda value, _place: f"{100.0 * value:.4g} %"))
 
 
 def bars(rates: Sequence[Json]) -> Grid:
@@ -241,7 +241,8 @@ def between_targets(results: Sequence[Json]) -> Figure:
     left.axvline(0.0, color=GREY, lw=1.0)
     left.axvline(-0.5, color=RED, lw=1.0, ls=":")
     left.set_yticks([-k for k in range(len(ways))], [label for label, *_ in ways])
-    left.set(ylim=(0.6 - len(ways), 0.6), title="5000 random goals less the targets")
+    title = f"{ways[0][1]['n']} random goals less the targets"
+    left.set(ylim=(0.6 - len(ways), 0.6), title=title)
     left.set(xlabel="success rate, points")
     left.grid(False, axis="y")
     right.set(title="... by how far they are from the grid", ylabel="success")

@@ -62,7 +62,8 @@ class GoalGizmo:
         @self._handle.on_update
         async def _(event: viser.TransformControlsEvent) -> None:
             self._free_at = time.monotonic() + (SETTLE_S if event.phase == "end" else HOLD_S)
-            self._submit(MoveGoal(position=self._inside(self._handle.position)))
+            if event.phase != "start":
+                self._submit(MoveGoal(position=self._inside(self._handle.position)))
 
     def _inside(self, position: Vec) -> tuple[float, float, float]:
         """Return the point of the goal region nearest to where the handle is [m]."""

@@ -33,8 +33,6 @@ EDGE: Rgb = (130, 146, 160)
 DOT: Rgb = (150, 164, 178)
 GAUGE_M, GAUGE_Z = 0.21, 0.012
 N_GAUGE, N_TRAIL = 60, 90
-PERIOD_S = 0.08
-"""Time between two drawings of zone, gauge and trail [s]."""
 TRAIL_M = 4e-3
 """Way of the tool that is worth a piece of trail [m]."""
 BACK: Rgb = (226, 230, 235)
@@ -73,7 +71,6 @@ class ReachScene:
         self._gauge = _Gauge(server)
         self._trail = _Trail(server)
         self._path = Arc(server, "/way", lift=0.05)
-        self._next = -1.0
 
     def draw(self, snapshot: WorldSnapshot, *, zone: bool, trail: bool, targets: bool) -> None:
         """Show a snapshot; sends only what changed.
@@ -97,9 +94,6 @@ class ReachScene:
         else:
             self._path.hide()
         self._trail.note(snapshot)
-        if self._next <= snapshot.t_s < self._next + PERIOD_S and not snapshot.paused:
-            return
-        self._next = snapshot.t_s
         self._zone.draw(view, visible=zone and view.safety.person is not None)
         self._gauge.draw(view)
         self._trail.draw(visible=trail)
@@ -127,7 +121,7 @@ class _Zone:
             if part.visible != visible:
                 part.visible = visible
         color, outline = override_color(view.safety), view.safety.zone
-        key = (color, *np.round(outline[::9], 3).ravel().tolist())
+        key = (color, *np.round(outline[::9], 2).ravel().tolist())
         if not visible or key == self._key:
             return
         self._key = key

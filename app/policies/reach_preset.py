@@ -78,7 +78,11 @@ class ReachPreset:
         "observation", SIGHTS, "what critics see: as the actor, or also where people will be"
     )
     ema: float = number(
-        0.999, 0.0, 0.99999, "", "what an update leaves of the actor's averaged weights; 0: none"
+        0.999,
+        0.0,
+        0.99999,
+        "",
+        "what an update leaves of the averaged actor; 0: no average",
     )
     precision: str = choice(
         "float32", PRECISIONS, "products in training; bfloat16 is faster on some processors"

@@ -7,7 +7,7 @@ from app.errors import NotFound
 from app.policies import checkpoint as formats
 from app.policies.checkpoint import Checkpoint
 
-ALIASES = ("pick", "sorting-e0", "sorting-e1")
+ALIASES = ("pick", "sorting-e0", "sorting-e1", "reach")
 """Names of the shipped checkpoints."""
 
 

@@ -10,6 +10,7 @@ from app.policies.evaluation.protocols import (
     OF_SORTING,
     PROTOCOLS,
     WITH_MOTIONS,
+    WITH_OR_WITHOUT_MOTIONS,
     default_checkpoint,
     evaluate,
     most_episodes,
@@ -26,12 +27,14 @@ def test_recorded_motion_without_any_is_refused():
     assert caught.value.field == "motions"
 
 
-@pytest.mark.parametrize("name", sorted(set(PROTOCOLS) - WITH_MOTIONS))
+@pytest.mark.parametrize(
+    "name", sorted(set(PROTOCOLS) - WITH_MOTIONS - WITH_OR_WITHOUT_MOTIONS)
+)
 def test_motions_are_refused_where_none_are_taken(name):
     run = run_of(working(60), name="wave")
     with pytest.raises(InvalidInput, match=f"'wave'.*must not be given to {name}") as caught:
         evaluate(name, pretrained.load("pick"), episodes=1, motions=(run,))
-    assert caught.value.choices == tuple(sorted(WITH_MOTIONS))
+    assert set(caught.value.choices) == WITH_MOTIONS | WITH_OR_WITHOUT_MOTIONS
 
 
 @pytest.mark.parametrize("name", ["pick-single", "pick-choice", "safety-ssm"])
