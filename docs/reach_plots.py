@@ -18,7 +18,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import Colormap, LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
-from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
+from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -391,7 +391,7 @@ def curves(found: Sequence[Json]) -> Figure:
         colour = colour_of(one["name"])
         label = None if one["name"] in named else one["name"]
         named.add(one["name"])
-        points = one["targets"] or one["played"]
+        points = one["played"] or one["targets"]
         minutes = np.array([point["cpu_s"] / 60.0 for point in points])
         for axis, kind in ((left, "success"), (right, "collision")):
             told = label if kind == "success" else None
@@ -405,6 +405,7 @@ def curves(found: Sequence[Json]) -> Figure:
     for axis in (left, right):
         axis.set(xscale="log", xlabel="CPU time of the training [min]")
         axis.xaxis.set_major_formatter(FuncFormatter(lambda value, _place: f"{value:g}"))
+        axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axis.xaxis.set_minor_formatter(NullFormatter())
         percent(axis.yaxis)
     figure.legend(loc="outside lower center", ncols=min(5, len(named)))

@@ -21,6 +21,7 @@ Source: METHOD 2.6; the trials' figure is 98.7 %.
 """
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -116,14 +117,14 @@ class Ceiling:
         search = self.search
         self.stage("policy", lambda: search.undisturbed(mover.acts))
         for n_each in SCRIPTED:
-            self.stage(
-                f"scripted-{n_each}",
-                lambda n_each=n_each: search.scripted(search.unsolved(), n_each),
-            )
+            self.stage(f"scripted-{n_each}", partial(self._scripted, n_each))
         self.stage(
             "disturbed", lambda: search.disturbed(search.unsolved(), DISTURBED, mover.acts)
         )
-        self.stage("long", lambda: search.scripted(search.unsolved(), LONG))
+        self.stage("long", partial(self._scripted, LONG))
+
+    def _scripted(self, n_each: int) -> None:
+        self.search.scripted(self.search.unsolved(), n_each)
 
 
 def verdict(search: Hindsight, never: Any, targets: Vec, goals: Vec) -> Json:

@@ -6,7 +6,7 @@ velocity. All follow from positions and velocities of the moment and the time le
 history. ``LAYOUT`` names every slice.
 
 A policy sees one person as a vertical cylinder, the nearest one: a walker as it is, a worker as
-the cylinder about the pelvis that contains the capsules, nobody as one too far away to matter.
+the cylinder about the pelvis that contains the capsules, nobody as one who stands far away.
 Clearances are exact, to the real shapes of all people.
 
 Source: (4.30). Deviates: features are added to it, since the raw state learned far more slowly
@@ -41,8 +41,9 @@ N_STATE = 20
 """Length of the plain state (4.30)."""
 N_SEEN = 6
 """Numbers by which a person is seen: x, y [m], vx, vy [m/s], r [m] and its growth [m/s]."""
-NOBODY = (0.0, 4.0, 0.0, 0.0, 0.2, 0.0)
-"""The person assumed where nobody is there."""
+NOBODY = (-2.0, 2.0, 0.0, 0.0, 0.2, 0.0)
+"""The person assumed where nobody is there: one who stands in the corner of the walking area
+farthest from the robot. Beside one farther away than any met in training, policies fail."""
 EVERYBODY = -1
 """In place of a person's number: all of them."""
 CENTER_Y = 1.25
