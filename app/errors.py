@@ -2,7 +2,6 @@
 
     ServiceError
     ├── NotFound             nothing has that name or id
-    │   └── NotShipped       no checkpoint of a kind comes with the service yet
     ├── InvalidInput         a value breaks a rule: field, value, rule, choices
     │   ├── BadCell          a work cell has faults: all of them, each with its place
     │   ├── BadMotion        a motion file has faults: each with its place
@@ -58,26 +57,6 @@ class NotFound(ServiceError):
     def problem(self) -> dict[str, object]:
         """Return noun, name and the known names."""
         return {"what": self.what, "name": self.name, "known": list(self.known)}
-
-
-class NotShipped(NotFound):
-    """No checkpoint of a kind comes with the service, and none was named.
-
-    Args:
-        what: The noun, such as ``"checkpoint that reaches goals"``.
-        alias: Name under which it would be known.
-        remedy: What to do about it, as a clause.
-    """
-
-    def __init__(self, what: str, alias: str, remedy: str) -> None:
-        super().__init__(what, alias)
-        self.message = f"no {what} is shipped as {alias!r}: {remedy}"
-        self.args = (self.message,)
-        self.remedy = remedy
-
-    def problem(self) -> dict[str, object]:
-        """Return noun, name and what to do."""
-        return {**super().problem(), "remedy": self.remedy}
 
 
 class InvalidInput(ServiceError):

@@ -143,8 +143,7 @@ class Service:
             warm_up_sorting()
             for name in SORTERS:
                 warm_up_sorting(self.parts.sorters.load(name))
-            if REACH_ALIAS in self.parts.checkpoints.aliases:
-                self.parts.movers.load(REACH_ALIAS)
+            self.parts.movers.load(REACH_ALIAS)
             cell = LiveCell(load_cell(LIVE_CELL), policy, id=WORLD_ID)
             if self.parts.stopping.is_set():
                 return

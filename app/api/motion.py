@@ -19,11 +19,10 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from app.api.known_people import known_people, take_time
 from app.api.problems import problem, service_problem, validation_problem
-from app.api.registry import REACH_ALIAS
 from app.api.schemas.motion import MotionAnswer, MotionRequest
 from app.api.services import Services, ServicesDep, services_of
 from app.api.task_selection import known_cell
-from app.errors import NotShipped, ServiceError
+from app.errors import ServiceError
 from app.policies.motion_decision import MotionDecider
 from app.sim.cells import Cell, require_cell
 from app.sim.safety import safety_settings
@@ -37,10 +36,6 @@ MAX_STAMP, MAX_TIME = 64, 1e18
 """Longest text and greatest number that a stamp in a problem may be."""
 LOOK_S = 0.2
 """How often an idle socket looks whether the server stops [s]."""
-REMEDY = (
-    "train one (POST /v1/jobs, kind `train`, a preset that reaches goals) and name its "
-    "checkpoint in `checkpoint`"
-)
 
 router = APIRouter(prefix=PATH, tags=["deciding"])
 
@@ -76,12 +71,9 @@ async def _decider(name: str | None, services: Services) -> MotionDecider:
     """Return the policy that is named, or the shipped one.
 
     Raises:
-        NotShipped: None is named and none is shipped.
         InvalidInput: Nothing has that name.
         CheckpointMismatch: It does not reach goals.
     """
-    if name is None and REACH_ALIAS not in services.checkpoints.aliases:
-        raise NotShipped("checkpoint that reaches goals", REACH_ALIAS, REMEDY)
     found = services.movers.loaded(name)
     if found is None:
         found = await run_in_threadpool(services.movers.load, name)
