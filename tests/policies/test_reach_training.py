@@ -84,7 +84,9 @@ def test_the_reward_of_what_is_played_is_that_of_the_batch(preset):
     assert set(ended.tolist()) <= {2, 3}
     steps = np.rint(batch.state.elapsed / batch.arm.dt)
     collided = ended == 2
-    np.testing.assert_allclose(returns, -0.004 * steps - 4.0 * collided, atol=1e-4)
+    np.testing.assert_allclose(
+        returns, -preset.c_step * steps - preset.c_c * collided, atol=1e-4
+    )
 
 
 @pytest.mark.parametrize(("sees_time", "cut"), [(True, False), (False, True)])

@@ -8,6 +8,7 @@ from gymnasium.error import ResetNeeded
 import app.sim.envs  # noqa: F401  (registers the ids)
 from app.errors import InvalidInput, NotFound
 from app.sim.envs.reach import ReachEnv
+from app.sim.kernels.reach_features import N_FEATURES
 from app.sim.reach import ReachSettings
 
 
@@ -19,7 +20,7 @@ def test_registered_id_takes_settings() -> None:
     env.close()
 
 
-@pytest.mark.parametrize(("observation", "size"), [("state", 20), ("features", 53)])
+@pytest.mark.parametrize(("observation", "size"), [("state", 20), ("features", N_FEATURES)])
 def test_both_observations_are_as_long_as_the_data_sheet_says(
     observation: str, size: int
 ) -> None:

@@ -11,6 +11,7 @@ from app.errors import InvalidInput, NotFound
 from app.sim.cells import load_cell
 from app.sim.envs import SORTING_IDS
 from app.sim.envs.sorting import SortingEnv, SortingVectorEnv
+from app.sim.kernels.sorting_reward import SortingWeights
 from app.sim.sorting import OUTCOMES, SortingBatch, SortingSettings, fail_of, shape_of
 from app.sim.sorting_state import SortingState
 from tests.benchmarks.plain_sorting import PlainSorting
@@ -137,7 +138,9 @@ def test_plain_environment_gives_the_same_transitions_and_rewards(
     shape = shape_of(cell)
     # A pick that succeeds for sure, and, as 1 is not allowed, one that fails as good as surely.
     fail = np.full(shape.n_cells, 0.99 if fails else 0.0)
-    settings = SortingSettings(disturbed_share=0.5)
+    # The plain environment has the reward of the source's presets.
+    weights = SortingWeights(fail=0.05, back=0.05, distance=0.1)
+    settings = SortingSettings(disturbed_share=0.5, weights=weights)
     batch = SortingBatch(shape, fail, 8, 4, settings)
     batch.reset()
     rng, seen = np.random.default_rng(6), set()

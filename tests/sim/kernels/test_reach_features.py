@@ -131,7 +131,7 @@ def test_enclosing_radius_of_one_capsule_is_its_farther_end_and_radius() -> None
 
 def test_nobody_is_seen_far_away() -> None:
     obs = observed(batch_of(observation="state"))
-    np.testing.assert_allclose(obs[:, 12:17], np.tile(NOBODY, (6, 1)), rtol=1e-6)
+    np.testing.assert_allclose(obs[:, 12:17], np.tile(NOBODY[:5], (6, 1)), rtol=1e-6)
     far = observed(batch_of())
     assert (far[:, LAYOUT["clearance"]] == 3.0).all()
     assert (far[:, LAYOUT["look_ahead"]] == 3.0).all()
