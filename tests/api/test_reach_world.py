@@ -40,7 +40,7 @@ def until(client: TestClient, holds: Callable[[dict[str, Any]], bool]) -> dict[s
 
 
 def test_world_shows_goal_safety_layer_and_cylinders(client: TestClient) -> None:
-    world = client.get(WORLD).json()
+    world = until(client, lambda one: one["checkpoint"] is None)
     reach, person = world["reach"], world["people"][0]
     assert (world["cell"], world["sorting"], world["candidates"]) == (
         "shared-workspace",
@@ -48,8 +48,7 @@ def test_world_shows_goal_safety_layer_and_cylinders(client: TestClient) -> None
         [],
     )
     assert reach["tolerance"] == 0.1
-    assert world["checkpoint"] == pretrained.load(REACH_ALIAS).sha256
-    assert {"direct", "interpolated", "averaged"} <= set(reach["ways"])
+    assert reach["ways"] == []
     safety = reach["safety"]
     total = safety["person_way"] + safety["robot_way"] + safety["margin"]
     assert safety["required"] == pytest.approx(total)
