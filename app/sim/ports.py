@@ -138,8 +138,8 @@ class TaskPolicy(Protocol):
         """
 
 
-class ReachActor(Protocol):
-    """Brings the tcp to a goal beside people; safe to call from several threads."""
+class ReachKnown(Protocol):
+    """What is known of a policy that brings the tcp to a goal beside people."""
 
     @property
     def checkpoint(self) -> str:
@@ -172,6 +172,10 @@ class ReachActor(Protocol):
     @property
     def targets(self) -> Vec | None:
         """The goals it was trained on [m], shape (n, 3); None for a whole box."""
+
+
+class ReachActor(ReachKnown, Protocol):
+    """Brings the tcp to a goal beside people; safe to call from several threads."""
 
     @property
     def trained_range(self) -> Mapping[str, Mapping[str, Sequence[float]]]:
