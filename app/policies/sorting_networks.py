@@ -22,6 +22,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from app.policies.one_hot import OneHotLinear
 from app.sim.kernels.sorting import FAILURE_SCALE
 from app.sim.sorting_state import SortingShape
 
@@ -193,26 +194,20 @@ class PrintedNetwork(nn.Module):
         width: Width of the hidden layers.
     """
 
-    one_hot: Tensor
-    """Rows of the identity, (n_types + 1, n_types + 1)."""
-
     def __init__(self, shape: SortingShape, width: int) -> None:
         super().__init__()
-        self.shape, self.view = shape, SortingView(shape)
-        n_places = shape.n_cells * (1 + 2 * shape.n_colours)
-        n_in = n_places * (shape.n_types + 1) + shape.n_cells
-        self.body = nn.Sequential(
-            nn.Linear(n_in, width), nn.ReLU(), nn.Linear(width, width), nn.ReLU()
-        )
+        self.shape = shape
+        self.n_places = shape.n_cells * (1 + 2 * shape.n_colours)
+        self.first = OneHotLinear(self.n_places, shape.n_types + 1, shape.n_cells, width)
+        self.second = nn.Linear(width, width)
         self.advantage = nn.Linear(width, shape.n_actions)
         self.value = nn.Linear(width, 1)
-        self.register_buffer("one_hot", torch.eye(shape.n_types + 1), persistent=False)
 
     def forward(self, obs: Tensor) -> Tensor:
         """Return the values of all moves, (B, n_actions); it knows nothing of valid ones."""
-        clutter, towers, goal, fail = self.view(obs)
-        places = torch.cat([clutter, towers.flatten(1), goal.flatten(1)], dim=1)
-        hidden = self.body(torch.cat([self.one_hot[places].flatten(1), fail], dim=1))
+        codes, fail = obs[:, : self.n_places], obs[:, self.n_places :].float() / FAILURE_SCALE
+        hidden = self.first(codes.to(torch.uint8).contiguous(), fail).relu()
+        hidden = self.second(hidden).relu()
         advantage = self.advantage(hidden)
         values: Tensor = self.value(hidden) + advantage - advantage.mean(dim=1, keepdim=True)
         return values

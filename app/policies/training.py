@@ -9,6 +9,8 @@ What is particular to a scenario is in ``pick_training.py``, ``reach_training.py
 
 from collections.abc import Callable
 
+import torch
+
 from app.policies import pick_training, reach_training, sorting_training
 from app.policies.checkpoint import Checkpoint
 from app.policies.presets import Preset
@@ -46,6 +48,7 @@ def train(
         InvalidInput: The cell cannot be trained in.
         SimulationError: A reward was not finite.
     """
+    torch.set_flush_denormal(True)  # Adam's moments of rare inputs fade into slow numbers
     place = cell or load_cell(preset.cell)
     calls = (on_progress, on_checkpoint, should_stop)
     reporter: Reporter
