@@ -110,5 +110,5 @@ class OneHotLinear(nn.Module):
 
     def forward(self, codes: Tensor, plain: Tensor) -> Tensor:
         """Return (B, width) for codes, uint8, (B, P), and plain numbers, (B, n_plain)."""
-        summed: Tensor = _Product.apply(codes, self.n_codes, self.weight)
+        summed: Tensor = _Product.apply(codes, self.n_codes, self.weight)  # type: ignore[no-untyped-call]
         return summed + torch.addmm(self.bias, plain, self.plain)

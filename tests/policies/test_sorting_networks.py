@@ -105,9 +105,9 @@ def test_turning_all_colours_turns_the_values(n_colours):
 
 def test_the_printed_network_has_two_layers_of_its_width():
     net = PrintedNetwork(SHAPE, 128)
-    hidden = [layer.out_features for layer in net.body if isinstance(layer, torch.nn.Linear)]
-    assert hidden == [128, 128]
-    assert net.body[0].in_features == 50 * 7 + 10
+    assert net.first.weight.shape == (50 * 7, 128)
+    assert net.first.plain.shape == (10, 128)
+    assert (net.second.in_features, net.second.out_features) == (128, 128)
     obs = torch.as_tensor(batch_in(load_cell("sorting-e0"), 3, 1).reset())
     assert net(obs).shape == (3, SHAPE.n_actions)
 
