@@ -14,62 +14,20 @@ episodes that only draw the learning curve are left out. Rows of trainers come t
 env-steps and as updates.
 """
 
-import argparse
-import time
-
 import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
-from stable_baselines3.common.callbacks import BaseCallback
 
 from app.policies import presets, sorting_training
 from app.policies.sorting_preset import SortingPreset
 from app.sim.cells import load_cell
-from tests.benchmarks.measure import Row, Subject, report, rounds_over, row
+from tests.benchmarks.measure import report, rounds_over, row
 from tests.benchmarks.sorting_steps import batched, gymnasium_alone
 from tests.benchmarks.stock_dqn import FOR_EVER, stock
+from tests.benchmarks.training_rates import rates, trainer_arguments
 
 BENCH = "training"
 CELL = "sorting-e0"
 PRESET = "sorting-e0-dqn"
-
-
-class Meter(BaseCallback):
-    """Count steps and updates for a while, then stop the training."""
-
-    def __init__(self, warm_s: float, seconds: float, least_updates: int = 50) -> None:
-        super().__init__()
-        self._warm_s, self._seconds, self._least = warm_s, seconds, least_updates
-        self._begin = time.process_time()
-        self._first: tuple[float, int, int] | None = None
-        self.steps_per_s = self.updates_per_s = 0.0
-        """Rates per processor second."""
-
-    def _on_step(self) -> bool:
-        now = time.process_time()
-        updates = int(vars(self.model)["_n_updates"])
-        if self._first is None:
-            if now - self._begin >= self._warm_s and updates >= self._least:
-                self._first = (now, self.num_timesteps, updates)
-            return True
-        began, steps, done = self._first
-        if now - began < self._seconds:
-            return True
-        self.steps_per_s = (self.num_timesteps - steps) / (now - began)
-        self.updates_per_s = (updates - done) / (now - began)
-        return False
-
-
-def rates(
-    name: str, batch: int, model: BaseAlgorithm, steps: int, options: argparse.Namespace
-) -> list[Row]:
-    """Train for a while of ``steps``; return the rows of steps and of updates."""
-    meter = Meter(options.warm, options.seconds)
-    model.learn(steps, callback=meter)
-    subject = Subject(name=name, batch=batch, run=lambda: None)
-    return [
-        row(subject, [meter.steps_per_s], "env-steps/cpu-s"),
-        row(subject, [meter.updates_per_s], "updates/cpu-s"),
-    ]
 
 
 def ours(seed: int) -> tuple[SortingPreset, BaseAlgorithm]:
@@ -79,22 +37,9 @@ def ours(seed: int) -> tuple[SortingPreset, BaseAlgorithm]:
     return preset, sorting_training.start(preset, seed, None, load_cell(preset.cell))[1]
 
 
-def arguments() -> argparse.Namespace:
-    """Read the command line."""
-    parser = argparse.ArgumentParser(prog=f"bench {BENCH}")
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
-    parser.add_argument("--rounds", type=int, default=3, help="of the environments alone")
-    parser.add_argument(
-        "--warm", type=float, default=20.0, help="processor seconds not counted"
-    )
-    parser.add_argument("--seconds", type=float, default=40.0, help="processor seconds counted")
-    parser.add_argument("--seed", type=int, default=11)
-    return parser.parse_args()
-
-
 def main() -> None:
     """Measure and print."""
-    options = arguments()
+    options = trainer_arguments(BENCH)
     torch.set_num_threads(1)
     preset, model = ours(options.seed)
     rows = rates(f"tandem/{PRESET}", preset.n_envs, model, preset.total_steps, options)
