@@ -79,7 +79,8 @@ def _known(
         person = entry.to_domain(cell, place)
         return KnownPerson(person=person, source="joint-angles", speeds="given")
     if isinstance(entry, CylinderPerson):
-        person = standing_in(entry.x, entry.y, entry.vx, entry.vy, entry.r, entry.growth)
+        seen = entry.x, entry.y, entry.vx, entry.vy, entry.r, entry.growth
+        person = standing_in(*seen, past=entry.remembered())
         return KnownPerson(person=person, source="cylinder", speeds="given")
     if isinstance(entry, KeypointsPerson):
         return _from_keypoints(entry, place, cell)

@@ -23,6 +23,7 @@ from app.policies.reach_preset import ACTORS, action_of
 from app.policies.trained_cell import cell_of
 from app.sim.actions import ActionSettings
 from app.sim.goal_sets import MOST_HALTON, N_HALTON, halton_targets
+from app.sim.kernels import reach_ways
 from app.sim.kernels.reach_features import BASE_START, SIZES, STATE_SIZES
 from app.sim.ports import Vec
 from app.sim.reach import N_ACT, GoalRule, ViewName, goal_region_of
@@ -30,6 +31,7 @@ from app.sim.reach import N_ACT, GoalRule, ViewName, goal_region_of
 LAYOUTS = {
     "features": [[name, size] for name, size in SIZES],
     "state": [[name, size] for name, size in STATE_SIZES],
+    "forecast": [[name, size] for name, size in (*SIZES, *reach_ways.SIZES)],
 }
 """Names and sizes of the groups of each kind of observation, as manifests carry them."""
 MAX_LAYERS = 16

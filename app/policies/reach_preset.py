@@ -118,7 +118,9 @@ class ReachPreset:
         "ends", ("ends", "goes-on"), "whether a collision ends an episode or it goes on"
     )
     observation: str = choice(
-        "features", get_args(ViewName), "what the networks see: the plain state, or features"
+        "features",
+        get_args(ViewName),
+        "what the networks see: the plain state, features, or what is forecast with them",
     )
 
     action_degree: int = number(

@@ -138,7 +138,7 @@ def start(
     first = 0 if resume is None else int(resume.manifest["step"])
     batch = ReachBatch(cell, preset.n_envs, seed + first, settings_of(preset))
     foresight = Foresight(batch) if preset.critic_sees == "future" else None
-    env = CellVecEnv(batch, preset.observation == "features", foresight)
+    env = CellVecEnv(batch, preset.observation != "state", foresight)
     model = BatchTD3(
         preset,
         env,

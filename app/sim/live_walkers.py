@@ -23,6 +23,7 @@ from app.sim.contact import walker_distances
 from app.sim.human import rest_posture
 from app.sim.kernels.body import N_SIZE
 from app.sim.kernels.occupancy import (
+    AGE,
     COURSE_X,
     COURSE_Y,
     FIXED,
@@ -31,6 +32,7 @@ from app.sim.kernels.occupancy import (
     KIND,
     LEFT,
     MIDDLE,
+    PAST_SPEED,
     RADIUS,
     SPEED,
     STILL,
@@ -297,6 +299,8 @@ class LiveWalker:
             self.row[X] += step[0]
             self.row[Y] += step[1]
             self.row[VX], self.row[VY] = self._velocity()
+            if self.row[AGE] == 0.0:
+                self.row[PAST_SPEED] = math.hypot(self.row[VX], self.row[VY])
         vx, vy = float(self.row[VX]), float(self.row[VY])
         if math.hypot(vx, vy) > SLOW:
             turn = (math.atan2(vy, vx) - self.yaw + math.pi) % (2.0 * math.pi) - math.pi

@@ -13,9 +13,21 @@ from numpy.typing import NDArray
 
 from app.sim.cells import Cell
 from app.sim.checker import Shapes
+from app.sim.forecasts import new_forecaster
 from app.sim.kernels import motion, reach, reach_views
 from app.sim.kernels.compiled import direct
-from app.sim.kernels.occupancy import GROWTH, VX, VY, R, X, Y
+from app.sim.kernels.occupancy import (
+    AGE,
+    GROWTH,
+    N_PAST,
+    PAST_RADIUS,
+    PAST_SPEED,
+    VX,
+    VY,
+    R,
+    X,
+    Y,
+)
 from app.sim.kernels.reach_features import EVERYBODY
 from app.sim.ports import Person, Vec
 from app.sim.reach import VIEWS, ViewName, new_state, with_workplace, world_of
@@ -42,7 +54,7 @@ class Stage:
         shared = people_of(staged)
         self._world = world_of(staged, shared, np.zeros((0, 3)))
         self._state = new_state(self._world, new_people_state(staged, shared, 1), 1)
-        self._work = reach.new_work(self._world, self._state)
+        self._work = reach.new_work(self._world, self._state, new_forecaster())
         self._view, self.obs_size = VIEWS[view]
         self.arm, self.top_z = self._world.arm, shared.top_z
         self._own_size = shared.bodies[0]
@@ -101,6 +113,7 @@ class Stage:
             walker = rows.walkers.rows[0, i - first]
             walker[X], walker[Y], walker[R] = person.cylinder
             walker[VX], walker[VY], walker[GROWTH] = *person.qd[:2], person.growth
+            _remind(walker, person.past)
             rows.cylinders[0, i - first] = person.cylinder
         self._take_in(*self._shared)
 
@@ -135,3 +148,18 @@ class Stage:
         self._calls[0](*arguments)
         found: NDArray[np.float32] = out[0]
         return found
+
+
+def _remind(walker: Vec, past: Vec | None) -> None:
+    """Set what a walker's row, shape (N_STATE,), remembers; what is unknown stayed as it was.
+
+    Args:
+        walker: The row; radius and velocity now are set already.
+        past: As in ``Person.past``.
+    """
+    now = [[walker[R], np.hypot(walker[VX], walker[VY])]]
+    known = np.array(now) if past is None else np.concatenate([now, past])
+    held = np.minimum(np.arange(N_PAST), len(known) - 1)
+    walker[AGE] = 0.0
+    walker[PAST_RADIUS : PAST_RADIUS + N_PAST] = known[held, 0]
+    walker[PAST_SPEED : PAST_SPEED + N_PAST] = known[held, 1]

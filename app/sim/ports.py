@@ -35,6 +35,9 @@ class Person:
     (``seen_people.standing_in``); then distances count to it. None: a body of 18 joints."""
     growth: float = 0.0
     """How fast the radius of that cylinder grows [m/s]; 0 where nothing is known of it."""
+    past: Vec | None = None
+    """Radius [m] and walking speed [m/s] of that cylinder 0.1 s, 0.2 s, ... ago, shape (n, 2),
+    n at most ``occupancy.N_PAST - 1``; None where nothing is remembered."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -17,13 +17,15 @@ from app.sim.batch import CellBatch
 from app.sim.cell_parts import GoalRegion, Station
 from app.sim.cell_people import Worker
 from app.sim.cells import Cell
+from app.sim.forecasts import new_forecaster
 from app.sim.goal_sets import N_HALTON, halton_targets
 from app.sim.kernels import reach, reach_views
-from app.sim.kernels.episode import FEATURES, PLAIN
+from app.sim.kernels.episode import FEATURES, FORECAST, PLAIN
 from app.sim.kernels.geometry import FAR
 from app.sim.kernels.people import People, PeopleState
 from app.sim.kernels.reach_features import EVERYBODY, N_FEATURES, N_STATE
 from app.sim.kernels.reach_reward import ReachWeights
+from app.sim.kernels.reach_ways import N_WAYS
 from app.sim.occupancy import AUTHORS_WALK, walker_rules
 from app.sim.ports import Vec
 from app.sim.scene import (
@@ -45,9 +47,14 @@ N_ACT = 6
 """Joints a policy moves: all of them."""
 StartRule = Literal["clearance", "uniform", "authors"]
 GoalRule = Literal["grid", "halton", "box"]
-ViewName = Literal["features", "state"]
-VIEWS = {"state": (PLAIN, N_STATE), "features": (FEATURES, N_FEATURES)}
-"""What observations hold: the plain state (4.30), or that and features; and their lengths."""
+ViewName = Literal["features", "state", "forecast"]
+VIEWS = {
+    "state": (PLAIN, N_STATE),
+    "features": (FEATURES, N_FEATURES),
+    "forecast": (FORECAST, N_FEATURES + N_WAYS),
+}
+"""What observations hold: the plain state (4.30), that and features, or those and what comes of
+every way beside people who go on as forecast; and their lengths."""
 THESIS_WEIGHTS = ReachWeights(
     c_d=1.0, c_p=0.0, gamma=1.0, c_a=0.1, c_step=0.0, c_c=5.0, c_s=20.0
 )
@@ -92,7 +99,7 @@ class ReachSettings:
     action: ActionSettings = field(default=DEFAULT_ACTION)
     """What actions mean (METHOD 2.2)."""
     observation: ViewName = "features"
-    """What policies see: the plain state (4.30), or that and more."""
+    """What policies see: the plain state (4.30), or that and more; see VIEWS."""
     weights: ReachWeights = field(default=THESIS_WEIGHTS)
     """Reward coefficients (METHOD 2.3)."""
 
@@ -290,7 +297,7 @@ class ReachBatch(CellBatch):
                 settings.action.rule(),
                 settings.weights,
                 self.state,
-                reach.new_work(self.world, self.state),
+                reach.new_work(self.world, self.state, new_forecaster()),
             ),
             n_envs=n_envs,
             n_act=N_ACT,

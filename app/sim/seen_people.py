@@ -17,6 +17,7 @@ from app.sim.kernels import arm as arm_kernel
 from app.sim.kernels import people as people_kernel
 from app.sim.kernels.arm import Arm
 from app.sim.kernels.body import N_SIZE, PELVIS_Z
+from app.sim.kernels.occupancy import N_PAST
 from app.sim.kernels.people import MAX_PEOPLE, People
 from app.sim.person_estimate import PersonEstimate
 from app.sim.ports import Person, Vec
@@ -31,11 +32,21 @@ WIDEST = 5.0
 """Greatest radius of a cylinder [m]."""
 FASTEST_GROWTH = 5.0
 """Greatest speed at which the radius of a cylinder changes [m/s]."""
+FASTEST_WALK = 10.0
+"""Greatest walking speed that is remembered of a cylinder [m/s]."""
+MOST_REMEMBERED = N_PAST - 1
+"""Most moments that are remembered of a cylinder, a tenth of a second apart."""
 _CYLINDER_HIGH = np.array([human.Q_MAX[0], human.Q_MAX[1], WIDEST])
 
 
 def standing_in(
-    x: float, y: float, vx: float, vy: float, r: float, growth: float = 0.0
+    x: float,
+    y: float,
+    vx: float,
+    vy: float,
+    r: float,
+    growth: float = 0.0,
+    past: Vec | None = None,
 ) -> Person:
     """Return the person that a cylinder is seen as.
 
@@ -46,6 +57,7 @@ def standing_in(
         vy: The same.
         r: Its radius [m].
         growth: How fast the radius grows [m/s].
+        past: Radius [m] and walking speed [m/s] before, as in ``Person.past``.
     """
     qd = np.zeros(18)
     qd[:2] = vx, vy
@@ -54,6 +66,7 @@ def standing_in(
         qd=qd,
         cylinder=np.array([x, y, r]),
         growth=growth,
+        past=past,
     )
 
 
@@ -92,13 +105,29 @@ def _checked(person: Person, path: str) -> Person:
     if not abs(person.growth) <= FASTEST_GROWTH:
         rule = f"must lie in [-{FASTEST_GROWTH:g}, {FASTEST_GROWTH:g}] m/s"
         raise InvalidInput(f"{path}.growth", person.growth, rule)
+    past = None if person.past is None else _checked_past(f"{path}.past", person.past)
     return Person(
         q=checked_vector(f"{path}.q", person.q, 18, _Q_LOW, _Q_HIGH, "m or rad"),
         qd=checked_vector(f"{path}.qd", person.qd, 18, -_QD_LIMIT, _QD_LIMIT, "m/s or rad/s"),
         size=size,
         cylinder=cylinder,
         growth=person.growth,
+        past=past,
     )
+
+
+def _checked_past(path: str, past: Vec) -> Vec:
+    known = np.asarray(past, dtype=np.float64)
+    if known.ndim != 2 or known.shape[1] != 2 or len(known) > MOST_REMEMBERED:
+        rule = f"must hold a radius and a speed of at most {MOST_REMEMBERED} moments"
+        raise InvalidInput(path, list(known.shape), rule)
+    right = np.isfinite(known) & (known >= 0.0) & (known <= [WIDEST, FASTEST_WALK])
+    if not right.all():
+        moment, what = (int(i) for i in np.argwhere(~right)[0])
+        most, unit = ((WIDEST, "m"), (FASTEST_WALK, "m/s"))[what]
+        rule = f"must lie in [0, {most:g}] {unit}"
+        raise InvalidInput(f"{path}[{moment}][{what}]", float(known[moment, what]), rule)
+    return known
 
 
 def nearest_index(arm: Arm, shared: People, q: Vec, people: Sequence[Person]) -> int | None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from app.sim.cells import load_cell
-from app.sim.kernels.occupancy import GROWTH, VX, VY, R, X, Y
+from app.sim.kernels.occupancy import AGE, GROWTH, PAST_RADIUS, PAST_SPEED, VX, VY, R, X, Y
 from app.sim.motion_state import Stage
 from app.sim.ports import Person
 from app.sim.reach import ReachBatch, ReachSettings
@@ -25,10 +25,15 @@ def driven(people: tuple[str, ...], view: str) -> ReachBatch:
 def people_of(batch: ReachBatch, e: int) -> list[Person]:
     rows = batch.state.people
     bodies = [Person(q=q, qd=qd) for q, qd in zip(rows.q[e], rows.qd[e], strict=True)]
-    return bodies + [standing_in(*w[[X, Y, VX, VY, R, GROWTH]]) for w in rows.walkers.rows[e]]
+    walkers = []
+    for row in rows.walkers.rows[e]:
+        assert row[AGE] == 0.0  # or the last moment remembered is not now
+        past = np.stack([row[PAST_RADIUS:PAST_SPEED], row[PAST_SPEED:]], axis=1)[1:]
+        walkers.append(standing_in(*row[[X, Y, VX, VY, R, GROWTH]], past=past))
+    return bodies + walkers
 
 
-@pytest.mark.parametrize("view", ["features", "state"])
+@pytest.mark.parametrize("view", ["features", "state", "forecast"])
 @pytest.mark.parametrize("people", [(), ("walker",), ("worker", "walker", "constant")])
 def test_observations_and_distances_are_those_of_the_batch(
     people: tuple[str, ...], view: str
@@ -47,6 +52,25 @@ def test_observations_and_distances_are_those_of_the_batch(
     np.testing.assert_allclose(
         stage.apart, batch.person_distances(np.array([4]))[0], atol=1e-12
     )
+
+
+def test_what_is_not_remembered_was_as_the_oldest_that_is() -> None:
+    stage, q, goal = Stage(CELL, 0, 1, "forecast"), np.array(CELL.robot.home_q), [[0, 0.8, 1.0]]
+    seen = {}
+    for name, past in {
+        "nothing": None,
+        "no moment": np.zeros((0, 2)),
+        "always so": np.full((15, 2), [0.3, 0.5]),
+        "grew": np.array([[0.25, 0.5], [0.2, 0.5]]),
+        "grew long ago": np.array([[0.25, 0.5], *[[0.2, 0.5]] * 14]),
+    }.items():
+        person = standing_in(0.1, 1.4, 0.3, 0.4, 0.3, 0.0, past)
+        stage.put(q, np.zeros(6), [person], 5.0)
+        seen[name] = stage.observe(np.array(goal)).copy()
+    np.testing.assert_array_equal(seen["nothing"], seen["no moment"])
+    np.testing.assert_array_equal(seen["nothing"], seen["always so"])
+    np.testing.assert_array_equal(seen["grew"], seen["grew long ago"])
+    assert np.abs(seen["grew"] - seen["nothing"]).max() > 0.05
 
 
 def test_a_persons_own_size_counts() -> None:

@@ -19,12 +19,14 @@ from app.sim.kernels.body import N_SIZE
 from app.sim.keypoints import BODY_25, N_KEYPOINTS
 from app.sim.person_estimate import PersonEstimate
 from app.sim.ports import Person, Vec
-from app.sim.seen_people import FASTEST_GROWTH, WIDEST
+from app.sim.seen_people import FASTEST_GROWTH, FASTEST_WALK, MOST_REMEMBERED, WIDEST
 
 Source = Literal["joint-angles", "keypoints", "cylinder", "tracker"]
 Speeds = Literal["given", "zero", "estimated"]
 Percentile = Annotated[float, Field(ge=PERCENTILES[0], le=PERCENTILES[1])]
 Speed = Annotated[float, Field(ge=-50.0, le=50.0)]
+Radius = Annotated[float, Field(ge=0.0, le=WIDEST)]
+Walk = Annotated[float, Field(ge=0.0, le=FASTEST_WALK)]
 Keypoint = Annotated[list[Finite], Field(min_length=3, max_length=4)] | None
 Velocity = Vector3 | None
 Lengths = Annotated[list[Finite], Field(min_length=N_SIZE, max_length=N_SIZE)]
@@ -140,6 +142,15 @@ class CylinderPerson(Body):
     growth: Annotated[float, Field(ge=-FASTEST_GROWTH, le=FASTEST_GROWTH)] = Field(
         0.0, description="how fast the radius grows [m/s]; read by policies that move the arm"
     )
+    past: Annotated[list[tuple[Radius, Walk]], Field(max_length=MOST_REMEMBERED)] = Field(
+        [],
+        description="radius [m] and walking speed [m/s] 0.1 s, 0.2 s, ... ago, the newest "
+        "first; before that it was as the last; read by policies that forecast",
+    )
+
+    def remembered(self) -> Vec | None:
+        """Return the past, shape (n, 2); None where nothing is remembered."""
+        return np.array(self.past) if self.past else None
 
 
 class TrackedPerson(Body):

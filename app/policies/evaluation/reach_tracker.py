@@ -29,7 +29,7 @@ from app.policies.evaluation.reach_bench import ReachBench, walker_of
 from app.policies.evaluation.rows import OnRow, untold
 from app.policies.movers import Mover, mover_of
 from app.sim.cylinder_tracker import CylinderTracker, CylinderTrackerSettings
-from app.sim.kernels.occupancy import GROWTH, VX, VY, R, X, Y
+from app.sim.kernels.occupancy import AGE, GROWTH, N_PAST, PAST_S, VX, VY, R, X, Y
 from app.sim.ports import Vec
 from app.sim.reach import ReachBatch
 
@@ -76,6 +76,8 @@ class ThroughTracker:
     def __init__(self, mover: Mover, row: TrackedRow, seed: int) -> None:
         self._mover, self._row, self._seed = mover, row, seed
         self._tracker: CylinderTracker | None = None
+        self._rng = np.random.default_rng([seed, 1])
+        self._past: Vec | None = None
         self.errors: list[Vec] = []
         """Distance of seen and true axes at every step of every row [m]."""
 
@@ -94,19 +96,50 @@ class ThroughTracker:
         seen, change = self._tracker.seen(every, predicted=self._row.predicted)
         seen[:, :, 2] = np.maximum(seen[:, :, 2], THINNEST)
         self.errors.append(np.linalg.norm(seen[:, :, :2] - true[:, :, :2], axis=2).ravel())
-        return self._ask(batch, seen, change)
+        return self._ask(batch, fresh, seen, change)
 
-    def _ask(self, batch: ReachBatch, seen: Vec, change: Vec) -> NDArray[np.float32]:
+    def _ask(
+        self, batch: ReachBatch, fresh: NDArray[np.int64], seen: Vec, change: Vec
+    ) -> NDArray[np.float32]:
         """Ask about people elsewhere, and put them back where they are."""
         people, clear = batch.state.people, batch.state.clear
         kept = people.walkers.rows.copy(), people.cylinders.copy(), clear.copy()
         people.walkers.rows[:, :, [X, Y, R]] = seen
         people.walkers.rows[:, :, [VX, VY, GROWTH]] = change
+        people.walkers.rows[:, :, AGE:] = self._remembered(
+            fresh, people.walkers.rows, batch.arm.dt
+        )
         people.cylinders[:] = seen
         batch.observe()
         act = self._mover.acts(batch)
         people.walkers.rows[:], people.cylinders[:], clear[:] = kept
         return act
+
+    def _remembered(self, fresh: NDArray[np.int64], rows: Vec, dt: float) -> Vec:
+        """Return what is remembered of everybody, all as the tracker knew them.
+
+        What lies before an episode was measured with the tracker's noise.
+
+        Args:
+            fresh: Cells whose episode starts, shape (k,).
+            rows: Walkers as the tracker knows them now, (n, n_people, N_STATE).
+            dt: Control period [s].
+        """
+        past = self._past
+        if past is None:
+            past = self._past = rows[:, :, AGE:].copy()
+        before = rows[fresh][:, :, AGE:]
+        noise = self._row.tracker.noise * self._rng.standard_normal(before.shape)
+        noise[:, :, 0] = 0.0
+        past[fresh] = before + noise
+        later = np.setdiff1d(np.arange(len(rows)), fresh)
+        past[later, :, 0] += dt
+        due = past[:, :, 0] > PAST_S - 1e-9
+        now = np.stack([rows[:, :, R], np.hypot(rows[:, :, VX], rows[:, :, VY])], axis=2)
+        kept = past[due][:, 1:].reshape(-1, 2, N_PAST)
+        kept = np.concatenate([now[due][:, :, None], kept[:, :, :-1]], axis=2)
+        past[due] = np.concatenate([np.zeros((len(kept), 1)), kept.reshape(-1, 2 * N_PAST)], 1)
+        return past
 
 
 def run_tracker(

@@ -123,7 +123,7 @@ class ReachEnv(SingleEnv):
     ) -> None:
         chosen = settings_with(settings or ReachSettings(), people)
         self.batch = ReachBatch(cell_of(cell), 1, 0, chosen, first_env)
-        super().__init__(self.batch, N_ACT, sees_time=chosen.observation == "features")
+        super().__init__(self.batch, N_ACT, sees_time=chosen.observation != "state")
 
 
 class ReachVectorEnv(BatchVectorEnv):
@@ -147,4 +147,4 @@ class ReachVectorEnv(BatchVectorEnv):
     ) -> None:
         chosen = settings_with(settings or ReachSettings(), people)
         self.batch = ReachBatch(cell_of(cell), num_envs, 0, chosen, first_env)
-        super().__init__(self.batch, N_ACT, sees_time=chosen.observation == "features")
+        super().__init__(self.batch, N_ACT, sees_time=chosen.observation != "state")

@@ -22,6 +22,9 @@ is not the continuous function that the text describes, and uses 0.1 for the thi
 this is the printed function, drawn once per episode. ``a`` is "a random value within the range"
 in the text: uniform in [v_min, v_max] and in [r_min, r_max] here, frequencies uniform from 0.
 What else that code does is there to be chosen, in the rules APART to P_GO_ON, off by default.
+
+A row also keeps what a watcher would remember of the last 1.5 s: radius and walking speed every
+tenth of a second. People are watched before an episode starts, and walk then already.
 """
 
 import math
@@ -83,7 +86,16 @@ X, Y, VX, VY, R, GROWTH, GAIT, TARGET_X, TARGET_Y, COURSE_X, COURSE_Y, LEFT, TIM
 the period that passed [m/s], gait, target [m], direction to it, way left [m], time since the
 start [s]; then the constants of the speed's function, and from RADIUS on the radius'."""
 RADIUS = SPEED + N_CONSTANTS
-N_STATE = RADIUS + N_CONSTANTS
+N_PAST = 16
+"""Moments of the past that are remembered."""
+PAST_S = 0.1
+"""Time between two of them [s]."""
+AGE = RADIUS + N_CONSTANTS
+PAST_RADIUS = AGE + 1
+PAST_SPEED = PAST_RADIUS + N_PAST
+"""What is remembered: how long ago the newest moment was [s], radii [m] and speeds [m/s], the
+newest first."""
+N_STATE = PAST_SPEED + N_PAST
 
 
 class WalkerRules(NamedTuple):
@@ -190,6 +202,7 @@ def start_walker(rules: WalkerRules, state: WalkerState, e: int, p: int, stream:
     row[R] = _radius(rules.rows, state.rows, e, p, 0.0)
     _new_target(rules.rows, state.rows, own, e, p)
     _set_velocity(rules.rows, state.rows, e, p, 0.0)
+    _remember_before(rules.rows, state.rows, e, p)
     stands = row[VX] == 0.0 and row[VY] == 0.0
     if rule[HURRIED] > 0.0 and stands and row[GAIT] == WALKING and rule[KIND] != FIXED_SPEED:
         row[VX], row[VY] = rule[V_MIN] * row[COURSE_X], rule[V_MIN] * row[COURSE_Y]
@@ -226,6 +239,37 @@ def advance_walker(rules: WalkerRules, state: WalkerState, e: int, p: int, dt: f
     rows[e, p, R] = r
     rows[e, p, TIME] = t
     _set_velocity(rule, rows, e, p, t)
+    remember(rows, e, p, dt)
+
+
+@kernel(inline="always")
+def remember(rows: Vec, e: int, p: int, dt: float) -> None:
+    """Let the past of a walker grow older, and add the moment that is now when it is time.
+
+    Args:
+        rows: State of all walkers, shape (n_envs, W, N_STATE).
+        e: Environment.
+        p: Walker.
+        dt: Time since the last call [s].
+    """
+    rows[e, p, AGE] += dt
+    if rows[e, p, AGE] < PAST_S - 1e-9:
+        return
+    for k in range(N_PAST - 1, 0, -1):
+        rows[e, p, PAST_RADIUS + k] = rows[e, p, PAST_RADIUS + k - 1]
+        rows[e, p, PAST_SPEED + k] = rows[e, p, PAST_SPEED + k - 1]
+    rows[e, p, AGE], rows[e, p, PAST_RADIUS] = 0.0, rows[e, p, R]
+    rows[e, p, PAST_SPEED] = math.hypot(rows[e, p, VX], rows[e, p, VY])
+
+
+@kernel()
+def _remember_before(rule: Vec, rows: Vec, e: int, p: int) -> None:
+    """Set the past of a walker as it was before it started."""
+    rows[e, p, AGE] = 0.0
+    for k in range(N_PAST):
+        t = -k * PAST_S
+        rows[e, p, PAST_RADIUS + k] = _radius(rule, rows, e, p, t)
+        rows[e, p, PAST_SPEED + k] = _speed(rule, rows, e, p, t)
 
 
 @kernel()
@@ -277,12 +321,19 @@ def _radius(rule: Vec, rows: Vec, e: int, p: int, t: float) -> float:
 
 
 @kernel(inline="always")
-def _set_velocity(rule: Vec, rows: Vec, e: int, p: int, t: float) -> None:
-    """Write the velocity from ``t`` on, for one period."""
+def _speed(rule: Vec, rows: Vec, e: int, p: int, t: float) -> float:
+    """Return the walking speed at ``t`` [m/s]."""
     speed = 0.0
     if rows[e, p, GAIT] == WALKING:
         speed = wave(rows, e, p, SPEED, t)
         if rule[p, KIND] != FIXED_SPEED:
             speed = 0.0 if speed < rule[p, V_MIN] else min(speed, rule[p, V_MAX])
+    return float(speed)
+
+
+@kernel(inline="always")
+def _set_velocity(rule: Vec, rows: Vec, e: int, p: int, t: float) -> None:
+    """Write the velocity from ``t`` on, for one period."""
+    speed = _speed(rule, rows, e, p, t)
     rows[e, p, VX] = speed * rows[e, p, COURSE_X]
     rows[e, p, VY] = speed * rows[e, p, COURSE_Y]

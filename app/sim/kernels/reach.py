@@ -18,6 +18,7 @@ from app.sim.kernels.compiled import kernel
 from app.sim.kernels.contact import clearances
 from app.sim.kernels.episode import (
     COLLISION,
+    FORECAST,
     NO_OBS,
     PLAIN,
     RUNNING,
@@ -29,6 +30,7 @@ from app.sim.kernels.episode import (
     distance_to,
     move,
 )
+from app.sim.kernels.forecast import Forecaster
 from app.sim.kernels.people import (
     Crowd,
     People,
@@ -39,6 +41,8 @@ from app.sim.kernels.people import (
     start_people,
 )
 from app.sim.kernels.reach_features import (
+    EVERYBODY,
+    N_FEATURES,
     Obs,
     ReachSight,
     new_reach_sight,
@@ -47,6 +51,7 @@ from app.sim.kernels.reach_features import (
     see_cylinder,
 )
 from app.sim.kernels.reach_reward import ReachWeights, reward
+from app.sim.kernels.reach_ways import Ways, foresee, look_aside, new_ways, put_ways
 from app.sim.ports import Vec
 
 NO_TARGET = -1
@@ -125,6 +130,8 @@ class Work(NamedTuple):
     """A pose of the people."""
     sight: ReachSight
     """What an observation looks at."""
+    ways: Ways
+    """What comes of every way."""
     c: Vec
     """Second coefficients of a period [rad/s^2], shape (6,)."""
     d: Vec
@@ -139,13 +146,14 @@ class Work(NamedTuple):
     """Random stream of the episode that starts, shape (1,)."""
 
 
-def new_work(world: ReachWorld, state: ReachState) -> Work:
+def new_work(world: ReachWorld, state: ReachState, forecaster: Forecaster) -> Work:
     """Return work space for a batch."""
     people = state.people
     return Work(
         new_robot_pose(world.arm),
         new_crowd(world.people, people.q.shape[1], people.cylinders.shape[1]),
         new_reach_sight(world.arm),
+        new_ways(world.arm, forecaster),
         np.zeros(6),
         np.zeros(6),
         np.zeros(6),
@@ -279,13 +287,13 @@ def write_obs(
         state: Rows.
         e: Environment.
         work: Robot and people are placed in it as they are now.
-        view: NO_OBS, PLAIN (4.30) or FEATURES.
-        out: Filled, shape (N_STATE,) or (N_FEATURES,).
+        view: NO_OBS, PLAIN (4.30), FEATURES or FORECAST.
+        out: Filled, shape (N_STATE,), (N_FEATURES,) or (N_FEATURES + N_WAYS,).
     """
     if view == NO_OBS:
         return
     seen = work.sight.seen
-    see_cylinder(world.people, state.people, e, work.robot.columns, work.crowd, seen)
+    who = see_cylinder(world.people, state.people, e, work.robot.columns, work.crowd, seen)
     if view == PLAIN:
         put_state(state.q[e], state.qd[e], seen, state.goal[e], out)
         return
@@ -301,6 +309,41 @@ def write_obs(
         state.time_left[e],
         work.robot,
         work.sight,
+        out,
+    )
+    if view == FORECAST:
+        foresee(state.people, e, EVERYBODY, who, work.crowd, work.ways)
+        look_aside(world.arm, world.people.top_z, state.q[e], state.qd[e], work.ways)
+        put_forecast(world, state, e, work, state.goal[e], out)
+
+
+@kernel(inline="always")
+def put_forecast(
+    world: ReachWorld, state: ReachState, e: int, work: Work, goal: Vec, out: Obs
+) -> None:
+    """Write what comes of every way behind the features.
+
+    People are foreseen, and the ways that do not lead to the goal looked at already.
+
+    Args:
+        world: Shared data.
+        state: Rows.
+        e: Environment.
+        work: Robot and people are placed in it as they are now.
+        goal: Where the tcp shall be [m], shape (3,).
+        out: Filled, shape (N_FEATURES + N_WAYS,).
+    """
+    put_ways(
+        world.arm,
+        world.people.top_z,
+        state.q[e],
+        state.qd[e],
+        work.sight.seen,
+        goal,
+        work.robot,
+        work.sight.prospect,
+        work.ways,
+        N_FEATURES,
         out,
     )
 
@@ -376,7 +419,7 @@ def step_batch(
         work: Work space.
         act: Actions in [-1, 1], shape (n_envs, 6).
         auto_reset: Start the next episode at once; otherwise ended rows stay as they are.
-        view: NO_OBS, PLAIN or FEATURES.
+        view: NO_OBS, PLAIN, FEATURES or FORECAST.
         obs: Filled with the observations after the step (and reset), shape (n_envs, F).
         last_obs: Filled with the final observation of rows that ended, shape (n_envs, F).
         rew: Filled with rewards, shape (n_envs,).

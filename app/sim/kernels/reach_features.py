@@ -154,8 +154,8 @@ def show_person(state: PeopleState, e: int, who: int, crowd: Crowd, seen: Vec) -
 @kernel(inline="always")
 def see_cylinder(
     people: People, state: PeopleState, e: int, robot: Vec, crowd: Crowd, seen: Vec
-) -> None:
-    """Write the nearest person of environment ``e`` as a cylinder.
+) -> int:
+    """Write the nearest person of environment ``e`` as a cylinder; return who that is.
 
     Args:
         people: Shared data.
@@ -165,7 +165,9 @@ def see_cylinder(
         crowd: The people, placed as they are now.
         seen: Filled with x, y [m], vx, vy [m/s], r [m], growth [m/s], shape (6,).
     """
-    show_person(state, e, nearest_person(people, robot, crowd), crowd, seen)
+    who = nearest_person(people, robot, crowd)
+    show_person(state, e, who, crowd, seen)
+    return who
 
 
 @kernel(inline="always")

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from app.sim.kernels.arm import place_robot
 from app.sim.kernels.columns import gaps
 from app.sim.kernels.compiled import kernel
-from app.sim.kernels.episode import PLAIN
+from app.sim.kernels.episode import FORECAST, PLAIN
 from app.sim.kernels.people import nearest_person, person_clearance, place_people
-from app.sim.kernels.reach import ReachState, ReachWorld, Work
+from app.sim.kernels.reach import ReachState, ReachWorld, Work, put_forecast
 from app.sim.kernels.reach_features import (
     EVERYBODY,
     Obs,
@@ -22,6 +22,7 @@ from app.sim.kernels.reach_features import (
     put_state,
     show_person,
 )
+from app.sim.kernels.reach_ways import foresee, look_aside
 from app.sim.ports import Vec
 
 Indices = NDArray[np.int64]
@@ -51,6 +52,9 @@ def _look(
     show_person(state.people, e, seen, crowd, sight.seen)
     if view != PLAIN:
         clearances_ahead(world.people, state.people, e, who, robot.columns, sight)
+    if view == FORECAST:
+        foresee(state.people, e, who, seen, crowd, work.ways)
+        look_aside(world.arm, world.people.top_z, state.q[e], state.qd[e], work.ways)
     return float(clearance)
 
 
@@ -73,6 +77,8 @@ def _write(
     time_left = state.time_left[e]
     top = world.people.top_z
     describe(world.arm, top, q, qd, goal, clearance, time_left, work.robot, sight, out)
+    if view == FORECAST:
+        put_forecast(world, state, e, work, goal, out)
 
 
 @kernel(nogil=True)
@@ -86,9 +92,9 @@ def observe_goals(
         state: Rows.
         e: Environment.
         work: Work space; need not be placed.
-        view: PLAIN (4.30) or FEATURES.
+        view: PLAIN (4.30), FEATURES or FORECAST.
         goals: Where the tcp shall be [m], shape (n, 3).
-        out: Filled, shape (n, N_STATE) or (n, N_FEATURES).
+        out: Filled, shape (n, F).
     """
     clearance = _look(world, state, e, work, view, EVERYBODY)
     for k in range(goals.shape[0]):
@@ -106,9 +112,9 @@ def observe_person(
         state: Rows.
         e: Environment.
         work: Work space; need not be placed.
-        view: PLAIN (4.30) or FEATURES.
+        view: PLAIN (4.30), FEATURES or FORECAST.
         who: The person: workers first, then walkers.
-        out: Filled, shape (N_STATE,) or (N_FEATURES,).
+        out: Filled, shape (F,).
     """
     clearance = _look(world, state, e, work, view, who)
     _write(world, state, e, work, view, clearance, state.goal[e], out)
@@ -132,11 +138,11 @@ def observe_rows(
         state: Rows.
         rows: Which environments, shape (k,).
         work: Work space.
-        view: PLAIN (4.30) or FEATURES.
+        view: PLAIN (4.30), FEATURES or FORECAST.
         who: EVERYBODY as ordinarily, the nearest seen and all counted; or the one person who
             is there alone.
         goals: Where each tcp shall be [m], shape (k, n, 3).
-        out: Filled, shape (k, n, N_STATE) or (k, n, N_FEATURES).
+        out: Filled, shape (k, n, F).
     """
     for k in range(rows.shape[0]):
         e = rows[k]

@@ -4,12 +4,16 @@ import numpy as np
 import pytest
 
 from app.sim.kernels.occupancy import (
+    AGE,
     COS_1,
     FREQUENCY,
     GAIT,
     GROWTH,
     MIDDLE,
+    N_PAST,
     N_STATE,
+    PAST_RADIUS,
+    PAST_SPEED,
     RADIUS,
     SIN_1,
     SPEED,
@@ -122,6 +126,37 @@ def test_row_is_written_whole_by_a_start() -> None:
     start_walker(rules, used, 0, 0, stream)
     assert used.rows.shape == (1, 1, N_STATE)
     assert used.rows.tobytes() == clean.rows.tobytes()
+
+
+def test_radius_and_speed_of_the_last_second_and_a_half_are_remembered() -> None:
+    rules = walker_rules([WalkerSettings(p_still=0.0, p_stay=0.0)])
+    state = started(rules, 8, seed=12)
+    for e in range(8):
+        row = state.rows[e, 0]
+        assert row[PAST_RADIUS] == row[R] and len(np.unique(row[PAST_RADIUS:PAST_SPEED])) > 1
+        seen = []
+        for _ in range(90):
+            seen.append([row[R], np.hypot(row[VX], row[VY])])
+            advance_walker(rules, state, e, 0, 0.02)
+        assert row[AGE] == 0.0
+        seen.append([row[R], np.hypot(row[VX], row[VY])])
+        kept = np.stack([row[PAST_RADIUS:PAST_SPEED], row[PAST_SPEED:]], axis=1)
+        np.testing.assert_allclose(kept, np.array(seen)[::-5][:N_PAST], atol=1e-12)
+        advance_walker(rules, state, e, 0, 0.02)
+        assert row[AGE] == pytest.approx(0.02)
+        np.testing.assert_array_equal(row[PAST_RADIUS:PAST_SPEED], kept[:, 0])
+
+
+def test_the_past_before_a_start_goes_on_into_it() -> None:
+    rules = walker_rules([WalkerSettings(p_still=0.0, p_stay=0.0)])
+    state = started(rules, 40, seed=13)
+    for e in range(40):
+        row = state.rows[e, 0]
+        before = row[PAST_RADIUS:PAST_SPEED].copy()
+        for _ in range(5 * N_PAST):
+            advance_walker(rules, state, e, 0, 0.02)
+        whole = np.concatenate([row[PAST_RADIUS:PAST_SPEED], before])
+        assert np.abs(np.diff(whole)).max() < 0.1 * 2.1  # the radius changes by 2.1 m/s at most
 
 
 def test_walker_that_would_pass_its_target_lands_on_it() -> None:
