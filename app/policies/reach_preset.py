@@ -35,7 +35,7 @@ class ReachPreset:
     """Work cell trained in."""
 
     total_steps: int = number(
-        2_560_000, 1_000, 100_000_000, "env steps", "length of the training"
+        7_680_000, 1_000, 100_000_000, "env steps", "length of the training"
     )
     n_envs: int = number(128, 1, 1024, "", "cells stepped together")
     buffer_size: int = number(
@@ -118,7 +118,7 @@ class ReachPreset:
         "ends", ("ends", "goes-on"), "whether a collision ends an episode or it goes on"
     )
     observation: str = choice(
-        "features",
+        "forecast",
         get_args(ViewName),
         "what the networks see: the plain state, features, or what is forecast with them",
     )
@@ -141,13 +141,13 @@ class ReachPreset:
     c_s: float = number(4.0, 0.0, 100.0, "", "bonus of a success")
 
     progress_steps: int = number(
-        153_600, 100, 1_000_000, "env steps", "steps between two points of the curve"
+        256_000, 100, 1_000_000, "env steps", "steps between two points of the curve"
     )
     progress_episodes: int = number(
         1_080, 1, 10_000, "episodes", "episodes played for a point of the curve"
     )
     checkpoint_steps: int = number(
-        614_400, 100, 10_000_000, "env steps", "steps between two checkpoints"
+        1_280_000, 100, 10_000_000, "env steps", "steps between two checkpoints"
     )
 
     @property

@@ -413,3 +413,26 @@ def test_growth_of_a_cylinder_is_seen(client: TestClient) -> None:
     ]
     assert acts[0] != acts[1]
     assert refused(client, people=[{**WALKER, "growth": 9}])["field"] == "people[0].growth"
+
+
+def test_the_past_of_a_cylinder_is_seen_by_a_policy_that_forecasts(client: TestClient) -> None:
+    grown = [[0.3 - 0.02 * k, 0.5] for k in range(1, 6)]
+    acts = [
+        asked(client, people=[{**WALKER, "past": past}])["act"]
+        for past in ([], [[0.3, 0.5]] * 15, grown)
+    ]
+    assert acts[0] == acts[1] != acts[2]
+
+
+@pytest.mark.parametrize(
+    ("past", "field"),
+    [
+        ([[0.3, 0.5], [-0.1, 0.5]], "people[0].past[1][0]"),
+        ([[0.3, 11.0]], "people[0].past[0][1]"),
+        ([[0.3, "NaN"]], "people[0].past[0][1]"),
+        ([[0.3]], "people[0].past[0][1]"),
+        ([[0.3, 0.5]] * 16, "people[0].past"),
+    ],
+)
+def test_a_past_that_cannot_be_is_refused(client: TestClient, past: Any, field: str) -> None:
+    assert refused(client, people=[{**WALKER, "past": past}])["field"] == field

@@ -62,6 +62,24 @@ class ReachEnv(SingleEnv):
     | look_ahead | 3 | the same in 0.25, 0.5, 1 s: robot still, people at constant velocity |
     | distance | 1 | twice the distance of tcp and goal [m] |
     | time_left | 1 | [2.5 s] |
+    | base | 6 | the straight way of the tcp to its goal, as an action |
+    | look_ahead_base | 3 | clearance in 0.25, 0.5, 1 s if the robot goes that way [0.5 m] |
+    | human_growth | 1 | twice the growth of the radius [m/s] |
+    | approach | 4 x 2 | when [2 s] and how near [0.5 m] the person comes: to the tcp as it |
+    | | | moves and as it stands, to the elbow as it moves, to the goal |
+    | goal_gap | 4 | distance of person and goal now and in 0.25, 0.5, 1 s [0.5 m] |
+    | group_gap | 3 x 3 | gap [0.5 m] and direction of the person: upper arm, forearm, wrists |
+
+    ``ReachSettings(observation="forecast")`` has more behind these, ``LAYOUT`` of
+    ``app.sim.kernels.reach_ways``, where people go on as ``app.sim.kernels.forecast`` says:
+
+    | group | size | content |
+    |-------|------|---------|
+    | arrival | 1 | time to the goal the straight way [s] |
+    | way_clearance | 9 | clearance that way in 0.06 to 1.3 s, and the least [0.2 m], -1 to 2 |
+    | aside_clearance | 4 x 9 | the same standing still, going home, to either side of home |
+    | goal_gap_ahead | 8 | distance of person and goal at these times [0.5 m] |
+    | radius_ahead | 8 | by how much the person is wider then [0.2 m] |
 
     Of several people the nearest is seen; a worker as the cylinder about the pelvis that
     contains the body, nobody as one far away. Clearances are those of all, exact.

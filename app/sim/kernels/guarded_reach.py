@@ -30,7 +30,19 @@ from app.sim.kernels.episode import (
     TIMEOUT,
 )
 from app.sim.kernels.episode import distance_to as tcp_distance
-from app.sim.kernels.occupancy import GAIT, GROWTH, STAYING, TIME, VX, VY, R, X, Y
+from app.sim.kernels.occupancy import (
+    GAIT,
+    GROWTH,
+    STAYING,
+    TIME,
+    VX,
+    VY,
+    R,
+    X,
+    Y,
+    remember,
+    remember_as_now,
+)
 from app.sim.kernels.people import advance_people, place_people
 from app.sim.kernels.reach import (
     ReachRules,
@@ -111,6 +123,10 @@ def put_on_track(state: ReachState, e: int, guard: Guard, dt: float) -> None:
     row[VX], row[VY] = (after[0] - now[0]) / dt, (after[1] - now[1]) / dt
     row[GROWTH] = (now[2] - row[R]) / dt if k > 0 else 0.0
     row[R], row[GAIT], row[TIME] = now[2], STAYING, k * dt
+    if k == 0:
+        remember_as_now(state.people.walkers.rows, e, 0)
+    else:
+        remember(state.people.walkers.rows, e, 0, dt)
     for i in range(3):
         state.people.cylinders[e, 0, i] = now[i]
 

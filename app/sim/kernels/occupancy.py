@@ -263,6 +263,15 @@ def remember(rows: Vec, e: int, p: int, dt: float) -> None:
 
 
 @kernel()
+def remember_as_now(rows: Vec, e: int, p: int) -> None:
+    """Set a walker's past as if it had always been as it is now."""
+    rows[e, p, AGE] = 0.0
+    for k in range(N_PAST):
+        rows[e, p, PAST_RADIUS + k] = rows[e, p, R]
+        rows[e, p, PAST_SPEED + k] = math.hypot(rows[e, p, VX], rows[e, p, VY])
+
+
+@kernel()
 def _remember_before(rule: Vec, rows: Vec, e: int, p: int) -> None:
     """Set the past of a walker as it was before it started."""
     rows[e, p, AGE] = 0.0
