@@ -12,6 +12,7 @@ from app.sim.contact import clearance
 from app.sim.guarded_reach import GuardedReach
 from app.sim.kernels.episode import COLLISION, RUNNING, SUCCESS, TIMEOUT
 from app.sim.kernels.kinematics import ik_vertical_batch
+from app.sim.kernels.occupancy import AGE, N_PAST, PAST_RADIUS, PAST_SPEED
 from app.sim.reach import ReachBatch, ReachSettings
 from app.sim.safety import SafetyLayer, safety_settings
 from app.sim.scene import NO_CYLINDERS, people_of
@@ -214,3 +215,19 @@ def test_tracks_that_do_not_fit_are_refused():
     with pytest.raises(InvalidInput, match="auto_reset"):
         batch.step(np.zeros((1, 6), dtype=np.float32))
     assert NO_CYLINDERS.shape == (0, 3)
+
+
+def test_people_on_tracks_are_remembered():
+    tracks = passing(2, speed=0.8)
+    tracks[:, :, 2] += 0.001 * np.arange(250)
+    batch = GuardedReach(CELL, 2, 3, BOX, SAFETY, tracks=tracks)
+    batch.reset()
+    act = np.zeros((2, 6), dtype=np.float32)
+    for _ in range(40):
+        batch.step(act, auto_reset=False)
+    for row in batch.state.people.walkers.rows[:, 0]:
+        assert row[AGE] == 0.0
+        np.testing.assert_allclose(
+            row[PAST_RADIUS:PAST_SPEED], 0.3 + 0.001 * np.maximum(40 - 5 * np.arange(N_PAST), 0)
+        )
+        np.testing.assert_allclose(row[PAST_SPEED:], 0.8)
