@@ -138,6 +138,8 @@ def _kind(schema: Node) -> str:
     if "$ref" in schema:
         return "object"
     kind = str(schema.get("type", "any"))
+    if "prefixItems" in schema:
+        return "[" + ", ".join(_kind(one) for one in schema["prefixItems"]) + "]"
     return f"{kind} of {_kind(schema['items'])}" if kind == "array" else kind
 
 

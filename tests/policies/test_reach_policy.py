@@ -19,7 +19,7 @@ from app.sim.ports import ReachActor
 from app.sim.reach import ReachBatch, ReachSettings, goal_region_of
 from tests.policies.untrained import untrained_reach
 
-SEEN = {"observation": "features"}
+SEEN = {"observation": "forecast"}
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +51,7 @@ def test_it_says_what_it_is(checkpoint):
     policy: ReachActor = ReachPolicy(checkpoint)
     cell = load_cell("shared-workspace")
     assert is_reach(checkpoint) and not is_reach(pretrained.load("pick"))
-    assert (policy.checkpoint, policy.view) == (checkpoint.sha256, "features")
+    assert (policy.checkpoint, policy.view) == (checkpoint.sha256, "forecast")
     assert (policy.cell, policy.cell_sha256) == (cell.name, cell.sha256)
     assert policy.title == "reach-td3, 0.00 M steps"
     assert policy.action == ActionSettings()
@@ -61,7 +61,10 @@ def test_it_says_what_it_is(checkpoint):
     np.testing.assert_array_equal(halton, halton_targets(goal_region_of(cell), 30))
 
 
-@pytest.mark.parametrize(("view", "actor"), [("features", "residual"), ("state", "plain")])
+@pytest.mark.parametrize(
+    ("view", "actor"),
+    [("forecast", "residual"), ("features", "residual"), ("state", "plain")],
+)
 def test_it_moves_the_robot_of_a_batch(view, actor):
     policy = ReachPolicy(untrained_reach(width=16, observation=view, actor=actor))
     batch = ReachBatch(
