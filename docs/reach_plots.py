@@ -398,8 +398,8 @@ def curves(found: Sequence[Json]) -> Figure:
             rates = [point[kind] for point in points]
             axis.plot(minutes, rates, color=colour, lw=1.1, alpha=0.85, label=told)
     left.axhline(SOURCE_SUCCESS, color=RED, lw=0.9, ls=":")
-    left.text(0.02, SOURCE_SUCCESS + 0.01, "the source, after 47 h", color=RED, va="bottom",
-              transform=left.get_yaxis_transform())  # fmt: skip
+    left.text(0.98, SOURCE_SUCCESS - 0.01, "the source, after 47 h", color=RED, va="top",
+              ha="right", transform=left.get_yaxis_transform())  # fmt: skip
     left.set(title="Success", ylim=(0.0, 1.02))
     right.set(title="Collisions", ylim=(0.0, None))
     for axis in (left, right):
