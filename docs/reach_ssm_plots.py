@@ -54,6 +54,7 @@ def override(example: Json) -> Figure:
             textcoords="offset points",
             ha="right",
             color=colour,
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.5},
         )
         axis.set(title=label[0].upper() + label[1:], ylabel="override [%]", ylim=(0.0, 105.0))
     axes[-1, 0].set(xlabel="time [s]", xlim=(0.0, 1.05 * longest))
