@@ -18,7 +18,7 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.colors import Colormap, LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, PercentFormatter
+from matplotlib.ticker import FuncFormatter, NullFormatter, PercentFormatter
 from numpy.typing import NDArray
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -147,6 +147,7 @@ def curves(found: Sequence[Json]) -> Figure:
     seconds.xaxis.set_major_formatter(FuncFormatter(lambda value, _place: f"{value:,.0f}"))
     for axis in (steps, rewards):
         axis.xaxis.set_major_formatter(FuncFormatter(_short))
+        axis.xaxis.set_minor_formatter(NullFormatter())
     figure.legend(loc="outside lower center", ncols=min(4, len(named)))
     return figure
 
