@@ -5,9 +5,15 @@ import pytest
 import torch
 
 from app.policies import make_forecasts
-from app.policies.make_forecasts import disturbed, errors, fitted, watched
+from app.policies.make_forecasts import (
+    disturbed,
+    errors,
+    fitted,
+    going_on_as_now,
+    watched,
+)
 from app.sim.forecasts import new_forecaster
-from app.sim.kernels.forecast import N_PAST, N_TIMES, RADIUS_MIDDLE, RADIUS_SCALE, TIMES
+from app.sim.kernels.forecast import N_PAST, N_TIMES, RADIUS_MIDDLE, RADIUS_SCALE
 
 OTHERS = watched(4000, 99)
 """People the shipped networks were not made from."""
@@ -29,10 +35,7 @@ def test_the_shipped_networks_do_much_better_than_going_on_as_now() -> None:
     net = new_forecaster()
     radius = errors(net.radius, OTHERS.radius_seen, OTHERS.radius)
     way = errors(net.way, OTHERS.way_seen, OTHERS.way)
-    r = OTHERS.radius_seen[:, :1] * RADIUS_SCALE + RADIUS_MIDDLE
-    grown = np.clip(r + OTHERS.radius_seen[:, 1:2] * np.array(TIMES), 0.2, 0.5) - r
-    linear = np.sqrt((((grown / RADIUS_SCALE) - OTHERS.radius) ** 2).mean(axis=0))
-    constant = np.sqrt((OTHERS.way**2).mean(axis=0))
+    linear, constant = going_on_as_now(OTHERS)
     assert (radius[2:] < 0.5 * linear[2:]).all()
     assert (way[2:] < 0.6 * constant[2:]).all()
 
