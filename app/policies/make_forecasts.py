@@ -30,7 +30,7 @@ from app.sim.kernels.forecast import (
     RADIUS_SCALE,
     SPEED_MIDDLE,
     SPEED_SCALE,
-    TIMES,
+    STEP_S,
     Network,
     see_past,
 )
@@ -55,20 +55,25 @@ logger = logging.getLogger(__name__)
 
 CELL = "shared-workspace"
 SEED = 6
-WIDTH = 96
+WIDTH = 192
 """Units of each hidden layer."""
-N_WALKERS = 400_000
+N_WALKERS = 1_000_000
 """Moments learned from."""
-N_UPDATES = 30_000
+N_UPDATES = 40_000
 BATCH = 1024
 LR = 2e-3
 MOST_PERIODS = 250
 """Latest moment looked at, in periods."""
 DT = 0.02
 """Control period [s]."""
-CONSTANT_SHARE, SHORT_SHARE, NOISY_SHARE = 0.1, 0.1, 0.4
+CONSTANT_SHARE, SHORT_SHARE, NOISY_SHARE = 0.1, 0.1, 0.2
 MOST_NOISE = 0.02
 """Greatest standard deviation of noise on radii [m]; five times that on speeds [m/s]."""
+
+AHEAD = STEP_S * np.arange(1, N_TIMES + 1)
+"""Times of the forecasts [s]."""
+TOLD = [2, 5, 8, 12, 17, 23, 31]
+"""Which of them errors are told at."""
 
 Floats = NDArray[np.float32]
 
@@ -128,12 +133,12 @@ def _watch(
         )
         done, gone = 0, 0.0
         for i in range(N_TIMES):
-            while done < round(TIMES[i] / DT):
+            while done < round(STEP_S * (i + 1) / DT):
                 gone += DT * math.hypot(rows[0, p, VX], rows[0, p, VY])
                 advance_walker(rules, state, 0, p, DT)
                 done += 1
             radius[n, i] = (rows[0, p, R] - r) / RADIUS_SCALE
-            way[n, i] = (gone / TIMES[i] - v) / SPEED_SCALE
+            way[n, i] = (gone / (STEP_S * (i + 1)) - v) / SPEED_SCALE
 
 
 def watched(n: int, seed: int) -> Moments:
@@ -258,7 +263,7 @@ def going_on_as_now(moments: Moments) -> tuple[Floats, Floats]:
     settings = walker_settings(load_cell(CELL).cylinders[0])
     grown = (
         np.clip(
-            now + growth * np.array(TIMES, dtype=np.float32), settings.r_min, settings.r_max
+            now + growth * AHEAD.astype(np.float32), settings.r_min, settings.r_max
         )
         - now
     )
@@ -278,12 +283,15 @@ def main() -> None:
             np.full(N_TIMES, 1e3 * RADIUS_SCALE),
             errors(radius, other.radius_seen, other.radius),
         ),
-        ("way", 1e3 * SPEED_SCALE * np.array(TIMES), errors(way, other.way_seen, other.way)),
+        ("way", 1e3 * SPEED_SCALE * AHEAD, errors(way, other.way_seen, other.way)),
     )
     for (name, unit, off), plain in zip(kinds, going_on_as_now(other), strict=True):
         logger.info(
             "%s off by, root mean square [mm], at %s s: %s; going on as now: %s",
-            name, TIMES, (unit * off).round(1), (unit * plain).round(1),
+            name,
+            AHEAD[TOLD].round(2),
+            (unit * off)[TOLD].round(1),
+            (unit * plain)[TOLD].round(1),
         )  # fmt: skip
     write_networks(radius, way)
 

@@ -35,7 +35,7 @@ class ReachPreset:
     """Work cell trained in."""
 
     total_steps: int = number(
-        7_680_000, 1_000, 100_000_000, "env steps", "length of the training"
+        5_120_000, 1_000, 100_000_000, "env steps", "length of the training"
     )
     n_envs: int = number(128, 1, 1024, "", "cells stepped together")
     buffer_size: int = number(

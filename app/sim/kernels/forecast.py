@@ -17,9 +17,10 @@ from app.sim.kernels.geometry import FAST
 from app.sim.kernels.occupancy import N_PAST
 from app.sim.ports import Vec
 
-TIMES = (0.06, 0.14, 0.24, 0.36, 0.5, 0.7, 0.95, 1.3)
-"""Times ahead [s]."""
-N_TIMES = len(TIMES)
+STEP_S = 0.04
+"""Time between two forecasts [s]."""
+N_TIMES = 32
+"""Number of times ahead; the first is one step from now."""
 N_IN = N_PAST + 3
 """Inputs: the value now, its rate, the age of the newest moment remembered, and all of them."""
 RADIUS_MIDDLE, RADIUS_SCALE = 0.35, 0.15
@@ -128,7 +129,7 @@ def forecast(
         age: How long ago the newest moment remembered was [s].
         radii: Radii remembered [m], the newest first, shape (N_PAST,).
         speeds: Speeds remembered [m/s], shape (N_PAST,).
-        out: Filled with radius and way at each of TIMES [m], shape (N_TIMES, 2).
+        out: Filled with radius and way at each time ahead [m], shape (N_TIMES, 2).
     """
     see_past(r, growth, age, radii, RADIUS_MIDDLE, RADIUS_SCALE, with_.seen)
     _ask(with_.radius, with_)
@@ -137,4 +138,4 @@ def forecast(
     see_past(speed, 0.0, age, speeds, SPEED_MIDDLE, SPEED_SCALE, with_.seen)
     _ask(with_.way, with_)
     for i in range(N_TIMES):
-        out[i, 1] = max(0.0, TIMES[i] * (speed + SPEED_SCALE * with_.said[i]))
+        out[i, 1] = max(0.0, STEP_S * (i + 1) * (speed + SPEED_SCALE * with_.said[i]))

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from app.sim.kernels.arm import Arm, RobotPose, new_robot_pose, place_robot
 from app.sim.kernels.compiled import kernel
 from app.sim.kernels.cylinder import cylinder_clearance
-from app.sim.kernels.forecast import N_TIMES, TIMES, Forecaster, forecast
+from app.sim.kernels.forecast import N_TIMES, STEP_S, Forecaster, forecast
 from app.sim.kernels.geometry import FAR
 from app.sim.kernels.layout import slices_of
 from app.sim.kernels.occupancy import AGE, N_PAST, PAST_RADIUS, PAST_SPEED
@@ -28,6 +28,9 @@ from app.sim.kernels.reach_features import EVERYBODY, N_SEEN, Obs, show_person
 from app.sim.kernels.reach_prospect import Prospect, base_motion
 from app.sim.ports import Vec
 
+LOOKS = (1, 3, 6, 9, 12, 17, 24, 32)
+"""When clearances are looked at, in steps of the forecast."""
+N_LOOKS = len(LOOKS)
 ASIDE = 0.9
 """How far to either side of home a robot may draw back, about its pan axis [rad]."""
 N_ASIDE = 4
@@ -46,10 +49,10 @@ GROWN = 0.2
 """Unit of the change of a radius [m]."""
 SIZES = (
     ("arrival", 1),
-    ("way_clearance", N_TIMES + 1),
-    ("aside_clearance", N_ASIDE * (N_TIMES + 1)),
-    ("goal_gap_ahead", N_TIMES),
-    ("radius_ahead", N_TIMES),
+    ("way_clearance", N_LOOKS + 1),
+    ("aside_clearance", N_ASIDE * (N_LOOKS + 1)),
+    ("goal_gap_ahead", N_LOOKS),
+    ("radius_ahead", N_LOOKS),
 )
 """Names and sizes of the groups of features; of each way the least clearance comes last."""
 LAYOUT = slices_of(SIZES)
@@ -79,7 +82,7 @@ class Ways(NamedTuple):
     refuge: Vec
     """Postures to draw back to [rad], shape (N_ASIDE - 1, 6)."""
     aside: Vec
-    """Features of the ways that do not lead to the goal, shape (N_ASIDE * (N_TIMES + 1),)."""
+    """Features of the ways that do not lead to the goal, shape (N_ASIDE * (N_LOOKS + 1),)."""
 
 
 def new_ways(arm: Arm, forecaster: Forecaster) -> Ways:
@@ -95,7 +98,7 @@ def new_ways(arm: Arm, forecaster: Forecaster) -> Ways:
         robot=new_robot_pose(arm),
         q=np.zeros(6),
         refuge=np.clip(arm.home + turn, arm.q_min, arm.q_max),
-        aside=np.zeros(N_ASIDE * (N_TIMES + 1)),
+        aside=np.zeros(N_ASIDE * (N_LOOKS + 1)),
     )
 
 
@@ -129,7 +132,7 @@ def _go_on(state: PeopleState, e: int, walker: int, ways: Ways) -> None:
     told, person, k = ways.told, ways.person, ways.number[0]
     speed = math.hypot(person[2], person[3])
     for i in range(N_TIMES):
-        told[i, 0], told[i, 1] = person[4], TIMES[i] * speed
+        told[i, 0], told[i, 1] = person[4], STEP_S * (i + 1) * speed
     if walker >= 0:
         row = state.walkers.rows[e, walker]
         radii = row[PAST_RADIUS : PAST_RADIUS + N_PAST]
@@ -151,7 +154,7 @@ def _cut(d: float) -> float:
 
 @kernel(inline="always")
 def _clearance(arm: Arm, top_z: float, i: int, ways: Ways) -> float:
-    """Return the distance of the robot at ``ways.q`` and everybody at TIMES[i] [m]."""
+    """Return the distance of the robot at ``ways.q`` and everybody, step ``i`` ahead [m]."""
     place_robot(arm, ways.q, ways.robot)
     least = FAR
     for p in range(ways.number[0]):
@@ -178,17 +181,18 @@ def look_aside(arm: Arm, top_z: float, q: Vec, qd: Vec, ways: Ways) -> None:
             for j in range(6):
                 left = abs(ways.refuge[way - 1, j] - q[j])
                 longest = max(longest, left / arm.qd_max[j])
-        k, least = way * (N_TIMES + 1), FAR
-        for i in range(N_TIMES):
-            share = min(1.0, max(0.0, TIMES[i] - LAG_S) / longest)
+        k, least = way * (N_LOOKS + 1), FAR
+        for i in range(N_LOOKS):
+            t = STEP_S * LOOKS[i]
+            share = min(1.0, max(0.0, t - LAG_S) / longest)
             for j in range(6):
-                ways.q[j] = q[j] + 0.5 * qd[j] * min(TIMES[i], ROLL_S)
+                ways.q[j] = q[j] + 0.5 * qd[j] * min(t, ROLL_S)
                 if way > 0:
                     ways.q[j] += share * (ways.refuge[way - 1, j] - q[j])
-            d = _clearance(arm, top_z, i, ways)
+            d = _clearance(arm, top_z, LOOKS[i] - 1, ways)
             least = min(least, d)
             ways.aside[k + i] = _cut(d)
-        ways.aside[k + N_TIMES] = _cut(least)
+        ways.aside[k + N_LOOKS] = _cut(least)
 
 
 @kernel()
@@ -223,18 +227,23 @@ def put_ways(
     rate = base_motion(arm, robot, goal, prospect)
     arrival, least, slot = 1.0 / rate, FAR, ways.number[1]
     out[k] = arrival
-    for i in range(N_TIMES):
-        share = min(1.0, rate * max(0.0, TIMES[i] - LAG_S))
+    for i in range(N_LOOKS):
+        t, step = STEP_S * LOOKS[i], LOOKS[i] - 1
+        share = min(1.0, rate * max(0.0, t - LAG_S))
         for j in range(6):
-            rolled = 0.5 * qd[j] * min(TIMES[i], ROLL_S)
+            rolled = 0.5 * qd[j] * min(t, ROLL_S)
             ways.q[j] = q[j] + rolled + share * prospect.step[j]
-        d = _clearance(arm, top_z, i, ways)
-        if TIMES[i] <= arrival + AFTER_S:
+        d = _clearance(arm, top_z, step, ways)
+        if t <= arrival + AFTER_S:
             least = min(least, d)
         out[k + WAY + i] = _cut(d)
-        x, y, r = ways.ahead[i, slot, 0], ways.ahead[i, slot, 1], ways.ahead[i, slot, 2]
+        x, y, r = (
+            ways.ahead[step, slot, 0],
+            ways.ahead[step, slot, 1],
+            ways.ahead[step, slot, 2],
+        )
         out[k + GAP + i] = min(3.0, (math.hypot(x - goal[0], y - goal[1]) - r) / SCALE)
         out[k + GROWTH + i] = (r - seen[4]) / GROWN
-    out[k + WAY + N_TIMES] = _cut(least)
+    out[k + WAY + N_LOOKS] = _cut(least)
     for i in range(ways.aside.shape[0]):
         out[k + OTHERS + i] = ways.aside[i]

@@ -6,7 +6,7 @@ import pytest
 from app.sim import contact
 from app.sim.forecasts import new_forecaster
 from app.sim.kernels import reach_ways
-from app.sim.kernels.forecast import N_TIMES, TIMES, forecast
+from app.sim.kernels.forecast import N_TIMES, STEP_S, forecast
 from app.sim.kernels.occupancy import (
     AGE,
     COURSE_X,
@@ -25,6 +25,9 @@ from app.sim.reach import ReachBatch
 from tests.sim.kernels.test_reach_features import batch_of, observed
 
 LAYOUT = reach_ways.LAYOUT
+LOOKS = np.array(reach_ways.LOOKS)
+TIMES = STEP_S * LOOKS
+"""When clearances are looked at [s]."""
 
 
 def features(batch: ReachBatch) -> np.ndarray:
@@ -32,7 +35,7 @@ def features(batch: ReachBatch) -> np.ndarray:
 
 
 def ahead(batch: ReachBatch, e: int) -> np.ndarray:
-    """Where the walkers of a cell will be, (N_TIMES, W, 3), by the shipped forecasts."""
+    """Where the walkers of a cell will be, (len(LOOKS), W, 3), by the shipped forecasts."""
     found = []
     for row in batch.state.people.walkers.rows[e]:
         out = np.zeros((N_TIMES, 2))
@@ -41,7 +44,7 @@ def ahead(batch: ReachBatch, e: int) -> np.ndarray:
         forecast(new_forecaster(), row[R], row[GROWTH], speed, row[AGE], *past, out)
         course = row[[COURSE_X, COURSE_Y]] * (speed > 0.0)
         found.append(np.c_[row[[X, Y]] + out[:, 1:] * course, out[:, 0]])
-    return np.array(found).swapaxes(0, 1)
+    return np.array(found).swapaxes(0, 1)[LOOKS - 1]
 
 
 def clearance(batch: ReachBatch, q: np.ndarray, walkers: np.ndarray) -> float:
@@ -57,7 +60,7 @@ def rolled(batch: ReachBatch, e: int, t: float) -> np.ndarray:
 @pytest.mark.parametrize("people", [("walker",), ("constant", "fixed-speed", "walker")])
 def test_clearances_of_staying_and_drawing_back(people: tuple[str, ...]) -> None:
     batch = batch_of(*people, observation="forecast")
-    found = features(batch)[:, LAYOUT["aside_clearance"]].reshape(-1, 4, N_TIMES + 1)
+    found = features(batch)[:, LAYOUT["aside_clearance"]].reshape(-1, 4, len(LOOKS) + 1)
     home = batch.arm.home
     for e in range(batch.n_envs):
         walkers, q = ahead(batch, e), batch.state.q[e]
