@@ -262,10 +262,7 @@ def going_on_as_now(moments: Moments) -> tuple[Floats, Floats]:
     now, growth = scale * moments.radius_seen[:, :1] + middle, moments.radius_seen[:, 1:2]
     settings = walker_settings(load_cell(CELL).cylinders[0])
     grown = (
-        np.clip(
-            now + growth * AHEAD.astype(np.float32), settings.r_min, settings.r_max
-        )
-        - now
+        np.clip(now + growth * AHEAD.astype(np.float32), settings.r_min, settings.r_max) - now
     )
     radius = np.sqrt(((grown / scale - moments.radius) ** 2).mean(axis=0))
     return np.asarray(radius), np.asarray(np.sqrt((moments.way**2).mean(axis=0)))

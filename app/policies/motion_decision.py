@@ -14,6 +14,7 @@ import numpy as np
 
 from app.errors import InvalidInput
 from app.policies.interpolation import Interpolation, interpolates
+from app.policies.lookahead import OTHERS, PASSED, Lookahead, looks_ahead
 from app.policies.movers import person_weights
 from app.sim import human
 from app.sim.cell_reach import LONGEST_REACH, SHOULDER
@@ -80,6 +81,7 @@ class MotionDecider:
             for name, entry in actor.trained_range.items()
         }
         self._stages: dict[tuple[int, int], Stage] = {}
+        self._aheads: dict[Stage, Lookahead] = {}
         self._layer = SafetyLayer(self.arm, SafetySettings())
         self._busy = threading.Lock()
 
@@ -99,7 +101,7 @@ class MotionDecider:
         started = time.perf_counter()
         q, qd, qdd, goal = self._numbers(question)
         people = checked_people(question.people)
-        way = self._way(question.way)
+        way, looks = self._way(question.way), self._looks(question.ahead)
         order = _bodies_first(people)
         known = [people[i] for i in order]
         with self._busy:
@@ -109,6 +111,7 @@ class MotionDecider:
             if question.safety is None:
                 _require_apart(apart, order)
             act, targets, weights, seen = self._act(stage, question, goal, way)
+            began = self._improve(stage, goal, qdd, act) if looks else None
             piece, unfeasible = self._piece(q, qd, qdd, act)
             safe, terms_of, terms = self._monitored(question, q, qd, piece, stage.shapes, order)
             outside = [one for who, what in seen for one in self._human(who, what, order)]
@@ -116,6 +119,8 @@ class MotionDecider:
         place = np.argsort(order)
         return MotionDecision(
             act=act,
+            ahead=looks,
+            began=began,
             piece=piece,
             unfeasible=unfeasible,
             way=way,
@@ -183,6 +188,26 @@ class MotionDecider:
             rule = "needs training targets, and this policy was trained on all of a box"
             raise InvalidInput("way", asked, rule, ("direct",))
         return asked
+
+    def _looks(self, asked: bool | None) -> bool:
+        able = looks_ahead(self.actor)
+        if asked and not able:
+            rule = "needs a policy that sees forecasts of people, with two hidden layers"
+            raise InvalidInput("ahead", True, rule, ("false",))
+        return able if asked is None else asked
+
+    def _improve(self, stage: Stage, goal: Vec, qdd: Vec, act: Vec) -> str | None:
+        """Play an action ahead; change it where another way is better, and return its name."""
+        if stage not in self._aheads:
+            self._aheads[stage] = Lookahead(self.actor)
+        state = stage.state
+        state.goal[0], state.qdd[0] = goal, qdd
+        played = act[None].astype(np.float32)
+        chosen = int(self._aheads[stage].improve(stage, played)[0])
+        if chosen == PASSED:
+            return None
+        act[:] = played[0]
+        return OTHERS[chosen]
 
     def _stage(self, people: Sequence[Person]) -> Stage:
         n_bodies = sum(person.cylinder is None for person in people)

@@ -4,6 +4,8 @@ direct                  the policy on its own observation; of several people it 
 interpolated            the mean of its actions for the training targets around the goal
 averaged                the mean over people of its actions beside each of them alone
 averaged-interpolated   both
+...-ahead               any of them, played ahead with the policy, and changed where that ends
+                        in a contact (``lookahead.py``)
 
 A mover looks at a batch as it is and gives an action for every cell in it. The policy need not
 have met more than one person in training.
@@ -20,13 +22,27 @@ from numpy.typing import NDArray
 
 from app.errors import CheckpointMismatch, InvalidInput
 from app.policies.interpolation import Interpolation, interpolates
+from app.policies.lookahead import Lookahead, looks_ahead
 from app.sim.kernels.episode import RUNNING
 from app.sim.ports import ReachActor, Vec
 from app.sim.reach import ReachBatch
 
-How = Literal["direct", "interpolated", "averaged", "averaged-interpolated"]
+How = Literal[
+    "direct",
+    "interpolated",
+    "averaged",
+    "averaged-interpolated",
+    "direct-ahead",
+    "interpolated-ahead",
+    "averaged-ahead",
+    "averaged-interpolated-ahead",
+]
 HOWS: tuple[How, ...] = get_args(How)
 """Names of the ways."""
+AHEAD = "-ahead"
+"""End of the names of those that look ahead."""
+CALM_M = 0.1
+"""These look every third period while the policy's way keeps this far from everybody [m]."""
 NEAREST_M = 0.05
 """People nearer than this weigh no more [m]."""
 POWER = 2.0
@@ -131,6 +147,27 @@ class Averaged:
         return mean.astype(np.float32)
 
 
+class Ahead:
+    """What is asked, played ahead and changed where that ends in a contact.
+
+    Args:
+        mover: Who says what to do.
+        actor: The policy it is played with.
+
+    Raises:
+        InvalidInput: The policy cannot be played ahead.
+    """
+
+    def __init__(self, mover: Mover, actor: ReachActor) -> None:
+        self._mover, self._ahead = mover, Lookahead(actor, CALM_M)
+
+    def acts(self, batch: ReachBatch) -> Actions:
+        """Return actions for every cell; see :class:`Mover`."""
+        act = self._mover.acts(batch)
+        self._ahead.improve(batch, act)
+        return act
+
+
 def person_weights(distances: Vec) -> Vec:
     """Return how much each person counts: the inverse square of the distance, as shares.
 
@@ -160,7 +197,18 @@ def mover_of(actor: ReachActor, how: How | None = None) -> Mover:
     if how not in HOWS:
         raise InvalidInput("how", how, "must name a way to move", HOWS)
     asked = Interpolated(actor) if "interpolated" in how else Direct(actor)
-    return Averaged(asked) if "averaged" in how else asked
+    mover = Averaged(asked) if "averaged" in how else asked
+    return Ahead(mover, actor) if how.endswith(AHEAD) else mover
+
+
+def hows_of(actor: ReachActor) -> tuple[How, ...]:
+    """Return the ways in which a policy can be asked."""
+    between, ahead = interpolates(actor), looks_ahead(actor)
+    return tuple(
+        how
+        for how in HOWS
+        if (between or "interpolated" not in how) and (ahead or not how.endswith(AHEAD))
+    )
 
 
 def _for_running(asked: Asked, batch: ReachBatch) -> Actions:

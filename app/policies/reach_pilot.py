@@ -1,12 +1,9 @@
 """A reach policy as the live cell drives it: with all the ways in which it can be asked."""
 
-from typing import get_args
-
 import numpy as np
 from numpy.typing import NDArray
 
-from app.policies.interpolation import interpolates
-from app.policies.movers import How, Mover, mover_of
+from app.policies.movers import Mover, hows_of, mover_of
 from app.sim.actions import ActionSettings
 from app.sim.ports import ReachActor, Vec
 from app.sim.reach import GoalRule, ReachBatch, ViewName
@@ -21,11 +18,7 @@ class ReachPilot:
 
     def __init__(self, actor: ReachActor) -> None:
         self._actor = actor
-        self._movers: dict[str, Mover] = {
-            how: mover_of(actor, how)
-            for how in get_args(How)
-            if interpolates(actor) or "interpolated" not in how
-        }
+        self._movers: dict[str, Mover] = {how: mover_of(actor, how) for how in hows_of(actor)}
 
     @property
     def checkpoint(self) -> str:

@@ -96,8 +96,9 @@ class LiveReacher:
 
 
 def usual_way(pilot: ReachPilot) -> str:
-    """Return how a policy is asked at first: between its targets where it can be."""
-    return "interpolated" if "interpolated" in pilot.ways else pilot.ways[0]
+    """Return how a policy is asked at first: between its targets and ahead where it can be."""
+    wanted = ("interpolated-ahead", "direct-ahead", "interpolated")
+    return next((way for way in wanted if way in pilot.ways), pilot.ways[0])
 
 
 def straight(arm: Arm, q: Vec, posture: Vec) -> Vec:

@@ -37,6 +37,8 @@ class MotionQuestion:
     """None interpolates where the policy has targets, else asks it for the goal itself."""
     beside: Beside = "nearest"
     """How several people are met by a policy that knows one."""
+    ahead: bool | None = None
+    """Whether the decision is played ahead; None does where the policy allows it."""
     time_left_s: float = 5.0
     """Time left to reach the goal, which policies see [s]."""
     safety: SafetySettings | None = None
@@ -70,7 +72,11 @@ class MotionDecision:
     """The next piece of motion, and all that explains it."""
 
     act: Vec
-    """The policy's action in [-1, 1], shape (6,)."""
+    """The action in [-1, 1], shape (6,): the policy's, or the first of a better way."""
+    ahead: bool
+    """Whether it was played ahead."""
+    began: str | None
+    """The way that is begun instead of the policy's action; None for that itself."""
     piece: Piece
     """The commanded piece, before any scaling."""
     unfeasible: bool

@@ -52,11 +52,11 @@ class Stage:
         staged = with_people(with_workplace(cell) if n_bodies else cell, people)
         # What workers do in episodes is left out: here they are where they are told to be.
         shared = people_of(staged)
-        self._world = world_of(staged, shared, np.zeros((0, 3)))
-        self._state = new_state(self._world, new_people_state(staged, shared, 1), 1)
-        self._work = reach.new_work(self._world, self._state, new_forecaster())
+        self.world = world_of(staged, shared, np.zeros((0, 3)))
+        self.state = new_state(self.world, new_people_state(staged, shared, 1), 1)
+        self._work = reach.new_work(self.world, self.state, new_forecaster())
         self._view, self.obs_size = VIEWS[view]
-        self.arm, self.top_z = self._world.arm, shared.top_z
+        self.arm, self.top_z = self.world.arm, shared.top_z
         self._own_size = shared.bodies[0]
         self.apart = np.zeros(n_bodies + n_cylinders)
         """Distance of the robot to each person [m], bodies first, shape (n_people,)."""
@@ -66,12 +66,12 @@ class Stage:
 
     @property
     def _shared(self) -> tuple[Any, ...]:
-        return self._world, self._state, self._work, self.apart
+        return self.world, self.state, self._work, self.apart
 
     @property
     def clear(self) -> Vec:
         """Distances to people, cell and the robot itself [m], shape (3,)."""
-        clear: Vec = self._state.clear[0]
+        clear: Vec = self.state.clear[0]
         return clear
 
     @property
@@ -102,7 +102,7 @@ class Stage:
             people: Those with joint angles first, then cylinders, checked.
             time_left_s: Time left to reach the goal [s].
         """
-        state = self._state
+        state = self.state
         state.q[0], state.qd[0], state.time_left[0] = q, qd, time_left_s
         rows, first = state.people, state.people.q.shape[1]
         for i, person in enumerate(people):
@@ -134,8 +134,8 @@ class Stage:
         places, out = self._room[n]
         places[0] = goals
         arguments = (
-            self._world,
-            self._state,
+            self.world,
+            self.state,
             _ROW,
             self._work,
             self._view,

@@ -3,9 +3,9 @@
 ``motion`` is one decision between training targets, eight states in one batch, as
 ``MotionDecider.decide`` gives it: checks, observations, network, weights, the piece and its
 limits. ``motion-monitored`` adds speed and separation monitoring, ``motion-direct`` asks for
-one state. ``motion-sb3-predict`` is Stable-Baselines3's own ``predict`` of a network of that
-size, called once for each of eight observations that are ready: without observing, weighing
-and the piece.
+one state, ``motion-ahead`` plays the decision ahead. ``motion-sb3-predict`` is
+Stable-Baselines3's own ``predict`` of a network of that size, called once for each of eight
+observations that are ready: without observing, weighing and the piece.
 
 All take turns, state by state, so that a machine that slows down slows all of them.
 """
@@ -98,12 +98,14 @@ def motion_times(seed: int, seconds: float) -> tuple[dict[str, Vec], str]:
     predict = predicting(one, seed)
 
     def asked(question: MotionQuestion) -> Sequence[tuple[str, Callable[[], object]]]:
+        question = replace(question, ahead=False)
         alone = replace(question, safety=None)
         direct = replace(alone, way="direct")
         return (
             ("motion", lambda: one.decide(alone)),
             ("motion-monitored", lambda: one.decide(question)),
             ("motion-direct", lambda: one.decide(direct)),
+            ("motion-ahead", lambda: one.decide(replace(alone, ahead=True))),
             ("motion-sb3-predict", predict),
         )
 

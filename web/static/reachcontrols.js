@@ -18,14 +18,19 @@ const BESIDE = [
   [false, "the nearest", "The policy sees the nearest person"],
   [true, "everyone", "The policy is asked beside each person alone; the nearer one counts more"],
 ];
+const AHEAD = [
+  [true, "On", "Each decision is played ahead for a second, and changed where that ends in a contact"],
+  [false, "Off", "The policy's action is taken as it is"],
+];
 
 export function ReachControls({ world, send }) {
   const { goal_mode: mode, safety, way, ways } = world.reach;
   const between = way.includes("interpolated");
   const averaged = way.includes("averaged");
-  const ask = (all, mixed) => {
-    const wanted = [all && "averaged", mixed && "interpolated"].filter(Boolean).join("-") || "direct";
-    send({ tag: "set-way", way: wanted });
+  const ahead = way.endsWith("-ahead");
+  const ask = (all, mixed, played) => {
+    const asked = [all && "averaged", mixed && "interpolated"].filter(Boolean).join("-") || "direct";
+    send({ tag: "set-way", way: played ? `${asked}-ahead` : asked });
   };
   return html`<div class="dock-row dock-wrap">
     <span class="dock-label" id="goal-label">Goal</span>
@@ -39,11 +44,15 @@ export function ReachControls({ world, send }) {
     ${ways.includes("interpolated") && html`<span class="dock-pair">
       <span class="dock-label dock-label-free" id="between-label">Interpolation</span>
       <${Segmented} labelledby="between-label" name="between" value=${between} items=${BETWEEN}
-        onPick=${(one) => ask(averaged, one)} /></span>`}
+        onPick=${(one) => ask(averaged, one, ahead)} /></span>`}
+    ${ways.includes("direct-ahead") && html`<span class="dock-pair">
+      <span class="dock-label dock-label-free" id="ahead-label">Look ahead</span>
+      <${Segmented} labelledby="ahead-label" name="ahead" value=${ahead} items=${AHEAD}
+        onPick=${(one) => ask(averaged, between, one)} /></span>`}
     ${ways.includes("averaged") && world.people.length > 1 && html`<span class="dock-pair">
       <span class="dock-label dock-label-free" id="beside-label">Policy sees</span>
       <${Segmented} labelledby="beside-label" name="beside" value=${averaged} items=${BESIDE}
-        onPick=${(one) => ask(one, between)} /></span>`}
+        onPick=${(one) => ask(one, between, ahead)} /></span>`}
   </div>`;
 }
 

@@ -85,6 +85,12 @@ class MotionRequest(Body):
         description="several people: the policy sees the nearest, or its actions beside each "
         "of them alone are averaged by their distances",
     )
+    ahead: bool | None = Field(
+        None,
+        description="whether the decision is played ahead with the policy, beside people who "
+        "go on as forecast, and changed where that ends in a contact; null does where the "
+        "policy allows it",
+    )
     time_left_s: Annotated[float, Field(ge=0.0, le=60.0)] = Field(
         5.0, description="time left to reach the goal, which the policy sees [s]"
     )
@@ -121,6 +127,7 @@ class MotionRequest(Body):
             people=people,
             way=self.way,
             beside=self.beside,
+            ahead=self.ahead,
             time_left_s=self.time_left_s,
             safety=None if self.safety is None else self.safety.to_domain(own),
             age_s=self.age_s + age_s,
@@ -271,8 +278,15 @@ class MotionAnswer(Answer):
     dt: float = Field(description="control period [s]")
     piece: MotionPiece = Field(description="what the robot shall execute")
     commanded: MotionPiece = Field(description="what the policy asked for, before scaling")
-    act: Vector6 = Field(description="the policy's action, -1 to 1 per joint")
+    act: Vector6 = Field(
+        description="the action, -1 to 1 per joint: the policy's, or the first of the way begun"
+    )
     way: Way
+    ahead: bool = Field(description="whether the decision was played ahead")
+    began: str | None = Field(
+        description="the way begun instead of the policy's action, by where it leads first and "
+        "for how long; null: the policy's action passed"
+    )
     targets: list[Target] = Field(description="what was interpolated; empty for `direct`")
     safety: Override | None = Field(description="null where monitoring was left out")
     people: list[PersonMet] = Field(description="what was made of each person")
@@ -310,6 +324,8 @@ class MotionAnswer(Answer):
             commanded=commanded,
             act=_numbers(decision.act),
             way=decision.way,
+            ahead=decision.ahead,
+            began=decision.began,
             targets=[
                 Target(position=list(one.position), weight=one.weight)
                 for one in decision.targets

@@ -20,8 +20,7 @@ from app.policies.evaluation.reach_episodes import (
     target_goals,
 )
 from app.policies.evaluation.rows import OnRow
-from app.policies.interpolation import interpolates
-from app.policies.movers import How, Mover, mover_of
+from app.policies.movers import AHEAD, How, Mover, hows_of, mover_of
 from app.policies.reach_policy import ReachPolicy
 from app.policies.trained_cell import cell_of
 from app.sim.cell_people import CylinderPerson
@@ -35,7 +34,17 @@ Json = dict[str, Any]
 
 def goal_ways(actor: ReachPolicy) -> tuple[How, ...]:
     """Return the ways of asking a policy for goals between those it was trained on."""
-    return ("direct", "interpolated") if interpolates(actor) else ("direct",)
+    return tuple(how for how in hows_of(actor) if "averaged" not in how)
+
+
+def direct_ways(actor: ReachPolicy) -> tuple[How, ...]:
+    """Return the ways of asking a policy for the goal itself: alone, and looking ahead."""
+    return tuple(how for how in hows_of(actor) if how.startswith("direct"))
+
+
+def ending(how: How) -> str:
+    """Return what the names of rows end with: nothing for the policy alone."""
+    return AHEAD if how.endswith(AHEAD) else ""
 
 
 def walker_of(cell: Cell) -> CylinderPerson:

@@ -136,7 +136,9 @@ class _Play:
             self._outcome[which] = ended[rows]
             self._duration[which] = dt * self._steps[rows]
             self._playing[rows] += batch.n_envs
-            self._begin(rows[self._playing[rows] < len(self._goals)])
+            more = self._playing[rows] < len(self._goals)
+            batch.state.outcome[rows[~more]] = kernel.TIMEOUT  # nobody need move these
+            self._begin(rows[more])
 
     def to_the_end(self) -> ReachEpisodes:
         """Play until every episode has ended."""

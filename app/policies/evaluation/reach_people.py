@@ -6,18 +6,22 @@ all averaged. Nobody and one person are the same by both.
 ``reach-speeds``: a person of 0.25, 0.5 and 1.0 m/s; the speed's limits do not apply, else
 0.25 m/s would be standing still (METHOD 2.1).
 
+``-ahead`` looks ahead with the policy (``lookahead.py``), at all people at once.
+
 All go round the grid's targets, with the same goals in every row.
 
 Source: thesis 4.4.2; METHOD 2.6, and 4 for several people.
 """
 
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
 from app.policies.checkpoint import Checkpoint
-from app.policies.evaluation.reach_bench import ReachBench, walker_of
+from app.policies.evaluation.reach_bench import ReachBench, direct_ways, ending, walker_of
 from app.policies.evaluation.rows import OnRow, untold
-from app.policies.movers import How
+from app.policies.movers import How, hows_of
+from app.policies.reach_policy import ReachPolicy
 from app.sim.cell_people import FixedSpeedWalker
 from app.sim.cells import Cell
 from app.sim.kernels.people import MAX_PEOPLE
@@ -27,7 +31,7 @@ DEFAULT_EPISODES = 1000
 """METHOD 2.6."""
 TARGET_EPISODES = 5400
 """Episodes of each row of ``reach-constant``: as many as ``reach-targets`` plays."""
-WAYS: tuple[How, ...] = ("direct", "averaged")
+WAYS: tuple[How, ...] = ("direct", "averaged", "direct-ahead")
 """Ways of asking a policy about several people; ``direct`` sees the nearest."""
 KINDS: tuple[HumanKind, ...] = ("walker", "constant")
 """Who walks: as usual, and with one speed and radius per episode."""
@@ -46,13 +50,19 @@ def run_people(
         seed: Seed of the episodes.
         on_row: Told of each row once it is known.
     """
-    rows = [(n, how) for n in range(MAX_PEOPLE + 1) for how in (WAYS if n > 1 else WAYS[:1])]
+    ways = [how for how in WAYS if how in hows_of(ReachPolicy(checkpoint))]
+    rows = [
+        (n, how)
+        for n in range(MAX_PEOPLE + 1)
+        for how in ways
+        if n > 1 or (how != "averaged" and n) or how == "direct"
+    ]
     bench = ReachBench(checkpoint, seed, len(rows), on_row)
     goals = bench.target_goals(episodes or DEFAULT_EPISODES)
     for n, how in rows:
         settings = replace(bench.usual, people=KINDS[:1] * n)
         played = bench.play(settings, goals, how)
-        name = f"{n}-people" + (f"-{how}" if n > 1 else "")
+        name = f"{n}-people" + (f"-{how}" if n > 1 else ending(how))
         row = played.row(name)
         row["starts_redrawn"] = float((played.redrawn > 0).mean())
         bench.add(row, settings, "grid", how)
@@ -71,11 +81,13 @@ def run_constant(
         seed: Seed of the episodes.
         on_row: Told of each row once it is known.
     """
-    bench = ReachBench(checkpoint, seed, 2, on_row)
+    ways = direct_ways(ReachPolicy(checkpoint))
+    bench = ReachBench(checkpoint, seed, len(ways) * len(KINDS), on_row)
     goals = bench.target_goals(episodes or TARGET_EPISODES)
-    for kind in KINDS:
+    for how, kind in product(ways, KINDS):
         settings = replace(bench.usual, people=(kind,))
-        bench.add(bench.play(settings, goals).row(kind), settings, "grid")
+        row = bench.play(settings, goals, how).row(kind + ending(how))
+        bench.add(row, settings, "grid", how)
     return bench.result()
 
 
@@ -90,13 +102,15 @@ def run_speeds(
         seed: Seed of the episodes.
         on_row: Told of each row once it is known.
     """
-    bench = ReachBench(checkpoint, seed, len(SPEEDS), on_row)
+    ways = direct_ways(ReachPolicy(checkpoint))
+    bench = ReachBench(checkpoint, seed, len(ways) * len(SPEEDS), on_row)
     goals = bench.target_goals(episodes or DEFAULT_EPISODES)
     settings = replace(bench.usual, people=("fixed-speed",))
-    for speed in SPEEDS:
+    for how, speed in product(ways, SPEEDS):
         cell = at_speed(bench.cell, speed)
-        row = bench.play(settings, goals, cell=cell).row(f"{speed:g}-m-s")
-        bench.add(row, settings, "grid", cell=cell, speed_m_s=speed)
+        played = bench.play(settings, goals, how, cell=cell)
+        row = played.row(f"{speed:g}-m-s{ending(how)}")
+        bench.add(row, settings, "grid", how, cell=cell, speed_m_s=speed)
     return bench.result()
 
 

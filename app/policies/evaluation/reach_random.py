@@ -7,6 +7,7 @@ also be asked at those around the goal, and its actions interpolated.
 ====================  ======================================================================
 ``targets``           the grid's targets instead, asked directly, the same people, 5 s
 ``WAY``, ``WAY-25s``  random goals by each way that the checkpoint allows, 5 s and 25 s
+``...-ahead``         the same looking ahead with the policy (``lookahead.py``)
 ====================  ======================================================================
 
 ``between`` groups the episodes of 5 s by the way from their goals to the nearest target.
@@ -24,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from app.policies.checkpoint import Checkpoint
-from app.policies.evaluation.reach_bench import ReachBench, goal_ways
+from app.policies.evaluation.reach_bench import ReachBench, direct_ways, ending, goal_ways
 from app.policies.evaluation.reach_episodes import ReachEpisodes, against
 from app.policies.evaluation.rows import OnRow, untold
 from app.policies.reach_policy import ReachPolicy
@@ -60,10 +61,14 @@ def run_random(
         seed: Seed of goals and people; use one that nothing was tuned on.
         on_row: Told of each row once it is known.
     """
-    n, ways = episodes or DEFAULT_EPISODES, goal_ways(ReachPolicy(checkpoint))
-    bench = ReachBench(checkpoint, seed, 1 + len(LIMITS_S) * len(ways), on_row)
-    at_targets = bench.play(bench.usual, bench.target_goals(n))
-    bench.add(at_targets.row("targets"), bench.usual, "grid")
+    actor = ReachPolicy(checkpoint)
+    n, ways, there = episodes or DEFAULT_EPISODES, goal_ways(actor), direct_ways(actor)
+    bench = ReachBench(checkpoint, seed, len(there) + len(LIMITS_S) * len(ways), on_row)
+    at_targets = {}
+    for how in there:
+        played = bench.play(bench.usual, bench.target_goals(n), how)
+        at_targets[ending(how)] = played
+        bench.add(played.row("targets" + ending(how)), bench.usual, "grid", how)
     goals = bench.random_goals(n)
     for how in ways:
         for limit in LIMITS_S:
@@ -72,7 +77,7 @@ def run_random(
             usual = limit == bench.usual.time_limit_s
             row = played.row(how if usual else f"{how}-{limit:g}s")
             if usual:
-                row["against_targets"] = against(played, at_targets)
+                row["against_targets"] = against(played, at_targets[ending(how)])
                 row["between"] = between(played, bench.targets)
             bench.add(row, settings, "box", how)
     bench.recheck(bench.usual, goals, ways[-1])

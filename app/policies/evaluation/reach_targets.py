@@ -9,6 +9,8 @@
                an episode goes on after a contact
 =============  =============================================================================
 
+``-ahead`` are the same looking ahead (``lookahead.py``), where the policy can.
+
 An episode with a contact is no success in any row; ``reached_after_contact`` is the share that
 came to the goal all the same.
 
@@ -17,15 +19,17 @@ people may start.
 """
 
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
 import numpy as np
 
 from app.policies.checkpoint import Checkpoint
-from app.policies.evaluation.reach_bench import ReachBench
+from app.policies.evaluation.reach_bench import ReachBench, direct_ways, ending
 from app.policies.evaluation.reach_episodes import ReachEpisodes
 from app.policies.evaluation.rows import OnRow, untold
 from app.policies.evaluation.statistics import wilson
+from app.policies.reach_policy import ReachPolicy
 from app.sim.kernels.episode import COLLISION, SUCCESS
 from app.sim.ports import Vec
 from app.sim.reach import StartRule
@@ -97,15 +101,16 @@ def run_targets(
         seed: Seed of the episodes; use one that nothing was tuned on.
         on_row: Told of each row once it is known.
     """
-    bench = ReachBench(checkpoint, seed, len(STARTS), on_row)
+    ways = direct_ways(ReachPolicy(checkpoint))
+    bench = ReachBench(checkpoint, seed, len(ways) * len(STARTS), on_row)
     per_target = episodes or PER_TARGET
     goals = bench.target_goals(per_target * len(bench.targets))
-    for start in STARTS:
+    for how, start in product(ways, STARTS):
         settings = replace(bench.usual, start=start, collision_ends=start != "authors")
-        played = bench.play(settings, goals)
+        played = bench.play(settings, goals, how)
         cells = by_target(played, bench.targets, bench.cell.table.height)
         row = {
-            **played.row(start),
+            **played.row(start + ending(how)),
             "begun_in_contact": played.begun_in_contact(),
             "starts_redrawn": float(np.mean(played.redrawn > 0)),
             "worst": worst_of(cells),
@@ -114,6 +119,6 @@ def run_targets(
         }
         if not settings.collision_ends:
             row["reached_after_contact"] = reached_after_contact(played)
-        bench.add(row, settings, "grid")
-    bench.recheck(bench.usual, goals)
+        bench.add(row, settings, "grid", how)
+    bench.recheck(bench.usual, goals, ways[-1])
     return {"episodes": per_target, **bench.result(targets=len(bench.targets))}

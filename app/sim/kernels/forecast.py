@@ -71,7 +71,16 @@ class Forecaster(NamedTuple):
 
 
 @kernel(fastmath=FAST)
-def _layer(x: Floats, w: Floats, b: Floats, rectified: bool, out: Floats) -> None:
+def layer(x: Floats, w: Floats, b: Floats, rectified: bool, out: Floats) -> None:
+    """Write one layer of a network.
+
+    Args:
+        x: Inputs, shape (n,).
+        w: Weights, shape (n, width).
+        b: Biases, shape (width,).
+        rectified: Whether outputs below 0 become 0.
+        out: Filled, shape (width,).
+    """
     for j in range(out.shape[0]):
         out[j] = b[j]
     for i in range(x.shape[0]):
@@ -87,9 +96,9 @@ def _layer(x: Floats, w: Floats, b: Floats, rectified: bool, out: Floats) -> Non
 @kernel()
 def _ask(net: Network, with_: Forecaster) -> None:
     """Fill ``with_.said`` from ``with_.seen``."""
-    _layer(with_.seen, net.w1, net.b1, True, with_.first)
-    _layer(with_.first, net.w2, net.b2, True, with_.second)
-    _layer(with_.second, net.w3, net.b3, False, with_.said)
+    layer(with_.seen, net.w1, net.b1, True, with_.first)
+    layer(with_.first, net.w2, net.b2, True, with_.second)
+    layer(with_.second, net.w3, net.b3, False, with_.said)
 
 
 @kernel(inline="always")

@@ -66,7 +66,4 @@ def test_a_wave_is_recognised() -> None:
     growth = 0.1 * np.pi * np.cos(0.3)
     found = told(wave(0.0), growth, 0.6, 0.0, wave(t), np.full(N_PAST, 0.6))
     assert np.abs(found[:, 0] - wave(TIMES)).mean() < 0.06
-    assert (
-        np.abs(found[:, 0] - wave(TIMES)).mean()
-        < np.abs(wave(0.0) - wave(TIMES)).mean()
-    )
+    assert np.abs(found[:, 0] - wave(TIMES)).mean() < np.abs(wave(0.0) - wave(TIMES)).mean()

@@ -1,0 +1,85 @@
+"""Looking ahead with a policy: its actions, replaced where they would end in a contact.
+
+``app/sim/kernels/lookahead.py`` plays them forward; here it meets a policy and a batch.
+"""
+
+import math
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.errors import InvalidInput
+from app.policies.networks import BASE_WEIGHT
+from app.policies.reach_policy import ReachPolicy
+from app.sim.forecasts import new_forecaster
+from app.sim.kernels import lookahead as kernel
+from app.sim.kernels.forecast import STEP_S
+from app.sim.kernels.reach import ReachState, ReachWorld, Work, new_work
+from app.sim.ports import ReachActor
+
+PASSED = kernel.PASSED
+"""In place of the number of another way: the action passed as it is."""
+OTHERS = (
+    *(f"{name}-{n * STEP_S:.2g}s" for name in kernel.NAMES for n in kernel.LASTING),
+    "straight",
+)
+"""Names of the other ways: where they lead first, and for how long."""
+
+Actions = NDArray[np.float32]
+
+
+def looks_ahead(actor: ReachActor) -> bool:
+    """Whether a policy can be played ahead: one of ours that sees forecasts."""
+    return isinstance(actor, ReachPolicy) and actor.kernel_network is not None
+
+
+class Cells(Protocol):
+    """Rows of the reach scenario: a batch, or a stage that somebody's state was put into."""
+
+    @property
+    def world(self) -> ReachWorld: ...  # noqa: D102
+    @property
+    def state(self) -> ReachState: ...  # noqa: D102
+
+
+class Lookahead:
+    """Plays the actions of one policy ahead; used by one thread at a time.
+
+    Args:
+        actor: The policy.
+        calm_m: Where the way of the policy keeps farther than this from everybody, the next two
+            decisions in the same cell pass unplayed [m]; by default each one is played.
+
+    Raises:
+        InvalidInput: It cannot be played ahead.
+    """
+
+    def __init__(self, actor: ReachActor, calm_m: float = math.inf) -> None:
+        network = actor.kernel_network if isinstance(actor, ReachPolicy) else None
+        if network is None:
+            rule = "must be a residual actor of two layers that sees forecasts, to look ahead"
+            raise InvalidInput("checkpoint", actor.checkpoint, rule)
+        self._network, self._rule, self._calm_m = network, actor.action.rule(), calm_m
+        self._cells: Cells | None = None
+        self._work: tuple[Work, kernel.Lookahead] | None = None
+
+    def improve(self, cells: Cells, act: Actions) -> NDArray[np.int64]:
+        """Replace actions that end in a contact by the first ones of better ways.
+
+        Args:
+            cells: Where they are asked for; rows whose episode has ended are left out.
+            act: The policy's actions, shape (n_envs, 6); changed.
+
+        Returns:
+            Numbers of the ways begun instead, among ``OTHERS``, or PASSED, shape (n_envs,).
+        """
+        world, state = cells.world, cells.state
+        if self._work is None or self._cells is not cells:
+            look = kernel.new_lookahead(
+                world.arm, self._network, BASE_WEIGHT, len(act), self._calm_m
+            )
+            self._cells, self._work = cells, (new_work(world, state, new_forecaster()), look)
+        chosen = np.empty(len(act), dtype=np.int64)
+        kernel.look_ahead_batch(world, self._rule, state, act, *self._work, chosen)
+        return chosen

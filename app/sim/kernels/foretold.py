@@ -1,0 +1,141 @@
+"""Where people will be at every step of a second and a half, as well as can be told, compiled.
+
+A worker goes on at constant velocity, a walker as the networks of ``forecast.py`` say; where
+the functions behind a walker's radius and speed can be found (``harmonic.py``), as they say.
+Who stands still stays. Where people turn nobody knows.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from app.sim.kernels.compiled import kernel
+from app.sim.kernels.forecast import N_TIMES, STEP_S
+from app.sim.kernels.harmonic import N_CONSTANTS, Fit, Limits, find_function, new_fit, value_at
+from app.sim.kernels.occupancy import (
+    AGE,
+    F_RADIUS_MAX,
+    F_SPEED_MAX,
+    N_PAST,
+    PAST_RADIUS,
+    PAST_SPEED,
+    R_MAX,
+    R_MIN,
+    V_MAX,
+    V_MIN,
+)
+from app.sim.kernels.people import MAX_PEOPLE, place_people
+from app.sim.kernels.reach import ReachState, ReachWorld, Work
+from app.sim.kernels.reach_features import EVERYBODY, N_SEEN, show_person
+from app.sim.kernels.reach_ways import foresee
+from app.sim.ports import Vec
+
+MOST_PLAYED = 40
+"""Most steps of the forecast that are played."""
+N_MOMENTS = MOST_PLAYED + N_TIMES + 1
+"""Moments at which it is known where people will be: now, and from each step played as far as
+the features of ``reach_ways.py`` look."""
+
+
+class Foretold(NamedTuple):
+    """Everybody at every moment, and work space."""
+
+    places: Vec
+    """x, y and radius of everybody, now and at each step [m], (N_MOMENTS, MAX_PEOPLE, 3)."""
+    person: Vec
+    """One person: x, y [m], vx, vy [m/s], r [m], growth [m/s], shape (6,)."""
+    fit: Fit
+    """Finds the functions behind what is remembered of walkers."""
+    found: Vec
+    """Those found last, of radius and speed, (n_envs, MAX_PEOPLE, 2, N_CONSTANTS)."""
+    since: Vec
+    """Time since then [s], shape (n_envs,)."""
+
+
+def new_foretold(n_envs: int) -> Foretold:
+    """Return work space for so many environments."""
+    return Foretold(
+        places=np.zeros((N_MOMENTS, MAX_PEOPLE, 3)),
+        person=np.zeros(N_SEEN),
+        fit=new_fit(),
+        found=np.zeros((n_envs, MAX_PEOPLE, 2, N_CONSTANTS)),
+        since=np.zeros(n_envs),
+    )
+
+
+@kernel()
+def foretell(
+    world: ReachWorld, state: ReachState, e: int, work: Work, foretold: Foretold
+) -> int:
+    """Fill ``foretold.places`` with the people of environment ``e``; return how many they are.
+
+    Args:
+        world: Shared data.
+        state: Rows.
+        e: Environment.
+        work: Work space.
+        foretold: Filled.
+    """
+    place_people(world.people, state.people, e, work.crowd)
+    foresee(state.people, e, EVERYBODY, -1, work.crowd, work.ways)
+    places, person, ahead = foretold.places, foretold.person, work.ways.ahead
+    since = foretold.since[e]
+    foretold.since[e] = 0.0
+    n, n_workers = int(work.ways.number[0]), state.people.q.shape[1]
+    for p in range(n):
+        show_person(state.people, e, p, work.crowd, person)
+        places[0, p, 0], places[0, p, 1], places[0, p, 2] = person[0], person[1], person[4]
+        for i in range(N_TIMES):
+            for m in range(3):
+                places[i + 1, p, m] = ahead[i, p, m]
+        for i in range(N_TIMES + 1, N_MOMENTS):
+            for m in range(2):
+                places[i, p, m] = 2.0 * places[i - 1, p, m] - places[i - 2, p, m]
+            places[i, p, 2] = places[i - 1, p, 2]
+        if p >= n_workers:
+            row = state.people.walkers.rows[e, p - n_workers]
+            rule = world.people.walkers.rows[p - n_workers]
+            _tell_radius(row, rule, since, p, foretold.found[e, p, 0], foretold)
+            _tell_way(row, rule, since, world.arm.dt, p, foretold.found[e, p, 1], foretold)
+    return n
+
+
+@kernel()
+def _tell_radius(
+    row: Vec, rule: Vec, since: float, p: int, found: Vec, foretold: Foretold
+) -> None:
+    """Put the function behind a walker's radius in place of its forecast, if it is found."""
+    limits = Limits(rule[R_MIN], rule[R_MAX], rule[F_RADIUS_MAX])
+    past = row[PAST_RADIUS : PAST_RADIUS + N_PAST]
+    r = foretold.person[4]
+    if not find_function(foretold.fit, r, row[AGE], past, limits, False, since, found):
+        return
+    middle = 0.5 * (limits.low + limits.high)
+    for i in range(1, N_MOMENTS):
+        value = value_at(found, middle, STEP_S * i)
+        foretold.places[i, p, 2] = min(limits.high, max(limits.low, value))
+
+
+@kernel()
+def _tell_way(
+    row: Vec, rule: Vec, since: float, dt: float, p: int, found: Vec, foretold: Foretold
+) -> None:
+    """Put the function behind a walker's speed in place of its forecast, if it is found."""
+    limits = Limits(rule[V_MIN], rule[V_MAX], rule[F_SPEED_MAX])
+    past = row[PAST_SPEED : PAST_SPEED + N_PAST]
+    person, places = foretold.person, foretold.places
+    speed = math.hypot(person[2], person[3])
+    if speed == 0.0:
+        return
+    if not find_function(foretold.fit, speed, row[AGE], past, limits, True, since, found):
+        return
+    middle, x, y, t = 0.5 * (limits.low + limits.high), person[0], person[1], 0.0
+    for i in range(1, N_MOMENTS):
+        while t < STEP_S * i - 0.5 * dt:
+            v = value_at(found, middle, t)
+            v = 0.0 if v < limits.low else min(limits.high, v)
+            x += dt * v * person[2] / speed
+            y += dt * v * person[3] / speed
+            t += dt
+        places[i, p, 0], places[i, p, 1] = x, y

@@ -1,0 +1,438 @@
+"""Looking ahead: what comes of a policy's action, played with the policy itself, compiled.
+
+A network knows to some centimetres whether its way is free; played forward the same way is
+known to millimetres. So a decision is played ahead: the robot exactly as it moves, people as
+``foretold.py`` says, the policy asked again every ``STEP_S``. Where that ends in a contact,
+other ways are played too: first to a posture for a while, or stopping, then the policy; or
+straight to the goal. The best of them is begun, for one period; the next decision looks anew.
+
+What is foretold promises nothing: people turn. Speed and separation monitoring (``ssm.py``) is
+what keeps them safe.
+
+Source: rollout, or policy improvement on-line: Tesauro and Galperin, *On-line policy
+improvement using Monte-Carlo search* (1996); Bertsekas et al., *Rollout algorithms for
+combinatorial optimization* (1997). Deviates: one forecast instead of samples, and improvement
+only where it is needed.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.sim.kernels import kinematics
+from app.sim.kernels.actions import ActionRule, advance
+from app.sim.kernels.arm import Arm, cell_clearance, place_robot, self_clearance
+from app.sim.kernels.compiled import kernel
+from app.sim.kernels.cylinder import cylinder_clearance
+from app.sim.kernels.episode import COLLISION, RUNNING, SUCCESS, SUCCESS_DISTANCE, distance_to
+from app.sim.kernels.features import HORIZONS
+from app.sim.kernels.forecast import N_TIMES, STEP_S, layer
+from app.sim.kernels.foretold import Foretold, foretell, new_foretold
+from app.sim.kernels.geometry import FAR
+from app.sim.kernels.reach import ReachState, ReachWorld, Work
+from app.sim.kernels.reach_features import BASE_START, N_FEATURES, Obs, describe
+from app.sim.kernels.reach_prospect import base_motion
+from app.sim.kernels.reach_ways import N_WAYS, look_aside, put_ways
+from app.sim.ports import Vec
+
+N_PLAYED = 32
+"""Steps of the forecast that are played, at most MOST_PLAYED."""
+GAIN = 5.0
+"""Speed wanted of a joint per way left to a posture [1/s]."""
+PASSED = -1
+"""In place of the number of another way: the action passes as it is."""
+POSTURES = (
+    (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    (0.0, 0.5, -0.5, 0.0, 0.0, 0.0),
+    (0.0, -0.3, 0.7, 0.0, 0.0, 0.0),
+    (0.9, 0.0, 0.0, 0.0, 0.0, 0.0),
+    (-0.9, 0.0, 0.0, 0.0, 0.0, 0.0),
+    (0.0, 0.6, 0.3, 0.0, 0.0, 0.0),
+)
+"""Where other ways lead first, less home [rad]: home, ahead and low, drawn up, to either side,
+ahead and down."""
+NAMES = ("home", "low", "up", "left", "right", "down", "stop")
+"""Their names; the last is to stop where it is."""
+LASTING = (2, 8, 15)
+"""For how many steps they do."""
+N_POSTURES = len(POSTURES) + 1
+"""Postures, and the one at which it stops."""
+STRAIGHT = N_POSTURES
+"""In place of a posture: the tcp straight to the goal, all the time."""
+N_OTHERS = N_POSTURES * len(LASTING) + 1
+"""Other ways: each posture for each time, then the policy; the last one is straight."""
+AT_GOAL, AT_CONTACT, LATER, ROOM, APART, TURNED = 2.0, -2.0, 0.3, 0.3, 0.3, 0.05
+"""What a way is worth: at the goal, less LATER per second; at a contact, more by it; else ROOM
+per metre of the least clearance up to FREE, less APART per metre to the goal; less TURNED per
+second spent on the way to a posture."""
+FREE = 0.5
+"""Clearance beyond which more is worth nothing [m]."""
+RESTS = 2
+"""Decisions that pass unplayed after one whose way keeps far from everybody."""
+BETTER = 0.02
+"""By how much another way must be worth more."""
+
+Floats = NDArray[np.float32]
+
+
+class ActorNetwork(NamedTuple):
+    """A residual actor of two hidden layers."""
+
+    w1: Floats
+    """(n_obs, width)."""
+    b1: Floats
+    """(width,)."""
+    w2: Floats
+    """(width, width)."""
+    b2: Floats
+    """(width,)."""
+    w3: Floats
+    """(width, 6)."""
+    b3: Floats
+    """(6,)."""
+
+
+class Lookahead(NamedTuple):
+    """Network and work space; used by one thread at a time."""
+
+    net: ActorNetwork
+    """The policy."""
+    base_weight: float
+    """Share of the base motion in its action."""
+    foretold: Foretold
+    """Where people will be."""
+    aim: Vec
+    """Postures of the other ways [rad], shape (N_POSTURES, 6)."""
+    q: Vec
+    """Joints [rad], shape (6,)."""
+    qd: Vec
+    """Their speeds [rad/s], shape (6,)."""
+    qdd: Vec
+    """Their accelerations [rad/s^2], shape (6,)."""
+    c: Vec
+    """Second coefficients of a period [rad/s^2], shape (6,)."""
+    d: Vec
+    """Third coefficients of a period [rad/s^3], shape (6,)."""
+    obs: Obs
+    """What the policy sees, shape (n_obs,)."""
+    h1: Floats
+    """First hidden layer, shape (width,)."""
+    h2: Floats
+    """Second hidden layer, shape (width,)."""
+    act: Floats
+    """Action of a step, shape (6,)."""
+    found: Floats
+    """First action of another way, shape (6,)."""
+    calm_m: float
+    """Clearance on the way of the policy above which the next RESTS decisions pass [m]."""
+    rests: NDArray[np.int64]
+    """How many do yet, shape (n_envs,)."""
+    begun: Floats
+    """That of the best one, shape (6,)."""
+
+
+def new_lookahead(
+    arm: Arm, net: ActorNetwork, base_weight: float, n_envs: int, calm_m: float
+) -> Lookahead:
+    """Return work space for a network and so many environments."""
+    aim = np.zeros((N_POSTURES, 6))
+    aim[:-1] = np.clip(arm.home + np.array(POSTURES), arm.q_min, arm.q_max)
+    width = len(net.b1)
+
+    def room(n: int) -> Floats:
+        return np.zeros(n, dtype=np.float32)
+
+    return Lookahead(
+        net=net,
+        base_weight=base_weight,
+        foretold=new_foretold(n_envs),
+        aim=aim,
+        q=np.zeros(6),
+        qd=np.zeros(6),
+        qdd=np.zeros(6),
+        c=np.zeros(6),
+        d=np.zeros(6),
+        obs=room(N_FEATURES + N_WAYS),
+        h1=room(width),
+        h2=room(width),
+        act=room(6),
+        found=room(6),
+        calm_m=calm_m,
+        rests=np.zeros(n_envs, dtype=np.int64),
+        begun=room(6),
+    )
+
+
+@kernel()
+def _ask(look: Lookahead) -> None:
+    """Write the policy's action for ``look.obs`` into ``look.act``."""
+    net = look.net
+    layer(look.obs, net.w1, net.b1, True, look.h1)
+    layer(look.h1, net.w2, net.b2, True, look.h2)
+    layer(look.h2, net.w3, net.b3, False, look.act)
+    for j in range(6):
+        base = min(1.0, max(-1.0, look.obs[BASE_START + j]))
+        look.act[j] = math.tanh(look.act[j] + math.atanh(look.base_weight * base))
+
+
+@kernel()
+def _see(world: ReachWorld, step: int, n: int, work: Work, look: Lookahead) -> float:
+    """Fill what is seen of the people at a step; return how near the placed robot is [m]."""
+    robot, sight, ways, top = work.robot, work.sight, work.ways, world.people.top_z
+    places, nearest, who = look.foretold.places, FAR, 0
+    for i in range(3):
+        sight.ahead[i] = FAR
+    for p in range(n):
+        x, y, r = places[step, p, 0], places[step, p, 1], places[step, p, 2]
+        d, _ = cylinder_clearance(robot.columns, 0, x, y, r, top)
+        if d < nearest:
+            nearest, who = d, p
+        vx = (places[step + 1, p, 0] - x) / STEP_S
+        vy = (places[step + 1, p, 1] - y) / STEP_S
+        for i in range(3):
+            there_x, there_y = x + HORIZONS[i] * vx, y + HORIZONS[i] * vy
+            d, _ = cylinder_clearance(robot.columns, 0, there_x, there_y, r, top)
+            sight.ahead[i] = min(sight.ahead[i], d)
+        for i in range(N_TIMES):
+            for m in range(3):
+                ways.ahead[i, p, m] = places[step + 1 + i, p, m]
+    for m in range(2):
+        sight.seen[m] = places[step, who, m]
+        sight.seen[2 + m] = (places[step + 1, who, m] - places[step, who, m]) / STEP_S
+    sight.seen[4] = places[step, who, 2]
+    sight.seen[5] = (places[step + 1, who, 2] - places[step, who, 2]) / STEP_S
+    ways.number[0], ways.number[1] = n, who
+    return nearest
+
+
+@kernel()
+def _ask_at(
+    world: ReachWorld,
+    goal: Vec,
+    time_left: float,
+    step: int,
+    n: int,
+    work: Work,
+    look: Lookahead,
+) -> None:
+    """Write the policy's action at a step into ``look.act``; the robot is placed."""
+    arm, top, robot, sight = world.arm, world.people.top_z, work.robot, work.sight
+    near = _see(world, step, n, work, look)
+    look_aside(arm, top, look.q, look.qd, work.ways)
+    describe(arm, top, look.q, look.qd, goal, near, time_left, robot, sight, look.obs)
+    put_ways(
+        arm, top, look.q, look.qd, sight.seen, goal, robot, sight.prospect, work.ways,
+        N_FEATURES, look.obs,
+    )  # fmt: skip
+    _ask(look)
+
+
+@kernel()
+def _clear(
+    world: ReachWorld, step: int, share: float, n: int, work: Work, look: Lookahead
+) -> float:
+    """Return the distance of the placed robot and everybody between two steps [m]."""
+    least, places = FAR, look.foretold.places
+    for p in range(n):
+        a, b = places[step, p], places[step + 1, p]
+        x, y = a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])
+        r = a[2] + share * (b[2] - a[2])
+        d, _ = cylinder_clearance(work.robot.columns, 0, x, y, r, world.people.top_z)
+        least = min(least, d)
+    return least
+
+
+@kernel()
+def _toward(arm: Arm, posture: int, look: Lookahead) -> None:
+    """Write the action that leads to a posture, or stops, into ``look.act``."""
+    for j in range(6):
+        wanted = 0.0
+        if posture < N_POSTURES - 1:
+            wanted = GAIN * (look.aim[posture, j] - look.q[j]) / arm.qd_max[j]
+        look.act[j] = max(-1.0, min(1.0, wanted))
+
+
+@kernel()
+def _straight(world: ReachWorld, goal: Vec, work: Work, look: Lookahead) -> None:
+    """Write the action that leads the tcp straight to the goal; the robot is placed."""
+    robot, prospect = work.robot, work.sight.prospect
+    kinematics.tcp_jacobian(robot.rot, robot.pos, robot.tcp, robot.jacobian)
+    base_motion(world.arm, robot, goal, prospect)
+    for j in range(6):
+        look.act[j] = max(-1.0, min(1.0, prospect.base[j]))
+
+
+@kernel()
+def _choose(
+    world: ReachWorld,
+    goal: Vec,
+    time_left: float,
+    step: int,
+    act: Floats,
+    posture: int,
+    lasting: int,
+    n: int,
+    work: Work,
+    look: Lookahead,
+) -> None:
+    """Write the action of a step into ``look.act``; arguments as :func:`_play`."""
+    if posture == PASSED and step == 0:
+        for j in range(6):
+            look.act[j] = act[j]
+    elif posture == PASSED or step >= lasting:
+        _ask_at(world, goal, time_left, step, n, work, look)
+    elif posture == STRAIGHT:
+        _straight(world, goal, work, look)
+    else:
+        _toward(world.arm, posture, look)
+
+
+@kernel()
+def _touches(arm: Arm, clear: float, work: Work) -> bool:
+    """Tell whether the placed robot touches somebody, the cell or itself."""
+    return bool(
+        clear <= 0.0
+        or cell_clearance(arm, work.robot.columns)[0] <= 0.0
+        or self_clearance(arm, work.robot)[0] <= 0.0
+    )
+
+
+@kernel()
+def _play(
+    world: ReachWorld,
+    rule: ActionRule,
+    state: ReachState,
+    e: int,
+    act: Floats,
+    posture: int,
+    lasting: int,
+    n: int,
+    work: Work,
+    look: Lookahead,
+) -> tuple[int, float, float]:
+    """Play one way: first to a posture, or ``act``, then the policy.
+
+    Args:
+        world: Shared data.
+        rule: How actions are read.
+        state: Rows.
+        e: Environment.
+        act: Action of the first step, where ``posture`` is PASSED; else filled with it.
+        posture: Where it leads first, STRAIGHT, or PASSED.
+        lasting: For how many steps.
+        n: People.
+        work: Work space.
+        look: Network and work space; people are foretold.
+
+    Returns:
+        How it ends (RUNNING, SUCCESS or COLLISION), what it is worth, and how near people come
+        on it [m], at most FREE.
+    """
+    arm, goal, least = world.arm, state.goal[e], FREE
+    periods = max(1, int(STEP_S / arm.dt + 0.5))
+    turned = TURNED * STEP_S * lasting if 0 <= posture < N_POSTURES else 0.0
+    for j in range(6):
+        look.q[j], look.qd[j], look.qdd[j] = state.q[e, j], state.qd[e, j], state.qdd[e, j]
+    place_robot(arm, look.q, work.robot)
+    for step in range(N_PLAYED):
+        left = state.time_left[e] - step * STEP_S
+        _choose(world, goal, left, step, act, posture, lasting, n, work, look)
+        if step == 0:
+            for j in range(6):
+                act[j] = look.act[j]
+        for i in range(periods):
+            advance(
+                rule, look.q, look.qd, look.qdd, look.act,
+                arm.q_min, arm.q_max, arm.qd_max, arm.qdd_max, arm.jerk_max, arm.dt,
+                look.c, look.d, look.q, look.qd, look.qdd,
+            )  # fmt: skip
+            place_robot(arm, look.q, work.robot)
+            share = (i + 1) / periods
+            t, clear = (step + share) * STEP_S, _clear(world, step, share, n, work, look)
+            least = min(least, clear)
+            if _touches(arm, clear, work):
+                return COLLISION, AT_CONTACT + LATER * t - turned, least
+            if distance_to(goal, work.robot) < SUCCESS_DISTANCE:
+                return SUCCESS, AT_GOAL - LATER * t - turned, least
+    worth = ROOM * least - APART * distance_to(goal, work.robot) - turned
+    return RUNNING, worth, least
+
+
+@kernel()
+def look_ahead(
+    world: ReachWorld,
+    rule: ActionRule,
+    state: ReachState,
+    e: int,
+    act: Floats,
+    work: Work,
+    look: Lookahead,
+) -> int:
+    """Keep an action, or replace it by the first one of a better way.
+
+    Args:
+        world: Shared data.
+        rule: How actions are read.
+        state: Rows.
+        e: Environment.
+        act: The policy's action, shape (6,); replaced where another way is better.
+        work: Work space.
+        look: Network and work space.
+
+    Returns:
+        Number of the way begun instead, or PASSED.
+    """
+    look.foretold.since[e] += world.arm.dt
+    if look.rests[e] > 0 and state.elapsed[e] > 0.0:
+        look.rests[e] -= 1
+        return PASSED
+    n = foretell(world, state, e, work, look.foretold)
+    if n == 0:
+        return PASSED
+    ended, best, least = _play(world, rule, state, e, act, PASSED, 0, n, work, look)
+    look.rests[e] = RESTS if least > look.calm_m else 0
+    if ended != COLLISION:
+        return PASSED
+    chosen = PASSED
+    for k in range(N_OTHERS):
+        posture, lasting = k // len(LASTING), LASTING[k % len(LASTING)]
+        if posture == STRAIGHT:
+            lasting = N_PLAYED
+        _, worth, _ = _play(world, rule, state, e, look.found, posture, lasting, n, work, look)
+        if worth > best + BETTER:
+            best, chosen = worth, k
+            for j in range(6):
+                look.begun[j] = look.found[j]
+    if chosen != PASSED:
+        for j in range(6):
+            act[j] = look.begun[j]
+    return chosen
+
+
+@kernel(nogil=True)
+def look_ahead_batch(
+    world: ReachWorld,
+    rule: ActionRule,
+    state: ReachState,
+    act: Floats,
+    work: Work,
+    look: Lookahead,
+    chosen: NDArray[np.int64],
+) -> None:
+    """Look ahead in every environment whose episode goes on.
+
+    Args:
+        world: Shared data.
+        rule: How actions are read.
+        state: Rows.
+        act: Actions, shape (n_envs, 6); replaced where another way is better.
+        work: Work space.
+        look: Network and work space.
+        chosen: Filled with the number of the way begun instead, or PASSED, shape (n_envs,).
+    """
+    for e in range(state.q.shape[0]):
+        chosen[e] = PASSED
+        if state.outcome[e] == RUNNING:
+            chosen[e] = look_ahead(world, rule, state, e, act[e], work, look)

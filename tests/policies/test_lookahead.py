@@ -1,0 +1,112 @@
+"""Looking ahead: what is played is what happens, and contacts become fewer."""
+
+import numpy as np
+import pytest
+
+from app.errors import InvalidInput
+from app.policies import pretrained
+from app.policies.evaluation.reach_episodes import play, target_goals
+from app.policies.lookahead import OTHERS, PASSED, Lookahead, looks_ahead
+from app.policies.movers import hows_of, mover_of
+from app.policies.networks import BASE_WEIGHT
+from app.policies.reach_policy import ReachPolicy
+from app.sim.cells import load_cell
+from app.sim.forecasts import new_forecaster
+from app.sim.kernels import lookahead as kernel
+from app.sim.kernels.episode import COLLISION, RUNNING, SUCCESS
+from app.sim.kernels.reach import new_work
+from app.sim.reach import ReachBatch, ReachSettings
+from tests.policies.test_movers import RandomActor
+
+CELL = load_cell("shared-workspace")
+POLICY = ReachPolicy(pretrained.load("reach"))
+
+
+def batch_of(n_envs: int, *people: str, seed: int = 3) -> ReachBatch:
+    settings = ReachSettings(people=people, observation="forecast", start="clearance")
+    batch = ReachBatch(CELL, n_envs, seed, settings)
+    batch.reset()
+    return batch
+
+
+def walked(batch: ReachBatch, periods: int) -> ReachBatch:
+    """Let the policy move on, so that robots are on their way."""
+    mover = mover_of(POLICY, "direct")
+    for _ in range(periods):
+        batch.step(mover.acts(batch), auto_reset=False)
+    return batch
+
+
+def test_the_kernel_asks_the_same_network() -> None:
+    """Beside constant people the first step of another way ends where the policy is asked."""
+    batch = walked(batch_of(20, "constant"), 10)
+    obs = batch.observe()
+    network = POLICY.kernel_network
+    assert network is not None
+    look = kernel.new_lookahead(batch.arm, network, BASE_WEIGHT, 20, np.inf)
+    for row in np.flatnonzero(batch.state.outcome == RUNNING):
+        look.obs[:] = obs[row]
+        kernel._ask(look)
+        np.testing.assert_allclose(look.act, POLICY.acts(obs[row][None])[0], atol=2e-5)
+
+
+def test_what_is_played_is_what_happens_beside_constant_people() -> None:
+    """Straight ahead without turns: outcomes within the horizon are told before."""
+    batch = walked(batch_of(150, "constant"), 15)
+    live = np.flatnonzero(batch.state.outcome == RUNNING)
+    network = POLICY.kernel_network
+    assert network is not None
+    look = kernel.new_lookahead(batch.arm, network, BASE_WEIGHT, 150, np.inf)
+    work = new_work(batch.world, batch.state, new_forecaster())
+    rule, told = batch.settings.action.rule(), {}
+    acts = mover_of(POLICY, "direct").acts(batch)
+    for row in live:
+        n = kernel.foretell(batch.world, batch.state, row, work, look.foretold)
+        told[row] = kernel._play(
+            batch.world, rule, batch.state, row, acts[row], PASSED, 0, n, work, look
+        )[0]
+    walked(batch, round(kernel.N_PLAYED * kernel.STEP_S / batch.arm.dt))
+    found = batch.state.outcome[live]
+    same = [told[row] == end for row, end in zip(live, found, strict=True)]
+    assert (found == SUCCESS).sum() > 30
+    assert np.mean(same) > 0.85
+
+
+def test_fewer_contacts_than_alone() -> None:
+    goals = target_goals(POLICY.targets, 270)
+    settings = batch_of(1).settings
+    ends = [play(CELL, settings, mover_of(POLICY, how), goals, 5).outcome for how in (
+        "direct", "direct-ahead")]  # fmt: skip
+    alone, ahead = ((end == COLLISION).sum() for end in ends)
+    assert ahead < alone
+    assert (ends[1] == SUCCESS).mean() >= (ends[0] == SUCCESS).mean()
+
+
+def test_nobody_to_look_out_for() -> None:
+    batch = walked(batch_of(4), 3)
+    acts = mover_of(POLICY, "direct").acts(batch)
+    kept = acts.copy()
+    assert (Lookahead(POLICY).improve(batch, acts) == PASSED).all()
+    np.testing.assert_array_equal(acts, kept)
+
+
+@pytest.mark.parametrize("people", [("walker", "walker"), ("worker", "walker")])
+def test_with_several_people_actions_stay_actions(people: tuple[str, ...]) -> None:
+    batch = walked(batch_of(40, *people), 10)
+    acts = mover_of(POLICY, "direct").acts(batch)
+    chosen = Lookahead(POLICY).improve(batch, acts)
+    assert np.abs(acts).max() <= 1.0
+    assert ((chosen >= PASSED) & (chosen < len(OTHERS))).all()
+
+
+def test_the_names_of_the_other_ways() -> None:
+    assert len(OTHERS) == len(set(OTHERS)) == kernel.N_OTHERS
+    assert OTHERS[-1] == "straight" and OTHERS[0] == "home-0.08s"
+
+
+def test_other_policies_cannot() -> None:
+    actor = RandomActor()
+    assert looks_ahead(POLICY) and not looks_ahead(actor)
+    assert "direct-ahead" in hows_of(POLICY) and "direct-ahead" not in hows_of(actor)
+    with pytest.raises(InvalidInput, match="look ahead"):
+        mover_of(actor, "direct-ahead")
