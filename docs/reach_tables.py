@@ -26,6 +26,13 @@ COLUMNS: Mapping[str, Mapping[str, str]] = {
         "begun_in_contact": "begin in contact",
         "worst": "worst target",
     },
+    "reach-seeds": {
+        **RATES,
+        **TIMES,
+        "cpu_min": "training [CPU min]",
+        "updates": "updates",
+        "to_source_min": "above 91.76 % after [CPU min]",
+    },
     "reach-random": {**RATES, **TIMES, "against_targets": "against the targets"},
     "reach-constant": {**RATES, **TIMES},
     "reach-speeds": {**RATES, **TIMES},

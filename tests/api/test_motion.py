@@ -181,14 +181,23 @@ def test_somebody_inside_the_robot_is_a_stop_with_monitoring_and_a_problem_witho
 
 def test_several_people_of_any_kind_are_taken(client: TestClient) -> None:
     people = [FAR, STANDING, WALKER, {**FAR, "x": 0.9}]
-    nearest = asked(client, people=people)
+    nearest = asked(client, people=people, ahead=False)
     assert sum(one["seen"] for one in nearest["people"]) == 1
-    averaged = asked(client, people=people, beside="averaged")
+    averaged = asked(client, people=people, beside="averaged", ahead=False)
     weights = [one["weight"] for one in averaged["people"]]
     assert sum(weights) == pytest.approx(1.0) and min(weights) > 0.0
     seen = [one["seen"] for one in averaged["people"]].index(True)
     assert weights[seen] == max(weights)
     assert averaged["act"] != nearest["act"]
+
+
+def test_a_decision_is_played_ahead_unless_told_not_to(client: TestClient) -> None:
+    there = asked(client)
+    assert there["ahead"] is True
+    alone = asked(client, ahead=False)
+    assert alone["ahead"] is False and alone["began"] is None
+    if there["began"] is None:
+        assert there["act"] == pytest.approx(alone["act"], abs=1e-6)
 
 
 def test_goals_outside_are_refused_by_interpolation_with_axis_and_distance(

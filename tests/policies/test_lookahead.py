@@ -74,7 +74,7 @@ def test_what_is_played_is_what_happens_beside_constant_people() -> None:
 
 def test_fewer_contacts_than_alone() -> None:
     goals = target_goals(POLICY.targets, 270)
-    settings = batch_of(1).settings
+    settings = batch_of(1, "walker").settings
     ends = [play(CELL, settings, mover_of(POLICY, how), goals, 5).outcome for how in (
         "direct", "direct-ahead")]  # fmt: skip
     alone, ahead = ((end == COLLISION).sum() for end in ends)

@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from app.errors import CheckpointMismatch, GoalOutside, InvalidInput
+from app.policies import pretrained
 from app.policies.motion_decision import MotionDecider
 from app.policies.movers import mover_of
+from app.policies.reach_policy import ReachPolicy
 from app.sim import human
 from app.sim.actions import ActionSettings
 from app.sim.cells import load_cell
@@ -250,6 +252,25 @@ def test_what_cannot_be_answered_is_refused_by_name(
 def test_a_policy_of_a_box_cannot_be_asked_to_interpolate() -> None:
     with pytest.raises(InvalidInput, match="training targets"):
         decider("box").decide(question(way="interpolated"))
+
+
+def test_a_policy_that_cannot_look_ahead_says_so() -> None:
+    with pytest.raises(InvalidInput, match="sees forecasts") as refused:
+        decider().decide(question(ahead=True))
+    assert refused.value.field == "ahead"
+    assert decider().decide(question()).ahead is False
+
+
+def test_looking_ahead_answers_whatever_is_told() -> None:
+    rng = np.random.default_rng(6)
+    one = MotionDecider(ReachPolicy(pretrained.load("reach")), CELL)
+    began = 0
+    for _ in range(100):
+        asked = random_question(rng)
+        decision = one.decide(asked)
+        assert decision.ahead and keeps_limits(decision, asked)
+        began += decision.began is not None
+    assert 0 < began < 100
 
 
 def test_a_policy_of_another_cell_is_refused() -> None:

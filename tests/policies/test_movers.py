@@ -5,7 +5,7 @@ import pytest
 
 from app.errors import CheckpointMismatch, GoalOutside, InvalidInput
 from app.policies.interpolation import Interpolation
-from app.policies.movers import HOWS, NEAREST_M, mover_of, person_weights
+from app.policies.movers import HOWS, NEAREST_M, hows_of, mover_of, person_weights
 from app.sim.cells import load_cell
 from app.sim.goal_sets import halton_targets
 from app.sim.reach import ReachBatch, ReachSettings
@@ -91,7 +91,12 @@ def test_a_policy_without_targets_cannot_interpolate() -> None:
         mover_of(RandomActor("box"), "sideways")
 
 
-@pytest.mark.parametrize("how", HOWS)
+def test_only_policies_that_can_look_ahead_do() -> None:
+    assert hows_of(RandomActor()) == tuple(how for how in HOWS if not how.endswith("ahead"))
+    assert hows_of(RandomActor("box")) == ("direct", "averaged")
+
+
+@pytest.mark.parametrize("how", hows_of(RandomActor()))
 def test_ended_cells_get_no_action_and_the_others_the_same(how: str) -> None:
     batch, mover = batch_of(("walker", "constant")), mover_of(RandomActor(), how)
     before = mover.acts(batch)

@@ -22,7 +22,7 @@ def policy() -> ReachPolicy:
 
 def test_policy_without_targets_cannot_be_interpolated() -> None:
     pilot = ReachPilot(ReachPolicy(untrained_reach(width=32, goals="box")))
-    assert pilot.ways == ("direct", "averaged")
+    assert pilot.ways == ("direct", "averaged", "direct-ahead", "averaged-ahead")
 
 
 def test_live_state_is_seen_as_the_batch_sees_it(policy: ReachPolicy) -> None:
@@ -54,7 +54,7 @@ def test_policy_moves_the_robot_of_a_live_cell_with_any_number_of_people(
     world = ReachWorld(CELL, None, seed=1)
     world.apply(SetPilot(pilot=pilot))
     shown = world.snapshot()
-    assert (shown.checkpoint, shown.reach.way) == (pilot.checkpoint, "interpolated")
+    assert (shown.checkpoint, shown.reach.way) == (pilot.checkpoint, "interpolated-ahead")
     assert shown.reach.ways == pilot.ways
     world.apply(commands.AddPerson())
     world.apply(SetWay(way="averaged-interpolated"))

@@ -25,9 +25,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.policies.checkpoint import Checkpoint
-from app.policies.evaluation.reach_bench import ReachBench, walker_of
+from app.policies.evaluation.reach_bench import ReachBench, direct_ways, ending, walker_of
 from app.policies.evaluation.rows import OnRow, untold
 from app.policies.movers import Mover, mover_of
+from app.policies.reach_policy import ReachPolicy
 from app.sim.cylinder_tracker import CylinderTracker, CylinderTrackerSettings
 from app.sim.kernels.occupancy import AGE, GROWTH, N_PAST, PAST_S, VX, VY, R, X, Y
 from app.sim.ports import Vec
@@ -62,6 +63,8 @@ ROWS = {
     "100ms-not-predicted": TrackedRow(tracker=_late(0.1), predicted=False),
 }
 """The rows beside ``exact``."""
+LOOKED_AHEAD = ("30hz", "100ms-noise")
+"""Those that are also played looking ahead, where the policy can."""
 
 
 class ThroughTracker:
@@ -156,14 +159,17 @@ def run_tracker(
     Raises:
         InvalidInput: Nobody walks about in the checkpoint's cell.
     """
-    bench = ReachBench(checkpoint, seed, 1 + len(ROWS), on_row)
+    ways = direct_ways(ReachPolicy(checkpoint))
+    rows = [(how, name) for how in ways for name in (LOOKED_AHEAD if ending(how) else ROWS)]
+    bench = ReachBench(checkpoint, seed, 1 + len(rows), on_row)
     walker_of(bench.cell)
     goals = bench.target_goals(episodes or DEFAULT_EPISODES)
     bench.add(bench.play(bench.usual, goals).row("exact"), bench.usual, "grid")
-    for name, tracked in ROWS.items():
-        mover = ThroughTracker(mover_of(bench.actor, "direct"), tracked, seed)
-        row = bench.play(bench.usual, goals, mover=mover).row(name)
+    for how, name in rows:
+        tracked = ROWS[name]
+        mover = ThroughTracker(mover_of(bench.actor, how), tracked, seed)
+        row = bench.play(bench.usual, goals, mover=mover).row(name + ending(how))
         median, p95 = np.percentile(1e3 * np.concatenate(mover.errors), [50, 95]).tolist()
         row |= {"axis_error_median_mm": median, "axis_error_p95_mm": p95}
-        bench.add(row, bench.usual, "grid", tracker=asdict(tracked))
+        bench.add(row, bench.usual, "grid", how, tracker=asdict(tracked))
     return bench.result()
