@@ -45,9 +45,13 @@ WAYS = {
     "direct": ("asked directly", BLUE, "o"),
     "interpolated": ("interpolated", ORANGE, "s"),
     "averaged": ("averaged over people", ORANGE, "s"),
-    "set": ("a network over the set", GREEN, "D"),
+    "set": ("a network over the set", PURPLE, "^"),
+    "direct-ahead": ("asked directly, ahead", GREEN, "D"),
+    "interpolated-ahead": ("interpolated, ahead", PURPLE, "^"),
 }
 """Words, colour and mark of each way of asking a policy."""
+PEOPLE = {"direct": "the nearest is seen", "direct-ahead": "... and it looks ahead"}
+"""Words of two of them where there are several people."""
 TRACKERS = {
     "exact": "exact state",
     "30hz": "30 Hz",
@@ -55,6 +59,8 @@ TRACKERS = {
     "100ms-noise": "... and 20 mm of noise",
     "200ms-noise": "200 ms late, 20 mm",
     "100ms-not-predicted": "100 ms late, not predicted",
+    "30hz-ahead": "30 Hz, looking ahead",
+    "100ms-noise-ahead": "100 ms late, 20 mm, ahead",
 }
 """Rows of ``reach-tracker`` in words."""
 PRESET_COLOURS = {"td3": BLUE, "thesis": ORANGE, "stock": GREY}
@@ -159,6 +165,7 @@ def start_rules(result: Json) -> Figure:
     left, right = axes[0]
     rows = result["results"][::-1]
     names = {"clearance": "0.05 m away", "uniform": "anywhere", "authors": "authors' code"}
+    names |= {f"{name}-ahead": f"{words}, ahead" for name, words in names.items()}
     for k, row in enumerate(rows):
         start = 0.0
         for kind, colour in (("collision", RED), ("timeout", GREY)):
@@ -275,10 +282,10 @@ def _people(axis: Axes, result: Json) -> None:
         own = [
             (len(asked[name]["people"]), row["success"])
             for name, row in rows.items()
-            if asked[name]["asked"] == how or len(asked[name]["people"]) < 2
+            if asked[name]["asked"] == how or _for_all(asked[name], how)
         ]
         words, colour, mark = WAYS[how]
-        words = "the nearest is seen" if how == "direct" else words
+        words = PEOPLE.get(how, words)
         axis.errorbar(
             [n + 0.06 * (k - 0.5 * (len(ways) - 1)) for n, _ in own],
             [rate["mean"] for _, rate in own],
@@ -295,18 +302,28 @@ def _people(axis: Axes, result: Json) -> None:
     axis.legend(loc="lower left")
 
 
+def _for_all(row: Json, how: str) -> bool:
+    """Tell whether a row stands for a way that differs only beside more people."""
+    n = len(row["people"])
+    return n == 0 or (n == 1 and row["asked"] == "direct" and not how.endswith("-ahead"))
+
+
 def _speeds(axis: Axes, result: Json) -> None:
-    speeds = [one["speed_m_s"] for one in result["settings"]["rows"].values()]
-    rows = result["results"]
-    for k, row in enumerate(rows):
+    asked, rows = result["settings"]["rows"], result["results"]
+    speeds = list(dict.fromkeys(one["speed_m_s"] for one in asked.values()))
+    ahead = [row["name"].endswith("-ahead") for row in rows]
+    shift, width = (0.2, 0.36) if any(ahead) else (0.0, 0.6)
+    for row, looks in zip(rows, ahead, strict=True):
+        x = speeds.index(asked[row["name"]]["speed_m_s"]) + (shift if looks else -shift)
         collision, timeout = row["collision"]["mean"], row["timeout"]["mean"]
-        axis.bar(k, collision, color=RED, width=0.6)
-        axis.bar(k, timeout, bottom=collision, color=GREY, width=0.6)
-        text = f"{100.0 * row['success']['mean']:.1f} %"
-        axis.text(k, collision + timeout, text, ha="center", va="bottom")
+        axis.bar(x, collision, color=RED, width=width)
+        axis.bar(x, timeout, bottom=collision, color=GREY, width=width)
+        text = f"{100.0 * row['success']['mean']:.1f}"
+        axis.text(x, collision + timeout, text, ha="center", va="bottom", fontsize="small")
     most = max(1.0 - row["success"]["mean"] for row in rows)
-    axis.set_xticks(range(len(rows)), [f"{speed:g}" for speed in speeds])
-    axis.set(title="Their speed", xlabel="[m/s]", ylim=(0.0, 1.2 * max(most, 1e-3)))
+    axis.set_xticks(range(len(speeds)), [f"{speed:g}" for speed in speeds])
+    words = "[m/s]; right: looking ahead" if any(ahead) else "[m/s]"
+    axis.set(title="Their speed", xlabel=words, ylim=(0.0, 1.2 * max(most, 1e-3)))
     axis.grid(False, axis="x")
     axis.tick_params(axis="x", length=0)
     percent(axis.yaxis)

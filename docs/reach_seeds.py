@@ -62,6 +62,7 @@ def main() -> None:
     result = {
         "protocol": "reach-seeds",
         "command": "python docs/reach_seeds.py RUN ...",
+        "policy": "reach-td3",
         "checkpoints": [name for name, _ in found],
         "seed": options.seed,
         "episodes": options.episodes,

@@ -83,7 +83,7 @@ def test_policy_is_named_and_asked_in_its_ways(client: TestClient) -> None:
     )
     assert send(client, tag="set-policy", checkpoint=made.sha256).status_code == 202
     acting = until(client, lambda one: one["checkpoint"] == made.sha256)
-    assert acting["reach"]["way"] == "interpolated"
+    assert acting["reach"]["way"] == "interpolated-ahead"
     assert "averaged" in acting["reach"]["ways"]
     assert send(client, tag="set-way", way="direct").status_code == 202
     until(client, lambda one: one["reach"]["way"] == "direct")
