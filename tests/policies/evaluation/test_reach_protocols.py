@@ -12,7 +12,7 @@ from app.policies.evaluation.protocols import OF_REACHING, evaluate
 from app.policies.evaluation.reach_people import SPEEDS, at_speed
 from app.policies.evaluation.reach_random import RINGS
 from app.policies.evaluation.reach_targets import STARTS
-from app.policies.evaluation.reach_tracker import ROWS
+from app.policies.evaluation.reach_tracker import LOOKED_AHEAD, ROWS
 from app.sim.cells import load_cell
 from tests.policies.untrained import untrained_reach
 
@@ -61,7 +61,8 @@ def test_a_result_is_json_and_states_the_rules_of_each_row(name: str) -> None:
 def test_every_target_is_counted_under_each_rule_of_starting() -> None:
     result, _ = run("reach-targets", 2)
     assert result["episodes"] == 2
-    assert [row["name"] for row in result["results"]] == list(STARTS)
+    names = [row["name"] for row in result["results"]]
+    assert names == [*STARTS, *(f"{start}-ahead" for start in STARTS)]
     for row in result["results"]:
         goals = {tuple(cell["goal"]) for cell in row["targets"]}
         assert len(goals) == 54
@@ -75,7 +76,7 @@ def test_every_target_is_counted_under_each_rule_of_starting() -> None:
         ends = row["ends"]
         for kind in ("success", "collision"):
             assert sum(one[kind] for one in ends) == round(row[kind]["mean"] * 108)
-    first, uniform, authors = result["results"]
+    first, uniform, authors = result["results"][:3]
     assert first["begun_in_contact"]["mean"] == 0.0 and first["starts_redrawn"] > 0.0
     assert uniform["starts_redrawn"] == 0.0
     assert "reached_after_contact" in authors
@@ -85,25 +86,27 @@ def test_every_target_is_counted_under_each_rule_of_starting() -> None:
 def test_random_goals_are_reached_by_every_way_the_policy_allows() -> None:
     on_grid, _ = run("reach-random", goals="grid")
     in_box, _ = run("reach-random", goals="box")
-    assert [row["name"] for row in in_box["results"]] == ["targets", "direct", "direct-25s"]
-    assert [row["name"] for row in on_grid["results"]][3:] == [
-        "interpolated",
-        "interpolated-25s",
-    ]
-    direct = in_box["results"][1]
+    names = [row["name"] for row in in_box["results"]]
+    assert names[:4] == ["targets", "targets-ahead", "direct", "direct-25s"]
+    assert names[4:] == ["direct-ahead", "direct-ahead-25s"]
+    ways = ["direct", "interpolated", "direct-ahead", "interpolated-ahead"]
+    names = [row["name"] for row in on_grid["results"]][2:]
+    assert names == [f"{way}{limit}" for way in ways for limit in ("", "-25s")]
+    direct = in_box["results"][2]
     assert sum(one["n"] for one in direct["between"]) == N
     assert all(
         RINGS[0] <= one["low_m"] < one["high_m"] <= RINGS[-1] for one in direct["between"]
     )
     limits = [rules["time_limit_s"] for rules in on_grid["settings"]["rows"].values()]
-    assert limits == [5.0, 5.0, 25.0, 5.0, 25.0]
+    assert limits == [5.0, 5.0, *(4 * [5.0, 25.0])]
 
 
 def test_zero_to_four_walkers_are_there_and_make_it_harder() -> None:
     result = evaluate("reach-people", pretrained.load("reach"), episodes=24, seed=5)
     people = [len(one["people"]) for one in result["settings"]["rows"].values()]
     assert sorted(set(people)) == [0, 1, 2, 3, 4]
-    nobody, four = result["results"][0], result["results"][-1]
+    rows = {row["name"]: row for row in result["results"]}
+    nobody, four = rows["0-people"], rows["4-people-direct"]
     assert nobody["success"]["mean"] == 1.0
     assert four["collision"]["mean"] > 0.0
 
@@ -122,7 +125,7 @@ def test_people_of_a_given_speed_walk_at_it() -> None:
 def test_a_row_per_tracker_stands_beside_the_exact_state() -> None:
     result, _ = run("reach-tracker")
     names = [row["name"] for row in result["results"]]
-    assert names == ["exact", *ROWS]
+    assert names == ["exact", *ROWS, *(f"{name}-ahead" for name in LOOKED_AHEAD)]
     errors = [row["axis_error_median_mm"] for row in result["results"][1:]]
     assert np.all(np.diff(errors[:4]) > 0.0)
 
