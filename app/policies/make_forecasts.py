@@ -2,10 +2,10 @@
 
 Walkers of the cell ``CELL`` are started as in episodes and looked at at random moments: what a
 row remembers goes in, how radius and way go on comes out. A tenth of them have constant
-speed and radius, a tenth have been watched for a shorter time, and in two fifths what is
+speed and radius, a tenth have been watched for a shorter time, and in a fifth what is
 remembered is noisy, as from a tracker. The squared errors of two small networks are made small.
 
-Takes five minutes on one core. The result is committed as ``forecasts_data/walker.npz``;
+Takes about eight minutes on one core. The result is committed as ``forecasts_data/walker.npz``;
 ``tests/policies/test_make_forecasts.py`` trains for a moment and holds the shipped networks to
 errors on walkers they were not made from.
 """
