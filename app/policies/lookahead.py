@@ -14,24 +14,35 @@ from app.policies.networks import BASE_WEIGHT
 from app.policies.reach_policy import ReachPolicy
 from app.sim.forecasts import new_forecaster
 from app.sim.kernels import lookahead as kernel
-from app.sim.kernels.forecast import STEP_S
+from app.sim.kernels.forecast import STEP_S, Network
 from app.sim.kernels.reach import ReachState, ReachWorld, Work, new_work
 from app.sim.ports import ReachActor
 
 PASSED = kernel.PASSED
 """In place of the number of another way: the action passed as it is."""
+_LETTERS = {1.0: "f", -1.0: "b", 0.0: "h"}
 OTHERS = (
     *(f"{name}-{n * STEP_S:.2g}s" for name in kernel.NAMES for n in kernel.LASTING),
     "straight",
+    *(
+        f"dash-{''.join(_LETTERS[sign] for sign in signs)}-{n * STEP_S:.2g}s"
+        for signs in kernel.SIGNS
+        for n in kernel.DASHING
+    ),
 )
-"""Names of the other ways: where they lead first, and for how long."""
+"""Names of the other ways: where they lead first, and for how long. Of a dash, what pan,
+shoulder and elbow do: forward, back, or held."""
 
 Actions = NDArray[np.float32]
 
 
+def _network_of(actor: ReachActor) -> Network | None:
+    return actor.kernel_network if isinstance(actor, ReachPolicy) else None
+
+
 def looks_ahead(actor: ReachActor) -> bool:
     """Whether a policy can be played ahead: one of ours that sees forecasts."""
-    return isinstance(actor, ReachPolicy) and actor.kernel_network is not None
+    return _network_of(actor) is not None
 
 
 class Cells(Protocol):
@@ -56,7 +67,7 @@ class Lookahead:
     """
 
     def __init__(self, actor: ReachActor, calm_m: float = math.inf) -> None:
-        network = actor.kernel_network if isinstance(actor, ReachPolicy) else None
+        network = _network_of(actor)
         if network is None:
             rule = "must be a residual actor of two layers that sees forecasts, to look ahead"
             raise InvalidInput("checkpoint", actor.checkpoint, rule)

@@ -24,7 +24,7 @@ from app.policies.trained_cell import cell_of
 from app.sim.actions import ActionSettings
 from app.sim.goal_sets import MOST_HALTON, N_HALTON, halton_targets
 from app.sim.kernels import reach_ways
-from app.sim.kernels.lookahead import ActorNetwork
+from app.sim.kernels.forecast import Network
 from app.sim.kernels.reach_features import BASE_START, SIZES, STATE_SIZES
 from app.sim.ports import Vec
 from app.sim.reach import N_ACT, GoalRule, ViewName, goal_region_of
@@ -111,13 +111,13 @@ class ReachPolicy:
         return ranges
 
     @property
-    def kernel_network(self) -> ActorNetwork | None:
+    def kernel_network(self) -> Network | None:
         """The network as kernels play it; None where it is of another kind."""
         if self.view != "forecast" or not self._residual or len(self._layers) != 3:
             return None
         if len(self._layers[0][1]) != len(self._layers[1][1]):
             return None
-        return ActorNetwork(*(array for layer in self._layers for array in layer))
+        return Network(*(array for layer in self._layers for array in layer))
 
     def acts(self, obs: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return actions in [-1, 1], shape (n, 6), of observations, shape (n, n_obs).

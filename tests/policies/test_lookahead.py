@@ -14,6 +14,8 @@ from app.sim.cells import load_cell
 from app.sim.forecasts import new_forecaster
 from app.sim.kernels import lookahead as kernel
 from app.sim.kernels.episode import COLLISION, RUNNING, SUCCESS
+from app.sim.kernels.forecast import STEP_S, Network
+from app.sim.kernels.occupancy import GAIT, STILL, VX, VY, X, Y
 from app.sim.kernels.reach import new_work
 from app.sim.reach import ReachBatch, ReachSettings
 from tests.policies.test_movers import RandomActor
@@ -72,6 +74,57 @@ def test_what_is_played_is_what_happens_beside_constant_people() -> None:
     assert np.mean(same) > 0.85
 
 
+def test_dashes_end_as_played_and_never_beyond_limits() -> None:
+    """The robot is driven by hand as each dash says; nobody is near the cell's corner."""
+    dashes = kernel.N_OTHERS - kernel.N_FIRST
+    batch = batch_of(dashes, "constant")
+    rows = batch.state.people.walkers.rows
+    rows[:, 0, [X, Y]], rows[:, 0, GAIT] = (-2.0, 2.0), STILL
+    rows[:, 0, [VX, VY]] = 0.0
+    network = POLICY.kernel_network
+    assert network is not None
+    look = kernel.new_lookahead(batch.arm, network, BASE_WEIGHT, dashes, np.inf)
+    work = new_work(batch.world, batch.state, new_forecaster())
+    rule, told = batch.settings.action.rule(), np.zeros(dashes, dtype=np.int64)
+    for row in range(dashes):
+        n = kernel.foretell(batch.world, batch.state, row, work, look.foretold)
+        way = kernel._way(kernel.N_FIRST + row)
+        told[row] = kernel._play(
+            batch.world, rule, batch.state, row, look.found, *way, n, work, look
+        )[0]
+    periods = round(STEP_S / batch.arm.dt)
+    for k in range(kernel.N_PLAYED * periods):
+        act = np.zeros((dashes, 6), dtype=np.float32)
+        for row in range(dashes):
+            posture, lasting = kernel._way(kernel.N_FIRST + row)
+            if k < lasting * periods:
+                act[row, :3] = kernel.SIGNS[posture - kernel.DASH]
+        batch.step(act, auto_reset=False)
+    np.testing.assert_array_equal(batch.state.outcome, told)
+    assert 0 < (told == COLLISION).sum() < dashes
+
+
+def test_a_way_into_the_table_is_changed_and_never_rested_on() -> None:
+    """A policy that only lowers the arm, with nobody near: the next decision looks again."""
+    batch = batch_of(1, "constant")
+    batch.state.people.walkers.rows[0, 0, [X, Y]] = -2.0, 2.0
+    n_obs, lowers = POLICY.n_obs, np.zeros(6, dtype=np.float32)
+    lowers[1] = 3.0
+    layers = [np.zeros(shape, dtype=np.float32) for shape in ((n_obs, 4), 4, (4, 4), 4, (4, 6))]
+    look = kernel.new_lookahead(batch.arm, Network(*layers, lowers), 0.0, 1, 0.1)
+    work = new_work(batch.world, batch.state, new_forecaster())
+    rule, act = batch.settings.action.rule(), np.tanh(lowers)
+    for _ in range(100):
+        given = act.copy()
+        way = kernel.look_ahead(batch.world, rule, batch.state, 0, given, work, look)
+        if way != PASSED:
+            break
+        batch.step(given[None], auto_reset=False)
+    assert batch.state.clear[0, 0] > 0.5, "nobody is near"
+    assert way >= 0 and look.rests[0] == 0
+    assert not np.array_equal(given, act)
+
+
 def test_fewer_contacts_than_alone() -> None:
     goals = target_goals(POLICY.targets, 270)
     settings = batch_of(1, "walker").settings
@@ -101,7 +154,8 @@ def test_with_several_people_actions_stay_actions(people: tuple[str, ...]) -> No
 
 def test_the_names_of_the_other_ways() -> None:
     assert len(OTHERS) == len(set(OTHERS)) == kernel.N_OTHERS
-    assert OTHERS[-1] == "straight" and OTHERS[0] == "home-0.08s"
+    assert OTHERS[kernel.STRAIGHT_WAY] == "straight" and OTHERS[0] == "home-0.08s"
+    assert OTHERS[-1] == "dash-bbb-0.6s"
 
 
 def test_other_policies_cannot() -> None:

@@ -39,7 +39,7 @@ class Network(NamedTuple):
     """Two hidden layers of rectified units."""
 
     w1: Floats
-    """(N_IN, width)."""
+    """(n_in, width)."""
     b1: Floats
     """(width,)."""
     w2: Floats
@@ -47,9 +47,9 @@ class Network(NamedTuple):
     b2: Floats
     """(width,)."""
     w3: Floats
-    """(width, N_TIMES)."""
+    """(width, n_out)."""
     b3: Floats
-    """(N_TIMES,)."""
+    """(n_out,)."""
 
 
 class Forecaster(NamedTuple):

@@ -31,9 +31,9 @@ from app.sim.kernels.reach_features import EVERYBODY, N_SEEN, show_person
 from app.sim.kernels.reach_ways import foresee
 from app.sim.ports import Vec
 
-MOST_PLAYED = 40
-"""Most steps of the forecast that are played."""
-N_MOMENTS = MOST_PLAYED + N_TIMES + 1
+N_PLAYED = 32
+"""Steps of the forecast that are played."""
+N_MOMENTS = N_PLAYED + N_TIMES + 1
 """Moments at which it is known where people will be: now, and from each step played as far as
 the features of ``reach_ways.py`` look."""
 

@@ -4,7 +4,13 @@ A network knows to some centimetres whether its way is free; played forward the 
 known to millimetres. So a decision is played ahead: the robot exactly as it moves, people as
 ``foretold.py`` says, the policy asked again every ``STEP_S``. Where that ends in a contact,
 other ways are played too: first to a posture for a while, or stopping, then the policy; or
-straight to the goal. The best of them is begun, for one period; the next decision looks anew.
+straight to the goal. Where all of these do, there are the dashes: pan, shoulder and elbow each
+at full speed forward or back, or held, for a while, then a stop. The best way is begun, for one
+period; the next decision looks anew. Later in an episode other ways are also played where the
+policy's leads neither to the goal nor into a contact: it may wait longer than it must.
+
+A contact is also who comes nearer than ``KEPT_M``, or less in the first moments, where nothing
+can be done about it: what is foretold is not known to less.
 
 What is foretold promises nothing: people turn. Speed and separation monitoring (``ssm.py``) is
 what keeps them safe.
@@ -16,6 +22,7 @@ only where it is needed.
 """
 
 import math
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -28,8 +35,8 @@ from app.sim.kernels.compiled import kernel
 from app.sim.kernels.cylinder import cylinder_clearance
 from app.sim.kernels.episode import COLLISION, RUNNING, SUCCESS, SUCCESS_DISTANCE, distance_to
 from app.sim.kernels.features import HORIZONS
-from app.sim.kernels.forecast import N_TIMES, STEP_S, layer
-from app.sim.kernels.foretold import Foretold, foretell, new_foretold
+from app.sim.kernels.forecast import N_TIMES, STEP_S, Floats, Network, layer
+from app.sim.kernels.foretold import N_PLAYED, Foretold, foretell, new_foretold
 from app.sim.kernels.geometry import FAR
 from app.sim.kernels.reach import ReachState, ReachWorld, Work
 from app.sim.kernels.reach_features import BASE_START, N_FEATURES, Obs, describe
@@ -37,8 +44,6 @@ from app.sim.kernels.reach_prospect import base_motion
 from app.sim.kernels.reach_ways import N_WAYS, look_aside, put_ways
 from app.sim.ports import Vec
 
-N_PLAYED = 32
-"""Steps of the forecast that are played, at most MOST_PLAYED."""
 GAIN = 5.0
 """Speed wanted of a joint per way left to a posture [1/s]."""
 PASSED = -1
@@ -61,44 +66,44 @@ N_POSTURES = len(POSTURES) + 1
 """Postures, and the one at which it stops."""
 STRAIGHT = N_POSTURES
 """In place of a posture: the tcp straight to the goal, all the time."""
-N_OTHERS = N_POSTURES * len(LASTING) + 1
-"""Other ways: each posture for each time, then the policy; the last one is straight."""
+N_FIRST = N_POSTURES * len(LASTING) + 1
+"""Other ways but the dashes: each posture for each time, then the policy; straight."""
+STRAIGHT_WAY = N_FIRST - 1
+"""Number of the straight one."""
+SIGNS = tuple(signs for signs in product((0.0, 1.0, -1.0), repeat=3) if any(signs))
+"""Directions of the dashes: of pan, shoulder and elbow."""
+DIRECTIONS = np.array(SIGNS)
+DASHING = (6, 15)
+"""For how many steps they last."""
+DASH = STRAIGHT + 1
+"""In place of a posture: the first of them."""
+N_OTHERS = N_FIRST + len(DIRECTIONS) * len(DASHING)
+"""All other ways; the dashes come last."""
 AT_GOAL, AT_CONTACT, LATER, ROOM, APART, TURNED = 2.0, -2.0, 0.3, 0.3, 0.3, 0.05
 """What a way is worth: at the goal, less LATER per second; at a contact, more by it; else ROOM
 per metre of the least clearance up to FREE, less APART per metre to the goal; less TURNED per
 second spent on the way to a posture."""
+NO_CONTACT = -1.0
+"""Worth more is every way that ends in no contact."""
 FREE = 0.5
 """Clearance beyond which more is worth nothing [m]."""
 RESTS = 2
 """Decisions that pass unplayed after one whose way keeps far from everybody."""
 BETTER = 0.02
 """By how much another way must be worth more."""
-
-Floats = NDArray[np.float32]
-
-
-class ActorNetwork(NamedTuple):
-    """A residual actor of two hidden layers."""
-
-    w1: Floats
-    """(n_obs, width)."""
-    b1: Floats
-    """(width,)."""
-    w2: Floats
-    """(width, width)."""
-    b2: Floats
-    """(width,)."""
-    w3: Floats
-    """(width, 6)."""
-    b3: Floats
-    """(6,)."""
+PATIENCE_S, HURRY_S = 1.0, 4.0
+"""Other ways but the dashes are played, too, where the policy's ends neither at the goal nor in
+a contact, from so long into an episode on, or when no more time than that is left [s]."""
+KEPT_M, KEPT_M_S = 0.01, 0.02
+"""Nearer to people than this is a contact on a way that is played: so much, or so much per
+second of it where that is less [m, m/s]."""
 
 
 class Lookahead(NamedTuple):
     """Network and work space; used by one thread at a time."""
 
-    net: ActorNetwork
-    """The policy."""
+    net: Network
+    """The policy, a residual actor."""
     base_weight: float
     """Share of the base motion in its action."""
     foretold: Foretold
@@ -134,7 +139,7 @@ class Lookahead(NamedTuple):
 
 
 def new_lookahead(
-    arm: Arm, net: ActorNetwork, base_weight: float, n_envs: int, calm_m: float
+    arm: Arm, net: Network, base_weight: float, n_envs: int, calm_m: float
 ) -> Lookahead:
     """Return work space for a network and so many environments."""
     aim = np.zeros((N_POSTURES, 6))
@@ -255,6 +260,13 @@ def _toward(arm: Arm, posture: int, look: Lookahead) -> None:
 
 
 @kernel()
+def _dash(direction: int, lasts: bool, look: Lookahead) -> None:
+    """Write the action of a dash, or of the stop after it, into ``look.act``."""
+    for j in range(6):
+        look.act[j] = DIRECTIONS[direction, j] if lasts and j < 3 else 0.0
+
+
+@kernel()
 def _straight(world: ReachWorld, goal: Vec, work: Work, look: Lookahead) -> None:
     """Write the action that leads the tcp straight to the goal; the robot is placed."""
     robot, prospect = work.robot, work.sight.prospect
@@ -281,6 +293,8 @@ def _choose(
     if posture == PASSED and step == 0:
         for j in range(6):
             look.act[j] = act[j]
+    elif posture >= DASH:
+        _dash(posture - DASH, step < lasting, look)
     elif posture == PASSED or step >= lasting:
         _ask_at(world, goal, time_left, step, n, work, look)
     elif posture == STRAIGHT:
@@ -312,7 +326,7 @@ def _play(
     work: Work,
     look: Lookahead,
 ) -> tuple[int, float, float]:
-    """Play one way: first to a posture, or ``act``, then the policy.
+    """Play one way: first to a posture, or ``act``, then the policy; or a dash.
 
     Args:
         world: Shared data.
@@ -320,7 +334,7 @@ def _play(
         state: Rows.
         e: Environment.
         act: Action of the first step, where ``posture`` is PASSED; else filled with it.
-        posture: Where it leads first, STRAIGHT, or PASSED.
+        posture: Where it leads first, STRAIGHT, PASSED, or from DASH on a dash.
         lasting: For how many steps.
         n: People.
         work: Work space.
@@ -352,12 +366,23 @@ def _play(
             share = (i + 1) / periods
             t, clear = (step + share) * STEP_S, _clear(world, step, share, n, work, look)
             least = min(least, clear)
-            if _touches(arm, clear, work):
+            if _touches(arm, clear - min(KEPT_M, KEPT_M_S * t), work):
                 return COLLISION, AT_CONTACT + LATER * t - turned, least
             if distance_to(goal, work.robot) < SUCCESS_DISTANCE:
                 return SUCCESS, AT_GOAL - LATER * t - turned, least
     worth = ROOM * least - APART * distance_to(goal, work.robot) - turned
     return RUNNING, worth, least
+
+
+@kernel(inline="always")
+def _way(k: int) -> tuple[int, int]:
+    """Return posture and number of steps of another way, by its number below N_OTHERS."""
+    if k >= N_FIRST:
+        k -= N_FIRST
+        return DASH + k // len(DASHING), DASHING[k % len(DASHING)]
+    if k == STRAIGHT_WAY:
+        return STRAIGHT, N_PLAYED
+    return k // len(LASTING), LASTING[k % len(LASTING)]
 
 
 @kernel()
@@ -371,6 +396,9 @@ def look_ahead(
     look: Lookahead,
 ) -> int:
     """Keep an action, or replace it by the first one of a better way.
+
+    Nothing is changed where the policy's own way ends at the goal, or early in an episode
+    where it goes on without a contact.
 
     Args:
         world: Shared data.
@@ -392,20 +420,22 @@ def look_ahead(
     if n == 0:
         return PASSED
     ended, best, least = _play(world, rule, state, e, act, PASSED, 0, n, work, look)
-    look.rests[e] = RESTS if least > look.calm_m else 0
-    if ended != COLLISION:
+    look.rests[e] = RESTS if ended != COLLISION and least > look.calm_m else 0
+    late = state.elapsed[e] >= PATIENCE_S or state.time_left[e] <= HURRY_S
+    if ended == SUCCESS or (ended == RUNNING and not late):
         return PASSED
     chosen = PASSED
     for k in range(N_OTHERS):
-        posture, lasting = k // len(LASTING), LASTING[k % len(LASTING)]
-        if posture == STRAIGHT:
-            lasting = N_PLAYED
+        if k == N_FIRST and (ended == RUNNING or best > NO_CONTACT):
+            break
+        posture, lasting = _way(k)
         _, worth, _ = _play(world, rule, state, e, look.found, posture, lasting, n, work, look)
         if worth > best + BETTER:
             best, chosen = worth, k
             for j in range(6):
                 look.begun[j] = look.found[j]
     if chosen != PASSED:
+        look.rests[e] = 0
         for j in range(6):
             act[j] = look.begun[j]
     return chosen
