@@ -5,8 +5,9 @@
 A RUN is a folder that ``docs/training_curves.py`` wrote; its last policy plays the row
 ``clearance`` of ``reach-targets``, alone and looking ahead, with the same people for all.
 Beside that stand what the training cost and when its curve was first above the source's
-91.76 % (greedy episodes with the training's goals), in CPU minutes. Writes
-``docs/results/reach-seeds.json``.
+91.76 % (greedy episodes with the training's goals), in CPU minutes, from the run's curve in
+``reach_curves.json``: training anew gives the same policy bit for bit, but takes as long as the
+machine does. Writes ``docs/results/reach-seeds.json``.
 """
 
 import argparse
@@ -24,7 +25,7 @@ from app.machine import describe  # noqa: E402 - the line above lets it be found
 from app.policies.checkpoint import load  # noqa: E402
 from app.policies.evaluation.reach_bench import ReachBench, direct_ways, ending  # noqa: E402
 from app.policies.evaluation.rows import untold  # noqa: E402
-from docs.reach_points import lines  # noqa: E402
+from docs.reach_points import RESULTS as CURVES  # noqa: E402
 
 RESULTS = ROOT / "docs/results/reach-seeds.json"
 SOURCE = 0.9176
@@ -33,19 +34,29 @@ PER_TARGET = 100
 Json = dict[str, Any]
 
 
+def curve_of(preset: str, seed: int) -> list[Json]:
+    """Return the points of a training's recorded curve.
+
+    Raises:
+        KeyError: There is none of that preset and seed.
+    """
+    curves = json.loads(CURVES.read_text(encoding="utf-8"))["curves"]
+    return {(one["name"], one["seed"]): one["played"] for one in curves}[preset, seed]
+
+
 def rows_of(folder: Path, seed: int, per_target: int) -> tuple[str, list[Json]]:
     """Return the checkpoint of a run, and a row for each way of asking it."""
     last = sorted(folder.glob("step-*.json"))[-1]
     manifest = json.loads(last.read_text(encoding="utf-8"))
     checkpoint = load(manifest, last.with_suffix(".safetensors").read_bytes())
-    told = lines(folder / "curve.jsonl")
-    passed = [one["cpu_s"] / 60.0 for one in told if (one["success"] or 0.0) >= SOURCE]
+    told = curve_of(manifest["preset"]["name"], manifest["seed"])
+    passed = [one["cpu_s"] / 60.0 for one in told if one["success"] >= SOURCE]
     bench = ReachBench(checkpoint, seed, 2, untold)
     goals, rows = bench.target_goals(per_target * len(bench.targets)), []
     for how in direct_ways(bench.actor):
         played = bench.play(bench.usual, goals, how)
         row = played.row(f"seed-{manifest['seed']}{ending(how)}")
-        spent = {"cpu_min": manifest["cpu_s"] / 60.0, "updates": manifest["updates"]}
+        spent = {"cpu_min": told[-1]["cpu_s"] / 60.0, "updates": manifest["updates"]}
         rows.append({**row, **spent, "to_source_min": passed[0] if passed else None})
     return checkpoint.sha256, rows
 

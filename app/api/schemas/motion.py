@@ -285,7 +285,8 @@ class MotionAnswer(Answer):
     ahead: bool = Field(description="whether the decision was played ahead")
     began: str | None = Field(
         description="the way begun instead of the policy's action, by where it leads first and "
-        "for how long; null: the policy's action passed"
+        "for how long, or what pan, shoulder and elbow do (f: forward, b: back, h: held); "
+        "null: the policy's action passed"
     )
     targets: list[Target] = Field(description="what was interpolated; empty for `direct`")
     safety: Override | None = Field(description="null where monitoring was left out")
