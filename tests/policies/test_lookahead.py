@@ -74,19 +74,20 @@ def test_what_is_played_is_what_happens_beside_constant_people() -> None:
     assert np.mean(same) > 0.85
 
 
-def test_dashes_end_as_played_and_never_beyond_limits() -> None:
-    """The robot is driven by hand as each dash says; nobody is near the cell's corner."""
+def test_dashes_end_as_they_are_played() -> None:
+    """The robot is driven by hand as each dash says, with nobody but in the far corner."""
     dashes = kernel.N_OTHERS - kernel.N_FIRST
     batch = batch_of(dashes, "constant")
     rows = batch.state.people.walkers.rows
     rows[:, 0, [X, Y]], rows[:, 0, GAIT] = (-2.0, 2.0), STILL
     rows[:, 0, [VX, VY]] = 0.0
+    live = np.flatnonzero(walked(batch, 45).state.outcome == RUNNING)
     network = POLICY.kernel_network
     assert network is not None
     look = kernel.new_lookahead(batch.arm, network, BASE_WEIGHT, dashes, np.inf)
     work = new_work(batch.world, batch.state, new_forecaster())
     rule, told = batch.settings.action.rule(), np.zeros(dashes, dtype=np.int64)
-    for row in range(dashes):
+    for row in live:
         n = kernel.foretell(batch.world, batch.state, row, work, look.foretold)
         way = kernel._way(kernel.N_FIRST + row)
         told[row] = kernel._play(
@@ -100,8 +101,8 @@ def test_dashes_end_as_played_and_never_beyond_limits() -> None:
             if k < lasting * periods:
                 act[row, :3] = kernel.SIGNS[posture - kernel.DASH]
         batch.step(act, auto_reset=False)
-    np.testing.assert_array_equal(batch.state.outcome, told)
-    assert 0 < (told == COLLISION).sum() < dashes
+    np.testing.assert_array_equal(batch.state.outcome[live], told[live])
+    assert {RUNNING, COLLISION} <= set(told[live])
 
 
 def test_a_way_into_the_table_is_changed_and_never_rested_on() -> None:
