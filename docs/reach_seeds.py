@@ -6,8 +6,9 @@ A RUN is a folder that ``docs/training_curves.py`` wrote; its last policy plays 
 ``clearance`` of ``reach-targets``, alone and looking ahead, with the same people for all.
 Beside that stand what the training cost and when its curve was first above the source's
 91.76 % (greedy episodes with the training's goals), in CPU minutes, from the run's curve in
-``reach_curves.json``: training anew gives the same policy bit for bit, but takes as long as the
-machine does. Writes ``docs/results/reach-seeds.json``.
+``reach_curves.json``: training anew gives the same policy bit for bit, but takes as long as
+the machine does. Writes ``docs/results/reach-seeds.json``; rows of other seeds in it stay
+where they are of the same episodes.
 """
 
 import argparse
@@ -44,8 +45,19 @@ def curve_of(preset: str, seed: int) -> list[Json]:
     return {(one["name"], one["seed"]): one["played"] for one in curves}[preset, seed]
 
 
-def rows_of(folder: Path, seed: int, per_target: int) -> tuple[str, list[Json]]:
-    """Return the checkpoint of a run, and a row for each way of asking it."""
+def kept(rows: list[Json], seed: int, per_target: int) -> list[Json]:
+    """Return the rows that are written already, of the same episodes, but those in ``rows``."""
+    if not RESULTS.exists():
+        return []
+    before = json.loads(RESULTS.read_text(encoding="utf-8"))
+    if (before["seed"], before["episodes"]) != (seed, per_target):
+        return []
+    names = {row["name"] for row in rows}
+    return [row for row in before["results"] if row["name"] not in names]
+
+
+def rows_of(folder: Path, seed: int, per_target: int) -> list[Json]:
+    """Return a row for each way of asking a run's policy."""
     last = sorted(folder.glob("step-*.json"))[-1]
     manifest = json.loads(last.read_text(encoding="utf-8"))
     checkpoint = load(manifest, last.with_suffix(".safetensors").read_bytes())
@@ -57,8 +69,9 @@ def rows_of(folder: Path, seed: int, per_target: int) -> tuple[str, list[Json]]:
         played = bench.play(bench.usual, goals, how)
         row = played.row(f"seed-{manifest['seed']}{ending(how)}")
         spent = {"cpu_min": told[-1]["cpu_s"] / 60.0, "updates": manifest["updates"]}
-        rows.append({**row, **spent, "to_source_min": passed[0] if passed else None})
-    return checkpoint.sha256, rows
+        told_by = {"checkpoint": checkpoint.sha256, **spent}
+        rows.append({**row, **told_by, "to_source_min": passed[0] if passed else None})
+    return rows
 
 
 def main() -> None:
@@ -69,15 +82,17 @@ def main() -> None:
     parser.add_argument("--episodes", type=int, default=PER_TARGET, help="per target")
     options = parser.parse_args()
     torch.set_num_threads(1)
-    found = [rows_of(folder, options.seed, options.episodes) for folder in options.runs]
+    rows: list[Json] = []
+    for folder in options.runs:
+        rows += rows_of(folder, options.seed, options.episodes)
+    rows += kept(rows, options.seed, options.episodes)
     result = {
         "protocol": "reach-seeds",
         "command": "python docs/reach_seeds.py RUN ...",
         "policy": "reach-td3",
-        "checkpoints": [name for name, _ in found],
         "seed": options.seed,
         "episodes": options.episodes,
-        "results": [row for _, rows in found for row in rows],
+        "results": sorted(rows, key=lambda row: str(row["name"])),
         "machine": describe(),
     }
     RESULTS.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
