@@ -10,9 +10,9 @@ from fastapi.testclient import TestClient
 
 from app.main import create_app
 from app.settings import Settings
+from tests.api.live_server import WARM_UP_S
 
 ADDRESS = "http://127.0.0.1:8000"
-WARM_UP_S = 300.0
 
 
 def wait_until_ready(client: TestClient) -> None:

@@ -12,7 +12,8 @@ from app.listening import address_of, listen
 from app.serving import Server, server_of
 
 START_S = 30.0
-WARM_UP_S = 300.0
+WARM_UP_S = 900.0
+"""On a loaded machine, with every kernel to compile [s]."""
 
 
 @contextlib.contextmanager

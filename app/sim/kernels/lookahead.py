@@ -374,9 +374,11 @@ def _play(
     return RUNNING, worth, least
 
 
-@kernel(inline="always")
+@kernel()
 def _way(k: int) -> tuple[int, int]:
-    """Return posture and number of steps of another way, by its number below N_OTHERS."""
+    """Return posture and number of steps of another way by its number, or of PASSED."""
+    if k == PASSED:
+        return PASSED, 0
     if k >= N_FIRST:
         k -= N_FIRST
         return DASH + k // len(DASHING), DASHING[k % len(DASHING)]
@@ -419,7 +421,8 @@ def look_ahead(
     n = foretell(world, state, e, work, look.foretold)
     if n == 0:
         return PASSED
-    ended, best, least = _play(world, rule, state, e, act, PASSED, 0, n, work, look)
+    posture, lasting = _way(PASSED)  # no literals: _play would be compiled once more for them
+    ended, best, least = _play(world, rule, state, e, act, posture, lasting, n, work, look)
     look.rests[e] = RESTS if ended != COLLISION and least > look.calm_m else 0
     late = state.elapsed[e] >= PATIENCE_S or state.time_left[e] <= HURRY_S
     if ended == SUCCESS or (ended == RUNNING and not late):
