@@ -5,10 +5,8 @@
 A RUN is a folder that ``docs/training_curves.py`` wrote; its last policy plays the row
 ``clearance`` of ``reach-targets``, alone and looking ahead, with the same people for all.
 Beside that stand what the training cost and when its curve was first above the source's
-91.76 % (greedy episodes with the training's goals), in CPU minutes, from the run's curve in
-``reach_curves.json``: training anew gives the same policy bit for bit, but takes as long as
-the machine does. Writes ``docs/results/reach-seeds.json``; rows of other seeds in it stay
-where they are of the same episodes.
+91.76 % (greedy episodes with the training's goals), in CPU minutes. Writes
+``docs/results/reach-seeds.json``.
 """
 
 import argparse
@@ -26,7 +24,7 @@ from app.machine import describe  # noqa: E402 - the line above lets it be found
 from app.policies.checkpoint import load  # noqa: E402
 from app.policies.evaluation.reach_bench import ReachBench, direct_ways, ending  # noqa: E402
 from app.policies.evaluation.rows import untold  # noqa: E402
-from docs.reach_points import RESULTS as CURVES  # noqa: E402
+from docs.reach_points import lines  # noqa: E402
 
 RESULTS = ROOT / "docs/results/reach-seeds.json"
 SOURCE = 0.9176
@@ -35,43 +33,21 @@ PER_TARGET = 100
 Json = dict[str, Any]
 
 
-def curve_of(preset: str, seed: int) -> list[Json]:
-    """Return the points of a training's recorded curve.
-
-    Raises:
-        KeyError: There is none of that preset and seed.
-    """
-    curves = json.loads(CURVES.read_text(encoding="utf-8"))["curves"]
-    return {(one["name"], one["seed"]): one["played"] for one in curves}[preset, seed]
-
-
-def kept(rows: list[Json], seed: int, per_target: int) -> list[Json]:
-    """Return the rows that are written already, of the same episodes, but those in ``rows``."""
-    if not RESULTS.exists():
-        return []
-    before = json.loads(RESULTS.read_text(encoding="utf-8"))
-    if (before["seed"], before["episodes"]) != (seed, per_target):
-        return []
-    names = {row["name"] for row in rows}
-    return [row for row in before["results"] if row["name"] not in names]
-
-
-def rows_of(folder: Path, seed: int, per_target: int) -> list[Json]:
-    """Return a row for each way of asking a run's policy."""
+def rows_of(folder: Path, seed: int, per_target: int) -> tuple[str, list[Json]]:
+    """Return the checkpoint of a run, and a row for each way of asking it."""
     last = sorted(folder.glob("step-*.json"))[-1]
     manifest = json.loads(last.read_text(encoding="utf-8"))
     checkpoint = load(manifest, last.with_suffix(".safetensors").read_bytes())
-    told = curve_of(manifest["preset"]["name"], manifest["seed"])
-    passed = [one["cpu_s"] / 60.0 for one in told if one["success"] >= SOURCE]
+    told = lines(folder / "curve.jsonl")
+    passed = [one["cpu_s"] / 60.0 for one in told if (one["success"] or 0.0) >= SOURCE]
     bench = ReachBench(checkpoint, seed, 2, untold)
     goals, rows = bench.target_goals(per_target * len(bench.targets)), []
     for how in direct_ways(bench.actor):
         played = bench.play(bench.usual, goals, how)
         row = played.row(f"seed-{manifest['seed']}{ending(how)}")
-        spent = {"cpu_min": told[-1]["cpu_s"] / 60.0, "updates": manifest["updates"]}
-        told_by = {"checkpoint": checkpoint.sha256, **spent}
-        rows.append({**row, **told_by, "to_source_min": passed[0] if passed else None})
-    return rows
+        spent = {"cpu_min": manifest["cpu_s"] / 60.0, "updates": manifest["updates"]}
+        rows.append({**row, **spent, "to_source_min": passed[0] if passed else None})
+    return checkpoint.sha256, rows
 
 
 def main() -> None:
@@ -82,17 +58,15 @@ def main() -> None:
     parser.add_argument("--episodes", type=int, default=PER_TARGET, help="per target")
     options = parser.parse_args()
     torch.set_num_threads(1)
-    rows: list[Json] = []
-    for folder in options.runs:
-        rows += rows_of(folder, options.seed, options.episodes)
-    rows += kept(rows, options.seed, options.episodes)
+    found = [rows_of(folder, options.seed, options.episodes) for folder in options.runs]
     result = {
         "protocol": "reach-seeds",
         "command": "python docs/reach_seeds.py RUN ...",
         "policy": "reach-td3",
+        "checkpoints": [name for name, _ in found],
         "seed": options.seed,
         "episodes": options.episodes,
-        "results": sorted(rows, key=lambda row: str(row["name"])),
+        "results": [row for _, rows in found for row in rows],
         "machine": describe(),
     }
     RESULTS.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
