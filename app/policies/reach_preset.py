@@ -35,13 +35,13 @@ class ReachPreset:
     """Work cell trained in."""
 
     total_steps: int = number(
-        5_120_000, 1_000, 100_000_000, "env steps", "length of the training"
+        7_680_000, 1_000, 100_000_000, "env steps", "length of the training"
     )
     n_envs: int = number(128, 1, 1024, "", "cells stepped together")
     buffer_size: int = number(
         400_000, 2_000, 2_000_000, "transitions", "size of the replay memory"
     )
-    batch_size: int = number(512, 16, 4096, "transitions", "minibatch of an update")
+    batch_size: int = number(256, 16, 4096, "transitions", "minibatch of an update")
     learning_starts: int = number(
         25_600, 0, 1_000_000, "env steps", "steps before the first update"
     )

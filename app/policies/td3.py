@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from stable_baselines3 import TD3
 from stable_baselines3.common.policies import ContinuousCritic
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
-from stable_baselines3.common.utils import polyak_update
 from stable_baselines3.td3.policies import Actor, TD3Policy
 from torch import Tensor, nn
 
@@ -238,7 +237,6 @@ class BatchTD3(TD3):
         """
         if self.num_timesteps // self.n_envs % self.extras.update_every:
             return
-        self.policy.set_training_mode(True)
         self._update_learning_rate([self.actor.optimizer, self.critic.optimizer])
         for group in self.actor.optimizer.param_groups:
             group["lr"] *= self.extras.actor_lr_ratio
@@ -249,10 +247,8 @@ class BatchTD3(TD3):
             if self._n_updates % self.policy_delay == 0:
                 if self._n_updates > self.preset.actor_frozen_updates:
                     self._update_actor(data.obs)
-                polyak_update(
-                    self.critic.parameters(), self.critic_target.parameters(), self.tau
-                )
-                polyak_update(self.actor.parameters(), self.actor_target.parameters(), self.tau)
+                _follow(self.critic_target, self.critic, self.tau)
+                _follow(self.actor_target, self.actor, self.tau)
 
     def _draw(self, batch_size: int) -> Minibatch:
         memory = self.replay_buffer
@@ -299,17 +295,25 @@ class BatchTD3(TD3):
 
     def _update_actor(self, obs: Tensor) -> None:
         critics = critics_of(self.critic)
-        critics.requires_grad_(False)
         with self._precision():
             loss = -critics.first(obs, self.actor(obs)).mean()
         self.actor.optimizer.zero_grad()
-        loss.backward()  # type: ignore[no-untyped-call]
+        learning = list(self.actor.mu.parameters())  # and not the critics it goes through
+        loss.backward(inputs=learning)  # type: ignore[no-untyped-call]
         self.actor.optimizer.step()
-        critics.requires_grad_(True)
         if self.averaged is not None:
             learned = (self._n_updates - self.preset.actor_frozen_updates) / self.policy_delay
             decay = min(self.extras.ema, learned / (learned + 9.0))
-            polyak_update(self.actor.mu.parameters(), self.averaged.parameters(), 1.0 - decay)
+            _follow(self.averaged, self.actor.mu, 1.0 - decay)
 
     def _precision(self) -> torch.autocast:
         return torch.autocast("cpu", torch.bfloat16, enabled=self.extras.bfloat16)
+
+
+def _follow(behind: nn.Module, ahead: nn.Module, share: float) -> None:
+    """Move the weights of one network by a share of the way to those of another.
+
+    Deviates: Stable-Baselines3's ``polyak_update`` says the same one tensor at a time.
+    """
+    with torch.no_grad():
+        torch._foreach_lerp_(list(behind.parameters()), list(ahead.parameters()), share)

@@ -2,7 +2,9 @@
 
 A worker goes on at constant velocity, a walker as the networks of ``forecast.py`` say; where
 the functions behind a walker's radius and speed can be found (``harmonic.py``), as they say.
-Who stands still stays. Where people turn nobody knows.
+Who stands still stays; but a walker whose function says that the speed is too low to walk with
+for now goes on the way he came. Where people turn nobody knows, only that they do before they
+leave the walking area: on its edge they are taken to stand.
 """
 
 import math
@@ -24,6 +26,10 @@ from app.sim.kernels.occupancy import (
     R_MIN,
     V_MAX,
     V_MIN,
+    X_MAX,
+    X_MIN,
+    Y_MAX,
+    Y_MIN,
 )
 from app.sim.kernels.people import MAX_PEOPLE, place_people
 from app.sim.kernels.reach import ReachState, ReachWorld, Work
@@ -51,6 +57,8 @@ class Foretold(NamedTuple):
     """Those found last, of radius and speed, (n_envs, MAX_PEOPLE, 2, N_CONSTANTS)."""
     since: Vec
     """Time since then [s], shape (n_envs,)."""
+    course: Vec
+    """Directions in which walkers were seen to walk last, zeros for none, (n_envs, MAX_PEOPLE, 2)."""
 
 
 def new_foretold(n_envs: int) -> Foretold:
@@ -61,6 +69,7 @@ def new_foretold(n_envs: int) -> Foretold:
         fit=new_fit(),
         found=np.zeros((n_envs, MAX_PEOPLE, 2, N_CONSTANTS)),
         since=np.zeros(n_envs),
+        course=np.zeros((n_envs, MAX_PEOPLE, 2)),
     )
 
 
@@ -82,6 +91,8 @@ def foretell(
     places, person, ahead = foretold.places, foretold.person, work.ways.ahead
     since = foretold.since[e]
     foretold.since[e] = 0.0
+    if state.elapsed[e] == 0.0:
+        foretold.course[e] = 0.0
     n, n_workers = int(work.ways.number[0]), state.people.q.shape[1]
     for p in range(n):
         show_person(state.people, e, p, work.crowd, person)
@@ -97,7 +108,8 @@ def foretell(
             row = state.people.walkers.rows[e, p - n_workers]
             rule = world.people.walkers.rows[p - n_workers]
             _tell_radius(row, rule, since, p, foretold.found[e, p, 0], foretold)
-            _tell_way(row, rule, since, world.arm.dt, p, foretold.found[e, p, 1], foretold)
+            _tell_way(row, rule, since, world.arm.dt, e, p, foretold)
+            _stay_inside(rule, p, places)
     return n
 
 
@@ -119,23 +131,46 @@ def _tell_radius(
 
 @kernel()
 def _tell_way(
-    row: Vec, rule: Vec, since: float, dt: float, p: int, found: Vec, foretold: Foretold
+    row: Vec, rule: Vec, since: float, dt: float, e: int, p: int, foretold: Foretold
 ) -> None:
     """Put the function behind a walker's speed in place of its forecast, if it is found."""
     limits = Limits(rule[V_MIN], rule[V_MAX], rule[F_SPEED_MAX])
     past = row[PAST_SPEED : PAST_SPEED + N_PAST]
-    person, places = foretold.person, foretold.places
+    person, places, course = foretold.person, foretold.places, foretold.course[e, p]
+    found, middle = foretold.found[e, p, 1], 0.5 * (limits.low + limits.high)
     speed = math.hypot(person[2], person[3])
-    if speed == 0.0:
+    if speed > 0.0:
+        course[0], course[1] = person[2] / speed, person[3] / speed
+    if course[0] == 0.0 and course[1] == 0.0:
         return
     if not find_function(foretold.fit, speed, row[AGE], past, limits, True, since, found):
         return
-    middle, x, y, t = 0.5 * (limits.low + limits.high), person[0], person[1], 0.0
+    if speed == 0.0 and value_at(found, middle, 0.0) >= limits.low:
+        return  # It is not for its function that this one stands.
+    x, y, t = person[0], person[1], 0.0
     for i in range(1, N_MOMENTS):
         while t < STEP_S * i - 0.5 * dt:
             v = value_at(found, middle, t)
             v = 0.0 if v < limits.low else min(limits.high, v)
-            x += dt * v * person[2] / speed
-            y += dt * v * person[3] / speed
+            x += dt * v * course[0]
+            y += dt * v * course[1]
             t += dt
         places[i, p, 0], places[i, p, 1] = x, y
+
+
+@kernel()
+def _inside(rule: Vec, place: Vec) -> bool:
+    """Tell whether a place, x and y, is in a walking area."""
+    return bool(
+        rule[X_MIN] <= place[0] <= rule[X_MAX] and rule[Y_MIN] <= place[1] <= rule[Y_MAX]
+    )
+
+
+@kernel()
+def _stay_inside(rule: Vec, p: int, places: Vec) -> None:
+    """Let a walker that is in its area stand where its way would leave it."""
+    if not _inside(rule, places[0, p]):
+        return
+    for i in range(1, N_MOMENTS):
+        if not _inside(rule, places[i, p]):
+            places[i, p, 0], places[i, p, 1] = places[i - 1, p, 0], places[i - 1, p, 1]

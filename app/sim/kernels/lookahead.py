@@ -6,8 +6,12 @@ known to millimetres. So a decision is played ahead: the robot exactly as it mov
 other ways are played too: first to a posture for a while, or stopping, then the policy; or
 straight to the goal. Where all of these do, there are the dashes: pan, shoulder and elbow each
 at full speed forward or back, or held, for a while, then a stop. The best way is begun, for one
-period; the next decision looks anew. Later in an episode other ways are also played where the
-policy's leads neither to the goal nor into a contact: it may wait longer than it must.
+period. The next decision looks anew, and what is left of the way begun is one of those looked
+at: it is gone on with until the policy's own way is better.
+
+Later in an episode other ways are now and then also played where the policy's leads neither to
+the goal nor into a contact: it may wait longer than it must. Only one that ends at the goal is
+begun then.
 
 A contact is also who comes nearer than ``KEPT_M``, or less in the first moments, where nothing
 can be done about it: what is foretold is not known to less.
@@ -31,6 +35,7 @@ from numpy.typing import NDArray
 from app.sim.kernels import kinematics
 from app.sim.kernels.actions import ActionRule, advance
 from app.sim.kernels.arm import Arm, cell_clearance, place_robot, self_clearance
+from app.sim.kernels.columns import copy_values
 from app.sim.kernels.compiled import kernel
 from app.sim.kernels.cylinder import cylinder_clearance
 from app.sim.kernels.episode import COLLISION, RUNNING, SUCCESS, SUCCESS_DISTANCE, distance_to
@@ -90,10 +95,14 @@ FREE = 0.5
 RESTS = 2
 """Decisions that pass unplayed after one whose way keeps far from everybody."""
 BETTER = 0.02
-"""By how much another way must be worth more."""
+"""By how much another way must be worth more than the best so far."""
+WORTH_IT = 1.0
+"""Worth more is every way that ends at the goal."""
 PATIENCE_S, HURRY_S = 1.0, 4.0
 """Other ways but the dashes are played, too, where the policy's ends neither at the goal nor in
 a contact, from so long into an episode on, or when no more time than that is left [s]."""
+WAITS = 3
+"""Every so manyth decision of those."""
 KEPT_M, KEPT_M_S = 0.01, 0.02
 """Nearer to people than this is a contact on a way that is played: so much, or so much per
 second of it where that is less [m, m/s]."""
@@ -136,6 +145,11 @@ class Lookahead(NamedTuple):
     """How many do yet, shape (n_envs,)."""
     begun: Floats
     """That of the best one, shape (6,)."""
+    plan: NDArray[np.int64]
+    """Number of the way that was begun last, or PASSED, and for how many decisions it has been
+    gone on with, shape (n_envs, 2)."""
+    waits: NDArray[np.int64]
+    """Decisions until other ways are played again where the policy waits, shape (n_envs,)."""
 
 
 def new_lookahead(
@@ -167,6 +181,8 @@ def new_lookahead(
         calm_m=calm_m,
         rests=np.zeros(n_envs, dtype=np.int64),
         begun=room(6),
+        plan=np.full((n_envs, 2), PASSED),
+        waits=np.zeros(n_envs, dtype=np.int64),
     )
 
 
@@ -388,6 +404,58 @@ def _way(k: int) -> tuple[int, int]:
 
 
 @kernel()
+def _best_of_others(
+    world: ReachWorld,
+    rule: ActionRule,
+    state: ReachState,
+    e: int,
+    bar: float,
+    n: int,
+    work: Work,
+    look: Lookahead,
+) -> int:
+    """Return the best other way that is worth more than a bar, or PASSED.
+
+    The dashes are played where each way before ends in a contact. Its first action is written
+    into ``look.begun``; the other arguments are as in :func:`_play`.
+    """
+    chosen = PASSED
+    for k in range(N_OTHERS):
+        if k == N_FIRST and bar > NO_CONTACT:
+            break
+        posture, lasting = _way(k)
+        _, worth, _ = _play(world, rule, state, e, look.found, posture, lasting, n, work, look)
+        if worth > bar:
+            bar, chosen = worth + BETTER, k
+            copy_values(look.found, look.begun)
+    return chosen
+
+
+@kernel()
+def _is_late(state: ReachState, e: int, look: Lookahead) -> bool:
+    """Tell whether it is time to see if the policy waits longer than it must."""
+    if state.elapsed[e] < PATIENCE_S and state.time_left[e] > HURRY_S:
+        return False
+    look.waits[e] -= 1
+    if look.waits[e] > 0:
+        return False
+    look.waits[e] = WAITS
+    return True
+
+
+@kernel()
+def _left(e: int, look: Lookahead, dt: float) -> tuple[int, int]:
+    """Return what is left of the way begun in an environment, as :func:`_way`; or PASSED."""
+    k = look.plan[e, 0]
+    posture, lasting = _way(k)
+    look.plan[e, 1] += 1
+    lasting -= int(look.plan[e, 1] * dt / STEP_S + 1e-9)
+    if k == PASSED or lasting <= 0:
+        return _way(PASSED)
+    return posture, lasting
+
+
+@kernel()
 def look_ahead(
     world: ReachWorld,
     rule: ActionRule,
@@ -399,9 +467,6 @@ def look_ahead(
 ) -> int:
     """Keep an action, or replace it by the first one of a better way.
 
-    Nothing is changed where the policy's own way ends at the goal, or early in an episode
-    where it goes on without a contact.
-
     Args:
         world: Shared data.
         rule: How actions are read.
@@ -412,10 +477,12 @@ def look_ahead(
         look: Network and work space.
 
     Returns:
-        Number of the way begun instead, or PASSED.
+        Number of the way begun or gone on with instead, or PASSED.
     """
     look.foretold.since[e] += world.arm.dt
-    if look.rests[e] > 0 and state.elapsed[e] > 0.0:
+    if state.elapsed[e] == 0.0:
+        look.rests[e], look.waits[e], look.plan[e, 0] = 0, 0, PASSED
+    if look.rests[e] > 0:
         look.rests[e] -= 1
         return PASSED
     n = foretell(world, state, e, work, look.foretold)
@@ -424,23 +491,24 @@ def look_ahead(
     posture, lasting = _way(PASSED)  # no literals: _play would be compiled once more for them
     ended, best, least = _play(world, rule, state, e, act, posture, lasting, n, work, look)
     look.rests[e] = RESTS if ended != COLLISION and least > look.calm_m else 0
-    late = state.elapsed[e] >= PATIENCE_S or state.time_left[e] <= HURRY_S
-    if ended == SUCCESS or (ended == RUNNING and not late):
-        return PASSED
     chosen = PASSED
-    for k in range(N_OTHERS):
-        if k == N_FIRST and (ended == RUNNING or best > NO_CONTACT):
-            break
-        posture, lasting = _way(k)
-        _, worth, _ = _play(world, rule, state, e, look.found, posture, lasting, n, work, look)
-        if worth > best + BETTER:
-            best, chosen = worth, k
-            for j in range(6):
-                look.begun[j] = look.found[j]
+    posture, lasting = _left(e, look, world.arm.dt)
+    if posture != PASSED:
+        played = _play(world, rule, state, e, look.found, posture, lasting, n, work, look)
+        if played[1] > best:
+            ended, best, chosen = played[0], played[1], look.plan[e, 0]
+            copy_values(look.found, look.begun)
+    looked = PASSED
+    if ended == COLLISION:
+        looked = _best_of_others(world, rule, state, e, best + BETTER, n, work, look)
+    elif ended == RUNNING and _is_late(state, e, look):
+        looked = _best_of_others(world, rule, state, e, WORTH_IT, n, work, look)
+    if looked != PASSED:
+        chosen, look.plan[e, 1] = looked, 0
+    look.plan[e, 0] = chosen
     if chosen != PASSED:
         look.rests[e] = 0
-        for j in range(6):
-            act[j] = look.begun[j]
+        copy_values(look.begun, act)
     return chosen
 
 
