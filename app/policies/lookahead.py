@@ -14,20 +14,21 @@ from app.policies.networks import BASE_WEIGHT
 from app.policies.reach_policy import ReachPolicy
 from app.sim.forecasts import new_forecaster
 from app.sim.kernels import lookahead as kernel
+from app.sim.kernels import other_ways
 from app.sim.kernels.forecast import STEP_S, Network
 from app.sim.kernels.reach import ReachState, ReachWorld, Work, new_work
 from app.sim.ports import ReachActor
 
-PASSED = kernel.PASSED
+PASSED = other_ways.PASSED
 """In place of the number of another way: the action passed as it is."""
 _LETTERS = {1.0: "f", -1.0: "b", 0.0: "h"}
 OTHERS = (
-    *(f"{name}-{n * STEP_S:.2g}s" for name in kernel.NAMES for n in kernel.LASTING),
+    *(f"{name}-{n * STEP_S:.2g}s" for name in other_ways.NAMES for n in other_ways.LASTING),
     "straight",
     *(
         f"dash-{''.join(_LETTERS[sign] for sign in signs)}-{n * STEP_S:.2g}s"
-        for signs in kernel.SIGNS
-        for n in kernel.DASHING
+        for signs in other_ways.SIGNS
+        for n in other_ways.DASHING
     ),
 )
 """Names of the other ways: where they lead first, and for how long. Of a dash, what pan,

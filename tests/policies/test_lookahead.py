@@ -13,8 +13,10 @@ from app.policies.reach_policy import ReachPolicy
 from app.sim.cells import load_cell
 from app.sim.forecasts import new_forecaster
 from app.sim.kernels import lookahead as kernel
+from app.sim.kernels import other_ways
 from app.sim.kernels.episode import COLLISION, RUNNING, SUCCESS
 from app.sim.kernels.forecast import STEP_S, Network
+from app.sim.kernels.foretold import N_PLAYED
 from app.sim.kernels.occupancy import GAIT, STILL, VX, VY, X, Y
 from app.sim.kernels.reach import new_work
 from app.sim.reach import ReachBatch, ReachSettings
@@ -67,7 +69,7 @@ def test_what_is_played_is_what_happens_beside_constant_people() -> None:
         told[row] = kernel._play(
             batch.world, rule, batch.state, row, acts[row], PASSED, 0, n, work, look
         )[0]
-    walked(batch, round(kernel.N_PLAYED * kernel.STEP_S / batch.arm.dt))
+    walked(batch, round(N_PLAYED * kernel.STEP_S / batch.arm.dt))
     found = batch.state.outcome[live]
     same = [told[row] == end for row, end in zip(live, found, strict=True)]
     assert (found == SUCCESS).sum() > 30
@@ -76,7 +78,7 @@ def test_what_is_played_is_what_happens_beside_constant_people() -> None:
 
 def test_dashes_end_as_they_are_played() -> None:
     """The robot is driven by hand as each dash says, with nobody but in the far corner."""
-    dashes = kernel.N_OTHERS - kernel.N_FIRST
+    dashes = other_ways.N_OTHERS - other_ways.N_FIRST
     batch = batch_of(dashes, "constant")
     rows = batch.state.people.walkers.rows
     rows[:, 0, [X, Y]], rows[:, 0, GAIT] = (-2.0, 2.0), STILL
@@ -89,17 +91,17 @@ def test_dashes_end_as_they_are_played() -> None:
     rule, told = batch.settings.action.rule(), np.zeros(dashes, dtype=np.int64)
     for row in live:
         n = kernel.foretell(batch.world, batch.state, row, work, look.foretold)
-        way = kernel._way(kernel.N_FIRST + row)
+        way = other_ways.way_of(other_ways.N_FIRST + row)
         told[row] = kernel._play(
             batch.world, rule, batch.state, row, look.found, *way, n, work, look
         )[0]
     periods = round(STEP_S / batch.arm.dt)
-    for k in range(kernel.N_PLAYED * periods):
+    for k in range(N_PLAYED * periods):
         act = np.zeros((dashes, 6), dtype=np.float32)
         for row in range(dashes):
-            posture, lasting = kernel._way(kernel.N_FIRST + row)
+            posture, lasting = other_ways.way_of(other_ways.N_FIRST + row)
             if k < lasting * periods:
-                act[row, :3] = kernel.SIGNS[posture - kernel.DASH]
+                act[row, :3] = other_ways.SIGNS[posture - other_ways.DASH]
         batch.step(act, auto_reset=False)
     np.testing.assert_array_equal(batch.state.outcome[live], told[live])
     assert {RUNNING, COLLISION} <= set(told[live])
@@ -154,8 +156,8 @@ def test_with_several_people_actions_stay_actions(people: tuple[str, ...]) -> No
 
 
 def test_the_names_of_the_other_ways() -> None:
-    assert len(OTHERS) == len(set(OTHERS)) == kernel.N_OTHERS
-    assert OTHERS[kernel.STRAIGHT_WAY] == "straight" and OTHERS[0] == "home-0.08s"
+    assert len(OTHERS) == len(set(OTHERS)) == other_ways.N_OTHERS
+    assert OTHERS[other_ways.STRAIGHT_WAY] == "straight" and OTHERS[0] == "home-0.08s"
     assert OTHERS[-1] == "dash-bbb-0.6s"
 
 

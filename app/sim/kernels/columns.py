@@ -232,7 +232,7 @@ def longest_way(before: Vec, after: Vec) -> float:
 
 
 @kernel(inline="always")
-def copy_values(values: Vec, out: Vec) -> None:
+def copy_values(values: NDArray[np.floating], out: NDArray[np.floating]) -> None:
     """Copy an array of shape (n,); a slice would have to count references."""
     for i in range(values.shape[0]):
         out[i] = values[i]

@@ -58,7 +58,7 @@ class Foretold(NamedTuple):
     since: Vec
     """Time since then [s], shape (n_envs,)."""
     course: Vec
-    """Directions in which walkers were seen to walk last, zeros for none, (n_envs, MAX_PEOPLE, 2)."""
+    """Directions in which walkers went last, or zeros, (n_envs, MAX_PEOPLE, 2)."""
 
 
 def new_foretold(n_envs: int) -> Foretold:

@@ -3,11 +3,9 @@
 A network knows to some centimetres whether its way is free; played forward the same way is
 known to millimetres. So a decision is played ahead: the robot exactly as it moves, people as
 ``foretold.py`` says, the policy asked again every ``STEP_S``. Where that ends in a contact,
-other ways are played too: first to a posture for a while, or stopping, then the policy; or
-straight to the goal. Where all of these do, there are the dashes: pan, shoulder and elbow each
-at full speed forward or back, or held, for a while, then a stop. The best way is begun, for one
-period. The next decision looks anew, and what is left of the way begun is one of those looked
-at: it is gone on with until the policy's own way is better.
+those of ``other_ways.py`` are played too, the dashes only where all before end in one. The best
+way is begun, for one period. The next decision looks anew, and what is left of the way begun is
+one of those looked at: it is gone on with until the policy's own way is better.
 
 Later in an episode other ways are now and then also played where the policy's leads neither to
 the goal nor into a contact: it may wait longer than it must. Only one that ends at the goal is
@@ -26,7 +24,6 @@ only where it is needed.
 """
 
 import math
-from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -43,47 +40,24 @@ from app.sim.kernels.features import HORIZONS
 from app.sim.kernels.forecast import N_TIMES, STEP_S, Floats, Network, layer
 from app.sim.kernels.foretold import N_PLAYED, Foretold, foretell, new_foretold
 from app.sim.kernels.geometry import FAR
+from app.sim.kernels.other_ways import (
+    DASH,
+    N_FIRST,
+    N_OTHERS,
+    N_POSTURES,
+    PASSED,
+    POSTURES,
+    STRAIGHT,
+    way_of,
+    write_dash,
+    write_toward,
+)
 from app.sim.kernels.reach import ReachState, ReachWorld, Work
 from app.sim.kernels.reach_features import BASE_START, N_FEATURES, Obs, describe
 from app.sim.kernels.reach_prospect import base_motion
 from app.sim.kernels.reach_ways import N_WAYS, look_aside, put_ways
 from app.sim.ports import Vec
 
-GAIN = 5.0
-"""Speed wanted of a joint per way left to a posture [1/s]."""
-PASSED = -1
-"""In place of the number of another way: the action passes as it is."""
-POSTURES = (
-    (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-    (0.0, 0.5, -0.5, 0.0, 0.0, 0.0),
-    (0.0, -0.3, 0.7, 0.0, 0.0, 0.0),
-    (0.9, 0.0, 0.0, 0.0, 0.0, 0.0),
-    (-0.9, 0.0, 0.0, 0.0, 0.0, 0.0),
-    (0.0, 0.6, 0.3, 0.0, 0.0, 0.0),
-)
-"""Where other ways lead first, less home [rad]: home, ahead and low, drawn up, to either side,
-ahead and down."""
-NAMES = ("home", "low", "up", "left", "right", "down", "stop")
-"""Their names; the last is to stop where it is."""
-LASTING = (2, 8, 15)
-"""For how many steps they do."""
-N_POSTURES = len(POSTURES) + 1
-"""Postures, and the one at which it stops."""
-STRAIGHT = N_POSTURES
-"""In place of a posture: the tcp straight to the goal, all the time."""
-N_FIRST = N_POSTURES * len(LASTING) + 1
-"""Other ways but the dashes: each posture for each time, then the policy; straight."""
-STRAIGHT_WAY = N_FIRST - 1
-"""Number of the straight one."""
-SIGNS = tuple(signs for signs in product((0.0, 1.0, -1.0), repeat=3) if any(signs))
-"""Directions of the dashes: of pan, shoulder and elbow."""
-DIRECTIONS = np.array(SIGNS)
-DASHING = (6, 15)
-"""For how many steps they last."""
-DASH = STRAIGHT + 1
-"""In place of a posture: the first of them."""
-N_OTHERS = N_FIRST + len(DIRECTIONS) * len(DASHING)
-"""All other ways; the dashes come last."""
 AT_GOAL, AT_CONTACT, LATER, ROOM, APART, TURNED = 2.0, -2.0, 0.3, 0.3, 0.3, 0.05
 """What a way is worth: at the goal, less LATER per second; at a contact, more by it; else ROOM
 per metre of the least clearance up to FREE, less APART per metre to the goal; less TURNED per
@@ -266,23 +240,6 @@ def _clear(
 
 
 @kernel()
-def _toward(arm: Arm, posture: int, look: Lookahead) -> None:
-    """Write the action that leads to a posture, or stops, into ``look.act``."""
-    for j in range(6):
-        wanted = 0.0
-        if posture < N_POSTURES - 1:
-            wanted = GAIN * (look.aim[posture, j] - look.q[j]) / arm.qd_max[j]
-        look.act[j] = max(-1.0, min(1.0, wanted))
-
-
-@kernel()
-def _dash(direction: int, lasts: bool, look: Lookahead) -> None:
-    """Write the action of a dash, or of the stop after it, into ``look.act``."""
-    for j in range(6):
-        look.act[j] = DIRECTIONS[direction, j] if lasts and j < 3 else 0.0
-
-
-@kernel()
 def _straight(world: ReachWorld, goal: Vec, work: Work, look: Lookahead) -> None:
     """Write the action that leads the tcp straight to the goal; the robot is placed."""
     robot, prospect = work.robot, work.sight.prospect
@@ -310,13 +267,13 @@ def _choose(
         for j in range(6):
             look.act[j] = act[j]
     elif posture >= DASH:
-        _dash(posture - DASH, step < lasting, look)
+        write_dash(posture - DASH, step < lasting, look.act)
     elif posture == PASSED or step >= lasting:
         _ask_at(world, goal, time_left, step, n, work, look)
     elif posture == STRAIGHT:
         _straight(world, goal, work, look)
     else:
-        _toward(world.arm, posture, look)
+        write_toward(world.arm, look.aim, posture, look.q, look.act)
 
 
 @kernel()
@@ -391,19 +348,6 @@ def _play(
 
 
 @kernel()
-def _way(k: int) -> tuple[int, int]:
-    """Return posture and number of steps of another way by its number, or of PASSED."""
-    if k == PASSED:
-        return PASSED, 0
-    if k >= N_FIRST:
-        k -= N_FIRST
-        return DASH + k // len(DASHING), DASHING[k % len(DASHING)]
-    if k == STRAIGHT_WAY:
-        return STRAIGHT, N_PLAYED
-    return k // len(LASTING), LASTING[k % len(LASTING)]
-
-
-@kernel()
 def _best_of_others(
     world: ReachWorld,
     rule: ActionRule,
@@ -423,7 +367,7 @@ def _best_of_others(
     for k in range(N_OTHERS):
         if k == N_FIRST and bar > NO_CONTACT:
             break
-        posture, lasting = _way(k)
+        posture, lasting = way_of(k)
         _, worth, _ = _play(world, rule, state, e, look.found, posture, lasting, n, work, look)
         if worth > bar:
             bar, chosen = worth + BETTER, k
@@ -445,13 +389,13 @@ def _is_late(state: ReachState, e: int, look: Lookahead) -> bool:
 
 @kernel()
 def _left(e: int, look: Lookahead, dt: float) -> tuple[int, int]:
-    """Return what is left of the way begun in an environment, as :func:`_way`; or PASSED."""
+    """Return what is left of the way begun in an environment, as :func:`way_of`; or PASSED."""
     k = look.plan[e, 0]
-    posture, lasting = _way(k)
+    posture, lasting = way_of(k)
     look.plan[e, 1] += 1
     lasting -= int(look.plan[e, 1] * dt / STEP_S + 1e-9)
     if k == PASSED or lasting <= 0:
-        return _way(PASSED)
+        return way_of(PASSED)
     return posture, lasting
 
 
@@ -488,7 +432,7 @@ def look_ahead(
     n = foretell(world, state, e, work, look.foretold)
     if n == 0:
         return PASSED
-    posture, lasting = _way(PASSED)  # no literals: _play would be compiled once more for them
+    posture, lasting = way_of(PASSED)  # no literals: _play would be compiled once more for them
     ended, best, least = _play(world, rule, state, e, act, posture, lasting, n, work, look)
     look.rests[e] = RESTS if ended != COLLISION and least > look.calm_m else 0
     chosen = PASSED

@@ -1,0 +1,82 @@
+"""Foretelling walkers: those who only pause go on, and nobody is foretold out of the area."""
+
+import numpy as np
+
+from app.sim.cells import load_cell
+from app.sim.forecasts import new_forecaster
+from app.sim.kernels.forecast import STEP_S
+from app.sim.kernels.foretold import N_MOMENTS, foretell, new_foretold
+from app.sim.kernels.occupancy import (
+    COURSE_X,
+    LEFT,
+    VX,
+    VY,
+    X_MAX,
+    X_MIN,
+    Y_MAX,
+    Y_MIN,
+    X,
+    Y,
+)
+from app.sim.kernels.reach import new_work
+from app.sim.ports import Vec
+from app.sim.reach import ReachBatch, ReachSettings
+
+N_ENVS, AHEAD = 200, 13
+"""Cells, and steps after which what was foretold is held against what happened: 0.52 s."""
+HELD = np.zeros((N_ENVS, 6), dtype=np.float32)
+
+
+def batch_of(seed: int) -> ReachBatch:
+    settings = ReachSettings(people=("walker",), observation="forecast", time_limit_s=60.0)
+    batch = ReachBatch(load_cell("shared-workspace"), N_ENVS, seed, settings)
+    batch.reset()
+    return batch
+
+
+def watched(batch: ReachBatch, periods: int) -> tuple[Vec, Vec]:
+    """Foretell at every period, as a policy does; return what was told of all, and the rows.
+
+    Returns:
+        Places, shape (periods, n_envs, N_MOMENTS, 3), and walkers, (periods, n_envs, N_STATE).
+    """
+    work, foretold = new_work(batch.world, batch.state, new_forecaster()), new_foretold(N_ENVS)
+    told, rows = [], []
+    for _ in range(periods):
+        foretold.since[:] += batch.arm.dt
+        now = np.empty((N_ENVS, N_MOMENTS, 3))
+        for e in range(N_ENVS):
+            assert foretell(batch.world, batch.state, e, work, foretold) == 1
+            now[e] = foretold.places[:, 0]
+        told.append(now)
+        rows.append(batch.state.people.walkers.rows[:, 0].copy())
+        batch.state.outcome[:] = 0  # people go on, whatever becomes of the robot
+        batch.step(HELD, auto_reset=False)
+    return np.array(told), np.array(rows)
+
+
+def test_who_only_pauses_is_foretold_to_go_on() -> None:
+    batch = batch_of(4)
+    told, rows = watched(batch, 110)
+    later = round(AHEAD * STEP_S / batch.arm.dt)
+    now, then = rows[:-later], rows[later:]
+    stood = np.hypot(now[..., VX], now[..., VY]) == 0.0
+    walks_then = np.hypot(then[..., VX], then[..., VY]) > 0.0
+    same_way = (now[..., COURSE_X] == then[..., COURSE_X]) & (now[..., LEFT] > 0.0)
+    pauses = stood & walks_then & same_way
+    pauses[:60] = False  # by then everybody who walks has been seen to
+    way = then[..., [X, Y]] - now[..., [X, Y]]
+    off = told[:-later, :, AHEAD, :2] - then[..., [X, Y]]
+    gone, missed = np.hypot(*way[pauses].T), np.hypot(*off[pauses].T)
+    assert pauses.sum() > 50
+    assert missed.mean() < 0.5 * gone.mean(), "standing still would miss all of it"
+
+
+def test_nobody_is_foretold_to_leave_the_walking_area() -> None:
+    batch = batch_of(5)
+    told, rows = watched(batch, 40)
+    rule = batch.world.people.walkers.rows[0]
+    low, high = rule[[X_MIN, Y_MIN]], rule[[X_MAX, Y_MAX]]
+    assert ((told[..., :2] >= low - 1e-9) & (told[..., :2] <= high + 1e-9)).all()
+    speed = rows[..., [VX, VY]] * STEP_S * N_MOMENTS
+    assert (rows[..., [X, Y]] + speed > high).any(), "going on as now some would leave it"
