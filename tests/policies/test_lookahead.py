@@ -128,6 +128,29 @@ def test_a_way_into_the_table_is_changed_and_never_rested_on() -> None:
     assert not np.array_equal(given, act)
 
 
+def test_a_way_begun_is_gone_on_with_for_no_longer_than_it_lasts() -> None:
+    batch, ahead, goes_on = batch_of(300, "walker"), Lookahead(POLICY), 0
+    mover = mover_of(POLICY, "direct")
+    periods = round(STEP_S / batch.arm.dt)
+    for _ in range(90):
+        acts = mover.acts(batch)
+        chosen = ahead.improve(batch, acts)
+        assert ahead._work is not None
+        look = ahead._work[1]
+        for e in np.flatnonzero((chosen != PASSED) & (look.plan[:, 1] > 0)):
+            posture, lasting = other_ways.way_of(chosen[e])
+            assert look.plan[e, 0] == chosen[e]
+            assert look.plan[e, 1] < lasting * periods
+            if posture < other_ways.STRAIGHT:
+                wanted = np.zeros(6, dtype=np.float32)
+                q = batch.state.q[e]
+                other_ways.write_toward(batch.arm, look.aim, posture, q, wanted)
+                np.testing.assert_array_equal(acts[e], wanted)
+                goes_on += 1
+        batch.step(acts, auto_reset=False)
+    assert goes_on > 20
+
+
 def test_fewer_contacts_than_alone() -> None:
     goals = target_goals(POLICY.targets, 270)
     settings = batch_of(1, "walker").settings
