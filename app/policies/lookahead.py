@@ -4,6 +4,7 @@
 """
 
 import math
+from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
@@ -15,6 +16,7 @@ from app.policies.reach_policy import ReachPolicy
 from app.sim.forecasts import new_forecaster
 from app.sim.kernels import lookahead as kernel
 from app.sim.kernels import other_ways
+from app.sim.kernels.compiled import direct
 from app.sim.kernels.forecast import STEP_S, Network
 from app.sim.kernels.reach import ReachState, ReachWorld, Work, new_work
 from app.sim.ports import ReachActor
@@ -75,6 +77,7 @@ class Lookahead:
         self._network, self._rule, self._calm_m = network, actor.action.rule(), calm_m
         self._cells: Cells | None = None
         self._work: tuple[Work, kernel.Lookahead] | None = None
+        self._call: Callable[..., None] = kernel.look_ahead_batch
 
     def improve(self, cells: Cells, act: Actions) -> NDArray[np.int64]:
         """Replace actions that end in a contact by the first ones of better ways.
@@ -86,12 +89,14 @@ class Lookahead:
         Returns:
             Numbers of the ways begun instead, among ``OTHERS``, or PASSED, shape (n_envs,).
         """
-        world, state = cells.world, cells.state
+        world, state, chosen = cells.world, cells.state, np.empty(len(act), dtype=np.int64)
         if self._work is None or self._cells is not cells:
             look = kernel.new_lookahead(
                 world.arm, self._network, BASE_WEIGHT, len(act), self._calm_m
             )
             self._cells, self._work = cells, (new_work(world, state, new_forecaster()), look)
-        chosen = np.empty(len(act), dtype=np.int64)
-        kernel.look_ahead_batch(world, self._rule, state, act, *self._work, chosen)
+            self._call = direct(
+                kernel.look_ahead_batch, (world, self._rule, state, act, *self._work, chosen)
+            )
+        self._call(world, self._rule, state, act, *self._work, chosen)
         return chosen

@@ -9,6 +9,7 @@ remembered from one call to the next: the speeds hold all that the next period n
 import threading
 import time
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -47,16 +48,25 @@ LONGEST_S = 60.0
 _FAR = np.full(3, 10.0)
 HUMAN = ("x", "y", "vx", "vy", "r", "growth")
 """What a policy sees of a person."""
-RANGES: Mapping[str, Sequence[str]] = {
-    "q": tuple(f"robot.q[{j}]" for j in range(6)),
-    "qd": tuple(f"robot.qd[{j}]" for j in range(6)),
-    "goal": ("goal.x", "goal.y", "goal.z"),
-}
-"""Variables of a manifest's ``trained_range`` and what messages call their numbers."""
+ROBOT = (
+    *(f"robot.q[{j}]" for j in range(6)),
+    *(f"robot.qd[{j}]" for j in range(6)),
+    *("goal.x", "goal.y", "goal.z"),
+)
+"""What messages call the numbers of ``q``, ``qd`` and ``goal`` of a ``trained_range``."""
 
 Seen = tuple[int | None, Vec]
 """A person, bodies first, or None for nobody, and the cylinder a policy saw, shape (6,)."""
 Told = tuple[SafetyDecision | None, int | None, SeparationTerms | None]
+
+
+class _Trained(NamedTuple):
+    """What was met in training of some numbers, and with slack; infinite where unknown."""
+
+    low: Vec
+    high: Vec
+    least: Vec
+    most: Vec
 
 
 class MotionDecider:
@@ -76,10 +86,8 @@ class MotionDecider:
         self.actor, self.cell, self.arm = actor, cell, arm_of(cell)
         self._between = Interpolation(actor) if interpolates(actor) else None
         self._rule = actor.action.rule()
-        self._ranges = {
-            name: (np.array(entry["low"]), np.array(entry["high"]))
-            for name, entry in actor.trained_range.items()
-        }
+        self._robot = _trained(actor.trained_range, {"q": 6, "qd": 6, "goal": 3})
+        self._person = _trained(actor.trained_range, {"human": len(HUMAN)})
         self._stages: dict[tuple[int, int], Stage] = {}
         self._aheads: dict[Stage, Lookahead] = {}
         self._layer = SafetyLayer(self.arm, SafetySettings())
@@ -286,41 +294,48 @@ class MotionDecider:
 
     def _outside(self, q: Vec, qd: Vec, goal: Vec) -> tuple[OutsideField, ...]:
         """Return what of robot and goal lies outside the training range."""
-        values = {"q": q, "qd": qd, "goal": goal}
-        return tuple(
-            one
-            for key, names in RANGES.items()
-            for one in self._beyond(key, values[key], names)
-        )
+        return _beyond(self._robot, np.concatenate((q, qd, goal)), ROBOT)
 
     def _human(
         self, who: int | None, seen: Vec, order: Sequence[int]
     ) -> tuple[OutsideField, ...]:
         """Return what of a person, or of nobody, lies outside the training range."""
         if who is None:
-            met = self._beyond("human", seen, HUMAN)
+            met = _beyond(self._person, seen, HUMAN)
             nobody = OutsideField(field="people", value=0.0, low=1.0, high=4.0)
             return (nobody,) if met else ()
-        return self._beyond("human", seen, [f"people[{order[who]}].{name}" for name in HUMAN])
+        return _beyond(self._person, seen, [f"people[{order[who]}].{name}" for name in HUMAN])
 
-    def _beyond(self, key: str, values: Vec, names: Sequence[str]) -> tuple[OutsideField, ...]:
-        found = self._ranges.get(key)
-        if found is None or len(found[0]) > len(values):
-            return ()
-        low, high = found
-        values = values[: len(low)]
-        beyond = (values < low - RANGE_SLACK) | (values > high + RANGE_SLACK)
-        if not beyond.any():
-            return ()
-        return tuple(
-            OutsideField(
-                field=names[i],
-                value=float(values[i]),
-                low=float(low[i]),
-                high=float(high[i]),
-            )
-            for i in np.flatnonzero(beyond).tolist()
+
+def _trained(
+    ranges: Mapping[str, Mapping[str, Sequence[float]]], sizes: Mapping[str, int]
+) -> _Trained:
+    """Return what a manifest says was met of some variables of these lengths, joined."""
+    n, first = sum(sizes.values()), 0
+    low, high = np.full(n, -np.inf), np.full(n, np.inf)
+    for name, size in sizes.items():
+        entry = ranges.get(name)
+        if entry is not None and len(entry["low"]) <= size:
+            known = slice(first, first + len(entry["low"]))
+            low[known], high[known] = entry["low"], entry["high"]
+        first += size
+    return _Trained(low, high, low - RANGE_SLACK, high + RANGE_SLACK)
+
+
+def _beyond(met: _Trained, values: Vec, names: Sequence[str]) -> tuple[OutsideField, ...]:
+    """Return which of some numbers lie outside what was met in training."""
+    inside = (met.least <= values) & (values <= met.most)
+    if inside.all():
+        return ()
+    return tuple(
+        OutsideField(
+            field=names[i],
+            value=float(values[i]),
+            low=float(met.low[i]),
+            high=float(met.high[i]),
         )
+        for i in np.flatnonzero(~inside).tolist()
+    )
 
 
 def _bodies_first(people: Sequence[Person]) -> list[int]:

@@ -14,6 +14,7 @@ ACTORS = ("residual", "plain")
 CRITICS = ("mean", "quantiles")
 SIGHTS = ("observation", "future")
 PRECISIONS = ("float32", "bfloat16")
+SAFETIES = ("none", "ssm")
 MAX_BYTES = 16 * 1024 * 1024
 """Size of the networks that a checkpoint holds [bytes]."""
 MOST_SEEN = 176
@@ -111,9 +112,14 @@ class ReachPreset:
     )
     start: str = choice("clearance", get_args(StartRule), "where people may start")
     start_clearance_m: float = number(
-        0.05, 0.0, 0.5, "m", "least distance of robot and person at the start"
+        0.05, 0.0, 1.0, "m", "least distance of robot and person at the start"
     )
     n_people: int = number(1, 0, 4, "", "people who walk; the policy sees the nearest")
+    safety: str = choice(
+        "none",
+        SAFETIES,
+        "what scales the motion: nothing, or speed and separation monitoring as in the cell",
+    )
     collision: str = choice(
         "ends", ("ends", "goes-on"), "whether a collision ends an episode or it goes on"
     )
@@ -139,6 +145,9 @@ class ReachPreset:
     c_step: float = number(0.003, 0.0, 1.0, "", "cost of a control period")
     c_c: float = number(4.0, 0.0, 100.0, "", "cost of a collision")
     c_s: float = number(4.0, 0.0, 100.0, "", "bonus of a success")
+    c_o: float = number(
+        0.0, 0.0, 10.0, "", "cost of a period that monitoring stops, for safety = ssm"
+    )
 
     progress_steps: int = number(
         256_000, 100, 1_000_000, "env steps", "steps between two points of the curve"
@@ -185,6 +194,12 @@ class ReachPreset:
                 "overrides.critic_sees",
                 self.critic_sees,
                 "must be observation with observation = state: its time-outs are no true ends",
+            )
+        if self.safety == "ssm" and (self.collision != "ends" or self.n_people == 0):
+            raise InvalidInput(
+                "overrides.safety",
+                self.safety,
+                "needs somebody to watch, n_people above 0, and collision = ends",
             )
         _check_size(self)
         check_learning(self.learning_starts, self.total_steps, self.buffer_size, self.n_envs)
@@ -251,7 +266,17 @@ THESIS = ReachPreset(
 printed: the exponents of the priorities are those of Schaul et al. (2016), the process moves by
 one unit of time per period, an episode goes on after a collision as in the authors' code."""
 
-REACH_PRESETS = (ReachPreset(), THESIS)
+MONITORED = ReachPreset(
+    name="reach-td3-monitored",
+    safety="ssm",
+    time_limit_s=10.0,
+    start_clearance_m=0.8,
+    c_o=0.02,
+)
+"""Ours under speed and separation monitoring: it learns where people who come will stop it, and
+has twice the time. Everybody starts so far away that the robot may set out."""
+
+REACH_PRESETS = (ReachPreset(), MONITORED, THESIS)
 """All presets of the scenario."""
 
 

@@ -26,6 +26,7 @@ from app.policies.run import Parts, TrainingRun
 from app.policies.td3 import BatchTD3, Extras, Networks, critics_of
 from app.policies.vecenv import CellVecEnv, Foresight
 from app.sim.cells import Cell
+from app.sim.guarded_reach import GuardedReach
 from app.sim.kernels.kinematics import ik_vertical_batch
 from app.sim.kernels.occupancy import VX, VY, R, X, Y
 from app.sim.kernels.reach_features import BASE_START
@@ -33,6 +34,7 @@ from app.sim.kernels.reach_reward import ReachWeights
 from app.sim.pick import OUTCOMES
 from app.sim.ports import Vec
 from app.sim.reach import N_ACT, ReachBatch, ReachSettings
+from app.sim.safety import safety_settings
 from app.sim.scene import HumanKind
 
 CURVE_SEED = 1_000_003
@@ -62,8 +64,17 @@ def settings_of(preset: ReachPreset) -> ReachSettings:
             c_step=preset.c_step,
             c_c=preset.c_c,
             c_s=preset.c_s,
+            c_o=preset.c_o,
         ),
     )
+
+
+def batch_of(preset: ReachPreset, cell: Cell, n_envs: int, seed: int) -> ReachBatch:
+    """Return the cells that a preset trains in, or that its curve is played in."""
+    settings = settings_of(preset)
+    if preset.safety == "ssm":
+        return GuardedReach(cell, n_envs, seed, settings, safety_settings(cell))
+    return ReachBatch(cell, n_envs, seed, settings)
 
 
 def explorer_of(preset: ReachPreset, batch: ReachBatch, seed: int) -> Explorer:
@@ -136,7 +147,7 @@ def start(
         InvalidInput: The cell has no goal region.
     """
     first = 0 if resume is None else int(resume.manifest["step"])
-    batch = ReachBatch(cell, preset.n_envs, seed + first, settings_of(preset))
+    batch = batch_of(preset, cell, preset.n_envs, seed + first)
     foresight = Foresight(batch) if preset.critic_sees == "future" else None
     env = CellVecEnv(batch, preset.observation != "state", foresight)
     model = BatchTD3(
@@ -197,7 +208,7 @@ class ReachReporter(Reporter):
         self._run, self._watched, preset = run, watched, run.preset
         assert isinstance(preset, ReachPreset)
         n = preset.progress_episodes
-        self._played = ReachBatch(run.cell, n, CURVE_SEED, settings_of(preset))
+        self._played = batch_of(preset, run.cell, n, CURVE_SEED)
 
     def watch(self, rewards: NDArray[np.floating]) -> None:
         """Look at the range of the states now and then."""

@@ -17,7 +17,6 @@ from app.sim.forecasts import new_forecaster
 from app.sim.kernels import motion, reach, reach_views
 from app.sim.kernels.compiled import direct
 from app.sim.kernels.occupancy import (
-    AGE,
     GROWTH,
     N_PAST,
     PAST_RADIUS,
@@ -27,6 +26,7 @@ from app.sim.kernels.occupancy import (
     R,
     X,
     Y,
+    remember_as_now,
 )
 from app.sim.kernels.reach_features import EVERYBODY
 from app.sim.ports import Person, Vec
@@ -113,7 +113,9 @@ class Stage:
             walker = rows.walkers.rows[0, i - first]
             walker[X], walker[Y], walker[R] = person.cylinder
             walker[VX], walker[VY], walker[GROWTH] = *person.qd[:2], person.growth
-            _remind(walker, person.past)
+            remember_as_now(rows.walkers.rows, 0, i - first)
+            if person.past is not None:
+                _remind(walker, person.past)
             rows.cylinders[0, i - first] = person.cylinder
         self._take_in(*self._shared)
 
@@ -150,16 +152,14 @@ class Stage:
         return found
 
 
-def _remind(walker: Vec, past: Vec | None) -> None:
+def _remind(walker: Vec, past: Vec) -> None:
     """Set what a walker's row, shape (N_STATE,), remembers; what is unknown stayed as it was.
 
     Args:
-        walker: The row; radius and velocity now are set already.
+        walker: The row; it remembers that all was as now.
         past: As in ``Person.past``.
     """
-    now = [[walker[R], np.hypot(walker[VX], walker[VY])]]
-    known = np.array(now) if past is None else np.concatenate([now, past])
+    known = np.concatenate([[[walker[PAST_RADIUS], walker[PAST_SPEED]]], past])
     held = np.minimum(np.arange(N_PAST), len(known) - 1)
-    walker[AGE] = 0.0
     walker[PAST_RADIUS : PAST_RADIUS + N_PAST] = known[held, 0]
     walker[PAST_SPEED : PAST_SPEED + N_PAST] = known[held, 1]

@@ -7,9 +7,10 @@ import torch
 from app.errors import CheckpointMismatch, InvalidInput
 from app.policies import presets, reach_training
 from app.policies.reach_policy import ReachPolicy
-from app.policies.reach_training import play, settings_of, states_met
+from app.policies.reach_training import batch_of, play, settings_of, states_met
 from app.policies.vecenv import CellVecEnv
 from app.sim.cells import load_cell
+from app.sim.guarded_reach import GuardedReach
 from app.sim.reach import THESIS_WEIGHTS, ReachBatch, ReachSettings
 from tests.policies.conftest import Recorder
 
@@ -73,6 +74,24 @@ def test_what_was_trained_decides_as_a_policy(preset, ran):
     ranges = policy.trained_range
     assert set(ranges) == {"q", "qd", "goal", "human"}
     assert ranges["human"]["low"][4] >= 0.2 and ranges["human"]["high"][4] <= 0.5
+
+
+def test_the_monitored_preset_trains_and_is_counted_under_the_layer():
+    preset = presets.resolve("reach-td3-monitored", TINY)
+    batch = batch_of(preset, load_cell("shared-workspace"), 16, 3)
+    assert isinstance(batch, GuardedReach)
+    assert batch.settings.weights.c_o == preset.c_o > 0.0
+    assert not isinstance(
+        batch_of(presets.resolve("reach-td3", TINY), batch.cell, 4, 3), GuardedReach
+    )
+    ran = Recorder().run(preset)
+    assert ReachPolicy(ran.checkpoint).acts(batch.reset()).shape == (16, 6)
+    assert (batch.state.clear[:, 0] >= 0.8).all()
+
+
+def test_monitoring_nobody_is_refused():
+    with pytest.raises(InvalidInput, match=r"overrides\.safety = 'ssm' needs somebody"):
+        presets.resolve("reach-td3-monitored", {"n_people": 0})
 
 
 def test_the_reward_of_what_is_played_is_that_of_the_batch(preset):

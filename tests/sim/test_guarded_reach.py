@@ -72,6 +72,24 @@ def test_people_walk_as_they_do_without_the_layer():
     )
 
 
+def test_a_period_that_is_stopped_costs_what_the_weights_say():
+    dear = replace(BOX, weights=BOX.weights._replace(c_o=0.5))
+    cheap, costly = (
+        GuardedReach(CELL, 8, 5, BOX, SAFETY),
+        GuardedReach(CELL, 8, 5, dear, SAFETY),
+    )
+    cheap.reset(), costly.reset()
+    n_stopped = 0
+    for _ in range(60):
+        act = straight(cheap)
+        went_on = cheap.state.outcome == RUNNING
+        one, other = cheap.step(act, auto_reset=False), costly.step(act, auto_reset=False)
+        stopped = went_on & (cheap.override <= 0.0)
+        np.testing.assert_allclose(one.rew - other.rew, 0.5 * stopped, atol=1e-6)
+        n_stopped += stopped.sum()
+    assert n_stopped > 20
+
+
 def test_each_period_is_what_the_layer_decides():
     batch = GuardedReach(
         CELL, 1, 0, replace(BOX, people=("walker",)), SAFETY, tracks=passing(1)

@@ -7,6 +7,8 @@ distance of the source's comparison.
 
 ===================  ========================================================================
 ``policy``           the checkpoint, asked every 20 ms
+``policy-unaware``   the shipped policy that knows of no safety layer, where the checkpoint was
+                     trained under it
 ``rrt-star-once``    planned once among people as they stand at the start, as in the source
 ``rrt-connect``      planned again where its path is blocked
 ``aorrtc``           the same with an anytime planner
@@ -39,6 +41,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from app.policies import pretrained
 from app.policies.checkpoint import Checkpoint
 from app.policies.evaluation.reach_episodes import N_ENVS, random_goals
 from app.policies.evaluation.rows import OnRow, untold
@@ -385,6 +388,16 @@ def example_of(courses: Mapping[str, Course], dt: float) -> Json:
     }
 
 
+def movers_of(checkpoint: Checkpoint, actor: ReachPolicy) -> dict[str, Mover]:
+    """Return who stands in for the policy, by row: see ``policy`` and ``policy-unaware``."""
+    movers = {"policy": mover_of(actor, "direct")}
+    if checkpoint.manifest["preset"].get("safety") == "ssm":
+        other = ReachPolicy(pretrained.load("reach"))
+        if (other.action, other.view) == (actor.action, actor.view):
+            movers["policy-unaware"] = mover_of(other, "direct")
+    return movers
+
+
 class _Rows:
     """Collects rows and tells of each."""
 
@@ -399,16 +412,16 @@ class _Rows:
 
 
 def compare(
-    comparison: Comparison, mover: Mover | None, rows: _Rows, suffix: str = ""
+    comparison: Comparison, movers: Mapping[str, Mover], rows: _Rows, suffix: str = ""
 ) -> dict[str, Course]:
-    """Run policy and planners over one set of crossings; return their courses by row."""
-    jobs: dict[str, Callable[[], Course]] = {}
-    if mover is not None:
-        jobs["policy"] = lambda: comparison.policy(mover)
+    """Run policies and planners over one set of crossings; return their courses by row."""
+    jobs: dict[str, Callable[[], Course]] = {
+        name: partial(comparison.policy, mover) for name, mover in movers.items()
+    }
     for name, settings in PLANNERS.items():
         jobs[name] = partial(comparison.planner, settings)
-    if mover is not None:
-        jobs["policy-alone"] = lambda: comparison.policy(mover, alone=True)
+    if "policy" in movers:
+        jobs["policy-alone"] = partial(comparison.policy, movers["policy"], alone=True)
     jobs["planner-alone"] = lambda: comparison.planner(ALONE, alone=True)
     jobs["planner-bare"] = lambda: comparison.planner(ALONE, blind=True, guarded=False)
     courses = {}
@@ -452,17 +465,17 @@ def run_ssm(
     """
     n_random = episodes or RANDOM_EPISODES
     actor, cell = ReachPolicy(checkpoint), cell_of(checkpoint.manifest)
-    mover, safety = mover_of(actor, "direct"), safety_settings(cell)
+    moved, safety = movers_of(checkpoint, actor), safety_settings(cell)
     settings = ReachSettings(action=actor.action, observation=actor.view)
     n = min(N_CROSSINGS, n_random)
     sets = {"": crossings(cell, n)}
     if motions:
         sets[" recorded"] = recorded_crossings(cell, motions, min(N_RECORDED, n_random))
-    rows = _Rows(len(sets) * (len(PLANNERS) + 5) + 2, on_row)
+    rows = _Rows(len(sets) * (len(PLANNERS) + len(moved) + 4) + 2, on_row)
     result: Json = {"paired": {}}
     for suffix, crossed in sets.items():
         comparison = Comparison(cell, crossed, settings, safety, seed)
-        courses = compare(comparison, mover, rows, suffix)
+        courses = compare(comparison, moved, rows, suffix)
         result["paired"] |= {
             f"policy against {name}{suffix}": against(
                 courses["policy"].runs, courses[name].runs
@@ -472,9 +485,8 @@ def run_ssm(
         if not suffix:
             result["seconds"] = seconds_of(courses)
             result["example"] = example_of(courses, cell.robot.dt)
-    movers: dict[str, Mover] = {"random": mover, "random-still": _Still()}
-    for name, moved in movers.items():
-        rows.add(random_row(name, random_runs(cell, settings, safety, moved, n_random, seed)))
+    for name, mover in {"random": moved["policy"], "random-still": _Still()}.items():
+        rows.add(random_row(name, random_runs(cell, settings, safety, mover, n_random, seed)))
     return {
         "settings": stated(safety, n, [motion.source for motion in motions]),
         "results": rows.rows,
@@ -503,5 +515,5 @@ def measure_planners(n: int = N_CROSSINGS, seed: int = 11, on_row: OnRow = untol
         cell, crossings(cell, n), ReachSettings(), safety_settings(cell), seed
     )
     rows = _Rows(len(PLANNERS) + 3, on_row)
-    compare(comparison, None, rows)
+    compare(comparison, {}, rows)
     return {"settings": stated(comparison.safety, n, ()), "results": rows.rows}

@@ -278,7 +278,8 @@ def guarded_period(
         state.outcome[e] = SUCCESS
     elif left <= 1e-9:
         state.outcome[e] = TIMEOUT
-    return reward(before, d, work.c, touched, state.outcome[e] == SUCCESS, weights)
+    stopped = weights.c_o if guard.override[e] <= 0.0 else 0.0
+    return reward(before, d, work.c, touched, state.outcome[e] == SUCCESS, weights) - stopped
 
 
 @kernel(error_model="numpy")

@@ -2,7 +2,8 @@
 
 ``r = c_p (d_old - gamma d) - c_d d - c_a |c| - c_step - c_c [collision] + c_s [success]``, with
 ``d`` the distance of tcp and goal and ``|c|`` the Euclidean norm of the period's second
-coefficients. With ``c_p = c_step = 0`` it is the source's; with ``c_d = c_a = 0`` it rewards
+coefficients; under speed and separation monitoring less ``c_o`` in a period that it stops.
+With ``c_p = c_step = 0`` it is the source's; with ``c_d = c_a = 0`` it rewards
 progress, which learned far better where a collision ends the episode: a cost of distance alone
 then rewards an early end.
 """
@@ -31,6 +32,8 @@ class ReachWeights(NamedTuple):
     """Cost of a period with a collision."""
     c_s: float
     """Bonus of a success."""
+    c_o: float = 0.0
+    """Cost of a period in which speed and separation monitoring stops the robot."""
 
 
 @kernel(inline="always")
