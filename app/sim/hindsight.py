@@ -81,7 +81,9 @@ def copy_rows(source: Any, rows: Index, target: Any, first: int = 0) -> None:
             new[first : first + len(rows)] = old[rows]
 
 
-def draw_detours(arm: Arm, rng: np.random.Generator, k: int) -> tuple[Vec, Vec]:
+def draw_detours(
+    arm: Arm, rng: np.random.Generator, k: int, longest: float = LONGEST_WAIT
+) -> tuple[Vec, Vec]:
     """Draw where replays go first [rad], shape (k, 6), and until when [s], shape (k,)."""
     kind, home = rng.uniform(size=k), np.repeat(np.array(arm.home)[None], k, axis=0)
     near = home + rng.uniform(-1.0, 1.0, (k, 6)) * NEARBY
@@ -90,7 +92,7 @@ def draw_detours(arm: Arm, rng: np.random.Generator, k: int) -> tuple[Vec, Vec]:
     anywhere[:, 5] = near[:, 5] = home[:, 5]
     first = np.where((kind < AT_HOME + NEAR_HOME)[:, None], near, anywhere)
     first = np.where((kind < AT_HOME)[:, None], home, first)
-    return np.clip(first, arm.q_min, arm.q_max), rng.uniform(0.0, LONGEST_WAIT, k)
+    return np.clip(first, arm.q_min, arm.q_max), rng.uniform(0.0, longest, k)
 
 
 def toward(arm: Arm, q: Vec, aim: Vec) -> NDArray[np.float32]:
