@@ -32,9 +32,10 @@ OTHERS = (
         for signs in other_ways.SIGNS
         for n in other_ways.DASHING
     ),
+    "dart",
 )
 """Names of the other ways: where they lead first, and for how long. Of a dash, what pan,
-shoulder and elbow do: forward, back, or held."""
+shoulder and elbow do: forward, back, or held. Where a dart leads is drawn."""
 
 Actions = NDArray[np.float32]
 

@@ -13,12 +13,13 @@ from app.policies.reach_policy import ReachPolicy
 from app.sim.cells import load_cell
 from app.sim.forecasts import new_forecaster
 from app.sim.kernels import lookahead as kernel
-from app.sim.kernels import other_ways
+from app.sim.kernels import other_ways, random
+from app.sim.kernels.arm import place_robot
 from app.sim.kernels.episode import COLLISION, RUNNING, SUCCESS
 from app.sim.kernels.forecast import STEP_S, Network
 from app.sim.kernels.foretold import N_PLAYED
 from app.sim.kernels.occupancy import GAIT, STILL, VX, VY, X, Y
-from app.sim.kernels.reach import new_work
+from app.sim.kernels.reach import Work, new_work
 from app.sim.reach import ReachBatch, ReachSettings
 from tests.policies.test_movers import RandomActor
 
@@ -39,6 +40,15 @@ def walked(batch: ReachBatch, periods: int) -> ReachBatch:
     for _ in range(periods):
         batch.step(mover.acts(batch), auto_reset=False)
     return batch
+
+
+def looked(n_envs: int, *people: str) -> tuple[kernel.Lookahead, Work, ReachBatch]:
+    """Return work space, and robots that are on their way."""
+    batch = walked(batch_of(n_envs, *people), 15)
+    network = POLICY.kernel_network
+    assert network is not None
+    look = kernel.new_lookahead(batch.arm, network, BASE_WEIGHT, n_envs, np.inf)
+    return look, new_work(batch.world, batch.state, new_forecaster()), batch
 
 
 def test_the_kernel_asks_the_same_network() -> None:
@@ -67,7 +77,7 @@ def test_what_is_played_is_what_happens_beside_constant_people() -> None:
     for row in live:
         n = kernel.foretell(batch.world, batch.state, row, work, look.foretold)
         told[row] = kernel._play(
-            batch.world, rule, batch.state, row, acts[row], PASSED, 0, n, work, look
+            batch.world, rule, batch.state, row, acts[row], PASSED, 0, 1.0, n, work, look
         )[0]
     walked(batch, round(N_PLAYED * kernel.STEP_S / batch.arm.dt))
     found = batch.state.outcome[live]
@@ -78,7 +88,7 @@ def test_what_is_played_is_what_happens_beside_constant_people() -> None:
 
 def test_dashes_end_as_they_are_played() -> None:
     """The robot is driven by hand as each dash says, with nobody but in the far corner."""
-    dashes = other_ways.N_OTHERS - other_ways.N_FIRST
+    dashes = other_ways.N_DRAWN - other_ways.N_FIRST
     batch = batch_of(dashes, "constant")
     rows = batch.state.people.walkers.rows
     rows[:, 0, [X, Y]], rows[:, 0, GAIT] = (-2.0, 2.0), STILL
@@ -93,7 +103,7 @@ def test_dashes_end_as_they_are_played() -> None:
         n = kernel.foretell(batch.world, batch.state, row, work, look.foretold)
         way = other_ways.way_of(other_ways.N_FIRST + row)
         told[row] = kernel._play(
-            batch.world, rule, batch.state, row, look.found, *way, n, work, look
+            batch.world, rule, batch.state, row, look.found, *way, 1.0, n, work, look
         )[0]
     periods = round(STEP_S / batch.arm.dt)
     for k in range(N_PLAYED * periods):
@@ -105,6 +115,67 @@ def test_dashes_end_as_they_are_played() -> None:
         batch.step(act, auto_reset=False)
     np.testing.assert_array_equal(batch.state.outcome[live], told[live])
     assert {RUNNING, COLLISION} <= set(told[live])
+
+
+def test_darts_end_as_they_are_played() -> None:
+    """Each row draws its own; beside people whose future is known it ends as was told."""
+    n_envs, look, work, batch = 60, *looked(60, "constant")
+    rows = batch.state.people.walkers.rows
+    rows[:, 0, GAIT], rows[:, 0, [VX, VY]] = STILL, 0.0
+    rule, rng = batch.settings.action.rule(), np.zeros(1, dtype=np.uint64)
+    random.start_stream(1, 2, 3, rng)
+    aims, lasting, told = np.zeros((n_envs, 6)), np.zeros(n_envs, dtype=int), np.zeros(n_envs)
+    live = np.flatnonzero(batch.state.outcome == RUNNING)
+    for row in live:
+        n = kernel.foretell(batch.world, batch.state, row, work, look.foretold)
+        lasting[row] = other_ways.draw_dart(batch.arm, batch.state.q[row], rng, look.dart)
+        aims[row] = look.dart
+        told[row] = kernel._play(
+            batch.world, rule, batch.state, row, look.found, other_ways.DART, lasting[row],
+            0.0, n, work, look,
+        )[0]  # fmt: skip
+    periods = round(STEP_S / batch.arm.dt)
+    for step in range(other_ways.DART_PLAYED):
+        act = np.zeros((n_envs, 6), dtype=np.float32)
+        for row in live:
+            if step < lasting[row]:
+                q = batch.state.q[row]
+                other_ways.write_toward(batch.arm, aims[row], q, act[row])
+            else:
+                act[row] = straight(batch, row, work, look)
+        for _ in range(periods):
+            batch.step(act, auto_reset=False)
+    np.testing.assert_array_equal(batch.state.outcome[live], told[live])
+    assert len(set(told[live])) == 3
+
+
+def straight(batch: ReachBatch, row: int, work: Work, look: kernel.Lookahead) -> np.ndarray:
+    """Return the action that leads the tcp of a row straight to its goal."""
+    place_robot(batch.arm, batch.state.q[row], work.robot)
+    kernel._straight(batch.world, batch.state.goal[row], work, look)
+    return look.act.copy()
+
+
+def test_a_dart_like_another_one_stays_within_the_joints() -> None:
+    _, _, batch = looked(1, "constant")
+    rng, out = np.zeros(1, dtype=np.uint64), np.zeros(6)
+    drawn = []
+    for k in range(200):
+        random.start_stream(0, 0, k, rng)
+        aim = batch.arm.q_max if k % 2 else batch.arm.home
+        drawn.append((other_ways.vary_dart(batch.arm, aim, 3, rng, out), *out))
+        assert (out >= batch.arm.q_min).all() and (out <= batch.arm.q_max).all()
+    assert min(row[0] for row in drawn) == 0 and max(row[0] for row in drawn) > 8
+    assert len(set(drawn)) == 200
+
+
+def test_looking_ahead_draws_the_same_again() -> None:
+    batch = walked(batch_of(60, "walker"), 70)
+    acts = mover_of(POLICY, "direct").acts(batch)
+    first, again = acts.copy(), acts.copy()
+    chosen = [Lookahead(POLICY).improve(batch, given) for given in (first, again)]
+    np.testing.assert_array_equal(*chosen)
+    np.testing.assert_array_equal(first, again)
 
 
 def test_a_way_into_the_table_is_changed_and_never_rested_on() -> None:
@@ -144,7 +215,8 @@ def test_a_way_begun_is_gone_on_with_for_no_longer_than_it_lasts() -> None:
             if posture < other_ways.STRAIGHT:
                 wanted = np.zeros(6, dtype=np.float32)
                 q = batch.state.q[e]
-                other_ways.write_toward(batch.arm, look.aim, posture, q, wanted)
+                if posture < other_ways.STOP:
+                    other_ways.write_toward(batch.arm, look.aim[posture], q, wanted)
                 np.testing.assert_array_equal(acts[e], wanted)
                 goes_on += 1
         batch.step(acts, auto_reset=False)
@@ -181,7 +253,7 @@ def test_with_several_people_actions_stay_actions(people: tuple[str, ...]) -> No
 def test_the_names_of_the_other_ways() -> None:
     assert len(OTHERS) == len(set(OTHERS)) == other_ways.N_OTHERS
     assert OTHERS[other_ways.STRAIGHT_WAY] == "straight" and OTHERS[0] == "home-0.08s"
-    assert OTHERS[-1] == "dash-bbb-0.6s"
+    assert OTHERS[-2:] == ("dash-bbb-0.6s", "dart")
 
 
 def test_other_policies_cannot() -> None:

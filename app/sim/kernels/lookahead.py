@@ -3,13 +3,14 @@
 A network knows to some centimetres whether its way is free; played forward the same way is
 known to millimetres. So a decision is played ahead: the robot exactly as it moves, people as
 ``foretold.py`` says, the policy asked again every ``STEP_S``. Where that ends in a contact,
-those of ``other_ways.py`` are played too, the dashes only where all before end in one. The best
-way is begun, for one period. The next decision looks anew, and what is left of the way begun is
-one of those looked at: it is gone on with until the policy's own way is better.
+those of ``other_ways.py`` are played too, dashes and darts only where all before end in one.
+The best way is begun, for one period. The next decision looks anew, and what is left of the
+way begun is one of those looked at: it is gone on with until the policy's own way is better.
 
-Later in an episode other ways are now and then also played where the policy's leads neither to
-the goal nor into a contact: it may wait longer than it must. Only one that ends at the goal is
-begun then.
+Later in an episode other ways are also played where the policy's leads neither to the goal nor
+into a contact: it may wait longer than it must. Only one that ends at the goal is begun then.
+Darts find ways around somebody who stands: most are drawn near the one that came nearest to the
+goal so far, so that they get better from decision to decision.
 
 A contact is also who comes nearer than ``KEPT_M``, or less in the first moments, where nothing
 can be done about it: what is foretold is not known to less.
@@ -29,7 +30,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from app.sim.kernels import kinematics
+from app.sim.kernels import kinematics, random
 from app.sim.kernels.actions import ActionRule, advance
 from app.sim.kernels.arm import Arm, cell_clearance, place_robot, self_clearance
 from app.sim.kernels.columns import copy_values
@@ -41,13 +42,20 @@ from app.sim.kernels.forecast import N_TIMES, STEP_S, Floats, Network, layer
 from app.sim.kernels.foretold import N_PLAYED, Foretold, foretell, new_foretold
 from app.sim.kernels.geometry import FAR
 from app.sim.kernels.other_ways import (
+    DART,
+    DART_PLAYED,
     DASH,
+    N_DARTS,
+    N_DRAWN,
     N_FIRST,
-    N_OTHERS,
     N_POSTURES,
     PASSED,
     POSTURES,
+    STOP,
     STRAIGHT,
+    VARIED,
+    draw_dart,
+    vary_dart,
     way_of,
     write_dash,
     write_toward,
@@ -73,13 +81,13 @@ BETTER = 0.02
 WORTH_IT = 1.0
 """Worth more is every way that ends at the goal."""
 PATIENCE_S, HURRY_S = 1.0, 4.0
-"""Other ways but the dashes are played, too, where the policy's ends neither at the goal nor in
+"""Ways other than dashes are played, too, where the policy's ends neither at the goal nor in
 a contact, from so long into an episode on, or when no more time than that is left [s]."""
-WAITS = 3
-"""Every so manyth decision of those."""
 KEPT_M, KEPT_M_S = 0.01, 0.02
 """Nearer to people than this is a contact on a way that is played: so much, or so much per
 second of it where that is less [m, m/s]."""
+KEPT_ON = 0.5
+"""Share of it that counts on a way that is gone on with."""
 
 
 class Lookahead(NamedTuple):
@@ -122,8 +130,23 @@ class Lookahead(NamedTuple):
     plan: NDArray[np.int64]
     """Number of the way that was begun last, or PASSED, and for how many decisions it has been
     gone on with, shape (n_envs, 2)."""
-    waits: NDArray[np.int64]
-    """Decisions until other ways are played again where the policy waits, shape (n_envs,)."""
+    came: Vec
+    """How near to the goal the way played last came [m], shape (1,)."""
+    dart: Vec
+    """Where the dart that is played leads first [rad], shape (6,)."""
+    darts: Vec
+    """The same of those begun last, shape (n_envs, 6)."""
+    darting: NDArray[np.int64]
+    """For how many steps they lead there, shape (n_envs,)."""
+    near: Vec
+    """The same of those that came nearest to the goal, shape (n_envs, 6)."""
+    nearest: Vec
+    """How near that was [m], 0 where there is none yet; for how many steps they lead there, and
+    since when in the episode [s], shape (n_envs, 3)."""
+    drawn: NDArray[np.int64]
+    """Decisions that drew darts in the present episodes, shape (n_envs,)."""
+    rng: random.State
+    """Random stream of a decision, shape (1,)."""
 
 
 def new_lookahead(
@@ -156,7 +179,14 @@ def new_lookahead(
         rests=np.zeros(n_envs, dtype=np.int64),
         begun=room(6),
         plan=np.full((n_envs, 2), PASSED),
-        waits=np.zeros(n_envs, dtype=np.int64),
+        came=np.zeros(1),
+        dart=np.zeros(6),
+        darts=np.zeros((n_envs, 6)),
+        darting=np.zeros(n_envs, dtype=np.int64),
+        near=np.zeros((n_envs, 6)),
+        nearest=np.zeros((n_envs, 3)),
+        drawn=np.zeros(n_envs, dtype=np.int64),
+        rng=np.zeros(1, dtype=np.uint64),
     )
 
 
@@ -266,14 +296,18 @@ def _choose(
     if posture == PASSED and step == 0:
         for j in range(6):
             look.act[j] = act[j]
+    elif posture == DART and step < lasting:
+        write_toward(world.arm, look.dart, look.q, look.act)
+    elif posture == DART or (posture == STRAIGHT and step < lasting):
+        _straight(world, goal, work, look)
     elif posture >= DASH:
         write_dash(posture - DASH, step < lasting, look.act)
     elif posture == PASSED or step >= lasting:
         _ask_at(world, goal, time_left, step, n, work, look)
-    elif posture == STRAIGHT:
-        _straight(world, goal, work, look)
+    elif posture == STOP:
+        look.act[:] = 0.0
     else:
-        write_toward(world.arm, look.aim, posture, look.q, look.act)
+        write_toward(world.arm, look.aim[posture], look.q, look.act)
 
 
 @kernel()
@@ -295,11 +329,12 @@ def _play(
     act: Floats,
     posture: int,
     lasting: int,
+    kept: float,
     n: int,
     work: Work,
     look: Lookahead,
 ) -> tuple[int, float, float]:
-    """Play one way: first to a posture, or ``act``, then the policy; or a dash.
+    """Play one way: first to a posture, or ``act``, then the policy; or a dash, or a dart.
 
     Args:
         world: Shared data.
@@ -309,9 +344,10 @@ def _play(
         act: Action of the first step, where ``posture`` is PASSED; else filled with it.
         posture: Where it leads first, STRAIGHT, PASSED, or from DASH on a dash.
         lasting: For how many steps.
+        kept: Share of KEPT_M that is kept from people.
         n: People.
         work: Work space.
-        look: Network and work space; people are foretold.
+        look: Network and work space; people are foretold. ``came`` is filled.
 
     Returns:
         How it ends (RUNNING, SUCCESS or COLLISION), what it is worth, and how near people come
@@ -323,8 +359,11 @@ def _play(
     for j in range(6):
         look.q[j], look.qd[j], look.qdd[j] = state.q[e, j], state.qd[e, j], state.qdd[e, j]
     place_robot(arm, look.q, work.robot)
-    for step in range(N_PLAYED):
+    look.came[0] = FAR
+    for step in range(DART_PLAYED if posture == DART else N_PLAYED):
         left = state.time_left[e] - step * STEP_S
+        if left <= 0.0:
+            break
         _choose(world, goal, left, step, act, posture, lasting, n, work, look)
         if step == 0:
             for j in range(6):
@@ -339,9 +378,10 @@ def _play(
             share = (i + 1) / periods
             t, clear = (step + share) * STEP_S, _clear(world, step, share, n, work, look)
             least = min(least, clear)
-            if _touches(arm, clear - min(KEPT_M, KEPT_M_S * t), work):
+            if _touches(arm, clear - kept * min(KEPT_M, KEPT_M_S * t), work):
                 return COLLISION, AT_CONTACT + LATER * t - turned, least
-            if distance_to(goal, work.robot) < SUCCESS_DISTANCE:
+            look.came[0] = min(look.came[0], distance_to(goal, work.robot))
+            if look.came[0] < SUCCESS_DISTANCE:
                 return SUCCESS, AT_GOAL - LATER * t - turned, least
     worth = ROOM * least - APART * distance_to(goal, work.robot) - turned
     return RUNNING, worth, least
@@ -360,31 +400,72 @@ def _best_of_others(
 ) -> int:
     """Return the best other way that is worth more than a bar, or PASSED.
 
-    The dashes are played where each way before ends in a contact. Its first action is written
-    into ``look.begun``; the other arguments are as in :func:`_play`.
+    The dashes are played where each way before ends in a contact, the darts where none is
+    chosen or all end so. Its first action is written into ``look.begun``; the other arguments
+    are as in :func:`_play`.
     """
     chosen = PASSED
-    for k in range(N_OTHERS):
+    for k in range(N_DRAWN):
         if k == N_FIRST and bar > NO_CONTACT:
             break
         posture, lasting = way_of(k)
-        _, worth, _ = _play(world, rule, state, e, look.found, posture, lasting, n, work, look)
+        _, worth, _ = _play(
+            world, rule, state, e, look.found, posture, lasting, 1.0, n, work, look
+        )
         if worth > bar:
             bar, chosen = worth + BETTER, k
             copy_values(look.found, look.begun)
+    if chosen != PASSED and bar > NO_CONTACT:
+        return chosen
+    return _best_dart(world, rule, state, e, bar, chosen, n, work, look)
+
+
+@kernel()
+def _best_dart(
+    world: ReachWorld,
+    rule: ActionRule,
+    state: ReachState,
+    e: int,
+    bar: float,
+    chosen: int,
+    n: int,
+    work: Work,
+    look: Lookahead,
+) -> int:
+    """Return the number of the darts if one is worth more than a bar, else ``chosen``."""
+    nearest, (posture, _) = look.nearest[e], way_of(N_DRAWN)
+    random.start_stream(0, 0, look.drawn[e], look.rng)
+    look.drawn[e] += 1
+    if nearest[0] > 0.0:  # it is looked at again, for as long as is left of it
+        nearest[1] = max(0.0, nearest[1] - (state.elapsed[e] - nearest[2]) / STEP_S)
+        nearest[2] = state.elapsed[e]
+    for k in range(N_DARTS):
+        again, lasting = k == 0 and nearest[0] > 0.0, int(nearest[1])
+        if again:
+            copy_values(look.near[e], look.dart)
+        elif nearest[0] > 0.0 and random.uniform(look.rng) < VARIED:
+            lasting = vary_dart(world.arm, look.near[e], lasting, look.rng, look.dart)
+        else:
+            lasting = draw_dart(world.arm, state.q[e], look.rng, look.dart)
+        _, worth, _ = _play(
+            world, rule, state, e, look.found, posture, lasting, 1.0, n, work, look
+        )
+        if again or nearest[0] == 0.0 or look.came[0] < nearest[0]:
+            nearest[0], nearest[1] = look.came[0], lasting
+            nearest[2] = state.elapsed[e]
+            copy_values(look.dart, look.near[e])
+        if worth > bar:
+            bar, chosen = worth + BETTER, N_DRAWN
+            copy_values(look.found, look.begun)
+            copy_values(look.dart, look.darts[e])
+            look.darting[e] = lasting
     return chosen
 
 
 @kernel()
-def _is_late(state: ReachState, e: int, look: Lookahead) -> bool:
+def _is_late(state: ReachState, e: int) -> bool:
     """Tell whether it is time to see if the policy waits longer than it must."""
-    if state.elapsed[e] < PATIENCE_S and state.time_left[e] > HURRY_S:
-        return False
-    look.waits[e] -= 1
-    if look.waits[e] > 0:
-        return False
-    look.waits[e] = WAITS
-    return True
+    return bool(state.elapsed[e] >= PATIENCE_S or state.time_left[e] <= HURRY_S)
 
 
 @kernel()
@@ -393,10 +474,13 @@ def _left(e: int, look: Lookahead, dt: float) -> tuple[int, int]:
     k = look.plan[e, 0]
     posture, lasting = way_of(k)
     look.plan[e, 1] += 1
-    lasting -= int(look.plan[e, 1] * dt / STEP_S + 1e-9)
-    if k == PASSED or lasting <= 0:
+    gone = int(look.plan[e, 1] * dt / STEP_S + 1e-9)
+    if k == PASSED or lasting <= gone:
         return way_of(PASSED)
-    return posture, lasting
+    if posture == DART:
+        copy_values(look.darts[e], look.dart)
+        return posture, max(0, look.darting[e] - gone)
+    return posture, lasting - gone
 
 
 @kernel()
@@ -425,7 +509,8 @@ def look_ahead(
     """
     look.foretold.since[e] += world.arm.dt
     if state.elapsed[e] == 0.0:
-        look.rests[e], look.waits[e], look.plan[e, 0] = 0, 0, PASSED
+        look.rests[e], look.plan[e, 0] = 0, PASSED
+        look.drawn[e], look.nearest[e, 0] = 0, 0.0
     if look.rests[e] > 0:
         look.rests[e] -= 1
         return PASSED
@@ -433,19 +518,22 @@ def look_ahead(
     if n == 0:
         return PASSED
     posture, lasting = way_of(PASSED)  # no literals: _play would be compiled once more for them
-    ended, best, least = _play(world, rule, state, e, act, posture, lasting, n, work, look)
-    look.rests[e] = RESTS if ended != COLLISION and least > look.calm_m else 0
+    ended, best, least = _play(world, rule, state, e, act, posture, lasting, 1.0, n, work, look)
     chosen = PASSED
+    calm = ended == SUCCESS or (ended == RUNNING and not _is_late(state, e))
+    look.rests[e] = RESTS if calm and least > look.calm_m else 0
     posture, lasting = _left(e, look, world.arm.dt)
     if posture != PASSED:
-        played = _play(world, rule, state, e, look.found, posture, lasting, n, work, look)
+        played = _play(
+            world, rule, state, e, look.found, posture, lasting, KEPT_ON, n, work, look
+        )
         if played[1] > best:
             ended, best, chosen = played[0], played[1], look.plan[e, 0]
             copy_values(look.found, look.begun)
     looked = PASSED
     if ended == COLLISION:
         looked = _best_of_others(world, rule, state, e, best + BETTER, n, work, look)
-    elif ended == RUNNING and _is_late(state, e, look):
+    elif ended == RUNNING and _is_late(state, e):
         looked = _best_of_others(world, rule, state, e, WORTH_IT, n, work, look)
     if looked != PASSED:
         chosen, look.plan[e, 1] = looked, 0

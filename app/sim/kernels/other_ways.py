@@ -2,7 +2,8 @@
 
 A way leads the robot somewhere for some steps, and then goes on as ``lookahead.py`` says: to a
 posture, or to a stop, and then as the policy wants; straight to the goal; or it is a *dash*:
-pan, shoulder and elbow each at full speed forward or back, or held, and then a stop.
+pan, shoulder and elbow each at full speed forward or back, or held, and then a stop; or a
+*dart*: to a posture that is drawn, for a time that is drawn, and then straight to the goal.
 """
 
 from itertools import product
@@ -10,9 +11,10 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from app.sim.kernels import random
 from app.sim.kernels.arm import Arm
 from app.sim.kernels.compiled import kernel
-from app.sim.kernels.foretold import N_PLAYED
+from app.sim.kernels.foretold import N_MOMENTS, N_PLAYED
 from app.sim.ports import Vec
 
 GAIN = 5.0
@@ -35,6 +37,8 @@ LASTING = (2, 8, 15)
 """For how many steps they do."""
 N_POSTURES = len(POSTURES) + 1
 """Postures, and the one at which it stops."""
+STOP = N_POSTURES - 1
+"""In place of a posture: to stop."""
 STRAIGHT = N_POSTURES
 """In place of a posture: the tcp straight to the goal, all the time."""
 N_FIRST = N_POSTURES * len(LASTING) + 1
@@ -48,17 +52,38 @@ DASHING = (6, 15)
 """For how many steps they last."""
 DASH = STRAIGHT + 1
 """In place of a posture: the first of them."""
-N_OTHERS = N_FIRST + len(DIRECTIONS) * len(DASHING)
-"""All ways; the dashes come last."""
+DART = DASH + len(DIRECTIONS)
+"""In place of a posture: that of a dart."""
+N_DRAWN = N_FIRST + len(DIRECTIONS) * len(DASHING)
+"""Ways but the darts."""
+N_OTHERS = N_DRAWN + 1
+"""All ways; first those that the policy ends, then the dashes; the darts are the last one."""
+N_DARTS = 32
+"""Darts of one decision."""
+DART_PLAYED = N_MOMENTS - 1
+"""For how many steps a dart is played."""
+AROUND = np.array([1.5, 0.8, 0.8, 0.8, 0.8, 0.0])
+"""How far from home, or from where the robot is, a dart may lead [rad]."""
+WAITING = 0.25
+"""Share of those drawn that first stop."""
+VARIED = 0.7
+"""Share of the darts that are like the one that came nearest to the goal so far."""
+WIDEST, LONGEST = 0.3, 8.0
+"""By how much they differ from it at most, as a standard deviation: shares of AROUND, steps."""
 
 Floats = NDArray[np.float32]
 
 
 @kernel()
 def way_of(k: int) -> tuple[int, int]:
-    """Return posture and number of steps of a way by its number, or of PASSED."""
+    """Return posture and number of steps of a way by its number, or of PASSED.
+
+    A dart's are drawn: see :func:`draw_dart`.
+    """
     if k == PASSED:
         return PASSED, 0
+    if k == N_DRAWN:
+        return DART, DART_PLAYED
     if k >= N_FIRST:
         k -= N_FIRST
         return DASH + k // len(DASHING), DASHING[k % len(DASHING)]
@@ -68,21 +93,17 @@ def way_of(k: int) -> tuple[int, int]:
 
 
 @kernel()
-def write_toward(arm: Arm, aim: Vec, posture: int, q: Vec, act: Floats) -> None:
-    """Write the action that leads to a posture, or stops.
+def write_toward(arm: Arm, aim: Vec, q: Vec, act: Floats) -> None:
+    """Write the action that leads to a posture.
 
     Args:
         arm: Model and limits.
-        aim: Postures [rad], shape (N_POSTURES, 6).
-        posture: Which; the last stops.
+        aim: The posture [rad], shape (6,).
         q: Joints [rad], shape (6,).
         act: Filled, shape (6,).
     """
     for j in range(6):
-        wanted = 0.0
-        if posture < N_POSTURES - 1:
-            wanted = GAIN * (aim[posture, j] - q[j]) / arm.qd_max[j]
-        act[j] = max(-1.0, min(1.0, wanted))
+        act[j] = max(-1.0, min(1.0, GAIN * (aim[j] - q[j]) / arm.qd_max[j]))
 
 
 @kernel()
@@ -90,3 +111,39 @@ def write_dash(direction: int, lasts: bool, act: Floats) -> None:
     """Write the action of a dash, or of the stop after it, shape (6,)."""
     for j in range(6):
         act[j] = DIRECTIONS[direction, j] if lasts and j < 3 else 0.0
+
+
+@kernel()
+def draw_dart(arm: Arm, q: Vec, rng: random.State, aim: Vec) -> int:
+    """Draw where a dart leads first; return for how many steps.
+
+    Args:
+        arm: Model and limits.
+        q: Joints now [rad], shape (6,).
+        rng: Stream, shape (1,).
+        aim: Filled [rad], shape (6,).
+    """
+    kind = random.uniform(rng)
+    for j in range(6):
+        away = 0.0 if kind < WAITING else AROUND[j] * (2.0 * random.uniform(rng) - 1.0)
+        middle = q[j] if kind < 0.5 * (1.0 + WAITING) else arm.home[j]
+        aim[j] = min(arm.q_max[j], max(arm.q_min[j], middle + away))
+    return 1 + random.below(rng, DART_PLAYED - 1)
+
+
+@kernel()
+def vary_dart(arm: Arm, aim: Vec, lasting: int, rng: random.State, out: Vec) -> int:
+    """Draw a dart like another one; return for how many steps it leads away.
+
+    Args:
+        arm: Model and limits.
+        aim: Where the other one leads first [rad], shape (6,).
+        lasting: For how many steps.
+        rng: Stream, shape (1,).
+        out: Filled [rad], shape (6,).
+    """
+    share = random.uniform(rng)
+    for j in range(6):
+        wanted = aim[j] + share * WIDEST * AROUND[j] * random.normal(rng)
+        out[j] = min(arm.q_max[j], max(arm.q_min[j], wanted))
+    return max(0, lasting + int(share * LONGEST * random.normal(rng)))
