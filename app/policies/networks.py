@@ -10,6 +10,7 @@ losses. Deviates: the residual action and layer normalisation are ours.
 """
 
 from functools import reduce
+from typing import NamedTuple
 
 import torch
 from torch import nn
@@ -22,6 +23,52 @@ BASE_WEIGHT = 0.9
 """Share of the full speed the base motion may ask for, so that atanh stays finite."""
 FIRST_RESIDUAL = 0.05
 """Factor on the initial weights of the actor's last layer."""
+CROWD_WIDTH = 64
+"""Numbers by which networks that see everybody as a set describe the set."""
+
+
+class CrowdShape(NamedTuple):
+    """Where people stand as a set in an observation (``kernels/reach_crowd.py``)."""
+
+    first: int
+    """Numbers before them."""
+    n_people: int
+    """Blocks, one for each person."""
+    n_block: int
+    """Numbers of a block, of which the first is 1, or 0 where nobody is."""
+
+
+class CrowdEncoder(nn.Module):
+    """Replaces the blocks of all people in an observation by CROWD_WIDTH numbers.
+
+    Each block goes through the same layers; of everybody who is there the greatest of each
+    number counts, so that neither order nor number of people matters.
+
+    Args:
+        shape: Where the blocks are.
+
+    Source: Zaheer et al., *Deep sets* (2017); the maximum as in Qi et al., *PointNet* (2017).
+    """
+
+    def __init__(self, shape: CrowdShape) -> None:
+        super().__init__()
+        self._shape = shape
+        self.block = nn.Sequential(*hidden(shape.n_block, CROWD_WIDTH, 2))
+
+    def forward(self, rows: torch.Tensor) -> torch.Tensor:
+        """Return rows, shape (n, first + CROWD_WIDTH + rest), of (n, first + all + rest)."""
+        first, n_people, n_block = self._shape
+        last = first + n_people * n_block
+        blocks = rows[:, first:last].reshape(-1, n_people, n_block)
+        pooled = (self.block(blocks) * blocks[:, :, :1]).amax(dim=1)
+        return torch.cat([rows[:, :first], pooled, rows[:, last:]], dim=1)
+
+
+def _seen(crowd: CrowdShape | None, n_obs: int) -> tuple[int, list[nn.Module]]:
+    """Return the numbers that the first layer sees, and what stands before it."""
+    if crowd is None:
+        return n_obs, []
+    return n_obs - crowd.n_people * crowd.n_block + CROWD_WIDTH, [CrowdEncoder(crowd)]
 
 
 class ResidualActor(nn.Module):
@@ -33,6 +80,7 @@ class ResidualActor(nn.Module):
         n_act: Numbers of an action.
         base: Where in an observation the base motion starts.
         layers: Hidden layers.
+        crowd: Where people stand as a set; None: nowhere.
     """
 
     def __init__(
@@ -42,19 +90,23 @@ class ResidualActor(nn.Module):
         n_act: int = CONTROLLED,
         base: int = BASE_START,
         layers: int = 2,
+        crowd: CrowdShape | None = None,
     ) -> None:
         super().__init__()
+        n_seen, before = _seen(crowd, n_obs)
         last = nn.Linear(width, n_act)
         with torch.no_grad():
             last.weight.mul_(FIRST_RESIDUAL)
             last.bias.zero_()
-        self.net = nn.Sequential(*hidden(n_obs, width, layers), last)
+        self.crowd = nn.Sequential(*before)
+        self.net = nn.Sequential(*hidden(n_seen, width, layers), last)
         self.n_obs, self.base = n_obs, slice(base, base + n_act)
 
     def forward(self, obs: torch.Tensor) -> torch.Tensor:
         """Return actions, shape (n, n_act), for observations, shape (n, n_obs or more)."""
         base = obs[:, self.base].clamp(-1.0, 1.0)
-        return torch.tanh(self.net(obs[:, : self.n_obs]) + torch.atanh(BASE_WEIGHT * base))
+        residual = self.net(self.crowd(obs[:, : self.n_obs]))
+        return torch.tanh(residual + torch.atanh(BASE_WEIGHT * base))
 
 
 class PlainActor(nn.Module):
@@ -65,19 +117,29 @@ class PlainActor(nn.Module):
         n_obs: Numbers it sees, the first ones of an observation.
         n_act: Numbers of an action.
         layers: Hidden layers.
+        crowd: Where people stand as a set; None: nowhere.
     """
 
-    def __init__(self, width: int, n_obs: int, n_act: int, layers: int = 2) -> None:
+    def __init__(
+        self,
+        width: int,
+        n_obs: int,
+        n_act: int,
+        layers: int = 2,
+        crowd: CrowdShape | None = None,
+    ) -> None:
         super().__init__()
+        n_seen, before = _seen(crowd, n_obs)
         self.n_obs = n_obs
-        self.net = nn.Sequential(*hidden(n_obs, width, layers), nn.Linear(width, n_act))
+        self.crowd = nn.Sequential(*before)
+        self.net = nn.Sequential(*hidden(n_seen, width, layers), nn.Linear(width, n_act))
         with torch.no_grad():
             self.net[-1].weight.mul_(FIRST_RESIDUAL)  # type: ignore[operator]
             self.net[-1].bias.zero_()  # type: ignore[operator]
 
     def forward(self, obs: torch.Tensor) -> torch.Tensor:
         """Return actions, shape (n, n_act), for observations, shape (n, n_obs or more)."""
-        return torch.tanh(self.net(obs[:, : self.n_obs]))
+        return torch.tanh(self.net(self.crowd(obs[:, : self.n_obs])))
 
 
 def hidden(n_in: int, width: int, layers: int, normed: bool = False) -> list[nn.Module]:
@@ -101,6 +163,7 @@ class QNetwork(nn.Sequential):
         layers: Hidden layers.
         normed: Whether they are normalised.
         n_values: Values.
+        crowd: Where people stand as a set; None: nowhere.
     """
 
     def __init__(
@@ -111,9 +174,11 @@ class QNetwork(nn.Sequential):
         layers: int = 2,
         normed: bool = True,
         n_values: int = 1,
+        crowd: CrowdShape | None = None,
     ) -> None:
-        last = hidden(n_obs + n_act, width, layers, normed)
-        super().__init__(*last, nn.Linear(width, n_values))
+        n_seen, before = _seen(crowd, n_obs)
+        last = hidden(n_seen + n_act, width, layers, normed)
+        super().__init__(*before, *last, nn.Linear(width, n_values))
 
 
 class Critics(nn.Module):
@@ -127,6 +192,7 @@ class Critics(nn.Module):
         layers: Hidden layers of each.
         normed: Whether they are normalised.
         n_values: Values that each says.
+        crowd: Where people stand as a set; None: nowhere.
     """
 
     def __init__(
@@ -138,11 +204,12 @@ class Critics(nn.Module):
         layers: int = 2,
         normed: bool = True,
         n_values: int = 1,
+        crowd: CrowdShape | None = None,
     ) -> None:
         super().__init__()
         self.n_critics = n_critics
         for number in range(1, n_critics + 1):
-            q = QNetwork(width, n_obs, n_act, layers, normed, n_values)
+            q = QNetwork(width, n_obs, n_act, layers, normed, n_values, crowd)
             self.add_module(f"q{number}", q)
 
     def forward(self, obs: torch.Tensor, act: torch.Tensor) -> tuple[torch.Tensor, ...]:

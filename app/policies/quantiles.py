@@ -16,7 +16,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from app.policies.networks import Critics
+from app.policies.networks import Critics, CrowdShape
 from app.sim.kernels.compiled import kernel
 from app.sim.kernels.geometry import FAST
 
@@ -33,6 +33,7 @@ class QuantileCritics(Critics):
         normed: Whether they are normalised.
         n_quantiles: Quantiles of each.
         dropped: Highest quantiles that targets leave out, per critic.
+        crowd: Where people stand as a set; None: nowhere.
     """
 
     def __init__(
@@ -45,8 +46,9 @@ class QuantileCritics(Critics):
         normed: bool = True,
         n_quantiles: int = 25,
         dropped: int = 2,
+        crowd: CrowdShape | None = None,
     ) -> None:
-        super().__init__(width, n_obs, n_act, n_critics, layers, normed, n_quantiles)
+        super().__init__(width, n_obs, n_act, n_critics, layers, normed, n_quantiles, crowd)
         self._kept = n_critics * (n_quantiles - dropped)
 
     def targets(self, obs: Tensor, act: Tensor) -> Tensor:

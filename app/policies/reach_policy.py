@@ -18,14 +18,15 @@ from app.policies.checkpoint import (
     require_purpose,
     task_of,
 )
-from app.policies.networks import BASE_WEIGHT
+from app.policies.networks import BASE_WEIGHT, CROWD_WIDTH, CrowdShape
 from app.policies.reach_preset import ACTORS, action_of
 from app.policies.trained_cell import cell_of
 from app.sim.actions import ActionSettings
 from app.sim.goal_sets import MOST_HALTON, N_HALTON, halton_targets
-from app.sim.kernels import reach_ways
+from app.sim.kernels import reach_crowd, reach_ways
 from app.sim.kernels.forecast import Network
-from app.sim.kernels.reach_features import BASE_START, SIZES, STATE_SIZES
+from app.sim.kernels.people import MAX_PEOPLE
+from app.sim.kernels.reach_features import BASE_START, N_FEATURES, SIZES, STATE_SIZES
 from app.sim.ports import Vec
 from app.sim.reach import N_ACT, GoalRule, ViewName, goal_region_of
 
@@ -33,12 +34,19 @@ LAYOUTS = {
     "features": [[name, size] for name, size in SIZES],
     "state": [[name, size] for name, size in STATE_SIZES],
     "forecast": [[name, size] for name, size in (*SIZES, *reach_ways.SIZES)],
+    "crowd": [[name, size] for name, size in (*SIZES, *reach_ways.SIZES, *reach_crowd.SIZES)],
 }
 """Names and sizes of the groups of each kind of observation, as manifests carry them."""
+CROWD = CrowdShape(N_FEATURES + reach_ways.N_WAYS, MAX_PEOPLE, reach_crowd.N_BLOCK)
+"""Where everybody stands as a set in the observation of that name."""
 MAX_LAYERS = 16
 """Most layers of a network taken from a checkpoint."""
 
-Layer = tuple[NDArray[np.float32], NDArray[np.float32]]
+ACTOR_LAYERS, CROWD_LAYERS = "actor.net", "actor.crowd.0.block"
+"""What the names of an actor's tensors start with."""
+
+Floats = NDArray[np.float32]
+Layer = tuple[Floats, Floats]
 
 
 def is_reach(checkpoint: Checkpoint) -> bool:
@@ -77,7 +85,12 @@ class ReachPolicy:
             self.targets = halton_targets(goal_region_of(cell), _n_halton(preset))
         self.n_obs = sum(size for _, size in manifest["layout"])
         """Length of an observation."""
-        self._layers = _layers_of(checkpoint.arrays(), self.n_obs)
+        arrays, n_seen = checkpoint.arrays(), self.n_obs
+        self._crowd: tuple[Layer, ...] = ()
+        if self.view == "crowd":
+            self._crowd = _layers_of(arrays, CROWD_LAYERS, CROWD.n_block, CROWD_WIDTH)
+            n_seen = CROWD.first + CROWD_WIDTH
+        self._layers = _layers_of(arrays, ACTOR_LAYERS, n_seen, N_ACT)
         self._residual = _named(preset, "actor", ACTORS) == "residual"
 
     @property
@@ -129,11 +142,7 @@ class ReachPolicy:
             raise InvalidInput(
                 "obs", list(obs.shape), f"must have the shape ['n', {self.n_obs}]"
             )
-        rows = obs
-        for weight, bias in self._layers[:-1]:
-            rows = rows @ weight
-            rows += bias
-            np.maximum(rows, 0.0, out=rows)
+        rows = _hidden(self._with_crowd(obs), self._layers[:-1])
         weight, bias = self._layers[-1]
         rows = rows @ weight
         rows += bias
@@ -141,6 +150,23 @@ class ReachPolicy:
             base = np.clip(obs[:, BASE_START : BASE_START + N_ACT], -1.0, 1.0)
             rows += np.arctanh(np.float32(BASE_WEIGHT) * base)
         return cast(NDArray[np.float32], np.tanh(rows, out=rows))
+
+    def _with_crowd(self, obs: Floats) -> Floats:
+        """Return what the first layer sees: people as a set are described as one."""
+        if not self._crowd:
+            return obs
+        blocks = obs[:, CROWD.first :].reshape(-1, CROWD.n_people, CROWD.n_block)
+        found = _hidden(blocks, self._crowd) * blocks[:, :, :1]
+        return np.concatenate([obs[:, : CROWD.first], found.max(axis=1)], axis=1)
+
+
+def _hidden(rows: Floats, layers: tuple[Layer, ...]) -> Floats:
+    """Return what rectified layers make of rows, whose last axis they see."""
+    for weight, bias in layers:
+        rows = rows @ weight
+        rows += bias
+        np.maximum(rows, 0.0, out=rows)
+    return rows
 
 
 def _named(preset: Mapping[str, Any], field: str, choices: tuple[str, ...]) -> str:
@@ -160,26 +186,33 @@ def _n_halton(preset: Mapping[str, Any]) -> int:
     return n
 
 
-def _layers_of(arrays: Mapping[str, NDArray[Any]], n_obs: int) -> tuple[Layer, ...]:
-    """Return weights, shape (n_in, n_out), and biases of the actor, layer by layer.
+def _layers_of(
+    arrays: Mapping[str, NDArray[Any]], name: str, n_in: int, n_out: int
+) -> tuple[Layer, ...]:
+    """Return weights, shape (n_in, n_out), and biases of a network, layer by layer.
+
+    Args:
+        arrays: Tensors of a checkpoint.
+        name: What the names of its tensors start with.
+        n_in: Numbers it sees.
+        n_out: Numbers it says.
 
     Raises:
-        CheckpointMismatch: Its tensors do not make a network from observations to actions.
+        CheckpointMismatch: The tensors do not make such a network.
     """
     layers: list[Layer] = []
-    n_in = n_obs
     for number in range(MAX_LAYERS):
-        weight = arrays.get(f"actor.net.{2 * number}.weight")
-        bias = arrays.get(f"actor.net.{2 * number}.bias")
+        weight = arrays.get(f"{name}.{2 * number}.weight")
+        bias = arrays.get(f"{name}.{2 * number}.bias")
         if weight is None or bias is None:
             break
         if weight.ndim != 2 or weight.shape[1] != n_in or bias.shape != weight.shape[:1]:
             found = f"{list(weight.shape)} and {list(bias.shape)}"
-            name = f"tensors.actor.net.{2 * number}"
-            raise CheckpointMismatch(name, f"[n, {n_in}] and [n]", found)
+            field = f"tensors.{name}.{2 * number}"
+            raise CheckpointMismatch(field, f"[n, {n_in}] and [n]", found)
         n_in = len(bias)
         rows = np.ascontiguousarray(weight.T, dtype=np.float32)
         layers.append((rows, bias.astype(np.float32)))
-    if not layers or n_in != N_ACT:
-        raise CheckpointMismatch("tensors", f"an actor of {N_ACT} numbers", "none such")
+    if not layers or n_in != n_out:
+        raise CheckpointMismatch("tensors", f"{name} of {n_out} numbers", "none such")
     return tuple(layers)

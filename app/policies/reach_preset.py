@@ -17,7 +17,7 @@ PRECISIONS = ("float32", "bfloat16")
 SAFETIES = ("none", "ssm")
 MAX_BYTES = 16 * 1024 * 1024
 """Size of the networks that a checkpoint holds [bytes]."""
-MOST_SEEN = 176
+MOST_SEEN = 256
 """Most numbers that a network sees, its smaller parts included."""
 
 
@@ -115,6 +115,11 @@ class ReachPreset:
         0.05, 0.0, 1.0, "m", "least distance of robot and person at the start"
     )
     n_people: int = number(1, 0, 4, "", "people who walk; the policy sees the nearest")
+    people: str = choice(
+        "all",
+        ("all", "up-to"),
+        "all cells have n_people, or equal shares of them 1, 2, ... n_people",
+    )
     safety: str = choice(
         "none",
         SAFETIES,
@@ -201,6 +206,19 @@ class ReachPreset:
                 self.safety,
                 "needs somebody to watch, n_people above 0, and collision = ends",
             )
+        if self.people == "up-to" and (
+            self.n_people == 0
+            or self.n_envs < self.n_people
+            or self.safety != "none"
+            or self.critic_sees != "observation"
+            or self.option_rate > 0.0
+        ):
+            raise InvalidInput(
+                "overrides.people",
+                self.people,
+                "needs 1 to n_envs people, safety = none, critic_sees = observation and "
+                "option_rate = 0",
+            )
         _check_size(self)
         check_learning(self.learning_starts, self.total_steps, self.buffer_size, self.n_envs)
 
@@ -276,7 +294,15 @@ MONITORED = ReachPreset(
 """Ours under speed and separation monitoring: it learns where people who come will stop it, and
 has twice the time. Everybody starts so far away that the robot may set out."""
 
-REACH_PRESETS = (ReachPreset(), MONITORED, THESIS)
+CROWD = ReachPreset(
+    name="reach-td3-crowd",
+    n_people=4,
+    people="up-to",
+    observation="crowd",
+)
+"""Ours beside one to four people, whom the networks see as a set."""
+
+REACH_PRESETS = (ReachPreset(), MONITORED, CROWD, THESIS)
 """All presets of the scenario."""
 
 

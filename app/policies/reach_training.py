@@ -19,7 +19,7 @@ from app.policies.networks import Critics, PlainActor, ResidualActor
 from app.policies.progress import Progress
 from app.policies.quantiles import QuantileCritics
 from app.policies.ranges import Ranges
-from app.policies.reach_policy import LAYOUTS
+from app.policies.reach_policy import CROWD, LAYOUTS
 from app.policies.reach_preset import ReachPreset
 from app.policies.reporter import Reporter
 from app.policies.run import Parts, TrainingRun
@@ -34,6 +34,7 @@ from app.sim.kernels.reach_reward import ReachWeights
 from app.sim.pick import OUTCOMES
 from app.sim.ports import Vec
 from app.sim.reach import N_ACT, ReachBatch, ReachSettings
+from app.sim.reach_mix import ReachMix, ReachRows
 from app.sim.safety import safety_settings
 from app.sim.scene import HumanKind
 
@@ -69,15 +70,17 @@ def settings_of(preset: ReachPreset) -> ReachSettings:
     )
 
 
-def batch_of(preset: ReachPreset, cell: Cell, n_envs: int, seed: int) -> ReachBatch:
+def batch_of(preset: ReachPreset, cell: Cell, n_envs: int, seed: int) -> ReachRows:
     """Return the cells that a preset trains in, or that its curve is played in."""
     settings = settings_of(preset)
     if preset.safety == "ssm":
         return GuardedReach(cell, n_envs, seed, settings, safety_settings(cell))
+    if preset.people == "up-to":
+        return ReachMix(cell, n_envs, seed, settings)
     return ReachBatch(cell, n_envs, seed, settings)
 
 
-def explorer_of(preset: ReachPreset, batch: ReachBatch, seed: int) -> Explorer:
+def explorer_of(preset: ReachPreset, batch: ReachRows, seed: int) -> Explorer:
     """Return what changes actions so that other ones are tried."""
     rng = np.random.default_rng(seed)
     if preset.noise == "ou":
@@ -93,6 +96,7 @@ def explorer_of(preset: ReachPreset, batch: ReachBatch, seed: int) -> Explorer:
     )
     if preset.option_rate == 0.0:
         return ladder
+    assert isinstance(batch, ReachBatch)
     arm, targets = batch.arm, batch.world.targets
     postures, _ = ik_vertical_batch(targets, arm.tool_length, arm.q_min, arm.q_max)
     return OptionNoise(ladder, batch, postures, preset.option_rate, rng)
@@ -101,18 +105,19 @@ def explorer_of(preset: ReachPreset, batch: ReachBatch, seed: int) -> Explorer:
 def networks_of(preset: ReachPreset, n_obs: int, n_critic: int) -> Networks:
     """Return what makes an actor that sees ``n_obs`` numbers and critics that see more."""
     width, layers, normed = preset.width, preset.layers, preset.critic_norm == "layer"
+    crowd = CROWD if preset.observation == "crowd" else None
 
     def actor() -> ResidualActor | PlainActor:
         if preset.actor == "residual":
-            return ResidualActor(width, n_obs, N_ACT, BASE_START, layers)
-        return PlainActor(width, n_obs, N_ACT, layers)
+            return ResidualActor(width, n_obs, N_ACT, BASE_START, layers, crowd)
+        return PlainActor(width, n_obs, N_ACT, layers, crowd)
 
     def critic() -> Critics:
         n = preset.n_critics
         if preset.critic == "mean":
-            return Critics(width, n_critic, N_ACT, n, layers, normed)
+            return Critics(width, n_critic, N_ACT, n, layers, normed, crowd=crowd)
         quantiles = preset.n_quantiles, preset.dropped_quantiles
-        return QuantileCritics(width, n_critic, N_ACT, n, layers, normed, *quantiles)
+        return QuantileCritics(width, n_critic, N_ACT, n, layers, normed, *quantiles, crowd)
 
     return Networks(actor=actor, critic=critic, fused=True)
 
@@ -121,7 +126,7 @@ def networks_of(preset: ReachPreset, n_obs: int, n_critic: int) -> Networks:
 class Watched:
     """What the curve of a training on the reach scenario is counted from."""
 
-    batch: ReachBatch
+    batch: ReachRows
     """All cells."""
     actor: torch.nn.Module
     """The policy."""
@@ -148,7 +153,10 @@ def start(
     """
     first = 0 if resume is None else int(resume.manifest["step"])
     batch = batch_of(preset, cell, preset.n_envs, seed + first)
-    foresight = Foresight(batch) if preset.critic_sees == "future" else None
+    foresight = None
+    if preset.critic_sees == "future":
+        assert isinstance(batch, ReachBatch)
+        foresight = Foresight(batch)
     env = CellVecEnv(batch, preset.observation != "state", foresight)
     model = BatchTD3(
         preset,
@@ -228,18 +236,24 @@ class ReachReporter(Reporter):
         }
 
 
-def states_met(batch: ReachBatch) -> dict[str, Vec]:
+def states_met(batch: ReachRows) -> dict[str, Vec]:
     """Return the states that all cells are in."""
-    state = batch.state
-    met = {"q": state.q, "qd": state.qd, "goal": state.goal}
-    walkers = state.people.walkers.rows
-    if walkers.shape[1]:
-        met["human"] = walkers[:, :, [X, Y, VX, VY, R]].reshape(-1, 5)
+    parts = batch.parts if isinstance(batch, ReachMix) else (batch,)
+    states = [part.state for part in parts]
+    met = {
+        "q": np.concatenate([state.q for state in states]),
+        "qd": np.concatenate([state.qd for state in states]),
+        "goal": np.concatenate([state.goal for state in states]),
+    }
+    seen = [X, Y, VX, VY, R]
+    walkers = [state.people.walkers.rows[:, :, seen].reshape(-1, 5) for state in states]
+    if sum(len(rows) for rows in walkers):
+        met["human"] = np.concatenate(walkers)
     return met
 
 
 def play(
-    actor: torch.nn.Module, batch: ReachBatch
+    actor: torch.nn.Module, batch: ReachRows
 ) -> tuple[NDArray[np.int64], NDArray[np.floating]]:
     """Play one greedy episode in every row of a batch.
 

@@ -13,6 +13,7 @@ from app.sim.kernels.foresight import N_AHEAD, look_ahead_of_walkers
 from app.sim.kernels.occupancy import WalkerState
 from app.sim.pick import OUTCOMES, PickBatch
 from app.sim.reach import ReachBatch
+from app.sim.reach_mix import ReachRows
 from app.sim.sorting import SortingBatch
 
 
@@ -27,11 +28,11 @@ class BatchVecEnv(VecEnv):
 
     def __init__(
         self,
-        batch: PickBatch | ReachBatch | SortingBatch,
+        batch: PickBatch | ReachRows | SortingBatch,
         observation_space: spaces.Space[Any],
         action_space: spaces.Space[Any],
     ) -> None:
-        self._rows_of: PickBatch | ReachBatch | SortingBatch = batch
+        self._rows_of: PickBatch | ReachRows | SortingBatch = batch
         self.render_mode = None
         super().__init__(batch.n_envs, observation_space, action_space)
 
@@ -98,7 +99,7 @@ class CellVecEnv(BatchVecEnv):
 
     def __init__(
         self,
-        batch: PickBatch | ReachBatch,
+        batch: PickBatch | ReachRows,
         sees_time: bool = True,
         foresight: Foresight | None = None,
     ) -> None:

@@ -20,9 +20,10 @@ from app.sim.cells import Cell
 from app.sim.forecasts import new_forecaster
 from app.sim.goal_sets import N_HALTON, halton_targets
 from app.sim.kernels import reach, reach_views
-from app.sim.kernels.episode import FEATURES, FORECAST, PLAIN
+from app.sim.kernels.episode import CROWD, FEATURES, FORECAST, PLAIN
 from app.sim.kernels.geometry import FAR
 from app.sim.kernels.people import People, PeopleState
+from app.sim.kernels.reach_crowd import N_CROWD
 from app.sim.kernels.reach_features import EVERYBODY, N_FEATURES, N_STATE
 from app.sim.kernels.reach_reward import ReachWeights
 from app.sim.kernels.reach_ways import N_WAYS
@@ -47,14 +48,16 @@ N_ACT = 6
 """Joints a policy moves: all of them."""
 StartRule = Literal["clearance", "uniform", "authors"]
 GoalRule = Literal["grid", "halton", "box"]
-ViewName = Literal["features", "state", "forecast"]
+ViewName = Literal["features", "state", "forecast", "crowd"]
 VIEWS = {
     "state": (PLAIN, N_STATE),
     "features": (FEATURES, N_FEATURES),
     "forecast": (FORECAST, N_FEATURES + N_WAYS),
+    "crowd": (CROWD, N_FEATURES + N_WAYS + N_CROWD),
 }
-"""What observations hold: the plain state (4.30), that and features, or those and what comes of
-every way beside people who go on as forecast; and their lengths."""
+"""What observations hold: the plain state (4.30), that and features, those and what comes of
+every way beside people who go on as forecast, or all that and everybody as a set; and their
+lengths."""
 THESIS_WEIGHTS = ReachWeights(
     c_d=1.0, c_p=0.0, gamma=1.0, c_a=0.1, c_step=0.0, c_c=5.0, c_s=20.0
 )

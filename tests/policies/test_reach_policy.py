@@ -10,7 +10,7 @@ from app.errors import CheckpointMismatch, InvalidInput
 from app.policies import checkpoint as formats
 from app.policies import presets, pretrained
 from app.policies.model_state import under
-from app.policies.reach_policy import ReachPolicy, is_reach
+from app.policies.reach_policy import CROWD, ReachPolicy, is_reach
 from app.policies.reach_training import networks_of
 from app.sim.actions import ActionSettings
 from app.sim.cells import load_cell
@@ -61,9 +61,36 @@ def test_it_says_what_it_is(checkpoint):
     np.testing.assert_array_equal(halton, halton_targets(goal_region_of(cell), 30))
 
 
+@pytest.mark.parametrize("kind", ["residual", "plain"])
+def test_people_as_a_set_have_no_order_and_nobody_counts_for_nothing(kind):
+    checkpoint = untrained_reach(seed=4, width=48, actor=kind, observation="crowd")
+    policy = ReachPolicy(checkpoint)
+    preset = presets.resolve("reach-td3", {"width": 48, "actor": kind, "observation": "crowd"})
+    actor = networks_of(preset, policy.n_obs, policy.n_obs).actor()
+    actor.load_state_dict(under(checkpoint.arrays(), "actor"))
+    obs = np.random.default_rng(1).normal(size=(50, policy.n_obs)).astype(np.float32)
+    blocks = obs[:, CROWD.first :].reshape(50, CROWD.n_people, CROWD.n_block)
+    blocks[:, :, 0] = [1.0, 1.0, 1.0, 0.0]
+    act = policy.acts(obs)
+    with torch.no_grad():
+        np.testing.assert_allclose(act, actor(torch.as_tensor(obs)).numpy(), atol=2e-6)
+    blocks[:] = blocks[:, [3, 1, 0, 2]]
+    np.testing.assert_allclose(policy.acts(obs), act, atol=1e-6)
+    blocks[:, 0, 1:] = 9.0
+    np.testing.assert_allclose(policy.acts(obs), act, atol=1e-6)
+    blocks[:, 1, 1:] = 9.0
+    assert np.abs(policy.acts(obs) - act).max() > 0.01
+    assert policy.kernel_network is None, "looking ahead knows no sets"
+
+
 @pytest.mark.parametrize(
     ("view", "actor"),
-    [("forecast", "residual"), ("features", "residual"), ("state", "plain")],
+    [
+        ("forecast", "residual"),
+        ("features", "residual"),
+        ("state", "plain"),
+        ("crowd", "residual"),
+    ],
 )
 def test_it_moves_the_robot_of_a_batch(view, actor):
     policy = ReachPolicy(untrained_reach(width=16, observation=view, actor=actor))

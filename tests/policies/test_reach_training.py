@@ -151,6 +151,8 @@ def test_the_thesis_preset_is_table_4_2():
             "overrides.critic_sees",
         ),
         ({"dropped_quantiles": 25}, "overrides.dropped_quantiles"),
+        ({"people": "up-to", "n_people": 0}, "overrides.people"),
+        ({"people": "up-to", "option_rate": 0.01}, "overrides.people"),
         ({"learning_starts": 900_000, "total_steps": 512_000}, "overrides.learning_starts"),
     ],
 )
@@ -169,6 +171,7 @@ def test_a_bad_override_is_refused_by_name(overrides, field):
         {"alpha": 0.5, "n_steps": 3},
         {"n_critics": 3, "layers": 3},
         {"goals": "halton", "n_people": 2},
+        {"observation": "crowd", "n_people": 3, "people": "up-to"},
     ],
 )
 def test_every_option_trains_and_moves_the_actor(option):

@@ -18,6 +18,7 @@ from app.sim.kernels.compiled import kernel
 from app.sim.kernels.contact import clearances
 from app.sim.kernels.episode import (
     COLLISION,
+    CROWD,
     FORECAST,
     NO_OBS,
     PLAIN,
@@ -40,6 +41,7 @@ from app.sim.kernels.people import (
     place_people,
     start_people,
 )
+from app.sim.kernels.reach_crowd import put_crowd
 from app.sim.kernels.reach_features import (
     EVERYBODY,
     N_FEATURES,
@@ -51,7 +53,7 @@ from app.sim.kernels.reach_features import (
     see_cylinder,
 )
 from app.sim.kernels.reach_reward import ReachWeights, reward
-from app.sim.kernels.reach_ways import Ways, foresee, look_aside, new_ways, put_ways
+from app.sim.kernels.reach_ways import N_WAYS, Ways, foresee, look_aside, new_ways, put_ways
 from app.sim.ports import Vec
 
 NO_TARGET = -1
@@ -287,8 +289,8 @@ def write_obs(
         state: Rows.
         e: Environment.
         work: Robot and people are placed in it as they are now.
-        view: NO_OBS, PLAIN (4.30), FEATURES or FORECAST.
-        out: Filled, shape (N_STATE,), (N_FEATURES,) or (N_FEATURES + N_WAYS,).
+        view: NO_OBS, PLAIN (4.30), FEATURES, FORECAST or CROWD.
+        out: Filled, shape (N_STATE,), (N_FEATURES,) or more (``reach.VIEWS``).
     """
     if view == NO_OBS:
         return
@@ -311,17 +313,17 @@ def write_obs(
         work.sight,
         out,
     )
-    if view == FORECAST:
+    if view >= FORECAST:
         foresee(state.people, e, EVERYBODY, who, work.crowd, work.ways)
         look_aside(world.arm, world.people.top_z, state.q[e], state.qd[e], work.ways)
-        put_forecast(world, state, e, work, state.goal[e], out)
+        put_forecast(world, state, e, work, view, state.goal[e], out)
 
 
 @kernel(inline="always")
 def put_forecast(
-    world: ReachWorld, state: ReachState, e: int, work: Work, goal: Vec, out: Obs
+    world: ReachWorld, state: ReachState, e: int, work: Work, view: int, goal: Vec, out: Obs
 ) -> None:
-    """Write what comes of every way behind the features.
+    """Write what comes of every way behind the features, and everybody behind that.
 
     People are foreseen, and the ways that do not lead to the goal looked at already.
 
@@ -330,8 +332,9 @@ def put_forecast(
         state: Rows.
         e: Environment.
         work: Robot and people are placed in it as they are now.
+        view: FORECAST or CROWD.
         goal: Where the tcp shall be [m], shape (3,).
-        out: Filled, shape (N_FEATURES + N_WAYS,).
+        out: Filled, shape (N_FEATURES + N_WAYS,), with everybody N_CROWD more.
     """
     put_ways(
         world.arm,
@@ -346,6 +349,9 @@ def put_forecast(
         N_FEATURES,
         out,
     )
+    if view == CROWD:
+        first = N_FEATURES + N_WAYS
+        put_crowd(world.people.top_z, goal, work.robot, work.ways, first, out)
 
 
 @kernel(nogil=True)
@@ -419,7 +425,7 @@ def step_batch(
         work: Work space.
         act: Actions in [-1, 1], shape (n_envs, 6).
         auto_reset: Start the next episode at once; otherwise ended rows stay as they are.
-        view: NO_OBS, PLAIN, FEATURES or FORECAST.
+        view: NO_OBS, PLAIN, FEATURES, FORECAST or CROWD.
         obs: Filled with the observations after the step (and reset), shape (n_envs, F).
         last_obs: Filled with the final observation of rows that ended, shape (n_envs, F).
         rew: Filled with rewards, shape (n_envs,).

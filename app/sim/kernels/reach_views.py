@@ -52,7 +52,7 @@ def _look(
     show_person(state.people, e, seen, crowd, sight.seen)
     if view != PLAIN:
         clearances_ahead(world.people, state.people, e, who, robot.columns, sight)
-    if view == FORECAST:
+    if view >= FORECAST:
         foresee(state.people, e, who, seen, crowd, work.ways)
         look_aside(world.arm, world.people.top_z, state.q[e], state.qd[e], work.ways)
     return float(clearance)
@@ -77,8 +77,8 @@ def _write(
     time_left = state.time_left[e]
     top = world.people.top_z
     describe(world.arm, top, q, qd, goal, clearance, time_left, work.robot, sight, out)
-    if view == FORECAST:
-        put_forecast(world, state, e, work, goal, out)
+    if view >= FORECAST:
+        put_forecast(world, state, e, work, view, goal, out)
 
 
 @kernel(nogil=True)
@@ -92,7 +92,7 @@ def observe_goals(
         state: Rows.
         e: Environment.
         work: Work space; need not be placed.
-        view: PLAIN (4.30), FEATURES or FORECAST.
+        view: PLAIN (4.30), FEATURES, FORECAST or CROWD.
         goals: Where the tcp shall be [m], shape (n, 3).
         out: Filled, shape (n, F).
     """
@@ -112,7 +112,7 @@ def observe_person(
         state: Rows.
         e: Environment.
         work: Work space; need not be placed.
-        view: PLAIN (4.30), FEATURES or FORECAST.
+        view: PLAIN (4.30), FEATURES, FORECAST or CROWD.
         who: The person: workers first, then walkers.
         out: Filled, shape (F,).
     """
@@ -138,7 +138,7 @@ def observe_rows(
         state: Rows.
         rows: Which environments, shape (k,).
         work: Work space.
-        view: PLAIN (4.30), FEATURES or FORECAST.
+        view: PLAIN (4.30), FEATURES, FORECAST or CROWD.
         who: EVERYBODY as ordinarily, the nearest seen and all counted; or the one person who
             is there alone.
         goals: Where each tcp shall be [m], shape (k, n, 3).

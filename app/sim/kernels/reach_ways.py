@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.sim.kernels.arm import Arm, RobotPose, new_robot_pose, place_robot
+from app.sim.kernels.columns import copy_values
 from app.sim.kernels.compiled import kernel
 from app.sim.kernels.cylinder import cylinder_clearance
 from app.sim.kernels.forecast import N_TIMES, STEP_S, Forecaster, forecast
@@ -71,6 +72,8 @@ class Ways(NamedTuple):
     """Radius and way of one walker at each time ahead [m], shape (N_TIMES, 2)."""
     person: Vec
     """One person: x, y [m], vx, vy [m/s], r [m], growth [m/s], shape (6,)."""
+    now: Vec
+    """Everybody who counts, each as ``person``, shape (MAX_PEOPLE, 6)."""
     ahead: Vec
     """x, y and radius of everybody who counts at each time [m], (N_TIMES, MAX_PEOPLE, 3)."""
     number: NDArray[np.int64]
@@ -93,6 +96,7 @@ def new_ways(arm: Arm, forecaster: Forecaster) -> Ways:
         forecaster=forecaster,
         told=np.zeros((N_TIMES, 2)),
         person=np.zeros(N_SEEN),
+        now=np.zeros((MAX_PEOPLE, N_SEEN)),
         ahead=np.zeros((N_TIMES, MAX_PEOPLE, 3)),
         number=np.zeros(2, dtype=np.int64),
         robot=new_robot_pose(arm),
@@ -104,7 +108,7 @@ def new_ways(arm: Arm, forecaster: Forecaster) -> Ways:
 
 @kernel()
 def foresee(state: PeopleState, e: int, who: int, seen: int, crowd: Crowd, ways: Ways) -> None:
-    """Fill ``ways.ahead`` and ``ways.number`` with everybody who counts.
+    """Fill ``ways.now``, ``ahead`` and ``number`` with everybody who counts.
 
     Args:
         state: Rows of the people.
@@ -122,6 +126,7 @@ def foresee(state: PeopleState, e: int, who: int, seen: int, crowd: Crowd, ways:
         if p == seen:
             ways.number[1] = ways.number[0]
         show_person(state, e, p, crowd, ways.person)
+        copy_values(ways.person, ways.now[ways.number[0]])
         _go_on(state, e, p - n_workers, ways)
         ways.number[0] += 1
 
