@@ -46,6 +46,9 @@ RANGE_SLACK = 0.02
 LONGEST_S = 60.0
 """Longest time left to reach a goal [s]."""
 _FAR = np.full(3, 10.0)
+FIELDS = (("robot.q", "rad"), ("robot.qd", "rad/s"), ("robot.qdd", "rad/s^2"), ("goal", "m"))
+"""What messages call the vectors of a question, and their units."""
+_SHAPES = [(6,), (6,), (6,), (3,)]
 HUMAN = ("x", "y", "vx", "vy", "r", "growth")
 """What a policy sees of a person."""
 ROBOT = (
@@ -86,6 +89,15 @@ class MotionDecider:
         self.actor, self.cell, self.arm = actor, cell, arm_of(cell)
         self._between = Interpolation(actor) if interpolates(actor) else None
         self._rule = actor.action.rule()
+        qd_max, qdd_max = self.arm.qd_max + SLACK, self.arm.qdd_max + SLACK
+        self._each_limits = (
+            (self.arm.q_min - SLACK, self.arm.q_max + SLACK),
+            (-qd_max, qd_max),
+            (-qdd_max, qdd_max),
+            (-_FAR, _FAR),
+        )
+        low, high = zip(*self._each_limits, strict=True)
+        self._limits = np.concatenate(low), np.concatenate(high)
         self._robot = _trained(actor.trained_range, {"q": 6, "qd": 6, "goal": 3})
         self._person = _trained(actor.trained_range, {"human": len(HUMAN)})
         self._stages: dict[tuple[int, int], Stage] = {}
@@ -168,18 +180,22 @@ class MotionDecider:
 
     def _numbers(self, question: MotionQuestion) -> tuple[Vec, Vec, Vec, Vec]:
         """Return q, qd, qdd and goal once they keep their rules."""
-        arm, given = self.arm, question.qdd
-        q_min, q_max = arm.q_min - SLACK, arm.q_max + SLACK
-        q = checked_vector("robot.q", question.q, 6, q_min, q_max, "rad")
-        qd_max, qdd_max = arm.qd_max + SLACK, arm.qdd_max + SLACK
-        qd = checked_vector("robot.qd", question.qd, 6, -qd_max, qd_max, "rad/s")
-        if given is None and self.actor.action.degree == 3:
+        if question.qdd is None and self.actor.action.degree == 3:
             rule = "must be given: this policy limits jerk, which needs the accelerations"
             raise InvalidInput("robot.qdd", None, rule)
-        qdd = np.zeros(6)
-        if given is not None:
-            qdd = checked_vector("robot.qdd", given, 6, -qdd_max, qdd_max, "rad/s^2")
-        goal = checked_vector("goal", question.goal, 3, -_FAR, _FAR, "m")
+        given = np.zeros(6) if question.qdd is None else question.qdd
+        parts = [
+            np.asarray(values, dtype=np.float64)
+            for values in (question.q, question.qd, given, question.goal)
+        ]
+        if [part.shape for part in parts] != _SHAPES or not _within(self._limits, parts):
+            parts = [
+                checked_vector(name, part, len(low), low, high, unit)
+                for (name, unit), part, (low, high) in zip(
+                    FIELDS, parts, self._each_limits, strict=True
+                )
+            ]
+        q, qd, qdd, goal = parts
         for name, value in (("time_left_s", question.time_left_s), ("age_s", question.age_s)):
             if not 0.0 <= value <= LONGEST_S:
                 raise InvalidInput(name, value, f"must lie in [0, {LONGEST_S:g}] s")
@@ -305,6 +321,12 @@ class MotionDecider:
             nobody = OutsideField(field="people", value=0.0, low=1.0, high=4.0)
             return (nobody,) if met else ()
         return _beyond(self._person, seen, [f"people[{order[who]}].{name}" for name in HUMAN])
+
+
+def _within(limits: tuple[Vec, Vec], parts: Sequence[Vec]) -> bool:
+    """Return whether all numbers of some vectors lie within limits, which are joined."""
+    together, (low, high) = np.concatenate(parts), limits
+    return bool(((low <= together) & (together <= high)).all())
 
 
 def _trained(
