@@ -18,6 +18,7 @@ from app.__main__ import parsed_sets
 from app.policies import checkpoint as formats
 from app.policies import presets
 from app.policies.checkpoint import Checkpoint
+from app.policies.presets import Preset
 from app.policies.progress import Progress
 from app.policies.training import train
 
@@ -30,16 +31,19 @@ def main() -> None:
     parser.add_argument("--output", type=Path, required=True)
     parser.add_argument("--set", action="append", default=[], dest="sets")
     options = parser.parse_args()
-    preset = presets.resolve(options.preset, parsed_sets(options.sets))
-    folder: Path = options.output
-    folder.mkdir(parents=True, exist_ok=True)
     torch.set_num_threads(1)
+    preset = presets.resolve(options.preset, parsed_sets(options.sets))
+    record(preset, options.seed, options.output)
+
+
+def record(preset: Preset, seed: int, folder: Path) -> None:
+    """Train a preset, or go on with it, and keep curve and policies in a folder."""
+    folder.mkdir(parents=True, exist_ok=True)
 
     def on_progress(point: Progress) -> None:
         with (folder / "curve.jsonl").open("a", encoding="utf-8") as file:
             file.write(
-                json.dumps({"preset": preset.name, "seed": options.seed, **asdict(point)})
-                + "\n"
+                json.dumps({"preset": preset.name, "seed": seed, **asdict(point)}) + "\n"
             )
 
     def on_checkpoint(step: int, policy: Checkpoint, state: Checkpoint) -> None:
@@ -48,7 +52,7 @@ def main() -> None:
 
     train(
         preset,
-        seed=options.seed,
+        seed=seed,
         resume=read(folder / "resume"),
         on_progress=on_progress,
         on_checkpoint=on_checkpoint,

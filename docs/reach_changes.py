@@ -1,0 +1,184 @@
+"""Measure what each part of a recipe gives: one change at a time, several training seeds.
+
+    python docs/reach_changes.py FOLDER [--seeds 1 2 3] [--only NAME ...] [--measure]
+
+Trains ``reach-td3`` and every variant of it in CHANGES for 1.28 million steps into
+``FOLDER/NAME-SEED``, where it is not done yet; a training that was stopped is begun anew. Then
+the last policy of each plays the row ``clearance`` of ``reach-targets``, without looking ahead,
+beside the same people. Several processes may train different seeds or changes; ``--measure``
+plays what is there, trains nothing, and writes ``docs/results/reach-changes.json``.
+
+A row pools the episodes of all seeds. ``against_base`` is the difference of the mean success
+over seeds to the recipe as it is, with Welch's 95 % interval over seeds: what another seed may
+give is part of it.
+"""
+
+import argparse
+import json
+import shutil
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import numpy as np
+import torch
+from scipy import stats
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT))
+
+from app.machine import describe  # noqa: E402 - the line above lets it be found
+from app.policies import presets  # noqa: E402
+from app.policies.checkpoint import load  # noqa: E402
+from app.policies.evaluation.reach_bench import ReachBench  # noqa: E402
+from app.policies.evaluation.rows import untold  # noqa: E402
+from app.policies.evaluation.statistics import wilson  # noqa: E402
+from docs.reach_points import ENDS, lines  # noqa: E402
+from docs.reach_seeds import SOURCE  # noqa: E402
+from docs.training_curves import record  # noqa: E402
+
+RESULTS = ROOT / "docs/results/reach-changes.json"
+BASE = "reach-td3"
+SHORT = {"total_steps": 1_280_000, "checkpoint_steps": 1_280_000, "progress_steps": 128_000}
+"""What all trainings share: 9,800 updates."""
+CHANGES: Mapping[str, Mapping[str, Any]] = {
+    BASE: {},
+    "without the straight way": {"actor": "plain"},
+    "without forecasts": {"observation": "features"},
+    "prioritised replay": {"alpha": 0.6},
+    "distributional critics": {"critic": "quantiles"},
+    "five critics": {"n_critics": 5},
+    "twice the width": {"width": 512},
+    "critics that see the future": {"critic_sees": "future"},
+    "no averaged weights": {"ema": 0.0},
+    "an actor's update every other": {"policy_delay": 2},
+    "minibatches of 512": {"batch_size": 512},
+    "one-step returns": {"n_steps": 1},
+    "gamma 0.997": {"gamma": 0.997},
+    "random options": {"option_rate": 0.02},
+    "people start anywhere": {"start": "uniform"},
+    "no normalisation in critics": {"critic_norm": "none"},
+}
+"""Fields of the preset that each variant changes."""
+PER_TARGET = 50
+SEED = 77
+"""Seed of the episodes; training uses none such, and no result that is claimed does."""
+Json = dict[str, Any]
+
+
+def folder_of(root: Path, name: str, seed: int) -> Path:
+    """Return where a variant's training with one seed is kept."""
+    return root / f"{name.replace(' ', '-')}-{seed}"
+
+
+def last_of(folder: Path) -> Path | None:
+    """Return the manifest of a finished training's policy; None where it is not finished."""
+    found = folder / f"step-{SHORT['total_steps']:09d}.json"
+    return found if found.exists() else None
+
+
+def train_missing(root: Path, names: Sequence[str], seeds: Sequence[int]) -> None:
+    """Train what is not there yet, all variants with the first seed first."""
+    for seed in seeds:
+        for name in names:
+            folder = folder_of(root, name, seed)
+            if last_of(folder) is None:
+                shutil.rmtree(folder, ignore_errors=True)
+                record(presets.resolve(BASE, {**SHORT, **CHANGES[name]}), seed, folder)
+
+
+def played(manifest: Path, per_target: int) -> Json:
+    """Return how a policy's episodes ended, what it cost, and when it passed the source's."""
+    told = json.loads(manifest.read_text(encoding="utf-8"))
+    checkpoint = load(told, manifest.with_suffix(".safetensors").read_bytes())
+    bench = ReachBench(checkpoint, SEED, 1, untold)
+    goals = bench.target_goals(per_target * len(bench.targets))
+    curve = lines(manifest.parent / "curve.jsonl")
+    passed = [one["cpu_s"] / 60.0 for one in curve if (one["success"] or 0.0) >= SOURCE]
+    return {
+        "rates": bench.play(bench.usual, goals).rates(),
+        "n": len(goals),
+        "cpu_min": told["cpu_s"] / 60.0,
+        "updates": told["updates"],
+        "passed": passed[0] if passed else None,
+    }
+
+
+def row_of(name: str, runs: Sequence[Json], base: Sequence[Json]) -> Json:
+    """Return a variant's row: all episodes of its seeds, and how far it is from the base."""
+    n = sum(run["n"] for run in runs)
+    means = [run["rates"]["success"]["mean"] for run in runs]
+    passed = [run["passed"] for run in runs]
+    known = [one for one in passed if one is not None]
+    return {
+        "name": name,
+        "seeds": len(runs),
+        "n": n,
+        **{
+            end: wilson(round(sum(run["rates"][end]["mean"] * run["n"] for run in runs)), n)
+            for end in ENDS
+        },
+        "worst_seed": min(means),
+        "best_seed": max(means),
+        "against_base": welch(means, [run["rates"]["success"]["mean"] for run in base]),
+        "cpu_min": median(run["cpu_min"] for run in runs),
+        "updates": runs[0]["updates"],
+        "to_source_min": median(known) if len(known) == len(passed) else None,
+    }
+
+
+def welch(values: Sequence[float], others: Sequence[float]) -> dict[str, float] | None:
+    """Return the difference of two means with its 95 % interval; None for the same runs.
+
+    Source: Welch, *The generalization of "Student's" problem* (1947).
+    """
+    if list(values) == list(others) or min(len(values), len(others)) < 2:
+        return None
+    interval = stats.ttest_ind(values, others, equal_var=False).confidence_interval(0.95)
+    mean = float(np.mean(values) - np.mean(others))
+    return {"mean": mean, "low": float(interval.low), "high": float(interval.high)}
+
+
+def measured(root: Path, seeds: Sequence[int], per_target: int) -> list[Json]:
+    """Return a row for every variant with a finished training, the base first."""
+    runs = {
+        name: [
+            played(found, per_target)
+            for seed in seeds
+            if (found := last_of(folder_of(root, name, seed))) is not None
+        ]
+        for name in CHANGES
+    }
+    return [row_of(name, found, runs[BASE]) for name, found in runs.items() if found]
+
+
+def main() -> None:
+    """Train what is missing, or measure what is there."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", type=Path, metavar="FOLDER")
+    parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3])
+    parser.add_argument("--only", nargs="+", choices=list(CHANGES), default=list(CHANGES))
+    parser.add_argument("--measure", action="store_true", help="train nothing")
+    parser.add_argument("--episodes", type=int, default=PER_TARGET, help="per target")
+    options = parser.parse_args()
+    torch.set_num_threads(1)
+    if not options.measure:
+        train_missing(options.folder, options.only, options.seeds)
+        return
+    result = {
+        "protocol": "reach-changes",
+        "command": "python docs/reach_changes.py FOLDER --measure",
+        "policy": BASE,
+        "seed": SEED,
+        "episodes": options.episodes,
+        "changes": {name: dict(changed) for name, changed in CHANGES.items()},
+        "results": measured(options.folder, options.seeds, options.episodes),
+        "machine": describe(),
+    }
+    RESULTS.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

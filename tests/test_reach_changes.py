@@ -1,0 +1,67 @@
+"""How ``docs/reach_changes.py`` varies the recipe and puts seeds together."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from scipy import stats
+
+from app.policies import presets
+from app.policies.evaluation.statistics import wilson
+from docs.reach_changes import BASE, CHANGES, SHORT, folder_of, last_of, row_of, welch
+
+
+def run(success: float, *, cpu_min: float, passed: float | None) -> dict[str, Any]:
+    n, good = 1000, round(1000 * success)
+    ends = {"success": good, "collision": n - good, "timeout": 0}
+    return {
+        "rates": {end: wilson(hits, n) for end, hits in ends.items()},
+        "n": n,
+        "cpu_min": cpu_min,
+        "updates": 9_799,
+        "passed": passed,
+    }
+
+
+@pytest.mark.parametrize("name", CHANGES)
+def test_a_variant_changes_one_field_of_the_recipe(name: str) -> None:
+    base = presets.resolve(BASE, SHORT)
+    varied = presets.resolve(BASE, {**SHORT, **CHANGES[name]})
+    fields = [one for one in base.__slots__ if getattr(base, one) != getattr(varied, one)]
+    assert fields == list(CHANGES[name])
+    assert len(fields) == (name != BASE)
+
+
+def test_rows_pool_episodes_and_compare_seeds() -> None:
+    base = [run(one, cpu_min=4.0, passed=3.0) for one in (0.95, 0.96, 0.94)]
+    worse = [run(0.90, cpu_min=5.0, passed=None), run(0.92, cpu_min=7.0, passed=6.0)]
+    row = row_of("worse", worse, base)
+    assert row["n"] == 2000
+    assert row["success"] == wilson(1820, 2000)
+    assert (row["worst_seed"], row["best_seed"]) == (0.90, 0.92)
+    assert row["cpu_min"] == pytest.approx(6.0)
+    assert row["to_source_min"] is None
+    assert row_of(BASE, base, base)["against_base"] is None
+    assert row_of(BASE, base, base)["to_source_min"] == pytest.approx(3.0)
+
+
+def test_the_interval_is_welchs() -> None:
+    values, others = [0.90, 0.92, 0.93], [0.95, 0.96, 0.94]
+    found = welch(values, others)
+    assert found is not None
+    assert found["low"] < found["mean"] < found["high"] < 0.0
+    assert found["mean"] == pytest.approx(-0.0333333, abs=1e-6)
+    variances = [stats.tvar(one) / 3 for one in (values, others)]
+    freedom = sum(variances) ** 2 / sum(one**2 / 2 for one in variances)
+    half = stats.t.ppf(0.975, freedom) * sum(variances) ** 0.5
+    assert found["high"] - found["mean"] == pytest.approx(half)
+    assert welch([0.9], others) is None
+
+
+def test_only_finished_trainings_are_measured(tmp_path: Path) -> None:
+    folder = folder_of(tmp_path, "gamma 0.997", 2)
+    folder.mkdir()
+    assert folder.name == "gamma-0.997-2"
+    assert last_of(folder) is None
+    (folder / "step-001280000.json").write_text("{}")
+    assert last_of(folder) == folder / "step-001280000.json"
