@@ -44,13 +44,13 @@ JOINT_COLOURS = (BLUE, ORANGE, GREEN, RED, PURPLE, GREY)
 WAYS = {
     "direct": ("asked directly", BLUE, "o"),
     "interpolated": ("interpolated", ORANGE, "s"),
-    "averaged": ("averaged over people", ORANGE, "s"),
-    "set": ("a network over the set", PURPLE, "^"),
+    "averaged": ("averaged", ORANGE, "s"),
+    "set": ("seen as a set", PURPLE, "^"),
     "direct-ahead": ("asked directly, ahead", GREEN, "D"),
     "interpolated-ahead": ("interpolated, ahead", PURPLE, "^"),
 }
 """Words, colour and mark of each way of asking a policy."""
-PEOPLE = {"direct": "the nearest is seen", "direct-ahead": "... and it looks ahead"}
+PEOPLE = {"direct": "nearest seen", "direct-ahead": "... looking ahead"}
 """Words of two of them where there are several people."""
 TRACKERS = {
     "exact": "exact state",
@@ -261,12 +261,12 @@ def between_targets(results: Sequence[Json]) -> Figure:
 # Other people ---------------------------------------------------------------------------------
 
 
-def others(people: Json | None, speeds: Json | None, trackers: Json | None) -> Figure:
+def others(people: Sequence[Json], speeds: Json | None, trackers: Json | None) -> Figure:
     """Draw several people, fast and slow ones, and people seen through a tracker."""
     there = [
         (draw, one)
         for draw, one in ((_people, people), (_speeds, speeds), (_trackers, trackers))
-        if one is not None
+        if one
     ]
     figure, axes = panels(1, len(there), 3.2, width_ratios=[1.15, 0.8, 1.25][: len(there)])
     for axis, (draw, one) in zip(axes[0], there, strict=True):
@@ -274,20 +274,19 @@ def others(people: Json | None, speeds: Json | None, trackers: Json | None) -> F
     return figure
 
 
-def _people(axis: Axes, result: Json) -> None:
-    rows = {row["name"]: row for row in result["results"]}
-    asked = result["settings"]["rows"]
-    ways = list(dict.fromkeys(one["asked"] for one in asked.values()))
-    for k, how in enumerate(ways):
-        own = [
-            (len(asked[name]["people"]), row["success"])
-            for name, row in rows.items()
-            if asked[name]["asked"] == how or _for_all(asked[name], how)
-        ]
-        words, colour, mark = WAYS[how]
-        words = PEOPLE.get(how, words)
+def _people(axis: Axes, results: Sequence[Json]) -> None:
+    shown = [
+        (*WAYS[how][1:], PEOPLE.get(how, WAYS[how][0]), _by_people(results[0], how))
+        for how in dict.fromkeys(
+            one["asked"] for one in results[0]["settings"]["rows"].values()
+        )
+    ]
+    for other in results[1:]:  # asked in one way only: what it sees is another question
+        words, colour, mark = WAYS.get(other["label"], (other["label"], INK, "v"))
+        shown.append((colour, mark, words, _by_people(other, "direct")))
+    for k, (colour, mark, words, own) in enumerate(shown):
         axis.errorbar(
-            [n + 0.06 * (k - 0.5 * (len(ways) - 1)) for n, _ in own],
+            [n + 0.06 * (k - 0.5 * (len(shown) - 1)) for n, _ in own],
             [rate["mean"] for _, rate in own],
             bars([rate for _, rate in own]),
             fmt=f"{mark}-",
@@ -299,7 +298,18 @@ def _people(axis: Axes, result: Json) -> None:
     axis.set(title="Several people", xlabel="people in the cell", ylabel="success")
     axis.xaxis.set_major_locator(FixedLocator(range(5)))
     percent(axis.yaxis)
-    axis.legend(loc="lower left")
+    axis.set_ylim(bottom=axis.get_ylim()[0] - 0.04)  # room for the legend
+    axis.legend(loc="lower left", fontsize=8)
+
+
+def _by_people(result: Json, how: str) -> list[tuple[int, Json]]:
+    """Return how many people there are and the success beside them, asked in one way."""
+    asked = result["settings"]["rows"]
+    return [
+        (len(asked[row["name"]]["people"]), row["success"])
+        for row in result["results"]
+        if asked[row["name"]]["asked"] == how or _for_all(asked[row["name"]], how)
+    ]
 
 
 def _for_all(row: Json, how: str) -> bool:
@@ -436,7 +446,7 @@ def main() -> None:
         save(start_rules, IMAGES / "starts.png", targets)
     if randoms := read_all("reach-random"):
         save(between_targets, IMAGES / "between.png", randoms)
-    three = [read(f"reach-{name}") for name in ("people", "speeds", "tracker")]
+    three = read_all("reach-people"), read("reach-speeds"), read("reach-tracker")
     if any(three):
         save(others, IMAGES / "others.png", *three)
     if smooth := [one for one in read_all("reach-smoothness") if one["example"]]:
