@@ -3,7 +3,6 @@
 ``app/sim/kernels/lookahead.py`` plays them forward; here it meets a policy and a batch.
 """
 
-import math
 from collections.abc import Callable
 from typing import Protocol
 
@@ -63,19 +62,17 @@ class Lookahead:
 
     Args:
         actor: The policy.
-        calm_m: Where the way of the policy keeps farther than this from everybody, the next two
-            decisions in the same cell pass unplayed [m]; by default each one is played.
 
     Raises:
         InvalidInput: It cannot be played ahead.
     """
 
-    def __init__(self, actor: ReachActor, calm_m: float = math.inf) -> None:
+    def __init__(self, actor: ReachActor) -> None:
         network = _network_of(actor)
         if network is None:
             rule = "must be a residual actor of two layers that sees forecasts, to look ahead"
             raise InvalidInput("checkpoint", actor.checkpoint, rule)
-        self._network, self._rule, self._calm_m = network, actor.action.rule(), calm_m
+        self._network, self._rule = network, actor.action.rule()
         self._cells: Cells | None = None
         self._work: tuple[Work, kernel.Lookahead] | None = None
         self._call: Callable[..., None] = kernel.look_ahead_batch
@@ -92,9 +89,7 @@ class Lookahead:
         """
         world, state, chosen = cells.world, cells.state, np.empty(len(act), dtype=np.int64)
         if self._work is None or self._cells is not cells:
-            look = kernel.new_lookahead(
-                world.arm, self._network, BASE_WEIGHT, len(act), self._calm_m
-            )
+            look = kernel.new_lookahead(world.arm, self._network, BASE_WEIGHT, len(act))
             self._cells, self._work = cells, (new_work(world, state, new_forecaster()), look)
             self._call = direct(
                 kernel.look_ahead_batch, (world, self._rule, state, act, *self._work, chosen)

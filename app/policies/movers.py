@@ -41,8 +41,6 @@ HOWS: tuple[How, ...] = get_args(How)
 """Names of the ways."""
 AHEAD = "-ahead"
 """End of the names of those that look ahead."""
-CALM_M = 0.1
-"""These look every third period while the policy's way keeps this far from everybody [m]."""
 NEAREST_M = 0.05
 """People nearer than this weigh no more [m]."""
 POWER = 2.0
@@ -159,7 +157,7 @@ class Ahead:
     """
 
     def __init__(self, mover: Mover, actor: ReachActor) -> None:
-        self._mover, self._ahead = mover, Lookahead(actor, CALM_M)
+        self._mover, self._ahead = mover, Lookahead(actor)
 
     def acts(self, batch: ReachBatch) -> Actions:
         """Return actions for every cell; see :class:`Mover`."""

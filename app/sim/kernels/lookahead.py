@@ -74,8 +74,6 @@ NO_CONTACT = -1.0
 """Worth more is every way that ends in no contact."""
 FREE = 0.5
 """Clearance beyond which more is worth nothing [m]."""
-RESTS = 2
-"""Decisions that pass unplayed after one whose way keeps far from everybody."""
 BETTER = 0.02
 """By how much another way must be worth more than the best so far."""
 WORTH_IT = 1.0
@@ -121,10 +119,6 @@ class Lookahead(NamedTuple):
     """Action of a step, shape (6,)."""
     found: Floats
     """First action of another way, shape (6,)."""
-    calm_m: float
-    """Clearance on the way of the policy above which the next RESTS decisions pass [m]."""
-    rests: NDArray[np.int64]
-    """How many do yet, shape (n_envs,)."""
     begun: Floats
     """That of the best one, shape (6,)."""
     plan: NDArray[np.int64]
@@ -149,9 +143,7 @@ class Lookahead(NamedTuple):
     """Random stream of a decision, shape (1,)."""
 
 
-def new_lookahead(
-    arm: Arm, net: Network, base_weight: float, n_envs: int, calm_m: float
-) -> Lookahead:
+def new_lookahead(arm: Arm, net: Network, base_weight: float, n_envs: int) -> Lookahead:
     """Return work space for a network and so many environments."""
     aim = np.zeros((N_POSTURES, 6))
     aim[:-1] = np.clip(arm.home + np.array(POSTURES), arm.q_min, arm.q_max)
@@ -175,8 +167,6 @@ def new_lookahead(
         h2=room(width),
         act=room(6),
         found=room(6),
-        calm_m=calm_m,
-        rests=np.zeros(n_envs, dtype=np.int64),
         begun=room(6),
         plan=np.full((n_envs, 2), PASSED),
         came=np.zeros(1),
@@ -333,7 +323,7 @@ def _play(
     n: int,
     work: Work,
     look: Lookahead,
-) -> tuple[int, float, float]:
+) -> tuple[int, float]:
     """Play one way: first to a posture, or ``act``, then the policy; or a dash, or a dart.
 
     Args:
@@ -350,8 +340,7 @@ def _play(
         look: Network and work space; people are foretold. ``came`` is filled.
 
     Returns:
-        How it ends (RUNNING, SUCCESS or COLLISION), what it is worth, and how near people come
-        on it [m], at most FREE.
+        How it ends (RUNNING, SUCCESS or COLLISION), and what it is worth.
     """
     arm, goal, least = world.arm, state.goal[e], FREE
     periods = max(1, int(STEP_S / arm.dt + 0.5))
@@ -379,12 +368,12 @@ def _play(
             t, clear = (step + share) * STEP_S, _clear(world, step, share, n, work, look)
             least = min(least, clear)
             if _touches(arm, clear - kept * min(KEPT_M, KEPT_M_S * t), work):
-                return COLLISION, AT_CONTACT + LATER * t - turned, least
+                return COLLISION, AT_CONTACT + LATER * t - turned
             look.came[0] = min(look.came[0], distance_to(goal, work.robot))
             if look.came[0] < SUCCESS_DISTANCE:
-                return SUCCESS, AT_GOAL - LATER * t - turned, least
+                return SUCCESS, AT_GOAL - LATER * t - turned
     worth = ROOM * least - APART * distance_to(goal, work.robot) - turned
-    return RUNNING, worth, least
+    return RUNNING, worth
 
 
 @kernel()
@@ -409,7 +398,7 @@ def _best_of_others(
         if k == N_FIRST and bar > NO_CONTACT:
             break
         posture, lasting = way_of(k)
-        _, worth, _ = _play(
+        _, worth = _play(
             world, rule, state, e, look.found, posture, lasting, 1.0, n, work, look
         )
         if worth > bar:
@@ -447,7 +436,7 @@ def _best_dart(
             lasting = vary_dart(world.arm, look.near[e], lasting, look.rng, look.dart)
         else:
             lasting = draw_dart(world.arm, state.q[e], look.rng, look.dart)
-        _, worth, _ = _play(
+        _, worth = _play(
             world, rule, state, e, look.found, posture, lasting, 1.0, n, work, look
         )
         if again or nearest[0] == 0.0 or look.came[0] < nearest[0]:
@@ -509,19 +498,14 @@ def look_ahead(
     """
     look.foretold.since[e] += world.arm.dt
     if state.elapsed[e] == 0.0:
-        look.rests[e], look.plan[e, 0] = 0, PASSED
+        look.plan[e, 0] = PASSED
         look.drawn[e], look.nearest[e, 0] = 0, 0.0
-    if look.rests[e] > 0:
-        look.rests[e] -= 1
-        return PASSED
     n = foretell(world, state, e, work, look.foretold)
     if n == 0:
         return PASSED
     posture, lasting = way_of(PASSED)  # no literals: _play would be compiled once more for them
-    ended, best, least = _play(world, rule, state, e, act, posture, lasting, 1.0, n, work, look)
+    ended, best = _play(world, rule, state, e, act, posture, lasting, 1.0, n, work, look)
     chosen = PASSED
-    calm = ended == SUCCESS or (ended == RUNNING and not _is_late(state, e))
-    look.rests[e] = RESTS if calm and least > look.calm_m else 0
     posture, lasting = _left(e, look, world.arm.dt)
     if posture != PASSED:
         played = _play(
@@ -539,7 +523,6 @@ def look_ahead(
         chosen, look.plan[e, 1] = looked, 0
     look.plan[e, 0] = chosen
     if chosen != PASSED:
-        look.rests[e] = 0
         copy_values(look.begun, act)
     return chosen
 
