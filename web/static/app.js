@@ -159,7 +159,7 @@ function veil(link, reason) {
   if (link !== "warming") return ["Opening the cell", ""];
   const doing = reason.replace(/^(warming up|starting):? */, "");
   if (doing === reason && reason) return ["The server is not ready", reason];
-  const patience = " The first start on a machine takes a minute or two, later ones seconds.";
+  const patience = " The first start on a machine takes several minutes, later ones seconds.";
   return ["Warming up", `${capital(doing || "starting")} …${/compil/.test(doing) ? patience : ""}`];
 }
 
