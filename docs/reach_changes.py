@@ -8,9 +8,9 @@ the last policy of each plays the row ``clearance`` of ``reach-targets``, withou
 beside the same people. Several processes may train different seeds or changes; ``--measure``
 plays what is there, trains nothing, and writes ``docs/results/reach-changes.json``.
 
-A row pools the episodes of all seeds. ``against_base`` is the difference of the mean success
-over seeds to the recipe as it is, with Welch's 95 % interval over seeds: what another seed may
-give is part of it.
+All seeds meet the same people, so that intervals count seeds, not episodes: a rate's is
+Student's over them, and ``against_base``, the difference of the mean success to the recipe as
+it is, has Welch's.
 """
 
 import argparse
@@ -29,14 +29,15 @@ from scipy import stats
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from app.machine import describe  # noqa: E402 - the line above lets it be found
+from app.errors import InvalidInput  # noqa: E402 - the line above lets it be found
+from app.machine import describe  # noqa: E402
 from app.policies import presets  # noqa: E402
-from app.policies.checkpoint import load  # noqa: E402
+from app.policies.checkpoint import Checkpoint  # noqa: E402
 from app.policies.evaluation.reach_bench import ReachBench  # noqa: E402
 from app.policies.evaluation.rows import untold  # noqa: E402
-from app.policies.evaluation.statistics import wilson  # noqa: E402
+from docs.augmentation import over_seeds  # noqa: E402
 from docs.reach_points import ENDS  # noqa: E402
-from docs.training_curves import record  # noqa: E402
+from docs.training_curves import read, record  # noqa: E402
 
 RESULTS = ROOT / "docs/results/reach-changes.json"
 BASE = "reach-td3"
@@ -72,10 +73,9 @@ def folder_of(root: Path, name: str, seed: int) -> Path:
     return root / f"{name.replace(' ', '-')}-{seed}"
 
 
-def last_of(folder: Path) -> Path | None:
-    """Return the manifest of a finished training's policy; None where it is not finished."""
-    found = folder / f"step-{SHORT['total_steps']:09d}.json"
-    return found if found.exists() else None
+def policy_of(folder: Path) -> Checkpoint | None:
+    """Return the policy of a finished training; None where it is not finished."""
+    return read(folder / f"step-{SHORT['total_steps']:09d}")
 
 
 def train_missing(root: Path, names: Sequence[str], seeds: Sequence[int]) -> None:
@@ -83,68 +83,69 @@ def train_missing(root: Path, names: Sequence[str], seeds: Sequence[int]) -> Non
     for seed in seeds:
         for name in names:
             folder = folder_of(root, name, seed)
-            if last_of(folder) is None:
+            if policy_of(folder) is None:
                 shutil.rmtree(folder, ignore_errors=True)
                 record(presets.resolve(BASE, {**SHORT, **CHANGES[name]}), seed, folder)
 
 
-def played(manifest: Path, per_target: int) -> Json:
+def played(policy: Checkpoint, per_target: int) -> Json:
     """Return how a policy's episodes ended, and what it cost."""
-    told = json.loads(manifest.read_text(encoding="utf-8"))
-    checkpoint = load(told, manifest.with_suffix(".safetensors").read_bytes())
-    bench = ReachBench(checkpoint, SEED, 1, untold)
+    bench = ReachBench(policy, SEED, 1, untold)
     goals = bench.target_goals(per_target * len(bench.targets))
     return {
         "rates": bench.play(bench.usual, goals).rates(),
         "n": len(goals),
-        "cpu_min": told["cpu_s"] / 60.0,
-        "updates": told["updates"],
+        "cpu_min": policy.manifest["cpu_s"] / 60.0,
+        "updates": policy.manifest["updates"],
     }
 
 
 def row_of(name: str, runs: Sequence[Json], base: Sequence[Json]) -> Json:
-    """Return a variant's row: all episodes of its seeds, and how far it is from the base."""
-    n = sum(run["n"] for run in runs)
-    means = [run["rates"]["success"]["mean"] for run in runs]
+    """Return a variant's row over its seeds, and how far it is from the base."""
+    means = {end: [run["rates"][end]["mean"] for run in runs] for end in ENDS}
+    successes = means["success"]
     return {
         "name": name,
         "seeds": len(runs),
-        "n": n,
-        **{
-            end: wilson(round(sum(run["rates"][end]["mean"] * run["n"] for run in runs)), n)
-            for end in ENDS
-        },
-        "worst_seed": min(means),
-        "best_seed": max(means),
-        "against_base": welch(means, [run["rates"]["success"]["mean"] for run in base]),
+        "n": sum(run["n"] for run in runs),
+        **{end: over_seeds(each) for end, each in means.items()},
+        "worst_seed": min(successes),
+        "best_seed": max(successes),
+        "against_base": None
+        if runs is base
+        else welch(successes, [run["rates"]["success"]["mean"] for run in base]),
         "cpu_min": median(run["cpu_min"] for run in runs),
         "updates": runs[0]["updates"],
     }
 
 
-def welch(values: Sequence[float], others: Sequence[float]) -> dict[str, float] | None:
-    """Return the difference of two means with its 95 % interval; None for the same runs.
+def welch(values: Sequence[float], others: Sequence[float]) -> dict[str, float]:
+    """Return the difference of two means, of two or more values each, with its 95 % interval.
 
     Source: Welch, *The generalization of "Student's" problem* (1947).
     """
-    if list(values) == list(others) or min(len(values), len(others)) < 2:
-        return None
     interval = stats.ttest_ind(values, others, equal_var=False).confidence_interval(0.95)
     mean = float(np.mean(values) - np.mean(others))
     return {"mean": mean, "low": float(interval.low), "high": float(interval.high)}
 
 
 def measured(root: Path, seeds: Sequence[int], per_target: int) -> list[Json]:
-    """Return a row for every variant with a finished training, the base first."""
+    """Return a row for the base and every variant with two or more finished trainings.
+
+    Raises:
+        InvalidInput: The base has fewer.
+    """
     runs = {
         name: [
             played(found, per_target)
             for seed in seeds
-            if (found := last_of(folder_of(root, name, seed))) is not None
+            if (found := policy_of(folder_of(root, name, seed))) is not None
         ]
         for name in CHANGES
     }
-    return [row_of(name, found, runs[BASE]) for name, found in runs.items() if found]
+    if len(runs[BASE]) < 2:
+        raise InvalidInput(BASE, len(runs[BASE]), "must be trained with two or more seeds")
+    return [row_of(name, found, runs[BASE]) for name, found in runs.items() if len(found) > 1]
 
 
 def main() -> None:

@@ -6,9 +6,11 @@ from typing import Any
 import pytest
 from scipy import stats
 
+from app.errors import InvalidInput
 from app.policies import presets
 from app.policies.evaluation.statistics import wilson
-from docs.reach_changes import BASE, CHANGES, SHORT, folder_of, last_of, row_of, welch
+from docs.augmentation import over_seeds
+from docs.reach_changes import BASE, CHANGES, SHORT, folder_of, measured, row_of, welch
 
 
 def run(success: float, *, cpu_min: float) -> dict[str, Any]:
@@ -31,12 +33,13 @@ def test_a_variant_changes_one_field_of_the_recipe(name: str) -> None:
     assert len(fields) == (name != BASE)
 
 
-def test_rows_pool_episodes_and_compare_seeds() -> None:
+def test_intervals_count_seeds() -> None:
     base = [run(one, cpu_min=4.0) for one in (0.95, 0.96, 0.94)]
     worse = [run(0.90, cpu_min=5.0), run(0.92, cpu_min=7.0)]
     row = row_of("worse", worse, base)
     assert row["n"] == 2000
-    assert row["success"] == wilson(1820, 2000)
+    assert row["success"] == over_seeds([0.90, 0.92])
+    assert row["against_base"] == welch([0.90, 0.92], [0.95, 0.96, 0.94])
     assert (row["worst_seed"], row["best_seed"]) == (0.90, 0.92)
     assert row["cpu_min"] == pytest.approx(6.0)
     assert row_of(BASE, base, base)["against_base"] is None
@@ -45,20 +48,17 @@ def test_rows_pool_episodes_and_compare_seeds() -> None:
 def test_the_interval_is_welchs() -> None:
     values, others = [0.90, 0.92, 0.93], [0.95, 0.96, 0.94]
     found = welch(values, others)
-    assert found is not None
     assert found["low"] < found["mean"] < found["high"] < 0.0
     assert found["mean"] == pytest.approx(-0.0333333, abs=1e-6)
     variances = [stats.tvar(one) / 3 for one in (values, others)]
     freedom = sum(variances) ** 2 / sum(one**2 / 2 for one in variances)
     half = stats.t.ppf(0.975, freedom) * sum(variances) ** 0.5
     assert found["high"] - found["mean"] == pytest.approx(half)
-    assert welch([0.9], others) is None
 
 
-def test_only_finished_trainings_are_measured(tmp_path: Path) -> None:
-    folder = folder_of(tmp_path, "gamma 0.997", 2)
+def test_unfinished_trainings_are_not_measured(tmp_path: Path) -> None:
+    folder = folder_of(tmp_path, BASE, 2)
     folder.mkdir()
-    assert folder.name == "gamma-0.997-2"
-    assert last_of(folder) is None
-    (folder / "step-001280000.json").write_text("{}")
-    assert last_of(folder) == folder / "step-001280000.json"
+    (folder / "step-000320000.json").write_text("{}")
+    with pytest.raises(InvalidInput, match="two or more seeds"):
+        measured(tmp_path, (1, 2), 1)
