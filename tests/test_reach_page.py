@@ -26,6 +26,7 @@ def results(tmp_path: Path) -> Path:
         "reach-random.grid": made.random_goals(0.004, ("direct", "interpolated")),
         "reach-constant": made.result("reach-constant", [made.row("constant", 5400, 0.02)]),
         "reach-people": made.people(),
+        "reach-people.set": made.people(),
         "reach-speeds": made.speeds(),
         "reach-tracker": made.tracker(),
         "reach-ceiling": made.ceiling(),
