@@ -50,7 +50,7 @@ run: $(VENV)/setup.stamp ## set up what is missing, start the server, print its 
 
 setup: $(VENV)/setup.stamp ## set up without starting
 
-test: $(VENV)/dev.stamp ## the default tests: no network, no browser, no long training
+test: $(VENV)/dev.stamp $(VENV)/setup.stamp ## the default tests: no network, no browser, no long training
 	@$(PY) -m pytest
 
 test-browser: $(VENV)/dev.stamp ## the page in a real Chromium

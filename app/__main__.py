@@ -11,6 +11,7 @@ import logging
 import os
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -147,10 +148,14 @@ def run_setup(_options: argparse.Namespace) -> int:
         lock.release()
     print(f"database: {store.shown_url}", flush=True)
     store.close()
-    print("compiling the simulator's kernels (a minute or two, once) ...", flush=True)
-    from app.warm_up import warm_up
+    print("compiling the simulator's kernels (several minutes, once) ...", flush=True)
+    from app.machine import cores
+    from app.warm_up import PARTS, compile_all
 
-    print(f"kernels are ready ({warm_up():.1f} s)", flush=True)
+    started = time.monotonic()
+    for n, (name, cpu_s) in enumerate(compile_all(cores()), 1):
+        print(f"    {n} of {len(PARTS)}: {name} ({cpu_s:.0f} CPU seconds)", flush=True)
+    print(f"kernels are ready ({time.monotonic() - started:.1f} s)", flush=True)
     return 0
 
 

@@ -1,15 +1,19 @@
 """Compiling everything the simulator compiles, once, into the cache on disk.
 
 Done by set-up and by the image, so that later starts of the server, of training jobs and of
-evaluations only read what is there.
+evaluations only read what is there. The parts share few kernels: each is compiled in a process
+of its own, as many at once as there are cores.
 """
 
 import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from multiprocessing import get_context
 
 import numpy as np
 
 from app.policies import pretrained
-from app.policies.checkpoint import REACHING, SORTING, purpose_of
+from app.policies.checkpoint import CHOOSING, REACHING, Checkpoint, purpose_of
 from app.policies.motion_decision import MotionDecider
 from app.policies.reach_pilot import ReachPilot
 from app.policies.reach_policy import ReachPolicy
@@ -29,18 +33,24 @@ N_ENVS = 8
 SORTING_CELL, REACH_CELL = "sorting-e0", "shared-workspace"
 
 
-def warm_up() -> float:
-    """Use every kernel once; returns the time that took [s]."""
-    started = time.monotonic()
-    for alias in pretrained.ALIASES:
-        checkpoint = pretrained.load(alias)
-        if purpose_of(checkpoint.manifest) == SORTING:
-            continue
-        if purpose_of(checkpoint.manifest) == REACHING:
-            reacher, cell = ReachPolicy(checkpoint), cell_of(checkpoint.manifest)
-            MotionDecider(reacher, cell).warm_up()
-            ReachWorld(cell, ReachPilot(reacher), seed=0).step()
-            continue
+def _shipped(purpose: str) -> list[Checkpoint]:
+    """Return the shipped checkpoints for a purpose."""
+    shipped = [pretrained.load(alias) for alias in pretrained.ALIASES]
+    return [one for one in shipped if purpose_of(one.manifest) == purpose]
+
+
+def _moving() -> None:
+    """Decide about motion beside nobody, a body and a cylinder; run the live reach cell."""
+    for checkpoint in _shipped(REACHING):
+        reacher, cell = ReachPolicy(checkpoint), cell_of(checkpoint.manifest)
+        MotionDecider(reacher, cell).warm_up()
+        ReachWorld(cell, ReachPilot(reacher), seed=0).step()
+    new_world(load_cell(REACH_CELL), None, seed=0).step()
+
+
+def _choosing() -> None:
+    """Run the live pick and sorting cells, and a batch as training does."""
+    for checkpoint in _shipped(CHOOSING):
         policy = TaskChooser(checkpoint)
         cell = load_cell(policy.cell)
         world = World(cell, policy, seed=0)
@@ -52,10 +62,42 @@ def warm_up() -> float:
         batch.reset()
         batch.step(np.zeros((N_ENVS, CONTROLLED), dtype=np.float32))
         new_world(load_cell(SORTING_CELL), policy, seed=0).step()
-    new_world(load_cell(REACH_CELL), None, seed=0).step()
+
+
+def _sorting() -> None:
+    """Play sorting, in batches and by search."""
     tasks = batch_in(load_cell(SORTING_CELL), N_ENVS, seed=0)
     tasks.reset()
     tasks.masks()
     tasks.step(np.zeros(N_ENVS, dtype=np.int64))
     sorting_decision.warm_up()
-    return time.monotonic() - started
+
+
+PARTS: dict[str, Callable[[], None]] = {
+    "moving": _moving,
+    "choosing": _choosing,
+    "sorting": _sorting,
+}
+"""What is compiled, the longest first."""
+
+
+def compile_part(name: str) -> float:
+    """Use every kernel of a part once; return the CPU time that took [s]."""
+    started = time.process_time()
+    PARTS[name]()
+    return time.process_time() - started
+
+
+def compile_all(n_processes: int) -> Iterator[tuple[str, float]]:
+    """Compile all parts in processes of their own.
+
+    Args:
+        n_processes: How many at once.
+
+    Yields:
+        Name and CPU time [s] of each part, as soon as it is ready.
+    """
+    with ProcessPoolExecutor(n_processes, mp_context=get_context("spawn")) as pool:
+        begun = {pool.submit(compile_part, name): name for name in PARTS}
+        for done in as_completed(begun):
+            yield begun[done], done.result()

@@ -13,12 +13,13 @@ import pytest
 from app.__main__ import main, parsed_sets, table
 from app.errors import InvalidInput
 from app.listening import address_of, listen
+from app.warm_up import PARTS
 from tests import workshop
 from tests.policies.evaluation.sorting_players import untrained
 from tests.sim.recorded_person import csv_text, working
 
 ROOT = Path(__file__).resolve().parent.parent
-START_S = 240.0
+START_S, COMPILE_S = 240.0, 1200.0
 
 
 def environment(data: Path, **more: str) -> dict[str, str]:
@@ -26,7 +27,9 @@ def environment(data: Path, **more: str) -> dict[str, str]:
     return {**kept, "TANDEM_DATA": str(data), "PYTHONUNBUFFERED": "1", **more}
 
 
-def run(*arguments: str, data: Path, **more: str) -> subprocess.CompletedProcess[str]:
+def run(
+    *arguments: str, data: Path, timeout: float = START_S, **more: str
+) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "app", *arguments]
     return subprocess.run(
         command,
@@ -34,7 +37,7 @@ def run(*arguments: str, data: Path, **more: str) -> subprocess.CompletedProcess
         env=environment(data, **more),
         capture_output=True,
         text=True,
-        timeout=START_S,
+        timeout=timeout,
         check=False,
     )
 
@@ -83,6 +86,16 @@ def test_second_server_on_the_database_says_so_in_one_line(server: tuple[int, Pa
     assert second.returncode == 1
     assert second.stderr.count("\n") == 1
     assert "another Tandem server" in second.stderr
+
+
+def test_setup_makes_the_database_and_compiles_every_part(tmp_path: Path) -> None:
+    done = run("setup", data=tmp_path, timeout=COMPILE_S)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "tandem.db").stat().st_size > 0
+    for name in PARTS:
+        assert f": {name} (" in done.stdout
+    assert f"{len(PARTS)} of {len(PARTS)}: " in done.stdout
+    assert "kernels are ready" in done.stdout
 
 
 @pytest.mark.parametrize(

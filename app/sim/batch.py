@@ -1,9 +1,12 @@
 """Many cells of one scenario, stepped together by one thread.
 
 What the batches of both scenarios share: buffers, restarts and steps around the compiled
-kernels of ``kernels/pick.py`` and ``kernels/reach.py``, which take the same arguments.
+kernels of ``kernels/pick.py`` and ``kernels/reach.py``, which take the same arguments. A step
+is up to three kernels: all rows move, rows are observed, those that ended start again. In one
+kernel their code would be compiled, and optimised, once for every place that calls it.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import ModuleType
@@ -13,8 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.sim.kernels.compiled import direct
-from app.sim.kernels.episode import NO_OBS
+from app.sim.kernels.episode import RUNNING
 from app.sim.scene import require_finite, require_shape
+
+Rows = NDArray[np.int64]
+"""Numbers of environments."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,11 +37,11 @@ class StepResult:
     """Index into OUTCOMES of episodes that ended now, 0 elsewhere, (n_envs,)."""
 
 
-class CellBatch:
+class CellBatch(ABC):
     """Restarts and steps the rows of a scenario.
 
     Args:
-        kernel: The scenario's kernels: ``reset_batch`` and ``step_batch``.
+        kernel: The scenario's kernels: ``reset_rows`` and ``step_batch``.
         shared: World, rules, action rule, reward weights, rows and work space, as they take
             them.
         n_envs: Number of cells.
@@ -65,7 +71,8 @@ class CellBatch:
         self._last = np.zeros_like(self._obs)
         self._rew = np.zeros(n_envs, dtype=np.float32)
         self._ended = np.zeros(n_envs, dtype=np.int64)
-        self._step: Callable[..., None] | None = None
+        self._all = np.arange(n_envs)
+        self._compiled: dict[Callable[..., None], Callable[..., None]] = {}
 
     @property
     def obs(self) -> NDArray[np.float32]:
@@ -80,17 +87,8 @@ class CellBatch:
 
     def restart(self) -> NDArray[np.float32]:
         """Start the episodes numbered by ``state.episode``; return the observations."""
-        self._kernel.reset_batch(
-            self._world,
-            self._rules,
-            self.seed,
-            self._first,
-            self._rows,
-            self._work,
-            self._view,
-            self._obs,
-        )
-        return self._obs
+        self._start(self._all)
+        return self._look(self._all)
 
     def step(
         self, act: NDArray[np.float32], *, auto_reset: bool = True, features: bool = True
@@ -108,25 +106,63 @@ class CellBatch:
         """
         require_shape("act", act, (self.n_envs, self.n_act))
         require_finite("act", act)
-        wanted = np.array(act, dtype=np.float32, order="C")
-        arguments = (
+        live = np.flatnonzero(self._rows.outcome == RUNNING)
+        self._move(np.array(act, dtype=np.float32, order="C"))
+        if features:
+            self._look(live)
+        done = np.flatnonzero(self._ended)
+        if auto_reset and len(done):
+            self._last[done] = self._obs[done]
+            self._rows.episode[done] += 1
+            self._start(done)
+            if features:
+                self._look(done)
+        return StepResult(obs=self._obs, last_obs=self._last, rew=self._rew, ended=self._ended)
+
+    def _start(self, rows: Rows) -> None:
+        """Start episodes in some cells."""
+        self._call(
+            self._kernel.reset_rows,
+            self._world,
+            self._rules,
+            self.seed,
+            self._first,
+            self._rows,
+            rows,
+            self._work,
+        )
+
+    def _move(self, act: NDArray[np.float32]) -> None:
+        """Move every cell that runs through one period; fill rewards and ends."""
+        self._call(
+            self._kernel.step_batch,
             self._world,
             self._rules,
             self._action,
             self._weights,
-            self.seed,
-            self._first,
             self._rows,
             self._work,
-            wanted,
-            auto_reset,
-            self._view if features else NO_OBS,
-            self._obs,
-            self._last,
+            act,
             self._rew,
             self._ended,
         )
-        if self._step is None:
-            self._step = direct(self._kernel.step_batch, arguments)
-        self._step(*arguments)
-        return StepResult(obs=self._obs, last_obs=self._last, rew=self._rew, ended=self._ended)
+
+    def _look(self, rows: Rows) -> NDArray[np.float32]:
+        """Write the observations of some cells; return those of all, (n_envs, obs_size)."""
+        if len(rows) == self.n_envs:
+            self._observe(rows, self._obs)
+        elif len(rows):
+            out = np.empty((len(rows), self.obs_size), dtype=np.float32)
+            self._observe(rows, out)
+            self._obs[rows] = out
+        return self._obs
+
+    @abstractmethod
+    def _observe(self, rows: Rows, out: NDArray[np.float32]) -> None:
+        """Write the observations of some cells, shape (len(rows), obs_size)."""
+
+    def _call(self, kernel: Callable[..., None], *arguments: Any) -> None:
+        """Call a kernel that is always given arguments of the same types."""
+        if kernel not in self._compiled:
+            self._compiled[kernel] = direct(kernel, arguments)
+        self._compiled[kernel](*arguments)

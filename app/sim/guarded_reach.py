@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.errors import InvalidInput
-from app.sim.batch import StepResult
+from app.sim.batch import Rows, StepResult
 from app.sim.cells import Cell
 from app.sim.checker import Shapes
 from app.sim.kernels import guarded_reach, polynomial, watch
-from app.sim.kernels.episode import NO_OBS, SUCCESS
+from app.sim.kernels.episode import SUCCESS
 from app.sim.kernels.guarded_reach import (
     BELOW_HALF,
     CELL,
@@ -150,14 +150,6 @@ class GuardedReach(ReachBatch):
         """Override of the last period in [0, 1], shape (n_envs,)."""
         return self._guard.override
 
-    def restart(self) -> NDArray[np.float32]:
-        """Start the episodes numbered by ``state.episode``; return the observations."""
-        super().restart()
-        guarded_reach.begin_batch(
-            self.world, self.state, self._guard, self._work, self._view, self._obs
-        )
-        return self._obs
-
     def step(
         self, act: NDArray[np.float32], *, auto_reset: bool = True, features: bool = True
     ) -> StepResult:
@@ -173,31 +165,32 @@ class GuardedReach(ReachBatch):
                 on tracks.
             SimulationError: An action is NaN or infinite.
         """
-        require_shape("act", act, (self.n_envs, self.n_act))
-        require_finite("act", act)
         if auto_reset and self.n_tracks:
             raise InvalidInput(
                 "auto_reset", auto_reset, "must be false where people have tracks"
             )
-        guarded_reach.step_batch(
+        return super().step(act, auto_reset=auto_reset, features=features)
+
+    def _start(self, rows: Rows) -> None:
+        super()._start(rows)
+        self._call(
+            guarded_reach.begin_rows, self.world, self.state, rows, self._guard, self._work
+        )
+
+    def _move(self, act: NDArray[np.float32]) -> None:
+        self._call(
+            guarded_reach.step_batch,
             self.world,
             self._rules,
             self._action,
             self._weights,
-            self.seed,
-            self._first,
             self.state,
             self._guard,
             self._work,
-            np.array(act, dtype=np.float32, order="C"),
-            auto_reset,
-            self._view if features else NO_OBS,
-            self._obs,
-            self._last,
+            act,
             self._rew,
             self._ended,
         )
-        return StepResult(obs=self._obs, last_obs=self._last, rew=self._rew, ended=self._ended)
 
     def step_speeds(self, row: int, wanted: Vec) -> None:
         """Move one cell through one period toward wanted joint speeds, as planners ask.

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from app.errors import InvalidInput
 from app.sim.actions import ActionSettings
-from app.sim.batch import CellBatch
+from app.sim.batch import CellBatch, Rows
 from app.sim.cells import Cell, lacks_stations
 from app.sim.kernels import actions, features, kinematics, pick
 from app.sim.kernels import arm as arm_kernel
@@ -207,7 +207,10 @@ class PickBatch(CellBatch):
             view=VIEWS[settings.observation],
         )
 
-    def set_goals(self, rows: NDArray[np.int64], goals: Vec) -> None:
+    def _observe(self, rows: Rows, out: NDArray[np.float32]) -> None:
+        self._call(pick.observe_rows, self.world, self.state, rows, self._work, self._view, out)
+
+    def set_goals(self, rows: Rows, goals: Vec) -> None:
         """Send the robots of ``rows`` to new targets [m], shape (len(rows), 3)."""
         for row, goal in zip(rows, goals, strict=True):
             pick.set_goal(self.world, self.state, int(row), own(goal), self._work.robot)

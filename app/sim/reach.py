@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from app.errors import InvalidInput
 from app.sim.actions import ActionSettings
-from app.sim.batch import CellBatch
+from app.sim.batch import CellBatch, Rows
 from app.sim.cell_parts import GoalRegion, Station
 from app.sim.cell_people import Worker
 from app.sim.cells import Cell
@@ -309,7 +309,7 @@ class ReachBatch(CellBatch):
             view=VIEWS[settings.observation],
         )
 
-    def set_goals(self, rows: NDArray[np.int64], goals: Vec) -> NDArray[np.float32]:
+    def set_goals(self, rows: Rows, goals: Vec) -> NDArray[np.float32]:
         """Send the robots of ``rows`` to other goals, until their episodes end.
 
         Args:
@@ -325,17 +325,13 @@ class ReachBatch(CellBatch):
         """
         require_shape("goals", np.asarray(goals), (len(rows), 3))
         require_finite("goals", np.asarray(goals, dtype=np.float64))
-        for row, goal in zip(rows, goals, strict=True):
-            if not 0 <= row < self.n_envs:
-                raise InvalidInput("rows", int(row), f"must be one of {self.n_envs} cells")
+        checked = self._checked(rows)
+        for row, goal in zip(checked, goals, strict=True):
             reach.set_goal(self.world, self.state, int(row), own(goal), self._work.robot)
-            reach.observe_env(
-                self.world, self.state, int(row), self._work, self._view, self._obs[row]
-            )
-        return self._obs
+        return self._look(checked)
 
     def observe_goals(
-        self, rows: NDArray[np.int64], goals: Vec, who: int | None = None
+        self, rows: Rows, goals: Vec, who: int | None = None
     ) -> NDArray[np.float32]:
         """Return what a policy would observe in some cells if their goals were others.
 
@@ -354,22 +350,29 @@ class ReachBatch(CellBatch):
         shape = (len(rows), np.shape(goals)[1] if np.ndim(goals) == 3 else 0, 3)
         require_shape("goals", np.asarray(goals), shape)
         out = np.empty((*shape[:2], self.obs_size), dtype=np.float32)
-        alone = EVERYBODY if who is None else who
         if who is not None and not 0 <= who < self.n_people:
             raise InvalidInput("who", who, f"must be one of {self.n_people} people")
-        reach_views.observe_rows(
-            self.world,
-            self.state,
-            self._checked(rows),
-            self._work,
-            self._view,
-            alone,
-            own(goals),
-            out,
-        )
+        self._see(self._checked(rows), EVERYBODY if who is None else who, own(goals), out)
         return out
 
-    def person_distances(self, rows: NDArray[np.int64]) -> Vec:
+    def _observe(self, rows: Rows, out: NDArray[np.float32]) -> None:
+        self._see(rows, EVERYBODY, self.state.goal[rows][:, None], out[:, None])
+
+    def _see(self, rows: Rows, who: int, goals: Vec, out: NDArray[np.float32]) -> None:
+        """Write what policies would see for some goals, shape (k, n, obs_size)."""
+        self._call(
+            reach_views.observe_rows,
+            self.world,
+            self.state,
+            rows,
+            self._work,
+            self._view,
+            who,
+            goals,
+            out,
+        )
+
+    def person_distances(self, rows: Rows) -> Vec:
         """Return the distances of robot and people in some cells [m], shape (k, n_people).
 
         Args:
@@ -388,7 +391,7 @@ class ReachBatch(CellBatch):
         """People in each cell; workers come first."""
         return len(self.cell.people)
 
-    def _checked(self, rows: NDArray[np.int64]) -> NDArray[np.int64]:
+    def _checked(self, rows: Rows) -> Rows:
         numbers = own_index(np.asarray(rows, dtype=np.int64))
         wrong = numbers[(numbers < 0) | (numbers >= self.n_envs)]
         if wrong.size:
@@ -400,5 +403,5 @@ class ReachBatch(CellBatch):
 
         For whoever changes rows from outside.
         """
-        reach.observe_batch(self.world, self.state, self._work, self._view, self._obs)
-        return self._obs
+        reach_views.measure_rows(self.world, self.state, self._all, self._work)
+        return self._look(self._all)

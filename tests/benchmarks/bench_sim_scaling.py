@@ -131,15 +131,20 @@ def with_robot(pieces: int, seed: int) -> tuple[Subject, Row]:
     work, action = pick.new_work(world, state), DEFAULT_ACTION.rule()
     rules = pick.PickRules(20.0, 10.0, 0.0, 0.05, 0.0, 0.0, 1, 1)
     obs = np.zeros((BATCH, pick.N_PLAIN), dtype=np.float32)
-    last, rew = np.zeros_like(obs), np.zeros(BATCH, dtype=np.float32)
+    rew = np.zeros(BATCH, dtype=np.float32)
     ended, turn = np.zeros(BATCH, dtype=np.int64), acts(BATCH, seed)
-    pick.reset_batch(world, rules, seed, 0, state, work, PLAIN, obs)
+    every = np.arange(BATCH)
+    pick.reset_rows(world, rules, seed, 0, state, every, work)
 
     def step() -> None:
         pick.step_batch(
-            world, rules, action, DEFAULT_WEIGHTS, seed, 0, state, work, next(turn), True,
-            PLAIN, obs, last, rew, ended,
-        )  # fmt: skip
+            world, rules, action, DEFAULT_WEIGHTS, state, work, next(turn), rew, ended
+        )
+        pick.observe_rows(world, state, every, work, PLAIN, obs)
+        done = np.flatnonzero(ended)
+        if len(done):
+            state.episode[done] += 1
+            pick.reset_rows(world, rules, seed, 0, state, done, work)
 
     name = f"pick/capsules-{len(arm.link)}"
     return Subject(name=name, batch=BATCH, run=step), columns_of(arm, 1, N_CAPSULES)

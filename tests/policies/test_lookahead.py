@@ -76,8 +76,9 @@ def test_what_is_played_is_what_happens_beside_constant_people() -> None:
     acts = mover_of(POLICY, "direct").acts(batch)
     for row in live:
         n = kernel.foretell(batch.world, batch.state, row, work, look.foretold)
+        look.begun[:] = acts[row]
         told[row] = kernel._play(
-            batch.world, rule, batch.state, row, acts[row], PASSED, 0, 1.0, n, work, look
+            batch.world, rule, batch.state, row, PASSED, 0, 1.0, n, work, look
         )[0]
     walked(batch, round(N_PLAYED * kernel.STEP_S / batch.arm.dt))
     found = batch.state.outcome[live]
@@ -102,9 +103,9 @@ def test_dashes_end_as_they_are_played() -> None:
     for row in live:
         n = kernel.foretell(batch.world, batch.state, row, work, look.foretold)
         way = other_ways.way_of(other_ways.N_FIRST + row)
-        told[row] = kernel._play(
-            batch.world, rule, batch.state, row, look.found, *way, 1.0, n, work, look
-        )[0]
+        told[row] = kernel._play(batch.world, rule, batch.state, row, *way, 1.0, n, work, look)[
+            0
+        ]
     periods = round(STEP_S / batch.arm.dt)
     for k in range(N_PLAYED * periods):
         act = np.zeros((dashes, 6), dtype=np.float32)
@@ -131,7 +132,7 @@ def test_darts_end_as_they_are_played() -> None:
         lasting[row] = other_ways.draw_dart(batch.arm, batch.state.q[row], rng, look.dart)
         aims[row] = look.dart
         told[row] = kernel._play(
-            batch.world, rule, batch.state, row, look.found, other_ways.DART, lasting[row],
+            batch.world, rule, batch.state, row, other_ways.DART, lasting[row],
             0.0, n, work, look,
         )[0]  # fmt: skip
     periods = round(STEP_S / batch.arm.dt)
@@ -187,15 +188,16 @@ def test_a_way_into_the_table_is_changed() -> None:
     layers = [np.zeros(shape, dtype=np.float32) for shape in ((n_obs, 4), 4, (4, 4), 4, (4, 6))]
     look = kernel.new_lookahead(batch.arm, Network(*layers, lowers), 0.0, 1)
     work = new_work(batch.world, batch.state, new_forecaster())
-    rule, act = batch.settings.action.rule(), np.tanh(lowers)
+    rule, act = batch.settings.action.rule(), np.tanh(lowers)[None]
+    way = np.full(1, PASSED)
     for _ in range(100):
         given = act.copy()
-        way = kernel.look_ahead(batch.world, rule, batch.state, 0, given, work, look)
-        if way != PASSED:
+        kernel.look_ahead_batch(batch.world, rule, batch.state, given, work, look, way)
+        if way[0] != PASSED:
             break
-        batch.step(given[None], auto_reset=False)
+        batch.step(given, auto_reset=False)
     assert batch.state.clear[0, 0] > 0.5, "nobody is near"
-    assert way >= 0
+    assert way[0] >= 0
     assert not np.array_equal(given, act)
 
 

@@ -24,9 +24,9 @@ from app.sim.ports import Vec
 
 RUNNING, SUCCESS, COLLISION, TIMEOUT, UNFEASIBLE = range(5)
 """How an episode stands."""
-NO_OBS, PLAIN, FEATURES, FORECAST, CROWD = range(5)
-"""What observations hold: nothing, the source's plain state, that and features, those and what
-is forecast, or all that and everybody as a set."""
+PLAIN, FEATURES, FORECAST, CROWD = range(4)
+"""What observations hold: the source's plain state, that and features, those and what is
+forecast, or all that and everybody as a set."""
 SUCCESS_DISTANCE = 0.1
 """tcp to target [m], thesis 4.3 and 5.3.1."""
 START_TRIES = 200

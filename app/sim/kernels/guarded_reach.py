@@ -23,7 +23,6 @@ from app.sim.kernels.compiled import kernel
 from app.sim.kernels.contact import clearances
 from app.sim.kernels.episode import (
     COLLISION,
-    NO_OBS,
     RUNNING,
     SUCCESS,
     SUCCESS_DISTANCE,
@@ -44,15 +43,7 @@ from app.sim.kernels.occupancy import (
     remember_as_now,
 )
 from app.sim.kernels.people import advance_people, place_people
-from app.sim.kernels.reach import (
-    ReachRules,
-    ReachState,
-    ReachWorld,
-    Work,
-    observe_env,
-    reset_env,
-)
-from app.sim.kernels.reach_features import Obs
+from app.sim.kernels.reach import Indices, ReachRules, ReachState, ReachWorld, Work
 from app.sim.kernels.reach_reward import ReachWeights, reward
 from app.sim.kernels.safety_trial import MOVING, first_contact, touching_speed
 from app.sim.kernels.ssm import decide
@@ -296,23 +287,13 @@ def command(
     )  # fmt: skip
 
 
-@kernel(error_model="numpy")
-def _look(
-    world: ReachWorld, state: ReachState, e: int, work: Work, view: int, obs: Obs
-) -> None:
-    """Write the observation of environment ``e`` where one is wanted."""
-    if view != NO_OBS:
-        observe_env(world, state, e, work, view, obs[e])
-
-
 @kernel(nogil=True, error_model="numpy")
-def begin_batch(
-    world: ReachWorld, state: ReachState, guard: Guard, work: Work, view: int, obs: Obs
+def begin_rows(
+    world: ReachWorld, state: ReachState, rows: Indices, guard: Guard, work: Work
 ) -> None:
-    """Begin the episode of every environment that was just reset, and write observations."""
-    for e in range(state.q.shape[0]):
+    """Begin the episodes of some environments, shape (k,), that were just reset."""
+    for e in rows:
         begin_episode(world, state, e, guard, work)
-        _look(world, state, e, work, view, obs)
 
 
 @kernel(nogil=True, error_model="numpy")
@@ -321,16 +302,10 @@ def step_batch(
     rules: ReachRules,
     action: ActionRule,
     weights: ReachWeights,
-    seed: int,
-    first_env: int,
     state: ReachState,
     guard: Guard,
     work: Work,
     act: NDArray[np.float32],
-    auto_reset: bool,
-    view: int,
-    obs: Obs,
-    last_obs: Obs,
     rew: NDArray[np.float32],
     ended: NDArray[np.int64],
 ) -> None:
@@ -342,17 +317,9 @@ def step_batch(
         command(world, action, state, e, act[e], work)
         rew[e] = guarded_period(world, rules, weights, state, e, guard, work)
         ended[e] = state.outcome[e]
-        _look(world, state, e, work, view, obs)
         if ended[e] != RUNNING:
             for k in range(N_ACCOUNT):
                 guard.closed[e, k] = guard.account[e, k]
-        if ended[e] != RUNNING and auto_reset:
-            for i in range(obs.shape[1]):
-                last_obs[e, i] = obs[e, i]
-            state.episode[e] += 1
-            reset_env(world, rules, seed, first_env, state, e, work)
-            begin_episode(world, state, e, guard, work)
-            _look(world, state, e, work, view, obs)
 
 
 @kernel(nogil=True, error_model="numpy")

@@ -86,6 +86,12 @@ KEPT_M, KEPT_M_S = 0.01, 0.02
 second of it where that is less [m, m/s]."""
 KEPT_ON = 0.5
 """Share of it that counts on a way that is gone on with."""
+OWN, BEGUN, FIRST_OTHER = 0, 1, 2
+"""Ways in the order in which a decision plays them: the policy's own, what is left of the one
+begun last, the others by their numbers."""
+FIRST_DASH, FIRST_DART = FIRST_OTHER + N_FIRST, FIRST_OTHER + N_DRAWN
+N_LOOKED = FIRST_DART + N_DARTS
+"""Ways that a decision plays at most."""
 
 
 class Lookahead(NamedTuple):
@@ -118,9 +124,9 @@ class Lookahead(NamedTuple):
     act: Floats
     """Action of a step, shape (6,)."""
     found: Floats
-    """First action of another way, shape (6,)."""
+    """First action of the way played last, shape (6,)."""
     begun: Floats
-    """That of the best one, shape (6,)."""
+    """The policy's action, and then that of the best way so far, shape (6,)."""
     plan: NDArray[np.int64]
     """Number of the way that was begun last, or PASSED, and for how many decisions it has been
     gone on with, shape (n_envs, 2)."""
@@ -192,7 +198,7 @@ def _ask(look: Lookahead) -> None:
         look.act[j] = math.tanh(look.act[j] + math.atanh(look.base_weight * base))
 
 
-@kernel()
+@kernel(inline="always")
 def _see(world: ReachWorld, step: int, n: int, work: Work, look: Lookahead) -> float:
     """Fill what is seen of the people at a step; return how near the placed robot is [m]."""
     robot, sight, ways, top = work.robot, work.sight, work.ways, world.people.top_z
@@ -222,7 +228,7 @@ def _see(world: ReachWorld, step: int, n: int, work: Work, look: Lookahead) -> f
     return nearest
 
 
-@kernel()
+@kernel(inline="always")
 def _ask_at(
     world: ReachWorld,
     goal: Vec,
@@ -244,7 +250,7 @@ def _ask_at(
     _ask(look)
 
 
-@kernel()
+@kernel(inline="always")
 def _clear(
     world: ReachWorld, step: int, share: float, n: int, work: Work, look: Lookahead
 ) -> float:
@@ -259,7 +265,7 @@ def _clear(
     return least
 
 
-@kernel()
+@kernel(inline="always")
 def _straight(world: ReachWorld, goal: Vec, work: Work, look: Lookahead) -> None:
     """Write the action that leads the tcp straight to the goal; the robot is placed."""
     robot, prospect = work.robot, work.sight.prospect
@@ -269,13 +275,12 @@ def _straight(world: ReachWorld, goal: Vec, work: Work, look: Lookahead) -> None
         look.act[j] = max(-1.0, min(1.0, prospect.base[j]))
 
 
-@kernel()
+@kernel(inline="always")
 def _choose(
     world: ReachWorld,
     goal: Vec,
     time_left: float,
     step: int,
-    act: Floats,
     posture: int,
     lasting: int,
     n: int,
@@ -284,8 +289,7 @@ def _choose(
 ) -> None:
     """Write the action of a step into ``look.act``; arguments as :func:`_play`."""
     if posture == PASSED and step == 0:
-        for j in range(6):
-            look.act[j] = act[j]
+        copy_values(look.begun, look.act)
     elif posture == DART and step < lasting:
         write_toward(world.arm, look.dart, look.q, look.act)
     elif posture == DART or (posture == STRAIGHT and step < lasting):
@@ -300,7 +304,7 @@ def _choose(
         write_toward(world.arm, look.aim[posture], look.q, look.act)
 
 
-@kernel()
+@kernel(inline="always")
 def _touches(arm: Arm, clear: float, work: Work) -> bool:
     """Tell whether the placed robot touches somebody, the cell or itself."""
     return bool(
@@ -316,7 +320,6 @@ def _play(
     rule: ActionRule,
     state: ReachState,
     e: int,
-    act: Floats,
     posture: int,
     lasting: int,
     kept: float,
@@ -324,20 +327,21 @@ def _play(
     work: Work,
     look: Lookahead,
 ) -> tuple[int, float]:
-    """Play one way: first to a posture, or ``act``, then the policy; or a dash, or a dart.
+    """Play one way: first to a posture, or as begun, then the policy; or a dash, or a dart.
 
     Args:
         world: Shared data.
         rule: How actions are read.
         state: Rows.
         e: Environment.
-        act: Action of the first step, where ``posture`` is PASSED; else filled with it.
-        posture: Where it leads first, STRAIGHT, PASSED, or from DASH on a dash.
+        posture: Where it leads first, STRAIGHT, PASSED for the action in ``look.begun``, or
+            from DASH on a dash.
         lasting: For how many steps.
         kept: Share of KEPT_M that is kept from people.
         n: People.
         work: Work space.
-        look: Network and work space; people are foretold. ``came`` is filled.
+        look: Network and work space; people are foretold. ``came`` is filled, and ``found``
+            with the action of the first step.
 
     Returns:
         How it ends (RUNNING, SUCCESS or COLLISION), and what it is worth.
@@ -353,10 +357,9 @@ def _play(
         left = state.time_left[e] - step * STEP_S
         if left <= 0.0:
             break
-        _choose(world, goal, left, step, act, posture, lasting, n, work, look)
+        _choose(world, goal, left, step, posture, lasting, n, work, look)
         if step == 0:
-            for j in range(6):
-                act[j] = look.act[j]
+            copy_values(look.act, look.found)
         for i in range(periods):
             advance(
                 rule, look.q, look.qd, look.qdd, look.act,
@@ -377,87 +380,6 @@ def _play(
 
 
 @kernel()
-def _best_of_others(
-    world: ReachWorld,
-    rule: ActionRule,
-    state: ReachState,
-    e: int,
-    bar: float,
-    n: int,
-    work: Work,
-    look: Lookahead,
-) -> int:
-    """Return the best other way that is worth more than a bar, or PASSED.
-
-    The dashes are played where each way before ends in a contact, the darts where none is
-    chosen or all end so. Its first action is written into ``look.begun``; the other arguments
-    are as in :func:`_play`.
-    """
-    chosen = PASSED
-    for k in range(N_DRAWN):
-        if k == N_FIRST and bar > NO_CONTACT:
-            break
-        posture, lasting = way_of(k)
-        _, worth = _play(
-            world, rule, state, e, look.found, posture, lasting, 1.0, n, work, look
-        )
-        if worth > bar:
-            bar, chosen = worth + BETTER, k
-            copy_values(look.found, look.begun)
-    if chosen != PASSED and bar > NO_CONTACT:
-        return chosen
-    return _best_dart(world, rule, state, e, bar, chosen, n, work, look)
-
-
-@kernel()
-def _best_dart(
-    world: ReachWorld,
-    rule: ActionRule,
-    state: ReachState,
-    e: int,
-    bar: float,
-    chosen: int,
-    n: int,
-    work: Work,
-    look: Lookahead,
-) -> int:
-    """Return the number of the darts if one is worth more than a bar, else ``chosen``."""
-    nearest, (posture, _) = look.nearest[e], way_of(N_DRAWN)
-    random.start_stream(0, 0, look.drawn[e], look.rng)
-    look.drawn[e] += 1
-    if nearest[0] > 0.0:  # it is looked at again, for as long as is left of it
-        nearest[1] = max(0.0, nearest[1] - (state.elapsed[e] - nearest[2]) / STEP_S)
-        nearest[2] = state.elapsed[e]
-    for k in range(N_DARTS):
-        again, lasting = k == 0 and nearest[0] > 0.0, int(nearest[1])
-        if again:
-            copy_values(look.near[e], look.dart)
-        elif nearest[0] > 0.0 and random.uniform(look.rng) < VARIED:
-            lasting = vary_dart(world.arm, look.near[e], lasting, look.rng, look.dart)
-        else:
-            lasting = draw_dart(world.arm, state.q[e], look.rng, look.dart)
-        _, worth = _play(
-            world, rule, state, e, look.found, posture, lasting, 1.0, n, work, look
-        )
-        if again or nearest[0] == 0.0 or look.came[0] < nearest[0]:
-            nearest[0], nearest[1] = look.came[0], lasting
-            nearest[2] = state.elapsed[e]
-            copy_values(look.dart, look.near[e])
-        if worth > bar:
-            bar, chosen = worth + BETTER, N_DRAWN
-            copy_values(look.found, look.begun)
-            copy_values(look.dart, look.darts[e])
-            look.darting[e] = lasting
-    return chosen
-
-
-@kernel()
-def _is_late(state: ReachState, e: int) -> bool:
-    """Tell whether it is time to see if the policy waits longer than it must."""
-    return bool(state.elapsed[e] >= PATIENCE_S or state.time_left[e] <= HURRY_S)
-
-
-@kernel()
 def _left(e: int, look: Lookahead, dt: float) -> tuple[int, int]:
     """Return what is left of the way begun in an environment, as :func:`way_of`; or PASSED."""
     k = look.plan[e, 0]
@@ -472,58 +394,140 @@ def _left(e: int, look: Lookahead, dt: float) -> tuple[int, int]:
     return posture, lasting - gone
 
 
+@kernel(inline="always")
+def _aim_dart(world: ReachWorld, state: ReachState, e: int, k: int, look: Lookahead) -> int:
+    """Draw dart ``k`` of a decision; return for how many steps it leads away.
+
+    The first is the one that came nearest to the goal so far, for as long as is left of it.
+    """
+    nearest = look.nearest[e]
+    if k == 0:
+        random.start_stream(0, 0, look.drawn[e], look.rng)
+        look.drawn[e] += 1
+        if nearest[0] > 0.0:
+            nearest[1] = max(0.0, nearest[1] - (state.elapsed[e] - nearest[2]) / STEP_S)
+            nearest[2] = state.elapsed[e]
+            copy_values(look.near[e], look.dart)
+            return int(nearest[1])
+    if nearest[0] > 0.0 and random.uniform(look.rng) < VARIED:
+        return vary_dart(world.arm, look.near[e], int(nearest[1]), look.rng, look.dart)
+    return draw_dart(world.arm, state.q[e], look.rng, look.dart)
+
+
+@kernel(inline="always")
+def _keep_nearest(state: ReachState, e: int, k: int, lasting: int, look: Lookahead) -> None:
+    """Keep dart ``k`` of a decision, just played, if it came nearer to the goal than others."""
+    nearest = look.nearest[e]
+    if k == 0 or nearest[0] == 0.0 or look.came[0] < nearest[0]:
+        nearest[0], nearest[1], nearest[2] = look.came[0], lasting, state.elapsed[e]
+        copy_values(look.dart, look.near[e])
+
+
+@kernel(inline="always")
+def _way_at(
+    world: ReachWorld, state: ReachState, e: int, k: int, look: Lookahead
+) -> tuple[int, int]:
+    """Return the way that is played as number ``k`` of a decision, as :func:`way_of`."""
+    if k == BEGUN:
+        return _left(e, look, world.arm.dt)
+    if k >= FIRST_DART:
+        return DART, _aim_dart(world, state, e, k - FIRST_DART, look)
+    return way_of(PASSED if k == OWN else k - FIRST_OTHER)
+
+
 @kernel()
-def look_ahead(
+def _bar_for_others(state: ReachState, e: int, ended: int, worth: float) -> float:
+    """Return what other ways must be worth; infinite where none is looked for.
+
+    Args:
+        state: Rows.
+        e: Environment.
+        ended: How the best way so far ends: the policy's own, or what is left of the one begun.
+        worth: What it is worth.
+    """
+    if ended == COLLISION:
+        return worth + BETTER
+    late = state.elapsed[e] >= PATIENCE_S or state.time_left[e] <= HURRY_S
+    return WORTH_IT if ended == RUNNING and late else math.inf
+
+
+@kernel()
+def _next_way(k: int, bar: float, other: bool) -> int:
+    """Return which way is played after number ``k``; N_LOOKED for none.
+
+    Args:
+        k: Number of the way played.
+        bar: What others must be worth.
+        other: Whether one of them is chosen already.
+    """
+    k += 1
+    if bar == math.inf:
+        return N_LOOKED
+    if k == FIRST_DASH and bar > NO_CONTACT:
+        k = FIRST_DART
+    if k == FIRST_DART and bar > NO_CONTACT and other:
+        return N_LOOKED
+    return k
+
+
+@kernel(inline="always")
+def _begin(e: int, k: int, lasting: int, look: Lookahead) -> int:
+    """Note that a way, by its place in the order, is the best so far; return its number."""
+    if k == OWN:
+        return PASSED
+    if k == BEGUN:
+        return int(look.plan[e, 0])
+    look.plan[e, 1] = 0
+    if k < FIRST_DART:
+        return k - FIRST_OTHER
+    copy_values(look.dart, look.darts[e])
+    look.darting[e] = lasting
+    return N_DRAWN
+
+
+@kernel(inline="always")
+def _look_ahead(
     world: ReachWorld,
     rule: ActionRule,
     state: ReachState,
     e: int,
-    act: Floats,
+    n: int,
     work: Work,
     look: Lookahead,
 ) -> int:
-    """Keep an action, or replace it by the first one of a better way.
+    """Choose the way begun in an environment; return its number, or PASSED.
+
+    The policy's own way and what is left of the one begun last are always played; others where
+    that ends in a contact, or late; dashes where each before ends in a contact; darts where no
+    other is chosen, or all end so. One loop, and one call of :func:`_play`, because each call
+    would be optimised as a whole and cost half a minute of compilation.
 
     Args:
         world: Shared data.
         rule: How actions are read.
         state: Rows.
         e: Environment.
-        act: The policy's action, shape (6,); replaced where another way is better.
+        n: People, who are foretold.
         work: Work space.
-        look: Network and work space.
-
-    Returns:
-        Number of the way begun or gone on with instead, or PASSED.
+        look: Network and work space; ``begun`` holds the policy's action, and then that of the
+            way chosen.
     """
-    look.foretold.since[e] += world.arm.dt
-    if state.elapsed[e] == 0.0:
-        look.plan[e, 0] = PASSED
-        look.drawn[e], look.nearest[e, 0] = 0, 0.0
-    n = foretell(world, state, e, work, look.foretold)
-    if n == 0:
-        return PASSED
-    posture, lasting = way_of(PASSED)  # no literals: _play would be compiled once more for them
-    ended, best = _play(world, rule, state, e, act, posture, lasting, 1.0, n, work, look)
-    chosen = PASSED
-    posture, lasting = _left(e, look, world.arm.dt)
-    if posture != PASSED:
-        played = _play(
-            world, rule, state, e, look.found, posture, lasting, KEPT_ON, n, work, look
-        )
-        if played[1] > best:
-            ended, best, chosen = played[0], played[1], look.plan[e, 0]
-            copy_values(look.found, look.begun)
-    looked = PASSED
-    if ended == COLLISION:
-        looked = _best_of_others(world, rule, state, e, best + BETTER, n, work, look)
-    elif ended == RUNNING and _is_late(state, e):
-        looked = _best_of_others(world, rule, state, e, WORTH_IT, n, work, look)
-    if looked != PASSED:
-        chosen, look.plan[e, 1] = looked, 0
+    k, chosen, other, ended, bar = OWN, PASSED, False, RUNNING, -math.inf
+    while k < N_LOOKED:
+        posture, lasting = _way_at(world, state, e, k, look)
+        if k != BEGUN or posture != PASSED:
+            kept = KEPT_ON if k == BEGUN else 1.0
+            end, worth = _play(world, rule, state, e, posture, lasting, kept, n, work, look)
+            if k >= FIRST_DART:
+                _keep_nearest(state, e, k - FIRST_DART, lasting, look)
+            if worth > bar:
+                copy_values(look.found, look.begun)
+                chosen, other = _begin(e, k, lasting, look), k >= FIRST_OTHER
+                ended, bar = end, worth + BETTER if other else worth
+        if k == BEGUN:
+            bar = _bar_for_others(state, e, ended, bar)
+        k = _next_way(k, bar, other)
     look.plan[e, 0] = chosen
-    if chosen != PASSED:
-        copy_values(look.begun, act)
     return chosen
 
 
@@ -550,5 +554,16 @@ def look_ahead_batch(
     """
     for e in range(state.q.shape[0]):
         chosen[e] = PASSED
-        if state.outcome[e] == RUNNING:
-            chosen[e] = look_ahead(world, rule, state, e, act[e], work, look)
+        if state.outcome[e] != RUNNING:
+            continue
+        look.foretold.since[e] += world.arm.dt
+        if state.elapsed[e] == 0.0:
+            look.plan[e, 0] = PASSED
+            look.drawn[e], look.nearest[e, 0] = 0, 0.0
+        n = foretell(world, state, e, work, look.foretold)
+        if n == 0:
+            continue
+        copy_values(act[e], look.begun)
+        chosen[e] = _look_ahead(world, rule, state, e, n, work, look)
+        if chosen[e] != PASSED:
+            copy_values(look.begun, act[e])

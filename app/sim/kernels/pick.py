@@ -26,7 +26,6 @@ from app.sim.kernels.compiled import kernel
 from app.sim.kernels.contact import clearances
 from app.sim.kernels.episode import (
     COLLISION,
-    NO_OBS,
     PLAIN,
     RUNNING,
     START_TRIES,
@@ -43,12 +42,14 @@ from app.sim.kernels.people import (
     People,
     PeopleState,
     new_crowd,
+    place_people,
     see_nearest,
     start_people,
 )
 from app.sim.kernels.reward import RewardWeights, reward
 from app.sim.ports import Vec
 
+Indices = NDArray[np.int64]
 N_PLAIN = 51
 """Length of the plain observation: q, qd, the person's q, qd, target (5.8)."""
 SUCCESS_TILT = 0.2
@@ -230,7 +231,7 @@ def _draw_start(
         state.qd[e, j], state.qdd[e, j] = 0.0, 0.0
 
 
-@kernel()
+@kernel(inline="always")
 def reset_env(
     world: PickWorld,
     rules: PickRules,
@@ -306,7 +307,7 @@ def step_env(
 
 
 @kernel(inline="always")
-def write_obs(
+def _write_obs(
     world: PickWorld, state: PickState, e: int, work: Work, view: int, out: Obs
 ) -> None:
     """Write the observation of environment ``e``.
@@ -318,11 +319,9 @@ def write_obs(
         state: Rows.
         e: Environment.
         work: Robot and people are placed in it as they are now.
-        view: NO_OBS, PLAIN (the state of (5.8), ``N_PLAIN`` numbers) or FEATURES.
+        view: PLAIN (the state of (5.8), ``N_PLAIN`` numbers) or FEATURES.
         out: Filled, shape (N_PLAIN,) or (N_FEATURES,).
     """
-    if view == NO_OBS:
-        return
     crowd = work.crowd
     see_nearest(world.people, state.people, e, work.robot.columns, crowd)
     if view == PLAIN:
@@ -351,69 +350,67 @@ def write_obs(
 
 
 @kernel(nogil=True)
-def reset_batch(
+def observe_rows(
+    world: PickWorld, state: PickState, rows: Indices, work: Work, view: int, out: Obs
+) -> None:
+    """Write the observations of some environments.
+
+    Args:
+        world: Shared data.
+        state: Rows.
+        rows: Which environments, shape (k,).
+        work: Work space.
+        view: PLAIN or FEATURES.
+        out: Filled, shape (k, F).
+    """
+    for k in range(rows.shape[0]):
+        place_robot(world.arm, state.q[rows[k]], work.robot)
+        place_people(world.people, state.people, rows[k], work.crowd)
+        _write_obs(world, state, rows[k], work, view, out[k])
+
+
+@kernel(nogil=True)
+def reset_rows(
     world: PickWorld,
     rules: PickRules,
     seed: int,
     first_env: int,
     state: PickState,
+    rows: Indices,
     work: Work,
-    view: int,
-    obs: Obs,
 ) -> None:
-    """Start an episode in every environment and write the observations."""
-    for e in range(state.q.shape[0]):
+    """Start an episode in some environments, shape (k,)."""
+    for e in rows:
         reset_env(world, rules, seed, first_env, state, e, work)
-        write_obs(world, state, e, work, view, obs[e])
 
 
 @kernel(nogil=True)
 def step_batch(
     world: PickWorld,
-    rules: PickRules,
+    rules: PickRules,  # noqa: ARG001 - the reach scenario's needs them
     action: ActionRule,
     weights: RewardWeights,
-    seed: int,
-    first_env: int,
     state: PickState,
     work: Work,
     act: NDArray[np.float32],
-    auto_reset: bool,
-    view: int,
-    obs: Obs,
-    last_obs: Obs,
     rew: NDArray[np.float32],
     ended: NDArray[np.int64],
 ) -> None:
-    """Step all environments.
+    """Step all environments; rows that have ended stay as they are.
 
     Args:
         world: Shared data.
-        rules: Starts and ends.
+        rules: Not read; the kernels of both scenarios take the same arguments.
         action: What actions mean.
         weights: Reward coefficients.
-        seed: Seed of the batch.
-        first_env: Number of row 0 in the random streams.
         state: Rows; changed.
         work: Work space.
         act: Actions in [-1, 1], shape (n_envs, 5).
-        auto_reset: Start the next episode at once; otherwise ended rows stay as they are.
-        view: NO_OBS, PLAIN or FEATURES.
-        obs: Filled with the observations after the step (and reset), shape (n_envs, F).
-        last_obs: Filled with the final observation of rows that ended, shape (n_envs, F).
         rew: Filled with rewards, shape (n_envs,).
         ended: Filled with the outcome of rows that ended now, RUNNING elsewhere.
     """
     for e in range(state.q.shape[0]):
         ended[e], rew[e] = RUNNING, 0.0
-        if state.outcome[e] != RUNNING:
-            continue
-        rew[e] = step_env(world, action, weights, state, e, act[e], work)
-        ended[e] = state.outcome[e]
-        write_obs(world, state, e, work, view, obs[e])
-        if ended[e] != RUNNING and auto_reset:
-            for i in range(obs.shape[1]):
-                last_obs[e, i] = obs[e, i]
-            state.episode[e] += 1
-            reset_env(world, rules, seed, first_env, state, e, work)
-            write_obs(world, state, e, work, view, obs[e])
+        if state.outcome[e] == RUNNING:
+            rew[e] = step_env(world, action, weights, state, e, act[e], work)
+            ended[e] = state.outcome[e]

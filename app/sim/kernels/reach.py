@@ -18,10 +18,6 @@ from app.sim.kernels.compiled import kernel
 from app.sim.kernels.contact import clearances
 from app.sim.kernels.episode import (
     COLLISION,
-    CROWD,
-    FORECAST,
-    NO_OBS,
-    PLAIN,
     RUNNING,
     START_TRIES,
     SUCCESS,
@@ -38,24 +34,14 @@ from app.sim.kernels.people import (
     PeopleState,
     new_crowd,
     people_clearance,
-    place_people,
     start_people,
 )
-from app.sim.kernels.reach_crowd import put_crowd
-from app.sim.kernels.reach_features import (
-    EVERYBODY,
-    N_FEATURES,
-    Obs,
-    ReachSight,
-    new_reach_sight,
-    observe,
-    put_state,
-    see_cylinder,
-)
+from app.sim.kernels.reach_features import ReachSight, new_reach_sight
 from app.sim.kernels.reach_reward import ReachWeights, reward
-from app.sim.kernels.reach_ways import N_WAYS, Ways, foresee, look_aside, new_ways, put_ways
+from app.sim.kernels.reach_ways import Ways, new_ways
 from app.sim.ports import Vec
 
+Indices = NDArray[np.int64]
 NO_TARGET = -1
 """Number of a goal that is none of the targets."""
 
@@ -189,7 +175,7 @@ def _draw_goal(
         copy_values(world.targets[state.target[e]], state.goal[e])
 
 
-@kernel()
+@kernel(inline="always")
 def reset_env(
     world: ReachWorld,
     rules: ReachRules,
@@ -278,120 +264,19 @@ def step_env(
     return reward(d_old, d, work.c, collided, state.outcome[e] == SUCCESS, weights)
 
 
-@kernel(inline="always")
-def write_obs(
-    world: ReachWorld, state: ReachState, e: int, work: Work, view: int, out: Obs
-) -> None:
-    """Write the observation of environment ``e``.
-
-    Args:
-        world: Shared data.
-        state: Rows.
-        e: Environment.
-        work: Robot and people are placed in it as they are now.
-        view: NO_OBS, PLAIN (4.30), FEATURES, FORECAST or CROWD.
-        out: Filled, shape (N_STATE,), (N_FEATURES,) or more (``reach.VIEWS``).
-    """
-    if view == NO_OBS:
-        return
-    seen = work.sight.seen
-    who = see_cylinder(world.people, state.people, e, work.robot.columns, work.crowd, seen)
-    if view == PLAIN:
-        put_state(state.q[e], state.qd[e], seen, state.goal[e], out)
-        return
-    observe(
-        world.arm,
-        world.people,
-        state.people,
-        e,
-        state.q[e],
-        state.qd[e],
-        state.goal[e],
-        state.clear[e, 0],
-        state.time_left[e],
-        work.robot,
-        work.sight,
-        out,
-    )
-    if view >= FORECAST:
-        foresee(state.people, e, EVERYBODY, who, work.crowd, work.ways)
-        look_aside(world.arm, world.people.top_z, state.q[e], state.qd[e], work.ways)
-        put_forecast(world, state, e, work, view, state.goal[e], out)
-
-
-@kernel(inline="always")
-def put_forecast(
-    world: ReachWorld, state: ReachState, e: int, work: Work, view: int, goal: Vec, out: Obs
-) -> None:
-    """Write what comes of every way behind the features, and everybody behind that.
-
-    People are foreseen, and the ways that do not lead to the goal looked at already.
-
-    Args:
-        world: Shared data.
-        state: Rows.
-        e: Environment.
-        work: Robot and people are placed in it as they are now.
-        view: FORECAST or CROWD.
-        goal: Where the tcp shall be [m], shape (3,).
-        out: Filled, shape (N_FEATURES + N_WAYS,), with everybody N_CROWD more.
-    """
-    put_ways(
-        world.arm,
-        world.people.top_z,
-        state.q[e],
-        state.qd[e],
-        work.sight.seen,
-        goal,
-        work.robot,
-        work.sight.prospect,
-        work.ways,
-        N_FEATURES,
-        out,
-    )
-    if view == CROWD:
-        first = N_FEATURES + N_WAYS
-        put_crowd(world.people.top_z, goal, work.robot, work.ways, first, out)
-
-
 @kernel(nogil=True)
-def reset_batch(
+def reset_rows(
     world: ReachWorld,
     rules: ReachRules,
     seed: int,
     first_env: int,
     state: ReachState,
+    rows: Indices,
     work: Work,
-    view: int,
-    obs: Obs,
 ) -> None:
-    """Start an episode in every environment and write the observations."""
-    for e in range(state.q.shape[0]):
+    """Start an episode in some environments, shape (k,)."""
+    for e in rows:
         reset_env(world, rules, seed, first_env, state, e, work)
-        write_obs(world, state, e, work, view, obs[e])
-
-
-@kernel(nogil=True)
-def observe_env(
-    world: ReachWorld, state: ReachState, e: int, work: Work, view: int, out: Obs
-) -> None:
-    """Write the observation of environment ``e`` as it is now; ``work`` need not be placed."""
-    place_robot(world.arm, state.q[e], work.robot)
-    place_people(world.people, state.people, e, work.crowd)
-    write_obs(world, state, e, work, view, out)
-
-
-@kernel(nogil=True)
-def observe_batch(
-    world: ReachWorld, state: ReachState, work: Work, view: int, obs: Obs
-) -> None:
-    """Measure all distances to people and write all observations anew, as rows are now."""
-    for e in range(state.q.shape[0]):
-        place_robot(world.arm, state.q[e], work.robot)
-        place_people(world.people, state.people, e, work.crowd)
-        clear = people_clearance(world.people, work.robot.columns, work.crowd)
-        state.clear[e, 0] = clear
-        write_obs(world, state, e, work, view, obs[e])
 
 
 @kernel(nogil=True)
@@ -400,47 +285,27 @@ def step_batch(
     rules: ReachRules,
     action: ActionRule,
     weights: ReachWeights,
-    seed: int,
-    first_env: int,
     state: ReachState,
     work: Work,
     act: NDArray[np.float32],
-    auto_reset: bool,
-    view: int,
-    obs: Obs,
-    last_obs: Obs,
     rew: NDArray[np.float32],
     ended: NDArray[np.int64],
 ) -> None:
-    """Step all environments.
+    """Step all environments; rows that have ended stay as they are.
 
     Args:
         world: Shared data.
         rules: Starts and ends.
         action: What actions mean.
         weights: Reward coefficients.
-        seed: Seed of the batch.
-        first_env: Number of row 0 in the random streams.
         state: Rows; changed.
         work: Work space.
         act: Actions in [-1, 1], shape (n_envs, 6).
-        auto_reset: Start the next episode at once; otherwise ended rows stay as they are.
-        view: NO_OBS, PLAIN, FEATURES, FORECAST or CROWD.
-        obs: Filled with the observations after the step (and reset), shape (n_envs, F).
-        last_obs: Filled with the final observation of rows that ended, shape (n_envs, F).
         rew: Filled with rewards, shape (n_envs,).
         ended: Filled with the outcome of rows that ended now, RUNNING elsewhere.
     """
     for e in range(state.q.shape[0]):
         ended[e], rew[e] = RUNNING, 0.0
-        if state.outcome[e] != RUNNING:
-            continue
-        rew[e] = step_env(world, rules, action, weights, state, e, act[e], work)
-        ended[e] = state.outcome[e]
-        write_obs(world, state, e, work, view, obs[e])
-        if ended[e] != RUNNING and auto_reset:
-            for i in range(obs.shape[1]):
-                last_obs[e, i] = obs[e, i]
-            state.episode[e] += 1
-            reset_env(world, rules, seed, first_env, state, e, work)
-            write_obs(world, state, e, work, view, obs[e])
+        if state.outcome[e] == RUNNING:
+            rew[e] = step_env(world, rules, action, weights, state, e, act[e], work)
+            ended[e] = state.outcome[e]

@@ -30,7 +30,7 @@ from app.sim.kernels.layout import slices_of
 from app.sim.kernels.occupancy import GROWTH, VX, VY, R
 from app.sim.kernels.occupancy import X as WALKER_X
 from app.sim.kernels.occupancy import Y as WALKER_Y
-from app.sim.kernels.people import Crowd, People, PeopleState, nearest_person
+from app.sim.kernels.people import Crowd, People, PeopleState
 from app.sim.kernels.reach_prospect import Prospect, new_prospect, put_prospect
 from app.sim.kernels.trig import sine_cosine
 from app.sim.ports import Vec
@@ -149,25 +149,6 @@ def show_person(state: PeopleState, e: int, who: int, crowd: Crowd, seen: Vec) -
         seen[0], seen[1] = rows[e, k, WALKER_X], rows[e, k, WALKER_Y]
         seen[2], seen[3] = rows[e, k, VX], rows[e, k, VY]
         seen[4], seen[5] = rows[e, k, R], rows[e, k, GROWTH]
-
-
-@kernel(inline="always")
-def see_cylinder(
-    people: People, state: PeopleState, e: int, robot: Vec, crowd: Crowd, seen: Vec
-) -> int:
-    """Write the nearest person of environment ``e`` as a cylinder; return who that is.
-
-    Args:
-        people: Shared data.
-        state: Rows of the people.
-        e: Environment.
-        robot: The robot's capsules as columns, shape (9, n).
-        crowd: The people, placed as they are now.
-        seen: Filled with x, y [m], vx, vy [m/s], r [m], growth [m/s], shape (6,).
-    """
-    who = nearest_person(people, robot, crowd)
-    show_person(state, e, who, crowd, seen)
-    return who
 
 
 @kernel(inline="always")
@@ -325,38 +306,3 @@ def describe(
     )
     start = N_FEATURES - reach_prospect.N_PROSPECT
     put_prospect(arm, top_z, q, qd, sight.seen, goal, robot, sight.prospect, start, out)
-
-
-@kernel(inline="always")
-def observe(
-    arm: Arm,
-    people: People,
-    state: PeopleState,
-    e: int,
-    q: Vec,
-    qd: Vec,
-    goal: Vec,
-    clearance: float,
-    time_left: float,
-    robot: RobotPose,
-    sight: ReachSight,
-    out: Obs,
-) -> None:
-    """Write the features of environment ``e``; ``sight.seen`` is filled already.
-
-    Args:
-        arm: Robot in its cell.
-        people: Shared data of the people.
-        state: Rows of the people.
-        e: Environment.
-        q: Joint positions [rad], shape (6,).
-        qd: Joint speeds [rad/s], shape (6,).
-        goal: Where the tcp shall be [m], shape (3,).
-        clearance: Distance of robot and people [m].
-        time_left: Time left [s].
-        robot: The robot, placed at ``q``.
-        sight: Work space.
-        out: Filled, shape (N_FEATURES,).
-    """
-    clearances_ahead(people, state, e, EVERYBODY, robot.columns, sight)
-    describe(arm, people.top_z, q, qd, goal, clearance, time_left, robot, sight, out)

@@ -1,31 +1,33 @@
-"""The reach scenario seen for other goals, or beside one of its people alone, compiled.
+"""What policies see of the reach scenario, for its goals or others, compiled.
 
-A policy between training targets is asked for several goals of one state, and beside several
-people once for each of them. What the goal does not change, the poses and what is seen of the
-people, is worked out once per state.
+Several people are seen as they are, or one of them alone. A policy between training targets is
+asked for several goals of one state, and beside several people once for each of them. What the
+goal does not change, the poses and what is seen of the people, is worked out once per state.
 """
-
-import numpy as np
-from numpy.typing import NDArray
 
 from app.sim.kernels.arm import place_robot
 from app.sim.kernels.columns import gaps
 from app.sim.kernels.compiled import kernel
-from app.sim.kernels.episode import FORECAST, PLAIN
-from app.sim.kernels.people import nearest_person, person_clearance, place_people
-from app.sim.kernels.reach import ReachState, ReachWorld, Work, put_forecast
+from app.sim.kernels.episode import CROWD, FORECAST, PLAIN
+from app.sim.kernels.people import (
+    nearest_person,
+    people_clearance,
+    person_clearance,
+    place_people,
+)
+from app.sim.kernels.reach import Indices, ReachState, ReachWorld, Work
+from app.sim.kernels.reach_crowd import put_crowd
 from app.sim.kernels.reach_features import (
     EVERYBODY,
+    N_FEATURES,
     Obs,
     clearances_ahead,
     describe,
     put_state,
     show_person,
 )
-from app.sim.kernels.reach_ways import foresee, look_aside
+from app.sim.kernels.reach_ways import N_WAYS, foresee, look_aside, put_ways
 from app.sim.ports import Vec
-
-Indices = NDArray[np.int64]
 
 
 @kernel(inline="always")
@@ -78,46 +80,12 @@ def _write(
     top = world.people.top_z
     describe(world.arm, top, q, qd, goal, clearance, time_left, work.robot, sight, out)
     if view >= FORECAST:
-        put_forecast(world, state, e, work, view, goal, out)
-
-
-@kernel(nogil=True)
-def observe_goals(
-    world: ReachWorld, state: ReachState, e: int, work: Work, view: int, goals: Vec, out: Obs
-) -> None:
-    """Write the observations of environment ``e`` for other goals.
-
-    Args:
-        world: Shared data.
-        state: Rows.
-        e: Environment.
-        work: Work space; need not be placed.
-        view: PLAIN (4.30), FEATURES, FORECAST or CROWD.
-        goals: Where the tcp shall be [m], shape (n, 3).
-        out: Filled, shape (n, F).
-    """
-    clearance = _look(world, state, e, work, view, EVERYBODY)
-    for k in range(goals.shape[0]):
-        _write(world, state, e, work, view, clearance, goals[k], out[k])
-
-
-@kernel(nogil=True)
-def observe_person(
-    world: ReachWorld, state: ReachState, e: int, work: Work, view: int, who: int, out: Obs
-) -> None:
-    """Write the observation of environment ``e`` as if one of its people were there alone.
-
-    Args:
-        world: Shared data.
-        state: Rows.
-        e: Environment.
-        work: Work space; need not be placed.
-        view: PLAIN (4.30), FEATURES, FORECAST or CROWD.
-        who: The person: workers first, then walkers.
-        out: Filled, shape (F,).
-    """
-    clearance = _look(world, state, e, work, view, who)
-    _write(world, state, e, work, view, clearance, state.goal[e], out)
+        put_ways(
+            world.arm, top, q, qd, sight.seen, goal, work.robot, sight.prospect, work.ways,
+            N_FEATURES, out,
+        )  # fmt: skip
+    if view == CROWD:
+        put_crowd(top, goal, work.robot, work.ways, N_FEATURES + N_WAYS, out)
 
 
 @kernel(nogil=True)
@@ -149,6 +117,14 @@ def observe_rows(
         clearance = _look(world, state, e, work, view, who)
         for i in range(goals.shape[1]):
             _write(world, state, e, work, view, clearance, goals[k, i], out[k, i])
+
+
+@kernel(nogil=True)
+def measure_rows(world: ReachWorld, state: ReachState, rows: Indices, work: Work) -> None:
+    """Measure the distance of robot and people in some environments, shape (k,), anew."""
+    for e in rows:
+        _place(world, state, e, work)
+        state.clear[e, 0] = people_clearance(world.people, work.robot.columns, work.crowd)
 
 
 @kernel(nogil=True)

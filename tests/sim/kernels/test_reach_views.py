@@ -8,8 +8,7 @@ from app.sim import contact
 from app.sim.cells import load_cell
 from app.sim.kernels.people import nearest_person
 from app.sim.kernels.reach_features import LAYOUT
-from app.sim.kernels.reach_views import observe_goals, observe_person
-from app.sim.reach import VIEWS, ReachBatch, ReachSettings
+from app.sim.reach import ReachBatch, ReachSettings
 
 CROWD = ("worker", "walker", "constant")
 
@@ -42,12 +41,6 @@ def test_for_the_same_goal_they_are_the_ordinary_bits(
     obs, rows = ordinary(batch), everyone(batch)
     found = batch.observe_goals(rows, batch.state.goal[:, None])
     np.testing.assert_array_equal(found[:, 0], obs)
-    for e in rows:
-        out = np.zeros((1, batch.obs_size), dtype=np.float32)
-        view = VIEWS[observation][0]
-        goals = batch.state.goal[e : e + 1].copy()
-        observe_goals(batch.world, batch.state, e, batch._work, view, goals, out)
-        np.testing.assert_array_equal(out[0], obs[e])
 
 
 @pytest.mark.parametrize("observation", ["features", "state"])
@@ -65,11 +58,9 @@ def test_for_other_goals_they_are_those_after_setting_them(observation: str) -> 
 @pytest.mark.parametrize("kind", ["walker", "worker"])
 def test_beside_the_only_person_they_are_the_ordinary_bits(kind: str, observation: str) -> None:
     batch = batch_of((kind,), observation)
-    obs, view = ordinary(batch), VIEWS[observation][0]
-    for e in everyone(batch):
-        out = np.zeros(batch.obs_size, dtype=np.float32)
-        observe_person(batch.world, batch.state, e, batch._work, view, 0, out)
-        np.testing.assert_array_equal(out, obs[e])
+    obs, rows = ordinary(batch), everyone(batch)
+    found = batch.observe_goals(rows, batch.state.goal[:, None], who=0)
+    np.testing.assert_array_equal(found[:, 0], obs)
 
 
 @pytest.mark.parametrize("who", range(3))
