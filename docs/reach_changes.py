@@ -37,7 +37,7 @@ from app.policies.evaluation.reach_bench import ReachBench  # noqa: E402
 from app.policies.evaluation.rows import untold  # noqa: E402
 from docs.augmentation import over_seeds  # noqa: E402
 from docs.reach_points import ENDS  # noqa: E402
-from docs.training_curves import read, record  # noqa: E402
+from docs.training_curves import read_if_there, record  # noqa: E402
 
 RESULTS = ROOT / "docs/results/reach-changes.json"
 BASE = "reach-td3"
@@ -75,7 +75,7 @@ def folder_of(root: Path, name: str, seed: int) -> Path:
 
 def policy_of(folder: Path) -> Checkpoint | None:
     """Return the policy of a finished training; None where it is not finished."""
-    return read(folder / f"step-{SHORT['total_steps']:09d}")
+    return read_if_there(folder / f"step-{SHORT['total_steps']:09d}")
 
 
 def train_missing(root: Path, names: Sequence[str], seeds: Sequence[int]) -> None:

@@ -25,9 +25,10 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from app.machine import describe  # noqa: E402 - the line above lets it be found
-from app.policies.checkpoint import Checkpoint, load  # noqa: E402
+from app.policies.checkpoint import Checkpoint  # noqa: E402
 from app.policies.evaluation.reach_bench import ReachBench  # noqa: E402
 from app.policies.evaluation.rows import untold  # noqa: E402
+from docs.training_curves import read  # noqa: E402
 
 RESULTS = ROOT / "docs/results/reach_curves.json"
 SEED = 77
@@ -57,10 +58,8 @@ def curve_of_run(folder: Path, per_target: int) -> Json:
     spent = {one["step"]: one["cpu_s"] for one in told}
     targets = []
     for path in sorted(folder.glob("step-*.json")):
-        manifest = json.loads(path.read_text(encoding="utf-8"))
-        checkpoint = load(manifest, path.with_suffix(".safetensors").read_bytes())
-        point = point_of(checkpoint, per_target)
-        step = manifest["step"]
+        checkpoint = read(path)
+        point, step = point_of(checkpoint, per_target), checkpoint.manifest["step"]
         targets.append({"step": step, "cpu_s": spent.get(step), **point})
     return {
         "name": told[0]["preset"],

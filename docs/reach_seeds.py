@@ -21,10 +21,10 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from app.machine import describe  # noqa: E402 - the line above lets it be found
-from app.policies.checkpoint import load  # noqa: E402
 from app.policies.evaluation.reach_bench import ReachBench, direct_ways, ending  # noqa: E402
 from app.policies.evaluation.rows import untold  # noqa: E402
 from docs.reach_points import lines  # noqa: E402
+from docs.training_curves import read  # noqa: E402
 
 RESULTS = ROOT / "docs/results/reach-seeds.json"
 SOURCE = 0.9176
@@ -35,9 +35,8 @@ Json = dict[str, Any]
 
 def rows_of(folder: Path, seed: int, per_target: int) -> tuple[str, list[Json]]:
     """Return the checkpoint of a run, and a row for each way of asking it."""
-    last = sorted(folder.glob("step-*.json"))[-1]
-    manifest = json.loads(last.read_text(encoding="utf-8"))
-    checkpoint = load(manifest, last.with_suffix(".safetensors").read_bytes())
+    checkpoint = read(sorted(folder.glob("step-*.json"))[-1])
+    manifest = checkpoint.manifest
     told = lines(folder / "curve.jsonl")
     passed = [one["cpu_s"] / 60.0 for one in told if (one["success"] or 0.0) >= SOURCE]
     bench = ReachBench(checkpoint, seed, 2, untold)

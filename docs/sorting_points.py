@@ -26,11 +26,11 @@ sys.path.insert(0, str(ROOT))
 
 from app.machine import describe  # noqa: E402 - the line above lets it be found
 from app.policies import presets  # noqa: E402
-from app.policies.checkpoint import load  # noqa: E402
 from app.policies.evaluation.sorting_curve import curve_episodes, curve_point  # noqa: E402
 from app.policies.sorting_policy import SortingPolicy  # noqa: E402
 from app.policies.trained_cell import cell_of  # noqa: E402
 from app.sim.sorting import fail_of  # noqa: E402
+from docs.training_curves import read  # noqa: E402
 
 RESULTS = ROOT / "docs/results/sorting_curves.json"
 SEED = 77
@@ -53,8 +53,8 @@ def curve_of_run(folder: Path, episodes: int | None) -> Json:
     named = {"task": cell, "name": first["preset"], "seed": first.get("seed", 1)}
     pairs = []
     for path in sorted(folder.glob("step-*.json")):
-        manifest = json.loads(path.read_text(encoding="utf-8"))
-        checkpoint = load(manifest, path.with_suffix(".safetensors").read_bytes())
+        checkpoint = read(path)
+        manifest = checkpoint.manifest
         policy, fail = SortingPolicy(checkpoint), fail_of(cell_of(manifest))
         n = episodes or curve_episodes(policy.shape)
         point = curve_point(policy.values, policy.shape, fail, n, SEED)

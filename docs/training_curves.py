@@ -9,18 +9,22 @@ return of greedy episodes), and a policy per checkpoint, of which ``sorting_poin
 
 import argparse
 import json
+import sys
 from dataclasses import asdict
 from pathlib import Path
 
 import torch
 
-from app.__main__ import parsed_sets
-from app.policies import checkpoint as formats
-from app.policies import presets
-from app.policies.checkpoint import Checkpoint
-from app.policies.presets import Preset
-from app.policies.progress import Progress
-from app.policies.training import train
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT))
+
+from app.__main__ import parsed_sets  # noqa: E402 - the line above lets it be found
+from app.policies import checkpoint as formats  # noqa: E402
+from app.policies import presets  # noqa: E402
+from app.policies.checkpoint import Checkpoint  # noqa: E402
+from app.policies.presets import Preset  # noqa: E402
+from app.policies.progress import Progress  # noqa: E402
+from app.policies.training import train  # noqa: E402
 
 
 def main() -> None:
@@ -53,7 +57,7 @@ def record(preset: Preset, seed: int, folder: Path) -> None:
     train(
         preset,
         seed=seed,
-        resume=read(folder / "resume"),
+        resume=read_if_there(folder / "resume"),
         on_progress=on_progress,
         on_checkpoint=on_checkpoint,
         should_stop=lambda: False,
@@ -66,10 +70,13 @@ def write(checkpoint: Checkpoint, path: Path) -> None:
     path.with_suffix(".json").write_text(json.dumps(checkpoint.manifest), encoding="utf-8")
 
 
-def read(path: Path) -> Checkpoint | None:
+def read_if_there(path: Path) -> Checkpoint | None:
     """Return a checkpoint, or None where none was written."""
-    if not path.with_suffix(".json").exists():
-        return None
+    return read(path) if path.with_suffix(".json").exists() else None
+
+
+def read(path: Path) -> Checkpoint:
+    """Return what :func:`write` wrote."""
     manifest = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
     return formats.load(manifest, path.with_suffix(".safetensors").read_bytes())
 
