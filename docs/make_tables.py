@@ -53,21 +53,21 @@ def table(result: Json, others: Sequence[Json] = ()) -> str:
         others: Results of other checkpoints that belong in the same table.
     """
     if reach_tables.is_reach(result):
-        head, *rest = reach_tables.lines_of([result, *others])
-        return _markdown([head, ["---", *("---:" for _ in head[1:])], *rest], result)
+        return _markdown(reach_tables.lines_of([result, *others]), result, others)
     if is_sorting(result):
-        head, *rest = lines_of(result)
-        return _markdown([head, ["---", *("---:" for _ in head[1:])], *rest], result)
+        return _markdown(lines_of(result), result)
     rows: list[Json] = result["results"]
     columns = list(dict.fromkeys(key for row in rows for key in row if key != "name"))
     head = ["", *(key.replace("_", " ") for key in columns)]
-    lines = [head, ["---", *("---:" for _ in columns)]]
-    lines += [[f"`{row['name']}`", *(cell(row.get(key)) for key in columns)] for row in rows]
-    return _markdown(lines, result)
+    lines = [[f"`{row['name']}`", *(cell(row.get(key)) for key in columns)] for row in rows]
+    return _markdown([head, *lines], result)
 
 
-def _markdown(lines: list[list[str]], result: Json) -> str:
-    return "\n".join([*("| " + " | ".join(line) + " |" for line in lines), "", origin(result)])
+def _markdown(lines: list[list[str]], result: Json, others: Sequence[Json] = ()) -> str:
+    head, *rest = lines
+    ruled = [head, ["---", *("---:" for _ in head[1:])], *rest]
+    rows = ("| " + " | ".join(line) + " |" for line in ruled)
+    return "\n".join([*rows, "", origin(result, others)])
 
 
 def cell(value: object) -> str:
@@ -83,8 +83,8 @@ def cell(value: object) -> str:
     return "" if value is None else str(value)
 
 
-def origin(result: Json) -> str:
-    """Return the line below a table: command, seed, checkpoint, machine, commit."""
+def origin(result: Json, others: Sequence[Json] = ()) -> str:
+    """Return the line below a table: command, seed, checkpoints, machine, commit."""
     machine: Json = result["machine"]
     verb = "evaluate" if "protocol" in result else "bench"
     usual = f"python -m app {verb} {result.get('protocol') or result.get('bench')}"
@@ -95,6 +95,7 @@ def origin(result: Json) -> str:
     parts += [f"{key} {result[key]}" for key in ("episodes", "seed") if key in result]
     if "checkpoint" in result:
         parts.append(f"checkpoint `{result['checkpoint'][:12]}`")
+    parts += [f"`{one['label']}`: `{one['checkpoint'][:12]}`" for one in others]
     parts += conditions(result)
     parts += [f"{machine['cores']} cores of {machine['cpu']}", f"commit `{machine['commit']}`"]
     return f"<sub>{', '.join(parts)}</sub>"

@@ -204,9 +204,10 @@ def _ends(axis: Axes, row: Json) -> None:
     if mean is not None:
         axis.axvline(mean, color=INK, lw=1.0)
         axis.axvline(p95, color=INK, lw=1.0, ls=":")
-        top = axis.get_ylim()[1]
-        axis.text(mean, top, f" mean {mean:.2f} s", va="top", color=INK)
-        axis.text(p95, 0.9 * top, f" 95 % within {p95:.2f} s", va="top", color=INK)
+        top = 1.12 * axis.get_ylim()[1]
+        axis.set_ylim(0.0, top)
+        axis.text(mean, 0.98 * top, f"mean {mean:.2f} s ", va="top", ha="right", color=INK)
+        axis.text(p95, 0.98 * top, f" 95 % within {p95:.2f} s", va="top", color=INK)
     axis.set(title="When episodes end", xlabel="time since the start [s]")
     axis.set(ylabel=f"of all episodes, per {step:g} s")
     axis.legend(loc="center right")

@@ -33,6 +33,14 @@ COLUMNS: Mapping[str, Mapping[str, str]] = {
         "updates": "updates",
         "to_source_min": "above 91.76 % after [CPU min]",
     },
+    "reach-changes": {
+        "seeds": "seeds",
+        **RATES,
+        "worst_seed": "worst seed",
+        "best_seed": "best",
+        "against_base": "against the recipe",
+        "cpu_min": "training [CPU min]",
+    },
     "reach-random": {**RATES, **TIMES, "against_targets": "against the targets"},
     "reach-constant": {**RATES, **TIMES},
     "reach-speeds": {**RATES, **TIMES},
@@ -85,7 +93,9 @@ INSTEAD = {"arrived": "success"}
 """What stands for a measure in rows that call it otherwise."""
 TURNED = frozenset({"reach-smoothness"})
 """Protocols of few rows and many measures: a line per measure."""
-DIFFERENCES = frozenset({"against_targets"})
+DIFFERENCES = frozenset({"against_targets", "against_base"})
+SHARES = frozenset({"starts_redrawn", "worst_seed", "best_seed"})
+"""Measures that are shares without an interval."""
 
 
 def is_reach(result: Json) -> bool:
@@ -143,7 +153,7 @@ def shown(row: Json, key: str) -> str:
         worst = value[0]
         x, y, _ = worst["goal"]
         return f"{100.0 * worst['mean']:.0f} % at ({x:.1f}, {y:.1f}, {worst['height_m']:.1f})"
-    if key == "starts_redrawn":
+    if key in SHARES:
         return f"{100.0 * value:.1f} %"
     if isinstance(value, dict) and "sd" in value:
         return f"{value['mean']:.2f} ± {value['sd']:.2f}"

@@ -418,7 +418,8 @@ def test_a_stopping_server_ends_its_sockets(client: TestClient) -> None:
 
 def test_growth_of_a_cylinder_is_seen(client: TestClient) -> None:
     acts = [
-        asked(client, people=[{**WALKER, "growth": growth}])["act"] for growth in (0.0, 0.3)
+        asked(client, people=[{**WALKER, "growth": growth}], ahead=False)["act"]
+        for growth in (0.0, 0.3)
     ]
     assert acts[0] != acts[1]
     assert refused(client, people=[{**WALKER, "growth": 9}])["field"] == "people[0].growth"
@@ -427,7 +428,7 @@ def test_growth_of_a_cylinder_is_seen(client: TestClient) -> None:
 def test_the_past_of_a_cylinder_is_seen_by_a_policy_that_forecasts(client: TestClient) -> None:
     grown = [[0.3 - 0.02 * k, 0.5] for k in range(1, 6)]
     acts = [
-        asked(client, people=[{**WALKER, "past": past}])["act"]
+        asked(client, people=[{**WALKER, "past": past}], ahead=False)["act"]
         for past in ([], [[0.3, 0.5]] * 15, grown)
     ]
     assert acts[0] == acts[1] != acts[2]

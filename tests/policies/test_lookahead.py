@@ -78,7 +78,7 @@ def test_what_is_played_is_what_happens_beside_constant_people() -> None:
         n = kernel.foretell(batch.world, batch.state, row, work, look.foretold)
         look.begun[:] = acts[row]
         told[row] = kernel._play(
-            batch.world, rule, batch.state, row, PASSED, 0, 1.0, n, work, look
+            batch.world, rule, batch.state, row, PASSED, 0, 0, 1.0, n, work, look
         )[0]
     walked(batch, round(N_PLAYED * kernel.STEP_S / batch.arm.dt))
     found = batch.state.outcome[live]
@@ -103,9 +103,9 @@ def test_dashes_end_as_they_are_played() -> None:
     for row in live:
         n = kernel.foretell(batch.world, batch.state, row, work, look.foretold)
         way = other_ways.way_of(other_ways.N_FIRST + row)
-        told[row] = kernel._play(batch.world, rule, batch.state, row, *way, 1.0, n, work, look)[
-            0
-        ]
+        told[row] = kernel._play(
+            batch.world, rule, batch.state, row, *way, 0, 1.0, n, work, look
+        )[0]
     periods = round(STEP_S / batch.arm.dt)
     for k in range(N_PLAYED * periods):
         act = np.zeros((dashes, 6), dtype=np.float32)
@@ -133,7 +133,7 @@ def test_darts_end_as_they_are_played() -> None:
         aims[row] = look.dart
         told[row] = kernel._play(
             batch.world, rule, batch.state, row, other_ways.DART, lasting[row],
-            0.0, n, work, look,
+            0, 0.0, n, work, look,
         )[0]  # fmt: skip
     periods = round(STEP_S / batch.arm.dt)
     for step in range(other_ways.DART_PLAYED):
@@ -148,6 +148,39 @@ def test_darts_end_as_they_are_played() -> None:
             batch.step(act, auto_reset=False)
     np.testing.assert_array_equal(batch.state.outcome[live], told[live])
     assert len(set(told[live])) == 3
+
+
+def test_what_is_gone_on_with_is_what_was_played() -> None:
+    """Played anew every period, what is left of a dart comes as near as was told at first."""
+    n_envs, look, work, batch = 60, *looked(60, "constant")
+    rows = batch.state.people.walkers.rows
+    rows[:, 0, GAIT], rows[:, 0, [VX, VY]] = STILL, 0.0
+    periods = round(STEP_S / batch.arm.dt)
+    rule, rng = batch.settings.action.rule(), np.zeros(1, dtype=np.uint64)
+    random.start_stream(1, 2, 3, rng)
+    told, came = np.zeros(n_envs, dtype=np.int64), np.full(n_envs, np.inf)
+    look.plan[:] = other_ways.N_DRAWN, -1
+    for row in range(n_envs):
+        look.darting[row] = other_ways.draw_dart(
+            batch.arm, batch.state.q[row], rng, look.darts[row]
+        )
+    for _ in range(periods * other_ways.DART_PLAYED):
+        live = np.flatnonzero(batch.state.outcome == RUNNING)
+        for row in live:
+            n = kernel.foretell(batch.world, batch.state, row, work, look.foretold)
+            way = kernel._left(row, look, batch.arm.dt)
+            gone = look.plan[row, 1] % periods
+            told[row], _ = kernel._play(
+                batch.world, rule, batch.state, row, *way, gone, 0.0, n, work, look
+            )
+            look.last[row] = look.found
+            if told[row] == SUCCESS:
+                assert came[row] in (np.inf, pytest.approx(look.came[0]))
+                came[row] = look.came[0]
+        batch.step(look.last, auto_reset=False)
+    ended = batch.state.outcome != RUNNING
+    np.testing.assert_array_equal(batch.state.outcome[ended], told[ended])
+    assert ((came < np.inf) & (batch.state.outcome == SUCCESS)).sum() > 5
 
 
 def straight(batch: ReachBatch, row: int, work: Work, look: kernel.Lookahead) -> np.ndarray:
@@ -204,7 +237,7 @@ def test_a_way_into_the_table_is_changed() -> None:
 def test_a_way_begun_is_gone_on_with_for_no_longer_than_it_lasts() -> None:
     batch, ahead, goes_on = batch_of(300, "walker"), Lookahead(POLICY), 0
     mover = mover_of(POLICY, "direct")
-    periods = round(STEP_S / batch.arm.dt)
+    periods, before = round(STEP_S / batch.arm.dt), np.zeros((300, 6), dtype=np.float32)
     for _ in range(90):
         acts = mover.acts(batch)
         chosen = ahead.improve(batch, acts)
@@ -217,10 +250,13 @@ def test_a_way_begun_is_gone_on_with_for_no_longer_than_it_lasts() -> None:
             if posture < other_ways.STRAIGHT:
                 wanted = np.zeros(6, dtype=np.float32)
                 q = batch.state.q[e]
-                if posture < other_ways.STOP:
+                if look.plan[e, 1] % periods:
+                    wanted = before[e]
+                elif posture < other_ways.STOP:
                     other_ways.write_toward(batch.arm, look.aim[posture], q, wanted)
                 np.testing.assert_array_equal(acts[e], wanted)
                 goes_on += 1
+        before = acts
         batch.step(acts, auto_reset=False)
     assert goes_on > 20
 

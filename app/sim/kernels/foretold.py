@@ -117,23 +117,37 @@ def foretell(
 def _tell_radius(
     row: Vec, rule: Vec, since: float, p: int, found: Vec, foretold: Foretold
 ) -> None:
-    """Put the function behind a walker's radius in place of its forecast, if it is found."""
+    """Put the function behind a walker's radius in place of its forecast, if it is found.
+
+    Neither is beyond the walker's limits, but where he is so already.
+    """
     limits = Limits(rule[R_MIN], rule[R_MAX], rule[F_RADIUS_MAX])
     past = row[PAST_RADIUS : PAST_RADIUS + N_PAST]
     r = foretold.person[4]
-    if not find_function(foretold.fit, r, row[AGE], past, limits, False, since, found):
-        return
+    known = find_function(foretold.fit, r, row[AGE], past, limits, False, since, found)
     middle = 0.5 * (limits.low + limits.high)
+    least, most = min(r, limits.low), max(r, limits.high)
     for i in range(1, N_MOMENTS):
-        value = value_at(found, middle, STEP_S * i)
-        foretold.places[i, p, 2] = min(limits.high, max(limits.low, value))
+        value = value_at(found, middle, STEP_S * i) if known else foretold.places[i, p, 2]
+        foretold.places[i, p, 2] = min(most, max(least, value))
+
+
+@kernel()
+def _stand(p: int, places: Vec) -> None:
+    """Foretell a walker where he is now."""
+    for i in range(1, N_MOMENTS):
+        places[i, p, 0], places[i, p, 1] = places[0, p, 0], places[0, p, 1]
 
 
 @kernel()
 def _tell_way(
     row: Vec, rule: Vec, since: float, dt: float, e: int, p: int, foretold: Foretold
 ) -> None:
-    """Put the function behind a walker's speed in place of its forecast, if it is found."""
+    """Put the function behind a walker's speed in place of its forecast, if it is found.
+
+    Who stands goes on standing if that function says he should walk, or if he has stood for as
+    long as is remembered.
+    """
     limits = Limits(rule[V_MIN], rule[V_MAX], rule[F_SPEED_MAX])
     past = row[PAST_SPEED : PAST_SPEED + N_PAST]
     person, places, course = foretold.person, foretold.places, foretold.course[e, p]
@@ -141,12 +155,16 @@ def _tell_way(
     speed = math.hypot(person[2], person[3])
     if speed > 0.0:
         course[0], course[1] = person[2] / speed, person[3] / speed
+    if speed == 0.0 and not past.any():
+        _stand(p, places)
+        return
     if course[0] == 0.0 and course[1] == 0.0:
         return
     if not find_function(foretold.fit, speed, row[AGE], past, limits, True, since, found):
         return
     if speed == 0.0 and value_at(found, middle, 0.0) >= limits.low:
-        return  # It is not for its function that this one stands.
+        _stand(p, places)  # It is not for its function that this one stands.
+        return
     x, y, t = person[0], person[1], 0.0
     for i in range(1, N_MOMENTS):
         while t < STEP_S * i - 0.5 * dt:

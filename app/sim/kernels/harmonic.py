@@ -29,12 +29,12 @@ MULTIPLES = (1.0, 3.0, 4.0)
 """Of the frequency, one for each sine."""
 N_GRID = 20
 """Frequencies looked at."""
-N_TRIED = 3
+N_TRIED = 8
 """From how many of them Levenberg's method starts."""
-MOST_STEPS = 15
+MOST_STEPS = 60
 """Its steps."""
-LEAST_FREE = 7
-"""Moments not at a limit below which nothing is said."""
+LEAST_FREE = 6
+"""Moments not at a limit below which no function is looked for."""
 TRUSTED = 5e-4
 """Largest root mean square error of a fit that counts [m or m/s]."""
 AT_LIMIT = 1e-6
@@ -290,21 +290,24 @@ def find_function(
         speed: Whether it is a speed, of which 0 is seen below the limit.
         since: Time since the last call for this walker [s].
         found: What was found then, kept where it still holds, shape (5,); zeros at first.
-            Filled; with NOT_FOUND where there is nothing to be found.
+            Filled; the amplitude is NOT_FOUND where there is nothing to be found, and 0 where
+            too little is known to look.
 
     Returns:
         Whether they meet all that is remembered.
     """
     n_free = _remember(fit, now, age, past, limits, speed)
+    enough = max(1, n_free) * TRUSTED * TRUSTED
+    if found[1] > 0.0:
+        for k in range(3):
+            found[2 + k] += 2.0 * math.pi * MULTIPLES[k] * found[0] * since
+        if _error(fit, found, limits) < enough:
+            return True
+        found[1] = 0.0
     if n_free < LEAST_FREE or limits.f_max <= 0.0:
         return False
     if found[1] < 0.0 and age > since - 1e-9:
         return False  # Nothing more is remembered since it was not found.
-    enough = n_free * TRUSTED * TRUSTED
-    for k in range(3):
-        found[2 + k] += 2.0 * math.pi * MULTIPLES[k] * found[0] * since
-    if found[1] > 0.0 and _error(fit, found, limits) < enough:
-        return True
     _find_starts(fit, limits)
     least = WORST
     for n in range(N_TRIED):

@@ -6,6 +6,8 @@ known to millimetres. So a decision is played ahead: the robot exactly as it mov
 those of ``other_ways.py`` are played too, dashes and darts only where all before end in one.
 The best way is begun, for one period. The next decision looks anew, and what is left of the
 way begun is one of those looked at: it is gone on with until the policy's own way is better.
+An action of another way is held for ``STEP_S``, as it was played: so what is gone on with ends
+as it was told, beside people who do as foretold.
 
 Later in an episode other ways are also played where the policy's leads neither to the goal nor
 into a contact: it may wait longer than it must. Only one that ends at the goal is begun then.
@@ -127,6 +129,8 @@ class Lookahead(NamedTuple):
     """First action of the way played last, shape (6,)."""
     begun: Floats
     """The policy's action, and then that of the best way so far, shape (6,)."""
+    last: Floats
+    """Actions of the period before, shape (n_envs, 6)."""
     plan: NDArray[np.int64]
     """Number of the way that was begun last, or PASSED, and for how many decisions it has been
     gone on with, shape (n_envs, 2)."""
@@ -174,6 +178,7 @@ def new_lookahead(arm: Arm, net: Network, base_weight: float, n_envs: int) -> Lo
         act=room(6),
         found=room(6),
         begun=room(6),
+        last=np.zeros((n_envs, 6), dtype=np.float32),
         plan=np.full((n_envs, 2), PASSED),
         came=np.zeros(1),
         dart=np.zeros(6),
@@ -322,6 +327,7 @@ def _play(
     e: int,
     posture: int,
     lasting: int,
+    gone: int,
     kept: float,
     n: int,
     work: Work,
@@ -337,6 +343,7 @@ def _play(
         posture: Where it leads first, STRAIGHT, PASSED for the action in ``look.begun``, or
             from DASH on a dash.
         lasting: For how many steps.
+        gone: Periods of the first step that are over: the action of the last one goes on.
         kept: Share of KEPT_M that is kept from people.
         n: People.
         work: Work space.
@@ -347,7 +354,7 @@ def _play(
         How it ends (RUNNING, SUCCESS or COLLISION), and what it is worth.
     """
     arm, goal, least = world.arm, state.goal[e], FREE
-    periods = max(1, int(STEP_S / arm.dt + 0.5))
+    periods, now = _periods(arm.dt), 0
     turned = TURNED * STEP_S * lasting if 0 <= posture < N_POSTURES else 0.0
     for j in range(6):
         look.q[j], look.qd[j], look.qdd[j] = state.q[e, j], state.qd[e, j], state.qdd[e, j]
@@ -357,18 +364,23 @@ def _play(
         left = state.time_left[e] - step * STEP_S
         if left <= 0.0:
             break
-        _choose(world, goal, left, step, posture, lasting, n, work, look)
+        if step == 0 and gone > 0:
+            copy_values(look.last[e], look.act)
+        else:
+            _choose(world, goal, left, step, posture, lasting, n, work, look)
         if step == 0:
             copy_values(look.act, look.found)
-        for i in range(periods):
+        for _ in range(gone if step == 0 else 0, periods):
             advance(
                 rule, look.q, look.qd, look.qdd, look.act,
                 arm.q_min, arm.q_max, arm.qd_max, arm.qdd_max, arm.jerk_max, arm.dt,
                 look.c, look.d, look.q, look.qd, look.qdd,
             )  # fmt: skip
             place_robot(arm, look.q, work.robot)
-            share = (i + 1) / periods
-            t, clear = (step + share) * STEP_S, _clear(world, step, share, n, work, look)
+            before = now // periods
+            now += 1
+            t, share = now * arm.dt, now / periods - before
+            clear = _clear(world, before, share, n, work, look)
             least = min(least, clear)
             if _touches(arm, clear - kept * min(KEPT_M, KEPT_M_S * t), work):
                 return COLLISION, AT_CONTACT + LATER * t - turned
@@ -379,13 +391,19 @@ def _play(
     return RUNNING, worth
 
 
+@kernel(inline="always")
+def _periods(dt: float) -> int:
+    """Return how many periods [s] a step is of."""
+    return max(1, int(STEP_S / dt + 0.5))
+
+
 @kernel()
 def _left(e: int, look: Lookahead, dt: float) -> tuple[int, int]:
     """Return what is left of the way begun in an environment, as :func:`way_of`; or PASSED."""
     k = look.plan[e, 0]
     posture, lasting = way_of(k)
     look.plan[e, 1] += 1
-    gone = int(look.plan[e, 1] * dt / STEP_S + 1e-9)
+    gone = look.plan[e, 1] // _periods(dt)
     if k == PASSED or lasting <= gone:
         return way_of(PASSED)
     if posture == DART:
@@ -516,8 +534,12 @@ def _look_ahead(
     while k < N_LOOKED:
         posture, lasting = _way_at(world, state, e, k, look)
         if k != BEGUN or posture != PASSED:
-            kept = KEPT_ON if k == BEGUN else 1.0
-            end, worth = _play(world, rule, state, e, posture, lasting, kept, n, work, look)
+            gone, kept = 0, 1.0
+            if k == BEGUN:
+                gone, kept = look.plan[e, 1] % _periods(world.arm.dt), KEPT_ON
+            end, worth = _play(
+                world, rule, state, e, posture, lasting, gone, kept, n, work, look
+            )
             if k >= FIRST_DART:
                 _keep_nearest(state, e, k - FIRST_DART, lasting, look)
             if worth > bar:
@@ -528,6 +550,7 @@ def _look_ahead(
             bar = _bar_for_others(state, e, ended, bar)
         k = _next_way(k, bar, other)
     look.plan[e, 0] = chosen
+    copy_values(look.begun, look.last[e])
     return chosen
 
 

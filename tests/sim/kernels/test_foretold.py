@@ -9,14 +9,18 @@ from app.sim.kernels.foretold import N_MOMENTS, foretell, new_foretold
 from app.sim.kernels.occupancy import (
     COURSE_X,
     LEFT,
+    R_MAX,
+    R_MIN,
     VX,
     VY,
     X_MAX,
     X_MIN,
     Y_MAX,
     Y_MIN,
+    R,
     X,
     Y,
+    remember_as_now,
 )
 from app.sim.kernels.reach import new_work
 from app.sim.ports import Vec
@@ -70,6 +74,30 @@ def test_who_only_pauses_is_foretold_to_go_on() -> None:
     gone, missed = np.hypot(*way[pauses].T), np.hypot(*off[pauses].T)
     assert pauses.sum() > 50
     assert missed.mean() < 0.5 * gone.mean(), "standing still would miss all of it"
+
+
+def test_who_has_stood_for_long_is_foretold_to_stand() -> None:
+    batch = batch_of(6)
+    told, rows = watched(batch, 60)
+    still = np.flatnonzero((rows[..., [VX, VY]] == 0.0).all(axis=(0, 2)))
+    assert len(still) > 3
+    first = told[:, still, :1, :2]
+    np.testing.assert_array_equal(
+        told[:, still, :, :2], np.broadcast_to(first, told[:, still, :, :2].shape)
+    )
+
+
+def test_no_radius_is_foretold_beyond_its_limits() -> None:
+    told, _ = watched(batch_of(7), 5)
+    batch = batch_of(7)
+    rule = batch.world.people.walkers.rows[0]
+    assert told[..., 2].min() >= rule[R_MIN] and told[..., 2].max() <= rule[R_MAX]
+    batch.state.people.walkers.rows[:, 0, R] = 1.1 * rule[R_MAX]
+    work, foretold = new_work(batch.world, batch.state, new_forecaster()), new_foretold(N_ENVS)
+    for e in range(N_ENVS):
+        remember_as_now(batch.state.people.walkers.rows, e, 0)
+        foretell(batch.world, batch.state, e, work, foretold)
+        assert foretold.places[1, 0, 2] > rule[R_MAX], "who is larger is not cut to the limit"
 
 
 def test_nobody_is_foretold_to_leave_the_walking_area() -> None:

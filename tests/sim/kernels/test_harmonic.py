@@ -67,6 +67,18 @@ def test_a_radius_seen_through_noise_is_left_to_the_networks() -> None:
     assert claimed <= 3
 
 
+def test_a_function_stays_known_while_it_is_beyond_a_limit() -> None:
+    constants, found, fit = np.array([0.05, 0.48, 1.54, -1.12, -0.83]), np.zeros(5), new_fit()
+    at_limit = 0
+    for k in range(200):
+        age = 0.02 * (k % 5)
+        now, past = seen(constants, RADIUS, age)
+        assert find_function(fit, now, age, past, RADIUS, False, 0.02, found), k
+        at_limit += now == RADIUS.high == past.min()
+        constants[2:] += 2.0 * np.pi * np.array([1.0, 3.0, 4.0]) * constants[0] * 0.02
+    assert at_limit > 10, "all that is remembered was beyond"
+
+
 def test_what_was_at_a_limit_all_the_time_says_nothing() -> None:
     found = np.zeros(5)
     assert not find_function(
