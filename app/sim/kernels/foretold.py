@@ -119,17 +119,17 @@ def _tell_radius(
 ) -> None:
     """Put the function behind a walker's radius in place of its forecast, if it is found.
 
-    Neither is beyond the walker's limits, but where he is so already.
+    Neither leads beyond the walker's limits. Who is beyond them already stays as he is: neither
+    was made for him.
     """
     limits = Limits(rule[R_MIN], rule[R_MAX], rule[F_RADIUS_MAX])
     past = row[PAST_RADIUS : PAST_RADIUS + N_PAST]
-    r = foretold.person[4]
+    r, places = foretold.person[4], foretold.places
     known = find_function(foretold.fit, r, row[AGE], past, limits, False, since, found)
-    middle = 0.5 * (limits.low + limits.high)
-    least, most = min(r, limits.low), max(r, limits.high)
+    middle, beyond = 0.5 * (limits.low + limits.high), r < limits.low or r > limits.high
     for i in range(1, N_MOMENTS):
-        value = value_at(found, middle, STEP_S * i) if known else foretold.places[i, p, 2]
-        foretold.places[i, p, 2] = min(most, max(least, value))
+        value = value_at(found, middle, STEP_S * i) if known else places[i, p, 2]
+        places[i, p, 2] = r if beyond else min(limits.high, max(limits.low, value))
 
 
 @kernel()

@@ -1,6 +1,7 @@
 """Foretelling walkers: those who only pause go on, and nobody is foretold out of the area."""
 
 import numpy as np
+import pytest
 
 from app.sim.cells import load_cell
 from app.sim.forecasts import new_forecaster
@@ -88,16 +89,22 @@ def test_who_has_stood_for_long_is_foretold_to_stand() -> None:
 
 
 def test_no_radius_is_foretold_beyond_its_limits() -> None:
-    told, _ = watched(batch_of(7), 5)
     batch = batch_of(7)
     rule = batch.world.people.walkers.rows[0]
+    told, _ = watched(batch, 5)
     assert told[..., 2].min() >= rule[R_MIN] and told[..., 2].max() <= rule[R_MAX]
-    batch.state.people.walkers.rows[:, 0, R] = 1.1 * rule[R_MAX]
+
+
+@pytest.mark.parametrize("times", [0.5, 1.1])
+def test_who_is_smaller_or_larger_than_walkers_are_is_foretold_to_stay_so(times: float) -> None:
+    batch = batch_of(7)
+    rule, rows = batch.world.people.walkers.rows[0], batch.state.people.walkers.rows
+    rows[:, 0, R] = r = times * rule[R_MIN if times < 1.0 else R_MAX]
     work, foretold = new_work(batch.world, batch.state, new_forecaster()), new_foretold(N_ENVS)
     for e in range(N_ENVS):
-        remember_as_now(batch.state.people.walkers.rows, e, 0)
+        remember_as_now(rows, e, 0)
         foretell(batch.world, batch.state, e, work, foretold)
-        assert foretold.places[1, 0, 2] > rule[R_MAX], "who is larger is not cut to the limit"
+        np.testing.assert_array_equal(foretold.places[:, 0, 2], r)
 
 
 def test_nobody_is_foretold_to_leave_the_walking_area() -> None:
