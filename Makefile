@@ -24,6 +24,8 @@ PIP := $(PY) -m pip --disable-pip-version-check
 RESOLVE = $(VENV)/bin/uv pip compile --quiet --no-config --universal --python-version 3.11 \
 	--fork-strategy fewest --generate-hashes --no-annotate --custom-compile-command "make lock" \
 	$(addprefix --no-emit-package ,torch $(CUDA_PACKAGES)) $(UPGRADE) pyproject.toml
+# Test files side by side, at most four: each process holds torch and the kernels.
+SIDE_BY_SIDE := --numprocesses auto --maxprocesses 4 --dist loadfile
 CUDA_PACKAGES := triton cuda-bindings cuda-pathfinder cuda-toolkit \
 	$(addprefix nvidia-,cublas cuda-cupti cuda-nvrtc cuda-runtime cudnn-cu13 cufft cufile curand cusolver cusparse cusparselt-cu13 nccl-cu13 nvjitlink nvshmem-cu13 nvtx)
 
@@ -51,7 +53,7 @@ run: $(VENV)/setup.stamp ## set up what is missing, start the server, print its 
 setup: $(VENV)/setup.stamp ## set up without starting
 
 test: $(VENV)/dev.stamp $(VENV)/setup.stamp ## the default tests: no network, no browser, no long training
-	@$(PY) -m pytest
+	@$(PY) -m pytest $(SIDE_BY_SIDE)
 
 test-browser: $(VENV)/dev.stamp ## the page in a real Chromium
 	@$(PY) -m pytest -m browser
