@@ -34,7 +34,6 @@ from app.machine import describe  # noqa: E402
 from app.policies import presets  # noqa: E402
 from app.policies.checkpoint import Checkpoint  # noqa: E402
 from app.policies.evaluation.reach_bench import ReachBench  # noqa: E402
-from app.policies.evaluation.rows import untold  # noqa: E402
 from docs.augmentation import over_seeds  # noqa: E402
 from docs.reach_points import ENDS  # noqa: E402
 from docs.training_curves import read_if_there, record  # noqa: E402
@@ -90,7 +89,7 @@ def train_missing(root: Path, names: Sequence[str], seeds: Sequence[int]) -> Non
 
 def played(policy: Checkpoint, per_target: int) -> Json:
     """Return how a policy's episodes ended, and what it cost."""
-    bench = ReachBench(policy, SEED, 1, untold)
+    bench = ReachBench(policy, SEED)
     goals = bench.target_goals(per_target * len(bench.targets))
     return {
         "rates": bench.play(bench.usual, goals).rates(),

@@ -27,7 +27,6 @@ sys.path.insert(0, str(ROOT))
 from app.machine import describe  # noqa: E402 - the line above lets it be found
 from app.policies.checkpoint import Checkpoint  # noqa: E402
 from app.policies.evaluation.reach_bench import ReachBench  # noqa: E402
-from app.policies.evaluation.rows import untold  # noqa: E402
 from docs.training_curves import read  # noqa: E402
 
 RESULTS = ROOT / "docs/results/reach_curves.json"
@@ -46,7 +45,7 @@ def lines(path: Path) -> list[Json]:
 
 def point_of(checkpoint: Checkpoint, per_target: int) -> Json:
     """Return how a policy's episodes round all targets ended."""
-    bench = ReachBench(checkpoint, SEED, 1, untold)
+    bench = ReachBench(checkpoint, SEED)
     goals = bench.target_goals(per_target * len(bench.targets))
     rates = bench.play(bench.usual, goals).rates()
     return {name: rates[name]["mean"] for name in ENDS}

@@ -22,7 +22,6 @@ sys.path.insert(0, str(ROOT))
 
 from app.machine import describe  # noqa: E402 - the line above lets it be found
 from app.policies.evaluation.reach_bench import ReachBench, direct_ways, ending  # noqa: E402
-from app.policies.evaluation.rows import untold  # noqa: E402
 from docs.reach_points import lines  # noqa: E402
 from docs.training_curves import read  # noqa: E402
 
@@ -39,7 +38,7 @@ def rows_of(folder: Path, seed: int, per_target: int) -> tuple[str, list[Json]]:
     manifest = checkpoint.manifest
     told = lines(folder / "curve.jsonl")
     passed = [one["cpu_s"] / 60.0 for one in told if (one["success"] or 0.0) >= SOURCE]
-    bench = ReachBench(checkpoint, seed, 2, untold)
+    bench = ReachBench(checkpoint, seed)
     goals, rows = bench.target_goals(per_target * len(bench.targets)), []
     for how in direct_ways(bench.actor):
         played = bench.play(bench.usual, goals, how)

@@ -19,7 +19,7 @@ from app.policies.evaluation.reach_episodes import (
     recheck_contacts,
     target_goals,
 )
-from app.policies.evaluation.rows import OnRow
+from app.policies.evaluation.rows import OnRow, untold
 from app.policies.movers import AHEAD, How, Mover, hows_of, mover_of
 from app.policies.reach_policy import ReachPolicy
 from app.policies.trained_cell import cell_of
@@ -65,18 +65,19 @@ class ReachBench:
     Args:
         checkpoint: What acts.
         seed: Seed of the episodes; use one that nothing was tuned on.
-        n_rows: How many rows the result will have.
         on_row: Told of each row once it is known.
     """
 
-    def __init__(self, checkpoint: Checkpoint, seed: int, n_rows: int, on_row: OnRow) -> None:
+    def __init__(self, checkpoint: Checkpoint, seed: int, on_row: OnRow = untold) -> None:
         self.actor = ReachPolicy(checkpoint)
         self.cell = cell_of(checkpoint.manifest)
         region = goal_region_of(self.cell)
         self.targets: Vec = region.targets()
         middle, half = np.array(region.center), 0.5 * np.array(region.size)
         self.low, self.high = middle - half, middle + half
-        self._seed, self._n_rows, self._on_row = seed, n_rows, on_row
+        self.n_rows = 1
+        """How many rows the result will have."""
+        self._seed, self._on_row = seed, on_row
         self._rows: list[Json] = []
         self._stated: dict[str, Json] = {}
         self._recheck: Json | None = None
@@ -149,7 +150,7 @@ class ReachBench:
         rules = stated_rules(cell or self.cell, settings)
         self._stated[row["name"]] = {**rules, "goals": goals, "asked": how, **more}
         self._rows.append(row)
-        self._on_row(len(self._rows), self._n_rows, row)
+        self._on_row(len(self._rows), self.n_rows, row)
 
     def result(self, **more: Any) -> Json:
         """Return the whole result.

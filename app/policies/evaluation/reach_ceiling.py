@@ -160,7 +160,7 @@ def run_ceiling(
         seed: Seed of the episodes.
         on_row: Told of each stage once it is known.
     """
-    bench = ReachBench(checkpoint, seed, 1, untold)
+    bench = ReachBench(checkpoint, seed)
     goals = bench.target_goals((episodes or PER_TARGET) * len(bench.targets))
     cell, settings = bench.cell, bench.usual
     batch = started(cell, settings, goals, seed)

@@ -21,7 +21,6 @@ from app.policies.checkpoint import Checkpoint
 from app.policies.evaluation.reach_bench import ReachBench, direct_ways, ending, walker_of
 from app.policies.evaluation.rows import OnRow, untold
 from app.policies.movers import How, hows_of
-from app.policies.reach_policy import ReachPolicy
 from app.sim.cell_people import FixedSpeedWalker
 from app.sim.cells import Cell
 from app.sim.kernels.people import MAX_PEOPLE
@@ -50,14 +49,15 @@ def run_people(
         seed: Seed of the episodes.
         on_row: Told of each row once it is known.
     """
-    ways = [how for how in WAYS if how in hows_of(ReachPolicy(checkpoint))]
+    bench = ReachBench(checkpoint, seed, on_row)
+    ways = [how for how in WAYS if how in hows_of(bench.actor)]
     rows = [
         (n, how)
         for n in range(MAX_PEOPLE + 1)
         for how in ways
         if n > 1 or (how != "averaged" and n) or how == "direct"
     ]
-    bench = ReachBench(checkpoint, seed, len(rows), on_row)
+    bench.n_rows = len(rows)
     goals = bench.target_goals(episodes or DEFAULT_EPISODES)
     for n, how in rows:
         settings = replace(bench.usual, people=KINDS[:1] * n)
@@ -81,8 +81,9 @@ def run_constant(
         seed: Seed of the episodes.
         on_row: Told of each row once it is known.
     """
-    ways = direct_ways(ReachPolicy(checkpoint))
-    bench = ReachBench(checkpoint, seed, len(ways) * len(KINDS), on_row)
+    bench = ReachBench(checkpoint, seed, on_row)
+    ways = direct_ways(bench.actor)
+    bench.n_rows = len(ways) * len(KINDS)
     goals = bench.target_goals(episodes or TARGET_EPISODES)
     for how, kind in product(ways, KINDS):
         settings = replace(bench.usual, people=(kind,))
@@ -102,8 +103,9 @@ def run_speeds(
         seed: Seed of the episodes.
         on_row: Told of each row once it is known.
     """
-    ways = direct_ways(ReachPolicy(checkpoint))
-    bench = ReachBench(checkpoint, seed, len(ways) * len(SPEEDS), on_row)
+    bench = ReachBench(checkpoint, seed, on_row)
+    ways = direct_ways(bench.actor)
+    bench.n_rows = len(ways) * len(SPEEDS)
     goals = bench.target_goals(episodes or DEFAULT_EPISODES)
     settings = replace(bench.usual, people=("fixed-speed",))
     for how, speed in product(ways, SPEEDS):

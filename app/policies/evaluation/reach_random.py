@@ -28,7 +28,6 @@ from app.policies.checkpoint import Checkpoint
 from app.policies.evaluation.reach_bench import ReachBench, direct_ways, ending, goal_ways
 from app.policies.evaluation.reach_episodes import ReachEpisodes, against
 from app.policies.evaluation.rows import OnRow, untold
-from app.policies.reach_policy import ReachPolicy
 from app.sim.ports import Vec
 
 DEFAULT_EPISODES = 5000
@@ -61,9 +60,9 @@ def run_random(
         seed: Seed of goals and people; use one that nothing was tuned on.
         on_row: Told of each row once it is known.
     """
-    actor = ReachPolicy(checkpoint)
-    n, ways, there = episodes or DEFAULT_EPISODES, goal_ways(actor), direct_ways(actor)
-    bench = ReachBench(checkpoint, seed, len(there) + len(LIMITS_S) * len(ways), on_row)
+    bench, n = ReachBench(checkpoint, seed, on_row), episodes or DEFAULT_EPISODES
+    ways, there = goal_ways(bench.actor), direct_ways(bench.actor)
+    bench.n_rows = len(there) + len(LIMITS_S) * len(ways)
     at_targets = {}
     for how in there:
         played = bench.play(bench.usual, bench.target_goals(n), how)

@@ -182,7 +182,7 @@ def run_smoothness(
         seed: Seed of the episodes.
         on_row: Told of the row once it is known.
     """
-    bench = ReachBench(checkpoint, seed, 1, on_row)
+    bench = ReachBench(checkpoint, seed, on_row)
     settings, n = bench.usual, episodes or DEFAULT_EPISODES
     batch = ReachBatch(bench.cell, n, seed, settings)
     paths = drive(batch, mover_of(bench.actor, "direct"), bench.target_goals(n))

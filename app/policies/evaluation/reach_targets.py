@@ -29,7 +29,6 @@ from app.policies.evaluation.reach_bench import ReachBench, direct_ways, ending
 from app.policies.evaluation.reach_episodes import ReachEpisodes
 from app.policies.evaluation.rows import OnRow, untold
 from app.policies.evaluation.statistics import wilson
-from app.policies.reach_policy import ReachPolicy
 from app.sim.kernels.episode import COLLISION, SUCCESS
 from app.sim.ports import Vec
 from app.sim.reach import StartRule
@@ -101,8 +100,9 @@ def run_targets(
         seed: Seed of the episodes; use one that nothing was tuned on.
         on_row: Told of each row once it is known.
     """
-    ways = direct_ways(ReachPolicy(checkpoint))
-    bench = ReachBench(checkpoint, seed, len(ways) * len(STARTS), on_row)
+    bench = ReachBench(checkpoint, seed, on_row)
+    ways = direct_ways(bench.actor)
+    bench.n_rows = len(ways) * len(STARTS)
     per_target = episodes or PER_TARGET
     goals = bench.target_goals(per_target * len(bench.targets))
     for how, start in product(ways, STARTS):

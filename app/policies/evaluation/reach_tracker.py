@@ -28,7 +28,6 @@ from app.policies.checkpoint import Checkpoint
 from app.policies.evaluation.reach_bench import ReachBench, direct_ways, ending, walker_of
 from app.policies.evaluation.rows import OnRow, untold
 from app.policies.movers import Mover, mover_of
-from app.policies.reach_policy import ReachPolicy
 from app.sim.cylinder_tracker import CylinderTracker, CylinderTrackerSettings
 from app.sim.kernels.occupancy import AGE, GROWTH, N_PAST, PAST_S, VX, VY, R, X, Y
 from app.sim.ports import Vec
@@ -159,9 +158,10 @@ def run_tracker(
     Raises:
         InvalidInput: Nobody walks about in the checkpoint's cell.
     """
-    ways = direct_ways(ReachPolicy(checkpoint))
+    bench = ReachBench(checkpoint, seed, on_row)
+    ways = direct_ways(bench.actor)
     rows = [(how, name) for how in ways for name in (LOOKED_AHEAD if ending(how) else ROWS)]
-    bench = ReachBench(checkpoint, seed, 1 + len(rows), on_row)
+    bench.n_rows = 1 + len(rows)
     walker_of(bench.cell)
     goals = bench.target_goals(episodes or DEFAULT_EPISODES)
     bench.add(bench.play(bench.usual, goals).row("exact"), bench.usual, "grid")
