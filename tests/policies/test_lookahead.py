@@ -262,8 +262,9 @@ def test_a_way_begun_is_gone_on_with_for_no_longer_than_it_lasts() -> None:
 
 
 def test_fewer_contacts_than_alone() -> None:
+    """Beside two people, where there are enough contacts to tell by so few episodes."""
     goals = target_goals(POLICY.targets, 270)
-    settings = batch_of(1, "walker").settings
+    settings = batch_of(1, "walker", "walker").settings
     ends = [play(CELL, settings, mover_of(POLICY, how), goals, 5).outcome for how in (
         "direct", "direct-ahead")]  # fmt: skip
     alone, ahead = ((end == COLLISION).sum() for end in ends)
