@@ -24,10 +24,11 @@ PIP := $(PY) -m pip --disable-pip-version-check
 RESOLVE = $(VENV)/bin/uv pip compile --quiet --no-config --universal --python-version 3.11 \
 	--fork-strategy fewest --generate-hashes --no-annotate --custom-compile-command "make lock" \
 	$(addprefix --no-emit-package ,torch $(CUDA_PACKAGES)) $(UPGRADE) pyproject.toml
-# Test files side by side, at most four: each process holds torch and the kernels.
-SIDE_BY_SIDE := --numprocesses auto --maxprocesses 4 --dist loadfile
 CUDA_PACKAGES := triton cuda-bindings cuda-pathfinder cuda-toolkit \
 	$(addprefix nvidia-,cublas cuda-cupti cuda-nvrtc cuda-runtime cudnn-cu13 cufft cufile curand cusolver cusparse cusparselt-cu13 nccl-cu13 nvjitlink nvshmem-cu13 nvtx)
+
+# Test files side by side, at most four: each process holds torch and the kernels.
+SIDE_BY_SIDE := --numprocesses auto --maxprocesses 4 --dist loadfile
 
 # $(call INSTALL_LOCK,file): installs exactly what the file lists, and counts along. pip's
 # notes on a configured index that lacks a package are left out: another one has it.

@@ -252,9 +252,11 @@ class MotionDecider:
             used = mix.weights[0] > 0.0
             places, shares = around[0, used], mix.weights[0, used]
         asked: list[int | None] = [None]
-        weights = np.zeros(len(apart))
+        weights, beside = np.zeros(len(apart)), np.ones(1)
         if question.beside == "averaged" and len(apart) > 1:
-            asked, weights = list(range(len(apart))), person_weights(apart[None])[0]
+            # The nearest first: answers are rounded by their place in the batch.
+            first, weights = apart.argsort(), person_weights(apart[None])[0]
+            asked, beside = first.tolist(), weights[first]
         elif len(apart):
             weights[apart.argmin()] = 1.0
         seen: list[Seen] = []
@@ -264,12 +266,12 @@ class MotionDecider:
             number = who if who is not None or not len(apart) else int(apart.argmin())
             seen.append((number, stage.seen.copy()))
         acts = self.actor.acts(obs.reshape(-1, stage.obs_size))
-        beside = weights if len(asked) > 1 else np.ones(1)
         act = np.outer(beside, shares).ravel() @ acts.astype(np.float64)
         targets = tuple(
             TargetWeight(position=(p[0], p[1], p[2]), weight=w)
             for p, w in zip(places.tolist(), shares.tolist(), strict=True)
         )
+        seen.sort(key=lambda one: one[0] or 0)
         return act, targets if way == "interpolated" else (), weights, seen
 
     def _piece(self, q: Vec, qd: Vec, qdd: Vec, act: Vec) -> tuple[Piece, bool]:

@@ -96,8 +96,7 @@ def test_people_may_come_in_any_order() -> None:
     for beside in ("nearest", "averaged"):
         first = one.decide(replace(asked, beside=beside))
         second = one.decide(replace(turned, beside=beside))
-        # A row of a batch is rounded by its place in it, on some processors.
-        np.testing.assert_allclose(first.act, second.act, atol=2e-6)
+        np.testing.assert_allclose(first.act, second.act, atol=1e-12)
         for here, there in zip(first.met, second.met[::-1], strict=True):
             assert here.separation == there.separation
             assert here.weight == pytest.approx(there.weight, abs=1e-12)
