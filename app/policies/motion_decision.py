@@ -6,9 +6,10 @@ every limit, and the override at which speed and separation monitoring lets it r
 remembered from one call to the next: the speeds hold all that the next period needs.
 """
 
+import math
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -20,8 +21,8 @@ from app.policies.movers import person_weights
 from app.sim import human
 from app.sim.cell_reach import LONGEST_REACH, SHOULDER
 from app.sim.cells import Cell, require_cell
-from app.sim.checker import Shapes
 from app.sim.kernels import actions
+from app.sim.kernels.compiled import direct
 from app.sim.motion_ports import (
     BESIDES,
     WAYS,
@@ -88,7 +89,9 @@ class MotionDecider:
         require_cell(cell, actor.cell, actor.cell_sha256)
         self.actor, self.cell, self.arm = actor, cell, arm_of(cell)
         self._between = Interpolation(actor) if interpolates(actor) else None
+        self._able = looks_ahead(actor)
         self._rule = actor.action.rule()
+        self._advance: Callable[..., bool] | None = None
         qd_max, qdd_max = self.arm.qd_max + SLACK, self.arm.qdd_max + SLACK
         self._each_limits = (
             (self.arm.q_min - SLACK, self.arm.q_max + SLACK),
@@ -98,8 +101,9 @@ class MotionDecider:
         )
         low, high = zip(*self._each_limits, strict=True)
         self._limits = np.concatenate(low), np.concatenate(high)
-        self._robot = _trained(actor.trained_range, {"q": 6, "qd": 6, "goal": 3})
-        self._person = _trained(actor.trained_range, {"human": len(HUMAN)})
+        self._met = _trained(
+            actor.trained_range, {"q": 6, "qd": 6, "goal": 3, "human": len(HUMAN)}
+        )
         self._stages: dict[tuple[int, int], Stage] = {}
         self._aheads: dict[Stage, Lookahead] = {}
         self._layer = SafetyLayer(self.arm, SafetySettings())
@@ -127,16 +131,18 @@ class MotionDecider:
         with self._busy:
             stage = self._stage(known)
             stage.put(q, qd, known, question.time_left_s)
-            apart = stage.apart.copy()
+            apart = stage.apart.tolist()
             if question.safety is None:
                 _require_apart(apart, order)
             act, targets, weights, seen = self._act(stage, question, goal, way)
             began = self._improve(stage, goal, qdd, act) if looks else None
             piece, unfeasible = self._piece(q, qd, qdd, act)
-            safe, terms_of, terms = self._monitored(question, q, qd, piece, stage.shapes, order)
-            outside = [one for who, what in seen for one in self._human(who, what, order)]
-            clearance, distance = stage.clear.tolist(), float(np.linalg.norm(stage.tcp - goal))
-        place = np.argsort(order)
+            safe, terms_of, terms = self._monitored(question, q, qd, piece, stage, order)
+            state = np.concatenate((q, qd, goal))
+            outside = [one for two in seen for one in self._outside(state, *two, order)]
+            clearance, distance = stage.clear.tolist(), math.dist(stage.tcp, goal)
+        met = [Met(separation=d, weight=w) for d, w in zip(apart, weights, strict=True)]
+        place = sorted(range(len(order)), key=order.__getitem__)
         return MotionDecision(
             act=act,
             ahead=looks,
@@ -145,15 +151,15 @@ class MotionDecider:
             unfeasible=unfeasible,
             way=way,
             targets=targets,
-            met=tuple(Met(separation=float(apart[i]), weight=float(weights[i])) for i in place),
-            seen=order[int(apart.argmin())] if order else None,
+            met=tuple(met[i] for i in place),
+            seen=order[apart.index(min(apart))] if order else None,
             safe=safe,
             terms=terms,
             terms_of=terms_of,
             clearance=(clearance[0], clearance[1], clearance[2]),
             distance=distance,
             beyond_reach=self._beyond_reach(goal),
-            outside=(*self._outside(q, qd, goal), *outside),
+            outside=tuple(dict.fromkeys(outside)),
             checkpoint=self.checkpoint,
             elapsed_ms=1e3 * (time.perf_counter() - started),
         )
@@ -185,7 +191,7 @@ class MotionDecider:
             raise InvalidInput("robot.qdd", None, rule)
         given = np.zeros(6) if question.qdd is None else question.qdd
         parts = [
-            np.asarray(values, dtype=np.float64)
+            np.ascontiguousarray(values, dtype=np.float64)
             for values in (question.q, question.qd, given, question.goal)
         ]
         if [part.shape for part in parts] != _SHAPES or not _within(self._limits, parts):
@@ -214,11 +220,10 @@ class MotionDecider:
         return asked
 
     def _looks(self, asked: bool | None) -> bool:
-        able = looks_ahead(self.actor)
-        if asked and not able:
+        if asked and not self._able:
             rule = "needs a policy that sees forecasts of people, with two hidden layers"
             raise InvalidInput("ahead", True, rule, ("false",))
-        return able if asked is None else asked
+        return self._able if asked is None else asked
 
     def _improve(self, stage: Stage, goal: Vec, qdd: Vec, act: Vec) -> str | None:
         """Play an action ahead; change it where another way is better, and return its name."""
@@ -242,46 +247,51 @@ class MotionDecider:
 
     def _act(
         self, stage: Stage, question: MotionQuestion, goal: Vec, way: Way
-    ) -> tuple[Vec, tuple[TargetWeight, ...], Vec, list[Seen]]:
+    ) -> tuple[Vec, tuple[TargetWeight, ...], list[float], list[Seen]]:
         """Return action, targets, weights of the people and who was seen, as what."""
         apart = stage.apart
+        nearest = int(apart.argmin()) if len(apart) else None
         places, shares = goal[None], np.ones(1)
         if way == "interpolated":
             assert self._between is not None
             mix, around = self._between.around(goal[None])
             used = mix.weights[0] > 0.0
-            places, shares = around[0, used], mix.weights[0, used]
-        asked: list[int | None] = [None]
-        weights, beside = np.zeros(len(apart)), np.ones(1)
+            places, shares = around[0][used], mix.weights[0][used]
+        weights = [float(who == nearest) for who in range(len(apart))]
         if question.beside == "averaged" and len(apart) > 1:
             # The nearest first: answers are rounded by their place in the batch.
-            first, weights = apart.argsort(), person_weights(apart[None])[0]
-            asked, beside = first.tolist(), weights[first]
-        elif len(apart):
-            weights[apart.argmin()] = 1.0
-        seen: list[Seen] = []
-        obs = np.empty((len(asked), len(places), stage.obs_size), dtype=np.float32)
-        for row, who in enumerate(asked):
-            obs[row] = stage.observe(places, who)
-            number = who if who is not None or not len(apart) else int(apart.argmin())
-            seen.append((number, stage.seen.copy()))
-        acts = self.actor.acts(obs.reshape(-1, stage.obs_size))
-        act = np.outer(beside, shares).ravel() @ acts.astype(np.float64)
-        targets = tuple(
-            TargetWeight(position=(p[0], p[1], p[2]), weight=w)
-            for p, w in zip(places.tolist(), shares.tolist(), strict=True)
-        )
-        seen.sort(key=lambda one: one[0] or 0)
-        return act, targets if way == "interpolated" else (), weights, seen
+            counts = person_weights(apart[None])[0]
+            first, weights = apart.argsort(), counts.tolist()
+            obs = np.empty((len(first), len(places), stage.obs_size), dtype=np.float32)
+            seen: list[Seen] = []
+            for row, who in enumerate(first.tolist()):
+                obs[row] = stage.observe(places, who)
+                seen.append((who, stage.seen.copy()))
+            seen.sort(key=lambda one: one[0] or 0)
+            acts = self.actor.acts(obs.reshape(-1, stage.obs_size))
+            shares_of_acts = np.outer(counts[first], shares).ravel()
+        else:
+            acts = self.actor.acts(stage.observe(places))
+            seen, shares_of_acts = [(nearest, stage.seen.copy())], shares
+        targets: tuple[TargetWeight, ...] = ()
+        if way == "interpolated":
+            targets = tuple(
+                TargetWeight(position=(x, y, z), weight=w)
+                for (x, y, z), w in zip(places.tolist(), shares.tolist(), strict=True)
+            )
+        return shares_of_acts @ acts.astype(np.float64), targets, weights, seen
 
     def _piece(self, q: Vec, qd: Vec, qdd: Vec, act: Vec) -> tuple[Piece, bool]:
         """Return the commanded piece, and whether a joint had to brake for want of one."""
         arm = self.arm
         c, d, q1, qd1, qdd1 = np.empty((5, 6))
-        empty = actions.advance(
+        arguments = (
             self._rule, q, qd, qdd, act.astype(np.float32), arm.q_min, arm.q_max, arm.qd_max,
             arm.qdd_max, arm.jerk_max, arm.dt, c, d, q1, qd1, qdd1,
         )  # fmt: skip
+        if self._advance is None:
+            self._advance = direct(actions.advance, arguments)
+        empty = self._advance(*arguments)
         return Piece(c=c, d=d, q=q1, qd=qd1, qdd=qdd1), bool(empty)
 
     def _monitored(
@@ -290,13 +300,14 @@ class MotionDecider:
         q: Vec,
         qd: Vec,
         piece: Piece,
-        people: Shapes,
+        stage: Stage,
         order: Sequence[int],
     ) -> Told:
         """Return what monitoring executes, and the terms for one person."""
         settings = question.safety
         if settings is None:
             return None, None, None
+        people = stage.shapes
         if settings != self._layer.settings:
             self._layer = SafetyLayer(self.arm, settings)
         safe = self._layer.decide(q, qd, piece.c, piece.d, people, question.age_s)
@@ -308,21 +319,33 @@ class MotionDecider:
     def _beyond_reach(self, goal: Vec) -> float:
         """Return by how much a goal is farther away than the arm is long [m]."""
         longest = LONGEST_REACH + max(self.arm.tool_length - 0.12, 0.0)
-        return max(0.0, float(np.linalg.norm(goal - SHOULDER)) - longest)
+        return max(0.0, math.dist(goal, SHOULDER) - longest)
 
-    def _outside(self, q: Vec, qd: Vec, goal: Vec) -> tuple[OutsideField, ...]:
-        """Return what of robot and goal lies outside the training range."""
-        return _beyond(self._robot, np.concatenate((q, qd, goal)), ROBOT)
-
-    def _human(
-        self, who: int | None, seen: Vec, order: Sequence[int]
-    ) -> tuple[OutsideField, ...]:
-        """Return what of a person, or of nobody, lies outside the training range."""
-        if who is None:
-            met = _beyond(self._person, seen, HUMAN)
-            nobody = OutsideField(field="people", value=0.0, low=1.0, high=4.0)
-            return (nobody,) if met else ()
-        return _beyond(self._person, seen, [f"people[{order[who]}].{name}" for name in HUMAN])
+    def _outside(
+        self, state: Vec, who: int | None, seen: Vec, order: Sequence[int]
+    ) -> list[OutsideField]:
+        """Return what of q, qd and goal, and of a person or nobody, lies outside training."""
+        met, values = self._met, np.concatenate((state, seen))
+        inside = (met.least <= values) & (values <= met.most)
+        if inside.all():
+            return []
+        names = ROBOT
+        if who is not None:
+            names += tuple(f"people[{order[who]}].{name}" for name in HUMAN)
+        wrong = np.flatnonzero(~inside).tolist()
+        found = [
+            OutsideField(
+                field=names[i],
+                value=float(values[i]),
+                low=float(met.low[i]),
+                high=float(met.high[i]),
+            )
+            for i in wrong
+            if i < len(names)
+        ]
+        if len(found) < len(wrong):
+            found.append(OutsideField(field="people", value=0.0, low=1.0, high=4.0))
+        return found
 
 
 def _within(limits: tuple[Vec, Vec], parts: Sequence[Vec]) -> bool:
@@ -346,36 +369,21 @@ def _trained(
     return _Trained(low, high, low - RANGE_SLACK, high + RANGE_SLACK)
 
 
-def _beyond(met: _Trained, values: Vec, names: Sequence[str]) -> tuple[OutsideField, ...]:
-    """Return which of some numbers lie outside what was met in training."""
-    inside = (met.least <= values) & (values <= met.most)
-    if inside.all():
-        return ()
-    return tuple(
-        OutsideField(
-            field=names[i],
-            value=float(values[i]),
-            low=float(met.low[i]),
-            high=float(met.high[i]),
-        )
-        for i in np.flatnonzero(~inside).tolist()
-    )
-
-
 def _bodies_first(people: Sequence[Person]) -> list[int]:
     """Return the numbers of people with joint angles, then of cylinders."""
     return sorted(range(len(people)), key=lambda i: people[i].cylinder is not None)
 
 
-def _require_apart(apart: Vec, order: Sequence[int]) -> None:
+def _require_apart(apart: Sequence[float], order: Sequence[int]) -> None:
     """Raise where somebody is inside the robot.
 
     Raises:
         InvalidInput: Somebody is.
     """
-    for i in np.flatnonzero(apart <= 0.0)[:1]:
-        rule = (
-            "is the distance to the robot in m: this person is inside it; with `safety` the "
-            "answer would be a stop"
-        )
-        raise InvalidInput(f"people[{order[i]}]", round(float(apart[i]), 4), rule)
+    for who, distance in zip(order, apart, strict=True):
+        if distance <= 0.0:
+            rule = (
+                "is the distance to the robot in m: this person is inside it; with `safety` "
+                "the answer would be a stop"
+            )
+            raise InvalidInput(f"people[{who}]", round(distance, 4), rule)

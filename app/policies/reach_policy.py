@@ -147,7 +147,7 @@ class ReachPolicy:
         rows = rows @ weight
         rows += bias
         if self._residual:
-            base = np.clip(obs[:, BASE_START : BASE_START + N_ACT], -1.0, 1.0)
+            base = obs[:, BASE_START : BASE_START + N_ACT].clip(-1.0, 1.0)
             rows += np.arctanh(np.float32(BASE_WEIGHT) * base)
         return cast(NDArray[np.float32], np.tanh(rows, out=rows))
 
