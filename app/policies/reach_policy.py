@@ -1,10 +1,11 @@
 """A trained policy of the reach scenario, for inference.
 
-Its network is read from the checkpoint's tensors and run by numpy: eight states cost less than
-any library's overhead. Source: METHOD 2.2 to 2.4; the tensors are data, see ``checkpoint.py``.
+Its network is read from the checkpoint's tensors and run by numpy, for few states by a kernel:
+a library's overhead costs more than they do. Source: METHOD 2.2 to 2.4; the tensors are data,
+see ``checkpoint.py``.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, cast, get_args
 
 import numpy as np
@@ -24,9 +25,11 @@ from app.policies.trained_cell import cell_of
 from app.sim.actions import ActionSettings
 from app.sim.goal_sets import MOST_HALTON, N_HALTON, halton_targets
 from app.sim.kernels import reach_crowd, reach_ways
+from app.sim.kernels.compiled import direct
 from app.sim.kernels.forecast import Network
 from app.sim.kernels.people import MAX_PEOPLE
 from app.sim.kernels.reach_features import BASE_START, N_FEATURES, SIZES, STATE_SIZES
+from app.sim.kernels.residual_actor import FEW, answers, new_residual_actor
 from app.sim.ports import Vec
 from app.sim.reach import N_ACT, GoalRule, ViewName, goal_region_of
 
@@ -92,6 +95,8 @@ class ReachPolicy:
             n_seen = CROWD.first + CROWD_WIDTH
         self._layers = _layers_of(arrays, ACTOR_LAYERS, n_seen, N_ACT)
         self._residual = _named(preset, "actor", ACTORS) == "residual"
+        self._few = self.kernel_network
+        self._answers: Callable[..., None] | None = None
 
     @property
     def checkpoint(self) -> str:
@@ -142,6 +147,8 @@ class ReachPolicy:
             raise InvalidInput(
                 "obs", list(obs.shape), f"must have the shape ['n', {self.n_obs}]"
             )
+        if self._few is not None and len(obs) <= FEW:
+            return self._answered(self._few, obs)
         rows = _hidden(self._with_crowd(obs), self._layers[:-1])
         weight, bias = self._layers[-1]
         rows = rows @ weight
@@ -150,6 +157,16 @@ class ReachPolicy:
             base = obs[:, BASE_START : BASE_START + N_ACT].clip(-1.0, 1.0)
             rows += np.arctanh(np.float32(BASE_WEIGHT) * base)
         return cast(NDArray[np.float32], np.tanh(rows, out=rows))
+
+    def _answered(self, network: Network, obs: Floats) -> Floats:
+        """Return what :meth:`acts` does, by the kernel."""
+        seen = np.ascontiguousarray(obs, dtype=np.float32)
+        acts = np.empty((len(seen), N_ACT), dtype=np.float32)
+        arguments = new_residual_actor(network, BASE_WEIGHT), seen, acts
+        if self._answers is None:
+            self._answers = direct(answers, arguments)
+        self._answers(*arguments)
+        return acts
 
     def _with_crowd(self, obs: Floats) -> Floats:
         """Return what the first layer sees: people as a set are described as one."""

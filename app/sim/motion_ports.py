@@ -5,7 +5,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal, NamedTuple, get_args
 
 from app.sim.pick import Piece
 from app.sim.ports import OutsideField, Person, Vec
@@ -47,8 +47,7 @@ class MotionQuestion:
     """How old the people are beyond the tracker's delay [s]."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TargetWeight:
+class TargetWeight(NamedTuple):
     """One training target that the action is made from."""
 
     position: tuple[float, float, float]
@@ -57,8 +56,7 @@ class TargetWeight:
     """Its share of the action."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Met:
+class Met(NamedTuple):
     """One person as the decision met them."""
 
     separation: float

@@ -125,7 +125,8 @@ def _with_library(shared: People, cell: Cell, settings: WorkSettings) -> People:
         augmentation=settings.augmentation,
         variants=settings.variants,
     )
-    # Copies: for read-only arrays the kernels would be compiled anew.
+    # Copies: for read-only arrays the kernels would be compiled anew. Samples are read-only
+    # everywhere, since they are large.
     return shared._replace(
         source=people.LIBRARY,
         bodies=np.array(library.bodies),

@@ -51,19 +51,6 @@ def looked(n_envs: int, *people: str) -> tuple[kernel.Lookahead, Work, ReachBatc
     return look, new_work(batch.world, batch.state, new_forecaster()), batch
 
 
-def test_the_kernel_asks_the_same_network() -> None:
-    """Beside constant people the first step of another way ends where the policy is asked."""
-    batch = walked(batch_of(20, "constant"), 10)
-    obs = batch.observe()
-    network = POLICY.kernel_network
-    assert network is not None
-    look = kernel.new_lookahead(batch.arm, network, BASE_WEIGHT, 20)
-    for row in np.flatnonzero(batch.state.outcome == RUNNING):
-        look.obs[:] = obs[row]
-        kernel._ask(look)
-        np.testing.assert_allclose(look.act, POLICY.acts(obs[row][None])[0], atol=2e-5)
-
-
 def test_what_is_played_is_what_happens_beside_constant_people() -> None:
     """Straight ahead without turns: outcomes within the horizon are told before."""
     batch = walked(batch_of(150, "constant"), 15)

@@ -15,6 +15,7 @@ from app.policies.reach_training import networks_of
 from app.sim.actions import ActionSettings
 from app.sim.cells import load_cell
 from app.sim.goal_sets import halton_targets
+from app.sim.kernels.residual_actor import FEW
 from app.sim.ports import ReachActor
 from app.sim.reach import ReachBatch, ReachSettings, goal_region_of
 from tests.policies.untrained import untrained_reach
@@ -45,6 +46,21 @@ def test_it_acts_as_the_network_that_was_trained(layers, kind):
     act = policy.acts(obs)
     assert act.dtype == np.float32 and np.ptp(act) > 0.1
     np.testing.assert_allclose(act, expected, atol=2e-6)
+
+
+def test_few_states_are_answered_as_many_are():
+    """By the kernel, each by itself, what the matrices say of all together."""
+    policy = ReachPolicy(pretrained.load("reach"))
+    cell, n = load_cell("shared-workspace"), 3 * FEW
+    batch = ReachBatch(cell, n, 5, ReachSettings(observation=policy.view))
+    obs = batch.reset()
+    for _ in range(10):
+        obs = batch.step(policy.acts(obs)).obs
+    many = policy.acts(obs)
+    alone = np.concatenate([policy.acts(obs[row : row + 1]) for row in range(n)])
+    assert np.ptp(alone) > 0.5
+    np.testing.assert_allclose(alone, many, atol=2e-5)
+    np.testing.assert_array_equal(policy.acts(obs[:FEW][::-1]), alone[:FEW][::-1])
 
 
 def test_it_says_what_it_is(checkpoint):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numba import typeof
 
 from app.errors import InvalidInput
 from app.sim import human
@@ -191,6 +192,14 @@ def test_library_people_of_all_sizes_are_drawn(cell: Cell) -> None:
     assert len(people.bodies) == len(set(state.body.ravel())) == 6
     assert (state.body[:, 0] != state.body[:, 1]).mean() > 0.5
     np.testing.assert_array_equal(state.size, people.bodies[state.body])
+
+
+def test_kernels_are_compiled_once_whatever_people_do(cell: Cell) -> None:
+    kinds = {
+        str(typeof(people_of(cell, work)))
+        for work in (None, WorkSettings(motion="library"), WorkSettings(motion="reaches"))
+    }
+    assert len(kinds) == 1
 
 
 def test_sizes_that_are_asked_for_are_the_only_ones(cell: Cell) -> None:

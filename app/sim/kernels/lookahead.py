@@ -40,7 +40,7 @@ from app.sim.kernels.compiled import kernel
 from app.sim.kernels.cylinder import cylinder_clearance
 from app.sim.kernels.episode import COLLISION, RUNNING, SUCCESS, SUCCESS_DISTANCE, distance_to
 from app.sim.kernels.features import HORIZONS
-from app.sim.kernels.forecast import N_TIMES, STEP_S, Floats, Network, layer
+from app.sim.kernels.forecast import N_TIMES, STEP_S, Floats, Network
 from app.sim.kernels.foretold import N_PLAYED, Foretold, foretell, new_foretold
 from app.sim.kernels.geometry import FAR
 from app.sim.kernels.other_ways import (
@@ -63,9 +63,10 @@ from app.sim.kernels.other_ways import (
     write_toward,
 )
 from app.sim.kernels.reach import ReachState, ReachWorld, Work
-from app.sim.kernels.reach_features import BASE_START, N_FEATURES, Obs, describe
+from app.sim.kernels.reach_features import N_FEATURES, Obs, describe
 from app.sim.kernels.reach_prospect import base_motion
 from app.sim.kernels.reach_ways import N_WAYS, look_aside, put_ways
+from app.sim.kernels.residual_actor import ResidualActor, answer, new_residual_actor
 from app.sim.ports import Vec
 
 AT_GOAL, AT_CONTACT, LATER, ROOM, APART, TURNED = 2.0, -2.0, 0.3, 0.3, 0.3, 0.05
@@ -99,10 +100,8 @@ N_LOOKED = FIRST_DART + N_DARTS
 class Lookahead(NamedTuple):
     """Network and work space; used by one thread at a time."""
 
-    net: Network
-    """The policy, a residual actor."""
-    base_weight: float
-    """Share of the base motion in its action."""
+    actor: ResidualActor
+    """The policy."""
     foretold: Foretold
     """Where people will be."""
     aim: Vec
@@ -119,10 +118,6 @@ class Lookahead(NamedTuple):
     """Third coefficients of a period [rad/s^3], shape (6,)."""
     obs: Obs
     """What the policy sees, shape (n_obs,)."""
-    h1: Floats
-    """First hidden layer, shape (width,)."""
-    h2: Floats
-    """Second hidden layer, shape (width,)."""
     act: Floats
     """Action of a step, shape (6,)."""
     found: Floats
@@ -157,14 +152,12 @@ def new_lookahead(arm: Arm, net: Network, base_weight: float, n_envs: int) -> Lo
     """Return work space for a network and so many environments."""
     aim = np.zeros((N_POSTURES, 6))
     aim[:-1] = np.clip(arm.home + np.array(POSTURES), arm.q_min, arm.q_max)
-    width = len(net.b1)
 
     def room(n: int) -> Floats:
         return np.zeros(n, dtype=np.float32)
 
     return Lookahead(
-        net=net,
-        base_weight=base_weight,
+        actor=new_residual_actor(net, base_weight),
         foretold=new_foretold(n_envs),
         aim=aim,
         q=np.zeros(6),
@@ -173,8 +166,6 @@ def new_lookahead(arm: Arm, net: Network, base_weight: float, n_envs: int) -> Lo
         c=np.zeros(6),
         d=np.zeros(6),
         obs=room(N_FEATURES + N_WAYS),
-        h1=room(width),
-        h2=room(width),
         act=room(6),
         found=room(6),
         begun=room(6),
@@ -189,18 +180,6 @@ def new_lookahead(arm: Arm, net: Network, base_weight: float, n_envs: int) -> Lo
         drawn=np.zeros(n_envs, dtype=np.int64),
         rng=np.zeros(1, dtype=np.uint64),
     )
-
-
-@kernel()
-def _ask(look: Lookahead) -> None:
-    """Write the policy's action for ``look.obs`` into ``look.act``."""
-    net = look.net
-    layer(look.obs, net.w1, net.b1, True, look.h1)
-    layer(look.h1, net.w2, net.b2, True, look.h2)
-    layer(look.h2, net.w3, net.b3, False, look.act)
-    for j in range(6):
-        base = min(1.0, max(-1.0, look.obs[BASE_START + j]))
-        look.act[j] = math.tanh(look.act[j] + math.atanh(look.base_weight * base))
 
 
 @kernel(inline="always")
@@ -252,7 +231,7 @@ def _ask_at(
         arm, top, look.q, look.qd, sight.seen, goal, robot, sight.prospect, work.ways,
         N_FEATURES, look.obs,
     )  # fmt: skip
-    _ask(look)
+    answer(look.actor, look.obs, look.act)
 
 
 @kernel(inline="always")

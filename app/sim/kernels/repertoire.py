@@ -77,9 +77,15 @@ class Legs(NamedTuple):
 
 
 def no_repertoire() -> Repertoire:
-    """Return the repertoire of workers who use none."""
+    """Return the repertoire of workers who use none.
+
+    Its samples are read-only, like a library's: all that kernels are handed is then of one
+    type, and they are compiled once.
+    """
+    samples = np.zeros((1, 18, N_BASIS))
+    samples.setflags(write=False)
     return Repertoire(
-        samples=np.zeros((1, 18, N_BASIS)),
+        samples=samples,
         gain=np.zeros((1, 18 * N_BASIS, 36)),
         legs=np.full((1, 1, 2, 3), -1, dtype=np.int64),
         duration=np.zeros((1, 2)),
