@@ -10,7 +10,7 @@ drawn.
 
 import json
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -217,46 +217,69 @@ def _ends(axis: Axes, row: Json) -> None:
 # Goals between targets ------------------------------------------------------------------------
 
 
-def ways_of(results: Sequence[Json]) -> Iterator[tuple[str, Json, str, str]]:
-    """Yield label, row, colour and mark of every way and policy, the targets' rows left out."""
-    several = len(results) > 1
-    colours = iter((BLUE, ORANGE, GREEN, PURPLE, RED, GREY))
-    marks = iter("osD^vP")
-    for result in results:
-        for row in result["results"]:
-            if "between" in row:
-                words = WAYS.get(row["name"], (row["name"], "", ""))[0]
-                label = f"{policy_of(result)}, {words}" if several else words
-                yield label, row, next(colours), next(marks)
+def ways_of(result: Json) -> dict[str, Json]:
+    """Return the rows of random goals by way, in 5 s."""
+    return {row["name"]: row for row in result["results"] if "between" in row}
+
+
+def own_way(result: Json) -> str:
+    """Return the way that a policy is made for, looking ahead where it can."""
+    ways = list(ways_of(result))
+    return ([way for way in ways if way.startswith("interpolated")] or ways)[-1]
 
 
 def between_targets(results: Sequence[Json]) -> Figure:
-    """Draw what goals between targets cost, by way and by how far off the grid they are."""
-    figure, axes = panels(1, 2, 3.3, width_ratios=(1.0, 1.2))
+    """Draw what goals between targets cost, by way and by how far off the grid they are.
+
+    Of several policies the right half shows each by the way that it is made for.
+    """
+    several = len(results) > 1
+    n_ways = sum(len(ways_of(result)) for result in results)
+    figure, axes = panels(1, 2, max(3.3, 0.9 + 0.26 * n_ways), width_ratios=(1.0, 1.2))
     left, right = axes[0]
-    ways = list(ways_of(results))
-    for k, (_, row, colour, mark) in enumerate(ways):
-        low, high = row["against_targets"]["low"], row["against_targets"]["high"]
-        left.plot([100.0 * low, 100.0 * high], [-k, -k], color=colour, lw=2.0)
-        left.plot(100.0 * row["against_targets"]["mean"], -k, mark, color=colour, ms=6)
-        groups = row["between"]
-        x = [500.0 * (one["low_m"] + one["high_m"]) for one in groups]
-        mean, low, high = (
-            [one["success"][name] for one in groups] for name in ("mean", "low", "high")
-        )
-        right.fill_between(x, low, high, color=colour, alpha=0.1, lw=0)
-        right.plot(x, mean, f"{mark}-", color=colour, ms=4.5)
+    labels: list[str] = []
+    for number, result in enumerate(results):
+        for way, row in ways_of(result).items():
+            words, colour, mark = WAYS[way]
+            if several:
+                words = f"{policy_of(result)}, {words}"
+                colour = (BLUE, ORANGE, GREEN, PURPLE, RED)[number % 5]
+            k, gain = -len(labels), row["against_targets"]
+            labels.append(words)
+            left.plot([100.0 * gain["low"], 100.0 * gain["high"]], [k, k], color=colour, lw=2.0)
+            left.plot(100.0 * gain["mean"], k, mark, color=colour, ms=6)
+            if not several or way == own_way(result):
+                _by_distance(right, row["between"], 2.5 * number, colour, mark, words)
     left.axvline(0.0, color=GREY, lw=1.0)
     left.axvline(-0.5, color=RED, lw=1.0, ls=":")
-    left.set_yticks([-k for k in range(len(ways))], [label for label, *_ in ways])
-    title = f"{ways[0][1]['n']} random goals less the targets"
-    left.set(ylim=(0.6 - len(ways), 0.6), title=title)
+    left.set_yticks([-k for k in range(len(labels))], labels)
+    title = f"{next(iter(ways_of(results[0]).values()))['n']} random goals less the targets"
+    left.set(ylim=(0.6 - len(labels), 0.6), title=title)
     left.set(xlabel="success rate, points")
     left.grid(False, axis="y")
     right.set(title="... by how far they are from the grid", ylabel="success")
     right.set(xlabel="goal to the nearest target [mm]")
     percent(right.yaxis)
+    if several:
+        right.legend(loc="lower left")
     return figure
+
+
+def _by_distance(
+    axis: Axes, groups: Sequence[Json], aside: float, colour: str, mark: str, words: str
+) -> None:
+    """Draw success by the way to the nearest target, so far to the right [mm]."""
+    rates = [one["success"] for one in groups]
+    axis.errorbar(
+        [500.0 * (one["low_m"] + one["high_m"]) + aside for one in groups],
+        [rate["mean"] for rate in rates],
+        bars(rates),
+        fmt=f"{mark}-",
+        color=colour,
+        ms=4.5,
+        elinewidth=0.9,
+        label=words,
+    )
 
 
 # Other people ---------------------------------------------------------------------------------
@@ -366,7 +389,7 @@ def _trackers(axis: Axes, result: Json) -> None:
 
 
 def smoothness(results: Sequence[Json]) -> Figure:
-    """Draw joints, tool and person along an episode, a column for each degree."""
+    """Draw joints, tool and person along an episode, a column for each result."""
     figure, axes = panels(4, len(results), 7.4, sharex="col", height_ratios=(1, 1, 1, 0.75))
     for column, result in enumerate(results):
         _episode(axes[:, column], result, first=column == 0)
@@ -450,8 +473,13 @@ def main() -> None:
     three = read_all("reach-people"), read("reach-speeds"), read("reach-tracker")
     if any(three):
         save(others, IMAGES / "others.png", *three)
-    if smooth := [one for one in read_all("reach-smoothness") if one["example"]]:
-        save(smoothness, IMAGES / "smoothness.png", smooth)
+    smooth = {
+        one["settings"]["action"]["degree"]: one
+        for one in reversed(read_all("reach-smoothness"))
+        if one["example"]
+    }
+    if smooth:
+        save(smoothness, IMAGES / "smoothness.png", [smooth[k] for k in sorted(smooth)])
     if trained := read("reach_curves"):
         save(curves, IMAGES / "curves.png", trained["curves"])
 
