@@ -86,6 +86,7 @@ COLUMNS: Mapping[str, Mapping[str, str]] = {
         "tool_way_m": "tool's way [m]",
         "contacts_moving": "contacts, robot moving",
         "contacts_at_rest": "... at rest",
+        "contacts_cell": "at table or cell",
     },
 }
 """Measures of each protocol and what its table calls them."""
