@@ -13,6 +13,8 @@ from typing import Any
 
 import httpx
 
+from tests import patient_http
+
 ROOT = Path(__file__).parents[1]
 PATIENCE_S = 300.0
 """Longest wait for anything on a busy machine [s]."""
@@ -64,25 +66,26 @@ def wait_for(what: Callable[[], Any]) -> Any:
 
 def test_training_finishes_without_gap_after_the_server_was_killed(tmp_path: Path) -> None:
     with serving(tmp_path) as (process, address):
-        wait_for(lambda: httpx.get(f"{address}/v1/jobs").status_code == 200)
-        posted = httpx.post(f"{address}/v1/jobs", json=TRAINING)
+        wait_for(lambda: patient_http.get(f"{address}/v1/jobs").status_code == 200)
+        posted = patient_http.post(f"{address}/v1/jobs", json=TRAINING)
         assert posted.status_code == 202
         path = posted.headers["location"]
-        wait_for(lambda: httpx.get(f"{address}{path}").json()["step"] >= 1024)
+        wait_for(lambda: patient_http.get(f"{address}{path}").json()["step"] >= 1024)
         process.send_signal(signal.SIGKILL)
         process.wait()
     with serving(tmp_path) as (_, address):
         ended = ("succeeded", "failed", "cancelled")
 
         def settled() -> Any:
-            job = httpx.get(f"{address}{path}").json()
+            job = patient_http.get(f"{address}{path}").json()
             return job if job["state"] in ended else None
 
         job = wait_for(settled)
         assert (job["state"], job["attempt"]) == ("succeeded", 2), job
-        curve = httpx.get(f"{address}{path}/metrics", params={"limit": 1000}).json()
+        curve = patient_http.get(f"{address}{path}/metrics", params={"limit": 1000}).json()
         steps = [point["step"] for point in curve["items"]]
         assert steps == list(range(256, 6144 + 1, 256))
-        stored = httpx.get(f"{address}/v1/checkpoints", params={"limit": 100}).json()["items"]
+        kept = patient_http.get(f"{address}/v1/checkpoints", params={"limit": 100})
+        stored = kept.json()["items"]
         mine = [row["step"] for row in stored if row.get("job_id") == job["id"]]
         assert sorted(mine) == list(range(512, 6144 + 1, 512))

@@ -5,11 +5,11 @@ import threading
 import time
 from collections.abc import Iterator
 
-import httpx
 from fastapi import FastAPI
 
 from app.listening import address_of, listen
 from app.serving import Server, server_of
+from tests import patient_http
 
 START_S = 30.0
 WARM_UP_S = 900.0
@@ -38,6 +38,6 @@ def running(app: FastAPI) -> Iterator[tuple[Server, str]]:
 def wait_until_ready(address: str) -> None:
     """Wait for the kernels and the live cell."""
     give_up = time.monotonic() + WARM_UP_S
-    while (answer := httpx.get(f"{address}/readyz")).status_code != 200:
+    while (answer := patient_http.get(f"{address}/readyz")).status_code != 200:
         assert time.monotonic() < give_up, answer.text
         time.sleep(0.05)

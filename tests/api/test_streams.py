@@ -9,6 +9,7 @@ import pytest
 
 from app.main import create_app
 from app.settings import Settings
+from tests import patient_http
 from tests.api.live_server import running, wait_until_ready
 
 
@@ -33,7 +34,7 @@ def events(response: httpx.Response) -> Iterator[tuple[str, str, Any]]:
 
 
 def test_world_streams_light_snapshots_as_time_goes_on(address: str) -> None:
-    with httpx.stream("GET", f"{address}/v1/worlds/main/events") as response:
+    with patient_http.stream("GET", f"{address}/v1/worlds/main/events") as response:
         assert response.headers["content-type"].startswith("text/event-stream")
         stream = events(response)
         seen = [next(stream) for _ in range(3)]
@@ -44,7 +45,7 @@ def test_world_streams_light_snapshots_as_time_goes_on(address: str) -> None:
 
 
 def test_stream_tells_of_the_people_without_their_joints(address: str) -> None:
-    with httpx.stream("GET", f"{address}/v1/worlds/main/events") as response:
+    with patient_http.stream("GET", f"{address}/v1/worlds/main/events") as response:
         _, _, data = next(events(response))
     (person,) = data["people"]
     assert (person["id"], person["mode"], person["body"]["stature"]) == (0, "auto", 50.0)
@@ -52,13 +53,13 @@ def test_stream_tells_of_the_people_without_their_joints(address: str) -> None:
 
 
 def test_stream_of_a_world_ends_when_it_is_started_anew(address: str) -> None:
-    with httpx.stream("GET", f"{address}/v1/worlds/main/events", timeout=60.0) as response:
+    with patient_http.stream("GET", f"{address}/v1/worlds/main/events") as response:
         stream = events(response)
         next(stream)
         world = f"{address}/v1/worlds/main"
-        httpx.put(f"{world}/cell", json={"cell": "pick-and-place"}, timeout=60.0)
+        patient_http.put(f"{world}/cell", json={"cell": "pick-and-place"})
         assert [name for name, _, _ in stream][-1] == "end"
-    assert httpx.get(world).json()["tick"] >= 0
+    assert patient_http.get(world).json()["tick"] >= 0
 
 
 def test_job_streams_its_curve_without_gap_or_duplicate_and_then_ends(address: str) -> None:
@@ -72,15 +73,15 @@ def test_job_streams_its_curve_without_gap_or_duplicate_and_then_ends(address: s
         "width": 16,
     }
     body = {"kind": "train", "preset": "pick-td3", "seed": 1, "overrides": overrides}
-    job = httpx.post(f"{address}/v1/jobs", json=body).json()["id"]
-    with httpx.stream("GET", f"{address}/v1/jobs/{job}/events", timeout=120.0) as response:
+    job = patient_http.post(f"{address}/v1/jobs", json=body).json()["id"]
+    with patient_http.stream("GET", f"{address}/v1/jobs/{job}/events") as response:
         seen = list(events(response))
     assert [data["state"] for name, _, data in seen if name == "state"][-1] == "succeeded"
     steps = [data["step"] for name, _, data in seen if name == "progress"]
     assert steps == list(range(128, 1281, 128))
-    stored = httpx.get(f"{address}/v1/jobs/{job}/metrics?after_step=640").json()["items"]
+    stored = patient_http.get(f"{address}/v1/jobs/{job}/metrics?after_step=640").json()["items"]
     assert [row["step"] for row in stored] == list(range(768, 1281, 128))
-    made = httpx.get(f"{address}/v1/checkpoints?job_id={job}").json()["items"]
+    made = patient_http.get(f"{address}/v1/checkpoints?job_id={job}").json()["items"]
     assert {one["step"] for one in made} == {640, 1280}
 
 
@@ -91,7 +92,7 @@ def test_open_streams_do_not_hold_up_the_end(tmp_path: Path) -> None:
         open_stream, ended = threading.Event(), threading.Event()
 
         def follow() -> None:
-            with httpx.stream("GET", f"{address}/v1/worlds/main/events") as response:
+            with patient_http.stream("GET", f"{address}/v1/worlds/main/events") as response:
                 for _ in events(response):
                     open_stream.set()
             ended.set()

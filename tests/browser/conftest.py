@@ -14,6 +14,8 @@ import httpx
 import pytest
 from playwright.sync_api import Browser, ConsoleMessage, Page, Request, expect, sync_playwright
 
+from tests import patient_http
+
 ROOT = Path(__file__).parents[2]
 START_S = 300.0
 """Time a first start may take: the kernels are compiled on two busy cores [s]."""
@@ -81,7 +83,7 @@ def wait_until_ready(address: str, process: subprocess.Popen[bytes], log: Path) 
     end = time.monotonic() + START_S
     while time.monotonic() < end and process.poll() is None:
         try:
-            if httpx.get(f"{address}/readyz").status_code == 200:
+            if patient_http.get(f"{address}/readyz").status_code == 200:
                 return
         except httpx.TransportError:
             pass

@@ -4,7 +4,6 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 
-import httpx
 import numpy as np
 import pytest
 import viser
@@ -12,6 +11,7 @@ from playwright.sync_api import Page, expect
 
 from app.sim import human
 from app.sim.cells import load_cell
+from tests import patient_http
 from tests.browser.camera import Camera
 from web import workplace
 
@@ -52,12 +52,12 @@ def on_canvas(page: Page, camera: Camera) -> Camera:
 def tell(server: str, *commands: dict) -> None:
     """Send commands to the world."""
     for command in commands:
-        answer = httpx.post(f"{server}/v1/worlds/main/commands", json=command)
+        answer = patient_http.post(f"{server}/v1/worlds/main/commands", json=command)
         assert answer.status_code == 202, answer.text
 
 
 def state(server: str) -> dict:
-    found: dict = httpx.get(f"{server}/v1/worlds/main").json()
+    found: dict = patient_http.get(f"{server}/v1/worlds/main").json()
     return found
 
 
@@ -153,7 +153,7 @@ def test_dragging_a_hand_onto_the_chosen_cube_changes_the_choice(
                 break
     assert {other} == GOALS - {chosen}
     expect(page.locator(f'[data-candidate="{other}"]')).to_have_attribute("data-chosen", "true")
-    asked = httpx.post(f"{server}/v1/task-selection", json=state(server)["state"]).json()
+    asked = patient_http.post(f"{server}/v1/task-selection", json=state(server)["state"]).json()
     assert asked["chosen"] == other
     values = {c["id"]: c["value"] for c in asked["candidates"]}
     assert values[other] > values[chosen]

@@ -2,9 +2,10 @@
 
 from collections.abc import Callable
 
-import httpx
 import pytest
 from playwright.sync_api import Page, expect
+
+from tests import patient_http
 
 pytestmark = pytest.mark.browser
 
@@ -12,7 +13,7 @@ PHONE = (390, 844)
 
 
 def world(server: str) -> dict:
-    found: dict = httpx.get(f"{server}/v1/worlds/main").json()
+    found: dict = patient_http.get(f"{server}/v1/worlds/main").json()
     return found
 
 

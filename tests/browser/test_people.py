@@ -2,10 +2,10 @@
 
 from collections.abc import Callable, Iterator
 
-import httpx
 import pytest
 from playwright.sync_api import Page, expect
 
+from tests import patient_http
 from tests.browser.test_drag import state, until
 from tests.sim.recorded_person import csv_text, working
 
@@ -20,10 +20,10 @@ def one_person(server: str) -> Iterator[str]:
     yield server
     commands = f"{server}/v1/worlds/main/commands"
     for other in state(server)["people"][1:]:
-        httpx.post(commands, json={"tag": "remove-person", "person": other["id"]})
-    httpx.post(commands, json={"tag": "set-body", "stature": 50})
-    httpx.post(commands, json={"tag": "set-mode", "mode": "auto"})
-    httpx.delete(f"{server}/v1/motions/visit")
+        patient_http.post(commands, json={"tag": "remove-person", "person": other["id"]})
+    patient_http.post(commands, json={"tag": "set-body", "stature": 50})
+    patient_http.post(commands, json={"tag": "set-mode", "mode": "auto"})
+    patient_http.delete(f"{server}/v1/motions/visit")
 
 
 def test_visitor_adds_a_person_changes_its_size_and_plays_a_recording(
@@ -40,7 +40,7 @@ def test_visitor_adds_a_person_changes_its_size_and_plays_a_recording(
     expect(page.locator('[data-role="stature-text"]')).to_have_text("1.87 m")
     now = until(server, lambda world: world["people"][1]["size"][11] > 1.08, LIMIT_S)
     assert [one["body"]["stature"] for one in now["people"]] == [50.0, 95.0]
-    posted = httpx.post(
+    posted = patient_http.post(
         f"{server}/v1/motions",
         params={"file_name": "visit.csv"},
         content=csv_text(working()),

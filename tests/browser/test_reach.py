@@ -2,13 +2,13 @@
 
 from collections.abc import Callable, Iterator
 
-import httpx
 import numpy as np
 import pytest
 import viser
 from playwright.sync_api import Page, expect
 
 from app.sim.cells import load_cell
+from tests import patient_http
 from tests.browser.camera import Camera
 from tests.browser.test_drag import VIEWER, on_canvas, state, tell, until
 from web import workplace
@@ -26,10 +26,10 @@ GRIP_M = 0.15
 def reaching(server: str) -> Iterator[str]:
     """The server with the reach cell, one person, the clock running."""
     world = f"{server}/v1/worlds/main/cell"
-    shown = httpx.put(world, json={"cell": CELL.name}, timeout=300.0)
+    shown = patient_http.put(world, json={"cell": CELL.name})
     assert shown.status_code == 200, shown.text
     yield server
-    httpx.put(world, json={"cell": load_cell().name}, timeout=300.0).raise_for_status()
+    patient_http.put(world, json={"cell": load_cell().name}).raise_for_status()
 
 
 def camera_of(port: int) -> Camera:

@@ -2,11 +2,11 @@
 
 from collections.abc import Callable, Iterator
 
-import httpx
 import pytest
 from playwright.sync_api import Page, expect
 
 from app.sim.cells import load_cell
+from tests import patient_http
 from tests.browser.test_drag import state, tell
 
 pytestmark = pytest.mark.browser
@@ -25,7 +25,7 @@ STEP_MS = 150_000
 
 
 def show(server: str, cell: str) -> None:
-    answer = httpx.put(f"{server}/v1/worlds/main/cell", json={"cell": cell}, timeout=120.0)
+    answer = patient_http.put(f"{server}/v1/worlds/main/cell", json={"cell": cell})
     assert answer.status_code == 200, answer.text
 
 

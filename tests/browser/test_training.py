@@ -2,9 +2,10 @@
 
 from collections.abc import Callable
 
-import httpx
 import pytest
 from playwright.sync_api import Page, expect
+
+from tests import patient_http
 
 pytestmark = pytest.mark.browser
 
@@ -43,11 +44,11 @@ def test_posted_job_appears_and_its_curve_grows(
         arg=seen,
         timeout=GROWTH_MS,
     )
-    stored = httpx.get(f"{server}/v1/jobs/{job_id}/metrics").json()["items"]
+    stored = patient_http.get(f"{server}/v1/jobs/{job_id}/metrics").json()["items"]
     steps = [row["step"] for row in stored]
     assert steps == sorted(set(steps))
     assert len(steps) >= seen + 2
-    job = httpx.get(f"{server}/v1/jobs/{job_id}").json()
+    job = patient_http.get(f"{server}/v1/jobs/{job_id}").json()
     assert (job["seed"], job["overrides"]) == (7, FINE)
     cancel(page)
     assert page.problems == []  # type: ignore[attr-defined]
@@ -74,7 +75,7 @@ def test_bad_input_is_explained_at_its_field(open_page: Callable[..., Page]) -> 
 def test_override_out_of_range_is_explained_at_its_field(
     open_page: Callable[..., Page], server: str
 ) -> None:
-    preset = httpx.get(f"{server}/v1/presets").json()["items"][0]
+    preset = patient_http.get(f"{server}/v1/presets").json()["items"][0]
     field = next(f for f in preset["fields"] if f["maximum"] is not None)
     page = open_page(scene=False)
     open_form(page)
@@ -82,5 +83,5 @@ def test_override_out_of_range_is_explained_at_its_field(
     page.fill(f"#train-{field['name']}", str(int(field["maximum"]) + 1000))
     page.click("form.train button[type=submit]")
     expect(page.locator(f"#train-{field['name']}-error")).not_to_be_empty()
-    jobs = httpx.get(f"{server}/v1/jobs").json()["items"]
+    jobs = patient_http.get(f"{server}/v1/jobs").json()["items"]
     assert all(field["name"] not in job["overrides"] for job in jobs)
