@@ -22,7 +22,8 @@ from docs.world_plots import BLUE, GREEN, GREY, ORANGE, RED, panels, save  # noq
 RESULT = ROOT / "docs/results/reach-ssm.json"
 IMAGES = ROOT / "docs/img/reach"
 ROWS = {
-    "policy": ("policy", BLUE, "-"),
+    "policy-ahead": ("policy, looking ahead", BLUE, "-"),
+    "policy": ("policy alone", BLUE, ":"),
     "rrt-star-once": ("RRT*, planned once", ORANGE, "-"),
     "rrt-connect": ("RRT-Connect, again where blocked", RED, "-"),
     "aorrtc": ("AORRTC, again where blocked", RED, ":"),
@@ -31,7 +32,7 @@ ROWS = {
     "hindsight": ("best replay in hindsight", GREY, ":"),
 }
 """Words, colour and line of each row."""
-SHOWN = ("policy", "rrt-star-once")
+SHOWN = ("policy-ahead", "rrt-star-once")
 """Rows whose override is drawn."""
 Json = dict[str, Any]
 

@@ -7,6 +7,8 @@ distance of the source's comparison.
 
 ===================  ========================================================================
 ``policy``           the checkpoint, asked every 20 ms
+``policy-ahead``     the same, each decision played ahead (``lookahead.py``) for contacts with
+                     people, cell and itself; what is played knows nothing of the layer
 ``policy-unaware``   the shipped policy that knows of no safety layer, where the checkpoint was
                      trained under it
 ``rrt-star-once``    planned once among people as they stand at the start, as in the source
@@ -47,6 +49,7 @@ from app.policies.checkpoint import Checkpoint
 from app.policies.evaluation.reach_episodes import N_ENVS, random_goals
 from app.policies.evaluation.rows import OnRow, untold
 from app.policies.evaluation.statistics import mean_of, wilson
+from app.policies.lookahead import looks_ahead
 from app.policies.movers import Mover, mover_of
 from app.policies.reach_policy import ReachPolicy
 from app.policies.trained_cell import cell_of
@@ -66,6 +69,8 @@ from app.sim.safety import SafetySettings, safety_settings
 from app.sim.scene import arm_of
 
 Json = dict[str, Any]
+AHEAD = "policy-ahead"
+"""Row of the policy where it looks ahead."""
 CAP_S = 20.0
 """Longest run of a crossing [s]."""
 RANDOM_EPISODES = 10_000
@@ -382,7 +387,8 @@ class _Still:
 
 def example_of(courses: Mapping[str, Course], dt: float) -> Json:
     """Return how the override went in one crossing: that of the median saving of time."""
-    one, other = courses["policy"].runs, courses["rrt-star-once"].runs
+    one = courses[AHEAD if AHEAD in courses else "policy"].runs
+    other = courses["rrt-star-once"].runs
     both = np.flatnonzero(one.arrived & other.arrived)
     if len(both) == 0:
         return {}
@@ -400,8 +406,10 @@ def example_of(courses: Mapping[str, Course], dt: float) -> Json:
 
 
 def movers_of(checkpoint: Checkpoint, actor: ReachPolicy) -> dict[str, Mover]:
-    """Return who stands in for the policy, by row: see ``policy`` and ``policy-unaware``."""
+    """Return who stands in for the policy, by row; see the head of this file."""
     movers = {"policy": mover_of(actor, "direct")}
+    if looks_ahead(actor):
+        movers[AHEAD] = mover_of(actor, "direct-ahead")
     if checkpoint.manifest["preset"].get("safety") == "ssm":
         other = ReachPolicy(pretrained.load("reach"))
         if (other.action, other.view) == (actor.action, actor.view):
@@ -489,9 +497,8 @@ def run_ssm(
         comparison = Comparison(cell, crossed, settings, safety, seed)
         courses = compare(comparison, moved, rows, suffix)
         result["paired"] |= {
-            f"policy against {name}{suffix}": against(
-                courses["policy"].runs, courses[name].runs
-            )
+            f"{mine} against {name}{suffix}": against(courses[mine].runs, courses[name].runs)
+            for mine in moved
             for name in PLANNERS
         }
         if not suffix:

@@ -101,11 +101,14 @@ def test_the_protocol_runs_policy_planners_recordings_and_random_episodes(monkey
         on_row=lambda *row: told.append(row),
     )
     names = [row["name"] for row in result["results"]]
-    assert names[:3] == ["policy", "rrt-star-once", "every-tick"]
+    assert names[:4] == ["policy", "policy-ahead", "rrt-star-once", "every-tick"]
     assert "policy recorded" in names and names[-2:] == ["random", "random-still"]
     assert [total for _, total, _ in told] == [len(names)] * len(names)
     assert all(
         row["contacts_moving"] == 0 for row in result["results"] if "bare" not in row["name"]
     )
     assert result["settings"]["crossings"] == 2
-    assert "policy against every-tick recorded" in result["paired"]
+    assert {f"{mine} against every-tick recorded" for mine in names[:2]} <= set(
+        result["paired"]
+    )
+    assert len(result["seconds"]["policy-ahead"]) == 2
