@@ -1,6 +1,7 @@
-"""The protocols of the reach scenario, mostly run with policies that have learned nothing."""
+"""The protocols of the reach scenario, run with the shipped policy."""
 
 import json
+from functools import cache
 
 import numpy as np
 import pytest
@@ -14,9 +15,11 @@ from app.policies.evaluation.reach_random import RINGS
 from app.policies.evaluation.reach_targets import STARTS
 from app.policies.evaluation.reach_tracker import LOOKED_AHEAD, ROWS
 from app.sim.cells import load_cell
-from tests.policies.untrained import untrained_reach
+from tests.policies.untrained import shipped_as, untrained_reach
 
 N = 24
+EPISODES = {"reach-targets": 2}
+"""Episodes of each target; of other protocols N."""
 MEASURED = sorted(name for name in OF_REACHING if name in {
     "reach-targets", "reach-random", "reach-constant", "reach-speeds", "reach-smoothness",
     "reach-people", "reach-tracker",
@@ -29,18 +32,23 @@ def few_rows(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(reach_episodes, "N_RECHECKED", 2)
 
 
-def run(name: str, episodes: int = N, **overrides: object) -> tuple[dict, list]:
+@cache
+def run(name: str) -> tuple[dict, list]:
+    """Return the result of a protocol and the rows it told of; each is run once."""
     told: list = []
-    policy = untrained_reach(width=16, **overrides)
     result = evaluate(
-        name, policy, episodes=episodes, seed=5, on_row=lambda *what: told.append(what)
+        name,
+        pretrained.load("reach"),
+        episodes=EPISODES.get(name, N),
+        seed=5,
+        on_row=lambda *what: told.append(what),
     )
     return result, told
 
 
 @pytest.mark.parametrize("name", MEASURED)
 def test_a_result_is_json_and_states_the_rules_of_each_row(name: str) -> None:
-    result, told = run(name, 1 if name == "reach-targets" else N)
+    result, told = run(name)
     rows = json.loads(json.dumps(result, allow_nan=False))["results"]
     assert [one for _, _, one in told] == result["results"]
     assert [(done, total) for done, total, _ in told] == [
@@ -53,13 +61,13 @@ def test_a_result_is_json_and_states_the_rules_of_each_row(name: str) -> None:
         assert {"cell", "people", "start", "collision_ends", "goals", "time_limit_s"} <= set(
             rules
         )
-        assert row["n"] == (54 if name == "reach-targets" else N)
+        assert row["n"] == (108 if name == "reach-targets" else N)
         assert all("mean" in one for one in row.values() if isinstance(one, dict))
-    assert result["checkpoint"] == untrained_reach(width=16).sha256
+    assert result["checkpoint"] == pretrained.load("reach").sha256
 
 
 def test_every_target_is_counted_under_each_rule_of_starting() -> None:
-    result, _ = run("reach-targets", 2)
+    result, _ = run("reach-targets")
     assert result["episodes"] == 2
     names = [row["name"] for row in result["results"]]
     assert names == [*STARTS, *(f"{start}-ahead" for start in STARTS)]
@@ -84,8 +92,8 @@ def test_every_target_is_counted_under_each_rule_of_starting() -> None:
 
 
 def test_random_goals_are_reached_by_every_way_the_policy_allows() -> None:
-    on_grid, _ = run("reach-random", goals="grid")
-    in_box, _ = run("reach-random", goals="box")
+    on_grid, _ = run("reach-random")
+    in_box = evaluate("reach-random", shipped_as(goals="box"), episodes=N, seed=5)
     names = [row["name"] for row in in_box["results"]]
     assert names[:4] == ["targets", "targets-ahead", "direct", "direct-25s"]
     assert names[4:] == ["direct-ahead", "direct-ahead-25s"]
@@ -102,7 +110,7 @@ def test_random_goals_are_reached_by_every_way_the_policy_allows() -> None:
 
 
 def test_zero_to_four_walkers_are_there_and_make_it_harder() -> None:
-    result = evaluate("reach-people", pretrained.load("reach"), episodes=24, seed=5)
+    result, _ = run("reach-people")
     people = [len(one["people"]) for one in result["settings"]["rows"].values()]
     assert sorted(set(people)) == [0, 1, 2, 3, 4]
     rows = {row["name"]: row for row in result["results"]}
@@ -131,7 +139,8 @@ def test_a_row_per_tracker_stands_beside_the_exact_state() -> None:
 
 
 def test_a_jerk_limited_policy_is_measured_as_such() -> None:
-    result, _ = run("reach-smoothness", action_degree=3)
+    policy = untrained_reach(width=16, action_degree=3)
+    result = evaluate("reach-smoothness", policy, episodes=N, seed=5)
     (row,) = result["results"]
     assert row["name"] == "degree-3"
     assert row["jerk_rad_s3"] <= row["jerk_limit_rad_s3"] + 1e-6

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from app.policies import pretrained
 from app.policies.evaluation import reach_ssm
 from app.policies.evaluation.protocols import evaluate
 from app.policies.evaluation.reach_ssm import (
@@ -22,7 +23,6 @@ from app.sim.planners import PlanSettings
 from app.sim.reach import ReachSettings
 from app.sim.safety import safety_settings
 from tests.policies.straight_mover import Straight
-from tests.policies.untrained import untrained_reach
 from tests.sim.recorded_motion import recorded
 
 CELL = load_cell("shared-workspace")
@@ -94,7 +94,7 @@ def test_the_protocol_runs_policy_planners_recordings_and_random_episodes(monkey
     told = []
     result = evaluate(
         "reach-ssm",
-        untrained_reach(width=16),
+        pretrained.load("reach"),
         episodes=2,
         seed=3,
         motions=[recorded(4.0, walk=2.4, turn=0.0)],
