@@ -178,8 +178,12 @@ class GuardedReach(ReachBatch):
         )
 
     def _move(self, act: NDArray[np.float32]) -> None:
+        self._step(np.arange(self.n_envs), act, np.empty((0, 6)))
+
+    def _step(self, rows: Rows, act: NDArray[np.float32], pieces: Vec) -> None:
+        """Step some cells by actions, or by pieces where there are any."""
         self._call(
-            guarded_reach.step_batch,
+            guarded_reach.step_rows,
             self.world,
             self._rules,
             self._action,
@@ -187,7 +191,9 @@ class GuardedReach(ReachBatch):
             self.state,
             self._guard,
             self._work,
+            rows,
             act,
+            pieces,
             self._rew,
             self._ended,
         )
@@ -202,14 +208,12 @@ class GuardedReach(ReachBatch):
         require_shape("wanted", wanted, (6,))
         require_finite("wanted", wanted)
         arm, state = self.arm, self.state
-        c, q, qd = np.empty(6), np.empty(6), np.empty(6)
+        pieces, q, qd = np.empty((1, 6)), np.empty(6), np.empty(6)
         polynomial.advance(
             own(state.q[row]), own(state.qd[row]), own(wanted),
-            arm.q_min, arm.q_max, arm.qd_max, arm.qdd_max, arm.dt, c, q, qd,
+            arm.q_min, arm.q_max, arm.qd_max, arm.qdd_max, arm.dt, pieces[0], q, qd,
         )  # fmt: skip
-        guarded_reach.step_piece(
-            self.world, self._rules, self._weights, state, row, self._guard, self._work, c
-        )
+        self._step(np.array([row]), np.empty((0, 6), dtype=np.float32), pieces)
 
     def people_shapes(self, row: int) -> Shapes:
         """Return where one cell's people are now, as planners see them."""

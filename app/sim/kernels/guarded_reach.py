@@ -100,7 +100,7 @@ class Guard(NamedTuple):
     """The same of each row's last episode that ended, shape (n_envs, N_ACCOUNT)."""
 
 
-@kernel()
+@kernel(inline="always")
 def put_on_track(state: ReachState, e: int, guard: Guard, dt: float) -> None:
     """Write the walker of environment ``e`` as its track has it now, and its velocity.
 
@@ -122,7 +122,7 @@ def put_on_track(state: ReachState, e: int, guard: Guard, dt: float) -> None:
         state.people.cylinders[e, 0, i] = now[i]
 
 
-@kernel()
+@kernel(inline="always")
 def begin_episode(
     world: ReachWorld, state: ReachState, e: int, guard: Guard, work: Work
 ) -> None:
@@ -139,7 +139,7 @@ def begin_episode(
     state.time_left[e] = min(guard.horizon, state.time_left[e])
 
 
-@kernel(error_model="numpy")
+@kernel(inline="always")
 def _people_before(world: ReachWorld, state: ReachState, e: int, trial: TrialWork) -> None:
     """Keep where people are when a period begins."""
     copy_rows(state.people.columns[e], trial.columns0)
@@ -150,7 +150,7 @@ def _people_before(world: ReachWorld, state: ReachState, e: int, trial: TrialWor
         trial.cylinders[k, 3] = trial.cylinders1[k, 3] = world.people.top_z
 
 
-@kernel(error_model="numpy")
+@kernel(inline="always")
 def _people_after(
     world: ReachWorld, state: ReachState, e: int, guard: Guard, work: Work
 ) -> None:
@@ -169,7 +169,7 @@ def _people_after(
             trial.cylinders1[k, i] = state.people.cylinders[e, k, i]
 
 
-@kernel(error_model="numpy")
+@kernel(inline="always")
 def _execute(world: ReachWorld, state: ReachState, e: int, guard: Guard, work: Work) -> None:
     """Ask the safety layer about the piece in ``work``; what is executed is in its watch."""
     trial, account = guard.trial, guard.account[e]
@@ -193,7 +193,7 @@ def _execute(world: ReachWorld, state: ReachState, e: int, guard: Guard, work: W
     account[SLOWED] += 1.0 if override < 1.0 else 0.0
 
 
-@kernel(error_model="numpy")
+@kernel(inline="always")
 def _touch(world: ReachWorld, guard: Guard, e: int) -> bool:
     """Note whether people touch the robot, and how fast the link is; tell if it ends here."""
     arm, trial, account = world.arm, guard.trial, guard.account[e]
@@ -209,7 +209,7 @@ def _touch(world: ReachWorld, guard: Guard, e: int) -> bool:
     return guard.rest_ends or speed > MOVING
 
 
-@kernel(error_model="numpy")
+@kernel(inline="always")
 def _arrive(world: ReachWorld, state: ReachState, e: int, guard: Guard, work: Work) -> float:
     """Put the robot where the period ends and measure; return the distance to the goal [m]."""
     arm, watch, account = world.arm, guard.trial.watch, guard.account[e]
@@ -231,7 +231,7 @@ def _arrive(world: ReachWorld, state: ReachState, e: int, guard: Guard, work: Wo
     return float(tcp_distance(state.goal[e], work.robot))
 
 
-@kernel(error_model="numpy")
+@kernel(inline="always")
 def guarded_period(
     world: ReachWorld, rules: ReachRules, weights: ReachWeights, state: ReachState, e: int,
     guard: Guard, work: Work,
@@ -273,7 +273,7 @@ def guarded_period(
     return reward(before, d, work.c, touched, state.outcome[e] == SUCCESS, weights) - stopped
 
 
-@kernel(error_model="numpy")
+@kernel(inline="always")
 def command(
     world: ReachWorld, action: ActionRule, state: ReachState, e: int, act: NDArray[np.float32],
     work: Work,
@@ -296,8 +296,17 @@ def begin_rows(
         begin_episode(world, state, e, guard, work)
 
 
+@kernel(inline="always")
+def take_piece(state: ReachState, e: int, c: Vec, dt: float, work: Work) -> None:
+    """Write a given piece of degree 2, by its second coefficients, into the work space."""
+    for j in range(6):
+        work.c[j], work.d[j], work.qdd[j] = c[j], 0.0, 2.0 * c[j]
+        work.q[j] = state.q[e, j] + dt * (state.qd[e, j] + dt * c[j])
+        work.qd[j] = state.qd[e, j] + 2.0 * dt * c[j]
+
+
 @kernel(nogil=True, error_model="numpy")
-def step_batch(
+def step_rows(
     world: ReachWorld,
     rules: ReachRules,
     action: ActionRule,
@@ -305,54 +314,42 @@ def step_batch(
     state: ReachState,
     guard: Guard,
     work: Work,
+    rows: Indices,
     act: NDArray[np.float32],
+    pieces: Vec,
     rew: NDArray[np.float32],
     ended: NDArray[np.int64],
 ) -> None:
-    """Step all environments under the safety layer; arguments as ``reach.step_batch``."""
-    for e in range(state.q.shape[0]):
-        ended[e], rew[e] = RUNNING, 0.0
-        if state.outcome[e] != RUNNING:
-            continue
-        command(world, action, state, e, act[e], work)
-        rew[e] = guarded_period(world, rules, weights, state, e, guard, work)
-        ended[e] = state.outcome[e]
-        if ended[e] != RUNNING:
-            for k in range(N_ACCOUNT):
-                guard.closed[e, k] = guard.account[e, k]
+    """Step some environments under the safety layer, by actions or given pieces.
 
-
-@kernel(nogil=True, error_model="numpy")
-def step_piece(
-    world: ReachWorld,
-    rules: ReachRules,
-    weights: ReachWeights,
-    state: ReachState,
-    e: int,
-    guard: Guard,
-    work: Work,
-    c: Vec,
-) -> None:
-    """Run one period of environment ``e`` with a commanded piece of degree 2.
+    Both in one kernel: the period would be compiled twice in two.
 
     Args:
         world: Shared data.
         rules: Time limit and ends.
+        action: How actions are read.
         weights: Reward coefficients.
         state: Rows; changed.
-        e: Environment.
         guard: Safety layer, tracks and accounts.
         work: Work space.
-        c: Second coefficients [rad/s^2], shape (6,).
+        rows: Which environments, shape (k,).
+        act: Actions of all environments, shape (n_envs, 6).
+        pieces: In place of actions the second coefficients of pieces of degree 2 [rad/s^2],
+            shape (k, 6); none for actions.
+        rew: Filled for those environments, shape (n_envs,).
+        ended: Filled with how their episodes ended, or RUNNING, shape (n_envs,).
     """
-    if state.outcome[e] != RUNNING:
-        return
-    dt = world.arm.dt
-    for j in range(6):
-        work.c[j], work.d[j], work.qdd[j] = c[j], 0.0, 2.0 * c[j]
-        work.q[j] = state.q[e, j] + dt * (state.qd[e, j] + dt * c[j])
-        work.qd[j] = state.qd[e, j] + 2.0 * dt * c[j]
-    guarded_period(world, rules, weights, state, e, guard, work)
-    if state.outcome[e] != RUNNING:
-        for k in range(N_ACCOUNT):
-            guard.closed[e, k] = guard.account[e, k]
+    for k in range(rows.shape[0]):
+        e = rows[k]
+        ended[e], rew[e] = RUNNING, 0.0
+        if state.outcome[e] != RUNNING:
+            continue
+        if pieces.shape[0] > 0:
+            take_piece(state, e, pieces[k], world.arm.dt, work)
+        else:
+            command(world, action, state, e, act[e], work)
+        rew[e] = guarded_period(world, rules, weights, state, e, guard, work)
+        ended[e] = state.outcome[e]
+        if ended[e] != RUNNING:
+            for i in range(N_ACCOUNT):
+                guard.closed[e, i] = guard.account[e, i]
