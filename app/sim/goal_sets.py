@@ -13,6 +13,7 @@ the grid's own cells do, and points outside are moved to the nearest point of th
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -22,6 +23,7 @@ from scipy.spatial import Delaunay
 
 from app.errors import GoalOutside, InvalidInput
 from app.sim.cell_parts import GoalRegion
+from app.sim.kernels.compiled import direct
 from app.sim.kernels.goal_cells import N_BOX, N_SIMPLEX, box_weights, simplex_weights
 from app.sim.ports import OutsideField, Vec
 
@@ -170,6 +172,7 @@ class GridCells:
         self.targets = np.array(targets, dtype=np.float64)
         """The grid's points [m], shape (n_targets, 3)."""
         self._low, self._high = self.targets.min(axis=0), self.targets.max(axis=0)
+        self._weigh: Callable[..., None] | None = None
         self._x, self._y, self._z = (np.unique(self.targets[:, i]) for i in range(3))
         planes = np.meshgrid(self._x, self._y, self._z, indexing="ij")
         points = np.stack(planes, axis=-1).reshape(-1, 3)
@@ -182,7 +185,10 @@ class GridCells:
         inside = _inside(self._low, self._high, goals, field)
         which = np.empty((len(inside), N_BOX), dtype=np.int64)
         weights = np.empty((len(inside), N_BOX))
-        box_weights(self._x, self._y, self._z, inside, which, weights)
+        arguments = self._x, self._y, self._z, inside, which, weights
+        if self._weigh is None:
+            self._weigh = direct(box_weights, arguments)
+        self._weigh(*arguments)
         return GoalMix(which=which, weights=weights)
 
 
