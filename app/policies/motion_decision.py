@@ -21,6 +21,7 @@ from app.policies.movers import person_weights
 from app.sim import human
 from app.sim.cell_reach import LONGEST_REACH, SHOULDER
 from app.sim.cells import Cell, require_cell
+from app.sim.guarded_reach import HORIZON_S
 from app.sim.kernels import actions
 from app.sim.kernels.compiled import direct
 from app.sim.motion_ports import (
@@ -130,12 +131,12 @@ class MotionDecider:
         known = [people[i] for i in order]
         with self._busy:
             stage = self._stage(known)
-            stage.put(q, qd, known, question.time_left_s)
+            stage.put(q, qd, known, min(question.time_left_s, HORIZON_S))
             apart = stage.apart.tolist()
             if question.safety is None:
                 _require_apart(apart, order)
             act, targets, weights, seen = self._act(stage, question, goal, way)
-            began = self._improve(stage, goal, qdd, act) if looks else None
+            began = self._improve(stage, question, goal, qdd, act) if looks else None
             piece, unfeasible = self._piece(q, qd, qdd, act)
             safe, terms_of, terms = self._monitored(question, q, qd, piece, stage, order)
             state = np.concatenate((q, qd, goal))
@@ -202,7 +203,8 @@ class MotionDecider:
                 )
             ]
         q, qd, qdd, goal = parts
-        for name, value in (("time_left_s", question.time_left_s), ("age_s", question.age_s)):
+        for name in ("time_left_s", "elapsed_s", "age_s"):
+            value = getattr(question, name)
             if not 0.0 <= value <= LONGEST_S:
                 raise InvalidInput(name, value, f"must lie in [0, {LONGEST_S:g}] s")
         if question.beside not in BESIDES:
@@ -225,12 +227,15 @@ class MotionDecider:
             raise InvalidInput("ahead", True, rule, ("false",))
         return self._able if asked is None else asked
 
-    def _improve(self, stage: Stage, goal: Vec, qdd: Vec, act: Vec) -> str | None:
+    def _improve(
+        self, stage: Stage, question: MotionQuestion, goal: Vec, qdd: Vec, act: Vec
+    ) -> str | None:
         """Play an action ahead; change it where another way is better, and return its name."""
         if stage not in self._aheads:
             self._aheads[stage] = Lookahead(self.actor)
+        self._aheads[stage].forget()
         state = stage.state
-        state.goal[0], state.qdd[0] = goal, qdd
+        state.goal[0], state.qdd[0], state.elapsed[0] = goal, qdd, question.elapsed_s
         played = act[None].astype(np.float32)
         chosen = int(self._aheads[stage].improve(stage, played)[0])
         if chosen == PASSED:

@@ -50,7 +50,13 @@ class LiveReacher:
         return () if self.pilot is None else self.pilot.ways
 
     def act(
-        self, robot: LiveArm, walkers: Vec, goal: Vec, clear_m: float, time_left: float
+        self,
+        robot: LiveArm,
+        walkers: Vec,
+        goal: Vec,
+        clear_m: float,
+        time_left: float,
+        elapsed: float,
     ) -> Vec:
         """Return the action for the period to come, in [-1, 1], shape (6,).
 
@@ -60,11 +66,13 @@ class LiveReacher:
             goal: Where the tcp shall be [m], shape (3,).
             clear_m: Distance of robot and people [m].
             time_left: Time left to reach it [s].
+            elapsed: Time for which it has been sought [s].
         """
         if self.pilot is None:
             return straight(robot.arm, robot.q, robot.posture_at(goal)[0])
         started = time.perf_counter()
         batch = self._filled(self.pilot, robot, walkers, clear_m, time_left)
+        batch.state.elapsed[0] = elapsed
         batch.state.goal[0] = goal
         act = np.asarray(self.pilot.acts(batch, self.way)[0], dtype=np.float64)
         self.elapsed_ms = 1e3 * (time.perf_counter() - started)
@@ -91,7 +99,6 @@ class LiveReacher:
         state.people.walkers.rows[0] = walkers
         state.people.cylinders[0] = walkers[:, [X, Y, R]]
         state.clear[0, 0], state.time_left[0] = clear_m, left
-        state.elapsed[0] = TIME_LIMIT_S - left
         return self._batch
 
 

@@ -41,6 +41,9 @@ class MotionQuestion:
     """Whether the decision is played ahead; None does where the policy allows it."""
     time_left_s: float = 5.0
     """Time left to reach the goal, which policies see [s]."""
+    elapsed_s: float = 0.0
+    """Time for which the goal has been sought: from 1 s on other ways are tried where the
+    policy's leads neither to it nor into a contact [s]."""
     safety: SafetySettings | None = None
     """What speed and separation monitoring assumes; None leaves it out."""
     age_s: float = 0.0

@@ -259,7 +259,9 @@ class ReachWorld:
         if stage.status == "moving":
             clear = robot.clearance_m if robot.clearance_m is not None else FAR
             left = min(stage.time_left, TIME_LIMIT_S)
-            act = self._reacher.act(robot, stage.people.rows, self._goal.position, clear, left)
+            act = self._reacher.act(
+                robot, stage.people.rows, self._goal.position, clear, left, stage.status_s
+            )
             wanted = robot.piece(act, straight=self._reacher.pilot is None)
         else:
             wanted = robot.piece(np.zeros(6), straight=True)

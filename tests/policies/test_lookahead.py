@@ -199,10 +199,11 @@ def test_looking_ahead_draws_the_same_again() -> None:
     np.testing.assert_array_equal(first, again)
 
 
-def test_a_way_into_the_table_is_changed() -> None:
-    """A policy that only lowers the arm, with nobody near."""
-    batch = batch_of(1, "constant")
-    batch.state.people.walkers.rows[0, 0, [X, Y]] = -2.0, 2.0
+@pytest.mark.parametrize("people", [("constant",), ()])
+def test_a_way_into_the_table_is_changed(people: tuple[str, ...]) -> None:
+    """A policy that only lowers the arm, with nobody near, or nobody at all."""
+    batch = batch_of(1, *people)
+    batch.state.people.walkers.rows[0, :, [X, Y]] = [[-2.0], [2.0]]
     n_obs, lowers = POLICY.n_obs, np.zeros(6, dtype=np.float32)
     lowers[1] = 3.0
     layers = [np.zeros(shape, dtype=np.float32) for shape in ((n_obs, 4), 4, (4, 4), 4, (4, 6))]

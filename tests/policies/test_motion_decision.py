@@ -15,7 +15,17 @@ from app.sim import human
 from app.sim.actions import ActionSettings
 from app.sim.cells import load_cell
 from app.sim.goal_sets import halton_targets
-from app.sim.kernels.occupancy import GROWTH, VX, VY, R, X, Y
+from app.sim.kernels.occupancy import (
+    GROWTH,
+    N_PAST,
+    PAST_RADIUS,
+    PAST_SPEED,
+    VX,
+    VY,
+    R,
+    X,
+    Y,
+)
 from app.sim.motion_ports import MotionDecision, MotionQuestion
 from app.sim.ports import Person
 from app.sim.reach import ReachBatch, ReachSettings
@@ -65,6 +75,17 @@ def told(batch: ReachBatch, e: int) -> MotionQuestion:
         people=people,
         time_left_s=float(state.time_left[e]),
     )
+
+
+def remembered(batch: ReachBatch, e: int) -> MotionQuestion:
+    """The state of one cell with what is remembered of its walkers."""
+    asked, rows = told(batch, e), batch.state.people.walkers.rows[e]
+    past = [
+        np.stack([row[k : k + N_PAST] for k in (PAST_RADIUS, PAST_SPEED)], axis=1)[1:]
+        for row in rows
+    ]
+    people = [replace(one, past=of) for one, of in zip(asked.people, past, strict=True)]
+    return replace(asked, people=people)
 
 
 @pytest.mark.parametrize("way", ["interpolated", "direct"])
@@ -232,6 +253,8 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"goal": np.array([0.0, 11.0, 0.3])}, r"goal\[1\]"),
     ({"time_left_s": -1.0}, "time_left_s"),
     ({"time_left_s": float("nan")}, "time_left_s"),
+    ({"elapsed_s": 61.0}, "elapsed_s"),
+    ({"elapsed_s": float("nan")}, "elapsed_s"),
     ({"age_s": float("inf")}, "age_s"),
     ({"way": "around"}, "choices: interpolated, direct"),
     ({"beside": "farthest"}, "choices: nearest, averaged"),
@@ -271,6 +294,38 @@ def test_looking_ahead_answers_whatever_is_told() -> None:
         assert decision.ahead and keeps_limits(decision, asked)
         began += decision.began is not None
     assert 0 < began < 100
+
+
+def test_an_answer_does_not_hang_on_what_was_asked_before() -> None:
+    batch, actor = driven(12, ("walker",)), ReachPolicy(pretrained.load("reach"))
+    rng = np.random.default_rng(6)
+    questions = [random_question(rng) for _ in range(40)]
+    questions += [
+        remembered(batch, e) for e in np.flatnonzero(batch.state.outcome == 0).tolist()
+    ]
+    one = MotionDecider(actor, CELL)
+    for k, asked in enumerate(questions):
+        late = replace(asked, elapsed_s=0.7 * (k % 3))
+        first = MotionDecider(actor, CELL).decide(late)
+        assert np.array_equal(one.decide(late).act, first.act)
+
+
+def test_who_has_sought_the_goal_for_long_tries_other_ways() -> None:
+    rng = np.random.default_rng(6)
+    one = MotionDecider(ReachPolicy(pretrained.load("reach")), CELL)
+    tried = 0
+    for _ in range(60):
+        asked = random_question(rng)
+        if one.decide(asked).began is None:
+            tried += one.decide(replace(asked, elapsed_s=2.0)).began is not None
+    assert tried > 0
+
+
+def test_the_policy_is_told_of_no_more_time_than_it_met() -> None:
+    one = MotionDecider(ReachPolicy(pretrained.load("reach")), CELL)
+    acts = [one.decide(question(time_left_s=left)).act for left in (2.0, 5.0, 25.0)]
+    assert np.array_equal(acts[1], acts[2])
+    assert not np.array_equal(acts[0], acts[1])
 
 
 def test_a_policy_of_another_cell_is_refused() -> None:

@@ -1,12 +1,13 @@
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from app.policies.movers import mover_of
 from app.policies.reach_pilot import ReachPilot
 from app.policies.reach_policy import ReachPolicy
 from app.sim import commands
 from app.sim.cells import load_cell
-from app.sim.live_reacher import LiveReacher
+from app.sim.live_reacher import TIME_LIMIT_S, LiveReacher
 from app.sim.reach import ReachBatch, ReachSettings
 from app.sim.reach_commands import SetPilot, SetWay
 from app.sim.reach_world import ReachWorld
@@ -43,8 +44,36 @@ def test_live_state_is_seen_as_the_batch_sees_it(policy: ReachPolicy) -> None:
             state.goal[0],
             float(state.clear[0, 0]),
             float(state.time_left[0]),
+            float(state.elapsed[0]),
         )
         assert np.allclose(act, mover_of(policy, way).acts(batch)[0], atol=1e-6)
+
+
+class Noting(ReachPilot):
+    """Notes what it is told about time."""
+
+    def __init__(self, actor: ReachPolicy) -> None:
+        super().__init__(actor)
+        self.told: list[tuple[float, float]] = []
+
+    def acts(self, batch: ReachBatch, way: str) -> NDArray[np.float32]:
+        self.told.append((float(batch.state.elapsed[0]), float(batch.state.time_left[0])))
+        return super().acts(batch, way)
+
+
+def test_under_the_layer_the_policy_has_its_usual_time_and_looking_ahead_the_true_one(
+    policy: ReachPolicy,
+) -> None:
+    pilot = Noting(policy)
+    world = ReachWorld(CELL, pilot, seed=1)
+    world.apply(SetWay(way="direct"))
+    pilot.told.clear()
+    while world.snapshot().status == "moving" and len(pilot.told) < 90:
+        world.step()
+    elapsed, left = np.array(pilot.told).T
+    assert len(elapsed) > 60
+    np.testing.assert_allclose(np.diff(elapsed), CELL.robot.dt, atol=1e-9)
+    assert (left == TIME_LIMIT_S).all()
 
 
 def test_policy_moves_the_robot_of_a_live_cell_with_any_number_of_people(

@@ -92,7 +92,13 @@ class MotionRequest(Body):
         "policy allows it",
     )
     time_left_s: Annotated[float, Field(ge=0.0, le=60.0)] = Field(
-        5.0, description="time left to reach the goal, which the policy sees [s]"
+        5.0,
+        description="time left to reach the goal, of which the policy sees at most 5 [s]",
+    )
+    elapsed_s: Annotated[float, Field(ge=0.0, le=60.0)] = Field(
+        0.0,
+        description="time for which this goal has been sought [s]: from 1 on, other ways are "
+        "tried, too, where the policy's leads neither to the goal nor into a contact",
     )
     safety: SafetyInput | None = Field(
         SafetyInput(),
@@ -129,6 +135,7 @@ class MotionRequest(Body):
             beside=self.beside,
             ahead=self.ahead,
             time_left_s=self.time_left_s,
+            elapsed_s=self.elapsed_s,
             safety=None if self.safety is None else self.safety.to_domain(own),
             age_s=self.age_s + age_s,
         )

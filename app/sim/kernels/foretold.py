@@ -79,6 +79,8 @@ def foretell(
 ) -> int:
     """Fill ``foretold.places`` with the people of environment ``e``; return how many they are.
 
+    Where nobody is there it is one, NOBODY, whom the policy sees too.
+
     Args:
         world: Shared data.
         state: Rows.
@@ -94,8 +96,10 @@ def foretell(
     if state.elapsed[e] == 0.0:
         foretold.course[e] = 0.0
     n, n_workers = int(work.ways.number[0]), state.people.q.shape[1]
+    anybody = n_workers + state.people.walkers.rows.shape[1] > 0
     for p in range(n):
-        show_person(state.people, e, p, work.crowd, person)
+        who = p if anybody else -1
+        show_person(state.people, e, who, work.crowd, person)
         places[0, p, 0], places[0, p, 1], places[0, p, 2] = person[0], person[1], person[4]
         for i in range(N_TIMES):
             for m in range(3):
@@ -104,7 +108,7 @@ def foretell(
             for m in range(2):
                 places[i, p, m] = 2.0 * places[i - 1, p, m] - places[i - 2, p, m]
             places[i, p, 2] = places[i - 1, p, 2]
-        if p >= n_workers:
+        if who >= n_workers:
             row = state.people.walkers.rows[e, p - n_workers]
             rule = world.people.walkers.rows[p - n_workers]
             _tell_radius(row, rule, since, p, foretold.found[e, p, 0], foretold)

@@ -563,8 +563,6 @@ def look_ahead_batch(
             look.plan[e, 0] = PASSED
             look.drawn[e], look.nearest[e, 0] = 0, 0.0
         n = foretell(world, state, e, work, look.foretold)
-        if n == 0:
-            continue
         copy_values(act[e], look.begun)
         chosen[e] = _look_ahead(world, rule, state, e, n, work, look)
         if chosen[e] != PASSED:

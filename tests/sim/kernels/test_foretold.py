@@ -10,6 +10,7 @@ from app.sim.kernels.foretold import N_MOMENTS, foretell, new_foretold
 from app.sim.kernels.occupancy import (
     COURSE_X,
     LEFT,
+    N_STATE,
     R_MAX,
     R_MIN,
     VX,
@@ -24,16 +25,18 @@ from app.sim.kernels.occupancy import (
     remember_as_now,
 )
 from app.sim.kernels.reach import new_work
+from app.sim.kernels.reach_features import NOBODY
 from app.sim.ports import Vec
 from app.sim.reach import ReachBatch, ReachSettings
+from app.sim.scene import HumanKind
 
 N_ENVS, AHEAD = 200, 13
 """Cells, and steps after which what was foretold is held against what happened: 0.52 s."""
 HELD = np.zeros((N_ENVS, 6), dtype=np.float32)
 
 
-def batch_of(seed: int) -> ReachBatch:
-    settings = ReachSettings(people=("walker",), observation="forecast", time_limit_s=60.0)
+def batch_of(seed: int, people: tuple[HumanKind, ...] = ("walker",)) -> ReachBatch:
+    settings = ReachSettings(people=people, observation="forecast", time_limit_s=60.0)
     batch = ReachBatch(load_cell("shared-workspace"), N_ENVS, seed, settings)
     batch.reset()
     return batch
@@ -54,10 +57,16 @@ def watched(batch: ReachBatch, periods: int) -> tuple[Vec, Vec]:
             assert foretell(batch.world, batch.state, e, work, foretold) == 1
             now[e] = foretold.places[:, 0]
         told.append(now)
-        rows.append(batch.state.people.walkers.rows[:, 0].copy())
+        rows.append(batch.state.people.walkers.rows[:, :1].copy())
         batch.state.outcome[:] = 0  # people go on, whatever becomes of the robot
         batch.step(HELD, auto_reset=False)
-    return np.array(told), np.array(rows)
+    return np.array(told), np.array(rows).reshape(periods, -1, N_STATE)
+
+
+def test_nobody_stands_where_policies_see_nobody() -> None:
+    batch = batch_of(4, people=())
+    told, _ = watched(batch, 2)
+    assert (told == (NOBODY[0], NOBODY[1], NOBODY[4])).all()
 
 
 def test_who_only_pauses_is_foretold_to_go_on() -> None:
