@@ -29,7 +29,7 @@ def points(page: Page) -> int:
 def test_posted_job_appears_and_its_curve_grows(
     open_page: Callable[..., Page], server: str
 ) -> None:
-    page = open_page()
+    page = open_page(scene=False)
     open_form(page)
     page.fill("#train-seed", "7")
     page.click("form.train summary")
