@@ -31,6 +31,9 @@ class Shapes:
     """Their capsules, shape (9, m); see ``kernels/columns.py``."""
     cylinders: Vec
     """Upright cylinders on the floor: x, y, radius, top [m], shape (n, 4)."""
+    going: Vec | None = None
+    """How the cylinders go on: vx, vy and growth of the radius [m/s], shape (n, 3); None where
+    that is not known."""
 
 
 def no_people() -> Shapes:

@@ -32,6 +32,7 @@ from app.sim.kernels.guarded_reach import (
     TOOL_WAY,
     Guard,
 )
+from app.sim.kernels.occupancy import GROWTH, VX, VY
 from app.sim.kernels.people import new_crowd
 from app.sim.kernels.safety_trial import MOVING
 from app.sim.kernels.trial_people import new_trial_work
@@ -117,10 +118,11 @@ class GuardedReach(ReachBatch):
         people = self.world.people
         shape = (people.columns.shape[1], len(self.cell.cylinders))
         self._guard = Guard(
-            safety=rule_of(safety, *shape),
+            safety=rule_of(safety, *shape, safety.measured),
             guarded=guarded,
             rest_ends=rest_ends,
             horizon=horizon_s,
+            measured=safety.measured,
             tracks=np.zeros((0, 1, 3)) if tracks is None else own(tracks),
             period=np.zeros(n_envs, dtype=np.int64),
             trial=new_trial_work(
@@ -220,7 +222,9 @@ class GuardedReach(ReachBatch):
         walkers = self.state.people.cylinders[row]
         top = np.full((len(walkers), 1), self.world.people.top_z)
         return Shapes(
-            columns=own(self.state.people.columns[row]), cylinders=np.hstack([walkers, top])
+            columns=own(self.state.people.columns[row]),
+            cylinders=np.hstack([walkers, top]),
+            going=self.state.people.walkers.rows[row][:, [VX, VY, GROWTH]],
         )
 
     def runs(self) -> GuardedRuns:

@@ -90,7 +90,9 @@ class Stage:
         crowd = self._work.crowd
         tops = np.full((len(crowd.cylinders), 1), self.top_z)
         return Shapes(
-            columns=crowd.columns, cylinders=np.concatenate([crowd.cylinders, tops], axis=1)
+            columns=crowd.columns,
+            cylinders=np.concatenate([crowd.cylinders, tops], axis=1),
+            going=self.state.people.walkers.rows[0][:, [VX, VY, GROWTH]],
         )
 
     def put(self, q: Vec, qd: Vec, people: Sequence[Person], time_left_s: float) -> None:

@@ -25,13 +25,15 @@ from app.sim.kernels import body, override, ssm
 from app.sim.kernels import watch as watch_kernel
 from app.sim.kernels.arm import Arm
 from app.sim.kernels.columns import distances, least
-from app.sim.kernels.cylinder import cylinder_clearance
+from app.sim.kernels.cylinder import cylinder_clearance, swept_clearance
 from app.sim.ports import Vec
 from app.sim.robot import LINK_NAMES
 from app.sim.scene import own, require_finite
 
 UNITS = {
     "human_speed": "m/s",
+    "measured": "",
+    "speed_change": "m/s",
     "reaction_time": "s",
     "tracker_delay": "s",
     "intrusion_distance": "m",
@@ -55,6 +57,10 @@ class SafetySettings:
 
     human_speed: float = 1.6
     """Greatest speed of any point of a person, v_h [m/s]."""
+    measured: bool = False
+    """Whether a cylinder whose velocity is known is taken to go on at it, instead of at v_h."""
+    speed_change: float = 0.2
+    """How much faster such a person may be than was seen, in any direction [m/s]."""
     reaction_time: float = 0.1
     """From a decision to its effect [s]; a part of T_r."""
     tracker_delay: float = 0.0
@@ -256,10 +262,22 @@ def contact_speeds(settings: SafetySettings, n_columns: int, n_cylinders: int) -
     return out
 
 
-def rule_of(settings: SafetySettings, n_columns: int, n_cylinders: int) -> watch_kernel.Safety:
-    """Return the settings as the kernels read them; see :func:`contact_speeds`."""
+def rule_of(
+    settings: SafetySettings, n_columns: int, n_cylinders: int, known: bool
+) -> watch_kernel.Safety:
+    """Return the settings as the kernels read them.
+
+    Args:
+        settings: Assumptions.
+        n_columns: Capsules; see :func:`contact_speeds`.
+        n_cylinders: Cylinders.
+        known: Whether the kernels are told how cylinders go on.
+    """
+    speed = np.full(n_columns + n_cylinders, settings.human_speed)
+    if known:
+        speed[n_columns:] = settings.speed_change
     return watch_kernel.Safety(
-        human_speed=settings.human_speed,
+        speed=speed,
         lead=settings.lead,
         margin=settings.margin,
         contact_speed=contact_speeds(settings, n_columns, n_cylinders),
@@ -277,6 +295,7 @@ class SafetyLayer:
     def __init__(self, arm: Arm, settings: SafetySettings) -> None:
         self.arm, self.settings = arm, settings
         self._shape = (-1, -1)
+        self._known = False
 
     def decide(
         self, q: Vec, qd: Vec, c: Vec, d: Vec, people: Shapes, age: float = 0.0
@@ -301,20 +320,27 @@ class SafetyLayer:
         if age < 0.0:
             raise InvalidInput("age", age, "must not be negative")
         q, qd = own(q), own(qd)
-        self._make_room(people)
+        self._take_in(people)
         chosen = ssm.decide(
             self.arm, self._rule, age, own(people.columns), own(people.cylinders), q, qd,
             own(c), own(d), self._watch,
         )  # fmt: skip
         return self._told(chosen, q, qd, people, age)
 
-    def _make_room(self, people: Shapes) -> None:
-        """Make work space for so many capsules and cylinders."""
+    def _take_in(self, people: Shapes) -> None:
+        """Make work space for so many people, and note how cylinders go on."""
         shape = (people.columns.shape[1], len(people.cylinders))
-        if shape != self._shape:
-            self._shape = shape
+        going = people.going if self.settings.measured else None
+        known = going is not None
+        if (shape, known) != (self._shape, self._known):
+            self._shape, self._known = shape, known
             self._watch = watch_kernel.new_watch(self.arm, *shape)
-            self._rule = rule_of(self.settings, *shape)
+            self._rule = rule_of(self.settings, *shape, known)
+        if going is not None:
+            require_finite("people", going)
+            self._watch.going[:] = going
+            fastest = np.hypot(going[:, 0], going[:, 1]) + np.abs(going[:, 2])
+            self._watch.going_speed[shape[0] :] = fastest
 
     def _told(
         self, chosen: float, q: Vec, qd: Vec, people: Shapes, age: float
@@ -381,15 +407,16 @@ class SafetyLayer:
     ) -> SeparationTerms:
         """Return S_p of the link nearest to a part of the people."""
         arm, settings = self.arm, self.settings
-        nearest = self._nearest_link(column, people)
+        separation, nearest = self._nearest(column, people)
         joints = slice(0, int(arm.link[nearest]))
         v_r = float(np.abs(qd[joints]) @ arm.lever[joints])
+        t_r = arm.dt + settings.lead + age
         return SeparationTerms(
             link=LINK_NAMES[arm.link[nearest]],
-            separation=float(self._watch.gap[watch_kernel.NOW, column]),
-            human_speed=settings.human_speed,
+            separation=separation,
+            human_speed=self._human_speed(column, people, separation, t_r + t_stop),
             robot_speed=v_r,
-            reaction_time=arm.dt + settings.lead + age,
+            reaction_time=t_r,
             stop_time=t_stop,
             braking=0.5 * v_r * t_stop,
             intrusion=settings.intrusion_distance,
@@ -398,11 +425,32 @@ class SafetyLayer:
             protective_distance=settings.protective_distance,
         )
 
-    def _nearest_link(self, column: int, people: Shapes) -> int:
-        """Return the robot's capsule that is nearest to a part of the people now."""
+    def _nearest(self, column: int, people: Shapes) -> tuple[float, int]:
+        """Return how near a part of the people is as seen [m], and which capsule to."""
         robot, out = self._watch.columns[watch_kernel.NOW], np.empty(self.arm.columns.shape[1])
         if column < people.columns.shape[1]:
             distances(own(people.columns), column, robot, out)
-            return int(least(out)[1])
+            return float(self._watch.gap[watch_kernel.NOW, column]), int(least(out)[1])
         x, y, r, top = people.cylinders[column - people.columns.shape[1]]
-        return int(cylinder_clearance(robot, 0, x, y, r, top)[1])
+        separation, nearest = cylinder_clearance(robot, 0, x, y, r, top)
+        return float(separation), int(nearest)
+
+    def _human_speed(
+        self, column: int, people: Shapes, separation: float, seconds: float
+    ) -> float:
+        """Return v_h of a part of the people: assumed, or toward the robot as seen [m/s].
+
+        Args:
+            column: The part.
+            people: As seen.
+            separation: Its distance to the robot [m].
+            seconds: Time in which it is looked at how much nearer it comes [s].
+        """
+        k = column - self._shape[0]
+        if k < 0 or not self._known or people.going is None:
+            return self.settings.human_speed
+        robot, (x, y, r, _) = self._watch.columns[watch_kernel.NOW], people.cylinders[k]
+        vx, vy, growth = people.going[k]
+        grown = r + max(0.0, growth) * seconds
+        there = swept_clearance(robot, x, y, vx * seconds, vy * seconds, grown)
+        return max(0.0, separation - float(there)) / seconds + self.settings.speed_change

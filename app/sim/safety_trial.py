@@ -156,8 +156,8 @@ def run_trial(
         n_steps=round(settings.seconds / arm.dt),
         guarded=settings.guarded,
     )
+    safety = rule_of(settings.safety, *shape, known=False)
     safety_trial.run_episodes(
-        arm, people, rule_of(settings.safety, *shape), trial, settings.action.rule(), seed,
-        first, work, rows,
-    )  # fmt: skip
+        arm, people, safety, trial, settings.action.rule(), seed, first, work, rows
+    )
     return TrialResult(rows=rows, dt=arm.dt)

@@ -165,6 +165,24 @@ def test_terms_add_up_to_the_distance_that_is_required(client: TestClient) -> No
     assert one["required"] == pytest.approx(way + one["protective_distance"])
 
 
+def test_who_is_seen_to_walk_past_does_not_hold_the_robot_where_velocities_are_measured(
+    client: TestClient,
+) -> None:
+    def told(vy: float, **safety: object) -> dict[str, Any]:
+        walker = {**WALKER, "x": 0.0, "y": 1.12, "vx": 0.0, "vy": vy}
+        answer = asked(client, people=[walker], safety=safety)
+        found: dict[str, Any] = answer["safety"]
+        return found
+
+    assumed, measured = told(0.0), told(0.0, measured=True)
+    assert assumed["override"] < measured["override"] == 1.0
+    assert assumed["terms"]["human_speed"] == 1.6
+    assert measured["terms"]["human_speed"] == pytest.approx(0.2)
+    toward = told(-1.0, measured=True, speed_change=0.1)
+    assert toward["terms"]["human_speed"] == pytest.approx(1.1, abs=0.05)
+    assert toward["override"] < 1.0
+
+
 def test_somebody_inside_the_robot_is_a_stop_with_monitoring_and_a_problem_without(
     client: TestClient,
 ) -> None:
@@ -259,6 +277,7 @@ BAD: list[tuple[dict[str, Any], int, str]] = [
     ({"elapsed_s": 61}, 422, "elapsed_s"),
     ({"age_s": 9}, 422, "age_s"),
     ({"safety": {"human_speed": -1}}, 422, "safety.human_speed"),
+    ({"safety": {"speed_change": -1}}, 422, "safety.speed_change"),
     ({"safety": {"human_sped": 1}}, 422, "safety.human_sped"),
     ({"safety": {"reaction_time": float("nan")}}, 422, "safety.reaction_time"),
     ({"people": [WALKER] * 5}, 422, "people"),

@@ -90,12 +90,13 @@ def test_a_period_that_is_stopped_costs_what_the_weights_say():
     assert n_stopped > 20
 
 
-def test_each_period_is_what_the_layer_decides():
+@pytest.mark.parametrize("safety", [SAFETY, replace(SAFETY, measured=True)])
+def test_each_period_is_what_the_layer_decides(safety):
     batch = GuardedReach(
-        CELL, 1, 0, replace(BOX, people=("walker",)), SAFETY, tracks=passing(1)
+        CELL, 1, 0, replace(BOX, people=("walker",)), safety, tracks=passing(1, y=0.8)
     )
     batch.reset()
-    layer, slowed = SafetyLayer(batch.arm, SAFETY), 0
+    layer, slowed = SafetyLayer(batch.arm, safety), 0
     for _ in range(120):
         q, qd = batch.state.q[0].copy(), batch.state.qd[0].copy()
         people = batch.people_shapes(0)

@@ -7,7 +7,7 @@ import pytest
 
 from app.errors import InvalidInput, SimulationError
 from app.sim.cells import load_cell
-from app.sim.checker import Shapes, capsule_shapes, no_people, shapes_of
+from app.sim.checker import Checker, Shapes, capsule_shapes, no_people, shapes_of
 from app.sim.kernels import body
 from app.sim.kernels.columns import distances
 from app.sim.robot import Robot
@@ -86,6 +86,72 @@ def test_a_turning_robot_needs_the_standard_s_distance_and_hardly_more():
 def test_every_assumption_costs_its_own_distance(change, more):
     settings = replace(SafetySettings(), **change)
     assert least_full_distance(settings, NONE, NONE) == pytest.approx(0.54 + more, abs=1e-6)
+
+
+WALKS = replace(SafetySettings(), measured=True)
+
+
+def walker(distance, toward=0.0, across=0.0, growth=0.0):
+    """A cylinder before the robot at rest, and how it goes on."""
+    tip = tool()[0]
+    way = tip[:2] / np.linalg.norm(tip[:2])
+    radius = 0.3
+    x, y = tip[:2] + (distance + radius + CELL.robot.tool_radius) * way
+    going = np.append(-toward * way + across * np.array([-way[1], way[0]]), growth)
+    cylinders = np.array([[x, y, radius, 3.0]])
+    return replace(no_people(), cylinders=cylinders, going=going[None])
+
+
+def apart(people):
+    """How far people are from the robot at rest now [m]."""
+    return Checker(ARM, people).clearance(REST).people
+
+
+@pytest.mark.parametrize(
+    ("going", "required"),
+    [
+        ({}, 0.3 + 0.2 * 0.15),
+        ({"toward": 0.8}, 0.3 + (0.8 + 0.2) * 0.15),
+        ({"toward": -0.8}, 0.3 + 0.2 * 0.15),
+        ({"growth": 0.4}, 0.3 + (0.4 + 0.2) * 0.15),
+        ({"growth": -0.4}, 0.3 + 0.2 * 0.15),
+    ],
+)
+def test_whose_velocity_is_known_needs_what_he_covers_at_it(going, required):
+    """By hand, at rest: D + (v toward the robot + allowed change) (0.1 s + 0.05 s).
+
+    To a millimetre: the nearest link is not exactly where the person walks to.
+    """
+    layer, low, high = SafetyLayer(ARM, WALKS), 0.0, 1.5
+    for _ in range(30):
+        middle = 0.5 * (low + high)
+        full = layer.decide(REST, NONE, NONE, NONE, walker(middle, **going)).override == 1.0
+        low, high = (low, middle) if full else (middle, high)
+    assert apart(walker(high, **going)) == pytest.approx(required, abs=1e-3)
+
+
+def test_who_walks_past_needs_hardly_more_than_who_stands():
+    layer = SafetyLayer(ARM, WALKS)
+    assert layer.decide(REST, NONE, NONE, NONE, walker(0.34, across=1.0)).override == 1.0
+    assert layer.decide(REST, NONE, NONE, NONE, walker(0.34, toward=1.0)).override == 0.0
+
+
+@pytest.mark.parametrize(("toward", "told"), [(0.8, 1.0), (0.0, 0.2), (-0.8, 0.2)])
+def test_the_speed_told_is_the_one_toward_the_robot_and_the_change(toward, told):
+    layer, people = SafetyLayer(ARM, WALKS), walker(0.4, toward=toward)
+    decision = layer.decide(REST, NONE, NONE, NONE, people)
+    _, terms = layer.terms(decision, NONE, people)
+    assert terms.human_speed == pytest.approx(told, abs=3e-3)
+    assert terms.separation == pytest.approx(apart(people), abs=1e-9)
+
+
+@pytest.mark.parametrize("settings", [WALKS, SafetySettings()])
+def test_who_is_not_known_to_go_on_is_taken_to_be_as_fast_as_assumed(settings):
+    people = replace(walker(0.5), going=None) if settings.measured else walker(0.5)
+    layer = SafetyLayer(ARM, settings)
+    decision = layer.decide(REST, NONE, NONE, NONE, people)
+    assert decision.override == 0.0
+    assert layer.terms(decision, NONE, people)[1].human_speed == 1.6
 
 
 def test_old_data_count_as_distance_lost():

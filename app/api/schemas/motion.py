@@ -35,6 +35,16 @@ class SafetyInput(Body):
     human_speed: Annotated[float, Field(ge=0.0, le=10.0)] | None = Field(
         default=None, description="greatest speed of any point of a person, v_h [m/s]"
     )
+    measured: bool | None = Field(
+        default=None,
+        description="whether people given as cylinders are taken to go on at their own "
+        "velocity (`vx`, `vy`, `growth`), which must then be measured, instead of at "
+        "`human_speed` in any direction; people by joint angles are not",
+    )
+    speed_change: Annotated[float, Field(ge=0.0, le=10.0)] | None = Field(
+        default=None,
+        description="how much faster than that they may be, in any direction [m/s]",
+    )
     reaction_time: Seconds | None = Field(
         default=None, description="from a decision to its effect, a part of T_r [s]"
     )
@@ -200,7 +210,10 @@ class Terms(Answer):
     required: float = Field(
         description="v_h (T_r + T_s) + v_r T_r + B + C + Z_d + Z_r + protective distance [m]"
     )
-    human_speed: float = Field(description="v_h [m/s]")
+    human_speed: float = Field(
+        description="v_h [m/s]; of a measured velocity what leads to the link, and "
+        "`speed_change`"
+    )
     robot_speed: float = Field(description="v_r, a bound on that link's speed [m/s]")
     reaction_time: float = Field(description="T_r: period, reaction, delay and age [s]")
     stop_time: float = Field(description="T_s [s]")

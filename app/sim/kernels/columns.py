@@ -85,7 +85,7 @@ def distances(a: Vec, i: int, b: Vec, out: Vec) -> None:
     uu, radius, inverse = a[UU, i], a[RADIUS, i], a[INVERSE, i]
     for j in range(b.shape[1]):
         out[j] = (
-            _segments(
+            segments_apart(
                 ax - b[X, j], ay - b[Y, j], az - b[Z, j],
                 ux, uy, uz, uu, inverse,
                 b[UX, j], b[UY, j], b[UZ, j], b[UU, j], b[INVERSE, j],
@@ -96,7 +96,7 @@ def distances(a: Vec, i: int, b: Vec, out: Vec) -> None:
 
 
 @kernel(inline="always", error_model="numpy", fastmath=FAST)
-def _segments(
+def segments_apart(
     wx: float, wy: float, wz: float,
     ux: float, uy: float, uz: float, uu: float, iu: float,
     vx: float, vy: float, vz: float, vv: float, iv: float,
@@ -137,7 +137,7 @@ def gaps(a: Vec, b: Vec, out: Vec) -> None:
         uu, radius, inverse = a[UU, i], a[RADIUS, i], a[INVERSE, i]
         for j in range(b.shape[1]):
             d = (
-                _segments(
+                segments_apart(
                     ax - b[X, j], ay - b[Y, j], az - b[Z, j],
                     ux, uy, uz, uu, inverse,
                     b[UX, j], b[UY, j], b[UZ, j], b[UU, j], b[INVERSE, j],
@@ -167,7 +167,7 @@ def nearest_parts(a: Vec, b: Vec, first: int, last: int, out: Vec, part: Vec) ->
         vv, radius, inverse = b[UU, i], b[RADIUS, i], b[INVERSE, i]
         for j in range(a.shape[1]):
             d = (
-                _segments(
+                segments_apart(
                     bx - a[X, j], by - a[Y, j], bz - a[Z, j],
                     vx, vy, vz, vv, inverse,
                     a[UX, j], a[UY, j], a[UZ, j], a[UU, j], a[INVERSE, j],
@@ -204,7 +204,7 @@ def pair_distances(
     for k in range(first.shape[0]):
         i, j = first[k], second[k]
         out[k] = (
-            _segments(
+            segments_apart(
                 a[X, i] - a[X, j], a[Y, i] - a[Y, j], a[Z, i] - a[Z, j],
                 a[UX, i], a[UY, i], a[UZ, i], a[UU, i], a[INVERSE, i],
                 a[UX, j], a[UY, j], a[UZ, j], a[UU, j], a[INVERSE, j],

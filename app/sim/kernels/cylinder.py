@@ -11,7 +11,7 @@ hold this file against python-fcl.
 
 import math
 
-from app.sim.kernels.columns import RADIUS, UX, UY, UZ, X, Y, Z
+from app.sim.kernels.columns import RADIUS, UX, UY, UZ, X, Y, Z, segments_apart
 from app.sim.kernels.compiled import kernel
 from app.sim.kernels.geometry import FAR, FAST
 from app.sim.ports import Vec
@@ -65,6 +65,34 @@ def cylinder_clearance(
                 continue
         best, near = d, k
     return best, near
+
+
+@kernel(error_model="numpy", fastmath=FAST)
+def swept_clearance(robot: Vec, x: float, y: float, sx: float, sy: float, r: float) -> float:
+    """Return the least distance of capsules to a cylinder all along a straight way [m].
+
+    Seen from above, as if the cylinder had no top: never more than the true distance.
+
+    Args:
+        robot: Capsules as columns, shape (>= 8, n).
+        x: Axis where the way begins [m].
+        y: The same.
+        sx: The way [m].
+        sy: The same.
+        r: Radius of the cylinder [m].
+    """
+    best, square = FAR, sx * sx + sy * sy
+    inverse = 1.0 / square if square > _POINT else 0.0
+    for k in range(robot.shape[1]):
+        ux, uy = robot[UX, k], robot[UY, k]
+        uu = ux * ux + uy * uy
+        d = segments_apart(
+            robot[X, k] - x, robot[Y, k] - y, 0.0,
+            ux, uy, 0.0, uu, 1.0 / uu if uu > _POINT else 0.0,
+            sx, sy, 0.0, square, inverse,
+        )  # fmt: skip
+        best = min(best, d - robot[RADIUS, k] - r)
+    return best
 
 
 @kernel(error_model="numpy", fastmath=FAST)

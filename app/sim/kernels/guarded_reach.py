@@ -48,7 +48,7 @@ from app.sim.kernels.reach_reward import ReachWeights, reward
 from app.sim.kernels.safety_trial import MOVING, first_contact, touching_speed
 from app.sim.kernels.ssm import decide
 from app.sim.kernels.trial_people import TrialWork, people_speed
-from app.sim.kernels.watch import NOW, Safety, place_node
+from app.sim.kernels.watch import NOW, Safety, Watch, place_node
 from app.sim.ports import Vec
 
 N_ACCOUNT = 10
@@ -85,6 +85,8 @@ class Guard(NamedTuple):
     and the episode goes on."""
     horizon: float
     """Most time left that a policy is shown [s]."""
+    measured: bool
+    """Whether the layer is told how walkers go on."""
     tracks: Vec
     """Cylinder in place of each row's first walker, at the ends of periods: x, y, radius [m],
     shape (n_envs, n + 1, 3); no rows where people walk by themselves."""
@@ -170,12 +172,24 @@ def _people_after(
 
 
 @kernel(inline="always")
+def _show_going(state: ReachState, e: int, watch: Watch) -> None:
+    """Tell the layer how the walkers of environment ``e`` go on, as measured."""
+    rows, m = state.people.walkers.rows, watch.going_speed.shape[0] - watch.going.shape[0]
+    for k in range(watch.going.shape[0]):
+        row, going = rows[e, k], watch.going[k]
+        going[0], going[1], going[2] = row[VX], row[VY], row[GROWTH]
+        watch.going_speed[m + k] = math.hypot(row[VX], row[VY]) + abs(row[GROWTH])
+
+
+@kernel(inline="always")
 def _execute(world: ReachWorld, state: ReachState, e: int, guard: Guard, work: Work) -> None:
     """Ask the safety layer about the piece in ``work``; what is executed is in its watch."""
     trial, account = guard.trial, guard.account[e]
     watch, override = trial.watch, 1.0
     for j in range(6):
         trial.q[j], trial.qd[j] = state.q[e, j], state.qd[e, j]
+    if guard.measured:
+        _show_going(state, e, watch)
     if guard.guarded:
         override = decide(
             world.arm, guard.safety, 0.0, trial.columns0, trial.cylinders0, trial.q, trial.qd,
@@ -200,7 +214,7 @@ def _touch(world: ReachWorld, guard: Guard, e: int) -> bool:
     account[FASTEST] = max(account[FASTEST], people_speed(trial, arm.dt))
     if trial.cylinders0.shape[0] + trial.columns0.shape[1] == 0:
         return False
-    place_node(arm, trial.columns0, trial.cylinders0, trial.q, NOW, trial.touch)
+    place_node(arm, trial.columns0, trial.cylinders0, trial.q, NOW, 0.0, trial.touch)
     when, part = first_contact(arm, trial)
     if when < 0.0:
         return False

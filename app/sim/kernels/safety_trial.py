@@ -145,7 +145,7 @@ def first_contact(arm: Arm, work: TrialWork) -> tuple[float, int]:
         motion_at(
             work.q, work.qd, watch.c, watch.d, watch.drop[0], t, touch.q_node, touch.qd_node
         )
-        place_node(arm, work.columns, work.cylinders, touch.q_node, NOW, touch)
+        place_node(arm, work.columns, work.cylinders, touch.q_node, NOW, 0.0, touch)
         gap, j = least(touch.gap[NOW])
         if gap <= TOUCH:
             return t, j
@@ -175,7 +175,7 @@ def _draw_place(arm: Arm, people: People, work: TrialWork) -> float:
         work.cylinders0[k, 3] = people.top_z
     copy_rows(work.cylinders0, work.cylinders1)
     copy_rows(work.cylinders0, work.cylinders)
-    place_node(arm, work.columns0, work.cylinders0, work.q, NOW, work.watch)
+    place_node(arm, work.columns0, work.cylinders0, work.q, NOW, 0.0, work.watch)
     return least(work.watch.gap[NOW])[0]
 
 
@@ -225,7 +225,7 @@ def _step(
     out[STEPS] = step + 1.0
     out[STOPPED] += 1.0 if override <= 0.0 else 0.0
     out[SLOWED] += 1.0 if override < 1.0 else 0.0
-    place_node(arm, work.columns0, work.cylinders0, work.q, NOW, work.touch)
+    place_node(arm, work.columns0, work.cylinders0, work.q, NOW, 0.0, work.touch)
     advance_workers(people, trial, mode, t, arm.dt, work)
     advance_cylinders(people, trial, mode, t, arm.dt, work)
     out[WORST_PEOPLE] = max(out[WORST_PEOPLE], people_speed(work, arm.dt))

@@ -9,6 +9,10 @@ at every moment ``t`` of that path, until the robot rests, every person as last 
 is clear of the robot. Otherwise the stop from the present state is executed. ``lead`` is how
 much older than the robot's state the people are, counting the controller's reaction: age of the
 data, tracker's delay and reaction time. ``D = C + Z_d + Z_r`` plus the protective distance.
+A cylinder whose velocity is known may be held to that instead: all of the way it goes at that
+velocity since it was seen counts, as if it were there all the time, and ``v_h`` is only how
+much faster it may be than was seen (``watch.py``).
+
 ``T_r`` of the standard is ``lead`` and the control period; ``T_s`` is the stop that the path
 ends in; ``v_r T_r + B`` are not bounded by a speed but taken from the poses themselves.
 
@@ -36,6 +40,12 @@ older than stated. Let ``P`` be the people as seen at ``t_k``, when a path was a
    ``t + R`` is where the decision had it at ``t``, while people have moved for R more: this is
    R more ``lead``.
 
+5. *Where velocities are taken as known* the same holds of whoever stays as fast, in any
+   direction, as seen at each of the times between two sightings and no more than the allowed
+   change faster. Who changes by more, ``w`` in excess, is nearer than D by ``w (T_r + T_s)`` at
+   most when the robot rests, because the stop is executed from the next sighting on: there is
+   no contact in motion while that is less than D.
+
 **Power and force limiting** is the same rule with a contact speed per part of a person instead
 of 0: a part may be reached while no capsule's axis is faster than its limit anywhere, and a
 surface comes nearer to what it meets no faster than its axis moves. All of the robot counts as
@@ -46,8 +56,6 @@ Between poses, see ``watch.py``: never late.
 
 Source: ISO/TS 15066:2016, 5.5.4 and 5.5.5 (METHOD 2.7).
 """
-
-import numpy as np
 
 from app.sim.kernels.arm import Arm
 from app.sim.kernels.compiled import kernel
@@ -81,6 +89,25 @@ N_HALVINGS = 4
 
 
 @kernel(error_model="numpy")
+def _far(safety: Safety, way: float, since: float, later: float, watch: Watch) -> bool:
+    """Whether nobody can meet a robot that goes no farther than ``way`` [m].
+
+    Args:
+        safety: What the rule assumes.
+        way: How far any point of the robot goes [m].
+        since: How long ago people were seen when it rests [s].
+        later: How long that is from now [s].
+        watch: Work space; node NOW is placed.
+    """
+    now = watch.gap[NOW]
+    for j in range(now.shape[0]):
+        reach = safety.speed[j] * since + watch.going_speed[j] * later + safety.margin
+        if not now[j] - way > reach:
+            return False
+    return True
+
+
+@kernel(error_model="numpy")
 def admissible(
     arm: Arm, safety: Safety, lead: float, columns: Vec, cylinders: Vec, q: Vec, qd: Vec,
     c: Vec, d: Vec, override: float, watch: Watch,
@@ -111,18 +138,14 @@ def admissible(
     s_end = clock(drop, arm.dt)[0]
     first, second = path_bounds(arm, qd, c, d, s_end)
     stop_first, stop_second = path_bounds(arm, qd1, watch.none, watch.none, 0.0)
-    reach = safety.human_speed * (lead + arm.dt + t_stop) + safety.margin
-    nearest, now = np.inf, watch.gap[NOW]
-    for j in range(now.shape[0]):
-        nearest = min(nearest, now[j])
-    if nearest - first * s_end - 0.5 * t_stop * stop_first > reach:
+    way, since = first * s_end + 0.5 * t_stop * stop_first, lead + arm.dt + t_stop
+    if _far(safety, way, since, since - lead, watch):
         return True
-    place_node(arm, columns, cylinders, watch.q_node, REST, watch)
-    if reached(safety, reach, arm.dt + t_stop, REST, watch):
+    place_node(arm, columns, cylinders, watch.q_node, REST, since, watch)
+    if reached(safety, since, arm.dt + t_stop, REST, watch):
         return False
-    place_node(arm, columns, cylinders, q1, END, watch)
-    reach = safety.human_speed * (lead + arm.dt) + safety.margin
-    if reached(safety, reach, arm.dt, END, watch):
+    place_node(arm, columns, cylinders, q1, END, lead + arm.dt, watch)
+    if reached(safety, lead + arm.dt, arm.dt, END, watch):
         return False
     watch.x[NOW], watch.x[END] = 0.0, arm.dt
     if not segment_clear(
@@ -183,9 +206,9 @@ def decide(
     """
     lead = safety.lead + age
     watch.why[WHEN], watch.why[WHO], watch.why[SLACK] = 0.0, -1.0, 0.0
-    place_node(arm, columns, cylinders, q, NOW, watch)
+    place_node(arm, columns, cylinders, q, NOW, lead, watch)
     override = 0.0
-    kept = not reached(safety, safety.human_speed * lead + safety.margin, 0.0, NOW, watch)
+    kept = not reached(safety, lead, 0.0, NOW, watch)
     for j in range(6):
         kept = kept and joint_keeps_limits(
             q[j], qd[j], c[j], d[j], arm.dt, arm.q_min[j], arm.q_max[j], arm.qd_max[j],

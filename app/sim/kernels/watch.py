@@ -7,6 +7,10 @@ interval is halved, and given up as not clear where that would tell no more than
 never late. ``w`` is the longest chord of the capsules' ends plus half a bound on the path's
 curvature, or the sum of joint ways times levers where that is less.
 
+A cylinder that is known to go on at some velocity counts all along its way since it was seen, a
+little more of it at the end of an interval than at its start: that much more may be missing
+between them.
+
 Power and force limiting gives parts of people a speed at which they may be touched; they are
 passed over in intervals in which no point of the robot is faster. Source: METHOD 2.7.
 """
@@ -20,7 +24,7 @@ from app.sim.kernels import kinematics
 from app.sim.kernels.arm import Arm, place_capsules
 from app.sim.kernels.columns import gaps, longest_way
 from app.sim.kernels.compiled import kernel
-from app.sim.kernels.cylinder import cylinder_clearance
+from app.sim.kernels.cylinder import cylinder_clearance, swept_clearance
 from app.sim.kernels.override import clock, motion_at
 from app.sim.ports import Vec
 
@@ -37,8 +41,9 @@ WHEN, WHO, SLACK = range(3)
 class Safety(NamedTuple):
     """What the rule assumes."""
 
-    human_speed: float
-    """Speed of people, v_h [m/s]."""
+    speed: Vec
+    """Speed of each capsule and each cylinder in any direction, beyond what is known of how it
+    goes on [m/s], shape (m + n,)."""
     lead: float
     """How much older than the robot's state the people are [s], reaction included."""
     margin: float
@@ -58,6 +63,11 @@ class Watch(NamedTuple):
     """The robot's capsules at each node, shape (N_NODES, 9, n)."""
     gap: Vec
     """Distances of people's capsules and cylinders to the robot there [m], (N_NODES, m + n)."""
+    going: Vec
+    """How cylinders are known to go on: vx, vy and growth [m/s], zeros where that is not known,
+    shape (n, 3)."""
+    going_speed: Vec
+    """How fast any point of each part gets on so [m/s], shape (m + n,)."""
     x: Vec
     """When each node is [s], since the start of its segment, shape (N_NODES,)."""
     right: NDArray[np.int64]
@@ -95,6 +105,8 @@ def new_watch(arm: Arm, n_columns: int, n_cylinders: int) -> Watch:
         np.empty((7, 3)),
         np.repeat(arm.columns[None], N_NODES, axis=0),
         np.empty((N_NODES, n_columns + n_cylinders)),
+        np.zeros((n_cylinders, 3)),
+        np.zeros(n_columns + n_cylinders),
         np.zeros(N_NODES),
         np.zeros(N_NODES, dtype=np.int64),
         np.zeros(6),
@@ -113,8 +125,21 @@ def new_watch(arm: Arm, n_columns: int, n_cylinders: int) -> Watch:
 
 
 @kernel(error_model="numpy")
-def place_node(arm: Arm, columns: Vec, cylinders: Vec, q: Vec, node: int, watch: Watch) -> None:
-    """Place the robot at ``q`` and write its distances to every part of the people."""
+def place_node(
+    arm: Arm, columns: Vec, cylinders: Vec, q: Vec, node: int, since: float, watch: Watch
+) -> None:
+    """Place the robot at ``q`` and write its distances to every part of the people.
+
+    Args:
+        arm: Robot in its cell.
+        columns: The people's capsules, shape (9, m).
+        cylinders: Cylinders: x, y, radius, top [m], shape (n, 4).
+        q: Joints [rad], shape (6,).
+        node: Which node.
+        since: How long ago people were there [s]: where cylinders are known to go on, all of
+            their way since then counts.
+        watch: Work space.
+    """
     robot, gap = watch.columns[node], watch.gap[node]
     kinematics.link_poses(q, watch.rot, watch.pos)
     place_capsules(watch.rot, watch.pos, arm.link, arm.p0, arm.span, 0, robot)
@@ -122,14 +147,20 @@ def place_node(arm: Arm, columns: Vec, cylinders: Vec, q: Vec, node: int, watch:
     gaps(robot, columns, gap[:m])
     for k in range(cylinders.shape[0]):
         x, y, r, top = cylinders[k, 0], cylinders[k, 1], cylinders[k, 2], cylinders[k, 3]
-        gap[m + k], _ = cylinder_clearance(robot, 0, x, y, r, top)
+        if watch.going_speed[m + k] * since > 0.0:
+            sx, sy, growth = watch.going[k, 0], watch.going[k, 1], watch.going[k, 2]
+            r += max(0.0, growth) * since
+            gap[m + k] = swept_clearance(robot, x, y, sx * since, sy * since, r)
+        else:
+            gap[m + k], _ = cylinder_clearance(robot, 0, x, y, r, top)
 
 
 @kernel(error_model="numpy", inline="always")
-def reached(safety: Safety, reach: float, t: float, node: int, watch: Watch) -> bool:
+def reached(safety: Safety, since: float, t: float, node: int, watch: Watch) -> bool:
     """Whether a part that may not be touched in motion could be within reach at a node."""
     gap = watch.gap[node]
     for j in range(gap.shape[0]):
+        reach = safety.speed[j] * since + safety.margin
         if safety.contact_speed[j] <= 0.0 and not gap[j] >= reach:
             watch.why[WHEN], watch.why[WHO], watch.why[SLACK] = t, j, reach - gap[j]
             return True
@@ -164,15 +195,16 @@ def path_bounds(arm: Arm, qd: Vec, c: Vec, d: Vec, s_end: float) -> tuple[float,
 
 @kernel(error_model="numpy", inline="always")
 def _interval_clear(
-    safety: Safety, reach: float, t: float, way: float, rate: float, first: float,
+    safety: Safety, since: float, t: float, span: float, way: float, rate: float, first: float,
     second: float, a: int, b: int, watch: Watch,
 ) -> tuple[bool, float]:  # fmt: skip
     """Whether nobody can be met between two nodes too fast.
 
     Args:
         safety: What the rule assumes.
-        reach: How far people may have come by the end [m].
+        since: How long ago people were seen by the end [s].
         t: When the interval ends, on the path [s].
+        span: How long it is [s].
         way: Length of the interval along the path [s].
         rate: Rate at its start, the greatest in it.
         first: Bound on ``|dp/ds|`` [m/s].
@@ -182,7 +214,7 @@ def _interval_clear(
         watch: Both nodes are placed.
 
     Returns:
-        Whether it is clear, and the farthest any point of the robot goes [m].
+        Whether it is clear, and the farthest any point of robot and people goes as known [m].
     """
     fastest = first
     if way > 0.0:
@@ -191,10 +223,12 @@ def _interval_clear(
     w = fastest * way
     before, after = watch.gap[a], watch.gap[b]
     for j in range(before.shape[0]):
-        least = 0.5 * (before[j] + after[j] - w)
+        both = w + watch.going_speed[j] * span
+        least = 0.5 * (before[j] + after[j] - both)
+        reach = safety.speed[j] * since + safety.margin
         if not (least > reach or rate * fastest <= safety.contact_speed[j]):
             watch.why[WHEN], watch.why[WHO], watch.why[SLACK] = t, j, reach - least
-            return False, w
+            return False, both + safety.speed[j] * span
     return True, w
 
 
@@ -232,21 +266,20 @@ def segment_clear(
         sa, rate = clock(drop, xa)
         sb, _ = clock(drop, xb)
         t = t0 + xb
-        reach = safety.human_speed * (lead + t) + safety.margin
         clear, w = _interval_clear(
-            safety, reach, t, sb - sa, rate, first, second, left, b, watch
+            safety, lead + t, t, xb - xa, sb - sa, rate, first, second, left, b, watch
         )
         if clear:
             left = b
             top -= 1
             continue
-        if w + safety.human_speed * (xb - xa) < RESOLUTION or fresh == N_NODES:
+        if w < RESOLUTION or fresh == N_NODES:
             return False
         x = 0.5 * (xa + xb)
         motion_at(q, qd, c, d, drop, x, watch.q_node, watch.qd_node)
-        place_node(arm, columns, cylinders, watch.q_node, fresh, watch)
-        reach = safety.human_speed * (lead + t0 + x) + safety.margin
-        if reached(safety, reach, t0 + x, fresh, watch):
+        since = lead + t0 + x
+        place_node(arm, columns, cylinders, watch.q_node, fresh, since, watch)
+        if reached(safety, since, t0 + x, fresh, watch):
             return False
         watch.x[fresh] = x
         top += 1

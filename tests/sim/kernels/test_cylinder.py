@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from app.sim.kernels.columns import columns_of, new_columns
-from app.sim.kernels.cylinder import cylinder_clearance
+from app.sim.kernels.cylinder import cylinder_clearance, swept_clearance
 from app.sim.kernels.geometry import FAR
 from tests.sim.fcl_capsules import KINDS, check_against_fcl, random_ends
 
@@ -81,3 +81,23 @@ def test_least_of_many_is_the_least_of_each() -> None:
         ]
         d, k = cylinder_clearance(columns, 0, 0.1, 0.2, 0.3, top)
         assert d == min(each) and k == np.argmin(each)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_distance_to_all_of_a_way_is_the_least_along_it(kind: str) -> None:
+    rng = np.random.default_rng(13)
+    for ends in random_ends(60, 14, kind):
+        robot = columns_of(ends[None], np.array([0.05]))
+        x, y, sx, sy = rng.uniform(-0.8, 0.8, 4)
+        along = [
+            cylinder_clearance(robot, 0, x + s * sx, y + s * sy, 0.2, 10.0)[0]
+            for s in np.linspace(0.0, 1.0, 401)
+        ]
+        found = swept_clearance(robot, x, y, sx, sy, 0.2)
+        assert min(along) - 0.5 * np.hypot(sx, sy) / 400 <= found <= min(along) + 1e-9
+
+
+def test_distance_to_a_way_is_never_more_than_over_the_top() -> None:
+    robot = columns_of(np.array([[[0.0, 0.0, 2.0], [0.3, 0.0, 2.2]]]), np.array([0.05]))
+    over, _ = cylinder_clearance(robot, 0, 0.1, 0.0, 0.3, 1.3)
+    assert swept_clearance(robot, 0.1, 0.0, 1e-3, 0.0, 0.3) < over

@@ -12,6 +12,10 @@ ARM = arm_of(load_cell("pick-and-place"))
 NO_CYLINDERS = np.zeros((0, 4))
 
 
+def no_columns():
+    return np.zeros((9, 0))
+
+
 def spheres(rng, n=8):
     """Spheres and short capsules around the robot."""
     start = rng.uniform([-1.2, -0.2, 0.0], [1.2, 1.6, 1.2], (n, 3))
@@ -34,7 +38,7 @@ def motions(n, seed):
 
 
 def gaps_at(q, people, space):
-    watch.place_node(ARM, people, NO_CYLINDERS, q, watch.NOW, space)
+    watch.place_node(ARM, people, NO_CYLINDERS, q, watch.NOW, 0.0, space)
     return space.gap[watch.NOW].copy()
 
 
@@ -56,7 +60,7 @@ def path_of(q, qd, c, d, rate, times):
 
 def test_nobody_could_have_come_near_on_a_path_that_was_admitted():
     space, admitted = watch.new_watch(ARM, 8, 0), 0
-    rule = watch.Safety(0.5, 0.02, 0.05, np.zeros(8))
+    rule = watch.Safety(np.full(8, 0.5), 0.02, 0.05, np.zeros(8))
     for k, (q, qd, c, d, people) in enumerate(motions(400, 1)):
         rate = (1.0, 0.9)[k % 2]
         gaps_at(q, people, space)
@@ -68,9 +72,34 @@ def test_nobody_could_have_come_near_on_a_path_that_was_admitted():
     assert 40 < admitted < 360
 
 
+def test_whoever_goes_on_as_seen_is_not_met_on_a_path_that_was_admitted():
+    """Cylinders with known velocities: anywhere on their way, and a little faster."""
+    rng, space, admitted = np.random.default_rng(9), watch.new_watch(ARM, 0, 2), 0
+    rule, nobody = watch.Safety(np.full(2, 0.1), 0.02, 0.05, np.zeros(2)), no_columns()
+    for k, (q, qd, c, d, _) in enumerate(motions(400, 10)):
+        rate, cylinders = (1.0, 0.9)[k % 2], np.full((2, 4), 1.3)
+        cylinders[:, :2], cylinders[:, 2] = rng.uniform(-1.5, 1.5, (2, 2)), 0.2
+        space.going[:] = rng.uniform([-1.0, -1.0, -0.3], [1.0, 1.0, 0.3], (2, 3))
+        going, growth = space.going[:, :2], np.maximum(0.0, space.going[:, 2])
+        space.going_speed[:] = np.hypot(*going.T) + np.abs(space.going[:, 2])
+        watch.place_node(ARM, nobody, cylinders, q, watch.NOW, 0.02, space)
+        if not ssm.admissible(ARM, rule, 0.02, nobody, cylinders, q, qd, c, d, rate, space):
+            continue
+        admitted += 1
+        for t, pose in path_of(q, qd, c, d, rate, lambda end: np.linspace(0.0, end, 30)):
+            for since in np.linspace(0.0, 0.02 + t, 5):
+                there = cylinders.copy()
+                there[:, :2] += since * going
+                there[:, 2] += since * growth
+                other = watch.new_watch(ARM, 0, 2)
+                watch.place_node(ARM, nobody, there, pose, watch.NOW, 0.0, other)
+                assert other.gap[watch.NOW].min() > 0.05 + 0.1 * (0.02 + t) - 1e-9
+    assert 40 < admitted < 360
+
+
 def test_a_path_is_refused_only_where_somebody_comes_within_the_resolution():
     space, refused = watch.new_watch(ARM, 8, 0), 0
-    rule = watch.Safety(0.5, 0.02, 0.05, np.zeros(8))
+    rule = watch.Safety(np.full(8, 0.5), 0.02, 0.05, np.zeros(8))
     for q, qd, c, d, people in motions(300, 2):
         gaps_at(q, people, space)
         stop_inside = (np.abs(q) < 0.8 * np.abs(ARM.q_max) + 0.2).all()
@@ -88,7 +117,7 @@ def test_a_path_is_refused_only_where_somebody_comes_within_the_resolution():
 def test_what_was_admitted_stays_admissible_as_people_run():
     """Step 2 of the proof: a period after any admitted piece the stop obeys the rule."""
     rng, space = np.random.default_rng(3), watch.new_watch(ARM, 8, 0)
-    rule, checked = watch.Safety(0.5, 0.02, 0.05, np.zeros(8)), 0
+    rule, checked = watch.Safety(np.full(8, 0.5), 0.02, 0.05, np.zeros(8)), 0
     for q, qd, c, d, people in motions(400, 4):
         rate = ssm.decide(ARM, rule, 0.0, people, NO_CYLINDERS, q, qd, c, d, space)
         if rate == 0.0:
@@ -123,7 +152,7 @@ def test_a_path_s_bounds_hold_for_points_of_every_link():
 
 def test_what_is_executed_keeps_speed_acceleration_and_continuity():
     space = watch.new_watch(ARM, 8, 0)
-    rule, seen = watch.Safety(0.4, 0.0, 0.02, np.zeros(8)), set()
+    rule, seen = watch.Safety(np.full(8, 0.4), 0.0, 0.02, np.zeros(8)), set()
     for q, qd, c, d, people in motions(400, 6):
         rate = ssm.decide(ARM, rule, 0.0, people, NO_CYLINDERS, q, qd, c, d, space)
         seen.add("stop" if rate == 0.0 else "full" if rate == 1.0 else "scaled")
@@ -141,7 +170,7 @@ def test_what_is_executed_keeps_speed_acceleration_and_continuity():
 
 def test_joint_limits_hold_whatever_is_commanded_and_whoever_appears():
     rng, space = np.random.default_rng(8), watch.new_watch(ARM, 8, 0)
-    rule, closest, rates = watch.Safety(0.4, 0.0, 0.02, np.zeros(8)), np.inf, []
+    rule, closest, rates = watch.Safety(np.full(8, 0.4), 0.0, 0.02, np.zeros(8)), np.inf, []
     q, qd, none = np.array(ARM.home), np.zeros(6), np.zeros(6)
     for k in range(3000):
         if k % 40 == 0:
