@@ -3,7 +3,8 @@
 Between ``<!-- begin NAME -->`` and ``<!-- end NAME -->`` a page shows the table of
 ``docs/results/NAME.json``: what ``python -m app evaluate NAME --json`` or
 ``python -m app bench NAME --json`` printed, or what the script named in its ``command`` wrote.
-A result without rows is not a table: its section is written by a script of its own. What has no
+A result without rows is not a table: its section is written by a script of its own.
+``NAME-measured`` shows the rows that end so, which the table of NAME leaves out. What has no
 result yet stays as it is, and a test names it. Run by ``make tables``; a test compares.
 """
 
@@ -33,12 +34,13 @@ def render(readme: str, results: Path) -> str:
     """
 
     def block(match: re.Match[str]) -> str:
-        path = results / f"{match[2]}.json"
+        path = results / f"{match[2].removesuffix(reach_tables.PART)}.json"
         if not path.exists():
             return match[0]
         found = json.loads(path.read_text(encoding="utf-8"))
         if "results" not in found:
             return match[0]
+        found = reach_tables.part_of(found, measured=match[2].endswith(reach_tables.PART))
         others = reach_tables.siblings(path) if reach_tables.is_reach(found) else []
         return f"{match[1]}{table(found, others)}\n{match[3]}"
 

@@ -23,6 +23,7 @@ RESULT = ROOT / "docs/results/reach-ssm.json"
 IMAGES = ROOT / "docs/img/reach"
 ROWS = {
     "policy-ahead": ("policy, looking ahead", BLUE, "-"),
+    "policy-heedless": ("... knowing nothing of the layer", BLUE, "--"),
     "policy": ("policy alone", BLUE, ":"),
     "rrt-star-once": ("RRT*, planned once", ORANGE, "-"),
     "rrt-connect": ("RRT-Connect, again where blocked", RED, "-"),
@@ -32,6 +33,8 @@ ROWS = {
     "hindsight": ("best replay in hindsight", GREY, ":"),
 }
 """Words, colour and line of each row."""
+LAYER = "measured"
+"""The layer that is drawn: the one that goes by measured velocities."""
 SHOWN = ("policy-ahead", "rrt-star-once")
 """Rows whose override is drawn."""
 Json = dict[str, Any]
@@ -88,8 +91,9 @@ def main() -> int:
         print(f"{RESULT.relative_to(ROOT)} is not there: run `evaluate reach-ssm` first")
         return 1
     result = json.loads(RESULT.read_text(encoding="utf-8"))
-    save(override, IMAGES / "override.png", result["example"])
-    save(arrivals, IMAGES / "arrivals.png", result["seconds"], result["settings"]["cap_s"])
+    example, seconds = result["example"][LAYER], result["seconds"][LAYER]
+    save(override, IMAGES / "override.png", example)
+    save(arrivals, IMAGES / "arrivals.png", seconds, result["settings"]["cap_s"])
     return 0
 
 

@@ -81,7 +81,9 @@ COLUMNS: Mapping[str, Mapping[str, str]] = {
         "time_capped_s": "... of all runs [s]",
         "below_half_s": "override below 50 % [s]",
         "stopped_s": "at 0 [s]",
+        "held_s": "held at rest [s]",
         "never_stopped": "never at 0",
+        "never_held": "never held at rest",
         "joint_way_rad": "joints' way [rad]",
         "tool_way_m": "tool's way [m]",
         "contacts_moving": "contacts, robot moving",
@@ -90,6 +92,8 @@ COLUMNS: Mapping[str, Mapping[str, str]] = {
     },
 }
 """Measures of each protocol and what its table calls them."""
+PART, MEASURED = "-measured", " measured"
+"""Ends of the names of a table and of its rows that show the layer going by measured speeds."""
 INSTEAD = {"arrived": "success"}
 """What stands for a measure in rows that call it otherwise."""
 TURNED = frozenset({"reach-smoothness"})
@@ -97,6 +101,14 @@ TURNED = frozenset({"reach-smoothness"})
 DIFFERENCES = frozenset({"against_targets", "against_base"})
 SHARES = frozenset({"starts_redrawn", "worst_seed", "best_seed"})
 """Measures that are shares without an interval."""
+
+
+def part_of(result: Json, *, measured: bool) -> Json:
+    """Return a result with the rows that end in ``measured``, less that end, or all others."""
+    rows = [row for row in result["results"] if row["name"].endswith(MEASURED) == measured]
+    if measured:
+        rows = [{**row, "name": row["name"].removesuffix(MEASURED)} for row in rows]
+    return {**result, "results": rows}
 
 
 def is_reach(result: Json) -> bool:

@@ -91,6 +91,19 @@ def test_times_under_the_safety_layer_have_their_spread_and_no_row_is_empty() ->
     assert "FILE" not in table(made.ssm())
 
 
+def test_rows_of_measured_velocities_have_a_table_of_their_own(results: Path) -> None:
+    result = made.ssm()
+    result["results"].append({**result["results"][0], "name": "policy measured"})
+    (results / "reach-ssm.json").write_text(json.dumps(result))
+    blocks = "".join(
+        f"<!-- begin {name} -->\n<!-- end {name} -->\n"
+        for name in ("reach-ssm", "reach-ssm-measured")
+    )
+    lines = render(blocks, results).splitlines()
+    found = [line.split("|")[1].strip() for line in lines if line.startswith("| `")]
+    assert found == ["`policy`", "`random`", "`policy`"]
+
+
 def test_results_of_other_tasks_are_left_to_others() -> None:
     assert not is_reach({"protocol": "pick-single"})
     assert is_reach({"protocol": "reach-targets"})

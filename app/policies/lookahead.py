@@ -4,7 +4,7 @@
 """
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +14,12 @@ from app.policies.networks import BASE_WEIGHT
 from app.policies.reach_policy import ReachPolicy
 from app.sim.forecasts import new_forecaster
 from app.sim.kernels import lookahead as kernel
-from app.sim.kernels import other_ways
+from app.sim.kernels import other_ways, played_ways
 from app.sim.kernels.compiled import direct
 from app.sim.kernels.forecast import STEP_S, Network
 from app.sim.kernels.reach import ReachState, ReachWorld, Work, new_work
 from app.sim.ports import ReachActor
+from app.sim.safety import SafetySettings
 
 PASSED = other_ways.PASSED
 """In place of the number of another way: the action passed as it is."""
@@ -37,6 +38,42 @@ OTHERS = (
 shoulder and elbow do: forward, back, or held. Where a dart leads is drawn."""
 
 Actions = NDArray[np.float32]
+
+
+class Layer(NamedTuple):
+    """What looking ahead knows of a safety layer."""
+
+    distance: float
+    """How far people are kept from a robot that moves [m]; 0 where nothing is known."""
+    ahead: float
+    """How long they go on until a motion that is asked for now is over [s]."""
+
+
+NO_LAYER = Layer(0.0, 0.0)
+"""No layer, or one that takes people to come at once from wherever they are: nothing that is
+known of their way says where it would not hold the robot."""
+
+
+SPARE_M = 0.04
+"""People are kept so much farther away than a robot at rest is asked to [m]: one that moves
+must be able to stop. With 0.02 m the time to the goal fell from 4.29 to 4.20 s, and the share
+of runs never stopped from 60 to 43 %, on the first 100 crossings of seed 77."""
+LONGEST_AHEAD = 1.0
+"""Longest time ahead for which people's way counts [s]."""
+
+
+def layer_of(settings: SafetySettings | None, dt: float, age: float = 0.0) -> Layer:
+    """Return what looking ahead knows of a safety layer.
+
+    Args:
+        settings: What it assumes; None where there is none.
+        dt: Control period [s].
+        age: How old people are beyond the tracker's delay [s].
+    """
+    if settings is None or not settings.measured:
+        return NO_LAYER
+    ahead = min(LONGEST_AHEAD, settings.lead + dt + age)
+    return Layer(settings.margin + settings.speed_change * ahead + SPARE_M, ahead)
 
 
 def _network_of(actor: ReachActor) -> Network | None:
@@ -73,8 +110,10 @@ class Lookahead:
             rule = "must be a residual actor of two layers that sees forecasts, to look ahead"
             raise InvalidInput("checkpoint", actor.checkpoint, rule)
         self._network, self._rule = network, actor.action.rule()
+        self.layer = NO_LAYER
+        """The safety layer that what is played goes through."""
         self._cells: Cells | None = None
-        self._work: tuple[Work, kernel.Lookahead] | None = None
+        self._work: tuple[Work, played_ways.Lookahead] | None = None
         self._call: Callable[..., None] = kernel.look_ahead_batch
 
     def forget(self) -> None:
@@ -98,10 +137,11 @@ class Lookahead:
         """
         world, state, chosen = cells.world, cells.state, np.empty(len(act), dtype=np.int64)
         if self._work is None or self._cells is not cells:
-            look = kernel.new_lookahead(world.arm, self._network, BASE_WEIGHT, len(act))
+            look = played_ways.new_lookahead(world.arm, self._network, BASE_WEIGHT, len(act))
             self._cells, self._work = cells, (new_work(world, state, new_forecaster()), look)
             self._call = direct(
                 kernel.look_ahead_batch, (world, self._rule, state, act, *self._work, chosen)
             )
+        self._work[1].layer[:] = self.layer
         self._call(world, self._rule, state, act, *self._work, chosen)
         return chosen

@@ -16,7 +16,7 @@ import numpy as np
 
 from app.errors import InvalidInput
 from app.policies.interpolation import Interpolation, interpolates
-from app.policies.lookahead import OTHERS, PASSED, Lookahead, looks_ahead
+from app.policies.lookahead import OTHERS, PASSED, Lookahead, layer_of, looks_ahead
 from app.policies.movers import person_weights
 from app.sim import human
 from app.sim.cell_reach import LONGEST_REACH, SHOULDER
@@ -233,11 +233,13 @@ class MotionDecider:
         """Play an action ahead; change it where another way is better, and return its name."""
         if stage not in self._aheads:
             self._aheads[stage] = Lookahead(self.actor)
-        self._aheads[stage].forget()
+        ahead = self._aheads[stage]
+        ahead.forget()
+        ahead.layer = layer_of(question.safety, self.arm.dt, question.age_s)
         state = stage.state
         state.goal[0], state.qdd[0], state.elapsed[0] = goal, qdd, question.elapsed_s
         played = act[None].astype(np.float32)
-        chosen = int(self._aheads[stage].improve(stage, played)[0])
+        chosen = int(ahead.improve(stage, played)[0])
         if chosen == PASSED:
             return None
         act[:] = played[0]

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from app.errors import CheckpointMismatch, InvalidInput
 from app.policies.interpolation import Interpolation, interpolates
-from app.policies.lookahead import Lookahead, looks_ahead
+from app.policies.lookahead import NO_LAYER, Layer, Lookahead, looks_ahead
 from app.sim.kernels.episode import RUNNING
 from app.sim.ports import ReachActor, Vec
 from app.sim.reach import ReachBatch
@@ -151,17 +151,19 @@ class Ahead:
     Args:
         mover: Who says what to do.
         actor: The policy it is played with.
+        layer: The safety layer that it acts under.
 
     Raises:
         InvalidInput: The policy cannot be played ahead.
     """
 
-    def __init__(self, mover: Mover, actor: ReachActor) -> None:
-        self._mover, self._ahead = mover, Lookahead(actor)
+    def __init__(self, mover: Mover, actor: ReachActor, layer: Layer = NO_LAYER) -> None:
+        self._mover, self._ahead, self.layer = mover, Lookahead(actor), layer
 
     def acts(self, batch: ReachBatch) -> Actions:
         """Return actions for every cell; see :class:`Mover`."""
         act = self._mover.acts(batch)
+        self._ahead.layer = self.layer
         self._ahead.improve(batch, act)
         return act
 

@@ -3,10 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from app.policies.movers import Mover, hows_of, mover_of
+from app.policies.lookahead import layer_of
+from app.policies.movers import Ahead, Mover, hows_of, mover_of
 from app.sim.actions import ActionSettings
 from app.sim.ports import ReachActor, Vec
 from app.sim.reach import GoalRule, ReachBatch, ViewName
+from app.sim.safety import SafetySettings
 
 
 class ReachPilot:
@@ -65,11 +67,17 @@ class ReachPilot:
         """How it can be asked."""
         return tuple(self._movers)
 
-    def acts(self, batch: ReachBatch, way: str) -> NDArray[np.float32]:
+    def acts(
+        self, batch: ReachBatch, way: str, safety: SafetySettings | None
+    ) -> NDArray[np.float32]:
         """Return the actions for every environment of a batch, shape (n_envs, 6).
 
         Args:
             batch: Robots, people and goals.
             way: One of ``ways``.
+            safety: What the safety layer assumes that they go through; None without one.
         """
-        return self._movers[way].acts(batch)
+        mover = self._movers[way]
+        if isinstance(mover, Ahead):
+            mover.layer = layer_of(safety, batch.arm.dt)
+        return mover.acts(batch)

@@ -22,6 +22,7 @@ from app.sim.kernels.guarded_reach import (
     CELL,
     CONTACT,
     FASTEST,
+    HELD,
     JOINT_WAY,
     N_ACCOUNT,
     PERIODS,
@@ -59,6 +60,8 @@ class GuardedRuns:
     """Time with override below one half, that at 0 included [s]."""
     standing_s: Vec
     """Time at rest for whatever reason [s]."""
+    held_s: Vec
+    """Time at rest with override 0 [s]; a stop that is begun and not ended is no rest."""
     joint_way: Vec
     """Way in joint space [rad]."""
     tool_way: Vec
@@ -237,6 +240,7 @@ class GuardedReach(ReachBatch):
             stopped_s=dt * account[:, STOPPED],
             below_half_s=dt * account[:, BELOW_HALF],
             standing_s=dt * account[:, STANDING],
+            held_s=dt * account[:, HELD],
             joint_way=account[:, JOINT_WAY].copy(),
             tool_way=account[:, TOOL_WAY].copy(),
             touched_moving=person & moving,

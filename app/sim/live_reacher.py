@@ -17,6 +17,7 @@ from app.sim.live_arm import GAIN, LiveArm
 from app.sim.ports import Vec
 from app.sim.reach import ReachBatch, ReachSettings
 from app.sim.reach_ports import ReachPilot
+from app.sim.safety import SafetySettings
 from app.sim.scene import HumanKind
 
 TIME_LIMIT_S = 5.0
@@ -57,6 +58,7 @@ class LiveReacher:
         clear_m: float,
         time_left: float,
         elapsed: float,
+        safety: SafetySettings | None,
     ) -> Vec:
         """Return the action for the period to come, in [-1, 1], shape (6,).
 
@@ -67,6 +69,7 @@ class LiveReacher:
             clear_m: Distance of robot and people [m].
             time_left: Time left to reach it [s].
             elapsed: Time for which it has been sought [s].
+            safety: What the safety layer assumes that the robot obeys; None without one.
         """
         if self.pilot is None:
             return straight(robot.arm, robot.q, robot.posture_at(goal)[0])
@@ -74,7 +77,7 @@ class LiveReacher:
         batch = self._filled(self.pilot, robot, walkers, clear_m, time_left)
         batch.state.elapsed[0] = elapsed
         batch.state.goal[0] = goal
-        act = np.asarray(self.pilot.acts(batch, self.way)[0], dtype=np.float64)
+        act = np.asarray(self.pilot.acts(batch, self.way, safety)[0], dtype=np.float64)
         self.elapsed_ms = 1e3 * (time.perf_counter() - started)
         return np.clip(act, -1.0, 1.0)
 

@@ -51,6 +51,8 @@ class SetSafety:
     tag: ClassVar[str] = "set-safety"
     on: bool
     """Whether it does."""
+    measured: bool | None = None
+    """Whether the layer goes by the velocities that people are seen with; None as before."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

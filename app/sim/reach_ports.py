@@ -9,6 +9,7 @@ from app.sim.ports import ReachKnown
 
 if TYPE_CHECKING:  # the batch needs the ports first
     from app.sim.reach import ReachBatch
+    from app.sim.safety import SafetySettings
 
 
 class ReachPilot(ReachKnown, Protocol):
@@ -18,10 +19,13 @@ class ReachPilot(ReachKnown, Protocol):
     def ways(self) -> tuple[str, ...]:
         """How it can be asked, ``direct`` among them; see ``app.policies.movers``."""
 
-    def acts(self, batch: "ReachBatch", way: str) -> NDArray[np.float32]:
+    def acts(
+        self, batch: "ReachBatch", way: str, safety: "SafetySettings | None"
+    ) -> NDArray[np.float32]:
         """Return the actions for every environment of a batch, shape (n_envs, 6).
 
         Args:
             batch: Robots, people and goals.
             way: One of ``ways``.
+            safety: What the safety layer assumes that they go through; None without one.
         """

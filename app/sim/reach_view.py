@@ -34,13 +34,15 @@ class SafetyView:
     """What the robot covers until then, v_r T_r + B [m]."""
     margin: float
     """Distance to keep, C + Z_d + Z_r and the protective distance [m]."""
+    measured: bool
+    """Whether the layer goes by the velocities that people are seen with."""
     human_speed: float
-    """Speed assumed for people, v_h [m/s]."""
+    """Speed assumed for people, v_h; where measured what is added to theirs [m/s]."""
     stop_time: float
     """How long a stop takes from now, T_s [s]."""
     zone: Vec
-    """Outline on the floor of where a person would be nearer than S_p [m], shape (n, 2),
-    read-only."""
+    """Outline on the floor of where a person would be nearer than S_p [m], where velocities are
+    measured one who stands; shape (n, 2), read-only."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -26,6 +26,7 @@ from app.sim.commands import Command
 from app.sim.contact import Contact
 from app.sim.kernels.episode import SUCCESS_DISTANCE
 from app.sim.kernels.geometry import FAR
+from app.sim.kernels.occupancy import GROWTH, VX, VY
 from app.sim.live_arm import Bodies
 from app.sim.live_goal import LiveGoal
 from app.sim.live_person import frozen
@@ -145,6 +146,7 @@ class ReachWorld:
                 self._goal.mode = command.mode
             case reach_commands.SetSafety():
                 self._obeys = command.on
+                self._go_by(command.measured)
                 self._follow_goal()
             case reach_commands.SetWay():
                 check_way(command.way, self._reacher.ways)
@@ -160,6 +162,12 @@ class ReachWorld:
         self._reacher.use(pilot)
         self._goal.among = self._goals_drawn()
         self._follow_goal()
+
+    def _go_by(self, measured: bool | None) -> None:
+        """Let the safety layer go by measured velocities or not; None leaves it."""
+        if measured is not None:
+            settings = replace(self._layer.settings, measured=measured)
+            self._layer = SafetyLayer(self._layer.arm, settings)
 
     def _goals_drawn(self) -> Vec | None:
         """Return the goals to draw from: those the policy was trained on, or None for any."""
@@ -260,7 +268,13 @@ class ReachWorld:
             clear = robot.clearance_m if robot.clearance_m is not None else FAR
             left = min(stage.time_left, TIME_LIMIT_S)
             act = self._reacher.act(
-                robot, stage.people.rows, self._goal.position, clear, left, stage.status_s
+                robot,
+                stage.people.rows,
+                self._goal.position,
+                clear,
+                left,
+                stage.status_s,
+                self._layer.settings if self._obeys else None,
             )
             wanted = robot.piece(act, straight=self._reacher.pilot is None)
         else:
@@ -270,9 +284,13 @@ class ReachWorld:
         self._safety = self._seen(told, shapes)
 
     def _shapes(self) -> Shapes:
-        cylinders = self._stage.people.cylinders
-        top = np.full((len(cylinders), 1), self._top)
-        return replace(no_people(), cylinders=np.hstack([cylinders, top]))
+        people = self._stage.people
+        top = np.full((len(people), 1), self._top)
+        return replace(
+            no_people(),
+            cylinders=np.hstack([people.cylinders, top]),
+            going=people.rows[:, [VX, VY, GROWTH]],
+        )
 
     def _seen(self, told: SafetyDecision, shapes: Shapes) -> SafetyView:
         """Return the layer's decision with the terms of S_p."""
@@ -292,7 +310,8 @@ class ReachWorld:
             if terms
             else None,
             margin=layer.settings.margin,
-            human_speed=layer.settings.human_speed,
+            measured=layer.settings.measured,
+            human_speed=layer.settings.other_speed,
             stop_time=told.stop_time,
             zone=frozen(separation_zone(layer.arm, layer.settings, robot.q, robot.qd)),
         )

@@ -59,7 +59,7 @@ class SafetySettings:
     """Greatest speed of any point of a person, v_h [m/s]."""
     measured: bool = False
     """Whether a cylinder whose velocity is known is taken to go on at it, instead of at v_h."""
-    speed_change: float = 0.2
+    speed_change: float = 0.1
     """How much faster such a person may be than was seen, in any direction [m/s]."""
     reaction_time: float = 0.1
     """From a decision to its effect [s]; a part of T_r."""
@@ -90,6 +90,11 @@ class SafetySettings:
         if self.moving_mass <= 0.0 or self.contact_area <= 0.0:
             value = [self.moving_mass, self.contact_area]
             raise InvalidInput("moving_mass, contact_area", value, "must be above 0")
+
+    @property
+    def other_speed(self) -> float:
+        """Speed in any direction, of a cylinder beyond what is seen where that counts [m/s]."""
+        return self.speed_change if self.measured else self.human_speed
 
     @property
     def lead(self) -> float:

@@ -33,7 +33,7 @@ def required_distances(arm: Arm, settings: SafetySettings, qd: Vec) -> Vec:
     fastest = np.concatenate([[0.0], np.cumsum(np.abs(qd) * arm.lever)])
     v_r = fastest[arm.link]
     way = v_r * (t_r + 0.5 * t_stop)
-    return np.asarray(settings.human_speed * (t_r + t_stop) + way + settings.margin)
+    return np.asarray(settings.other_speed * (t_r + t_stop) + way + settings.margin)
 
 
 def separation_zone(arm: Arm, settings: SafetySettings, q: Vec, qd: Vec) -> Vec:

@@ -66,9 +66,9 @@ def test_visitor_opens_the_cell_sees_it_reach_and_gets_in_its_way(
     expect(page.locator('[data-status="moving"]')).to_have_text("Stopped")
     expect(page.locator(".sentence")).to_contain_text("Stopped: the person")
     expect(page.locator('[data-role="override"]')).to_have_attribute("data-override", "0.000")
-    page.click('[data-choice="safety:false"]')
+    page.click('[data-choice="safety:off"]')
     expect(page.locator('[data-role="override"]')).to_contain_text("layer off")
-    page.click('[data-choice="safety:true"]')
+    page.click('[data-choice="safety:measured"]')
     page.click('[data-action="remove-person"]')
     expect(page.locator('[data-role="override"]')).to_have_attribute("data-override", "1.000")
     assert state(server)["people"] == []
@@ -117,6 +117,6 @@ def test_reach_page_fits_a_phone(open_page: Callable[..., Page], reaching: str) 
     page = open_page(PHONE, scene=False)
     assert state(reaching)["cell"] == CELL.name
     assert page.evaluate("document.documentElement.scrollWidth") <= PHONE[0]
-    for part in ('[data-choice="safety:true"]', ".gauge", ".terms", ".tiles"):
+    for part in ('[data-choice="safety:assumed"]', ".gauge", ".terms", ".tiles"):
         page.locator(part).first.scroll_into_view_if_needed()
         expect(page.locator(part).first).to_be_visible()

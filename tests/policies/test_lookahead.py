@@ -13,11 +13,11 @@ from app.policies.reach_policy import ReachPolicy
 from app.sim.cells import load_cell
 from app.sim.forecasts import new_forecaster
 from app.sim.kernels import lookahead as kernel
-from app.sim.kernels import other_ways, random
+from app.sim.kernels import other_ways, played_ways, random
 from app.sim.kernels.arm import place_robot
 from app.sim.kernels.episode import COLLISION, RUNNING, SUCCESS
 from app.sim.kernels.forecast import STEP_S, Network
-from app.sim.kernels.foretold import N_PLAYED
+from app.sim.kernels.foretold import MOMENTS, N_PLAYED, foretell
 from app.sim.kernels.occupancy import GAIT, STILL, VX, VY, X, Y
 from app.sim.kernels.reach import Work, new_work
 from app.sim.reach import ReachBatch, ReachSettings
@@ -42,12 +42,12 @@ def walked(batch: ReachBatch, periods: int) -> ReachBatch:
     return batch
 
 
-def looked(n_envs: int, *people: str) -> tuple[kernel.Lookahead, Work, ReachBatch]:
+def looked(n_envs: int, *people: str) -> tuple[played_ways.Lookahead, Work, ReachBatch]:
     """Return work space, and robots that are on their way."""
     batch = walked(batch_of(n_envs, *people), 15)
     network = POLICY.kernel_network
     assert network is not None
-    look = kernel.new_lookahead(batch.arm, network, BASE_WEIGHT, n_envs)
+    look = played_ways.new_lookahead(batch.arm, network, BASE_WEIGHT, n_envs)
     return look, new_work(batch.world, batch.state, new_forecaster()), batch
 
 
@@ -57,17 +57,17 @@ def test_what_is_played_is_what_happens_beside_constant_people() -> None:
     live = np.flatnonzero(batch.state.outcome == RUNNING)
     network = POLICY.kernel_network
     assert network is not None
-    look = kernel.new_lookahead(batch.arm, network, BASE_WEIGHT, 150)
+    look = played_ways.new_lookahead(batch.arm, network, BASE_WEIGHT, 150)
     work = new_work(batch.world, batch.state, new_forecaster())
     rule, told = batch.settings.action.rule(), {}
     acts = mover_of(POLICY, "direct").acts(batch)
     for row in live:
-        n = kernel.foretell(batch.world, batch.state, row, work, look.foretold)
+        n = foretell(batch.world, batch.state, row, MOMENTS, work, look.foretold)
         look.begun[:] = acts[row]
-        told[row] = kernel._play(
+        told[row] = played_ways.play(
             batch.world, rule, batch.state, row, PASSED, 0, 0, 1.0, n, work, look
         )[0]
-    walked(batch, round(N_PLAYED * kernel.STEP_S / batch.arm.dt))
+    walked(batch, round(N_PLAYED * STEP_S / batch.arm.dt))
     found = batch.state.outcome[live]
     same = [told[row] == end for row, end in zip(live, found, strict=True)]
     assert (found == SUCCESS).sum() > 30
@@ -84,13 +84,13 @@ def test_dashes_end_as_they_are_played() -> None:
     live = np.flatnonzero(walked(batch, 45).state.outcome == RUNNING)
     network = POLICY.kernel_network
     assert network is not None
-    look = kernel.new_lookahead(batch.arm, network, BASE_WEIGHT, dashes)
+    look = played_ways.new_lookahead(batch.arm, network, BASE_WEIGHT, dashes)
     work = new_work(batch.world, batch.state, new_forecaster())
     rule, told = batch.settings.action.rule(), np.zeros(dashes, dtype=np.int64)
     for row in live:
-        n = kernel.foretell(batch.world, batch.state, row, work, look.foretold)
+        n = foretell(batch.world, batch.state, row, MOMENTS, work, look.foretold)
         way = other_ways.way_of(other_ways.N_FIRST + row)
-        told[row] = kernel._play(
+        told[row] = played_ways.play(
             batch.world, rule, batch.state, row, *way, 0, 1.0, n, work, look
         )[0]
     periods = round(STEP_S / batch.arm.dt)
@@ -115,10 +115,10 @@ def test_darts_end_as_they_are_played() -> None:
     aims, lasting, told = np.zeros((n_envs, 6)), np.zeros(n_envs, dtype=int), np.zeros(n_envs)
     live = np.flatnonzero(batch.state.outcome == RUNNING)
     for row in live:
-        n = kernel.foretell(batch.world, batch.state, row, work, look.foretold)
+        n = foretell(batch.world, batch.state, row, MOMENTS, work, look.foretold)
         lasting[row] = other_ways.draw_dart(batch.arm, batch.state.q[row], rng, look.dart)
         aims[row] = look.dart
-        told[row] = kernel._play(
+        told[row] = played_ways.play(
             batch.world, rule, batch.state, row, other_ways.DART, lasting[row],
             0, 0.0, n, work, look,
         )[0]  # fmt: skip
@@ -154,10 +154,10 @@ def test_what_is_gone_on_with_is_what_was_played() -> None:
     for _ in range(periods * other_ways.DART_PLAYED):
         live = np.flatnonzero(batch.state.outcome == RUNNING)
         for row in live:
-            n = kernel.foretell(batch.world, batch.state, row, work, look.foretold)
+            n = foretell(batch.world, batch.state, row, MOMENTS, work, look.foretold)
             way = kernel._left(row, look, batch.arm.dt)
             gone = look.plan[row, 1] % periods
-            told[row], _ = kernel._play(
+            told[row], _ = played_ways.play(
                 batch.world, rule, batch.state, row, *way, gone, 0.0, n, work, look
             )
             look.last[row] = look.found
@@ -170,10 +170,12 @@ def test_what_is_gone_on_with_is_what_was_played() -> None:
     assert ((came < np.inf) & (batch.state.outcome == SUCCESS)).sum() > 5
 
 
-def straight(batch: ReachBatch, row: int, work: Work, look: kernel.Lookahead) -> np.ndarray:
+def straight(
+    batch: ReachBatch, row: int, work: Work, look: played_ways.Lookahead
+) -> np.ndarray:
     """Return the action that leads the tcp of a row straight to its goal."""
     place_robot(batch.arm, batch.state.q[row], work.robot)
-    kernel._straight(batch.world, batch.state.goal[row], work, look)
+    played_ways._straight(batch.world, batch.state.goal[row], work, look)
     return look.act.copy()
 
 
@@ -207,7 +209,7 @@ def test_a_way_into_the_table_is_changed(people: tuple[str, ...]) -> None:
     n_obs, lowers = POLICY.n_obs, np.zeros(6, dtype=np.float32)
     lowers[1] = 3.0
     layers = [np.zeros(shape, dtype=np.float32) for shape in ((n_obs, 4), 4, (4, 4), 4, (4, 6))]
-    look = kernel.new_lookahead(batch.arm, Network(*layers, lowers), 0.0, 1)
+    look = played_ways.new_lookahead(batch.arm, Network(*layers, lowers), 0.0, 1)
     work = new_work(batch.world, batch.state, new_forecaster())
     rule, act = batch.settings.action.rule(), np.tanh(lowers)[None]
     way = np.full(1, PASSED)

@@ -2,15 +2,17 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from app.policies.movers import mover_of
+from app.policies.lookahead import NO_LAYER
+from app.policies.movers import Ahead, mover_of
 from app.policies.reach_pilot import ReachPilot
 from app.policies.reach_policy import ReachPolicy
 from app.sim import commands
 from app.sim.cells import load_cell
 from app.sim.live_reacher import TIME_LIMIT_S, LiveReacher
 from app.sim.reach import ReachBatch, ReachSettings
-from app.sim.reach_commands import SetPilot, SetWay
+from app.sim.reach_commands import SetPilot, SetSafety, SetWay
 from app.sim.reach_world import ReachWorld
+from app.sim.safety import SafetySettings
 from tests.policies.untrained import untrained_reach
 
 CELL = load_cell("shared-workspace")
@@ -45,6 +47,7 @@ def test_live_state_is_seen_as_the_batch_sees_it(policy: ReachPolicy) -> None:
             float(state.clear[0, 0]),
             float(state.time_left[0]),
             float(state.elapsed[0]),
+            None,
         )
         assert np.allclose(act, mover_of(policy, way).acts(batch)[0], atol=1e-6)
 
@@ -56,9 +59,24 @@ class Noting(ReachPilot):
         super().__init__(actor)
         self.told: list[tuple[float, float]] = []
 
-    def acts(self, batch: ReachBatch, way: str) -> NDArray[np.float32]:
+    def acts(
+        self, batch: ReachBatch, way: str, safety: SafetySettings | None
+    ) -> NDArray[np.float32]:
         self.told.append((float(batch.state.elapsed[0]), float(batch.state.time_left[0])))
-        return super().acts(batch, way)
+        return super().acts(batch, way, safety)
+
+
+@pytest.mark.parametrize(("on", "measured"), [(True, True), (True, False), (False, True)])
+def test_looking_ahead_is_told_of_the_layer_that_is_obeyed(
+    policy: ReachPolicy, on: bool, measured: bool
+) -> None:
+    pilot = ReachPilot(policy)
+    world = ReachWorld(CELL, pilot, seed=1)
+    world.apply(SetWay(way="direct-ahead"))
+    world.apply(SetSafety(on=on, measured=measured))
+    mover = pilot._movers["direct-ahead"]
+    assert isinstance(mover, Ahead)
+    assert (mover.layer != NO_LAYER) == (on and measured)
 
 
 def test_under_the_layer_the_policy_has_its_usual_time_and_looking_ahead_the_true_one(

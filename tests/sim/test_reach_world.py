@@ -138,6 +138,22 @@ def test_without_the_layer_the_robot_runs_into_whom_it_does_not_see() -> None:
     assert np.allclose(again.robot_q, CELL.robot.home_q, atol=0.02)
 
 
+def test_who_stands_near_does_not_hold_the_robot_where_velocities_are_measured() -> None:
+    world = ReachWorld(CELL, None, seed=3)
+    x, y, _ = world.snapshot().tcp
+    standing_at(world, float(x), float(y) + 0.75)
+    assumed = world.snapshot().reach.safety
+    world.apply(SetSafety(on=True, measured=True))
+    measured = world.snapshot().reach.safety
+    assert assumed.advised < measured.advised == 1.0
+    assert (assumed.measured, measured.measured) == (False, True)
+    assert (assumed.human_speed, measured.human_speed) == (1.6, pytest.approx(0.1))
+    assert measured.required < assumed.required
+    assert np.ptp(measured.zone, axis=0).max() < np.ptp(assumed.zone, axis=0).max() - 0.3
+    world.apply(SetSafety(on=False))
+    assert world.snapshot().reach.safety.measured
+
+
 def test_goal_that_is_not_reached_in_time_counts_and_is_tried_again() -> None:
     world = ReachWorld(CELL, None, seed=3)
     standing_at(world, 0.0, 0.8)

@@ -40,7 +40,8 @@ function Safety({ world, history }) {
       <h2 id="safety-title">How fast it may go</h2>
       <span class="hint" tabindex="0" aria-describedby="safety-help">speed and separation
         <span class="tip tip-left" role="tooltip" id="safety-help">The robot must be able to stop
-          before a person walking at ${safety.human_speed.toFixed(1)} m/s could reach it. The layer
+          before a person ${safety.measured ? "who goes on as seen, or up to" : "walking at"}
+          ${safety.human_speed.toFixed(1)} m/s${safety.measured ? " faster," : ""} could reach it. The layer
           looks at the very path ahead; the sum S_p is the standard’s bound for it, so near the
           limit the two differ a little, and a robot that moves away may be faster. S_p adds what
           the person and the robot may cover until it rests, and a distance to keep free.

@@ -7,8 +7,9 @@ const GOAL_MODES = [
   ["follow", "Follows me", "It stays where you drag it: take the arrows in the scene"],
 ];
 const SAFETY = [
-  [true, "On", "The robot obeys the safety layer"],
-  [false, "Off", "See what happens without"],
+  ["assumed", "Worst case", "The robot obeys the safety layer: anybody may come from anywhere at the assumed speed"],
+  ["measured", "As seen", "The layer goes by the velocities that people are seen with, and the policy keeps clear of it"],
+  ["off", "Off", "See what happens without"],
 ];
 const BETWEEN = [
   [true, "On", "The policy is asked about the targets around the goal, and their mean is taken"],
@@ -39,8 +40,8 @@ export function ReachControls({ world, send }) {
     <button type="button" class="tool" data-action="new-goal" title="Draw another goal"
       onClick=${() => send({ tag: "new-goal" })}><${Icon} name="reset" />New goal</button>
     <span class="dock-pair"><span class="dock-label dock-label-free" id="layer-label">Safety layer</span>
-      <${Segmented} labelledby="layer-label" name="safety" value=${safety.on} items=${SAFETY}
-        onPick=${(on) => send({ tag: "set-safety", on })} /></span>
+      <${Segmented} labelledby="layer-label" name="safety" value=${layerOf(safety)} items=${SAFETY}
+        onPick=${(one) => send({ tag: "set-safety", on: one !== "off", ...(one !== "off" && { measured: one === "measured" }) })} /></span>
     ${ways.includes("interpolated") && html`<span class="dock-pair">
       <span class="dock-label dock-label-free" id="between-label">Interpolation</span>
       <${Segmented} labelledby="between-label" name="between" value=${between} items=${BETWEEN}
@@ -54,6 +55,12 @@ export function ReachControls({ world, send }) {
       <${Segmented} labelledby="beside-label" name="beside" value=${averaged} items=${BESIDE}
         onPick=${(one) => ask(one, between, ahead)} /></span>`}
   </div>`;
+}
+
+/** Which of the choices holds for the safety layer. */
+function layerOf({ on, measured }) {
+  if (!on) return "off";
+  return measured ? "measured" : "assumed";
 }
 
 /** A choice of one; `items` are [value, label, title]. */

@@ -24,7 +24,12 @@ class SafetyLive(Answer):
     person_way: float | None = Field(description="v_h (T_r + T_s) [m]")
     robot_way: float | None = Field(description="v_r T_r + B [m]")
     margin: float = Field(description="C + Z_d + Z_r and the protective distance [m]")
-    human_speed: float = Field(description="speed assumed for people, v_h [m/s]")
+    measured: bool = Field(
+        description="the layer goes by the velocities that people are seen with"
+    )
+    human_speed: float = Field(
+        description="speed assumed for people, v_h; where measured, added to theirs [m/s]"
+    )
     stop_time: float = Field(description="how long a stop takes from now, T_s [s]")
 
     @classmethod
@@ -116,11 +121,16 @@ class SetSafety(Body):
     """Let the robot obey the safety layer, or see what happens without."""
 
     tag: Literal["set-safety"]
-    on: bool
+    on: bool = Field(description="whether the robot obeys the layer")
+    measured: bool | None = Field(
+        None,
+        description="whether the layer goes by the velocities that people are seen with, "
+        "instead of a speed in every direction; null leaves that as it is",
+    )
 
     def to_domain(self) -> commands.Command:
         """Return the world's command."""
-        return reach_commands.SetSafety(on=self.on)
+        return reach_commands.SetSafety(on=self.on, measured=self.measured)
 
 
 class SetWay(Body):

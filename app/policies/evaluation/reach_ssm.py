@@ -8,7 +8,9 @@ distance of the source's comparison.
 ===================  ========================================================================
 ``policy``           the checkpoint, asked every 20 ms
 ``policy-ahead``     the same, each decision played ahead (``lookahead.py``) for contacts with
-                     people, cell and itself; what is played knows nothing of the layer
+                     people, cell and itself, and, where velocities are measured, for those whom
+                     the layer would hold the robot for
+``policy-heedless``  there the same, but what is played knows nothing of the layer
 ``policy-unaware``   the shipped policy that knows of no safety layer, where the checkpoint was
                      trained under it
 ``rrt-star-once``    planned once among people as they stand at the start, as in the source
@@ -24,15 +26,19 @@ distance of the source's comparison.
 ``hindsight-free``   of the same replays the one that the layer holds least
 ===================  ========================================================================
 
+Rows that end in ``measured`` have the same layer going by measured velocities, the others take
+people to come at 1.6 m/s from wherever they are, as where nothing is known of their speed.
+
 The time to the goal is that of the runs which arrive; ``time_capped_s`` is over all runs and
 counts those not there in CAP_S as CAP_S. People give way to nothing, so they may walk into a
 robot that the layer holds: such a run is counted (``contacts_at_rest``), and goes on once they
 have passed; ``time_untouched_s`` leaves it out. A link touched in motion ends the run.
-``below_half_s`` includes the time at 0, ``stopped_s``. Planners arrive, like policies, once the
-tcp is within 0.1 m of the goal.
+``below_half_s`` includes the time at 0, ``stopped_s``; ``held_s`` is the part of that in which
+the robot is at rest: a stop may be begun and not ended. Planners arrive, like policies, once
+the tcp is within 0.1 m of the goal.
 
 ``random`` is another trial: random goals and people who walk about (METHOD 2.1) for RANDOM_S,
-with the policy under the layer, and ``random-still`` the same beside a robot that stays at
+with the policy under either layer, and ``random-still`` the same beside a robot that stays at
 home: contacts, apart by whether the robot moved.
 """
 
@@ -49,8 +55,8 @@ from app.policies.checkpoint import Checkpoint
 from app.policies.evaluation.reach_episodes import N_ENVS, random_goals
 from app.policies.evaluation.rows import OnRow, untold
 from app.policies.evaluation.statistics import mean_of, wilson
-from app.policies.lookahead import looks_ahead
-from app.policies.movers import Mover, mover_of
+from app.policies.lookahead import NO_LAYER, layer_of, looks_ahead
+from app.policies.movers import Ahead, Mover, mover_of
 from app.policies.reach_policy import ReachPolicy
 from app.policies.trained_cell import cell_of
 from app.sim.actions import ActionSettings
@@ -71,6 +77,8 @@ from app.sim.scene import arm_of
 Json = dict[str, Any]
 AHEAD = "policy-ahead"
 """Row of the policy where it looks ahead."""
+MEASURED = " measured"
+"""End of the rows in which the layer goes by measured velocities."""
 CAP_S = 20.0
 """Longest run of a crossing [s]."""
 RANDOM_EPISODES = 10_000
@@ -130,7 +138,9 @@ def course_row(name: str, runs: GuardedRuns) -> Json:
         "below_half_s": _spread(runs.below_half_s),
         "stopped_s": _spread(runs.stopped_s),
         "standing_s": _spread(runs.standing_s),
+        "held_s": _spread(runs.held_s),
         "never_stopped": wilson(int((runs.stopped_s == 0.0).sum()), n),
+        "never_held": wilson(int((runs.held_s == 0.0).sum()), n),
         "joint_way_rad": _spread(runs.joint_way[arrived]),
         "tool_way_m": _spread(runs.tool_way[arrived]),
         **contacts_of(runs),
@@ -405,11 +415,16 @@ def example_of(courses: Mapping[str, Course], dt: float) -> Json:
     }
 
 
-def movers_of(checkpoint: Checkpoint, actor: ReachPolicy) -> dict[str, Mover]:
+def movers_of(
+    checkpoint: Checkpoint, actor: ReachPolicy, safety: SafetySettings, dt: float
+) -> dict[str, Mover]:
     """Return who stands in for the policy, by row; see the head of this file."""
-    movers = {"policy": mover_of(actor, "direct")}
+    direct, layer = mover_of(actor, "direct"), layer_of(safety, dt)
+    movers = {"policy": direct}
     if looks_ahead(actor):
-        movers[AHEAD] = mover_of(actor, "direct-ahead")
+        movers[AHEAD] = Ahead(direct, actor, layer)
+        if layer != NO_LAYER:
+            movers["policy-heedless"] = Ahead(direct, actor)
     if checkpoint.manifest["preset"].get("safety") == "ssm":
         other = ReachPolicy(pretrained.load("reach"))
         if (other.action, other.view) == (actor.action, actor.view):
@@ -485,31 +500,49 @@ def run_ssm(
     """
     n_random = episodes or RANDOM_EPISODES
     actor, cell = ReachPolicy(checkpoint), cell_of(checkpoint.manifest)
-    moved, safety = movers_of(checkpoint, actor), safety_settings(cell)
     settings = ReachSettings(action=actor.action, observation=actor.view)
     n = min(N_CROSSINGS, n_random)
     sets = {"": crossings(cell, n)}
     if motions:
         sets[" recorded"] = recorded_crossings(cell, motions, min(N_RECORDED, n_random))
-    rows = _Rows(len(sets) * (len(PLANNERS) + len(moved) + 5) + 2, on_row)
-    result: Json = {"paired": {}}
-    for suffix, crossed in sets.items():
-        comparison = Comparison(cell, crossed, settings, safety, seed)
-        courses = compare(comparison, moved, rows, suffix)
-        result["paired"] |= {
-            f"{mine} against {name}{suffix}": against(courses[mine].runs, courses[name].runs)
-            for mine in moved
-            for name in PLANNERS
-        }
-        if not suffix:
-            result["seconds"] = seconds_of(courses)
-            result["example"] = example_of(courses, cell.robot.dt)
-    for name, mover in {"random": moved["policy"], "random-still": _Still()}.items():
+    assumed = safety_settings(cell)
+    layers = {"": assumed, MEASURED: replace(assumed, measured=True)}
+    acting = {
+        end: movers_of(checkpoint, actor, safety, cell.robot.dt)
+        for end, safety in layers.items()
+    }
+    each = sum(len(PLANNERS) + len(movers) + 5 for movers in acting.values())
+    rows = _Rows(len(sets) * each + 3, on_row)
+    result: Json = {"paired": {}, "seconds": {}, "example": {}}
+    for name, crossed in sets.items():
+        for end, safety in layers.items():
+            comparison = Comparison(cell, crossed, settings, safety, seed)
+            courses = compare(comparison, acting[end], rows, name + end)
+            result["paired"] |= paired_of(courses, acting[end], name + end)
+            if not name:
+                result["seconds"][end.strip()] = seconds_of(courses)
+                result["example"][end.strip()] = example_of(courses, cell.robot.dt)
+    policy = acting[""]["policy"]
+    trials: dict[str, tuple[Mover, SafetySettings]] = {
+        "random": (policy, layers[""]),
+        "random-still": (_Still(), layers[""]),
+        "random" + MEASURED: (policy, layers[MEASURED]),
+    }
+    for name, (mover, safety) in trials.items():
         rows.add(random_row(name, random_runs(cell, settings, safety, mover, n_random, seed)))
     return {
-        "settings": stated(safety, n, [motion.source for motion in motions]),
+        "settings": stated(assumed, n, [motion.source for motion in motions]),
         "results": rows.rows,
         **result,
+    }
+
+
+def paired_of(courses: Mapping[str, Course], movers: Mapping[str, Mover], end: str) -> Json:
+    """Return what each mover saves against each planner, by names of rows."""
+    return {
+        f"{mine} against {name}{end}": against(courses[mine].runs, courses[name].runs)
+        for mine in movers
+        for name in PLANNERS
     }
 
 
@@ -523,6 +556,7 @@ def stated(safety: SafetySettings, n: int, sources: Sequence[str]) -> Json:
         "random_s": RANDOM_S,
         "planner_margin_m": MARGIN,
         "safety": safety.describe(),
+        "measured": replace(safety, measured=True).describe(),
         "motions": list(sources),
     }
 

@@ -39,7 +39,9 @@ from app.sim.ports import Vec
 
 N_PLAYED = 32
 """Steps of the forecast that are played."""
-N_MOMENTS = N_PLAYED + N_TIMES + 1
+LONG_PLAYED = 150
+"""Steps that are played where somebody may have to pass first."""
+MOMENTS, LONG_MOMENTS = N_PLAYED + N_TIMES + 1, LONG_PLAYED + N_TIMES + 1
 """Moments at which it is known where people will be: now, and from each step played as far as
 the features of ``reach_ways.py`` look."""
 
@@ -48,7 +50,8 @@ class Foretold(NamedTuple):
     """Everybody at every moment, and work space."""
 
     places: Vec
-    """x, y and radius of everybody, now and at each step [m], (N_MOMENTS, MAX_PEOPLE, 3)."""
+    """x, y and radius of everybody, now and at each step [m], (LONG_MOMENTS, MAX_PEOPLE, 3).
+    """
     person: Vec
     """One person: x, y [m], vx, vy [m/s], r [m], growth [m/s], shape (6,)."""
     fit: Fit
@@ -64,7 +67,7 @@ class Foretold(NamedTuple):
 def new_foretold(n_envs: int) -> Foretold:
     """Return work space for so many environments."""
     return Foretold(
-        places=np.zeros((N_MOMENTS, MAX_PEOPLE, 3)),
+        places=np.zeros((LONG_MOMENTS, MAX_PEOPLE, 3)),
         person=np.zeros(N_SEEN),
         fit=new_fit(),
         found=np.zeros((n_envs, MAX_PEOPLE, 2, N_CONSTANTS)),
@@ -75,7 +78,7 @@ def new_foretold(n_envs: int) -> Foretold:
 
 @kernel()
 def foretell(
-    world: ReachWorld, state: ReachState, e: int, work: Work, foretold: Foretold
+    world: ReachWorld, state: ReachState, e: int, moments: int, work: Work, foretold: Foretold
 ) -> int:
     """Fill ``foretold.places`` with the people of environment ``e``; return how many they are.
 
@@ -85,6 +88,7 @@ def foretell(
         world: Shared data.
         state: Rows.
         e: Environment.
+        moments: How many are filled: MOMENTS or LONG_MOMENTS.
         work: Work space.
         foretold: Filled.
     """
@@ -104,22 +108,23 @@ def foretell(
         for i in range(N_TIMES):
             for m in range(3):
                 places[i + 1, p, m] = ahead[i, p, m]
-        for i in range(N_TIMES + 1, N_MOMENTS):
+        for i in range(N_TIMES + 1, moments):
             for m in range(2):
                 places[i, p, m] = 2.0 * places[i - 1, p, m] - places[i - 2, p, m]
             places[i, p, 2] = places[i - 1, p, 2]
         if who >= n_workers:
             row = state.people.walkers.rows[e, p - n_workers]
             rule = world.people.walkers.rows[p - n_workers]
-            _tell_radius(row, rule, since, p, foretold.found[e, p, 0], foretold)
-            _tell_way(row, rule, since, world.arm.dt, e, p, foretold)
-            _stay_inside(rule, p, places)
+            found = foretold.found[e, p, 0]
+            _tell_radius(row, rule, since, p, moments, found, foretold)
+            _tell_way(row, rule, since, world.arm.dt, e, p, moments, foretold)
+            _stay_inside(rule, p, places, moments)
     return n
 
 
 @kernel()
 def _tell_radius(
-    row: Vec, rule: Vec, since: float, p: int, found: Vec, foretold: Foretold
+    row: Vec, rule: Vec, since: float, p: int, moments: int, found: Vec, foretold: Foretold
 ) -> None:
     """Put the function behind a walker's radius in place of its forecast, if it is found.
 
@@ -131,21 +136,28 @@ def _tell_radius(
     r, places = foretold.person[4], foretold.places
     known = find_function(foretold.fit, r, row[AGE], past, limits, False, since, found)
     middle, beyond = 0.5 * (limits.low + limits.high), r < limits.low or r > limits.high
-    for i in range(1, N_MOMENTS):
+    for i in range(1, moments):
         value = value_at(found, middle, STEP_S * i) if known else places[i, p, 2]
         places[i, p, 2] = r if beyond else min(limits.high, max(limits.low, value))
 
 
 @kernel()
-def _stand(p: int, places: Vec) -> None:
+def _stand(p: int, places: Vec, moments: int) -> None:
     """Foretell a walker where he is now."""
-    for i in range(1, N_MOMENTS):
+    for i in range(1, moments):
         places[i, p, 0], places[i, p, 1] = places[0, p, 0], places[0, p, 1]
 
 
 @kernel()
 def _tell_way(
-    row: Vec, rule: Vec, since: float, dt: float, e: int, p: int, foretold: Foretold
+    row: Vec,
+    rule: Vec,
+    since: float,
+    dt: float,
+    e: int,
+    p: int,
+    moments: int,
+    foretold: Foretold,
 ) -> None:
     """Put the function behind a walker's speed in place of its forecast, if it is found.
 
@@ -160,17 +172,17 @@ def _tell_way(
     if speed > 0.0:
         course[0], course[1] = person[2] / speed, person[3] / speed
     if speed == 0.0 and not past.any():
-        _stand(p, places)
+        _stand(p, places, moments)
         return
     if course[0] == 0.0 and course[1] == 0.0:
         return
     if not find_function(foretold.fit, speed, row[AGE], past, limits, True, since, found):
         return
     if speed == 0.0 and value_at(found, middle, 0.0) >= limits.low:
-        _stand(p, places)  # It is not for its function that this one stands.
+        _stand(p, places, moments)  # It is not for its function that this one stands.
         return
     x, y, t = person[0], person[1], 0.0
-    for i in range(1, N_MOMENTS):
+    for i in range(1, moments):
         while t < STEP_S * i - 0.5 * dt:
             v = value_at(found, middle, t)
             v = 0.0 if v < limits.low else min(limits.high, v)
@@ -189,10 +201,10 @@ def _inside(rule: Vec, place: Vec) -> bool:
 
 
 @kernel()
-def _stay_inside(rule: Vec, p: int, places: Vec) -> None:
+def _stay_inside(rule: Vec, p: int, places: Vec, moments: int) -> None:
     """Let a walker that is in its area stand where its way would leave it."""
     if not _inside(rule, places[0, p]):
         return
-    for i in range(1, N_MOMENTS):
+    for i in range(1, moments):
         if not _inside(rule, places[i, p]):
             places[i, p, 0], places[i, p, 1] = places[i - 1, p, 0], places[i - 1, p, 1]

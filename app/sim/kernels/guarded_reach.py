@@ -51,13 +51,14 @@ from app.sim.kernels.trial_people import TrialWork, people_speed
 from app.sim.kernels.watch import NOW, Safety, Watch, place_node
 from app.sim.ports import Vec
 
-N_ACCOUNT = 10
+N_ACCOUNT = 11
 (
     PERIODS,
     STOPPED,
     BELOW_HALF,
     SLOWED,
     STANDING,
+    HELD,
     JOINT_WAY,
     TOOL_WAY,
     CONTACT,
@@ -65,8 +66,9 @@ N_ACCOUNT = 10
     FASTEST,
 ) = range(N_ACCOUNT)
 """Of an episode: periods; those with override 0, below one half and below 1; those at whose end
-the robot stands, for whatever reason; the way of the joints [rad] and of the tcp [m]; NO_TOUCH,
-PERSON or CELL; speed of the touching link [m/s]; greatest speed of any person [m/s]."""
+the robot stands, for whatever reason, and those of them with override 0; the way of the joints
+[rad] and of the tcp [m]; NO_TOUCH, PERSON or CELL; speed of the touching link [m/s]; greatest
+speed of any person [m/s]."""
 NO_TOUCH, PERSON, CELL = range(3)
 """What touched the robot in an episode; at its end, where that ends it."""
 AT_REST = 1e-3
@@ -235,7 +237,9 @@ def _arrive(world: ReachWorld, state: ReachState, e: int, guard: Guard, work: Wo
         fastest = max(fastest, abs(watch.qd[j]))
         state.q[e, j], state.qd[e, j], state.qdd[e, j] = watch.q[j], watch.qd[j], watch.qdd[j]
     account[JOINT_WAY] += math.sqrt(square)
-    account[STANDING] += 1.0 if fastest < AT_REST else 0.0
+    if fastest < AT_REST:
+        account[STANDING] += 1.0
+        account[HELD] += 1.0 if guard.override[e] <= 0.0 else 0.0
     place_robot(arm, state.q[e], work.robot)
     tcp = work.robot.tcp
     account[TOOL_WAY] += math.sqrt((tcp[0] - x) ** 2 + (tcp[1] - y) ** 2 + (tcp[2] - z) ** 2)

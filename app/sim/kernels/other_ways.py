@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from app.sim.kernels import random
 from app.sim.kernels.arm import Arm
 from app.sim.kernels.compiled import kernel
-from app.sim.kernels.foretold import N_MOMENTS, N_PLAYED
+from app.sim.kernels.foretold import MOMENTS, N_PLAYED
 from app.sim.ports import Vec
 
 GAIN = 5.0
@@ -58,10 +58,10 @@ N_DRAWN = N_FIRST + len(DIRECTIONS) * len(DASHING)
 """Ways but the darts."""
 N_OTHERS = N_DRAWN + 1
 """All ways; first those that the policy ends, then the dashes; the darts are the last one."""
-N_DARTS = 32
-"""Darts of one decision."""
-DART_PLAYED = N_MOMENTS - 1
-"""For how many steps a dart is played."""
+N_DARTS, N_DARTS_LAYERED = 32, 128
+"""Darts of one decision, and under a safety layer, where most of the ways begun are darts."""
+DART_PLAYED = MOMENTS - 1
+"""For how many steps a dart is played, and the longest that one leads away."""
 AROUND = np.array([1.5, 0.8, 0.8, 0.8, 0.8, 0.0])
 """How far from home, or from where the robot is, a dart may lead [rad]."""
 WAITING = 0.25

@@ -47,6 +47,8 @@ def test_every_run_counts_and_the_layer_keeps_every_link_in_motion_apart(straigh
     total = straight.runs.seconds[straight.runs.arrived].sum() + late * CAP_S
     assert row["time_capped_s"]["mean"] == pytest.approx(total / 6)
     assert row["below_half_s"]["mean"] >= row["stopped_s"]["mean"] > 0.0
+    assert row["stopped_s"]["mean"] >= row["held_s"]["mean"] > 0.0
+    assert row["never_held"]["mean"] >= row["never_stopped"]["mean"]
 
 
 def test_the_overrides_told_are_those_counted(straight):
@@ -102,7 +104,9 @@ def test_the_protocol_runs_policy_planners_recordings_and_random_episodes(monkey
     )
     names = [row["name"] for row in result["results"]]
     assert names[:4] == ["policy", "policy-ahead", "rrt-star-once", "every-tick"]
-    assert "policy recorded" in names and names[-2:] == ["random", "random-still"]
+    assert {"policy recorded", "policy measured", "policy-heedless measured"} <= set(names)
+    assert "policy-heedless" not in names and "policy-ahead recorded measured" in names
+    assert names[-3:] == ["random", "random-still", "random measured"]
     assert [total for _, total, _ in told] == [len(names)] * len(names)
     assert all(
         row["contacts_moving"] == 0 for row in result["results"] if "bare" not in row["name"]
@@ -111,4 +115,6 @@ def test_the_protocol_runs_policy_planners_recordings_and_random_episodes(monkey
     assert {f"{mine} against every-tick recorded" for mine in names[:2]} <= set(
         result["paired"]
     )
-    assert len(result["seconds"]["policy-ahead"]) == 2
+    assert "policy-ahead against every-tick measured" in result["paired"]
+    assert len(result["seconds"][""]["policy-ahead"]) == 2
+    assert set(result["example"]) == {"", "measured"}

@@ -6,7 +6,7 @@ import pytest
 from app.sim.cells import load_cell
 from app.sim.forecasts import new_forecaster
 from app.sim.kernels.forecast import STEP_S
-from app.sim.kernels.foretold import N_MOMENTS, foretell, new_foretold
+from app.sim.kernels.foretold import MOMENTS, foretell, new_foretold
 from app.sim.kernels.occupancy import (
     COURSE_X,
     LEFT,
@@ -46,16 +46,16 @@ def watched(batch: ReachBatch, periods: int) -> tuple[Vec, Vec]:
     """Foretell at every period, as a policy does; return what was told of all, and the rows.
 
     Returns:
-        Places, shape (periods, n_envs, N_MOMENTS, 3), and walkers, (periods, n_envs, N_STATE).
+        Places, shape (periods, n_envs, MOMENTS, 3), and walkers, (periods, n_envs, N_STATE).
     """
     work, foretold = new_work(batch.world, batch.state, new_forecaster()), new_foretold(N_ENVS)
     told, rows = [], []
     for _ in range(periods):
         foretold.since[:] += batch.arm.dt
-        now = np.empty((N_ENVS, N_MOMENTS, 3))
+        now = np.empty((N_ENVS, MOMENTS, 3))
         for e in range(N_ENVS):
-            assert foretell(batch.world, batch.state, e, work, foretold) == 1
-            now[e] = foretold.places[:, 0]
+            assert foretell(batch.world, batch.state, e, MOMENTS, work, foretold) == 1
+            now[e] = foretold.places[:MOMENTS, 0]
         told.append(now)
         rows.append(batch.state.people.walkers.rows[:, :1].copy())
         batch.state.outcome[:] = 0  # people go on, whatever becomes of the robot
@@ -112,7 +112,7 @@ def test_who_is_smaller_or_larger_than_walkers_are_is_foretold_to_stay_so(times:
     work, foretold = new_work(batch.world, batch.state, new_forecaster()), new_foretold(N_ENVS)
     for e in range(N_ENVS):
         remember_as_now(rows, e, 0)
-        foretell(batch.world, batch.state, e, work, foretold)
+        foretell(batch.world, batch.state, e, MOMENTS, work, foretold)
         np.testing.assert_array_equal(foretold.places[:, 0, 2], r)
 
 
@@ -122,5 +122,5 @@ def test_nobody_is_foretold_to_leave_the_walking_area() -> None:
     rule = batch.world.people.walkers.rows[0]
     low, high = rule[[X_MIN, Y_MIN]], rule[[X_MAX, Y_MAX]]
     assert ((told[..., :2] >= low - 1e-9) & (told[..., :2] <= high + 1e-9)).all()
-    speed = rows[..., [VX, VY]] * STEP_S * N_MOMENTS
+    speed = rows[..., [VX, VY]] * STEP_S * MOMENTS
     assert (rows[..., [X, Y]] + speed > high).any(), "going on as now some would leave it"
