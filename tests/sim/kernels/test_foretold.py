@@ -113,7 +113,7 @@ def test_who_is_smaller_or_larger_than_walkers_are_is_foretold_to_stay_so(times:
     for e in range(N_ENVS):
         remember_as_now(rows, e, 0)
         foretell(batch.world, batch.state, e, MOMENTS, work, foretold)
-        np.testing.assert_array_equal(foretold.places[:, 0, 2], r)
+        np.testing.assert_array_equal(foretold.places[:MOMENTS, 0, 2], r)
 
 
 def test_nobody_is_foretold_to_leave_the_walking_area() -> None:
