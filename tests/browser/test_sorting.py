@@ -7,7 +7,7 @@ from playwright.sync_api import Page, expect
 
 from app.sim.cells import load_cell
 from tests import patient_http
-from tests.browser.test_drag import state, tell
+from tests.browser.test_drag import state, tell, until
 
 pytestmark = pytest.mark.browser
 
@@ -104,7 +104,8 @@ def test_goal_editor_says_why_a_block_cannot_be_asked_for(
     expect(offer).to_be_enabled()
     page.click('[data-goal-block="red-0"]')
     expect(page.locator('[data-role="goal-text"]')).to_contain_text("No goal yet")
-    assert task(sorting)["goal"] == []
+    # The page says at once what it has asked for.
+    until(sorting, lambda now: now["sorting"]["goal"] == [], 60.0)
 
 
 def test_sorting_page_fits_a_phone(open_page: Callable[..., Page], sorting: str) -> None:
