@@ -32,8 +32,8 @@ class Shapes:
     cylinders: Vec
     """Upright cylinders on the floor: x, y, radius, top [m], shape (n, 4)."""
     going: Vec | None = None
-    """How the cylinders go on: vx, vy and growth of the radius [m/s], shape (n, 3); None where
-    that is not known."""
+    """How the cylinders go on: vx, vy and growth of the radius [m/s], shape (n, 3); NaN in the
+    row of one of whom that is not known, None where it is known of nobody."""
 
 
 def no_people() -> Shapes:

@@ -58,6 +58,7 @@ class Stage:
         self._view, self.obs_size = VIEWS[view]
         self.arm, self.top_z = self.world.arm, shared.top_z
         self._own_size = shared.bodies[0]
+        self._measured = np.ones(n_cylinders, dtype=np.bool_)
         self.apart = np.zeros(n_bodies + n_cylinders)
         """Distance of the robot to each person [m], bodies first, shape (n_people,)."""
         self._calls: dict[int, Callable[..., None]] = {}
@@ -92,7 +93,11 @@ class Stage:
         return Shapes(
             columns=crowd.columns,
             cylinders=np.concatenate([crowd.cylinders, tops], axis=1),
-            going=self.state.people.walkers.rows[0][:, [VX, VY, GROWTH]],
+            going=np.where(
+                self._measured[:, None],
+                self.state.people.walkers.rows[0][:, [VX, VY, GROWTH]],
+                np.nan,
+            ),
         )
 
     def put(self, q: Vec, qd: Vec, people: Sequence[Person], time_left_s: float) -> None:
@@ -113,6 +118,7 @@ class Stage:
                 rows.size[0, i] = self._own_size if person.size is None else person.size
                 continue
             walker = rows.walkers.rows[0, i - first]
+            self._measured[i - first] = person.measured
             walker[X], walker[Y], walker[R] = person.cylinder
             walker[VX], walker[VY], walker[GROWTH] = *person.qd[:2], person.growth
             remember_as_now(rows.walkers.rows, 0, i - first)

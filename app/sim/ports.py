@@ -38,6 +38,9 @@ class Person:
     past: Vec | None = None
     """Radius [m] and walking speed [m/s] of that cylinder 0.1 s, 0.2 s, ... ago, shape (n, 2),
     n at most ``occupancy.N_PAST - 1``; None where nothing is remembered."""
+    measured: bool = False
+    """Whether a safety layer may go by the velocity of that cylinder: it was measured, and is
+    not 0 for want of knowing."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

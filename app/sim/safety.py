@@ -342,10 +342,15 @@ class SafetyLayer:
             self._watch = watch_kernel.new_watch(self.arm, *shape)
             self._rule = rule_of(self.settings, *shape, known)
         if going is not None:
-            require_finite("people", going)
-            self._watch.going[:] = going
-            fastest = np.hypot(going[:, 0], going[:, 1]) + np.abs(going[:, 2])
+            unknown = np.asarray(np.isnan(going).any(axis=1))
+            seen = np.where(unknown[:, None], 0.0, going)
+            require_finite("people", seen)
+            self._watch.going[:] = seen
+            fastest = np.hypot(seen[:, 0], seen[:, 1]) + np.abs(seen[:, 2])
             self._watch.going_speed[shape[0] :] = fastest
+            settings = self.settings
+            change = np.where(unknown, settings.human_speed, settings.speed_change)
+            self._rule.speed[shape[0] :] = change
 
     def _told(
         self, chosen: float, q: Vec, qd: Vec, people: Shapes, age: float
@@ -452,7 +457,7 @@ class SafetyLayer:
             seconds: Time in which it is looked at how much nearer it comes [s].
         """
         k = column - self._shape[0]
-        if k < 0 or not self._known or people.going is None:
+        if k < 0 or not self._known or people.going is None or np.isnan(people.going[k]).any():
             return self.settings.human_speed
         robot, (x, y, r, _) = self._watch.columns[watch_kernel.NOW], people.cylinders[k]
         vx, vy, growth = people.going[k]

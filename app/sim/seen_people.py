@@ -50,6 +50,7 @@ def standing_in(
     r: float,
     growth: float = 0.0,
     past: Vec | None = None,
+    measured: bool = True,
 ) -> Person:
     """Return the person that a cylinder is seen as.
 
@@ -61,6 +62,7 @@ def standing_in(
         r: Its radius [m].
         growth: How fast the radius grows [m/s].
         past: Radius [m] and walking speed [m/s] before, as in ``Person.past``.
+        measured: Whether a safety layer may go by the velocity.
     """
     qd = np.zeros(18)
     qd[:2] = vx, vy
@@ -70,6 +72,7 @@ def standing_in(
         cylinder=np.array([x, y, r]),
         growth=growth,
         past=past,
+        measured=measured,
     )
 
 
@@ -84,7 +87,7 @@ def as_person(estimate: PersonEstimate) -> Person | None:
         return estimate.person
     x, y = np.clip(cylinder.center, human.Q_MIN[:2], human.Q_MAX[:2]).tolist()
     vx, vy = cylinder.velocity.tolist()
-    return standing_in(x, y, vx, vy, min(cylinder.radius, WIDEST))
+    return standing_in(x, y, vx, vy, min(cylinder.radius, WIDEST), measured=False)
 
 
 def checked_people(people: Sequence[Person]) -> tuple[Person, ...]:
@@ -118,6 +121,7 @@ def _checked(person: Person, path: str) -> Person:
         cylinder=cylinder,
         growth=person.growth,
         past=past,
+        measured=person.measured,
     )
 
 

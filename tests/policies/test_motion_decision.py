@@ -222,6 +222,16 @@ def test_monitoring_tells_the_terms_that_make_up_the_distance() -> None:
     assert terms.separation == pytest.approx(decision.met[0].separation, abs=1e-9)
 
 
+@pytest.mark.parametrize(("measured", "speed"), [(True, 0.1), (False, 1.6)])
+def test_only_a_measured_velocity_takes_the_place_of_the_assumed_one(
+    measured: bool, speed: float
+) -> None:
+    person = standing_in(0.3, 1.3, 0.0, 0.0, 0.3, measured=measured)
+    asked = question(people=(person,), safety=SafetySettings(measured=True))
+    terms = decider().decide(asked).terms
+    assert terms is not None and terms.human_speed == pytest.approx(speed)
+
+
 def test_far_from_people_monitoring_leaves_the_piece_as_it_is() -> None:
     decision = decider().decide(question(safety=SafetySettings()))
     assert decision.safe is not None and decision.safe.override == 1.0

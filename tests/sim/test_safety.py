@@ -154,6 +154,22 @@ def test_who_is_not_known_to_go_on_is_taken_to_be_as_fast_as_assumed(settings):
     assert layer.terms(decision, NONE, people)[1].human_speed == 1.6
 
 
+def test_of_several_people_each_is_taken_as_what_is_known_of_it():
+    near, far = walker(0.4), walker(1.0)
+    people = replace(
+        near,
+        cylinders=np.concatenate([near.cylinders, far.cylinders]),
+        going=np.array([[np.nan, 0.0, 0.0], [0.0, 0.0, 0.0]]),
+    )
+    layer = SafetyLayer(ARM, WALKS)
+    held = layer.decide(REST, NONE, NONE, NONE, people)
+    assert (held.override, held.person) == (0.0, 0)
+    assert layer.terms(held, NONE, people)[1].human_speed == 1.6
+    known = replace(people, going=np.zeros((2, 3)))
+    assert layer.decide(REST, NONE, NONE, NONE, known).override == 1.0
+    assert layer.decide(REST, NONE, NONE, NONE, people).override == 0.0
+
+
 def test_old_data_count_as_distance_lost():
     found = least_full_distance(SafetySettings(), NONE, NONE, age=0.25)
     assert found == pytest.approx(0.54 + 0.4, abs=1e-6)

@@ -61,6 +61,7 @@ def test_without_a_trunk_the_person_is_as_good_as_the_cylinder() -> None:
     assert estimate.person is None and estimate.cylinder is not None
     person = as_person(estimate)
     assert person is not None and person.cylinder is not None
+    assert not person.measured
     np.testing.assert_allclose(person.q[:2], estimate.cylinder.center)
 
 

@@ -39,7 +39,7 @@ class SafetyInput(Body):
         default=None,
         description="whether people given as cylinders are taken to go on at their own "
         "velocity (`vx`, `vy`, `growth`), which must then be measured, instead of at "
-        "`human_speed` in any direction; people by joint angles are not",
+        "`human_speed` in any direction; people known in other ways are not",
     )
     speed_change: Annotated[float, Field(ge=0.0, le=10.0)] | None = Field(
         default=None,
