@@ -28,6 +28,8 @@ from app.api import (
 from app.api.bodies import BodyRules
 from app.api.security import SESSION_PATH, Guard
 
+ICON_PATH = "/favicon.ico"
+"""Where browsers look for an icon of a page that names none; open, as the sign-in page is."""
 Lifespan = Callable[[FastAPI], AbstractAsyncContextManager[None]]
 
 DESCRIPTION = (
@@ -76,7 +78,7 @@ def build_app(*, lifespan: Lifespan, static: Path, token: str | None, version: s
         app.include_router(part.router)
     add_page(app, static)
     app.add_middleware(BodyRules, files=motions.FILES)
-    app.add_middleware(Guard, token=token, open_paths=(SESSION_PATH,))
+    app.add_middleware(Guard, token=token, open_paths=(SESSION_PATH, ICON_PATH))
     return app
 
 
@@ -86,5 +88,9 @@ def add_page(app: FastAPI, static: Path) -> None:
     @app.get("/", include_in_schema=False)
     async def index() -> FileResponse:
         return FileResponse(static / "index.html", headers={"Cache-Control": "no-cache"})
+
+    @app.get(ICON_PATH, include_in_schema=False)
+    async def icon() -> FileResponse:
+        return FileResponse(static / "favicon.ico", media_type="image/x-icon")
 
     app.mount("/static", StaticFiles(directory=static), name="static")

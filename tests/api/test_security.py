@@ -122,3 +122,10 @@ def test_foreign_origin_is_refused_in_spite_of_the_token(guarded: TestClient) ->
 
 def bearer() -> dict[str, str]:
     return {"Authorization": f"Bearer {TOKEN}"}
+
+
+def test_browsers_find_the_icon_where_they_look_for_it(guarded: TestClient) -> None:
+    answer = guarded.get("/favicon.ico")
+    assert answer.status_code == 200
+    assert answer.headers["content-type"] == "image/x-icon"
+    assert answer.content[:4] == b"\x00\x00\x01\x00"

@@ -2,6 +2,7 @@
 import { html, render, useEffect, useMemo, useRef, useState } from "./vendor/htm-preact-standalone.module.js";
 import { Acting, useCheckpoints } from "./checkpoints.js";
 import { Controls } from "./controls.js";
+import { useFrameFocus } from "./framefocus.js";
 import { Icon, Logo } from "./icons.js";
 import { isActive, useJobs } from "./jobs.js";
 import { useCell, WORLD } from "./live.js";
@@ -135,9 +136,11 @@ function useGoals({ cell, world }) {
 function Scene({ cell }) {
   const { link, world, epoch, reason } = cell;
   const goals = useGoals(cell);
+  const frame = useRef(null);
+  const keyed = useFrameFocus(frame);
   return html`<section class="hero" aria-label="The cell">
-    <div class="viewer">
-      ${epoch > 0 && html`<iframe key=${epoch} src=${`/viewer/${WORLD}/`} data-role="viewer"
+    <div class=${`viewer ${keyed ? "is-keyed" : ""}`}>
+      ${epoch > 0 && html`<iframe key=${epoch} ref=${frame} src=${`/viewer/${WORLD}/`} data-role="viewer"
         title="Live 3D view of robot and person"></iframe>`}
       ${!world && html`<div class="veil" role="status">
         <i class="spinner"></i>

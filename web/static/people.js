@@ -1,6 +1,7 @@
 // The people in the cell: who is there, who moves each, what is played, how large each is.
 import { html, useCallback, useEffect, useState } from "./vendor/htm-preact-standalone.module.js";
 import { get } from "./api.js";
+import { Segmented } from "./choice.js";
 import * as format from "./format.js";
 import { Icon } from "./icons.js";
 import { VESTS } from "./palette.js";
@@ -8,10 +9,10 @@ import { WalkerMover } from "./walkers.js";
 
 const MAX_PEOPLE = 4;
 const MODES = [
-  ["manual", "By hand", "hand", "You drag the handles in the scene"],
-  ["auto", "Work cycle", "walk", "Reaches for cubes and docks, on and on"],
-  ["recorded", "Recording", "film", "Moves as somebody was recorded"],
-  ["still", "Stands", "stand", "Goes home and rests"],
+  ["manual", "By hand", "You drag the handles in the scene", "hand"],
+  ["auto", "Work cycle", "Reaches for cubes and docks, on and on", "walk"],
+  ["recorded", "Recording", "Moves as somebody was recorded", "film"],
+  ["still", "Stands", "Goes home and rests", "stand"],
 ];
 const SLIDERS = [
   ["stature", "Stature", (body) => metres(body.stature_m)],
@@ -71,14 +72,10 @@ function Mover({ person, send, sized, onSized }) {
     else if (list?.length && !playing) send(playOf(id, list[0].name));
     else refresh();
   };
-  const on = (one) => (open && !playing ? one === "recorded" : one === mode);
   return html`<div class="dock-row">
       <span class="dock-label" id="mode-label">Moved by</span>
-      <div class="segmented" role="radiogroup" aria-labelledby="mode-label">
-        ${MODES.map(([one, label, icon, title]) => html`<button key=${one} type="button"
-          role="radio" aria-checked=${String(on(one))} data-mode=${one} title=${title}
-          onClick=${() => pick(one)}><${Icon} name=${icon} />${label}</button>`)}
-      </div>
+      <${Segmented} labelledby="mode-label" value=${open && !playing ? "recorded" : mode}
+        items=${MODES} onPick=${pick} mark=${(one) => ({ "data-mode": one })} />
       ${mode === "manual" && !open && html`<p class="dock-hint">Drag the handles in the scene.</p>`}
       <span class="spacer"></span>
       <div class="transport" role="group" aria-label=${`${nameOf(id)} in the cell`}>

@@ -1,5 +1,6 @@
 // What a visitor can do to a reach cell besides people and clock: goal, safety layer, policy.
 import { html } from "./vendor/htm-preact-standalone.module.js";
+import { Segmented } from "./choice.js";
 import { Icon } from "./icons.js";
 
 const GOAL_MODES = [
@@ -35,24 +36,24 @@ export function ReachControls({ world, send }) {
   };
   return html`<div class="dock-row dock-wrap">
     <span class="dock-label" id="goal-label">Goal</span>
-    <${Segmented} labelledby="goal-label" name="goal-mode" value=${mode} items=${GOAL_MODES}
+    <${Segmented} labelledby="goal-label" mark=${marked("goal-mode")} value=${mode} items=${GOAL_MODES}
       onPick=${(one) => send({ tag: "set-goal-mode", mode: one })} />
     <button type="button" class="tool" data-action="new-goal" title="Draw another goal"
       onClick=${() => send({ tag: "new-goal" })}><${Icon} name="reset" />New goal</button>
     <span class="dock-pair"><span class="dock-label dock-label-free" id="layer-label">Safety layer</span>
-      <${Segmented} labelledby="layer-label" name="safety" value=${layerOf(safety)} items=${SAFETY}
+      <${Segmented} labelledby="layer-label" mark=${marked("safety")} value=${layerOf(safety)} items=${SAFETY}
         onPick=${(one) => send({ tag: "set-safety", on: one !== "off", ...(one !== "off" && { measured: one === "measured" }) })} /></span>
     ${ways.includes("interpolated") && html`<span class="dock-pair">
       <span class="dock-label dock-label-free" id="between-label">Interpolation</span>
-      <${Segmented} labelledby="between-label" name="between" value=${between} items=${BETWEEN}
+      <${Segmented} labelledby="between-label" mark=${marked("between")} value=${between} items=${BETWEEN}
         onPick=${(one) => ask(averaged, one, ahead)} /></span>`}
     ${ways.includes("direct-ahead") && html`<span class="dock-pair">
       <span class="dock-label dock-label-free" id="ahead-label">Look ahead</span>
-      <${Segmented} labelledby="ahead-label" name="ahead" value=${ahead} items=${AHEAD}
+      <${Segmented} labelledby="ahead-label" mark=${marked("ahead")} value=${ahead} items=${AHEAD}
         onPick=${(one) => ask(averaged, between, one)} /></span>`}
     ${ways.includes("averaged") && world.people.length > 1 && html`<span class="dock-pair">
       <span class="dock-label dock-label-free" id="beside-label">Policy sees</span>
-      <${Segmented} labelledby="beside-label" name="beside" value=${averaged} items=${BESIDE}
+      <${Segmented} labelledby="beside-label" mark=${marked("beside")} value=${averaged} items=${BESIDE}
         onPick=${(one) => ask(one, between, ahead)} /></span>`}
   </div>`;
 }
@@ -63,11 +64,6 @@ function layerOf({ on, measured }) {
   return measured ? "measured" : "assumed";
 }
 
-/** A choice of one; `items` are [value, label, title]. */
-export function Segmented({ labelledby, name, value, items, onPick }) {
-  return html`<div class="segmented" role="radiogroup" aria-labelledby=${labelledby}>
-    ${items.map(([one, label, title]) => html`<button key=${String(one)} type="button" role="radio"
-      aria-checked=${String(one === value)} data-choice=${`${name}:${one}`} title=${title}
-      onClick=${() => onPick(one)}>${label}</button>`)}
-  </div>`;
+function marked(name) {
+  return (one) => ({ "data-choice": `${name}:${one}` });
 }

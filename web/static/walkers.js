@@ -1,11 +1,12 @@
 // Who moves a walking cylinder, and how fast all of them walk.
 import { html } from "./vendor/htm-preact-standalone.module.js";
+import { Segmented } from "./choice.js";
 import { Icon } from "./icons.js";
 
 const MODES = [
-  ["manual", "By hand", "hand", "You drag the handle in the scene"],
-  ["auto", "Walks", "walk", "From one random place to the next"],
-  ["still", "Stands", "stand", "Stays where it is"],
+  ["manual", "By hand", "You drag the handle in the scene", "hand"],
+  ["auto", "Walks", "From one random place to the next", "walk"],
+  ["still", "Stands", "Stays where it is", "stand"],
 ];
 const SPEEDS = [["", "varies"], ["0.25", "0.25 m/s"], ["0.5", "0.5 m/s"], ["1", "1 m/s"],
   ["1.6", "1.6 m/s"]];
@@ -16,12 +17,9 @@ export function WalkerMover({ person, name, world, send }) {
   const known = SPEEDS.some(([value]) => value === String(speed ?? ""));
   return html`<div class="dock-row dock-wrap">
     <span class="dock-label" id="mode-label">Moved by</span>
-    <div class="segmented" role="radiogroup" aria-labelledby="mode-label">
-      ${MODES.map(([one, label, icon, title]) => html`<button key=${one} type="button" role="radio"
-        aria-checked=${String(one === mode)} data-mode=${one} title=${title}
-        onClick=${() => send({ tag: "set-mode", person: id, mode: one })}>
-        <${Icon} name=${icon} />${label}</button>`)}
-    </div>
+    <${Segmented} labelledby="mode-label" value=${mode} items=${MODES}
+      mark=${(one) => ({ "data-mode": one })}
+      onPick=${(one) => send({ tag: "set-mode", person: id, mode: one })} />
     <label class="dock-pair"><span class="dock-label dock-label-free">Speed</span>
       <select data-role="walk-speed" value=${String(speed ?? "")} title="How fast all people walk; as in training it varies between 0.3 and 1 m/s"
         onChange=${(e) => send({ tag: "set-walk", speed: e.target.value === "" ? null : Number(e.target.value) })}>

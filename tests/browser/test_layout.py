@@ -1,0 +1,106 @@
+"""Every cell's page fits its window, can be read, and obeys the keyboard."""
+
+from collections.abc import Callable, Iterator
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from app.sim.cells import cell_names, load_cell
+from tests import patient_http
+from tests.browser.contrast import faint_text
+from tests.browser.test_drag import state, tell, until
+
+pytestmark = pytest.mark.browser
+
+DESKTOPS = ((1440, 900), (1280, 720), (1024, 700))
+PHONE = (390, 844)
+SCENE_PX = 150
+"""Least height that the dock leaves to the scene of a desktop."""
+
+
+@pytest.fixture(params=cell_names())
+def shown(request: pytest.FixtureRequest, server: str) -> Iterator[str]:
+    """The server with one of the shipped cells."""
+    world = f"{server}/v1/worlds/main/cell"
+    patient_http.put(world, json={"cell": request.param}).raise_for_status()
+    yield server
+    patient_http.put(world, json={"cell": load_cell().name}).raise_for_status()
+
+
+def size_of(page: Page) -> tuple[int, int]:
+    """Return width and height of all there is to scroll to [px]."""
+    found = page.evaluate(
+        "(({scrollWidth: w, scrollHeight: h}) => [w, h])(document.documentElement)"
+    )
+    return int(found[0]), int(found[1])
+
+
+@pytest.mark.usefixtures("shown")
+def test_page_fits_its_window_and_its_text_stands_out(open_page: Callable[..., Page]) -> None:
+    page = open_page(DESKTOPS[0], scene=False)
+    page.wait_for_selector(".sentence")
+    for tab in ("cell", "training"):
+        page.click(f"#tab-{tab}")
+        for size in DESKTOPS:
+            page.set_viewport_size({"width": size[0], "height": size[1]})
+            assert size_of(page) == size
+            box = page.locator(".viewer").bounding_box()
+            assert box is not None
+            assert box["height"] > SCENE_PX
+        for scheme in ("light", "dark"):
+            page.emulate_media(color_scheme=scheme, reduced_motion="reduce")
+            assert faint_text(page) == [], (tab, scheme)
+        page.set_viewport_size({"width": PHONE[0], "height": PHONE[1]})
+        assert size_of(page)[0] == PHONE[0]
+    assert page.problems == []  # type: ignore[attr-defined]
+
+
+@pytest.mark.usefixtures("shown")
+def test_arrow_keys_move_and_choose_in_every_radio_group(
+    open_page: Callable[..., Page],
+) -> None:
+    page = open_page(DESKTOPS[0], scene=False)
+    groups = page.get_by_role("radiogroup")
+    expect(groups.first).to_be_visible()
+    for k in range(groups.count()):
+        radios = groups.nth(k).get_by_role("radio")
+        stops = radios.evaluate_all("all => all.filter((one) => one.tabIndex === 0).length")
+        assert stops == 1
+        first, last = radios.first, radios.last
+        first.click()
+        expect(first).to_have_attribute("aria-checked", "true")
+        page.keyboard.press("ArrowLeft")
+        expect(last).to_be_focused()
+        expect(last).to_have_attribute("aria-checked", "true")
+        page.keyboard.press("ArrowDown")
+        expect(first).to_be_focused()
+        expect(first).to_have_attribute("aria-checked", "true")
+
+
+def test_keyboard_sees_when_it_is_in_the_scene(open_page: Callable[..., Page]) -> None:
+    page = open_page(scene=False)
+    ring = "getComputedStyle(document.querySelector('.viewer'), '::after').borderTopStyle"
+    assert page.evaluate(ring) == "none"
+    page.locator('[data-action="pause"]').focus()
+    for _ in range(40):
+        page.keyboard.press("Shift+Tab")
+        if page.evaluate("document.activeElement.dataset.role") == "viewer":
+            break
+    page.wait_for_selector(".viewer.is-keyed")
+    assert page.evaluate(ring) == "solid"
+    page.locator('[data-action="pause"]').click()
+    page.locator(".viewer:not(.is-keyed)").wait_for()
+    page.locator('[data-action="pause"]').click()
+
+
+def test_person_follows_the_mode_chosen_by_arrow_keys(
+    open_page: Callable[..., Page], server: str
+) -> None:
+    tell(server, {"tag": "set-mode", "mode": "auto"})
+    page = open_page(scene=False)
+    page.locator('[data-mode="auto"]').focus()
+    page.keyboard.press("ArrowLeft")
+    until(server, lambda now: now["people"][0]["mode"] == "manual", 60.0)
+    expect(page.locator('[data-mode="manual"]')).to_be_focused()
+    tell(server, {"tag": "set-mode", "mode": "auto"})
+    assert state(server)["people"]
