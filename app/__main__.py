@@ -107,6 +107,9 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("target", nargs="?", metavar="FILE|NAME", help=".bvh, .mot, .sto or .csv")
     one.add_argument("--keep", action="store_true", help="store what is imported")
     one.add_argument("--name", help="name to store it under; the file's by default")
+    one.add_argument("--unit", help="unit of the lengths, such as cm, or metres per unit")
+    one.add_argument("--root-unit", metavar="UNIT", help="unit of the root's path, if another")
+    one.add_argument("--up", metavar="AXIS", help="axis that points up: y, z, -y, ...")
     one.add_argument("--json", action="store_true")
     return top
 
@@ -298,10 +301,14 @@ def run_motions(options: argparse.Namespace) -> int:
     prepare_kernels(settings)
     from app.errors import BadMotion
     from app.motion_verbs import faulty, run
+    from app.sim.read_options import ReadOptions
 
+    stated = ReadOptions(unit=options.unit, root_unit=options.root_unit, up=options.up)
     keep, name = options.keep, options.name
     try:
-        text, data = run(options.action, options.target, settings, keep=keep, name=name)
+        text, data = run(
+            options.action, options.target, settings, keep=keep, name=name, options=stated
+        )
     except BadMotion as error:
         for fault in error.faults:
             print(f"{options.target}: {fault.text}", file=sys.stderr)

@@ -12,6 +12,7 @@ from app.database import has_database, opened
 from app.errors import BadMotion, Fault, InvalidInput
 from app.settings import Settings
 from app.sim.motions import MAX_BYTES, Motion, read_motion
+from app.sim.read_options import NOTHING_STATED, ReadOptions
 from app.store.records import MotionRecord
 from jobs.motions import MotionCatalog
 from jobs.stored_motion import detail_of, summary_of
@@ -30,6 +31,7 @@ def run(
     *,
     keep: bool = False,
     name: str | None = None,
+    options: ReadOptions = NOTHING_STATED,
 ) -> Printed:
     """Carry out one action.
 
@@ -39,6 +41,7 @@ def run(
         settings: Where the database is.
         keep: Whether an imported motion is stored.
         name: Name under which; made from the file's name if None.
+        options: What is stated about the file that is imported.
 
     Raises:
         BadMotion: The file is no sound motion; carries every fault.
@@ -48,6 +51,8 @@ def run(
         raise InvalidInput("--name", name, "is the name of a motion that is kept: add --keep")
     if keep and action != "import":
         raise InvalidInput("--keep", action, "goes with import only")
+    if options.stated() and action != "import":
+        raise InvalidInput(f"--{min(options.stated())}", action, "goes with import only")
     if action == "list":
         return _listed(settings)
     if target is None:
@@ -55,7 +60,9 @@ def run(
         raise InvalidInput(noun, None, f"must be given: motions {action} {noun}")
     if action == "import":
         path = Path(target)
-        return keep_motion(path, settings, name) if keep else import_motion(path)
+        if keep:
+            return keep_motion(path, settings, name, options)
+        return import_motion(path, options)
     with opened(settings, NOUN) as store:
         motions = MotionCatalog(store)
         if action == "show":
@@ -65,14 +72,14 @@ def run(
     return f"{target} is removed", {"name": target, "removed": True}
 
 
-def import_motion(path: Path) -> Printed:
+def import_motion(path: Path, options: ReadOptions = NOTHING_STATED) -> Printed:
     """Read a file and tell what is in it.
 
     Raises:
         BadMotion: It is no sound motion; carries every fault.
         InvalidInput: The file cannot be read.
     """
-    found = read_motion(_content(path), path.name)
+    found = read_motion(_content(path), path.name, options)
     data = {
         "ok": True,
         "name": found.name,
@@ -84,7 +91,12 @@ def import_motion(path: Path) -> Printed:
     return _told(data), data
 
 
-def keep_motion(path: Path, settings: Settings, name: str | None) -> Printed:
+def keep_motion(
+    path: Path,
+    settings: Settings,
+    name: str | None,
+    options: ReadOptions = NOTHING_STATED,
+) -> Printed:
     """Read a file, store its motion and tell what is in it.
 
     Raises:
@@ -94,7 +106,7 @@ def keep_motion(path: Path, settings: Settings, name: str | None) -> Printed:
     """
     content = _content(path)
     with opened(settings, NOUN, create=True) as store:
-        record, new = MotionCatalog(store).add(content, path.name, name)
+        record, new = MotionCatalog(store).add(content, path.name, name, options)
     data = {**_data_of(record), "new": new}
     stored = "is stored" if new else "was stored already"
     return f"{_told(data)}\n{stored} as {record.name}", data

@@ -21,6 +21,7 @@ from typing import Any
 
 from app.errors import BadMotion, Fault, InvalidInput, NotReady, SimulationError
 from app.sim.motions import read_motion
+from app.sim.read_options import NOTHING_STATED, ReadOptions
 from app.store.records import NewMotion
 from jobs.executor import PROJECT_ROOT, search_path
 from jobs.stored_motion import packed
@@ -42,7 +43,14 @@ class ImportProcess:
         self._running: set[subprocess.Popen[bytes]] = set()
         self._stopped = False
 
-    def __call__(self, content: bytes, file_name: str, name: str, sha256: str) -> NewMotion:
+    def __call__(
+        self,
+        content: bytes,
+        file_name: str,
+        name: str,
+        sha256: str,
+        options: ReadOptions = NOTHING_STATED,
+    ) -> NewMotion:
         """Return a file's motion as it is stored; waits until it is imported.
 
         Args:
@@ -50,6 +58,7 @@ class ImportProcess:
             file_name: Its name; the ending says which format is meant.
             name: Name under which the motion will be stored.
             sha256: Of the file.
+            options: What is stated about the file.
 
         Raises:
             BadMotion: It is no sound motion; each fault names line or column and rule.
@@ -58,7 +67,12 @@ class ImportProcess:
             SimulationError: The process ended without an answer.
         """
         process = self._start()
-        head = {"file_name": file_name, "name": name, "sha256": sha256}
+        head = {
+            "file_name": file_name,
+            "name": name,
+            "sha256": sha256,
+            "options": options.stated(),
+        }
         try:
             output, words = process.communicate(_framed(head, content), MAX_IMPORT_S)
         except subprocess.TimeoutExpired as error:
@@ -107,13 +121,20 @@ class ImportProcess:
                 process.communicate()
 
 
-def import_here(content: bytes, file_name: str, name: str, sha256: str) -> NewMotion:
+def import_here(
+    content: bytes,
+    file_name: str,
+    name: str,
+    sha256: str,
+    options: ReadOptions = NOTHING_STATED,
+) -> NewMotion:
     """Return a file's motion as it is stored, imported in this process.
 
     Raises:
         BadMotion: It is no sound motion; each fault names line or column and rule.
     """
-    return packed(read_motion(content, file_name), name, file_name, sha256)
+    found = read_motion(content, file_name, options)
+    return packed(found, name, file_name, sha256, options)
 
 
 def main() -> None:
@@ -121,8 +142,9 @@ def main() -> None:
     os.nice(NICENESS)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     asked, content = _unframed(sys.stdin.buffer.read())
+    asked["options"] = ReadOptions(**asked["options"])
     try:
-        new = import_here(content, asked["file_name"], asked["name"], asked["sha256"])
+        new = import_here(content, **asked)
     except BadMotion as error:
         answer = _framed({"faults": [asdict(fault) for fault in error.faults]}, b"")
     else:

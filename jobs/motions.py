@@ -8,8 +8,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import PurePath
 
-from app.errors import InvalidInput, NotFound
+from app.errors import Conflict, InvalidInput, NotFound
 from app.sim.motions import Motion
+from app.sim.read_options import NOTHING_STATED, ReadOptions
 from app.store import motions as kept
 from app.store.engine import Store
 from app.store.records import MotionRecord, NewMotion
@@ -21,8 +22,9 @@ MAX_CACHED_FRAMES = 500_000
 MAX_FILE_NAME = 255
 """Longest file name [characters]."""
 
-Importer = Callable[[bytes, str, str, str], NewMotion]
-"""Turns a file, its name, the motion's name and the file's SHA-256 into what is stored."""
+Importer = Callable[[bytes, str, str, str, ReadOptions], NewMotion]
+"""Turns a file, its name, the motion's name, the file's SHA-256 and what is stated about the
+file into what is stored."""
 
 _NAME = re.compile(r"[a-z0-9][a-z0-9-]{0,63}")
 
@@ -107,7 +109,11 @@ class MotionCatalog:
         return tuple(replace(run, name=name) for name in names for run in self.get(name))
 
     def add(
-        self, content: bytes, file_name: str, name: str | None = None
+        self,
+        content: bytes,
+        file_name: str,
+        name: str | None = None,
+        options: ReadOptions = NOTHING_STATED,
     ) -> tuple[MotionRecord, bool]:
         """Import a file and keep its motion.
 
@@ -115,6 +121,7 @@ class MotionCatalog:
             content: The file, of whatever kind.
             file_name: Its name; the ending says which format is meant.
             name: Name of the motion; made from the file's name if None.
+            options: What is stated about the file.
 
         Returns:
             What is known of the motion, and whether it is new: the same file under the same
@@ -123,7 +130,8 @@ class MotionCatalog:
         Raises:
             BadMotion: The file is no sound motion; each fault names line or column and rule.
             InvalidInput: The name cannot be one.
-            Conflict: Another file has that name, or there are too many motions.
+            Conflict: Another file, or this one with other options, has that name, or there are
+                too many motions.
         """
         file_name = checked_file_name(file_name)
         name = motion_name(file_name) if name is None else checked_name(name)
@@ -131,11 +139,11 @@ class MotionCatalog:
         same = kept.find_same(self._store, name, sha256)
         ending = PurePath(file_name).suffix.lower()
         if same is not None and ending == f".{same.summary['format']}":
-            return same, False
+            return _read_alike(same, options), False
         with self._importing:  # one at a time: its memory is a multiple of the file's
-            new = self._import(content, file_name, name, sha256)
+            new = self._import(content, file_name, name, sha256, options)
         is_new = kept.put_motion(self._store, new)
-        return kept.get_motion(self._store, name), is_new
+        return _read_alike(kept.get_motion(self._store, name), options), is_new
 
     def remove(self, name: str) -> None:
         """Forget a motion; whoever has its runs keeps them.
@@ -193,6 +201,18 @@ def motion_name(file_name: str) -> str:
         rule = "must be given: the file's name has none of the characters a-z 0-9"
         raise InvalidInput("name", "", rule)
     return name
+
+
+def _read_alike(record: MotionRecord, options: ReadOptions) -> MotionRecord:
+    """Return a stored motion, unless its file was read with other options."""
+    before = record.summary.get("options", {})
+    if before != options.stated():
+        said = ", ".join(f"{name} = {value}" for name, value in before.items())
+        raise Conflict(
+            f"motion {record.name!r} was read from this file with {said or 'no options'}: "
+            "remove it first, or give another name"
+        )
+    return record
 
 
 def _possible(name: str) -> str:

@@ -19,6 +19,7 @@ from app.errors import InvalidInput
 from app.sim.body_size import BodySize
 from app.sim.body_track import MEASURED
 from app.sim.motions import ImportedMotion, Motion, Spread
+from app.sim.read_options import NOTHING_STATED, ReadOptions
 from app.store.records import MotionRecord, NewMotion
 
 MAX_GLITCHES = 1000
@@ -59,7 +60,13 @@ def detail_of(found: ImportedMotion) -> dict[str, Any]:
     }
 
 
-def packed(found: ImportedMotion, name: str, file_name: str, sha256: str) -> NewMotion:
+def packed(
+    found: ImportedMotion,
+    name: str,
+    file_name: str,
+    sha256: str,
+    options: ReadOptions = NOTHING_STATED,
+) -> NewMotion:
     """Return an import as it is stored.
 
     Args:
@@ -67,6 +74,7 @@ def packed(found: ImportedMotion, name: str, file_name: str, sha256: str) -> New
         name: Name under which it is stored.
         file_name: Name of its file.
         sha256: Of its file.
+        options: What was stated about its file.
     """
     detail = detail_of(found)
     detail["glitches"] = detail["glitches"][:MAX_GLITCHES]
@@ -91,7 +99,7 @@ def packed(found: ImportedMotion, name: str, file_name: str, sha256: str) -> New
         n_runs=len(found.runs),
         n_frames=found.n_frames,
         duration=found.duration,
-        summary=summary_of(found),
+        summary={**summary_of(found), "options": options.stated()},
         detail=detail,
         tensors=tensors,
     )

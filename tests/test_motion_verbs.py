@@ -81,6 +81,15 @@ def test_kept_motion_can_be_given_a_name(
     assert (found["name"], found["file_name"]) == ("reach-1", "someone.bvh")
 
 
+def test_unit_and_up_axis_can_be_stated(clip: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert (
+        main(["motions", "import", str(clip), "--unit", "0.0011", "--up", "y", "--json"]) == 0
+    )
+    found = json.loads(capsys.readouterr().out)
+    assert found["unit"] == "0.0011"
+    assert found["body_m"]["forearm_r"] == pytest.approx(0.286)
+
+
 def test_other_file_under_a_taken_name_is_refused(
     clip: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -96,6 +105,9 @@ def test_other_file_under_a_taken_name_is_refused(
         (["import", "{clip}", "--name", "a"], "add --keep"),
         (["import", "{clip}", "--keep", "--name", "A"], "1 to 64 of the characters"),
         (["list", "--keep"], "goes with import only"),
+        (["show", "someone", "--unit", "cm"], "--unit = 'show' goes with import only"),
+        (["import", "{clip}", "--unit", "furlong"], "choices: m, cm, mm, inch, foot, cmu"),
+        (["import", "{clip}", "--up", "up"], "choices: x, y, z, -x, -y, -z"),
         (["show"], "must be given: motions show NAME"),
         (["import"], "must be given: motions import FILE"),
         (["remove", "someone"], "there is no database at"),

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import APIRouter, Depends, Query, Request, Response
 from starlette.concurrency import run_in_threadpool
 
 from app.api.bodies import FILE_TYPES
@@ -10,6 +10,7 @@ from app.api.schemas.motions import MotionItem, MotionList, MotionPublic
 from app.api.services import MAX_UPLOADS, Services, ServicesDep
 from app.errors import NotReady
 from app.sim.motions import FORMATS, MAX_BYTES
+from app.sim.read_options import UNITS, UP_AXES, ReadOptions
 from app.store.records import MotionRecord
 
 router = APIRouter(prefix="/v1/motions", tags=["motions"])
@@ -25,6 +26,24 @@ BODY: dict[str, Any] = {
     }
 }
 """The body is the file itself."""
+UNIT = f"{', '.join(UNITS)}, or metres per unit"
+"""What a unit can be stated as."""
+
+
+def stated_options(
+    unit: Annotated[
+        str | None, Query(description=f"unit of the lengths: {UNIT}; found if missing")
+    ] = None,
+    root_unit: Annotated[
+        str | None, Query(description=f"unit of the root's path, if another: {UNIT}")
+    ] = None,
+    up: Annotated[
+        str | None,
+        Query(description=f"axis that points up: {', '.join(UP_AXES)}; found if missing"),
+    ] = None,
+) -> ReadOptions:
+    """Return what a request states about its file."""
+    return ReadOptions(unit=unit, root_unit=root_unit, up=up)
 
 
 @router.get("", summary="List the imported motions")
@@ -44,6 +63,7 @@ async def create(
     request: Request,
     services: ServicesDep,
     response: Response,
+    options: Annotated[ReadOptions, Depends(stated_options)],
     file_name: Annotated[
         str, Query(description=f"name of the file; ends with {', '.join(FORMATS)}")
     ],
@@ -53,7 +73,7 @@ async def create(
     ] = None,
 ) -> MotionPublic:
     """Import the file that is the body, and keep it; the same one again answers 200."""
-    record, new = await _taken_in(request, services, file_name, name)
+    record, new = await _taken_in(request, services, file_name, name, options)
     if not new:
         response.status_code = 200
     response.headers["Location"] = f"{router.prefix}/{record.name}"
@@ -67,13 +87,18 @@ def remove(name: str, services: ServicesDep) -> None:
 
 
 async def _taken_in(
-    request: Request, services: Services, file_name: str, name: str | None
+    request: Request,
+    services: Services,
+    file_name: str,
+    name: str | None,
+    options: ReadOptions,
 ) -> tuple[MotionRecord, bool]:
     """Read the body and have it imported while a thread waits, a few at a time."""
     if not services.uploads.acquire(blocking=False):
         raise NotReady(f"{MAX_UPLOADS} files are being imported: post again in a moment")
     try:
         content = await request.body()
-        return await run_in_threadpool(services.motions.add, content, file_name, name)
+        add = services.motions.add
+        return await run_in_threadpool(add, content, file_name, name, options)
     finally:
         services.uploads.release()

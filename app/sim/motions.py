@@ -36,6 +36,7 @@ from app.sim.human import JOINT_NAMES, Q_MAX, Q_MIN
 from app.sim.joint_tables import AngleTrack, read_csv
 from app.sim.opensim import read_opensim
 from app.sim.ports import Vec
+from app.sim.read_options import NOTHING_STATED, ReadOptions
 from app.sim.skeletons import body_track
 from app.sim.track_angles import body_angles
 
@@ -119,12 +120,15 @@ class ImportedMotion:
         return sum(len(run.times) for run in self.runs)
 
 
-def read_motion(content: bytes, file_name: str) -> ImportedMotion:
+def read_motion(
+    content: bytes, file_name: str, options: ReadOptions = NOTHING_STATED
+) -> ImportedMotion:
     """Import a file of recorded motion.
 
     Args:
         content: The file, of whatever kind.
         file_name: Its name; the ending says which format is meant.
+        options: What is stated about the file.
 
     Raises:
         BadMotion: It is no sound motion; each fault names line or column and rule.
@@ -135,7 +139,7 @@ def read_motion(content: bytes, file_name: str) -> ImportedMotion:
     text = _text(content)
     digest = hashlib.sha256(content).hexdigest()[:12]
     if ending == ".bvh":
-        track, unit = body_track(read_bvh(text))
+        track, unit = body_track(read_bvh(text), options)
         size, angles = measure(track.points), None
     else:
         angles = read_csv(text) if ending == ".csv" else read_opensim(text)

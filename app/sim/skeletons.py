@@ -6,6 +6,7 @@ The unit is found from the arm: shoulder to wrist measures 0.40 to 0.75 m in exa
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -25,15 +26,8 @@ from app.sim.body_track import (
 )
 from app.sim.bvh import Bvh, forward
 from app.sim.ports import Vec
+from app.sim.read_options import NOTHING_STATED, UNITS, ReadOptions, metres
 
-UNITS: Mapping[str, float] = {
-    "m": 1.0,
-    "cm": 0.01,
-    "mm": 0.001,
-    "inch": 0.0254,
-    "CMU unit": 0.0254 / 0.45,
-}
-"""Lengths that skeletons are written in [m]."""
 MIN_ARM, MAX_ARM = 0.40, 0.75
 """Shoulder to wrist of a person [m]; the ranges of the units do not overlap."""
 LENGTHS: Mapping[str, tuple[float, float]] = {
@@ -87,7 +81,7 @@ def skeleton_joints(names: Sequence[str]) -> dict[str, int]:
     return found
 
 
-def body_track(bvh: Bvh) -> tuple[BodyTrack, str]:
+def body_track(bvh: Bvh, options: ReadOptions = NOTHING_STATED) -> tuple[BodyTrack, str]:
     """Return a file's joint centres [m], z up, and the name of its unit.
 
     Raises:
@@ -96,17 +90,19 @@ def body_track(bvh: Bvh) -> tuple[BodyTrack, str]:
     roles = skeleton_joints([joint.name for joint in bvh.joints])
     _require_degrees(bvh)
     chosen = [roles[name] for name in TRACK_NAMES]
+    found = options.unit or length_unit(forward(bvh, chosen))
+    if options.root_unit is not None:
+        bvh = _with_root_scaled(bvh, metres(options.root_unit) / metres(found))
     points = forward(bvh, chosen)
-    found = length_unit(points)
-    up = _up_axis(points)
-    points = UNITS[found] * _z_up(points, up)
+    up = options.up or "xyz"[_up_axis(points)]
+    points = metres(found) * _z_up(points, up)
     _require_a_body(points)
     _require_elbows(points)
     rest = _z_up(_rest(bvh)[None, chosen], up)
     hips = None
     if "hip_r" in roles and "hip_l" in roles:
         right, left = forward(bvh, [roles["hip_r"], roles["hip_l"]]).transpose(1, 0, 2)
-        hips = UNITS[found] * _z_up(left - right, up)
+        hips = metres(found) * _z_up(left - right, up)
     times: Vec = np.asarray(bvh.dt * np.arange(len(points)))
     return BodyTrack(times=times, points=points, upright=_upright(rest), hips=hips), found
 
@@ -128,6 +124,12 @@ def length_unit(points: Vec) -> str:
     rule = f"must be {MIN_ARM} to {MAX_ARM} m in one of the units {', '.join(UNITS)}"
     place = "OFFSET of elbow and wrist: shoulder to wrist"
     raise BadMotion([Fault(place=place, value=f"{arm:.4g}", rule=rule)])
+
+
+def _with_root_scaled(bvh: Bvh, factor: float) -> Bvh:
+    """Return a file with the root's path multiplied."""
+    moving = [joint == 0 and name.endswith("position") for joint, name in bvh.channels]
+    return replace(bvh, values=np.where(moving, factor * bvh.values, bvh.values))
 
 
 def _spellings() -> dict[str, list[str]]:
@@ -173,10 +175,17 @@ def _up_axis(points: Vec) -> int:
     return axis
 
 
-def _z_up(v: Vec, up: int) -> Vec:
-    if up == 2:
-        return v
-    return np.stack([v[..., 0], -v[..., 2], v[..., 1]], axis=-1)
+def _z_up(v: Vec, up: str) -> Vec:
+    """Return vectors turned so that a direction of the file points along z."""
+    turns = {
+        "x": [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]],
+        "y": [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]],
+        "z": [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+        "-x": [[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]],
+        "-y": [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]],
+        "-z": [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]],
+    }
+    return np.asarray(v @ np.array(turns[up]).T)
 
 
 def _rest(bvh: Bvh) -> Vec:

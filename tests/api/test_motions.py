@@ -68,6 +68,23 @@ def test_runs_of_a_posted_motion_are_there_for_the_service(
     assert all(run.q.shape == (len(run.times), 18) for run in runs)
 
 
+def test_unit_and_up_axis_can_be_stated(client: TestClient) -> None:
+    answer = post(client, CLIP, file_name="stated.bvh", unit="0.0011", up="y")
+    client.delete("/v1/motions/stated")
+    assert answer.status_code == 201
+    assert answer.json()["options"] == {"unit": "0.0011", "up": "y"}
+    assert answer.json()["body_m"]["forearm_r"] == pytest.approx(0.286)
+
+
+@pytest.mark.parametrize("field", ["unit", "root_unit", "up"])
+def test_option_that_is_none_is_refused_with_the_choices(
+    client: TestClient, field: str
+) -> None:
+    answer = post(client, CLIP, file_name="stated.bvh", **{field: "furlong"})
+    assert answer.status_code == 422
+    assert answer.json()["field"] == field and answer.json()["choices"]
+
+
 def test_joints_beyond_their_limits_are_told(client: TestClient) -> None:
     q = working(100)
     q[:, 13] = Q_MAX[13] + 0.2

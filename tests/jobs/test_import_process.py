@@ -4,9 +4,10 @@ import time
 import pytest
 
 from app.errors import BadMotion, InvalidInput, NotReady, SimulationError
+from app.sim.read_options import ReadOptions
 from jobs import import_process
 from jobs.import_process import ImportProcess, import_here
-from tests.sim.recorded_person import csv_text, working
+from tests.sim.recorded_person import bvh_text, csv_text, working
 
 CLIP = csv_text(working(100)).encode()
 ASKED = ("nod.csv", "nod", "a" * 64)
@@ -14,6 +15,14 @@ ASKED = ("nod.csv", "nod", "a" * 64)
 
 def test_process_of_its_own_finds_the_same_as_this_one() -> None:
     assert ImportProcess()(CLIP, *ASKED) == import_here(CLIP, *ASKED)
+
+
+def test_what_is_stated_about_a_file_goes_to_the_process() -> None:
+    clip, options = bvh_text(working(100)).encode(), ReadOptions(unit="0.0011", up="y")
+    asked = ("nod.bvh", "nod", "a" * 64, options)
+    found = ImportProcess()(clip, *asked)
+    assert found == import_here(clip, *asked)
+    assert found.summary["body_m"]["forearm_r"] == pytest.approx(0.286)
 
 
 def test_faults_come_back_whole() -> None:

@@ -7,6 +7,7 @@ import sqlalchemy as sa
 
 from app.errors import BadMotion, Conflict, InvalidInput, NotFound
 from app.sim.motions import Motion, read_motion
+from app.sim.read_options import ReadOptions
 from app.store.engine import Store
 from app.store.motions import put_motion
 from app.store.records import NewMotion
@@ -59,14 +60,27 @@ def test_same_file_again_is_not_new_and_is_not_imported_again(
 ) -> None:
     calls: list[str] = []
 
-    def counted(content: bytes, file_name: str, name: str, sha256: str) -> NewMotion:
+    def counted(
+        content: bytes, file_name: str, name: str, sha256: str, options: ReadOptions
+    ) -> NewMotion:
         calls.append(file_name)
-        return import_here(content, file_name, name, sha256)
+        return import_here(content, file_name, name, sha256, options)
 
     catalog = MotionCatalog(store, counted)
     first, _ = catalog.add(CLIP, "nod.csv")
     assert catalog.add(CLIP, "Nod.csv") == (first, False)
     assert calls == ["nod.csv"]
+
+
+def test_same_file_with_other_options_is_another_motion(catalog: MotionCatalog) -> None:
+    clip, metres = bvh_text(working(100), unit=1.0).encode(), ReadOptions(unit="m")
+    first, _ = catalog.add(clip, "nod.bvh", options=metres)
+    assert first.summary["options"] == {"unit": "m"}
+    assert catalog.add(clip, "nod.bvh", options=metres) == (first, False)
+    with pytest.raises(Conflict, match="was read from this file with unit = m: remove it"):
+        catalog.add(clip, "nod.bvh", options=ReadOptions(unit="1.1"))
+    larger, new = catalog.add(clip, "nod.bvh", "large", ReadOptions(unit="1.1"))
+    assert new and larger.summary["body_m"]["forearm_r"] == pytest.approx(0.286)
 
 
 def test_same_file_with_a_wrong_ending_is_refused_all_the_same(catalog: MotionCatalog) -> None:

@@ -5,7 +5,8 @@ from app.errors import BadMotion
 from app.sim.body_size import BodySize
 from app.sim.body_track import model_points
 from app.sim.bvh import read_bvh
-from app.sim.skeletons import UNITS, body_track, skeleton_joints
+from app.sim.read_options import UNITS, ReadOptions
+from app.sim.skeletons import body_track, skeleton_joints
 from tests.sim.recorded_person import SKELETONS, TUM, bvh_text, working
 
 NECK = "OFFSET 0.0 440.0 0.0"
@@ -91,6 +92,17 @@ def test_positions_in_another_unit_than_the_skeleton_are_refused() -> None:
     q = working(10)
     q[:, :2] *= 1000.0
     assert "positions and offsets are probably in two units" in fault(bvh_text(q))
+
+
+def test_root_path_in_a_unit_of_its_own_is_read_where_it_is_stated() -> None:
+    lines = bvh_text(working(10), unit=0.01).splitlines()
+    start = lines.index("Frame Time: 0.02") + 1
+    for k in range(start, len(lines)):
+        place, rest = lines[k].split()[:3], lines[k].split()[3:]
+        lines[k] = " ".join([*(repr(float(one) / 100.0) for one in place), *rest])
+    options = ReadOptions(unit="cm", root_unit="m")
+    track, _ = body_track(read_bvh("\n".join(lines)), options)
+    np.testing.assert_allclose(track.points, TRUTH, atol=1e-5)
 
 
 def test_person_who_hangs_head_down_is_refused() -> None:

@@ -63,6 +63,9 @@ class MotionItem(Answer):
     created_at: datetime
     format: str = Field(description="bvh, mot, sto or csv")
     unit: str = Field(description="unit of the file's lengths, as it was found")
+    options: dict[str, Any] = Field(
+        default_factory=dict, description="what was stated about the file when it was posted"
+    )
     frames: int = Field(description="frames of the file")
     duration_s: float = Field(description="of the file [s]")
     n_runs: int = Field(description="clean runs")

@@ -1,0 +1,79 @@
+"""What a caller states about a recording: units, up axis, and names of joints or columns.
+
+Every reader takes a :class:`ReadOptions`. What is not stated is found from the file; where two
+readings fit, the file is refused, and the caller states which one is meant.
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from app.errors import InvalidInput
+
+UNITS: Mapping[str, float] = {
+    "m": 1.0,
+    "cm": 0.01,
+    "mm": 0.001,
+    "inch": 0.0254,
+    "foot": 0.3048,
+    "cmu": 0.0254 / 0.45,
+}
+"""Lengths that skeletons are written in [m]; ``cmu`` is an inch over 0.45."""
+UP_AXES = ("x", "y", "z", "-x", "-y", "-z")
+"""Directions of a file that can point up."""
+MIN_UNIT, MAX_UNIT = 1e-6, 10.0
+"""Range of a unit that is stated as a number [m]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadOptions:
+    """What is stated about a recording; None and an empty map state nothing.
+
+    Raises:
+        InvalidInput: A unit is neither one of UNITS nor a number, or the axis is none.
+    """
+
+    unit: str | None = None
+    """Unit of the skeleton's lengths: one of UNITS, or metres per unit as ``"0.045"``."""
+    root_unit: str | None = None
+    """Unit of the root's path, where it is not the skeleton's."""
+    up: str | None = None
+    """Direction of the file that points up, one of UP_AXES."""
+    names: Mapping[str, str] = field(default_factory=dict)
+    """The file's names of joints or columns, and ours for them."""
+
+    def __post_init__(self) -> None:
+        for name in ("unit", "root_unit"):
+            stated = getattr(self, name)
+            if stated is not None:
+                metres(stated, name)
+        if self.up is not None and self.up not in UP_AXES:
+            raise InvalidInput("up", self.up[:40], "must be the axis that points up", UP_AXES)
+
+    def stated(self) -> dict[str, Any]:
+        """Return what is stated, by field, as JSON data."""
+        return {name: value for name, value in asdict(self).items() if value}
+
+
+NOTHING_STATED = ReadOptions()
+"""Everything is found from the file."""
+
+
+def metres(unit: str, place: str = "unit") -> float:
+    """Return the length of a unit [m].
+
+    Args:
+        unit: One of UNITS, or metres per unit as a number.
+        place: Field that states it, for the message.
+
+    Raises:
+        InvalidInput: It is neither.
+    """
+    try:
+        length = UNITS[unit] if unit in UNITS else float(unit)
+    except ValueError:
+        length = 0.0
+    if not MIN_UNIT <= length <= MAX_UNIT:
+        rule = f"must be a unit, or metres per unit in [{MIN_UNIT:g}, {MAX_UNIT:g}]"
+        raise InvalidInput(place, unit[:40], rule, tuple(UNITS))
+    return length
