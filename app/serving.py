@@ -19,8 +19,8 @@ from app.settings import Settings
 GRACE_S = 3
 """How long open requests may go on once the server stops [s]."""
 
-MAX_FRAME_BYTES = 64 * 1024 * 1024
-"""Largest frame a browser may send to the viewer: a picture of its canvas."""
+MAX_FRAME_BYTES = 16 * 1024 * 1024
+"""Largest frame a socket takes in: a picture of the viewer's canvas; see ``app.api.viewer``."""
 
 Say = Callable[[str], None]
 

@@ -10,13 +10,12 @@ of making it jump. A visitor may let it run faster: then several steps are one p
 
 import logging
 import queue
-import socket
 import threading
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import rich
-import viser
 
 from app.errors import ServiceError
 from app.sim import commands
@@ -30,6 +29,7 @@ from app.sim.snapshot import WorldSnapshot
 from app.sim.sorting_commands import SORTING_COMMANDS
 from web import gui
 from web.scene import CellScene
+from web.viewer_server import ViewerServer
 
 logger = logging.getLogger(__name__)
 
@@ -107,8 +107,6 @@ class LiveCell:
     Args:
         cell: Work cell.
         policy: Acts at first; None lets the robot rest.
-        host: Address the viewer listens on; loopback, since it has no authentication.
-        port: Port of the viewer; 0 takes a free one.
         seed: Seed of the people's work.
         id: Name of the world in URLs.
         sorter: Values the moves of a sorting cell; None leaves them to the exact planner.
@@ -120,14 +118,12 @@ class LiveCell:
         cell: Cell,
         policy: TaskPolicy | None,
         *,
-        host: str = "127.0.0.1",
-        port: int = 0,
         seed: int = 0,
         id: str = "main",
         sorter: SortingValues | None = None,
         pilot: ReachPilot | None = None,
     ) -> None:
-        self._cell, self._host, self._port = cell, host, port
+        self._cell = cell
         # The first one compiles what is not in the kernels' cache yet.
         new_world(cell, policy, seed, id, sorter, pilot).step()
         self._world = new_world(cell, policy, seed, id, sorter, pilot)
@@ -136,7 +132,7 @@ class LiveCell:
         self._speed = 1
         self._turn, self._undrawn_s = 0, 0.0
         self._stop = threading.Event()
-        self._server: viser.ViserServer | None = None
+        self._server: ViewerServer | None = None
         self._thread: threading.Thread | None = None
 
     @property
@@ -145,24 +141,16 @@ class LiveCell:
         return self._cell
 
     @property
-    def viewer_port(self) -> int:
-        """Port the viewer listens on."""
+    def viewer_address(self) -> Path:
+        """Unix socket the viewer listens on."""
         if self._server is None:
             raise RuntimeError("the viewer has not been started")
-        return int(self._server.get_port())
-
-    @property
-    def server(self) -> viser.ViserServer:
-        """The viewer."""
-        if self._server is None:
-            raise RuntimeError("the viewer has not been started")
-        return self._server
+        return self._server.address
 
     def start(self) -> None:
         """Start viewer and thread."""
         rich.get_console().quiet = True  # viser would print its own address, past the page
-        port = self._port or free_port(self._host)
-        self._server = viser.ViserServer(host=self._host, port=port, verbose=False)
+        self._server = ViewerServer()
         scene = CellScene(self._server, self._cell, self.handle.submit)
         gui.build(self._server, scene.overlays, self._cell)
         scene.draw(self.handle.snapshot(), 0.0)
@@ -214,10 +202,3 @@ class LiveCell:
             self._speed = command.factor
         else:
             self._world.apply(command)
-
-
-def free_port(host: str) -> int:
-    """Return a port of ``host`` that nobody listens on at the moment."""
-    with socket.socket() as probe:
-        probe.bind((host, 0))
-        return int(probe.getsockname()[1])

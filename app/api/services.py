@@ -3,6 +3,7 @@
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Annotated, Protocol
 
 from fastapi import Depends
@@ -24,6 +25,8 @@ MAX_UPLOADS = 4
 """Most files that are taken in at once; each is held in memory."""
 MAX_STREAMS = 16
 """Most sockets that ask for motion at once."""
+MAX_VIEWERS = 16
+"""Most 3D viewers that are open at once."""
 
 
 class LiveWorld(Protocol):
@@ -38,8 +41,8 @@ class LiveWorld(Protocol):
         """The work cell it shows."""
 
     @property
-    def viewer_port(self) -> int:
-        """Loopback port of its 3D viewer."""
+    def viewer_address(self) -> Path:
+        """Unix socket of its 3D viewer."""
 
     def stop(self) -> None:
         """End world and viewer."""
@@ -111,6 +114,10 @@ class Services:
         default_factory=lambda: threading.BoundedSemaphore(MAX_STREAMS)
     )
     """Held by every open socket that asks for motion."""
+    viewers: threading.BoundedSemaphore = field(
+        default_factory=lambda: threading.BoundedSemaphore(MAX_VIEWERS)
+    )
+    """Held by every open viewer."""
     stopping: threading.Event = field(default_factory=threading.Event)
     """Set when the server goes down: open streams end."""
 

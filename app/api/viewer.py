@@ -1,36 +1,49 @@
 """The 3D viewer of a world, through this service's own port.
 
-The viewer (viser 1.1.1) listens on loopback without any check of who talks to it, and any of
-its clients may ask it to open a public tunnel. So nothing reaches it but through here: behind
-:mod:`app.api.security`, with that request dropped. Its page is served with one style sheet and
-script of ours that hide the library's own notices, which mean nothing to a visitor.
+The viewer (viser 1.1.1) listens on a Unix socket of this process's user and checks nothing
+itself, so a browser reaches it only through here: behind :mod:`app.api.security`, with frames
+of the types a viewer sends and of a bounded size. Its page is served with one style sheet and
+script of ours that hide the library's own notices and start a broken scene again.
 """
 
 import asyncio
 import gzip
-import http.client
 import logging
 from functools import lru_cache
 from importlib import resources
-from typing import Annotated
+from typing import Annotated, Literal
 
 import msgspec
 from fastapi import APIRouter, Header
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import RedirectResponse, Response
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
-from websockets.asyncio.client import ClientConnection, connect
+from websockets.asyncio.client import ClientConnection, unix_connect
 from websockets.exceptions import ConnectionClosed
 from websockets.typing import Subprotocol
 
-from app.api.services import ServicesDep, services_of
-from app.errors import NotReady, ServiceError
+from app.api.services import MAX_VIEWERS, LiveWorld, ServicesDep, services_of
+from app.errors import ServiceError
 
 logger = logging.getLogger(__name__)
 router = APIRouter(include_in_schema=False)
 
-DROPPED_PREFIX = "ShareUrl"
-FETCH_TIMEOUT_S = 5.0
+TYPES = {
+    "GuiUpdateMessage",
+    "SceneNodeClickMessage",
+    "SceneNodeDragMessage",
+    "ScenePointerMessage",
+    "TransformControlsDragEndMessage",
+    "TransformControlsDragStartMessage",
+    "TransformControlsUpdateMessage",
+    "ViewerCameraMessage",
+    "GetRenderResponseMessage",
+}
+"""Messages that a browser may send: no request for a public tunnel, no upload."""
+MAX_FRAME_BYTES = 64 * 1024
+"""Largest frame that is not a picture."""
+SMALL_BYTES = 1024
+"""Frames up to this size are decoded on the event loop, in microseconds."""
 # The viewer's page is one inline script that unpacks itself, and the glue of its WebAssembly
 # builds functions from text; both stay inside its own frame and talk to this server only.
 POLICY = (
@@ -56,8 +69,8 @@ async def page(
     accept_encoding: Annotated[str, Header()] = "",
 ) -> Response:
     """Return the viewer's one page."""
-    port = services.world(world_id).viewer_port
-    plain, packed = await run_in_threadpool(viewer_page, port)
+    services.world(world_id)
+    plain, packed = await run_in_threadpool(viewer_page)
     headers = {
         "Content-Security-Policy": POLICY,
         "Cache-Control": "no-cache",
@@ -70,24 +83,10 @@ async def page(
     return Response(plain, media_type="text/html", headers=headers)
 
 
-@lru_cache(maxsize=8)
-def viewer_page(port: int) -> tuple[bytes, bytes]:
-    """Fetch the viewer's page, add our style and script; plain and gzip-packed.
-
-    Raises:
-        NotReady: The viewer does not answer.
-    """
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=FETCH_TIMEOUT_S)
-    try:
-        connection.request("GET", "/")
-        answer = connection.getresponse()
-        content = answer.read()
-    except OSError as error:
-        raise NotReady(f"the 3D viewer does not answer: {error}") from error
-    finally:
-        connection.close()
-    if answer.status != 200:
-        raise NotReady(f"the 3D viewer answers with status {answer.status}")
+@lru_cache(maxsize=1)
+def viewer_page() -> tuple[bytes, bytes]:
+    """Return the viewer's page with our style and script, plain and gzip-packed."""
+    content = (resources.files("viser") / "client" / "build" / "index.html").read_bytes()
     extra = (resources.files("app.api") / "viewer_extra.html").read_bytes()
     plain = content.replace(b"</head>", extra + b"</head>", 1)
     return plain, gzip.compress(plain, 6)
@@ -97,25 +96,43 @@ def viewer_page(port: int) -> tuple[bytes, bytes]:
 @router.websocket("/viewer/{world_id}/")
 async def socket(client: WebSocket, world_id: str) -> None:
     """Pass frames between a browser and the viewer until one of them leaves."""
+    services = services_of(client)
     try:
-        port = services_of(client).world(world_id).viewer_port
+        world = services.world(world_id)
     except ServiceError as error:
         logger.info("viewer socket refused: %s", error)
         await client.close(1013, "no such world yet")
         return
+    if not services.viewers.acquire(blocking=False):
+        await refuse(client, f"{MAX_VIEWERS} viewers are open already: close one of them")
+        return
+    try:
+        await connect_viewer(client, world)
+    finally:
+        services.viewers.release()
+
+
+async def refuse(client: WebSocket, reason: str) -> None:
+    """Open a socket only to close it: a browser learns the reason of no other refusal."""
+    offered: list[str] = client.scope.get("subprotocols", [])
+    await client.accept(offered[0] if offered else None)
+    await client.close(1013, reason)
+
+
+async def connect_viewer(client: WebSocket, world: LiveWorld) -> None:
+    """Open the viewer's own socket and pass frames."""
     offered = [Subprotocol(one) for one in client.scope.get("subprotocols", [])]
     try:
-        viewer = await connect(
-            f"ws://127.0.0.1:{port}/",
+        viewer = await unix_connect(
+            str(world.viewer_address),
             subprotocols=offered or None,
             max_size=None,
             compression=None,
-            proxy=None,
             ping_interval=None,
         )
-    except (OSError, TimeoutError) as error:
-        logger.warning("the viewer on port %d does not answer: %s", port, error)
-        await client.close(1013, "the viewer does not answer")
+    except (OSError, RuntimeError) as error:
+        logger.warning("the viewer does not answer: %s", error)
+        await refuse(client, "the viewer does not answer")
         return
     async with viewer:
         await client.accept(viewer.subprotocol)
@@ -146,16 +163,23 @@ async def pass_frames(client: WebSocket, viewer: ClientConnection) -> None:
 
 
 async def to_viewer(client: WebSocket, viewer: ClientConnection) -> None:
-    """Pass on what the browser sends, but for what it must not ask."""
+    """Pass on what the browser may send; end the connection at a frame that is too large."""
     while True:
         message = await client.receive()
         if message["type"] == "websocket.disconnect":
             return
-        frame = message.get("bytes")
-        if frame is not None and is_allowed(frame):
-            await viewer.send(frame)
+        frame: bytes = message.get("bytes") or b""
+        if len(frame) <= SMALL_BYTES:
+            allowed = is_allowed(frame)
         else:
-            logger.warning("dropped a frame from a browser that the viewer must not get")
+            allowed = await asyncio.to_thread(is_allowed, frame)
+        if allowed:
+            await viewer.send(frame)
+            continue
+        logger.warning("dropped a frame from a browser that the viewer must not get")
+        if len(frame or message.get("text") or "") > MAX_FRAME_BYTES:
+            await client.close(1009, f"a frame has at most {MAX_FRAME_BYTES} bytes")
+            return
 
 
 async def to_client(client: WebSocket, viewer: ClientConnection) -> None:
@@ -164,17 +188,31 @@ async def to_client(client: WebSocket, viewer: ClientConnection) -> None:
         await client.send_bytes(frame if isinstance(frame, bytes) else frame.encode())
 
 
-def is_allowed(frame: bytes) -> bool:
-    """Whether a browser's frame may reach the viewer.
+class Picture(msgspec.Struct, forbid_unknown_fields=True):
+    """A picture of the canvas, as the viewer asks for it."""
 
-    A frame is one msgpack map whose ``type`` names the message. It is read by the decoder that
-    the viewer uses, so that both see the same ``type``.
+    type: Literal["GetRenderResponseMessage"]
+    """Name of the message."""
+    payload: bytes
+    """The picture, JPEG or PNG."""
+    render_uuid: str
+    """Which request it answers."""
+
+
+def is_allowed(frame: bytes) -> bool:
+    """Return whether a browser's frame may reach the viewer.
+
+    A frame is one msgpack map whose ``type`` names the message. A frame of at most
+    ``MAX_FRAME_BYTES`` is read by the decoder that the viewer uses, so that both see the same
+    ``type``; a larger one must be a picture and nothing else, which is decided at its first
+    other member.
     """
     try:
+        if len(frame) > MAX_FRAME_BYTES:
+            msgspec.msgpack.decode(frame, type=Picture)
+            return True
         message = msgspec.msgpack.decode(frame)
     except (msgspec.DecodeError, ValueError, RecursionError):
         return False
-    if not isinstance(message, dict):
-        return False
-    kind = message.get("type")
-    return isinstance(kind, str) and not kind.startswith(DROPPED_PREFIX)
+    kind = message.get("type") if isinstance(message, dict) else None
+    return isinstance(kind, str) and kind in TYPES

@@ -35,9 +35,10 @@ def running(app: FastAPI) -> Iterator[tuple[Server, str]]:
         assert not thread.is_alive()
 
 
-def wait_until_ready(address: str) -> None:
+def wait_until_ready(address: str, headers: dict[str, str] | None = None) -> None:
     """Wait for the kernels and the live cell."""
     give_up = time.monotonic() + WARM_UP_S
-    while (answer := patient_http.get(f"{address}/readyz")).status_code != 200:
+    url = f"{address}/readyz"
+    while (answer := patient_http.get(url, headers=headers)).status_code != 200:
         assert time.monotonic() < give_up, answer.text
         time.sleep(0.05)

@@ -1,18 +1,25 @@
+import time
 from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
 
 import msgspec
 import pytest
 import viser
 from fastapi.testclient import TestClient
-from websockets.exceptions import InvalidStatus
+from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol
 
-from app.api.viewer import is_allowed
+from app.api.services import MAX_VIEWERS
+from app.api.viewer import MAX_FRAME_BYTES, is_allowed
 from app.main import create_app
 from app.settings import Settings
+from tests import patient_http
 from tests.api.live_server import running, wait_until_ready
+from tests.listening_ports import listening_ports
 
+TOKEN = "a-token-of-some-length"
 PROTOCOL = Subprotocol(f"viser-v{viser.__version__}")
 
 
@@ -22,6 +29,12 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     with running(app) as (_, found):
         wait_until_ready(found)
         yield found
+
+
+def picture(payload: object, **more: object) -> bytes:
+    """Return the frame of a picture of the canvas."""
+    message = {"type": "GetRenderResponseMessage", "render_uuid": "a", "payload": payload}
+    return msgspec.msgpack.encode(message | more)
 
 
 def open_socket(
@@ -78,7 +91,7 @@ def test_request_for_a_public_tunnel_never_reaches_the_viewer(
     address: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked: list[object] = []
-    monkeypatch.setattr(viser.ViserServer, "request_share_url", lambda *_: asked.append(1))
+    monkeypatch.setattr(viser._viser, "ViserTunnel", lambda *_: asked.append(1))
     with open_socket(address) as socket:
         socket.recv(timeout=10.0)
         for frame in ({"type": "ShareUrlRequest"}, {"type": "ShareUrlDisconnect"}):
@@ -87,6 +100,85 @@ def test_request_for_a_public_tunnel_never_reaches_the_viewer(
         socket.send("text")
         assert isinstance(socket.recv(timeout=10.0), bytes)
     assert not asked
+
+
+def test_only_the_service_itself_listens_and_asks_viewers_for_its_token(
+    tmp_path: Path,
+) -> None:
+    before = listening_ports()
+    app = create_app(Settings(data=tmp_path, token=TOKEN))  # type: ignore[arg-type]
+    with running(app) as (_, found):
+        bearer = {"Authorization": f"Bearer {TOKEN}"}
+        wait_until_ready(found, bearer)
+        assert listening_ports() - before == {int(found.rsplit(":", 1)[1])}
+        people = patient_http.get(f"{found}/v1/worlds/main", headers=bearer).json()["people"]
+        for options in ({}, {"origin": Origin("http://evil.example")}):
+            with pytest.raises(InvalidStatus):
+                with open_socket(found, **options) as stranger:
+                    stranger.send(drag_of_the_pelvis())
+        assert patient_http.get(f"{found}/viewer/main/").status_code == 401
+        now = patient_http.get(f"{found}/v1/worlds/main", headers=bearer).json()["people"]
+        assert [one["mode"] for one in now] == [one["mode"] for one in people] == ["auto"]
+        with open_socket(found, additional_headers=bearer) as visitor:
+            assert isinstance(visitor.recv(timeout=10.0), bytes)
+
+
+def drag_of_the_pelvis() -> bytes:
+    return msgspec.msgpack.encode(
+        {
+            "type": "TransformControlsUpdateMessage",
+            "name": "/gizmos/0/pelvis",
+            "wxyz": (1.0, 0.0, 0.0, 0.0),
+            "position": (0.0, 2.0, 0.0),
+            "owner": "",
+        }
+    )
+
+
+def test_one_viewer_too_many_is_told_why_and_gets_in_once_another_has_left(
+    address: str,
+) -> None:
+    with ExitStack() as stack:
+        first, *_ = [stack.enter_context(open_socket(address)) for _ in range(MAX_VIEWERS)]
+        with pytest.raises(ConnectionClosed, match="16 viewers are open already") as refused:
+            stack.enter_context(open_socket(address)).recv(timeout=10.0)
+        assert refused.value.rcvd is not None and refused.value.rcvd.code == 1013
+        first.close()
+        assert isinstance(enter_when_free(address, stack).recv(timeout=10.0), bytes)
+
+
+def enter_when_free(address: str, stack: ExitStack) -> ClientConnection:
+    """Return a viewer that was let in; the server learns of a leave a moment later."""
+    for _ in range(100):
+        one = stack.enter_context(open_socket(address))
+        try:
+            one.recv(timeout=10.0)
+        except ConnectionClosed:
+            time.sleep(0.1)
+            continue
+        return one
+    raise AssertionError("nobody is let in")
+
+
+@pytest.mark.parametrize(
+    "frame",
+    [
+        b"\xdd\x00\xff\xff\xf0" + b"\x91" * (2**24 - 16),
+        msgspec.msgpack.encode({"type": "ViewerCameraMessage", "x": b"0" * MAX_FRAME_BYTES}),
+        "text" * MAX_FRAME_BYTES,
+    ],
+    ids=["16 MB of nested arrays", "camera of 64 kB and a little", "text"],
+)
+def test_frame_that_is_too_large_ends_its_own_connection_only(
+    address: str, frame: bytes | str
+) -> None:
+    with open_socket(address) as other, open_socket(address) as socket:
+        socket.send(frame)
+        with pytest.raises(ConnectionClosed) as closed:
+            while True:
+                socket.recv(timeout=10.0)
+        assert closed.value.rcvd is not None and closed.value.rcvd.code == 1009
+        assert isinstance(other.recv(timeout=10.0), bytes)
 
 
 @pytest.mark.parametrize(
@@ -98,7 +190,15 @@ def test_request_for_a_public_tunnel_never_reaches_the_viewer(
         (msgspec.msgpack.encode([{"type": "ViewerCameraMessage"}]), False),
         (b"\x82\xa4type\xa1A\xa4type\xafShareUrlRequest", False),
         (b"", False),
+        (b"\x91" * 50_000, False),
         (b"\x91" * 100_000, False),
+        (msgspec.msgpack.encode({"type": "FileTransferStartUpload"}), False),
+        (msgspec.msgpack.encode({"type": None}), False),
+        (msgspec.msgpack.encode({"type": ["ViewerCameraMessage"]}), False),
+        (picture(b"0" * 2**20), True),
+        (picture(b"0" * 2**20, type="ViewerCameraMessage"), False),
+        (picture(b"0" * 2**20, extra=1), False),
+        (picture([0] * 2**20), False),
     ],
 )
 def test_frames_are_let_through_by_the_type_that_the_viewer_reads(

@@ -99,12 +99,6 @@ def free_port() -> int:
         return port
 
 
-@pytest.fixture
-def unused_port() -> int:
-    """A port nobody listens on."""
-    return free_port()
-
-
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Browser]:
     """Start the system's Chromium, headless, with software rendering."""

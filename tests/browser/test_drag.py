@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import viser
 from playwright.sync_api import Page, expect
 
 from app.sim import human
-from app.sim.cells import load_cell
+from app.sim.cells import Cell, load_cell
 from tests import patient_http
 from tests.browser.camera import Camera
 from web import workplace
+from web.viewer_server import ViewerServer
 
 pytestmark = pytest.mark.browser
 
@@ -29,10 +29,10 @@ PICK_S = 120.0
 """Time the robot may take for its first pick, on a busy machine [s]."""
 
 
-def first_camera(port: int) -> Camera:
-    """Return the camera every visitor starts with, from a scene of its own."""
-    server = viser.ViserServer(host="127.0.0.1", port=port, verbose=False)
-    workplace.build(server, CELL)
+def first_camera(cell: Cell) -> Camera:
+    """Return the camera every visitor of a cell starts with, from a scene of its own."""
+    server = ViewerServer()
+    workplace.build(server, cell)
     first = server.initial_camera
     camera = Camera(
         position=tuple(first.position), look_at=tuple(first.look_at), fov=float(first.fov)
@@ -134,13 +134,13 @@ def until(server: str, holds: Callable[[dict], bool], limit_s: float) -> dict:
 
 
 def test_dragging_a_hand_onto_the_chosen_cube_changes_the_choice(
-    open_page: Callable[..., Page], server: str, unused_port: int
+    open_page: Callable[..., Page], server: str
 ) -> None:
     pause_after_a_pick(server)
     page = open_page()
     expect(page.locator(".story .chip")).to_have_text("Paused")
     page.frame_locator(VIEWER).locator("canvas").first.wait_for()
-    camera = first_camera(unused_port)
+    camera = first_camera(CELL)
     chosen = settle(page, server)
     target = np.array(CELL.station(chosen).position)
     name = "right" if target[0] < 0 else "left"

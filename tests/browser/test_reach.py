@@ -4,14 +4,11 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
-import viser
 from playwright.sync_api import Page, expect
 
 from app.sim.cells import load_cell
 from tests import patient_http
-from tests.browser.camera import Camera
-from tests.browser.test_drag import VIEWER, on_canvas, state, tell, until
-from web import workplace
+from tests.browser.test_drag import VIEWER, first_camera, on_canvas, state, tell, until
 
 pytestmark = pytest.mark.browser
 
@@ -30,18 +27,6 @@ def reaching(server: str) -> Iterator[str]:
     assert shown.status_code == 200, shown.text
     yield server
     patient_http.put(world, json={"cell": load_cell().name}).raise_for_status()
-
-
-def camera_of(port: int) -> Camera:
-    """Return the camera every visitor of the cell starts with, from a scene of its own."""
-    server = viser.ViserServer(host="127.0.0.1", port=port, verbose=False)
-    workplace.build(server, CELL)
-    first = server.initial_camera
-    camera = Camera(
-        position=tuple(first.position), look_at=tuple(first.look_at), fov=float(first.fov)
-    )
-    server.stop()
-    return camera
 
 
 def override(page: Page) -> float:
@@ -77,9 +62,7 @@ def test_visitor_opens_the_cell_sees_it_reach_and_gets_in_its_way(
     page.wait_for_selector("[data-candidate]")
 
 
-def test_goal_is_dragged_by_its_arrow(
-    open_page: Callable[..., Page], reaching: str, unused_port: int
-) -> None:
+def test_goal_is_dragged_by_its_arrow(open_page: Callable[..., Page], reaching: str) -> None:
     tell(
         reaching,
         {"tag": "remove-person", "person": 0},
@@ -89,7 +72,7 @@ def test_goal_is_dragged_by_its_arrow(
     )
     page = open_page()
     page.frame_locator(VIEWER).locator("canvas").first.wait_for()
-    camera = camera_of(unused_port)
+    camera = first_camera(CELL)
     for _ in range(4):
         view = on_canvas(page, camera)
         start = np.array(state(reaching)["reach"]["goal"])

@@ -1,4 +1,4 @@
-import socket
+import stat
 import time
 from collections.abc import Callable, Iterator
 
@@ -8,6 +8,7 @@ import pytest
 from app.errors import InvalidInput, NotFound
 from app.sim import commands, human
 from app.sim.cells import load_cell
+from tests.listening_ports import listening_ports
 from tests.straight_policy import StraightPolicy
 from tests.web.viewer_client import ViewerClient
 from web.loop import LiveCell
@@ -45,10 +46,16 @@ def test_simulated_time_never_runs_ahead_of_the_clock(live: LiveCell) -> None:
     assert ticks * 0.05 <= elapsed + 0.3
 
 
-def test_viewer_listens_on_loopback_only(live: LiveCell) -> None:
-    assert live.server.get_host() == "127.0.0.1"
-    with socket.create_connection(("127.0.0.1", live.viewer_port), timeout=5.0):
-        pass
+def test_viewer_opens_no_port_but_a_socket_of_its_user(live: LiveCell) -> None:
+    before = listening_ports()
+    other = LiveCell(load_cell(), None)
+    other.start()
+    assert listening_ports() == before
+    for one in (live, other):
+        assert stat.S_ISSOCK(one.viewer_address.stat().st_mode)
+        assert stat.S_IMODE(one.viewer_address.parent.stat().st_mode) == 0o700
+    assert live.viewer_address != other.viewer_address
+    other.stop()
 
 
 def test_commands_are_carried_out_in_order(live: LiveCell) -> None:
@@ -80,7 +87,7 @@ def test_person_can_be_changed_as_soon_as_it_was_added(live: LiveCell) -> None:
 def test_click_on_a_cube_toggles_it_as_candidate(live: LiveCell) -> None:
     live.handle.submit(commands.SetCandidates(ids=("cube0",)))
     wait_for(lambda: live.handle.snapshot().selected == ("cube0",))
-    with ViewerClient(live.viewer_port) as visitor:
+    with ViewerClient(live.viewer_address) as visitor:
         visitor.click("/stations/cube3")
         wait_for(lambda: live.handle.snapshot().selected == ("cube0", "cube3"))
         visitor.click("/stations/cube0")
@@ -97,7 +104,7 @@ def test_drag_of_a_hand_moves_the_person(live: LiveCell) -> None:
         palm = human.joint_points(person.q, person.size)["hand_r"]
         return float(np.linalg.norm(palm - [-0.15, 0.9, 0.25]))
 
-    with ViewerClient(live.viewer_port) as visitor:
+    with ViewerClient(live.viewer_address) as visitor:
         visitor.drag("/gizmos/0/right", [(-0.1, 0.95, 0.3), (-0.15, 0.9, 0.25)])
         wait_for(lambda: away() < 0.03)
 
@@ -106,12 +113,11 @@ def test_stop_ends_thread_and_viewer() -> None:
     cell = load_cell()
     live = LiveCell(cell, None)
     live.start()
-    port = live.viewer_port
+    address = live.viewer_address
     live.stop()
     live.stop()
     tick = live.handle.snapshot().tick
-    with pytest.raises(OSError):
-        socket.create_connection(("127.0.0.1", port), timeout=1.0)
+    assert not address.parent.exists()
     assert live.handle.snapshot().tick == tick
 
 

@@ -14,19 +14,19 @@ from app.sim.reach_commands import MoveGoal, SetSafety, goal_box
 from app.sim.reach_world import ReachWorld
 from app.sim.snapshot import WorldSnapshot
 from tests.web.viewer_client import ViewerClient
-from web.loop import free_port
 from web.mannequin import VESTS
 from web.reach_scene import N_GAUGE, OFF, OVERRIDES, blend, override_color
 from web.scene import CellScene
 from web.stations_view import HIT
+from web.viewer_server import ViewerServer
 
 CELL = load_cell("shared-workspace")
 WAIT_S = 10.0
 
 
 @pytest.fixture(scope="module")
-def server() -> Iterator[viser.ViserServer]:
-    server = viser.ViserServer(host="127.0.0.1", port=free_port("127.0.0.1"), verbose=False)
+def server() -> Iterator[ViewerServer]:
+    server = ViewerServer()
     yield server
     server.stop()
 
@@ -173,7 +173,7 @@ def test_trail_follows_the_tool(
 def test_goal_that_is_dragged_out_of_its_region_stays_at_the_edge(
     server: viser.ViserServer, queued: list[Command]
 ) -> None:
-    with ViewerClient(server.get_port()) as visitor:
+    with ViewerClient(server.address) as visitor:
         end = time.monotonic() + WAIT_S
         while not any(isinstance(one, MoveGoal) for one in queued):
             assert time.monotonic() < end, "the drag never arrived"

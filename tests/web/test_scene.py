@@ -11,9 +11,9 @@ from app.sim.robot import LINK_NAMES, Robot
 from app.sim.world import World
 from tests.straight_policy import StraightPolicy
 from web.arc import dashes
-from web.loop import free_port
 from web.scene import PATH_LIFT, CellScene
 from web.stations_view import IDLE, RAMP, color_of
+from web.viewer_server import ViewerServer
 
 
 @pytest.fixture(scope="module")
@@ -22,8 +22,8 @@ def cell() -> Cell:
 
 
 @pytest.fixture(scope="module")
-def server() -> Iterator[viser.ViserServer]:
-    server = viser.ViserServer(host="127.0.0.1", port=free_port("127.0.0.1"), verbose=False)
+def server() -> Iterator[ViewerServer]:
+    server = ViewerServer()
     yield server
     server.stop()
 

@@ -16,9 +16,9 @@ from app.sim.sorting_view import HELD, SortingView
 from app.sim.world import World
 from tests.web.sorting_views import a_view, centre, piece
 from tests.web.viewer_client import ViewerClient
-from web.loop import free_port
 from web.scene import CellScene
 from web.sorting_bodies import BLOCKS, FAILURES, failure_color
+from web.viewer_server import ViewerServer
 
 WAIT_S = 10.0
 
@@ -29,8 +29,8 @@ def cell() -> Cell:
 
 
 @pytest.fixture(scope="module")
-def server() -> Iterator[viser.ViserServer]:
-    server = viser.ViserServer(host="127.0.0.1", port=free_port("127.0.0.1"), verbose=False)
+def server() -> Iterator[ViewerServer]:
+    server = ViewerServer()
     yield server
     server.stop()
 
@@ -167,7 +167,7 @@ def test_click_on_a_block_puts_it_into_the_goal_or_out(
     queued: list[Command],
 ) -> None:
     scene.draw(replace(still, sorting=a_view(cell)), 0.05)
-    with ViewerClient(server.get_port()) as visitor:
+    with ViewerClient(server.address) as visitor:
         visitor.click("/blocks/block3")
         end = time.monotonic() + WAIT_S
         while not queued and time.monotonic() < end:

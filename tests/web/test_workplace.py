@@ -7,12 +7,12 @@ import viser
 from app.sim.cell_parts import Obstacle
 from app.sim.cells import load_cell
 from web import workplace
-from web.loop import free_port
+from web.viewer_server import ViewerServer
 
 
 @pytest.fixture
-def server() -> Iterator[viser.ViserServer]:
-    server = viser.ViserServer(host="127.0.0.1", port=free_port("127.0.0.1"), verbose=False)
+def server() -> Iterator[ViewerServer]:
+    server = ViewerServer()
     yield server
     server.stop()
 

@@ -1,20 +1,23 @@
 """A visitor of a viewer without a browser: speaks viser's protocol over its websocket."""
 
+import random
 import threading
+import time
 from collections.abc import Sequence
+from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
 import msgspec.msgpack
 import viser
-from websockets.sync.client import connect
+from websockets.sync.client import unix_connect
 from websockets.typing import Subprotocol
 
 
 class ViewerClient:
-    def __init__(self, port: int) -> None:
-        self._socket = connect(
-            f"ws://127.0.0.1:{port}",
+    def __init__(self, address: Path) -> None:
+        self._socket = unix_connect(
+            str(address),
             subprotocols=[Subprotocol(f"viser-v{viser.__version__}")],
             compression=None,
             max_size=None,
@@ -22,18 +25,7 @@ class ViewerClient:
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
         # viser counts a visitor from its first camera on.
-        self._send(
-            type="ViewerCameraMessage",
-            wxyz=(1.0, 0.0, 0.0, 0.0),
-            position=(2.0, 0.0, 1.0),
-            fov=0.7,
-            near=0.01,
-            far=100.0,
-            image_height=600,
-            image_width=800,
-            look_at=(0.0, 0.0, 0.0),
-            up_direction=(0.0, 0.0, 1.0),
-        )
+        self.look(0.7)
 
     def __enter__(self) -> Self:
         return self
@@ -52,11 +44,37 @@ class ViewerClient:
         for _ in self._socket:
             pass
 
-    def _send(self, **message: Any) -> None:
+    def send(self, **message: Any) -> None:
         self._socket.send(msgspec.msgpack.encode(message))
 
+    def look(self, fov: float) -> None:
+        """Say where the camera is, with a field of view [rad]."""
+        self.send(
+            type="ViewerCameraMessage",
+            wxyz=(1.0, 0.0, 0.0, 0.0),
+            position=(2.0, 0.0, 1.0),
+            fov=fov,
+            near=0.01,
+            far=100.0,
+            image_height=600,
+            image_width=800,
+            look_at=(0.0, 0.0, 0.0),
+            up_direction=(0.0, 0.0, 1.0),
+        )
+
+    def wait_until_heard(self, server: viser.ViserServer) -> None:
+        """Wait until the server has handled all that was sent before."""
+        end = time.monotonic() + 10.0
+        fov = 0.5 + 0.1 * random.random()
+        self.look(fov)
+        while not any(
+            abs(one.camera.fov - fov) < 1e-9 for one in server.get_clients().values()
+        ):
+            assert time.monotonic() < end, "the viewer does not hear"
+            time.sleep(0.02)
+
     def click(self, name: str) -> None:
-        self._send(
+        self.send(
             type="SceneNodeClickMessage",
             name=name,
             instance_index=None,
@@ -68,13 +86,13 @@ class ViewerClient:
         )
 
     def drag(self, name: str, positions: Sequence[tuple[float, float, float]]) -> None:
-        self._send(type="TransformControlsDragStartMessage", name=name, owner="")
+        self.send(type="TransformControlsDragStartMessage", name=name, owner="")
         for position in positions:
-            self._send(
+            self.send(
                 type="TransformControlsUpdateMessage",
                 name=name,
                 wxyz=(1.0, 0.0, 0.0, 0.0),
                 position=position,
                 owner="",
             )
-        self._send(type="TransformControlsDragEndMessage", name=name, owner="")
+        self.send(type="TransformControlsDragEndMessage", name=name, owner="")

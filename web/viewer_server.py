@@ -1,0 +1,89 @@
+"""viser's server behind a Unix socket, which no browser and no other user can reach.
+
+viser (1.1.1) listens on a TCP port and checks neither token nor ``Origin`` nor ``Host``: any
+page in a browser of this machine could open that port and drag a person of the live cell. Here
+it listens on a Unix socket in a directory of mode 0700 instead. The kernel lets only processes
+of the same user connect, browsers cannot address a Unix socket at all, and the one way in is
+the proxy in :mod:`app.api.viewer`, behind the service's own checks.
+
+viser hands no listening option on, so ``serve`` of :mod:`websockets.asyncio.server`, which it
+looks up while it starts, is replaced for the time of its constructor; calls for another host
+pass through. The message that asks for a public tunnel has no handler.
+"""
+
+import shutil
+import socket
+import tempfile
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import viser
+import viser._messages
+import websockets.asyncio.server
+from typing_extensions import override
+
+_starting = threading.Lock()
+
+
+class ViewerServer(viser.ViserServer):
+    """A viser server that listens on a Unix socket; ``stop`` removes the socket.
+
+    Raises:
+        OSError: The socket cannot be made.
+    """
+
+    def __init__(self) -> None:
+        self.address = Path(tempfile.mkdtemp(prefix="tandem-")) / "viewer"
+        """Path of the socket."""
+        try:
+            with _listening_on(self.address):
+                super().__init__(host=str(self.address), port=0, verbose=False)
+        except BaseException:
+            shutil.rmtree(self.address.parent)
+            raise
+        for request in (viser._messages.ShareUrlRequest, viser._messages.ShareUrlDisconnect):
+            self._websock_server.unregister_handler(request)
+
+    @override
+    def request_share_url(self, verbose: bool = True) -> str | None:
+        """Refuse: a public tunnel would pass the service's checks by."""
+        return None
+
+    @override
+    def stop(self) -> None:
+        """End the server and remove its socket."""
+        super().stop()
+        shutil.rmtree(self.address.parent, ignore_errors=True)  # may be called twice
+
+
+@contextmanager
+def _listening_on(address: Path) -> Iterator[None]:
+    """Let the viser server that starts in this block listen on ``address``.
+
+    Raises:
+        OSError: The socket cannot be made.
+    """
+    listener = socket.socket(socket.AF_UNIX)
+    try:
+        listener.bind(str(address))
+    except OSError:
+        listener.close()
+        raise
+    original = websockets.asyncio.server.serve
+
+    def serve(handler: Any, host: Any = None, port: Any = None, **options: Any) -> Any:
+        if host != str(address):
+            return original(handler, host, port, **options)
+        # Both ends live in this process: a ping could only find that it was paused.
+        options |= {"sock": listener, "ping_interval": None}
+        return websockets.asyncio.server.unix_serve(handler, **options)
+
+    with _starting:
+        websockets.asyncio.server.serve = serve  # type: ignore[assignment,misc]
+        try:
+            yield
+        finally:
+            websockets.asyncio.server.serve = original  # type: ignore[misc]
