@@ -12,6 +12,7 @@ import torch
 import uvicorn
 from fastapi import FastAPI
 
+from app.http_limits import LimitedHttp
 from app.listening import address_of
 from app.main import create_app
 from app.settings import Settings
@@ -49,6 +50,7 @@ def server_of(app: FastAPI, tell: Callable[[], Awaitable[None]] | None = None) -
     """
     config = uvicorn.Config(
         app,
+        http=LimitedHttp,
         log_config=None,
         access_log=False,
         ws_per_message_deflate=False,

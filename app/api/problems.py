@@ -14,6 +14,7 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from pydantic import BaseModel
 from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
 from starlette.routing import Match
 
 from app.api.validation import (
@@ -198,6 +199,11 @@ def _methods_at(request: Request) -> list[str]:
     ]
 
 
+async def on_disconnect(request: Request, _error: Exception) -> ProblemResponse:
+    """End a request whose client left, or was disconnected, before its body was complete."""
+    return problem(400, "the body of the request is incomplete", instance=request.url.path)
+
+
 async def on_bug(request: Request, _error: Exception) -> ProblemResponse:
     """Answer what nobody foresaw; the trace goes to the log, never to the caller."""
     return problem(
@@ -210,4 +216,5 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(ServiceError, on_service_error)
     app.add_exception_handler(RequestValidationError, on_validation_error)
     app.add_exception_handler(HTTPException, on_http_error)
+    app.add_exception_handler(ClientDisconnect, on_disconnect)
     app.add_exception_handler(Exception, on_bug)

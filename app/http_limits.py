@@ -1,0 +1,245 @@
+"""Limits of the HTTP connection: size of a request head, time, progress, number of clients.
+
+uvicorn's parser (httptools 0.9) accepts a head of any size and waits for it without end, and
+joins a header that arrives in pieces at quadratic cost. This protocol refuses both before the
+application, and with it the token, is reached. A WebSocket handshake is parsed here as well.
+"""
+
+import asyncio
+from collections.abc import Callable
+
+from uvicorn.protocols.http.httptools_impl import STATUS_LINE, HttpToolsProtocol
+
+from app.api.problems import problem
+from app.api.security import HEADERS
+
+HEAD_BYTES = 32 * 1024
+"""Longest head of a request: URL and headers, trailers included [bytes]."""
+HEAD_S = 10.0
+"""Longest time from a connection, or the first byte of a further request, to its head [s]."""
+BODY_S = 10.0
+"""Time in which a body must progress by BODY_BYTES or end [s]."""
+BODY_BYTES = 5000
+"""Least progress of a body in BODY_S [bytes]."""
+UNREAD_BYTES = 1 << 20
+"""Most of a body that is still read after its request was answered [bytes]."""
+DRAIN_S = 60.0
+"""Longest time in which a client may take nothing of its answer [s]."""
+LINGER_S = 2.0
+"""Time for a client to read a refusal while what it sends is dropped [s]."""
+MAX_PIPELINED = 32
+"""Most requests of a connection that wait for the answer to an earlier one."""
+MAX_CONNECTIONS = 512
+"""Most open connections, WebSockets included."""
+
+
+class LimitedHttp(HttpToolsProtocol):
+    """uvicorn's HTTP/1.1 protocol with limits; one object per connection."""
+
+    _timer: asyncio.TimerHandle | None = None
+    _drain_timer: asyncio.TimerHandle | None = None
+    _begun = False
+    """Whether a request has begun and not ended."""
+    _in_body = False
+    """Whether the head of this request is complete."""
+    _ended = False
+    """Whether no further request is taken; what still arrives is dropped."""
+    _head = 0
+    """Length of the parsed part of the head [bytes]."""
+    _pending = 0
+    """What arrived since a whole header or a piece of a body did [bytes]."""
+    _progress = 0
+    """What arrived of the body since the timer was set [bytes]."""
+    _unread = 0
+    """What arrived of the body after the answer [bytes]."""
+    _refusal = (400, "bad-request", "the request is not valid HTTP/1.1")
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        """Take a client; where there are too many, close the one that is idle for longest."""
+        super().connection_made(transport)
+        self._idle_since = self.loop.time()
+        self._set_timer(HEAD_S, self._head_is_late)
+        if len(self.connections) > MAX_CONNECTIONS:
+            every = [one for one in self.connections if isinstance(one, LimitedHttp)]
+            oldest = min(filter(LimitedHttp._is_idle, every), key=lambda one: one._idle_since)
+            oldest._make_room()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Stop the timers."""
+        self._stop_timer()
+        self.resume_writing()
+        super().connection_lost(exc)
+
+    def data_received(self, data: bytes) -> None:
+        """Parse what arrived, within the limits."""
+        if self._ended:
+            return
+        self._pending += len(data)
+        super().data_received(data)
+        if self._ended:
+            return
+        if self._head + self._pending > HEAD_BYTES:
+            self._refuse(*_HEAD_TOO_LARGE)
+        elif self._timer is None and self._in_body:
+            self._progress = 0
+            self._set_timer(BODY_S, self._body_is_due)
+        elif self._timer is None and (self._begun or self._pending):
+            self._set_timer(HEAD_S, self._head_is_late)
+
+    def on_message_begin(self) -> None:
+        """Begin to count."""
+        self._begun, self._head, self._pending, self._unread = True, 0, 0, 0
+        super().on_message_begin()
+
+    def on_url(self, url: bytes) -> None:
+        """Count a part of the URL."""
+        self._count(len(url))
+        super().on_url(url)
+
+    def on_header(self, name: bytes, value: bytes) -> None:
+        """Count a header with its punctuation."""
+        self._count(len(name) + len(value) + 4)
+        super().on_header(name, value)
+
+    def on_headers_complete(self) -> None:
+        """Start the request, unless too many wait already."""
+        self._stop_timer()
+        if len(self.pipeline) >= MAX_PIPELINED:
+            self._refusal = 503, "too-many-requests-at-once", "too many pipelined requests"
+            raise ValueError(self._refusal)
+        super().on_headers_complete()
+        self._in_body = True
+
+    def on_body(self, body: bytes) -> None:
+        """Note that the body goes on."""
+        self._pending = 0
+        self._progress += len(body)
+        super().on_body(body)
+        if self.cycle.response_complete:
+            self._unread += len(body)
+            if self._unread > UNREAD_BYTES:
+                raise ValueError("the request was answered, its body has no reader")
+
+    def on_message_complete(self) -> None:
+        """Wait for the next request."""
+        self._stop_timer()
+        self._begun = self._in_body = False
+        self._head = self._pending = 0
+        super().on_message_complete()
+
+    def on_response_complete(self) -> None:
+        """Count the time without a request from here."""
+        self._idle_since = self.loop.time()
+        super().on_response_complete()
+
+    def handle_websocket_upgrade(self) -> None:
+        """Hand the connection to the WebSocket protocol, which has limits of its own."""
+        self._stop_timer()
+        self._ended = True
+        super().handle_websocket_upgrade()
+        if not getattr(self.transport.get_protocol(), "handshake_initiated", True):
+            detail = "the headers of the handshake are too long or too many"
+            self.transport.write(_refusal(431, "head-too-large", detail))
+            self.transport.close()
+
+    def pause_writing(self) -> None:
+        """Give a client that reads nothing some time."""
+        super().pause_writing()
+        self._drain_timer = self.loop.call_later(DRAIN_S, self.transport.abort)
+
+    def resume_writing(self) -> None:
+        """Go on: the client has read."""
+        super().resume_writing()
+        if self._drain_timer is not None:
+            self._drain_timer.cancel()
+            self._drain_timer = None
+
+    def send_400_response(self, msg: str) -> None:
+        """Answer what the parser, or a limit in its callbacks, refused."""
+        self._refuse(*self._refusal)
+
+    def _is_idle(self) -> bool:
+        answered = self.cycle is None or self.cycle.response_complete
+        return answered and not self.transport.is_closing()
+
+    def _make_room(self) -> None:
+        self._ended = True
+        if self.cycle is None:
+            detail = f"the server has {MAX_CONNECTIONS} connections, no more are taken"
+            self.transport.write(_refusal(503, "too-many-connections", detail))
+        self.transport.close()
+
+    def _count(self, n_bytes: int) -> None:
+        self._head += n_bytes
+        self._pending = 0
+        if self._head > HEAD_BYTES:
+            self._refusal = _HEAD_TOO_LARGE
+            raise ValueError(_HEAD_TOO_LARGE)
+
+    def _head_is_late(self) -> None:
+        if self._begun or self._pending:
+            detail = f"the head of the request was not complete after {HEAD_S:g} s"
+            self._refuse(408, "request-too-slow", detail)
+        else:
+            self.transport.close()
+
+    def _body_is_due(self) -> None:
+        is_ours = self.flow.read_paused or self.cycle.waiting_for_100_continue
+        if is_ours or self._progress >= BODY_BYTES:
+            self._progress = 0
+            self._set_timer(BODY_S, self._body_is_due)
+            return
+        detail = f"the body progressed by less than {BODY_BYTES} bytes in {BODY_S:g} s"
+        self._refuse(408, "request-too-slow", detail)
+
+    def _refuse(self, status: int, kind: str, detail: str) -> None:
+        """Take no further request; say why, unless an earlier answer is on its way."""
+        self._ended = True
+        self._unset_keepalive_if_required()
+        self._stop_timer()
+        if self.transport.is_closing():
+            return
+        cycle = self.cycle if self.cycle and not self.cycle.response_complete else None
+        if cycle is not None and not self._in_body:
+            cycle.keep_alive = False  # the connection ends with this earlier answer
+            self.flow.pause_reading()
+            return
+        if self.pipeline:  # of this request, whose turn to be answered does not come
+            self.transport.close()
+            return
+        if cycle is not None:
+            cycle.disconnected = True
+            cycle.message_event.set()
+        if not self._in_body or (cycle is not None and not cycle.response_started):
+            self.transport.write(_refusal(status, kind, detail))
+        self.flow.resume_reading()
+        self.transport.write_eof()
+        self._set_timer(LINGER_S, self.transport.close)
+
+    def _set_timer(self, seconds: float, call: Callable[[], None]) -> None:
+        self._stop_timer()
+        self._timer = self.loop.call_later(seconds, call)
+
+    def _stop_timer(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+
+_HEAD_TOO_LARGE = (
+    431,
+    "head-too-large",
+    f"URL and headers of the request exceed {HEAD_BYTES} bytes",
+)
+
+
+def _refusal(status: int, kind: str, detail: str) -> bytes:
+    """Return a whole HTTP/1.1 response that ends the connection."""
+    headers = {**HEADERS, "Connection": "close"}
+    if status == 503:
+        headers["Retry-After"] = "2"
+    answer = problem(status, detail, kind=kind, headers=headers)
+    lines = [STATUS_LINE[status]]
+    for name, value in answer.raw_headers:
+        lines += [name, b": ", value, b"\r\n"]
+    return b"".join([*lines, b"\r\n", bytes(answer.body)])

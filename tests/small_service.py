@@ -1,0 +1,74 @@
+"""A small application behind the service's guard and server: ``python -m tests.small_service``.
+
+Runs until it is killed, in a process of its own, so that its memory can be measured. Prints its
+address once it listens.
+"""
+
+import asyncio
+import os
+from collections.abc import AsyncIterator
+
+from fastapi import FastAPI, Request
+from starlette.responses import Response, StreamingResponse
+from starlette.websockets import WebSocket
+
+from app import http_limits
+from app.api.bodies import BodyRules
+from app.api.problems import install
+from app.api.security import Guard
+from app.listening import address_of, listen
+from app.serving import server_of
+
+TOKEN = "a token of the tests"
+LARGE = bytes(64 * 1024 * 1024)
+
+app = FastAPI()
+install(app)
+
+
+@app.get("/name")
+async def name(request: Request) -> dict[str, str]:
+    """Answer with the query."""
+    return dict(request.query_params)
+
+
+@app.post("/length")
+async def length(request: Request) -> dict[str, int]:
+    """Answer with the length of the body [bytes]."""
+    return {"length": len(await request.body())}
+
+
+@app.get("/slow")
+async def slow() -> StreamingResponse:
+    """Answer in pieces over one second."""
+
+    async def pieces() -> AsyncIterator[bytes]:
+        for _ in range(10):
+            await asyncio.sleep(0.1)
+            yield b"piece "
+
+    return StreamingResponse(pieces())
+
+
+@app.get("/large")
+async def large() -> Response:
+    """Answer with more than any socket buffers."""
+    return Response(LARGE)
+
+
+@app.websocket("/echo")
+async def echo(socket: WebSocket) -> None:
+    """Send back each text."""
+    await socket.accept()
+    async for text in socket.iter_text():
+        await socket.send_text(text)
+
+
+app.add_middleware(BodyRules, files={"/length": 64 * 1024 * 1024})
+app.add_middleware(Guard, token=TOKEN, open_paths=())
+
+if __name__ == "__main__":
+    http_limits.DRAIN_S = float(os.environ.get("DRAIN_S", http_limits.DRAIN_S))
+    sock = listen("127.0.0.1", 0)
+    print(address_of(sock), flush=True)
+    server_of(app).run(sockets=[sock])
