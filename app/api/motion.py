@@ -88,7 +88,8 @@ def _decided(
     question = request.to_domain(
         [one.person for one in people], safety_settings(cell), max(ages, default=0.0)
     )
-    decision = decider.decide(question)
+    with request.robot.faults_in_place():
+        decision = decider.decide(question)
     uses = [one.use(i == decision.seen) for i, one in enumerate(people)]
     return MotionAnswer.from_domain(decision, question, uses, cell.robot.dt, request.stamp)
 

@@ -25,7 +25,7 @@ async def choose(request: TaskSelectionRequest, services: ServicesDep) -> TaskSe
     # since handing them to a thread costs more than it saves.
     services.readiness.require()
     cell = await known_cell(request.cell, services)
-    q, qd, candidates = request.to_domain(cell)
+    q, qd, candidates = request.to_domain()
     policy = services.policies.loaded(request.checkpoint)
     if policy is None:
         policy = await run_in_threadpool(services.policies.load, request.checkpoint)
@@ -41,7 +41,8 @@ async def choose(request: TaskSelectionRequest, services: ServicesDep) -> TaskSe
 
     def answer() -> TaskSelection:
         people = known_people(request.people, cell, services.trackers)
-        decision = decide([one.person for one in people])
+        with request.robot.faults_in_place():
+            decision = decide([one.person for one in people])
         uses = [one.use(i == decision.seen) for i, one in enumerate(people)]
         return TaskSelection.from_domain(decision, candidates, uses, request.stamp)
 

@@ -66,6 +66,8 @@ def validation_member(error: Mapping[str, Any], body: type[BaseModel] | None) ->
         side, bound = ("at least", "min") if kind == "too_short" else ("at most", "max")
         rule = f"must have {side} {context[bound + '_length']} items"
         rule += f", not {context['actual_length']}" if context.get("actual_length") else ""
+    elif "choices" in context:
+        choices = list(context["choices"])
     elif isinstance(value, float) and not math.isfinite(value):
         rule = "must be a finite number"
     return member(dotted(location), shown(value), rule, choices)

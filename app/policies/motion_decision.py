@@ -21,9 +21,11 @@ from app.policies.movers import person_weights
 from app.sim import human
 from app.sim.cell_reach import LONGEST_REACH, SHOULDER
 from app.sim.cells import Cell, require_cell
+from app.sim.checker import Shapes
 from app.sim.guarded_reach import HORIZON_S
 from app.sim.kernels import actions
 from app.sim.kernels.compiled import direct
+from app.sim.measured_state import MeasuredState, StateLimits, returning
 from app.sim.motion_ports import (
     BESIDES,
     WAYS,
@@ -39,18 +41,13 @@ from app.sim.ports import OutsideField, Person, ReachActor, Vec
 from app.sim.reach import goal_region_of
 from app.sim.safety import SafetyDecision, SafetyLayer, SafetySettings, SeparationTerms
 from app.sim.scene import FAR_AWAY, arm_of
-from app.sim.seen_people import checked_people, checked_vector, standing_in
+from app.sim.seen_people import as_known, checked_people, checked_vector, standing_in
 
-SLACK = 1e-6
-"""How far outside a limit a measured joint may be."""
 RANGE_SLACK = 0.02
 """Inputs this far outside what was met in training are not flagged [m, rad or per second]."""
 LONGEST_S = 60.0
 """Longest time left to reach a goal [s]."""
 _FAR = np.full(3, 10.0)
-FIELDS = (("robot.q", "rad"), ("robot.qd", "rad/s"), ("robot.qdd", "rad/s^2"), ("goal", "m"))
-"""What messages call the vectors of a question, and their units."""
-_SHAPES = [(6,), (6,), (6,), (3,)]
 HUMAN = ("x", "y", "vx", "vy", "r", "growth")
 """What a policy sees of a person."""
 ROBOT = (
@@ -93,15 +90,7 @@ class MotionDecider:
         self._able = looks_ahead(actor)
         self._rule = actor.action.rule()
         self._advance: Callable[..., bool] | None = None
-        qd_max, qdd_max = self.arm.qd_max + SLACK, self.arm.qdd_max + SLACK
-        self._each_limits = (
-            (self.arm.q_min - SLACK, self.arm.q_max + SLACK),
-            (-qd_max, qd_max),
-            (-qdd_max, qdd_max),
-            (-_FAR, _FAR),
-        )
-        low, high = zip(*self._each_limits, strict=True)
-        self._limits = np.concatenate(low), np.concatenate(high)
+        self._limits = StateLimits(self.arm)
         self._met = _trained(
             actor.trained_range, {"q": 6, "qd": 6, "goal": 3, "human": len(HUMAN)}
         )
@@ -124,24 +113,30 @@ class MotionDecider:
             GoalOutside: Interpolation is asked for a goal outside the training targets.
         """
         started = time.perf_counter()
-        q, qd, qdd, goal = self._numbers(question)
+        robot, goal = self._numbers(question)
         people = checked_people(question.people)
         way, looks = self._way(question.way), self._looks(question.ahead)
         order = _bodies_first(people)
         known = [people[i] for i in order]
         with self._busy:
-            stage = self._stage(known)
-            stage.put(q, qd, known, min(question.time_left_s, HORIZON_S))
-            apart = stage.apart.tolist()
+            stage, time_left = self._stage(known), min(question.time_left_s, HORIZON_S)
+            stage.put(robot.measured, known, time_left)
+            apart, clearance = stage.apart.tolist(), stage.clear.tolist()
+            distance, shapes = math.dist(stage.tcp, goal), stage.shapes
             if question.safety is None:
                 _require_apart(apart, order)
+            # Distances and monitoring go by what was measured, the policy by what it knows.
+            viewed = [as_known(person) for person in known]
+            if robot.outside or any(a is not b for a, b in zip(known, viewed, strict=True)):
+                stage.put(robot.clamped, viewed, time_left)
+            nearest = int(stage.apart.argmin()) if order else None
             act, targets, weights, seen = self._act(stage, question, goal, way)
-            began = self._improve(stage, question, goal, qdd, act) if looks else None
-            piece, unfeasible = self._piece(q, qd, qdd, act)
-            safe, terms_of, terms = self._monitored(question, q, qd, piece, stage, order)
-            state = np.concatenate((q, qd, goal))
-            outside = [one for two in seen for one in self._outside(state, *two, order)]
-            clearance, distance = stage.clear.tolist(), math.dist(stage.tcp, goal)
+            began = self._improve(stage, question, goal, act) if looks else None
+            piece, unfeasible = self._piece(robot, act)
+            safe, terms_of, terms = self._monitored(question, robot, piece, shapes, order)
+            state = np.concatenate((robot.clamped.q, robot.clamped.qd, goal))
+            told = _as_told(seen, known, viewed)
+            outside = [one for two in told for one in self._outside(state, *two, order)]
         met = [Met(separation=d, weight=w) for d, w in zip(apart, weights, strict=True)]
         place = sorted(range(len(order)), key=order.__getitem__)
         return MotionDecision(
@@ -153,13 +148,14 @@ class MotionDecider:
             way=way,
             targets=targets,
             met=tuple(met[i] for i in place),
-            seen=order[apart.index(min(apart))] if order else None,
+            seen=None if nearest is None else order[nearest],
             safe=safe,
             terms=terms,
             terms_of=terms_of,
             clearance=(clearance[0], clearance[1], clearance[2]),
             distance=distance,
             beyond_reach=self._beyond_reach(goal),
+            state_outside=robot.outside,
             outside=tuple(dict.fromkeys(outside)),
             checkpoint=self.checkpoint,
             elapsed_ms=1e3 * (time.perf_counter() - started),
@@ -185,31 +181,20 @@ class MotionDecider:
                 )
             )
 
-    def _numbers(self, question: MotionQuestion) -> tuple[Vec, Vec, Vec, Vec]:
-        """Return q, qd, qdd and goal once they keep their rules."""
+    def _numbers(self, question: MotionQuestion) -> tuple[MeasuredState, Vec]:
+        """Return the robot's state and the goal once they keep their rules."""
         if question.qdd is None and self.actor.action.degree == 3:
             rule = "must be given: this policy limits jerk, which needs the accelerations"
             raise InvalidInput("robot.qdd", None, rule)
-        given = np.zeros(6) if question.qdd is None else question.qdd
-        parts = [
-            np.ascontiguousarray(values, dtype=np.float64)
-            for values in (question.q, question.qd, given, question.goal)
-        ]
-        if [part.shape for part in parts] != _SHAPES or not _within(self._limits, parts):
-            parts = [
-                checked_vector(name, part, len(low), low, high, unit)
-                for (name, unit), part, (low, high) in zip(
-                    FIELDS, parts, self._each_limits, strict=True
-                )
-            ]
-        q, qd, qdd, goal = parts
+        robot = self._limits.take(question.q, question.qd, question.qdd)
+        goal = checked_vector("goal", question.goal, 3, -_FAR, _FAR, "m")
         for name in ("time_left_s", "elapsed_s", "age_s"):
             value = getattr(question, name)
             if not 0.0 <= value <= LONGEST_S:
                 raise InvalidInput(name, value, f"must lie in [0, {LONGEST_S:g}] s")
         if question.beside not in BESIDES:
             raise InvalidInput("beside", question.beside, "must name a rule", BESIDES)
-        return q, qd, qdd, goal
+        return robot, goal
 
     def _way(self, asked: Way | None) -> Way:
         if asked is None:
@@ -228,7 +213,7 @@ class MotionDecider:
         return self._able if asked is None else asked
 
     def _improve(
-        self, stage: Stage, question: MotionQuestion, goal: Vec, qdd: Vec, act: Vec
+        self, stage: Stage, question: MotionQuestion, goal: Vec, act: Vec
     ) -> str | None:
         """Play an action ahead; change it where another way is better, and return its name."""
         if stage not in self._aheads:
@@ -237,7 +222,7 @@ class MotionDecider:
         ahead.forget()
         ahead.layer = layer_of(question.safety, self.arm.dt, question.age_s)
         state = stage.state
-        state.goal[0], state.qdd[0], state.elapsed[0] = goal, qdd, question.elapsed_s
+        state.goal[0], state.elapsed[0] = goal, question.elapsed_s
         played = act[None].astype(np.float32)
         chosen = int(ahead.improve(stage, played)[0])
         if chosen == PASSED:
@@ -288,33 +273,33 @@ class MotionDecider:
             )
         return shares_of_acts @ acts.astype(np.float64), targets, weights, seen
 
-    def _piece(self, q: Vec, qd: Vec, qdd: Vec, act: Vec) -> tuple[Piece, bool]:
-        """Return the commanded piece, and whether a joint had to brake for want of one."""
-        arm = self.arm
+    def _piece(self, robot: MeasuredState, act: Vec) -> tuple[Piece, bool]:
+        """Return the commanded piece from the measured state, and whether it is unfeasible."""
+        arm, (q, qd, _) = self.arm, robot.measured
+        act, q_min, q_max = returning(arm, q, act)
         c, d, q1, qd1, qdd1 = np.empty((5, 6))
         arguments = (
-            self._rule, q, qd, qdd, act.astype(np.float32), arm.q_min, arm.q_max, arm.qd_max,
-            arm.qdd_max, arm.jerk_max, arm.dt, c, d, q1, qd1, qdd1,
+            self._rule, q, qd, robot.clamped.qdd, act.astype(np.float32), q_min, q_max,
+            arm.qd_max, arm.qdd_max, arm.jerk_max, arm.dt, c, d, q1, qd1, qdd1,
         )  # fmt: skip
         if self._advance is None:
             self._advance = direct(actions.advance, arguments)
-        empty = self._advance(*arguments)
+        empty = self._advance(*arguments) or q_min is not arm.q_min
         return Piece(c=c, d=d, q=q1, qd=qd1, qdd=qdd1), bool(empty)
 
     def _monitored(
         self,
         question: MotionQuestion,
-        q: Vec,
-        qd: Vec,
+        robot: MeasuredState,
         piece: Piece,
-        stage: Stage,
+        people: Shapes,
         order: Sequence[int],
     ) -> Told:
         """Return what monitoring executes, and the terms for one person."""
         settings = question.safety
         if settings is None:
             return None, None, None
-        people = stage.shapes
+        q, qd, _ = robot.measured
         if settings != self._layer.settings:
             self._layer = SafetyLayer(self.arm, settings)
         safe = self._layer.decide(q, qd, piece.c, piece.d, people, question.age_s)
@@ -355,10 +340,20 @@ class MotionDecider:
         return found
 
 
-def _within(limits: tuple[Vec, Vec], parts: Sequence[Vec]) -> bool:
-    """Return whether all numbers of some vectors lie within limits, which are joined."""
-    together, (low, high) = np.concatenate(parts), limits
-    return bool(((low <= together) & (together <= high)).all())
+def _as_told(
+    seen: Sequence[Seen], told: Sequence[Person], viewed: Sequence[Person]
+) -> list[Seen]:
+    """Return who was seen, with the numbers that were told where the policy saw others."""
+    return [
+        (who, view if who is None else view + _cylinder(told[who]) - _cylinder(viewed[who]))
+        for who, view in seen
+    ]
+
+
+def _cylinder(person: Person) -> Vec:
+    """Return x, y, 0, 0, radius, growth of a person; no radius where there are joints."""
+    x, y, r = (*person.q[:2], 0.0) if person.cylinder is None else person.cylinder
+    return np.array([x, y, 0.0, 0.0, r, person.growth])
 
 
 def _trained(

@@ -25,10 +25,17 @@ from app.sim import human, robot
 from app.sim.actions import ActionSettings
 from app.sim.cells import Cell, require_cell
 from app.sim.kernels.arm import CONTROLLED
+from app.sim.measured_state import StateLimits
 from app.sim.pick import observe, step_robot
 from app.sim.ports import Candidate, Decision, OutsideField, Person, Vec
 from app.sim.scene import FAR_AWAY, arm_of, people_of
-from app.sim.seen_people import checked_people, checked_vector, nearest_index
+from app.sim.seen_people import (
+    as_known,
+    checked_people,
+    checked_vector,
+    is_far,
+    nearest_index,
+)
 
 HYSTERESIS = 0.2
 """By how much another candidate's value must be better before the choice changes."""
@@ -117,7 +124,7 @@ class TaskChooser:
         self._checkpoint, self._hysteresis = checkpoint, hysteresis
         self._networks = ValueNetworks(checkpoint)
         self._arm, self._people = arm_of(self._cell), people_of(self._cell)
-        self._ranges = _TrainedRanges(checkpoint)
+        self._limits, self._ranges = StateLimits(self._arm), _TrainedRanges(checkpoint)
 
     @property
     def checkpoint(self) -> str:
@@ -160,11 +167,13 @@ class TaskChooser:
         """Choose one candidate; see :class:`~app.sim.ports.TaskPolicy`.
 
         The checkpoint knows one person: it sees the one nearest to the robot, in the person's
-        own size (``seen_people.py``). The others count for nothing in this choice.
+        own size (``seen_people.py``). The others count for nothing in this choice, and nor
+        does anybody who is farther away than policies know people to be.
         """
         started = time.perf_counter()
-        q, qd = self._robot_state(q, qd)
-        seen, person = self._nearest(q, people)
+        robot_state = self._limits.take(q, qd)
+        q, qd, _ = robot_state.clamped
+        seen, person = self._nearest(robot_state.measured.q, people)
         ids, goals = _check_candidates(candidates)
         if not (np.isfinite(time_left_s) and 0.0 <= time_left_s <= 60.0):
             raise InvalidInput("time_left_s", time_left_s, "must lie in [0, 60] s")
@@ -191,7 +200,7 @@ class TaskChooser:
             actions=act,
             qd_target=qd_target,
             reachable=tuple(bool(flag) for flag in reachable),
-            outside=self._ranges.of_state(q, qd, person, seen),
+            outside=robot_state.outside + self._ranges.of_state(q, qd, person, seen),
             outside_candidates=tuple(self._ranges.of_goal(goal) for goal in goals),
             checkpoint=self.checkpoint,
             elapsed_ms=1e3 * (time.perf_counter() - started),
@@ -209,17 +218,14 @@ class TaskChooser:
         speeds[:, :CONTROLLED] = act * self._arm.qd_max[:CONTROLLED]
         return speeds
 
-    def _robot_state(self, q: Vec, qd: Vec) -> tuple[Vec, Vec]:
-        arm, slack = self._arm, 1e-6
-        q = checked_vector("robot.q", q, 6, arm.q_min - slack, arm.q_max + slack, "rad")
-        limit = arm.qd_max + slack
-        return q, checked_vector("robot.qd", qd, 6, -limit, limit, "rad/s")
-
     def _nearest(self, q: Vec, people: Sequence[Person]) -> tuple[int | None, Person]:
-        """Return which person is seen and that person; someone far away where nobody is."""
+        """Return which person is seen, as policies know people; nobody where all are far."""
         known = checked_people(people)
-        index = nearest_index(self._arm, self._people, q, known)
-        return index, _NOBODY if index is None else known[index]
+        near = [i for i, person in enumerate(known) if not is_far(person)]
+        found = nearest_index(self._arm, self._people, q, [known[i] for i in near])
+        if found is None:
+            return None, _NOBODY
+        return near[found], as_known(known[near[found]])
 
 
 class _TrainedRanges:

@@ -27,6 +27,7 @@ _STEP_S = 0.005
 """Step of the derivative of the joint angles [s]."""
 _Q_MIN, _Q_MAX = human.Q_MIN.copy(), human.Q_MAX.copy()
 """Limits as the kernel takes them: writable, or it would be compiled anew."""
+_Q_MIN[:2], _Q_MAX[:2] = -np.inf, np.inf  # a person far away is there, not at the model's 5 m
 
 
 def joint_angles(points: Vec, q_before: Vec, size: Vec) -> tuple[Vec, Mask]:

@@ -81,7 +81,7 @@ class MotionDecision:
     piece: Piece
     """The commanded piece, before any scaling."""
     unfeasible: bool
-    """Whether a joint had no admissible coefficient and brakes."""
+    """Whether a joint had no admissible coefficient and brakes, or returns to its limits."""
     way: Way
     """How the action came about."""
     targets: tuple[TargetWeight, ...]
@@ -103,6 +103,8 @@ class MotionDecision:
     """tcp to goal [m]."""
     beyond_reach: float
     """By how much the goal is farther away than the arm is long [m]; 0 within."""
+    state_outside: tuple[OutsideField, ...]
+    """Measured joints outside their limits; the policy sees them clamped."""
     outside: tuple[OutsideField, ...]
     """Inputs outside what was met in training."""
     checkpoint: str

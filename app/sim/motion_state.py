@@ -29,6 +29,7 @@ from app.sim.kernels.occupancy import (
     remember_as_now,
 )
 from app.sim.kernels.reach_features import EVERYBODY
+from app.sim.measured_state import Joints
 from app.sim.ports import Person, Vec
 from app.sim.reach import VIEWS, ViewName, new_state, with_workplace, world_of
 from app.sim.scene import HumanKind, new_people_state, people_of, with_people
@@ -87,11 +88,11 @@ class Stage:
 
     @property
     def shapes(self) -> Shapes:
-        """The people as shapes, bodies first; overwritten by the next state."""
+        """The people as shapes, bodies first."""
         crowd = self._work.crowd
         tops = np.full((len(crowd.cylinders), 1), self.top_z)
         return Shapes(
-            columns=crowd.columns,
+            columns=crowd.columns.copy(),
             cylinders=np.concatenate([crowd.cylinders, tops], axis=1),
             going=np.where(
                 self._measured[:, None],
@@ -100,17 +101,17 @@ class Stage:
             ),
         )
 
-    def put(self, q: Vec, qd: Vec, people: Sequence[Person], time_left_s: float) -> None:
+    def put(self, robot: Joints, people: Sequence[Person], time_left_s: float) -> None:
         """Take a state in and look at its distances.
 
         Args:
-            q: Joint positions [rad], shape (6,).
-            qd: Joint speeds [rad/s], shape (6,).
+            robot: Positions, speeds and accelerations of its joints.
             people: Those with joint angles first, then cylinders, checked.
             time_left_s: Time left to reach the goal [s].
         """
         state = self.state
-        state.q[0], state.qd[0], state.time_left[0] = q, qd, time_left_s
+        state.q[0], state.qd[0], state.qdd[0] = robot
+        state.time_left[0] = time_left_s
         rows, first = state.people, state.people.q.shape[1]
         for i, person in enumerate(people):
             if person.cylinder is None:

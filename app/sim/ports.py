@@ -7,7 +7,7 @@ is written here (numpy in, numpy out).
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,16 +55,18 @@ class Candidate:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OutsideField:
-    """One input that lies outside what the checkpoint was trained on."""
+    """One input outside what the checkpoint was trained on, or a joint outside its limits."""
 
     field: str
     """Name of the input, such as ``"people[0].q.pelvis_y"``."""
     value: float
     """Its value, in the input's unit."""
     low: float
-    """Least value met in training."""
+    """Least value met in training, or lower limit of the joint."""
     high: float
-    """Greatest value met in training."""
+    """Greatest value met in training, or upper limit of the joint."""
+    of: Literal["training", "limits"] = "training"
+    """What ``low`` and ``high`` are: the range met in training, or the joint's limits."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,7 +86,7 @@ class Decision:
     reachable: tuple[bool, ...]
     """Whether inverse kinematics finds a vertical-tool posture at each candidate."""
     outside: tuple[OutsideField, ...]
-    """Fields of the state outside the training range."""
+    """Fields of the state outside the joints' limits or the training range."""
     outside_candidates: tuple[tuple[OutsideField, ...], ...]
     """The same for each candidate's position."""
     checkpoint: str

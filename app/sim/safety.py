@@ -6,9 +6,11 @@ rule and the proof that it holds are in ``kernels/ssm.py``; the contact speeds o
 force limiting in ``contact_limits.py``. Not a certified safety function.
 
 The layer keeps position, speed and acceleration limits; where it slows, it does not keep a jerk
-limit. It watches people only: that a stop meets table or robot is the policy's affair, and a
-straight stop leaves a curved path. State and motion are those commanded; what a drive does on
-top of that belongs into the uncertainty ``Z_r`` and the reaction time.
+limit. From a measured state outside its limits, or one whose straight stop leaves them, it
+admits what leaves them no farther than that stop (``measured_state.py``). It watches people
+only: that a stop meets table or robot is the policy's affair, and a straight stop leaves a
+curved path. State and motion are those commanded; what a drive does on top of that belongs into
+the uncertainty ``Z_r`` and the reaction time.
 
 Source: METHOD 2.7; ISO/TS 15066:2016.
 """
@@ -26,6 +28,7 @@ from app.sim.kernels import watch as watch_kernel
 from app.sim.kernels.arm import Arm
 from app.sim.kernels.columns import distances, least
 from app.sim.kernels.cylinder import cylinder_clearance, swept_clearance
+from app.sim.measured_state import admitting
 from app.sim.ports import Vec
 from app.sim.robot import LINK_NAMES
 from app.sim.scene import own, require_finite
@@ -327,8 +330,8 @@ class SafetyLayer:
         q, qd = own(q), own(qd)
         self._take_in(people)
         chosen = ssm.decide(
-            self.arm, self._rule, age, own(people.columns), own(people.cylinders), q, qd,
-            own(c), own(d), self._watch,
+            admitting(self.arm, q, qd), self._rule, age, own(people.columns),
+            own(people.cylinders), q, qd, own(c), own(d), self._watch,
         )  # fmt: skip
         return self._told(chosen, q, qd, people, age)
 

@@ -1,13 +1,19 @@
-"""Which of several people a policy for one sees, and how a cylinder is seen as a person.
+"""People as they come from outside: checked, and as policies see them.
 
 The same rules as in the batches (``kernels/people.py``, ``nearest_person`` and
 ``see_nearest``): the person nearest to the robot is seen, by the distance of their capsules to
 the robot's, or of their cylinder where no more is known of them; a cylinder is seen as a person
 of the cell's size who stands in it and faces the robot's base.
+
+What a person can physically be is taken as it is: anywhere in a hall, any number of turns
+about the vertical, joints somewhat beyond the model's limits. Distances and safety layers go by
+that. Policies know people within 5 m and inside the model's limits, so that they see the others
+there (:func:`as_known`), and answers say so (:func:`degradations`).
 """
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,27 +25,37 @@ from app.sim.kernels.arm import Arm
 from app.sim.kernels.body import N_SIZE, PELVIS_Z
 from app.sim.kernels.occupancy import N_PAST
 from app.sim.kernels.people import MAX_PEOPLE, People
+from app.sim.keypoints import FARTHEST_M
 from app.sim.person_estimate import PersonEstimate
 from app.sim.ports import Person, Vec
 from app.sim.scene import crowd_of, own
 
-_Q_LOW, _Q_HIGH = human.Q_MIN - 1e-6, human.Q_MAX + 1e-6
-_QD_LIMIT = np.full(18, 50.0)
+FASTEST = 50.0
+"""Greatest speed of a person's joints, cylinder or radius [m/s, rad/s]."""
+JOINT_TOLERANCE = 0.5
+"""How far beyond the model's limits the joint angles of a person may be [rad]."""
+WIDEST = 3.0 * FARTHEST_M
+"""Greatest radius of a cylinder [m]: one that grows while unseen then holds the whole hall."""
+KNOWN_RADIUS, KNOWN_GROWTH, KNOWN_WALK = 5.0, 5.0, 10.0
+"""Greatest radius [m], growth [m/s] and remembered walking speed [m/s] that policies see."""
+_YAW, _MOST_YAW = 2, 1e6
+_SLACK = 1e-6
+_QD_LIMIT = np.full(18, FASTEST)
+_Q_LOW, _Q_HIGH = human.Q_MIN - JOINT_TOLERANCE, human.Q_MAX + JOINT_TOLERANCE
+_Q_LOW[:2], _Q_HIGH[:2] = -FARTHEST_M, FARTHEST_M
+_Q_LOW[_YAW], _Q_HIGH[_YAW] = -_MOST_YAW, _MOST_YAW
 _SIZE_LOW, _SIZE_HIGH = np.full(N_SIZE, 0.01), np.full(N_SIZE, 3.0)
 _SIZE_LOW[PELVIS_Z] = -10.0  # counted from the cell's origin
-_CYLINDER_LOW = np.array([human.Q_MIN[0], human.Q_MIN[1], 0.01])
-WIDEST = 5.0
-"""Greatest radius of a cylinder [m]."""
-FASTEST_GROWTH = 5.0
-"""Greatest speed at which the radius of a cylinder changes [m/s]."""
-FASTEST_WALK = 10.0
-"""Greatest walking speed that is remembered of a cylinder [m/s]."""
 MOST_REMEMBERED = N_PAST - 1
 """Most moments that are remembered of a cylinder, a tenth of a second apart."""
-_CYLINDER_HIGH = np.array([human.Q_MAX[0], human.Q_MAX[1], WIDEST])
-_PAST_HIGH = np.array([WIDEST, FASTEST_WALK])
-_JOINED_LOW = np.concatenate((_Q_LOW, -_QD_LIMIT, _CYLINDER_LOW))
-_JOINED_HIGH = np.concatenate((_Q_HIGH, _QD_LIMIT, _CYLINDER_HIGH))
+_CYLINDER_LOW = np.array([-FARTHEST_M, -FARTHEST_M, 0.01])
+_CYLINDER_HIGH = np.array([FARTHEST_M, FARTHEST_M, WIDEST])
+_PAST_HIGH = np.array([WIDEST, FASTEST])
+_KNOWN_LOW = np.concatenate((human.Q_MIN, -_QD_LIMIT, [*human.Q_MIN[:2], 0.01])) - _SLACK
+_KNOWN_HIGH = np.concatenate((human.Q_MAX, _QD_LIMIT, [*human.Q_MAX[:2], KNOWN_RADIUS]))
+_KNOWN_HIGH += _SLACK
+_KNOWN_LOW[_YAW], _KNOWN_HIGH[_YAW] = -_MOST_YAW, _MOST_YAW
+_KNOWN_PAST = np.array([KNOWN_RADIUS, KNOWN_WALK])
 
 
 def standing_in(
@@ -82,12 +98,75 @@ def as_person(estimate: PersonEstimate) -> Person | None:
     Where pelvis and trunk were never seen together there are no joint angles; then the person
     is as good as their safety cylinder.
     """
-    cylinder = estimate.cylinder
-    if estimate.person is not None or cylinder is None:
-        return estimate.person
-    x, y = np.clip(cylinder.center, human.Q_MIN[:2], human.Q_MAX[:2]).tolist()
-    vx, vy = cylinder.velocity.tolist()
+    cylinder, person = estimate.cylinder, estimate.person
+    if person is not None:
+        # An estimate that is moved on for long must not cost the decision.
+        q, qd = np.clip(person.q, _Q_LOW, _Q_HIGH), np.clip(person.qd, -FASTEST, FASTEST)
+        return replace(person, q=q, qd=qd)
+    if cylinder is None:
+        return None
+    x, y = np.clip(cylinder.center, -FARTHEST_M, FARTHEST_M).tolist()
+    vx, vy = np.clip(cylinder.velocity, -FASTEST, FASTEST).tolist()
     return standing_in(x, y, vx, vy, min(cylinder.radius, WIDEST), measured=False)
+
+
+def degradations(person: Person) -> tuple[str, ...]:
+    """Return in what policies see a person otherwise than given: ``far``, ``clamped``."""
+    near = _brought_near(person)
+    far = ("far",) if near is not person else ()
+    return far if _is_known(near) else (*far, "clamped")
+
+
+def is_far(person: Person) -> bool:
+    """Return whether a person is farther away than policies know people to be."""
+    return _brought_near(person) is not person
+
+
+def as_known(person: Person) -> Person:
+    """Return a checked person as policies see them; the same object where that is as given.
+
+    Beyond 5 m along x or y a person is seen at that distance, in the same direction from the
+    robot's base.
+    """
+    if _is_known(person):
+        return person
+    near = _brought_near(person)
+    cylinder, past = near.cylinder, near.past
+    if cylinder is not None:
+        cylinder = np.array([*cylinder[:2], min(cylinder[2], KNOWN_RADIUS)])
+    return replace(
+        near,
+        q=np.clip(near.q, human.Q_MIN, human.Q_MAX),
+        cylinder=cylinder,
+        growth=min(KNOWN_GROWTH, max(-KNOWN_GROWTH, near.growth)),
+        past=None if past is None else np.minimum(past, _KNOWN_PAST),
+    )
+
+
+def _brought_near(person: Person) -> Person:
+    """Return a person no farther than policies know; the same object where that is so."""
+    cylinder = person.cylinder
+    there = person.q[:2] if cylinder is None else cylinder[:2]
+    away, most = float(np.abs(there).max()), float(human.Q_MAX[0])
+    if away <= most + _SLACK:
+        return person
+    here = most / away * there
+    if cylinder is not None:
+        cylinder = np.array([*here, cylinder[2]])
+    return replace(person, q=np.concatenate([here, person.q[2:]]), cylinder=cylinder)
+
+
+def _is_known(person: Person) -> bool:
+    """Tell in one comparison whether policies know such numbers; the yaw may be any."""
+    parts: tuple[Vec, ...] = (person.q, person.qd)
+    if person.cylinder is not None:
+        parts = (person.q, person.qd, person.cylinder)
+    values = np.concatenate(parts)
+    n = len(values)
+    inside = (_KNOWN_LOW[:n] <= values) & (values <= _KNOWN_HIGH[:n])
+    if not inside.all() or not abs(person.growth) <= KNOWN_GROWTH:
+        return False
+    return person.past is None or bool((person.past <= _KNOWN_PAST).all())
 
 
 def checked_people(people: Sequence[Person]) -> tuple[Person, ...]:
@@ -110,12 +189,12 @@ def _checked(person: Person, path: str) -> Person:
     if cylinder is not None:
         low, high = _CYLINDER_LOW, _CYLINDER_HIGH
         cylinder = checked_vector(f"{path}.cylinder", cylinder, 3, low, high, "m")
-    if not abs(person.growth) <= FASTEST_GROWTH:
-        rule = f"must lie in [-{FASTEST_GROWTH:g}, {FASTEST_GROWTH:g}] m/s"
+    if not abs(person.growth) <= FASTEST:
+        rule = f"must lie in [-{FASTEST:g}, {FASTEST:g}] m/s"
         raise InvalidInput(f"{path}.growth", person.growth, rule)
     past = None if person.past is None else _checked_past(f"{path}.past", person.past)
     return Person(
-        q=checked_vector(f"{path}.q", person.q, 18, _Q_LOW, _Q_HIGH, "m or rad"),
+        q=_checked_q(f"{path}.q", person.q),
         qd=checked_vector(f"{path}.qd", person.qd, 18, -_QD_LIMIT, _QD_LIMIT, "m/s or rad/s"),
         size=size,
         cylinder=cylinder,
@@ -135,10 +214,16 @@ def _right_as_it_is(person: Person) -> bool:
     for part, n in zip(parts, (18, 18, 3), strict=False):
         if type(part) is not np.ndarray or part.dtype != np.float64 or part.shape != (n,):
             return False
-    values = np.concatenate(parts)
-    low, high = _JOINED_LOW[: len(values)], _JOINED_HIGH[: len(values)]
-    inside = (low <= values) & (values <= high)
-    return bool(inside.all()) and abs(person.growth) <= FASTEST_GROWTH
+    return _is_known(person) and abs(person.q[_YAW]) <= human.Q_MAX[_YAW]
+
+
+def _checked_q(path: str, q: Vec) -> Vec:
+    found = checked_vector(path, q, 18, _Q_LOW, _Q_HIGH, "m or rad")
+    if abs(found[_YAW]) <= human.Q_MAX[_YAW]:
+        return found
+    turned = found.copy()
+    turned[_YAW] = math.remainder(turned[_YAW], 2.0 * math.pi)
+    return turned
 
 
 def _checked_past(path: str, past: Vec) -> Vec:
@@ -149,7 +234,7 @@ def _checked_past(path: str, past: Vec) -> Vec:
     right = (known >= 0.0) & (known <= _PAST_HIGH)
     if not right.all():
         moment, what = (int(i) for i in np.argwhere(~right)[0])
-        most, unit = ((WIDEST, "m"), (FASTEST_WALK, "m/s"))[what]
+        most, unit = ((WIDEST, "m"), (FASTEST, "m/s"))[what]
         rule = f"must lie in [0, {most:g}] {unit}"
         raise InvalidInput(f"{path}[{moment}][{what}]", float(known[moment, what]), rule)
     return known

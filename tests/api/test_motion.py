@@ -442,7 +442,7 @@ def test_growth_of_a_cylinder_is_seen(client: TestClient) -> None:
         for growth in (0.0, 0.3)
     ]
     assert acts[0] != acts[1]
-    assert refused(client, people=[{**WALKER, "growth": 9}])["field"] == "people[0].growth"
+    assert refused(client, people=[{**WALKER, "growth": 90}])["field"] == "people[0].growth"
 
 
 def test_the_past_of_a_cylinder_is_seen_by_a_policy_that_forecasts(client: TestClient) -> None:
@@ -458,7 +458,7 @@ def test_the_past_of_a_cylinder_is_seen_by_a_policy_that_forecasts(client: TestC
     ("past", "field"),
     [
         ([[0.3, 0.5], [-0.1, 0.5]], "people[0].past[1][0]"),
-        ([[0.3, 11.0]], "people[0].past[0][1]"),
+        ([[0.3, 51.0]], "people[0].past[0][1]"),
         ([[0.3, "NaN"]], "people[0].past[0][1]"),
         ([[0.3]], "people[0].past[0][1]"),
         ([[0.3, 0.5]] * 16, "people[0].past"),

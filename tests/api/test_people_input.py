@@ -123,7 +123,7 @@ def millimetres() -> list[Any]:
         ({"keypoints": POINTS, "velocities": []}, "people[0].velocities", "at least 25"),
         ({"keypoints": POINTS, "q": WHOLE["q"]}, "people[0].qd", "is required"),
         ({"x": 0, "y": 1, "vx": 0, "vy": 0, "r": 0}, "people[0].r", "must be greater"),
-        ({"x": 90, "y": 1, "vx": 0, "vy": 0, "r": 1}, "people[0].x", "must be less"),
+        ({"x": 900, "y": 1, "vx": 0, "vy": 0, "r": 1}, "people[0].x", "must be less"),
         ({"tracker": "none", "person": 0}, "people[0].tracker", "no open tracker"),
         ({**WHOLE, "body": {"stature": 0}}, "people[0].body.stature", "must be greater"),
         ({**WHOLE, "body": {}, "size": [1] * 12}, "people[0].size", "left out"),

@@ -5,6 +5,7 @@ import pytest
 
 from app.sim.cells import load_cell
 from app.sim.kernels.occupancy import AGE, GROWTH, PAST_RADIUS, PAST_SPEED, VX, VY, R, X, Y
+from app.sim.measured_state import Joints
 from app.sim.motion_state import Stage
 from app.sim.ports import Person
 from app.sim.reach import ReachBatch, ReachSettings
@@ -45,7 +46,11 @@ def test_observations_and_distances_are_those_of_the_batch(
     for who in (None, *range(len(people))):
         expected = batch.observe_goals(rows, goals, who)
         for e in rows:
-            stage.put(state.q[e], state.qd[e], people_of(batch, e), state.time_left[e])
+            stage.put(
+                Joints(state.q[e], state.qd[e], np.zeros(6)),
+                people_of(batch, e),
+                state.time_left[e],
+            )
             found = stage.observe(goals[e], who)
             np.testing.assert_allclose(found, expected[e], atol=2e-7)
             np.testing.assert_allclose(stage.clear, state.clear[e], atol=1e-12)
@@ -65,7 +70,7 @@ def test_what_is_not_remembered_was_as_the_oldest_that_is() -> None:
         "grew long ago": np.array([[0.25, 0.5], *[[0.2, 0.5]] * 14]),
     }.items():
         person = standing_in(0.1, 1.4, 0.3, 0.4, 0.3, 0.0, past)
-        stage.put(q, np.zeros(6), [person], 5.0)
+        stage.put(Joints(q, np.zeros(6), np.zeros(6)), [person], 5.0)
         seen[name] = stage.observe(np.array(goal)).copy()
     np.testing.assert_array_equal(seen["nothing"], seen["no moment"])
     np.testing.assert_array_equal(seen["nothing"], seen["always so"])
@@ -77,17 +82,17 @@ def test_a_persons_own_size_counts() -> None:
     stage, q = Stage(CELL, 1, 0, "features"), np.array(CELL.robot.home_q)
     batch = driven(("worker",), "features")
     (one,) = people_of(batch, 0)
-    stage.put(q, np.zeros(6), [one], 5.0)
+    stage.put(Joints(q, np.zeros(6), np.zeros(6)), [one], 5.0)
     ordinary = stage.apart[0]
     large = Person(q=one.q, qd=one.qd, size=CELL.body * 1.3)
-    stage.put(q, np.zeros(6), [large], 5.0)
+    stage.put(Joints(q, np.zeros(6), np.zeros(6)), [large], 5.0)
     assert stage.apart[0] != ordinary
 
 
 def test_shapes_are_the_people_with_the_height_of_the_cell() -> None:
     stage = Stage(CELL, 0, 2, "state")
     people = [standing_in(0.1, 1.2, 0.0, 0.0, 0.3), standing_in(-1.0, 1.5, 0.0, 0.0, 0.4)]
-    stage.put(np.array(CELL.robot.home_q), np.zeros(6), people, 5.0)
+    stage.put(Joints(np.array(CELL.robot.home_q), np.zeros(6), np.zeros(6)), people, 5.0)
     top = CELL.floor_z + CELL.cylinders[0].height
     np.testing.assert_allclose(
         stage.shapes.cylinders, [[0.1, 1.2, 0.3, top], [-1.0, 1.5, 0.4, top]]

@@ -97,7 +97,7 @@ def test_a_person_in_a_cylinder_faces_the_robot_and_has_its_velocity() -> None:
     ("people", "field"),
     [
         ([standing(0.0, 1.0)] * 5, "people"),
-        ([standing(0.0, 1.0), standing(9.0, 1.0)], "people[1].q[0]"),
+        ([standing(0.0, 1.0), standing(101.0, 1.0)], "people[1].q[0]"),
         ([replace(standing(0.0, 1.0), qd=np.full(18, np.nan))], "people[0].qd[0]"),
         ([replace(standing(0.0, 1.0), size=np.ones(11))], "people[0].size"),
         ([replace(standing(0.0, 1.0), size=np.zeros(12))], "people[0].size[1]"),

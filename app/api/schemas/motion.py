@@ -9,7 +9,8 @@ from pydantic import Field
 
 from app.api.schemas.numbers import Answer, Body, Vector3, Vector6
 from app.api.schemas.people import PersonInput, PersonUse
-from app.api.schemas.task_selection import Outside, RobotState, Stamp
+from app.api.schemas.robot_state import ROS_NAMES, RobotState
+from app.api.schemas.task_selection import Outside, Stamp
 from app.sim.human import CAPSULE_NAMES
 from app.sim.motion_ports import Beside, MotionDecision, MotionQuestion, Way
 from app.sim.pick import Piece
@@ -25,7 +26,8 @@ class ArmState(RobotState):
 
     qdd: Vector6 | None = Field(
         None,
-        description="joint accelerations [rad/s^2]; needed by a policy that limits jerk",
+        description="joint accelerations [rad/s^2], in the same order; needed by a policy that "
+        "limits jerk",
     )
 
 
@@ -134,11 +136,11 @@ class MotionRequest(Body):
             own: What the cell says about safety.
             age_s: How old the oldest of them is by its own tracker [s].
         """
-        qdd = self.robot.qdd
+        robot = self.robot
         return MotionQuestion(
-            q=np.array(self.robot.q),
-            qd=np.array(self.robot.qd),
-            qdd=None if qdd is None else np.array(qdd),
+            q=robot.joints(robot.q),
+            qd=robot.joints(robot.qd),
+            qdd=None if robot.qdd is None else robot.joints(robot.qdd),
             goal=np.array(self.goal),
             people=people,
             way=self.way,
@@ -295,6 +297,10 @@ class PersonMet(PersonUse):
 class MotionAnswer(Answer):
     """The next piece of motion and all that explains it."""
 
+    joints: list[str] = Field(
+        default=list(ROS_NAMES),
+        description="the joints in the order of all vectors of this answer",
+    )
     dt: float = Field(description="control period [s]")
     piece: MotionPiece = Field(description="what the robot shall execute")
     commanded: MotionPiece = Field(description="what the policy asked for, before scaling")
@@ -317,7 +323,12 @@ class MotionAnswer(Answer):
         description="by how much the goal is farther away than the arm is long [m]"
     )
     unfeasible: bool = Field(
-        description="whether a joint cannot keep its limits from this state, and brakes"
+        description="whether a joint cannot keep its limits from this state: it brakes, or "
+        "returns to them"
+    )
+    state_outside: list[Outside] = Field(
+        description="measured joints outside their limits: the policy sees them clamped; "
+        "`piece` starts at the measured positions and speeds, and monitoring goes by those"
     )
     outside: list[Outside] = Field(description="inputs outside what was met in training")
     checkpoint: str = Field(description="SHA-256 of the checkpoint that decided")
@@ -360,6 +371,7 @@ class MotionAnswer(Answer):
             distance=decision.distance,
             beyond_reach=decision.beyond_reach,
             unfeasible=decision.unfeasible,
+            state_outside=[Outside.from_domain(one) for one in decision.state_outside],
             outside=[Outside.from_domain(one) for one in decision.outside],
             checkpoint=decision.checkpoint,
             elapsed_ms=decision.elapsed_ms,

@@ -16,17 +16,18 @@ from app.sim import human
 from app.sim.body_size import NAMES, PERCENTILES, percentile_body
 from app.sim.cells import Cell
 from app.sim.kernels.body import N_SIZE
-from app.sim.keypoints import BODY_25, N_KEYPOINTS
+from app.sim.keypoints import BODY_25, FARTHEST_M, N_KEYPOINTS
 from app.sim.person_estimate import PersonEstimate
 from app.sim.ports import Person, Vec
-from app.sim.seen_people import FASTEST_GROWTH, FASTEST_WALK, MOST_REMEMBERED, WIDEST
+from app.sim.seen_people import FASTEST, MOST_REMEMBERED, degradations
 
 Source = Literal["joint-angles", "keypoints", "cylinder", "tracker"]
 Speeds = Literal["given", "zero", "estimated"]
 Percentile = Annotated[float, Field(ge=PERCENTILES[0], le=PERCENTILES[1])]
-Speed = Annotated[float, Field(ge=-50.0, le=50.0)]
-Radius = Annotated[float, Field(ge=0.0, le=WIDEST)]
-Walk = Annotated[float, Field(ge=0.0, le=FASTEST_WALK)]
+Speed = Annotated[float, Field(ge=-FASTEST, le=FASTEST)]
+Place = Annotated[float, Field(ge=-FARTHEST_M, le=FARTHEST_M)]
+Radius = Annotated[float, Field(ge=0.0, le=FARTHEST_M)]
+Walk = Annotated[float, Field(ge=0.0, le=FASTEST)]
 Keypoint = Annotated[list[Finite], Field(min_length=3, max_length=4)] | None
 Velocity = Vector3 | None
 Lengths = Annotated[list[Finite], Field(min_length=N_SIZE, max_length=N_SIZE)]
@@ -134,12 +135,12 @@ class CylinderPerson(Body):
     Seen as a person of the cell's size who stands in it and faces the robot's base.
     """
 
-    x: Annotated[float, Field(ge=-5.0, le=5.0)] = Field(description="axis [m]")
-    y: Annotated[float, Field(ge=-5.0, le=5.0)] = Field(description="axis [m]")
+    x: Place = Field(description="axis [m]")
+    y: Place = Field(description="axis [m]")
     vx: Speed = Field(description="velocity [m/s]")
     vy: Speed = Field(description="velocity [m/s]")
-    r: Annotated[float, Field(ge=0.01, le=WIDEST)] = Field(description="radius [m]")
-    growth: Annotated[float, Field(ge=-FASTEST_GROWTH, le=FASTEST_GROWTH)] = Field(
+    r: Annotated[float, Field(ge=0.01, le=FARTHEST_M)] = Field(description="radius [m]")
+    growth: Speed = Field(
         0.0, description="how fast the radius grows [m/s]; read by policies that move the arm"
     )
     past: Annotated[list[tuple[Radius, Walk]], Field(max_length=MOST_REMEMBERED)] = Field(
@@ -211,7 +212,11 @@ class PersonUse(Answer):
         description="whether no joint angles are known: seen as standing in a cylinder"
     )
     speeds: Speeds = Field(description="where the speeds are from; zero: nothing is known")
-    flags: list[str] = Field(description="how the estimate is degraded; empty where it is not")
+    flags: list[str] = Field(
+        description="how the estimate is degraded; `far`: the policy sees this person at 5 m, "
+        "or nobody there; `clamped`: it sees angles, radius, growth or past at the bounds it "
+        "knows"
+    )
     held: list[str] = Field(description="joints taken at rest or as before: nothing shows them")
     missing: list[str] = Field(description="key-points that are not known")
     strays: list[str] = Field(description="key-points dropped: too far from all others")
@@ -234,7 +239,7 @@ class PersonUse(Answer):
             seen=seen,
             as_cylinder=person.cylinder is not None,
             speeds=speeds,
-            flags=[] if estimate is None else list(estimate.flags),
+            flags=[*([] if estimate is None else estimate.flags), *degradations(person)],
             held=[] if estimate is None else list(estimate.held),
             missing=[] if estimate is None else list(estimate.missing),
             strays=[] if estimate is None else list(estimate.strays),

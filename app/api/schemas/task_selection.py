@@ -9,22 +9,13 @@ from pydantic import Field
 from app.api.schemas.numbers import Answer, Body, Finite, Vector3, Vector6
 from app.api.schemas.people import PersonInput, PersonUse
 from app.api.schemas.people import PersonState as PersonState
+from app.api.schemas.robot_state import RobotState
 from app.errors import InvalidInput
-from app.sim import human
-from app.sim.cells import Cell
 from app.sim.ports import Candidate, Decision, OutsideField, Vec
 
 MAX_CANDIDATES = 1000
-LIMIT_TOLERANCE = 1e-6
 
 Stamp = Finite | Annotated[str, Field(max_length=64)] | None
-
-
-class RobotState(Body):
-    """The robot as measured."""
-
-    q: Vector6 = Field(description="joint positions [rad], base to wrist 3")
-    qd: Vector6 = Field(description="joint speeds [rad/s]")
 
 
 class CandidateState(Body):
@@ -59,28 +50,18 @@ class TaskSelectionRequest(Body):
         None, max_length=64, description="SHA-256 or alias; the shipped policy if null"
     )
 
-    def to_domain(self, cell: Cell) -> tuple[Vec, Vec, tuple[Candidate, ...]]:
+    def to_domain(self) -> tuple[Vec, Vec, tuple[Candidate, ...]]:
         """Check what a schema cannot, and return q, qd and candidates as arrays.
 
         The people need more than the request: ``app/api/known_people.py``.
 
-        Args:
-            cell: The work cell that the request names.
-
         Raises:
-            InvalidInput: A joint outside its limits, an id given twice.
+            InvalidInput: An id given twice.
         """
-        q, qd = np.array(self.robot.q), np.array(self.robot.qd)
-        robot_names = [f"robot.q[{joint}]" for joint in range(6)]
-        _check_limits(robot_names, q, np.array(cell.robot.q_min), np.array(cell.robot.q_max))
-        for index, person in enumerate(self.people):
-            if isinstance(person, PersonState):
-                names = [f"people[{index}].q[{j}]" for j in range(len(human.JOINT_NAMES))]
-                _check_limits(names, np.array(person.q), human.Q_MIN, human.Q_MAX)
         self._check_ids_are_unique()
         return (
-            q,
-            qd,
+            self.robot.joints(self.robot.q),
+            self.robot.joints(self.robot.qd),
             tuple(
                 Candidate(id=one.id, position=np.array(one.position)) for one in self.candidates
             ),
@@ -95,25 +76,21 @@ class TaskSelectionRequest(Body):
             seen.add(candidate.id)
 
 
-def _check_limits(names: list[str], values: Vec, low: Vec, high: Vec) -> None:
-    outside = (values < low - LIMIT_TOLERANCE) | (values > high + LIMIT_TOLERANCE)
-    for joint in np.flatnonzero(outside)[:1]:
-        rule = f"must lie in [{low[joint]:g}, {high[joint]:g}], the limits of this joint"
-        raise InvalidInput(names[joint], float(values[joint]), rule)
-
-
 class Outside(Answer):
-    """One input outside what the checkpoint was trained on."""
+    """One input outside what the checkpoint was trained on, or a joint outside its limits."""
 
     field: str
     value: float
-    low: float = Field(description="least value met in training")
-    high: float = Field(description="greatest value met in training")
+    low: float = Field(description="least value met in training, or the joint's lower limit")
+    high: float = Field(description="greatest value met in training, or its upper limit")
+    of: Literal["training", "limits"] = Field(
+        "training", description="what `low` and `high` are"
+    )
 
     @classmethod
     def from_domain(cls, outside: OutsideField) -> Self:
         """Make it from the simulator's data."""
-        return cls(field=outside.field, value=outside.value, low=outside.low, high=outside.high)
+        return cls(**{name: getattr(outside, name) for name in cls.model_fields})
 
 
 class Action(Answer):
@@ -139,7 +116,10 @@ class TaskSelection(Answer):
     chosen: str = Field(description="id of the chosen candidate")
     candidates: list[CandidateValue]
     people: list[PersonUse] = Field(description="what was made of each person")
-    state_outside: list[Outside] = Field(description="state fields outside the training range")
+    state_outside: list[Outside] = Field(
+        description="measured joints outside their limits, which the policy sees clamped, and "
+        "state fields outside the training range"
+    )
     checkpoint: str = Field(description="SHA-256 of the checkpoint that decided")
     elapsed_ms: float = Field(description="time the decision took [ms]")
     stamp: Stamp = None

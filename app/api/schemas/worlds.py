@@ -25,11 +25,11 @@ from app.api.schemas.live_sorting import (
     ToggleGoal,
 )
 from app.api.schemas.numbers import Answer, Body, Finite, Vector3
+from app.api.schemas.robot_state import RobotState
 from app.api.schemas.task_selection import (
     CandidateState,
     Outside,
     PersonState,
-    RobotState,
     TaskSelectionRequest,
 )
 from app.errors import InvalidInput

@@ -1,0 +1,77 @@
+"""The robot's joints in a request: base to wrist 3, or in any order by name."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Annotated, Self
+
+import numpy as np
+from pydantic import Field, field_validator
+from pydantic_core import PydanticCustomError
+
+from app.api.schemas.numbers import Body, Vector6
+from app.errors import InvalidInput
+from app.sim.ports import Vec
+from app.sim.robot import JOINT_NAMES
+
+ROS_NAMES = tuple(f"{name}_joint" for name in JOINT_NAMES)
+"""The joints as ROS calls them, base to wrist 3."""
+_FIELDS = ("q", "qd", "qdd")
+
+
+class RobotState(Body):
+    """The robot as measured."""
+
+    names: Annotated[list[str], Field(max_length=32)] | None = Field(
+        default=None,
+        description="names of the joints in the order of `q` and `qd`, as in "
+        "sensor_msgs/JointState (which is alphabetical): each of "
+        f"{', '.join(ROS_NAMES)} once; null: this order, base to wrist 3",
+        examples=[sorted(ROS_NAMES)],
+    )
+    q: Vector6 = Field(description="joint positions [rad], base to wrist 3 or as `names` says")
+    qd: Vector6 = Field(description="joint speeds [rad/s], in the same order")
+
+    @field_validator("names")
+    @classmethod
+    def _are_the_joints_of_the_robot(cls, names: list[str] | None) -> list[str] | None:
+        if names is None or sorted(names) == sorted(ROS_NAMES):
+            return names
+        faults = [f"does not know {name!r}" for name in names if name not in ROS_NAMES]
+        faults += [
+            f"holds {one!r} {names.count(one)} times"
+            for one in ROS_NAMES
+            if names.count(one) > 1
+        ]
+        faults += [f"lacks {one!r}" for one in ROS_NAMES if one not in names]
+        raise PydanticCustomError(
+            "joint_names",
+            "must hold every joint of the robot once: it {faults}",
+            {"faults": ", ".join(faults)[:300], "choices": list(ROS_NAMES)},
+        )
+
+    def joints(self, values: list[float]) -> Vec:
+        """Return numbers of the joints from base to wrist 3, shape (6,).
+
+        Args:
+            values: In the order of the request.
+        """
+        return np.array(values)[self._order()]
+
+    def _order(self) -> list[int]:
+        """Return the places of the joints, base to wrist 3, in the request."""
+        names = self.names
+        return list(range(6)) if names is None else [names.index(one) for one in ROS_NAMES]
+
+    @contextmanager
+    def faults_in_place(self) -> Iterator[Self]:
+        """Let errors name joints by their places in the request."""
+        try:
+            yield self
+        except InvalidInput as error:
+            for name in _FIELDS:
+                for joint, place in enumerate(self._order()):
+                    if error.field == f"robot.{name}[{joint}]":
+                        field = f"robot.{name}[{place}]"
+                        rule = f"{error.rule}: {ROS_NAMES[joint]}"
+                        raise InvalidInput(field, error.value, rule, error.choices) from None
+            raise
