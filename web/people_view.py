@@ -1,4 +1,4 @@
-"""The people in the scene: whoever comes is drawn, whoever leaves is taken out."""
+"""The people in the scene: each is drawn while present, and hidden afterwards."""
 
 from collections.abc import Callable
 
@@ -6,6 +6,7 @@ import viser
 
 from app.sim.cells import Cell
 from app.sim.commands import MoveHuman
+from app.sim.snapshot import PersonView as Seen
 from app.sim.snapshot import WorldSnapshot
 from web.gizmos import Gizmos
 from web.person_view import PersonView
@@ -25,6 +26,8 @@ class PeopleView:
     ) -> None:
         self._server, self._cell, self._submit = server, cell, submit
         self._drawn: dict[int, tuple[PersonView, Gizmos]] = {}
+        # Those of people who have left: their meshes must not be removed, see PersonView.
+        self._hidden: dict[int, PersonView] = {}
 
     def draw(self, snapshot: WorldSnapshot, dt: float, *, shapes: bool) -> None:
         """Show the people of a snapshot.
@@ -37,22 +40,25 @@ class PeopleView:
         here = {person.id for person in snapshot.people}
         for id in self._drawn.keys() - here:
             view, gizmos = self._drawn.pop(id)
-            view.remove()
+            view.hide()
             gizmos.remove()
+            self._hidden[id] = view
         contact = snapshot.contact if snapshot.status == "contact" else None
         for person in snapshot.people:
             if person.id not in self._drawn:
-                self._drawn[person.id] = (
-                    PersonView(self._server, self._cell, person),
-                    Gizmos(
-                        self._server,
-                        person.id,
-                        self._submit,
-                        jointed=person.cylinder is None,
-                    ),
-                )
+                self._drawn[person.id] = self._add(person)
             view, gizmos = self._drawn[person.id]
             view.draw(person, dt)
             touched = contact is not None and contact.person == person.id
             view.show_capsules(shapes, contact.body if contact and touched else None)
             gizmos.draw(person)
+
+    def _add(self, person: Seen) -> tuple[PersonView, Gizmos]:
+        """Show a person that was not there at the last call."""
+        view = self._hidden.pop(person.id, None)
+        if view is None:
+            view = PersonView(self._server, self._cell, person)
+        else:
+            view.show(person)
+        jointed = person.cylinder is None
+        return view, Gizmos(self._server, person.id, self._submit, jointed=jointed)

@@ -1,4 +1,11 @@
-"""One person in the scene: the mannequin, its feet, and the simulator's capsules over it."""
+"""One person in the scene: the mannequin, its feet, and the simulator's capsules over it.
+
+A skinned mesh is never removed. viser's client (1.1.1) takes the bones off the mesh's node when
+the mesh goes, tests that node against ``undefined`` where it is ``null``, and the error ends
+the drawing in every open window. So a person that leaves is hidden and shown again once its
+number is given to somebody else (numbers are reused, so there are few), and a person that grows
+gets its meshes by adding them under the same names, which the client takes as an update.
+"""
 
 import numpy as np
 import viser
@@ -37,15 +44,22 @@ class PersonView:
         self._lengths = self._fitted = _lengths(person.size)
         self._fit(person)
 
-    def remove(self) -> None:
-        """Take the person out of the scene."""
-        self._frame.remove()
+    def hide(self) -> None:
+        """Take the person out of sight."""
+        self._frame.visible = False
+
+    def show(self, person: Seen) -> None:
+        """Show a person that was hidden, or another one of the same number."""
+        self._gait = Gait(self._cell.floor_z)
+        self._drawn = None
+        self._lengths = _lengths(person.size)
+        if not _same(self._lengths, self._fitted):
+            self._fit(person)
+        self._frame.visible = True
 
     def _fit(self, person: Seen) -> None:
         """Give the mannequin the person's size."""
         self._fitted = _lengths(person.size)
-        for handle, _ in (*self._skins, *self._solids):
-            handle.remove()
         bind = skeleton.bind_bones(person.size)
         self._skins = [
             self._add_skin(part, person.size, bind)

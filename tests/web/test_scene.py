@@ -148,7 +148,7 @@ def test_two_people_are_drawn_and_one_who_leaves_is_taken_out(
     assert not node(server, "/gizmos/0/right").visible
     world.apply(commands.RemovePerson(person=1))
     scene.draw(world.snapshot(), 0.05)
-    assert server.scene.get_handle_by_name("/people/1/vest") is None
+    assert not node(server, "/people/1").visible
     assert server.scene.get_handle_by_name("/gizmos/1/right") is None
 
 

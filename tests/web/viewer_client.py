@@ -10,8 +10,17 @@ from typing import Any, Self
 
 import msgspec.msgpack
 import viser
+import zstandard
 from websockets.sync.client import unix_connect
 from websockets.typing import Subprotocol
+
+
+def messages_of(frame: bytes) -> list[dict[str, Any]]:
+    """Return the messages of one frame: two lengths, then zstd-packed msgpack, then arrays."""
+    size = int.from_bytes(frame[8:16], "little")
+    inner = zstandard.ZstdDecompressor().decompress(frame[16 : 16 + size])
+    messages: list[dict[str, Any]] = msgspec.msgpack.decode(inner)["messages"]
+    return messages
 
 
 class ViewerClient:
@@ -22,6 +31,8 @@ class ViewerClient:
             compression=None,
             max_size=None,
         )
+        self.received: list[dict[str, Any]] = []
+        """What the viewer has sent, in order; arrays are placeholders."""
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
         # viser counts a visitor from its first camera on.
@@ -41,11 +52,21 @@ class ViewerClient:
 
     def _read(self) -> None:
         """Take what the viewer sends, or it would wait for us; ends with the socket."""
-        for _ in self._socket:
-            pass
+        for frame in self._socket:
+            assert isinstance(frame, bytes)
+            self.received.extend(messages_of(frame))
 
     def send(self, **message: Any) -> None:
         self._socket.send(msgspec.msgpack.encode(message))
+
+    def wait_for(self, type: str, name: str) -> None:
+        """Wait until a message of a type that concerns a node has come."""
+        end = time.monotonic() + 10.0
+        while not any(
+            one["type"] == type and one.get("name") == name for one in list(self.received)
+        ):
+            assert time.monotonic() < end, f"no {type} of {name}"
+            time.sleep(0.02)
 
     def look(self, fov: float) -> None:
         """Say where the camera is, with a field of view [rad]."""
