@@ -10,7 +10,10 @@ from web.poses import Vec, orientation
 
 STIFF_M = 1e-3
 """Change of a capsule's length that is not shown [m]."""
-SHAPE, TOUCHED = (64, 150, 190), (224, 44, 40)
+SHAPES, TOUCHED = "/shapes", "/touched"
+"""Nodes of all capsules: what a visitor may hide, and what touched, which everybody sees."""
+SHAPE, HIT = (64, 150, 190), (224, 44, 40)
+OPACITY, HIT_OPACITY = 0.32, 0.65
 
 
 class CapsulesView:
@@ -18,22 +21,22 @@ class CapsulesView:
 
     Args:
         server: Where to draw.
-        root: Name of their node in the scene.
+        owner: Whose they are; names their nodes.
     """
 
-    def __init__(self, server: viser.ViserServer, root: str) -> None:
-        self._scene, self._root = server.scene, root
-        self._scene.add_frame(root, show_axes=False)
+    def __init__(self, server: viser.ViserServer, owner: str) -> None:
+        self._scene, self._owner = server.scene, owner
         self._handles: dict[str, viser.MeshHandle] = {}
-        self._sizes: list[tuple[float, float]] = []
+        self._hits: dict[str, viser.MeshHandle] = {}
+        self._sizes: dict[str, tuple[float, float]] = {}
         self._ends: Vec | None = None
         self._placed = False
 
     def clear(self) -> None:
         """Take all capsules away."""
-        for handle in self._handles.values():
+        for handle in (*self._handles.values(), *self._hits.values()):
             handle.remove()
-        self._handles, self._sizes, self._ends = {}, [], None
+        self._handles, self._hits, self._sizes, self._ends = {}, {}, {}, None
 
     def add(self, name: str, radius: float, length: float) -> None:
         """Add a capsule, hidden at first.
@@ -43,18 +46,24 @@ class CapsulesView:
             radius: Radius [m].
             length: Distance of its ends [m].
         """
-        self._sizes.append((radius, length))
+        self._sizes[name] = radius, length
+        self._handles[name] = self._add(f"{SHAPES}/{self._owner}/{name}", name, SHAPE, OPACITY)
+        self._handles[name].visible = False
+
+    def _add(
+        self, node: str, name: str, color: tuple[int, int, int], opacity: float
+    ) -> viser.MeshHandle:
+        radius, length = self._sizes[name]
         mesh = trimesh.creation.capsule(height=length, radius=radius, count=(24, 14))
         vertices = np.asarray(mesh.vertices)
-        self._handles[name] = self._scene.add_mesh_simple(
-            f"{self._root}/{name}",
+        return self._scene.add_mesh_simple(
+            node,
             vertices - 0.5 * (vertices.min(axis=0) + vertices.max(axis=0)),
             np.asarray(mesh.faces),
-            color=SHAPE,
-            opacity=0.32,
+            color=color,
+            opacity=opacity,
             cast_shadow=False,
             receive_shadow=False,
-            visible=False,
         )
 
     def place(self, ends: Vec) -> None:
@@ -67,26 +76,31 @@ class CapsulesView:
 
     def show(self, visible: bool, touched: Collection[str]) -> None:
         """Show all or none; those named ``touched`` are seen in any case, in red."""
-        for name, handle in self._handles.items():
-            hit = name in touched
-            if tuple(handle.color) != (color := TOUCHED if hit else SHAPE):
-                handle.color, handle.opacity = color, 0.65 if hit else 0.32
-            if handle.visible != (visible or hit):
-                handle.visible = visible or hit
-        if (visible or touched) and not self._placed and self._ends is not None:
+        for handle in self._handles.values():
+            if handle.visible != visible:
+                handle.visible = visible
+        for name in self._hits.keys() - set(touched):
+            self._hits.pop(name).remove()
+        for name in self._handles.keys() & set(touched) - self._hits.keys():
+            node = f"{TOUCHED}/{self._owner}/{name}"
+            self._hits[name], self._placed = self._add(node, name, HIT, HIT_OPACITY), False
+        if (visible or self._hits) and not self._placed and self._ends is not None:
             self._send(self._ends)
 
     def _send(self, ends: Vec) -> None:
         self._placed = True
         turns = orientation(_turns_onto(ends[:, 1] - ends[:, 0]))
-        handles = zip(self._handles.values(), self._sizes, turns, ends, strict=True)
-        for handle, (radius, length), turn, pair in handles:
-            handle.wxyz, handle.position = turn, pair.mean(axis=0)
+        for name, turn, pair in zip(self._handles, turns, ends, strict=True):
+            radius, length = self._sizes[name]
             now = float(np.linalg.norm(pair[1] - pair[0]))
             stretch = (now + 2.0 * radius) / (length + 2.0 * radius)
             scale = (1.0, 1.0, stretch if abs(now - length) > STIFF_M else 1.0)
-            if handle.scale != scale:
-                handle.scale = scale
+            for handle in (self._handles[name], self._hits.get(name)):
+                if handle is None:
+                    continue
+                handle.wxyz, handle.position = turn, pair.mean(axis=0)
+                if handle.scale != scale:
+                    handle.scale = scale
 
 
 def _turns_onto(directions: Vec) -> Vec:

@@ -59,24 +59,21 @@ class ClutterView:
                 anchor="center-center",
                 font_screen_scale=0.7,
                 depth_test=True,
-                visible=False,
             )
             self._tiles.append(surface)
             self._labels.append(label)
-        self._shown: tuple[tuple[float, ...], bool] | None = None
+        self._shown: tuple[float, ...] | None = None
 
-    def draw(self, failure: tuple[float, ...], *, chances: bool) -> None:
-        """Show the chance of failure by cell; ``chances`` says whether in figures too."""
-        if (failure, chances) == self._shown:
+    def draw(self, failure: tuple[float, ...]) -> None:
+        """Show the chance of failure by cell."""
+        if failure == self._shown:
             return
-        self._shown = failure, chances
+        self._shown = failure
         for surface, label, chance in zip(self._tiles, self._labels, failure, strict=True):
             if tuple(surface.color) != (color := failure_color(chance)):
                 surface.color = color
             if label.text != (text := f"{100.0 * chance:.0f} %"):
                 label.text = text
-            if label.visible != chances:
-                label.visible = chances
 
 
 def _spacing(values: Vec) -> float:

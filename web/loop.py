@@ -27,8 +27,8 @@ from app.sim.reach_commands import SetWay
 from app.sim.reach_ports import ReachPilot
 from app.sim.snapshot import WorldSnapshot
 from app.sim.sorting_commands import SORTING_COMMANDS
-from web import gui
 from web.scene import CellScene
+from web.view_settings import COLLISION_SHAPES, ViewSettings
 from web.viewer_server import ViewerServer
 
 logger = logging.getLogger(__name__)
@@ -151,11 +151,11 @@ class LiveCell:
         """Start viewer and thread."""
         rich.get_console().quiet = True  # viser would print its own address, past the page
         self._server = ViewerServer()
+        views = ViewSettings(self._server, self._cell)
         scene = CellScene(self._server, self._cell, self.handle.submit)
-        gui.build(self._server, scene.overlays, self._cell)
         scene.draw(self.handle.snapshot(), 0.0)
         self._thread = threading.Thread(
-            target=self._run, args=(scene,), name=f"world-{self.handle.id}", daemon=True
+            target=self._run, args=(scene, views), name=f"world-{self.handle.id}", daemon=True
         )
         self._thread.start()
 
@@ -169,18 +169,18 @@ class LiveCell:
             self._server.stop()
             self._server = None
 
-    def _run(self, scene: CellScene) -> None:
+    def _run(self, scene: CellScene, views: ViewSettings) -> None:
         dt = self._cell.robot.dt
         due = time.monotonic() + dt
         while not self._stop.wait(max(due - time.monotonic(), 0.0)):
             try:
-                self._tick(scene, dt)
+                self._tick(scene, views, dt)
             except Exception:
                 logger.exception("the live cell failed at tick %d", self.handle.snapshot().tick)
                 self._stop.wait(ERROR_PAUSE_S)
             due = max(due + dt, time.monotonic() - MAX_BEHIND_S)
 
-    def _tick(self, scene: CellScene, dt: float) -> None:
+    def _tick(self, scene: CellScene, views: ViewSettings, dt: float) -> None:
         for command in self.handle.drain():
             try:
                 self._obey(command)
@@ -193,7 +193,8 @@ class LiveCell:
         self._turn += 1
         self._undrawn_s += dt * self._speed
         if self._turn % max(1, round(PICTURE_S / dt)) == 0:
-            scene.draw(snapshot, self._undrawn_s)
+            shapes = views.is_seen(COLLISION_SHAPES)
+            scene.draw(snapshot, self._undrawn_s, shapes=shapes)
             self._undrawn_s = 0.0
 
     def _obey(self, command: Command) -> None:

@@ -40,13 +40,14 @@ class PersonView:
         self._drawn: tuple[Vec, Vec] | None = None
         self._frame = self._scene.add_frame(self._root, show_axes=False)
         self._solids: list[tuple[viser.MeshHandle, str]] = []
-        self._capsules = CapsulesView(server, f"{self._root}/shapes")
+        self._capsules = CapsulesView(server, f"people/{person.id}")
         self._lengths = self._fitted = _lengths(person.size)
         self._fit(person)
 
     def hide(self) -> None:
         """Take the person out of sight."""
         self._frame.visible = False
+        self.show_capsules(False, None)
 
     def show(self, person: Seen) -> None:
         """Show a person that was hidden, or another one of the same number."""

@@ -67,37 +67,27 @@ class ReachScene:
     ) -> None:
         self._walkers = WalkersView(server, cell)
         self._goal = GoalGizmo(server, cell, submit)
-        self._targets = _add_targets(server, cell)
+        _add_targets(server, cell)
         self._zone = _Zone(server, cell)
         self._gauge = _Gauge(server)
         self._trail = _Trail(server)
         self._path = Arc(server, "/way", lift=0.05)
 
-    def draw(self, snapshot: WorldSnapshot, *, zone: bool, trail: bool, targets: bool) -> None:
-        """Show a snapshot; sends only what changed.
-
-        Args:
-            snapshot: What to show.
-            zone: Whether the separation zone is shown.
-            trail: Whether the tool's way is shown.
-            targets: Whether the goals that policies are trained on are shown.
-        """
+    def draw(self, snapshot: WorldSnapshot) -> None:
+        """Show a snapshot; sends only what changed."""
         view = snapshot.reach
         if view is None:
             return
         self._walkers.draw(snapshot)
         self._goal.draw(view, reached=snapshot.status == "reached")
-        for part in self._targets:
-            if part.visible != targets:
-                part.visible = targets
         if snapshot.status == "moving":
             self._path.show(snapshot.tcp, view.goal)
         else:
             self._path.hide()
         self._trail.note(snapshot)
-        self._zone.draw(view, visible=zone and view.safety.person is not None)
+        self._zone.draw(view, visible=view.safety.person is not None)
         self._gauge.draw(view)
-        self._trail.draw(visible=trail)
+        self._trail.draw()
 
 
 class _Zone:
@@ -180,7 +170,7 @@ class _Trail:
     def __init__(self, server: viser.ViserServer) -> None:
         self._points: deque[tuple[Vec, Rgb]] = deque(maxlen=N_TRAIL + 1)
         self._lines = server.scene.add_line_segments(
-            "/trail", np.zeros((N_TRAIL, 2, 3)), MARK, thickness=0.012, visible=False
+            "/trail/lines", np.zeros((N_TRAIL, 2, 3)), MARK, thickness=0.012, visible=False
         )
         self._sent = 0
         self._n = 0
@@ -195,9 +185,9 @@ class _Trail:
             points.append((tcp, override_color(snapshot.reach.safety)))
             self._n += 1
 
-    def draw(self, *, visible: bool) -> None:
+    def draw(self) -> None:
         """Show what was noted."""
-        seen = visible and len(self._points) > 1
+        seen = len(self._points) > 1
         if self._lines.visible != seen:
             self._lines.visible = seen
         if not seen or self._sent == self._n:
@@ -223,10 +213,8 @@ def _fan(outline: Vec, z: float) -> tuple[Vec, Vec]:
     return np.vstack([rim, middle]), faces
 
 
-def _add_targets(
-    server: viser.ViserServer, cell: Cell
-) -> tuple[viser.LineSegmentsHandle, viser.PointCloudHandle]:
-    """Return the outline of the goal region and its targets."""
+def _add_targets(server: viser.ViserServer, cell: Cell) -> None:
+    """Add the outline of the goal region and its targets."""
     low, high = goal_box(cell)
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
     pairs = [
@@ -236,10 +224,8 @@ def _add_targets(
         if np.abs(corners[a] - corners[b]).sum() == 1
     ]
     places = low + corners * (high - low)
-    box = server.scene.add_line_segments(
-        "/goals/box", places[np.array(pairs)], EDGE, thickness=0.004
-    )
-    dots = server.scene.add_point_cloud(
+    server.scene.add_line_segments("/goals/box", places[np.array(pairs)], EDGE, thickness=0.004)
+    server.scene.add_point_cloud(
         "/goals/targets",
         goal_region_of(cell).targets().astype(np.float32),
         DOT,
@@ -248,4 +234,3 @@ def _add_targets(
         precision="float32",
         point_shading="flat",
     )
-    return box, dots

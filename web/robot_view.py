@@ -42,7 +42,7 @@ class RobotView:
         else:
             self._fingers = self._add_gripper(scene, cell)
         self._closed = False
-        self._capsules = CapsulesView(server, "/robot/shapes")
+        self._capsules = CapsulesView(server, "robot")
         self._shapes = load_robot_capsules(tool.tool_length, tool.tool_radius)
         for name, radius, p0, p1 in zip(
             self._shapes.name,

@@ -4,7 +4,6 @@ Only the thread that owns the world draws; clicks and drags leave as commands.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 import viser
@@ -25,28 +24,6 @@ PATH_LIFT = 0.12
 """Height of the dashed path's arc over the straight line [m]."""
 
 
-@dataclass(slots=True)
-class Overlays:
-    """What a visitor may show or hide; written by the panel, read by the drawing thread."""
-
-    shapes: bool = False
-    """The capsules the simulator sees."""
-    values: bool = True
-    """The labels at the stations."""
-    path: bool = True
-    """The dashed line from tool to target, or along the way of a block."""
-    chances: bool = True
-    """The figures of the failure map."""
-    ghosts: bool = True
-    """The blocks that the goal asks for."""
-    zone: bool = True
-    """Where people make the robot slow down."""
-    trail: bool = True
-    """Where the tool has been."""
-    targets: bool = True
-    """The goals that policies are trained on."""
-
-
 class CellScene:
     """One cell in one viewer.
 
@@ -60,7 +37,6 @@ class CellScene:
         self, server: viser.ViserServer, cell: Cell, submit: Callable[[Command], None]
     ) -> None:
         self._server, self._cell = server, cell
-        self.overlays = Overlays()
         with server.atomic():
             workplace.build(server, cell)
             self._robot = RobotView(server, cell)
@@ -68,42 +44,32 @@ class CellScene:
             self._people = PeopleView(server, cell, submit)
             self._sorting = SortingScene(server, cell, submit) if sorts(cell) else None
             self._reach = ReachScene(server, cell, submit) if is_reaching(cell) else None
-            self._path = Arc(server, "/path", lift=PATH_LIFT)
+            self._path = Arc(server, "/path/arc", lift=PATH_LIFT)
 
-    def draw(self, snapshot: WorldSnapshot, dt: float) -> None:
+    def draw(self, snapshot: WorldSnapshot, dt: float, *, shapes: bool = False) -> None:
         """Show a snapshot; sends only what changed.
 
         Args:
             snapshot: What to show.
             dt: Time since the last call [s].
+            shapes: Whether anybody looks at the capsules that the simulator sees.
         """
         with self._server.atomic():
             touched = snapshot.contact if snapshot.status == "contact" else None
             self._robot.draw(snapshot.robot_q)
             self._robot.grip(snapshot.gripping)
-            self._robot.show_capsules(self.overlays.shapes, touched.link if touched else None)
-            self._people.draw(snapshot, dt, shapes=self.overlays.shapes)
-            self._stations.show_values(self.overlays.values)
+            self._robot.show_capsules(shapes, touched.link if touched else None)
+            self._people.draw(snapshot, dt, shapes=shapes)
             self._stations.draw(snapshot)
             if self._sorting is not None:
-                self._sorting.draw(
-                    snapshot,
-                    chances=self.overlays.chances,
-                    ghosts=self.overlays.ghosts,
-                    path=self.overlays.path,
-                )
+                self._sorting.draw(snapshot)
             elif self._reach is not None:
-                self._reach.draw(
-                    snapshot,
-                    zone=self.overlays.zone,
-                    trail=self.overlays.trail,
-                    targets=self.overlays.targets,
-                )
+                self._reach.draw(snapshot)
             else:
                 self._draw_path(snapshot)
 
     def _draw_path(self, snapshot: WorldSnapshot) -> None:
-        if snapshot.status != "moving" or snapshot.chosen is None or not self.overlays.path:
+        if snapshot.status != "moving" or snapshot.chosen is None:
             self._path.hide()
             return
         self._path.show(snapshot.tcp, np.array(self._cell.station(snapshot.chosen).position))

@@ -50,27 +50,20 @@ class SortingScene:
         self._towers = TowersView(server, cell)
         self._blocks = BlocksView(server, submit)
         self._rings = {name: _add_ring(server, name) for name in ("pick", "place")}
-        self._arc = Arc(server, "/move", lift=ARC_LIFT)
+        self._arc = Arc(server, "/move/arc", lift=ARC_LIFT)
 
-    def draw(self, snapshot: WorldSnapshot, *, chances: bool, ghosts: bool, path: bool) -> None:
-        """Show a snapshot; sends only what changed.
-
-        Args:
-            snapshot: What to show.
-            chances: Whether the failure map has figures.
-            ghosts: Whether the goal is shown.
-            path: Whether the way of the block is shown.
-        """
+    def draw(self, snapshot: WorldSnapshot) -> None:
+        """Show a snapshot; sends only what changed."""
         view = snapshot.sorting
         if view is None:
             return
-        self._clutter.draw(view.failure, chances=chances)
-        self._towers.draw(view.goal, ghosts=ghosts)
+        self._clutter.draw(view.failure)
+        self._towers.draw(view.goal)
         self._blocks.draw(view.pieces)
         ends = _ends(view, self._cell, self._floor)
         self._ring("pick", None if ends is None or ends[2] else ends[0])
         self._ring("place", None if ends is None else ends[1])
-        if ends is None or not path:
+        if ends is None:
             self._arc.hide()
         else:
             self._arc.show(ends[0], ends[1])

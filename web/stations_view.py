@@ -65,7 +65,6 @@ class StationsView:
         self._bodies = {station.id: self._add_body(station) for station in self._stations}
         self._labels = {station.id: self._add_label(station) for station in self._stations}
         self._marker = self._add_marker()
-        self._values = True
         self._key: tuple[object, ...] = ()
         self._next = 0.0
 
@@ -123,13 +122,9 @@ class StationsView:
         )
         return marker
 
-    def show_values(self, visible: bool) -> None:
-        """Show or hide the labels."""
-        self._values = visible
-
     def draw(self, snapshot: WorldSnapshot) -> None:
         """Show what the critic says; at once who is chosen, a few times a second how sure."""
-        key = (snapshot.chosen, tuple(c.id for c in snapshot.candidates), self._values)
+        key = (snapshot.chosen, tuple(c.id for c in snapshot.candidates))
         if key == self._key and time.monotonic() < self._next:
             return
         self._key, self._next = key, time.monotonic() + PERIOD_S
@@ -143,7 +138,7 @@ class StationsView:
                 body.color = color
             if label.text != (text := _text(station, candidate)):
                 label.text = text
-            if label.visible != (shown := self._values and candidate is not None):
+            if label.visible != (shown := candidate is not None):
                 label.visible = shown
         self._mark(snapshot.chosen if snapshot.chosen in self._bodies else None)
 

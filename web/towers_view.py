@@ -32,9 +32,9 @@ class TowersView:
                 )
         self._ghosts: dict[tuple[str, int], tuple[Kind, viser.MeshHandle]] = {}
 
-    def draw(self, goal: tuple[GoalBlockView, ...], *, ghosts: bool) -> None:
-        """Show what is wanted and not there yet; nothing where ``ghosts`` is false."""
-        wanted = {(one.tower, one.level): one for one in goal if ghosts and not one.done}
+    def draw(self, goal: tuple[GoalBlockView, ...]) -> None:
+        """Show what is wanted and not there yet."""
+        wanted = {(one.tower, one.level): one for one in goal if not one.done}
         for place in self._ghosts.keys() - wanted.keys():
             self._ghosts.pop(place)[1].remove()
         for place, block in wanted.items():

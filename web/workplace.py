@@ -17,9 +17,7 @@ FOOT = material((52, 55, 61), roughness=0.6)
 PLATE = material((96, 103, 112), metallic=0.5, roughness=0.4)
 
 OBSTACLE = (150, 158, 168)
-FLOOR = (226, 230, 235)
-GRID, GRID_BOLD = (205, 211, 219), (188, 196, 206)
-SKY, HORIZON = (206, 217, 230), (238, 241, 245)
+GRID, GRID_BOLD = (160, 170, 182), (134, 145, 158)
 
 
 def build(server: viser.ViserServer, cell: Cell) -> None:
@@ -100,8 +98,7 @@ def _floor(server: viser.ViserServer, cell: Cell) -> None:
         fade_strength=1.4,
         fade_from="origin",
         shadow_opacity=0.22,
-        plane_color=FLOOR,
-        plane_opacity=1.0,
+        plane_opacity=0.0,  # What is behind follows the visitor's light or dark.
     )
 
 

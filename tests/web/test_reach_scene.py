@@ -107,7 +107,7 @@ def test_goal_is_drawn_with_its_tolerance_and_the_handle_follows(
     assert node(server, "/goal/place/tolerance").scale == now.reach.tolerance
 
 
-def test_targets_and_goal_region_are_shown_until_they_are_switched_off(
+def test_targets_and_goal_region_are_shown(
     scene: CellScene, server: viser.ViserServer, world: ReachWorld
 ) -> None:
     now, (low, high) = world.snapshot(), goal_box(CELL)
@@ -117,10 +117,6 @@ def test_targets_and_goal_region_are_shown_until_they_are_switched_off(
     assert box.points.shape == (12, 2, 3)
     assert np.allclose(box.points.reshape(-1, 3).min(axis=0), low)
     assert np.allclose(box.points.reshape(-1, 3).max(axis=0), high)
-    scene.overlays.targets = False
-    scene.draw(now, 0.02)
-    assert not dots.visible and not box.visible
-    scene.overlays.targets = True
 
 
 def test_gauge_is_as_full_as_the_override_and_the_zone_has_its_colour(
@@ -163,7 +159,7 @@ def test_trail_follows_the_tool(
     for _ in range(40):
         world.step()
         scene.draw(world.snapshot(), 0.02)
-    trail = node(server, "/trail")
+    trail = node(server, "/trail/lines")
     assert trail.visible
     last = world.snapshot().tcp
     assert np.linalg.norm(trail.points[-1, 1] - last) < 0.1

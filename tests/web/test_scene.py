@@ -11,6 +11,7 @@ from app.sim.robot import LINK_NAMES, Robot
 from app.sim.world import World
 from tests.straight_policy import StraightPolicy
 from web.arc import dashes
+from web.capsules_view import HIT
 from web.scene import PATH_LIFT, CellScene
 from web.stations_view import IDLE, RAMP, color_of
 from web.viewer_server import ViewerServer
@@ -90,7 +91,7 @@ def test_gizmos_are_seen_in_manual_mode_only_and_sit_on_the_hands(
 
 
 def test_contact_shows_what_touched_in_red(
-    scene: CellScene, server: viser.ViserServer, world: World
+    scene: CellScene, server: viser.ViserServer, world: World, cell: Cell
 ) -> None:
     world.apply(commands.SetCandidates(ids=("cube2",)))
     world.apply(commands.MoveHuman(pelvis=(0.0, 1.15, -1.57), right=(-0.1, 0.62, 0.2)))
@@ -101,25 +102,30 @@ def test_contact_shows_what_touched_in_red(
     snapshot = world.snapshot()
     assert snapshot.contact is not None
     scene.draw(snapshot, 0.05)
-    touched = f"/people/0/shapes/{snapshot.contact.body}"
-    assert node(server, touched).visible
-    assert not node(server, "/people/0/shapes/head").visible
+    touched = node(server, f"/touched/people/0/{snapshot.contact.body}")
+    assert tuple(touched.color) == HIT
+    ends = human.capsules(snapshot.person_q, cell.body, cell.floor_z)
+    body = human.CAPSULE_NAMES.index(snapshot.contact.body)
+    assert np.allclose(touched.position, ends[body].mean(axis=0), atol=1e-9)
+    assert server.scene.get_handle_by_name("/touched/people/0/head") is None
+    assert not node(server, "/shapes/people/0/head").visible
+    world.apply(commands.Reset())
+    scene.draw(world.snapshot(), 0.05)
+    assert server.scene.get_handle_by_name(touched.name) is None
 
 
 def test_collision_shapes_lie_over_the_person_when_asked_for(
     scene: CellScene, server: viser.ViserServer, world: World, cell: Cell
 ) -> None:
-    scene.overlays.shapes = True
     snapshot = world.snapshot()
-    scene.draw(snapshot, 0.05)
+    scene.draw(snapshot, 0.05, shapes=True)
     ends = human.capsules(snapshot.person_q, cell.body, cell.floor_z)
     for name, pair in zip(human.CAPSULE_NAMES, ends, strict=True):
-        capsule = node(server, f"/people/0/shapes/{name}")
+        capsule = node(server, f"/shapes/people/0/{name}")
         assert capsule.visible
         assert np.allclose(capsule.position, pair.mean(axis=0), atol=1e-9)
-    scene.overlays.shapes = False
     scene.draw(snapshot, 0.05)
-    assert not node(server, "/people/0/shapes/head").visible
+    assert not node(server, "/shapes/people/0/head").visible
 
 
 def test_colour_runs_from_green_for_the_best_to_red_for_the_worst() -> None:
@@ -165,6 +171,6 @@ def test_mannequin_and_capsules_grow_with_the_person(
     person = world.snapshot().people[0]
     assert np.ptp(node(server, "/people/0/head").vertices[:, 2]) > 1.07 * before
     assert np.ptp(node(server, "/people/0/jacket").vertices[:, 1]) > 1.07 * sleeves
-    forearm = np.ptp(node(server, "/people/0/shapes/forearm_r").vertices[:, 2])
+    forearm = np.ptp(node(server, "/shapes/people/0/forearm_r").vertices[:, 2])
     girth = human.capsule_radii(person.size)[human.CAPSULE_NAMES.index("forearm_r")]
     assert forearm == pytest.approx(person.size[6] + 2.0 * girth, abs=2e-3)

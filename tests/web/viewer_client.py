@@ -56,6 +56,21 @@ class ViewerClient:
             assert isinstance(frame, bytes)
             self.received.extend(messages_of(frame))
 
+    def heard(self, kind: str) -> list[dict[str, Any]]:
+        """Return the messages of a kind that came so far."""
+        return [one for one in list(self.received) if one["type"] == kind]
+
+    def shown(self) -> dict[str, bool]:
+        """Return what of the scene's nodes is seen in this visitor's own scope, by name."""
+        own = [one for one in self.heard("SetSceneNodeVisibilityMessage") if one["owner"]]
+        return {one["name"]: one["visible"] for one in own}
+
+    def check(self, label: str, value: bool) -> None:
+        """Check or uncheck the box of that label."""
+        boxes = self.heard("GuiCheckboxMessage")
+        [box] = [one for one in boxes if one["props"]["label"] == label]
+        self.send(type="GuiUpdateMessage", uuid=box["uuid"], updates={"value": value})
+
     def send(self, **message: Any) -> None:
         self._socket.send(msgspec.msgpack.encode(message))
 

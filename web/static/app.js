@@ -13,6 +13,7 @@ import { SortingDecision } from "./sorting.js";
 import { SmallPrint, Story } from "./story.js";
 import { Training } from "./training.js";
 import { Values } from "./values.js";
+import { ViewMenu } from "./viewmenu.js";
 
 const LINKS = {
   connecting: ["Connecting", "quiet"],
@@ -142,6 +143,7 @@ function Scene({ cell }) {
     <div class=${`viewer ${keyed ? "is-keyed" : ""}`}>
       ${epoch > 0 && html`<iframe key=${epoch} ref=${frame} src=${`/viewer/${WORLD}/`} data-role="viewer"
         title="Live 3D view of robot and person"></iframe>`}
+      ${epoch > 0 && world && html`<${ViewMenu} key=${epoch} frame=${frame} />`}
       ${!world && html`<div class="veil" role="status">
         <i class="spinner"></i>
         <p><b>${veil(link, reason)[0]}</b></p>
