@@ -51,11 +51,11 @@ def detail_of(found: ImportedMotion) -> dict[str, Any]:
         "glitches": [asdict(one) for one in found.glitches],
         "clean_runs": [
             {
-                "first": first,
-                "last": last,
+                "first": run.first_frame,
+                "last": run.first_frame + len(run.times) - 1,
                 "duration_s": float(run.times[-1]),
             }
-            for run, (first, last) in zip(found.runs, found.spans, strict=True)
+            for run in found.runs
         ],
     }
 

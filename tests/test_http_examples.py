@@ -80,3 +80,12 @@ def test_training_job_is_accepted_with_its_place(address: str) -> None:
 @pytest.mark.parametrize("text", OTHERS)
 def test_command_is_answered(text: str, address: str) -> None:
     assert shell(text.replace("curl -s ", "curl -sf "), address).startswith("{")
+
+
+def test_people_of_the_examples_are_answered_without_flags(address: str) -> None:
+    examples = [text for text in OTHERS if '"keypoints"' in text]
+    assert len(examples) == 2
+    for text in examples:
+        answer = json.loads(shell(text, address))
+        seen = [one for one in answer["people"] if one.get("age_s") is not None]
+        assert len(seen) == 1 and seen[0]["flags"] == []

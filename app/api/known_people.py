@@ -88,12 +88,12 @@ def _known(
 
 
 def _from_keypoints(entry: KeypointsPerson, place: str, cell: Cell) -> KnownPerson:
-    points, trust = entry.points(place)
+    points, trust = entry.points()
     size = cell.body if entry.body is None else entry.body.size(cell)
     speeds = entry.speeds()
-    estimate = estimate_once(points, size, trust, speeds, place)
+    estimate = estimate_once(points, size, trust, speeds, place, cell.floor_z)
     person = as_person(estimate)
-    assert person is not None  # estimate_once refuses a frame that shows nothing
+    assert person is not None  # estimate_once always tells a cylinder
     said: Speeds = "zero" if speeds is None else "given"
     return KnownPerson(person=person, source="keypoints", speeds=said, estimate=estimate)
 

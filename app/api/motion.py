@@ -8,6 +8,7 @@ as text messages, one after the other, and gives the same answers in their order
 import asyncio
 import json
 import logging
+import math
 from collections.abc import Mapping
 from functools import partial
 from typing import Any
@@ -85,6 +86,7 @@ def _decided(
 ) -> MotionAnswer:
     people = known_people(request.people, cell, services.trackers)
     ages = [one.estimate.age_s for one in people if one.estimate is not None]
+    ages = [age for age in ages if math.isfinite(age)]  # inf: nothing was ever seen
     question = request.to_domain(
         [one.person for one in people], safety_settings(cell), max(ages, default=0.0)
     )

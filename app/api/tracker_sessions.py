@@ -89,13 +89,16 @@ class TrackerSessions:
         self._lock = threading.Lock()
         self._sessions: dict[str, TrackerSession] = {}
 
-    def open(self, cell: str, n_people: int, size: Vec) -> TrackerSession:
+    def open(
+        self, cell: str, n_people: int, size: Vec, floor_z: float | None = None
+    ) -> TrackerSession:
         """Return a new session.
 
         Args:
             cell: Name of the work cell.
             n_people: Most people at once.
             size: Size of these people [m], shape (12,).
+            floor_z: Height of the cell's floor [m]; None: heights over it are not judged.
 
         Raises:
             Conflict: There are as many as there may be.
@@ -104,7 +107,7 @@ class TrackerSessions:
             id=secrets.token_hex(8),
             cell=cell,
             n_people=n_people,
-            estimator=PeopleEstimator(n_people, size),
+            estimator=PeopleEstimator(n_people, size, floor_z=floor_z),
         )
         with self._lock:
             self._forget_idle()

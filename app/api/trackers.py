@@ -26,7 +26,7 @@ async def create(
     services.readiness.require()
     cell = await known_cell(body.cell, services)
     size = cell.body if body.body is None else body.body.size(cell)
-    session = services.trackers.open(cell.name, body.n_people, size)
+    session = services.trackers.open(cell.name, body.n_people, size, cell.floor_z)
     response.headers["Location"] = f"/v1/trackers/{session.id}"
     return TrackerPublic.from_domain(session)
 
@@ -46,13 +46,14 @@ async def take_frame(
     """Take one frame of all people in and return what is known of each at its time.
 
     Who is who is found out from where people were, so their order means nothing; what is
-    missing, held, exchanged or not credible is named.
+    missing, held, exchanged or not credible is named, and so are people who are not followed.
     """
     session = services.trackers.get(tracker_id)
-    seen = [one.points(f"people[{i}].") for i, one in enumerate(body.people)]
+    seen = [one.points() for one in body.people]
     points, trust = [one[0] for one in seen], [one[1] for one in seen]
     estimates = await run_in_threadpool(session.take, body.t, points, trust)
-    return EstimatesPublic.from_domain(tracker_id, body.t, estimates)
+    rest = session.estimator.unfollowed
+    return EstimatesPublic.from_domain(tracker_id, body.t, estimates, rest)
 
 
 @router.get("/{tracker_id}", summary="What is known of a tracker's people")
@@ -70,7 +71,8 @@ async def get_one(
     """Return the estimates at a time not earlier than the newest frame."""
     session = services.trackers.get(tracker_id)
     at, estimates = await run_in_threadpool(session.estimates, t)
-    return EstimatesPublic.from_domain(tracker_id, at, estimates)
+    rest = session.estimator.unfollowed
+    return EstimatesPublic.from_domain(tracker_id, at, estimates, rest)
 
 
 @router.delete("/{tracker_id}", status_code=204, summary="Listen to a tracker no longer")

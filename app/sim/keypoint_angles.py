@@ -16,11 +16,13 @@ Source: METHOD 2.8 and 3.4; the inverse of ``kernels/body.py``.
 """
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 
 from app.sim import human
 from app.sim.kernels.keypoint_fit import Mask, fit_joints, new_fit_space
+from app.sim.keypoints import K
 from app.sim.ports import Vec
 
 _STEP_S = 0.005
@@ -28,6 +30,11 @@ _STEP_S = 0.005
 _Q_MIN, _Q_MAX = human.Q_MIN.copy(), human.Q_MAX.copy()
 """Limits as the kernel takes them: writable, or it would be compiled anew."""
 _Q_MIN[:2], _Q_MAX[:2] = -np.inf, np.inf  # a person far away is there, not at the model's 5 m
+
+
+_FITTED = ("neck", *(f"{part}_{s}" for part in ("shoulder", "elbow", "wrist") for s in "rl"))
+"""Key-points that are joints of the model, besides the pelvis, whose height is given."""
+_TRUNK = ("neck", "shoulder_r", "shoulder_l")
 
 
 def joint_angles(points: Vec, q_before: Vec, size: Vec) -> tuple[Vec, Mask]:
@@ -70,3 +77,27 @@ def joint_motion(
     qd = np.clip(change / (2.0 * _STEP_S), -qd_max, qd_max)
     qd[held] = 0.0
     return q, qd, held
+
+
+def fit_errors(q: Vec, size: Vec, points: Vec) -> tuple[float, float]:
+    """Return how far the model's joints are from key-points [m]; NaN where none is seen.
+
+    Args:
+        q: Joint positions [m, rad], shape (18,).
+        size: The person's size [m], shape (12,).
+        points: Key-points [m], shape (25, 3), NaN where missing.
+
+    Returns:
+        The median over all joints; for the trunk alone the greater one of the median over neck
+        and shoulders and of the error of the hips' height, which the model does not fit.
+    """
+    joints = human.joint_points(q, size)
+    away = [float(np.linalg.norm(points[K[name]] - joints[name])) for name in _FITTED]
+    hips = abs(float(points[K["mid_hip"], 2] - joints["pelvis"][2]))
+    trunk = [_median(one for one, name in zip(away, _FITTED, strict=True) if name in _TRUNK)]
+    return _median(away), max((d for d in (*trunk, hips) if d == d), default=math.nan)
+
+
+def _median(values: Iterable[float]) -> float:
+    there = [value for value in values if math.isfinite(value)]
+    return float(np.median(there)) if there else math.nan

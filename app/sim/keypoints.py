@@ -1,9 +1,7 @@
-"""Key-points of a depth camera in the layout BODY_25: names, checks, sides, our body's own.
+"""Key-points of a depth camera in the layout BODY_25: names, sides, our body's own.
 
 A frame is 25 points [m] in the cell's frame, NaN where a point is missing, as OpenPose with a
-depth image gives them (METHOD 2.8). :func:`check_keypoints` lets nothing else in: what cannot
-be a person in metres is an error with its rule; single points far from all others are dropped
-and named.
+depth image gives them (METHOD 2.8). ``keypoint_check.py`` checks frames from outside.
 
 :func:`keypoints_of` gives the key-points of our 18-DoF person. Shoulders, elbows, wrists, neck
 and mid-hip are joints of the model. The model has no face, knees or feet, so these are placed
@@ -14,13 +12,10 @@ capsule, with the knee half-way and the foot pointing where the pelvis faces.
 Source: Cao et al., OpenPose (2019), output format BODY_25; METHOD 2.8.
 """
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
-from app.errors import InvalidInput
 from app.sim import human
 from app.sim.kernels import body
 from app.sim.ports import Vec
@@ -72,107 +67,6 @@ _HALF_FOOT = 0.035
 
 FARTHEST_M = 100.0
 """Coordinates beyond this are no cell's; ours."""
-PERSON_M = (0.02, 1.2)
-"""Least and greatest median distance of a person's key-points from their middle [m]; ours. A
-standing adult has 0.4 m."""
-STRAY_M = 1.6
-"""Distance from the middle at which a key-point is no part of the person [m]; an arm stretched
-up or out is within 1.3 m."""
-_ENOUGH = 5
-"""Key-points from which on the size of what is seen is judged."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Keypoints:
-    """One checked frame of one person."""
-
-    points: Vec
-    """Key-points [m], shape (25, 3); rows of NaN are missing."""
-    confidences: Vec
-    """Trust in each in (0, 1], 0 where it is missing, shape (25,)."""
-    strays: tuple[str, ...]
-    """Names of key-points dropped because they lie too far from all others."""
-
-    @property
-    def seen(self) -> NDArray[np.bool_]:
-        """Which key-points are there, shape (25,)."""
-        return self.confidences > 0.0
-
-
-def check_keypoints(
-    keypoints: ArrayLike,
-    confidences: ArrayLike | None = None,
-    min_confidence: float = 0.1,
-    place: str = "",
-) -> Keypoints:
-    """Check one frame of one person as it comes from outside.
-
-    Missing is: NaN in any coordinate; exactly (0, 0, 0), as OpenPose writes it; a confidence
-    below ``min_confidence`` or NaN. A frame in which all are missing is a valid frame.
-
-    Args:
-        keypoints: Order of BODY_25, cell's frame [m], shape (25, 3).
-        confidences: Trust in each in [0, 1], shape (25,); 1 where None.
-        min_confidence: Trust below which a key-point counts as missing.
-        place: Put before the field's name in errors, such as ``"people[1]."``.
-
-    Raises:
-        InvalidInput: Not numbers, another shape, infinite, confidences outside [0, 1], or not
-            a person in metres.
-    """
-    points = _numbers(f"{place}keypoints", keypoints, (N_KEYPOINTS, 3))
-    trust = np.ones(N_KEYPOINTS)
-    if confidences is not None:
-        given = _numbers(f"{place}confidences", confidences, (N_KEYPOINTS,))
-        trust = np.nan_to_num(given, nan=0.0)
-        if trust.min() < 0.0 or trust.max() > 1.0:
-            wrong = trust[(trust < 0.0) | (trust > 1.0)]
-            raise InvalidInput(f"{place}confidences", float(wrong[0]), "must lie in [0, 1]")
-    missing = ~np.isfinite(points).all(axis=1) | (points == 0.0).all(axis=1)
-    missing |= trust < max(min_confidence, 1e-6)
-    strays = _strays(points, ~missing, place)
-    missing[strays] = True
-    points[missing], trust[missing] = np.nan, 0.0
-    return Keypoints(
-        points=points, confidences=trust, strays=tuple(BODY_25[int(k)] for k in strays)
-    )
-
-
-def _numbers(field: str, values: ArrayLike, shape: tuple[int, ...]) -> Vec:
-    try:
-        array = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InvalidInput(field, type(values).__name__, "must be numbers") from error
-    if array.shape != shape:
-        raise InvalidInput(field, array.shape, f"must have the shape {shape}")
-    if np.isinf(array).any():
-        first = BODY_25[int(np.argwhere(np.isinf(array))[0][0])]
-        raise InvalidInput(f"{field}.{first}", "inf", "must be finite, or NaN where missing")
-    return array
-
-
-def _strays(points: Vec, seen: NDArray[np.bool_], place: str) -> NDArray[np.int64]:
-    """Return the indices of key-points far from the others, after a check of the unit."""
-    there = np.flatnonzero(seen)
-    if len(there) == 0:
-        return there
-    if float(np.median(np.abs(points[there]).max(axis=1))) > FARTHEST_M:
-        largest = float(np.abs(points[there]).max())
-        rule = (
-            f"must be within {FARTHEST_M:g} m of the robot, in metres (are these millimetres?)"
-        )
-        raise InvalidInput(f"{place}keypoints", largest, rule)
-    away = np.linalg.norm(points[there] - np.median(points[there], axis=0), axis=1)
-    if len(there) < _ENOUGH:
-        return np.zeros(0, dtype=np.int64)
-    size, (least, most) = float(np.median(away)), PERSON_M
-    if not least <= size <= most:
-        rule = (
-            f"is the median distance of the key-points from their middle; a person's lies in "
-            f"[{least:g}, {most:g}] m (other units?)"
-        )
-        raise InvalidInput(f"{place}keypoints", round(size, 4), rule)
-    return np.asarray(there[away > STRAY_M])
 
 
 def keypoints_of(q: Vec, size: Vec, floor_z: float) -> Vec:

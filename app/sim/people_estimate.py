@@ -3,72 +3,120 @@
 A tracker numbers its people anew in every frame, and exchanges them when they cross. Every
 person seen is given to the track it continues, by where that track's key-points were expected;
 so exchanged people are put right, and whose number has changed is named (``people-swapped``).
-Who continues no track starts a free one. Each track degrades as ``person_estimate.py`` says.
+The nearest who continue no track start the free ones. Each track degrades as
+``person_estimate.py`` says.
+
+A frame may show more people than there are tracks. Then the nearest are followed: somebody who
+was already there in the frame before and is nearer to the robot's base than the farthest one
+followed, by more than ``NEARER_M``, takes that track (``replaced``). The margin is above the
+noise of a tracker, so that two people at one distance do not take turns. All others are named
+(:class:`Unfollowed`, ``people-dropped``). A skeleton that cannot stand in the cell's frame
+continues no track; the tracks not seen in that frame say ``foreign-frame``.
 """
 
-import itertools
 import math
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.optimize import linear_sum_assignment
 
 from app.errors import InvalidInput
 from app.sim.kernels.people import MAX_PEOPLE
-from app.sim.keypoints import N_KEYPOINTS, check_keypoints
-from app.sim.person_estimate import EstimatorSettings, PersonEstimate, PersonEstimator
+from app.sim.keypoint_check import Keypoints, check_keypoints
+from app.sim.keypoints import N_KEYPOINTS
+from app.sim.person_estimate import EstimatorSettings, Flag, PersonEstimate, PersonEstimator
 from app.sim.ports import Vec
 
-_NOBODY = np.full((N_KEYPOINTS, 3), np.nan)
+MAX_SKELETONS = 64
+"""Most people that a frame may show."""
+NEARER_M = 0.1
+"""By how much nearer than the farthest person followed somebody takes that track [m]."""
+_NOBODY = Keypoints(points=np.full((N_KEYPOINTS, 3), np.nan), confidences=np.zeros(N_KEYPOINTS))
 
 
-def match_people(expected: Sequence[Vec], seen: Sequence[Vec], gate: float) -> list[int | None]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Unfollowed:
+    """Somebody in a frame whom no track follows."""
+
+    index: int
+    """Place in the frame."""
+    reason: Literal["farther", "jump", "foreign-frame"]
+    """Farther away than those who are followed; not credible yet; in another frame."""
+    distance_m: float | None
+    """Horizontal distance of the nearest key-point to the robot's base [m]; None: unknown."""
+    detail: str | None = None
+    """Why this cannot be a person in the cell's frame; None where it can."""
+
+
+def match_people(
+    expected: Sequence[Vec], seen: Sequence[Vec], gates: Sequence[float]
+) -> list[int | None]:
     """Return for every track which of the people seen continues it, or None.
 
     The assignment with the most matches counts, of those the one with the least sum of median
-    distances; all are tried (4 people: at most 209).
+    distances.
 
     Args:
         expected: Key-points expected of each track [m], shape (25, 3) each, NaN unknown.
         seen: Key-points of each person seen [m], shape (25, 3) each, NaN missing.
-        gate: Median distance beyond which a person is no continuation [m].
+        gates: Median distance beyond which a person is no continuation of each track [m].
     """
-    cost = np.full((len(expected), len(seen)), np.inf)
-    for i, track in enumerate(expected):
-        for j, person in enumerate(seen):
-            away = np.linalg.norm(track - person, axis=1)
-            if np.isfinite(away).any():
-                distance = float(np.nanmedian(away))
-                cost[i, j] = distance if distance <= gate else np.inf
-    choices: list[int | None] = [*range(len(seen)), *[None] * len(expected)]
-    best: list[int | None] = [None] * len(expected)
-    least = (math.inf, math.inf)
-    for order in set(itertools.permutations(choices, len(expected))):
-        costs = [cost[i, j] for i, j in enumerate(order) if j is not None]
-        score = (-len(costs), float(sum(costs)))
-        if math.isfinite(score[1]) and score < least:
-            best, least = list(order), score
-    return best
+    cost = np.array([[_apart(track, one) for one in seen] for track in expected])
+    cost = cost.reshape(len(expected), len(seen))
+    allowed = cost <= np.array(gates)[:, None]
+    # Dearer than all that is allowed together: one match more is worth any distance.
+    cost[~allowed] = 1.0 + cost[allowed].sum()
+    matched: list[int | None] = [None] * len(expected)
+    for i, j in zip(*linear_sum_assignment(cost), strict=True):
+        if allowed[i, j]:
+            matched[int(i)] = int(j)
+    return matched
+
+
+def _apart(one: Vec, other: Vec) -> float:
+    """Return the median distance of key-points that both have [m]; inf where none is."""
+    away = np.linalg.norm(one - other, axis=1)
+    there = away[np.isfinite(away)]
+    return float(np.median(there)) if len(there) else np.inf
+
+
+def _from_base(points: Vec) -> float:
+    """Return the horizontal distance of the nearest key-point to the base [m]; inf: none."""
+    away = np.hypot(points[:, 0], points[:, 1])
+    return float(np.min(away, where=np.isfinite(away), initial=np.inf))
 
 
 class PeopleEstimator:
     """The estimates of several people whose frames come together, in any order.
 
     Args:
-        n_people: Most people at once, at most four.
+        n_people: Most people followed at once, at most four.
         size: The person's size [m], shape (12,) (``Cell.body``).
         settings: Noise, margins and times, the same for all.
+        floor_z: Height of the floor [m]; None: heights over it are not judged.
     """
 
     def __init__(
-        self, n_people: int, size: Vec, settings: EstimatorSettings | None = None
+        self,
+        n_people: int,
+        size: Vec,
+        settings: EstimatorSettings | None = None,
+        floor_z: float | None = None,
     ) -> None:
         if not 1 <= n_people <= MAX_PEOPLE:
             raise InvalidInput("n_people", n_people, f"must lie in [1, {MAX_PEOPLE}]")
-        self.settings = settings or EstimatorSettings()
-        self._tracks = [PersonEstimator(size, self.settings) for _ in range(n_people)]
+        self.settings, self._floor_z = settings or EstimatorSettings(), floor_z
+        self._tracks = [PersonEstimator(size, self.settings, floor_z) for _ in range(n_people)]
         self._order: list[int | None] = [None] * n_people
+        self._flags: list[tuple[Flag, ...]] = [()] * n_people
+        self._foreign: str | None = None
+        self._waiting: list[Vec] = []
+        self._waiting_since = 0.0
+        self.unfollowed: tuple[Unfollowed, ...] = ()
+        """Whom of the newest frame no track follows, nearest first."""
 
     def update(
         self,
@@ -81,51 +129,121 @@ class PeopleEstimator:
         Args:
             t: When the frame was taken [s].
             people: Key-points of each person seen [m], shape (25, 3) each, in the tracker's
-                order; nobody may be seen.
+                order; nobody may be seen, or more than are followed.
             confidences: Trust in them, shape (25,) each; 1 where None.
 
         Raises:
-            InvalidInput: As for one person, and more people than tracks; nothing is taken in.
+            InvalidInput: As for one person, and more than 64 people; nothing is taken in.
         """
         trust = [None] * len(people) if confidences is None else list(confidences)
-        if len(people) > len(self._tracks):
-            rule = f"must be at most {len(self._tracks)}"
-            raise InvalidInput("people", len(people), rule)
+        if len(people) > MAX_SKELETONS:
+            raise InvalidInput("people", len(people), f"must be at most {MAX_SKELETONS}")
         if len(trust) != len(people):
             raise InvalidInput("confidences", len(trust), "must be as many as people")
         least = self.settings.min_confidence
         frames = [
-            check_keypoints(points, trust[j], least, f"people[{j}].")
+            check_keypoints(points, trust[j], least, f"people[{j}].", self._floor_z)
             for j, points in enumerate(people)
         ]
-        order = self._continue(t, [frame.points for frame in frames])
-        estimates = []
+        seen = {j: frame.points for j, frame in enumerate(frames) if frame.seen.any()}
+        order, replaced = self._assign(t, seen)
         for i, (track, j) in enumerate(zip(self._tracks, order, strict=True)):
-            points = _NOBODY if j is None else frames[j].points
-            estimate = track.update(t, points, None if j is None else frames[j].confidences)
-            if j is not None and self._order[i] not in (None, j):
-                estimate = replace(estimate, flags=(*estimate.flags, "people-swapped"))
-            if j is not None:
-                estimate = replace(estimate, strays=frames[j].strays)
-            estimates.append(estimate)
-        self._order = [k if j is None else j for j, k in zip(order, self._order, strict=True)]
-        return tuple(estimates)
+            track.take_frame(t, _NOBODY if j is None else frames[j], fresh=i in replaced)
+        self._tell(t, frames, order, replaced)
+        return self.at(t)
 
-    def _continue(self, t: float, seen: list[Vec]) -> list[int | None]:
-        """Return who continues each track; every person seen gets one.
-
-        Who continues none starts a free track, or else shows up as a jump of a lost one.
-        """
+    def _assign(self, t: float, seen: Mapping[int, Vec]) -> tuple[list[int | None], set[int]]:
+        """Return who continues each track, and which tracks are taken over by others."""
         limits = self.settings.filter
         expected = [track.expected(t) for track in self._tracks]
-        order = match_people(expected, seen, limits.gate + limits.max_speed * limits.hold_s)
-        new = [j for j in range(len(seen)) if j not in order]
+        gates = [
+            limits.gate + limits.max_speed * min(track.unseen_s(t), limits.hold_s)
+            for track in self._tracks
+        ]
+        there = list(seen)
+        matched = match_people(expected, list(seen.values()), gates)
+        order = [None if k is None else there[k] for k in matched]
+        new = sorted(set(there) - set(order), key=lambda j: _from_base(seen[j]))
         unknown = [bool(np.isnan(points).all()) for points in expected]
-        for i in sorted(range(len(order)), key=lambda i: not unknown[i]):
-            if new and order[i] is None:
+        for i, free in enumerate(unknown):
+            if new and free:
                 order[i] = new.pop(0)
-        return order
+        replaced = set[int]()
+        away = [_from_base(expected[i] if j is None else seen[j]) for i, j in enumerate(order)]
+        for one in [j for j in new if self._was_waiting(t, seen[j])]:
+            far = int(np.argmax(away))
+            if _from_base(seen[one]) + NEARER_M < away[far]:
+                new.remove(one)
+                order[far], away[far] = one, _from_base(seen[one])
+                replaced.add(far)
+        for i, j in enumerate(order):  # The rest show up as jumps of those who are lost.
+            if new and j is None:
+                order[i] = new.pop(0)
+        return order, replaced
+
+    def _was_waiting(self, t: float, points: Vec) -> bool:
+        """Return whether somebody whom no track followed was here in the frame before."""
+        limits = self.settings.filter
+        since = min(max(t - self._waiting_since, 0.0), limits.hold_s)
+        gate = limits.gate + limits.max_speed * since
+        return any(_apart(points, before) <= gate for before in self._waiting)
+
+    def _tell(
+        self,
+        t: float,
+        frames: Sequence[Keypoints],
+        order: Sequence[int | None],
+        replaced: set[int],
+    ) -> None:
+        """Note whom no track follows, and what that and their numbers mean for each track."""
+        jumps = {
+            j
+            for track, j in zip(self._tracks, order, strict=True)
+            if j is not None and "jump" in track.frame_flags
+        }
+        unfollowed = [
+            Unfollowed(
+                index=j,
+                reason="foreign-frame"
+                if frame.implausible
+                else "jump"
+                if j in jumps
+                else "farther",
+                distance_m=None if frame.implausible else _from_base(frame.points),
+                detail=frame.implausible,
+            )
+            for j, frame in enumerate(frames)
+            if frame.implausible or (frame.seen.any() and (j in jumps or j not in order))
+        ]
+        self.unfollowed = tuple(sorted(unfollowed, key=lambda one: one.distance_m or np.inf))
+        self._waiting_since = t
+        self._waiting = [frames[one.index].points for one in unfollowed if not one.detail]
+        self._foreign = next((frame.implausible for frame in frames if frame.implausible), None)
+        dropped = any(one.reason == "farther" for one in unfollowed)
+        for i, (j, before) in enumerate(zip(order, self._order, strict=True)):
+            flags: list[Flag] = ["replaced"] if i in replaced else []
+            another = i in replaced or "restarted" in self._tracks[i].frame_flags
+            if not another and None not in (j, before) and before != j:
+                flags.append("people-swapped")
+            if dropped:
+                flags.append("people-dropped")
+            if self._foreign and j is None:
+                # Somebody is there, and nothing is known of where: as old as can be.
+                never = math.isinf(self._tracks[i].unseen_s(t))
+                flags += ["foreign-frame", "stale"] if never else ["foreign-frame"]
+            self._flags[i] = tuple(flags)
+        self._order = [k if j is None else j for j, k in zip(order, self._order, strict=True)]
 
     def at(self, t: float) -> tuple[PersonEstimate, ...]:
         """Return the estimates at ``t`` [s], not earlier than the last frame."""
-        return tuple(track.at(t) for track in self._tracks)
+        return tuple(
+            self._noted(track.at(t), flags)
+            for track, flags in zip(self._tracks, self._flags, strict=True)
+        )
+
+    def _noted(self, estimate: PersonEstimate, flags: tuple[Flag, ...]) -> PersonEstimate:
+        """Return the estimate of one track with what all tracks together tell."""
+        if not flags:
+            return estimate
+        foreign = self._foreign if "foreign-frame" in flags else None
+        return replace(estimate, flags=(*estimate.flags, *flags), implausible=foreign)

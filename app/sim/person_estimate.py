@@ -17,7 +17,12 @@ How it degrades, each step named in the estimate:
   ``hold_s`` without a credible frame the person is taken anew (``restarted``);
 - nothing seen for ``stale_s``: ``stale``; after ``hold_s`` the last cylinder grows at walking
   speed and the joints rest;
-- the model fits the key-points badly: ``misfit`` (a person of another size, a bad tracker).
+- the model fits the key-points badly: ``misfit`` (a person of another size, a bad tracker);
+  beyond ``unfit`` there are no joint angles (somebody kneels, sits or lies), and the cylinder
+  is all that is known;
+- the key-points are in another frame or unit: ``foreign-frame``; nothing is seen then;
+- arms and legs both contradict the way the person faces: ``mirrored`` (both exchanged, or the
+  whole frame is mirrored, which puts people where they are not).
 
 Several people: ``people_estimate.py``.
 """
@@ -32,7 +37,8 @@ from numpy.typing import ArrayLike, NDArray
 from app.errors import InvalidInput
 from app.sim import human
 from app.sim.kernels.body import N_SIZE
-from app.sim.keypoint_angles import joint_angles, joint_motion
+from app.sim.keypoint_angles import fit_errors, joint_angles, joint_motion
+from app.sim.keypoint_check import Keypoints, check_keypoints
 from app.sim.keypoint_cylinder import (
     CylinderSettings,
     SafetyCylinder,
@@ -45,8 +51,6 @@ from app.sim.keypoints import (
     GROUPS,
     N_KEYPOINTS,
     Group,
-    K,
-    check_keypoints,
     faces_backward,
     swap_sides,
     swapped_against,
@@ -59,6 +63,10 @@ Flag = Literal[
     "legs-swapped",
     "sides-restarted",
     "people-swapped",
+    "people-dropped",
+    "replaced",
+    "foreign-frame",
+    "mirrored",
     "outliers",
     "jump",
     "restarted",
@@ -67,8 +75,6 @@ Flag = Literal[
 ]
 _SWAPPED: dict[Group, Flag] = {"arms": "arms-swapped", "legs": "legs-swapped"}
 """Groups whose sides are judged; eyes and ears are too near each other, and decide nothing."""
-_FITTED = ("neck", *(f"{part}_{s}" for part in ("shoulder", "elbow", "wrist") for s in "rl"))
-"""Key-points that are joints of the model, besides the pelvis, whose height is given."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,11 +93,14 @@ class EstimatorSettings:
     """Time for which sides are exchanged back before the group starts anew [s]."""
     misfit: float = 0.10
     """Median distance of the model's joints from the key-points that is named [m]."""
+    unfit: float = 0.25
+    """Misfit of the trunk beyond which there are no joint angles [m]; between the 1st and the
+    99th percentile of stature, taken for the median, it is below 0.2 m."""
     qd_max: float = 8.0
     """Bound of estimated joint speeds [rad/s, m/s]; faster is noise near a singularity."""
 
     def __post_init__(self) -> None:
-        for name in ("min_confidence", "stale_s", "swap_s", "misfit", "qd_max"):
+        for name in ("min_confidence", "stale_s", "swap_s", "misfit", "unfit", "qd_max"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
                 raise InvalidInput(name, value, "must be finite and not negative")
@@ -108,7 +117,8 @@ class PersonEstimate:
     cylinder: SafetyCylinder | None
     """Safety cylinder of METHOD 2.8; None where nothing was ever seen."""
     person: Person | None
-    """Joint angles and speeds; None until pelvis and trunk were seen together once."""
+    """Joint angles and speeds; None until pelvis and trunk were seen together once, and where
+    the model does not fit the key-points."""
     held: tuple[str, ...]
     """Joints that keep their last angle because their key-points are missing."""
     missing: tuple[str, ...]
@@ -119,6 +129,10 @@ class PersonEstimate:
     """Median distance of the model's joints from the filtered key-points [m]; NaN unknown."""
     flags: tuple[Flag, ...]
     """How the estimate is degraded; empty where it is not."""
+    unusable: tuple[str, ...] = ()
+    """Key-points of the last frame whose numbers cannot be used."""
+    implausible: str | None = None
+    """Why nobody can stand in this frame as the last key-points say; None: somebody can."""
 
     @property
     def stale(self) -> bool:
@@ -132,14 +146,20 @@ class PersonEstimator:
     Args:
         size: The person's size [m], shape (12,) (``Cell.body``).
         settings: Noise, margins and times.
+        floor_z: Height of the floor [m]; None: heights over it are not judged.
     """
 
-    def __init__(self, size: Vec, settings: EstimatorSettings | None = None) -> None:
+    def __init__(
+        self,
+        size: Vec,
+        settings: EstimatorSettings | None = None,
+        floor_z: float | None = None,
+    ) -> None:
         if np.shape(size) != (N_SIZE,) or not np.isfinite(size).all():
             rule = f"must be {N_SIZE} finite numbers"
             raise InvalidInput("size", np.asarray(size).tolist(), rule)
         self.settings = settings or EstimatorSettings()
-        self._size = size
+        self._size, self._floor_z = size, floor_z
         self._points = PointFilter(N_KEYPOINTS, self.settings.filter)
         self._center = PointFilter(1, self.settings.filter)
         self._t, self._seen_at = -math.inf, -math.inf
@@ -147,7 +167,8 @@ class PersonEstimator:
         self._q: Vec | None = None
         self._last_points: Vec | None = None
         self._flags: tuple[Flag, ...] = ()
-        self._strays: tuple[str, ...] = ()
+        self._frame: Keypoints | None = None
+        self._unfit = False
 
     def update(
         self, t: float, keypoints: ArrayLike, confidences: ArrayLike | None = None
@@ -170,11 +191,32 @@ class PersonEstimator:
             InvalidInput: See :func:`~app.sim.keypoints.check_keypoints`; or ``t`` is not later
                 than the last. The estimate is then as if the frame had not come.
         """
+        least = self.settings.min_confidence
+        self.take_frame(
+            t, check_keypoints(keypoints, confidences, least, floor_z=self._floor_z)
+        )
+
+    def take_frame(self, t: float, frame: Keypoints, fresh: bool = False) -> None:
+        """Take one checked frame in; see :meth:`take`.
+
+        Args:
+            t: When the frame was taken [s]; later than the one before.
+            frame: The key-points.
+            fresh: Whether they are another person's than those before, who is forgotten.
+
+        Raises:
+            InvalidInput: ``t`` is not later than the last. The estimate is then as if the
+                frame had not come.
+        """
         if not math.isfinite(t) or t <= self._t:
             raise InvalidInput("t", t, f"must be finite and later than {self._t:g} s")
-        frame = check_keypoints(keypoints, confidences, self.settings.min_confidence)
-        flags: list[Flag] = []
-        points, trust = self._put_sides_right(t, frame.points, frame.confidences, flags)
+        if fresh:
+            self._forget()
+        flags: list[Flag] = [] if frame.implausible is None else ["foreign-frame"]
+        if all(faces_backward(frame.points, group) for group in _SWAPPED):
+            flags.append("mirrored")
+        given = frame.points.copy(), frame.confidences.copy()
+        points, trust = self._put_sides_right(t, *given, flags)
         refused = self._points.refuse(t, points)
         n_refused = int(refused.sum())
         n_judged = int((self._points.known(t) & (trust > 0.0)).sum())
@@ -189,8 +231,16 @@ class PersonEstimator:
                 flags.append("restarted")
             self._seen_at = t
         self._points.update(t, points, trust)
-        self._t, self._flags, self._strays = t, tuple(flags), frame.strays
+        self._t, self._flags, self._frame = t, tuple(flags), frame
         self._remember(t)
+
+    def _forget(self) -> None:
+        """Know nothing of anybody, as at the start."""
+        self._points.forget(list(range(N_KEYPOINTS)))
+        self._center.forget([0])
+        self._seen_at, self._unfit = -math.inf, False
+        self._swapped_at.clear()
+        self._q = self._last_points = None
 
     def _put_sides_right(
         self, t: float, points: Vec, trust: Vec, flags: list[Flag]
@@ -230,12 +280,22 @@ class PersonEstimator:
         q, held = joint_angles(points, before, self._size)
         if self._q is not None or not held[:5].any():
             self._q = q
+            self._unfit = fit_errors(q, self._size, points)[1] > self.settings.unfit
         corners = bounding_box(points[known])
         center = 0.5 * (corners[:1] + corners[7:])
         if self._center.refuse(t, center).any():
             self._center.forget([0])
         self._center.update(t, center, np.ones(1))
         self._last_points = points
+
+    @property
+    def frame_flags(self) -> tuple[Flag, ...]:
+        """What the last frame was flagged with."""
+        return self._flags
+
+    def unseen_s(self, t: float) -> float:
+        """Return for how long nothing credible was seen [s]; inf: never."""
+        return max(0.0, t - self._seen_at)
 
     def expected(self, t: float) -> Vec:
         """Return where the key-points are expected at ``t`` [m], (25, 3), NaN where unknown."""
@@ -266,12 +326,14 @@ class PersonEstimator:
             t=t,
             age_s=age,
             cylinder=self._cylinder_at(t, points, age),
-            person=person,
+            person=None if self._unfit else person,
             held=tuple(human.JOINT_NAMES[int(j)] for j in np.flatnonzero(held)),
             missing=tuple(BODY_25[int(k)] for k in np.flatnonzero(~known)),
-            strays=self._strays,
+            strays=() if self._frame is None else self._frame.strays,
             misfit_m=misfit,
             flags=tuple(flags),
+            unusable=() if self._frame is None else self._frame.unusable,
+            implausible=None if self._frame is None else self._frame.implausible,
         )
 
     def person_at(self, t: float) -> Person | None:
@@ -290,11 +352,7 @@ class PersonEstimator:
         if self._q is None:
             return None, np.ones(18, dtype=np.bool_), math.nan
         q, qd, held = joint_motion(points, speeds, self._q, self._size, self.settings.qd_max)
-        joints = human.joint_points(q, self._size)
-        away = [float(np.linalg.norm(points[K[name]] - joints[name])) for name in _FITTED]
-        there = [d for d in away if math.isfinite(d)]
-        person = Person(q=q, qd=qd, size=self._size)
-        return person, held, float(np.median(there)) if there else math.nan
+        return Person(q=q, qd=qd, size=self._size), held, fit_errors(q, self._size, points)[0]
 
     def _cylinder_at(self, t: float, points: Vec, age: float) -> SafetyCylinder | None:
         """Return the cylinder at ``t``: around what is known, else the last one, grown."""

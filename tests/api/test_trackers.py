@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
+from app.sim.keypoints import K
 from tests.api.test_task_selection import URL, refused
 from tests.sim.tracked_person import CELL, RATE_HZ, seen, work
 
@@ -133,13 +134,7 @@ def test_somebody_who_is_not_followed_is_refused(
     ("body", "field", "rule"),
     [
         (frame(0.3, points(FIRST[1][0])), "t", "later than"),
-        (
-            frame(9.0, (1000.0 * seen(FIRST[1][0])).tolist()),
-            "people[0].keypoints",
-            "millimetres",
-        ),
-        (frame(9.0, *[points(FIRST[1][0])] * 3), "people", "at most 2"),
-        (frame(9.0, *[points(FIRST[1][0])] * 5), "people", "at most 4"),
+        (frame(9.0, *[points(FIRST[1][0])] * 65), "people", "at most 64"),
         (frame(9.0, points(FIRST[1][0])[:20]), "people[0].keypoints", "at least 25"),
         ({"people": []}, "t", "is required"),
         ({"t": 1e300, "people": []}, "t", "less than"),
@@ -153,6 +148,49 @@ def test_a_frame_that_cannot_be_is_refused_and_leaves_no_trace(
     assert answer.status_code == 422
     assert answer.json()["field"] == field and rule in answer.json()["rule"]
     assert client.get(tracker).json()["people"] == before["people"]
+
+
+def test_more_people_than_are_followed_cost_nobody_anything(
+    client: TestClient, tracker: str
+) -> None:
+    fed(client, tracker, 5)
+    near = points(FIRST[1][5]), points(SECOND[1][5], APART)
+    far = points(FIRST[1][5], [0.0, 4.0, 0.0]), points(FIRST[1][5], [0.0, 2.0, 0.0])
+    sent = frame(5 / RATE_HZ, far[0], near[0], far[1], near[1])
+    answer = client.post(f"{tracker}/frames", json=sent).json()
+    for k, person in enumerate(answer["people"]):
+        assert person["age_s"] == 0.0 and not person["stale"]
+        assert "people-dropped" in person["flags"]
+        true = near[k][K["mid_hip"]][0]
+        assert person["q"][0] == pytest.approx(true, abs=0.05)
+    assert [(one["index"], one["reason"]) for one in answer["unfollowed"]] == [
+        (2, "farther"),
+        (0, "farther"),
+    ]
+    assert client.get(tracker).json()["unfollowed"] == answer["unfollowed"]
+
+
+def test_somebody_in_another_frame_is_told_and_others_are_followed(
+    client: TestClient, tracker: str
+) -> None:
+    fed(client, tracker, 5)
+    wrong = (1000.0 * seen(FIRST[1][5])).tolist()
+    sent = frame(5 / RATE_HZ, wrong, points(SECOND[1][5], APART))
+    lost, followed = client.post(f"{tracker}/frames", json=sent).json()["people"]
+    assert lost["flags"] == ["foreign-frame"] and lost["age_s"] > 0.0
+    assert "millimetres" in lost["implausible"]
+    assert followed["flags"] == [] and followed["age_s"] == 0.0
+
+
+def test_frames_of_another_frame_alone_never_count_as_seen(
+    client: TestClient, tracker: str
+) -> None:
+    for k in range(20):
+        sent = frame(k / RATE_HZ, points(FIRST[1][k], [0.0, 0.0, 2.0]))
+        person = client.post(f"{tracker}/frames", json=sent).json()["people"][0]
+        assert person["stale"] and person["age_s"] is None and person["q"] is None
+        assert {"never-seen", "foreign-frame"} <= set(person["flags"])
+        assert "over the floor" in person["implausible"]
 
 
 def test_a_deleted_tracker_is_gone(client: TestClient) -> None:

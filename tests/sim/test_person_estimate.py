@@ -12,6 +12,7 @@ from app.sim.person_estimate import (
     PersonEstimator,
 )
 from app.sim.tracker import TrackerSettings
+from tests.sim.postures import POSTURES, posture
 from tests.sim.tracked_person import CELL, seen, work
 from tests.sim.tracker_errors import errors
 
@@ -198,8 +199,50 @@ def test_one_keypoint_that_leaps_is_an_outlier_and_moves_nothing() -> None:
 def test_a_person_the_model_does_not_fit_is_named() -> None:
     points = seen(human.rest_posture(0.0, 1.2, -1.5))
     root = points[K["mid_hip"]]
-    estimate = PersonEstimator(CELL.body).update(0.0, root + 1.6 * (points - root))
+    estimate = PersonEstimator(CELL.body).update(0.0, root + 1.55 * (points - root))
     assert "misfit" in estimate.flags and estimate.misfit_m > 0.1
+
+
+@pytest.mark.parametrize("name", POSTURES)
+def test_joint_angles_are_given_only_where_the_model_fits(name: str) -> None:
+    points = posture(name, CELL.floor_z)
+    estimator = PersonEstimator(CELL.body, floor_z=CELL.floor_z)
+    estimate = estimator.update(0.0, points)
+    assert estimate.cylinder is not None and estimate.cylinder.contains(points)
+    assert "foreign-frame" not in estimate.flags
+    if estimate.person is None:
+        later = estimator.at(1.0)  # nothing is known any more, and the last fit was bad
+        assert later.stale and later.person is None and later.cylinder is not None
+    else:
+        joints = human.joint_points(estimate.person.q, CELL.body)
+        near = np.linalg.norm(joints["neck"] - points[K["neck"]])
+        assert near < 1.1 * estimator.settings.unfit
+
+
+def test_people_who_stand_are_given_joint_angles_and_those_who_lie_are_not() -> None:
+    for name, fits in (("standing", True), ("bent by 90 degrees", True), ("kneeling", False)):
+        estimator = PersonEstimator(CELL.body, floor_z=CELL.floor_z)
+        estimate = estimator.update(0.0, posture(name, CELL.floor_z))
+        assert (estimate.person is not None) is fits
+
+
+def test_a_frame_in_another_frame_is_unseen_and_told() -> None:
+    estimator, q = tracked(30)
+    estimate = estimator.update(30 * DT, 1000.0 * seen(q[30]))
+    assert estimate.flags == ("foreign-frame",) and "millimetres" in str(estimate.implausible)
+    assert estimate.age_s == pytest.approx(DT)
+    for k in range(31, 40):
+        estimate = estimator.update(k * DT, 1000.0 * seen(q[k]))
+    assert estimate.stale and estimate.age_s == pytest.approx(10 * DT)
+    assert estimator.update(40 * DT, seen(q[40])).flags == ()
+
+
+def test_a_mirrored_person_is_named() -> None:
+    points = seen(human.rest_posture(0.0, 1.2, -1.5))
+    for flipped in (points * [-1.0, 1.0, 1.0], points * [1.0, -1.0, 1.0]):
+        assert "mirrored" in PersonEstimator(CELL.body).update(0.0, flipped).flags
+    assert "mirrored" not in PersonEstimator(CELL.body).update(0.0, -points).flags
+    assert PersonEstimator(CELL.body).update(0.0, points).flags == ()
 
 
 @pytest.mark.parametrize("t", [np.nan, np.inf, 29 * DT, 0.0])
@@ -211,7 +254,7 @@ def test_a_frame_without_a_later_time_is_refused(t: float) -> None:
 
 def test_a_refused_frame_leaves_no_trace() -> None:
     (one, q), (other, _) = tracked(30), tracked(30)
-    for wrong in (1000.0 * seen(q[30]), np.zeros((3, 25)), np.full((25, 3), np.inf)):
+    for wrong in (np.zeros((3, 25)), np.zeros((24, 3)), "nobody"):
         with pytest.raises(InvalidInput):
             one.update(30 * DT, wrong)
     a, b = one.update(31 * DT, seen(q[31])), other.update(31 * DT, seen(q[31]))
@@ -229,21 +272,19 @@ def test_the_past_cannot_be_asked_for() -> None:
 
 def test_any_finite_frames_give_a_finite_estimate() -> None:
     rng, estimator, taken = np.random.default_rng(8), PersonEstimator(CELL.body), 0
+    q = human.rest_posture(0.0, 1.2, -1.5)
     for k in range(200):
-        points = rng.uniform(-0.9, 0.9, (25, 3))
+        points = seen(q) + rng.uniform(-0.3, 0.3, (25, 3))
         points[rng.random(25) < rng.random()] = np.nan
-        try:
-            estimate = estimator.update(k * DT, points)
-        except InvalidInput as error:
-            assert error.field == "keypoints"
-            continue
-        taken += 1
+        points[rng.random((25, 3)) < 0.1 * rng.random()] = rng.choice([np.nan, np.inf, 1e300])
+        estimate = estimator.update(k * DT, points)
+        taken += bool(np.isfinite(estimate.age_s) and estimate.age_s < DT)
         if estimate.person is not None:
             assert (
                 np.isfinite(estimate.person.q).all() and np.isfinite(estimate.person.qd).all()
             )
         assert estimate.cylinder is None or np.isfinite(estimate.cylinder.radius)
-    assert taken > 150
+    assert taken > 100
 
 
 def test_settings_without_sense_are_refused_by_name() -> None:

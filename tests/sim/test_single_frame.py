@@ -5,9 +5,10 @@ import pytest
 
 from app.errors import InvalidInput
 from app.sim import human
-from app.sim.keypoints import K, keypoints_of, swap_sides
+from app.sim.keypoints import BODY_25, K, keypoints_of, swap_sides
 from app.sim.seen_people import as_person
 from app.sim.single_frame import estimate_once
+from tests.sim.postures import FRAMES, POSTURES, posture
 from tests.sim.tracked_person import CELL, seen, work
 
 Q, QD = (values[100] for values in work(1, 12.0)[1:])
@@ -66,18 +67,50 @@ def test_without_a_trunk_the_person_is_as_good_as_the_cylinder() -> None:
 
 
 @pytest.mark.parametrize(
-    ("points", "rule"),
+    ("points", "flag"),
     [
-        (np.full((25, 3), np.nan), "at least one"),
-        (np.zeros((25, 3)), "at least one"),
-        (1000.0 * POINTS, "millimetres"),
-        (POINTS[:24], "shape"),
+        (np.full((25, 3), np.nan), "never-seen"),
+        (np.zeros((25, 3)), "never-seen"),
+        (1000.0 * POINTS, "foreign-frame"),
+        (POINTS @ FRAMES["a camera's, y down and z ahead"].T, "foreign-frame"),
+        (POINTS + [0.0, 0.0, 2.0], "foreign-frame"),
     ],
 )
-def test_what_shows_nobody_is_refused_with_its_place(points: np.ndarray, rule: str) -> None:
-    with pytest.raises(InvalidInput, match=rule) as refused:
-        estimate_once(points, CELL.body, place="people[2].")
+def test_somebody_of_unknown_place_may_be_anywhere(points: np.ndarray, flag: str) -> None:
+    velocities = np.ones((25, 3))
+    estimate = estimate_once(points, CELL.body, velocities=velocities, floor_z=CELL.floor_z)
+    assert flag in estimate.flags and estimate.person is None
+    assert (estimate.implausible is not None) is (flag == "foreign-frame")
+    person = as_person(estimate)
+    assert person is not None and person.cylinder is not None
+    x, y, r = person.cylinder
+    assert r - np.hypot(x, y) > 2.0  # the robot is inside, wherever it reaches
+
+
+def test_another_number_of_points_is_refused_with_its_place() -> None:
+    with pytest.raises(InvalidInput, match="shape") as refused:
+        estimate_once(POINTS[:24], CELL.body, place="people[2].")
     assert refused.value.field == "people[2].keypoints"
+
+
+def test_velocities_that_cannot_be_are_named_and_count_as_zero() -> None:
+    wrong, unknown = velocities(), velocities()
+    for k, value in enumerate(([np.inf] * 3, [1e6, 0.0, 0.0], [np.nan, 1.0, 0.0])):
+        wrong[k], unknown[k] = value, np.nan
+    named = tuple(f"velocity of {name}" for name in BODY_25[:3])
+    estimate = estimate_once(POINTS, CELL.body, velocities=wrong)
+    same = estimate_once(POINTS, CELL.body, velocities=unknown)
+    assert estimate.unusable == named and same.unusable == ()
+    assert estimate.person is not None and same.person is not None
+    np.testing.assert_array_equal(estimate.person.qd, same.person.qd)
+
+
+@pytest.mark.parametrize("name", POSTURES)
+def test_a_persons_cylinder_holds_every_posture(name: str) -> None:
+    points = posture(name, CELL.floor_z)
+    estimate = estimate_once(points, CELL.body, floor_z=CELL.floor_z)
+    assert estimate.cylinder is not None and estimate.cylinder.contains(points)
+    assert estimate.implausible is None and estimate.cylinder.radius < 2.0
 
 
 def test_velocities_of_another_shape_are_refused() -> None:

@@ -4,13 +4,15 @@ An entry is told apart by its members: ``q`` (joint angles), ``keypoints`` (BODY
 cylinder) or ``tracker`` (somebody whom a tracker of ``/v1/trackers`` follows).
 """
 
+import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import Discriminator, Field, Tag
+from pydantic import BeforeValidator, Discriminator, Field, Tag
+from pydantic_core import PydanticCustomError
 
-from app.api.schemas.numbers import Answer, Body, Finite, Vector3, Vector18
+from app.api.schemas.numbers import Answer, Body, Finite, Vector18
 from app.errors import InvalidInput
 from app.sim import human
 from app.sim.body_size import NAMES, PERCENTILES, percentile_body
@@ -28,10 +30,54 @@ Speed = Annotated[float, Field(ge=-FASTEST, le=FASTEST)]
 Place = Annotated[float, Field(ge=-FARTHEST_M, le=FARTHEST_M)]
 Radius = Annotated[float, Field(ge=0.0, le=FARTHEST_M)]
 Walk = Annotated[float, Field(ge=0.0, le=FASTEST)]
-Keypoint = Annotated[list[Finite], Field(min_length=3, max_length=4)] | None
-Velocity = Vector3 | None
+Coordinate = Annotated[float, Field(allow_inf_nan=True)] | None
+Keypoint = Annotated[list[Coordinate], Field(max_length=8)] | None
 Lengths = Annotated[list[Finite], Field(min_length=N_SIZE, max_length=N_SIZE)]
 ORDER = ", ".join(BODY_25)
+UNUSABLE = (
+    "key-points dropped: only some coordinates, infinite, beyond 100 m, or a confidence "
+    "outside [0, 1]"
+)
+IMPLAUSIBLE = (
+    "why nobody can stand in this frame as the key-points say (`foreign-frame`): another frame "
+    "or unit; null where somebody can"
+)
+
+
+def _in_order(value: object) -> object:
+    """Return key-points given by name as a list in the order of BODY_25, None where absent."""
+    if not isinstance(value, Mapping):
+        return value
+    unknown = [name for name in value if name not in BODY_25]
+    if unknown:
+        text = "has the name {name}; must be one of {names}"
+        given = {"name": str(unknown[0])[:64], "names": ORDER}
+        raise PydanticCustomError("keypoint_name", text, given)
+    return [value.get(name) for name in BODY_25]
+
+
+OfKeypoints = Annotated[
+    list[Keypoint],
+    Field(min_length=N_KEYPOINTS, max_length=N_KEYPOINTS),
+    BeforeValidator(_in_order),
+]
+"""A list in the order of BODY_25, or a mapping of some of its names."""
+
+
+def _rows(values: list[Keypoint], width: int) -> Vec:
+    """Return rows of numbers, shape (25, width), NaN where there is none.
+
+    A row of another length than 3 to ``width`` has lost its order: its coordinates become
+    infinite, which no tracker means by missing.
+    """
+    rows = np.full((N_KEYPOINTS, width), np.nan)
+    for k, value in enumerate(values):
+        numbers = [np.nan if number is None else number for number in value or ()]
+        if 3 <= len(numbers) <= width:
+            rows[k, : len(numbers)] = numbers
+        elif not np.isnan(numbers).all():
+            rows[k, :3] = np.inf
+    return rows
 
 
 class BodyPercentiles(Body):
@@ -82,51 +128,36 @@ class PersonState(Body):
 class KeypointsSeen(Body):
     """One person in one frame of a tracker of key-points."""
 
-    keypoints: Annotated[
-        list[Keypoint], Field(min_length=N_KEYPOINTS, max_length=N_KEYPOINTS)
-    ] = Field(
+    keypoints: OfKeypoints = Field(
         description="[x, y, z] in m, in the robot's base frame, or [x, y, z, confidence] with "
-        f"a confidence in [0, 1]; null where missing. In the order of BODY_25: {ORDER}"
+        "a confidence in [0, 1]. Missing: null, [], null or NaN in all coordinates, 0 or -1 in "
+        "all three, confidence 0. A point that cannot be used otherwise is dropped and named. "
+        f"In the order of BODY_25: {ORDER}; or a mapping of these names, absent where missing"
     )
 
-    def points(self, place: str) -> tuple[Vec, Vec]:
-        """Return key-points [m], (25, 3), NaN where missing, and confidences, (25,).
-
-        Args:
-            place: Path of this person, for errors.
-
-        Raises:
-            InvalidInput: A confidence outside [0, 1].
-        """
-        points, trust = np.full((N_KEYPOINTS, 3), np.nan), np.zeros(N_KEYPOINTS)
-        for k, point in enumerate(self.keypoints):
-            if point is None:
-                continue
-            points[k], trust[k] = point[:3], point[3] if len(point) == 4 else 1.0
-            if not 0.0 <= trust[k] <= 1.0:
-                field = f"{place}keypoints[{k}][3]"
-                raise InvalidInput(field, float(trust[k]), "is a confidence, in [0, 1]")
-        return points, trust
+    def points(self) -> tuple[Vec, Vec]:
+        """Return key-points [m], (25, 3), NaN where missing, and confidences, (25,)."""
+        rows = _rows(self.keypoints, 4)
+        told = np.array([value is not None and len(value) == 4 for value in self.keypoints])
+        return rows[:, :3], np.where(told, rows[:, 3], 1.0)
 
 
 class KeypointsPerson(KeypointsSeen):
     """One person by the key-points of a single frame; nothing is remembered."""
 
-    velocities: (
-        Annotated[list[Velocity], Field(min_length=N_KEYPOINTS, max_length=N_KEYPOINTS)] | None
-    ) = Field(
+    velocities: OfKeypoints | None = Field(
         None,
-        description="velocities of the key-points [m/s], null where unknown; taken as zero",
+        description="velocities of the key-points [m/s], in the same form; null, [] or NaN "
+        "where unknown, taken as zero",
     )
     body: BodyPercentiles | None = Field(
         None, description="the person's size; the cell's person if null"
     )
 
     def speeds(self) -> Vec | None:
-        """Return the velocities [m/s], (25, 3), NaN where unknown; None where none is given."""
-        if self.velocities is None:
-            return None
-        return np.array([[np.nan] * 3 if v is None else v for v in self.velocities])
+        """Return the velocities [m/s], (25, 3), NaN where unknown; None where none is known."""
+        rows = None if self.velocities is None else _rows(self.velocities, 3)
+        return None if rows is None or np.isnan(rows).all() else rows
 
 
 class CylinderPerson(Body):
@@ -220,6 +251,8 @@ class PersonUse(Answer):
     held: list[str] = Field(description="joints taken at rest or as before: nothing shows them")
     missing: list[str] = Field(description="key-points that are not known")
     strays: list[str] = Field(description="key-points dropped: too far from all others")
+    unusable: list[str] = Field(description=UNUSABLE)
+    implausible: str | None = Field(description=IMPLAUSIBLE)
     age_s: float | None = Field(
         description="time since the newest credible key-point [s]; null without key-points"
     )
@@ -243,5 +276,7 @@ class PersonUse(Answer):
             held=[] if estimate is None else list(estimate.held),
             missing=[] if estimate is None else list(estimate.missing),
             strays=[] if estimate is None else list(estimate.strays),
-            age_s=None if estimate is None else estimate.age_s,
+            unusable=[] if estimate is None else list(estimate.unusable),
+            implausible=None if estimate is None else estimate.implausible,
+            age_s=estimate.age_s if estimate and math.isfinite(estimate.age_s) else None,
         )

@@ -1,14 +1,16 @@
 """Trackers of key-points: frames in, estimates of people out."""
 
-from typing import Annotated, Self
+from dataclasses import asdict
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import Field
 
 from app.api.schemas.numbers import Answer, Body
-from app.api.schemas.people import BodyPercentiles, KeypointsSeen
+from app.api.schemas.people import IMPLAUSIBLE, UNUSABLE, BodyPercentiles, KeypointsSeen
 from app.api.tracker_sessions import IDLE_S, TrackerSession
 from app.sim.keypoint_cylinder import SafetyCylinder
+from app.sim.people_estimate import MAX_SKELETONS, Unfollowed
 from app.sim.person_estimate import PersonEstimate
 
 Time = Annotated[float, Field(ge=-1e10, le=1e10)]
@@ -58,7 +60,9 @@ class FrameCreate(Body):
 
     t: Time = Field(description="when the frame was taken, on the tracker's clock, rising [s]")
     people: list[KeypointsSeen] = Field(
-        max_length=4, description="whom the frame shows; nobody: an empty list"
+        max_length=MAX_SKELETONS,
+        description="whom the frame shows; nobody: an empty list; of more than the tracker "
+        "follows, the nearest to the robot's base are followed",
     )
 
 
@@ -87,7 +91,9 @@ class EstimatePublic(Answer):
     """What is known of one person."""
 
     person: int = Field(description="which of the tracker's people")
-    q: list[float] | None = Field(description="joint positions [m, rad]; null: not known yet")
+    q: list[float] | None = Field(
+        description="joint positions [m, rad]; null: not known yet, or the model does not fit"
+    )
     qd: list[float] | None = Field(description="joint speeds [m/s, rad/s]")
     cylinder: CylinderPublic | None = Field(description="null where nobody was ever seen")
     age_s: float | None = Field(
@@ -98,6 +104,8 @@ class EstimatePublic(Answer):
     held: list[str] = Field(description="joints that keep their angle: nothing shows them")
     missing: list[str] = Field(description="key-points unseen for longer than the hold time")
     strays: list[str] = Field(description="key-points dropped: too far from all others")
+    unusable: list[str] = Field(description=UNUSABLE)
+    implausible: str | None = Field(description=IMPLAUSIBLE)
     misfit_m: float | None = Field(
         description="median distance of the model's joints from the key-points [m]"
     )
@@ -117,8 +125,25 @@ class EstimatePublic(Answer):
             held=list(estimate.held),
             missing=list(estimate.missing),
             strays=list(estimate.strays),
+            unusable=list(estimate.unusable),
+            implausible=estimate.implausible,
             misfit_m=estimate.misfit_m if np.isfinite(estimate.misfit_m) else None,
         )
+
+
+class UnfollowedPublic(Answer):
+    """Somebody in the newest frame whom the tracker does not follow."""
+
+    index: int = Field(description="place in the frame's `people`")
+    reason: Literal["farther", "jump", "foreign-frame"] = Field(
+        description="farther away than those who are followed; not credible yet, as in `jump`; "
+        "another frame or unit"
+    )
+    distance_m: float | None = Field(
+        description="horizontal distance of the nearest key-point to the robot's base [m]; "
+        "null: unknown"
+    )
+    detail: str | None = Field(description=IMPLAUSIBLE)
 
 
 class EstimatesPublic(Answer):
@@ -127,9 +152,19 @@ class EstimatesPublic(Answer):
     tracker: str
     t: float = Field(description="time the estimates are for [s]")
     people: list[EstimatePublic]
+    unfollowed: list[UnfollowedPublic] = Field(
+        description="whom of the newest frame the tracker does not follow, nearest first"
+    )
 
     @classmethod
-    def from_domain(cls, tracker: str, t: float, estimates: tuple[PersonEstimate, ...]) -> Self:
-        """Make it from the estimates of all people."""
+    def from_domain(
+        cls,
+        tracker: str,
+        t: float,
+        estimates: tuple[PersonEstimate, ...],
+        unfollowed: tuple[Unfollowed, ...] = (),
+    ) -> Self:
+        """Make it from the estimates of all people, and whom of the frame nobody follows."""
         people = [EstimatePublic.from_domain(i, one) for i, one in enumerate(estimates)]
-        return cls(tracker=tracker, t=t, people=people)
+        rest = [UnfollowedPublic(**asdict(one)) for one in unfollowed]
+        return cls(tracker=tracker, t=t, people=people, unfollowed=rest)
