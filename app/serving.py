@@ -41,16 +41,20 @@ class Server(uvicorn.Server):
         super().handle_exit(sig, frame)
 
 
-def server_of(app: FastAPI, tell: Callable[[], Awaitable[None]] | None = None) -> Server:
+def server_of(
+    app: FastAPI, tell: Callable[[], Awaitable[None]] | None = None, *, root_path: str = ""
+) -> Server:
     """Return the server that runs an application.
 
     Args:
         app: The application.
         tell: Called once a second.
+        root_path: Path under which a reverse proxy shows the service and which it removes.
     """
     config = uvicorn.Config(
         app,
         http=LimitedHttp,
+        root_path=root_path,
         log_config=None,
         access_log=False,
         ws_per_message_deflate=False,
@@ -87,4 +91,4 @@ def serve(settings: Settings, sock: socket.socket, say: Say) -> None:
         for line in told:
             say(line)
 
-    server_of(app, tell).run(sockets=[sock])
+    server_of(app, tell, root_path=settings.root_path).run(sockets=[sock])

@@ -32,6 +32,12 @@ class Settings(BaseSettings):
         None, description="Bearer token; required for any address but loopback."
     )
 
+    root_path: str = Field(
+        "",
+        pattern=r"^(/[A-Za-z0-9._~-]+)*$",
+        description="Path that a reverse proxy removes from requests, such as `/tandem`.",
+    )
+
     @property
     def is_loopback(self) -> bool:
         """Whether only programs on this machine can reach the server."""

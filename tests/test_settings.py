@@ -8,7 +8,7 @@ from app.settings import Settings, check_access, load_settings
 
 @pytest.fixture(autouse=True)
 def no_settings(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("HOST", "PORT", "DATA", "DATABASE_URL", "TOKEN"):
+    for name in ("HOST", "PORT", "DATA", "DATABASE_URL", "TOKEN", "ROOT_PATH"):
         monkeypatch.delenv(f"TANDEM_{name}", raising=False)
 
 
@@ -55,6 +55,14 @@ def test_short_token_is_refused_and_not_shown() -> None:
     with pytest.raises(InvalidInput, match="at least 16") as refused:
         check_access(Settings(token="hunter2"))
     assert "hunter2" not in str(refused.value)
+
+
+@pytest.mark.parametrize("path", ["", "/tandem", "/robots/cell-1"])
+def test_root_path_starts_with_a_slash_and_ends_without(path: str) -> None:
+    assert load_settings(root_path=path).root_path == path
+    for wrong in ("tandem", "/tandem/", "//host", "/a b", "/a?b", '/"x', "/../a\n"):
+        with pytest.raises(InvalidInput, match="TANDEM_ROOT_PATH"):
+            load_settings(root_path=wrong)
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "127.0.0.9", "localhost", "::1"])

@@ -4,8 +4,9 @@ from collections.abc import Callable
 from contextlib import AbstractAsyncContextManager
 from pathlib import Path
 
-from fastapi import FastAPI
-from starlette.responses import FileResponse
+from fastapi import FastAPI, Request
+from starlette.middleware.gzip import GZipMiddleware
+from starlette.responses import FileResponse, Response
 from starlette.staticfiles import StaticFiles
 
 from app.api import (
@@ -83,14 +84,18 @@ def build_app(*, lifespan: Lifespan, static: Path, token: str | None, version: s
 
 
 def add_page(app: FastAPI, static: Path) -> None:
-    """Serve the page at ``/`` and what it loads under ``/static``."""
+    """Serve the page at ``/`` and what it loads under ``/static``.
+
+    Browsers keep both and ask each time whether they have changed (``ETag``, ``no-cache``).
+    """
+    files = StaticFiles(directory=static)
 
     @app.get("/", include_in_schema=False)
-    async def index() -> FileResponse:
-        return FileResponse(static / "index.html", headers={"Cache-Control": "no-cache"})
+    async def index(request: Request) -> Response:
+        return await files.get_response("index.html", request.scope)
 
     @app.get(ICON_PATH, include_in_schema=False)
     async def icon() -> FileResponse:
         return FileResponse(static / "favicon.ico", media_type="image/x-icon")
 
-    app.mount("/static", StaticFiles(directory=static), name="static")
+    app.mount("/static", GZipMiddleware(files), name="static")

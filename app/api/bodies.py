@@ -10,6 +10,7 @@ from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.api.problems import problem
+from app.api.security import path_of
 
 MAX_BODY_BYTES = 1 << 20
 JSON_ONLY_PREFIX = "/v1/"
@@ -42,8 +43,9 @@ class BodyRules:
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
-        takes_file = scope["method"] == "POST" and scope["path"] in self.files
-        max_bytes = self.files[scope["path"]] if takes_file else self.max_bytes
+        path = path_of(scope)
+        takes_file = scope["method"] == "POST" and path in self.files
+        max_bytes = self.files[path] if takes_file else self.max_bytes
         headers = Headers(scope=scope)
         length = headers.get("content-length", "")
         if length.isdecimal() and int(length) > max_bytes:
@@ -55,7 +57,7 @@ class BodyRules:
             if given and _media_type(given) not in FILE_TYPES:
                 await _refuse_type(given, "must be a file's", FILE_TYPES, scope, receive, send)
                 return
-        elif has_body and scope["path"].startswith(JSON_ONLY_PREFIX) and not _is_json(given):
+        elif has_body and path.startswith(JSON_ONLY_PREFIX) and not _is_json(given):
             choices = ("application/json",)
             await _refuse_type(given, "must be JSON", choices, scope, receive, send)
             return

@@ -57,10 +57,11 @@ def render(api: Node) -> str:
     return (
         f"<!doctype html><html lang=en><meta charset=utf-8><title>{escape(info['title'])} "
         "API</title><meta name=viewport content='width=device-width'>"
+        "<link rel=icon href='static/favicon.svg'>"
         f"<style>{STYLE}</style><body><h1>{escape(info['title'])} API "
         f"<span class=faint>{escape(info['version'])}</span></h1>"
         f"<p>{escape(info['description'])}</p><p class=faint>For programs: "
-        f"<a href='/openapi.json'>openapi.json</a></p>{sections}</body></html>"
+        f"<a href='openapi.json'>openapi.json</a></p>{sections}</body></html>"
     )
 
 

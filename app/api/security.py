@@ -41,8 +41,15 @@ HEADERS = {  # where an answer does not set its own
 
 
 @lru_cache(maxsize=1)
-def _sign_in_page() -> bytes:
-    return (resources.files("app.api") / "signin.html").read_bytes()
+def _sign_in_page(root_path: str) -> str:
+    page = (resources.files("app.api") / "signin.html").read_text("utf-8")
+    return page.replace('action="/', f'action="{root_path}/')
+
+
+def path_of(scope: Scope) -> str:
+    """Return the path of a request below the service's root path, as routes state it."""
+    path: str = scope["path"]
+    return path.removeprefix(scope.get("root_path", ""))
 
 
 def session_value(token: str) -> str:
@@ -81,7 +88,7 @@ class Guard:
             return
         refusal = self.refusal(scope, Headers(scope=scope))
         if refusal is None:
-            await self.app(scope, receive, _with_headers(send))
+            await self.app(scope, receive, _with_headers(send, scope))
             return
         status, kind, detail, data = refusal
         if scope["type"] == "websocket":
@@ -93,8 +100,8 @@ class Guard:
             status, detail, kind=kind, instance=scope["path"], data=data, headers=headers
         )
         if status == 401 and "text/html" in Headers(scope=scope).get("accept", ""):
-            answer = HTMLResponse(_sign_in_page(), 401, headers)
-        await answer(scope, receive, _with_headers(send))
+            answer = HTMLResponse(_sign_in_page(scope.get("root_path", "")), 401, headers)
+        await answer(scope, receive, _with_headers(send, scope))
 
     def refusal(
         self, scope: Scope, headers: Headers
@@ -108,7 +115,7 @@ class Guard:
         if origin is not None and not _same_site(origin, host):
             rule = "must be the address of this server"
             return _refusal(403, "wrong-origin", "Origin", origin, rule)
-        if self.token is None or scope["path"] in self.open_paths:
+        if self.token is None or path_of(scope) in self.open_paths:
             return None
         if not self._proves_token(headers):
             detail = "this server needs its token, as 'Authorization: Bearer ...'"
@@ -151,12 +158,17 @@ def _same_site(origin: str, host: str) -> bool:
     return parts.scheme in ("http", "https") and parts.netloc.lower() == host.lower()
 
 
-def _with_headers(send: Send) -> Send:
+def _with_headers(send: Send, scope: Scope) -> Send:
+    """Complete the headers of an answer; its ``Location`` is put below the root path."""
+    root_path = scope.get("root_path", "")
+
     async def send_with_headers(message: Message) -> None:
         if message["type"] == "http.response.start":
             headers = MutableHeaders(scope=message)
             for name, value in HEADERS.items():
                 headers.setdefault(name, value)
+            if headers.get("location", "").startswith("/"):
+                headers["Location"] = root_path + headers["location"]
         await send(message)
 
     return send_with_headers

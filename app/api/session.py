@@ -32,6 +32,7 @@ async def sign_in(request: Request) -> Response:
             COOKIE,
             session_value(token),
             max_age=COOKIE_AGE_S,
+            path=request.scope.get("root_path") or "/",
             httponly=True,
             samesite="strict",
             secure=request.url.scheme == "https",

@@ -8,6 +8,7 @@ script of ours that hide the library's own notices and start a broken scene agai
 
 import asyncio
 import gzip
+import hashlib
 import logging
 from functools import lru_cache
 from importlib import resources
@@ -67,15 +68,19 @@ async def page(
     world_id: str,
     services: ServicesDep,
     accept_encoding: Annotated[str, Header()] = "",
+    if_none_match: Annotated[str, Header()] = "",
 ) -> Response:
     """Return the viewer's one page."""
     services.world(world_id)
-    plain, packed = await run_in_threadpool(viewer_page)
+    plain, packed, etag = await run_in_threadpool(viewer_page)
     headers = {
+        "ETag": etag,
         "Content-Security-Policy": POLICY,
         "Cache-Control": "no-cache",
         "Vary": "Accept-Encoding",
     }
+    if etag in if_none_match:
+        return Response(status_code=304, headers=headers)
     if "gzip" in accept_encoding:
         return Response(
             packed, media_type="text/html", headers=headers | {"Content-Encoding": "gzip"}
@@ -84,12 +89,12 @@ async def page(
 
 
 @lru_cache(maxsize=1)
-def viewer_page() -> tuple[bytes, bytes]:
-    """Return the viewer's page with our style and script, plain and gzip-packed."""
+def viewer_page() -> tuple[bytes, bytes, str]:
+    """Return the viewer's page with our style and script: plain, gzip-packed, its ETag."""
     content = (resources.files("viser") / "client" / "build" / "index.html").read_bytes()
     extra = (resources.files("app.api") / "viewer_extra.html").read_bytes()
     plain = content.replace(b"</head>", extra + b"</head>", 1)
-    return plain, gzip.compress(plain, 6)
+    return plain, gzip.compress(plain, 6), f'"{hashlib.sha256(plain).hexdigest()[:32]}"'
 
 
 @router.websocket("/viewer/{world_id}")

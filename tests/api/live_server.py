@@ -17,10 +17,10 @@ WARM_UP_S = 900.0
 
 
 @contextlib.contextmanager
-def running(app: FastAPI) -> Iterator[tuple[Server, str]]:
+def running(app: FastAPI, *, root_path: str = "") -> Iterator[tuple[Server, str]]:
     """Run ``app`` on a free port; yields the server and its address."""
     sock = listen("127.0.0.1", 0)
-    server = server_of(app)
+    server = server_of(app, root_path=root_path)
     thread = threading.Thread(target=server.run, kwargs={"sockets": [sock]})
     thread.start()
     give_up = time.monotonic() + START_S

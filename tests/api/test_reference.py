@@ -20,7 +20,7 @@ def test_docs_describe_every_route_without_outside_help(client: TestClient) -> N
         assert path in page.text
     links = Links()
     links.feed(page.text)
-    assert links.found == ["/openapi.json"]
+    assert links.found == ["static/favicon.svg", "openapi.json"]
 
 
 def test_units_reach_the_description(client: TestClient) -> None:

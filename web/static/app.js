@@ -47,7 +47,7 @@ function App() {
       ${world && html`<${Acting} world=${world} checkpoints=${checkpoints} jobs=${jobs}
         send=${cell.send} />`}
       <${Link} link=${link} />
-      <a class="docs" href="/docs">API<${Icon} name="external" /></a>
+      <a class="docs" href="docs">API<${Icon} name="external" /></a>
     </header>
     ${cell.error && html`<p class="banner bad" role="alert"><${Icon} name="alert" />
       <span>${cell.error.message}</span>
@@ -141,7 +141,7 @@ function Scene({ cell }) {
   const keyed = useFrameFocus(frame);
   return html`<section class="hero" aria-label="The cell">
     <div class=${`viewer ${keyed ? "is-keyed" : ""}`}>
-      ${epoch > 0 && html`<iframe key=${epoch} ref=${frame} src=${`/viewer/${WORLD}/`} data-role="viewer"
+      ${epoch > 0 && html`<iframe key=${epoch} ref=${frame} src=${`viewer/${WORLD}/`} data-role="viewer"
         title="Live 3D view of robot and person"></iframe>`}
       ${epoch > 0 && world && html`<${ViewMenu} key=${epoch} frame=${frame} />`}
       ${!world && html`<div class="veil" role="status">

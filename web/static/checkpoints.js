@@ -13,7 +13,7 @@ export function useCheckpoints(link, stamp) {
   const [list, setList] = useState([]);
   const refresh = useCallback(() => {
     if (link !== "live") return;
-    get("/v1/checkpoints?limit=100").then((page) => setList(page.items), () => {});
+    get("v1/checkpoints?limit=100").then((page) => setList(page.items), () => {});
   }, [link]);
   useEffect(refresh, [refresh, stamp]);
   return { list, refresh };

@@ -25,7 +25,7 @@ export function useJobs(link) {
     let over = false;
     refresh.current = async () => {
       try {
-        const page = await get("/v1/jobs?limit=50");
+        const page = await get("v1/jobs?limit=50");
         if (!over) setState({ jobs: page.items, error: null });
       } catch (error) {
         if (!over) setState((now) => ({ ...now, error }));
@@ -215,7 +215,7 @@ function useCurve(job, onChanged) {
     };
     show();
     setState((now) => ({ ...now, rows: null }));
-    const stop = follow(`/v1/jobs/${job.id}/events`, {
+    const stop = follow(`v1/jobs/${job.id}/events`, {
       onEvent,
       onUp: schedule,
       onDown: () => show(true),
@@ -234,7 +234,7 @@ function Cancel({ job, onChanged }) {
   if (job.state === "cancelling") return html`<span class="faint">Stopping …</span>`;
   const cancel = async () => {
     try {
-      await post(`/v1/jobs/${job.id}/cancel`);
+      await post(`v1/jobs/${job.id}/cancel`);
       setAsking(false);
       onChanged();
     } catch (problem) {

@@ -35,8 +35,8 @@ export function useCell() {
     }
   }, []);
   const send = useCallback(
-    (command) => told(post(`/v1/worlds/${WORLD}/commands`, command)), []);
-  const show = useCallback((name) => told(put(`/v1/worlds/${WORLD}/cell`, { cell: name })), []);
+    (command) => told(post(`v1/worlds/${WORLD}/commands`, command)), []);
+  const show = useCallback((name) => told(put(`v1/worlds/${WORLD}/cell`, { cell: name })), []);
   const dismiss = () => setError(null);
   return { ...state, epoch, history: history.current, send, show, error, dismiss };
 }
@@ -47,7 +47,7 @@ async function watch(signal, history, setState, setEpoch) {
   while (!signal.aborted) {
     await ready(signal, merge);
     try {
-      const [world, cells] = await Promise.all([get(`/v1/worlds/${WORLD}`), get("/v1/cells")]);
+      const [world, cells] = await Promise.all([get(`v1/worlds/${WORLD}`), get("v1/cells")]);
       const list = cells.items;
       const cell = list.find((c) => c.name === world.cell) ?? null;
       let anew = false;
@@ -55,7 +55,7 @@ async function watch(signal, history, setState, setEpoch) {
       merge({ world, cell, cells: list, link: "live", reason: "" });
       setEpoch((n) => n + 1);
       await until(signal, (lost) =>
-        follow(`/v1/worlds/${WORLD}/events`, {
+        follow(`v1/worlds/${WORLD}/events`, {
           onEvent: (name, snapshot) => {
             if (name === "end") {
               anew = true;
@@ -80,7 +80,7 @@ async function watch(signal, history, setState, setEpoch) {
 async function ready(signal, merge) {
   while (!signal.aborted) {
     try {
-      const response = await fetch("/readyz", { signal, cache: "no-store" });
+      const response = await fetch("readyz", { signal, cache: "no-store" });
       if (response.ok) return;
       const body = await response.json().catch(() => null);
       merge({ link: "warming", reason: body?.detail ?? "" });

@@ -182,7 +182,7 @@ function Note({ children, role }) {
 function useMotions() {
   const [found, setFound] = useState({ list: null, error: null });
   const refresh = useCallback(() => {
-    get("/v1/motions").then(
+    get("v1/motions").then(
       (answer) => setFound({ list: answer.items, error: null }),
       (problem) => setFound({ list: null, error: problem.message }));
   }, []);

@@ -9,7 +9,7 @@ export function SignIn() {
   const submit = async (event) => {
     event.preventDefault();
     try {
-      await post("/session", { token });
+      await post("session", { token });
       location.reload();
     } catch (problem) {
       setError(problem);

@@ -9,7 +9,7 @@ export function usePresets(link) {
   const [state, setState] = useState({ presets: null, error: null });
   useEffect(() => {
     if (link !== "live" || state.presets) return;
-    get("/v1/presets").then(
+    get("v1/presets").then(
       (answer) => setState({ presets: answer.items, error: null }),
       (error) => setState({ presets: null, error }));
   }, [link]);
@@ -35,7 +35,7 @@ export function TrainForm({ presets, error, cell, onStarted, onClose }) {
     setBusy(true);
     setProblem(null);
     try {
-      const job = await post("/v1/jobs", {
+      const job = await post("v1/jobs", {
         kind: "train",
         preset: preset.name,
         seed: parsed(seed),
