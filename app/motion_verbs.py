@@ -183,6 +183,7 @@ def _told(found: Mapping[str, Any]) -> str:
     lines = [
         f"{found['name']}: {found['frames']} frames, {found['duration_s']:.2f} s, "
         f"{found['format']} in {found['unit']}",
+        *_reading(found.get("reading")),
         f"body [mm]: {lengths}",
         "error [mm]                           p50     p99   worst",
         _row("wrists", error["wrists"]),
@@ -199,6 +200,22 @@ def _told(found: Mapping[str, Any]) -> str:
         text = f"{name} beyond its limits in {100.0 * beyond['share']:.1f} % of the frames"
         lines.append(f"{text}, by {beyond['farthest_rad']:.2f} rad at most")
     return "\n".join(lines)
+
+
+def _reading(reading: Mapping[str, Any] | None) -> list[str]:
+    """Write how a file was read; nothing where an older version read it."""
+    if reading is None:
+        return []
+    words = [f"{reading['up']} up", f"{reading['rate_hz']:.4g} frames/s"]
+    if reading["root_unit"] != reading["unit"]:
+        words.append(f"root's path in {reading['root_unit']}")
+    if reading["stature"] is not None:
+        words.append(f"{reading['stature']:.2f} m tall")
+    lines = [f"read as: {', '.join(words)}"]
+    if reading["names"]:
+        names = ", ".join(f"{ours} = {theirs}" for ours, theirs in reading["names"].items())
+        lines.append(f"joints: {names}")
+    return [*lines, *reading["notes"]]
 
 
 def faulty(error: BadMotion) -> dict[str, Any]:

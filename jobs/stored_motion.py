@@ -33,7 +33,8 @@ def summary_of(found: ImportedMotion) -> dict[str, Any]:
     lengths = found.size.lengths()
     return {
         "format": found.format,
-        "unit": found.unit,
+        "unit": found.reading.unit,
+        "reading": {**asdict(found.reading), "notes": list(found.reading.notes)},
         "body_m": {name: lengths[name] for name in MEASURED},
         "error_mm": {name: _mm(getattr(found, name)) for name in _SPREADS},
         "clean_frames": found.n_clean,

@@ -6,6 +6,7 @@ Source: Biovision's format as described by Meredith and Maddock, "Motion capture
 explained" (2001).
 """
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -178,7 +179,8 @@ def read_rows(
         words = line.split(separator)
         if len(words) != n_columns:
             rule = f"must hold {n_columns} numbers, {what}"
-            faults.append(Fault(place=f"line {number}", value=f"<{len(words)}>", rule=rule))
+            place, hint = f"line {number}", "" if separator else _comma_hint(line)
+            faults.append(Fault(place=place, value=f"<{len(words)}>", rule=rule, hint=hint))
         else:
             try:
                 values[k] = list(map(float, words))
@@ -204,7 +206,8 @@ def _bad_words(words: Sequence[str], line: int) -> Iterator[Fault]:
     for k, word in enumerate(words):
         rule = _number_rule(word)
         if rule:
-            yield Fault(place=f"line {line}, number {k + 1}", value=shown(word), rule=rule)
+            place, hint = f"line {line}, number {k + 1}", _comma_hint(word)
+            yield Fault(place=place, value=shown(word), rule=rule, hint=hint)
 
 
 def _number_rule(word: str) -> str:
@@ -216,6 +219,13 @@ def _number_rule(word: str) -> str:
     if abs(value) <= MAX_NUMBER:
         return ""
     return f"must be a finite number of at most {MAX_NUMBER:g}"
+
+
+def _comma_hint(text: str) -> str:
+    """Return what commas in a piece of a file mean; empty where it has none."""
+    if re.fullmatch(r"[-+]?\d*,\d*(e[-+]?\d+)?", text.strip(), re.IGNORECASE):
+        return "decimal commas: write points"
+    return "commas between numbers: write spaces" if "," in text else ""
 
 
 def shown(text: str) -> str:
@@ -251,7 +261,7 @@ def _frame_lines(head: list[tuple[int, str]], n_lines: int) -> tuple[int, float]
         word = rest[len(name) :].strip()
         rule = _number_rule(word)
         if rule:
-            raise _bad(line, shown(word), rule)
+            raise _bad(line, shown(word), rule, _comma_hint(word))
         found.append(float(word))
     if found[0] < 0.0 or found[0] != int(found[0]):
         raise _bad(texts[0][0], f"{found[0]:g}", "must be a whole number of frames")
@@ -269,6 +279,7 @@ class _Tree:
 
     def __init__(self, words: Iterator[tuple[int, str]]) -> None:
         self._words, self._line = words, 1
+        self._ahead = next(words, None)
         self._joints: list[BvhJoint] = []
         self._open: list[int] = []
 
@@ -279,8 +290,9 @@ class _Tree:
         self._open_joint(self._next("ROOT"))
         while self._open:
             self._part(self._next("} or JOINT"))
-        for line, word in self._words:
-            raise _bad(line, shown(word), "must be MOTION: one skeleton is read from a file")
+        if self._ahead is not None:
+            rule = "must be MOTION: one skeleton is read from a file"
+            raise _bad(self._ahead[0], shown(self._ahead[1]), rule)
         return tuple(self._joints)
 
     def _part(self, word: str) -> None:
@@ -311,14 +323,18 @@ class _Tree:
 
     def _name(self, word: str, parent: int) -> str:
         """Read a joint's name, which may have several words, up to its brace."""
-        first = self._next("a name")
+        words = [self._next("a name")]
         if word == "End":
             return f"{self._joints[parent].name}.end"
-        if first in _WORDS:
-            raise _bad(self._line, shown(first), "must be the name of a joint")
-        if any(one.name == first for one in self._joints):
-            raise _bad(self._line, shown(first), "is the name of two joints")
-        return first
+        if words[0] in _WORDS:
+            raise _bad(self._line, shown(words[0]), "must be the name of a joint")
+        line = self._line
+        while self._ahead is not None and self._ahead[0] == line and self._ahead[1] != "{":
+            words.append(self._next("a name"))
+        name = " ".join(words)
+        if any(one.name == name for one in self._joints):
+            raise _bad(line, shown(name), "is the name of two joints")
+        return name
 
     def _channels(self) -> tuple[str, ...]:
         self._expect("CHANNELS")
@@ -336,7 +352,7 @@ class _Tree:
         word = self._next("a number")
         rule = _number_rule(word)
         if rule:
-            raise _bad(self._line, shown(word), rule)
+            raise _bad(self._line, shown(word), rule, _comma_hint(word))
         return float(word)
 
     def _expect(self, word: str) -> None:
@@ -345,7 +361,7 @@ class _Tree:
             raise _bad(self._line, shown(found), f"must be {word}")
 
     def _next(self, wanted: str) -> str:
-        found = next(self._words, None)
+        found, self._ahead = self._ahead, next(self._words, None)
         if found is None:
             rule = f"ends where {wanted} must stand"
             raise _bad(self._line, "", rule, "a } is missing or the file is cut off")

@@ -36,7 +36,7 @@ from app.sim.human import JOINT_NAMES, Q_MAX, Q_MIN
 from app.sim.joint_tables import AngleTrack, read_csv
 from app.sim.opensim import read_opensim
 from app.sim.ports import Vec
-from app.sim.read_options import NOTHING_STATED, ReadOptions
+from app.sim.read_options import NOTHING_STATED, Reading, ReadOptions
 from app.sim.skeletons import body_track
 from app.sim.track_angles import body_angles
 
@@ -89,10 +89,10 @@ class ImportedMotion:
     """The file's name without its ending."""
     format: str
     """One of FORMATS, without its dot."""
-    unit: str
-    """Unit of lengths that was found: ``"mm"``."""
+    reading: Reading
+    """How the file was read: units, up axis, names, rate."""
     n_frames: int
-    """Frames in the file."""
+    """Frames in the file; those that repeat count once."""
     duration: float
     """Of the file [s]."""
     size: BodySize
@@ -139,13 +139,16 @@ def read_motion(
     text = _text(content)
     digest = hashlib.sha256(content).hexdigest()[:12]
     if ending == ".bvh":
-        track, unit = body_track(read_bvh(text), options)
+        track, reading = body_track(read_bvh(text), options)
         size, angles = measure(track.points), None
     else:
         angles = read_csv(text) if ending == ".csv" else read_opensim(text)
-        size, unit = BodySize(), "m"
+        size = BodySize()
         points = model_points(angles.q, angles.pelvis_z, size)
         track = BodyTrack(times=angles.times, points=points)
+        rate_hz = 1.0 / float(np.median(np.diff(angles.times)))
+        up = "z" if ending == ".csv" else "y"
+        reading = Reading(unit="m", root_unit="m", up=up, rate_hz=rate_hz)
     glitches = find_glitches(track.times, track.points)
     spans = clean_runs(track.times, glitches)
     if not spans:
@@ -158,7 +161,7 @@ def read_motion(
     return ImportedMotion(
         name=name,
         format=ending[1:],
-        unit=unit,
+        reading=reading,
         n_frames=len(track.times),
         duration=float(track.times[-1] - track.times[0]),
         size=size,

@@ -1,4 +1,4 @@
-"""What a caller states about a recording: units, up axis, and names of joints or columns.
+"""What a caller states about a recording, and how it was read: units, axis, names.
 
 Every reader takes a :class:`ReadOptions`. What is not stated is found from the file; where two
 readings fit, the file is refused, and the caller states which one is meant.
@@ -53,6 +53,26 @@ class ReadOptions:
     def stated(self) -> dict[str, Any]:
         """Return what is stated, by field, as JSON data."""
         return {name: value for name, value in asdict(self).items() if value}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reading:
+    """How a file was read: what was stated and what was found."""
+
+    unit: str
+    """Of lengths."""
+    root_unit: str
+    """Of the root's path."""
+    up: str
+    """Direction of the file that points up."""
+    rate_hz: float
+    """Frames per second, those that repeat counted once."""
+    names: Mapping[str, str] = field(default_factory=dict)
+    """Joints or columns of the file, by our names."""
+    stature: float | None = None
+    """Of the recorded person [m]; None where only angles are given."""
+    notes: tuple[str, ...] = ()
+    """What else was found, in sentences."""
 
 
 NOTHING_STATED = ReadOptions()

@@ -1,11 +1,12 @@
-"""Which joint of a recorded skeleton is which, what its unit is, and which way is up.
+"""From a recorded skeleton to a person's joint centres in metres, z up.
 
-Names of the skeletons in common use are known: the TUM clips, CMU, Mixamo, Xsens, SMPL, Daz.
-The unit is found from the arm: shoulder to wrist measures 0.40 to 0.75 m in exactly one unit.
+Names say which joint is which (``joint_names.py``), the person's stature the unit
+(``length_units.py``), rest pose, legs and trunk the axis that points up (``up_axis.py``).
+What a caller states goes before what is found; what was decided is told as a
+:class:`~app.sim.read_options.Reading`.
 """
 
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -18,136 +19,154 @@ from app.sim.body_track import (
     SHOULDER_L,
     SHOULDER_R,
     TRACK_NAMES,
-    WRIST_R,
     BodyTrack,
-    measure,
     trunk_frame,
     unit,
 )
 from app.sim.bvh import Bvh, forward
+from app.sim.joint_names import Joints, find_joints
+from app.sim.length_units import (
+    Stature,
+    find_lengths,
+    find_stature,
+    find_unit,
+    require_one_unit,
+    require_proportions,
+)
 from app.sim.ports import Vec
-from app.sim.read_options import NOTHING_STATED, UNITS, ReadOptions, metres
+from app.sim.read_options import NOTHING_STATED, Reading, ReadOptions, metres
+from app.sim.repeated_frames import without_repeats
+from app.sim.up_axis import Posture, find_up_axis, rest_axis, z_up
 
-MIN_ARM, MAX_ARM = 0.40, 0.75
-"""Shoulder to wrist of a person [m]; the ranges of the units do not overlap."""
-LENGTHS: Mapping[str, tuple[float, float]] = {
-    "trunk": (0.25, 0.80),
-    "clavicle": (0.05, 0.35),
-    "upper_arm": (0.15, 0.50),
-    "forearm": (0.15, 0.45),
-}
-"""Segments of people [m], with room for markers that are no joint centres."""
 MAX_TILT = np.radians(30.0)
 """Lean of the trunk in a rest pose above which that pose is not taken for upright [rad]."""
 MAX_DEGREES_IN_RADIANS = 6.2832
 """A file none of whose angles exceeds this is one in radians, or nobody moves in it."""
-
+MAX_FAR = 100.0
+"""Farthest from the file's origin that a pelvis stands [m]."""
 MAX_BACKWARD = 0.3
 """Mean of the elbows' backward bend, from -1 to 1, above which sides are mixed up."""
 
-_CENTRE = {
-    "pelvis": ("hips", "hip", "pelvis", "root"),
-    "neck": ("neck", "neck1", "neckbase", "c7"),
-}
-_PARTS = {
-    "shoulder": ("upperarm", "uparm", "arm", "shldr", "shoulder", "humerus"),
-    "elbow": ("forearm", "lowerarm", "lowarm", "elbow", "radius"),
-    "wrist": ("hand", "wrist"),
-    "hip": ("upleg", "upperleg", "thigh", "hip", "femur"),
-}
+Centres = Mapping[str, Vec]
+"""Joint centres by role, each of shape (n, 3)."""
 
 
-def skeleton_joints(names: Sequence[str]) -> dict[str, int]:
-    """Return the index of each joint of TRACK_NAMES, and of ``hip_r``, ``hip_l`` if there.
+def body_track(bvh: Bvh, options: ReadOptions = NOTHING_STATED) -> tuple[BodyTrack, Reading]:
+    """Return a file's joint centres [m], z up, and how it was read.
 
     Args:
-        names: The skeleton's own, such as ``mixamorig:LeftForeArm`` or ``left_forearm``.
+        bvh: The file.
+        options: What is stated about it.
 
     Raises:
-        BadMotion: Joints are missing; the hint lists what the file has.
+        BadMotion: It is no upright person in a known unit and in degrees, or it can be read in
+            two ways; the fault names both.
     """
-    plain = {_plain(name): k for k, name in reversed(list(enumerate(names)))}
-    found: dict[str, int] = {}
-    for role, spellings in _spellings().items():
-        match = next((plain[one] for one in spellings if one in plain), None)
-        if match is not None:
-            found[role] = match
-    missing = [role for role in TRACK_NAMES if role not in found]
-    if missing:
-        listed = ", ".join(names[:40])[:300]
-        hint = f"the file's joints are {listed}; known names: docs/motions.md"
-        rule = f"has no joint that is known as {', '.join(missing)}"
-        raise BadMotion([Fault(place="HIERARCHY", value="", rule=rule, hint=hint)])
-    return found
-
-
-def body_track(bvh: Bvh, options: ReadOptions = NOTHING_STATED) -> tuple[BodyTrack, str]:
-    """Return a file's joint centres [m], z up, and the name of its unit.
-
-    Raises:
-        BadMotion: It is no upright person in a known unit and in degrees.
-    """
-    roles = skeleton_joints([joint.name for joint in bvh.joints])
+    bvh, repeated = without_repeats(bvh)
+    names = [joint.name for joint in bvh.joints]
+    joints = find_joints(names, [joint.parent for joint in bvh.joints], options.names)
     _require_degrees(bvh)
-    chosen = [roles[name] for name in TRACK_NAMES]
-    found = options.unit or length_unit(forward(bvh, chosen))
-    if options.root_unit is not None:
-        bvh = _with_root_scaled(bvh, metres(options.root_unit) / metres(found))
-    points = forward(bvh, chosen)
-    up = options.up or "xyz"[_up_axis(points)]
-    points = metres(found) * _z_up(points, up)
+    centres, rest = _centres(bvh, joints), _centres(_resting(bvh), joints)
+    stature, found = _measured(centres, options)
+    standing = _posture(rest)
+    up = options.up or find_up_axis(_posture(centres), standing)
+    floor, root_unit = "", options.root_unit or found
+    if options.root_unit is None:
+        floor = _check_root(centres, up, bvh.dt, stature, found)
+    elif root_unit != found:
+        scaled = _with_root_scaled(bvh, joints, metres(root_unit) / metres(found))
+        centres = _centres(scaled, joints)
+    placed = {role: metres(found) * z_up(v, up) for role, v in centres.items()}
+    points = _stacked(placed)
     _require_a_body(points)
     _require_elbows(points)
-    rest = _z_up(_rest(bvh)[None, chosen], up)
-    hips = None
-    if "hip_r" in roles and "hip_l" in roles:
-        right, left = forward(bvh, [roles["hip_r"], roles["hip_l"]]).transpose(1, 0, 2)
-        hips = metres(found) * _z_up(left - right, up)
-    times: Vec = np.asarray(bvh.dt * np.arange(len(points)))
-    return BodyTrack(times=times, points=points, upright=_upright(rest), hips=hips), found
+    track = BodyTrack(
+        times=np.asarray(bvh.dt * np.arange(len(points))),
+        points=points,
+        upright=_upright(z_up(_stacked(rest), rest_axis(standing) or up)),
+        hips=placed["hip_l"] - placed["hip_r"] if {"hip_r", "hip_l"} <= placed.keys() else None,
+    )
+    reading = Reading(
+        unit=found,
+        root_unit=root_unit,
+        up=up,
+        names={role: " + ".join(names[k] for k in joints[role]) for role in joints},
+        rate_hz=1.0 / bvh.dt,
+        stature=metres(found) * stature.value,
+        notes=tuple(one for one in (repeated, floor) if one),
+    )
+    return track, reading
 
 
-def length_unit(points: Vec) -> str:
-    """Return the unit in which the arm has the length of a person's.
-
-    Args:
-        points: Joint centres [unknown unit], shape (n, 8, 3).
-
-    Raises:
-        BadMotion: No unit fits.
-    """
-    chain = points[:, SHOULDER_R : WRIST_R + 1]
-    arm = float(np.median(np.linalg.norm(np.diff(chain, axis=1), axis=2).sum(axis=1)))
-    for name, factor in UNITS.items():
-        if MIN_ARM <= factor * arm <= MAX_ARM:
-            return name
-    rule = f"must be {MIN_ARM} to {MAX_ARM} m in one of the units {', '.join(UNITS)}"
-    place = "OFFSET of elbow and wrist: shoulder to wrist"
-    raise BadMotion([Fault(place=place, value=f"{arm:.4g}", rule=rule)])
+def _measured(centres: Centres, options: ReadOptions) -> tuple[Stature, str]:
+    """Return the stature [the file's unit] and the unit; refuse who is no person in it."""
+    lengths = find_lengths(centres)
+    stature = find_stature(lengths)
+    found = options.unit or find_unit(stature)
+    require_proportions(lengths, stature, found)
+    return stature, found
 
 
-def _with_root_scaled(bvh: Bvh, factor: float) -> Bvh:
-    """Return a file with the root's path multiplied."""
-    moving = [joint == 0 and name.endswith("position") for joint, name in bvh.channels]
+def _check_root(centres: Centres, up: str, dt: float, stature: Stature, found: str) -> str:
+    """Refuse a root in another unit; return a sentence where the file's zero is no floor."""
+    pelvis, ankles = z_up(centres["pelvis"], up), None
+    if {"ankle_r", "ankle_l"} <= centres.keys():
+        both = np.stack([centres["ankle_r"], centres["ankle_l"]], axis=1)
+        ankles = z_up(both, up) - pelvis[:, None]
+    return require_one_unit(pelvis, ankles, dt, stature, found)
+
+
+def _centres(bvh: Bvh, joints: Joints) -> dict[str, Vec]:
+    """Return the joint centres of a file by role [the file's unit], each of shape (n, 3)."""
+    wanted = sorted({k for found in joints.values() for k in found})
+    points = dict(zip(wanted, forward(bvh, wanted).transpose(1, 0, 2), strict=True))
+    return {
+        role: np.asarray(np.mean([points[k] for k in found], axis=0))
+        for role, found in joints.items()
+    }
+
+
+def _stacked(centres: Centres) -> Vec:
+    """Return joint centres in the order of TRACK_NAMES, shape (n, 8, 3)."""
+    return np.stack([centres[role] for role in TRACK_NAMES], axis=1)
+
+
+def _resting(bvh: Bvh) -> Bvh:
+    """Return a file of one frame: the rest pose, where all joints stand at their offsets."""
+    row = [
+        bvh.joints[k].offset["XYZ".index(name[0])] if name.endswith("position") else 0.0
+        for k, name in bvh.channels
+    ]
+    return replace(bvh, values=np.array([row]))
+
+
+def _with_root_scaled(bvh: Bvh, joints: Joints, factor: float) -> Bvh:
+    """Return a file with the path of the pelvis multiplied."""
+    path, k = set(), joints["pelvis"][0]
+    while k >= 0:
+        path.add(k)
+        k = bvh.joints[k].parent
+    moving = [joint in path and name.endswith("position") for joint, name in bvh.channels]
     return replace(bvh, values=np.where(moving, factor * bvh.values, bvh.values))
 
 
-def _spellings() -> dict[str, list[str]]:
-    spelt = {role: list(names) for role, names in _CENTRE.items()}
-    for part, names in _PARTS.items():
-        for letter, word in (("r", "right"), ("l", "left")):
-            spelt[f"{part}_{letter}"] = [
-                form.format(side=side, name=name)
-                for name in names
-                for side in (word, letter)
-                for form in ("{side}{name}", "{name}{side}")
-            ]
-    return spelt
+def _posture(centres: Centres) -> Posture:
+    """Return the directions of a person's parts."""
 
+    def both(a: str, b: str) -> Vec | None:
+        ways = [
+            unit(centres[b + side] - centres[a + side])
+            for side in ("_r", "_l")
+            if a + side in centres and b + side in centres
+        ]
+        return np.concatenate(ways) if ways else None
 
-def _plain(name: str) -> str:
-    """Return a name without its prefix, case and punctuation."""
-    return re.sub(r"[^a-z0-9]", "", re.split(r"[:|]", name)[-1].lower())
+    return Posture(
+        trunk=unit(centres["neck"] - centres["pelvis"]),
+        across=unit(centres["shoulder_l"] - centres["shoulder_r"]),
+        legs=both("knee", "ankle") if "knee_r" in centres else both("hip", "ankle"),
+        toes=both("ankle", "toe"),
+    )
 
 
 def _require_degrees(bvh: Bvh) -> None:
@@ -163,40 +182,6 @@ def _require_degrees(bvh: Bvh) -> None:
     raise BadMotion([Fault(place=place, value=f"{largest:.4g}", rule=rule, hint=hint)])
 
 
-def _up_axis(points: Vec) -> int:
-    """Return the axis along which the neck stands above the pelvis: 1 or 2."""
-    trunk = np.median(points[:, NECK] - points[:, PELVIS], axis=0)
-    axis = int(np.argmax(trunk))
-    length = float(np.linalg.norm(trunk))
-    if axis == 0 or length <= 0.0 or trunk[axis] < 0.7 * length:
-        rule = "must point up, along y or z, in most frames"
-        value = "(" + ", ".join(f"{one:.4g}" for one in trunk) + ")"
-        raise BadMotion([Fault(place="pelvis to neck", value=value, rule=rule)])
-    return axis
-
-
-def _z_up(v: Vec, up: str) -> Vec:
-    """Return vectors turned so that a direction of the file points along z."""
-    turns = {
-        "x": [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]],
-        "y": [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]],
-        "z": [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
-        "-x": [[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]],
-        "-y": [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]],
-        "-z": [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]],
-    }
-    return np.asarray(v @ np.array(turns[up]).T)
-
-
-def _rest(bvh: Bvh) -> Vec:
-    """Return the joints of the rest pose, all angles zero, shape (n_joints, 3)."""
-    rest = np.array([joint.offset for joint in bvh.joints])
-    for k, joint in enumerate(bvh.joints):
-        if joint.parent >= 0:
-            rest[k] += rest[joint.parent]
-    return rest
-
-
 def _upright(rest: Vec) -> Vec:
     """Return the trunk's frame in the rest pose, its heading taken out, shape (3, 3)."""
     across = rest[:, SHOULDER_L] - rest[:, SHOULDER_R]
@@ -210,16 +195,10 @@ def _upright(rest: Vec) -> Vec:
 
 
 def _require_a_body(points: Vec) -> None:
-    """Refuse a person whose parts are no person's, who is far away, or who never moves."""
-    for name, length in measure(points).lengths().items():
-        # Lengths that no joint centre tells are the median person's.
-        low, high = LENGTHS.get(name.removesuffix("_r").removesuffix("_l"), (0.0, np.inf))
-        if not low <= length <= high:
-            rule = f"must be {low} to {high} m long, by the unit that the right arm has"
-            raise BadMotion([Fault(place=name, value=f"{length:.3f} m", rule=rule)])
+    """Refuse a person who is far away, or who never moves."""
     far = float(np.abs(points[:, PELVIS]).max())
-    if far > 100.0:
-        rule = "must lie within 100 m of the file's origin, in the unit of the skeleton"
+    if far > MAX_FAR:
+        rule = f"must lie within {MAX_FAR:g} m of the file's origin"
         hint = "positions and offsets are probably in two units"
         value = f"{far:.4g} m"
         raise BadMotion([Fault(place="pelvis", value=value, rule=rule, hint=hint)])

@@ -101,6 +101,41 @@ def test_fault_is_named_with_its_line(old: str, new: str, place: str, text: str)
     assert text in told
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "place", "hint"),
+    [
+        ("OFFSET 5 5 5", "OFFSET 5,00 5,00 5,00", "line 4", "decimal commas: write points"),
+        ("90 0 0 0 0 90", "90,5 0 0 0 0 90", "line 20, number 4", "decimal commas"),
+        ("Frame Time: 0.01", "Frame Time: 0,01", "line 18", "decimal commas"),
+        ("90 0 0 0 0 90", "90,0,0,0,0,90", "line 20", "commas between numbers: write spaces"),
+    ],
+)
+def test_commas_are_named(old: str, new: str, place: str, hint: str) -> None:
+    assert old in ARM
+    told = fault(ARM.replace(old, new, 1))
+    assert told.startswith(place) and hint in told
+
+
+@pytest.mark.parametrize("name", ["Bip01 L UpperArm", "arm (left)", "a  b"])
+def test_name_of_a_joint_may_have_several_words(name: str) -> None:
+    lines = ARM.splitlines()
+    at = next(k for k, line in enumerate(lines) if "JOINT" in line)
+    for brace in ("", " {"):
+        text = lines.copy()
+        text[at] = f"JOINT {name}{brace}"
+        if brace:
+            del text[at + 1]
+        read = read_bvh("\n".join(text))
+        assert [one.name for one in read.joints][1] == " ".join(name.split())
+
+
+def test_brace_that_is_missing_is_told_rather_than_read_as_a_name() -> None:
+    lines = ARM.splitlines()
+    at = next(k for k, line in enumerate(lines) if "JOINT" in line)
+    del lines[at + 1]
+    assert "'OFFSET' must be {" in fault("\n".join(lines))
+
+
 def test_all_faulty_lines_are_told_at_once() -> None:
     lines = PERSON.splitlines()
     lines[FIRST - 1] += " 7"

@@ -12,6 +12,7 @@ from app.sim.glitches import MAX_SPEED
 from app.sim.human import Q_MAX
 from app.sim.motions import MAX_BYTES, beyond_limits, placed, read_motion
 from tests.sim.recorded_person import CMU, bvh_text, csv_text, working
+from tests.sim.recorded_skeleton import Person, skeleton
 
 ROOT = Path(__file__).resolve().parents[2]
 CLIPS = sorted(Path(os.environ.get("MOCAP_CLIPS", ROOT.parent / "mocap")).glob("**/*.bvh"))
@@ -38,7 +39,7 @@ def test_angles_of_a_known_person_are_found_in_a_bvh_file() -> None:
     truth = model_points(q, height - np.percentile(height, 95.0), BodySize())
     assert np.abs(points - truth).max() < 1e-3
     assert found.wrists.p99 < 1e-3 and found.elbows.worst < 1e-6
-    assert (found.name, found.unit, found.n_frames) == ("someone", "mm", 200)
+    assert (found.name, found.reading.unit, found.n_frames) == ("someone", "mm", 200)
     assert found.glitches == ()
 
 
@@ -145,8 +146,23 @@ if CLIPS:  # without clips there is no test to skip
     @pytest.mark.parametrize("path", CLIPS, ids=lambda path: f"{path.parent.name}/{path.name}")
     def test_wrists_of_a_recorded_clip_are_met_within_a_centimetre(path: Path) -> None:
         found = read_motion(path.read_bytes(), path.name)
-        assert found.unit == "mm"
+        assert (found.reading.unit, found.reading.up) == ("mm", "y")
         assert found.wrists.p99 < 0.01
         assert found.elbows.worst < 1e-6
         assert all(one.speed > MAX_SPEED for one in found.glitches)
+        assert all(np.isfinite(run.q).all() for run in found.runs)
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_garbled_skeleton_is_read_or_refused_but_never_crashes(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    words = skeleton(Person(legs=seed % 3 > 0))[0].split(" ")
+    for place in rng.integers(0, len(words), rng.integers(1, 12)):
+        if words[place].strip().replace(".", "").replace("-", "").isdigit():
+            words[place] = str(rng.choice(["0", "1e9", "-1e-9", "1e3", "3", "-0"]))
+    try:
+        found = read_motion(" ".join(words).encode(), "garbled.bvh")
+    except BadMotion as error:
+        assert error.faults[0].place and error.faults[0].rule
+    else:
         assert all(np.isfinite(run.q).all() for run in found.runs)

@@ -1,9 +1,7 @@
-import numpy as np
 import pytest
 
 from app.errors import InvalidInput
-from app.sim.read_options import UP_AXES, ReadOptions, metres
-from app.sim.skeletons import _z_up
+from app.sim.read_options import ReadOptions, metres
 
 
 def test_only_what_is_stated_is_told() -> None:
@@ -32,11 +30,3 @@ def test_unit_that_is_none_is_refused_with_the_choices(unit: str) -> None:
 def test_axis_that_is_none_is_refused_with_the_choices(up: str) -> None:
     with pytest.raises(InvalidInput, match="up = .* choices: x, y, z, -x, -y, -z"):
         ReadOptions(up=up)
-
-
-@pytest.mark.parametrize("up", UP_AXES)
-def test_any_axis_is_turned_up_without_a_mirror(up: str) -> None:
-    turned = _z_up(np.eye(3), up)
-    axis = np.eye(3)["xyz".index(up[-1])] * (-1.0 if up[0] == "-" else 1.0)
-    np.testing.assert_array_equal(_z_up(axis, up), [0.0, 0.0, 1.0])
-    assert np.linalg.det(turned) == pytest.approx(1.0)

@@ -5,9 +5,11 @@ from app.errors import BadMotion
 from app.sim.body_size import BodySize
 from app.sim.body_track import model_points
 from app.sim.bvh import read_bvh
-from app.sim.read_options import UNITS, ReadOptions
-from app.sim.skeletons import body_track, skeleton_joints
+from app.sim.joint_names import find_joints
+from app.sim.read_options import UNITS
+from app.sim.skeletons import body_track
 from tests.sim.recorded_person import SKELETONS, TUM, bvh_text, working
+from tests.sim.recorded_skeleton import Person, skeleton
 
 NECK = "OFFSET 0.0 440.0 0.0"
 TRUTH = model_points(working(10), np.full(10, 0.95), BodySize())
@@ -27,28 +29,11 @@ def test_joints_of_every_common_skeleton_are_found(names: dict[str, str]) -> Non
 
 
 @pytest.mark.parametrize("unit", UNITS)
-def test_unit_is_found_from_the_length_of_the_arm(unit: str) -> None:
+def test_unit_is_found_without_legs_and_head(unit: str) -> None:
     text = bvh_text(working(10), unit=UNITS[unit])
-    track, found = body_track(read_bvh(text))
-    assert found == unit
+    track, reading = body_track(read_bvh(text))
+    assert reading.unit == reading.root_unit == unit
     np.testing.assert_allclose(track.points, TRUTH, atol=1e-5)
-
-
-def test_file_with_z_up_is_read_as_it_stands() -> None:
-    lines = bvh_text(working(10)).splitlines()
-    # The same person lies in a file whose z is up: turn everything at the root.
-    start = lines.index("Frame Time: 0.02") + 1
-    head = "\n".join(lines[:start])
-    rows = np.array([[float(word) for word in line.split()] for line in lines[start:]])
-    x, y, z = rows[:, :3].T.copy()
-    rows[:, :3] = np.column_stack([x, -z, y])
-    head = head.replace("6 Xposition Yposition Zposition", "6 Xposition Yposition Zposition", 1)
-    head = head.replace("Zrotation Xrotation Yrotation", "Xrotation Yrotation Zrotation", 1)
-    yaw = rows[:, 5].copy()
-    rows[:, 3:6] = np.column_stack([np.full(10, 90.0), yaw, np.zeros(10)])
-    body = "\n".join(" ".join(repr(float(one)) for one in row) for row in rows)
-    track, _ = body_track(read_bvh(f"{head}\n{body}\n"))
-    np.testing.assert_allclose(track.points, TRUTH, atol=1e-6)
 
 
 def test_pelvis_before_the_trunk_does_not_make_the_person_lean() -> None:
@@ -62,18 +47,14 @@ def test_pelvis_before_the_trunk_does_not_make_the_person_lean() -> None:
 
 def test_side_may_stand_before_or_behind_the_name() -> None:
     sides = ["Arm.L", "ForeArm.L", "Hand.L", "arm_r", "forearm_r", "hand_r"]
-    found = skeleton_joints(["Root", "Neck", *sides])
-    assert [found[name] for name in ("shoulder_l", "wrist_l", "elbow_r")] == [2, 4, 6]
+    found = find_joints(["Root", "Neck", *sides], [-1, 0, 1, 2, 3, 1, 5, 6])
+    assert [found[name] for name in ("shoulder_l", "wrist_l", "elbow_r")] == [(2,), (4,), (6,)]
 
 
 def test_missing_joint_is_named_beside_those_the_file_has() -> None:
     told = fault(bvh_text(working(10)).replace("left_hand", "left_tentacle"))
     assert "HIERARCHY has no joint that is known as wrist_l" in told
     assert "left_tentacle" in told
-
-
-def test_body_of_no_known_unit_is_refused() -> None:
-    assert "must be 0.4 to 0.75 m in one of the units" in fault(bvh_text(working(10), unit=3.0))
 
 
 def test_angles_in_radians_are_refused() -> None:
@@ -94,25 +75,14 @@ def test_positions_in_another_unit_than_the_skeleton_are_refused() -> None:
     assert "positions and offsets are probably in two units" in fault(bvh_text(q))
 
 
-def test_root_path_in_a_unit_of_its_own_is_read_where_it_is_stated() -> None:
-    lines = bvh_text(working(10), unit=0.01).splitlines()
-    start = lines.index("Frame Time: 0.02") + 1
-    for k in range(start, len(lines)):
-        place, rest = lines[k].split()[:3], lines[k].split()[3:]
-        lines[k] = " ".join([*(repr(float(one) / 100.0) for one in place), *rest])
-    options = ReadOptions(unit="cm", root_unit="m")
-    track, _ = body_track(read_bvh("\n".join(lines)), options)
-    np.testing.assert_allclose(track.points, TRUTH, atol=1e-5)
-
-
 def test_person_who_hangs_head_down_is_refused() -> None:
-    text = bvh_text(working(10)).replace(NECK, "OFFSET 0.0 -440.0 0.0")
-    assert "must point up, along y or z" in fault(text)
+    hanging = skeleton(Person(up="-y"))[0]
+    assert "must point up, along y or z, in most frames: with y up" in fault(hanging)
 
 
 def test_body_with_an_arm_of_no_length_is_refused() -> None:
     text = bvh_text(working(10)).replace("OFFSET 0.0 -290.0", "OFFSET 0.0 0.0", 1)
-    assert fault(text).startswith("upper_arm_l = 0.000 m must be 0.15 to 0.5 m long")
+    assert fault(text).startswith("upper_arm_l = 0.000 m must be 0.1")
 
 
 def test_person_whose_sides_are_mixed_up_is_refused() -> None:

@@ -54,6 +54,20 @@ class GlitchPublic(Answer):
     reason: str = Field(description="what is wrong, for people")
 
 
+class ReadingPublic(Answer):
+    """How a file was read: what was stated, else what was found."""
+
+    unit: str = Field(description="unit of lengths: a name, or metres per unit")
+    root_unit: str = Field(description="unit of the root's path")
+    up: str = Field(description="direction of the file that points up")
+    rate_hz: float = Field(description="frames per second; those that repeat count once [Hz]")
+    names: dict[str, str] = Field(description="joints of the file, by our names")
+    stature: float | None = Field(
+        description="of the recorded person, by the skeleton [m]; null for files of angles"
+    )
+    notes: list[str] = Field(description="what else was found, for people")
+
+
 class MotionItem(Answer):
     """One stored motion, in short."""
 
@@ -63,6 +77,9 @@ class MotionItem(Answer):
     created_at: datetime
     format: str = Field(description="bvh, mot, sto or csv")
     unit: str = Field(description="unit of the file's lengths, as it was found")
+    reading: ReadingPublic | None = Field(
+        default=None, description="how the file was read; null where an older version read it"
+    )
     options: dict[str, Any] = Field(
         default_factory=dict, description="what was stated about the file when it was posted"
     )

@@ -1,0 +1,156 @@
+"""BVH files of a person of known stature and posture, in any unit, axis, naming and floor."""
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from app.sim.body_track import TRACK_NAMES
+from app.sim.ports import Vec
+
+WORLD = {
+    "y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]),
+    "z": np.eye(3),
+    "-y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
+}
+"""From z up to the axis of the file that points up."""
+
+_CENTRE = (
+    ("Hips", "", (0.0, 0.0, 0.0)),
+    ("Spine", "Hips", (0.0, 0.0, 0.05)),
+    ("Chest", "Spine", (0.0, 0.0, 0.11)),
+    ("Neck", "Chest", (0.0, 0.0, 0.10)),
+    ("Head", "Neck", (0.01, 0.0, 0.05)),
+    ("HeadEnd", "Head", (0.0, 0.0, 0.13)),
+)
+_SIDE = (
+    ("{}Shoulder", "Chest", (0.0, 0.03, 0.10)),
+    ("{}Arm", "{}Shoulder", (0.0, 0.075, 0.0)),
+    ("{}ForeArm", "{}Arm", (0.0, 0.172, 0.0)),
+    ("{}Hand", "{}ForeArm", (0.0, 0.149, 0.0)),
+    ("{}UpLeg", "Hips", (0.0, 0.05, -0.03)),
+    ("{}Leg", "{}UpLeg", (0.0, 0.0, -0.245)),
+    ("{}Foot", "{}Leg", (0.0, 0.0, -0.246)),
+    ("{}ToeBase", "{}Foot", (0.08, 0.0, -0.02)),
+)
+LEG = 0.491
+"""Hip to ankle, relative to stature."""
+_CENTRES = dict(
+    zip(
+        TRACK_NAMES,
+        ("Hips", "Neck", "RightArm", "RightForeArm", "RightHand", "LeftArm", "LeftForeArm",
+         "LeftHand"),
+        strict=True,
+    )
+)  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Person:
+    """What a recording shows, and how it is written."""
+
+    stature: float = 1.72
+    bend: float = 0.0
+    """Of the spine, forward [deg]."""
+    tilt: float = 0.0
+    """Of the pelvis, forward; the legs stay upright [deg]."""
+    heading: float = 0.4
+    floor: float = 0.0
+    """Height of the floor over the file's zero [m]."""
+    unit: float = 0.01
+    root_unit: float | None = None
+    up: str = "y"
+    rest_up: str = ""
+    """Of the rest pose, where it is another."""
+    legs: bool = True
+    head: bool = True
+    named: Callable[[str], str] = str
+    n: int = 60
+    dt: float = 0.02
+
+    def without(self, role: str) -> bool:
+        """Whether a joint is left out."""
+        leg = any(part in role for part in ("Leg", "Foot", "Toe"))
+        return (leg and not self.legs) or (role in ("Head", "HeadEnd") and not self.head)
+
+
+def skeleton(who: Person) -> tuple[str, Vec]:
+    """The file of a person who sways over standing feet and works, and the joint centres.
+
+    Returns:
+        The text, and the points in order of TRACK_NAMES, z up [m], shape (n, 8, 3).
+    """
+    joints = [
+        *_CENTRE,
+        *(
+            (role.format(side), parent.format(side), (x, sign * y, z))
+            for side, sign in (("Left", 1.0), ("Right", -1.0))
+            for role, parent, (x, y, z) in _SIDE
+        ),
+    ]
+    joints = [one for one in joints if not who.without(one[0])]
+    turns, root = _motion(who)
+    children: dict[str, list[tuple[str, tuple[float, float, float]]]] = {}
+    for role, parent, offset in joints:
+        children.setdefault(parent, []).append((role, offset))
+    world, rest = WORLD[who.up], WORLD[who.rest_up or who.up]
+    lines, columns = ["HIERARCHY"], [root @ world.T / (who.root_unit or who.unit)]
+    points: dict[str, tuple[Vec, Vec]] = {}
+
+    def write(role: str, offset: tuple[float, float, float], parent: str, depth: int) -> None:
+        pad, place = "  " * depth, who.stature * np.array(offset)
+        turn = turns.get(role, np.tile(np.eye(3), (who.n, 1, 1)))
+        if parent:
+            at, above = points[parent]
+            points[role] = at + above @ place, above @ turn
+        else:
+            points[role] = root, turn
+        x, y, z = (f"{one:.7g}" for one in rest @ place / who.unit)
+        if role == "HeadEnd":
+            lines.extend([f"{pad}End Site", f"{pad}{{", f"{pad}  OFFSET {x} {y} {z}"])
+            lines.append(f"{pad}}}")
+            return
+        rotations = "Zrotation Xrotation Yrotation"
+        channels = (
+            f"3 {rotations}" if parent else f"6 Xposition Yposition Zposition {rotations}"
+        )
+        lines.append(f"{pad}{'JOINT' if parent else 'ROOT'} {who.named(role)}")
+        lines.extend([f"{pad}{{", f"{pad}  OFFSET {x} {y} {z}", f"{pad}  CHANNELS {channels}"])
+        in_file = Rotation.from_matrix((rest if parent else world) @ turn @ rest.T)
+        with warnings.catch_warnings(action="ignore"):  # where two axes are in line
+            columns.append(in_file.as_euler("ZXY", degrees=True))
+        for child, way in children.get(role, []):
+            write(child, way, role, depth + 1)
+        lines.append(f"{pad}}}")
+
+    write("Hips", (0.0, 0.0, 0.0), "", 0)
+    rows = (" ".join(f"{value:.8g}" for value in row) for row in np.hstack(columns))
+    head = ["MOTION", f"Frames: {who.n}", f"Frame Time: {who.dt}"]
+    track = np.stack([points[_CENTRES[name]][0] for name in TRACK_NAMES], axis=1)
+    return "\n".join([*lines, *head, *rows]) + "\n", track
+
+
+def _motion(who: Person) -> tuple[dict[str, Vec], Vec]:
+    """Rotations of the joints in their parents, z up, and the path of the hips [m]."""
+    t = who.dt * np.arange(who.n)
+    wave = np.sin(2.0 * t)
+
+    def about(axis: str, degrees: Vec | float) -> Vec:
+        angles = np.broadcast_to(np.asarray(degrees, dtype=float), t.shape)
+        turn: Vec = Rotation.from_euler(axis, angles[:, None], degrees=True).as_matrix()
+        return turn
+
+    sway = 10.0 * wave
+    heading = about("z", np.degrees(who.heading))
+    turns = {"Hips": heading @ about("y", who.tilt), "Spine": about("y", who.bend + 4.0 * wave)}
+    for side, sign in (("Left", 1.0), ("Right", -1.0)):
+        raised = about("y", -20.0 + 15.0 * wave - who.bend) @ about("x", -sign * 80.0)
+        turns[f"{side}Arm"] = raised
+        turns[f"{side}ForeArm"] = about("z", -sign * (50.0 + 20.0 * wave))
+        turns[f"{side}UpLeg"] = about("y", sway - who.tilt)
+    down = np.array([0.0, 0.0, -LEG * who.stature])
+    hips = turns["Hips"] @ np.array([0.0, 0.0, -0.03 * who.stature])
+    feet = np.array([0.2, 0.5, who.floor + 0.039 * who.stature])
+    return turns, feet - hips - (heading @ about("y", sway)) @ down
