@@ -244,7 +244,12 @@ def why_implausible(points: Vec, floor_z: float | None) -> str | None:
             f"bones are {ratio:.3g} times those of the median adult, a person's {least:g} to "
             f"{most:g} times{hint}"
         )
-    return None if floor_z is None else _why_not_standing(points, floor_z)
+    reason = None if floor_z is None else _why_not_standing(points, floor_z)
+    if reason is None or floor_z is None:
+        return reason
+    if _why_not_standing(points, 0.0) is None:
+        return f"{reason} (does z count from the floor here?)"
+    return f"{reason}{_axis_hint(points)}"
 
 
 def _why_not_standing(points: Vec, floor_z: float) -> str | None:
@@ -255,18 +260,18 @@ def _why_not_standing(points: Vec, floor_z: float) -> str | None:
         if not (np.isnan(height) or _BELOW_M <= height <= high):
             return (
                 f"{part} are {height:.2f} m over the floor, a person's {_BELOW_M:g} to "
-                f"{high:g} m{_axis_hint(points)}"
+                f"{high:g} m"
             )
     hips, shoulders = heights["hips"], heights["shoulders"]
     if shoulders < hips + 0.1 and hips > _FLAT_HIPS_M:
         return (
             f"hips are {hips:.2f} m over the floor and shoulders {shoulders:.2f} m: level or "
-            f"head down, a person's hips are within {_FLAT_HIPS_M:g} m{_axis_hint(points)}"
+            f"head down, a person's hips are within {_FLAT_HIPS_M:g} m"
         )
     legs = np.fmin(heights["knees"], heights["feet"])
     if shoulders < hips - _INVERTED_M and legs > hips + _INVERTED_M:
         return (
             f"shoulders are {hips - shoulders:.2f} m below the hips and legs "
-            f"{legs - hips:.2f} m above them{_axis_hint(points)}"
+            f"{legs - hips:.2f} m above them"
         )
     return None

@@ -148,6 +148,14 @@ def test_a_cameras_axes_are_named() -> None:
     )
 
 
+def test_an_origin_on_the_floor_is_named() -> None:
+    for name in ("standing", "kneeling", "lying on the back", "on a step"):
+        found = check_keypoints(posture(name, 0.0), floor_z=-0.95)
+        assert found.implausible is None or "does z count from the floor" in found.implausible
+    found = check_keypoints(posture("standing", 0.0), floor_z=FLOOR)
+    assert "does z count from the floor here?" in str(found.implausible)
+
+
 @pytest.mark.parametrize("up", [0.75, 2.0, -0.75, -2.0])
 def test_a_person_over_or_under_the_floor_is_implausible(up: float) -> None:
     points = posture("standing", FLOOR) + [0.0, 0.0, up]
