@@ -171,6 +171,8 @@ def _too_far(points: Vec, there: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """
     far = np.zeros(N_KEYPOINTS, dtype=np.bool_)
     far[there] = np.abs(points[there]).max(axis=1) > FARTHEST_M
+    if not far.any():
+        return far
     _, where, count = np.unique(points, axis=0, return_inverse=True, return_counts=True)
     repeated = far & (count[where] > 1)
     others = there & ~repeated
