@@ -7,6 +7,7 @@
     │   ├── BadMotion        a motion file has faults: each with its place
     │   └── GoalOutside      a goal lies beyond what can be answered for: axes and by how much
     ├── Conflict             the request contradicts the present state
+    │   ├── ClockJump        a frame's stamp does not continue those before
     │   └── StaleAttempt     a worker writes about a job that is no longer its own
     ├── StorageUnavailable   the database does not answer for now
     ├── StorageFull          the database or the disk has no room left
@@ -187,6 +188,46 @@ class GoalOutside(InvalidInput):
 
 class Conflict(ServiceError):
     """The request contradicts the present state."""
+
+
+class ClockJump(Conflict):
+    """The stamp of a frame does not continue the stamps before it; the frame is not taken.
+
+    Args:
+        stamp: Stamp of the frame, on the tracker's clock [s].
+        newest: Stamp of the newest frame taken [s].
+        silence: How long ago that frame arrived [s].
+        count: How many frames in a row continue each other like this.
+        needed: How many of them make the tracker's clock count as changed.
+    """
+
+    def __init__(
+        self, stamp: float, newest: float, silence: float, count: int, needed: int
+    ) -> None:
+        self.stamp, self.newest, self.silence = stamp, newest, silence
+        self.count, self.needed = count, needed
+        self.rule = (
+            f"must be later than {newest!r} s, the stamp of the frame taken {silence:.3g} s "
+            "ago, by about as much"
+        )
+        super().__init__(
+            f"t = {stamp!r} {self.rule}; this frame is not taken, and people count as stale. "
+            f"Send on: {needed} frames in a row whose stamps (in seconds) continue each other "
+            f"are taken as a change of the clock; this is number {count}. Or delete the "
+            "tracker and open a new one"
+        )
+
+    def problem(self) -> dict[str, object]:
+        """Return field, value and rule, and how far the resynchronisation is."""
+        return {
+            "field": "t",
+            "value": repr(self.stamp),
+            "rule": self.rule,
+            "choices": [],
+            "newest_t": self.newest,
+            "consistent_frames": self.count,
+            "needed_frames": self.needed,
+        }
 
 
 class NotReady(ServiceError):

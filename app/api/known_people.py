@@ -1,11 +1,14 @@
 """From the people of a request to the people a policy decides beside.
 
-Whatever describes them becomes a :class:`~app.sim.ports.Person`, with a note of how good that
-is. Key-points take some milliseconds: away from the event loop.
+Every description becomes a :class:`~app.sim.ports.Person`, with a note of how good it is. The
+policy sees a person as estimated for the present; a safety layer takes them as last observed,
+with the age of that observation, and assumes the worst of what was not seen since. Key-points
+take some milliseconds: away from the event loop.
 """
 
+import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,18 +28,30 @@ from app.sim import human
 from app.sim.cells import Cell
 from app.sim.keypoints import keypoints_of
 from app.sim.person_estimate import PersonEstimate
-from app.sim.ports import Person
+from app.sim.ports import OutsideField, Person
 from app.sim.scene import arm_of, people_of
-from app.sim.seen_people import as_person, nearest_index, standing_in
+from app.sim.seen_people import (
+    as_monitored,
+    as_person,
+    nearest_index,
+    person_anywhere,
+    standing_in,
+)
 from app.sim.single_frame import estimate_once
+
+_PERSON = re.compile(r"^people\[(\d+)\]")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KnownPerson:
-    """One person as a policy takes them, and where that is from."""
+    """One person of a request, as a policy and a safety layer take them."""
 
-    person: Person
-    """Joints, size, perhaps a cylinder."""
+    person: Person | None
+    """As the policy sees them at present; None: a tracker has never seen this person."""
+    observed: Person | None
+    """As a safety layer takes them: where they were last observed; None: nobody is there."""
+    age_s: float = 0.0
+    """Age of that observation [s]."""
     source: Source
     """What the request told."""
     speeds: Speeds
@@ -46,7 +61,9 @@ class KnownPerson:
 
     def use(self, seen: bool) -> PersonUse:
         """Return what the answer says of this person."""
-        return PersonUse.from_domain(self.source, seen, self.speeds, self.person, self.estimate)
+        return PersonUse.from_domain(
+            self.source, seen, self.speeds, self.person, self.observed, self.estimate
+        )
 
 
 def known_people(
@@ -67,6 +84,25 @@ def known_people(
     )
 
 
+def renumbered(
+    outside: Sequence[OutsideField], places: Sequence[int]
+) -> tuple[OutsideField, ...]:
+    """Return fields of a decision by the numbers that people have in the request.
+
+    Args:
+        outside: Fields; ``people[i]`` is the ``i``-th person whom the policy sees.
+        places: Place in the request of each person whom the policy sees.
+    """
+
+    def in_request(found: re.Match[str]) -> str:
+        i = int(found[1])
+        return f"people[{places[i] if i < len(places) else i}]"
+
+    return tuple(
+        replace(one, field=_PERSON.sub(in_request, one.field, count=1)) for one in outside
+    )
+
+
 def take_time(entries: Sequence[PersonInput]) -> bool:
     """Return whether making persons of these takes more than a moment."""
     return any(isinstance(entry, KeypointsPerson | TrackedPerson) for entry in entries)
@@ -77,11 +113,13 @@ def _known(
 ) -> KnownPerson:
     if isinstance(entry, PersonState):
         person = entry.to_domain(cell, place)
-        return KnownPerson(person=person, source="joint-angles", speeds="given")
+        return KnownPerson(
+            person=person, observed=person, source="joint-angles", speeds="given"
+        )
     if isinstance(entry, CylinderPerson):
         seen = entry.x, entry.y, entry.vx, entry.vy, entry.r, entry.growth
         person = standing_in(*seen, past=entry.remembered())
-        return KnownPerson(person=person, source="cylinder", speeds="given")
+        return KnownPerson(person=person, observed=person, source="cylinder", speeds="given")
     if isinstance(entry, KeypointsPerson):
         return _from_keypoints(entry, place, cell)
     return _from_tracker(entry, place, cell, trackers)
@@ -95,7 +133,13 @@ def _from_keypoints(entry: KeypointsPerson, place: str, cell: Cell) -> KnownPers
     person = as_person(estimate)
     assert person is not None  # estimate_once always tells a cylinder
     said: Speeds = "zero" if speeds is None else "given"
-    return KnownPerson(person=person, source="keypoints", speeds=said, estimate=estimate)
+    return KnownPerson(
+        person=person,
+        observed=as_monitored(estimate) if estimate.held else person,
+        source="keypoints",
+        speeds=said,
+        estimate=estimate,
+    )
 
 
 def _from_tracker(
@@ -115,15 +159,19 @@ def _from_tracker(
     if entry.person >= session.n_people:
         rule = f"must be less than {session.n_people}, the people this tracker follows"
         raise refused("person", entry.person, rule)
-    try:
-        _, estimates = session.estimates(entry.t)
-    except InvalidInput as error:
-        raise refused(error.field, error.value, error.rule) from None
-    estimate = estimates[entry.person]
-    person = as_person(estimate)
-    if person is None:
-        raise refused("person", entry.person, "has never been seen by this tracker")
-    return KnownPerson(person=person, source="tracker", speeds="estimated", estimate=estimate)
+    known, i = session.people(entry.t), entry.person
+    estimate, last = known.estimates[i], known.observed[i]
+    observed = None if last is None else as_monitored(last)
+    if observed is None and "stale" in estimate.flags:
+        observed = person_anywhere()
+    return KnownPerson(
+        person=as_person(estimate),
+        observed=observed,
+        age_s=known.observed_age_s[i],
+        source="tracker",
+        speeds="estimated",
+        estimate=estimate,
+    )
 
 
 def warm_up(cell: Cell) -> None:

@@ -8,8 +8,8 @@ as text messages, one after the other, and gives the same answers in their order
 import asyncio
 import json
 import logging
-import math
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -18,11 +18,12 @@ from pydantic import ValidationError
 from starlette.concurrency import run_in_threadpool
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from app.api.known_people import known_people, take_time
+from app.api.known_people import known_people, renumbered, take_time
 from app.api.problems import problem, service_problem, validation_problem
-from app.api.schemas.motion import MotionAnswer, MotionRequest
+from app.api.schemas.motion import MotionAnswer, MotionRequest, PersonMet
 from app.api.services import Services, ServicesDep, services_of
 from app.api.task_selection import known_cell
+from app.api.tracker_sessions import TrackerSessions
 from app.errors import ServiceError
 from app.policies.motion_decision import MotionDecider
 from app.sim.cells import Cell, require_cell
@@ -61,7 +62,7 @@ async def answer(request: MotionRequest, services: Services) -> MotionAnswer:
     cell = await known_cell(request.cell, services)
     decider = await _decider(request.checkpoint, services)
     require_cell(cell, decider.actor.cell, decider.actor.cell_sha256)
-    decided = partial(_decided, request, cell, decider, services)
+    decided = partial(decide, request, cell, decider, services.trackers)
     # A decision without looking ahead takes less than a millisecond: right here then.
     if request.ahead is not False or take_time(request.people):
         return await run_in_threadpool(decided)
@@ -81,18 +82,43 @@ async def _decider(name: str | None, services: Services) -> MotionDecider:
     return found
 
 
-def _decided(
-    request: MotionRequest, cell: Cell, decider: MotionDecider, services: Services
+def decide(
+    request: MotionRequest, cell: Cell, decider: MotionDecider, trackers: TrackerSessions
 ) -> MotionAnswer:
-    people = known_people(request.people, cell, services.trackers)
-    ages = [one.estimate.age_s for one in people if one.estimate is not None]
-    ages = [age for age in ages if math.isfinite(age)]  # inf: nothing was ever seen
+    """Return the answer to one request by a policy of its cell.
+
+    Args:
+        request: State, people and goal.
+        cell: The work cell it names.
+        decider: The policy, trained in that cell.
+        trackers: Those that requests may name.
+
+    Raises:
+        ServiceError: There is none; says why.
+    """
+    people = known_people(request.people, cell, trackers)
+    present = [i for i, one in enumerate(people) if one.person is not None]
+    monitored = [i for i, one in enumerate(people) if one.observed is not None]
+    as_seen = all(one.observed is one.person for one in people)
     question = request.to_domain(
-        [one.person for one in people], safety_settings(cell), max(ages, default=0.0)
+        [one.person for one in people if one.person is not None],
+        None if as_seen else [one.observed for one in people if one.observed is not None],
+        safety_settings(cell),
+        max((one.age_s for one in people), default=0.0),
     )
     with request.robot.faults_in_place():
         decision = decider.decide(question)
-    uses = [one.use(i == decision.seen) for i, one in enumerate(people)]
+    decision = replace(
+        decision,
+        seen=None if decision.seen is None else present[decision.seen],
+        terms_of=None if decision.terms_of is None else monitored[decision.terms_of],
+        outside=renumbered(decision.outside, present),
+    )
+    met = dict(zip(present, decision.met, strict=True))
+    uses = [
+        PersonMet.from_use(one.use(i == decision.seen), met.get(i))
+        for i, one in enumerate(people)
+    ]
     return MotionAnswer.from_domain(decision, question, uses, cell.robot.dt, request.stamp)
 
 

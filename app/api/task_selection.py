@@ -1,11 +1,12 @@
 """The critic's choice among tasks, for other programs (thesis chapter 5, METHOD 3.1)."""
 
+from dataclasses import replace
 from functools import partial
 
 from fastapi import APIRouter
 from starlette.concurrency import run_in_threadpool
 
-from app.api.known_people import known_people, take_time
+from app.api.known_people import known_people, renumbered, take_time
 from app.api.schemas.task_selection import TaskSelection, TaskSelectionRequest
 from app.api.services import Services, ServicesDep
 from app.api.world_policies import require_mover
@@ -41,8 +42,14 @@ async def choose(request: TaskSelectionRequest, services: ServicesDep) -> TaskSe
 
     def answer() -> TaskSelection:
         people = known_people(request.people, cell, services.trackers)
+        present = [i for i, one in enumerate(people) if one.person is not None]
         with request.robot.faults_in_place():
-            decision = decide([one.person for one in people])
+            decision = decide([one.person for one in people if one.person is not None])
+        decision = replace(
+            decision,
+            seen=None if decision.seen is None else present[decision.seen],
+            outside=renumbered(decision.outside, present),
+        )
         uses = [one.use(i == decision.seen) for i, one in enumerate(people)]
         return TaskSelection.from_domain(decision, candidates, uses, request.stamp)
 

@@ -1,27 +1,56 @@
-"""Trackers that are being listened to: their estimators, kept between frames.
+"""Sessions of trackers: the estimators of their people, kept between frames.
 
-A session is opened, fed frame by frame and closed; one that nobody uses ends by itself. There
-is room for a stated number of them. A session's estimates are made under its own lock, so that
-frames of one camera come in order and different cameras do not wait for each other.
+A session is opened, fed frame by frame and closed; an unused one ends by itself. Their number
+is limited. A session's estimates are made under its own lock, so that frames of one camera come
+in order and different cameras do not wait for each other.
+
+The age of what a tracker reports counts from the arrival of its newest frame
+(:mod:`app.sim.stamp_timeline`), on a clock that goes on while the machine is suspended.
 """
 
 import secrets
 import threading
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
-from app.errors import Conflict, InvalidInput, NotFound
+from app.errors import Conflict, NotFound
 from app.sim.people_estimate import PeopleEstimator
-from app.sim.person_estimate import PersonEstimate
+from app.sim.person_estimate import Flag, PersonEstimate
 from app.sim.ports import Vec
+from app.sim.stamp_timeline import StampTimeline
 
 MAX_SESSIONS = 32
 """Most trackers at once."""
 IDLE_S = 300.0
 """Time after which a tracker that nobody used ends [s]."""
-MAX_SILENCE_S = 3600.0
-"""How far beyond the newest frame an estimate may be asked for [s]."""
+
+
+def service_clock() -> float:
+    """Return the time of the service's clock [s].
+
+    It never runs backwards, and on Linux it counts the time for which the machine was
+    suspended: people have moved on meanwhile.
+    """
+    if hasattr(time, "CLOCK_BOOTTIME"):
+        return time.clock_gettime(time.CLOCK_BOOTTIME)
+    return time.monotonic()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrackedPeople:
+    """A tracker's people at one moment."""
+
+    t: float | None
+    """The moment, on the tracker's clock [s]; None before the first frame."""
+    since_frame_s: float
+    """Time since the newest frame, or since the tracker was opened where none has come [s]."""
+    estimates: tuple[PersonEstimate, ...]
+    """Estimate of each track, predicted for the moment."""
+    observed: tuple[PersonEstimate | None, ...]
+    """Estimate of each track at the last frame that showed its person; None: no frame did."""
+    observed_age_s: tuple[float, ...]
+    """Age of each observation at the moment [s]; without one, ``since_frame_s``."""
 
 
 @dataclass(slots=True, kw_only=True)
@@ -35,57 +64,95 @@ class TrackerSession:
     n_people: int
     """Most people it follows."""
     estimator: PeopleEstimator
-    """What is known of them."""
-    t: float | None = None
-    """Time of its newest frame [s]."""
+    """Estimates its people, on the timeline."""
+    timeline: StampTimeline
+    """Maps its stamps to time."""
+    clock: Callable[[], float]
+    """The service's clock [s]."""
     n_frames: int = 0
-    """Frames taken in."""
+    """Frames taken."""
     used_at: float = 0.0
     """When it was last used, on the service's clock [s]."""
     lock: threading.Lock = field(default_factory=threading.Lock)
     """Held while its estimator works."""
 
+    @property
+    def t(self) -> float | None:
+        """Stamp of its newest frame [s]; None before the first."""
+        return self.timeline.stamp
+
     def take(
-        self, t: float, people: Sequence[Vec], confidences: Sequence[Vec]
+        self, t: float, arrived: float, people: Sequence[Vec], confidences: Sequence[Vec]
     ) -> tuple[PersonEstimate, ...]:
-        """Take one frame of all people in.
+        """Take one frame of all people and return the estimates at its time.
+
+        Args:
+            t: When the frame was taken, tracker's clock [s].
+            arrived: When it arrived, service's clock [s].
+            people: Key-points of each person [m], shape (25, 3) each, NaN where missing.
+            confidences: Trust in them, shape (25,) each.
 
         Raises:
-            InvalidInput: See :meth:`PeopleEstimator.update`; nothing is taken in then.
+            ClockJump: ``t`` does not continue the frames before; the frame is not taken.
+            InvalidInput: See :meth:`PeopleEstimator.update`; the frame is not taken.
         """
         with self.lock:
-            estimates = self.estimator.update(t, people, confidences)
-            self.t, self.n_frames = t, self.n_frames + 1
+            at = self.timeline.offer(t, arrived)
+            estimates = self.estimator.update(at, people, confidences)
+            self.timeline.accept(t, at, arrived)
+            self.n_frames += 1
+            return self._flagged(estimates)
+
+    def people(self, t: float | None = None) -> TrackedPeople:
+        """Return what is known of its people now.
+
+        Args:
+            t: The present on the tracker's clock, as the caller has it [s]. It counts where it
+                makes people older than the arrival of the newest frame does.
+        """
+        with self.lock:
+            newest = self.timeline.stamp
+            since = self.timeline.ahead(self.clock(), t)
+            at = since if self.timeline.time is None else self.timeline.time + since
+            observed = self.estimator.observed
+            ages = [since if one is None else at - one.t + one.carried_s for one in observed]
+            return TrackedPeople(
+                t=None if newest is None else newest + since,
+                since_frame_s=since,
+                estimates=self._flagged(self.estimator.at(at), since),
+                observed=tuple(observed),
+                observed_age_s=tuple(ages),
+            )
+
+    def _flagged(
+        self, estimates: tuple[PersonEstimate, ...], since_frame_s: float = 0.0
+    ) -> tuple[PersonEstimate, ...]:
+        """Return estimates that also name the silence of the tracker and a jump of its clock.
+
+        A person who was never seen is only known to be absent while frames arrive.
+        """
+        added: list[Flag] = []
+        if self.timeline.out_of_step or self.timeline.jumped:
+            added.append("clock-jump")
+        silent = since_frame_s > self.estimator.settings.stale_s
+        if self.timeline.out_of_step or self.timeline.stamp is None or silent:
+            added.append("stale")
+        if not added:
             return estimates
-
-    def estimates(self, t: float | None) -> tuple[float, tuple[PersonEstimate, ...]]:
-        """Return what is known at ``t``, by default at the newest frame, and that time [s].
-
-        Raises:
-            InvalidInput: There is no frame yet, or ``t`` is before the newest or long after.
-        """
-        with self.lock:
-            newest = self.t
-            if newest is None:
-                raise InvalidInput("tracker", self.id, "must have had a frame before")
-            at = newest if t is None else t
-            if not newest <= at <= newest + MAX_SILENCE_S:
-                rule = (
-                    f"must lie within {MAX_SILENCE_S:g} s after the newest frame, {newest:g} s"
-                )
-                raise InvalidInput("t", at, rule)
-            return at, self.estimator.at(at)
+        return tuple(
+            replace(one, flags=tuple(dict.fromkeys((*one.flags, *added)))) for one in estimates
+        )
 
 
 class TrackerSessions:
     """The sessions that are open; safe to use from any thread.
 
     Args:
-        clock: Tells the time [s], by default one that never goes back.
+        clock: Returns the time [s]; must never run backwards.
     """
 
-    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        self._clock = clock
+    def __init__(self, clock: Callable[[], float] = service_clock) -> None:
+        self.clock = clock
         self._lock = threading.Lock()
         self._sessions: dict[str, TrackerSession] = {}
 
@@ -108,6 +175,8 @@ class TrackerSessions:
             cell=cell,
             n_people=n_people,
             estimator=PeopleEstimator(n_people, size, floor_z=floor_z),
+            timeline=StampTimeline(self.clock()),
+            clock=self.clock,
         )
         with self._lock:
             self._forget_idle()
@@ -116,7 +185,7 @@ class TrackerSessions:
                     f"{MAX_SESSIONS} trackers are open, the most there may be: delete one, or "
                     f"wait: one that nobody uses ends after {IDLE_S:g} s"
                 )
-            session.used_at = self._clock()
+            session.used_at = self.clock()
             self._sessions[session.id] = session
         return session
 
@@ -131,7 +200,7 @@ class TrackerSessions:
             session = self._sessions.get(session_id)
             if session is None:
                 raise NotFound("tracker", session_id)
-            session.used_at = self._clock()
+            session.used_at = self.clock()
             return session
 
     def close(self, session_id: str) -> None:
@@ -151,7 +220,7 @@ class TrackerSessions:
             return list(self._sessions.values())
 
     def _forget_idle(self) -> None:
-        now = self._clock()
+        now = self.clock()
         for session in list(self._sessions.values()):
             if now - session.used_at > IDLE_S:
                 del self._sessions[session.id]

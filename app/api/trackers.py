@@ -46,12 +46,16 @@ async def take_frame(
     """Take one frame of all people in and return what is known of each at its time.
 
     Who is who is found out from where people were, so their order means nothing; what is
-    missing, held, exchanged or not credible is named, and so are people who are not followed.
+    missing, held, exchanged or not credible is named, and so are people who are not
+    followed. A frame whose stamp does not continue
+    the frames before is not taken (409); the third such frame in a row is, as a change of the
+    tracker's clock.
     """
+    arrived = services.trackers.clock()
     session = services.trackers.get(tracker_id)
     seen = [one.points() for one in body.people]
     points, trust = [one[0] for one in seen], [one[1] for one in seen]
-    estimates = await run_in_threadpool(session.take, body.t, points, trust)
+    estimates = await run_in_threadpool(session.take, body.t, arrived, points, trust)
     rest = session.estimator.unfollowed
     return EstimatesPublic.from_domain(tracker_id, body.t, estimates, rest)
 
@@ -64,15 +68,19 @@ async def get_one(
         float | None,
         Query(
             allow_inf_nan=False,
-            description="time to tell them for [s]; that of the newest frame if left out",
+            description="the present on the tracker's clock [s]: it counts where it makes the "
+            "people older than the arrival of the newest frame does",
         ),
     ] = None,
 ) -> EstimatesPublic:
-    """Return the estimates at a time not earlier than the newest frame."""
+    """Return the estimates of all people at present.
+
+    Ages count from the arrival of the newest frame.
+    """
     session = services.trackers.get(tracker_id)
-    at, estimates = await run_in_threadpool(session.estimates, t)
+    known = await run_in_threadpool(session.people, t)
     rest = session.estimator.unfollowed
-    return EstimatesPublic.from_domain(tracker_id, at, estimates, rest)
+    return EstimatesPublic.from_domain(tracker_id, known.t, known.estimates, rest)
 
 
 @router.delete("/{tracker_id}", status_code=204, summary="Listen to a tracker no longer")

@@ -45,8 +45,6 @@ from app.sim.seen_people import as_known, checked_people, checked_vector, standi
 
 RANGE_SLACK = 0.02
 """Inputs this far outside what was met in training are not flagged [m, rad or per second]."""
-LONGEST_S = 60.0
-"""Longest time left to reach a goal [s]."""
 _FAR = np.full(3, 10.0)
 HUMAN = ("x", "y", "vx", "vy", "r", "growth")
 """What a policy sees of a person."""
@@ -95,6 +93,7 @@ class MotionDecider:
             actor.trained_range, {"q": 6, "qd": 6, "goal": 3, "human": len(HUMAN)}
         )
         self._stages: dict[tuple[int, int], Stage] = {}
+        self._last: dict[tuple[int, int], Stage] = {}
         self._aheads: dict[Stage, Lookahead] = {}
         self._layer = SafetyLayer(self.arm, SafetySettings())
         self._busy = threading.Lock()
@@ -119,7 +118,8 @@ class MotionDecider:
         order = _bodies_first(people)
         known = [people[i] for i in order]
         with self._busy:
-            stage, time_left = self._stage(known), min(question.time_left_s, HORIZON_S)
+            stage = self._stage(known, self._stages)
+            time_left = min(question.time_left_s, HORIZON_S)
             stage.put(robot.measured, known, time_left)
             apart, clearance = stage.apart.tolist(), stage.clear.tolist()
             distance, shapes = math.dist(stage.tcp, goal), stage.shapes
@@ -133,7 +133,8 @@ class MotionDecider:
             act, targets, weights, seen = self._act(stage, question, goal, way)
             began = self._improve(stage, question, goal, act) if looks else None
             piece, unfeasible = self._piece(robot, act)
-            safe, terms_of, terms = self._monitored(question, robot, piece, shapes, order)
+            shapes, places = self._observed(question.observed, robot) or (shapes, order)
+            safe, terms_of, terms = self._monitored(question, robot, piece, shapes, places)
             state = np.concatenate((robot.clamped.q, robot.clamped.qd, goal))
             told = _as_told(seen, known, viewed)
             outside = [one for two in told for one in self._outside(state, *two, order)]
@@ -190,8 +191,8 @@ class MotionDecider:
         goal = checked_vector("goal", question.goal, 3, -_FAR, _FAR, "m")
         for name in ("time_left_s", "elapsed_s", "age_s"):
             value = getattr(question, name)
-            if not 0.0 <= value <= LONGEST_S:
-                raise InvalidInput(name, value, f"must lie in [0, {LONGEST_S:g}] s")
+            if not 0.0 <= value < math.inf:
+                raise InvalidInput(name, value, "must be finite and not negative [s]")
         if question.beside not in BESIDES:
             raise InvalidInput("beside", question.beside, "must name a rule", BESIDES)
         return robot, goal
@@ -230,12 +231,25 @@ class MotionDecider:
         act[:] = played[0]
         return OTHERS[chosen]
 
-    def _stage(self, people: Sequence[Person]) -> Stage:
+    def _observed(
+        self, observed: Sequence[Person] | None, robot: MeasuredState
+    ) -> tuple[Shapes, list[int]] | None:
+        """Return people as last observed, bodies first, and their places; None: as seen."""
+        if observed is None:
+            return None
+        people = checked_people(observed)
+        places = _bodies_first(people)
+        last = [people[i] for i in places]
+        stage = self._stage(last, self._last)
+        stage.put(robot.measured, last, 0.0)
+        return stage.shapes, places
+
+    def _stage(self, people: Sequence[Person], stages: dict[tuple[int, int], Stage]) -> Stage:
         n_bodies = sum(person.cylinder is None for person in people)
         kinds = (n_bodies, len(people) - n_bodies)
-        if kinds not in self._stages:
-            self._stages[kinds] = Stage(self.cell, *kinds, self.actor.view)
-        return self._stages[kinds]
+        if kinds not in stages:
+            stages[kinds] = Stage(self.cell, *kinds, self.actor.view)
+        return stages[kinds]
 
     def _act(
         self, stage: Stage, question: MotionQuestion, goal: Vec, way: Way

@@ -32,7 +32,7 @@ _Q_MIN, _Q_MAX = human.Q_MIN.copy(), human.Q_MAX.copy()
 _Q_MIN[:2], _Q_MAX[:2] = -np.inf, np.inf  # a person far away is there, not at the model's 5 m
 
 
-_FITTED = ("neck", *(f"{part}_{s}" for part in ("shoulder", "elbow", "wrist") for s in "rl"))
+FITTED = ("neck", *(f"{part}_{s}" for part in ("shoulder", "elbow", "wrist") for s in "rl"))
 """Key-points that are joints of the model, besides the pelvis, whose height is given."""
 _TRUNK = ("neck", "shoulder_r", "shoulder_l")
 
@@ -92,9 +92,9 @@ def fit_errors(q: Vec, size: Vec, points: Vec) -> tuple[float, float]:
         and shoulders and of the error of the hips' height, which the model does not fit.
     """
     joints = human.joint_points(q, size)
-    away = [float(np.linalg.norm(points[K[name]] - joints[name])) for name in _FITTED]
+    away = [float(np.linalg.norm(points[K[name]] - joints[name])) for name in FITTED]
     hips = abs(float(points[K["mid_hip"], 2] - joints["pelvis"][2]))
-    trunk = [_median(one for one, name in zip(away, _FITTED, strict=True) if name in _TRUNK)]
+    trunk = [_median(one for one, name in zip(away, FITTED, strict=True) if name in _TRUNK)]
     return _median(away), max((d for d in (*trunk, hips) if d == d), default=math.nan)
 
 

@@ -30,7 +30,10 @@ class MotionQuestion:
     goal: Vec
     """Where the tcp shall be, robot's base frame [m], shape (3,)."""
     people: Sequence[Person] = ()
-    """The people in the cell, at most four."""
+    """The people in the cell as the policy sees them, at most four."""
+    observed: Sequence[Person] | None = None
+    """The people as a safety layer takes them: as last observed, ``age_s`` ago, at most four;
+    None: as in ``people``."""
     qdd: Vec | None = None
     """Joint accelerations [rad/s^2], shape (6,); a policy that limits jerk needs them."""
     way: Way | None = None
@@ -47,7 +50,7 @@ class MotionQuestion:
     safety: SafetySettings | None = None
     """What speed and separation monitoring assumes; None leaves it out."""
     age_s: float = 0.0
-    """How old the people are beyond the tracker's delay [s]."""
+    """How old the observation of the people is beyond the tracker's delay [s]."""
 
 
 class TargetWeight(NamedTuple):
@@ -91,12 +94,11 @@ class MotionDecision:
     seen: int | None
     """Who is nearest; None for nobody."""
     safe: SafetyDecision | None
-    """What is executed of the piece; None without monitoring. Its ``person`` counts as the
-    question does."""
+    """What is executed of the piece; None without monitoring."""
     terms: SeparationTerms | None
     """S_p for whoever set the override, else for the nearest; None where nobody is there."""
     terms_of: int | None
-    """Whose terms these are."""
+    """Whose terms these are: place in ``observed`` of the question."""
     clearance: tuple[float, float, float]
     """Distances to people, cell and the robot itself [m]."""
     distance: float

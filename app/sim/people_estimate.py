@@ -113,6 +113,8 @@ class PeopleEstimator:
         self._order: list[int | None] = [None] * n_people
         self._flags: list[tuple[Flag, ...]] = [()] * n_people
         self._foreign: str | None = None
+        self.observed: list[PersonEstimate | None] = [None] * n_people
+        """Estimate of each track at the last frame that showed its person; None: none did."""
         self._waiting: list[Vec] = []
         self._waiting_since = 0.0
         self.unfollowed: tuple[Unfollowed, ...] = ()
@@ -150,7 +152,11 @@ class PeopleEstimator:
         for i, (track, j) in enumerate(zip(self._tracks, order, strict=True)):
             track.take_frame(t, _NOBODY if j is None else frames[j], fresh=i in replaced)
         self._tell(t, frames, order, replaced)
-        return self.at(t)
+        estimates = self.at(t)
+        for i, track in enumerate(self._tracks):
+            if track.unseen_s(t) == 0.0:
+                self.observed[i] = estimates[i]
+        return estimates
 
     def _assign(self, t: float, seen: Mapping[int, Vec]) -> tuple[list[int | None], set[int]]:
         """Return who continues each track, and which tracks are taken over by others."""

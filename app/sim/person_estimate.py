@@ -37,7 +37,7 @@ from numpy.typing import ArrayLike, NDArray
 from app.errors import InvalidInput
 from app.sim import human
 from app.sim.kernels.body import N_SIZE
-from app.sim.keypoint_angles import fit_errors, joint_angles, joint_motion
+from app.sim.keypoint_angles import FITTED, fit_errors, joint_angles, joint_motion
 from app.sim.keypoint_check import Keypoints, check_keypoints
 from app.sim.keypoint_cylinder import (
     CylinderSettings,
@@ -51,6 +51,7 @@ from app.sim.keypoints import (
     GROUPS,
     N_KEYPOINTS,
     Group,
+    K,
     faces_backward,
     swap_sides,
     swapped_against,
@@ -70,11 +71,14 @@ Flag = Literal[
     "outliers",
     "jump",
     "restarted",
+    "clock-jump",
     "stale",
     "misfit",
 ]
 _SWAPPED: dict[Group, Flag] = {"arms": "arms-swapped", "legs": "legs-swapped"}
 """Groups whose sides are judged; eyes and ears are too near each other, and decide nothing."""
+_DECIDING = [K[name] for name in (*FITTED, "mid_hip", "hip_r", "hip_l")]
+"""Key-points that decide joint angles."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,6 +137,9 @@ class PersonEstimate:
     """Key-points of the last frame whose numbers cannot be used."""
     implausible: str | None = None
     """Why nobody can stand in this frame as the last key-points say; None: somebody can."""
+    carried_s: float = 0.0
+    """Longest time for which a key-point of trunk or arms is carried on without having been
+    seen [s]; at most the hold time."""
 
     @property
     def stale(self) -> bool:
@@ -334,7 +341,14 @@ class PersonEstimator:
             flags=tuple(flags),
             unusable=() if self._frame is None else self._frame.unusable,
             implausible=None if self._frame is None else self._frame.implausible,
+            carried_s=self._carried_at(t),
         )
+
+    def _carried_at(self, t: float) -> float:
+        """Return for how long the key-points of trunk and arms are carried on at most [s]."""
+        carried = t - self._points.seen_at[_DECIDING]
+        known = carried <= self.settings.filter.hold_s
+        return float(carried[known].max(initial=0.0))
 
     def person_at(self, t: float) -> Person | None:
         """Return joint angles and speeds alone at ``t`` [s], as :meth:`at` has them."""

@@ -93,21 +93,44 @@ def standing_in(
 
 
 def as_person(estimate: PersonEstimate) -> Person | None:
-    """Return the person that an estimate is seen as; None where nobody was ever seen.
+    """Return the person that an estimate is seen as; None where there never was one.
 
     Where pelvis and trunk were never seen together there are no joint angles; then the person
     is as good as their safety cylinder.
     """
-    cylinder, person = estimate.cylinder, estimate.person
-    if person is not None:
-        # An estimate that is moved on for long must not cost the decision.
-        q, qd = np.clip(person.q, _Q_LOW, _Q_HIGH), np.clip(person.qd, -FASTEST, FASTEST)
-        return replace(person, q=q, qd=qd)
+    if estimate.person is None:
+        return _in_cylinder(estimate)
+    # An estimate that is moved on for long must not cost the decision.
+    person = estimate.person
+    q, qd = np.clip(person.q, _Q_LOW, _Q_HIGH), np.clip(person.qd, -FASTEST, FASTEST)
+    return replace(person, q=q, qd=qd)
+
+
+def as_monitored(observed: PersonEstimate) -> Person | None:
+    """Return the person that a safety layer takes an observation as; None where there is none.
+
+    A joint that nothing shows may have any angle; then the person is the safety cylinder, which
+    is as wide as the unseen limbs reach.
+
+    Args:
+        observed: The estimate at the last frame that showed the person.
+    """
+    return _in_cylinder(observed) if observed.held else as_person(observed)
+
+
+def _in_cylinder(estimate: PersonEstimate) -> Person | None:
+    """Return a person who stands in the safety cylinder of an estimate; None without one."""
+    cylinder = estimate.cylinder
     if cylinder is None:
         return None
     x, y = np.clip(cylinder.center, -FARTHEST_M, FARTHEST_M).tolist()
     vx, vy = np.clip(cylinder.velocity, -FASTEST, FASTEST).tolist()
     return standing_in(x, y, vx, vy, min(cylinder.radius, WIDEST), measured=False)
+
+
+def person_anywhere() -> Person:
+    """Return the person that a safety layer assumes where nothing is known: it stops."""
+    return standing_in(0.0, 0.0, 0.0, 0.0, WIDEST, measured=False)
 
 
 def degradations(person: Person) -> tuple[str, ...]:

@@ -263,7 +263,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"goal": np.array([0.0, 11.0, 0.3])}, r"goal\[1\]"),
     ({"time_left_s": -1.0}, "time_left_s"),
     ({"time_left_s": float("nan")}, "time_left_s"),
-    ({"elapsed_s": 61.0}, "elapsed_s"),
+    ({"elapsed_s": -1.0}, "elapsed_s"),
     ({"elapsed_s": float("nan")}, "elapsed_s"),
     ({"age_s": float("inf")}, "age_s"),
     ({"way": "around"}, "choices: interpolated, direct"),

@@ -12,7 +12,7 @@ from app.api.schemas.people import PersonInput, PersonUse
 from app.api.schemas.robot_state import ROS_NAMES, RobotState
 from app.api.schemas.task_selection import Outside, Stamp
 from app.sim.human import CAPSULE_NAMES
-from app.sim.motion_ports import Beside, MotionDecision, MotionQuestion, Way
+from app.sim.motion_ports import Beside, Met, MotionDecision, MotionQuestion, Way
 from app.sim.pick import Piece
 from app.sim.ports import Person, Vec
 from app.sim.safety import SafetyDecision, SafetySettings, SeparationTerms, powers_of_time
@@ -103,11 +103,11 @@ class MotionRequest(Body):
         "go on as forecast, and changed where that ends in a contact; null does where the "
         "policy allows it",
     )
-    time_left_s: Annotated[float, Field(ge=0.0, le=60.0)] = Field(
+    time_left_s: Annotated[float, Field(ge=0.0, le=1e9)] = Field(
         5.0,
         description="time left to reach the goal, of which the policy sees at most 5 [s]",
     )
-    elapsed_s: Annotated[float, Field(ge=0.0, le=60.0)] = Field(
+    elapsed_s: Annotated[float, Field(ge=0.0, le=1e9)] = Field(
         0.0,
         description="time for which this goal has been sought [s]: from 1 on, other ways are "
         "tried, too, where the policy's leads neither to the goal nor into a contact",
@@ -117,24 +117,29 @@ class MotionRequest(Body):
         description="speed and separation monitoring: by default as the cell says; null leaves "
         "it out, and people inside the robot are then refused",
     )
-    age_s: Annotated[float, Field(ge=0.0, le=5.0)] = Field(
+    age_s: Annotated[float, Field(ge=0.0, le=1e9)] = Field(
         0.0,
-        description="how old the people are beyond `tracker_delay` [s]; the age of what a "
-        "tracker tells is added",
+        description="how old the people are beyond `tracker_delay` [s]; the age of a tracker's "
+        "observation, which counts from the arrival of its frame, is added",
     )
     checkpoint: str | None = Field(
         None, max_length=64, description="SHA-256 or alias; the shipped policy if null"
     )
 
     def to_domain(
-        self, people: Sequence[Person], own: SafetySettings, age_s: float
+        self,
+        people: Sequence[Person],
+        observed: Sequence[Person] | None,
+        own: SafetySettings,
+        age_s: float,
     ) -> MotionQuestion:
         """Return the question.
 
         Args:
-            people: Those of the request, as the simulator's data.
+            people: Those of the request, as the policy sees them.
+            observed: As last observed; None: like ``people``.
             own: What the cell says about safety.
-            age_s: How old the oldest of them is by its own tracker [s].
+            age_s: Age of the oldest observation, by its tracker [s].
         """
         robot = self.robot
         return MotionQuestion(
@@ -143,6 +148,7 @@ class MotionRequest(Body):
             qdd=None if robot.qdd is None else robot.joints(robot.qdd),
             goal=np.array(self.goal),
             people=people,
+            observed=observed,
             way=self.way,
             beside=self.beside,
             ahead=self.ahead,
@@ -290,8 +296,16 @@ class Distances(Answer):
 class PersonMet(PersonUse):
     """What was made of one person, and how near."""
 
-    separation: float = Field(description="distance to the robot [m]; below 0: inside it")
+    separation: float | None = Field(
+        description="distance to the robot [m]; below 0: inside it; null: never seen"
+    )
     weight: float = Field(description="share of the action beside this person")
+
+    @classmethod
+    def from_use(cls, use: PersonUse, met: Met | None) -> Self:
+        """Make it from what was made of a person; ``met`` is None without distance."""
+        separation, weight = (None, 0.0) if met is None else met
+        return cls(**dict(use), separation=separation, weight=weight)
 
 
 class MotionAnswer(Answer):
@@ -340,7 +354,7 @@ class MotionAnswer(Answer):
         cls,
         decision: MotionDecision,
         question: MotionQuestion,
-        uses: Sequence[PersonUse],
+        people: Sequence[PersonMet],
         dt: float,
         stamp: Stamp,
     ) -> Self:
@@ -363,10 +377,7 @@ class MotionAnswer(Answer):
                 for one in decision.targets
             ],
             safety=Override.from_domain(decision),
-            people=[
-                PersonMet(**dict(use), separation=met.separation, weight=met.weight)
-                for use, met in zip(uses, decision.met, strict=True)
-            ],
+            people=list(people),
             clearance=Distances(people=to_people, cell=to_cell, robot=to_itself),
             distance=decision.distance,
             beyond_reach=decision.beyond_reach,

@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 from pydantic_core import PydanticCustomError
 
-from app.api.schemas.numbers import Answer, Body, Finite, Vector18
+from app.api.schemas.numbers import Answer, Body, Finite, Time, Vector18
 from app.errors import InvalidInput
 from app.sim import human
 from app.sim.body_size import NAMES, PERCENTILES, percentile_body
@@ -190,10 +190,10 @@ class TrackedPerson(Body):
 
     tracker: str = Field(max_length=64, description="id of the tracker")
     person: Annotated[int, Field(ge=0, le=3)] = Field(description="which of its people")
-    t: Finite | None = Field(
+    t: Time | None = Field(
         None,
-        description="time to tell the person for, on the clock of its frames [s], not earlier "
-        "than the newest one; that of the newest one if null",
+        description="the present on the clock of its frames [s]: it counts where it makes the "
+        "person older than the arrival of the newest frame does",
     )
 
 
@@ -242,6 +242,10 @@ class PersonUse(Answer):
     as_cylinder: bool = Field(
         description="whether no joint angles are known: seen as standing in a cylinder"
     )
+    monitored_as_cylinder: bool = Field(
+        description="whether speed and separation monitoring takes this person as a cylinder: "
+        "no joint angles are known, or an arm is not seen and may be anywhere in it"
+    )
     speeds: Speeds = Field(description="where the speeds are from; zero: nothing is known")
     flags: list[str] = Field(
         description="how the estimate is degraded; `far`: the policy sees this person at 5 m, "
@@ -254,7 +258,7 @@ class PersonUse(Answer):
     unusable: list[str] = Field(description=UNUSABLE)
     implausible: str | None = Field(description=IMPLAUSIBLE)
     age_s: float | None = Field(
-        description="time since the newest credible key-point [s]; null without key-points"
+        description="time since the newest credible key-point [s]; null where there was none"
     )
 
     @classmethod
@@ -263,16 +267,30 @@ class PersonUse(Answer):
         source: Source,
         seen: bool,
         speeds: Speeds,
-        person: Person,
+        person: Person | None,
+        observed: Person | None,
         estimate: PersonEstimate | None,
     ) -> Self:
-        """Make it from what was decided with; ``estimate`` where there were key-points."""
+        """Make it from what was decided with.
+
+        Args:
+            source: What the request states.
+            seen: Whether the policy sees this person.
+            speeds: Where the speeds are from.
+            person: As the policy sees them; None: not at all.
+            observed: As monitoring takes them; None: not at all.
+            estimate: From key-points; None without.
+        """
         return cls(
             by=source,
             seen=seen,
-            as_cylinder=person.cylinder is not None,
+            as_cylinder=person is not None and person.cylinder is not None,
+            monitored_as_cylinder=observed is not None and observed.cylinder is not None,
             speeds=speeds,
-            flags=[*([] if estimate is None else estimate.flags), *degradations(person)],
+            flags=[
+                *(() if estimate is None else estimate.flags),
+                *(() if person is None else degradations(person)),
+            ],
             held=[] if estimate is None else list(estimate.held),
             missing=[] if estimate is None else list(estimate.missing),
             strays=[] if estimate is None else list(estimate.strays),

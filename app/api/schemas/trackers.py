@@ -6,14 +6,12 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field
 
-from app.api.schemas.numbers import Answer, Body
+from app.api.schemas.numbers import Answer, Body, Time
 from app.api.schemas.people import IMPLAUSIBLE, UNUSABLE, BodyPercentiles, KeypointsSeen
 from app.api.tracker_sessions import IDLE_S, TrackerSession
 from app.sim.keypoint_cylinder import SafetyCylinder
 from app.sim.people_estimate import MAX_SKELETONS, Unfollowed
 from app.sim.person_estimate import PersonEstimate
-
-Time = Annotated[float, Field(ge=-1e10, le=1e10)]
 
 
 class TrackerCreate(Body):
@@ -58,7 +56,7 @@ class TrackerList(Answer):
 class FrameCreate(Body):
     """One frame of all people, in any order."""
 
-    t: Time = Field(description="when the frame was taken, on the tracker's clock, rising [s]")
+    t: Time = Field(description="when the frame was taken, on the tracker's clock [s]")
     people: list[KeypointsSeen] = Field(
         max_length=MAX_SKELETONS,
         description="whom the frame shows; nobody: an empty list; of more than the tracker "
@@ -150,7 +148,10 @@ class EstimatesPublic(Answer):
     """What is known of a tracker's people at one time."""
 
     tracker: str
-    t: float = Field(description="time the estimates are for [s]")
+    t: float | None = Field(
+        description="time the estimates are for, on the tracker's clock [s]; null before the "
+        "first frame"
+    )
     people: list[EstimatePublic]
     unfollowed: list[UnfollowedPublic] = Field(
         description="whom of the newest frame the tracker does not follow, nearest first"
@@ -160,7 +161,7 @@ class EstimatesPublic(Answer):
     def from_domain(
         cls,
         tracker: str,
-        t: float,
+        t: float | None,
         estimates: tuple[PersonEstimate, ...],
         unfollowed: tuple[Unfollowed, ...] = (),
     ) -> Self:

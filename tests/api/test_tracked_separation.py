@@ -1,0 +1,233 @@
+"""The override beside tracked people: never more than their last arrived frame allows.
+
+Any sequence of frames, gaps, missing limbs, wild stamps, clock changes and decisions, on the
+test's own clock; the reference is the safety layer itself, given the true person at the
+arrival of the last frame that showed them, and the time since.
+"""
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from app.api.motion import decide
+from app.api.schemas.motion import MotionAnswer, MotionRequest
+from app.api.tracker_sessions import TrackerSession, TrackerSessions
+from app.errors import ClockJump
+from app.policies import pretrained
+from app.policies.motion_decision import MotionDecider
+from app.policies.reach_policy import ReachPolicy
+from app.sim import human
+from app.sim.cells import load_cell
+from app.sim.checker import shapes_of
+from app.sim.keypoints import BODY_25, keypoints_of
+from app.sim.safety import SafetyLayer, safety_settings
+from app.sim.scene import arm_of
+
+CELL = load_cell("shared-workspace")
+ARM = arm_of(CELL)
+DT = 1.0 / 30.0
+ESTIMATION_ERROR = 0.06
+"""How far filtered key-points of a person who walks may lag behind exact ones [m]."""
+RIGHT_ARM = [BODY_25.index(name) for name in ("elbow_r", "wrist_r")]
+
+
+@lru_cache(maxsize=1)
+def policy() -> MotionDecider:
+    return MotionDecider(ReachPolicy(pretrained.load("reach")), CELL)
+
+
+def points_of(q: np.ndarray) -> np.ndarray:
+    return keypoints_of(q, CELL.body, CELL.floor_z)
+
+
+@dataclass
+class Scene:
+    """A person who walks about, a tracker that watches, and the robot."""
+
+    rng: np.random.Generator
+    now: float = 100.0
+    skew: float = 500.0
+    shown: tuple[np.ndarray, float] | None = None
+    session: TrackerSession = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.trackers = TrackerSessions(lambda: self.now)
+        self.session = self.trackers.open(CELL.name, 1, CELL.body)
+        self.place = np.array([self.rng.uniform(-0.6, 0.6), self.rng.uniform(1.2, 2.4)])
+        self.velocity = np.zeros(2)
+        self.flex, self.flexing, self.hidden = 0.15, 0.0, False
+        self.answers = 0
+
+    def posture(self) -> np.ndarray:
+        q = human.rest_posture(self.place[0], self.place[1], -np.pi / 2.0)
+        q[human.JOINT_NAMES.index("shoulder_r_flex")] = self.flex
+        return q
+
+    def wait(self, seconds: float) -> None:
+        """Let time pass; the person walks at up to 0.9 m/s, an arm swings at up to 0.6 m/s."""
+        self.now += seconds
+        if self.rng.uniform() < 0.1:
+            speed, heading = self.rng.uniform(0.0, 0.9), self.rng.uniform(-np.pi, np.pi)
+            self.velocity = speed * np.array([np.cos(heading), np.sin(heading)])
+            self.flexing = self.rng.uniform(-1.0, 1.0)
+        self.flex = float(np.clip(self.flex + seconds * self.flexing, 0.0, 1.4))
+        self.place = np.clip(self.place + seconds * self.velocity, [-1.0, 0.9], [1.0, 3.0])
+
+    def frame(self, stamp: float, event: str = "frame") -> None:
+        """Send a frame of this moment, and note the person that it showed if it is taken."""
+        points = points_of(self.posture())
+        if self.hidden:
+            points[RIGHT_ARM] = np.nan
+        people = [] if event == "empty" else [points]
+        try:
+            self.session.take(stamp, self.now, people, [np.ones(25)] * len(people))
+        except ClockJump:
+            return
+        if people:
+            self.shown = self.posture(), self.now
+
+    def decision(self, t: float | None) -> None:
+        body = {
+            "cell": CELL.name,
+            "robot": {
+                "q": (np.array(CELL.robot.home_q) + self.rng.uniform(-0.3, 0.3, 6)).tolist(),
+                "qd": self.rng.uniform(-0.6, 0.6, 6).tolist(),
+            },
+            "goal": [0.05, 0.75, 0.31],
+            "people": [{"tracker": self.session.id, "person": 0, "t": t}],
+            "ahead": False,
+        }
+        request = MotionRequest.model_validate(body)
+        answer = decide(request, CELL, policy(), self.trackers)
+        assert answer.safety is not None
+        assert answer.safety.override <= self.allowed(request, answer) + 1e-9
+        self.answers += answer.safety.override > 0.0
+
+    def allowed(self, request: MotionRequest, answer: MotionAnswer) -> float:
+        """The override that the person at the last frame's arrival allows."""
+        if self.shown is None:  # before the first frame anybody may be anywhere
+            return 1.0 if self.session.n_frames else 0.0
+        q_human, arrived = self.shown
+        settings = safety_settings(CELL)
+        nearer = settings.protective_distance - ESTIMATION_ERROR
+        layer = SafetyLayer(
+            ARM,
+            type(settings)(
+                reaction_time=settings.reaction_time,
+                tracker_delay=settings.tracker_delay,
+                human_speed=settings.human_speed,
+                protective_distance=nearer,
+            ),
+        )
+        c = np.array([joint[2] for joint in answer.commanded.coefficients])
+        people = shapes_of(CELL, q_human[None])
+        return layer.decide(
+            np.array(request.robot.q),
+            np.array(request.robot.qd),
+            c,
+            np.zeros(6),
+            people,
+            self.now - arrived,
+        ).override
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_override_never_exceeds_what_the_last_arrived_frame_allows(seed: int) -> None:
+    scene = Scene(np.random.default_rng(seed))
+    rng = scene.rng
+    for _ in range(200):
+        event = rng.choice(
+            ["frame", "gap", "wild", "clock", "limb", "empty", "late", "decide", "decide-t"],
+            p=[0.5, 0.03, 0.02, 0.02, 0.03, 0.02, 0.02, 0.26, 0.1],
+        )
+        scene.wait(DT * rng.uniform(0.8, 1.2) if event != "gap" else rng.uniform(0.05, 4.0))
+        stamp = scene.now + scene.skew
+        match event:
+            case "frame" | "empty":
+                scene.frame(stamp, event)
+            case "limb":
+                scene.hidden = not scene.hidden
+            case "wild":
+                scene.frame(stamp + float(rng.choice([86400.0, -5.0, -1e6, 1e9])))
+            case "late":
+                scene.frame(stamp - 0.1)
+            case "clock":
+                scene.skew += float(rng.choice([-2.0, -600.0, 3600.0, 1.0]))
+            case "decide":
+                scene.decision(None)
+            case "decide-t":
+                scene.decision(stamp + float(rng.choice([-1e6, -0.5, 0.0, 0.3, 1e6])))
+
+
+def decide_beside(scene: Scene) -> MotionAnswer:
+    """The answer to a robot that stands at home."""
+    body = {
+        "cell": CELL.name,
+        "robot": {"q": list(CELL.robot.home_q), "qd": [0.0] * 6},
+        "goal": [0.05, 0.75, 0.31],
+        "people": [{"tracker": scene.session.id, "person": 0}],
+    }
+    return decide(MotionRequest.model_validate(body), CELL, policy(), scene.trackers)
+
+
+def test_the_property_is_tried_where_the_robot_may_move() -> None:
+    scene = Scene(np.random.default_rng(1))
+    scene.place = np.array([0.0, 2.6])
+    for _ in range(30):
+        scene.now += DT
+        scene.frame(scene.now)
+        scene.decision(None)
+    assert scene.answers > 20
+
+
+@pytest.mark.parametrize("silence", [0.6, 3.0, 70.0, 250.0])
+def test_a_camera_that_died_stops_the_robot(silence: float) -> None:
+    scene = Scene(np.random.default_rng(2))
+    scene.place = np.array([0.0, 2.6])
+    for _ in range(30):
+        scene.now += DT
+        scene.frame(scene.now)
+    scene.now += silence
+    answer = decide_beside(scene)
+    (person,) = answer.people
+    assert person.age_s == pytest.approx(silence) and "stale" in person.flags
+    assert answer.safety is not None
+    if silence > 1.0:
+        assert answer.safety.override == 0.0
+
+
+def test_an_arm_that_is_not_seen_is_monitored_wherever_it_can_reach() -> None:
+    scene = Scene(np.random.default_rng(3))
+    scene.place, scene.flex = np.array([0.0, 2.05]), 1.4
+    for k in range(60):
+        scene.now += DT
+        scene.hidden = k > 30
+        scene.frame(scene.now)
+        if k % 10 == 9:
+            scene.decision(None)
+    body = decide_beside(scene)
+    assert body.people[0].monitored_as_cylinder and not body.people[0].as_cylinder
+    scene.hidden = False
+    scene.now += DT
+    scene.frame(scene.now)
+    assert not decide_beside(scene).people[0].monitored_as_cylinder
+
+
+def test_a_silent_tracker_that_has_seen_nobody_stops_the_robot() -> None:
+    scene = Scene(np.random.default_rng(4))
+    assert scene.session.n_frames == 0
+    before = decide_beside(scene)
+    scene.frame(scene.now, "empty")
+    fresh = decide_beside(scene)
+    scene.now += 1.0
+    silent = decide_beside(scene)
+    overrides = [one.safety.override for one in (before, fresh, silent) if one.safety]
+    assert overrides == [0.0, 1.0, 0.0]
+    assert [one.people[0].flags for one in (before, fresh, silent)] == [
+        ["never-seen", "stale"],
+        ["never-seen"],
+        ["never-seen", "stale"],
+    ]
+    assert fresh.people[0].separation is None and fresh.people[0].age_s is None
