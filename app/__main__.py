@@ -206,11 +206,12 @@ def log_progress(progress: "Progress") -> None:
         )
         if rate is not None
     )
+    left = progress.time_left_s
     logging.getLogger("app.train").info(
-        "%d of %d steps, %.0f s left: %s",
+        "%d of %d steps, %s: %s",
         progress.step,
         progress.total_steps,
-        progress.time_left_s,
+        "no updates yet" if left is None else f"{left:.0f} s left",
         ", ".join(rates) or "no episode has ended yet",
     )
 

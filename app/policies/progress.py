@@ -35,8 +35,8 @@ class Progress:
     """Environment steps per second of wall time in the window."""
     cpu_s: float
     """CPU time of the training so far, interrupted attempts up to their checkpoint included."""
-    time_left_s: float
-    """Estimated wall time to the end [s]."""
+    time_left_s: float | None
+    """Estimated wall time to the end [s]; None while no updates run, which cost most of it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -98,13 +98,14 @@ class Reporter(BaseCallback, ABC):
         wall = max(1e-6, time.monotonic() - self._wall)
         speed = (step - self._window_step) / wall
         total, updates = self._attempt.preset.total_steps, self._attempt.updates
+        has_rate = updates > self._window_updates or step >= total
         return Progress(
             step=step,
             total_steps=total,
             updates=updates,
             updates_per_s=(updates - self._window_updates) / wall,
             steps_per_s=speed,
-            time_left_s=(total - step) / speed,
+            time_left_s=(total - step) / speed if has_rate else None,
             **self.rates(),
             cpu_s=self._attempt.cpu_s,
         )

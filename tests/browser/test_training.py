@@ -5,7 +5,9 @@ from collections.abc import Callable
 import pytest
 from playwright.sync_api import Page, expect
 
+from app.policies.evaluation.statistics import wilson
 from tests import patient_http
+from tests.browser.test_drag import state, tell
 
 pytestmark = pytest.mark.browser
 
@@ -50,8 +52,35 @@ def test_posted_job_appears_and_its_curve_grows(
     assert len(steps) >= seen + 2
     job = patient_http.get(f"{server}/v1/jobs/{job_id}").json()
     assert (job["seed"], job["overrides"]) == (7, FINE)
+    expect(page.locator('[data-role="point"]')).to_contain_text("episodes")
+    expect(page.locator(".job-detail .legend").first).to_contain_text(" to ")
     cancel(page)
     assert page.problems == []  # type: ignore[attr-defined]
+    page.close()
+    newest_acts_though_the_stream_is_behind(open_page, server, job_id)
+
+
+def newest_acts_though_the_stream_is_behind(
+    open_page: Callable[..., Page], server: str, job_id: str | None
+) -> None:
+    """Let a job act while its page has read no more than the first checkpoint's event."""
+    known = patient_http.get(f"{server}/v1/checkpoints", params={"job_id": job_id}).json()
+    newest, first = known["items"][0], known["items"][-1]
+    assert newest["step"] > first["step"]
+    page = open_page(scene=False)
+    page.route(
+        f"**/v1/jobs/{job_id}/events",
+        lambda route: route.fulfill(
+            content_type="text/event-stream",
+            body=f'id: 1\nevent: checkpoint\ndata: {{"sha256": "{first["sha256"]}"}}\n\n'
+            "event: end\ndata: {}\n\n",
+        ),
+    )
+    page.click("#tab-training")
+    page.click('[data-action="act"]')
+    expect(page.locator('[data-role="acts"]')).to_contain_text(f"{newest['step'] / 1e3:.1f} k")
+    assert state(server)["checkpoint"] == newest["sha256"]
+    tell(server, {"tag": "set-policy", "checkpoint": "pick"})
 
 
 def cancel(page: Page) -> None:
@@ -70,6 +99,45 @@ def test_bad_input_is_explained_at_its_field(open_page: Callable[..., Page]) -> 
     expect(page.locator("#train-seed")).to_have_attribute("aria-invalid", "true")
     expect(page.locator("#train-seed-error")).to_contain_text("integer")
     expect(page.locator("#train-seed")).to_be_focused()
+    page.fill("#train-seed", "1")
+    expect(page.locator("#train-seed-error")).to_have_count(0)
+    expect(page.locator("#train-seed")).to_have_attribute("aria-invalid", "false")
+
+
+@pytest.mark.parametrize(("hits", "n"), [(0, 14), (9, 14), (14, 14), (986, 1000)])
+def test_page_and_evaluations_take_the_same_intervals(
+    open_page: Callable[..., Page], hits: int, n: int
+) -> None:
+    page = open_page(scene=False)
+    code = "([rate, n]) => import('/static/format.js').then((one) => one.wilson(rate, n))"
+    assert page.evaluate(code, [hits / n, n]) == pytest.approx(wilson(hits, n))
+
+
+def test_error_of_a_field_stays_while_another_is_edited(open_page: Callable[..., Page]) -> None:
+    page = open_page(scene=False)
+    open_form(page)
+    page.fill("#train-seed", "x")
+    page.click("form.train summary")
+    page.click("form.train button[type=submit]")
+    expect(page.locator("#train-seed-error")).to_be_visible()
+    page.fill("#train-progress_steps", "5120")
+    expect(page.locator("#train-seed-error")).to_be_visible()
+
+
+def test_evaluation_is_shown_with_its_intervals(
+    open_page: Callable[..., Page], server: str
+) -> None:
+    body = {"kind": "evaluate", "protocol": "pick-single", "episodes": 40, "seed": 3}
+    posted = patient_http.post(f"{server}/v1/jobs", json=body)
+    assert posted.status_code == 202, posted.text
+    page = open_page(scene=False)
+    page.click("#tab-training")
+    rows = page.locator(f'[data-job="{posted.json()["id"]}"] [data-role="rows"]')
+    expect(rows).to_contain_text("n = 40", timeout=GROWTH_MS)
+    result = patient_http.get(f"{server}/v1/jobs/{posted.json()['id']}").json()["result"]
+    success = result["results"][0]["success"]
+    low, high = (f"{100 * success[end]:.1f}" for end in ("low", "high"))
+    expect(rows).to_contain_text(f"{100 * success['mean']:.1f} % ({low} to {high})")
 
 
 def test_override_out_of_range_is_explained_at_its_field(

@@ -24,6 +24,13 @@ def test_the_curve_lies_on_the_grid_and_counts_updates(tiny_run):
     assert tiny_run.progress[-1].time_left_s == 0.0
 
 
+def test_time_left_is_told_from_the_first_updates_on(tiny_run):
+    told = [point.time_left_s is not None for point in tiny_run.progress]
+    assert told == [point.updates > 0 for point in tiny_run.progress]
+    assert told[0] is False
+    assert all(told[1:])
+
+
 def test_rates_of_a_point_sum_to_one_where_episodes_ended(tiny_run):
     ended = [point for point in tiny_run.progress if point.episodes]
     assert ended

@@ -33,11 +33,13 @@ function App() {
   const visited = useRef(false);
   visited.current ||= roomy || tab === "training";
   const acting = world?.checkpoint;
+  const sorter = world?.sorting?.sorter;
   const training = useMemo(() => {
-    const act = (checkpoint) => cell.send({ tag: "set-policy", checkpoint });
+    const act = ({ purpose, sha256 }) =>
+      cell.send({ tag: purpose === "sorting" ? "set-sorter" : "set-policy", checkpoint: sha256 });
     return html`<${Training} link=${link} jobs=${jobs} error=${error} refresh=${refresh}
-      cell=${cell.cell?.name} acting=${acting} onAct=${act} />`;
-  }, [link, jobs, error, acting, cell.cell?.name]);
+      cell=${cell.cell?.name} acting=${[acting, sorter]} onAct=${act} />`;
+  }, [link, jobs, error, acting, sorter, cell.cell?.name]);
   if (link === "signin") return html`<${SignIn} />`;
   return html`<div class="frame" data-link=${link}>
     <header class="topbar">

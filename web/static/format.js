@@ -30,6 +30,21 @@ export function percent(rate, digits = 1) {
   return `${(rate * 100).toFixed(digits)} %`;
 }
 
+/** A rate with its 95 % interval: 98.6 % (97.7 to 99.2). */
+export function interval({ mean, low, high }) {
+  const ends = [low, high].map((v) => (v * 100).toFixed(1));
+  return `${percent(mean)} (${ends.join(" to ")})`;
+}
+
+/** The 95 % Wilson interval of `rate` among `n`, as in app/policies/evaluation/statistics.py. */
+export function wilson(rate, n) {
+  const z = 1.959963984540054;
+  const spread = z * Math.sqrt((rate * (1 - rate)) / n + (z / (2 * n)) ** 2);
+  const [centre, scale] = [rate + z ** 2 / (2 * n), 1 + z ** 2 / n];
+  const [low, high] = [(centre - spread) / scale, (centre + spread) / scale];
+  return { mean: rate, low: rate === 0 ? 0 : Math.max(0, low), high: rate === 1 ? 1 : Math.min(1, high) };
+}
+
 /** A time span in seconds: 8 s, 2 min 10 s, 1 h 05 min. */
 export function duration(seconds) {
   if (seconds === null || seconds === undefined || !Number.isFinite(seconds)) return "–";

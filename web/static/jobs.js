@@ -95,10 +95,12 @@ function subtitle(job) {
   const unit = job.kind === "evaluate" ? "rows" : "steps";
   if (isActive(job) && job.total_steps) {
     parts.push(`${format.steps(job.step)} of ${format.steps(job.total_steps)} ${unit}`);
-    const left = job.latest?.time_left_s ?? job.time_left_s;
-    if (job.state === "running" && Number.isFinite(left)) parts.push(`${format.duration(left)} left`);
+    if (job.state === "running" && job.latest && job.kind === "train") {
+      const left = job.latest.time_left_s;
+      parts.push(Number.isFinite(left) ? `${format.duration(left)} left` : "collecting");
+    }
   } else {
-    if (job.step) parts.push(`${format.steps(job.step)} ${unit}`);
+    if (job.step) parts.push(`${format.steps(job.step)} ${job.step === 1 ? unit.slice(0, -1) : unit}`);
     parts.push(format.ago(job.finished_at ?? job.created_at));
   }
   if (job.attempt > 1) parts.push(`attempt ${job.attempt}`);
@@ -123,7 +125,7 @@ function JobDetail({ job, onChanged, onAct, acting }) {
       : isActive(job) ? "Warming up; the first point comes after the first episodes."
         : "It ended before its first point."}</p>`}
     ${rows && rows.length > 0 && html`
-      <${Legend} lines=${OUTCOMES} row=${row} show=${(v) => format.percent(v)} />
+      <${Legend} lines=${OUTCOMES} row=${row} show=${(v) => rate(v, row?.episodes)} />
       <${CurvePlot} rows=${rows} lines=${OUTCOMES} height=${168} unit="%" range=${[0, 1]}
         sync=${job.id} onHover=${setAt}
         label=${`Success, collision and time-out rate over ${rows.length} points`} />
@@ -131,24 +133,56 @@ function JobDetail({ job, onChanged, onAct, acting }) {
       <${CurvePlot} rows=${rows} lines=${REWARD} height=${112} sync=${job.id} onHover=${setAt}
         label="Mean reward over environment steps" />
       <p class="plot-foot"><span data-points=${rows.length}>${rows.length} points</span>
-        <span>${readout ? `at ${format.steps(row.step)} steps` : "environment steps"}</span></p>`}
+        <span data-role="point">${row && `${readout ? "" : "last: "}${format.steps(row.step)} steps,
+          ${episodes(row)}`}</span></p>`}
     ${lost && html`<p class="notice warn" role="status"><${Icon} name="alert" />
       Lost the stream of this job; trying again.</p>`}
     <${Speed} job=${job} row=${rows?.at(-1)} />
     <div class="job-actions">
-      ${checkpoint && html`<button type="button" class="tool" disabled=${acting === checkpoint}
-        onClick=${() => onAct(checkpoint)}>
-        ${acting === checkpoint ? "Acts in the cell" : "Let it act in the cell"}</button>`}
+      ${checkpoint && html`<${Act} job=${job} newest=${checkpoint} acting=${acting}
+        onAct=${onAct} />`}
       ${isActive(job) && html`<${Cancel} job=${job} onChanged=${onChanged} />`}
     </div>
   </div>`;
 }
 
+/** Lets the job's newest checkpoint act: which one that is, the server says at the click. */
+function Act({ job, newest, acting, onAct }) {
+  const [loaded, setLoaded] = useState(null);
+  const [error, setError] = useState(null);
+  const act = async () => {
+    try {
+      const { items } = await get(`/v1/checkpoints?job_id=${job.id}&limit=1`);
+      if (items.length === 0) throw new Error("its checkpoints are gone");
+      await onAct(items[0]);
+      setLoaded(items[0]);
+      setError(null);
+    } catch (problem) {
+      setError(problem);
+    }
+  };
+  const acts = loaded && acting.includes(loaded.sha256);
+  return html`<button type="button" class="tool" data-action="act"
+      disabled=${acting.includes(newest) && !isActive(job)} onClick=${act}>
+      ${acts && isActive(job) ? "Load its newest checkpoint" : "Let it act in the cell"}</button>
+    ${acts && html`<span class="faint" role="status" data-role="acts">Acts in the cell, with
+      ${` ${format.steps(loaded.step)} `}steps.</span>`}
+    ${error && html`<span class="field-error" role="alert">${error.message}</span>`}`;
+}
+
+/** A rate of a point, with its interval where it is known of how many episodes. */
+function rate(v, n) {
+  return Number.isFinite(v) && n > 0 ? format.interval(format.wilson(v, n)) : "–";
+}
+
+function episodes({ episodes: n }) {
+  return n === 1 ? "1 episode" : `${format.steps(n ?? 0)} episodes`;
+}
+
 /** An evaluation has no curve: its rows, once all are known. */
 function Evaluation({ job, onChanged }) {
   const rows = job.result?.results ?? [];
-  const rates = (row) => OUTCOMES.filter(({ key }) => row[key])
-    .map(({ key, label }) => `${format.percent(row[key].mean)} ${label}`).join(" · ");
+  const rates = (row) => OUTCOMES.filter(({ key }) => row[key]);
   return html`<div class="job-detail">
     ${job.error && html`<p class="notice bad" role="alert"><${Icon} name="alert" />
       <span>${job.error}</span></p>`}
@@ -156,9 +190,14 @@ function Evaluation({ job, onChanged }) {
       ? "Waiting for its turn; one job runs at a time."
       : isActive(job) ? "The rows are shown once all are known."
         : "It ended without a result."}</p>`}
-    ${rows.length > 0 && html`<dl class="facts">${rows.map((row) => html`<div key=${row.name}>
-      <dt>${row.name}, ${format.steps(row.n)} episodes</dt><dd>${rates(row)
-        || `${format.steps(row.contacts)} contacts`}</dd></div>`)}</dl>`}
+    ${rows.length > 0 && html`<dl class="rows" data-role="rows">${rows.map((row) => html`
+      <div key=${row.name}><dt>${row.name} <small>n = ${row.n}</small></dt>
+        ${rates(row).map(({ key, label }) => html`<dd key=${key}><span>${label}</span>
+          <b>${format.interval(row[key])}</b></dd>`)}
+        ${rates(row).length === 0 && html`<dd><span>contacts</span>
+          <b>${format.steps(row.contacts)}</b></dd>`}
+      </div>`)}</dl>
+      <p class="plot-foot"><span>Rates with their 95 % intervals</span></p>`}
     ${isActive(job) && html`<div class="job-actions">
       <${Cancel} job=${job} onChanged=${onChanged} /></div>`}
   </div>`;
@@ -173,7 +212,6 @@ function Speed({ job, row }) {
   const changed = Object.entries(job.overrides ?? {});
   return html`<dl class="facts">
     ${row && [
-      ["Episodes", format.steps(row.episodes)],
       ["Updates", format.steps(row.updates)],
       ["Updates per s", format.number(row.updates_per_s)],
       ["Steps per s", format.steps(row.steps_per_s)],

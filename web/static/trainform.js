@@ -57,9 +57,12 @@ export function TrainForm({ presets, error, cell, onStarted, onClose }) {
   const faults = faultsByField(problem, preset);
   const fields = preset.fields ?? [];
   const inRest = fields.slice(FIRST_FIELDS).some((f) => faults[f.name] || changed(f, texts));
+  const type = (name, text) => {
+    setTyped((now) => ({ ...now, [name]: text }));
+    setProblem((now) => without(now, name, preset));
+  };
   const row = (f) => html`<${Field} key=${f.name} field=${f} text=${texts[f.name]}
-    fault=${faults[f.name]}
-    onText=${(text) => setTyped((now) => ({ ...now, [f.name]: text }))} />`;
+    fault=${faults[f.name]} onText=${(text) => type(f.name, text)} />`;
   return html`<form class="train" ref=${form} onSubmit=${submit} noValidate
     aria-label="New training job">
     <div class="train-head"><h3>New training job</h3>
@@ -71,14 +74,17 @@ export function TrainForm({ presets, error, cell, onStarted, onClose }) {
       <label for="train-preset">Preset</label>
       <select id="train-preset" ref=${first} value=${preset.name} aria-describedby="preset-help"
         aria-invalid=${String(Boolean(faults.preset))}
-        onChange=${(e) => { setName(e.target.value); setTyped({}); }}>
+        onChange=${(e) => { setName(e.target.value); setTyped({}); setProblem(null); }}>
         ${presets.map((p) => html`<option key=${p.name} value=${p.name}>${p.name}</option>`)}
       </select>
       <p class="field-help" id="preset-help">${preset.title ?? preset.help ?? preset.description}</p>
       ${faults.preset && html`<p class="field-error" role="alert">${faults.preset}</p>`}
     </div>
     <${Field} field=${{ name: "seed", default: 1, help: "Same seed, same job: the same curve." }}
-      text=${seed} fault=${faults.seed} onText=${setSeed} />
+      text=${seed} fault=${faults.seed} onText=${(text) => {
+        setSeed(text);
+        setProblem((now) => without(now, "seed", preset));
+      }} />
     ${fields.slice(0, FIRST_FIELDS).map(row)}
     ${fields.length > FIRST_FIELDS && html`<details class="more" open=${inRest || undefined}>
       <summary><${Icon} name="chevron" />${fields.length - FIRST_FIELDS} more settings</summary>
@@ -167,17 +173,31 @@ function overrides(preset, texts) {
   return Object.fromEntries(own.map((f) => [f.name, parsed(texts[f.name])]));
 }
 
+/** The single faults that a problem lists. */
+function faultsOf(problem) {
+  return problem?.errors?.length ? problem.errors : problem?.field ? [problem] : [];
+}
+
+/** Name of the form's field that a fault is about; "" where it is none of them. */
+function fieldOf(fault, preset) {
+  const names = new Set(["seed", "preset", ...(preset.fields ?? []).map((f) => f.name)]);
+  const path = String(fault.field ?? "");
+  return [path.replace(/^overrides\./, ""), path.split(".").at(-1)].find((n) => names.has(n)) ?? "";
+}
+
+/** What is left of a problem once a field was edited: the faults of the other fields. */
+function without(problem, name, preset) {
+  const rest = faultsOf(problem).filter((one) => !["", name].includes(fieldOf(one, preset)));
+  return rest.length ? { message: problem.message, errors: rest } : null;
+}
+
 /** Where each fault of a problem belongs: by field name, "" for the form as a whole. */
 function faultsByField(problem, preset) {
   if (!problem) return {};
-  const listed = problem.errors?.length ? problem.errors
-    : problem.field ? [problem] : [];
-  const names = new Set(["seed", "preset", ...(preset.fields ?? []).map((f) => f.name)]);
+  const listed = faultsOf(problem);
   const faults = {};
   for (const one of listed) {
-    const path = String(one.field ?? "");
-    const name = [path.replace(/^overrides\./, ""), path.split(".").at(-1)]
-      .find((n) => names.has(n)) ?? "";
+    const name = fieldOf(one, preset);
     const choice = one.choices?.length ? ` Choices: ${one.choices.join(", ")}.` : "";
     faults[name] = name
       ? `${capital(one.rule ?? problem.message)}.${choice}`.replace(/\.\.(?= |$)/, ".")
