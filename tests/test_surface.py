@@ -17,7 +17,6 @@ from app.api.schemas.jobs import JobCreate
 from app.api.schemas.task_selection import TaskSelectionRequest
 from app.main import create_app
 from app.settings import PREFIX, Settings
-from app.sim.cells import load_cell
 from app.sim.envs import IDS
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -105,7 +104,7 @@ def test_readme_requests_are_ones_the_service_takes() -> None:
     job = TypeAdapter[Any](JobCreate).validate_python(bodies["/v1/jobs"])
     assert (job.kind, job.preset) == ("train", "pick-td3")
     state = TaskSelectionRequest.model_validate(bodies["/v1/task-selection"])
-    _, _, candidates = state.to_domain(load_cell(state.cell))
+    _, _, candidates = state.to_domain()
     assert len(state.people) == 1
     assert [one.id for one in candidates] == ["left", "right"]
 

@@ -14,8 +14,9 @@ import numpy as np
 
 from app.errors import Fault
 from app.sim.cell_numbers import numbers, shown
-from app.sim.cell_parts import GoalRegion, Obstacle, RobotMount, Station
+from app.sim.cell_parts import GoalRegion, RobotMount, Station
 from app.sim.cell_people import Worker
+from app.sim.cell_places import Sound, places
 from app.sim.cell_reach import Reach, Touching
 from app.sim.cells import LIMITS, MAX_TARGETS, Cell
 from app.sim.collision import obstacle_box, touch
@@ -43,38 +44,17 @@ def check_cell(cell: Cell, known: Sequence[Fault] = ()) -> list[Fault]:
         known: Faults found before, in reading; nothing is built on the values they name.
     """
     faults = [*_counts(cell, known), *_ids(cell), *numbers(cell)]
-    sound = _Sound(cell, [*known, *faults])
+    sound = Sound(cell, [*known, *faults])
     faults += [*_kinds(cell), *_people(sound)]
     faults += _table(cell) if sound.table else []
     faults += _robot(cell.robot) if sound.robot else []
     faults += _grid(sound.goal_region) if sound.goal_region is not None else []
-    sound = _Sound(cell, [*known, *faults])
-    faults += [*_overlaps(sound), *_places(sound)] if sound.few else []
-    sound = _Sound(cell, [*known, *faults])
+    sound = Sound(cell, [*known, *faults])
+    faults += [*_overlaps(sound), *places(sound)] if sound.few else []
+    sound = Sound(cell, [*known, *faults])
     if sound.robot and sound.few:
         faults += _reach(sound)
     return faults
-
-
-class _Sound:
-    """The parts of a cell that no fault names, for checks that build on them."""
-
-    def __init__(self, cell: Cell, faults: list[Fault]) -> None:
-        named = [fault.place for fault in faults]
-
-        def fine(place: str) -> bool:
-            inside = (f"{place}.", f"{place}[")
-            return not any(one == place or one.startswith(inside) for one in named)
-
-        self.cell = cell
-        self.table, self.robot = fine("table"), fine("robot")
-        self.few = "stations" not in named and "obstacles" not in named
-        self.stations = tuple(s for s in cell.stations if fine(f"stations.{s.id}"))
-        self.obstacles = tuple(o for o in cell.obstacles if fine(f"obstacles.{o.id}"))
-        self.people = tuple(
-            (k, person) for k, person in enumerate(cell.people) if fine(f"people[{k}]")
-        )
-        self.goal_region = cell.goal_region if fine("goal_region") else None
 
 
 def _counts(cell: Cell, known: Sequence[Fault]) -> Iterator[Fault]:
@@ -156,7 +136,7 @@ def _kinds(cell: Cell) -> Iterator[Fault]:
             yield Fault(place=place, value=station.colour, rule=rule)
 
 
-def _people(sound: _Sound) -> Iterator[Fault]:
+def _people(sound: Sound) -> Iterator[Fault]:
     for index, person in sound.people:
         place = f"people[{index}]"
         for name in ("x", "y", "speed", "radius"):
@@ -196,7 +176,7 @@ def _grid(region: GoalRegion) -> list[Fault]:
     return faults
 
 
-def _overlaps(sound: _Sound) -> Iterator[Fault]:
+def _overlaps(sound: Sound) -> Iterator[Fault]:
     for a, b in combinations(sound.stations, 2):
         if (distance := station_distance(a, b)) < MIN_SPACING:
             yield Fault(
@@ -224,90 +204,7 @@ def station_distance(a: Station, b: Station) -> float:
     return math.hypot(flat, gap)
 
 
-def _over(box: Obstacle, point: Sequence[float]) -> bool:
-    """Tell whether a point lies over or in the footprint of an obstacle."""
-    c, s = math.cos(box.yaw), math.sin(box.yaw)
-    x, y = point[0] - box.center[0], point[1] - box.center[1]
-    along, across = abs(c * x + s * y), abs(c * y - s * x)
-    return along <= box.half_size[0] and across <= box.half_size[1]
-
-
-def _places(sound: _Sound) -> Iterator[Fault]:
-    """Stations on the table or on an obstacle, in none; people off table and obstacles."""
-    for station in sound.stations:
-        place, value = f"stations.{station.id}.position", shown(station.position)
-        under = [box for box in sound.obstacles if _over(box, station.position)]
-        inside = [
-            box
-            for box in under
-            if any(_in_height(box, float(z)) for z in station.points()[:, 2])
-        ]
-        if inside:
-            rule = f"must not lie inside the obstacle {inside[0].id}"
-            yield Fault(place=place, value=value, rule=rule)
-        elif station.position[2] < 0.0:
-            yield Fault(
-                place=place, value=value, rule="must not lie below the table top, z = 0"
-            )
-        elif sound.table and not under and not _on_table(sound.cell, station.position):
-            yield Fault(
-                place=place,
-                value=value,
-                rule="must lie over the table or over an obstacle that carries it",
-                hint=_table_text(sound.cell),
-            )
-    region = sound.goal_region
-    if region is not None and region.center[2] - 0.5 * region.size[2] < 0.0:
-        rule = "must keep the whole region over the table top, z = 0"
-        yield Fault(place="goal_region.center", value=shown(region.center), rule=rule)
-    yield from _standing(sound)
-
-
-def _in_height(box: Obstacle, z: float) -> bool:
-    """Tell whether a height lies between bottom and top of an obstacle."""
-    return abs(z - box.center[2]) < box.half_size[2]
-
-
-def _on_table(cell: Cell, position: tuple[float, float, float]) -> bool:
-    table, (x, y, _) = cell.table, position
-    return table.x_min <= x <= table.x_max and table.y_min <= y <= table.y_max
-
-
-def _table_text(cell: Cell) -> str:
-    t = cell.table
-    return f"the table is x in [{t.x_min:g}, {t.x_max:g}] m, y in [{t.y_min:g}, {t.y_max:g}] m"
-
-
-def _standing(sound: _Sound) -> Iterator[Fault]:
-    """Workers stand beside the table; a cylinder stands for arms too and may cross it."""
-    table = sound.cell.table
-    for index, person in sound.people:
-        if not isinstance(person, Worker):
-            continue
-        place = f"people[{index}]"
-        apart = (
-            person.x_min >= table.x_max - 1e-9
-            or person.x_max <= table.x_min + 1e-9
-            or person.y_min >= table.y_max - 1e-9
-            or person.y_max <= table.y_min + 1e-9
-        )
-        if sound.table and not apart:
-            yield Fault(
-                place=f"{place}.y_min",
-                value=shown(person.y_min),
-                rule="must keep a worker's walking area off the table",
-                hint=_table_text(sound.cell),
-            )
-        for box in sound.obstacles:
-            on_floor = (
-                box.center[2] - box.half_size[2] < person.pelvis_height + sound.cell.floor_z
-            )
-            if on_floor and _over(box, person.home):
-                rule = f"must not lie inside the obstacle {box.id}"
-                yield Fault(place=f"{place}.home", value=shown(person.home), rule=rule)
-
-
-def _reach(sound: _Sound) -> Iterator[Fault]:
+def _reach(sound: Sound) -> Iterator[Fault]:
     cell = sound.cell.model_copy(update={"obstacles": sound.obstacles})
     found = list(Reach(cell).touching(np.array(cell.robot.home_q)))
     yield from _home_contacts(cell, found)

@@ -59,6 +59,10 @@ def obstacle(*boxes: dict[str, Any]) -> Edit:
         (person(y_min=0.5), "people[0].y_min", "off the table"),
         (person(home=[0.0, 2.5, -1.57]), "people[0].home", "inside the walking area"),
         (person(home=[0.0, 1.45, -90.0]), "people[0].home[2]", "degrees"),
+        (person(home=[0.0, 1.45, 1.57]), "people[0].home[2]", "the table is at -1.57 rad"),
+        (person(home=[0.0, 1.45, 0.0]), "people[0].home[2]", "must look at the table"),
+        (person(home=[0.0, 1.45, 3.1416]), "people[0].home[2]", "must look at the table"),
+        (station(position=[-0.5, 0.7, 0.45]), "stations.cube0.position", "0.45 m below it"),
         (person(x_min=0.8), "people[0].x_min", "less than x_max = 0.7"),
         (
             obstacle(box([0.0, 0.0, 0.2], [0.1, 0.1, 0.2])),
@@ -180,3 +184,41 @@ def test_distance_to_a_cluster_counts_all_its_levels() -> None:
         level_height=0.02,
     )
     assert station_distance(cube, tower) == pytest.approx((0.3**2 + 0.07**2) ** 0.5)
+
+
+@pytest.mark.parametrize(
+    ("z", "box_top", "text"),
+    [
+        (0.35, None, None),  # on the table, a high part
+        (0.6, 0.4, None),  # on a box on the table
+        (0.6, 0.1, "box ends 0.5 m below it"),
+        (0.5, 0.0, "the table ends 0.5 m below it"),
+    ],
+)
+def test_a_station_must_be_carried_by_what_is_below(
+    z: float, box_top: float | None, text: str | None
+) -> None:
+    def edit(cell: dict[str, Any]) -> None:
+        cell["stations"][0]["position"] = [-0.5, 0.5, z]
+        if box_top:
+            half = 0.5 * box_top
+            cell["obstacles"] = [box([-0.5, 0.5, half], [0.08, 0.08, half])]
+
+    rules = [one.text for one in faults_of(edit) if one.place == "stations.cube0.position"]
+    carried = [one for one in rules if "carried" in one]
+    assert len(carried) == (text is not None)
+    assert text is None or text in carried[0]
+
+
+def test_a_station_beside_the_table_below_a_box_is_not_carried_by_it() -> None:
+    def edit(cell: dict[str, Any]) -> None:
+        cell["stations"][0]["position"] = [-1.1, 0.2, 0.1]
+        cell["obstacles"] = [box([-1.1, 0.2, 0.5], [0.05, 0.05, 0.05])]
+
+    texts = [one.text for one in faults_of(edit) if one.place == "stations.cube0.position"]
+    assert any("box lies above it" in one for one in texts)
+
+
+@pytest.mark.parametrize("yaw", [-1.57, -0.4, -2.7, 4.71])
+def test_a_worker_may_look_at_the_table_at_an_angle(yaw: float) -> None:
+    assert faults_of(person(home=[0.3, 1.45, yaw])) == []
