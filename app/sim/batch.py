@@ -40,8 +40,9 @@ class StepResult:
 class CellBatch(ABC):
     """Restarts and steps the rows of a scenario.
 
+    Copies (``copy.deepcopy``, ``pickle``) go on bit by bit as the original would.
+
     Args:
-        kernel: The scenario's kernels: ``reset_rows`` and ``step_batch``.
         shared: World, rules, action rule, reward weights, rows and work space, as they take
             them.
         n_envs: Number of cells.
@@ -51,9 +52,11 @@ class CellBatch(ABC):
         view: What observations hold, and how many numbers they are.
     """
 
+    _kernel: ModuleType
+    """The scenario's kernels: ``reset_rows`` and ``step_batch``."""
+
     def __init__(
         self,
-        kernel: ModuleType,
         shared: tuple[Any, Any, Any, Any, Any, Any],
         *,
         n_envs: int,
@@ -64,7 +67,7 @@ class CellBatch(ABC):
     ) -> None:
         self.n_envs, self.seed = n_envs, seed
         self.n_act = n_act
-        self._kernel, self._first = kernel, first_env
+        self._first = first_env
         self._world, self._rules, self._action, self._weights, self._rows, self._work = shared
         self._view, self.obs_size = view
         self._obs = np.zeros((n_envs, self.obs_size), dtype=np.float32)
@@ -73,6 +76,25 @@ class CellBatch(ABC):
         self._ended = np.zeros(n_envs, dtype=np.int64)
         self._all = np.arange(n_envs)
         self._compiled: dict[Callable[..., None], Callable[..., None]] = {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a copy is made of; it finds its compiled kernels itself."""
+        return {**self.__dict__, "_compiled": {}}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Take the state of another batch over.
+
+        Copied arrays are writable. Kernels are compiled once more, for minutes, where one is
+        that was not, so the shared repertoire is made read-only again.
+        """
+        self.__dict__.update(state)
+        self._world.people.repertoire.samples.setflags(write=False)
+
+    @property
+    def episode(self) -> Rows:
+        """Numbers of the present episodes, (n_envs,); those that start next are set here."""
+        numbers: Rows = self._rows.episode
+        return numbers
 
     @property
     def obs(self) -> NDArray[np.float32]:
@@ -86,9 +108,20 @@ class CellBatch(ABC):
         return self.restart()
 
     def restart(self) -> NDArray[np.float32]:
-        """Start the episodes numbered by ``state.episode``; return the observations."""
-        self._start(self._all)
-        return self._look(self._all)
+        """Start the episodes numbered by ``episode``; return the observations."""
+        return self.start(self._all)
+
+    def start(self, rows: Rows) -> NDArray[np.float32]:
+        """Start the episodes numbered by ``episode`` in some cells.
+
+        Args:
+            rows: Numbers of the cells, shape (k,).
+
+        Returns:
+            Observations of all cells, (n_envs, obs_size).
+        """
+        self._start(rows)
+        return self._look(rows)
 
     def step(
         self, act: NDArray[np.float32], *, auto_reset: bool = True, features: bool = True

@@ -182,6 +182,8 @@ class PickBatch(CellBatch):
             ``k`` and on of a batch that starts at 0, bit for bit.
     """
 
+    _kernel = pick
+
     def __init__(
         self, cell: Cell, n_envs: int, seed: int, settings: PickSettings, first_env: int = 0
     ) -> None:
@@ -191,7 +193,6 @@ class PickBatch(CellBatch):
         people = new_people_state(self.cell, self.world.people, n_envs)
         self.state = _new_state(self.world, people, n_envs)
         super().__init__(
-            pick,
             (
                 self.world,
                 _rules_of(settings),

@@ -282,6 +282,8 @@ class ReachBatch(CellBatch):
             ``k`` and on of a batch that starts at 0, bit for bit.
     """
 
+    _kernel = reach
+
     def __init__(
         self, cell: Cell, n_envs: int, seed: int, settings: ReachSettings, first_env: int = 0
     ) -> None:
@@ -293,7 +295,6 @@ class ReachBatch(CellBatch):
         people = new_people_state(self.cell, self.world.people, n_envs)
         self.state = new_state(self.world, people, n_envs)
         super().__init__(
-            reach,
             (
                 self.world,
                 _rules_of(settings),

@@ -139,6 +139,8 @@ def _check_sizes(settings: SortingSettings, shape: SortingShape) -> None:
 class SortingBatch:
     """Many sorting tasks, stepped together by one thread.
 
+    Copies (``copy.deepcopy``, ``pickle``) go on bit by bit as the original would.
+
     Args:
         shape: Size of the tasks.
         fail: Failure probabilities of the clutter cells, shape (K,).
@@ -179,6 +181,20 @@ class SortingBatch:
         self._ended = np.zeros(n_envs, dtype=np.int64)
         self._step: Callable[..., None] | None = None
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a copy is made of; it finds its compiled kernel itself."""
+        return {**self.__dict__, "_step": None}
+
+    @property
+    def obs(self) -> Obs:
+        """Observations as they were last written, (n_envs, obs_size)."""
+        return self._obs
+
+    @property
+    def episode(self) -> NDArray[np.int64]:
+        """Numbers of the present episodes, (n_envs,); those that start next are set here."""
+        return self.rows.episode
+
     @property
     def horizon(self) -> int:
         """Attempts after which an episode is cut off."""
@@ -208,6 +224,23 @@ class SortingBatch:
     def restart(self) -> Obs:
         """Start the episodes numbered by ``rows.episode``; return the observations."""
         sorting_episode.start_rows(self.rows, self._rules(), self.seed, self._first, self._obs)
+        return self._obs
+
+    def start(self, rows: NDArray[np.int64]) -> Obs:
+        """Start the episodes numbered by ``episode`` in some rows.
+
+        Args:
+            rows: Numbers of the rows, shape (k,).
+
+        Returns:
+            Observations of all rows, (n_envs, obs_size).
+        """
+        if len(rows) == self.n_envs:
+            return self.restart()
+        for e in rows.tolist():
+            one = kernel.SortingRows._make(column[e : e + 1] for column in self.rows)
+            first, obs = self._first + e, self._obs[e : e + 1]
+            sorting_episode.start_rows(one, self._rules(), self.seed, first, obs)
         return self._obs
 
     def step(self, act: NDArray[np.int64], *, auto_reset: bool = True) -> SortingStep:

@@ -3,11 +3,12 @@
 from collections.abc import Sequence
 from typing import Any
 
+from gymnasium.vector import AutoresetMode
+
 from app.sim.cells import Cell
-from app.sim.envs.rows import cell_of, settings_with
+from app.sim.envs.rows import CellTask, cell_of, frames_per_s, settings_with
 from app.sim.envs.single import SingleEnv
 from app.sim.envs.vector import BatchVectorEnv
-from app.sim.kernels.arm import CONTROLLED
 from app.sim.pick import PickBatch, PickSettings
 from app.sim.scene import HumanKind
 
@@ -94,12 +95,13 @@ class PickEnv(SingleEnv):
         settings: Starts, ends and rewards.
         people: Who is in the cell, 0 to 4 kinds of person; None for the settings'.
         first_env: Which row of a vector environment this one equals.
+        render_mode: ``rgb_array`` or None; ``metadata["render_fps"]`` is the control rate.
 
     Source: thesis section 5.3. Deviates: features are added to the raw state (5.8), actions are
     wanted speeds instead of coefficients (``kernels/features.py``, ``kernels/reward.py``).
     """
 
-    metadata: dict[str, Any] = {"render_modes": [], "render_fps": 20}
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 20}
 
     def __init__(
         self,
@@ -107,10 +109,12 @@ class PickEnv(SingleEnv):
         settings: PickSettings | None = None,
         people: Sequence[HumanKind] | None = None,
         first_env: int = 0,
+        render_mode: str | None = None,
     ) -> None:
         chosen = settings_with(settings or PickSettings(), people)
         self.batch = PickBatch(cell_of(cell), 1, 0, chosen, first_env)
-        super().__init__(self.batch, CONTROLLED, sees_time=chosen.observation != "state")
+        task = CellTask(self.batch, sees_time=chosen.observation != "state")
+        super().__init__(task, render_mode, frames_per_s(self.batch.cell))
 
 
 class PickVectorEnv(BatchVectorEnv):
@@ -122,6 +126,9 @@ class PickVectorEnv(BatchVectorEnv):
         settings: Starts, ends and rewards.
         people: Who is in each cell, 0 to 4 kinds of person; None for the settings'.
         first_env: Number of the first cell.
+        autoreset_mode: What happens after an episode's end; see :class:`BatchVectorEnv`.
+        max_episode_steps: Steps after which an episode is truncated; None for no such limit.
+        render_mode: ``rgb_array`` (``render`` gives an image of every cell) or None.
     """
 
     def __init__(
@@ -131,7 +138,12 @@ class PickVectorEnv(BatchVectorEnv):
         settings: PickSettings | None = None,
         people: Sequence[HumanKind] | None = None,
         first_env: int = 0,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        max_episode_steps: int | None = None,
+        render_mode: str | None = None,
     ) -> None:
         chosen = settings_with(settings or PickSettings(), people)
         self.batch = PickBatch(cell_of(cell), num_envs, 0, chosen, first_env)
-        super().__init__(self.batch, CONTROLLED, sees_time=chosen.observation != "state")
+        task = CellTask(self.batch, sees_time=chosen.observation != "state")
+        fps = frames_per_s(self.batch.cell)
+        super().__init__(task, render_mode, fps, autoreset_mode, max_episode_steps)

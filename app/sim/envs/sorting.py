@@ -2,23 +2,71 @@
 
 from typing import Any, cast
 
-import gymnasium
 import numpy as np
 from gymnasium import spaces
-from gymnasium.error import ResetNeeded
-from gymnasium.vector import AutoresetMode, VectorEnv
-from gymnasium.vector.utils import batch_space
+from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from app.sim.cells import Cell
-from app.sim.envs.rows import add_final, cell_of, next_episode
-from app.sim.kernels.sorting import FAILURE_SCALE, SUCCESS, TIMEOUT
+from app.sim.envs.pictures import block_solids, picture, standing_workers
+from app.sim.envs.rows import Infos, Mask, Rows, cell_of
+from app.sim.envs.single import SingleEnv
+from app.sim.envs.vector import BatchVectorEnv
+from app.sim.kernels.sorting import FAILURE_SCALE, TIMEOUT
+from app.sim.raycast import Image
 from app.sim.sorting import OUTCOMES, Obs, SortingBatch, SortingSettings, fail_of, shape_of
 from app.sim.sorting_state import SortingShape
 
 NAMES = np.array(OUTCOMES, dtype=object)
-Acts = NDArray[np.int64]
-Steps = tuple[Obs, NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]
+RENDER_FPS = 4
+"""Attempts per second of a video."""
+
+
+class SortingTask:
+    """Sorting tasks of a cell.
+
+    Args:
+        cell: Work cell.
+        n_envs: Number of tasks.
+        settings: Starts, disturbances, rewards and ends.
+        first_env: Number of the first task.
+    """
+
+    def __init__(
+        self, cell: Cell, n_envs: int, settings: SortingSettings | None, first_env: int
+    ) -> None:
+        self._cell, shape = cell, shape_of(cell)
+        self.batch = SortingBatch(shape, fail_of(cell), n_envs, 0, settings, first_env)
+        self.action_space = cast("spaces.Space[Any]", spaces.Discrete(shape.n_actions))
+        self.observation_space = _obs_space(shape)
+
+    def actions(self, given: Any) -> NDArray[np.int64]:
+        """Return actions as the batch takes them, shape (n_envs,)."""
+        return np.asarray(given).reshape(-1)
+
+    def cut(self, ended: Rows) -> Mask:
+        """Return which of these outcomes truncate an episode, shape (n_envs,)."""
+        late: Mask = ended == TIMEOUT
+        return late
+
+    def infos(self) -> Infos:
+        """Return what ``info`` says, an entry per task."""
+        rows = self.batch.rows
+        return {
+            "outcome": NAMES[rows.outcome],
+            "episode_number": rows.episode.copy(),
+            "attempts": rows.steps.copy(),
+            "moves": rows.moves.copy(),
+            "failures": rows.failures.copy(),
+            "action_mask": self.batch.masks().astype(np.int8),
+        }
+
+    def picture(self, row: int) -> Image:
+        """Return an image of one task: the robot and the person stand still."""
+        cell, blocks = self._cell, self.batch.state_of(row)
+        home = np.array(cell.robot.home_q)
+        task = block_solids(cell, self.batch.shape, blocks)
+        return picture(cell, home, standing_workers(cell), task)
 
 
 def _obs_space(shape: SortingShape) -> spaces.Space[Obs]:
@@ -29,20 +77,7 @@ def _obs_space(shape: SortingShape) -> spaces.Space[Obs]:
     return cast("spaces.Space[Obs]", box)
 
 
-def _tell(batch: SortingBatch) -> dict[str, Any]:
-    """Return what ``info`` says, a row per task."""
-    rows = batch.rows
-    return {
-        "outcome": NAMES[rows.outcome],
-        "episode_number": rows.episode.copy(),
-        "attempts": rows.steps.copy(),
-        "moves": rows.moves.copy(),
-        "failures": rows.failures.copy(),
-        "action_mask": batch.masks().astype(np.int8),
-    }
-
-
-class SortingEnv(gymnasium.Env[Obs, np.int64]):
+class SortingEnv(SingleEnv):
     """A robot sorts objects out of a clutter onto towers, one per colour.
 
     | id | cell | K | colours | sizes | actions |
@@ -112,90 +147,46 @@ class SortingEnv(gymnasium.Env[Obs, np.int64]):
         cell: Name of a shipped work cell, or a work cell.
         settings: Starts, disturbances, rewards and ends.
         first_env: Which row of a vector environment this one equals.
+        render_mode: ``rgb_array`` or None: blocks in clutter and towers, those that the goal
+            asks for translucent; clutter cells are darker the likelier a pick fails.
 
     Source: thesis sections 3.3 and 3.4, METHOD 1. Deviates: coefficients and failure map are
     not printed and chosen here; the failure map is observed.
     """
 
-    metadata: dict[str, Any] = {"render_modes": []}
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": RENDER_FPS}
 
     def __init__(
         self,
         cell: str | Cell = "sorting-e0",
         settings: SortingSettings | None = None,
         first_env: int = 0,
+        render_mode: str | None = None,
     ) -> None:
-        self.batch = _batch(cell, 1, settings, first_env)
-        self.action_space = spaces.Discrete(self.batch.shape.n_actions)
-        self.observation_space = _obs_space(self.batch.shape)
-        self._running, self._seeded = False, False
-
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Obs, dict[str, Any]]:
-        """Start episode 0 of a seed, or the next episode where no seed is given.
-
-        Args:
-            seed: Seed of this and the following episodes.
-            options: ``{"episode": k}`` starts episode ``k`` instead.
-        """
-        super().reset(seed=seed)
-        if seed is None and not self._seeded:
-            seed = int(self.np_random.integers(2**31))
-        self._seeded = self._running = True
-        episode = (options or {}).get("episode")
-        next_episode(self.batch, self.batch.rows.episode, seed, episode)
-        return self.batch.restart()[0].copy(), self._info()
-
-    def step(self, action: np.int64) -> tuple[Obs, float, bool, bool, dict[str, Any]]:
-        """Make one attempt.
-
-        Args:
-            action: Number of a move, see the action space.
-
-        Raises:
-            ResetNeeded: The episode has ended.
-            InvalidInput: There is no such action.
-        """
-        if not self._running:
-            raise ResetNeeded("the episode has ended: call reset() before the next step()")
-        result = self.batch.step(np.asarray(action).reshape(1), auto_reset=False)
-        ended = int(result.ended[0])
-        self._running = not ended
-        obs, rew = result.obs[0].copy(), float(result.rew[0])
-        return obs, rew, ended == SUCCESS, ended == TIMEOUT, self._info()
+        task = SortingTask(cell_of(cell), 1, settings, first_env)
+        self.batch = task.batch
+        super().__init__(task, render_mode, RENDER_FPS)
 
     def action_masks(self) -> NDArray[np.bool_]:
         """Return which moves would change something, shape (n_actions,)."""
         mask: NDArray[np.bool_] = self.batch.masks()[0].copy()
         return mask
 
-    def _info(self) -> dict[str, Any]:
-        told = {name: rows[0] for name, rows in _tell(self.batch).items()}
-        return {
-            name: int(one) if isinstance(one, np.integer) else one for name, one in told.items()
-        }
 
+class SortingVectorEnv(BatchVectorEnv):
+    """Many tasks of :class:`SortingEnv`, stepped together.
 
-class SortingVectorEnv(VectorEnv[Obs, Acts, NDArray[Any]]):
-    """Many tasks of :class:`SortingEnv`, stepped together: ``AutoresetMode.SAME_STEP``.
-
-    Where an episode ends, the next one starts within the same step: the observation returned is
-    already the new episode's first, the last one is in ``infos["final_obs"]``, outcome and
-    number of the episode in ``infos["final_info"]``. All else in ``infos`` tells of the
-    episodes that run now; ``infos["action_mask"]`` has the shape (num_envs, n_actions).
+    ``infos["action_mask"]`` has the shape (num_envs, n_actions).
 
     Args:
         num_envs: Number of tasks.
         cell: Name of a shipped work cell, or a work cell.
         settings: Starts, disturbances, rewards and ends.
         first_env: Number of the first task.
+        autoreset_mode: What happens after an episode's end; see :class:`BatchVectorEnv`.
+        max_episode_steps: Steps after which an episode is truncated; None for no such limit.
+        render_mode: ``rgb_array`` (``render`` gives an image of every task) or None.
     """
-
-    metadata: dict[str, Any] = {
-        "autoreset_mode": AutoresetMode.SAME_STEP,
-        "render_modes": [],
-    }
 
     def __init__(
         self,
@@ -203,66 +194,14 @@ class SortingVectorEnv(VectorEnv[Obs, Acts, NDArray[Any]]):
         cell: str | Cell = "sorting-e0",
         settings: SortingSettings | None = None,
         first_env: int = 0,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        max_episode_steps: int | None = None,
+        render_mode: str | None = None,
     ) -> None:
-        self.batch = _batch(cell, num_envs, settings, first_env)
-        self.num_envs = num_envs
-        self.single_action_space = spaces.Discrete(self.batch.shape.n_actions)
-        self.single_observation_space = _obs_space(self.batch.shape)
-        self.action_space = batch_space(self.single_action_space, num_envs)
-        self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self._seeded = False
-
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Obs, dict[str, Any]]:
-        """Start episode 0 of a seed in every task, or the next one where no seed is given.
-
-        Args:
-            seed: Seed of all tasks: task ``k`` equals a single environment with this seed and
-                ``first_env=k``.
-            options: ``{"episode": n}`` starts episode ``n`` instead.
-        """
-        super().reset(seed=seed)
-        if seed is None and not self._seeded:
-            seed = int(self.np_random.integers(2**31))
-        self._seeded = True
-        episode = (options or {}).get("episode")
-        next_episode(self.batch, self.batch.rows.episode, seed, episode)
-        return self.batch.restart().copy(), self._info()
-
-    def step(self, actions: Acts) -> Steps:
-        """Make one attempt in every task.
-
-        Args:
-            actions: Numbers of moves, shape (num_envs,).
-
-        Raises:
-            ResetNeeded: ``reset`` was never called.
-            InvalidInput: There is no such action.
-        """
-        if not self._seeded:
-            raise ResetNeeded("call reset() before the first step()")
-        result = self.batch.step(np.asarray(actions))
-        done, infos = result.ended > 0, self._info()
-        if done.any():
-            outcome, episode = NAMES[result.ended], self.batch.rows.episode
-            add_final(infos, result.last_obs, done, outcome, episode)
-        rew = result.rew.astype(np.float64)
-        over, late = result.ended == SUCCESS, result.ended == TIMEOUT
-        return result.obs.copy(), rew, over, late, infos
+        task = SortingTask(cell_of(cell), num_envs, settings, first_env)
+        self.batch = task.batch
+        super().__init__(task, render_mode, RENDER_FPS, autoreset_mode, max_episode_steps)
 
     def action_masks(self) -> NDArray[np.bool_]:
         """Return which moves would change something, shape (num_envs, n_actions)."""
         return self.batch.masks().copy()
-
-    def _info(self) -> dict[str, Any]:
-        infos = _tell(self.batch)
-        marks = {f"_{name}": np.ones(self.num_envs, dtype=np.bool_) for name in infos}
-        return infos | marks
-
-
-def _batch(
-    cell: str | Cell, n_envs: int, settings: SortingSettings | None, first_env: int
-) -> SortingBatch:
-    found = cell_of(cell)
-    return SortingBatch(shape_of(found), fail_of(found), n_envs, 0, settings, first_env)

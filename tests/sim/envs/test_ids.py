@@ -49,7 +49,9 @@ def assert_single_equals_row(
     **keywords: object,
 ) -> int:
     """Compare one environment with a row of three; return the episodes seen."""
-    many = gymnasium.make_vec(env_id, 3, settings=settings, **keywords)
+    many = gymnasium.make_vec(
+        env_id, 3, settings=settings, autoreset_mode="SameStep", **keywords
+    )
     one = gymnasium.make(env_id, settings=settings, first_env=row, **keywords)
     (expected, _), (obs, _) = many.reset(seed=9), one.reset(seed=9)
     size = many.single_action_space.shape[0]
@@ -86,7 +88,7 @@ def test_id_names_who_is_there(env_id: str) -> None:
 
 @pytest.mark.parametrize("env_id", PEOPLE_IDS)
 def test_environment_passes_gymnasiums_check(env_id: str) -> None:
-    check_env(gymnasium.make(env_id).unwrapped, skip_render_check=True)
+    check_env(gymnasium.make(env_id).unwrapped)
 
 
 @pytest.mark.parametrize("env_id", PEOPLE_IDS)

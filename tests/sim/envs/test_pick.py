@@ -29,7 +29,7 @@ def test_registered_id_makes_the_environment() -> None:
 
 
 def test_environment_passes_gymnasiums_check() -> None:
-    check_env(gymnasium.make("tandem/Pick-v0").unwrapped, skip_render_check=True)
+    check_env(gymnasium.make("tandem/Pick-v0").unwrapped)
 
 
 def test_environment_passes_stable_baselines3s_check() -> None:

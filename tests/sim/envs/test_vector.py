@@ -12,13 +12,9 @@ from app.errors import SimulationError
 from app.sim.envs.reach import ReachVectorEnv
 from app.sim.reach import ReachSettings
 
+SAME = AutoresetMode.SAME_STEP
 QUICK = ReachSettings(time_limit_s=0.1, observation="state")
 STILL = np.zeros((4, 6), dtype=np.float32)
-
-
-def test_autoreset_mode_is_told() -> None:
-    env = gymnasium.make_vec("tandem/Reach-v0", 4)
-    assert env.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
 
 
 def test_observations_fit_the_spaces_and_are_not_overwritten() -> None:
@@ -31,7 +27,7 @@ def test_observations_fit_the_spaces_and_are_not_overwritten() -> None:
 
 
 def test_next_episode_starts_in_the_step_that_ended_one() -> None:
-    env = ReachVectorEnv(4, settings=QUICK, people=())
+    env = ReachVectorEnv(4, settings=QUICK, people=(), autoreset_mode=SAME)
     env.reset(seed=3)
     ends = [env.step(STILL)[2:] for _ in range(5)]
     assert not any("final_obs" in infos for _, _, infos in ends[:4])
@@ -45,7 +41,7 @@ def test_next_episode_starts_in_the_step_that_ended_one() -> None:
 
 
 def test_rows_that_did_not_end_have_no_final_observation() -> None:
-    env = ReachVectorEnv(64, settings=ReachSettings(start="uniform"))
+    env = ReachVectorEnv(64, settings=ReachSettings(start="uniform"), autoreset_mode=SAME)
     env.reset(seed=3)
     *_, infos = env.step(np.zeros((64, 6), dtype=np.float32))
     ended = infos["_final_obs"]
@@ -66,7 +62,11 @@ def test_time_out_truncates_only_where_the_time_left_is_not_observed(
 
 
 def test_gymnasiums_own_wrappers_work() -> None:
-    env = DictInfoToList(RecordEpisodeStatistics(ReachVectorEnv(4, settings=QUICK, people=())))
+    env = DictInfoToList(
+        RecordEpisodeStatistics(
+            ReachVectorEnv(4, settings=QUICK, people=(), autoreset_mode=SAME)
+        )
+    )
     env.reset(seed=3)
     for _ in range(5):
         *_, infos = env.step(STILL)
