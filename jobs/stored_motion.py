@@ -52,11 +52,11 @@ def detail_of(found: ImportedMotion) -> dict[str, Any]:
         "glitches": [asdict(one) for one in found.glitches],
         "clean_runs": [
             {
-                "first": run.first_frame,
-                "last": run.first_frame + len(run.times) - 1,
+                "first": first,
+                "last": last,
                 "duration_s": float(run.times[-1]),
             }
-            for run in found.runs
+            for run, (first, last) in zip(found.runs, found.spans, strict=True)
         ],
     }
 

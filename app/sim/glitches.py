@@ -6,7 +6,7 @@ between two frames is a glitch, and so is a hole in the time column.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,9 +38,10 @@ class Glitch:
     last: int
     """Last frame of the fault."""
     parts: tuple[str, ...]
-    """Points that were too fast, the fastest first; ``("time",)`` for a hole in the times."""
+    """Points that were too fast, the fastest first; ``("time",)`` for a hole in the times;
+    columns that lack a value."""
     speed: float
-    """Highest speed [m/s]; 0 for a hole in the times."""
+    """Highest speed [m/s]; 0 for a hole in the times and for missing values."""
     reason: str
     """One sentence part: ``"wrist_r at 41.2 m/s: jumps"``."""
 
@@ -78,6 +79,28 @@ def clean_runs(times: Vec, glitches: Sequence[Glitch]) -> tuple[tuple[int, int],
     edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(int)))
     runs = edges.reshape(-1, 2) - np.array([0, 1])
     return tuple((int(a), int(b)) for a, b in runs if times[b] - times[a] >= MIN_RUN)
+
+
+def merged(
+    found: Sequence[Glitch], missing: Sequence[Glitch], frames: NDArray[np.int64]
+) -> tuple[Glitch, ...]:
+    """Return all glitches in frames of the file, in their order.
+
+    Args:
+        found: From :func:`find_glitches`, in rows that have all values.
+        missing: Frames that lack a value; the holes that they leave are told by them.
+        frames: Frame of the file that each row is, shape (n,).
+    """
+    in_file = [
+        replace(one, first=int(frames[one.first]), last=int(frames[one.last])) for one in found
+    ]
+    firsts = np.array([one.first for one in missing])
+    told = [
+        one
+        for one in in_file
+        if one.parts != ("time",) or not ((one.first < firsts) & (firsts < one.last)).any()
+    ]
+    return tuple(sorted([*told, *missing], key=lambda one: (one.first, one.last)))
 
 
 def _glitch(

@@ -11,7 +11,9 @@ error of the conversion itself, ``wrists`` and ``elbows``, is measured on the re
 Source: METHOD 3.4.
 """
 
+import codecs
 import hashlib
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import PurePath
@@ -31,7 +33,7 @@ from app.sim.body_track import (
     model_points,
 )
 from app.sim.bvh import read_bvh
-from app.sim.glitches import MIN_RUN, Glitch, clean_runs, find_glitches
+from app.sim.glitches import MIN_RUN, Glitch, clean_runs, find_glitches, merged
 from app.sim.human import JOINT_NAMES, Q_MAX, Q_MIN
 from app.sim.joint_tables import AngleTrack, read_csv
 from app.sim.opensim import read_opensim
@@ -92,13 +94,15 @@ class ImportedMotion:
     reading: Reading
     """How the file was read: units, up axis, names, rate."""
     n_frames: int
-    """Frames in the file; those that repeat count once."""
+    """Frames in the file; those that repeat count once, those that lack a value do count."""
     duration: float
     """Of the file [s]."""
     size: BodySize
     """Lengths of the recorded person; the simulator's own where only angles are given."""
     runs: tuple[Motion, ...]
     """Clean runs, at least one."""
+    spans: tuple[tuple[int, int], ...]
+    """First and last frame of each run, counted from 0 in the file."""
     glitches: tuple[Glitch, ...]
     """What was cut out."""
     wrists: Spread
@@ -136,7 +140,7 @@ def read_motion(
     ending = PurePath(file_name).suffix.lower()
     if ending not in FORMATS:
         raise _bad("file name", repr(file_name[-60:]), f"must end with {', '.join(FORMATS)}")
-    text = _text(content)
+    text = _text(content, ending)
     digest = hashlib.sha256(content).hexdigest()[:12]
     if ending == ".bvh":
         track, reading = body_track(read_bvh(text), options)
@@ -149,29 +153,35 @@ def read_motion(
         rate_hz = 1.0 / float(np.median(np.diff(angles.times)))
         up = "z" if ending == ".csv" else "y"
         reading = Reading(unit="m", root_unit="m", up=up, rate_hz=rate_hz)
-    glitches = find_glitches(track.times, track.points)
-    spans = clean_runs(track.times, glitches)
+    frames = np.arange(len(track.times)) if angles is None else angles.frames
+    missing = () if angles is None else angles.missing
+    found = find_glitches(track.times, track.points)
+    spans = clean_runs(track.times, found)
+    glitches = merged(found, missing, frames)
     if not spans:
         raise _no_run(track, glitches)
     name = PurePath(file_name).stem[:100]
     origin = f"{PurePath(file_name).name[:100]} ({digest})"
     pieces = [_converted(track, angles, size, span) for span in spans]
     # Our own tables count the height from standing; elsewhere that is the 95th percentile.
-    found = _Pieces(track, size, spans, pieces, 0.0 if ending == ".csv" else None)
+    standing = 0.0 if ending == ".csv" else None
+    joined = _Pieces(track, size, spans, pieces, standing)
+    in_file = tuple((int(frames[a]), int(frames[b])) for a, b in spans)
     return ImportedMotion(
         name=name,
         format=ending[1:],
         reading=reading,
-        n_frames=len(track.times),
+        n_frames=len(track.times) if angles is None else angles.n_frames,
         duration=float(track.times[-1] - track.times[0]),
         size=size,
-        runs=found.motions(name, origin),
+        runs=joined.motions(name, origin, in_file),
+        spans=in_file,
         glitches=glitches,
-        wrists=found.error((WRIST_R, WRIST_L)),
-        elbows=found.error((ELBOW_R, ELBOW_L)),
-        wrists_at_fixed_height=found.error((WRIST_R, WRIST_L), carry_height=False),
-        pelvis=found.error((PELVIS,)),
-        fixed_body=found.error((WRIST_R, WRIST_L), body=BodySize()),
+        wrists=joined.error((WRIST_R, WRIST_L)),
+        elbows=joined.error((ELBOW_R, ELBOW_L)),
+        wrists_at_fixed_height=joined.error((WRIST_R, WRIST_L), carry_height=False),
+        pelvis=joined.error((PELVIS,)),
+        fixed_body=joined.error((WRIST_R, WRIST_L), body=BodySize()),
         beyond_limits=beyond_limits(np.concatenate([q for q, _ in pieces])),
     )
 
@@ -229,19 +239,23 @@ class _Pieces:
         self._standing = standing
         self._pieces = pieces
 
-    def motions(self, name: str, origin: str) -> tuple[Motion, ...]:
+    def motions(
+        self, name: str, origin: str, in_file: Sequence[tuple[int, int]]
+    ) -> tuple[Motion, ...]:
         """Return the runs; the pelvis's height counts from standing."""
         return tuple(
             Motion(
                 name=name,
-                source=f"{origin}, frames {a} to {b}",
+                source=f"{origin}, frames {first} to {last}",
                 times=_own(self._track.times[a : b + 1] - self._track.times[a]),
                 q=_own(q),
                 pelvis_z=_own(height - self._standing),
                 size=self._size,
-                first_frame=a,
+                first_frame=first,
             )
-            for (a, b), (q, height) in zip(self._spans, self._pieces, strict=True)
+            for (a, b), (first, last), (q, height) in zip(
+                self._spans, in_file, self._pieces, strict=True
+            )
         )
 
     def error(
@@ -275,13 +289,17 @@ def _converted(
     return body_angles(run, size)
 
 
-def _text(content: bytes) -> str:
+def _text(content: bytes, ending: str) -> str:
+    """Return a file's text: UTF-8, UTF-16 with its mark, or a spreadsheet's Latin-1."""
     if len(content) > MAX_BYTES:
         rule = f"must have at most {MAX_BYTES} bytes (32 MB)"
         raise _bad("file", f"<{len(content)} bytes>", rule, "cut it into parts")
+    marked = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     try:
-        text = content.decode("utf-8-sig")
+        text = content.decode("utf-16" if marked else "utf-8-sig")
     except UnicodeDecodeError as error:
+        if ending == ".csv" and not re.search(rb"[\x00-\x08\x0e-\x1f]", content):
+            return content.decode("latin-1")
         value = f"<byte {content[error.start]:#04x} at {error.start}>"
         raise _bad("file", value, "must be text in UTF-8") from error
     if not text.strip():

@@ -118,7 +118,7 @@ def _arm(upper: Vec, fore: Vec, side: float, rate_hz: float, first: int) -> Vec:
     toward = np.cross(_elbow_normal(upper, fore, bend, rate_hz), upper)
     shoulder = np.empty((len(bend), 3))
     joint_angles.arms_to_angles(_own(upper), _own(toward), side, shoulder)
-    return np.column_stack([_one_branch(shoulder, first), bend])
+    return np.column_stack([one_branch(shoulder, first), bend])
 
 
 def _elbow_normal(upper: Vec, fore: Vec, bend: Vec, rate_hz: float) -> Vec:
@@ -143,7 +143,7 @@ def _elbow_normal(upper: Vec, fore: Vec, bend: Vec, rate_hz: float) -> Vec:
     return normal
 
 
-def _one_branch(angles: Vec, first: int) -> Vec:
+def one_branch(angles: Vec, first: int) -> Vec:
     """Return the same shoulders, shape (n, 3), without leaps between equal triples.
 
     (flex, abduct, rotate) and (flex + pi, pi - abduct, rotate + pi) are one orientation. The

@@ -12,6 +12,7 @@ from tests.sim.recorded_person import bvh_text, csv_text, working
 from tests.sim.test_motions import with_leap
 
 CLIP = bvh_text(working(200)).encode()
+UNDECLARED = csv_text(working(100)).partition("\n")[2].encode()
 FILE = {"Content-Type": "application/octet-stream"}
 
 
@@ -136,12 +137,13 @@ IN_RADIANS = csv_text(working(100), degrees=False).replace("radians", "degrees")
     [
         (b"", "a.bvh", "file", "is empty"),
         (b"\n \n", "a.csv", "file", "is empty"),
-        (b"\xff\xfe", "a.bvh", "file", "must be text in UTF-8"),
+        (b"\xff\xfd", "a.bvh", "file", "must be text in UTF-8"),
         (b"\x80\x04K\x01.", "a.csv", "file", "must be text in UTF-8"),
         (b"\x00" * 5000, "a.bvh", "line 1", "has no line MOTION"),
         (CLIP, "a.c3d", "file name", "must end with .bvh, .mot, .sto, .csv"),
         (CLIP, "a", "file name", "must end with"),
-        (CLIP, "a.csv", "angles", "must be declared in the first line"),
+        (CLIP, "a.csv", "line 1", "lacks the columns pelvis_x"),
+        (UNDECLARED, "a.csv", "angles", "must be declared in the first line"),
         (CLIP[: len(CLIP) // 2], "a.bvh", "line ", "must hold"),
         (CLIP[:400], "a.bvh", "line ", "has no line MOTION"),
         (TWICE, "a.bvh", "frames, last line ", "must be the 300 that the head"),

@@ -3,7 +3,7 @@ import pytest
 
 from app.sim.body_size import BodySize
 from app.sim.body_track import ELBOW_L, WRIST_L, WRIST_R, model_points
-from app.sim.glitches import MARGIN, MAX_SPEED, clean_runs, find_glitches
+from app.sim.glitches import MARGIN, MAX_SPEED, Glitch, clean_runs, find_glitches, merged
 from app.sim.ports import Vec
 from tests.sim.recorded_person import working
 
@@ -60,6 +60,24 @@ def test_hole_in_the_times_parts_two_runs() -> None:
     assert (glitch.first, glitch.last, glitch.parts) == (299, 300, ("time",))
     assert "0.51 s without a frame" in glitch.reason
     assert [b - a for a, b in clean_runs(times, [glitch])] == [293, 293]
+
+
+def test_missing_values_stand_among_glitches_in_frames_of_the_file() -> None:
+    times, points = points_of_somebody(200)
+    frames = np.delete(np.arange(200), range(60, 90))
+    missing = Glitch(first=60, last=89, parts=("elbow_r",), speed=0.0, reason="no value")
+    points[150:152, WRIST_R] += 0.8
+    found = find_glitches(times[frames], points[frames])
+    assert [one.parts[0] for one in found] == ["time", "wrist_r"]
+    told = merged(found, [missing], frames)
+    assert [(one.first, one.last) for one in told] == [(60, 89), (149, 152)]
+
+
+def test_hole_without_missing_values_is_told_as_before() -> None:
+    times, points = points_of_somebody(200)
+    times = times + np.where(np.arange(200) >= 100, 0.5, 0.0)
+    found = find_glitches(times, points)
+    assert merged(found, (), np.arange(200)) == found
 
 
 def test_runs_shorter_than_a_second_are_dropped() -> None:

@@ -1,4 +1,5 @@
 import os
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -48,6 +49,64 @@ def test_angles_of_a_table_come_back_as_they_are() -> None:
     found = read_motion(csv_text(q).encode(), "someone.csv")
     np.testing.assert_allclose(found.runs[0].q, q, atol=1e-8)
     assert found.wrists.worst == 0.0
+
+
+def without_values(first: int, last: int, word: str = "NaN") -> str:
+    """A table of 4 s in which the left elbow has no value in some rows."""
+    lines = csv_text(working(200)).splitlines()
+    for k in range(first + 2, last + 3):
+        lines[k] = f"{lines[k].rpartition(',')[0]},{word}"
+    return "\n".join(lines)
+
+
+def test_rows_without_a_value_are_cut_out_and_named() -> None:
+    found = read_motion(without_values(100, 101).encode(), "someone.csv")
+    (gap,) = found.glitches
+    assert (gap.first, gap.last, gap.parts) == (100, 101, ("elbow_l",))
+    assert (found.spans, found.n_frames, found.n_clean) == (((0, 199),), 200, 198)
+    (run,) = found.runs
+    np.testing.assert_allclose(run.q, np.delete(working(200), [100, 101], axis=0), atol=1e-8)
+    assert np.diff(run.times).max() == pytest.approx(0.06)
+
+
+def test_long_gap_of_values_parts_two_runs_and_is_told_once() -> None:
+    found = read_motion(without_values(90, 110, "").encode(), "someone.csv")
+    (gap,) = found.glitches
+    assert (gap.first, gap.last) == (90, 110)
+    (_, before), (after, last) = found.spans
+    assert before < 90 and after > 110 and last == 199
+    assert found.runs[1].first_frame == after
+    assert f"frames {after} to 199" in found.runs[1].source
+
+
+def test_rows_without_a_value_at_both_ends_count_as_frames() -> None:
+    text = re.sub(r"\n3\.9\d*", "\nNA", without_values(0, 9))
+    found = read_motion(text.encode(), "someone.csv")
+    assert [(one.first, one.last) for one in found.glitches] == [(0, 9), (195, 199)]
+    assert (found.spans, found.n_frames) == (((10, 194),), 200)
+
+
+def test_leap_after_missing_values_is_told_in_frames_of_the_file() -> None:
+    lines = without_values(20, 22).splitlines()
+    cells = lines[150 + 2].split(",")
+    cells[1] = "9.0"
+    lines[150 + 2] = ",".join(cells)
+    found = read_motion("\n".join(lines).encode(), "someone.csv")
+    gap, leap = found.glitches
+    assert (gap.first, gap.last) == (20, 22)
+    assert (leap.first, leap.last) == (149, 151) and "jumps" in leap.reason
+
+
+def test_table_with_values_for_less_than_a_second_has_no_run() -> None:
+    with pytest.raises(BadMotion, match="no run of 1 s .*no value of elbow_l"):
+        read_motion(without_values(30, 199).encode(), "someone.csv")
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "latin-1", "cp1252"])
+def test_table_is_read_in_the_encodings_of_spreadsheets(encoding: str) -> None:
+    text = csv_text(working(100)).replace("elbow_r", "elbow_r [°]")
+    found = read_motion(text.encode(encoding), "someone.csv")
+    np.testing.assert_allclose(found.runs[0].q, working(100), atol=1e-8)
 
 
 def test_table_of_a_crouching_person_keeps_its_pelvis_height() -> None:
@@ -100,7 +159,7 @@ def test_clip_of_half_a_second_is_too_short() -> None:
     [
         (b"", "a.bvh", "file = <0 bytes> is empty"),
         (b" \n", "a.csv", "is empty"),
-        (b"\xff\xfe", "a.bvh", "byte 0xff at 0"),
+        (b"\xff", "a.bvh", "byte 0xff at 0"),
         (b"x", "a.c3d", "must end with .bvh, .mot, .sto, .csv"),
         (b"x", "a", "must end with"),
         (b"\x00" * 50, "a.bvh", "has no line MOTION"),

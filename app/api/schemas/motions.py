@@ -49,8 +49,12 @@ class GlitchPublic(Answer):
 
     first: int = Field(description="first frame of the fault, from 0")
     last: int = Field(description="last frame of the fault")
-    parts: list[str] = Field(description="points that were too fast, the fastest first")
-    speed: float = Field(description="highest speed [m/s]; 0 for a hole in the times")
+    parts: list[str] = Field(
+        description="points that were too fast, the fastest first; columns without a value"
+    )
+    speed: float = Field(
+        description="highest speed [m/s]; 0 for a hole in the times and for missing values"
+    )
     reason: str = Field(description="what is wrong, for people")
 
 
