@@ -3,7 +3,8 @@
 A tracker numbers its people anew in every frame, and exchanges them when they cross. Every
 person seen is given to the track it continues, by where that track's key-points were expected;
 so exchanged people are put right, and whose number has changed is named (``people-swapped``).
-The nearest who continue no track start the free ones. Each track degrades as
+The nearest who continue no track start the free ones: that of somebody lost whom they may be,
+who walks at 1.6 m/s while unseen, or one that never saw anybody. Each track degrades as
 ``person_estimate.py`` says.
 
 A frame may show more people than there are tracks. Then the nearest are followed: somebody who
@@ -44,7 +45,8 @@ class Unfollowed:
     index: int
     """Place in the frame."""
     reason: Literal["farther", "jump", "foreign-frame"]
-    """Farther away than those who are followed; not credible yet; in another frame."""
+    """Farther away than those who are followed are, or may be; not credible yet; in another
+    frame."""
     distance_m: float | None
     """Horizontal distance of the nearest key-point to the robot's base [m]; None: unknown."""
     detail: str | None = None
@@ -170,12 +172,17 @@ class PeopleEstimator:
         matched = match_people(expected, list(seen.values()), gates)
         order = [None if k is None else there[k] for k in matched]
         new = sorted(set(there) - set(order), key=lambda j: _from_base(seen[j]))
-        unknown = [bool(np.isnan(points).all()) for points in expected]
-        for i, free in enumerate(unknown):
-            if new and free:
-                order[i] = new.pop(0)
+        unknown = [i for i, points in enumerate(expected) if np.isnan(points).all()]
+        for one in list(new):
+            free = self._free_track(t, seen[one], [i for i in unknown if order[i] is None])
+            if free is not None:
+                new.remove(one)
+                order[free] = one
         replaced = set[int]()
-        away = [_from_base(expected[i] if j is None else seen[j]) for i, j in enumerate(order)]
+        away = [
+            self._nearest(t, i) if j is None else _from_base(seen[j])
+            for i, j in enumerate(order)
+        ]
         for one in [j for j in new if self._was_waiting(t, seen[j])]:
             far = int(np.argmax(away))
             if _from_base(seen[one]) + NEARER_M < away[far]:
@@ -183,9 +190,35 @@ class PeopleEstimator:
                 order[far], away[far] = one, _from_base(seen[one])
                 replaced.add(far)
         for i, j in enumerate(order):  # The rest show up as jumps of those who are lost.
-            if new and j is None:
+            if new and j is None and i not in unknown:
                 order[i] = new.pop(0)
         return order, replaced
+
+    def _free_track(self, t: float, points: Vec, free: Sequence[int]) -> int | None:
+        """Return which of the tracks that expect nobody a newcomer starts; None for none.
+
+        That of the person lost whom the newcomer may be, else one that never saw anybody.
+        Other people who are lost are not forgotten for a newcomer: they may still be there.
+        """
+        here = np.nanmedian(points, axis=0)
+        apart = {
+            i: float(np.linalg.norm(here - np.nanmedian(last, axis=0))) - self._walked(t, i)
+            for i in free
+            if (last := self._tracks[i].last_points) is not None
+        }
+        own = min(apart, key=apart.__getitem__, default=None)
+        if own is not None and apart[own] <= self.settings.filter.gate:
+            return own
+        return next((i for i in free if i not in apart), None)
+
+    def _walked(self, t: float, i: int) -> float:
+        """Return how far the person of a track can have got unseen [m]."""
+        return self.settings.cylinder.growth * self._tracks[i].unseen_s(t)
+
+    def _nearest(self, t: float, i: int) -> float:
+        """Return how near to the base the unseen person of a track may be [m]."""
+        last = self._tracks[i].last_points
+        return 0.0 if last is None else max(0.0, _from_base(last) - self._walked(t, i))
 
     def _was_waiting(self, t: float, points: Vec) -> bool:
         """Return whether somebody whom no track followed was here in the frame before."""

@@ -172,7 +172,8 @@ class PersonEstimator:
         self._t, self._seen_at = -math.inf, -math.inf
         self._swapped_at: dict[Group, float] = {}
         self._q: Vec | None = None
-        self._last_points: Vec | None = None
+        self.last_points: Vec | None = None
+        """Key-points known at the last frame [m], shape (25, 3); None: nothing ever seen."""
         self._flags: tuple[Flag, ...] = ()
         self._frame: Keypoints | None = None
         self._unfit = False
@@ -247,7 +248,7 @@ class PersonEstimator:
         self._center.forget([0])
         self._seen_at, self._unfit = -math.inf, False
         self._swapped_at.clear()
-        self._q = self._last_points = None
+        self._q = self.last_points = None
 
     def _put_sides_right(
         self, t: float, points: Vec, trust: Vec, flags: list[Flag]
@@ -293,7 +294,7 @@ class PersonEstimator:
         if self._center.refuse(t, center).any():
             self._center.forget([0])
         self._center.update(t, center, np.ones(1))
-        self._last_points = points
+        self.last_points = points
 
     @property
     def frame_flags(self) -> tuple[Flag, ...]:
@@ -323,7 +324,7 @@ class PersonEstimator:
         points, speeds = self._points.at(t)
         known = np.isfinite(points).all(axis=1)
         person, held, misfit = self._person(points, speeds)
-        if self._last_points is None:
+        if self.last_points is None:
             flags.append("never-seen")
         elif age > self.settings.stale_s:
             flags.append("stale")
@@ -370,12 +371,12 @@ class PersonEstimator:
 
     def _cylinder_at(self, t: float, points: Vec, age: float) -> SafetyCylinder | None:
         """Return the cylinder at ``t``: around what is known, else the last one, grown."""
-        if self._last_points is None:
+        if self.last_points is None:
             return None
         settings = self.settings.cylinder
         if np.isfinite(points).any():
             velocity = self._center.at(t)[1][0, :2]
             return safety_cylinder(points, np.nan_to_num(velocity), settings)
-        last = safety_cylinder(self._last_points, None, settings)
+        last = safety_cylinder(self.last_points, None, settings)
         growth = settings.growth * max(0.0, age - self.settings.filter.hold_s)
         return None if last is None else last.after(0.0, growth)

@@ -182,13 +182,36 @@ def test_nobody_unfollowed_is_nearer_for_long_whatever_people_do(
         assert len(following(estimates)) == n_tracks
 
 
-def test_a_stale_track_goes_to_the_nearest_newcomer() -> None:
+def test_a_newcomer_takes_the_track_of_somebody_lost_only_where_it_may_be_the_same() -> None:
     people = PeopleEstimator(1, CELL.body, floor_z=CELL.floor_z)
     people.update(0.0, [at(1.0)])
-    for k in range(1, 20):
-        people.update(k * DT, [])
-    (estimate,) = people.update(20 * DT, [at(5.0), at(3.0)])
-    assert following((estimate,)) == [3.0] and estimate.flags == ("restarted", "people-dropped")
+    for k in range(1, 90):
+        (estimate,) = people.update(k * DT, [at(5.0), at(3.0)] if k > 15 else [])
+        reached = 1.0 + 0.2 + 1.6 * k * DT
+        if reached < 3.0:  # the person lost may still be at 1 m
+            assert following((estimate,)) in ([], [1.0]) and estimate.age_s > 0.9 * k * DT
+            assert estimate.stale or k * DT < 0.3
+        else:
+            assert following((estimate,)) == [3.0] and not estimate.stale
+    assert [one.index for one in people.unfollowed] == [0]
+
+
+def test_a_newcomer_starts_a_track_of_nobody_and_the_person_lost_comes_back() -> None:
+    people = PeopleEstimator(2, CELL.body, floor_z=CELL.floor_z)
+    people.update(0.0, [at(1.0)])
+    for k in range(1, 60):
+        lost, new = people.update(k * DT, [at(5.0)] if k > 18 else [])
+    assert lost.stale and following((new,)) == [5.0]
+    both = people.update(60 * DT, [at(5.0), at(1.5)])
+    assert following(both) == [1.5, 5.0] and both[0].flags == ("restarted",)
+
+
+def test_somebody_nearer_than_the_lost_may_be_is_followed() -> None:
+    people = PeopleEstimator(1, CELL.body, floor_z=CELL.floor_z)
+    people.update(0.0, [at(6.0)])
+    for k in range(1, 25):
+        (estimate,) = people.update(k * DT, [at(1.0)] if k > 20 else [])
+    assert following((estimate,)) == [1.0] and not estimate.stale
 
 
 def test_a_skeleton_in_another_frame_costs_nobody_else_anything() -> None:

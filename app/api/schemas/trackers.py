@@ -134,8 +134,8 @@ class UnfollowedPublic(Answer):
 
     index: int = Field(description="place in the frame's `people`")
     reason: Literal["farther", "jump", "foreign-frame"] = Field(
-        description="farther away than those who are followed; not credible yet, as in `jump`; "
-        "another frame or unit"
+        description="farther away than those who are followed are, or may be where they are "
+        "not seen; not credible yet, as in `jump`; another frame or unit"
     )
     distance_m: float | None = Field(
         description="horizontal distance of the nearest key-point to the robot's base [m]; "
