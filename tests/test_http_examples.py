@@ -1,4 +1,4 @@
-"""The commands of ``docs/http.md``, run as written against a real server."""
+"""The commands of the documents, run as written against a real server."""
 
 import json
 import re
@@ -14,12 +14,20 @@ from app.main import create_app
 from app.settings import Settings
 from tests.api.live_server import running, wait_until_ready
 
-TEXT = (Path(__file__).resolve().parent.parent / "docs" / "http.md").read_text("utf-8")
+ROOT = Path(__file__).resolve().parent.parent
+TEXT = (ROOT / "docs" / "http.md").read_text("utf-8")
 SHELL = re.findall(r"```sh\n(.*?)```", TEXT, re.DOTALL)
 JOB = next(k for k, text in enumerate(SHELL) if "my-first-job" in text)
 """The example that posts a job; the first, SORT and the last have tests of their own, too."""
 SORT = next(k for k, text in enumerate(SHELL) if "/v1/sorting" in text)
 OTHERS = [text for k, text in enumerate(SHELL[:-1]) if k not in (0, JOB, SORT)]
+DECIDES = re.compile(r"/v1/(task-selection|motion|sorting|trackers/\$\w+/frames)(?![\w/])")
+DECISIONS = [
+    text
+    for page in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
+    for text in re.findall(r"```sh\n(.*?)```", page.read_text("utf-8"), re.DOTALL)
+    if DECIDES.search(text)
+]
 SAMPLES = [json.loads(one) for one in re.findall(r"```json\n(.*?)```", TEXT, re.DOTALL)]
 
 
@@ -48,6 +56,39 @@ def shape(value: Any) -> Any:
     if isinstance(value, list):
         return [shape(member) for member in value]
     return "number" if isinstance(value, int | float) else type(value).__name__
+
+
+def flagged(value: Any, place: str = "") -> list[str]:
+    """Return what an answer flags: where, and what."""
+    if isinstance(value, list):
+        return [one for k, item in enumerate(value) for one in flagged(item, f"{place}[{k}]")]
+    if not isinstance(value, dict):
+        return []
+    found = [
+        f"{place}.{name} = {value[name]}"
+        for name in ("flags", "outside", "state_outside", "unfeasible", "strays")
+        if value.get(name)
+    ]
+    return found + [
+        one for name, item in value.items() for one in flagged(item, f"{place}.{name}")
+    ]
+
+
+def test_every_route_that_decides_is_documented_by_a_request() -> None:
+    found = {one.split("/")[0] for text in DECISIONS for one in DECIDES.findall(text)}
+    assert found == {"task-selection", "motion", "sorting", "trackers"}
+
+
+@pytest.mark.parametrize("text", DECISIONS)
+def test_documented_request_is_answered_without_a_flag(text: str, address: str) -> None:
+    output = shell(text.replace("curl -s ", "curl -sf "), address)
+    answer = json.loads(output)
+    assert flagged(answer) == []
+
+
+def test_what_is_flagged_is_found_wherever_it_is() -> None:
+    answer = {"people": [{"flags": []}, {"flags": ["far"]}], "outside": [{"field": "x"}]}
+    assert flagged(answer) == [".outside = [{'field': 'x'}]", ".people[1].flags = ['far']"]
 
 
 def test_task_selection_answers_in_the_shape_that_is_shown(address: str) -> None:

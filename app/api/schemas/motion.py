@@ -7,10 +7,11 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field
 
+from app.api.schemas.examples import MOTION, shows
 from app.api.schemas.numbers import Answer, Body, Vector3, Vector6
 from app.api.schemas.people import PersonInput, PersonUse
 from app.api.schemas.robot_state import ROS_NAMES, RobotState
-from app.api.schemas.task_selection import Outside, Stamp
+from app.api.schemas.task_selection import FRAME_TEXT, Outside, Stamp
 from app.sim.human import CAPSULE_NAMES
 from app.sim.motion_ports import Beside, Met, MotionDecision, MotionQuestion, Way
 from app.sim.pick import Piece
@@ -74,10 +75,12 @@ class SafetyInput(Body):
 class MotionRequest(Body):
     """A state and a goal at this moment; nothing is remembered of the request before."""
 
+    model_config = shows(MOTION)
+
     cell: str = Field(
         max_length=64, description="name of the work cell", examples=["shared-workspace"]
     )
-    frame: Literal["robot-base"] = Field("robot-base", description="frame of all positions")
+    frame: Literal["robot-base"] = Field("robot-base", description=FRAME_TEXT)
     stamp: Stamp = Field(None, description="your time of the state; comes back unchanged")
     robot: ArmState
     people: Sequence[PersonInput] = Field(

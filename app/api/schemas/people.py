@@ -129,7 +129,7 @@ class KeypointsSeen(Body):
     """One person in one frame of a tracker of key-points."""
 
     keypoints: OfKeypoints = Field(
-        description="[x, y, z] in m, in the robot's base frame, or [x, y, z, confidence] with "
+        description="[x, y, z] in m, in the robot's `base_link`, or [x, y, z, confidence] with "
         "a confidence in [0, 1]. Missing: null, [], null or NaN in all coordinates, 0 or -1 in "
         "all three, confidence 0. A point that cannot be used otherwise is dropped and named. "
         f"In the order of BODY_25: {ORDER}; or a mapping of these names, absent where missing"

@@ -6,6 +6,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field
 
+from app.api.schemas.examples import TASK_SELECTION, shows
 from app.api.schemas.numbers import Answer, Body, Finite, Vector3, Vector6
 from app.api.schemas.people import PersonInput, PersonUse
 from app.api.schemas.people import PersonState as PersonState
@@ -14,6 +15,10 @@ from app.errors import InvalidInput
 from app.sim.ports import Candidate, Decision, OutsideField, Vec
 
 MAX_CANDIDATES = 1000
+FRAME_TEXT = (
+    "frame of all positions: ROS's `base_link`, x right, y toward the person, z up, table top "
+    "at z = 0; the pendant's `base` is turned by half a turn about z (x and y change sign)"
+)
 
 Stamp = Finite | Annotated[str, Field(max_length=64)] | None
 
@@ -28,8 +33,10 @@ class CandidateState(Body):
 class TaskSelectionRequest(Body):
     """What is known at the moment of choice."""
 
+    model_config = shows(TASK_SELECTION)
+
     cell: str = Field(description="name of the work cell", examples=["pick-and-place"])
-    frame: Literal["robot-base"] = Field("robot-base", description="frame of all positions")
+    frame: Literal["robot-base"] = Field("robot-base", description=FRAME_TEXT)
     stamp: Stamp = Field(None, description="your time of the state; comes back unchanged")
     robot: RobotState
     people: Sequence[PersonInput] = Field(

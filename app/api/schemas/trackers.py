@@ -6,6 +6,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field
 
+from app.api.schemas.examples import FRAME, shows
 from app.api.schemas.numbers import Answer, Body, Time
 from app.api.schemas.people import IMPLAUSIBLE, UNUSABLE, BodyPercentiles, KeypointsSeen
 from app.api.tracker_sessions import IDLE_S, TrackerSession
@@ -55,6 +56,8 @@ class TrackerList(Answer):
 
 class FrameCreate(Body):
     """One frame of all people, in any order."""
+
+    model_config = shows(FRAME)
 
     t: Time = Field(description="when the frame was taken, on the tracker's clock [s]")
     people: list[KeypointsSeen] = Field(

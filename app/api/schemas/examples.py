@@ -1,0 +1,44 @@
+"""Whole requests that the OpenAPI document shows; a test posts each of them."""
+
+from typing import Any
+
+from pydantic import ConfigDict
+
+KEYPOINTS: list[list[float] | None] = [
+    [0.0, 1.33, 0.81], [0.0, 1.45, 0.64], [-0.18, 1.45, 0.64], None, None,
+    [0.18, 1.45, 0.64], [0.23, 1.41, 0.36], [0.26, 1.22, 0.19],
+    [0.0, 1.45, 0.2], [-0.09, 1.45, 0.2], None, None, [0.09, 1.45, 0.2], *[None] * 12,
+]  # fmt: skip
+"""Somebody at the table of ``pick-and-place``, the left hand forward [m]."""
+TASK_SELECTION: dict[str, Any] = {
+    "cell": "pick-and-place",
+    "robot": {"q": [0.99, -2.33, 2.08, -1.32, -1.57, 0.0], "qd": [0.0] * 6},
+    "people": [{"keypoints": KEYPOINTS}],
+    "candidates": [
+        {"id": "left", "position": [-0.5, 0.7, 0.12]},
+        {"id": "right", "position": [0.3, 0.7, 0.12]},
+    ],
+}
+MOTION: dict[str, Any] = {
+    "cell": "shared-workspace",
+    "robot": {
+        "names": [
+            "elbow_joint",
+            "shoulder_lift_joint",
+            "shoulder_pan_joint",
+            "wrist_1_joint",
+            "wrist_2_joint",
+            "wrist_3_joint",
+        ],
+        "q": [2.0, -2.5, 0.0, 0.0, 0.0, 0.0],
+        "qd": [0.0, 0.0, 0.4, 0.0, 0.0, 0.0],
+    },
+    "people": [{"x": 0.3, "y": 1.6, "vx": 0.0, "vy": -0.5, "r": 0.3}],
+    "goal": [0.05, 0.75, 0.31],
+}
+FRAME: dict[str, Any] = {"t": 12.3, "people": [{"keypoints": KEYPOINTS}]}
+
+
+def shows(example: dict[str, Any]) -> ConfigDict:
+    """Return the configuration of a request that shows an example."""
+    return ConfigDict(json_schema_extra={"examples": [example]})
