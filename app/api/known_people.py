@@ -7,7 +7,7 @@ take some milliseconds: away from the event loop.
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,13 +26,15 @@ from app.api.tracker_sessions import IDLE_S, TrackerSessions
 from app.errors import InvalidInput, NotFound
 from app.sim import human
 from app.sim.cells import Cell
+from app.sim.kernels.people import MAX_PEOPLE
 from app.sim.keypoints import keypoints_of
 from app.sim.person_estimate import PersonEstimate
-from app.sim.ports import OutsideField, Person
+from app.sim.ports import OutsideField, Person, Vec
 from app.sim.scene import arm_of, people_of
 from app.sim.seen_people import (
     as_monitored,
     as_person,
+    checked_person,
     nearest_index,
     person_anywhere,
     standing_in,
@@ -59,11 +61,17 @@ class KnownPerson:
     estimate: PersonEstimate | None = None
     """What key-points told; None where there were none."""
 
-    def use(self, seen: bool) -> PersonUse:
-        """Return what the answer says of this person."""
-        return PersonUse.from_domain(
+    def use(self, seen: bool, dropped: bool = False) -> PersonUse:
+        """Return what the answer says of this person.
+
+        Args:
+            seen: Whether the policy sees this person.
+            dropped: Whether the request holds more people than count, and not this one.
+        """
+        use = PersonUse.from_domain(
             self.source, seen, self.speeds, self.person, self.observed, self.estimate
         )
+        return use.model_copy(update={"flags": [*use.flags, "dropped"]}) if dropped else use
 
 
 def known_people(
@@ -82,6 +90,30 @@ def known_people(
     return tuple(
         _known(entry, f"people[{i}].", cell, trackers) for i, entry in enumerate(entries)
     )
+
+
+def nearest_places(people: Mapping[int, Person], cell: Cell, q: Vec) -> list[int]:
+    """Return the places of at most four people, those nearest to the robot, in order.
+
+    Args:
+        people: People by their places in the request.
+        cell: The work cell.
+        q: The robot's joint positions [rad], shape (6,).
+
+    Raises:
+        InvalidInput: Of more than four, somebody who cannot be, with the place in the request.
+    """
+    if len(people) <= MAX_PEOPLE:
+        return list(people)
+    left = {i: checked_person(person, f"people[{i}]") for i, person in people.items()}
+    arm, shared, near = arm_of(cell), people_of(cell), list[int]()
+    while len(near) < MAX_PEOPLE:
+        places = list(left)
+        nearest = nearest_index(arm, shared, q, list(left.values()))
+        assert nearest is not None  # somebody is left
+        near.append(places[nearest])
+        del left[places[nearest]]
+    return sorted(near)
 
 
 def renumbered(

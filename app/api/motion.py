@@ -18,7 +18,7 @@ from pydantic import ValidationError
 from starlette.concurrency import run_in_threadpool
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from app.api.known_people import known_people, renumbered, take_time
+from app.api.known_people import known_people, nearest_places, renumbered, take_time
 from app.api.problems import problem, service_problem, validation_problem
 from app.api.schemas.motion import MotionAnswer, MotionRequest, PersonMet
 from app.api.services import Services, ServicesDep, services_of
@@ -97,12 +97,14 @@ def decide(
         ServiceError: There is none; says why.
     """
     people = known_people(request.people, cell, trackers)
-    present = [i for i, one in enumerate(people) if one.person is not None]
-    monitored = [i for i, one in enumerate(people) if one.observed is not None]
     as_seen = all(one.observed is one.person for one in people)
+    present = {i: one.person for i, one in enumerate(people) if one.person is not None}
+    last = {i: one.observed for i, one in enumerate(people) if one.observed is not None}
+    q = request.robot.joints(request.robot.q)
+    seen, monitored = (nearest_places(some, cell, q) for some in (present, last))
     question = request.to_domain(
-        [one.person for one in people if one.person is not None],
-        None if as_seen else [one.observed for one in people if one.observed is not None],
+        [present[i] for i in seen],
+        None if as_seen else [last[i] for i in monitored],
         safety_settings(cell),
         max((one.age_s for one in people), default=0.0),
     )
@@ -110,13 +112,15 @@ def decide(
         decision = decider.decide(question)
     decision = replace(
         decision,
-        seen=None if decision.seen is None else present[decision.seen],
+        seen=None if decision.seen is None else seen[decision.seen],
         terms_of=None if decision.terms_of is None else monitored[decision.terms_of],
-        outside=renumbered(decision.outside, present),
+        outside=renumbered(decision.outside, seen),
     )
-    met = dict(zip(present, decision.met, strict=True))
+    met = dict(zip(seen, decision.met, strict=True))
     uses = [
-        PersonMet.from_use(one.use(i == decision.seen), met.get(i))
+        PersonMet.from_use(
+            one.use(i == decision.seen, i in last and i not in monitored), met.get(i)
+        )
         for i, one in enumerate(people)
     ]
     return MotionAnswer.from_domain(decision, question, uses, cell.robot.dt, request.stamp)

@@ -6,7 +6,7 @@ from functools import partial
 from fastapi import APIRouter
 from starlette.concurrency import run_in_threadpool
 
-from app.api.known_people import known_people, renumbered, take_time
+from app.api.known_people import known_people, nearest_places, renumbered, take_time
 from app.api.schemas.task_selection import TaskSelection, TaskSelectionRequest
 from app.api.services import Services, ServicesDep
 from app.api.world_policies import require_mover
@@ -42,15 +42,19 @@ async def choose(request: TaskSelectionRequest, services: ServicesDep) -> TaskSe
 
     def answer() -> TaskSelection:
         people = known_people(request.people, cell, services.trackers)
-        present = [i for i, one in enumerate(people) if one.person is not None]
+        present = {i: one.person for i, one in enumerate(people) if one.person is not None}
+        seen = nearest_places(present, cell, q)
         with request.robot.faults_in_place():
-            decision = decide([one.person for one in people if one.person is not None])
+            decision = decide([present[i] for i in seen])
         decision = replace(
             decision,
-            seen=None if decision.seen is None else present[decision.seen],
-            outside=renumbered(decision.outside, present),
+            seen=None if decision.seen is None else seen[decision.seen],
+            outside=renumbered(decision.outside, seen),
         )
-        uses = [one.use(i == decision.seen) for i, one in enumerate(people)]
+        uses = [
+            one.use(i == decision.seen, i in present and i not in seen)
+            for i, one in enumerate(people)
+        ]
         return TaskSelection.from_domain(decision, candidates, uses, request.stamp)
 
     long = len(candidates) > MAX_INLINE_CANDIDATES or take_time(request.people)

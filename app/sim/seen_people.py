@@ -200,10 +200,19 @@ def checked_people(people: Sequence[Person]) -> tuple[Person, ...]:
     """
     if len(people) > MAX_PEOPLE:
         raise InvalidInput("people", len(people), f"must hold at most {MAX_PEOPLE} people")
-    return tuple(_checked(person, f"people[{i}]") for i, person in enumerate(people))
+    return tuple(checked_person(person, f"people[{i}]") for i, person in enumerate(people))
 
 
-def _checked(person: Person, path: str) -> Person:
+def checked_person(person: Person, path: str) -> Person:
+    """Return a person with checked arrays.
+
+    Args:
+        person: As told.
+        path: Name of the field, for errors.
+
+    Raises:
+        InvalidInput: A number that no person can have.
+    """
     if _right_as_it_is(person):
         return person
     size, cylinder = person.size, person.cylinder
@@ -270,7 +279,7 @@ def nearest_index(arm: Arm, shared: People, q: Vec, people: Sequence[Person]) ->
         arm: Robot in its cell.
         shared: From :func:`~app.sim.scene.people_of`.
         q: The robot's joint positions [rad], shape (6,).
-        people: At most four.
+        people: Any number.
     """
     if len(people) < 2:
         return len(people) - 1 if people else None

@@ -280,7 +280,7 @@ BAD: list[tuple[dict[str, Any], int, str]] = [
     ({"safety": {"speed_change": -1}}, 422, "safety.speed_change"),
     ({"safety": {"human_sped": 1}}, 422, "safety.human_sped"),
     ({"safety": {"reaction_time": float("nan")}}, 422, "safety.reaction_time"),
-    ({"people": [WALKER] * 5}, 422, "people"),
+    ({"people": [WALKER] * 65}, 422, "people"),
     ({"people": [{"x": 0.1}]}, 422, "people[0].y"),
     ({"people": [{**WALKER, "r": -1}]}, 422, "people[0].r"),
     ({"people": [{**WALKER, "vx": 1e9}]}, 422, "people[0].vx"),

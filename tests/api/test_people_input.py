@@ -263,6 +263,47 @@ def test_a_field_that_no_such_person_has_is_refused_with_those_it_has(
     assert problem["choices"] == ["q", "qd", "body", "size"]
 
 
-def test_five_people_are_too_many(client: TestClient, state: dict[str, Any]) -> None:
-    problem = refused(client, {**state, "people": [WHOLE] * 5})
-    assert problem["field"] == "people" and "at most 4" in problem["rule"]
+def test_of_more_than_four_people_the_nearest_count_and_the_rest_is_named(
+    client: TestClient, state: dict[str, Any]
+) -> None:
+    crowd: list[Any] = [{"x": 0.5 * k, "y": 5.0, "vx": 0, "vy": 0, "r": 0.3} for k in range(7)]
+    farther = {**WHOLE, "q": [0.0, 4.0, *WHOLE["q"][2:]]}
+    people = [*crowd[:4], farther, *crowd[4:], WHOLE, {"keypoints": POINTS}]
+    answer = asked(client, state, *people)
+    near = asked(client, state, crowd[0], farther, WHOLE, {"keypoints": POINTS})
+    assert values(answer) == values(near)
+    kept = [i for i, one in enumerate(answer["people"]) if "dropped" not in one["flags"]]
+    assert kept == [0, 4, 8, 9]
+    assert [i for i, one in enumerate(answer["people"]) if one["seen"]] in ([8], [9])
+    assert all(
+        "people[8]" in o["field"] or "people[9]" in o["field"] or "robot" in o["field"]
+        for o in answer["state_outside"]
+    )
+
+
+def test_people_are_told_by_their_places_among_many(client: TestClient) -> None:
+    question = {
+        "cell": "shared-workspace",
+        "robot": {"q": [0, -2.5, 2.0, 0, 0, 0], "qd": [0.4, 0, 0, 0, 0, 0]},
+        "goal": [0.05, 0.75, 0.31],
+    }
+    near = {"x": 0.3, "y": 1.1, "vx": 0, "vy": -0.5, "r": 0.3}
+    crowd = [{"x": 0.7 * k, "y": 6.0, "vx": 0, "vy": 0, "r": 0.3} for k in range(6)]
+    alone = client.post("/v1/motion", json={**question, "people": [near]}).json()
+    answer = client.post("/v1/motion", json={**question, "people": [*crowd, near]}).json()
+    assert answer["safety"]["set_by"] == answer["safety"]["terms"]["person"] == 6
+    assert answer["safety"]["override"] == alone["safety"]["override"]
+    assert answer["people"][6]["seen"] and answer["people"][6]["separation"] < 1.0
+    dropped = [i for i, one in enumerate(answer["people"]) if "dropped" in one["flags"]]
+    assert dropped == [3, 4, 5]
+    assert all(answer["people"][i]["separation"] is None for i in dropped)
+
+
+def test_wrong_people_among_many_are_refused_by_their_places(
+    client: TestClient, state: dict[str, Any]
+) -> None:
+    problem = refused(client, {**state, "people": [WHOLE] * 65})
+    assert problem["field"] == "people" and "at most 64" in problem["rule"]
+    wrong = {**WHOLE, "size": [0] * 12}
+    problem = refused(client, {**state, "people": [*[WHOLE] * 5, wrong]})
+    assert problem["field"] == "people[5].size[1]"

@@ -14,6 +14,7 @@ from app.api.schemas.robot_state import ROS_NAMES, RobotState
 from app.api.schemas.task_selection import FRAME_TEXT, Outside, Stamp
 from app.sim.human import CAPSULE_NAMES
 from app.sim.motion_ports import Beside, Met, MotionDecision, MotionQuestion, Way
+from app.sim.people_estimate import MAX_SKELETONS
 from app.sim.pick import Piece
 from app.sim.ports import Person, Vec
 from app.sim.safety import SafetyDecision, SafetySettings, SeparationTerms, powers_of_time
@@ -84,9 +85,9 @@ class MotionRequest(Body):
     stamp: Stamp = Field(None, description="your time of the state; comes back unchanged")
     robot: ArmState
     people: Sequence[PersonInput] = Field(
-        max_length=4,
+        max_length=MAX_SKELETONS,
         description="the people in the cell, each by joint angles, key-points, a cylinder or a "
-        "tracker",
+        "tracker; of more than four the nearest four count, the others are flagged `dropped`",
     )
     goal: Vector3 = Field(description="where the tool shall be, in `frame` [m]")
     way: Way | None = Field(
@@ -300,7 +301,8 @@ class PersonMet(PersonUse):
     """What was made of one person, and how near."""
 
     separation: float | None = Field(
-        description="distance to the robot [m]; below 0: inside it; null: never seen"
+        description="distance to the robot [m]; below 0: inside it; null: never seen, or "
+        "dropped"
     )
     weight: float = Field(description="share of the action beside this person")
 

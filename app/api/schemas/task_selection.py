@@ -12,6 +12,7 @@ from app.api.schemas.people import PersonInput, PersonUse
 from app.api.schemas.people import PersonState as PersonState
 from app.api.schemas.robot_state import RobotState
 from app.errors import InvalidInput
+from app.sim.people_estimate import MAX_SKELETONS
 from app.sim.ports import Candidate, Decision, OutsideField, Vec
 
 MAX_CANDIDATES = 1000
@@ -40,9 +41,10 @@ class TaskSelectionRequest(Body):
     stamp: Stamp = Field(None, description="your time of the state; comes back unchanged")
     robot: RobotState
     people: Sequence[PersonInput] = Field(
-        max_length=4,
+        max_length=MAX_SKELETONS,
         description="the people in the cell, each by joint angles, key-points, a cylinder or a "
-        "tracker; a policy that knows one person sees the one nearest to the robot",
+        "tracker; a policy that knows one person sees the one nearest to the robot; of more "
+        "than four the nearest four count, the others are flagged `dropped`",
     )
     candidates: list[CandidateState] = Field(
         min_length=1, max_length=MAX_CANDIDATES, description="what may be chosen"
