@@ -110,6 +110,13 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("--unit", help="unit of the lengths, such as cm, or metres per unit")
     one.add_argument("--root-unit", metavar="UNIT", help="unit of the root's path, if another")
     one.add_argument("--up", metavar="AXIS", help="axis that points up: y, z, -y, ...")
+    one.add_argument(
+        "--map",
+        action="append",
+        default=[],
+        metavar="THEIRS=OURS",
+        help="what a joint or column of the file is; may be repeated",
+    )
     one.add_argument("--json", action="store_true")
     return top
 
@@ -302,9 +309,14 @@ def run_motions(options: argparse.Namespace) -> int:
     prepare_kernels(settings)
     from app.errors import BadMotion
     from app.motion_verbs import faulty, run
-    from app.sim.read_options import ReadOptions
+    from app.sim.read_options import ReadOptions, name_map
 
-    stated = ReadOptions(unit=options.unit, root_unit=options.root_unit, up=options.up)
+    stated = ReadOptions(
+        unit=options.unit,
+        root_unit=options.root_unit,
+        up=options.up,
+        names=name_map(options.map),
+    )
     keep, name = options.keep, options.name
     try:
         text, data = run(

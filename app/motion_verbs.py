@@ -21,6 +21,7 @@ Printed = tuple[str, dict[str, Any]]
 """Text for people, and the same as data."""
 MAX_LINES = 12
 """Most glitches, and most runs, that are told to people; the data has all."""
+_FLAGS = {"unit": "--unit", "root_unit": "--root-unit", "up": "--up", "names": "--map"}
 NOUN = "stored motion"
 
 
@@ -52,7 +53,8 @@ def run(
     if keep and action != "import":
         raise InvalidInput("--keep", action, "goes with import only")
     if options.stated() and action != "import":
-        raise InvalidInput(f"--{min(options.stated())}", action, "goes with import only")
+        flag = _FLAGS[min(options.stated())]
+        raise InvalidInput(flag, action, "goes with import only")
     if action == "list":
         return _listed(settings)
     if target is None:
@@ -214,7 +216,7 @@ def _reading(reading: Mapping[str, Any] | None) -> list[str]:
     lines = [f"read as: {', '.join(words)}"]
     if reading["names"]:
         names = ", ".join(f"{ours} = {theirs}" for ours, theirs in reading["names"].items())
-        lines.append(f"joints: {names}")
+        lines.append(f"names: {names}")
     return [*lines, *reading["notes"]]
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 
 from app.__main__ import main
-from tests.sim.recorded_person import bvh_text, working
+from tests.sim.recorded_person import bvh_text, csv_text, working
 
 
 @pytest.fixture
@@ -99,9 +99,28 @@ def test_other_file_under_a_taken_name_is_refused(
     assert "from another file is stored: remove it first" in capsys.readouterr().err
 
 
+def test_names_of_joints_and_columns_can_be_mapped(
+    clip: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    table = clip.with_suffix(".csv")
+    text = csv_text(working(100)).replace("elbow_r", "coude d").replace("elbow_l", "coude g")
+    table.write_text(text, encoding="utf-8")
+    asked = ["motions", "import", str(table), "--map", "coude d=elbow_r"]
+    assert main(asked) == 2
+    assert "lacks the columns elbow_l (other columns: coude g" in capsys.readouterr().err
+    assert main([*asked, "--map", "coude g = elbow_l", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["frames"] == 100
+    assert main([*asked, "--map", "coude g=elbow", "--json"]) == 2
+    (fault,) = json.loads(capsys.readouterr().out)["faults"]
+    assert "choices: time, pelvis_x" in fault["hint"]
+
+
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
+        (["list", "--map", "a=neck"], "--map = 'list' goes with import only"),
+        (["import", "{clip}", "--map", "a"], "map = 'a' must be theirs=ours"),
+        (["import", "{clip}", "--map", "a=neck", "--map", "b=neck"], "the only name for neck"),
         (["import", "{clip}", "--name", "a"], "add --keep"),
         (["import", "{clip}", "--keep", "--name", "A"], "1 to 64 of the characters"),
         (["list", "--keep"], "goes with import only"),

@@ -10,7 +10,7 @@ from app.api.schemas.motions import MotionItem, MotionList, MotionPublic
 from app.api.services import MAX_UPLOADS, Services, ServicesDep
 from app.errors import NotReady
 from app.sim.motions import FORMATS, MAX_BYTES
-from app.sim.read_options import UNITS, UP_AXES, ReadOptions
+from app.sim.read_options import UNITS, UP_AXES, ReadOptions, name_map
 from app.store.records import MotionRecord
 
 router = APIRouter(prefix="/v1/motions", tags=["motions"])
@@ -41,9 +41,16 @@ def stated_options(
         str | None,
         Query(description=f"axis that points up: {', '.join(UP_AXES)}; found if missing"),
     ] = None,
+    names: Annotated[
+        list[str] | None,
+        Query(
+            alias="map",
+            description="what a joint or column of the file is, theirs=ours; may be repeated",
+        ),
+    ] = None,
 ) -> ReadOptions:
     """Return what a request states about its file."""
-    return ReadOptions(unit=unit, root_unit=root_unit, up=up)
+    return ReadOptions(unit=unit, root_unit=root_unit, up=up, names=name_map(names or []))
 
 
 @router.get("", summary="List the imported motions")

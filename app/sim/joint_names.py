@@ -82,7 +82,7 @@ def find_joints(
     missing = [role for role in TRACK_NAMES if role not in joints]
     if missing:
         listed = ", ".join(names[:40])[:300]
-        hint = f"the file's joints are {listed}; known names: docs/motions.md"
+        hint = f"the file's joints are {listed}; a name map says which is which: theirs=ours"
         rule = f"has no joint that is known as {', '.join(missing)}"
         raise BadMotion([Fault(place="HIERARCHY", value="", rule=rule, hint=hint)])
     return joints

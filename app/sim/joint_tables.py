@@ -54,6 +54,8 @@ class AngleTrack:
     """Frames of the file, with those that lack a value."""
     missing: tuple[Glitch, ...]
     """Frames that lack a value; they are left out."""
+    names: Mapping[str, str]
+    """Columns whose name in the file is not ours, by our name."""
 
 
 def read_csv(text: str, names: Mapping[str, str] | None = None) -> AngleTrack:
@@ -91,6 +93,7 @@ def read_csv(text: str, names: Mapping[str, str] | None = None) -> AngleTrack:
         frames=np.flatnonzero(good),
         n_frames=len(good),
         missing=missing_values(values, good),
+        names=file.table.foreign(columns),
     )
 
 
@@ -106,7 +109,7 @@ def _columns(table: Table, names: Mapping[str, str]) -> dict[str, int]:
     strange = [name for k, name in enumerate(table.labels) if name and k not in known]
     if strange:
         optional = [name for name in CSV_COLUMNS if name not in columns]
-        hint = table.near(optional, columns) or f"known are {', '.join(CSV_COLUMNS)}"
+        hint = table.near(optional, columns)
         raise bad(place, "", f"has unknown columns: {', '.join(strange)[:200]}", hint)
     return columns
 

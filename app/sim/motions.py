@@ -142,17 +142,8 @@ def read_motion(
         raise _bad("file name", repr(file_name[-60:]), f"must end with {', '.join(FORMATS)}")
     text = _text(content, ending)
     digest = hashlib.sha256(content).hexdigest()[:12]
-    if ending == ".bvh":
-        track, reading = body_track(read_bvh(text), options)
-        size, angles = measure(track.points), None
-    else:
-        angles = read_csv(text) if ending == ".csv" else read_opensim(text)
-        size = BodySize()
-        points = model_points(angles.q, angles.pelvis_z, size)
-        track = BodyTrack(times=angles.times, points=points)
-        rate_hz = 1.0 / float(np.median(np.diff(angles.times)))
-        up = "z" if ending == ".csv" else "y"
-        reading = Reading(unit="m", root_unit="m", up=up, rate_hz=rate_hz)
+    track, angles, reading = _read(text, ending, options)
+    size = measure(track.points) if angles is None else BodySize()
     frames = np.arange(len(track.times)) if angles is None else angles.frames
     missing = () if angles is None else angles.missing
     found = find_glitches(track.times, track.points)
@@ -183,6 +174,25 @@ def read_motion(
         pelvis=joined.error((PELVIS,)),
         fixed_body=joined.error((WRIST_R, WRIST_L), body=BodySize()),
         beyond_limits=beyond_limits(np.concatenate([q for q, _ in pieces])),
+    )
+
+
+def _read(
+    text: str, ending: str, options: ReadOptions
+) -> tuple[BodyTrack, AngleTrack | None, Reading]:
+    """Return joint centres, joint angles where the file holds them, and how it was read."""
+    if ending == ".bvh":
+        track, reading = body_track(read_bvh(text), options)
+        return track, None, reading
+    _require_names_only(options)
+    read, up = (read_csv, "z") if ending == ".csv" else (read_opensim, "y")
+    angles = read(text, options.names)
+    points = model_points(angles.q, angles.pelvis_z, BodySize())
+    rate_hz = 1.0 / float(np.median(np.diff(angles.times)))
+    return (
+        BodyTrack(times=angles.times, points=points),
+        angles,
+        Reading(unit="m", root_unit="m", up=up, rate_hz=rate_hz, names=angles.names),
     )
 
 
@@ -305,6 +315,14 @@ def _text(content: bytes, ending: str) -> str:
     if not text.strip():
         raise _bad("file", f"<{len(content)} bytes>", "is empty")
     return text
+
+
+def _require_names_only(options: ReadOptions) -> None:
+    """Refuse a unit or an axis that is stated of a table: its places are metres."""
+    for name in ("unit", "root_unit", "up"):
+        stated = getattr(options, name)
+        if stated is not None:
+            raise _bad(name, repr(stated), "goes with .bvh only: places of a table are metres")
 
 
 def _no_run(track: BodyTrack, glitches: Sequence[Glitch]) -> BadMotion:

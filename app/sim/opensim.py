@@ -97,6 +97,7 @@ def read_opensim(text: str, names: Mapping[str, str] | None = None) -> AngleTrac
         frames=np.flatnonzero(good),
         n_frames=len(good),
         missing=missing_values(values, good),
+        names=table.foreign(columns),
     )
 
 
@@ -188,8 +189,6 @@ def _columns(table: Table, names: Mapping[str, str]) -> dict[str, int]:
         arms = re.compile("arm|elbow|should|humer|(^|_)sh_", re.IGNORECASE)
         if not any(arms.search(label) for label in table.labels):
             hint = "a full-body model with arms is needed, such as Rajagopal's"
-        elif not hint:
-            hint = "if the file has them under other names, give a name map: theirs=ours"
         raise bad(f"line {table.line}", "", f"lacks the columns {', '.join(missing)}", hint)
     return {name: there[name] for name in wanted}
 

@@ -4,7 +4,7 @@ Every reader takes a :class:`ReadOptions`. What is not stated is found from the 
 readings fit, the file is refused, and the caller states which one is meant.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -21,6 +21,8 @@ UNITS: Mapping[str, float] = {
 """Lengths that skeletons are written in [m]; ``cmu`` is an inch over 0.45."""
 UP_AXES = ("x", "y", "z", "-x", "-y", "-z")
 """Directions of a file that can point up."""
+MAX_NAMES = 100
+"""Most names that are stated."""
 MIN_UNIT, MAX_UNIT = 1e-6, 10.0
 """Range of a unit that is stated as a number [m]."""
 
@@ -30,7 +32,8 @@ class ReadOptions:
     """What is stated about a recording; None and an empty map state nothing.
 
     Raises:
-        InvalidInput: A unit is neither one of UNITS nor a number, or the axis is none.
+        InvalidInput: A unit is neither one of UNITS nor a number, the axis is none, or two of
+            the file's names stand for one of ours.
     """
 
     unit: str | None = None
@@ -49,6 +52,11 @@ class ReadOptions:
                 metres(stated, name)
         if self.up is not None and self.up not in UP_AXES:
             raise InvalidInput("up", self.up[:40], "must be the axis that points up", UP_AXES)
+        ours = list(self.names.values())
+        for theirs, own in self.names.items():
+            if ours.count(own) > 1:
+                rule = f"must be the only name for {own[:40]}, which has {ours.count(own)}"
+                raise InvalidInput("map", f"{theirs[:60]}={own[:40]}", rule)
 
     def stated(self) -> dict[str, Any]:
         """Return what is stated, by field, as JSON data."""
@@ -73,6 +81,31 @@ class Reading:
     """Of the recorded person [m]; None where only angles are given."""
     notes: tuple[str, ...] = ()
     """What else was found, in sentences."""
+
+
+def name_map(pairs: Sequence[str]) -> dict[str, str]:
+    """Return a name map from pairs as they are written.
+
+    Args:
+        pairs: ``"theirs=ours"`` each; the last ``=`` counts.
+
+    Raises:
+        InvalidInput: One is no pair, a name is mapped twice, or there are too many.
+    """
+    if len(pairs) > MAX_NAMES:
+        raise InvalidInput("map", f"<{len(pairs)} names>", f"must be at most {MAX_NAMES}")
+    names: dict[str, str] = {}
+    for pair in pairs:
+        if not pair.isprintable():
+            raise InvalidInput("map", pair[:80], "must have only characters that can be shown")
+        theirs, _, own = (part.strip() for part in pair.rpartition("="))
+        if not theirs or not own:
+            rule = "must be theirs=ours, such as LeftForeArm2=elbow_l"
+            raise InvalidInput("map", pair[:80], rule)
+        if theirs in names:
+            raise InvalidInput("map", pair[:80], "must map a name once")
+        names[theirs] = own
+    return names
 
 
 NOTHING_STATED = ReadOptions()

@@ -26,6 +26,8 @@ MAX_NAME = 200
 """Characters of a name that count."""
 MIN_LIKENESS = 0.6
 """Two names are nearly the same from this ratio of ``difflib`` on."""
+MAX_OTHERS = 12
+"""Most columns that a hint lists which are not known at all."""
 MAX_PAIRS = 6
 """Most pairs of nearly known names that a hint lists."""
 
@@ -114,6 +116,15 @@ class Table:
             raise BadMotion(faults[:MAX_FAULTS])
         return dict(zip(columns, found.T, strict=True))
 
+    def foreign(self, columns: Mapping[str, int]) -> dict[str, str]:
+        """Return the names in the file, by our name, that are not ours themselves.
+
+        Args:
+            columns: Indices by our name.
+        """
+        names = {own: self.names[k][:MAX_NAME] for own, k in columns.items()}
+        return {own: theirs for own, theirs in names.items() if theirs != own}
+
     def near(self, missing: Iterable[str], columns: Mapping[str, int]) -> str:
         """Return a hint that pairs names that are missing with nearly known columns.
 
@@ -124,6 +135,9 @@ class Table:
         known = set(columns.values())
         free = [name for k, name in enumerate(self.labels) if name and k not in known]
         pairs = near_names(missing, [name for name in free if len(name) <= MAX_NAME])
+        if not pairs and free:
+            others = ", ".join(free[:MAX_OTHERS])[:300]
+            return f"other columns: {others}; a name map says what they are: theirs=ours"
         if not pairs:
             return ""
         listed = ", ".join(f"{theirs}={own}" for theirs, own in pairs[:MAX_PAIRS])
@@ -227,23 +241,19 @@ def near_names(missing: Iterable[str], there: Iterable[str]) -> list[tuple[str, 
 
 
 def check_map(names: Mapping[str, str], ours: Sequence[str]) -> None:
-    """Refuse a name map that names what is none of ours, or one of ours twice.
+    """Refuse a name map that names what is none of ours.
 
     Args:
         names: Theirs to ours.
         ours: The choices.
 
     Raises:
-        BadMotion: Says which, and lists the choices.
+        BadMotion: It does; the hint lists the choices.
     """
     for theirs, own in names.items():
         if own not in ours:
             hint = f"choices: {', '.join(ours)}"
             raise bad("name map", shown(f"{theirs}={own}"), "must end with one of ours", hint)
-        twice = [one for one, other in names.items() if other == own]
-        if len(twice) > 1:
-            rule = f"must name {own} once, not by {' and '.join(twice)[:100]}"
-            raise bad("name map", shown(f"{theirs}={own}"), rule)
 
 
 def no_such_name(theirs: str, there: Sequence[str], what: str) -> BadMotion:
@@ -259,7 +269,7 @@ def no_such_name(theirs: str, there: Sequence[str], what: str) -> BadMotion:
     close = [one for one in near if likeness[one] >= MIN_LIKENESS]
     said = "nearly the same" if close else f"the file's {what}s"
     hint = f"{said}: {', '.join((close[:3] or list(there))[:40])[:300]}"
-    return bad("name map", shown(theirs), f"is no {what} of the file, or several", hint)
+    return bad("name map", shown(theirs), f"is the name of no {what}, or of several", hint)
 
 
 def number(cell: str, decimal: str = ".") -> float:

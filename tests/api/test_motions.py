@@ -1,6 +1,8 @@
+import json
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
+from urllib.parse import urlencode
 
 import pytest
 from fastapi.testclient import TestClient
@@ -75,6 +77,38 @@ def test_unit_and_up_axis_can_be_stated(client: TestClient) -> None:
     assert answer.status_code == 201
     assert answer.json()["options"] == {"unit": "0.0011", "up": "y"}
     assert answer.json()["body_m"]["forearm_r"] == pytest.approx(0.286)
+
+
+def test_columns_can_be_mapped(client: TestClient) -> None:
+    text = csv_text(working(100)).replace("elbow_r", "coude d").replace("elbow_l", "coude g")
+    asked = {"file_name": "coude.csv", "map": ["coude d=elbow_r", "coude g=elbow_l"]}
+    answer = client.post("/v1/motions", params=asked, content=text.encode(), headers=FILE)
+    client.delete("/v1/motions/coude")
+    assert answer.status_code == 201, answer.json()
+    assert answer.json()["options"] == {"names": {"coude d": "elbow_r", "coude g": "elbow_l"}}
+
+
+@pytest.mark.parametrize(
+    ("pairs", "text"),
+    [
+        (["coude d"], "must be theirs=ours"),
+        (["a=elbow_l", "b=elbow_l"], "must be the only name for elbow_l"),
+        (["elbow_l=ellbow"], "choices: time, pelvis_x"),
+        (["ellbow_l=elbow_l"], "nearly the same: elbow_l"),
+        (["\ud800=elbow_l"], "is the name of no column"),
+        (["a\0=elbow_l"], "must have only characters that can be shown"),
+    ],
+)
+def test_map_that_does_not_fit_is_a_problem(
+    client: TestClient, pairs: list[str], text: str
+) -> None:
+    content = csv_text(working(100)).encode()
+    query = urlencode(
+        [("file_name", "a.csv"), *(("map", one) for one in pairs)], errors="surrogatepass"
+    )
+    answer = client.post(f"/v1/motions?{query}", content=content, headers=FILE)
+    assert answer.status_code == 422
+    assert text in json.dumps(answer.json(), ensure_ascii=False)
 
 
 @pytest.mark.parametrize("field", ["unit", "root_unit", "up"])

@@ -144,7 +144,7 @@ def test_row_without_any_value_counts_where_a_rate_is_declared() -> None:
         ("shoulder_r_abduct", "shoulder_r_abd", "shoulder_r_abd=shoulder_r_abduct"),
         ("abdomen_flex", "lumbar", "lacks the columns abdomen_flex"),
         ("time", "times", "has unknown columns: times (nearly known; if it is meant"),
-        ("time", "heart", "has unknown columns: heart (known are time, pelvis_x"),
+        ("time", "heart", "has unknown columns: heart (other columns: heart; a name map"),
         ("elbow_l", "Elbow R", "'elbow_r' is the name of two columns"),
     ],
 )

@@ -257,8 +257,8 @@ def test_arm_that_is_raised_in_its_plane_points_there() -> None:
         ({"arm_flex_l": "arm_flexion_left"}, "arm_flexion_left=arm_flex_l"),
         ({"pelvis_tilt": "pelvic_tilt"}, "pelvic_tilt=pelvis_tilt"),
         ({"lumbar_bending": "lumbar_bend"}, "lumbar_bend=lumbar_bending"),
-        ({"arm_flex_r": "shoulder_r_x"}, "if the file has them under other names"),
-        ({"elbow_flex_l": "x", "elbow_flex_r": "y"}, "give a name map: theirs=ours"),
+        ({"arm_flex_r": "shoulder_r_x"}, "other columns: shoulder_r_x; a name map says"),
+        ({"elbow_flex_l": "x", "elbow_flex_r": "y"}, "other columns: y, x; a name map says"),
     ],
 )
 def test_column_that_is_nearly_known_is_named(renamed: dict[str, str], text: str) -> None:

@@ -1,7 +1,7 @@
 import pytest
 
 from app.errors import InvalidInput
-from app.sim.read_options import ReadOptions, metres
+from app.sim.read_options import ReadOptions, metres, name_map
 
 
 def test_only_what_is_stated_is_told() -> None:
@@ -30,3 +30,34 @@ def test_unit_that_is_none_is_refused_with_the_choices(unit: str) -> None:
 def test_axis_that_is_none_is_refused_with_the_choices(up: str) -> None:
     with pytest.raises(InvalidInput, match="up = .* choices: x, y, z, -x, -y, -z"):
         ReadOptions(up=up)
+
+
+def test_name_map_is_read_from_pairs() -> None:
+    pairs = ["Bip01 L Hand=wrist_l", " Zeit = t = time ", "/jointset/a/b/value=arm_flex_r"]
+    assert name_map(pairs) == {
+        "Bip01 L Hand": "wrist_l",
+        "Zeit = t": "time",
+        "/jointset/a/b/value": "arm_flex_r",
+    }
+
+
+@pytest.mark.parametrize(
+    ("pairs", "text"),
+    [
+        (["wrist"], "map = 'wrist' must be theirs=ours"),
+        (["=wrist_l"], "must be theirs=ours"),
+        (["a="], "must be theirs=ours"),
+        ([""], "must be theirs=ours"),
+        (["a\0b=wrist_l"], "must have only characters that can be shown"),
+        (["a=wrist_l", "a=wrist_r"], "map = 'a=wrist_r' must map a name once"),
+        ([f"{k}=wrist_l" for k in range(101)], "must be at most 100"),
+    ],
+)
+def test_pairs_that_are_no_map_are_refused(pairs: list[str], text: str) -> None:
+    with pytest.raises(InvalidInput, match=text):
+        name_map(pairs)
+
+
+def test_two_names_for_one_of_ours_are_refused() -> None:
+    with pytest.raises(InvalidInput, match="'a=elbow_l' must be the only name for elbow_l"):
+        ReadOptions(names={"a": "elbow_l", "b": "elbow_l"})
