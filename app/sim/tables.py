@@ -176,7 +176,9 @@ class Table:
         count = len(self.split(text, 2 * MAX_COLUMNS))
         rule = f"must hold {len(self.names)} values, one per column"
         hint = ""
-        if count > len(self.names) and self.split("0,0", 1) == ["0", "0"]:
+        if count == len(self.names) + 1:
+            hint = "a column without a name? the line of names needs an empty one for it"
+        elif count > len(self.names) and self.split("0,0", 1) == ["0", "0"]:
             hint = "decimal commas? write points, or separate the columns by semicolons"
         return Fault(place=f"line {line}", value=f"<{count}>", rule=rule, hint=hint)
 

@@ -63,6 +63,7 @@ WRITTEN = {
     "row of units": with_units("s", "m", "m", *16 * ["deg"]),
     "row of units, some empty": with_units("[s]", "", "", *16 * ["°"]),
     "names as a comment": TEXT.replace(HEAD, f"# {HEAD}"),
+    "index of R": TEXT.replace(HEAD, f'"",{quoted(HEAD)}').replace("\n0.", '\n"7",0.'),
     "declared with a colon": TEXT.replace("angles = degrees", "angles: degrees"),
     "minus sign of typography": TEXT.replace("-", "\u2212"),
 }
@@ -171,6 +172,11 @@ def test_thousands_separators_beside_decimal_points_are_refused(word: str) -> No
 def test_decimal_commas_between_commas_are_told() -> None:
     told = fault(each_row(lambda line: line.replace(".", ",")))
     assert "line 3 = <38> must hold 19 values" in told and "decimal commas?" in told
+
+
+def test_index_that_has_no_place_among_the_names_is_told() -> None:
+    told = fault(TEXT.replace("\n0.", "\n7,0."))
+    assert "line 3 = <20> must hold 19 values" in told and "a column without a name?" in told
 
 
 @pytest.mark.parametrize("word", ["inf", "1e300", "-Infinity"])
