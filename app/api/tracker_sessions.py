@@ -156,16 +156,14 @@ class TrackerSessions:
         self._lock = threading.Lock()
         self._sessions: dict[str, TrackerSession] = {}
 
-    def open(
-        self, cell: str, n_people: int, size: Vec, floor_z: float | None = None
-    ) -> TrackerSession:
+    def open(self, cell: str, n_people: int, size: Vec, floor_z: float) -> TrackerSession:
         """Return a new session.
 
         Args:
             cell: Name of the work cell.
             n_people: Most people at once.
             size: Size of these people [m], shape (12,).
-            floor_z: Height of the cell's floor [m]; None: heights over it are not judged.
+            floor_z: Height of the cell's floor [m].
 
         Raises:
             Conflict: There are as many as there may be.

@@ -46,10 +46,9 @@ async def take_frame(
     """Take one frame of all people in and return what is known of each at its time.
 
     Who is who is found out from where people were, so their order means nothing; what is
-    missing, held, exchanged or not credible is named, and so are people who are not
-    followed. A frame whose stamp does not continue
-    the frames before is not taken (409); the third such frame in a row is, as a change of the
-    tracker's clock.
+    missing, held, exchanged or not credible is named, and so are people who are not followed.
+    A frame whose stamp does not continue the frames before is not taken (409); the third such
+    frame in a row is, as a change of the tracker's clock.
     """
     arrived = services.trackers.clock()
     session = services.trackers.get(tracker_id)

@@ -1,7 +1,7 @@
 """From a stream of key-points to a person: safety cylinder and 18 joint angles with speeds.
 
-Per frame: check (``keypoints.py``), put confused sides right, refuse what nobody can do, filter
-every key-point (``keypoint_filter.py``), then both closed forms on the filtered points:
+Per frame: check (``keypoint_check.py``), put confused sides right, refuse what nobody can do,
+filter every key-point (``keypoint_filter.py``), then both closed forms on the filtered points:
 ``keypoint_cylinder.py`` and ``keypoint_angles.py``. Joint speeds are the derivative of the
 second along the filtered speeds. Nothing looks ahead; :meth:`PersonEstimator.at` tells the
 estimate at any later time, so latency is bridged by the filter's own prediction.
@@ -196,8 +196,8 @@ class PersonEstimator:
             confidences: Trust in each in [0, 1], shape (25,); 1 where None.
 
         Raises:
-            InvalidInput: See :func:`~app.sim.keypoints.check_keypoints`; or ``t`` is not later
-                than the last. The estimate is then as if the frame had not come.
+            InvalidInput: See :func:`~app.sim.keypoint_check.check_keypoints`; or ``t`` is not
+                later than the last. The estimate is then as if the frame had not come.
         """
         least = self.settings.min_confidence
         self.take_frame(

@@ -54,7 +54,7 @@ class Scene:
 
     def __post_init__(self) -> None:
         self.trackers = TrackerSessions(lambda: self.now)
-        self.session = self.trackers.open(CELL.name, 1, CELL.body)
+        self.session = self.trackers.open(CELL.name, 1, CELL.body, CELL.floor_z)
         self.place = np.array([self.rng.uniform(-0.6, 0.6), self.rng.uniform(1.2, 2.4)])
         self.velocity = np.zeros(2)
         self.flex, self.flexing, self.hidden = 0.15, 0.0, False
@@ -80,12 +80,15 @@ class Scene:
         points = points_of(self.posture())
         if self.hidden:
             points[RIGHT_ARM] = np.nan
+        if event == "foreign":  # in millimetres, or a camera's axes
+            turned = points @ np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]]).T + [0.0, 0.0, 2.0]
+            points = 1000.0 * points if self.rng.uniform() < 0.5 else turned
         people = [] if event == "empty" else [points]
         try:
             self.session.take(stamp, self.now, people, [np.ones(25)] * len(people))
         except ClockJump:
             return
-        if people:
+        if people and event != "foreign":
             self.shown = self.posture(), self.now
 
     def decision(self, t: float | None) -> None:
@@ -139,13 +142,14 @@ def test_override_never_exceeds_what_the_last_arrived_frame_allows(seed: int) ->
     rng = scene.rng
     for _ in range(200):
         event = rng.choice(
-            ["frame", "gap", "wild", "clock", "limb", "empty", "late", "decide", "decide-t"],
-            p=[0.5, 0.03, 0.02, 0.02, 0.03, 0.02, 0.02, 0.26, 0.1],
+            ["frame", "gap", "wild", "clock", "limb", "empty", "foreign", "late"]
+            + ["decide", "decide-t"],
+            p=[0.48, 0.03, 0.02, 0.02, 0.03, 0.02, 0.02, 0.02, 0.26, 0.1],
         )
         scene.wait(DT * rng.uniform(0.8, 1.2) if event != "gap" else rng.uniform(0.05, 4.0))
         stamp = scene.now + scene.skew
         match event:
-            case "frame" | "empty":
+            case "frame" | "empty" | "foreign":
                 scene.frame(stamp, event)
             case "limb":
                 scene.hidden = not scene.hidden
@@ -196,6 +200,35 @@ def test_a_camera_that_died_stops_the_robot(silence: float) -> None:
     assert answer.safety is not None
     if silence > 1.0:
         assert answer.safety.override == 0.0
+
+
+@pytest.mark.parametrize("seen_before", [False, True])
+def test_a_tracker_of_another_frame_stops_the_robot(seen_before: bool) -> None:
+    scene = Scene(np.random.default_rng(5))
+    scene.place = np.array([0.0, 2.6])
+    for k in range(60):
+        scene.now += DT
+        scene.frame(scene.now, "frame" if seen_before and k < 30 else "foreign")
+    (person,) = (answer := decide_beside(scene)).people
+    assert {"foreign-frame", "stale"} <= set(person.flags) and person.implausible
+    assert answer.safety is not None and answer.safety.override == 0.0
+    assert person.age_s == (pytest.approx(1.0) if seen_before else None)
+
+
+def test_somebody_far_away_does_not_make_a_hidden_person_forgotten() -> None:
+    scene = Scene(np.random.default_rng(6))
+    scene.place = np.array([0.0, 1.6])
+    for _ in range(30):
+        scene.now += DT
+        scene.frame(scene.now)
+    hidden, stranger = scene.shown, human.rest_posture(0.5, 5.5, -np.pi / 2.0)
+    for k in range(60):  # the stranger is 3.9 m from where the other one was last seen
+        scene.now += DT
+        scene.session.take(scene.now, scene.now, [points_of(stranger)], [np.ones(25)])
+        scene.shown = hidden
+        if k % 4 == 0:
+            scene.decision(None)
+    assert decide_beside(scene).people[0].age_s == pytest.approx(2.0)
 
 
 def test_an_arm_that_is_not_seen_is_monitored_wherever_it_can_reach() -> None:

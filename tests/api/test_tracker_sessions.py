@@ -29,7 +29,7 @@ class Clock:
 def test_an_idle_session_ends_and_a_used_one_stays() -> None:
     clock = Clock()
     sessions = TrackerSessions(clock)
-    idle, used = (sessions.open(CELL.name, 1, CELL.body) for _ in range(2))
+    idle, used = (sessions.open(CELL.name, 1, CELL.body, CELL.floor_z) for _ in range(2))
     for _ in range(4):
         clock.t += 0.4 * IDLE_S
         sessions.get(used.id)
@@ -40,11 +40,11 @@ def test_an_idle_session_ends_and_a_used_one_stays() -> None:
 
 def test_there_is_room_for_so_many_and_again_after_one_is_closed() -> None:
     sessions = TrackerSessions(Clock())
-    opened = [sessions.open(CELL.name, 1, CELL.body) for _ in range(MAX_SESSIONS)]
+    opened = [sessions.open(CELL.name, 1, CELL.body, CELL.floor_z) for _ in range(MAX_SESSIONS)]
     with pytest.raises(Conflict, match="delete one"):
-        sessions.open(CELL.name, 1, CELL.body)
+        sessions.open(CELL.name, 1, CELL.body, CELL.floor_z)
     sessions.close(opened[0].id)
-    sessions.open(CELL.name, 1, CELL.body)
+    sessions.open(CELL.name, 1, CELL.body, CELL.floor_z)
     with pytest.raises(NotFound):
         sessions.close(opened[0].id)
 
@@ -53,14 +53,14 @@ def test_room_comes_back_when_sessions_are_idle() -> None:
     clock = Clock()
     sessions = TrackerSessions(clock)
     for _ in range(MAX_SESSIONS):
-        sessions.open(CELL.name, 1, CELL.body)
+        sessions.open(CELL.name, 1, CELL.body, CELL.floor_z)
     clock.t = IDLE_S + 1.0
-    assert sessions.open(CELL.name, 1, CELL.body) and len(sessions.all()) == 1
+    assert sessions.open(CELL.name, 1, CELL.body, CELL.floor_z) and len(sessions.all()) == 1
 
 
 def fed(clock: Clock, n_people: int = 1) -> TrackerSession:
     """A session after a second of frames at 30 Hz, stamped from 1000 s on."""
-    session = TrackerSessions(clock).open(CELL.name, n_people, CELL.body)
+    session = TrackerSessions(clock).open(CELL.name, n_people, CELL.body, CELL.floor_z)
     for k, q in enumerate(work(1, 12.0)[1][:30]):
         session.take(1000.0 + k * DT, clock(), [seen(q)], [np.ones(25)])
         clock.t += DT
@@ -124,7 +124,7 @@ def test_nobody_is_only_known_to_be_absent_while_frames_arrive() -> None:
 
 
 def test_before_the_first_frame_everybody_is_stale() -> None:
-    session = TrackerSessions(Clock()).open(CELL.name, 1, CELL.body)
+    session = TrackerSessions(Clock()).open(CELL.name, 1, CELL.body, CELL.floor_z)
     known = session.people(5.0)
     assert known.t is None and known.observed == (None,)
     assert known.estimates[0].flags == ("never-seen", "stale")
