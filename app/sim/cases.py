@@ -46,6 +46,10 @@ class Case:
     """Station it moves to; None where it stays."""
     expected: str
     """The goal it should end at."""
+    first: str | None = None
+    """The goal it should choose at first; None where any will do."""
+    switches: tuple[int, int | None] = (0, None)
+    """Least and greatest number of changes of mind; None where there is no greatest."""
     palm_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Palm relative to its stations [m]."""
     pelvis_x: tuple[float | None, float | None] = (None, None)
@@ -66,6 +70,8 @@ CASES = (
         human_from="cube4",
         human_to=None,
         expected="cube4",
+        first="cube4",
+        switches=(0, 0),
         palm_offset=(0.02, 0.16, 0.02),
     ),
     Case(
@@ -95,6 +101,7 @@ CASES = (
         human_from="cube3",
         human_to="dock1",
         expected="cube1",
+        switches=(1, None),
     ),
     Case(
         id="case-4",
@@ -109,6 +116,8 @@ CASES = (
         human_from="dock1",
         human_to="cube0",
         expected="dock0",
+        first="cube1",
+        switches=(1, 1),
         pelvis_x=(None, 0.3),
     ),
 )

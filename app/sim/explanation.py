@@ -2,9 +2,9 @@
 
 from collections.abc import Callable
 
-from app.sim.cases import Case
 from app.sim.ports import Decision
 from app.sim.snapshot import ContactView, Status
+from app.sim.verdict import Verdict
 
 Label = Callable[[str], str]
 """Maps a station id to its name for people."""
@@ -28,12 +28,14 @@ _BODIES = {
 }
 
 
-def switched(decision: Decision, names: tuple[str, ...], before: str, label: Label) -> str:
-    """Return why the choice changed: both values side by side."""
+def switched(
+    decision: Decision, names: tuple[str, ...], before: str, t_s: float, label: Label
+) -> str:
+    """Return why the choice changed: when, and both values of that moment side by side."""
     old = decision.values[names.index(before)]
     new = decision.values[decision.index]
     return (
-        f"Changed its mind: {label(decision.chosen)} is worth {new:.2f} now, "
+        f"Changed its mind at {t_s:.1f} s: {label(decision.chosen)} was worth {new:.2f} then, "
         f"{label(before)} {old:.2f}."
     )
 
@@ -56,12 +58,12 @@ def touched(contact: ContactView, *, final: bool) -> str:
     return f"Contact: {link} touched {body}. {then}"
 
 
-def case_ended(case: Case, goal: str | None, label: Label) -> str:
-    """Return how a case study ended, and whether that was expected."""
+def case_ended(verdict: Verdict, goal: str | None, label: Label) -> str:
+    """Return where a case study ended, and the verdict on the whole run."""
+    agrees = "as expected" if verdict.as_expected else "not as expected"
     if goal is None:
-        return "Time is up in this case."
-    verdict = "as expected" if goal == case.expected else f"not at {label(case.expected)}"
-    return f"The case ended at {label(goal)}, {verdict}."
+        return f"Time is up in this case: {agrees}."
+    return f"The case ended at {label(goal)}: {agrees}."
 
 
 def resting(status: Status, goal: str | None, label: Label) -> str:

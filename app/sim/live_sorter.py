@@ -135,6 +135,15 @@ class LiveSorter:
         return others[0].move if best.move.pick in self._avoid and others else best.move
 
 
+def has_safer_twin(table: SortingTable, cell: int) -> bool:
+    """Return whether a block like the one in a clutter cell lies in a safer cell."""
+    block, least = table.clutter[cell], table.fail[cell] - ALIKE
+    return block is not None and any(
+        one is not None and one.code == block.code and fail < least
+        for one, fail in zip(table.clutter, table.fail, strict=False)
+    )
+
+
 def _twins(table: SortingTable, move: Move, block: Block) -> dict[Block, Move]:
     """Return blocks like the one in a clutter cell that fail about as often."""
     if move.pick >= table.shape.n_cells:

@@ -112,6 +112,7 @@ class LiveStage(Generic[P]):
         self.time_left = TIME_LIMIT_S
         self.offered: tuple[Candidate, ...] = ()
         self.decision: Decision | None = None
+        self.decided_s: float | None = None
         self.previous: str | None = None
         self.t = 0.0
         self.tick = 0
@@ -226,7 +227,7 @@ class LiveStage(Generic[P]):
         except ServiceError as error:
             self.tell(error.message)
             return None
-        self.decision = decision
+        self.decision, self.decided_s = decision, self.t
         if self.previous is None or decision.chosen == self.previous:
             return None
         self.count(switches=1)
@@ -298,5 +299,6 @@ class LiveStage(Generic[P]):
             policy_title=None if policy is None else policy.title,
             elapsed_ms=None if decision is None else decision.elapsed_ms,
             counters=self.counters,
+            decided_s=None if decision is None else self.decided_s,
             **scenario,
         )

@@ -11,6 +11,7 @@ from app.sim.commands import Mode
 from app.sim.ports import OutsideField, Vec
 from app.sim.reach_view import ReachView
 from app.sim.sorting_view import SortingView
+from app.sim.verdict import Verdict
 
 Status = Literal[
     "moving",
@@ -225,6 +226,10 @@ class WorldSnapshot:
     """Id of the running case study."""
     counters: Counters
     """What happened since the last reset."""
+    decided_s: float | None = None
+    """When the last decision was made, as ``t_s``; None without one."""
+    verdict: Verdict | None = None
+    """What the running case study or sorting test expects, and what happened so far."""
     speed: int = 1
     """Simulated seconds per second that were asked for last."""
     sorting: SortingView | None = None

@@ -48,7 +48,6 @@ def view_of(sight: Sight) -> SortingView:
     """Return the sorting task as it is now."""
     table, decision = sight.table, sight.sorter.decision
     sorter, choice = sight.sorter.sorter, sight.choice
-    state = table.state
     ranked = () if decision is None else decision.ranked[:MAX_RANKED]
     return SortingView(
         pieces=tuple(_piece(sight, one) for one in table.blocks),
@@ -67,8 +66,14 @@ def view_of(sight: Sight) -> SortingView:
         sorter=None if sorter is None else sorter.checkpoint,
         sorter_title=None if sorter is None else sorter.title,
         test=sight.test,
-        solved=state.solved and bool((state.goal != NULL).any()) and table.held is None,
+        solved=is_solved(table),
     )
+
+
+def is_solved(table: SortingTable) -> bool:
+    """Return whether there is a goal, every tower is as it asks, and nothing is held."""
+    state = table.state
+    return state.solved and bool((state.goal != NULL).any()) and table.held is None
 
 
 def table_of(cell: Cell, view: SortingView) -> SortingTable:

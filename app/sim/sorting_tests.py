@@ -65,6 +65,10 @@ class SortingTest:
     """Objects of the first goal, ``K_G``."""
     start: Start
     """Draws the start."""
+    expected: str
+    """What it shows where all goes well, for people."""
+    safer_twins: bool = False
+    """Whether each pick shall take the safer one of two such objects."""
     interferences: tuple[Interference, ...] = ()
     """What a person does, in this order."""
     n_added: int = 0
@@ -260,6 +264,7 @@ TESTS: tuple[SortingTest, ...] = (
         name="test-1",
         title="Sort five objects",
         text="Five objects lie about; all of them shall be sorted.",
+        expected="Every object is sorted, without a contact.",
         n_objects=5,
         n_goal=5,
         start=_sort_all(5),
@@ -268,6 +273,7 @@ TESTS: tuple[SortingTest, ...] = (
         name="test-2",
         title="Sort ten objects",
         text="As the first test, with twice the objects.",
+        expected="Every object is sorted, without a contact.",
         n_objects=10,
         n_goal=10,
         start=_sort_all(10),
@@ -276,6 +282,8 @@ TESTS: tuple[SortingTest, ...] = (
         name="test-3",
         title="Take the safer twin",
         text="Each of five objects has a twin in a cell where picks fail more often.",
+        expected="Every object is sorted, each from the safer cell, without a contact.",
+        safer_twins=True,
         n_objects=10,
         n_goal=5,
         start=_with_twins(5),
@@ -284,6 +292,7 @@ TESTS: tuple[SortingTest, ...] = (
         name="test-4",
         title="A larger object comes late",
         text="At the goal a person adds a larger object that belongs below sorted ones.",
+        expected="The goal is reached, with the larger object as well, without a contact.",
         n_objects=5,
         n_goal=5,
         start=_with_room_below,
@@ -301,6 +310,7 @@ TESTS: tuple[SortingTest, ...] = (
         name="test-5",
         title="An alternative, then another goal",
         text="A person adds a twin of an object on the way, and changes the goal at its end.",
+        expected="The goal is reached, and the changed goal as well, without a contact.",
         n_objects=8,
         n_goal=5,
         start=_some(8, 5),
@@ -322,6 +332,7 @@ TESTS: tuple[SortingTest, ...] = (
         name="test-6",
         title="One colour, then another",
         text="Three objects of one colour; then the goal asks for three of another as well.",
+        expected="The goal is reached, and the longer one as well, without a contact.",
         n_objects=8,
         n_goal=3,
         start=_of_two_colours,

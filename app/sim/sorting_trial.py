@@ -14,6 +14,7 @@ from app.sim.ports import Vec
 from app.sim.sorting import SortingBatch, SortingSettings
 from app.sim.sorting_state import SortingShape, SortingState
 from app.sim.sorting_tests import sorting_test
+from app.sim.verdict import Verdict
 
 N_BLOCKS = 6
 """Blocks of a random task."""
@@ -63,6 +64,9 @@ class SortingTrial:
         self._test, self._rng = sorting_test(name), np.random.default_rng(seed)
         self._waiting = list(self._test.interferences)
         self._moves = 0
+        self._contacts = self._picks = self._riskier = 0
+        self._spoilt: str | None = None
+        self._ended: Verdict | None = None
 
     @property
     def name(self) -> str:
@@ -103,4 +107,60 @@ class SortingTrial:
         try:
             return Interfered(state=now.change(state, self._shape, self._rng), text=now.text)
         except InvalidInput:  # A visitor left nothing that this person could do.
+            self._spoilt = "the person could not do what the test says"
             return None
+
+    # What it is judged by.
+
+    def note_contact(self) -> None:
+        """Note that the robot touched something."""
+        self._contacts += 1
+
+    def note_pick(self, *, riskier: bool) -> None:
+        """Note a grasp in the clutter; ``riskier`` where such an object lay in a safer cell."""
+        self._picks += 1
+        self._riskier += riskier
+
+    def note_visitor(self) -> None:
+        """Note that a visitor changed blocks or goal: what follows says nothing of the test."""
+        self._spoilt = "a visitor changed blocks or goal"
+
+    def verdict(self, *, solved: bool, moves: int) -> Verdict:
+        """Return what the test expects, what happened, and whether both agree.
+
+        Args:
+            solved: Whether every tower is as the goal asks now.
+            moves: Moves done in this test.
+        """
+        if self._ended is not None:
+            return self._ended
+        over = solved and not self._waiting
+        good = self._contacts == 0 and not (self._test.safer_twins and self._riskier)
+        agrees = False if not good else True if over else None
+        found = Verdict(
+            expected=self._test.expected,
+            observed=self._observed(over=over, solved=solved, moves=moves),
+            as_expected=None if self._spoilt else agrees,
+        )
+        if over:
+            self._ended = found
+        return found
+
+    def _observed(self, *, over: bool, solved: bool, moves: int) -> str:
+        if self._spoilt is not None:
+            return f"Not judged: {self._spoilt}."
+        goals = 1 + sum(one.after_moves is None for one in self._test.interferences)
+        waiting = 1 + sum(one.after_moves is None for one in self._waiting)
+        reached = goals if over else goals - waiting + (solved and waiting > 1)
+        parts = [
+            f"{reached} of {goals} goals reached" if goals > 1 else _reached(over=over),
+            f"{moves} {'move' if moves == 1 else 'moves'}",
+            f"{self._contacts or 'no'} {'contact' if self._contacts == 1 else 'contacts'}",
+        ]
+        if self._test.safer_twins:
+            parts.append(f"{self._riskier} of {self._picks} grasps in a riskier cell")
+        return f"{', '.join(parts)}.".capitalize()
+
+
+def _reached(*, over: bool) -> str:
+    return "the goal is reached" if over else "the goal is not reached yet"

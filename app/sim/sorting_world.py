@@ -26,14 +26,14 @@ from app.sim.cells import Cell
 from app.sim.commands import Command
 from app.sim.live_arm import Bodies
 from app.sim.live_people import LivePeople
-from app.sim.live_sorter import Choice, LiveSorter
+from app.sim.live_sorter import Choice, LiveSorter, has_safer_twin
 from app.sim.live_stage import CONTACT_HOLD_S, LiveStage, PeopleCommand
 from app.sim.ports import Candidate, SortingValues, TaskPolicy, Vec
 from app.sim.snapshot import Counters, Status, WorldSnapshot
 from app.sim.sorting_cell import above, reaching_cell
 from app.sim.sorting_descent import Descent
 from app.sim.sorting_explanation import DONE, NO_GOAL, Teller
-from app.sim.sorting_sight import Sight, view_of
+from app.sim.sorting_sight import Sight, is_solved, view_of
 from app.sim.sorting_state import NULL
 from app.sim.sorting_table import SortingTable
 from app.sim.sorting_trial import SortingTrial, random_task
@@ -142,6 +142,8 @@ class SortingWorld:
             raise
         if gone is not None:
             self._stage.tell(self._teller.shrunk(gone))
+        if self._trial is not None:
+            self._trial.note_visitor()
         self._changed()
 
     def _start_test(self, name: str) -> None:
@@ -218,6 +220,8 @@ class SortingWorld:
         if found.kind != "none":
             self._descent = None
             stage.note_contact(found)
+            if self._trial is not None:
+                self._trial.note_contact()
         elif descent is not None:
             self._follow(descent)
         elif stage.decision is not None:
@@ -318,6 +322,8 @@ class SortingWorld:
         self._sorter.note_attempt(table, choice.move)
         rng = np.random.default_rng((self._seed, self._n_tasks, self._counts.attempts))
         risk = float(table.fail[pick]) if pick < table.shape.n_cells else 0.0
+        if self._trial is not None and pick < table.shape.n_cells:
+            self._trial.note_pick(riskier=has_safer_twin(table, pick))
         self._counts = replace(self._counts, attempts=self._counts.attempts + 1)
         if rng.random() >= risk:
             table.lift(pick)
@@ -429,4 +435,7 @@ class SortingWorld:
             selected=(),
             case=None,
             sorting=view_of(sight),
+            verdict=None
+            if self._trial is None
+            else self._trial.verdict(solved=is_solved(self._table), moves=self._counts.moves),
         )

@@ -20,6 +20,7 @@ from app.sim.live_people import LivePeople
 from app.sim.live_stage import CONTACT_HOLD_S, ClockCommand, LiveStage
 from app.sim.ports import Candidate, Decision, TaskPolicy, Vec
 from app.sim.snapshot import Counters, Status, WorldSnapshot
+from app.sim.verdict import CaseRun, Verdict, judge
 
 PICK_HEIGHT = 0.065
 """Height of the tcp over the table when the fingers close [m]."""
@@ -43,6 +44,7 @@ class World:
         self.cell, self.id = cell, id
         self._stage = LiveStage(cell, policy, id, LivePeople(cell, seed))
         self._case: Case | None = None
+        self._run = CaseRun()
         self._selected = tuple(s.id for s in cell.stations if s.kind == "cube")
         self._own_choice = self._selected
         self._reset()
@@ -51,6 +53,7 @@ class World:
 
     def _reset(self) -> None:
         self._stage.t, self._stage.counters = 0.0, Counters()
+        self._run = CaseRun()
         for person in self._stage.people:
             person.start(self._case)
         self._restart_robot()
@@ -109,7 +112,10 @@ class World:
                 self._choose_among(set(self._selected) ^ {command.id})
             case commands.SetPolicy():
                 self._stage.use(command.policy)
-                self._refresh()
+                if self._case is None:
+                    self._refresh()
+                else:  # A run of a case study belongs to one policy.
+                    self._reset()
             case commands.StartCase():
                 self._start_case(find_case(command.id))
 
@@ -179,6 +185,7 @@ class World:
         found = stage.robot.advance(self._action(), stage.people, before, straight=straight)
         if found.kind != "none":
             stage.note_contact(found)
+            self._run = self._run.finish("contact", stage.t)
         elif stage.status == "picking":
             self._finish_pick()
         elif stage.decision is not None:
@@ -205,6 +212,7 @@ class World:
             stage.enter("picking")
         elif stage.time_left <= 0.0:
             stage.count(timeouts=1)
+            self._run = self._run.finish("timeout", stage.t)
             self._begin_episode("moving" if self._case is None else "case done")
 
     def _finish_pick(self) -> None:
@@ -212,6 +220,7 @@ class World:
             return
         if self._case is not None:
             self._stage.status = "case done"
+            self._run = self._run.finish("reached", self._stage.t)
         else:
             self._cross_off(self._goal)
             self._begin_episode()
@@ -243,11 +252,14 @@ class World:
 
     def _decide(self) -> None:
         """Ask the policy about this very state."""
-        left = self._stage.decide(self._candidates())
-        if left is not None and self._stage.decision is not None:
-            names = tuple(candidate.id for candidate in self._stage.offered)
-            text = explanation.switched(self._stage.decision, names, left, self._label)
-            self._stage.tell(text)
+        stage = self._stage
+        left = stage.decide(self._candidates())
+        if stage.decision is None:
+            return
+        self._run = self._run.choose(stage.t, stage.decision.chosen)
+        if left is not None:
+            names = tuple(candidate.id for candidate in stage.offered)
+            stage.tell(explanation.switched(stage.decision, names, left, stage.t, self._label))
 
     # What is seen.
 
@@ -271,8 +283,12 @@ class World:
         if status == "case done" and self._case is not None:
             if stage.contact is not None:
                 return explanation.touched(stage.contact, final=True)
-            return explanation.case_ended(self._case, self._goal, self._label)
+            verdict = judge(self._case, self._run, self._label)
+            return explanation.case_ended(verdict, self._goal, self._label)
         return explanation.resting(status, self._goal, self._label)
+
+    def _verdict(self) -> Verdict | None:
+        return None if self._case is None else judge(self._case, self._run, self._label)
 
     def snapshot(self) -> WorldSnapshot:
         """Return what is known now, frozen."""
@@ -283,4 +299,5 @@ class World:
             gripping=status == "picking" and self._stage.status_s >= PICK_S[0],
             selected=self._selected,
             case=None if self._case is None else self._case.id,
+            verdict=self._verdict(),
         )

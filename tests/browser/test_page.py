@@ -75,3 +75,37 @@ def test_page_fits_a_phone(open_page: Callable[..., Page]) -> None:
     for part in (".viewer", '[data-mode="manual"]', "[data-goal]", ".bars", "#tab-training"):
         page.locator(part).first.scroll_into_view_if_needed()
         expect(page.locator(part).first).to_be_visible()
+
+
+@pytest.mark.parametrize("case", ["case-2", "case-3"])
+def test_case_shows_expected_observed_and_a_verdict_of_the_whole_run(
+    open_page: Callable[..., Page], server: str, case: str
+) -> None:
+    page = open_page(scene=False)
+    page.click(f'[data-case="{case}"]')
+    expect(page.locator('[data-status="case done"]')).to_be_visible()
+    now = world(server)
+    verdict = now["verdict"]
+    assert now["case"] == case
+    expect(page.locator('[data-role="expected"]')).to_have_text(verdict["expected"])
+    expect(page.locator('[data-role="observed"]')).to_have_text(verdict["observed"])
+    agrees = "true" if verdict["as_expected"] else "false"
+    shown = page.locator('[data-role="verdict"]')
+    expect(shown).to_have_attribute("data-as-expected", agrees)
+    tone = "chip-good" if verdict["as_expected"] else "chip-bad"
+    expect(page.locator(f".story-top .{tone}")).to_be_visible()
+    expect(shown.locator(f".{tone}")).to_be_visible()
+    assert [one["goal"] for one in verdict["choices"]][-1] == now["chosen"]
+    page.click('[data-mode="auto"]')
+    expect(shown).to_have_count(0)
+
+
+def test_values_carry_the_time_of_their_decision(
+    open_page: Callable[..., Page], server: str
+) -> None:
+    page = open_page(scene=False)
+    page.click('[data-action="pause"]')
+    expect(page.locator(".story .chip").first).to_have_text("Paused")
+    decided = world(server)["decided_s"]
+    expect(page.locator('[data-role="decided"]')).to_have_text(f"at {decided:.1f} s")
+    page.click('[data-action="pause"]')

@@ -234,6 +234,10 @@ def test_person_of_a_test_adds_a_larger_block_at_the_goal() -> None:
     end = until(world, solved, 6000)
     assert end.sorting.test == "test-4"
     assert end.sorting.counters.moves > 6
+    assert more.verdict.as_expected is None
+    assert end.verdict.as_expected is True
+    assert end.verdict.observed.startswith("2 of 2 goals reached")
+    assert end.counters.contacts == 0
 
 
 def test_contact_lets_a_held_block_fall_back_where_it_came_from() -> None:

@@ -12,8 +12,13 @@ export function value(v) {
 /** A distance in metres, in cm below one metre. */
 export function distance(metres) {
   if (metres === null || metres === undefined || !Number.isFinite(metres)) return "–";
-  if (metres < 0) return `${MINUS}${Math.round(-metres * 100)} cm`;
   return metres < 0.995 ? `${Math.round(metres * 100)} cm` : `${metres.toFixed(1)} m`;
+}
+
+/** How far somebody is from the robot, in metres; contact where nothing is between them. */
+export function gap(metres) {
+  if (metres === null || metres === undefined || !Number.isFinite(metres)) return "–";
+  return metres <= 0 ? "contact" : `${metres.toFixed(2)} m`;
 }
 
 /** A count of steps: 950, 12.4 k, 1.25 M. */

@@ -5,6 +5,9 @@ export const SPAN_S = 20;
 /** A jump longer than this is drawn as a gap [s]. */
 const GAP_S = 2;
 
+/** Values that were decided longer ago are not those of the present state [s]. */
+const FRESH_S = 0.06;
+
 /**
  * Values of all candidates over the last `SPAN_S` seconds. Time is the cell's own, so that a
  * slow browser draws no bursts; while the cell is paused it is the clock on the wall, since a
@@ -25,8 +28,10 @@ export class History {
       this.samples.push({ t: this.samples.at(-1).t + 1e-3, values: new Map(), chosen: null });
     }
     const t = (last?.t ?? 0) + Math.min(elapsed, SPAN_S);
-    const values = new Map(world.candidates.map((c) => [c.id, c.value]));
-    this.samples.push({ t, values, chosen: world.chosen });
+    // Between two motions the last decision stays as it was: nothing is known of now.
+    const fresh = world.decided_s !== null && world.t_s - world.decided_s < FRESH_S;
+    const values = new Map(fresh ? world.candidates.map((c) => [c.id, c.value]) : []);
+    this.samples.push({ t, values, chosen: fresh ? world.chosen : null });
     this.last = { t, wall, world: world.t_s };
     while (this.samples[0].t < t - SPAN_S) this.samples.shift();
   }
@@ -51,8 +56,10 @@ export class History {
 
   /** Where another goal was chosen than before; `mind` where the old one was still to be had. */
   switches() {
+    let last = null;
     return this.samples.flatMap(({ chosen, values }, i) => {
-      const before = this.samples[i - 1]?.chosen;
+      const before = last;
+      last = chosen ?? last;
       return before && chosen && before !== chosen ? [{ i, mind: values.has(before) }] : [];
     });
   }

@@ -152,7 +152,7 @@ function Act({ job, newest, acting, onAct }) {
   const [error, setError] = useState(null);
   const act = async () => {
     try {
-      const { items } = await get(`/v1/checkpoints?job_id=${job.id}&limit=1`);
+      const { items } = await get(`v1/checkpoints?job_id=${job.id}&limit=1`);
       if (items.length === 0) throw new Error("its checkpoints are gone");
       await onAct(items[0]);
       setLoaded(items[0]);

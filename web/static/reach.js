@@ -92,7 +92,7 @@ function Terms({ safety, people }) {
   return html`<dl class="terms">
     <div class=${separation < required ? "terms-top is-short" : "terms-top"}>
       <dt>${whom} to ${LINKS[link] ?? "robot"}</dt>
-      <dd data-role="separation">${metres(Math.max(0, separation))}</dd></div>
+      <dd data-role="separation">${format.gap(separation)}</dd></div>
     <div class="terms-top"><dt>Needed, S<sub>p</sub></dt><dd data-role="required">${metres(required)}</dd></div>
     ${rows.map(([key, label, value]) => html`<div key=${key}><dt><i class=${`term term-${key}`}></i>${label}</dt>
       <dd>${metres(value)}</dd></div>`)}

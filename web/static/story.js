@@ -19,7 +19,7 @@ const CLEARANCE_SCALE_M = 1.0;
 
 /** `chip` says what the status is called where its own name is too coarse. */
 export function Story({ world, chip = null }) {
-  const [text, tone] = chip ?? STATUS[world.status] ?? [String(world.status), "quiet"];
+  const [text, tone] = chip ?? judged(world) ?? STATUS[world.status] ?? [String(world.status), "quiet"];
   return html`<section class="story" aria-labelledby="story-title">
     <h2 id="story-title" class="sr">What the robot does and why</h2>
     <div class="story-top">
@@ -29,8 +29,26 @@ export function Story({ world, chip = null }) {
       <span class="clock">${world.t_s.toFixed(1)} s</span>
     </div>
     <p class="sentence">${world.message || "Waiting for the first decision."}</p>
+    ${world.verdict && html`<${Verdict} ...${world.verdict} />`}
     <${Clearance} metres=${world.clearance_m} people=${world.people ?? []} />
   </section>`;
+}
+
+/** A case that is done is called by its verdict. */
+function judged({ status, verdict }) {
+  if (status !== "case done" || !verdict) return null;
+  return verdict.as_expected ? ["As expected", "good"] : ["Not as expected", "bad"];
+}
+
+/** What a case study or a test expects, what was observed, and whether both agree. */
+function Verdict({ expected, observed, as_expected: agrees }) {
+  const [text, tone] = agrees === null ? ["open", "quiet"]
+    : agrees ? ["as expected", "good"] : ["not as expected", "bad"];
+  return html`<dl class="verdict" data-role="verdict" data-as-expected=${String(agrees)}>
+    <div><dt>Expected</dt><dd data-role="expected">${expected}</dd></div>
+    <div><dt>Observed</dt><dd data-role="observed">${observed}</dd></div>
+    <div><dt>Verdict</dt><dd><span class=${`chip chip-${tone}`}>${text}</span></dd></div>
+  </dl>`;
 }
 
 function Clearance({ metres, people }) {
@@ -41,12 +59,12 @@ function Clearance({ metres, people }) {
   const tone = !known ? "" : metres < 0.05 ? "bad" : metres < 0.15 ? "warn" : "good";
   return html`<div class="clearance">
     <span class="label">${people.length ? `Clearance to ${whom}` : "Nobody is in the cell"}</span>
-    <span class="meter" role="meter" aria-label="Clearance to the nearest person in centimetres"
-      aria-valuemin="0" aria-valuemax=${CLEARANCE_SCALE_M * 100}
-      aria-valuenow=${Math.round(share * CLEARANCE_SCALE_M * 100)}>
+    <span class="meter" role="meter" aria-label="Clearance to the nearest person in metres"
+      aria-valuemin="0" aria-valuemax=${CLEARANCE_SCALE_M}
+      aria-valuenow=${(share * CLEARANCE_SCALE_M).toFixed(2)} aria-valuetext=${format.gap(metres)}>
       <i class=${`meter-fill ${tone}`} style=${{ transform: `scaleX(${share})` }}></i>
     </span>
-    <strong>${format.distance(metres)}</strong>
+    <strong data-role="clearance">${format.gap(metres)}</strong>
   </div>`;
 }
 

@@ -16,7 +16,8 @@ export function Values({ world, cell, history, colourOf, labelOf }) {
   const past = history.samples[at] ?? null;
   return html`<section class="card" aria-labelledby="values-title">
     <header class="card-head">
-      <h2 id="values-title">What each goal is worth now</h2>
+      <h2 id="values-title">What each goal is worth${Number.isFinite(world.decided_s)
+        && html`, <span class="decided" data-role="decided">at ${world.decided_s.toFixed(1)} s</span>`}</h2>
       <span class="hint" tabindex="0" aria-describedby="values-help">critic’s value
         <span class="tip tip-left" role="tooltip" id="values-help">The trained critic estimates, for
           each candidate, the discounted reward the robot can expect if it goes there now: reaching

@@ -38,6 +38,7 @@ from app.sim.body_size import PERCENTILES
 from app.sim.motions import Motion
 from app.sim.ports import TaskPolicy
 from app.sim.snapshot import CandidateView, WorldSnapshot
+from app.sim.verdict import Verdict
 
 MAX_CHOICES = 20
 """Most choices that an error lists."""
@@ -85,6 +86,36 @@ class CountersPublic(Answer):
     switches: int
 
 
+class ChoicePublic(Answer):
+    """A goal that was chosen, and when."""
+
+    t_s: float = Field(description="simulated time [s]")
+    goal: str
+
+
+class VerdictPublic(Answer):
+    """What a case study or a sorting test is judged by."""
+
+    expected: str = Field(description="what it expects, one sentence")
+    observed: str = Field(description="what happened so far, one sentence")
+    as_expected: bool | None = Field(
+        description="the verdict on the whole run; null while it is open or cannot be judged"
+    )
+    choices: list[ChoicePublic] = Field(
+        description="in a case study, the first choice and every change of mind"
+    )
+
+    @classmethod
+    def from_domain(cls, verdict: Verdict) -> Self:
+        """Make it from the world's verdict."""
+        return cls(
+            expected=verdict.expected,
+            observed=verdict.observed,
+            as_expected=verdict.as_expected,
+            choices=[ChoicePublic(t_s=one.t_s, goal=one.goal) for one in verdict.choices],
+        )
+
+
 class WorldLight(Answer):
     """One live world at one tick, without joint positions: ten times a second on a stream."""
 
@@ -103,12 +134,20 @@ class WorldLight(Answer):
     candidates: list[CandidateLive]
     chosen: str | None
     outside: list[Outside] = Field(description="state fields outside the training range")
-    clearance_m: float | None = Field(description="least distance robot to people [m]")
+    decided_s: float | None = Field(
+        description="when values and choice were decided, as `t_s` [s]; null without a decision"
+    )
+    clearance_m: float | None = Field(
+        description="least distance robot to people [m]; 0 or less: contact, negative: overlap"
+    )
     contact: ContactPublic | None
     checkpoint: str | None = Field(description="SHA-256 of the checkpoint that decides")
     policy_title: str | None
     elapsed_ms: float | None = Field(description="time the decision took [ms]")
     case: str | None
+    verdict: VerdictPublic | None = Field(
+        description="of the running case study or sorting test; null without one"
+    )
     counters: CountersPublic
     sorting: SortingLive | None = Field(description="the sorting task; null without one")
     reach: ReachLive | None = Field(
@@ -229,6 +268,7 @@ def light_members(snapshot: WorldSnapshot) -> dict[str, Any]:
     same = (
         "id", "cell", "tick", "t_s", "mode", "paused", "speed", "status", "message",
         "gripping", "chosen", "clearance_m", "checkpoint", "policy_title", "elapsed_ms", "case",
+        "decided_s",
     )  # fmt: skip
     return {name: getattr(snapshot, name) for name in same} | {
         "people": tuple(PersonLight.from_domain(one) for one in snapshot.people),
@@ -239,6 +279,7 @@ def light_members(snapshot: WorldSnapshot) -> dict[str, Any]:
         and ContactPublic(
             kind=contact.kind, link=contact.link, body=contact.body, person=contact.person
         ),
+        "verdict": snapshot.verdict and VerdictPublic.from_domain(snapshot.verdict),
         "counters": CountersPublic(
             reached=counters.reached,
             contacts=counters.contacts,
