@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from app.errors import InvalidInput, NotFound, ServiceError
+from app.reading_flags import add_flags, stated_options
 from app.settings import Settings, check_access, load_settings
 from app.sim.kernel_cache import kernel_cache
 
@@ -95,6 +96,7 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("--checkpoint", help="alias, SHA-256 or .safetensors file")
     one.add_argument("--episodes", type=int, help="the protocol's own if not given")
     one.add_argument("--seed", type=int, default=11)
+    add_flags(one)
     one.add_argument("--json", action="store_true")
     one = verb("bench", run_bench, "Run a benchmark of the checkout; more options go to it.")
     one.add_argument("name")
@@ -107,16 +109,7 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("target", nargs="?", metavar="FILE|NAME", help=".bvh, .mot, .sto or .csv")
     one.add_argument("--keep", action="store_true", help="store what is imported")
     one.add_argument("--name", help="name to store it under; the file's by default")
-    one.add_argument("--unit", help="unit of the lengths, such as cm, or metres per unit")
-    one.add_argument("--root-unit", metavar="UNIT", help="unit of the root's path, if another")
-    one.add_argument("--up", metavar="AXIS", help="axis that points up: y, z, -y, ...")
-    one.add_argument(
-        "--map",
-        action="append",
-        default=[],
-        metavar="THEIRS=OURS",
-        help="what a joint or column of the file is; may be repeated",
-    )
+    add_flags(one)
     one.add_argument("--json", action="store_true")
     return top
 
@@ -245,7 +238,7 @@ def run_evaluate(options: argparse.Namespace) -> int:
     files = [str(path) for path in options.motions]
     check_motions(options.protocol, files, "FILE", f"evaluate {options.protocol} FILE ...")
     try:
-        motions = runs_of(options.motions)
+        motions = runs_of(options.motions, stated_options(options))
     except BadMotion as error:
         for fault in error.faults:
             print(fault.text, file=sys.stderr)
@@ -309,15 +302,8 @@ def run_motions(options: argparse.Namespace) -> int:
     prepare_kernels(settings)
     from app.errors import BadMotion
     from app.motion_verbs import faulty, run
-    from app.sim.read_options import ReadOptions, name_map
 
-    stated = ReadOptions(
-        unit=options.unit,
-        root_unit=options.root_unit,
-        up=options.up,
-        names=name_map(options.map),
-    )
-    keep, name = options.keep, options.name
+    keep, name, stated = options.keep, options.name, stated_options(options)
     try:
         text, data = run(
             options.action, options.target, settings, keep=keep, name=name, options=stated

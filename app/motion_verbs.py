@@ -114,8 +114,12 @@ def keep_motion(
     return f"{_told(data)}\n{stored} as {record.name}", data
 
 
-def runs_of(paths: Sequence[Path]) -> tuple[Motion, ...]:
+def runs_of(paths: Sequence[Path], options: ReadOptions = NOTHING_STATED) -> tuple[Motion, ...]:
     """Return the clean runs of files; where two have one name, all are named by folder too.
+
+    Args:
+        paths: The files.
+        options: What is stated about all of them.
 
     Raises:
         BadMotion: Some are no sound motion; carries every fault of every file, with its path.
@@ -127,7 +131,7 @@ def runs_of(paths: Sequence[Path]) -> tuple[Motion, ...]:
     for path in paths:
         name = f"{path.parent.name}-{path.stem}" if alike else path.stem
         try:
-            found = read_motion(_content(path), path.name)
+            found = read_motion(_content(path), path.name, options)
         except BadMotion as error:
             faults += [replace(one, place=f"{path}: {one.place}") for one in error.faults]
             continue

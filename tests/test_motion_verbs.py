@@ -4,7 +4,11 @@ from pathlib import Path
 import pytest
 
 from app.__main__ import main
+from app.errors import BadMotion
+from app.motion_verbs import runs_of
+from app.sim.read_options import ReadOptions
 from tests.sim.recorded_person import bvh_text, csv_text, working
+from tests.sim.recorded_skeleton import Person, skeleton
 
 
 @pytest.fixture
@@ -88,6 +92,15 @@ def test_unit_and_up_axis_can_be_stated(clip: Path, capsys: pytest.CaptureFixtur
     found = json.loads(capsys.readouterr().out)
     assert found["unit"] == "0.0011"
     assert found["body_m"]["forearm_r"] == pytest.approx(0.286)
+
+
+def test_files_of_an_evaluation_are_read_as_stated(tmp_path: Path) -> None:
+    path = tmp_path / "child.bvh"
+    path.write_text(skeleton(Person(unit=0.0254, stature=0.98))[0], encoding="utf-8")
+    with pytest.raises(BadMotion, match="fits two units, inch"):
+        runs_of([path])
+    (run,) = runs_of([path], ReadOptions(unit="inch"))
+    assert run.size.forearm_r == pytest.approx(0.149 * 0.98, rel=1e-3)
 
 
 def test_other_file_under_a_taken_name_is_refused(

@@ -164,7 +164,10 @@ def _nobody(motion: Posture, against: dict[str, dict[str, str]], straight: float
     others = [
         one for one in UP_AXES if one not in FOUND and not _objections(motion, one, straight)
     ]
-    hint = f"state up = {' or '.join(others or FOUND)}" + (", which fits" if others else "")
+    leaning = _nearest(_direction(motion.trunk))
+    hint = f"state up = {' or '.join([*FOUND, *others])}"
+    if leaning in others:
+        hint = f"state up = {leaning}, which fits"
     rule = f"must point up, along {' or '.join(FOUND)}, in most frames: {reasons}"
     return _bad(motion, "pelvis to neck", rule, hint)
 

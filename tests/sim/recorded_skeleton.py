@@ -35,8 +35,6 @@ _SIDE = (
     ("{}Foot", "{}Leg", (0.0, 0.0, -0.246)),
     ("{}ToeBase", "{}Foot", (0.08, 0.0, -0.02)),
 )
-LEG = 0.491
-"""Hip to ankle, relative to stature."""
 _CENTRES = dict(
     zip(
         TRACK_NAMES,
@@ -56,6 +54,10 @@ class Person:
     """Of the spine, forward [deg]."""
     tilt: float = 0.0
     """Of the pelvis, forward; the legs stay upright [deg]."""
+    thigh: float = 0.0
+    """Raised forward from the vertical: 85 sits [deg]."""
+    knee: float = 0.0
+    """Bend of both knees: 85 sits, with the thighs upright it kneels [deg]."""
     heading: float = 0.4
     floor: float = 0.0
     """Height of the floor over the file's zero [m]."""
@@ -149,8 +151,12 @@ def _motion(who: Person) -> tuple[dict[str, Vec], Vec]:
         raised = about("y", -20.0 + 15.0 * wave - who.bend) @ about("x", -sign * 80.0)
         turns[f"{side}Arm"] = raised
         turns[f"{side}ForeArm"] = about("z", -sign * (50.0 + 20.0 * wave))
-        turns[f"{side}UpLeg"] = about("y", sway - who.tilt)
-    down = np.array([0.0, 0.0, -LEG * who.stature])
-    hips = turns["Hips"] @ np.array([0.0, 0.0, -0.03 * who.stature])
+        turns[f"{side}UpLeg"] = about("y", sway - who.thigh - who.tilt)
+        turns[f"{side}Leg"] = about("y", who.knee)
+        turns[f"{side}Foot"] = about("y", min(who.thigh, 90.0) - who.knee)
+    upper, lower = np.array([0.0, 0.0, -0.245]), np.array([0.0, 0.0, -0.246])
+    hips = turns["Hips"] @ np.array([0.0, 0.0, -0.03])
+    thighs = heading @ about("y", sway - who.thigh)
+    legs = thighs @ upper + thighs @ about("y", who.knee) @ lower
     feet = np.array([0.2, 0.5, who.floor + 0.039 * who.stature])
-    return turns, feet - hips - (heading @ about("y", sway)) @ down
+    return turns, feet - who.stature * (hips + legs)

@@ -12,6 +12,8 @@ from app.sim.body_track import model_points
 from app.sim.glitches import MAX_SPEED
 from app.sim.human import Q_MAX
 from app.sim.motions import MAX_BYTES, beyond_limits, placed, read_motion
+from app.sim.ports import Vec
+from app.sim.read_options import ReadOptions
 from tests.sim.recorded_person import CMU, bvh_text, csv_text, working
 from tests.sim.recorded_skeleton import Person, skeleton
 
@@ -210,6 +212,27 @@ if CLIPS:  # without clips there is no test to skip
         assert found.elbows.worst < 1e-6
         assert all(one.speed > MAX_SPEED for one in found.glitches)
         assert all(np.isfinite(run.q).all() for run in found.runs)
+
+
+@pytest.mark.parametrize("stated", [{"unit": "cm"}, {"root_unit": "m"}, {"up": "z"}])
+def test_unit_of_a_file_of_angles_cannot_be_stated(stated: dict[str, str]) -> None:
+    (field,) = stated
+    with pytest.raises(BadMotion, match=rf"{field} = .* goes with \.bvh only"):
+        read_motion(csv_text(working(100)).encode(), "a.csv", ReadOptions(**stated))
+
+
+@pytest.mark.parametrize(("up", "rest_up"), [("y", "y"), ("z", "z"), ("y", "z"), ("z", "y")])
+@pytest.mark.parametrize("bend", [0.0, 40.0, 65.0])
+def test_angles_are_the_same_in_any_frame(up: str, rest_up: str, bend: float) -> None:
+    def angles(who: Person) -> Vec:
+        (run,) = read_motion(skeleton(who)[0].encode(), "someone.bvh").runs
+        return run.q
+
+    plain = Person(bend=bend)
+    q = angles(replace(plain, up=up, rest_up=rest_up, unit=0.0254))
+    np.testing.assert_allclose(q, angles(plain), atol=2e-3)
+    # The hips are below the joint that bends, so the line from there leans less.
+    assert np.degrees(np.median(q[:, 3])) == pytest.approx(0.85 * bend, abs=5.0)
 
 
 @pytest.mark.parametrize("seed", range(60))

@@ -67,6 +67,16 @@ def test_without_legs_an_upright_person_with_a_lying_rest_pose_may_be_bent() -> 
     assert_read(upright, ReadOptions(up="z"))
 
 
+@pytest.mark.parametrize("up", ["y", "z"])
+@pytest.mark.parametrize("heading", [-1.5708, 0.0, 1.2, 3.1])
+@pytest.mark.parametrize(("thigh", "knee"), [(85.0, 85.0), (60.0, 110.0), (0.0, 88.0)])
+@pytest.mark.parametrize("bend", [0.0, 35.0])
+def test_person_who_sits_squats_or_kneels_is_upright(
+    up: str, heading: float, thigh: float, knee: float, bend: float
+) -> None:
+    assert_read(Person(up=up, heading=heading, thigh=thigh, knee=knee, bend=bend))
+
+
 def test_axis_that_is_not_looked_for_is_named_and_can_be_stated() -> None:
     hanging = Person(up="-y")
     told = fault(hanging)

@@ -16,16 +16,22 @@ export class Problem extends Error {
 /** No answer at all: the server is away. */
 export class Unreachable extends Error {}
 
-/** Send one request; resolves to the JSON answer, throws Problem or Unreachable. */
-export async function request(path, { method = "GET", body, headers = {}, signal } = {}) {
+/** Send one request, a body as JSON; resolves to the JSON answer, throws Problem or Unreachable. */
+export function request(path, { body, headers = {}, ...options } = {}) {
+  if (body === undefined) return send(path, { headers, ...options });
+  headers = { "Content-Type": "application/json", ...headers };
+  return send(path, { headers, body: JSON.stringify(body), ...options });
+}
+
+async function send(path, { method = "GET", body, headers, signal }) {
   let response;
   try {
     response = await fetch(path, {
       method,
       signal,
       cache: "no-store",
-      headers: body === undefined ? headers : { "Content-Type": "application/json", ...headers },
-      body: body === undefined ? undefined : JSON.stringify(body),
+      headers,
+      body,
     });
   } catch (error) {
     if (error.name === "AbortError") throw error;
@@ -40,6 +46,9 @@ export const get = (path, options) => request(path, options);
 export const put = (path, body = {}) => request(path, { method: "PUT", body });
 export const post = (path, body = {}, headers = {}) =>
   request(path, { method: "POST", body, headers });
+/** Post a file as it is. */
+export const postFile = (path, file) =>
+  send(path, { method: "POST", body: file, headers: { "Content-Type": "application/octet-stream" } });
 
 /**
  * Follow a server-sent event stream, for good: after a loss it connects again and resumes

@@ -4,6 +4,7 @@ import { get } from "./api.js";
 import { Segmented } from "./choice.js";
 import * as format from "./format.js";
 import { Icon } from "./icons.js";
+import { ImportForm } from "./importform.js";
 import { VESTS } from "./palette.js";
 import { WalkerMover } from "./walkers.js";
 
@@ -87,18 +88,18 @@ function Mover({ person, send, sized, onSized }) {
           <${Icon} name="close" /><span>Remove</span></button>
       </div>
     </div>
-    ${shown && html`<${Recording} person=${person} list=${list} error=${error} send=${send} />`}`;
+    ${shown && html`<${Recording} person=${person} list=${list} error=${error} send=${send} />
+      <${ImportForm} onDone=${refresh} />`}`;
 }
 
-/** Stored recordings to choose from, and the one that plays; or how to import one. */
+/** Stored recordings to choose from, and the one that plays. */
 function Recording({ person, list, error, send }) {
   const { id, motion } = person;
   if (error) return html`<${Note}>The recordings cannot be listed: ${error}</${Note}>`;
   if (list === null) return html`<${Note}>Looking for recordings …</${Note}>`;
   if (list.length === 0 && !motion) {
-    return html`<${Note} role="empty-motions">No recordings yet. Import one with
-      ${" "}<code>python -m app motions import FILE --keep</code>, or post it to
-      ${" "}<code>/v1/motions</code>.</${Note}>`;
+    return html`<${Note} role="empty-motions">No recordings yet. Import one here, or with
+      ${" "}<code>python -m app motions import FILE --keep</code>.</${Note}>`;
   }
   const known = list.some((one) => one.name === motion?.name);
   return html`<div class="dock-row recording">

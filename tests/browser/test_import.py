@@ -1,0 +1,61 @@
+"""A visitor imports a recording and states what its file does not tell."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests import patient_http
+from tests.sim.recorded_person import csv_text, working
+from tests.sim.recorded_skeleton import Person, skeleton
+
+pytestmark = pytest.mark.browser
+
+
+@pytest.fixture
+def emptied(server: str) -> Iterator[str]:
+    """The server; what was imported is removed again and the person works."""
+    yield server
+    for name in ("mixed", "angles"):
+        patient_http.delete(f"{server}/v1/motions/{name}")
+    patient_http.post(
+        f"{server}/v1/worlds/main/commands", json={"tag": "set-mode", "mode": "auto"}
+    )
+
+
+@pytest.mark.usefixtures("emptied")
+def test_visitor_states_the_unit_that_a_file_leaves_open(
+    open_page: Callable[..., Page], tmp_path: Path
+) -> None:
+    clip = tmp_path / "mixed.bvh"
+    clip.write_text(skeleton(Person(unit=0.01, root_unit=1.0))[0], encoding="utf-8")
+    page = open_page(scene=False)
+    page.click('[data-mode="recorded"]')
+    page.set_input_files('[data-role="import-file"]', clip)
+    page.click('[data-action="import"]')
+    expect(page.locator('[data-role="import-error"]')).to_contain_text("root_unit = cm or m")
+    page.locator('[data-role="import-root-unit"]').fill("m")
+    page.click('[data-action="import"]')
+    result = page.locator('[data-role="import-result"]')
+    expect(result).to_contain_text(
+        "mixed read as: cm, y up, root's path in m, 50 frames/s, 1.7"
+    )
+    expect(page.locator('[data-role="motion"]')).to_contain_text("mixed")
+    expect(page.locator('[data-role="import-error"]')).to_have_count(0)
+
+
+@pytest.mark.usefixtures("emptied")
+def test_file_of_angles_has_no_unit_to_state(
+    open_page: Callable[..., Page], tmp_path: Path
+) -> None:
+    clip = tmp_path / "angles.csv"
+    clip.write_text(csv_text(working()), encoding="utf-8")
+    page = open_page(scene=False)
+    page.click('[data-mode="recorded"]')
+    page.set_input_files('[data-role="import-file"]', clip)
+    expect(page.locator('[data-action="import"]')).to_be_visible()
+    expect(page.locator('[data-role="import-unit"]')).to_have_count(0)
+    page.click('[data-action="import"]')
+    expect(page.locator('[data-role="import-result"]')).to_contain_text("angles read as: m")
+    assert page.problems == []  # type: ignore[attr-defined]

@@ -1,0 +1,75 @@
+// Importing a recording: a file, what is stated about it, and how it was read.
+import { html, useState } from "./vendor/htm-preact-standalone.module.js";
+import { postFile } from "./api.js";
+import { Icon } from "./icons.js";
+
+const FORMATS = ".bvh,.mot,.sto,.csv";
+const UNITS = ["m", "cm", "mm", "inch", "foot", "cmu"];
+const UP_AXES = ["y", "z", "x", "-y", "-z", "-x"];
+const NUMBER_TITLE = "A unit, or metres per unit as a number; found from the file if empty";
+
+/** A button that picks a file, and behind it the form; `onDone` is called with what is stored. */
+export function ImportForm({ onDone }) {
+  const [file, setFile] = useState(null);
+  const [stated, setStated] = useState({});
+  const [answer, setAnswer] = useState({});
+  const state = (name) => (e) => setStated((now) => ({ ...now, [name]: e.target.value.trim() }));
+  const choose = (e) => {
+    setFile(e.target.files[0] ?? null);
+    setStated({});
+    setAnswer({});
+    e.target.value = ""; // so that the same file can be chosen again
+  };
+  const send = async (e) => {
+    e.preventDefault();
+    const asked = Object.entries({ file_name: file.name, ...stated }).filter(([, value]) => value);
+    setAnswer({ busy: true });
+    try {
+      const motion = await postFile(`v1/motions?${new URLSearchParams(asked)}`, file);
+      setAnswer({ motion });
+      setFile(null);
+      onDone(motion);
+    } catch (problem) {
+      setAnswer({ problem });
+    }
+  };
+  const skeleton = file?.name.toLowerCase().endsWith(".bvh");
+  return html`<form class="dock-row import" onSubmit=${send} aria-label="Import a recording">
+    <span class="dock-label">Import</span>
+    <label class="tool" title="BVH, OpenSim or CSV, at most 32 MB">
+      <input class="sr" type="file" accept=${FORMATS} data-role="import-file" onChange=${choose} />
+      <${Icon} name="plus" />${file ? file.name : "Choose a file"}</label>
+    ${skeleton && html`
+      <datalist id="import-units">${UNITS.map((one) => html`<option key=${one} value=${one} />`)}
+      </datalist>
+      <label class="stated" title=${NUMBER_TITLE}>Unit
+        <input data-role="import-unit" list="import-units" placeholder="found"
+          onInput=${state("unit")} /></label>
+      <label class="stated" title=${`Unit of the root's path, if another. ${NUMBER_TITLE}`}>Root
+        <input data-role="import-root-unit" list="import-units" placeholder="same"
+          onInput=${state("root_unit")} /></label>
+      <label class="stated">Up
+        <select data-role="import-up" onChange=${state("up")}>
+          <option value="">found</option>
+          ${UP_AXES.map((one) => html`<option key=${one} value=${one}>${one}</option>`)}
+        </select></label>`}
+    ${file && html`<button type="submit" class="tool" data-action="import"
+      disabled=${Boolean(answer.busy)}>${answer.busy ? "Reading …" : "Import"}</button>`}
+    ${answer.problem && html`<p class="field-error" role="alert" data-role="import-error">
+      ${answer.problem.message}</p>`}
+    ${answer.motion && html`<p class="dock-hint" role="status" data-role="import-result">
+      ${told(answer.motion)}</p>`}
+  </form>`;
+}
+
+/** How a file was read, in sentences. */
+function told({ name, reading, n_runs: runs, n_glitches: glitches }) {
+  const parts = [
+    `${reading.unit}, ${reading.up} up`,
+    reading.root_unit !== reading.unit && `root's path in ${reading.root_unit}`,
+    `${Number(reading.rate_hz.toPrecision(4))} frames/s`,
+    reading.stature !== null && `${reading.stature.toFixed(2)} m tall`,
+    `${runs} clean ${runs === 1 ? "run" : "runs"}, ${glitches} cut out`,
+  ].filter(Boolean);
+  return [`${name} read as: ${parts.join(", ")}.`, ...reading.notes].join(" ");
+}
