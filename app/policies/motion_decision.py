@@ -9,8 +9,7 @@ remembered from one call to the next: the speeds hold all that the next period n
 import math
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -18,6 +17,7 @@ from app.errors import InvalidInput
 from app.policies.interpolation import Interpolation, interpolates
 from app.policies.lookahead import OTHERS, PASSED, Lookahead, layer_of, looks_ahead
 from app.policies.movers import person_weights
+from app.policies.trained_values import Seen, TrainedValues, as_told
 from app.sim import human
 from app.sim.cell_reach import LONGEST_REACH, SHOULDER
 from app.sim.cells import Cell, require_cell
@@ -37,36 +37,14 @@ from app.sim.motion_ports import (
 )
 from app.sim.motion_state import Stage
 from app.sim.pick import Piece
-from app.sim.ports import OutsideField, Person, ReachActor, Vec
+from app.sim.ports import Person, ReachActor, Vec
 from app.sim.reach import goal_region_of
 from app.sim.safety import SafetyDecision, SafetyLayer, SafetySettings, SeparationTerms
 from app.sim.scene import FAR_AWAY, arm_of
 from app.sim.seen_people import as_known, checked_people, checked_vector, standing_in
 
-RANGE_SLACK = 0.02
-"""Inputs this far outside what was met in training are not flagged [m, rad or per second]."""
 _FAR = np.full(3, 10.0)
-HUMAN = ("x", "y", "vx", "vy", "r", "growth")
-"""What a policy sees of a person."""
-ROBOT = (
-    *(f"robot.q[{j}]" for j in range(6)),
-    *(f"robot.qd[{j}]" for j in range(6)),
-    *("goal.x", "goal.y", "goal.z"),
-)
-"""What messages call the numbers of ``q``, ``qd`` and ``goal`` of a ``trained_range``."""
-
-Seen = tuple[int | None, Vec]
-"""A person, bodies first, or None for nobody, and the cylinder a policy saw, shape (6,)."""
 Told = tuple[SafetyDecision | None, int | None, SeparationTerms | None]
-
-
-class _Trained(NamedTuple):
-    """What was met in training of some numbers, and with slack; infinite where unknown."""
-
-    low: Vec
-    high: Vec
-    least: Vec
-    most: Vec
 
 
 class MotionDecider:
@@ -89,9 +67,7 @@ class MotionDecider:
         self._rule = actor.action.rule()
         self._advance: Callable[..., bool] | None = None
         self._limits = StateLimits(self.arm)
-        self._met = _trained(
-            actor.trained_range, {"q": 6, "qd": 6, "goal": 3, "human": len(HUMAN)}
-        )
+        self._met = TrainedValues(actor.trained_range)
         self._stages: dict[tuple[int, int], Stage] = {}
         self._last: dict[tuple[int, int], Stage] = {}
         self._aheads: dict[Stage, Lookahead] = {}
@@ -119,7 +95,7 @@ class MotionDecider:
         known = [people[i] for i in order]
         with self._busy:
             stage = self._stage(known, self._stages)
-            time_left = min(question.time_left_s, HORIZON_S)
+            time_left = min(max(0.0, question.time_left_s), HORIZON_S)
             stage.put(robot.measured, known, time_left)
             apart, clearance = stage.apart.tolist(), stage.clear.tolist()
             distance, shapes = math.dist(stage.tcp, goal), stage.shapes
@@ -136,8 +112,7 @@ class MotionDecider:
             shapes, places = self._observed(question.observed, robot) or (shapes, order)
             safe, terms_of, terms = self._monitored(question, robot, piece, shapes, places)
             state = np.concatenate((robot.clamped.q, robot.clamped.qd, goal))
-            told = _as_told(seen, known, viewed)
-            outside = [one for two in told for one in self._outside(state, *two, order)]
+            outside = self._met.outside(state, as_told(seen, known, viewed), order)
         met = [Met(separation=d, weight=w) for d, w in zip(apart, weights, strict=True)]
         place = sorted(range(len(order)), key=order.__getitem__)
         return MotionDecision(
@@ -157,7 +132,7 @@ class MotionDecider:
             distance=distance,
             beyond_reach=self._beyond_reach(goal),
             state_outside=robot.outside,
-            outside=tuple(dict.fromkeys(outside)),
+            outside=outside,
             checkpoint=self.checkpoint,
             elapsed_ms=1e3 * (time.perf_counter() - started),
         )
@@ -189,7 +164,9 @@ class MotionDecider:
             raise InvalidInput("robot.qdd", None, rule)
         robot = self._limits.take(question.q, question.qd, question.qdd)
         goal = checked_vector("goal", question.goal, 3, -_FAR, _FAR, "m")
-        for name in ("time_left_s", "elapsed_s", "age_s"):
+        if not math.isfinite(question.time_left_s):
+            raise InvalidInput("time_left_s", question.time_left_s, "must be finite [s]")
+        for name in ("elapsed_s", "age_s"):
             value = getattr(question, name)
             if not 0.0 <= value < math.inf:
                 raise InvalidInput(name, value, "must be finite and not negative [s]")
@@ -326,63 +303,6 @@ class MotionDecider:
         """Return by how much a goal is farther away than the arm is long [m]."""
         longest = LONGEST_REACH + max(self.arm.tool_length - 0.12, 0.0)
         return max(0.0, math.dist(goal, SHOULDER) - longest)
-
-    def _outside(
-        self, state: Vec, who: int | None, seen: Vec, order: Sequence[int]
-    ) -> list[OutsideField]:
-        """Return what of q, qd and goal, and of a person or nobody, lies outside training."""
-        met, values = self._met, np.concatenate((state, seen))
-        inside = (met.least <= values) & (values <= met.most)
-        if inside.all():
-            return []
-        names = ROBOT
-        if who is not None:
-            names += tuple(f"people[{order[who]}].{name}" for name in HUMAN)
-        wrong = np.flatnonzero(~inside).tolist()
-        found = [
-            OutsideField(
-                field=names[i],
-                value=float(values[i]),
-                low=float(met.low[i]),
-                high=float(met.high[i]),
-            )
-            for i in wrong
-            if i < len(names)
-        ]
-        if len(found) < len(wrong):
-            found.append(OutsideField(field="people", value=0.0, low=1.0, high=4.0))
-        return found
-
-
-def _as_told(
-    seen: Sequence[Seen], told: Sequence[Person], viewed: Sequence[Person]
-) -> list[Seen]:
-    """Return who was seen, with the numbers that were told where the policy saw others."""
-    return [
-        (who, view if who is None else view + _cylinder(told[who]) - _cylinder(viewed[who]))
-        for who, view in seen
-    ]
-
-
-def _cylinder(person: Person) -> Vec:
-    """Return x, y, 0, 0, radius, growth of a person; no radius where there are joints."""
-    x, y, r = (*person.q[:2], 0.0) if person.cylinder is None else person.cylinder
-    return np.array([x, y, 0.0, 0.0, r, person.growth])
-
-
-def _trained(
-    ranges: Mapping[str, Mapping[str, Sequence[float]]], sizes: Mapping[str, int]
-) -> _Trained:
-    """Return what a manifest says was met of some variables of these lengths, joined."""
-    n, first = sum(sizes.values()), 0
-    low, high = np.full(n, -np.inf), np.full(n, np.inf)
-    for name, size in sizes.items():
-        entry = ranges.get(name)
-        if entry is not None and len(entry["low"]) <= size:
-            known = slice(first, first + len(entry["low"]))
-            low[known], high[known] = entry["low"], entry["high"]
-        first += size
-    return _Trained(low, high, low - RANGE_SLACK, high + RANGE_SLACK)
 
 
 def _bodies_first(people: Sequence[Person]) -> list[int]:

@@ -39,6 +39,8 @@ from app.sim.seen_people import (
 
 HYSTERESIS = 0.2
 """By how much another candidate's value must be better before the choice changes."""
+LONGEST_S = 60.0
+"""Most time left that the policy sees [s]."""
 MAX_CANDIDATES = 1000
 """Most candidates taken at once."""
 
@@ -175,8 +177,9 @@ class TaskChooser:
         q, qd, _ = robot_state.clamped
         seen, person = self._nearest(robot_state.measured.q, people)
         ids, goals = _check_candidates(candidates)
-        if not (np.isfinite(time_left_s) and 0.0 <= time_left_s <= 60.0):
-            raise InvalidInput("time_left_s", time_left_s, "must lie in [0, 60] s")
+        if not np.isfinite(time_left_s):
+            raise InvalidInput("time_left_s", time_left_s, "must be finite [s]")
+        time_left_s = min(LONGEST_S, max(0.0, time_left_s))
         obs, reachable = observe(
             self._arm,
             self._people,

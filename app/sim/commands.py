@@ -6,7 +6,6 @@ command has a ``tag``, so that it can travel as JSON: ``{"tag": "toggle-candidat
 "id": "cube1"}``.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Literal
@@ -15,6 +14,7 @@ from app.errors import InvalidInput, NotFound
 from app.sim.body_size import PERCENTILES
 from app.sim.cases import cases_of
 from app.sim.cells import LIMITS, Cell
+from app.sim.keypoints import FARTHEST_M
 from app.sim.motions import Motion
 from app.sim.ports import TaskPolicy
 from app.sim.reach_commands import REACH_COMMANDS, ReachCommand, check_reaching, is_reaching
@@ -308,8 +308,11 @@ def _check_person(
     if isinstance(command, MoveHuman):
         for name in ("pelvis", "right", "left"):
             values = getattr(command, name)
-            if values is not None and not all(map(math.isfinite, values)):
-                raise InvalidInput(name, values, "must be finite")
+            # Written so that NaN is refused, too.
+            if values is not None and not all(abs(one) <= FARTHEST_M for one in values):
+                most = f"{FARTHEST_M:g}"
+                rule = f"must be finite, within {most} m of the robot (yaw: {most} rad)"
+                raise InvalidInput(name, values, rule)
     elif isinstance(command, SetMode) and command.mode not in PLAIN_MODES:
         raise InvalidInput("mode", command.mode, "cannot be set", PLAIN_MODES)
     elif isinstance(command, SetBody):

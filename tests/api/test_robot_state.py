@@ -125,6 +125,18 @@ def test_joints_are_taken_by_name_in_any_order(client: TestClient, url: str) -> 
     assert wrong != plain
 
 
+@pytest.mark.parametrize(("left", "same"), [(-0.01, 0.0), (-300.0, 0.0), (1e6, 60.0)])
+def test_a_deadline_that_has_passed_or_is_far_costs_no_decision(
+    client: TestClient, url: str, left: float, same: float
+) -> None:
+    assert asked(client, url, time_left_s=left) == asked(client, url, time_left_s=same)
+
+
+def test_the_frame_goes_by_the_name_of_ros_too(client: TestClient, url: str) -> None:
+    assert asked(client, url, frame="base_link") == asked(client, url)
+    assert refused(client, url, frame="base")["choices"] == ["robot-base", "base_link"]
+
+
 def test_answers_name_the_joints_of_their_vectors(client: TestClient) -> None:
     assert asked(client, "/v1/motion")["joints"] == list(ROS_NAMES)
 

@@ -261,7 +261,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"qdd": np.full(6, 6.0)}, r"robot\.qdd\[0\]"),
     ({"goal": np.array([0.0, np.nan, 0.3])}, r"goal\[1\].* finite"),
     ({"goal": np.array([0.0, 11.0, 0.3])}, r"goal\[1\]"),
-    ({"time_left_s": -1.0}, "time_left_s"),
+    ({"time_left_s": float("-inf")}, "time_left_s"),
     ({"time_left_s": float("nan")}, "time_left_s"),
     ({"elapsed_s": -1.0}, "elapsed_s"),
     ({"elapsed_s": float("nan")}, "elapsed_s"),

@@ -164,8 +164,11 @@ def test_the_arm_inside_the_person_is_answered(chooser):
         ({"qd": np.array([0, 0, 0, 0.9, 0, 0])}, "robot.qd[3]"),
         ({"people": [person()] * 5}, "people"),
         ({"people": [Person(q=np.zeros(17), qd=np.zeros(18))]}, "people[0].q"),
-        ({"people": [person(), Person(q=np.full(18, 9.0), qd=np.zeros(18))]}, "people[1].q[0]"),
-        ({"people": [Person(q=np.full(18, 9.0), qd=np.zeros(18))]}, "people[0].q[0]"),
+        (
+            {"people": [person(), Person(q=np.full(18, 900.0), qd=np.zeros(18))]},
+            "people[1].q[0]",
+        ),
+        ({"people": [Person(q=np.full(18, 900.0), qd=np.zeros(18))]}, "people[0].q[0]"),
         ({"candidates": []}, "candidates"),
         ({"candidates": cubes("cube0") * 1001}, "candidates"),
         ({"candidates": cubes("cube0", "cube0")}, "candidates[1].id"),
@@ -173,7 +176,7 @@ def test_the_arm_inside_the_person_is_answered(chooser):
             {"candidates": [Candidate(id="a", position=np.array([0, np.nan, 0]))]},
             "candidates[0].position[1]",
         ),
-        ({"time_left_s": -1.0}, "time_left_s"),
+        ({"time_left_s": float("-inf")}, "time_left_s"),
     ],
 )
 def test_bad_input_names_its_field(chooser, change, field):

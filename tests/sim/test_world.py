@@ -220,3 +220,20 @@ def test_commands_that_do_not_fit_are_refused_and_change_nothing(world: World) -
 def test_snapshots_cannot_be_written(world: World) -> None:
     with pytest.raises(ValueError, match="read-only"):
         world.snapshot().robot_q[0] = 1.0
+
+
+@pytest.mark.parametrize("point", [(1e308, 1e308, 0.0), (0.0, -1e155, 0.0), (0.0, 0.0, 600.0)])
+@pytest.mark.parametrize("part", ["pelvis", "right", "left"])
+def test_a_place_that_is_in_no_hall_is_refused(
+    world: World, part: str, point: tuple[float, float, float]
+) -> None:
+    with pytest.raises(InvalidInput, match=f"{part} = .* within 100 m of the robot"):
+        world.apply(commands.MoveHuman(**{part: point}))
+    assert np.isfinite(run(world, 5).people[0].q).all()
+
+
+@pytest.mark.parametrize("far", [60.0, -99.9])
+def test_a_place_far_away_in_the_hall_is_reached_for(world: World, far: float) -> None:
+    world.apply(commands.MoveHuman(pelvis=(far, far, far), right=(far, far, far)))
+    world.apply(commands.MoveHuman(left=(-far, far, -far)))
+    assert np.isfinite(run(world, 80).people[0].q).all()

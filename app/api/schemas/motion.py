@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Annotated, Literal, Self
+from typing import Annotated, Self
 
 import numpy as np
 from pydantic import Field
@@ -11,7 +11,7 @@ from app.api.schemas.examples import MOTION, shows
 from app.api.schemas.numbers import Answer, Body, Vector3, Vector6
 from app.api.schemas.people import PersonInput, PersonUse
 from app.api.schemas.robot_state import ROS_NAMES, RobotState
-from app.api.schemas.task_selection import FRAME_TEXT, Outside, Stamp
+from app.api.schemas.task_selection import FRAME_TEXT, FrameName, Outside, Stamp
 from app.sim.human import CAPSULE_NAMES
 from app.sim.motion_ports import Beside, Met, MotionDecision, MotionQuestion, Way
 from app.sim.people_estimate import MAX_SKELETONS
@@ -81,7 +81,7 @@ class MotionRequest(Body):
     cell: str = Field(
         max_length=64, description="name of the work cell", examples=["shared-workspace"]
     )
-    frame: Literal["robot-base"] = Field("robot-base", description=FRAME_TEXT)
+    frame: FrameName = Field("robot-base", description=FRAME_TEXT)
     stamp: Stamp = Field(None, description="your time of the state; comes back unchanged")
     robot: ArmState
     people: Sequence[PersonInput] = Field(
@@ -107,9 +107,9 @@ class MotionRequest(Body):
         "go on as forecast, and changed where that ends in a contact; null does where the "
         "policy allows it",
     )
-    time_left_s: Annotated[float, Field(ge=0.0, le=1e9)] = Field(
+    time_left_s: Annotated[float, Field(ge=-1e9, le=1e9)] = Field(
         5.0,
-        description="time left to reach the goal, of which the policy sees at most 5 [s]",
+        description="time left to reach the goal [s]; the policy sees 0 to 5",
     )
     elapsed_s: Annotated[float, Field(ge=0.0, le=1e9)] = Field(
         0.0,

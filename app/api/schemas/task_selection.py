@@ -16,6 +16,8 @@ from app.sim.people_estimate import MAX_SKELETONS
 from app.sim.ports import Candidate, Decision, OutsideField, Vec
 
 MAX_CANDIDATES = 1000
+FrameName = Literal["robot-base", "base_link"]
+"""Two names of one frame."""
 FRAME_TEXT = (
     "frame of all positions: ROS's `base_link`, x right, y toward the person, z up, table top "
     "at z = 0; the pendant's `base` is turned by half a turn about z (x and y change sign)"
@@ -37,7 +39,7 @@ class TaskSelectionRequest(Body):
     model_config = shows(TASK_SELECTION)
 
     cell: str = Field(description="name of the work cell", examples=["pick-and-place"])
-    frame: Literal["robot-base"] = Field("robot-base", description=FRAME_TEXT)
+    frame: FrameName = Field("robot-base", description=FRAME_TEXT)
     stamp: Stamp = Field(None, description="your time of the state; comes back unchanged")
     robot: RobotState
     people: Sequence[PersonInput] = Field(
@@ -52,8 +54,10 @@ class TaskSelectionRequest(Body):
     previous: str | None = Field(
         None, max_length=128, description="id chosen last, for hysteresis; null chooses afresh"
     )
-    time_left_s: Annotated[float, Field(ge=0.0, le=60.0)] = Field(
-        10.0, description="time left to reach the target [s]"
+    time_left_s: Annotated[float, Field(ge=-1e9, le=1e9)] = Field(
+        10.0,
+        description="time left to reach the target [s]; the policy sees 0 where it is over, at "
+        "most 60",
     )
     checkpoint: str | None = Field(
         None, max_length=64, description="SHA-256 or alias; the shipped policy if null"
