@@ -5,7 +5,7 @@ point that cannot be used costs that point, and is named. Only another number of
 error.
 
 A skeleton in another frame (a camera's, with the depth along z; a floor's origin in place of
-the table's) or in another unit has the shape of a person in the wrong place. It is told by
+the table's) or in another unit has the shape of a person in the wrong place. It is detected by
 :func:`why_implausible`: bone lengths, heights of the body's parts over the floor, and the pose
 that goes with them. People who stand, bend, kneel, sit, lie on the floor or on a table, reach
 up or stand on a step of half a metre pass. A skeleton that does not pass counts as unseen,

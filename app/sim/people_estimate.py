@@ -3,9 +3,9 @@
 A tracker numbers its people anew in every frame, and exchanges them when they cross. Every
 person seen is given to the track it continues, by where that track's key-points were expected;
 so exchanged people are put right, and whose number has changed is named (``people-swapped``).
-The nearest who continue no track start the free ones: that of somebody lost whom they may be,
-who walks at 1.6 m/s while unseen, or one that never saw anybody. Each track degrades as
-``person_estimate.py`` says.
+The nearest of the others start the free tracks: that of a lost person who can have walked there
+at 1.6 m/s since, or one that never saw anybody. Each track degrades as ``person_estimate.py``
+says.
 
 A frame may show more people than there are tracks. Then the nearest are followed: somebody who
 was already there in the frame before and is nearer to the robot's base than the farthest one
@@ -40,7 +40,7 @@ _NOBODY = Keypoints(points=np.full((N_KEYPOINTS, 3), np.nan), confidences=np.zer
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Unfollowed:
-    """Somebody in a frame whom no track follows."""
+    """A person in a frame that no track follows."""
 
     index: int
     """Place in the frame."""
@@ -120,7 +120,7 @@ class PeopleEstimator:
         self._waiting: list[Vec] = []
         self._waiting_since = 0.0
         self.unfollowed: tuple[Unfollowed, ...] = ()
-        """Whom of the newest frame no track follows, nearest first."""
+        """People in the newest frame that no track follows, nearest first."""
 
     def update(
         self,
@@ -197,8 +197,8 @@ class PeopleEstimator:
     def _free_track(self, t: float, points: Vec, free: Sequence[int]) -> int | None:
         """Return which of the tracks that expect nobody a newcomer starts; None for none.
 
-        That of the person lost whom the newcomer may be, else one that never saw anybody.
-        Other people who are lost are not forgotten for a newcomer: they may still be there.
+        The track of a lost person who can have walked there, else one that never saw anybody.
+        Other lost people are not forgotten for a newcomer: they may still be there.
         """
         here = np.nanmedian(points, axis=0)
         apart = {
@@ -221,7 +221,7 @@ class PeopleEstimator:
         return 0.0 if last is None else max(0.0, _from_base(last) - self._walked(t, i))
 
     def _was_waiting(self, t: float, points: Vec) -> bool:
-        """Return whether somebody whom no track followed was here in the frame before."""
+        """Return whether a person not followed was here in the frame before."""
         limits = self.settings.filter
         since = min(max(t - self._waiting_since, 0.0), limits.hold_s)
         gate = limits.gate + limits.max_speed * since
@@ -234,7 +234,7 @@ class PeopleEstimator:
         order: Sequence[int | None],
         replaced: set[int],
     ) -> None:
-        """Note whom no track follows, and what that and their numbers mean for each track."""
+        """Note the people not followed, and the flags of each track that follow from them."""
         jumps = {
             j
             for track, j in zip(self._tracks, order, strict=True)
@@ -281,7 +281,7 @@ class PeopleEstimator:
         )
 
     def _noted(self, estimate: PersonEstimate, flags: tuple[Flag, ...]) -> PersonEstimate:
-        """Return the estimate of one track with what all tracks together tell."""
+        """Return the estimate of one track with the flags that come from all tracks."""
         if not flags:
             return estimate
         foreign = self._foreign if "foreign-frame" in flags else None

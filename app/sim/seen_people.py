@@ -207,7 +207,7 @@ def checked_person(person: Person, path: str) -> Person:
     """Return a person with checked arrays.
 
     Args:
-        person: As told.
+        person: The person.
         path: Name of the field, for errors.
 
     Raises:

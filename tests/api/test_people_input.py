@@ -155,6 +155,20 @@ def test_a_keypoint_that_cannot_be_used_costs_that_one_and_is_named(
     assert use["unusable"] == use["missing"] == ["wrist_r"] and use["implausible"] is None
 
 
+def test_the_socket_takes_keypoints_as_other_tools_write_them(client: TestClient) -> None:
+    question = {
+        "cell": "shared-workspace",
+        "robot": {"q": [0, -2.5, 2.0, 0, 0, 0], "qd": [0.4, 0, 0, 0, 0, 0]},
+        "goal": [0.05, 0.75, 0.31],
+        "people": [{"keypoints": [*POINTS[:15], *["MISSING"] * 10]}],
+    }
+    with client.websocket_connect("ws://127.0.0.1/v1/motion/stream") as socket:
+        for missing in ("null", "[NaN, NaN, NaN]", "[null, null, null, 0]", "[]"):
+            socket.send_text(json.dumps(question).replace('"MISSING"', missing))
+            (person,) = socket.receive_json()["people"]
+            assert person["flags"] == person["unusable"] == [] and len(person["missing"]) == 10
+
+
 def test_keypoints_by_name_are_those_in_order_and_absent_ones_are_missing(
     client: TestClient, state: dict[str, Any]
 ) -> None:

@@ -128,7 +128,7 @@ def test_of_a_crowd_the_nearest_are_followed_and_the_rest_is_named() -> None:
     assert people.unfollowed == ()
 
 
-def test_who_comes_nearer_than_the_farthest_followed_takes_that_track() -> None:
+def test_a_person_who_comes_nearer_than_the_farthest_followed_takes_that_track() -> None:
     people = PeopleEstimator(1, CELL.body, floor_z=CELL.floor_z)
     followed, replaced = [], []
     for k in range(90):  # one stands at 2 m, another walks past to 1 m

@@ -138,8 +138,8 @@ class KeypointsSeen(Body):
     def points(self) -> tuple[Vec, Vec]:
         """Return key-points [m], (25, 3), NaN where missing, and confidences, (25,)."""
         rows = _rows(self.keypoints, 4)
-        told = np.array([value is not None and len(value) == 4 for value in self.keypoints])
-        return rows[:, :3], np.where(told, rows[:, 3], 1.0)
+        given = np.array([value is not None and len(value) == 4 for value in self.keypoints])
+        return rows[:, :3], np.where(given, rows[:, 3], 1.0)
 
 
 class KeypointsPerson(KeypointsSeen):

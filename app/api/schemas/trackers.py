@@ -62,7 +62,7 @@ class FrameCreate(Body):
     t: Time = Field(description="when the frame was taken, on the tracker's clock [s]")
     people: list[KeypointsSeen] = Field(
         max_length=MAX_SKELETONS,
-        description="whom the frame shows; nobody: an empty list; of more than the tracker "
+        description="people in the frame; nobody: an empty list; of more than the tracker "
         "follows, the nearest to the robot's base are followed",
     )
 
@@ -133,7 +133,7 @@ class EstimatePublic(Answer):
 
 
 class UnfollowedPublic(Answer):
-    """Somebody in the newest frame whom the tracker does not follow."""
+    """A person in the newest frame that the tracker does not follow."""
 
     index: int = Field(description="place in the frame's `people`")
     reason: Literal["farther", "jump", "foreign-frame"] = Field(
@@ -157,7 +157,7 @@ class EstimatesPublic(Answer):
     )
     people: list[EstimatePublic]
     unfollowed: list[UnfollowedPublic] = Field(
-        description="whom of the newest frame the tracker does not follow, nearest first"
+        description="people in the newest frame that are not followed, nearest first"
     )
 
     @classmethod
@@ -168,7 +168,7 @@ class EstimatesPublic(Answer):
         estimates: tuple[PersonEstimate, ...],
         unfollowed: tuple[Unfollowed, ...] = (),
     ) -> Self:
-        """Make it from the estimates of all people, and whom of the frame nobody follows."""
+        """Make it from the estimates of all people and the people not followed."""
         people = [EstimatePublic.from_domain(i, one) for i, one in enumerate(estimates)]
         rest = [UnfollowedPublic(**asdict(one)) for one in unfollowed]
         return cls(tracker=tracker, t=t, people=people, unfollowed=rest)
