@@ -26,6 +26,7 @@ from app.api import (
     viewer,
     worlds,
 )
+from app.api.answers import Answers
 from app.api.bodies import BodyRules
 from app.api.security import SESSION_PATH, Guard
 
@@ -79,7 +80,9 @@ def build_app(*, lifespan: Lifespan, static: Path, token: str | None, version: s
         app.include_router(part.router)
     add_page(app, static)
     app.add_middleware(BodyRules, files=motions.FILES)
-    app.add_middleware(Guard, token=token, open_paths=(SESSION_PATH, ICON_PATH))
+    open_paths = (SESSION_PATH, ICON_PATH, *health.PATHS)
+    app.add_middleware(Guard, token=token, open_paths=open_paths)
+    app.add_middleware(Answers)
     return app
 
 

@@ -1,25 +1,33 @@
-"""What a request body may be: JSON, or a file where one is taken, and not more than a limit.
+"""What a request may hold: an address and a body that no part of the service stumbles over.
 
-Wrong type and size are refused before a route sees them, as problems.
+Bodies are JSON, or a file where one is taken, uncompressed and not more than a limit. Wrong
+encoding, type and size, and text and integers that nothing takes (``texts.py``), are refused
+before a route sees them, as problems.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from app.api.problems import problem
+from app.api.problems import ProblemResponse, member_problem
 from app.api.security import path_of
+from app.api.texts import fault_in_address, fault_in_json
+from app.api.validation import member
 
 MAX_BODY_BYTES = 1 << 20
 JSON_ONLY_PREFIX = "/v1/"
 FILE_TYPES = ("application/octet-stream", "text/plain", "text/csv")
 """Content types of a file that is posted as it is; none is one, too."""
+FORM = "application/x-www-form-urlencoded"
 
 
 class BodyRules:
-    """ASGI layer that refuses bodies that are too large (413) or of a wrong type (415).
+    """ASGI layer that refuses requests that nothing behind it takes.
+
+    Bodies that are too large (413), compressed or of a wrong type (415); text and integers that
+    cannot be kept (422).
 
     Args:
         app: What it protects.
@@ -43,25 +51,80 @@ class BodyRules:
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
-        path = path_of(scope)
+        path, headers = path_of(scope), Headers(scope=scope)
         takes_file = scope["method"] == "POST" and path in self.files
         max_bytes = self.files[path] if takes_file else self.max_bytes
-        headers = Headers(scope=scope)
-        length = headers.get("content-length", "")
-        if length.isdecimal() and int(length) > max_bytes:
-            await _refuse_size(f"{length} bytes", max_bytes, scope, receive, send)
-            return
-        has_body = length not in ("", "0") or "transfer-encoding" in headers
-        given = headers.get("content-type", "")
-        if takes_file:
-            if given and _media_type(given) not in FILE_TYPES:
-                await _refuse_type(given, "must be a file's", FILE_TYPES, scope, receive, send)
-                return
-        elif has_body and path.startswith(JSON_ONLY_PREFIX) and not _is_json(given):
-            choices = ("application/json",)
-            await _refuse_type(given, "must be JSON", choices, scope, receive, send)
+        refused = _refused_head(scope, headers, takes_file, max_bytes)
+        if refused is None and _has_body(headers) and not takes_file and not _is_form(headers):
+            receive, body = await _whole(receive, max_bytes)
+            refused = _refused_json(body, path, max_bytes)
+        if refused is not None:
+            await refused(scope, receive, send)
             return
         await self.app(scope, _counted(receive, max_bytes), send)
+
+
+def _refused_head(
+    scope: Scope, headers: Headers, takes_file: bool, max_bytes: int
+) -> ProblemResponse | None:
+    """Return the problem that address, size, encoding or type are, or None."""
+    path = path_of(scope)
+    fault = fault_in_address(path, scope["query_string"])
+    if fault is not None:
+        return member_problem(422, "invalid-input", fault, path)
+    length = headers.get("content-length", "")
+    if length.isdecimal() and _exceeds(length, max_bytes):
+        return _too_large(f"{length} bytes", max_bytes, path)
+    if not _has_body(headers):
+        return None
+    encoding, given = headers.get("content-encoding", ""), headers.get("content-type", "")
+    if encoding.strip().lower() not in ("", "identity"):
+        rule = "must not be compressed"
+        fault = member("Content-Encoding", repr(encoding), rule, ["identity"])
+        return member_problem(
+            415, "wrong-encoding", fault, path, {"Accept-Encoding": "identity"}
+        )
+    if takes_file and given and _media_type(given) not in FILE_TYPES:
+        return _wrong_type(given, "must be a file's", FILE_TYPES, path)
+    if not takes_file and path.startswith(JSON_ONLY_PREFIX) and not _is_json(given):
+        return _wrong_type(given, "must be JSON", ("application/json",), path)
+    return None
+
+
+def _has_body(headers: Headers) -> bool:
+    return headers.get("content-length", "") not in ("", "0") or "transfer-encoding" in headers
+
+
+def _exceeds(length: str, most: int) -> bool:
+    """Return whether a number of any length is greater than another."""
+    digits = length.lstrip("0")
+    return len(digits) > len(str(most)) or int(digits or "0") > most
+
+
+async def _whole(receive: Receive, max_bytes: int) -> tuple[Receive, bytes]:
+    """Read a body, one byte beyond the limit at most; return it, and what receives it again."""
+    messages: list[Message] = []
+    body = b""
+    while len(body) <= max_bytes:
+        message = await receive()
+        messages.append(message)
+        body += message.get("body", b"")
+        if not message.get("more_body", False):  # complete, or the client has left
+            break
+    messages.reverse()
+
+    async def receive_again() -> Message:
+        return messages.pop() if messages else await receive()
+
+    return receive_again, body
+
+
+def _refused_json(body: bytes, path: str, max_bytes: int) -> ProblemResponse | None:
+    """Return the problem that a body is, or None."""
+    if len(body) > max_bytes:
+        return _too_large(f"more than {max_bytes} bytes", max_bytes, path)
+    fault = fault_in_json(body)
+    return None if fault is None else member_problem(422, "invalid-input", fault, path)
 
 
 def _counted(receive: Receive, max_bytes: int) -> Receive:
@@ -78,23 +141,12 @@ def _counted(receive: Receive, max_bytes: int) -> Receive:
     return receive_counted
 
 
-async def _refuse_size(
-    value: str, max_bytes: int, scope: Scope, receive: Receive, send: Send
-) -> None:
-    rule = f"must be at most {max_bytes} bytes"
-    answer = problem(
-        413,
-        f"the body has {value}; it {rule}",
-        kind="body-too-large",
-        instance=scope["path"],
-        data={"field": "body", "value": value, "rule": rule, "choices": []},
-        headers={"Connection": "close"},
-    )
-    await answer(scope, receive, send)
-
-
 def _media_type(content_type: str) -> str:
     return content_type.partition(";")[0].strip().lower()
+
+
+def _is_form(headers: Headers) -> bool:
+    return _media_type(headers.get("content-type", "")) == FORM
 
 
 def _is_json(content_type: str) -> bool:
@@ -104,19 +156,12 @@ def _is_json(content_type: str) -> bool:
     )
 
 
-async def _refuse_type(
-    given: str, rule: str, choices: Sequence[str], scope: Scope, receive: Receive, send: Send
-) -> None:
-    answer = problem(
-        415,
-        f"the body is {given or 'of no stated type'}; it {rule}",
-        kind="wrong-media-type",
-        instance=scope["path"],
-        data={
-            "field": "Content-Type",
-            "value": repr(given),
-            "rule": rule,
-            "choices": list(choices),
-        },
-    )
-    await answer(scope, receive, send)
+def _too_large(value: str, max_bytes: int, path: str) -> ProblemResponse:
+    rule = f"must be at most {max_bytes} bytes"
+    fault = member("body", value, rule)
+    return member_problem(413, "body-too-large", fault, path, {"Connection": "close"})
+
+
+def _wrong_type(given: str, rule: str, choices: tuple[str, ...], path: str) -> ProblemResponse:
+    fault = member("Content-Type", repr(given), rule, choices)
+    return member_problem(415, "wrong-media-type", fault, path)

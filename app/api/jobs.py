@@ -12,6 +12,7 @@ from app.api.schemas.jobs import EvaluateJobCreate, JobCreate, JobList, JobPubli
 from app.api.services import Services, ServicesDep
 from app.policies import presets
 from app.store import events, jobs, metrics
+from app.store.cursors import MAX_INTEGER
 from app.store.records import JobEvent, JobRecord, JobState, MetricRow
 
 POLL_S = 0.3
@@ -86,7 +87,9 @@ def cancel(job: JobDep, services: ServicesDep) -> JobPublic:
 def get_metrics(
     job: JobDep,
     services: ServicesDep,
-    after_step: Annotated[int, Query(ge=-1, description="last step already known")] = -1,
+    after_step: Annotated[
+        int, Query(ge=-1, le=MAX_INTEGER, description="last step already known")
+    ] = -1,
     limit: Annotated[int, Query(ge=1, le=10_000, description="at most so many")] = 10_000,
 ) -> MetricsPublic:
     """Return the points beyond a step, in order of steps."""
@@ -101,7 +104,7 @@ async def stream(
     job: JobDep,
     services: ServicesDep,
     last_event_id: Annotated[
-        int | None, Header(ge=0, description="go on after this event")
+        int | None, Header(ge=0, le=MAX_INTEGER, description="go on after this event")
     ] = None,
 ) -> AsyncIterator[ServerSentEvent]:
     """Send every event of the job, then new ones, then ``end`` once it is over."""

@@ -19,10 +19,17 @@ from starlette.concurrency import run_in_threadpool
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from app.api.known_people import known_people, nearest_places, renumbered, take_time
-from app.api.problems import problem, service_problem, validation_problem
+from app.api.problems import (
+    member_problem,
+    problem,
+    service_problem,
+    validation_problem,
+)
 from app.api.schemas.motion import MotionAnswer, MotionRequest, PersonMet
-from app.api.services import Services, ServicesDep, services_of
+from app.api.services import MAX_STREAMS, Services, ServicesDep, services_of
+from app.api.sockets import refuse
 from app.api.task_selection import known_cell
+from app.api.texts import fault_in_json
 from app.api.tracker_sessions import TrackerSessions
 from app.errors import ServiceError
 from app.policies.motion_decision import MotionDecider
@@ -131,7 +138,7 @@ async def stream(client: WebSocket) -> None:
     """Answer requests, one message each, until the caller leaves or the server stops."""
     services = services_of(client)
     if not services.motion_streams.acquire(blocking=False):
-        await client.close(1013, "too many sockets ask for motion already")
+        await refuse(client, f"{MAX_STREAMS} sockets ask for motion already: close one of them")
         return
     try:
         await client.accept()
@@ -174,8 +181,10 @@ async def reply(message: Mapping[str, Any], services: Services) -> str:
         else:
             body = json.loads(text)
             stamp = _stamp_of(body)
-            found = await answer(MotionRequest.model_validate(body), services)
-            return found.model_dump_json()
+            if (fault := fault_in_json(text.encode())) is None:
+                found = await answer(MotionRequest.model_validate(body), services)
+                return found.model_dump_json()
+            refused = member_problem(422, "invalid-input", fault, path)
     except ValidationError as error:
         wrong = [
             {**dict(one), "loc": ("body", *one["loc"])}

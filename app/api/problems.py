@@ -5,6 +5,7 @@ the error's data; bad input always carries ``field``, ``value``, ``rule`` and ``
 """
 
 import http
+import json
 import logging
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -19,6 +20,7 @@ from starlette.routing import Match
 
 from app.api.validation import (
     NOTHING,
+    Member,
     body_models,
     member,
     validation_member,
@@ -58,6 +60,10 @@ class ProblemResponse(JSONResponse):
     """A JSON answer with the media type of problems."""
 
     media_type = MEDIA_TYPE
+
+    def render(self, content: object) -> bytes:
+        """Write JSON; half a surrogate pair that a caller sent is escaped again."""
+        return json.dumps(content, ensure_ascii=False).encode("utf-8", "backslashreplace")
 
 
 class Problem(BaseModel):
@@ -105,6 +111,26 @@ def problem(
     return ProblemResponse(
         {**members, **(data or {})}, status, headers=dict(headers) if headers else None
     )
+
+
+def member_problem(
+    status: int,
+    kind: str,
+    fault: Member,
+    instance: str,
+    headers: Mapping[str, str] | None = None,
+) -> ProblemResponse:
+    """Build the problem of one faulty member.
+
+    Args:
+        status: HTTP status.
+        kind: Last part of the type URI.
+        fault: Field, value, rule and choices.
+        instance: Path of the request.
+        headers: Headers of the answer.
+    """
+    detail = f"{fault['field']} = {fault['value']} {fault['rule']}"
+    return problem(status, detail, kind=kind, instance=instance, data=fault, headers=headers)
 
 
 def service_problem(error: ServiceError, instance: str) -> ProblemResponse:
@@ -191,9 +217,10 @@ def _methods_at(request: Request) -> list[str]:
     routes = request.app.routes
     return [
         method
-        for method in ("GET", "POST", "PUT", "PATCH", "DELETE")
+        for method in ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE")
         if any(
-            route.matches({**request.scope, "method": method})[0] is Match.FULL
+            route.matches({**request.scope, "method": method.replace("HEAD", "GET")})[0]
+            is Match.FULL
             for route in routes
         )
     ]
@@ -204,17 +231,9 @@ async def on_disconnect(request: Request, _error: Exception) -> ProblemResponse:
     return problem(400, "the body of the request is incomplete", instance=request.url.path)
 
 
-async def on_bug(request: Request, _error: Exception) -> ProblemResponse:
-    """Answer what nobody foresaw; the trace goes to the log, never to the caller."""
-    return problem(
-        500, "an unforeseen error; the server's log has the trace", instance=request.url.path
-    )
-
-
 def install(app: FastAPI) -> None:
-    """Make ``app`` answer every error with a problem."""
+    """Make ``app`` answer every error that is foreseen with a problem; see ``answers.py``."""
     app.add_exception_handler(ServiceError, on_service_error)
     app.add_exception_handler(RequestValidationError, on_validation_error)
     app.add_exception_handler(HTTPException, on_http_error)
     app.add_exception_handler(ClientDisconnect, on_disconnect)
-    app.add_exception_handler(Exception, on_bug)

@@ -16,28 +16,14 @@ from http.cookies import CookieError, SimpleCookie
 from importlib import resources
 from urllib.parse import urlsplit
 
-from starlette.datastructures import Headers, MutableHeaders
+from starlette.datastructures import Headers
 from starlette.responses import HTMLResponse, Response
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.types import ASGIApp, Receive, Scope, Send
 
 from app.api.problems import problem
 
 COOKIE = "tandem_session"
 SESSION_PATH = "/session"
-PAGE_POLICY = (
-    "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; "
-    "script-src 'self'; connect-src 'self'; object-src 'none'; base-uri 'none'; "
-    "form-action 'self'; frame-src 'self'; frame-ancestors 'self'"
-)
-HEADERS = {  # where an answer does not set its own
-    "X-Content-Type-Options": "nosniff",
-    "X-Frame-Options": "SAMEORIGIN",
-    "Referrer-Policy": "same-origin",
-    "Cross-Origin-Opener-Policy": "same-origin",
-    "Cross-Origin-Resource-Policy": "same-origin",
-    "Content-Security-Policy": PAGE_POLICY,
-    "Cache-Control": "no-cache",
-}
 
 
 @lru_cache(maxsize=1)
@@ -68,12 +54,13 @@ def is_loopback_name(host: str | None) -> bool:
 
 
 class Guard:
-    """ASGI layer that checks Host, Origin and token, and adds the security headers.
+    """ASGI layer that checks Host, Origin and token.
 
     Args:
         app: What it protects.
         token: The token, or None on loopback.
-        open_paths: Paths answered without the token (health checks, sign-in).
+        open_paths: Paths answered without the token (health checks, sign-in);
+            ``request.state.trusted`` tells them whether it was proven.
     """
 
     def __init__(self, app: ASGIApp, *, token: str | None, open_paths: Iterable[str]) -> None:
@@ -88,7 +75,7 @@ class Guard:
             return
         refusal = self.refusal(scope, Headers(scope=scope))
         if refusal is None:
-            await self.app(scope, receive, _with_headers(send, scope))
+            await self.app(scope, receive, send)
             return
         status, kind, detail, data = refusal
         if scope["type"] == "websocket":
@@ -101,7 +88,7 @@ class Guard:
         )
         if status == 401 and "text/html" in Headers(scope=scope).get("accept", ""):
             answer = HTMLResponse(_sign_in_page(scope.get("root_path", "")), 401, headers)
-        await answer(scope, receive, _with_headers(send, scope))
+        await answer(scope, receive, send)
 
     def refusal(
         self, scope: Scope, headers: Headers
@@ -115,9 +102,9 @@ class Guard:
         if origin is not None and not _same_site(origin, host):
             rule = "must be the address of this server"
             return _refusal(403, "wrong-origin", "Origin", origin, rule)
-        if self.token is None or path_of(scope) in self.open_paths:
-            return None
-        if not self._proves_token(headers):
+        trusted = self.token is None or self._proves_token(headers)
+        scope.setdefault("state", {})["trusted"] = trusted
+        if not trusted and path_of(scope) not in self.open_paths:
             detail = "this server needs its token, as 'Authorization: Bearer ...'"
             return 401, "token-needed", detail, {}
         return None
@@ -133,7 +120,7 @@ class Guard:
             return False
         if morsel is None:
             return False
-        return hmac.compare_digest(morsel.value, session_value(self.token))
+        return hmac.compare_digest(morsel.value.encode(), session_value(self.token).encode())
 
 
 def _refusal(
@@ -156,19 +143,3 @@ def _same_site(origin: str, host: str) -> bool:
     except ValueError:
         return False
     return parts.scheme in ("http", "https") and parts.netloc.lower() == host.lower()
-
-
-def _with_headers(send: Send, scope: Scope) -> Send:
-    """Complete the headers of an answer; its ``Location`` is put below the root path."""
-    root_path = scope.get("root_path", "")
-
-    async def send_with_headers(message: Message) -> None:
-        if message["type"] == "http.response.start":
-            headers = MutableHeaders(scope=message)
-            for name, value in HEADERS.items():
-                headers.setdefault(name, value)
-            if headers.get("location", "").startswith("/"):
-                headers["Location"] = root_path + headers["location"]
-        await send(message)
-
-    return send_with_headers

@@ -24,7 +24,8 @@ async def sign_in(request: Request) -> Response:
         "application/x-www-form-urlencoded"
     )
     given = _from_form(body) if is_form else _from_json(body)
-    if token is not None and not hmac.compare_digest(given.encode(), token.encode()):
+    proof = given.encode("utf-8", "replace")
+    if token is not None and not hmac.compare_digest(proof, token.encode()):
         raise InvalidInput("token", "***", "is not the token of this server")
     answer = RedirectResponse("/", 303) if is_form else Response(status_code=204)
     if token is not None:
@@ -48,6 +49,8 @@ def _from_form(body: bytes) -> str:
 def _from_json(body: bytes) -> str:
     try:
         given = json.loads(body)["token"]
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise InvalidInput("token", "nothing", "must be given") from error
-    return str(given)
+    if not isinstance(given, str):
+        raise InvalidInput("token", "***", "must be a string")
+    return given

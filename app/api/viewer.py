@@ -24,6 +24,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.typing import Subprotocol
 
 from app.api.services import MAX_VIEWERS, LiveWorld, ServicesDep, services_of
+from app.api.sockets import refuse
 from app.errors import ServiceError
 
 logger = logging.getLogger(__name__)
@@ -106,7 +107,7 @@ async def socket(client: WebSocket, world_id: str) -> None:
         world = services.world(world_id)
     except ServiceError as error:
         logger.info("viewer socket refused: %s", error)
-        await client.close(1013, "no such world yet")
+        await refuse(client, "no such world yet")
         return
     if not services.viewers.acquire(blocking=False):
         await refuse(client, f"{MAX_VIEWERS} viewers are open already: close one of them")
@@ -115,13 +116,6 @@ async def socket(client: WebSocket, world_id: str) -> None:
         await connect_viewer(client, world)
     finally:
         services.viewers.release()
-
-
-async def refuse(client: WebSocket, reason: str) -> None:
-    """Open a socket only to close it: a browser learns the reason of no other refusal."""
-    offered: list[str] = client.scope.get("subprotocols", [])
-    await client.accept(offered[0] if offered else None)
-    await client.close(1013, reason)
 
 
 async def connect_viewer(client: WebSocket, world: LiveWorld) -> None:

@@ -5,6 +5,8 @@ import binascii
 
 from app.errors import InvalidInput
 
+MAX_INTEGER = 2**63 - 1
+"""Greatest integer that the database holds."""
 MAX_PAGE = 200
 """Longest page of a list."""
 
@@ -25,6 +27,8 @@ def decode_cursor(cursor: str | None) -> int | None:
     try:
         text = base64.urlsafe_b64decode(cursor + "=" * (-len(cursor) % 4)).decode()
         number = int(text.removeprefix("n"))
+        if not 0 <= number <= MAX_INTEGER:
+            raise ValueError(number)
     except (binascii.Error, ValueError) as error:
         rule = "must be a cursor that an earlier page returned"
         raise InvalidInput("cursor", cursor, rule) from error

@@ -413,13 +413,39 @@ def test_only_so_many_sockets_are_open_at_once(client: TestClient) -> None:
     slots = client.app.state.services.motion_streams  # type: ignore[attr-defined]
     held = sum(slots.acquire(blocking=False) for _ in range(MAX_STREAMS))
     try:
-        with pytest.raises(WebSocketDisconnect) as caught, client.websocket_connect(SOCKET):
-            pass
+        with client.websocket_connect(SOCKET) as one_too_many:
+            with pytest.raises(WebSocketDisconnect) as caught:
+                one_too_many.receive_text()
         assert caught.value.code == 1013
+        assert "16 sockets ask for motion already" in caught.value.reason
     finally:
         for _ in range(held):
             slots.release()
     with client.websocket_connect(SOCKET) as one:
+        one.send_json(TASK)
+        assert one.receive_json()["way"] == "interpolated"
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        ({"cell": "\ud800"}, "cell"),
+        ({"cell": "a\0"}, "cell"),
+        ({"t\0": 1}, "t\0"),
+        ({"checkpoint": 2**70}, "checkpoint"),
+        ({"people": [[[2**64]]]}, "people[0][0][0]"),
+    ],
+)
+def test_a_socket_outlives_text_and_integers_that_nothing_takes(
+    client: TestClient, change: dict[str, Any], field: str
+) -> None:
+    with client.websocket_connect(SOCKET) as one:
+        one.send_text(json.dumps({**TASK, **change, "stamp": "s1"}))
+        told = one.receive_json()
+        assert (told["status"], told["field"], told["stamp"]) == (422, field, "s1")
+        for text in ("[" * 60_000, '{"a": ' * 10_000, "[" * 100 + "]" * 100):
+            one.send_text(text)
+            assert one.receive_json()["status"] in (400, 422)
         one.send_json(TASK)
         assert one.receive_json()["way"] == "interpolated"
 

@@ -1,10 +1,14 @@
+import gzip
+import json
 import logging
 
 import pytest
 from fastapi import FastAPI
 from fastapi.testclient import TestClient
+from starlette.types import ASGIApp, Receive, Scope, Send
 
 from app.api import problems
+from app.api.answers import Answers
 from app.errors import (
     CheckpointMismatch,
     Conflict,
@@ -43,18 +47,46 @@ def test_each_error_becomes_a_problem_with_its_data(error: ServiceError, status:
     assert error.problem().items() <= answer.json().items()
 
 
-def test_bug_answers_without_its_trace(caplog: pytest.LogCaptureFixture) -> None:
+def broken_app(where: str) -> FastAPI:
+    """An application with an unforeseen error in a route or in a layer around it."""
     app = FastAPI()
     problems.install(app)
 
     @app.get("/")
     async def fail() -> None:
-        raise RuntimeError("secret")
+        if where == "route":
+            raise RuntimeError("secret")
 
+    class Layer:
+        def __init__(self, app: ASGIApp) -> None:
+            self.app = app
+
+        async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+            if where == "layer" and scope["type"] == "http":
+                raise TypeError("secret")
+            await self.app(scope, receive, send)
+
+    app.add_middleware(Layer)
+    app.add_middleware(Answers)
+    return app
+
+
+@pytest.mark.parametrize("where", ["route", "layer"])
+def test_bug_answers_with_a_problem_and_the_security_headers_but_without_its_trace(
+    where: str, caplog: pytest.LogCaptureFixture
+) -> None:
     caplog.set_level(logging.CRITICAL)
-    answer = TestClient(app, raise_server_exceptions=False).get("/")
-    assert answer.status_code == 500
+    answer = TestClient(broken_app(where)).get("/")
+    assert answer.status_code == answer.json()["status"] == 500
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert "frame-ancestors" in answer.headers["content-security-policy"]
+    assert answer.headers["x-content-type-options"] == "nosniff"
     assert "secret" not in answer.text
+
+
+def test_problem_may_show_half_of_a_surrogate_pair() -> None:
+    answer = problems.problem(422, "\ud800 \u00e4 \U0001f600")
+    assert json.loads(bytes(answer.body))["detail"] == "\ud800 \u00e4 \U0001f600"
 
 
 def test_unknown_path_is_a_problem(client: TestClient) -> None:
@@ -73,8 +105,8 @@ def test_missing_file_of_the_page_is_a_problem(client: TestClient) -> None:
 def test_wrong_method_lists_those_that_are_answered(client: TestClient) -> None:
     answer = client.delete("/v1/jobs")
     assert answer.status_code == 405
-    assert answer.json()["choices"] == ["GET", "POST"]
-    assert answer.headers["allow"] == "GET, POST"
+    assert answer.json()["choices"] == ["GET", "HEAD", "POST"]
+    assert answer.headers["allow"] == "GET, HEAD, POST"
 
 
 def test_body_over_the_limit_is_refused(client: TestClient) -> None:
@@ -90,6 +122,68 @@ def test_body_over_the_limit_without_a_length_is_refused(client: TestClient) -> 
     answer = client.post("/v1/task-selection", content=chunks, headers=headers)
     assert answer.status_code == 413
     assert answer.headers["content-type"] == "application/problem+json"
+
+
+@pytest.mark.parametrize("encoding", ["gzip", "br", "deflate", "GZIP", "identity, gzip"])
+@pytest.mark.parametrize("path", ["/v1/trackers", "/v1/motions?file_name=a.bvh"])
+def test_compressed_bodies_are_refused(client: TestClient, path: str, encoding: str) -> None:
+    body = gzip.compress(b'{"cell": "pick-and-place"}')
+    headers = {"Content-Encoding": encoding}
+    if "trackers" in path:
+        headers["Content-Type"] = "application/json"
+    answer = client.post(path, content=body, headers=headers)
+    assert answer.status_code == 415
+    assert answer.json()["field"] == "Content-Encoding"
+    assert answer.json()["choices"] == ["identity"]
+    assert answer.headers["accept-encoding"] == "identity"
+
+
+def test_body_of_identity_encoding_is_taken(client: TestClient) -> None:
+    headers = {"Content-Encoding": "identity"}
+    answer = client.post("/v1/jobs", json={"kind": "nothing"}, headers=headers)
+    assert answer.json()["field"] == "kind"
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/",
+        "/healthz",
+        "/readyz",
+        "/docs",
+        "/openapi.json",
+        "/static/index.html",
+        "/v1/cells",
+        "/v1/jobs",
+        "/v1/worlds/main",
+        "/viewer/main/",
+        "/favicon.ico",
+        "/v1/checkpoints/pick",
+    ],
+)
+def test_head_has_the_headers_of_get_and_no_body(client: TestClient, path: str) -> None:
+    get, head = client.get(path), client.head(path)
+    assert head.status_code == get.status_code == 200
+    assert head.content == b""
+    changing = {"date"} | ({"content-length"} if path == "/v1/worlds/main" else set())
+    assert {k: v for k, v in head.headers.items() if k not in changing} == {
+        k: v for k, v in get.headers.items() if k not in changing
+    }
+
+
+def test_head_of_a_stream_ends(client: TestClient) -> None:
+    answer = client.head("/v1/worlds/main/events")
+    assert answer.status_code == 200
+    assert answer.headers["content-type"].startswith("text/event-stream")
+
+
+@pytest.mark.parametrize(("path", "status"), [("/v1/nothing", 404), ("/v1/motion", 405)])
+def test_head_of_what_get_refuses_is_refused(
+    client: TestClient, path: str, status: int
+) -> None:
+    answer = client.head(path)
+    assert answer.status_code == client.get(path).status_code == status
+    assert answer.content == b""
 
 
 def test_body_that_is_no_json_is_refused(client: TestClient) -> None:

@@ -9,7 +9,7 @@ from app.main import create_app
 from app.settings import Settings
 
 TOKEN = "a-token-of-some-length"
-OPEN = {"/session"}
+OPEN = {"/session", "/healthz", "/readyz"}
 
 
 @pytest.fixture(scope="module")
@@ -98,6 +98,65 @@ def test_wrong_token_is_refused(guarded: TestClient, given: str) -> None:
 
 def test_bearer_token_is_answered(guarded: TestClient) -> None:
     assert guarded.get("/v1/jobs", headers=bearer()).status_code == 200
+
+
+@pytest.mark.parametrize(
+    "cookie",
+    [
+        b"tandem_session=\xff\xfe",
+        "tandem_session=\u00e4".encode(),
+        b"tandem_session=" + b"x" * 5000,
+        b"\xed\xa0\x80=1; tandem_session=",
+        b'tandem_session="\\377"',
+    ],
+)
+def test_cookie_of_any_bytes_is_refused(guarded: TestClient, cookie: bytes) -> None:
+    answer = guarded.get("/v1/jobs", headers={b"Cookie": cookie})
+    assert answer.status_code == 401
+    assert answer.headers["content-type"] == "application/problem+json"
+
+
+@pytest.mark.parametrize(
+    "given", [b"Bearer \xff", "Bearer \u00e4\u00f6".encode(), b"\xff \xff"]
+)
+def test_authorization_of_any_bytes_is_refused(guarded: TestClient, given: bytes) -> None:
+    assert guarded.get("/v1/jobs", headers={b"Authorization": given}).status_code == 401
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        b'{"token": "\\ud800"}',
+        b'{"token": "\\u0000"}',
+        b'{"token": 12345678901234567890123}',
+        b'{"token": ' + b"[" * 100_000,
+        b'{"token": ["a-token-of-some-length"]}',
+        b"[" * 100_000,
+        b"\xff\xff",
+        b"",
+    ],
+)
+def test_signing_in_with_anything_else_is_refused(guarded: TestClient, body: bytes) -> None:
+    answer = guarded.post("/session", content=body)
+    assert answer.status_code == 422
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert "set-cookie" not in answer.headers
+
+
+def test_health_tells_strangers_nothing_but_up_and_ready(guarded: TestClient) -> None:
+    services = guarded.app.state.services  # type: ignore[attr-defined]
+    services.readiness.ready, services.readiness.reason = False, "compiling: a secret"
+    for path in ("/healthz", "/readyz"):
+        for headers in ({}, {"Authorization": "Bearer wrong"}):
+            answer = guarded.get(path, headers=headers)
+            assert answer.status_code == 503
+            assert answer.json()["detail"] == "the service is up and not ready"
+            assert "secret" not in answer.text
+        assert "secret" in guarded.get(path, headers=bearer()).text
+    services.readiness.ready = True
+    assert guarded.get("/healthz").json() == {"status": "ok"}
+    assert guarded.get("/readyz").json() == {"status": "ready"}
+    assert "worlds" in guarded.get("/healthz", headers=bearer()).json()
 
 
 def test_browser_gets_a_page_to_sign_in_and_then_a_cookie(guarded: TestClient) -> None:

@@ -82,9 +82,12 @@ def test_foreign_page_gets_no_socket(address: str) -> None:
     assert refused.value.response.status_code == 403
 
 
-def test_unknown_world_has_no_socket(address: str) -> None:
-    with pytest.raises(InvalidStatus):
-        open_socket(address, path="/viewer/other")
+def test_unknown_world_has_no_socket_and_says_so(address: str) -> None:
+    with open_socket(address, path="/viewer/other") as socket:
+        with pytest.raises(ConnectionClosed) as refused:
+            socket.recv(timeout=10.0)
+    assert refused.value.rcvd is not None
+    assert (refused.value.rcvd.code, refused.value.rcvd.reason) == (1013, "no such world yet")
 
 
 def test_request_for_a_public_tunnel_never_reaches_the_viewer(

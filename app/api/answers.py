@@ -1,0 +1,86 @@
+"""What every answer has, whichever layer gives it: the outermost ASGI layer.
+
+Security headers; a ``Location`` below the root path; a problem where an error was not foreseen;
+and an answer to ``HEAD`` wherever ``GET`` has one, with the same headers and without a body.
+"""
+
+import logging
+
+import anyio
+import anyio.lowlevel
+from starlette.datastructures import MutableHeaders
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from app.api.problems import problem
+from app.api.security import path_of
+
+logger = logging.getLogger(__name__)
+
+PAGE_POLICY = (
+    "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; "
+    "script-src 'self'; connect-src 'self'; object-src 'none'; base-uri 'none'; "
+    "form-action 'self'; frame-src 'self'; frame-ancestors 'self'"
+)
+HEADERS = {  # where an answer does not set its own
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "SAMEORIGIN",
+    "Referrer-Policy": "same-origin",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Content-Security-Policy": PAGE_POLICY,
+    "Cache-Control": "no-cache",
+}
+
+
+class Answers:
+    """ASGI layer around all others.
+
+    Args:
+        app: What answers.
+    """
+
+    def __init__(self, app: ASGIApp) -> None:
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Let a request through and complete its answer."""
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        if scope["method"] != "HEAD":
+            await self._answer(scope, receive, send)
+            return
+        with anyio.CancelScope() as answering:
+
+            async def send_head(message: Message) -> None:
+                await send(message)
+                if message["type"] == "http.response.start":
+                    await send({"type": "http.response.body", "body": b""})
+                    answering.cancel()  # nothing more is wanted, not even of a stream
+                    await anyio.lowlevel.checkpoint()
+
+            await self._answer({**scope, "method": "GET"}, receive, send_head)
+
+    async def _answer(self, scope: Scope, receive: Receive, send: Send) -> None:
+        started, root_path = False, scope.get("root_path", "")
+
+        async def send_complete(message: Message) -> None:
+            nonlocal started
+            if message["type"] == "http.response.start":
+                started = True
+                headers = MutableHeaders(scope=message)
+                for name, value in HEADERS.items():
+                    headers.setdefault(name, value)
+                if headers.get("location", "").startswith("/"):
+                    headers["Location"] = root_path + headers["location"]
+            await send(message)
+
+        try:
+            await self.app(scope, receive, send_complete)
+        except Exception:
+            path = path_of(scope)
+            logger.exception("%s %s could not be answered", scope["method"], path)
+            if started:
+                raise
+            detail = "an unforeseen error; the server's log has the trace"
+            await problem(500, detail, instance=path)(scope, receive, send_complete)

@@ -1,0 +1,98 @@
+"""What no part of the service takes, whichever route it is sent to, found before any sees it.
+
+JSON that is not UTF-8 or nested too deeply; characters that cannot be stored or sent on (NUL,
+lone surrogates); integers that no column of the database holds.
+"""
+
+import json
+import re
+from collections.abc import Iterator, Sequence
+from urllib.parse import parse_qsl
+
+import numpy as np
+
+from app.api.validation import Member, dotted, member, shown
+from app.store.cursors import MAX_INTEGER
+
+MAX_DEPTH = 64
+"""How deeply lists and objects of a body may be nested."""
+_TEXT_RULE = "must hold neither NUL nor half of a surrogate pair"
+_WRONG = re.compile("[\0\ud800-\udfff]")
+# Only bodies that hold one of these are read a second time.
+_SUSPECT = re.compile(rb"\\u(?:d[89a-f]|0000)|[0-9]{19}", re.IGNORECASE)
+# An unterminated string ends with the body: no text is looked at twice.
+_STRING = re.compile(rb'"(?:[^"\\]++|\\.)*+(?:"|\\?\Z)', re.DOTALL)
+_STEPS = bytes.maketrans(b"[{]}", b"\x01\x01\xff\xff")
+_OTHERS = bytes(set(range(256)) - set(b"[{]}"))
+
+
+def fault_in_json(body: bytes) -> Member | None:
+    """Return field, value, rule and choices of what is wrong with a JSON body, or None.
+
+    Text that is no JSON at all is left to the parser.
+
+    Args:
+        body: The whole body.
+    """
+    if not body.isascii() or b"\0" in body:
+        try:
+            body.decode()
+        except UnicodeDecodeError as error:
+            return member("body", f"byte {error.start}", "must be UTF-8")
+        if b"\0" in body:
+            return member("body", f"byte {body.index(0)}", "must be UTF-8 without NUL")
+    if (depth := _depth(body)) > MAX_DEPTH:
+        return member("body", f"<{depth} levels>", f"must have at most {MAX_DEPTH} levels")
+    if _SUSPECT.search(body) is None:
+        return None
+    try:
+        found = json.loads(body)
+    except ValueError:
+        return None
+    return next(_faults(found, ("body",)), None)
+
+
+def _depth(body: bytes) -> int:
+    """Return how deeply the lists and objects of a text are nested."""
+    if body.count(b"[") + body.count(b"{") <= MAX_DEPTH:
+        return 0
+    steps = _STRING.sub(b"", body).translate(_STEPS, _OTHERS)
+    return int(np.frombuffer(steps, dtype=np.int8).cumsum(dtype=np.int64).max(initial=0))
+
+
+def _faults(value: object, place: Sequence[str | int]) -> Iterator[Member]:
+    """Yield what is wrong with the texts and integers of a JSON value."""
+    if isinstance(value, str):
+        if _WRONG.search(value):
+            yield member(_field(place), shown(value), _TEXT_RULE)
+    elif isinstance(value, dict):
+        for name, inner in value.items():
+            if _WRONG.search(name):
+                yield member(_field((*place, name)), shown(name), f"the name {_TEXT_RULE}")
+            yield from _faults(inner, (*place, name))
+    elif isinstance(value, list):
+        for index, inner in enumerate(value):
+            yield from _faults(inner, (*place, index))
+    elif isinstance(value, int) and not -MAX_INTEGER - 1 <= value <= MAX_INTEGER:
+        rule = f"must lie in [{-MAX_INTEGER - 1}, {MAX_INTEGER}]"
+        yield member(_field(place), shown(value), rule)
+
+
+def _field(place: Sequence[str | int]) -> str:
+    return dotted(place).encode("utf-8", "backslashreplace").decode()
+
+
+def fault_in_address(path: str, query: bytes) -> Member | None:
+    """Return field, value, rule and choices of what is wrong with an address, or None.
+
+    Args:
+        path: Its path, decoded.
+        query: Its query as it was sent.
+    """
+    if _WRONG.search(path):
+        return member("path", shown(path), _TEXT_RULE)
+    if b"%00" in query or b"\0" in query:
+        for name, value in parse_qsl(query.decode("latin-1"), keep_blank_values=True):
+            if _WRONG.search(name + value):
+                return member(shown(name).strip("'"), shown(value), _TEXT_RULE)
+    return None
