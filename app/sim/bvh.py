@@ -21,6 +21,8 @@ MAX_DEPTH = 60
 """Deepest nesting of joints."""
 MAX_FRAMES = 200_000
 """Most frames of a file: half an hour at 100 frames/s."""
+MAX_LINE_ENDS = 4 * MAX_FRAMES + 10_000
+"""Most ends of lines of a file: two per line, and as many empty lines as frames."""
 MAX_FAULTS = 20
 """Most faults that one answer lists."""
 MAX_NUMBER = 1e9
@@ -76,7 +78,7 @@ def read_bvh(text: str) -> Bvh:
     Raises:
         BadMotion: It is no sound BVH; the faults name lines.
     """
-    lines = text.splitlines()
+    lines = lines_of(text)
     start = next((k for k, line in enumerate(lines) if line.split()[:1] == ["MOTION"]), None)
     if start is None:
         rule = "has no line MOTION, after which the frames stand"
@@ -88,6 +90,19 @@ def read_bvh(text: str) -> Bvh:
     values = read_rows(head[2:], n_channels, n_frames, "a number per channel of the skeleton")
     first_line = head[2][0]
     return Bvh(joints=joints, dt=dt, values=values, first_line=first_line)
+
+
+def lines_of(text: str) -> list[str]:
+    """Return the lines of a text.
+
+    Raises:
+        BadMotion: It has many more than a file of MAX_FRAMES frames.
+    """
+    n_ends = sum(text.count(end) for end in "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029")
+    if n_ends > MAX_LINE_ENDS:
+        rule = f"must be at most {MAX_FRAMES}"
+        raise _bad("frames", f"<{n_ends} ends of lines>", rule, "cut the file into parts")
+    return text.splitlines()
 
 
 def forward(bvh: Bvh, wanted: Sequence[int]) -> Vec:

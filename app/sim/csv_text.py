@@ -10,7 +10,16 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from app.sim.tables import MAX_COLUMNS, MISSING, PADDING, Table, bad, named_columns, plain
+from app.sim.bvh import lines_of
+from app.sim.tables import (
+    MAX_COLUMNS,
+    MISSING,
+    PADDING,
+    Table,
+    bad,
+    named_columns,
+    plain,
+)
 
 SEPARATORS = (",", ";", "\t", "|")
 """Between columns; white space where none of them is there."""
@@ -78,7 +87,7 @@ def read_csv_text(text: str, known: Sequence[str]) -> CsvText:
 
 def _lines(text: str) -> tuple[Lines, Lines]:
     """Return comments and table without lines that hold nothing around them."""
-    lines = [(k, line) for k, line in enumerate(text.splitlines(), 1) if line.strip()]
+    lines = [(k, line) for k, line in enumerate(lines_of(text), 1) if line.strip()]
     comments = [one for one in lines if _is_comment(one[1])]
     table = [one for one in lines if not _is_comment(one[1])]
     held = [k for k, (_, line) in enumerate(table) if line.strip(PADDING)]

@@ -19,7 +19,7 @@ from functools import reduce
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from app.sim.bvh import axis_turns, shown
+from app.sim.bvh import axis_turns, lines_of, shown
 from app.sim.joint_tables import AngleTrack, check_times, in_radians, require_places
 from app.sim.ports import Vec
 from app.sim.tables import MAX_COLUMNS, Table, bad, complete_rows, missing_values, named_columns
@@ -70,7 +70,7 @@ def read_opensim(text: str, names: Mapping[str, str] | None = None) -> AngleTrac
     Raises:
         BadMotion: It is no sound table of those coordinates; the faults name lines, columns.
     """
-    lines = text.splitlines()
+    lines = lines_of(text)
     end = next((k for k, line in enumerate(lines) if line.strip() == "endheader"), None)
     if end is None:
         rule = "has no line endheader"
@@ -165,7 +165,7 @@ def _check_counts(said: Mapping[str, str], table: Table) -> None:
     word = said.get("nrows", said.get("datarows", str(n_rows)))
     if not word.isascii() or not word.isdigit():
         raise bad("head, nRows", shown(word), "must be a whole number")
-    if word.lstrip("0") != str(n_rows):
+    if (word.lstrip("0") or "0") != str(n_rows):
         rule = f"must be the {word[:20]} that the head of the file promises"
         hint = "the file is cut off" if n_rows < int(word[:9]) else ""
         place = f"frames, last line {table.rows[-1][0]}" if table.rows else "frames"

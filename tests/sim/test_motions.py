@@ -9,6 +9,7 @@ import pytest
 from app.errors import BadMotion
 from app.sim.body_size import BodySize
 from app.sim.body_track import model_points
+from app.sim.bvh import MAX_FRAMES
 from app.sim.glitches import MAX_SPEED
 from app.sim.human import Q_MAX
 from app.sim.motions import MAX_BYTES, beyond_limits, placed, read_motion
@@ -102,6 +103,14 @@ def test_leap_after_missing_values_is_told_in_frames_of_the_file() -> None:
 def test_table_with_values_for_less_than_a_second_has_no_run() -> None:
     with pytest.raises(BadMotion, match="no run of 1 s .*no value of elbow_l"):
         read_motion(without_values(30, 199).encode(), "someone.csv")
+
+
+@pytest.mark.parametrize("ending", [".bvh", ".mot", ".csv"])
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\x0b", "\u2028"])
+def test_file_of_far_too_many_lines_is_refused(ending: str, end: str) -> None:
+    content = (f"1{end}" * (4 * MAX_FRAMES + 10_001)).encode()
+    with pytest.raises(BadMotion, match=f"ends of lines> must be at most {MAX_FRAMES}"):
+        read_motion(content, f"long{ending}")
 
 
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "latin-1", "cp1252"])

@@ -87,6 +87,7 @@ TEXT = opensim_text(coordinates())
         ("inDegrees=yes", "inDegrees=maybe", "head, inDegrees = 'maybe' must be declared"),
         ("inDegrees=yes", "inDegrees=no", "looks like degrees"),
         ("nRows=20", "nRows=30", "must be the 30 that the head of the file promises"),
+        ("nRows=20", "nRows=0", "must be the 0 that the head of the file promises"),
         ("nRows=20", "nRows=x", "head, nRows = 'x' must be a whole number"),
         ("nColumns=18", "nColumns=17", "line 8 = <18 columns> must be the nColumns=17"),
         ("arm_flex_r", "arm_r", "line 8 lacks the columns arm_flex_r"),
@@ -281,3 +282,10 @@ def test_model_without_arms_is_told_that_arms_are_needed() -> None:
 def test_file_of_speeds_is_not_taken_for_one_of_coordinates(title: str) -> None:
     told = fault(TEXT.replace("Coordinates", title))
     assert told.startswith(f"line 1 = '{title}' must be coordinates")
+
+
+@pytest.mark.parametrize("head", ["", "nRows=0\n", "nRows=00\n"])
+def test_table_without_rows_is_refused(head: str) -> None:
+    names = TEXT.splitlines()[7]
+    told = fault(f"{head}inDegrees=yes\nendheader\n{names}\n")
+    assert told.startswith("frames = <0> must be at least 2 that have all values")
