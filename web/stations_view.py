@@ -1,7 +1,7 @@
-"""Cubes and docks in the scene: coloured by value, labelled, and clickable.
+"""Cubes and docks in the scene: each in its own colour, labelled, and clickable.
 
-Green is the best candidate; the others turn to amber and red the more the critic values them
-below it. What is no candidate is grey. A ring marks the chosen one.
+A label has rank and value of a candidate. What is no candidate is grey. A ring marks the chosen
+one.
 """
 
 import time
@@ -19,30 +19,24 @@ from web.mannequin import Rgb
 from web.solids import block, disc, slab, torus
 
 CUBE_SIDE, DOCK_SIDE = 0.07, 0.15
-RAMP: tuple[tuple[float, Rgb], ...] = (
-    (0.0, (38, 166, 104)),
-    (0.35, (150, 190, 62)),
-    (0.8, (240, 176, 52)),
-    (1.6, (222, 78, 62)),
+GOALS: tuple[Rgb, ...] = (
+    (49, 119, 220),
+    (206, 100, 0),
+    (0, 146, 159),
+    (167, 76, 193),
+    (140, 131, 0),
+    (211, 45, 72),
+    (146, 94, 50),
+    (42, 144, 75),
+    (202, 87, 148),
+    (98, 108, 196),
 )
-"""Colour by how much less than the best a candidate is worth."""
+"""Colours of the goals, in the cell's order; the same as GOALS in ``web/static/palette.js``."""
 IDLE: Rgb = (196, 202, 210)
 PERIOD_S = 0.25
 """Time between two drawings of values that change all the time [s]."""
-UNKNOWN: Rgb = (122, 142, 166)
 MARK: Rgb = (11, 127, 119)
 HIT: Rgb = (214, 52, 46)
-
-
-def color_of(value: float | None, best: float | None) -> Rgb:
-    """Return the colour of a candidate worth ``value`` where the best is worth ``best``."""
-    if value is None or best is None:
-        return UNKNOWN
-    channels = [
-        np.interp(best - value, [x for x, _ in RAMP], [color[k] for _, color in RAMP])
-        for k in range(3)
-    ]
-    return int(channels[0]), int(channels[1]), int(channels[2])
 
 
 class StationsView:
@@ -129,14 +123,14 @@ class StationsView:
             return
         self._key, self._next = key, time.monotonic() + PERIOD_S
         offered = {candidate.id: candidate for candidate in snapshot.candidates}
-        best = max(snapshot.values.values(), default=None)
-        for station in self._stations:
+        values = list(snapshot.values.values())
+        for index, station in enumerate(self._stations):
             candidate = offered.get(station.id)
-            color = IDLE if candidate is None else color_of(candidate.value, best)
+            color = IDLE if candidate is None else GOALS[index % len(GOALS)]
             body, label = self._bodies[station.id], self._labels[station.id]
             if tuple(body.color) != color:
                 body.color = color
-            if label.text != (text := _text(station, candidate)):
+            if label.text != (text := _text(station, candidate, values)):
                 label.text = text
             if label.visible != (shown := candidate is not None):
                 label.visible = shown
@@ -151,11 +145,12 @@ class StationsView:
                 self._marker.position = (x, y, 0.0)
 
 
-def _text(station: Station, candidate: CandidateView | None) -> str:
+def _text(station: Station, candidate: CandidateView | None, values: list[float]) -> str:
     if candidate is None or candidate.value is None:
         return station.label
     sign = "\N{BLACK RIGHT-POINTING SMALL TRIANGLE} " if candidate.chosen else ""
-    return f"{sign}{station.label}  {candidate.value:.1f}"
+    rank = 1 + sum(value > candidate.value for value in values)
+    return f"{sign}{rank}. {station.label}  {candidate.value:.1f}"
 
 
 def _cube() -> trimesh.Trimesh:

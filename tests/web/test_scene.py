@@ -13,7 +13,7 @@ from tests.straight_policy import StraightPolicy
 from web.arc import dashes
 from web.capsules_view import HIT
 from web.scene import PATH_LIFT, CellScene
-from web.stations_view import IDLE, RAMP, color_of
+from web.stations_view import GOALS, IDLE
 from web.viewer_server import ViewerServer
 
 
@@ -62,7 +62,7 @@ def test_links_are_placed_where_pinocchio_says(
         assert np.allclose(node(server, f"/robot/{name}").position, pose[:3, 3], atol=1e-9)
 
 
-def test_chosen_station_is_ringed_and_green_and_others_are_not(
+def test_chosen_station_is_ringed_and_goals_have_their_own_colours(
     scene: CellScene, server: viser.ViserServer, world: World, cell: Cell
 ) -> None:
     world.apply(commands.SetCandidates(ids=("cube0", "cube4")))
@@ -71,10 +71,14 @@ def test_chosen_station_is_ringed_and_green_and_others_are_not(
     assert snapshot.chosen is not None
     x, y, _ = cell.station(snapshot.chosen).position
     assert tuple(node(server, "/chosen").position) == (x, y, 0.0)
-    assert tuple(node(server, f"/stations/{snapshot.chosen}").color) == RAMP[0][1]
+    assert tuple(node(server, "/stations/cube0").color) == GOALS[0]
+    assert tuple(node(server, "/stations/cube4").color) == GOALS[4]
     assert tuple(node(server, "/stations/cube2").color) == IDLE
     text = node(server, f"/labels/{snapshot.chosen}").text
     assert f"{snapshot.values[snapshot.chosen]:.1f}" in text
+    ranked = sorted(snapshot.values, key=lambda name: -snapshot.values[name])
+    for rank, name in enumerate(ranked, start=1):
+        assert f"{rank}. {cell.station(name).label}" in node(server, f"/labels/{name}").text
     assert not node(server, "/labels/cube2").visible
 
 
@@ -126,13 +130,6 @@ def test_collision_shapes_lie_over_the_person_when_asked_for(
         assert np.allclose(capsule.position, pair.mean(axis=0), atol=1e-9)
     scene.draw(snapshot, 0.05)
     assert not node(server, "/shapes/people/0/head").visible
-
-
-def test_colour_runs_from_green_for_the_best_to_red_for_the_worst() -> None:
-    assert color_of(3.0, 3.0) == RAMP[0][1]
-    assert color_of(-9.0, 3.0) == RAMP[-1][1]
-    shades = [color_of(3.0 - x, 3.0) for x in np.linspace(0.0, 1.6, 9)]
-    assert len(set(shades)) == 9
 
 
 def test_path_runs_from_the_tool_to_the_target() -> None:

@@ -2,6 +2,7 @@
 import { html, render, useEffect, useMemo, useRef, useState } from "./vendor/htm-preact-standalone.module.js";
 import { Acting, useCheckpoints } from "./checkpoints.js";
 import { Controls } from "./controls.js";
+import { FirstUse } from "./firstuse.js";
 import { useFrameFocus } from "./framefocus.js";
 import { Icon, Logo } from "./icons.js";
 import { isActive, useJobs } from "./jobs.js";
@@ -127,11 +128,11 @@ function Tabs({ tab, onTab, active }) {
   </div>`;
 }
 
-function useGoals({ cell, world }) {
+function useGoals({ cell }) {
   const stations = cell?.stations ?? [];
   const labels = useMemo(() => new Map(stations.map((s) => [s.id, s.label])), [cell]);
   return {
-    colourOf: goalColours(world?.candidates ?? []),
+    colourOf: useMemo(() => goalColours(stations), [cell]),
     labelOf: (id) => labels.get(id) ?? id,
   };
 }
@@ -145,6 +146,7 @@ function Scene({ cell }) {
     <div class=${`viewer ${keyed ? "is-keyed" : ""}`}>
       ${epoch > 0 && html`<iframe key=${epoch} ref=${frame} src=${`viewer/${WORLD}/`} data-role="viewer"
         title="Live 3D view of robot and person"></iframe>`}
+      ${world && html`<${FirstUse} world=${world} cell=${cell.cell} send=${cell.send} />`}
       ${epoch > 0 && world && html`<${ViewMenu} key=${epoch} frame=${frame} />`}
       ${!world && html`<div class="veil" role="status">
         <i class="spinner"></i>

@@ -1,14 +1,11 @@
-// Colour means one thing on the whole page and in the scene: how much a goal falls short of
-// the best one. Names, not colours, tell the goals apart.
+// A goal has one colour on the whole page and in the scene, whatever it is worth: lengths of
+// bars, heights of lines and ranks in numbers tell that.
 
-/** Shortfall in value -> colour; the same ramp as RAMP in web/stations_view.py. */
-const RAMP = [
-  [0.0, [38, 166, 104]],
-  [0.35, [150, 190, 62]],
-  [0.8, [240, 176, 52]],
-  [1.6, [222, 78, 62]],
+/** Colours of the goals, in the cell's order; the same as GOALS in web/stations_view.py. */
+export const GOALS = [
+  "rgb(49 119 220)", "rgb(206 100 0)", "rgb(0 146 159)", "rgb(167 76 193)", "rgb(140 131 0)",
+  "rgb(211 45 72)", "rgb(146 94 50)", "rgb(42 144 75)", "rgb(202 87 148)", "rgb(98 108 196)",
 ];
-const UNKNOWN = "rgb(122 142 166)";
 const IDLE = "rgb(196 202 210)";
 
 /** Colours of the people's vests, by id; the same as VESTS in web/mannequin.py. */
@@ -39,12 +36,6 @@ export const OVERRIDES = [
 /** The terms of the protective separation distance; as in reach.css. */
 export const TERMS = { walk: "rgb(240 176 92)", way: "rgb(104 150 210)", margin: "rgb(160 172 184)" };
 
-/** Colour of a goal worth `value` where the best is worth `best`. */
-export function colourByValue(value, best) {
-  if (!Number.isFinite(value) || !Number.isFinite(best)) return UNKNOWN;
-  return along(RAMP, best - value);
-}
-
 /** Colour of a robot that goes at this share of its speed. */
 export function overrideColour(override) {
   return along(OVERRIDES, override);
@@ -71,15 +62,11 @@ function along(ramp, x) {
   return `rgb(${from.map((c, k) => Math.round(c + share * (to[k] - c))).join(" ")})`;
 }
 
-/** Colours of the goals of a snapshot by id; grey for what is no candidate. */
-export function goalColours(candidates) {
-  const best = bestOf(candidates.map((c) => c.value));
-  const colours = new Map(candidates.map((c) => [c.id, colourByValue(c.value, best)]));
+/** Colours of a cell's goals by id. */
+export function goalColours(stations) {
+  const goals = stations.filter(({ kind }) => kind === "cube" || kind === "dock");
+  const colours = new Map(goals.map(({ id }, i) => [id, GOALS[i % GOALS.length]]));
   return (id) => colours.get(id) ?? IDLE;
-}
-
-export function bestOf(values) {
-  return Math.max(...values.filter((v) => Number.isFinite(v)));
 }
 
 /** The page's own colours as the style sheet has them now (light or dark). */

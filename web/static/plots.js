@@ -57,10 +57,10 @@ export function secondsAgo(v) {
 }
 
 /** Values of all candidates over the last seconds; the chosen one is drawn thick. */
-export function ValuePlot({ history, ids, labelOf, chosen, onHover }) {
+export function ValuePlot({ history, ids, labelOf, colourOf, chosen, onHover }) {
   const theme = useTheme();
   const live = useRef({});
-  live.current = { history, ids, labelOf, onHover };
+  live.current = { history, ids, labelOf, colourOf, onHover };
   const key = ids.join("|");
   const stamp = history.samples.at(-1)?.t;
   const options = useMemo(() => valueOptions(theme, ids, live), [key, theme]);

@@ -1,6 +1,5 @@
-// The lines of the running plot, drawn piece by piece: colour is the shortfall to the best at
-// that moment, as in the scene; thickness says chosen; a dashed rule marks a change of mind.
-import { bestOf, colourByValue } from "./palette.js";
+// The lines of the running plot, drawn piece by piece: each goal in its colour, as in the scene;
+// thickness says chosen; a dashed rule marks a change of mind.
 
 const FONT = "px Inter, system-ui, sans-serif";
 const LABEL_GAP = 13;
@@ -8,7 +7,7 @@ const THIN = 1.6;
 const THICK = 3.4;
 
 /** Draw hook of uPlot. */
-export function drawValues(plot, { history, ids, labelOf }, theme) {
+export function drawValues(plot, { history, ids, labelOf, colourOf }, theme) {
   const { ctx, bbox } = plot;
   const dpr = devicePixelRatio;
   const chosen = history.chosen();
@@ -16,7 +15,6 @@ export function drawValues(plot, { history, ids, labelOf }, theme) {
   const [x, ...columns] = plot.data;
   if (x.length !== chosen.length) return;
   const at = (i, column) => [plot.valToPos(x[i], "x", true), plot.valToPos(column[i], "y", true)];
-  const best = x.map((_, i) => bestOf(columns.map((column) => column[i])));
   ctx.save();
   ctx.save();
   ctx.beginPath();
@@ -28,34 +26,27 @@ export function drawValues(plot, { history, ids, labelOf }, theme) {
     ctx.lineWidth = (isThick ? THICK : THIN) * dpr;
     columns.forEach((column, k) => {
       const wanted = (i) => (chosen[i] === ids[k]) === isThick;
-      drawPieces(ctx, column, at, (i) => colourByValue(column[i], best[i]), wanted);
+      ctx.strokeStyle = colourOf(ids[k]);
+      drawPieces(ctx, column, at, wanted);
     });
   }
   markChoices(ctx, switches, (i) => at(i, columns[ids.indexOf(chosen[i])]), theme, dpr);
   ctx.restore();
-  label(ctx, plot, ids, columns, chosen.at(-1), labelOf, theme, dpr);
+  label(ctx, plot, ids, columns, chosen.findLast((one) => one), labelOf, theme, dpr);
   ctx.restore();
 }
 
-/** Stroke the pieces that `wanted` accepts, joining neighbours of one colour. */
-function drawPieces(ctx, column, at, colour, wanted) {
-  let pen = null;
-  const flush = () => pen && ctx.stroke();
+/** Stroke the pieces that `wanted` accepts. */
+function drawPieces(ctx, column, at, wanted) {
+  ctx.beginPath();
+  let drawn = false;
   for (let i = 1; i < column.length; i++) {
-    const drawn = wanted(i) && Number.isFinite(column[i]) && Number.isFinite(column[i - 1]);
-    const next = drawn ? colour(i) : null;
-    if (next !== pen) {
-      flush();
-      pen = next;
-      if (pen) {
-        ctx.strokeStyle = pen;
-        ctx.beginPath();
-        ctx.moveTo(...at(i - 1, column));
-      }
-    }
-    if (pen) ctx.lineTo(...at(i, column));
+    const before = drawn;
+    drawn = wanted(i) && Number.isFinite(column[i]) && Number.isFinite(column[i - 1]);
+    if (drawn && !before) ctx.moveTo(...at(i - 1, column));
+    if (drawn) ctx.lineTo(...at(i, column));
   }
-  flush();
+  ctx.stroke();
 }
 
 /** A dashed rule where it changed its mind: the goal it left was still to be had. */
@@ -91,8 +82,9 @@ function markChoices(ctx, switches, at, theme, dpr) {
 /** Names at the right ends of the lines, pushed apart where they would overlap. */
 function label(ctx, plot, ids, columns, chosen, labelOf, theme, dpr) {
   const { bbox } = plot;
+  const last = columns[0]?.findLastIndex((_, i) => columns.some((one) => Number.isFinite(one[i])));
   const ends = ids
-    .map((id, k) => ({ id, value: columns[k].at(-1) }))
+    .map((id, k) => ({ id, value: columns[k][last] }))
     .filter((end) => Number.isFinite(end.value))
     .map((end) => ({ ...end, y: plot.valToPos(end.value, "y", true) }))
     .sort((a, b) => a.y - b.y);

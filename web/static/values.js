@@ -30,7 +30,7 @@ export function Values({ world, cell, history, colourOf, labelOf }) {
       : html`<ul class="bars">
           ${rows.map((c) => html`<${Bar} key=${c.id} candidate=${c} chosen=${chosen}
             isChosen=${c.id === world.chosen} colour=${colourOf(c.id)} label=${labelOf(c.id)}
-            scale=${scale} />`)}
+            rank=${rankOf(c, rows)} scale=${scale} />`)}
         </ul>`}
     <div class="plot-head">
       <span>last ${SPAN_S} s</span>
@@ -38,7 +38,7 @@ export function Values({ world, cell, history, colourOf, labelOf }) {
         ? html`<${Readout} past=${past} age=${history.age(at)} labelOf=${labelOf} />`
         : html`<span class="faint"><i class="switch-mark"></i>change of mind</span>`}</span>
     </div>
-    <${ValuePlot} history=${history} ids=${ids} labelOf=${labelOf}
+    <${ValuePlot} history=${history} ids=${ids} labelOf=${labelOf} colourOf=${colourOf}
       chosen=${world.chosen} onHover=${setAt} />
   </section>`;
 }
@@ -53,7 +53,7 @@ function Readout({ past, age, labelOf }) {
     ${next && html`<span>${labelOf(next[0])} ${format.value(next[1])}</span>`}`;
 }
 
-function Bar({ candidate, chosen, isChosen, colour, label, scale }) {
+function Bar({ candidate, chosen, isChosen, colour, label, rank, scale }) {
   const { id, value, reachable } = candidate;
   const outside = candidate.outside ?? [];
   const known = Number.isFinite(value);
@@ -70,9 +70,15 @@ function Bar({ candidate, chosen, isChosen, colour, label, scale }) {
       <i class="bar-fill" style=${bar}></i>
     </span>
     <span class="bar-value">${format.value(value)}</span>
+    <span class="bar-rank" aria-label=${rank && `rank ${rank}`}>${rank && `${rank}.`}</span>
     <span class="bar-note">${note(isChosen, reachable, outside)}</span>
     <span class="tip" role="tooltip" id=${`tip-${id}`}>${explain(candidate, chosen, label)}</span>
   </li>`;
+}
+
+/** 1 for the highest value of all rows; null where none is known. */
+function rankOf({ value }, rows) {
+  return Number.isFinite(value) ? 1 + rows.filter((one) => one.value > value).length : null;
 }
 
 function note(isChosen, reachable, outside) {

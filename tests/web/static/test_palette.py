@@ -1,12 +1,16 @@
 """The page paints goals with the very colours of the scene."""
 
+import itertools
 import re
 from pathlib import Path
 
+import pytest
+
+from tests.web.static.test_contrast import contrast, tokens
 from web.mannequin import VESTS
 from web.reach_scene import OVERRIDES
 from web.sorting_bodies import BLOCKS, FAILURES
-from web.stations_view import RAMP
+from web.stations_view import GOALS
 
 PALETTE = Path(__file__).parents[3] / "web" / "static" / "palette.js"
 STOP = re.compile(r"\[([\d.]+), \[(\d+), (\d+), (\d+)\]\]")
@@ -18,8 +22,17 @@ def ramp(name: str) -> tuple[tuple[float, tuple[int, int, int]], ...]:
     return tuple((float(x), (int(r), int(g), int(b))) for x, r, g, b in STOP.findall(text))
 
 
-def test_page_and_scene_use_one_ramp_of_colours() -> None:
-    assert ramp("RAMP") == RAMP
+def test_goals_have_one_colour_on_page_and_in_the_scene() -> None:
+    text = PALETTE.read_text().split("const GOALS = [")[1].split("];")[0]
+    found = re.findall(r"rgb\((\d+) (\d+) (\d+)\)", text)
+    assert tuple((int(r), int(g), int(b)) for r, g, b in found) == GOALS
+
+
+@pytest.mark.parametrize("panel", [tokens(scheme)["panel"] for scheme in ("light", "dark")])
+def test_goals_stand_out_from_the_panel_and_from_each_other(panel: str) -> None:
+    assert all(contrast(f"#{r:02x}{g:02x}{b:02x}", panel) >= 3.0 for r, g, b in GOALS)
+    pairs = itertools.combinations(GOALS, 2)
+    assert min(sum(abs(a - b) for a, b in zip(*pair, strict=True)) for pair in pairs) > 60
 
 
 def test_page_and_scene_use_one_ramp_of_failures() -> None:

@@ -1,0 +1,69 @@
+"""A line over the scene says what to try, and its button sets it up."""
+
+from collections.abc import Callable, Iterator
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from app.sim.cells import load_cell
+from tests import patient_http
+from tests.browser.test_drag import state, tell, until
+
+pytestmark = pytest.mark.browser
+
+LINE, TRY = '[data-role="first-use"]', '[data-action="try"]'
+LIMIT_S = 60.0
+
+
+@pytest.fixture
+def clean(server: str) -> Iterator[str]:
+    """The server, in its first cell with a person at work afterwards."""
+    yield server
+    world = f"{server}/v1/worlds/main/cell"
+    patient_http.put(world, json={"cell": load_cell().name}).raise_for_status()
+    tell(server, {"tag": "set-mode", "mode": "auto"})
+
+
+def show(server: str, cell: str) -> None:
+    world = f"{server}/v1/worlds/main/cell"
+    patient_http.put(world, json={"cell": cell}).raise_for_status()
+
+
+def test_line_puts_a_hand_in_the_way_and_stays_away_once_dismissed(
+    open_page: Callable[..., Page], clean: str
+) -> None:
+    page = open_page(scene=False)
+    page.click(TRY)
+    until(clean, lambda now: now["people"][0]["mode"] == "manual", LIMIT_S)
+    page.click('[data-action="dismiss-first-use"]')
+    expect(page.locator(LINE)).to_have_count(0)
+    page.reload()
+    page.wait_for_selector(".sentence")
+    expect(page.locator(LINE)).to_have_count(0)
+    assert page.problems == []  # type: ignore[attr-defined]
+
+
+def test_line_puts_the_person_beside_the_goal_of_a_reach_cell(
+    open_page: Callable[..., Page], clean: str
+) -> None:
+    show(clean, "shared-workspace")
+    tell(clean, {"tag": "set-goal-mode", "mode": "follow"})
+    page = open_page(scene=False)
+    page.click(TRY)
+    goal = state(clean)["reach"]["goal"]
+    until(
+        clean,
+        lambda now: (
+            abs(now["people"][0]["cylinder"]["x"] - goal[0]) < 0.1
+            and abs(now["people"][0]["cylinder"]["y"] - goal[1] - 0.3) < 0.1
+        ),
+        LIMIT_S,
+    )
+
+
+def test_line_starts_a_sorting_test(open_page: Callable[..., Page], clean: str) -> None:
+    show(clean, "sorting-e0")
+    page = open_page(scene=False)
+    page.click(TRY)
+    until(clean, lambda now: now["sorting"]["test"] == "test-1", LIMIT_S)
+    expect(page.locator('[data-role="verdict"]')).to_contain_text("Every object is sorted")

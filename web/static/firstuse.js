@@ -1,0 +1,77 @@
+// One line over the scene for whoever sees it first: what to try, and a button that sets it up.
+import { html, useState } from "./vendor/htm-preact-standalone.module.js";
+import { Icon } from "./icons.js";
+
+const KEPT = "tandem-tried";
+const BESIDE_M = 0.3;
+
+/** What to try in a kind of cell: `ask` gives the commands that set it up. */
+const TRIES = {
+  choice: {
+    text: "Put a hand on the goal the robot goes for: it takes another one.",
+    button: "Put a hand in its way",
+    ask({ candidates, chosen, people }) {
+      const at = (candidates.find(({ id }) => id === chosen) ?? candidates[0])?.position;
+      if (!at || people.length === 0) return [];
+      const person = people[0].id;
+      return [{ tag: "set-mode", person, mode: "manual" },
+        { tag: "move-human", person, [at[0] < 0 ? "right" : "left"]: at }];
+    },
+  },
+  reach: {
+    text: "Step between the robot and its goal: it slows down, and stops before it touches you.",
+    button: "Step in its way",
+    ask({ people, reach }) {
+      if (people.length === 0) return [];
+      const person = people[0].id;
+      const [x, y] = reach.goal;
+      return [{ tag: "set-mode", person, mode: "manual" },
+        { tag: "move-human", person, pelvis: [x, y + BESIDE_M, 0] }];
+    },
+  },
+  sorting: {
+    text: "Ask for blocks under “Goal” and change your mind meanwhile: the robot plans anew.",
+    button: "Let it sort five blocks",
+    ask: (_, cell) => (cell?.sorting_tests ?? []).slice(0, 1)
+      .map(({ id }) => ({ tag: "start-test", id })),
+  },
+};
+
+export function FirstUse({ world, cell, send }) {
+  const [tried, setTried] = useState(kept);
+  const kind = world.sorting ? "sorting" : world.reach ? "reach" : "choice";
+  if (tried.includes(kind)) return null;
+  const { text, button, ask } = TRIES[kind];
+  const commands = ask(world, cell);
+  const start = async () => {
+    if (world.paused) await send({ tag: "resume" });
+    for (const command of commands) await send(command);
+  };
+  const dismiss = () => {
+    const now = [...tried, kind];
+    setTried(now);
+    keep(now);
+  };
+  return html`<p class="first-use" data-role="first-use"><span><b>Try it.</b> ${text}</span>
+    ${commands.length > 0 && html`<button type="button" class="tool" data-action="try"
+      onClick=${start}>${button}</button>`}
+    <button type="button" class="quiet-button" aria-label="Do not show this again"
+      data-action="dismiss-first-use" onClick=${dismiss}><${Icon} name="close" /></button></p>`;
+}
+
+function kept() {
+  try {
+    const found = JSON.parse(localStorage.getItem(KEPT));
+    return Array.isArray(found) ? found : [];
+  } catch {
+    return [];
+  }
+}
+
+function keep(kinds) {
+  try {
+    localStorage.setItem(KEPT, JSON.stringify(kinds));
+  } catch {
+    // A browser that keeps nothing shows the line again.
+  }
+}
