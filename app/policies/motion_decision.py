@@ -66,7 +66,7 @@ class MotionDecider:
         self._able = looks_ahead(actor)
         self._rule = actor.action.rule()
         self._advance: Callable[..., bool] | None = None
-        self._limits = StateLimits(self.arm)
+        self._limits = StateLimits(self.arm, limits_jerk=actor.action.degree == 3)
         self._met = TrainedValues(actor.trained_range)
         self._stages: dict[tuple[int, int], Stage] = {}
         self._last: dict[tuple[int, int], Stage] = {}

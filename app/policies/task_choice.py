@@ -126,7 +126,10 @@ class TaskChooser:
         self._checkpoint, self._hysteresis = checkpoint, hysteresis
         self._networks = ValueNetworks(checkpoint)
         self._arm, self._people = arm_of(self._cell), people_of(self._cell)
-        self._limits, self._ranges = StateLimits(self._arm), _TrainedRanges(checkpoint)
+        self._limits, self._ranges = (
+            StateLimits(self._arm, limits_jerk=False),
+            _TrainedRanges(checkpoint),
+        )
 
     @property
     def checkpoint(self) -> str:

@@ -35,6 +35,8 @@ RATE_TOLERANCE = 0.05
 """Share of a speed or acceleration limit by which a joint may be measured beyond it."""
 LEAST_TOLERANCE = (0.01, 0.05)
 """Least of these tolerances: speed [rad/s] and acceleration [rad/s^2]."""
+LARGEST = 1e6
+"""Largest acceleration that is taken where none is needed [rad/s^2]."""
 FREE = 1e3
 """Stands for a position limit that does not bind [rad]."""
 TURN = 2.0 * math.pi
@@ -69,9 +71,11 @@ class StateLimits:
 
     Args:
         arm: From :func:`~app.sim.scene.arm_of`.
+        limits_jerk: Whether the policy needs accelerations. Where it does not, they are clamped
+            and flagged however far outside they are.
     """
 
-    def __init__(self, arm: Arm) -> None:
+    def __init__(self, arm: Arm, *, limits_jerk: bool = True) -> None:
         stop_s = stop_time((1.0 + RATE_TOLERANCE) * arm.qd_max, arm.qdd_max)
         overrun = 0.5 * (1.0 + RATE_TOLERANCE) * arm.qd_max * stop_s
         self._low = np.stack([arm.q_min, -arm.qd_max, -arm.qdd_max])
@@ -83,6 +87,8 @@ class StateLimits:
                 np.maximum(RATE_TOLERANCE * arm.qdd_max, LEAST_TOLERANCE[1]),
             ]
         )
+        if not limits_jerk:
+            self._tolerance[2] = LARGEST
 
     def take(self, q: Vec, qd: Vec, qdd: Vec | None = None) -> MeasuredState:
         """Return a measured state, and as policies see it.

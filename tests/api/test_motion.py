@@ -265,7 +265,14 @@ BAD: list[tuple[dict[str, Any], int, str]] = [
     ({"robot": {"q": [9.0, *HOME[1:]], "qd": [0.0] * 6}}, 422, "robot.q[0]"),
     ({"robot": {"q": HOME, "qd": [0, 0, 1.2, 0, 0, 0]}}, 422, "robot.qd[2]"),
     ({"robot": {"q": HOME, "qd": [0, 0, float("nan"), 0, 0, 0]}}, 422, "robot.qd[2]"),
-    ({"robot": {"q": HOME, "qd": [0.0] * 6, "qdd": [0, 50, 0, 0, 0, 0]}}, 422, "robot.qdd[1]"),
+    (
+        {
+            "robot": {"q": HOME, "qd": [0.0] * 6, "qdd": [0, 50, 0, 0, 0, 0]},
+            "checkpoint": JERK,
+        },
+        422,
+        "robot.qdd[1]",
+    ),
     ({"goal": [0.0, 0.8]}, 422, "goal"),
     ({"goal": [0.0, float("inf"), 0.3]}, 422, "goal[1]"),
     ({"goal": [0.0, 1e300, 0.3]}, 422, "goal[1]"),

@@ -148,6 +148,58 @@ def test_noisy_measurements_of_a_closed_loop_never_lose_a_decision() -> None:
     assert fastest > 0.99 and flagged > 10
 
 
+@pytest.mark.parametrize("joints", [[2], [0, 3], list(range(6))])
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize("kind", list(ACTIONS))
+def test_a_joint_at_its_limit_at_full_speed_outward_brakes_and_is_flagged(
+    kind: str, side: float, joints: list[int]
+) -> None:
+    one = MotionDecider(RandomActor(action=ACTIONS[kind]), CELL)
+    q, qd = HOME.copy(), np.zeros(6)
+    q[joints] = (HIGH if side > 0 else LOW)[joints]
+    qd[joints] = side * FAST[joints]
+    decision = one.decide(question(q=q, qd=qd, qdd=np.zeros(6), people=()))
+    assert decision.unfeasible and decision.state_outside == ()
+    slower = side * (qd - decision.piece.qd)[joints]
+    most = HARD * DT if kind != "jerk" else 0.5 * np.array(CELL.robot.jerk_max) * DT**2
+    np.testing.assert_allclose(slower, most[joints], rtol=1e-6)
+    assert decision.safe is not None and (side * decision.safe.qd < FAST)[joints].all()
+
+
+@pytest.mark.parametrize("away", [1.0, 1.25, 1.5, 1.75, 2.0])
+def test_a_faster_measured_robot_needs_more_distance_and_is_never_let_run_faster(
+    away: float,
+) -> None:
+    one, found = MotionDecider(RandomActor(), CELL), []
+    for share in (1.0, 1.02, 1.05):
+        qd = share * FAST * [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+        person = standing_in(0.2, away, 0.0, 0.0, 0.3)
+        decision = one.decide(question(qd=qd, people=(person,)))
+        assert decision.safe is not None and decision.terms is not None
+        found.append(
+            (decision.terms.required, decision.terms.stop_time, decision.safe.override)
+        )
+        assert decision.terms.robot_speed > 0.0
+    required, stops, overrides = zip(*found, strict=True)
+    assert required == tuple(sorted(set(required)))
+    assert stops == tuple(sorted(set(stops)))
+    assert overrides == tuple(sorted(overrides, reverse=True))
+
+
+def test_accelerations_that_no_policy_needs_cost_no_decision() -> None:
+    noisy = question(qdd=np.array([80.0, -40.0, 3.0, 0.0, 6.0, -5.01]))
+    decision = MotionDecider(RandomActor(), CELL).decide(noisy)
+    names = [one.field for one in decision.state_outside]
+    assert [one.rsplit(".", 1)[1] for one in names] == [
+        "shoulder_pan",
+        "shoulder_lift",
+        "wrist_2",
+        "wrist_3",
+    ]
+    plain = MotionDecider(RandomActor(), CELL).decide(question())
+    np.testing.assert_array_equal(decision.act, plain.act)
+
+
 def test_the_policy_sees_a_state_over_its_limits_as_the_one_at_them() -> None:
     one, qd = MotionDecider(RandomActor(), CELL), np.zeros(6)
     qd[0], q = 1.03 * FAST[0], HOME.copy()
