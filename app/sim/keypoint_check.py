@@ -97,6 +97,10 @@ class Keypoints:
         return self.confidences > 0.0
 
 
+UNSEEN = Keypoints(points=np.full((N_KEYPOINTS, 3), np.nan), confidences=np.zeros(N_KEYPOINTS))
+"""A frame without anybody."""
+
+
 def check_keypoints(
     keypoints: ArrayLike,
     confidences: ArrayLike | None = None,

@@ -26,8 +26,7 @@ from scipy.optimize import linear_sum_assignment
 
 from app.errors import InvalidInput
 from app.sim.kernels.people import MAX_PEOPLE
-from app.sim.keypoint_check import Keypoints, check_keypoints
-from app.sim.keypoints import N_KEYPOINTS
+from app.sim.keypoint_check import UNSEEN, Keypoints, check_keypoints
 from app.sim.person_estimate import EstimatorSettings, Flag, PersonEstimate, PersonEstimator
 from app.sim.ports import Vec
 
@@ -35,7 +34,6 @@ MAX_SKELETONS = 64
 """Most people that a frame may show."""
 NEARER_M = 0.1
 """By how much nearer than the farthest person followed somebody takes that track [m]."""
-_NOBODY = Keypoints(points=np.full((N_KEYPOINTS, 3), np.nan), confidences=np.zeros(N_KEYPOINTS))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -152,7 +150,7 @@ class PeopleEstimator:
         seen = {j: frame.points for j, frame in enumerate(frames) if frame.seen.any()}
         order, replaced = self._assign(t, seen)
         for i, (track, j) in enumerate(zip(self._tracks, order, strict=True)):
-            track.take_frame(t, _NOBODY if j is None else frames[j], fresh=i in replaced)
+            track.take_frame(t, UNSEEN if j is None else frames[j], fresh=i in replaced)
         self._tell(t, frames, order, replaced)
         estimates = self.at(t)
         for i, track in enumerate(self._tracks):
@@ -284,5 +282,5 @@ class PeopleEstimator:
         """Return the estimate of one track with the flags that come from all tracks."""
         if not flags:
             return estimate
-        foreign = self._foreign if "foreign-frame" in flags else None
+        foreign = self._foreign if "foreign-frame" in flags else estimate.implausible
         return replace(estimate, flags=(*estimate.flags, *flags), implausible=foreign)

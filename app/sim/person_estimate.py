@@ -21,14 +21,15 @@ How it degrades, each step named in the estimate:
   beyond ``unfit`` there are no joint angles (somebody kneels, sits or lies), and the cylinder
   is all that is known;
 - the key-points are in another frame or unit: ``foreign-frame``; nothing is seen then;
-- arms and legs both contradict the way the person faces: ``mirrored`` (both exchanged, or the
-  whole frame is mirrored, which puts people where they are not).
+- arms and legs both contradict the way the person faces: ``mirrored``. Both are exchanged, or
+  the whole frame is mirrored, which puts people where they are not: after ``swap_s`` of
+  nothing else, such frames are in another frame, too.
 
 Several people: ``people_estimate.py``.
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -38,7 +39,7 @@ from app.errors import InvalidInput
 from app.sim import human
 from app.sim.kernels.body import N_SIZE
 from app.sim.keypoint_angles import FITTED, fit_errors, joint_angles, joint_motion
-from app.sim.keypoint_check import Keypoints, check_keypoints
+from app.sim.keypoint_check import UNSEEN, Keypoints, check_keypoints
 from app.sim.keypoint_cylinder import (
     CylinderSettings,
     SafetyCylinder,
@@ -81,6 +82,9 @@ _DECIDING = [K[name] for name in (*FITTED, "mid_hip", "hip_r", "hip_l")]
 """Key-points that decide joint angles."""
 
 
+_MIRRORED = "arms and legs are mirrored (does one axis point the other way here?)"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EstimatorSettings:
     """Noise, margins and times of the estimate."""
@@ -94,7 +98,8 @@ class EstimatorSettings:
     stale_s: float = 0.25
     """Age of the newest credible key-point from which an estimate is stale [s]."""
     swap_s: float = 0.5
-    """Time for which sides are exchanged back before the group starts anew [s]."""
+    """Time for which sides are exchanged back before the group starts anew, and for which
+    somebody may be mirrored [s]."""
     misfit: float = 0.10
     """Median distance of the model's joints from the key-points that is named [m]."""
     unfit: float = 0.25
@@ -177,6 +182,7 @@ class PersonEstimator:
         self._flags: tuple[Flag, ...] = ()
         self._frame: Keypoints | None = None
         self._unfit = False
+        self._mirrored_at = math.inf
 
     def update(
         self, t: float, keypoints: ArrayLike, confidences: ArrayLike | None = None
@@ -220,9 +226,16 @@ class PersonEstimator:
             raise InvalidInput("t", t, f"must be finite and later than {self._t:g} s")
         if fresh:
             self._forget()
-        flags: list[Flag] = [] if frame.implausible is None else ["foreign-frame"]
+        flags: list[Flag] = []
         if all(faces_backward(frame.points, group) for group in _SWAPPED):
             flags.append("mirrored")
+            self._mirrored_at = min(self._mirrored_at, t)
+            if t - self._mirrored_at > self.settings.swap_s:
+                frame = replace(UNSEEN, implausible=_MIRRORED)
+        elif frame.seen.any():
+            self._mirrored_at = math.inf
+        if frame.implausible is not None:
+            flags.append("foreign-frame")
         given = frame.points.copy(), frame.confidences.copy()
         points, trust = self._put_sides_right(t, *given, flags)
         refused = self._points.refuse(t, points)
