@@ -22,7 +22,9 @@ class BlocksView:
         submit: Takes the command of a click: the block comes into the goal, or out of it.
     """
 
-    def __init__(self, server: viser.ViserServer, submit: Callable[[ToggleGoal], None]) -> None:
+    def __init__(
+        self, server: viser.ViserServer, submit: Callable[[ToggleGoal], object]
+    ) -> None:
         self._scene, self._submit = server.scene, submit
         self._drawn: dict[str, tuple[viser.GlbHandle, Vec]] = {}
 

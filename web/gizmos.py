@@ -36,7 +36,7 @@ class Gizmos:
         self,
         server: viser.ViserServer,
         person: int,
-        submit: Callable[[MoveHuman], None],
+        submit: Callable[[MoveHuman], object],
         *,
         jointed: bool = True,
     ) -> None:

@@ -32,7 +32,7 @@ class GoalGizmo:
     """
 
     def __init__(
-        self, server: viser.ViserServer, cell: Cell, submit: Callable[[MoveGoal], None]
+        self, server: viser.ViserServer, cell: Cell, submit: Callable[[MoveGoal], object]
     ) -> None:
         scene, self._submit = server.scene, submit
         self._low, self._high = goal_box(cell)

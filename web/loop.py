@@ -54,6 +54,7 @@ class LiveHandle:
         self._id, self._cell, self._last = id, cell, first
         self._queue: queue.SimpleQueue[Command] = queue.SimpleQueue()
         self._lock = threading.Lock()
+        self._submitted = 0
         # Who will be there once all that waits is done.
         self._people = tuple(person.id for person in first.people)
         # Changes of the table that no snapshot shows yet: those that wait, those in work.
@@ -64,8 +65,10 @@ class LiveHandle:
         """Name of the world in URLs."""
         return self._id
 
-    def submit(self, command: Command) -> None:
-        """Queue one command; returns at once.
+    def submit(self, command: Command) -> int:
+        """Queue one command; returns its number at once.
+
+        A snapshot whose ``commands`` is as high shows its effect.
 
         Raises:
             ServiceError: The command does not fit this cell.
@@ -80,6 +83,8 @@ class LiveHandle:
                 self._unseen[0] += 1
             self._people = commands.people_after(command, self._people)
             self._queue.put(command)
+            self._submitted += 1
+            return self._submitted
 
     def snapshot(self) -> WorldSnapshot:
         """Return the last snapshot; never waits."""
@@ -131,6 +136,8 @@ class LiveCell:
         """Commands in, snapshots out."""
         self._speed = 1
         self._turn, self._undrawn_s = 0, 0.0
+        self._done = 0
+        self._refused: tuple[int, str] | None = None
         self._stop = threading.Event()
         self._server: ViewerServer | None = None
         self._thread: threading.Thread | None = None
@@ -182,13 +189,20 @@ class LiveCell:
 
     def _tick(self, scene: CellScene, views: ViewSettings, dt: float) -> None:
         for command in self.handle.drain():
+            self._done += 1
             try:
                 self._obey(command)
             except ServiceError as error:
+                self._refused = self._done, error.message
                 logger.warning("command %s was refused: %s", command.tag, error.message)
         for _ in range(self._speed):
             self._world.step()
-        snapshot = replace(self._world.snapshot(), speed=self._speed)
+        snapshot = replace(
+            self._world.snapshot(),
+            speed=self._speed,
+            commands=self._done,
+            refused=self._refused,
+        )
         self.handle.publish(snapshot)
         self._turn += 1
         self._undrawn_s += dt * self._speed

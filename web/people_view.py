@@ -22,7 +22,7 @@ class PeopleView:
     """
 
     def __init__(
-        self, server: viser.ViserServer, cell: Cell, submit: Callable[[MoveHuman], None]
+        self, server: viser.ViserServer, cell: Cell, submit: Callable[[MoveHuman], object]
     ) -> None:
         self._server, self._cell, self._submit = server, cell, submit
         self._drawn: dict[int, tuple[PersonView, Gizmos]] = {}

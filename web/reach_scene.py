@@ -63,7 +63,7 @@ class ReachScene:
     """
 
     def __init__(
-        self, server: viser.ViserServer, cell: Cell, submit: Callable[[MoveGoal], None]
+        self, server: viser.ViserServer, cell: Cell, submit: Callable[[MoveGoal], object]
     ) -> None:
         self._walkers = WalkersView(server, cell)
         self._goal = GoalGizmo(server, cell, submit)

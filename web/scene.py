@@ -34,7 +34,7 @@ class CellScene:
     """
 
     def __init__(
-        self, server: viser.ViserServer, cell: Cell, submit: Callable[[Command], None]
+        self, server: viser.ViserServer, cell: Cell, submit: Callable[[Command], object]
     ) -> None:
         self._server, self._cell = server, cell
         with server.atomic():

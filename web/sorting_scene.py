@@ -43,7 +43,7 @@ class SortingScene:
         self,
         server: viser.ViserServer,
         cell: Cell,
-        submit: Callable[[ToggleGoal], None],
+        submit: Callable[[ToggleGoal], object],
     ) -> None:
         self._cell, self._floor = cell, tray_height(cell)
         self._clutter = ClutterView(server, cell)

@@ -52,7 +52,7 @@ class StationsView:
         self,
         server: viser.ViserServer,
         cell: Cell,
-        submit: Callable[[ToggleCandidate], None],
+        submit: Callable[[ToggleCandidate], object],
     ) -> None:
         self._scene, self._cell, self._submit = server.scene, cell, submit
         self._stations = [one for one in cell.stations if one.kind in ("cube", "dock")]

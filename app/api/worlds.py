@@ -80,7 +80,7 @@ async def command(
         pilot = None
         if body.checkpoint is not None:
             pilot = await run_in_threadpool(pilot_of, body.checkpoint, world.cell, services)
-        world.handle.submit(SetPilot(pilot=pilot))
+        number = world.handle.submit(SetPilot(pilot=pilot))
     elif isinstance(body, SetPolicy):
         policy = None
         if body.checkpoint is not None:
@@ -89,19 +89,19 @@ async def command(
                 rule = f"must decide in the cell {snapshot.cell}, not in {policy.cell}"
                 raise InvalidInput("checkpoint", body.checkpoint, rule)
             require_mover(policy, world.cell, services)
-        world.handle.submit(body.to_domain(policy))
+        number = world.handle.submit(body.to_domain(policy))
     elif isinstance(body, SetSorter):
         sorter = None
         if body.checkpoint is not None:
             sorter = await run_in_threadpool(services.sorters.load, body.checkpoint)
             require_sorter(sorter, world.cell)
-        world.handle.submit(body.to_domain(sorter))
+        number = world.handle.submit(body.to_domain(sorter))
     elif isinstance(body, SetMotion):
         runs = await run_in_threadpool(_runs_of, body.name, services)
-        world.handle.submit(body.to_domain(runs))
+        number = world.handle.submit(body.to_domain(runs))
     else:
-        world.handle.submit(body.to_domain())
-    return CommandAccepted(tag=body.tag, tick=snapshot.tick)
+        number = world.handle.submit(body.to_domain())
+    return CommandAccepted(tag=body.tag, number=number, tick=snapshot.tick)
 
 
 @router.get(

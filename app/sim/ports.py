@@ -244,8 +244,8 @@ class WorldHandle(Protocol):
     def id(self) -> str:
         """Name of the world in URLs."""
 
-    def submit(self, command: Any) -> None:
-        """Queue one command of ``app.sim.commands``; returns at once."""
+    def submit(self, command: Any) -> int:
+        """Queue one command of ``app.sim.commands``; returns its number at once."""
 
     def snapshot(self) -> Any:
         """Return the last ``WorldSnapshot``; never waits."""

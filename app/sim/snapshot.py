@@ -232,6 +232,10 @@ class WorldSnapshot:
     """What the running case study or sorting test expects, and what happened so far."""
     speed: int = 1
     """Simulated seconds per second that were asked for last."""
+    commands: int = 0
+    """Number of the last command that was carried out or refused; they count from 1."""
+    refused: tuple[int, str] | None = None
+    """Number of the last command that was refused after it had been queued, and why."""
     sorting: SortingView | None = None
     """The sorting task; None in a cell without one."""
     reach: ReachView | None = None

@@ -7,6 +7,7 @@ import pytest
 
 from app.errors import InvalidInput, NotFound
 from app.sim import commands, human
+from app.sim import sorting_commands as commands_of_sorting
 from app.sim.cells import load_cell
 from tests.listening_ports import listening_ports
 from tests.straight_policy import StraightPolicy
@@ -63,6 +64,37 @@ def test_commands_are_carried_out_in_order(live: LiveCell) -> None:
     live.handle.submit(commands.ToggleCandidate(id="cube2"))
     live.handle.submit(commands.ToggleCandidate(id="cube1"))
     wait_for(lambda: live.handle.snapshot().selected == ("cube2",))
+
+
+def test_snapshot_says_which_commands_it_shows(live: LiveCell) -> None:
+    live.handle.submit(commands.Pause())
+    numbers = [live.handle.submit(commands.ToggleCandidate(id="cube3")) for _ in range(3)]
+    assert numbers == list(range(numbers[0], numbers[0] + 3))
+    before = live.handle.snapshot().selected
+    wait_for(lambda: live.handle.snapshot().commands >= numbers[-1])
+    assert ("cube3" in live.handle.snapshot().selected) != ("cube3" in before)
+    with pytest.raises(InvalidInput):
+        live.handle.submit(commands.SetSpeed(factor=3))
+    assert live.handle.submit(commands.Resume()) == numbers[-1] + 1
+    wait_for(lambda: live.handle.snapshot().commands == numbers[-1] + 1)
+    assert live.handle.snapshot().refused is None
+
+
+def test_command_that_fits_no_more_when_its_turn_comes_is_named() -> None:
+    live = LiveCell(load_cell("sorting-e0"), None)
+    block = commands_of_sorting.AddObject(colour="red", size="large", at="cell5")
+    live.start()
+    piece = live.handle.snapshot().sorting
+    assert piece is not None
+    for one in piece.pieces:
+        live.handle.submit(commands_of_sorting.RemoveObject(id=one.id))
+    number = [live.handle.submit(block), live.handle.submit(block)][-1]
+    wait_for(lambda: live.handle.snapshot().commands >= number)
+    refused = live.handle.snapshot().refused
+    live.stop()
+    assert refused is not None
+    assert refused[0] == number
+    assert "cell5" in refused[1]
 
 
 def test_bad_commands_are_refused_at_the_door(live: LiveCell) -> None:

@@ -68,6 +68,13 @@ class CandidateLive(Answer):
         )
 
 
+class RefusedCommand(Answer):
+    """A command that fitted the world when it was queued and did not when its turn came."""
+
+    number: int
+    reason: str
+
+
 class ContactPublic(Answer):
     """The contact that ended an episode."""
 
@@ -127,6 +134,10 @@ class WorldLight(Answer):
     people: tuple[PersonLight, ...] = Field(description="0 to 4, in the order of their ids")
     paused: bool
     speed: int = Field(description="simulated seconds per second that were asked for last")
+    commands: int = Field(description="number of the last command that was carried out")
+    refused: RefusedCommand | None = Field(
+        description="the last command that was queued and could not be carried out then"
+    )
     status: str
     message: str = Field(description="why, in one sentence")
     gripping: bool = Field(description="whether the fingers are closed")
@@ -268,10 +279,12 @@ def light_members(snapshot: WorldSnapshot) -> dict[str, Any]:
     same = (
         "id", "cell", "tick", "t_s", "mode", "paused", "speed", "status", "message",
         "gripping", "chosen", "clearance_m", "checkpoint", "policy_title", "elapsed_ms", "case",
-        "decided_s",
+        "commands", "decided_s",
     )  # fmt: skip
     return {name: getattr(snapshot, name) for name in same} | {
         "people": tuple(PersonLight.from_domain(one) for one in snapshot.people),
+        "refused": snapshot.refused
+        and RefusedCommand(number=snapshot.refused[0], reason=snapshot.refused[1]),
         "selected": list(snapshot.selected),
         "candidates": [CandidateLive.from_domain(one) for one in snapshot.candidates],
         "outside": [Outside.from_domain(one) for one in snapshot.outside],
@@ -500,6 +513,7 @@ class CommandAccepted(Answer):
     """The command is queued; the world applies it before its next tick."""
 
     tag: str
+    number: int = Field(description="a snapshot whose `commands` is as high shows its effect")
     tick: int = Field(description="the world's last tick when the command was queued")
 
 
