@@ -94,7 +94,7 @@ def viewer_page() -> tuple[bytes, bytes, str]:
     """Return the viewer's page with our style and script: plain, gzip-packed, its ETag."""
     content = (resources.files("viser") / "client" / "build" / "index.html").read_bytes()
     extra = (resources.files("app.api") / "viewer_extra.html").read_bytes()
-    plain = content.replace(b"</head>", extra + b"</head>", 1)
+    plain = content.replace(b"<script", extra + b"<script", 1)
     return plain, gzip.compress(plain, 6), f'"{hashlib.sha256(plain).hexdigest()[:32]}"'
 
 

@@ -13,28 +13,39 @@ export class Problem extends Error {
   }
 }
 
-/** No answer at all: the server is away. */
+/** No answer at all: the server is away or has stopped. */
 export class Unreachable extends Error {}
 
-/** Send one request, a body as JSON; resolves to the JSON answer, throws Problem or Unreachable. */
+const ANSWER_MS = 15000;
+const FILE_MS = 180000;
+
+/**
+ * Send one request, a body as JSON; resolves to the JSON answer, throws Problem or Unreachable,
+ * the latter also when nothing has come after `patience` milliseconds.
+ */
 export function request(path, { body, headers = {}, ...options } = {}) {
   if (body === undefined) return send(path, { headers, ...options });
   headers = { "Content-Type": "application/json", ...headers };
   return send(path, { headers, body: JSON.stringify(body), ...options });
 }
 
-async function send(path, { method = "GET", body, headers, signal }) {
+async function send(path, { method = "GET", body, headers, signal, patience = ANSWER_MS }) {
   let response;
+  const late = AbortSignal.timeout(patience);
   try {
     response = await fetch(path, {
       method,
-      signal,
+      signal: signal ? AbortSignal.any([signal, late]) : late,
       cache: "no-store",
       headers,
       body,
     });
   } catch (error) {
     if (error.name === "AbortError") throw error;
+    if (error.name === "TimeoutError") {
+      const text = `the server did not answer within ${Math.round(patience / 1000)} s`;
+      throw Object.assign(new Unreachable(text), { silent: true });
+    }
     throw new Unreachable("the server does not answer");
   }
   const json = await response.json().catch(() => null);
@@ -43,12 +54,15 @@ async function send(path, { method = "GET", body, headers, signal }) {
 }
 
 export const get = (path, options) => request(path, options);
-export const put = (path, body = {}) => request(path, { method: "PUT", body });
-export const post = (path, body = {}, headers = {}) =>
-  request(path, { method: "POST", body, headers });
+export const put = (path, body = {}, options = {}) =>
+  request(path, { method: "PUT", body, ...options });
+export const post = (path, body = {}, headers = {}, options = {}) =>
+  request(path, { method: "POST", body, headers, ...options });
 /** Post a file as it is. */
-export const postFile = (path, file) =>
-  send(path, { method: "POST", body: file, headers: { "Content-Type": "application/octet-stream" } });
+export const postFile = (path, file) => send(path, {
+  method: "POST", body: file, headers: { "Content-Type": "application/octet-stream" },
+  patience: FILE_MS,
+});
 
 /**
  * Follow a server-sent event stream, for good: after a loss it connects again and resumes

@@ -14,12 +14,14 @@ import { SortingDecision } from "./sorting.js";
 import { SmallPrint, Story } from "./story.js";
 import { Training } from "./training.js";
 import { Values } from "./values.js";
+import { Viewer } from "./viewer.js";
 import { ViewMenu } from "./viewmenu.js";
 
 const LINKS = {
   connecting: ["Connecting", "quiet"],
   warming: ["Warming up", "warn"],
   live: ["Live", "good"],
+  stale: ["Stale", "bad"],
   lost: ["Disconnected", "bad"],
 };
 
@@ -49,15 +51,14 @@ function App() {
       <span class="spacer"></span>
       ${world && html`<${Acting} world=${world} checkpoints=${checkpoints} jobs=${jobs}
         send=${cell.send} />`}
-      <${Link} link=${link} />
+      <${Link} cell=${cell} />
       <a class="docs" href="docs">API<${Icon} name="external" /></a>
     </header>
     ${cell.error && html`<p class="banner bad" role="alert"><${Icon} name="alert" />
       <span>${cell.error.message}</span>
       <button type="button" class="quiet-button" aria-label="Dismiss" onClick=${cell.dismiss}>
         <${Icon} name="close" /></button></p>`}
-    ${link === "lost" && world && html`<p class="banner warn" role="alert">
-      <${Icon} name="alert" /><span>The server went away. Trying again …</span></p>`}
+    <${Stale} cell=${cell} />
     <main class="stage">
       <${Scene} cell=${cell} />
       <aside class="side" aria-label="Decision and training">
@@ -106,9 +107,52 @@ function useMedia(condition) {
   return matches;
 }
 
-function Link({ link }) {
-  const [text, tone] = LINKS[link];
-  return html`<span class=${`link ${tone}`} role="status" data-role="link"><i></i>${text}</span>`;
+/** Live, stale or what else; commands that wait longer than a moment are told here. */
+function Link({ cell: { link, world, heardAt, pending } }) {
+  const waiting = useLate(pending > 0 && link === "live");
+  const [text, tone] = waiting ? ["Waiting for the server", "warn"] : LINKS[link];
+  const seconds = useSeconds(heardAt, link === "stale" && world);
+  return html`<span class=${`link ${tone}`} role="status" data-role="link"
+    data-pending=${pending}><i></i><span>${text}${
+    seconds !== null && html`<span aria-hidden="true"> for ${seconds} s</span>`}</span></span>`;
+}
+
+const CAUSES = {
+  stale: "The server sends nothing.",
+  lost: "The server does not answer.",
+  warming: "The server starts again.",
+};
+
+/** Says that what is shown is old, how old, and what waits. */
+function Stale({ cell: { link, world, heardAt, pending } }) {
+  const seconds = useSeconds(heardAt, link in CAUSES && world);
+  if (seconds === null) return null;
+  const waits = pending === 1 ? " 1 command is pending." : ` ${pending} commands are pending.`;
+  return html`<p class="banner warn" role="alert" data-role="stale"><${Icon} name="alert" />
+    <span><b>Stale<span aria-hidden="true"> for ${seconds} s</span>.</b> ${CAUSES[link]} Scene and
+    values show the last known state.${pending > 0 && waits}</span></p>`;
+}
+
+/** Whole seconds since `start`, counted on while `on`; null otherwise. */
+function useSeconds(start, on) {
+  const [now, setNow] = useState(0);
+  useEffect(() => {
+    if (!on) return undefined;
+    setNow(performance.now());
+    const timer = setInterval(() => setNow(performance.now()), 500);
+    return () => clearInterval(timer);
+  }, [Boolean(on)]);
+  return on ? Math.max(0, Math.floor((Math.max(now, start) - start) / 1000)) : null;
+}
+
+/** True once `on` has held for half a second. */
+function useLate(on) {
+  const [late, setLate] = useState(false);
+  useEffect(() => {
+    const timer = setTimeout(() => setLate(on), on ? 500 : 0);
+    return () => clearTimeout(timer);
+  }, [on]);
+  return on && late;
 }
 
 function Tabs({ tab, onTab, active }) {
@@ -144,8 +188,8 @@ function Scene({ cell }) {
   const keyed = useFrameFocus(frame);
   return html`<section class="hero" aria-label="The cell">
     <div class=${`viewer ${keyed ? "is-keyed" : ""}`}>
-      ${epoch > 0 && html`<iframe key=${epoch} ref=${frame} src=${`viewer/${WORLD}/`} data-role="viewer"
-        title="Live 3D view of robot and person"></iframe>`}
+      ${epoch > 0 && html`<${Viewer} src=${`viewer/${WORLD}/`} epoch=${epoch} link=${link}
+        frame=${frame} />`}
       ${world && html`<${FirstUse} world=${world} cell=${cell.cell} send=${cell.send} />`}
       ${epoch > 0 && world && html`<${ViewMenu} key=${epoch} frame=${frame} />`}
       ${!world && html`<div class="veil" role="status">
@@ -164,7 +208,7 @@ function capital(text) {
 }
 
 function veil(link, reason) {
-  if (link === "lost") return ["The server does not answer", "Trying again every second."];
+  if (link === "lost" || link === "stale") return ["The server does not answer", "Trying again every second."];
   if (link !== "warming") return ["Opening the cell", ""];
   const doing = reason.replace(/^(warming up|starting):? */, "");
   if (doing === reason && reason) return ["The server is not ready", reason];

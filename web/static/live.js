@@ -1,48 +1,80 @@
 // The live cell as this page knows it: its last snapshot, its recent values, the link to it.
 import { useCallback, useEffect, useRef, useState } from "./vendor/htm-preact-standalone.module.js";
-import { follow, get, post, put } from "./api.js";
+import { follow, get, post, put, Unreachable } from "./api.js";
+import { Unconfirmed } from "./confirm.js";
 import { History } from "./history.js";
 
 export const WORLD = "main";
 const RETRY_MS = 1000;
+const ASK_MS = 3000; // time that one question whether the server is ready may take
+const LOOK_MS = 250;
+const STALE_MS = 2000; // silence after which what is shown counts as stale
+const AGAIN_MS = 10000; // silence after which the stream is opened again
+const COMMAND_MS = 8000;
+const CELL_MS = 180000; // another cell may have kernels to compile
 
 /**
  * Follow the server and its world.
  *
- * @returns {{link: "connecting"|"warming"|"live"|"lost"|"signin", reason: string, world: object|null,
- *            cell: object|null, cells: object[], history: History, epoch: number,
+ * @returns {{link: "connecting"|"warming"|"live"|"stale"|"lost"|"signin", reason: string,
+ *            world: object|null, cell: object|null, cells: object[], history: History,
+ *            epoch: number, heardAt: number, pending: number,
  *            send: (command: object) => Promise<void>, show: (cell: string) => Promise<void>}}
- *   `epoch` counts how often the server was found ready: the viewer is loaded anew each time.
+ *   `epoch` counts how often the server was found ready; `heardAt` is the time of the last
+ *   snapshot, as performance.now() gives it; `pending` counts commands that no snapshot shows
+ *   yet.
  */
 export function useCell() {
   const [state, setState] = useState({ link: "connecting", reason: "", world: null, cell: null, cells: [] });
   const [epoch, setEpoch] = useState(0);
   const [error, setError] = useState(null);
+  const [pending, setPending] = useState(0);
+  const unconfirmed = useRef(new Unconfirmed());
   const history = useRef(new History());
 
   useEffect(() => {
     const stop = new AbortController();
-    watch(stop.signal, history.current, setState, setEpoch);
+    watch(stop.signal, history.current, unconfirmed.current, setState, setEpoch);
     return () => stop.abort();
   }, []);
 
   const told = useCallback(async (request) => {
+    setPending((n) => n + 1);
     try {
       await request;
       setError(null);
     } catch (problem) {
       setError(problem);
     }
+    setPending((n) => n - 1);
   }, []);
-  const send = useCallback(
-    (command) => told(post(`v1/worlds/${WORLD}/commands`, command)), []);
-  const show = useCallback((name) => told(put(`v1/worlds/${WORLD}/cell`, { cell: name })), []);
+  // A command that was not confirmed in time: what the world shows now is the answer.
+  useEffect(() => {
+    if (state.link === "live") setError((now) => (now instanceof Unreachable ? null : now));
+  }, [state.link]);
+  const send = useCallback((command) => told(carryOut(command, unconfirmed.current)), []);
+  const show = useCallback((name) =>
+    told(put(`v1/worlds/${WORLD}/cell`, { cell: name }, { patience: CELL_MS })), []);
   const dismiss = () => setError(null);
-  return { ...state, epoch, history: history.current, send, show, error, dismiss };
+  return { ...state, epoch, pending, history: history.current, send, show, error, dismiss };
+}
+
+/** Send a command; resolves once a snapshot shows its effect, throws if none does in time. */
+async function carryOut(command, unconfirmed) {
+  const name = command.tag.replaceAll("-", " ");
+  try {
+    const options = { patience: COMMAND_MS };
+    const { number } = await post(`v1/worlds/${WORLD}/commands`, command, {}, options);
+    await unconfirmed.wait(number, COMMAND_MS);
+  } catch (problem) {
+    if (!(problem instanceof Unreachable)) throw problem;
+    throw new Unreachable(`Not confirmed: ${name}. ${problem.message[0].toUpperCase()}${
+      problem.message.slice(1)}; the command may still be carried out later.`);
+  }
 }
 
 /** Wait until ready, then follow the world; for ever. */
-async function watch(signal, history, setState, setEpoch) {
+async function watch(signal, history, unconfirmed, setState, setEpoch) {
   const merge = (more) => !signal.aborted && setState((now) => ({ ...now, ...more }));
   while (!signal.aborted) {
     await ready(signal, merge);
@@ -50,28 +82,38 @@ async function watch(signal, history, setState, setEpoch) {
       const [world, cells] = await Promise.all([get(`v1/worlds/${WORLD}`), get("v1/cells")]);
       const list = cells.items;
       const cell = list.find((c) => c.name === world.cell) ?? null;
-      let anew = false;
+      let replaced = false;
+      let link = "lost";
       history.add(world);
-      merge({ world, cell, cells: list, link: "live", reason: "" });
+      merge({ world, cell, cells: list, link: "live", reason: "", heardAt: performance.now() });
       setEpoch((n) => n + 1);
-      await until(signal, (lost) =>
-        follow(`v1/worlds/${WORLD}/events`, {
+      await until(signal, (lost) => {
+        const silence = listen((quiet) => {
+          merge({ link: "stale" });
+          if (quiet > AGAIN_MS) lost((link = "stale"));
+        });
+        const leave = follow(`v1/worlds/${WORLD}/events`, {
           onEvent: (name, snapshot) => {
-            if (name === "end") {
-              anew = true;
-              lost();
-            }
+            if (name === "end") lost((replaced = true));
             if (!snapshot?.candidates) return;
+            silence.end();
             history.add(snapshot);
-            setState((now) => ({ ...now, world: { ...now.world, ...snapshot }, link: "live" }));
+            unconfirmed.see(snapshot);
+            const heardAt = performance.now();
+            setState((now) => ({
+              ...now, world: { ...now.world, ...snapshot }, link: "live", heardAt,
+            }));
           },
           onDown: lost,
-        }));
-      if (anew) continue;
-      merge({ link: "lost" });
+        });
+        return () => (silence.stop(), leave());
+      });
+      unconfirmed.drop();
+      if (replaced) continue;
+      merge({ link });
     } catch (error) {
-      merge({ link: error.status === 401 ? "signin" : "lost", reason: error.message });
-      if (error.status === 401) return;
+      if (error.status === 401) return merge({ link: "signin" });
+      merge({ link: error.silent ? "stale" : "lost", reason: error.message });
     }
     await pause(signal);
   }
@@ -80,16 +122,32 @@ async function watch(signal, history, setState, setEpoch) {
 async function ready(signal, merge) {
   while (!signal.aborted) {
     try {
-      const response = await fetch("readyz", { signal, cache: "no-store" });
+      const late = AbortSignal.any([signal, AbortSignal.timeout(ASK_MS)]);
+      const response = await fetch("readyz", { signal: late, cache: "no-store" });
       if (response.ok) return;
       const body = await response.json().catch(() => null);
       merge({ link: "warming", reason: body?.detail ?? "" });
-    } catch {
+    } catch (error) {
       if (signal.aborted) return;
-      merge({ link: "lost", reason: "" });
+      merge({ link: error.name === "TimeoutError" ? "stale" : "lost", reason: "" });
     }
     await pause(signal);
   }
+}
+
+/**
+ * Call `onSilence(quiet)` while nothing has been heard for STALE_MS and more, at two looks in a
+ * row: what came while the page itself was busy is handled between them.
+ */
+function listen(onSilence) {
+  let heard = performance.now();
+  let quietBefore = false;
+  const timer = setInterval(() => {
+    const quiet = performance.now() - heard;
+    if (quiet > STALE_MS && quietBefore) onSilence(quiet);
+    quietBefore = quiet > STALE_MS;
+  }, LOOK_MS);
+  return { end: () => (heard = performance.now()), stop: () => clearInterval(timer) };
 }
 
 /** Run `start(lost)` until `lost` is called or the signal aborts, then stop it. */
