@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import signal
 import socket
 import subprocess
 import sys
@@ -48,13 +49,16 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     if running:
         yield running
         return
-    with serving(tmp_path_factory.mktemp("tandem"), free_port()) as address:
+    with serving(tmp_path_factory.mktemp("tandem"), free_port()) as (address, _):
         yield address
 
 
 @contextmanager
-def serving(data: Path, port: int) -> Iterator[str]:
-    """Start a server process, wait until it is ready, and stop it in the end."""
+def serving(data: Path, port: int) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
+    """Start a server process, wait until it is ready, and stop it in the end.
+
+    Yields its address and the process, which may have been killed by then.
+    """
     env = os.environ | {"TANDEM_DATA": str(data), "TANDEM_PORT": str(port)}
     log = data / "server.log"
     with log.open("wb") as sink:
@@ -68,8 +72,9 @@ def serving(data: Path, port: int) -> Iterator[str]:
         try:
             address = f"http://127.0.0.1:{port}"
             wait_until_ready(address, process, log)
-            yield address
+            yield address, process
         finally:
+            process.send_signal(signal.SIGCONT)
             process.terminate()
             try:
                 process.wait(20)
@@ -122,7 +127,9 @@ def open_page(browser: Browser, server: str) -> Iterator[OpenPage]:
     pages: list[Page] = []
     expect.set_options(timeout=STEP_MS)
 
-    def open_it(size: tuple[int, int] = (1024, 700), *, scene: bool = True) -> Page:
+    def open_it(
+        size: tuple[int, int] = (1024, 700), *, scene: bool = True, address: str = server
+    ) -> Page:
         page = browser.new_page(viewport={"width": size[0], "height": size[1]})
         page.set_default_timeout(STEP_MS)
         pages.append(page)
@@ -135,7 +142,7 @@ def open_page(browser: Browser, server: str) -> Iterator[OpenPage]:
             page.route(
                 "**/viewer/**", lambda route: route.fulfill(body="", content_type="text/html")
             )
-        page.goto(server)
+        page.goto(address)
         page.wait_for_selector('[data-link="live"]')
         return page
 

@@ -24,7 +24,7 @@ def server(tmp_path_factory: pytest.TempPathFactory, strays: list[str]) -> Itera
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("TANDEM_ROOT_PATH", PREFIX)
         with (
-            serving(tmp_path_factory.mktemp("below"), free_port()) as address,
+            serving(tmp_path_factory.mktemp("below"), free_port()) as (address, _),
             below_path(address, strays) as shown,
         ):
             yield f"{shown}/"

@@ -1,0 +1,164 @@
+"""The 3D scene outlives people who leave, other cells, and a server that stops or restarts."""
+
+import os
+import signal
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Frame, Page, expect
+
+from app.sim.cells import load_cell
+from tests import patient_http
+from tests.browser.conftest import free_port, serving
+from tests.browser.test_drag import VIEWER, state, tell, until
+
+pytestmark = pytest.mark.browser
+
+REACH, SORT = "shared-workspace", "sorting-e0"
+UP = f'{VIEWER}[data-state="up"]'
+LIMIT_S = 180.0
+
+
+def scene_of(page: Page) -> Frame:
+    """Return the frame of the scene once it has drawn."""
+    page.wait_for_selector(UP)
+    return next(one for one in page.frames if "/viewer/" in one.url)
+
+
+def expect_drawing(page: Page) -> None:
+    """Wait until the scene draws another picture; fail if it had to be loaded again."""
+    scene = scene_of(page)
+    scene.evaluate(
+        """() => new Promise((resolve) => {
+          const draw = WebGL2RenderingContext.prototype.drawElements;
+          WebGL2RenderingContext.prototype.drawElements = function (...all) {
+            WebGL2RenderingContext.prototype.drawElements = draw;
+            resolve();
+            return draw.apply(this, all);
+          };
+        })"""
+    )
+
+
+def show(server: str, cell: str) -> None:
+    answer = patient_http.put(f"{server}/v1/worlds/main/cell", json={"cell": cell})
+    assert answer.status_code == 200, answer.text
+
+
+@pytest.fixture
+def shown(server: str) -> Iterator[str]:
+    """The server, which shows its first cell with one person at work, before and after."""
+    show(server, load_cell().name)
+    yield server
+    show(server, load_cell().name)
+
+
+def test_scene_goes_on_in_two_windows_while_people_come_and_go(
+    open_page: Callable[..., Page], shown: str
+) -> None:
+    pages = [open_page((640, 480)), open_page((500, 600))]
+    for page in pages:
+        expect_drawing(page)
+    pages[0].click('[data-action="add-person"]')
+    until(shown, lambda now: len(now["people"]) == 2, LIMIT_S)
+    expect_drawing(pages[1])
+    pages[0].click('[data-person="1"]')
+    pages[0].click('[data-action="remove-person"]')
+    until(shown, lambda now: len(now["people"]) == 1, LIMIT_S)
+    for page in pages:
+        expect_drawing(page)
+    tell(shown, {"tag": "set-body", "stature": 95}, {"tag": "add-person"})
+    tell(shown, {"tag": "remove-person", "person": 0}, {"tag": "remove-person", "person": 1})
+    until(shown, lambda now: now["people"] == [], LIMIT_S)
+    tell(shown, {"tag": "add-person"}, {"tag": "add-person"})
+    until(shown, lambda now: len(now["people"]) == 2, LIMIT_S)
+    for page in pages:
+        expect_drawing(page)
+        assert page.locator('[data-role="scene-note"]').count() == 0
+        assert page.problems == []  # type: ignore[attr-defined]
+
+
+def test_scene_follows_into_other_cells_and_back_in_every_window(
+    open_page: Callable[..., Page], shown: str
+) -> None:
+    pages = [open_page((640, 480)), open_page((500, 600))]
+    for page in pages:
+        expect_drawing(page)
+    for cell in (REACH, SORT, load_cell().name):
+        pages[0].locator('[data-role="cell"]').select_option(cell)
+        until(shown, lambda now, cell=cell: now["cell"] == cell, LIMIT_S)
+        for page in pages:
+            expect(page.locator('[data-role="cell"]')).to_have_value(cell)
+            expect_drawing(page)
+            assert page.locator('[data-role="scene-note"]').count() == 0
+
+
+@pytest.mark.parametrize(
+    "harm",
+    [
+        "document.querySelectorAll('canvas').forEach((one) => one.remove())",
+        """[...document.querySelectorAll('canvas')].map((one) => one.getContext('webgl2'))
+        .forEach((gl) => gl?.getExtension('WEBGL_lose_context').loseContext())""",
+        "WebGL2RenderingContext.prototype.clear = () => {}",
+    ],
+    ids=["its canvas is gone", "its graphics context is lost", "it draws no more"],
+)
+@pytest.mark.usefixtures("shown")
+def test_scene_that_has_died_is_loaded_again_and_the_visitor_is_told(
+    open_page: Callable[..., Page], harm: str
+) -> None:
+    page = open_page((500, 600))
+    expect_drawing(page)
+    scene_of(page).evaluate(f"() => {{ {harm} }}")
+    page.wait_for_selector('[data-role="scene-note"]')
+    expect_drawing(page)
+    expect(page.locator('[data-link="live"]')).to_be_visible()
+
+
+def test_page_says_stale_while_the_server_is_frozen_and_goes_on_when_it_thaws(
+    open_page: Callable[..., Page], tmp_path: Path
+) -> None:
+    with serving(tmp_path, free_port()) as (address, process):
+        page = open_page((640, 700), address=address)
+        expect_drawing(page)
+        for cell in (load_cell().name, REACH, SORT):
+            if cell != load_cell().name:
+                show(address, cell)
+                expect(page.locator('[data-role="cell"]')).to_have_value(cell)
+                page.wait_for_selector('[data-link="live"]')
+            os.kill(process.pid, signal.SIGSTOP)
+            page.wait_for_selector('[data-link="stale"]')
+            expect(page.locator('[data-role="link"]')).to_contain_text("Stale for")
+            expect(page.locator('[data-role="stale"]')).to_contain_text("last known state")
+            grey = page.locator(VIEWER).evaluate("frame => getComputedStyle(frame).filter")
+            assert "grayscale" in grey
+            page.click('[data-action="pause"]')
+            expect(page.locator('[data-role="link"]')).to_have_attribute("data-pending", "1")
+            expect(page.locator(".banner.bad")).to_contain_text("Not confirmed: pause")
+            expect(page.locator('[data-role="link"]')).to_have_attribute("data-pending", "0")
+            os.kill(process.pid, signal.SIGCONT)
+            page.wait_for_selector('[data-link="live"]')
+            expect(page.locator(".banner")).to_have_count(0)
+            tell(address, {"tag": "resume"})
+            expect_drawing(page)
+
+
+def test_page_and_scene_come_back_by_themselves_after_the_server_was_killed(
+    open_page: Callable[..., Page], tmp_path: Path
+) -> None:
+    port = free_port()
+    with serving(tmp_path, port) as (address, process):
+        page = open_page((640, 700), address=address)
+        expect_drawing(page)
+        process.kill()
+        page.wait_for_selector('[data-link="lost"]')
+        expect(page.locator('[data-role="stale"]')).to_contain_text("does not answer")
+        process.wait()
+    with serving(tmp_path, port):
+        page.wait_for_selector('[data-link="live"]')
+        expect_drawing(page)
+        page.click('[data-action="pause"]')
+        until(address, lambda now: now["paused"], LIMIT_S)
+        expect(page.locator('[data-role="link"]')).to_have_attribute("data-pending", "0")
+        assert state(address)["people"]
