@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Frame, Page, expect
+from playwright.sync_api import Error, Frame, Page, TimeoutError, expect
 
 from app.sim.cells import load_cell
 from tests import patient_http
@@ -18,6 +18,16 @@ pytestmark = pytest.mark.browser
 REACH, SORT = "shared-workspace", "sorting-e0"
 UP = f'{VIEWER}[data-state="up"]'
 LIMIT_S = 180.0
+ATTEMPTS = 5
+NEXT_PICTURE = """() => new Promise((resolve) => {
+  const draw = WebGL2RenderingContext.prototype.drawElements;
+  WebGL2RenderingContext.prototype.drawElements = function (...all) {
+    WebGL2RenderingContext.prototype.drawElements = draw;
+    resolve();
+    return draw.apply(this, all);
+  };
+})"""
+"""Resolves in a frame when it draws next."""
 
 
 def scene_of(page: Page) -> Frame:
@@ -27,18 +37,17 @@ def scene_of(page: Page) -> Frame:
 
 
 def expect_drawing(page: Page) -> None:
-    """Wait until the scene draws another picture; fail if it had to be loaded again."""
-    scene = scene_of(page)
-    scene.evaluate(
-        """() => new Promise((resolve) => {
-          const draw = WebGL2RenderingContext.prototype.drawElements;
-          WebGL2RenderingContext.prototype.drawElements = function (...all) {
-            WebGL2RenderingContext.prototype.drawElements = draw;
-            resolve();
-            return draw.apply(this, all);
-          };
-        })"""
-    )
+    """Wait until the scene draws another picture; another cell loads it again meanwhile."""
+    for _ in range(ATTEMPTS):
+        try:
+            scene_of(page).evaluate(NEXT_PICTURE)
+        except (Error, StopIteration) as error:
+            if isinstance(error, TimeoutError):
+                raise
+            page.wait_for_timeout(1000)
+            continue
+        return
+    raise AssertionError("the scene does not stay")
 
 
 def show(server: str, cell: str) -> None:
