@@ -17,7 +17,7 @@ pytestmark = pytest.mark.browser
 def emptied(server: str) -> Iterator[str]:
     """The server; what was imported is removed again and the person works."""
     yield server
-    for name in ("mixed", "angles"):
+    for name in ("mixed", "angles", "foreign"):
         patient_http.delete(f"{server}/v1/motions/{name}")
     patient_http.post(
         f"{server}/v1/worlds/main/commands", json={"tag": "set-mode", "mode": "auto"}
@@ -59,3 +59,28 @@ def test_file_of_angles_has_no_unit_to_state(
     page.click('[data-action="import"]')
     expect(page.locator('[data-role="import-result"]')).to_contain_text("angles read as: m")
     assert page.problems == []  # type: ignore[attr-defined]
+
+
+@pytest.mark.usefixtures("emptied")
+def test_visitor_says_what_foreign_columns_are(
+    open_page: Callable[..., Page], tmp_path: Path
+) -> None:
+    text = csv_text(working()).replace("elbow_r", "coude d").replace("elbow_l", "elbow_left")
+    lines = text.splitlines()
+    lines[50] = f"{lines[50].rpartition(',')[0]},NaN"
+    clip = tmp_path / "foreign.csv"
+    clip.write_text("\n".join(lines), encoding="utf-8")
+    page = open_page(scene=False)
+    page.click('[data-mode="recorded"]')
+    page.set_input_files('[data-role="import-file"]', clip)
+    page.click('[data-action="import"]')
+    expect(page.locator('[data-role="import-error"]')).to_contain_text(
+        "give the name map elbow_left=elbow_l"
+    )
+    page.locator('[data-role="import-names"]').fill("coude d = elbow_r; elbow_left=elbow_l;")
+    page.click('[data-action="import"]')
+    expect(page.locator('[data-role="import-result"]')).to_contain_text(
+        "1 clean run, 1 cut out (frame 48: no value of elbow_l)"
+    )
+    stored = page.evaluate("fetch('v1/motions/foreign').then((one) => one.json())")
+    assert stored["options"] == {"names": {"coude d": "elbow_r", "elbow_left": "elbow_l"}}

@@ -4,8 +4,11 @@ import { postFile } from "./api.js";
 import { Icon } from "./icons.js";
 
 const FORMATS = ".bvh,.mot,.sto,.csv";
+const MAX_LISTED = 3;
 const UNITS = ["m", "cm", "mm", "inch", "foot", "cmu"];
 const UP_AXES = ["y", "z", "x", "-y", "-z", "-x"];
+const NAMES_TITLE =
+  "Joints or columns under names that are not known: theirs=ours, several separated by ;";
 const NUMBER_TITLE = "A unit, or metres per unit as a number; found from the file if empty";
 
 /** A button that picks a file, and behind it the form; `onDone` is called with what is stored. */
@@ -22,7 +25,11 @@ export function ImportForm({ onDone }) {
   };
   const send = async (e) => {
     e.preventDefault();
-    const asked = Object.entries({ file_name: file.name, ...stated }).filter(([, value]) => value);
+    const { names = "", ...others } = stated;
+    const asked = [
+      ...Object.entries({ file_name: file.name, ...others }).filter(([, value]) => value),
+      ...names.split(";").filter((pair) => pair.trim()).map((pair) => ["map", pair]),
+    ];
     setAnswer({ busy: true });
     try {
       const motion = await postFile(`v1/motions?${new URLSearchParams(asked)}`, file);
@@ -53,23 +60,33 @@ export function ImportForm({ onDone }) {
           <option value="">found</option>
           ${UP_AXES.map((one) => html`<option key=${one} value=${one}>${one}</option>`)}
         </select></label>`}
-    ${file && html`<button type="submit" class="tool" data-action="import"
+    ${file && html`<label class="stated" title=${NAMES_TITLE}>Names
+      <input class="names" data-role="import-names" placeholder="theirs=ours; …" spellcheck="false"
+        onInput=${state("names")} /></label>
+    <button type="submit" class="tool" data-action="import"
       disabled=${Boolean(answer.busy)}>${answer.busy ? "Reading …" : "Import"}</button>`}
     ${answer.problem && html`<p class="field-error" role="alert" data-role="import-error">
       ${answer.problem.message}</p>`}
-    ${answer.motion && html`<p class="dock-hint" role="status" data-role="import-result">
+    ${answer.motion && html`<p class="result" role="status" data-role="import-result">
       ${told(answer.motion)}</p>`}
   </form>`;
 }
 
+/** The first frames that were cut out, and why. */
+function cutOut(glitches) {
+  const listed = glitches.slice(0, MAX_LISTED).map(({ first, last, reason }) =>
+    `${first === last ? `frame ${first}` : `frames ${first} to ${last}`}: ${reason}`);
+  return [...listed, ...(glitches.length > MAX_LISTED ? ["…"] : [])].join("; ");
+}
+
 /** How a file was read, in sentences. */
-function told({ name, reading, n_runs: runs, n_glitches: glitches }) {
+function told({ name, reading, n_runs: runs, n_glitches: n, glitches }) {
   const parts = [
     `${reading.unit}, ${reading.up} up`,
     reading.root_unit !== reading.unit && `root's path in ${reading.root_unit}`,
     `${Number(reading.rate_hz.toPrecision(4))} frames/s`,
     reading.stature !== null && `${reading.stature.toFixed(2)} m tall`,
-    `${runs} clean ${runs === 1 ? "run" : "runs"}, ${glitches} cut out`,
+    `${runs} clean ${runs === 1 ? "run" : "runs"}, ${n} cut out${n ? ` (${cutOut(glitches)})` : ""}`,
   ].filter(Boolean);
   return [`${name} read as: ${parts.join(", ")}.`, ...reading.notes].join(" ");
 }
