@@ -328,12 +328,13 @@ def find_checkpoint(reference: str, settings: Settings) -> "Checkpoint":
 
     Raises:
         NotFound: There is none.
+        Damaged: It is damaged.
     """
     from app.policies import pretrained
     from app.policies.checkpoint import load
-    from app.store.checkpoints import get_checkpoint, read_tensors
     from app.store.engine import Store
     from app.store.schema import check_schema
+    from jobs.checkpoints import read_sound
 
     path = Path(reference)
     if path.suffix == ".safetensors":
@@ -348,8 +349,8 @@ def find_checkpoint(reference: str, settings: Settings) -> "Checkpoint":
     store = Store(settings.database)
     try:
         check_schema(store)
-        record = get_checkpoint(store, reference)
-        return load(record.manifest, read_tensors(store, record.sha256))
+        record, tensors = read_sound(store, reference)
+        return load(record.manifest, tensors)
     finally:
         store.close()
 

@@ -11,6 +11,7 @@
     │   └── StaleAttempt     a worker writes about a job that is no longer its own
     ├── StorageUnavailable   the database does not answer for now
     ├── StorageFull          the database or the disk has no room left
+    ├── Damaged              stored data are not what was stored: what, name, remedy
     ├── NotReady             the service cannot answer yet, or not now
     ├── MissingPackage       an optional library is not installed
     ├── SimulationError      the simulator met a state it must never meet
@@ -227,6 +228,33 @@ class ClockJump(Conflict):
             "newest_t": self.newest,
             "consistent_frames": self.count,
             "needed_frames": self.needed,
+        }
+
+
+class Damaged(ServiceError):
+    """Stored data do not have the checksum that was stored with them.
+
+    Args:
+        what: The noun, such as ``"checkpoint"``.
+        name: Its name or id.
+        remedy: What to do about it.
+        sha256: The checksum that it should have.
+    """
+
+    def __init__(self, what: str, name: str, remedy: str, sha256: str = "") -> None:
+        super().__init__(
+            f"{what} {name!r} is damaged: its content does not have its checksum and is not "
+            f"used; {remedy}"
+        )
+        self.what, self.name, self.remedy, self.sha256 = what, name, remedy, sha256
+
+    def problem(self) -> dict[str, object]:
+        """Return noun, name, checksum and remedy."""
+        return {
+            "what": self.what,
+            "name": self.name,
+            "sha256": self.sha256 or None,
+            "remedy": self.remedy,
         }
 
 

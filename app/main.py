@@ -26,7 +26,7 @@ from app.api.registry import (
     PolicyRegistry,
 )
 from app.api.services import Services
-from app.errors import ServiceError
+from app.errors import Damaged, ServiceError
 from app.policies import pretrained
 from app.policies.checkpoint import CHOOSING, SORTING, load, require_purpose
 from app.policies.motion_decision import MotionDecider
@@ -39,9 +39,10 @@ from app.sim.cells import Cell, load_cell
 from app.sim.ports import SortingValues, TaskPolicy
 from app.sim.reach_ports import ReachPilot
 from app.sim.sorting_decision import warm_up as warm_up_sorting
+from app.store.checkpoints import find_damaged
 from app.store.engine import Store
-from app.store.records import NewCheckpoint
 from jobs.cells import CellCatalog
+from jobs.checkpoints import shipped
 from jobs.import_process import ImportProcess
 from jobs.motions import MotionCatalog
 from jobs.supervisor import Supervisor
@@ -151,12 +152,22 @@ class Service:
             self.parts.worlds[WORLD_ID] = cell
             readiness.ready, readiness.reason = True, "ready"
             logger.info("ready: %s decides in the live cell", policy.title)
+            self._look_for_damage()
         except ServiceError as error:
             readiness.failed, readiness.reason = True, error.message
             logger.error("the live cell could not start: %s", error.message)
         except Exception as error:
             readiness.failed, readiness.reason = True, f"the start failed: {error}"
             logger.exception("the live cell could not start")
+
+    def _look_for_damage(self) -> None:
+        """Note which stored checkpoints are damaged, before they are asked for."""
+        names = self.parts.checkpoints
+        for damage in find_damaged(names.store):
+            if self.parts.stopping.is_set():
+                return
+            if damage is not None:
+                names.note(damage)
 
 
 def start_world(
@@ -195,12 +206,17 @@ def build_mover(manifest: Mapping[str, Any], tensors: bytes) -> MotionDecider:
 
 
 def publish_shipped(names: CheckpointNames) -> None:
-    """Put the checkpoints that come with the service into its store, under their aliases."""
-    for alias in pretrained.ALIASES:
-        shipped = pretrained.load(alias)
-        names.publish(
-            alias,
-            NewCheckpoint(
-                sha256=shipped.sha256, manifest=shipped.manifest, tensors=shipped.tensors
-            ),
-        )
+    """Put the checkpoints that come with the service into its store, under their aliases.
+
+    Those that are damaged there are stored again; one whose file in the package is damaged is
+    taken as an earlier start stored it.
+
+    Raises:
+        NotFound: A file in the package is damaged, and none is stored.
+    """
+    for alias, sha256 in pretrained.SHA256.items():
+        try:
+            names.publish(alias, shipped(alias))
+        except Damaged as error:
+            names.note(error)
+            names.point(alias, sha256)

@@ -59,7 +59,7 @@ class MotionCatalog:
             NotFound: No motion has that name.
         """
         try:
-            return kept.get_motion(self._store, _possible(name))
+            return kept.read_runs(self._store, _possible(name))[0]
         except NotFound:
             raise NotFound("motion", name, self.names()) from None
 
@@ -138,12 +138,14 @@ class MotionCatalog:
         sha256 = hashlib.sha256(content).hexdigest()
         same = kept.find_same(self._store, name, sha256)
         ending = PurePath(file_name).suffix.lower()
+        if same is not None:
+            same, _ = kept.read_runs(self._store, name)
         if same is not None and ending == f".{same.summary['format']}":
             return _read_alike(same, options), False
         with self._importing:  # one at a time: its memory is a multiple of the file's
             new = self._import(content, file_name, name, sha256, options)
         is_new = kept.put_motion(self._store, new)
-        return _read_alike(kept.get_motion(self._store, name), options), is_new
+        return _read_alike(kept.read_runs(self._store, name)[0], options), is_new
 
     def remove(self, name: str) -> None:
         """Forget a motion; whoever has its runs keeps them.

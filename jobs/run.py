@@ -11,7 +11,6 @@ from typing import Any
 
 import torch
 
-from app.errors import CheckpointMismatch
 from app.policies import checkpoint as formats
 from app.policies import presets
 from app.policies.checkpoint import Checkpoint
@@ -20,11 +19,11 @@ from app.policies.evaluation.rows import Row
 from app.policies.progress import Progress
 from app.policies.training import train as train_policy
 from app.settings import load_settings
-from app.store import checkpoints
 from app.store.engine import Store
 from app.store.records import NewCheckpoint, ResumeState
 from jobs.attempt import main
 from jobs.cells import CellCatalog
+from jobs.checkpoints import read_sound
 from jobs.motions import MotionCatalog
 from jobs.spec import EvaluateSpec, parse_spec
 from jobs.worker import Runner, Worker
@@ -94,12 +93,8 @@ def _rates(row: Row) -> dict[str, float | None]:
 
 
 def _stored(store: Store, reference: str) -> Checkpoint:
-    record = checkpoints.get_checkpoint(store, reference)
-    tensors = checkpoints.read_tensors(store, record.sha256)
-    checkpoint = formats.load(dict(record.manifest), tensors)
-    if checkpoint.sha256 != record.sha256:
-        raise CheckpointMismatch("sha256", record.sha256, checkpoint.sha256)
-    return checkpoint
+    record, tensors = read_sound(store, reference)
+    return formats.load(dict(record.manifest), tensors)
 
 
 RUNNERS: Mapping[str, Runner] = {"train": train, "evaluate": evaluate}

@@ -7,7 +7,8 @@ from starlette.responses import Response
 
 from app.api.schemas.checkpoints import CheckpointList, CheckpointPublic
 from app.api.services import ServicesDep
-from app.store import checkpoints
+from app.store.checkpoints import list_checkpoints
+from jobs.checkpoints import read_sound
 
 router = APIRouter(prefix="/v1/checkpoints", tags=["checkpoints"])
 
@@ -20,23 +21,22 @@ def list_some(
     limit: Annotated[int, Query(description="length of the page, 1 to 200")] = 50,
 ) -> CheckpointList:
     """Return one page, newest first; shipped ones are among them."""
-    page = checkpoints.list_checkpoints(
-        services.store, job_id=job_id, cursor=cursor, limit=limit
-    )
+    page = list_checkpoints(services.store, job_id=job_id, cursor=cursor, limit=limit)
     return CheckpointList.from_domain(page)
 
 
 @router.get("/{reference}", summary="One checkpoint, by SHA-256 or alias")
 def get_one(reference: str, services: ServicesDep) -> CheckpointPublic:
     """Return one checkpoint without its tensors."""
-    record = checkpoints.get_checkpoint(services.store, reference)
+    record, _ = read_sound(services.store, reference)
     return CheckpointPublic.from_domain(record)
 
 
 @router.get("/{reference}/manifest", summary="A checkpoint's manifest alone")
 def get_manifest(reference: str, services: ServicesDep) -> dict[str, Any]:
     """Return the manifest that belongs to the tensors."""
-    return dict(checkpoints.get_checkpoint(services.store, reference).manifest)
+    record, _ = read_sound(services.store, reference)
+    return dict(record.manifest)
 
 
 @router.get(
@@ -49,10 +49,10 @@ def get_manifest(reference: str, services: ServicesDep) -> dict[str, Any]:
 )
 def get_tensors(reference: str, services: ServicesDep) -> Response:
     """Return the tensors as a safetensors file."""
-    record = checkpoints.get_checkpoint(services.store, reference)
+    record, tensors = read_sound(services.store, reference)
     name = (*record.aliases, record.sha256[:12])[0]
     return Response(
-        checkpoints.read_tensors(services.store, record.sha256),
+        tensors,
         media_type="application/octet-stream",
         headers={
             "Content-Disposition": f'attachment; filename="{name}.safetensors"',

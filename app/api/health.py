@@ -30,10 +30,11 @@ async def health(request: Request, services: ServicesDep) -> dict[str, Any]:
 async def ready(request: Request, services: ServicesDep) -> dict[str, Any]:
     """Answer 200 once everything is warm, a 503 problem until then.
 
-    With the token, where there is one, the problem says what is going on.
+    With the token, where there is one, the problem says what is going on, and ``degraded``
+    names stored checkpoints that are damaged; all others decide.
     """
-    _told_all(request, services)
-    return {"status": "ready"}
+    damaged = services.checkpoints.damaged if _told_all(request, services) else ()
+    return {"status": "degraded", "damaged": damaged} if damaged else {"status": "ready"}
 
 
 def _told_all(request: Request, services: Services) -> bool:

@@ -40,7 +40,7 @@ def create(
 ) -> JobPublic:
     """Queue a training or an evaluation; ``Location`` says where to follow it."""
     if isinstance(body, EvaluateJobCreate) and body.checkpoint is not None:
-        services.checkpoints.check(body.checkpoint)
+        services.checkpoints.read(body.checkpoint)
     new = body.to_domain()
     if isinstance(body, EvaluateJobCreate):
         services.motions.check(body.motions)

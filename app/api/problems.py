@@ -29,6 +29,7 @@ from app.api.validation import (
 from app.errors import (
     CheckpointMismatch,
     Conflict,
+    Damaged,
     InvalidInput,
     MissingPackage,
     NotFound,
@@ -46,6 +47,7 @@ MAX_LISTED_ERRORS = 20
 STATUS: tuple[tuple[type[ServiceError], int, str], ...] = (
     (NotFound, 404, "not-found"),
     (InvalidInput, 422, "invalid-input"),
+    (Damaged, 500, "damaged"),
     (CheckpointMismatch, 409, "checkpoint-mismatch"),
     (Conflict, 409, "conflict"),
     (NotReady, 503, "not-ready"),

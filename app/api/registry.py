@@ -5,21 +5,19 @@ that sort (``ports.SortingValues``) each have their own, over the same names. Li
 the routes that decide get the very same objects from here, so that one state gives one choice.
 """
 
+import logging
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from typing import Any, Generic, Protocol, TypeVar
 
-from app.errors import InvalidInput, NotFound
-from app.store.checkpoints import (
-    get_checkpoint,
-    list_aliases,
-    put_checkpoint,
-    read_tensors,
-    set_alias,
-)
+from app.errors import Damaged, InvalidInput, NotFound
+from app.store.checkpoints import list_aliases, put_checkpoint, set_alias
 from app.store.engine import Store
 from app.store.records import CheckpointRecord, NewCheckpoint
+from jobs.checkpoints import read_sound
+
+logger = logging.getLogger(__name__)
 
 MAX_POLICIES = 32
 """Most objects that a registry keeps."""
@@ -56,6 +54,7 @@ class CheckpointNames:
         """Where checkpoints are kept."""
         self._lock = threading.Lock()
         self._aliases: dict[str, str] = list_aliases(store)
+        self._damaged: dict[str, str] = {}
 
     def publish(self, alias: str, checkpoint: NewCheckpoint) -> None:
         """Store a checkpoint that came with the service and point its alias to it."""
@@ -79,17 +78,34 @@ class CheckpointNames:
         """The SHA-256 behind every alias."""
         return self._aliases
 
-    def check(self, name: str) -> CheckpointRecord:
-        """Return what the store knows of a checkpoint that a caller named.
+    def read(self, name: str) -> tuple[CheckpointRecord, bytes]:
+        """Return a checkpoint that a caller named, with its tensors.
 
         Raises:
             InvalidInput: Nothing has that name.
+            Damaged: It is damaged, and not shipped.
         """
         try:
-            return get_checkpoint(self.store, name)
+            record, tensors = read_sound(self.store, self._aliases.get(name, name))
+        except Damaged as error:
+            self.note(error)
+            raise
         except NotFound:
             rule = "is no stored checkpoint: neither its SHA-256 nor an alias"
             raise InvalidInput("checkpoint", name, rule, tuple(self._aliases)) from None
+        self._damaged.pop(record.sha256, None)
+        return record, tensors
+
+    def note(self, damage: Damaged) -> None:
+        """Remember that a checkpoint is damaged, until it is read undamaged."""
+        if damage.sha256 not in self._damaged:
+            logger.error("%s", damage.message)
+        self._damaged[damage.sha256] = damage.name
+
+    @property
+    def damaged(self) -> tuple[str, ...]:
+        """Names of the damaged checkpoints that were met."""
+        return tuple(sorted(self._damaged.values()))
 
 
 class PolicyRegistry(Generic[P]):
@@ -126,12 +142,12 @@ class PolicyRegistry(Generic[P]):
         Raises:
             InvalidInput: Nothing has that name.
             CheckpointMismatch: It is a policy of another kind.
+            Damaged: It is damaged, and not shipped.
         """
         policy = self.loaded(reference)
         if policy is not None:
             return policy
-        record = self._names.check(reference or self._default)
-        tensors = read_tensors(self._names.store, record.sha256)
+        record, tensors = self._names.read(reference or self._default)
         policy = self._build(record.manifest, tensors)
         with self._lock:
             self._policies[record.sha256] = policy

@@ -4,9 +4,11 @@ A policy moves the arm in the cell it was trained in, and in sorting cells that 
 in nothing but their stations (``sorting_cell.same_workspace``).
 """
 
-from app.api.registry import REACH_ALIAS, SORTERS
+import logging
+
+from app.api.registry import REACH_ALIAS, SORTERS, P, PolicyRegistry
 from app.api.services import Services
-from app.errors import CheckpointMismatch, NotFound
+from app.errors import CheckpointMismatch, Damaged, NotFound
 from app.policies.checkpoint import CHOOSING, REACHING, purpose_of
 from app.policies.reach_pilot import ReachPilot
 from app.policies.trained_cell import is_for
@@ -15,6 +17,8 @@ from app.sim.ports import SortingValues, TaskPolicy
 from app.sim.sorting import shape_of
 from app.sim.sorting_cell import is_sorting, require_workspace
 from app.store.checkpoints import list_checkpoints
+
+logger = logging.getLogger(__name__)
 
 MAX_LOOKED_AT = 200
 """Newest checkpoints that are looked through for one of a cell."""
@@ -51,11 +55,21 @@ def mover_for(cell: Cell, services: Services) -> TaskPolicy | None:
     default = services.policies.load(None)
     if default.cell == cell.name and may_move(default, cell, services):
         return default
+    newest = newest_for(cell, CHOOSING, services.policies, services)
+    return newest or (default if may_move(default, cell, services) else None)
+
+
+def newest_for(
+    cell: Cell, purpose: str, policies: PolicyRegistry[P], services: Services
+) -> P | None:
+    """Return the newest policy that was trained in a cell for a purpose, damaged ones aside."""
     for record in list_checkpoints(services.store, limit=MAX_LOOKED_AT).items:
-        chooses = purpose_of(record.manifest) == CHOOSING
-        if chooses and is_for(record.manifest, cell):
-            return services.policies.load(record.sha256)
-    return default if may_move(default, cell, services) else None
+        if purpose_of(record.manifest) == purpose and is_for(record.manifest, cell):
+            try:
+                return policies.load(record.sha256)
+            except Damaged as error:
+                logger.warning("left out for cell %s: %s", cell.name, error.message)
+    return None
 
 
 def require_sorter(sorter: SortingValues, cell: Cell) -> None:
@@ -97,8 +111,5 @@ def pilot_for(cell: Cell, services: Services) -> ReachPilot | None:
         actor = services.movers.load(REACH_ALIAS).actor
         if (actor.cell, actor.cell_sha256) == (cell.name, cell.sha256):
             return ReachPilot(actor)
-    for record in list_checkpoints(services.store, limit=MAX_LOOKED_AT).items:
-        reaches = purpose_of(record.manifest) == REACHING
-        if reaches and is_for(record.manifest, cell):
-            return ReachPilot(services.movers.load(record.sha256).actor)
-    return None
+    newest = newest_for(cell, REACHING, services.movers, services)
+    return None if newest is None else ReachPilot(newest.actor)

@@ -6,8 +6,6 @@ optimiser moments; continues an interrupted training). The id of a checkpoint is
 its canonical manifest followed by its tensors.
 """
 
-import hashlib
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,6 +18,7 @@ from safetensors import SafetensorError
 from safetensors.numpy import load as load_tensors
 from safetensors.numpy import save as save_tensors
 
+from app.digests import digest
 from app.errors import CheckpointMismatch, InvalidInput
 
 FORMAT = "tandem-checkpoint/1"
@@ -57,9 +56,7 @@ class Checkpoint:
     @cached_property
     def sha256(self) -> str:
         """Id of the checkpoint, 64 hexadecimal digits."""
-        digest = hashlib.sha256(canonical(self.manifest).encode())
-        digest.update(self.tensors)
-        return digest.hexdigest()
+        return digest(self.manifest, self.tensors)
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Return the tensors by name.
@@ -75,11 +72,6 @@ class Checkpoint:
             if not np.isfinite(array).all():
                 raise InvalidInput(f"tensors.{name}", "non-finite", "must be finite")
         return arrays
-
-
-def canonical(manifest: Mapping[str, Any]) -> str:
-    """Return a manifest as JSON text with one spelling."""
-    return json.dumps(manifest, sort_keys=True, separators=(",", ":"), allow_nan=False)
 
 
 def pack(manifest: dict[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Checkpoint:
@@ -153,7 +145,9 @@ def purpose_of(manifest: Mapping[str, Any]) -> str:
 
     It sorts if it sees towers, and reaches goals if people are cylinders to it.
     """
-    groups = [entry[0] for entry in manifest["layout"] if isinstance(entry, list) and entry]
+    layout = manifest.get("layout")
+    entries = layout if isinstance(layout, list) else []
+    groups = [entry[0] for entry in entries if isinstance(entry, list) and entry]
     if "towers" in groups:
         return SORTING
     return REACHING if "human" in groups else CHOOSING

@@ -3,6 +3,7 @@
 Every write is fenced (``app.store.fences``). How attempts end is in ``app.store.endings``.
 """
 
+import logging
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,6 +12,7 @@ from typing import Any
 
 import sqlalchemy as sa
 
+from app.digests import digest, has_digest
 from app.errors import InvalidInput
 from app.store.checkpoints import drop_job_checkpoints, insert_checkpoint
 from app.store.engine import Store
@@ -19,6 +21,8 @@ from app.store.fences import change_state, fenced_update
 from app.store.jobs import job_from_row, read_job
 from app.store.records import Claim, JobRecord, NewCheckpoint, ResumeState
 from app.store.tables import events, job_checkpoints, jobs, metrics, resume_states
+
+logger = logging.getLogger(__name__)
 
 MAX_RESUME = 900 * 1024 * 1024
 """Largest resume state; SQLite holds blobs of at most 1e9 bytes [bytes]."""
@@ -130,7 +134,7 @@ def record_checkpoint(
         claim: The attempt that writes.
         step: Steps done; a checkpoint of the same step is replaced.
         policy: The policy as it acts.
-        resume: Replaces the job's earlier resume state.
+        resume: Kept beside the job's last one; earlier ones are dropped.
 
     Raises:
         StaleAttempt: The attempt no longer holds the job.
@@ -155,13 +159,9 @@ def record_checkpoint(
 
 
 def load_resume(store: Store, job_id: str) -> ResumeState | None:
-    """Return what a new attempt goes on from; None to start afresh."""
-    query = sa.select(resume_states).where(resume_states.c.job_id == job_id)
+    """Return what a new attempt goes on from: the newest that is undamaged; None if none is."""
     with store.reading() as connection:
-        row = connection.execute(query).first()
-    if row is None:
-        return None
-    return ResumeState(step=row.step, manifest=row.manifest, tensors=row.tensors)
+        return _newest_sound(connection, job_id)
 
 
 def watch_running(store: Store) -> tuple[Watch, ...]:
@@ -181,9 +181,10 @@ def watch_running(store: Store) -> tuple[Watch, ...]:
 
 def _forget_beyond_resume(connection: sa.Connection, job_id: str) -> int:
     """Drop what the dead attempt wrote after its last resume state; return that step."""
-    query = sa.select(resume_states.c.step).where(resume_states.c.job_id == job_id)
-    found = connection.execute(query).scalar()
-    step = -1 if found is None else int(found)
+    found = _newest_sound(connection, job_id)
+    step = -1 if found is None else found.step
+    beyond = sa.and_(resume_states.c.job_id == job_id, resume_states.c.step > step)
+    connection.execute(sa.delete(resume_states).where(beyond))
     connection.execute(
         sa.delete(metrics).where(metrics.c.job_id == job_id, metrics.c.step > step)
     )
@@ -193,11 +194,31 @@ def _forget_beyond_resume(connection: sa.Connection, job_id: str) -> int:
 
 
 def _replace_resume(connection: sa.Connection, job_id: str, resume: ResumeState) -> None:
-    connection.execute(sa.delete(resume_states).where(resume_states.c.job_id == job_id))
+    mine = resume_states.c.job_id == job_id
+    newest = sa.select(sa.func.max(resume_states.c.step))
+    newest = newest.where(mine, resume_states.c.step < resume.step)
+    previous = connection.execute(newest).scalar()
+    keeps = resume_states.c.step != (-1 if previous is None else previous)
+    connection.execute(sa.delete(resume_states).where(mine, keeps))
+    manifest = dict(resume.manifest)
     values = {
         "job_id": job_id,
         "step": resume.step,
-        "manifest": dict(resume.manifest),
+        "manifest": manifest,
+        "digest": digest({"manifest": manifest}, resume.tensors),
         "tensors": resume.tensors,
     }
     connection.execute(sa.insert(resume_states).values(values))
+
+
+def _newest_sound(connection: sa.Connection, job_id: str) -> ResumeState | None:
+    mine = sa.select(resume_states).where(resume_states.c.job_id == job_id)
+    for row in connection.execute(mine.order_by(resume_states.c.step.desc())):
+        if has_digest(row.digest, {"manifest": row.manifest}, row.tensors):
+            return ResumeState(step=row.step, manifest=row.manifest, tensors=row.tensors)
+        logger.warning(
+            "job %s: its state at step %d is damaged, it goes on from an earlier one",
+            job_id,
+            row.step,
+        )
+    return None

@@ -4,16 +4,20 @@ A stored cell never changes: another one of the same name is refused until the f
 so that what a job trains in is what its name meant when it was posted.
 """
 
+import logging
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from typing import Any
 
 import sqlalchemy as sa
 
-from app.errors import Conflict, NotFound
+from app.digests import digest, has_digest
+from app.errors import Conflict, Damaged, NotFound
 from app.store.engine import Store
 from app.store.records import CellRecord
 from app.store.tables import cells, jobs
+
+logger = logging.getLogger(__name__)
 
 MAX_CELLS = 200
 """Most cells that are kept."""
@@ -48,6 +52,7 @@ def put_cell(store: Store, name: str, definition: Mapping[str, Any]) -> bool:
         values = {
             "name": name,
             "definition": dict(definition),
+            "digest": digest({"definition": dict(definition)}),
             "created_at": datetime.now(UTC),
         }
         connection.execute(sa.insert(cells).values(values))
@@ -59,20 +64,35 @@ def get_cell(store: Store, name: str) -> CellRecord:
 
     Raises:
         NotFound: No cell has that name.
+        Damaged: It is not what was stored.
     """
     query = sa.select(cells).where(cells.c.name == name)
     with store.reading() as connection:
         row = connection.execute(query).mappings().first()
     if row is None:
         raise NotFound("cell", name)
-    return CellRecord(**row)
+    if not _is_sound(row):
+        raise Damaged("cell", name, "remove it, and post its file again")
+    return _record(row)
 
 
 def list_cells(store: Store) -> tuple[CellRecord, ...]:
-    """Return all cells, by name."""
+    """Return all cells that are undamaged, by name."""
     with store.reading() as connection:
         rows = connection.execute(sa.select(cells).order_by(cells.c.name)).mappings().all()
-    return tuple(CellRecord(**row) for row in rows)
+    for row in rows:
+        if not _is_sound(row):
+            logger.error("cell %s is damaged and left out", row["name"])
+    return tuple(_record(row) for row in rows if _is_sound(row))
+
+
+def _is_sound(row: sa.RowMapping) -> bool:
+    return has_digest(row["digest"], {"definition": row["definition"]})
+
+
+def _record(row: sa.RowMapping) -> CellRecord:
+    values = {name: value for name, value in row.items() if name != "digest"}
+    return CellRecord(**values)
 
 
 def remove_cell(store: Store, name: str) -> None:

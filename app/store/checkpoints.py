@@ -1,21 +1,30 @@
 """Trained policies and the names that point to them.
 
-A checkpoint is a JSON manifest and safetensors bytes under its SHA-256; the store never opens
-it. Two jobs that made the same bytes share one row.
+A checkpoint is a JSON manifest and safetensors bytes under its SHA-256, which is compared each
+time both are read; the store never opens it. Two jobs that made the same bytes share one row.
 """
 
+import logging
 import re
+from collections.abc import Iterator
 from datetime import UTC, datetime
 from typing import Any
 
 import sqlalchemy as sa
 
-from app.errors import InvalidInput, NotFound
+from app.digests import has_digest
+from app.errors import Damaged, InvalidInput, NotFound
 from app.store.cursors import check_limit, decode_cursor, encode_cursor
 from app.store.engine import Store
 from app.store.records import CheckpointRecord, NewCheckpoint, Page
 from app.store.tables import aliases, checkpoints, job_checkpoints
 
+logger = logging.getLogger(__name__)
+
+REMEDY = (
+    "restore the database from a backup, or train it again with its preset and seed: the same "
+    "weights take its place"
+)
 MAX_TENSORS = 16 * 1024 * 1024
 """Largest policy that goes into the database [bytes]."""
 
@@ -49,19 +58,40 @@ def get_checkpoint(store: Store, reference: str) -> CheckpointRecord:
         return _record(row, _names(connection))
 
 
-def read_tensors(store: Store, reference: str) -> bytes:
-    """Return the safetensors bytes of a checkpoint, by SHA-256 or alias.
+def read_checkpoint(store: Store, reference: str) -> tuple[CheckpointRecord, bytes]:
+    """Return one checkpoint, by SHA-256 or alias, with its safetensors bytes.
 
     Raises:
         NotFound: Nothing has that name.
+        Damaged: Manifest and tensors are not those that were stored, or an alias names
+            nothing.
     """
     with store.reading() as connection:
         sha256 = _resolve(connection, reference)
-        query = sa.select(checkpoints.c.tensors).where(checkpoints.c.sha256 == sha256)
-        tensors: bytes | None = connection.execute(query).scalar()
-    if tensors is None:
+        query = _described().add_columns(checkpoints.c.tensors)
+        row = connection.execute(query.where(checkpoints.c.sha256 == sha256)).first()
+        names = _names(connection)
+    if row is None and reference == sha256:
         raise NotFound("checkpoint", reference)
-    return tensors
+    if row is None or not has_digest(sha256, row.manifest, row.tensors):
+        known = ", ".join(names.get(sha256, ()))
+        raise Damaged("checkpoint", known or sha256, REMEDY, sha256)
+    return _record(row, names), row.tensors
+
+
+def find_damaged(store: Store) -> Iterator[Damaged | None]:
+    """Read all checkpoints; yields the error of each that is damaged, None for a sound one."""
+    with store.reading() as connection:
+        ids = connection.execute(sa.select(checkpoints.c.sha256)).scalars().all()
+    for reference in (*ids, *list_aliases(store)):
+        try:
+            read_checkpoint(store, reference)
+        except Damaged as error:
+            yield error
+        except NotFound:
+            continue  # removed since
+        else:
+            yield None
 
 
 def list_checkpoints(
@@ -122,6 +152,8 @@ def insert_checkpoint(
 ) -> None:
     """Write a checkpoint inside a transaction, unless the same bytes are there already.
 
+    A damaged one of that id is replaced.
+
     Raises:
         InvalidInput: Its id is no SHA-256 or it is too large.
     """
@@ -130,20 +162,23 @@ def insert_checkpoint(
     if len(new.tensors) > MAX_TENSORS:
         rule = f"bytes exceed the limit of {MAX_TENSORS} bytes per checkpoint"
         raise InvalidInput("checkpoint.tensors", len(new.tensors), rule)
-    same = checkpoints.c.sha256 == new.sha256
-    if connection.execute(sa.select(checkpoints.c.number).where(same)).first() is not None:
-        if imported:
-            connection.execute(sa.update(checkpoints).where(same).values(imported=True))
-        return
-    values = {
-        "sha256": new.sha256,
-        "imported": imported,
+    content = {
         "manifest": dict(new.manifest),
         "size": len(new.tensors),
-        "created_at": datetime.now(UTC),
         "tensors": new.tensors,
     }
-    connection.execute(sa.insert(checkpoints).values(values))
+    same = checkpoints.c.sha256 == new.sha256
+    query = sa.select(checkpoints.c.manifest, checkpoints.c.tensors).where(same)
+    there = connection.execute(query).first()
+    if there is None:
+        values = {"sha256": new.sha256, "imported": imported, "created_at": datetime.now(UTC)}
+        connection.execute(sa.insert(checkpoints).values({**values, **content}))
+        return
+    if not has_digest(new.sha256, there.manifest, there.tensors):
+        logger.warning("checkpoint %s was damaged: it is stored again", new.sha256)
+        connection.execute(sa.update(checkpoints).where(same).values(content))
+    if imported:
+        connection.execute(sa.update(checkpoints).where(same).values(imported=True))
 
 
 def drop_job_checkpoints(connection: sa.Connection, job_id: str, *, beyond: int) -> None:
@@ -205,7 +240,7 @@ def _record(row: Any, names: dict[str, tuple[str, ...]]) -> CheckpointRecord:
         number=row.number,
         job_id=row.job_id,
         step=row.step,
-        manifest=row.manifest,
+        manifest=row.manifest if isinstance(row.manifest, dict) else {},
         size=row.size,
         created_at=row.created_at,
         aliases=names.get(row.sha256, ()),

@@ -6,8 +6,10 @@ a transaction that reads first and writes later would otherwise fail under concu
 """
 
 import json
+import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +17,12 @@ import sqlalchemy as sa
 from sqlalchemy import event
 from sqlalchemy.engine import make_url
 from sqlalchemy.engine.interfaces import DBAPIConnection
-from sqlalchemy.exc import ArgumentError, NoSuchModuleError, OperationalError
+from sqlalchemy.exc import ArgumentError, DatabaseError, NoSuchModuleError, OperationalError
 from sqlalchemy.pool import ConnectionPoolEntry
 
 from app.errors import InvalidInput, StorageFull, StorageUnavailable
+
+logger = logging.getLogger(__name__)
 
 BUSY_TIMEOUT_MS = 30_000
 """How long a writer waits for another one; a 100 MB blob takes below one second."""
@@ -48,7 +52,9 @@ class Store:
     def __init__(self, database_url: str) -> None:
         self._url = _checked_url(database_url)
         try:
-            self.engine = sa.create_engine(self._url, json_serializer=_to_json)
+            self.engine = sa.create_engine(
+                self._url, json_serializer=_to_json, json_deserializer=_from_json
+            )
         except (NoSuchModuleError, ModuleNotFoundError) as error:
             rule = f"needs a database driver that is not installed ({error})"
             raise InvalidInput("database_url", self.shown_url, rule) from error
@@ -100,9 +106,11 @@ class Store:
                 connection = plain.execution_options(tandem_writes=writes)
                 with connection.begin():
                     yield connection
-        except OperationalError as error:
+        except DatabaseError as error:
             if _is_full(error):
                 raise StorageFull(self.shown_url) from error
+            if not (isinstance(error, OperationalError) or "malformed" in str(error.orig)):
+                raise
             raise StorageUnavailable(self.shown_url, str(error.orig)) from error
 
     def close(self) -> None:
@@ -136,9 +144,20 @@ def _to_json(value: Any) -> str:
     return json.dumps(value, allow_nan=False, ensure_ascii=False)
 
 
+def _from_json(text: str) -> Any:
+    """Return stored JSON; nothing where it cannot be read, so that other rows still are."""
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError):
+        logger.error("JSON in the database is damaged: %.60r", text)
+        return {}
+
+
 def _prepare_connection(connection: DBAPIConnection, _entry: ConnectionPoolEntry) -> None:
     # The driver's own implicit BEGIN comes too late and is never IMMEDIATE: switch it off.
     connection.isolation_level = None
+    # One damaged character must not keep a whole list from being read.
+    connection.text_factory = partial(str, encoding="utf-8", errors="replace")
     cursor = connection.cursor()
     for pragma in _PRAGMAS:
         cursor.execute(pragma)
@@ -150,6 +169,6 @@ def _begin(connection: sa.Connection) -> None:
     connection.exec_driver_sql("BEGIN IMMEDIATE" if writes else "BEGIN")
 
 
-def _is_full(error: OperationalError) -> bool:
+def _is_full(error: DatabaseError) -> bool:
     text = str(error.orig).lower()
     return "disk is full" in text or "no space left" in text or "disk full" in text

@@ -4,15 +4,19 @@ A stored motion never changes: another file under the same name is refused until
 removed, so that what was measured with a motion is what its name meant.
 """
 
+import logging
 from datetime import UTC, datetime
 from typing import Any
 
 import sqlalchemy as sa
 
-from app.errors import Conflict, InvalidInput, NotFound
+from app.digests import digest, has_digest
+from app.errors import Conflict, Damaged, InvalidInput, NotFound
 from app.store.engine import Store
 from app.store.records import MotionRecord, NewMotion
 from app.store.tables import motions
+
+logger = logging.getLogger(__name__)
 
 MAX_MOTIONS = 200
 """Most motions that are kept."""
@@ -21,7 +25,7 @@ MAX_TENSORS = 40 * 1024 * 1024
 MAX_TOTAL = 2 * 1024 * 1024 * 1024
 """Most that all motions together take [bytes]."""
 
-_LISTED = [column for column in motions.c if column.name not in ("tensors", "detail")]
+_LISTED = [column for column in motions.c if column.name not in ("digest", "tensors", "detail")]
 _DETAILED = [*_LISTED, motions.c.detail]
 
 
@@ -46,6 +50,7 @@ def put_motion(store: Store, new: NewMotion) -> bool:
     with store.writing() as connection:
         if _same(connection, new.name, new.sha256) is not None:
             return False
+        summary, detail = dict(new.summary), dict(new.detail)
         values = {
             "name": new.name,
             "sha256": new.sha256,
@@ -53,10 +58,12 @@ def put_motion(store: Store, new: NewMotion) -> bool:
             "n_runs": new.n_runs,
             "n_frames": new.n_frames,
             "duration": new.duration,
-            "summary": dict(new.summary),
-            "detail": dict(new.detail),
+            "summary": summary,
+            "detail": detail,
             "size": len(new.tensors),
             "created_at": datetime.now(UTC),
+            "summary_digest": digest({"summary": summary}),
+            "digest": digest({"summary": summary, "detail": detail}, new.tensors),
             "tensors": new.tensors,
         }
         connection.execute(sa.insert(motions).values(values))
@@ -78,26 +85,20 @@ def find_same(store: Store, name: str, sha256: str) -> MotionRecord | None:
         return _same(connection, name, sha256)
 
 
-def get_motion(store: Store, name: str) -> MotionRecord:
-    """Return one motion with its detail, without its runs.
-
-    Raises:
-        NotFound: No motion has that name.
-    """
-    with store.reading() as connection:
-        return MotionRecord(**_row(connection, name, _DETAILED))
-
-
 def read_runs(store: Store, name: str) -> tuple[MotionRecord, bytes]:
     """Return one motion with its detail and the safetensors bytes of its runs.
 
     Raises:
         NotFound: No motion has that name.
+        Damaged: It is not what was stored.
     """
     with store.reading() as connection:
         row = dict(_row(connection, name, list(motions.c)))
+    content = {"summary": row["summary"], "detail": row["detail"]}
+    if not has_digest(row["digest"], content, row["tensors"]):
+        raise Damaged("motion", name, "remove it, and import its file again")
     tensors: bytes = row.pop("tensors")
-    return MotionRecord(**row), tensors
+    return _record(row), tensors
 
 
 def motion_number(store: Store, name: str) -> int:
@@ -111,10 +112,16 @@ def motion_number(store: Store, name: str) -> int:
 
 
 def list_motions(store: Store) -> tuple[MotionRecord, ...]:
-    """Return all motions, by name, without detail and runs."""
+    """Return all motions whose summary is undamaged, by name, without detail and runs."""
     with store.reading() as connection:
         rows = connection.execute(sa.select(*_LISTED).order_by(motions.c.name)).mappings().all()
-    return tuple(MotionRecord(**row) for row in rows)
+    found = []
+    for row in rows:
+        if has_digest(row["summary_digest"], {"summary": row["summary"]}):
+            found.append(_record(row))
+        else:
+            logger.error("motion %s is damaged and left out", row["name"])
+    return tuple(found)
 
 
 def motion_names(store: Store) -> tuple[str, ...]:
@@ -135,6 +142,10 @@ def remove_motion(store: Store, name: str) -> None:
             raise NotFound("motion", name)
 
 
+def _record(row: Any) -> MotionRecord:
+    return MotionRecord(**{name: row[name] for name in row if "digest" not in name})
+
+
 def _row(connection: sa.Connection, name: str, columns: list[sa.Column[Any]]) -> Any:
     query = sa.select(*columns).where(motions.c.name == name)
     row = connection.execute(query).mappings().first()
@@ -148,7 +159,7 @@ def _same(connection: sa.Connection, name: str, sha256: str) -> MotionRecord | N
     row = connection.execute(query).mappings().first()
     if row is not None:
         if row["sha256"] == sha256:
-            return MotionRecord(**row)
+            return _record(row)
         raise Conflict(
             f"a motion named {name!r} from another file is stored: remove it first, or choose "
             "another name"

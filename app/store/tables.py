@@ -128,10 +128,12 @@ resume_states = Table(
     "resume_states",
     metadata,
     _job_key(primary=True),
-    Column("step", BigInteger, nullable=False),
+    Column("step", BigInteger, primary_key=True, autoincrement=False),
     Column("manifest", JSON, nullable=False),
+    Column("digest", String(64)),
     Column("tensors", LargeBinary, nullable=False),
 )
+"""The newest two of each job, so that damage to one does not cost the training."""
 
 aliases = Table(
     "aliases",
@@ -146,6 +148,7 @@ cells = Table(
     metadata,
     Column("name", String(64), primary_key=True),
     Column("definition", JSON, nullable=False),
+    Column("digest", String(64)),
     Column("created_at", UtcDateTime, nullable=False),
 )
 
@@ -163,6 +166,8 @@ motions = Table(
     Column("detail", JSON, nullable=False),
     Column("size", Integer, nullable=False),
     Column("created_at", UtcDateTime, nullable=False),
+    Column("summary_digest", String(64)),
+    Column("digest", String(64)),
     Column("tensors", LargeBinary, nullable=False),
     sqlite_autoincrement=True,
 )

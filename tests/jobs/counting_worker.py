@@ -7,7 +7,6 @@ of these steps until it is stopped or killed), ``deaf`` (it never asks whether t
 process).
 """
 
-import hashlib
 import os
 import sys
 import time
@@ -16,6 +15,7 @@ from typing import Any
 
 from sqlalchemy import event
 
+from app.digests import digest
 from app.errors import InvalidInput
 from app.store.records import NewCheckpoint, ResumeState
 from jobs.attempt import main
@@ -52,7 +52,7 @@ def load(resume: ResumeState) -> tuple[int, int]:
 def save(worker: Worker, step: int, value: int) -> None:
     tensors = value.to_bytes(8, "big") + bytes(worker.job.overrides.get("padding", 0))
     manifest = {"job": worker.job.id, "step": step}
-    sha256 = hashlib.sha256(f"{manifest}".encode() + tensors).hexdigest()
+    sha256 = digest(manifest, tensors)
     policy = NewCheckpoint(sha256=sha256, manifest=manifest, tensors=tensors)
     worker.record_checkpoint(step, policy, ResumeState(step=step, manifest={}, tensors=tensors))
 

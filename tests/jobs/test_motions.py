@@ -3,7 +3,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import sqlalchemy as sa
 
 from app.errors import BadMotion, Conflict, InvalidInput, NotFound
 from app.sim.motions import Motion, read_motion
@@ -11,7 +10,6 @@ from app.sim.read_options import ReadOptions
 from app.store.engine import Store
 from app.store.motions import put_motion
 from app.store.records import NewMotion
-from app.store.tables import motions as table
 from jobs import motions as motions_module
 from jobs.import_process import import_here
 from jobs.motions import MotionCatalog
@@ -235,12 +233,9 @@ def test_stored_body_of_another_version_is_read_as_far_as_it_is_known(
 
 
 def test_stored_runs_that_do_not_add_up_are_named(store: Store, catalog: MotionCatalog) -> None:
-    record, _ = catalog.add(CLIP, "nod.csv")
-    assert record.detail is not None
-    recorded = {**record.detail["recorded"], "sources": ["a", "b"]}
-    with store.writing() as connection:
-        changed = {"detail": {**record.detail, "recorded": recorded}}
-        connection.execute(sa.update(table).values(changed))
+    new = packed(read_motion(CLIP, "nod.csv"), "nod", "nod.csv", "a" * 64)
+    recorded = {**new.detail["recorded"], "sources": ["a", "b"]}
+    put_motion(store, replace(new, detail={**new.detail, "recorded": recorded}))
     with pytest.raises(InvalidInput, match="post it anew"):
         catalog.get("nod")
 

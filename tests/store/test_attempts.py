@@ -1,9 +1,9 @@
 import threading
 from collections.abc import Callable
-from hashlib import sha256
 
 import pytest
 
+from app.digests import digest
 from app.errors import InvalidInput, StaleAttempt
 from app.store import attempts, checkpoints, endings, events, fences, jobs, metrics
 from app.store.engine import Store
@@ -11,8 +11,8 @@ from app.store.records import Claim, NewCheckpoint, NewJob, ResumeState
 
 
 def policy(content: bytes = b"x") -> NewCheckpoint:
-    digest = sha256(content).hexdigest()
-    return NewCheckpoint(sha256=digest, manifest={"n": len(content)}, tensors=content)
+    manifest = {"n": len(content)}
+    return NewCheckpoint(sha256=digest(manifest, content), manifest=manifest, tensors=content)
 
 
 def resume(step: int, content: bytes = b"r") -> ResumeState:

@@ -1,7 +1,6 @@
-from hashlib import sha256
-
 import pytest
 
+from app.digests import digest
 from app.errors import InvalidInput, NotFound
 from app.store import attempts, checkpoints, endings, jobs
 from app.store.engine import Store
@@ -9,8 +8,8 @@ from app.store.records import Claim, NewCheckpoint, NewJob, ResumeState
 
 
 def policy(content: bytes) -> NewCheckpoint:
-    digest = sha256(content).hexdigest()
-    return NewCheckpoint(sha256=digest, manifest={"preset": "p"}, tensors=content)
+    manifest = {"preset": "p"}
+    return NewCheckpoint(sha256=digest(manifest, content), manifest=manifest, tensors=content)
 
 
 def second_job(store: Store) -> Claim:
@@ -26,7 +25,7 @@ def test_checkpoint_of_a_job_is_found_by_its_hash(store: Store, claim: Claim) ->
     found = checkpoints.get_checkpoint(store, new.sha256)
     assert (found.job_id, found.step, found.size) == (claim.job_id, 7, 256)
     assert found.manifest == {"preset": "p"}
-    assert checkpoints.read_tensors(store, new.sha256) == new.tensors
+    assert checkpoints.read_checkpoint(store, new.sha256) == (found, new.tensors)
 
 
 def test_imported_checkpoint_has_no_job(store: Store) -> None:
@@ -40,7 +39,7 @@ def test_unknown_checkpoint_is_not_found(store: Store, reference: str) -> None:
     with pytest.raises(NotFound, match="no checkpoint"):
         checkpoints.get_checkpoint(store, reference)
     with pytest.raises(NotFound):
-        checkpoints.read_tensors(store, reference)
+        checkpoints.read_checkpoint(store, reference)
 
 
 def test_unknown_alias_names_the_known_ones(store: Store) -> None:
@@ -77,9 +76,9 @@ def test_too_large_checkpoint_is_refused(store: Store, claim: Claim) -> None:
         attempts.record_checkpoint(store, claim, 1, new)
 
 
-@pytest.mark.parametrize("digest", ["", "xyz", "A" * 64, "0" * 63])
-def test_id_that_is_no_hash_is_refused(store: Store, digest: str) -> None:
-    new = NewCheckpoint(sha256=digest, manifest={}, tensors=b"")
+@pytest.mark.parametrize("given", ["", "xyz", "A" * 64, "0" * 63])
+def test_id_that_is_no_hash_is_refused(store: Store, given: str) -> None:
+    new = NewCheckpoint(sha256=given, manifest={}, tensors=b"")
     with pytest.raises(InvalidInput, match="must be 64 hexadecimal digits"):
         checkpoints.put_checkpoint(store, new)
 

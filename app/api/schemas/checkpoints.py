@@ -19,7 +19,9 @@ class CheckpointPublic(Answer):
     job_id: str | None = Field(description="the job that made it; null for a shipped one")
     step: int | None = Field(description="environment steps of that job")
     preset: str | None
-    purpose: str = Field(description="`choosing tasks` or `sorting`")
+    purpose: str = Field(
+        description="`choosing tasks`, `reaching goals`, `sorting`, or `unreadable` if damaged"
+    )
     size: int = Field(description="length of the tensors [bytes]")
     created_at: datetime
     tensors: str = Field(description="where its safetensors bytes are")
@@ -36,7 +38,7 @@ class CheckpointPublic(Answer):
             job_id=record.job_id,
             step=record.step,
             preset=preset.get("name") if isinstance(preset, dict) else None,
-            purpose=purpose_of(record.manifest),
+            purpose=purpose_of(record.manifest) if record.manifest else "unreadable",
             size=record.size,
             created_at=record.created_at,
             tensors=f"/v1/checkpoints/{record.sha256}/tensors",

@@ -1,0 +1,33 @@
+"""SHA-256 of stored data: JSON in one spelling, followed by bytes."""
+
+import hashlib
+import json
+from typing import Any
+
+
+def canonical(value: Any) -> str:
+    """Return JSON data as text with one spelling.
+
+    Raises:
+        ValueError: A number is not finite.
+    """
+    return json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False)
+
+
+def digest(value: Any, content: bytes = b"") -> str:
+    """Return the SHA-256 of JSON data followed by bytes, 64 hexadecimal digits.
+
+    Raises:
+        ValueError: A number is not finite.
+    """
+    found = hashlib.sha256(canonical(value).encode())
+    found.update(content)
+    return found.hexdigest()
+
+
+def has_digest(expected: str | None, value: Any, content: bytes = b"") -> bool:
+    """Whether JSON data and bytes that were read have the digest that was stored with them."""
+    try:
+        return digest(value, content) == expected
+    except (TypeError, ValueError):  # what was read is no JSON data any more
+        return False
