@@ -54,8 +54,9 @@ STANDING = (0.85, 1.18)
 """Range of the pelvis's height over the file's zero, relative to what legs make of it."""
 HIGH_PELVIS = (0.42, 0.62)
 """Range of the pelvis's height relative to stature, where no legs were recorded."""
-MIN_PLANTED = 0.8
-"""Cosine between the paths of pelvis and lower foot above which the foot stands."""
+MIN_PLANTED, SURELY_PLANTED = 0.8, 0.95
+"""Cosines between the paths of pelvis and lower foot above which the foot stands: where nothing
+contradicts, and where the height of the pelvis does."""
 SAME_FACTOR = (0.75, 1.33)
 """Range of the root's unit relative to the skeleton's in which they are the same."""
 MAX_PACE = 3.0
@@ -194,11 +195,12 @@ def require_one_unit(
     Raises:
         BadMotion: Another unit fits and this one does not; the fault names both.
     """
-    own, planted, span = metres(unit), None, HIGH_PELVIS
+    own, planted, cosine, span = metres(unit), 0.0, 0.0, HIGH_PELVIS
     legs = own * stature.value
     what = f"must fit a stature of {legs:.2f} m"
     if ankles is not None:
-        planted, span = _planted(pelvis, ankles, dt, stature.value), STANDING
+        planted, cosine = _planted(pelvis, ankles, dt, stature.value)
+        span = STANDING
         legs = own * (float(np.median(-ankles[:, :, 2].min(axis=1))) + SOLE * stature.value)
         what = f"must fit the legs, which hold it {legs:.2f} m over the floor"
     height = float(np.median(pelvis[:, 2]))
@@ -207,10 +209,11 @@ def require_one_unit(
         return _within(length * height / legs, span)
 
     def treads(length: float) -> bool:
-        return planted is not None and _within(planted * own / length, SAME_FACTOR)
+        return cosine > MIN_PLANTED and _within(planted * own / length, SAME_FACTOR)
 
     rest = {one: length for one, length in UNITS.items() if not 0.99 < length / own < 1.01}
-    if treads(own) or (stands(own) and not any(treads(length) for length in rest.values())):
+    slides = cosine > SURELY_PLANTED and any(treads(length) for length in rest.values())
+    if treads(own) or (stands(own) and not slides):
         return ""
     possible = _possible_path(pelvis, dt)
     others = [
@@ -220,7 +223,7 @@ def require_one_unit(
     ]
     if not others and possible(own):
         over = f"the file's zero is not the floor: the pelvis is {own * height:.2f} m over it"
-        return over if planted else f"{over}; nothing tells whether its path is in {unit}"
+        return f"{over}; nothing tells whether its path is in {unit}"
     others = others or [one for one, length in rest.items() if possible(length)]
     named = "".join(f", or {UNITS[one] * height:.3g} m in {one}" for one in others)
     value = f"{own * height:.3g} m in {unit}, as the skeleton{named}"
@@ -242,10 +245,11 @@ def _possible_path(pelvis: Vec, dt: float) -> Callable[[float], bool]:
     return possible
 
 
-def _planted(pelvis: Vec, ankles: Vec, dt: float, stature: float) -> float | None:
+def _planted(pelvis: Vec, ankles: Vec, dt: float, stature: float) -> tuple[float, float]:
     """Return by what the root's path must be multiplied so that the lower foot stands.
 
-    None where the pelvis does not move over its feet.
+    And the cosine between that path and the foot's, relative to the pelvis: 1 where it stands;
+    0 where the pelvis does not move over its feet.
     """
     step = max(1, round(0.1 / dt))
     lower = ankles[:, :, 2].argmin(axis=1)[:-step]
@@ -255,8 +259,8 @@ def _planted(pelvis: Vec, ankles: Vec, dt: float, stature: float) -> float | Non
     size, along = float((moved**2).sum()), float((moved * under).sum())
     swung = float((under**2).sum())
     if len(lower) < 2 or size <= 0.0 or swung < len(lower) * (0.005 * stature) ** 2:
-        return None
-    return along / size if along > MIN_PLANTED * np.sqrt(size * swung) else None
+        return 0.0, 0.0
+    return along / size, along / float(np.sqrt(size * swung))
 
 
 def _within(value: float, span: tuple[float, float]) -> bool:

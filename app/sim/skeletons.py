@@ -83,7 +83,7 @@ def body_track(bvh: Bvh, options: ReadOptions = NOTHING_STATED) -> tuple[BodyTra
     track = BodyTrack(
         times=np.asarray(bvh.dt * np.arange(len(points))),
         points=points,
-        upright=_upright(z_up(_stacked(rest), rest_axis(standing) or up)),
+        upright=_upright(rest, rest_axis(standing)),
         hips=placed["hip_l"] - placed["hip_r"] if {"hip_r", "hip_l"} <= placed.keys() else None,
     )
     reading = Reading(
@@ -182,10 +182,18 @@ def _require_degrees(bvh: Bvh) -> None:
     raise BadMotion([Fault(place=place, value=f"{largest:.4g}", rule=rule, hint=hint)])
 
 
-def _upright(rest: Vec) -> Vec:
-    """Return the trunk's frame in the rest pose, its heading taken out, shape (3, 3)."""
-    across = rest[:, SHOULDER_L] - rest[:, SHOULDER_R]
-    frame = trunk_frame(rest[:, PELVIS], rest[:, NECK], across)[0]
+def _upright(rest: Centres, axis: str | None) -> Vec:
+    """Return the trunk's frame in the rest pose, its heading taken out, shape (3, 3).
+
+    Args:
+        rest: Joint centres of the rest pose.
+        axis: Direction in which it stands; None where it tells nothing.
+    """
+    if axis is None:
+        return np.eye(3)
+    points = z_up(_stacked(rest), axis)
+    across = points[:, SHOULDER_L] - points[:, SHOULDER_R]
+    frame = trunk_frame(points[:, PELVIS], points[:, NECK], across)[0]
     level = float(np.linalg.norm(across[0, :2]))
     if level <= 0.5 * float(np.linalg.norm(across)) or frame[2, 2] < np.cos(MAX_TILT):
         return np.eye(3)

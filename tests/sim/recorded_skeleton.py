@@ -68,6 +68,10 @@ class Person:
     """Of the rest pose, where it is another."""
     legs: bool = True
     head: bool = True
+    twisted: bool = False
+    """Whether each joint has axes of its own, so that the rest pose tells nothing."""
+    placed: bool = False
+    """Whether all joints have positions for channels, and no offsets."""
     named: Callable[[str], str] = str
     n: int = 60
     dt: float = 0.02
@@ -100,6 +104,7 @@ def skeleton(who: Person) -> tuple[str, Vec]:
     world, rest = WORLD[who.up], WORLD[who.rest_up or who.up]
     lines, columns = ["HIERARCHY"], [root @ world.T / (who.root_unit or who.unit)]
     points: dict[str, tuple[Vec, Vec]] = {}
+    axes: dict[str, Vec] = {"": world}
 
     def write(role: str, offset: tuple[float, float, float], parent: str, depth: int) -> None:
         pad, place = "  " * depth, who.stature * np.array(offset)
@@ -109,18 +114,24 @@ def skeleton(who: Person) -> tuple[str, Vec]:
             points[role] = at + above @ place, above @ turn
         else:
             points[role] = root, turn
-        x, y, z = (f"{one:.7g}" for one in rest @ place / who.unit)
+        axes[role] = rest
+        if who.twisted:
+            axes[role] = Rotation.random(random_state=len(axes)).as_matrix() @ rest
+        local = (axes[parent] if parent else rest) @ place / who.unit
+        x, y, z = ("0", "0", "0") if who.placed else (f"{one:.7g}" for one in local)
         if role == "HeadEnd":
             lines.extend([f"{pad}End Site", f"{pad}{{", f"{pad}  OFFSET {x} {y} {z}"])
             lines.append(f"{pad}}}")
             return
         rotations = "Zrotation Xrotation Yrotation"
-        channels = (
-            f"3 {rotations}" if parent else f"6 Xposition Yposition Zposition {rotations}"
-        )
+        channels = f"3 {rotations}"
+        if who.placed or not parent:
+            channels = f"6 Xposition Yposition Zposition {rotations}"
         lines.append(f"{pad}{'JOINT' if parent else 'ROOT'} {who.named(role)}")
         lines.extend([f"{pad}{{", f"{pad}  OFFSET {x} {y} {z}", f"{pad}  CHANNELS {channels}"])
-        in_file = Rotation.from_matrix((rest if parent else world) @ turn @ rest.T)
+        if who.placed and parent:
+            columns.append(np.tile(local, (who.n, 1)))
+        in_file = Rotation.from_matrix(axes[parent] @ turn @ axes[role].T)
         with warnings.catch_warnings(action="ignore"):  # where two axes are in line
             columns.append(in_file.as_euler("ZXY", degrees=True))
         for child, way in children.get(role, []):

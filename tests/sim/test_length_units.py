@@ -126,6 +126,8 @@ def test_any_person_is_read_right_or_refused_with_what_is_meant() -> None:
             root_unit=UNITS[root],
             up=up,
             rest_up=str(rng.choice(["", "", "y", "z"])),
+            twisted=bool(rng.random() < 0.15),
+            placed=bool(rng.random() < 0.15),
             legs=legs,
             head=bool(rng.random() < 0.5),
         )

@@ -240,6 +240,7 @@ def test_angles_are_the_same_in_any_frame(up: str, rest_up: str, bend: float) ->
     plain = Person(bend=bend)
     q = angles(replace(plain, up=up, rest_up=rest_up, unit=0.0254))
     np.testing.assert_allclose(q, angles(plain), atol=2e-3)
+    np.testing.assert_allclose(angles(replace(plain, twisted=True)), q, atol=2e-3)
     # The hips are below the joint that bends, so the line from there leans less.
     assert np.degrees(np.median(q[:, 3])) == pytest.approx(0.85 * bend, abs=5.0)
 

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -44,6 +46,15 @@ def test_legs_go_before_a_rest_pose_that_lies_in_the_frame_of_the_motion(
     up: str, rest_up: str, bend: float
 ) -> None:
     assert_read(Person(up=up, rest_up=rest_up, bend=bend))
+
+
+@pytest.mark.parametrize("up", ["y", "z"])
+@pytest.mark.parametrize("bend", [0.0, 65.0, 88.0])
+@pytest.mark.parametrize("kind", ["twisted", "placed"])
+def test_legs_tell_the_axis_where_the_rest_pose_does_not(
+    up: str, bend: float, kind: str
+) -> None:
+    assert_read(replace(Person(up=up, bend=bend), **{kind: True}))
 
 
 @pytest.mark.parametrize("up", ["y", "z"])
