@@ -16,8 +16,10 @@ from app.sim.read_options import UP_AXES
 
 FOUND = ("y", "z")
 """Axes that are found; others have to be stated."""
-NEAR = 45.0
-"""Angle below which a direction counts as that of an axis [deg]."""
+NEAR, NEAR_AT_REST = 45.0, 35.0
+"""Angles below which a direction counts as that of an axis, in motion and at rest [deg]."""
+UPPER_BODY = {"shoulders", "trunk"}
+"""What contradicts an axis whether a person stands, sits or kneels."""
 MAX_LEG = 50.0
 """Most that lower legs are off the vertical in half of the frames [deg]."""
 MAX_TOES = 35.0
@@ -53,15 +55,12 @@ def find_up_axis(motion: Posture, rest: Posture) -> str:
     """
     resting, leaning = rest_axis(rest), _nearest(_direction(motion.trunk))
     straight = _lean(rest, resting) if resting else 0.0  # the hip is often a marker on the belt
+    resting = resting if resting in FOUND else None
     against = {axis: _objections(motion, axis, straight) for axis in FOUND}
     fits = [axis for axis in FOUND if not against[axis]]
     if not fits:
-        if (
-            resting in FOUND
-            and resting == leaning
-            and against[resting].keys() <= {"lower legs"}
-        ):
-            return resting  # a person who kneels
+        if kneeling := _kneeling(resting, leaning, against):
+            return kneeling
         raise _nobody(motion, against, straight)
     if len(fits) == 1 and (resting in (None, fits[0]) or leaning == fits[0]):
         return fits[0]
@@ -72,15 +71,27 @@ def find_up_axis(motion: Posture, rest: Posture) -> str:
     raise _two(motion, fits, resting)
 
 
+def _kneeling(
+    resting: str | None, leaning: str | None, against: dict[str, dict[str, str]]
+) -> str | None:
+    """Return the axis of a person who kneels or squats: only the lower legs are against it."""
+    for axis, other in (FOUND, FOUND[::-1]):
+        if against[axis].keys() == {"lower legs"} and resting in (None, axis):
+            only = axis in (resting, leaning) and against[other].keys() & UPPER_BODY
+            if only or resting == leaning == axis:
+                return axis
+    return None
+
+
 def rest_axis(rest: Posture) -> str | None:
     """Return the direction along which the rest pose stands, one of UP_AXES.
 
     None where trunk and legs are not in line, or nothing is known.
     """
-    axis = _nearest(_direction(rest.trunk))
-    if axis is None or abs(_elevation(rest.across, axis)) > NEAR:
+    axis = _nearest(_direction(rest.trunk), NEAR_AT_REST)
+    if axis is None or abs(_elevation(rest.across, axis)) > NEAR_AT_REST:
         return None
-    if rest.legs is not None and _nearest(-_direction(rest.legs)) != axis:
+    if rest.legs is not None and _nearest(-_direction(rest.legs), NEAR_AT_REST) != axis:
         return None
     return axis
 
@@ -149,13 +160,13 @@ def _direction(directions: Vec) -> Vec:
     return np.asarray(np.median(directions, axis=0))
 
 
-def _nearest(direction: Vec) -> str | None:
+def _nearest(direction: Vec, within: float = NEAR) -> str | None:
     """Return the axis that a direction is near to; None where it is near to none."""
     length = float(np.linalg.norm(direction))
     if length < 0.5:  # unit vectors that point everywhere
         return None
     axis = max(UP_AXES, key=lambda one: float(vector(one) @ direction))
-    near = float(vector(axis) @ direction) > np.cos(np.radians(NEAR)) * length
+    near = float(vector(axis) @ direction) > np.cos(np.radians(within)) * length
     return axis if near else None
 
 
@@ -175,7 +186,7 @@ def _nobody(motion: Posture, against: dict[str, dict[str, str]], straight: float
 def _two(motion: Posture, fits: list[str], resting: str | None) -> BadMotion:
     parts = [f"{axis} up by the motion (the trunk {_leaning(motion, axis)})" for axis in fits]
     named = fits
-    if resting in FOUND:
+    if resting:
         parts.append(f"{resting} up by the rest pose")
         named = sorted({*fits, resting})
     rule, hint = f"fits {' and '.join(parts)}", f"state up = {' or '.join(named)}"

@@ -113,13 +113,16 @@ def test_any_person_is_read_right_or_refused_with_what_is_meant() -> None:
         unit, up = str(rng.choice(list(UNITS))), str(rng.choice(["y", "z"]))
         root = str(rng.choice([*UNITS, unit, unit, unit, unit, unit]))
         legs, bend, share = bool(rng.random() < 0.7), rng.uniform(0.0, 90.0), rng.random()
-        told = legs or root == unit  # else only the height of one who stands tells the unit
+        thigh, knee = rng.choice([(0.0, 0.0), (0.0, 20.0), (60.0, 110.0), (85.0, 85.0)])
+        told = legs or root == unit
+        if not told:  # only the height of a person who stands tells the unit
+            thigh = knee = 0.0
         who = Person(
             stature=rng.uniform(1.05, 2.05),
             bend=bend * share,
             tilt=0.7 * bend * (1.0 - share),
-            thigh=float(rng.choice([0.0, 0.0, 60.0, 85.0])) if told else 0.0,
-            knee=float(rng.choice([0.0, 20.0, 85.0])) if told else 0.0,
+            thigh=thigh,
+            knee=knee,
             heading=rng.uniform(-np.pi, np.pi),
             floor=float(rng.choice([0.0, 0.0, -0.9, 0.3])) if told else 0.0,
             unit=UNITS[unit],
