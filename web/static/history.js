@@ -11,7 +11,7 @@ const FRESH_S = 0.06;
 /**
  * Values of all candidates over the last `SPAN_S` seconds. Time is the cell's own, so that a
  * slow browser draws no bursts; while the cell is paused it is the clock on the wall, since a
- * paused cell still answers to a person who is dragged.
+ * paused cell still answers to a person who is dragged; nothing is added while nothing changes.
  */
 export class History {
   constructor() {
@@ -22,6 +22,7 @@ export class History {
   /** Add what a snapshot says, which came at `wall` [s]. */
   add(world, wall = performance.now() / 1000) {
     const { last } = this;
+    if (last && world.paused && this.isLast(world)) return;
     const cellTime = world.t_s - (last?.world ?? 0);
     const elapsed = !last ? 0 : cellTime > 0 ? cellTime : world.paused ? wall - last.wall : 0.05;
     if (last && (elapsed > GAP_S || cellTime < 0)) {
@@ -34,6 +35,13 @@ export class History {
     this.samples.push({ t, values, chosen: fresh ? world.chosen : null });
     this.last = { t, wall, world: world.t_s };
     while (this.samples[0].t < t - SPAN_S) this.samples.shift();
+  }
+
+  /** Whether a snapshot says what the last sample says. */
+  isLast({ candidates, chosen, t_s: t }) {
+    const { values, chosen: before } = this.samples.at(-1);
+    return t === this.last.world && chosen === before && candidates.length === values.size
+      && candidates.every(({ id, value }) => values.get(id) === value);
   }
 
   /** Seconds since sample `i`, negative. */
