@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 from app.errors import Conflict, NotFound
-from app.sim.people_estimate import PeopleEstimator
+from app.sim.people_estimate import PeopleEstimator, Unfollowed
 from app.sim.person_estimate import Flag, PersonEstimate
 from app.sim.ports import Vec
 from app.sim.stamp_timeline import StampTimeline
@@ -51,6 +51,8 @@ class TrackedPeople:
     """Estimate of each track at the last frame that showed its person; None: no frame did."""
     observed_age_s: tuple[float, ...]
     """Age of each observation at the moment [s]; without one, ``since_frame_s``."""
+    unfollowed: tuple[Unfollowed, ...]
+    """People in the newest frame who are not followed, nearest first."""
 
 
 @dataclass(slots=True, kw_only=True)
@@ -83,8 +85,8 @@ class TrackerSession:
 
     def take(
         self, t: float, arrived: float, people: Sequence[Vec], confidences: Sequence[Vec]
-    ) -> tuple[PersonEstimate, ...]:
-        """Take one frame of all people and return the estimates at its time.
+    ) -> TrackedPeople:
+        """Take one frame of all people and return what is known at its time.
 
         Args:
             t: When the frame was taken, tracker's clock [s].
@@ -101,7 +103,7 @@ class TrackerSession:
             estimates = self.estimator.update(at, people, confidences)
             self.timeline.accept(t, at, arrived)
             self.n_frames += 1
-            return self._flagged(estimates)
+            return self._tracked(estimates, 0.0)
 
     def people(self, t: float | None = None) -> TrackedPeople:
         """Return what is known of its people now.
@@ -111,21 +113,29 @@ class TrackerSession:
                 makes people older than the arrival of the newest frame does.
         """
         with self.lock:
-            newest = self.timeline.stamp
             since = self.timeline.ahead(self.clock(), t)
-            at = since if self.timeline.time is None else self.timeline.time + since
-            observed = self.estimator.observed
-            ages = [since if one is None else at - one.t + one.carried_s for one in observed]
-            return TrackedPeople(
-                t=None if newest is None else newest + since,
-                since_frame_s=since,
-                estimates=self._flagged(self.estimator.at(at), since),
-                observed=tuple(observed),
-                observed_age_s=tuple(ages),
-            )
+            return self._tracked(self.estimator.at((self.timeline.time or 0.0) + since), since)
+
+    def _tracked(
+        self, estimates: tuple[PersonEstimate, ...], since_frame_s: float
+    ) -> TrackedPeople:
+        """Return estimates for a moment after the newest frame, with all that is known then."""
+        newest, observed = self.timeline.stamp, tuple(self.estimator.observed)
+        at = (self.timeline.time or 0.0) + since_frame_s
+        ages = [
+            since_frame_s if one is None else at - one.t + one.carried_s for one in observed
+        ]
+        return TrackedPeople(
+            t=None if newest is None else newest + since_frame_s,
+            since_frame_s=since_frame_s,
+            estimates=self._flagged(estimates, since_frame_s),
+            observed=observed,
+            observed_age_s=tuple(ages),
+            unfollowed=self.estimator.unfollowed,
+        )
 
     def _flagged(
-        self, estimates: tuple[PersonEstimate, ...], since_frame_s: float = 0.0
+        self, estimates: tuple[PersonEstimate, ...], since_frame_s: float
     ) -> tuple[PersonEstimate, ...]:
         """Return estimates that also name the silence of the tracker and a jump of its clock.
 

@@ -54,9 +54,8 @@ async def take_frame(
     session = services.trackers.get(tracker_id)
     seen = [one.points() for one in body.people]
     points, trust = [one[0] for one in seen], [one[1] for one in seen]
-    estimates = await run_in_threadpool(session.take, body.t, arrived, points, trust)
-    rest = session.estimator.unfollowed
-    return EstimatesPublic.from_domain(tracker_id, body.t, estimates, rest)
+    known = await run_in_threadpool(session.take, body.t, arrived, points, trust)
+    return EstimatesPublic.from_domain(tracker_id, known)
 
 
 @router.get("/{tracker_id}", summary="What is known of a tracker's people")
@@ -78,8 +77,7 @@ async def get_one(
     """
     session = services.trackers.get(tracker_id)
     known = await run_in_threadpool(session.people, t)
-    rest = session.estimator.unfollowed
-    return EstimatesPublic.from_domain(tracker_id, known.t, known.estimates, rest)
+    return EstimatesPublic.from_domain(tracker_id, known)
 
 
 @router.delete("/{tracker_id}", status_code=204, summary="Listen to a tracker no longer")

@@ -60,6 +60,7 @@ class Stage:
         self.arm, self.top_z = self.world.arm, shared.top_z
         self._own_size = shared.bodies[0]
         self._measured = np.ones(n_cylinders, dtype=np.bool_)
+        self._tops = np.full((n_cylinders, 1), self.top_z)
         self.apart = np.zeros(n_bodies + n_cylinders)
         """Distance of the robot to each person [m], bodies first, shape (n_people,)."""
         self._calls: dict[int, Callable[..., None]] = {}
@@ -90,10 +91,9 @@ class Stage:
     def shapes(self) -> Shapes:
         """The people as shapes, bodies first."""
         crowd = self._work.crowd
-        tops = np.full((len(crowd.cylinders), 1), self.top_z)
         return Shapes(
             columns=crowd.columns.copy(),
-            cylinders=np.concatenate([crowd.cylinders, tops], axis=1),
+            cylinders=np.concatenate([crowd.cylinders, self._tops], axis=1),
             going=np.where(
                 self._measured[:, None],
                 self.state.people.walkers.rows[0][:, [VX, VY, GROWTH]],
@@ -120,6 +120,7 @@ class Stage:
                 continue
             walker = rows.walkers.rows[0, i - first]
             self._measured[i - first] = person.measured
+            self._tops[i - first] = max(self.top_z, person.top or self.top_z)
             walker[X], walker[Y], walker[R] = person.cylinder
             walker[VX], walker[VY], walker[GROWTH] = *person.qd[:2], person.growth
             remember_as_now(rows.walkers.rows, 0, i - first)

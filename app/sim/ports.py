@@ -33,6 +33,9 @@ class Person:
     cylinder: Vec | None = None
     """x, y and radius [m], shape (3,), of the cylinder that is all that is known of this person
     (``seen_people.standing_in``); then distances count to it. None: a body of 18 joints."""
+    top: float | None = None
+    """Height of the top of that cylinder [m], as safety layers take it; None: as high as the
+    cell's people, or 2 m over the floor."""
     growth: float = 0.0
     """How fast the radius of that cylinder grows [m/s]; 0 where nothing is known of it."""
     past: Vec | None = None

@@ -125,7 +125,8 @@ def _in_cylinder(estimate: PersonEstimate) -> Person | None:
         return None
     x, y = np.clip(cylinder.center, -FARTHEST_M, FARTHEST_M).tolist()
     vx, vy = np.clip(cylinder.velocity, -FASTEST, FASTEST).tolist()
-    return standing_in(x, y, vx, vy, min(cylinder.radius, WIDEST), measured=False)
+    person = standing_in(x, y, vx, vy, min(cylinder.radius, WIDEST), measured=False)
+    return replace(person, top=cylinder.top)
 
 
 def person_anywhere() -> Person:
@@ -225,14 +226,13 @@ def checked_person(person: Person, path: str) -> Person:
         rule = f"must lie in [-{FASTEST:g}, {FASTEST:g}] m/s"
         raise InvalidInput(f"{path}.growth", person.growth, rule)
     past = None if person.past is None else _checked_past(f"{path}.past", person.past)
-    return Person(
+    return replace(
+        person,
         q=_checked_q(f"{path}.q", person.q),
         qd=checked_vector(f"{path}.qd", person.qd, 18, -_QD_LIMIT, _QD_LIMIT, "m/s or rad/s"),
         size=size,
         cylinder=cylinder,
-        growth=person.growth,
         past=past,
-        measured=person.measured,
     )
 
 

@@ -5,7 +5,7 @@ test's own clock; the reference is the safety layer itself, given the true perso
 arrival of the last frame that showed them, and the time since.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
@@ -22,8 +22,12 @@ from app.sim import human
 from app.sim.cells import load_cell
 from app.sim.checker import shapes_of
 from app.sim.keypoints import BODY_25, keypoints_of
+from app.sim.measured_state import Joints
+from app.sim.motion_state import Stage
 from app.sim.safety import SafetyLayer, safety_settings
 from app.sim.scene import arm_of
+from app.sim.seen_people import as_monitored
+from app.sim.single_frame import estimate_once
 
 CELL = load_cell("shared-workspace")
 ARM = arm_of(CELL)
@@ -264,3 +268,22 @@ def test_a_silent_tracker_that_has_seen_nobody_stops_the_robot() -> None:
         ["never-seen", "stale"],
     ]
     assert fresh.people[0].separation is None and fresh.people[0].age_s is None
+
+
+def test_a_raised_arm_is_monitored_to_its_full_height() -> None:
+    points = points_of(human.rest_posture(0.0, 1.2, -np.pi / 2.0))
+    for name, height in (("elbow_r", 1.3), ("wrist_r", 1.6)):
+        points[BODY_25.index(name)] = [-0.18, 1.2, height]
+    points[[BODY_25.index(name) for name in ("elbow_l", "wrist_l")]] = np.nan
+    person = as_monitored(estimate_once(points, CELL.body, floor_z=CELL.floor_z))
+    assert person is not None and person.cylinder is not None
+    assert person.top is not None and person.top > 1.6
+    stage = Stage(CELL, 0, 1, policy().actor.view)
+    stage.put(Joints(np.array(CELL.robot.home_q), np.zeros(6), np.zeros(6)), [person], 5.0)
+    assert stage.shapes.cylinders[0, 3] == person.top > stage.top_z
+    stage.put(
+        Joints(np.array(CELL.robot.home_q), np.zeros(6), np.zeros(6)),
+        [replace(person, top=None)],
+        5.0,
+    )
+    assert stage.shapes.cylinders[0, 3] == stage.top_z

@@ -9,9 +9,9 @@ from pydantic import Field
 from app.api.schemas.examples import FRAME, shows
 from app.api.schemas.numbers import Answer, Body, Time
 from app.api.schemas.people import IMPLAUSIBLE, UNUSABLE, BodyPercentiles, KeypointsSeen
-from app.api.tracker_sessions import IDLE_S, TrackerSession
+from app.api.tracker_sessions import IDLE_S, TrackedPeople, TrackerSession
 from app.sim.keypoint_cylinder import SafetyCylinder
-from app.sim.people_estimate import MAX_SKELETONS, Unfollowed
+from app.sim.people_estimate import MAX_SKELETONS
 from app.sim.person_estimate import PersonEstimate
 
 
@@ -161,14 +161,8 @@ class EstimatesPublic(Answer):
     )
 
     @classmethod
-    def from_domain(
-        cls,
-        tracker: str,
-        t: float | None,
-        estimates: tuple[PersonEstimate, ...],
-        unfollowed: tuple[Unfollowed, ...] = (),
-    ) -> Self:
-        """Make it from the estimates of all people and the people not followed."""
-        people = [EstimatePublic.from_domain(i, one) for i, one in enumerate(estimates)]
-        rest = [UnfollowedPublic(**asdict(one)) for one in unfollowed]
-        return cls(tracker=tracker, t=t, people=people, unfollowed=rest)
+    def from_domain(cls, tracker: str, known: TrackedPeople) -> Self:
+        """Make it from what is known of a tracker's people."""
+        people = [EstimatePublic.from_domain(i, one) for i, one in enumerate(known.estimates)]
+        rest = [UnfollowedPublic(**asdict(one)) for one in known.unfollowed]
+        return cls(tracker=tracker, t=known.t, people=people, unfollowed=rest)
