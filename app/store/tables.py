@@ -4,7 +4,9 @@ Every table of a job hangs on ``jobs.id``. ``jobs.last_event`` numbers the event
 is raised in the same UPDATE that fences the write, so ids follow the order of commits.
 """
 
+import logging
 from datetime import UTC, datetime
+from typing import Any
 
 from sqlalchemy import (
     JSON,
@@ -25,6 +27,8 @@ from sqlalchemy import (
     TypeDecorator,
 )
 
+logger = logging.getLogger(__name__)
+
 metadata = MetaData(
     naming_convention={
         "ix": "ix_%(column_0_label)s",
@@ -44,6 +48,19 @@ class UtcDateTime(TypeDecorator[datetime]):
     def process_bind_param(self, value: datetime | None, dialect: Dialect) -> datetime | None:
         """Drop the zone, after moving to UTC."""
         return None if value is None else value.astimezone(UTC).replace(tzinfo=None)
+
+    def result_processor(self, dialect: Dialect, coltype: object) -> Any:
+        """Read a damaged time as the year 1, so that other rows are still read."""
+        read = super().result_processor(dialect, coltype)
+
+        def process(value: Any) -> Any:
+            try:
+                return value if read is None else read(value)
+            except (TypeError, ValueError):
+                logger.error("a time in the database is damaged: %.40r", value)
+                return datetime.min.replace(tzinfo=UTC)
+
+        return process
 
     def process_result_value(self, value: datetime | None, dialect: Dialect) -> datetime | None:
         """Put the zone back."""

@@ -187,6 +187,22 @@ def test_damaged_job_keeps_no_other_from_being_read(
     assert len(jobs.list_jobs(store).items) == 1
 
 
+@pytest.mark.parametrize("change", [cut, flip(4, 6), flip(1, 7), lambda _: b""])
+def test_damaged_times_keep_no_list_from_being_read(
+    store: Store, claim: Claim, change: Change
+) -> None:
+    checkpoints.put_checkpoint(store, policy())
+    cells.put_cell(store, "mine", DEFINITION)
+    motions.put_motion(store, WAVE)
+    for table in ("jobs", "checkpoints", "cells", "motions"):
+        harm(store, table, "created_at", change)
+    assert len(checkpoints.list_checkpoints(store).items) == 1
+    assert len(jobs.list_jobs(store).items) == 1
+    assert len(cells.list_cells(store)) == len(motions.list_motions(store)) == 1
+    assert checkpoints.read_checkpoint(store, policy().sha256)[1] == CONTENT
+    assert jobs.get_job(store, claim.job_id).created_at.tzinfo is not None
+
+
 def garbage(path: Path, page: int) -> None:
     with path.open("r+b") as file:
         file.seek(4096 * page)
