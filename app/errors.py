@@ -21,9 +21,28 @@ Every error keeps its data as attributes and gives them by ``problem()``, from w
 border builds an RFC 9457 problem.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from decimal import Decimal
 from typing import Protocol
+
+
+def digits(value: float) -> str:
+    """Return a number as it is compared: all its digits, without an exponent where they fit.
+
+    Args:
+        value: A bound, or another number of a rule.
+    """
+    number = value if isinstance(value, int) else float(value)
+    if math.isfinite(number) and abs(number) < 1e21:
+        return f"{Decimal(repr(number or 0)).normalize():f}"
+    return repr(number)
+
+
+def interval(low: float, high: float) -> str:
+    """Return a closed interval with all digits of its bounds."""
+    return f"[{digits(low)}, {digits(high)}]"
 
 
 class ServiceError(Exception):

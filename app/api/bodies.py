@@ -79,7 +79,7 @@ def _refused_head(
         return None
     encoding, given = headers.get("content-encoding", ""), headers.get("content-type", "")
     if encoding.strip().lower() not in ("", "identity"):
-        rule = "must not be compressed"
+        rule = "must be identity: bodies are sent uncompressed"
         fault = member("Content-Encoding", repr(encoding), rule, ["identity"])
         return member_problem(
             415, "wrong-encoding", fault, path, {"Accept-Encoding": "identity"}

@@ -58,6 +58,9 @@ STATUS: tuple[tuple[type[ServiceError], int, str], ...] = (
 )
 
 
+_JSON = json.JSONEncoder(ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+
+
 class ProblemResponse(JSONResponse):
     """A JSON answer with the media type of problems."""
 
@@ -65,7 +68,7 @@ class ProblemResponse(JSONResponse):
 
     def render(self, content: object) -> bytes:
         """Write JSON; half a surrogate pair that a caller sent is escaped again."""
-        return json.dumps(content, ensure_ascii=False).encode("utf-8", "backslashreplace")
+        return _JSON.encode(content).encode("utf-8", "backslashreplace")
 
 
 class Problem(BaseModel):

@@ -12,6 +12,8 @@ from typing import Any
 from fastapi import APIRouter, Request
 from starlette.responses import HTMLResponse
 
+from app.errors import digits
+
 router = APIRouter(include_in_schema=False)
 
 Node = Mapping[str, Any]
@@ -152,5 +154,5 @@ def _limits(schema: Node) -> str:
         "minItems": "length >=",
         "maxItems": "length <=",
     }
-    found = [f"{sign} {schema[name]:g}" for name, sign in names.items() if name in schema]
+    found = [f"{sign} {digits(schema[name])}" for name, sign in names.items() if name in schema]
     return ", ".join(found)

@@ -38,11 +38,11 @@ def fault_in_json(body: bytes) -> Member | None:
         try:
             body.decode()
         except UnicodeDecodeError as error:
-            return member("body", f"byte {error.start}", "must be UTF-8")
+            return member("body", f"byte {error.start}", "must be text in UTF-8")
         if b"\0" in body:
-            return member("body", f"byte {body.index(0)}", "must be UTF-8 without NUL")
+            return member("body", f"byte {body.index(0)}", "must be text in UTF-8 without NUL")
     if (depth := _depth(body)) > MAX_DEPTH:
-        return member("body", f"<{depth} levels>", f"must have at most {MAX_DEPTH} levels")
+        return member("body", f"<{depth} levels>", f"must be nested at most {MAX_DEPTH} deep")
     if _SUSPECT.search(body) is None:
         return None
     try:

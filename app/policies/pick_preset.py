@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from app.errors import InvalidInput
+from app.errors import InvalidInput, digits
 from app.policies.preset_fields import check_learning, check_rounds, choice, number
 from app.sim.actions import BOUNDS, MEANINGS, ActionSettings
 
@@ -142,7 +142,7 @@ class PickPreset:
             raise InvalidInput(
                 "overrides.short_limit_s",
                 self.short_limit_s,
-                f"must not exceed time_limit_s = {self.time_limit_s:g} s",
+                f"must not exceed time_limit_s = {digits(self.time_limit_s)} s",
             )
 
 

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
-from app.errors import InvalidInput
+from app.errors import InvalidInput, interval
 
 
 def number(default: float, low: float, high: float, unit: str, text: str) -> Any:
@@ -83,7 +83,7 @@ def checked(info: FieldInfo, value: object) -> int | float | str:
     if not info.minimum <= value <= info.maximum:
         unit = f" {info.unit}" if info.unit else ""
         raise InvalidInput(
-            path, value, f"must lie in [{info.minimum:g}, {info.maximum:g}]{unit}"
+            path, value, f"must lie in {interval(info.minimum, info.maximum)}{unit}"
         )
     return int(value) if info.type == "int" else float(value)
 

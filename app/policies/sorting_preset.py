@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from app.errors import InvalidInput
+from app.errors import InvalidInput, digits
 from app.policies.preset_fields import check_learning, check_rounds, choice, number
 from app.sim.kernels.sorting_reward import SortingWeights
 from app.sim.sorting import SortingSettings
@@ -158,7 +158,7 @@ class SortingPreset:
         check_learning(self.learning_starts, self.total_steps, self.buffer_size, self.n_envs)
         if self.solved_episodes + self.disturbed_share > 1.0:
             most = 1.0 - self.disturbed_share
-            rule = f"must not exceed 1 - disturbed_share = {most:g}"
+            rule = f"must not exceed 1 - disturbed_share = {digits(most)}"
             raise InvalidInput("overrides.solved_episodes", self.solved_episodes, rule)
 
 

@@ -20,7 +20,7 @@ from statistics import NormalDist
 
 import numpy as np
 
-from app.errors import InvalidInput
+from app.errors import InvalidInput, interval
 from app.sim.kernels import body
 from app.sim.ports import Vec
 
@@ -121,5 +121,5 @@ def _factor(name: str, percentile: float) -> float:
     """Return by how much a measure of a percentile differs from the median, 1 at the median."""
     low, high = PERCENTILES
     if not low <= percentile <= high:
-        raise InvalidInput(name, percentile, f"must be a percentile in [{low:g}, {high:g}]")
+        raise InvalidInput(name, percentile, f"must be a percentile in {interval(low, high)}")
     return 1.0 + SPREADS[name] * NormalDist().inv_cdf(percentile / 100.0)

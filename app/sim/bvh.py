@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.errors import BadMotion, Fault
+from app.errors import BadMotion, Fault, digits
 from app.sim.ports import Vec
 
 MAX_JOINTS = 300
@@ -233,7 +233,7 @@ def _number_rule(word: str) -> str:
         return "must be a number"
     if abs(value) <= MAX_NUMBER:
         return ""
-    return f"must be a finite number of at most {MAX_NUMBER:g}"
+    return f"must be a finite number of at most {digits(MAX_NUMBER)}"
 
 
 def _comma_hint(text: str) -> str:

@@ -12,7 +12,7 @@ from itertools import combinations
 
 import numpy as np
 
-from app.errors import Fault
+from app.errors import Fault, digits, interval
 from app.sim.cell_numbers import numbers, shown
 from app.sim.cell_parts import GoalRegion, RobotMount, Station
 from app.sim.cell_people import Worker
@@ -81,7 +81,7 @@ def _in_order(place: str, low: float, high: float, names: tuple[str, str]) -> It
         yield Fault(
             place=f"{place}.{names[0]}",
             value=shown(low),
-            rule=f"must be less than {names[1]} = {high:g}",
+            rule=f"must be less than {names[1]} = {digits(high)}",
             hint="the two may have changed places",
         )
 
@@ -92,7 +92,7 @@ def _table(cell: Cell) -> Iterator[Fault]:
         names = (f"{axis}_min", f"{axis}_max")
         yield from _in_order("table", getattr(table, names[0]), getattr(table, names[1]), names)
     if table.thickness >= table.height:
-        rule = f"must be less than the table's height = {table.height:g} m"
+        rule = f"must be less than the table's height = {digits(table.height)} m"
         yield Fault(place="table.thickness", value=shown(table.thickness), rule=rule)
 
 
@@ -103,17 +103,17 @@ def _robot(robot: RobotMount) -> Iterator[Fault]:
             yield Fault(
                 place=f"robot.q_min[{joint}]",
                 value=shown(low),
-                rule=f"must be less than q_max[{joint}] = {high:g}",
+                rule=f"must be less than q_max[{joint}] = {digits(high)}",
                 hint="the two may have changed places",
             )
         elif not low < home < high:
             yield Fault(
                 place=f"robot.home_q[{joint}]",
                 value=shown(home),
-                rule=f"must lie inside the joint's limits ({low:g}, {high:g}) rad",
+                rule=f"must lie inside the joint's limits ({digits(low)}, {digits(high)}) rad",
             )
     if robot.tool_radius > robot.tool_length:
-        rule = f"must not exceed tool_length = {robot.tool_length:g} m"
+        rule = f"must not exceed tool_length = {digits(robot.tool_length)} m"
         yield Fault(place="robot.tool_radius", value=shown(robot.tool_radius), rule=rule)
 
 
@@ -151,8 +151,8 @@ def _people(sound: Sound) -> Iterator[Fault]:
             person.x_min <= x <= person.x_max and person.y_min <= y <= person.y_max
         ):
             rule = (
-                f"must lie inside the walking area, x in [{person.x_min:g}, "
-                f"{person.x_max:g}] m and y in [{person.y_min:g}, {person.y_max:g}] m"
+                f"must lie inside the walking area, x in [{digits(person.x_min)}, "
+                f"{digits(person.x_max)}] m and y in {interval(person.y_min, person.y_max)} m"
             )
             yield Fault(place=f"{place}.home", value=shown(person.home), rule=rule)
 
@@ -163,7 +163,7 @@ def _grid(region: GoalRegion) -> list[Fault]:
     faults = []
     for axis, side in enumerate(region.size):
         if abs(side - round(side / region.spacing) * region.spacing) > 1e-6:
-            rule = f"must be a multiple of spacing = {region.spacing:g} m"
+            rule = f"must be a multiple of spacing = {digits(region.spacing)} m"
             faults.append(
                 Fault(place=f"goal_region.size[{axis}]", value=shown(side), rule=rule)
             )
@@ -182,7 +182,7 @@ def _overlaps(sound: Sound) -> Iterator[Fault]:
             yield Fault(
                 place=f"stations.{b.id}.position",
                 value=shown(b.position),
-                rule=f"must be at least {MIN_SPACING:g} m from every other station",
+                rule=f"must be at least {digits(MIN_SPACING)} m from every other station",
                 hint=f"{a.id} is {distance:.3g} m away",
             )
     for one, other in combinations(sound.obstacles, 2):
@@ -191,7 +191,7 @@ def _overlaps(sound: Sound) -> Iterator[Fault]:
             yield Fault(
                 place=f"obstacles.{other.id}.center",
                 value=shown(other.center),
-                rule=f"must not overlap another obstacle by more than {MAX_OVERLAP:g} m",
+                rule=f"must not overlap another obstacle by more than {digits(MAX_OVERLAP)} m",
                 hint=f"it overlaps {one.id}",
             )
 

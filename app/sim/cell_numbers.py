@@ -9,14 +9,14 @@ from collections.abc import Iterator
 
 from pydantic import BaseModel
 
-from app.errors import Fault
+from app.errors import Fault, digits, interval
 from app.sim.cell_parts import Each, Within
 
 
 def shown(value: object) -> str:
     """Write a value as a user would."""
     if isinstance(value, float):
-        return f"{value:g}"
+        return digits(value)
     if isinstance(value, tuple | list):
         return f"[{', '.join(shown(one) for one in value)}]"
     return str(value)
@@ -69,6 +69,6 @@ def _against(rule: object, value: object, path: str) -> Iterator[Fault]:
             yield Fault(
                 place=path,
                 value=shown(value),
-                rule=f"must lie in [{rule.low:.4g}, {rule.high:.4g}] {rule.unit}".rstrip(),
+                rule=f"must lie in {interval(rule.low, rule.high)} {rule.unit}".rstrip(),
                 hint=unit_hint(value, rule),
             )

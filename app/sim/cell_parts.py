@@ -4,7 +4,6 @@ Each field says its unit in its description and the values it may have in its an
 (:class:`Within`, :class:`Each`); ``cell_numbers`` holds a cell against them.
 """
 
-import math
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
@@ -51,7 +50,7 @@ class Each:
 
 UR10_QD_MAX = (2.16, 2.16, 3.15, 3.2, 3.2, 3.2)
 """Joint speeds of the UR10, from ur10_robot.urdf [rad/s]."""
-TURN = 2.0 * math.pi + 1e-3
+TURN = 6.2842
 """A full turn, with room for rounded numbers [rad]."""
 
 Length = Annotated[float, Within(-10.0, 10.0, "m")]

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-from app.errors import InvalidInput, NotFound
+from app.errors import InvalidInput, NotFound, digits, interval
 from app.sim.body_size import PERCENTILES
 from app.sim.cases import cases_of
 from app.sim.cells import LIMITS, Cell
@@ -310,7 +310,7 @@ def _check_person(
             values = getattr(command, name)
             # Written so that NaN is refused, too.
             if values is not None and not all(abs(one) <= FARTHEST_M for one in values):
-                most = f"{FARTHEST_M:g}"
+                most = f"{digits(FARTHEST_M)}"
                 rule = f"must be finite, within {most} m of the robot (yaw: {most} rad)"
                 raise InvalidInput(name, values, rule)
     elif isinstance(command, SetMode) and command.mode not in PLAIN_MODES:
@@ -335,7 +335,7 @@ def _check_percentiles(command: SetBody) -> None:
     for name in ("stature", "arms", "shoulders"):
         value = getattr(command, name)
         if value is not None and not low <= value <= high:
-            rule = f"must be a percentile in [{low:g}, {high:g}]"
+            rule = f"must be a percentile in {interval(low, high)}"
             raise InvalidInput(name, value, rule)
 
 

@@ -17,7 +17,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from app.errors import InvalidInput
+from app.errors import InvalidInput, digits
 from app.sim.ports import Vec
 
 LOOKED_S = 0.5
@@ -55,7 +55,9 @@ class CylinderTrackerSettings:
             if not np.isfinite(value) or value < 0.0:
                 raise InvalidInput(item.name, value, "must be finite and not negative")
         if not 0.0 < self.rate_hz <= MAX_RATE_HZ:
-            raise InvalidInput("rate_hz", self.rate_hz, f"must lie in (0, {MAX_RATE_HZ:g}] Hz")
+            raise InvalidInput(
+                "rate_hz", self.rate_hz, f"must lie in (0, {digits(MAX_RATE_HZ)}] Hz"
+            )
 
     def gains(self) -> tuple[float, float]:
         """Return the steady gains of position and speed [1, 1/s] of the Kalman filter.

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from app.errors import digits
 from app.sim.bvh import check_dt, shown
 from app.sim.csv_text import CsvText, read_csv_text
 from app.sim.glitches import Glitch
@@ -196,9 +197,9 @@ def check_times(times: Vec, table: Table, good: NDArray[np.bool_]) -> Vec:
     stuck = np.flatnonzero(dt <= 0.0)
     if stuck.size:
         k = int(stuck[0]) + 1
-        rule = f"must be later than the row before, {times[k - 1]:g} s"
+        rule = f"must be later than the row before, {digits(times[k - 1])} s"
         line = table.rows[int(np.flatnonzero(good)[k])][0]
-        raise bad(f"line {line}, column time", f"{times[k]:g}", rule)
+        raise bad(f"line {line}, column time", digits(times[k]), rule)
     check_dt(float(np.median(dt)), "column time, between rows")
     return times
 

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from app.errors import InvalidInput
+from app.errors import InvalidInput, interval
 from app.sim.kernels.arm import Arm
 from app.sim.kernels.override import stop_time
 from app.sim.ports import OutsideField, Vec
@@ -134,7 +134,7 @@ class StateLimits:
             raise InvalidInput(field, value, "must be finite")
         least, most = self._low[part, joint], self._high[part, joint]
         slack = self._tolerance[part, joint]
-        rule = f"must lie in [{least:.4g}, {most:.4g}] {unit}, at most {slack:.2g} outside"
+        rule = f"must lie in {interval(least, most)} {unit}, at most {slack:.2g} outside"
         hint = self._hint(part, joint, state[part])
         raise InvalidInput(field, value, rule + (f" ({hint})" if hint else ""))
 

@@ -35,7 +35,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from app.errors import InvalidInput
+from app.errors import InvalidInput, digits
 from app.sim import human
 from app.sim.kernels.body import N_SIZE
 from app.sim.keypoint_angles import FITTED, fit_errors, joint_angles, joint_motion
@@ -223,7 +223,7 @@ class PersonEstimator:
                 frame had not come.
         """
         if not math.isfinite(t) or t <= self._t:
-            raise InvalidInput("t", t, f"must be finite and later than {self._t:g} s")
+            raise InvalidInput("t", t, f"must be finite and later than {digits(self._t)} s")
         if fresh:
             self._forget()
         flags: list[Flag] = []
@@ -324,7 +324,9 @@ class PersonEstimator:
 
     def _require_now(self, t: float) -> None:
         if not math.isfinite(t) or t < self._t:
-            raise InvalidInput("t", t, f"must be finite and not earlier than {self._t:g} s")
+            raise InvalidInput(
+                "t", t, f"must be finite and not earlier than {digits(self._t)} s"
+            )
 
     def at(self, t: float) -> PersonEstimate:
         """Return the estimate at ``t`` [s], not earlier than the last frame; changes nothing.

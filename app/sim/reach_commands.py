@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from app.errors import InvalidInput
+from app.errors import InvalidInput, interval
 from app.sim.cells import Cell
 from app.sim.ports import Vec
 from app.sim.reach_view import GOAL_MODES, GoalMode
@@ -130,7 +130,7 @@ def check_reaching(command: ReachCommand, cell: Cell) -> None:
             low, high = WALK_SPEEDS
             if not low <= command.speed <= high:
                 raise InvalidInput(
-                    "speed", command.speed, f"must lie in [{low:g}, {high:g}] m/s"
+                    "speed", command.speed, f"must lie in {interval(low, high)} m/s"
                 )
         case _:
             pass

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from app.errors import InvalidInput
+from app.errors import InvalidInput, interval
 
 UNITS: Mapping[str, float] = {
     "m": 1.0,
@@ -127,6 +127,6 @@ def metres(unit: str, place: str = "unit") -> float:
     except ValueError:
         length = 0.0
     if not MIN_UNIT <= length <= MAX_UNIT:
-        rule = f"must be a unit, or metres per unit in [{MIN_UNIT:g}, {MAX_UNIT:g}]"
+        rule = f"must be a unit, or metres per unit in {interval(MIN_UNIT, MAX_UNIT)}"
         raise InvalidInput(place, unit[:40], rule, tuple(UNITS))
     return length

@@ -17,7 +17,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.errors import InvalidInput
+from app.errors import InvalidInput, digits, interval
 from app.sim import human
 from app.sim.kernels import arm as arm_kernel
 from app.sim.kernels import people as people_kernel
@@ -223,7 +223,7 @@ def checked_person(person: Person, path: str) -> Person:
         low, high = _CYLINDER_LOW, _CYLINDER_HIGH
         cylinder = checked_vector(f"{path}.cylinder", cylinder, 3, low, high, "m")
     if not abs(person.growth) <= FASTEST:
-        rule = f"must lie in [-{FASTEST:g}, {FASTEST:g}] m/s"
+        rule = f"must lie in [-{digits(FASTEST)}, {digits(FASTEST)}] m/s"
         raise InvalidInput(f"{path}.growth", person.growth, rule)
     past = None if person.past is None else _checked_past(f"{path}.past", person.past)
     return replace(
@@ -267,7 +267,7 @@ def _checked_past(path: str, past: Vec) -> Vec:
     if not right.all():
         moment, what = (int(i) for i in np.argwhere(~right)[0])
         most, unit = ((WIDEST, "m"), (FASTEST, "m/s"))[what]
-        rule = f"must lie in [0, {most:g}] {unit}"
+        rule = f"must lie in [0, {digits(most)}] {unit}"
         raise InvalidInput(f"{path}[{moment}][{what}]", float(known[moment, what]), rule)
     return known
 
@@ -321,6 +321,6 @@ def checked_vector(path: str, values: Vec, size: int, low: Vec, high: Vec, unit:
         field, value = f"{path}[{i}]", float(vector[i])
         if not math.isfinite(value):
             raise InvalidInput(field, value, "must be finite")
-        rule = f"must lie in [{low[i]:.4g}, {high[i]:.4g}] {unit}"
+        rule = f"must lie in {interval(low[i], high[i])} {unit}"
         raise InvalidInput(field, value, rule)
     return vector

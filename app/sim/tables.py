@@ -13,7 +13,7 @@ from operator import itemgetter
 import numpy as np
 from numpy.typing import NDArray
 
-from app.errors import BadMotion, Fault
+from app.errors import BadMotion, Fault, digits
 from app.sim.bvh import MAX_FAULTS, MAX_FRAMES, MAX_NUMBER, shown
 from app.sim.glitches import Glitch
 from app.sim.ports import Vec
@@ -191,7 +191,7 @@ class Table:
                 continue
             rule, hint = "must be a number", ""
             if _number(cell) is not None:
-                rule = f"must be a finite number of at most {MAX_NUMBER:g}"
+                rule = f"must be a finite number of at most {digits(MAX_NUMBER)}"
             if _THOUSANDS.fullmatch(cell.strip()[:MAX_NAME]) or (
                 self.decimal == "," and "." in cell
             ):
