@@ -31,6 +31,7 @@ export function request(path, { body, headers = {}, ...options } = {}) {
 
 async function send(path, { method = "GET", body, headers, signal, patience = ANSWER_MS }) {
   let response;
+  let json;
   const late = AbortSignal.timeout(patience);
   try {
     response = await fetch(path, {
@@ -40,6 +41,10 @@ async function send(path, { method = "GET", body, headers, signal, patience = AN
       headers,
       body,
     });
+    json = await response.json().catch((error) => {
+      if (error instanceof SyntaxError) return null;
+      throw error;
+    });
   } catch (error) {
     if (error.name === "AbortError") throw error;
     if (error.name === "TimeoutError") {
@@ -48,7 +53,6 @@ async function send(path, { method = "GET", body, headers, signal, patience = AN
     }
     throw new Unreachable("the server does not answer");
   }
-  const json = await response.json().catch(() => null);
   if (!response.ok) throw new Problem(response.status, json);
   return json;
 }

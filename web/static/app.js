@@ -110,7 +110,7 @@ function useMedia(condition) {
 /** Live, stale or what else; commands that wait longer than a moment are told here. */
 function Link({ cell: { link, world, heardAt, pending } }) {
   const waiting = useLate(pending > 0 && link === "live");
-  const [text, tone] = waiting ? ["Waiting for the server", "warn"] : LINKS[link];
+  const [text, tone] = waiting ? ["Waiting", "warn"] : LINKS[link];
   const seconds = useSeconds(heardAt, link === "stale" && world);
   return html`<span class=${`link ${tone}`} role="status" data-role="link"
     data-pending=${pending}><i></i><span>${text}${

@@ -4,7 +4,7 @@ import { html, useEffect, useRef, useState } from "./vendor/htm-preact-standalon
 import { Icon } from "./icons.js";
 
 const MUTE_MS = 20000; // time without a word of the frame after which it is loaded again
-const NOTE_MS = 12000;
+const NOTE_MS = 20000;
 
 /**
  * @param {string} src Address of the viewer.
