@@ -36,7 +36,7 @@ from app.sim.length_units import (
 from app.sim.ports import Vec
 from app.sim.read_options import NOTHING_STATED, Reading, ReadOptions, metres
 from app.sim.repeated_frames import without_repeats
-from app.sim.up_axis import Posture, find_up_axis, rest_axis, z_up
+from app.sim.up_axis import Posture, find_up_axis, require_not_head_down, rest_axis, z_up
 
 MAX_TILT = np.radians(30.0)
 """Lean of the trunk in a rest pose above which that pose is not taken for upright [rad]."""
@@ -68,8 +68,9 @@ def body_track(bvh: Bvh, options: ReadOptions = NOTHING_STATED) -> tuple[BodyTra
     _require_degrees(bvh)
     centres, rest = _centres(bvh, joints), _centres(_resting(bvh), joints)
     stature, found = _measured(centres, options)
-    standing = _posture(rest)
-    up = options.up or find_up_axis(_posture(centres), standing)
+    standing, moving = _posture(rest), _posture(centres)
+    up = options.up or find_up_axis(moving, standing)
+    require_not_head_down(moving, up)
     floor, root_unit = "", options.root_unit or found
     if options.root_unit is None:
         floor = _check_root(centres, up, bvh.dt, stature, found)

@@ -71,6 +71,17 @@ def find_up_axis(motion: Posture, rest: Posture) -> str:
     raise _two(motion, fits, resting)
 
 
+def require_not_head_down(motion: Posture, axis: str) -> None:
+    """Refuse an axis that is stated where the trunk points down along it.
+
+    Raises:
+        BadMotion: It does in most frames.
+    """
+    if _elevation(motion.trunk, axis) < -NEAR:
+        rule = f"turns the person head down: the trunk {_leaning(motion, axis)}"
+        raise BadMotion([Fault(place="up", value=axis, rule=rule)])
+
+
 def _kneeling(
     resting: str | None, leaning: str | None, against: dict[str, dict[str, str]]
 ) -> str | None:

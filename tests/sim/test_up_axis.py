@@ -88,6 +88,12 @@ def test_person_who_sits_squats_or_kneels_is_upright(
     assert_read(Person(up=up, heading=heading, thigh=thigh, knee=knee, bend=bend))
 
 
+@pytest.mark.parametrize(("up", "stated"), [("y", "-y"), ("z", "-z"), ("-y", "y")])
+def test_axis_that_turns_the_person_head_down_cannot_be_stated(up: str, stated: str) -> None:
+    with pytest.raises(BadMotion, match=f"up = {stated} turns the person head down"):
+        body_track(read_bvh(skeleton(Person(up=up))[0]), ReadOptions(up=stated))
+
+
 def test_axis_that_is_not_looked_for_is_named_and_can_be_stated() -> None:
     hanging = Person(up="-y")
     told = fault(hanging)
