@@ -81,6 +81,7 @@ function cutOut(glitches) {
 
 /** How a file was read, in sentences. */
 function told({ name, reading, n_runs: runs, n_glitches: n, glitches }) {
+  if (!reading) return `${name} is stored already; an older version read it.`;
   const parts = [
     `${reading.unit}, ${reading.up} up`,
     reading.root_unit !== reading.unit && `root's path in ${reading.root_unit}`,
