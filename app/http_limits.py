@@ -22,7 +22,7 @@ BODY_S = 10.0
 BODY_BYTES = 5000
 """Least progress of a body in BODY_S [bytes]."""
 UNREAD_BYTES = 1 << 20
-"""Most of a body that is still read after its request was answered [bytes]."""
+"""Most that is still read of what follows an answer or a refusal [bytes]."""
 DRAIN_S = 60.0
 """Longest time in which a client may take nothing of its answer [s]."""
 LINGER_S = 2.0
@@ -43,7 +43,7 @@ class LimitedHttp(HttpToolsProtocol):
     _in_body = False
     """Whether the head of this request is complete."""
     _ended = False
-    """Whether no further request is taken; what still arrives is dropped."""
+    """Whether no further request is taken; what still arrives is dropped or left unread."""
     _head = 0
     """Length of the parsed part of the head [bytes]."""
     _pending = 0
@@ -51,7 +51,7 @@ class LimitedHttp(HttpToolsProtocol):
     _progress = 0
     """What arrived of the body since the timer was set [bytes]."""
     _unread = 0
-    """What arrived of the body after the answer [bytes]."""
+    """What arrived after the answer or the refusal [bytes]."""
     _refusal = (400, "bad-request", "the request is not valid HTTP/1.1")
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
@@ -73,6 +73,9 @@ class LimitedHttp(HttpToolsProtocol):
     def data_received(self, data: bytes) -> None:
         """Parse what arrived, within the limits."""
         if self._ended:
+            self._unread += len(data)
+            if self._unread > UNREAD_BYTES:  # reading on costs others more than it helps
+                self.flow.pause_reading()
             return
         self._pending += len(data)
         super().data_received(data)
