@@ -31,7 +31,6 @@ class Settings(BaseSettings):
     token: SecretStr | None = Field(
         None, description="Bearer token; required for any address but loopback."
     )
-
     root_path: str = Field(
         "",
         pattern=r"^(/[A-Za-z0-9._~-]+)*$",
