@@ -23,7 +23,6 @@ from typing import Any
 import viser
 import viser._messages
 import websockets.asyncio.server
-from typing_extensions import override
 
 _starting = threading.Lock()
 
@@ -47,12 +46,10 @@ class ViewerServer(viser.ViserServer):
         for request in (viser._messages.ShareUrlRequest, viser._messages.ShareUrlDisconnect):
             self._websock_server.unregister_handler(request)
 
-    @override
     def request_share_url(self, verbose: bool = True) -> str | None:
         """Refuse: a public tunnel would pass the service's checks by."""
         return None
 
-    @override
     def stop(self) -> None:
         """End the server and remove its socket."""
         super().stop()
