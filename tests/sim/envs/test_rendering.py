@@ -1,15 +1,13 @@
 """Images of environments show table, robot, people and the task; videos can be made of them."""
 
-import importlib.util
 import warnings
-from pathlib import Path
 from typing import Any
 
 import gymnasium
 import numpy as np
 import pytest
 from gymnasium.error import ResetNeeded
-from gymnasium.wrappers import AddRenderObservation, RecordVideo
+from gymnasium.wrappers import AddRenderObservation
 from numpy.typing import NDArray
 
 from app.errors import InvalidInput
@@ -145,13 +143,3 @@ def test_gymnasiums_wrappers_take_the_images() -> None:
     seen = AddRenderObservation(rendered("tandem/Pick-v0"), render_only=True)
     obs, _ = seen.reset(seed=1)
     assert obs.shape == SHAPE
-
-
-@pytest.mark.skipif(importlib.util.find_spec("moviepy") is None, reason="moviepy is optional")
-def test_videos_are_recorded(tmp_path: Path) -> None:
-    env = RecordVideo(rendered("tandem/SortingE0-v0", max_episode_steps=3), str(tmp_path))
-    env.reset(seed=1)
-    while not env.step(env.action_space.sample())[3]:
-        pass
-    env.close()
-    assert [path.suffix for path in tmp_path.iterdir()] == [".mp4"]
