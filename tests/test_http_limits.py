@@ -283,9 +283,10 @@ def test_connections_are_kept_and_requests_pipelined(small: Small) -> None:
 
 
 def test_more_pipelined_requests_than_are_taken_end_the_connection(small: Small) -> None:
-    before = small.peak_memory
-    answers = small.ask((NAME + b"\r\n") * 200_000)
-    assert answers.count(b"200 OK") == http_limits.MAX_PIPELINED + 1
+    most, before = http_limits.MAX_PIPELINED + 1, small.peak_memory
+    assert small.ask((NAME + b"\r\n") * (most + 8)).count(b"200 OK") == most
+    # TCP drops answers on their way where the end of a connection leaves bytes unread.
+    assert 0 < small.ask((NAME + b"\r\n") * 200_000).count(b"200 OK") <= most
     assert small.peak_memory - before < MAX_GROWTH
 
 
