@@ -18,9 +18,8 @@ class PickPreset:
     """TD3 on the pick scenario: all that a training run depends on besides its seed.
 
     The defaults are those of ``pick-td3``. Source: METHOD 3.3 and 3.5 for the form.
-    Deviates: table 5.2's values; these are the ones that learn in minutes:
-    residual action, features, n-step returns, batched cells). The source's recipe is its own
-    preset.
+    Deviates: the values of table 5.2 are replaced by values that learn in minutes (residual
+    action, features, n-step returns, batched cells). No preset has the source's values.
     """
 
     name: str = "pick-td3"

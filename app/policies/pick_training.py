@@ -22,7 +22,7 @@ from app.sim.kernels.arm import CONTROLLED
 from app.sim.kernels.features import BODY_SIZES, SIZES
 from app.sim.kernels.people import ABSENT
 from app.sim.kernels.reward import RewardWeights
-from app.sim.pick import PickBatch, PickSettings
+from app.sim.pick import OUTCOMES, PickBatch, PickSettings
 from app.sim.ports import Vec
 from app.sim.scene import HumanKind
 from app.sim.worker_motion import WorkSettings
@@ -183,28 +183,30 @@ class PickReporter(Reporter):
         super().__init__(run, on_progress, on_checkpoint, should_stop)
         self._watched = watched
         self._returns = np.zeros(run.preset.n_envs)
-        self._counts, self._total_return = np.zeros(4, dtype=np.int64), 0.0
+        self._counts = np.zeros(len(OUTCOMES), dtype=np.int64)
+        self._total_return = 0.0
 
     def watch(self, rewards: NDArray[np.floating]) -> None:
         """Count episodes that ended; look at the range of the states now and then."""
         n, ended = self._watched.n_greedy, self._watched.env.ended
         self._returns += rewards
         finished = ended[:n] > 0
-        self._counts += np.bincount(ended[:n][finished], minlength=4)
+        self._counts += np.bincount(ended[:n][finished], minlength=len(OUTCOMES))
         self._total_return += float(self._returns[:n][finished].sum())
         self._returns[ended > 0] = 0.0
         if (self.num_timesteps // len(rewards)) % RANGE_EVERY == 0:
             self._watched.ranges.look(states_met(self._watched.batch))
 
     def rates(self) -> dict[str, Any]:
-        """Return how the episodes since the last point ended."""
-        episodes, total = int(self._counts.sum()), self._total_return
-        shares = [None] * 4 if episodes == 0 else [c / episodes for c in self._counts.tolist()]
-        self._counts, self._total_return = np.zeros(4, dtype=np.int64), 0.0
-        return {
-            "episodes": episodes,
-            "success": shares[1],
-            "collision": shares[2],
-            "timeout": shares[3],
-            "reward": total / episodes if episodes else None,
+        """Return how the episodes since the last point ended.
+
+        An episode that ends *unfeasible* counts in ``episodes`` and has no share of its own.
+        """
+        episodes = int(self._counts.sum())
+        shares = {
+            name: int(self._counts[OUTCOMES.index(name)]) / episodes if episodes else None
+            for name in ("success", "collision", "timeout")
         }
+        reward = self._total_return / episodes if episodes else None
+        self._counts[:], self._total_return = 0, 0.0
+        return {"episodes": episodes, **shares, "reward": reward}

@@ -38,6 +38,16 @@ def test_rates_of_a_point_sum_to_one_where_episodes_ended(tiny_run):
         assert point.success + point.collision + point.timeout == pytest.approx(1.0)
 
 
+def test_a_training_counts_episodes_that_end_unfeasible():
+    """One-step bounds can become empty, which is a fifth outcome."""
+    overrides = {**TINY, "action_bounds": "one-step", "total_steps": 12 * TINY["total_steps"]}
+    recorder = Recorder()
+    recorder.run(presets.resolve("pick-td3", overrides))
+    ended = [point for point in recorder.progress if point.episodes]
+    shares = [point.success + point.collision + point.timeout for point in ended]
+    assert min(shares) < 1.0 and max(shares) <= 1.0 + 1e-12
+
+
 def test_the_same_seed_trains_the_same_bits(tiny_preset, tiny_run):
     again = Recorder()
     result = again.run(tiny_preset)
