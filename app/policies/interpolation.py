@@ -3,7 +3,7 @@
 Trilinear among the eight corners of a grid's cell (METHOD 2.4), barycentric among the four of
 a Halton set's tetrahedron. At a target it is the policy's own action.
 
-Source: (4.29); Halton, the outlook of thesis 4.6.
+Source: (4.29); Halton, the outlook of thesis 4.5.
 """
 
 import numpy as np

@@ -10,7 +10,7 @@ averaged-interpolated   both
 A mover looks at a batch as it is and gives an action for every cell in it. The policy need not
 have met more than one person in training.
 
-Source: METHOD 2.4; for several people the outlook of thesis 4.6, "deploying a policy for each
+Source: METHOD 2.4; for several people the outlook of thesis 4.5, "deploying a policy for each
 person inside the robot workspace and then averaging the action based on the distance between
 human and robot", which leaves the weights open.
 """

@@ -14,7 +14,7 @@ via points (``app.sim.via_points`` does that too, and keeps the palm at the via 
 :func:`vary_elbow` turns the arm about the line from shoulder to palm instead, the one freedom a
 palm at a given place leaves the arm, and so keeps the palm at every sample.
 
-Source: METHOD 3.4, thesis section 5.2.
+Source: METHOD 3.4, thesis section 5.3.3.
 """
 
 from collections.abc import Sequence

@@ -6,7 +6,7 @@ halton   a low-discrepancy sequence over the box     cells are tetrahedra of 4 t
 A goal between targets is reached by the weighted mean of the policy's actions for the targets
 of its cell. :class:`GridCells` and :class:`HaltonCells` say which those are.
 
-Source: thesis 4.3.4 and, for the Halton set, its outlook 4.6. Deviates: points of the sequence
+Source: thesis 4.3.4 and, for the Halton set, its outlook 4.5. Deviates: points of the sequence
 alone leave the faces of the box empty, and Delaunay's tetrahedra between them and the corners
 span the whole box. So the sequence fills a box that is larger by half the grid's spacing, as
 the grid's own cells do, and points outside are moved to the nearest point of the box.

@@ -10,7 +10,7 @@ all averaged. Nobody and one person are the same by both.
 
 All go round the grid's targets, with the same goals in every row.
 
-Source: thesis 4.4.2; METHOD 2.6, and 4 for several people.
+Source: thesis 4.4.3; METHOD 2.6, and 4 for several people.
 """
 
 from dataclasses import replace

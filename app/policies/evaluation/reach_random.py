@@ -15,7 +15,7 @@ also be asked at those around the goal, and its actions interpolated.
 people, with its 95 % interval. In 25 s a policy is told 5 s until no more are left: more it
 never met.
 
-Source: thesis 4.4.2; METHOD 2.4 and 2.6.
+Source: thesis 4.4.3; METHOD 2.4 and 2.6.
 """
 
 from dataclasses import replace

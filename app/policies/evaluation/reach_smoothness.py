@@ -9,7 +9,7 @@ driven; the acceleration does with degree 2, which bounds no jerk; with degree 3
 compared; ``rms_acceleration`` goes over time and joints. One episode is kept whole for the
 plot: of the first hundred successes the longest.
 
-Source: thesis 4.4.2 (joint positions and velocities over an episode, "no discontinuity").
+Source: thesis 4.4.3 (joint positions and velocities over an episode, "no discontinuity").
 Deviates: accelerations and jerk are ours.
 """
 

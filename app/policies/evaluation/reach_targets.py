@@ -14,7 +14,7 @@
 An episode with a contact is no success in any row; ``reached_after_contact`` is the share that
 came to the goal all the same.
 
-Source: thesis 4.4.1, figs 4.5 and 4.6; METHOD 2.6. Deviates: the source does not say how its
+Source: thesis 4.4.3, figs 4.5 and 4.6; METHOD 2.6. Deviates: the source does not say how its
 people may start.
 """
 
