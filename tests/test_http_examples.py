@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from app.main import create_app
+from app.policies import pretrained
 from app.settings import Settings
 from tests.api.live_server import running, wait_until_ready
 
@@ -94,7 +95,28 @@ def test_what_is_flagged_is_found_wherever_it_is() -> None:
 def test_task_selection_answers_in_the_shape_that_is_shown(address: str) -> None:
     answer = json.loads(shell(SHELL[0], address))
     assert shape(answer) == shape(SAMPLES[0])
-    assert answer["chosen"] in ("left", "right")
+    assert answer["chosen"] == SAMPLES[0]["chosen"]
+    for one, shown in zip(answer["candidates"], SAMPLES[0]["candidates"], strict=True):
+        assert one["value"] == pytest.approx(shown["value"], abs=0.02)
+
+
+def test_motion_answers_as_is_shown(address: str) -> None:
+    (command,) = (one for one in SHELL if "8000/v1/motion " in one)
+    (shown,) = (sample for sample in SAMPLES if "commanded" in sample)
+    answer = json.loads(shell(command, address))
+    assert answer["checkpoint"].startswith(shown["checkpoint"])
+    assert answer["act"] == pytest.approx(shown["act"], abs=0.02)
+    for one, two in zip(
+        answer["commanded"]["coefficients"], shown["commanded"]["coefficients"], strict=True
+    ):
+        assert one == pytest.approx(two, abs=1e-3)
+
+
+def test_samples_are_of_shipped_checkpoints() -> None:
+    shown = [sample["checkpoint"] for sample in SAMPLES if sample.get("checkpoint")]
+    assert len(shown) >= 2
+    for one in shown:
+        assert any(sha256.startswith(one) for sha256 in pretrained.SHA256.values())
 
 
 def test_sorting_answers_as_is_shown_but_for_the_moves_left_out(address: str) -> None:
