@@ -12,6 +12,7 @@ import pytest
 
 from app.main import create_app
 from app.policies import pretrained
+from app.policies.evaluation.protocols import PROTOCOLS
 from app.settings import Settings
 from tests.api.live_server import running, wait_until_ready
 
@@ -110,6 +111,11 @@ def test_motion_answers_as_is_shown(address: str) -> None:
         answer["commanded"]["coefficients"], shown["commanded"]["coefficients"], strict=True
     ):
         assert one == pytest.approx(two, abs=1e-3)
+
+
+def test_every_protocol_is_listed() -> None:
+    section = TEXT.split("## Evaluate a policy")[1].split("\n## ")[0]
+    assert {name for name in PROTOCOLS if f"`{name}`" not in section} == set()
 
 
 def test_samples_are_of_shipped_checkpoints() -> None:

@@ -95,6 +95,12 @@ class Scene:
         if people and event != "foreign":
             self.shown = self.posture(), self.now
 
+    def watch(self, n_frames: int) -> None:
+        """Send frames at 30 Hz of a person who stands still."""
+        for _ in range(n_frames):
+            self.now += DT
+            self.frame(self.now)
+
     def decision(self, t: float | None) -> None:
         body = {
             "cell": CELL.name,
@@ -194,9 +200,7 @@ def test_the_property_is_tried_where_the_robot_may_move() -> None:
 def test_a_camera_that_died_stops_the_robot(silence: float) -> None:
     scene = Scene(np.random.default_rng(2))
     scene.place = np.array([0.0, 2.6])
-    for _ in range(30):
-        scene.now += DT
-        scene.frame(scene.now)
+    scene.watch(30)
     scene.now += silence
     answer = decide_beside(scene)
     (person,) = answer.people
@@ -222,9 +226,7 @@ def test_a_tracker_of_another_frame_stops_the_robot(seen_before: bool) -> None:
 def test_somebody_far_away_does_not_make_a_hidden_person_forgotten() -> None:
     scene = Scene(np.random.default_rng(6))
     scene.place = np.array([0.0, 1.6])
-    for _ in range(30):
-        scene.now += DT
-        scene.frame(scene.now)
+    scene.watch(30)
     hidden, stranger = scene.shown, human.rest_posture(0.5, 5.5, -np.pi / 2.0)
     for k in range(60):  # the stranger is 3.9 m from where the other one was last seen
         scene.now += DT
@@ -244,8 +246,8 @@ def test_an_arm_that_is_not_seen_is_monitored_wherever_it_can_reach() -> None:
         scene.frame(scene.now)
         if k % 10 == 9:
             scene.decision(None)
-    body = decide_beside(scene)
-    assert body.people[0].monitored_as_cylinder and not body.people[0].as_cylinder
+    person = decide_beside(scene).people[0]
+    assert person.monitored_as_cylinder and not person.as_cylinder
     scene.hidden = False
     scene.now += DT
     scene.frame(scene.now)

@@ -33,7 +33,7 @@ export function Controls({ world, cell, cases, send, colourOf, labelOf }) {
       : world.sorting
       ? html`<${Presets} label="Tests" items=${cell?.sorting_tests ?? []} tag="start-test"
           running=${world.sorting.test} send=${send}
-          hint="Six tests of the study: the cell is laid out anew and the robot sorts." />`
+          hint="Six tests of the study: the cell is laid out again and the robot sorts." />`
       : html`<div class="dock-row">
           <span class="dock-label" id="goals-label">Goals</span>
           <${Goals} world=${world} cell=${cell} send=${send} colourOf=${colourOf}

@@ -30,7 +30,7 @@ const TRIES = {
     },
   },
   sorting: {
-    text: "Ask for blocks under “Goal” and change your mind meanwhile: the robot plans anew.",
+    text: "Ask for blocks under “Goal” and change your mind meanwhile: the robot replans.",
     button: "Let it sort five blocks",
     ask: (_, cell) => (cell?.sorting_tests ?? []).slice(0, 1)
       .map(({ id }) => ({ tag: "start-test", id })),
