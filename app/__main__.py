@@ -20,11 +20,11 @@ from typing import TYPE_CHECKING, Any
 from app.errors import InvalidInput, NotFound, ServiceError
 from app.reading_flags import add_flags, stated_options
 from app.settings import Settings, check_access, load_settings
-from app.sim.kernel_cache import kernel_cache
+from app.sim.core.kernel_cache import kernel_cache
 
 if TYPE_CHECKING:
-    from app.policies.checkpoint import Checkpoint
-    from app.policies.progress import Progress
+    from app.policies.checkpoints.checkpoint import Checkpoint
+    from app.policies.training.progress import Progress
 
 ROOT = Path(__file__).resolve().parent.parent
 WRONG_CALL = 2
@@ -169,8 +169,8 @@ def run_train(options: argparse.Namespace) -> int:
     import torch
 
     from app.cell_verbs import named_cell
-    from app.policies import presets
-    from app.policies.training import train
+    from app.policies.configs import presets
+    from app.policies.training.train import train
 
     preset = presets.resolve(options.preset, parsed_sets(options.sets))
     cell = named_cell(preset.cell, settings)
@@ -225,7 +225,7 @@ def run_evaluate(options: argparse.Namespace) -> int:
     from app.errors import BadMotion
     from app.machine import describe
     from app.motion_verbs import faulty, runs_of
-    from app.policies.evaluation.protocols import (
+    from app.policies.evaluation.registry import (
         PROTOCOLS,
         WITHOUT_CHECKPOINT,
         check_motions,
@@ -330,8 +330,8 @@ def find_checkpoint(reference: str, settings: Settings) -> "Checkpoint":
         NotFound: There is none.
         Damaged: It is damaged.
     """
-    from app.policies import pretrained
-    from app.policies.checkpoint import load
+    from app.policies.checkpoints import pretrained
+    from app.policies.checkpoints.checkpoint import load
     from app.store.engine import Store
     from app.store.schema import check_schema
     from jobs.checkpoints import read_sound

@@ -10,8 +10,8 @@ from typing import Any
 from app.database import has_database, opened
 from app.errors import InvalidInput, NotFound
 from app.settings import Settings
-from app.sim.cell_file import MAX_BYTES, read_cell
-from app.sim.cells import Cell, cell_names, lacks_for_pick, load_cell
+from app.sim.cell_validation.reader import MAX_BYTES, read_cell
+from app.sim.cells.cell import Cell, cell_names, lacks_for_pick, load_cell
 from jobs.cells import CellCatalog
 
 Printed = tuple[str, dict[str, Any]]

@@ -27,18 +27,19 @@ from app.api.registry import (
 )
 from app.api.services import Services
 from app.errors import Damaged, ServiceError
-from app.policies import pretrained
-from app.policies.checkpoint import CHOOSING, SORTING, load, require_purpose
-from app.policies.motion_decision import MotionDecider
-from app.policies.reach_policy import ReachPolicy
-from app.policies.sorting_policy import SortingPolicy
-from app.policies.task_choice import TaskChooser
-from app.policies.trained_cell import cell_of
+from app.live.reach.interfaces import ReachPilot
+from app.policies.checkpoints import pretrained
+from app.policies.checkpoints.checkpoint import CHOOSING, SORTING, load, require_purpose
+from app.policies.checkpoints.trained_cell import cell_of
+from app.policies.inference.motion_decision import MotionDecider
+from app.policies.inference.reach_policy import ReachPolicy
+from app.policies.inference.sorting_policy import SortingPolicy
+from app.policies.inference.task_selection import TaskChooser
 from app.settings import Settings, check_access
-from app.sim.cells import Cell, load_cell
-from app.sim.ports import SortingValues, TaskPolicy
-from app.sim.reach_ports import ReachPilot
-from app.sim.sorting_decision import warm_up as warm_up_sorting
+from app.sim.cells.cell import Cell, load_cell
+from app.sim.pick.task_policy import TaskPolicy
+from app.sim.sorting.decision import warm_up as warm_up_sorting
+from app.sim.sorting.sorting_values import SortingValues
 from app.store.checkpoints import find_damaged
 from app.store.engine import Store
 from jobs.cells import CellCatalog
@@ -46,7 +47,7 @@ from jobs.checkpoints import shipped
 from jobs.import_process import ImportProcess
 from jobs.motions import MotionCatalog
 from jobs.supervisor import Supervisor
-from web.loop import LiveCell
+from web.viewer.loop import LiveCell
 
 logger = logging.getLogger(__name__)
 

@@ -11,8 +11,8 @@ from typing import Any
 from app.database import has_database, opened
 from app.errors import BadMotion, Fault, InvalidInput
 from app.settings import Settings
-from app.sim.motions import MAX_BYTES, Motion, read_motion
-from app.sim.read_options import NOTHING_STATED, ReadOptions
+from app.sim.mocap.importer import MAX_BYTES, Motion, read_motion
+from app.sim.mocap.read_options import NOTHING_STATED, ReadOptions
 from app.store.records import MotionRecord
 from jobs.motions import MotionCatalog
 from jobs.stored_motion import detail_of, summary_of

@@ -2,7 +2,7 @@
 
 import argparse
 
-from app.sim.read_options import ReadOptions, name_map
+from app.sim.mocap.read_options import ReadOptions, name_map
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:

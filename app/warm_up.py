@@ -12,22 +12,22 @@ from multiprocessing import get_context
 
 import numpy as np
 
-from app.policies import pretrained
-from app.policies.checkpoint import CHOOSING, REACHING, Checkpoint, purpose_of
-from app.policies.motion_decision import MotionDecider
-from app.policies.reach_pilot import ReachPilot
-from app.policies.reach_policy import ReachPolicy
-from app.policies.task_choice import TaskChooser
-from app.policies.trained_cell import cell_of
-from app.sim import sorting_decision
-from app.sim.cells import load_cell
-from app.sim.commands import MoveHuman
-from app.sim.kernels.arm import CONTROLLED
-from app.sim.live_world import new_world
-from app.sim.pick import PickBatch, PickSettings
-from app.sim.reach_world import ReachWorld
-from app.sim.sorting import batch_in
-from app.sim.world import World
+from app.live.commands import MoveHuman
+from app.live.factory import new_world
+from app.live.pick.world import World
+from app.live.reach.world import ReachWorld
+from app.policies.checkpoints import pretrained
+from app.policies.checkpoints.checkpoint import CHOOSING, REACHING, Checkpoint, purpose_of
+from app.policies.checkpoints.trained_cell import cell_of
+from app.policies.inference.live_reach_policy import ReachPilot
+from app.policies.inference.motion_decision import MotionDecider
+from app.policies.inference.reach_policy import ReachPolicy
+from app.policies.inference.task_selection import TaskChooser
+from app.sim.cells.cell import load_cell
+from app.sim.pick.batch import PickBatch, PickSettings
+from app.sim.robot.kernels.arm import CONTROLLED
+from app.sim.sorting import decision as sorting_decision
+from app.sim.sorting.batch import batch_in
 
 N_ENVS = 8
 SORTING_CELL, REACH_CELL = "sorting-e0", "shared-workspace"

@@ -34,14 +34,14 @@ sys.path.insert(0, str(ROOT))
 from app.errors import InvalidInput  # noqa: E402 - the line above lets it be found
 from app.machine import describe  # noqa: E402
 from app.motion_verbs import runs_of  # noqa: E402
-from app.policies.checkpoint import Checkpoint, load  # noqa: E402
-from app.policies.evaluation import choice_rules  # noqa: E402
-from app.policies.evaluation.episodes import Evaluator, settings_for  # noqa: E402
-from app.policies.task_choice import HYSTERESIS, ValueNetworks  # noqa: E402
-from app.policies.trained_cell import cell_of  # noqa: E402
-from app.sim.motions import Motion  # noqa: E402
-from app.sim.pick import PickSettings  # noqa: E402
-from app.sim.worker_motion import at_the_table  # noqa: E402
+from app.policies.checkpoints.checkpoint import Checkpoint, load  # noqa: E402
+from app.policies.checkpoints.trained_cell import cell_of  # noqa: E402
+from app.policies.evaluation.pick import selection_rules as choice_rules  # noqa: E402
+from app.policies.evaluation.pick.episodes import Evaluator, settings_for  # noqa: E402
+from app.policies.inference.task_selection import HYSTERESIS, ValueNetworks  # noqa: E402
+from app.sim.mocap.importer import Motion  # noqa: E402
+from app.sim.people.human_motion_config import at_the_table  # noqa: E402
+from app.sim.pick.batch import PickSettings  # noqa: E402
 
 KINDS = ("sampled", "replayed")
 EPISODES, SEED = 1000, 11

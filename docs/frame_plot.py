@@ -17,13 +17,13 @@ from matplotlib.patches import Rectangle
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from app.sim.cells import Cell, load_cell  # noqa: E402 - the line above lets it be found
-from app.sim.human import rest_posture  # noqa: E402
-from app.sim.kernels.arm import new_robot_pose, place_robot  # noqa: E402
-from app.sim.kernels.body import N_CAPSULES  # noqa: E402
-from app.sim.kernels.columns import RADIUS, ends_of  # noqa: E402
-from app.sim.ports import Vec  # noqa: E402
-from app.sim.scene import arm_of, crowd_of, own, people_of  # noqa: E402
+from app.sim.cells.cell import Cell, load_cell  # noqa: E402 - the line above lets it be found
+from app.sim.core.arrays import Vec  # noqa: E402
+from app.sim.geometry.capsules import RADIUS, ends_of  # noqa: E402
+from app.sim.human.kernels.kinematics import N_CAPSULES  # noqa: E402
+from app.sim.human.model import rest_posture  # noqa: E402
+from app.sim.robot.kernels.arm import new_robot_pose, place_robot  # noqa: E402
+from app.sim.scene.scene import arm_of, crowd_of, own, people_of  # noqa: E402
 from docs.world_plots import BLUE, GREEN, GREY, LIGHT, ORANGE, RED, panels, save  # noqa: E402
 
 IMAGE = ROOT / "docs/img/frame.png"

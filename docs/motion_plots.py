@@ -25,7 +25,12 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from app.machine import describe  # noqa: E402 - the line above lets it be found
-from app.sim.body_track import (  # noqa: E402
+from app.sim.core.arrays import Vec  # noqa: E402
+from app.sim.mocap.artifacts import MAX_SPEED, Glitch, clean_runs, find_glitches  # noqa: E402
+from app.sim.mocap.bvh import read_bvh  # noqa: E402
+from app.sim.mocap.importer import ImportedMotion, Spread, read_motion  # noqa: E402
+from app.sim.mocap.inverse_kinematics import body_angles  # noqa: E402
+from app.sim.mocap.joint_centres import (  # noqa: E402
     ELBOW_L,
     ELBOW_R,
     PELVIS,
@@ -34,17 +39,7 @@ from app.sim.body_track import (  # noqa: E402
     measure,
     model_points,
 )
-from app.sim.bvh import read_bvh  # noqa: E402
-from app.sim.glitches import (  # noqa: E402
-    MAX_SPEED,
-    Glitch,
-    clean_runs,
-    find_glitches,
-)
-from app.sim.motions import ImportedMotion, Spread, read_motion  # noqa: E402
-from app.sim.ports import Vec  # noqa: E402
-from app.sim.skeletons import body_track  # noqa: E402
-from app.sim.track_angles import body_angles  # noqa: E402
+from app.sim.mocap.skeletons import body_track  # noqa: E402
 from docs.world_plots import BLUE, GREEN, GREY, ORANGE, RED, panels, save  # noqa: E402
 
 RESULTS, IMAGE = ROOT / "docs/results/motions.json", ROOT / "docs/img/motions/error.png"

@@ -22,13 +22,13 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from app.machine import describe  # noqa: E402 - the line above lets it be found
-from app.sim import human  # noqa: E402
-from app.sim.body_size import percentile_body  # noqa: E402
-from app.sim.cells import Cell, load_cell  # noqa: E402
-from app.sim.demonstrations import PHASES, STYLES, between, draw_node  # noqa: E402
-from app.sim.ports import Vec  # noqa: E402
-from app.sim.primitives import FILE, HANDS, load_primitives, read_header  # noqa: E402
-from app.sim.task_library import TaskLibrary, task_library  # noqa: E402
+from app.sim.cells.cell import Cell, load_cell  # noqa: E402
+from app.sim.core.arrays import Vec  # noqa: E402
+from app.sim.human import model as human  # noqa: E402
+from app.sim.human.anthropometry import percentile_body  # noqa: E402
+from app.sim.primitives.demonstrations import PHASES, STYLES, between, draw_node  # noqa: E402
+from app.sim.primitives.library_file import FILE, HANDS, load_primitives, read_header  # noqa: E402
+from app.sim.primitives.primitive_library import TaskLibrary, task_library  # noqa: E402
 from docs.world_plots import BLUE, GREEN, GREY, LIGHT, ORANGE, panels, save  # noqa: E402
 from tests.sim.library_motions import LegMotion, random_leg, random_legs  # noqa: E402
 

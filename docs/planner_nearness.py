@@ -24,10 +24,10 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from app.machine import describe  # noqa: E402 - the line above lets it be found
-from app.sim.kernels.sorting_planner import new_work, plan_rows  # noqa: E402
-from app.sim.sorting import apply  # noqa: E402
-from app.sim.sorting_planner import attempts_of, solve  # noqa: E402
-from app.sim.sorting_state import Move, SortingShape, SortingState  # noqa: E402
+from app.sim.sorting.batch import apply  # noqa: E402
+from app.sim.sorting.kernels.planner import new_work, plan_rows  # noqa: E402
+from app.sim.sorting.planner import attempts_of, solve  # noqa: E402
+from app.sim.sorting.state import Move, SortingShape, SortingState  # noqa: E402
 from tests.sim.sorting_search import (  # noqa: E402
     fewest_attempts,
     first_moves,

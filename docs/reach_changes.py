@@ -31,9 +31,9 @@ sys.path.insert(0, str(ROOT))
 
 from app.errors import InvalidInput  # noqa: E402 - the line above lets it be found
 from app.machine import describe  # noqa: E402
-from app.policies import presets  # noqa: E402
-from app.policies.checkpoint import Checkpoint  # noqa: E402
-from app.policies.evaluation.reach_bench import ReachBench  # noqa: E402
+from app.policies.checkpoints.checkpoint import Checkpoint  # noqa: E402
+from app.policies.configs import presets  # noqa: E402
+from app.policies.evaluation.reach.bench import ReachBench  # noqa: E402
 from docs.augmentation import over_seeds  # noqa: E402
 from docs.reach_points import ENDS  # noqa: E402
 from docs.training_curves import read_if_there, record  # noqa: E402

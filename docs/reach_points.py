@@ -25,8 +25,8 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from app.machine import describe  # noqa: E402 - the line above lets it be found
-from app.policies.checkpoint import Checkpoint  # noqa: E402
-from app.policies.evaluation.reach_bench import ReachBench  # noqa: E402
+from app.policies.checkpoints.checkpoint import Checkpoint  # noqa: E402
+from app.policies.evaluation.reach.bench import ReachBench  # noqa: E402
 from docs.training_curves import read  # noqa: E402
 
 RESULTS = ROOT / "docs/results/reach_curves.json"

@@ -21,7 +21,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from app.machine import describe  # noqa: E402 - the line above lets it be found
-from app.policies.evaluation.reach_bench import ReachBench, direct_ways, ending  # noqa: E402
+from app.policies.evaluation.reach.bench import ReachBench, direct_ways, ending  # noqa: E402
 from docs.reach_points import lines  # noqa: E402
 from docs.training_curves import read  # noqa: E402
 

@@ -25,11 +25,11 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from app.machine import describe  # noqa: E402 - the line above lets it be found
-from app.policies import presets  # noqa: E402
-from app.policies.evaluation.sorting_curve import curve_episodes, curve_point  # noqa: E402
-from app.policies.sorting_policy import SortingPolicy  # noqa: E402
-from app.policies.trained_cell import cell_of  # noqa: E402
-from app.sim.sorting import fail_of  # noqa: E402
+from app.policies.checkpoints.trained_cell import cell_of  # noqa: E402
+from app.policies.configs import presets  # noqa: E402
+from app.policies.evaluation.sorting.curve import curve_episodes, curve_point  # noqa: E402
+from app.policies.inference.sorting_policy import SortingPolicy  # noqa: E402
+from app.sim.sorting.batch import fail_of  # noqa: E402
 from docs.training_curves import read  # noqa: E402
 
 RESULTS = ROOT / "docs/results/sorting_curves.json"

@@ -25,12 +25,11 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from app.machine import describe  # noqa: E402 - the line above lets it be found
-from app.policies.dqn import SortingDQN  # noqa: E402
-from app.policies.sorting_preset import SortingPreset  # noqa: E402
-from app.policies.sorting_vecenv import SortingVecEnv  # noqa: E402
-from app.sim.kernels.sorting_reward import SortingWeights, distance_cost  # noqa: E402
-from app.sim.ports import Vec  # noqa: E402
-from app.sim.sorting import (  # noqa: E402
+from app.policies.algorithms.dqn import SortingDQN  # noqa: E402
+from app.policies.algorithms.sorting_vecenv import SortingVecEnv  # noqa: E402
+from app.policies.configs.sorting import SortingPreset  # noqa: E402
+from app.sim.core.arrays import Vec  # noqa: E402
+from app.sim.sorting.batch import (  # noqa: E402
     OUTCOMES,
     SortingBatch,
     SortingSettings,
@@ -38,8 +37,9 @@ from app.sim.sorting import (  # noqa: E402
     observe,
     valid_moves,
 )
-from app.sim.sorting_planner import solve  # noqa: E402
-from app.sim.sorting_state import SortingShape, SortingState  # noqa: E402
+from app.sim.sorting.kernels.reward import SortingWeights, distance_cost  # noqa: E402
+from app.sim.sorting.planner import solve  # noqa: E402
+from app.sim.sorting.state import SortingShape, SortingState  # noqa: E402
 
 RESULTS, PAGE = ROOT / "docs/results/sorting_tiny.json", ROOT / "docs/sorting-tiny.md"
 SHAPE = SortingShape(n_cells=2, n_colours=2, n_sizes=2)

@@ -19,12 +19,12 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from app.__main__ import parsed_sets  # noqa: E402 - the line above lets it be found
-from app.policies import checkpoint as formats  # noqa: E402
-from app.policies import presets  # noqa: E402
-from app.policies.checkpoint import Checkpoint  # noqa: E402
-from app.policies.presets import Preset  # noqa: E402
-from app.policies.progress import Progress  # noqa: E402
-from app.policies.training import train  # noqa: E402
+from app.policies.checkpoints import checkpoint as formats  # noqa: E402
+from app.policies.checkpoints.checkpoint import Checkpoint  # noqa: E402
+from app.policies.configs import presets  # noqa: E402
+from app.policies.configs.presets import Preset  # noqa: E402
+from app.policies.training.progress import Progress  # noqa: E402
+from app.policies.training.train import train  # noqa: E402
 
 
 def main() -> None:

@@ -8,19 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from app.sim.actions import ActionSettings
-from app.sim.cell_reach import Reach
-from app.sim.cells import Cell, load_cell
-from app.sim.kernels.arm import Arm, new_robot_pose, place_robot
-from app.sim.kernels.columns import ends_of
-from app.sim.kernels.kinematics import tcp_jacobian
-from app.sim.kernels.occupancy import WALKING
-from app.sim.occupancy import Walk, WalkerSettings, walk
-from app.sim.pick import step_robot
-from app.sim.recheck import robot_ends
-from app.sim.robot import Robot
-from app.sim.scene import arm_of
-from app.sim.shapes import TOOL, load_robot_capsules
+from app.sim.cell_validation.reachability import Reach
+from app.sim.cells.cell import Cell, load_cell
+from app.sim.collision.fcl_recheck import robot_ends
+from app.sim.geometry.capsules import ends_of
+from app.sim.people.kernels.pedestrian import WALKING
+from app.sim.people.pedestrian import Walk, WalkerSettings, walk
+from app.sim.pick.batch import step_robot
+from app.sim.robot.actions import ActionSettings
+from app.sim.robot.capsules import TOOL, load_robot_capsules
+from app.sim.robot.kernels.arm import Arm, new_robot_pose, place_robot
+from app.sim.robot.kernels.kinematics import tcp_jacobian
+from app.sim.robot.ur10 import Robot
+from app.sim.scene.scene import arm_of
 from tests.sim.configurations import CHUNK, N, configurations
 from tests.sim.fast_hands import HAND_SPEED, passes
 from tests.sim.mesh_gap import FARTHEST, Gap, gaps

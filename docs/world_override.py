@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from app.sim import human
-from app.sim.cells import load_cell
-from app.sim.checker import shapes_of
-from app.sim.contact import clearance
-from app.sim.pick import step_robot
-from app.sim.robot import Robot
-from app.sim.safety import SafetyLayer, safety_settings
-from app.sim.scene import NO_CYLINDERS, arm_of, people_of
+from app.sim.cells.cell import load_cell
+from app.sim.collision.checker import shapes_of
+from app.sim.collision.contact import clearance
+from app.sim.human import model as human
+from app.sim.pick.batch import step_robot
+from app.sim.robot.ur10 import Robot
+from app.sim.safety.layer import SafetyLayer, safety_settings
+from app.sim.scene.scene import NO_CYLINDERS, arm_of, people_of
 from docs.world_plots import BLUE, GREY, RED, WIDTH
 
 Json = dict[str, Any]

@@ -14,10 +14,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Rectangle
 
-from app.sim.cells import Cell, load_cell
-from app.sim.kernels.arm import Arm
-from app.sim.occupancy import Walk, WalkerSettings
-from app.sim.shapes import TOOL
+from app.sim.cells.cell import Cell, load_cell
+from app.sim.people.pedestrian import Walk, WalkerSettings
+from app.sim.robot.capsules import TOOL
+from app.sim.robot.kernels.arm import Arm
 from docs.world_measures import EXTENT, Episode, ReachMap
 from tests.sim.mesh_gap import Gap
 

@@ -3,10 +3,10 @@
 import logging
 
 from app.errors import Conflict, InvalidInput, NotFound
-from app.policies.presets import Preset
-from app.policies.reach_preset import ReachPreset
-from app.policies.sorting_preset import SortingPreset
-from app.sim.cells import (
+from app.policies.configs.presets import Preset
+from app.policies.configs.reach import ReachPreset
+from app.policies.configs.sorting import SortingPreset
+from app.sim.cells.cell import (
     Cell,
     cell_names,
     lacks_for_pick,
@@ -14,7 +14,7 @@ from app.sim.cells import (
     load_cell,
     parse_definition,
 )
-from app.sim.sorting_cell import lacks_for_tasks
+from app.sim.sorting.layout import lacks_for_tasks
 from app.store.cells import get_cell, list_cells, put_cell, remove_cell
 from app.store.engine import Store
 

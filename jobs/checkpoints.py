@@ -3,7 +3,7 @@
 import logging
 
 from app.errors import Damaged
-from app.policies import pretrained
+from app.policies.checkpoints import pretrained
 from app.store.checkpoints import put_checkpoint, read_checkpoint
 from app.store.engine import Store
 from app.store.records import CheckpointRecord, NewCheckpoint

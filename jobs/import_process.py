@@ -20,8 +20,8 @@ from dataclasses import asdict, fields
 from typing import Any
 
 from app.errors import BadMotion, Fault, InvalidInput, NotReady, SimulationError
-from app.sim.motions import read_motion
-from app.sim.read_options import NOTHING_STATED, ReadOptions
+from app.sim.mocap.importer import read_motion
+from app.sim.mocap.read_options import NOTHING_STATED, ReadOptions
 from app.store.records import NewMotion
 from jobs.executor import PROJECT_ROOT, search_path
 from jobs.stored_motion import packed

@@ -9,8 +9,8 @@ from dataclasses import replace
 from pathlib import PurePath
 
 from app.errors import Conflict, InvalidInput, NotFound
-from app.sim.motions import Motion
-from app.sim.read_options import NOTHING_STATED, ReadOptions
+from app.sim.mocap.importer import Motion
+from app.sim.mocap.read_options import NOTHING_STATED, ReadOptions
 from app.store import motions as kept
 from app.store.engine import Store
 from app.store.records import MotionRecord, NewMotion

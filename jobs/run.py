@@ -11,13 +11,13 @@ from typing import Any
 
 import torch
 
-from app.policies import checkpoint as formats
-from app.policies import presets
-from app.policies.checkpoint import Checkpoint
-from app.policies.evaluation.protocols import evaluate as run_protocol
+from app.policies.checkpoints import checkpoint as formats
+from app.policies.checkpoints.checkpoint import Checkpoint
+from app.policies.configs import presets
+from app.policies.evaluation.registry import evaluate as run_protocol
 from app.policies.evaluation.rows import Row
-from app.policies.progress import Progress
-from app.policies.training import train as train_policy
+from app.policies.training.progress import Progress
+from app.policies.training.train import train as train_policy
 from app.settings import load_settings
 from app.store.engine import Store
 from app.store.records import NewCheckpoint, ResumeState

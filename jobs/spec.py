@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from app.errors import InvalidInput
-from app.policies import presets
-from app.policies.evaluation.protocols import (
+from app.policies.configs import presets
+from app.policies.evaluation.registry import (
     PROTOCOLS,
     check_motions,
     default_checkpoint,

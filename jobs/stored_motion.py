@@ -16,10 +16,10 @@ from safetensors.numpy import load as load_tensors
 from safetensors.numpy import save as save_tensors
 
 from app.errors import InvalidInput
-from app.sim.body_size import BodySize
-from app.sim.body_track import MEASURED
-from app.sim.motions import ImportedMotion, Motion, Spread
-from app.sim.read_options import NOTHING_STATED, ReadOptions
+from app.sim.human.anthropometry import BodySize
+from app.sim.mocap.importer import ImportedMotion, Motion, Spread
+from app.sim.mocap.joint_centres import MEASURED
+from app.sim.mocap.read_options import NOTHING_STATED, ReadOptions
 from app.store.records import MotionRecord, NewMotion
 
 MAX_GLITCHES = 1000

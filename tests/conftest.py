@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from app.sim.kernel_cache import kernel_cache
+from app.sim.core.kernel_cache import kernel_cache
 
 IN_CI = os.environ.get("CI", "").lower() in ("1", "true")
 

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from app.policies.evaluation.reach_people import SPEEDS
-from app.policies.evaluation.reach_random import RINGS
-from app.policies.evaluation.reach_tracker import ROWS
+from app.policies.evaluation.reach.people import SPEEDS
+from app.policies.evaluation.reach.random_goals import RINGS
+from app.policies.evaluation.reach.tracker import ROWS
 from app.policies.evaluation.statistics import wilson
 
 Json = dict[str, Any]

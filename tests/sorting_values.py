@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from app.sim.sorting_state import Move, SortingShape
+from app.sim.sorting.state import Move, SortingShape
 
 
 class FixedValues:

@@ -7,12 +7,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from app.sim import human
-from app.sim.actions import ActionSettings
-from app.sim.cells import Cell
-from app.sim.kernels import kinematics
-from app.sim.ports import Candidate, Decision, Person, Vec
-from app.sim.scene import arm_of
+from app.sim.cells.cell import Cell
+from app.sim.core.arrays import Vec
+from app.sim.human import model as human
+from app.sim.human.person import Person
+from app.sim.pick.task_policy import Candidate, Decision
+from app.sim.robot.actions import ActionSettings
+from app.sim.robot.kernels import kinematics
+from app.sim.scene.scene import arm_of
 
 
 class StraightPolicy:

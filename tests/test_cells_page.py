@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from app.__main__ import main
-from app.sim.cell_file import read_cell
-from app.sim.cells import Cell, cell_names, lacks_for_pick
+from app.sim.cell_validation.reader import read_cell
+from app.sim.cells.cell import Cell, cell_names, lacks_for_pick
 
 TEXT = (Path(__file__).resolve().parent.parent / "docs" / "cells.md").read_text("utf-8")
 

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from app.errors import digits, interval
-from app.policies import presets
-from app.sim.cell_numbers import shown
+from app.policies.configs import presets
+from app.sim.cell_validation.units import shown
 
 
 @pytest.mark.parametrize(

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from app.sim.cells import load_cell
-from app.sim.robot import Robot
+from app.sim.cells.cell import load_cell
+from app.sim.robot.ur10 import Robot
 from docs.frame_plot import IMAGE, frame
 
 ROOT = Path(__file__).resolve().parent.parent

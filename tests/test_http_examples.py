@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 
 from app.main import create_app
-from app.policies import pretrained
-from app.policies.evaluation.protocols import PROTOCOLS
+from app.policies.checkpoints import pretrained
+from app.policies.evaluation.registry import PROTOCOLS
 from app.settings import Settings
 from tests.api.live_server import running, wait_until_ready
 

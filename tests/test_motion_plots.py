@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from docs.motion_plots import Course, course, name_of, row, shown_of
-from tests.sim.test_motions import with_leap
+from tests.sim.mocap.test_importer import with_leap
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ import pytest
 from app.__main__ import main
 from app.errors import BadMotion
 from app.motion_verbs import runs_of
-from app.sim.read_options import ReadOptions
+from app.sim.mocap.read_options import ReadOptions
 from tests.sim.recorded_person import bvh_text, csv_text, working
 from tests.sim.recorded_skeleton import Person, skeleton
 

@@ -13,7 +13,7 @@ from packaging.utils import canonicalize_name
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 ROOMS = ("app", "jobs", "web")
-RUN_BY_HAND = {"web/distance_fields.py"}
+RUN_BY_HAND = {"tools/distance_fields.py"}
 """Modules of scripts that make committed data; they may use the development extras."""
 
 

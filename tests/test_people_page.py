@@ -3,9 +3,9 @@
 import json
 from pathlib import Path
 
-from app.sim.make_primitives import N_DEMONSTRATIONS, SEED
-from app.sim.primitives import load_primitives
+from app.sim.primitives.library_file import load_primitives
 from docs.people_plots import IMAGES, KINDS, PAGE, RESULTS, page
+from tools.make_primitives import N_DEMONSTRATIONS, SEED
 
 
 def test_page_is_what_the_results_give() -> None:

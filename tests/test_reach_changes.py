@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from app.errors import InvalidInput
-from app.policies import presets
+from app.policies.configs import presets
 from app.policies.evaluation.statistics import wilson
 from docs.augmentation import over_seeds
 from docs.reach_changes import BASE, CHANGES, SHORT, folder_of, measured, row_of, welch

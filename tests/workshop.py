@@ -3,7 +3,7 @@
 import json
 from typing import Any
 
-from app.sim.cells import Cell, load_cell, parse_definition
+from app.sim.cells.cell import Cell, load_cell, parse_definition
 
 
 def definition(**changes: Any) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from starlette.concurrency import run_in_threadpool
 from app.api.schemas.cells import CellList, CellPublic, cell_schema
 from app.api.services import Services, ServicesDep
 from app.errors import Conflict
-from app.sim.cell_file import read_cell
+from app.sim.cell_validation.reader import read_cell
 
 router = APIRouter(prefix="/v1/cells", tags=["cells"])
 

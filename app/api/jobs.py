@@ -10,7 +10,7 @@ from starlette.concurrency import run_in_threadpool
 
 from app.api.schemas.jobs import EvaluateJobCreate, JobCreate, JobList, JobPublic, MetricsPublic
 from app.api.services import Services, ServicesDep
-from app.policies import presets
+from app.policies.configs import presets
 from app.store import events, jobs, metrics
 from app.store.cursors import MAX_INTEGER
 from app.store.records import JobEvent, JobRecord, JobState, MetricRow

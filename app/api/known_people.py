@@ -24,14 +24,14 @@ from app.api.schemas.people import (
 )
 from app.api.tracker_sessions import IDLE_S, TrackerSessions
 from app.errors import InvalidInput, NotFound
-from app.sim import human
-from app.sim.cells import Cell
-from app.sim.kernels.people import MAX_PEOPLE
-from app.sim.keypoints import keypoints_of
-from app.sim.person_estimate import PersonEstimate
-from app.sim.ports import OutsideField, Person, Vec
-from app.sim.scene import arm_of, people_of
-from app.sim.seen_people import (
+from app.sim.cells.cell import Cell
+from app.sim.core.arrays import Vec
+from app.sim.core.out_of_range import OutsideField
+from app.sim.human import model as human
+from app.sim.human.person import Person
+from app.sim.people.kernels.people import MAX_PEOPLE
+from app.sim.perception.keypoints import keypoints_of
+from app.sim.perception.observed_people import (
     as_monitored,
     as_person,
     checked_person,
@@ -39,7 +39,9 @@ from app.sim.seen_people import (
     person_anywhere,
     standing_in,
 )
-from app.sim.single_frame import estimate_once
+from app.sim.perception.person_estimator import PersonEstimate
+from app.sim.perception.single_frame import estimate_once
+from app.sim.scene.scene import arm_of, people_of
 
 _PERSON = re.compile(r"^people\[(\d+)\]")
 

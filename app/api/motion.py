@@ -32,9 +32,9 @@ from app.api.task_selection import known_cell
 from app.api.texts import fault_in_json
 from app.api.tracker_sessions import TrackerSessions
 from app.errors import ServiceError
-from app.policies.motion_decision import MotionDecider
-from app.sim.cells import Cell, require_cell
-from app.sim.safety import safety_settings
+from app.policies.inference.motion_decision import MotionDecider
+from app.sim.cells.cell import Cell, require_cell
+from app.sim.safety.layer import safety_settings
 
 logger = logging.getLogger(__name__)
 

@@ -9,8 +9,8 @@ from app.api.bodies import FILE_TYPES
 from app.api.schemas.motions import MotionItem, MotionList, MotionPublic
 from app.api.services import MAX_UPLOADS, Services, ServicesDep
 from app.errors import NotReady
-from app.sim.motions import FORMATS, MAX_BYTES
-from app.sim.read_options import UNITS, UP_AXES, ReadOptions, name_map
+from app.sim.mocap.importer import FORMATS, MAX_BYTES
+from app.sim.mocap.read_options import UNITS, UP_AXES, ReadOptions, name_map
 from app.store.records import MotionRecord
 
 router = APIRouter(prefix="/v1/motions", tags=["motions"])

@@ -12,10 +12,12 @@ from starlette.requests import HTTPConnection
 from app.api.registry import CheckpointNames, PolicyRegistry
 from app.api.tracker_sessions import TrackerSessions
 from app.errors import NotFound, NotReady
-from app.policies.motion_decision import MotionDecider
-from app.sim.cells import Cell
-from app.sim.ports import SortingValues, TaskPolicy, WorldHandle
-from app.sim.reach_ports import ReachPilot
+from app.live.reach.interfaces import ReachPilot
+from app.live.world_handle import WorldHandle
+from app.policies.inference.motion_decision import MotionDecider
+from app.sim.cells.cell import Cell
+from app.sim.pick.task_policy import TaskPolicy
+from app.sim.sorting.sorting_values import SortingValues
 from app.store.engine import Store
 from jobs.cells import CellCatalog
 from jobs.motions import MotionCatalog
@@ -30,7 +32,7 @@ MAX_VIEWERS = 16
 
 
 class LiveWorld(Protocol):
-    """One live world and its viewer; ``web.loop.LiveCell`` is one."""
+    """One live world and its viewer; ``web.viewer.loop.LiveCell`` is one."""
 
     @property
     def handle(self) -> WorldHandle:

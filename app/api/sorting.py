@@ -11,10 +11,11 @@ from app.api.schemas.sorting import SortingAnswer, SortingRequest, outside_of
 from app.api.services import Services, ServicesDep
 from app.api.task_selection import known_cell
 from app.errors import InvalidInput
-from app.sim.ports import SortingValues, Vec
-from app.sim.sorting import fail_of
-from app.sim.sorting_decision import decide, takes_time
-from app.sim.sorting_names import SortingNames, names_of, plain_names
+from app.sim.core.arrays import Vec
+from app.sim.sorting.batch import fail_of
+from app.sim.sorting.decision import decide, takes_time
+from app.sim.sorting.names import SortingNames, names_of, plain_names
+from app.sim.sorting.sorting_values import SortingValues
 
 router = APIRouter(prefix="/v1/sorting", tags=["deciding"])
 

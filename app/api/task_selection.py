@@ -11,7 +11,7 @@ from app.api.schemas.task_selection import TaskSelection, TaskSelectionRequest
 from app.api.services import Services, ServicesDep
 from app.api.world_policies import require_mover
 from app.errors import InvalidInput, NotFound
-from app.sim.cells import Cell, cell_names
+from app.sim.cells.cell import Cell, cell_names
 
 MAX_INLINE_CANDIDATES = 32
 """More than this many are decided on a thread, so that streams and other callers go on."""

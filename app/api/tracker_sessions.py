@@ -5,7 +5,8 @@ is limited. A session's estimates are made under its own lock, so that frames of
 in order and different cameras do not wait for each other.
 
 The age of what a tracker reports counts from the arrival of its newest frame
-(:mod:`app.sim.stamp_timeline`), on a clock that goes on while the machine is suspended.
+(:mod:`app.sim.perception.stamp_timeline`), on a clock that goes on while the machine is
+suspended.
 """
 
 import secrets
@@ -15,10 +16,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 from app.errors import Conflict, NotFound
-from app.sim.people_estimate import PeopleEstimator, Unfollowed
-from app.sim.person_estimate import Flag, PersonEstimate
-from app.sim.ports import Vec
-from app.sim.stamp_timeline import StampTimeline
+from app.sim.core.arrays import Vec
+from app.sim.perception.multi_person_tracker import PeopleEstimator, Unfollowed
+from app.sim.perception.person_estimator import Flag, PersonEstimate
+from app.sim.perception.stamp_timeline import StampTimeline
 
 MAX_SESSIONS = 32
 """Most trackers at once."""

@@ -9,13 +9,14 @@ import logging
 from app.api.registry import REACH_ALIAS, SORTERS, P, PolicyRegistry
 from app.api.services import Services
 from app.errors import CheckpointMismatch, Damaged, NotFound
-from app.policies.checkpoint import CHOOSING, REACHING, purpose_of
-from app.policies.reach_pilot import ReachPilot
-from app.policies.trained_cell import is_for
-from app.sim.cells import Cell, require_cell
-from app.sim.ports import SortingValues, TaskPolicy
-from app.sim.sorting import shape_of
-from app.sim.sorting_cell import is_sorting, require_workspace
+from app.policies.checkpoints.checkpoint import CHOOSING, REACHING, purpose_of
+from app.policies.checkpoints.trained_cell import is_for
+from app.policies.inference.live_reach_policy import ReachPilot
+from app.sim.cells.cell import Cell, require_cell
+from app.sim.pick.task_policy import TaskPolicy
+from app.sim.sorting.batch import shape_of
+from app.sim.sorting.layout import is_sorting, require_workspace
+from app.sim.sorting.sorting_values import SortingValues
 from app.store.checkpoints import list_checkpoints
 
 logger = logging.getLogger(__name__)

@@ -35,13 +35,14 @@ from app.api.world_policies import (
     sorter_for,
 )
 from app.errors import InvalidInput, NotReady
-from app.sim.cases import cases_of
-from app.sim.cells import Cell
-from app.sim.live_world import lacks_for_live
-from app.sim.motions import Motion
-from app.sim.ports import SortingValues, TaskPolicy
-from app.sim.reach_commands import SetPilot, is_reaching
-from app.sim.reach_ports import ReachPilot
+from app.live.factory import lacks_for_live
+from app.live.reach.commands import SetPilot, is_reaching
+from app.live.reach.interfaces import ReachPilot
+from app.sim.cells.cell import Cell
+from app.sim.mocap.importer import Motion
+from app.sim.pick.cases import cases_of
+from app.sim.pick.task_policy import TaskPolicy
+from app.sim.sorting.sorting_values import SortingValues
 
 STREAM_PERIOD_S = 0.1
 

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from app.sim.cells import cell_names
+from app.sim.cells.cell import cell_names
 from tests import workshop
 
 

@@ -1,7 +1,7 @@
 from fastapi.testclient import TestClient
 from safetensors.numpy import load
 
-from app.policies import checkpoint
+from app.policies.checkpoints import checkpoint
 
 
 def test_shipped_checkpoint_is_listed_with_its_alias(client: TestClient) -> None:

@@ -13,8 +13,8 @@ from safetensors.numpy import load
 from app.__main__ import find_checkpoint
 from app.errors import Damaged
 from app.main import create_app
-from app.policies import pretrained
-from app.policies.checkpoint import Checkpoint
+from app.policies.checkpoints import pretrained
+from app.policies.checkpoints.checkpoint import Checkpoint
 from app.settings import Settings
 from app.store.checkpoints import put_checkpoint, read_checkpoint, set_alias
 from app.store.engine import Store

@@ -13,8 +13,8 @@ from starlette.testclient import WebSocketTestSession
 from starlette.websockets import WebSocketDisconnect
 
 from app.api.services import MAX_STREAMS
-from app.policies.checkpoint import Checkpoint, pack
-from app.sim.cells import load_cell
+from app.policies.checkpoints.checkpoint import Checkpoint, pack
+from app.sim.cells.cell import load_cell
 from app.store.records import NewCheckpoint
 from tests.api.conftest import ADDRESS
 from tests.policies.untrained import untrained_reach

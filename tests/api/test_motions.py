@@ -8,10 +8,10 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.api.services import MAX_UPLOADS
-from app.sim.human import Q_MAX
-from app.sim.motions import MAX_BYTES
+from app.sim.human.model import Q_MAX
+from app.sim.mocap.importer import MAX_BYTES
+from tests.sim.mocap.test_importer import with_leap
 from tests.sim.recorded_person import bvh_text, csv_text, working
-from tests.sim.test_motions import with_leap
 
 CLIP = bvh_text(working(200)).encode()
 UNDECLARED = csv_text(working(100)).partition("\n")[2].encode()

@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from app.policies import presets
-from app.policies.training import train
+from app.policies.configs import presets
+from app.policies.training.train import train
 from app.store.checkpoints import put_checkpoint
 from app.store.records import NewCheckpoint
 from tests import workshop

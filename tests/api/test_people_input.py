@@ -8,7 +8,7 @@ import pytest
 from fastapi.testclient import TestClient
 from httpx import Response
 
-from app.sim.keypoints import BODY_25, K
+from app.sim.perception.keypoints import BODY_25, K
 from tests.api.test_task_selection import URL, refused
 from tests.sim.postures import FRAMES
 from tests.sim.tracked_person import CELL, seen, work

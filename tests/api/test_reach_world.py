@@ -9,7 +9,7 @@ from fastapi.testclient import TestClient
 
 from app.api.registry import REACH_ALIAS
 from app.api.services import Services
-from app.policies import pretrained
+from app.policies.checkpoints import pretrained
 from app.store.checkpoints import put_checkpoint
 from app.store.records import NewCheckpoint
 from tests.policies.untrained import untrained_reach

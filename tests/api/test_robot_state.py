@@ -6,8 +6,8 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.api.schemas.robot_state import ROS_NAMES
-from app.sim import human
-from app.sim.cells import load_cell
+from app.sim.cells.cell import load_cell
+from app.sim.human import model as human
 from tests.api.conftest import ADDRESS
 
 SOCKET = ADDRESS.replace("http", "ws") + "/v1/motion/stream"

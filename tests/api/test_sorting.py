@@ -7,10 +7,10 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from app.policies import presets
-from app.policies.sorting_preset import SortingPreset
-from app.policies.sorting_training import start
-from app.sim.cells import load_cell
+from app.policies.configs import presets
+from app.policies.configs.sorting import SortingPreset
+from app.policies.training.sorting import start
+from app.sim.cells.cell import load_cell
 from app.store.records import NewCheckpoint
 
 URL = "/v1/sorting"

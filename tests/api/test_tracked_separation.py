@@ -15,19 +15,19 @@ from app.api.motion import decide
 from app.api.schemas.motion import MotionAnswer, MotionRequest
 from app.api.tracker_sessions import TrackerSession, TrackerSessions
 from app.errors import ClockJump
-from app.policies import pretrained
-from app.policies.motion_decision import MotionDecider
-from app.policies.reach_policy import ReachPolicy
-from app.sim import human
-from app.sim.cells import load_cell
-from app.sim.checker import shapes_of
-from app.sim.keypoints import BODY_25, keypoints_of
-from app.sim.measured_state import Joints
-from app.sim.motion_state import Stage
-from app.sim.safety import SafetyLayer, safety_settings
-from app.sim.scene import arm_of
-from app.sim.seen_people import as_monitored
-from app.sim.single_frame import estimate_once
+from app.policies.checkpoints import pretrained
+from app.policies.inference.motion_decision import MotionDecider
+from app.policies.inference.reach_policy import ReachPolicy
+from app.sim.cells.cell import load_cell
+from app.sim.collision.checker import shapes_of
+from app.sim.human import model as human
+from app.sim.perception.keypoints import BODY_25, keypoints_of
+from app.sim.perception.observed_people import as_monitored
+from app.sim.perception.single_frame import estimate_once
+from app.sim.reach.query_state import Stage
+from app.sim.robot.measured_state import Joints
+from app.sim.safety.layer import SafetyLayer, safety_settings
+from app.sim.scene.scene import arm_of
 
 CELL = load_cell("shared-workspace")
 ARM = arm_of(CELL)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
-from app.sim.keypoints import K
+from app.sim.perception.keypoints import K
 from tests.api.test_task_selection import URL, refused
 from tests.sim.tracked_person import CELL, RATE_HZ, seen, work
 

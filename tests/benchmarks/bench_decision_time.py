@@ -25,15 +25,18 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from app.policies import pretrained
-from app.policies.sorting_policy import SortingPolicy
-from app.policies.task_choice import TaskChooser
-from app.sim.cells import Cell, load_cell
-from app.sim.pick import PickBatch, PickSettings
-from app.sim.ports import Candidate, Person, SortingValues, TaskPolicy, Vec
-from app.sim.sorting import SortingSettings, batch_in, shape_of
-from app.sim.sorting_decision import decide
-from app.sim.sorting_state import SortingState
+from app.policies.checkpoints import pretrained
+from app.policies.inference.sorting_policy import SortingPolicy
+from app.policies.inference.task_selection import TaskChooser
+from app.sim.cells.cell import Cell, load_cell
+from app.sim.core.arrays import Vec
+from app.sim.human.person import Person
+from app.sim.pick.batch import PickBatch, PickSettings
+from app.sim.pick.task_policy import Candidate, TaskPolicy
+from app.sim.sorting.batch import SortingSettings, batch_in, shape_of
+from app.sim.sorting.decision import decide
+from app.sim.sorting.sorting_values import SortingValues
+from app.sim.sorting.state import SortingState
 from tests.benchmarks.measure import Row, arguments, report, row_without
 from tests.benchmarks.motion_decisions import motion_times
 

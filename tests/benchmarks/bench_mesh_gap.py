@@ -13,9 +13,9 @@ import statistics
 
 import numpy as np
 
-from app.sim.cells import load_cell
-from app.sim.scene import arm_of
-from app.sim.shapes import TOOL
+from app.sim.cells.cell import load_cell
+from app.sim.robot.capsules import TOOL
+from app.sim.scene.scene import arm_of
 from tests.benchmarks.measure import Row, arguments, report
 from tests.sim.mesh_gap import Gap, gaps
 

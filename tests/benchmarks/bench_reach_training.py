@@ -23,10 +23,11 @@ from stable_baselines3 import DDPG, TD3
 from stable_baselines3.common.base_class import BaseAlgorithm
 
 import app.sim.envs  # noqa: F401 - registers the environments
-from app.policies import presets, reach_training
-from app.policies.reach_preset import ReachPreset
-from app.sim.cells import load_cell
-from app.sim.reach import N_ACT, ReachBatch
+from app.policies.configs import presets
+from app.policies.configs.reach import ReachPreset
+from app.policies.training import reach as reach_training
+from app.sim.cells.cell import load_cell
+from app.sim.reach.batch import N_ACT, ReachBatch
 from tests.benchmarks.measure import Subject, report, rounds_over, row
 from tests.benchmarks.stock_dqn import FOR_EVER
 from tests.benchmarks.training_rates import rates, trainer_arguments

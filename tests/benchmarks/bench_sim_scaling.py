@@ -23,15 +23,15 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from app.sim.cells import load_cell
-from app.sim.kernels import pick
-from app.sim.kernels.arm import FIRST_OVER_TABLE, Arm
-from app.sim.kernels.body import N_CAPSULES
-from app.sim.kernels.columns import new_columns
-from app.sim.kernels.episode import PLAIN
-from app.sim.pick import DEFAULT_ACTION, DEFAULT_WEIGHTS, PickBatch, PickSettings
-from app.sim.scene import HumanKind, own, own_index
-from app.sim.shapes import load_robot_capsules
+from app.sim.cells.cell import load_cell
+from app.sim.geometry.capsules import new_columns
+from app.sim.human.kernels.kinematics import N_CAPSULES
+from app.sim.pick.batch import DEFAULT_ACTION, DEFAULT_WEIGHTS, PickBatch, PickSettings
+from app.sim.pick.kernels import episode as pick
+from app.sim.robot.capsules import load_robot_capsules
+from app.sim.robot.kernels.arm import FIRST_OVER_TABLE, Arm
+from app.sim.scenario.kernels.episode import PLAIN
+from app.sim.scene.scene import HumanKind, own, own_index
 from tests.benchmarks.measure import Row, Subject, arguments, report, rounds_over, row
 
 BENCH = "sim-scaling"

@@ -25,10 +25,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from app.sim.cells import load_cell
-from app.sim.pick import PickBatch, PickSettings
-from app.sim.ports import Vec
-from app.sim.reach import ReachBatch, ReachSettings
+from app.sim.cells.cell import load_cell
+from app.sim.core.arrays import Vec
+from app.sim.pick.batch import PickBatch, PickSettings
+from app.sim.reach.batch import ReachBatch, ReachSettings
 from tests.benchmarks import sorting_steps
 from tests.benchmarks.fcl_pick import FclPick
 from tests.benchmarks.measure import (

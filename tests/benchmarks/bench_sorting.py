@@ -26,11 +26,11 @@ import numpy as np
 import torch
 
 from app.errors import NotFound
-from app.policies import pretrained
-from app.policies.sorting_policy import SortingPolicy
-from app.sim.sorting import observe, valid_moves
-from app.sim.sorting_planner import solve
-from app.sim.sorting_state import SortingShape, SortingState, empty_state
+from app.policies.checkpoints import pretrained
+from app.policies.inference.sorting_policy import SortingPolicy
+from app.sim.sorting.batch import observe, valid_moves
+from app.sim.sorting.planner import solve
+from app.sim.sorting.state import SortingShape, SortingState, empty_state
 from tests.benchmarks.measure import Row, report, row_without
 from tests.benchmarks.sorting_pddl import PACKAGES, Found, installed, plan
 

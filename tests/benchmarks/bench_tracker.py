@@ -3,8 +3,10 @@
     python -m app bench tracker [--json]
 
 Three people at the synthetic work cycle for 12 s each, seen as BODY_25 key-points at 30 Hz
-(``app/sim/tracker.py``) and turned back into a safety cylinder and joint angles
-(``app/sim/person_estimate.py``). ``center``: the cylinder's axis against that around exact
+(``app/sim/perception/keypoint_sensor_model.py``) and turned back into a safety cylinder and
+joint angles
+(``app/sim/perception/person_estimator.py``). ``center``: the cylinder's axis against that
+around exact
 key-points. ``points inside``: every joint centre, palm and crown; ``surface inside``: every
 capsule. ``body``: the model's fourteen points. ``p5`` and ``p95`` are people of that percentile
 of stature, arms and shoulders, whose size the estimator knows, or takes for the median's
@@ -15,8 +17,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from app.sim.person_estimate import EstimatorSettings
-from app.sim.tracker import TrackerSettings
+from app.sim.perception.keypoint_sensor_model import TrackerSettings
+from app.sim.perception.person_estimator import EstimatorSettings
 from tests.benchmarks.measure import Row, arguments, report
 from tests.sim.tracker_errors import SECONDS, SEEDS, errors
 

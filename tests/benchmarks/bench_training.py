@@ -17,9 +17,10 @@ env-steps and as updates.
 import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 
-from app.policies import presets, sorting_training
-from app.policies.sorting_preset import SortingPreset
-from app.sim.cells import load_cell
+from app.policies.configs import presets
+from app.policies.configs.sorting import SortingPreset
+from app.policies.training import sorting as sorting_training
+from app.sim.cells.cell import load_cell
 from tests.benchmarks.measure import report, rounds_over, row
 from tests.benchmarks.sorting_steps import batched, gymnasium_alone
 from tests.benchmarks.stock_dqn import FOR_EVER, stock

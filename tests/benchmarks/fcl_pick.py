@@ -13,12 +13,12 @@ import fcl
 import numpy as np
 from numpy.typing import NDArray
 
-from app.sim import human
-from app.sim.cells import Cell
-from app.sim.collision import make_box, make_capsule
-from app.sim.ports import Vec
-from app.sim.robot import Robot
-from app.sim.shapes import FLANGE, TOOL_AXIS, load_robot_capsules, self_pairs
+from app.sim.cells.cell import Cell
+from app.sim.collision.fcl_reference import make_box, make_capsule
+from app.sim.core.arrays import Vec
+from app.sim.human import model as human
+from app.sim.robot.capsules import FLANGE, TOOL_AXIS, load_robot_capsules, self_pairs
+from app.sim.robot.ur10 import Robot
 
 Array = NDArray[np.float64]
 

@@ -19,16 +19,16 @@ import gymnasium as gym
 import numpy as np
 from stable_baselines3 import TD3
 
-from app.policies import pretrained
-from app.policies.motion_decision import MotionDecider
-from app.policies.reach_policy import ReachPolicy
-from app.policies.trained_cell import cell_of
-from app.sim.kernels.occupancy import GROWTH, VX, VY, R, X, Y
-from app.sim.motion_ports import MotionQuestion
-from app.sim.ports import Vec
-from app.sim.reach import VIEWS, ReachBatch, ReachSettings
-from app.sim.safety import SafetySettings
-from app.sim.seen_people import standing_in
+from app.policies.checkpoints import pretrained
+from app.policies.checkpoints.trained_cell import cell_of
+from app.policies.inference.motion_decision import MotionDecider
+from app.policies.inference.reach_policy import ReachPolicy
+from app.sim.core.arrays import Vec
+from app.sim.people.kernels.pedestrian import GROWTH, VX, VY, R, X, Y
+from app.sim.perception.observed_people import standing_in
+from app.sim.reach.batch import VIEWS, ReachBatch, ReachSettings
+from app.sim.reach.motion_types import MotionQuestion
+from app.sim.safety.layer import SafetySettings
 from tests.policies.untrained import untrained_reach
 
 ALIAS = "reach"

@@ -19,12 +19,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from app.sim import human
-from app.sim.cells import Cell
-from app.sim.kernels import kinematics
-from app.sim.kernels.arm import FIRST_OVER_TABLE
-from app.sim.ports import Vec
-from app.sim.shapes import RobotCapsules, load_robot_capsules, self_pairs
+from app.sim.cells.cell import Cell
+from app.sim.core.arrays import Vec
+from app.sim.human import model as human
+from app.sim.robot.capsules import RobotCapsules, load_robot_capsules, self_pairs
+from app.sim.robot.kernels import kinematics
+from app.sim.robot.kernels.arm import FIRST_OVER_TABLE
 
 WAYS = ("distances", "sensors", "contacts")
 INSTALLED = importlib.util.find_spec("mujoco") is not None
@@ -33,7 +33,7 @@ CUTOFF = 1e3
 QUARTER = "0.7071067811865476 0 0.7071067811865476 0"
 """A quarter turn about y, as a quaternion w, x, y, z."""
 JOINTS = (
-    # Place in the link before it [m], turn, axis; see ``kernels/kinematics.py``.
+    # Place in the link before it [m], turn, axis; see ``robot/kernels/kinematics.py``.
     ((0.0, 0.0, kinematics.BASE_HEIGHT), "1 0 0 0", "0 0 1"),
     ((0.0, kinematics.SHOULDER_OFFSET, 0.0), QUARTER, "0 1 0"),
     ((0.0, kinematics.ELBOW_OFFSET, kinematics.UPPER_ARM), "1 0 0 0", "0 1 0"),

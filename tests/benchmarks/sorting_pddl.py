@@ -23,7 +23,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.sim.sorting_state import NULL, Codes, SortingShape, SortingState, code_counts
+from app.sim.sorting.state import NULL, Codes, SortingShape, SortingState, code_counts
 
 DOMAIN = Path(__file__).with_name("sorting.pddl")
 PACKAGES = {

@@ -4,8 +4,8 @@ import itertools
 
 import numpy as np
 
-from app.sim.cells import load_cell
-from app.sim.sorting import batch_in
+from app.sim.cells.cell import load_cell
+from app.sim.sorting.batch import batch_in
 from tests.benchmarks.measure import Subject
 from tests.benchmarks.stock_dqn import plain
 

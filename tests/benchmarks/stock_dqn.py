@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from stable_baselines3 import DQN
 from stable_baselines3.common.callbacks import BaseCallback
 
-from app.sim.cells import load_cell
+from app.sim.cells.cell import load_cell
 from tests.benchmarks.plain_sorting import PlainSorting
 
 EXPLORATION_STEPS = {"sorting-e0": 2_000_000, "sorting-e1": 8_000_000}

@@ -1,10 +1,10 @@
 import numpy as np
 
-from app.sim import human
-from app.sim.cells import load_cell
-from app.sim.contact import clearance
-from app.sim.pick import step_robot
-from app.sim.scene import NO_CYLINDERS, arm_of, people_of
+from app.sim.cells.cell import load_cell
+from app.sim.collision.contact import clearance
+from app.sim.human import model as human
+from app.sim.pick.batch import step_robot
+from app.sim.scene.scene import NO_CYLINDERS, arm_of, people_of
 from tests.benchmarks.fcl_pick import FclPick
 
 CELL = load_cell()

@@ -5,11 +5,16 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from app.sim import human
-from app.sim.cells import load_cell
-from app.sim.kernels.arm import FIRST_OVER_TABLE, new_robot_pose, place_robot, table_clearance
-from app.sim.kernels.columns import distances, pair_distances
-from app.sim.scene import arm_of, crowd_of, people_of
+from app.sim.cells.cell import load_cell
+from app.sim.geometry.capsules import distances, pair_distances
+from app.sim.human import model as human
+from app.sim.robot.kernels.arm import (
+    FIRST_OVER_TABLE,
+    new_robot_pose,
+    place_robot,
+    table_clearance,
+)
+from app.sim.scene.scene import arm_of, crowd_of, people_of
 from tests.benchmarks.mujoco_pick import INSTALLED, MujocoPick
 
 pytestmark = pytest.mark.skipif(not INSTALLED, reason="MuJoCo comes with the dev extra")

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from app.sim.sorting_planner import solve
-from app.sim.sorting_state import SortingShape, SortingState
+from app.sim.sorting.planner import solve
+from app.sim.sorting.state import SortingShape, SortingState
 from tests.benchmarks.bench_sorting import task
 from tests.benchmarks.sorting_pddl import installed, plan, problem, replayed
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
-from app.sim import human
-from app.sim.cells import Cell, load_cell
+from app.sim.cells.cell import Cell, load_cell
+from app.sim.human import model as human
 from tests import patient_http
 from tests.browser.camera import Camera
-from web import workplace
-from web.viewer_server import ViewerServer
+from web.viewer.scene import workplace
+from web.viewer.server import ViewerServer
 
 pytestmark = pytest.mark.browser
 

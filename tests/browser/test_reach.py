@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
-from app.sim.cells import load_cell
+from app.sim.cells.cell import load_cell
 from tests import patient_http
 from tests.browser.test_drag import VIEWER, first_camera, on_canvas, state, tell, until
 

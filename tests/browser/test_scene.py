@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Error, Frame, Page, TimeoutError, expect
 
-from app.sim.cells import load_cell
+from app.sim.cells.cell import load_cell
 from tests import patient_http
 from tests.browser.conftest import free_port, serving
 from tests.browser.test_drag import VIEWER, state, tell, until

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 import pytest
 from playwright.sync_api import Page, expect
 
-from app.sim.cells import load_cell
+from app.sim.cells.cell import load_cell
 from tests import patient_http
 from tests.browser.test_drag import state, tell, until
 

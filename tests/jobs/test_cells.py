@@ -1,8 +1,8 @@
 import pytest
 
 from app.errors import Conflict, InvalidInput, NotFound
-from app.policies.presets import resolve
-from app.sim.cells import cell_names, load_cell
+from app.policies.configs.presets import resolve
+from app.sim.cells.cell import cell_names, load_cell
 from app.store.cells import put_cell
 from app.store.engine import Store
 from jobs.cells import CellCatalog

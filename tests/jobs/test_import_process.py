@@ -4,7 +4,7 @@ import time
 import pytest
 
 from app.errors import BadMotion, InvalidInput, NotReady, SimulationError
-from app.sim.read_options import ReadOptions
+from app.sim.mocap.read_options import ReadOptions
 from jobs import import_process
 from jobs.import_process import ImportProcess, import_here
 from tests.sim.recorded_person import bvh_text, csv_text, working

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from app.errors import BadMotion, Conflict, InvalidInput, NotFound
-from app.sim.motions import Motion, read_motion
-from app.sim.read_options import ReadOptions
+from app.sim.mocap.importer import Motion, read_motion
+from app.sim.mocap.read_options import ReadOptions
 from app.store.engine import Store
 from app.store.motions import put_motion
 from app.store.records import NewMotion
@@ -14,8 +14,8 @@ from jobs import motions as motions_module
 from jobs.import_process import import_here
 from jobs.motions import MotionCatalog
 from jobs.stored_motion import packed
+from tests.sim.mocap.test_importer import CLIPS, with_leap
 from tests.sim.recorded_person import bvh_text, csv_text, working
-from tests.sim.test_motions import CLIPS, with_leap
 
 CLIP = csv_text(working(100)).encode()
 

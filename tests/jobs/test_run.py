@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from app.policies import pretrained
-from app.policies.trained_cell import is_for
+from app.policies.checkpoints import pretrained
+from app.policies.checkpoints.trained_cell import is_for
 from app.store import attempts, checkpoints, jobs, metrics
 from app.store.engine import Store
 from app.store.records import NewCheckpoint

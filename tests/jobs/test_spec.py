@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from app.errors import InvalidInput, NotFound
-from app.policies.presets import PRESETS
+from app.policies.configs.presets import PRESETS
 from jobs.spec import MAX_SEED, EvaluateSpec, TrainSpec, new_job, parse_spec
 
 EVALUATE = {"kind": "evaluate", "protocol": "pick-single", "episodes": 10, "seed": 11}

@@ -2,10 +2,10 @@
 
 import pytest
 
-from app.policies import presets
-from app.policies.pick_preset import PickPreset
-from app.policies.progress import Progress
-from app.policies.training import train
+from app.policies.configs import presets
+from app.policies.configs.pick import PickPreset
+from app.policies.training.progress import Progress
+from app.policies.training.train import train
 
 TINY = {
     "total_steps": 1536,

@@ -3,10 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from app.sim.actions import ActionSettings
-from app.sim.cells import Cell, load_cell
-from app.sim.goal_sets import halton_targets
-from app.sim.reach import VIEWS
+from app.sim.cells.cell import Cell, load_cell
+from app.sim.reach.batch import VIEWS
+from app.sim.reach.goal_sets import halton_targets
+from app.sim.robot.actions import ActionSettings
 
 
 class RandomActor:

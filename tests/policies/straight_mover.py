@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from app.sim.kernels.kinematics import ik_vertical_batch
-from app.sim.reach import ReachBatch
+from app.sim.reach.batch import ReachBatch
+from app.sim.robot.kernels.kinematics import ik_vertical_batch
 
 
 class Straight:

@@ -5,9 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.policies import pretrained
-from app.policies.evaluation.reach_ssm import Comparison
-from app.policies.lookahead import (
+from app.policies.checkpoints import pretrained
+from app.policies.evaluation.reach.ssm import Comparison
+from app.policies.inference.controllers import Ahead, mover_of
+from app.policies.inference.motion_decision import MotionDecider
+from app.policies.inference.reach_policy import ReachPolicy
+from app.policies.inference.rollout import (
     LONGEST_AHEAD,
     NO_LAYER,
     SPARE_M,
@@ -15,22 +18,19 @@ from app.policies.lookahead import (
     Lookahead,
     layer_of,
 )
-from app.policies.motion_decision import MotionDecider
-from app.policies.movers import Ahead, mover_of
-from app.policies.networks import BASE_WEIGHT
-from app.policies.reach_policy import ReachPolicy
-from app.sim.cells import load_cell
-from app.sim.crossings import crossings
-from app.sim.forecasts import new_forecaster
-from app.sim.kernels import played_ways
-from app.sim.kernels.arm import new_robot_pose, place_robot
-from app.sim.kernels.foretold import LONG_MOMENTS, MOMENTS, foretell
-from app.sim.kernels.occupancy import GAIT, STILL, VX, VY, X, Y
-from app.sim.kernels.reach import new_work
-from app.sim.motion_ports import MotionQuestion
-from app.sim.reach import ReachBatch, ReachSettings
-from app.sim.safety import SafetySettings, safety_settings
-from app.sim.seen_people import standing_in
+from app.policies.networks.actor_critic import BASE_WEIGHT
+from app.sim.cells.cell import load_cell
+from app.sim.people.kernels.pedestrian import GAIT, STILL, VX, VY, X, Y
+from app.sim.perception.observed_people import standing_in
+from app.sim.prediction.weights import new_forecaster
+from app.sim.reach.batch import ReachBatch, ReachSettings
+from app.sim.reach.crossings import crossings
+from app.sim.reach.kernels.episode import new_work
+from app.sim.reach.motion_types import MotionQuestion
+from app.sim.reach.rollout.kernels import rollout as played_ways
+from app.sim.reach.rollout.kernels.prediction import LONG_MOMENTS, MOMENTS, foretell
+from app.sim.robot.kernels.arm import new_robot_pose, place_robot
+from app.sim.safety.layer import SafetySettings, safety_settings
 
 CELL = load_cell("shared-workspace")
 POLICY = ReachPolicy(pretrained.load("reach"))

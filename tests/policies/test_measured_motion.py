@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.policies import pretrained
-from app.policies.motion_decision import MotionDecider
-from app.policies.reach_policy import ReachPolicy
-from app.sim.actions import ActionSettings
-from app.sim.cells import load_cell
-from app.sim.motion_ports import MotionDecision, MotionQuestion
-from app.sim.ports import Person
-from app.sim.safety import SafetySettings
-from app.sim.seen_people import standing_in
+from app.policies.checkpoints import pretrained
+from app.policies.inference.motion_decision import MotionDecider
+from app.policies.inference.reach_policy import ReachPolicy
+from app.sim.cells.cell import load_cell
+from app.sim.human.person import Person
+from app.sim.perception.observed_people import standing_in
+from app.sim.reach.motion_types import MotionDecision, MotionQuestion
+from app.sim.robot.actions import ActionSettings
+from app.sim.safety.layer import SafetySettings
 from tests.policies.reach_actor import RandomActor
 
 CELL = load_cell("shared-workspace")

@@ -1,7 +1,7 @@
 import pytest
 
 from app.errors import Damaged, NotFound
-from app.policies import pretrained
+from app.policies.checkpoints import pretrained
 
 
 @pytest.mark.parametrize("alias", pretrained.ALIASES)

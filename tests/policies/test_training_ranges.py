@@ -1,10 +1,10 @@
 """What a checkpoint says of the states it met."""
 
-from app.policies.pick_training import states_met
-from app.policies.ranges import Ranges
-from app.sim.cells import load_cell
-from app.sim.pick import PickBatch, PickSettings
-from app.sim.worker_motion import WorkSettings
+from app.policies.checkpoints.training_range import Ranges
+from app.policies.training.pick import states_met
+from app.sim.cells.cell import load_cell
+from app.sim.people.human_motion_config import WorkSettings
+from app.sim.pick.batch import PickBatch, PickSettings
 
 
 def test_people_who_are_not_there_widen_no_range() -> None:

@@ -8,16 +8,17 @@ from dataclasses import asdict
 
 import torch
 
-from app.policies import checkpoint as formats
-from app.policies import presets, pretrained
-from app.policies.checkpoint import Checkpoint
-from app.policies.model_state import weights_of
-from app.policies.reach_policy import LAYOUTS
-from app.policies.reach_preset import ReachPreset
-from app.policies.reach_training import networks_of
-from app.policies.trained_cell import manifest_fields
-from app.sim.cells import Cell, load_cell
-from app.sim.reach import N_ACT
+from app.policies.checkpoints import checkpoint as formats
+from app.policies.checkpoints import pretrained
+from app.policies.checkpoints.checkpoint import Checkpoint
+from app.policies.checkpoints.model_state import weights_of
+from app.policies.checkpoints.trained_cell import manifest_fields
+from app.policies.configs import presets
+from app.policies.configs.reach import ReachPreset
+from app.policies.inference.reach_policy import LAYOUTS
+from app.policies.training.reach import networks_of
+from app.sim.cells.cell import Cell, load_cell
+from app.sim.reach.batch import N_ACT
 
 
 def untrained_reach(seed: int = 0, cell: Cell | None = None, **overrides: object) -> Checkpoint:

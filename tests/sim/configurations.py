@@ -9,15 +9,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from app.sim import human
-from app.sim.cells import load_cell
-from app.sim.kernels.arm import new_robot_pose, place_robot
-from app.sim.kernels.columns import distances
-from app.sim.kernels.people import new_crowd, people_clearance, place_workers
-from app.sim.recheck import robot_ends, segment_distances
-from app.sim.robot import Robot
-from app.sim.scene import arm_of, people_of
-from app.sim.shapes import load_robot_capsules
+from app.sim.cells.cell import load_cell
+from app.sim.collision.fcl_recheck import robot_ends, segment_distances
+from app.sim.geometry.capsules import distances
+from app.sim.human import model as human
+from app.sim.people.kernels.people import new_crowd, people_clearance, place_workers
+from app.sim.robot.capsules import load_robot_capsules
+from app.sim.robot.kernels.arm import new_robot_pose, place_robot
+from app.sim.robot.ur10 import Robot
+from app.sim.scene.scene import arm_of, people_of
 from tests.sim.person_reference import capsule_ends
 
 CELL = load_cell()

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from app.sim.cells import load_cell
-from app.sim.phase import min_jerk
-from app.sim.ports import Vec
-from app.sim.work_cycle import build_library
+from app.sim.cells.cell import load_cell
+from app.sim.core.arrays import Vec
+from app.sim.people.reach_script import build_library
+from app.sim.primitives.phase import min_jerk
 
 
 def reaches(n: int = 20, seed: int = 5, hz: float = 60.0) -> tuple[list[Vec], Vec]:

@@ -9,14 +9,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.sim import human
-from app.sim.cells import Cell
-from app.sim.contact import clearance, contact
-from app.sim.kernels import body
-from app.sim.recheck import Recheck, Trajectory, robot_ends
-from app.sim.robot import Robot
-from app.sim.scene import NO_CYLINDERS, arm_of, people_of
-from app.sim.shapes import load_robot_capsules
+from app.sim.cells.cell import Cell
+from app.sim.collision.contact import clearance, contact
+from app.sim.collision.fcl_recheck import Recheck, Trajectory, robot_ends
+from app.sim.human import model as human
+from app.sim.human.kernels import kinematics as body
+from app.sim.robot.capsules import load_robot_capsules
+from app.sim.robot.ur10 import Robot
+from app.sim.scene.scene import NO_CYLINDERS, arm_of, people_of
 
 HAND_SPEED = 2.5
 """Speed of the palm, as fast as clean motion capture shows hands [m/s]."""

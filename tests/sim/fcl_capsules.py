@@ -10,7 +10,7 @@ from typing import Any
 import fcl
 import numpy as np
 
-from app.sim.collision import make_capsule, touch
+from app.sim.collision.fcl_reference import make_capsule, touch
 
 GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
 

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.sim import human, promp
-from app.sim.cells import Cell
-from app.sim.demonstrations import height_over_table
-from app.sim.ports import Vec
-from app.sim.task_library import TaskLibrary, leg_weights
+from app.sim.cells.cell import Cell
+from app.sim.core.arrays import Vec
+from app.sim.human import model as human
+from app.sim.primitives import promp
+from app.sim.primitives.demonstrations import height_over_table
+from app.sim.primitives.primitive_library import TaskLibrary, leg_weights
 
 PHASES = np.linspace(0.0, 1.0, 41)
 LOW = ("elbow_r", "wrist_r", "elbow_l", "wrist_l")

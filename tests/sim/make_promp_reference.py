@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from app.sim.ports import Vec
-from app.sim.promp import ProMP, fit, moments
+from app.sim.core.arrays import Vec
+from app.sim.primitives.promp import ProMP, fit, moments
 from tests.sim.demonstrations import reaches
 
 FILE = Path(__file__).with_name("promp_reference.npz")

@@ -10,14 +10,14 @@ from functools import cache
 
 import numpy as np
 
-from app.sim import human
-from app.sim.cells import Cell
-from app.sim.collision import collision_mesh
-from app.sim.kernels.arm import Arm
-from app.sim.pick import PickBatch, PickSettings
-from app.sim.recheck import robot_ends, segment_distances
-from app.sim.robot import LINK_NAMES, Robot
-from app.sim.shapes import TOOL, load_robot_capsules
+from app.sim.cells.cell import Cell
+from app.sim.collision.fcl_recheck import robot_ends, segment_distances
+from app.sim.collision.fcl_reference import collision_mesh
+from app.sim.human import model as human
+from app.sim.pick.batch import PickBatch, PickSettings
+from app.sim.robot.capsules import TOOL, load_robot_capsules
+from app.sim.robot.kernels.arm import Arm
+from app.sim.robot.ur10 import LINK_NAMES, Robot
 
 FARTHEST = 0.5
 """Postures with more clearance than this are left out: nothing depends on their gap [m]."""

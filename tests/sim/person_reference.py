@@ -1,15 +1,16 @@
 """The 18-DoF person a second time, in plain numpy: the reference for the kernels.
 
 A tree of homogeneous transforms from METHOD 3.4 for a person of any size; nothing is taken from
-``kernels/body.py`` but the order of the capsules and their radii. A clavicle is a bar that
+``human/kernels/kinematics.py`` but the order of the capsules and their radii. A clavicle is a
+bar that
 turns about the torso's z by protraction and then lifts by elevation; it carries the shoulder's
 place, not its orientation.
 """
 
 import numpy as np
 
-from app.sim.body_size import BodySize
-from app.sim.kernels import body
+from app.sim.human.anthropometry import BodySize
+from app.sim.human.kernels import kinematics as body
 
 PELVIS_HALF, CHEST_HALF = 0.06, 0.07
 """Half widths of the median person's capsules of pelvis and chest [m]."""

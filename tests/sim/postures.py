@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from app.sim.keypoints import N_KEYPOINTS, K
+from app.sim.perception.keypoints import N_KEYPOINTS, K
 
 X, Y, Z = np.eye(3)
 STANDING = {"thigh": -Z, "shank": -Z, "arm": -Z, "forearm": -Z, "trunk": Z, "hips": 0.92}

@@ -2,10 +2,11 @@
 
 import numpy as np
 
-from app.sim.cells import Cell
-from app.sim.kernels import random, script
-from app.sim.ports import Vec
-from app.sim.work_cycle import Script, build_library
+from app.sim.cells.cell import Cell
+from app.sim.core.arrays import Vec
+from app.sim.core.kernels import rng as random
+from app.sim.people.reach_script import Script, build_library
+from app.sim.primitives.kernels import script
 
 
 class ReachingPerson:

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from app.sim.body_size import BodySize
-from app.sim.human import rest_posture
-from app.sim.motions import Motion
+from app.sim.human.anthropometry import BodySize
+from app.sim.human.model import rest_posture
+from app.sim.mocap.importer import Motion
 
 DT = 0.02
 

@@ -5,9 +5,9 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from app.sim.body_size import MEDIAN
-from app.sim.human import JOINT_NAMES, rest_posture
-from app.sim.ports import Vec
+from app.sim.core.arrays import Vec
+from app.sim.human.anthropometry import MEDIAN
+from app.sim.human.model import JOINT_NAMES, rest_posture
 
 TUM = {
     "hips": "hip",

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from app.sim.body_track import TRACK_NAMES
-from app.sim.ports import Vec
+from app.sim.core.arrays import Vec
+from app.sim.mocap.joint_centres import TRACK_NAMES
 
 WORLD = {
     "y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]),

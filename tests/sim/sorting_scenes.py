@@ -2,12 +2,13 @@
 
 from collections.abc import Callable, Mapping, Sequence
 
-from app.sim import commands
-from app.sim.cells import load_cell
-from app.sim.ports import SortingValues, TaskPolicy
-from app.sim.snapshot import WorldSnapshot
-from app.sim.sorting_commands import AddObject, RemoveObject, SetGoal
-from app.sim.sorting_world import SortingWorld
+from app.live import commands
+from app.live.snapshot import WorldSnapshot
+from app.live.sorting.commands import AddObject, RemoveObject, SetGoal
+from app.live.sorting.world import SortingWorld
+from app.sim.cells.cell import load_cell
+from app.sim.pick.task_policy import TaskPolicy
+from app.sim.sorting.sorting_values import SortingValues
 from tests.straight_policy import StraightPolicy
 
 LOOK = 3

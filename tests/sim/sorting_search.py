@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from app.sim.sorting_state import SortingShape, SortingState
+from app.sim.sorting.state import SortingShape, SortingState
 
 Key = tuple[tuple[int, ...], tuple[tuple[int, ...], ...]]
 """Objects in the cells, and on each tower without free levels."""

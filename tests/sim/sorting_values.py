@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from app.sim.kernels.sorting import RUNNING, SUCCESS
-from app.sim.kernels.sorting_reward import SortingWeights
-from app.sim.sorting import SortingBatch, SortingSettings
-from app.sim.sorting_state import SortingShape, SortingState
+from app.sim.sorting.batch import SortingBatch, SortingSettings
+from app.sim.sorting.kernels.reward import SortingWeights
+from app.sim.sorting.kernels.task import RUNNING, SUCCESS
+from app.sim.sorting.state import SortingShape, SortingState
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 import trimesh
 
-from app.sim.cells import load_cell
-from app.sim.kernels.box import box_clearance
-from app.sim.kernels.columns import columns_of
-from app.sim.scene import arm_of
-from app.sim.shapes import TOOL
+from app.sim.cells.cell import load_cell
+from app.sim.geometry.box import box_clearance
+from app.sim.geometry.capsules import columns_of
+from app.sim.robot.capsules import TOOL
+from app.sim.scene.scene import arm_of
 from tests.sim.mesh_gap import gaps, segment_to_triangles
 
 GOAL = 0.015

@@ -6,9 +6,9 @@ By value iteration over all states of small tasks, with transitions and rewards 
 import numpy as np
 import pytest
 
-from app.sim.kernels.sorting_reward import SortingWeights
-from app.sim.sorting_planner import solve
-from app.sim.sorting_state import SortingShape, SortingState
+from app.sim.sorting.kernels.reward import SortingWeights
+from app.sim.sorting.planner import solve
+from app.sim.sorting.state import SortingShape, SortingState
 from tests.sim.sorting_search import random_task
 from tests.sim.sorting_values import judged, model_of, moves_to_go, values
 

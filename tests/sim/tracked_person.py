@@ -5,8 +5,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from app.sim.cells import Cell, load_cell
-from app.sim.keypoints import keypoints_of
+from app.sim.cells.cell import Cell, load_cell
+from app.sim.perception.keypoints import keypoints_of
 from tests.sim.reaching_person import ReachingPerson
 
 CELL = load_cell()

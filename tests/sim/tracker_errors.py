@@ -5,12 +5,12 @@ from functools import lru_cache
 
 import numpy as np
 
-from app.sim import human
-from app.sim.cells import Cell
-from app.sim.keypoint_cylinder import SafetyCylinder, safety_cylinder
-from app.sim.keypoints import keypoints_of
-from app.sim.person_estimate import PersonEstimate, PersonEstimator
-from app.sim.tracker import Tracker, TrackerSettings, follow
+from app.sim.cells.cell import Cell
+from app.sim.human import model as human
+from app.sim.perception.bounding_cylinder import SafetyCylinder, safety_cylinder
+from app.sim.perception.keypoint_sensor_model import Tracker, TrackerSettings, follow
+from app.sim.perception.keypoints import keypoints_of
+from app.sim.perception.person_estimator import PersonEstimate, PersonEstimator
 from tests.sim.tracked_person import RATE_HZ, cell_of, motion, work
 
 SECONDS = 12.0

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from app.sim.body_size import MEDIAN, BodySize
-from app.sim.cells import Cell
-from app.sim.motions import Motion
-from app.sim.ports import Vec
-from app.sim.worker_motion import WorkSettings, at_the_table
+from app.sim.cells.cell import Cell
+from app.sim.core.arrays import Vec
+from app.sim.human.anthropometry import MEDIAN, BodySize
+from app.sim.mocap.importer import Motion
+from app.sim.people.human_motion_config import WorkSettings, at_the_table
 from tests.sim.recorded_person import working
 
 

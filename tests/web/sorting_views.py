@@ -5,14 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.sim.cells import Cell
-from app.sim.sorting_view import (
+from app.live.sorting.snapshot import (
     GoalBlockView,
     MoveView,
     PieceView,
     SortingCounters,
     SortingView,
 )
+from app.sim.cells.cell import Cell
 
 SIZES = ("small", "medium", "large")
 HALVES = {"small": 0.025, "medium": 0.035, "large": 0.045}

@@ -8,13 +8,13 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import pytest
 
-from app.sim import commands
-from app.sim.cells import load_cell
-from app.sim.commands import Command
-from app.sim.live_world import new_world
+from app.live import commands
+from app.live.commands import Command
+from app.live.factory import new_world
+from app.sim.cells.cell import load_cell
 from tests.web.viewer_client import ViewerClient
-from web.scene import CellScene
-from web.viewer_server import ViewerServer
+from web.viewer.scene.cell_scene import CellScene
+from web.viewer.server import ViewerServer
 
 STEPS = 15
 """Steps after a new size: it is reached within them, and the skin is fitted."""

@@ -1,10 +1,10 @@
 import pytest
 
 from app.errors import InvalidInput
-from app.sim.cells import load_cell
-from app.sim.live_world import new_world
-from app.sim.sorting_commands import AddObject, MoveObject, RemoveObject
-from web.loop import LiveHandle
+from app.live.factory import new_world
+from app.live.sorting.commands import AddObject, MoveObject, RemoveObject
+from app.sim.cells.cell import load_cell
+from web.viewer.loop import LiveHandle
 
 
 @pytest.fixture

@@ -1,22 +1,22 @@
 // A goal has one colour on the whole page and in the scene, whatever it is worth: lengths of
 // bars, heights of lines and ranks in numbers tell that.
 
-/** Colours of the goals, in the cell's order; the same as GOALS in web/stations_view.py. */
+/** Colours of the goals, in the cell's order; the same as GOALS in web/viewer/scene/stations_view.py. */
 export const GOALS = [
   "rgb(49 119 220)", "rgb(206 100 0)", "rgb(0 146 159)", "rgb(167 76 193)", "rgb(140 131 0)",
   "rgb(211 45 72)", "rgb(146 94 50)", "rgb(42 144 75)", "rgb(202 87 148)", "rgb(98 108 196)",
 ];
 const IDLE = "rgb(196 202 210)";
 
-/** Colours of the people's vests, by id; the same as VESTS in web/mannequin.py. */
+/** Colours of the people's vests, by id; the same as VESTS in web/viewer/people/mannequin.py. */
 export const VESTS = ["rgb(255 116 32)", "rgb(196 214 48)", "rgb(72 164 232)", "rgb(232 104 168)"];
 
-/** Colours of sorted blocks, and of what is written on them; as BLOCKS in web/sorting_bodies.py. */
+/** Colours of sorted blocks, and of what is written on them; as BLOCKS in web/viewer/scene/sorting_bodies.py. */
 export const BLOCKS = { red: "rgb(205 58 62)", green: "rgb(112 184 92)", blue: "rgb(52 104 196)" };
 const DARK_INK = "rgb(15 21 26)";
 export const BLOCK_INK = { red: "white", green: DARK_INK, blue: "white" };
 
-/** Chance that a grasp fails -> colour of its cell; as FAILURES in web/sorting_bodies.py. */
+/** Chance that a grasp fails -> colour of its cell; as FAILURES in web/viewer/scene/sorting_bodies.py. */
 const FAILURES = [
   [0.0, [240, 237, 229]],
   [0.2, [243, 217, 164]],
@@ -26,7 +26,7 @@ const FAILURES = [
 ];
 const LIGHT_ON_FAILURE = 0.6;
 
-/** Override -> colour; the same as OVERRIDES in web/reach_scene.py. */
+/** Override -> colour; the same as OVERRIDES in web/viewer/scene/reach_scene.py. */
 export const OVERRIDES = [
   [0.0, [214, 52, 46]],
   [0.5, [240, 176, 52]],

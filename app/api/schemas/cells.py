@@ -5,9 +5,9 @@ from typing import Any, Self
 from pydantic import Field
 
 from app.api.schemas.numbers import Answer
-from app.sim.cases import cases_of
-from app.sim.cells import Cell, cell_names, lacks_for_pick
-from app.sim.live_world import lacks_for_live, tests_of
+from app.live.factory import lacks_for_live, tests_of
+from app.sim.cells.cell import Cell, cell_names, lacks_for_pick
+from app.sim.pick.cases import cases_of
 
 
 class CasePublic(Answer):

@@ -6,7 +6,7 @@ from typing import Any, Self
 from pydantic import Field
 
 from app.api.schemas.numbers import Answer
-from app.policies.checkpoint import purpose_of
+from app.policies.checkpoints.checkpoint import purpose_of
 from app.store.records import CheckpointRecord, Page
 
 

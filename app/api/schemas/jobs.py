@@ -7,8 +7,8 @@ from pydantic import Field
 
 from app.api.schemas.numbers import Answer, Body
 from app.errors import InvalidInput
-from app.policies.evaluation.protocols import default_checkpoint
-from app.policies.presets import PRESETS
+from app.policies.configs.presets import PRESETS
+from app.policies.evaluation.registry import default_checkpoint
 from app.store.records import JobRecord, MetricRow, NewJob
 from jobs.spec import MAX_MOTIONS, new_job
 

@@ -5,9 +5,9 @@ from typing import Any, Self
 from pydantic import Field
 
 from app.api.schemas.numbers import Answer
-from app.sim import human
-from app.sim.body_size import NAMES
-from app.sim.snapshot import BodyView, CylinderView, MotionView, PersonView
+from app.live.snapshot import BodyView, CylinderView, MotionView, PersonView
+from app.sim.human import model as human
+from app.sim.human.anthropometry import NAMES
 
 
 class BodyPublic(Answer):

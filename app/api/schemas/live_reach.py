@@ -5,8 +5,9 @@ from typing import Literal, Self
 from pydantic import Field
 
 from app.api.schemas.numbers import Answer, Body, Finite, Vector3
-from app.sim import commands, reach_commands
-from app.sim.reach_view import GoalMode, ReachView, SafetyView
+from app.live import commands
+from app.live.reach import commands as reach_commands
+from app.live.reach.snapshot import GoalMode, ReachView, SafetyView
 
 
 class SafetyLive(Answer):

@@ -5,9 +5,10 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field
 
 from app.api.schemas.numbers import Answer, Body
-from app.sim import commands, sorting_commands
-from app.sim.ports import SortingValues
-from app.sim.sorting_view import GoalBlockView, MoveView, PieceView, SortingView
+from app.live import commands
+from app.live.sorting import commands as sorting_commands
+from app.live.sorting.snapshot import GoalBlockView, MoveView, PieceView, SortingView
+from app.sim.sorting.sorting_values import SortingValues
 
 MAX_TOWERS = 5
 """Most towers that a goal names."""

@@ -12,12 +12,13 @@ from app.api.schemas.numbers import Answer, Body, Vector3, Vector6
 from app.api.schemas.people import PersonInput, PersonUse
 from app.api.schemas.robot_state import ROS_NAMES, RobotState
 from app.api.schemas.task_selection import FRAME_TEXT, FrameName, Outside, Stamp
-from app.sim.human import CAPSULE_NAMES
-from app.sim.motion_ports import Beside, Met, MotionDecision, MotionQuestion, Way
-from app.sim.people_estimate import MAX_SKELETONS
-from app.sim.pick import Piece
-from app.sim.ports import Person, Vec
-from app.sim.safety import SafetyDecision, SafetySettings, SeparationTerms, powers_of_time
+from app.sim.core.arrays import Vec
+from app.sim.human.model import CAPSULE_NAMES
+from app.sim.human.person import Person
+from app.sim.perception.multi_person_tracker import MAX_SKELETONS
+from app.sim.pick.batch import Piece
+from app.sim.reach.motion_types import Beside, Met, MotionDecision, MotionQuestion, Way
+from app.sim.safety.layer import SafetyDecision, SafetySettings, SeparationTerms, powers_of_time
 
 Metres = Annotated[float, Field(ge=0.0, le=5.0)]
 Seconds = Annotated[float, Field(ge=0.0, le=5.0)]

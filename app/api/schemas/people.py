@@ -14,14 +14,15 @@ from pydantic_core import PydanticCustomError
 
 from app.api.schemas.numbers import Answer, Body, Finite, Time, Vector18
 from app.errors import InvalidInput
-from app.sim import human
-from app.sim.body_size import NAMES, PERCENTILES, percentile_body
-from app.sim.cells import Cell
-from app.sim.kernels.body import N_SIZE
-from app.sim.keypoints import BODY_25, FARTHEST_M, N_KEYPOINTS
-from app.sim.person_estimate import PersonEstimate
-from app.sim.ports import Person, Vec
-from app.sim.seen_people import FASTEST, MOST_REMEMBERED, degradations
+from app.sim.cells.cell import Cell
+from app.sim.core.arrays import Vec
+from app.sim.human import model as human
+from app.sim.human.anthropometry import NAMES, PERCENTILES, percentile_body
+from app.sim.human.kernels.kinematics import N_SIZE
+from app.sim.human.person import Person
+from app.sim.perception.keypoints import BODY_25, FARTHEST_M, N_KEYPOINTS
+from app.sim.perception.observed_people import FASTEST, MOST_REMEMBERED, degradations
+from app.sim.perception.person_estimator import PersonEstimate
 
 Source = Literal["joint-angles", "keypoints", "cylinder", "tracker"]
 Speeds = Literal["given", "zero", "estimated"]

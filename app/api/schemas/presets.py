@@ -6,7 +6,7 @@ from typing import Self
 from pydantic import Field
 
 from app.api.schemas.numbers import Answer
-from app.policies.presets import PRESETS, fields
+from app.policies.configs.presets import PRESETS, fields
 
 
 class PresetField(Answer):

@@ -10,8 +10,8 @@ from pydantic_core import PydanticCustomError
 
 from app.api.schemas.numbers import Body, Vector6
 from app.errors import InvalidInput
-from app.sim.ports import Vec
-from app.sim.robot import JOINT_NAMES
+from app.sim.core.arrays import Vec
+from app.sim.robot.ur10 import JOINT_NAMES
 
 ROS_NAMES = tuple(f"{name}_joint" for name in JOINT_NAMES)
 """The joints as ROS calls them, base to wrist 3."""

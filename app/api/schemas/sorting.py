@@ -9,11 +9,13 @@ from pydantic import BeforeValidator, Field
 from app.api.schemas.numbers import Answer, Body, Finite
 from app.api.schemas.task_selection import Stamp
 from app.errors import InvalidInput
-from app.sim.ports import SortingValues, Vec
-from app.sim.sorting import SortingSettings
-from app.sim.sorting_names import NamedObject, SortingNames, fail_with, state_from_names
-from app.sim.sorting_ports import REASONS, By, RankedMove, SortingDecision, Why
-from app.sim.sorting_state import (
+from app.sim.core.arrays import Vec
+from app.sim.sorting.batch import SortingSettings
+from app.sim.sorting.decision_types import REASONS, By, RankedMove, SortingDecision, Why
+from app.sim.sorting.names import NamedObject, SortingNames, fail_with, state_from_names
+from app.sim.sorting.progress_monitor import MAX_SEEN, HandOver, SortingWatch
+from app.sim.sorting.sorting_values import SortingValues
+from app.sim.sorting.state import (
     MAX_CELLS,
     MAX_COLOURS,
     MAX_SIZES,
@@ -23,7 +25,6 @@ from app.sim.sorting_state import (
     SortingShape,
     SortingState,
 )
-from app.sim.sorting_watch import MAX_SEEN, HandOver, SortingWatch
 
 Word = Annotated[str, Field(min_length=1, max_length=64)]
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]{0,31}$")]

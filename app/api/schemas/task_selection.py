@@ -12,8 +12,10 @@ from app.api.schemas.people import PersonInput, PersonUse
 from app.api.schemas.people import PersonState as PersonState
 from app.api.schemas.robot_state import RobotState
 from app.errors import InvalidInput
-from app.sim.people_estimate import MAX_SKELETONS
-from app.sim.ports import Candidate, Decision, OutsideField, Vec
+from app.sim.core.arrays import Vec
+from app.sim.core.out_of_range import OutsideField
+from app.sim.perception.multi_person_tracker import MAX_SKELETONS
+from app.sim.pick.task_policy import Candidate, Decision
 
 MAX_CANDIDATES = 1000
 FrameName = Literal["robot-base", "base_link"]

@@ -10,9 +10,9 @@ from app.api.schemas.examples import FRAME, shows
 from app.api.schemas.numbers import Answer, Body, Time
 from app.api.schemas.people import IMPLAUSIBLE, UNUSABLE, BodyPercentiles, KeypointsSeen
 from app.api.tracker_sessions import IDLE_S, TrackedPeople, TrackerSession
-from app.sim.keypoint_cylinder import SafetyCylinder
-from app.sim.people_estimate import MAX_SKELETONS
-from app.sim.person_estimate import PersonEstimate
+from app.sim.perception.bounding_cylinder import SafetyCylinder
+from app.sim.perception.multi_person_tracker import MAX_SKELETONS
+from app.sim.perception.person_estimator import PersonEstimate
 
 
 class TrackerCreate(Body):

@@ -33,12 +33,12 @@ from app.api.schemas.task_selection import (
     TaskSelectionRequest,
 )
 from app.errors import InvalidInput
-from app.sim import commands
-from app.sim.body_size import PERCENTILES
-from app.sim.motions import Motion
-from app.sim.ports import TaskPolicy
-from app.sim.snapshot import CandidateView, WorldSnapshot
-from app.sim.verdict import Verdict
+from app.live import commands
+from app.live.snapshot import CandidateView, WorldSnapshot
+from app.sim.human.anthropometry import PERCENTILES
+from app.sim.mocap.importer import Motion
+from app.sim.pick.case_verdict import Verdict
+from app.sim.pick.task_policy import TaskPolicy
 
 MAX_CHOICES = 20
 """Most choices that an error lists."""

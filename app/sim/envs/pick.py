@@ -5,12 +5,12 @@ from typing import Any
 
 from gymnasium.vector import AutoresetMode
 
-from app.sim.cells import Cell
-from app.sim.envs.rows import CellTask, cell_of, frames_per_s, settings_with
-from app.sim.envs.single import SingleEnv
-from app.sim.envs.vector import BatchVectorEnv
-from app.sim.pick import PickBatch, PickSettings
-from app.sim.scene import HumanKind
+from app.sim.cells.cell import Cell
+from app.sim.envs.single_env import SingleEnv
+from app.sim.envs.tasks import CellTask, cell_of, frames_per_s, settings_with
+from app.sim.envs.vector_env import BatchVectorEnv
+from app.sim.pick.batch import PickBatch, PickSettings
+from app.sim.scene.scene import HumanKind
 
 
 class PickEnv(SingleEnv):
@@ -47,7 +47,8 @@ class PickEnv(SingleEnv):
     | 4     | wrist 2        | -6.2 .. 6.2               |
 
     ## Observation space
-    ``Box(-100, 100, (N_FEATURES,), float32)``; ``app.sim.kernels.features.LAYOUT`` gives the
+    ``Box(-100, 100, (N_FEATURES,), float32)``; ``app.sim.pick.kernels.observation.LAYOUT``
+    gives the
     slice of each group, in this order:
 
     | group | size | content |
@@ -67,7 +68,8 @@ class PickEnv(SingleEnv):
     one far away. ``PickSettings(observation="state")`` gives the plain state (5.8), 51 numbers:
     q, qd of the robot (2 x 6) and the person (2 x 18) [rad, rad/s, m, m/s], target [m].
     ``PickSettings(observation="body")`` adds the size of the person seen to the features, 12
-    numbers: ``app.sim.body_size.NAMES`` [m], the pelvis's height as it is now, and the girth;
+    numbers: ``app.sim.human.anthropometry.NAMES`` [m], the pelvis's height as it is now, and
+    the girth;
     in all ``N_WITH_BODY``, groups as in ``features.BODY_SIZES``.
 
     ## Reward
@@ -98,7 +100,8 @@ class PickEnv(SingleEnv):
         render_mode: ``rgb_array`` or None; ``metadata["render_fps"]`` is the control rate.
 
     Source: thesis section 5.3. Deviates: features are added to the raw state (5.8), actions are
-    wanted speeds instead of coefficients (``kernels/features.py``, ``kernels/reward.py``).
+    wanted speeds instead of coefficients (``pick/kernels/observation.py``,
+    ``pick/kernels/reward.py``).
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 20}

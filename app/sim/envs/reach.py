@@ -5,12 +5,12 @@ from typing import Any
 
 from gymnasium.vector import AutoresetMode
 
-from app.sim.cells import Cell
-from app.sim.envs.rows import CellTask, cell_of, frames_per_s, settings_with
-from app.sim.envs.single import SingleEnv
-from app.sim.envs.vector import BatchVectorEnv
-from app.sim.reach import ReachBatch, ReachSettings
-from app.sim.scene import HumanKind
+from app.sim.cells.cell import Cell
+from app.sim.envs.single_env import SingleEnv
+from app.sim.envs.tasks import CellTask, cell_of, frames_per_s, settings_with
+from app.sim.envs.vector_env import BatchVectorEnv
+from app.sim.reach.batch import ReachBatch, ReachSettings
+from app.sim.scene.scene import HumanKind
 
 
 class ReachEnv(SingleEnv):
@@ -47,7 +47,8 @@ class ReachEnv(SingleEnv):
     | 5     | wrist 3        | -6.2 .. 6.2               |
 
     ## Observation space
-    ``Box(-100, 100, (N_FEATURES,), float32)``; ``app.sim.kernels.reach_features.LAYOUT`` gives
+    ``Box(-100, 100, (N_FEATURES,), float32)``; ``app.sim.reach.kernels.observation.LAYOUT``
+    gives
     the slice of each group, in this order:
 
     | group | size | content |
@@ -73,7 +74,8 @@ class ReachEnv(SingleEnv):
     | group_gap | 3 x 3 | gap [0.5 m] and direction of the person: upper arm, forearm, wrists |
 
     ``ReachSettings(observation="forecast")`` has more behind these, ``LAYOUT`` of
-    ``app.sim.kernels.reach_ways``, where people go on as ``app.sim.kernels.forecast`` says:
+    ``app.sim.reach.kernels.option_features``, where people go on as
+    ``app.sim.prediction.kernels.networks`` says:
 
     | group | size | content |
     |-------|------|---------|

@@ -7,15 +7,22 @@ from gymnasium import spaces
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from app.sim.cells import Cell
-from app.sim.envs.pictures import block_solids, picture, standing_workers
-from app.sim.envs.rows import Infos, Mask, Rows, cell_of
-from app.sim.envs.single import SingleEnv
-from app.sim.envs.vector import BatchVectorEnv
-from app.sim.kernels.sorting import FAILURE_SCALE, TIMEOUT
-from app.sim.raycast import Image
-from app.sim.sorting import OUTCOMES, Obs, SortingBatch, SortingSettings, fail_of, shape_of
-from app.sim.sorting_state import SortingShape
+from app.sim.cells.cell import Cell
+from app.sim.envs.raycast import Image
+from app.sim.envs.rendering import block_solids, picture, standing_workers
+from app.sim.envs.single_env import SingleEnv
+from app.sim.envs.tasks import Infos, Mask, Rows, cell_of
+from app.sim.envs.vector_env import BatchVectorEnv
+from app.sim.sorting.batch import (
+    OUTCOMES,
+    Obs,
+    SortingBatch,
+    SortingSettings,
+    fail_of,
+    shape_of,
+)
+from app.sim.sorting.kernels.task import FAILURE_SCALE, TIMEOUT
+from app.sim.sorting.state import SortingShape
 
 NAMES = np.array(OUTCOMES, dtype=object)
 RENDER_FPS = 4

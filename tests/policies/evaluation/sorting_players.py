@@ -7,14 +7,14 @@ from itertools import count
 import numpy as np
 import torch
 
-from app.policies import presets
-from app.policies.checkpoint import FORMAT, Checkpoint, pack
-from app.policies.sorting_networks import NETWORKS, layout_of
-from app.sim.cells import load_cell
-from app.sim.kernels.sorting import FAILURE_SCALE
-from app.sim.sorting import shape_of
-from app.sim.sorting_planner import solve
-from app.sim.sorting_state import NULL, SortingShape, SortingState
+from app.policies.checkpoints.checkpoint import FORMAT, Checkpoint, pack
+from app.policies.configs import presets
+from app.policies.networks.sorting_q import NETWORKS, layout_of
+from app.sim.cells.cell import load_cell
+from app.sim.sorting.batch import shape_of
+from app.sim.sorting.kernels.task import FAILURE_SCALE
+from app.sim.sorting.planner import solve
+from app.sim.sorting.state import NULL, SortingShape, SortingState
 
 Choice = Callable[[SortingState, SortingShape], int]
 

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from app.errors import InvalidInput
-from app.policies import pretrained
-from app.policies.evaluation import reach_episodes
-from app.policies.evaluation.protocols import OF_REACHING, evaluate
-from app.policies.evaluation.reach_people import SPEEDS, at_speed
-from app.policies.evaluation.reach_random import RINGS
-from app.policies.evaluation.reach_targets import STARTS
-from app.policies.evaluation.reach_tracker import LOOKED_AHEAD, ROWS
-from app.sim.cells import load_cell
+from app.policies.checkpoints import pretrained
+from app.policies.evaluation.reach import episodes as reach_episodes
+from app.policies.evaluation.reach.people import SPEEDS, at_speed
+from app.policies.evaluation.reach.random_goals import RINGS
+from app.policies.evaluation.reach.targets import STARTS
+from app.policies.evaluation.reach.tracker import LOOKED_AHEAD, ROWS
+from app.policies.evaluation.registry import OF_REACHING, evaluate
+from app.sim.cells.cell import load_cell
 from tests.policies.untrained import shipped_as, untrained_reach
 
 N = 24

@@ -16,9 +16,9 @@ from gymnasium.wrappers.vector import (
 
 import app.sim.envs  # noqa: F401  (registers the ids)
 from app.errors import InvalidInput
-from app.sim.pick import PickSettings
-from app.sim.reach import ReachSettings
-from app.sim.sorting import SortingSettings
+from app.sim.pick.batch import PickSettings
+from app.sim.reach.batch import ReachSettings
+from app.sim.sorting.batch import SortingSettings
 
 N = 3
 MODES = tuple(mode.value for mode in AutoresetMode)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import app.sim.envs  # noqa: F401  (registers the ids)
-from app.sim.sorting import SortingSettings
+from app.sim.sorting.batch import SortingSettings
 
 LIVELY = SortingSettings(human_rate=0.2, localisation_rate=0.2, random_map_share=0.5)
 KINDS: dict[str, tuple[str, dict[str, Any]]] = {

@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-from app.sim.cells import load_cell
+from app.sim.cells.cell import load_cell
 from app.sim.envs import PEOPLE_IDS
-from app.sim.envs.single import SingleEnv
-from app.sim.envs.vector import BatchVectorEnv
-from app.sim.pick import PickSettings
-from app.sim.reach import ReachSettings
-from app.sim.worker_motion import WorkSettings
+from app.sim.envs.single_env import SingleEnv
+from app.sim.envs.vector_env import BatchVectorEnv
+from app.sim.people.human_motion_config import WorkSettings
+from app.sim.pick.batch import PickSettings
+from app.sim.reach.batch import ReachSettings
 from tests.sim.working_people import recorded_work
 
 PEOPLE = {

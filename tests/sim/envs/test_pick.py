@@ -8,12 +8,12 @@ from gymnasium.utils.env_checker import check_env
 
 import app.sim.envs  # noqa: F401  (registers the ids)
 from app.errors import NotFound, SimulationError
-from app.sim.body_size import MEDIAN, percentile_body
-from app.sim.cells import load_cell
+from app.sim.cells.cell import load_cell
 from app.sim.envs.pick import PickEnv, PickVectorEnv
-from app.sim.kernels.features import N_FEATURES, N_WITH_BODY
-from app.sim.pick import PickBatch, PickSettings
-from app.sim.worker_motion import WorkSettings
+from app.sim.human.anthropometry import MEDIAN, percentile_body
+from app.sim.people.human_motion_config import WorkSettings
+from app.sim.pick.batch import PickBatch, PickSettings
+from app.sim.pick.kernels.observation import N_FEATURES, N_WITH_BODY
 
 
 def actions(n: int) -> np.ndarray:

@@ -8,8 +8,8 @@ from gymnasium.error import ResetNeeded
 import app.sim.envs  # noqa: F401  (registers the ids)
 from app.errors import InvalidInput, NotFound
 from app.sim.envs.reach import ReachEnv
-from app.sim.kernels.reach_features import N_FEATURES
-from app.sim.reach import ReachSettings
+from app.sim.reach.batch import ReachSettings
+from app.sim.reach.kernels.observation import N_FEATURES
 
 
 def test_registered_id_takes_settings() -> None:

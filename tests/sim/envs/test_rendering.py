@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from app.errors import InvalidInput
 from app.sim.envs import IDS
-from app.sim.envs.pictures import CYLINDERS, GLOVE, HEIGHT, TOOL, TOP, WIDTH
+from app.sim.envs.rendering import CYLINDERS, GLOVE, HEIGHT, TOOL, TOP, WIDTH
 
 SHAPE = (HEIGHT, WIDTH, 3)
 Image = NDArray[np.uint8]

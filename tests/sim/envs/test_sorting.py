@@ -7,12 +7,12 @@ from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
 from app.errors import InvalidInput, NotFound
-from app.sim.cells import load_cell
+from app.sim.cells.cell import load_cell
 from app.sim.envs import SORTING_IDS
 from app.sim.envs.sorting import SortingEnv, SortingVectorEnv
-from app.sim.kernels.sorting_reward import SortingWeights
-from app.sim.sorting import OUTCOMES, SortingBatch, SortingSettings, fail_of, shape_of
-from app.sim.sorting_state import SortingState
+from app.sim.sorting.batch import OUTCOMES, SortingBatch, SortingSettings, fail_of, shape_of
+from app.sim.sorting.kernels.reward import SortingWeights
+from app.sim.sorting.state import SortingState
 from tests.benchmarks.plain_sorting import PlainSorting
 
 LIVELY = SortingSettings(

@@ -1,7 +1,7 @@
 """A hand that flies past the arm at 2.5 m/s is found at every millisecond, or before."""
 
-from app.sim.cells import load_cell
-from app.sim.kernels.contact import FINEST_STEP
+from app.sim.cells.cell import load_cell
+from app.sim.collision.kernels.contact import FINEST_STEP
 from tests.sim.fast_hands import HAND_SPEED, passes
 
 N = 400

@@ -9,8 +9,8 @@ what is asked instead there.
 import numpy as np
 import pytest
 
-from app.sim import human
-from app.sim.collision import make_capsule
+from app.sim.collision.fcl_reference import make_capsule
+from app.sim.human import model as human
 from tests.sim.configurations import RADII, Case, N, chunk, configurations
 from tests.sim.fcl_capsules import check_against_fcl
 

@@ -1,0 +1,1 @@
+"""People of live worlds: workers, pedestrians, dragged people."""

@@ -1,0 +1,103 @@
+"""A person who is moved by hand: follows drags smoothly, with a speed that makes sense.
+
+A drag jumps; a person does not. The posture follows its target through a first-order low pass
+with bounded joint speeds, so that the speeds a policy sees are those of the movement it sees.
+"""
+
+import numpy as np
+
+from app.live.commands import MoveHuman
+from app.sim.cells.cell import Cell
+from app.sim.core.arrays import Vec
+from app.sim.human import model as human
+
+LAG_S = 0.1
+"""Time constant with which the posture follows [s]."""
+Q_RATE = np.array([1.2, 1.2, 2.5, *([1.5] * 3), *([1.5] * 4), *([4.0] * 8)])
+"""Greatest joint speeds [m/s, rad/s]: walking, turning, bending, arms; shape (18,)."""
+STEP_BACK, STEP_ASIDE = 0.8, 0.6
+"""How far beyond the walking area a person may be dragged, away from the table [m]."""
+
+
+class DraggedPerson:
+    """Posture and speed of one person who follows targets.
+
+    Args:
+        cell: Work cell the person stands in.
+        q: Posture at first [m, rad], shape (18,).
+    """
+
+    def __init__(self, cell: Cell, q: Vec) -> None:
+        self._cell = cell
+        self.q = np.array(q)
+        """Joint positions [m, rad], shape (18,)."""
+        self.qd = np.zeros(18)
+        """Joint speeds [m/s, rad/s], shape (18,)."""
+        self._target = np.array(q)
+        self._hands: dict[str, Vec] = {}
+
+    def place(self, q: Vec, qd: Vec) -> None:
+        """Take over a posture [m, rad] and its speed [m/s, rad/s], and stay there."""
+        self.q, self.qd, self._target = np.array(q), np.array(qd), np.array(q)
+        self._hands.clear()
+
+    def aim(self, q: Vec) -> None:
+        """Follow a posture [m, rad], shape (18,)."""
+        self._target = np.array(q)
+
+    def drag(self, command: MoveHuman, size: Vec) -> None:
+        """Take what was dragged as the new target; dragged hands stay where they were put.
+
+        Args:
+            command: What was dragged.
+            size: The person's size [m], shape (12,).
+        """
+        pelvis = (
+            self._walkable(command.pelvis)
+            if command.pelvis is not None
+            else (float(self._target[0]), float(self._target[1]), float(self._target[2]))
+        )
+        self._carry_hands(pelvis)
+        for hand, point in (("r", command.right), ("l", command.left)):
+            if point is not None:
+                self._hands[hand] = np.array(point)
+        posture = human.solve_hands(
+            self._target,
+            size,
+            right=self._hands.get("r"),
+            left=self._hands.get("l"),
+            pelvis=pelvis,
+        )
+        self._target = posture.q
+
+    def _walkable(self, pelvis: tuple[float, float, float]) -> tuple[float, float, float]:
+        area = self._cell.human
+        x = float(np.clip(pelvis[0], area.x_min - STEP_ASIDE, area.x_max + STEP_ASIDE))
+        y = float(np.clip(pelvis[1], area.y_min, area.y_max + STEP_BACK))
+        turn = pelvis[2] - float(self._target[2])
+        yaw = float(self._target[2]) + (turn + np.pi) % (2.0 * np.pi) - np.pi
+        return x, y, yaw
+
+    def _carry_hands(self, pelvis: tuple[float, float, float]) -> None:
+        """Move dragged hands along with the pelvis, as one body."""
+        turn = pelvis[2] - self._target[2]
+        c, s = np.cos(turn), np.sin(turn)
+        for hand, point in self._hands.items():
+            x, y = point[:2] - self._target[:2]
+            moved = [pelvis[0] + c * x - s * y, pelvis[1] + s * x + c * y, point[2]]
+            self._hands[hand] = np.array(moved)
+
+    @property
+    def arrived(self) -> bool:
+        """Whether the posture is its target, but for 1 cm or 0.01 rad."""
+        return bool(np.abs(self._target - self.q).max() < 0.01)
+
+    def follow(self, dt: float) -> bool:
+        """Move for ``dt`` [s]; return whether anything moved."""
+        way = (self._target - self.q) * (1.0 - np.exp(-dt / LAG_S))
+        step = np.clip(way, -Q_RATE * dt, Q_RATE * dt)
+        step[np.abs(self._target - self.q) < 1e-5] = 0.0
+        moved = bool(np.any(step) or np.any(self.qd))
+        self.q = self.q + step
+        self.qd = step / dt
+        return moved

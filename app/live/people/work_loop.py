@@ -1,0 +1,81 @@
+"""The work of one live person: task primitives, one script after the other without a jump.
+
+The same legs, postures and laws of time as in training (``primitives/kernels/primitives.py``),
+for one
+person of any size, asked for at any time.
+
+Source: METHOD 3.2 and 3.4.
+"""
+
+import numpy as np
+
+from app.sim.cells.cell import Cell
+from app.sim.core.arrays import Vec
+from app.sim.core.kernels import rng as random
+from app.sim.human.anthropometry import BodySize
+from app.sim.people.human_motion_config import WorkSettings
+from app.sim.people.kernels.people import worker_at
+from app.sim.primitives.kernels.primitives import draw_legs
+from app.sim.primitives.kernels.script import draw_pause
+from app.sim.primitives.primitive_library import VARIANTS
+from app.sim.scene.scene import new_people_state, people_of, with_people
+
+
+class TaskCycle:
+    """A person who works on and on.
+
+    Args:
+        cell: Work cell with a worker, who is meant.
+        seed: Seed of postures, samples and scripts.
+        size: How large the person is; None for the cell's worker.
+        variants: Postures for each place and hand; fewer are made sooner.
+    """
+
+    def __init__(
+        self, cell: Cell, seed: int, size: BodySize | None = None, variants: int = VARIANTS
+    ) -> None:
+        alone = with_people(cell, ("worker",))
+        work = WorkSettings(seed=seed, bodies=(size or cell.human.size,), variants=variants)
+        self._people = people_of(alone, work)
+        self._state = new_people_state(alone, self._people, 1)
+        self._seed, self._block, self._begin = seed, 0, 0.0
+        self._away = np.empty(36)
+        self._end = self._draw(-1)
+
+    def _draw(self, first: int) -> float:
+        """Draw the next script, from posture ``first`` on; return when it ends [s]."""
+        people, state, rng = self._people, self._state, np.zeros(1, dtype=np.uint64)
+        random.start_stream(self._seed, 0, self._block, rng)
+        legs, start, duration = state.legs, state.start[0, 0], state.duration[0, 0]
+        n = draw_legs(
+            rng,
+            people.repertoire,
+            people.of_station[0],
+            people.n_cubes,
+            first,
+            start,
+            duration,
+            state.chosen[0, 0],
+            legs.primitive[0, 0],
+            legs.sample[0, 0],
+            legs.stop[0, 0],
+        )
+        state.n_moves[0, 0], state.move[0, 0], legs.ready[0, 0] = n, 0, -1
+        last = n - 1
+        whole = float(start[last] + duration[last] + legs.stop[0, 0, last, 1])
+        return whole + draw_pause(rng, True)
+
+    def at(self, t: float) -> tuple[Vec, Vec]:
+        """Return joint positions [m, rad] and speeds [m/s, rad/s], (18,) each.
+
+        Args:
+            t: Time [s]; must not go back beyond the script it is in.
+        """
+        state = self._state
+        while t - self._begin > self._end:
+            self._begin += self._end
+            self._block += 1
+            self._end = self._draw(int(state.chosen[0, 0, state.n_moves[0, 0]]))
+        state.move[0, 0] = 0
+        worker_at(self._people, state, 0, 0, t - self._begin, 1.0, self._away)
+        return state.q[0, 0].copy(), state.qd[0, 0].copy()

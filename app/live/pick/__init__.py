@@ -1,0 +1,1 @@
+"""The live pick-and-place world."""

@@ -1,0 +1,166 @@
+"""What a live sorting cell begins with: a random task, or one of the six tests.
+
+A test's person acts without a visitor.
+
+Source: METHOD 1.5; ``sorting_tests.py``.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.errors import InvalidInput
+from app.sim.core.arrays import Vec
+from app.sim.pick.case_verdict import Verdict
+from app.sim.sorting.batch import SortingBatch, SortingSettings
+from app.sim.sorting.benchmark_tasks import sorting_test
+from app.sim.sorting.state import SortingShape, SortingState
+
+N_BLOCKS = 6
+"""Blocks of a random task."""
+TASK_SEED = 7919
+"""Between the seeds of two tasks."""
+PAUSE_S = 1.5
+"""How long a reached goal is shown before the person acts [s]."""
+
+
+def random_task(shape: SortingShape, fail: Vec, seed: int, number: int) -> SortingState:
+    """Draw blocks in the clutter and a goal for some of them, as episodes are drawn.
+
+    Args:
+        shape: Size of the task.
+        fail: Failure probabilities of the clutter cells, shape (K,).
+        seed: Seed of the world.
+        number: Tasks begun before.
+    """
+    settings = SortingSettings(n_objects=min(N_BLOCKS, shape.n_cells))
+    batch = SortingBatch(shape, fail, 1, seed + TASK_SEED * number, settings)
+    batch.reset()
+    return batch.state_of(0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Interfered:
+    """What a person did."""
+
+    state: SortingState
+    """The state after it."""
+    text: str
+    """What it was, for people."""
+
+
+class SortingTrial:
+    """A running test.
+
+    Args:
+        name: ``test-1`` to ``test-6``.
+        seed: Seeds of what is drawn.
+
+    Raises:
+        NotFound: There is no such test.
+    """
+
+    def __init__(self, name: str, seed: tuple[int, ...]) -> None:
+        self._test, self._rng = sorting_test(name), np.random.default_rng(seed)
+        self._waiting = list(self._test.interferences)
+        self._moves = 0
+        self._contacts = self._picks = self._riskier = 0
+        self._spoilt: str | None = None
+        self._ended: Verdict | None = None
+
+    @property
+    def name(self) -> str:
+        """Its id."""
+        return self._test.name
+
+    @property
+    def text(self) -> str:
+        """What happens in it, for people."""
+        return self._test.text
+
+    def start(self, shape: SortingShape, fail: Vec) -> SortingState:
+        """Draw the start.
+
+        Raises:
+            InvalidInput: The cell is too small for the test.
+        """
+        if not self._test.fits(shape):
+            raise InvalidInput("id", self.name, "needs more cells, colours or sizes than here")
+        self._shape = shape
+        return self._test.start(shape, fail, self._rng)
+
+    def interfere(self, state: SortingState, moves: int, idle_s: float) -> Interfered | None:
+        """Do what is due; None where nothing is.
+
+        Args:
+            state: The state now; nothing is held.
+            moves: Moves done in this test.
+            idle_s: How long the robot has had nothing to do [s].
+        """
+        if not self._waiting:
+            return None
+        after = self._waiting[0].after_moves
+        due = idle_s >= PAUSE_S if after is None else moves - self._moves >= after
+        if not due:
+            return None
+        now, self._moves = self._waiting.pop(0), moves
+        try:
+            return Interfered(state=now.change(state, self._shape, self._rng), text=now.text)
+        except InvalidInput:  # A visitor left nothing that this person could do.
+            self._spoilt = "the person could not do what the test says"
+            return None
+
+    # What it is judged by.
+
+    def note_contact(self) -> None:
+        """Note that the robot touched something."""
+        self._contacts += 1
+
+    def note_pick(self, *, riskier: bool) -> None:
+        """Note a grasp in the clutter; ``riskier`` where such an object lay in a safer cell."""
+        self._picks += 1
+        self._riskier += riskier
+
+    def note_visitor(self) -> None:
+        """Note that a visitor changed blocks or goal: what follows says nothing of the test."""
+        self._spoilt = "a visitor changed blocks or goal"
+
+    def verdict(self, *, solved: bool, moves: int) -> Verdict:
+        """Return what the test expects, what happened, and whether both agree.
+
+        Args:
+            solved: Whether every tower is as the goal asks now.
+            moves: Moves done in this test.
+        """
+        if self._ended is not None:
+            return self._ended
+        over = solved and not self._waiting
+        good = self._contacts == 0 and not (self._test.safer_twins and self._riskier)
+        agrees = False if not good else True if over else None
+        found = Verdict(
+            expected=self._test.expected,
+            observed=self._observed(over=over, solved=solved, moves=moves),
+            as_expected=None if self._spoilt else agrees,
+        )
+        if over:
+            self._ended = found
+        return found
+
+    def _observed(self, *, over: bool, solved: bool, moves: int) -> str:
+        if self._spoilt is not None:
+            return f"Not judged: {self._spoilt}."
+        goals = 1 + sum(one.after_moves is None for one in self._test.interferences)
+        waiting = 1 + sum(one.after_moves is None for one in self._waiting)
+        reached = goals if over else goals - waiting + (solved and waiting > 1)
+        parts = [
+            f"{reached} of {goals} goals reached" if goals > 1 else _reached(over=over),
+            f"{moves} {'move' if moves == 1 else 'moves'}",
+            f"{self._contacts or 'no'} {'contact' if self._contacts == 1 else 'contacts'}",
+        ]
+        if self._test.safer_twins:
+            parts.append(f"{self._riskier} of {self._picks} grasps in a riskier cell")
+        return f"{', '.join(parts)}.".capitalize()
+
+
+def _reached(*, over: bool) -> str:
+    return "the goal is reached" if over else "the goal is not reached yet"

@@ -1,0 +1,168 @@
+"""Puts the sorting task of a live cell into a snapshot."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.live.people.worker import frozen
+from app.live.sorting.controller import Choice, LiveSorter
+from app.live.sorting.snapshot import (
+    HELD,
+    MAX_RANKED,
+    GoalBlockView,
+    MoveView,
+    Phase,
+    PieceView,
+    SortingCounters,
+    SortingView,
+)
+from app.live.sorting.table import Block, SortingTable
+from app.sim.cells.cell import Cell
+from app.sim.core.arrays import Vec
+from app.sim.sorting.decision_types import RankedMove
+from app.sim.sorting.layout import above, half_size
+from app.sim.sorting.state import NULL, Move
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sight:
+    """What a view is made of."""
+
+    table: SortingTable
+    """Blocks and goal."""
+    sorter: LiveSorter
+    """Who decides, with the last decision."""
+    choice: Choice | None
+    """What is carried out."""
+    phase: Phase
+    """How far it is."""
+    counters: SortingCounters
+    """What was done since the task began."""
+    test: str | None
+    """Id of the running test."""
+    tcp: Vec
+    """Where the tool is [m], shape (3,)."""
+
+
+def view_of(sight: Sight) -> SortingView:
+    """Return the sorting task as it is now."""
+    table, decision = sight.table, sight.sorter.decision
+    sorter, choice = sight.sorter.sorter, sight.choice
+    ranked = () if decision is None else decision.ranked[:MAX_RANKED]
+    return SortingView(
+        pieces=tuple(_piece(sight, one) for one in table.blocks),
+        goal=_goal(sight),
+        failure=tuple(table.fail.tolist()),
+        colours=table.names.colours,
+        sizes=table.names.sizes,
+        move=None if choice is None else _current(sight, choice),
+        phase=sight.phase,
+        decided_by=None if choice is None or decision is None else decision.by,
+        twins=() if choice is None else tuple(block.id for block, _ in choice.options),
+        ranked=tuple(_ranked(table, one) for one in ranked),
+        moves_to_go=0 if decision is None else decision.fewest_moves,
+        attempts_to_go=0.0 if decision is None else decision.expected_attempts,
+        counters=sight.counters,
+        sorter=None if sorter is None else sorter.checkpoint,
+        sorter_title=None if sorter is None else sorter.title,
+        test=sight.test,
+        solved=is_solved(table),
+    )
+
+
+def is_solved(table: SortingTable) -> bool:
+    """Return whether there is a goal, every tower is as it asks, and nothing is held."""
+    state = table.state
+    return state.solved and bool((state.goal != NULL).any()) and table.held is None
+
+
+def table_of(cell: Cell, view: SortingView) -> SortingTable:
+    """Return a table as a view shows it, to try a change on."""
+    table = SortingTable(cell)
+    for piece in sorted(view.pieces, key=lambda one: one.level):
+        size = table.names.sizes.index(piece.size)
+        code = table.shape.code(table.names.colours.index(piece.colour), size)
+        table.show(Block(piece.id, code), None if piece.held else piece.place)
+    for block in view.goal:
+        size = table.names.sizes.index(block.size)
+        code = table.shape.code(table.names.colours.index(block.colour), size)
+        table.goal[table.names.towers.index(block.tower), block.level] = code
+    return table
+
+
+def _piece(sight: Sight, block: Block) -> PieceView:
+    table = sight.table
+    size = table.shape.size_of(block.code)
+    half = half_size(table.cell, size, table.shape.n_sizes)
+    held = block == table.held
+    place, level, top = HELD, 0, sight.tcp
+    if not held:
+        position, level = table.place_of(block)
+        place = table.names.stations[position]
+        top = table.point(position, level)
+    return PieceView(
+        id=block.id,
+        colour=table.names.colours[table.shape.colour_of(block.code)],
+        size=table.names.sizes[size],
+        place=place,
+        level=level,
+        position=frozen(above(top, -float(half[2]))),
+        half_size=frozen(half),
+        held=held,
+        in_goal=block.id in table.wanted,
+    )
+
+
+def _goal(sight: Sight) -> tuple[GoalBlockView, ...]:
+    table, found = sight.table, []
+    for c, codes in enumerate(table.goal.tolist()):
+        good = True
+        for level, code in enumerate(codes):
+            if code == NULL:
+                break
+            there = table.towers[c][level].code if level < len(table.towers[c]) else NULL
+            good = good and there == code
+            size = table.shape.size_of(code)
+            half = half_size(table.cell, size, table.shape.n_sizes)
+            top = table.point(table.shape.n_cells + c, level)
+            found.append(
+                GoalBlockView(
+                    tower=table.names.towers[c],
+                    level=level,
+                    colour=table.names.colours[table.shape.colour_of(code)],
+                    size=table.names.sizes[size],
+                    position=frozen(above(top, -float(half[2]))),
+                    half_size=frozen(half),
+                    done=good,
+                )
+            )
+    return tuple(found)
+
+
+def _ranked(table: SortingTable, one: RankedMove) -> MoveView:
+    held = table.held is not None and one.move.pick == table.seat
+    block = table.held if held else table.top(one.move.pick)
+    return _view(table, one.move, block, one.value, one.fewest)
+
+
+def _current(sight: Sight, choice: Choice) -> MoveView:
+    decision = sight.sorter.decision
+    same = [
+        one for one in (() if decision is None else decision.ranked) if one.move == choice.move
+    ]
+    value, best = (same[0].value, same[0].fewest) if same else (None, False)
+    return _view(sight.table, choice.move, choice.block, value, best)
+
+
+def _view(
+    table: SortingTable, move: Move, block: Block | None, value: float | None, best: bool
+) -> MoveView:
+    if value is not None and not np.isfinite(value):
+        value = None
+    return MoveView(
+        pick=table.names.stations[move.pick],
+        place=table.names.stations[move.place],
+        piece=None if block is None else block.id,
+        value=value,
+        best=best,
+    )

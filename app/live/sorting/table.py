@@ -1,0 +1,399 @@
+"""The blocks of a live sorting cell, its goal, and what robot and people do to them.
+
+A block keeps its id wherever it goes; :attr:`SortingTable.state` forgets the ids, as the sorter
+does. A block at the magnet counts on its *seat*: where it came from or, if somebody took that
+place, on the first free clutter cell. There is always one: there are as many cells as blocks.
+
+Source: METHOD 1.1 and 1.2.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.errors import InvalidInput
+from app.sim.cells.cell import Cell
+from app.sim.core.arrays import Vec
+from app.sim.sorting.batch import fail_of
+from app.sim.sorting.benchmark_tasks import sorted_goal
+from app.sim.sorting.names import names_of
+from app.sim.sorting.state import NULL, Codes, SortingState, missing
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """One block."""
+
+    id: str
+    """Its name."""
+    code: int
+    """Its colour and size, see ``sorting_state.py``."""
+
+
+class SortingTable:
+    """Blocks by place, and the goal.
+
+    Args:
+        cell: Sorting cell.
+    """
+
+    def __init__(self, cell: Cell) -> None:
+        self.cell = cell
+        """Where it stands."""
+        self.names = names_of(cell)
+        """The words of the task."""
+        self.shape = self.names.shape
+        """How large it is."""
+        self.fail = fail_of(cell)
+        """Failure probability of each clutter cell, shape (K,)."""
+        self.clutter: list[Block | None] = [None] * self.shape.n_cells
+        self.towers: list[list[Block]] = [[] for _ in range(self.shape.n_colours)]
+        self.goal = np.zeros((self.shape.n_colours, self.shape.n_cells), dtype=np.int8)
+        self.held: Block | None = None
+        """The block at the magnet."""
+        self.version = 0
+        """Grows whenever a person changed something."""
+        self._origin = 0
+        self._next = 1
+        self._wanted: tuple[str, ...] = ()
+
+    # What there is.
+
+    @property
+    def blocks(self) -> tuple[Block, ...]:
+        """All blocks, the held one too, in the order of their making."""
+        found = [one for one in self.clutter if one is not None]
+        found += [one for tower in self.towers for one in tower]
+        found += [self.held] if self.held is not None else []
+        return tuple(sorted(found, key=lambda one: int(one.id.removeprefix("block"))))
+
+    @property
+    def wanted(self) -> frozenset[str]:
+        """Ids of the blocks that stand for the goal."""
+        return frozenset(self._wanted)
+
+    @property
+    def seat(self) -> int:
+        """Position on which the held block counts."""
+        k = self.shape.n_cells
+        if self._origin >= k or self.clutter[self._origin] is None:
+            return self._origin
+        return next(i for i in range(k) if self.clutter[i] is None)
+
+    @property
+    def state(self) -> SortingState:
+        """The task as the sorter sees it."""
+        clutter = np.array([one.code if one else NULL for one in self.clutter], dtype=np.int8)
+        towers = np.zeros_like(self.goal)
+        for c, tower in enumerate(self.towers):
+            towers[c, : len(tower)] = [one.code for one in tower]
+        if self.held is not None and self.seat < len(clutter):
+            clutter[self.seat] = self.held.code
+        elif self.held is not None:
+            c = self.seat - len(clutter)
+            towers[c, len(self.towers[c])] = self.held.code
+        return SortingState(
+            clutter=clutter, towers=towers, goal=self.goal.copy(), fail=self.fail.copy()
+        )
+
+    def top(self, position: int) -> Block | None:
+        """Return the block that is picked at a position, if there is one."""
+        k = self.shape.n_cells
+        if position < k:
+            return self.clutter[position]
+        return self.towers[position - k][-1] if self.towers[position - k] else None
+
+    def place_of(self, block: Block) -> tuple[int, int]:
+        """Return the position and the level of a block that is not held."""
+        for k, one in enumerate(self.clutter):
+            if one == block:
+                return k, 0
+        for c, tower in enumerate(self.towers):
+            if block in tower:
+                return self.shape.n_cells + c, tower.index(block)
+        raise InvalidInput("id", block.id, "is held by the magnet")
+
+    def level_at(self, position: int) -> int:
+        """Return the level on which the next block is put at a position."""
+        k = self.shape.n_cells
+        return 0 if position < k else len(self.towers[position - k])
+
+    def is_free(self, position: int) -> bool:
+        """Whether a block can be put at a position."""
+        k = self.shape.n_cells
+        return position >= k or self.clutter[position] is None
+
+    def point(self, position: int, level: int) -> Vec:
+        """Return where the tcp touches the top of a block at a position and level [m], (3,)."""
+        return np.asarray(self.cell.station(self.names.stations[position]).points()[level])
+
+    def point_at(self, position: int) -> Vec:
+        """Return where the tcp puts the next block at a position [m], shape (3,)."""
+        return self.point(position, self.level_at(position))
+
+    def point_of(self, block: Block) -> Vec | None:
+        """Return where the tcp takes a block [m], shape (3,); None where it is not."""
+        if block not in self.blocks or block == self.held:
+            return None
+        return self.point(*self.place_of(block))
+
+    # What the robot does.
+
+    def lift(self, position: int) -> Block:
+        """Take the block of a position to the magnet."""
+        block = self._take(position)
+        self.held, self._origin = block, position
+        return block
+
+    def drop(self, position: int) -> None:
+        """Put the held block at a position."""
+        assert self.held is not None
+        self._put(self.held, position)
+        self.held = None
+        self._mark()
+
+    # What people do.
+
+    def add(self, colour: str, size: str, at: str | None) -> Block:
+        """Put another block on the table.
+
+        Raises:
+            InvalidInput: An unknown word, no room, or as many blocks as cells already.
+        """
+        names = self.names
+        code = self.shape.code(
+            _index("colour", colour, names.colours), _index("size", size, names.sizes)
+        )
+        if len(self.blocks) >= self.shape.n_cells:
+            rule = f"would be more than {self.shape.n_cells} blocks, one per clutter cell"
+            raise InvalidInput("objects", len(self.blocks) + 1, rule)
+        position = self._free_cell() if at is None else self._free("at", at)
+        block = self._new(code)
+        self._put(block, position)
+        self._changed()
+        return block
+
+    def remove(self, id: str) -> Block:
+        """Take a block out; the goal loses what can no longer be met.
+
+        Raises:
+            InvalidInput: There is no such block.
+        """
+        block = self._known(id)
+        self._pull(block)
+        self._meet()
+        self._changed()
+        return block
+
+    def move(self, id: str, to: str) -> Block:
+        """Put a block elsewhere, from under others or off the magnet too.
+
+        Raises:
+            InvalidInput: No such block or place, or the place is taken or its own.
+        """
+        block = self._known(id)
+        position = self._free("to", to, block)
+        self._pull(block)
+        self._put(block, position)
+        self._changed()
+        return block
+
+    def set_goal(self, towers: Mapping[str, Iterable[str]]) -> None:
+        """Say what the towers shall be; those not named shall be empty.
+
+        Args:
+            towers: Sizes from the bottom, by tower.
+
+        Raises:
+            InvalidInput: An unknown word, too many levels, or blocks are missing.
+        """
+        goal = np.zeros_like(self.goal)
+        for name, sizes in towers.items():
+            c = _index("towers", name, self.names.towers)
+            wanted = list(sizes)
+            if len(wanted) > self.shape.n_cells:
+                rule = f"must have at most {self.shape.n_cells} levels"
+                raise InvalidInput(f"towers.{name}", len(wanted), rule)
+            for level, size in enumerate(wanted):
+                field = f"towers.{name}[{level}]"
+                goal[c, level] = self.shape.code(c, _index(field, size, self.names.sizes))
+        self._require_met(goal)
+        self.goal, self._wanted = goal, ()
+        self._changed()
+
+    def toggle_goal(self, id: str) -> None:
+        """Put a block, or one more of a kind, into the goal or out of it.
+
+        Raises:
+            InvalidInput: There is no such block or kind, or no block of the kind.
+        """
+        code = self._kind(id)
+        there = [one.id for one in self.blocks if one.code == code]
+        if not there:
+            raise InvalidInput("id", id, "is a kind of which there is no block")
+        marked = [one for one in self._wanted if one in there]
+        if id in there:
+            now = [one for one in marked if one != id] + ([id] if id not in marked else [])
+        else:
+            more = [one for one in there if one not in marked][:1]
+            now = marked + more if more else []
+        others = [int(one) for one in self.goal.ravel() if one not in (NULL, code)]
+        own_towers_only = sorted_goal([*others, *[code] * len(now)], self.shape)
+        self.goal = own_towers_only
+        self._wanted = tuple(one for one in self._wanted if one not in there) + tuple(now)
+        self._changed()
+
+    def begin(self, state: SortingState) -> None:
+        """Begin with a state, all blocks new."""
+        self.clutter = [None] * self.shape.n_cells
+        self.towers = [[] for _ in range(self.shape.n_colours)]
+        self.adopt(state)
+
+    def adopt(self, state: SortingState) -> None:
+        """Make the table what a state says; blocks that stay where they were keep their ids."""
+        for k, code in enumerate(state.clutter.tolist()):
+            self.clutter[k] = self._kept(self.clutter[k], code)
+        for c, codes in enumerate(state.towers.tolist()):
+            old = [*self.towers[c], *[None] * len(codes)]
+            kept = [self._kept(old[level], code) for level, code in enumerate(codes)]
+            self.towers[c] = [one for one in kept if one is not None]
+        self.held = None
+        self.goal, self.fail = state.goal.copy(), state.fail.copy()
+        self._changed()
+
+    def show(self, block: Block, place: str | None) -> None:
+        """Put a block of another table on a station, or None: at the magnet."""
+        if place is None:
+            self.held = block
+        else:
+            self._put(block, self.names.stations.index(place))
+        self._next = max(self._next, int(block.id.removeprefix("block")) + 1)
+
+    # Parts.
+
+    def _kept(self, block: Block | None, code: int) -> Block | None:
+        if code == NULL:
+            return None
+        return block if block is not None and block.code == code else self._new(code)
+
+    def _new(self, code: int) -> Block:
+        block = Block(f"block{self._next}", code)
+        self._next += 1
+        return block
+
+    def _take(self, position: int) -> Block:
+        k = self.shape.n_cells
+        if position >= k:
+            return self.towers[position - k].pop()
+        block = self.clutter[position]
+        assert block is not None
+        self.clutter[position] = None
+        return block
+
+    def _put(self, block: Block, position: int) -> None:
+        k = self.shape.n_cells
+        if position >= k:
+            self.towers[position - k].append(block)
+        else:
+            self.clutter[position] = block
+
+    def _pull(self, block: Block) -> None:
+        if block == self.held:
+            self.held = None
+            return
+        position, _ = self.place_of(block)
+        k = self.shape.n_cells
+        if position >= k:
+            self.towers[position - k].remove(block)
+        else:
+            self.clutter[position] = None
+
+    def _known(self, id: str) -> Block:
+        for one in self.blocks:
+            if one.id == id:
+                return one
+        raise InvalidInput("id", id, "is no block", [one.id for one in self.blocks])
+
+    def _kind(self, id: str) -> int:
+        colour, _, size = id.partition("-")
+        if colour in self.names.colours and size in self.names.sizes:
+            return self.shape.code(
+                self.names.colours.index(colour), self.names.sizes.index(size)
+            )
+        return self._known(id).code
+
+    def _free_cell(self) -> int:
+        taken = self.seat if self.held is not None else None
+        free = [k for k in range(self.shape.n_cells) if self.is_free(k) and k != taken]
+        if not free:
+            raise InvalidInput("at", None, "is nowhere: no clutter cell is free")
+        return free[0]
+
+    def _free(self, field: str, place: str, block: Block | None = None) -> int:
+        position = _index(field, place, self.names.stations)
+        if position < self.shape.n_cells:
+            there = self.clutter[position]
+            if there is not None:
+                own = there == block
+                rule = "is where it is already" if own else f"is taken by {there.id}"
+                raise InvalidInput(field, place, rule, self._free_names())
+        elif self.top(position) == block and block is not None:
+            raise InvalidInput(field, place, "is where it is already")
+        return position
+
+    def _free_names(self) -> list[str]:
+        free = [name for k, name in enumerate(self.names.cells) if self.is_free(k)]
+        return [*free, *self.names.towers]
+
+    def _require_met(self, goal: Codes) -> None:
+        lack = self._lack(goal)
+        if lack:
+            counts = {code: lack.count(code) for code in sorted(set(lack))}
+            words = ", ".join(f"{n} x {self.names.kind(code)}" for code, n in counts.items())
+            rule = "must be met by the blocks: these are missing"
+            raise InvalidInput("towers", words, rule)
+
+    def _lack(self, goal: Codes) -> list[int]:
+        state = self.state
+        counts = missing(
+            SortingState(
+                clutter=state.clutter, towers=state.towers, goal=goal, fail=state.fail
+            ),
+            self.shape,
+        )
+        return [code for code, n in enumerate(counts.tolist()) for _ in range(n)]
+
+    def _meet(self) -> None:
+        """Take out of the goal what no block is left for, the highest first."""
+        for code in self._lack(self.goal):
+            c, level = (int(found[-1]) for found in np.nonzero(self.goal == code))
+            self.goal[c, level:-1] = self.goal[c, level + 1 :]
+            self.goal[c, -1] = NULL
+
+    def _changed(self) -> None:
+        self.version += 1
+        self._mark()
+
+    def _mark(self) -> None:
+        """Let blocks stand for the goal: those in place, those that did, then any."""
+        counts = np.bincount(self.goal.ravel(), minlength=self.shape.n_types + 1)
+        in_place = [
+            one.id
+            for c, tower in enumerate(self.towers)
+            for level, one in enumerate(tower)
+            if one.code == self.goal[c, level]
+        ]
+        codes = {one.id: one.code for one in self.blocks}
+        wanted: list[str] = []
+        for id in (*in_place, *self._wanted, *codes):
+            if id in codes and id not in wanted and counts[codes[id]] > 0:
+                counts[codes[id]] -= 1
+                wanted.append(id)
+        self._wanted = tuple(wanted)
+
+
+def _index(field: str, word: str, words: tuple[str, ...]) -> int:
+    if word not in words:
+        raise InvalidInput(field, word, "is not known here", words)
+    return words.index(word)

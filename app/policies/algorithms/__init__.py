@@ -1,0 +1,1 @@
+"""TD3 and DQN on Stable-Baselines3."""

@@ -1,0 +1,206 @@
+"""DQN on Stable-Baselines3, with what it lacks added at its extension points.
+
+Double Q-learning, dueling networks, prioritised replay with n-step returns in one buffer, masks
+of valid moves in exploration, targets and prediction, and advice: in a part of each minibatch
+the exact planner marks every move that is best in the states met, and a margin loss asks that
+one of them be worth more than all others.
+
+The double target is ``r + gamma^n Q_target(s', argmax_a Q_online(s', a))``.
+
+Source: van Hasselt, Guez, Silver, *Deep reinforcement learning with double Q-learning* (2016);
+Hester et al., *Deep Q-learning from demonstrations* (2018); METHOD 1.4 with its corrections.
+Deviates: advice marks sets of moves, in the states the learner meets (as in Ross, Gordon,
+Bagnell, *A reduction of imitation learning to no-regret online learning*, 2011).
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from stable_baselines3 import DQN
+from stable_baselines3.common.type_aliases import PyTorchObs
+from stable_baselines3.dqn.policies import DQNPolicy, QNetwork
+from torch import Tensor
+from torch.nn import functional
+
+from app.policies.algorithms.prioritized_replay import PrioritisedReplay
+from app.policies.algorithms.sorting_vecenv import SortingVecEnv
+from app.policies.configs.sorting import SortingPreset
+from app.policies.networks.sorting_q import NETWORKS, NEVER, PrintedNetwork, SharedNetwork
+from app.sim.sorting.batch import SortingBatch
+from app.sim.sorting.state import SortingShape
+
+Adviser = Callable[[NDArray[np.uint8]], NDArray[np.bool_]]
+"""Marks the best moves of observations, shape (n, obs_size): shape (n, n_actions)."""
+
+
+def network_of(preset: SortingPreset, shape: SortingShape) -> SharedNetwork | PrintedNetwork:
+    """Return a new network as a preset describes it."""
+    return NETWORKS[preset.network](shape, preset.width)
+
+
+class _SB3QNetwork(QNetwork):
+    """Stable-Baselines3's network with one of ours in place of its own layers."""
+
+    def __init__(
+        self, *args: Any, preset: SortingPreset, shape: SortingShape, **kwargs: Any
+    ) -> None:
+        super().__init__(*args, **{**kwargs, "net_arch": [1]})
+        self.q_net = network_of(preset, shape)  # type: ignore[assignment]
+
+    def forward(self, obs: PyTorchObs) -> Tensor:
+        """Return the values of all moves, (B, n_actions)."""
+        values: Tensor = self.q_net(obs)
+        return values
+
+
+class SortingDQNPolicy(DQNPolicy):
+    """Builds the networks of this project instead of Stable-Baselines3's default."""
+
+    def __init__(
+        self, *args: Any, preset: SortingPreset, shape: SortingShape, **kwargs: Any
+    ) -> None:
+        self._preset, self._shape = preset, shape
+        super().__init__(*args, **kwargs)
+
+    def make_q_net(self) -> QNetwork:
+        """Return a network as the preset describes it."""
+        kwargs = self._update_features_extractor(self.net_args, features_extractor=None)
+        made = _SB3QNetwork(**kwargs, preset=self._preset, shape=self._shape)
+        return made.to(self.device)
+
+
+class SortingDQN(DQN):
+    """Double, dueling, prioritised, masked DQN that may ask for advice.
+
+    Args:
+        preset: Hyper-parameters.
+        env: The batched task.
+        seed: Seed of networks, replay and exploration.
+        adviser: Marks best moves; needed where the preset takes advice.
+    """
+
+    def __init__(
+        self,
+        preset: SortingPreset,
+        env: SortingVecEnv,
+        seed: int,
+        adviser: Adviser | None = None,
+    ) -> None:
+        start, end = preset.lr_start, preset.lr_end
+        self.preset, self._tasks, self._adviser = preset, env, adviser
+        self._random = np.random.default_rng(seed)
+        super().__init__(
+            SortingDQNPolicy,
+            env,
+            learning_rate=lambda remaining: end * (start / end) ** remaining,
+            buffer_size=preset.buffer_size,
+            learning_starts=preset.learning_starts,
+            batch_size=preset.batch_size,
+            gamma=preset.gamma,
+            train_freq=1,
+            gradient_steps=preset.gradient_steps,
+            replay_buffer_class=PrioritisedReplay,
+            replay_buffer_kwargs={
+                "n_steps": preset.n_steps,
+                "gamma": preset.gamma,
+                "alpha": preset.alpha,
+                "seed": seed,
+            },
+            exploration_initial_eps=preset.eps_start,
+            exploration_final_eps=preset.eps_end,
+            exploration_fraction=preset.eps_share,
+            max_grad_norm=preset.max_grad_norm,
+            policy_kwargs={
+                "preset": preset,
+                "shape": env.batch.shape,
+                "optimizer_kwargs": {"fused": True},
+            },
+            seed=seed,
+            device="cpu",
+        )
+
+    @property
+    def tasks(self) -> SortingBatch:
+        """The tasks it learns on."""
+        return self._tasks.batch
+
+    @property
+    def memory(self) -> PrioritisedReplay:
+        """The replay memory."""
+        assert isinstance(self.replay_buffer, PrioritisedReplay)
+        return self.replay_buffer
+
+    def _on_step(self) -> None:
+        """Follow the schedule of exploration; the target is copied per updates, in train."""
+        self.exploration_rate = self.exploration_schedule(self._current_progress_remaining)
+
+    def _sample_action(
+        self,
+        learning_starts: int,
+        action_noise: Any = None,
+        n_envs: int = 1,
+    ) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Act greedily or at random among the moves, row by row."""
+        masked = self.preset.network == "shared"
+        moves = self._tasks.action_masks()
+        chance = 1.0 if self.num_timesteps < learning_starts else self.exploration_rate
+        at_random = self._random.random(n_envs) < chance
+        scores = self._random.random(moves.shape, dtype=np.float32)
+        actions = (scores * moves if masked else scores).argmax(axis=1)
+        if not at_random.all():
+            assert self._last_obs is not None
+            with torch.no_grad():
+                values = self.q_net(torch.as_tensor(self._last_obs))
+            actions = np.where(at_random, actions, values.argmax(dim=1).numpy())
+        return actions, actions
+
+    def train(self, gradient_steps: int, batch_size: int = 100) -> None:
+        """Update the network ``gradient_steps`` times."""
+        self.policy.set_training_mode(True)
+        self._update_learning_rate(self.policy.optimizer)
+        done = 1.0 - self._current_progress_remaining
+        beta = self.preset.beta + done * (1.0 - self.preset.beta)
+        for _ in range(gradient_steps):
+            self._update(batch_size, beta)
+            self._n_updates += 1
+            if self._n_updates % self.preset.target_every == 0:
+                self.q_net_target.load_state_dict(self.q_net.state_dict())
+
+    def _update(self, batch_size: int, beta: float) -> None:
+        drawn = self.memory.draw(batch_size, beta)
+        with torch.no_grad():
+            following = self.q_net(drawn.next_observations).argmax(dim=1, keepdim=True)
+            there = self.q_net_target(drawn.next_observations).gather(1, following)[:, 0]
+            target = drawn.rewards + drawn.discounts * there
+        values = self.q_net(drawn.observations)
+        taken = values.gather(1, drawn.actions[:, None])[:, 0]
+        error = functional.smooth_l1_loss(taken, target, reduction="none")
+        loss = (drawn.weights * error).mean()
+        if self._adviser is not None:
+            n = round(self.preset.advice_share * batch_size)
+            best = self._adviser(drawn.observations[:n].numpy())
+            short = margin_loss(values[:n], torch.as_tensor(best), self.preset.advice_margin)
+            loss = loss + self.preset.advice_weight * short
+        self.policy.optimizer.zero_grad()
+        loss.backward()  # type: ignore[no-untyped-call]
+        torch.nn.utils.clip_grad_norm_(self.policy.parameters(), self.max_grad_norm)
+        self.policy.optimizer.step()
+        with torch.no_grad():
+            self.memory.update(drawn.indices, (taken - target).abs().numpy())
+
+
+def margin_loss(values: Tensor, best: Tensor, margin: float) -> Tensor:
+    """Return by how much the best moves fall short of all others by a margin, on average.
+
+    Args:
+        values: Values of all moves, (n, n_actions).
+        best: Which are best, (n, n_actions); at least one in every row.
+        margin: By how much they shall be worth more.
+    """
+    of_best = values.masked_fill(~best, NEVER).amax(dim=1)
+    of_others = (values + margin).masked_fill(best, NEVER).amax(dim=1)
+    short: Tensor = functional.relu(of_others - of_best).mean()
+    return short

@@ -1,0 +1,226 @@
+"""Replay memory with priorities and n-step returns, in one buffer.
+
+Transitions lie in Stable-Baselines3's arrays, one column per environment. A transition is drawn
+with a chance in proportion to ``priority ** alpha`` (a sum tree, in compiled code) and weighted
+by ``(1 / (size * chance)) ** beta`` over the greatest weight in the batch; its return is summed
+over ``n_steps`` at the moment it is drawn, cut where the episode ended or the buffer's head is.
+
+Source: Schaul et al., *Prioritized experience replay* (2016); METHOD 1.4. Stable-Baselines3
+ignores its own ``n_steps`` where a buffer class is given, so one buffer must do both.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from gymnasium import spaces
+from numpy.typing import NDArray
+from stable_baselines3.common.buffers import ReplayBuffer
+
+from app.sim.core.jit import kernel
+from app.sim.core.kernels import rng as random
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+class ReplaySamples(NamedTuple):
+    """A minibatch of n-step transitions, ``B`` of them."""
+
+    observations: torch.Tensor
+    """(B, obs_size)."""
+    actions: torch.Tensor
+    """(B,) integers of a discrete action, or (B, n_act)."""
+    rewards: torch.Tensor
+    """Discounted sums of rewards, (B,)."""
+    next_observations: torch.Tensor
+    """Where the sums end, (B, obs_size)."""
+    discounts: torch.Tensor
+    """What the value there is multiplied by; 0 where the episode terminated, (B,)."""
+    weights: torch.Tensor
+    """Importance weights, the greatest 1, (B,)."""
+    indices: Ints
+    """Places in the buffer, for :meth:`PrioritisedReplay.update`, (B,)."""
+
+
+@kernel()
+def _set_priority(tree: Floats, leaf: int, value: float) -> None:
+    """Set a leaf of the sum tree, shape (2 * leaves,), and the sums above it."""
+    node = leaf + tree.shape[0] // 2
+    tree[node] = value
+    node //= 2
+    while node >= 1:
+        tree[node] = tree[2 * node] + tree[2 * node + 1]
+        node //= 2
+
+
+@kernel()
+def _find(tree: Floats, mass: float) -> int:
+    """Return the leaf in which the running sum passes ``mass``."""
+    node: int = 1
+    leaves: int = tree.shape[0] // 2
+    while node < leaves:
+        node *= 2
+        if mass >= tree[node] and tree[node + 1] > 0.0:
+            mass -= tree[node]
+            node += 1
+    return node - leaves
+
+
+@kernel(nogil=True)
+def set_priorities(tree: Floats, leaves: Ints, values: Floats) -> None:
+    """Set several leaves of the sum tree."""
+    for i in range(leaves.shape[0]):
+        _set_priority(tree, leaves[i], values[i])
+
+
+@kernel(nogil=True)
+def draw(tree: Floats, rng: random.State, leaves: Ints, chances: Floats) -> None:
+    """Draw leaves, one from each equal part of the total, and say how likely each was."""
+    total, n = tree[1], leaves.shape[0]
+    for i in range(n):
+        leaves[i] = _find(tree, (i + random.uniform(rng)) / n * total)
+        chances[i] = tree[leaves[i] + tree.shape[0] // 2] / total
+
+
+@kernel(nogil=True)
+def sum_returns(
+    leaves: Ints,
+    n_envs: int,
+    head: int,
+    n_steps: int,
+    gamma: float,
+    rewards: NDArray[np.float32],
+    dones: NDArray[np.float32],
+    timeouts: NDArray[np.float32],
+    returns: Floats,
+    discounts: Floats,
+    last: Ints,
+) -> None:
+    """Sum rewards from each drawn transition on.
+
+    Args:
+        leaves: Drawn transitions, ``row * n_envs + environment``.
+        n_envs: Number of environments.
+        head: Row that is written next; sums do not run over it.
+        n_steps: Most steps of a sum.
+        gamma: Discount.
+        rewards: Shape (rows, n_envs).
+        dones: 1 where an episode ended, shape (rows, n_envs).
+        timeouts: 1 where it was cut off, shape (rows, n_envs).
+        returns: Filled with the sums.
+        discounts: Filled with what the value at the end is multiplied by.
+        last: Filled with the row whose next observation is the end of the sum.
+    """
+    for i in range(leaves.shape[0]):
+        row, env = leaves[i] // n_envs, leaves[i] % n_envs
+        total, factor = 0.0, 1.0
+        for k in range(n_steps):
+            total += factor * rewards[row, env]
+            factor *= gamma
+            last[i] = row
+            if dones[row, env] > 0.0:
+                if timeouts[row, env] == 0.0:
+                    factor = 0.0
+                break
+            following = (row + 1) % rewards.shape[0]
+            if following == head or k == n_steps - 1:
+                break
+            row = following
+        returns[i], discounts[i] = total, factor
+
+
+class PrioritisedReplay(ReplayBuffer):
+    """Stable-Baselines3's buffer, with priorities and n-step returns.
+
+    Args:
+        buffer_size: Transitions it holds.
+        observation_space: Space of observations.
+        action_space: Space of actions.
+        device: Where minibatches go.
+        n_envs: Number of environments.
+        n_steps: Most steps of a return.
+        gamma: Discount.
+        alpha: Exponent of the priorities; 0 draws evenly.
+        seed: Seed of what is drawn.
+    """
+
+    def __init__(
+        self,
+        buffer_size: int,
+        observation_space: spaces.Space[Any],
+        action_space: spaces.Space[Any],
+        device: torch.device | str = "cpu",
+        n_envs: int = 1,
+        n_steps: int = 1,
+        gamma: float = 0.99,
+        alpha: float = 0.6,
+        seed: int = 0,
+        **_: Any,
+    ) -> None:
+        super().__init__(buffer_size, observation_space, action_space, device, n_envs)
+        self._n_steps, self._gamma, self._alpha = n_steps, gamma, alpha
+        leaves = 1
+        while leaves < self.buffer_size * n_envs:
+            leaves *= 2
+        self._tree = np.zeros(2 * leaves)
+        self._greatest = 1.0
+        self._rng = np.zeros(1, dtype=np.uint64)
+        random.start_stream(seed, 0, 0, self._rng)
+
+    def add(
+        self,
+        obs: NDArray[Any],
+        next_obs: NDArray[Any],
+        action: NDArray[Any],
+        reward: NDArray[Any],
+        done: NDArray[Any],
+        infos: list[dict[str, Any]],
+    ) -> None:
+        """Add one transition per environment, with the greatest priority so far."""
+        leaves = self.pos * self.n_envs + np.arange(self.n_envs)
+        super().add(obs, next_obs, action, reward, done, infos)
+        set_priorities(self._tree, leaves, np.full(self.n_envs, self._greatest))
+
+    def draw(self, batch_size: int, beta: float) -> ReplaySamples:
+        """Draw a minibatch.
+
+        Args:
+            batch_size: Number of transitions.
+            beta: Exponent of the importance weights.
+        """
+        leaves, last = np.empty((2, batch_size), dtype=np.int64)
+        chances, returns, discounts = np.empty((3, batch_size))
+        draw(self._tree, self._rng, leaves, chances)
+        size = self.buffer_size if self.full else self.pos
+        sum_returns(
+            leaves, self.n_envs, self.pos, self._n_steps, self._gamma,
+            self.rewards, self.dones, self.timeouts, returns, discounts, last,
+        )  # fmt: skip
+        rows, envs = leaves // self.n_envs, leaves % self.n_envs
+        weights = (size * self.n_envs * chances) ** -beta
+        return ReplaySamples(
+            observations=torch.as_tensor(self.observations[rows, envs]),
+            actions=torch.as_tensor(self._actions_of(rows, envs)),
+            rewards=torch.as_tensor(returns, dtype=torch.float32),
+            next_observations=torch.as_tensor(self.next_observations[last, envs]),
+            discounts=torch.as_tensor(discounts, dtype=torch.float32),
+            weights=torch.as_tensor(weights / weights.max(), dtype=torch.float32),
+            indices=leaves,
+        )
+
+    def _actions_of(self, rows: Ints, envs: Ints) -> NDArray[Any]:
+        if isinstance(self.action_space, spaces.Discrete):
+            return np.asarray(self.actions[rows, envs, 0].astype(np.int64))
+        return np.asarray(self.actions[rows, envs])
+
+    def update(self, indices: Ints, errors: NDArray[np.floating]) -> None:
+        """Set priorities by temporal-difference errors.
+
+        Args:
+            indices: Places from a minibatch.
+            errors: Absolute errors, shape (B,).
+        """
+        values = (np.asarray(errors, dtype=np.float64) + 1e-4) ** self._alpha
+        self._greatest = max(self._greatest, float(values.max()))
+        set_priorities(self._tree, indices, values)

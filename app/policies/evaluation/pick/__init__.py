@@ -1,0 +1,1 @@
+"""Evaluation of the pick scenario."""

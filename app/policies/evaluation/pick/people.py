@@ -1,0 +1,192 @@
+"""Protocols ``pick-people``, ``pick-mocap``, ``pick-courtesy``: a policy beside other people.
+
+All choose among 2-3 random targets by the critic with hysteresis, as ``pick-choice`` does, and
+differ in who is in the cell. A policy for one person sees the nearest. Several workers share
+the table and do not see one another, so they may stand in each other's place.
+
+``pick-people``: nobody; one to four people of the library's sizes; one and three people of the
+5th and of the 95th percentile; a worker and a walking cylinder; the first, synthetic reaches.
+``pick-mocap``: recorded motion, placed at the table, each run by itself and all together.
+``pick-courtesy``: people who give way to the arm, from not at all (the source's) to fully, and
+how far the same policy leans on it.
+
+Beside every row stands how often the same people touch a robot that never moves.
+
+Source: METHOD 3.4 and 4 (several people; a model whose dimensions are known; a human that
+reacts).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from app.errors import InvalidInput
+from app.policies.checkpoints.checkpoint import Checkpoint
+from app.policies.checkpoints.trained_cell import cell_of
+from app.policies.evaluation.pick import selection_rules as choice_rules
+from app.policies.evaluation.pick.episodes import Evaluator, settings_for
+from app.policies.evaluation.pick.tasks import settings_of
+from app.policies.evaluation.rows import OnRow, untold
+from app.policies.evaluation.statistics import wilson
+from app.policies.inference.task_selection import HYSTERESIS, ValueNetworks
+from app.sim.human.anthropometry import percentile_body
+from app.sim.mocap.importer import Motion
+from app.sim.people.human_motion_config import WorkSettings, at_the_table
+from app.sim.pick.batch import PickBatch, PickSettings
+from app.sim.robot.kernels.arm import CONTROLLED
+from app.sim.scenario.kernels.episode import COLLISION, RUNNING
+from app.sim.scene.scene import HumanKind
+
+DEFAULT_EPISODES = 1000
+CANDIDATES = (2, 3)
+COURTESIES = (0.0, 0.5, 1.0)
+"""Strengths compared."""
+MAX_RECORDED_S = 36_000
+"""Most recorded motion of one evaluation [s]; the tracks of so much are 274 MB."""
+SMALL, LARGE = 5.0, 95.0
+"""Percentiles of stature compared; arms and shoulders go with it."""
+
+
+class _Bench:
+    """Evaluates one checkpoint under varied settings, on episodes of one seed."""
+
+    def __init__(
+        self, checkpoint: Checkpoint, episodes: int | None, seed: int, on_row: OnRow
+    ) -> None:
+        self._networks = ValueNetworks(checkpoint)
+        self.cell = cell_of(checkpoint.manifest)
+        self.usual = settings_for(CANDIDATES, checkpoint.manifest["preset"])
+        self._n, self._seed, self._on_row = episodes or DEFAULT_EPISODES, seed, on_row
+
+    def row(self, name: str, settings: PickSettings) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Return the result row of some settings, and what it states of its episodes."""
+        evaluator = Evaluator(self._networks, self.cell, self._n, self._seed, settings)
+        row = evaluator.run(choice_rules.critic(HYSTERESIS)).row(name)
+        row["touched_at_rest"] = _touched_at_rest(evaluator.batch)
+        return row, settings_of(evaluator)
+
+    def all(self, rows: Mapping[str, PickSettings]) -> dict[str, Any]:
+        """Return the result of several rows."""
+        done: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {}
+        for name, settings in rows.items():
+            done[name] = self.row(name, settings)
+            self._on_row(len(done), len(rows), done[name][0])
+        return {
+            "settings": {
+                "hysteresis": HYSTERESIS,
+                **{name: stated for name, (_, stated) in done.items()},
+            },
+            "results": [row for row, _ in done.values()],
+        }
+
+
+def _touched_at_rest(batch: PickBatch) -> dict[str, float]:
+    """Return how often people touch a robot that stays where it starts: how bold they are."""
+    batch.reset()
+    rest = np.zeros((batch.n_envs, CONTROLLED), dtype=np.float32)
+    while (batch.state.outcome == RUNNING).any():
+        batch.step(rest, auto_reset=False, features=False)
+    return wilson(int((batch.state.outcome == COLLISION).sum()), batch.n_envs)
+
+
+def _sized(work: WorkSettings, percentile: float, pelvis: float) -> WorkSettings:
+    return replace(work, bodies=(percentile_body(percentile, pelvis=pelvis),))
+
+
+def run_people(
+    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = untold
+) -> dict[str, Any]:
+    """Evaluate beside 0 to 4 people and people of several sizes.
+
+    Args:
+        checkpoint: What acts and chooses.
+        episodes: Number of episodes of each row, by default 1000.
+        seed: Seed of the episodes.
+        on_row: Told of each row once it is known.
+    """
+    bench = _Bench(checkpoint, episodes, seed, on_row)
+    usual, pelvis = bench.usual, bench.cell.human.pelvis_height
+    small, large = (_sized(usual.work, share, pelvis) for share in (SMALL, LARGE))
+
+    def beside(*people: HumanKind, work: WorkSettings = usual.work) -> PickSettings:
+        return replace(usual, people=people, work=work)
+
+    worker: HumanKind = "worker"
+    rows = {f"{n}-people": beside(*(worker,) * n) for n in range(5)}
+    rows |= {"1-person-p5": beside(worker, work=small)}
+    rows |= {"1-person-p95": beside(worker, work=large)}
+    rows |= {"3-people-p5": beside(*(worker,) * 3, work=small)}
+    rows |= {"3-people-p95": beside(*(worker,) * 3, work=large)}
+    rows |= {"worker-and-walker": beside(worker, "walker")}
+    rows |= {"first-reaches": replace(usual, work=replace(usual.work, motion="reaches"))}
+    return bench.all(rows)
+
+
+def run_courtesy(
+    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = untold
+) -> dict[str, Any]:
+    """Evaluate beside people who give way to the arm by 0, one half and fully.
+
+    Args:
+        checkpoint: What acts and chooses.
+        episodes: Number of episodes of each row, by default 1000.
+        seed: Seed of the episodes.
+        on_row: Told of each row once it is known.
+    """
+    bench = _Bench(checkpoint, episodes, seed, on_row)
+    usual = bench.usual
+
+    def beside(strength: float) -> PickSettings:
+        return replace(usual, work=replace(usual.work, courtesy=strength))
+
+    return bench.all({f"courtesy-{strength:g}": beside(strength) for strength in COURTESIES})
+
+
+def run_mocap(
+    checkpoint: Checkpoint,
+    *,
+    episodes: int | None,
+    seed: int,
+    motions: Sequence[Motion] = (),
+    on_row: OnRow = untold,
+) -> dict[str, Any]:
+    """Evaluate beside recorded people, with the library's people as the first row.
+
+    Args:
+        checkpoint: What acts and chooses.
+        episodes: Number of episodes of each row, by default 1000.
+        seed: Seed of the episodes.
+        motions: Clean runs of recorded motion; those of one name are evaluated together.
+        on_row: Told of each row once it is known.
+
+    Raises:
+        InvalidInput: There is no motion, or too much.
+    """
+    seconds = sum(float(motion.times[-1]) for motion in motions)
+    if not motions:
+        raise InvalidInput("motions", 0, "must hold at least one run of recorded motion")
+    if seconds > MAX_RECORDED_S:
+        rule = f"s of recorded motion are too much: at most {MAX_RECORDED_S} s at a time"
+        raise InvalidInput("motions", round(seconds), rule)
+    bench = _Bench(checkpoint, episodes, seed, on_row)
+    usual = bench.usual
+    placed = tuple(at_the_table(motion, bench.cell) for motion in motions)
+
+    def beside(some: tuple[Motion, ...]) -> PickSettings:
+        return replace(usual, work=replace(usual.work, motion="recorded", recorded=some))
+
+    files = sorted({motion.name for motion in placed})
+    rows = {"library": usual, "recorded": beside(placed)}
+    if len(files) > 1:
+        rows |= {
+            f"recorded {name}": beside(tuple(m for m in placed if m.name == name))
+            for name in files
+        }
+    result = bench.all(rows)
+    result["settings"]["motions"] = [
+        {"source": motion.source, "seconds": round(float(motion.times[-1]), 2)}
+        for motion in motions
+    ]
+    return result

@@ -1,0 +1,130 @@
+"""What is recorded of episodes for a second look: poses of robot and people, for FCL.
+
+Both scenarios' evaluations keep the poses of some episodes and ask FCL on the raw meshes
+whether the kernels missed a contact.
+"""
+
+from collections.abc import Sequence
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.sim.cells.cell import Cell
+from app.sim.collision.fcl_recheck import Trajectory, recheck_trajectories
+from app.sim.core.arrays import Vec
+from app.sim.human import model as human
+from app.sim.robot.actions import ActionSettings
+from app.sim.robot.kernels.arm import Arm
+from app.sim.scenario.kernels.episode import COLLISION
+from app.sim.scene.scene import FAR_AWAY
+
+Index = NDArray[np.int64]
+
+
+class Settings(Protocol):
+    """What a recording needs to know of a scenario's settings."""
+
+    @property
+    def action(self) -> ActionSettings:
+        """What actions mean."""
+
+
+class Batch(Protocol):
+    """What a recording needs of a scenario's batch."""
+
+    @property
+    def arm(self) -> Arm:
+        """The robot."""
+
+    @property
+    def state(self) -> Any:
+        """Rows of robot and people."""
+
+    @property
+    def settings(self) -> Settings:
+        """Settings."""
+
+
+class Trace:
+    """Records robot and people of the first rows at a part of the control period.
+
+    Args:
+        batch: What is recorded.
+        n_recorded: How many of its rows.
+        parts: Recorded poses per control period.
+    """
+
+    def __init__(self, batch: Batch, n_recorded: int, parts: int = 5) -> None:
+        self._batch, self._n, self._parts = batch, n_recorded, parts
+        self._robot: list[list[Vec]] = [[] for _ in range(n_recorded)]
+        self._people: list[list[tuple[Vec, ...]]] = [[] for _ in range(n_recorded)]
+
+    def before(self, rows: Index) -> None:
+        """Keep where the rows are that are about to move."""
+        state, n = self._batch.state, self._n
+        self._rows = rows[rows < n]
+        self._q0, self._qd0 = state.q[:n].copy(), state.qd[:n].copy()
+        self._qdd0 = state.qdd[:n].copy()
+        self._people0 = tuple(part[:n].copy() for part in self._of_people())
+
+    def after(self) -> None:
+        """Add the period's poses; a row that collided is left out, its contact is known."""
+        state, dt = self._batch.state, self._batch.arm.dt
+        for row in self._rows:
+            if state.outcome[row] == COLLISION:
+                continue
+            c = (state.qd[row] - self._qd0[row]) / (2.0 * dt)
+            d = np.zeros(6)
+            if self._batch.settings.action.degree == 3:
+                c = 0.5 * self._qdd0[row]
+                d = (state.qdd[row] - self._qdd0[row]) / (6.0 * dt)
+            pairs = [
+                (before[row], now[row])
+                for before, now in zip(self._people0, self._of_people(), strict=True)
+            ]
+            for part in range(1, self._parts + 1):
+                x, blend = dt * part / self._parts, part / self._parts
+                q = self._q0[row] + x * (self._qd0[row] + x * (c + x * d))
+                self._robot[row].append(q)
+                self._people[row].append(tuple(a + blend * (b - a) for a, b in pairs))
+
+    def _of_people(self) -> tuple[Vec, Vec, Vec]:
+        """Return joints and sizes of the workers, and the cylinders."""
+        people = self._batch.state.people
+        return people.q, people.size, people.cylinders
+
+    def trajectories(self) -> tuple[Trajectory, ...]:
+        """Return one trajectory for each worker of each recorded row, or one without any.
+
+        Cylinders are part of a row's first.
+        """
+        found = []
+        for q, people in zip(self._robot, self._people, strict=True):
+            if not q:
+                continue
+            joints, sizes, cylinders = (np.array(part) for part in zip(*people, strict=True))
+            sized = joints.shape[1] > 0
+            if not sized:
+                joints = np.tile(human.rest_posture(*FAR_AWAY), (len(q), 1, 1))
+            for w in range(joints.shape[1]):
+                found.append(
+                    Trajectory(
+                        q_robot=np.array(q),
+                        q_human=joints[:, w],
+                        sizes=sizes[:, w] if sized else None,
+                        cylinders=cylinders if w == 0 else None,
+                        dt=self._batch.arm.dt / self._parts,
+                    )
+                )
+        return tuple(found)
+
+
+def recheck(cell: Cell, trajectories: Sequence[Trajectory]) -> dict[str, int]:
+    """Ask FCL on raw meshes about every recorded pose without a reported contact."""
+    found = recheck_trajectories(cell, trajectories)
+    return {
+        "episodes": len(trajectories),
+        "poses": sum(len(trajectory.q_robot) for trajectory in trajectories),
+        "missed_contacts": sum(contact is not None for contact in found),
+    }

@@ -1,0 +1,51 @@
+"""Rules of choosing among candidates, to compare the critic's choice with (METHOD 3.6)."""
+
+import numpy as np
+
+from app.policies.evaluation.pick.episodes import Index, Rule, View
+
+
+def _n_candidates(view: View) -> Index:
+    count: Index = np.isfinite(view.distances).sum(axis=1)
+    return count
+
+
+def critic(hysteresis: float) -> Rule:
+    """Return the critic's choice at every step; 0 is the source's rule."""
+
+    def rule(view: View) -> Index:
+        best: Index = view.values.argmax(axis=1)
+        if view.first:
+            return best
+        rows = np.arange(len(best))
+        gain = view.values[rows, best] - view.values[rows, view.chosen]
+        return np.where(gain > hysteresis, best, view.chosen)
+
+    return rule
+
+
+def nearest(view: View) -> Index:
+    """Choose, at every step, the candidate nearest to the tcp."""
+    choice: Index = view.distances.argmin(axis=1)
+    return choice
+
+
+def at_random(seed: int, n_episodes: int) -> Rule:
+    """Return the rule that draws one candidate at the start and keeps it."""
+    draw = np.random.default_rng(seed).random(n_episodes)
+
+    def rule(view: View) -> Index:
+        if not view.first:
+            return view.chosen
+        return (draw[view.rows] * _n_candidates(view)).astype(np.int64)
+
+    return rule
+
+
+def fixed(place: int) -> Rule:
+    """Return the rule that keeps the candidate at ``place``, or the last one there is."""
+
+    def rule(view: View) -> Index:
+        return np.minimum(place, _n_candidates(view) - 1)
+
+    return rule

@@ -1,0 +1,198 @@
+"""Protocol ``pick-tracker``: what a policy loses when it sees people through a tracker.
+
+Every row runs the same episodes of ``pick-choice``; contacts are the true person's, and only
+what the policy sees differs: BODY_25 key-points at 30 Hz
+(``app/sim/perception/keypoint_sensor_model.py``), turned back
+into joint angles and speeds by ``app/sim/perception/person_estimator.py``. Each row of the
+batch has its
+own tracker and estimator, and the tracker has looked for a while before the episode starts.
+
+========================  ==================================================================
+``exact``                 the true state
+``33ms``                  one frame late, nothing else
+``100ms``, ``200ms``      later; the estimator predicts up to now
+``100ms-not-predicted``   as it was when the newest frame was taken, 0.1 s and more ago
+``100ms-noise-missing``   100 ms, 20 mm noise per axis, 20 % of the key-points missing
+========================  ==================================================================
+
+Source: METHOD 2.8 (30 Hz). Noise, share and latencies are ours.
+"""
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from app.policies.checkpoints.checkpoint import Checkpoint
+from app.policies.evaluation.pick import selection_rules as choice_rules
+from app.policies.evaluation.pick.episodes import Index, Seen, Sight, seen_exactly
+from app.policies.evaluation.pick.tasks import evaluator_of, settings_of
+from app.policies.evaluation.rows import OnRow, untold
+from app.policies.inference.task_selection import HYSTERESIS
+from app.sim.core.arrays import Vec
+from app.sim.human import model as human
+from app.sim.perception.keypoint_sensor_model import Tracker, TrackerSettings
+from app.sim.perception.person_estimator import PersonEstimator
+from app.sim.pick.batch import PickBatch
+
+DEFAULT_EPISODES = 300
+RATE_HZ = 30.0
+LOOKED_S = 0.4
+"""Time for which the tracker has looked before its first frame counts [s]. The person is taken
+to have come to the start at the speed they have there."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrackedRow:
+    """How one row of the result sees people."""
+
+    tracker: TrackerSettings
+    """How good the tracker is."""
+    predicted: bool = True
+    """Whether the estimate is for now, or for the time of the newest frame."""
+
+
+def _late(seconds: float, **disturbed: float) -> TrackerSettings:
+    clean = {"noise": 0.0, "missing": 0.0, **disturbed}
+    return TrackerSettings(rate_hz=RATE_HZ, latency_s=seconds, **clean)
+
+
+ROWS = {
+    "33ms": TrackedRow(tracker=_late(1.0 / RATE_HZ)),
+    "100ms": TrackedRow(tracker=_late(0.1)),
+    "200ms": TrackedRow(tracker=_late(0.2)),
+    "100ms-not-predicted": TrackedRow(tracker=_late(0.1), predicted=False),
+    "100ms-noise-missing": TrackedRow(tracker=_late(0.1, noise=0.02, missing=0.2)),
+}
+"""The rows beside ``exact``."""
+
+
+def between(
+    t0: float, q0: Vec, qd0: Vec, t1: float, q1: Vec, qd1: Vec
+) -> Callable[[float], Vec]:
+    """Return the motion between two states, cubic, and straight on before the first.
+
+    Args:
+        t0: Time of the first state [s].
+        q0: Joint positions then [m, rad], shape (18,).
+        qd0: Joint speeds then [m/s, rad/s], shape (18,).
+        t1: Time of the second state [s], not before the first.
+        q1: As ``q0``.
+        qd1: As ``qd0``.
+    """
+    span = t1 - t0
+
+    def at(t: float) -> Vec:
+        if t <= t0 or span <= 0.0:
+            return np.clip(q0 + (t - t0) * qd0, human.Q_MIN, human.Q_MAX)
+        x = (t - t0) / span
+        rise = x * x * (3.0 - 2.0 * x)
+        bend = x * (1.0 - x) * span * ((1.0 - x) * qd0 - x * qd1)
+        return np.asarray(q0 + rise * (q1 - q0) + bend)
+
+    return at
+
+
+class ThroughTracker:
+    """Shows the policy the first worker of each row as a tracker and an estimator know them.
+
+    Made anew for every run.
+
+    Args:
+        row: How people are seen.
+        seed: Seed of the disturbances.
+    """
+
+    def __init__(self, row: TrackedRow, seed: int) -> None:
+        self._row, self._seed = row, seed
+        self._trackers: dict[int, Tracker] = {}
+        self._estimators: dict[int, PersonEstimator] = {}
+        self._frame_at: dict[int, float] = {}
+        self._before: tuple[Vec, Vec, Vec] | None = None
+        self.wrist_errors: list[float] = []
+        """Distance of seen and true wrists at every step of every row [m]."""
+
+    def __call__(self, batch: PickBatch, rows: Index) -> Sight:
+        """Take in the frames handed over by now and return what is known of each person."""
+        people, t = batch.state.people, batch.state.elapsed
+        if self._before is None:
+            self._start(batch, rows)
+            self._before = t.copy(), people.q[:, 0].copy(), people.qd[:, 0].copy()
+        t0, q0, qd0 = self._before
+        seen = Sight(
+            q=np.empty((len(rows), 18)),
+            qd=np.empty((len(rows), 18)),
+            size=people.size[rows, 0].copy(),
+        )
+        for k, e in enumerate(rows.tolist()):
+            motion = between(t0[e], q0[e], qd0[e], float(t[e]), people.q[e, 0], people.qd[e, 0])
+            seen.q[k], seen.qd[k] = self._look(batch, e, float(t[e]), motion)
+            self._measure(seen.q[k], people.q[e, 0], seen.size[k])
+        self._before = t.copy(), people.q[:, 0].copy(), people.qd[:, 0].copy()
+        return seen
+
+    def _start(self, batch: PickBatch, rows: Index) -> None:
+        settings = self._row.tracker
+        phases = np.random.default_rng(self._seed).random(batch.n_envs) / settings.rate_hz
+        for e in rows.tolist():
+            size = batch.state.people.size[e, 0].copy()
+            self._trackers[e] = Tracker(
+                settings,
+                (self._seed, e),
+                size,
+                batch.world.people.floor_z,
+                start=-settings.latency_s - LOOKED_S + float(phases[e]),
+            )
+            self._estimators[e] = PersonEstimator(size)
+
+    def _look(
+        self, batch: PickBatch, e: int, t: float, motion: Callable[[float], Vec]
+    ) -> tuple[Vec, Vec]:
+        """Return joint positions and speeds of one row's person as they are known at ``t``."""
+        estimator = self._estimators[e]
+        for frame in self._trackers[e].frames(t, motion):
+            estimator.take(frame.t, frame.keypoints, frame.confidences)
+            self._frame_at[e] = frame.t
+        person = None
+        if e in self._frame_at:
+            person = estimator.person_at(t if self._row.predicted else self._frame_at[e])
+        if person is None:
+            return batch.world.people.nobody, np.zeros(18)
+        return person.q, person.qd
+
+    def _measure(self, seen: Vec, true: Vec, size: Vec) -> None:
+        one, other = human.joint_points(seen, size), human.joint_points(true, size)
+        for wrist in ("wrist_r", "wrist_l"):
+            self.wrist_errors.append(float(np.linalg.norm(one[wrist] - other[wrist])))
+
+
+def run_tracker(
+    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = untold
+) -> dict[str, object]:
+    """Evaluate the choice among 2-3 random targets beside people seen by a tracker.
+
+    Args:
+        checkpoint: What acts and chooses.
+        episodes: Number of episodes per row, by default 300.
+        seed: Seed of the episodes and of the disturbances.
+        on_row: Told of each row once it is known.
+    """
+    evaluator = evaluator_of(checkpoint, (2, 3), episodes or DEFAULT_EPISODES, seed)
+    rule, results = choice_rules.critic(HYSTERESIS), []
+    looks: dict[str, Seen] = {"exact": seen_exactly}
+    looks |= {name: ThroughTracker(row, seed) for name, row in ROWS.items()}
+    for name, look in looks.items():
+        row = evaluator.run(rule, seen=look).row(name)
+        errors = np.array(look.wrist_errors if isinstance(look, ThroughTracker) else [0.0])
+        row["wrist_error_median_mm"] = 1e3 * float(np.median(errors))
+        row["wrist_error_p95_mm"] = 1e3 * float(np.percentile(errors, 95))
+        results.append(row)
+        on_row(len(results), len(looks), row)
+    return {
+        "settings": {
+            **settings_of(evaluator),
+            "hysteresis": HYSTERESIS,
+            "trackers": {name: asdict(row) for name, row in ROWS.items()},
+        },
+        "results": results,
+    }

@@ -1,0 +1,180 @@
+"""Protocol ``reach-ceiling``: how much success is possible at all, by hindsight search.
+
+The episodes are those of ``reach-targets`` (54 targets x 100, start clearance 0.05 m, 5 s): the
+same people, the same motion. What the policy does not solve is replayed, moved differently each
+time (``app/sim/reach/oracle_search.py``), until a replay reaches the goal or the search ends.
+So
+``solvable`` is a lower bound on what is possible, and no causal policy need reach it: a replay
+knows what the person will do. ``never`` are episodes for which it is shown that nobody could
+have solved them; the ``undecided`` rest is neither. ``doomed`` are episodes in which every
+replay, retreats among them, ended in a collision: an upper bound on what cannot be avoided.
+
+==============  ==============================================================================
+stage           replays of each episode that is not solved yet
+==============  ==============================================================================
+``policy``      the policy by itself
+``scripted``    to a random posture, later straight to the goal: 64, then 256
+``disturbed``   to a random posture, later the policy with noise: 32
+``long``        scripted again: 2048
+==============  ==============================================================================
+
+Source: METHOD 2.6; the trials' figure is 98.7 %.
+"""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from app.policies.checkpoints.checkpoint import Checkpoint
+from app.policies.evaluation.reach.bench import ReachBench
+from app.policies.evaluation.reach.episodes import N_ENVS
+from app.policies.evaluation.rows import OnRow, untold
+from app.policies.evaluation.statistics import wilson
+from app.policies.inference.controllers import Mover, mover_of
+from app.sim.cells.cell import Cell
+from app.sim.core.arrays import Vec
+from app.sim.reach.batch import ReachBatch, ReachSettings
+from app.sim.reach.oracle_search import Hindsight, copy_rows, never_possible, walks_of
+from app.sim.robot.capsules import load_robot_capsules
+
+Json = dict[str, Any]
+PER_TARGET = 100
+"""Episodes of each target (METHOD 2.6)."""
+SCRIPTED = (64, 256)
+"""Scripted replays of each episode in the first two rounds."""
+DISTURBED = 32
+"""Replays of the policy."""
+LONG = 2048
+"""Scripted replays in the last round."""
+SOONEST_TRIES = 256
+"""Replays with nobody there, of which the soonest says when anybody could be at a target."""
+
+
+def started(cell: Cell, settings: ReachSettings, goals: Vec, seed: int) -> ReachBatch:
+    """Return a batch whose rows are the first states of the episodes ``play`` would play.
+
+    Args:
+        cell: Work cell.
+        settings: Rules.
+        goals: Goal of each episode [m], shape (n, 3).
+        seed: Seed of the episodes.
+    """
+    found = ReachBatch(cell, len(goals), seed, settings)
+    source = ReachBatch(cell, N_ENVS, seed, settings)
+    for number, first in enumerate(range(0, len(goals), N_ENVS)):
+        some = goals[first : first + N_ENVS]
+        rows = np.arange(len(some))
+        source.state.episode[:] = number
+        source.restart()
+        source.set_goals(rows, some)
+        copy_rows(source.state, rows, found.state, first)
+    return found
+
+
+def soonest_arrivals(cell: Cell, settings: ReachSettings, goals: Vec, seed: int) -> Vec:
+    """Return when the tcp could be at each goal at the soonest, with nobody there [s]."""
+    different, which = np.unique(goals, axis=0, return_inverse=True)
+    rules = ReachSettings(people=(), action=settings.action, time_limit_s=settings.time_limit_s)
+    alone = ReachBatch(cell, len(different), seed, rules)
+    alone.reset()
+    alone.set_goals(np.arange(len(different)), different)
+    search = Hindsight(alone, seed)
+    search.scripted(np.arange(len(different)), SOONEST_TRIES, at_once=True)
+    return np.asarray(search.replays.soonest[which])
+
+
+class Ceiling:
+    """The search over one set of episodes.
+
+    Args:
+        batch: From :func:`started`.
+        seed: Seed of the search.
+        on_row: Told of each stage.
+        n_stages: How many there will be.
+    """
+
+    def __init__(self, batch: ReachBatch, seed: int, n_stages: int, on_row: OnRow) -> None:
+        self.search, self._n_stages, self._on_row = Hindsight(batch, seed), n_stages, on_row
+        self.rows: list[Json] = []
+
+    def stage(self, name: str, replay: Callable[[], None]) -> None:
+        """Run a stage and tell what is solved after it."""
+        replay()
+        found = self.search.replays
+        row = {
+            "name": name,
+            "n": self.search.n,
+            "solved": wilson(int((found.reached > 0).sum()), self.search.n),
+            "doomed": wilson(int((found.untouched == 0).sum()), self.search.n),
+            "replays": int(found.n.sum()),
+        }
+        self.rows.append(row)
+        self._on_row(len(self.rows), self._n_stages, row)
+
+    def run(self, mover: Mover) -> None:
+        """Run all stages."""
+        search = self.search
+        self.stage("policy", lambda: search.undisturbed(mover.acts))
+        for n_each in SCRIPTED:
+            self.stage(f"scripted-{n_each}", partial(self._scripted, n_each))
+        self.stage(
+            "disturbed", lambda: search.disturbed(search.unsolved(), DISTURBED, mover.acts)
+        )
+        self.stage("long", partial(self._scripted, LONG))
+
+    def _scripted(self, n_each: int) -> None:
+        self.search.scripted(self.search.unsolved(), n_each)
+
+
+def verdict(search: Hindsight, never: Any, targets: Vec, goals: Vec) -> Json:
+    """Return what is solvable, what never was, and what nobody knows, with intervals."""
+    n, solved = search.n, search.replays.reached > 0
+    undecided = ~solved & ~never
+    worst = []
+    for target in targets:
+        of_it = (goals == target).all(axis=1)
+        if of_it.any():
+            worst.append({"goal": target.tolist(), "solvable": float(solved[of_it].mean())})
+    worst.sort(key=lambda one: one["solvable"])
+    return {
+        "name": "ceiling",
+        "n": n,
+        "solvable": wilson(int(solved.sum()), n),
+        "never": wilson(int((never & ~solved).sum()), n),
+        "undecided": wilson(int(undecided.sum()), n),
+        "doomed": wilson(int((search.replays.untouched == 0).sum()), n),
+        "replays": int(search.replays.n.sum()),
+        "worst_targets": worst[:5],
+    }
+
+
+def run_ceiling(
+    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = untold
+) -> Json:
+    """Search for what was possible in the episodes of ``reach-targets``.
+
+    Args:
+        checkpoint: Policy whose replays the search begins with.
+        episodes: Number of episodes of each target, by default 100.
+        seed: Seed of the episodes.
+        on_row: Told of each stage once it is known.
+    """
+    bench = ReachBench(checkpoint, seed)
+    goals = bench.target_goals((episodes or PER_TARGET) * len(bench.targets))
+    cell, settings = bench.cell, bench.usual
+    batch = started(cell, settings, goals, seed)
+    n_stages = len(SCRIPTED) + 4
+    ceiling = Ceiling(batch, seed, n_stages, on_row)
+    ceiling.run(mover_of(bench.actor, "direct"))
+    arm = batch.arm
+    soonest = soonest_arrivals(cell, settings, goals, seed)
+    base = load_robot_capsules(cell.robot.tool_length, cell.robot.tool_radius).radius[0]
+    walks = walks_of(batch, round(settings.time_limit_s / arm.dt))
+    never = never_possible(walks, goals, soonest, arm.dt, cell.robot.tool_radius, float(base))
+    row = verdict(ceiling.search, never, bench.targets, goals)
+    on_row(n_stages, n_stages, row)
+    bench.add(row, settings, "training targets in turn")
+    result = bench.result(search_seed=seed, soonest_tries=SOONEST_TRIES)
+    return {**result, "stages": ceiling.rows}

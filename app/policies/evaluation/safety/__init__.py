@@ -1,0 +1,1 @@
+"""Falsification of the safety layer."""

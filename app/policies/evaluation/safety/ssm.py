@@ -1,0 +1,127 @@
+"""Protocol ``safety-ssm``: does speed and separation monitoring keep what it promises?
+
+People run at a robot that does as it likes (``app/sim/safety/adversarial_trials.py``), in both
+scenarios'
+cells, without uncertainties to hide behind: C, Z_d, Z_r and the protective distance are 0. No
+checkpoint takes part.
+
+========================  ==================================================================
+``inside``                nobody breaks an assumption; seen at once, and 0.1 s late, known
+``touch-limited``         the same with power and force limiting: touched, but slowly enough
+``fast-hands``            people at 2.5 m/s where 1.6 m/s are assumed
+``late-tracker``          people seen 0.1 s late that nobody knows of
+``fast-hands-cell``       fast hands with what the cell assumes: 0.3 m and 0.1 s in hand
+``late-tracker-cell``     a late tracker with the same
+``unguarded``             no safety layer: how often these people are hit
+========================  ==================================================================
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from app.policies.checkpoints.checkpoint import Checkpoint
+from app.policies.evaluation.rows import OnRow, untold
+from app.policies.evaluation.statistics import wilson
+from app.sim.cells.cell import load_cell
+from app.sim.safety.adversarial_trials import TrialResult, TrialSettings, run_trial
+from app.sim.safety.layer import SafetySettings, safety_settings
+
+DEFAULT_EPISODES = 100_000
+OUTSIDE_SHARE = 10
+"""One row's episodes outside the assumptions, as a divisor of those inside."""
+FAST_HANDS = 2.5
+"""Clean reaches of trained hands: 2 to 2.7 m/s, above what is usually assumed [m/s]."""
+LATE = 0.1
+"""Delay of the tracker [s]."""
+BARE = SafetySettings(reaction_time=0.0, protective_distance=0.0)
+"""Nothing to hide behind."""
+PLACES: tuple[TrialSettings, ...] = (
+    TrialSettings(safety=BARE, cell="pick-and-place", people=("worker",)),
+    TrialSettings(safety=BARE, cell="shared-workspace", people=("walker",)),
+)
+"""The two scenarios."""
+
+
+def trials() -> dict[str, list[TrialSettings]]:
+    """Return the trials of every row; a row's episodes are shared evenly among them."""
+    known = replace(BARE, tracker_delay=LATE)
+    rows: dict[str, list[TrialSettings]] = {
+        "inside": [*PLACES, *(replace(p, safety=known, true_delay=LATE) for p in PLACES)],
+        "touch-limited": [replace(p, safety=replace(BARE, pfl=True)) for p in PLACES],
+        "fast-hands": [replace(p, human_speed=FAST_HANDS) for p in PLACES],
+        "late-tracker": [replace(p, true_delay=LATE) for p in PLACES],
+    }
+    for name in ("fast-hands", "late-tracker"):
+        rows[f"{name}-cell"] = [
+            replace(p, safety=safety_settings(load_cell(p.cell))) for p in rows[name]
+        ]
+    rows["unguarded"] = [replace(p, guarded=False) for p in PLACES]
+    return rows
+
+
+def _row(name: str, results: list[TrialResult]) -> dict[str, Any]:
+    """Return one row: all its episodes together."""
+    n, moving = sum(r.n for r in results), sum(r.n_moving for r in results)
+    periods = np.array([r.n_steps for r in results])
+    stopped = np.array([r.stopped_share for r in results])
+    slowed = np.array([r.slowed_share for r in results])
+    return {
+        "name": name,
+        "n": n,
+        "contacts": sum(r.n_contacts for r in results),
+        "contacts_moving": moving,
+        "moving_rate": wilson(moving, n),
+        "fastest_link_m_s": max(r.fastest_link for r in results),
+        "fastest_person_m_s": max(r.fastest_person for r in results),
+        "stopped_share": float(stopped @ periods / periods.sum()),
+        "slowed_share": float(slowed @ periods / periods.sum()),
+    }
+
+
+def stated(trial: TrialSettings) -> Mapping[str, Any]:
+    """Return what a trial assumes and what is true in it."""
+    return {
+        "cell": trial.cell,
+        "people": list(trial.people),
+        "assumed": trial.safety.describe(),
+        "true human_speed [m/s]": trial.human_speed,
+        "true tracker_delay [s]": trial.true_delay,
+        "seconds [s]": trial.seconds,
+        "guarded": trial.guarded,
+    }
+
+
+def run_safety(
+    _checkpoint: Checkpoint | None,
+    *,
+    episodes: int | None,
+    seed: int,
+    on_row: OnRow = untold,
+) -> dict[str, Any]:
+    """Run all rows.
+
+    Args:
+        _checkpoint: Not used; all protocols are called alike.
+        episodes: Number of episodes inside the assumptions, by default 100,000; every other
+            row runs a tenth of that.
+        seed: Seed of the episodes.
+        on_row: Told of each row once it is known.
+    """
+    n_inside = episodes or DEFAULT_EPISODES
+    rows, settings = [], {}
+    planned = trials()
+    for name, row_trials in planned.items():
+        n = n_inside if name == "inside" else max(1, n_inside // OUTSIDE_SHARE)
+        shares = [len(part) for part in np.array_split(np.arange(n), len(row_trials))]
+        results = [
+            run_trial(trial, share, seed)
+            for trial, share in zip(row_trials, shares, strict=True)
+            if share
+        ]
+        rows.append(_row(name, results))
+        on_row(len(rows), len(planned), rows[-1])
+        settings[name] = [stated(trial) for trial in row_trials]
+    return {"settings": settings, "results": rows}

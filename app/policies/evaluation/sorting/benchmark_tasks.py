@@ -1,0 +1,158 @@
+"""Protocol ``sorting-tests``: the six tests of ``app/sim/sorting/benchmark_tasks.py``, many of
+each.
+
+Rows ``test-1`` to ``test-6`` are the policy alone, ``test-1-handover`` and so on the policy
+until it goes in circles, then the exact planner. Picks fail as the work cell says. An episode
+is a success when the last goal is reached, and ``fewest`` when no part of it took a move more
+than the exact planner needs. Each part has 4 K attempts.
+
+Source: thesis 3.4.3, METHOD 1.5. Deviates: the source shows one run of each.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from app.errors import InvalidInput
+from app.policies.evaluation.rows import OnRow, untold
+from app.policies.evaluation.sorting.episodes import (
+    ENDLESS,
+    Chooser,
+    Flags,
+    Index,
+    SortingEpisodes,
+    Values,
+    greedy,
+    run_episodes,
+)
+from app.policies.evaluation.sorting.grid import settings_of, share
+from app.policies.evaluation.statistics import mean_of, wilson
+from app.sim.core.arrays import Vec
+from app.sim.sorting.batch import SortingBatch, SortingSettings
+from app.sim.sorting.benchmark_tasks import TESTS, SortingTest
+from app.sim.sorting.state import SortingShape
+
+DEFAULT_EPISODES = 1000
+
+
+class Person:
+    """The person of a test, in every row of a batch; made anew for every run.
+
+    Args:
+        test: The test.
+        n: Number of rows.
+        seed: Seed; what is done in row ``e`` is fixed by (seed, test, e).
+    """
+
+    def __init__(self, test: SortingTest, n: int, seed: int) -> None:
+        self._test, self._seed = test, seed
+        self._next = np.zeros(n, dtype=np.int64)
+        self._after = np.array(
+            [
+                np.inf if one.after_moves is None else one.after_moves
+                for one in test.interferences
+            ]
+            + [np.nan]
+        )
+
+    def due(self, which: Index, moves: Index, solved: Flags) -> Flags:
+        """Tell in which rows the next interference comes now; at a goal it always does."""
+        after = self._after[self._next[which]]
+        return np.asarray(~np.isnan(after) & (solved | (moves >= after)))
+
+    def interfere(self, batch: SortingBatch, e: int) -> None:
+        """Do to row ``e`` what comes next."""
+        k = int(self._next[e])
+        rng = _random(self._test, self._seed, e, 1 + k)
+        change = self._test.interferences[k].change
+        batch.change(e, change(batch.state_of(e), batch.shape, rng))
+        self._next[e] += 1
+
+
+def _random(test: SortingTest, seed: int, e: int, part: int) -> np.random.Generator:
+    return np.random.default_rng((seed, TESTS.index(test), e, part))
+
+
+def start_test(batch: SortingBatch, test: SortingTest, fail: Vec, seed: int) -> None:
+    """Put every row of a batch at a start of a test."""
+    batch.reset()
+    for e in range(batch.n_envs):
+        batch.put(e, test.start(batch.shape, fail, _random(test, seed, e, 0)))
+
+
+def run_test(
+    test: SortingTest, choose: Chooser, shape: SortingShape, fail: Vec, n: int, seed: int
+) -> tuple[SortingEpisodes, SortingEpisodes]:
+    """Return the episodes of a test by a policy alone, and with hand-over."""
+    batch = SortingBatch(shape, fail, n, seed, SortingSettings(horizon_factor=ENDLESS))
+    start_test(batch, test, fail, seed)
+    alone = run_episodes(batch, choose, script=Person(test, n, seed))
+    called = alone.handed_over
+    if not called.any():
+        return alone, alone
+    start_test(batch, test, fail, seed)
+    script = Person(test, n, seed)
+    again = run_episodes(batch, choose, script=script, obey=True, only=called)
+    return alone, alone.with_those(again, called)
+
+
+def row_of(name: str, episodes: SortingEpisodes) -> dict[str, Any]:
+    """Return a row of the result."""
+    n, good = len(episodes.success), episodes.part(episodes.success)
+    choices, riskier = int(episodes.choices.sum()), int(episodes.riskier.sum())
+    return {
+        "name": name,
+        "n": n,
+        "success": wilson(len(good.success), n),
+        "timeout": wilson(n - len(good.success), n),
+        "fewest": wilson(int((good.moves == good.fewest).sum()), n),
+        "moves_over_minimum": mean_of(good.moves / good.fewest),
+        "riskier_pick": share(episodes.riskier, episodes.picks),
+        "safest_of_twins": wilson(choices - riskier, choices) if choices else None,
+        "failed_pick": share(episodes.failed, episodes.picks),
+        "handover": wilson(int(episodes.handed_over.sum()), n),
+        "repeated": wilson(int(episodes.repeated.sum()), n),
+    }
+
+
+def trials(
+    values: Values,
+    shape: SortingShape,
+    fail: Vec,
+    episodes: int | None,
+    seed: int,
+    on_row: OnRow = untold,
+) -> dict[str, Any]:
+    """Put a policy to the tests; those that need a larger task are left out.
+
+    Args:
+        values: Q of every move, from observations.
+        shape: How large the task is.
+        fail: Failure probabilities of the clutter cells, shape (K,).
+        episodes: Number of episodes per test, by default 1000.
+        seed: Seed of the episodes; use one that nothing was tuned on.
+        on_row: Told of each row once it is known.
+
+    Raises:
+        InvalidInput: The task is too small for all six.
+    """
+    n = episodes or DEFAULT_EPISODES
+    fitting = [test for test in TESTS if test.fits(shape)]
+    if not fitting:
+        raise InvalidInput("n_cells", shape.n_cells, "must be enough for one of the six tests")
+    alone, handed = [], []
+    for test in fitting:
+        one, other = run_test(test, greedy(values), shape, fail, n, seed)
+        alone.append(row_of(test.name, one))
+        handed.append(row_of(f"{test.name}-handover", other))
+        on_row(len(alone), 2 * len(fitting), alone[-1])
+    for k, row in enumerate(handed):
+        on_row(len(alone) + k + 1, 2 * len(fitting), row)
+    return {
+        "episodes": n,
+        "settings": {
+            **settings_of(shape, fail),
+            "left_out": [test.name for test in TESTS if test not in fitting],
+        },
+        "results": [*alone, *handed],
+    }

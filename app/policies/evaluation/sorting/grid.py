@@ -1,0 +1,196 @@
+"""Protocol ``sorting-grid``: every pair of object and goal numbers (METHOD 1.5).
+
+For every pair ``1 <= K_G <= K_E <= K``, the same episodes in every row of a kind:
+
+=======================  ===================================================================
+``clean``                the policy alone, from starts with everything in the clutter
+``disturbed``            the same from starts with junk on towers and goals partly built
+``clean-handover``       the policy until it goes in circles, then the exact planner
+``disturbed-handover``   the same from disturbed starts
+``clean-planner``        the exact planner alone, a yardstick
+``disturbed-planner``    the same from disturbed starts
+=======================  ===================================================================
+
+Episodes are cut off after 4 K attempts; a hand-over counts them anew.
+
+Source: thesis 3.4.2, fig. 3.2. Deviates: disturbed starts, hand-over and yardstick are ours.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from app.policies.evaluation.rows import OnRow, untold
+from app.policies.evaluation.sorting.episodes import (
+    HORIZON_FACTOR,
+    Chooser,
+    Index,
+    SortingEpisodes,
+    Values,
+    greedy,
+    joined,
+    run_episodes,
+)
+from app.policies.evaluation.sorting.optimal_baseline import by_planner
+from app.policies.evaluation.sorting.pairs import SMALL, grid_batches, pairs_of
+from app.policies.evaluation.statistics import mean_of, wilson
+from app.sim.core.arrays import Vec
+from app.sim.sorting.batch import SortingBatch, SortingSettings
+from app.sim.sorting.state import SortingShape
+
+STARTS: Mapping[str, float] = {"clean": 0.0, "disturbed": 1.0}
+"""Share of disturbed starts by the kind of row."""
+WHO = ("", "-handover", "-planner")
+"""Who decides, as the end of a row's name."""
+
+
+def episodes_for(shape: SortingShape) -> int:
+    """Return how many episodes per pair are run by default."""
+    return 1000 if shape.n_cells <= SMALL else 300
+
+
+def least_success(shape: SortingShape) -> float:
+    """Return the success rate below which no pair may be."""
+    return 0.99 if shape.n_cells <= SMALL else 0.98
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Kind:
+    """Episodes of one kind of start, by everybody who decides."""
+
+    alone: SortingEpisodes
+    """The policy."""
+    handed: SortingEpisodes
+    """The policy, with hand-over."""
+    planned: SortingEpisodes
+    """The exact planner."""
+
+
+def run_kind(batches: Iterable[SortingBatch], choose: Chooser) -> Kind:
+    """Run started batches by a policy, with hand-over, and by the exact planner."""
+    alone, handed, planned = [], [], []
+    for batch in batches:
+        alone.append(run_episodes(batch, choose))
+        handed.append(alone[-1])
+        called = alone[-1].handed_over
+        if called.any():
+            batch.reset()
+            again = run_episodes(batch, choose, obey=True, only=called)
+            handed[-1] = alone[-1].with_those(again, called)
+        batch.reset()
+        planned.append(run_episodes(batch, by_planner))
+    return Kind(alone=joined(alone), handed=joined(handed), planned=joined(planned))
+
+
+def row_of(name: str, episodes: SortingEpisodes, pairs: Index, least: float) -> dict[str, Any]:
+    """Return a row of the result.
+
+    Args:
+        name: Of the row.
+        episodes: As many of each pair, in the order of ``pairs``.
+        pairs: Every (K_E, K_G), shape (n_pairs, 2).
+        least: Success rate below which no pair may be.
+    """
+    n, won = len(episodes.success), episodes.success
+    each = np.arange(n).reshape(len(pairs), -1)
+    cells = [
+        pair_of(int(n_e), int(n_g), episodes.part(each[p]), least)
+        for p, (n_e, n_g) in enumerate(pairs)
+    ]
+    worst = min(cells, key=lambda cell: (cell["success"]["mean"], -cell["n_objects"]))
+    good = episodes.part(won)
+    return {
+        "name": name,
+        "n": n,
+        "success": wilson(int(won.sum()), n),
+        "timeout": wilson(int((~won).sum()), n),
+        "worst_pair": {
+            **worst["success"],
+            "n_objects": worst["n_objects"],
+            "n_goal": worst["n_goal"],
+        },
+        "pairs_below": sum(cell["below"] for cell in cells),
+        "moves_over_minimum": mean_of(good.moves / good.fewest),
+        "exactly_minimal": wilson(int((good.moves == good.fewest).sum()), n),
+        "attempts_over_expected": mean_of(good.attempts / good.expected),
+        "riskier_pick": share(episodes.riskier, episodes.picks),
+        "failed_pick": share(episodes.failed, episodes.picks),
+        "handover": wilson(int(episodes.handed_over.sum()), n),
+        "repeated": wilson(int(episodes.repeated.sum()), n),
+        "mean_return": float(episodes.rewards.mean()),
+        "pairs": cells,
+    }
+
+
+def pair_of(
+    n_objects: int, n_goal: int, episodes: SortingEpisodes, least: float
+) -> dict[str, Any]:
+    """Return what the heat maps show of a pair, and whether it is below ``least``.
+
+    It is when the upper bound of its success rate is.
+    """
+    success = wilson(int(episodes.success.sum()), len(episodes.success))
+    return {
+        "n_objects": n_objects,
+        "n_goal": n_goal,
+        "success": success,
+        "return": float(episodes.rewards.mean()),
+        "below": success["high"] < least,
+    }
+
+
+def share(hits: Index, of: Index) -> dict[str, float] | None:
+    """Return a rate over all episodes together, or None where there is nothing to count."""
+    total = int(of.sum())
+    return wilson(int(hits.sum()), total) if total else None
+
+
+def grid(
+    values: Values,
+    shape: SortingShape,
+    fail: Vec,
+    episodes: int | None,
+    seed: int,
+    on_row: OnRow = untold,
+) -> dict[str, Any]:
+    """Evaluate a policy on every pair.
+
+    Args:
+        values: Q of every move, from observations.
+        shape: How large the task is.
+        fail: Failure probabilities of the clutter cells, shape (K,).
+        episodes: Number of episodes per pair and row; by default 1000 for up to 10 cells and
+            300 for more.
+        seed: Seed of the episodes; use one that nothing was tuned on.
+        on_row: Told of each row once it is known.
+    """
+    per_pair = episodes or episodes_for(shape)
+    pairs, least, choose = pairs_of(shape), least_success(shape), greedy(values)
+    rows: list[dict[str, Any]] = []
+    for start, disturbed in STARTS.items():
+        found = run_kind(grid_batches(shape, fail, per_pair, seed, disturbed), choose)
+        for end, part in zip(WHO, (found.alone, found.handed, found.planned), strict=True):
+            rows.append(row_of(start + end, part, pairs, least))
+            on_row(len(rows), len(WHO) * len(STARTS), rows[-1])
+    return {
+        "episodes": per_pair,
+        "settings": {
+            **settings_of(shape, fail),
+            "pairs": len(pairs),
+            "least_success": least,
+        },
+        "results": rows,
+    }
+
+
+def settings_of(shape: SortingShape, fail: Vec) -> dict[str, Any]:
+    """Return what a result states of its episodes."""
+    return {
+        **asdict(shape),
+        "horizon_attempts": round(HORIZON_FACTOR * shape.n_cells),
+        "failure_max": float(fail.max()),
+        "failure_mean": float(fail.mean()),
+        "weights": SortingSettings().weights._asdict(),
+    }

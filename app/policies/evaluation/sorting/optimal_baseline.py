@@ -1,0 +1,54 @@
+"""The exact planner as the yardstick of sorting episodes: fewest moves, expected attempts."""
+
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.errors import SimulationError
+from app.sim.sorting.batch import SortingBatch
+from app.sim.sorting.kernels.optimal_costs import measure_rows
+from app.sim.sorting.kernels.planner import PlannerWork, new_work, plan_rows
+from app.sim.sorting.state import SortingShape
+
+Index = NDArray[np.int64]
+
+
+@cache
+def _work(shape: SortingShape) -> PlannerWork:
+    return new_work(shape.n_cells, shape.n_colours, shape.n_sizes)
+
+
+def measure(batch: SortingBatch, which: Index) -> tuple[Index, NDArray[np.float64]]:
+    """Return the fewest moves to the goal and the attempts to be expected, shape (m,) each.
+
+    Args:
+        batch: Tasks.
+        which: Rows that are measured, shape (m,).
+
+    Raises:
+        SimulationError: A goal that the objects cannot meet.
+    """
+    fewest, attempts = np.zeros(len(which), dtype=np.int64), np.zeros(len(which))
+    measure_rows(batch.rows, which, _work(batch.shape), fewest, attempts)
+    if (fewest < 0).any():
+        e = int(which[fewest.argmin()])
+        raise SimulationError(f"row {e} of seed {batch.seed}: its goal cannot be met")
+    return fewest, attempts
+
+
+def by_planner(batch: SortingBatch, which: Index) -> Index:
+    """Choose the moves of some rows as the exact planner does; none of them at its goal."""
+    rows, best = batch.rows, np.zeros(len(which), dtype=np.int64)
+    plan_rows(
+        rows.clutter[which],
+        rows.towers[which],
+        rows.heights[which],
+        rows.goal[which],
+        rows.goal_heights[which],
+        rows.fail[which],
+        _work(batch.shape),
+        best,
+        np.zeros_like(best),
+    )
+    return best

@@ -1,0 +1,50 @@
+"""Protocols ``sorting-grid`` and ``sorting-tests`` of a checkpoint (METHOD 1.5).
+
+What they measure is told in ``sorting_grid.py`` and ``sorting_trials.py``. The task and its
+failure probabilities are those of the cell the policy was trained in.
+"""
+
+from typing import Any
+
+from app.policies.checkpoints.checkpoint import Checkpoint
+from app.policies.checkpoints.trained_cell import cell_of
+from app.policies.evaluation.rows import OnRow, untold
+from app.policies.evaluation.sorting.benchmark_tasks import trials
+from app.policies.evaluation.sorting.grid import grid
+from app.policies.inference.sorting_policy import SortingPolicy
+from app.sim.sorting.batch import fail_of
+
+
+def run_grid(
+    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = untold
+) -> dict[str, Any]:
+    """Evaluate a sorting policy on every pair (K_E, K_G).
+
+    Args:
+        checkpoint: What decides.
+        episodes: Number of episodes per pair and row, by default 1000 for up to 10 cells and
+            300 for more.
+        seed: Seed of the episodes; use one that nothing was tuned on.
+        on_row: Told of each row once it is known.
+    """
+    policy = SortingPolicy(checkpoint)
+    fail = fail_of(cell_of(checkpoint.manifest))
+    found = grid(policy.values, policy.shape, fail, episodes, seed, on_row)
+    return {**found, "settings": {"cell": policy.cell, **found["settings"]}}
+
+
+def run_tests(
+    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = untold
+) -> dict[str, Any]:
+    """Evaluate a sorting policy in the six tests.
+
+    Args:
+        checkpoint: What decides.
+        episodes: Number of episodes per test, by default 1000.
+        seed: Seed of the episodes; use one that nothing was tuned on.
+        on_row: Told of each row once it is known.
+    """
+    policy = SortingPolicy(checkpoint)
+    fail = fail_of(cell_of(checkpoint.manifest))
+    found = trials(policy.values, policy.shape, fail, episodes, seed, on_row)
+    return {**found, "settings": {"cell": policy.cell, **found["settings"]}}

@@ -1,0 +1,84 @@
+"""A reach policy as the live cell drives it: with all the ways in which it can be asked."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.policies.inference.controllers import Ahead, Mover, hows_of, mover_of
+from app.policies.inference.rollout import layer_of
+from app.sim.core.arrays import Vec
+from app.sim.reach.batch import GoalRule, ReachBatch, ViewName
+from app.sim.reach.reach_actor import ReachActor
+from app.sim.robot.actions import ActionSettings
+from app.sim.safety.layer import SafetySettings
+
+
+class ReachPilot:
+    """One policy and its movers; used by one thread at a time.
+
+    Args:
+        actor: The policy.
+    """
+
+    def __init__(self, actor: ReachActor) -> None:
+        self._actor = actor
+        self._movers: dict[str, Mover] = {how: mover_of(actor, how) for how in hows_of(actor)}
+
+    @property
+    def checkpoint(self) -> str:
+        """SHA-256 of the checkpoint."""
+        return self._actor.checkpoint
+
+    @property
+    def title(self) -> str:
+        """Short text for people."""
+        return self._actor.title
+
+    @property
+    def cell(self) -> str:
+        """Name of the work cell it was trained for."""
+        return self._actor.cell
+
+    @property
+    def cell_sha256(self) -> str:
+        """Identity of that cell's content."""
+        return self._actor.cell_sha256
+
+    @property
+    def view(self) -> ViewName:
+        """What it sees."""
+        return self._actor.view
+
+    @property
+    def action(self) -> ActionSettings:
+        """What its actions mean."""
+        return self._actor.action
+
+    @property
+    def goals(self) -> GoalRule:
+        """Where the goals of its training were drawn from."""
+        return self._actor.goals
+
+    @property
+    def targets(self) -> Vec | None:
+        """The goals it was trained on [m], shape (n, 3); None for a whole box."""
+        return self._actor.targets
+
+    @property
+    def ways(self) -> tuple[str, ...]:
+        """How it can be asked."""
+        return tuple(self._movers)
+
+    def acts(
+        self, batch: ReachBatch, way: str, safety: SafetySettings | None
+    ) -> NDArray[np.float32]:
+        """Return the actions for every environment of a batch, shape (n_envs, 6).
+
+        Args:
+            batch: Robots, people and goals.
+            way: One of ``ways``.
+            safety: What the safety layer assumes that they go through; None without one.
+        """
+        mover = self._movers[way]
+        if isinstance(mover, Ahead):
+            mover.layer = layer_of(safety, batch.arm.dt)
+        return mover.acts(batch)

@@ -1,0 +1,236 @@
+"""A trained policy of the reach scenario, for inference.
+
+Its network is read from the checkpoint's tensors and run by numpy, for few states by a kernel:
+a library's overhead costs more than they do. Source: METHOD 2.2 to 2.4; the tensors are data,
+see ``checkpoint.py``.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Any, cast, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.errors import CheckpointMismatch, InvalidInput
+from app.policies.checkpoints.checkpoint import (
+    REACHING,
+    Checkpoint,
+    expect_layout,
+    require_purpose,
+    task_of,
+)
+from app.policies.checkpoints.trained_cell import cell_of
+from app.policies.configs.reach import ACTORS, action_of
+from app.policies.networks.actor_critic import BASE_WEIGHT, CROWD_WIDTH, CrowdShape
+from app.sim.core.arrays import Vec
+from app.sim.core.jit import direct
+from app.sim.people.kernels.people import MAX_PEOPLE
+from app.sim.prediction.kernels.networks import Network
+from app.sim.reach.batch import N_ACT, GoalRule, ViewName, goal_region_of
+from app.sim.reach.goal_sets import MOST_HALTON, N_HALTON, halton_targets
+from app.sim.reach.kernels import option_features as reach_ways
+from app.sim.reach.kernels import people_set as reach_crowd
+from app.sim.reach.kernels.observation import BASE_START, N_FEATURES, SIZES, STATE_SIZES
+from app.sim.reach.rollout.kernels.actor import FEW, answers, new_residual_actor
+from app.sim.robot.actions import ActionSettings
+
+LAYOUTS = {
+    "features": [[name, size] for name, size in SIZES],
+    "state": [[name, size] for name, size in STATE_SIZES],
+    "forecast": [[name, size] for name, size in (*SIZES, *reach_ways.SIZES)],
+    "crowd": [[name, size] for name, size in (*SIZES, *reach_ways.SIZES, *reach_crowd.SIZES)],
+}
+"""Names and sizes of the groups of each kind of observation, as manifests carry them."""
+CROWD = CrowdShape(N_FEATURES + reach_ways.N_WAYS, MAX_PEOPLE, reach_crowd.N_BLOCK)
+"""Where everybody stands as a set in the observation of that name."""
+MAX_LAYERS = 16
+"""Most layers of a network taken from a checkpoint."""
+
+ACTOR_LAYERS, CROWD_LAYERS = "actor.net", "actor.crowd.0.block"
+"""What the names of an actor's tensors start with."""
+
+Floats = NDArray[np.float32]
+Layer = tuple[Floats, Floats]
+
+
+def is_reach(checkpoint: Checkpoint) -> bool:
+    """Tell whether a checkpoint's policy reaches goals beside people."""
+    return task_of(checkpoint) == REACHING
+
+
+class ReachPolicy:
+    """Says how to move toward a goal; safe to call from several threads.
+
+    Args:
+        checkpoint: A ``policy`` checkpoint of a reach preset.
+
+    Raises:
+        CheckpointMismatch: It is for another task, network or layout.
+        InvalidInput: Its preset names an unknown rule.
+    """
+
+    def __init__(self, checkpoint: Checkpoint) -> None:
+        require_purpose(checkpoint, REACHING)
+        manifest = checkpoint.manifest
+        preset, cell = manifest["preset"], cell_of(manifest)
+        self._checkpoint, self._cell = checkpoint, (cell.name, cell.sha256)
+        self.view = cast(ViewName, _named(preset, "observation", get_args(ViewName)))
+        """What it sees."""
+        expect_layout(checkpoint, LAYOUTS[self.view], N_ACT)
+        self.goals = cast(GoalRule, _named(preset, "goals", get_args(GoalRule)))
+        """Where the goals of its training were drawn from."""
+        self.action: ActionSettings = action_of(preset)
+        """What its actions mean (METHOD 2.2)."""
+        self.targets: Vec | None = None
+        """The goals it was trained on [m], shape (n, 3); None for a whole box."""
+        if self.goals == "grid":
+            self.targets = goal_region_of(cell).targets()
+        elif self.goals == "halton":
+            self.targets = halton_targets(goal_region_of(cell), _n_halton(preset))
+        self.n_obs = sum(size for _, size in manifest["layout"])
+        """Length of an observation."""
+        arrays, n_seen = checkpoint.arrays(), self.n_obs
+        self._crowd: tuple[Layer, ...] = ()
+        if self.view == "crowd":
+            self._crowd = _layers_of(arrays, CROWD_LAYERS, CROWD.n_block, CROWD_WIDTH)
+            n_seen = CROWD.first + CROWD_WIDTH
+        self._layers = _layers_of(arrays, ACTOR_LAYERS, n_seen, N_ACT)
+        self._residual = _named(preset, "actor", ACTORS) == "residual"
+        self._few = self.kernel_network
+        self._answers: Callable[..., None] | None = None
+
+    @property
+    def checkpoint(self) -> str:
+        """SHA-256 of the checkpoint."""
+        return self._checkpoint.sha256
+
+    @property
+    def title(self) -> str:
+        """Short text for people."""
+        manifest = self._checkpoint.manifest
+        name = manifest["preset"].get("name", "policy")
+        return f"{name}, {manifest['step'] / 1e6:.2f} M steps"
+
+    @property
+    def cell(self) -> str:
+        """Name of the work cell it was trained for."""
+        return self._cell[0]
+
+    @property
+    def cell_sha256(self) -> str:
+        """Identity of that cell's content."""
+        return self._cell[1]
+
+    @property
+    def trained_range(self) -> Mapping[str, Mapping[str, list[float]]]:
+        """Least and greatest value of each state variable met in training."""
+        ranges: Mapping[str, Mapping[str, list[float]]] = self._checkpoint.manifest[
+            "trained_range"
+        ]
+        return ranges
+
+    @property
+    def kernel_network(self) -> Network | None:
+        """The network as kernels play it; None where it is of another kind."""
+        if self.view != "forecast" or not self._residual or len(self._layers) != 3:
+            return None
+        if len(self._layers[0][1]) != len(self._layers[1][1]):
+            return None
+        return Network(*(array for layer in self._layers for array in layer))
+
+    def acts(self, obs: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return actions in [-1, 1], shape (n, 6), of observations, shape (n, n_obs).
+
+        Raises:
+            InvalidInput: They have another shape.
+        """
+        if obs.ndim != 2 or obs.shape[1] != self.n_obs:
+            raise InvalidInput(
+                "obs", list(obs.shape), f"must have the shape ['n', {self.n_obs}]"
+            )
+        if self._few is not None and len(obs) <= FEW:
+            return self._answered(self._few, obs)
+        rows = _hidden(self._with_crowd(obs), self._layers[:-1])
+        weight, bias = self._layers[-1]
+        rows = rows @ weight
+        rows += bias
+        if self._residual:
+            base = obs[:, BASE_START : BASE_START + N_ACT].clip(-1.0, 1.0)
+            rows += np.arctanh(np.float32(BASE_WEIGHT) * base)
+        return cast(NDArray[np.float32], np.tanh(rows, out=rows))
+
+    def _answered(self, network: Network, obs: Floats) -> Floats:
+        """Return what :meth:`acts` does, by the kernel."""
+        seen = np.ascontiguousarray(obs, dtype=np.float32)
+        acts = np.empty((len(seen), N_ACT), dtype=np.float32)
+        arguments = new_residual_actor(network, BASE_WEIGHT), seen, acts
+        if self._answers is None:
+            self._answers = direct(answers, arguments)
+        self._answers(*arguments)
+        return acts
+
+    def _with_crowd(self, obs: Floats) -> Floats:
+        """Return what the first layer sees: people as a set are described as one."""
+        if not self._crowd:
+            return obs
+        blocks = obs[:, CROWD.first :].reshape(-1, CROWD.n_people, CROWD.n_block)
+        found = _hidden(blocks, self._crowd) * blocks[:, :, :1]
+        return np.concatenate([obs[:, : CROWD.first], found.max(axis=1)], axis=1)
+
+
+def _hidden(rows: Floats, layers: tuple[Layer, ...]) -> Floats:
+    """Return what rectified layers make of rows, whose last axis they see."""
+    for weight, bias in layers:
+        rows = rows @ weight
+        rows += bias
+        np.maximum(rows, 0.0, out=rows)
+    return rows
+
+
+def _named(preset: Mapping[str, Any], field: str, choices: tuple[str, ...]) -> str:
+    """Return a choice that a manifest's preset names."""
+    value = preset.get(field)
+    if value not in choices:
+        raise InvalidInput(f"manifest.preset.{field}", value, "must be a known rule", choices)
+    return str(value)
+
+
+def _n_halton(preset: Mapping[str, Any]) -> int:
+    """Return the number of points of the Halton set that a manifest's preset names."""
+    n = preset.get("n_halton", N_HALTON)
+    if not isinstance(n, int) or not 1 <= n <= MOST_HALTON:
+        rule = f"must be a number in [1, {MOST_HALTON}]"
+        raise InvalidInput("manifest.preset.n_halton", n, rule)
+    return n
+
+
+def _layers_of(
+    arrays: Mapping[str, NDArray[Any]], name: str, n_in: int, n_out: int
+) -> tuple[Layer, ...]:
+    """Return weights, shape (n_in, n_out), and biases of a network, layer by layer.
+
+    Args:
+        arrays: Tensors of a checkpoint.
+        name: What the names of its tensors start with.
+        n_in: Numbers it sees.
+        n_out: Numbers it says.
+
+    Raises:
+        CheckpointMismatch: The tensors do not make such a network.
+    """
+    layers: list[Layer] = []
+    for number in range(MAX_LAYERS):
+        weight = arrays.get(f"{name}.{2 * number}.weight")
+        bias = arrays.get(f"{name}.{2 * number}.bias")
+        if weight is None or bias is None:
+            break
+        if weight.ndim != 2 or weight.shape[1] != n_in or bias.shape != weight.shape[:1]:
+            found = f"{list(weight.shape)} and {list(bias.shape)}"
+            field = f"tensors.{name}.{2 * number}"
+            raise CheckpointMismatch(field, f"[n, {n_in}] and [n]", found)
+        n_in = len(bias)
+        rows = np.ascontiguousarray(weight.T, dtype=np.float32)
+        layers.append((rows, bias.astype(np.float32)))
+    if not layers or n_in != n_out:
+        raise CheckpointMismatch("tensors", f"{name} of {n_out} numbers", "none such")
+    return tuple(layers)

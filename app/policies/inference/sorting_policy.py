@@ -1,0 +1,94 @@
+"""A trained sorting network, for inference.
+
+Source: METHOD 1.4; the tensors are data, see ``checkpoint.py``.
+"""
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from app.errors import CheckpointMismatch, InvalidInput
+from app.policies.checkpoints.checkpoint import (
+    SORTING,
+    Checkpoint,
+    expect_layout,
+    purpose_of,
+    require_purpose,
+)
+from app.policies.checkpoints.model_state import under
+from app.policies.checkpoints.trained_cell import cell_of
+from app.policies.networks.sorting_q import NETWORKS, layout_of
+from app.sim.sorting.batch import Obs, shape_of
+from app.sim.sorting.state import SortingShape
+
+
+def is_sorting(checkpoint: Checkpoint) -> bool:
+    """Tell whether a checkpoint sorts."""
+    return purpose_of(checkpoint.manifest) == SORTING
+
+
+class SortingPolicy:
+    """Values the moves of the sorting task; safe to call from several threads.
+
+    Args:
+        checkpoint: A ``policy`` checkpoint of a sorting preset.
+
+    Raises:
+        CheckpointMismatch: It is for another task, network or layout.
+    """
+
+    def __init__(self, checkpoint: Checkpoint) -> None:
+        require_purpose(checkpoint, SORTING)
+        kind = str(checkpoint.manifest["preset"].get("network"))
+        if kind not in NETWORKS:
+            raise CheckpointMismatch("preset.network", sorted(NETWORKS), kind)
+        cell = cell_of(checkpoint.manifest)
+        self._checkpoint, self._cell = checkpoint, (cell.name, cell.sha256)
+        self.shape: SortingShape = shape_of(cell)
+        """Size of the tasks it knows."""
+        expect_layout(checkpoint, layout_of(self.shape), self.shape.n_actions)
+        manifest = checkpoint.manifest
+        self._network = NETWORKS[kind](self.shape, int(manifest["width"]))
+        try:
+            self._network.load_state_dict(under(checkpoint.arrays(), "q"))
+        except RuntimeError as error:
+            raise CheckpointMismatch("tensors", "those of q", str(error)) from error
+        self._network.eval()
+
+    @property
+    def checkpoint(self) -> str:
+        """SHA-256 of the checkpoint."""
+        return self._checkpoint.sha256
+
+    @property
+    def title(self) -> str:
+        """Short text for people."""
+        manifest = self._checkpoint.manifest
+        name = manifest["preset"].get("name", "policy")
+        return f"{name}, {manifest['step'] / 1e6:.2f} M steps"
+
+    @property
+    def cell(self) -> str:
+        """Name of the work cell it was trained for."""
+        return self._cell[0]
+
+    @property
+    def cell_sha256(self) -> str:
+        """Identity of that cell's content."""
+        return self._cell[1]
+
+    def values(self, obs: Obs) -> NDArray[np.float32]:
+        """Return the values of all moves, shape (n, n_actions).
+
+        Args:
+            obs: Observations as ``sorting.observe`` makes them, shape (n, obs_size).
+
+        Raises:
+            InvalidInput: They have another shape.
+        """
+        if obs.ndim != 2 or obs.shape[1] != self.shape.obs_size:
+            wanted = ["n", self.shape.obs_size]
+            raise InvalidInput("obs", list(obs.shape), f"must have the shape {wanted}")
+        with torch.inference_mode():
+            found: NDArray[np.float32] = self._network(torch.as_tensor(obs)).numpy()
+        return found

@@ -1,0 +1,72 @@
+"""Actions for goals between training targets: the weighted mean of those for targets around.
+
+Trilinear among the eight corners of a grid's cell (METHOD 2.4), barycentric among the four of
+a Halton set's tetrahedron. At a target it is the policy's own action.
+
+Source: (4.29); Halton, the outlook of thesis 4.5.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.errors import InvalidInput
+from app.sim.core.arrays import Vec
+from app.sim.reach.goal_sets import GoalCells, GoalMix, cells_of
+from app.sim.reach.reach_actor import ReachActor
+
+INTERPOLATING = ("grid", "halton")
+"""Rules of goals that leave targets to interpolate between."""
+
+
+def interpolates(actor: ReachActor) -> bool:
+    """Whether a policy has training targets to interpolate between."""
+    return actor.targets is not None and actor.goals in INTERPOLATING
+
+
+class Interpolation:
+    """A policy between its training targets.
+
+    Args:
+        actor: A policy trained on a grid or a Halton set.
+
+    Raises:
+        InvalidInput: It was trained on a continuous set of goals.
+    """
+
+    def __init__(self, actor: ReachActor) -> None:
+        if actor.targets is None or actor.goals not in INTERPOLATING:
+            rule = "of its training leaves no targets to interpolate between"
+            raise InvalidInput("goals", actor.goals, rule, INTERPOLATING)
+        self.actor = actor
+        """The policy."""
+        self.cells: GoalCells = cells_of(actor.targets, actor.goals)
+        """The cells between its targets."""
+
+    def around(self, goals: Vec, field: str = "goal") -> tuple[GoalMix, Vec]:
+        """Return the targets around goals, with weights and positions.
+
+        Args:
+            goals: [m], shape (n, 3).
+            field: What messages call a goal.
+
+        Returns:
+            Numbers and weights, shape (n, K), and positions [m], shape (n, K, 3).
+
+        Raises:
+            GoalOutside: A goal lies outside the targets.
+        """
+        mix = self.cells.mix(goals, field)
+        return mix, self.cells.targets[mix.which]
+
+    def acts(self, obs: NDArray[np.float32], mix: GoalMix) -> NDArray[np.float32]:
+        """Return the mean actions, shape (n, 6); targets without weight are not asked for.
+
+        Args:
+            obs: What is observed for each target, shape (n, K, obs_size).
+            mix: Their weights.
+        """
+        used = mix.weights > 0.0
+        act = np.zeros((*used.shape, 6))
+        act[used] = self.actor.acts(obs[used])
+        mean: NDArray[np.float32] = (mix.weights[..., None] * act).sum(axis=1, dtype=np.float64)
+        return mean.astype(np.float32)

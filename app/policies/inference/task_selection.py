@@ -1,0 +1,309 @@
+"""The critic's choice among geometric tasks (METHOD 3.1).
+
+``R_i = Q(s_i, pi(s_i))`` for every candidate, the smaller of both critics, and the best one is
+taken; with hysteresis the previous choice is kept unless another is better by a margin, so that
+the robot does not dither. The same object decides for the HTTP route and the live cell, and the
+evaluations use the same networks and values.
+
+Source: thesis eq. (5.1)-(5.7). Deviates: hysteresis is ours; 0 gives the source's rule.
+"""
+
+import time
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from app.errors import CheckpointMismatch, InvalidInput
+from app.policies.checkpoints.checkpoint import Checkpoint, expect_layout
+from app.policies.checkpoints.trained_cell import cell_of
+from app.policies.configs.pick import action_of
+from app.policies.networks.actor_critic import Critics, ResidualActor
+from app.policies.training.pick import LAYOUTS
+from app.sim.cells.cell import Cell, require_cell
+from app.sim.core.arrays import Vec
+from app.sim.core.out_of_range import OutsideField
+from app.sim.human import model as human
+from app.sim.human.person import Person
+from app.sim.perception.observed_people import (
+    as_known,
+    checked_people,
+    checked_vector,
+    is_far,
+    nearest_index,
+)
+from app.sim.pick.batch import observe, step_robot
+from app.sim.pick.task_policy import Candidate, Decision
+from app.sim.robot import ur10 as robot
+from app.sim.robot.actions import ActionSettings
+from app.sim.robot.kernels.arm import CONTROLLED
+from app.sim.robot.measured_state import StateLimits
+from app.sim.scene.scene import FAR_AWAY, arm_of, people_of
+
+HYSTERESIS = 0.2
+"""By how much another candidate's value must be better before the choice changes."""
+LONGEST_S = 60.0
+"""Most time left that the policy sees [s]."""
+MAX_CANDIDATES = 1000
+"""Most candidates taken at once."""
+
+_NOBODY = Person(q=human.rest_posture(*FAR_AWAY), qd=np.zeros(18))
+"""Who is seen where nobody is."""
+
+
+class ValueNetworks:
+    """Actor and critics of a checkpoint, for inference.
+
+    Args:
+        checkpoint: A ``policy`` checkpoint.
+
+    Raises:
+        CheckpointMismatch: It was trained on another layout of observations or actions.
+    """
+
+    def __init__(self, checkpoint: Checkpoint) -> None:
+        kind = checkpoint.manifest["preset"].get("observation", "features")
+        expect_layout(checkpoint, LAYOUTS.get(kind, LAYOUTS["features"]), CONTROLLED)
+        width = int(checkpoint.manifest["width"])
+        self.n_obs = sum(size for _, size in checkpoint.manifest["layout"])
+        """Length of the observations."""
+        self.actor = ResidualActor(width, self.n_obs)
+        self.critic = Critics(width, self.n_obs)
+        arrays = checkpoint.arrays()
+        for name, module in (("actor", self.actor), ("critic", self.critic)):
+            start = f"{name}."
+            tensors = {
+                key.removeprefix(start): torch.as_tensor(value)
+                for key, value in arrays.items()
+                if key.startswith(start)
+            }
+            try:
+                module.load_state_dict(tensors)
+            except RuntimeError as error:
+                raise CheckpointMismatch("tensors", f"those of {name}", str(error)) from error
+            module.eval()
+
+    def act_and_value(
+        self, obs: NDArray[np.float32]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Return actions, shape (n, 5), and values, shape (n,), of observations."""
+        with torch.inference_mode():
+            rows = torch.as_tensor(obs)
+            act = self.actor(rows)
+            return act.numpy(), self.critic.least(rows, act).numpy()
+
+
+def choose(values: NDArray[np.floating], previous: int | None, hysteresis: float) -> int:
+    """Return the index of the chosen candidate.
+
+    Args:
+        values: Value of each candidate, shape (n,).
+        previous: Index chosen last; None chooses afresh.
+        hysteresis: Margin by which another must be better.
+    """
+    best = int(np.argmax(values))
+    if previous is None or values[best] > values[previous] + hysteresis:
+        return best
+    return previous
+
+
+class TaskChooser:
+    """A :class:`~app.sim.ports.TaskPolicy` made of one checkpoint.
+
+    Args:
+        checkpoint: A ``policy`` checkpoint.
+        cell: The work cell it shall decide in; by default the one it was trained in.
+        hysteresis: Margin before the choice changes.
+
+    Raises:
+        CheckpointMismatch: The checkpoint is for another cell or layout.
+    """
+
+    def __init__(
+        self, checkpoint: Checkpoint, cell: Cell | None = None, hysteresis: float = HYSTERESIS
+    ) -> None:
+        self._cell = cell_of(checkpoint.manifest)
+        if cell is not None:
+            require_cell(cell, self._cell.name, self._cell.sha256)
+        self._cell_sha256 = self._cell.sha256
+        self._checkpoint, self._hysteresis = checkpoint, hysteresis
+        self._networks = ValueNetworks(checkpoint)
+        self._arm, self._people = arm_of(self._cell), people_of(self._cell)
+        self._limits, self._ranges = (
+            StateLimits(self._arm, limits_jerk=False),
+            _TrainedRanges(checkpoint),
+        )
+
+    @property
+    def checkpoint(self) -> str:
+        """SHA-256 of the checkpoint."""
+        return self._checkpoint.sha256
+
+    @property
+    def action(self) -> ActionSettings:
+        """What its actions mean (METHOD 2.2)."""
+        return action_of(self._checkpoint.manifest["preset"])
+
+    @property
+    def title(self) -> str:
+        """Short text for people."""
+        manifest = self._checkpoint.manifest
+        return (
+            f"{manifest['preset'].get('name', 'policy')}, {manifest['step'] / 1e6:.2f} M steps"
+        )
+
+    @property
+    def cell(self) -> str:
+        """Name of the work cell it was trained for."""
+        return self._cell.name
+
+    @property
+    def cell_sha256(self) -> str:
+        """Identity of that cell's content."""
+        return self._cell_sha256
+
+    def decide(
+        self,
+        q: Vec,
+        qd: Vec,
+        people: Sequence[Person],
+        candidates: Sequence[Candidate],
+        *,
+        previous: str | None = None,
+        time_left_s: float = 10.0,
+    ) -> Decision:
+        """Choose one candidate; see :class:`~app.sim.ports.TaskPolicy`.
+
+        The checkpoint knows one person: it sees the one nearest to the robot, in the person's
+        own size (``seen_people.py``). The others count for nothing in this choice, and nor
+        does anybody who is farther away than policies know people to be.
+        """
+        started = time.perf_counter()
+        robot_state = self._limits.take(q, qd)
+        q, qd, _ = robot_state.clamped
+        seen, person = self._nearest(robot_state.measured.q, people)
+        ids, goals = _check_candidates(candidates)
+        if not np.isfinite(time_left_s):
+            raise InvalidInput("time_left_s", time_left_s, "must be finite [s]")
+        time_left_s = min(LONGEST_S, max(0.0, time_left_s))
+        obs, reachable = observe(
+            self._arm,
+            self._people,
+            q,
+            qd,
+            person.q,
+            person.qd,
+            goals,
+            time_left_s,
+            person.size,
+            self._networks.n_obs,
+        )
+        act, values = self._networks.act_and_value(obs)
+        last = ids.index(previous) if previous in ids else None
+        index = choose(values, last, self._hysteresis)
+        qd_target = self._speeds(q, qd, act)
+        return Decision(
+            chosen=ids[index],
+            index=index,
+            values=tuple(float(value) for value in values),
+            actions=act,
+            qd_target=qd_target,
+            reachable=tuple(bool(flag) for flag in reachable),
+            outside=robot_state.outside + self._ranges.of_state(q, qd, person, seen),
+            outside_candidates=tuple(self._ranges.of_goal(goal) for goal in goals),
+            checkpoint=self.checkpoint,
+            elapsed_ms=1e3 * (time.perf_counter() - started),
+            seen=seen,
+        )
+
+    def _speeds(self, q: Vec, qd: Vec, act: NDArray[np.float32]) -> Vec:
+        """Return the joint speeds that actions, shape (n, 5), ask for [rad/s], shape (n, 6)."""
+        if self.action.meaning == "coefficient":
+            pieces = (
+                step_robot(self._arm, q, qd, np.zeros(6), row, self.action) for row in act
+            )
+            return np.stack([piece.qd for piece in pieces])
+        speeds = np.zeros((len(act), 6))
+        speeds[:, :CONTROLLED] = act * self._arm.qd_max[:CONTROLLED]
+        return speeds
+
+    def _nearest(self, q: Vec, people: Sequence[Person]) -> tuple[int | None, Person]:
+        """Return which person is seen, as policies know people; nobody where all are far."""
+        known = checked_people(people)
+        near = [i for i, person in enumerate(known) if not is_far(person)]
+        found = nearest_index(self._arm, self._people, q, [known[i] for i in near])
+        if found is None:
+            return None, _NOBODY
+        return near[found], as_known(known[near[found]])
+
+
+class _TrainedRanges:
+    """What a checkpoint met in training, to flag what lies outside."""
+
+    SLACK = 0.02
+    """Values this far outside [m, rad or per second] are not flagged."""
+
+    def __init__(self, checkpoint: Checkpoint) -> None:
+        ranges = checkpoint.manifest["trained_range"]
+        self._met_nobody = checkpoint.manifest["preset"].get("human_absent", 0.0) > 0.0
+        self._low = {name: np.array(entry["low"]) for name, entry in ranges.items()}
+        self._high = {name: np.array(entry["high"]) for name, entry in ranges.items()}
+
+    def of_state(
+        self, q: Vec, qd: Vec, person: Person, index: int | None
+    ) -> tuple[OutsideField, ...]:
+        path = f"people[{index or 0}]"
+        alone = (
+            *self._outside("q", q, "robot.q", robot.JOINT_NAMES),
+            *self._outside("qd", qd, "robot.qd", robot.JOINT_NAMES),
+        )
+        if index is None and self._met_nobody:
+            return alone
+        return (
+            *alone,
+            *self._outside("human_q", person.q, f"{path}.q", human.JOINT_NAMES),
+            *self._outside("human_qd", person.qd, f"{path}.qd", human.JOINT_NAMES),
+        )
+
+    def of_goal(self, goal: Vec) -> tuple[OutsideField, ...]:
+        return self._outside("goal", goal, "position", ("x", "y", "z"))
+
+    def _outside(
+        self, key: str, values: Vec, path: str, names: Sequence[str]
+    ) -> tuple[OutsideField, ...]:
+        if key not in self._low or len(self._low[key]) != len(values):
+            return ()
+        low, high = self._low[key], self._high[key]
+        beyond = (values < low - self.SLACK) | (values > high + self.SLACK)
+        return tuple(
+            OutsideField(
+                field=f"{path}.{names[i]}",
+                value=float(values[i]),
+                low=float(low[i]),
+                high=float(high[i]),
+            )
+            for i in np.flatnonzero(beyond).tolist()
+        )
+
+
+def _check_candidates(candidates: Sequence[Candidate]) -> tuple[list[str], Vec]:
+    n = len(candidates)
+    if not 1 <= n <= MAX_CANDIDATES:
+        raise InvalidInput("candidates", n, f"must be 1 to {MAX_CANDIDATES} of them")
+    limit = np.full(3, 10.0)
+    goals = np.array(
+        [
+            checked_vector(
+                f"candidates[{i}].position", candidate.position, 3, -limit, limit, "m"
+            )
+            for i, candidate in enumerate(candidates)
+        ]
+    )
+    ids = [candidate.id for candidate in candidates]
+    seen: set[str] = set()
+    for i, name in enumerate(ids):
+        if name in seen:
+            raise InvalidInput(f"candidates[{i}].id", name, "must be given once")
+        seen.add(name)
+    return ids, goals

@@ -1,0 +1,114 @@
+"""A linear layer over one-hot codes, without the zeros: compiled, with its gradient.
+
+A row of ``P`` codes in ``0 .. n_codes - 1``, each written as a one-hot vector, times a matrix
+is the sum of ``P`` of the matrix's rows. Code 0 stands for a free place and is by far the most
+frequent one, so the sum starts from all places free and changes only what is not::
+
+    y = sum_p W[p, 0] + sum_{p: code_p > 0} (W[p, code_p] - W[p, 0])
+
+The function and its weights are those of the plain product, rounded otherwise.
+"""
+
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+
+from app.sim.core.jit import kernel
+
+Floats = NDArray[np.float32]
+Codes = NDArray[np.uint8]
+
+
+@kernel(nogil=True, fastmath=True)
+def sum_rows(codes: Codes, n_codes: int, weight: Floats, out: Floats) -> None:
+    """Add to each row of ``out`` what its codes change against free places.
+
+    Args:
+        codes: Shape (n, P).
+        n_codes: Codes a place may have.
+        weight: One row per place and code, shape (P * n_codes, width).
+        out: Changed, shape (n, width).
+    """
+    for i in range(codes.shape[0]):
+        for p in range(codes.shape[1]):
+            if codes[i, p] != 0:
+                free = p * n_codes
+                there = free + codes[i, p]
+                for j in range(out.shape[1]):
+                    out[i, j] += weight[there, j] - weight[free, j]
+
+
+@kernel(nogil=True, fastmath=True)
+def add_gradient(codes: Codes, n_codes: int, above: Floats, total: Floats, out: Floats) -> None:
+    """Write the gradient of :func:`sum_rows`' result with respect to the matrix.
+
+    Args:
+        codes: Shape (n, P).
+        n_codes: Codes a place may have.
+        above: Gradient with respect to the result, shape (n, width).
+        total: Its sum over rows, shape (width,).
+        out: Filled, shape (P * n_codes, width).
+    """
+    for p in range(codes.shape[1]):
+        for k in range(p * n_codes, (p + 1) * n_codes):
+            for j in range(out.shape[1]):
+                out[k, j] = total[j] if k == p * n_codes else 0.0
+    for i in range(codes.shape[0]):
+        for p in range(codes.shape[1]):
+            if codes[i, p] != 0:
+                free = p * n_codes
+                there = free + codes[i, p]
+                for j in range(out.shape[1]):
+                    out[there, j] += above[i, j]
+                    out[free, j] -= above[i, j]
+
+
+class _Product(torch.autograd.Function):
+    """``one_hot(codes) @ weight``."""
+
+    @staticmethod
+    def forward(ctx: Any, codes: Tensor, n_codes: int, weight: Tensor) -> Tensor:
+        ctx.save_for_backward(codes)
+        ctx.n_codes = n_codes
+        out = weight[::n_codes].sum(dim=0).expand(len(codes), -1).contiguous()
+        sum_rows(codes.numpy(), n_codes, weight.detach().numpy(), out.numpy())
+        return out
+
+    @staticmethod
+    def backward(ctx: Any, *above: Tensor) -> tuple[None, None, Tensor]:
+        (codes,) = ctx.saved_tensors
+        given = above[0].contiguous()
+        out = given.new_empty((codes.shape[1] * ctx.n_codes, given.shape[1]))
+        add_gradient(
+            codes.numpy(), ctx.n_codes, given.numpy(), given.sum(dim=0).numpy(), out.numpy()
+        )
+        return None, None, out
+
+
+class OneHotLinear(nn.Module):
+    """Maps codes, and plain numbers beside them, linearly.
+
+    Args:
+        n_places: Codes of a row, P.
+        n_codes: Codes a place may have; 0 is a free place.
+        n_plain: Plain numbers of a row.
+        width: Units.
+    """
+
+    def __init__(self, n_places: int, n_codes: int, n_plain: int, width: int) -> None:
+        super().__init__()
+        like = nn.Linear(n_places * n_codes + n_plain, width)
+        self.n_codes = n_codes
+        self.weight = nn.Parameter(like.weight.detach()[:, :-n_plain].t().contiguous())
+        """One row per place and code, (P * n_codes, width)."""
+        self.plain = nn.Parameter(like.weight.detach()[:, -n_plain:].t().contiguous())
+        """One row per plain number, (n_plain, width)."""
+        self.bias = nn.Parameter(like.bias.detach())
+
+    def forward(self, codes: Tensor, plain: Tensor) -> Tensor:
+        """Return (B, width) for codes, uint8, (B, P), and plain numbers, (B, n_plain)."""
+        summed: Tensor = _Product.apply(codes, self.n_codes, self.weight)  # type: ignore[no-untyped-call]
+        return summed + torch.addmm(self.bias, plain, self.plain)

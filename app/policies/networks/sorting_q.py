@@ -1,0 +1,238 @@
+"""Networks that value the moves of the sorting task.
+
+:class:`SharedNetwork` is ours. It looks at every tower with the same weights, at colours
+counted from that tower's own, and only at what is left to do: what must come off (from the top
+down) and what must go on (from the next level up). A pick fails and leaves everything as it
+was, so the true value of a pick is linear in the failure probability of its cell; the network
+says value and slope per type and tower, and never prefers the riskier of two twins.
+
+:class:`PrintedNetwork` is the source's: one-hot numbers through two layers of 128 (table 3.1).
+
+Both are dueling: ``Q = V + A - mean A``; ours takes the mean over the moves that are valid and
+puts all others out of the question, in exploration, targets and prediction alike.
+
+Source: METHOD 1.4; Wang et al., *Dueling network architectures* (2016).
+"""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from app.policies.networks.one_hot import OneHotLinear
+from app.sim.sorting.kernels.task import FAILURE_SCALE
+from app.sim.sorting.state import SortingShape
+
+NEVER = -1e9
+"""Value of a move that changes nothing."""
+BACK_SLOPE = 0.3
+"""By how much a free cell that fails always can be worth more or less than one that never does:
+an object put there costs more attempts to fetch, if it is fetched at all."""
+WINDOW = 4
+"""Objects of a tower, on and over the seam of what is in place, that are seen one by one."""
+
+
+def layout_of(shape: SortingShape) -> list[list[Any]]:
+    """Return names and sizes of the groups of an observation."""
+    k, c = shape.n_cells, shape.n_colours
+    return [["clutter", k], ["towers", c * k], ["goal", c * k], ["fail", k]]
+
+
+class SortingView(nn.Module):
+    """Takes observations apart: cells, towers, goal and failure probabilities.
+
+    Args:
+        shape: Size of the task.
+    """
+
+    def __init__(self, shape: SortingShape) -> None:
+        super().__init__()
+        self.shape = shape
+
+    def forward(self, obs: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """Return clutter (B, K), towers (B, C, K), goal (B, C, K) and probabilities (B, K)."""
+        k, c = self.shape.n_cells, self.shape.n_colours
+        clutter, towers, goal, fail = torch.split(obs, [k, c * k, c * k, k], dim=1)
+        return (
+            clutter.long(),
+            towers.long().view(-1, c, k),
+            goal.long().view(-1, c, k),
+            fail.float() / FAILURE_SCALE,
+        )
+
+
+def valid_moves(clutter: Tensor, towers: Tensor) -> Tensor:
+    """Return which moves change something, (B, n_actions), as ``sorting.valid_moves``."""
+    n, n_towers, k = towers.shape
+    there, tops = clutter > 0, (towers > 0).any(dim=2)
+    own = torch.eye(n_towers, dtype=torch.bool, device=towers.device)
+    place = there[:, :, None].expand(n, k, n_towers)
+    back = tops[:, :, None] & ~there[:, None, :]
+    across = tops[:, :, None] & ~own
+    return torch.cat([place.flatten(1), back.flatten(1), across.flatten(1)], dim=1)
+
+
+def dueling(value: Tensor, advantage: Tensor, valid: Tensor) -> Tensor:
+    """Return ``V + A - mean A``, the mean taken over valid moves."""
+    share = valid.float() / valid.sum(dim=1, keepdim=True).clamp(min=1)
+    return value + advantage - (advantage * share).sum(dim=1, keepdim=True)
+
+
+class SharedNetwork(nn.Module):
+    """Values of all moves, with one set of weights for all towers.
+
+    Args:
+        shape: Size of the task.
+        width: Width of the hidden layers.
+    """
+
+    relative: Tensor
+    """Codes as each tower counts colours, (C, n_types + 1)."""
+    absolute: Tensor
+    """The way back, (C, n_types + 1)."""
+
+    def __init__(self, shape: SortingShape, width: int) -> None:
+        super().__init__()
+        self.shape, self.view = shape, SortingView(shape)
+        n_colours, n_types = shape.n_colours, shape.n_types
+        codes = n_types + 1
+        relative = _relative_codes(shape)
+        self.register_buffer("relative", relative, persistent=False)
+        self.register_buffer("absolute", relative.argsort(dim=1), persistent=False)
+        n_in = 2 * WINDOW * codes + 4 * codes + 4
+        self.tower = nn.Sequential(
+            nn.Linear(n_in, width), nn.ReLU(), nn.Linear(width, width), nn.ReLU()
+        )
+        self.joint = nn.Sequential(nn.Linear(n_colours * width, width), nn.ReLU())
+        self.head = nn.Linear(width, 2 * n_types + 2 + n_colours)
+        self.value = nn.Linear(width, 1)
+
+    def forward(self, obs: Tensor) -> Tensor:
+        """Return the values of all moves, NEVER where nothing changes, (B, n_actions)."""
+        clutter, towers, goal, fail = self.view(obs)
+        n, n_towers, _ = towers.shape
+        seen = self.tower(self._features(clutter, towers, goal, fail))
+        # Every tower sees itself first, then the others in order of their colours.
+        order = torch.arange(n_towers, device=obs.device)
+        order = (order[:, None] + order[None, :]) % n_towers
+        joint = self.joint(seen[:, order].flatten(2))
+        valid = valid_moves(clutter, towers)
+        advantage = self._advantages(self.head(joint), clutter, towers, fail)
+        value = self.value(joint).mean(dim=1)
+        return dueling(value, advantage, valid).masked_fill(~valid, NEVER)
+
+    def _features(self, clutter: Tensor, towers: Tensor, goal: Tensor, fail: Tensor) -> Tensor:
+        """Return what every tower sees, (B, C, n_in)."""
+        n, n_towers, k = towers.shape
+        codes, levels = self.shape.n_types + 1, torch.arange(k, device=towers.device)
+        rel_tower = self.relative[torch.arange(n_towers)[None, :, None], towers]
+        rel_goal = self.relative[torch.arange(n_towers)[None, :, None], goal]
+        height, wanted = (towers > 0).sum(dim=2), (goal > 0).sum(dim=2)
+        same = (towers == goal).long().cumprod(dim=2).sum(dim=2)
+        seam = torch.minimum(same, torch.minimum(height, wanted))
+        junk = rel_tower * (levels >= seam[:, :, None])
+        needed = rel_goal * (levels >= seam[:, :, None])
+        steps = levels[:WINDOW] if k >= WINDOW else torch.arange(WINDOW, device=towers.device)
+        up = (seam[:, :, None] + steps).clamp(max=k - 1)
+        fits = seam[:, :, None] + steps < k
+        down = height[:, :, None] - 1 - steps
+        next_needed = needed.gather(2, up) * fits
+        next_junk = junk.gather(2, down.clamp(min=0)) * (down >= 0)
+        counts = clutter.new_zeros((n, codes), dtype=torch.float32)
+        counts.scatter_add_(1, clutter, torch.ones_like(fail))
+        safest = torch.ones_like(counts).scatter_reduce_(1, clutter, fail, "amin")
+        absolute = self.absolute.expand(n, -1, -1)
+        parts = [
+            functional.one_hot(next_needed, codes).flatten(2).float(),
+            functional.one_hot(next_junk, codes).flatten(2).float(),
+            _histogram(needed, codes),
+            _histogram(junk, codes),
+            counts[:, None].expand(-1, n_towers, -1).gather(2, absolute) / 2.0,
+            safest[:, None].expand(-1, n_towers, -1).gather(2, absolute),
+            (height - seam)[:, :, None] / 4.0,
+            (wanted - seam)[:, :, None] / 4.0,
+            (height == seam)[:, :, None].float(),
+            (wanted == seam)[:, :, None].float(),
+        ]
+        return torch.cat(parts, dim=2)
+
+    def _advantages(self, out: Tensor, clutter: Tensor, towers: Tensor, fail: Tensor) -> Tensor:
+        """Turn what the towers say, (B, C, outputs), into advantages of all moves.
+
+        A tower's gain from an object is one number, wherever the object comes from; one that
+        comes from another tower cannot fail, and what that tower gains by it is added.
+        """
+        n, n_towers, _ = out.shape
+        n_types = self.shape.n_types
+        gain, slope, back, across = torch.split(out, [n_types, n_types, 2, n_towers], dim=2)
+        # (B, K, C): relative type of each cell's object, as each tower counts colours.
+        kind = (self.relative.T[clutter] - 1).clamp(min=0)
+        per_cell = kind.transpose(1, 2)
+        risk = functional.softplus(slope).gather(2, per_cell) * fail[:, None]
+        place = (gain.gather(2, per_cell) - risk).transpose(1, 2)
+        preference = BACK_SLOPE * torch.tanh(back[:, :, 1:])
+        free = back[:, :, :1] + preference * fail[:, None]
+        # Column j of a tower is the tower j colours further.
+        order = torch.arange(n_towers, device=out.device)
+        order = (order[None, :] - order[:, None]) % n_towers
+        over = across.gather(2, order.expand(n, -1, -1))
+        # (B, C from, C to): relative type of each top, as the tower it goes to counts colours.
+        top = towers.gather(2, ((towers > 0).sum(dim=2, keepdim=True) - 1).clamp(min=0))
+        top_kind = (self.relative.T[top.squeeze(2)] - 1).clamp(min=0)
+        over = over + gain.gather(2, top_kind.transpose(1, 2)).transpose(1, 2)
+        return torch.cat([place.flatten(1), free.flatten(1), over.flatten(1)], dim=1)
+
+
+class PrintedNetwork(nn.Module):
+    """Two layers of the same width over one-hot numbers, as table 3.1 prints it.
+
+    Args:
+        shape: Size of the task.
+        width: Width of the hidden layers.
+    """
+
+    def __init__(self, shape: SortingShape, width: int) -> None:
+        super().__init__()
+        self.shape = shape
+        self.n_places = shape.n_cells * (1 + 2 * shape.n_colours)
+        self.first = OneHotLinear(self.n_places, shape.n_types + 1, shape.n_cells, width)
+        self.second = nn.Linear(width, width)
+        self.advantage = nn.Linear(width, shape.n_actions)
+        self.value = nn.Linear(width, 1)
+
+    def forward(self, obs: Tensor) -> Tensor:
+        """Return the values of all moves, (B, n_actions); it knows nothing of valid ones."""
+        codes, fail = obs[:, : self.n_places], obs[:, self.n_places :].float() / FAILURE_SCALE
+        hidden = self.first(codes.to(torch.uint8).contiguous(), fail).relu()
+        hidden = self.second(hidden).relu()
+        advantage = self.advantage(hidden)
+        values: Tensor = self.value(hidden) + advantage - advantage.mean(dim=1, keepdim=True)
+        return values
+
+
+def _relative_codes(shape: SortingShape) -> Tensor:
+    """Return codes as each tower counts colours from its own, (C, n_types + 1)."""
+    rows = []
+    for tower in range(shape.n_colours):
+        turned = [
+            shape.code((shape.colour_of(code) - tower) % shape.n_colours, shape.size_of(code))
+            for code in range(1, shape.n_types + 1)
+        ]
+        rows.append([0, *turned])
+    return torch.tensor(rows)
+
+
+def _histogram(codes: Tensor, n: int) -> Tensor:
+    """Count codes along the last axis, halved; code 0 is free places and counts nothing."""
+    counts = codes.new_zeros((*codes.shape[:2], n), dtype=torch.float32)
+    counts.scatter_add_(2, codes, (codes > 0).float())
+    return counts / 2.0
+
+
+NETWORKS: Mapping[str, type[SharedNetwork] | type[PrintedNetwork]] = MappingProxyType(
+    {"shared": SharedNetwork, "printed": PrintedNetwork}
+)
+"""Networks by the name that presets give them."""

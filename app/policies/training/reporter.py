@@ -1,0 +1,111 @@
+"""What is done between two steps of a training: count, report, keep, stop."""
+
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import numpy as np
+from stable_baselines3.common.callbacks import BaseCallback
+
+from app.errors import SimulationError
+from app.policies.checkpoints.checkpoint import Checkpoint
+from app.policies.configs.presets import Preset
+from app.policies.training.progress import Progress
+
+
+class Run(Protocol):
+    """One attempt at a training."""
+
+    @property
+    def preset(self) -> Preset:
+        """All hyper-parameters."""
+
+    @property
+    def seed(self) -> int:
+        """Seed of everything random."""
+
+    @property
+    def step(self) -> int:
+        """Environment steps so far."""
+
+    @property
+    def updates(self) -> int:
+        """Updates so far."""
+
+    @property
+    def cpu_s(self) -> float:
+        """CPU time so far [s]."""
+
+    def checkpoints(self) -> tuple[Checkpoint, Checkpoint]:
+        """Return the policy and what resuming needs."""
+
+
+class Reporter(BaseCallback, ABC):
+    """Calls out on the grid of ``progress_steps``; scenarios say what they count.
+
+    Args:
+        run: The attempt.
+        on_progress: Takes the points of the curve.
+        on_checkpoint: Takes the step, the policy and what resuming needs.
+        should_stop: Asked after every step.
+    """
+
+    def __init__(
+        self,
+        run: Run,
+        on_progress: Callable[[Progress], None],
+        on_checkpoint: Callable[[int, Checkpoint, Checkpoint], None],
+        should_stop: Callable[[], bool],
+    ) -> None:
+        super().__init__()
+        self.stopped = False
+        """Whether the training was asked to stop before its end."""
+        self._attempt = run
+        self._on_progress, self._on_checkpoint = on_progress, on_checkpoint
+        self._should_stop = should_stop
+        self._begin_window()
+
+    @abstractmethod
+    def watch(self, rewards: Any) -> None:
+        """Look at the step that was just done; ``rewards`` are its rows', (n_envs,)."""
+
+    @abstractmethod
+    def rates(self) -> dict[str, Any]:
+        """Return episodes, success, collision, timeout and reward of the window; clear it."""
+
+    def _begin_window(self) -> None:
+        self._wall, self._window_step = time.monotonic(), self._attempt.step
+        self._window_updates = self._attempt.updates
+
+    def _on_step(self) -> bool:
+        rewards = np.asarray(self.locals["rewards"])
+        if not np.isfinite(rewards).all():
+            raise SimulationError(
+                f"non-finite reward at step {self.num_timesteps}, seed {self._attempt.seed}"
+            )
+        self.watch(rewards)
+        step, preset = self.num_timesteps, self._attempt.preset
+        if step % preset.progress_steps == 0:
+            self._on_progress(self._point(step))
+            self._begin_window()
+            if step % preset.checkpoint_steps == 0:
+                self._on_checkpoint(step, *self._attempt.checkpoints())
+        self.stopped = self._should_stop()
+        return not self.stopped
+
+    def _point(self, step: int) -> Progress:
+        wall = max(1e-6, time.monotonic() - self._wall)
+        speed = (step - self._window_step) / wall
+        total, updates = self._attempt.preset.total_steps, self._attempt.updates
+        has_rate = updates > self._window_updates or step >= total
+        return Progress(
+            step=step,
+            total_steps=total,
+            updates=updates,
+            updates_per_s=(updates - self._window_updates) / wall,
+            steps_per_s=speed,
+            time_left_s=(total - step) / speed if has_rate else None,
+            **self.rates(),
+            cpu_s=self._attempt.cpu_s,
+        )

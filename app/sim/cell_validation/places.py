@@ -1,0 +1,156 @@
+"""Where stations and people of a work cell stand: on the table, on an obstacle, on the floor.
+
+A part of ``cell_checks.py``.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+
+from app.errors import Fault
+from app.sim.cell_validation.units import shown
+from app.sim.cells.cell import Cell
+from app.sim.cells.parts import Obstacle, Station
+from app.sim.cells.people import Worker
+
+HIGHEST_PART = 0.4
+"""A part is gripped at most this far over the table or obstacle that carries it [m]."""
+FACING = 1.4
+"""Greatest angle between a worker's gaze at home and the direction to the table [rad]."""
+
+
+class Sound:
+    """The parts of a cell that no fault names, for checks that build on them."""
+
+    def __init__(self, cell: Cell, faults: list[Fault]) -> None:
+        named = [fault.place for fault in faults]
+
+        def fine(place: str) -> bool:
+            inside = (f"{place}.", f"{place}[")
+            return not any(one == place or one.startswith(inside) for one in named)
+
+        self.cell = cell
+        self.table, self.robot = fine("table"), fine("robot")
+        self.few = "stations" not in named and "obstacles" not in named
+        self.stations = tuple(s for s in cell.stations if fine(f"stations.{s.id}"))
+        self.obstacles = tuple(o for o in cell.obstacles if fine(f"obstacles.{o.id}"))
+        self.people = tuple(
+            (k, person) for k, person in enumerate(cell.people) if fine(f"people[{k}]")
+        )
+        self.goal_region = cell.goal_region if fine("goal_region") else None
+
+
+def _over(box: Obstacle, point: Sequence[float]) -> bool:
+    """Tell whether a point lies over or in the footprint of an obstacle."""
+    c, s = math.cos(box.yaw), math.sin(box.yaw)
+    x, y = point[0] - box.center[0], point[1] - box.center[1]
+    along, across = abs(c * x + s * y), abs(c * y - s * x)
+    return along <= box.half_size[0] and across <= box.half_size[1]
+
+
+def places(sound: Sound) -> Iterator[Fault]:
+    """Stations on the table or on an obstacle, in none; people off table and obstacles."""
+    for station in sound.stations:
+        place, value = f"stations.{station.id}.position", shown(station.position)
+        under = [box for box in sound.obstacles if _over(box, station.position)]
+        inside = [
+            box
+            for box in under
+            if any(_in_height(box, float(z)) for z in station.points()[:, 2])
+        ]
+        if inside:
+            rule = f"must not lie inside the obstacle {inside[0].id}"
+            yield Fault(place=place, value=value, rule=rule)
+        elif station.position[2] < 0.0:
+            yield Fault(
+                place=place, value=value, rule="must not lie below the table top, z = 0"
+            )
+        elif sound.table and not under and not _on_table(sound.cell, station.position):
+            yield Fault(
+                place=place,
+                value=value,
+                rule="must lie over the table or over an obstacle that carries it",
+                hint=_table_text(sound.cell),
+            )
+        elif sound.table and (hint := _hangs(sound.cell, station, under)):
+            rule = (
+                f"must be carried by the table or an obstacle at most {HIGHEST_PART:g} m below"
+            )
+            yield Fault(place=place, value=value, rule=rule, hint=hint)
+    region = sound.goal_region
+    if region is not None and region.center[2] - 0.5 * region.size[2] < 0.0:
+        rule = "must keep the whole region over the table top, z = 0"
+        yield Fault(place="goal_region.center", value=shown(region.center), rule=rule)
+    yield from _standing(sound)
+
+
+def _hangs(cell: Cell, station: Station, under: Sequence[Obstacle]) -> str:
+    """Return how far a station hangs in the air; empty where something carries it."""
+    z = station.position[2]
+    tops = [(box.center[2] + box.half_size[2], box.id) for box in under]
+    tops += [(0.0, "the table")] if _on_table(cell, station.position) else []
+    carrying = [one for one in tops if one[0] <= z]
+    if not carrying:
+        return f"{tops[0][1]} lies above it"
+    top, name = max(carrying)
+    return f"{name} ends {z - top:.3g} m below it" if z - top > HIGHEST_PART else ""
+
+
+def _in_height(box: Obstacle, z: float) -> bool:
+    """Tell whether a height lies between bottom and top of an obstacle."""
+    return abs(z - box.center[2]) < box.half_size[2]
+
+
+def _on_table(cell: Cell, position: tuple[float, float, float]) -> bool:
+    table, (x, y, _) = cell.table, position
+    return table.x_min <= x <= table.x_max and table.y_min <= y <= table.y_max
+
+
+def _table_text(cell: Cell) -> str:
+    t = cell.table
+    return f"the table is x in [{t.x_min:g}, {t.x_max:g}] m, y in [{t.y_min:g}, {t.y_max:g}] m"
+
+
+def _standing(sound: Sound) -> Iterator[Fault]:
+    """Workers stand beside the table; a cylinder stands for arms too and may cross it."""
+    table = sound.cell.table
+    for index, person in sound.people:
+        if not isinstance(person, Worker):
+            continue
+        place = f"people[{index}]"
+        apart = (
+            person.x_min >= table.x_max - 1e-9
+            or person.x_max <= table.x_min + 1e-9
+            or person.y_min >= table.y_max - 1e-9
+            or person.y_max <= table.y_min + 1e-9
+        )
+        if sound.table and not apart:
+            yield Fault(
+                place=f"{place}.y_min",
+                value=shown(person.y_min),
+                rule="must keep a worker's walking area off the table",
+                hint=_table_text(sound.cell),
+            )
+        if sound.table and apart:
+            yield from _facing(sound.cell, person, place)
+        for box in sound.obstacles:
+            on_floor = (
+                box.center[2] - box.half_size[2] < person.pelvis_height + sound.cell.floor_z
+            )
+            if on_floor and _over(box, person.home):
+                rule = f"must not lie inside the obstacle {box.id}"
+                yield Fault(place=f"{place}.home", value=shown(person.home), rule=rule)
+
+
+def _facing(cell: Cell, worker: Worker, place: str) -> Iterator[Fault]:
+    """A worker at home looks at the table, not away from it."""
+    table, (x, y, yaw) = cell.table, worker.home
+    to_x = min(table.x_max, max(table.x_min, x)) - x
+    to_y = min(table.y_max, max(table.y_min, y)) - y
+    toward = math.atan2(to_y, to_x)
+    if math.hypot(to_x, to_y) > 0.0 and abs(math.remainder(yaw - toward, math.tau)) > FACING:
+        yield Fault(
+            place=f"{place}.home[2]",
+            value=shown(yaw),
+            rule=f"must look at the table, at most {FACING:g} rad past it",
+            hint=f"the table is at {toward:.3g} rad",
+        )

@@ -1,0 +1,157 @@
+"""Whether the robot reaches a point of its cell, in a posture that touches nothing.
+
+Postures are tested on the robot's capsules, as the simulator has them: against each other
+(``shapes.SELF_PAIRS``), against the table's plane, which the simulator takes as endless, and
+against the fixed obstacles. Capsules and boxes meet in python-fcl, so that nothing is compiled.
+
+The tool points down where a station is reached (closed form, ``kernels.kinematics``); a goal of
+METHOD 2.3 may be reached in any posture (damped least squares on Pinocchio's Jacobian from
+several starts).
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.sim.cells.cell import Cell
+from app.sim.collision.fcl_reference import make_capsule, obstacle_box, place_capsule, touch
+from app.sim.core.arrays import Vec
+from app.sim.robot.capsules import load_robot_capsules, self_pairs
+from app.sim.robot.ur10 import Robot
+
+SHOULDER_LINK = 1
+"""Links up to this one (base, shoulder) stand on the table and never leave it."""
+LONGEST_REACH = 1.45
+"""No point of the robot is farther from its base than this, with a tool of 0.12 m [m]."""
+SHOULDER = np.array([0.0, 0.0, 0.1273])
+"""Centre of the reach [m]."""
+TOLERANCE = 1e-3
+"""Distance at which a target counts as reached [m]."""
+N_STARTS, N_STEPS = 16, 60
+DAMPING, LONGEST_STEP = 0.05, 0.4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Touching:
+    """Two things that touch."""
+
+    link: str
+    """Capsule of the robot."""
+    kind: str
+    """``self``, ``table`` or ``obstacle``."""
+    other: str
+    """The other capsule, ``table`` or the obstacle's id."""
+
+    @property
+    def text(self) -> str:
+        """What touches what, in words."""
+        link = self.link.replace("_", " ")
+        if self.kind == "obstacle":
+            return f"the robot's {link} touches the obstacle {self.other}"
+        other = "the table" if self.kind == "table" else f"its {self.other.replace('_', ' ')}"
+        return f"the robot's {link} touches {other}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reached:
+    """How an attempt to reach a point ended."""
+
+    q: Vec | None
+    """Joint positions [rad], shape (6,); None where no posture does it."""
+    reason: str = ""
+    """Why none does, in words."""
+
+
+class Reach:
+    """The robot of one cell, looking for postures; not thread-safe.
+
+    Args:
+        cell: A cell whose robot and obstacles are sound numbers.
+    """
+
+    def __init__(self, cell: Cell) -> None:
+        mount = cell.robot
+        self._robot = Robot(mount.tool_length)
+        self._capsules = load_robot_capsules(mount.tool_length, mount.tool_radius)
+        self._pairs = self_pairs(self._capsules).tolist()
+        ends = zip(self._capsules.p0, self._capsules.p1, self._capsules.radius, strict=True)
+        self._bodies = [make_capsule(float(radius), p0, p1) for p0, p1, radius in ends]
+        self._boxes = {one.id: obstacle_box(one) for one in cell.obstacles}
+        self._q_min, self._q_max = np.array(mount.q_min), np.array(mount.q_max)
+        self._home = np.array(mount.home_q)
+        self._longest = LONGEST_REACH + max(mount.tool_length - 0.12, 0.0)
+
+    def touching(self, q: Vec) -> Iterator[Touching]:
+        """Yield everything the robot touches at joint positions ``q`` [rad], shape (6,)."""
+        shapes, names = self._capsules, self._capsules.name
+        poses = self._robot.link_poses(np.asarray(q, dtype=np.float64))
+        for k, body in enumerate(self._bodies):
+            pose = poses[shapes.link[k]]
+            p0, p1 = (pose[:3, :3] @ end + pose[:3, 3] for end in (shapes.p0[k], shapes.p1[k]))
+            place_capsule(body, p0, p1)
+            low = min(p0[2], p1[2]) - shapes.radius[k]
+            if shapes.link[k] > SHOULDER_LINK and low <= 0.0:
+                yield Touching(link=names[k], kind="table", other="table")
+        for a, b in self._pairs:
+            if touch(self._bodies[a], self._bodies[b]):
+                yield Touching(link=names[b], kind="self", other=names[a])
+        for name, box in self._boxes.items():
+            for k, body in enumerate(self._bodies):
+                if touch(body, box):
+                    yield Touching(link=names[k], kind="obstacle", other=name)
+
+    def tool_down(self, point: Vec) -> Reached:
+        """Look for the posture with the tool pointing down at ``point`` [m], shape (3,)."""
+        q = self._robot.ik_vertical(point, self._q_min, self._q_max)
+        if q is None:
+            return Reached(q=None, reason=self._why_not(point))
+        for found in self.touching(q):
+            return Reached(q=None, reason=f"there {found.text}")
+        return Reached(q=q)
+
+    def _why_not(self, point: Vec) -> str:
+        far = float(np.hypot(point[0], point[1]))
+        loose = np.full(6, 2.0 * np.pi)
+        if self._robot.ik_vertical(point, -loose, loose) is not None:
+            return "the posture it takes is outside the joint limits"
+        side = "too far from" if far > 0.6 else "too near to"
+        return f"it lies {far:.2f} m from the robot's base, {side} it at that height"
+
+    def any_posture(self, point: Vec, seed: int = 0) -> Reached:
+        """Look for any posture with the tcp at ``point`` [m], shape (3,).
+
+        Args:
+            point: Where the tcp shall be [m].
+            seed: Seed of the starts of the search.
+        """
+        if np.linalg.norm(point - SHOULDER) > self._longest:
+            return Reached(q=None, reason="it is farther than the arm is long")
+        down = self.tool_down(point)
+        if down.q is not None:
+            return down
+        rng = np.random.default_rng(seed)
+        starts = [self._home, *rng.uniform(self._q_min, self._q_max, (N_STARTS, 6))]
+        reason = "no posture inside the joint limits was found"
+        for start in starts:
+            q = self._solve(point, start)
+            if q is None:
+                continue
+            found = next(self.touching(q), None)
+            if found is None:
+                return Reached(q=q)
+            reason = f"in every posture found it touches something: {found.text}"
+        return Reached(q=None, reason=reason)
+
+    def _solve(self, point: Vec, start: Vec) -> Vec | None:
+        """Go from ``start`` toward ``point`` by damped least squares; None where it fails."""
+        q = start.copy()
+        for _ in range(N_STEPS):
+            error = point - self._robot.tcp_pose(q)[:3, 3]
+            if np.linalg.norm(error) < TOLERANCE:
+                return q
+            slope = self._robot.jacobian(q)[:3]
+            step = slope.T @ np.linalg.solve(slope @ slope.T + DAMPING**2 * np.eye(3), error)
+            step *= min(1.0, LONGEST_STEP / max(float(np.abs(step).max()), 1e-9))
+            q = np.clip(q + step, self._q_min, self._q_max)
+        return None

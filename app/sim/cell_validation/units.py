@@ -1,0 +1,74 @@
+"""Numbers of a work cell against the values they may have, with a guess at the unit meant.
+
+A length in millimetres or an angle in degrees is the most common mistake in a cell file, so a
+number outside its bounds is tried in these units too.
+"""
+
+import math
+from collections.abc import Iterator
+
+from pydantic import BaseModel
+
+from app.errors import Fault, digits, interval
+from app.sim.cells.parts import Each, Within
+
+
+def shown(value: object) -> str:
+    """Write a value as a user would."""
+    if isinstance(value, float):
+        return digits(value)
+    if isinstance(value, tuple | list):
+        return f"[{', '.join(shown(one) for one in value)}]"
+    return str(value)
+
+
+def unit_hint(value: float, within: Within) -> str:
+    """Say which unit a number outside its bounds is probably in; empty where unclear."""
+    if within.unit.startswith("rad") and within.low <= math.radians(value) <= within.high:
+        unit = within.unit.replace("rad", "degrees", 1)
+        return f"looks like {unit}: in {within.unit} that is {math.radians(value):.4g}"
+    if not within.unit or value == 0.0:
+        return ""
+    milli = {"m": "millimetres", "s": "milliseconds", "m/s": "mm/s"}.get(within.unit)
+    if milli and within.low <= value / 1000.0 <= within.high and abs(value) >= 5.0:
+        return f"looks like {milli}: in {within.unit} that is {value / 1000.0:g}"
+    if milli and within.low <= value * 1000.0 <= within.high:
+        return f"looks 1000 times too small: {value * 1000.0:g} {within.unit}?"
+    return ""
+
+
+def numbers(model: BaseModel, place: str = "") -> Iterator[Fault]:
+    """Hold every number of a model, and of the models in it, against its bounds.
+
+    Args:
+        model: A cell, or a part of one.
+        place: Path of the model, with a dot at its end; empty for a cell.
+    """
+    for name, field in type(model).model_fields.items():
+        value, path = getattr(model, name), f"{place}{name}"
+        if isinstance(value, BaseModel):
+            yield from numbers(value, f"{path}.")
+        elif isinstance(value, tuple) and value and isinstance(value[0], BaseModel):
+            for index, one in enumerate(value):
+                inner = f"{path}.{one.id}" if hasattr(one, "id") else f"{path}[{index}]"
+                yield from numbers(one, f"{inner}.")
+        elif value is not None:
+            for rule in field.metadata:
+                yield from _against(rule, value, path)
+
+
+def _against(rule: object, value: object, path: str) -> Iterator[Fault]:
+    if isinstance(rule, Each) and isinstance(value, tuple):
+        for index, (part, one) in enumerate(zip(rule.parts, value, strict=True)):
+            yield from _against(part, one, f"{path}[{index}]")
+    elif isinstance(rule, Within) and isinstance(value, tuple):
+        for index, one in enumerate(value):
+            yield from _against(rule, one, f"{path}[{index}]")
+    elif isinstance(rule, Within) and isinstance(value, int | float):
+        if not rule.low <= value <= rule.high:
+            yield Fault(
+                place=path,
+                value=shown(value),
+                rule=f"must lie in {interval(rule.low, rule.high)} {rule.unit}".rstrip(),
+                hint=unit_hint(value, rule),
+            )

@@ -1,0 +1,1 @@
+"""Work cells as data."""

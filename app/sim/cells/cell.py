@@ -1,0 +1,211 @@
+"""Work cells as data: what stands where, who walks there, and the limits that hold.
+
+A cell is a JSON file that a user may write; ``cell_file.read_cell`` reads it and
+``cell_checks.check_cell`` says everything that is wrong with it. Its fields are in
+``cell_parts`` and ``cell_people``. Frame: the robot's base, x right, y toward the
+person, z up, table top at z = 0. SI units, radians.
+
+Source: METHOD 2.1 and 2.3 (``shared-workspace``), 3.2 (``pick-and-place``), 1.1
+(``sorting-*``); coordinates that the source does not print are ours.
+"""
+
+import hashlib
+import json
+from functools import cache
+from importlib import resources
+from typing import Any
+
+import numpy as np
+from pydantic import Field, ValidationError
+
+from app.errors import CheckpointMismatch, InvalidInput, NotFound
+from app.sim.cells.parts import (
+    CellData,
+    GoalRegion,
+    Label,
+    Obstacle,
+    RobotMount,
+    SafetySettings,
+    Station,
+    Table,
+)
+from app.sim.cells.people import CylinderPerson, Person, Worker
+from app.sim.core.arrays import Vec
+from app.sim.human.anthropometry import MEDIAN
+
+LIMITS = {"stations": 128, "obstacles": 32, "people": 4}
+"""Longest list of each name."""
+MAX_TARGETS = 2000
+"""Most grid points of a goal region."""
+
+
+class Cell(CellData):
+    """One work cell."""
+
+    name: str = Field(pattern=r"^[a-z][a-z0-9-]{0,63}$", description="name in requests")
+    title: Label = Field(description="name for people")
+    table: Table
+    robot: RobotMount
+    stations: tuple[Station, ...] = Field(default=(), description="named places, at most 128")
+    goal_region: GoalRegion | None = Field(default=None, description="box of goals, or null")
+    obstacles: tuple[Obstacle, ...] = Field(default=(), description="fixed boxes, at most 32")
+    people: tuple[Person, ...] = Field(default=(), description="who may be there, at most 4")
+    safety: SafetySettings = SafetySettings()
+
+    @property
+    def floor_z(self) -> float:
+        """Height of the floor in the cell's frame [m]."""
+        return -self.table.height
+
+    @property
+    def workers(self) -> tuple[Worker, ...]:
+        """The people with 18 joints, in order."""
+        return tuple(person for person in self.people if isinstance(person, Worker))
+
+    @property
+    def cylinders(self) -> tuple[CylinderPerson, ...]:
+        """The people who are cylinders, in order."""
+        return tuple(person for person in self.people if not isinstance(person, Worker))
+
+    @property
+    def human(self) -> Worker:
+        """The first worker.
+
+        Raises:
+            NotFound: Nobody works in this cell.
+        """
+        for person in self.workers:
+            return person
+        raise NotFound("worker in the cell", self.name)
+
+    @property
+    def body(self) -> Vec:
+        """Size of the first worker as kernels take it [m], shape (12,); median where none."""
+        for person in self.workers:
+            return person.size.vector(self.floor_z)
+        return MEDIAN.vector(self.floor_z)
+
+    @property
+    def station_ids(self) -> tuple[str, ...]:
+        """Names of all stations, in order."""
+        return tuple(station.id for station in self.stations)
+
+    @property
+    def pick_stations(self) -> tuple[Station, ...]:
+        """The stations of the pick scenario: cubes, then docks."""
+        return self.stations_of("cube") + self.stations_of("dock")
+
+    def stations_of(self, kind: str) -> tuple[Station, ...]:
+        """Return the stations of one kind, in order."""
+        return tuple(station for station in self.stations if station.kind == kind)
+
+    def positions(self) -> Vec:
+        """Return the stations' positions [m], shape (n_stations, 3)."""
+        rows = [station.position for station in self.stations]
+        return np.array(rows, dtype=np.float64).reshape(-1, 3)
+
+    def station(self, name: str) -> Station:
+        """Return one station by id.
+
+        Raises:
+            NotFound: The cell has no such station.
+        """
+        for station in self.stations:
+            if station.id == name:
+                return station
+        raise NotFound("station", name, self.station_ids)
+
+    def definition(self) -> dict[str, Any]:
+        """Return the cell as JSON data, without fields that are not set."""
+        return self.model_dump(mode="json", exclude_none=True)
+
+    @property
+    def sha256(self) -> str:
+        """Identity of its content, 64 hexadecimal digits: any change of a field changes it."""
+        text = json.dumps(self.model_dump(mode="json"), sort_keys=True, separators=(",", ":"))
+        return hashlib.sha256(text.encode()).hexdigest()
+
+
+def require_cell(cell: Cell, name: str, sha256: str) -> None:
+    """Make sure that a policy was trained in this very cell.
+
+    Args:
+        cell: The cell it shall act in.
+        name: Name of the cell it was trained in.
+        sha256: Identity of that cell's content.
+
+    Raises:
+        CheckpointMismatch: It was trained in another cell, or before the cell was changed.
+    """
+    if name != cell.name:
+        raise CheckpointMismatch("cell", cell.name, name)
+    if sha256 != cell.sha256:
+        now, then = f"{name} as it is now ({cell.sha256[:8]})", f"{name} ({sha256[:8]})"
+        raise CheckpointMismatch("cell", now, then)
+
+
+def lacks_stations(cell: Cell) -> str | None:
+    """Say what a cell lacks to be simulated as a pick scenario; None where nothing."""
+    if not cell.stations_of("cube") or not cell.stations_of("dock"):
+        return "needs at least one station of kind cube and one of kind dock"
+    return None
+
+
+def lacks_for_pick(cell: Cell) -> str | None:
+    """Say what a cell lacks to train, decide and be shown (METHOD 3.2); None where nothing.
+
+    The simulator takes 0 to 4 people of any kind; the shipped policies know one worker. Fixed
+    obstacles are not observed: they never move, so a policy learns where they are.
+    """
+    if len(cell.people) != 1 or not cell.workers:
+        return lacks_stations(cell) or "needs exactly one person, of kind worker"
+    return lacks_stations(cell)
+
+
+def lacks_for_reach(cell: Cell) -> str | None:
+    """Say what a cell lacks to train a policy that reaches goals; None where nothing.
+
+    Who walks is for the preset to say: where the cell has no walker, people walk where its
+    first person may be.
+    """
+    return "needs a goal_region" if cell.goal_region is None else None
+
+
+def cell_names() -> tuple[str, ...]:
+    """Return the names of the shipped cells."""
+    folder = resources.files("app.sim.cells") / "data"
+    return tuple(
+        sorted(
+            entry.name.removesuffix(".json")
+            for entry in folder.iterdir()
+            if entry.name.endswith(".json")
+        )
+    )
+
+
+@cache
+def load_cell(name: str = "pick-and-place") -> Cell:
+    """Return a shipped cell.
+
+    Raises:
+        NotFound: No cell of that name is shipped.
+    """
+    if name not in cell_names():
+        raise NotFound("cell", name, cell_names())
+    text = (resources.files("app.sim.cells") / "data" / f"{name}.json").read_text("utf-8")
+    return Cell.model_validate_json(text)
+
+
+def parse_definition(definition: object) -> Cell:
+    """Return a cell from JSON data that was checked when it came in.
+
+    Raises:
+        InvalidInput: It does not fit this version of the schema.
+    """
+    try:
+        return Cell.model_validate_json(json.dumps(definition))
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        place = ".".join(str(part) for part in first["loc"])
+        rule = "was stored by another version of Tandem and does not fit this one: add it anew"
+        raise InvalidInput(f"cell.{place}", first["msg"], rule) from error

@@ -1,0 +1,224 @@
+"""Contact and clearance of one state, for the live cell, deciding, safety and planners.
+
+The same kernels as the batches (``collision/kernels/contact.py``), so that what was trained
+with is what
+is reported.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.sim.collision.kernels import contact as kernel
+from app.sim.core.arrays import Vec
+from app.sim.geometry.capsules import distances, gaps
+from app.sim.geometry.cylinder import cylinder_clearance
+from app.sim.human import model as human
+from app.sim.human.kernels.kinematics import N_CAPSULES, PELVIS_Z
+from app.sim.people.kernels import people as people_kernel
+from app.sim.people.kernels.people import Crowd, People
+from app.sim.robot.capsules import load_robot_capsules
+from app.sim.robot.kernels import arm as arm_kernel
+from app.sim.robot.kernels.arm import Arm
+from app.sim.scene.scene import NO_CYLINDERS, crowd_of, own, require_finite
+
+CONTACT_KINDS = ("none", "human", "cell", "self")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Contact:
+    """Result of the contact test of one period."""
+
+    kind: str
+    """One of CONTACT_KINDS."""
+    clearance_m: float
+    """Distance of robot and people at the pose of contact, or at the end [m]."""
+    time_s: float
+    """Time in the period at which it was found; the period without contact [s]."""
+    link: str
+    """Robot capsule that touches, or is nearest to a person."""
+    part: str
+    """What it touches or is nearest to: a capsule of a worker (CAPSULE_NAMES), ``walker``,
+    ``table``, ``obstacle``, another capsule of the robot, or ``nobody``."""
+    worker: int | None = None
+    """The worker whose capsule that is, from 0."""
+    walker: int | None = None
+    """The walker that is, from 0."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Clearance:
+    """Distances of one pose of the robot."""
+
+    people_m: float
+    """To the nearest person [m]; 1000 where there is none."""
+    cell_m: float
+    """To table and obstacles [m]."""
+    self_m: float
+    """Of its own links to each other [m]."""
+
+
+def clearance(
+    arm: Arm,
+    people: People,
+    q: Vec,
+    human_q: Vec,
+    cylinders: Vec,
+    sizes: Vec | None = None,
+) -> Clearance:
+    """Return the distances of the robot at ``q``.
+
+    Args:
+        arm: Robot in its cell.
+        people: Shared data of the people.
+        q: Joint positions [rad], shape (6,).
+        human_q: The workers' joints [m, rad], shape (W, 18).
+        cylinders: The walkers' x, y and radius [m], shape (C, 3).
+        sizes: The workers' sizes [m], shape (W, body.N_SIZE); None for the cell's person.
+    """
+    robot = arm_kernel.new_robot_pose(arm)
+    arm_kernel.place_robot(arm, own(q), robot)
+    crowd = crowd_of(people, human_q, cylinders, sizes)
+    to_people, to_cell, to_self = kernel.clearances(arm, people, robot, crowd)
+    return Clearance(people_m=to_people, cell_m=to_cell, self_m=to_self)
+
+
+def contact(
+    arm: Arm,
+    people: People,
+    q0: Vec,
+    qd0: Vec,
+    c: Vec,
+    d: Vec,
+    human_q: tuple[Vec, Vec],
+    cylinders: tuple[Vec, Vec] = (NO_CYLINDERS, NO_CYLINDERS),
+    sizes: Vec | tuple[Vec, Vec] | None = None,
+) -> Contact:
+    """Test one control period for contact, between its ends too.
+
+    Args:
+        arm: Robot in its cell.
+        people: Shared data of the people.
+        q0: Joint positions at the start [rad], shape (6,).
+        qd0: Joint speeds at the start [rad/s], shape (6,).
+        c: Second coefficients of the period [rad/s^2], shape (6,).
+        d: Third coefficients of the period [rad/s^3], shape (6,).
+        human_q: The workers' joints at start and end [m, rad], shape (W, 18) each.
+        cylinders: The walkers' x, y, radius at start and end [m], shape (C, 3) each.
+        sizes: The workers' sizes [m], shape (W, body.N_SIZE), or those at start and end where
+            pelvis or lengths change; None for the cell's person.
+
+    Raises:
+        SimulationError: A number is NaN or infinite.
+    """
+    before, after = sizes if isinstance(sizes, tuple) else (sizes, sizes)
+    require_finite("q, qd, c, d", np.concatenate([q0, qd0, c, d]))
+    require_finite("human_q", np.concatenate(human_q))
+    require_finite("cylinders", np.concatenate(cylinders))
+    q0, qd0, c, d = own(q0), own(qd0), own(c), own(d)
+    robot = arm_kernel.new_robot_pose(arm)
+    arm_kernel.place_robot(arm, q0, robot)
+    crowd = crowd_of(people, human_q[0], cylinders[0], before)
+    crowd.pelvis_z[:] = crowd.size[:, PELVIS_Z]
+    crowd.q0[:], crowd.cylinders0[:] = human_q[0], cylinders[0]
+    clear = np.array(kernel.clearances(arm, people, robot, crowd))
+    columns0 = crowd.columns.copy()
+    if after is not None:
+        crowd.size[:] = after
+    kind, x = kernel.sweep(
+        arm,
+        people,
+        q0,
+        qd0,
+        c,
+        d,
+        q0 + arm.dt * (qd0 + arm.dt * (c + arm.dt * d)),
+        own(human_q[1]),
+        own(cylinders[1]),
+        robot.columns.copy(),
+        columns0,
+        clear,
+        robot,
+        crowd,
+    )
+    link, part, worker, walker = _who(arm, people, kind, robot, crowd)
+    return Contact(
+        kind=CONTACT_KINDS[kind],
+        clearance_m=float(clear[0]),
+        time_s=x,
+        link=link,
+        part=part,
+        worker=worker,
+        walker=walker,
+    )
+
+
+def worker_distances(arm: Arm, people: People, q: Vec, human_q: Vec, sizes: Vec) -> Vec:
+    """Return the distance of the robot at ``q`` to each worker [m], shape (W,).
+
+    Args:
+        arm: Robot in its cell.
+        people: Shared data of W workers.
+        q: Joint positions [rad], shape (6,).
+        human_q: The workers' joints [m, rad], shape (W, 18).
+        sizes: Their sizes [m], shape (W, body.N_SIZE).
+    """
+    n_workers = len(human_q)
+    if n_workers == 0:
+        return np.zeros(0)
+    robot = arm_kernel.new_robot_pose(arm)
+    arm_kernel.place_robot(arm, own(q), robot)
+    crowd = crowd_of(people, human_q, NO_CYLINDERS, sizes)
+    gaps(robot.columns, crowd.columns, crowd.gap)
+    parts = crowd.gap[: n_workers * N_CAPSULES].reshape(n_workers, N_CAPSULES)
+    return np.asarray(parts.min(axis=1))
+
+
+def walker_distances(arm: Arm, people: People, q: Vec, cylinders: Vec) -> Vec:
+    """Return the distance of the robot at ``q`` to each walking cylinder [m], shape (C,).
+
+    Args:
+        arm: Robot in its cell.
+        people: Shared data; says how high the cylinders are.
+        q: Joint positions [rad], shape (6,).
+        cylinders: x, y and radius of each [m], shape (C, 3).
+    """
+    robot = arm_kernel.new_robot_pose(arm)
+    arm_kernel.place_robot(arm, own(q), robot)
+    return np.array(
+        [
+            cylinder_clearance(robot.columns, 0, x, y, r, people.top_z)[0]
+            for x, y, r in cylinders
+        ]
+    )
+
+
+def _who(
+    arm: Arm, people: People, kind: int, robot: arm_kernel.RobotPose, crowd: Crowd
+) -> tuple[str, str, int | None, int | None]:
+    """Return the names of the capsule and of what it touches or is nearest to, and of whom.
+
+    Whom is a worker or a walker.
+    """
+    names = load_robot_capsules().name
+    if kind == kernel.SELF_CONTACT:
+        _, pair = arm_kernel.self_clearance(arm, robot)
+        return names[arm.first[pair]], names[arm.second[pair]], None, None
+    if kind == kernel.CELL_CONTACT:
+        _, link, box = arm_kernel.cell_clearance(arm, robot.columns)
+        return names[link], "table" if box < 0 else "obstacle", None, None
+    who = people_kernel.nearest_person(people, robot.columns, crowd)
+    if who < 0:
+        return names[-1], "nobody", None, None
+    if who >= len(crowd.q):
+        walker = who - len(crowd.q)
+        x, y, r = crowd.cylinders[walker]
+        _, link = cylinder_clearance(robot.columns, 0, x, y, r, people.top_z)
+        return names[link], "walker", None, walker
+    best, link, part = np.inf, 0, 0
+    for k in range(len(names)):
+        distances(robot.columns, k, crowd.columns, crowd.gap)
+        near = int(np.argmin(crowd.gap))
+        if crowd.gap[near] < best:
+            best, link, part = float(crowd.gap[near]), k, near
+    return names[link], human.CAPSULE_NAMES[part % N_CAPSULES], part // N_CAPSULES, None

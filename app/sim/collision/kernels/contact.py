@@ -1,0 +1,196 @@
+"""The contact test of one control period, compiled: early by a millimetre, never late.
+
+At a pose with clearance ``d`` nothing touches before ``d / v`` seconds, with ``v`` a bound on
+how fast any two points can approach. So an interval with clearances ``a`` and ``b`` at its ends
+is free where ``a + b > v (its length)``; otherwise its middle is looked at, down to intervals
+of ``FINEST_STEP``, where contact is reported. Mostly the end of the period settles it. Within a
+period the robot follows its polynomial, workers move linearly in joint space, walkers linearly.
+"""
+
+from app.sim.core.arrays import Vec
+from app.sim.core.jit import kernel
+from app.sim.geometry.capsules import copy_rows
+from app.sim.human.kernels.kinematics import PELVIS_Z
+from app.sim.people.kernels.people import (
+    Crowd,
+    People,
+    people_clearance,
+    people_speed_bound,
+    place_workers,
+)
+from app.sim.robot.kernels.arm import (
+    Arm,
+    RobotPose,
+    cell_clearance,
+    place_robot,
+    robot_speed_bound,
+    self_clearance,
+)
+
+NO_CONTACT, HUMAN_CONTACT, CELL_CONTACT, SELF_CONTACT = range(4)
+FINEST_STEP = 1e-3
+"""Intervals up to this are not looked into [s]."""
+
+
+Clear = tuple[float, float, float]
+
+
+@kernel(inline="always")
+def clearances(arm: Arm, people: People, robot: RobotPose, crowd: Crowd) -> Clear:
+    """Return the distances of a placed robot to people, cell and itself [m]."""
+    return (
+        people_clearance(people, robot.columns, crowd),
+        cell_clearance(arm, robot.columns)[0],
+        self_clearance(arm, robot)[0],
+    )
+
+
+@kernel(inline="always")
+def _kind(a: Clear, b: Clear, robot_speed: float, approach: float, seconds: float) -> int:
+    """Return what may touch in an interval, from the clearances at its ends."""
+    if a[0] + b[0] <= approach * seconds:
+        return HUMAN_CONTACT
+    if a[1] + b[1] <= robot_speed * seconds:
+        return CELL_CONTACT
+    if a[2] + b[2] <= 2.0 * robot_speed * seconds:
+        return SELF_CONTACT
+    return NO_CONTACT
+
+
+@kernel(inline="always")
+def sweep(
+    arm: Arm,
+    people: People,
+    q0: Vec,
+    qd0: Vec,
+    c: Vec,
+    d: Vec,
+    q1: Vec,
+    human_q1: Vec,
+    cylinders1: Vec,
+    robot0: Vec,
+    crowd0: Vec,
+    clear: Vec,
+    robot: RobotPose,
+    crowd: Crowd,
+) -> tuple[int, float]:
+    """Test one whole period for contact, between its ends too.
+
+    Args:
+        arm: Robot in its cell.
+        people: Shared data of the people.
+        q0: Joint positions at the start [rad], shape (6,).
+        qd0: Joint speeds at the start [rad/s], shape (6,).
+        c: Second coefficients of the period [rad/s^2], shape (6,).
+        d: Third coefficients of the period [rad/s^3], shape (6,).
+        q1: Joint positions at the end [rad], shape (6,).
+        human_q1: The workers' joints at the end [m, rad], shape (W, 18).
+        cylinders1: The walkers' x, y, radius at the end [m], shape (C, 3).
+        robot0: The robot's capsules at the start, shape (9, n).
+        crowd0: The workers' capsules at the start, shape (9, m).
+        clear: Clearances at the start, from :func:`clearances` [m], shape (3,); afterwards
+            those at the last pose looked at.
+        robot: Work space; holds the last pose looked at, the end of the period if no contact.
+        crowd: Work space, likewise; ``q0``, ``cylinders0`` and ``pelvis_z[0]`` hold the people
+            at the start, ``size`` their sizes at the end.
+
+    Returns:
+        Kind of contact, and the time in the period at which it was found [s].
+    """
+    place_robot(arm, q1, robot)
+    place_workers(people, human_q1, crowd)
+    for w in range(human_q1.shape[0]):
+        crowd.pelvis_z[1, w] = crowd.size[w, PELVIS_Z]
+    copy_rows(cylinders1, crowd.cylinders)
+    robot_speed = robot_speed_bound(arm, qd0, c, d, robot0, robot.columns)
+    approach = robot_speed + people_speed_bound(
+        crowd0, crowd.columns, crowd.cylinders0, cylinders1, arm.dt
+    )
+    begin = (clear[0], clear[1], clear[2])
+    end = clearances(arm, people, robot, crowd)
+    kind, x, last = NO_CONTACT, arm.dt, end
+    if _kind(begin, end, robot_speed, approach, arm.dt) != NO_CONTACT:
+        kind, x, last = _search(
+            arm, people, q0, qd0, c, d, human_q1, cylinders1, begin, end, robot_speed,
+            approach, robot, crowd,
+        )  # fmt: skip
+        _place_at(arm, people, q0, qd0, c, d, human_q1, cylinders1, x, robot, crowd)
+    clear[0], clear[1], clear[2] = last
+    return kind, x
+
+
+@kernel()
+def _search(
+    arm: Arm,
+    people: People,
+    q0: Vec,
+    qd0: Vec,
+    c: Vec,
+    d: Vec,
+    human_q1: Vec,
+    cylinders1: Vec,
+    begin: Clear,
+    end: Clear,
+    robot_speed: float,
+    approach: float,
+    robot: RobotPose,
+    crowd: Crowd,
+) -> tuple[int, float, Clear]:
+    """Halve the period until every part is free or too short to look into.
+
+    Returns:
+        Kind of contact, where in the period [s], and the clearances there [m].
+    """
+    a, top = 0.0, 0
+    right, ahead = crowd.stack_end, crowd.stack_clear
+    right[0] = arm.dt
+    ahead[0, 0], ahead[0, 1], ahead[0, 2] = end
+    while top >= 0:
+        b, there = right[top], (ahead[top, 0], ahead[top, 1], ahead[top, 2])
+        kind = _kind(begin, there, robot_speed, approach, b - a)
+        if kind == NO_CONTACT:
+            a, begin = b, there
+            top -= 1
+        elif a == 0.0 and begin[kind - 1] <= 0.0:
+            return kind, a, begin
+        elif b - a <= FINEST_STEP:
+            return kind, b, there
+        else:
+            top += 1
+            right[top] = 0.5 * (a + b)
+            _place_at(
+                arm, people, q0, qd0, c, d, human_q1, cylinders1, right[top], robot, crowd
+            )
+            ahead[top, 0], ahead[top, 1], ahead[top, 2] = clearances(arm, people, robot, crowd)
+    return NO_CONTACT, arm.dt, end
+
+
+@kernel()
+def _place_at(
+    arm: Arm,
+    people: People,
+    q0: Vec,
+    qd0: Vec,
+    c: Vec,
+    d: Vec,
+    human_q1: Vec,
+    cylinders1: Vec,
+    x: float,
+    robot: RobotPose,
+    crowd: Crowd,
+) -> None:
+    """Place robot and people at time ``x`` of the period [s]."""
+    q, part = crowd.robot_q, x / arm.dt
+    for j in range(6):
+        q[j] = q0[j] + x * (qd0[j] + x * (c[j] + x * d[j]))
+    place_robot(arm, q, robot)
+    for w in range(human_q1.shape[0]):
+        for j in range(18):
+            crowd.q[w, j] = crowd.q0[w, j] + part * (human_q1[w, j] - crowd.q0[w, j])
+        rise = crowd.pelvis_z[1, w] - crowd.pelvis_z[0, w]
+        crowd.size[w, PELVIS_Z] = crowd.pelvis_z[0, w] + part * rise
+    place_workers(people, crowd.q, crowd)
+    for k in range(cylinders1.shape[0]):
+        for i in range(3):
+            start = crowd.cylinders0[k, i]
+            crowd.cylinders[k, i] = start + part * (cylinders1[k, i] - start)

@@ -1,0 +1,1 @@
+"""Arrays, compilation, random numbers, trigonometry."""

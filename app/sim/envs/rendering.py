@@ -1,0 +1,251 @@
+"""Images of one cell of a batch: table, robot, people, and what the task is about."""
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+
+from app.sim.cells.cell import Cell
+from app.sim.cells.parts import Table
+from app.sim.core.arrays import Vec
+from app.sim.envs.raycast import Camera, Image, Raycaster
+from app.sim.envs.solids import Box, Capsule, Cylinder, Rgb, Solid
+from app.sim.geometry.capsules import RADIUS, ends_of
+from app.sim.human import model as human
+from app.sim.human.kernels import kinematics as body
+from app.sim.people.kernels.people import PeopleState
+from app.sim.robot.capsules import load_robot_capsules
+from app.sim.robot.kernels import arm as arm_kernel
+from app.sim.scenario.kernels.episode import SUCCESS_DISTANCE
+from app.sim.scene.scene import arm_of, crowd_of, own, people_of
+from app.sim.sorting.layout import block_height, half_size, is_sorting
+from app.sim.sorting.state import NULL, SortingShape, SortingState
+
+WIDTH, HEIGHT = 480, 360
+"""Size of the images [px]."""
+FOV = 0.7
+"""Vertical field of view [rad]."""
+
+TOP: Rgb = (236, 233, 226)
+EDGE: Rgb = (172, 142, 108)
+FRAME: Rgb = (178, 184, 191)
+PLATE: Rgb = (96, 103, 112)
+OBSTACLE: Rgb = (150, 158, 168)
+ALUMINIUM: Rgb = (205, 209, 214)
+JOINT: Rgb = (88, 152, 196)
+TOOL: Rgb = (255, 138, 52)
+STATION: Rgb = (150, 164, 182)
+TARGET: Rgb = (11, 127, 119)
+TRAY: Rgb = (206, 210, 214)
+CYLINDERS: tuple[Rgb, ...] = ((255, 116, 32), (196, 214, 48), (72, 164, 232), (232, 104, 168))
+"""Colour of cylinders, and of workers' vests, one after the other."""
+BLOCKS: dict[str, Rgb] = {"red": (205, 58, 62), "green": (112, 184, 92), "blue": (52, 104, 196)}
+UNNAMED: tuple[Rgb, ...] = ((205, 58, 62), (112, 184, 92), (52, 104, 196), *CYLINDERS[:2])
+"""Colour of towers for which the cell names none."""
+FAILURES: tuple[Rgb, Rgb] = ((240, 237, 229), (176, 108, 48))
+"""Colours of clutter cells where grasps never fail, and where MOST_FAILURE do."""
+MOST_FAILURE = 0.7
+
+SKIN: Rgb = (214, 164, 134)
+TROUSERS: Rgb = (44, 53, 70)
+SLEEVE: Rgb = (58, 70, 92)
+GLOVE: Rgb = (247, 189, 74)
+_JOINTS = ("shoulder", "upper_arm_low", "forearm_low", "wrist_1", "wrist_2")
+_VEST = (body.C_ABDOMEN, body.C_CHEST)
+_PARTS = {
+    body.C_PELVIS: TROUSERS,
+    body.C_LEG_R: TROUSERS,
+    body.C_LEG_L: TROUSERS,
+    body.C_HEAD: SKIN,
+    body.C_HAND_R: GLOVE,
+    body.C_HAND_L: GLOVE,
+}
+"""Colours of a worker's capsules; the arms have SLEEVE, the trunk that of the vest."""
+
+
+@lru_cache(maxsize=8)
+def raycaster_of(cell: Cell) -> Raycaster:
+    """Return what draws a cell: blocks are seen from nearer, walkers from farther off."""
+    if is_sorting(cell):
+        position, look_at = (2.05, -1.15, 1.7), (0.0, 0.62, 0.1)
+    elif cell.goal_region is not None:
+        position, look_at = (2.9, -2.0, 2.2), (-0.2, 0.75, 0.0)
+    else:
+        position, look_at = (2.4, -1.1, 1.5), (-0.05, 0.6, 0.12)
+    camera = Camera(position=position, look_at=look_at, fov=FOV)
+    return Raycaster(camera, WIDTH, HEIGHT, cell.floor_z, _furniture(cell))
+
+
+def picture(cell: Cell, robot_q: Vec, people: Sequence[Solid], task: Sequence[Solid]) -> Image:
+    """Return an image of a cell, uint8, shape (HEIGHT, WIDTH, 3).
+
+    Args:
+        cell: Work cell.
+        robot_q: The robot's joints [rad], shape (6,).
+        people: From :func:`people_solids`.
+        task: Targets or blocks.
+    """
+    return raycaster_of(cell).draw([*_robot_solids(cell, robot_q), *people, *task])
+
+
+def _furniture(cell: Cell) -> tuple[Solid, ...]:
+    """Return table, robot plate, obstacles and what stands at the stations of a pick cell."""
+    solids: list[Solid] = [*_table_solids(cell.table)]
+    solids.append(Box(center=(0, 0, 0.004), half_size=(0.15, 0.15, 0.004), colour=PLATE))
+    for box in cell.obstacles:
+        half = box.half_size
+        solids.append(Box(center=box.center, half_size=half, yaw=box.yaw, colour=OBSTACLE))
+    for kind, side, height in (("cube", 0.035, 0.07), ("dock", 0.075, 0.012)):
+        for station in cell.stations_of("cube" if kind == "cube" else "dock"):
+            middle = (*station.position[:2], 0.5 * height)
+            half = (side, side, 0.5 * height)
+            solids.append(Box(center=middle, half_size=half, colour=STATION))
+    return tuple(solids)
+
+
+def _table_solids(table: Table) -> list[Solid]:
+    x, y = 0.5 * (table.x_min + table.x_max), 0.5 * (table.y_min + table.y_max)
+    half = (0.5 * (table.x_max - table.x_min), 0.5 * (table.y_max - table.y_min))
+    middle, thick = (x, y, -0.5 * table.thickness), 0.5 * table.thickness
+    solids: list[Solid] = [
+        Box(center=middle, half_size=(*half, thick), colour=TOP),
+        Box(
+            center=middle,
+            half_size=(half[0] + 0.003, half[1] + 0.003, 0.7 * thick),
+            colour=EDGE,
+        ),
+    ]
+    length = 0.5 * (table.height - table.thickness)
+    for sx in (-1.0, 1.0):
+        for sy in (-1.0, 1.0):
+            at = (x + sx * (half[0] - 0.11), y + sy * (half[1] - 0.11))
+            foot = (*at, -table.thickness - length)
+            solids.append(Box(center=foot, half_size=(0.035, 0.035, length), colour=FRAME))
+    return solids
+
+
+def _robot_solids(cell: Cell, q: Vec) -> list[Solid]:
+    arm, mount = arm_of(cell), cell.robot
+    capsules = load_robot_capsules(mount.tool_length, mount.tool_radius)
+    pose = arm_kernel.new_robot_pose(arm)
+    arm_kernel.place_robot(arm, own(q), pose)
+    ends = ends_of(pose.columns, len(capsules.name))
+    colours = [JOINT if name in _JOINTS else ALUMINIUM for name in capsules.name[:-1]]
+    return _capsules(ends, capsules.radius, [*colours, TOOL])
+
+
+def _capsules(ends: Vec, radii: Vec, colours: Sequence[Rgb]) -> list[Solid]:
+    rows = zip(ends, radii.tolist(), colours, strict=True)
+    return [Capsule(start=a, end=b, radius=r, colour=colour) for (a, b), r, colour in rows]
+
+
+def people_solids(cell: Cell, state: PeopleState, row: int) -> list[Solid]:
+    """Return the people of one cell of a batch.
+
+    Args:
+        cell: Work cell.
+        state: People of the batch.
+        row: Which cell.
+    """
+    workers = worker_solids(cell, state.q[row], state.size[row])
+    floor = cell.floor_z
+    walkers = [
+        Cylinder(
+            base=(x, y, floor),
+            height=person.height,
+            radius=r,
+            colour=CYLINDERS[(len(state.q[row]) + k) % len(CYLINDERS)],
+        )
+        for k, (person, (x, y, r)) in enumerate(
+            zip(cell.cylinders, state.cylinders[row].tolist(), strict=True)
+        )
+    ]
+    return [*workers, *walkers]
+
+
+def worker_solids(cell: Cell, q: Vec, sizes: Vec | None = None) -> list[Solid]:
+    """Return workers in their postures.
+
+    Args:
+        cell: Work cell.
+        q: Their joints [m, rad], shape (W, 18).
+        sizes: Their sizes [m], shape (W, body.N_SIZE); None for the cell's person.
+    """
+    crowd = crowd_of(people_of(cell), q, np.zeros((0, 3)), sizes)
+    n = len(q) * body.N_CAPSULES
+    colours = [
+        CYLINDERS[w % len(CYLINDERS)] if part in _VEST else _PARTS.get(part, SLEEVE)
+        for w in range(len(q))
+        for part in range(body.N_CAPSULES)
+    ]
+    return _capsules(ends_of(crowd.columns, n), crowd.columns[RADIUS, :n], colours)
+
+
+def standing_workers(cell: Cell) -> list[Solid]:
+    """Return a cell's workers where they stand at rest."""
+    postures = [human.rest_posture(*person.home) for person in cell.workers]
+    return worker_solids(cell, np.array(postures).reshape(-1, 18))
+
+
+def target_solids(goal: Vec) -> list[Solid]:
+    """Return a target and the space around it in which it counts as reached.
+
+    Args:
+        goal: Where it is [m], shape (3,).
+    """
+    return [
+        Capsule(start=goal, end=goal, radius=0.025, colour=TARGET),
+        Capsule(start=goal, end=goal, radius=SUCCESS_DISTANCE, colour=TARGET, opacity=0.45),
+    ]
+
+
+def block_solids(cell: Cell, shape: SortingShape, state: SortingState) -> list[Solid]:
+    """Return clutter cells, towers and their blocks; what the goal asks for is translucent.
+
+    Args:
+        cell: Sorting cell.
+        shape: Size of its task.
+        state: What lies where, what is wanted, and where grasps fail.
+    """
+    level = block_height(cell) or 0.03
+    named = [one.colour for one in cell.stations_of("cluster")]
+    colours = [BLOCKS.get(one or "", UNNAMED[k]) for k, one in enumerate(named)]
+
+    def block(code: int, x: float, y: float, stands: int, opacity: float = 1.0) -> Solid:
+        colour, size = divmod(int(code) - 1, shape.n_sizes)
+        half = half_size(cell, size, shape.n_sizes)
+        half[2] = 0.5 * level - 5e-4  # a line between two blocks of one colour
+        half[:2] += 0.002 * (opacity < 1.0)
+        at = (x, y, _FLAT + (stands + 0.5) * level)
+        return Box(center=at, half_size=half, colour=colours[colour], opacity=opacity)
+
+    solids: list[Solid] = []
+    for k, station in enumerate(cell.stations_of("clutter")):
+        x, y, _ = station.position
+        share = min(float(state.fail[k]) / MOST_FAILURE, 1.0)
+        solids.append(_tile(x, y, 0.08, _between(*FAILURES, share)))
+        if state.clutter[k] != NULL:
+            solids.append(block(state.clutter[k], x, y, 0))
+    for c, station in enumerate(cell.stations_of("cluster")):
+        x, y, _ = station.position
+        solids.append(_tile(x, y, 0.08, _between(TRAY, colours[c], 0.35)))
+        for k, (code, wanted) in enumerate(zip(state.towers[c], state.goal[c], strict=True)):
+            if code != NULL:
+                solids.append(block(code, x, y, k))
+            if wanted not in (NULL, code):
+                solids.append(block(wanted, x, y, k, opacity=0.4))
+    return solids
+
+
+_FLAT = 0.004
+"""Height of the tiles on which blocks stand [m]."""
+
+
+def _tile(x: float, y: float, half: float, colour: Rgb) -> Solid:
+    return Box(center=(x, y, 0.5 * _FLAT), half_size=(half, half, 0.5 * _FLAT), colour=colour)
+
+
+def _between(low: Rgb, high: Rgb, share: float) -> Rgb:
+    """Return a mixture of two colours."""
+    r, g, b = (round(a + share * (z - a)) for a, z in zip(low, high, strict=True))
+    return r, g, b

@@ -1,0 +1,176 @@
+"""What single and vector environments ask of a batch of cells."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, Protocol, TypeVar, cast
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from app.errors import InvalidInput
+from app.sim.cells.cell import Cell, load_cell
+from app.sim.envs.raycast import Image
+from app.sim.envs.rendering import people_solids, picture, target_solids
+from app.sim.pick.batch import OUTCOMES, PickBatch, PickSettings
+from app.sim.reach.batch import ReachBatch, ReachSettings
+from app.sim.scene.scene import HumanKind
+
+Rows = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+Infos = dict[str, NDArray[Any]]
+Settings = TypeVar("Settings", PickSettings, ReachSettings)
+
+OBS_BOUND = 100.0
+"""Bound of the observation spaces; nothing observed comes near it."""
+RENDER_MODES = ("rgb_array",)
+NAMES = np.array(OUTCOMES, dtype=object)
+TIMEOUT = OUTCOMES.index("timeout")
+
+
+class Result(Protocol):
+    """What one batched step gave."""
+
+    @property
+    def rew(self) -> NDArray[np.float32]:
+        """Rewards, shape (n_envs,)."""
+
+    @property
+    def ended(self) -> Rows:
+        """Outcome of the episodes that ended now, 0 elsewhere, shape (n_envs,)."""
+
+
+class Batch(Protocol):
+    """Rows that are stepped together and draw their episodes from one seed."""
+
+    n_envs: int
+    seed: int
+
+    @property
+    def episode(self) -> Rows:
+        """Numbers of the present episodes, shape (n_envs,); changed before a start."""
+
+    @property
+    def obs(self) -> NDArray[Any]:
+        """Observations, shape (n_envs, obs_size); overwritten."""
+
+    def start(self, rows: Rows) -> NDArray[Any]:
+        """Start the episodes numbered by ``episode`` in some rows."""
+
+    def step(self, act: Any, *, auto_reset: bool = True) -> Result:
+        """Step every row whose episode has not ended."""
+
+
+class Task(Protocol):
+    """A batch, and how it looks from outside."""
+
+    @property
+    def batch(self) -> Batch:
+        """The rows."""
+
+    @property
+    def action_space(self) -> spaces.Space[Any]:
+        """Space of one row's actions."""
+
+    @property
+    def observation_space(self) -> spaces.Space[Any]:
+        """Space of one row's observations."""
+
+    def actions(self, given: Any) -> NDArray[Any]:
+        """Return actions as the batch takes them."""
+
+    def cut(self, ended: Rows) -> Mask:
+        """Return which of these outcomes truncate an episode, shape (n_envs,)."""
+
+    def infos(self) -> Infos:
+        """Return what ``info`` says, an entry per row; nothing of it is overwritten."""
+
+    def picture(self, row: int) -> Image:
+        """Return an image of one row."""
+
+
+class CellTask:
+    """Cells with a robot, people and a target.
+
+    Args:
+        batch: The cells.
+        sees_time: Whether the time left is observed. A time-out then terminates, since it is
+            part of the task; otherwise it truncates.
+    """
+
+    def __init__(self, batch: PickBatch | ReachBatch, *, sees_time: bool) -> None:
+        self.batch, self._sees_time = batch, sees_time
+        self.action_space = _box(1.0, batch.n_act)
+        self.observation_space = _box(OBS_BOUND, batch.obs_size)
+
+    def actions(self, given: Any) -> NDArray[np.float32]:
+        """Return actions as the batch takes them, shape (n_envs, n_act)."""
+        shape = self.batch.n_envs, self.batch.n_act
+        return np.asarray(given, dtype=np.float32).reshape(shape)
+
+    def cut(self, ended: Rows) -> Mask:
+        """Return which of these outcomes truncate an episode, shape (n_envs,)."""
+        late: Mask = (ended == TIMEOUT) & (not self._sees_time)
+        return late
+
+    def infos(self) -> Infos:
+        """Return what ``info`` says, an entry per cell."""
+        state = self.batch.state
+        return {
+            "outcome": NAMES[state.outcome],
+            "episode_number": state.episode.copy(),
+            "clearance_m": state.clear[:, 0].copy(),
+            "time_left_s": state.time_left.copy(),
+        }
+
+    def picture(self, row: int) -> Image:
+        """Return an image of one cell."""
+        cell, state = self.batch.cell, self.batch.state
+        people = people_solids(cell, state.people, row)
+        return picture(cell, state.q[row], people, target_solids(state.goal[row]))
+
+
+def _box(bound: float, n: int) -> spaces.Space[Any]:
+    return cast("spaces.Space[Any]", spaces.Box(-bound, bound, (n,), np.float32))
+
+
+def cell_of(cell: str | Cell) -> Cell:
+    """Return a work cell given by name or as it is."""
+    return load_cell(cell) if isinstance(cell, str) else cell
+
+
+def settings_with(settings: Settings, people: Sequence[HumanKind] | None) -> Settings:
+    """Return settings with other people, or as they are where ``people`` is None."""
+    return settings if people is None else replace(settings, people=tuple(people))
+
+
+def frames_per_s(cell: Cell) -> int:
+    """Return the control rate of a cell [Hz]."""
+    return round(1.0 / cell.robot.dt)
+
+
+def check_render_mode(mode: str | None) -> str | None:
+    """Return a render mode that exists, or None for none.
+
+    Raises:
+        InvalidInput: There is no such mode.
+    """
+    if mode is not None and mode not in RENDER_MODES:
+        raise InvalidInput("render_mode", mode, "must be a render mode or None", RENDER_MODES)
+    return mode
+
+
+def next_episode(batch: Batch, rows: Rows, seed: int | None, episode: int | None) -> None:
+    """Number the episodes that start now in some rows, and start them.
+
+    Args:
+        batch: Batch of the rows.
+        rows: Numbers of the rows.
+        seed: Seed of episode 0; None for the next episode of the present seed.
+        episode: Number of the episode instead of these.
+    """
+    if seed is not None:
+        batch.seed = seed
+    after = batch.episode[rows] + 1 if seed is None else 0
+    batch.episode[rows] = after if episode is None else episode
+    batch.start(rows)

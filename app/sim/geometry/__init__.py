@@ -1,0 +1,1 @@
+"""Distances between segments, capsules, boxes and cylinders (compiled)."""

@@ -1,0 +1,1 @@
+"""Compiled kinematics of the human model."""

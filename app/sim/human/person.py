@@ -1,0 +1,31 @@
+"""One person in the cell: state of the human model, or a cylinder."""
+
+from dataclasses import dataclass
+
+from app.sim.core.arrays import Vec
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Person:
+    """One person in the cell, as the 18-DoF model of METHOD 3.4."""
+
+    q: Vec
+    """Joint positions [m, rad], shape (18,), order of ``human.JOINT_NAMES``."""
+    qd: Vec
+    """Joint speeds [m/s, rad/s], shape (18,)."""
+    size: Vec | None = None
+    """Lengths of the body [m], shape (12,) (``BodySize.vector``); None: the cell's person."""
+    cylinder: Vec | None = None
+    """x, y and radius [m], shape (3,), of the cylinder that is all that is known of this person
+    (``seen_people.standing_in``); then distances count to it. None: a body of 18 joints."""
+    top: float | None = None
+    """Height of the top of that cylinder [m], as safety layers take it; None: as high as the
+    cell's people, or 2 m over the floor."""
+    growth: float = 0.0
+    """How fast the radius of that cylinder grows [m/s]; 0 where nothing is known of it."""
+    past: Vec | None = None
+    """Radius [m] and walking speed [m/s] of that cylinder 0.1 s, 0.2 s, ... ago, shape (n, 2),
+    n at most ``occupancy.N_PAST - 1``; None where nothing is remembered."""
+    measured: bool = False
+    """Whether a safety layer may go by the velocity of that cylinder: it was measured, and is
+    not 0 for want of knowing."""

@@ -1,1 +1,0 @@
-"""Compiled, batched kernels (numba): scalar code per environment, no allocation in loops."""

@@ -1,0 +1,216 @@
+"""Joint angles in tables: CSV with our own columns.
+
+Declared are ``# angles = degrees`` (or ``radians``) and, where there is no column ``time``,
+``# rate_hz = 100``. A line names the columns: the 18 of ``human.JOINT_NAMES`` in any order,
+and, if wanted, ``time`` [s] and ``pelvis_z``, the height of the pelvis above its height in
+standing [m]. ``pelvis_x`` and ``pelvis_y`` are metres. ``csv_text.py`` reads the text.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.errors import digits
+from app.sim.core.arrays import Vec
+from app.sim.human.model import JOINT_NAMES
+from app.sim.mocap.artifacts import Glitch
+from app.sim.mocap.bvh import check_dt, shown
+from app.sim.mocap.csv_text import CsvText, read_csv_text
+from app.sim.mocap.tables import Table, bad, complete_rows, missing_values
+
+CSV_COLUMNS = ("time", *JOINT_NAMES, "pelvis_z")
+"""Columns that a CSV file can have."""
+ANGLE_UNITS: Mapping[str, tuple[str, ...]] = {
+    "degrees": ("deg", "degs", "degree", "degrees", "°"),
+    "radians": ("rad", "rads", "radian", "radians"),
+}
+"""Units that angles can be declared in, and what files call them."""
+MAX_RADIANS = 8.0
+"""A table in radians whose joint angles exceed this is in degrees [rad]."""
+MIN_DEGREES = 3.2
+"""A table in degrees none of whose joint angles exceeds this is in radians [deg]."""
+MAX_PLACE = 100.0
+"""Farthest from the origin that a pelvis stands [m]."""
+
+_SECONDS = ("s", "sec", "second", "seconds")
+_METRES = ("m", "metre", "metres", "meter", "meters")
+_PLACES = ("pelvis_x", "pelvis_y", "pelvis_z")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AngleTrack:
+    """Joint angles over time, as a file gives them."""
+
+    times: Vec
+    """Rising [s], shape (n,)."""
+    q: Vec
+    """Joint positions of the 18-DoF model [m, rad], shape (n, 18)."""
+    pelvis_z: Vec
+    """Height of the pelvis [m], shape (n,)."""
+    frames: NDArray[np.int64]
+    """Frame of the file that each row is, counted from 0, shape (n,)."""
+    n_frames: int
+    """Frames of the file, with those that lack a value."""
+    missing: tuple[Glitch, ...]
+    """Frames that lack a value; they are left out."""
+    names: Mapping[str, str]
+    """Columns whose name in the file is not ours, by our name."""
+
+
+def read_csv(text: str, names: Mapping[str, str] | None = None) -> AngleTrack:
+    """Return the joint angles of a CSV file.
+
+    Args:
+        text: The file.
+        names: Name map, theirs to ours.
+
+    Raises:
+        BadMotion: It is no sound table; the faults name lines and columns.
+    """
+    names = names or {}
+    file = read_csv_text(text, (*CSV_COLUMNS, *names))
+    columns = _columns(file.table, names)
+    degrees = _declared_degrees(file, columns)
+    _check_units(file, columns, degrees)
+    values = file.table.values(columns)
+    good = complete_rows(values, "frames")
+    sound = {name: column[good] for name, column in values.items()}
+    q = np.stack([sound[name] for name in JOINT_NAMES], axis=1)
+    q[:, 2:] = in_radians({name: sound[name] for name in JOINT_NAMES[2:]}, degrees)
+    require_places({name: sound[name] for name in ("pelvis_x", "pelvis_y")})
+    pelvis_z = sound.get("pelvis_z", np.zeros(len(q)))
+    require_places({"pelvis_z": pelvis_z}, most=2.0)
+    times: Vec
+    if "time" in sound:
+        times = check_times(sound["time"], file.table, good)
+    else:
+        times = np.asarray(_dt(file.said.get("rate_hz")) * np.flatnonzero(good))
+    return AngleTrack(
+        times=times,
+        q=q,
+        pelvis_z=pelvis_z,
+        frames=np.flatnonzero(good),
+        n_frames=len(good),
+        missing=missing_values(values, good),
+        names=file.table.foreign(columns),
+    )
+
+
+def _columns(table: Table, names: Mapping[str, str]) -> dict[str, int]:
+    """Return the index of each column by our name; all must be known."""
+    columns = table.columns(CSV_COLUMNS, names)
+    place = f"line {table.line}"
+    missing = [name for name in JOINT_NAMES if name not in columns]
+    if missing:
+        rule = f"lacks the columns {', '.join(missing)}"
+        raise bad(place, "", rule, table.near(missing, columns))
+    known = set(columns.values())
+    strange = [name for k, name in enumerate(table.labels) if name and k not in known]
+    if strange:
+        optional = [name for name in CSV_COLUMNS if name not in columns]
+        hint = table.near(optional, columns)
+        raise bad(place, "", f"has unknown columns: {', '.join(strange)[:200]}", hint)
+    return columns
+
+
+def _declared_degrees(file: CsvText, columns: Mapping[str, int]) -> bool:
+    """Return whether angles are declared in degrees, by a comment or by all their units."""
+    said = file.said.get("angles", "")
+    stated = {file.units.get(columns[name]) for name in JOINT_NAMES[2:]}
+    for unit, spellings in ANGLE_UNITS.items():
+        if said == unit or (not said and stated <= set(spellings)):
+            return unit == "degrees"
+    rule = "must be declared in the first line: # angles = degrees, or # angles = radians"
+    raise bad("angles", shown(said) if said else "", rule)
+
+
+def _check_units(file: CsvText, columns: Mapping[str, int], degrees: bool) -> None:
+    """Refuse units that the file states of its columns and that are not those we read."""
+    angles = ANGLE_UNITS["degrees" if degrees else "radians"]
+    for name, k in columns.items():
+        wanted = _SECONDS if name == "time" else _METRES if name in _PLACES else angles
+        unit = file.units.get(k)
+        if unit is not None and unit not in wanted:
+            rule = f"is the unit that the file states; must be {wanted[0]}"
+            raise bad(f"column {name}", shown(unit), rule)
+
+
+def in_radians(angles: Mapping[str, Vec], degrees: bool) -> Vec:
+    """Return joint angles [rad], shape (n, number of columns).
+
+    Args:
+        angles: Columns by name, in the declared unit; the yaw may turn round and round.
+        degrees: The declared unit.
+
+    Raises:
+        BadMotion: The numbers fit the other unit.
+    """
+    turning = ("pelvis_yaw", "pelvis_rotation")
+    largest = {
+        name: float(np.abs(column).max())
+        for name, column in angles.items()
+        if name not in turning
+    }
+    name = max(largest, key=largest.__getitem__)
+    most = largest[name]
+    if not degrees and most > MAX_RADIANS:
+        rule = f"must be at most {MAX_RADIANS} rad, as the file declares radians"
+        raise bad(f"column {name}", f"{most:.4g}", rule, "looks like degrees")
+    if degrees and 0.0 < most <= MIN_DEGREES:
+        rule = f"is the largest angle, and a motion in degrees exceeds {MIN_DEGREES}"
+        raise bad(f"column {name}", f"{most:.4g}", rule, "looks like radians")
+    if degrees and most > 720.0:
+        rule = "must be at most 720 degrees"
+        raise bad(f"column {name}", f"{most:.4g}", rule)
+    columns = np.stack(list(angles.values()), axis=1)
+    return np.radians(columns) if degrees else columns
+
+
+def require_places(places: Mapping[str, Vec], most: float = MAX_PLACE) -> None:
+    """Refuse positions that are no metres.
+
+    Raises:
+        BadMotion: One lies farther than ``most`` [m] from the origin.
+    """
+    for name, column in places.items():
+        far = float(np.abs(column).max())
+        if far > most:
+            hint = f"looks like millimetres: in m that is {far / 1000.0:.4g}"
+            rule = f"must be at most {most:g} m"
+            raise bad(f"column {name}", f"{far:.4g}", rule, hint if far > 100.0 else "")
+
+
+def check_times(times: Vec, table: Table, good: NDArray[np.bool_]) -> Vec:
+    """Return a column of times [s].
+
+    Args:
+        times: Of the rows that have all values, shape (n,).
+        table: The whole table.
+        good: Which rows have all values.
+
+    Raises:
+        BadMotion: They do not rise, or at no rate of motion capture.
+    """
+    dt = np.diff(times)
+    stuck = np.flatnonzero(dt <= 0.0)
+    if stuck.size:
+        k = int(stuck[0]) + 1
+        rule = f"must be later than the row before, {digits(times[k - 1])} s"
+        line = table.rows[int(np.flatnonzero(good)[k])][0]
+        raise bad(f"line {line}, column time", digits(times[k]), rule)
+    check_dt(float(np.median(dt)), "column time, between rows")
+    return times
+
+
+def _dt(rate: str | None) -> float:
+    """Return the time between two rows [s], from a declared rate."""
+    try:
+        rate_hz = float((rate or "").replace(",", "."))
+    except ValueError:
+        rate_hz = 0.0
+    if not 0.0 < rate_hz < np.inf:
+        rule = "must be declared where there is no column time: # rate_hz = 100"
+        raise bad("rate_hz", shown(rate) if rate else "", rule)
+    return check_dt(1.0 / rate_hz, "rate_hz, the time between rows")

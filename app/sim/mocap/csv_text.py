@@ -1,0 +1,157 @@
+"""The text of a CSV file as spreadsheets, statistics programs and people write it.
+
+The separator is the one under which the line of names holds most known names; ``csv.Sniffer``
+guesses it from the rows instead, and takes decimal commas for separators. Source: RFC 4180;
+spreadsheets deviate from it by ``;`` and tabs, decimal commas, padding and a line ``sep=;``.
+"""
+
+import csv
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from app.sim.mocap.bvh import lines_of
+from app.sim.mocap.tables import MAX_COLUMNS, MISSING, PADDING, Table, bad, named_columns, plain
+
+SEPARATORS = (",", ";", "\t", "|")
+"""Between columns; white space where none of them is there."""
+INDEX_NAMES = frozenset(("index", "idx", "frame", "frameno", "framenumber", "row", "nr", "no"))
+"""Plain names of columns that count the rows; they are not read."""
+
+_ERRORS = tuple(word for word in MISSING if word.startswith("#"))
+"""What a spreadsheet writes for an error, which begins like a comment."""
+
+Split = Callable[[str, int], list[str]]
+"""Splits a line into cells, at so many places at most."""
+Lines = list[tuple[int, str]]
+"""Line numbers and texts."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CsvText:
+    """A CSV file: what its comments declare, and its table."""
+
+    said: Mapping[str, str]
+    """Declarations, ``# key = value``, in lower case."""
+    table: Table
+    """Columns and rows, without the row of units."""
+    units: Mapping[int, str]
+    """Unit that the file states of a column, by index: in its name or in a row of its own."""
+
+
+def read_csv_text(text: str, known: Sequence[str]) -> CsvText:
+    """Return the declarations and the table of a CSV file.
+
+    Args:
+        text: The file.
+        known: Names of columns by which the line of names and the separator are found.
+
+    Raises:
+        BadMotion: It holds no table.
+    """
+    comments, table = _lines(text)
+    if not table:
+        raise bad("file", "", "holds no table")
+    keys = frozenset(plain(name) for name in known)
+    head, rows = table[0], table[1:]
+    if not _known(head[1], keys):  # numpy.savetxt writes the names as a comment
+        named = [one for one in comments if _known(one[1].lstrip("# "), keys) > 2]
+        head, rows = (named[-1], table) if named else (head, rows)
+    told = head[1].lstrip("# ").rstrip(",;|\t ")
+    split = _splitter(told, keys)
+    names = named_columns(split(told, MAX_COLUMNS), head[0])
+    units = {k: unit for k, name in enumerate(names) if (unit := _bracketed(name))}
+    if rows and (below := _units_row(split(rows[0][1], len(names)))):
+        units, rows = {**units, **below}, rows[1:]
+    return CsvText(
+        said=dict(_declared(line) for _, line in comments),
+        table=Table(
+            names=names,
+            labels=tuple("" if _is_index(name) else name for name in names),
+            line=head[0],
+            rows=rows,
+            split=split,
+            decimal=_decimal(split(line, len(names)) for _, line in rows[:50]),
+        ),
+        units=units,
+    )
+
+
+def _lines(text: str) -> tuple[Lines, Lines]:
+    """Return comments and table without lines that hold nothing around them."""
+    lines = [(k, line) for k, line in enumerate(lines_of(text), 1) if line.strip()]
+    comments = [one for one in lines if _is_comment(one[1])]
+    table = [one for one in lines if not _is_comment(one[1])]
+    held = [k for k, (_, line) in enumerate(table) if line.strip(PADDING)]
+    if held and table[held[0]][1].strip(PADDING).startswith("sep="):
+        del held[0]
+    return comments, table[held[0] : held[-1] + 1] if held else []
+
+
+def _is_comment(line: str) -> bool:
+    start = line.lstrip(PADDING)[:10].lower()
+    return start.startswith("#") and not start.startswith(_ERRORS)
+
+
+def _known(line: str, keys: frozenset[str]) -> int:
+    """Return how many known names a line holds, under the best separator."""
+    return _score(_splitter(line, keys)(line, MAX_COLUMNS), keys)
+
+
+def _score(cells: Iterable[str], keys: frozenset[str]) -> int:
+    return sum(plain(cell) in keys for cell in cells)
+
+
+def _splitter(line: str, keys: frozenset[str]) -> Split:
+    """Return what splits the lines of a file at its separator, and takes quotes away."""
+    found: list[tuple[int, int, Split]] = []
+    for separator in SEPARATORS:
+        split = _split_at(separator)
+        cells = split(line, MAX_COLUMNS)
+        found.append((_score(cells, keys), len(cells), split))
+    _, n_cells, best = max(found, key=lambda one: one[:2])
+    return _split_at(None) if n_cells == 1 and len(line.split(None, 2)) > 2 else best
+
+
+def _split_at(separator: str | None) -> Split:
+    def split(line: str, most: int) -> list[str]:
+        if '"' not in line or separator is None:
+            return line.split(separator, most)
+        try:
+            return next(csv.reader([line], delimiter=separator, skipinitialspace=True))
+        except csv.Error:  # a cell of more than 128 kB
+            return line.split(separator, most)
+
+    return split
+
+
+def _declared(line: str) -> tuple[str, str]:
+    key, _, value = line.replace(":", "=").strip(PADDING).lstrip("# ").partition("=")
+    return key.strip(PADDING).lower(), value.strip(PADDING).lower()
+
+
+def _is_index(name: str) -> bool:
+    return not plain(name) or plain(name) in INDEX_NAMES or name.startswith("Unnamed:")
+
+
+def _bracketed(name: str) -> str:
+    """Return the unit in brackets behind a column's name."""
+    found = re.search(r"[(\[{]([^)\]}]{1,20})[)\]}]\s*$", name[-30:])
+    return found.group(1).strip().lower() if found else ""
+
+
+def _units_row(cells: Sequence[str]) -> dict[int, str]:
+    """Return the units that a row states; none where it holds numbers or nothing."""
+    words = {k: cell.strip().strip("()[]{}").lower() for k, cell in enumerate(cells)}
+    stated = {k: word for k, word in words.items() if word not in MISSING}
+    sound = all(re.fullmatch("[a-z°/^]{1,10}", one) for one in stated.values())
+    return stated if sound else {}
+
+
+def _decimal(rows: Iterable[Sequence[str]]) -> str:
+    """Return the decimal sign of a table: the last sign of its first broken number."""
+    for cells in rows:
+        for cell in cells:
+            if re.fullmatch(r"\s*[+-]?[\d.,'\s]*\d\s*", cell[:60]) and re.search("[.,]", cell):
+                return max(".,", key=cell.rfind)
+    return "."

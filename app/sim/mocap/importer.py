@@ -1,0 +1,343 @@
+"""Importing recorded human motion: a file in, clean runs of the 18-DoF model out.
+
+Three formats: BVH (joint centres, through ``skeletons.py`` and ``track_angles.py``), OpenSim's
+``.mot``/``.sto`` and our own CSV (angles). Whatever the file is, the answer is an
+:class:`ImportedMotion` or one :class:`~app.errors.BadMotion` that names place and rule.
+
+Bodies of another size: **angles are kept, and the pelvis's path is kept in metres.** A person
+of the simulator's size makes the recorded gesture in the recorded place; where the recorded arm
+was longer, the simulated hand falls short by the difference, which ``fixed_body`` measures. The
+error of the conversion itself, ``wrists`` and ``elbows``, is measured on the recorded body.
+Source: METHOD 3.4.
+"""
+
+import codecs
+import hashlib
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import PurePath
+
+import numpy as np
+
+from app.errors import BadMotion, Fault
+from app.sim.core.arrays import Vec
+from app.sim.human.anthropometry import BodySize
+from app.sim.human.model import JOINT_NAMES, Q_MAX, Q_MIN
+from app.sim.mocap.artifacts import MIN_RUN, Glitch, clean_runs, find_glitches, merged
+from app.sim.mocap.bvh import read_bvh
+from app.sim.mocap.csv_tables import AngleTrack, read_csv
+from app.sim.mocap.inverse_kinematics import body_angles
+from app.sim.mocap.joint_centres import (
+    ELBOW_L,
+    ELBOW_R,
+    PELVIS,
+    WRIST_L,
+    WRIST_R,
+    BodyTrack,
+    measure,
+    model_points,
+)
+from app.sim.mocap.opensim import read_opensim
+from app.sim.mocap.read_options import NOTHING_STATED, Reading, ReadOptions
+from app.sim.mocap.skeletons import body_track
+
+MAX_BYTES = 32 * 1024 * 1024
+"""Largest file that is read [bytes]."""
+FORMATS = (".bvh", ".mot", ".sto", ".csv")
+"""Endings of the names of files that can be read."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Motion:
+    """One run of recorded motion of the 18-DoF person."""
+
+    name: str
+    """The file's name without its ending."""
+    source: str
+    """Where it comes from: file, SHA-256 (12 digits) and frames."""
+    times: Vec
+    """From 0, rising [s], shape (n,)."""
+    q: Vec
+    """Joint positions [m, rad], shape (n, 18); continuous, not clipped to joint limits."""
+    pelvis_z: Vec
+    """Height of the pelvis above its height in standing [m], shape (n,).
+
+    Standing is the 95th percentile of the file's clean frames; our own tables state it.
+    """
+    size: BodySize
+    """Lengths of the recorded person."""
+    first_frame: int
+    """Frame of the file with which the run begins, counted from 0."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Spread:
+    """How an error is spread over frames [m]."""
+
+    p50: float
+    """Half of the frames are better."""
+    p99: float
+    """One frame of a hundred is worse."""
+    worst: float
+    """The largest."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ImportedMotion:
+    """What an import found in a file."""
+
+    name: str
+    """The file's name without its ending."""
+    format: str
+    """One of FORMATS, without its dot."""
+    reading: Reading
+    """How the file was read: units, up axis, names, rate."""
+    n_frames: int
+    """Frames in the file; those that repeat count once, those that lack a value do count."""
+    duration: float
+    """Of the file [s]."""
+    size: BodySize
+    """Lengths of the recorded person; the simulator's own where only angles are given."""
+    runs: tuple[Motion, ...]
+    """Clean runs, at least one."""
+    spans: tuple[tuple[int, int], ...]
+    """First and last frame of each run, counted from 0 in the file."""
+    glitches: tuple[Glitch, ...]
+    """What was cut out."""
+    wrists: Spread
+    """Wrists of the model, with the recorded lengths, against the file's own."""
+    elbows: Spread
+    """The same for the elbows."""
+    wrists_at_fixed_height: Spread
+    """Wrists where the pelvis's height is not carried along but stays that of standing."""
+    pelvis: Spread
+    """The pelvis, which gives way so that the neck is met."""
+    fixed_body: Spread
+    """Wrists of the simulator's person, who has other lengths, against the file's."""
+    beyond_limits: dict[str, tuple[float, float]]
+    """Joints that leave the model's limits: share of the clean frames, farthest [rad]."""
+
+    @property
+    def n_clean(self) -> int:
+        """Frames of all clean runs."""
+        return sum(len(run.times) for run in self.runs)
+
+
+def read_motion(
+    content: bytes, file_name: str, options: ReadOptions = NOTHING_STATED
+) -> ImportedMotion:
+    """Import a file of recorded motion.
+
+    Args:
+        content: The file, of whatever kind.
+        file_name: Its name; the ending says which format is meant.
+        options: What is stated about the file.
+
+    Raises:
+        BadMotion: It is no sound motion; each fault names line or column and rule.
+    """
+    ending = PurePath(file_name).suffix.lower()
+    if ending not in FORMATS:
+        raise _bad("file name", repr(file_name[-60:]), f"must end with {', '.join(FORMATS)}")
+    text = _text(content, ending)
+    digest = hashlib.sha256(content).hexdigest()[:12]
+    track, angles, reading = _read(text, ending, options)
+    size = measure(track.points) if angles is None else BodySize()
+    frames = np.arange(len(track.times)) if angles is None else angles.frames
+    missing = () if angles is None else angles.missing
+    found = find_glitches(track.times, track.points)
+    spans = clean_runs(track.times, found)
+    glitches = merged(found, missing, frames)
+    if not spans:
+        raise _no_run(track, glitches)
+    name = PurePath(file_name).stem[:100]
+    origin = f"{PurePath(file_name).name[:100]} ({digest})"
+    pieces = [_converted(track, angles, size, span) for span in spans]
+    # Our own tables count the height from standing; elsewhere that is the 95th percentile.
+    standing = 0.0 if ending == ".csv" else None
+    joined = _Pieces(track, size, spans, pieces, standing)
+    in_file = tuple((int(frames[a]), int(frames[b])) for a, b in spans)
+    return ImportedMotion(
+        name=name,
+        format=ending[1:],
+        reading=reading,
+        n_frames=len(track.times) if angles is None else angles.n_frames,
+        duration=float(track.times[-1] - track.times[0]),
+        size=size,
+        runs=joined.motions(name, origin, in_file),
+        spans=in_file,
+        glitches=glitches,
+        wrists=joined.error((WRIST_R, WRIST_L)),
+        elbows=joined.error((ELBOW_R, ELBOW_L)),
+        wrists_at_fixed_height=joined.error((WRIST_R, WRIST_L), carry_height=False),
+        pelvis=joined.error((PELVIS,)),
+        fixed_body=joined.error((WRIST_R, WRIST_L), body=BodySize()),
+        beyond_limits=beyond_limits(np.concatenate([q for q, _ in pieces])),
+    )
+
+
+def _read(
+    text: str, ending: str, options: ReadOptions
+) -> tuple[BodyTrack, AngleTrack | None, Reading]:
+    """Return joint centres, joint angles where the file holds them, and how it was read."""
+    if ending == ".bvh":
+        track, reading = body_track(read_bvh(text), options)
+        return track, None, reading
+    _require_names_only(options)
+    read, up = (read_csv, "z") if ending == ".csv" else (read_opensim, "y")
+    angles = read(text, options.names)
+    points = model_points(angles.q, angles.pelvis_z, BodySize())
+    rate_hz = 1.0 / float(np.median(np.diff(angles.times)))
+    return (
+        BodyTrack(times=angles.times, points=points),
+        angles,
+        Reading(unit="m", root_unit="m", up=up, rate_hz=rate_hz, names=angles.names),
+    )
+
+
+def placed(motion: Motion, x: float, y: float, yaw: float) -> Motion:
+    """Return the motion moved so that it begins with the pelvis at a place, facing ``yaw``.
+
+    Args:
+        motion: A run as imported, in the frame of its file.
+        x: Pelvis x at the first frame [m].
+        y: Pelvis y at the first frame [m].
+        yaw: Direction faced at the first frame [rad].
+    """
+    q = motion.q.copy()
+    turn = yaw - q[0, 2]
+    c, s = np.cos(turn), np.sin(turn)
+    path = q[:, :2] - q[0, :2]
+    q[:, 0] = x + c * path[:, 0] - s * path[:, 1]
+    q[:, 1] = y + s * path[:, 0] + c * path[:, 1]
+    q[:, 2] += turn
+    return replace(motion, q=_own(q))
+
+
+def beyond_limits(q: Vec) -> dict[str, tuple[float, float]]:
+    """Return the joints that leave the model's limits: share of frames, farthest [rad].
+
+    Args:
+        q: Joint positions [m, rad], shape (n, 18); place and yaw have no limits here.
+    """
+    excess = np.maximum(Q_MIN - q, q - Q_MAX)[:, 3:]
+    return {
+        name: (float((column > 0.0).mean()), float(column.max()))
+        for name, column in zip(JOINT_NAMES[3:], excess.T, strict=True)
+        if column.max() > 0.0
+    }
+
+
+class _Pieces:
+    """The clean runs of one track, to be measured together."""
+
+    def __init__(
+        self,
+        track: BodyTrack,
+        size: BodySize,
+        spans: Sequence[tuple[int, int]],
+        pieces: Sequence[tuple[Vec, Vec]],
+        standing: float | None,
+    ) -> None:
+        self._track, self._size, self._spans = track, size, spans
+        self._q = np.concatenate([q for q, _ in pieces])
+        self._height = np.concatenate([height for _, height in pieces])
+        self._points = np.concatenate([track.points[a : b + 1] for a, b in spans])
+        if standing is None:
+            standing = float(np.percentile(self._height, 95.0))
+        self._standing = standing
+        self._pieces = pieces
+
+    def motions(
+        self, name: str, origin: str, in_file: Sequence[tuple[int, int]]
+    ) -> tuple[Motion, ...]:
+        """Return the runs; the pelvis's height counts from standing."""
+        return tuple(
+            Motion(
+                name=name,
+                source=f"{origin}, frames {first} to {last}",
+                times=_own(self._track.times[a : b + 1] - self._track.times[a]),
+                q=_own(q),
+                pelvis_z=_own(height - self._standing),
+                size=self._size,
+                first_frame=first,
+            )
+            for (a, b), (first, last), (q, height) in zip(
+                self._spans, in_file, self._pieces, strict=True
+            )
+        )
+
+    def error(
+        self,
+        which: tuple[int, ...],
+        *,
+        body: BodySize | None = None,
+        carry_height: bool = True,
+    ) -> Spread:
+        """Return how far points of the model lie from the file's [m]."""
+        height = self._height if carry_height else np.full(len(self._height), self._standing)
+        model = model_points(self._q, height, body or self._size)
+        gaps = np.linalg.norm((model - self._points)[:, list(which)], axis=2)
+        p50, p99, worst = (float(one) for one in np.percentile(gaps, (50.0, 99.0, 100.0)))
+        return Spread(p50=p50, p99=p99, worst=worst)
+
+
+def _converted(
+    track: BodyTrack, angles: AngleTrack | None, size: BodySize, span: tuple[int, int]
+) -> tuple[Vec, Vec]:
+    """Return joint positions and the pelvis's height of one clean run."""
+    part = slice(span[0], span[1] + 1)
+    if angles is not None:
+        return angles.q[part].copy(), angles.pelvis_z[part].copy()
+    run = replace(
+        track,
+        times=track.times[part],
+        points=track.points[part],
+        hips=None if track.hips is None else track.hips[part],
+    )
+    return body_angles(run, size)
+
+
+def _text(content: bytes, ending: str) -> str:
+    """Return a file's text: UTF-8, UTF-16 with its mark, or a spreadsheet's Latin-1."""
+    if len(content) > MAX_BYTES:
+        rule = f"must have at most {MAX_BYTES} bytes (32 MB)"
+        raise _bad("file", f"<{len(content)} bytes>", rule, "cut it into parts")
+    marked = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    try:
+        text = content.decode("utf-16" if marked else "utf-8-sig")
+    except UnicodeDecodeError as error:
+        if ending == ".csv" and not re.search(rb"[\x00-\x08\x0e-\x1f]", content):
+            return content.decode("latin-1")
+        value = f"<byte {content[error.start]:#04x} at {error.start}>"
+        raise _bad("file", value, "must be text in UTF-8") from error
+    if not text.strip():
+        raise _bad("file", f"<{len(content)} bytes>", "is empty")
+    return text
+
+
+def _require_names_only(options: ReadOptions) -> None:
+    """Refuse a unit or an axis that is stated of a table: its places are metres."""
+    for name in ("unit", "root_unit", "up"):
+        stated = getattr(options, name)
+        if stated is not None:
+            raise _bad(name, repr(stated), "goes with .bvh only: places of a table are metres")
+
+
+def _no_run(track: BodyTrack, glitches: Sequence[Glitch]) -> BadMotion:
+    value = f"<{len(track.times)} frames, {track.times[-1] - track.times[0]:.2f} s>"
+    rule = f"has no run of {MIN_RUN:g} s without a glitch"
+    hint = f"{len(glitches)} glitches, first: {glitches[0].reason}" if glitches else "too short"
+    return _bad("frames", value, rule, hint)
+
+
+def _own(values: Vec) -> Vec:
+    """Return an array of its own that nobody can write to."""
+    kept = np.array(values, dtype=np.float64)
+    kept.setflags(write=False)
+    return kept
+
+
+def _bad(place: str, value: str, rule: str, hint: str = "") -> BadMotion:
+    return BadMotion([Fault(place=place, value=value, rule=rule, hint=hint)])

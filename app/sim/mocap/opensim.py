@@ -1,0 +1,254 @@
+"""Reading OpenSim's tables of joint angles (``.mot``, ``.sto``) onto the 18-DoF model.
+
+Coordinates are those of the full-body models (Hamner 2010, Rajagopal 2015, LaiUhlrich2022 of
+OpenCap, Pose2Sim): the pelvis's six, and trunk, shoulders and elbows each under one of the
+names below. OpenSim 4 names states by paths, ``/jointset/acromial_r/arm_flex_r/value``;
+speeds, activations, controls and multipliers are passed over, whatever they hold.
+
+OpenSim's x points forward, y up, z right. Our shoulder turns in the same order about the same
+axes as ``arm_flex``, ``arm_add``, ``arm_rot``, so these go over one to one; other shoulders are
+composed and taken apart again, and so are pelvis and lumbar rotations, into yaw and abdomen.
+Clavicles stay at zero. Sources: Rajagopal et al., "Full-body musculoskeletal model", IEEE TBME
+63(10), 2016; joints ``glenohumeral_r`` and ``_l`` of ``LaiUhlrich2022_shoulder.osim``.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from functools import reduce
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from app.sim.core.arrays import Vec
+from app.sim.mocap.bvh import axis_turns, lines_of, shown
+from app.sim.mocap.csv_tables import AngleTrack, check_times, in_radians, require_places
+from app.sim.mocap.inverse_kinematics import euler_angles, one_branch
+from app.sim.mocap.tables import (
+    MAX_COLUMNS,
+    Table,
+    bad,
+    complete_rows,
+    missing_values,
+    named_columns,
+)
+
+PELVIS = ("pelvis_tilt", "pelvis_list", "pelvis_rotation")
+PLACES = ("pelvis_tx", "pelvis_ty", "pelvis_tz")
+LUMBAR = ("lumbar_extension", "lumbar_bending", "lumbar_rotation")
+LEVELS = tuple(
+    tuple(f"{level}_{turn}" for turn in ("Flex_Ext", "Lat_Bending", "axial_rotation"))
+    for level in ("L5_S1", "L4_L5", "L3_L4", "L2_L3", "L1_L2", "L1_T12")
+)
+"""Where a model bends the lumbar spine level by level instead, or at its lowest level only."""
+ARMS = {hand: tuple(f"arm_{turn}_{hand}" for turn in ("flex", "add", "rot")) for hand in "rl"}
+ELEVATED = {
+    hand: tuple(f"sh_{turn}_{hand}" for turn in ("plane_elev", "elev", "axial_rot"))
+    for hand in "rl"
+}
+"""Shoulders by plane of elevation, elevation and axial rotation instead."""
+ELBOWS = {hand: f"elbow_flex_{hand}" for hand in "rl"}
+COORDINATES = (
+    *PELVIS,
+    *LUMBAR,
+    *PLACES,
+    *(name for hand in "rl" for name in (*ARMS[hand], ELBOWS[hand])),
+)
+"""Columns that must be there, besides ``time``; others (legs, forces) are not read."""
+KNOWN = (
+    "time",
+    *COORDINATES,
+    *(name for level in LEVELS for name in level),
+    *(name for hand in "rl" for name in ELEVATED[hand]),
+)
+"""All columns that are read."""
+
+_AXIAL = np.array([-0.0846, 0.0584, 0.9947])
+"""Axis of the right shoulder's axial rotation in our axes (x forward, y left, z up)."""
+_RATES = ("speeds", "velocities", "accelerations")
+
+
+def read_opensim(text: str, names: Mapping[str, str] | None = None) -> AngleTrack:
+    """Return the joint angles of a ``.mot`` or ``.sto`` file.
+
+    Args:
+        text: The file.
+        names: Name map, theirs to ours.
+
+    Raises:
+        BadMotion: It is no sound table of those coordinates; the faults name lines, columns.
+    """
+    lines = lines_of(text)
+    end = next((k for k, line in enumerate(lines) if line.strip() == "endheader"), None)
+    if end is None:
+        rule = "has no line endheader"
+        raise bad(f"line {len(lines)}", "", rule, "the file is cut off or not OpenSim's")
+    said = _head(lines[:end])
+    degrees = _in_degrees(said)
+    rows = [(k + 1, lines[k]) for k in range(end + 1, len(lines)) if lines[k].strip()]
+    if not rows:
+        raise bad(f"line {len(lines)}", "", "ends after endheader", "the file is cut off")
+    table = _table(rows)
+    _check_counts(said, table)
+    columns = _columns(table, names or {})
+    values = table.values(columns)
+    good = complete_rows(values, "frames")
+    sound = {name: column[good] for name, column in values.items()}
+    times = check_times(sound.pop("time"), table, good)
+    require_places({name: sound[name] for name in PLACES})
+    turning = {name: column for name, column in sound.items() if name not in PLACES}
+    angle = dict(zip(turning, in_radians(turning, degrees).T, strict=True))
+    return AngleTrack(
+        times=times,
+        q=_onto_model({**sound, **angle}),
+        pelvis_z=sound["pelvis_ty"],
+        frames=np.flatnonzero(good),
+        n_frames=len(good),
+        missing=missing_values(values, good),
+        names=table.foreign(columns),
+    )
+
+
+def coordinate(column: str) -> str:
+    """Return the coordinate whose value a column holds; empty where it holds something else.
+
+    Args:
+        column: A coordinate's name, or the path of a state or an output.
+    """
+    parts = re.split(r"[/|]", column.strip("/"))
+    if parts[-1] == "value" and len(parts) > 1:
+        return parts[-2]
+    is_joint = len(parts) == 3 and parts[0] == "jointset"
+    return parts[-1] if is_joint or len(parts) == 1 else ""
+
+
+def _head(lines: Sequence[str]) -> dict[str, str]:
+    """Return what the head says, by key in lower case.
+
+    Raises:
+        BadMotion: It is the head of a file of speeds or accelerations.
+    """
+    title = next((line.strip() for line in lines if line.strip()), "")
+    if title.lower() in _RATES:
+        hint = "take the file of coordinates, which ends with _q"
+        raise bad("line 1", shown(title), "must be coordinates", hint)
+    return {
+        key.strip().lower(): value.strip()
+        for key, _, value in (line.partition("=") for line in lines)
+    }
+
+
+def _in_degrees(said: Mapping[str, str]) -> bool:
+    degrees = {"yes": True, "no": False}.get(said.get("indegrees", "").lower())
+    if degrees is None:
+        value = shown(said["indegrees"]) if "indegrees" in said else ""
+        raise bad("head, inDegrees", value, "must be declared: inDegrees=yes or inDegrees=no")
+    return degrees
+
+
+def _table(rows: Sequence[tuple[int, str]]) -> Table:
+    line, head = rows[0]
+    separator = next((one for one in "\t," if one in head), None)
+    names = named_columns(head.split(separator, MAX_COLUMNS), line)
+
+    def split(text: str, most: int) -> list[str]:
+        here = separator if separator is None or separator in text else None
+        return text.split(here, most)
+
+    return Table(
+        names=names,
+        labels=tuple(coordinate(name) for name in names),
+        line=line,
+        rows=rows[1:],
+        split=split,
+    )
+
+
+def _check_counts(said: Mapping[str, str], table: Table) -> None:
+    """Refuse a table that has not as many columns and rows as the head promises."""
+    n_columns, n_rows = len(table.names), len(table.rows)
+    if said.get("ncolumns", str(n_columns)) != str(n_columns):
+        rule = f"must be the nColumns={said['ncolumns'][:20]} that the head promises"
+        raise bad(f"line {table.line}", f"<{n_columns} columns>", rule)
+    word = said.get("nrows", said.get("datarows", str(n_rows)))
+    if not word.isascii() or not word.isdigit():
+        raise bad("head, nRows", shown(word), "must be a whole number")
+    if (word.lstrip("0") or "0") != str(n_rows):
+        rule = f"must be the {word[:20]} that the head of the file promises"
+        hint = "the file is cut off" if n_rows < int(word[:9]) else ""
+        place = f"frames, last line {table.rows[-1][0]}" if table.rows else "frames"
+        raise bad(place, f"<{n_rows}>", rule, hint)
+
+
+def _columns(table: Table, names: Mapping[str, str]) -> dict[str, int]:
+    """Return the index of each column that is read, each part of the body under one name."""
+    there = table.columns(KNOWN, names)
+    lumbar = [LUMBAR] if _all(LUMBAR, there) else [one for one in LEVELS if _all(one, there)]
+    shoulders = [
+        next((one for one in (ARMS[h], ELEVATED[h]) if _all(one, there)), ARMS[h]) for h in "rl"
+    ]
+    wanted = [
+        "time", *PELVIS, *PLACES, *(name for part in lumbar or [LUMBAR] for name in part),
+        *(name for part in shoulders for name in part), *ELBOWS.values(),
+    ]  # fmt: skip
+    missing = [name for name in wanted if name not in there]
+    if missing:
+        hint = table.near(missing, there)
+        arms = re.compile("arm|elbow|should|humer|(^|_)sh_", re.IGNORECASE)
+        if not any(arms.search(label) for label in table.labels):
+            hint = "a full-body model with arms is needed, such as Rajagopal's"
+        raise bad(f"line {table.line}", "", f"lacks the columns {', '.join(missing)}", hint)
+    return {name: there[name] for name in wanted}
+
+
+def _all(part: Sequence[str], there: Mapping[str, int]) -> bool:
+    return all(name in there for name in part)
+
+
+def _onto_model(values: Mapping[str, Vec]) -> Vec:
+    """Return joint positions [m, rad], shape (n, 18), from coordinates [m, rad]."""
+    yaw, abdomen = trunk_angles(values)
+    q = np.zeros((len(yaw), 18))
+    q[:, 0], q[:, 1], q[:, 2] = values["pelvis_tx"], -values["pelvis_tz"], yaw
+    q[:, 3:6] = abdomen
+    for hand, first, side in (("r", 10, -1.0), ("l", 14, 1.0)):
+        if ARMS[hand][0] in values:
+            flex, add, rot = (values[name] for name in ARMS[hand])
+            q[:, first : first + 3] = np.column_stack([flex, -add, -side * rot])
+        else:
+            q[:, first : first + 3] = _elevated(values, hand, side, first)
+        q[:, first + 3] = values[ELBOWS[hand]]
+    return q
+
+
+def _elevated(values: Mapping[str, Vec], hand: str, side: float, first: int) -> Vec:
+    """Return our shoulder [rad], shape (n, 3), of plane of elevation, elevation, rotation.
+
+    The left shoulder turns about the right one's axes, the other way round.
+    """
+    plane, elevation, axial = (-side * values[name] for name in ELEVATED[hand])
+    turns = axis_turns(2, plane) @ axis_turns(0, -elevation)
+    turns = turns @ Rotation.from_rotvec(np.outer(axial, _AXIAL)).as_matrix()
+    return one_branch(euler_angles(turns) * np.array([-1.0, side, 1.0]), first)
+
+
+def trunk_angles(angle: Mapping[str, Vec]) -> tuple[Vec, Vec]:
+    """Return yaw [rad], shape (n,), and abdomen [rad], shape (n, 3).
+
+    The yaw is where the pelvis's forward axis points, seen from above; the abdomen takes what
+    is left of pelvis and lumbar rotations together.
+
+    Args:
+        angle: Rotations of the pelvis and of the lumbar joint, or of levels of the lumbar
+            spine, by name [rad], shape (n,).
+    """
+    joints = [one for one in (PELVIS, LUMBAR, *LEVELS) if one[0] in angle]
+    turns = [_turn(*(angle[name] for name in one)) for one in joints]
+    pelvis, torso = turns[0], reduce(np.matmul, turns)
+    yaw = np.unwrap(np.arctan2(pelvis[:, 1, 0], pelvis[:, 0, 0]))
+    return yaw, euler_angles(axis_turns(2, -yaw) @ torso)
+
+
+def _turn(about_z: Vec, about_x: Vec, about_y: Vec) -> Vec:
+    """Return OpenSim's ``Rz Rx Ry`` in our axes (x forward, y left, z up), shape (n, 3, 3)."""
+    turns: Vec = axis_turns(1, -about_z) @ axis_turns(0, about_x) @ axis_turns(2, about_y)
+    return turns

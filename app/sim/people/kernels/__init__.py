@@ -1,0 +1,1 @@
+"""Compiled motion of people."""

@@ -1,0 +1,202 @@
+"""People as walking cylinders: their settings, and walks for tests, plots and replay.
+
+The arithmetic is ``people/kernels/pedestrian.py``, compiled. Source: METHOD 2.1; the defaults
+are the
+constants given there.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import astuple, dataclass, fields
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.errors import InvalidInput
+from app.sim.core.arrays import Vec
+from app.sim.core.kernels.rng import State, start_stream
+from app.sim.people.kernels.pedestrian import (
+    CONSTANT,
+    FIXED_SPEED,
+    GAIT,
+    N_RULES,
+    N_STATE,
+    TARGET_X,
+    TARGET_Y,
+    TIME,
+    VX,
+    VY,
+    WALKER,
+    R,
+    WalkerRules,
+    WalkerState,
+    X,
+    Y,
+    advance_walker,
+    start_walker,
+)
+
+WalkerKind = Literal["walker", "constant", "fixed-speed"]
+WALKER_KINDS: dict[WalkerKind, int] = {
+    "walker": WALKER,
+    "constant": CONSTANT,
+    "fixed-speed": FIXED_SPEED,
+}
+"""Speed and radius by METHOD 2.1; both constant per episode; a given speed."""
+
+
+AUTHORS_WALK: dict[str, Any] = {"apart": 0.5, "inside": 1.0, "hurried": True, "p_go_on": 0.01}
+"""What the authors' public code does besides METHOD 2.1, as fields of the settings."""
+
+_RANGES = (("v_min", "v_max"), ("r_min", "r_max"), ("x_min", "x_max"), ("y_min", "y_max"))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WalkerSettings:
+    """One person who is a walking cylinder (METHOD 2.1).
+
+    Raises:
+        InvalidInput: A value that is not finite, out of its range, or above its upper partner.
+    """
+
+    kind: WalkerKind = "walker"
+    """Which variant."""
+    v_min: float = 0.3
+    """Least walking speed; slower counts as standing [m/s]."""
+    v_max: float = 1.0
+    """Greatest walking speed [m/s]."""
+    r_min: float = 0.2
+    """Least radius [m]."""
+    r_max: float = 0.5
+    """Greatest radius [m]."""
+    f_speed_max: float = 1.0
+    """Greatest frequency of the speed's function [Hz]."""
+    f_radius_max: float = 0.5
+    """Greatest frequency of the radius' function [Hz]."""
+    x_min: float = -2.0
+    """Walking area, left edge [m]."""
+    x_max: float = 1.0
+    """Walking area, right edge [m]."""
+    y_min: float = 0.5
+    """Walking area, near edge [m]."""
+    y_max: float = 2.0
+    """Walking area, far edge [m]."""
+    tolerance: float = 0.1
+    """Distance at which a target counts as reached [m]."""
+    p_still: float = 0.05
+    """Probability of standing still for a whole episode."""
+    p_stay: float = 0.1
+    """Probability of staying for good at a target that was reached."""
+    fixed_speed: float = 0.5
+    """Speed of kind ``fixed-speed`` [m/s]; the limits of the speed do not apply to it."""
+    apart: float = 0.0
+    """Least way to a new target [m]."""
+    inside: float = 0.0
+    """Targets lie this many radii inside the walking area."""
+    hurried: bool = False
+    """Whether the first period is never slower than ``v_min``."""
+    p_go_on: float = 0.0
+    """Probability, per period, of walking on after having stayed at a target."""
+
+    def __post_init__(self) -> None:
+        if self.kind not in WALKER_KINDS:
+            raise InvalidInput(
+                "kind", self.kind, "must be a kind of walker", list(WALKER_KINDS)
+            )
+        for field in fields(self)[1:]:
+            value = getattr(self, field.name)
+            if not math.isfinite(value):
+                raise InvalidInput(field.name, value, "must be finite")
+            if value < 0.0 and field.name[:2] not in ("x_", "y_"):
+                raise InvalidInput(field.name, value, "must not be negative")
+        for low, high in _RANGES:
+            least, greatest = getattr(self, low), getattr(self, high)
+            if least > greatest:
+                raise InvalidInput(low, least, f"must be at most {high} = {greatest}")
+        if self.r_min == 0.0:
+            raise InvalidInput("r_min", self.r_min, "must be positive")
+        for name in ("p_still", "p_stay", "p_go_on"):
+            if getattr(self, name) > 1.0:
+                raise InvalidInput(name, getattr(self, name), "must lie in [0, 1]")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Walk:
+    """One walker's episode, at the ends of n control periods."""
+
+    time: Vec
+    """Time since the start [s], shape (n + 1,)."""
+    position: Vec
+    """Axis x, y [m], shape (n + 1, 2)."""
+    velocity: Vec
+    """Velocity in the period to come [m/s], shape (n + 1, 2)."""
+    radius: Vec
+    """Radius [m], shape (n + 1,); linear between."""
+    target: Vec
+    """Where it is going [m], shape (n + 1, 2)."""
+    gait: NDArray[np.int64]
+    """WALKING, STAYING or STILL, shape (n + 1,)."""
+
+
+def walker_rules(walkers: Sequence[WalkerSettings]) -> WalkerRules:
+    """Return what the kernels know of a cell's walkers."""
+    rows = [(WALKER_KINDS[walker.kind], *astuple(walker)[1:]) for walker in walkers]
+    return WalkerRules(rows=np.array(rows, dtype=np.float64).reshape(-1, N_RULES))
+
+
+def walker_state(n_envs: int, n_walkers: int) -> WalkerState:
+    """Return rows for the walkers of ``n_envs`` environments, not started yet."""
+    return WalkerState(
+        rows=np.zeros((n_envs, n_walkers, N_STATE)),
+        stream=np.zeros((n_envs, n_walkers, 1), dtype=np.uint64),
+    )
+
+
+def walk(
+    walker: WalkerSettings,
+    seed: int,
+    seconds: float,
+    dt: float = 0.02,
+    *,
+    env: int = 0,
+    episode: int = 0,
+) -> Walk:
+    """Return one walker's episode, without a robot and without a rule about the start.
+
+    Args:
+        walker: How it walks.
+        seed: Seed of the batch.
+        seconds: How long; rounded to whole periods [s].
+        dt: Control period [s].
+        env: Environment in the batch.
+        episode: Number of the episode.
+
+    Raises:
+        InvalidInput: ``dt`` is not positive, or ``seconds`` is negative.
+    """
+    if not (math.isfinite(dt) and dt > 0.0):
+        raise InvalidInput("dt", dt, "must be positive")
+    if not (math.isfinite(seconds) and seconds >= 0.0):
+        raise InvalidInput("seconds", seconds, "must not be negative")
+    stream = np.zeros(1, dtype=np.uint64)
+    start_stream(seed, env, episode, stream)
+    rows = np.empty((round(seconds / dt) + 1, N_STATE))
+    _record(walker_rules([walker]), walker_state(1, 1), stream, dt, rows)
+    return Walk(
+        time=rows[:, TIME],
+        position=rows[:, X : Y + 1],
+        velocity=rows[:, VX : VY + 1],
+        radius=rows[:, R],
+        target=rows[:, TARGET_X : TARGET_Y + 1],
+        gait=rows[:, GAIT].astype(np.int64),
+    )
+
+
+def _record(rules: WalkerRules, state: WalkerState, stream: State, dt: float, out: Vec) -> None:
+    """Write the state at the ends of all periods, shape (n + 1, N_STATE)."""
+    start_walker(rules, state, 0, 0, stream)
+    out[0] = state.rows[0, 0]
+    for row in out[1:]:
+        advance_walker(rules, state, 0, 0, dt)
+        row[:] = state.rows[0, 0]

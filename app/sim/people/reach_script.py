@@ -1,0 +1,181 @@
+"""The synthetic person: reaches by inverse kinematics, home -> cube -> dock and back.
+
+A *library* holds many postures per place and hand, with random stance, elbow and grip. A script
+goes through them with random pace and pauses (``primitives/kernels/script.py``). The other
+hand supports
+itself at the table's edge while the trunk leans.
+
+These were the first people; now they are a variant (``WorkSettings(motion="reaches")``), and
+:func:`reach_script` makes the case studies' single reaches.
+
+Source: METHOD 3.2 and 3.4. Deviates: the thesis replays motion capture through movement
+primitives; these reaches are synthetic (``task_library.py`` has the primitives).
+"""
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from app.sim.cells.cell import Cell
+from app.sim.core.arrays import Vec
+from app.sim.human import model as human
+from app.sim.human.anthropometry import BodySize
+from app.sim.human.model import Hand
+from app.sim.primitives.kernels import script
+
+HANDS: tuple[Hand, Hand] = ("r", "l")
+REACH_PACE = 0.5
+"""Mean palm speed of a single reach [m/s]."""
+SHORTEST_REACH_S = 0.8
+"""Least duration of a single reach [s]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Library:
+    """Postures of one cell's work, read-only arrays."""
+
+    postures: Vec
+    """Joint positions [m, rad], shape (n, 18)."""
+    hands: Vec
+    """Palm positions, right then left [m], shape (n, 2, 3)."""
+    of_station: script.Index
+    """First posture and count of each body, place and hand, (n_bodies, n_places, 2, 2)."""
+    n_stations: int
+    """Number of stations, cubes first; the place after them is home."""
+    n_cubes: int
+    """Number of cubes."""
+
+
+@lru_cache(maxsize=8)
+def build_library(
+    cell: Cell, seed: int, bodies: tuple[BodySize, ...] | None = None, variants: int = 24
+) -> Library:
+    """Make ``variants`` random postures for each body, place and hand of a cell.
+
+    Args:
+        cell: Work cell.
+        seed: Seed of stances, elbows and grips.
+        bodies: Sizes of the people; None for the cell's own.
+        variants: Postures per place and hand.
+    """
+    rng = np.random.default_rng(seed)
+    sizes = [size.vector(cell.floor_z) for size in bodies or (cell.human.size,)]
+    postures: list[Vec] = []
+    hands: list[Vec] = []
+    of_station = np.zeros((len(sizes), len(cell.pick_stations) + 1, 2, 2), dtype=np.int64)
+    for size, index in zip(sizes, of_station, strict=True):
+        begin = len(postures)
+        for place, station in enumerate(cell.pick_stations):
+            for column, hand in enumerate(HANDS):
+                index[place, column] = len(postures), variants
+                target = np.array(station.position)
+                postures.extend(
+                    _at_station(cell, size, rng, target, hand) for _ in range(variants)
+                )
+        index[-1, :] = len(postures), variants
+        postures.extend(_at_home(cell, rng) for _ in range(variants))
+        hands.extend(_palms(q, size) for q in postures[begin:])
+    stacked, palms = np.array(postures), np.array(hands)
+    for array in (stacked, palms, of_station):
+        array.setflags(write=False)
+    n_cubes = sum(station.kind == "cube" for station in cell.pick_stations)
+    return Library(
+        postures=stacked,
+        hands=palms,
+        of_station=of_station,
+        n_stations=len(cell.pick_stations),
+        n_cubes=n_cubes,
+    )
+
+
+def _palms(q: Vec, size: Vec) -> Vec:
+    points = human.joint_points(q, size)
+    return np.stack([points["hand_r"], points["hand_l"]])
+
+
+def _at_home(cell: Cell, rng: np.random.Generator) -> Vec:
+    x, y, yaw = cell.human.home
+    q = human.rest_posture(
+        float(np.clip(x + rng.normal(0.0, 0.2), cell.human.x_min, cell.human.x_max)),
+        float(np.clip(y + rng.uniform(-0.08, 0.15), cell.human.y_min, cell.human.y_max)),
+        yaw + rng.normal(0.0, 0.15),
+    )
+    for first in (10, 14):
+        q[first : first + 4] += rng.uniform([-0.1, -0.06, -0.2, -0.25], [0.2, 0.09, 0.2, 0.65])
+    return q
+
+
+def _at_station(
+    cell: Cell, size: Vec, rng: np.random.Generator, target: Vec, hand: Hand
+) -> Vec:
+    """Return a posture with one palm at a station and the other at the table's edge."""
+    sign = -1.0 if hand == "r" else 1.0
+    grip = target + rng.uniform([-0.03, -0.03, -0.06], [0.03, 0.03, 0.05])
+    x = 0.8 * target[0] - sign * 0.12 + rng.normal(0.0, 0.07)
+    x = float(np.clip(x, cell.human.x_min, cell.human.x_max))
+    y = cell.human.y_min + rng.uniform(0.0, 0.12)
+    yaw = cell.human.home[2] + rng.normal(0.0, 0.12) + 0.3 * math.atan2(target[0] - x, 0.5)
+    start = human.rest_posture(x, y, yaw)
+    support = np.array([x + sign * -0.25, cell.table.y_max - 0.03, 0.06])
+    support += rng.uniform(-0.04, 0.04, 3)
+    right, left = (grip, support) if hand == "r" else (support, grip)
+    swivel = float(rng.uniform(0.0, 0.9))
+    posture = human.solve_hands(start, size, right=right, left=left, swivel=swivel)
+    return posture.q
+
+
+class Script:
+    """A fixed sequence of moves, evaluated at any time.
+
+    Args:
+        start: Start of each move [s], shape (n,).
+        duration: Duration of each move [s], shape (n,).
+        postures: Postures before, between and after the moves [m, rad], shape (n + 1, 18).
+    """
+
+    def __init__(self, start: Vec, duration: Vec, postures: Vec) -> None:
+        self._start, self._duration, self._postures = start, duration, postures
+
+    def at(self, t: float) -> tuple[Vec, Vec]:
+        """Return joint positions [m, rad] and speeds [m/s, rad/s] at ``t`` [s], (18,) each."""
+        q, qd = np.empty(18), np.empty(18)
+        n_moves = len(self._start)
+        script.script_at(t, n_moves, self._start, self._duration, self._postures, q, qd)
+        return q, qd
+
+
+def reach_script(
+    cell: Cell,
+    hand: Hand,
+    palms: tuple[Vec, Vec],
+    pelvis_x: tuple[float | None, float | None] = (None, None),
+    delay_s: float = 0.4,
+) -> Script:
+    """Return a single reach from one point to another, both postures without chance.
+
+    Args:
+        cell: Work cell.
+        hand: The hand that works.
+        palms: Where its palm is at first and at last [m], shape (3,) each; equal to rest.
+        pelvis_x: Where the person stands at first and at last [m]; None follows the palm.
+        delay_s: Rest before the move [s].
+    """
+    postures = [
+        _standing_reach(cell, palm, hand, stand)
+        for palm, stand in zip(palms, pelvis_x, strict=True)
+    ]
+    way = float(np.linalg.norm(np.subtract(*palms)))
+    duration = max(SHORTEST_REACH_S, way / REACH_PACE)
+    return Script(np.array([delay_s]), np.array([duration]), np.array(postures))
+
+
+def _standing_reach(cell: Cell, palm: Vec, hand: Hand, pelvis_x: float | None) -> Vec:
+    sign = -1.0 if hand == "r" else 1.0
+    x = 0.8 * palm[0] - sign * 0.12 if pelvis_x is None else pelvis_x
+    x = float(np.clip(x, cell.human.x_min, cell.human.x_max))
+    start = human.rest_posture(x, cell.human.y_min + 0.03, cell.human.home[2])
+    support = np.array([x + sign * -0.25, cell.table.y_max - 0.03, 0.06])
+    right, left = (palm, support) if hand == "r" else (support, palm)
+    return human.solve_hands(start, cell.body, right=right, left=left).q

@@ -1,0 +1,1 @@
+"""From key-points and cylinders of a tracker to people."""

@@ -1,0 +1,152 @@
+"""A causal filter of points that come late, noisy and not always: one Kalman filter each.
+
+Per point and axis the state is position and speed; the speed forgets itself with a time
+constant (so that a point unseen for a while comes to rest instead of flying off), driven by
+white acceleration:
+
+    p' = p + tau (1 - e) v,   v' = e v,   e = exp(-dt / tau),
+    Q = a^2 [dt^4/4, dt^3/2; dt^3/2, dt^2].
+
+The three axes of a point share one covariance. A measurement farther from the prediction than
+``gate + max_speed dt``, with dt since it was last offered, is refused: the point then counts as
+unseen, and is taken anew once the hold time is over.
+
+Source: Bar-Shalom et al., Estimation with Applications to Tracking and Navigation (2001),
+ch. 6; the forgetting speed is Singer's idea (1970) one order lower.
+"""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.errors import InvalidInput
+from app.sim.core.arrays import Vec
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FilterSettings:
+    """Noise of state and measurement, and when to stop believing."""
+
+    noise: float = 0.02
+    """Standard deviation of a measurement at confidence 1, per axis [m]."""
+    acceleration: float = 2.5
+    """Standard deviation of the driving acceleration, per axis [m/s^2]."""
+    memory_s: float = 0.4
+    """Time constant tau of the speed [s]."""
+    hold_s: float = 0.5
+    """Time for which an unseen point is carried on [s]."""
+    gate: float = 0.2
+    """Distance from the prediction at which a measurement is refused at once [m]."""
+    max_speed: float = 4.0
+    """Speed that widens the gate with the time since the point was seen [m/s]."""
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            value = getattr(self, item.name)
+            if not (np.isfinite(value) and value > 0.0):
+                raise InvalidInput(item.name, value, "must be finite and greater than 0")
+
+
+class PointFilter:
+    """Filters of ``n`` points.
+
+    Args:
+        n: Number of points.
+        settings: Noise and times.
+    """
+
+    def __init__(self, n: int, settings: FilterSettings) -> None:
+        self.settings = settings
+        self.t = -np.inf
+        """Time of the last update [s]."""
+        self.seen_at = np.full(n, -np.inf)
+        """When each point was last seen [s], shape (n,)."""
+        self._offered_at = np.full(n, -np.inf)
+        self._p, self._v = np.full((n, 3), np.nan), np.zeros((n, 3))
+        self._cov = np.zeros((n, 3))  # of position, position and speed, speed
+
+    def known(self, t: float) -> NDArray[np.bool_]:
+        """Return which points were seen within the hold time before ``t`` [s], shape (n,)."""
+        return np.asarray(t - self.seen_at <= self.settings.hold_s + 1e-9)
+
+    def at(self, t: float) -> tuple[Vec, Vec]:
+        """Return positions [m] and speeds [m/s] at ``t``, (n, 3) each; NaN where not known."""
+        known = self.known(t)[:, None]
+        if not known.any():
+            return np.full_like(self._p, np.nan), np.full_like(self._p, np.nan)
+        e, b = self._step(t)
+        p, v = self._p + b * self._v, e * self._v
+        return np.where(known, p, np.nan), np.where(known, v, np.nan)
+
+    def _step(self, t: float) -> tuple[float, float]:
+        tau = self.settings.memory_s
+        e = float(np.exp(-max(t - self.t, 0.0) / tau))
+        return e, tau * (1.0 - e)
+
+    def refuse(self, t: float, points: Vec) -> NDArray[np.bool_]:
+        """Return which measurements are too far from where they were expected, shape (n,).
+
+        The gate widens while a point is unseen, not while it is refused: who stays where
+        nobody can have got to is not believed for waiting.
+
+        Args:
+            t: Time [s].
+            points: Measurements [m], shape (n, 3), NaN where missing.
+        """
+        away = np.linalg.norm(points - self.at(t)[0], axis=1)
+        with np.errstate(invalid="ignore"):
+            since = t - np.maximum(self._offered_at, self.seen_at)
+            too_far = np.asarray(away > self.settings.gate + self.settings.max_speed * since)
+        self._offered_at[np.isfinite(points).all(axis=1)] = t
+        return too_far
+
+    def update(self, t: float, points: Vec, confidences: Vec) -> None:
+        """Take one frame in.
+
+        Args:
+            t: Time of the frame [s], later than the last.
+            points: Measurements [m], shape (n, 3), NaN where missing.
+            confidences: Trust in each in [0, 1], shape (n,); variance is divided by its square.
+        """
+        known = self.known(t)
+        if known.any():
+            self._predict(t)
+        seen = np.isfinite(points).all(axis=1) & (confidences > 0.0)
+        variance = (self.settings.noise / np.maximum(confidences, 1e-3)) ** 2
+        fresh = seen & ~known
+        self._p[fresh], self._v[fresh] = points[fresh], 0.0
+        self._cov[fresh, 0], self._cov[fresh, 1], self._cov[fresh, 2] = (
+            variance[fresh],
+            0.0,
+            1.0,
+        )
+        more = seen & known
+        pp, pv, vv = self._cov[more].T
+        total = pp + variance[more]
+        gain, gain_speed = pp / total, pv / total
+        miss = points[more] - self._p[more]
+        self._p[more] += gain[:, None] * miss
+        self._v[more] += gain_speed[:, None] * miss
+        self._cov[more] = np.column_stack(
+            [(1.0 - gain) * pp, (1.0 - gain) * pv, vv - gain_speed * pv]
+        )
+        self.seen_at[seen], self.t = t, t
+
+    def forget(self, members: list[int]) -> None:
+        """Take some points as never seen."""
+        self.seen_at[members] = -np.inf
+
+    def _predict(self, t: float) -> None:
+        e, b = self._step(t)
+        dt, a2 = t - self.t, self.settings.acceleration**2
+        pp, pv, vv = self._cov.T
+        self._p += b * self._v
+        self._v *= e
+        self._cov = np.column_stack(
+            [
+                pp + 2.0 * b * pv + b * b * vv + a2 * dt**4 / 4.0,
+                e * (pv + b * vv) + a2 * dt**3 / 2.0,
+                e * e * vv + a2 * dt**2,
+            ]
+        )

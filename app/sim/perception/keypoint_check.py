@@ -1,0 +1,283 @@
+"""Checks of key-points from outside: missing points, unusable ones, people in another frame.
+
+Trackers write a missing point in many ways; :func:`check_keypoints` takes them all. A single
+point that cannot be used costs that point, and is named. Only another number of points is an
+error.
+
+A skeleton in another frame (a camera's, with the depth along z; a floor's origin in place of
+the table's) or in another unit has the shape of a person in the wrong place. It is detected by
+:func:`why_implausible`: bone lengths, heights of the body's parts over the floor, and the pose
+that goes with them. People who stand, bend, kneel, sit, lie on the floor or on a table, reach
+up or stand on a step of half a metre pass. A skeleton that does not pass counts as unseen,
+since neither its place nor its posture can be relied on. Bounds are ours.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from app.errors import InvalidInput
+from app.sim.core.arrays import Vec
+from app.sim.human.kernels.kinematics import MEDIAN_TRUNK
+from app.sim.perception.keypoints import BODY_25, FARTHEST_M, N_KEYPOINTS, K
+
+STRAY_M = 1.6
+"""Distance from the middle at which a key-point is no part of the person [m]; an arm stretched
+up or out is within 1.3 m."""
+_ENOUGH = 5
+"""Key-points from which on strays are looked for."""
+_PLACEHOLDERS = (0.0, -1.0)
+"""Values that trackers write into all three coordinates of a missing key-point."""
+_HUGE = 1e9
+"""Greater coordinates count as this [m]: their squares are numbers still."""
+_TRUST_SLACK = 0.01
+"""How far outside [0, 1] a confidence is still taken, as the nearer bound."""
+
+_BONES = (
+    (K["neck"], K["mid_hip"], MEDIAN_TRUNK),
+    (K["shoulder_r"], K["shoulder_l"], 0.36),
+    *((K[f"shoulder_{s}"], K[f"elbow_{s}"], 0.29) for s in "rl"),
+    *((K[f"elbow_{s}"], K[f"wrist_{s}"], 0.26) for s in "rl"),
+    *((K[f"hip_{s}"], K[f"knee_{s}"], 0.42) for s in "rl"),
+    *((K[f"knee_{s}"], K[f"ankle_{s}"], 0.42) for s in "rl"),
+)
+"""Pairs of key-points and their distance in the median person [m]."""
+_BONE_RATIO = (0.55, 1.6)
+"""Least and greatest median ratio of the bones seen to the median person's."""
+_ENOUGH_BONES = 3
+"""Bones from which on they are judged."""
+_UNITS = {"millimetres": 1000.0, "centimetres": 100.0, "inches": 39.37, "feet": 3.281}
+
+_STEP_M = 0.5
+"""Height of a step or platform that a person may stand on [m]."""
+_BELOW_M = -0.3
+"""Height over the floor down to which any part may seem to be, by errors of a tracker [m]."""
+_PARTS: dict[str, tuple[tuple[int, ...], float]] = {
+    "feet": (
+        tuple(
+            K[f"{part}_{s}"] for part in ("ankle", "heel", "big_toe", "small_toe") for s in "rl"
+        ),
+        1.0,  # lying on a table
+    ),
+    "knees": ((K["knee_r"], K["knee_l"]), 1.4),
+    "hips": ((K["mid_hip"], K["hip_r"], K["hip_l"]), 1.1 + _STEP_M),
+    "shoulders": ((K["neck"], K["shoulder_r"], K["shoulder_l"]), 1.75 + _STEP_M),
+    "head": (tuple(K[name] for name in ("nose", "eye_r", "eye_l", "ear_r", "ear_l")), 2.5),
+    "elbows": ((K["elbow_r"], K["elbow_l"]), 2.6),
+    "wrists": ((K["wrist_r"], K["wrist_l"]), 2.9),
+}
+"""Parts of the body: their key-points and how high over the floor they can be [m]: those of a
+person of 1.95 m on a step, arms raised."""
+_FLAT_HIPS_M = 1.25
+"""Height of the hips over the floor up to which the trunk may be level or head down [m]."""
+_INVERTED_M = 0.25
+"""How far shoulders may be below the hips while knees or feet are as far above them [m]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Keypoints:
+    """One checked frame of one person."""
+
+    points: Vec
+    """Key-points [m], shape (25, 3); rows of NaN are missing."""
+    confidences: Vec
+    """Trust in each in (0, 1], 0 where it is missing, shape (25,)."""
+    strays: tuple[str, ...] = ()
+    """Names of key-points dropped because they lie too far from all others."""
+    unusable: tuple[str, ...] = ()
+    """Names of key-points dropped because their numbers cannot be used."""
+    implausible: str | None = None
+    """Why nobody can stand like this in the cell's frame, with numbers; None: somebody can.
+    All key-points are missing then."""
+
+    @property
+    def seen(self) -> NDArray[np.bool_]:
+        """Which key-points are there, shape (25,)."""
+        return self.confidences > 0.0
+
+
+UNSEEN = Keypoints(points=np.full((N_KEYPOINTS, 3), np.nan), confidences=np.zeros(N_KEYPOINTS))
+"""A frame without anybody."""
+
+
+def check_keypoints(
+    keypoints: ArrayLike,
+    confidences: ArrayLike | None = None,
+    min_confidence: float = 0.1,
+    place: str = "",
+    floor_z: float | None = None,
+) -> Keypoints:
+    """Check one frame of one person as it comes from outside.
+
+    Missing is: NaN in all coordinates; exactly (0, 0, 0) or (-1, -1, -1), as trackers write
+    it; a confidence below ``min_confidence`` or NaN. Unusable, and named, is a point with some
+    coordinates only, an infinite one, one beyond 100 m or with a confidence outside [0, 1]. A
+    frame in which all are missing is a valid frame.
+
+    Args:
+        keypoints: Order of BODY_25, cell's frame [m], shape (25, 3).
+        confidences: Trust in each in [0, 1], shape (25,); 1 where None.
+        min_confidence: Trust below which a key-point counts as missing.
+        place: Put before the field's name in errors, such as ``"people[1]."``.
+        floor_z: Height of the floor [m]; None: heights are not judged.
+
+    Raises:
+        InvalidInput: Not numbers, or another shape.
+    """
+    points = _numbers(f"{place}keypoints", keypoints, (N_KEYPOINTS, 3))
+    trust = np.ones(N_KEYPOINTS)
+    if confidences is not None:
+        trust = _numbers(f"{place}confidences", confidences, (N_KEYPOINTS,))
+    missing = np.isnan(points).all(axis=1) | np.isnan(trust)
+    for placeholder in _PLACEHOLDERS:
+        missing |= (points == placeholder).all(axis=1)
+    beyond = (trust < -_TRUST_SLACK) | (trust > 1.0 + _TRUST_SLACK)
+    unusable = beyond | ~np.isfinite(points).all(axis=1)
+    trust = np.clip(np.nan_to_num(trust, nan=0.0), 0.0, 1.0)
+    points = np.clip(points, -_HUGE, _HUGE)
+    missing |= ~beyond & (trust < max(min_confidence, 1e-6))
+    unusable |= _too_far(points, ~missing & ~unusable)
+    unusable &= ~missing
+    missing |= unusable
+    points[missing], trust[missing] = np.nan, 0.0
+    implausible = why_implausible(points, floor_z)
+    strays = _strays(points, ~missing) if implausible is None else np.arange(N_KEYPOINTS)
+    points[strays], trust[strays] = np.nan, 0.0
+    return Keypoints(
+        points=points,
+        confidences=trust,
+        strays=_names(strays) if implausible is None else (),
+        unusable=_names(np.flatnonzero(unusable)),
+        implausible=implausible,
+    )
+
+
+def _names(indices: NDArray[np.intp]) -> tuple[str, ...]:
+    return tuple(BODY_25[k] for k in indices.tolist())
+
+
+def _numbers(field: str, values: ArrayLike, shape: tuple[int, ...]) -> Vec:
+    try:
+        array = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InvalidInput(field, type(values).__name__, "must be numbers") from error
+    if array.shape != shape:
+        raise InvalidInput(field, array.shape, f"must have the shape {shape}")
+    return array
+
+
+def _too_far(points: Vec, there: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which key-points are placeholders or errors beyond ``FARTHEST_M``, shape (25,).
+
+    None, where most are that far: another unit, to be judged as a whole. Points that are the
+    same are placeholders, however many.
+    """
+    far = np.zeros(N_KEYPOINTS, dtype=np.bool_)
+    far[there] = np.abs(points[there]).max(axis=1) > FARTHEST_M
+    if not far.any():
+        return far
+    _, where, count = np.unique(points, axis=0, return_inverse=True, return_counts=True)
+    repeated = far & (count[where] > 1)
+    others = there & ~repeated
+    return far if 2 * (far & others).sum() < others.sum() else repeated
+
+
+def _strays(points: Vec, seen: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Return the indices of key-points far from the others."""
+    there = np.flatnonzero(seen)
+    if len(there) < _ENOUGH:
+        return there[:0]
+    away = np.linalg.norm(points[there] - np.median(points[there], axis=0), axis=1)
+    return np.asarray(there[away > STRAY_M])
+
+
+def _bone_ratio(points: Vec) -> float:
+    """Return the median ratio of the bones seen to the median person's; NaN of too few."""
+    ratios = np.array([np.linalg.norm(points[a] - points[b]) / one for a, b, one in _BONES])
+    there = ratios[np.isfinite(ratios)]
+    return float(np.median(there)) if len(there) >= _ENOUGH_BONES else float("nan")
+
+
+def _unit_hint(ratio: float) -> str:
+    """Return which unit a skeleton of this size may be in; NaN: nothing is known of it."""
+    if np.isnan(ratio):
+        return " (are these millimetres?)"
+    for unit, per_metre in _UNITS.items():
+        if 0.7 <= ratio / per_metre <= 1.4:
+            return f" (are these {unit}?)"
+    return " (other units?)"
+
+
+def _axis_hint(points: Vec) -> str:
+    """Return which axis points up along the trunk or the legs, where that is not z."""
+    middles = [_middle(points, part) for part in ("shoulders", "hips", "knees", "feet")]
+    there = [middle for middle in middles if np.isfinite(middle).all()]
+    if len(there) < 2:
+        return ""
+    up = there[0] - there[-1]
+    axis = int(np.abs(up).argmax())
+    if axis == 2 and up[2] > 0.0:
+        return ""
+    sign = "up" if up[axis] > 0.0 else "down"
+    camera = ": a camera's frame" if (axis, sign) == (1, "down") else ""
+    return f" (does {'xyz'[axis]} point {sign} here{camera}?)"
+
+
+def _middle(points: Vec, part: str) -> Vec:
+    """Return the median of the key-points seen of a part [m], shape (3,), NaN where none is."""
+    own = points[list(_PARTS[part][0])]
+    there = own[np.isfinite(own).all(axis=1)]
+    return np.median(there, axis=0) if len(there) else np.full(3, np.nan)
+
+
+def why_implausible(points: Vec, floor_z: float | None) -> str | None:
+    """Return why these cannot be a person in the cell's frame, or None where they can.
+
+    Args:
+        points: Key-points [m], shape (25, 3), NaN where missing.
+        floor_z: Height of the floor [m]; None: heights are not judged.
+    """
+    there = points[np.isfinite(points).all(axis=1)]
+    if len(there) == 0:
+        return None
+    ratio = _bone_ratio(points)
+    hint, (least, most) = _unit_hint(ratio), _BONE_RATIO
+    if np.abs(there).max(axis=1).min() > FARTHEST_M:
+        return f"all key-points are over {FARTHEST_M:g} m away{hint}"
+    if not (np.isnan(ratio) or least <= ratio <= most):
+        return (
+            f"bones are {ratio:.3g} times those of the median adult, a person's {least:g} to "
+            f"{most:g} times{hint}"
+        )
+    reason = None if floor_z is None else _why_not_standing(points, floor_z)
+    if reason is None or floor_z is None:
+        return reason
+    if _why_not_standing(points, 0.0) is None:
+        return f"{reason} (does z count from the floor here?)"
+    return f"{reason}{_axis_hint(points)}"
+
+
+def _why_not_standing(points: Vec, floor_z: float) -> str | None:
+    """Return why nobody is supported by the floor like this, or None."""
+    heights = {part: float(_middle(points, part)[2] - floor_z) for part in _PARTS}
+    for part, height in heights.items():
+        high = _PARTS[part][1]
+        if not (np.isnan(height) or _BELOW_M <= height <= high):
+            return (
+                f"{part} are {height:.2f} m over the floor, a person's {_BELOW_M:g} to "
+                f"{high:g} m"
+            )
+    hips, shoulders = heights["hips"], heights["shoulders"]
+    if shoulders < hips + 0.1 and hips > _FLAT_HIPS_M:
+        return (
+            f"hips are {hips:.2f} m over the floor and shoulders {shoulders:.2f} m: level or "
+            f"head down, a person's hips are within {_FLAT_HIPS_M:g} m"
+        )
+    legs = np.fmin(heights["knees"], heights["feet"])
+    if shoulders < hips - _INVERTED_M and legs > hips + _INVERTED_M:
+        return (
+            f"shoulders are {hips - shoulders:.2f} m below the hips and legs "
+            f"{legs - hips:.2f} m above them"
+        )
+    return None

@@ -1,0 +1,161 @@
+"""A model of a key-point tracker, to be put between a world and whoever watches its people.
+
+A camera samples the true motion at its own rate, turns it into BODY_25 key-points
+(:func:`~app.sim.perception.keypoints.keypoints_of`), disturbs them, loses some of them and
+some whole
+frames, and hands each frame over after its latency, stamped with the time it was taken at
+(one clock for all). The same seed gives the same disturbances.
+
+Source: METHOD 2.8 (30 Hz). The numbers of noise and loss are ours, those the issue asks for.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from app.errors import InvalidInput
+from app.sim.core.arrays import Vec
+from app.sim.perception.keypoints import GROUPS, N_KEYPOINTS, keypoints_of, swap_sides
+from app.sim.perception.person_estimator import PersonEstimate, PersonEstimator
+
+Motion = Callable[[float], Vec]
+"""True joint positions [m, rad], shape (18,), at a time [s]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrackerSettings:
+    """How good a tracker is."""
+
+    rate_hz: float = 30.0
+    """Frames per second [Hz]."""
+    latency_s: float = 0.1
+    """Time from taking a frame to handing it over [s]."""
+    noise: float = 0.02
+    """Standard deviation of each coordinate [m]."""
+    missing: float = 0.2
+    """Share of key-points that are missing, in [0, 1)."""
+    missing_s: float = 0.0
+    """Mean time for which a key-point stays missing [s]; below one frame: frame by frame."""
+    lost: float = 0.0
+    """Share of frames that never arrive, in [0, 1]."""
+    sides_swapped: float = 0.0
+    """Share of frames in which left and right are exchanged in arms, legs and face."""
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            value = getattr(self, item.name)
+            if not np.isfinite(value) or value < 0.0:
+                raise InvalidInput(item.name, value, "must be finite and not negative")
+        if self.rate_hz == 0.0:
+            raise InvalidInput("rate_hz", self.rate_hz, "must be greater than 0 Hz")
+        if self.missing >= 1.0:
+            raise InvalidInput("missing", self.missing, "must lie in [0, 1)")
+        for name in ("lost", "sides_swapped"):
+            if getattr(self, name) > 1.0:
+                raise InvalidInput(name, getattr(self, name), "must lie in [0, 1]")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Frame:
+    """What a tracker says of one person."""
+
+    t: float
+    """When it was taken [s]."""
+    delivered: float
+    """When it is handed over [s]."""
+    keypoints: Vec
+    """Key-points [m], shape (25, 3), NaN where missing."""
+    confidences: Vec
+    """1, or 0 where missing, shape (25,)."""
+
+
+class Tracker:
+    """A tracker of one person.
+
+    Args:
+        settings: How good it is.
+        seed: Seed of noise and losses.
+        size: The person's size [m], shape (12,) (``Cell.body``).
+        floor_z: Height of the floor in the cell [m].
+        start: Time of the first frame [s].
+    """
+
+    def __init__(
+        self,
+        settings: TrackerSettings,
+        seed: int | Sequence[int],
+        size: Vec,
+        floor_z: float,
+        start: float = 0.0,
+    ) -> None:
+        self.settings = settings
+        self._rng = np.random.default_rng(seed)
+        self._size, self._floor_z, self._start = size, floor_z, start
+        self._n_taken = 0
+        self._missing = self._rng.random(N_KEYPOINTS) < settings.missing
+        self._waiting: list[Frame] = []
+
+    def frames(self, t: float, motion: Motion) -> tuple[Frame, ...]:
+        """Return the frames handed over up to ``t`` that were not returned before.
+
+        Args:
+            t: Present time [s].
+            motion: The true motion; asked at every frame's time since the last call, up to
+                ``t``. A world that goes in steps may give its states interpolated.
+        """
+        period = 1.0 / self.settings.rate_hz
+        while self._start + self._n_taken * period <= t + 1e-9:
+            taken = self._start + self._n_taken * period
+            self._n_taken += 1
+            frame = self._take(taken, motion(taken))
+            if frame is not None:
+                self._waiting.append(frame)
+        ready = tuple(frame for frame in self._waiting if frame.delivered <= t + 1e-9)
+        self._waiting = self._waiting[len(ready) :]
+        return ready
+
+    def _take(self, t: float, q: Vec) -> Frame | None:
+        """Return one frame, or None where it is lost; always draws alike."""
+        settings, rng = self.settings, self._rng
+        points = keypoints_of(q, self._size, self._floor_z)
+        points += settings.noise * rng.standard_normal(points.shape)
+        draw, lost, swapped = rng.random(N_KEYPOINTS), rng.random(), rng.random()
+        self._missing = draw < np.where(self._missing, *self._loss_rates())
+        points[self._missing] = np.nan
+        if swapped < settings.sides_swapped:
+            for group in GROUPS:
+                points = swap_sides(points, group)
+        if lost < settings.lost:
+            return None
+        trust = np.asarray(np.isfinite(points).all(axis=1), dtype=np.float64)
+        return Frame(t=t, delivered=t + settings.latency_s, keypoints=points, confidences=trust)
+
+    def _loss_rates(self) -> tuple[float, float]:
+        """Return the chance to be missing after missing and after seen.
+
+        A chain of two states with ``missing`` as its long-run share and ``missing_s`` as the
+        mean stay in the first: out of it 1 / n, into it missing / (1 - missing) / n.
+        """
+        share = self.settings.missing
+        n = self.settings.missing_s * self.settings.rate_hz
+        if n <= 1.0 / (1.0 - share):
+            return share, share
+        return 1.0 - 1.0 / n, share / (1.0 - share) / n
+
+
+def follow(
+    motion: Motion, times: Sequence[float], tracker: Tracker, estimator: PersonEstimator
+) -> Iterator[PersonEstimate]:
+    """Yield what is known of a person at each time, seen through a tracker.
+
+    Args:
+        motion: The true motion.
+        times: When to look [s], rising.
+        tracker: What lies between.
+        estimator: What turns its frames into a person.
+    """
+    for t in times:
+        for frame in tracker.frames(t, motion):
+            estimator.take(frame.t, frame.keypoints, frame.confidences)
+        yield estimator.at(t)

@@ -1,0 +1,143 @@
+"""Key-points of a depth camera in the layout BODY_25: names, sides, our body's own.
+
+A frame is 25 points [m] in the cell's frame, NaN where a point is missing, as OpenPose with a
+depth image gives them (METHOD 2.8). ``keypoint_check.py`` checks frames from outside.
+
+:func:`keypoints_of` gives the key-points of our 18-DoF person. Shoulders, elbows, wrists, neck
+and mid-hip are joints of the model. The model has no face, knees or feet, so these are placed
+by proportion: the face rigid on the torso (the model's head does not turn), the hips half their
+distance to either side of the pelvis, and under each hip a straight upright leg, as its
+capsule, with the knee half-way and the foot pointing where the pelvis faces.
+
+Source: Cao et al., OpenPose (2019), output format BODY_25; METHOD 2.8.
+"""
+
+from typing import Literal
+
+import numpy as np
+
+from app.sim.core.arrays import Vec
+from app.sim.human import model as human
+from app.sim.human.kernels import kinematics as body
+
+BODY_25 = (
+    *("nose", "neck", "shoulder_r", "elbow_r", "wrist_r", "shoulder_l", "elbow_l", "wrist_l"),
+    *("mid_hip", "hip_r", "knee_r", "ankle_r", "hip_l", "knee_l", "ankle_l"),
+    *("eye_r", "eye_l", "ear_r", "ear_l"),
+    *("big_toe_l", "small_toe_l", "heel_l", "big_toe_r", "small_toe_r", "heel_r"),
+)
+"""Names of the key-points in OpenPose's order."""
+N_KEYPOINTS = len(BODY_25)
+K = {name: index for index, name in enumerate(BODY_25)}
+"""Index of a key-point by its name."""
+
+Group = Literal["arms", "legs", "face"]
+GROUPS: dict[Group, tuple[int, ...]] = {
+    "arms": tuple(K[f"{part}_{s}"] for part in ("shoulder", "elbow", "wrist") for s in "rl"),
+    "legs": tuple(
+        K[f"{part}_{s}"]
+        for part in ("hip", "knee", "ankle", "big_toe", "small_toe", "heel")
+        for s in "rl"
+    ),
+    "face": tuple(K[f"{part}_{s}"] for part in ("eye", "ear") for s in "rl"),
+}
+"""Pairs of key-points whose sides a tracker confuses together."""
+MIRROR = np.array(
+    [K[f"{n[:-1]}{'l' if n[-1] == 'r' else 'r'}"] if n[-2:-1] == "_" else K[n] for n in BODY_25]
+)
+"""The same key-point of the other side, shape (25,)."""
+
+_FACE = {
+    "nose": (0.12, 0.0, -0.01),
+    "eye_r": (0.10, -0.03, 0.03),
+    "eye_l": (0.10, 0.03, 0.03),
+    "ear_r": (0.0, -0.075, 0.0),
+    "ear_l": (0.0, 0.075, 0.0),
+}
+"""Face from the centre of the head in the torso's axes [m]; proportions of an adult's head."""
+_ANKLE, _HEEL, _BIG_TOE, _SMALL_TOE = (
+    (0, 0, 0.08),
+    (-0.06, 0, 0.03),
+    (0.17, 1, 0.02),
+    (0.13, -1, 0.02),
+)
+"""Foot under the hip: forward [m], toward the other foot (1 or -1), above the floor [m]."""
+_HALF_FOOT = 0.035
+"""Half the distance of big and small toe [m]."""
+
+FARTHEST_M = 100.0
+"""Coordinates beyond this are no cell's; ours."""
+
+
+def keypoints_of(q: Vec, size: Vec, floor_z: float) -> Vec:
+    """Return the key-points of our person [m], shape (25, 3), order of BODY_25.
+
+    Args:
+        q: Joint positions [m, rad], shape (18,).
+        size: The person's size [m], shape (12,) (``Cell.body``).
+        floor_z: Height of the floor [m].
+
+    Deviates: face, knees and feet are no joints of the model; see the head of this file.
+    """
+    joints, frames = human.joint_points(q, size), human.body_frames(q, size)
+    torso, pelvis = frames["torso"][:3, :3], frames["pelvis"][:3, :3]
+    out = np.empty((N_KEYPOINTS, 3))
+    out[K["neck"]], out[K["mid_hip"]] = joints["neck"], joints["pelvis"]
+    for name, offset in _FACE.items():
+        out[K[name]] = joints["head"] + torso @ np.array(offset)
+    for hand, side in (("r", -1.0), ("l", 1.0)):
+        for part in ("shoulder", "elbow", "wrist"):
+            out[K[f"{part}_{hand}"]] = joints[f"{part}_{hand}"]
+        hip = joints["pelvis"] + side * size[body.HIP] * pelvis[:, 1]
+        out[K[f"hip_{hand}"]] = hip
+        feet = {"ankle": _ANKLE, "heel": _HEEL, "big_toe": _BIG_TOE, "small_toe": _SMALL_TOE}
+        for part, (forward, inward, up) in feet.items():
+            place = hip + forward * pelvis[:, 0] - side * inward * _HALF_FOOT * pelvis[:, 1]
+            place[2] = floor_z + up
+            out[K[f"{part}_{hand}"]] = place
+        out[K[f"knee_{hand}"]] = 0.5 * (hip + out[K[f"ankle_{hand}"]])
+    return out
+
+
+def swap_sides(values: Vec, group: Group) -> Vec:
+    """Return a copy with left and right of one group exchanged, shape as given (25, ...)."""
+    out, members = values.copy(), list(GROUPS[group])
+    out[members] = values[MIRROR[members]]
+    return out
+
+
+def swapped_against(points: Vec, expected: Vec, group: Group, margin: float = 0.08) -> bool:
+    """Return whether a group fits what was expected better with its sides exchanged.
+
+    Args:
+        points: Key-points seen [m], shape (25, 3), NaN where missing.
+        expected: Where they were expected [m], shape (25, 3), NaN where unknown.
+        group: Which of GROUPS.
+        margin: How much less the mean distance must be [m].
+    """
+    members = list(GROUPS[group])
+    given = np.linalg.norm(points[members] - expected[members], axis=1)
+    crossed = np.linalg.norm(points[members] - expected[MIRROR[members]], axis=1)
+    both = np.isfinite(given) & np.isfinite(crossed)
+    return bool(both.any() and crossed[both].mean() + margin < given[both].mean())
+
+
+def faces_backward(points: Vec, group: Group) -> bool:
+    """Return whether a group's sides contradict the way the person faces; no history needed.
+
+    Shoulders are held against the nose before the ears, hips against the toes before the
+    heels; these directions stay right where left and right are mistaken.
+
+    Args:
+        points: Key-points [m], shape (25, 3), NaN where missing.
+        group: ``"arms"`` or ``"legs"``; the face itself is never contradicted.
+    """
+    if group == "face":  # Nose and ears decide, and they say nothing about themselves.
+        return False
+    if group == "arms":
+        across = points[K["shoulder_l"]] - points[K["shoulder_r"]]
+        ahead = points[K["nose"]] - 0.5 * (points[K["ear_r"]] + points[K["ear_l"]])
+    else:
+        across = points[K["hip_l"]] - points[K["hip_r"]]
+        ahead = sum(points[K[f"big_toe_{s}"]] - points[K[f"heel_{s}"]] for s in "rl")
+    return bool(across[1] * ahead[0] - across[0] * ahead[1] < 0.0)

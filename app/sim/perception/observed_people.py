@@ -1,0 +1,327 @@
+"""People as they come from outside: checked, and as policies see them.
+
+The same rules as in the batches (``people/kernels/people.py``, ``nearest_person`` and
+``see_nearest``): the person nearest to the robot is seen, by the distance of their capsules to
+the robot's, or of their cylinder where no more is known of them; a cylinder is seen as a person
+of the cell's size who stands in it and faces the robot's base.
+
+What a person can physically be is taken as it is: anywhere in a hall, any number of turns
+about the vertical, joints somewhat beyond the model's limits. Distances and safety layers go by
+that. Policies know people within 5 m and inside the model's limits, so that they see the others
+there (:func:`as_known`), and answers say so (:func:`degradations`).
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from app.errors import InvalidInput, digits, interval
+from app.sim.core.arrays import Vec
+from app.sim.human import model as human
+from app.sim.human.kernels.kinematics import N_SIZE, PELVIS_Z
+from app.sim.human.person import Person
+from app.sim.people.kernels import people as people_kernel
+from app.sim.people.kernels.pedestrian import N_PAST
+from app.sim.people.kernels.people import MAX_PEOPLE, People
+from app.sim.perception.keypoints import FARTHEST_M
+from app.sim.perception.person_estimator import PersonEstimate
+from app.sim.robot.kernels import arm as arm_kernel
+from app.sim.robot.kernels.arm import Arm
+from app.sim.scene.scene import crowd_of, own
+
+FASTEST = 50.0
+"""Greatest speed of a person's joints, cylinder or radius [m/s, rad/s]."""
+JOINT_TOLERANCE = 0.5
+"""How far beyond the model's limits the joint angles of a person may be [rad]."""
+WIDEST = 3.0 * FARTHEST_M
+"""Greatest radius of a cylinder [m]: one that grows while unseen then holds the whole hall."""
+KNOWN_RADIUS, KNOWN_GROWTH, KNOWN_WALK = 5.0, 5.0, 10.0
+"""Greatest radius [m], growth [m/s] and remembered walking speed [m/s] that policies see."""
+_YAW, _MOST_YAW = 2, 1e6
+_SLACK = 1e-6
+_QD_LIMIT = np.full(18, FASTEST)
+_Q_LOW, _Q_HIGH = human.Q_MIN - JOINT_TOLERANCE, human.Q_MAX + JOINT_TOLERANCE
+_Q_LOW[:2], _Q_HIGH[:2] = -FARTHEST_M, FARTHEST_M
+_Q_LOW[_YAW], _Q_HIGH[_YAW] = -_MOST_YAW, _MOST_YAW
+_SIZE_LOW, _SIZE_HIGH = np.full(N_SIZE, 0.01), np.full(N_SIZE, 3.0)
+_SIZE_LOW[PELVIS_Z] = -10.0  # counted from the cell's origin
+MOST_REMEMBERED = N_PAST - 1
+"""Most moments that are remembered of a cylinder, a tenth of a second apart."""
+_CYLINDER_LOW = np.array([-FARTHEST_M, -FARTHEST_M, 0.01])
+_CYLINDER_HIGH = np.array([FARTHEST_M, FARTHEST_M, WIDEST])
+_PAST_HIGH = np.array([WIDEST, FASTEST])
+_KNOWN_LOW = np.concatenate((human.Q_MIN, -_QD_LIMIT, [*human.Q_MIN[:2], 0.01])) - _SLACK
+_KNOWN_HIGH = np.concatenate((human.Q_MAX, _QD_LIMIT, [*human.Q_MAX[:2], KNOWN_RADIUS]))
+_KNOWN_HIGH += _SLACK
+_KNOWN_LOW[_YAW], _KNOWN_HIGH[_YAW] = -_MOST_YAW, _MOST_YAW
+_KNOWN_PAST = np.array([KNOWN_RADIUS, KNOWN_WALK])
+
+
+def standing_in(
+    x: float,
+    y: float,
+    vx: float,
+    vy: float,
+    r: float,
+    growth: float = 0.0,
+    past: Vec | None = None,
+    measured: bool = True,
+) -> Person:
+    """Return the person that a cylinder is seen as.
+
+    Args:
+        x: Axis of the cylinder, robot's base frame [m].
+        y: The same.
+        vx: Its velocity [m/s].
+        vy: The same.
+        r: Its radius [m].
+        growth: How fast the radius grows [m/s].
+        past: Radius [m] and walking speed [m/s] before, as in ``Person.past``.
+        measured: Whether a safety layer may go by the velocity.
+    """
+    qd = np.zeros(18)
+    qd[:2] = vx, vy
+    return Person(
+        q=human.rest_posture(x, y, math.atan2(-y, -x)),
+        qd=qd,
+        cylinder=np.array([x, y, r]),
+        growth=growth,
+        past=past,
+        measured=measured,
+    )
+
+
+def as_person(estimate: PersonEstimate) -> Person | None:
+    """Return the person that an estimate is seen as; None where there never was one.
+
+    Where pelvis and trunk were never seen together there are no joint angles; then the person
+    is as good as their safety cylinder.
+    """
+    if estimate.person is None:
+        return _in_cylinder(estimate)
+    # An estimate that is moved on for long must not cost the decision.
+    person = estimate.person
+    q, qd = np.clip(person.q, _Q_LOW, _Q_HIGH), np.clip(person.qd, -FASTEST, FASTEST)
+    return replace(person, q=q, qd=qd)
+
+
+def as_monitored(observed: PersonEstimate) -> Person | None:
+    """Return the person that a safety layer takes an observation as; None where there is none.
+
+    A joint that nothing shows may have any angle; then the person is the safety cylinder, which
+    is as wide as the unseen limbs reach.
+
+    Args:
+        observed: The estimate at the last frame that showed the person.
+    """
+    return _in_cylinder(observed) if observed.held else as_person(observed)
+
+
+def _in_cylinder(estimate: PersonEstimate) -> Person | None:
+    """Return a person who stands in the safety cylinder of an estimate; None without one."""
+    cylinder = estimate.cylinder
+    if cylinder is None:
+        return None
+    x, y = np.clip(cylinder.center, -FARTHEST_M, FARTHEST_M).tolist()
+    vx, vy = np.clip(cylinder.velocity, -FASTEST, FASTEST).tolist()
+    person = standing_in(x, y, vx, vy, min(cylinder.radius, WIDEST), measured=False)
+    return replace(person, top=cylinder.top)
+
+
+def person_anywhere() -> Person:
+    """Return the person that a safety layer assumes where nothing is known: it stops."""
+    return standing_in(0.0, 0.0, 0.0, 0.0, WIDEST, measured=False)
+
+
+def degradations(person: Person) -> tuple[str, ...]:
+    """Return in what policies see a person otherwise than given: ``far``, ``clamped``."""
+    near = _brought_near(person)
+    far = ("far",) if near is not person else ()
+    return far if _is_known(near) else (*far, "clamped")
+
+
+def is_far(person: Person) -> bool:
+    """Return whether a person is farther away than policies know people to be."""
+    return _brought_near(person) is not person
+
+
+def as_known(person: Person) -> Person:
+    """Return a checked person as policies see them; the same object where that is as given.
+
+    Beyond 5 m along x or y a person is seen at that distance, in the same direction from the
+    robot's base.
+    """
+    if _is_known(person):
+        return person
+    near = _brought_near(person)
+    cylinder, past = near.cylinder, near.past
+    if cylinder is not None:
+        cylinder = np.array([*cylinder[:2], min(cylinder[2], KNOWN_RADIUS)])
+    return replace(
+        near,
+        q=np.clip(near.q, human.Q_MIN, human.Q_MAX),
+        cylinder=cylinder,
+        growth=min(KNOWN_GROWTH, max(-KNOWN_GROWTH, near.growth)),
+        past=None if past is None else np.minimum(past, _KNOWN_PAST),
+    )
+
+
+def _brought_near(person: Person) -> Person:
+    """Return a person no farther than policies know; the same object where that is so."""
+    cylinder = person.cylinder
+    there = person.q[:2] if cylinder is None else cylinder[:2]
+    away, most = float(np.abs(there).max()), float(human.Q_MAX[0])
+    if away <= most + _SLACK:
+        return person
+    here = most / away * there
+    if cylinder is not None:
+        cylinder = np.array([*here, cylinder[2]])
+    return replace(person, q=np.concatenate([here, person.q[2:]]), cylinder=cylinder)
+
+
+def _is_known(person: Person) -> bool:
+    """Tell in one comparison whether policies know such numbers; the yaw may be any."""
+    parts: tuple[Vec, ...] = (person.q, person.qd)
+    if person.cylinder is not None:
+        parts = (person.q, person.qd, person.cylinder)
+    values = np.concatenate(parts)
+    n = len(values)
+    inside = (_KNOWN_LOW[:n] <= values) & (values <= _KNOWN_HIGH[:n])
+    if not inside.all() or not abs(person.growth) <= KNOWN_GROWTH:
+        return False
+    return person.past is None or bool((person.past <= _KNOWN_PAST).all())
+
+
+def checked_people(people: Sequence[Person]) -> tuple[Person, ...]:
+    """Return the people with checked arrays.
+
+    Raises:
+        InvalidInput: More than four, or a number that no person can have.
+    """
+    if len(people) > MAX_PEOPLE:
+        raise InvalidInput("people", len(people), f"must hold at most {MAX_PEOPLE} people")
+    return tuple(checked_person(person, f"people[{i}]") for i, person in enumerate(people))
+
+
+def checked_person(person: Person, path: str) -> Person:
+    """Return a person with checked arrays.
+
+    Args:
+        person: The person.
+        path: Name of the field, for errors.
+
+    Raises:
+        InvalidInput: A number that no person can have.
+    """
+    if _right_as_it_is(person):
+        return person
+    size, cylinder = person.size, person.cylinder
+    if size is not None:
+        size = checked_vector(f"{path}.size", size, N_SIZE, _SIZE_LOW, _SIZE_HIGH, "m")
+    if cylinder is not None:
+        low, high = _CYLINDER_LOW, _CYLINDER_HIGH
+        cylinder = checked_vector(f"{path}.cylinder", cylinder, 3, low, high, "m")
+    if not abs(person.growth) <= FASTEST:
+        rule = f"must lie in [-{digits(FASTEST)}, {digits(FASTEST)}] m/s"
+        raise InvalidInput(f"{path}.growth", person.growth, rule)
+    past = None if person.past is None else _checked_past(f"{path}.past", person.past)
+    return replace(
+        person,
+        q=_checked_q(f"{path}.q", person.q),
+        qd=checked_vector(f"{path}.qd", person.qd, 18, -_QD_LIMIT, _QD_LIMIT, "m/s or rad/s"),
+        size=size,
+        cylinder=cylinder,
+        past=past,
+    )
+
+
+def _right_as_it_is(person: Person) -> bool:
+    """Tell in one comparison whether nothing is wrong with a person of ordinary arrays."""
+    if person.size is not None or person.past is not None:
+        return False
+    parts: tuple[Vec, ...] = (person.q, person.qd)
+    if person.cylinder is not None:
+        parts = (person.q, person.qd, person.cylinder)
+    for part, n in zip(parts, (18, 18, 3), strict=False):
+        if type(part) is not np.ndarray or part.dtype != np.float64 or part.shape != (n,):
+            return False
+    return _is_known(person) and abs(person.q[_YAW]) <= human.Q_MAX[_YAW]
+
+
+def _checked_q(path: str, q: Vec) -> Vec:
+    found = checked_vector(path, q, 18, _Q_LOW, _Q_HIGH, "m or rad")
+    if abs(found[_YAW]) <= human.Q_MAX[_YAW]:
+        return found
+    turned = found.copy()
+    turned[_YAW] = math.remainder(turned[_YAW], 2.0 * math.pi)
+    return turned
+
+
+def _checked_past(path: str, past: Vec) -> Vec:
+    known = np.asarray(past, dtype=np.float64)
+    if known.ndim != 2 or known.shape[1] != 2 or len(known) > MOST_REMEMBERED:
+        rule = f"must hold a radius and a speed of at most {MOST_REMEMBERED} moments"
+        raise InvalidInput(path, list(known.shape), rule)
+    right = (known >= 0.0) & (known <= _PAST_HIGH)
+    if not right.all():
+        moment, what = (int(i) for i in np.argwhere(~right)[0])
+        most, unit = ((WIDEST, "m"), (FASTEST, "m/s"))[what]
+        rule = f"must lie in [0, {digits(most)}] {unit}"
+        raise InvalidInput(f"{path}[{moment}][{what}]", float(known[moment, what]), rule)
+    return known
+
+
+def nearest_index(arm: Arm, shared: People, q: Vec, people: Sequence[Person]) -> int | None:
+    """Return which person is nearest to the robot; None for nobody.
+
+    Args:
+        arm: Robot in its cell.
+        shared: From :func:`~app.sim.scene.scene.people_of`.
+        q: The robot's joint positions [rad], shape (6,).
+        people: Any number.
+    """
+    if len(people) < 2:
+        return len(people) - 1 if people else None
+    workers = [i for i, person in enumerate(people) if person.cylinder is None]
+    walkers = [i for i, person in enumerate(people) if person.cylinder is not None]
+    sizes = [shared.bodies[0] if (s := people[i].size) is None else s for i in workers]
+    crowd = crowd_of(
+        shared,
+        np.array([people[i].q for i in workers]).reshape(-1, 18),
+        np.array([people[i].cylinder for i in walkers], dtype=np.float64).reshape(-1, 3),
+        np.array(sizes).reshape(-1, N_SIZE),
+    )
+    robot = arm_kernel.new_robot_pose(arm)
+    arm_kernel.place_robot(arm, own(q), robot)
+    return (workers + walkers)[people_kernel.nearest_person(shared, robot.columns, crowd)]
+
+
+def checked_vector(path: str, values: Vec, size: int, low: Vec, high: Vec, unit: str) -> Vec:
+    """Return numbers as an array once they keep their rules.
+
+    Args:
+        path: Name of the field, for the error.
+        values: Numbers.
+        size: How many there must be.
+        low: Least of each, shape (size,).
+        high: Greatest of each, shape (size,).
+        unit: Unit, for the error.
+
+    Raises:
+        InvalidInput: Another number of them, not finite, or outside the limits.
+    """
+    vector = np.asarray(values, dtype=np.float64)
+    if vector.shape != (size,):
+        raise InvalidInput(path, vector.tolist(), f"must hold {size} numbers")
+    inside = (low <= vector) & (vector <= high)
+    if inside.all():
+        return vector
+    for i in np.flatnonzero(~inside)[:1]:
+        field, value = f"{path}[{i}]", float(vector[i])
+        if not math.isfinite(value):
+            raise InvalidInput(field, value, "must be finite")
+        rule = f"must lie in {interval(low[i], high[i])} {unit}"
+        raise InvalidInput(field, value, rule)
+    return vector

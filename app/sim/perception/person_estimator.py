@@ -1,0 +1,399 @@
+"""From a stream of key-points to a person: safety cylinder and 18 joint angles with speeds.
+
+Per frame: check (``keypoint_check.py``), put confused sides right, refuse what nobody can do,
+filter every key-point (``keypoint_filter.py``), then both closed forms on the filtered points:
+``keypoint_cylinder.py`` and ``keypoint_angles.py``. Joint speeds are the derivative of the
+second along the filtered speeds. Nothing looks ahead; :meth:`PersonEstimator.at` tells the
+estimate at any later time, so latency is bridged by the filter's own prediction.
+
+How it degrades, each step named in the estimate:
+
+- a key-point missing: carried on for ``hold_s``; then the joints it decides keep their angles
+  (``held``) and the cylinder widens to where it can be;
+- arms or legs with sides exchanged: exchanged back (``arms-swapped``, ...); if that goes
+  on for ``swap_s``, the group starts anew, judged by the way the person faces
+  (``sides-restarted``);
+- most key-points farther away than a person moves: the frame is refused (``jump``); after
+  ``hold_s`` without a credible frame the person is taken anew (``restarted``);
+- nothing seen for ``stale_s``: ``stale``; after ``hold_s`` the last cylinder grows at walking
+  speed and the joints rest;
+- the model fits the key-points badly: ``misfit`` (a person of another size, a bad tracker);
+  beyond ``unfit`` there are no joint angles (somebody kneels, sits or lies), and the cylinder
+  is all that is known;
+- the key-points are in another frame or unit: ``foreign-frame``; nothing is seen then;
+- arms and legs both contradict the way the person faces: ``mirrored``. Both are exchanged, or
+  the whole frame is mirrored, which puts people where they are not: after ``swap_s`` of
+  nothing else, such frames are in another frame, too.
+
+Several people: ``people_estimate.py``.
+"""
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from app.errors import InvalidInput, digits
+from app.sim.core.arrays import Vec
+from app.sim.human import model as human
+from app.sim.human.kernels.kinematics import N_SIZE
+from app.sim.human.person import Person
+from app.sim.perception.bounding_cylinder import (
+    CylinderSettings,
+    SafetyCylinder,
+    bounding_box,
+    safety_cylinder,
+)
+from app.sim.perception.kalman_filter import FilterSettings, PointFilter
+from app.sim.perception.keypoint_angles import FITTED, fit_errors, joint_angles, joint_motion
+from app.sim.perception.keypoint_check import UNSEEN, Keypoints, check_keypoints
+from app.sim.perception.keypoints import (
+    BODY_25,
+    GROUPS,
+    N_KEYPOINTS,
+    Group,
+    K,
+    faces_backward,
+    swap_sides,
+    swapped_against,
+)
+
+Flag = Literal[
+    "never-seen",
+    "arms-swapped",
+    "legs-swapped",
+    "sides-restarted",
+    "people-swapped",
+    "people-dropped",
+    "replaced",
+    "foreign-frame",
+    "mirrored",
+    "outliers",
+    "jump",
+    "restarted",
+    "clock-jump",
+    "stale",
+    "misfit",
+]
+_SWAPPED: dict[Group, Flag] = {"arms": "arms-swapped", "legs": "legs-swapped"}
+"""Groups whose sides are judged; eyes and ears are too near each other, and decide nothing."""
+_DECIDING = [K[name] for name in (*FITTED, "mid_hip", "hip_r", "hip_l")]
+"""Key-points that decide joint angles."""
+
+
+_MIRRORED = "arms and legs are mirrored (does one axis point the other way here?)"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EstimatorSettings:
+    """Noise, margins and times of the estimate."""
+
+    filter: FilterSettings = field(default_factory=FilterSettings)
+    """Noise of state and measurement, hold time."""
+    cylinder: CylinderSettings = field(default_factory=CylinderSettings)
+    """Flesh margin and growth."""
+    min_confidence: float = 0.1
+    """Trust below which a key-point counts as missing."""
+    stale_s: float = 0.25
+    """Age of the newest credible key-point from which an estimate is stale [s]."""
+    swap_s: float = 0.5
+    """Time for which sides are exchanged back before the group starts anew, and for which
+    somebody may be mirrored [s]."""
+    misfit: float = 0.10
+    """Median distance of the model's joints from the key-points that is named [m]."""
+    unfit: float = 0.25
+    """Misfit of the trunk beyond which there are no joint angles [m]; between the 1st and the
+    99th percentile of stature, taken for the median, it is below 0.2 m."""
+    qd_max: float = 8.0
+    """Bound of estimated joint speeds [rad/s, m/s]; faster is noise near a singularity."""
+
+    def __post_init__(self) -> None:
+        for name in ("min_confidence", "stale_s", "swap_s", "misfit", "unfit", "qd_max"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise InvalidInput(name, value, "must be finite and not negative")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PersonEstimate:
+    """What is known of one person at one time."""
+
+    t: float
+    """Time the estimate is for [s]."""
+    age_s: float
+    """Time since the newest credible key-point [s]; inf where there was none."""
+    cylinder: SafetyCylinder | None
+    """Safety cylinder of METHOD 2.8; None where nothing was ever seen."""
+    person: Person | None
+    """Joint angles and speeds; None until pelvis and trunk were seen together once, and where
+    the model does not fit the key-points."""
+    held: tuple[str, ...]
+    """Joints that keep their last angle because their key-points are missing."""
+    missing: tuple[str, ...]
+    """Key-points unseen for longer than the hold time."""
+    strays: tuple[str, ...]
+    """Key-points of the last frame that lay far from all others."""
+    misfit_m: float
+    """Median distance of the model's joints from the filtered key-points [m]; NaN unknown."""
+    flags: tuple[Flag, ...]
+    """How the estimate is degraded; empty where it is not."""
+    unusable: tuple[str, ...] = ()
+    """Key-points of the last frame whose numbers cannot be used."""
+    implausible: str | None = None
+    """Why nobody can stand in this frame as the last key-points say; None: somebody can."""
+    carried_s: float = 0.0
+    """Longest time for which a key-point of trunk or arms is carried on without having been
+    seen [s]; at most the hold time."""
+
+    @property
+    def stale(self) -> bool:
+        """Whether nothing credible was seen lately."""
+        return "stale" in self.flags or "never-seen" in self.flags
+
+
+class PersonEstimator:
+    """The estimate of one person from a stream of frames.
+
+    Args:
+        size: The person's size [m], shape (12,) (``Cell.body``).
+        settings: Noise, margins and times.
+        floor_z: Height of the floor [m]; None: heights over it are not judged.
+    """
+
+    def __init__(
+        self,
+        size: Vec,
+        settings: EstimatorSettings | None = None,
+        floor_z: float | None = None,
+    ) -> None:
+        if np.shape(size) != (N_SIZE,) or not np.isfinite(size).all():
+            rule = f"must be {N_SIZE} finite numbers"
+            raise InvalidInput("size", np.asarray(size).tolist(), rule)
+        self.settings = settings or EstimatorSettings()
+        self._size, self._floor_z = size, floor_z
+        self._points = PointFilter(N_KEYPOINTS, self.settings.filter)
+        self._center = PointFilter(1, self.settings.filter)
+        self._t, self._seen_at = -math.inf, -math.inf
+        self._swapped_at: dict[Group, float] = {}
+        self._q: Vec | None = None
+        self.last_points: Vec | None = None
+        """Key-points known at the last frame [m], shape (25, 3); None: nothing ever seen."""
+        self._flags: tuple[Flag, ...] = ()
+        self._frame: Keypoints | None = None
+        self._unfit = False
+        self._mirrored_at = math.inf
+
+    def update(
+        self, t: float, keypoints: ArrayLike, confidences: ArrayLike | None = None
+    ) -> PersonEstimate:
+        """Take one frame in and return the estimate at its time; see :meth:`take`."""
+        self.take(t, keypoints, confidences)
+        return self.at(t)
+
+    def take(
+        self, t: float, keypoints: ArrayLike, confidences: ArrayLike | None = None
+    ) -> None:
+        """Take one frame in.
+
+        Args:
+            t: When the frame was taken [s]; later than the one before.
+            keypoints: Order of BODY_25, cell's frame [m], shape (25, 3); NaN where missing.
+            confidences: Trust in each in [0, 1], shape (25,); 1 where None.
+
+        Raises:
+            InvalidInput: See :func:`~app.sim.perception.keypoint_check.check_keypoints`; or
+            ``t`` is not
+                later than the last. The estimate is then as if the frame had not come.
+        """
+        least = self.settings.min_confidence
+        self.take_frame(
+            t, check_keypoints(keypoints, confidences, least, floor_z=self._floor_z)
+        )
+
+    def take_frame(self, t: float, frame: Keypoints, fresh: bool = False) -> None:
+        """Take one checked frame in; see :meth:`take`.
+
+        Args:
+            t: When the frame was taken [s]; later than the one before.
+            frame: The key-points.
+            fresh: Whether they are another person's than those before, who is forgotten.
+
+        Raises:
+            InvalidInput: ``t`` is not later than the last. The estimate is then as if the
+                frame had not come.
+        """
+        if not math.isfinite(t) or t <= self._t:
+            raise InvalidInput("t", t, f"must be finite and later than {digits(self._t)} s")
+        if fresh:
+            self._forget()
+        flags: list[Flag] = []
+        if all(faces_backward(frame.points, group) for group in _SWAPPED):
+            flags.append("mirrored")
+            self._mirrored_at = min(self._mirrored_at, t)
+            if t - self._mirrored_at > self.settings.swap_s:
+                frame = replace(UNSEEN, implausible=_MIRRORED)
+        elif frame.seen.any():
+            self._mirrored_at = math.inf
+        if frame.implausible is not None:
+            flags.append("foreign-frame")
+        given = frame.points.copy(), frame.confidences.copy()
+        points, trust = self._put_sides_right(t, *given, flags)
+        refused = self._points.refuse(t, points)
+        n_refused = int(refused.sum())
+        n_judged = int((self._points.known(t) & (trust > 0.0)).sum())
+        if n_refused:
+            flags.append("jump" if 2 * n_refused > n_judged else "outliers")
+        # A jump refuses all: what happens to lie near belongs to the same wrong person.
+        drop = np.ones_like(refused) if "jump" in flags else refused
+        points[drop], trust[drop] = np.nan, 0.0
+        anew = math.isfinite(self._seen_at) and not self._points.known(t).any()
+        if (trust > 0.0).any():
+            if anew:
+                flags.append("restarted")
+            self._seen_at = t
+        self._points.update(t, points, trust)
+        self._t, self._flags, self._frame = t, tuple(flags), frame
+        self._remember(t)
+
+    def _forget(self) -> None:
+        """Know nothing of anybody, as at the start."""
+        self._points.forget(list(range(N_KEYPOINTS)))
+        self._center.forget([0])
+        self._seen_at, self._unfit = -math.inf, False
+        self._swapped_at.clear()
+        self._q = self.last_points = None
+
+    def _put_sides_right(
+        self, t: float, points: Vec, trust: Vec, flags: list[Flag]
+    ) -> tuple[Vec, Vec]:
+        """Return key-points and trust with exchanged sides exchanged back."""
+        expected = self._points.at(t)[0]
+        for group, flag in _SWAPPED.items():
+            members = GROUPS[group]
+            known = bool(np.isfinite(expected[list(members)]).any())
+            since = self._swapped_at.get(group, t)
+            if known and t - since > self.settings.swap_s:
+                self._points.forget(list(members))
+                del self._swapped_at[group]
+                flags.append("sides-restarted")
+                known = False
+            if known:
+                swapped = swapped_against(points, expected, group)
+            else:
+                swapped = faces_backward(points, group)
+            if not swapped:
+                if np.isfinite(points[list(members)]).any():
+                    self._swapped_at.pop(group, None)
+                continue
+            if known:
+                self._swapped_at.setdefault(group, t)
+            points, trust = swap_sides(points, group), swap_sides(trust, group)
+            flags.append(flag)
+        return points, trust
+
+    def _remember(self, t: float) -> None:
+        """Keep what the next estimates build on: joint angles, the last cylinder."""
+        points = self._points.at(t)[0]
+        known = np.isfinite(points).all(axis=1)
+        if not known.any():
+            return
+        before = human.rest_posture(0.0, 0.0, 0.0) if self._q is None else self._q
+        q, held = joint_angles(points, before, self._size)
+        if self._q is not None or not held[:5].any():
+            self._q = q
+            self._unfit = fit_errors(q, self._size, points)[1] > self.settings.unfit
+        corners = bounding_box(points[known])
+        center = 0.5 * (corners[:1] + corners[7:])
+        if self._center.refuse(t, center).any():
+            self._center.forget([0])
+        self._center.update(t, center, np.ones(1))
+        self.last_points = points
+
+    @property
+    def frame_flags(self) -> tuple[Flag, ...]:
+        """What the last frame was flagged with."""
+        return self._flags
+
+    def unseen_s(self, t: float) -> float:
+        """Return for how long nothing credible was seen [s]; inf: never."""
+        return max(0.0, t - self._seen_at)
+
+    def expected(self, t: float) -> Vec:
+        """Return where the key-points are expected at ``t`` [m], (25, 3), NaN where unknown."""
+        return self._points.at(t)[0]
+
+    def _require_now(self, t: float) -> None:
+        if not math.isfinite(t) or t < self._t:
+            raise InvalidInput(
+                "t", t, f"must be finite and not earlier than {digits(self._t)} s"
+            )
+
+    def at(self, t: float) -> PersonEstimate:
+        """Return the estimate at ``t`` [s], not earlier than the last frame; changes nothing.
+
+        Raises:
+            InvalidInput: ``t`` is earlier than the last frame, or not finite.
+        """
+        self._require_now(t)
+        flags, age = list(self._flags), t - self._seen_at
+        points, speeds = self._points.at(t)
+        known = np.isfinite(points).all(axis=1)
+        person, held, misfit = self._person(points, speeds)
+        if self.last_points is None:
+            flags.append("never-seen")
+        elif age > self.settings.stale_s:
+            flags.append("stale")
+        if misfit > self.settings.misfit:
+            flags.append("misfit")
+        return PersonEstimate(
+            t=t,
+            age_s=age,
+            cylinder=self._cylinder_at(t, points, age),
+            person=None if self._unfit else person,
+            held=tuple(human.JOINT_NAMES[int(j)] for j in np.flatnonzero(held)),
+            missing=tuple(BODY_25[int(k)] for k in np.flatnonzero(~known)),
+            strays=() if self._frame is None else self._frame.strays,
+            misfit_m=misfit,
+            flags=tuple(flags),
+            unusable=() if self._frame is None else self._frame.unusable,
+            implausible=None if self._frame is None else self._frame.implausible,
+            carried_s=self._carried_at(t),
+        )
+
+    def _carried_at(self, t: float) -> float:
+        """Return for how long the key-points of trunk and arms are carried on at most [s]."""
+        carried = t - self._points.seen_at[_DECIDING]
+        known = carried <= self.settings.filter.hold_s
+        return float(carried[known].max(initial=0.0))
+
+    def person_at(self, t: float) -> Person | None:
+        """Return joint angles and speeds alone at ``t`` [s], as :meth:`at` has them."""
+        self._require_now(t)
+        if self._q is None:
+            return None
+        points, speeds = self._points.at(t)
+        q, qd, _ = joint_motion(points, speeds, self._q, self._size, self.settings.qd_max)
+        return Person(q=q, qd=qd, size=self._size)
+
+    def _person(
+        self, points: Vec, speeds: Vec
+    ) -> tuple[Person | None, NDArray[np.bool_], float]:
+        """Return joint angles and speeds, which are held, and how badly they fit [m]."""
+        if self._q is None:
+            return None, np.ones(18, dtype=np.bool_), math.nan
+        q, qd, held = joint_motion(points, speeds, self._q, self._size, self.settings.qd_max)
+        return Person(q=q, qd=qd, size=self._size), held, fit_errors(q, self._size, points)[0]
+
+    def _cylinder_at(self, t: float, points: Vec, age: float) -> SafetyCylinder | None:
+        """Return the cylinder at ``t``: around what is known, else the last one, grown."""
+        if self.last_points is None:
+            return None
+        settings = self.settings.cylinder
+        if np.isfinite(points).any():
+            velocity = self._center.at(t)[1][0, :2]
+            return safety_cylinder(points, np.nan_to_num(velocity), settings)
+        last = safety_cylinder(self.last_points, None, settings)
+        growth = settings.growth * max(0.0, age - self.settings.filter.hold_s)
+        return None if last is None else last.after(0.0, growth)

@@ -1,0 +1,131 @@
+"""Whether what happened in a case study is what it is for: expected, observed, verdict.
+
+The one rule for the live cell and for whoever evaluates the case studies. It looks at the whole
+run: which goal was chosen first, every change of mind, and how the run ended.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from app.sim.pick.cases import Case
+
+Label = Callable[[str], str]
+"""Maps a station id to its name for people."""
+End = Literal["reached", "contact", "timeout"]
+"""How a run ended; ``reached``: the tool came over its goal, and touched nothing until the
+robot was through with it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Choice:
+    """A goal that was chosen, and when."""
+
+    t_s: float
+    """Time since the start of the run [s]."""
+    goal: str
+    """Station id."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CaseRun:
+    """What happened in a case study so far."""
+
+    choices: tuple[Choice, ...] = ()
+    """The first choice and every change of mind, in order."""
+    end: End | None = None
+    """How it ended; None while it runs."""
+    end_s: float | None = None
+    """When it ended [s]."""
+
+    def choose(self, t_s: float, goal: str) -> "CaseRun":
+        """Return the run with the choice at a time [s]; the same where it is the last one."""
+        if self.end is not None or (self.choices and self.choices[-1].goal == goal):
+            return self
+        return replace(self, choices=(*self.choices, Choice(t_s=t_s, goal=goal)))
+
+    def finish(self, end: End, t_s: float) -> "CaseRun":
+        """Return the run with its end at a time [s]; the first end counts."""
+        return self if self.end is not None else replace(self, end=end, end_s=t_s)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verdict:
+    """What a case study or a sorting test is judged by."""
+
+    expected: str
+    """What it expects, one sentence."""
+    observed: str
+    """What happened so far, one sentence."""
+    as_expected: bool | None
+    """The verdict; None while it is open."""
+    choices: tuple[Choice, ...] = ()
+    """In a case study, the first choice and every change of mind."""
+
+
+def is_as_expected(case: Case, run: CaseRun) -> bool | None:
+    """Return whether a run shows what its case study is for; None while it is open.
+
+    It does where the first choice, the number of changes of mind and the goal it ended at
+    are those of the case, and the run ended without contact and in time.
+    """
+    if run.end is None:
+        return None
+    if run.end != "reached" or not run.choices:
+        return False
+    least, most = case.switches
+    switches = len(run.choices) - 1
+    return (
+        run.choices[-1].goal == case.expected
+        and case.first in (None, run.choices[0].goal)
+        and least <= switches
+        and (most is None or switches <= most)
+    )
+
+
+def judge(case: Case, run: CaseRun, label: Label) -> Verdict:
+    """Return what a case study expects, what a run shows, and whether both agree."""
+    return Verdict(
+        expected=_expected(case, label),
+        observed=_observed(run, label),
+        as_expected=is_as_expected(case, run),
+        choices=run.choices,
+    )
+
+
+def _expected(case: Case, label: Label) -> str:
+    parts = [] if case.first is None else [f"goes for {label(case.first)} first"]
+    if case.switches != (0, None):
+        parts.append(
+            {
+                (0, 0): "does not change its mind",
+                (1, 1): "changes its mind once",
+                (1, None): "changes its mind at least once",
+            }[case.switches]
+        )
+    return f"The robot {_joined([*parts, f'ends at {label(case.expected)}'])}."
+
+
+def _observed(run: CaseRun, label: Label) -> str:
+    if not run.choices:
+        return "The robot has chosen nothing yet."
+    first, *later = run.choices
+    parts = [f"went for {label(first.goal)} first"]
+    if later:
+        turns = [f"to {label(one.goal)} at {one.t_s:.1f} s" for one in later]
+        parts.append(f"changed its mind {_joined(turns)}")
+    elif run.end is not None:
+        parts.append("did not change its mind")
+    if run.end is None:
+        return f"The robot {_joined(parts)}."
+    ends = {
+        "reached": f"reached {label(run.choices[-1].goal)}",
+        "contact": "was in contact",
+        "timeout": "ran out of time",
+    }
+    return f"The robot {_joined([*parts, f'{ends[run.end]} at {run.end_s:.1f} s'])}."
+
+
+def _joined(parts: list[str]) -> str:
+    """Return parts as a list in words."""
+    return " and ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts)

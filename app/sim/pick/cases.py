@@ -1,0 +1,193 @@
+"""The four case studies of the critic's choice (METHOD 3.6, thesis table 5.3).
+
+The layout of the cell was chosen so that each case's geometry is what its text says;
+:func:`geometry` measures it (which goal is nearer, when each goal posture is blocked), and
+tests hold the cell to it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.errors import NotFound
+from app.sim.cells.cell import Cell
+from app.sim.human.model import Hand
+from app.sim.people.kernels.people import people_clearance
+from app.sim.people.reach_script import Script, reach_script
+from app.sim.robot.kernels import arm as arm_kernel
+from app.sim.robot.kernels import kinematics
+from app.sim.scene.scene import NO_CYLINDERS, arm_of, crowd_of, people_of
+
+CASES_CELL = "pick-and-place"
+"""The cell whose layout the cases were chosen for."""
+BLOCKED_BELOW = 0.0
+"""A goal posture nearer to the person than this is blocked [m]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Case:
+    """One case study."""
+
+    id: str
+    """Name in requests."""
+    title: str
+    """Name for people."""
+    text: str
+    """What happens and what is expected, one sentence."""
+    robot_start: str
+    """Station the robot starts from."""
+    goals: tuple[str, str]
+    """Stations it may choose between."""
+    hand: Hand
+    """The person's working hand."""
+    human_from: str
+    """Station the palm starts at."""
+    human_to: str | None
+    """Station it moves to; None where it stays."""
+    expected: str
+    """The goal it should end at."""
+    first: str | None = None
+    """The goal it should choose at first; None where any will do."""
+    switches: tuple[int, int | None] = (0, None)
+    """Least and greatest number of changes of mind; None where there is no greatest."""
+    palm_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Palm relative to its stations [m]."""
+    pelvis_x: tuple[float | None, float | None] = (None, None)
+    """Where the person stands at first and at last [m]; None follows the palm."""
+
+
+CASES = (
+    Case(
+        id="case-1",
+        title="Nearer and free of crossing",
+        text=(
+            "A hand rests beside cube 4; both cubes can be reached, and the robot should take "
+            "cube 4 from the start: it is nearer, and the way does not cross the person."
+        ),
+        robot_start="cube5",
+        goals=("cube0", "cube4"),
+        hand="r",
+        human_from="cube4",
+        human_to=None,
+        expected="cube4",
+        first="cube4",
+        switches=(0, 0),
+        palm_offset=(0.02, 0.16, 0.02),
+    ),
+    Case(
+        id="case-2",
+        title="Farther but safer",
+        text=(
+            "The right hand stays on cube 1, the nearer goal; the robot should end at cube 0, "
+            "the farther and free one."
+        ),
+        robot_start="cube2",
+        goals=("cube0", "cube1"),
+        hand="r",
+        human_from="cube1",
+        human_to=None,
+        expected="cube0",
+    ),
+    Case(
+        id="case-3",
+        title="Blocked for a while",
+        text=(
+            "The right arm moves from cube 3 to dock 1 and stands in the way for a while; the "
+            "robot should switch while its goal is blocked."
+        ),
+        robot_start="cube5",
+        goals=("cube0", "cube1"),
+        hand="r",
+        human_from="cube3",
+        human_to="dock1",
+        expected="cube1",
+        switches=(1, None),
+    ),
+    Case(
+        id="case-4",
+        title="A change of mind that stays",
+        text=(
+            "The right arm moves from dock 1 to cube 0, across the way to cube 1; the robot "
+            "should start for cube 1, switch to dock 0 and stay with it."
+        ),
+        robot_start="cube3",
+        goals=("cube1", "dock0"),
+        hand="r",
+        human_from="dock1",
+        human_to="cube0",
+        expected="dock0",
+        first="cube1",
+        switches=(1, 1),
+        pelvis_x=(None, 0.3),
+    ),
+)
+
+
+def find_case(name: str) -> Case:
+    """Return a case study by id.
+
+    Raises:
+        NotFound: There is no such case.
+    """
+    for case in CASES:
+        if case.id == name:
+            return case
+    raise NotFound("case study", name, tuple(case.id for case in CASES))
+
+
+def cases_of(cell: Cell) -> tuple[Case, ...]:
+    """Return the case studies that can be started in a cell."""
+    return CASES if cell.name == CASES_CELL else ()
+
+
+def script_of(cell: Cell, case: Case) -> Script:
+    """Return the person's movement in a case study."""
+    places = [case.human_from, case.human_to or case.human_from]
+    palms = [np.add(cell.station(place).position, case.palm_offset) for place in places]
+    return reach_script(cell, case.hand, (palms[0], palms[1]), case.pelvis_x)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CaseGeometry:
+    """What a case study looks like in a cell, by goal."""
+
+    way_rad: dict[str, float]
+    """Greatest joint difference from the start to each goal posture [rad]."""
+    distance_m: dict[str, float]
+    """Distance from the start to each goal [m]."""
+    blocked_s: dict[str, tuple[float, float] | None]
+    """First and last time each goal posture is blocked [s]; None where never."""
+    clearance_m: dict[str, float]
+    """Least clearance of each goal posture over the first 6 s [m]."""
+    start_clearance_m: float
+    """Clearance of the robot's start posture at t = 0 [m]."""
+
+
+def geometry(cell: Cell, case: Case) -> CaseGeometry:
+    """Measure a case study in a cell."""
+    arm = arm_of(cell)
+    names = (case.robot_start, *case.goals)
+    positions = np.array([cell.station(name).position for name in names])
+    postures, _ = kinematics.ik_vertical_batch(positions, arm.tool_length, arm.q_min, arm.q_max)
+    script = script_of(cell, case)
+    times = np.arange(0.0, 6.0, 0.05)
+    pose, people = arm_kernel.new_robot_pose(arm), people_of(cell)
+    clearance = np.empty((3, len(times)))
+    for k, t in enumerate(times):
+        human_q, _ = script.at(float(t))
+        crowd = crowd_of(people, human_q[None], NO_CYLINDERS)
+        for i, posture in enumerate(postures):
+            arm_kernel.place_robot(arm, posture, pose)
+            clearance[i, k] = people_clearance(people, pose.columns, crowd)
+    blocked = {}
+    for i, name in enumerate(case.goals, start=1):
+        when = times[clearance[i] < BLOCKED_BELOW]
+        blocked[name] = (float(when[0]), float(when[-1])) if when.size else None
+    goals = list(enumerate(case.goals, start=1))
+    return CaseGeometry(
+        way_rad={n: float(np.abs(postures[i] - postures[0]).max()) for i, n in goals},
+        distance_m={n: float(np.linalg.norm(positions[i] - positions[0])) for i, n in goals},
+        blocked_s=blocked,
+        clearance_m={n: float(clearance[i].min()) for i, n in goals},
+        start_clearance_m=float(clearance[0, 0]),
+    )

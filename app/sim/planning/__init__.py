@@ -1,0 +1,1 @@
+"""Sampling-based planning, time parameterization, path tracking."""

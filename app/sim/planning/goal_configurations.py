@@ -1,0 +1,93 @@
+"""Postures that bring the tool to a target: the goals of the planners.
+
+Where the tool shall point down, the closed form of ``robot/kernels/kinematics.py`` gives the
+posture
+that training uses. Where any tilt will do, damped least squares from random starts (Pinocchio)
+finds several, which a planner may choose among.
+"""
+
+import numpy as np
+
+from app.sim.core.arrays import Vec
+from app.sim.robot.kernels.arm import CONTROLLED, Arm
+from app.sim.robot.ur10 import Robot
+
+DAMPING = 0.05
+"""Damping of the least squares [m/rad]: keeps steps short near singular postures."""
+LONGEST_STEP = 0.3
+"""Longest step of a joint per iteration [rad]."""
+ITERATIONS = 60
+CLOSE = 1e-4
+"""Distance of tcp and target at which the iteration ends [m]."""
+APART = 0.1
+"""Postures nearer than this are taken for one [rad]."""
+
+
+def vertical_posture(arm: Arm, target: Vec) -> Vec:
+    """Return the posture, if any, with the tool down at ``target`` [m], shape (0 or 1, 6)."""
+    q = Robot(arm.tool_length).ik_vertical(target, arm.q_min, arm.q_max)
+    return np.zeros((0, 6)) if q is None else q[None]
+
+
+def goal_postures(
+    arm: Arm,
+    target: Vec,
+    rng: np.random.Generator,
+    *,
+    n_starts: int = 24,
+    spread: float = 0.0,
+    tilt_max: float | None = None,
+) -> Vec:
+    """Return postures whose tcp lies at a target, of any tilt up to a bound.
+
+    Args:
+        arm: From ``scene.arm_of``.
+        target: Where the tcp shall be [m], shape (3,).
+        rng: Draws the starts of the search, and points near the target.
+        n_starts: Random starts; the first one is the cell's home.
+        spread: Postures may miss the target by so much [m]; a success counts within 0.1 m.
+        tilt_max: Largest angle of the tool to the vertical [rad]; None for any.
+
+    Returns:
+        Postures inside the joint limits that differ by APART at least [rad], shape (k, 6), with
+        the joints beyond the controlled ones at home; k = 0 where none was found. Neither
+        people nor contact are looked at.
+    """
+    robot = Robot(arm.tool_length)
+    found: list[Vec] = []
+    for k in range(n_starts):
+        q = np.array(arm.home)
+        if k > 0:
+            low, high = arm.q_min[:CONTROLLED], arm.q_max[:CONTROLLED]
+            q[:CONTROLLED] = rng.uniform(np.maximum(low, -np.pi), np.minimum(high, np.pi))
+        point = np.array(target, dtype=np.float64)
+        if k > 0 and spread > 0.0:
+            way = rng.normal(size=3)
+            point += spread * rng.uniform() ** (1.0 / 3.0) * way / np.linalg.norm(way)
+        posture = _descend(robot, arm, point, q)
+        if posture is None or not _upright(robot, posture, tilt_max):
+            continue
+        if all(np.abs(posture - other).max() > APART for other in found):
+            found.append(posture)
+    return np.array(found).reshape(-1, 6)
+
+
+def _descend(robot: Robot, arm: Arm, point: Vec, q: Vec) -> Vec | None:
+    """Return the posture that damped least squares reaches from ``q``; None if it fails."""
+    moving = slice(0, CONTROLLED)
+    for _ in range(ITERATIONS):
+        miss = point - robot.tcp_pose(q)[:3, 3]
+        if float(np.linalg.norm(miss)) <= CLOSE:
+            return q
+        jacobian = robot.jacobian(q)[:3, moving]
+        square = jacobian @ jacobian.T + DAMPING**2 * np.eye(3)
+        step = jacobian.T @ np.linalg.solve(square, miss)
+        step *= min(1.0, LONGEST_STEP / max(float(np.abs(step).max()), 1e-12))
+        q[moving] = np.clip(q[moving] + step, arm.q_min[moving], arm.q_max[moving])
+    return None
+
+
+def _upright(robot: Robot, q: Vec, tilt_max: float | None) -> bool:
+    if tilt_max is None:
+        return True
+    return bool(np.arccos(np.clip(-robot.tcp_pose(q)[2, 2], -1.0, 1.0)) <= tilt_max)

@@ -1,0 +1,378 @@
+"""Sampling planners to compare policies with: OMPL on our own collision checker (METHOD 2.6).
+
+A query asks for a path of straight joint motions from one posture to any of several. Three
+planners: RRT-Connect (the first path found), RRT* (Karaman and Frazzoli 2011; the shortest path
+its time allows, as in the source's comparison) and AORRTC (Wilson et al. 2025; almost-surely
+optimal RRT-Connect). Path length is in joint space [rad], Euclidean. OMPL is asked only where
+the straight motion to the nearest goal is not free: no path is shorter than that (and AORRTC of
+2.0.1 returns paths that do not begin at the start where a goal can be reached straight).
+Whatever happens, the answer is a :class:`Plan` whose ``outcome`` has a name; only malformed
+numbers raise.
+
+Time: the search ends before its budget of wall time is spent, so that the path can be looked at
+once more within it; only a step of OMPL that is under way, or a busy machine, makes it a few
+milliseconds longer. With ``max_poses`` it ends after so many poses instead, which makes plans
+repeatable.
+
+Seeds: OMPL keeps one seed generator per process. It is set before each plan, and all of a
+plan's random generators are made new from it, under a lock, so equal queries with equal seeds
+and ``max_poses`` give equal plans, whatever was planned before. OMPL's own warning that it was
+seeded twice is silenced with the rest of its console output.
+"""
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from app.errors import InvalidInput, MissingPackage
+from app.sim.collision.checker import Checker
+from app.sim.core.arrays import Vec
+from app.sim.robot.kernels.arm import CONTROLLED
+
+try:
+    from ompl import base as ob
+    from ompl import geometric as og
+    from ompl import util as ou
+except ImportError:  # no wheel for this machine: everything else of the simulator works
+    ob = og = ou = None
+
+PLANNERS = ("rrt-connect", "rrt-star", "aorrtc")
+OUTCOMES = (
+    "solved",
+    "approximate",
+    "out-of-time",
+    "start-in-contact",
+    "goal-in-contact",
+    "start-outside-limits",
+    "no-goal",
+)
+"""``solved``: a free path to a goal. ``approximate``: a free path that ends short of all goals.
+``out-of-time``: no path within the budget. ``start-in-contact``, ``goal-in-contact``: the
+start, or every goal, is nearer to something than the margin. ``start-outside-limits``: of the
+joints.
+``no-goal``: no posture was given, or none within the limits."""
+
+SAME = 1e-6
+"""Difference below which two lengths, or two positions of a joint, are one [rad]."""
+LAST_LOOK_S = 0.004
+"""Part of the budget kept to look at the path once more [s]; a quarter of it at most."""
+MOST_KEPT = 6
+"""Paths kept from while a planner runs."""
+_SEEDING = threading.Lock()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlanSettings:
+    """How to plan."""
+
+    planner: str = "rrt-connect"
+    """One of PLANNERS."""
+    budget_s: float = 1.0
+    """Longest wall time [s], shortening included."""
+    shorten_share: float = 0.15
+    """Part of the budget kept to shorten the path; RRT-Connect gives it all that is left."""
+    max_poses: int | None = None
+    """End after so many poses looked at instead, whatever the time; for repeatable plans."""
+    range_rad: float = 0.5
+    """Longest motion of a tree's branch [rad]; 0 lets OMPL choose."""
+    detour_rad: float = 1.5
+    """How far each joint may go beyond start and goals [rad]; the cell's limits hold anyway."""
+    n_joints: int = CONTROLLED
+    """Joints that move, from the base on; the others stay as they are at the start."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plan:
+    """The answer to one query."""
+
+    outcome: str
+    """One of OUTCOMES."""
+    planner: str
+    """The planner asked."""
+    path: Vec
+    """Postures joined by straight motions [rad], shape (n, 6); n = 0 without a path."""
+    goal: int
+    """Place of the reached goal among those given; -1 where none is reached."""
+    length_rad: float
+    """Length of the path [rad]."""
+    first_length_rad: float
+    """Its length before shortening [rad]."""
+    planning_s: float
+    """Wall time spent [s]."""
+    n_poses: int
+    """Poses looked at."""
+
+    @property
+    def solved(self) -> bool:
+        """Whether the path reaches a goal."""
+        return self.outcome == "solved"
+
+
+def plan(
+    checker: Checker, start: Vec, goals: Vec, settings: PlanSettings, seed: int = 1
+) -> Plan:
+    """Plan from one posture to any of several.
+
+    Args:
+        checker: People, margins and the robot; people stand still while it plans.
+        start: Joint positions [rad], shape (6,).
+        goals: Joint positions to reach one of [rad], shape (k, 6); of the joints that stay, the
+            start's values count.
+        settings: How to plan.
+        seed: Seed, at least 1.
+
+    Raises:
+        InvalidInput: A number is NaN or infinite, a shape or a setting breaks its rule.
+        MissingPackage: OMPL is not installed.
+    """
+    _require(settings, seed)
+    start, goals = _finite("start", start, 1), _finite("goals", goals, 2)
+    clock = _Clock(checker, settings)
+    goals = goals.copy()
+    goals[:, settings.n_joints :] = start[settings.n_joints :]
+    low, high = planning_limits(checker, start)
+    if np.any(start < checker.arm.q_min) or np.any(start > checker.arm.q_max):
+        return clock.answer("start-outside-limits")
+    inside = np.flatnonzero(np.all((goals >= low) & (goals <= high), axis=1))
+    if len(inside) == 0:
+        return clock.answer("no-goal")
+    if not checker.is_free(start):
+        return clock.answer("start-in-contact")
+    usable = np.array([k for k in inside if checker.is_free(goals[k])], dtype=np.int64)
+    if len(usable) == 0:
+        return clock.answer("goal-in-contact")
+    order = usable[np.argsort(np.linalg.norm(goals[usable] - start, axis=1), kind="stable")]
+    direct = next((n for n, k in enumerate(order) if checker.edge_free(start, goals[k])), None)
+    if direct is not None:
+        straight = np.stack([start, goals[order[direct]]])
+        if direct == 0 or settings.planner == "rrt-connect":
+            return clock.answer("solved", straight, goals)
+    with _SEEDING:
+        ou.RNG.setSeed(seed)
+        nearer = goals[order[:direct]]
+        found = _Query(checker, start, nearer, (low, high), settings, clock).solve()
+    if direct is not None and (
+        found.outcome != "solved" or path_length(found.path) > path_length(straight)
+    ):
+        return clock.answer("solved", straight, goals)
+    return clock.answer(found.outcome, found.path, goals, found.first_length)
+
+
+def planning_limits(checker: Checker, start: Vec) -> tuple[Vec, Vec]:
+    """Return the joint limits that plans keep [rad], each of shape (6,).
+
+    Half a period at full speed inside the cell's limits: there every timed path is viable
+    (METHOD 2.2), so that it can be followed to the letter. A start beyond them is kept.
+    """
+    inset = 0.5 * checker.arm.qd_max * checker.arm.dt
+    return (
+        np.minimum(checker.arm.q_min + inset, start),
+        np.maximum(checker.arm.q_max - inset, start),
+    )
+
+
+def path_length(path: Vec) -> float:
+    """Return the length of a path of straight joint motions, shape (n, 6) [rad]."""
+    return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()) if len(path) else 0.0
+
+
+class _Clock:
+    """The budget of one plan, in time or in poses."""
+
+    def __init__(self, checker: Checker, settings: PlanSettings) -> None:
+        self._checker, self._settings = checker, settings
+        self._start, self._n0 = time.perf_counter(), checker.n_poses
+
+    def over(self, share: float = 1.0) -> bool:
+        """Tell whether this share of the budget is spent."""
+        if self._settings.max_poses is not None:
+            return self._checker.n_poses - self._n0 >= share * self._settings.max_poses
+        budget = self._settings.budget_s
+        search = budget - min(LAST_LOOK_S, 0.25 * budget)
+        return time.perf_counter() - self._start >= share * search
+
+    def answer(
+        self,
+        outcome: str,
+        path: Vec | None = None,
+        goals: Vec | None = None,
+        first: float | None = None,
+    ) -> Plan:
+        """Return the plan with the time and poses spent so far."""
+        path = np.zeros((0, 6)) if path is None else path
+        goal = -1
+        if outcome == "solved" and goals is not None:
+            goal = int(np.argmin(np.linalg.norm(goals - path[-1], axis=1)))
+        length = path_length(path)
+        return Plan(
+            outcome=outcome,
+            planner=self._settings.planner,
+            path=path,
+            goal=goal,
+            length_rad=length,
+            first_length_rad=length if first is None else first,
+            planning_s=time.perf_counter() - self._start,
+            n_poses=self._checker.n_poses - self._n0,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _Found:
+    """What OMPL found: one of OUTCOMES, the path [rad], its length unshortened [rad]."""
+
+    outcome: str
+    path: Vec
+    first_length: float
+
+
+class _Query:
+    """One query in OMPL's terms; lives as long as its plan.
+
+    What is asked after the budget is spent is answered "not free" at once, so that OMPL's inner
+    loops that know no budget come to their end too.
+    """
+
+    def __init__(
+        self,
+        checker: Checker,
+        start: Vec,
+        goals: Vec,
+        limits: tuple[Vec, Vec],
+        settings: PlanSettings,
+        clock: _Clock,
+    ) -> None:
+        ou.noOutputHandler()
+        self._checker, self._settings, self._clock = checker, settings, clock
+        self._start, self._goals = start, goals
+        n = settings.n_joints
+        self._read = _reader(start, n)
+        self._kept: list[tuple[float, Vec]] = []
+        every = np.vstack([start, goals])[:, :n]
+        low = np.maximum(limits[0][:n], every.min(axis=0) - settings.detour_rad)
+        high = np.minimum(limits[1][:n], every.max(axis=0) + settings.detour_rad)
+        space = ob.RealVectorStateSpace(n)
+        bounds = ob.RealVectorBounds(n)
+        for j in range(n):
+            bounds.setLow(j, float(low[j]))
+            bounds.setHigh(j, float(high[j]))
+        space.setBounds(bounds)
+        self._info = ob.SpaceInformation(space)
+        _set_checks(self._info, checker, clock, self._read)
+        self._problem = ob.ProblemDefinition(self._info)
+        self._problem.addStartState(_state(space, start, n))
+        states = ob.GoalStates(self._info)
+        for goal in goals:
+            states.addState(_state(space, goal, n))
+        self._problem.setGoal(states)
+        self._problem.setOptimizationObjective(ob.PathLengthOptimizationObjective(self._info))
+
+    def solve(self) -> _Found:
+        """Run the planner, then shorten its path."""
+        anytime = self._settings.planner != "rrt-connect"
+        share = 1.0 - self._settings.shorten_share if anytime else 1.0
+        algorithm = self._algorithm()
+        algorithm.setProblemDefinition(self._problem)
+        algorithm.setup()
+        algorithm.solve(ob.PlannerTerminationCondition(lambda: self._watch(share)))
+        found = self._problem.getSolutionPath()
+        if found is None:
+            return _Found("out-of-time", np.zeros((0, 6)), 0.0)
+        if not self._problem.hasExactSolution():
+            path = self._rows(found)
+            if path_length(path) <= SAME or not self._checker.path_free(path):
+                return _Found("out-of-time", np.zeros((0, 6)), 0.0)
+            return _Found("approximate", path, path_length(path))
+        self._keep(found)
+        first = self._kept[-1][0]
+        if found.getStateCount() > 2 and not self._clock.over():
+            over = ob.PlannerTerminationCondition(self._clock.over)
+            og.PathSimplifier(self._info).simplify(found, over, False)
+            self._keep(found)
+        for _, path in sorted(self._kept, key=lambda kept: kept[0]):
+            # Ours is the last word: AORRTC may also end with a path of length 0 at the start.
+            if self._reaches(path) and self._checker.path_free(path):
+                return _Found("solved", path, first)
+        return _Found("out-of-time", np.zeros((0, 6)), 0.0)
+
+    def _watch(self, share: float) -> bool:
+        """Tell whether the planner's part of the budget is spent; keep what it has found.
+
+        AORRTC shortens its paths in place, and one that the end of the budget catches in the
+        middle of that may be in contact: then an earlier one is taken.
+        """
+        if self._clock.over(share):
+            return True
+        if self._problem.hasExactSolution():
+            found = self._problem.getSolutionPath()
+            if not self._kept or abs(found.length() - self._kept[-1][0]) > SAME:
+                self._keep(found)
+        return False
+
+    def _reaches(self, path: Vec) -> bool:
+        """Tell whether a path leads from the start to a goal."""
+        ends = np.abs(path[-1] - self._goals).max(axis=1).min()
+        return bool(np.abs(path[0] - self._start).max() <= SAME and ends <= SAME)
+
+    def _keep(self, found: Any) -> None:
+        path = self._rows(found)
+        self._kept = [*self._kept[-MOST_KEPT:], (path_length(path), path)]
+
+    def _algorithm(self) -> Any:
+        kinds = {"rrt-connect": og.RRTConnect, "rrt-star": og.RRTstar, "aorrtc": og.AORRTC}
+        algorithm = kinds[self._settings.planner](self._info)
+        if self._settings.range_rad > 0.0:
+            algorithm.setRange(self._settings.range_rad)
+        return algorithm
+
+    def _rows(self, found: Any) -> Vec:
+        rows = [self._read(found.getState(k)) for k in range(found.getStateCount())]
+        return np.array(rows).reshape(-1, 6)
+
+
+def _reader(start: Vec, n: int) -> Callable[[Any], Vec]:
+    """Return the function that reads an OMPL state as joint positions [rad], shape (6,)."""
+    rest = start[n:].tolist()
+    return lambda state: np.array([*state[0:n], *rest])
+
+
+def _state(space: Any, q: Vec, n: int) -> Any:
+    state = space.allocState()
+    for j in range(n):
+        state[j] = float(q[j])
+    return state
+
+
+def _set_checks(info: Any, checker: Checker, clock: _Clock, read: Callable[[Any], Vec]) -> None:
+    """Let OMPL ask the checker about states and motions."""
+
+    class Motions(ob.MotionValidator):  # type: ignore[misc]
+        def checkMotion(self, a: Any, b: Any) -> bool:
+            return not clock.over() and checker.edge_free(read(a), read(b))
+
+    info.setStateValidityChecker(lambda q: not clock.over() and checker.is_free(read(q)))
+    info.setMotionValidator(Motions(info))
+
+
+def _finite(name: str, values: Vec, ndim: int) -> Vec:
+    out = np.array(values, dtype=np.float64)
+    if out.ndim != ndim or out.shape[-1] != 6 or not np.isfinite(out).all():
+        rule = "must be finite, of shape " + ("(6,)" if ndim == 1 else "(k, 6)")
+        raise InvalidInput(name, out.tolist(), rule)
+    return out
+
+
+def _require(settings: PlanSettings, seed: int) -> None:
+    if ob is None:
+        raise MissingPackage("ompl", "planning", "pip install ompl (Linux, macOS 15 or later)")
+    if settings.planner not in PLANNERS:
+        raise InvalidInput("planner", settings.planner, "is not known", PLANNERS)
+    if not settings.budget_s >= 0.0:
+        raise InvalidInput("budget_s", settings.budget_s, "must be at least 0 s")
+    if not 1 <= settings.n_joints <= 6:
+        raise InvalidInput("n_joints", settings.n_joints, "must be between 1 and 6")
+    if seed < 1:
+        raise InvalidInput("seed", seed, "must be at least 1")

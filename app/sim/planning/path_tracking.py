@@ -1,0 +1,118 @@
+"""Follows a timed path from wherever the robot really is on it, period by period.
+
+As long as nobody slows the robot down, each period's wanted speeds are the next knot's, and
+the motion is the timed path to rounding. A safety layer may scale a period or stop (METHOD
+2.7); then the tracker finds the place on the path from the robot's position and goes on from
+there at the greatest rate ``o`` in [0, 1] of the path's own speed that the acceleration limits
+allow:
+
+    qd_wanted = o' p'(s') + GAIN (p(s') - q - (qd + o' p'(s')) dt / 2) / dt,
+    s' = s + (o + o') dt / 2,
+
+with ``o`` the present rate. A timed path can be followed at any rate below 1, since speeds
+scale with o and accelerations with o^2; the second term takes back what is lost where a period
+straddles two pieces: a few milliradians at worst. The bounded actions
+(``robot/kernels/acceleration_bounds.py``) keep the limits in any case.
+"""
+
+import numpy as np
+
+from app.sim.core.arrays import Vec
+from app.sim.planning.time_parameterization import Limits, TimedPath, stop_periods
+
+GAIN = 0.3
+"""Part of the position error that is taken back per period; ours."""
+RATES = np.linspace(0.0, 1.0, 41)
+"""Rates tried."""
+ON_PLAN = 1e-7
+"""Differences in position [rad] and speed [rad/s] below which the robot is at a knot."""
+
+
+class Tracker:
+    """The follower of one timed path.
+
+    Args:
+        timed: The path.
+        limits: Limits of the robot.
+    """
+
+    def __init__(self, timed: TimedPath, limits: Limits) -> None:
+        self.timed, self._limits = timed, limits
+        self.place = 0.0
+        """Where on the path the robot is, as the path's own time [s]."""
+        self._expected = 0.0
+        self.error_rad = 0.0
+        """Distance of the robot from the path, greatest joint [rad]."""
+
+    @property
+    def remaining(self) -> float:
+        """What is left of the path, in its own time [s]."""
+        return max(0.0, self.timed.duration - self.place)
+
+    @property
+    def period(self) -> int:
+        """The period of the path that the robot is in."""
+        return min(int(self.place / self.timed.dt + 1e-6), self.timed.n_periods)
+
+    def locate(self, q: Vec) -> None:
+        """Find the robot's place on the path; it lies at most one period after the last."""
+        at = np.abs(q - self.timed.at(self._expected)[0]).max()
+        if at <= ON_PLAN:
+            self.place, self.error_rad = self._expected, float(at)
+            return
+        low, high = self.place, min(self.place + self.timed.dt, self.timed.duration)
+        for _ in range(3):
+            times = np.linspace(low, high, 11)
+            misses = [float(np.linalg.norm(q - self.timed.at(t)[0])) for t in times]
+            k = int(np.argmin(misses))
+            low, high = times[max(k - 1, 0)], times[min(k + 1, 10)]
+        self.place = float(times[k])
+        self.error_rad = float(np.abs(q - self.timed.at(self.place)[0]).max())
+
+    def wanted(self, q: Vec, qd: Vec, brake: bool = False) -> Vec:
+        """Return the joint speeds to have after this period [rad/s], shape (6,).
+
+        Args:
+            q: Joint positions [rad], shape (6,), as given to :meth:`locate`.
+            qd: Joint speeds [rad/s], shape (6,).
+            brake: Come to rest along the path instead, as soon as the limits allow.
+        """
+        timed, dt = self.timed, self.timed.dt
+        k = round(self.place / dt)
+        exact = abs(self.place - k * dt) <= 1e-9 and self.error_rad <= ON_PLAN
+        if exact and not brake and k < timed.n_periods:
+            if np.abs(qd - timed.qd[k]).max() <= ON_PLAN:
+                self._expected = (k + 1) * dt
+                return np.array(timed.qd[k + 1])
+        rate = self._rate(qd, brake)
+        options, ends = [], []
+        for after in RATES if brake else RATES[::-1]:
+            end = min(self.place + 0.5 * (rate + after) * dt, timed.duration)
+            point, speed = timed.at(end)
+            speed = after * speed
+            miss = point - q - 0.5 * (qd + speed) * dt
+            options.append(speed + GAIN * miss / dt)
+            ends.append(end)
+        wanted = np.array(options)
+        excess = np.maximum(
+            np.max(np.abs(wanted - qd) / (self._limits.qdd_max * dt), axis=1),
+            np.max(np.abs(wanted) / self._limits.qd_max, axis=1),
+        )
+        fits = np.flatnonzero(excess <= 1.0 + 1e-9)
+        choice = int(fits[0]) if len(fits) else int(np.argmin(excess))
+        self._expected = ends[choice]
+        return np.asarray(wanted[choice])
+
+    def _rate(self, qd: Vec, brake: bool) -> float:
+        """Return the robot's speed along the path relative to the path's own."""
+        speed = self.timed.at(self.place)[1]
+        square = float(speed @ speed)
+        if square < 1e-12:
+            return 0.0 if brake else 1.0
+        return min(1.0, max(0.0, float(speed @ qd) / square))
+
+
+def straight_stop(qd: Vec, limits: Limits) -> Vec:
+    """Return the joint speeds after one period of a straight stop [rad/s], shape (6,)."""
+    n = stop_periods(qd, limits)
+    return np.asarray(qd * (1.0 - 1.0 / n)) if n > 1 else np.zeros(6)

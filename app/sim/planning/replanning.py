@@ -1,0 +1,269 @@
+"""Planners in three roles, wherever a policy may stand (METHOD 2.6, last row).
+
+``once`` plans among the people as they stand at the start and follows whatever happens: only a
+safety layer slows it down. ``when-blocked`` looks at the rest of its path every so often; where
+people are nearer to it than the margin it brakes along the path, plans again from where it will
+come to rest, and turns to the new path as soon as it is there. ``every-tick`` plans again every
+period within a small budget, and changes over where its path is blocked or the new one shorter.
+
+Planning takes time: a path planned at ``t`` is used from ``t`` plus the budget on (at least one
+period), tested again among the people as they are then. Only the first plan is free of charge:
+the robot is at rest and the episode has not begun. New paths begin where a straight stop from
+the state in motion ends; the timed motion turns toward them without standing still where it
+can (``time_scaling``). Without a plan the robot brakes to rest, and the report says so.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from app.errors import InvalidInput
+from app.sim.collision.checker import Checker, Shapes
+from app.sim.core.arrays import Vec
+from app.sim.planning.ompl_planners import Plan, PlanSettings, plan
+from app.sim.planning.path_tracking import Tracker, straight_stop
+from app.sim.planning.time_parameterization import Limits, stopping_point, time_free_path
+from app.sim.robot.kernels import acceleration_bounds as polynomial
+from app.sim.robot.kernels.arm import Arm
+
+STATES = ("waiting", "following", "braking", "arrived", "lost")
+"""``waiting``: no plan, at rest or braking to rest. ``braking``: slows down along a path that
+is blocked. ``lost``: farther from the path than ``lost_rad``, braking to rest."""
+AGAIN_BUDGET_S = {"once": 0.0, "when-blocked": 0.2, "every-tick": 0.02}
+"""Budget of later plans by role [s]; ours."""
+EASED = 0.005
+"""Where the robot is nearer to people than the margin, a margin this much below its clearance
+holds instead [m]: it may leave, and pass by no nearer than it stands."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FollowSettings:
+    """How a planner follows and plans again."""
+
+    role: str = "once"
+    """One of ROLES."""
+    plan: PlanSettings = field(default_factory=PlanSettings)
+    """How the first path is planned."""
+    again_budget_s: float | None = None
+    """Budget of later plans [s]; that of the role (AGAIN_BUDGET_S) if None."""
+    margin: float = 0.05
+    """Distance at which people block the path [m]."""
+    extra_margin: float = 0.02
+    """What plans keep beyond the margin [m], so that a new path is not blocked at once."""
+    look_every_s: float = 0.1
+    """How often ``when-blocked`` looks at the rest of its path [s]."""
+    better_share: float = 0.05
+    """``every-tick`` changes to a free path that saves at least this share of the time left."""
+    arrived_rad: float = 1e-3
+    """Distance to the end of the path, greatest joint, that counts as arrived [rad]."""
+    lost_rad: float = 0.1
+    """Distance from the path, greatest joint, that counts as lost [rad]."""
+
+
+@dataclass(slots=True, kw_only=True)
+class FollowReport:
+    """What happened so far; grows with every period."""
+
+    state: str = "waiting"
+    """One of STATES."""
+    outcome: str = ""
+    """Outcome of the last plan, one of ``planners.OUTCOMES``; empty before the first."""
+    n_plans: int = 0
+    """Plans asked for."""
+    n_solved: int = 0
+    """Plans that found a path."""
+    n_changes: int = 0
+    """Times it turned to a new path."""
+    planning_s: float = 0.0
+    """Wall time spent planning [s]."""
+    longest_plan_s: float = 0.0
+    """Longest plan [s]."""
+    blocked_s: float = 0.0
+    """Time during which it braked or stood because the path was blocked [s]."""
+    margin: float = 0.0
+    """Margin of the last plan [m], eased where the robot stood nearer to people."""
+    error_rad: float = 0.0
+    """Greatest distance from the path so far [rad]."""
+
+
+class Follower:
+    """A planner that acts like a policy: state and people in, wanted joint speeds out.
+
+    Args:
+        arm: From ``scene.arm_of``.
+        goals: Postures to reach one of [rad], shape (k, 6).
+        settings: Role, margins, budgets.
+        seed: Seed of the first plan; each later one adds 1.
+
+    Raises:
+        InvalidInput: The role is not known.
+    """
+
+    def __init__(self, arm: Arm, goals: Vec, settings: FollowSettings, seed: int = 1) -> None:
+        if settings.role not in ROLES:
+            raise InvalidInput("role", settings.role, "is not known", tuple(ROLES))
+        self.arm, self.goals, self.settings, self.seed = arm, goals, settings, seed
+        self.limits = Limits(qd_max=arm.qd_max, qdd_max=arm.qdd_max, dt=arm.dt)
+        self.report = FollowReport(margin=settings.margin)
+        self.tracker: Tracker | None = None
+        self.blocked = False
+        self.pending: tuple[float, Plan] | None = None
+        self.next_look = -math.inf
+
+    def act(self, q: Vec, qd: Vec, people: Shapes, t: float) -> Vec:
+        """Return the joint speeds to have after this period [rad/s], shape (6,).
+
+        Args:
+            q: Joint positions [rad], shape (6,).
+            qd: Joint speeds [rad/s], shape (6,).
+            people: Where people are now.
+            t: Time since the start [s].
+        """
+        if self.report.n_plans == 0:
+            first = self.ask(people, stopping_point(q, qd, self.limits), self.settings.plan)
+            self.turn_to(first, q, qd, people)
+        if self.tracker is not None:
+            self.tracker.locate(q)
+            self.report.error_rad = max(self.report.error_rad, self.tracker.error_rad)
+        ROLES[self.settings.role](self, q, qd, people, t)
+        return self._order(q, qd)
+
+    def ask(self, people: Shapes, start: Vec, settings: PlanSettings) -> Plan:
+        """Plan from a posture at rest [rad], shape (6,), among people as they are now."""
+        margin = self.settings.margin + self.settings.extra_margin
+        checker = self.checker(people, start, margin)
+        answer = plan(checker, start, self.goals, settings, self.seed + self.report.n_plans)
+        report = self.report
+        report.outcome, report.margin = answer.outcome, checker.margin
+        report.n_plans, report.n_solved = report.n_plans + 1, report.n_solved + answer.solved
+        report.planning_s += answer.planning_s
+        report.longest_plan_s = max(report.longest_plan_s, answer.planning_s)
+        return answer
+
+    def again(self, people: Shapes, q: Vec, qd: Vec, t: float) -> None:
+        """Plan from where a straight stop from a state would end; used after the budget."""
+        budget = self.settings.again_budget_s
+        if budget is None:
+            budget = AGAIN_BUDGET_S[self.settings.role]
+        later = replace(self.settings.plan, budget_s=budget)
+        answer = self.ask(people, stopping_point(q, qd, self.limits), later)
+        if answer.solved:
+            self.pending = (t + max(budget, self.arm.dt), answer)
+
+    def checker(self, people: Shapes, q: Vec, margin: float) -> Checker:
+        """Return the checker for a margin [m], eased where the robot at ``q`` is nearer."""
+        clearance = Checker(self.arm, people).clearance(q).people
+        return Checker(self.arm, people, max(0.0, min(margin, clearance - EASED)))
+
+    def is_blocked(self, people: Shapes, q: Vec) -> bool:
+        """Tell whether people are nearer to the rest of the path than the margin."""
+        if self.tracker is None:
+            return True
+        checker = self.checker(people, q, self.settings.margin)
+        timed, first = self.tracker.timed, self.tracker.period
+        return checker.first_blocked(timed.q, timed.qd, first) < timed.n_periods
+
+    def turn_to(
+        self, answer: Plan, q: Vec, qd: Vec, people: Shapes, within_s: float = math.inf
+    ) -> bool:
+        """Follow a plan from the present state if its motion is free and short enough.
+
+        Args:
+            answer: A plan from where the robot was to stop.
+            q: Joint positions [rad], shape (6,).
+            qd: Joint speeds [rad/s], shape (6,).
+            people: Where people are now.
+            within_s: Longest motion taken [s].
+        """
+        if not answer.solved:
+            return False
+        stop = stopping_point(q, qd, self.limits)
+        checker = self.checker(people, stop, self.settings.margin)
+        for rest in (answer.path[1:], answer.path):
+            path = np.vstack([stop, rest])
+            if checker.path_free(path):
+                timed = time_free_path(checker, path, self.limits, qd)
+                if timed is None or timed.duration > within_s:
+                    return False
+                self.tracker, self.blocked = Tracker(timed, self.limits), False
+                self.report.n_changes += 1
+                return True
+        return False
+
+    def _order(self, q: Vec, qd: Vec) -> Vec:
+        """Return the wanted speeds of the present state of affairs."""
+        report, tracker = self.report, self.tracker
+        if tracker is None:
+            report.state = "waiting"
+            return straight_stop(qd, self.limits)
+        if tracker.error_rad > self.settings.lost_rad:
+            report.state, self.tracker = "lost", None
+            return straight_stop(qd, self.limits)
+        near = float(np.abs(q - tracker.timed.q[-1]).max()) <= self.settings.arrived_rad
+        if near and float(np.abs(qd).max()) <= self.settings.arrived_rad:
+            report.state = "arrived"
+        else:
+            report.state = "braking" if self.blocked else "following"
+        if report.state == "braking":
+            report.blocked_s += self.arm.dt
+        return tracker.wanted(q, qd, brake=report.state == "braking")
+
+
+def _once(follower: Follower, q: Vec, qd: Vec, people: Shapes, t: float) -> None:
+    """Leave the path as it is."""
+
+
+def _when_blocked(follower: Follower, q: Vec, qd: Vec, people: Shapes, t: float) -> None:
+    """Look at the rest of the path; plan again where it is blocked."""
+    if follower.report.state == "arrived":
+        return
+    if follower.pending is not None and t >= follower.pending[0] - 1e-9:
+        answer, follower.pending = follower.pending[1], None
+        if follower.blocked or follower.tracker is None:
+            follower.turn_to(answer, q, qd, people)
+    if t < follower.next_look - 1e-9:
+        return
+    follower.next_look = t + follower.settings.look_every_s
+    follower.blocked = follower.is_blocked(people, q)
+    if follower.blocked and follower.pending is None:
+        follower.again(people, q, qd, t)
+
+
+def _every_tick(follower: Follower, q: Vec, qd: Vec, people: Shapes, t: float) -> None:
+    """Plan again for the state after this period; turn to what was planned for this one."""
+    if follower.report.state == "arrived":
+        return
+    follower.blocked = follower.is_blocked(people, q)
+    if follower.pending is not None and t >= follower.pending[0] - 1e-9:
+        answer, follower.pending = follower.pending[1], None
+        left = math.inf
+        if follower.tracker is not None and not follower.blocked:
+            left = follower.tracker.remaining * (1.0 - follower.settings.better_share)
+        follower.turn_to(answer, q, qd, people, left)
+    if follower.pending is None:
+        after_q, after_qd = _after_period(follower, q, qd)
+        follower.again(people, after_q, after_qd, t)
+
+
+def _after_period(follower: Follower, q: Vec, qd: Vec) -> tuple[Vec, Vec]:
+    """Return positions [rad] and speeds [rad/s] after this period if nobody slows it down."""
+    arm, tracker = follower.arm, follower.tracker
+    if tracker is None:
+        wanted = straight_stop(qd, follower.limits)
+    else:
+        wanted = tracker.wanted(q, qd, brake=follower.blocked)
+    c, after_q, after_qd = np.empty(6), np.empty(6), np.empty(6)
+    polynomial.advance(
+        np.array(q), np.array(qd), wanted,
+        arm.q_min, arm.q_max, arm.qd_max, arm.qdd_max, arm.dt, c, after_q, after_qd,
+    )  # fmt: skip
+    return after_q, after_qd
+
+
+ROLES: dict[str, Callable[[Follower, Vec, Vec, Shapes, float], None]] = {
+    "once": _once,
+    "when-blocked": _when_blocked,
+    "every-tick": _every_tick,
+}

@@ -1,0 +1,215 @@
+"""From a path of straight joint motions to one timed within the limits, in exact pieces.
+
+The time law is linear segments with parabolic blends (Craig, *Introduction to Robotics*,
+section 7.3; LSPB) on the grid of the control period ``dt``: along segment i all joints move at
+constant speed ``v_i = D_i / T_i``; about corner i the speeds change evenly from ``v_{i-1}`` to
+``v_i`` during ``b_i`` whole periods; the constant part lasts ``m_i`` whole periods, so that
+``T_i = (m_i + (b_i + b_{i+1}) / 2) dt``. Every period is therefore one polynomial of degree 2,
+a bounded polynomial action (METHOD 2.2) like those of a policy. The ``b_i`` are the least with
+
+    |v_i| <= qd_max   and   |v_i - v_{i-1}| <= qdd_max b_i dt   for every joint,
+
+found by lengthening the blends that are too short until none is. A blend leaves the path near
+its corner, by ``|v_i - v_{i-1}| b_i dt / 8`` at most; where that is in contact, the motion
+stops at the corner instead. A motion already under way begins with its blend: the first corner
+is where a straight stop would end.
+
+Not the time-optimal parametrisation of the path: speeds are constant along a segment and
+durations whole periods. On straight lines between few corners little is lost. TOPP-RA's wheel
+(toppra 0.6.10, MIT) exists for x86-64 Linux only, brings Matplotlib, and keeps limits at its
+grid points, not in pieces of the control period.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.errors import InvalidInput
+from app.sim.collision.checker import Checker
+from app.sim.core.arrays import Vec
+
+SAME = 1e-9
+"""Corners nearer than this are one [rad]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TimedPath:
+    """A path in time: n periods, each a polynomial of degree 2 between its knots."""
+
+    dt: float
+    """Control period [s]."""
+    q: Vec
+    """Joint positions at the knots [rad], shape (n + 1, 6)."""
+    qd: Vec
+    """Joint speeds at the knots [rad/s], shape (n + 1, 6); the last are 0."""
+    corner_rad: float
+    """How far the motion leaves the path at its corners at most, per joint [rad]."""
+    n_stops: int
+    """Corners at which it stops."""
+
+    @property
+    def n_periods(self) -> int:
+        """Number of periods."""
+        return len(self.q) - 1
+
+    @property
+    def duration(self) -> float:
+        """Duration [s]."""
+        return self.n_periods * self.dt
+
+    def at(self, t: float) -> tuple[Vec, Vec]:
+        """Return positions [rad] and speeds [rad/s] at time ``t`` [s], held beyond its ends."""
+        if t >= self.duration:
+            return self.q[-1], self.qd[-1]
+        k = max(0, int(t / self.dt))
+        x = max(0.0, t - k * self.dt)
+        double_c = (self.qd[k + 1] - self.qd[k]) / self.dt
+        speed = self.qd[k] + double_c * x
+        return self.q[k] + 0.5 * (self.qd[k] + speed) * x, speed
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """What a motion keeps, per joint."""
+
+    qd_max: Vec
+    """Speed [rad/s], shape (6,)."""
+    qdd_max: Vec
+    """Acceleration [rad/s^2], shape (6,)."""
+    dt: float
+    """Control period [s]."""
+
+
+def stop_periods(qd: Vec, limits: Limits) -> int:
+    """Return the periods of a straight stop: all joints slow down evenly and rest together."""
+    return math.ceil(float(np.max(np.abs(qd) / (limits.qdd_max * limits.dt))) - 1e-9)
+
+
+def stopping_point(q: Vec, qd: Vec, limits: Limits) -> Vec:
+    """Return where a straight stop from ``q`` [rad] and ``qd`` [rad/s] ends [rad], (6,)."""
+    return np.asarray(q + 0.5 * stop_periods(qd, limits) * limits.dt * qd)
+
+
+def time_path(
+    path: Vec, limits: Limits, qd0: Vec | None = None, stops: frozenset[int] = frozenset()
+) -> TimedPath:
+    """Time a path within limits, from a state in motion or at rest to rest.
+
+    Args:
+        path: Postures joined by straight motions [rad], shape (n, 6), n >= 1. For a start in
+            motion the first one is :func:`stopping_point`.
+        limits: What to keep.
+        qd0: Joint speeds at the start [rad/s], shape (6,), inside the limits; at rest if None.
+        stops: Corners (places in ``path``) to stop at; 0 means to brake before anything else.
+
+    Raises:
+        InvalidInput: The path has no posture, or a number is NaN or infinite.
+    """
+    path = np.array(path, dtype=np.float64)
+    if path.ndim != 2 or path.shape[1:] != (6,) or len(path) == 0:
+        raise InvalidInput("path", path.shape, "must have shape (n, 6), n >= 1")
+    qd0 = np.zeros(6) if qd0 is None else np.array(qd0, dtype=np.float64)
+    if not (np.isfinite(path).all() and np.isfinite(qd0).all()):
+        raise InvalidInput("path, qd0", [path.tolist(), qd0.tolist()], "must be finite")
+    corners = [k for k in sorted(stops) if (0 if qd0.any() else 1) <= k < len(path) - 1]
+    runs: list[TimedPath] = []
+    for first, last in zip([0, *corners], [*corners, len(path) - 1], strict=True):
+        runs.append(_run(path[first : last + 1], limits, np.zeros(6) if runs else qd0))
+    return TimedPath(
+        dt=limits.dt,
+        q=np.vstack([*(run.q[:-1] for run in runs[:-1]), runs[-1].q]),
+        qd=np.vstack([*(run.qd[:-1] for run in runs[:-1]), runs[-1].qd]),
+        corner_rad=max(run.corner_rad for run in runs),
+        n_stops=len(corners),
+    )
+
+
+def time_free_path(
+    checker: Checker, path: Vec, limits: Limits, qd0: Vec | None = None
+) -> TimedPath | None:
+    """Time a path so that the timed motion is free too, stopping at corners where it must.
+
+    Args:
+        checker: People and margins.
+        path: A free path; see :func:`time_path`.
+        limits: What to keep.
+        qd0: Joint speeds at the start [rad/s], shape (6,); at rest if None.
+
+    Returns:
+        The shorter of the motions that turn at once and that brake first; None where even the
+        straight stop is in contact.
+    """
+    moving = qd0 is not None and bool(np.any(qd0))
+    best: TimedPath | None = None
+    for first in (frozenset[int](), frozenset({0})) if moving else (frozenset[int](),):
+        stops = first
+        while True:
+            timed = time_path(path, limits, qd0, stops)
+            k = checker.first_blocked(timed.q, timed.qd)
+            if k == timed.n_periods:
+                break
+            nearest = int(np.argmin(np.abs(path - timed.q[k]).max(axis=1)))
+            if nearest in stops or not 0 < nearest < len(path) - 1:
+                break
+            stops |= {nearest}
+        if k == timed.n_periods and (best is None or timed.n_periods < best.n_periods):
+            best = timed
+    return best
+
+
+def _run(path: Vec, limits: Limits, qd0: Vec) -> TimedPath:
+    """Time a path without stops between its ends."""
+    apart = np.abs(np.diff(path, axis=0)).max(axis=1) > SAME
+    path = np.vstack([path[:1], path[1:][apart]])
+    blends, speeds, cruise = _blends(np.diff(path, axis=0), limits, qd0)
+    q, qd = [path[0] - 0.5 * blends[0] * limits.dt * qd0], [qd0]
+    corner = 0.0
+    for i, corner_q in enumerate(path):
+        before, after = (qd0 if i == 0 else speeds[i - 1]), speeds[i]
+        reach = blends[i] * limits.dt
+        for k in range(1, blends[i] + 1):
+            x = k * limits.dt
+            turn = (after - before) * (x * x / (2.0 * reach))
+            q.append(corner_q + before * (x - 0.5 * reach) + turn)
+            qd.append(before + (after - before) * (k / blends[i]))
+        for k in range(1, cruise[i] + 1):
+            q.append(corner_q + after * (0.5 * reach + k * limits.dt))
+            qd.append(after)
+        if 0 < i < len(path) - 1:
+            corner = max(corner, float(np.abs(after - before).max()) * reach / 8.0)
+    q[-1], qd[-1] = path[-1].copy(), np.zeros(6)
+    return TimedPath(dt=limits.dt, q=np.array(q), qd=np.array(qd), corner_rad=corner, n_stops=0)
+
+
+def _blends(ways: Vec, limits: Limits, qd0: Vec) -> tuple[list[int], Vec, list[int]]:
+    """Return the blends [periods], the speeds after each corner, and the periods at them.
+
+    Args:
+        ways: The segments [rad], shape (n, 6).
+        limits: What to keep.
+        qd0: Joint speeds before the first corner [rad/s], shape (6,).
+    """
+    n, dt = len(ways), limits.dt
+    least = np.max(np.abs(ways) / limits.qd_max, axis=1, initial=0.0) / dt
+    moving = stop_periods(qd0, limits)
+    blends = np.array([moving if moving > 0 else min(n, 1), *[1] * n], dtype=np.float64)
+    speeds = np.zeros((n + 1, 6))
+    while True:
+        ends = 0.5 * (blends[:-1] + blends[1:])
+        cruise = np.maximum(0.0, np.ceil(least - ends - 1e-9))
+        if n:
+            speeds[:n] = ways / ((cruise + ends) * dt)[:, None]
+        turns = np.diff(speeds, axis=0, prepend=qd0[None])
+        short = np.max(np.abs(turns) / (limits.qdd_max * dt), axis=1) > blends + 1e-9
+        if not short.any():
+            break
+        if moving > 0 and short[0]:  # where its corner lies fixes the first blend: go slower
+            least[0] = cruise[0] + ends[0] + 1.0
+            short[0] = False
+        blends[short] += 1.0
+    return (
+        [int(b) for b in blends],
+        speeds,
+        [*(int(m) for m in cruise), 0],
+    )

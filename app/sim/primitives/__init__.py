@@ -1,0 +1,1 @@
+"""Probabilistic movement primitives of people."""

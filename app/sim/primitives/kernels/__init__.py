@@ -1,0 +1,1 @@
+"""Compiled movement primitives and scripts."""

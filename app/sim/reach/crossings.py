@@ -1,0 +1,348 @@
+"""People who cross between the robot and its goal: the trials of ``reach-ssm`` (METHOD 2.6).
+
+A crossing is fixed by its seed and number, before anything was tuned on it. The robot starts at
+home. The goal is uniform in the cell's goal box. Seen from above, the person's axis comes
+straight at constant speed, crosses the segment from the tcp at home to the goal, stands there
+for a while, and goes straight on until it is far away:
+
+=================  ==========================================================================
+speed              uniform in SPEED [m/s], the range of METHOD 2.1
+radius             uniform in RADIUS [m], the range of METHOD 2.1, constant
+dwell              uniform in DWELL [s], standing where the segment is crossed
+arrival            uniform in ARRIVAL [s]: when the axis reaches the segment; the unhindered
+                   robot needs about two seconds to the goal
+place              uniform in PLACE, as a share of the segment
+direction          uniform within TILT [rad] of the normal to the segment, from either side
+=================  ==========================================================================
+
+Whoever would come nearer than CLEAR to the robot at home, or is nearer than AT_START when the
+run begins, is drawn anew, goal and all: a robot that waits at home is never touched, the safety
+layer lets everybody set out at full speed, and nobody in the way stands there for good. So near
+goals, between which and the robot nobody could pass, are rarer than in the box.
+
+The second set is made of recorded people: every frame's key-points become the safety cylinder
+of METHOD 2.8 (without flesh margin), a run is turned and moved so that the person walks across
+as above, and once the recording ends the person walks away. These cylinders are 0.35 to 0.8 m
+wide in radius, too wide for their axis to pass between a robot at home and its goal: here the
+cylinder covers part of the segment, its axis may pass behind the goal.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.errors import InvalidInput
+from app.sim.cells.cell import Cell
+from app.sim.collision.checker import Checker, shapes_of
+from app.sim.core.arrays import Vec
+from app.sim.mocap.importer import Motion
+from app.sim.perception.bounding_cylinder import CylinderSettings, safety_cylinder
+from app.sim.perception.keypoints import keypoints_of
+from app.sim.reach.batch import goal_region_of
+from app.sim.robot.ur10 import Robot
+from app.sim.scene.scene import arm_of
+
+SEED = 4104
+"""Seed of the crossings that are evaluated."""
+N_CROSSINGS = 200
+SPEED = (0.3, 1.0)
+RADIUS = (0.2, 0.5)
+DWELL = (0.0, 3.0)
+ARRIVAL = (0.5, 3.0)
+PLACE = (0.2, 0.9)
+TILT = 0.25 * math.pi
+CLEAR = 0.05
+"""Least distance of any person to the robot at home [m]."""
+AT_START = 0.8
+"""Least distance of anybody to the robot when the run begins [m]."""
+FAR = 4.0
+"""Distance from the segment at which people have left [m]."""
+HEIGHT = 2.0
+"""Height of people above the floor [m], METHOD 2.1."""
+TRIES = 10_000
+"""Draws before a crossing is given up."""
+LEAVE_SPEED = 1.0
+"""Speed at which recorded people walk away [m/s]."""
+LONGEST_S = 8.0
+"""Most of a recording that is used for one crossing [s]."""
+LEAST_STEP = 0.15
+"""Recorded people go at least so far in the second around their arrival [m]."""
+BEHIND = (0.2, 3.0)
+"""Place of a recorded person's axis, as a share of the segment and beyond its end."""
+ON_LINE = 1e-9
+"""An axis so near to a segment, as a share of its length, is on it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Crossing:
+    """One person who crosses, and where the robot shall go meanwhile."""
+
+    number: int
+    """Number in its set."""
+    goal: Vec
+    """Where the tcp shall be [m], shape (3,)."""
+    track: Vec
+    """The person's x, y and radius at the ends of periods [m], shape (n + 1, 3)."""
+    arrival: float
+    """When the axis reaches the segment from the tcp at home to the goal [s]."""
+    speed: float
+    """Walking speed [m/s]; of a recorded person, at the crossing."""
+    dwell: float
+    """How long the person stands there [s]; NaN for a recorded one."""
+    source: str
+    """Recording it is made from; empty for a walk."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CrossingSet:
+    """Crossings of one cell, as a batch runs them."""
+
+    goals: Vec
+    """Goals [m], shape (n, 3)."""
+    tracks: Vec
+    """Cylinders: x, y, radius [m], shape (n, n_periods + 1, 3); the last one stays."""
+    crossings: tuple[Crossing, ...]
+    """What they are made of."""
+
+
+def tcp_at_home(cell: Cell) -> Vec:
+    """Return where the tcp is when the robot is at home [m], shape (3,)."""
+    robot = Robot(cell.robot.tool_length)
+    return np.asarray(robot.tcp_pose(np.array(cell.robot.home_q))[:3, 3])
+
+
+def crossing_time(track: Vec, start: Vec, goal: Vec, dt: float) -> float:
+    """Return when the axis first reaches a segment, seen from above [s]; infinity if never.
+
+    Args:
+        track: x, y and more at the ends of periods [m], shape (n + 1, >= 2).
+        start: Start of the segment [m], shape (>= 2,).
+        goal: Its end [m], shape (>= 2,).
+        dt: Period [s].
+    """
+    way = goal[:2] - start[:2]
+    square = float(way @ way)
+    if square <= 0.0:
+        return math.inf
+    offset = track[:, :2] - start[:2]
+    side = (way[0] * offset[:, 1] - way[1] * offset[:, 0]) / square
+    side[np.abs(side) < ON_LINE] = 0.0
+    along = offset @ way / square
+    before, after = side[:-1], side[1:]
+    for k in np.flatnonzero((before * after <= 0.0) & (before != after)):
+        part = before[k] / (before[k] - after[k])
+        if 0.0 < along[k] + part * (along[k + 1] - along[k]) < 1.0:
+            return float((k + part) * dt)
+    return math.inf
+
+
+def covered(track: Vec, start: Vec, goal: Vec) -> NDArray[np.bool_]:
+    """Return when a cylinder covers part of a segment, seen from above, shape (n + 1,).
+
+    Args:
+        track: x, y, radius at the ends of periods [m], shape (n + 1, 3).
+        start: Start of the segment [m], shape (>= 2,).
+        goal: Its end [m], shape (>= 2,).
+    """
+    way = goal[:2] - start[:2]
+    offset = track[:, :2] - start[:2]
+    along = np.clip(offset @ way / max(float(way @ way), 1e-12), 0.0, 1.0)
+    away = np.linalg.norm(offset - along[:, None] * way, axis=1)
+    return np.asarray(away < track[:, 2])
+
+
+def crossings(cell: Cell, n: int = N_CROSSINGS, seed: int = SEED) -> CrossingSet:
+    """Return the first ``n`` crossings of a seed; each is fixed by (seed, number).
+
+    Args:
+        cell: Work cell with a goal region.
+        n: Number of crossings.
+        seed: Seed.
+
+    Raises:
+        InvalidInput: There shall be none, or the cell has no goal region or no room.
+    """
+    if n < 1:
+        raise InvalidInput("crossings", n, "must be at least 1")
+    home = tcp_at_home(cell)
+    return _set_of([_walk(cell, home, seed, number) for number in range(n)])
+
+
+def recorded_crossings(
+    cell: Cell, motions: Sequence[Motion], n: int, seed: int = SEED
+) -> CrossingSet:
+    """Return crossings made from recorded people.
+
+    Args:
+        cell: Work cell with a goal region.
+        motions: Clean runs of recorded motion.
+        n: Number of crossings.
+        seed: Seed; each crossing is fixed by (seed, number) and the motions.
+
+    Raises:
+        InvalidInput: There shall be none, there is no motion, or none of it crosses anything.
+    """
+    if n < 1:
+        raise InvalidInput("crossings", n, "must be at least 1")
+    if not motions:
+        raise InvalidInput("motions", 0, "must hold at least one run of recorded motion")
+    home, dt = tcp_at_home(cell), cell.robot.dt
+    cylinders = [cylinder_track(motion, cell.floor_z, dt) for motion in motions]
+    found = []
+    for number in range(n):
+        found.append(_recorded(cell, home, motions, cylinders, seed, number))
+    return _set_of(found)
+
+
+def cylinder_track(motion: Motion, floor_z: float, dt: float) -> Vec:
+    """Return a recorded person as the cylinders of METHOD 2.8: x, y, radius [m], (n, 3).
+
+    Args:
+        motion: One run.
+        floor_z: Height of the floor [m].
+        dt: Step between cylinders [s].
+    """
+    settings = CylinderSettings(flesh_margin=0.0)
+    size = motion.size.vector(floor_z)
+    times = np.arange(0.0, float(motion.times[-1]) + 1e-9, dt)
+    rows = []
+    for t in times:
+        q = motion.q[min(int(np.searchsorted(motion.times, t)), len(motion.q) - 1)]
+        cylinder = safety_cylinder(keypoints_of(q, size, floor_z), settings=settings)
+        assert cylinder is not None
+        rows.append((*cylinder.center, cylinder.radius))
+    return np.array(rows)
+
+
+def _set_of(found: Sequence[Crossing]) -> CrossingSet:
+    longest = max(len(crossing.track) for crossing in found)
+    tracks = np.empty((len(found), longest, 3))
+    for row, crossing in zip(tracks, found, strict=True):
+        row[: len(crossing.track)] = crossing.track
+        row[len(crossing.track) :] = crossing.track[-1]
+    return CrossingSet(
+        goals=np.stack([crossing.goal for crossing in found]),
+        tracks=tracks,
+        crossings=tuple(found),
+    )
+
+
+def _walk(cell: Cell, home: Vec, seed: int, number: int) -> Crossing:
+    """Draw one crossing until it is clear of the robot at home."""
+    rng = np.random.default_rng([seed, number])
+    for _ in range(TRIES):
+        goal = _goal(cell, rng)
+        speed, radius = rng.uniform(*SPEED), rng.uniform(*RADIUS)
+        dwell, arrival = rng.uniform(*DWELL), rng.uniform(*ARRIVAL)
+        there, course = _across(home, goal, rng)
+        dt = cell.robot.dt
+        times = dt * np.arange(math.ceil((arrival + dwell + FAR / speed) / dt) + 1)
+        way = np.where(
+            times < arrival, times - arrival, np.maximum(0.0, times - arrival - dwell)
+        )
+        track = np.empty((len(times), 3))
+        track[:, :2] = there + speed * way[:, None] * course
+        track[:, 2] = radius
+        if _clear_of_home(cell, track):
+            return Crossing(
+                number=number,
+                goal=goal,
+                track=track,
+                arrival=arrival,
+                speed=speed,
+                dwell=dwell,
+                source="",
+            )
+    raise InvalidInput("cell", cell.name, "has no room between the robot and its goals")
+
+
+def _recorded(
+    cell: Cell,
+    home: Vec,
+    motions: Sequence[Motion],
+    cylinders: Sequence[Vec],
+    seed: int,
+    number: int,
+) -> Crossing:
+    """Draw goal, recording and moment until they make a crossing clear of the robot at home."""
+    rng, dt = np.random.default_rng([seed, number, 1]), cell.robot.dt
+    for _ in range(TRIES):
+        goal, which = _goal(cell, rng), int(rng.integers(len(motions)))
+        lead = round(rng.uniform(*ARRIVAL) / dt)
+        there, course = _across(home, goal, rng, BEHIND)
+        if len(cylinders[which]) <= lead + 1:
+            continue
+        first = int(rng.integers(len(cylinders[which]) - lead))
+        run = cylinders[which][first : first + round(LONGEST_S / dt)].copy()
+        speed = _turn(run, lead, there, course, dt)
+        if speed < LEAST_STEP:
+            continue
+        track = np.vstack([run, _leaving(run[-1], course, dt)])
+        crossed = covered(track, home, goal)
+        first_covered = float(np.argmax(crossed) * dt)
+        in_time = crossed.any() and 0.0 < first_covered <= ARRIVAL[1]
+        if in_time and _clear_of_home(cell, track):
+            return Crossing(
+                number=number,
+                goal=goal,
+                track=track,
+                arrival=first_covered,
+                speed=speed,
+                dwell=math.nan,
+                source=f"{motions[which].source}, from {first * dt:.2f} s",
+            )
+    names = sorted({motion.name for motion in motions})
+    raise InvalidInput("motions", names, "must hold somebody who walks across the segment")
+
+
+def _turn(run: Vec, lead: int, there: Vec, course: Vec, dt: float) -> float:
+    """Turn and move a run so that it is at a place on a course; return its speed then [m/s]."""
+    half = round(0.5 / dt)
+    step = run[min(lead + half, len(run) - 1), :2] - run[max(lead - half, 0), :2]
+    turn = math.atan2(course[1], course[0]) - math.atan2(step[1], step[0])
+    c, s = math.cos(turn), math.sin(turn)
+    run[:, :2] = there + (run[:, :2] - run[lead, :2]) @ np.array([[c, s], [-s, c]])
+    return float(np.linalg.norm(step))
+
+
+def _goal(cell: Cell, rng: np.random.Generator) -> Vec:
+    region = goal_region_of(cell)
+    middle, half = np.array(region.center), 0.5 * np.array(region.size)
+    return np.asarray(rng.uniform(middle - half, middle + half))
+
+
+def _across(
+    home: Vec, goal: Vec, rng: np.random.Generator, place: tuple[float, float] = PLACE
+) -> tuple[Vec, Vec]:
+    """Draw where the segment is crossed [m], shape (2,), and the course, a unit vector."""
+    way = goal[:2] - home[:2]
+    there = home[:2] + rng.uniform(*place) * way
+    side = 1.0 if rng.uniform() < 0.5 else -1.0
+    course = math.atan2(way[1], way[0]) + side * 0.5 * math.pi + rng.uniform(-TILT, TILT)
+    return there, np.array([math.cos(course), math.sin(course)])
+
+
+def _leaving(last: Vec, course: Vec, dt: float) -> Vec:
+    """Return how a person walks away from where a recording ends: along the course."""
+    steps = np.arange(1, math.ceil(FAR / LEAVE_SPEED / dt) + 1)
+    track = np.empty((len(steps), 3))
+    track[:, :2] = last[:2] + LEAVE_SPEED * dt * steps[:, None] * course
+    track[:, 2] = last[2]
+    return track
+
+
+def _clear_of_home(cell: Cell, track: Vec) -> bool:
+    """Tell whether everybody on a track keeps CLEAR, and at first AT_START, of home."""
+    arm, top = arm_of(cell), cell.floor_z + HEIGHT
+    home = np.array(arm.home)
+    every = track[:: max(1, round(0.1 / cell.robot.dt))]
+    rows = np.hstack([every, np.full((len(every), 1), top)])
+    first = Checker(arm, shapes_of(cell, None, rows[:1])).clearance(home).people
+    near = rows[np.hypot(rows[:, 0], rows[:, 1]) < 2.0]
+    return (
+        first >= AT_START
+        and Checker(arm, shapes_of(cell, None, near)).clearance(home).people >= CLEAR
+    )

@@ -1,0 +1,247 @@
+"""Training targets in a box of goals, and the cells between them (METHOD 2.4, 4).
+
+grid     every ``spacing`` along each axis           cells are boxes of 8 targets
+halton   a low-discrepancy sequence over the box     cells are tetrahedra of 4 targets
+
+A goal between targets is reached by the weighted mean of the policy's actions for the targets
+of its cell. :class:`GridCells` and :class:`HaltonCells` say which those are.
+
+Source: thesis 4.3.4 and, for the Halton set, its outlook 4.5. Deviates: points of the sequence
+alone leave the faces of the box empty, and Delaunay's tetrahedra between them and the corners
+span the whole box. So the sequence fills a box that is larger by half the grid's spacing, as
+the grid's own cells do, and points outside are moved to the nearest point of the box.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import Delaunay
+
+from app.errors import GoalOutside, InvalidInput
+from app.sim.cells.parts import GoalRegion
+from app.sim.core.arrays import Vec
+from app.sim.core.jit import direct
+from app.sim.core.out_of_range import OutsideField
+from app.sim.reach.kernels.interpolation_weights import (
+    N_BOX,
+    N_SIMPLEX,
+    box_weights,
+    simplex_weights,
+)
+
+N_HALTON = 54
+"""Targets of a Halton set: as many as the source's grid has."""
+MOST_HALTON = 2000
+"""Most targets of a Halton set."""
+AXES = ("x", "y", "z")
+BASES = (2, 3, 5)
+"""Bases of the sequence along x, y and z."""
+N_CORNERS = 8
+SLACK = 1e-9
+"""How far outside a goal may be by rounding [m]."""
+_FLAT = 1e-12
+"""Volume below which a tetrahedron is none [m^3]."""
+
+
+def radical_inverse(numbers: NDArray[np.int64], base: int) -> Vec:
+    """Return the van der Corput sequence at some places: digits mirrored behind the point.
+
+    Args:
+        numbers: Places, not negative, shape (n,).
+        base: Base of the digits.
+
+    Returns:
+        Values in [0, 1), shape (n,).
+    """
+    left, out, scale = np.array(numbers), np.zeros(len(numbers)), 1.0 / base
+    while left.any():
+        out += scale * (left % base)
+        left //= base
+        scale /= base
+    return out
+
+
+def halton_targets(region: GoalRegion, n: int = N_HALTON) -> Vec:
+    """Return targets of low discrepancy in a box [m], shape (n, 3); its corners come first.
+
+    Args:
+        region: Box of goals.
+        n: Number of targets, the 8 corners among them.
+
+    Raises:
+        InvalidInput: There are too few or too many, or the box has no volume.
+    """
+    if not N_CORNERS <= n <= MOST_HALTON:
+        rule = f"must lie in [{N_CORNERS}, {MOST_HALTON}]: the corners are among them"
+        raise InvalidInput("n_halton", n, rule)
+    size = np.array(region.size)
+    if (size <= 0.0).any():
+        rule = "needs a box with a volume for goals of a Halton set"
+        raise InvalidInput("goal_region.size", list(region.size), rule)
+    low, high = region.center - 0.5 * size, region.center + 0.5 * size
+    corners = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+    found = dict.fromkeys(map(tuple, np.where(corners, high, low).tolist()))
+    rim, first = 0.5 * region.spacing, 1
+    while len(found) < n:
+        places = np.arange(first, first + n)
+        share = np.stack([radical_inverse(places, base) for base in BASES], axis=1)
+        points = np.clip(low - rim + (size + 2.0 * rim) * share, low, high)
+        found.update(dict.fromkeys(map(tuple, points.tolist())))
+        first += n
+    return np.array(list(found)[:n])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GoalMix:
+    """Which targets goals lie between; K is 8 in a grid, 4 among scattered targets."""
+
+    which: NDArray[np.int64]
+    """Numbers of targets, shape (n, K)."""
+    weights: Vec
+    """Their weights, which sum to one, shape (n, K)."""
+
+
+class GoalCells(Protocol):
+    """Cells between training targets."""
+
+    @property
+    def targets(self) -> Vec:
+        """The training targets [m], shape (n_targets, 3)."""
+
+    def mix(self, goals: Vec, field: str = "goal") -> GoalMix:
+        """Return which targets goals lie between, and with what weights.
+
+        Args:
+            goals: [m], shape (n, 3).
+            field: What messages call a goal.
+
+        Raises:
+            GoalOutside: A goal lies outside the targets; says along which axes.
+            InvalidInput: A goal is no three finite numbers.
+        """
+
+
+def _inside(low: Vec, high: Vec, goals: Vec, field: str) -> Vec:
+    """Return goals moved into the targets' box from as far as rounding puts them."""
+    points = np.array(goals, dtype=np.float64, ndmin=2)
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise InvalidInput(field, list(np.shape(goals)), "must have the shape [n, 3]")
+    if ((points >= low) & (points <= high)).all():
+        return points
+    held = np.clip(points, low, high)
+    # Written so that NaN is refused too.
+    wrong = np.flatnonzero(~(np.abs(held - points) <= SLACK).all(axis=1))
+    for row in wrong[:1]:
+        goal = points[row].tolist()
+        if not all(map(math.isfinite, goal)):
+            raise InvalidInput(field, goal, "must be finite")
+        raise GoalOutside(field, goal, outside_of(points[row], low, high, field))
+    return held
+
+
+def outside_of(goal: Vec, low: Vec, high: Vec, field: str) -> tuple[OutsideField, ...]:
+    """Return the axes along which a goal lies outside a box.
+
+    Args:
+        goal: [m], shape (3,).
+        low: Lower corner of the box [m], shape (3,).
+        high: Upper corner of the box [m], shape (3,).
+        field: What messages call the goal.
+    """
+    return tuple(
+        OutsideField(
+            field=f"{field}.{axis}",
+            value=float(goal[i]),
+            low=float(low[i]),
+            high=float(high[i]),
+        )
+        for i, axis in enumerate(AXES)
+        if not low[i] - SLACK <= goal[i] <= high[i] + SLACK
+    )
+
+
+class GridCells:
+    """Boxes of eight targets of a grid.
+
+    Args:
+        targets: The grid's points [m], z running fastest, then y, shape (n_targets, 3).
+
+    Raises:
+        InvalidInput: The targets are no such grid.
+    """
+
+    def __init__(self, targets: Vec) -> None:
+        self.targets = np.array(targets, dtype=np.float64)
+        """The grid's points [m], shape (n_targets, 3)."""
+        self._low, self._high = self.targets.min(axis=0), self.targets.max(axis=0)
+        self._weigh: Callable[..., None] | None = None
+        self._x, self._y, self._z = (np.unique(self.targets[:, i]) for i in range(3))
+        planes = np.meshgrid(self._x, self._y, self._z, indexing="ij")
+        points = np.stack(planes, axis=-1).reshape(-1, 3)
+        if not np.array_equal(points, self.targets):
+            rule = "must be all points of a grid, z running fastest, then y"
+            raise InvalidInput("targets", list(self.targets.shape), rule)
+
+    def mix(self, goals: Vec, field: str = "goal") -> GoalMix:
+        """Return the corners of each goal's box and trilinear weights; see GoalCells."""
+        inside = _inside(self._low, self._high, goals, field)
+        which = np.empty((len(inside), N_BOX), dtype=np.int64)
+        weights = np.empty((len(inside), N_BOX))
+        arguments = self._x, self._y, self._z, inside, which, weights
+        if self._weigh is None:
+            self._weigh = direct(box_weights, arguments)
+        self._weigh(*arguments)
+        return GoalMix(which=which, weights=weights)
+
+
+class HaltonCells:
+    """Tetrahedra of four targets: the Delaunay cells of scattered points.
+
+    Args:
+        targets: Points whose hull is a box [m], shape (n_targets, 3).
+
+    Raises:
+        InvalidInput: A corner of the box is no target.
+    """
+
+    def __init__(self, targets: Vec) -> None:
+        self.targets = np.array(targets, dtype=np.float64)
+        """The points [m], shape (n_targets, 3)."""
+        low, high = self.targets.min(axis=0), self.targets.max(axis=0)
+        self._low, self._high = low, high
+        at_corner = ((self.targets == low) | (self.targets == high)).all(axis=1)
+        if at_corner.sum() != N_CORNERS or not (low < high).all():
+            rule = "must have the 8 corners of their box among them, once each"
+            raise InvalidInput("targets", int(at_corner.sum()), rule)
+        simplices = Delaunay(self.targets).simplices
+        edges = self.targets[simplices[:, :3]] - self.targets[simplices[:, 3:]]
+        kept = np.abs(np.linalg.det(edges)) > 6.0 * _FLAT
+        self.corners = np.ascontiguousarray(simplices[kept], dtype=np.int64)
+        """Targets of each tetrahedron, shape (m, 4)."""
+        self._last = self.targets[self.corners[:, 3]]
+        self._inverse = np.ascontiguousarray(np.linalg.inv(edges[kept].transpose(0, 2, 1)))
+
+    def mix(self, goals: Vec, field: str = "goal") -> GoalMix:
+        """Return the corners of each goal's tetrahedron and its weights; see GoalCells."""
+        inside = _inside(self._low, self._high, goals, field)
+        which = np.empty((len(inside), N_SIMPLEX), dtype=np.int64)
+        weights = np.empty((len(inside), N_SIMPLEX))
+        simplex_weights(self.corners, self._inverse, self._last, inside, which, weights)
+        return GoalMix(which=which, weights=weights)
+
+
+def cells_of(targets: Vec, rule: str) -> GoalCells:
+    """Return the cells of targets by the rule that made them, ``"grid"`` or ``"halton"``.
+
+    Raises:
+        InvalidInput: The rule gives no targets to interpolate between.
+    """
+    if rule == "grid":
+        return GridCells(targets)
+    if rule == "halton":
+        return HaltonCells(targets)
+    raise InvalidInput("goals", rule, "has no targets to interpolate", ("grid", "halton"))

@@ -1,0 +1,1 @@
+"""The reach scenario under speed and separation monitoring."""

@@ -1,0 +1,77 @@
+"""Planners where a policy stands, under the same safety layer and limits (METHOD 2.6).
+
+Each row of a :class:`~app.sim.reach.monitored.batch.GuardedReach` is driven by one
+:class:`~app.sim.planning.replanning.Follower` to postures whose tcp lies within reach of
+success around
+the goal, of any tilt: what a policy may choose, a planner may choose too.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from app.sim.collision.checker import Shapes, no_people
+from app.sim.core.arrays import Vec
+from app.sim.planning.goal_configurations import goal_postures
+from app.sim.planning.replanning import Follower, FollowReport, FollowSettings
+from app.sim.reach.monitored.batch import GuardedReach
+from app.sim.robot.kernels.arm import Arm
+from app.sim.scenario.kernels.episode import RUNNING
+
+GOAL_SPREAD = 0.08
+"""How far from the goal a planner's postures have the tcp [m]; success counts within 0.1."""
+
+
+def postures_of(arm: Arm, goals: Vec, seed: int) -> list[Vec]:
+    """Return the postures that planners may choose among for each goal [rad], (k, 6) each.
+
+    Args:
+        arm: From ``scene.arm_of``.
+        goals: Goals [m], shape (n, 3).
+        seed: Seed of the search; each goal's postures are fixed by (seed, number).
+    """
+    return [
+        goal_postures(arm, goal, np.random.default_rng([seed, k]), spread=GOAL_SPREAD)
+        for k, goal in enumerate(goals)
+    ]
+
+
+def drive_planner(
+    batch: GuardedReach,
+    postures: Sequence[Vec],
+    settings: FollowSettings,
+    seed: int,
+    *,
+    blind: bool = False,
+) -> tuple[list[Vec], list[FollowReport]]:
+    """Drive every row of a batch that was just reset until its episode ends.
+
+    Args:
+        batch: Rows at the start of their episodes.
+        postures: Postures each row's planner may choose among [rad], shape (k, 6) each.
+        settings: Planner, role and margins.
+        seed: Seed of the planners.
+        blind: Whether the planner is told of nobody.
+
+    Returns:
+        Override of each row's periods, in [0, 1], and what each planner reports.
+    """
+    overrides, reports = [], []
+    for row in range(batch.n_envs):
+        follower = Follower(batch.arm, postures[row], settings, seed + 1000 * row)
+        overrides.append(_drive(batch, row, follower, blind))
+        reports.append(follower.report)
+    return overrides, reports
+
+
+def _drive(batch: GuardedReach, row: int, follower: Follower, blind: bool) -> Vec:
+    """Drive one row to the end of its episode; return its overrides."""
+    state, found = batch.state, []
+    nobody: Shapes = no_people()
+    while state.outcome[row] == RUNNING:
+        people = nobody if blind else batch.people_shapes(row)
+        q, qd = state.q[row].copy(), state.qd[row].copy()
+        wanted = follower.act(q, qd, people, float(state.elapsed[row]))
+        batch.step_speeds(row, wanted)
+        found.append(float(batch.override[row]))
+    return np.array(found)

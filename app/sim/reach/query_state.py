@@ -1,0 +1,184 @@
+"""A state that somebody tells, seen as the reach scenario's policies see it in training.
+
+:class:`Stage` holds one row of the scenario (``reach.py``) for so many people of each kind:
+whoever is told is put into it, and the same kernels look at it that look in training, so that
+one state gives one observation wherever it comes from.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.sim.cells.cell import Cell
+from app.sim.collision.checker import Shapes
+from app.sim.core.arrays import Vec
+from app.sim.core.jit import direct
+from app.sim.human.person import Person
+from app.sim.people.kernels.pedestrian import (
+    GROWTH,
+    N_PAST,
+    PAST_RADIUS,
+    PAST_SPEED,
+    VX,
+    VY,
+    R,
+    X,
+    Y,
+    remember_as_now,
+)
+from app.sim.prediction.weights import new_forecaster
+from app.sim.reach.batch import VIEWS, ViewName, new_state, with_workplace, world_of
+from app.sim.reach.kernels import (
+    episode as reach,
+)
+from app.sim.reach.kernels import (
+    queries as reach_views,
+)
+from app.sim.reach.kernels import (
+    query_state as motion,
+)
+from app.sim.reach.kernels.observation import EVERYBODY
+from app.sim.robot.measured_state import Joints
+from app.sim.scene.scene import HumanKind, new_people_state, people_of, with_people
+
+_ROW = np.zeros(1, dtype=np.int64)
+
+
+class Stage:
+    """One state with a number of bodies and cylinders in it; not thread-safe.
+
+    Args:
+        cell: Work cell with a goal region.
+        n_bodies: People by joint angles; they come first.
+        n_cylinders: People by cylinders.
+        view: What policies observe.
+    """
+
+    def __init__(self, cell: Cell, n_bodies: int, n_cylinders: int, view: ViewName) -> None:
+        people: list[HumanKind] = ["worker"] * n_bodies
+        people += ["walker"] * n_cylinders
+        staged = with_people(with_workplace(cell) if n_bodies else cell, people)
+        # What workers do in episodes is left out: here they are where they are told to be.
+        shared = people_of(staged)
+        self.world = world_of(staged, shared, np.zeros((0, 3)))
+        self.state = new_state(self.world, new_people_state(staged, shared, 1), 1)
+        self._work = reach.new_work(self.world, self.state, new_forecaster())
+        self._view, self.obs_size = VIEWS[view]
+        self.arm, self.top_z = self.world.arm, shared.top_z
+        self._own_size = shared.bodies[0]
+        self._measured = np.ones(n_cylinders, dtype=np.bool_)
+        self._tops = np.full((n_cylinders, 1), self.top_z)
+        self.apart = np.zeros(n_bodies + n_cylinders)
+        """Distance of the robot to each person [m], bodies first, shape (n_people,)."""
+        self._calls: dict[int, Callable[..., None]] = {}
+        self._room: dict[int, tuple[Vec, NDArray[np.float32]]] = {}
+        self._take_in = direct(motion.take_in, self._shared)
+
+    @property
+    def _shared(self) -> tuple[Any, ...]:
+        return self.world, self.state, self._work, self.apart
+
+    @property
+    def clear(self) -> Vec:
+        """Distances to people, cell and the robot itself [m], shape (3,)."""
+        clear: Vec = self.state.clear[0]
+        return clear
+
+    @property
+    def tcp(self) -> Vec:
+        """Tool centre point [m], shape (3,)."""
+        return self._work.robot.tcp
+
+    @property
+    def seen(self) -> Vec:
+        """The person observed last: x, y [m], vx, vy [m/s], r [m], growth [m/s], shape (6,)."""
+        return self._work.sight.seen
+
+    @property
+    def shapes(self) -> Shapes:
+        """The people as shapes, bodies first."""
+        crowd = self._work.crowd
+        return Shapes(
+            columns=crowd.columns.copy(),
+            cylinders=np.concatenate([crowd.cylinders, self._tops], axis=1),
+            going=np.where(
+                self._measured[:, None],
+                self.state.people.walkers.rows[0][:, [VX, VY, GROWTH]],
+                np.nan,
+            ),
+        )
+
+    def put(self, robot: Joints, people: Sequence[Person], time_left_s: float) -> None:
+        """Take a state in and look at its distances.
+
+        Args:
+            robot: Positions, speeds and accelerations of its joints.
+            people: Those with joint angles first, then cylinders, checked.
+            time_left_s: Time left to reach the goal [s].
+        """
+        state = self.state
+        state.q[0], state.qd[0], state.qdd[0] = robot
+        state.time_left[0] = time_left_s
+        rows, first = state.people, state.people.q.shape[1]
+        for i, person in enumerate(people):
+            if person.cylinder is None:
+                rows.q[0, i], rows.qd[0, i] = person.q, person.qd
+                rows.size[0, i] = self._own_size if person.size is None else person.size
+                continue
+            walker = rows.walkers.rows[0, i - first]
+            self._measured[i - first] = person.measured
+            self._tops[i - first] = max(self.top_z, person.top or self.top_z)
+            walker[X], walker[Y], walker[R] = person.cylinder
+            walker[VX], walker[VY], walker[GROWTH] = *person.qd[:2], person.growth
+            remember_as_now(rows.walkers.rows, 0, i - first)
+            if person.past is not None:
+                _remind(walker, person.past)
+            rows.cylinders[0, i - first] = person.cylinder
+        self._take_in(*self._shared)
+
+    def observe(self, goals: Vec, who: int | None = None) -> NDArray[np.float32]:
+        """Return what a policy sees of the state for some goals.
+
+        Args:
+            goals: Where the tcp shall be [m], shape (n, 3).
+            who: The person who is there alone, bodies first; None for all as they are.
+
+        Returns:
+            Observations, shape (n, obs_size); overwritten by the next call.
+        """
+        n = len(goals)
+        if n not in self._room:
+            shape = (1, n, self.obs_size)
+            self._room[n] = (np.zeros((1, n, 3)), np.zeros(shape, dtype=np.float32))
+        places, out = self._room[n]
+        places[0] = goals
+        arguments = (
+            self.world,
+            self.state,
+            _ROW,
+            self._work,
+            self._view,
+            EVERYBODY if who is None else who,
+            places,
+            out,
+        )
+        if not self._calls:
+            self._calls[0] = direct(reach_views.observe_rows, arguments)
+        self._calls[0](*arguments)
+        found: NDArray[np.float32] = out[0]
+        return found
+
+
+def _remind(walker: Vec, past: Vec) -> None:
+    """Set what a walker's row, shape (N_STATE,), remembers; what is unknown stayed as it was.
+
+    Args:
+        walker: The row; it remembers that all was as now.
+        past: As in ``Person.past``.
+    """
+    known = np.concatenate([[[walker[PAST_RADIUS], walker[PAST_SPEED]]], past])
+    held = np.minimum(np.arange(N_PAST), len(known) - 1)
+    walker[PAST_RADIUS : PAST_RADIUS + N_PAST] = known[held, 0]
+    walker[PAST_SPEED : PAST_SPEED + N_PAST] = known[held, 1]

@@ -1,0 +1,65 @@
+"""Interface of a policy that brings the tcp to a goal."""
+
+from collections.abc import Mapping, Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.sim.core.arrays import Vec
+from app.sim.reach.batch import GoalRule, ViewName
+from app.sim.robot.actions import ActionSettings
+
+
+class ReachKnown(Protocol):
+    """What is known of a policy that brings the tcp to a goal beside people."""
+
+    @property
+    def checkpoint(self) -> str:
+        """SHA-256 of the checkpoint."""
+
+    @property
+    def title(self) -> str:
+        """Short text for people, such as ``"reach-td3, 7.7 M steps"``."""
+
+    @property
+    def cell(self) -> str:
+        """Name of the work cell it was trained for."""
+
+    @property
+    def cell_sha256(self) -> str:
+        """Identity of that cell's content (``Cell.sha256``)."""
+
+    @property
+    def view(self) -> "ViewName":
+        """What it sees."""
+
+    @property
+    def action(self) -> "ActionSettings":
+        """What its actions mean."""
+
+    @property
+    def goals(self) -> "GoalRule":
+        """Where the goals of its training were drawn from."""
+
+    @property
+    def targets(self) -> Vec | None:
+        """The goals it was trained on [m], shape (n, 3); None for a whole box."""
+
+
+class ReachActor(ReachKnown, Protocol):
+    """Brings the tcp to a goal beside people; safe to call from several threads."""
+
+    @property
+    def trained_range(self) -> Mapping[str, Mapping[str, Sequence[float]]]:
+        """Least (``low``) and greatest (``high``) value of each state variable in training."""
+
+    def acts(self, obs: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return actions in [-1, 1].
+
+        Args:
+            obs: Observations of :attr:`view`, as ``ReachBatch`` gives them, shape (n, F).
+
+        Returns:
+            Actions, shape (n, 6).
+        """

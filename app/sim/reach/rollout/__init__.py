@@ -1,0 +1,1 @@
+"""Rollout policy improvement for reaching."""

@@ -1,0 +1,1 @@
+"""Compiled rollout policy improvement."""

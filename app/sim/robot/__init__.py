@@ -1,0 +1,1 @@
+"""The robot: model, kinematics, capsules, joint limits, actions."""

@@ -1,0 +1,122 @@
+"""Capsules of the robot: what the fast kernels take for the UR10's meshes and its tool.
+
+The capsules *contain* the collision meshes of example-robot-data (fitted once by
+``tools.fit_capsules``, committed as data), so that a kernel may report contact early, never
+late. A capsule is the set of points within ``radius`` of the segment ``p0``-``p1``.
+"""
+
+import json
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.sim.core.arrays import Vec
+from app.sim.robot.ur10 import LINK_NAMES
+
+Index = NDArray[np.int64]
+
+CAPSULE_FILE = Path(str(resources.files("app.sim.robot"))) / "data" / "ur10_capsules.json"
+"""The fitted capsules, in the frames of their links [m]."""
+
+TOOL = "tool"
+"""Name of the tool's capsule."""
+
+FLANGE = np.array([0.0, 0.0922, 0.0])
+"""Origin of ``tool0`` in the frame of wrist_3_link [m], from ur10_robot.urdf."""
+TOOL_AXIS = np.array([0.0, 1.0, 0.0])
+"""z axis of ``tool0`` in the frame of wrist_3_link, from ur10_robot.urdf."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobotCapsules:
+    """The robot and its tool as n capsules, each rigidly tied to one link."""
+
+    name: tuple[str, ...]
+    """Name of each capsule."""
+    link: Index
+    """Place of its link in ``robot.LINK_NAMES``, shape (n,)."""
+    p0: Vec
+    """One end of its segment in the link's frame [m], shape (n, 3)."""
+    p1: Vec
+    """The other end [m], shape (n, 3)."""
+    radius: Vec
+    """Its radius [m], shape (n,)."""
+
+
+def tool_capsule(tool_length: float, tool_radius: float) -> tuple[Vec, Vec]:
+    """End points of the tool's segment in the frame of wrist_3_link [m].
+
+    The tool reaches from the flange to the tcp, ``tool_length`` along z of ``tool0``; its round
+    end touches the tcp.
+    """
+    reach = max(tool_length - tool_radius, 0.0)
+    return FLANGE.copy(), FLANGE + reach * TOOL_AXIS
+
+
+@lru_cache(maxsize=8)
+def load_robot_capsules(tool_length: float = 0.12, tool_radius: float = 0.04) -> RobotCapsules:
+    """Read the fitted capsules and add the tool.
+
+    Args:
+        tool_length: Distance from flange to tcp [m].
+        tool_radius: Radius of the tool [m].
+
+    Returns:
+        The capsules, the tool last; the arrays are read-only.
+    """
+    rows = json.loads(CAPSULE_FILE.read_text())["capsules"]
+    start, end = tool_capsule(tool_length, tool_radius)
+    p0 = np.array([*(row["p0"] for row in rows), start])
+    p1 = np.array([*(row["p1"] for row in rows), end])
+    radius = np.array([*(row["radius"] for row in rows), tool_radius])
+    links = [*(LINK_NAMES.index(row["link"]) for row in rows), len(LINK_NAMES) - 1]
+    link = np.array(links, dtype=np.int64)
+    for array in (p0, p1, radius, link):
+        array.flags.writeable = False
+    names = (*(str(row["name"]) for row in rows), TOOL)
+    return RobotCapsules(name=names, link=link, p0=p0, p1=p1, radius=radius)
+
+
+SELF_PAIRS = (
+    ("base", ("forearm_mid", "forearm_high", "wrist_2", "wrist_3", TOOL)),
+    ("shoulder", ("wrist_2", "wrist_3", TOOL)),
+    ("upper_arm_low", ("wrist_2", "wrist_3", TOOL)),
+    ("upper_arm_mid", ("wrist_2", "wrist_3", TOOL)),
+    ("forearm_mid", ("wrist_2", "wrist_3", TOOL)),
+)
+"""Capsules that can touch although their links are not neighbours.
+
+All other pairs of non-adjacent links stay apart in every posture of the cells' joint ranges
+(least clearance by search 4 mm), but for base and upper arm, whose capsules overlap where the
+meshes never meet, and wrist_2 and the tool, which are bolted together through wrist_3.
+"""
+
+
+def self_pairs(capsules: RobotCapsules) -> Index:
+    """Return the pairs of capsules to check for self-collision, shape (m, 2)."""
+    place = {name: index for index, name in enumerate(capsules.name)}
+    pairs = [(place[a], place[b]) for a, partners in SELF_PAIRS for b in partners]
+    return np.array(pairs, dtype=np.int64)
+
+
+LEVERS = (1.4432, 1.4319, 0.8199, 0.2476, 0.2123, 0.0469)
+"""Greatest distance of any point of the capsules from each joint's axis [m], with a tool of
+0.12 m and radius 0.04 m; found by search over all postures, rounded up."""
+
+
+def levers(tool_length: float = 0.12, tool_radius: float = 0.04) -> Vec:
+    """Return how far from each joint's axis the robot can reach at most [m], shape (6,).
+
+    A point moves at most at the sum of joint speeds times levers. A longer or thicker tool adds
+    its excess; the last joint turns the tool about itself.
+
+    Args:
+        tool_length: Distance from flange to tcp [m].
+        tool_radius: Radius of the tool [m].
+    """
+    longer, thicker = max(tool_length - 0.12, 0.0), max(tool_radius - 0.04, 0.0)
+    return np.array(LEVERS) + longer * np.array([1.0, 1.0, 1.0, 1.0, 1.0, 0.0]) + thicker

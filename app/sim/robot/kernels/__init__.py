@@ -1,0 +1,1 @@
+"""Compiled kinematics, action bounds and speed override."""

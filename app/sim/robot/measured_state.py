@@ -1,0 +1,205 @@
+"""The robot's state as it was measured: a little outside its limits, or far outside.
+
+A drive that is commanded 0.999997 of its speed limit is measured beyond it about every second
+time. Such a state is answered: it is flagged, policies see it clamped to the limits, and the
+commanded piece starts at the measured positions and speeds and leads back inside as fast as the
+acceleration limits allow. Speed and separation monitoring takes the measured state itself, so
+that distances, stop times and stop distances are those of the robot as it is. Accelerations are
+commanded, so that a piece of a jerk-limited policy starts at the clamped one.
+
+Far outside, the numbers are no state of this robot: they are refused, with a hint where they
+look like degrees, or like a joint that is a whole turn away.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from app.errors import InvalidInput, interval
+from app.sim.core.arrays import Vec
+from app.sim.core.out_of_range import OutsideField
+from app.sim.robot.kernels.arm import Arm
+from app.sim.robot.kernels.override import stop_time
+from app.sim.robot.ur10 import JOINT_NAMES
+from app.sim.scene.scene import own
+
+SLACK = 1e-6
+"""Excess over a limit that is taken for rounding and not flagged [rad, rad/s, rad/s^2]."""
+POSITION_TOLERANCE = 0.05
+"""How far outside a position limit a joint may be measured [rad], besides the way of a stop
+from the speed limit: a joint that passes its limit while it brakes is still answered."""
+LONGEST_OVERRUN = 0.2
+"""Most that is added for that way [rad]."""
+RATE_TOLERANCE = 0.05
+"""Share of a speed or acceleration limit by which a joint may be measured beyond it."""
+LEAST_TOLERANCE = (0.01, 0.05)
+"""Least of these tolerances: speed [rad/s] and acceleration [rad/s^2]."""
+LARGEST = 1e6
+"""Largest acceleration that is taken where none is needed [rad/s^2]."""
+FREE = 1e3
+"""Stands for a position limit that does not bind [rad]."""
+TURN = 2.0 * math.pi
+PARTS = (("q", "rad"), ("qd", "rad/s"), ("qdd", "rad/s^2"))
+"""The vectors of a state, and their units."""
+
+
+class Joints(NamedTuple):
+    """Positions, speeds and accelerations of the joints, base to wrist 3, shape (6,) each."""
+
+    q: Vec
+    """[rad]"""
+    qd: Vec
+    """[rad/s]"""
+    qdd: Vec
+    """[rad/s^2]"""
+
+
+class MeasuredState(NamedTuple):
+    """A state that is no farther outside the limits than a robot is measured."""
+
+    measured: Joints
+    """As given."""
+    clamped: Joints
+    """Inside the limits: what policies see; the same object where nothing is outside."""
+    outside: tuple[OutsideField, ...]
+    """What lies outside, with the limits of the joint."""
+
+
+class StateLimits:
+    """Takes measured states of one robot in.
+
+    Args:
+        arm: From :func:`~app.sim.scene.scene.arm_of`.
+        limits_jerk: Whether the policy needs accelerations. Where it does not, they are clamped
+            and flagged however far outside they are.
+    """
+
+    def __init__(self, arm: Arm, *, limits_jerk: bool = True) -> None:
+        stop_s = stop_time((1.0 + RATE_TOLERANCE) * arm.qd_max, arm.qdd_max)
+        overrun = 0.5 * (1.0 + RATE_TOLERANCE) * arm.qd_max * stop_s
+        self._low = np.stack([arm.q_min, -arm.qd_max, -arm.qdd_max])
+        self._high = np.stack([arm.q_max, arm.qd_max, arm.qdd_max])
+        self._tolerance = np.stack(
+            [
+                POSITION_TOLERANCE + np.minimum(overrun, LONGEST_OVERRUN),
+                np.maximum(RATE_TOLERANCE * arm.qd_max, LEAST_TOLERANCE[0]),
+                np.maximum(RATE_TOLERANCE * arm.qdd_max, LEAST_TOLERANCE[1]),
+            ]
+        )
+        if not limits_jerk:
+            self._tolerance[2] = LARGEST
+
+    def take(self, q: Vec, qd: Vec, qdd: Vec | None = None) -> MeasuredState:
+        """Return a measured state, and as policies see it.
+
+        Args:
+            q: Joint positions [rad], shape (6,).
+            qd: Joint speeds [rad/s], shape (6,).
+            qdd: Joint accelerations [rad/s^2], shape (6,); zeros where None.
+
+        Raises:
+            InvalidInput: Another number of joints, a number that is not finite, or one that is
+                farther outside its limits than a robot is measured.
+        """
+        given = (q, qd, np.zeros(6) if qdd is None else qdd)
+        state = np.stack([_six(name, one) for (name, _), one in zip(PARTS, given, strict=True)])
+        measured = Joints(*state)
+        inside = (self._low - SLACK <= state) & (state <= self._high + SLACK)
+        if inside.all():
+            return MeasuredState(measured, measured, ())
+        self._require_near(state)
+        outside = tuple(
+            OutsideField(
+                field=f"robot.{PARTS[part][0]}.{JOINT_NAMES[joint]}",
+                value=float(state[part, joint]),
+                low=float(self._low[part, joint]),
+                high=float(self._high[part, joint]),
+                of="limits",
+            )
+            for part, joint in np.argwhere(~inside).tolist()
+        )
+        return MeasuredState(measured, Joints(*np.clip(state, self._low, self._high)), outside)
+
+    def _require_near(self, state: Vec) -> None:
+        low, high = self._low - self._tolerance, self._high + self._tolerance
+        # Written so that NaN is far, too.
+        far = np.argwhere(~((low <= state) & (state <= high))).tolist()
+        if not far:
+            return
+        part, joint = far[0]
+        name, unit = PARTS[part]
+        field, value = f"robot.{name}[{joint}]", float(state[part, joint])
+        if not math.isfinite(value):
+            raise InvalidInput(field, value, "must be finite")
+        least, most = self._low[part, joint], self._high[part, joint]
+        slack = self._tolerance[part, joint]
+        rule = f"must lie in {interval(least, most)} {unit}, at most {slack:.2g} outside"
+        hint = self._hint(part, joint, state[part])
+        raise InvalidInput(field, value, rule + (f" ({hint})" if hint else ""))
+
+    def _hint(self, part: int, joint: int, values: Vec) -> str:
+        """Return what may be wrong with one vector of a state; empty where that is unclear."""
+        low = self._low[part] - self._tolerance[part]
+        high = self._high[part] + self._tolerance[part]
+        value, turned = float(values[joint]), np.radians(values)
+        largest = float(np.abs(values).max())
+        there = value - math.copysign(TURN, value)
+        if part == 0 and largest <= 2.0 * TURN and low[joint] <= there <= high[joint]:
+            return f"a whole turn away? {there:.4g} lies inside"
+        beyond = TURN if part == 0 else 5.0 * float(self._high[part].max())
+        if largest > beyond and ((low <= turned) & (turned <= high)).all():
+            return f"degrees? in {PARTS[part][1]} that is {math.radians(value):.4g}"
+        return ""
+
+
+def _six(name: str, values: ArrayLike) -> Vec:
+    vector = np.asarray(values, dtype=np.float64)
+    if vector.shape != (6,):
+        raise InvalidInput(f"robot.{name}", vector.tolist(), "must hold 6 numbers")
+    return vector
+
+
+def returning(arm: Arm, q: Vec, act: Vec) -> tuple[Vec, Vec, Vec]:
+    """Return action and position limits that lead joints outside their limits back inside.
+
+    Such a joint is given the whole action inward and no limit on the side where it is: its
+    speed turns inward as fast as its acceleration (and jerk) limits allow.
+
+    Args:
+        arm: Robot in its cell.
+        q: Joint positions [rad], shape (6,).
+        act: Action in [-1, 1], shape (6,).
+
+    Returns:
+        Action, lower and upper position limits [rad], shape (6,) each.
+    """
+    below, above = q < arm.q_min, q > arm.q_max
+    if not (below | above).any():
+        return act, arm.q_min, arm.q_max
+    inward = np.where(above, -1.0, np.where(below, 1.0, act))
+    return inward, np.where(below, -FREE, arm.q_min), np.where(above, FREE, arm.q_max)
+
+
+def admitting(arm: Arm, q: Vec, qd: Vec) -> Arm:
+    """Return the robot with position and speed limits that its own straight stop keeps.
+
+    Speed and separation monitoring admits only pieces inside the limits and stops otherwise. A
+    state whose straight stop leaves the limits anyway would always be stopped, however far
+    people are. Acceleration limits stay: stops are as long as they are.
+
+    Args:
+        arm: Robot in its cell.
+        q: Joint positions as measured [rad], shape (6,).
+        qd: Joint speeds as measured [rad/s], shape (6,).
+    """
+    rest = q + 0.5 * stop_time(qd, arm.qdd_max) * qd
+    low, high, fast = np.minimum(q, rest), np.maximum(q, rest), np.abs(qd)
+    if (arm.q_min <= low).all() and (high <= arm.q_max).all() and (fast <= arm.qd_max).all():
+        return arm
+    return arm._replace(
+        q_min=own(np.minimum(arm.q_min, low)),
+        q_max=own(np.maximum(arm.q_max, high)),
+        qd_max=own(np.maximum(arm.qd_max, fast)),
+    )

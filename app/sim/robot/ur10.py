@@ -1,0 +1,107 @@
+"""The UR10 on Pinocchio: the reference model behind the compiled kernels.
+
+The model is example-robot-data's ``ur10_robot.urdf`` with a tool along ``tool0``'s z axis; the
+tcp is its tip. Use one :class:`Robot` per thread: Pinocchio's data objects are not shared.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+
+from app.sim.core.arrays import Vec
+from app.sim.robot.kernels import kinematics
+
+LINK_NAMES = (
+    "base_link",
+    "shoulder_link",
+    "upper_arm_link",
+    "forearm_link",
+    "wrist_1_link",
+    "wrist_2_link",
+    "wrist_3_link",
+)
+JOINT_NAMES = (
+    "shoulder_pan",
+    "shoulder_lift",
+    "elbow",
+    "wrist_1",
+    "wrist_2",
+    "wrist_3",
+)
+
+
+def package_dir() -> Path:
+    """Return the folder that ``package://example-robot-data`` paths are relative to.
+
+    Raises:
+        FileNotFoundError: example-robot-data is not installed beside Pinocchio.
+    """
+    for parent in Path(pin.__file__).resolve().parents:
+        share = parent / "share"
+        if (share / "example-robot-data").is_dir():
+            return share
+    raise FileNotFoundError(
+        f"no share/example-robot-data above {pin.__file__}: pip install example-robot-data"
+    )
+
+
+def urdf_path() -> Path:
+    """Return the UR10's URDF."""
+    return package_dir() / "example-robot-data/robots/ur_description/urdf/ur10_robot.urdf"
+
+
+class Robot:
+    """Kinematics of the UR10 with a tool, by Pinocchio; not thread-safe.
+
+    Args:
+        tool_length: From flange to tcp [m].
+    """
+
+    def __init__(self, tool_length: float = 0.12) -> None:
+        self.tool_length = tool_length
+        self.model = pin.buildModelFromUrdf(str(urdf_path()))
+        tool0 = self.model.frames[self.model.getFrameId("tool0")]
+        placement = tool0.placement * pin.SE3(np.eye(3), np.array([0.0, 0.0, tool_length]))
+        self._tcp = self.model.addFrame(
+            pin.Frame("tcp", tool0.parentJoint, placement, pin.FrameType.OP_FRAME)
+        )
+        self._links = [self.model.getFrameId(name) for name in LINK_NAMES]
+        self.data = self.model.createData()
+
+    def link_poses(self, q: Vec) -> Vec:
+        """Return T_world_link of base and six links, shape (7, 4, 4)."""
+        pin.framesForwardKinematics(self.model, self.data, q)
+        return np.stack([self.data.oMf[frame].homogeneous for frame in self._links])
+
+    def tcp_pose(self, q: Vec) -> Vec:
+        """Return T_world_tcp, shape (4, 4); its z axis is the tool's direction."""
+        pin.framesForwardKinematics(self.model, self.data, q)
+        return np.array(self.data.oMf[self._tcp].homogeneous)
+
+    def jacobian(self, q: Vec) -> Vec:
+        """Return the tcp's Jacobian in world axes, rows v (3) then omega (3), shape (6, 6)."""
+        pin.computeJointJacobians(self.model, self.data, q)
+        pin.updateFramePlacements(self.model, self.data)
+        return np.array(
+            pin.getFrameJacobian(
+                self.model, self.data, self._tcp, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+            )
+        )
+
+    def ik_vertical(self, position: Vec, q_min: Vec, q_max: Vec) -> Vec | None:
+        """Return the posture with the tool pointing down at ``position``.
+
+        Args:
+            position: Where the tcp shall be [m], shape (3,).
+            q_min: Lower joint limits [rad], shape (6,).
+            q_max: Upper joint limits [rad], shape (6,).
+
+        Returns:
+            Joint positions [rad], shape (6,); None where no such posture exists.
+        """
+        q = np.empty(6)
+        # Copies: for a read-only array the kernel would be compiled anew.
+        target, low, high = (np.array(x, dtype=np.float64) for x in (position, q_min, q_max))
+        reached = kinematics.ik_vertical(target, self.tool_length, low, high, q)
+        return q if reached else None

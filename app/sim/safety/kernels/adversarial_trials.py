@@ -1,0 +1,272 @@
+"""Episodes that try to break speed and separation monitoring, compiled.
+
+A robot under some policy and the safety layer, people who move by themselves or run at it, no
+table, no goal: all that counts is whether a contact finds a link in motion.
+
+People move as in ``trial_people.py``, never faster than the trial allows.
+
+**Policies.** *Smooth*: speeds wander. *Constant*: full speed, until a limit. *Goals*: straight
+to random postures. *Bang-bang*: each joint at full speed this way or that for random times.
+
+**Contacts** are found by conservative advancement: with clearance ``g`` and a bound ``v`` on
+how fast robot and people approach, nothing touches before ``g/v``; steps end at a clearance of
+TOUCH. Then the speed of the links that touch is taken from exact kinematics.
+"""
+
+import math
+
+from app.sim.core.arrays import Vec
+from app.sim.core.jit import kernel
+from app.sim.core.kernels import rng as random
+from app.sim.geometry.capsules import UX, UY, UZ, X, Y, Z, copy_rows, distances, least
+from app.sim.people.kernels.people import People, start_people
+from app.sim.robot.kernels.actions import ActionRule, advance
+from app.sim.robot.kernels.arm import CONTROLLED, Arm
+from app.sim.robot.kernels.override import clock, motion_at
+from app.sim.safety.kernels.adversarial_people import (
+    Trial,
+    TrialWork,
+    advance_cylinders,
+    advance_workers,
+    blend,
+    people_speed,
+    place_workers_at,
+)
+from app.sim.safety.kernels.separation_check import NOW, Safety, Watch, path_bounds, place_node
+from app.sim.safety.kernels.ssm import decide
+
+SMOOTH, CONSTANT, GOALS, BANG_BANG = range(4)
+"""Policies."""
+TOUCH = 1e-7
+"""Clearance that counts as contact [m]."""
+MAX_ADVANCES = 500
+"""Steps of the contact search per period; who comes closer more slowly counts as touching."""
+START_CLEARANCE = 0.02
+"""Least distance of robot and people at the start [m]."""
+START_TRIES = 100
+"""Starts drawn before the last one is taken whatever its clearance."""
+MOVING = 1e-3
+"""A touching link faster than this is a moving contact [m/s]."""
+
+N_RESULT = 9
+STEPS, CONTACT, SPEED, STOPPED, SLOWED, POLICY, MODE, WORST_PEOPLE, ALLOWED = range(N_RESULT)
+"""Of an episode: periods; whether it ended in contact; speed of the touching link then [m/s];
+periods in which the robot stood still or braked to stand, and in which it was slowed at all;
+the policy; what the people did; the fastest any point of them was [m/s]; the speed at which the
+touched part may be touched [m/s]."""
+
+
+@kernel(error_model="numpy", inline="always")
+def _act(arm: Arm, policy: int, t: float, work: TrialWork) -> None:
+    """Write the policy's action."""
+    act, aim, rng = work.act, work.aim, work.rng
+    if policy == GOALS:
+        far = 0.0
+        for j in range(CONTROLLED):
+            far = max(far, abs(aim[j] - work.q[j]))
+        if far < 0.02 or random.uniform(rng) < 0.01:
+            for j in range(CONTROLLED):
+                aim[j] = arm.q_min[j] + random.uniform(rng) * (arm.q_max[j] - arm.q_min[j])
+            return
+        for j in range(CONTROLLED):
+            act[j] = (aim[j] - work.q[j]) / max(far, 0.2)
+        return
+    for j in range(CONTROLLED):
+        if policy == SMOOTH:
+            act[j] = 0.9 * act[j] + 0.4 * random.normal(rng)
+        elif t >= aim[j]:
+            act[j] = 1.0 if random.uniform(rng) < 0.5 else -1.0
+            aim[j] = t + (0.05 + 0.8 * random.uniform(rng) if policy == BANG_BANG else 1e9)
+
+
+@kernel(error_model="numpy")
+def link_speed(arm: Arm, watch: Watch, node: int, k: int, qd: Vec) -> float:
+    """Return the greatest speed of any point on the axis of one of the robot's capsules [m/s].
+
+    A capsule's surface comes nearer to anything no faster than its axis moves.
+
+    Args:
+        arm: Robot in its cell.
+        watch: Its links are those of the pose.
+        node: Node where the pose's capsules are.
+        k: The capsule.
+        qd: Joint speeds [rad/s], shape (6,).
+    """
+    columns, rot, pos = watch.columns[node], watch.rot, watch.pos
+    fastest = 0.0
+    for end in range(2):
+        px = columns[X, k] + end * columns[UX, k]
+        py = columns[Y, k] + end * columns[UY, k]
+        pz = columns[Z, k] + end * columns[UZ, k]
+        vx, vy, vz = 0.0, 0.0, 0.0
+        for j in range(arm.link[k]):
+            # Joints 0 and 4 turn about their link's z axis, the others about y.
+            axis = 2 if j == 0 or j == 4 else 1
+            ax, ay, az = rot[j + 1, 0, axis], rot[j + 1, 1, axis], rot[j + 1, 2, axis]
+            rx, ry, rz = px - pos[j + 1, 0], py - pos[j + 1, 1], pz - pos[j + 1, 2]
+            vx += qd[j] * (ay * rz - az * ry)
+            vy += qd[j] * (az * rx - ax * rz)
+            vz += qd[j] * (ax * ry - ay * rx)
+        fastest = max(fastest, math.sqrt(vx * vx + vy * vy + vz * vz))
+    return float(fastest)
+
+
+@kernel(error_model="numpy", inline="always")
+def touching_speed(arm: Arm, j: int, work: TrialWork) -> float:
+    """Return the speed of the fastest link that touches part ``j`` of the people [m/s].
+
+    With a cylinder the fastest of all links counts.
+    """
+    touch, m = work.touch, work.columns.shape[1]
+    fastest = 0.0
+    if j < m:
+        distances(work.columns, j, touch.columns[NOW], work.toward)
+    for k in range(arm.link.shape[0]):
+        if j >= m or work.toward[k] <= 10.0 * TOUCH:
+            fastest = max(fastest, link_speed(arm, touch, NOW, k, touch.qd_node))
+    return fastest
+
+
+@kernel(error_model="numpy", inline="always")
+def first_contact(arm: Arm, work: TrialWork) -> tuple[float, int]:
+    """Return when a period's contact is [s], -1 if never, and with which part of the people."""
+    watch, touch, dt = work.watch, work.touch, arm.dt
+    s_end, _ = clock(watch.drop[0], dt)
+    first, _ = path_bounds(arm, work.qd, watch.c, watch.d, s_end)
+    approach = first + people_speed(work, dt)
+    t, j = 0.0, 0
+    for _ in range(MAX_ADVANCES):
+        part = t / dt
+        blend(work.columns0, work.columns1, part, work.columns)
+        for k in range(work.cylinders.shape[0]):
+            for i in range(3):
+                old = work.cylinders0[k, i]
+                work.cylinders[k, i] = old + part * (work.cylinders1[k, i] - old)
+        motion_at(
+            work.q, work.qd, watch.c, watch.d, watch.drop[0], t, touch.q_node, touch.qd_node
+        )
+        place_node(arm, work.columns, work.cylinders, touch.q_node, NOW, 0.0, touch)
+        gap, j = least(touch.gap[NOW])
+        if gap <= TOUCH:
+            return t, j
+        if t >= dt:
+            return -1.0, 0
+        t = min(dt, t + gap / approach) if approach > 0.0 else dt
+    return t, j
+
+
+@kernel(error_model="numpy", inline="always")
+def _draw_place(arm: Arm, people: People, work: TrialWork) -> float:
+    """Draw a posture at rest and where people are; return their distance [m]."""
+    rng = work.rng
+    for j in range(6):
+        work.q[j], work.qd[j], work.qdd[j] = arm.home[j], 0.0, 0.0
+    for j in range(CONTROLLED):
+        work.q[j] = arm.q_min[j] + random.uniform(rng) * (arm.q_max[j] - arm.q_min[j])
+    start_people(people, work.state, 0, rng, work.crowd)
+    for w in range(work.time.shape[0]):
+        work.time[w] = 0.0
+        work.offset[w, 0], work.offset[w, 1], work.offset[w, 2] = 0.0, 0.0, 0.0
+    place_workers_at(people, work, 0.0)
+    copy_rows(work.columns1, work.columns0)
+    for k in range(work.cylinders0.shape[0]):
+        for i in range(3):
+            work.cylinders0[k, i] = work.state.cylinders[0, k, i]
+        work.cylinders0[k, 3] = people.top_z
+    copy_rows(work.cylinders0, work.cylinders1)
+    copy_rows(work.cylinders0, work.cylinders)
+    place_node(arm, work.columns0, work.cylinders0, work.q, NOW, 0.0, work.watch)
+    return least(work.watch.gap[NOW])[0]
+
+
+@kernel(error_model="numpy", inline="always")
+def _start(arm: Arm, people: People, policy: int, seconds: float, work: TrialWork) -> None:
+    """Draw the start of an episode, and when people begin to run."""
+    for _ in range(START_TRIES):
+        if _draw_place(arm, people, work) >= START_CLEARANCE:
+            break
+    for i in range(work.seen_columns.shape[0]):
+        copy_rows(work.columns0, work.seen_columns[i])
+        copy_rows(work.cylinders0, work.seen_cylinders[i])
+    for j in range(6):
+        work.aim[j] = work.q[j] if policy == GOALS else 0.0
+    for j in range(CONTROLLED):
+        work.act[j] = 0.0
+    work.plan[0], work.plan[1], work.plan[3] = 0.0, 0.0, 1.0
+    work.plan[2] = 0.7 * seconds * random.uniform(work.rng)
+
+
+@kernel(error_model="numpy", inline="always")
+def _step(
+    arm: Arm, people: People, safety: Safety, trial: Trial, action: ActionRule, policy: int,
+    mode: int, step: int, work: TrialWork, out: Vec,
+) -> bool:  # fmt: skip
+    """Run one period; return whether the episode ends in contact."""
+    t, slot = step * arm.dt, step % (trial.n_late + 1)
+    copy_rows(work.columns0, work.seen_columns[slot])
+    copy_rows(work.cylinders0, work.seen_cylinders[slot])
+    oldest = (step + 1) % (trial.n_late + 1)
+    _act(arm, policy, t, work)
+    end = work.end
+    advance(
+        action, work.q, work.qd, work.qdd, work.act, arm.q_min, arm.q_max, arm.qd_max,
+        arm.qdd_max, arm.jerk_max, arm.dt, work.c, work.d, end[0], end[1], end[2],
+    )  # fmt: skip
+    watch = work.watch
+    override = decide(
+        arm, safety, 0.0, work.seen_columns[oldest], work.seen_cylinders[oldest], work.q,
+        work.qd, work.c, work.d, watch,
+    )  # fmt: skip
+    if not trial.guarded:
+        override, watch.drop[0] = 1.0, 0.0
+        for j in range(6):
+            watch.c[j], watch.d[j] = work.c[j], work.d[j]
+            watch.q[j], watch.qd[j], watch.qdd[j] = end[0, j], end[1, j], end[2, j]
+    out[STEPS] = step + 1.0
+    out[STOPPED] += 1.0 if override <= 0.0 else 0.0
+    out[SLOWED] += 1.0 if override < 1.0 else 0.0
+    place_node(arm, work.columns0, work.cylinders0, work.q, NOW, 0.0, work.touch)
+    advance_workers(people, trial, mode, t, arm.dt, work)
+    advance_cylinders(people, trial, mode, t, arm.dt, work)
+    out[WORST_PEOPLE] = max(out[WORST_PEOPLE], people_speed(work, arm.dt))
+    when, part = first_contact(arm, work)
+    if when >= 0.0:
+        out[CONTACT], out[ALLOWED] = 1.0, safety.contact_speed[part]
+        out[SPEED] = touching_speed(arm, part, work)
+        return True
+    copy_rows(work.columns1, work.columns0)
+    copy_rows(work.cylinders1, work.cylinders0)
+    for j in range(6):
+        work.q[j], work.qd[j], work.qdd[j] = watch.q[j], watch.qd[j], watch.qdd[j]
+    return False
+
+
+@kernel(nogil=True, error_model="numpy")
+def run_episodes(
+    arm: Arm, people: People, safety: Safety, trial: Trial, action: ActionRule, seed: int,
+    first: int, work: TrialWork, out: Vec,
+) -> None:  # fmt: skip
+    """Run episodes ``first`` and on; fixed by (seed, number).
+
+    Args:
+        arm: Robot in its cell.
+        people: Shared data of the people.
+        safety: What the layer assumes.
+        trial: What is true.
+        action: How actions are read.
+        seed: Seed of all episodes.
+        first: Number of the first episode.
+        work: Work space.
+        out: Filled with results, shape (n, N_RESULT).
+    """
+    for e in range(out.shape[0]):
+        row, number = out[e], first + e
+        random.start_stream(seed, number, 0, work.rng)
+        policy, mode = number % 4, (number // 4) % 4
+        for k in range(N_RESULT):
+            row[k] = 0.0
+        row[POLICY], row[MODE] = policy, mode
+        _start(arm, people, policy, trial.n_steps * arm.dt, work)
+        for step in range(trial.n_steps):
+            if _step(arm, people, safety, trial, action, policy, mode, step, work, row):
+                break

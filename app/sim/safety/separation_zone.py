@@ -1,0 +1,63 @@
+"""The protective separation distance around the whole robot, as a zone on the floor.
+
+``SafetyLayer.terms`` gives S_p for one person and the nearest link; here is S_p of every
+capsule of the robot, as fast as its joints could make it, and what it covers seen from above.
+
+Source: METHOD 2.7; ISO/TS 15066:2016, 5.5.4.
+"""
+
+import numpy as np
+
+from app.sim.core.arrays import Vec
+from app.sim.geometry.capsules import RADIUS, UX, UY, X, Y
+from app.sim.robot.kernels import arm as arm_kernel
+from app.sim.robot.kernels import override
+from app.sim.robot.kernels.arm import Arm
+from app.sim.safety.layer import SafetySettings
+from app.sim.scene.scene import own
+
+N_DIRECTIONS = 72
+"""Corners of the outline."""
+
+
+def required_distances(arm: Arm, settings: SafetySettings, qd: Vec) -> Vec:
+    """Return S_p of each of the robot's capsules [m], shape (n,).
+
+    Args:
+        arm: Robot in its cell.
+        settings: Assumptions.
+        qd: Joint speeds [rad/s], shape (6,).
+    """
+    t_stop = float(override.stop_time(own(qd), arm.qdd_max))
+    t_r = arm.dt + settings.lead
+    fastest = np.concatenate([[0.0], np.cumsum(np.abs(qd) * arm.lever)])
+    v_r = fastest[arm.link]
+    way = v_r * (t_r + 0.5 * t_stop)
+    return np.asarray(settings.other_speed * (t_r + t_stop) + way + settings.margin)
+
+
+def separation_zone(arm: Arm, settings: SafetySettings, q: Vec, qd: Vec) -> Vec:
+    """Return the outline of where a person would be nearer than S_p.
+
+    The convex hull, seen from above, of all capsules, each grown by its own S_p.
+
+    Args:
+        arm: Robot in its cell.
+        settings: Assumptions.
+        q: Joint positions [rad], shape (6,).
+        qd: Joint speeds [rad/s], shape (6,).
+
+    Returns:
+        Corners, counter-clockwise [m], shape (N_DIRECTIONS, 2).
+    """
+    robot = arm_kernel.new_robot_pose(arm)
+    arm_kernel.place_robot(arm, own(q), robot)
+    n = len(arm.link)
+    start, along = robot.columns[[X, Y], :n].T, robot.columns[[UX, UY], :n].T
+    points = np.concatenate([start, start + along])
+    grown = robot.columns[RADIUS, :n] + required_distances(arm, settings, qd)
+    radii = np.tile(grown, 2)
+    angles = 2.0 * np.pi * np.arange(N_DIRECTIONS) / N_DIRECTIONS
+    out = np.column_stack([np.cos(angles), np.sin(angles)])
+    furthest = np.argmax(out @ points.T + radii, axis=1)
+    return np.asarray(points[furthest] + radii[furthest, None] * out)

@@ -1,0 +1,1 @@
+"""Compiled episode steps that the scenarios share."""

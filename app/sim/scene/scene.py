@@ -1,0 +1,257 @@
+"""What the compiled kernels know of a work cell: its robot and its people.
+
+The kernels take plain tuples of arrays (``robot/kernels/arm.py``,
+``people/kernels/people.py``); this file
+makes them from a :class:`~app.sim.cells.cell.Cell`.
+"""
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from app.errors import InvalidInput, SimulationError
+from app.sim.cells.cell import Cell
+from app.sim.cells.people import (
+    ConstantWalker,
+    CylinderPerson,
+    FixedSpeedWalker,
+    Walker,
+    Worker,
+)
+from app.sim.core.arrays import Vec
+from app.sim.geometry.capsules import new_columns
+from app.sim.human import model as human
+from app.sim.human.kernels import kinematics as body
+from app.sim.people.human_motion_config import NO_TRACKS, WorkSettings, with_work
+from app.sim.people.kernels import people
+from app.sim.people.kernels.people import MAX_PEOPLE, People, PeopleState
+from app.sim.people.pedestrian import WalkerSettings, walker_rules, walker_state
+from app.sim.primitives.kernels import script
+from app.sim.primitives.kernels.primitives import new_legs, no_repertoire
+from app.sim.robot.capsules import levers, load_robot_capsules, self_pairs
+from app.sim.robot.kernels.arm import Arm
+
+HumanKind = Literal["worker", "walker", "constant", "fixed-speed"]
+HUMAN_KINDS: tuple[HumanKind, ...] = ("worker", "walker", "constant", "fixed-speed")
+"""An 18-DoF person at work; a cylinder that walks (METHOD 2.1), with speed and radius that
+vary, that are constant per episode, or with a given speed."""
+NO_CYLINDERS = np.zeros((0, 3))
+"""Cylinders of a cell without walkers."""
+FAR_AWAY = (0.0, 4.0, -np.pi / 2.0)
+"""Pelvis of the person assumed where nobody is there: out of everyone's reach [m, rad]."""
+
+
+def require_finite(name: str, values: NDArray[np.floating]) -> None:
+    """Raise SimulationError for NaN and infinity, which the contact test would pass over."""
+    if not np.isfinite(values).all():
+        raise SimulationError(f"{name} = {values.tolist()} must be finite")
+
+
+def require_shape(name: str, values: NDArray[Any], shape: tuple[int, ...]) -> None:
+    """Raise InvalidInput for an array of another shape: kernels would read beyond its end."""
+    if values.shape != shape:
+        raise InvalidInput(name, values.shape, f"must have the shape {shape}")
+
+
+def own(values: ArrayLike) -> Vec:
+    """Return a copy of one kind, float64, contiguous and writable.
+
+    Kernels are compiled anew for read-only, strided or integer arrays: half a minute in the
+    middle of a live cell.
+    """
+    return np.array(values, dtype=np.float64, order="C")
+
+
+def check_people(kinds: Sequence[str]) -> None:
+    """Check a list of people.
+
+    Raises:
+        InvalidInput: An unknown kind, or more people than a cell holds.
+    """
+    for kind in kinds:
+        if kind not in HUMAN_KINDS:
+            raise InvalidInput("people", kind, "must be a kind of person", HUMAN_KINDS)
+    if len(kinds) > MAX_PEOPLE:
+        raise InvalidInput("people", list(kinds), f"must be at most {MAX_PEOPLE}")
+
+
+def kinds_of(cell: Cell) -> tuple[HumanKind, ...]:
+    """Return the kinds of a cell's people, workers first, as the kernels number them."""
+    return tuple(person.kind for person in (*cell.workers, *cell.cylinders))
+
+
+def with_people(cell: Cell, kinds: Sequence[HumanKind]) -> Cell:
+    """Return a cell with other people in it.
+
+    Who the cell already describes is taken over, in order and as often as asked for; other
+    kinds walk, with the constants of METHOD 2.1, where the cell's people may be.
+
+    Raises:
+        InvalidInput: An unknown kind, too many people, or a worker where the cell has none.
+    """
+    check_people(kinds)
+    found = {kind: [p for p in cell.people if p.kind == kind] for kind in HUMAN_KINDS}
+    people: list[Worker | CylinderPerson] = []
+    for kind in kinds:
+        known = found[kind]
+        if not known and kind == "worker":
+            raise InvalidInput(
+                "people", kind, f"must be described in the cell {cell.name}: it has no worker"
+            )
+        if known:
+            people.append(known[sum(p.kind == kind for p in people) % len(known)])
+        else:
+            people.append(_cylinder_of(cell, kind))
+    return cell.model_copy(update={"people": tuple(people)})
+
+
+def _cylinder_of(cell: Cell, kind: HumanKind) -> CylinderPerson:
+    """Return a cylinder of a kind that walks where a cell's first person may be."""
+    where = cell.people[0] if cell.people else WalkerSettings()
+    area = {name: getattr(where, name) for name in ("x_min", "x_max", "y_min", "y_max")}
+    if kind == "walker":
+        return Walker(kind=kind, **area)
+    if kind == "constant":
+        return ConstantWalker(kind=kind, **area)
+    return FixedSpeedWalker(kind="fixed-speed", speed=0.5, **area)
+
+
+_WALKER_FIELDS = {
+    "speed_min": "v_min",
+    "speed_max": "v_max",
+    "radius_min": "r_min",
+    "radius_max": "r_max",
+    "speed_frequency_max": "f_speed_max",
+    "radius_frequency_max": "f_radius_max",
+    "target_tolerance": "tolerance",
+    "speed": "fixed_speed",
+}
+
+
+def walker_settings(person: CylinderPerson) -> WalkerSettings:
+    """Return how a cell's cylinder walks."""
+    values = person.model_dump(exclude={"height"})
+    return WalkerSettings(**{_WALKER_FIELDS.get(name, name): v for name, v in values.items()})
+
+
+@lru_cache(maxsize=8)
+def arm_of(cell: Cell) -> Arm:
+    """Return what the kernels know of a cell's robot."""
+    mount = cell.robot
+    capsules = load_robot_capsules(mount.tool_length, mount.tool_radius)
+    pairs, span = self_pairs(capsules), capsules.p1 - capsules.p0
+    return Arm(
+        q_min=np.array(mount.q_min),
+        q_max=np.array(mount.q_max),
+        qd_max=np.array(mount.qd_max),
+        qdd_max=np.array(mount.qdd_max),
+        jerk_max=np.array(mount.jerk_max),
+        home=np.array(mount.home_q),
+        dt=mount.dt,
+        tool_length=mount.tool_length,
+        link=own_index(capsules.link),
+        p0=own(capsules.p0),
+        span=own(span),
+        columns=new_columns(len(capsules.link), capsules.radius, (span**2).sum(axis=1)),
+        first=own_index(pairs[:, 0]),
+        second=own_index(pairs[:, 1]),
+        lever=levers(mount.tool_length, mount.tool_radius),
+        boxes=boxes_of(cell),
+    )
+
+
+def own_index(values: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return a contiguous, writable copy of integers."""
+    return np.array(values, dtype=np.int64, order="C")
+
+
+def boxes_of(cell: Cell) -> Vec:
+    """Return a cell's fixed obstacles: centre, half sizes [m], yaw [rad], shape (n, 7)."""
+    rows = [(*box.center, *box.half_size, box.yaw) for box in cell.obstacles]
+    return np.array(rows, dtype=np.float64).reshape(-1, 7)
+
+
+def people_of(cell: Cell, work: WorkSettings | None = None) -> People:
+    """Return what the kernels know of a cell's people.
+
+    Args:
+        cell: Work cell with 0 to 4 people.
+        work: What the workers do; None where they only stand where they are put.
+    """
+    workers = len(cell.workers)
+    shared = People(
+        bodies=own(cell.body[None]),
+        floor_z=cell.floor_z,
+        top_z=cell.floor_z + max([p.height for p in cell.cylinders], default=2.0),
+        columns=body.capsule_columns(workers),
+        postures=np.zeros((1, 18)),
+        hands=np.zeros((1, 2, 3)),
+        of_station=np.zeros((1, 1, 2, 2), dtype=np.int64),
+        n_cubes=0,
+        source=people.REACHES,
+        track_share=0.0,
+        absent_share=0.0,
+        repertoire=no_repertoire(),
+        tracks=NO_TRACKS,
+        limits=np.stack([human.Q_MIN, human.Q_MAX]),
+        courtesy=0.0,
+        pace=1.0,
+        walkers=walker_rules([walker_settings(person) for person in cell.cylinders]),
+        nobody=human.rest_posture(*FAR_AWAY),
+    )
+    return with_work(shared, cell, work) if workers and work is not None else shared
+
+
+def new_people_state(cell: Cell, shared: People, n_envs: int) -> PeopleState:
+    """Return rows for the people of ``n_envs`` cells, not started yet."""
+    workers, walkers = len(cell.workers), len(cell.cylinders)
+
+    def rows(*shape: int) -> Vec:
+        return np.zeros((n_envs, *shape))
+
+    def counts(*shape: int) -> NDArray[np.int64]:
+        return np.zeros((n_envs, *shape), dtype=np.int64)
+
+    return PeopleState(
+        q=rows(workers, 18),
+        qd=rows(workers, 18),
+        body=counts(workers),
+        size=np.broadcast_to(shared.bodies[0], (n_envs, workers, body.N_SIZE)).copy(),
+        columns=np.repeat(shared.columns[None], n_envs, axis=0),
+        clock=rows(workers),
+        near=rows(workers),
+        lean=rows(workers, 4),
+        track=counts(workers) + people.SCRIPTED,
+        legs=new_legs(n_envs, workers),
+        move=counts(workers),
+        n_moves=counts(workers),
+        start=rows(workers, script.MAX_MOVES),
+        duration=rows(workers, script.MAX_MOVES),
+        chosen=counts(workers, script.MAX_MOVES + 1),
+        walkers=walker_state(n_envs, walkers),
+        cylinders=rows(walkers, 3),
+    )
+
+
+def crowd_of(
+    shared: People, human_q: Vec, cylinders: Vec, sizes: Vec | None = None
+) -> people.Crowd:
+    """Return people placed as shapes.
+
+    Args:
+        shared: From :func:`people_of`.
+        human_q: The workers' joints [m, rad], shape (W, 18).
+        cylinders: The walkers' x, y and radius [m], shape (C, 3).
+        sizes: The workers' sizes [m], shape (W, body.N_SIZE); None for the cell's person.
+    """
+    if len(human_q) * body.N_CAPSULES > shared.columns.shape[1]:  # more than the cell's own
+        shared = shared._replace(columns=body.capsule_columns(len(human_q)))
+    crowd = people.new_crowd(shared, len(human_q), len(cylinders))
+    if sizes is not None:
+        crowd.size[:] = sizes
+    people.place_workers(shared, own(human_q), crowd)
+    crowd.cylinders[:] = cylinders
+    return crowd

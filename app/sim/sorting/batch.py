@@ -1,0 +1,371 @@
+"""The sorting task: many of them stepped together, and what one state looks like (METHOD 1).
+
+A batch hands out observations of integers (cells, towers, goal, failure probabilities), masks
+of the moves that change something, rewards and ends. The people of METHOD 1.2, who add, remove
+and move objects or change the goal, are part of it (``human_rate``).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.errors import InvalidInput
+from app.sim.cells.cell import Cell
+from app.sim.core.arrays import Vec
+from app.sim.core.jit import direct
+from app.sim.scene.scene import require_shape
+from app.sim.sorting.kernels import episode as sorting_episode
+from app.sim.sorting.kernels import task as kernel
+from app.sim.sorting.kernels.reward import SortingWeights
+from app.sim.sorting.state import (
+    MAX_FAILURE,
+    NULL,
+    Move,
+    SortingShape,
+    SortingState,
+    check_state,
+)
+
+OUTCOMES = ("running", "success", "timeout")
+"""How an episode stands, by the number in ``rows.outcome``."""
+
+Obs = NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SortingSettings:
+    """How episodes start, are disturbed, pay and end."""
+
+    horizon_factor: float = 4.0
+    """Attempts per clutter cell after which an episode is cut off."""
+    disturbed_share: float = 0.0
+    """Share of episodes that start with junk on the towers and goals partly built."""
+    solved_episodes: float = 0.0
+    """Share of episodes that start partly solved (e_s of METHOD 1.4)."""
+    solved_share: float = 0.0
+    """Share of their goal that is done (g_s)."""
+    even_share: float = 0.0
+    """Share of episodes whose K_E and K_G are drawn evenly, not triangular."""
+    human_rate: float = 0.0
+    """Chance per attempt that a person interferes."""
+    localisation_rate: float = 0.0
+    """Chance per pick from the clutter that another object is moved than was meant."""
+    random_map_share: float = 0.0
+    """Share of episodes with a failure map drawn at random."""
+    failure_max: float = 0.4
+    """Greatest failure probability of such a map."""
+    n_objects: int = 0
+    """Objects per episode, K_E; 0 draws it (METHOD 1.4)."""
+    n_goal: int = 0
+    """Objects in the goal, K_G; 0 draws it."""
+    weights: SortingWeights = field(default_factory=SortingWeights)
+    """Reward coefficients."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SortingStep:
+    """What one batched step gave; the arrays are overwritten by the next step."""
+
+    obs: Obs
+    """Observations after the step, of new episodes where one ended, (n_envs, obs_size)."""
+    last_obs: Obs
+    """Final observation of the rows that ended, (n_envs, obs_size)."""
+    rew: NDArray[np.float32]
+    """Rewards, (n_envs,)."""
+    ended: NDArray[np.int64]
+    """Index into OUTCOMES of episodes that ended now, 0 elsewhere, (n_envs,)."""
+
+
+def shape_of(cell: Cell) -> SortingShape:
+    """Return how large the sorting task of a cell is: its clutter cells and its towers.
+
+    Raises:
+        InvalidInput: The cell has no clutter cells or no clusters.
+    """
+    n_cells, n_colours = len(cell.stations_of("clutter")), len(cell.stations_of("cluster"))
+    if not n_cells or not n_colours:
+        rule = "needs stations of kind clutter and of kind cluster to sort"
+        raise InvalidInput("cell", cell.name, rule)
+    return SortingShape(n_cells=n_cells, n_colours=n_colours)
+
+
+def fail_of(cell: Cell) -> Vec:
+    """Return the failure probabilities of a cell's clutter cells, shape (K,)."""
+    return np.array([one.failure_probability or 0.0 for one in cell.stations_of("clutter")])
+
+
+def new_rows(shape: SortingShape, n_envs: int, fail: Vec) -> kernel.SortingRows:
+    """Return rows for ``n_envs`` tasks, not started yet."""
+    k, c = shape.n_cells, shape.n_colours
+
+    def ints(*more: int) -> NDArray[np.int64]:
+        return np.zeros((n_envs, *more), dtype=np.int64)
+
+    return kernel.SortingRows(
+        clutter=np.zeros((n_envs, k), dtype=np.int8),
+        towers=np.zeros((n_envs, c, k), dtype=np.int8),
+        heights=ints(c),
+        goal=np.zeros((n_envs, c, k), dtype=np.int8),
+        goal_heights=ints(c),
+        fail=np.tile(fail, (n_envs, 1)),
+        own_fail=np.tile(fail, (n_envs, 1)),
+        fixed_objects=ints(),
+        fixed_goal=ints(),
+        steps=ints(),
+        moves=ints(),
+        failures=ints(),
+        interferences=ints(),
+        episode=ints(),
+        outcome=ints(),
+        rng=np.zeros((n_envs, 1), dtype=np.uint64),
+        counts=ints(2, shape.n_types + 1),
+    )
+
+
+def _check_sizes(settings: SortingSettings, shape: SortingShape) -> None:
+    """Raise InvalidInput where more objects are asked for than there are, or fit."""
+    most = settings.n_objects or shape.n_cells
+    for name, value, limit in (
+        ("n_objects", settings.n_objects, shape.n_cells),
+        ("n_goal", settings.n_goal, most),
+    ):
+        if not 0 <= value <= limit:
+            raise InvalidInput(name, value, f"must lie in [0, {limit}]")
+
+
+class SortingBatch:
+    """Many sorting tasks, stepped together by one thread.
+
+    Copies (``copy.deepcopy``, ``pickle``) go on bit by bit as the original would.
+
+    Args:
+        shape: Size of the tasks.
+        fail: Failure probabilities of the clutter cells, shape (K,).
+        n_envs: Number of tasks.
+        seed: Seed; episode ``k`` of row ``e`` is fixed by (seed, e, k).
+        settings: Starts, disturbances, rewards and ends.
+        first_env: Number of the first row in the random streams.
+
+    Raises:
+        InvalidInput: The failure map or the fixed sizes do not fit the shape.
+    """
+
+    def __init__(
+        self,
+        shape: SortingShape,
+        fail: Vec,
+        n_envs: int,
+        seed: int,
+        settings: SortingSettings | None = None,
+        first_env: int = 0,
+    ) -> None:
+        if fail.shape != (shape.n_cells,) or not ((fail >= 0.0) & (fail <= MAX_FAILURE)).all():
+            rule = f"must be {shape.n_cells} probabilities in [0, {MAX_FAILURE}]"
+            raise InvalidInput("fail", fail.tolist(), rule)
+        self.shape, self.n_envs, self.seed = shape, n_envs, seed
+        self._first = first_env
+        self.rows = new_rows(shape, n_envs, fail)
+        """Rows of all tasks."""
+        self.settings = settings or SortingSettings()
+        _check_sizes(self.settings, shape)
+        """Starts, disturbances, rewards and ends; may be replaced between two steps."""
+        self.rows.fixed_objects[:] = self.settings.n_objects
+        self.rows.fixed_goal[:] = self.settings.n_goal
+        self._obs = np.zeros((n_envs, shape.obs_size), dtype=np.uint8)
+        self._last = np.zeros_like(self._obs)
+        self._masks = np.zeros((n_envs, shape.n_actions), dtype=np.bool_)
+        self._rew = np.zeros(n_envs, dtype=np.float32)
+        self._ended = np.zeros(n_envs, dtype=np.int64)
+        self._step: Callable[..., None] | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a copy is made of; it finds its compiled kernel itself."""
+        return {**self.__dict__, "_step": None}
+
+    @property
+    def obs(self) -> Obs:
+        """Observations as they were last written, (n_envs, obs_size)."""
+        return self._obs
+
+    @property
+    def episode(self) -> NDArray[np.int64]:
+        """Numbers of the present episodes, (n_envs,); those that start next are set here."""
+        return self.rows.episode
+
+    @property
+    def horizon(self) -> int:
+        """Attempts after which an episode is cut off."""
+        return round(self.settings.horizon_factor * self.shape.n_cells)
+
+    def _rules(self) -> kernel.SortingRules:
+        of = self.settings
+        return kernel.SortingRules(
+            n_sizes=self.shape.n_sizes,
+            horizon=self.horizon,
+            disturbed_share=of.disturbed_share,
+            solved_episodes=of.solved_episodes,
+            solved_share=of.solved_share,
+            even_share=of.even_share,
+            human_rate=of.human_rate,
+            localisation_rate=of.localisation_rate,
+            random_map_share=of.random_map_share,
+            failure_max=of.failure_max,
+        )
+
+    def reset(self, seed: int | None = None) -> Obs:
+        """Start episode 0 in every row; return observations, (n_envs, obs_size)."""
+        self.seed = self.seed if seed is None else seed
+        self.rows.episode[:] = 0
+        return self.restart()
+
+    def restart(self) -> Obs:
+        """Start the episodes numbered by ``rows.episode``; return the observations."""
+        sorting_episode.start_rows(self.rows, self._rules(), self.seed, self._first, self._obs)
+        return self._obs
+
+    def start(self, rows: NDArray[np.int64]) -> Obs:
+        """Start the episodes numbered by ``episode`` in some rows.
+
+        Args:
+            rows: Numbers of the rows, shape (k,).
+
+        Returns:
+            Observations of all rows, (n_envs, obs_size).
+        """
+        if len(rows) == self.n_envs:
+            return self.restart()
+        for e in rows.tolist():
+            one = kernel.SortingRows._make(column[e : e + 1] for column in self.rows)
+            first, obs = self._first + e, self._obs[e : e + 1]
+            sorting_episode.start_rows(one, self._rules(), self.seed, first, obs)
+        return self._obs
+
+    def step(self, act: NDArray[np.int64], *, auto_reset: bool = True) -> SortingStep:
+        """Make one attempt in every row.
+
+        Args:
+            act: Actions as ``SortingShape`` numbers them, shape (n_envs,).
+            auto_reset: Start the next episode where one ended; else its row stands still.
+
+        Raises:
+            InvalidInput: The actions have another shape, or one is no action.
+        """
+        require_shape("act", act, (self.n_envs,))
+        wanted = np.array(act, dtype=np.int64, order="C")
+        if (wanted < 0).any() or (wanted >= self.shape.n_actions).any():
+            raise InvalidInput("act", act, f"must lie in [0, {self.shape.n_actions})")
+        arguments: tuple[Any, ...] = (
+            self.rows,
+            self._rules(),
+            self.settings.weights,
+            self.seed,
+            self._first,
+            wanted,
+            auto_reset,
+            self._obs,
+            self._last,
+            self._rew,
+            self._ended,
+        )
+        if self._step is None:
+            self._step = direct(sorting_episode.step_rows, arguments)
+        self._step(*arguments)
+        return SortingStep(obs=self._obs, last_obs=self._last, rew=self._rew, ended=self._ended)
+
+    def masks(self) -> NDArray[np.bool_]:
+        """Return which moves change something, shape (n_envs, n_actions); overwritten."""
+        kernel.masks_of(self.rows, self._masks)
+        return self._masks
+
+    def observations(self) -> Obs:
+        """Return the observations as the rows are now, (n_envs, obs_size); overwritten."""
+        kernel.observe_rows(self.rows, self._obs)
+        return self._obs
+
+    def put(self, e: int, state: SortingState) -> None:
+        """Start an episode of row ``e`` in a given state."""
+        self.change(e, state)
+        rows = self.rows
+        for counter in (rows.steps, rows.moves, rows.failures, rows.interferences):
+            counter[e] = 0
+
+    def change(self, e: int, state: SortingState) -> None:
+        """Put row ``e`` into another state, as a person would; the counters go on.
+
+        Raises:
+            InvalidInput: The state does not fit.
+        """
+        check_state(state, self.shape)
+        rows = self.rows
+        rows.clutter[e], rows.towers[e], rows.goal[e] = state.clutter, state.towers, state.goal
+        rows.heights[e] = state.heights
+        rows.goal_heights[e] = (state.goal != NULL).sum(axis=1)
+        rows.fail[e] = state.fail
+        rows.outcome[e] = kernel.RUNNING
+
+    def state_of(self, e: int) -> SortingState:
+        """Return a copy of row ``e``."""
+        rows = self.rows
+        return SortingState(
+            clutter=rows.clutter[e].copy(),
+            towers=rows.towers[e].copy(),
+            goal=rows.goal[e].copy(),
+            fail=rows.fail[e].copy(),
+        )
+
+
+def batch_in(
+    cell: Cell, n_envs: int, seed: int, settings: SortingSettings | None = None
+) -> SortingBatch:
+    """Return a batch with the size and the failure map of a work cell."""
+    return SortingBatch(shape_of(cell), fail_of(cell), n_envs, seed, settings)
+
+
+def observe(state: SortingState) -> Obs:
+    """Return the observation of one state, shape (obs_size,): integers.
+
+    Clutter (K), towers (C K), goal (C K), failure probabilities times 250 (K).
+    """
+    scaled = np.floor(state.fail * kernel.FAILURE_SCALE + 0.5)
+    parts = (state.clutter, state.towers.ravel(), state.goal.ravel(), scaled)
+    return np.concatenate(parts).astype(np.uint8)
+
+
+def valid_moves(state: SortingState, shape: SortingShape) -> NDArray[np.bool_]:
+    """Return which moves change something, shape (n_actions,)."""
+    there, towers = state.clutter != NULL, state.heights > 0
+    across = towers[:, None] & ~np.eye(shape.n_colours, dtype=np.bool_)
+    return np.concatenate(
+        [
+            np.repeat(there, shape.n_colours),
+            (towers[:, None] & ~there).ravel(),
+            across.ravel(),
+        ]
+    )
+
+
+def apply(state: SortingState, shape: SortingShape, move: Move) -> SortingState:
+    """Return the state after a move that succeeds.
+
+    Raises:
+        InvalidInput: The move changes nothing.
+    """
+    if not valid_moves(state, shape)[shape.action_of(move)]:
+        rule = "must pick where an object is and place where there is room"
+        raise InvalidInput("move", [move.pick, move.place], rule)
+    k, heights = shape.n_cells, state.heights
+    clutter, towers = state.clutter.copy(), state.towers.copy()
+    if move.pick < k:
+        code, clutter[move.pick] = clutter[move.pick], NULL
+    else:
+        c = move.pick - k
+        code, towers[c, heights[c] - 1] = towers[c, heights[c] - 1], NULL
+    if move.place < k:
+        clutter[move.place] = code
+    else:
+        c = move.place - k
+        towers[c, heights[c]] = code
+    return SortingState(clutter=clutter, towers=towers, goal=state.goal, fail=state.fail)

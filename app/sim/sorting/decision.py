@@ -1,0 +1,226 @@
+"""The next move of the sorting task, by a learned policy or by the exact planner (METHOD 1).
+
+The policy decides by the greatest Q among the valid moves. The planner decides where there is
+no policy, where its shape or the goal is not what it was trained for, and where
+:mod:`app.sim.sorting.progress_monitor` hands over. The answer always says who decided and why,
+and ranks
+every valid move with the decider's own values.
+"""
+
+import time
+
+import numpy as np
+
+from app.sim.core.arrays import Vec
+from app.sim.sorting.batch import apply, observe, valid_moves
+from app.sim.sorting.decision_types import OutsideGoal, RankedMove, SortingDecision, Why
+from app.sim.sorting.kernels.action_costs import attempts_by_move
+from app.sim.sorting.kernels.planner import Objects, Task, new_work
+from app.sim.sorting.kernels.shortest_paths import most_states
+from app.sim.sorting.planner import Plan, solve
+from app.sim.sorting.progress_monitor import SortingWatch, look, note_move, state_key
+from app.sim.sorting.sorting_values import SortingValues
+from app.sim.sorting.state import NULL, Codes, Move, SortingShape, SortingState, empty_state
+
+MAX_PLANNED = 20_000
+"""Most states that the planner may look at to value every move: about a millisecond."""
+MAX_AT_ONCE = 4_000
+"""Most states of a task for which a decision takes a moment: ``sorting-e1`` has fewer."""
+
+
+def decide(
+    policy: SortingValues | None,
+    state: SortingState,
+    shape: SortingShape,
+    watch: SortingWatch | None = None,
+    *,
+    ask_planner: bool = False,
+) -> SortingDecision:
+    """Choose the next move.
+
+    Args:
+        policy: Who decides as a rule; None leaves it to the planner.
+        state: The task now; ``sorting_state.check_state`` accepts it.
+        shape: How large the task is.
+        watch: ``watch`` of the decision before, in the same task; None at its beginning.
+        ask_planner: Whether the planner shall decide whatever the policy could.
+    """
+    begin = time.perf_counter()
+    plan = solve(state, shape)
+    outside = outside_goal(state.goal, shape)
+    noted: SortingWatch | None = None
+    ranked: tuple[RankedMove, ...] = ()
+    trusted, why = _trusted(policy, shape, plan, outside, ask_planner)
+    if trusted is not None:
+        noted = look(watch, state_key(state), plan.attempts, trusted.checkpoint)
+        if noted.handed_over is not None:
+            trusted, why = None, noted.handed_over
+    if plan.best is not None:
+        ranked = (
+            rank_by_planner(state, shape, plan)
+            if trusted is None
+            else rank_by_policy(trusted, state, shape, plan)
+        )
+    if noted is not None:
+        noted = _noted_move(noted, state, shape, ranked[0].move)
+    return SortingDecision(
+        solved=plan.best is None,
+        action=ranked[0].action if ranked else None,
+        move=ranked[0].move if ranked else None,
+        by="planner" if trusted is None else "policy",
+        why=why,
+        ranked=ranked,
+        fewest_moves=plan.moves,
+        expected_attempts=plan.attempts,
+        outside=outside,
+        checkpoint=None if policy is None else policy.checkpoint,
+        watch=noted,
+        elapsed_ms=1e3 * (time.perf_counter() - begin),
+    )
+
+
+def outside_goal(goal: Codes, shape: SortingShape) -> tuple[OutsideGoal, ...]:
+    """Return the objects of a goal that goals met in training never ask for.
+
+    Args:
+        goal: What the towers shall be, shape (C, K).
+        shape: How large the task is.
+    """
+    towers, levels = np.nonzero(goal)
+    found = []
+    for tower, level in zip(towers.tolist(), levels.tolist(), strict=True):
+        code = int(goal[tower, level])
+        below = int(goal[tower, level - 1]) if level else NULL
+        if shape.colour_of(code) != tower:
+            rule = "must be of the tower's own colour"
+            found.append(OutsideGoal(tower=tower, level=level, rule=rule))
+        elif below != NULL and shape.size_of(code) > shape.size_of(below):
+            rule = "must not be larger than the object below it"
+            found.append(OutsideGoal(tower=tower, level=level, rule=rule))
+    return tuple(found)
+
+
+def failure_of(state: SortingState, move: Move) -> float:
+    """Return the probability that the pick of a move fails; picks from towers never do."""
+    return float(state.fail[move.pick]) if move.pick < len(state.fail) else 0.0
+
+
+def rank_by_policy(
+    policy: SortingValues, state: SortingState, shape: SortingShape, plan: Plan
+) -> tuple[RankedMove, ...]:
+    """Return the valid moves by the policy's Q, the greatest first."""
+    q = policy.values(observe(state)[None])[0]
+    values = {action: float(q[action]) for action in valid_actions(state, shape)}
+    order = sorted(values, key=lambda action: (-values[action], action))
+    return _ranked(order, values, shape, plan)
+
+
+def rank_by_planner(
+    state: SortingState, shape: SortingShape, plan: Plan
+) -> tuple[RankedMove, ...]:
+    """Return the valid moves by the attempts expected if they come first, the plan's own first.
+
+    After any other move the planner's rules are followed, without looking ahead. Where even
+    that would take too long there are no values: the moves that begin a plan of the fewest
+    moves come before the others.
+    """
+    valid = valid_actions(state, shape)
+    attempts = attempts_by_action(state, shape, valid)
+    if attempts is None:
+        fewest = frozenset(plan.first)
+        order = sorted(valid, key=lambda one: (one != plan.best, one not in fewest, one))
+        return _ranked(order, {}, shape, plan)
+    values = {one: -float(value) for one, value in zip(valid, attempts, strict=True)}
+    assert plan.best is not None
+    values[plan.best] = -plan.attempts
+    order = sorted(valid, key=lambda one: (one != plan.best, -values[one], one))
+    return _ranked(order, values, shape, plan)
+
+
+def attempts_by_action(
+    state: SortingState, shape: SortingShape, actions: list[int]
+) -> Vec | None:
+    """Return the attempts that the planner expects to the goal, by the move that comes first.
+
+    Args:
+        state: A state that ``check_state`` accepts.
+        shape: Its shape.
+        actions: Valid moves by their numbers.
+
+    Returns:
+        Expected attempts, shape (n,); None where finding them would take too long.
+    """
+    moves = [shape.move_of(action) for action in actions]
+    attempts = np.zeros(len(actions))
+    heights = np.count_nonzero(state.towers, axis=1)
+    written = attempts_by_move(
+        Objects(state.clutter.copy(), state.towers.copy(), heights),
+        Task(state.goal, np.count_nonzero(state.goal, axis=1), state.fail),
+        np.array([(move.pick, move.place) for move in moves], dtype=np.int64).reshape(-1, 2),
+        MAX_PLANNED,
+        new_work(shape.n_cells, shape.n_colours, shape.n_sizes),
+        attempts,
+    )
+    return attempts if written else None
+
+
+def takes_time(shape: SortingShape) -> bool:
+    """Return whether a decision may take more than a moment."""
+    return most_states(shape.n_cells, shape.n_colours) > MAX_AT_ONCE
+
+
+def valid_actions(state: SortingState, shape: SortingShape) -> list[int]:
+    """Return the moves that change something, by their numbers."""
+    found: list[int] = np.flatnonzero(valid_moves(state, shape)).tolist()
+    return found
+
+
+def warm_up(policy: SortingValues | None = None) -> None:
+    """Compile what a decision needs, before the first one; a policy decides once for that."""
+    shape = SortingShape(n_cells=2, n_colours=1) if policy is None else policy.shape
+    state = empty_state(shape)
+    state.clutter[0] = state.goal[0, 0] = shape.code(0, 0)
+    decide(policy, state, shape)
+
+
+def _trusted(
+    policy: SortingValues | None,
+    shape: SortingShape,
+    plan: Plan,
+    outside: tuple[OutsideGoal, ...],
+    ask_planner: bool,
+) -> tuple[SortingValues | None, Why]:
+    """Return the policy if it may decide, else None, and why."""
+    if plan.best is None:
+        return None, "solved"
+    if ask_planner:
+        return None, "asked"
+    if policy is None:
+        return None, "no-policy"
+    if policy.shape != shape:
+        return None, "other-shape"
+    if outside:
+        return None, "untrained-goal"
+    return policy, "policy"
+
+
+def _ranked(
+    order: list[int], values: dict[int, float], shape: SortingShape, plan: Plan
+) -> tuple[RankedMove, ...]:
+    fewest = frozenset(plan.first)
+    return tuple(
+        RankedMove(
+            action=action,
+            move=shape.move_of(action),
+            value=values.get(action),
+            fewest=action in fewest,
+        )
+        for action in order
+    )
+
+
+def _noted_move(
+    watch: SortingWatch, state: SortingState, shape: SortingShape, move: Move
+) -> SortingWatch:
+    expected = state_key(apply(state, shape, move))
+    return note_move(watch, expected, can_fail=failure_of(state, move) > 0.0)

@@ -1,0 +1,1 @@
+"""Compiled sorting episodes and planner."""

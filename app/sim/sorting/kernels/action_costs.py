@@ -1,0 +1,67 @@
+"""What every valid move of the sorting task is worth to the exact planner, compiled.
+
+A move that comes first costs ``1 / (1 - p)`` attempts, ``p`` the failure probability of its
+pick, and then what a plan by the rules from the state it gives costs.
+"""
+
+from app.sim.core.arrays import Vec
+from app.sim.core.jit import kernel
+from app.sim.sorting.kernels.planner import Objects, PlannerWork, Task, rough_plan
+from app.sim.sorting.kernels.shortest_paths import Ints, lay_out
+
+
+@kernel()
+def _shift(source: int, target: int, objects: Objects) -> None:
+    """Move the object at one position to another."""
+    n_cells = len(objects.clutter)
+    if source < n_cells:
+        code = objects.clutter[source]
+        objects.clutter[source] = 0
+    else:
+        c = source - n_cells
+        objects.heights[c] -= 1
+        code = objects.towers[c, objects.heights[c]]
+        objects.towers[c, objects.heights[c]] = 0
+    if target < n_cells:
+        objects.clutter[target] = code
+    else:
+        c = target - n_cells
+        objects.towers[c, objects.heights[c]] = code
+        objects.heights[c] += 1
+
+
+@kernel(nogil=True)
+def attempts_by_move(
+    objects: Objects, task: Task, moves: Ints, most: int, work: PlannerWork, attempts: Vec
+) -> bool:
+    """Write the attempts expected to the goal by the move that comes first.
+
+    Args:
+        objects: Where the objects are; as before at the end.
+        task: What is asked for.
+        moves: Valid moves as positions to pick and to place, shape (n, 2).
+        most: States of the planner, over all moves, beyond which nothing is written.
+        work: Work space of the shape.
+        attempts: Expected attempts by move, shape (n,), written.
+
+    Returns:
+        Whether they were written.
+    """
+    size = lay_out(
+        objects.clutter,
+        objects.towers,
+        objects.heights,
+        task.goal,
+        task.goal_heights,
+        work.progress,
+    )
+    if size * len(moves) > most:
+        return False
+    for i in range(len(moves)):
+        pick, place = moves[i, 0], moves[i, 1]
+        _shift(pick, place, objects)
+        _, after = rough_plan(objects, task, work)
+        _shift(place, pick, objects)
+        risk = task.fail[pick] if pick < len(task.fail) else 0.0
+        attempts[i] = after + 1.0 / (1.0 - risk)
+    return True

@@ -1,0 +1,32 @@
+"""What the exact planner needs from where many sorting tasks are, in one call."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.sim.core.jit import kernel
+from app.sim.sorting.kernels.planner import Objects, PlannerWork, Task, plan_state
+from app.sim.sorting.kernels.task import Ints, SortingRows
+
+
+@kernel(nogil=True)
+def measure_rows(
+    rows: SortingRows,
+    which: Ints,
+    work: PlannerWork,
+    fewest: Ints,
+    attempts: NDArray[np.float64],
+) -> None:
+    """Write the fewest moves to the goal, and the attempts the planner expects for its plan.
+
+    Args:
+        rows: Rows of all tasks.
+        which: Rows that are measured, shape (m,).
+        work: Work space of the shape.
+        fewest: Fewest moves, -1 where the goal cannot be met, shape (m,), written.
+        attempts: Expected attempts, shape (m,), written.
+    """
+    for i in range(len(which)):
+        e = which[i]
+        objects = Objects(rows.clutter[e], rows.towers[e], rows.heights[e])
+        task = Task(rows.goal[e], rows.goal_heights[e], rows.fail[e])
+        fewest[i], attempts[i] = plan_state(objects, task, work)

@@ -1,0 +1,440 @@
+"""Exact plans of the sorting task: next moves for batches, whole plans and risk, compiled.
+
+A pick from cell ``k`` fails with probability ``fail[k]`` and leaves everything as it is, so it
+takes ``1 / (1 - fail[k])`` attempts on average, and a plan's expected attempts are the sum over
+its picks; picks from towers do not fail. Fewest moves come first. Of the plans with the fewest
+moves one with few expected attempts is found by rules
+(:mod:`app.sim.sorting.kernels.tie_breaking`)
+and by looking ahead: wherever the rules put an object aside that will be wanted again, each
+other way to put one aside is tried, the rules finish the plan, and the best one is taken.
+``docs/planner_nearness.py`` measures how near that comes to the fewest expected attempts.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.sim.core.arrays import Vec
+from app.sim.core.jit import kernel
+from app.sim.sorting.kernels.shortest_paths import (
+    Bytes,
+    Ints,
+    Progress,
+    fill,
+    lay_out,
+    new_progress,
+    state_number,
+    ties_on_tower,
+)
+from app.sim.sorting.kernels.tie_breaking import (
+    NONE,
+    choose,
+    mark_first,
+    still_wanted,
+    worst_free,
+)
+
+MOST_STATES = 20_000
+"""Tasks with more states are planned by the rules alone: looking ahead would take seconds."""
+LESS = 1e-9
+"""Attempts by which a plan must be better to be preferred."""
+CELLS_TRIED = 3
+"""How many of the best free cells are tried for an object put aside, besides the worst one."""
+
+
+class Objects(NamedTuple):
+    """Where the objects are, while a plan is followed."""
+
+    clutter: Bytes
+    """Objects in the cells, shape (K,)."""
+    towers: Bytes
+    """Objects on the towers, lowest first, shape (C, K)."""
+    heights: Ints
+    """Objects per tower, shape (C,)."""
+
+
+class Task(NamedTuple):
+    """What is asked for, and at which risk."""
+
+    goal: Bytes
+    """What the towers shall be, shape (C, K)."""
+    goal_heights: Ints
+    """Objects per tower there, shape (C,)."""
+    fail: Vec
+    """Failure probabilities of the cells, shape (K,)."""
+
+
+class PlannerWork(NamedTuple):
+    """Work space of the planner; made once, for any task of its shape."""
+
+    progress: Progress
+    """States of the task."""
+    at: Ints
+    """Work space of sweeps, shape (C,)."""
+    now: Objects
+    """Where the objects are on the plan that is followed."""
+    trial: Objects
+    """Where they are on a plan that is tried."""
+    first: NDArray[np.bool_]
+    """Marks of the actions with which some shortest plan begins, shape (n_actions,)."""
+    actions: Ints
+    """The plan that was followed, then -1, shape (4 K + 1,)."""
+
+
+def _new_objects(n_cells: int, n_colours: int) -> Objects:
+    """Return work space for the objects of a task."""
+    return Objects(
+        clutter=np.zeros(n_cells, dtype=np.int8),
+        towers=np.zeros((n_colours, n_cells), dtype=np.int8),
+        heights=np.zeros(n_colours, dtype=np.int64),
+    )
+
+
+def new_work(n_cells: int, n_colours: int, n_sizes: int) -> PlannerWork:
+    """Return work space: 30 kB for K = 20, C = 3; 10 MB for K = 40, C = 5."""
+    return PlannerWork(
+        progress=new_progress(n_cells, n_colours, n_sizes),
+        at=np.zeros(n_colours, dtype=np.int64),
+        now=_new_objects(n_cells, n_colours),
+        trial=_new_objects(n_cells, n_colours),
+        first=np.zeros(n_colours * (2 * n_cells + n_colours), dtype=np.bool_),
+        actions=np.zeros(4 * n_cells + 1, dtype=np.int64),
+    )
+
+
+@kernel()
+def _copy(source: Objects, target: Objects) -> None:
+    """Copy where the objects are."""
+    for k in range(len(source.clutter)):
+        target.clutter[k] = source.clutter[k]
+    for c in range(len(source.heights)):
+        target.heights[c] = source.heights[c]
+        for level in range(len(source.clutter)):
+            target.towers[c, level] = source.towers[c, level]
+
+
+@kernel()
+def _lay_out(objects: Objects, task: Task, work: PlannerWork) -> int:
+    """Write the states of a task and the fewest moves from them; return their number."""
+    size = lay_out(
+        objects.clutter,
+        objects.towers,
+        objects.heights,
+        task.goal,
+        task.goal_heights,
+        work.progress,
+    )
+    if size > 0:
+        fill(size, work.at, work.progress)
+    return size
+
+
+@kernel()
+def _locate(objects: Objects, task: Task, p: Progress) -> None:
+    """Write the towers' progress."""
+    for c in range(len(objects.heights)):
+        height, level = objects.heights[c], 0
+        while level < height and objects.towers[c, level] == task.goal[c, level]:
+            level += 1
+        p.at[c] = p.junk[c] + (height - p.cut[c] if level == height else p.match[c] - height)
+
+
+@kernel()
+def _carry_out(action: int, objects: Objects, task: Task, work: PlannerWork) -> bool:
+    """Carry an action out, and note the towers' progress.
+
+    Returns:
+        Whether the states had to be written anew: an object waits on a tower.
+    """
+    p, n_cells, n_towers = work.progress, len(objects.clutter), len(objects.heights)
+    moves = n_cells * n_towers
+    d = action % n_towers
+    if action < moves:
+        code = objects.clutter[action // n_towers]
+        objects.clutter[action // n_towers] = 0
+    else:
+        c = (
+            (action - moves) // n_cells
+            if action < 2 * moves
+            else (action - 2 * moves) // n_towers
+        )
+        objects.heights[c] -= 1
+        code = objects.towers[c, objects.heights[c]]
+        objects.towers[c, objects.heights[c]] = 0
+        p.at[c] = p.below[c, p.at[c]]
+        if action < 2 * moves:
+            objects.clutter[(action - moves) % n_cells] = code
+            return False
+        d = (action - 2 * moves) % n_towers
+    objects.towers[d, objects.heights[d]] = code
+    objects.heights[d] += 1
+    if p.want[d, p.at[d]] == code:
+        p.at[d] += 1
+        return False
+    _lay_out(objects, task, work)
+    return True
+
+
+@kernel()
+def _attempts(action: int, task: Task) -> float:
+    """Return the expected attempts of an action."""
+    k = action // len(task.goal)
+    return 1.0 / (1.0 - task.fail[k]) if k < len(task.fail) else 1.0
+
+
+@kernel()
+def _choose(objects: Objects, task: Task, p: Progress) -> int:
+    """Return the next action by the rules, -1 at the goal."""
+    return choose(objects.clutter, task.goal, task.goal_heights, task.fail, p)
+
+
+@kernel()
+def _try(action: int, best: float, task: Task, work: PlannerWork) -> float:
+    """Return the expected attempts from an action to the goal, by the rules after it.
+
+    Args:
+        action: First action, from where the objects are now.
+        best: Expected attempts that would have to be less for it to be taken.
+        task: What is asked for.
+        work: Work space; its states fit where the objects are now, and do so again.
+    """
+    p = work.progress
+    _copy(work.now, work.trial)
+    attempts, anew = 0.0, False
+    while action >= 0 and attempts < best:
+        attempts += _attempts(action, task)
+        anew = _carry_out(action, work.trial, task, work) or anew
+        action = _choose(work.trial, task, p)
+    if anew:
+        _lay_out(work.now, task, work)
+    else:
+        _locate(work.now, task, p)
+    return attempts
+
+
+@kernel()
+def _next_free(last: int, clutter: Bytes, fail: Vec) -> int:
+    """Return the next free cell by risk after ``last`` (-1: the best), -1 after the worst."""
+    found = -1
+    for k in range(len(clutter)):
+        if clutter[k] != 0 or k == last:
+            continue
+        later = last < 0 or fail[k] > fail[last] or (fail[k] == fail[last] and k > last)
+        if later and (found < 0 or fail[k] < fail[found]):
+            found = k
+    return found
+
+
+@kernel()
+def _try_cells(c: int, best: float, task: Task, work: PlannerWork) -> tuple[int, float]:
+    """Try to put the top of a tower into the best free cells, and into the worst one.
+
+    Args:
+        c: The tower.
+        best: Expected attempts that would have to be less.
+        task: What is asked for.
+        work: Work space; its states fit where the objects are now.
+
+    Returns:
+        The best such action, -1 where none is better, and the expected attempts then.
+    """
+    now, n_cells = work.now, len(work.now.clutter)
+    base = n_cells * len(now.heights) + c * n_cells
+    chosen, k = NONE, -1
+    for n in range(CELLS_TRIED + 1):
+        if n < CELLS_TRIED:
+            k = _next_free(k, now.clutter, task.fail)
+        elif k >= 0:
+            worst = worst_free(now.clutter, task.fail)
+            k = worst if worst != k else -1
+        if k < 0:
+            break
+        attempts = _try(base + k, best, task, work)
+        if attempts < best - LESS:
+            chosen, best = base + k, attempts
+    return chosen, best
+
+
+@kernel()
+def _waiting(c: int, removed: int, p: Progress) -> int:
+    """Return a tower where the top of another may wait at no cost, -1 where none is.
+
+    Args:
+        c: The other tower.
+        removed: State after a removal to the clutter instead, on a shortest plan.
+        p: The states, ``table`` filled, the towers at ``at``.
+    """
+    top = p.top[c, p.at[c]]
+    for d in range(len(p.at)):
+        if d != c and p.want[d, p.at[d]] != top and ties_on_tower(removed, d, top, p):
+            return d
+    return -1
+
+
+@kernel()
+def _look_ahead(task: Task, work: PlannerWork) -> int:
+    """Return the next action of the plan, -1 at the goal.
+
+    Args:
+        task: What is asked for.
+        work: Work space; its states fit where the objects are now.
+    """
+    p, now = work.progress, work.now
+    chosen = _choose(now, task, p)
+    n_cells, n_towers = len(now.clutter), len(now.heights)
+    moves = n_cells * n_towers
+    if not moves <= chosen < 2 * moves:
+        return chosen
+    top = p.top[(chosen - moves) // n_cells, p.at[(chosen - moves) // n_cells]]
+    if still_wanted(top, task.goal, task.goal_heights, p) == 0:
+        return chosen
+    best, index = np.inf, state_number(p)
+    for c in range(n_towers):
+        top = p.top[c, p.at[c]]
+        removed = index + (p.below[c, p.at[c]] - p.at[c]) * p.stride[c]
+        if top == 0 or p.table[removed] != p.table[index] - 1:
+            continue
+        d = _waiting(c, removed, p)
+        if d < 0:
+            action, attempts = _try_cells(c, best, task, work)
+        else:
+            action = 2 * moves + c * n_towers + d
+            attempts = _try(action, best, task, work)
+        if attempts < best - LESS:
+            chosen, best = action, attempts
+    return chosen
+
+
+@kernel()
+def _next_action(size: int, task: Task, work: PlannerWork) -> int:
+    """Return the next action of the plan, -1 at the goal.
+
+    Args:
+        size: Number of states.
+        task: What is asked for.
+        work: Work space; its states fit where the objects are now.
+    """
+    if size > MOST_STATES:
+        return _choose(work.now, task, work.progress)
+    return _look_ahead(task, work)
+
+
+@kernel(nogil=True)
+def plan_state(objects: Objects, task: Task, work: PlannerWork) -> tuple[int, float]:
+    """Plan one state to its end.
+
+    Args:
+        objects: Where the objects are.
+        task: What is asked for.
+        work: Work space; ``first`` and ``actions`` are written.
+
+    Returns:
+        Fewest moves, and expected attempts of the plan; -1 and 0 where the goal cannot be met.
+    """
+    p = work.progress
+    size = _lay_out(objects, task, work)
+    if size == 0:
+        return NONE, 0.0
+    mark_first(objects.clutter, p, work.first)
+    fewest = p.table[state_number(p)]
+    _copy(objects, work.now)
+    attempts, count = 0.0, 0
+    while count < len(work.actions):
+        action = _next_action(size, task, work)
+        work.actions[count] = action
+        if action < 0:
+            break
+        attempts += _attempts(action, task)
+        _carry_out(action, work.now, task, work)
+        count += 1
+    return fewest, attempts
+
+
+@kernel(nogil=True)
+def rough_plan(objects: Objects, task: Task, work: PlannerWork) -> tuple[int, float]:
+    """Plan one state by the rules alone: as many moves, sometimes a few more attempts.
+
+    Args:
+        objects: Where the objects are.
+        task: What is asked for.
+        work: Work space.
+
+    Returns:
+        Fewest moves, and expected attempts of the plan; -1 and 0 where the goal cannot be met.
+    """
+    p = work.progress
+    if _lay_out(objects, task, work) == 0:
+        return NONE, 0.0
+    _copy(objects, work.now)
+    action = _choose(work.now, task, p)
+    fewest = p.table[state_number(p)]
+    return fewest, _try(action, np.inf, task, work) if action >= 0 else 0.0
+
+
+@kernel(nogil=True)
+def plan_rows(
+    clutter: Bytes,
+    towers: Bytes,
+    heights: Ints,
+    goal: Bytes,
+    goal_heights: Ints,
+    fail: Vec,
+    work: PlannerWork,
+    best: Ints,
+    fewest: Ints,
+) -> None:
+    """Write the next action of the plan for every row of a batch.
+
+    Args:
+        clutter: Objects in the cells, shape (n, K).
+        towers: Objects on the towers, lowest first, shape (n, C, K).
+        heights: Objects per tower, shape (n, C).
+        goal: What the towers shall be, shape (n, C, K).
+        goal_heights: Objects per tower there, shape (n, C).
+        fail: Failure probabilities of the cells, shape (n, K).
+        work: Work space of the shape.
+        best: Next action, -1 where solved or unsolvable, shape (n,), written.
+        fewest: Fewest moves, -1 where the goal cannot be met, shape (n,), written.
+    """
+    p = work.progress
+    for e in range(len(clutter)):
+        best[e], fewest[e] = NONE, NONE
+        objects = Objects(clutter[e], towers[e], heights[e])
+        task = Task(goal[e], goal_heights[e], fail[e])
+        size = _lay_out(objects, task, work)
+        if size > 0:
+            fewest[e] = p.table[state_number(p)]
+            _copy(objects, work.now)
+            best[e] = _next_action(size, task, work)
+
+
+@kernel(nogil=True)
+def mark_rows(
+    clutter: Bytes,
+    towers: Bytes,
+    heights: Ints,
+    goal: Bytes,
+    goal_heights: Ints,
+    fail: Vec,
+    work: PlannerWork,
+    first: NDArray[np.bool_],
+) -> None:
+    """Mark the moves with which plans of the fewest moves begin, for every row of a batch.
+
+    Args:
+        clutter: Objects in the cells, shape (n, K).
+        towers: Objects on the towers, lowest first, shape (n, C, K).
+        heights: Objects per tower, shape (n, C).
+        goal: What the towers shall be, shape (n, C, K).
+        goal_heights: Objects per tower there, shape (n, C).
+        fail: Failure probabilities of the cells, shape (n, K).
+        work: Work space of the shape.
+        first: Marks, shape (n, actions), written; all false where solved or unsolvable.
+    """
+    for e in range(len(clutter)):
+        for action in range(first.shape[1]):
+            first[e, action] = False
+        objects = Objects(clutter[e], towers[e], heights[e])
+        if _lay_out(objects, Task(goal[e], goal_heights[e], fail[e]), work) > 0:
+            mark_first(clutter[e], work.progress, first[e])

@@ -1,0 +1,128 @@
+"""The geometry of a sorting cell: where blocks lie, where the tool goes, what people do there.
+
+Blocks are as high as a level of the towers and narrower than the clutter's cells. A station's
+point is where the tcp is when the magnet touches the top of the block there; the pick policy
+brings the tool to APPROACH_M above it.
+
+To the pick scenario (``pick.py``, ``task_library.py``) a sorting cell is one whose clutter
+cells are cubes and whose towers are docks (:func:`reaching_cell`): so people work there, and so
+policies can be trained and measured there.
+"""
+
+from functools import lru_cache
+
+import numpy as np
+
+from app.errors import CheckpointMismatch
+from app.sim.cells.cell import Cell
+from app.sim.cells.parts import Station
+from app.sim.core.arrays import Vec
+from app.sim.sorting.state import MAX_CELLS, MAX_COLOURS
+
+APPROACH_M = 0.07
+"""How far above the point of a grasp the pick policy brings the tool [m]."""
+HALF_WIDTHS = (0.02, 0.03, 0.04)
+"""Half of the width of small, medium and large blocks [m]."""
+
+
+def is_sorting(cell: Cell) -> bool:
+    """Whether there is something to sort in a cell."""
+    return bool(cell.stations_of("clutter")) and bool(cell.stations_of("cluster"))
+
+
+def lacks_for_tasks(cell: Cell) -> str | None:
+    """Say what a cell lacks to be trained to sort in; None where nothing."""
+    if not is_sorting(cell):
+        return "needs at least one station of kind clutter and one of kind cluster"
+    clutter, towers = cell.stations_of("clutter"), cell.stations_of("cluster")
+    if len(clutter) > MAX_CELLS or len(towers) > MAX_COLOURS:
+        return f"has more than {MAX_CELLS} clutter cells or {MAX_COLOURS} clusters"
+    return None
+
+
+def lacks_for_sorting(cell: Cell) -> str | None:
+    """Say what a cell lacks to be shown as a live sorting cell; None where nothing."""
+    clutter, towers = cell.stations_of("clutter"), cell.stations_of("cluster")
+    if (lack := lacks_for_tasks(cell)) is not None:
+        return lack
+    if len(cell.people) != 1 or not cell.workers:
+        return "needs exactly one person, of kind worker"
+    if any(one.colour is None or one.level_height is None for one in towers):
+        return "needs a colour and a level height for each cluster"
+    if len({one.colour for one in towers}) < len(towers):
+        return "needs another colour for each cluster"
+    if len({one.level_height for one in towers}) > 1:
+        return "needs the same level height for each cluster"
+    if any((one.levels or 1) < len(clutter) for one in towers):
+        return f"needs at least {len(clutter)} levels for each cluster, one per clutter cell"
+    return None
+
+
+def same_workspace(one: Cell, other: Cell) -> bool:
+    """Whether two cells differ in nothing but their stations.
+
+    Robot, limits, tool, table, obstacles and people agree. A policy that goes to any point it
+    is given may then act in both; points outside what it was trained on are flagged.
+    """
+    parts = ("robot", "table", "obstacles", "people")
+    return all(getattr(one, part) == getattr(other, part) for part in parts)
+
+
+def require_workspace(cell: Cell, trained: Cell) -> None:
+    """Make sure that a policy of another cell may act in a sorting cell.
+
+    Args:
+        cell: The cell it shall act in.
+        trained: The cell it was trained in.
+
+    Raises:
+        CheckpointMismatch: The cells differ in more than their stations.
+    """
+    if cell != trained and not (is_sorting(cell) and same_workspace(cell, trained)):
+        found = f"{trained.name}, which differs in more than its stations"
+        raise CheckpointMismatch("cell", cell.name, found)
+
+
+@lru_cache(maxsize=8)
+def reaching_cell(cell: Cell) -> Cell:
+    """Return the cell as the pick scenario sees it: clutter as cubes, towers as docks.
+
+    Their points are those above which the policy brings the tool.
+    """
+
+    def seen(station: Station) -> Station:
+        x, y, z = station.position
+        kind = {"clutter": "cube", "cluster": "dock"}.get(station.kind, station.kind)
+        return Station.model_validate(
+            {
+                "id": station.id,
+                "kind": kind,
+                "label": station.label,
+                "position": (x, y, z + APPROACH_M),
+            }
+        )
+
+    return cell.model_copy(update={"stations": tuple(seen(one) for one in cell.stations)})
+
+
+def above(point: Vec, height: float = APPROACH_M) -> Vec:
+    """Return the point ``height`` above another [m], shape (3,)."""
+    return np.asarray(point + np.array([0.0, 0.0, height]))
+
+
+def block_height(cell: Cell) -> float:
+    """Return the height of a cell's blocks: that of a level [m]."""
+    return float(cell.stations_of("cluster")[0].level_height or 0.0)
+
+
+def half_size(cell: Cell, size: int, n_sizes: int) -> Vec:
+    """Return half of a block's length, width and height [m], shape (3,).
+
+    Args:
+        cell: Sorting cell.
+        size: 0 the smallest.
+        n_sizes: How many sizes there are.
+    """
+    share = size / (n_sizes - 1) if n_sizes > 1 else 0.5
+    width = HALF_WIDTHS[0] + share * (HALF_WIDTHS[-1] - HALF_WIDTHS[0])
+    return np.array([width, width, 0.5 * block_height(cell)])

@@ -1,0 +1,252 @@
+"""Names of a sorting task's colours, sizes and places, and states written in them.
+
+Programs say ``red``, ``large``, ``cell3``; kernels and networks see codes and positions
+(``sorting_state.py``). What does not fit is refused in the caller's own words.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.errors import InvalidInput
+from app.sim.cells.cell import Cell
+from app.sim.core.arrays import Vec
+from app.sim.sorting.batch import shape_of
+from app.sim.sorting.state import (
+    MAX_FAILURE,
+    NULL,
+    SIZE_NAMES,
+    SortingShape,
+    SortingState,
+    check_state,
+    empty_state,
+    missing,
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SortingNames:
+    """The words of one sorting task."""
+
+    shape: SortingShape
+    """How large it is."""
+    cells: tuple[str, ...]
+    """Clutter cells, in the order of their positions."""
+    towers: tuple[str, ...]
+    """Towers, in the order of their colours."""
+    levels: tuple[int, ...]
+    """Levels of each tower."""
+    colours: tuple[str, ...]
+    """Colours, one per tower."""
+    sizes: tuple[str, ...]
+    """Sizes, from the smallest."""
+
+    @property
+    def stations(self) -> tuple[str, ...]:
+        """All places, by position."""
+        return self.cells + self.towers
+
+    def kind(self, code: int) -> str:
+        """Return an object in words: ``large red``."""
+        size, colour = self.shape.size_of(code), self.shape.colour_of(code)
+        return f"{self.sizes[size]} {self.colours[colour]}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NamedObject:
+    """One object in words."""
+
+    colour: str
+    """One of the task's colours."""
+    size: str
+    """One of its sizes."""
+    at: str
+    """Clutter cell or tower it is on."""
+    level: int | None = None
+    """Level on a tower, 0 the lowest; None in the clutter."""
+    id: str | None = None
+    """The caller's name for it."""
+
+
+def names_of(cell: Cell) -> SortingNames:
+    """Return the words of a work cell's sorting task.
+
+    Raises:
+        InvalidInput: The cell has nothing to sort.
+    """
+    shape = shape_of(cell)
+    towers = cell.stations_of("cluster")
+    return SortingNames(
+        shape=shape,
+        cells=tuple(one.id for one in cell.stations_of("clutter")),
+        towers=tuple(one.id for one in towers),
+        levels=tuple(min(one.levels or shape.n_cells, shape.n_cells) for one in towers),
+        colours=tuple(one.colour or one.id for one in towers),
+        sizes=SIZE_NAMES[shape.n_sizes],
+    )
+
+
+def plain_names(
+    n_cells: int, colours: Sequence[str], sizes: Sequence[str] = SIZE_NAMES[3]
+) -> SortingNames:
+    """Return the words of a task without a work cell: ``cell0``, ...; towers go by colour.
+
+    Raises:
+        InvalidInput: Too many of something, or a name given twice.
+    """
+    shape = SortingShape(n_cells=n_cells, n_colours=len(colours), n_sizes=len(sizes))
+    names = SortingNames(
+        shape=shape,
+        cells=tuple(f"cell{k}" for k in range(n_cells)),
+        towers=tuple(colours),
+        levels=(n_cells,) * len(colours),
+        colours=tuple(colours),
+        sizes=tuple(sizes),
+    )
+    for field, words in (("colours", names.stations), ("sizes", names.sizes)):
+        for index, word in enumerate(words):
+            if word in words[:index]:
+                raise InvalidInput(field, word, "must be the name of one thing only")
+    return names
+
+
+def state_from_names(
+    names: SortingNames,
+    objects: Sequence[NamedObject],
+    goal: Mapping[str, Sequence[tuple[str | None, str]]],
+    fail: Vec,
+) -> SortingState:
+    """Return the state that a caller describes.
+
+    Args:
+        names: The words of the task.
+        objects: What is where.
+        goal: Colour (None: the tower's own) and size by level, from the bottom, by tower.
+            Towers that are not named shall be empty.
+        fail: Failure probability of a pick from each clutter cell, shape (K,).
+
+    Raises:
+        InvalidInput: It cannot be; names the field as the caller wrote it.
+    """
+    n_cells = names.shape.n_cells
+    if len(objects) > n_cells:
+        rule = f"must be at most {n_cells}, as many as there are clutter cells"
+        raise InvalidInput("objects", len(objects), rule)
+    state = empty_state(names.shape)
+    state.fail[:] = fail
+    _check_ids(objects)
+    for index, one in enumerate(objects):
+        _put(state, names, one, f"objects[{index}]")
+    _check_gaps(state, names, objects)
+    for tower, wanted in goal.items():
+        _ask(state, names, tower, wanted)
+    _check_goal_is_met(state, names)
+    check_state(state, names.shape)
+    return state
+
+
+def fail_with(names: SortingNames, own: Vec, changes: Mapping[str, float]) -> Vec:
+    """Return failure probabilities with those that a caller gives in place of the cell's own.
+
+    Args:
+        names: The words of the task.
+        own: The cell's own, shape (K,).
+        changes: By clutter cell.
+
+    Raises:
+        InvalidInput: No such clutter cell, or no probability below 1.
+    """
+    fail = own.copy()
+    for cell, chance in changes.items():
+        field = f"failure_map.{cell}"
+        if cell not in names.cells:
+            raise InvalidInput(field, chance, "is of no clutter cell", names.cells)
+        if not 0.0 <= chance <= MAX_FAILURE:
+            rule = f"must lie in [0, {MAX_FAILURE}]: a pick that always fails has no plan"
+            raise InvalidInput(field, chance, rule)
+        fail[names.cells.index(cell)] = chance
+    return fail
+
+
+def _index(field: str, word: str, words: tuple[str, ...], what: str) -> int:
+    if word not in words:
+        raise InvalidInput(field, word, f"is no {what}", words)
+    return words.index(word)
+
+
+def _code(names: SortingNames, colour: str, size: str, place: str) -> int:
+    return names.shape.code(
+        _index(f"{place}.colour", colour, names.colours, "colour of this task"),
+        _index(f"{place}.size", size, names.sizes, "size of this task"),
+    )
+
+
+def _check_ids(objects: Sequence[NamedObject]) -> None:
+    seen: set[str] = set()
+    for index, one in enumerate(objects):
+        if one.id in seen:
+            rule = "must be unique among the objects"
+            raise InvalidInput(f"objects[{index}].id", one.id, rule)
+        if one.id is not None:
+            seen.add(one.id)
+
+
+def _put(state: SortingState, names: SortingNames, one: NamedObject, place: str) -> None:
+    code = _code(names, one.colour, one.size, place)
+    position = _index(f"{place}.at", one.at, names.stations, "place of this task")
+    if position < names.shape.n_cells:
+        if one.level is not None:
+            raise InvalidInput(f"{place}.level", one.level, "must be null in a clutter cell")
+        if state.clutter[position] != NULL:
+            rule = f"is taken: {_other(names, int(state.clutter[position]))} is there already"
+            raise InvalidInput(f"{place}.at", one.at, rule)
+        state.clutter[position] = code
+        return
+    tower = position - names.shape.n_cells
+    if one.level is None or not 0 <= one.level < names.levels[tower]:
+        rule = f"must lie in [0, {names.levels[tower] - 1}] on the tower {one.at}, 0 the lowest"
+        raise InvalidInput(f"{place}.level", one.level, rule)
+    if (there := int(state.towers[tower, one.level])) != NULL:
+        rule = f"is taken: {_other(names, there)} is at this level of {one.at} already"
+        raise InvalidInput(f"{place}.level", one.level, rule)
+    state.towers[tower, one.level] = code
+
+
+def _other(names: SortingNames, code: int) -> str:
+    return f"another object ({names.kind(code)})"
+
+
+def _check_gaps(
+    state: SortingState, names: SortingNames, objects: Sequence[NamedObject]
+) -> None:
+    for index, one in enumerate(objects):
+        if one.level:
+            tower = names.towers.index(one.at)
+            if state.towers[tower, one.level - 1] == NULL:
+                rule = f"leaves a gap: nothing is at level {one.level - 1} of {one.at}"
+                raise InvalidInput(f"objects[{index}].level", one.level, rule)
+
+
+def _ask(
+    state: SortingState,
+    names: SortingNames,
+    tower: str,
+    wanted: Sequence[tuple[str | None, str]],
+) -> None:
+    c = _index("goal", tower, names.towers, "tower of this task")
+    if len(wanted) > names.levels[c]:
+        rule = f"must have at most {names.levels[c]} objects, one per level"
+        raise InvalidInput(f"goal.{tower}", len(wanted), rule)
+    for level, (colour, size) in enumerate(wanted):
+        place = f"goal.{tower}[{level}]"
+        own = names.colours[c] if colour is None else colour
+        state.goal[c, level] = _code(names, own, size, place)
+
+
+def _check_goal_is_met(state: SortingState, names: SortingNames) -> None:
+    lack = missing(state, names.shape)
+    if lack.any():
+        parts = [f"{lack[code]} x {names.kind(int(code))}" for code in np.flatnonzero(lack)]
+        rule = "must be met by the objects: these are missing"
+        raise InvalidInput("goal", ", ".join(parts), rule)

@@ -1,0 +1,227 @@
+"""The state of the sorting task as integers, and its moves (METHOD 1.1 and 1.2).
+
+An object is a *code*: 0 is the null object that fills every free place, others are ``1 +
+colour * n_sizes + size``, sizes from the smallest. Objects of one code are twins: goals ask for
+a code, never for one certain object. There are ``K`` clutter cells and one tower per colour,
+with ``K`` levels each; towers have no gaps. Any object may stand on any tower.
+
+A position is a number: ``k`` a clutter cell, ``K + c`` the top of tower ``c``. Moves are
+numbered without gaps, so that a network's outputs are the moves:
+
+| action | move |
+|---|---|
+| ``k * C + c`` | clutter cell ``k`` to tower ``c`` |
+| ``K * C + c * K + k`` | top of tower ``c`` to clutter cell ``k`` |
+| ``2 * K * C + c * C + d`` | top of tower ``c`` to ``d``; ``c == d`` is the *stuck* move |
+
+Source: thesis eq. (3.7)-(3.17). Deviates: tower to tower is a move (METHOD 1.2), and colours
+never count the null colour (METHOD 1.1).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.errors import InvalidInput
+from app.sim.core.arrays import Vec
+
+Codes = NDArray[np.int8]
+"""Objects by code."""
+
+MAX_CELLS = 40
+"""Most clutter cells, and most objects."""
+MAX_COLOURS = 5
+"""Most colours, and most towers."""
+MAX_SIZES = 5
+"""Most sizes."""
+NULL = 0
+"""Code of the null object."""
+SIZE_NAMES = {
+    1: ("medium",),
+    2: ("small", "large"),
+    3: ("small", "medium", "large"),
+    4: ("small", "medium", "large", "huge"),
+    5: ("tiny", "small", "medium", "large", "huge"),
+}
+"""Names of sizes by their number, from the smallest."""
+MAX_FAILURE = 0.99
+"""Greatest failure probability of a pick: at 1 no plan would end."""
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Move:
+    """Pick the object at one position and place it at another."""
+
+    pick: int
+    """Position it is taken from."""
+    place: int
+    """Position it is put on."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SortingShape:
+    """How large a sorting task is.
+
+    Raises:
+        InvalidInput: A number outside its bounds.
+    """
+
+    n_cells: int
+    """Clutter cells, ``K``: most objects, and levels of a tower."""
+    n_colours: int
+    """Colours, ``C``: towers; the null colour is not counted."""
+    n_sizes: int = 3
+    """Sizes, ``S``."""
+
+    def __post_init__(self) -> None:
+        for name, value, most in (
+            ("n_cells", self.n_cells, MAX_CELLS),
+            ("n_colours", self.n_colours, MAX_COLOURS),
+            ("n_sizes", self.n_sizes, MAX_SIZES),
+        ):
+            if not 1 <= value <= most:
+                raise InvalidInput(name, value, f"must lie in [1, {most}]")
+
+    @property
+    def n_types(self) -> int:
+        """Number of different objects."""
+        return self.n_colours * self.n_sizes
+
+    @property
+    def n_actions(self) -> int:
+        """Number of moves, valid or not."""
+        return self.n_colours * (2 * self.n_cells + self.n_colours)
+
+    @property
+    def obs_size(self) -> int:
+        """Numbers of an observation: cells, towers, goal, failure percentages."""
+        return 2 * self.n_cells * (1 + self.n_colours)
+
+    def code(self, colour: int, size: int) -> int:
+        """Return the code of an object."""
+        return 1 + colour * self.n_sizes + size
+
+    def colour_of(self, code: int) -> int:
+        """Return the colour of an object."""
+        return (code - 1) // self.n_sizes
+
+    def size_of(self, code: int) -> int:
+        """Return the size of an object, 0 the smallest."""
+        return (code - 1) % self.n_sizes
+
+    def move_of(self, action: int) -> Move:
+        """Return the move of an action."""
+        k, c = self.n_cells, self.n_colours
+        if not 0 <= action < self.n_actions:
+            raise InvalidInput("action", action, f"must lie in [0, {self.n_actions})")
+        if action < k * c:
+            return Move(action // c, k + action % c)
+        if action < 2 * k * c:
+            return Move(k + (action - k * c) // k, (action - k * c) % k)
+        return Move(k + (action - 2 * k * c) // c, k + (action - 2 * k * c) % c)
+
+    def action_of(self, move: Move) -> int:
+        """Return the action of a move.
+
+        Raises:
+            InvalidInput: No such positions, or from one clutter cell to another.
+        """
+        k, c = self.n_cells, self.n_colours
+        for name, position in (("pick", move.pick), ("place", move.place)):
+            if not 0 <= position < k + c:
+                raise InvalidInput(name, position, f"must lie in [0, {k + c})")
+        if move.pick < k:
+            if move.place < k:
+                raise InvalidInput("place", move.place, "must be a tower for a clutter cell")
+            return move.pick * c + move.place - k
+        if move.place < k:
+            return k * c + (move.pick - k) * k + move.place
+        return 2 * k * c + (move.pick - k) * c + move.place - k
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SortingState:
+    """One sorting task at one moment."""
+
+    clutter: Codes
+    """Objects in the clutter cells, shape (K,)."""
+    towers: Codes
+    """Objects on the towers, lowest level first, shape (C, K)."""
+    goal: Codes
+    """What the towers shall be, shape (C, K)."""
+    fail: Vec
+    """Failure probability of a pick from each clutter cell, shape (K,)."""
+
+    @property
+    def heights(self) -> NDArray[np.int64]:
+        """Objects per tower, shape (C,)."""
+        return np.asarray((self.towers != NULL).sum(axis=1))
+
+    @property
+    def n_objects(self) -> int:
+        """Objects in the cell."""
+        return int((self.clutter != NULL).sum() + (self.towers != NULL).sum())
+
+    @property
+    def solved(self) -> bool:
+        """Whether every tower is as the goal asks."""
+        return bool((self.towers == self.goal).all())
+
+
+def empty_state(shape: SortingShape) -> SortingState:
+    """Return a state without objects, goal or risk, to be filled."""
+    k, c = shape.n_cells, shape.n_colours
+    return SortingState(
+        clutter=np.zeros(k, dtype=np.int8),
+        towers=np.zeros((c, k), dtype=np.int8),
+        goal=np.zeros((c, k), dtype=np.int8),
+        fail=np.zeros(k),
+    )
+
+
+def code_counts(codes: Codes, shape: SortingShape) -> NDArray[np.int64]:
+    """Return how many objects of each code there are; index 0 counts free places."""
+    return np.bincount(codes.ravel().astype(np.int64), minlength=shape.n_types + 1)
+
+
+def missing(state: SortingState, shape: SortingShape) -> NDArray[np.int64]:
+    """Return how many objects of each code the goal asks for beyond those there are."""
+    there = code_counts(state.clutter, shape) + code_counts(state.towers, shape)
+    lack = np.maximum(code_counts(state.goal, shape) - there, 0)
+    lack[NULL] = 0
+    return lack
+
+
+def check_state(state: SortingState, shape: SortingShape) -> None:
+    """Check a state that came from outside.
+
+    Raises:
+        InvalidInput: Another shape, an unknown code, a tower with a gap, too many objects, a
+            goal that the objects cannot meet, or a failure probability outside [0, 0.99].
+    """
+    k, c = shape.n_cells, shape.n_colours
+    for name, codes, wanted in (
+        ("clutter", state.clutter, (k,)),
+        ("towers", state.towers, (c, k)),
+        ("goal", state.goal, (c, k)),
+    ):
+        if codes.shape != wanted:
+            raise InvalidInput(name, list(codes.shape), f"must have the shape {list(wanted)}")
+        if ((codes < 0) | (codes > shape.n_types)).any():
+            raise InvalidInput(name, codes.tolist(), f"must hold codes in [0, {shape.n_types}]")
+        if codes.ndim == 2 and ((codes[:, 1:] != NULL) & (codes[:, :-1] == NULL)).any():
+            raise InvalidInput(name, codes.tolist(), "must have no gap below an object")
+    if state.fail.shape != (k,):
+        raise InvalidInput("fail", list(state.fail.shape), f"must have the shape [{k}]")
+    bad = ~((state.fail >= 0.0) & (state.fail <= MAX_FAILURE))
+    if bad.any():
+        first = int(np.flatnonzero(bad)[0])
+        rule = f"must lie in [0, {MAX_FAILURE}]"
+        raise InvalidInput(f"fail[{first}]", float(state.fail[first]), rule)
+    if state.n_objects > k:
+        raise InvalidInput("objects", state.n_objects, f"must be at most {k}")
+    lack = missing(state, shape)
+    if lack.any():
+        rule = "must be met by the objects: these codes are missing"
+        raise InvalidInput("goal", np.flatnonzero(lack).tolist(), rule)

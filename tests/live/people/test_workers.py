@@ -1,0 +1,339 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.errors import InvalidInput
+from app.live import commands
+from app.live.people.workers import LivePeople, place_of
+from app.live.pick.world import World
+from app.live.playback import PlayedMotion
+from app.live.snapshot import PersonView, WorldSnapshot
+from app.sim.cells.cell import Cell, load_cell
+from app.sim.collision.contact import clearance
+from app.sim.human import model as human
+from app.sim.human.anthropometry import percentile_body
+from app.sim.human.kernels.kinematics import PELVIS_Z, capsule_columns
+from app.sim.scene.scene import NO_CYLINDERS, arm_of, people_of
+from tests.sim.recorded_motion import recorded
+from tests.straight_policy import StraightPolicy
+
+DT = 0.05
+
+
+@pytest.fixture
+def cell() -> Cell:
+    return load_cell()
+
+
+@pytest.fixture
+def world(cell: Cell) -> World:
+    return World(cell, StraightPolicy(cell), seed=3)
+
+
+def run(world: World, ticks: int) -> WorldSnapshot:
+    for _ in range(ticks):
+        world.step()
+    return world.snapshot()
+
+
+def play(world: World, person: int = 0, **how: float) -> WorldSnapshot:
+    """Play a recording and wait until the person has come to its beginning."""
+    world.apply(commands.SetMotion(motion=recorded(**how), name="made-up", person=person))
+    for _ in range(200):
+        world.step()
+        if not world.snapshot().people[person].joining:
+            return world.snapshot()
+    raise AssertionError("the person never begins")
+
+
+def palms(person: PersonView) -> np.ndarray:
+    points = human.joint_points(person.q, person.size)
+    return np.stack([points["hand_r"], points["hand_l"]])
+
+
+def gap(first: PersonView, second: PersonView, floor_z: float) -> float:
+    """Least distance of two people's capsules, by sampling their axes [m]."""
+    shares = np.linspace(0.0, 1.0, 9)[:, None]
+    lines = []
+    for one in (first, second):
+        ends = human.capsules(one.q, one.size, floor_z)
+        lines.append(np.array([a + shares * (b - a) for a, b in ends]))
+    radii = human.CAPSULE_RADII
+    away = np.linalg.norm(lines[0][:, None, :, None] - lines[1][None, :, None], axis=-1)
+    return float((away.min(axis=(2, 3)) - radii[:, None] - radii).min())
+
+
+def test_a_person_who_is_added_works_beside_the_first(world: World, cell: Cell) -> None:
+    world.apply(commands.AddPerson())
+    first, second = world.snapshot().people
+    assert (first.id, second.id) == (0, 1)
+    assert gap(first, second, cell.floor_z) > 0.0
+    after = run(world, 200)
+    assert [one.mode for one in after.people] == ["auto", "auto"]
+    assert not any(one.joining for one in after.people)
+    assert not np.allclose(after.people[0].q[3:], after.people[1].q[3:], atol=0.1)
+    assert after.people[0].q[0] < 0.0 < after.people[1].q[0]
+
+
+@pytest.mark.parametrize("n", [2, 3, 4])
+def test_people_stand_apart_at_the_start(world: World, cell: Cell, n: int) -> None:
+    for _ in range(n - 1):
+        world.apply(commands.AddPerson())
+    world.apply(commands.Reset())
+    people = world.snapshot().people
+    gaps = [gap(a, b, cell.floor_z) for i, a in enumerate(people) for b in people[:i]]
+    assert len(people) == n
+    assert min(gaps) > 0.0
+
+
+def test_everyone_has_stations_of_both_kinds_and_all_are_shared_out(cell: Cell) -> None:
+    for n in (1, 2, 3, 4):
+        places = [place_of(cell, k, n) for k in range(n)]
+        assert all(one.stations_of("cube") and one.stations_of("dock") for one in places)
+        assert {s.id for one in places for s in one.stations} == set(cell.station_ids)
+
+
+def test_ids_stay_when_somebody_leaves_and_are_given_again(cell: Cell) -> None:
+    people = LivePeople(cell, seed=1)
+    for _ in range(2):
+        people.change(commands.AddPerson())
+    people.change(commands.RemovePerson(person=1))
+    assert people.ids == (0, 2)
+    people.change(commands.AddPerson())
+    assert people.ids == (0, 1, 2)
+
+
+def test_nobody_jumps_when_somebody_comes_or_leaves(world: World) -> None:
+    run(world, 60)
+    for command in (
+        commands.AddPerson(),
+        commands.AddPerson(),
+        commands.RemovePerson(person=1),
+    ):
+        world.apply(command)
+        last = {one.id: one.q for one in world.snapshot().people}
+        for _ in range(60):
+            now = {one.id: one.q for one in run(world, 1).people}
+            assert all(np.abs(now[id] - last[id]).max() < 0.5 for id in now)
+            last = now
+
+
+def test_empty_cell_has_no_clearance_and_the_robot_works(world: World) -> None:
+    world.apply(commands.RemovePerson(person=0))
+    after = run(world, 100)
+    assert after.people == ()
+    assert (after.clearance_m, after.mode, after.nearest) == (None, None, None)
+    assert after.chosen is not None
+    world.apply(commands.AddPerson())
+    assert run(world, 1).clearance_m is not None
+
+
+def test_nearest_person_is_named_and_distances_are_those_of_each_alone(
+    world: World, cell: Cell
+) -> None:
+    world.apply(commands.AddPerson())
+    world.apply(commands.MoveHuman(person=0, pelvis=(0.0, 2.4, -1.57)))
+    snapshot = run(world, 60)
+    nearest = snapshot.nearest
+    assert nearest is not None
+    assert nearest.id == 1
+    away = [one.clearance_m for one in snapshot.people]
+    assert away[1] < away[0]
+    for one in snapshot.people:
+        people = people_of(cell)._replace(columns=capsule_columns(1))
+        alone = clearance(
+            arm_of(cell), people, snapshot.robot_q, one.q[None], NO_CYLINDERS, one.size[None]
+        )
+        assert alone.people_m == pytest.approx(one.clearance_m)
+
+
+def test_contact_names_the_person_who_was_touched(world: World) -> None:
+    world.apply(commands.AddPerson())
+    world.apply(commands.MoveHuman(person=0, pelvis=(-0.6, 2.4, -1.57)))
+    world.apply(commands.SetCandidates(ids=("cube2",)))
+    world.apply(
+        commands.MoveHuman(person=1, pelvis=(0.0, 1.15, -1.57), right=(-0.1, 0.62, 0.2))
+    )
+    for _ in range(400):
+        world.step()
+        if (found := world.snapshot().contact) is not None:
+            break
+    assert found is not None
+    assert (found.kind, found.person) == ("human", 1)
+
+
+def test_size_glides_to_what_was_asked_for(world: World, cell: Cell) -> None:
+    world.apply(commands.SetBody(stature=95.0, arms=90.0, shoulders=10.0))
+    wanted = percentile_body(95.0, 90.0, 10.0).vector(cell.floor_z)
+    sizes = [world.snapshot().people[0].size]
+    for _ in range(12):
+        sizes.append(run(world, 1).people[0].size)
+    steps = np.abs(np.diff(sizes, axis=0)).max(axis=0)
+    assert np.allclose(sizes[-1], wanted)
+    assert (steps <= 0.11 * np.abs(wanted - sizes[0]) + 1e-12).all()
+    body = world.snapshot().people[0].body
+    assert (body.stature, body.recorded) == (95.0, False)
+    assert body.stature_m == pytest.approx(1.87, abs=0.01)
+
+
+def test_hands_do_not_jump_while_a_working_person_grows(world: World) -> None:
+    run(world, 30)
+    world.apply(commands.SetBody(stature=5.0))
+    last = palms(world.snapshot().people[0])
+    for _ in range(80):
+        now = palms(run(world, 1).people[0])
+        assert np.linalg.norm(now - last, axis=1).max() < 4.0 * DT
+        last = now
+
+
+def test_dragged_hand_stays_where_it_was_put_while_the_person_grows(world: World) -> None:
+    target = np.array([-0.2, 0.9, 0.2])
+    world.apply(commands.MoveHuman(pelvis=(0.0, 1.2, -1.57), right=(-0.2, 0.9, 0.2)))
+    run(world, 60)
+    world.apply(commands.SetBody(stature=95.0, arms=80.0))
+    assert np.linalg.norm(palms(run(world, 40).people[0])[0] - target) < 0.02
+
+
+def test_size_changes_while_the_clock_stands(world: World) -> None:
+    world.apply(commands.Pause())
+    world.apply(commands.SetBody(stature=95.0))
+    before = world.snapshot()
+    after = run(world, 15)
+    assert after.tick == before.tick
+    assert after.people[0].size[PELVIS_Z] > before.people[0].size[PELVIS_Z] + 0.05
+
+
+def test_recorded_motion_is_played_at_the_table_at_its_own_pace_and_size_of_path(
+    world: World, cell: Cell
+) -> None:
+    start = play(world).people[0]
+    places, yaws, times = [start.q[:2]], [], []
+    while not (now := run(world, 1).people[0]).joining:
+        assert now.motion is not None
+        places.append(now.q[:2])
+        yaws.append(now.q[2])
+        times.append(now.motion.t_s)
+    ways = np.linalg.norm(np.array(places) - places[0], axis=1)
+    assert ways.max() == pytest.approx(0.3, abs=0.01)
+    x, _, yaw = cell.human.home
+    assert np.median(places, axis=0)[0] == pytest.approx(x, abs=0.02)
+    assert np.min(places, axis=0)[1] == pytest.approx(cell.human.y_min, abs=0.02)
+    assert np.median(yaws) == pytest.approx(yaw, abs=0.05)
+    assert np.allclose(np.diff(times), DT)
+
+
+def test_recorded_motion_carries_pelvis_and_lengths(world: World, cell: Cell) -> None:
+    play(world)
+    recorded_size = recorded().size.vector(cell.floor_z)
+    heights = []
+    for _ in range(36):
+        size = run(world, 1).people[0].size
+        heights.append(size[PELVIS_Z] - recorded_size[PELVIS_Z])
+        assert np.allclose(size[1:], recorded_size[1:])
+    assert min(heights) == pytest.approx(-0.1, abs=0.005)
+    world.apply(commands.SetBody(stature=50.0))
+    body = run(world, 15).people[0].body
+    assert not body.recorded
+    assert world.snapshot().people[0].mode == "recorded"
+
+
+def test_recorded_motion_loops_without_a_jump(world: World) -> None:
+    last = play(world, turn=5.0).people[0]
+    begun = 0
+    for _ in range(300):
+        now = run(world, 1).people[0]
+        assert np.linalg.norm(palms(now) - palms(last), axis=1).max() < 4.0 * DT
+        begun += last.joining and not now.joining
+        last = now
+    assert begun >= 2
+
+
+def test_recorded_path_that_leaves_the_area_is_told(world: World) -> None:
+    play(world, walk=1.0)
+    seen = [run(world, 1).people[0] for _ in range(39)]
+    assert seen[0].motion is not None
+    assert seen[0].outside_area
+    assert not seen[20].outside_area
+    assert 0.2 < seen[0].motion.outside_share < 0.8
+
+
+def test_body_is_where_it_was_recorded_and_policies_are_told_the_limits(world: World) -> None:
+    start = play(world, shoulder=3.5).people[0]
+    assert start.motion is not None
+    assert 0.05 < start.motion.clipped_share < 0.5
+    assert 0.1 < start.motion.clipped_m < 0.4
+    beyond = 0.0
+    for _ in range(39):
+        person = run(world, 1).people[0]
+        assert (person.q <= human.Q_MAX + 1e-9).all()
+        beyond = max(beyond, float((person.posture - human.Q_MAX)[3:].max()))
+    assert beyond > 0.3
+    assert play(world).people[0].motion.clipped_share == 0.0  # type: ignore[union-attr]
+
+
+def test_speeds_of_a_recording_stay_within_what_a_policy_takes(cell: Cell) -> None:
+    motion = recorded()
+    q = motion.q.copy()
+    q[50:, 2] += 3.0
+    played = PlayedMotion(replace(motion, q=q), cell, cell.human, "jerk")
+    fastest = max(np.abs(played.at(0.01 * k)[1]).max() for k in range(200))
+    assert fastest == 50.0
+
+
+def test_recorded_motion_stands_while_paused(world: World) -> None:
+    play(world)
+    world.apply(commands.Pause())
+    before = run(world, 1).people[0]
+    after = run(world, 20).people[0]
+    assert np.array_equal(before.q, after.q)
+    assert before.motion == after.motion
+
+
+def test_person_of_mode_still_goes_home_and_stays(world: World, cell: Cell) -> None:
+    run(world, 100)
+    world.apply(commands.SetMode(mode="still"))
+    rest = run(world, 150).people[0]
+    assert rest.q == pytest.approx(human.rest_posture(*cell.human.home), abs=0.02)
+    assert np.allclose(run(world, 20).people[0].q, rest.q, atol=0.01)
+
+
+def test_case_study_keeps_one_person_of_the_cells_size(world: World, cell: Cell) -> None:
+    world.apply(commands.SetBody(stature=95.0))
+    world.apply(commands.AddPerson())
+    run(world, 5)
+    world.apply(commands.StartCase(id="case-1"))
+    (alone,) = run(world, 1).people
+    assert np.allclose(alone.size, cell.body)
+
+
+@pytest.mark.parametrize(
+    ("command", "field"),
+    [
+        (commands.SetMode(mode="auto", person=2), "person"),
+        (commands.RemovePerson(person=-1), "person"),
+        (commands.SetBody(stature=0.0), "stature"),
+        (commands.SetBody(arms=float("nan")), "arms"),
+        (commands.SetMode(mode="recorded"), "mode"),  # type: ignore[arg-type]
+        (commands.MoveHuman(left=(0.0, float("inf"), 0.0)), "left"),
+    ],
+)
+def test_command_that_does_not_fit_the_people_is_refused(
+    world: World, command: commands.Command, field: str
+) -> None:
+    with pytest.raises(InvalidInput) as caught:
+        world.apply(command)
+    assert caught.value.field == field
+
+
+def test_fifth_person_is_refused(world: World) -> None:
+    for _ in range(3):
+        world.apply(commands.AddPerson())
+    with pytest.raises(InvalidInput, match="4 at most"):
+        world.apply(commands.AddPerson())
+
+
+def test_nobody_can_be_moved_in_an_empty_cell(world: World) -> None:
+    world.apply(commands.RemovePerson(person=0))
+    with pytest.raises(InvalidInput, match="empty"):
+        world.apply(commands.SetMode(mode="manual"))

@@ -1,0 +1,241 @@
+import numpy as np
+import pytest
+
+from app.errors import InvalidInput, NotFound
+from app.live import commands
+from app.live.pick.world import World
+from app.live.snapshot import WorldSnapshot
+from app.sim.cells.cell import Cell, load_cell
+from app.sim.human import model as human
+from app.sim.human.person import Person
+from app.sim.pick.task_policy import Candidate
+from tests.straight_policy import StraightPolicy
+
+
+@pytest.fixture
+def cell() -> Cell:
+    return load_cell()
+
+
+@pytest.fixture
+def world(cell: Cell) -> World:
+    """A world whose person stands back, so that nothing is in the robot's way."""
+    world = World(cell, StraightPolicy(cell), seed=3)
+    world.apply(commands.MoveHuman(pelvis=(0.0, 2.4, -1.57)))
+    run(world, 40)
+    world.apply(commands.Reset())
+    return world
+
+
+def run(world: World, ticks: int) -> WorldSnapshot:
+    for _ in range(ticks):
+        world.step()
+    return world.snapshot()
+
+
+def until(world: World, status: str, limit: int = 400) -> WorldSnapshot:
+    for _ in range(limit):
+        world.step()
+        if world.snapshot().status == status:
+            return world.snapshot()
+    raise AssertionError(f"never {status}: {world.snapshot().message}")
+
+
+def palm(snapshot: WorldSnapshot, cell: Cell, hand: str) -> np.ndarray:
+    return human.joint_points(snapshot.person_q, cell.body)[f"hand_{hand}"]
+
+
+def test_robot_reaches_a_candidate_and_the_next_episode_offers_the_others(world: World) -> None:
+    world.apply(commands.SetCandidates(ids=("cube1", "cube4")))
+    first = until(world, "picking")
+    assert first.counters.reached == 1
+    after = until(world, "moving")
+    assert [c.id for c in after.candidates] == [
+        n for n in ("cube1", "cube4") if n != first.chosen
+    ]
+
+
+def test_tool_goes_down_to_the_cube_and_closes_before_the_next_episode(world: World) -> None:
+    until(world, "picking")
+    heights, closed = [], False
+    while world.snapshot().status == "picking":
+        heights.append(world.snapshot().tcp[2])
+        closed = closed or world.snapshot().gripping
+        world.step()
+    assert min(heights) < 0.08
+    assert closed
+
+
+def test_decision_in_a_snapshot_is_the_one_for_its_own_state(world: World, cell: Cell) -> None:
+    snapshot = run(world, 25)
+    again = StraightPolicy(cell).decide(
+        snapshot.robot_q,
+        snapshot.robot_qd,
+        [Person(q=one.q, qd=one.qd, size=one.size) for one in snapshot.people],
+        [Candidate(id=c.id, position=c.position) for c in snapshot.candidates],
+        previous=snapshot.previous,
+        time_left_s=snapshot.time_left_s,
+    )
+    assert again.chosen == snapshot.chosen
+    assert again.values == tuple(snapshot.values.values())
+
+
+def test_joint_limits_hold_over_a_minute_of_work(cell: Cell) -> None:
+    world = World(cell, StraightPolicy(cell), seed=5)
+    for _ in range(1200):
+        world.step()
+        snapshot = world.snapshot()
+        assert (np.abs(snapshot.robot_qd) <= np.array(cell.robot.qd_max) + 1e-9).all()
+        assert (snapshot.robot_q >= cell.robot.q_min).all()
+        assert (snapshot.robot_q <= cell.robot.q_max).all()
+
+
+def test_hand_on_the_chosen_cube_changes_the_choice_and_counts_a_switch(
+    world: World, cell: Cell
+) -> None:
+    world.apply(commands.SetCandidates(ids=("cube1", "cube4")))
+    world.apply(commands.MoveHuman(pelvis=(0.0, 1.2, -1.57)))
+    run(world, 5)
+    world.apply(commands.Pause())
+    before = world.snapshot().chosen
+    assert before is not None
+    x, y, z = cell.station(before).position
+    world.apply(commands.MoveHuman(right=(x, y, z), left=(x, y, z)))
+    after = run(world, 60)
+    assert after.chosen != before
+    assert after.counters.switches >= 1
+    assert "Changed its mind" in after.message
+
+
+def test_dragged_hand_arrives_with_bounded_speed(world: World, cell: Cell) -> None:
+    world.apply(commands.MoveHuman(pelvis=(0.0, 1.2, -1.57)))
+    run(world, 60)
+    world.apply(commands.MoveHuman(right=(-0.2, 0.8, 0.2)))
+    speeds, last = [], palm(world.snapshot(), cell, "r")
+    for _ in range(60):
+        now = palm(run(world, 1), cell, "r")
+        speeds.append(np.linalg.norm(now - last) / cell.robot.dt)
+        last = now
+    assert np.linalg.norm(last - [-0.2, 0.8, 0.2]) < 0.02
+    assert 0.3 < max(speeds) < 4.0
+
+
+def test_speed_given_to_the_policy_is_the_speed_of_the_movement(world: World) -> None:
+    world.apply(commands.MoveHuman(pelvis=(0.3, 1.6, -1.2)))
+    before = run(world, 3)
+    after = run(world, 1)
+    assert np.allclose(after.person_qd, (after.person_q - before.person_q) / 0.05)
+
+
+def test_contact_is_told_and_the_robot_starts_again_from_home(world: World, cell: Cell) -> None:
+    world.apply(commands.SetCandidates(ids=("cube2",)))
+    world.apply(commands.MoveHuman(pelvis=(0.0, 1.15, -1.57), right=(-0.1, 0.62, 0.2)))
+    hit = until(world, "contact")
+    assert hit.contact is not None
+    assert hit.contact.kind == "human"
+    assert hit.contact.body in human.CAPSULE_NAMES
+    world.apply(commands.MoveHuman(pelvis=(0.0, 2.4, -1.57)))
+    again = until(world, "moving")
+    assert np.allclose(again.robot_q, cell.robot.home_q)
+    assert again.counters.contacts == 1
+
+
+def test_paused_clock_stands_while_the_dragged_person_moves(world: World) -> None:
+    world.apply(commands.Pause())
+    before = world.snapshot()
+    world.apply(commands.MoveHuman(pelvis=(0.5, 1.8, -1.0)))
+    after = run(world, 30)
+    assert (after.tick, after.t_s) == (before.tick, before.t_s)
+    assert np.array_equal(after.robot_q, before.robot_q)
+    assert abs(after.person_q[0] - 0.5) < 0.05
+    assert not after.person_qd.any()
+
+
+def test_step_once_advances_by_one_period_and_stays_paused(world: World) -> None:
+    before = world.snapshot()
+    world.apply(commands.StepOnce())
+    after = run(world, 5)
+    assert after.tick == before.tick + 1
+    assert after.paused
+
+
+def test_person_does_not_jump_when_it_goes_back_to_work(world: World) -> None:
+    world.apply(commands.SetMode(mode="auto"))
+    q = world.snapshot().person_q
+    for _ in range(200):
+        after = run(world, 1).person_q
+        assert np.abs(after - q).max() < 0.5
+        q = after
+
+
+def test_case_study_starts_at_its_station_and_ends_with_a_verdict(cell: Cell) -> None:
+    world = World(cell, StraightPolicy(cell), seed=1)
+    world.apply(commands.StartCase(id="case-1"))
+    start = world.snapshot()
+    assert np.allclose(start.tcp, cell.station("cube5").position, atol=1e-6)
+    assert {c.id for c in start.candidates} == {"cube0", "cube4"}
+    end = until(world, "case done")
+    assert end.case == "case-1"
+    assert "ended" in end.message
+
+
+def test_leaving_a_case_brings_back_the_visitors_candidates(cell: Cell) -> None:
+    world = World(cell, StraightPolicy(cell), seed=1)
+    world.apply(commands.SetCandidates(ids=("cube3", "dock0")))
+    world.apply(commands.StartCase(id="case-2"))
+    world.apply(commands.SetMode(mode="manual"))
+    after = world.snapshot()
+    assert after.case is None
+    assert after.selected == ("cube3", "dock0")
+
+
+def test_without_policy_or_candidates_the_robot_rests_and_says_why(cell: Cell) -> None:
+    world = World(cell, None, seed=1)
+    assert run(world, 20).status == "no policy"
+    world.apply(commands.SetPolicy(policy=StraightPolicy(cell)))
+    world.apply(commands.SetCandidates(ids=()))
+    after = run(world, 20)
+    assert after.status == "no candidates"
+    assert np.allclose(after.robot_q, cell.robot.home_q)
+
+
+def test_toggling_adds_and_removes_a_candidate_in_the_cells_order(world: World) -> None:
+    world.apply(commands.SetCandidates(ids=("cube4",)))
+    world.apply(commands.ToggleCandidate(id="cube1"))
+    assert world.snapshot().selected == ("cube1", "cube4")
+    world.apply(commands.ToggleCandidate(id="cube4"))
+    assert world.snapshot().selected == ("cube1",)
+
+
+def test_commands_that_do_not_fit_are_refused_and_change_nothing(world: World) -> None:
+    before = world.snapshot()
+    with pytest.raises(NotFound, match="cube9"):
+        world.apply(commands.ToggleCandidate(id="cube9"))
+    with pytest.raises(NotFound, match="case-9"):
+        world.apply(commands.StartCase(id="case-9"))
+    with pytest.raises(InvalidInput, match="finite"):
+        world.apply(commands.MoveHuman(right=(0.0, float("nan"), 0.0)))
+    assert world.snapshot().selected == before.selected
+    assert world.snapshot().mode == before.mode
+
+
+def test_snapshots_cannot_be_written(world: World) -> None:
+    with pytest.raises(ValueError, match="read-only"):
+        world.snapshot().robot_q[0] = 1.0
+
+
+@pytest.mark.parametrize("point", [(1e308, 1e308, 0.0), (0.0, -1e155, 0.0), (0.0, 0.0, 600.0)])
+@pytest.mark.parametrize("part", ["pelvis", "right", "left"])
+def test_a_place_that_is_in_no_hall_is_refused(
+    world: World, part: str, point: tuple[float, float, float]
+) -> None:
+    with pytest.raises(InvalidInput, match=f"{part} = .* within 100 m of the robot"):
+        world.apply(commands.MoveHuman(**{part: point}))
+    assert np.isfinite(run(world, 5).people[0].q).all()
+
+
+@pytest.mark.parametrize("far", [60.0, -99.9])
+def test_a_place_far_away_in_the_hall_is_reached_for(world: World, far: float) -> None:
+    world.apply(commands.MoveHuman(pelvis=(far, far, far), right=(far, far, far)))
+    world.apply(commands.MoveHuman(left=(-far, far, -far)))
+    assert np.isfinite(run(world, 80).people[0].q).all()

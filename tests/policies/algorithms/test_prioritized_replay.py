@@ -1,0 +1,104 @@
+"""The replay memory: chances by priorities, n-step sums, and where they are cut."""
+
+import numpy as np
+import pytest
+from gymnasium import spaces
+
+from app.policies.algorithms.prioritized_replay import PrioritisedReplay
+
+N_ENVS = 2
+SPACE = spaces.Box(0, 255, (1,), np.uint8)
+
+
+def memory(n_steps: int = 1, alpha: float = 1.0, rows: int = 8) -> PrioritisedReplay:
+    return PrioritisedReplay(
+        rows * N_ENVS,
+        SPACE,
+        spaces.Discrete(4),
+        n_envs=N_ENVS,
+        n_steps=n_steps,
+        gamma=0.5,
+        alpha=alpha,
+        seed=3,
+    )
+
+
+def add(buffer: PrioritisedReplay, t: int, done: bool = False, cut_off: bool = False) -> None:
+    """Add the transition t -> t + 1 with reward t + 1 in both environments."""
+    infos = [{"TimeLimit.truncated": cut_off}] * N_ENVS
+    here, there = np.full((N_ENVS, 1), t), np.full((N_ENVS, 1), t + 1)
+    reward, ended = np.full(N_ENVS, t + 1.0), np.full(N_ENVS, done)
+    buffer.add(here, there, np.zeros(N_ENVS), reward, ended, infos)
+
+
+def drawn_from(buffer: PrioritisedReplay, t: int):
+    """Return one drawn transition that begins at t, as numbers."""
+    sample = buffer.draw(256, 0.4)
+    place = int(np.flatnonzero(sample.observations[:, 0].numpy() == t)[0])
+    following = int(sample.next_observations[place, 0])
+    return float(sample.rewards[place]), following, float(sample.discounts[place])
+
+
+def test_a_return_sums_discounted_rewards_over_n_steps():
+    buffer = memory(n_steps=3)
+    for t in range(6):
+        add(buffer, t)
+    assert drawn_from(buffer, 1) == (2.0 + 0.5 * 3.0 + 0.25 * 4.0, 4, 0.125)
+
+
+def test_a_return_ends_where_the_episode_terminates():
+    buffer = memory(n_steps=3)
+    for t in range(6):
+        add(buffer, t, done=t == 2)
+    assert drawn_from(buffer, 1) == (2.0 + 0.5 * 3.0, 3, 0.0)
+
+
+def test_a_return_goes_on_by_value_where_the_episode_is_cut_off():
+    buffer = memory(n_steps=3)
+    for t in range(6):
+        add(buffer, t, done=t == 2, cut_off=t == 2)
+    assert drawn_from(buffer, 1) == (2.0 + 0.5 * 3.0, 3, 0.25)
+
+
+@pytest.mark.parametrize("n_added", [6, 8, 11])
+def test_a_return_does_not_run_over_the_head_of_the_buffer(n_added):
+    buffer = memory(n_steps=3)
+    for t in range(n_added):
+        add(buffer, t)
+    newest = n_added - 1
+    assert drawn_from(buffer, newest) == (newest + 1.0, newest + 1, 0.5)
+    assert drawn_from(buffer, newest - 1)[1:] == (newest + 1, 0.25)
+
+
+def test_transitions_are_drawn_in_proportion_to_their_priorities():
+    buffer = memory()
+    for t in range(8):
+        add(buffer, t)
+    buffer.update(np.arange(16), np.arange(16) / 10.0)
+    counts = np.zeros(16)
+    for _ in range(400):
+        counts += np.bincount(buffer.draw(64, 0.4).indices, minlength=16)
+    wanted = np.arange(16) + 1e-3
+    assert counts / counts.sum() == pytest.approx(wanted / wanted.sum(), abs=0.005)
+
+
+def test_importance_weights_undo_the_chances():
+    buffer = memory()
+    for t in range(8):
+        add(buffer, t)
+    errors = np.linspace(0.1, 1.6, 16)
+    buffer.update(np.arange(16), errors)
+    sample = buffer.draw(64, 1.0)
+    weights = sample.weights.numpy()
+    product = weights * (errors[sample.indices] + 1e-4)
+    assert product == pytest.approx(np.full(64, product[0]), rel=1e-5)
+    assert weights.max() == 1.0
+
+
+def test_without_alpha_all_are_drawn_evenly():
+    buffer = memory(alpha=0.0)
+    for t in range(8):
+        add(buffer, t)
+    buffer.update(np.arange(16), np.arange(16) * 5.0)
+    counts = np.bincount(buffer.draw(1600, 0.4).indices, minlength=16)
+    assert (np.abs(counts - 100) <= 1).all()

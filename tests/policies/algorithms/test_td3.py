@@ -1,0 +1,152 @@
+"""What this project adds to Stable-Baselines3's TD3."""
+
+import numpy as np
+import pytest
+import torch
+
+from app.policies.algorithms.exploration import OUNoise
+from app.policies.algorithms.prioritized_replay import PrioritisedReplay
+from app.policies.algorithms.td3 import BatchTD3, critics_of
+from app.policies.configs import presets
+from app.policies.networks.actor_critic import Critics, PlainActor, ResidualActor
+from app.policies.training import pick as pick_training
+from app.policies.training import reach as reach_training
+from app.policies.training.run import TrainingRun
+from app.sim.cells.cell import load_cell
+from app.sim.pick.kernels.observation import LAYOUT, N_FEATURES
+from app.sim.reach.batch import ReachBatch
+
+
+def model_of(run: TrainingRun) -> BatchTD3:
+    assert isinstance(run.model, BatchTD3)
+    return run.model
+
+
+@pytest.fixture
+def model(tiny_preset):
+    cell = load_cell("pick-and-place")
+    run, _ = pick_training.start(tiny_preset, 5, None, cell)
+    return model_of(run)
+
+
+def test_the_untrained_actor_follows_the_base_motion():
+    torch.manual_seed(0)
+    obs = torch.zeros(3, N_FEATURES)
+    obs[:, LAYOUT["base"]] = torch.tensor([0.5, -1.0, 0.0, 0.2, 1.0])
+    act = ResidualActor(32)(obs)
+    assert torch.allclose(act, 0.9 * obs[:, LAYOUT["base"]], atol=0.05)
+
+
+def test_the_least_of_both_critics_is_the_value():
+    torch.manual_seed(1)
+    critic, obs, act = Critics(16), torch.randn(7, N_FEATURES), torch.zeros(7, 5)
+    q1, q2 = critic(obs, act)
+    assert torch.equal(critic.least(obs, act), torch.minimum(q1, q2).squeeze(1))
+
+
+def test_the_actor_stays_frozen_while_the_critics_learn(model, tiny_preset):
+    actor = [p.clone() for p in model.actor.parameters()]
+    target = [p.clone() for p in model.critic_target.parameters()]
+    steps = tiny_preset.learning_starts + 16 * (tiny_preset.actor_frozen_updates - 1)
+    model.learn(steps)
+    assert 0 < model._n_updates < tiny_preset.actor_frozen_updates
+    assert all(torch.equal(a, b) for a, b in zip(actor, model.actor.parameters(), strict=True))
+    moved = zip(target, model.critic_target.parameters(), strict=True)
+    assert any(not torch.equal(a, b) for a, b in moved)
+
+
+def test_stable_baselines_trains_the_same_modules_that_decide(model):
+    obs = torch.randn(4, N_FEATURES)
+    act = model.actor(obs)
+    assert torch.equal(act, model.actor.mu(obs))
+    assert torch.equal(model.critic(obs, act)[0], critics_of(model.critic)(obs, act)[0])
+
+
+def test_greedy_rows_explore_nothing_and_noise_grows_with_the_row(model):
+    exploration = model.exploration
+    act = np.zeros((model.preset.n_envs, 5), dtype=np.float32)
+    taken = np.stack([exploration.apply(act) for _ in range(200)])
+    spread = taken.std(axis=(0, 2))
+    assert np.all(spread[: exploration.n_greedy] == 0.0)
+    assert spread[-1] > 2.0 * spread[exploration.n_greedy + 1] > 0.0
+
+
+def test_critics_learn_the_value_of_an_episode_that_ends_at_once(model):
+    """With done = 1 everywhere the value is the reward, whatever the networks say."""
+    obs = np.random.default_rng(0).normal(size=(16, N_FEATURES)).astype(np.float32)
+    act, reward = np.zeros((16, 5), dtype=np.float32), np.full(16, 2.5, dtype=np.float32)
+    for _ in range(40):
+        model.replay_buffer.add(obs, obs, act, reward, np.ones(16), [{} for _ in range(16)])
+    model._setup_learn(10_000)
+    for _ in range(300):
+        model.train(1, 64)
+    q1, _ = model.critic(torch.as_tensor(obs), torch.as_tensor(act))
+    assert q1.detach().numpy() == pytest.approx(2.5, abs=0.2)
+
+
+@pytest.fixture(scope="module")
+def ddpg() -> BatchTD3:
+    """The thesis recipe with small networks."""
+    small = {
+        "total_steps": 4000,
+        "progress_steps": 1000,
+        "checkpoint_steps": 1000,
+        "buffer_size": 2000,
+        "learning_starts": 100,
+        "width": 16,
+        "batch_size": 16,
+    }
+    preset = presets.resolve("reach-ddpg-thesis", small)
+    run, _ = reach_training.start(preset, 3, None, load_cell("shared-workspace"))
+    return model_of(run)
+
+
+def test_ddpg_is_td3_with_one_critic_and_updates_every_sixty_steps(ddpg):
+    ddpg.learn(700)
+    assert ddpg._n_updates == sum(1 for step in range(101, 701) if step % 60 == 0)
+    assert critics_of(ddpg.critic).n_critics == 1
+    linear = [m for m in ddpg.actor.mu.modules() if isinstance(m, torch.nn.Linear)]
+    assert len(linear) == 11
+    critic = ddpg.critic.optimizer.param_groups[0]["lr"]
+    assert ddpg.actor.optimizer.param_groups[0]["lr"] == pytest.approx(10.0 * critic)
+
+
+def test_prioritised_replay_learns_where_the_errors_are(ddpg):
+    assert isinstance(ddpg.replay_buffer, PrioritisedReplay)
+    before = ddpg.replay_buffer._tree[1]
+    ddpg.train(1, 16)
+    ddpg.num_timesteps = 720
+    ddpg.train(1, 16)
+    assert ddpg.replay_buffer._tree[1] != before
+
+
+def test_the_plain_actor_sees_the_first_numbers_and_holds_still_at_first():
+    torch.manual_seed(0)
+    actor, obs = PlainActor(32, 7, 6), torch.randn(50, 9)
+    act = actor(obs)
+    assert act.shape == (50, 6) and act.abs().max() < 0.1
+    assert torch.equal(act, actor(obs[:, :7]))
+
+
+def test_options_take_over_in_every_second_noisy_row():
+    preset = presets.resolve("reach-td3", {"n_envs": 16, "option_rate": 0.5, "sigma_max": 0.0})
+    cell = load_cell("shared-workspace")
+    batch = ReachBatch(cell, 16, 1, reach_training.settings_of(preset))
+    batch.reset()
+    explorer = reach_training.explorer_of(preset, batch, 3)
+    still = np.zeros((16, 6), dtype=np.float32)
+    changed = np.zeros(16, dtype=bool)
+    for _ in range(60):
+        taken = explorer.apply(still)
+        assert np.abs(taken).max() <= 1.0
+        changed |= taken.any(axis=1)
+        batch.step(taken)
+    assert changed.tolist() == [row >= explorer.n_greedy and row % 2 == 0 for row in range(16)]
+
+
+def test_ornstein_uhlenbeck_noise_settles_where_push_and_pull_balance():
+    noise, still = OUNoise(64, 6, 0.3, 0.1, np.random.default_rng(2)), np.zeros((64, 6))
+    taken = np.stack([noise.apply(still.astype(np.float32)) for _ in range(400)])[50:]
+    assert taken.std() == pytest.approx(0.1 / np.sqrt(1.0 - 0.7**2), rel=0.03)
+    one, later = taken[:-1].ravel(), taken[1:].ravel()
+    assert np.corrcoef(one, later)[0, 1] == pytest.approx(0.7, abs=0.02)

@@ -1,0 +1,89 @@
+"""Checkpoints are data: whatever is wrong with one is named, and nothing is executed."""
+
+import json
+import pickle
+
+import numpy as np
+import pytest
+
+from app.errors import CheckpointMismatch, InvalidInput
+from app.policies.checkpoints import checkpoint as formats
+from app.policies.checkpoints import pretrained
+
+
+@pytest.fixture(scope="module")
+def shipped():
+    return pretrained.load("pick")
+
+
+def test_packing_and_loading_gives_the_same_arrays_and_id(shipped):
+    again = formats.pack(json.loads(json.dumps(shipped.manifest)), shipped.arrays())
+    assert again.sha256 == shipped.sha256
+    for name, array in shipped.arrays().items():
+        assert np.array_equal(array, again.arrays()[name])
+
+
+def test_one_changed_number_changes_the_id(shipped):
+    arrays = {name: array.copy() for name, array in shipped.arrays().items()}
+    arrays["actor.net.0.bias"][0] += 1.0
+    assert formats.pack(shipped.manifest, arrays).sha256 != shipped.sha256
+
+
+@pytest.mark.parametrize("field", sorted(formats.REQUIRED))
+def test_a_missing_field_is_named(shipped, field):
+    manifest = {key: value for key, value in shipped.manifest.items() if key != field}
+    with pytest.raises(InvalidInput, match=f"manifest.{field}"):
+        formats.load(manifest, shipped.tensors)
+
+
+def test_another_format_is_refused(shipped):
+    with pytest.raises(CheckpointMismatch, match="format"):
+        formats.load({**shipped.manifest, "format": "tandem-checkpoint/9"}, shipped.tensors)
+
+
+def test_a_pickle_is_refused_and_not_run(shipped, tmp_path):
+    class Bomb:
+        def __reduce__(self):
+            return (tmp_path.joinpath("ran").write_text, ("ran",))
+
+    checkpoint = formats.load(shipped.manifest, pickle.dumps(Bomb()))
+    with pytest.raises(InvalidInput, match="safetensors"):
+        checkpoint.arrays()
+    assert not (tmp_path / "ran").exists()
+
+
+def test_non_finite_weights_are_refused(shipped):
+    arrays = {name: array.copy() for name, array in shipped.arrays().items()}
+    arrays["critic.q1.0.weight"][0, 0] = np.nan
+    with pytest.raises(InvalidInput, match=r"critic\.q1\.0\.weight"):
+        formats.pack(shipped.manifest, arrays).arrays()
+
+
+def test_what_resumes_a_training_may_be_larger_than_a_policy(shipped):
+    large = bytes(formats.MAX_BYTES + 1)
+    with pytest.raises(InvalidInput, match=f"must not exceed {formats.MAX_BYTES} bytes"):
+        formats.load(shipped.manifest, large)
+    formats.load({**shipped.manifest, "kind": "resume"}, large)
+    with pytest.raises(InvalidInput, match=f"must not exceed {formats.MAX_RESUME_BYTES} bytes"):
+        formats.load({**shipped.manifest, "kind": "resume"}, bytes(4 * len(large)))
+
+
+def test_a_range_with_a_word_in_it_is_refused(shipped):
+    ranges = {"q": {"low": [0.0], "high": ["much"]}}
+    with pytest.raises(InvalidInput, match="trained_range.q"):
+        formats.load({**shipped.manifest, "trained_range": ranges}, shipped.tensors)
+
+
+def test_a_shipped_checkpoint_is_small_and_has_a_card(shipped):
+    assert len(shipped.tensors) < 4 * 1024 * 1024
+
+
+def test_policy_for_another_purpose_is_refused(shipped):
+    formats.require_purpose(shipped, formats.CHOOSING)
+    with pytest.raises(CheckpointMismatch, match="purpose is 'choosing tasks'"):
+        formats.require_purpose(shipped, formats.SORTING)
+
+
+@pytest.mark.parametrize("layout", [[["clutter", 4], ["towers", 8]], [[], "x", ["towers", 1]]])
+def test_policy_that_sees_towers_sorts(shipped, layout):
+    assert formats.purpose_of({**shipped.manifest, "layout": layout}) == formats.SORTING

@@ -1,0 +1,80 @@
+"""Which cell a policy belongs to, and that it refuses every other."""
+
+from dataclasses import replace
+
+import pytest
+
+from app.errors import BadCell, CheckpointMismatch, InvalidInput, NotFound
+from app.policies.checkpoints import pretrained
+from app.policies.checkpoints.checkpoint import load
+from app.policies.checkpoints.trained_cell import cell_of, is_for, manifest_fields
+from app.policies.inference.task_selection import TaskChooser
+from app.policies.training.train import train
+from app.sim.cells.cell import load_cell
+from tests import workshop
+
+
+@pytest.fixture(scope="module")
+def own_policy(tiny_preset):
+    """The policy of a tiny training in a cell of the user's own."""
+    preset = replace(tiny_preset, cell="workshop", total_steps=512)
+    return train(
+        preset,
+        seed=1,
+        resume=None,
+        on_progress=lambda _: None,
+        on_checkpoint=lambda *_: None,
+        should_stop=lambda: False,
+        cell=workshop.cell(),
+    ).checkpoint
+
+
+def test_shipped_cell_goes_by_its_name():
+    assert manifest_fields(load_cell()) == {"cell": "pick-and-place"}
+    assert cell_of({"cell": "pick-and-place"}) == load_cell()
+
+
+def test_own_cell_travels_with_the_checkpoint(own_policy):
+    again = load(own_policy.manifest, own_policy.tensors)
+    assert cell_of(again.manifest) == workshop.cell()
+    assert TaskChooser(again).cell_sha256 == workshop.cell().sha256
+
+
+def test_policy_refuses_another_cell_and_a_changed_one(own_policy):
+    with pytest.raises(CheckpointMismatch, match="'workshop', expected 'pick-and-place'"):
+        TaskChooser(own_policy, load_cell())
+    with pytest.raises(CheckpointMismatch, match="workshop as it is now"):
+        TaskChooser(own_policy, workshop.cell(title="Changed"))
+
+
+def test_policy_of_a_cell_is_told_by_its_manifest(own_policy):
+    shipped = pretrained.load("pick").manifest
+    assert is_for(own_policy.manifest, workshop.cell())
+    assert not is_for(own_policy.manifest, workshop.cell(title="Changed"))
+    assert not is_for(own_policy.manifest, load_cell())
+    assert is_for(shipped, load_cell())
+    assert not is_for(shipped, workshop.cell(name="pick-and-place"))
+
+
+def test_carried_cell_is_checked_like_any_other():
+    broken = workshop.definition()
+    broken["robot"]["dt"] = 50.0
+    with pytest.raises(BadCell, match="milliseconds"):
+        cell_of({"cell": "workshop", "cell_definition": broken})
+    with pytest.raises(CheckpointMismatch):
+        cell_of({"cell": "garage", "cell_definition": workshop.definition()})
+    with pytest.raises(NotFound):
+        cell_of({"cell": "garage"})
+
+
+def test_cell_without_cubes_cannot_be_trained_in(tiny_preset):
+    with pytest.raises(InvalidInput, match="cannot be used for picking"):
+        train(
+            tiny_preset,
+            seed=1,
+            resume=None,
+            on_progress=lambda _: None,
+            on_checkpoint=lambda *_: None,
+            should_stop=lambda: False,
+            cell=load_cell("sorting-e0"),
+        )

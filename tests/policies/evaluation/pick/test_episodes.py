@@ -1,0 +1,97 @@
+"""Whom a policy sees among several people, and what is recorded of them."""
+
+import numpy as np
+import pytest
+
+from app.policies.checkpoints import pretrained
+from app.policies.evaluation.pick import selection_rules as choice_rules
+from app.policies.evaluation.pick.episodes import Evaluator, seen_exactly, settings_for
+from app.policies.inference.task_selection import ValueNetworks
+from app.sim.cells.cell import load_cell
+from app.sim.collision.contact import clearance
+from app.sim.human import model as human
+from app.sim.human.anthropometry import percentile_body
+from app.sim.people.human_motion_config import WorkSettings, at_the_table
+from app.sim.pick.batch import PickBatch, PickSettings
+from tests.sim.recorded_person import working
+from tests.sim.working_people import run_of
+
+NO_WALKERS = np.zeros((0, 3))
+
+
+def test_the_nearest_of_several_workers_is_seen_in_their_own_size():
+    batch = PickBatch(load_cell(), 40, 7, PickSettings(people=("worker",) * 3))
+    batch.reset()
+    rows, people, seen = np.arange(3, 40, 2), batch.state.people, set()
+    sight = seen_exactly(batch, rows)
+    for k, e in enumerate(rows):
+        gaps = [
+            clearance(
+                batch.arm, batch.world.people, batch.state.q[e], q[None], NO_WALKERS, size[None]
+            ).people_m
+            for q, size in zip(people.q[e], people.size[e], strict=True)
+        ]
+        nearest = int(np.argmin(gaps))
+        seen.add(nearest)
+        np.testing.assert_array_equal(sight.q[k], people.q[e, nearest])
+        np.testing.assert_array_equal(sight.qd[k], people.qd[e, nearest])
+        np.testing.assert_array_equal(sight.size[k], people.size[e, nearest])
+    assert seen == {0, 1, 2}
+
+
+def test_nobody_is_seen_as_somebody_far_away():
+    batch = PickBatch(load_cell(), 2, 7, PickSettings(people=()))
+    batch.reset()
+    sight = seen_exactly(batch, np.arange(2))
+    np.testing.assert_array_equal(sight.q, np.tile(batch.world.people.nobody, (2, 1)))
+    assert sight.q[0, 1] > 3.0 and not sight.qd.any()
+
+
+def test_an_angle_beyond_its_limit_is_told_as_the_limit():
+    cell, q = load_cell(), working(60)
+    q[:, 13], q[:, 3] = 4.0, 0.3
+    run = at_the_table(run_of(q), cell)
+    work = WorkSettings(motion="recorded", recorded=(run,))
+    batch = PickBatch(cell, 3, 7, PickSettings(work=work))
+    batch.reset()
+    sight = seen_exactly(batch, np.arange(3))
+    np.testing.assert_array_equal(sight.q[:, 13], human.Q_MAX[13])
+    others = np.delete(sight.q, 13, axis=1)
+    np.testing.assert_array_equal(others, np.delete(batch.state.people.q[:, 0], 13, axis=1))
+
+
+@pytest.fixture(scope="module")
+def two_sizes():
+    bodies = (percentile_body(5.0), percentile_body(95.0))
+    usual = settings_for((1, 1), {})
+    settings = PickSettings(
+        time_limit_s=usual.time_limit_s,
+        people=("worker", "worker"),
+        work=WorkSettings(bodies=bodies),
+    )
+    networks = ValueNetworks(pretrained.load("pick"))
+    evaluator = Evaluator(networks, load_cell(), 8, 3, settings)
+    return evaluator, evaluator.run(choice_rules.fixed(0), n_recorded=6)
+
+
+def test_each_worker_of_each_recorded_row_is_a_trajectory_in_their_size(two_sizes):
+    evaluator, episodes = two_sizes
+    sizes, found = evaluator.batch.state.people.size[:6].reshape(-1, 12), []
+    for trajectory in episodes.trajectories:
+        assert trajectory.sizes.shape == (len(trajectory.q_robot), 12)
+        assert len(trajectory.q_human) == len(trajectory.q_robot)
+        np.testing.assert_array_equal(trajectory.sizes, trajectory.sizes[:1].repeat(
+            len(trajectory.sizes), axis=0))  # fmt: skip
+        found.append(trajectory.sizes[0])
+    assert 2 <= len(found) <= 12 and len(found) % 2 == 0
+    assert all((np.abs(sizes - one).max(axis=1) == 0.0).any() for one in found)
+    assert len({float(one[0]) for one in found}) == 2
+
+
+def test_a_trajectory_is_the_path_of_its_worker(two_sizes):
+    evaluator, episodes = two_sizes
+    first, second = episodes.trajectories[:2]
+    np.testing.assert_array_equal(first.q_robot, second.q_robot)
+    assert not np.array_equal(first.q_human, second.q_human)
+    steps = np.abs(np.diff(first.q_human, axis=0)).max()
+    assert 0.0 < steps < 0.2

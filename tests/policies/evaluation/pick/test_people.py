@@ -1,0 +1,109 @@
+"""The protocols of several, courteous and recorded people: rows, people, and what differs."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.errors import InvalidInput
+from app.policies.checkpoints import pretrained
+from app.policies.evaluation.pick.people import MAX_RECORDED_S
+from app.policies.evaluation.registry import evaluate
+from app.sim.human import model as human
+from tests.sim.recorded_person import working
+from tests.sim.working_people import run_of
+
+N = 40
+PEOPLE = [
+    "0-people", "1-people", "2-people", "3-people", "4-people", "1-person-p5", "1-person-p95",
+    "3-people-p5", "3-people-p95", "worker-and-walker", "first-reaches",
+]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def told():
+    return []
+
+
+@pytest.fixture(scope="module")
+def beside_people(told):
+    return evaluate(
+        "pick-people",
+        pretrained.load("pick"),
+        episodes=N,
+        seed=5,
+        on_row=lambda *what: told.append(what),
+    )
+
+
+def rows_of(result):
+    return {row["name"]: row for row in result["results"]}
+
+
+def test_people_have_a_row_for_every_number_and_size(beside_people):
+    assert [row["name"] for row in beside_people["results"]] == PEOPLE
+    assert {row["n"] for row in beside_people["results"]} == {N}
+    stated = beside_people["settings"]
+    assert stated["3-people-p5"]["people"] == ["worker"] * 3
+    assert stated["worker-and-walker"]["people"] == ["worker", "walker"]
+
+
+def test_nobody_is_never_touched_and_the_more_people_the_bolder(beside_people):
+    rows = rows_of(beside_people)
+    assert rows["0-people"]["touched_at_rest"]["mean"] == 0.0
+    touched = [rows[f"{n}-people"]["touched_at_rest"]["mean"] for n in (0, 1, 4)]
+    assert touched[0] < touched[1] < touched[2]
+
+
+def test_small_and_large_people_give_other_episodes(beside_people):
+    rows, stated = rows_of(beside_people), beside_people["settings"]
+    small, large = rows["3-people-p5"], rows["3-people-p95"]
+    assert {k: v for k, v in small.items() if k != "name"} != {
+        k: v for k, v in large.items() if k != "name"
+    }
+    speeds = [stated[f"1-person-p{p}"]["hand_speed_median_m_s"] for p in (5, 95)]
+    assert speeds[0] != speeds[1]
+
+
+def test_every_row_is_told_as_soon_as_it_is_known(beside_people, told):
+    assert [(done, total) for done, total, _ in told] == [(k + 1, 11) for k in range(11)]
+    assert [row for _, _, row in told] == beside_people["results"]
+
+
+def test_courteous_people_touch_a_robot_at_rest_less_often():
+    result = evaluate("pick-courtesy", pretrained.load("pick"), episodes=80, seed=5)
+    assert [row["name"] for row in result["results"]] == [
+        "courtesy-0", "courtesy-0.5", "courtesy-1"
+    ]  # fmt: skip
+    touched = [row["touched_at_rest"]["mean"] for row in result["results"]]
+    assert touched[0] > touched[2] + 0.05
+    assert touched[0] >= touched[1] >= touched[2]
+
+
+def test_recorded_people_are_evaluated_together_and_one_by_one():
+    standing = run_of(np.tile(human.rest_posture(1.0, 2.0, 0.5), (700, 1)), name="stands")
+    busy = run_of(working(700), name="works")
+    result = evaluate(
+        "pick-mocap", pretrained.load("pick"), episodes=20, seed=5, motions=(standing, busy)
+    )
+    rows, stated = rows_of(result), result["settings"]
+    assert list(rows) == ["library", "recorded", "recorded stands", "recorded works"]
+    assert rows["recorded stands"]["touched_at_rest"]["mean"] == 0.0
+    assert "hand_speed_median_m_s" not in stated["recorded stands"]
+    assert stated["recorded works"]["hand_speed_median_m_s"] > 0.05
+    assert stated["motions"][1] == {"source": "works, made up", "seconds": 13.98}
+    library = rows["library"]["touched_at_rest"]["mean"]
+    assert library > 0.0
+
+
+def test_one_recording_has_no_row_of_its_own():
+    runs = (run_of(working(100), name="a"), run_of(working(100, seed=1), name="a"))
+    result = evaluate("pick-mocap", pretrained.load("pick"), episodes=2, motions=runs)
+    assert list(rows_of(result)) == ["library", "recorded"]
+
+
+def test_more_recorded_motion_than_memory_is_refused():
+    run = run_of(working(100))
+    long = replace(run, times=run.times * (MAX_RECORDED_S + 10.0) / run.times[-1])
+    with pytest.raises(InvalidInput, match="motions = 36010 s .* at most 36000 s"):
+        evaluate("pick-mocap", pretrained.load("pick"), episodes=1, motions=(long,))

@@ -1,0 +1,97 @@
+"""The protocols: same episodes for every rule, complete rows, stated people."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.errors import InvalidInput, NotFound
+from app.policies.checkpoints import pretrained
+from app.policies.evaluation.pick import selection_rules as choice_rules
+from app.policies.evaluation.pick.episodes import Evaluator, View, seen_exactly, settings_for
+from app.policies.evaluation.registry import evaluate
+from app.policies.inference.task_selection import ValueNetworks
+from app.sim.cells.cell import load_cell
+
+
+@pytest.fixture(scope="module")
+def evaluator():
+    networks = ValueNetworks(pretrained.load("pick"))
+    return Evaluator(networks, load_cell("pick-and-place"), 24, 99, settings_for((2, 3), {}))
+
+
+def view(values, chosen, first=False):
+    values = np.array(values, dtype=np.float32)
+    n = len(values)
+    return View(
+        values=values,
+        distances=np.where(np.isfinite(values), np.arange(values.shape[1])[None] + 1.0, np.inf),
+        chosen=np.array(chosen),
+        first=first,
+        rows=np.arange(n),
+    )
+
+
+def test_every_episode_ends_and_rates_sum_to_one(evaluator):
+    row = evaluator.run(choice_rules.critic(0.2)).row("critic")
+    total = sum(row[end]["mean"] for end in ("success", "collision", "timeout"))
+    assert total == pytest.approx(1.0)
+    assert row["n"] == 24
+
+
+def test_the_same_rule_twice_gives_the_same_episodes(evaluator):
+    one, two = (evaluator.run(choice_rules.critic(0.2)) for _ in range(2))
+    assert np.array_equal(one.outcome, two.outcome)
+    assert np.array_equal(one.duration_s, two.duration_s)
+
+
+def test_a_fixed_choice_never_switches(evaluator):
+    assert evaluator.run(choice_rules.fixed(1)).switches.sum() == 0
+
+
+def test_hysteresis_keeps_and_zero_follows_the_best():
+    seen = view([[1.0, 1.1, -np.inf]], [0])
+    assert choice_rules.critic(0.2)(seen).tolist() == [0]
+    assert choice_rules.critic(0.0)(seen).tolist() == [1]
+
+
+def test_random_draws_only_candidates_that_exist():
+    seen = view([[0.0, 0.0, -np.inf]] * 500, [0] * 500, first=True)
+    drawn = choice_rules.at_random(3, 500)(seen)
+    assert set(drawn.tolist()) == {0, 1}
+
+
+def test_a_result_states_people_and_rechecks_contacts():
+    result = evaluate("pick-single", pretrained.load("pick"), episodes=12, seed=4)
+    assert result["episodes"] == 12
+    assert result["settings"]["hand_speed_median_m_s"] >= 0.4
+    assert result["settings"]["hand_speed_p99_m_s"] >= 1.5
+    assert result["fcl_recheck"]["missed_contacts"] == 0
+    assert result["fcl_recheck"]["poses"] > 100
+
+
+def test_an_unknown_protocol_names_the_known_ones():
+    with pytest.raises(NotFound, match="pick-choice"):
+        evaluate("pick-dance", pretrained.load("pick"))
+
+
+def test_no_episodes_is_refused():
+    with pytest.raises(InvalidInput, match="episodes"):
+        evaluate("pick-single", pretrained.load("pick"), episodes=0)
+
+
+def test_what_stands_between_is_asked_for_running_rows_only_and_changes_what_happens(evaluator):
+    running = []
+
+    def nobody(batch, rows):
+        running.append(batch.state.outcome[rows])
+        sight = seen_exactly(batch, rows)
+        q = sight.q.copy()
+        q[:, :2] = 100.0
+        return replace(sight, q=q, qd=np.zeros_like(q))
+
+    blind = evaluator.run(choice_rules.critic(0.2), seen=nobody)
+    assert not np.concatenate(running).any()
+    assert not np.array_equal(
+        blind.duration_s, evaluator.run(choice_rules.critic(0.2)).duration_s
+    )

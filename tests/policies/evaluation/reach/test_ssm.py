@@ -1,0 +1,120 @@
+"""Policies and planners are compared on equal terms, and every run is counted."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.policies.checkpoints import pretrained
+from app.policies.evaluation.reach import ssm as reach_ssm
+from app.policies.evaluation.reach.ssm import (
+    CAP_S,
+    PLANNERS,
+    Comparison,
+    against,
+    best_replays,
+    course_row,
+    picked,
+)
+from app.policies.evaluation.registry import evaluate
+from app.sim.cells.cell import load_cell
+from app.sim.planning.ompl_planners import PlanSettings
+from app.sim.reach.batch import ReachSettings
+from app.sim.reach.crossings import crossings
+from app.sim.safety.layer import safety_settings
+from tests.policies.straight_mover import Straight
+from tests.sim.recorded_motion import recorded
+
+CELL = load_cell("shared-workspace")
+
+
+@pytest.fixture(scope="module")
+def comparison() -> Comparison:
+    return Comparison(CELL, crossings(CELL, 6), ReachSettings(), safety_settings(CELL), seed=1)
+
+
+@pytest.fixture(scope="module")
+def straight(comparison):
+    return comparison.policy(Straight())
+
+
+def test_every_run_counts_and_the_layer_keeps_every_link_in_motion_apart(straight):
+    row = course_row("policy", straight.runs)
+    assert row["n"] == 6
+    assert row["contacts_moving"] == 0
+    assert row["contacts"] == row["contacts_at_rest"]
+    late = 6 - int(straight.runs.arrived.sum())
+    total = straight.runs.seconds[straight.runs.arrived].sum() + late * CAP_S
+    assert row["time_capped_s"]["mean"] == pytest.approx(total / 6)
+    assert row["below_half_s"]["mean"] >= row["stopped_s"]["mean"] > 0.0
+    assert row["stopped_s"]["mean"] >= row["held_s"]["mean"] > 0.0
+    assert row["never_held"]["mean"] >= row["never_stopped"]["mean"]
+
+
+def test_the_overrides_told_are_those_counted(straight):
+    for number, course in enumerate(straight.overrides):
+        assert (course <= 0.0).sum() * 0.02 == pytest.approx(straight.runs.stopped_s[number])
+        assert len(course) * 0.02 == pytest.approx(straight.runs.seconds[number])
+
+
+def test_with_nobody_there_it_is_never_slowed(comparison):
+    runs = comparison.policy(Straight(), alone=True).runs
+    assert runs.arrived.all()
+    assert course_row("alone", runs)["never_stopped"]["mean"] == 1.0
+
+
+def test_hindsight_takes_the_soonest_run_that_nobody_touches(comparison, straight):
+    found = best_replays(comparison, 12, np.random.default_rng(2))
+    best, free = found["hindsight"], found["hindsight-free"]
+    assert free.arrived.all()
+    assert (free.stopped_s <= best.stopped_s + 1e-3 * best.seconds + 1e-9).all()
+    assert free.stopped_s.sum() < best.stopped_s.sum()
+    alone = comparison.policy(Straight(), alone=True).runs
+    assert best.arrived.all() and not best.touched_at_rest.any()
+    assert straight.runs.touched_at_rest.any()
+    assert (best.seconds > 0.7 * alone.seconds).all()
+
+
+def test_a_saving_is_paired_and_counts_who_does_not_arrive(straight):
+    same = against(straight.runs, straight.runs)
+    assert same["all"]["saved_s"]["mean"] == 0.0
+    assert same["all"]["n"] == 6
+    half = picked(straight.runs, np.arange(3))
+    assert against(half, half)["all"]["n"] == 3
+
+
+def test_the_protocol_runs_policy_planners_recordings_and_random_episodes(monkeypatch):
+    monkeypatch.setattr(reach_ssm, "N_HINDSIGHT", 4)
+    short = PlanSettings(planner="rrt-star", budget_s=0.02)
+    few = {
+        name: replace(PLANNERS[name], plan=short) for name in ("rrt-star-once", "every-tick")
+    }
+    monkeypatch.setattr(reach_ssm, "PLANNERS", few)
+    monkeypatch.setattr(reach_ssm, "ALONE", few["rrt-star-once"])
+    monkeypatch.setattr(reach_ssm, "CAP_S", 3.0)
+    monkeypatch.setattr(reach_ssm, "RANDOM_S", 0.5)
+    told = []
+    result = evaluate(
+        "reach-ssm",
+        pretrained.load("reach"),
+        episodes=2,
+        seed=3,
+        motions=[recorded(4.0, walk=2.4, turn=0.0)],
+        on_row=lambda *row: told.append(row),
+    )
+    names = [row["name"] for row in result["results"]]
+    assert names[:4] == ["policy", "policy-ahead", "rrt-star-once", "every-tick"]
+    assert {"policy recorded", "policy measured", "policy-heedless measured"} <= set(names)
+    assert "policy-heedless" not in names and "policy-ahead recorded measured" in names
+    assert names[-3:] == ["random", "random-still", "random measured"]
+    assert [total for _, total, _ in told] == [len(names)] * len(names)
+    assert all(
+        row["contacts_moving"] == 0 for row in result["results"] if "bare" not in row["name"]
+    )
+    assert result["settings"]["crossings"] == 2
+    assert {f"{mine} against every-tick recorded" for mine in names[:2]} <= set(
+        result["paired"]
+    )
+    assert "policy-ahead against every-tick measured" in result["paired"]
+    assert len(result["seconds"][""]["policy-ahead"]) == 2
+    assert set(result["example"]) == {"", "measured"}

@@ -1,0 +1,107 @@
+"""What a protocol can be given, and what it tells."""
+
+import pytest
+
+from app.errors import InvalidInput
+from app.policies.checkpoints import pretrained
+from app.policies.evaluation.registry import (
+    MAX_SORTING_EPISODES,
+    OF_REACHING,
+    OF_SORTING,
+    PROTOCOLS,
+    WITH_MOTIONS,
+    WITH_OR_WITHOUT_MOTIONS,
+    default_checkpoint,
+    evaluate,
+    most_episodes,
+)
+from tests.policies.evaluation.sorting_players import untrained
+from tests.policies.untrained import untrained_reach
+from tests.sim.recorded_person import working
+from tests.sim.working_people import run_of
+
+
+def test_recorded_motion_without_any_is_refused():
+    with pytest.raises(InvalidInput, match="must hold at least one motion") as caught:
+        evaluate("pick-mocap", pretrained.load("pick"), episodes=1)
+    assert caught.value.field == "motions"
+
+
+@pytest.mark.parametrize(
+    "name", sorted(set(PROTOCOLS) - WITH_MOTIONS - WITH_OR_WITHOUT_MOTIONS)
+)
+def test_motions_are_refused_where_none_are_taken(name):
+    run = run_of(working(60), name="wave")
+    with pytest.raises(InvalidInput, match=f"'wave'.*must not be given to {name}") as caught:
+        evaluate(name, pretrained.load("pick"), episodes=1, motions=(run,))
+    assert set(caught.value.choices) == WITH_MOTIONS | WITH_OR_WITHOUT_MOTIONS
+
+
+@pytest.mark.parametrize("name", ["pick-single", "pick-choice", "safety-ssm"])
+def test_rows_are_told_in_order_and_are_those_of_the_result(name):
+    told = []
+    result = evaluate(
+        name, pretrained.load("pick"), episodes=4, on_row=lambda *what: told.append(what)
+    )
+    n = len(result["results"])
+    assert [(done, total) for done, total, _ in told] == [(k + 1, n) for k in range(n)]
+    assert [row for _, _, row in told] == result["results"]
+
+
+@pytest.mark.parametrize("name", sorted(OF_SORTING))
+def test_a_policy_that_picks_is_no_policy_that_sorts(name):
+    with pytest.raises(InvalidInput, match=f"must be a policy that sorts for {name}") as caught:
+        evaluate(name, pretrained.load("pick"), episodes=1)
+    assert caught.value.field == "checkpoint"
+    assert caught.value.choices and not set(caught.value.choices) & OF_SORTING
+
+
+def test_a_policy_that_sorts_is_no_policy_that_picks():
+    with pytest.raises(
+        InvalidInput, match="must be a policy that picks for pick-single"
+    ) as found:
+        evaluate("pick-single", untrained(), episodes=1)
+    assert (found.value.field, found.value.value) == ("checkpoint", "sorting-e0-dqn")
+    assert set(found.value.choices) == OF_SORTING
+
+
+@pytest.mark.parametrize("name", ["pick-single", "sorting-grid"])
+def test_a_policy_that_reaches_neither_picks_nor_sorts(name):
+    with pytest.raises(InvalidInput, match=f"must be a policy that .* for {name}") as found:
+        evaluate(name, untrained_reach(width=16), episodes=1)
+    assert (found.value.field, found.value.value) == ("checkpoint", "reach-td3")
+    assert set(found.value.choices) == OF_REACHING
+
+
+@pytest.mark.parametrize("name", sorted(OF_REACHING))
+def test_a_policy_that_picks_reaches_no_goals(name):
+    with pytest.raises(InvalidInput, match="must be a policy that reaches goals for") as found:
+        evaluate(name, pretrained.load("pick"), episodes=1)
+    assert not set(found.value.choices) & (OF_REACHING | OF_SORTING)
+
+
+def test_every_protocol_has_a_checkpoint_and_a_most_number_of_episodes_of_its_own():
+    assert default_checkpoint("sorting-grid") == "sorting-e0"
+    assert default_checkpoint("pick-choice") == "pick"
+    assert most_episodes("sorting-tests") == MAX_SORTING_EPISODES < most_episodes("pick-single")
+    with pytest.raises(InvalidInput, match="10000"):
+        evaluate("sorting-grid", untrained(), episodes=MAX_SORTING_EPISODES + 1)
+
+
+@pytest.mark.parametrize(("name", "n_rows"), [("sorting-grid", 6), ("sorting-tests", 12)])
+def test_a_sorting_result_states_task_policy_and_seed(name, n_rows):
+    policy = untrained()
+    result = evaluate(name, policy, episodes=1, seed=8)
+    assert (result["protocol"], result["seed"], result["episodes"]) == (name, 8, 1)
+    assert result["checkpoint"] == policy.sha256
+    assert len(result["results"]) == n_rows
+    settings = result["settings"]
+    assert (settings["cell"], settings["n_cells"], settings["horizon_attempts"]) == (
+        "sorting-e0",
+        10,
+        40,
+    )
+    if name == "sorting-grid":
+        assert len(result["results"][0]["pairs"]) == settings["pairs"] == 55
+    handed = [row for row in result["results"] if row["name"].endswith("-handover")]
+    assert all(row["success"]["mean"] == 1.0 for row in handed)

@@ -1,0 +1,127 @@
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from app.live import commands
+from app.live.reach.commands import SetPilot, SetSafety, SetWay
+from app.live.reach.controller import TIME_LIMIT_S, LiveReacher
+from app.live.reach.world import ReachWorld
+from app.policies.inference.controllers import Ahead, mover_of
+from app.policies.inference.live_reach_policy import ReachPilot
+from app.policies.inference.reach_policy import ReachPolicy
+from app.policies.inference.rollout import NO_LAYER
+from app.sim.cells.cell import load_cell
+from app.sim.reach.batch import ReachBatch, ReachSettings
+from app.sim.safety.layer import SafetySettings
+from tests.policies.untrained import untrained_reach
+
+CELL = load_cell("shared-workspace")
+
+
+@pytest.fixture(scope="module")
+def policy() -> ReachPolicy:
+    return ReachPolicy(untrained_reach(width=32))
+
+
+def test_policy_without_targets_cannot_be_interpolated() -> None:
+    pilot = ReachPilot(ReachPolicy(untrained_reach(width=32, goals="box")))
+    assert pilot.ways == ("direct", "averaged", "direct-ahead", "averaged-ahead")
+
+
+def test_live_state_is_seen_as_the_batch_sees_it(policy: ReachPolicy) -> None:
+    pilot = ReachPilot(policy)
+    batch = ReachBatch(CELL, 1, 11, ReachSettings(observation=policy.view))
+    batch.reset()
+    for _ in range(5):
+        batch.step(np.full((1, 6), 0.3, dtype=np.float32))
+    world = ReachWorld(CELL, pilot, seed=1)
+    robot, reacher = world._stage.robot, LiveReacher(CELL, pilot)
+    state = batch.state
+    robot.q, robot.qd, robot.qdd = state.q[0], state.qd[0], state.qdd[0]
+    for way in pilot.ways:
+        reacher.way = way
+        act = reacher.act(
+            robot,
+            state.people.walkers.rows[0],
+            state.goal[0],
+            float(state.clear[0, 0]),
+            float(state.time_left[0]),
+            float(state.elapsed[0]),
+            None,
+        )
+        assert np.allclose(act, mover_of(policy, way).acts(batch)[0], atol=1e-6)
+
+
+class Noting(ReachPilot):
+    """Notes what it is told about time."""
+
+    def __init__(self, actor: ReachPolicy) -> None:
+        super().__init__(actor)
+        self.told: list[tuple[float, float]] = []
+
+    def acts(
+        self, batch: ReachBatch, way: str, safety: SafetySettings | None
+    ) -> NDArray[np.float32]:
+        self.told.append((float(batch.state.elapsed[0]), float(batch.state.time_left[0])))
+        return super().acts(batch, way, safety)
+
+
+@pytest.mark.parametrize(("on", "measured"), [(True, True), (True, False), (False, True)])
+def test_looking_ahead_is_told_of_the_layer_that_is_obeyed(
+    policy: ReachPolicy, on: bool, measured: bool
+) -> None:
+    pilot = ReachPilot(policy)
+    world = ReachWorld(CELL, pilot, seed=1)
+    world.apply(SetWay(way="direct-ahead"))
+    world.apply(SetSafety(on=on, measured=measured))
+    mover = pilot._movers["direct-ahead"]
+    assert isinstance(mover, Ahead)
+    assert (mover.layer != NO_LAYER) == (on and measured)
+
+
+def test_under_the_layer_the_policy_has_its_usual_time_and_looking_ahead_the_true_one(
+    policy: ReachPolicy,
+) -> None:
+    pilot = Noting(policy)
+    world = ReachWorld(CELL, pilot, seed=1)
+    world.apply(SetWay(way="direct"))
+    pilot.told.clear()
+    while world.snapshot().status == "moving" and len(pilot.told) < 90:
+        world.step()
+    elapsed, left = np.array(pilot.told).T
+    assert len(elapsed) > 60
+    np.testing.assert_allclose(np.diff(elapsed), CELL.robot.dt, atol=1e-9)
+    assert (left == TIME_LIMIT_S).all()
+
+
+def test_policy_moves_the_robot_of_a_live_cell_with_any_number_of_people(
+    policy: ReachPolicy,
+) -> None:
+    pilot = ReachPilot(policy)
+    world = ReachWorld(CELL, None, seed=1)
+    world.apply(SetPilot(pilot=pilot))
+    shown = world.snapshot()
+    assert (shown.checkpoint, shown.reach.way) == (pilot.checkpoint, "interpolated-ahead")
+    assert shown.reach.ways == pilot.ways
+    world.apply(commands.AddPerson())
+    world.apply(SetWay(way="averaged-interpolated"))
+    world.step()
+    for id in (0, 1):
+        world.apply(commands.RemovePerson(person=id))
+        world.step()
+    after = world.snapshot()
+    assert after.people == ()
+    assert not np.array_equal(after.robot_q, shown.robot_q)
+    assert after.elapsed_ms > 0.0
+
+
+def test_goals_jump_among_the_targets_unless_the_policy_is_interpolated(
+    policy: ReachPolicy,
+) -> None:
+    world = ReachWorld(CELL, ReachPilot(policy), seed=1)
+    on_target = []
+    for way in ("direct", "interpolated"):
+        world.apply(SetWay(way=way))
+        world._goal.jump()
+        on_target.append(world.snapshot().reach.on_target)
+    assert on_target == [True, False]

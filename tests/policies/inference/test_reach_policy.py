@@ -1,0 +1,159 @@
+"""A trained reach policy, for inference: numpy in, numpy out, and what it refuses."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import torch
+
+from app.errors import CheckpointMismatch, InvalidInput
+from app.policies.checkpoints import checkpoint as formats
+from app.policies.checkpoints import pretrained
+from app.policies.checkpoints.model_state import under
+from app.policies.configs import presets
+from app.policies.inference.reach_policy import CROWD, ReachPolicy, is_reach
+from app.policies.training.reach import networks_of
+from app.sim.cells.cell import load_cell
+from app.sim.reach.batch import ReachBatch, ReachSettings, goal_region_of
+from app.sim.reach.goal_sets import halton_targets
+from app.sim.reach.reach_actor import ReachActor
+from app.sim.reach.rollout.kernels.actor import FEW
+from app.sim.robot.actions import ActionSettings
+from tests.policies.untrained import untrained_reach
+
+SEEN = {"observation": "forecast"}
+
+
+@pytest.fixture(scope="module")
+def checkpoint():
+    return untrained_reach(width=64)
+
+
+def changed(checkpoint, **fields):
+    """Return the checkpoint with other fields in its manifest."""
+    return formats.load({**checkpoint.manifest, **fields}, checkpoint.tensors)
+
+
+@pytest.mark.parametrize(("layers", "kind"), [(2, "residual"), (5, "plain")])
+def test_it_acts_as_the_network_that_was_trained(layers, kind):
+    checkpoint = untrained_reach(seed=4, width=48, layers=layers, actor=kind)
+    policy = ReachPolicy(checkpoint)
+    preset = presets.resolve("reach-td3", {"width": 48, "layers": layers, "actor": kind})
+    actor = networks_of(preset, policy.n_obs, policy.n_obs).actor()
+    actor.load_state_dict(under(checkpoint.arrays(), "actor"))
+    obs = np.random.default_rng(1).normal(size=(300, policy.n_obs)).astype(np.float32)
+    with torch.no_grad():
+        expected = actor(torch.as_tensor(obs)).numpy()
+    act = policy.acts(obs)
+    assert act.dtype == np.float32 and np.ptp(act) > 0.1
+    np.testing.assert_allclose(act, expected, atol=2e-6)
+
+
+def test_few_states_are_answered_as_many_are():
+    """By the kernel, each by itself, what the matrices say of all together."""
+    policy = ReachPolicy(pretrained.load("reach"))
+    cell, n = load_cell("shared-workspace"), 3 * FEW
+    batch = ReachBatch(cell, n, 5, ReachSettings(observation=policy.view))
+    obs = batch.reset()
+    for _ in range(10):
+        obs = batch.step(policy.acts(obs)).obs
+    many = policy.acts(obs)
+    alone = np.concatenate([policy.acts(obs[row : row + 1]) for row in range(n)])
+    assert np.ptp(alone) > 0.5
+    np.testing.assert_allclose(alone, many, atol=2e-5)
+    np.testing.assert_array_equal(policy.acts(obs[:FEW][::-1]), alone[:FEW][::-1])
+
+
+def test_it_says_what_it_is(checkpoint):
+    policy: ReachActor = ReachPolicy(checkpoint)
+    cell = load_cell("shared-workspace")
+    assert is_reach(checkpoint) and not is_reach(pretrained.load("pick"))
+    assert (policy.checkpoint, policy.view) == (checkpoint.sha256, "forecast")
+    assert (policy.cell, policy.cell_sha256) == (cell.name, cell.sha256)
+    assert policy.title == "reach-td3, 0.00 M steps"
+    assert policy.action == ActionSettings()
+    np.testing.assert_array_equal(policy.targets, goal_region_of(cell).targets())
+    assert ReachPolicy(untrained_reach(width=16, goals="box")).targets is None
+    halton = ReachPolicy(untrained_reach(width=16, goals="halton", n_halton=30)).targets
+    np.testing.assert_array_equal(halton, halton_targets(goal_region_of(cell), 30))
+
+
+@pytest.mark.parametrize("kind", ["residual", "plain"])
+def test_people_as_a_set_have_no_order_and_nobody_counts_for_nothing(kind):
+    checkpoint = untrained_reach(seed=4, width=48, actor=kind, observation="crowd")
+    policy = ReachPolicy(checkpoint)
+    preset = presets.resolve("reach-td3", {"width": 48, "actor": kind, "observation": "crowd"})
+    actor = networks_of(preset, policy.n_obs, policy.n_obs).actor()
+    actor.load_state_dict(under(checkpoint.arrays(), "actor"))
+    obs = np.random.default_rng(1).normal(size=(50, policy.n_obs)).astype(np.float32)
+    blocks = obs[:, CROWD.first :].reshape(50, CROWD.n_people, CROWD.n_block)
+    blocks[:, :, 0] = [1.0, 1.0, 1.0, 0.0]
+    act = policy.acts(obs)
+    with torch.no_grad():
+        np.testing.assert_allclose(act, actor(torch.as_tensor(obs)).numpy(), atol=2e-6)
+    blocks[:] = blocks[:, [3, 1, 0, 2]]
+    np.testing.assert_allclose(policy.acts(obs), act, atol=1e-6)
+    blocks[:, 0, 1:] = 9.0
+    np.testing.assert_allclose(policy.acts(obs), act, atol=1e-6)
+    blocks[:, 1, 1:] = 9.0
+    assert np.abs(policy.acts(obs) - act).max() > 0.01
+    assert policy.kernel_network is None, "looking ahead knows no sets"
+
+
+@pytest.mark.parametrize(
+    ("view", "actor"),
+    [
+        ("forecast", "residual"),
+        ("features", "residual"),
+        ("state", "plain"),
+        ("crowd", "residual"),
+    ],
+)
+def test_it_moves_the_robot_of_a_batch(view, actor):
+    policy = ReachPolicy(untrained_reach(width=16, observation=view, actor=actor))
+    batch = ReachBatch(
+        load_cell("shared-workspace"), 3, 1, ReachSettings(observation=policy.view)
+    )
+    first = batch.reset().copy()
+    result = batch.step(policy.acts(first))
+    assert not np.array_equal(result.obs[:, :6], first[:, :6])
+
+
+def test_observations_of_another_shape_are_refused(checkpoint):
+    with pytest.raises(InvalidInput, match="obs"):
+        ReachPolicy(checkpoint).acts(np.zeros((2, 20), dtype=np.float32))
+
+
+def test_a_policy_of_another_task_is_refused():
+    with pytest.raises(CheckpointMismatch, match="purpose"):
+        ReachPolicy(pretrained.load("pick"))
+
+
+@pytest.mark.parametrize(
+    ("fields", "fault"),
+    [
+        ({"act_size": 5}, "act_size"),
+        ({"layout": [["human", 5]]}, "layout"),
+        ({"preset": {**SEEN, "goals": "moon"}}, "manifest.preset.goals"),
+        ({"preset": {**SEEN, "goals": "halton", "n_halton": "1"}}, "n_halton"),
+        ({"preset": {"goals": "grid"}}, "manifest.preset.observation"),
+    ],
+)
+def test_a_manifest_that_does_not_fit_is_named(checkpoint, fields, fault):
+    with pytest.raises((CheckpointMismatch, InvalidInput), match=fault):
+        ReachPolicy(changed(checkpoint, **fields))
+
+
+@pytest.mark.parametrize("drop", ["actor.net.0.weight", "actor.net.2.bias", "actor.net.4.bias"])
+def test_tensors_that_make_no_network_are_refused(checkpoint, drop):
+    arrays = {name: array for name, array in checkpoint.arrays().items() if name != drop}
+    with pytest.raises(CheckpointMismatch, match="tensors"):
+        ReachPolicy(formats.pack(checkpoint.manifest, arrays))
+
+
+def test_layers_that_do_not_fit_each_other_are_refused(checkpoint):
+    arrays = dict(checkpoint.arrays())
+    arrays["actor.net.2.weight"] = np.zeros((64, 63), dtype=np.float32)
+    broken = formats.pack(checkpoint.manifest, arrays)
+    with pytest.raises(CheckpointMismatch, match=r"actor\.net\.2"):
+        ReachPolicy(dataclasses.replace(broken))

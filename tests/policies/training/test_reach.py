@@ -1,0 +1,216 @@
+"""Training on the reach scenario: its curve, its checkpoints, and going on with one."""
+
+import numpy as np
+import pytest
+import torch
+
+from app.errors import CheckpointMismatch, InvalidInput
+from app.policies.algorithms.vecenv import CellVecEnv
+from app.policies.configs import presets
+from app.policies.inference.reach_policy import ReachPolicy
+from app.policies.training import reach as reach_training
+from app.policies.training.reach import batch_of, play, settings_of, states_met
+from app.sim.cells.cell import load_cell
+from app.sim.reach.batch import THESIS_WEIGHTS, ReachBatch, ReachSettings
+from app.sim.reach.monitored.batch import GuardedReach
+from tests.policies.conftest import Recorder
+
+TINY = {
+    "total_steps": 1536,
+    "n_envs": 16,
+    "buffer_size": 2000,
+    "batch_size": 32,
+    "learning_starts": 256,
+    "actor_frozen_updates": 8,
+    "width": 32,
+    "progress_steps": 256,
+    "progress_episodes": 8,
+    "checkpoint_steps": 512,
+}
+
+
+@pytest.fixture(scope="module")
+def preset():
+    return presets.resolve("reach-td3", TINY)
+
+
+@pytest.fixture(scope="module")
+def ran(preset):
+    recorder = Recorder()
+    recorder.result = recorder.run(preset)
+    return recorder
+
+
+def test_a_point_of_the_curve_plays_its_own_episodes(ran):
+    assert [point.step for point in ran.progress] == [256, 512, 768, 1024, 1280, 1536]
+    for point in ran.progress:
+        assert point.episodes == 8
+        assert point.success + point.collision + point.timeout == pytest.approx(1.0)
+
+
+def test_the_same_seed_trains_the_same_bits(preset, ran):
+    again = Recorder().run(preset)
+    assert again.checkpoint.tensors == ran.result.checkpoint.tensors
+
+
+def test_a_stopped_run_goes_on_where_it_was(preset, ran):
+    stopped = Recorder(stop_at=768)
+    assert stopped.run(preset).stopped
+    step, _, state = stopped.checkpoints[-1]
+    resumed = Recorder()
+    resumed.run(preset, resume=state)
+    steps = [point.step for point in stopped.progress + resumed.progress]
+    assert (step, steps) == (768, [point.step for point in ran.progress])
+
+
+def test_a_checkpoint_of_another_task_does_not_resume(preset, tiny_run):
+    with pytest.raises(CheckpointMismatch, match="preset"):
+        Recorder().run(preset, resume=tiny_run.checkpoints[0][2])
+
+
+def test_what_was_trained_decides_as_a_policy(preset, ran):
+    policy = ReachPolicy(ran.result.checkpoint)
+    batch = ReachBatch(load_cell("shared-workspace"), 4, 2, settings_of(preset))
+    assert np.abs(policy.acts(batch.reset())).max() <= 1.0
+    ranges = policy.trained_range
+    assert set(ranges) == {"q", "qd", "goal", "human"}
+    assert ranges["human"]["low"][4] >= 0.2 and ranges["human"]["high"][4] <= 0.5
+
+
+def test_the_monitored_preset_trains_and_is_counted_under_the_layer():
+    preset = presets.resolve("reach-td3-monitored", TINY)
+    batch = batch_of(preset, load_cell("shared-workspace"), 16, 3)
+    assert isinstance(batch, GuardedReach)
+    assert batch.settings.weights.c_o == preset.c_o > 0.0
+    assert not isinstance(
+        batch_of(presets.resolve("reach-td3", TINY), batch.cell, 4, 3), GuardedReach
+    )
+    ran = Recorder().run(preset)
+    assert ReachPolicy(ran.checkpoint).acts(batch.reset()).shape == (16, 6)
+    assert (batch.state.clear[:, 0] >= 0.8).all()
+
+
+def test_monitoring_nobody_is_refused():
+    with pytest.raises(InvalidInput, match=r"overrides\.safety = 'ssm' needs somebody"):
+        presets.resolve("reach-td3-monitored", {"n_people": 0})
+
+
+def test_the_reward_of_what_is_played_is_that_of_the_batch(preset):
+    batch = ReachBatch(load_cell("shared-workspace"), 6, 7, settings_of(preset))
+    still = torch.nn.Linear(batch.obs_size, 6)
+    torch.nn.init.zeros_(still.weight)
+    torch.nn.init.zeros_(still.bias)
+    ended, returns = play(still, batch)
+    assert set(ended.tolist()) <= {2, 3}
+    steps = np.rint(batch.state.elapsed / batch.arm.dt)
+    collided = ended == 2
+    np.testing.assert_allclose(
+        returns, -preset.c_step * steps - preset.c_c * collided, atol=1e-4
+    )
+
+
+@pytest.mark.parametrize(("sees_time", "cut"), [(True, False), (False, True)])
+def test_only_where_time_is_not_seen_is_a_time_out_no_true_end(sees_time, cut):
+    settings = ReachSettings(time_limit_s=0.04, people=())
+    env = CellVecEnv(ReachBatch(load_cell("shared-workspace"), 2, 1, settings), sees_time)
+    env.reset()
+    for _ in range(2):
+        _, _, done, infos = env.step(np.zeros((2, 6), dtype=np.float32))
+    assert done.all()
+    assert [info.get("TimeLimit.truncated", False) for info in infos] == [cut, cut]
+    assert "terminal_observation" in infos[0]
+
+
+def test_without_people_there_is_no_range_of_them():
+    settings = settings_of(presets.resolve("reach-td3", {**TINY, "n_people": 0}))
+    batch = ReachBatch(load_cell("shared-workspace"), 2, 1, settings)
+    batch.reset()
+    assert set(states_met(batch)) == {"q", "qd", "goal"}
+
+
+def test_the_thesis_preset_is_table_4_2():
+    preset = presets.get("reach-ddpg-thesis")
+    settings = settings_of(preset)
+    assert settings.weights == THESIS_WEIGHTS
+    assert (settings.observation, settings.collision_ends) == ("state", False)
+    assert (settings.action.bounds, settings.action.meaning) == ("one-step", "coefficient")
+    assert (preset.layers, preset.width, preset.batch_size) == (10, 400, 128)
+    assert preset.lr_start * preset.actor_lr_ratio == pytest.approx(1e-3)
+    preset.check()
+
+
+@pytest.mark.parametrize(
+    ("overrides", "field"),
+    [
+        ({"goals": "moon"}, "overrides.goals"),
+        ({"n_people": 5}, "overrides.n_people"),
+        ({"gamma": 1.0}, "overrides.gamma"),
+        ({"action_degree": 3, "action_bounds": "one-step"}, "overrides.action_bounds"),
+        ({"width": 1024, "layers": 8}, "overrides.width"),
+        (
+            {"critic_sees": "future", "observation": "state", "actor": "plain"},
+            "overrides.critic_sees",
+        ),
+        ({"dropped_quantiles": 25}, "overrides.dropped_quantiles"),
+        ({"people": "up-to", "n_people": 0}, "overrides.people"),
+        ({"people": "up-to", "option_rate": 0.01}, "overrides.people"),
+        ({"learning_starts": 900_000, "total_steps": 512_000}, "overrides.learning_starts"),
+    ],
+)
+def test_a_bad_override_is_refused_by_name(overrides, field):
+    with pytest.raises(InvalidInput) as refused:
+        presets.resolve("reach-td3", overrides)
+    assert refused.value.field == field
+
+
+@pytest.mark.parametrize(
+    "option",
+    [
+        {"critic": "quantiles", "n_quantiles": 8},
+        {"critic_sees": "future"},
+        {"precision": "bfloat16"},
+        {"alpha": 0.5, "n_steps": 3},
+        {"n_critics": 3, "layers": 3},
+        {"goals": "halton", "n_people": 2},
+        {"observation": "crowd", "n_people": 3, "people": "up-to"},
+    ],
+)
+def test_every_option_trains_and_moves_the_actor(option):
+    short = {**TINY, "total_steps": 1024, "checkpoint_steps": 256, **option}
+    recorder = Recorder()
+    recorder.run(presets.resolve("reach-td3", short))
+    before, after = recorder.checkpoints[0][1].arrays(), recorder.checkpoints[-1][1].arrays()
+    assert all(np.isfinite(array).all() for array in after.values())
+    assert not np.array_equal(before["actor.net.0.weight"], after["actor.net.0.weight"])
+    ReachPolicy(recorder.checkpoints[-1][1])
+
+
+def test_averaged_weights_are_what_is_shown_and_kept():
+    preset = presets.resolve("reach-td3", {**TINY, "ema": 0.99})
+    stopped = Recorder(stop_at=768)
+    stopped.run(preset)
+    _, policy, state = stopped.checkpoints[-1]
+    shown, arrays = policy.arrays()["actor.net.0.weight"], state.arrays()
+    assert np.array_equal(shown, arrays["actor.net.0.weight"])
+    assert not np.array_equal(shown, arrays["actor_learned.net.0.weight"])
+    resumed = Recorder()
+    resumed.run(preset, resume=state)
+    assert resumed.progress[-1].step == preset.total_steps
+
+
+def test_critics_that_see_the_future_stand_beside_an_actor_that_does_not(preset):
+    ahead = presets.resolve("reach-td3", {**TINY, "critic_sees": "future"})
+    run, _ = reach_training.start(ahead, 1, None, load_cell("shared-workspace"))
+    plain, _ = reach_training.start(preset, 1, None, load_cell("shared-workspace"))
+    shapes = [
+        {name: array.shape for name, array in one.checkpoints()[0].arrays().items()}
+        for one in (run, plain)
+    ]
+    assert shapes[0]["actor.net.0.weight"] == shapes[1]["actor.net.0.weight"]
+    assert shapes[0]["critic.q1.0.weight"][1] == shapes[1]["critic.q1.0.weight"][1] + 12
+    env = run.model.get_env()
+    obs = env.reset()
+    with torch.no_grad():
+        act = run.model.actor(torch.as_tensor(obs))
+        obs[:, -12:] += 1.0
+        assert torch.equal(act, run.model.actor(torch.as_tensor(obs)))

@@ -1,0 +1,80 @@
+import numpy as np
+import pytest
+
+from app.errors import BadMotion
+from app.sim.human.model import JOINT_NAMES
+from app.sim.mocap.csv_tables import read_csv
+from tests.sim.recorded_person import csv_text, working
+
+Q = working(30)
+TEXT = csv_text(Q)
+
+
+def fault(text: str) -> str:
+    with pytest.raises(BadMotion) as caught:
+        read_csv(text)
+    return caught.value.faults[0].text
+
+
+@pytest.mark.parametrize("degrees", [True, False])
+def test_angles_are_read_in_the_declared_unit(degrees: bool) -> None:
+    track = read_csv(csv_text(Q, degrees=degrees))
+    np.testing.assert_allclose(track.q, Q, atol=1e-8)
+    np.testing.assert_allclose(track.times, 0.02 * np.arange(30))
+    assert not track.pelvis_z.any()
+
+
+def test_columns_may_stand_in_any_order_and_carry_the_pelvis_height() -> None:
+    order = [*reversed(JOINT_NAMES), "pelvis_z"]
+    rows = [",".join(f"{one:.9f}" for one in (*row[::-1], -0.1)) for row in Q]
+    text = "\n".join(["# angles = radians", "# rate_hz = 50", ", ".join(order), *rows])
+    track = read_csv(text)
+    np.testing.assert_allclose(track.q, Q, atol=1e-8)
+    np.testing.assert_allclose(track.pelvis_z, -0.1)
+    np.testing.assert_allclose(np.diff(track.times), 0.02)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "text"),
+    [
+        ("# angles = degrees\n", "", "angles must be declared in the first line"),
+        ("= degrees", "= gradians", "angles = 'gradians' must be declared"),
+        ("= degrees", "= radians", "looks like degrees"),
+        ("elbow_r", "elbow", "line 2 lacks the columns elbow_r"),
+        ("elbow_r", "elbow_l", "line 2 = 'elbow_l' is the name of two columns"),
+        ("time", "thyme", "line 2 has unknown columns: thyme"),
+        ("\n0.020000000,", "\n0.000000000,", "line 4, column time = 0 must be later"),
+        ("\n0.020000000,", "\nsoon,", "line 4, column time = 'soon' must be a number"),
+        ("\n0.020000000,", "\n", "line 4 = <18> must hold 19 values, one per column"),
+        (TEXT[40:], "", "line 2 lacks the columns"),
+        (TEXT, "# angles = degrees\n", "file holds no table"),
+    ],
+)
+def test_fault_is_named_with_line_or_column(old: str, new: str, text: str) -> None:
+    assert old in TEXT
+    assert text in fault(TEXT.replace(old, new, 1))
+
+
+def test_table_in_radians_that_says_degrees_is_refused() -> None:
+    told = fault(csv_text(Q, degrees=False).replace("= radians", "= degrees"))
+    assert "looks like radians" in told
+
+
+def test_pelvis_in_millimetres_is_refused() -> None:
+    q = Q.copy()
+    q[:, :2] *= 1000.0
+    told = fault(csv_text(q))
+    assert told.startswith("column pelvis_x")
+    assert "looks like millimetres" in told
+
+
+def test_times_in_milliseconds_are_refused() -> None:
+    assert "looks like milliseconds" in fault(csv_text(Q, dt=20.0))
+
+
+@pytest.mark.parametrize(
+    "rate", ["", "# rate_hz = fast\n", "# rate_hz = 0\n", "# rate_hz = nan\n"]
+)
+def test_table_without_times_needs_a_rate(rate: str) -> None:
+    text = "\n".join(line.partition(",")[2] for line in TEXT.splitlines()[1:])
+    assert "rate_hz" in fault(f"# angles = degrees\n{rate}{text}")

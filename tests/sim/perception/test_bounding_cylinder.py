@@ -1,0 +1,89 @@
+"""The safety cylinder: smallest around the box, and wide enough for what is unseen."""
+
+import numpy as np
+import pytest
+
+from app.errors import InvalidInput
+from app.sim.human import model as human
+from app.sim.perception.bounding_cylinder import CylinderSettings, bounding_box, safety_cylinder
+from app.sim.perception.keypoints import GROUPS, K
+from tests.sim.tracked_person import CELL, seen, work
+
+BARE = CylinderSettings(flesh_margin=0.0)
+
+
+def test_box_of_a_turned_box_is_that_box() -> None:
+    rng = np.random.default_rng(5)
+    turn = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+    inside = rng.uniform(0.0, 1.0, (50, 3))
+    signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    unit = np.concatenate([signs, *(inside * sign for sign in signs)])
+    points = unit * [0.2, 0.4, 0.9] @ turn + [1.0, 2.0, 3.0]
+    corners = bounding_box(points)
+    edges = np.linalg.norm(corners[[1, 2, 4]] - corners[0], axis=1)
+    np.testing.assert_allclose(sorted(edges), [0.4, 0.8, 1.8], atol=1e-9)
+    np.testing.assert_allclose(corners.mean(axis=0), [1.0, 2.0, 3.0], atol=1e-9)
+
+
+def test_no_smaller_cylinder_holds_the_box() -> None:
+    rng = np.random.default_rng(6)
+    for q in work(1, 12.0)[1][::20]:
+        corners = bounding_box(seen(q))[:, :2]
+        found = safety_cylinder(seen(q), settings=BARE)
+        assert found is not None
+        for center in found.center + 0.2 * rng.standard_normal((200, 2)):
+            radius = np.linalg.norm(corners - center, axis=1).max()
+            assert radius >= found.radius / 1.1 - 1e-9
+
+
+def test_cylinder_holds_all_keypoints_and_the_whole_surface_of_the_body() -> None:
+    for seed in (1, 2, 3):
+        for q in work(seed, 12.0)[1][::5]:
+            points = seen(q)
+            found = safety_cylinder(points)
+            assert found is not None and found.contains(points)
+            ends = human.capsules(q, CELL.body, CELL.floor_z)
+            radii = human.CAPSULE_RADII[:, None]
+            away = np.linalg.norm(ends[:, :, :2] - found.center, axis=2) + radii
+            assert away.max() <= found.radius
+            assert (ends[:, :, 2] + radii).max() <= found.top
+
+
+def test_an_arm_never_seen_is_inside_wherever_it_is() -> None:
+    for seed in (1, 2, 3):
+        for q in work(seed, 12.0)[1][::5]:
+            points = seen(q)
+            partial = points.copy()
+            partial[[K[n] for n in ("elbow_r", "wrist_r", "wrist_l", "nose")]] = np.nan
+            partial[list(GROUPS["face"])] = np.nan
+            found = safety_cylinder(partial)
+            assert found is not None and found.contains(points)
+
+
+@pytest.mark.parametrize("names", [["neck"], ["wrist_r"], ["mid_hip", "nose"], ["ankle_l"]])
+def test_one_keypoint_alone_bounds_the_whole_person(names: list[str]) -> None:
+    for q in work(3, 12.0)[1][::20]:
+        partial = np.full((25, 3), np.nan)
+        members = [K[name] for name in names]
+        partial[members] = seen(q)[members]
+        found = safety_cylinder(partial)
+        points = np.array(list(human.joint_points(q, CELL.body).values()))
+        assert found is not None and found.contains(points)
+
+
+def test_nothing_seen_gives_no_cylinder() -> None:
+    assert safety_cylinder(np.full((25, 3), np.nan)) is None
+
+
+def test_cylinder_moves_on_with_its_velocity() -> None:
+    found = safety_cylinder(seen(work(1, 12.0)[1][0]), np.array([0.5, -1.0]))
+    assert found is not None
+    later = found.after(0.2, 0.03)
+    np.testing.assert_allclose(later.center - found.center, [0.1, -0.2])
+    assert later.radius == pytest.approx(found.radius + 0.03)
+
+
+@pytest.mark.parametrize("margin", [-0.1, np.nan, np.inf])
+def test_margins_that_are_none_are_refused(margin: float) -> None:
+    with pytest.raises(InvalidInput, match="flesh_margin"):
+        CylinderSettings(flesh_margin=margin)

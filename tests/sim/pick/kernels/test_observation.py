@@ -1,0 +1,107 @@
+"""What the networks see: the layout, and values checked against the models."""
+
+import numpy as np
+import pytest
+
+from app.sim.cells.cell import Cell, load_cell
+from app.sim.human import model as human
+from app.sim.pick import batch as pick
+from app.sim.pick.kernels.observation import DISTANCE_SCALE, LAYOUT, N_FEATURES
+from app.sim.robot.ur10 import Robot
+from app.sim.scene.scene import arm_of, people_of
+
+
+@pytest.fixture(scope="module")
+def cell() -> Cell:
+    return load_cell()
+
+
+def state(cell: Cell) -> dict[str, np.ndarray]:
+    rng = np.random.default_rng(95)
+    person = human.rest_posture(0.1, 1.3, -1.4)
+    return {
+        "q": np.array(cell.robot.home_q) + rng.normal(0, 0.2, 6) * [1, 1, 1, 1, 1, 0],
+        "qd": rng.uniform(-0.5, 0.5, 6) * [1, 1, 1, 1, 1, 0],
+        "human_q": person + rng.normal(0, 0.1, 18),
+        "human_qd": rng.normal(0, 0.5, 18),
+        "goals": cell.positions(),
+    }
+
+
+def seen(cell: Cell, **changes: np.ndarray) -> np.ndarray:
+    return pick.observe(
+        arm_of(cell), people_of(cell), **(state(cell) | changes), time_left_s=7.0
+    )[0]
+
+
+def test_layout_covers_the_observation_without_gap_or_overlap() -> None:
+    covered = np.concatenate([np.arange(N_FEATURES)[part] for part in LAYOUT.values()])
+    np.testing.assert_array_equal(covered, np.arange(N_FEATURES))
+
+
+def test_tool_and_target_are_where_pinocchio_has_them(cell: Cell) -> None:
+    obs, at, robot = seen(cell), state(cell), Robot()
+    pose = robot.tcp_pose(at["q"])
+    velocity = (robot.jacobian(at["q"]) @ at["qd"])[:3]
+    for row, goal in zip(obs, at["goals"], strict=True):
+        np.testing.assert_allclose(row[LAYOUT["tcp"]], pose[:3, 3], atol=1e-5)
+        away = 2.0 * (goal - pose[:3, 3])
+        np.testing.assert_allclose(row[LAYOUT["goal_minus_tcp"]], away, atol=1e-5)
+        np.testing.assert_allclose(row[LAYOUT["tcp_velocity"]], 2 * velocity, atol=1e-5)
+        np.testing.assert_allclose(row[LAYOUT["tool_axis"]], pose[:3, 2], atol=1e-5)
+
+
+def test_hand_velocities_are_the_derivatives_of_the_hands(cell: Cell) -> None:
+    at, step = state(cell), 1e-6
+    before = human.joint_points(at["human_q"], cell.body)
+    after = human.joint_points(at["human_q"] + step * at["human_qd"], cell.body)
+    speeds = [(after[hand] - before[hand]) / step for hand in ("hand_r", "hand_l")]
+    row = seen(cell)[0, LAYOUT["hand_velocities"]]
+    np.testing.assert_allclose(row, np.concatenate(speeds), atol=0.01)
+
+
+def test_a_full_turn_of_the_person_changes_nothing(cell: Cell) -> None:
+    turned = state(cell)["human_q"] + 2 * np.pi * (np.arange(18) == 2)
+    np.testing.assert_allclose(seen(cell, human_q=turned), seen(cell), atol=1e-5)
+
+
+def test_candidates_do_not_influence_one_another(cell: Cell) -> None:
+    together, goals = seen(cell), state(cell)["goals"]
+    for i, goal in enumerate(goals):
+        np.testing.assert_array_equal(seen(cell, goals=goal[None])[0], together[i])
+
+
+def test_base_motion_leads_to_the_posture_at_the_target(cell: Cell) -> None:
+    at = state(cell)
+    limits = np.array(cell.robot.q_min), np.array(cell.robot.q_max)
+    for row, goal in zip(seen(cell), at["goals"], strict=True):
+        way = Robot().ik_vertical(goal, *limits)[:5] - at["q"][:5]
+        np.testing.assert_allclose(row[LAYOUT["goal_posture_minus_q"]], way, atol=1e-5)
+        base = row[LAYOUT["base"]]
+        np.testing.assert_allclose(
+            base / np.abs(base).max(), way / np.abs(way).max(), atol=1e-5
+        )
+
+
+def test_person_far_away_is_seen_at_the_farthest_distance(cell: Cell) -> None:
+    away = human.rest_posture(0.0, 4.9, -1.57)
+    row = seen(cell, human_q=away, human_qd=np.zeros(18))[0]
+    assert row[LAYOUT["distance_tilt_clearance_time"]][2] == 3.0
+    np.testing.assert_array_equal(row[LAYOUT["look_ahead_still"]], 3.0)
+
+
+def test_approaching_person_shortens_the_look_ahead(cell: Cell) -> None:
+    person, walking = human.rest_posture(0.0, 1.6, -1.57), np.zeros(18)
+    walking[1] = -0.5
+    row = seen(cell, human_q=person, human_qd=walking)[0]
+    ahead = row[LAYOUT["look_ahead_still"]] * DISTANCE_SCALE
+    assert (np.diff(ahead) < 0).all()
+
+
+def test_seen_values_stay_within_a_few_units(cell: Cell) -> None:
+    batch = pick.PickBatch(cell, 200, 3, pick.PickSettings())
+    obs = batch.reset().copy()
+    for _ in range(20):
+        obs = batch.step(np.ones((200, 5), dtype=np.float32)).obs
+        assert np.isfinite(obs).all()
+        assert np.abs(obs).max() < 15.0

@@ -1,0 +1,216 @@
+"""The batched scenario: determinism, limits, starts, ends, and agreement with the referee."""
+
+import numpy as np
+import pytest
+
+from app.errors import InvalidInput, SimulationError
+from app.sim.cells.cell import Cell, load_cell
+from app.sim.collision.contact import contact
+from app.sim.collision.fcl_recheck import Recheck, Trajectory
+from app.sim.collision.kernels import contact as contact_kernel
+from app.sim.human import model as human
+from app.sim.pick import batch as pick
+from app.sim.pick.batch import OUTCOMES, PickBatch, PickSettings
+from app.sim.pick.kernels import observation as features
+from app.sim.pick.kernels.observation import LAYOUT
+from app.sim.robot.kernels import actions
+from app.sim.scene.scene import arm_of, people_of
+
+TEN_SECONDS = PickSettings(time_limit_s=10.0)
+
+
+@pytest.fixture(scope="module")
+def cell() -> Cell:
+    return load_cell()
+
+
+def random_actions(n_steps: int, n_envs: int) -> np.ndarray:
+    """Held for a second each, so that the robot gets about."""
+    rng = np.random.default_rng(81)
+    held = rng.uniform(-1, 1, (n_steps // 20 + 1, n_envs, 5))
+    return np.repeat(held, 20, axis=0)[:n_steps].astype(np.float32)
+
+
+def test_rows_do_not_depend_on_how_many_there_are(cell: Cell) -> None:
+    few, many = PickBatch(cell, 3, 5, TEN_SECONDS), PickBatch(cell, 9, 5, TEN_SECONDS)
+    np.testing.assert_array_equal(few.reset(), many.reset()[:3])
+    for act in random_actions(500, 9):
+        one, two = few.step(act[:3]), many.step(act)
+        np.testing.assert_array_equal(one.obs, two.obs[:3])
+        np.testing.assert_array_equal(one.rew, two.rew[:3])
+        np.testing.assert_array_equal(one.ended, two.ended[:3])
+    assert few.state.episode.sum() > 3
+
+
+def test_same_seed_gives_the_same_bits_and_another_seed_does_not(cell: Cell) -> None:
+    first, second = PickBatch(cell, 4, 5, TEN_SECONDS), PickBatch(cell, 4, 6, TEN_SECONDS)
+    start = first.reset().copy()
+    assert not np.array_equal(start, second.reset())
+    np.testing.assert_array_equal(start, second.reset(seed=5))
+
+
+def test_limits_hold_through_whole_episodes(cell: Cell) -> None:
+    batch = PickBatch(cell, 64, 5, TEN_SECONDS)
+    batch.reset()
+    mount, qd0 = cell.robot, batch.state.qd.copy()
+    for act in random_actions(400, 64):
+        result = batch.step(np.sign(act).astype(np.float32))
+        q, qd = batch.state.q, batch.state.qd
+        assert (q >= np.array(mount.q_min) - 1e-9).all()
+        assert (q <= np.array(mount.q_max) + 1e-9).all()
+        assert (np.abs(qd) <= np.array(mount.qd_max) + 1e-9).all()
+        going_on = result.ended == 0
+        acc = np.abs(qd - qd0)[going_on] / mount.dt
+        assert (acc <= np.array(mount.qdd_max) + 1e-9).all()
+        qd0 = qd.copy()
+
+
+def test_starts_keep_the_required_clearance_from_the_person(cell: Cell) -> None:
+    batch = PickBatch(cell, 400, 7, PickSettings(start_clearance_m=0.05))
+    obs = batch.reset()
+    assert (batch.state.clear[:, 0] >= 0.05).all()
+    assert np.isfinite(obs).all()
+    assert (batch.state.outcome == OUTCOMES.index("running")).all()
+
+
+def test_robot_starts_from_home_cubes_and_docks_in_equal_shares(cell: Cell) -> None:
+    batch = PickBatch(cell, 1500, 8, PickSettings(start_clearance_m=-10.0))
+    batch.reset()
+    at_home = (batch.state.q == np.array(cell.robot.home_q)).all(axis=1)
+    docks = batch.world.station_q[batch.world.n_cubes :]
+    at_dock = (batch.state.q[:, None] == docks).all(axis=2).any(axis=1)
+    assert at_home.mean() == pytest.approx(1 / 3, abs=0.05)
+    assert at_dock.mean() == pytest.approx(1 / 3, abs=0.05)
+
+
+def test_targets_are_drawn_uniformly(cell: Cell) -> None:
+    batch = PickBatch(cell, 4000, 9, PickSettings(start_clearance_m=-10.0))
+    batch.reset()
+    counts = np.bincount(batch.state.candidates[:, 0], minlength=len(cell.stations))
+    np.testing.assert_allclose(counts / 4000, 1 / len(cell.stations), atol=0.03)
+
+
+def test_candidates_are_different_stations_in_the_asked_for_number(cell: Cell) -> None:
+    batch = PickBatch(cell, 500, 10, PickSettings(n_candidates=(2, 3)))
+    batch.reset()
+    for row in batch.state.candidates:
+        offered = row[row >= 0]
+        assert len(set(offered)) == len(offered)
+    sizes = (batch.state.candidates >= 0).sum(axis=1)
+    assert set(sizes) == {2, 3}
+
+
+def test_meshes_find_no_contact_that_the_kernels_missed(cell: Cell) -> None:
+    batch = PickBatch(cell, 24, 12, TEN_SECONDS)
+    obs, state = batch.reset(), batch.state
+    paths: list[list[tuple[np.ndarray, ...]]] = [[] for _ in range(24)]
+    for _ in range(200):
+        before = state.q.copy(), state.qd.copy(), state.people.q[:, 0].copy()
+        running = np.flatnonzero(state.outcome == 0)
+        obs = batch.step(obs[:, LAYOUT["base"]].copy(), auto_reset=False).obs
+        for e in running:
+            paths[e].append(
+                (*(b[e] for b in before), state.qd[e].copy(), state.people.q[e, 0].copy())
+            )
+    recheck, x = Recheck(cell), np.arange(5)[:, None] / 5
+    for e, path in enumerate(paths):
+        q, person = [], []
+        for q0, qd0, human0, qd1, human1 in path:
+            q.append(q0 + cell.robot.dt * (qd0 * x + 0.5 * (qd1 - qd0) * x**2))
+            person.append(human0 + (human1 - human0) * x)
+        q_robot = np.concatenate([*q, state.q[e : e + 1]])
+        q_human = np.concatenate([*person, state.people.q[e]])
+        sizes = np.repeat(state.people.size[e], len(q_human), axis=0)
+        path = Trajectory(q_robot=q_robot, q_human=q_human, dt=0.01, sizes=sizes)
+        hit = recheck.first_contact(path)
+        assert hit is None or OUTCOMES[state.outcome[e]] == "collision"
+    assert {OUTCOMES[outcome] for outcome in state.outcome} >= {"success", "collision"}
+
+
+def test_single_state_functions_do_what_the_batch_does(cell: Cell) -> None:
+    batch = PickBatch(cell, 6, 13, TEN_SECONDS)
+    batch.reset()
+    state, people = batch.state, batch.world.people
+    for act in random_actions(40, 6):
+        q, qd, person = state.q.copy(), state.qd.copy(), state.people.q.copy()
+        result = batch.step(act, auto_reset=False)
+        for e in np.flatnonzero(state.outcome == 0):
+            piece = pick.step_robot(batch.arm, q[e], qd[e], np.zeros(6), act[e])
+            np.testing.assert_array_equal(piece.q, state.q[e])
+            np.testing.assert_array_equal(piece.qd, state.qd[e])
+            hit = contact(
+                batch.arm,
+                people,
+                q[e],
+                qd[e],
+                piece.c,
+                piece.d,
+                (person[e], state.people.q[e]),
+                sizes=state.people.size[e],
+            )
+            assert hit.kind == "none" and hit.clearance_m == state.clear[e, 0]
+            seen, _ = pick.observe(
+                batch.arm, people, piece.q, piece.qd, state.people.q[e, 0],
+                state.people.qd[e, 0], state.goal[e : e + 1], state.time_left[e],
+                state.people.size[e, 0],
+            )  # fmt: skip
+            np.testing.assert_array_equal(seen[0], result.obs[e])
+
+
+def test_person_at_the_tool_is_a_contact_with_both_names(cell: Cell) -> None:
+    arm, people, zero = arm_of(cell), people_of(cell), np.zeros(6)
+    rest = human.rest_posture(*cell.human.home)
+    q = PickBatch(cell, 1, 0, TEN_SECONDS).world.station_q[3]
+    grip = np.array(cell.stations[3].position) + [0.0, 0.04, 0.06]
+    person = human.reach("r", grip, rest, cell.body).q[None]
+    found = contact(arm, people, q, zero, zero, zero, (person, person))
+    assert found.kind == "human"
+    assert found.part in ("hand_r", "forearm_r")
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_numbers_that_are_not_finite_are_errors_not_silence(cell: Cell, value: float) -> None:
+    arm, people, zero = arm_of(cell), people_of(cell), np.zeros(6)
+    person = human.rest_posture(*cell.human.home)[None]
+    person[0, 3] = value
+    with pytest.raises(SimulationError, match="finite"):
+        contact(arm, people, arm.home, zero, zero, zero, (person, person))
+    with pytest.raises(SimulationError, match="finite"):
+        pick.step_robot(arm, arm.home, zero, zero, np.full(5, value))
+    with pytest.raises(SimulationError, match="finite"):
+        PickBatch(cell, 1, 0, TEN_SECONDS).step(np.full((1, 5), value, dtype=np.float32))
+
+
+def test_cell_whose_station_is_out_of_reach_is_refused_by_name(cell: Cell) -> None:
+    far = cell.stations[0].model_copy(update={"position": (0.0, 2.0, 0.1)})
+    broken = cell.model_copy(update={"stations": (far, *cell.stations[1:])})
+    with pytest.raises(InvalidInput, match="stations.cube0.position"):
+        PickBatch(broken, 1, 0, TEN_SECONDS)
+
+
+def test_hands_are_fast_enough_to_be_a_problem(cell: Cell) -> None:
+    speeds = pick.hand_speeds(PickBatch(cell, 1, 11, TEN_SECONDS), n_scripts=60)
+    assert speeds["hand_speed_median_m_s"] >= 0.4
+    assert speeds["hand_speed_p99_m_s"] >= 1.5
+
+
+def test_read_only_integer_and_strided_inputs_compile_nothing_anew(cell: Cell) -> None:
+    arm, people = arm_of(cell), people_of(cell)
+    person = human.rest_posture(*cell.human.home)
+    q, zero, goals = arm.home.copy(), np.zeros(6), cell.positions()
+
+    def use() -> None:
+        pick.step_robot(arm, q, zero, zero, zero[:5])
+        contact(arm, people, q, zero, zero, zero, (person[None], person[None]))
+        pick.observe(arm, people, q, zero, person, np.zeros(18), goals[::2], 10)
+        pick.tool_state(arm, q, zero, goals[0])
+        human.capsules(person, cell.body, cell.floor_z)
+
+    use()
+    kernels = (features.observe_rows, contact_kernel.sweep, actions.advance)
+    before = [len(compiled.signatures) for compiled in kernels]
+    zero, goals = np.zeros(6, dtype=np.int64), goals[:, :]
+    for array in (q, person, goals):
+        array.setflags(write=False)
+    use()
+    assert [len(compiled.signatures) for compiled in kernels] == before

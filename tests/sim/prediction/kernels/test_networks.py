@@ -1,0 +1,69 @@
+"""What is forecast of a walker: the networks in the kernel, and simple people."""
+
+import numpy as np
+import pytest
+
+from app.sim.people.kernels.pedestrian import N_PAST
+from app.sim.prediction.kernels.networks import (
+    N_TIMES,
+    RADIUS_MIDDLE,
+    RADIUS_SCALE,
+    SPEED_MIDDLE,
+    SPEED_SCALE,
+    STEP_S,
+    forecast,
+)
+from app.sim.prediction.weights import new_forecaster
+
+TIMES = STEP_S * np.arange(1, N_TIMES + 1)
+
+
+def told(
+    r: float, growth: float, speed: float, age: float, radii: np.ndarray, speeds: np.ndarray
+) -> np.ndarray:
+    out = np.full((N_TIMES, 2), np.nan)
+    forecast(new_forecaster(), r, growth, speed, age, radii, speeds, out)
+    return out
+
+
+def test_the_kernel_computes_the_networks() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        radii, speeds = rng.uniform(0.2, 0.5, N_PAST), rng.uniform(0.0, 1.0, N_PAST)
+        r, growth, speed, age = 0.3, 0.7, 0.8, 0.04
+        net = new_forecaster()
+        seen = np.r_[(r - RADIUS_MIDDLE) / RADIUS_SCALE, growth, age / 0.1]
+        seen = np.r_[seen, (radii - RADIUS_MIDDLE) / RADIUS_SCALE]
+        radius = r + RADIUS_SCALE * _said(net.radius, seen)
+        seen = np.r_[(speed - SPEED_MIDDLE) / SPEED_SCALE, 0.0, age / 0.1]
+        seen = np.r_[seen, (speeds - SPEED_MIDDLE) / SPEED_SCALE]
+        way = np.maximum(0.0, TIMES * (speed + SPEED_SCALE * _said(net.way, seen)))
+        found = told(r, growth, speed, age, radii, speeds)
+        np.testing.assert_allclose(found, np.stack([radius, way], axis=1), atol=2e-5)
+
+
+def _said(net, seen: np.ndarray) -> np.ndarray:
+    hidden = np.maximum(seen.astype(np.float32) @ net.w1 + net.b1, 0.0)
+    return np.maximum(hidden @ net.w2 + net.b2, 0.0) @ net.w3 + net.b3
+
+
+@pytest.mark.parametrize("r", [0.22, 0.35, 0.48])
+def test_who_was_always_the_same_stays_about_so(r: float) -> None:
+    found = told(r, 0.0, 0.6, 0.0, np.full(N_PAST, r), np.full(N_PAST, 0.6))
+    assert np.abs(found[:12, 0] - r).max() < 0.06
+    assert np.abs(found[:12, 1] - 0.6 * TIMES[:12]).max() < 0.08
+
+
+def test_who_stands_and_stood_goes_nowhere() -> None:
+    found = told(0.3, 0.0, 0.0, 0.0, np.full(N_PAST, 0.3), np.zeros(N_PAST))
+    assert found[:, 1].max() < 0.06
+
+
+def test_a_wave_is_recognised() -> None:
+    """A radius that went up and down twice in the last second will be wide when it was."""
+    t = -0.1 * np.arange(N_PAST)
+    wave = lambda s: 0.35 + 0.1 * np.sin(2.0 * np.pi * 0.5 * s + 0.3)  # noqa: E731
+    growth = 0.1 * np.pi * np.cos(0.3)
+    found = told(wave(0.0), growth, 0.6, 0.0, wave(t), np.full(N_PAST, 0.6))
+    assert np.abs(found[:, 0] - wave(TIMES)).mean() < 0.06
+    assert np.abs(found[:, 0] - wave(TIMES)).mean() < np.abs(wave(0.0) - wave(TIMES)).mean()

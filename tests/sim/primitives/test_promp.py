@@ -1,0 +1,216 @@
+"""Movement primitives: formulas, derivatives, and an independent implementation."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.errors import InvalidInput
+from app.sim.core.arrays import Vec
+from app.sim.primitives.promp import (
+    ProMP,
+    basis,
+    basis_slope,
+    draw_durations,
+    draw_like,
+    draw_weights,
+    fit,
+    gain,
+    gain_of_ends,
+    moments,
+    observe,
+    of_weights,
+    positions,
+    reversed_primitive,
+    speed_moments,
+    speeds,
+    usual_width,
+)
+from tests.sim import make_promp_reference as reference
+from tests.sim.demonstrations import reaches
+
+Z = np.linspace(0.0, 1.0, 41)
+RATE = np.full(41, 1.0)
+
+
+@pytest.fixture(scope="module")
+def promp() -> ProMP:
+    return fit(*reaches())
+
+
+@pytest.fixture(scope="module")
+def peer() -> dict[str, Vec]:
+    """What the package movement_primitives gives for the same primitive."""
+    with np.load(reference.FILE, allow_pickle=False) as file:
+        return dict(file)
+
+
+def test_basis_sums_to_one_and_peaks_at_its_centres() -> None:
+    phi = basis(np.linspace(0.0, 1.0, 12), 12, usual_width(12))
+    np.testing.assert_allclose(phi.sum(axis=1), 1.0, atol=1e-14)
+    assert (phi.argmax(axis=1) == np.arange(12)).all()
+
+
+def test_basis_slope_is_the_derivative_of_the_basis() -> None:
+    step, width = 1e-6, usual_width(12)
+    numeric = (basis(Z + step, 12, width) - basis(Z - step, 12, width)) / (2 * step)
+    np.testing.assert_allclose(basis_slope(Z, 12, width), numeric, atol=1e-7)
+
+
+def test_ridge_regression_is_that_of_its_formula() -> None:
+    motion = np.random.default_rng(3).normal(size=(30, 2))
+    found = fit([motion], [1.0], n_basis=5, ridge=0.01).mean
+    phi = basis(np.linspace(0.0, 1.0, 30), 5, usual_width(5))
+    stacked = np.vstack([phi, math.sqrt(0.01 * 30) * np.eye(5)])
+    expected = np.linalg.lstsq(stacked, np.vstack([motion, np.zeros((5, 2))]), rcond=None)[0]
+    np.testing.assert_allclose(found, expected.T, atol=1e-10)
+
+
+def test_fit_follows_twenty_demonstrations_within_a_milliradian(promp: ProMP) -> None:
+    assert promp.mean.shape == (18, 12)
+    assert promp.residual.max() < 1e-3
+    ends = np.array([[motion[0], motion[-1]] for motion in reaches()[0]])
+    mean, cov = moments(promp, np.array([0.0, 1.0]))
+    np.testing.assert_allclose(mean, ends.mean(axis=0), atol=2e-3)
+    spread = np.sqrt(np.diagonal(cov, axis1=1, axis2=2))
+    np.testing.assert_allclose(spread, np.hypot(ends.std(axis=0, ddof=1), 0.01), atol=3e-3)
+
+
+def test_weights_of_known_spread_are_found_again() -> None:
+    rng = np.random.default_rng(8)
+    template = fit(*reaches(4))
+    true = replace(template, cov=template.cov * 4.0)
+    weights = draw_weights(true, 4000, rng)
+    motions = positions(true, weights, np.linspace(0.0, 1.0, 40))
+    found = fit(list(motions), np.ones(4000), floor=0.0)
+    np.testing.assert_allclose(found.mean, true.mean, atol=0.03)
+    np.testing.assert_allclose(moments(found, Z)[1], moments(true, Z)[1], atol=0.012)
+
+
+def test_execution_times_are_drawn_like_the_demonstrated_ones(promp: ProMP) -> None:
+    logs = np.log(reaches()[1])
+    drawn = np.log(draw_durations(promp, 20000, np.random.default_rng(1)))
+    assert drawn.mean() == pytest.approx(logs.mean(), abs=0.01)
+    assert drawn.std() == pytest.approx(logs.std(ddof=1), abs=0.01)
+
+
+def test_given_phases_align_demonstrations_of_unlike_pace() -> None:
+    x = np.linspace(0.0, 1.0, 80)
+    path = np.stack([np.sin(2.0 * x), np.cos(3.0 * x)], axis=1)
+    late = np.stack([np.sin(2.0 * x**2), np.cos(3.0 * x**2)], axis=1)
+    aligned = fit([path, late], [1.0, 1.0], phases=[x, x**2], floor=0.0)
+    blind = fit([path, late], [1.0, 1.0], floor=0.0)
+    assert moments(aligned, Z)[1].max() < 1e-5 < 1e-2 < moments(blind, Z)[1].max()
+
+
+def test_speeds_are_the_derivatives_of_the_positions(promp: ProMP) -> None:
+    weights, step = draw_weights(promp, 3, np.random.default_rng(2)), 1e-6
+    ahead, behind = (positions(promp, weights, Z + s) for s in (step, -step))
+    found = speeds(promp, weights, Z, np.full(41, 0.8))
+    np.testing.assert_allclose(found, 0.8 * (ahead - behind) / (2 * step), atol=1e-6)
+
+
+def test_moments_are_those_of_many_draws(promp: ProMP) -> None:
+    weights = draw_weights(promp, 20000, np.random.default_rng(6))
+    phase, rate = np.array([0.3]), np.array([0.7])
+    for drawn, (mean, cov) in (
+        (positions(promp, weights, phase)[:, 0], moments(promp, phase)),
+        (speeds(promp, weights, phase, rate)[:, 0], speed_moments(promp, phase, rate)),
+    ):
+        scale = np.sqrt(np.diag(cov[0]))
+        np.testing.assert_allclose((drawn.mean(axis=0) - mean[0]) / scale, 0.0, atol=0.04)
+        off = (np.cov(drawn.T) - cov[0]) / np.outer(scale, scale)
+        np.testing.assert_allclose(off, 0.0, atol=0.06)
+
+
+def test_moments_agree_with_the_package_movement_primitives(peer: dict[str, Vec]) -> None:
+    promp, phases = reference.primitive(), reference.Z
+    mean, cov = moments(promp, phases)
+    np.testing.assert_allclose(mean, peer["mean"], atol=1e-9)
+    np.testing.assert_allclose(cov, peer["cov"], atol=1e-9)
+    mean, cov = speed_moments(promp, phases, np.full(len(phases), 1.0))
+    np.testing.assert_allclose(mean, peer["mean_speed"], atol=1e-8)
+    np.testing.assert_allclose(cov, peer["cov_speed"], atol=1e-8)
+
+
+@pytest.mark.parametrize("k", range(len(reference.VARIANCES)))
+def test_conditioning_agrees_with_the_package_movement_primitives(
+    peer: dict[str, Vec], k: int
+) -> None:
+    start = promp = reference.primitive()
+    noise = reference.VARIANCES[k] * np.eye(18)
+    for phase, target in reference.via_points(start):
+        rows = np.kron(np.eye(18), basis(np.array([phase]), reference.N_BASIS, promp.width))
+        promp = observe(promp, rows, target, noise)
+    mean, cov = moments(promp, reference.Z)
+    np.testing.assert_allclose(mean, peer[f"mean_{k}"], atol=1e-6)
+    np.testing.assert_allclose(cov, peer[f"cov_{k}"], atol=1e-8)
+
+
+def test_observations_together_and_one_by_one_are_the_same(promp: ProMP) -> None:
+    rng = np.random.default_rng(9)
+    rows, values = rng.normal(size=(6, 216)), rng.normal(size=6)
+    noise = np.diag(rng.uniform(0.01, 0.1, 6))
+    together, singly = observe(promp, rows, values, noise), promp
+    for i in range(6):
+        singly = observe(
+            singly, rows[i : i + 1], values[i : i + 1], noise[i : i + 1, i : i + 1]
+        )
+    np.testing.assert_allclose(together.mean, singly.mean, atol=1e-8)
+    np.testing.assert_allclose(together.cov, singly.cov, atol=1e-9)
+
+
+def test_draws_like_demonstrations_are_draws_from_their_primitive() -> None:
+    rng = np.random.default_rng(4)
+    weights = rng.normal(0.0, 0.2, (7, 2, 4))
+    known = of_weights(weights, np.ones(7), floor=0.1)
+    drawn = draw_like(weights, 40_000, rng, floor=0.1).reshape(-1, 8)
+    np.testing.assert_allclose(drawn.mean(axis=0), known.mean.ravel(), atol=5e-3)
+    np.testing.assert_allclose(np.cov(drawn.T), known.cov, atol=3e-3)
+
+
+def test_gain_of_both_ends_is_the_gain_of_the_whole_covariance() -> None:
+    weights = np.random.default_rng(5).normal(0.0, 0.3, (9, 3, 12))
+    known = of_weights(weights, np.ones(9), floor=0.03)
+    phi = basis(np.array([0.0, 1.0]), 12, known.width)
+    rows = np.concatenate([np.kron(np.eye(3), row) for row in phi])
+    expected = gain(known, rows, np.zeros((6, 6)))
+    np.testing.assert_allclose(gain_of_ends(weights, 0.03), expected, atol=1e-9)
+
+
+def test_reversed_primitive_is_that_of_reversed_demonstrations(promp: ProMP) -> None:
+    motions, durations = reaches()
+    expected = fit([motion[::-1] for motion in motions], durations)
+    found = reversed_primitive(promp)
+    np.testing.assert_allclose(found.mean, expected.mean, atol=1e-6)
+    np.testing.assert_allclose(found.cov, expected.cov, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "field"),
+    [
+        (lambda d, t: ([], []), "demonstrations"),
+        (lambda d, t: (d, t[:-1]), "demonstrations"),
+        (lambda d, t: ([d[0], d[1][:5]], t[:2]), "demonstrations[1].shape"),
+        (lambda d, t: ([d[0], d[1][:, :17]], t[:2]), "demonstrations[1].shape"),
+        (lambda d, t: ([np.where(d[0] == d[0][7], np.nan, d[0])], t[:1]), "demonstrations[0]["),
+        (lambda d, t: (d[:1], [0.0]), "durations[0]"),
+        (lambda d, t: (d[:1], [np.nan]), "durations[0]"),
+    ],
+)
+def test_broken_demonstration_is_named(spoil, field: str) -> None:
+    with pytest.raises(InvalidInput) as caught:
+        fit(*spoil(*reaches(3)))
+    assert caught.value.field.startswith(field)
+
+
+@pytest.mark.parametrize("phases", [[], [np.linspace(0.0, 1.0, 9)], [np.full(80, np.nan)]])
+def test_phases_that_do_not_fit_their_samples_are_named(phases: list[Vec]) -> None:
+    with pytest.raises(InvalidInput, match="phases"):
+        fit([np.zeros((80, 2))], [1.0], phases=phases)
+
+
+def test_primitive_cannot_be_written_to(promp: ProMP) -> None:
+    with pytest.raises(ValueError, match="read-only"):
+        promp.mean[0, 0] = 1.0

@@ -1,0 +1,76 @@
+"""Planners drive guarded cells: they arrive alone, wait for people, and replay exactly."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from app.sim.cells.cell import load_cell
+from app.sim.planning.ompl_planners import PlanSettings
+from app.sim.planning.replanning import FollowSettings
+from app.sim.reach.batch import ReachSettings
+from app.sim.reach.monitored.batch import GuardedReach
+from app.sim.reach.monitored.planners import GOAL_SPREAD, drive_planner, postures_of
+from app.sim.robot.ur10 import Robot
+from app.sim.safety.layer import safety_settings
+from app.sim.scene.scene import arm_of
+
+CELL = load_cell("shared-workspace")
+ARM = arm_of(CELL)
+GOALS = np.array([[0.2, 0.9, 0.3], [-0.2, 0.85, 0.25]])
+POSTURES = postures_of(ARM, GOALS, 3)
+PLANNED = PlanSettings(planner="rrt-connect", max_poses=6_000)
+RULES = ReachSettings(goals="box", people=("walker",), time_limit_s=15.0)
+
+
+def in_the_way(leaves_s: float) -> np.ndarray:
+    """Somebody between robot and goals who walks off to the side after a while."""
+    t = 0.02 * np.arange(600)
+    x = 0.05 + np.maximum(0.0, t - leaves_s)
+    return np.repeat(
+        np.column_stack([x, np.full(600, 0.7), np.full(600, 0.2)])[None], 2, axis=0
+    )
+
+
+def run(role: str, tracks: np.ndarray | None, **more: bool) -> GuardedReach:
+    rules = RULES if tracks is not None else replace(RULES, people=())
+    batch = GuardedReach(
+        CELL, 2, 0, rules, safety_settings(CELL), tracks=tracks, rest_ends=False
+    )
+    batch.reset()
+    batch.set_goals(np.arange(2), GOALS)
+    overrides, _ = drive_planner(
+        batch, POSTURES, FollowSettings(role=role, plan=PLANNED), 5, **more
+    )
+    for row, course in enumerate(overrides):
+        assert len(course) == round(batch.runs().seconds[row] / ARM.dt)
+    return batch
+
+
+def test_postures_lie_where_success_counts():
+    robot = Robot(CELL.robot.tool_length)
+    for goal, postures in zip(GOALS, POSTURES, strict=True):
+        assert len(postures) >= 2
+        for q in postures:
+            assert np.linalg.norm(robot.tcp_pose(q)[:3, 3] - goal) <= GOAL_SPREAD + 1e-3
+
+
+def test_alone_every_role_arrives_at_once():
+    times = {role: run(role, None).runs() for role in ("once", "when-blocked", "every-tick")}
+    for runs in times.values():
+        assert runs.arrived.all()
+        assert (runs.stopped_s == 0.0).all()
+        np.testing.assert_allclose(runs.seconds, times["once"].seconds, atol=0.05)
+
+
+def test_a_planner_waits_until_who_holds_it_has_gone():
+    runs = run("when-blocked", in_the_way(2.0)).runs()
+    assert runs.arrived.all()
+    assert (runs.stopped_s > 2.0).all()
+    assert (runs.seconds > 3.0).all()
+
+
+def test_a_blind_planner_is_told_of_nobody():
+    told = run("once", in_the_way(2.0), blind=True).runs()
+    alone = run("once", None).runs()
+    np.testing.assert_allclose(told.joint_way, alone.joint_way, atol=0.1)
+    assert (told.seconds > alone.seconds + 1.0).all()

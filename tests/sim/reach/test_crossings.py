@@ -1,0 +1,119 @@
+"""Crossings lie between robot and goal, in the stated ranges, fixed by seed and number."""
+
+import math
+
+import numpy as np
+import pytest
+
+from app.errors import InvalidInput
+from app.sim.cells.cell import load_cell
+from app.sim.collision.checker import Checker, shapes_of
+from app.sim.reach import crossings as crossing
+from app.sim.reach.crossings import (
+    covered,
+    crossing_time,
+    crossings,
+    cylinder_track,
+    recorded_crossings,
+    tcp_at_home,
+)
+from app.sim.scene.scene import arm_of
+from tests.sim.recorded_motion import recorded
+
+CELL = load_cell("shared-workspace")
+DT = CELL.robot.dt
+HOME = tcp_at_home(CELL)
+
+
+@pytest.fixture(scope="module")
+def evaluated() -> crossing.CrossingSet:
+    return crossings(CELL)
+
+
+def clearances_at_home(track: np.ndarray) -> np.ndarray:
+    arm, top = arm_of(CELL), CELL.floor_z + crossing.HEIGHT
+    return np.array(
+        [
+            Checker(arm, shapes_of(CELL, None, np.array([[*row, top]])))
+            .clearance(np.array(arm.home))
+            .people
+            for row in track
+        ]
+    )
+
+
+def test_every_one_of_the_200_crosses_between_the_robot_and_its_goal(evaluated):
+    assert len(evaluated.crossings) == len(evaluated.goals) == 200
+    for one in evaluated.crossings:
+        found = crossing_time(one.track, HOME, one.goal, DT)
+        assert found == pytest.approx(one.arrival, abs=DT + 1e-9)
+        assert covered(one.track, HOME, one.goal)[round(one.arrival / DT)]
+
+
+def test_they_keep_to_the_stated_ranges(evaluated):
+    half = 0.5 * np.array(CELL.goal_region.size)
+    assert (np.abs(evaluated.goals - CELL.goal_region.center) <= half).all()
+    for one in evaluated.crossings:
+        assert crossing.ARRIVAL[0] <= one.arrival <= crossing.ARRIVAL[1]
+        steps = np.linalg.norm(np.diff(one.track[:, :2], axis=0), axis=1) / DT
+        assert steps.max() == pytest.approx(one.speed)
+        assert crossing.SPEED[0] <= one.speed <= crossing.SPEED[1]
+        assert crossing.RADIUS[0] <= one.track[0, 2] <= crossing.RADIUS[1]
+        stands = (steps < 1e-9).sum() * DT
+        assert stands == pytest.approx(one.dwell, abs=2 * DT)
+        assert crossing.DWELL[0] <= one.dwell <= crossing.DWELL[1]
+
+
+def test_they_begin_away_from_home_and_never_touch_a_robot_that_waits_there(evaluated):
+    for one in evaluated.crossings[::20]:
+        found = clearances_at_home(one.track[::10])
+        assert found[0] >= crossing.AT_START
+        assert found.min() >= crossing.CLEAR - 0.01
+        assert found[-1] > 2.0
+
+
+def test_a_crossing_is_fixed_by_seed_and_number(evaluated):
+    again = crossings(CELL, 3)
+    for k in range(3):
+        np.testing.assert_array_equal(again.crossings[k].track, evaluated.crossings[k].track)
+    assert not np.array_equal(crossings(CELL, 3, seed=1).goals, again.goals)
+
+
+def test_shorter_tracks_of_a_set_stay_where_they_end(evaluated):
+    one = min(evaluated.crossings, key=lambda each: len(each.track))
+    rest = evaluated.tracks[one.number, len(one.track) :]
+    assert len(rest) > 0
+    assert (rest == one.track[-1]).all()
+
+
+def test_an_axis_that_passes_behind_the_goal_does_not_cross():
+    goal = HOME + np.array([0.0, 0.5, 0.0])
+    x = np.linspace(-1.0, 1.0, 101)
+    for y, crosses in ((0.4, True), (0.6, False), (-0.1, False)):
+        track = np.column_stack([HOME[0] + x, np.full(101, HOME[1] + y), np.full(101, 0.2)])
+        assert math.isfinite(crossing_time(track, HOME, goal, DT)) == crosses
+        assert covered(track, HOME, goal).any()
+    assert not covered(track - np.array([0.0, 0.15, 0.0]), HOME, goal).any()
+
+
+def test_recorded_people_become_cylinders_that_cover_the_way_to_the_goal():
+    motion = recorded(4.0, walk=2.4, turn=0.0)
+    run = cylinder_track(motion, CELL.floor_z, DT)
+    assert np.linalg.norm(run[-1, :2] - run[0, :2]) == pytest.approx(2.4, abs=0.3)
+    found = recorded_crossings(CELL, [motion], 4)
+    for one in found.crossings:
+        over = covered(one.track, HOME, one.goal)
+        assert np.argmax(over) * DT == pytest.approx(one.arrival)
+        assert 0.0 < one.arrival <= crossing.ARRIVAL[1]
+        assert crossing.LEAST_STEP <= one.speed <= 1.2
+        assert "made-up.csv" in one.source
+        assert clearances_at_home(one.track[::5]).min() >= crossing.CLEAR - 0.01
+
+
+def test_recordings_of_people_who_stand_still_are_refused_by_name():
+    with pytest.raises(InvalidInput, match="made-up"):
+        recorded_crossings(CELL, [recorded(4.0, walk=0.0, turn=0.0)], 1)
+    with pytest.raises(InvalidInput, match="motions"):
+        recorded_crossings(CELL, [], 1)
+    with pytest.raises(InvalidInput, match="crossings"):
+        crossings(CELL, 0)

@@ -1,0 +1,113 @@
+"""Replays are of the same episodes, and only what cannot be done stays unsolved."""
+
+import numpy as np
+import pytest
+
+from app.sim.cells.cell import load_cell
+from app.sim.reach.batch import ReachBatch, ReachSettings
+from app.sim.reach.oracle_search import Hindsight, copy_rows, never_possible, walks_of
+from app.sim.scenario.kernels.episode import RUNNING, SUCCESS
+from tests.policies.straight_mover import Straight
+
+CELL = load_cell("shared-workspace")
+RULES = ReachSettings()
+SMALL = 256
+
+
+def batch_of(n: int, seed: int = 4, rules: ReachSettings = RULES) -> ReachBatch:
+    batch = ReachBatch(CELL, n, seed, rules)
+    batch.reset()
+    return batch
+
+
+def still(batch: ReachBatch) -> np.ndarray:
+    return np.zeros((batch.n_envs, 6), dtype=np.float32)
+
+
+def test_a_copied_episode_goes_exactly_as_the_first():
+    first, other = batch_of(6), batch_of(4, seed=99)
+    rows = np.array([5, 2, 2])
+    copy_rows(first.state, rows, other.state, 1)
+    mover = Straight()
+    for _ in range(100):
+        first.step(mover.acts(first), auto_reset=False)
+        other.step(mover.acts(other), auto_reset=False)
+    np.testing.assert_array_equal(other.state.q[1:], first.state.q[rows])
+    np.testing.assert_array_equal(
+        other.state.people.cylinders[1:], first.state.people.cylinders[rows]
+    )
+    np.testing.assert_array_equal(other.state.outcome[1:], first.state.outcome[rows])
+
+
+def test_a_policy_replayed_by_itself_ends_as_it_does_without_the_search():
+    batch, mover = batch_of(40), Straight()
+    search = Hindsight(batch, 1, SMALL)
+    search.undisturbed(mover.acts)
+    while (batch.state.outcome == RUNNING).any():
+        batch.step(mover.acts(batch), auto_reset=False)
+    solved = batch.state.outcome == SUCCESS
+    assert 5 < solved.sum() < 40
+    np.testing.assert_array_equal(search.replays.reached > 0, solved)
+    np.testing.assert_allclose(search.replays.soonest[solved], batch.state.elapsed[solved])
+
+
+def test_replays_solve_what_straight_moves_do_not():
+    search = Hindsight(batch_of(40), 1, SMALL)
+    search.undisturbed(Straight().acts)
+    before = search.unsolved()
+    search.scripted(before, 24)
+    after = search.unsolved()
+    assert len(before) > 2 * len(after)
+    assert set(after) <= set(before)
+    assert (search.replays.n[before] == 25).all()
+    assert (search.replays.untouched <= search.replays.n).all()
+
+
+def test_noise_and_detours_change_what_a_policy_does():
+    search = Hindsight(batch_of(20), 1, SMALL)
+    search.disturbed(np.arange(20), 8, Straight().acts)
+    assert (search.replays.n == 8).all()
+    assert ((search.replays.reached > 0) & (search.replays.reached < 8)).any()
+
+
+def test_the_search_leaves_the_episodes_as_they_were():
+    batch = batch_of(10)
+    q, people = batch.state.q.copy(), batch.state.people.cylinders.copy()
+    Hindsight(batch, 1, SMALL).scripted(np.arange(10), 2)
+    np.testing.assert_array_equal(batch.state.q, q)
+    np.testing.assert_array_equal(batch.state.people.cylinders, people)
+
+
+@pytest.mark.parametrize("rest", [0.0, 0.5])
+def test_a_walk_is_what_the_replays_meet(rest: float):
+    batch, played = batch_of(5), batch_of(5)
+    walks = walks_of(batch, 50)
+    for k in range(50):
+        np.testing.assert_array_equal(walks[k], played.state.people.cylinders)
+        played.state.outcome[:] = RUNNING
+        played.step(still(played) + np.float32(rest), auto_reset=False)
+
+
+def test_what_is_covered_for_good_or_pinned_at_the_base_is_never_possible():
+    goals = np.tile([0.0, 0.8, 0.3], (4, 1))
+    walks = np.zeros((101, 4, 1, 3))
+    walks[:, 0, 0] = (0.0, 0.9, 0.4)
+    walks[:, 1, 0] = (0.0, 0.9, 0.4)
+    walks[60:, 1, 0] = (0.0, 3.0, 0.4)
+    walks[:, 2, 0] = (0.0, 3.0, 0.4)
+    walks[20:30, 2, 0] = (0.0, 0.4, 0.4)
+    walks[:, 3, 0] = (0.0, 3.0, 0.4)
+    walks[60:, 3, 0] = (0.0, 0.4, 0.4)
+    soonest = np.full(4, 1.0)
+    found = never_possible(walks, goals, soonest, 0.02, 0.04, 0.08)
+    assert found.tolist() == [True, False, True, False]
+
+
+def test_what_was_never_possible_is_never_solved():
+    batch = batch_of(300)
+    search = Hindsight(batch, 1, 1024)
+    search.scripted(np.arange(300), 12)
+    walks = walks_of(batch_of(300), 250)
+    soonest = np.full(300, 0.5)
+    never = never_possible(walks, batch.state.goal, soonest, CELL.robot.dt, 0.04, 0.08)
+    assert not (never & (search.replays.reached > 0)).any()

@@ -1,0 +1,122 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+from app.sim.sorting.batch import apply, valid_moves
+from app.sim.sorting.progress_monitor import MAX_SEEN, SortingWatch, look, note_move, state_key
+from app.sim.sorting.state import Move, SortingShape, SortingState, empty_state
+
+SHAPE = SortingShape(n_cells=4, n_colours=2)
+POLICY = "a" * 64
+
+
+def start() -> SortingState:
+    """One small red object in the risky cell 0; it shall go to the red tower."""
+    state = empty_state(SHAPE)
+    state.clutter[0] = state.goal[0, 0] = SHAPE.code(0, 0)
+    state.fail[0] = 0.4
+    return state
+
+
+def seen(
+    watch: SortingWatch | None, state: SortingState, attempts: float = 10.0
+) -> SortingWatch:
+    return look(watch, state_key(state), attempts, POLICY)
+
+
+def after_move(watch: SortingWatch, state: SortingState, move: Move) -> SortingWatch:
+    fail = state.fail[move.pick] if move.pick < SHAPE.n_cells else 0.0
+    return note_move(watch, state_key(apply(state, SHAPE, move)), can_fail=bool(fail > 0.0))
+
+
+def test_record_begins_with_the_state_and_one_and_a_half_times_the_attempts() -> None:
+    watch = seen(None, start(), attempts=4.0)
+    assert watch.seen == (state_key(start()),)
+    assert (watch.attempts, watch.budget, watch.handed_over) == (0, 6.0, None)
+
+
+def test_failed_pick_explains_that_the_state_stayed() -> None:
+    watch = after_move(seen(None, start()), start(), Move(0, 4))
+    for attempt in range(1, 5):
+        watch = after_move(seen(watch, start()), start(), Move(0, 4))
+        assert (watch.handed_over, watch.attempts) == (None, attempt)
+
+
+def test_state_that_stayed_though_the_pick_cannot_fail_hands_over() -> None:
+    state = apply(start(), SHAPE, Move(0, 5))
+    watch = after_move(seen(None, state), state, Move(5, 1))
+    assert seen(watch, state).handed_over == "repeated"
+
+
+def test_state_that_comes_back_by_the_moves_alone_hands_over() -> None:
+    first = start()
+    second = apply(first, SHAPE, Move(0, 5))
+    watch = after_move(seen(None, first), first, Move(0, 5))
+    watch = after_move(seen(watch, second), second, Move(5, 0))
+    assert seen(watch, first).handed_over == "repeated"
+
+
+def test_record_begins_anew_when_somebody_interferes() -> None:
+    watch = after_move(seen(None, start()), start(), Move(0, 4))
+    moved = apply(apply(start(), SHAPE, Move(0, 5)), SHAPE, Move(5, 3))
+    again = seen(watch, moved, attempts=2.0)
+    assert again == seen(None, moved, attempts=2.0)
+
+
+@pytest.mark.parametrize("part", ["goal", "fail"])
+def test_record_begins_anew_when_goal_or_failure_map_change(part: str) -> None:
+    watch = after_move(seen(None, start()), start(), Move(0, 4))
+    other = dataclasses.replace(start(), **{part: getattr(start(), part).copy()})
+    getattr(other, part).flat[1] = 0.2 if part == "fail" else SHAPE.code(0, 0)
+    assert seen(watch, other).seen == (state_key(other),)
+
+
+def test_record_begins_anew_for_another_policy() -> None:
+    watch = after_move(seen(None, start()), start(), Move(0, 4))
+    assert look(watch, state_key(start()), 10.0, "b" * 64).attempts == 0
+
+
+def test_planner_takes_over_after_one_and_a_half_times_the_expected_attempts() -> None:
+    watch = after_move(seen(None, start(), attempts=2.0), start(), Move(0, 4))
+    whys = []
+    for _ in range(4):
+        watch = after_move(seen(watch, start(), attempts=2.0), start(), Move(0, 4))
+        whys.append((watch.handed_over, watch.attempts))
+    assert whys == [(None, 1), (None, 2), ("patience", 0), ("patience", 1)]
+
+
+def test_planner_keeps_deciding_until_somebody_interferes() -> None:
+    state = apply(start(), SHAPE, Move(0, 5))
+    watch = seen(after_move(seen(None, state), state, Move(5, 1)), state)
+    on_its_way = apply(state, SHAPE, Move(5, 4))
+    watch = seen(after_move(watch, state, Move(5, 4)), on_its_way)
+    assert watch.handed_over == "repeated"
+    assert seen(after_move(watch, on_its_way, Move(4, 2)), start()).handed_over is None
+
+
+def test_record_never_grows_beyond_its_bound() -> None:
+    watch = seen(None, start(), attempts=1e6)
+    full = dataclasses.replace(watch, seen=tuple(f"{k:016x}" for k in range(MAX_SEEN)))
+    second = apply(start(), SHAPE, Move(0, 5))
+    handed = seen(after_move(full, start(), Move(0, 5)), second)
+    assert handed.handed_over == "patience"
+    assert len(handed.seen) <= MAX_SEEN
+
+
+def test_keys_of_states_that_differ_in_any_part_differ() -> None:
+    base = start()
+    keys = {state_key(base)}
+    for part, value in (("clutter", 2), ("towers", 2), ("goal", 2), ("fail", 0.1)):
+        other = dataclasses.replace(base, **{part: getattr(base, part).copy()})
+        getattr(other, part).flat[2] = value
+        keys.add(state_key(other))
+    assert len(keys) == 5
+    assert all(len(key) == 16 for key in keys)
+
+
+def test_every_valid_move_gives_a_state_of_another_key() -> None:
+    state = apply(start(), SHAPE, Move(0, 5))
+    for action in np.flatnonzero(valid_moves(state, SHAPE)):
+        move = SHAPE.move_of(int(action))
+        assert state_key(apply(state, SHAPE, move)) != state_key(state)

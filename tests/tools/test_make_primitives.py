@@ -1,0 +1,31 @@
+"""The script that makes the shipped primitives makes them again."""
+
+import numpy as np
+
+from app.sim.cells.cell import load_cell
+from app.sim.human import anthropometry as body_size
+from app.sim.human.kernels import kinematics as body
+from app.sim.primitives.library_file import load_primitives, read_header
+from tools.make_primitives import N_DEMONSTRATIONS, SEED, VERSION, draw_people, make_primitive
+
+
+def test_a_leg_made_again_is_the_shipped_one() -> None:
+    header, shipped = read_header(), load_primitives()[21]
+    assert (header["seed"], header["version"]) == (SEED, VERSION)
+    assert header["demonstrations"] == len(shipped.weights) == N_DEMONSTRATIONS
+    made = make_primitive(load_cell(shipped.cell), shipped.leg)
+    np.testing.assert_allclose(made.weights, shipped.weights, atol=1e-5)
+    np.testing.assert_allclose(made.durations, shipped.durations, rtol=1e-5)
+    np.testing.assert_allclose(made.residual, shipped.residual, atol=1e-5)
+
+
+def test_people_are_spread_over_the_percentiles() -> None:
+    cell = load_cell()
+    people = np.array(draw_people(cell, 40, np.random.default_rng(1)))
+    low, high = (
+        body_size.percentile_body(percent, pelvis=cell.human.pelvis_height).trunk
+        for percent in (5.0, 95.0)
+    )
+    trunks = np.sort(people[:, body.TRUNK])
+    assert low <= trunks[0] and trunks[-1] <= high
+    assert trunks[0] < low + 0.1 * (high - low) and trunks[-1] > high - 0.1 * (high - low)

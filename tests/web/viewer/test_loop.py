@@ -1,0 +1,175 @@
+import stat
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+from app.errors import InvalidInput, NotFound
+from app.live import commands
+from app.live.sorting import commands as commands_of_sorting
+from app.sim.cells.cell import load_cell
+from app.sim.human import model as human
+from tests.listening_ports import listening_ports
+from tests.straight_policy import StraightPolicy
+from tests.web.viewer_client import ViewerClient
+from web.viewer.loop import LiveCell
+
+WAIT_S = 10.0
+
+
+@pytest.fixture(scope="module")
+def live() -> Iterator[LiveCell]:
+    cell = load_cell()
+    live = LiveCell(cell, StraightPolicy(cell), seed=2)
+    live.start()
+    yield live
+    live.stop()
+
+
+def wait_for(condition: Callable[[], bool]) -> None:
+    end = time.monotonic() + WAIT_S
+    while not condition():
+        assert time.monotonic() < end, "it never happened"
+        time.sleep(0.01)
+
+
+def test_world_ticks_without_any_client(live: LiveCell) -> None:
+    first = live.handle.snapshot()
+    wait_for(lambda: live.handle.snapshot().tick >= first.tick + 20)
+    assert live.handle.snapshot().t_s > first.t_s
+
+
+def test_simulated_time_never_runs_ahead_of_the_clock(live: LiveCell) -> None:
+    start, first = time.monotonic(), live.handle.snapshot().tick
+    wait_for(lambda: live.handle.snapshot().tick >= first + 15)
+    elapsed = time.monotonic() - start
+    ticks = live.handle.snapshot().tick - first
+    assert ticks * 0.05 <= elapsed + 0.3
+
+
+def test_viewer_opens_no_port_but_a_socket_of_its_user(live: LiveCell) -> None:
+    before = listening_ports()
+    other = LiveCell(load_cell(), None)
+    other.start()
+    assert listening_ports() == before
+    for one in (live, other):
+        assert stat.S_ISSOCK(one.viewer_address.stat().st_mode)
+        assert stat.S_IMODE(one.viewer_address.parent.stat().st_mode) == 0o700
+    assert live.viewer_address != other.viewer_address
+    other.stop()
+
+
+def test_commands_are_carried_out_in_order(live: LiveCell) -> None:
+    live.handle.submit(commands.SetCandidates(ids=("cube1",)))
+    live.handle.submit(commands.ToggleCandidate(id="cube2"))
+    live.handle.submit(commands.ToggleCandidate(id="cube1"))
+    wait_for(lambda: live.handle.snapshot().selected == ("cube2",))
+
+
+def test_snapshot_says_which_commands_it_shows(live: LiveCell) -> None:
+    live.handle.submit(commands.Pause())
+    numbers = [live.handle.submit(commands.ToggleCandidate(id="cube3")) for _ in range(3)]
+    assert numbers == list(range(numbers[0], numbers[0] + 3))
+    before = live.handle.snapshot().selected
+    wait_for(lambda: live.handle.snapshot().commands >= numbers[-1])
+    assert ("cube3" in live.handle.snapshot().selected) != ("cube3" in before)
+    with pytest.raises(InvalidInput):
+        live.handle.submit(commands.SetSpeed(factor=3))
+    assert live.handle.submit(commands.Resume()) == numbers[-1] + 1
+    wait_for(lambda: live.handle.snapshot().commands == numbers[-1] + 1)
+    assert live.handle.snapshot().refused is None
+
+
+def test_command_that_fits_no_more_when_its_turn_comes_is_named() -> None:
+    live = LiveCell(load_cell("sorting-e0"), None)
+    block = commands_of_sorting.AddObject(colour="red", size="large", at="cell5")
+    live.start()
+    piece = live.handle.snapshot().sorting
+    assert piece is not None
+    for one in piece.pieces:
+        live.handle.submit(commands_of_sorting.RemoveObject(id=one.id))
+    number = [live.handle.submit(block), live.handle.submit(block)][-1]
+    wait_for(lambda: live.handle.snapshot().commands >= number)
+    refused = live.handle.snapshot().refused
+    live.stop()
+    assert refused is not None
+    assert refused[0] == number
+    assert "cell5" in refused[1]
+
+
+def test_bad_commands_are_refused_at_the_door(live: LiveCell) -> None:
+    with pytest.raises(NotFound):
+        live.handle.submit(commands.ToggleCandidate(id="cube9"))
+    with pytest.raises(InvalidInput):
+        live.handle.submit(commands.MoveHuman(pelvis=(float("inf"), 0.0, 0.0)))
+    with pytest.raises(InvalidInput, match="person"):
+        live.handle.submit(commands.SetBody(person=3, stature=40.0))
+
+
+def test_person_can_be_changed_as_soon_as_it_was_added(live: LiveCell) -> None:
+    live.handle.submit(commands.AddPerson())
+    live.handle.submit(commands.SetBody(person=1, stature=90.0))
+    wait_for(lambda: live.handle.snapshot().people[-1].body.stature == 90.0)
+    live.handle.submit(commands.RemovePerson(person=1))
+    with pytest.raises(InvalidInput, match="nobody"):
+        live.handle.submit(commands.SetMode(person=1, mode="still"))
+    wait_for(lambda: len(live.handle.snapshot().people) == 1)
+
+
+def test_click_on_a_cube_toggles_it_as_candidate(live: LiveCell) -> None:
+    live.handle.submit(commands.SetCandidates(ids=("cube0",)))
+    wait_for(lambda: live.handle.snapshot().selected == ("cube0",))
+    with ViewerClient(live.viewer_address) as visitor:
+        visitor.click("/stations/cube3")
+        wait_for(lambda: live.handle.snapshot().selected == ("cube0", "cube3"))
+        visitor.click("/stations/cube0")
+        wait_for(lambda: live.handle.snapshot().selected == ("cube3",))
+
+
+def test_drag_of_a_hand_moves_the_person(live: LiveCell) -> None:
+    live.handle.submit(commands.SetMode(mode="manual"))
+    live.handle.submit(commands.MoveHuman(pelvis=(0.0, 1.3, -1.5708)))
+    wait_for(lambda: abs(live.handle.snapshot().people[0].q[1] - 1.3) < 0.02)
+
+    def away() -> float:
+        person = live.handle.snapshot().people[0]
+        palm = human.joint_points(person.q, person.size)["hand_r"]
+        return float(np.linalg.norm(palm - [-0.15, 0.9, 0.25]))
+
+    with ViewerClient(live.viewer_address) as visitor:
+        visitor.drag("/gizmos/0/right", [(-0.1, 0.95, 0.3), (-0.15, 0.9, 0.25)])
+        wait_for(lambda: away() < 0.03)
+
+
+def test_stop_ends_thread_and_viewer() -> None:
+    cell = load_cell()
+    live = LiveCell(cell, None)
+    live.start()
+    address = live.viewer_address
+    live.stop()
+    live.stop()
+    tick = live.handle.snapshot().tick
+    assert not address.parent.exists()
+    assert live.handle.snapshot().tick == tick
+
+
+def test_faster_clock_takes_so_many_steps_between_two_pictures(live: LiveCell) -> None:
+    live.handle.submit(commands.SetSpeed(factor=4))
+    wait_for(lambda: live.handle.snapshot().speed == 4)
+    first = live.handle.snapshot().tick
+    seen = set[int]()
+
+    def look() -> bool:
+        seen.add(live.handle.snapshot().tick)
+        return len(seen) >= 5
+
+    wait_for(look)
+    live.handle.submit(commands.SetSpeed(factor=1))
+    wait_for(lambda: live.handle.snapshot().speed == 1)
+    assert {(tick - first) % 4 for tick in seen} == {0}
+
+
+def test_clock_does_not_run_at_any_speed(live: LiveCell) -> None:
+    with pytest.raises(InvalidInput, match="factor"):
+        live.handle.submit(commands.SetSpeed(factor=3))

@@ -1,0 +1,1 @@
+"""Offline generators, run by hand."""

@@ -1,0 +1,115 @@
+"""The shapes the simulator sees, translucent over what is drawn; red where they touched."""
+
+from collections.abc import Collection
+
+import numpy as np
+import trimesh
+import viser
+
+from web.viewer.poses import Vec, orientation
+
+STIFF_M = 1e-3
+"""Change of a capsule's length that is not shown [m]."""
+SHAPES, TOUCHED = "/shapes", "/touched"
+"""Nodes of all capsules: what a visitor may hide, and what touched, which everybody sees."""
+SHAPE, HIT = (64, 150, 190), (224, 44, 40)
+OPACITY, HIT_OPACITY = 0.32, 0.65
+
+
+class CapsulesView:
+    """Capsules that are placed by their ends; one that changes its length is stretched.
+
+    Args:
+        server: Where to draw.
+        owner: Whose they are; names their nodes.
+    """
+
+    def __init__(self, server: viser.ViserServer, owner: str) -> None:
+        self._scene, self._owner = server.scene, owner
+        self._handles: dict[str, viser.MeshHandle] = {}
+        self._hits: dict[str, viser.MeshHandle] = {}
+        self._sizes: dict[str, tuple[float, float]] = {}
+        self._ends: Vec | None = None
+        self._placed = False
+
+    def clear(self) -> None:
+        """Take all capsules away."""
+        for handle in (*self._handles.values(), *self._hits.values()):
+            handle.remove()
+        self._handles, self._hits, self._sizes, self._ends = {}, {}, {}, None
+
+    def add(self, name: str, radius: float, length: float) -> None:
+        """Add a capsule, hidden at first.
+
+        Args:
+            name: Its name, unique here.
+            radius: Radius [m].
+            length: Distance of its ends [m].
+        """
+        self._sizes[name] = radius, length
+        self._handles[name] = self._add(f"{SHAPES}/{self._owner}/{name}", name, SHAPE, OPACITY)
+        self._handles[name].visible = False
+
+    def _add(
+        self, node: str, name: str, color: tuple[int, int, int], opacity: float
+    ) -> viser.MeshHandle:
+        radius, length = self._sizes[name]
+        mesh = trimesh.creation.capsule(height=length, radius=radius, count=(24, 14))
+        vertices = np.asarray(mesh.vertices)
+        return self._scene.add_mesh_simple(
+            node,
+            vertices - 0.5 * (vertices.min(axis=0) + vertices.max(axis=0)),
+            np.asarray(mesh.faces),
+            color=color,
+            opacity=opacity,
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+
+    def place(self, ends: Vec) -> None:
+        """Say where the capsules are; poses are sent only while they are seen.
+
+        Args:
+            ends: End points in world [m], shape (n, 2, 3), in the order they were added.
+        """
+        self._ends, self._placed = ends, False
+
+    def show(self, visible: bool, touched: Collection[str]) -> None:
+        """Show all or none; those named ``touched`` are seen in any case, in red."""
+        for handle in self._handles.values():
+            if handle.visible != visible:
+                handle.visible = visible
+        for name in self._hits.keys() - set(touched):
+            self._hits.pop(name).remove()
+        for name in self._handles.keys() & set(touched) - self._hits.keys():
+            node = f"{TOUCHED}/{self._owner}/{name}"
+            self._hits[name], self._placed = self._add(node, name, HIT, HIT_OPACITY), False
+        if (visible or self._hits) and not self._placed and self._ends is not None:
+            self._send(self._ends)
+
+    def _send(self, ends: Vec) -> None:
+        self._placed = True
+        turns = orientation(_turns_onto(ends[:, 1] - ends[:, 0]))
+        for name, turn, pair in zip(self._handles, turns, ends, strict=True):
+            radius, length = self._sizes[name]
+            now = float(np.linalg.norm(pair[1] - pair[0]))
+            stretch = (now + 2.0 * radius) / (length + 2.0 * radius)
+            scale = (1.0, 1.0, stretch if abs(now - length) > STIFF_M else 1.0)
+            for handle in (self._handles[name], self._hits.get(name)):
+                if handle is None:
+                    continue
+                handle.wxyz, handle.position = turn, pair.mean(axis=0)
+                if handle.scale != scale:
+                    handle.scale = scale
+
+
+def _turns_onto(directions: Vec) -> Vec:
+    """Return rotations whose z axis points along the directions, shape (n, 3, 3)."""
+    out = np.empty((len(directions), 3, 3))
+    for rotation, direction in zip(out, directions, strict=True):
+        length = float(np.linalg.norm(direction))
+        z = direction / length if length > 1e-9 else np.array([0.0, 0.0, 1.0])
+        x = np.cross([0.0, 1.0, 0.0] if abs(z[1]) < 0.9 else [1.0, 0.0, 0.0], z)
+        x /= np.linalg.norm(x)
+        rotation[:] = np.column_stack([x, np.cross(z, x), z])
+    return out

@@ -1,0 +1,124 @@
+"""Handles on a person: pelvis and both hands, for a visitor to drag in manual mode.
+
+Callbacks run on viser's event loop and only queue a command. A gizmo that is not held follows
+the body it belongs to, so that it shows what was reached.
+"""
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+import viser
+
+from app.live.commands import MoveHuman
+from app.live.snapshot import PersonView
+from app.sim.human import model as human
+from web.viewer.poses import Vec, upright, yaw_of
+
+HANDS = {"right": "hand_r", "left": "hand_l"}
+SETTLE_S = 0.6
+"""How long a released gizmo stays where it was let go [s]."""
+HOLD_S = 5.0
+"""How long a held gizmo stays without moving; its visitor may have left [s]."""
+
+
+class Gizmos:
+    """Gizmos of one person; poses are written by the live cell's thread only.
+
+    Args:
+        server: Where to draw.
+        person: Id of the person.
+        submit: Takes the command of a drag.
+        jointed: Whether the person has hands, and a side to turn.
+    """
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        person: int,
+        submit: Callable[[MoveHuman], object],
+        *,
+        jointed: bool = True,
+    ) -> None:
+        self._person, self._submit = person, submit
+        scene, root = server.scene, f"/gizmos/{person}"
+        self._frame = scene.add_frame(root, show_axes=False)
+        self._released: dict[str, float] = {}
+        self._pelvis = scene.add_transform_controls(
+            f"{root}/pelvis",
+            scale=0.34,
+            line_width=3.0,
+            active_axes=(True, True, False),
+            disable_rotations=not jointed,
+            depth_test=False,
+            opacity=0.9,
+            visible=False,
+        )
+        self._hands = {
+            name: scene.add_transform_controls(
+                f"{root}/{name}",
+                scale=0.2,
+                line_width=2.5,
+                disable_rotations=True,
+                depth_test=False,
+                opacity=0.9,
+                visible=False,
+            )
+            for name in (HANDS if jointed else ())
+        }
+        self._listen()
+
+    def _listen(self) -> None:
+        @self._pelvis.on_update
+        async def _(event: viser.TransformControlsEvent) -> None:
+            self._hold("pelvis", event.phase)
+            x, y, _ = (float(value) for value in self._pelvis.position)
+            self._submit(
+                MoveHuman(person=self._person, pelvis=(x, y, yaw_of(self._pelvis.wxyz)))
+            )
+
+        for name, gizmo in self._hands.items():
+            self._listen_to_hand(name, gizmo)
+
+    def _listen_to_hand(self, name: str, gizmo: viser.TransformControlsHandle) -> None:
+        @gizmo.on_update
+        async def _(event: viser.TransformControlsEvent) -> None:
+            self._hold(name, event.phase)
+            x, y, z = (float(value) for value in gizmo.position)
+            if name == "right":
+                self._submit(MoveHuman(person=self._person, right=(x, y, z)))
+            else:
+                self._submit(MoveHuman(person=self._person, left=(x, y, z)))
+
+    def _hold(self, name: str, phase: str) -> None:
+        self._released[name] = time.monotonic() + (SETTLE_S if phase == "end" else HOLD_S)
+
+    def _free(self, name: str) -> bool:
+        return time.monotonic() >= self._released.get(name, 0.0)
+
+    def remove(self) -> None:
+        """Take the gizmos out of the scene."""
+        self._frame.remove()
+
+    def draw(self, person: PersonView) -> None:
+        """Show the gizmos in manual mode, each where its body is."""
+        manual = person.mode == "manual"
+        for gizmo in (self._pelvis, *self._hands.values()):
+            if gizmo.visible != manual:
+                gizmo.visible = manual
+        if not manual:
+            self._released.clear()
+            return
+        points = human.joint_points(person.posture, person.size)
+        if self._free("pelvis"):
+            _move(self._pelvis, points["pelvis"], upright(float(person.posture[2])))
+        for name, gizmo in self._hands.items():
+            if self._free(name):
+                _move(gizmo, points[HANDS[name]])
+
+
+def _move(gizmo: viser.TransformControlsHandle, position: Vec, wxyz: Vec | None = None) -> None:
+    if np.abs(gizmo.position - position).max() > 1e-3:
+        gizmo.position = position
+    if wxyz is not None and np.abs(gizmo.wxyz - wxyz).max() > 1e-3:
+        gizmo.wxyz = wxyz

@@ -1,0 +1,148 @@
+"""What the person looks like: eleven parts, ready to be drawn.
+
+The surfaces come from ``data/mannequin.npz``, written by :mod:`tools.model_mannequin`; colours
+and skin weights are given here, and the surfaces for people of other sizes (:func:`fitted`).
+Positions are stored as 16-bit shares of each part's box (steps below 0.03 mm).
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from web.viewer.people import skeleton
+from web.viewer.poses import Vec
+
+Rgb = tuple[int, int, int]
+Faces = NDArray[np.uint32]
+
+_FILE = "data/mannequin.npz"
+_STEPS = 65535
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Surface:
+    """A triangle mesh."""
+
+    vertices: Vec
+    """Vertex positions [m], shape (n, 3)."""
+    faces: Faces
+    """Vertex indices, shape (m, 3), outward winding."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Part:
+    """One piece of the mannequin."""
+
+    name: str
+    """Name in the scene."""
+    surface: Surface
+    """In the bind pose for soft parts, in the bone's own frame for rigid ones."""
+    color: Rgb
+    """Colour, 0 to 255."""
+    bone: str | None = None
+    """Bone a rigid part follows; None for soft parts."""
+    weights: dict[str, Vec] = field(default_factory=dict)
+    """Skin weights by bone for soft parts, each of shape (n_vertices,)."""
+
+
+_COLORS: Mapping[str, Rgb] = {
+    "jacket": (58, 70, 92),
+    "vest": (255, 116, 32),
+    "stripes": (238, 240, 228),
+    "trousers": (44, 53, 70),
+    "head": (214, 164, 134),
+    "helmet": (250, 250, 246),
+    "glasses": (36, 44, 54),
+    "hand_l": (247, 189, 74),
+    "hand_r": (247, 189, 74),
+    "shoe_l": (33, 34, 38),
+    "shoe_r": (33, 34, 38),
+}
+VESTS: tuple[Rgb, ...] = ((255, 116, 32), (196, 214, 48), (72, 164, 232), (232, 104, 168))
+"""Colours of the vests by which people are told apart, in the order of their ids; the same as
+VESTS in ``web/static/palette.js``."""
+_BONES = {
+    "head": "head",
+    "helmet": "head",
+    "glasses": "head",
+    "hand_l": "hand_l",
+    "hand_r": "hand_r",
+    "shoe_l": "foot_l",
+    "shoe_r": "foot_r",
+}
+_WEIGHTS: Mapping[str, Callable[[Vec], dict[str, Vec]]] = {
+    "jacket": skeleton.upper_weights,
+    "vest": skeleton.spine_weights,
+    "stripes": skeleton.spine_weights,
+    "trousers": skeleton.leg_weights,
+}
+
+
+def save(surfaces: Mapping[str, Surface], path: Path | None = None) -> None:
+    """Write surfaces to the file that :func:`parts` reads, or to ``path``."""
+    arrays: dict[str, NDArray[np.generic]] = {}
+    for name, surface in surfaces.items():
+        low, high = surface.vertices.min(axis=0), surface.vertices.max(axis=0)
+        shares = np.round((surface.vertices - low) / (high - low) * _STEPS)
+        arrays[f"{name}.box"] = np.stack([low, high])
+        arrays[f"{name}.vertices"] = shares.astype(np.uint16)
+        arrays[f"{name}.faces"] = surface.faces.astype(np.uint16)
+    np.savez_compressed(path or Path(__file__).parent / _FILE, allow_pickle=False, **arrays)
+
+
+def load(name: str, stored: Mapping[str, NDArray[np.generic]]) -> Surface:
+    """Return one surface from the arrays that :func:`save` wrote."""
+    low, high = np.asarray(stored[f"{name}.box"], dtype=np.float64)
+    shares = np.asarray(stored[f"{name}.vertices"], dtype=np.float64) / _STEPS
+    faces = np.asarray(stored[f"{name}.faces"], dtype=np.uint32)
+    return Surface(vertices=low + shares * (high - low), faces=faces)
+
+
+@lru_cache(maxsize=1)
+def parts() -> tuple[Part, ...]:
+    """Return all parts of the mannequin."""
+    with (resources.files("web.viewer.people") / _FILE).open("rb") as file:
+        with np.load(file, allow_pickle=False) as stored:
+            surfaces = {name: load(name, stored) for name in _COLORS}
+    return tuple(
+        Part(
+            name=name,
+            surface=surface,
+            color=_COLORS[name],
+            bone=_BONES.get(name),
+            weights=_WEIGHTS[name](surface.vertices) if name in _WEIGHTS else {},
+        )
+        for name, surface in surfaces.items()
+    )
+
+
+def color_of(part: Part, person: int) -> Rgb:
+    """Return the colour of a part of the person of an id."""
+    return VESTS[person % len(VESTS)] if part.name == "vest" else part.color
+
+
+def fitted(part: Part, size: Vec) -> Vec:
+    """Return a soft part's vertices for a person of another size [m], shape (n, 3).
+
+    Each vertex is moved and scaled with its bones, weighted as when they move: what joins two
+    bones stays joined.
+
+    Args:
+        part: A soft part.
+        size: The person's size [m], shape (12,).
+    """
+    median, own = skeleton.bind_bones(), skeleton.bind_bones(size)
+    right, left = skeleton.scales(size, "r"), skeleton.scales(size, "l")
+    out = np.zeros_like(part.surface.vertices)
+    for name, weights in part.weights.items():
+        before, after = median[name], own[name]
+        local = (part.surface.vertices - before[:3, 3]) @ before[:3, :3]
+        scale = np.where(local[:, 1:2] < 0.0, right[name], left[name])
+        moved = (local * scale) @ after[:3, :3].T + after[:3, 3]
+        out += weights[:, None] * moved
+    return out

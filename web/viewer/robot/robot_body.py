@@ -1,0 +1,151 @@
+"""What the UR10 looks like: its visual meshes, repainted, and a two-finger gripper.
+
+The meshes are example-robot-data's ``.dae`` visuals in each link's frame, read once per
+process. The gripper is ours, drawn around the tool capsule the simulator uses.
+"""
+
+from functools import lru_cache
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+from app.sim.robot.ur10 import LINK_NAMES, package_dir
+from web.viewer.scene.solid_meshes import block, material, painted, rod
+
+_FILES = dict(
+    zip(
+        LINK_NAMES,
+        ("base", "shoulder", "upperarm", "forearm", "wrist1", "wrist2", "wrist3"),
+        strict=True,
+    )
+)
+
+Ints = NDArray[np.int64]
+
+ALUMINIUM = material((205, 209, 214), metallic=0.15, roughness=0.42)
+CAP = material((88, 152, 196), metallic=0.05, roughness=0.35)
+RUBBER = material((58, 62, 70), roughness=0.55)
+STEEL = material((150, 155, 162), metallic=0.3, roughness=0.35)
+ACCENT = material((255, 138, 52), roughness=0.5)
+
+_PAINT = {57: ALUMINIUM, 100: CAP, 118: RUBBER, 95: RUBBER, 167: STEEL, 20: RUBBER}
+"""Material by the red channel of the file's own colour, which tells the parts apart."""
+CREASE = 0.6
+"""Angle from which on an edge stays sharp [rad]."""
+
+
+@lru_cache(maxsize=1)
+def link_meshes() -> dict[str, bytes]:
+    """Return each link's visual as binary glTF, in the link's frame."""
+    folder = package_dir() / "example-robot-data/robots/ur_description/meshes/ur10/visual"
+    out = {}
+    for link, name in _FILES.items():
+        scene = trimesh.load_scene(folder / f"{name}.dae")
+        pieces = []
+        for part in scene.geometry.values():
+            paint = _PAINT[int(part.visual.material.main_color[0])]
+            pieces.append((_welded(part), paint))
+        out[link] = painted(pieces)
+    return out
+
+
+def _welded(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
+    """Return the mesh with shared vertices, shaded smoothly except at creases.
+
+    The files give every face its own vertices. Here faces that meet at less than ``CREASE``
+    form a group, and each group shares one vertex per place.
+    """
+    points, index = np.unique(mesh.vertices.round(4), axis=0, return_inverse=True)
+    faces = index.reshape(-1)[mesh.faces]
+    faces = faces[(np.diff(np.sort(faces, axis=1), axis=1) > 0).all(axis=1)]
+    solid = trimesh.Trimesh(vertices=points, faces=faces, process=False)
+    faces = np.asarray(solid.faces)
+    soft = solid.face_adjacency[solid.face_adjacency_angles < CREASE]
+    group = _groups(len(faces), soft)
+    corners = np.stack([faces.ravel(), np.repeat(group, 3)], axis=1)
+    own, corner = np.unique(corners, axis=0, return_inverse=True)
+    shared = corner.reshape(faces.shape)
+    normals = np.zeros((len(own), 3))
+    areas = solid.face_normals * solid.area_faces[:, None]
+    for column in range(3):
+        np.add.at(normals, shared[:, column], areas)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    return trimesh.Trimesh(
+        vertices=points[own[:, 0]], faces=shared, vertex_normals=normals, process=False
+    )
+
+
+def _groups(n: int, pairs: Ints) -> Ints:
+    """Return the group of each of ``n`` things, joined by ``pairs``, shape (m, 2)."""
+    label = np.arange(n)
+    while True:
+        least = label[pairs].min(axis=1)
+        new = label.copy()
+        np.minimum.at(new, pairs[:, 0], least)
+        np.minimum.at(new, pairs[:, 1], least)
+        new = new[new]
+        if np.array_equal(new, label):
+            return label
+        label = new
+
+
+@lru_cache(maxsize=4)
+def gripper_body(tool_length: float, tool_radius: float) -> bytes:
+    """Return the gripper without fingers, in the frame of ``tool0``, as binary glTF.
+
+    Args:
+        tool_length: From flange to tcp along z [m].
+        tool_radius: Radius of the simulator's tool capsule [m].
+    """
+    palm = 0.46 * tool_length
+    pieces = [
+        (rod((0, 0, 0), 0.014, 0.95 * tool_radius), STEEL),
+        (rod((0, 0, 0.014), 0.008, 0.8 * tool_radius), ACCENT),
+        (
+            block(
+                (1.9 * tool_radius, 1.3 * tool_radius, palm - 0.02),
+                (0, 0, 0.5 * palm + 0.012),
+                0.006,
+            ),
+            RUBBER,
+        ),
+        (
+            block((2.5 * tool_radius, 0.9 * tool_radius, 0.012), (0, 0, palm + 0.006), 0.003),
+            STEEL,
+        ),
+    ]
+    return painted(pieces)
+
+
+@lru_cache(maxsize=4)
+def gripper_finger(tool_length: float) -> bytes:
+    """Return one finger in its own frame: the pad faces -x, the tip ends beyond the tcp."""
+    palm, tip = 0.46 * tool_length + 0.012, tool_length + 0.012
+    length = tip - palm
+    pieces = [
+        (block((0.012, 0.024, length), (0.006, 0, palm + 0.5 * length), 0.003), STEEL),
+        (block((0.006, 0.026, 0.03), (-0.002, 0, tip - 0.016), 0.002), RUBBER),
+    ]
+    return painted(pieces)
+
+
+@lru_cache(maxsize=4)
+def magnet_body(tool_length: float, tool_radius: float) -> bytes:
+    """Return a round lifting magnet in the frame of ``tool0``, as binary glTF.
+
+    Args:
+        tool_length: From flange to the magnet's face along z [m].
+        tool_radius: Radius of the simulator's tool capsule [m].
+    """
+    face = 0.022
+    neck = tool_length - face - 0.022
+    return painted(
+        [
+            (rod((0, 0, 0), 0.014, 0.95 * tool_radius), STEEL),
+            (rod((0, 0, 0.014), 0.008, 0.8 * tool_radius), ACCENT),
+            (rod((0, 0, 0.022), neck, 0.5 * tool_radius), RUBBER),
+            (rod((0, 0, tool_length - face), face - 0.003, 0.9 * tool_radius), RUBBER),
+            (rod((0, 0, tool_length - 0.003), 0.003, 0.7 * tool_radius), STEEL),
+        ]
+    )

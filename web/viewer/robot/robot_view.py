@@ -1,0 +1,116 @@
+"""The robot in the scene: link meshes placed from Pinocchio, and the gripper or magnet."""
+
+import numpy as np
+import viser
+
+from app.sim.cells.cell import Cell
+from app.sim.robot.capsules import load_robot_capsules
+from app.sim.robot.ur10 import LINK_NAMES, Robot
+from web.viewer.capsules_view import CapsulesView
+from web.viewer.poses import Vec, orientation
+from web.viewer.robot.robot_body import gripper_body, gripper_finger, link_meshes, magnet_body
+from web.viewer.scene.solid_meshes import torus
+
+LAMP = (38, 196, 182)
+"""Colour of the ring that is seen while the magnet is on."""
+OPEN, CLOSED = 0.044, 0.036
+"""Half the distance of the fingers [m]; a cube's side lies between."""
+
+
+class RobotView:
+    """Draws one UR10; used by the live cell's thread only.
+
+    Args:
+        server: Where to draw.
+        cell: Says which tool it carries.
+    """
+
+    def __init__(self, server: viser.ViserServer, cell: Cell) -> None:
+        tool = cell.robot
+        self._robot = Robot(tool.tool_length)
+        self._drawn: Vec | None = None
+        scene = server.scene
+        scene.add_frame("/robot", show_axes=False)
+        self._links = [
+            scene.add_glb(f"/robot/{name}", link_meshes()[name]) for name in LINK_NAMES
+        ]
+        self._tool = scene.add_frame("/robot/tool", show_axes=False)
+        self._fingers: tuple[viser.GlbHandle, ...] = ()
+        self._lamp: viser.MeshHandle | None = None
+        if any(station.kind == "clutter" for station in cell.stations):
+            self._lamp = self._add_magnet(scene, cell)
+        else:
+            self._fingers = self._add_gripper(scene, cell)
+        self._closed = False
+        self._capsules = CapsulesView(server, "robot")
+        self._shapes = load_robot_capsules(tool.tool_length, tool.tool_radius)
+        for name, radius, p0, p1 in zip(
+            self._shapes.name,
+            self._shapes.radius,
+            self._shapes.p0,
+            self._shapes.p1,
+            strict=True,
+        ):
+            self._capsules.add(name, float(radius), float(np.linalg.norm(p1 - p0)))
+
+    def _add_gripper(
+        self, scene: viser.SceneApi, cell: Cell
+    ) -> tuple[viser.GlbHandle, viser.GlbHandle]:
+        length = cell.robot.tool_length
+        scene.add_glb("/robot/tool/body", gripper_body(length, cell.robot.tool_radius))
+        finger, turned = gripper_finger(length), (0.0, 0.0, 0.0, 1.0)
+        return (
+            scene.add_glb("/robot/tool/finger_a", finger, position=(OPEN, 0.0, 0.0)),
+            scene.add_glb(
+                "/robot/tool/finger_b", finger, position=(-OPEN, 0.0, 0.0), wxyz=turned
+            ),
+        )
+
+    def _add_magnet(self, scene: viser.SceneApi, cell: Cell) -> viser.MeshHandle:
+        length, radius = cell.robot.tool_length, cell.robot.tool_radius
+        scene.add_glb("/robot/tool/body", magnet_body(length, radius))
+        vertices, faces = torus(0.8 * radius, 0.004)
+        return scene.add_mesh_simple(
+            "/robot/tool/lamp",
+            vertices,
+            faces,
+            color=LAMP,
+            cast_shadow=False,
+            position=(0.0, 0.0, length - 0.022),
+            visible=False,
+        )
+
+    def draw(self, q: Vec) -> None:
+        """Show the robot at joint positions ``q`` [rad], shape (6,)."""
+        if self._drawn is not None and np.array_equal(q, self._drawn):
+            return
+        self._drawn = q.copy()
+        poses = self._robot.link_poses(q)
+        for handle, turn, pose in zip(
+            self._links, orientation(poses[:, :3, :3]), poses, strict=True
+        ):
+            handle.wxyz, handle.position = turn, pose[:3, 3]
+        tcp = self._robot.tcp_pose(q)
+        self._tool.wxyz = orientation(tcp[:3, :3])
+        self._tool.position = tcp[:3, 3] - self._robot.tool_length * tcp[:3, 2]
+        frames = poses[self._shapes.link]
+        ends = np.stack([self._shapes.p0, self._shapes.p1], axis=1)
+        self._capsules.place(
+            np.einsum("nij,nkj->nki", frames[:, :3, :3], ends) + frames[:, None, :3, 3]
+        )
+
+    def show_capsules(self, visible: bool, touched: str | None) -> None:
+        """Show or hide the simulator's capsules; those that touched stay in view, red."""
+        self._capsules.show(visible, () if touched is None else touched.split(" and "))
+
+    def grip(self, closed: bool) -> None:
+        """Open or close the fingers, or switch the magnet."""
+        if closed == self._closed:
+            return
+        self._closed = closed
+        if self._lamp is not None:
+            self._lamp.visible = closed
+            return
+        half = CLOSED if closed else OPEN
+        for finger, side in zip(self._fingers, (half, -half), strict=True):
+            finger.position = (side, 0, 0)

@@ -1,0 +1,1 @@
+"""The work cell in the scene."""

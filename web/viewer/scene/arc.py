@@ -1,0 +1,55 @@
+"""A dashed arc in the scene, from where something is to where it goes."""
+
+import numpy as np
+import viser
+
+from web.viewer.poses import Vec
+from web.viewer.scene.stations_view import MARK
+
+DASHES = 14
+
+
+class Arc:
+    """One dashed arc; used by the live cell's thread only.
+
+    Args:
+        server: Where to draw.
+        name: Name of its node in the scene.
+        lift: Greatest height over the straight line [m].
+    """
+
+    def __init__(self, server: viser.ViserServer, name: str, lift: float) -> None:
+        self._lift = lift
+        self._lines = server.scene.add_line_segments(
+            name, np.zeros((DASHES, 2, 3)), MARK, thickness=0.006, visible=False
+        )
+        self._key: tuple[object, ...] = ()
+
+    def hide(self) -> None:
+        """Take it out of sight."""
+        if self._lines.visible:
+            self._lines.visible = False
+
+    def show(self, start: Vec, end: Vec) -> None:
+        """Draw it from ``start`` to ``end`` [m], shape (3,)."""
+        if not self._lines.visible:
+            self._lines.visible = True
+        key = (*np.round(start, 3).tolist(), *np.round(end, 3).tolist())
+        if key != self._key:
+            self._key = key
+            self._lines.points = dashes(start, end, self._lift).astype(np.float32)
+
+
+def dashes(start: Vec, end: Vec, lift: float) -> Vec:
+    """Return the dashes of an arc from ``start`` to ``end`` [m], shape (DASHES, 2, 3).
+
+    Args:
+        start: Its beginning [m], shape (3,).
+        end: Its end [m], shape (3,).
+        lift: Greatest height over the straight line [m]; less where the ends are near.
+    """
+    ends = (np.arange(DASHES)[:, None] + np.array([0.15, 0.75])) / DASHES
+    line = start + ends[..., None] * (end - start)
+    lift = min(lift, 0.35 * float(np.linalg.norm(end - start)))
+    line[..., 2] += 4.0 * lift * ends * (1.0 - ends)
+    return np.asarray(line)

@@ -1,0 +1,58 @@
+"""The blocks in the scene: each is made once, moved while it lives, and clickable."""
+
+from collections.abc import Callable
+
+import numpy as np
+import viser
+
+from app.live.sorting.commands import ToggleGoal
+from app.live.sorting.snapshot import PieceView
+from web.viewer.poses import Vec
+from web.viewer.scene.sorting_bodies import BLOCKS, block_body
+
+STILL_M = 2e-4
+"""A way that is not worth sending [m]."""
+
+
+class BlocksView:
+    """Draws all blocks; used by the live cell's thread only.
+
+    Args:
+        server: Where to draw.
+        submit: Takes the command of a click: the block comes into the goal, or out of it.
+    """
+
+    def __init__(
+        self, server: viser.ViserServer, submit: Callable[[ToggleGoal], object]
+    ) -> None:
+        self._scene, self._submit = server.scene, submit
+        self._drawn: dict[str, tuple[viser.GlbHandle, Vec]] = {}
+
+    def draw(self, pieces: tuple[PieceView, ...]) -> None:
+        """Show the blocks where they are."""
+        here = {piece.id for piece in pieces}
+        for id in self._drawn.keys() - here:
+            self._drawn.pop(id)[0].remove()
+        for piece in pieces:
+            if piece.id not in self._drawn:
+                self._drawn[piece.id] = self._add(piece), piece.position
+                continue
+            handle, before = self._drawn[piece.id]
+            if np.abs(piece.position - before).max() > STILL_M:
+                handle.position = piece.position
+                self._drawn[piece.id] = handle, piece.position
+
+    def _add(self, piece: PieceView) -> viser.GlbHandle:
+        x, y, z = piece.half_size.tolist()
+        body = self._scene.add_glb(
+            f"/blocks/{piece.id}",
+            block_body(BLOCKS[piece.colour], (x, y, z)),
+            position=piece.position,
+        )
+        name = piece.id
+
+        async def toggle(_: object) -> None:
+            self._submit(ToggleGoal(id=name))
+
+        body.on_click(toggle)
+        return body

@@ -1,0 +1,75 @@
+"""The live cell as a picture: everything that moves, drawn from one snapshot.
+
+Only the thread that owns the world draws; clicks and drags leave as commands.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+import viser
+
+from app.live.commands import Command
+from app.live.reach.commands import is_reaching
+from app.live.snapshot import WorldSnapshot
+from app.sim.cells.cell import Cell
+from web.viewer.people.people_view import PeopleView
+from web.viewer.robot.robot_view import RobotView
+from web.viewer.scene import workplace
+from web.viewer.scene.arc import Arc
+from web.viewer.scene.reach_scene import ReachScene
+from web.viewer.scene.sorting_scene import SortingScene, sorts
+from web.viewer.scene.stations_view import StationsView
+
+PATH_LIFT = 0.12
+"""Height of the dashed path's arc over the straight line [m]."""
+
+
+class CellScene:
+    """One cell in one viewer.
+
+    Args:
+        server: The viewer.
+        cell: Work cell.
+        submit: Takes commands of clicks and drags.
+    """
+
+    def __init__(
+        self, server: viser.ViserServer, cell: Cell, submit: Callable[[Command], object]
+    ) -> None:
+        self._server, self._cell = server, cell
+        with server.atomic():
+            workplace.build(server, cell)
+            self._robot = RobotView(server, cell)
+            self._stations = StationsView(server, cell, submit)
+            self._people = PeopleView(server, cell, submit)
+            self._sorting = SortingScene(server, cell, submit) if sorts(cell) else None
+            self._reach = ReachScene(server, cell, submit) if is_reaching(cell) else None
+            self._path = Arc(server, "/path/arc", lift=PATH_LIFT)
+
+    def draw(self, snapshot: WorldSnapshot, dt: float, *, shapes: bool = False) -> None:
+        """Show a snapshot; sends only what changed.
+
+        Args:
+            snapshot: What to show.
+            dt: Time since the last call [s].
+            shapes: Whether anybody looks at the capsules that the simulator sees.
+        """
+        with self._server.atomic():
+            touched = snapshot.contact if snapshot.status == "contact" else None
+            self._robot.draw(snapshot.robot_q)
+            self._robot.grip(snapshot.gripping)
+            self._robot.show_capsules(shapes, touched.link if touched else None)
+            self._people.draw(snapshot, dt, shapes=shapes)
+            self._stations.draw(snapshot)
+            if self._sorting is not None:
+                self._sorting.draw(snapshot)
+            elif self._reach is not None:
+                self._reach.draw(snapshot)
+            else:
+                self._draw_path(snapshot)
+
+    def _draw_path(self, snapshot: WorldSnapshot) -> None:
+        if snapshot.status != "moving" or snapshot.chosen is None:
+            self._path.hide()
+            return
+        self._path.show(snapshot.tcp, np.array(self._cell.station(snapshot.chosen).position))

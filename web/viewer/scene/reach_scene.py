@@ -1,0 +1,236 @@
+"""A reach cell in the scene: goal, targets, the way of the tool, the separation zone.
+
+The zone on the floor is where a person would be nearer than the protective separation distance
+S_p; its colour, and the ring around the robot's base, say how fast the robot may go.
+"""
+
+from collections import deque
+from collections.abc import Callable
+
+import numpy as np
+import viser
+
+from app.live.reach.commands import MoveGoal, goal_box
+from app.live.reach.snapshot import ReachView, SafetyView
+from app.live.snapshot import WorldSnapshot
+from app.sim.cells.cell import Cell
+from app.sim.reach.batch import goal_region_of
+from app.sim.safety.separation_zone import N_DIRECTIONS
+from web.viewer.people.mannequin import Rgb
+from web.viewer.people.pedestrians_view import WalkersView
+from web.viewer.poses import Vec
+from web.viewer.scene.arc import Arc
+from web.viewer.scene.goal_gizmo import GoalGizmo
+from web.viewer.scene.stations_view import MARK
+
+OVERRIDES: tuple[tuple[float, Rgb], ...] = (
+    (0.0, (214, 52, 46)),
+    (0.5, (240, 176, 52)),
+    (1.0, (38, 166, 104)),
+)
+"""Colour by override; the same as OVERRIDES in ``web/static/palette.js``."""
+OFF: Rgb = (122, 142, 166)
+EDGE: Rgb = (130, 146, 160)
+DOT: Rgb = (150, 164, 178)
+GAUGE_M, GAUGE_Z = 0.21, 0.012
+N_GAUGE, N_TRAIL = 60, 90
+TRAIL_M = 4e-3
+"""Way of the tool that is worth a piece of trail [m]."""
+BACK: Rgb = (226, 230, 235)
+
+
+def override_color(safety: SafetyView) -> Rgb:
+    """Return the colour of the robot's rate; grey where the layer is off."""
+    if not safety.on:
+        return OFF
+    return blend(OVERRIDES, safety.override)
+
+
+def blend(ramp: tuple[tuple[float, Rgb], ...], x: float) -> Rgb:
+    """Return the colour at ``x`` of a ramp."""
+    places = [at for at, _ in ramp]
+    channels = [np.interp(x, places, [color[k] for _, color in ramp]) for k in range(3)]
+    return int(channels[0]), int(channels[1]), int(channels[2])
+
+
+class ReachScene:
+    """Draws what a reach cell has; used by the live cell's thread only.
+
+    Args:
+        server: Where to draw.
+        cell: Reach cell.
+        submit: Takes the command of a drag of the goal.
+    """
+
+    def __init__(
+        self, server: viser.ViserServer, cell: Cell, submit: Callable[[MoveGoal], object]
+    ) -> None:
+        self._walkers = WalkersView(server, cell)
+        self._goal = GoalGizmo(server, cell, submit)
+        _add_targets(server, cell)
+        self._zone = _Zone(server, cell)
+        self._gauge = _Gauge(server)
+        self._trail = _Trail(server)
+        self._path = Arc(server, "/way", lift=0.05)
+
+    def draw(self, snapshot: WorldSnapshot) -> None:
+        """Show a snapshot; sends only what changed."""
+        view = snapshot.reach
+        if view is None:
+            return
+        self._walkers.draw(snapshot)
+        self._goal.draw(view, reached=snapshot.status == "reached")
+        if snapshot.status == "moving":
+            self._path.show(snapshot.tcp, view.goal)
+        else:
+            self._path.hide()
+        self._trail.note(snapshot)
+        self._zone.draw(view, visible=view.safety.person is not None)
+        self._gauge.draw(view)
+        self._trail.draw()
+
+
+class _Zone:
+    """The separation zone on the floor."""
+
+    def __init__(self, server: viser.ViserServer, cell: Cell) -> None:
+        self._z = cell.floor_z + 0.005
+        square = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+        vertices, faces = _fan(square, self._z)
+        self._area = server.scene.add_mesh_simple(
+            "/zone/area", vertices, faces, color=OFF, opacity=0.22, side="double",
+            cast_shadow=False, receive_shadow=False, visible=False,
+        )  # fmt: skip
+        self._edge = server.scene.add_line_segments(
+            "/zone/edge",
+            np.zeros((N_DIRECTIONS, 2, 3)),
+            OFF,
+            thickness=0.016,
+            visible=False,
+        )
+        self._key: tuple[object, ...] = ()
+
+    def draw(self, view: ReachView, *, visible: bool) -> None:
+        """Show the zone of this state."""
+        for part in (self._area, self._edge):
+            if part.visible != visible:
+                part.visible = visible
+        color, outline = override_color(view.safety), view.safety.zone
+        key = (color, *np.round(outline[::9], 2).ravel().tolist())
+        if not visible or key == self._key:
+            return
+        self._key = key
+        vertices, faces = _fan(outline, self._z)
+        if len(faces) != len(self._area.faces):
+            self._area.faces = faces.astype(np.uint32)
+        self._area.vertices = vertices.astype(np.float32)
+        if tuple(self._area.color) != color:
+            self._area.color = color
+        rim = np.column_stack([outline, np.full(len(outline), self._z + 0.003)])
+        self._edge.points = np.stack([rim, np.roll(rim, -1, axis=0)], axis=1).astype(np.float32)
+        self._edge.colors = np.full((len(rim), 2, 3), color, dtype=np.uint8)
+
+
+class _Gauge:
+    """A ring around the robot's base that is as full as the override."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        angles = -0.5 * np.pi - 2.0 * np.pi * np.arange(N_GAUGE + 1) / N_GAUGE
+        rim = GAUGE_M * np.column_stack([np.cos(angles), np.sin(angles)])
+        points = np.column_stack([rim, np.full(len(rim), GAUGE_Z)])
+        self._ring = server.scene.add_line_segments(
+            "/gauge/ring", np.stack([points[:-1], points[1:]], axis=1), OFF, thickness=0.03
+        )
+        self._text = server.scene.add_label(
+            "/gauge/text",
+            "",
+            position=(0.0, -GAUGE_M - 0.1, 0.02),
+            anchor="center-center",
+            font_screen_scale=1.1,
+        )
+        self._key: tuple[object, ...] = ()
+
+    def draw(self, view: ReachView) -> None:
+        """Show the override of this state."""
+        safety, color = view.safety, override_color(view.safety)
+        full = round(N_GAUGE * safety.override)
+        text = f"{100 * safety.override:.0f} %" if safety.on else "no safety layer"
+        if (full, color, text) == self._key:
+            return
+        self._key = (full, color, text)
+        colors = np.full((N_GAUGE, 2, 3), BACK, dtype=np.uint8)
+        colors[:full] = color
+        self._ring.colors = colors
+        self._text.text = text
+
+
+class _Trail:
+    """Where the tool has been, in the colour of the rate at which it went there."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._points: deque[tuple[Vec, Rgb]] = deque(maxlen=N_TRAIL + 1)
+        self._lines = server.scene.add_line_segments(
+            "/trail/lines", np.zeros((N_TRAIL, 2, 3)), MARK, thickness=0.012, visible=False
+        )
+        self._sent = 0
+        self._n = 0
+
+    def note(self, snapshot: WorldSnapshot) -> None:
+        """Remember where the tool is."""
+        tcp, points = np.array(snapshot.tcp), self._points
+        assert snapshot.reach is not None
+        if points and float(np.linalg.norm(tcp - points[-1][0])) > 0.3:
+            points.clear()
+        if not points or float(np.linalg.norm(tcp - points[-1][0])) > TRAIL_M:
+            points.append((tcp, override_color(snapshot.reach.safety)))
+            self._n += 1
+
+    def draw(self) -> None:
+        """Show what was noted."""
+        seen = len(self._points) > 1
+        if self._lines.visible != seen:
+            self._lines.visible = seen
+        if not seen or self._sent == self._n:
+            return
+        self._sent = self._n
+        first = [self._points[0]] * (N_TRAIL + 1 - len(self._points))
+        noted = [*first, *self._points]
+        places = np.array([place for place, _ in noted])
+        colors = np.array([color for _, color in noted], dtype=np.float64)
+        fresh = np.linspace(0.25, 1.0, len(colors))[:, None]
+        faded = (fresh * colors + (1.0 - fresh) * np.array(BACK)).astype(np.uint8)
+        self._lines.points = np.stack([places[:-1], places[1:]], axis=1).astype(np.float32)
+        self._lines.colors = np.stack([faded[:-1], faded[1:]], axis=1)
+
+
+def _fan(outline: Vec, z: float) -> tuple[Vec, Vec]:
+    """Return vertices [m] and faces of the area inside an outline, shape (n, 2)."""
+    n = len(outline)
+    middle = np.array([*outline.mean(axis=0), z])
+    rim = np.column_stack([outline, np.full(n, z)])
+    index = np.arange(n)
+    faces = np.column_stack([np.full(n, n), index, (index + 1) % n])
+    return np.vstack([rim, middle]), faces
+
+
+def _add_targets(server: viser.ViserServer, cell: Cell) -> None:
+    """Add the outline of the goal region and its targets."""
+    low, high = goal_box(cell)
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
+    pairs = [
+        (a, b)
+        for a in range(8)
+        for b in range(a + 1, 8)
+        if np.abs(corners[a] - corners[b]).sum() == 1
+    ]
+    places = low + corners * (high - low)
+    server.scene.add_line_segments("/goals/box", places[np.array(pairs)], EDGE, thickness=0.004)
+    server.scene.add_point_cloud(
+        "/goals/targets",
+        goal_region_of(cell).targets().astype(np.float32),
+        DOT,
+        point_size=0.014,
+        point_shape="circle",
+        precision="float32",
+        point_shading="flat",
+    )

@@ -1,0 +1,143 @@
+"""Plain solids with soft edges, painted with physical materials, as binary glTF."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import trimesh
+from trimesh.visual.material import PBRMaterial
+
+from web.viewer.poses import Vec
+
+
+def material(
+    color: tuple[int, int, int], *, metallic: float = 0.0, roughness: float = 0.6
+) -> PBRMaterial:
+    """Return a physical material.
+
+    Args:
+        color: Base colour, sRGB 0 to 255.
+        metallic: 0 for paint and plastic, 1 for bare metal.
+        roughness: 0 for a mirror, 1 for chalk.
+    """
+    linear = [round(255.0 * (channel / 255.0) ** 2.2) for channel in color]
+    return PBRMaterial(  # type: ignore[no-untyped-call]
+        baseColorFactor=(*linear, 255),
+        metallicFactor=metallic,
+        roughnessFactor=roughness,
+        doubleSided=False,
+    )
+
+
+def _flat(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
+    """Return the mesh with its own vertices per face, so that edges stay crisp."""
+    return trimesh.Trimesh(
+        vertices=mesh.triangles.reshape(-1, 3),
+        faces=np.arange(3 * len(mesh.faces)).reshape(-1, 3),
+        vertex_normals=np.repeat(mesh.face_normals, 3, axis=0),
+        process=False,
+    )
+
+
+def block(size: Sequence[float], center: Sequence[float], bevel: float) -> trimesh.Trimesh:
+    """Return a box with soft edges; sizes and centre in [m], shape (3,)."""
+    return slab(size, center, 1.5 * bevel, bevel, sections=16)
+
+
+def slab(
+    size: Sequence[float],
+    center: Sequence[float],
+    radius: float,
+    bevel: float,
+    sections: int = 64,
+) -> trimesh.Trimesh:
+    """Return a plate with rounded corners and chamfered edges.
+
+    Args:
+        size: Edge lengths [m], shape (3,).
+        center: Centre [m], shape (3,).
+        radius: Radius of the four vertical edges [m].
+        bevel: Width of the chamfer at top and bottom [m].
+        sections: Points around the outline, a multiple of four.
+    """
+    half, count = 0.5 * np.asarray(size, dtype=np.float64), sections
+    angles = 2.0 * np.pi * (np.arange(count) + 0.5) / count
+    outline = np.column_stack([np.cos(angles), np.sin(angles)])
+    middle = np.sign(outline) * (half[:2] - radius)
+    levels = (
+        (radius - bevel, -half[2]),
+        (radius, bevel - half[2]),
+        (radius, half[2] - bevel),
+        (radius - bevel, half[2]),
+    )
+    rings = [np.column_stack([middle + r * outline, np.full(count, z)]) for r, z in levels]
+    i, j = np.arange(count), (np.arange(count) + 1) % count
+    faces = []
+    for level in range(len(levels) - 1):
+        low, high = level * count, (level + 1) * count
+        faces += [
+            np.column_stack([low + i, low + j, high + j]),
+            np.column_stack([low + i, high + j, high + i]),
+        ]
+    bottom, top = len(levels) * count, len(levels) * count + 1
+    last = (len(levels) - 1) * count
+    faces += [
+        np.column_stack([np.full(count, bottom), j, i]),
+        np.column_stack([np.full(count, top), last + i, last + j]),
+    ]
+    tips = [[0.0, 0.0, -half[2]], [0.0, 0.0, half[2]]]
+    mesh = trimesh.Trimesh(np.vstack([*rings, tips]), np.vstack(faces), process=False)
+    mesh.apply_translation(center)
+    return _flat(mesh)
+
+
+def rod(base: Sequence[float], height: float, radius: float) -> trimesh.Trimesh:
+    """Return an upright cylinder on ``base`` [m], shape (3,), with a smooth side."""
+    count = 40
+    angles = 2.0 * np.pi * np.arange(count) / count
+    side = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(count)])
+    up = np.array([0.0, 0.0, 1.0])
+    low = np.asarray(base) + radius * side
+    high = low + height * up
+    i, j = np.arange(count), (np.arange(count) + 1) % count
+    caps = [
+        np.column_stack([np.full(count, 2 * count), 2 * count + i, 2 * count + j])[1:-1],
+        np.column_stack([np.full(count, 3 * count), 3 * count + j, 3 * count + i])[1:-1],
+    ]
+    walls = [
+        np.column_stack([i, j, count + j]),
+        np.column_stack([i, count + j, count + i]),
+    ]
+    return trimesh.Trimesh(
+        vertices=np.vstack([low, high, high, low]),
+        faces=np.vstack([*walls, *caps]),
+        vertex_normals=np.vstack(
+            [side, side, np.tile(up, (count, 1)), np.tile(-up, (count, 1))]
+        ),
+        process=False,
+    )
+
+
+def painted(pieces: Sequence[tuple[trimesh.Trimesh, PBRMaterial]]) -> bytes:
+    """Return meshes with their materials as one binary glTF."""
+    scene = trimesh.Scene()
+    for mesh, paint in pieces:
+        mesh.visual = trimesh.visual.TextureVisuals(material=paint)  # type: ignore[no-untyped-call]
+        scene.add_geometry(mesh)
+    data = scene.export(file_type="glb", include_normals=True)  # type: ignore[no-untyped-call]
+    assert isinstance(data, bytes)
+    return data
+
+
+def torus(radius: float, thickness: float) -> tuple[Vec, Vec]:
+    """Return vertices [m] and faces of a ring in the xy plane."""
+    ring = trimesh.creation.torus(radius, thickness, major_sections=64, minor_sections=12)
+    return np.asarray(ring.vertices), np.asarray(ring.faces)
+
+
+def disc(radius: float, sections: int = 64) -> tuple[Vec, Vec]:
+    """Return vertices [m] and faces of a disc in the xy plane, facing up."""
+    angles = np.linspace(0.0, 2.0 * np.pi, sections, endpoint=False)
+    rim = radius * np.column_stack([np.cos(angles), np.sin(angles), np.zeros(sections)])
+    index = np.arange(sections)
+    faces = np.column_stack([np.full(sections, sections), index, (index + 1) % sections])
+    return np.vstack([rim, np.zeros(3)]), faces

@@ -1,0 +1,114 @@
+"""What blocks, towers and clutter cells look like, and the colours of the failure map.
+
+Colours are the same as in ``web/static/palette.js``. The map of failures runs in one hue from
+light to dark, so that it reads without seeing colours, and none of its shades is a block's.
+"""
+
+from functools import lru_cache
+
+import numpy as np
+import trimesh
+
+from web.viewer.people.mannequin import Rgb
+from web.viewer.poses import Vec
+from web.viewer.scene.solid_meshes import material, painted, rod, slab
+
+BLOCKS: dict[str, Rgb] = {"red": (205, 58, 62), "green": (112, 184, 92), "blue": (52, 104, 196)}
+"""Colour of blocks and towers by name."""
+FAILURES: tuple[tuple[float, Rgb], ...] = (
+    (0.0, (240, 237, 229)),
+    (0.2, (243, 217, 164)),
+    (0.4, (226, 166, 92)),
+    (0.7, (176, 108, 48)),
+    (1.0, (112, 62, 24)),
+)
+"""Colour of a clutter cell by the chance that a grasp in it fails."""
+TRAY = material((206, 210, 214), roughness=0.6)
+RIM = material((160, 167, 175), metallic=0.3, roughness=0.45)
+PLATE_SIDE = 0.16
+"""Side of a tower's base plate [m]."""
+GHOST_GROWTH = 1.02
+"""How much larger a wanted block is drawn than a real one, to be seen around it."""
+
+
+def failure_color(chance: float) -> Rgb:
+    """Return the colour of a clutter cell where a grasp fails with this chance."""
+    channels = [
+        np.interp(chance, [x for x, _ in FAILURES], [color[k] for _, color in FAILURES])
+        for k in range(3)
+    ]
+    return round(float(channels[0])), round(float(channels[1])), round(float(channels[2]))
+
+
+@lru_cache(maxsize=64)
+def block_body(color: Rgb, half_size: tuple[float, float, float]) -> bytes:
+    """Return a block with a steel disc on top for the magnet, as binary glTF.
+
+    Args:
+        color: Its colour.
+        half_size: Half of length, width and height [m]; the origin is the centre.
+    """
+    x, y, z = half_size
+    disc = rod((0.0, 0.0, z - 0.001), 0.0014, 0.42 * min(x, y))
+    return painted(
+        [
+            (_block(half_size), material(color, roughness=0.5)),
+            (disc, material((214, 217, 221), metallic=0.4, roughness=0.35)),
+        ]
+    )
+
+
+@lru_cache(maxsize=16)
+def ghost_body(half_size: tuple[float, float, float]) -> trimesh.Trimesh:
+    """Return the surface of a block that is wanted; sizes as in :func:`block_body`."""
+    x, y, z = half_size
+    return _block((GHOST_GROWTH * x, GHOST_GROWTH * y, 0.98 * z))
+
+
+def _block(half_size: tuple[float, float, float]) -> trimesh.Trimesh:
+    x, y, z = half_size
+    bevel = min(0.003, 0.3 * z)
+    return slab((2 * x, 2 * y, 2 * z), (0.0, 0.0, 0.0), 0.3 * min(x, y), bevel, sections=32)
+
+
+def tower_plate(color: Rgb, height: float) -> bytes:
+    """Return the plate under a tower: grey, with a top in the tower's colour, as glTF.
+
+    Args:
+        color: Colour of the tower.
+        height: Its top over the table [m].
+    """
+    side, top = PLATE_SIDE, 0.004
+    soft = (
+        round(0.72 * color[0] + 66),
+        round(0.72 * color[1] + 66),
+        round(0.72 * color[2] + 66),
+    )
+    return painted(
+        [
+            (slab((side, side, height), (0.0, 0.0, 0.5 * height), 0.02, 0.002), RIM),
+            (
+                slab((side - 0.012, side - 0.012, top), (0.0, 0.0, height), 0.016, 0.001),
+                material(soft, roughness=0.65),
+            ),
+        ]
+    )
+
+
+def tray(points: Vec, height: float, margin: float) -> bytes:
+    """Return the plate under all clutter cells as binary glTF.
+
+    Args:
+        points: Places of the cells [m], shape (n, 2).
+        height: Its top over the table [m].
+        margin: From the outermost places to its edges [m].
+    """
+    low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
+    size, center = high - low, 0.5 * (low + high)
+    body = slab((*size, height), (*center, 0.5 * height), 0.02, 0.002)
+    return painted([(body, TRAY)])
+
+
+def tile(width: float, depth: float) -> trimesh.Trimesh:
+    """Return a clutter cell as a thin plate on z = 0, sizes in [m]."""
+    return slab((width, depth, 0.002), (0.0, 0.0, 0.001), 0.012, 0.0006, sections=32)

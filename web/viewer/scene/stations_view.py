@@ -1,0 +1,171 @@
+"""Cubes and docks in the scene: each in its own colour, labelled, and clickable.
+
+A label has rank and value of a candidate. What is no candidate is grey. A ring marks the chosen
+one.
+"""
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+import trimesh
+import viser
+
+from app.live.commands import ToggleCandidate
+from app.live.snapshot import CandidateView, WorldSnapshot
+from app.sim.cells.cell import Cell
+from app.sim.cells.parts import Station
+from web.viewer.people.mannequin import Rgb
+from web.viewer.scene.solid_meshes import block, disc, slab, torus
+
+CUBE_SIDE, DOCK_SIDE = 0.07, 0.15
+GOALS: tuple[Rgb, ...] = (
+    (49, 119, 220),
+    (206, 100, 0),
+    (0, 146, 159),
+    (167, 76, 193),
+    (140, 131, 0),
+    (211, 45, 72),
+    (146, 94, 50),
+    (42, 144, 75),
+    (202, 87, 148),
+    (98, 108, 196),
+)
+"""Colours of the goals, in the cell's order; the same as GOALS in ``web/static/palette.js``."""
+IDLE: Rgb = (196, 202, 210)
+PERIOD_S = 0.25
+"""Time between two drawings of values that change all the time [s]."""
+MARK: Rgb = (11, 127, 119)
+HIT: Rgb = (214, 52, 46)
+
+
+class StationsView:
+    """Draws the stations of one cell; used by the live cell's thread only.
+
+    Args:
+        server: Where to draw.
+        cell: Says what stands where.
+        submit: Takes the command of a click.
+    """
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        cell: Cell,
+        submit: Callable[[ToggleCandidate], object],
+    ) -> None:
+        self._scene, self._cell, self._submit = server.scene, cell, submit
+        self._stations = [one for one in cell.stations if one.kind in ("cube", "dock")]
+        self._bodies = {station.id: self._add_body(station) for station in self._stations}
+        self._labels = {station.id: self._add_label(station) for station in self._stations}
+        self._marker = self._add_marker()
+        self._key: tuple[object, ...] = ()
+        self._next = 0.0
+
+    def _add_body(self, station: Station) -> viser.MeshHandle:
+        x, y, _ = station.position
+        mesh = _cube() if station.kind == "cube" else _dock()
+        body = self._scene.add_mesh_simple(
+            f"/stations/{station.id}",
+            np.asarray(mesh.vertices),
+            np.asarray(mesh.faces),
+            color=IDLE,
+            flat_shading=True,
+            cast_shadow=station.kind == "cube",
+            position=(x, y, 0.0),
+        )
+        name = station.id
+
+        async def toggle(_: object) -> None:
+            self._submit(ToggleCandidate(id=name))
+
+        body.on_click(toggle)
+        return body
+
+    def _add_label(self, station: Station) -> viser.LabelHandle:
+        x, y, _ = station.position
+        height = CUBE_SIDE + 0.035 if station.kind == "cube" else 0.05
+        return self._scene.add_label(
+            f"/labels/{station.id}",
+            station.label,
+            position=(x, y, height),
+            anchor="bottom-center",
+            font_screen_scale=0.95,
+        )
+
+    def _add_marker(self) -> viser.FrameHandle:
+        marker = self._scene.add_frame("/chosen", show_axes=False, visible=False)
+        vertices, faces = torus(0.085, 0.0055)
+        self._scene.add_mesh_simple(
+            "/chosen/ring",
+            vertices,
+            faces,
+            color=MARK,
+            position=(0, 0, 0.006),
+            cast_shadow=False,
+        )
+        vertices, faces = disc(0.083)
+        self._scene.add_mesh_simple(
+            "/chosen/glow",
+            vertices,
+            faces,
+            color=MARK,
+            opacity=0.22,
+            position=(0.0, 0.0, 0.003),
+            cast_shadow=False,
+        )
+        return marker
+
+    def draw(self, snapshot: WorldSnapshot) -> None:
+        """Show what the critic says; at once who is chosen, a few times a second how sure."""
+        key = (snapshot.chosen, tuple(c.id for c in snapshot.candidates))
+        if key == self._key and time.monotonic() < self._next:
+            return
+        self._key, self._next = key, time.monotonic() + PERIOD_S
+        offered = {candidate.id: candidate for candidate in snapshot.candidates}
+        values = list(snapshot.values.values())
+        for index, station in enumerate(self._stations):
+            candidate = offered.get(station.id)
+            color = IDLE if candidate is None else GOALS[index % len(GOALS)]
+            body, label = self._bodies[station.id], self._labels[station.id]
+            if tuple(body.color) != color:
+                body.color = color
+            if label.text != (text := _text(station, candidate, values)):
+                label.text = text
+            if label.visible != (shown := candidate is not None):
+                label.visible = shown
+        self._mark(snapshot.chosen if snapshot.chosen in self._bodies else None)
+
+    def _mark(self, chosen: str | None) -> None:
+        if self._marker.visible != (chosen is not None):
+            self._marker.visible = chosen is not None
+        if chosen is not None:
+            x, y, _ = self._cell.station(chosen).position
+            if tuple(self._marker.position[:2]) != (x, y):
+                self._marker.position = (x, y, 0.0)
+
+
+def _text(station: Station, candidate: CandidateView | None, values: list[float]) -> str:
+    if candidate is None or candidate.value is None:
+        return station.label
+    sign = "\N{BLACK RIGHT-POINTING SMALL TRIANGLE} " if candidate.chosen else ""
+    rank = 1 + sum(value > candidate.value for value in values)
+    return f"{sign}{rank}. {station.label}  {candidate.value:.1f}"
+
+
+def _cube() -> trimesh.Trimesh:
+    side = CUBE_SIDE
+    return block((side, side, side), (0.0, 0.0, 0.5 * side), 0.005)
+
+
+def _dock() -> trimesh.Trimesh:
+    """Return a tray with a raised rim of four bars."""
+    side, bar = DOCK_SIDE, 0.012
+    pieces = [slab((side, side, 0.006), (0.0, 0.0, 0.003), 0.012, 0.002)]
+    for sign in (-1.0, 1.0):
+        at = sign * 0.5 * (side - bar)
+        pieces.append(block((bar, side, 0.016), (at, 0.0, 0.008), 0.002))
+        pieces.append(block((side, bar, 0.016), (0.0, at, 0.008), 0.002))
+    mesh = trimesh.util.concatenate(pieces)
+    assert isinstance(mesh, trimesh.Trimesh)
+    return mesh

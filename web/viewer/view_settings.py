@@ -1,0 +1,96 @@
+"""What each visitor may show or hide over the scene, each for himself.
+
+Everything that can be hidden lies below a node of its own. A visitor's setting is a check box
+of that visitor's connection, and hides the node in that visitor's scene only. The viewer's own
+panel is never shown: the page has the boxes' doubles and sets them (``viewer_extra.html``).
+"""
+
+from dataclasses import dataclass
+
+import viser
+
+from app.live.reach.commands import is_reaching
+from app.sim.cells.cell import Cell
+from web.viewer.capsules_view import SHAPES
+from web.viewer.scene.sorting_scene import sorts
+
+PREFIX = "view: "
+"""What the labels of these check boxes begin with, so that the page knows them."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Setting:
+    """Something that can be shown or hidden."""
+
+    label: str
+    """Name for people."""
+    node: str
+    """What it is in the scene."""
+    shown: bool = True
+    """Whether it is shown at first."""
+
+
+COLLISION_SHAPES = Setting(label="Collision shapes", node=SHAPES, shown=False)
+CHOICE = (
+    Setting(label="Values", node="/labels"),
+    Setting(label="Target line", node="/path"),
+)
+SORTING = (
+    Setting(label="Failure figures", node="/chances"),
+    Setting(label="Goal", node="/goal"),
+    Setting(label="Move", node="/move"),
+)
+REACH = (
+    Setting(label="Separation zone", node="/zone"),
+    Setting(label="Trail", node="/trail"),
+    Setting(label="Targets", node="/goals"),
+)
+
+
+def settings_of(cell: Cell) -> tuple[Setting, ...]:
+    """Return what can be shown or hidden in a cell's scene."""
+    if sorts(cell):
+        return (COLLISION_SHAPES, *SORTING)
+    return (COLLISION_SHAPES, *(REACH if is_reaching(cell) else CHOICE))
+
+
+class ViewSettings:
+    """Gives every visitor check boxes, and hides what each of them unchecks.
+
+    Args:
+        server: The viewer.
+        cell: Says what there is.
+    """
+
+    def __init__(self, server: viser.ViserServer, cell: Cell) -> None:
+        self._settings = settings_of(cell)
+        self._seen_by: dict[Setting, set[int]] = {one: set() for one in self._settings}
+        server.gui.configure_theme(show_logo=False, show_share_button=False)
+        for one in self._settings:
+            server.scene.add_frame(one.node, show_axes=False, visible=one.shown)
+        server.on_client_connect(self._greet)
+        server.on_client_disconnect(self._forget)
+
+    def is_seen(self, setting: Setting) -> bool:
+        """Whether any visitor looks at it."""
+        return bool(self._seen_by[setting])
+
+    async def _greet(self, visitor: viser.ClientHandle) -> None:
+        for one in self._settings:
+            self._add_box(visitor, one)
+
+    async def _forget(self, visitor: viser.ClientHandle) -> None:
+        for seen_by in self._seen_by.values():
+            seen_by.discard(visitor.client_id)
+
+    def _add_box(self, visitor: viser.ClientHandle, setting: Setting) -> None:
+        seen_by, id = self._seen_by[setting], visitor.client_id
+        box = visitor.gui.add_checkbox(f"{PREFIX}{setting.label}", setting.shown)
+        if setting.shown:
+            seen_by.add(id)
+
+        @box.on_update
+        async def _(_: object) -> None:
+            (seen_by.add if box.value else seen_by.discard)(id)
+            # A visitor's own node of that name stands in for everybody's.
+            visitor.scene.add_frame(setting.node, show_axes=False, visible=box.value)
