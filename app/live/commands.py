@@ -1,8 +1,8 @@
 """What may be done to a live world, as data.
 
 The page, the HTTP interface and the tests change a world through these commands only; the
-world's one owner applies them between two ticks (:meth:`app.live.pick.world.World.apply`). Every
-command has a ``tag``, so that it can travel as JSON: ``{"tag": "toggle-candidate",
+world's one owner applies them between two ticks (:meth:`app.live.pick.world.World.apply`).
+Every command has a ``tag``, so that it can travel as JSON: ``{"tag": "toggle-candidate",
 "id": "cube1"}``.
 """
 

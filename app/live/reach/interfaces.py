@@ -17,8 +17,7 @@ class ReachPilot(ReachKnown, Protocol):
 
     @property
     def ways(self) -> tuple[str, ...]:
-        """How it can be asked, ``direct`` among them; see
-        ``app.policies.inference.controllers``."""
+        """Names of the inference modes (``app.policies.inference.controllers``)."""
 
     def acts(
         self, batch: "ReachBatch", way: str, safety: "SafetySettings | None"

@@ -1,5 +1,4 @@
-"""Protocol ``sorting-tests``: the six tests of ``app/sim/sorting/benchmark_tasks.py``, many of
-each.
+"""Protocol ``sorting-tests``: many episodes of each benchmark task of the thesis (3.4.3).
 
 Rows ``test-1`` to ``test-6`` are the policy alone, ``test-1-handover`` and so on the policy
 until it goes in circles, then the exact planner. Picks fail as the work cell says. An episode
