@@ -198,8 +198,9 @@ def admitting(arm: Arm, q: Vec, qd: Vec) -> Arm:
     low, high, fast = np.minimum(q, rest), np.maximum(q, rest), np.abs(qd)
     if (arm.q_min <= low).all() and (high <= arm.q_max).all() and (fast <= arm.qd_max).all():
         return arm
-    return arm._replace(
+    wider = arm.limits._replace(
         q_min=own(np.minimum(arm.q_min, low)),
         q_max=own(np.maximum(arm.q_max, high)),
         qd_max=own(np.maximum(arm.qd_max, fast)),
     )
+    return arm._replace(limits=wider, q_min=wider.q_min, q_max=wider.q_max, qd_max=wider.qd_max)

@@ -33,6 +33,7 @@ from app.sim.primitives.kernels import script
 from app.sim.primitives.kernels.primitives import new_legs, no_repertoire
 from app.sim.robot.capsules import levers, load_robot_capsules, self_pairs
 from app.sim.robot.kernels.arm import Arm
+from app.sim.robot.kernels.joints import JointLimits
 
 HumanKind = Literal["worker", "walker", "constant", "fixed-speed"]
 HUMAN_KINDS: tuple[HumanKind, ...] = ("worker", "walker", "constant", "fixed-speed")
@@ -144,6 +145,13 @@ def arm_of(cell: Cell) -> Arm:
     capsules = load_robot_capsules(mount.tool_length, mount.tool_radius)
     pairs, span = self_pairs(capsules), capsules.p1 - capsules.p0
     return Arm(
+        limits=JointLimits(
+            q_min=np.array(mount.q_min),
+            q_max=np.array(mount.q_max),
+            qd_max=np.array(mount.qd_max),
+            qdd_max=np.array(mount.qdd_max),
+            jerk_max=np.array(mount.jerk_max),
+        ),
         q_min=np.array(mount.q_min),
         q_max=np.array(mount.q_max),
         qd_max=np.array(mount.qd_max),

@@ -12,6 +12,7 @@ from app.sim.geometry.box import box_clearance
 from app.sim.geometry.capsules import RADIUS, UX, UZ, X, Z, least, longest_way, pair_distances
 from app.sim.geometry.segments import FAR, FAST
 from app.sim.robot.kernels import kinematics
+from app.sim.robot.kernels.joints import JointLimits
 
 CONTROLLED = 5
 """Joints a policy moves; the sixth turns the tool about itself and is held (thesis 5.3.1)."""
@@ -22,6 +23,8 @@ FIRST_OVER_TABLE = 2
 class Arm(NamedTuple):
     """Limits, tool, capsules and surroundings of the robot in its cell."""
 
+    limits: JointLimits
+    """Joint limits."""
     q_min: Vec
     """Lower joint limits [rad], shape (6,)."""
     q_max: Vec
