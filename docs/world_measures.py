@@ -44,7 +44,7 @@ def references() -> Json:
     """Return how far the kernels are from Pinocchio and from plain numpy at most."""
     arm, robot, capsules = arm_of(load_cell()), Robot(), load_robot_capsules()
     pose, links = new_robot_pose(arm), 0.0
-    q = np.random.default_rng(52).uniform(arm.q_min, arm.q_max, (N, 6))
+    q = np.random.default_rng(52).uniform(arm.limits.q_min, arm.limits.q_max, (N, 6))
     p0, p1 = robot_ends(robot, capsules, q)
     for row, start, end in zip(q, p0, p1, strict=True):
         place_robot(arm, row, pose)
@@ -153,9 +153,13 @@ def limits(seed: int) -> tuple[Json, Arm, dict[int, Episode]]:
         for number in range(EPISODES):
             one = episode(arm, degree, seed + number)
             shown.setdefault(degree, one)
-            over = np.maximum(one.q - arm.q_max, arm.q_min - one.q).max()
+            over = np.maximum(one.q - arm.limits.q_max, arm.limits.q_min - one.q).max()
             worst["q_over_rad"] = max(worst["q_over_rad"], float(over))
-            pairs = (("qd", arm.qd_max), ("qdd", arm.qdd_max), ("jerk", arm.jerk_max))
+            pairs = (
+                ("qd", arm.limits.qd_max),
+                ("qdd", arm.limits.qdd_max),
+                ("jerk", arm.limits.jerk_max),
+            )
             for name, limit in pairs:
                 share = float((np.abs(getattr(one, name)) / limit).max())
                 worst[f"{name}_share"] = max(worst[f"{name}_share"], share)
@@ -223,7 +227,9 @@ def reach_map(cell: Cell, z: float) -> ReachMap:
         point = np.array([xs[j], ys[i], z])
         found = reach.tool_down(point).q
         if found is None:
-            blocked[i, j] = robot.ik_vertical(point, arm.q_min, arm.q_max) is not None
+            blocked[i, j] = (
+                robot.ik_vertical(point, arm.limits.q_min, arm.limits.q_max) is not None
+            )
             continue
         place_robot(arm, found, pose)
         tcp_jacobian(pose.rot, pose.pos, pose.tcp, pose.jacobian)

@@ -62,14 +62,14 @@ def visit() -> tuple[Json, Visit]:
     settings = safety_settings(cell)
     layer = SafetyLayer(arm, settings)
     goals = [np.array(cell.station(name).position) for name in CUBES]
-    postures = [robot.ik_vertical(goal, arm.q_min, arm.q_max) for goal in goals]
+    postures = [robot.ik_vertical(goal, arm.limits.q_min, arm.limits.q_max) for goal in goals]
     q, qd, qdd = postures[0].copy(), np.zeros(6), np.zeros(6)
     at, rows = 1, []
     for period in range(round(ENDS / arm.dt)):
         person = human.rest_posture(0.0, pelvis_y(period * arm.dt), -0.5 * np.pi)
         if np.abs(postures[at] - q).max() < 0.05:
             at = 1 - at
-        act = np.clip(GAIN * (postures[at] - q) / arm.qd_max, -1.0, 1.0)[:5]
+        act = np.clip(GAIN * (postures[at] - q) / arm.limits.qd_max, -1.0, 1.0)[:5]
         piece = step_robot(arm, q, qd, qdd, act)
         done = layer.decide(q, qd, piece.c, piece.d, shapes_of(cell, person[None]))
         q, qd, qdd = done.q, done.qd, done.qdd

@@ -113,10 +113,10 @@ def limits(arm: Arm, shown: dict[int, Episode]) -> Figure:
     """Draw position, speed, acceleration and jerk of one episode of each degree."""
     figure, axes = panels(4, 2, 7.4, sharex=True, sharey="row")
     rows = (
-        ("q", "position [rad]", arm.q_min, arm.q_max),
-        ("qd", "speed [rad/s]", -arm.qd_max, arm.qd_max),
-        ("qdd", "acceleration [rad/s²]", -arm.qdd_max, arm.qdd_max),
-        ("jerk", "jerk [rad/s³]", -arm.jerk_max, arm.jerk_max),
+        ("q", "position [rad]", arm.limits.q_min, arm.limits.q_max),
+        ("qd", "speed [rad/s]", -arm.limits.qd_max, arm.limits.qd_max),
+        ("qdd", "acceleration [rad/s²]", -arm.limits.qdd_max, arm.limits.qdd_max),
+        ("jerk", "jerk [rad/s³]", -arm.limits.jerk_max, arm.limits.jerk_max),
     )
     for column, (degree, one) in enumerate(shown.items()):
         for axis, (name, label, low, high) in zip(axes[:, column], rows, strict=True):

@@ -39,7 +39,7 @@ class StraightPolicy:
         goals = np.array([candidate.position for candidate in candidates])
         arm = self._arm
         postures, reachable = kinematics.ik_vertical_batch(
-            goals, arm.tool_length, arm.q_min, arm.q_max
+            goals, arm.tool_length, arm.limits.q_min, arm.limits.q_max
         )
         hands = [np.full(3, np.inf)]
         for person in people:
@@ -49,12 +49,12 @@ class StraightPolicy:
         near = np.linalg.norm(goals[:, None] - np.stack(hands), axis=2).min(axis=1)
         values = 4.0 - np.abs(postures - q).max(axis=1) - 4.0 * np.exp(-((near / 0.2) ** 2))
         index = int(values.argmax())
-        speed = np.clip(2.5 * (postures - q), -arm.qd_max, arm.qd_max)
+        speed = np.clip(2.5 * (postures - q), -arm.limits.qd_max, arm.limits.qd_max)
         return Decision(
             chosen=candidates[index].id,
             index=index,
             values=tuple(float(value) for value in values),
-            actions=(speed / arm.qd_max)[:, :5].astype(np.float32),
+            actions=(speed / arm.limits.qd_max)[:, :5].astype(np.float32),
             qd_target=speed,
             reachable=tuple(bool(found) for found in reachable),
             outside=(),

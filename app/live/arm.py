@@ -149,12 +149,14 @@ class LiveArm:
             point: Where the tcp shall be [m], shape (3,).
         """
         q, arm = np.empty(6), self.arm
-        exact = kinematics.ik_vertical(point, arm.tool_length, arm.q_min, arm.q_max, q)
+        exact = kinematics.ik_vertical(
+            point, arm.tool_length, arm.limits.q_min, arm.limits.q_max, q
+        )
         return q, bool(exact)
 
     def toward(self, posture: Vec) -> Vec:
         """Return the action that goes straight to a posture, shape (5,)."""
-        speed = GAIN * (posture - self.q) / self.arm.qd_max
+        speed = GAIN * (posture - self.q) / self.arm.limits.qd_max
         return np.asarray(np.clip(speed[:5], -1.0, 1.0))
 
     def tcp(self) -> Vec:

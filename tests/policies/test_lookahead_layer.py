@@ -93,7 +93,9 @@ def test_a_posture_is_found_at_every_target() -> None:
     for goal, (_, posture) in zip(targets, heeded(batch, layer_of(MEASURED, DT)), strict=True):
         place_robot(batch.arm, posture, pose)
         assert np.linalg.norm(pose.tcp - goal) < 0.1
-        assert (batch.arm.q_min <= posture).all() and (posture <= batch.arm.q_max).all()
+        assert (batch.arm.limits.q_min <= posture).all() and (
+            posture <= batch.arm.limits.q_max
+        ).all()
 
 
 def test_looking_farther_changes_nothing_of_what_is_foretold_sooner() -> None:

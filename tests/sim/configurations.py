@@ -44,7 +44,7 @@ def chunk(number: int) -> Iterator[Case]:
     """CHUNK random configurations: the robot within its limits, the person in its reach."""
     arm, people = arm_of(CELL), people_of(CELL)
     rng = np.random.default_rng((55, number))
-    q = rng.uniform(arm.q_min, arm.q_max, (CHUNK, 6))
+    q = rng.uniform(arm.limits.q_min, arm.limits.q_max, (CHUNK, 6))
     human_q = rng.uniform(human.Q_MIN, human.Q_MAX, (CHUNK, 18))
     human_q[:, :3] = rng.uniform([-0.7, 0.0, -np.pi], [0.7, 1.7, np.pi], (CHUNK, 3))
     robot_at = np.stack(robot_ends(Robot(), load_robot_capsules(), q), axis=2)

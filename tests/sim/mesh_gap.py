@@ -93,8 +93,8 @@ def postures(cell: Cell, arm: Arm, n: int, seed: int) -> tuple[np.ndarray, np.nd
         found = None
         while found is None:
             target = rng.uniform([-0.7, 0.4, 0.05], [0.7, 0.85, 0.45])
-            found = robot.ik_vertical(target, arm.q_min, arm.q_max)
-        row[:] = np.clip(found + rng.normal(0.0, 0.15, 6), arm.q_min, arm.q_max)
+            found = robot.ik_vertical(target, arm.limits.q_min, arm.limits.q_max)
+        row[:] = np.clip(found + rng.normal(0.0, 0.15, 6), arm.limits.q_min, arm.limits.q_max)
     return q, batch.state.people.q[:, 0].copy()
 
 

@@ -115,5 +115,5 @@ def usual_way(pilot: ReachPilot) -> str:
 def straight(arm: Arm, q: Vec, posture: Vec) -> Vec:
     """Return the action that leads straight, in joint space, to a posture [rad], shape (6,)."""
     speed = GAIN * (posture - q)
-    fastest = float(np.max(np.abs(speed) / arm.qd_max))
-    return np.asarray(speed / arm.qd_max / max(1.0, fastest))
+    fastest = float(np.max(np.abs(speed) / arm.limits.qd_max))
+    return np.asarray(speed / arm.limits.qd_max / max(1.0, fastest))

@@ -159,5 +159,5 @@ class OptionNoise:
     def _toward_goals(self) -> Vec:
         away = self._goal - self._batch.state.q[:, : self._batch.n_act]
         widest = np.maximum(np.abs(away).max(axis=1, keepdims=True), 1e-9)
-        pace = np.minimum(1.0, BASE_GAIN * widest / self._batch.arm.qd_max[0])
+        pace = np.minimum(1.0, BASE_GAIN * widest / self._batch.arm.limits.qd_max[0])
         return np.asarray(away / widest * pace)

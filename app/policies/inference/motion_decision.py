@@ -278,11 +278,12 @@ class MotionDecider:
         c, d, q1, qd1, qdd1 = np.empty((5, 6))
         arguments = (
             self._rule, q, qd, robot.clamped.qdd, act.astype(np.float32), q_min, q_max,
-            arm.qd_max, arm.qdd_max, arm.jerk_max, arm.dt, c, d, q1, qd1, qdd1,
+            arm.limits.qd_max, arm.limits.qdd_max, arm.limits.jerk_max, arm.dt, c, d, q1, qd1,
+            qdd1,
         )  # fmt: skip
         if self._advance is None:
             self._advance = direct(actions.advance, arguments)
-        empty = self._advance(*arguments) or q_min is not arm.q_min
+        empty = self._advance(*arguments) or q_min is not arm.limits.q_min
         return Piece(c=c, d=d, q=q1, qd=qd1, qdd=qdd1), bool(empty)
 
     def _monitored(

@@ -225,7 +225,7 @@ class TaskChooser:
             )
             return np.stack([piece.qd for piece in pieces])
         speeds = np.zeros((len(act), 6))
-        speeds[:, :CONTROLLED] = act * self._arm.qd_max[:CONTROLLED]
+        speeds[:, :CONTROLLED] = act * self._arm.limits.qd_max[:CONTROLLED]
         return speeds
 
     def _nearest(self, q: Vec, people: Sequence[Person]) -> tuple[int | None, Person]:

@@ -98,7 +98,9 @@ def explorer_of(preset: ReachPreset, batch: ReachRows, seed: int) -> Explorer:
         return ladder
     assert isinstance(batch, ReachBatch)
     arm, targets = batch.arm, batch.world.targets
-    postures, _ = ik_vertical_batch(targets, arm.tool_length, arm.q_min, arm.q_max)
+    postures, _ = ik_vertical_batch(
+        targets, arm.tool_length, arm.limits.q_min, arm.limits.q_max
+    )
     return OptionNoise(ladder, batch, postures, preset.option_rate, rng)
 
 

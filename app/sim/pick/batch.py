@@ -246,7 +246,7 @@ def observe(
     """
     n, targets = len(goals), own(goals)
     q_goals, reachable = kinematics.ik_vertical_batch(
-        targets, arm.tool_length, arm.q_min, arm.q_max
+        targets, arm.tool_length, arm.limits.q_min, arm.limits.q_max
     )
     obs = np.empty((n, n_obs), dtype=np.float32)
     features.observe_batch(
@@ -289,11 +289,11 @@ def step_robot(
         own(qd),
         own(qdd),
         np.array(act, dtype=np.float32),
-        arm.q_min,
-        arm.q_max,
-        arm.qd_max,
-        arm.qdd_max,
-        arm.jerk_max,
+        arm.limits.q_min,
+        arm.limits.q_max,
+        arm.limits.qd_max,
+        arm.limits.qdd_max,
+        arm.limits.jerk_max,
         arm.dt,
         c,
         d,

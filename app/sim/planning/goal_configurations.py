@@ -25,7 +25,7 @@ APART = 0.1
 
 def vertical_posture(arm: Arm, target: Vec) -> Vec:
     """Return the posture, if any, with the tool down at ``target`` [m], shape (0 or 1, 6)."""
-    q = Robot(arm.tool_length).ik_vertical(target, arm.q_min, arm.q_max)
+    q = Robot(arm.tool_length).ik_vertical(target, arm.limits.q_min, arm.limits.q_max)
     return np.zeros((0, 6)) if q is None else q[None]
 
 
@@ -58,7 +58,7 @@ def goal_postures(
     for k in range(n_starts):
         q = np.array(arm.home)
         if k > 0:
-            low, high = arm.q_min[:CONTROLLED], arm.q_max[:CONTROLLED]
+            low, high = arm.limits.q_min[:CONTROLLED], arm.limits.q_max[:CONTROLLED]
             q[:CONTROLLED] = rng.uniform(np.maximum(low, -np.pi), np.minimum(high, np.pi))
         point = np.array(target, dtype=np.float64)
         if k > 0 and spread > 0.0:
@@ -83,7 +83,9 @@ def _descend(robot: Robot, arm: Arm, point: Vec, q: Vec) -> Vec | None:
         square = jacobian @ jacobian.T + DAMPING**2 * np.eye(3)
         step = jacobian.T @ np.linalg.solve(square, miss)
         step *= min(1.0, LONGEST_STEP / max(float(np.abs(step).max()), 1e-12))
-        q[moving] = np.clip(q[moving] + step, arm.q_min[moving], arm.q_max[moving])
+        q[moving] = np.clip(
+            q[moving] + step, arm.limits.q_min[moving], arm.limits.q_max[moving]
+        )
     return None
 
 

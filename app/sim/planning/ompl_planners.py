@@ -135,7 +135,7 @@ def plan(
     goals = goals.copy()
     goals[:, settings.n_joints :] = start[settings.n_joints :]
     low, high = planning_limits(checker, start)
-    if np.any(start < checker.arm.q_min) or np.any(start > checker.arm.q_max):
+    if np.any(start < checker.arm.limits.q_min) or np.any(start > checker.arm.limits.q_max):
         return clock.answer("start-outside-limits")
     inside = np.flatnonzero(np.all((goals >= low) & (goals <= high), axis=1))
     if len(inside) == 0:
@@ -168,10 +168,10 @@ def planning_limits(checker: Checker, start: Vec) -> tuple[Vec, Vec]:
     Half a period at full speed inside the cell's limits: there every timed path is viable
     (METHOD 2.2), so that it can be followed to the letter. A start beyond them is kept.
     """
-    inset = 0.5 * checker.arm.qd_max * checker.arm.dt
+    inset = 0.5 * checker.arm.limits.qd_max * checker.arm.dt
     return (
-        np.minimum(checker.arm.q_min + inset, start),
-        np.maximum(checker.arm.q_max - inset, start),
+        np.minimum(checker.arm.limits.q_min + inset, start),
+        np.maximum(checker.arm.limits.q_max - inset, start),
     )
 
 

@@ -105,7 +105,7 @@ class Follower:
         if settings.role not in ROLES:
             raise InvalidInput("role", settings.role, "is not known", tuple(ROLES))
         self.arm, self.goals, self.settings, self.seed = arm, goals, settings, seed
-        self.limits = Limits(qd_max=arm.qd_max, qdd_max=arm.qdd_max, dt=arm.dt)
+        self.limits = Limits(qd_max=arm.limits.qd_max, qdd_max=arm.limits.qdd_max, dt=arm.dt)
         self.report = FollowReport(margin=settings.margin)
         self.tracker: Tracker | None = None
         self.blocked = False
@@ -257,7 +257,8 @@ def _after_period(follower: Follower, q: Vec, qd: Vec) -> tuple[Vec, Vec]:
     c, after_q, after_qd = np.empty(6), np.empty(6), np.empty(6)
     polynomial.advance(
         np.array(q), np.array(qd), wanted,
-        arm.q_min, arm.q_max, arm.qd_max, arm.qdd_max, arm.dt, c, after_q, after_qd,
+        arm.limits.q_min, arm.limits.q_max, arm.limits.qd_max, arm.limits.qdd_max, arm.dt, c,
+        after_q, after_qd,
     )  # fmt: skip
     return after_q, after_qd
 

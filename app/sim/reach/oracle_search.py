@@ -87,17 +87,17 @@ def draw_detours(
     """Draw where replays go first [rad], shape (k, 6), and until when [s], shape (k,)."""
     kind, home = rng.uniform(size=k), np.repeat(np.array(arm.home)[None], k, axis=0)
     near = home + rng.uniform(-1.0, 1.0, (k, 6)) * NEARBY
-    low, high = np.maximum(arm.q_min, -np.pi), np.minimum(arm.q_max, np.pi)
+    low, high = np.maximum(arm.limits.q_min, -np.pi), np.minimum(arm.limits.q_max, np.pi)
     anywhere = rng.uniform(low, high, (k, 6))
     anywhere[:, 5] = near[:, 5] = home[:, 5]
     first = np.where((kind < AT_HOME + NEAR_HOME)[:, None], near, anywhere)
     first = np.where((kind < AT_HOME)[:, None], home, first)
-    return np.clip(first, arm.q_min, arm.q_max), rng.uniform(0.0, longest, k)
+    return np.clip(first, arm.limits.q_min, arm.limits.q_max), rng.uniform(0.0, longest, k)
 
 
 def toward(arm: Arm, q: Vec, aim: Vec) -> NDArray[np.float32]:
     """Return actions, shares of the speed limits, that lead straight to postures [rad]."""
-    return np.clip(GAIN * (aim - q) / arm.qd_max, -1.0, 1.0).astype(np.float32)
+    return np.clip(GAIN * (aim - q) / arm.limits.qd_max, -1.0, 1.0).astype(np.float32)
 
 
 class Hindsight:

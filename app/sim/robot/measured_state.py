@@ -77,15 +77,15 @@ class StateLimits:
     """
 
     def __init__(self, arm: Arm, *, limits_jerk: bool = True) -> None:
-        stop_s = stop_time((1.0 + RATE_TOLERANCE) * arm.qd_max, arm.qdd_max)
-        overrun = 0.5 * (1.0 + RATE_TOLERANCE) * arm.qd_max * stop_s
-        self._low = np.stack([arm.q_min, -arm.qd_max, -arm.qdd_max])
-        self._high = np.stack([arm.q_max, arm.qd_max, arm.qdd_max])
+        stop_s = stop_time((1.0 + RATE_TOLERANCE) * arm.limits.qd_max, arm.limits.qdd_max)
+        overrun = 0.5 * (1.0 + RATE_TOLERANCE) * arm.limits.qd_max * stop_s
+        self._low = np.stack([arm.limits.q_min, -arm.limits.qd_max, -arm.limits.qdd_max])
+        self._high = np.stack([arm.limits.q_max, arm.limits.qd_max, arm.limits.qdd_max])
         self._tolerance = np.stack(
             [
                 POSITION_TOLERANCE + np.minimum(overrun, LONGEST_OVERRUN),
-                np.maximum(RATE_TOLERANCE * arm.qd_max, LEAST_TOLERANCE[0]),
-                np.maximum(RATE_TOLERANCE * arm.qdd_max, LEAST_TOLERANCE[1]),
+                np.maximum(RATE_TOLERANCE * arm.limits.qd_max, LEAST_TOLERANCE[0]),
+                np.maximum(RATE_TOLERANCE * arm.limits.qdd_max, LEAST_TOLERANCE[1]),
             ]
         )
         if not limits_jerk:
@@ -175,11 +175,15 @@ def returning(arm: Arm, q: Vec, act: Vec) -> tuple[Vec, Vec, Vec]:
     Returns:
         Action, lower and upper position limits [rad], shape (6,) each.
     """
-    below, above = q < arm.q_min, q > arm.q_max
+    below, above = q < arm.limits.q_min, q > arm.limits.q_max
     if not (below | above).any():
-        return act, arm.q_min, arm.q_max
+        return act, arm.limits.q_min, arm.limits.q_max
     inward = np.where(above, -1.0, np.where(below, 1.0, act))
-    return inward, np.where(below, -FREE, arm.q_min), np.where(above, FREE, arm.q_max)
+    return (
+        inward,
+        np.where(below, -FREE, arm.limits.q_min),
+        np.where(above, FREE, arm.limits.q_max),
+    )
 
 
 def admitting(arm: Arm, q: Vec, qd: Vec) -> Arm:
@@ -194,13 +198,17 @@ def admitting(arm: Arm, q: Vec, qd: Vec) -> Arm:
         q: Joint positions as measured [rad], shape (6,).
         qd: Joint speeds as measured [rad/s], shape (6,).
     """
-    rest = q + 0.5 * stop_time(qd, arm.qdd_max) * qd
+    rest = q + 0.5 * stop_time(qd, arm.limits.qdd_max) * qd
     low, high, fast = np.minimum(q, rest), np.maximum(q, rest), np.abs(qd)
-    if (arm.q_min <= low).all() and (high <= arm.q_max).all() and (fast <= arm.qd_max).all():
+    if (
+        (arm.limits.q_min <= low).all()
+        and (high <= arm.limits.q_max).all()
+        and (fast <= arm.limits.qd_max).all()
+    ):
         return arm
     wider = arm.limits._replace(
-        q_min=own(np.minimum(arm.q_min, low)),
-        q_max=own(np.maximum(arm.q_max, high)),
-        qd_max=own(np.maximum(arm.qd_max, fast)),
+        q_min=own(np.minimum(arm.limits.q_min, low)),
+        q_max=own(np.maximum(arm.limits.q_max, high)),
+        qd_max=own(np.maximum(arm.limits.qd_max, fast)),
     )
     return arm._replace(limits=wider, q_min=wider.q_min, q_max=wider.q_max, qd_max=wider.qd_max)

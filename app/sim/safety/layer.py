@@ -363,7 +363,7 @@ class SafetyLayer:
     ) -> SafetyDecision:
         """Return the decision the work space holds, with what set it."""
         watch, arm = self._watch, self.arm
-        t_stop = override.stop_time(qd, arm.qdd_max)
+        t_stop = override.stop_time(qd, arm.limits.qdd_max)
         person = part = link = separation = required = None
         column = int(watch.why[watch_kernel.WHO])
         if chosen < 1.0 and column >= 0:

@@ -28,7 +28,7 @@ def required_distances(arm: Arm, settings: SafetySettings, qd: Vec) -> Vec:
         settings: Assumptions.
         qd: Joint speeds [rad/s], shape (6,).
     """
-    t_stop = float(override.stop_time(own(qd), arm.qdd_max))
+    t_stop = float(override.stop_time(own(qd), arm.limits.qdd_max))
     t_r = arm.dt + settings.lead
     fastest = np.concatenate([[0.0], np.cumsum(np.abs(qd) * arm.lever)])
     v_r = fastest[arm.link]

@@ -202,7 +202,9 @@ def test_with_monitoring_somebody_inside_the_robot_is_a_stop(speed: float) -> No
     assert decision.terms_of == 1 and decision.met[1].separation < 0.0
     arm = decider().arm
     np.testing.assert_allclose(
-        np.abs(decision.safe.qd), np.maximum(0.0, speed - arm.qdd_max * arm.dt), atol=1e-9
+        np.abs(decision.safe.qd),
+        np.maximum(0.0, speed - arm.limits.qdd_max * arm.dt),
+        atol=1e-9,
     )
 
 

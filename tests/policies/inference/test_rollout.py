@@ -187,9 +187,9 @@ def test_a_dart_like_another_one_stays_within_the_joints() -> None:
     drawn = []
     for k in range(200):
         random.start_stream(0, 0, k, rng)
-        aim = batch.arm.q_max if k % 2 else batch.arm.home
+        aim = batch.arm.limits.q_max if k % 2 else batch.arm.home
         drawn.append((other_ways.vary_dart(batch.arm, aim, 3, rng, out), *out))
-        assert (out >= batch.arm.q_min).all() and (out <= batch.arm.q_max).all()
+        assert (out >= batch.arm.limits.q_min).all() and (out <= batch.arm.limits.q_max).all()
     assert min(row[0] for row in drawn) == 0 and max(row[0] for row in drawn) > 8
     assert len(set(drawn)) == 200
 

@@ -16,7 +16,7 @@ def test_postures_reach_the_target_inside_the_limits_and_differ() -> None:
     robot = Robot(ARM.tool_length)
     postures = goal_postures(ARM, TARGET, np.random.default_rng(0))
     assert len(postures) >= 4
-    assert np.all((postures >= ARM.q_min) & (postures <= ARM.q_max))
+    assert np.all((postures >= ARM.limits.q_min) & (postures <= ARM.limits.q_max))
     for k, q in enumerate(postures):
         assert np.linalg.norm(robot.tcp_pose(q)[:3, 3] - TARGET) <= 1e-4
         assert all(np.abs(q - other).max() > APART for other in postures[:k])

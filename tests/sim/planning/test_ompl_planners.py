@@ -151,7 +151,7 @@ def test_start_and_goal_in_contact_have_names() -> None:
 
 def test_outside_limits_and_no_goal_have_names() -> None:
     checker, start = Checker(ARM, no_people()), station("cube5")
-    out = ARM.q_max + 0.1
+    out = ARM.limits.q_max + 0.1
     assert plan(checker, start, np.zeros((0, 6)), PlanSettings()).outcome == "no-goal"
     goals = np.stack([start + np.array([0, 9.0, 0, 0, 0, 0])])
     assert plan(checker, start, goals, PlanSettings()).outcome == "no-goal"
@@ -179,11 +179,11 @@ def test_a_cylinder_in_the_shared_workspace_is_planned_round_within_its_limits()
     start = start[[checker.is_free(q) for q in start]][0]
     answer = plan(checker, start, goals, PlanSettings(max_poses=20_000))
     assert answer.solved and len(answer.path) > 2
-    limits = Limits(qd_max=arm.qd_max, qdd_max=arm.qdd_max, dt=arm.dt)
+    limits = Limits(qd_max=arm.limits.qd_max, qdd_max=arm.limits.qdd_max, dt=arm.dt)
     timed = time_free_path(checker, answer.path, limits)
     assert timed is not None
-    assert np.all(np.abs(timed.qd) <= arm.qd_max + 1e-9)
-    assert np.all(np.abs(np.diff(timed.qd, axis=0)) <= arm.qdd_max * arm.dt + 1e-9)
+    assert np.all(np.abs(timed.qd) <= arm.limits.qd_max + 1e-9)
+    assert np.all(np.abs(np.diff(timed.qd, axis=0)) <= arm.limits.qdd_max * arm.dt + 1e-9)
 
 
 def test_joints_that_stay_do_not_move() -> None:

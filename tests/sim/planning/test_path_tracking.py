@@ -12,14 +12,24 @@ from app.sim.robot.kernels import acceleration_bounds as polynomial
 from app.sim.scene.scene import arm_of
 
 ARM = arm_of(load_cell())
-LIMITS = Limits(qd_max=ARM.qd_max, qdd_max=ARM.qdd_max, dt=ARM.dt)
+LIMITS = Limits(qd_max=ARM.limits.qd_max, qdd_max=ARM.limits.qdd_max, dt=ARM.dt)
 
 
 def move(q: Vec, qd: Vec, wanted: Vec) -> tuple[Vec, Vec, Vec]:
     """One period of the bounded actions: coefficients, positions, speeds."""
     c, q_out, qd_out = np.empty(6), np.empty(6), np.empty(6)
     polynomial.advance(
-        q, qd, wanted, ARM.q_min, ARM.q_max, ARM.qd_max, ARM.qdd_max, ARM.dt, c, q_out, qd_out
+        q,
+        qd,
+        wanted,
+        ARM.limits.q_min,
+        ARM.limits.q_max,
+        ARM.limits.qd_max,
+        ARM.limits.qdd_max,
+        ARM.dt,
+        c,
+        q_out,
+        qd_out,
     )
     return c, q_out, qd_out
 
@@ -41,8 +51,8 @@ def follow(
         if tracker.remaining <= 0.0 and np.abs(qd).max() < 1e-4:
             break
         c, q, qd = move(q, qd, scale(k) * tracker.wanted(q, qd))
-        assert np.all(np.abs(qd) <= ARM.qd_max + 1e-9)
-        assert np.all(np.abs(2.0 * c) <= ARM.qdd_max + 1e-9)
+        assert np.all(np.abs(qd) <= ARM.limits.qd_max + 1e-9)
+        assert np.all(np.abs(2.0 * c) <= ARM.limits.qdd_max + 1e-9)
     return tracker, errors, q
 
 
@@ -90,11 +100,11 @@ def test_braking_rests_on_the_path_and_goes_on_from_there() -> None:
 def test_a_straight_stop_keeps_the_direction_and_the_limits() -> None:
     rng = np.random.default_rng(0)
     for _ in range(100):
-        qd = rng.uniform(-1.0, 1.0, 6) * ARM.qd_max
+        qd = rng.uniform(-1.0, 1.0, 6) * ARM.limits.qd_max
         way = qd / np.linalg.norm(qd)
         for _ in range(4):
             after = straight_stop(qd, LIMITS)
-            assert np.all(np.abs(after - qd) <= ARM.qdd_max * ARM.dt + 1e-12)
+            assert np.all(np.abs(after - qd) <= ARM.limits.qdd_max * ARM.dt + 1e-12)
             np.testing.assert_allclose(after, (after @ way) * way, atol=1e-12)
             qd = after
         np.testing.assert_array_equal(qd, np.zeros(6))

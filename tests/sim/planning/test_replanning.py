@@ -71,10 +71,16 @@ def drive(
         way.append(q)
         if states[-1] == "arrived":
             break
-        bounds = (ARM.q_min, ARM.q_max, ARM.qd_max, ARM.qdd_max, ARM.dt)
+        bounds = (
+            ARM.limits.q_min,
+            ARM.limits.q_max,
+            ARM.limits.qd_max,
+            ARM.limits.qdd_max,
+            ARM.dt,
+        )
         polynomial.advance(q, qd, wanted, *bounds, c, q_out, qd_out)
-        assert np.all(np.abs(qd_out) <= ARM.qd_max + 1e-9)
-        assert np.all(np.abs(2.0 * c) <= ARM.qdd_max + 1e-9)
+        assert np.all(np.abs(qd_out) <= ARM.limits.qd_max + 1e-9)
+        assert np.all(np.abs(2.0 * c) <= ARM.limits.qdd_max + 1e-9)
         q, qd, t = q_out.copy(), qd_out.copy(), t + ARM.dt
         least = min(least, Checker(ARM, people(t)).clearance(q).people)
     return Run(follower, t, least, states, q, way)

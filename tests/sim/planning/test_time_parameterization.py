@@ -26,8 +26,8 @@ from app.sim.scene.scene import arm_of
 
 CELL = load_cell()
 ARM = arm_of(CELL)
-LIMITS = Limits(qd_max=ARM.qd_max, qdd_max=ARM.qdd_max, dt=ARM.dt)
-SLUGGISH = replace(LIMITS, qdd_max=0.1 * ARM.qdd_max)
+LIMITS = Limits(qd_max=ARM.limits.qd_max, qdd_max=ARM.limits.qdd_max, dt=ARM.dt)
+SLUGGISH = replace(LIMITS, qdd_max=0.1 * ARM.limits.qdd_max)
 """With a tenth of the acceleration corners are rounded widely enough to touch something."""
 
 
@@ -39,7 +39,7 @@ def some_paths(n: int, seed: int = 0) -> list[tuple[Vec, Vec, Vec, frozenset[int
         path = np.cumsum(rng.normal(size=(corners, 6)) * 10 ** rng.uniform(-4, 0.3), axis=0)
         q0, qd0 = path[0].copy(), np.zeros(6)
         if trial % 2:
-            qd0 = rng.uniform(-1.0, 1.0, 6) * ARM.qd_max
+            qd0 = rng.uniform(-1.0, 1.0, 6) * ARM.limits.qd_max
             path[0] = stopping_point(q0, qd0, LIMITS)
         stops = frozenset(int(k) for k in range(corners) if rng.random() < 0.2)
         out.append((q0, qd0, path, stops))
@@ -58,8 +58,8 @@ def distance_to_path(q: Vec, path: Vec) -> float:
 def test_speeds_and_accelerations_stay_inside_the_limits() -> None:
     for _, qd0, path, stops in some_paths(600):
         timed = time_path(path, LIMITS, qd0, stops)
-        assert np.all(np.abs(timed.qd) <= ARM.qd_max + 1e-12)
-        assert np.all(np.abs(np.diff(timed.qd, axis=0)) <= ARM.qdd_max * ARM.dt + 1e-12)
+        assert np.all(np.abs(timed.qd) <= ARM.limits.qd_max + 1e-12)
+        assert np.all(np.abs(np.diff(timed.qd, axis=0)) <= ARM.limits.qdd_max * ARM.dt + 1e-12)
 
 
 def test_periods_are_polynomials_of_degree_two_that_join() -> None:
@@ -106,7 +106,7 @@ def test_timing_costs_little_beside_the_speed_limits() -> None:
     for _ in range(100):
         path = np.cumsum(rng.normal(size=(4, 6)) * 0.5, axis=0)
         spent += time_path(path, LIMITS).duration
-        least += (np.abs(np.diff(path, axis=0)) / ARM.qd_max).max(axis=1).sum()
+        least += (np.abs(np.diff(path, axis=0)) / ARM.limits.qd_max).max(axis=1).sum()
     assert least <= spent < 1.2 * least
 
 
@@ -123,10 +123,10 @@ def test_every_piece_lies_in_the_interval_of_the_bounded_actions() -> None:
                 c_min, c_max = coefficient_interval(
                     timed.q[k, j],
                     timed.qd[k, j],
-                    ARM.q_min[j],
-                    ARM.q_max[j],
-                    ARM.qd_max[j],
-                    ARM.qdd_max[j],
+                    ARM.limits.q_min[j],
+                    ARM.limits.q_max[j],
+                    ARM.limits.qd_max[j],
+                    ARM.limits.qdd_max[j],
                     ARM.dt,
                 )
                 assert c_min - 1e-9 <= c[j] <= c_max + 1e-9

@@ -27,8 +27,8 @@ def at(joint: int, value: float, base: np.ndarray = NONE) -> np.ndarray:
 @pytest.mark.parametrize("cell", CELLS)
 def test_a_state_at_its_limits_is_taken_as_it_is(cell: str) -> None:
     arm = arm_of(load_cell(cell))
-    for q, sign in ((arm.q_min, -1.0), (arm.q_max, 1.0)):
-        state = StateLimits(arm).take(q, sign * arm.qd_max, sign * arm.qdd_max)
+    for q, sign in ((arm.limits.q_min, -1.0), (arm.limits.q_max, 1.0)):
+        state = StateLimits(arm).take(q, sign * arm.limits.qd_max, sign * arm.limits.qdd_max)
         assert state.outside == () and state.clamped is state.measured
 
 
@@ -36,13 +36,17 @@ def test_a_state_at_its_limits_is_taken_as_it_is(cell: str) -> None:
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 def test_all_joints_over_every_limit_are_clamped_and_named(cell: str, side: float) -> None:
     arm = arm_of(load_cell(cell))
-    q = (arm.q_max if side > 0 else arm.q_min) + side * 0.04
-    state = StateLimits(arm).take(q, side * 1.04 * arm.qd_max, side * 1.04 * arm.qdd_max)
+    q = (arm.limits.q_max if side > 0 else arm.limits.q_min) + side * 0.04
+    state = StateLimits(arm).take(
+        q, side * 1.04 * arm.limits.qd_max, side * 1.04 * arm.limits.qdd_max
+    )
     assert len(state.outside) == 18 and {one.of for one in state.outside} == {"limits"}
     np.testing.assert_array_equal(state.measured.q, q)
-    np.testing.assert_array_equal(state.clamped.q, np.clip(q, arm.q_min, arm.q_max))
-    np.testing.assert_allclose(state.clamped.qd, side * arm.qd_max)
-    np.testing.assert_allclose(state.clamped.qdd, side * arm.qdd_max)
+    np.testing.assert_array_equal(
+        state.clamped.q, np.clip(q, arm.limits.q_min, arm.limits.q_max)
+    )
+    np.testing.assert_allclose(state.clamped.qd, side * arm.limits.qd_max)
+    np.testing.assert_allclose(state.clamped.qdd, side * arm.limits.qdd_max)
 
 
 @pytest.mark.parametrize(
@@ -66,7 +70,7 @@ def test_one_joint_over_one_limit_is_named_with_value_and_limit(
     [
         (np.degrees(HOME), NONE, r"robot\.q\[\d\]", r"degrees\? in rad that is"),
         (at(3, 270.0, HOME), NONE, r"robot\.q\[3\]", r"degrees\? in rad that is 4.712"),
-        (HOME, np.degrees(0.5 * ARM.qd_max), r"robot\.qd\[0\]", r"degrees\? in rad/s"),
+        (HOME, np.degrees(0.5 * ARM.limits.qd_max), r"robot\.qd\[0\]", r"degrees\? in rad/s"),
         (at(0, -3.9, HOME), NONE, r"robot\.q\[0\]", r"a whole turn away\? 2.383 lies inside"),
         (at(0, 5.0, HOME), NONE, r"robot\.q\[0\]", r"a whole turn away\? -1.283"),
         (at(0, 9.0, HOME), NONE, r"robot\.q\[0\]", "away|degrees"),
@@ -87,22 +91,24 @@ def test_numbers_that_are_no_state_are_refused_with_a_hint(
 def test_joints_outside_their_limits_are_sent_inward_and_others_as_asked() -> None:
     act = np.linspace(-0.5, 0.5, 6)
     q = HOME.copy()
-    q[0], q[2] = ARM.q_min[0] - 0.01, ARM.q_max[2] + 0.01
+    q[0], q[2] = ARM.limits.q_min[0] - 0.01, ARM.limits.q_max[2] + 0.01
     inward, low, high = returning(ARM, q, act)
     assert (inward[0], inward[2]) == (1.0, -1.0)
     np.testing.assert_array_equal(inward[[1, 3, 4, 5]], act[[1, 3, 4, 5]])
     assert low[0] < q[0] and high[2] > q[2]
-    assert (low[2], high[0]) == (ARM.q_min[2], ARM.q_max[0])
+    assert (low[2], high[0]) == (ARM.limits.q_min[2], ARM.limits.q_max[0])
 
 
 def test_monitoring_admits_no_more_than_the_stop_of_the_measured_state() -> None:
     assert admitting(ARM, HOME, NONE) is ARM
-    q, qd = at(2, ARM.q_max[2], HOME), at(2, 1.04)
+    q, qd = at(2, ARM.limits.q_max[2], HOME), at(2, 1.04)
     wider = admitting(ARM, q, qd)
-    assert wider.q_max[2] == pytest.approx(ARM.q_max[2] + 0.5 * 1.04**2 / ARM.qdd_max[2])
+    assert wider.q_max[2] == pytest.approx(
+        ARM.limits.q_max[2] + 0.5 * 1.04**2 / ARM.limits.qdd_max[2]
+    )
     assert wider.qd_max[2] == 1.04
-    np.testing.assert_array_equal(wider.qdd_max, ARM.qdd_max)
-    np.testing.assert_array_equal(wider.q_min, ARM.q_min)
+    np.testing.assert_array_equal(wider.qdd_max, ARM.limits.qdd_max)
+    np.testing.assert_array_equal(wider.q_min, ARM.limits.q_min)
 
 
 def test_what_monitoring_executes_from_outside_the_limits_keeps_every_person_clear() -> None:
@@ -110,13 +116,13 @@ def test_what_monitoring_executes_from_outside_the_limits_keeps_every_person_cle
     layer, admitted = SafetyLayer(ARM, settings), 0
     for _ in range(120):
         q = HOME + rng.uniform(-0.3, 0.3, 6)
-        qd = rng.choice([-1.0, 1.0], 6) * rng.uniform(0.9, 1.05, 6) * ARM.qd_max
-        c = -0.5 * np.sign(qd) * rng.uniform(0.5, 1.0) * ARM.qdd_max
+        qd = rng.choice([-1.0, 1.0], 6) * rng.uniform(0.9, 1.05, 6) * ARM.limits.qd_max
+        c = -0.5 * np.sign(qd) * rng.uniform(0.5, 1.0) * ARM.limits.qdd_max
         angle, away = rng.uniform(0.0, np.pi), rng.uniform(0.9, 2.2)
         place = [away * np.cos(angle), away * np.sin(angle), 0.3, 2.0]
         people = replace(no_people(), cylinders=np.array([place]))
         safe = layer.decide(q, qd, c, NONE, people)
-        assert safe.stop_time == pytest.approx(float((np.abs(qd) / ARM.qdd_max).max()))
+        assert safe.stop_time == pytest.approx(float((np.abs(qd) / ARM.limits.qdd_max).max()))
         assert safe.stop_distance >= 0.5 * safe.stop_time * float(np.abs(qd) @ ARM.lever) - 1e-9
         if safe.override == 0.0:
             continue
@@ -125,7 +131,7 @@ def test_what_monitoring_executes_from_outside_the_limits_keeps_every_person_cle
         for t in np.linspace(0.0, ARM.dt, 5):
             reach = settings.human_speed * (settings.lead + t) + settings.margin
             assert checker.clearance(safe.at(q, qd, t)[0]).people > reach - 1e-9
-        stop_s = float((np.abs(safe.qd) / ARM.qdd_max).max())
+        stop_s = float((np.abs(safe.qd) / ARM.limits.qdd_max).max())
         for t in np.linspace(0.0, stop_s, 9):
             there = safe.q + safe.qd * (t - 0.5 * t * t / max(stop_s, 1e-9))
             reach = settings.human_speed * (settings.lead + ARM.dt + t) + settings.margin

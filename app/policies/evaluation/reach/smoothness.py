@@ -131,15 +131,15 @@ def measure(paths: Paths, degree: int, arm: Arm) -> dict[str, float]:
     pieces, dt = pieces_of(paths, degree, arm.dt), arm.dt
     q_end, v_end, a_end = pieces.at(dt)
     inside = [pieces.at(dt * k / PARTS) for k in range(PARTS + 1)]
-    margins = [np.fmin(q - arm.q_min, arm.q_max - q) for q, _, _ in inside]
+    margins = [np.fmin(q - arm.limits.q_min, arm.limits.q_max - q) for q, _, _ in inside]
     gap = np.nanmax(np.abs(q_end - paths.q[1:]))
     change = np.abs(np.diff(paths.qdd, axis=0)) / dt
     found = {
         "position_margin_rad": min(np.nanmin(margin) for margin in margins),
         "speed_rad_s": max(np.nanmax(np.abs(v)) for _, v, _ in inside),
-        "speed_limit_rad_s": arm.qd_max.max(),
+        "speed_limit_rad_s": arm.limits.qd_max.max(),
         "acceleration_rad_s2": max(np.nanmax(np.abs(a)) for _, _, a in (inside[0], inside[-1])),
-        "acceleration_limit_rad_s2": arm.qdd_max.max(),
+        "acceleration_limit_rad_s2": arm.limits.qdd_max.max(),
         "position_jump_rad": gap,
         "speed_jump_rad_s": max(2.0 * gap / dt, np.nanmax(np.abs(v_end - paths.qd[1:]))),
         "acceleration_jump_rad_s2": np.nanmax(np.abs(inside[0][2][1:] - a_end[:-1])),
@@ -147,7 +147,10 @@ def measure(paths: Paths, degree: int, arm: Arm) -> dict[str, float]:
         "rms_acceleration_rad_s2": np.sqrt(np.nanmean(np.square(paths.qdd[1:]))),
     }
     if degree == 3:
-        jerk = {"jerk_rad_s3": np.nanmax(change), "jerk_limit_rad_s3": arm.jerk_max.max()}
+        jerk = {
+            "jerk_rad_s3": np.nanmax(change),
+            "jerk_limit_rad_s3": arm.limits.jerk_max.max(),
+        }
         found |= jerk
     return {name: float(value) for name, value in found.items()}
 

@@ -132,7 +132,7 @@ def base_motion(arm: Arm, q: Vec, q_goal: Vec, out: Vec) -> float:
         for j in range(CONTROLLED):
             out[j] = 0.0
         return widest
-    pace = min(1.0, BASE_GAIN * widest / arm.qd_max[0]) / widest
+    pace = min(1.0, BASE_GAIN * widest / arm.limits.qd_max[0]) / widest
     for j in range(CONTROLLED):
         out[j] = (q_goal[j] - q[j]) * pace
     return widest
@@ -260,7 +260,7 @@ def _scaled(d: float) -> float:
 def _put_joints(arm: Arm, q: Vec, qd: Vec, human_q: Vec, human_qd: Vec, out: Obs) -> int:
     for j in range(CONTROLLED):
         out[j] = q[j] / math.pi
-        out[5 + j] = qd[j] / arm.qd_max[j]
+        out[5 + j] = qd[j] / arm.limits.qd_max[j]
         out[10 + j] = math.sin(q[j])
         out[15 + j] = math.cos(q[j])
     for j in range(18):
@@ -385,7 +385,7 @@ def observe(
     sight.q[5] = q[5]
     for i in range(3):
         for j in range(CONTROLLED):
-            way = base[j] * arm.qd_max[j] * HORIZONS[i]
+            way = base[j] * arm.limits.qd_max[j] * HORIZONS[i]
             limit = abs(q_goal[j] - q[j])
             sight.q[j] = q[j] + min(limit, max(-limit, way))
         _place_lanes(sight.q, ALONG_BASE, sight)

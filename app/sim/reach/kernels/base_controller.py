@@ -111,10 +111,10 @@ def base_motion(arm: Arm, robot: RobotPose, goal: Vec, prospect: Prospect) -> fl
     damped_step(robot.jacobian, prospect.q, step)
     widest = 0.0
     for j in range(6):
-        widest = max(widest, abs(step[j]) / arm.qd_max[j])
+        widest = max(widest, abs(step[j]) / arm.limits.qd_max[j])
     rate = min(BASE_GAIN, 1.0 / max(widest, 1e-9))
     for j in range(6):
-        base[j] = step[j] * rate / arm.qd_max[j]
+        base[j] = step[j] * rate / arm.limits.qd_max[j]
     return rate
 
 

@@ -294,7 +294,7 @@ def describe(
     put_features(
         q,
         qd,
-        arm.qd_max,
+        arm.limits.qd_max,
         sight.seen,
         goal,
         robot.rot,

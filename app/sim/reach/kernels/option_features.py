@@ -101,7 +101,7 @@ def new_ways(arm: Arm, forecaster: Forecaster) -> Ways:
         number=np.zeros(2, dtype=np.int64),
         robot=new_robot_pose(arm),
         q=np.zeros(6),
-        refuge=np.clip(arm.home + turn, arm.q_min, arm.q_max),
+        refuge=np.clip(arm.home + turn, arm.limits.q_min, arm.limits.q_max),
         aside=np.zeros(N_ASIDE * (N_LOOKS + 1)),
     )
 
@@ -185,7 +185,7 @@ def look_aside(arm: Arm, top_z: float, q: Vec, qd: Vec, ways: Ways) -> None:
         if way > 0:
             for j in range(6):
                 left = abs(ways.refuge[way - 1, j] - q[j])
-                longest = max(longest, left / arm.qd_max[j])
+                longest = max(longest, left / arm.limits.qd_max[j])
         k, least = way * (N_LOOKS + 1), FAR
         for i in range(N_LOOKS):
             t = STEP_S * LOOKS[i]

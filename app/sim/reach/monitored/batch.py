@@ -220,7 +220,8 @@ class GuardedReach(ReachBatch):
         pieces, q, qd = np.empty((1, 6)), np.empty(6), np.empty(6)
         polynomial.advance(
             own(state.q[row]), own(state.qd[row]), own(wanted),
-            arm.q_min, arm.q_max, arm.qd_max, arm.qdd_max, arm.dt, pieces[0], q, qd,
+            arm.limits.q_min, arm.limits.q_max, arm.limits.qd_max, arm.limits.qdd_max, arm.dt,
+            pieces[0], q, qd,
         )  # fmt: skip
         self._step(np.array([row]), np.empty((0, 6), dtype=np.float32), pieces)
 

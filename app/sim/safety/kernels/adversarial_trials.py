@@ -66,7 +66,9 @@ def _act(arm: Arm, policy: int, t: float, work: TrialWork) -> None:
             far = max(far, abs(aim[j] - work.q[j]))
         if far < 0.02 or random.uniform(rng) < 0.01:
             for j in range(CONTROLLED):
-                aim[j] = arm.q_min[j] + random.uniform(rng) * (arm.q_max[j] - arm.q_min[j])
+                aim[j] = arm.limits.q_min[j] + random.uniform(rng) * (
+                    arm.limits.q_max[j] - arm.limits.q_min[j]
+                )
             return
         for j in range(CONTROLLED):
             act[j] = (aim[j] - work.q[j]) / max(far, 0.2)
@@ -162,7 +164,9 @@ def _draw_place(arm: Arm, people: People, work: TrialWork) -> float:
     for j in range(6):
         work.q[j], work.qd[j], work.qdd[j] = arm.home[j], 0.0, 0.0
     for j in range(CONTROLLED):
-        work.q[j] = arm.q_min[j] + random.uniform(rng) * (arm.q_max[j] - arm.q_min[j])
+        work.q[j] = arm.limits.q_min[j] + random.uniform(rng) * (
+            arm.limits.q_max[j] - arm.limits.q_min[j]
+        )
     start_people(people, work.state, 0, rng, work.crowd)
     for w in range(work.time.shape[0]):
         work.time[w] = 0.0
@@ -209,8 +213,9 @@ def _step(
     _act(arm, policy, t, work)
     end = work.end
     advance(
-        action, work.q, work.qd, work.qdd, work.act, arm.q_min, arm.q_max, arm.qd_max,
-        arm.qdd_max, arm.jerk_max, arm.dt, work.c, work.d, end[0], end[1], end[2],
+        action, work.q, work.qd, work.qdd, work.act, arm.limits.q_min, arm.limits.q_max,
+        arm.limits.qd_max,
+        arm.limits.qdd_max, arm.limits.jerk_max, arm.dt, work.c, work.d, end[0], end[1], end[2],
     )  # fmt: skip
     watch = work.watch
     override = decide(

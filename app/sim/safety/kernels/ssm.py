@@ -130,10 +130,10 @@ def admissible(
     """
     drop, q1, qd1 = (1.0 - override) / arm.dt, watch.q_end, watch.qd_end
     motion_at(q, qd, c, d, drop, arm.dt, q1, qd1)
-    t_stop = stop_time(qd1, arm.qdd_max)
+    t_stop = stop_time(qd1, arm.limits.qdd_max)
     for j in range(6):
         rest = q1[j] + 0.5 * t_stop * qd1[j]
-        if not arm.q_min[j] - TOLERANCE <= rest <= arm.q_max[j] + TOLERANCE:
+        if not arm.limits.q_min[j] - TOLERANCE <= rest <= arm.limits.q_max[j] + TOLERANCE:
             return False
         watch.q_node[j] = rest
     s_end = clock(drop, arm.dt)[0]
@@ -169,7 +169,7 @@ def _execute(arm: Arm, q: Vec, qd: Vec, c: Vec, d: Vec, override: float, watch: 
     stop = override <= 0.0
     drop = (1.0 - override) / arm.dt
     if stop:
-        t_stop = stop_time(qd, arm.qdd_max)
+        t_stop = stop_time(qd, arm.limits.qdd_max)
         drop = 1.0 / t_stop if t_stop > 0.0 else 0.0
     watch.drop[0] = drop
     s, rate = clock(drop, arm.dt)
@@ -212,8 +212,9 @@ def decide(
     kept = not reached(safety, lead, 0.0, NOW, watch)
     for j in range(6):
         kept = kept and joint_keeps_limits(
-            q[j], qd[j], c[j], d[j], arm.dt, arm.q_min[j], arm.q_max[j], arm.qd_max[j],
-            arm.qdd_max[j],
+            q[j], qd[j], c[j], d[j], arm.dt, arm.limits.q_min[j], arm.limits.q_max[j],
+            arm.limits.qd_max[j],
+            arm.limits.qdd_max[j],
         )  # fmt: skip
     if kept:
         override = _greatest_override(arm, safety, lead, columns, cylinders, q, qd, c, d, watch)
@@ -229,14 +230,14 @@ def _greatest_override(
     """Return the greatest admissible override of those tried; 0 where there is none."""
     if admissible(arm, safety, lead, columns, cylinders, q, qd, c, d, 1.0, watch):
         return 1.0
-    low, high = lowest_override(qd, c, d, arm.qdd_max, arm.dt), 1.0
+    low, high = lowest_override(qd, c, d, arm.limits.qdd_max, arm.dt), 1.0
     if low >= 1.0 or not admissible(
         arm, safety, lead, columns, cylinders, q, qd, c, d, low, watch
     ):
         return 0.0
     for _ in range(N_HALVINGS):
         middle = 0.5 * (low + high)
-        if keeps_acceleration(qd, c, d, arm.qdd_max, middle, arm.dt) and admissible(
+        if keeps_acceleration(qd, c, d, arm.limits.qdd_max, middle, arm.dt) and admissible(
             arm, safety, lead, columns, cylinders, q, qd, c, d, middle, watch
         ):
             low = middle

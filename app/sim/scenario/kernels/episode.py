@@ -104,7 +104,8 @@ def move(
         crowd.pelvis_z[0, w] = people.size[e, w, PELVIS_Z]
     unfeasible = advance(
         action, state.q[e], state.qd[e], state.qdd[e], act,
-        arm.q_min, arm.q_max, arm.qd_max, arm.qdd_max, arm.jerk_max, arm.dt,
+        arm.limits.q_min, arm.limits.q_max, arm.limits.qd_max, arm.limits.qdd_max,
+        arm.limits.jerk_max, arm.dt,
         work.c, work.d, work.q, work.qd, work.qdd,
     )  # fmt: skip
     state.elapsed[e] += arm.dt

@@ -82,7 +82,7 @@ def test_pose_test_reports_every_contact_of_the_meshes_in_random_postures(cell: 
     rng, arm, reference = np.random.default_rng(62), arm_of(cell), CollisionReference(cell)
     people, kinds = people_of(cell), {"human": 0, "cell": 0, "self": 0}
     for _ in range(1500):
-        q = rng.uniform(arm.q_min, arm.q_max)
+        q = rng.uniform(arm.limits.q_min, arm.limits.q_max)
         human_q = rng.uniform(human.Q_MIN, human.Q_MAX)
         human_q[:3] = rng.uniform([-0.7, 0.6, -np.pi], [0.7, 1.7, np.pi])
         free = clearance(arm, people, q, human_q[None], NO_CYLINDERS)

@@ -16,9 +16,12 @@ def test_speed_bound_holds_for_every_point_of_the_robot(degree: int) -> None:
     before, after = kernel.new_robot_pose(arm), kernel.new_robot_pose(arm)
     now, soon, tick = kernel.new_robot_pose(arm), kernel.new_robot_pose(arm), 1e-5
     for _ in range(300):
-        q, qd = rng.uniform(arm.q_min, arm.q_max), rng.uniform(-arm.qd_max, arm.qd_max)
-        c = rng.uniform(-0.5, 0.5, 6) * arm.qdd_max
-        d = rng.uniform(-1, 1, 6) * arm.jerk_max / 6.0 * (degree == 3)
+        q, qd = (
+            rng.uniform(arm.limits.q_min, arm.limits.q_max),
+            rng.uniform(-arm.limits.qd_max, arm.limits.qd_max),
+        )
+        c = rng.uniform(-0.5, 0.5, 6) * arm.limits.qdd_max
+        d = rng.uniform(-1, 1, 6) * arm.limits.jerk_max / 6.0 * (degree == 3)
 
         def at(x: float) -> np.ndarray:
             return q + x * (qd + x * (c + x * d))  # noqa: B023

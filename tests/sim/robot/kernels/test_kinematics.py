@@ -20,7 +20,7 @@ def test_links_tcp_and_capsules_are_where_pinocchio_places_them() -> None:
     cell, robot, capsules = load_cell(), Robot(), load_robot_capsules()
     arm = arm_of(cell)
     pose, worst = new_robot_pose(arm), np.zeros(4)
-    q = np.random.default_rng(52).uniform(arm.q_min, arm.q_max, (N, 6))
+    q = np.random.default_rng(52).uniform(arm.limits.q_min, arm.limits.q_max, (N, 6))
     p0, p1 = robot_ends(robot, capsules, q)
     for row, start, end in zip(q, p0, p1, strict=True):
         place_robot(arm, row, pose)
@@ -39,7 +39,7 @@ def test_links_tcp_and_capsules_are_where_pinocchio_places_them() -> None:
 def test_jacobian_is_pinocchios() -> None:
     robot, arm = Robot(), arm_of(load_cell())
     pose = new_robot_pose(arm)
-    for q in np.random.default_rng(53).uniform(arm.q_min, arm.q_max, (2000, 6)):
+    for q in np.random.default_rng(53).uniform(arm.limits.q_min, arm.limits.q_max, (2000, 6)):
         place_robot(arm, q, pose)
         kinematics.tcp_jacobian(pose.rot, pose.pos, pose.tcp, pose.jacobian)
         assert np.abs(pose.jacobian - robot.jacobian(q)[:3]).max() < EXACT
@@ -48,10 +48,12 @@ def test_jacobian_is_pinocchios() -> None:
 def test_posture_with_the_tool_down_brings_pinocchios_tcp_to_the_target() -> None:
     robot, arm = Robot(), arm_of(load_cell())
     targets = np.random.default_rng(54).uniform([-1, -1, 0], [1, 1, 0.8], (4000, 3))
-    postures, reached = kinematics.ik_vertical_batch(targets, 0.12, arm.q_min, arm.q_max)
+    postures, reached = kinematics.ik_vertical_batch(
+        targets, 0.12, arm.limits.q_min, arm.limits.q_max
+    )
     for target, q in zip(targets[reached], postures[reached], strict=True):
         pose = robot.tcp_pose(q)
         assert pose[:3, 3] == pytest.approx(target, abs=EXACT)
         assert pose[2, 2] == pytest.approx(-1.0, abs=EXACT)
-        assert (q >= arm.q_min).all() and (q <= arm.q_max).all()
+        assert (q >= arm.limits.q_min).all() and (q <= arm.limits.q_max).all()
     assert 0.4 < reached.mean() < 0.95

@@ -29,11 +29,11 @@ def motions(n, seed):
     """Random states in motion with pieces that keep the limits, and people near them."""
     rng = np.random.default_rng(seed)
     while n:
-        q = rng.uniform(ARM.q_min, ARM.q_max) * 0.8
-        qd = rng.uniform(-1.0, 1.0, 6) * ARM.qd_max
-        c = 0.5 * rng.uniform(-1.0, 1.0, 6) * ARM.qdd_max
+        q = rng.uniform(ARM.limits.q_min, ARM.limits.q_max) * 0.8
+        qd = rng.uniform(-1.0, 1.0, 6) * ARM.limits.qd_max
+        c = 0.5 * rng.uniform(-1.0, 1.0, 6) * ARM.limits.qdd_max
         v = qd + 2.0 * c * ARM.dt
-        if (np.abs(v) > ARM.qd_max).any():
+        if (np.abs(v) > ARM.limits.qd_max).any():
             continue
         n -= 1
         yield q, qd, c, np.zeros(6), spheres(rng)
@@ -48,7 +48,7 @@ def path_of(q, qd, c, d, rate, times):
     """Poses along a piece at an override and the stop after it, and when it rests."""
     drop, q1, v1 = (1.0 - rate) / ARM.dt, np.empty(6), np.empty(6)
     override.motion_at(q, qd, c, d, drop, ARM.dt, q1, v1)
-    stop = override.stop_time(v1, ARM.qdd_max)
+    stop = override.stop_time(v1, ARM.limits.qdd_max)
     poses, none = [], np.zeros(6)
     for t in times(ARM.dt + stop):
         out, speed = np.empty(6), np.empty(6)
@@ -104,7 +104,7 @@ def test_a_path_is_refused_only_where_somebody_comes_within_the_resolution():
     rule = watch.Safety(np.full(8, 0.5), 0.02, 0.05, np.zeros(8))
     for q, qd, c, d, people in motions(300, 2):
         gaps_at(q, people, space)
-        stop_inside = (np.abs(q) < 0.8 * np.abs(ARM.q_max) + 0.2).all()
+        stop_inside = (np.abs(q) < 0.8 * np.abs(ARM.limits.q_max) + 0.2).all()
         if ssm.admissible(ARM, rule, 0.02, people, NO_CYLINDERS, q, qd, c, d, 1.0, space):
             continue
         refused += 1
@@ -127,9 +127,9 @@ def test_what_was_admitted_stays_admissible_as_people_run():
         q1, v1 = space.q.copy(), space.qd.copy()
         way = rng.normal(size=(3, 8))
         people[:3] += 0.5 * ARM.dt * way / np.linalg.norm(way, axis=0)
-        stop, checked = override.stop_time(v1, ARM.qdd_max), checked + 1
-        assert (q1 + 0.5 * stop * v1 <= ARM.q_max + 1e-9).all()
-        assert (q1 + 0.5 * stop * v1 >= ARM.q_min - 1e-9).all()
+        stop, checked = override.stop_time(v1, ARM.limits.qdd_max), checked + 1
+        assert (q1 + 0.5 * stop * v1 <= ARM.limits.q_max + 1e-9).all()
+        assert (q1 + 0.5 * stop * v1 >= ARM.limits.q_min - 1e-9).all()
         for t in np.linspace(0.0, stop, 30):
             pose, speed, none = np.empty(6), np.empty(6), np.zeros(6)
             override.motion_at(q1, v1, none, none, 1.0 / max(stop, 1e-9), t, pose, speed)
@@ -163,8 +163,10 @@ def test_what_is_executed_keeps_speed_acceleration_and_continuity():
             override.motion_at(q, qd, space.c, space.d, space.drop[0], t, pose, speed)
             speeds.append(speed.copy())
         assert speeds[0] == pytest.approx(qd, abs=1e-15)
-        assert (np.abs(speeds) <= ARM.qd_max + 1e-9).all()
-        assert (np.abs(np.diff(speeds, axis=0)) <= ARM.qdd_max * ARM.dt / 20 + 1e-9).all()
+        assert (np.abs(speeds) <= ARM.limits.qd_max + 1e-9).all()
+        assert (
+            np.abs(np.diff(speeds, axis=0)) <= ARM.limits.qdd_max * ARM.dt / 20 + 1e-9
+        ).all()
         assert pose == pytest.approx(space.q, abs=1e-15)
         assert speed == pytest.approx(space.qd, abs=1e-15)
     assert seen == {"stop", "full", "scaled"}
@@ -177,13 +179,17 @@ def test_joint_limits_hold_whatever_is_commanded_and_whoever_appears():
     for k in range(3000):
         if k % 40 == 0:
             sign = rng.choice([-1.0, 1.0], 6)
-        target = np.clip(sign * ARM.qd_max, qd - ARM.qdd_max * 0.05, qd + ARM.qdd_max * 0.05)
+        target = np.clip(
+            sign * ARM.limits.qd_max,
+            qd - ARM.limits.qdd_max * 0.05,
+            qd + ARM.limits.qdd_max * 0.05,
+        )
         c = 0.5 * (target - qd) / ARM.dt
         rates.append(
             ssm.decide(ARM, rule, 0.0, spheres(rng), NO_CYLINDERS, q, qd, c, none, space)
         )
         q, qd = space.q.copy(), space.qd.copy()
-        closest = min(closest, (ARM.q_max - q).min(), (q - ARM.q_min).min())
-        assert (np.abs(qd) <= ARM.qd_max + 1e-9).all()
+        closest = min(closest, (ARM.limits.q_max - q).min(), (q - ARM.limits.q_min).min())
+        assert (np.abs(qd) <= ARM.limits.qd_max + 1e-9).all()
     assert -1e-9 <= closest < 0.05
     assert 0.05 < np.mean(np.array(rates) == 0.0) < 0.95

@@ -301,7 +301,8 @@ def command(
     arm = world.arm
     advance(
         action, state.q[e], state.qd[e], state.qdd[e], act,
-        arm.q_min, arm.q_max, arm.qd_max, arm.qdd_max, arm.jerk_max, arm.dt,
+        arm.limits.q_min, arm.limits.q_max, arm.limits.qd_max, arm.limits.qdd_max,
+        arm.limits.jerk_max, arm.dt,
         work.c, work.d, work.q, work.qd, work.qdd,
     )  # fmt: skip
 

@@ -103,7 +103,7 @@ def write_toward(arm: Arm, aim: Vec, q: Vec, act: Floats) -> None:
         act: Filled, shape (6,).
     """
     for j in range(6):
-        act[j] = max(-1.0, min(1.0, GAIN * (aim[j] - q[j]) / arm.qd_max[j]))
+        act[j] = max(-1.0, min(1.0, GAIN * (aim[j] - q[j]) / arm.limits.qd_max[j]))
 
 
 @kernel()
@@ -127,7 +127,7 @@ def draw_dart(arm: Arm, q: Vec, rng: random.State, aim: Vec) -> int:
     for j in range(6):
         away = 0.0 if kind < WAITING else AROUND[j] * (2.0 * random.uniform(rng) - 1.0)
         middle = q[j] if kind < 0.5 * (1.0 + WAITING) else arm.home[j]
-        aim[j] = min(arm.q_max[j], max(arm.q_min[j], middle + away))
+        aim[j] = min(arm.limits.q_max[j], max(arm.limits.q_min[j], middle + away))
     return 1 + random.below(rng, DART_PLAYED - 1)
 
 
@@ -145,5 +145,5 @@ def vary_dart(arm: Arm, aim: Vec, lasting: int, rng: random.State, out: Vec) -> 
     share = random.uniform(rng)
     for j in range(6):
         wanted = aim[j] + share * WIDEST * AROUND[j] * random.normal(rng)
-        out[j] = min(arm.q_max[j], max(arm.q_min[j], wanted))
+        out[j] = min(arm.limits.q_max[j], max(arm.limits.q_min[j], wanted))
     return max(0, lasting + int(share * LONGEST * random.normal(rng)))

@@ -141,7 +141,7 @@ class Lookahead(NamedTuple):
 def new_lookahead(arm: Arm, net: Network, base_weight: float, n_envs: int) -> Lookahead:
     """Return work space for a network and so many environments."""
     aim = np.zeros((N_POSTURES, 6))
-    aim[:-1] = np.clip(arm.home + np.array(POSTURES), arm.q_min, arm.q_max)
+    aim[:-1] = np.clip(arm.home + np.array(POSTURES), arm.limits.q_min, arm.limits.q_max)
 
     def room(n: int) -> Floats:
         return np.zeros(n, dtype=np.float32)
@@ -289,7 +289,7 @@ def heed_layer(
             longest = max(longest, abs(prospect.step[j]))
         for j in range(6):
             there = look.goal_q[j] + POSTURE_STEP / longest * prospect.step[j]
-            look.goal_q[j] = max(arm.q_min[j], min(arm.q_max[j], there))
+            look.goal_q[j] = max(arm.limits.q_min[j], min(arm.limits.q_max[j], there))
 
 
 @kernel(inline="always")
@@ -381,7 +381,7 @@ def _left_to_go(arm: Arm, look: Lookahead) -> float:
     """Return how long the joints need to the posture at the goal [s]."""
     longest = 0.0
     for j in range(6):
-        longest = max(longest, abs(look.goal_q[j] - look.q[j]) / arm.qd_max[j])
+        longest = max(longest, abs(look.goal_q[j] - look.q[j]) / arm.limits.qd_max[j])
     return longest / AT_HALF
 
 
@@ -440,7 +440,8 @@ def play(
         for _ in range(gone if step == 0 else 0, periods):
             advance(
                 rule, look.q, look.qd, look.qdd, look.act,
-                arm.q_min, arm.q_max, arm.qd_max, arm.qdd_max, arm.jerk_max, arm.dt,
+                arm.limits.q_min, arm.limits.q_max, arm.limits.qd_max, arm.limits.qdd_max,
+                arm.limits.jerk_max, arm.dt,
                 look.c, look.d, look.q, look.qd, look.qdd,
             )  # fmt: skip
             place_robot(arm, look.q, work.robot)
