@@ -211,4 +211,4 @@ def admitting(arm: Arm, q: Vec, qd: Vec) -> Arm:
         q_max=own(np.maximum(arm.limits.q_max, high)),
         qd_max=own(np.maximum(arm.limits.qd_max, fast)),
     )
-    return arm._replace(limits=wider, q_min=wider.q_min, q_max=wider.q_max, qd_max=wider.qd_max)
+    return arm._replace(limits=wider)

@@ -25,16 +25,6 @@ class Arm(NamedTuple):
 
     limits: JointLimits
     """Joint limits."""
-    q_min: Vec
-    """Lower joint limits [rad], shape (6,)."""
-    q_max: Vec
-    """Upper joint limits [rad], shape (6,)."""
-    qd_max: Vec
-    """Speed limits [rad/s], shape (6,)."""
-    qdd_max: Vec
-    """Acceleration limits [rad/s^2], shape (6,)."""
-    jerk_max: Vec
-    """Jerk limits [rad/s^3], shape (6,)."""
     home: Vec
     """Home posture [rad], shape (6,)."""
     dt: float
