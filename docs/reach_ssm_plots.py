@@ -28,7 +28,7 @@ ROWS = {
     "rrt-star-once": ("RRT*, planned once", ORANGE, "-"),
     "rrt-connect": ("RRT-Connect, again where blocked", RED, "-"),
     "aorrtc": ("AORRTC, again where blocked", RED, ":"),
-    "every-tick": ("RRT-Connect, every 20 ms", GREEN, "-"),
+    "replan-every-cycle": ("RRT-Connect, every 20 ms", GREEN, "-"),
     "policy-alone": ("policy, nobody there", GREY, "-"),
     "hindsight": ("best replay in hindsight", GREY, ":"),
 }

@@ -79,12 +79,12 @@ def beside_people(seed: int) -> Iterator[tuple[Subject, Row]]:
             continue
         batch = beside((kind,) * n, BATCH, seed)
         shapes = n * (N_CAPSULES if kind == "worker" else 1)
-        columns = columns_of(batch.arm, n, shapes)
+        columns = capsules_soa(batch.arm, n, shapes)
         name = f"pick/{kind}s-{n}"
         yield Subject(name=name, batch=BATCH, run=stepping(batch, seed)), columns
 
 
-def columns_of(arm: Arm, people: int, shapes: int) -> Row:
+def capsules_soa(arm: Arm, people: int, shapes: int) -> Row:
     """Return the columns that say what is measured against what."""
     n = len(arm.link)
     return {"people": people, "capsules": n, "pairs": n * shapes + len(arm.first)}
@@ -147,7 +147,7 @@ def with_robot(pieces: int, seed: int) -> tuple[Subject, Row]:
             pick.reset_rows(world, rules, seed, 0, state, done, work)
 
     name = f"pick/capsules-{len(arm.link)}"
-    return Subject(name=name, batch=BATCH, run=step), columns_of(arm, 1, N_CAPSULES)
+    return Subject(name=name, batch=BATCH, run=step), capsules_soa(arm, 1, N_CAPSULES)
 
 
 def side_by_side(runs: list[Callable[[], object]], seconds: float) -> tuple[float, float]:

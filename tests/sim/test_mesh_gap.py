@@ -6,7 +6,7 @@ import trimesh
 
 from app.sim.cells.cell import load_cell
 from app.sim.geometry.box import box_clearance
-from app.sim.geometry.capsules import columns_of
+from app.sim.geometry.capsules import capsules_soa
 from app.sim.robot.capsules import TOOL
 from app.sim.scene.scene import arm_of
 from tests.sim.mesh_gap import gaps, segment_to_triangles
@@ -20,7 +20,7 @@ def test_distance_to_a_boxs_triangles_is_that_to_the_box() -> None:
     corners = np.asarray(trimesh.creation.box(2.0 * half).triangles)
     box, n_apart = np.array([[0.0, 0.0, 0.0, *half, 0.0]]), 0
     for ends in rng.uniform(-0.7, 0.7, (2000, 2, 3)):
-        d, _, _ = box_clearance(columns_of(ends[None], np.zeros(1)), 0, box)
+        d, _, _ = box_clearance(capsules_soa(ends[None], np.zeros(1)), 0, box)
         assert segment_to_triangles(*ends, corners) == pytest.approx(max(d, 0.0), abs=1e-9)
         n_apart += d > 0.0
     assert 500 < n_apart < 1900

@@ -50,7 +50,7 @@ def new_columns(n: int, radius: Vec, length2: Vec | None = None) -> Vec:
     return out
 
 
-def columns_of(ends: Vec, radius: Vec, n: int | None = None) -> Vec:
+def capsules_soa(ends: Vec, radius: Vec, n: int | None = None) -> Vec:
     """Return capsules given by their ends as columns.
 
     Args:
@@ -85,7 +85,7 @@ def distances(a: Vec, i: int, b: Vec, out: Vec) -> None:
     uu, radius, inverse = a[UU, i], a[RADIUS, i], a[INVERSE, i]
     for j in range(b.shape[1]):
         out[j] = (
-            segments_apart(
+            segment_distance(
                 ax - b[X, j], ay - b[Y, j], az - b[Z, j],
                 ux, uy, uz, uu, inverse,
                 b[UX, j], b[UY, j], b[UZ, j], b[UU, j], b[INVERSE, j],
@@ -96,7 +96,7 @@ def distances(a: Vec, i: int, b: Vec, out: Vec) -> None:
 
 
 @kernel(inline="always", error_model="numpy", fastmath=FAST)
-def segments_apart(
+def segment_distance(
     wx: float, wy: float, wz: float,
     ux: float, uy: float, uz: float, uu: float, iu: float,
     vx: float, vy: float, vz: float, vv: float, iv: float,
@@ -137,7 +137,7 @@ def gaps(a: Vec, b: Vec, out: Vec) -> None:
         uu, radius, inverse = a[UU, i], a[RADIUS, i], a[INVERSE, i]
         for j in range(b.shape[1]):
             d = (
-                segments_apart(
+                segment_distance(
                     ax - b[X, j], ay - b[Y, j], az - b[Z, j],
                     ux, uy, uz, uu, inverse,
                     b[UX, j], b[UY, j], b[UZ, j], b[UU, j], b[INVERSE, j],
@@ -167,7 +167,7 @@ def nearest_parts(a: Vec, b: Vec, first: int, last: int, out: Vec, part: Vec) ->
         vv, radius, inverse = b[UU, i], b[RADIUS, i], b[INVERSE, i]
         for j in range(a.shape[1]):
             d = (
-                segments_apart(
+                segment_distance(
                     bx - a[X, j], by - a[Y, j], bz - a[Z, j],
                     vx, vy, vz, vv, inverse,
                     a[UX, j], a[UY, j], a[UZ, j], a[UU, j], a[INVERSE, j],
@@ -204,7 +204,7 @@ def pair_distances(
     for k in range(first.shape[0]):
         i, j = first[k], second[k]
         out[k] = (
-            segments_apart(
+            segment_distance(
                 a[X, i] - a[X, j], a[Y, i] - a[Y, j], a[Z, i] - a[Z, j],
                 a[UX, i], a[UY, i], a[UZ, i], a[UU, i], a[INVERSE, i],
                 a[UX, j], a[UY, j], a[UZ, j], a[UU, j], a[INVERSE, j],
@@ -215,7 +215,7 @@ def pair_distances(
 
 
 @kernel(error_model="numpy", fastmath=FAST)
-def longest_way(before: Vec, after: Vec) -> float:
+def greatest_displacement(before: Vec, after: Vec) -> float:
     """Return the farthest any end of a set's capsules moved [m]; both of shape (9, n)."""
     longest = 0.0
     for k in range(before.shape[1]):

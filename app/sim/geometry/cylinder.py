@@ -13,7 +13,7 @@ import math
 
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
-from app.sim.geometry.capsules import RADIUS, UX, UY, UZ, X, Y, Z, segments_apart
+from app.sim.geometry.capsules import RADIUS, UX, UY, UZ, X, Y, Z, segment_distance
 from app.sim.geometry.segments import FAR, FAST
 
 _POINT = 1e-12
@@ -86,7 +86,7 @@ def swept_clearance(robot: Vec, x: float, y: float, sx: float, sy: float, r: flo
     for k in range(robot.shape[1]):
         ux, uy = robot[UX, k], robot[UY, k]
         uu = ux * ux + uy * uy
-        d = segments_apart(
+        d = segment_distance(
             robot[X, k] - x, robot[Y, k] - y, 0.0,
             ux, uy, 0.0, uu, 1.0 / uu if uu > _POINT else 0.0,
             sx, sy, 0.0, square, inverse,

@@ -1,9 +1,11 @@
 """Planners in three roles, wherever a policy may stand (METHOD 2.6, last row).
 
 ``once`` plans among the people as they stand at the start and follows whatever happens: only a
-safety layer slows it down. ``when-blocked`` looks at the rest of its path every so often; where
+safety layer slows it down. ``replan-on-blocked`` looks at the rest of its path every so often;
+where
 people are nearer to it than the margin it brakes along the path, plans again from where it will
-come to rest, and turns to the new path as soon as it is there. ``every-tick`` plans again every
+come to rest, and turns to the new path as soon as it is there. ``replan-every-cycle`` plans
+again every
 period within a small budget, and changes over where its path is blocked or the new one shorter.
 
 Planning takes time: a path planned at ``t`` is used from ``t`` plus the budget on (at least one
@@ -31,7 +33,7 @@ from app.sim.robot.kernels.arm import Arm
 STATES = ("waiting", "following", "braking", "arrived", "lost")
 """``waiting``: no plan, at rest or braking to rest. ``braking``: slows down along a path that
 is blocked. ``lost``: farther from the path than ``lost_rad``, braking to rest."""
-AGAIN_BUDGET_S = {"once": 0.0, "when-blocked": 0.2, "every-tick": 0.02}
+AGAIN_BUDGET_S = {"once": 0.0, "replan-on-blocked": 0.2, "replan-every-cycle": 0.02}
 """Budget of later plans by role [s]; ours."""
 EASED = 0.005
 """Where the robot is nearer to people than the margin, a margin this much below its clearance
@@ -39,7 +41,7 @@ holds instead [m]: it may leave, and pass by no nearer than it stands."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FollowSettings:
+class ReplanningSettings:
     """How a planner follows and plans again."""
 
     role: str = "once"
@@ -53,9 +55,10 @@ class FollowSettings:
     extra_margin: float = 0.02
     """What plans keep beyond the margin [m], so that a new path is not blocked at once."""
     look_every_s: float = 0.1
-    """How often ``when-blocked`` looks at the rest of its path [s]."""
+    """How often ``replan-on-blocked`` looks at the rest of its path [s]."""
     better_share: float = 0.05
-    """``every-tick`` changes to a free path that saves at least this share of the time left."""
+    """``replan-every-cycle`` changes to a free path that saves at least this share of the time
+    left."""
     arrived_rad: float = 1e-3
     """Distance to the end of the path, greatest joint, that counts as arrived [rad]."""
     lost_rad: float = 0.1
@@ -63,7 +66,7 @@ class FollowSettings:
 
 
 @dataclass(slots=True, kw_only=True)
-class FollowReport:
+class ReplanningReport:
     """What happened so far; grows with every period."""
 
     state: str = "waiting"
@@ -88,7 +91,7 @@ class FollowReport:
     """Greatest distance from the path so far [rad]."""
 
 
-class Follower:
+class ReplanningExecutor:
     """A planner that acts like a policy: state and people in, wanted joint speeds out.
 
     Args:
@@ -101,12 +104,14 @@ class Follower:
         InvalidInput: The role is not known.
     """
 
-    def __init__(self, arm: Arm, goals: Vec, settings: FollowSettings, seed: int = 1) -> None:
+    def __init__(
+        self, arm: Arm, goals: Vec, settings: ReplanningSettings, seed: int = 1
+    ) -> None:
         if settings.role not in ROLES:
             raise InvalidInput("role", settings.role, "is not known", tuple(ROLES))
         self.arm, self.goals, self.settings, self.seed = arm, goals, settings, seed
         self.limits = Limits(qd_max=arm.limits.qd_max, qdd_max=arm.limits.qdd_max, dt=arm.dt)
-        self.report = FollowReport(margin=settings.margin)
+        self.report = ReplanningReport(margin=settings.margin)
         self.tracker: Tracker | None = None
         self.blocked = False
         self.pending: tuple[float, Plan] | None = None
@@ -211,11 +216,13 @@ class Follower:
         return tracker.wanted(q, qd, brake=report.state == "braking")
 
 
-def _once(follower: Follower, q: Vec, qd: Vec, people: Shapes, t: float) -> None:
+def _once(follower: ReplanningExecutor, q: Vec, qd: Vec, people: Shapes, t: float) -> None:
     """Leave the path as it is."""
 
 
-def _when_blocked(follower: Follower, q: Vec, qd: Vec, people: Shapes, t: float) -> None:
+def _when_blocked(
+    follower: ReplanningExecutor, q: Vec, qd: Vec, people: Shapes, t: float
+) -> None:
     """Look at the rest of the path; plan again where it is blocked."""
     if follower.report.state == "arrived":
         return
@@ -231,7 +238,9 @@ def _when_blocked(follower: Follower, q: Vec, qd: Vec, people: Shapes, t: float)
         follower.again(people, q, qd, t)
 
 
-def _every_tick(follower: Follower, q: Vec, qd: Vec, people: Shapes, t: float) -> None:
+def _every_tick(
+    follower: ReplanningExecutor, q: Vec, qd: Vec, people: Shapes, t: float
+) -> None:
     """Plan again for the state after this period; turn to what was planned for this one."""
     if follower.report.state == "arrived":
         return
@@ -247,7 +256,7 @@ def _every_tick(follower: Follower, q: Vec, qd: Vec, people: Shapes, t: float) -
         follower.again(people, after_q, after_qd, t)
 
 
-def _after_period(follower: Follower, q: Vec, qd: Vec) -> tuple[Vec, Vec]:
+def _after_period(follower: ReplanningExecutor, q: Vec, qd: Vec) -> tuple[Vec, Vec]:
     """Return positions [rad] and speeds [rad/s] after this period if nobody slows it down."""
     arm, tracker = follower.arm, follower.tracker
     if tracker is None:
@@ -263,8 +272,8 @@ def _after_period(follower: Follower, q: Vec, qd: Vec) -> tuple[Vec, Vec]:
     return after_q, after_qd
 
 
-ROLES: dict[str, Callable[[Follower, Vec, Vec, Shapes, float], None]] = {
+ROLES: dict[str, Callable[[ReplanningExecutor, Vec, Vec, Shapes, float], None]] = {
     "once": _once,
-    "when-blocked": _when_blocked,
-    "every-tick": _every_tick,
+    "replan-on-blocked": _when_blocked,
+    "replan-every-cycle": _every_tick,
 }

@@ -13,11 +13,11 @@ coefficient  a in [-1, 1] is a place in the interval, the source's map (4.23)
 from dataclasses import dataclass
 
 from app.errors import InvalidInput
-from app.sim.robot.kernels.actions import COEFFICIENT, ONE_STEP, SPEED, VIABLE, ActionRule
+from app.sim.robot.kernels.actions import COEFFICIENT, MYOPIC, SPEED, VIABLE, ActionRule
 
 DEGREES = (2, 3)
 """Degrees of the polynomial."""
-BOUNDS = {"viable": VIABLE, "one-step": ONE_STEP}
+BOUNDS = {"viable": VIABLE, "one-step": MYOPIC}
 """Kinds of bounds by name."""
 MEANINGS = {"speed": SPEED, "coefficient": COEFFICIENT}
 """What an action stands for, by name."""

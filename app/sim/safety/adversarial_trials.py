@@ -33,7 +33,7 @@ from app.sim.safety.kernels.adversarial_trials import (
     STOPPED,
     WORST_PEOPLE,
 )
-from app.sim.safety.layer import SafetySettings, rule_of
+from app.sim.safety.layer import SafetySettings, separation_rule
 from app.sim.scene.scene import HumanKind, arm_of, new_people_state, people_of, with_people
 
 POLICIES = ("smooth", "constant", "goals", "bang-bang")
@@ -149,7 +149,7 @@ def run_trial(
     crowd = new_crowd(people, len(cell.workers), len(cell.cylinders))
     n_late = ceil(settings.true_delay / arm.dt - 1e-9)
     shape = (people.columns.shape[1], len(cell.cylinders))
-    watches = (watch.new_watch(arm, *shape), watch.new_watch(arm, *shape))
+    watches = (watch.new_ssm_workspace(arm, *shape), watch.new_ssm_workspace(arm, *shape))
     work = new_trial_work(arm, people, state, crowd, watches, n_late)
     rows = np.zeros((n_episodes, N_RESULT))
     trial = Trial(
@@ -158,7 +158,7 @@ def run_trial(
         n_steps=round(settings.seconds / arm.dt),
         guarded=settings.guarded,
     )
-    safety = rule_of(settings.safety, *shape, known=False)
+    safety = separation_rule(settings.safety, *shape, known=False)
     safety_trial.run_episodes(
         arm, people, safety, trial, settings.action.rule(), seed, first, work, rows
     )

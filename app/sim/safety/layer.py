@@ -273,7 +273,7 @@ def contact_speeds(settings: SafetySettings, n_columns: int, n_cylinders: int) -
     return out
 
 
-def rule_of(
+def separation_rule(
     settings: SafetySettings, n_columns: int, n_cylinders: int, known: bool
 ) -> watch_kernel.Safety:
     """Return the settings as the kernels read them.
@@ -345,8 +345,8 @@ class SafetyLayer:
         known = going is not None
         if (shape, known) != (self._shape, self._known):
             self._shape, self._known = shape, known
-            self._watch = watch_kernel.new_watch(self.arm, *shape)
-            self._rule = rule_of(self.settings, *shape, known)
+            self._watch = watch_kernel.new_ssm_workspace(self.arm, *shape)
+            self._rule = separation_rule(self.settings, *shape, known)
         if going is not None:
             unknown = np.asarray(np.isnan(going).any(axis=1))
             seen = np.where(unknown[:, None], 0.0, going)

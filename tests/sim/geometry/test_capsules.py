@@ -9,7 +9,7 @@ from app.sim.collision.fcl_recheck import robot_ends, segment_distances
 from app.sim.collision.fcl_reference import make_capsule, touch
 from app.sim.geometry import capsules as columns
 from app.sim.geometry import segments as geometry
-from app.sim.geometry.capsules import columns_of, ends_of
+from app.sim.geometry.capsules import capsules_soa, ends_of
 from app.sim.robot.capsules import load_robot_capsules
 from app.sim.robot.kernels import arm as arm_kernel
 from app.sim.robot.ur10 import Robot
@@ -39,9 +39,9 @@ def distance(a: np.ndarray, radius_a: float, b: np.ndarray, radius_b: float) -> 
     """Distance of two capsules, by the kernel for sets."""
     out = np.empty(1)
     columns.distances(
-        columns_of(a[None], np.array([radius_a])),
+        capsules_soa(a[None], np.array([radius_a])),
         0,
-        columns_of(b[None], np.array([radius_b])),
+        capsules_soa(b[None], np.array([radius_b])),
         out,
     )
     return float(out[0])
@@ -86,7 +86,7 @@ def test_sets_give_the_least_of_all_pairs_each_way() -> None:
         radius_a, radius_b = rng.uniform(0.01, 0.1, n), rng.uniform(0.01, 0.1, m)
         expected = segment_distances(a[:, None, 0], a[:, None, 1], b[:, 0], b[:, 1])
         expected = expected - radius_a[:, None] - radius_b
-        one, two = columns_of(a, radius_a), columns_of(b, radius_b)
+        one, two = capsules_soa(a, radius_a), capsules_soa(b, radius_b)
         out, part = np.empty(m), np.empty(m)
         columns.gaps(one, two, out)
         np.testing.assert_allclose(out, expected.min(axis=0), atol=1e-12)
@@ -101,15 +101,15 @@ def test_pairs_of_one_set_are_measured_one_by_one() -> None:
     ends, radius = rng.uniform(-0.6, 0.6, (12, 2, 3)), rng.uniform(0.01, 0.1, 12)
     first, second = rng.integers(0, 12, (2, 17))
     out = np.empty(17)
-    columns.pair_distances(columns_of(ends, radius), first, second, out)
+    columns.pair_distances(capsules_soa(ends, radius), first, second, out)
     for d, i, j in zip(out, first, second, strict=True):
         assert d == pytest.approx(distance(ends[i], radius[i], ends[j], radius[j]), abs=1e-12)
 
 
 def test_columns_that_fill_up_a_set_are_nowhere_near() -> None:
     rng = np.random.default_rng(45)
-    one = columns_of(rng.uniform(-1, 1, (3, 2, 3)), np.full(3, 0.1))
-    two = columns_of(rng.uniform(-1, 1, (3, 2, 3)), np.full(3, 0.1), columns.padded(3))
+    one = capsules_soa(rng.uniform(-1, 1, (3, 2, 3)), np.full(3, 0.1))
+    two = capsules_soa(rng.uniform(-1, 1, (3, 2, 3)), np.full(3, 0.1), columns.padded(3))
     out = np.empty(8)
     columns.gaps(one, two, out)
     assert (out[:3] < 5.0).all() and (out[3:] > 900.0).all()
@@ -118,14 +118,16 @@ def test_columns_that_fill_up_a_set_are_nowhere_near() -> None:
 def test_longest_way_is_that_of_the_end_that_moved_farthest() -> None:
     rng = np.random.default_rng(46)
     before, after = rng.uniform(-1, 1, (2, 7, 2, 3))
-    found = columns.longest_way(columns_of(before, np.ones(7)), columns_of(after, np.ones(7)))
+    found = columns.greatest_displacement(
+        capsules_soa(before, np.ones(7)), capsules_soa(after, np.ones(7))
+    )
     assert found == pytest.approx(np.linalg.norm(after - before, axis=2).max())
 
 
 def test_nearest_vector_leads_from_one_segment_to_the_other() -> None:
     gap, radius = np.empty(3), np.zeros(1)
     for a, b in zip(*segments("random"), strict=True):
-        one, two = columns_of(a[None], radius), columns_of(b[None], radius)
+        one, two = capsules_soa(a[None], radius), capsules_soa(b[None], radius)
         length = geometry.segment_nearest(one, 0, two, 0, gap)
         assert length == pytest.approx(np.linalg.norm(gap), abs=1e-12)
         assert distance(a + gap, 0.0, b, 0.0) < 1e-7

@@ -4,7 +4,7 @@ import fcl
 import numpy as np
 import pytest
 
-from app.sim.geometry.capsules import columns_of, new_columns
+from app.sim.geometry.capsules import capsules_soa, new_columns
 from app.sim.geometry.cylinder import cylinder_clearance, swept_clearance
 from app.sim.geometry.segments import FAR
 from tests.sim.fcl_capsules import KINDS, check_against_fcl, random_ends
@@ -14,7 +14,9 @@ HEIGHT = 6.0
 
 
 def distance(ends: list[list[float]], radius: float, cylinder: tuple[float, ...]) -> float:
-    return cylinder_clearance(columns_of(np.array([ends]), np.array([radius])), 0, *cylinder)[0]
+    return cylinder_clearance(capsules_soa(np.array([ends]), np.array([radius])), 0, *cylinder)[
+        0
+    ]
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -23,7 +25,7 @@ def test_distance_and_overlap_are_fcls(kind: str) -> None:
     over_the_top = 0
     for ends in random_ends(KINDS[kind], 11, kind):
         x, y, r, top = rng.uniform([-0.6, -0.6, 0.2, 0.3], [0.6, 0.6, 0.5, 1.4])
-        d, _ = cylinder_clearance(columns_of(ends[None], np.array([0.05])), 0, x, y, r, top)
+        d, _ = cylinder_clearance(capsules_soa(ends[None], np.array([0.05])), 0, x, y, r, top)
         middle = fcl.Transform(np.array([x, y, top - HEIGHT / 2]))
         cylinder = fcl.CollisionObject(fcl.Cylinder(r, HEIGHT), middle)
         check_against_fcl(ends, 0.05, cylinder, d)
@@ -59,7 +61,7 @@ def test_depth_to_the_side_is_negative() -> None:
 
 def test_nearest_column_is_named_and_earlier_ones_are_passed_over() -> None:
     ends = np.array([[[0.5, y, 0.0], [0.5, y, 1.0]] for y in (0.0, 2.0, 1.0)])
-    columns = columns_of(ends, np.full(3, 0.1))
+    columns = capsules_soa(ends, np.full(3, 0.1))
     near, column = cylinder_clearance(columns, 0, 0.0, 0.0, 0.3, 2.0)
     later, after = cylinder_clearance(columns, 1, 0.0, 0.0, 0.3, 2.0)
     assert (column, after) == (0, 2)
@@ -74,7 +76,7 @@ def test_least_of_many_is_the_least_of_each() -> None:
     rng = np.random.default_rng(3)
     radii = rng.uniform(0.02, 0.2, 12)
     for top in np.linspace(0.0, 1.6, 200):
-        columns = columns_of(random_ends(12, int(1000 * top), "any"), radii)
+        columns = capsules_soa(random_ends(12, int(1000 * top), "any"), radii)
         each = [
             cylinder_clearance(np.ascontiguousarray(columns[:, [k]]), 0, 0.1, 0.2, 0.3, top)[0]
             for k in range(12)
@@ -87,7 +89,7 @@ def test_least_of_many_is_the_least_of_each() -> None:
 def test_distance_to_all_of_a_way_is_the_least_along_it(kind: str) -> None:
     rng = np.random.default_rng(13)
     for ends in random_ends(60, 14, kind):
-        robot = columns_of(ends[None], np.array([0.05]))
+        robot = capsules_soa(ends[None], np.array([0.05]))
         x, y, sx, sy = rng.uniform(-0.8, 0.8, 4)
         along = [
             cylinder_clearance(robot, 0, x + s * sx, y + s * sy, 0.2, 10.0)[0]
@@ -98,6 +100,6 @@ def test_distance_to_all_of_a_way_is_the_least_along_it(kind: str) -> None:
 
 
 def test_distance_to_a_way_is_never_more_than_over_the_top() -> None:
-    robot = columns_of(np.array([[[0.0, 0.0, 2.0], [0.3, 0.0, 2.2]]]), np.array([0.05]))
+    robot = capsules_soa(np.array([[[0.0, 0.0, 2.0], [0.3, 0.0, 2.2]]]), np.array([0.05]))
     over, _ = cylinder_clearance(robot, 0, 0.1, 0.0, 0.3, 1.3)
     assert swept_clearance(robot, 0.1, 0.0, 1e-3, 0.0, 0.3) < over

@@ -15,13 +15,13 @@ from app.sim.core.arrays import Vec
 from app.sim.human import model as human
 from app.sim.planning.goal_configurations import vertical_posture
 from app.sim.planning.ompl_planners import PLANNERS, PlanSettings
-from app.sim.planning.replanning import ROLES, Follower, FollowSettings
+from app.sim.planning.replanning import ROLES, ReplanningExecutor, ReplanningSettings
 from app.sim.robot.kernels import acceleration_bounds as polynomial
 from app.sim.scene.scene import arm_of
 
 CELL = load_cell()
 ARM = arm_of(CELL)
-REPLANNING = ["when-blocked", "every-tick"]
+REPLANNING = ["replan-on-blocked", "replan-every-cycle"]
 NOBODY = no_people()
 
 
@@ -44,7 +44,7 @@ AT_THE_GOAL = reaching_to((-0.5, 0.7, 0.2))
 
 @dataclass
 class Run:
-    follower: Follower
+    follower: ReplanningExecutor
     seconds: float
     least_m: float
     states: list[str]
@@ -60,8 +60,10 @@ def drive(
     limit_s: float = 10.0,
 ) -> Run:
     """From cube5 to cube0 with plans limited by poses; the limits are asserted throughout."""
-    settings = FollowSettings(role=role, plan=PlanSettings(planner=planner, max_poses=6_000))
-    follower = Follower(ARM, station("cube0")[None], settings)
+    settings = ReplanningSettings(
+        role=role, plan=PlanSettings(planner=planner, max_poses=6_000)
+    )
+    follower = ReplanningExecutor(ARM, station("cube0")[None], settings)
     q, qd, t, least = station("cube5"), np.zeros(6), 0.0, 9.0
     states, way = [], []
     c, q_out, qd_out = np.empty(6), np.empty(6), np.empty(6)
@@ -127,13 +129,13 @@ def test_the_motion_driven_is_free_for_the_reference_on_raw_meshes(role: str) ->
 
 
 def test_when_blocked_plans_only_when_blocked() -> None:
-    run = drive("when-blocked", from_time(0.3, IN_THE_WAY))
+    run = drive("replan-on-blocked", from_time(0.3, IN_THE_WAY))
     assert run.follower.report.n_plans <= 4
-    assert drive("when-blocked", lambda _: NOBODY).follower.report.n_plans == 1
+    assert drive("replan-on-blocked", lambda _: NOBODY).follower.report.n_plans == 1
 
 
 def test_every_tick_plans_in_every_period() -> None:
-    run = drive("every-tick", lambda _: NOBODY)
+    run = drive("replan-every-cycle", lambda _: NOBODY)
     assert run.follower.report.n_plans >= len(run.states) - 1
 
 
@@ -184,8 +186,8 @@ def test_from_within_the_margin_it_may_leave_with_an_eased_margin(role: str) -> 
 
 
 def test_a_robot_pushed_off_its_path_is_lost_and_planned_for_again() -> None:
-    settings = FollowSettings(role="when-blocked", plan=PlanSettings(max_poses=3_000))
-    follower = Follower(ARM, station("cube0")[None], settings)
+    settings = ReplanningSettings(role="replan-on-blocked", plan=PlanSettings(max_poses=3_000))
+    follower = ReplanningExecutor(ARM, station("cube0")[None], settings)
     q, qd = station("cube5"), np.zeros(6)
     follower.act(q, qd, NOBODY, 0.0)
     pushed = q - np.array([0.3, 0.3, 0.0, 0.0, 0.0, 0.0])
@@ -198,5 +200,5 @@ def test_a_robot_pushed_off_its_path_is_lost_and_planned_for_again() -> None:
 
 
 def test_an_unknown_role_is_named() -> None:
-    with pytest.raises(InvalidInput, match="every-tick"):
-        Follower(ARM, np.zeros((1, 6)), FollowSettings(role="sometimes"))
+    with pytest.raises(InvalidInput, match="replan-every-cycle"):
+        ReplanningExecutor(ARM, np.zeros((1, 6)), ReplanningSettings(role="sometimes"))

@@ -4,7 +4,7 @@ import pytest
 
 from app.errors import InvalidInput
 from app.sim.robot.actions import ActionSettings
-from app.sim.robot.kernels.actions import COEFFICIENT, ONE_STEP, SPEED, VIABLE
+from app.sim.robot.kernels.actions import COEFFICIENT, MYOPIC, SPEED, VIABLE
 
 
 def test_default_is_the_viable_speed_of_degree_two() -> None:
@@ -13,7 +13,7 @@ def test_default_is_the_viable_speed_of_degree_two() -> None:
 
 def test_names_become_numbers_of_the_kernels() -> None:
     settings = ActionSettings(degree=2, bounds="one-step", meaning="coefficient")
-    assert settings.rule() == (2, ONE_STEP, COEFFICIENT)
+    assert settings.rule() == (2, MYOPIC, COEFFICIENT)
 
 
 @pytest.mark.parametrize(

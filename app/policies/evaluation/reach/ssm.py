@@ -17,7 +17,7 @@ distance of the source's comparison.
 ``rrt-star-once``    planned once among people as they stand at the start, as in the source
 ``rrt-connect``      planned again where its path is blocked
 ``aorrtc``           the same with an anytime planner
-``every-tick``       planned again every period, in 20 ms of wall time
+``replan-every-cycle``       planned again every period, in 20 ms of wall time
 ``policy-alone``     the policy with nobody near (ASIDE): the unhindered time
 ``planner-alone``    a planned path, likewise
 ``planner-bare``     a path planned for nobody, followed without a safety layer: how often these
@@ -64,7 +64,7 @@ from app.sim.cells.cell import Cell, load_cell
 from app.sim.core.arrays import Vec
 from app.sim.mocap.importer import Motion
 from app.sim.planning.ompl_planners import PlanSettings
-from app.sim.planning.replanning import FollowSettings
+from app.sim.planning.replanning import ReplanningSettings
 from app.sim.reach.batch import ReachBatch, ReachSettings, goal_region_of
 from app.sim.reach.crossings import (
     N_CROSSINGS,
@@ -103,22 +103,22 @@ RRT-Connect arrived sooner, on 20 crossings of another seed (77)."""
 ASIDE = (-2.0, 2.0, 0.2)
 """x, y, radius of who stands aside where nobody shall be near [m]: far corner of the walking
 area of METHOD 2.1, not an empty cell, for policies need not have met one in training."""
-PLANNERS: Mapping[str, FollowSettings] = {
-    "rrt-star-once": FollowSettings(
+PLANNERS: Mapping[str, ReplanningSettings] = {
+    "rrt-star-once": ReplanningSettings(
         role="once", margin=MARGIN, plan=PlanSettings(planner="rrt-star", budget_s=1.0)
     ),
-    "rrt-connect": FollowSettings(
-        role="when-blocked", margin=MARGIN, plan=PlanSettings(planner="rrt-connect")
+    "rrt-connect": ReplanningSettings(
+        role="replan-on-blocked", margin=MARGIN, plan=PlanSettings(planner="rrt-connect")
     ),
-    "aorrtc": FollowSettings(
-        role="when-blocked", margin=MARGIN, plan=PlanSettings(planner="aorrtc")
+    "aorrtc": ReplanningSettings(
+        role="replan-on-blocked", margin=MARGIN, plan=PlanSettings(planner="aorrtc")
     ),
-    "every-tick": FollowSettings(
-        role="every-tick", margin=MARGIN, plan=PlanSettings(planner="rrt-connect")
+    "replan-every-cycle": ReplanningSettings(
+        role="replan-every-cycle", margin=MARGIN, plan=PlanSettings(planner="rrt-connect")
     ),
 }
 """Planners by row."""
-ALONE = FollowSettings(role="once", plan=PlanSettings(planner="rrt-star", budget_s=0.2))
+ALONE = ReplanningSettings(role="once", plan=PlanSettings(planner="rrt-star", budget_s=0.2))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -285,7 +285,7 @@ class Comparison:
 
     def planner(
         self,
-        settings: FollowSettings,
+        settings: ReplanningSettings,
         *,
         alone: bool = False,
         blind: bool = False,

@@ -21,7 +21,7 @@ _QUARTER_LOW = 6.077100506506192e-11
 
 
 @kernel(inline="always", error_model="numpy", fastmath=FAST)
-def sine_cosine(angle: float) -> tuple[float, float]:
+def sincos(angle: float) -> tuple[float, float]:
     """Return sine and cosine of one angle [rad]."""
     k = np.floor(angle * (2.0 / math.pi) + 0.5)
     r = (angle - k * _QUARTER_HIGH) - k * _QUARTER_LOW
@@ -56,4 +56,4 @@ def sine_cosine(angle: float) -> tuple[float, float]:
 def sines(angle: Vec, sine: Vec, cosine: Vec) -> None:
     """Write sine and cosine of every angle [rad]; all of shape (n,)."""
     for j in range(angle.shape[0]):
-        sine[j], cosine[j] = sine_cosine(angle[j])
+        sine[j], cosine[j] = sincos(angle[j])

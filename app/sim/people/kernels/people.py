@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
 from app.sim.core.kernels import rng as random
-from app.sim.geometry.capsules import copy_rows, copy_values, gaps, least, longest_way
+from app.sim.geometry.capsules import copy_rows, copy_values, gaps, greatest_displacement, least
 from app.sim.geometry.cylinder import cylinder_clearance
 from app.sim.geometry.segments import FAR
 from app.sim.human.kernels import kinematics as body
@@ -260,7 +260,7 @@ def people_speed_bound(before: Vec, after: Vec, start: Vec, end: Vec, dt: float)
         end: The same at the end [m], shape (C, 3).
         dt: Period [s].
     """
-    longest = 1.05 * longest_way(before, after)
+    longest = 1.05 * greatest_displacement(before, after)
     for k in range(start.shape[0]):
         way = math.hypot(end[k, 0] - start[k, 0], end[k, 1] - start[k, 1])
         longest = max(longest, way + abs(end[k, 2] - start[k, 2]))

@@ -26,12 +26,12 @@ from app.sim.people.kernels.people import (
 from app.sim.pick.kernels.observation import Obs, Sight, new_sight, observe
 from app.sim.pick.kernels.reward import RewardWeights, reward
 from app.sim.robot.kernels import kinematics
-from app.sim.robot.kernels.actions import ONE_STEP, ActionRule
+from app.sim.robot.kernels.actions import MYOPIC, ActionRule
 from app.sim.robot.kernels.arm import (
     CONTROLLED,
     Arm,
     RobotPose,
-    keep_columns,
+    copy_capsules,
     new_robot_pose,
     place_robot,
     robot_tilt,
@@ -269,8 +269,8 @@ def reset_env(
             break
     state.distance[e] = distance_to(goal, work.robot)
     state.tilt[e] = robot_tilt(work.robot)
-    keep_columns(work.robot.columns, state.robot[e])
-    keep_columns(work.crowd.columns, state.people.columns[e])
+    copy_capsules(work.robot.columns, state.robot[e])
+    copy_capsules(work.crowd.columns, state.people.columns[e])
     state.elapsed[e] = 0.0
     state.outcome[e] = RUNNING
 
@@ -304,7 +304,7 @@ def step_env(
         state.outcome[e] = COLLISION
     elif success:
         state.outcome[e] = SUCCESS
-    elif unfeasible and action.bounds == ONE_STEP:
+    elif unfeasible and action.bounds == MYOPIC:
         state.outcome[e] = UNFEASIBLE
     elif state.time_left[e] <= 1e-9:
         state.outcome[e] = TIMEOUT

@@ -27,8 +27,8 @@ from app.sim.prediction.kernels.networks import Forecaster
 from app.sim.reach.kernels.observation import ReachSight, new_reach_sight
 from app.sim.reach.kernels.option_features import Ways, new_ways
 from app.sim.reach.kernels.reward import ReachWeights, reward
-from app.sim.robot.kernels.actions import ONE_STEP, ActionRule
-from app.sim.robot.kernels.arm import Arm, RobotPose, keep_columns, new_robot_pose, place_robot
+from app.sim.robot.kernels.actions import MYOPIC, ActionRule
+from app.sim.robot.kernels.arm import Arm, RobotPose, copy_capsules, new_robot_pose, place_robot
 from app.sim.scenario.kernels.episode import (
     COLLISION,
     RUNNING,
@@ -201,8 +201,8 @@ def reset_env(
     found = clearances(arm, world.people, work.robot, work.crowd)
     state.clear[e, 0], state.clear[e, 1], state.clear[e, 2] = found
     state.distance[e] = distance_to(state.goal[e], work.robot)
-    keep_columns(work.robot.columns, state.robot[e])
-    keep_columns(work.crowd.columns, state.people.columns[e])
+    copy_capsules(work.robot.columns, state.robot[e])
+    copy_capsules(work.crowd.columns, state.people.columns[e])
     state.time_left[e], state.elapsed[e] = rules.time_limit, 0.0
     state.touched[e], state.outcome[e] = 0, RUNNING
 
@@ -257,7 +257,7 @@ def step_env(
         collided,
         state.touched[e] > 0,
         d < SUCCESS_DISTANCE,
-        unfeasible and action.bounds == ONE_STEP,
+        unfeasible and action.bounds == MYOPIC,
         state.time_left[e],
         rules.collision_ends,
     )

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
-from app.sim.core.kernels.trig import sine_cosine
+from app.sim.core.kernels.trig import sincos
 from app.sim.core.observation_layout import slices_of
 from app.sim.geometry.capsules import RADIUS, UX, UY, X, Y, gaps, least
 from app.sim.geometry.cylinder import cylinder_clearance
@@ -241,7 +241,7 @@ def put_features(
     """
     for j in range(6):
         out[j], out[6 + j] = q[j] / math.pi, qd[j] / qd_max[j]
-        out[20 + j], out[26 + j] = sine_cosine(q[j])
+        out[20 + j], out[26 + j] = sincos(q[j])
     for i in range(5):
         out[12 + i] = seen[i]
     out[13] = seen[1] - CENTER_Y

@@ -41,7 +41,7 @@ from app.sim.robot.kernels import acceleration_bounds as polynomial
 from app.sim.safety.kernels import separation_check as watch
 from app.sim.safety.kernels.adversarial_people import new_trial_work
 from app.sim.safety.kernels.adversarial_trials import MOVING
-from app.sim.safety.layer import SafetySettings, rule_of
+from app.sim.safety.layer import SafetySettings, separation_rule
 from app.sim.scenario.batch import Rows, StepResult
 from app.sim.scenario.kernels.episode import SUCCESS
 from app.sim.scene.scene import new_people_state, own, require_finite, require_shape
@@ -125,7 +125,7 @@ class GuardedReach(ReachBatch):
         people = self.world.people
         shape = (people.columns.shape[1], len(self.cell.cylinders))
         self._guard = Guard(
-            safety=rule_of(safety, *shape, safety.measured),
+            safety=separation_rule(safety, *shape, safety.measured),
             guarded=guarded,
             rest_ends=rest_ends,
             horizon=horizon_s,
@@ -137,7 +137,10 @@ class GuardedReach(ReachBatch):
                 people,
                 new_people_state(self.cell, people, 1),
                 new_crowd(people, len(self.cell.workers), len(self.cell.cylinders)),
-                (watch.new_watch(self.arm, *shape), watch.new_watch(self.arm, *shape)),
+                (
+                    watch.new_ssm_workspace(self.arm, *shape),
+                    watch.new_ssm_workspace(self.arm, *shape),
+                ),
                 0,
             ),
             override=np.ones(n_envs),

@@ -1,8 +1,8 @@
 """Planners where a policy stands, under the same safety layer and limits (METHOD 2.6).
 
 Each row of a :class:`~app.sim.reach.monitored.batch.GuardedReach` is driven by one
-:class:`~app.sim.planning.replanning.Follower` to postures whose tcp lies within reach of
-success around
+:class:`~app.sim.planning.replanning.ReplanningExecutor` to postures whose tcp lies within
+reach of success around
 the goal, of any tilt: what a policy may choose, a planner may choose too.
 """
 
@@ -13,7 +13,7 @@ import numpy as np
 from app.sim.collision.checker import Shapes, no_people
 from app.sim.core.arrays import Vec
 from app.sim.planning.goal_configurations import goal_postures
-from app.sim.planning.replanning import Follower, FollowReport, FollowSettings
+from app.sim.planning.replanning import ReplanningExecutor, ReplanningReport, ReplanningSettings
 from app.sim.reach.monitored.batch import GuardedReach
 from app.sim.robot.kernels.arm import Arm
 from app.sim.scenario.kernels.episode import RUNNING
@@ -39,11 +39,11 @@ def postures_of(arm: Arm, goals: Vec, seed: int) -> list[Vec]:
 def drive_planner(
     batch: GuardedReach,
     postures: Sequence[Vec],
-    settings: FollowSettings,
+    settings: ReplanningSettings,
     seed: int,
     *,
     blind: bool = False,
-) -> tuple[list[Vec], list[FollowReport]]:
+) -> tuple[list[Vec], list[ReplanningReport]]:
     """Drive every row of a batch that was just reset until its episode ends.
 
     Args:
@@ -58,13 +58,13 @@ def drive_planner(
     """
     overrides, reports = [], []
     for row in range(batch.n_envs):
-        follower = Follower(batch.arm, postures[row], settings, seed + 1000 * row)
+        follower = ReplanningExecutor(batch.arm, postures[row], settings, seed + 1000 * row)
         overrides.append(_drive(batch, row, follower, blind))
         reports.append(follower.report)
     return overrides, reports
 
 
-def _drive(batch: GuardedReach, row: int, follower: Follower, blind: bool) -> Vec:
+def _drive(batch: GuardedReach, row: int, follower: ReplanningExecutor, blind: bool) -> Vec:
     """Drive one row to the end of its episode; return its overrides."""
     state, found = batch.state, []
     nobody: Shapes = no_people()

@@ -86,7 +86,7 @@ def coefficient_interval(
 
 
 @kernel(error_model="numpy")
-def one_step_position_bound(room: float, qd: float, dt: float) -> float:
+def myopic_position_bound(room: float, qd: float, dt: float) -> float:
     """Return the greatest coefficient toward a limit that keeps it for one period [rad/s^2].
 
     Args:
@@ -100,7 +100,7 @@ def one_step_position_bound(room: float, qd: float, dt: float) -> float:
 
 
 @kernel(error_model="numpy")
-def coefficient_interval_one_step(
+def myopic_interval(
     q: float, qd: float, q_min: float, q_max: float, qd_max: float, acc: float, dt: float
 ) -> tuple[float, float]:
     """Return the source's least and greatest coefficient [rad/s^2]; empty is *unfeasible*.
@@ -117,9 +117,9 @@ def coefficient_interval_one_step(
     Source: thesis eq. (4.17)-(4.22), mended (METHOD 2.2).
     """
     end = min(0.5 * acc, (qd_max - qd) / (2.0 * dt))
-    c_max = min(end, one_step_position_bound(q_max - q, qd, dt))
+    c_max = min(end, myopic_position_bound(q_max - q, qd, dt))
     start = max(-0.5 * acc, (-qd_max - qd) / (2.0 * dt))
-    c_min = max(start, -one_step_position_bound(q - q_min, -qd, dt))
+    c_min = max(start, -myopic_position_bound(q - q_min, -qd, dt))
     return c_min, c_max
 
 

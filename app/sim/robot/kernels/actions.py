@@ -17,7 +17,7 @@ from app.sim.robot.kernels.jerk_bounds import Limits
 
 Action = NDArray[np.floating]
 
-VIABLE, ONE_STEP = range(2)
+VIABLE, MYOPIC = range(2)
 """Bounds: recursively feasible, or the source's for this period alone (degree 2)."""
 SPEED, COEFFICIENT = range(2)
 """Meanings: a share of the speed limit to come near to, or a place in the interval (4.23)."""
@@ -33,7 +33,7 @@ class ActionRule(NamedTuple):
     degree: int
     """2 (acceleration-limited) or 3 (jerk-limited)."""
     bounds: int
-    """VIABLE or ONE_STEP."""
+    """VIABLE or MYOPIC."""
     meaning: int
     """SPEED or COEFFICIENT."""
 
@@ -64,10 +64,8 @@ def quadratic_by_interval(
         The coefficient [rad/s^2] and whether the interval is empty; the joint brakes then.
     """
     acc, dt = to.qdd_max, to.dt
-    if rule.bounds == ONE_STEP:
-        c_min, c_max = polynomial.coefficient_interval_one_step(
-            q, qd, to.q_min, to.q_max, to.qd_max, acc, dt
-        )
+    if rule.bounds == MYOPIC:
+        c_min, c_max = polynomial.myopic_interval(q, qd, to.q_min, to.q_max, to.qd_max, acc, dt)
     else:
         c_min, c_max = polynomial.coefficient_interval(
             q, qd, to.q_min, to.q_max, to.qd_max, acc, dt

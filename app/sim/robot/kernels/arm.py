@@ -9,7 +9,16 @@ from numpy.typing import NDArray
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
 from app.sim.geometry.box import box_clearance
-from app.sim.geometry.capsules import RADIUS, UX, UZ, X, Z, least, longest_way, pair_distances
+from app.sim.geometry.capsules import (
+    RADIUS,
+    UX,
+    UZ,
+    X,
+    Z,
+    greatest_displacement,
+    least,
+    pair_distances,
+)
 from app.sim.geometry.segments import FAR, FAST
 from app.sim.robot.kernels import kinematics
 from app.sim.robot.kernels.joints import JointLimits
@@ -185,7 +194,7 @@ def robot_speed_bound(arm: Arm, qd0: Vec, c: Vec, d: Vec, before: Vec, after: Ve
         angular += fastest
         swing += fastest * arm.lever[j]
         push += max(abs(2.0 * c[j]), abs(2.0 * (c[j] + bend))) * arm.lever[j]
-    chord = longest_way(before, after)
+    chord = greatest_displacement(before, after)
     return min(swing, chord / arm.dt + 0.5 * arm.dt * (push + angular * swing))
 
 
@@ -210,7 +219,7 @@ def tcp_speed(pose: RobotPose, qd: Vec) -> float:
 
 
 @kernel(inline="always")
-def keep_columns(columns: Vec, out: Vec) -> None:
+def copy_capsules(columns: Vec, out: Vec) -> None:
     """Copy the rows that change, ``X`` to ``UZ``, of columns of equal shape."""
     for row in range(X, UX + 3):
         for k in range(columns.shape[1]):

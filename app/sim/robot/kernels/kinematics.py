@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
-from app.sim.core.kernels.trig import sine_cosine
+from app.sim.core.kernels.trig import sincos
 from app.sim.geometry.segments import FAST
 
 BASE_HEIGHT = 0.1273
@@ -46,7 +46,7 @@ def link_poses(q: Vec, rot: Vec, pos: Vec) -> None:
         rot: Filled with R_world_link, shape (7, 3, 3).
         pos: Filled with the origins [m], shape (7, 3).
     """
-    s0, c0 = sine_cosine(q[0])
+    s0, c0 = sincos(q[0])
     rot[0] = 0.0
     pos[0] = 0.0
     for i in range(3):
@@ -62,7 +62,7 @@ def link_poses(q: Vec, rot: Vec, pos: Vec) -> None:
     pitch += q[3] + 0.5 * math.pi
     _pan_then_pitch(c0, s0, pitch, rot[4])
     _along(rot[3], 0.0, 0.0, FOREARM, pos[3], pos[4])
-    s4, c4 = sine_cosine(q[4])
+    s4, c4 = sincos(q[4])
     for i in range(3):
         x, y = rot[4, i, 0], rot[4, i, 1]
         rot[5, i, 0], rot[5, i, 1], rot[5, i, 2] = (
@@ -71,7 +71,7 @@ def link_poses(q: Vec, rot: Vec, pos: Vec) -> None:
             rot[4, i, 2],
         )
     _along(rot[4], 0.0, WRIST_1_OFFSET, 0.0, pos[4], pos[5])
-    s5, c5 = sine_cosine(q[5])
+    s5, c5 = sincos(q[5])
     for i in range(3):
         x, z = rot[5, i, 0], rot[5, i, 2]
         rot[6, i, 0], rot[6, i, 1], rot[6, i, 2] = (
@@ -85,7 +85,7 @@ def link_poses(q: Vec, rot: Vec, pos: Vec) -> None:
 @kernel(inline="always")
 def _pan_then_pitch(c0: float, s0: float, pitch: float, out: Vec) -> None:
     """Write ``Rz(pan) Ry(pitch)`` into ``out``, shape (3, 3)."""
-    s, c = sine_cosine(pitch)
+    s, c = sincos(pitch)
     out[0, 0], out[0, 1], out[0, 2] = c0 * c, -s0, c0 * s
     out[1, 0], out[1, 1], out[1, 2] = s0 * c, c0, s0 * s
     out[2, 0], out[2, 1], out[2, 2] = -s, 0.0, c

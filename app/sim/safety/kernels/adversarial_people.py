@@ -31,8 +31,8 @@ from app.sim.geometry.capsules import (
     Y,
     copy_rows,
     distances,
+    greatest_displacement,
     least,
-    longest_way,
 )
 from app.sim.geometry.segments import segment_nearest
 from app.sim.human.kernels import kinematics as body
@@ -60,7 +60,7 @@ class Trial(NamedTuple):
     """Whether the safety layer acts; without it, pieces are executed as commanded."""
 
 
-class TrialWork(NamedTuple):
+class TrialWorkspace(NamedTuple):
     """State and work space of one episode after the other."""
 
     state: PeopleState
@@ -118,7 +118,7 @@ class TrialWork(NamedTuple):
 
 
 @kernel(error_model="numpy", inline="always")
-def _worker_to_robot(w: int, work: TrialWork) -> float:
+def _worker_to_robot(w: int, work: TrialWorkspace) -> float:
     """Write the way from worker ``w`` to the nearest link; return the distance [m]."""
     robot, gap, first = work.watch.columns[NOW], work.touch.gap[NOW], w * body.N_CAPSULES
     _, j = least(gap[first : first + body.N_CAPSULES])
@@ -129,7 +129,7 @@ def _worker_to_robot(w: int, work: TrialWork) -> float:
 
 
 @kernel(error_model="numpy", inline="always")
-def _cylinder_to_robot(x: float, y: float, work: TrialWork) -> None:
+def _cylinder_to_robot(x: float, y: float, work: TrialWorkspace) -> None:
     """Write the way from an axis to the nearest link's nearer end, seen from above [m]."""
     robot, best = work.watch.columns[NOW], 1e9
     for i in range(robot.shape[1]):
@@ -142,7 +142,7 @@ def _cylinder_to_robot(x: float, y: float, work: TrialWork) -> None:
 
 
 @kernel(error_model="numpy")
-def _swerve(mode: int, t: float, work: TrialWork) -> None:
+def _swerve(mode: int, t: float, work: TrialWorkspace) -> None:
     """Turn the way of those who run by what they are up to, and give it length 1."""
     plan, way, rng = work.plan, work.way, work.rng
     if t >= plan[1]:
@@ -161,7 +161,7 @@ def _swerve(mode: int, t: float, work: TrialWork) -> None:
 
 
 @kernel(error_model="numpy")
-def place_workers_at(people: People, work: TrialWork, step: float) -> None:
+def place_workers_at(people: People, work: TrialWorkspace, step: float) -> None:
     """Write the workers' capsules ``step`` seconds on in their scripts into ``columns1``."""
     state, out = work.state, work.columns1
     for w in range(work.time.shape[0]):
@@ -190,7 +190,7 @@ def blend(a: Vec, b: Vec, part: float, out: Vec) -> None:
 
 @kernel(error_model="numpy", inline="always")
 def advance_workers(
-    people: People, trial: Trial, mode: int, t: float, dt: float, work: TrialWork
+    people: People, trial: Trial, mode: int, t: float, dt: float, work: TrialWorkspace
 ) -> None:
     """Write where the workers are after the period, nobody faster than the trial's speed."""
     most, runs = BELOW * trial.human_speed * dt, mode != SCRIPT and t >= work.plan[2]
@@ -203,13 +203,13 @@ def advance_workers(
     step = 0.0 if runs else dt
     for _ in range(4):
         place_workers_at(people, work, step)
-        way = longest_way(work.columns0, work.columns1)
+        way = greatest_displacement(work.columns0, work.columns1)
         if way <= most:
             break
         step *= 0.95 * most / way
     for w in range(work.time.shape[0]):
         work.time[w] += step
-    way = longest_way(work.columns0, work.columns1)
+    way = greatest_displacement(work.columns0, work.columns1)
     blend(
         work.columns0, work.columns1, min(1.0, most / way) if way > 0.0 else 1.0, work.columns
     )
@@ -218,7 +218,7 @@ def advance_workers(
 
 @kernel(error_model="numpy", inline="always")
 def advance_cylinders(
-    people: People, trial: Trial, mode: int, t: float, dt: float, work: TrialWork
+    people: People, trial: Trial, mode: int, t: float, dt: float, work: TrialWorkspace
 ) -> None:
     """Write where the walkers are after the period, nobody faster than the trial's speed."""
     most, runs = BELOW * trial.human_speed * dt, mode != SCRIPT and t >= work.plan[2]
@@ -240,9 +240,9 @@ def advance_cylinders(
 
 
 @kernel(error_model="numpy", inline="always")
-def people_speed(work: TrialWork, dt: float) -> float:
+def people_speed(work: TrialWorkspace, dt: float) -> float:
     """Return the greatest speed of any point of the people in the period [m/s]."""
-    fastest = longest_way(work.columns0, work.columns1)
+    fastest = greatest_displacement(work.columns0, work.columns1)
     for k in range(work.cylinders0.shape[0]):
         old, new = work.cylinders0[k], work.cylinders1[k]
         way = math.hypot(new[0] - old[0], new[1] - old[1]) + abs(new[2] - old[2])
@@ -253,11 +253,11 @@ def people_speed(work: TrialWork, dt: float) -> float:
 def new_trial_work(
     arm: Arm, people: People, state: PeopleState, crowd: Crowd, watches: tuple[Watch, Watch],
     n_late: int,
-) -> TrialWork:  # fmt: skip
+) -> TrialWorkspace:  # fmt: skip
     """Return work space for people of one row of ``state``."""
     n_workers, n_walkers = state.q.shape[1], state.cylinders.shape[1]
     columns, cylinders = people.columns, np.zeros((n_walkers, 4))
-    return TrialWork(
+    return TrialWorkspace(
         state,
         crowd,
         columns.copy(),

@@ -25,7 +25,7 @@ from app.sim.robot.kernels.arm import CONTROLLED, Arm
 from app.sim.robot.kernels.override import clock, motion_at
 from app.sim.safety.kernels.adversarial_people import (
     Trial,
-    TrialWork,
+    TrialWorkspace,
     advance_cylinders,
     advance_workers,
     blend,
@@ -57,7 +57,7 @@ touched part may be touched [m/s]."""
 
 
 @kernel(error_model="numpy", inline="always")
-def _act(arm: Arm, policy: int, t: float, work: TrialWork) -> None:
+def _act(arm: Arm, policy: int, t: float, work: TrialWorkspace) -> None:
     """Write the policy's action."""
     act, aim, rng = work.act, work.aim, work.rng
     if policy == GOALS:
@@ -114,7 +114,7 @@ def link_speed(arm: Arm, watch: Watch, node: int, k: int, qd: Vec) -> float:
 
 
 @kernel(error_model="numpy", inline="always")
-def touching_speed(arm: Arm, j: int, work: TrialWork) -> float:
+def touching_speed(arm: Arm, j: int, work: TrialWorkspace) -> float:
     """Return the speed of the fastest link that touches part ``j`` of the people [m/s].
 
     With a cylinder the fastest of all links counts.
@@ -130,7 +130,7 @@ def touching_speed(arm: Arm, j: int, work: TrialWork) -> float:
 
 
 @kernel(error_model="numpy", inline="always")
-def first_contact(arm: Arm, work: TrialWork) -> tuple[float, int]:
+def first_contact(arm: Arm, work: TrialWorkspace) -> tuple[float, int]:
     """Return when a period's contact is [s], -1 if never, and with which part of the people."""
     watch, touch, dt = work.watch, work.touch, arm.dt
     s_end, _ = clock(watch.drop[0], dt)
@@ -158,7 +158,7 @@ def first_contact(arm: Arm, work: TrialWork) -> tuple[float, int]:
 
 
 @kernel(error_model="numpy", inline="always")
-def _draw_place(arm: Arm, people: People, work: TrialWork) -> float:
+def _draw_place(arm: Arm, people: People, work: TrialWorkspace) -> float:
     """Draw a posture at rest and where people are; return their distance [m]."""
     rng = work.rng
     for j in range(6):
@@ -184,7 +184,7 @@ def _draw_place(arm: Arm, people: People, work: TrialWork) -> float:
 
 
 @kernel(error_model="numpy", inline="always")
-def _start(arm: Arm, people: People, policy: int, seconds: float, work: TrialWork) -> None:
+def _start(arm: Arm, people: People, policy: int, seconds: float, work: TrialWorkspace) -> None:
     """Draw the start of an episode, and when people begin to run."""
     for _ in range(START_TRIES):
         if _draw_place(arm, people, work) >= START_CLEARANCE:
@@ -203,7 +203,7 @@ def _start(arm: Arm, people: People, policy: int, seconds: float, work: TrialWor
 @kernel(error_model="numpy", inline="always")
 def _step(
     arm: Arm, people: People, safety: Safety, trial: Trial, action: ActionRule, policy: int,
-    mode: int, step: int, work: TrialWork, out: Vec,
+    mode: int, step: int, work: TrialWorkspace, out: Vec,
 ) -> bool:  # fmt: skip
     """Run one period; return whether the episode ends in contact."""
     t, slot = step * arm.dt, step % (trial.n_late + 1)
@@ -249,7 +249,7 @@ def _step(
 @kernel(nogil=True, error_model="numpy")
 def run_episodes(
     arm: Arm, people: People, safety: Safety, trial: Trial, action: ActionRule, seed: int,
-    first: int, work: TrialWork, out: Vec,
+    first: int, work: TrialWorkspace, out: Vec,
 ) -> None:  # fmt: skip
     """Run episodes ``first`` and on; fixed by (seed, number).
 

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
-from app.sim.geometry.capsules import gaps, longest_way
+from app.sim.geometry.capsules import gaps, greatest_displacement
 from app.sim.geometry.cylinder import cylinder_clearance, swept_clearance
 from app.sim.robot.kernels import kinematics
 from app.sim.robot.kernels.arm import Arm, place_capsules
@@ -98,7 +98,7 @@ class Watch(NamedTuple):
     """What set the override (WHEN, WHO, SLACK); WHO is -1 where nobody did, shape (3,)."""
 
 
-def new_watch(arm: Arm, n_columns: int, n_cylinders: int) -> Watch:
+def new_ssm_workspace(arm: Arm, n_columns: int, n_cylinders: int) -> Watch:
     """Return work space for people of ``n_columns`` capsules and ``n_cylinders`` cylinders."""
     return Watch(
         np.empty((7, 3, 3)),
@@ -218,7 +218,7 @@ def _interval_clear(
     """
     fastest = first
     if way > 0.0:
-        chord = longest_way(watch.columns[a], watch.columns[b])
+        chord = greatest_displacement(watch.columns[a], watch.columns[b])
         fastest = min(first, chord / way + 0.5 * way * second)
     w = fastest * way
     before, after = watch.gap[a], watch.gap[b]

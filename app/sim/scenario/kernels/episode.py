@@ -20,7 +20,7 @@ from app.sim.people.kernels.people import (
     place_people,
 )
 from app.sim.robot.kernels.actions import ActionRule, advance
-from app.sim.robot.kernels.arm import Arm, RobotPose, keep_columns, place_robot
+from app.sim.robot.kernels.arm import Arm, RobotPose, copy_capsules, place_robot
 
 RUNNING, SUCCESS, COLLISION, TIMEOUT, UNFEASIBLE = range(5)
 """How an episode stands."""
@@ -124,8 +124,8 @@ def move(
         place_people(everybody, people, e, crowd)
     if everybody.courtesy > 0.0:
         keep_distances(people, e, crowd)
-    keep_columns(robot.columns, state.robot[e])
-    keep_columns(crowd.columns, people.columns[e])
+    copy_capsules(robot.columns, state.robot[e])
+    copy_capsules(crowd.columns, people.columns[e])
     return kind != NO_CONTACT, unfeasible
 
 

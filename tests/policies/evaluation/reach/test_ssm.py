@@ -87,7 +87,8 @@ def test_the_protocol_runs_policy_planners_recordings_and_random_episodes(monkey
     monkeypatch.setattr(reach_ssm, "N_HINDSIGHT", 4)
     short = PlanSettings(planner="rrt-star", budget_s=0.02)
     few = {
-        name: replace(PLANNERS[name], plan=short) for name in ("rrt-star-once", "every-tick")
+        name: replace(PLANNERS[name], plan=short)
+        for name in ("rrt-star-once", "replan-every-cycle")
     }
     monkeypatch.setattr(reach_ssm, "PLANNERS", few)
     monkeypatch.setattr(reach_ssm, "ALONE", few["rrt-star-once"])
@@ -103,7 +104,7 @@ def test_the_protocol_runs_policy_planners_recordings_and_random_episodes(monkey
         on_row=lambda *row: told.append(row),
     )
     names = [row["name"] for row in result["results"]]
-    assert names[:4] == ["policy", "policy-ahead", "rrt-star-once", "every-tick"]
+    assert names[:4] == ["policy", "policy-ahead", "rrt-star-once", "replan-every-cycle"]
     assert {"policy recorded", "policy measured", "policy-heedless measured"} <= set(names)
     assert "policy-heedless" not in names and "policy-ahead recorded measured" in names
     assert names[-3:] == ["random", "random-still", "random measured"]
@@ -112,9 +113,9 @@ def test_the_protocol_runs_policy_planners_recordings_and_random_episodes(monkey
         row["contacts_moving"] == 0 for row in result["results"] if "bare" not in row["name"]
     )
     assert result["settings"]["crossings"] == 2
-    assert {f"{mine} against every-tick recorded" for mine in names[:2]} <= set(
+    assert {f"{mine} against replan-every-cycle recorded" for mine in names[:2]} <= set(
         result["paired"]
     )
-    assert "policy-ahead against every-tick measured" in result["paired"]
+    assert "policy-ahead against replan-every-cycle measured" in result["paired"]
     assert len(result["seconds"][""]["policy-ahead"]) == 2
     assert set(result["example"]) == {"", "measured"}

@@ -6,7 +6,7 @@ import numpy as np
 
 from app.sim.cells.cell import load_cell
 from app.sim.planning.ompl_planners import PlanSettings
-from app.sim.planning.replanning import FollowSettings
+from app.sim.planning.replanning import ReplanningSettings
 from app.sim.reach.batch import ReachSettings
 from app.sim.reach.monitored.batch import GuardedReach
 from app.sim.reach.monitored.planners import GOAL_SPREAD, drive_planner, postures_of
@@ -39,7 +39,7 @@ def run(role: str, tracks: np.ndarray | None, **more: bool) -> GuardedReach:
     batch.reset()
     batch.set_goals(np.arange(2), GOALS)
     overrides, _ = drive_planner(
-        batch, POSTURES, FollowSettings(role=role, plan=PLANNED), 5, **more
+        batch, POSTURES, ReplanningSettings(role=role, plan=PLANNED), 5, **more
     )
     for row, course in enumerate(overrides):
         assert len(course) == round(batch.runs().seconds[row] / ARM.dt)
@@ -55,7 +55,10 @@ def test_postures_lie_where_success_counts():
 
 
 def test_alone_every_role_arrives_at_once():
-    times = {role: run(role, None).runs() for role in ("once", "when-blocked", "every-tick")}
+    times = {
+        role: run(role, None).runs()
+        for role in ("once", "replan-on-blocked", "replan-every-cycle")
+    }
     for runs in times.values():
         assert runs.arrived.all()
         assert (runs.stopped_s == 0.0).all()
@@ -63,7 +66,7 @@ def test_alone_every_role_arrives_at_once():
 
 
 def test_a_planner_waits_until_who_holds_it_has_gone():
-    runs = run("when-blocked", in_the_way(2.0)).runs()
+    runs = run("replan-on-blocked", in_the_way(2.0)).runs()
     assert runs.arrived.all()
     assert (runs.stopped_s > 2.0).all()
     assert (runs.seconds > 3.0).all()

@@ -32,7 +32,7 @@ def keeps_limits(q: float, qd: float, c: np.ndarray) -> np.ndarray:
 def test_free_joint_is_bound_by_acceleration_and_speed_alone() -> None:
     for interval in (
         polynomial.coefficient_interval,
-        polynomial.coefficient_interval_one_step,
+        polynomial.myopic_interval,
     ):
         assert interval(0.0, 0.0, *LIMITS) == (-2.5, 2.5)
         assert interval(0.0, 0.96, *LIMITS) == pytest.approx((-2.5, 1.0))
@@ -49,7 +49,7 @@ def test_viable_end_is_the_greatest_speed_from_which_full_braking_stops_in_time(
 
 
 def test_one_step_bounds_by_hand() -> None:
-    bound = polynomial.one_step_position_bound
+    bound = polynomial.myopic_position_bound
     assert bound(0.03, 1.0, DT) == pytest.approx((0.03 - 0.02) / 0.0004)  # at the end
     assert bound(0.01, 1.0, DT) == pytest.approx(-25.0)  # where both bounds meet
     assert bound(0.005, 1.0, DT) == pytest.approx(-50.0)  # at the turning point
@@ -61,7 +61,7 @@ def test_one_step_interval_is_all_that_brute_force_admits() -> None:
     c = np.linspace(-A / 2, A / 2, 2001)
     checked = empty = 0
     for q, qd in random_states(400, 11):
-        low, high = polynomial.coefficient_interval_one_step(q, qd, *LIMITS)
+        low, high = polynomial.myopic_interval(q, qd, *LIMITS)
         kept = keeps_limits(q, qd, c)
         clear = (abs(c - low) > 1e-3) & (abs(c - high) > 1e-3)
         np.testing.assert_array_equal(kept[clear], ((c > low) & (c < high))[clear])
@@ -78,7 +78,7 @@ def test_viable_interval_lies_within_the_one_step_interval() -> None:
             n_viable += 1
             low, high = polynomial.coefficient_interval(q, qd, *LIMITS)
             assert low <= high + 1e-9
-            low1, high1 = polynomial.coefficient_interval_one_step(q, qd, *LIMITS)
+            low1, high1 = polynomial.myopic_interval(q, qd, *LIMITS)
             assert low1 <= low + 1e-9
             assert high <= high1 + 1e-9
     assert n_viable > 3_000
@@ -109,16 +109,14 @@ def test_turning_point_as_printed_exceeds_the_position_limit(side: float) -> Non
     """(4.17) and (4.21) with ``q^2 - 2 qd^2`` in place of ``qd^2``."""
     q, qd, room = 0.0, 0.1, 0.0006  # room < qd dt/2 = 0.001
     printed = -(q**2 - 2 * qd**2) / (4 * room)
-    mended = polynomial.one_step_position_bound(room, qd, DT)
+    mended = polynomial.myopic_position_bound(room, qd, DT)
     highest = {}
     for name, c in (("printed", min(A / 2, printed)), ("mended", mended)):
         x = np.linspace(0, DT, 10_001)
         highest[name] = (q + qd * x + c * x**2).max()
     assert highest["printed"] > room + 1e-3
     assert highest["mended"] == pytest.approx(room, abs=1e-9)
-    low, high = polynomial.coefficient_interval_one_step(
-        q, side * qd, -room, room, V, 100.0, DT
-    )
+    low, high = polynomial.myopic_interval(q, side * qd, -room, room, V, 100.0, DT)
     assert (high if side > 0 else -low) == pytest.approx(mended)
 
 

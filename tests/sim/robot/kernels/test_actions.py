@@ -9,7 +9,7 @@ import pytest
 from app.sim.robot.kernels import acceleration_bounds as polynomial
 from app.sim.robot.kernels.actions import (
     COEFFICIENT,
-    ONE_STEP,
+    MYOPIC,
     SPEED,
     VIABLE,
     ActionRule,
@@ -259,7 +259,7 @@ def test_an_action_picks_its_place_in_the_interval() -> None:
     limit = limits(2.0, 0.5, 3.0, 50.0, 0.05)
     # free joint at 0.4 rad/s: c from -3/2 (acceleration) to (0.5 - 0.4)/0.1 = 1 (speed)
     for act, c in ((-1, -1.5), (0, -0.25), (1, 1.0), (7, 1.0)):
-        for bounds in (VIABLE, ONE_STEP):
+        for bounds in (VIABLE, MYOPIC):
             rule = ActionRule(2, bounds, COEFFICIENT)
             assert single(rule, 0.0, 0.4, 0.0, act, limit)[0] == pytest.approx(c, abs=1e-12)
     # degree 3, acceleration 2: j from -50 to (3 - 2)/0.05 = 20, c = 1, d = j/6
@@ -312,7 +312,7 @@ def unfeasible_share(qdd_max: float, push: str, n: int) -> float:
         np.full(N, -2 * np.pi), np.full(N, 2 * np.pi), np.ones(N), np.full(N, qdd_max),
         np.full(N, 50.0), 0.02,
     )  # fmt: skip
-    rng, rule = np.random.default_rng(19), ActionRule(2, ONE_STEP, COEFFICIENT)
+    rng, rule = np.random.default_rng(19), ActionRule(2, MYOPIC, COEFFICIENT)
     c, d, qdd, ended = np.empty(N), np.empty(N), np.zeros(N), 0
     for _ in range(n):
         q, qd = 0.9 * rng.uniform(limit.q_min, limit.q_max), np.zeros(N)

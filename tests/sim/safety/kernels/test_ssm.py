@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from app.sim.cells.cell import load_cell
-from app.sim.geometry.capsules import columns_of
+from app.sim.geometry.capsules import capsules_soa
 from app.sim.robot.kernels import override
 from app.sim.safety.kernels import separation_check as watch
 from app.sim.safety.kernels import ssm
@@ -22,7 +22,7 @@ def spheres(rng, n=8):
     """Spheres and short capsules around the robot."""
     start = rng.uniform([-1.2, -0.2, 0.0], [1.2, 1.6, 1.2], (n, 3))
     ends = np.stack([start, start + rng.uniform(-0.2, 0.2, (n, 3))], axis=1)
-    return columns_of(ends, rng.uniform(0.03, 0.15, n))
+    return capsules_soa(ends, rng.uniform(0.03, 0.15, n))
 
 
 def motions(n, seed):
@@ -61,7 +61,7 @@ def path_of(q, qd, c, d, rate, times):
 
 
 def test_nobody_could_have_come_near_on_a_path_that_was_admitted():
-    space, admitted = watch.new_watch(ARM, 8, 0), 0
+    space, admitted = watch.new_ssm_workspace(ARM, 8, 0), 0
     rule = watch.Safety(np.full(8, 0.5), 0.02, 0.05, np.zeros(8))
     for k, (q, qd, c, d, people) in enumerate(motions(400, 1)):
         rate = (1.0, 0.9)[k % 2]
@@ -76,7 +76,7 @@ def test_nobody_could_have_come_near_on_a_path_that_was_admitted():
 
 def test_whoever_goes_on_as_seen_is_not_met_on_a_path_that_was_admitted():
     """Cylinders with known velocities: anywhere on their way, and a little faster."""
-    rng, space, admitted = np.random.default_rng(9), watch.new_watch(ARM, 0, 2), 0
+    rng, space, admitted = np.random.default_rng(9), watch.new_ssm_workspace(ARM, 0, 2), 0
     rule, nobody = watch.Safety(np.full(2, 0.1), 0.02, 0.05, np.zeros(2)), no_columns()
     for k, (q, qd, c, d, _) in enumerate(motions(400, 10)):
         rate, cylinders = (1.0, 0.9)[k % 2], np.full((2, 4), 1.3)
@@ -93,14 +93,14 @@ def test_whoever_goes_on_as_seen_is_not_met_on_a_path_that_was_admitted():
                 there = cylinders.copy()
                 there[:, :2] += since * going
                 there[:, 2] += since * growth
-                other = watch.new_watch(ARM, 0, 2)
+                other = watch.new_ssm_workspace(ARM, 0, 2)
                 watch.place_node(ARM, nobody, there, pose, watch.NOW, 0.0, other)
                 assert other.gap[watch.NOW].min() > 0.05 + 0.1 * (0.02 + t) - 1e-9
     assert 40 < admitted < 360
 
 
 def test_a_path_is_refused_only_where_somebody_comes_within_the_resolution():
-    space, refused = watch.new_watch(ARM, 8, 0), 0
+    space, refused = watch.new_ssm_workspace(ARM, 8, 0), 0
     rule = watch.Safety(np.full(8, 0.5), 0.02, 0.05, np.zeros(8))
     for q, qd, c, d, people in motions(300, 2):
         gaps_at(q, people, space)
@@ -118,7 +118,7 @@ def test_a_path_is_refused_only_where_somebody_comes_within_the_resolution():
 
 def test_what_was_admitted_stays_admissible_as_people_run():
     """Step 2 of the proof: a period after any admitted piece the stop obeys the rule."""
-    rng, space = np.random.default_rng(3), watch.new_watch(ARM, 8, 0)
+    rng, space = np.random.default_rng(3), watch.new_ssm_workspace(ARM, 8, 0)
     rule, checked = watch.Safety(np.full(8, 0.5), 0.02, 0.05, np.zeros(8)), 0
     for q, qd, c, d, people in motions(400, 4):
         rate = ssm.decide(ARM, rule, 0.0, people, NO_CYLINDERS, q, qd, c, d, space)
@@ -138,7 +138,7 @@ def test_what_was_admitted_stays_admissible_as_people_run():
 
 
 def test_a_path_s_bounds_hold_for_points_of_every_link():
-    space = watch.new_watch(ARM, 8, 0)
+    space = watch.new_ssm_workspace(ARM, 8, 0)
     for q, qd, c, d, people in motions(100, 5):
         d = np.full(6, 3.0)
         first, second = watch.path_bounds(ARM, qd, c, d, ARM.dt)
@@ -153,7 +153,7 @@ def test_a_path_s_bounds_hold_for_points_of_every_link():
 
 
 def test_what_is_executed_keeps_speed_acceleration_and_continuity():
-    space = watch.new_watch(ARM, 8, 0)
+    space = watch.new_ssm_workspace(ARM, 8, 0)
     rule, seen = watch.Safety(np.full(8, 0.4), 0.0, 0.02, np.zeros(8)), set()
     for q, qd, c, d, people in motions(400, 6):
         rate = ssm.decide(ARM, rule, 0.0, people, NO_CYLINDERS, q, qd, c, d, space)
@@ -173,7 +173,7 @@ def test_what_is_executed_keeps_speed_acceleration_and_continuity():
 
 
 def test_joint_limits_hold_whatever_is_commanded_and_whoever_appears():
-    rng, space = np.random.default_rng(8), watch.new_watch(ARM, 8, 0)
+    rng, space = np.random.default_rng(8), watch.new_ssm_workspace(ARM, 8, 0)
     rule, closest, rates = watch.Safety(np.full(8, 0.4), 0.0, 0.02, np.zeros(8)), np.inf, []
     q, qd, none = np.array(ARM.home), np.zeros(6), np.zeros(6)
     for k in range(3000):

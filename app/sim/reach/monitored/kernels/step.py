@@ -38,8 +38,8 @@ from app.sim.people.kernels.people import advance_people, place_people
 from app.sim.reach.kernels.episode import Indices, ReachRules, ReachState, ReachWorld, Work
 from app.sim.reach.kernels.reward import ReachWeights, reward
 from app.sim.robot.kernels.actions import ActionRule, advance
-from app.sim.robot.kernels.arm import keep_columns, place_robot
-from app.sim.safety.kernels.adversarial_people import TrialWork, people_speed
+from app.sim.robot.kernels.arm import copy_capsules, place_robot
+from app.sim.safety.kernels.adversarial_people import TrialWorkspace, people_speed
 from app.sim.safety.kernels.adversarial_trials import MOVING, first_contact, touching_speed
 from app.sim.safety.kernels.separation_check import NOW, Safety, Watch, place_node
 from app.sim.safety.kernels.ssm import decide
@@ -95,7 +95,7 @@ class Guard(NamedTuple):
     shape (n_envs, n + 1, 3); no rows where people walk by themselves."""
     period: NDArray[np.int64]
     """Period of each row's track, shape (n_envs,)."""
-    trial: TrialWork
+    trial: TrialWorkspace
     """Work space of the contact search and the safety layer."""
     override: Vec
     """Override of the last period, shape (n_envs,)."""
@@ -145,7 +145,7 @@ def begin_episode(
 
 
 @kernel(inline="always")
-def _people_before(world: ReachWorld, state: ReachState, e: int, trial: TrialWork) -> None:
+def _people_before(world: ReachWorld, state: ReachState, e: int, trial: TrialWorkspace) -> None:
     """Keep where people are when a period begins."""
     copy_rows(state.people.columns[e], trial.columns0)
     for k in range(trial.cylinders0.shape[0]):
@@ -167,7 +167,7 @@ def _people_after(
     else:
         advance_people(world.people, state.people, e, state.robot[e], arm.dt, work.crowd.away)
     place_people(world.people, state.people, e, work.crowd)
-    keep_columns(work.crowd.columns, state.people.columns[e])
+    copy_capsules(work.crowd.columns, state.people.columns[e])
     copy_rows(work.crowd.columns, trial.columns1)
     for k in range(trial.cylinders1.shape[0]):
         for i in range(3):
@@ -244,7 +244,7 @@ def _arrive(world: ReachWorld, state: ReachState, e: int, guard: Guard, work: Wo
     place_robot(arm, state.q[e], work.robot)
     tcp = work.robot.tcp
     account[TOOL_WAY] += math.sqrt((tcp[0] - x) ** 2 + (tcp[1] - y) ** 2 + (tcp[2] - z) ** 2)
-    keep_columns(work.robot.columns, state.robot[e])
+    copy_capsules(work.robot.columns, state.robot[e])
     clear = clearances(arm, world.people, work.robot, work.crowd)
     state.clear[e, 0], state.clear[e, 1], state.clear[e, 2] = clear
     return float(tcp_distance(state.goal[e], work.robot))
