@@ -38,9 +38,7 @@ class StraightPolicy:
     ) -> Decision:
         goals = np.array([candidate.position for candidate in candidates])
         arm = self._arm
-        postures, reachable = kinematics.ik_vertical_batch(
-            goals, arm.tool_length, arm.limits.q_min, arm.limits.q_max
-        )
+        postures, reachable = kinematics.ik_vertical_batch(arm.lengths, arm.limits, goals)
         hands = [np.full(3, np.inf)]
         for person in people:
             size = self._size if person.size is None else person.size

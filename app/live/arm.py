@@ -15,6 +15,7 @@ from app.sim.human.kernels import kinematics as body
 from app.sim.pick import batch as pick
 from app.sim.robot.actions import ActionSettings
 from app.sim.robot.kernels import kinematics
+from app.sim.robot.kernels.joints import JointPath
 from app.sim.scene.scene import arm_of, people_of
 
 GAIN = 3.0
@@ -120,10 +121,7 @@ class LiveArm:
         found = contact(
             self.arm,
             self._people._replace(columns=body.capsule_columns(len(after.q))),
-            self.q,
-            qd,
-            c,
-            d,
+            JointPath(self.q, qd, c, d),
             (before.q, after.q),
             (before.cylinders, after.cylinders),
             sizes=(before.sizes, after.sizes),
@@ -149,9 +147,7 @@ class LiveArm:
             point: Where the tcp shall be [m], shape (3,).
         """
         q, arm = np.empty(6), self.arm
-        exact = kinematics.ik_vertical(
-            point, arm.tool_length, arm.limits.q_min, arm.limits.q_max, q
-        )
+        exact = kinematics.ik_vertical(arm.lengths, arm.limits, point, q)
         return q, bool(exact)
 
     def toward(self, posture: Vec) -> Vec:
@@ -162,8 +158,8 @@ class LiveArm:
     def tcp(self) -> Vec:
         """Return the tool centre point [m], shape (3,)."""
         rotations, origins, point = np.empty((7, 3, 3)), np.empty((7, 3)), np.empty(3)
-        kinematics.link_poses(self.q, rotations, origins)
-        kinematics.tcp_point(rotations, origins, self.arm.tool_length, point)
+        kinematics.link_poses(self.arm.lengths, self.q, rotations, origins)
+        kinematics.tcp_point(self.arm.lengths, rotations, origins, point)
         return point
 
     def reached(self, point: Vec) -> bool:

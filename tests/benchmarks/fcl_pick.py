@@ -17,7 +17,7 @@ from app.sim.cells.cell import Cell
 from app.sim.collision.fcl_reference import make_box, make_capsule
 from app.sim.core.arrays import Vec
 from app.sim.human import model as human
-from app.sim.robot.capsules import FLANGE, TOOL_AXIS, load_robot_capsules, self_pairs
+from app.sim.robot.capsules import TOOL_AXIS, load_robot_capsules, self_pairs
 from app.sim.robot.ur10 import Robot
 
 Array = NDArray[np.float64]
@@ -40,7 +40,8 @@ class FclPick:
         )
         self._target, self._people = target, people
         self._robot = Robot(mount.tool_length)
-        self._tcp = np.append(FLANGE + mount.tool_length * TOOL_AXIS, 1.0)
+        lengths = self._robot.lengths()
+        self._tcp = np.append((lengths.flange + lengths.tool) * TOOL_AXIS, 1.0)
         capsules = load_robot_capsules(mount.tool_length, mount.tool_radius)
         self._pairs, self._link = self_pairs(capsules), capsules.link
         parts = zip(capsules.radius, capsules.p0, capsules.p1, strict=True)

@@ -23,8 +23,8 @@ from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
 from app.sim.human import model as human
 from app.sim.robot.capsules import RobotCapsules, load_robot_capsules, self_pairs
-from app.sim.robot.kernels import kinematics
 from app.sim.robot.kernels.arm import FIRST_OVER_TABLE
+from app.sim.robot.ur10 import Robot
 
 WAYS = ("distances", "sensors", "contacts")
 INSTALLED = importlib.util.find_spec("mujoco") is not None
@@ -32,14 +32,15 @@ CUTOFF = 1e3
 """Distances up to this are asked for: all [m]."""
 QUARTER = "0.7071067811865476 0 0.7071067811865476 0"
 """A quarter turn about y, as a quaternion w, x, y, z."""
+LENGTHS = Robot().lengths()
 JOINTS = (
     # Place in the link before it [m], turn, axis; see ``robot/kernels/kinematics.py``.
-    ((0.0, 0.0, kinematics.BASE_HEIGHT), "1 0 0 0", "0 0 1"),
-    ((0.0, kinematics.SHOULDER_OFFSET, 0.0), QUARTER, "0 1 0"),
-    ((0.0, kinematics.ELBOW_OFFSET, kinematics.UPPER_ARM), "1 0 0 0", "0 1 0"),
-    ((0.0, 0.0, kinematics.FOREARM), QUARTER, "0 1 0"),
-    ((0.0, kinematics.WRIST_1_OFFSET, 0.0), "1 0 0 0", "0 0 1"),
-    ((0.0, 0.0, kinematics.WRIST_2_LENGTH), "1 0 0 0", "0 1 0"),
+    ((0.0, 0.0, LENGTHS.base_height), "1 0 0 0", "0 0 1"),
+    ((0.0, LENGTHS.shoulder_offset, 0.0), QUARTER, "0 1 0"),
+    ((0.0, LENGTHS.elbow_offset, LENGTHS.upper_arm), "1 0 0 0", "0 1 0"),
+    ((0.0, 0.0, LENGTHS.forearm), QUARTER, "0 1 0"),
+    ((0.0, LENGTHS.wrist_1_offset, 0.0), "1 0 0 0", "0 0 1"),
+    ((0.0, 0.0, LENGTHS.wrist_2_length), "1 0 0 0", "0 1 0"),
 )
 
 

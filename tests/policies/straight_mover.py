@@ -15,10 +15,7 @@ class Straight:
         self.looked: list[np.ndarray] = []
 
     def acts(self, batch: ReachBatch) -> NDArray[np.float32]:
-        mount = batch.cell.robot
-        posture, _ = ik_vertical_batch(
-            batch.state.goal, mount.tool_length, np.array(mount.q_min), np.array(mount.q_max)
-        )
+        posture, _ = ik_vertical_batch(batch.arm.lengths, batch.arm.limits, batch.state.goal)
         if batch.state.people.walkers.rows.shape[1]:
             self.looked.append(batch.state.people.walkers.rows[:, 0, :5].copy())
         return np.clip(self._gain * (posture - batch.state.q), -1, 1).astype(np.float32)

@@ -15,6 +15,7 @@ from app.sim.collision.fcl_recheck import Recheck, Trajectory, robot_ends
 from app.sim.human import model as human
 from app.sim.human.kernels import kinematics as body
 from app.sim.robot.capsules import load_robot_capsules
+from app.sim.robot.kernels.joints import JointPath
 from app.sim.robot.ur10 import Robot
 from app.sim.scene.scene import NO_CYLINDERS, arm_of, people_of
 
@@ -117,7 +118,7 @@ def passes(cell: Cell, n: int, seed: int) -> Iterator[Pass]:
         if case is None:
             continue
         ends = (case.before[None], case.after[None])
-        found = contact(arm, people, case.q, case.qd, case.c, zero, ends)
+        found = contact(arm, people, JointPath(case.q, case.qd, case.c, zero), ends)
         path = rows(case, arm.dt)
         touching = recheck.first_contact(path)
         yield Pass(

@@ -18,7 +18,8 @@ from app.sim.human.person import Person
 from app.sim.perception.multi_person_tracker import MAX_SKELETONS
 from app.sim.pick.batch import Piece
 from app.sim.reach.motion_types import Beside, Met, MotionDecision, MotionQuestion, Way
-from app.sim.safety.layer import SafetyDecision, SafetySettings, SeparationTerms, powers_of_time
+from app.sim.safety.decision import SafetyDecision, SeparationTerms, powers_of_time
+from app.sim.safety.layer import SafetySettings
 
 Metres = Annotated[float, Field(ge=0.0, le=5.0)]
 Seconds = Annotated[float, Field(ge=0.0, le=5.0)]
@@ -195,12 +196,12 @@ class MotionPiece(Answer):
     @classmethod
     def executed(cls, safe: SafetyDecision, question: MotionQuestion, dt: float) -> Self:
         """Make it from what monitoring lets through."""
-        powers = powers_of_time(question.q, question.qd, safe.c, safe.d, safe.drop)
+        powers = powers_of_time(safe, question.q, question.qd)
         used = np.flatnonzero(powers.any(axis=0))
         n = max(3, int(used[-1]) + 1 if used.size else 0)
         return cls(
             coefficients=powers[:, :n].tolist(),
-            until=dt if safe.drop * dt <= 1.0 else 1.0 / safe.drop,
+            until=dt if safe.path_deceleration * dt <= 1.0 else 1.0 / safe.path_deceleration,
             q=safe.q.tolist(),
             qd=safe.qd.tolist(),
             qdd=safe.qdd.tolist(),

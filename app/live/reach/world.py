@@ -41,7 +41,8 @@ from app.sim.core.arrays import Vec
 from app.sim.geometry.segments import FAR
 from app.sim.people.kernels.pedestrian import GROWTH, VX, VY
 from app.sim.pick.batch import Piece
-from app.sim.safety.layer import SafetyDecision, SafetyLayer, SeparationTerms, safety_settings
+from app.sim.safety.decision import SafetyDecision, SeparationTerms
+from app.sim.safety.layer import SafetyLayer, safety_settings
 from app.sim.safety.separation_zone import separation_zone
 from app.sim.scenario.kernels.episode import SUCCESS_DISTANCE
 

@@ -46,8 +46,10 @@ from app.sim.reach.motion_types import (
 from app.sim.reach.query_state import Stage
 from app.sim.reach.reach_actor import ReachActor
 from app.sim.robot.kernels import actions
+from app.sim.robot.kernels.joints import JointState
 from app.sim.robot.measured_state import MeasuredState, StateLimits, returning
-from app.sim.safety.layer import SafetyDecision, SafetyLayer, SafetySettings, SeparationTerms
+from app.sim.safety.decision import SafetyDecision, SeparationTerms
+from app.sim.safety.layer import SafetyLayer, SafetySettings
 from app.sim.scene.scene import FAR_AWAY, arm_of
 
 _FAR = np.full(3, 10.0)
@@ -274,16 +276,14 @@ class MotionDecider:
     def _piece(self, robot: MeasuredState, act: Vec) -> tuple[Piece, bool]:
         """Return the commanded piece from the measured state, and whether it is unfeasible."""
         arm, (q, qd, _) = self.arm, robot.measured
-        act, q_min, q_max = returning(arm, q, act)
+        act, limits = returning(arm, q, act)
         c, d, q1, qd1, qdd1 = np.empty((5, 6))
-        arguments = (
-            self._rule, q, qd, robot.clamped.qdd, act.astype(np.float32), q_min, q_max,
-            arm.limits.qd_max, arm.limits.qdd_max, arm.limits.jerk_max, arm.dt, c, d, q1, qd1,
-            qdd1,
-        )  # fmt: skip
+        start, end = JointState(q, qd, robot.clamped.qdd), JointState(q1, qd1, qdd1)
+        segment, commanded = actions.Coefficients(c, d), act.astype(np.float32)
+        arguments = (self._rule, limits, arm.dt, start, commanded, segment, end)
         if self._advance is None:
             self._advance = direct(actions.advance, arguments)
-        empty = self._advance(*arguments) or q_min is not arm.limits.q_min
+        empty = self._advance(*arguments) or limits is not arm.limits
         return Piece(c=c, d=d, q=q1, qd=qd1, qdd=qdd1), bool(empty)
 
     def _monitored(
@@ -309,7 +309,7 @@ class MotionDecider:
 
     def _beyond_reach(self, goal: Vec) -> float:
         """Return by how much a goal is farther away than the arm is long [m]."""
-        longest = LONGEST_REACH + max(self.arm.tool_length - 0.12, 0.0)
+        longest = LONGEST_REACH + max(self.arm.lengths.tool - 0.12, 0.0)
         return max(0.0, math.dist(goal, SHOULDER) - longest)
 
 

@@ -74,7 +74,7 @@ def layer_of(settings: SafetySettings | None, dt: float, age: float = 0.0) -> La
     """
     if settings is None or not settings.measured:
         return NO_LAYER
-    ahead = min(LONGEST_AHEAD, settings.lead + dt + age)
+    ahead = min(LONGEST_AHEAD, settings.latency + dt + age)
     return Layer(settings.margin + settings.speed_change * ahead + SPARE_M, ahead)
 
 

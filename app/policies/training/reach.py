@@ -98,9 +98,7 @@ def explorer_of(preset: ReachPreset, batch: ReachRows, seed: int) -> Explorer:
         return ladder
     assert isinstance(batch, ReachBatch)
     arm, targets = batch.arm, batch.world.targets
-    postures, _ = ik_vertical_batch(
-        targets, arm.tool_length, arm.limits.q_min, arm.limits.q_max
-    )
+    postures, _ = ik_vertical_batch(arm.lengths, arm.limits, targets)
     return OptionNoise(ladder, batch, postures, preset.option_rate, rng)
 
 

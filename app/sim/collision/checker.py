@@ -15,7 +15,7 @@ from app.errors import InvalidInput
 from app.sim.cells.cell import Cell
 from app.sim.collision.kernels import free
 from app.sim.core.arrays import Vec
-from app.sim.geometry.capsules import N_ROWS, capsules_soa, padded
+from app.sim.geometry.capsules import N_ROWS, capsules_soa, padded_size
 from app.sim.human import model as human
 from app.sim.robot.kernels import arm as arm_kernel
 from app.sim.robot.kernels.arm import Arm
@@ -50,7 +50,7 @@ def capsule_shapes(ends: Vec, radius: Vec) -> Shapes:
         radius: Their radii [m], shape (m,).
     """
     return Shapes(
-        columns=capsules_soa(ends, radius, padded(len(radius))), cylinders=np.zeros((0, 4))
+        columns=capsules_soa(ends, radius, padded_size(len(radius))), cylinders=np.zeros((0, 4))
     )
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from app.sim.collision.kernels import contact as kernel
 from app.sim.core.arrays import Vec
-from app.sim.geometry.capsules import distances, gaps
+from app.sim.geometry.capsules import capsule_clearances, distances
 from app.sim.geometry.cylinder import cylinder_clearance
 from app.sim.human import model as human
 from app.sim.human.kernels.kinematics import N_CAPSULES, PELVIS_Z
@@ -20,6 +20,7 @@ from app.sim.people.kernels.people import Crowd, People
 from app.sim.robot.capsules import load_robot_capsules
 from app.sim.robot.kernels import arm as arm_kernel
 from app.sim.robot.kernels.arm import Arm
+from app.sim.robot.kernels.joints import JointPath
 from app.sim.scene.scene import NO_CYLINDERS, crowd_of, own, require_finite
 
 CONTACT_KINDS = ("none", "human", "cell", "self")
@@ -86,10 +87,7 @@ def clearance(
 def contact(
     arm: Arm,
     people: People,
-    q0: Vec,
-    qd0: Vec,
-    c: Vec,
-    d: Vec,
+    path: JointPath,
     human_q: tuple[Vec, Vec],
     cylinders: tuple[Vec, Vec] = (NO_CYLINDERS, NO_CYLINDERS),
     sizes: Vec | tuple[Vec, Vec] | None = None,
@@ -99,10 +97,7 @@ def contact(
     Args:
         arm: Robot in its cell.
         people: Shared data of the people.
-        q0: Joint positions at the start [rad], shape (6,).
-        qd0: Joint speeds at the start [rad/s], shape (6,).
-        c: Second coefficients of the period [rad/s^2], shape (6,).
-        d: Third coefficients of the period [rad/s^3], shape (6,).
+        path: The robot's path in the period.
         human_q: The workers' joints at start and end [m, rad], shape (W, 18) each.
         cylinders: The walkers' x, y, radius at start and end [m], shape (C, 3) each.
         sizes: The workers' sizes [m], shape (W, body.N_SIZE), or those at start and end where
@@ -112,10 +107,11 @@ def contact(
         SimulationError: A number is NaN or infinite.
     """
     before, after = sizes if isinstance(sizes, tuple) else (sizes, sizes)
-    require_finite("q, qd, c, d", np.concatenate([q0, qd0, c, d]))
+    require_finite("q, qd, c, d", np.concatenate(path))
     require_finite("human_q", np.concatenate(human_q))
     require_finite("cylinders", np.concatenate(cylinders))
-    q0, qd0, c, d = own(q0), own(qd0), own(c), own(d)
+    path = JointPath(*map(own, path))
+    q0, qd0, c, d = path
     robot = arm_kernel.new_robot_pose(arm)
     arm_kernel.place_robot(arm, q0, robot)
     crowd = crowd_of(people, human_q[0], cylinders[0], before)
@@ -125,21 +121,10 @@ def contact(
     columns0 = crowd.columns.copy()
     if after is not None:
         crowd.size[:] = after
+    q1 = q0 + arm.dt * (qd0 + arm.dt * (c + arm.dt * d))
+    motion = kernel.PeriodMotion(path, q1, own(human_q[1]), own(cylinders[1]))
     kind, x = kernel.sweep(
-        arm,
-        people,
-        q0,
-        qd0,
-        c,
-        d,
-        q0 + arm.dt * (qd0 + arm.dt * (c + arm.dt * d)),
-        own(human_q[1]),
-        own(cylinders[1]),
-        robot.columns.copy(),
-        columns0,
-        clear,
-        robot,
-        crowd,
+        arm, people, motion, robot.columns.copy(), columns0, clear, robot, crowd
     )
     link, part, worker, walker = _who(arm, people, kind, robot, crowd)
     return Contact(
@@ -169,7 +154,7 @@ def worker_distances(arm: Arm, people: People, q: Vec, human_q: Vec, sizes: Vec)
     robot = arm_kernel.new_robot_pose(arm)
     arm_kernel.place_robot(arm, own(q), robot)
     crowd = crowd_of(people, human_q, NO_CYLINDERS, sizes)
-    gaps(robot.columns, crowd.columns, crowd.gap)
+    capsule_clearances(robot.columns, crowd.columns, crowd.gap)
     parts = crowd.gap[: n_workers * N_CAPSULES].reshape(n_workers, N_CAPSULES)
     return np.asarray(parts.min(axis=1))
 

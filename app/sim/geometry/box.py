@@ -1,10 +1,10 @@
-"""Exact distances of capsules to boxes that are turned about the vertical, compiled.
+"""Exact distances of capsules to boxes rotated about the vertical, compiled.
 
-In the box's own frame the squared distance of the point at fraction ``s`` of a segment is
+In the frame of the box the squared distance of the point at fraction ``s`` of a segment is
 ``sum_i max(0, |p_i(s)| - half_i)^2``: convex, and quadratic between the places, six at most,
-where a coordinate passes a face. Its slope is therefore continuous, never falls and is linear
+where a coordinate passes a face. Its slope is therefore continuous, non-decreasing and linear
 between those places, so the least distance follows from the two places around the slope's zero,
-without iteration. Tests hold this file against python-fcl.
+without iteration. Tests compare with python-fcl.
 """
 
 import math
@@ -12,19 +12,19 @@ import math
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
 from app.sim.geometry.capsules import RADIUS, UX, UY, UZ, X, Y, Z
-from app.sim.geometry.segments import FAR, FAST
+from app.sim.geometry.segments import FAR, FAST, Point
 
 
 @kernel(error_model="numpy", fastmath=FAST)
 def box_clearance(robot: Vec, first: int, boxes: Vec) -> tuple[float, int, int]:
     """Return the least distance of capsules to boxes [m], the nearest capsule and its box.
 
-    Exact where they are apart; at most zero exactly where they touch, and then the radius of
-    the segment that is inside, negative: not how deep.
+    The distance is exact for capsules apart from the box. It is not positive exactly where they
+    touch; a segment inside the box yields minus its radius, not the penetration depth.
 
     Args:
         robot: Capsules as columns, shape (>= 8, n).
-        first: First column to look at.
+        first: First column that counts.
         boxes: Centre x, y, z, half sizes [m] and yaw [rad], shape (n_boxes, 7).
 
     Returns:
@@ -49,45 +49,34 @@ def box_clearance(robot: Vec, first: int, boxes: Vec) -> tuple[float, int, int]:
             reach = best + robot[RADIUS, k]
             if reach <= 0.0 or ex * ex + ey * ey + ez * ez >= reach * reach:
                 continue
-            d = _segment_to_box(px, py, pz, vx, vy, uz, hx, hy, hz) - robot[RADIUS, k]
+            d = _segment_to_box((px, py, pz), (vx, vy, uz), (hx, hy, hz)) - robot[RADIUS, k]
             if d < best:
                 best, near, which = d, k, b
     return best, near, which
 
 
 @kernel(error_model="numpy", fastmath=FAST)
-def _segment_to_box(
-    px: float, py: float, pz: float,
-    vx: float, vy: float, vz: float,
-    hx: float, hy: float, hz: float,
-) -> float:  # fmt: skip
+def _segment_to_box(p: Point, v: Point, h: Point) -> float:
     """Return the distance of a segment to a box around the origin [m].
 
     Args:
-        px: Start of the segment [m]; then py, pz.
-        py: See px.
-        pz: See px.
-        vx: End less start [m]; then vy, vz.
-        vy: See vx.
-        vz: See vx.
-        hx: Half sizes of the box [m]; then hy, hz.
-        hy: See hx.
-        hz: See hx.
+        p: Start of the segment [m].
+        v: End less start [m].
+        h: Half sizes of the box [m].
     """
     low, high = 0.0, 1.0
-    slope_low = _slope(low, px, py, pz, vx, vy, vz, hx, hy, hz)
-    slope_high = _slope(high, px, py, pz, vx, vy, vz, hx, hy, hz)
+    slope_low, slope_high = _slope(low, p, v, h), _slope(high, p, v, h)
     if slope_low < 0.0 < slope_high:
         for face in range(6):
             axis = face >> 1
-            p = px if axis == 0 else (py if axis == 1 else pz)
-            v = vx if axis == 0 else (vy if axis == 1 else vz)
-            h = hx if axis == 0 else (hy if axis == 1 else hz)
-            if v == 0.0:
+            p_i = p[0] if axis == 0 else (p[1] if axis == 1 else p[2])
+            v_i = v[0] if axis == 0 else (v[1] if axis == 1 else v[2])
+            h_i = h[0] if axis == 0 else (h[1] if axis == 1 else h[2])
+            if v_i == 0.0:
                 continue
-            s = ((h if face & 1 else -h) - p) / v
+            s = ((h_i if face & 1 else -h_i) - p_i) / v_i
             if low < s < high:
-                slope = _slope(s, px, py, pz, vx, vy, vz, hx, hy, hz)
+                slope = _slope(s, p, v, h)
                 if slope < 0.0:
                     low, slope_low = s, slope
                 else:
@@ -95,23 +84,18 @@ def _segment_to_box(
         low -= slope_low * (high - low) / (slope_high - slope_low)
     elif slope_low < 0.0:
         low = 1.0
-    x = max(0.0, abs(px + low * vx) - hx)
-    y = max(0.0, abs(py + low * vy) - hy)
-    z = max(0.0, abs(pz + low * vz) - hz)
+    x = max(0.0, abs(p[0] + low * v[0]) - h[0])
+    y = max(0.0, abs(p[1] + low * v[1]) - h[1])
+    z = max(0.0, abs(p[2] + low * v[2]) - h[2])
     return math.sqrt(x * x + y * y + z * z)
 
 
 @kernel(inline="always", error_model="numpy", fastmath=FAST)
-def _slope(
-    s: float,
-    px: float, py: float, pz: float,
-    vx: float, vy: float, vz: float,
-    hx: float, hy: float, hz: float,
-) -> float:  # fmt: skip
+def _slope(s: float, p: Point, v: Point, h: Point) -> float:
     """Return half the slope of the squared distance at fraction ``s`` [m^2]."""
-    x, y, z = px + s * vx, py + s * vy, pz + s * vz
+    x, y, z = p[0] + s * v[0], p[1] + s * v[1], p[2] + s * v[2]
     return (
-        vx * (x - min(hx, max(-hx, x)))
-        + vy * (y - min(hy, max(-hy, y)))
-        + vz * (z - min(hz, max(-hz, z)))
+        v[0] * (x - min(h[0], max(-h[0], x)))
+        + v[1] * (y - min(h[1], max(-h[1], y)))
+        + v[2] * (z - min(h[2], max(-h[2], z)))
     )

@@ -1,12 +1,11 @@
-"""Sets of capsules as columns, and exact distances between them, compiled.
+"""Sets of capsules as structures of arrays, and exact distances between them, compiled.
 
-A capsule is all points within ``radius`` of a segment. A set of n capsules is an array of shape
-(9, n), a structure of arrays: compilers turn the loops over columns into vector instructions,
-which is what the simulator's speed rests on. The distance of two capsules is the distance of
-their segments less both radii; segments by Ericson, *Real-Time Collision Detection* (2005),
-section 5.1.9, written without branches: the point on the second segment nearest to a first
-guess on the first, clamped, then the point on the first nearest to that. Tests hold this file
-against python-fcl to 1e-6 m.
+A capsule is the set of points within ``radius`` of a segment. A set of n capsules is an array
+of shape (9, n), one capsule per column: compilers vectorise the loops over columns, on which
+the simulator's speed depends. The distance of two capsules is the distance of their segments
+less both radii; segments by Ericson, *Real-Time Collision Detection* (2005), section 5.1.9,
+without branches: the point on the second segment nearest to a first guess on the first,
+clamped, then the point on the first nearest to that. Tests compare with python-fcl to 1e-6 m.
 """
 
 import math
@@ -16,25 +15,27 @@ from numpy.typing import NDArray
 
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
-from app.sim.geometry.segments import FAR, FAST
+from app.sim.geometry.segments import FAR, FAST, Point
 
+Span = tuple[float, float, float, float, float]
+"""Second end of a segment less the first [m], its square [m^2], and its inverse [1/m^2]."""
 X, Y, Z, UX, UY, UZ, UU, RADIUS, INVERSE = range(9)
 """Rows: first end [m], second end less first [m], its square [m^2], radius [m], 1 / UU (0 where
 the segment is a point)."""
 N_ROWS = 9
 WIDTH = 8
-"""Columns of sets that inner loops run over come in multiples of this."""
+"""Number of columns of sets in inner loops is a multiple of this."""
 NOWHERE = 1e3
-"""Coordinate of columns that only fill up a set [m]."""
+"""Coordinate of padding columns [m]."""
 
 
-def padded(n: int) -> int:
-    """Return the number of columns of a set of n capsules that an inner loop runs over."""
+def padded_size(n: int) -> int:
+    """Return n rounded up to a multiple of WIDTH."""
     return -(-n // WIDTH) * WIDTH
 
 
 def new_columns(n: int, radius: Vec, length2: Vec | None = None) -> Vec:
-    """Return a set of ``n`` columns, all nowhere until they are placed.
+    """Return a set of ``n`` capsules, all at NOWHERE until they are placed.
 
     Args:
         n: Number of columns, at least ``len(radius)``.
@@ -51,7 +52,7 @@ def new_columns(n: int, radius: Vec, length2: Vec | None = None) -> Vec:
 
 
 def capsules_soa(ends: Vec, radius: Vec, n: int | None = None) -> Vec:
-    """Return capsules given by their ends as columns.
+    """Return capsules given by their ends as a structure of arrays.
 
     Args:
         ends: Ends of the segments [m], shape (k, 2, 3).
@@ -71,37 +72,24 @@ def ends_of(columns: Vec, n: int) -> Vec:
     return np.stack([start, start + columns[UX:UU, :n].T], axis=1)
 
 
-@kernel(error_model="numpy", fastmath=FAST)
-def distances(a: Vec, i: int, b: Vec, out: Vec) -> None:
-    """Write the distance of column ``i`` of ``a`` to every column of ``b`` [m].
+@kernel(inline="always")
+def start_of(a: Vec, i: int) -> Point:
+    """Return the first end of column ``i`` [m]."""
+    return a[X, i], a[Y, i], a[Z, i]
 
-    Args:
-        a: Capsules, shape (9, n).
-        i: One of them.
-        b: Other capsules, shape (9, m).
-        out: Filled, shape (m,).
-    """
-    ax, ay, az, ux, uy, uz = a[X, i], a[Y, i], a[Z, i], a[UX, i], a[UY, i], a[UZ, i]
-    uu, radius, inverse = a[UU, i], a[RADIUS, i], a[INVERSE, i]
-    for j in range(b.shape[1]):
-        out[j] = (
-            segment_distance(
-                ax - b[X, j], ay - b[Y, j], az - b[Z, j],
-                ux, uy, uz, uu, inverse,
-                b[UX, j], b[UY, j], b[UZ, j], b[UU, j], b[INVERSE, j],
-            )
-            - radius
-            - b[RADIUS, j]
-        )  # fmt: skip
+
+@kernel(inline="always")
+def span_of(a: Vec, i: int) -> Span:
+    """Return the second end less the first of column ``i`` [m], its square and the inverse."""
+    return a[UX, i], a[UY, i], a[UZ, i], a[UU, i], a[INVERSE, i]
 
 
 @kernel(inline="always", error_model="numpy", fastmath=FAST)
-def segment_distance(
-    wx: float, wy: float, wz: float,
-    ux: float, uy: float, uz: float, uu: float, iu: float,
-    vx: float, vy: float, vz: float, vv: float, iv: float,
-) -> float:  # fmt: skip
-    """Return the distance of two segments [m]: w joins their starts, u and v their ends."""
+def segment_distance(p: Point, u: Span, q: Point, v: Span) -> float:
+    """Return the distance of two segments [m], given by their starts and spans."""
+    ux, uy, uz, uu, iu = u
+    vx, vy, vz, vv, iv = v
+    wx, wy, wz = p[0] - q[0], p[1] - q[1], p[2] - q[2]
     f = vx * wx + vy * wy + vz * wz
     c = ux * wx + uy * wy + uz * wz
     b = ux * vx + uy * vy + uz * vz
@@ -122,7 +110,23 @@ def segment_distance(
 
 
 @kernel(error_model="numpy", fastmath=FAST)
-def gaps(a: Vec, b: Vec, out: Vec) -> None:
+def distances(a: Vec, i: int, b: Vec, out: Vec) -> None:
+    """Write the distance of column ``i`` of ``a`` to every column of ``b`` [m].
+
+    Args:
+        a: Capsules, shape (9, n).
+        i: One of them.
+        b: Other capsules, shape (9, m).
+        out: Filled, shape (m,).
+    """
+    p, u, radius = start_of(a, i), span_of(a, i), a[RADIUS, i]
+    for j in range(b.shape[1]):
+        axes = segment_distance(p, u, start_of(b, j), span_of(b, j))
+        out[j] = axes - radius - b[RADIUS, j]
+
+
+@kernel(error_model="numpy", fastmath=FAST)
+def capsule_clearances(a: Vec, b: Vec, out: Vec) -> None:
     """Write, for every column of ``b``, its distance to the nearest column of ``a`` [m].
 
     Args:
@@ -133,48 +137,32 @@ def gaps(a: Vec, b: Vec, out: Vec) -> None:
     for j in range(b.shape[1]):
         out[j] = FAR
     for i in range(a.shape[1]):
-        ax, ay, az, ux, uy, uz = a[X, i], a[Y, i], a[Z, i], a[UX, i], a[UY, i], a[UZ, i]
-        uu, radius, inverse = a[UU, i], a[RADIUS, i], a[INVERSE, i]
+        p, u, radius = start_of(a, i), span_of(a, i), a[RADIUS, i]
         for j in range(b.shape[1]):
-            d = (
-                segment_distance(
-                    ax - b[X, j], ay - b[Y, j], az - b[Z, j],
-                    ux, uy, uz, uu, inverse,
-                    b[UX, j], b[UY, j], b[UZ, j], b[UU, j], b[INVERSE, j],
-                )
-                - radius
-                - b[RADIUS, j]
-            )  # fmt: skip
+            axes = segment_distance(p, u, start_of(b, j), span_of(b, j))
+            d = axes - radius - b[RADIUS, j]
             out[j] = d if d < out[j] else out[j]
 
 
 @kernel(error_model="numpy", fastmath=FAST)
 def nearest_parts(a: Vec, b: Vec, first: int, last: int, out: Vec, part: Vec) -> None:
-    """Write, for every column of ``a``, the nearest of some columns of ``b``.
+    """Write, for every column of ``a``, the nearest of a range of columns of ``b``.
 
     Args:
         a: Capsules, shape (9, n); n best a multiple of WIDTH.
         b: Other capsules, shape (9, m).
-        first: First column of ``b`` to look at.
-        last: Last one.
+        first: First column of ``b`` in the range.
+        last: Last column of ``b`` in the range.
         out: Filled with distances [m], shape (n,).
         part: Filled with columns of ``b``, shape (n,).
     """
     for j in range(a.shape[1]):
         out[j], part[j] = FAR, first
     for i in range(first, last + 1):
-        bx, by, bz, vx, vy, vz = b[X, i], b[Y, i], b[Z, i], b[UX, i], b[UY, i], b[UZ, i]
-        vv, radius, inverse = b[UU, i], b[RADIUS, i], b[INVERSE, i]
+        p, u, radius = start_of(b, i), span_of(b, i), b[RADIUS, i]
         for j in range(a.shape[1]):
-            d = (
-                segment_distance(
-                    bx - a[X, j], by - a[Y, j], bz - a[Z, j],
-                    vx, vy, vz, vv, inverse,
-                    a[UX, j], a[UY, j], a[UZ, j], a[UU, j], a[INVERSE, j],
-                )
-                - radius
-                - a[RADIUS, j]
-            )  # fmt: skip
+            axes = segment_distance(p, u, start_of(a, j), span_of(a, j))
+            d = axes - radius - a[RADIUS, j]
             part[j] = i if d < out[j] else part[j]
             out[j] = d if d < out[j] else out[j]
 
@@ -203,20 +191,13 @@ def pair_distances(
     """
     for k in range(first.shape[0]):
         i, j = first[k], second[k]
-        out[k] = (
-            segment_distance(
-                a[X, i] - a[X, j], a[Y, i] - a[Y, j], a[Z, i] - a[Z, j],
-                a[UX, i], a[UY, i], a[UZ, i], a[UU, i], a[INVERSE, i],
-                a[UX, j], a[UY, j], a[UZ, j], a[UU, j], a[INVERSE, j],
-            )
-            - a[RADIUS, i]
-            - a[RADIUS, j]
-        )  # fmt: skip
+        axes = segment_distance(start_of(a, i), span_of(a, i), start_of(a, j), span_of(a, j))
+        out[k] = axes - a[RADIUS, i] - a[RADIUS, j]
 
 
 @kernel(error_model="numpy", fastmath=FAST)
 def greatest_displacement(before: Vec, after: Vec) -> float:
-    """Return the farthest any end of a set's capsules moved [m]; both of shape (9, n)."""
+    """Return the greatest displacement of any capsule end [m]; both sets of shape (9, n)."""
     longest = 0.0
     for k in range(before.shape[1]):
         x, y, z = (

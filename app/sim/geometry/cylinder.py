@@ -1,12 +1,12 @@
 """Exact distances of capsules to a solid vertical cylinder that stands on the floor, compiled.
 
-The cylinder of METHOD 2.1 reaches from far below up to ``top``. A capsule is all points within
-its radius of a segment, so its distance is that of its segment less the radius. Seen from
-above, the distance of a segment to the axis less ``r`` is never more than the true distance,
-and equals it where that nearest point lies below ``top``: mostly that settles it. Otherwise the
-nearest point lies between there and the lowest point of the segment that is not below ``top``,
-where the squared distance to the disc is convex: a Newton search that keeps its bracket. Tests
-hold this file against python-fcl.
+The cylinder of docs/method.md 2.1 extends from far below up to ``top``. A capsule is the set of
+points within its radius of a segment, so its distance is that of its segment less the radius.
+In the horizontal plane, the distance of a segment to the axis less ``r`` is never more than the
+true distance, and equals it where the nearest point lies below ``top``, the usual case.
+Otherwise the nearest point lies between there and the lowest point of the segment that is not
+below ``top``, where the squared distance to the disc is convex: a bracketed Newton search.
+Tests compare with python-fcl.
 """
 
 import math
@@ -30,12 +30,12 @@ def cylinder_clearance(
 ) -> tuple[float, int]:
     """Return the least distance of capsules to a cylinder [m] and the nearest capsule.
 
-    Exact where they are apart. Below zero exactly where they overlap; how deep is then only
-    told to the side, not over the top.
+    Exact where they are apart. Negative exactly where they overlap; the penetration depth then
+    counts sideways only, not over the top.
 
     Args:
         robot: Capsules as columns, shape (>= 8, n).
-        first: First column to look at.
+        first: First column that counts.
         x: Axis [m].
         y: Axis [m].
         r: Radius of the cylinder [m].
@@ -69,28 +69,27 @@ def cylinder_clearance(
 
 @kernel(error_model="numpy", fastmath=FAST)
 def swept_clearance(robot: Vec, x: float, y: float, sx: float, sy: float, r: float) -> float:
-    """Return the least distance of capsules to a cylinder all along a straight way [m].
+    """Return the least distance of capsules to a cylinder swept along a straight line [m].
 
-    Seen from above, as if the cylinder had no top: never more than the true distance.
+    Computed in the plane, as if the cylinder had no top: never more than the true distance.
 
     Args:
         robot: Capsules as columns, shape (>= 8, n).
-        x: Axis where the way begins [m].
-        y: The same.
-        sx: The way [m].
-        sy: The same.
+        x: Start of the axis [m].
+        y: Start of the axis [m].
+        sx: Displacement of the axis [m].
+        sy: Displacement of the axis [m].
         r: Radius of the cylinder [m].
     """
     best, square = FAR, sx * sx + sy * sy
-    inverse = 1.0 / square if square > _POINT else 0.0
+    path = (sx, sy, 0.0, square, 1.0 / square if square > _POINT else 0.0)
+    origin = (0.0, 0.0, 0.0)
     for k in range(robot.shape[1]):
         ux, uy = robot[UX, k], robot[UY, k]
         uu = ux * ux + uy * uy
-        d = segment_distance(
-            robot[X, k] - x, robot[Y, k] - y, 0.0,
-            ux, uy, 0.0, uu, 1.0 / uu if uu > _POINT else 0.0,
-            sx, sy, 0.0, square, inverse,
-        )  # fmt: skip
+        inverse_u = 1.0 / uu if uu > _POINT else 0.0
+        start = (robot[X, k] - x, robot[Y, k] - y, 0.0)
+        d = segment_distance(start, (ux, uy, 0.0, uu, inverse_u), origin, path)
         best = min(best, d - robot[RADIUS, k] - r)
     return best
 
@@ -99,7 +98,7 @@ def swept_clearance(robot: Vec, x: float, y: float, sx: float, sy: float, r: flo
 def _over_the_top(
     wx: float, wy: float, h: float, ux: float, uy: float, uz: float, end: float, r: float
 ) -> float:
-    """Return the distance of a segment to the cylinder where seen from above it misleads [m].
+    """Return the distance of a segment to the cylinder near its rim or over its top [m].
 
     Args:
         wx: Start of the segment relative to the axis [m].

@@ -1,7 +1,7 @@
-"""Where two segments are nearest, compiled; one pair at a time, for directions and names.
+"""Nearest points of two segments, compiled; one pair at a time, for directions and names.
 
-Source: Ericson, *Real-Time Collision Detection* (2005), section 5.1.9. Distances of whole sets
-of capsules are in ``columns.py``.
+Source: Ericson, *Real-Time Collision Detection* (2005), section 5.1.9. Distances of sets of
+capsules are in ``columns.py``.
 """
 
 import math
@@ -9,40 +9,25 @@ import math
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
 
+Point = tuple[float, float, float]
 FAST = {"contract", "nsz", "arcp"}
-"""Freedoms given to the compiler: fused multiply-add, signs of zero, reciprocals.
-Never those that assume away NaN and infinity."""
+"""Fast-math flags: fused multiply-add, signs of zero, reciprocals."""
 FAR = 1e3
-"""A distance that stands for "nothing there" [m]."""
+"""Distance where nothing is near [m]."""
 
 
 @kernel(error_model="numpy", fastmath=FAST)
-def segment_parameters(
-    ux: float,
-    uy: float,
-    uz: float,
-    vx: float,
-    vy: float,
-    vz: float,
-    wx: float,
-    wy: float,
-    wz: float,
-) -> tuple[float, float]:
+def segment_parameters(u: Point, v: Point, w: Point) -> tuple[float, float]:
     """Return where two segments are nearest, as fractions of their lengths.
 
-    Scalars, not arrays: a function that compilers inline is several times faster here.
-
     Args:
-        ux: Direction of the first segment, end less start [m]; then uy, uz.
-        uy: See ux.
-        uz: See ux.
-        vx: Direction of the second segment [m]; then vy, vz.
-        vy: See vx.
-        vz: See vx.
-        wx: Start of the first less start of the second [m]; then wy, wz.
-        wy: See wx.
-        wz: See wx.
+        u: End of the first segment less its start [m].
+        v: End of the second segment less its start [m].
+        w: Start of the first less start of the second [m].
     """
+    ux, uy, uz = u
+    vx, vy, vz = v
+    wx, wy, wz = w
     a = ux * ux + uy * uy + uz * uz
     e = vx * vx + vy * vy + vz * vz
     f = vx * wx + vy * wy + vz * wz
@@ -78,7 +63,7 @@ def segment_nearest(a: Vec, i: int, b: Vec, j: int, out: Vec) -> float:
     ux, uy, uz = a[3, i], a[4, i], a[5, i]
     vx, vy, vz = b[3, j], b[4, j], b[5, j]
     wx, wy, wz = a[0, i] - b[0, j], a[1, i] - b[1, j], a[2, i] - b[2, j]
-    s, t = segment_parameters(ux, uy, uz, vx, vy, vz, wx, wy, wz)
+    s, t = segment_parameters((ux, uy, uz), (vx, vy, vz), (wx, wy, wz))
     out[0] = t * vx - wx - s * ux
     out[1] = t * vy - wy - s * uy
     out[2] = t * vz - wz - s * uz

@@ -26,6 +26,7 @@ from app.sim.robot.actions import ActionSettings
 from app.sim.robot.kernels import actions, kinematics
 from app.sim.robot.kernels import arm as arm_kernel
 from app.sim.robot.kernels.arm import CONTROLLED, Arm
+from app.sim.robot.kernels.joints import JointState
 from app.sim.scenario.batch import CellBatch, Rows
 from app.sim.scenario.kernels.episode import FEATURES, PLAIN, distance_to
 from app.sim.scene.scene import (
@@ -107,11 +108,9 @@ class Piece:
 def _world_of(cell: Cell, settings: PickSettings) -> pick.PickWorld:
     if (lack := lacks_stations(cell)) is not None:
         raise InvalidInput("cell", cell.name, f"cannot be used for picking: it {lack}")
-    mount, stations = cell.robot, cell.pick_stations
+    arm, stations = arm_of(cell), cell.pick_stations
     positions = np.array([station.position for station in stations]).reshape(-1, 3)
-    postures, reached = kinematics.ik_vertical_batch(
-        positions, mount.tool_length, np.array(mount.q_min), np.array(mount.q_max)
-    )
+    postures, reached = kinematics.ik_vertical_batch(arm.lengths, arm.limits, positions)
     for station, found in zip(stations, reached, strict=True):
         if not found:
             raise InvalidInput(
@@ -123,7 +122,7 @@ def _world_of(cell: Cell, settings: PickSettings) -> pick.PickWorld:
         stations=positions,
         station_q=postures,
         n_cubes=len(cell.stations_of("cube")),
-        arm=arm_of(cell),
+        arm=arm,
         people=people_of(cell, settings.work),
     )
 
@@ -245,9 +244,7 @@ def observe(
         Observations, shape (n, n_obs), and whether each target is reachable, (n,).
     """
     n, targets = len(goals), own(goals)
-    q_goals, reachable = kinematics.ik_vertical_batch(
-        targets, arm.tool_length, arm.limits.q_min, arm.limits.q_max
-    )
+    q_goals, reachable = kinematics.ik_vertical_batch(arm.lengths, arm.limits, targets)
     obs = np.empty((n, n_obs), dtype=np.float32)
     features.observe_batch(
         arm,
@@ -282,26 +279,12 @@ def step_robot(
         SimulationError: A number is NaN or infinite.
     """
     require_finite("q, qd, qdd, act", np.concatenate([q, qd, qdd, act]))
-    c, d, q1, qd1, qdd1 = (np.empty(6) for _ in range(5))
-    actions.advance(
-        action.rule(),
-        own(q),
-        own(qd),
-        own(qdd),
-        np.array(act, dtype=np.float32),
-        arm.limits.q_min,
-        arm.limits.q_max,
-        arm.limits.qd_max,
-        arm.limits.qdd_max,
-        arm.limits.jerk_max,
-        arm.dt,
-        c,
-        d,
-        q1,
-        qd1,
-        qdd1,
-    )
-    return Piece(c=c, d=d, q=q1, qd=qd1, qdd=qdd1)
+    segment = actions.Coefficients(np.empty(6), np.empty(6))
+    end = JointState(np.empty(6), np.empty(6), np.empty(6))
+    start = JointState(own(q), own(qd), own(qdd))
+    commanded = np.array(act, dtype=np.float32)
+    actions.advance(action.rule(), arm.limits, arm.dt, start, commanded, segment, end)
+    return Piece(c=segment.c, d=segment.d, q=end.q, qd=end.qd, qdd=end.qdd)
 
 
 def tool_state(arm: Arm, q: Vec, qd: Vec, goal: Vec) -> tuple[float, float, float, bool]:

@@ -168,9 +168,7 @@ def geometry(cell: Cell, case: Case) -> CaseGeometry:
     arm = arm_of(cell)
     names = (case.robot_start, *case.goals)
     positions = np.array([cell.station(name).position for name in names])
-    postures, _ = kinematics.ik_vertical_batch(
-        positions, arm.tool_length, arm.limits.q_min, arm.limits.q_max
-    )
+    postures, _ = kinematics.ik_vertical_batch(arm.lengths, arm.limits, positions)
     script = script_of(cell, case)
     times = np.arange(0.0, 6.0, 0.05)
     pose, people = arm_kernel.new_robot_pose(arm), people_of(cell)

@@ -25,7 +25,7 @@ APART = 0.1
 
 def vertical_posture(arm: Arm, target: Vec) -> Vec:
     """Return the posture, if any, with the tool down at ``target`` [m], shape (0 or 1, 6)."""
-    q = Robot(arm.tool_length).ik_vertical(target, arm.limits.q_min, arm.limits.q_max)
+    q = Robot(arm.lengths.tool).ik_vertical(target, arm.limits.q_min, arm.limits.q_max)
     return np.zeros((0, 6)) if q is None else q[None]
 
 
@@ -53,7 +53,7 @@ def goal_postures(
         the joints beyond the controlled ones at home; k = 0 where none was found. Neither
         people nor contact are looked at.
     """
-    robot = Robot(arm.tool_length)
+    robot = Robot(arm.lengths.tool)
     found: list[Vec] = []
     for k in range(n_starts):
         q = np.array(arm.home)

@@ -1,18 +1,17 @@
-"""Planners in three roles, wherever a policy may stand (METHOD 2.6, last row).
+"""Replanning executors: planners in three roles, in place of a policy (docs/method.md 2.6).
 
-``once`` plans among the people as they stand at the start and follows whatever happens: only a
-safety layer slows it down. ``replan-on-blocked`` looks at the rest of its path every so often;
-where
-people are nearer to it than the margin it brakes along the path, plans again from where it will
-come to rest, and turns to the new path as soon as it is there. ``replan-every-cycle`` plans
-again every
-period within a small budget, and changes over where its path is blocked or the new one shorter.
+``plan-once`` plans among the people at their initial positions and follows that path; only a
+safety layer slows it down. ``replan-on-blocked`` checks the rest of its path periodically;
+where people are nearer to it than the margin it brakes along the path, plans again from the
+point at which it comes to rest, and switches to the new path when ready. ``replan-every-cycle``
+plans again every period within a small budget, and switches where its path is blocked or the
+new one is shorter.
 
 Planning takes time: a path planned at ``t`` is used from ``t`` plus the budget on (at least one
-period), tested again among the people as they are then. Only the first plan is free of charge:
-the robot is at rest and the episode has not begun. New paths begin where a straight stop from
-the state in motion ends; the timed motion turns toward them without standing still where it
-can (``time_scaling``). Without a plan the robot brakes to rest, and the report says so.
+period), and checked again among the people at that time. The first plan is free of charge: the
+robot is at rest and the episode has not begun. New paths begin where a straight stop from the
+current state ends; the timed motion turns toward them without standing still where possible
+(``time_scaling``). Without a plan the robot brakes to rest, and the report says so.
 """
 
 import math
@@ -29,11 +28,13 @@ from app.sim.planning.path_tracking import Tracker, straight_stop
 from app.sim.planning.time_parameterization import Limits, stopping_point, time_free_path
 from app.sim.robot.kernels import acceleration_bounds as polynomial
 from app.sim.robot.kernels.arm import Arm
+from app.sim.robot.kernels.joints import JointState
+from app.sim.scene.scene import own
 
 STATES = ("waiting", "following", "braking", "arrived", "lost")
 """``waiting``: no plan, at rest or braking to rest. ``braking``: slows down along a path that
 is blocked. ``lost``: farther from the path than ``lost_rad``, braking to rest."""
-AGAIN_BUDGET_S = {"once": 0.0, "replan-on-blocked": 0.2, "replan-every-cycle": 0.02}
+AGAIN_BUDGET_S = {"plan-once": 0.0, "replan-on-blocked": 0.2, "replan-every-cycle": 0.02}
 """Budget of later plans by role [s]; ours."""
 EASED = 0.005
 """Where the robot is nearer to people than the margin, a margin this much below its clearance
@@ -44,7 +45,7 @@ holds instead [m]: it may leave, and pass by no nearer than it stands."""
 class ReplanningSettings:
     """How a planner follows and plans again."""
 
-    role: str = "once"
+    role: str = "plan-once"
     """One of ROLES."""
     plan: PlanSettings = field(default_factory=PlanSettings)
     """How the first path is planned."""
@@ -57,8 +58,7 @@ class ReplanningSettings:
     look_every_s: float = 0.1
     """How often ``replan-on-blocked`` looks at the rest of its path [s]."""
     better_share: float = 0.05
-    """``replan-every-cycle`` changes to a free path that saves at least this share of the time
-    left."""
+    """Least share of the time left that a new path saves in ``replan-every-cycle``."""
     arrived_rad: float = 1e-3
     """Distance to the end of the path, greatest joint, that counts as arrived [rad]."""
     lost_rad: float = 0.1
@@ -263,17 +263,14 @@ def _after_period(follower: ReplanningExecutor, q: Vec, qd: Vec) -> tuple[Vec, V
         wanted = straight_stop(qd, follower.limits)
     else:
         wanted = tracker.wanted(q, qd, brake=follower.blocked)
-    c, after_q, after_qd = np.empty(6), np.empty(6), np.empty(6)
-    polynomial.advance(
-        np.array(q), np.array(qd), wanted,
-        arm.limits.q_min, arm.limits.q_max, arm.limits.qd_max, arm.limits.qdd_max, arm.dt, c,
-        after_q, after_qd,
-    )  # fmt: skip
-    return after_q, after_qd
+    end = JointState(np.empty(6), np.empty(6), np.empty(6))
+    start = JointState(own(q), own(qd), np.zeros(6))
+    polynomial.advance_to_speeds(arm.limits, arm.dt, start, wanted, np.empty(6), end)
+    return end.q, end.qd
 
 
 ROLES: dict[str, Callable[[ReplanningExecutor, Vec, Vec, Shapes, float], None]] = {
-    "once": _once,
+    "plan-once": _once,
     "replan-on-blocked": _when_blocked,
     "replan-every-cycle": _every_tick,
 }

@@ -12,7 +12,8 @@ from app.sim.core.arrays import Vec
 from app.sim.core.out_of_range import OutsideField
 from app.sim.human.person import Person
 from app.sim.pick.batch import Piece
-from app.sim.safety.layer import SafetyDecision, SafetySettings, SeparationTerms
+from app.sim.safety.decision import SafetyDecision, SeparationTerms
+from app.sim.safety.layer import SafetySettings
 
 Way = Literal["interpolated", "direct"]
 """Between training targets, or the policy for the goal itself."""

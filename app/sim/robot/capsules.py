@@ -1,4 +1,4 @@
-"""Capsules of the robot: what the fast kernels take for the UR10's meshes and its tool.
+"""Capsules that contain the collision meshes of the robot and its tool, for the kernels.
 
 The capsules *contain* the collision meshes of example-robot-data (fitted once by
 ``tools.fit_capsules``, committed as data), so that a kernel may report contact early, never
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.sim.core.arrays import Vec
-from app.sim.robot.ur10 import LINK_NAMES
+from app.sim.robot.ur10 import LINK_NAMES, Robot
 
 Index = NDArray[np.int64]
 
@@ -25,10 +25,8 @@ CAPSULE_FILE = Path(str(resources.files("app.sim.robot"))) / "data" / "ur10_caps
 TOOL = "tool"
 """Name of the tool's capsule."""
 
-FLANGE = np.array([0.0, 0.0922, 0.0])
-"""Origin of ``tool0`` in the frame of wrist_3_link [m], from ur10_robot.urdf."""
 TOOL_AXIS = np.array([0.0, 1.0, 0.0])
-"""z axis of ``tool0`` in the frame of wrist_3_link, from ur10_robot.urdf."""
+"""z axis of ``tool0`` in the frame of wrist_3_link, as for all robots of the UR family."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,13 +46,14 @@ class RobotCapsules:
 
 
 def tool_capsule(tool_length: float, tool_radius: float) -> tuple[Vec, Vec]:
-    """End points of the tool's segment in the frame of wrist_3_link [m].
+    """Return the ends of the tool's segment in the frame of wrist_3_link [m].
 
-    The tool reaches from the flange to the tcp, ``tool_length`` along z of ``tool0``; its round
+    The tool extends from the flange to the tcp, ``tool_length`` along z of ``tool0``; its round
     end touches the tcp.
     """
+    flange = Robot(tool_length).lengths().flange * TOOL_AXIS
     reach = max(tool_length - tool_radius, 0.0)
-    return FLANGE.copy(), FLANGE + reach * TOOL_AXIS
+    return flange, flange + reach * TOOL_AXIS
 
 
 @lru_cache(maxsize=8)

@@ -21,6 +21,7 @@ from app.errors import InvalidInput, interval
 from app.sim.core.arrays import Vec
 from app.sim.core.out_of_range import OutsideField
 from app.sim.robot.kernels.arm import Arm
+from app.sim.robot.kernels.joints import JointLimits
 from app.sim.robot.kernels.override import stop_time
 from app.sim.robot.ur10 import JOINT_NAMES
 from app.sim.scene.scene import own
@@ -161,11 +162,11 @@ def _six(name: str, values: ArrayLike) -> Vec:
     return vector
 
 
-def returning(arm: Arm, q: Vec, act: Vec) -> tuple[Vec, Vec, Vec]:
-    """Return action and position limits that lead joints outside their limits back inside.
+def returning(arm: Arm, q: Vec, act: Vec) -> tuple[Vec, JointLimits]:
+    """Return action and limits that lead joints outside their position limits back inside.
 
-    Such a joint is given the whole action inward and no limit on the side where it is: its
-    speed turns inward as fast as its acceleration (and jerk) limits allow.
+    Such a joint is given the whole action inward and no limit on the exceeded side: its speed
+    turns inward as fast as its acceleration (and jerk) limits allow.
 
     Args:
         arm: Robot in its cell.
@@ -173,25 +174,23 @@ def returning(arm: Arm, q: Vec, act: Vec) -> tuple[Vec, Vec, Vec]:
         act: Action in [-1, 1], shape (6,).
 
     Returns:
-        Action, lower and upper position limits [rad], shape (6,) each.
+        Action, shape (6,), and limits; those of ``arm`` itself where no joint is outside.
     """
-    below, above = q < arm.limits.q_min, q > arm.limits.q_max
+    limits = arm.limits
+    below, above = q < limits.q_min, q > limits.q_max
     if not (below | above).any():
-        return act, arm.limits.q_min, arm.limits.q_max
+        return act, limits
     inward = np.where(above, -1.0, np.where(below, 1.0, act))
-    return (
-        inward,
-        np.where(below, -FREE, arm.limits.q_min),
-        np.where(above, FREE, arm.limits.q_max),
-    )
+    low, high = np.where(below, -FREE, limits.q_min), np.where(above, FREE, limits.q_max)
+    return inward, limits._replace(q_min=low, q_max=high)
 
 
 def admitting(arm: Arm, q: Vec, qd: Vec) -> Arm:
     """Return the robot with position and speed limits that its own straight stop keeps.
 
-    Speed and separation monitoring admits only pieces inside the limits and stops otherwise. A
-    state whose straight stop leaves the limits anyway would always be stopped, however far
-    people are. Acceleration limits stay: stops are as long as they are.
+    Speed and separation monitoring admits only trajectories inside the limits and stops
+    otherwise. A state whose straight stop leaves the limits would always be stopped, at any
+    distance of people. Acceleration limits are kept: they determine the stop.
 
     Args:
         arm: Robot in its cell.

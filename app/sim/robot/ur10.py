@@ -1,7 +1,7 @@
-"""The UR10 on Pinocchio: the reference model behind the compiled kernels.
+"""The UR10 on Pinocchio: the model from which the compiled kernels take their lengths.
 
 The model is example-robot-data's ``ur10_robot.urdf`` with a tool along ``tool0``'s z axis; the
-tcp is its tip. Use one :class:`Robot` per thread: Pinocchio's data objects are not shared.
+tcp is its tip. Create one :class:`Robot` per thread: Pinocchio's data objects are not shared.
 """
 
 from pathlib import Path
@@ -11,6 +11,7 @@ import pinocchio as pin
 
 from app.sim.core.arrays import Vec
 from app.sim.robot.kernels import kinematics
+from app.sim.robot.kernels.joints import JointLimits
 
 LINK_NAMES = (
     "base_link",
@@ -69,6 +70,31 @@ class Robot:
         self._links = [self.model.getFrameId(name) for name in LINK_NAMES]
         self.data = self.model.createData()
 
+    def lengths(self) -> kinematics.LinkLengths:
+        """Return the lengths of links and tool that the kernels need, from the model.
+
+        Raises:
+            ValueError: The model is not a robot of the UR family.
+        """
+        names = [joint.shortname().removeprefix("JointModel") for joint in self.model.joints]
+        at = [placement.translation for placement in self.model.jointPlacements]
+        tool0 = self.model.frames[self.model.getFrameId("tool0")].placement.translation
+        used = ((2,), (1,), (1, 2), (2,), (1,), (2,), (1,))
+        rest = [np.delete(one, axes) for one, axes in zip([*at[1:], tool0], used, strict=True)]
+        if names[1:] != ["RZ", "RY", "RY", "RY", "RZ", "RY"] or np.concatenate(rest).any():
+            raise ValueError(f"{self.model.name} must have the joints of the UR family")
+        return kinematics.LinkLengths(
+            base_height=float(at[1][2]),
+            shoulder_offset=float(at[2][1]),
+            elbow_offset=float(at[3][1]),
+            upper_arm=float(at[3][2]),
+            forearm=float(at[4][2]),
+            wrist_1_offset=float(at[5][1]),
+            wrist_2_length=float(at[6][2]),
+            flange=float(tool0[1]),
+            tool=float(self.tool_length),
+        )
+
     def link_poses(self, q: Vec) -> Vec:
         """Return T_world_link of base and six links, shape (7, 4, 4)."""
         pin.framesForwardKinematics(self.model, self.data, q)
@@ -90,18 +116,19 @@ class Robot:
         )
 
     def ik_vertical(self, position: Vec, q_min: Vec, q_max: Vec) -> Vec | None:
-        """Return the posture with the tool pointing down at ``position``.
+        """Return the configuration with the tool pointing down at ``position``.
 
         Args:
-            position: Where the tcp shall be [m], shape (3,).
+            position: Position of the tcp [m], shape (3,).
             q_min: Lower joint limits [rad], shape (6,).
             q_max: Upper joint limits [rad], shape (6,).
 
         Returns:
-            Joint positions [rad], shape (6,); None where no such posture exists.
+            Joint positions [rad], shape (6,); None where no such configuration exists.
         """
-        q = np.empty(6)
-        # Copies: for a read-only array the kernel would be compiled anew.
+        q, unlimited = np.empty(6), np.full(6, np.inf)
+        # Copies: kernels are compiled again for read-only arrays.
         target, low, high = (np.array(x, dtype=np.float64) for x in (position, q_min, q_max))
-        reached = kinematics.ik_vertical(target, self.tool_length, low, high, q)
+        limits = JointLimits(low, high, unlimited, unlimited, unlimited)
+        reached = kinematics.ik_vertical(self.lengths(), limits, target, q)
         return q if reached else None

@@ -1,9 +1,9 @@
-"""Trials of the safety layer: many episodes of people who run at a robot that does as it likes.
+"""Falsification trials of the safety layer: many episodes with adversarial people.
 
-``safety/kernels/adversarial_trials.py`` says who runs how, and why nobody is faster than a
-trial allows.
-Inside the layer's assumptions no contact may find a link in motion; outside them the rate is
-measured.
+The robot follows arbitrary policies; people run at it, never faster than a trial allows
+(``safety/kernels/adversarial_trials.py``). Inside the layer's assumptions no contact may find
+a link in
+motion; outside them the rate of such contacts is measured.
 """
 
 from dataclasses import dataclass, field
@@ -42,29 +42,29 @@ MODES = ("script", "straight", "zig-zag", "tease")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrialSettings:
-    """One trial: what is assumed, and what is true."""
+    """One trial: assumptions of the layer and true conditions."""
 
     safety: SafetySettings
-    """What the layer assumes."""
+    """Assumptions of the layer."""
     cell: str = "pick-and-place"
     """Name of a shipped cell."""
     people: tuple[HumanKind, ...] = ("worker",)
-    """Who is in it."""
+    """People in it."""
     human_speed: float = 1.6
     """Greatest true speed of any point of the people [m/s]."""
     true_delay: float = 0.0
-    """How late people are truly seen [s]; rounded up to periods."""
+    """True delay of observations of people [s]; rounded up to periods."""
     seconds: float = 4.0
     """Longest episode [s]."""
-    guarded: bool = True
-    """Whether the layer acts."""
+    monitored: bool = True
+    """Whether the safety layer acts."""
     action: ActionSettings = field(default_factory=ActionSettings)
-    """What the policies' actions mean."""
+    """Interpretation of the policies' actions."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrialResult:
-    """What happened; sums and rows of episodes."""
+    """Results of a trial; sums and rows of episodes."""
 
     rows: Vec
     """One row per episode; see ``safety/kernels/adversarial_trials.py``."""
@@ -112,7 +112,7 @@ class TrialResult:
         return float(self.rows[:, SLOWED].sum() / self.rows[:, STEPS].sum())
 
     def of(self, policy: str | None = None, mode: str | None = None) -> "TrialResult":
-        """Return the episodes of one policy, or of people who do one thing."""
+        """Return the episodes of one policy, or of one behaviour of people."""
         kept = np.ones(self.n, dtype=bool)
         if policy is not None:
             kept &= self.rows[:, POLICY] == POLICIES.index(policy)
@@ -131,7 +131,7 @@ def run_trial(
     """Run a trial's episodes.
 
     Args:
-        settings: What is assumed and what is true.
+        settings: Assumptions and true conditions.
         n_episodes: Number of episodes.
         seed: Seed; episode ``k`` is fixed by (seed, k).
         first: Number of the first episode.
@@ -149,17 +149,16 @@ def run_trial(
     crowd = new_crowd(people, len(cell.workers), len(cell.cylinders))
     n_late = ceil(settings.true_delay / arm.dt - 1e-9)
     shape = (people.columns.shape[1], len(cell.cylinders))
-    watches = (watch.new_ssm_workspace(arm, *shape), watch.new_ssm_workspace(arm, *shape))
-    work = new_trial_work(arm, people, state, crowd, watches, n_late)
+    spaces = (watch.new_ssm_workspace(arm, *shape), watch.new_ssm_workspace(arm, *shape))
+    work = new_trial_work(arm, people, state, crowd, spaces, n_late)
     rows = np.zeros((n_episodes, N_RESULT))
     trial = Trial(
         human_speed=settings.human_speed,
         n_late=n_late,
         n_steps=round(settings.seconds / arm.dt),
-        guarded=settings.guarded,
+        monitored=settings.monitored,
+        rule=separation_rule(settings.safety, *shape, known=False),
+        action=settings.action.rule(),
     )
-    safety = separation_rule(settings.safety, *shape, known=False)
-    safety_trial.run_episodes(
-        arm, people, safety, trial, settings.action.rule(), seed, first, work, rows
-    )
+    safety_trial.run_episodes(arm, people, trial, seed, first, work, rows)
     return TrialResult(rows=rows, dt=arm.dt)

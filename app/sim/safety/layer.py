@@ -1,19 +1,19 @@
-"""Speed and separation monitoring, and power and force limiting, over any policy or planner.
+"""Speed and separation monitoring, and power and force limiting, for any policy or planner.
 
-A :class:`SafetyLayer` is asked once per control period: robot's state, commanded piece, people
-as last seen. It answers with an override and the motion to execute, and says what set it. The
-rule and the proof that it holds are in ``safety/kernels/ssm.py``; the contact speeds of power
-and
-force limiting in ``contact_limits.py``. Not a certified safety function.
+A :class:`SafetyLayer` decides once per control period from the robot's state, the commanded
+trajectory and the people as last observed. It returns an override, the motion to execute and
+the cause. The rule and the proof that it holds are in ``safety/kernels/ssm.py``; the contact
+speeds of
+power and force limiting in ``contact_limits.py``. Not a certified safety function.
 
-The layer keeps position, speed and acceleration limits; where it slows, it does not keep a jerk
-limit. From a measured state outside its limits, or one whose straight stop leaves them, it
-admits what leaves them no farther than that stop (``measured_state.py``). It watches people
-only: that a stop meets table or robot is the policy's affair, and a straight stop leaves a
-curved path. State and motion are those commanded; what a drive does on top of that belongs into
+The layer keeps position, speed and acceleration limits; scaled motions may exceed jerk limits.
+From a measured state outside its limits, or one whose straight stop leaves them, it admits
+motions that leave them no farther than that stop (``measured_state.py``). It monitors people
+only: a stop leaves a curved path straight on, and keeping it clear of table and robot is the
+task of the policy. State and motion are the commanded ones; deviations of the drives belong to
 the uncertainty ``Z_r`` and the reaction time.
 
-Source: METHOD 2.7; ISO/TS 15066:2016.
+Source: docs/method.md 2.7; ISO/TS 15066:2016.
 """
 
 from dataclasses import dataclass, fields
@@ -29,11 +29,14 @@ from app.sim.geometry.cylinder import cylinder_clearance, swept_clearance
 from app.sim.human.kernels import kinematics as body
 from app.sim.robot.kernels import override
 from app.sim.robot.kernels.arm import Arm
+from app.sim.robot.kernels.joints import JointPath
 from app.sim.robot.measured_state import admitting
 from app.sim.robot.ur10 import LINK_NAMES
 from app.sim.safety import contact_limits
+from app.sim.safety.decision import SafetyDecision, SeparationTerms
 from app.sim.safety.kernels import separation_check as watch_kernel
 from app.sim.safety.kernels import ssm
+from app.sim.safety.kernels.separation_check import PeopleShapes
 from app.sim.scene.scene import own, require_finite
 
 UNITS = {
@@ -55,7 +58,7 @@ UNITS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SafetySettings:
-    """What the safety layer assumes; every result prints it.
+    """Assumptions of the safety layer; every result states them.
 
     Raises:
         InvalidInput: A number is negative, infinite or NaN.
@@ -64,13 +67,13 @@ class SafetySettings:
     human_speed: float = 1.6
     """Greatest speed of any point of a person, v_h [m/s]."""
     measured: bool = False
-    """Whether a cylinder whose velocity is known is taken to go on at it, instead of at v_h."""
+    """Whether a cylinder of known velocity is extrapolated with it, instead of with v_h."""
     speed_change: float = 0.1
-    """How much faster such a person may be than was seen, in any direction [m/s]."""
+    """Assumed excess over that velocity, in any direction [m/s]."""
     reaction_time: float = 0.1
-    """From a decision to its effect [s]; a part of T_r."""
+    """Time from a decision to its effect [s]; a part of T_r."""
     tracker_delay: float = 0.0
-    """Age of what the tracker says when it says it [s]; a part of T_r."""
+    """Age of the tracker's data on arrival [s]; a part of T_r."""
     intrusion_distance: float = 0.0
     """Intrusion distance, C [m]."""
     person_uncertainty: float = 0.0
@@ -78,11 +81,11 @@ class SafetySettings:
     robot_uncertainty: float = 0.0
     """Uncertainty of the robot's position, Z_r [m]."""
     protective_distance: float = 0.3
-    """Least distance to anyone while the robot moves, on top of the rule [m]."""
+    """Least distance to people while the robot moves, added to the rule [m]."""
     pfl: bool = False
-    """Whether people may be touched, as slowly as their parts allow."""
+    """Whether power and force limiting permits contacts at admissible speeds."""
     load: float = 0.0
-    """What the robot carries, m_L [kg]; read by power and force limiting."""
+    """Payload of the robot, m_L [kg]; read by power and force limiting."""
     moving_mass: float = contact_limits.UR10_MOVING_MASS
     """Mass of the robot's moving parts, M [kg]; read by power and force limiting."""
     contact_area: float = 1.0
@@ -99,12 +102,12 @@ class SafetySettings:
 
     @property
     def other_speed(self) -> float:
-        """Speed in any direction, of a cylinder beyond what is seen where that counts [m/s]."""
+        """Assumed speed in any direction; of a cylinder beyond its velocity, if used [m/s]."""
         return self.speed_change if self.measured else self.human_speed
 
     @property
-    def lead(self) -> float:
-        """How much older than the robot's state people are at least [s]."""
+    def latency(self) -> float:
+        """Least age of people relative to the robot's state [s]."""
         return self.reaction_time + self.tracker_delay
 
     @property
@@ -119,7 +122,7 @@ class SafetySettings:
         return 0.5 * self.moving_mass + self.load
 
     def describe(self) -> dict[str, float | bool]:
-        """Return every assumption by name and unit, as results print it."""
+        """Return every assumption by name and unit, as stated in results."""
         return {
             f"{field.name} [{UNITS[field.name]}]" if UNITS[field.name] else field.name: getattr(
                 self, field.name
@@ -129,127 +132,8 @@ class SafetySettings:
 
 
 def safety_settings(cell: Cell) -> SafetySettings:
-    """Return what a cell says about safety."""
+    """Return the safety settings of a cell."""
     return SafetySettings(**cell.safety.model_dump())
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SafetyDecision:
-    """What is executed in one period, and why.
-
-    The motion is ``q(s) = q + qd s + c s^2 + d s^3`` at ``s(t) = t - drop t^2/2``, up to rest.
-    """
-
-    override: float
-    """Rate at the end of the period, of the commanded 1; 0: the straight stop."""
-    c: Vec
-    """Second coefficients of the path [rad/s^2], shape (6,)."""
-    d: Vec
-    """Third coefficients of the path [rad/s^3], shape (6,)."""
-    drop: float
-    """What the rate loses per second [1/s]."""
-    q: Vec
-    """Joint positions after the period [rad], shape (6,)."""
-    qd: Vec
-    """Joint speeds after the period [rad/s], shape (6,)."""
-    qdd: Vec
-    """Joint accelerations at its end [rad/s^2], shape (6,)."""
-    person: int | None
-    """Who set it: workers first, then cylinders; None where nobody did."""
-    part: int | None
-    """Which of the worker's capsules; None for a cylinder."""
-    link: str | None
-    """The link nearest to that part now."""
-    separation: float | None
-    """Their distance as seen [m]."""
-    required: float | None
-    """S_p of the standard for that link at its speed now [m]."""
-    lacking: float
-    """By how much people could have come too near on the path that was refused [m]."""
-    stop_time: float
-    """How long a stop takes from now, T_s [s]."""
-    stop_distance: float
-    """Bound on how far any point of the robot goes in it, B [m]."""
-
-    def at(self, q: Vec, qd: Vec, t: float) -> tuple[Vec, Vec]:
-        """Return joints [rad] and speeds [rad/s], shape (6,), ``t`` seconds into the period.
-
-        Args:
-            q: Joint positions at its start [rad], shape (6,).
-            qd: Joint speeds at its start [rad/s], shape (6,).
-            t: Time since its start [s].
-        """
-        there, speeds = np.empty(6), np.empty(6)
-        override.motion_at(own(q), own(qd), self.c, self.d, self.drop, t, there, speeds)
-        return there, speeds
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SeparationTerms:
-    """S_p of the standard for one person and one link, term by term (METHOD 2.7).
-
-    ``S_p = v_h (T_r + T_s) + v_r T_r + B + C + Z_d + Z_r`` and the protective distance.
-    """
-
-    link: str
-    """The link."""
-    separation: float
-    """Distance as seen [m]."""
-    human_speed: float
-    """v_h [m/s]."""
-    robot_speed: float
-    """v_r, the link as fast as its joints could make it [m/s]."""
-    reaction_time: float
-    """T_r, with the control period, the tracker's delay and the data's age [s]."""
-    stop_time: float
-    """T_s [s]."""
-    braking: float
-    """B, the way of the link in the stop [m]."""
-    intrusion: float
-    """C [m]."""
-    person_uncertainty: float
-    """Z_d [m]."""
-    robot_uncertainty: float
-    """Z_r [m]."""
-    protective_distance: float
-    """Least distance to anyone, on top [m]."""
-
-    @property
-    def required(self) -> float:
-        """S_p and the protective distance [m]."""
-        way = self.human_speed * (self.reaction_time + self.stop_time)
-        way += self.robot_speed * self.reaction_time + self.braking + self.intrusion
-        uncertain = self.person_uncertainty + self.robot_uncertainty
-        return way + uncertain + self.protective_distance
-
-
-def powers_of_time(q: Vec, qd: Vec, c: Vec, d: Vec, drop: float) -> Vec:
-    """Return a scaled motion as polynomials in time, ascending, shape (6, 7).
-
-    ``q + qd s + c s^2 + d s^3`` at ``s = t - drop t^2/2``, written out in powers of ``t``: the
-    seven coefficients of each joint, from ``t^0`` to ``t^6``. They hold until the motion rests
-    at ``t = 1/drop``.
-
-    Args:
-        q: Joint positions at the start [rad], shape (6,).
-        qd: Joint speeds at the start [rad/s], shape (6,).
-        c: Second coefficients of the path [rad/s^2], shape (6,).
-        d: Third coefficients of the path [rad/s^3], shape (6,).
-        drop: What the rate loses per second [1/s].
-    """
-    k = drop
-    return np.stack(
-        [
-            q,
-            qd,
-            c - 0.5 * k * qd,
-            d - k * c,
-            0.25 * k**2 * c - 1.5 * k * d,
-            0.75 * k**2 * d,
-            -0.125 * k**3 * d,
-        ],
-        axis=1,
-    )
 
 
 def contact_speeds(settings: SafetySettings, n_columns: int, n_cylinders: int) -> Vec:
@@ -275,28 +159,28 @@ def contact_speeds(settings: SafetySettings, n_columns: int, n_cylinders: int) -
 
 def separation_rule(
     settings: SafetySettings, n_columns: int, n_cylinders: int, known: bool
-) -> watch_kernel.Safety:
-    """Return the settings as the kernels read them.
+) -> watch_kernel.SeparationRule:
+    """Return the settings for the kernels.
 
     Args:
         settings: Assumptions.
-        n_columns: Capsules; see :func:`contact_speeds`.
-        n_cylinders: Cylinders.
-        known: Whether the kernels are told how cylinders go on.
+        n_columns: Number of capsules; see :func:`contact_speeds`.
+        n_cylinders: Number of cylinders.
+        known: Whether the velocities of cylinders are known.
     """
     speed = np.full(n_columns + n_cylinders, settings.human_speed)
     if known:
         speed[n_columns:] = settings.speed_change
-    return watch_kernel.Safety(
+    return watch_kernel.SeparationRule(
         speed=speed,
-        lead=settings.lead,
+        latency=settings.latency,
         margin=settings.margin,
         contact_speed=contact_speeds(settings, n_columns, n_cylinders),
     )
 
 
 class SafetyLayer:
-    """Scales the motion of one robot; not thread-safe.
+    """Safety layer of one robot; not thread-safe.
 
     Args:
         arm: From :func:`~app.sim.scene.scene.arm_of`.
@@ -311,15 +195,15 @@ class SafetyLayer:
     def decide(
         self, q: Vec, qd: Vec, c: Vec, d: Vec, people: Shapes, age: float = 0.0
     ) -> SafetyDecision:
-        """Decide how the piece of one period is executed.
+        """Decide how the trajectory of one period is executed.
 
         Args:
             q: Joint positions [rad], shape (6,).
             qd: Joint speeds [rad/s], shape (6,).
             c: Commanded second coefficients [rad/s^2], shape (6,).
             d: Commanded third coefficients [rad/s^3], shape (6,).
-            people: As last seen; every twelve capsules are a worker.
-            age: How old they are beyond the tracker's delay [s].
+            people: People as last observed; every twelve capsules are a worker.
+            age: Their age beyond the tracker's delay [s].
 
         Raises:
             SimulationError: A number is NaN or infinite.
@@ -330,60 +214,59 @@ class SafetyLayer:
         require_finite("people", people.cylinders.ravel())
         if age < 0.0:
             raise InvalidInput("age", age, "must not be negative")
-        q, qd = own(q), own(qd)
-        self._take_in(people)
-        chosen = ssm.decide(
-            admitting(self.arm, q, qd), self._rule, age, own(people.columns),
-            own(people.cylinders), q, qd, own(c), own(d), self._watch,
-        )  # fmt: skip
-        return self._told(chosen, q, qd, people, age)
+        path = JointPath(own(q), own(qd), own(c), own(d))
+        self._load_people(people)
+        shapes = PeopleShapes(own(people.columns), own(people.cylinders))
+        arm = admitting(self.arm, path.q, path.qd)
+        chosen = ssm.decide(arm, self._rule, age, shapes, path, self._space)
+        return self._decision(chosen, path.qd, people, age)
 
-    def _take_in(self, people: Shapes) -> None:
-        """Make work space for so many people, and note how cylinders go on."""
+    def _load_people(self, people: Shapes) -> None:
+        """Allocate work space for the people and load the velocities of cylinders."""
         shape = (people.columns.shape[1], len(people.cylinders))
         going = people.going if self.settings.measured else None
         known = going is not None
         if (shape, known) != (self._shape, self._known):
             self._shape, self._known = shape, known
-            self._watch = watch_kernel.new_ssm_workspace(self.arm, *shape)
+            self._space = watch_kernel.new_ssm_workspace(self.arm, *shape)
             self._rule = separation_rule(self.settings, *shape, known)
         if going is not None:
             unknown = np.asarray(np.isnan(going).any(axis=1))
             seen = np.where(unknown[:, None], 0.0, going)
             require_finite("people", seen)
-            self._watch.going[:] = seen
+            self._space.velocity[:] = seen
             fastest = np.hypot(seen[:, 0], seen[:, 1]) + np.abs(seen[:, 2])
-            self._watch.going_speed[shape[0] :] = fastest
+            self._space.known_speed[shape[0] :] = fastest
             settings = self.settings
             change = np.where(unknown, settings.human_speed, settings.speed_change)
             self._rule.speed[shape[0] :] = change
 
-    def _told(
-        self, chosen: float, q: Vec, qd: Vec, people: Shapes, age: float
-    ) -> SafetyDecision:
-        """Return the decision the work space holds, with what set it."""
-        watch, arm = self._watch, self.arm
+    def _decision(self, chosen: float, qd: Vec, people: Shapes, age: float) -> SafetyDecision:
+        """Return the decision in the work space, with its cause."""
+        space, arm = self._space, self.arm
         t_stop = override.stop_time(qd, arm.limits.qdd_max)
         person = part = link = separation = required = None
-        column = int(watch.why[watch_kernel.WHO])
+        column = int(space.cause[watch_kernel.CAUSE_PART])
         if chosen < 1.0 and column >= 0:
             terms = self._terms_of(column, qd, people, t_stop, age)
             link, separation, required = terms.link, terms.separation, terms.required
-            person, part = self._numbered(column)
+            person, part = self._person_of(column)
         return SafetyDecision(
             override=float(chosen),
-            c=watch.c.copy(),
-            d=watch.d.copy(),
-            drop=float(watch.drop[0]),
-            q=watch.q.copy(),
-            qd=watch.qd.copy(),
-            qdd=watch.qdd.copy(),
+            c=space.c.copy(),
+            d=space.d.copy(),
+            path_deceleration=float(space.deceleration[0]),
+            q=space.end.q.copy(),
+            qd=space.end.qd.copy(),
+            qdd=space.end.qdd.copy(),
             person=person,
             part=part,
             link=link,
             separation=separation,
             required=required,
-            lacking=max(0.0, float(watch.why[watch_kernel.SLACK])) if chosen < 1.0 else 0.0,
+            lacking=max(0.0, float(space.cause[watch_kernel.CAUSE_SHORTFALL]))
+            if chosen < 1.0
+            else 0.0,
             stop_time=t_stop,
             stop_distance=float(0.5 * t_stop * (np.abs(qd) @ arm.lever)),
         )
@@ -391,28 +274,27 @@ class SafetyLayer:
     def terms(
         self, decision: SafetyDecision, qd: Vec, people: Shapes, age: float = 0.0
     ) -> tuple[int, SeparationTerms] | None:
-        """Return whom S_p is told for, and its terms, right after :meth:`decide`.
+        """Return the person to which S_p refers, and its terms, right after :meth:`decide`.
 
-        It is told for who set the override, or for the nearest where nobody did; None where
-        nobody is there.
+        The person is the cause of the override, else the nearest one; None without people.
 
         Args:
-            decision: What was decided last.
-            qd: Joint speeds then [rad/s], shape (6,).
-            people: As seen then.
-            age: How old they were beyond the tracker's delay [s].
+            decision: Last decision.
+            qd: Joint speeds of that decision [rad/s], shape (6,).
+            people: People of that decision.
+            age: Their age beyond the tracker's delay [s].
         """
-        gap = self._watch.gap[watch_kernel.NOW]
+        gap = self._space.gap[watch_kernel.NOW]
         if not gap.size:
             return None
-        column = int(self._watch.why[watch_kernel.WHO])
+        column = int(self._space.cause[watch_kernel.CAUSE_PART])
         if decision.person is None:
             column = int(np.argmin(gap))
         terms = self._terms_of(column, qd, people, decision.stop_time, age)
-        return self._numbered(column)[0], terms
+        return self._person_of(column)[0], terms
 
-    def _numbered(self, column: int) -> tuple[int, int | None]:
-        """Return a column's person, workers first, and the part; no part for a cylinder."""
+    def _person_of(self, column: int) -> tuple[int, int | None]:
+        """Return the person of a column, workers first, and its part; None for a cylinder."""
         n_columns = self._shape[0]
         if column >= n_columns:
             return n_columns // body.N_CAPSULES + column - n_columns, None
@@ -426,7 +308,7 @@ class SafetyLayer:
         separation, nearest = self._nearest(column, people)
         joints = slice(0, int(arm.link[nearest]))
         v_r = float(np.abs(qd[joints]) @ arm.lever[joints])
-        t_r = arm.dt + settings.lead + age
+        t_r = arm.dt + settings.latency + age
         return SeparationTerms(
             link=LINK_NAMES[arm.link[nearest]],
             separation=separation,
@@ -442,11 +324,11 @@ class SafetyLayer:
         )
 
     def _nearest(self, column: int, people: Shapes) -> tuple[float, int]:
-        """Return how near a part of the people is as seen [m], and which capsule to."""
-        robot, out = self._watch.columns[watch_kernel.NOW], np.empty(self.arm.columns.shape[1])
+        """Return the observed distance of a part of the people [m], and the nearest capsule."""
+        robot, out = self._space.columns[watch_kernel.NOW], np.empty(self.arm.columns.shape[1])
         if column < people.columns.shape[1]:
             distances(own(people.columns), column, robot, out)
-            return float(self._watch.gap[watch_kernel.NOW, column]), int(least(out)[1])
+            return float(self._space.gap[watch_kernel.NOW, column]), int(least(out)[1])
         x, y, r, top = people.cylinders[column - people.columns.shape[1]]
         separation, nearest = cylinder_clearance(robot, 0, x, y, r, top)
         return float(separation), int(nearest)
@@ -454,18 +336,18 @@ class SafetyLayer:
     def _human_speed(
         self, column: int, people: Shapes, separation: float, seconds: float
     ) -> float:
-        """Return v_h of a part of the people: assumed, or toward the robot as seen [m/s].
+        """Return v_h of a part of the people: assumed, or by its observed velocity [m/s].
 
         Args:
-            column: The part.
-            people: As seen.
-            separation: Its distance to the robot [m].
-            seconds: Time in which it is looked at how much nearer it comes [s].
+            column: Part of the people.
+            people: People as observed.
+            separation: Distance of the part to the robot [m].
+            seconds: Time over which the speed of approach is averaged [s].
         """
         k = column - self._shape[0]
         if k < 0 or not self._known or people.going is None or np.isnan(people.going[k]).any():
             return self.settings.human_speed
-        robot, (x, y, r, _) = self._watch.columns[watch_kernel.NOW], people.cylinders[k]
+        robot, (x, y, r, _) = self._space.columns[watch_kernel.NOW], people.cylinders[k]
         vx, vy, growth = people.going[k]
         grown = r + max(0.0, growth) * seconds
         there = swept_clearance(robot, x, y, vx * seconds, vy * seconds, grown)

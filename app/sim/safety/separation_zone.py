@@ -29,7 +29,7 @@ def required_distances(arm: Arm, settings: SafetySettings, qd: Vec) -> Vec:
         qd: Joint speeds [rad/s], shape (6,).
     """
     t_stop = float(override.stop_time(own(qd), arm.limits.qdd_max))
-    t_r = arm.dt + settings.lead
+    t_r = arm.dt + settings.latency
     fastest = np.concatenate([[0.0], np.cumsum(np.abs(qd) * arm.lever)])
     v_r = fastest[arm.link]
     way = v_r * (t_r + 0.5 * t_stop)

@@ -34,6 +34,7 @@ from app.sim.primitives.kernels.primitives import new_legs, no_repertoire
 from app.sim.robot.capsules import levers, load_robot_capsules, self_pairs
 from app.sim.robot.kernels.arm import Arm
 from app.sim.robot.kernels.joints import JointLimits
+from app.sim.robot.ur10 import Robot
 
 HumanKind = Literal["worker", "walker", "constant", "fixed-speed"]
 HUMAN_KINDS: tuple[HumanKind, ...] = ("worker", "walker", "constant", "fixed-speed")
@@ -154,7 +155,7 @@ def arm_of(cell: Cell) -> Arm:
         ),
         home=np.array(mount.home_q),
         dt=mount.dt,
-        tool_length=mount.tool_length,
+        lengths=Robot(mount.tool_length).lengths(),
         link=own_index(capsules.link),
         p0=own(capsules.p0),
         span=own(span),

@@ -88,7 +88,7 @@ def test_sets_give_the_least_of_all_pairs_each_way() -> None:
         expected = expected - radius_a[:, None] - radius_b
         one, two = capsules_soa(a, radius_a), capsules_soa(b, radius_b)
         out, part = np.empty(m), np.empty(m)
-        columns.gaps(one, two, out)
+        columns.capsule_clearances(one, two, out)
         np.testing.assert_allclose(out, expected.min(axis=0), atol=1e-12)
         columns.nearest_parts(two, one, 0, n - 1, out, part)
         np.testing.assert_allclose(out, expected.min(axis=0), atol=1e-12)
@@ -109,9 +109,9 @@ def test_pairs_of_one_set_are_measured_one_by_one() -> None:
 def test_columns_that_fill_up_a_set_are_nowhere_near() -> None:
     rng = np.random.default_rng(45)
     one = capsules_soa(rng.uniform(-1, 1, (3, 2, 3)), np.full(3, 0.1))
-    two = capsules_soa(rng.uniform(-1, 1, (3, 2, 3)), np.full(3, 0.1), columns.padded(3))
+    two = capsules_soa(rng.uniform(-1, 1, (3, 2, 3)), np.full(3, 0.1), columns.padded_size(3))
     out = np.empty(8)
-    columns.gaps(one, two, out)
+    columns.capsule_clearances(one, two, out)
     assert (out[:3] < 5.0).all() and (out[3:] > 900.0).all()
 
 

@@ -14,6 +14,7 @@ from app.sim.pick.batch import OUTCOMES, PickBatch, PickSettings
 from app.sim.pick.kernels import observation as features
 from app.sim.pick.kernels.observation import LAYOUT
 from app.sim.robot.kernels import actions
+from app.sim.robot.kernels.joints import JointPath
 from app.sim.scene.scene import arm_of, people_of
 
 TEN_SECONDS = PickSettings(time_limit_s=10.0)
@@ -141,10 +142,7 @@ def test_single_state_functions_do_what_the_batch_does(cell: Cell) -> None:
             hit = contact(
                 batch.arm,
                 people,
-                q[e],
-                qd[e],
-                piece.c,
-                piece.d,
+                JointPath(q[e], qd[e], piece.c, piece.d),
                 (person[e], state.people.q[e]),
                 sizes=state.people.size[e],
             )
@@ -163,7 +161,7 @@ def test_person_at_the_tool_is_a_contact_with_both_names(cell: Cell) -> None:
     q = PickBatch(cell, 1, 0, TEN_SECONDS).world.station_q[3]
     grip = np.array(cell.stations[3].position) + [0.0, 0.04, 0.06]
     person = human.reach("r", grip, rest, cell.body).q[None]
-    found = contact(arm, people, q, zero, zero, zero, (person, person))
+    found = contact(arm, people, JointPath(q, zero, zero, zero), (person, person))
     assert found.kind == "human"
     assert found.part in ("hand_r", "forearm_r")
 
@@ -174,7 +172,7 @@ def test_numbers_that_are_not_finite_are_errors_not_silence(cell: Cell, value: f
     person = human.rest_posture(*cell.human.home)[None]
     person[0, 3] = value
     with pytest.raises(SimulationError, match="finite"):
-        contact(arm, people, arm.home, zero, zero, zero, (person, person))
+        contact(arm, people, JointPath(arm.home, zero, zero, zero), (person, person))
     with pytest.raises(SimulationError, match="finite"):
         pick.step_robot(arm, arm.home, zero, zero, np.full(5, value))
     with pytest.raises(SimulationError, match="finite"):
@@ -201,7 +199,7 @@ def test_read_only_integer_and_strided_inputs_compile_nothing_anew(cell: Cell) -
 
     def use() -> None:
         pick.step_robot(arm, q, zero, zero, zero[:5])
-        contact(arm, people, q, zero, zero, zero, (person[None], person[None]))
+        contact(arm, people, JointPath(q, zero, zero, zero), (person[None], person[None]))
         pick.observe(arm, people, q, zero, person, np.zeros(18), goals[::2], 10)
         pick.tool_state(arm, q, zero, goals[0])
         human.capsules(person, cell.body, cell.floor_z)

@@ -13,7 +13,7 @@ TARGET = np.array(CELL.station("cube2").position)
 
 
 def test_postures_reach_the_target_inside_the_limits_and_differ() -> None:
-    robot = Robot(ARM.tool_length)
+    robot = Robot(ARM.lengths.tool)
     postures = goal_postures(ARM, TARGET, np.random.default_rng(0))
     assert len(postures) >= 4
     assert np.all((postures >= ARM.limits.q_min) & (postures <= ARM.limits.q_max))
@@ -23,7 +23,7 @@ def test_postures_reach_the_target_inside_the_limits_and_differ() -> None:
 
 
 def test_a_spread_stays_within_its_radius_and_is_used() -> None:
-    robot = Robot(ARM.tool_length)
+    robot = Robot(ARM.lengths.tool)
     postures = goal_postures(ARM, TARGET, np.random.default_rng(0), spread=0.05)
     misses = [np.linalg.norm(robot.tcp_pose(q)[:3, 3] - TARGET) for q in postures]
     assert max(misses) <= 0.0502
@@ -31,7 +31,7 @@ def test_a_spread_stays_within_its_radius_and_is_used() -> None:
 
 
 def test_a_bound_on_the_tilt_holds() -> None:
-    robot = Robot(ARM.tool_length)
+    robot = Robot(ARM.lengths.tool)
     rng = np.random.default_rng(0)
     postures = goal_postures(ARM, TARGET, rng, n_starts=60, tilt_max=0.8)
     assert len(postures) >= 1
@@ -46,4 +46,4 @@ def test_out_of_reach_gives_no_posture() -> None:
 
 def test_the_vertical_posture_points_down() -> None:
     (q,) = vertical_posture(ARM, TARGET)
-    assert Robot(ARM.tool_length).tcp_pose(q)[2, 2] < -1.0 + 1e-9
+    assert Robot(ARM.lengths.tool).tcp_pose(q)[2, 2] < -1.0 + 1e-9

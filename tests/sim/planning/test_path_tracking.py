@@ -9,6 +9,7 @@ from app.sim.core.arrays import Vec
 from app.sim.planning.path_tracking import Tracker, straight_stop
 from app.sim.planning.time_parameterization import Limits, time_path
 from app.sim.robot.kernels import acceleration_bounds as polynomial
+from app.sim.robot.kernels.joints import JointState
 from app.sim.scene.scene import arm_of
 
 ARM = arm_of(load_cell())
@@ -17,21 +18,10 @@ LIMITS = Limits(qd_max=ARM.limits.qd_max, qdd_max=ARM.limits.qdd_max, dt=ARM.dt)
 
 def move(q: Vec, qd: Vec, wanted: Vec) -> tuple[Vec, Vec, Vec]:
     """One period of the bounded actions: coefficients, positions, speeds."""
-    c, q_out, qd_out = np.empty(6), np.empty(6), np.empty(6)
-    polynomial.advance(
-        q,
-        qd,
-        wanted,
-        ARM.limits.q_min,
-        ARM.limits.q_max,
-        ARM.limits.qd_max,
-        ARM.limits.qdd_max,
-        ARM.dt,
-        c,
-        q_out,
-        qd_out,
-    )
-    return c, q_out, qd_out
+    c, end = np.empty(6), JointState(*np.empty((3, 6)))
+    start = JointState(q, qd, np.zeros(6))
+    polynomial.advance_to_speeds(ARM.limits, ARM.dt, start, wanted, c, end)
+    return c, end.q, end.qd
 
 
 def some_path(seed: int) -> Vec:

@@ -17,6 +17,7 @@ from app.sim.planning.goal_configurations import vertical_posture
 from app.sim.planning.ompl_planners import PLANNERS, PlanSettings
 from app.sim.planning.replanning import ROLES, ReplanningExecutor, ReplanningSettings
 from app.sim.robot.kernels import acceleration_bounds as polynomial
+from app.sim.robot.kernels.joints import JointState
 from app.sim.scene.scene import arm_of
 
 CELL = load_cell()
@@ -73,14 +74,10 @@ def drive(
         way.append(q)
         if states[-1] == "arrived":
             break
-        bounds = (
-            ARM.limits.q_min,
-            ARM.limits.q_max,
-            ARM.limits.qd_max,
-            ARM.limits.qdd_max,
-            ARM.dt,
+        start = JointState(q, qd, np.zeros(6))
+        polynomial.advance_to_speeds(
+            ARM.limits, ARM.dt, start, wanted, c, JointState(q_out, qd_out, np.empty(6))
         )
-        polynomial.advance(q, qd, wanted, *bounds, c, q_out, qd_out)
         assert np.all(np.abs(qd_out) <= ARM.limits.qd_max + 1e-9)
         assert np.all(np.abs(2.0 * c) <= ARM.limits.qdd_max + 1e-9)
         q, qd, t = q_out.copy(), qd_out.copy(), t + ARM.dt
@@ -96,13 +93,13 @@ def from_time(start_s: float, shapes: Shapes, end_s: float = 99.0) -> Callable[[
 def test_every_role_arrives_in_an_empty_cell_in_the_same_time(role: str) -> None:
     run = drive(role, lambda _: NOBODY)
     assert run.states[-1] == "arrived"
-    assert run.seconds == pytest.approx(drive("once", lambda _: NOBODY).seconds)
+    assert run.seconds == pytest.approx(drive("plan-once", lambda _: NOBODY).seconds)
     np.testing.assert_allclose(run.q, station("cube0"), atol=1e-3)
     assert run.follower.report.error_rad < 1e-9
 
 
 def test_once_plans_once_and_goes_through_whoever_comes() -> None:
-    run = drive("once", from_time(0.3, IN_THE_WAY))
+    run = drive("plan-once", from_time(0.3, IN_THE_WAY))
     assert run.states[-1] == "arrived"
     assert run.follower.report.n_plans == 1
     assert run.least_m < 0.0
@@ -159,7 +156,7 @@ def test_without_a_plan_the_robot_rests_and_says_why(role: str) -> None:
 
 
 def test_once_takes_the_way_round_people_who_stand_there_at_the_start() -> None:
-    run = drive("once", lambda _: IN_THE_WAY)
+    run = drive("plan-once", lambda _: IN_THE_WAY)
     assert run.states[-1] == "arrived"
     assert run.least_m > run.follower.settings.margin
 

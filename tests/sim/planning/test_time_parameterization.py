@@ -21,6 +21,7 @@ from app.sim.planning.time_parameterization import (
     time_path,
 )
 from app.sim.robot.kernels.acceleration_bounds import coefficient_interval
+from app.sim.robot.kernels.joints import AxisLimits
 from app.sim.robot.ur10 import Robot
 from app.sim.scene.scene import arm_of
 
@@ -120,15 +121,8 @@ def test_every_piece_lies_in_the_interval_of_the_bounded_actions() -> None:
         for k in range(timed.n_periods):
             c = (timed.qd[k + 1] - timed.qd[k]) / (2.0 * ARM.dt)
             for j in range(6):
-                c_min, c_max = coefficient_interval(
-                    timed.q[k, j],
-                    timed.qd[k, j],
-                    ARM.limits.q_min[j],
-                    ARM.limits.q_max[j],
-                    ARM.limits.qd_max[j],
-                    ARM.limits.qdd_max[j],
-                    ARM.dt,
-                )
+                axis = AxisLimits(*(limit[j] for limit in ARM.limits), ARM.dt)
+                c_min, c_max = coefficient_interval(timed.q[k, j], timed.qd[k, j], axis)
                 assert c_min - 1e-9 <= c[j] <= c_max + 1e-9
 
 
@@ -157,7 +151,7 @@ def corner_beside_a_ball() -> tuple[Checker, Vec]:
     path[2, 1] -= 0.5
     rounded = time_path(path, SLUGGISH).q
     sharp = np.vstack([np.linspace(a, b, 200) for a, b in itertools.pairwise(path)])
-    tcp = Robot(ARM.tool_length).tcp_pose(corner)[:3, 3]
+    tcp = Robot(ARM.lengths.tool).tcp_pose(corner)[:3, 3]
     rng = np.random.default_rng(0)
     for _ in range(100):
         way = rng.normal(size=3)

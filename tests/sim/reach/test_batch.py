@@ -38,10 +38,7 @@ def random_actions(n_steps: int, n_envs: int) -> np.ndarray:
 
 def straight(batch: ReachBatch) -> np.ndarray:
     """Joint moves toward a posture at the goal."""
-    mount = batch.cell.robot
-    posture, _ = ik_vertical_batch(
-        batch.state.goal, mount.tool_length, np.array(mount.q_min), np.array(mount.q_max)
-    )
+    posture, _ = ik_vertical_batch(batch.arm.lengths, batch.arm.limits, batch.state.goal)
     return np.clip(3.0 * (posture - batch.state.q), -1, 1).astype(np.float32)
 
 

@@ -92,7 +92,8 @@ def test_joints_outside_their_limits_are_sent_inward_and_others_as_asked() -> No
     act = np.linspace(-0.5, 0.5, 6)
     q = HOME.copy()
     q[0], q[2] = ARM.limits.q_min[0] - 0.01, ARM.limits.q_max[2] + 0.01
-    inward, low, high = returning(ARM, q, act)
+    inward, limits = returning(ARM, q, act)
+    low, high = limits.q_min, limits.q_max
     assert (inward[0], inward[2]) == (1.0, -1.0)
     np.testing.assert_array_equal(inward[[1, 3, 4, 5]], act[[1, 3, 4, 5]])
     assert low[0] < q[0] and high[2] > q[2]
@@ -103,12 +104,12 @@ def test_monitoring_admits_no_more_than_the_stop_of_the_measured_state() -> None
     assert admitting(ARM, HOME, NONE) is ARM
     q, qd = at(2, ARM.limits.q_max[2], HOME), at(2, 1.04)
     wider = admitting(ARM, q, qd)
-    assert wider.q_max[2] == pytest.approx(
+    assert wider.limits.q_max[2] == pytest.approx(
         ARM.limits.q_max[2] + 0.5 * 1.04**2 / ARM.limits.qdd_max[2]
     )
-    assert wider.qd_max[2] == 1.04
-    np.testing.assert_array_equal(wider.qdd_max, ARM.limits.qdd_max)
-    np.testing.assert_array_equal(wider.q_min, ARM.limits.q_min)
+    assert wider.limits.qd_max[2] == 1.04
+    np.testing.assert_array_equal(wider.limits.qdd_max, ARM.limits.qdd_max)
+    np.testing.assert_array_equal(wider.limits.q_min, ARM.limits.q_min)
 
 
 def test_what_monitoring_executes_from_outside_the_limits_keeps_every_person_clear() -> None:
@@ -129,11 +130,11 @@ def test_what_monitoring_executes_from_outside_the_limits_keeps_every_person_cle
         admitted += 1
         checker = Checker(ARM, people)
         for t in np.linspace(0.0, ARM.dt, 5):
-            reach = settings.human_speed * (settings.lead + t) + settings.margin
+            reach = settings.human_speed * (settings.latency + t) + settings.margin
             assert checker.clearance(safe.at(q, qd, t)[0]).people > reach - 1e-9
         stop_s = float((np.abs(safe.qd) / ARM.limits.qdd_max).max())
         for t in np.linspace(0.0, stop_s, 9):
             there = safe.q + safe.qd * (t - 0.5 * t * t / max(stop_s, 1e-9))
-            reach = settings.human_speed * (settings.lead + ARM.dt + t) + settings.margin
+            reach = settings.human_speed * (settings.latency + ARM.dt + t) + settings.margin
             assert checker.clearance(there).people > reach - 1e-9
     assert 20 < admitted < 110

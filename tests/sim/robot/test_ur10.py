@@ -21,8 +21,8 @@ def postures(n: int) -> np.ndarray:
 def test_kernel_link_poses_equal_pinocchios_to_a_nanometre(robot: Robot) -> None:
     rot, pos, tcp = np.empty((7, 3, 3)), np.empty((7, 3)), np.empty(3)
     for q in postures(500):
-        kinematics.link_poses(q, rot, pos)
-        kinematics.tcp_point(rot, pos, robot.tool_length, tcp)
+        kinematics.link_poses(robot.lengths(), q, rot, pos)
+        kinematics.tcp_point(robot.lengths(), rot, pos, tcp)
         expected = robot.link_poses(q)
         np.testing.assert_allclose(pos, expected[:, :3, 3], atol=1e-9)
         np.testing.assert_allclose(rot, expected[:, :3, :3], atol=1e-9)
@@ -37,8 +37,8 @@ def test_kernel_jacobian_equals_pinocchios(robot: Robot) -> None:
         np.empty((3, 6)),
     )
     for q in postures(200):
-        kinematics.link_poses(q, rot, pos)
-        kinematics.tcp_point(rot, pos, robot.tool_length, tcp)
+        kinematics.link_poses(robot.lengths(), q, rot, pos)
+        kinematics.tcp_point(robot.lengths(), rot, pos, tcp)
         kinematics.tcp_jacobian(rot, pos, tcp, jacobian)
         np.testing.assert_allclose(jacobian, robot.jacobian(q)[:3], atol=1e-9)
 

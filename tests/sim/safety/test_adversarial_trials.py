@@ -10,9 +10,9 @@ from app.sim.robot.actions import ActionSettings
 from app.sim.safety.adversarial_trials import MODES, POLICIES, TrialSettings, run_trial
 from app.sim.safety.layer import SafetySettings
 
-BARE = SafetySettings(reaction_time=0.0, protective_distance=0.0)
-WORKER = TrialSettings(safety=BARE)
-WALKER = TrialSettings(safety=BARE, cell="shared-workspace", people=("walker",))
+NO_MARGINS = SafetySettings(reaction_time=0.0, protective_distance=0.0)
+WORKER = TrialSettings(safety=NO_MARGINS)
+WALKER = TrialSettings(safety=NO_MARGINS, cell="shared-workspace", people=("walker",))
 PLACES = pytest.mark.parametrize("place", [WORKER, WALKER], ids=["worker", "walker"])
 
 
@@ -28,7 +28,7 @@ def test_inside_the_assumptions_nobody_meets_a_link_in_motion(place):
 
 @PLACES
 def test_a_delay_that_is_known_is_made_up_for(place):
-    known = replace(place, true_delay=0.1, safety=replace(BARE, tracker_delay=0.1))
+    known = replace(place, true_delay=0.1, safety=replace(NO_MARGINS, tracker_delay=0.1))
     assert run_trial(known, 500, seed=6).n_moving == 0
 
 
@@ -53,7 +53,7 @@ def test_jerk_limited_policies_are_stopped_in_time_too():
 
 @PLACES
 def test_power_and_force_limiting_keeps_contacts_slow_and_stops_less(place):
-    touched = run_trial(replace(place, safety=replace(BARE, pfl=True)), 500, seed=8)
+    touched = run_trial(replace(place, safety=replace(NO_MARGINS, pfl=True)), 500, seed=8)
     assert touched.n_moving == 0
     assert touched.fastest_link > 0.01
     assert touched.stopped_share < run_trial(place, 500, seed=8).stopped_share
@@ -67,7 +67,7 @@ def test_two_workers_and_a_walker_are_watched_together():
 
 
 def test_without_the_layer_the_same_people_are_hit():
-    free = run_trial(replace(WORKER, guarded=False), 100, seed=5)
+    free = run_trial(replace(WORKER, monitored=False), 100, seed=5)
     assert free.n_moving > 40
     assert free.stopped_share == 0.0
 

@@ -11,7 +11,8 @@ from app.sim.collision.checker import Checker, Shapes, capsule_shapes, no_people
 from app.sim.geometry.capsules import distances
 from app.sim.human.kernels import kinematics as body
 from app.sim.robot.ur10 import Robot
-from app.sim.safety.layer import SafetyLayer, SafetySettings, powers_of_time, safety_settings
+from app.sim.safety.decision import powers_of_time
+from app.sim.safety.layer import SafetyLayer, SafetySettings, safety_settings
 from app.sim.scene.scene import arm_of
 
 CELL = load_cell("pick-and-place")
@@ -19,12 +20,12 @@ ARM = arm_of(CELL)
 REST, NONE = np.array([1.0, -0.8, 0.4, 0.0, 0.0, 0.0]), np.zeros(6)  # stretched out
 PAN = np.array([0.5, 0.0, 0.0, 0.0, 0.0, 0.0])
 RADIUS = 0.05
-BARE = SafetySettings(reaction_time=0.0, protective_distance=0.0)
+NO_MARGINS = SafetySettings(reaction_time=0.0, protective_distance=0.0)
 
 
 def tool(q=REST):
     """Where the tool's tip is [m], and which way it goes when the base turns."""
-    tip = Robot(ARM.tool_length).tcp_pose(q)[:3, 3]
+    tip = Robot(ARM.lengths.tool).tcp_pose(q)[:3, 3]
     way = np.array([-tip[1], tip[0], 0.0])
     return tip, way / np.linalg.norm(way), np.hypot(tip[0], tip[1])
 
@@ -54,7 +55,7 @@ def least_full_distance(settings, qd, c, age=0.0):
         full = layer.decide(REST, qd, c, NONE, ahead(middle), age).override == 1.0
         low, high = (low, middle) if full else (middle, high)
     layer.decide(REST, qd, c, NONE, ahead(high), age)
-    return layer._watch.gap[0].min()
+    return layer._space.gap[0].min()
 
 
 def test_a_robot_at_rest_needs_what_a_person_covers_in_the_reaction():
@@ -210,7 +211,7 @@ def test_the_nearest_of_several_people_sets_the_override():
 
 
 def test_more_people_never_raise_the_override():
-    rng, layer = np.random.default_rng(7), SafetyLayer(ARM, BARE)
+    rng, layer = np.random.default_rng(7), SafetyLayer(ARM, NO_MARGINS)
     for _ in range(60):
         qd = rng.uniform(-0.5, 0.5, 6)
         one, two = (ball(rng.uniform([-1, 0, 0], [1, 1.5, 1])) for _ in range(2))
@@ -228,7 +229,7 @@ def test_a_decision_names_person_part_link_and_distances():
     assert decision.part is None
     assert decision.link in ("wrist_2_link", "wrist_3_link", "forearm_link", "wrist_1_link")
     robot = np.empty(ARM.columns.shape[1])
-    distances(ball(tip).columns, 0, layer._watch.columns[0], robot)
+    distances(ball(tip).columns, 0, layer._space.columns[0], robot)
     assert 0.0 < decision.separation < 0.4
     assert decision.required > 0.54
     assert decision.lacking > 0.0
@@ -238,7 +239,7 @@ def test_a_decision_names_person_part_link_and_distances():
 
 def test_power_and_force_limiting_lets_the_robot_go_on_slowly():
     """A hand in contact may be met at 1.347 m/s, a head at 0.129 m/s."""
-    settings = replace(BARE, pfl=True)
+    settings = replace(NO_MARGINS, pfl=True)
     tip, way, lever = tool()
     place = tip + (RADIUS + CELL.robot.tool_radius + 0.001) * way
     far = np.full((body.N_CAPSULES, 2, 3), 50.0)
@@ -259,7 +260,7 @@ def test_power_and_force_limiting_lets_the_robot_go_on_slowly():
 
 
 def test_without_power_and_force_limiting_nobody_may_be_met_at_all():
-    decision = SafetyLayer(ARM, BARE).decide(REST, 0.2 * PAN, NONE, NONE, ahead(0.001))
+    decision = SafetyLayer(ARM, NO_MARGINS).decide(REST, 0.2 * PAN, NONE, NONE, ahead(0.001))
     assert decision.override == 0.0
 
 
@@ -274,7 +275,7 @@ def test_the_motion_of_a_decision_starts_and_ends_as_it_says():
 
 def test_no_running_person_found_by_search_meets_a_robot_in_motion():
     """Random restarts of a person at v_h: straight at where the tool is or will be."""
-    rng, layer, ticks = np.random.default_rng(11), SafetyLayer(ARM, BARE), 5
+    rng, layer, ticks = np.random.default_rng(11), SafetyLayer(ARM, NO_MARGINS), 5
     nearest = np.inf
     for _ in range(120):
         q, qd, sign = REST.copy(), np.zeros(6), rng.choice([-1.0, 1.0], 6)
@@ -291,7 +292,7 @@ def test_no_running_person_found_by_search_meets_a_robot_in_motion():
             for part in np.linspace(0.0, 1.0, ticks):
                 pose, speed = decision.at(q, qd, part * ARM.dt)
                 layer.decide(pose, NONE, NONE, NONE, ball(person + part * step))
-                gap = layer._watch.gap[0].min()
+                gap = layer._space.gap[0].min()
                 if np.abs(speed).max() > 1e-6:
                     nearest = min(nearest, gap)
             q, qd, person = decision.q, decision.qd, person + step
@@ -316,7 +317,7 @@ def test_an_assumption_that_is_no_size_is_refused(value):
 
 def test_people_at_nan_are_refused():
     with pytest.raises(SimulationError, match="people"):
-        SafetyLayer(ARM, BARE).decide(REST, NONE, NONE, NONE, ball(np.full(3, np.nan)))
+        SafetyLayer(ARM, NO_MARGINS).decide(REST, NONE, NONE, NONE, ball(np.full(3, np.nan)))
 
 
 def test_terms_are_for_who_set_it_and_else_for_the_nearest():
@@ -326,7 +327,7 @@ def test_terms_are_for_who_set_it_and_else_for_the_nearest():
         decision = layer.decide(REST, PAN, NONE, NONE, people, 0.1)
         person, terms = layer.terms(decision, PAN, people, 0.1)
         assert (decision.override == 0.0) is stopped and person == 0
-        assert terms.separation == layer._watch.gap[0].min()
+        assert terms.separation == layer._space.gap[0].min()
         assert terms.reaction_time == pytest.approx(0.05 + 0.1 + 0.1)
         assert terms.braking == pytest.approx(0.5 * terms.robot_speed * terms.stop_time)
         if stopped:
@@ -339,12 +340,11 @@ def test_terms_are_for_who_set_it_and_else_for_the_nearest():
 def test_scaled_motion_written_out_in_time_is_the_motion():
     rng = np.random.default_rng(5)
     layer = SafetyLayer(ARM, SafetySettings())
-    for drop in (0.0, 3.0, 20.0):
+    for deceleration in (0.0, 3.0, 20.0):
         q, qd, c, d = rng.uniform(-1, 1, (4, 6))
-        decision = replace(
-            layer.decide(REST, NONE, NONE, NONE, no_people()), c=c, d=d, drop=drop
-        )
-        powers = powers_of_time(q, qd, c, d, drop)
+        decision = layer.decide(REST, NONE, NONE, NONE, no_people())
+        decision = replace(decision, c=c, d=d, path_deceleration=deceleration)
+        powers = powers_of_time(decision, q, qd)
         for t in (0.0, 0.01, 0.05):
             expected, speeds = decision.at(q, qd, t)
             series = t ** np.arange(7)

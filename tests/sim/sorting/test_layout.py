@@ -49,9 +49,7 @@ def test_tool_reaches_over_every_block_and_level(name: str) -> None:
     arm = arm_of(cell)
     for station in cell.stations:
         points = np.array([above(point) for point in station.points()])
-        _, reached = kinematics.ik_vertical_batch(
-            points, arm.tool_length, arm.limits.q_min, arm.limits.q_max
-        )
+        _, reached = kinematics.ik_vertical_batch(arm.lengths, arm.limits, points)
         assert reached.all(), station.id
 
 

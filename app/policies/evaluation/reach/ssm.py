@@ -105,7 +105,7 @@ ASIDE = (-2.0, 2.0, 0.2)
 area of METHOD 2.1, not an empty cell, for policies need not have met one in training."""
 PLANNERS: Mapping[str, ReplanningSettings] = {
     "rrt-star-once": ReplanningSettings(
-        role="once", margin=MARGIN, plan=PlanSettings(planner="rrt-star", budget_s=1.0)
+        role="plan-once", margin=MARGIN, plan=PlanSettings(planner="rrt-star", budget_s=1.0)
     ),
     "rrt-connect": ReplanningSettings(
         role="replan-on-blocked", margin=MARGIN, plan=PlanSettings(planner="rrt-connect")
@@ -118,7 +118,9 @@ PLANNERS: Mapping[str, ReplanningSettings] = {
     ),
 }
 """Planners by row."""
-ALONE = ReplanningSettings(role="once", plan=PlanSettings(planner="rrt-star", budget_s=0.2))
+ALONE = ReplanningSettings(
+    role="plan-once", plan=PlanSettings(planner="rrt-star", budget_s=0.2)
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,18 +1,18 @@
-"""Protocol ``safety-ssm``: does speed and separation monitoring keep what it promises?
+"""Protocol ``safety-ssm``: falsification of speed and separation monitoring.
 
-People run at a robot that does as it likes (``app/sim/safety/adversarial_trials.py``), in both
-scenarios'
-cells, without uncertainties to hide behind: C, Z_d, Z_r and the protective distance are 0. No
-checkpoint takes part.
+Adversarial people run at a robot under arbitrary policies
+(``app/sim/safety/adversarial_trials.py``), in the
+cells of both scenarios and without margins: C, Z_d, Z_r and the protective distance are 0. No
+checkpoint is involved.
 
 ========================  ==================================================================
-``inside``                nobody breaks an assumption; seen at once, and 0.1 s late, known
-``touch-limited``         the same with power and force limiting: touched, but slowly enough
+``inside``                all assumptions hold; no delay, and a known delay of 0.1 s
+``touch-limited``         the same with power and force limiting: contacts at admissible speeds
 ``fast-hands``            people at 2.5 m/s where 1.6 m/s are assumed
-``late-tracker``          people seen 0.1 s late that nobody knows of
-``fast-hands-cell``       fast hands with what the cell assumes: 0.3 m and 0.1 s in hand
-``late-tracker-cell``     a late tracker with the same
-``unguarded``             no safety layer: how often these people are hit
+``late-tracker``          an unknown delay of 0.1 s
+``fast-hands-cell``       fast hands with the margins of the cell: 0.3 m and 0.1 s
+``late-tracker-cell``     a late tracker with the same margins
+``no-ssm``                no safety layer: rate of contacts in motion
 ========================  ==================================================================
 """
 
@@ -31,26 +31,26 @@ from app.sim.safety.layer import SafetySettings, safety_settings
 
 DEFAULT_EPISODES = 100_000
 OUTSIDE_SHARE = 10
-"""One row's episodes outside the assumptions, as a divisor of those inside."""
+"""Ratio of the episodes inside the assumptions to those of every other row."""
 FAST_HANDS = 2.5
-"""Clean reaches of trained hands: 2 to 2.7 m/s, above what is usually assumed [m/s]."""
+"""Speed of trained hands, 2 to 2.7 m/s; above the usual assumption [m/s]."""
 LATE = 0.1
 """Delay of the tracker [s]."""
-BARE = SafetySettings(reaction_time=0.0, protective_distance=0.0)
-"""Nothing to hide behind."""
+NO_MARGINS = SafetySettings(reaction_time=0.0, protective_distance=0.0)
+"""Assumptions without margins."""
 PLACES: tuple[TrialSettings, ...] = (
-    TrialSettings(safety=BARE, cell="pick-and-place", people=("worker",)),
-    TrialSettings(safety=BARE, cell="shared-workspace", people=("walker",)),
+    TrialSettings(safety=NO_MARGINS, cell="pick-and-place", people=("worker",)),
+    TrialSettings(safety=NO_MARGINS, cell="shared-workspace", people=("walker",)),
 )
 """The two scenarios."""
 
 
 def trials() -> dict[str, list[TrialSettings]]:
     """Return the trials of every row; a row's episodes are shared evenly among them."""
-    known = replace(BARE, tracker_delay=LATE)
+    known = replace(NO_MARGINS, tracker_delay=LATE)
     rows: dict[str, list[TrialSettings]] = {
         "inside": [*PLACES, *(replace(p, safety=known, true_delay=LATE) for p in PLACES)],
-        "touch-limited": [replace(p, safety=replace(BARE, pfl=True)) for p in PLACES],
+        "touch-limited": [replace(p, safety=replace(NO_MARGINS, pfl=True)) for p in PLACES],
         "fast-hands": [replace(p, human_speed=FAST_HANDS) for p in PLACES],
         "late-tracker": [replace(p, true_delay=LATE) for p in PLACES],
     }
@@ -58,7 +58,7 @@ def trials() -> dict[str, list[TrialSettings]]:
         rows[f"{name}-cell"] = [
             replace(p, safety=safety_settings(load_cell(p.cell))) for p in rows[name]
         ]
-    rows["unguarded"] = [replace(p, guarded=False) for p in PLACES]
+    rows["no-ssm"] = [replace(p, monitored=False) for p in PLACES]
     return rows
 
 
@@ -82,7 +82,7 @@ def _row(name: str, results: list[TrialResult]) -> dict[str, Any]:
 
 
 def stated(trial: TrialSettings) -> Mapping[str, Any]:
-    """Return what a trial assumes and what is true in it."""
+    """Return the assumptions and the true conditions of a trial."""
     return {
         "cell": trial.cell,
         "people": list(trial.people),
@@ -90,7 +90,7 @@ def stated(trial: TrialSettings) -> Mapping[str, Any]:
         "true human_speed [m/s]": trial.human_speed,
         "true tracker_delay [s]": trial.true_delay,
         "seconds [s]": trial.seconds,
-        "guarded": trial.guarded,
+        "monitored": trial.monitored,
     }
 
 
@@ -104,7 +104,7 @@ def run_safety(
     """Run all rows.
 
     Args:
-        _checkpoint: Not used; all protocols are called alike.
+        _checkpoint: Not used; all protocols have the same signature.
         episodes: Number of episodes inside the assumptions, by default 100,000; every other
             row runs a tenth of that.
         seed: Seed of the episodes.

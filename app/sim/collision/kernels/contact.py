@@ -1,11 +1,13 @@
-"""The contact test of one control period, compiled: early by a millimetre, never late.
+"""Contact test of one control period, compiled: early by a millimetre at most, never late.
 
 At a pose with clearance ``d`` nothing touches before ``d / v`` seconds, with ``v`` a bound on
-how fast any two points can approach. So an interval with clearances ``a`` and ``b`` at its ends
-is free where ``a + b > v (its length)``; otherwise its middle is looked at, down to intervals
-of ``FINEST_STEP``, where contact is reported. Mostly the end of the period settles it. Within a
+the speed of approach of any two points. So an interval with clearances ``a`` and ``b`` at its
+ends is free where ``a + b > v (its length)``; otherwise it is halved, down to intervals of
+``FINEST_STEP``, where contact is reported. The end of the period mostly suffices. Within a
 period the robot follows its polynomial, workers move linearly in joint space, walkers linearly.
 """
+
+from typing import NamedTuple
 
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
@@ -26,13 +28,26 @@ from app.sim.robot.kernels.arm import (
     robot_speed_bound,
     self_clearance,
 )
+from app.sim.robot.kernels.joints import JointPath
 
 NO_CONTACT, HUMAN_CONTACT, CELL_CONTACT, SELF_CONTACT = range(4)
 FINEST_STEP = 1e-3
-"""Intervals up to this are not looked into [s]."""
-
+"""Intervals up to this are not halved [s]."""
 
 Clear = tuple[float, float, float]
+
+
+class PeriodMotion(NamedTuple):
+    """Motion of robot and people in one period."""
+
+    path: JointPath
+    """The robot's path."""
+    q1: Vec
+    """Joint positions at the end [rad], shape (6,)."""
+    human_q1: Vec
+    """The workers' joints at the end [m, rad], shape (W, 18)."""
+    cylinders1: Vec
+    """The walkers' x, y, radius at the end [m], shape (C, 3)."""
 
 
 @kernel(inline="always")
@@ -47,7 +62,7 @@ def clearances(arm: Arm, people: People, robot: RobotPose, crowd: Crowd) -> Clea
 
 @kernel(inline="always")
 def _kind(a: Clear, b: Clear, robot_speed: float, approach: float, seconds: float) -> int:
-    """Return what may touch in an interval, from the clearances at its ends."""
+    """Return the kind of contact possible in an interval, from clearances at its ends."""
     if a[0] + b[0] <= approach * seconds:
         return HUMAN_CONTACT
     if a[1] + b[1] <= robot_speed * seconds:
@@ -61,13 +76,7 @@ def _kind(a: Clear, b: Clear, robot_speed: float, approach: float, seconds: floa
 def sweep(
     arm: Arm,
     people: People,
-    q0: Vec,
-    qd0: Vec,
-    c: Vec,
-    d: Vec,
-    q1: Vec,
-    human_q1: Vec,
-    cylinders1: Vec,
+    motion: PeriodMotion,
     robot0: Vec,
     crowd0: Vec,
     clear: Vec,
@@ -79,42 +88,34 @@ def sweep(
     Args:
         arm: Robot in its cell.
         people: Shared data of the people.
-        q0: Joint positions at the start [rad], shape (6,).
-        qd0: Joint speeds at the start [rad/s], shape (6,).
-        c: Second coefficients of the period [rad/s^2], shape (6,).
-        d: Third coefficients of the period [rad/s^3], shape (6,).
-        q1: Joint positions at the end [rad], shape (6,).
-        human_q1: The workers' joints at the end [m, rad], shape (W, 18).
-        cylinders1: The walkers' x, y, radius at the end [m], shape (C, 3).
+        motion: Motion of robot and people.
         robot0: The robot's capsules at the start, shape (9, n).
         crowd0: The workers' capsules at the start, shape (9, m).
         clear: Clearances at the start, from :func:`clearances` [m], shape (3,); afterwards
-            those at the last pose looked at.
-        robot: Work space; holds the last pose looked at, the end of the period if no contact.
+            those at the last pose tested.
+        robot: Work space; holds the last pose tested, the end of the period if no contact.
         crowd: Work space, likewise; ``q0``, ``cylinders0`` and ``pelvis_z[0]`` hold the people
             at the start, ``size`` their sizes at the end.
 
     Returns:
         Kind of contact, and the time in the period at which it was found [s].
     """
-    place_robot(arm, q1, robot)
-    place_workers(people, human_q1, crowd)
-    for w in range(human_q1.shape[0]):
+    place_robot(arm, motion.q1, robot)
+    place_workers(people, motion.human_q1, crowd)
+    for w in range(motion.human_q1.shape[0]):
         crowd.pelvis_z[1, w] = crowd.size[w, PELVIS_Z]
-    copy_rows(cylinders1, crowd.cylinders)
-    robot_speed = robot_speed_bound(arm, qd0, c, d, robot0, robot.columns)
+    copy_rows(motion.cylinders1, crowd.cylinders)
+    robot_speed = robot_speed_bound(arm, motion.path, robot0, robot.columns)
     approach = robot_speed + people_speed_bound(
-        crowd0, crowd.columns, crowd.cylinders0, cylinders1, arm.dt
+        crowd0, crowd.columns, crowd.cylinders0, motion.cylinders1, arm.dt
     )
     begin = (clear[0], clear[1], clear[2])
     end = clearances(arm, people, robot, crowd)
     kind, x, last = NO_CONTACT, arm.dt, end
     if _kind(begin, end, robot_speed, approach, arm.dt) != NO_CONTACT:
-        kind, x, last = _search(
-            arm, people, q0, qd0, c, d, human_q1, cylinders1, begin, end, robot_speed,
-            approach, robot, crowd,
-        )  # fmt: skip
-        _place_at(arm, people, q0, qd0, c, d, human_q1, cylinders1, x, robot, crowd)
+        speeds = (robot_speed, approach)
+        kind, x, last = _search(arm, people, motion, begin, end, speeds, robot, crowd)
+        _place_at(arm, people, motion, x, robot, crowd)
     clear[0], clear[1], clear[2] = last
     return kind, x
 
@@ -123,25 +124,29 @@ def sweep(
 def _search(
     arm: Arm,
     people: People,
-    q0: Vec,
-    qd0: Vec,
-    c: Vec,
-    d: Vec,
-    human_q1: Vec,
-    cylinders1: Vec,
+    motion: PeriodMotion,
     begin: Clear,
     end: Clear,
-    robot_speed: float,
-    approach: float,
+    speeds: tuple[float, float],
     robot: RobotPose,
     crowd: Crowd,
 ) -> tuple[int, float, Clear]:
-    """Halve the period until every part is free or too short to look into.
+    """Halve the period until every interval is free or too short to be halved.
+
+    Args:
+        arm: Robot in its cell.
+        people: Shared data of the people.
+        motion: Motion of robot and people.
+        begin: Clearances at the start [m].
+        end: Clearances at the end [m].
+        speeds: Bounds on the robot's speed and on that of robot and people together [m/s].
+        robot: Work space.
+        crowd: Work space.
 
     Returns:
-        Kind of contact, where in the period [s], and the clearances there [m].
+        Kind of contact, its time in the period [s], and the clearances there [m].
     """
-    a, top = 0.0, 0
+    a, top, (robot_speed, approach) = 0.0, 0, speeds
     right, ahead = crowd.stack_end, crowd.stack_clear
     right[0] = arm.dt
     ahead[0, 0], ahead[0, 1], ahead[0, 2] = end
@@ -158,9 +163,7 @@ def _search(
         else:
             top += 1
             right[top] = 0.5 * (a + b)
-            _place_at(
-                arm, people, q0, qd0, c, d, human_q1, cylinders1, right[top], robot, crowd
-            )
+            _place_at(arm, people, motion, right[top], robot, crowd)
             ahead[top, 0], ahead[top, 1], ahead[top, 2] = clearances(arm, people, robot, crowd)
     return NO_CONTACT, arm.dt, end
 
@@ -169,18 +172,15 @@ def _search(
 def _place_at(
     arm: Arm,
     people: People,
-    q0: Vec,
-    qd0: Vec,
-    c: Vec,
-    d: Vec,
-    human_q1: Vec,
-    cylinders1: Vec,
+    motion: PeriodMotion,
     x: float,
     robot: RobotPose,
     crowd: Crowd,
 ) -> None:
     """Place robot and people at time ``x`` of the period [s]."""
     q, part = crowd.robot_q, x / arm.dt
+    q0, qd0, c, d = motion.path
+    human_q1, cylinders1 = motion.human_q1, motion.cylinders1
     for j in range(6):
         q[j] = q0[j] + x * (qd0[j] + x * (c[j] + x * d[j]))
     place_robot(arm, q, robot)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
-from app.sim.geometry.capsules import gaps, least
+from app.sim.geometry.capsules import capsule_clearances, least
 from app.sim.geometry.cylinder import cylinder_clearance
 from app.sim.geometry.segments import FAR
 from app.sim.robot.kernels.arm import (
@@ -54,7 +54,7 @@ def people_gap(around: Around, pose: RobotPose) -> float:
     """Return the distance of the placed robot to people [m]; FAR without any."""
     best = FAR
     if around.columns.shape[1] > 0:
-        gaps(pose.columns, around.columns, around.gap)
+        capsule_clearances(pose.columns, around.columns, around.gap)
         best, _ = least(around.gap)
     for k in range(around.cylinders.shape[0]):
         x, y = around.cylinders[k, 0], around.cylinders[k, 1]

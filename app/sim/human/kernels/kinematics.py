@@ -12,7 +12,7 @@ import numpy as np
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
 from app.sim.core.kernels.trig import sines
-from app.sim.geometry.capsules import INVERSE, RADIUS, UU, new_columns, padded
+from app.sim.geometry.capsules import INVERSE, RADIUS, UU, new_columns, padded_size
 
 N_SIZE = 12
 (
@@ -253,5 +253,5 @@ def capsule_columns(n_people: int) -> Vec:
     Args:
         n_people: Number of people; each has twelve columns, then come columns nowhere.
     """
-    n = padded(n_people * N_CAPSULES)
+    n = padded_size(n_people * N_CAPSULES)
     return new_columns(n, np.tile(RADII, n_people))

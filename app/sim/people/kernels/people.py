@@ -19,7 +19,13 @@ from numpy.typing import NDArray
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
 from app.sim.core.kernels import rng as random
-from app.sim.geometry.capsules import copy_rows, copy_values, gaps, greatest_displacement, least
+from app.sim.geometry.capsules import (
+    capsule_clearances,
+    copy_rows,
+    copy_values,
+    greatest_displacement,
+    least,
+)
 from app.sim.geometry.cylinder import cylinder_clearance
 from app.sim.geometry.segments import FAR
 from app.sim.human.kernels import kinematics as body
@@ -237,7 +243,7 @@ def people_clearance(people: People, robot: Vec, crowd: Crowd) -> float:
     """
     best = FAR
     if crowd.columns.shape[1] > 0:
-        gaps(robot, crowd.columns, crowd.gap)
+        capsule_clearances(robot, crowd.columns, crowd.gap)
         best, _ = least(crowd.gap)
     for k in range(crowd.cylinders.shape[0]):
         x, y, r = crowd.cylinders[k, 0], crowd.cylinders[k, 1], crowd.cylinders[k, 2]
@@ -464,7 +470,7 @@ def nearest_person(people: People, robot: Vec, crowd: Crowd) -> int:
         return int(n_workers + n_walkers - 1)
     best, nearest = FAR, 0
     if n_workers > 0:
-        gaps(robot, crowd.columns, crowd.gap)
+        capsule_clearances(robot, crowd.columns, crowd.gap)
     for who in range(n_workers + n_walkers):
         d = person_clearance(people, robot, crowd, who)
         if d < best:

@@ -179,9 +179,7 @@ def set_goal(world: PickWorld, state: PickState, e: int, goal: Vec, robot: Robot
     arm = world.arm
     for i in range(3):
         state.goal[e, i] = goal[i]
-    kinematics.ik_vertical(
-        goal, arm.tool_length, arm.limits.q_min, arm.limits.q_max, state.q_goal[e]
-    )
+    kinematics.ik_vertical(arm.lengths, arm.limits, goal, state.q_goal[e])
     place_robot(arm, state.q[e], robot)
     state.distance[e] = distance_to(goal, robot)
 
@@ -253,9 +251,7 @@ def reset_env(
     for i in range(3):
         goal[i] += rules.target_jitter * (2.0 * random.uniform(rng) - 1.0)
     arm = world.arm
-    kinematics.ik_vertical(
-        goal, arm.tool_length, arm.limits.q_min, arm.limits.q_max, state.q_goal[e]
-    )
+    kinematics.ik_vertical(arm.lengths, arm.limits, goal, state.q_goal[e])
     short = random.uniform(rng) < rules.short_share
     state.time_left[e] = rules.short_limit if short else rules.time_limit
     for attempt in range(START_TRIES):

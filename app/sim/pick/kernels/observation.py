@@ -29,7 +29,7 @@ from app.sim.geometry.capsules import (
     X,
     nearest_parts,
     new_columns,
-    padded,
+    padded_size,
 )
 from app.sim.geometry.segments import FAR, FAST, segment_nearest
 from app.sim.human.kernels import kinematics as body
@@ -109,7 +109,7 @@ COARSE_FIRST = (0, 1, 2, 4, 5)
 N_COARSE = 5
 STILL, ALONG_BASE, AT_GOAL = 0, N_COARSE, 2 * N_COARSE
 """First lane of three postures looked at together: now, along the base motion, at the goal."""
-N_LANES = padded(3 * N_COARSE)
+N_LANES = padded_size(3 * N_COARSE)
 FIRST_PART, LAST_PART = body.C_ABDOMEN, body.C_HAND_L
 """Human capsules the features look at: what stands above the table."""
 TICK = 1e-3
@@ -234,9 +234,9 @@ def look_ahead(now: Vec, later: Vec, ahead: float, moved: Vec) -> None:
 
 
 @kernel(inline="always")
-def _place_lanes(q: Vec, first: int, sight: Sight) -> None:
+def _place_lanes(arm: Arm, q: Vec, first: int, sight: Sight) -> None:
     """Place the robot's coarse capsules at ``q`` [rad], shape (6,), from lane ``first`` on."""
-    kinematics.link_poses(q, sight.rot, sight.pos)
+    kinematics.link_poses(arm.lengths, q, sight.rot, sight.pos)
     place_capsules(
         sight.rot, sight.pos, COARSE_LINK, COARSE_P0, COARSE_SPAN, first, sight.lanes
     )
@@ -377,7 +377,7 @@ def observe(
     place_capsules(
         robot.rot, robot.pos, COARSE_LINK, COARSE_P0, COARSE_SPAN, STILL, sight.lanes
     )
-    _place_lanes(q_goal, AT_GOAL, sight)
+    _place_lanes(arm, q_goal, AT_GOAL, sight)
     nearest_parts(sight.lanes, sight.now, FIRST_PART, LAST_PART, sight.gap, sight.part)
     out[k + 2] = _scaled(_put_nearest(sight, k + 4, out))
     k += 20
@@ -388,7 +388,7 @@ def observe(
             way = base[j] * arm.limits.qd_max[j] * HORIZONS[i]
             limit = abs(q_goal[j] - q[j])
             sight.q[j] = q[j] + min(limit, max(-limit, way))
-        _place_lanes(sight.q, ALONG_BASE, sight)
+        _place_lanes(arm, sight.q, ALONG_BASE, sight)
         look_ahead(sight.now, sight.later, HORIZONS[i], sight.moved)
         nearest_parts(sight.lanes, sight.moved, FIRST_PART, LAST_PART, sight.gap, sight.part)
         out[k + i] = _lane_clearance(STILL, sight)

@@ -23,7 +23,7 @@ from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
 from app.sim.core.kernels.trig import sincos
 from app.sim.core.observation_layout import slices_of
-from app.sim.geometry.capsules import RADIUS, UX, UY, X, Y, gaps, least
+from app.sim.geometry.capsules import RADIUS, UX, UY, X, Y, capsule_clearances, least
 from app.sim.geometry.cylinder import cylinder_clearance
 from app.sim.geometry.segments import FAR
 from app.sim.human.kernels import kinematics as body
@@ -188,7 +188,7 @@ def clearances_ahead(
         see_person(people.floor_z, state.q[e, w], state.qd[e, w], state.size[e, w], person)
         for i in range(3):
             look_ahead(person.now, person.later, HORIZONS[i], person.moved)
-            gaps(robot, person.moved, sight.gap)
+            capsule_clearances(robot, person.moved, sight.gap)
             ahead[i] = min(ahead[i], least(sight.gap)[0])
     rows = state.walkers.rows
     for k in range(rows.shape[1]):

@@ -7,7 +7,7 @@ goal does not change, the poses and what is seen of the people, is worked out on
 
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
-from app.sim.geometry.capsules import gaps
+from app.sim.geometry.capsules import capsule_clearances
 from app.sim.people.kernels.people import (
     nearest_person,
     people_clearance,
@@ -36,7 +36,7 @@ def _place(world: ReachWorld, state: ReachState, e: int, work: Work) -> None:
     place_robot(world.arm, state.q[e], work.robot)
     place_people(world.people, state.people, e, work.crowd)
     if state.people.q.shape[1] > 0:
-        gaps(work.robot.columns, work.crowd.columns, work.crowd.gap)
+        capsule_clearances(work.robot.columns, work.crowd.columns, work.crowd.gap)
 
 
 @kernel(inline="always")

@@ -3,7 +3,7 @@
 from app.sim.collision.kernels.contact import clearances
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
-from app.sim.geometry.capsules import gaps
+from app.sim.geometry.capsules import capsule_clearances
 from app.sim.people.kernels.people import person_clearance, place_people
 from app.sim.reach.kernels.episode import ReachState, ReachWorld, Work
 from app.sim.robot.kernels.arm import place_robot
@@ -25,6 +25,6 @@ def take_in(world: ReachWorld, state: ReachState, work: Work, apart: Vec) -> Non
     clear = clearances(world.arm, world.people, work.robot, work.crowd)
     state.clear[0, 0], state.clear[0, 1], state.clear[0, 2] = clear
     if state.people.q.shape[1] > 0:
-        gaps(work.robot.columns, work.crowd.columns, work.crowd.gap)
+        capsule_clearances(work.robot.columns, work.crowd.columns, work.crowd.gap)
     for who in range(apart.shape[0]):
         apart[who] = person_clearance(world.people, work.robot.columns, work.crowd, who)

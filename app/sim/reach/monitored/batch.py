@@ -38,6 +38,7 @@ from app.sim.reach.monitored.kernels.step import (
     Guard,
 )
 from app.sim.robot.kernels import acceleration_bounds as polynomial
+from app.sim.robot.kernels.joints import JointState
 from app.sim.safety.kernels import separation_check as watch
 from app.sim.safety.kernels.adversarial_people import new_trial_work
 from app.sim.safety.kernels.adversarial_trials import MOVING
@@ -220,12 +221,9 @@ class GuardedReach(ReachBatch):
         require_shape("wanted", wanted, (6,))
         require_finite("wanted", wanted)
         arm, state = self.arm, self.state
-        pieces, q, qd = np.empty((1, 6)), np.empty(6), np.empty(6)
-        polynomial.advance(
-            own(state.q[row]), own(state.qd[row]), own(wanted),
-            arm.limits.q_min, arm.limits.q_max, arm.limits.qd_max, arm.limits.qdd_max, arm.dt,
-            pieces[0], q, qd,
-        )  # fmt: skip
+        pieces, end = np.empty((1, 6)), JointState(np.empty(6), np.empty(6), np.empty(6))
+        start = JointState(own(state.q[row]), own(state.qd[row]), np.zeros(6))
+        polynomial.advance_to_speeds(arm.limits, arm.dt, start, own(wanted), pieces[0], end)
         self._step(np.array([row]), np.empty((0, 6), dtype=np.float32), pieces)
 
     def people_shapes(self, row: int) -> Shapes:

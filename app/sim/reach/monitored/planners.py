@@ -1,9 +1,9 @@
-"""Planners where a policy stands, under the same safety layer and limits (METHOD 2.6).
+"""Planners in place of a policy, under the same safety layer and limits (docs/method.md 2.6).
 
-Each row of a :class:`~app.sim.reach.monitored.batch.GuardedReach` is driven by one
-:class:`~app.sim.planning.replanning.ReplanningExecutor` to postures whose tcp lies within
-reach of success around
-the goal, of any tilt: what a policy may choose, a planner may choose too.
+One :class:`~app.sim.planning.replanning.ReplanningExecutor` drives each environment of a
+:class:`~app.sim.reach.monitored.batch.GuardedReach` to configurations of any tilt whose tcp
+lies within
+the success distance of the goal: planners may choose whatever a policy may choose.
 """
 
 from collections.abc import Sequence

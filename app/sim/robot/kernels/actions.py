@@ -1,7 +1,7 @@
-"""What an action of a policy does to the joints in one period, compiled (METHOD 2.2).
+"""Motion of the joints in one period that an action of a policy commands, compiled.
 
-One function for both degrees, both kinds of bounds and both meanings of an action. Every joint
-follows ``q(x) = q + qd x + c x^2 + d x^3``, ``0 <= x <= dt``.
+One function for both degrees, both kinds of bounds and both meanings of an action
+(docs/method.md 2.2). Every joint follows ``q(x) = q + qd x + c x^2 + d x^3``, ``0 <= x <= dt``.
 """
 
 from typing import NamedTuple
@@ -13,22 +13,22 @@ from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
 from app.sim.robot.kernels import acceleration_bounds as polynomial
 from app.sim.robot.kernels import jerk_bounds as jerk
-from app.sim.robot.kernels.jerk_bounds import Limits
+from app.sim.robot.kernels.joints import AxisLimits, AxisState, JointLimits, JointState
 
 Action = NDArray[np.floating]
 
 VIABLE, MYOPIC = range(2)
-"""Bounds: recursively feasible, or the source's for this period alone (degree 2)."""
+"""Bounds: recursively feasible, or the source's for one period only (degree 2)."""
 SPEED, COEFFICIENT = range(2)
-"""Meanings: a share of the speed limit to come near to, or a place in the interval (4.23)."""
+"""Meanings: a share of the speed limit to approach, or a place in the interval (4.23)."""
 N_JOINTS = 6
 """Joints of the robot; a constant, so that loops over them are unrolled."""
 HOLD_GAIN = 2.0
-"""Speed toward 0 of a joint that is held, per distance [1/s]."""
+"""Speed toward 0 of a joint without action, per distance [1/s]."""
 
 
 class ActionRule(NamedTuple):
-    """How actions are read; ``app.sim.robot.actions`` makes it from names."""
+    """Interpretation of actions; :mod:`app.sim.robot.actions` makes it from names."""
 
     degree: int
     """2 (acceleration-limited) or 3 (jerk-limited)."""
@@ -38,9 +38,18 @@ class ActionRule(NamedTuple):
     """SPEED or COEFFICIENT."""
 
 
+class Coefficients(NamedTuple):
+    """Coefficients of one period's trajectory, each of shape (6,)."""
+
+    c: Vec
+    """Of x^2 [rad/s^2]."""
+    d: Vec
+    """Of x^3 [rad/s^3]; 0 for degree 2."""
+
+
 @kernel(error_model="numpy", inline="always")
 def wanted_speed(j: int, q: float, qd_max: float, act: Action) -> float:
-    """Return the speed wanted of a joint [rad/s]; joints without action are held at 0."""
+    """Return the target speed of a joint [rad/s]; joints without action are held at 0."""
     if j < act.shape[0]:
         return float(min(1.0, max(-1.0, act[j])) * qd_max)
     return float(min(qd_max, max(-qd_max, -HOLD_GAIN * q)))
@@ -48,130 +57,109 @@ def wanted_speed(j: int, q: float, qd_max: float, act: Action) -> float:
 
 @kernel(error_model="numpy")
 def quadratic_by_interval(
-    rule: ActionRule, qd_target: float, held: bool, q: float, qd: float, to: Limits
+    rule: ActionRule, qd_target: float, held: bool, q: float, qd: float, limits: AxisLimits
 ) -> tuple[float, bool]:
-    """Return the coefficient of degree 2 that needs the whole interval.
+    """Return the coefficient of degree 2 for rules that need the whole interval.
 
     Args:
-        rule: How actions are read.
-        qd_target: Wanted speed [rad/s]; a share of it is the action.
+        rule: Interpretation of actions.
+        qd_target: Target speed [rad/s]; the action is its share of the speed limit.
         held: Whether the joint has no action and follows the speed in any case.
         q: Joint position [rad].
         qd: Joint speed [rad/s].
-        to: Limits.
+        limits: Limits of the joint.
 
     Returns:
-        The coefficient [rad/s^2] and whether the interval is empty; the joint brakes then.
+        The coefficient [rad/s^2] and whether the interval is empty; the joint then brakes.
     """
-    acc, dt = to.qdd_max, to.dt
     if rule.bounds == MYOPIC:
-        c_min, c_max = polynomial.myopic_interval(q, qd, to.q_min, to.q_max, to.qd_max, acc, dt)
+        c_min, c_max = polynomial.myopic_interval(q, qd, limits)
     else:
-        c_min, c_max = polynomial.coefficient_interval(
-            q, qd, to.q_min, to.q_max, to.qd_max, acc, dt
-        )
+        c_min, c_max = polynomial.coefficient_interval(q, qd, limits)
     if c_min > c_max:
-        return polynomial.brake(qd, acc, dt), True
+        return polynomial.brake(qd, limits.qdd_max, limits.dt), True
     if rule.meaning == COEFFICIENT and not held:
-        return polynomial.coefficient_of(qd_target / to.qd_max, c_min, c_max), False
-    return min(c_max, max(c_min, (qd_target - qd) / (2.0 * dt))), False
+        return polynomial.coefficient_of(qd_target / limits.qd_max, c_min, c_max), False
+    return min(c_max, max(c_min, (qd_target - qd) / (2.0 * limits.dt))), False
 
 
 @kernel(error_model="numpy")
-def other_piece(
-    rule: ActionRule,
-    qd_target: float,
-    held: bool,
-    q: float,
-    qd: float,
-    qdd: float,
-    to: Limits,
+def other_coefficients(
+    rule: ActionRule, qd_target: float, held: bool, at: AxisState, limits: AxisLimits
 ) -> tuple[float, float, bool]:
-    """Return ``c`` and ``d`` of a joint's piece for every rule but the default.
+    """Return ``c`` and ``d`` of one joint for every rule except the default.
 
     Scalars in, scalars out: the loop of :func:`advance` stays small for the default.
 
     Args:
-        rule: How actions are read.
-        qd_target: Wanted speed [rad/s]; a share of it is the action.
+        rule: Interpretation of actions.
+        qd_target: Target speed [rad/s]; the action is its share of the speed limit.
         held: Whether the joint has no action and follows the speed in any case.
-        q: Joint position [rad].
-        qd: Joint speed [rad/s].
-        qdd: Joint acceleration [rad/s^2].
-        to: Limits.
+        at: State of the joint.
+        limits: Limits of the joint.
 
     Returns:
         Coefficients [rad/s^2, rad/s^3] and whether the interval is empty.
     """
     if rule.degree == 2:
-        c, empty = quadratic_by_interval(rule, qd_target, held, q, qd, to)
+        c, empty = quadratic_by_interval(rule, qd_target, held, at.q, at.qd, limits)
         return c, 0.0, empty
     if rule.meaning == COEFFICIENT and not held:
-        low, high, empty = jerk.jerk_interval(q, qd, qdd, to)
-        j = polynomial.coefficient_of(qd_target / to.qd_max, low, high)
+        low, high, empty = jerk.jerk_interval(at, limits)
+        j = polynomial.coefficient_of(qd_target / limits.qd_max, low, high)
     else:
-        j, empty = jerk.jerk_for_speed(q, qd, qdd, qd_target, to)
-    return 0.5 * qdd, j / 6.0, empty
+        j, empty = jerk.jerk_for_speed(at, qd_target, limits)
+    return 0.5 * at.qdd, j / 6.0, empty
 
 
 @kernel(error_model="numpy", forceinline=True)
 def advance(
     rule: ActionRule,
-    q: Vec,
-    qd: Vec,
-    qdd: Vec,
-    act: Action,
-    q_min: Vec,
-    q_max: Vec,
-    qd_max: Vec,
-    qdd_max: Vec,
-    jerk_max: Vec,
+    limits: JointLimits,
     dt: float,
-    c: Vec,
-    d: Vec,
-    q_out: Vec,
-    qd_out: Vec,
-    qdd_out: Vec,
+    start: JointState,
+    act: Action,
+    out: Coefficients,
+    end: JointState,
 ) -> bool:
     """Move all joints through one period by an action.
 
     Args:
-        rule: How actions are read.
-        q: Joint positions [rad], shape (6,).
-        qd: Joint speeds [rad/s], shape (6,).
-        qdd: Joint accelerations [rad/s^2], shape (6,); read by degree 3 alone.
-        act: Actions, clipped to [-1, 1], shape (n,), n <= 6; further joints are held at 0.
-        q_min: Lower position limits [rad], shape (6,).
-        q_max: Upper position limits [rad], shape (6,).
-        qd_max: Speed limits [rad/s], shape (6,).
-        qdd_max: Acceleration limits [rad/s^2], shape (6,).
-        jerk_max: Jerk limits [rad/s^3], shape (6,); read by degree 3 alone.
+        rule: Interpretation of actions.
+        limits: Joint limits; jerk limits are read by degree 3 only.
         dt: Period [s].
-        c: Filled with the coefficients of x^2 [rad/s^2], shape (6,).
-        d: Filled with the coefficients of x^3 [rad/s^3], shape (6,); 0 for degree 2.
-        q_out: Filled with positions after the period [rad], shape (6,); may be ``q``.
-        qd_out: Filled with speeds after the period [rad/s], shape (6,); may be ``qd``.
-        qdd_out: Filled with accelerations at its end [rad/s^2], shape (6,); may be ``qdd``.
+        start: State at the start; accelerations are read by degree 3 only.
+        act: Actions, clipped to [-1, 1], shape (n,), n <= 6; further joints are held at 0.
+        out: Filled with the coefficients.
+        end: Filled with the state after the period; may be ``start``.
 
     Returns:
-        Whether a joint's interval was empty: *unfeasible*; that joint brakes. Viable bounds
-        never are, but from a state that was not viable already.
+        Whether the interval of a joint was empty (*unfeasible*); that joint brakes. Viable
+        bounds are empty only for a start that is not viable.
     """
     per_2dt, empty = 0.5 / dt, False
     plain = (rule.degree == 2) & (rule.bounds == VIABLE) & (rule.meaning == SPEED)
+    q, qd, qdd = start.q, start.qd, start.qdd
     for j in range(N_JOINTS):
         q_j, qd_j, d_j = q[j], qd[j], 0.0
-        target = wanted_speed(j, q_j, qd_max[j], act)
+        target = wanted_speed(j, q_j, limits.qd_max[j], act)
+        axis = AxisLimits(
+            limits.q_min[j],
+            limits.q_max[j],
+            limits.qd_max[j],
+            limits.qdd_max[j],
+            limits.jerk_max[j],
+            dt,
+        )
         if plain:
             c_j, none = polynomial.viable_coefficient_for_speed(
-                q_j, qd_j, target, q_min[j], q_max[j], qd_max[j], qdd_max[j], dt, per_2dt
+                q_j, qd_j, target, axis, per_2dt
             )
         else:
-            held = j >= act.shape[0]
-            to = Limits(q_min[j], q_max[j], qd_max[j], qdd_max[j], jerk_max[j], dt)
-            c_j, d_j, none = other_piece(rule, target, held, q_j, qd_j, qdd[j], to)
+            at = AxisState(q_j, qd_j, qdd[j])
+            c_j, d_j, none = other_coefficients(rule, target, j >= act.shape[0], at, axis)
         empty |= none
-        c[j], d[j], qdd_out[j] = c_j, d_j, 2.0 * c_j + 6.0 * d_j * dt
-        q_out[j] = q_j + dt * (qd_j + dt * (c_j + dt * d_j))
-        qd_out[j] = qd_j + dt * (2.0 * c_j + 3.0 * dt * d_j)
+        out.c[j], out.d[j], end.qdd[j] = c_j, d_j, 2.0 * c_j + 6.0 * d_j * dt
+        end.q[j] = q_j + dt * (qd_j + dt * (c_j + dt * d_j))
+        end.qd[j] = qd_j + dt * (2.0 * c_j + 3.0 * dt * d_j)
     return empty

@@ -1,4 +1,4 @@
-"""What the kernels know of the robot in its cell: limits, shapes, poses, bounds, compiled."""
+"""The robot in its cell: limits, capsules, poses, clearances and speed bounds, compiled."""
 
 import math
 from typing import NamedTuple
@@ -21,10 +21,10 @@ from app.sim.geometry.capsules import (
 )
 from app.sim.geometry.segments import FAR, FAST
 from app.sim.robot.kernels import kinematics
-from app.sim.robot.kernels.joints import JointLimits
+from app.sim.robot.kernels.joints import JointLimits, JointPath
 
 CONTROLLED = 5
-"""Joints a policy moves; the sixth turns the tool about itself and is held (thesis 5.3.1)."""
+"""Joints that a policy moves; the sixth turns the tool about itself (thesis 5.3.1)."""
 FIRST_OVER_TABLE = 2
 """Capsules before this one (base, shoulder) stand on the table and never leave it."""
 
@@ -35,11 +35,11 @@ class Arm(NamedTuple):
     limits: JointLimits
     """Joint limits."""
     home: Vec
-    """Home posture [rad], shape (6,)."""
+    """Home configuration [rad], shape (6,)."""
     dt: float
     """Control period [s]."""
-    tool_length: float
-    """From flange to tcp [m]."""
+    lengths: kinematics.LinkLengths
+    """Lengths of links and tool."""
     link: NDArray[np.int64]
     """Link of each capsule, shape (n,)."""
     p0: Vec
@@ -59,7 +59,7 @@ class Arm(NamedTuple):
 
 
 class RobotPose(NamedTuple):
-    """Work space of one pose of the robot; made once, filled again and again."""
+    """Work space of one pose of the robot."""
 
     rot: Vec
     """R_world_link, shape (7, 3, 3)."""
@@ -76,7 +76,7 @@ class RobotPose(NamedTuple):
 
 
 def new_robot_pose(arm: Arm) -> RobotPose:
-    """Return work space, not placed yet."""
+    """Return work space that is not placed yet."""
     return RobotPose(
         np.empty((7, 3, 3)),
         np.empty((7, 3)),
@@ -90,8 +90,8 @@ def new_robot_pose(arm: Arm) -> RobotPose:
 @kernel(inline="always")
 def place_robot(arm: Arm, q: Vec, pose: RobotPose) -> None:
     """Fill ``pose`` for joints ``q`` [rad], shape (6,)."""
-    kinematics.link_poses(q, pose.rot, pose.pos)
-    kinematics.tcp_point(pose.rot, pose.pos, arm.tool_length, pose.tcp)
+    kinematics.link_poses(arm.lengths, q, pose.rot, pose.pos)
+    kinematics.tcp_point(arm.lengths, pose.rot, pose.pos, pose.tcp)
     place_capsules(pose.rot, pose.pos, arm.link, arm.p0, arm.span, 0, pose.columns)
 
 
@@ -128,7 +128,7 @@ def place_capsules(
 
 @kernel(inline="always")
 def self_clearance(arm: Arm, pose: RobotPose) -> tuple[float, int]:
-    """Return the least distance of the tested capsule pairs [m] and the pair's number."""
+    """Return the least distance of the tested capsule pairs [m] and the index of the pair."""
     pair_distances(pose.columns, arm.first, arm.second, pose.pair)
     return least(pose.pair)
 
@@ -137,7 +137,7 @@ def self_clearance(arm: Arm, pose: RobotPose) -> tuple[float, int]:
 def table_clearance(robot: Vec) -> tuple[float, int]:
     """Return the distance of the moving links to the plane z = 0 [m] and the nearest capsule.
 
-    The table's plane is taken as endless: nothing of the robot may go below it anywhere.
+    The table's plane is infinite: no part of the robot may go below it anywhere.
 
     Args:
         robot: The robot's capsules as columns, shape (9, n).
@@ -152,11 +152,11 @@ def table_clearance(robot: Vec) -> tuple[float, int]:
 
 @kernel(inline="always")
 def cell_clearance(arm: Arm, robot: Vec) -> tuple[float, int, int]:
-    """Return the distance of the moving links to what stands in the cell [m].
+    """Return the distance of the moving links to the table and the boxes [m].
 
     Returns:
-        Distance, the nearest capsule, and what it is nearest to: -1 for the table, else the
-        number of the box.
+        Distance, the nearest capsule, and its nearest obstacle: -1 for the table, else the
+        index of the box.
     """
     best, link = table_clearance(robot)
     near = -1
@@ -168,7 +168,7 @@ def cell_clearance(arm: Arm, robot: Vec) -> tuple[float, int, int]:
 
 
 @kernel(inline="always")
-def robot_speed_bound(arm: Arm, qd0: Vec, c: Vec, d: Vec, before: Vec, after: Vec) -> float:
+def robot_speed_bound(arm: Arm, path: JointPath, before: Vec, after: Vec) -> float:
     """Return a bound on the speed of any point of the robot in a period [m/s].
 
     A point's mean velocity over the period is its chord over ``dt``, and its velocity never
@@ -178,12 +178,11 @@ def robot_speed_bound(arm: Arm, qd0: Vec, c: Vec, d: Vec, before: Vec, after: Ve
 
     Args:
         arm: Robot in its cell.
-        qd0: Joint speeds at the start [rad/s], shape (6,).
-        c: Second coefficients of the period [rad/s^2], shape (6,).
-        d: Third coefficients [rad/s^3], shape (6,).
+        path: Path of the period.
         before: The robot's capsules at the start, shape (9, n).
         after: Its capsules at the end, shape (9, n).
     """
+    _, qd0, c, d = path
     angular, swing, push = 0.0, 0.0, 0.0
     for j in range(6):
         bend = 3.0 * d[j] * arm.dt

@@ -1,4 +1,4 @@
-"""Bounded polynomial actions of degree 3 for one joint: jerk-limited (METHOD 2.2), compiled.
+"""Bounds of cubic, jerk-limited trajectories of one joint, compiled (docs/method.md 2.2).
 
 During one period of length ``T`` a joint follows ``q(x) = q + qd x + qdd/2 x^2 + j/6 x^3``. The
 free number is the jerk ``j``, six times the leading coefficient; acceleration goes on from
@@ -27,16 +27,16 @@ the last verified manoeuvre is at hand as the fallback without being stored. At 
 limits a joint is viable. To come to rest before a limit is a little more cautious than need be:
 a stop that swings back from it would be shorter.
 
-Source: METHOD 2.2; the law is the sampled time-optimal one of R. Zanasi, C. Guarino Lo Bianco
-and A. Tonielli, "Nonlinear filters for the generation of smooth trajectories", Automatica 36,
-2000, with a limit on acceleration.
-Deviates: the source of METHOD 2.2 names degrees up to 5 and bounds only degree 2.
+Source: docs/method.md 2.2; the law is the sampled time-optimal one of R. Zanasi, C. Guarino
+Lo Bianco and A. Tonielli, "Nonlinear filters for the generation of smooth trajectories",
+Automatica 36, 2000, with a limit on acceleration.
+Deviates: the source of docs/method.md 2.2 names degrees up to 5 and bounds only degree 2.
 """
 
 import math
-from typing import NamedTuple
 
 from app.sim.core.jit import kernel
+from app.sim.robot.kernels.joints import AxisLimits, AxisState
 
 SLACK = 1e-12
 """Excess over a limit that is taken for rounding when a jerk is judged [rad, rad/s]."""
@@ -46,23 +46,6 @@ JERK_RESOLUTION = 1e-9
 """Width at which the search for an end of the interval stops, as a share of the jerk limit."""
 MAX_SEARCH = 60
 """Most manoeuvres tried per end."""
-
-
-class Limits(NamedTuple):
-    """Limits of one joint, and the period."""
-
-    q_min: float
-    """Lower position limit [rad]."""
-    q_max: float
-    """Upper position limit [rad]."""
-    qd_max: float
-    """Speed limit [rad/s]."""
-    qdd_max: float
-    """Acceleration limit [rad/s^2]."""
-    jerk_max: float
-    """Jerk limit [rad/s^3]."""
-    dt: float
-    """Period [s]."""
 
 
 @kernel(error_model="numpy")
@@ -252,21 +235,20 @@ def period_extremes(
 
 
 @kernel(error_model="numpy")
-def excesses(j: float, q: float, qd: float, qdd: float, to: Limits) -> tuple[float, float]:
+def excesses(j: float, at: AxisState, to: AxisLimits) -> tuple[float, float]:
     """Return by how much a jerk for one period, then braking, exceeds the limits.
 
     Args:
         j: Jerk of this period [rad/s^3].
-        q: Joint position [rad].
-        qd: Joint speed [rad/s].
-        qdd: Joint acceleration [rad/s^2].
-        to: Limits.
+        at: State of the joint.
+        to: Limits of the joint.
 
     Returns:
         The greater of position [rad] and speed [rad/s] excess, below and above; not positive
         where the limits hold for ever.
     """
     dt = to.dt
+    q, qd, qdd = at
     low, high, slowest, fastest = period_extremes(qd, qdd, j, dt)
     move = dt * (qd + dt * (0.5 * qdd + dt * j / 6.0))
     later = manoeuvre_extremes(
@@ -285,10 +267,8 @@ def farthest_jerk(
     e_braking: float,
     wanted: float,
     e_wanted: float,
-    q: float,
-    qd: float,
-    qdd: float,
-    to: Limits,
+    at: AxisState,
+    to: AxisLimits,
 ) -> float:
     """Return the last admissible jerk on the way from braking to a wanted one [rad/s^3].
 
@@ -302,10 +282,8 @@ def farthest_jerk(
         e_braking: Its excess on that side, not positive but for rounding.
         wanted: Wanted jerk [rad/s^3], beyond which nothing is tried.
         e_wanted: Its excess, positive.
-        q: Joint position [rad].
-        qd: Joint speed [rad/s].
-        qdd: Joint acceleration [rad/s^2].
-        to: Limits.
+        at: State of the joint.
+        to: Limits of the joint.
     """
     good, bad = braking, wanted
     weight_good, weight_bad, last = min(e_braking, -SLACK), e_wanted, 0
@@ -314,7 +292,7 @@ def farthest_jerk(
             break
         share = 0.5 if k % 3 == 2 else weight_good / (weight_good - weight_bad)
         j = good + min(0.999, max(0.001, share)) * (bad - good)
-        e = excesses(j, q, qd, qdd, to)[side]
+        e = excesses(j, at, to)[side]
         if e <= 0.0:
             if last > 0:
                 weight_bad *= 0.5
@@ -327,38 +305,35 @@ def farthest_jerk(
 
 
 @kernel(error_model="numpy")
-def jerk_interval(q: float, qd: float, qdd: float, to: Limits) -> tuple[float, float, bool]:
+def jerk_interval(at: AxisState, to: AxisLimits) -> tuple[float, float, bool]:
     """Return the least and the greatest admissible jerk [rad/s^3].
 
     Args:
-        q: Joint position [rad].
-        qd: Joint speed [rad/s].
-        qdd: Joint acceleration [rad/s^2].
-        to: Limits.
+        at: State of the joint.
+        to: Limits of the joint.
 
     Returns:
         The ends [rad/s^3] and whether the interval is empty: from a state that is not viable;
         both ends are then the braking jerk.
     """
+    qd, qdd = at.qd, at.qdd
     braking = settling_jerk(qd, qdd, to.qdd_max, to.jerk_max, to.dt)
-    below, above = excesses(braking, q, qd, qdd, to)
+    below, above = excesses(braking, at, to)
     if max(below, above, abs(qdd) - to.qdd_max) > UNFEASIBLE:
         return braking, braking, True
     j_min = max(-to.jerk_max, (-to.qdd_max - qdd) / to.dt)
     j_max = min(to.jerk_max, (to.qdd_max - qdd) / to.dt)
-    e_min = excesses(j_min, q, qd, qdd, to)[0]
-    e_max = excesses(j_max, q, qd, qdd, to)[1]
+    e_min = excesses(j_min, at, to)[0]
+    e_max = excesses(j_max, at, to)[1]
     if e_min > SLACK:
-        j_min = farthest_jerk(0, braking, below, j_min, e_min, q, qd, qdd, to)
+        j_min = farthest_jerk(0, braking, below, j_min, e_min, at, to)
     if e_max > SLACK:
-        j_max = farthest_jerk(1, braking, above, j_max, e_max, q, qd, qdd, to)
+        j_max = farthest_jerk(1, braking, above, j_max, e_max, at, to)
     return min(j_min, braking), max(j_max, braking), False
 
 
 @kernel(error_model="numpy")
-def jerk_for_speed(
-    q: float, qd: float, qdd: float, qd_target: float, to: Limits
-) -> tuple[float, bool]:
+def jerk_for_speed(at: AxisState, qd_target: float, to: AxisLimits) -> tuple[float, bool]:
     """Return the admissible jerk nearest to the shortest way to a wanted speed [rad/s^3].
 
     That way ends at the speed with zero acceleration, without overshoot, so that holding a
@@ -366,25 +341,24 @@ def jerk_for_speed(
     where it is not admissible.
 
     Args:
-        q: Joint position [rad].
-        qd: Joint speed [rad/s].
-        qdd: Joint acceleration [rad/s^2].
+        at: State of the joint.
         qd_target: Wanted speed [rad/s].
-        to: Limits.
+        to: Limits of the joint.
 
     Returns:
         The jerk [rad/s^3] and whether the interval is empty; it brakes then.
     """
+    qd, qdd = at.qd, at.qdd
     wanted = settling_jerk(qd - qd_target, qdd, to.qdd_max, to.jerk_max, to.dt)
-    below, above = excesses(wanted, q, qd, qdd, to)
+    below, above = excesses(wanted, at, to)
     if max(below, above) <= SLACK and abs(qdd) <= to.qdd_max + SLACK:
         return wanted, False
     braking = settling_jerk(qd, qdd, to.qdd_max, to.jerk_max, to.dt)
-    low, high = excesses(braking, q, qd, qdd, to)
+    low, high = excesses(braking, at, to)
     if max(low, high, abs(qdd) - to.qdd_max) > UNFEASIBLE:
         return braking, True
     if wanted > braking and above > SLACK:
-        return farthest_jerk(1, braking, high, wanted, above, q, qd, qdd, to), False
+        return farthest_jerk(1, braking, high, wanted, above, at, to), False
     if wanted < braking and below > SLACK:
-        return farthest_jerk(0, braking, low, wanted, below, q, qd, qdd, to), False
+        return farthest_jerk(0, braking, low, wanted, below, at, to), False
     return wanted, False

@@ -1,16 +1,16 @@
-"""Episodes that try to break speed and separation monitoring, compiled.
+"""Falsification of speed and separation monitoring by adversarial people, compiled.
 
-A robot under some policy and the safety layer, people who move by themselves or run at it, no
-table, no goal: all that counts is whether a contact finds a link in motion.
+A robot under a policy and the safety layer moves beside people that follow a script or run at
+it (``trial_people.py``), never faster than the trial allows; there is no table and no goal. The
+only measure is whether a contact finds a link in motion.
 
-People move as in ``trial_people.py``, never faster than the trial allows.
-
-**Policies.** *Smooth*: speeds wander. *Constant*: full speed, until a limit. *Goals*: straight
-to random postures. *Bang-bang*: each joint at full speed this way or that for random times.
+**Policies.** *Smooth*: speeds drift. *Constant*: full speed, until a limit. *Goals*: straight
+to random configurations. *Bang-bang*: each joint at full speed in either direction for random
+times.
 
 **Contacts** are found by conservative advancement: with clearance ``g`` and a bound ``v`` on
-how fast robot and people approach, nothing touches before ``g/v``; steps end at a clearance of
-TOUCH. Then the speed of the links that touch is taken from exact kinematics.
+the speed of approach, nothing touches before ``g/v``; steps end at a clearance of TOUCH. The
+speed of the touching links then follows from exact kinematics.
 """
 
 import math
@@ -20,9 +20,10 @@ from app.sim.core.jit import kernel
 from app.sim.core.kernels import rng as random
 from app.sim.geometry.capsules import UX, UY, UZ, X, Y, Z, copy_rows, distances, least
 from app.sim.people.kernels.people import People, start_people
-from app.sim.robot.kernels.actions import ActionRule, advance
+from app.sim.robot.kernels.actions import Coefficients, advance
 from app.sim.robot.kernels.arm import CONTROLLED, Arm
-from app.sim.robot.kernels.override import clock, motion_at
+from app.sim.robot.kernels.joints import JointPath, JointState
+from app.sim.robot.kernels.override import motion_at, path_parameter
 from app.sim.safety.kernels.adversarial_people import (
     Trial,
     TrialWorkspace,
@@ -32,7 +33,13 @@ from app.sim.safety.kernels.adversarial_people import (
     people_speed,
     place_workers_at,
 )
-from app.sim.safety.kernels.separation_check import NOW, Safety, Watch, path_bounds, place_node
+from app.sim.safety.kernels.separation_check import (
+    NOW,
+    PeopleShapes,
+    SsmWorkspace,
+    path_bounds,
+    place_node,
+)
 from app.sim.safety.kernels.ssm import decide
 
 SMOOTH, CONSTANT, GOALS, BANG_BANG = range(4)
@@ -40,25 +47,24 @@ SMOOTH, CONSTANT, GOALS, BANG_BANG = range(4)
 TOUCH = 1e-7
 """Clearance that counts as contact [m]."""
 MAX_ADVANCES = 500
-"""Steps of the contact search per period; who comes closer more slowly counts as touching."""
+"""Steps of the contact search per period at most; a slower approach counts as contact."""
 START_CLEARANCE = 0.02
 """Least distance of robot and people at the start [m]."""
 START_TRIES = 100
-"""Starts drawn before the last one is taken whatever its clearance."""
+"""Greatest number of starts drawn; the last one counts with any clearance."""
 MOVING = 1e-3
 """A touching link faster than this is a moving contact [m/s]."""
 
 N_RESULT = 9
 STEPS, CONTACT, SPEED, STOPPED, SLOWED, POLICY, MODE, WORST_PEOPLE, ALLOWED = range(N_RESULT)
-"""Of an episode: periods; whether it ended in contact; speed of the touching link then [m/s];
-periods in which the robot stood still or braked to stand, and in which it was slowed at all;
-the policy; what the people did; the fastest any point of them was [m/s]; the speed at which the
-touched part may be touched [m/s]."""
+"""Columns of a result: periods; whether the episode ended in contact; speed of the touching
+link [m/s]; periods stopped, and slowed or stopped; policy; behaviour of the people; greatest
+speed of any of their points [m/s]; speed at which the touched part may be touched [m/s]."""
 
 
 @kernel(error_model="numpy", inline="always")
 def _act(arm: Arm, policy: int, t: float, work: TrialWorkspace) -> None:
-    """Write the policy's action."""
+    """Write the action of a policy."""
     act, aim, rng = work.act, work.aim, work.rng
     if policy == GOALS:
         far = 0.0
@@ -82,19 +88,19 @@ def _act(arm: Arm, policy: int, t: float, work: TrialWorkspace) -> None:
 
 
 @kernel(error_model="numpy")
-def link_speed(arm: Arm, watch: Watch, node: int, k: int, qd: Vec) -> float:
+def link_speed(arm: Arm, space: SsmWorkspace, node: int, k: int, qd: Vec) -> float:
     """Return the greatest speed of any point on the axis of one of the robot's capsules [m/s].
 
     A capsule's surface comes nearer to anything no faster than its axis moves.
 
     Args:
         arm: Robot in its cell.
-        watch: Its links are those of the pose.
+        space: Work space with the links of the pose.
         node: Node where the pose's capsules are.
         k: The capsule.
         qd: Joint speeds [rad/s], shape (6,).
     """
-    columns, rot, pos = watch.columns[node], watch.rot, watch.pos
+    columns, rot, pos = space.columns[node], space.rot, space.pos
     fastest = 0.0
     for end in range(2):
         px = columns[X, k] + end * columns[UX, k]
@@ -131,11 +137,12 @@ def touching_speed(arm: Arm, j: int, work: TrialWorkspace) -> float:
 
 @kernel(error_model="numpy", inline="always")
 def first_contact(arm: Arm, work: TrialWorkspace) -> tuple[float, int]:
-    """Return when a period's contact is [s], -1 if never, and with which part of the people."""
-    watch, touch, dt = work.watch, work.touch, arm.dt
-    s_end, _ = clock(watch.drop[0], dt)
-    first, _ = path_bounds(arm, work.qd, watch.c, watch.d, s_end)
-    approach = first + people_speed(work, dt)
+    """Return the time of a period's contact [s], -1 if none, and the part of the people."""
+    ssm, touch, dt = work.ssm, work.touch, arm.dt
+    path = JointPath(work.q, work.qd, ssm.c, ssm.d)
+    s_end, _ = path_parameter(ssm.deceleration[0], dt)
+    speed, _ = path_bounds(arm, path, s_end)
+    approach = speed + people_speed(work, dt)
     t, j = 0.0, 0
     for _ in range(MAX_ADVANCES):
         part = t / dt
@@ -144,10 +151,9 @@ def first_contact(arm: Arm, work: TrialWorkspace) -> tuple[float, int]:
             for i in range(3):
                 old = work.cylinders0[k, i]
                 work.cylinders[k, i] = old + part * (work.cylinders1[k, i] - old)
-        motion_at(
-            work.q, work.qd, watch.c, watch.d, watch.drop[0], t, touch.q_node, touch.qd_node
-        )
-        place_node(arm, work.columns, work.cylinders, touch.q_node, NOW, 0.0, touch)
+        motion_at(path, ssm.deceleration[0], t, touch.q_node, touch.qd_node)
+        people = PeopleShapes(work.columns, work.cylinders)
+        place_node(arm, people, touch.q_node, NOW, 0.0, touch)
         gap, j = least(touch.gap[NOW])
         if gap <= TOUCH:
             return t, j
@@ -159,7 +165,7 @@ def first_contact(arm: Arm, work: TrialWorkspace) -> tuple[float, int]:
 
 @kernel(error_model="numpy", inline="always")
 def _draw_place(arm: Arm, people: People, work: TrialWorkspace) -> float:
-    """Draw a posture at rest and where people are; return their distance [m]."""
+    """Draw a configuration at rest and places of people; return their distance [m]."""
     rng = work.rng
     for j in range(6):
         work.q[j], work.qd[j], work.qdd[j] = arm.home[j], 0.0, 0.0
@@ -179,13 +185,14 @@ def _draw_place(arm: Arm, people: People, work: TrialWorkspace) -> float:
         work.cylinders0[k, 3] = people.top_z
     copy_rows(work.cylinders0, work.cylinders1)
     copy_rows(work.cylinders0, work.cylinders)
-    place_node(arm, work.columns0, work.cylinders0, work.q, NOW, 0.0, work.watch)
-    return least(work.watch.gap[NOW])[0]
+    shapes = PeopleShapes(work.columns0, work.cylinders0)
+    place_node(arm, shapes, work.q, NOW, 0.0, work.ssm)
+    return least(work.ssm.gap[NOW])[0]
 
 
 @kernel(error_model="numpy", inline="always")
 def _start(arm: Arm, people: People, policy: int, seconds: float, work: TrialWorkspace) -> None:
-    """Draw the start of an episode, and when people begin to run."""
+    """Draw the start of an episode and the time at which people begin to run."""
     for _ in range(START_TRIES):
         if _draw_place(arm, people, work) >= START_CLEARANCE:
             break
@@ -202,63 +209,67 @@ def _start(arm: Arm, people: People, policy: int, seconds: float, work: TrialWor
 
 @kernel(error_model="numpy", inline="always")
 def _step(
-    arm: Arm, people: People, safety: Safety, trial: Trial, action: ActionRule, policy: int,
-    mode: int, step: int, work: TrialWorkspace, out: Vec,
-) -> bool:  # fmt: skip
+    arm: Arm,
+    people: People,
+    trial: Trial,
+    policy: int,
+    mode: int,
+    step: int,
+    work: TrialWorkspace,
+    out: Vec,
+) -> bool:
     """Run one period; return whether the episode ends in contact."""
     t, slot = step * arm.dt, step % (trial.n_late + 1)
     copy_rows(work.columns0, work.seen_columns[slot])
     copy_rows(work.cylinders0, work.seen_cylinders[slot])
     oldest = (step + 1) % (trial.n_late + 1)
     _act(arm, policy, t, work)
-    end = work.end
-    advance(
-        action, work.q, work.qd, work.qdd, work.act, arm.limits.q_min, arm.limits.q_max,
-        arm.limits.qd_max,
-        arm.limits.qdd_max, arm.limits.jerk_max, arm.dt, work.c, work.d, end[0], end[1], end[2],
-    )  # fmt: skip
-    watch = work.watch
-    override = decide(
-        arm, safety, 0.0, work.seen_columns[oldest], work.seen_cylinders[oldest], work.q,
-        work.qd, work.c, work.d, watch,
-    )  # fmt: skip
-    if not trial.guarded:
-        override, watch.drop[0] = 1.0, 0.0
+    end, ssm = work.end, work.ssm
+    start, segment = JointState(work.q, work.qd, work.qdd), Coefficients(work.c, work.d)
+    advance(trial.action, arm.limits, arm.dt, start, work.act, segment, end)
+    seen = PeopleShapes(work.seen_columns[oldest], work.seen_cylinders[oldest])
+    path = JointPath(work.q, work.qd, work.c, work.d)
+    override = decide(arm, trial.rule, 0.0, seen, path, ssm)
+    if not trial.monitored:
+        override, ssm.deceleration[0] = 1.0, 0.0
         for j in range(6):
-            watch.c[j], watch.d[j] = work.c[j], work.d[j]
-            watch.q[j], watch.qd[j], watch.qdd[j] = end[0, j], end[1, j], end[2, j]
+            ssm.c[j], ssm.d[j] = work.c[j], work.d[j]
+            ssm.end.q[j], ssm.end.qd[j], ssm.end.qdd[j] = end.q[j], end.qd[j], end.qdd[j]
     out[STEPS] = step + 1.0
     out[STOPPED] += 1.0 if override <= 0.0 else 0.0
     out[SLOWED] += 1.0 if override < 1.0 else 0.0
-    place_node(arm, work.columns0, work.cylinders0, work.q, NOW, 0.0, work.touch)
+    place_node(arm, PeopleShapes(work.columns0, work.cylinders0), work.q, NOW, 0.0, work.touch)
     advance_workers(people, trial, mode, t, arm.dt, work)
     advance_cylinders(people, trial, mode, t, arm.dt, work)
     out[WORST_PEOPLE] = max(out[WORST_PEOPLE], people_speed(work, arm.dt))
     when, part = first_contact(arm, work)
     if when >= 0.0:
-        out[CONTACT], out[ALLOWED] = 1.0, safety.contact_speed[part]
+        out[CONTACT], out[ALLOWED] = 1.0, trial.rule.contact_speed[part]
         out[SPEED] = touching_speed(arm, part, work)
         return True
     copy_rows(work.columns1, work.columns0)
     copy_rows(work.cylinders1, work.cylinders0)
     for j in range(6):
-        work.q[j], work.qd[j], work.qdd[j] = watch.q[j], watch.qd[j], watch.qdd[j]
+        work.q[j], work.qd[j], work.qdd[j] = ssm.end.q[j], ssm.end.qd[j], ssm.end.qdd[j]
     return False
 
 
 @kernel(nogil=True, error_model="numpy")
 def run_episodes(
-    arm: Arm, people: People, safety: Safety, trial: Trial, action: ActionRule, seed: int,
-    first: int, work: TrialWorkspace, out: Vec,
-) -> None:  # fmt: skip
-    """Run episodes ``first`` and on; fixed by (seed, number).
+    arm: Arm,
+    people: People,
+    trial: Trial,
+    seed: int,
+    first: int,
+    work: TrialWorkspace,
+    out: Vec,
+) -> None:
+    """Run episodes ``first`` and following; each is determined by (seed, number).
 
     Args:
         arm: Robot in its cell.
         people: Shared data of the people.
-        safety: What the layer assumes.
-        trial: What is true.
-        action: How actions are read.
+        trial: Settings of the trial.
         seed: Seed of all episodes.
         first: Number of the first episode.
         work: Work space.
@@ -273,5 +284,5 @@ def run_episodes(
         row[POLICY], row[MODE] = policy, mode
         _start(arm, people, policy, trial.n_steps * arm.dt, work)
         for step in range(trial.n_steps):
-            if _step(arm, people, safety, trial, action, policy, mode, step, work, row):
+            if _step(arm, people, trial, policy, mode, step, work, row):
                 break

@@ -1,18 +1,18 @@
-"""Whether a moving robot stays clear of people who grow with time, compiled.
+"""Separation of a moving robot from people whose possible position grows with time, compiled.
 
-With clearances ``a, b`` at both ends of an interval in which no point of the robot covers more
-than ``w``, the clearance inside is at least ``(a + b - w)/2``. That must exceed ``reach(t) =
-v_h (lead + t) + D``, how far people may have come, at the end of the interval. Otherwise the
-interval is halved, and given up as not clear where that would tell no more than RESOLUTION:
-never late. ``w`` is the longest chord of the capsules' ends plus half a bound on the path's
-curvature, or the sum of joint ways times levers where that is less.
+With clearances ``a, b`` at both ends of an interval in which no point of the robot moves more
+than ``w``, the clearance inside is at least ``(a + b - w)/2``. That must exceed ``v_h (T + t) +
+D``, the distance people may have covered, at the end of the interval. Otherwise the interval is
+halved, until both together move less than RESOLUTION, and then counts as not clear: the check
+is conservative. ``w`` is the longest chord of the capsules' ends plus half a bound on the
+path's curvature, or the sum of joint displacements times levers where that is less.
 
-A cylinder that is known to go on at some velocity counts all along its way since it was seen, a
-little more of it at the end of an interval than at its start: that much more may be missing
-between them.
+A cylinder with a known velocity counts along its whole path since its observation, so slightly
+more of it counts at the end of an interval than at its start: that difference may be missing
+between them and is added to ``w``.
 
-Power and force limiting gives parts of people a speed at which they may be touched; they are
-passed over in intervals in which no point of the robot is faster. Source: METHOD 2.7.
+Power and force limiting assigns each part of a person a speed at which it may be touched; it is
+skipped in intervals in which no point of the robot is faster (docs/method.md 2.7).
 """
 
 from typing import NamedTuple
@@ -22,38 +22,67 @@ from numpy.typing import NDArray
 
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
-from app.sim.geometry.capsules import gaps, greatest_displacement
+from app.sim.geometry.capsules import capsule_clearances, greatest_displacement
 from app.sim.geometry.cylinder import cylinder_clearance, swept_clearance
 from app.sim.robot.kernels import kinematics
 from app.sim.robot.kernels.arm import Arm, place_capsules
-from app.sim.robot.kernels.override import clock, motion_at
+from app.sim.robot.kernels.joints import JointPath, JointState
+from app.sim.robot.kernels.override import motion_at, path_parameter
 
 RESOLUTION = 0.01
 """Intervals in which robot and people approach by less than this are not halved [m]."""
 NOW, REST, END, FIRST_BETWEEN = range(4)
-"""Nodes of a path: its start, its end at rest, the end of the piece, and those between."""
+"""Nodes of a path: its start, its end at rest, the end of the period, and those between."""
 N_NODES = 32
-"""Poses looked at per path; a path that needs more is not admitted."""
-WHEN, WHO, SLACK = range(3)
-"""What set the override: time on the path [s], column of the people, distance lacking [m]."""
+"""Greatest number of robot poses per path; a path that needs more is not admitted."""
+CAUSE_TIME, CAUSE_PART, CAUSE_SHORTFALL = range(3)
+"""Cause of the override: time on the path [s], part of the people, missing distance [m]."""
 
 
-class Safety(NamedTuple):
-    """What the rule assumes."""
+class SeparationRule(NamedTuple):
+    """Assumptions of speed and separation monitoring."""
 
     speed: Vec
-    """Speed of each capsule and each cylinder in any direction, beyond what is known of how it
-    goes on [m/s], shape (m + n,)."""
-    lead: float
-    """How much older than the robot's state the people are [s], reaction included."""
+    """Assumed speed of each capsule and cylinder in any direction, beyond its known velocity
+    [m/s], shape (m + n,)."""
+    latency: float
+    """Age of people relative to the robot's state, with the reaction time [s]."""
     margin: float
     """Distance D to keep [m]."""
     contact_speed: Vec
-    """Speed at which each capsule and each cylinder may be touched [m/s], shape (m + n,)."""
+    """Speed at which each capsule and cylinder may be touched [m/s], shape (m + n,)."""
 
 
-class Watch(NamedTuple):
-    """Work space, and what was decided; made once."""
+class PeopleShapes(NamedTuple):
+    """Shapes of the people as observed."""
+
+    columns: Vec
+    """Capsules, shape (9, m)."""
+    cylinders: Vec
+    """Vertical cylinders: x, y, radius, top [m], shape (n, 4)."""
+
+
+class PathSegment(NamedTuple):
+    """Segment of a path that is checked: the period's trajectory, or the stop after it."""
+
+    path: JointPath
+    """Path of all joints."""
+    deceleration: float
+    """Decrease of the path speed [1/s]."""
+    start: float
+    """Time at which the segment starts, since the start of the period [s]."""
+    speed: float
+    """Bound on ``|dp/ds|`` of any point of the robot [m/s]."""
+    curvature: float
+    """Bound on ``|d2p/ds2|`` of any point of the robot [m/s^2]."""
+    first: int
+    """Node at its start; placed, and its time is set."""
+    last: int
+    """Node at its end, likewise."""
+
+
+class SsmWorkspace(NamedTuple):
+    """Work space of speed and separation monitoring, and the last decision."""
 
     rot: Vec
     """R_world_link, shape (7, 3, 3)."""
@@ -62,125 +91,129 @@ class Watch(NamedTuple):
     columns: Vec
     """The robot's capsules at each node, shape (N_NODES, 9, n)."""
     gap: Vec
-    """Distances of people's capsules and cylinders to the robot there [m], (N_NODES, m + n)."""
-    going: Vec
-    """How cylinders are known to go on: vx, vy and growth [m/s], zeros where that is not known,
-    shape (n, 3)."""
-    going_speed: Vec
-    """How fast any point of each part gets on so [m/s], shape (m + n,)."""
+    """Clearance of each part of the people to the robot there [m], shape (N_NODES, m + n)."""
+    velocity: Vec
+    """Known vx, vy and growth of cylinders [m/s], zeros where unknown, shape (n, 3)."""
+    known_speed: Vec
+    """Speed of any point of each part by that velocity [m/s], shape (m + n,)."""
     x: Vec
-    """When each node is [s], since the start of its segment, shape (N_NODES,)."""
+    """Time of each node since the start of its segment [s], shape (N_NODES,)."""
     right: NDArray[np.int64]
-    """Nodes that end the intervals still to be looked at, shape (N_NODES,)."""
+    """Nodes at the ends of intervals still to be checked, shape (N_NODES,)."""
     none: Vec
     """Zeros: the coefficients of a straight path, shape (6,)."""
     q_node: Vec
-    """Joints at a node [rad], shape (6,)."""
+    """Joint positions at a node [rad], shape (6,)."""
     qd_node: Vec
-    """Speeds there [rad/s], shape (6,)."""
+    """Joint speeds at a node [rad/s], shape (6,)."""
     q_end: Vec
-    """Joints at the end of the piece [rad], shape (6,)."""
+    """Joint positions at the end of the period [rad], shape (6,)."""
     qd_end: Vec
-    """Speeds there [rad/s], shape (6,)."""
+    """Joint speeds at the end of the period [rad/s], shape (6,)."""
     c: Vec
-    """Decided: second coefficients of the path [rad/s^2], shape (6,)."""
+    """Decision: second coefficients of the path [rad/s^2], shape (6,)."""
     d: Vec
-    """Decided: third coefficients of the path [rad/s^3], shape (6,)."""
-    drop: Vec
-    """Decided: what the rate loses per second [1/s], shape (1,)."""
-    q: Vec
-    """Decided: joints after the period [rad], shape (6,)."""
-    qd: Vec
-    """Decided: speeds after the period [rad/s], shape (6,)."""
-    qdd: Vec
-    """Decided: accelerations at its end [rad/s^2], shape (6,)."""
-    why: Vec
-    """What set the override (WHEN, WHO, SLACK); WHO is -1 where nobody did, shape (3,)."""
+    """Decision: third coefficients of the path [rad/s^3], shape (6,)."""
+    deceleration: Vec
+    """Decision: decrease of the path speed [1/s], shape (1,)."""
+    end: JointState
+    """Decision: state after the period."""
+    cause: Vec
+    """Cause of the override (CAUSE_TIME, CAUSE_PART, CAUSE_SHORTFALL); part -1 if none."""
 
 
-def new_ssm_workspace(arm: Arm, n_columns: int, n_cylinders: int) -> Watch:
+def new_ssm_workspace(arm: Arm, n_columns: int, n_cylinders: int) -> SsmWorkspace:
     """Return work space for people of ``n_columns`` capsules and ``n_cylinders`` cylinders."""
-    return Watch(
-        np.empty((7, 3, 3)),
-        np.empty((7, 3)),
-        np.repeat(arm.columns[None], N_NODES, axis=0),
-        np.empty((N_NODES, n_columns + n_cylinders)),
-        np.zeros((n_cylinders, 3)),
-        np.zeros(n_columns + n_cylinders),
-        np.zeros(N_NODES),
-        np.zeros(N_NODES, dtype=np.int64),
-        np.zeros(6),
-        np.zeros(6),
-        np.zeros(6),
-        np.zeros(6),
-        np.zeros(6),
-        np.zeros(6),
-        np.zeros(6),
-        np.zeros(1),
-        np.zeros(6),
-        np.zeros(6),
-        np.zeros(6),
-        np.zeros(3),
+    n_parts = n_columns + n_cylinders
+    return SsmWorkspace(
+        rot=np.empty((7, 3, 3)),
+        pos=np.empty((7, 3)),
+        columns=np.repeat(arm.columns[None], N_NODES, axis=0),
+        gap=np.empty((N_NODES, n_parts)),
+        velocity=np.zeros((n_cylinders, 3)),
+        known_speed=np.zeros(n_parts),
+        x=np.zeros(N_NODES),
+        right=np.zeros(N_NODES, dtype=np.int64),
+        none=np.zeros(6),
+        q_node=np.zeros(6),
+        qd_node=np.zeros(6),
+        q_end=np.zeros(6),
+        qd_end=np.zeros(6),
+        c=np.zeros(6),
+        d=np.zeros(6),
+        deceleration=np.zeros(1),
+        end=JointState(np.zeros(6), np.zeros(6), np.zeros(6)),
+        cause=np.zeros(3),
     )
 
 
 @kernel(error_model="numpy")
 def place_node(
-    arm: Arm, columns: Vec, cylinders: Vec, q: Vec, node: int, since: float, watch: Watch
+    arm: Arm, people: PeopleShapes, q: Vec, node: int, age: float, space: SsmWorkspace
 ) -> None:
-    """Place the robot at ``q`` and write its distances to every part of the people.
+    """Place the robot at ``q`` and write its clearance to every part of the people.
 
     Args:
         arm: Robot in its cell.
-        columns: The people's capsules, shape (9, m).
-        cylinders: Cylinders: x, y, radius, top [m], shape (n, 4).
-        q: Joints [rad], shape (6,).
-        node: Which node.
-        since: How long ago people were there [s]: where cylinders are known to go on, all of
-            their way since then counts.
-        watch: Work space.
+        people: People as observed.
+        q: Joint positions [rad], shape (6,).
+        node: Node to fill.
+        age: Time since the observation [s]; a cylinder with a known velocity counts along its
+            whole path since then.
+        space: Work space.
     """
-    robot, gap = watch.columns[node], watch.gap[node]
-    kinematics.link_poses(q, watch.rot, watch.pos)
-    place_capsules(watch.rot, watch.pos, arm.link, arm.p0, arm.span, 0, robot)
-    m = columns.shape[1]
-    gaps(robot, columns, gap[:m])
+    robot, gap = space.columns[node], space.gap[node]
+    kinematics.link_poses(arm.lengths, q, space.rot, space.pos)
+    place_capsules(space.rot, space.pos, arm.link, arm.p0, arm.span, 0, robot)
+    m = people.columns.shape[1]
+    capsule_clearances(robot, people.columns, gap[:m])
+    cylinders = people.cylinders
     for k in range(cylinders.shape[0]):
         x, y, r, top = cylinders[k, 0], cylinders[k, 1], cylinders[k, 2], cylinders[k, 3]
-        if watch.going_speed[m + k] * since > 0.0:
-            sx, sy, growth = watch.going[k, 0], watch.going[k, 1], watch.going[k, 2]
-            r += max(0.0, growth) * since
-            gap[m + k] = swept_clearance(robot, x, y, sx * since, sy * since, r)
+        if space.known_speed[m + k] * age > 0.0:
+            vx, vy, growth = space.velocity[k, 0], space.velocity[k, 1], space.velocity[k, 2]
+            r += max(0.0, growth) * age
+            gap[m + k] = swept_clearance(robot, x, y, vx * age, vy * age, r)
         else:
             gap[m + k], _ = cylinder_clearance(robot, 0, x, y, r, top)
 
 
 @kernel(error_model="numpy", inline="always")
-def reached(safety: Safety, since: float, t: float, node: int, watch: Watch) -> bool:
-    """Whether a part that may not be touched in motion could be within reach at a node."""
-    gap = watch.gap[node]
+def violates_separation(
+    rule: SeparationRule, age: float, t: float, node: int, space: SsmWorkspace
+) -> bool:
+    """Return whether a part that may not be touched could be in contact at a node.
+
+    Args:
+        rule: Assumptions.
+        age: Time since people were observed [s].
+        t: Time of the node on the path [s].
+        node: Node.
+        space: Work space.
+    """
+    gap = space.gap[node]
     for j in range(gap.shape[0]):
-        reach = safety.speed[j] * since + safety.margin
-        if safety.contact_speed[j] <= 0.0 and not gap[j] >= reach:
-            watch.why[WHEN], watch.why[WHO], watch.why[SLACK] = t, j, reach - gap[j]
+        reach = rule.speed[j] * age + rule.margin
+        if rule.contact_speed[j] <= 0.0 and not gap[j] >= reach:
+            cause = space.cause
+            cause[CAUSE_TIME], cause[CAUSE_PART], cause[CAUSE_SHORTFALL] = t, j, reach - gap[j]
             return True
     return False
 
 
 @kernel(error_model="numpy")
-def path_bounds(arm: Arm, qd: Vec, c: Vec, d: Vec, s_end: float) -> tuple[float, float]:
-    """Return bounds on the first and second derivative along a path of any point's place.
+def path_bounds(arm: Arm, path: JointPath, s_end: float) -> tuple[float, float]:
+    """Return bounds on the first and second derivative along a path of any robot point.
 
     Args:
         arm: Robot in its cell.
-        qd: First coefficients [rad/s], shape (6,).
-        c: Second coefficients [rad/s^2], shape (6,).
-        d: Third coefficients [rad/s^3], shape (6,).
-        s_end: Where the path ends [s].
+        path: Path of all joints.
+        s_end: End of the path [s].
 
     Returns:
         ``|dp/ds|`` [m/s] and ``|d2p/ds2|`` [m/s^2], for s in [0, s_end].
     """
+    _, qd, c, d = path
     angular, swing, push = 0.0, 0.0, 0.0
     for j in range(6):
         bend = 3.0 * d[j] * s_end
@@ -195,94 +228,87 @@ def path_bounds(arm: Arm, qd: Vec, c: Vec, d: Vec, s_end: float) -> tuple[float,
 
 @kernel(error_model="numpy", inline="always")
 def _interval_clear(
-    safety: Safety, since: float, t: float, span: float, way: float, rate: float, first: float,
-    second: float, a: int, b: int, watch: Watch,
-) -> tuple[bool, float]:  # fmt: skip
-    """Whether nobody can be met between two nodes too fast.
+    rule: SeparationRule,
+    segment: PathSegment,
+    latency: float,
+    a: int,
+    b: int,
+    space: SsmWorkspace,
+) -> tuple[bool, float]:
+    """Return whether the robot meets nobody too fast between two nodes.
 
     Args:
-        safety: What the rule assumes.
-        since: How long ago people were seen by the end [s].
-        t: When the interval ends, on the path [s].
-        span: How long it is [s].
-        way: Length of the interval along the path [s].
-        rate: Rate at its start, the greatest in it.
-        first: Bound on ``|dp/ds|`` [m/s].
-        second: Bound on ``|d2p/ds2|`` [m/s^2].
-        a: Node at the start.
-        b: Node at the end.
-        watch: Both nodes are placed.
+        rule: Assumptions.
+        segment: Segment of the path.
+        latency: Age of people at the start of the period [s].
+        a: Node at the start; placed.
+        b: Node at the end; placed.
+        space: Work space.
 
     Returns:
-        Whether it is clear, and the farthest any point of robot and people goes as known [m].
+        Whether it is clear, and a bound on the displacement of robot and people in it [m].
     """
-    fastest = first
-    if way > 0.0:
-        chord = greatest_displacement(watch.columns[a], watch.columns[b])
-        fastest = min(first, chord / way + 0.5 * way * second)
-    w = fastest * way
-    before, after = watch.gap[a], watch.gap[b]
+    xa, xb = space.x[a], space.x[b]
+    sa, path_speed = path_parameter(segment.deceleration, xa)
+    sb, _ = path_parameter(segment.deceleration, xb)
+    t, length = segment.start + xb, sb - sa
+    span, age = xb - xa, latency + t
+    fastest = segment.speed
+    if length > 0.0:
+        chord = greatest_displacement(space.columns[a], space.columns[b])
+        fastest = min(segment.speed, chord / length + 0.5 * length * segment.curvature)
+    w = fastest * length
+    before, after = space.gap[a], space.gap[b]
     for j in range(before.shape[0]):
-        both = w + watch.going_speed[j] * span
+        both = w + space.known_speed[j] * span
         least = 0.5 * (before[j] + after[j] - both)
-        reach = safety.speed[j] * since + safety.margin
-        if not (least > reach or rate * fastest <= safety.contact_speed[j]):
-            watch.why[WHEN], watch.why[WHO], watch.why[SLACK] = t, j, reach - least
-            return False, both + safety.speed[j] * span
+        reach = rule.speed[j] * age + rule.margin
+        if not (least > reach or path_speed * fastest <= rule.contact_speed[j]):
+            cause = space.cause
+            cause[CAUSE_TIME], cause[CAUSE_PART], cause[CAUSE_SHORTFALL] = t, j, reach - least
+            return False, both + rule.speed[j] * span
     return True, w
 
 
 @kernel(error_model="numpy")
 def segment_clear(
-    arm: Arm, safety: Safety, lead: float, columns: Vec, cylinders: Vec, q: Vec, qd: Vec,
-    c: Vec, d: Vec, drop: float, t0: float, first: float, second: float, left: int, last: int,
-    watch: Watch,
-) -> bool:  # fmt: skip
-    """Whether nobody can be met too fast on one segment of a path: the piece, or its stop.
+    arm: Arm,
+    rule: SeparationRule,
+    latency: float,
+    people: PeopleShapes,
+    segment: PathSegment,
+    space: SsmWorkspace,
+) -> bool:
+    """Return whether the robot meets nobody too fast on one segment of a path.
 
     Args:
         arm: Robot in its cell.
-        safety: What the rule assumes.
-        lead: How much older than the robot's state the people are [s].
-        columns: The people's capsules, shape (9, m).
-        cylinders: Cylinders: x, y, radius, top [m], shape (n, 4).
-        q: Joints at the start of the segment [rad], shape (6,).
-        qd: Speeds there [rad/s], shape (6,).
-        c: Second coefficients [rad/s^2], shape (6,).
-        d: Third coefficients [rad/s^3], shape (6,).
-        drop: What the rate loses per second [1/s].
-        t0: When the segment starts, on the path [s].
-        first: Bound on ``|dp/ds|`` [m/s].
-        second: Bound on ``|d2p/ds2|`` [m/s^2].
-        left: Node at its start.
-        last: Node at its end.
-        watch: Both are placed, and ``x`` is set for both.
+        rule: Assumptions.
+        latency: Age of people at the start of the period [s].
+        people: People as observed.
+        segment: Segment; its nodes are placed.
+        space: Work space.
     """
-    top, fresh = 0, FIRST_BETWEEN
-    watch.right[0] = last
+    top, fresh, left = 0, FIRST_BETWEEN, segment.first
+    space.right[0] = segment.last
     while top >= 0:
-        b = watch.right[top]
-        xa, xb = watch.x[left], watch.x[b]
-        sa, rate = clock(drop, xa)
-        sb, _ = clock(drop, xb)
-        t = t0 + xb
-        clear, w = _interval_clear(
-            safety, lead + t, t, xb - xa, sb - sa, rate, first, second, left, b, watch
-        )
+        b = space.right[top]
+        clear, w = _interval_clear(rule, segment, latency, left, b, space)
         if clear:
             left = b
             top -= 1
             continue
         if w < RESOLUTION or fresh == N_NODES:
             return False
-        x = 0.5 * (xa + xb)
-        motion_at(q, qd, c, d, drop, x, watch.q_node, watch.qd_node)
-        since = lead + t0 + x
-        place_node(arm, columns, cylinders, watch.q_node, fresh, since, watch)
-        if reached(safety, since, t0 + x, fresh, watch):
+        x = 0.5 * (space.x[left] + space.x[b])
+        motion_at(segment.path, segment.deceleration, x, space.q_node, space.qd_node)
+        t = segment.start + x
+        age = latency + segment.start + x
+        place_node(arm, people, space.q_node, fresh, age, space)
+        if violates_separation(rule, age, t, fresh, space):
             return False
-        watch.x[fresh] = x
+        space.x[fresh] = x
         top += 1
-        watch.right[top] = fresh
+        space.right[top] = fresh
         fresh += 1
     return True

@@ -6,7 +6,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from app.sim.collision.kernels.contact import NO_CONTACT, sweep
+from app.sim.collision.kernels.contact import NO_CONTACT, PeriodMotion, sweep
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
 from app.sim.geometry.capsules import copy_rows
@@ -19,8 +19,9 @@ from app.sim.people.kernels.people import (
     keep_distances,
     place_people,
 )
-from app.sim.robot.kernels.actions import ActionRule, advance
+from app.sim.robot.kernels.actions import ActionRule, Coefficients, advance
 from app.sim.robot.kernels.arm import Arm, RobotPose, copy_capsules, place_robot
+from app.sim.robot.kernels.joints import JointPath, JointState
 
 RUNNING, SUCCESS, COLLISION, TIMEOUT, UNFEASIBLE = range(5)
 """How an episode stands."""
@@ -102,21 +103,25 @@ def move(
     copy_rows(people.cylinders[e], crowd.cylinders0)
     for w in range(people.q.shape[1]):
         crowd.pelvis_z[0, w] = people.size[e, w, PELVIS_Z]
-    unfeasible = advance(
-        action, state.q[e], state.qd[e], state.qdd[e], act,
-        arm.limits.q_min, arm.limits.q_max, arm.limits.qd_max, arm.limits.qdd_max,
-        arm.limits.jerk_max, arm.dt,
-        work.c, work.d, work.q, work.qd, work.qdd,
-    )  # fmt: skip
+    start = JointState(state.q[e], state.qd[e], state.qdd[e])
+    segment, end = Coefficients(work.c, work.d), JointState(work.q, work.qd, work.qdd)
+    unfeasible = advance(action, arm.limits, arm.dt, start, act, segment, end)
     state.elapsed[e] += arm.dt
     state.time_left[e] -= arm.dt
     advance_people(everybody, people, e, state.robot[e], arm.dt, crowd.away)
     copy_rows(people.size[e], crowd.size)
+    path = JointPath(state.q[e], state.qd[e], work.c, work.d)
+    motion = PeriodMotion(path, work.q, people.q[e], people.cylinders[e])
     kind, _ = sweep(
-        arm, everybody, state.q[e], state.qd[e], work.c, work.d, work.q,
-        people.q[e], people.cylinders[e], state.robot[e], people.columns[e], state.clear[e],
-        robot, crowd,
-    )  # fmt: skip
+        arm,
+        everybody,
+        motion,
+        state.robot[e],
+        people.columns[e],
+        state.clear[e],
+        robot,
+        crowd,
+    )
     for j in range(6):
         state.q[e, j], state.qd[e, j], state.qdd[e, j] = work.q[j], work.qd[j], work.qdd[j]
     if kind != NO_CONTACT:

@@ -8,6 +8,7 @@ from app.sim.collision.contact import clearance, contact
 from app.sim.collision.fcl_recheck import Recheck, Trajectory
 from app.sim.collision.fcl_reference import CollisionReference
 from app.sim.human import model as human
+from app.sim.robot.kernels.joints import JointPath
 from app.sim.robot.ur10 import Robot
 from app.sim.scene.scene import NO_CYLINDERS, arm_of, people_of, with_people
 
@@ -70,7 +71,7 @@ def test_sweep_is_never_later_than_the_meshes_at_millisecond_substeps(
         period = Period(cell, rng, robot, hurry)
         human_q = period.human0[None], period.human1[None]
         zero = np.zeros(6)
-        found = contact(arm, people, period.q, period.qd, period.c, zero, human_q)
+        found = contact(arm, people, JointPath(period.q, period.qd, period.c, zero), human_q)
         touches = recheck.first_contact(period.rows(SUBSTEPS)) is not None
         assert not (touches and found.kind == "none")
         verdicts.append((found.kind != "none", touches))
@@ -113,7 +114,7 @@ def test_clearance_is_that_of_hulls_less_what_capsules_add(cell: Cell) -> None:
 def test_standing_still_at_home_reports_no_contact_and_the_distance(cell: Cell) -> None:
     arm, people, zero = arm_of(cell), people_of(cell), np.zeros(6)
     human_q = human.rest_posture(*cell.human.home)[None]
-    found = contact(arm, people, arm.home, zero, zero, zero, (human_q, human_q))
+    found = contact(arm, people, JointPath(arm.home, zero, zero, zero), (human_q, human_q))
     assert found.kind == "none"
     hull = CollisionReference(cell, "hull").distance(arm.home, human_q[0]).value
     assert found.clearance_m <= hull < found.clearance_m + EARLY
@@ -129,7 +130,11 @@ def test_sweep_beside_walkers_is_never_later_than_poses_every_millisecond(cell: 
         before = np.column_stack([at, rng.uniform(0.2, 0.5, 2)])
         after = before + rng.uniform(-1.0, 1.0, (2, 3)) * [0.1, 0.1, 0.03]
         found = contact(
-            arm, people, period.q, period.qd, period.c, zero, (nobody, nobody), (before, after)
+            arm,
+            people,
+            JointPath(period.q, period.qd, period.c, zero),
+            (nobody, nobody),
+            (before, after),
         )
         touches = False
         parts = np.linspace(0.0, 1.0, SUBSTEPS + 1)

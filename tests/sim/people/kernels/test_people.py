@@ -9,6 +9,7 @@ from app.sim.collision.contact import clearance, contact
 from app.sim.human import model as human
 from app.sim.pick.batch import OUTCOMES, PickBatch, PickSettings
 from app.sim.pick.kernels import episode as kernel
+from app.sim.robot.kernels.joints import JointPath
 from app.sim.scene import scene
 from app.sim.scene.scene import HumanKind, arm_of, people_of, with_people
 
@@ -116,10 +117,10 @@ def test_contact_names_the_person_that_is_touched() -> None:
     near = human.reach("r", grip, human.rest_posture(*cell.human.home), cell.body).q
     far, by = np.array([[3.0, 3.0, 0.3]]), np.array([[0.1, 0.9, 0.3]])
     both = np.stack([away, near])
-    found = contact(arm, people, q, zero, zero, zero, (both, both), (far, far))
+    found = contact(arm, people, JointPath(q, zero, zero, zero), (both, both), (far, far))
     assert (found.kind, found.part) in {("human", "hand_r"), ("human", "forearm_r")}
     gone = np.stack([away, away])
-    found = contact(arm, people, q, zero, zero, zero, (gone, gone), (by, by))
+    found = contact(arm, people, JointPath(q, zero, zero, zero), (gone, gone), (by, by))
     assert (found.kind, found.part) == ("human", "walker")
 
 
@@ -131,7 +132,9 @@ def test_a_walker_that_passes_between_two_poses_is_a_contact() -> None:
     q = PickBatch(CELL, 1, 0, PickSettings()).world.station_q[3]
     for cylinders in (before, after):
         assert clearance(arm, people, q, nobody, cylinders).people_m > 0.3
-    found = contact(arm, people, q, zero, zero, zero, (nobody, nobody), (before, after))
+    found = contact(
+        arm, people, JointPath(q, zero, zero, zero), (nobody, nobody), (before, after)
+    )
     assert found.kind == "human"
     assert 0.0 < found.time_s < arm.dt
 

@@ -57,12 +57,12 @@ def test_postures_lie_where_success_counts():
 def test_alone_every_role_arrives_at_once():
     times = {
         role: run(role, None).runs()
-        for role in ("once", "replan-on-blocked", "replan-every-cycle")
+        for role in ("plan-once", "replan-on-blocked", "replan-every-cycle")
     }
     for runs in times.values():
         assert runs.arrived.all()
         assert (runs.stopped_s == 0.0).all()
-        np.testing.assert_allclose(runs.seconds, times["once"].seconds, atol=0.05)
+        np.testing.assert_allclose(runs.seconds, times["plan-once"].seconds, atol=0.05)
 
 
 def test_a_planner_waits_until_who_holds_it_has_gone():
@@ -73,7 +73,7 @@ def test_a_planner_waits_until_who_holds_it_has_gone():
 
 
 def test_a_blind_planner_is_told_of_nobody():
-    told = run("once", in_the_way(2.0), blind=True).runs()
-    alone = run("once", None).runs()
+    told = run("plan-once", in_the_way(2.0), blind=True).runs()
+    alone = run("plan-once", None).runs()
     np.testing.assert_allclose(told.joint_way, alone.joint_way, atol=0.1)
     assert (told.seconds > alone.seconds + 1.0).all()

@@ -13,9 +13,11 @@ from app.sim.robot.kernels.actions import (
     SPEED,
     VIABLE,
     ActionRule,
+    Coefficients,
     advance,
 )
 from app.sim.robot.kernels.jerk_bounds import manoeuvre_extremes
+from app.sim.robot.kernels.joints import AxisLimits, JointLimits, JointState
 
 TOLERANCE = 1e-9
 N = 6
@@ -93,6 +95,10 @@ def pushes(kind: str, limit: Limits, n_steps: int, rng: np.random.Generator):
     return lambda k, _: plan[k]
 
 
+def move(rule, limit: Limits, start, act, out, end) -> bool:
+    return advance(rule, JointLimits(*limit[:5]), limit.dt, start, act, out, end)
+
+
 def walk(
     rule: ActionRule, limit: Limits, kind: str, n_steps: int, seed: int, start=None
 ) -> Walk:
@@ -106,9 +112,8 @@ def walk(
         q[0], qd[0], qdd[:] = start
     n_empty = 0
     for k in range(n_steps):
-        n_empty += advance(
-            rule, q[k], qd[k], qdd, push(k, q[k]), *limit, c[k], d[k], q[k + 1], qd[k + 1], qdd
-        )
+        start, end = JointState(q[k], qd[k], qdd), JointState(q[k + 1], qd[k + 1], qdd)
+        n_empty += move(rule, limit, start, push(k, q[k]), Coefficients(c[k], d[k]), end)
     return Walk(q, qd, c, d, n_empty)
 
 
@@ -235,10 +240,9 @@ def test_the_quick_default_equals_clipping_into_the_interval() -> None:
         one = walk(ActionRule(2, VIABLE, SPEED), limit, "ends at random", 300, seed=7)
         push = pushes("ends at random", limit, 300, np.random.default_rng(7))
         for k, j in itertools.product(range(300), range(N)):
-            of_joint = [limit[i][j] for i in range(4)]
-            low, high = polynomial.coefficient_interval(
-                one.q[k, j], one.qd[k, j], *of_joint, limit.dt
-            )
+            of_joint = [limit[i][j] for i in range(5)]
+            axis = AxisLimits(*of_joint, limit.dt)
+            low, high = polynomial.coefficient_interval(one.q[k, j], one.qd[k, j], axis)
             target = push(k, None)[j] * limit.qd_max[j]
             wanted = (target - one.qd[k, j]) / (2 * limit.dt)
             near = min(high, max(low, wanted))
@@ -249,10 +253,10 @@ def single(
     rule: ActionRule, q: float, qd: float, qdd: float, act: float, limit: Limits
 ) -> tuple:
     """First joint's c, d, acceleration after the period, and the verdict."""
-    state = [np.full(N, v) for v in (q, qd, qdd)]
-    c, d, out = np.empty(N), np.empty(N), [np.empty(N) for _ in range(3)]
-    empty = advance(rule, *state, np.full(N, act), *limit, c, d, *out)
-    return c[0], d[0], out[2][0], empty
+    start = JointState(*(np.full(N, v) for v in (q, qd, qdd)))
+    out, end = Coefficients(*np.empty((2, N))), JointState(*np.empty((3, N)))
+    empty = move(rule, limit, start, np.full(N, act), out, end)
+    return out.c[0], out.d[0], end.qdd[0], empty
 
 
 def test_an_action_picks_its_place_in_the_interval() -> None:
@@ -277,24 +281,12 @@ def test_the_second_degree_says_the_acceleration_it_drove_with() -> None:
 @pytest.mark.parametrize("meaning", [SPEED, COEFFICIENT])
 def test_a_joint_without_action_comes_to_rest_at_zero(degree: int, meaning: int) -> None:
     limit = limits(2.0, 0.5, 3.0, 50.0, 0.05)
-    q, qd, qdd, c, d = np.full(N, 0.3), np.zeros(N), np.zeros(N), np.empty(N), np.empty(N)
+    at, out = JointState(np.full(N, 0.3), np.zeros(N), np.zeros(N)), np.empty((2, N))
     for _ in range(200):
-        advance(
-            ActionRule(degree, VIABLE, meaning),
-            q,
-            qd,
-            qdd,
-            np.ones(5),
-            *limit,
-            c,
-            d,
-            q,
-            qd,
-            qdd,
-        )
-    assert abs(q[5]) < 1e-6
-    assert abs(qd[5]) < 1e-6
-    assert q[0] == pytest.approx(limit.q_max[0], abs=1e-6)
+        move(ActionRule(degree, VIABLE, meaning), limit, at, np.ones(5), Coefficients(*out), at)
+    assert abs(at.q[5]) < 1e-6
+    assert abs(at.qd[5]) < 1e-6
+    assert at.q[0] == pytest.approx(limit.q_max[0], abs=1e-6)
 
 
 @pytest.mark.parametrize("degree", [2, 3])
@@ -313,13 +305,14 @@ def unfeasible_share(qdd_max: float, push: str, n: int) -> float:
         np.full(N, 50.0), 0.02,
     )  # fmt: skip
     rng, rule = np.random.default_rng(19), ActionRule(2, MYOPIC, COEFFICIENT)
-    c, d, qdd, ended = np.empty(N), np.empty(N), np.zeros(N), 0
+    out, ended = Coefficients(*np.empty((2, N))), 0
     for _ in range(n):
-        q, qd = 0.9 * rng.uniform(limit.q_min, limit.q_max), np.zeros(N)
+        q = 0.9 * rng.uniform(limit.q_min, limit.q_max)
+        at = JointState(q, np.zeros(N), np.zeros(N))
         random = rng.uniform(-1, 1, (250, N))
         constant = np.broadcast_to(rng.choice([-1.0, 1.0], N), (250, N)).copy()
         for act in random if push == "random" else constant:
-            if advance(rule, q, qd, qdd, act, *limit, c, d, q, qd, qdd):
+            if move(rule, limit, at, act, out, at):
                 ended += 1
                 break
     return ended / n

@@ -6,6 +6,7 @@ import pytest
 from app.sim.cells.cell import load_cell
 from app.sim.geometry.capsules import ends_of
 from app.sim.robot.kernels import arm as kernel
+from app.sim.robot.kernels.joints import JointPath
 from app.sim.robot.ur10 import Robot
 from app.sim.scene.scene import arm_of
 
@@ -28,7 +29,9 @@ def test_speed_bound_holds_for_every_point_of_the_robot(degree: int) -> None:
 
         kernel.place_robot(arm, q, before)
         kernel.place_robot(arm, at(arm.dt), after)
-        bound = kernel.robot_speed_bound(arm, qd, c, d, before.columns, after.columns)
+        bound = kernel.robot_speed_bound(
+            arm, JointPath(q, qd, c, d), before.columns, after.columns
+        )
         for x in np.linspace(0.0, arm.dt, 9):
             kernel.place_robot(arm, at(x), now)
             kernel.place_robot(arm, at(x + tick), soon)

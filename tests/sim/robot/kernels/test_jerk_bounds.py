@@ -4,19 +4,19 @@ import numpy as np
 import pytest
 
 from app.sim.robot.kernels import jerk_bounds as jerk
-from app.sim.robot.kernels.jerk_bounds import Limits
+from app.sim.robot.kernels.joints import AxisLimits, AxisState
 
-CHAPTER_4 = Limits(-2.0, 2.0, 1.0, 5.0, 50.0, 0.02)
+CHAPTER_4 = AxisLimits(-2.0, 2.0, 1.0, 5.0, 50.0, 0.02)
 SETS = (
     CHAPTER_4,
-    Limits(-0.3, 0.2, 0.5, 3.0, 50.0, 0.05),
-    Limits(-0.5, 0.5, 1.0, 2.0, 9.3, 0.033),
-    Limits(-1.0, 1.0, 1.0, 1.0, 0.7, 0.1),
-    Limits(-0.2, 0.2, 2.0, 5.0, 500.0, 0.05),
+    AxisLimits(-0.3, 0.2, 0.5, 3.0, 50.0, 0.05),
+    AxisLimits(-0.5, 0.5, 1.0, 2.0, 9.3, 0.033),
+    AxisLimits(-1.0, 1.0, 1.0, 1.0, 0.7, 0.1),
+    AxisLimits(-0.2, 0.2, 2.0, 5.0, 500.0, 0.05),
 )
 
 
-def simulate_stop(qd: float, qdd: float, to: Limits) -> np.ndarray:
+def simulate_stop(qd: float, qdd: float, to: AxisLimits) -> np.ndarray:
     """Displacement and speed of the stop at 200 times a period, until rest, shape (2, n)."""
     x, q, parts = np.linspace(0, to.dt, 201), 0.0, []
     for _ in range(5_000):
@@ -30,14 +30,14 @@ def simulate_stop(qd: float, qdd: float, to: Limits) -> np.ndarray:
     raise AssertionError("never at rest")
 
 
-def random_motion(to: Limits, rng: np.random.Generator) -> tuple[float, float]:
+def random_motion(to: AxisLimits, rng: np.random.Generator) -> tuple[float, float]:
     """Speed and acceleration, of any size up to the limits."""
     size = rng.choice([1.0, 0.1, 0.01], 2)
     qd, qdd = rng.uniform(-1, 1, 2) * size * (to.qd_max, to.qdd_max)
     return float(qd), float(qdd)
 
 
-def viable_states(to: Limits, n: int, seed: int):
+def viable_states(to: AxisLimits, n: int, seed: int):
     """States on the way of a joint that is pushed about at random."""
     rng = np.random.default_rng(seed)
     q, qd, qdd = rng.uniform(to.q_min, to.q_max), 0.0, 0.0
@@ -45,7 +45,7 @@ def viable_states(to: Limits, n: int, seed: int):
         if k % 11 == 0:
             target = rng.choice([-1, 1]) * to.qd_max
         yield q, qd, qdd
-        j, empty = jerk.jerk_for_speed(q, qd, qdd, target, to)
+        j, empty = jerk.jerk_for_speed(AxisState(q, qd, qdd), target, to)
         assert not empty
         q += to.dt * (qd + to.dt * (qdd / 2 + to.dt * j / 6))
         qd, qdd = qd + to.dt * (qdd + to.dt * j / 2), qdd + to.dt * j
@@ -65,7 +65,7 @@ def test_stop_counts_the_acceleration_left_over() -> None:
 
 
 @pytest.mark.parametrize("to", SETS)
-def test_extremes_in_closed_form_are_those_of_the_simulated_stop(to: Limits) -> None:
+def test_extremes_in_closed_form_are_those_of_the_simulated_stop(to: AxisLimits) -> None:
     rng = np.random.default_rng(31)
     for _ in range(60):
         qd, qdd = random_motion(to, rng)
@@ -76,7 +76,7 @@ def test_extremes_in_closed_form_are_those_of_the_simulated_stop(to: Limits) -> 
 
 
 @pytest.mark.parametrize("to", SETS)
-def test_extremes_inside_a_period_are_those_of_its_samples(to: Limits) -> None:
+def test_extremes_inside_a_period_are_those_of_its_samples(to: AxisLimits) -> None:
     rng, x = np.random.default_rng(32), np.linspace(0, to.dt, 2_001)
     for _ in range(300):
         qd, qdd = random_motion(to, rng)
@@ -89,7 +89,7 @@ def test_extremes_inside_a_period_are_those_of_its_samples(to: Limits) -> None:
 
 
 @pytest.mark.parametrize("to", SETS)
-def test_interval_ends_where_brute_force_finds_the_last_admissible_jerk(to: Limits) -> None:
+def test_interval_ends_where_brute_force_finds_the_last_admissible_jerk(to: AxisLimits) -> None:
     def holds(q: float, qd: float, qdd: float, j: float) -> bool:
         x = np.linspace(0, to.dt, 201)
         at, speed = q + x * (qd + x * (qdd / 2 + x * j / 6)), qd + x * (qdd + x * j / 2)
@@ -100,7 +100,7 @@ def test_interval_ends_where_brute_force_finds_the_last_admissible_jerk(to: Limi
 
     n_bound, step = 0, 1e-3 * to.jerk_max
     for q, qd, qdd in list(viable_states(to, 400, 33))[::8]:
-        low, high, empty = jerk.jerk_interval(q, qd, qdd, to)
+        low, high, empty = jerk.jerk_interval(AxisState(q, qd, qdd), to)
         assert not empty
         assert holds(q, qd, qdd, low)
         assert holds(q, qd, qdd, high)
@@ -114,21 +114,21 @@ def test_interval_ends_where_brute_force_finds_the_last_admissible_jerk(to: Limi
 
 
 @pytest.mark.parametrize("to", SETS)
-def test_a_greater_jerk_goes_no_less_far_up_and_no_farther_down(to: Limits) -> None:
+def test_a_greater_jerk_goes_no_less_far_up_and_no_farther_down(to: AxisLimits) -> None:
     jerks = np.linspace(-to.jerk_max, to.jerk_max, 101)
     for q, qd, qdd in viable_states(to, 60, 34):
-        below, above = np.array([jerk.excesses(j, q, qd, qdd, to) for j in jerks]).T
+        below, above = np.array([jerk.excesses(j, AxisState(q, qd, qdd), to) for j in jerks]).T
         assert (np.diff(above) >= -1e-12).all()
         assert (np.diff(below) <= 1e-12).all()
 
 
 @pytest.mark.parametrize("to", SETS)
-def test_holding_a_target_speed_settles_without_overshoot(to: Limits) -> None:
+def test_holding_a_target_speed_settles_without_overshoot(to: AxisLimits) -> None:
     free = to._replace(q_min=-1e3, q_max=1e3)
     for target in (1.0, 0.37, -0.8, 0.01):
         q, qd, qdd, seen = 0.0, 0.0, 0.0, []
         for _ in range(200):
-            j, _ = jerk.jerk_for_speed(q, qd, qdd, target * to.qd_max, free)
+            j, _ = jerk.jerk_for_speed(AxisState(q, qd, qdd), target * to.qd_max, free)
             q += to.dt * (qd + to.dt * (qdd / 2 + to.dt * j / 6))
             qd, qdd = qd + to.dt * (qdd + to.dt * j / 2), qdd + to.dt * j
             seen.append(qd / (target * to.qd_max))
@@ -138,15 +138,15 @@ def test_holding_a_target_speed_settles_without_overshoot(to: Limits) -> None:
 
 
 @pytest.mark.parametrize("to", SETS)
-def test_a_joint_at_rest_on_its_limit_stays_and_can_leave(to: Limits) -> None:
+def test_a_joint_at_rest_on_its_limit_stays_and_can_leave(to: AxisLimits) -> None:
     for side, limit in ((1, to.q_max), (-1, to.q_min)):
-        low, high, empty = jerk.jerk_interval(limit, 0.0, 0.0, to)
+        low, high, empty = jerk.jerk_interval(AxisState(limit, 0.0, 0.0), to)
         assert not empty
         assert (high if side > 0 else -low) == pytest.approx(0.0, abs=1e-6 * to.jerk_max)
         assert (low if side > 0 else -high) < -0.1 * min(
             to.jerk_max, to.qdd_max / to.dt, to.qd_max / to.dt**2, to.q_max / to.dt**3
         )
-        outward, _ = jerk.jerk_for_speed(limit, 0.0, 0.0, side * to.qd_max, to)
+        outward, _ = jerk.jerk_for_speed(AxisState(limit, 0.0, 0.0), side * to.qd_max, to)
         assert outward == pytest.approx(0.0, abs=1e-6 * to.jerk_max)
 
 
@@ -156,5 +156,5 @@ def test_a_joint_at_rest_on_its_limit_stays_and_can_leave(to: Limits) -> None:
 def test_a_state_that_cannot_be_kept_has_an_empty_interval_and_brakes(state) -> None:
     q, qd, qdd = (float(v) for v in state)
     braking = jerk.settling_jerk(qd, qdd, 5.0, 50.0, 0.02)
-    assert jerk.jerk_interval(q, qd, qdd, CHAPTER_4) == (braking, braking, True)
-    assert jerk.jerk_for_speed(q, qd, qdd, 1.0, CHAPTER_4) == (braking, True)
+    assert jerk.jerk_interval(AxisState(q, qd, qdd), CHAPTER_4) == (braking, braking, True)
+    assert jerk.jerk_for_speed(AxisState(q, qd, qdd), 1.0, CHAPTER_4) == (braking, True)

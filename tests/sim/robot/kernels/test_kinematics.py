@@ -48,9 +48,7 @@ def test_jacobian_is_pinocchios() -> None:
 def test_posture_with_the_tool_down_brings_pinocchios_tcp_to_the_target() -> None:
     robot, arm = Robot(), arm_of(load_cell())
     targets = np.random.default_rng(54).uniform([-1, -1, 0], [1, 1, 0.8], (4000, 3))
-    postures, reached = kinematics.ik_vertical_batch(
-        targets, 0.12, arm.limits.q_min, arm.limits.q_max
-    )
+    postures, reached = kinematics.ik_vertical_batch(arm.lengths, arm.limits, targets)
     for target, q in zip(targets[reached], postures[reached], strict=True):
         pose = robot.tcp_pose(q)
         assert pose[:3, 3] == pytest.approx(target, abs=EXACT)

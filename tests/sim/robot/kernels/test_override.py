@@ -1,38 +1,40 @@
-"""Scaled pieces and stops: on the commanded path, inside every limit."""
+"""Scaled motions and stops: on the commanded path, inside every limit."""
 
 import numpy as np
 import pytest
 
 from app.sim.robot.kernels import override
+from app.sim.robot.kernels.joints import JointLimits, JointPath
 
 DT = 0.05
 Q_MIN, Q_MAX = np.full(6, -2.0), np.full(6, 2.0)
-QD_MAX, QDD_MAX = np.full(6, 0.5), np.array([3.0, 3.0, 2.0, 3.0, 4.0, 3.0])
+QDD_MAX = np.array([3.0, 3.0, 2.0, 3.0, 4.0, 3.0])
+LIMITS = JointLimits(Q_MIN, Q_MAX, np.full(6, 0.5), QDD_MAX, np.full(6, np.inf))
 
 
-def pieces(n, seed, cubic=True):
-    """Random states with pieces that keep speed and acceleration limits."""
+def paths(n, seed, cubic=True):
+    """Random paths that keep position, speed and acceleration limits."""
     rng = np.random.default_rng(seed)
     while n:
         q, qd = rng.uniform(-1.5, 1.5, 6), rng.uniform(-0.5, 0.5, 6)
         c = 0.5 * rng.uniform(-1.0, 1.0, 6) * QDD_MAX
         d = rng.uniform(-8.0, 8.0, 6) if cubic else np.zeros(6)
-        limits = zip(q, qd, c, d, Q_MIN, Q_MAX, QD_MAX, QDD_MAX, strict=True)
-        if all(override.joint_keeps_limits(*row[:4], DT, *row[4:]) for row in limits):
+        path = JointPath(q, qd, c, d)
+        if override.keeps_limits(path, LIMITS, DT):
             n -= 1
-            yield q, qd, c, d
+            yield path
 
 
-def at(piece, drop, t):
+def at(path, deceleration, t):
     q, qd = np.empty(6), np.empty(6)
-    override.motion_at(*piece, drop, t, q, qd)
+    override.motion_at(JointPath(*path), deceleration, t, q, qd)
     return q, qd
 
 
 def test_a_scaled_motion_stays_on_the_commanded_curve():
-    for q, qd, c, d in pieces(200, 1):
+    for q, qd, c, d in paths(200, 1):
         qd[0] = abs(qd[0]) + 0.01
-        c[0], d[0] = abs(c[0]), 0.0  # the first joint tells how far along the curve it is
+        c[0], d[0] = abs(c[0]), 0.0  # the position of the first joint determines s
         for part in (0.2, 0.5, 0.9, 1.0):
             there, _ = at((q, qd, c, d), (1.0 - 0.3) / DT, part * DT)
             s = max(np.roots([c[0], qd[0], q[0] - there[0]]).real)
@@ -41,26 +43,26 @@ def test_a_scaled_motion_stays_on_the_commanded_curve():
 
 
 def test_the_peak_of_acceleration_is_that_of_a_finely_sampled_motion():
-    for piece in pieces(100, 2):
-        drop, x, h = 0.6 / DT, np.linspace(0.0, DT, 401), 1e-6
-        speeds = np.array([[at(piece, drop, t + e)[1] for t in x] for e in (-h, h)])
+    for path in paths(100, 2):
+        deceleration, x, h = 0.6 / DT, np.linspace(0.0, DT, 401), 1e-6
+        speeds = np.array([[at(path, deceleration, t + e)[1] for t in x] for e in (-h, h)])
         sampled = np.abs((speeds[1] - speeds[0]) / (2.0 * h)).max(axis=0)
         s_end = 0.5 * 1.4 * DT
-        joints = zip(*piece[1:], strict=True)
-        exact = [override.acceleration_peak(*row, drop, s_end) for row in joints]
+        joints = zip(*path[1:], strict=True)
+        exact = [override.acceleration_peak(*row, deceleration, s_end) for row in joints]
         assert sampled == pytest.approx(exact, abs=2e-3)
 
 
 def test_the_least_override_keeps_limits_and_less_does_not():
-    for _, qd, c, d in pieces(300, 3):
-        low = override.lowest_override(qd, c, d, QDD_MAX, DT)
-        assert override.keeps_acceleration(qd, c, d, QDD_MAX, low, DT)
+    for path in paths(300, 3):
+        low = override.lowest_override(path, QDD_MAX, DT)
+        assert override.keeps_acceleration(path, QDD_MAX, low, DT)
         if override.LEAST_OVERRIDE < low:
-            assert not override.keeps_acceleration(qd, c, d, QDD_MAX, low - 0.001, DT)
+            assert not override.keeps_acceleration(path, QDD_MAX, low - 0.001, DT)
 
 
 def test_a_stop_is_straight_and_brakes_no_harder_than_it_may():
-    for q, qd, _, _ in pieces(100, 4):
+    for q, qd, _, _ in paths(100, 4):
         time, none = override.stop_time(qd, QDD_MAX), np.zeros(6)
         assert time == pytest.approx(np.max(np.abs(qd) / QDD_MAX))
         rest, still = at((q, qd, none, none), 1.0 / time, time)
@@ -70,7 +72,7 @@ def test_a_stop_is_straight_and_brakes_no_harder_than_it_may():
 
 
 def test_the_rest_of_a_stop_is_the_stop_from_there():
-    for q, qd, _, _ in pieces(100, 5):
+    for q, qd, _, _ in paths(100, 5):
         none, time = np.zeros(6), override.stop_time(qd, QDD_MAX)
         later, speeds = at((q, qd, none, none), 1.0 / time, 0.4 * time)
         again = override.stop_time(speeds, QDD_MAX)
@@ -80,7 +82,7 @@ def test_the_rest_of_a_stop_is_the_stop_from_there():
         assert first == pytest.approx(second, abs=1e-12)
 
 
-def test_a_piece_is_refused_exactly_where_a_sample_of_it_leaves_the_limits():
+def test_a_path_is_refused_exactly_where_a_sample_of_it_leaves_the_limits():
     rng, x = np.random.default_rng(6), np.linspace(0.0, DT, 2001)
     verdicts = []
     for _ in range(3000):
@@ -90,7 +92,8 @@ def test_a_piece_is_refused_exactly_where_a_sample_of_it_leaves_the_limits():
         speed, bend = qd + x * (2.0 * c + 3.0 * x * d), 2.0 * c + 6.0 * x * d
         excess = max(at_x.max() - 2.0, np.abs(speed).max() - 0.5, np.abs(bend).max() - 3.0)
         if abs(excess) > 1e-5:
-            kept = override.joint_keeps_limits(q, qd, c, d, DT, -2.0, 2.0, 0.5, 3.0)
+            path = JointPath(*(np.full(6, one) for one in (q, qd, c, d)))
+            kept = override.joint_keeps_limits(0, path, LIMITS, DT)
             assert kept == (excess < 0.0)
             verdicts.append(kept)
     assert 0.2 < np.mean(verdicts) < 0.8

@@ -1,4 +1,4 @@
-"""What the rule admits, against finely sampled motions."""
+"""Admitted paths, compared with finely sampled motions."""
 
 import numpy as np
 import pytest
@@ -6,8 +6,10 @@ import pytest
 from app.sim.cells.cell import load_cell
 from app.sim.geometry.capsules import capsules_soa
 from app.sim.robot.kernels import override
+from app.sim.robot.kernels.joints import JointPath
 from app.sim.safety.kernels import separation_check as watch
 from app.sim.safety.kernels import ssm
+from app.sim.safety.kernels.separation_check import PeopleShapes
 from app.sim.scene.scene import arm_of
 
 ARM = arm_of(load_cell("pick-and-place"))
@@ -18,6 +20,10 @@ def no_columns():
     return np.zeros((9, 0))
 
 
+def shapes(people):
+    return PeopleShapes(people, NO_CYLINDERS)
+
+
 def spheres(rng, n=8):
     """Spheres and short capsules around the robot."""
     start = rng.uniform([-1.2, -0.2, 0.0], [1.2, 1.6, 1.2], (n, 3))
@@ -26,7 +32,7 @@ def spheres(rng, n=8):
 
 
 def motions(n, seed):
-    """Random states in motion with pieces that keep the limits, and people near them."""
+    """Random states in motion with paths that keep the limits, and people near them."""
     rng = np.random.default_rng(seed)
     while n:
         q = rng.uniform(ARM.limits.q_min, ARM.limits.q_max) * 0.8
@@ -39,53 +45,65 @@ def motions(n, seed):
         yield q, qd, c, np.zeros(6), spheres(rng)
 
 
-def gaps_at(q, people, space):
-    watch.place_node(ARM, people, NO_CYLINDERS, q, watch.NOW, 0.0, space)
+def clearances_at(q, people, space):
+    watch.place_node(ARM, shapes(people), q, watch.NOW, 0.0, space)
     return space.gap[watch.NOW].copy()
 
 
 def path_of(q, qd, c, d, rate, times):
-    """Poses along a piece at an override and the stop after it, and when it rests."""
-    drop, q1, v1 = (1.0 - rate) / ARM.dt, np.empty(6), np.empty(6)
-    override.motion_at(q, qd, c, d, drop, ARM.dt, q1, v1)
+    """Poses along a path at an override and the stop after it, with their times."""
+    deceleration, q1, v1 = (1.0 - rate) / ARM.dt, np.empty(6), np.empty(6)
+    override.motion_at(JointPath(q, qd, c, d), deceleration, ARM.dt, q1, v1)
     stop = override.stop_time(v1, ARM.limits.qdd_max)
     poses, none = [], np.zeros(6)
     for t in times(ARM.dt + stop):
         out, speed = np.empty(6), np.empty(6)
         if t <= ARM.dt:
-            override.motion_at(q, qd, c, d, drop, t, out, speed)
+            override.motion_at(JointPath(q, qd, c, d), deceleration, t, out, speed)
         else:
-            override.motion_at(q1, v1, none, none, 1.0 / stop, t - ARM.dt, out, speed)
+            override.motion_at(
+                JointPath(q1, v1, none, none), 1.0 / stop, t - ARM.dt, out, speed
+            )
         poses.append((t, out))
     return poses
 
 
-def test_nobody_could_have_come_near_on_a_path_that_was_admitted():
+def test_nobody_can_come_near_on_an_admitted_path():
     space, admitted = watch.new_ssm_workspace(ARM, 8, 0), 0
-    rule = watch.Safety(np.full(8, 0.5), 0.02, 0.05, np.zeros(8))
+    rule = watch.SeparationRule(np.full(8, 0.5), 0.02, 0.05, np.zeros(8))
     for k, (q, qd, c, d, people) in enumerate(motions(400, 1)):
         rate = (1.0, 0.9)[k % 2]
-        gaps_at(q, people, space)
-        if not ssm.admissible(ARM, rule, 0.02, people, NO_CYLINDERS, q, qd, c, d, rate, space):
+        clearances_at(q, people, space)
+        if not ssm.admissible(
+            ARM, rule, 0.02, shapes(people), JointPath(q, qd, c, d), rate, space
+        ):
             continue
         admitted += 1
         for t, pose in path_of(q, qd, c, d, rate, lambda end: np.linspace(0.0, end, 60)):
-            assert gaps_at(pose, people, space).min() > 0.05 + 0.5 * (0.02 + t) - 1e-12
+            assert clearances_at(pose, people, space).min() > 0.05 + 0.5 * (0.02 + t) - 1e-12
     assert 40 < admitted < 360
 
 
-def test_whoever_goes_on_as_seen_is_not_met_on_a_path_that_was_admitted():
-    """Cylinders with known velocities: anywhere on their way, and a little faster."""
+def test_people_of_known_velocity_are_not_met_on_an_admitted_path():
+    """Cylinders with known velocities: anywhere on their path, and a little faster."""
     rng, space, admitted = np.random.default_rng(9), watch.new_ssm_workspace(ARM, 0, 2), 0
-    rule, nobody = watch.Safety(np.full(2, 0.1), 0.02, 0.05, np.zeros(2)), no_columns()
+    rule, nobody = watch.SeparationRule(np.full(2, 0.1), 0.02, 0.05, np.zeros(2)), no_columns()
     for k, (q, qd, c, d, _) in enumerate(motions(400, 10)):
         rate, cylinders = (1.0, 0.9)[k % 2], np.full((2, 4), 1.3)
         cylinders[:, :2], cylinders[:, 2] = rng.uniform(-1.5, 1.5, (2, 2)), 0.2
-        space.going[:] = rng.uniform([-1.0, -1.0, -0.3], [1.0, 1.0, 0.3], (2, 3))
-        going, growth = space.going[:, :2], np.maximum(0.0, space.going[:, 2])
-        space.going_speed[:] = np.hypot(*going.T) + np.abs(space.going[:, 2])
-        watch.place_node(ARM, nobody, cylinders, q, watch.NOW, 0.02, space)
-        if not ssm.admissible(ARM, rule, 0.02, nobody, cylinders, q, qd, c, d, rate, space):
+        space.velocity[:] = rng.uniform([-1.0, -1.0, -0.3], [1.0, 1.0, 0.3], (2, 3))
+        going, growth = space.velocity[:, :2], np.maximum(0.0, space.velocity[:, 2])
+        space.known_speed[:] = np.hypot(*going.T) + np.abs(space.velocity[:, 2])
+        watch.place_node(ARM, PeopleShapes(nobody, cylinders), q, watch.NOW, 0.02, space)
+        if not ssm.admissible(
+            ARM,
+            rule,
+            0.02,
+            PeopleShapes(nobody, cylinders),
+            JointPath(q, qd, c, d),
+            rate,
+            space,
+        ):
             continue
         admitted += 1
         for t, pose in path_of(q, qd, c, d, rate, lambda end: np.linspace(0.0, end, 30)):
@@ -94,46 +112,48 @@ def test_whoever_goes_on_as_seen_is_not_met_on_a_path_that_was_admitted():
                 there[:, :2] += since * going
                 there[:, 2] += since * growth
                 other = watch.new_ssm_workspace(ARM, 0, 2)
-                watch.place_node(ARM, nobody, there, pose, watch.NOW, 0.0, other)
+                watch.place_node(ARM, PeopleShapes(nobody, there), pose, watch.NOW, 0.0, other)
                 assert other.gap[watch.NOW].min() > 0.05 + 0.1 * (0.02 + t) - 1e-9
     assert 40 < admitted < 360
 
 
-def test_a_path_is_refused_only_where_somebody_comes_within_the_resolution():
+def test_a_path_is_refused_only_where_people_come_within_the_resolution():
     space, refused = watch.new_ssm_workspace(ARM, 8, 0), 0
-    rule = watch.Safety(np.full(8, 0.5), 0.02, 0.05, np.zeros(8))
+    rule = watch.SeparationRule(np.full(8, 0.5), 0.02, 0.05, np.zeros(8))
     for q, qd, c, d, people in motions(300, 2):
-        gaps_at(q, people, space)
+        clearances_at(q, people, space)
         stop_inside = (np.abs(q) < 0.8 * np.abs(ARM.limits.q_max) + 0.2).all()
-        if ssm.admissible(ARM, rule, 0.02, people, NO_CYLINDERS, q, qd, c, d, 1.0, space):
+        if ssm.admissible(ARM, rule, 0.02, shapes(people), JointPath(q, qd, c, d), 1.0, space):
             continue
         refused += 1
         slack = [
-            gaps_at(pose, people, space).min() - 0.05 - 0.5 * (0.02 + t)
+            clearances_at(pose, people, space).min() - 0.05 - 0.5 * (0.02 + t)
             for t, pose in path_of(q, qd, c, d, 1.0, lambda end: np.linspace(0.0, end, 60))
         ]
         assert min(slack) < 0.02 or not stop_inside
     assert refused > 40
 
 
-def test_what_was_admitted_stays_admissible_as_people_run():
-    """Step 2 of the proof: a period after any admitted piece the stop obeys the rule."""
+def test_an_admitted_stop_stays_admissible_as_people_run():
+    """Step 2 of the proof: a period after any admitted path the stop obeys the rule."""
     rng, space = np.random.default_rng(3), watch.new_ssm_workspace(ARM, 8, 0)
-    rule, checked = watch.Safety(np.full(8, 0.5), 0.02, 0.05, np.zeros(8)), 0
+    rule, checked = watch.SeparationRule(np.full(8, 0.5), 0.02, 0.05, np.zeros(8)), 0
     for q, qd, c, d, people in motions(400, 4):
-        rate = ssm.decide(ARM, rule, 0.0, people, NO_CYLINDERS, q, qd, c, d, space)
+        rate = ssm.decide(ARM, rule, 0.0, shapes(people), JointPath(q, qd, c, d), space)
         if rate == 0.0:
             continue
-        q1, v1 = space.q.copy(), space.qd.copy()
-        way = rng.normal(size=(3, 8))
-        people[:3] += 0.5 * ARM.dt * way / np.linalg.norm(way, axis=0)
+        q1, v1 = space.end.q.copy(), space.end.qd.copy()
+        step = rng.normal(size=(3, 8))
+        people[:3] += 0.5 * ARM.dt * step / np.linalg.norm(step, axis=0)
         stop, checked = override.stop_time(v1, ARM.limits.qdd_max), checked + 1
         assert (q1 + 0.5 * stop * v1 <= ARM.limits.q_max + 1e-9).all()
         assert (q1 + 0.5 * stop * v1 >= ARM.limits.q_min - 1e-9).all()
         for t in np.linspace(0.0, stop, 30):
             pose, speed, none = np.empty(6), np.empty(6), np.zeros(6)
-            override.motion_at(q1, v1, none, none, 1.0 / max(stop, 1e-9), t, pose, speed)
-            assert gaps_at(pose, people, space).min() >= 0.05 + 0.5 * (0.02 + t) - 1e-12
+            override.motion_at(
+                JointPath(q1, v1, none, none), 1.0 / max(stop, 1e-9), t, pose, speed
+            )
+            assert clearances_at(pose, people, space).min() >= 0.05 + 0.5 * (0.02 + t) - 1e-12
     assert checked > 40
 
 
@@ -141,10 +161,10 @@ def test_a_path_s_bounds_hold_for_points_of_every_link():
     space = watch.new_ssm_workspace(ARM, 8, 0)
     for q, qd, c, d, people in motions(100, 5):
         d = np.full(6, 3.0)
-        first, second = watch.path_bounds(ARM, qd, c, d, ARM.dt)
+        first, second = watch.path_bounds(ARM, JointPath(q, qd, c, d), ARM.dt)
         ends, x, h = [], np.linspace(0.0, ARM.dt, 21), ARM.dt / 20
         for s in x:
-            gaps_at(q + s * (qd + s * (c + s * d)), people, space)
+            clearances_at(q + s * (qd + s * (c + s * d)), people, space)
             ends.append(space.columns[watch.NOW, :3].copy())
         speed = np.linalg.norm(np.diff(ends, axis=0), axis=1) / h
         bend = np.linalg.norm(np.diff(ends, n=2, axis=0), axis=1) / h**2
@@ -152,29 +172,35 @@ def test_a_path_s_bounds_hold_for_points_of_every_link():
         assert bend.max() <= second * (1.0 + 1e-6)
 
 
-def test_what_is_executed_keeps_speed_acceleration_and_continuity():
+def test_the_executed_motion_keeps_speed_acceleration_and_continuity():
     space = watch.new_ssm_workspace(ARM, 8, 0)
-    rule, seen = watch.Safety(np.full(8, 0.4), 0.0, 0.02, np.zeros(8)), set()
+    rule, seen = watch.SeparationRule(np.full(8, 0.4), 0.0, 0.02, np.zeros(8)), set()
     for q, qd, c, d, people in motions(400, 6):
-        rate = ssm.decide(ARM, rule, 0.0, people, NO_CYLINDERS, q, qd, c, d, space)
+        rate = ssm.decide(ARM, rule, 0.0, shapes(people), JointPath(q, qd, c, d), space)
         seen.add("stop" if rate == 0.0 else "full" if rate == 1.0 else "scaled")
         speeds, speed, pose = [], np.empty(6), np.empty(6)
         for t in np.linspace(0.0, ARM.dt, 21):
-            override.motion_at(q, qd, space.c, space.d, space.drop[0], t, pose, speed)
+            override.motion_at(
+                JointPath(q, qd, space.c, space.d), space.deceleration[0], t, pose, speed
+            )
             speeds.append(speed.copy())
         assert speeds[0] == pytest.approx(qd, abs=1e-15)
         assert (np.abs(speeds) <= ARM.limits.qd_max + 1e-9).all()
         assert (
             np.abs(np.diff(speeds, axis=0)) <= ARM.limits.qdd_max * ARM.dt / 20 + 1e-9
         ).all()
-        assert pose == pytest.approx(space.q, abs=1e-15)
-        assert speed == pytest.approx(space.qd, abs=1e-15)
+        assert pose == pytest.approx(space.end.q, abs=1e-15)
+        assert speed == pytest.approx(space.end.qd, abs=1e-15)
     assert seen == {"stop", "full", "scaled"}
 
 
-def test_joint_limits_hold_whatever_is_commanded_and_whoever_appears():
+def test_joint_limits_hold_for_any_command_and_any_people():
     rng, space = np.random.default_rng(8), watch.new_ssm_workspace(ARM, 8, 0)
-    rule, closest, rates = watch.Safety(np.full(8, 0.4), 0.0, 0.02, np.zeros(8)), np.inf, []
+    rule, closest, rates = (
+        watch.SeparationRule(np.full(8, 0.4), 0.0, 0.02, np.zeros(8)),
+        np.inf,
+        [],
+    )
     q, qd, none = np.array(ARM.home), np.zeros(6), np.zeros(6)
     for k in range(3000):
         if k % 40 == 0:
@@ -186,9 +212,9 @@ def test_joint_limits_hold_whatever_is_commanded_and_whoever_appears():
         )
         c = 0.5 * (target - qd) / ARM.dt
         rates.append(
-            ssm.decide(ARM, rule, 0.0, spheres(rng), NO_CYLINDERS, q, qd, c, none, space)
+            ssm.decide(ARM, rule, 0.0, shapes(spheres(rng)), JointPath(q, qd, c, none), space)
         )
-        q, qd = space.q.copy(), space.qd.copy()
+        q, qd = space.end.q.copy(), space.end.qd.copy()
         closest = min(closest, (ARM.limits.q_max - q).min(), (q - ARM.limits.q_min).min())
         assert (np.abs(qd) <= ARM.limits.qd_max + 1e-9).all()
     assert -1e-9 <= closest < 0.05

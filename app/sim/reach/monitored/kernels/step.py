@@ -37,11 +37,18 @@ from app.sim.people.kernels.pedestrian import (
 from app.sim.people.kernels.people import advance_people, place_people
 from app.sim.reach.kernels.episode import Indices, ReachRules, ReachState, ReachWorld, Work
 from app.sim.reach.kernels.reward import ReachWeights, reward
-from app.sim.robot.kernels.actions import ActionRule, advance
+from app.sim.robot.kernels.actions import ActionRule, Coefficients, advance
 from app.sim.robot.kernels.arm import copy_capsules, place_robot
+from app.sim.robot.kernels.joints import JointPath, JointState
 from app.sim.safety.kernels.adversarial_people import TrialWorkspace, people_speed
 from app.sim.safety.kernels.adversarial_trials import MOVING, first_contact, touching_speed
-from app.sim.safety.kernels.separation_check import NOW, Safety, Watch, place_node
+from app.sim.safety.kernels.separation_check import (
+    NOW,
+    PeopleShapes,
+    SeparationRule,
+    SsmWorkspace,
+    place_node,
+)
 from app.sim.safety.kernels.ssm import decide
 from app.sim.scenario.kernels.episode import (
     COLLISION,
@@ -79,7 +86,7 @@ AT_REST = 1e-3
 class Guard(NamedTuple):
     """What a guarded batch has besides the rows of the scenario."""
 
-    safety: Safety
+    safety: SeparationRule
     """What the safety layer assumes."""
     guarded: bool
     """Whether the layer acts; without it, pieces are executed as commanded."""
@@ -175,34 +182,37 @@ def _people_after(
 
 
 @kernel(inline="always")
-def _show_going(state: ReachState, e: int, watch: Watch) -> None:
+def _show_going(state: ReachState, e: int, space: SsmWorkspace) -> None:
     """Tell the layer how the walkers of environment ``e`` go on, as measured."""
-    rows, m = state.people.walkers.rows, watch.going_speed.shape[0] - watch.going.shape[0]
-    for k in range(watch.going.shape[0]):
-        row, going = rows[e, k], watch.going[k]
+    rows, m = state.people.walkers.rows, space.known_speed.shape[0] - space.velocity.shape[0]
+    for k in range(space.velocity.shape[0]):
+        row, going = rows[e, k], space.velocity[k]
         going[0], going[1], going[2] = row[VX], row[VY], row[GROWTH]
-        watch.going_speed[m + k] = math.hypot(row[VX], row[VY]) + abs(row[GROWTH])
+        space.known_speed[m + k] = math.hypot(row[VX], row[VY]) + abs(row[GROWTH])
 
 
 @kernel(inline="always")
 def _execute(world: ReachWorld, state: ReachState, e: int, guard: Guard, work: Work) -> None:
     """Ask the safety layer about the piece in ``work``; what is executed is in its watch."""
     trial, account = guard.trial, guard.account[e]
-    watch, override = trial.watch, 1.0
+    watch, override = trial.ssm, 1.0
     for j in range(6):
         trial.q[j], trial.qd[j] = state.q[e, j], state.qd[e, j]
     if guard.measured:
         _show_going(state, e, watch)
     if guard.guarded:
-        override = decide(
-            world.arm, guard.safety, 0.0, trial.columns0, trial.cylinders0, trial.q, trial.qd,
-            work.c, work.d, watch,
-        )  # fmt: skip
+        people = PeopleShapes(trial.columns0, trial.cylinders0)
+        path = JointPath(trial.q, trial.qd, work.c, work.d)
+        override = decide(world.arm, guard.safety, 0.0, people, path, watch)
     else:
-        watch.drop[0] = 0.0
+        watch.deceleration[0] = 0.0
         for j in range(6):
             watch.c[j], watch.d[j] = work.c[j], work.d[j]
-            watch.q[j], watch.qd[j], watch.qdd[j] = work.q[j], work.qd[j], work.qdd[j]
+            watch.end.q[j], watch.end.qd[j], watch.end.qdd[j] = (
+                work.q[j],
+                work.qd[j],
+                work.qdd[j],
+            )
     guard.override[e] = override
     account[PERIODS] += 1.0
     account[STOPPED] += 1.0 if override <= 0.0 else 0.0
@@ -217,7 +227,8 @@ def _touch(world: ReachWorld, guard: Guard, e: int) -> bool:
     account[FASTEST] = max(account[FASTEST], people_speed(trial, arm.dt))
     if trial.cylinders0.shape[0] + trial.columns0.shape[1] == 0:
         return False
-    place_node(arm, trial.columns0, trial.cylinders0, trial.q, NOW, 0.0, trial.touch)
+    people = PeopleShapes(trial.columns0, trial.cylinders0)
+    place_node(arm, people, trial.q, NOW, 0.0, trial.touch)
     when, part = first_contact(arm, trial)
     if when < 0.0:
         return False
@@ -229,14 +240,18 @@ def _touch(world: ReachWorld, guard: Guard, e: int) -> bool:
 @kernel(inline="always")
 def _arrive(world: ReachWorld, state: ReachState, e: int, guard: Guard, work: Work) -> float:
     """Put the robot where the period ends and measure; return the distance to the goal [m]."""
-    arm, watch, account = world.arm, guard.trial.watch, guard.account[e]
+    arm, watch, account = world.arm, guard.trial.ssm, guard.account[e]
     place_robot(arm, state.q[e], work.robot)
     x, y, z = work.robot.tcp[0], work.robot.tcp[1], work.robot.tcp[2]
     square, fastest = 0.0, 0.0
     for j in range(6):
-        square += (watch.q[j] - state.q[e, j]) ** 2
-        fastest = max(fastest, abs(watch.qd[j]))
-        state.q[e, j], state.qd[e, j], state.qdd[e, j] = watch.q[j], watch.qd[j], watch.qdd[j]
+        square += (watch.end.q[j] - state.q[e, j]) ** 2
+        fastest = max(fastest, abs(watch.end.qd[j]))
+        state.q[e, j], state.qd[e, j], state.qdd[e, j] = (
+            watch.end.q[j],
+            watch.end.qd[j],
+            watch.end.qdd[j],
+        )
     account[JOINT_WAY] += math.sqrt(square)
     if fastest < AT_REST:
         account[STANDING] += 1.0
@@ -299,12 +314,9 @@ def command(
 ) -> None:  # fmt: skip
     """Write the piece that an action commands into the work space."""
     arm = world.arm
-    advance(
-        action, state.q[e], state.qd[e], state.qdd[e], act,
-        arm.limits.q_min, arm.limits.q_max, arm.limits.qd_max, arm.limits.qdd_max,
-        arm.limits.jerk_max, arm.dt,
-        work.c, work.d, work.q, work.qd, work.qdd,
-    )  # fmt: skip
+    start = JointState(state.q[e], state.qd[e], state.qdd[e])
+    segment, end = Coefficients(work.c, work.d), JointState(work.q, work.qd, work.qdd)
+    advance(action, arm.limits, arm.dt, start, act, segment, end)
 
 
 @kernel(nogil=True, error_model="numpy")

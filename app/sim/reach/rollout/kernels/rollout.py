@@ -51,8 +51,9 @@ from app.sim.reach.rollout.kernels.prediction import (
     new_foretold,
 )
 from app.sim.robot.kernels import kinematics
-from app.sim.robot.kernels.actions import ActionRule, advance
+from app.sim.robot.kernels.actions import ActionRule, Coefficients, advance
 from app.sim.robot.kernels.arm import Arm, cell_clearance, place_robot, self_clearance
+from app.sim.robot.kernels.joints import JointState
 from app.sim.scenario.kernels.episode import (
     COLLISION,
     RUNNING,
@@ -438,12 +439,11 @@ def play(
         if step == 0:
             copy_values(look.act, look.found)
         for _ in range(gone if step == 0 else 0, periods):
-            advance(
-                rule, look.q, look.qd, look.qdd, look.act,
-                arm.limits.q_min, arm.limits.q_max, arm.limits.qd_max, arm.limits.qdd_max,
-                arm.limits.jerk_max, arm.dt,
-                look.c, look.d, look.q, look.qd, look.qdd,
-            )  # fmt: skip
+            now_at, segment = (
+                JointState(look.q, look.qd, look.qdd),
+                Coefficients(look.c, look.d),
+            )
+            advance(rule, arm.limits, arm.dt, now_at, look.act, segment, now_at)
             place_robot(arm, look.q, work.robot)
             before = now // periods
             now += 1
