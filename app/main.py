@@ -56,7 +56,7 @@ WORLD_ID = "main"
 LIVE_CELL = "pick-and-place"
 STOP_S = 5.0
 """How long a stopping service waits for kernels that are being compiled [s]."""
-STATIC = Path(web.__file__).parent / "static"
+STATIC = Path(web.__file__).parent / "page"
 
 
 def create_app(settings: Settings) -> FastAPI:

@@ -17,7 +17,7 @@ from tests.api.conftest import ADDRESS
 from tests.api.live_server import running, wait_until_ready
 from tests.sub_path_proxy import PREFIX, below_path
 
-STATIC = Path(web.__file__).parent / "static"
+STATIC = Path(web.__file__).parent / "page"
 FILES = sorted(
     str(path.relative_to(STATIC))
     for path in STATIC.rglob("*")

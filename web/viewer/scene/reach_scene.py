@@ -28,7 +28,7 @@ OVERRIDES: tuple[tuple[float, Rgb], ...] = (
     (0.5, (240, 176, 52)),
     (1.0, (38, 166, 104)),
 )
-"""Colour by override; the same as OVERRIDES in ``web/static/palette.js``."""
+"""Colour by override; the same as OVERRIDES in ``web/page/palette.js``."""
 OFF: Rgb = (122, 142, 166)
 EDGE: Rgb = (130, 146, 160)
 DOT: Rgb = (150, 164, 178)

@@ -1,6 +1,6 @@
 """What blocks, towers and clutter cells look like, and the colours of the failure map.
 
-Colours are the same as in ``web/static/palette.js``. The map of failures runs in one hue from
+Colours are the same as in ``web/page/palette.js``. The map of failures runs in one hue from
 light to dark, so that it reads without seeing colours, and none of its shades is a block's.
 """
 

@@ -31,7 +31,7 @@ GOALS: tuple[Rgb, ...] = (
     (202, 87, 148),
     (98, 108, 196),
 )
-"""Colours of the goals, in the cell's order; the same as GOALS in ``web/static/palette.js``."""
+"""Colours of the goals, in the cell's order; the same as GOALS in ``web/page/palette.js``."""
 IDLE: Rgb = (196, 202, 210)
 PERIOD_S = 0.25
 """Time between two drawings of values that change all the time [s]."""

@@ -1,7 +1,7 @@
 // Which checkpoint acts in the cell, and which one chooses the moves where blocks are sorted.
-import { html, useCallback, useEffect, useState } from "./vendor/htm-preact-standalone.module.js";
-import { get } from "./api.js";
-import * as format from "./format.js";
+import { html, useCallback, useEffect, useState } from "../vendor/htm-preact-standalone.module.js";
+import { get } from "../api.js";
+import * as format from "../format.js";
 
 const PER_JOB = 5;
 const CHOOSING = "choosing tasks";

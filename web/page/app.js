@@ -1,19 +1,19 @@
 // Tandem's one page: the live cell, what the critic thinks of it, and training.
 import { html, render, useEffect, useMemo, useRef, useState } from "./vendor/htm-preact-standalone.module.js";
-import { Acting, useCheckpoints } from "./checkpoints.js";
-import { Controls } from "./controls.js";
+import { Acting, useCheckpoints } from "./training/checkpoints.js";
+import { Controls } from "./live/controls.js";
 import { FirstUse } from "./firstuse.js";
 import { useFrameFocus } from "./framefocus.js";
 import { Icon, Logo } from "./icons.js";
-import { isActive, useJobs } from "./jobs.js";
-import { useCell, WORLD } from "./live.js";
+import { isActive, useJobs } from "./training/jobs.js";
+import { useCell, WORLD } from "./live/live.js";
 import { goalColours } from "./palette.js";
-import { ReachDecision } from "./reach.js";
+import { ReachDecision } from "./reach/reach.js";
 import { SignIn } from "./signin.js";
-import { SortingDecision } from "./sorting.js";
-import { SmallPrint, Story } from "./story.js";
-import { Training } from "./training.js";
-import { Values } from "./values.js";
+import { SortingDecision } from "./sorting/sorting.js";
+import { SmallPrint, Story } from "./live/story.js";
+import { Training } from "./training/training.js";
+import { Values } from "./live/values.js";
 import { Viewer } from "./viewer.js";
 import { ViewMenu } from "./viewmenu.js";
 

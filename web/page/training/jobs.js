@@ -1,9 +1,9 @@
 // Jobs: the list, and for the open one its learning curves, numbers and what can be done.
-import { html, useCallback, useEffect, useRef, useState } from "./vendor/htm-preact-standalone.module.js";
-import { follow, get, post } from "./api.js";
-import * as format from "./format.js";
-import { Icon } from "./icons.js";
-import { CurvePlot } from "./plots.js";
+import { html, useCallback, useEffect, useRef, useState } from "../vendor/htm-preact-standalone.module.js";
+import { follow, get, post } from "../api.js";
+import * as format from "../format.js";
+import { Icon } from "../icons.js";
+import { CurvePlot } from "../plots.js";
 
 const POLL_MS = 2000;
 const FINAL = new Set(["succeeded", "failed", "cancelled"]);

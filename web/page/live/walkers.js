@@ -1,7 +1,7 @@
 // Who moves a walking cylinder, and how fast all of them walk.
-import { html } from "./vendor/htm-preact-standalone.module.js";
-import { Segmented } from "./choice.js";
-import { Icon } from "./icons.js";
+import { html } from "../vendor/htm-preact-standalone.module.js";
+import { Segmented } from "../choice.js";
+import { Icon } from "../icons.js";
 
 const MODES = [
   ["manual", "By hand", "You drag the handle in the scene", "hand"],

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from tests.web.static.test_contrast import contrast, tokens
+from tests.web.page.test_contrast import contrast, tokens
 from web.viewer.people.mannequin import VESTS
 from web.viewer.scene.reach_scene import OVERRIDES
 from web.viewer.scene.sorting_bodies import BLOCKS, FAILURES
 from web.viewer.scene.stations_view import GOALS
 
-PALETTE = Path(__file__).parents[3] / "web" / "static" / "palette.js"
+PALETTE = Path(__file__).parents[3] / "web" / "page" / "palette.js"
 STOP = re.compile(r"\[([\d.]+), \[(\d+), (\d+), (\d+)\]\]")
 
 

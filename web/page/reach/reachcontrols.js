@@ -1,7 +1,7 @@
 // What a visitor can do to a reach cell besides people and clock: goal, safety layer, policy.
-import { html } from "./vendor/htm-preact-standalone.module.js";
-import { Segmented } from "./choice.js";
-import { Icon } from "./icons.js";
+import { html } from "../vendor/htm-preact-standalone.module.js";
+import { Segmented } from "../choice.js";
+import { Icon } from "../icons.js";
 
 const GOAL_MODES = [
   ["jump", "Jumps on", "As soon as it is reached there is another one"],

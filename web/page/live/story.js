@@ -1,7 +1,7 @@
 // What the robot does and why, in one sentence, and the few numbers that matter beside it.
-import { html } from "./vendor/htm-preact-standalone.module.js";
-import * as format from "./format.js";
-import { Icon } from "./icons.js";
+import { html } from "../vendor/htm-preact-standalone.module.js";
+import * as format from "../format.js";
+import { Icon } from "../icons.js";
 import { nameOf } from "./people.js";
 
 const STATUS = {

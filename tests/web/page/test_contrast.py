@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-STYLE = Path(__file__).parents[3] / "web" / "static" / "style.css"
+STYLE = Path(__file__).parents[3] / "web" / "page" / "style.css"
 AA_SMALL = 4.5
 """Least ratio for small text: WCAG 2.2, success criterion 1.4.3."""
 ON_SURFACES = ("ink", "ink-2", "ink-3")

@@ -1,8 +1,8 @@
 // The goal, tower by tower: what stands there now beside what shall stand there. Blocks are
 // clicked in from below and out of the tower; the largest always lies at the bottom.
-import { html, useEffect, useRef, useState } from "./vendor/htm-preact-standalone.module.js";
+import { html, useEffect, useRef, useState } from "../vendor/htm-preact-standalone.module.js";
 import { Block, capital, kindOf, nameOf, plural } from "./blockshape.js";
-import * as format from "./format.js";
+import * as format from "../format.js";
 
 const SETTLE_MS = 2000;
 

@@ -1,7 +1,7 @@
 // Importing a recording: a file, what is stated about it, and how it was read.
-import { html, useState } from "./vendor/htm-preact-standalone.module.js";
-import { postFile } from "./api.js";
-import { Icon } from "./icons.js";
+import { html, useState } from "../vendor/htm-preact-standalone.module.js";
+import { postFile } from "../api.js";
+import { Icon } from "../icons.js";
 
 const FORMATS = ".bvh,.mot,.sto,.csv";
 const MAX_LISTED = 3;

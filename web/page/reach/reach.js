@@ -1,12 +1,12 @@
 // A reach cell as the page shows it: what the robot does, how fast it may go and why, outcomes.
-import { html, useRef } from "./vendor/htm-preact-standalone.module.js";
-import * as format from "./format.js";
-import { Icon } from "./icons.js";
-import { overrideColour } from "./palette.js";
-import { nameOf } from "./people.js";
+import { html, useRef } from "../vendor/htm-preact-standalone.module.js";
+import * as format from "../format.js";
+import { Icon } from "../icons.js";
+import { overrideColour } from "../palette.js";
+import { nameOf } from "../live/people.js";
 import { OverridePlot, SeparationPlot } from "./reachplots.js";
 import { SAFETY_SPAN_S, SafetyHistory } from "./safetyhistory.js";
-import { Story } from "./story.js";
+import { Story } from "../live/story.js";
 
 const SLOW = 0.995;
 const ARC = 2 * Math.PI * 40 * 0.75;

@@ -1,9 +1,9 @@
 // What a visitor can do to the cell: the people, the clock, the goals, the cases.
-import { html } from "./vendor/htm-preact-standalone.module.js";
-import { Icon } from "./icons.js";
+import { html } from "../vendor/htm-preact-standalone.module.js";
+import { Icon } from "../icons.js";
 import { People } from "./people.js";
 import { Presets } from "./presets.js";
-import { ReachControls } from "./reachcontrols.js";
+import { ReachControls } from "../reach/reachcontrols.js";
 
 const SPEEDS = [1, 2, 4, 8];
 

@@ -1,7 +1,7 @@
 // The form that starts a training job; every field comes from GET /v1/presets.
-import { html, useEffect, useRef, useState } from "./vendor/htm-preact-standalone.module.js";
-import { get, post } from "./api.js";
-import { Icon } from "./icons.js";
+import { html, useEffect, useRef, useState } from "../vendor/htm-preact-standalone.module.js";
+import { get, post } from "../api.js";
+import { Icon } from "../icons.js";
 
 const FIRST_FIELDS = 4;
 

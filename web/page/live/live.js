@@ -1,7 +1,7 @@
 // The live cell as this page knows it: its last snapshot, its recent values, the link to it.
-import { useCallback, useEffect, useRef, useState } from "./vendor/htm-preact-standalone.module.js";
-import { follow, get, post, put, Unreachable } from "./api.js";
-import { Unconfirmed } from "./confirm.js";
+import { useCallback, useEffect, useRef, useState } from "../vendor/htm-preact-standalone.module.js";
+import { follow, get, post, put, Unreachable } from "../api.js";
+import { Unconfirmed } from "../confirm.js";
 import { History } from "./history.js";
 
 export const WORLD = "main";

@@ -1,9 +1,9 @@
 // The sorting task as the page shows it: what the robot does, the goal, the blocks, the moves.
-import { html, useEffect, useState } from "./vendor/htm-preact-standalone.module.js";
+import { html, useEffect, useState } from "../vendor/htm-preact-standalone.module.js";
 import { Blocks } from "./blocks.js";
 import { GoalEditor } from "./goaleditor.js";
 import { Moves, SortingSmallPrint } from "./moves.js";
-import { Story } from "./story.js";
+import { Story } from "../live/story.js";
 
 const PHASES = {
   approach: ["On its way", "accent"],

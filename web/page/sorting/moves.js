@@ -1,8 +1,8 @@
 // The sorter's moves: the one that is carried out, who decided it, and the ranking behind it.
-import { html } from "./vendor/htm-preact-standalone.module.js";
+import { html } from "../vendor/htm-preact-standalone.module.js";
 import { Block, capital, nameOf, placeName } from "./blockshape.js";
-import { Sorter } from "./checkpoints.js";
-import * as format from "./format.js";
+import { Sorter } from "../training/checkpoints.js";
+import * as format from "../format.js";
 
 const PHASES = {
   approach: "on the way to it",

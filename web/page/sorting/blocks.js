@@ -1,8 +1,8 @@
 // The blocks that are there: a plan of the clutter on its failure map, from which blocks are
 // picked to be moved or taken away, and a shelf from which more are added.
-import { html } from "./vendor/htm-preact-standalone.module.js";
+import { html } from "../vendor/htm-preact-standalone.module.js";
 import { Block, capital, kindOf, nameOf, placeName, plural } from "./blockshape.js";
-import { failureColours, failureGradient } from "./palette.js";
+import { failureColours, failureGradient } from "../palette.js";
 
 export function Blocks({ sorting, cell, send, picked, onPick }) {
   const cells = cell.stations.filter((one) => one.kind === "clutter");

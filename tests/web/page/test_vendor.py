@@ -4,7 +4,7 @@ import hashlib
 import re
 from pathlib import Path
 
-STATIC = Path(__file__).parents[3] / "web" / "static"
+STATIC = Path(__file__).parents[3] / "web" / "page"
 VENDOR = STATIC / "vendor"
 ROW = re.compile(r"^\| `([^`]+)` \|.*`([0-9a-f]{64})` \|$", re.MULTILINE)
 

@@ -1,6 +1,6 @@
 // The training side: jobs with their curves, and the form that starts one.
-import { html, useEffect, useState } from "./vendor/htm-preact-standalone.module.js";
-import { Icon } from "./icons.js";
+import { html, useEffect, useState } from "../vendor/htm-preact-standalone.module.js";
+import { Icon } from "../icons.js";
 import { JobList, isActive } from "./jobs.js";
 import { TrainForm, usePresets } from "./trainform.js";
 

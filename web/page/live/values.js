@@ -1,8 +1,8 @@
 // What the critic expects from each candidate: bars, explained on hover, and a running plot.
-import { html, useMemo, useState } from "./vendor/htm-preact-standalone.module.js";
-import * as format from "./format.js";
+import { html, useMemo, useState } from "../vendor/htm-preact-standalone.module.js";
+import * as format from "../format.js";
 import { SPAN_S } from "./history.js";
-import { ValuePlot } from "./plots.js";
+import { ValuePlot } from "../plots.js";
 import { outsideText } from "./story.js";
 
 export function Values({ world, cell, history, colourOf, labelOf }) {

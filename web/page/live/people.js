@@ -1,11 +1,11 @@
 // The people in the cell: who is there, who moves each, what is played, how large each is.
-import { html, useCallback, useEffect, useState } from "./vendor/htm-preact-standalone.module.js";
-import { get } from "./api.js";
-import { Segmented } from "./choice.js";
-import * as format from "./format.js";
-import { Icon } from "./icons.js";
+import { html, useCallback, useEffect, useState } from "../vendor/htm-preact-standalone.module.js";
+import { get } from "../api.js";
+import { Segmented } from "../choice.js";
+import * as format from "../format.js";
+import { Icon } from "../icons.js";
 import { ImportForm } from "./importform.js";
-import { VESTS } from "./palette.js";
+import { VESTS } from "../palette.js";
 import { WalkerMover } from "./walkers.js";
 
 const MAX_PEOPLE = 4;

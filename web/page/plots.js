@@ -1,8 +1,8 @@
 // uPlot as Preact components: the running plot of values and the learning curves.
 import { html, useEffect, useMemo, useRef, useState } from "./vendor/htm-preact-standalone.module.js";
 import * as format from "./format.js";
-import { SPAN_S } from "./history.js";
-import { drawValues } from "./valuelines.js";
+import { SPAN_S } from "./live/history.js";
+import { drawValues } from "./live/valuelines.js";
 import { themeColours } from "./palette.js";
 
 const FONT = "11px Inter, system-ui, sans-serif";

@@ -1,7 +1,7 @@
 // The running plots of the safety layer: the override, and the separation over the terms of S_p.
-import { html, useMemo } from "./vendor/htm-preact-standalone.module.js";
-import { OVERRIDES, overrideColour, TERMS } from "./palette.js";
-import { axis, Plot, secondsAgo, useTheme } from "./plots.js";
+import { html, useMemo } from "../vendor/htm-preact-standalone.module.js";
+import { OVERRIDES, overrideColour, TERMS } from "../palette.js";
+import { axis, Plot, secondsAgo, useTheme } from "../plots.js";
 import { SAFETY_SPAN_S } from "./safetyhistory.js";
 
 const FAR_M = 1.6;

@@ -1,6 +1,6 @@
 // A block as the page draws it and names it, and the places it can be in.
-import { html } from "./vendor/htm-preact-standalone.module.js";
-import { BLOCK_INK, BLOCKS } from "./palette.js";
+import { html } from "../vendor/htm-preact-standalone.module.js";
+import { BLOCK_INK, BLOCKS } from "../palette.js";
 
 const LETTERS = { tiny: "XS", small: "S", medium: "M", large: "L", huge: "XL" };
 const NARROWEST = 0.46;

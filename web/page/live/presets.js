@@ -1,5 +1,5 @@
 // A row of situations to start with one click; what happens in one is told when it is pointed at.
-import { html, useState } from "./vendor/htm-preact-standalone.module.js";
+import { html, useState } from "../vendor/htm-preact-standalone.module.js";
 
 /** `items` with id, title and text; `tag` is the command that starts one. */
 export function Presets({ label, hint, items, running, tag, send }) {
