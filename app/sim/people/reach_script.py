@@ -1,12 +1,11 @@
 """The synthetic person: reaches by inverse kinematics, home -> cube -> dock and back.
 
 A *library* holds many postures per place and hand, with random stance, elbow and grip. A script
-goes through them with random pace and pauses (``primitives/kernels/script.py``). The other
-hand supports
-itself at the table's edge while the trunk leans.
+visits them at random pace with pauses (``primitives/kernels/script.py``). The other hand rests
+at the table's edge while the trunk leans.
 
-These were the first people; now they are a variant (``WorkSettings(motion="reaches")``), and
-:func:`reach_script` makes the case studies' single reaches.
+``WorkSettings(motion="reaches")`` selects this motion; :func:`reach_script` makes the single
+reaches of the case studies.
 
 Source: METHOD 3.2 and 3.4. Deviates: the thesis replays motion capture through movement
 primitives; these reaches are synthetic (``task_library.py`` has the primitives).

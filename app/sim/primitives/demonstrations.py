@@ -7,8 +7,8 @@ bowed a little, while the stance moves ahead of the hand or behind it. What is n
 motion (a jump, a joint limit, a hand or an elbow in the table) is drawn again.
 
 A *style* is a manner of doing this. A demonstration begins in one style and ends, now and then,
-in another, as do the people of ``task_library.py``, whose nodes are drawn here as well: what is
-asked of a primitive later lies in the distribution that it was fitted to.
+in another, as do the people of ``task_library.py``. Their postures are drawn here as
+well, so that queries of a primitive lie in the distribution to which it was fitted.
 
 Measured on the recorded clips (six clips, Vicon, 100 Hz; 65 reaches of 0.15 m or more from rest
 to rest; 5 %, median, 95 %): mean speed of the palm 0.25, 0.69, 1.15 m/s, standard deviation of

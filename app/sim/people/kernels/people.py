@@ -43,7 +43,7 @@ from app.sim.people.kernels.pedestrian import (
 from app.sim.people.kernels.yielding import closeness, give_way
 from app.sim.primitives.kernels import script
 from app.sim.primitives.kernels.primitives import (
-    Legs,
+    SegmentState,
     Repertoire,
     condition,
     draw_legs,
@@ -136,7 +136,7 @@ class PeopleState(NamedTuple):
     """How far each worker leans away, ``courtesy.give_way`` [rad, rad/s], (n_envs, W, 4)."""
     track: NDArray[np.int64]
     """Track of each worker, SCRIPTED or ABSENT, shape (n_envs, W)."""
-    legs: Legs
+    legs: SegmentState
     """The legs of their scripts, for LIBRARY."""
     move: NDArray[np.int64]
     """The move of the script each worker is in, shape (n_envs, W)."""

@@ -61,7 +61,7 @@ class Repertoire(NamedTuple):
     """Whether durations vary, legs pause and scripts begin anywhere (METHOD 3.4)."""
 
 
-class Legs(NamedTuple):
+class SegmentState(NamedTuple):
     """The legs of all workers' scripts beyond what every script has; rows (n_envs, W, ...)."""
 
     primitive: Index
@@ -93,9 +93,9 @@ def no_repertoire() -> Repertoire:
     )
 
 
-def new_legs(n_envs: int, n_workers: int) -> Legs:
+def new_legs(n_envs: int, n_workers: int) -> SegmentState:
     """Return rows for the legs of workers, no script drawn yet."""
-    return Legs(
+    return SegmentState(
         primitive=np.zeros((n_envs, n_workers, MAX_MOVES), dtype=np.int64),
         sample=np.zeros((n_envs, n_workers, MAX_MOVES), dtype=np.int64),
         stop=np.zeros((n_envs, n_workers, MAX_MOVES, 2)),
