@@ -20,7 +20,7 @@ from jobs.stored_motion import detail_of, summary_of
 Printed = tuple[str, dict[str, Any]]
 """Text for people, and the same as data."""
 MAX_LINES = 12
-"""Most glitches, and most runs, that are told to people; the data has all."""
+"""Most artifacts, and most runs, that are told to people; the data has all."""
 _FLAGS = {"unit": "--unit", "root_unit": "--root-unit", "up": "--up", "names": "--map"}
 NOUN = "stored motion"
 
@@ -174,7 +174,7 @@ def _data_of(record: MotionRecord) -> dict[str, Any]:
         "duration_s": record.duration,
         "n_runs": record.n_runs,
         **record.summary,
-        **{part: detail[part] for part in ("glitches", "clean_runs") if part in detail},
+        **{part: detail[part] for part in ("artifacts", "clean_runs") if part in detail},
     }
 
 
@@ -185,7 +185,7 @@ def _told(found: Mapping[str, Any]) -> str:
         for name, length in found["body_m"].items()
     )
     error = found["error_mm"]
-    runs, glitches = found["clean_runs"], found["glitches"]
+    runs, artifacts = found["clean_runs"], found["artifacts"]
     lines = [
         f"{found['name']}: {found['frames']} frames, {found['duration_s']:.2f} s, "
         f"{found['format']} in {found['unit']}",
@@ -197,8 +197,8 @@ def _told(found: Mapping[str, Any]) -> str:
         _row("pelvis", error["pelvis"]),
         _row("wrists, pelvis at one height", error["wrists_at_fixed_height"]),
         _row("wrists of the simulator's body", error["fixed_body"]),
-        f"{found['n_glitches']} glitches",
-        *_short([_glitch(one) for one in glitches]),
+        f"{found['n_artifacts']} artifacts",
+        *_short([_artifact(one) for one in artifacts]),
         f"{len(runs)} clean runs, {found['clean_frames']} frames",
         *_short([_run(one) for one in runs]),
     ]
@@ -235,7 +235,7 @@ def _row(what: str, spread: Mapping[str, float]) -> str:
     return f"  {what:30}{''.join(numbers)}"
 
 
-def _glitch(one: Mapping[str, Any]) -> str:
+def _artifact(one: Mapping[str, Any]) -> str:
     parts = one["parts"]
     also = f" (also {', '.join(parts[1:])})" if len(parts) > 1 else ""
     return f"  frames {one['first']} to {one['last']}: {one['reason']}{also}"

@@ -23,7 +23,7 @@ from app.sim.geometry.capsules import RADIUS, ends_of  # noqa: E402
 from app.sim.human.kernels.kinematics import N_CAPSULES  # noqa: E402
 from app.sim.human.model import rest_posture  # noqa: E402
 from app.sim.robot.kernels.arm import new_robot_pose, place_robot  # noqa: E402
-from app.sim.scene.scene import arm_of, crowd_of, own, people_of  # noqa: E402
+from app.sim.scene.scene import arm_of, own, people_geometry_of, people_of  # noqa: E402
 from docs.world_plots import BLUE, GREEN, GREY, LIGHT, ORANGE, RED, panels, save  # noqa: E402
 
 IMAGE = ROOT / "docs/img/frame.png"
@@ -100,7 +100,7 @@ def _robot(cell: Cell) -> tuple[Vec, Vec]:
 
 def _worker(cell: Cell) -> tuple[Vec, Vec]:
     q = rest_posture(*cell.human.home)
-    columns = crowd_of(people_of(cell), q[None], np.zeros((0, 3))).columns
+    columns = people_geometry_of(people_of(cell), q[None], np.zeros((0, 3))).columns
     return ends_of(columns, N_CAPSULES), columns[RADIUS, :N_CAPSULES]
 
 

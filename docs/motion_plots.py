@@ -3,7 +3,7 @@
     python docs/motion_plots.py FILE.bvh ...
 
 Writes ``docs/results/motions.json``, a row for each file: the table of ``docs/motions.md`` once
-``make tables`` ran. Draws ``docs/img/motions/error.png``: of the file with glitches that keeps
+``make tables`` ran. Draws ``docs/img/motions/error.png``: of the file with artifacts that keeps
 most clean frames, how fast the recorded points move, what is cut out and why, and how far the
 model is from the file's own points. The recordings are not part of this repository.
 """
@@ -26,7 +26,7 @@ sys.path.insert(0, str(ROOT))
 
 from app.machine import describe  # noqa: E402 - the line above lets it be found
 from app.sim.core.arrays import Vec  # noqa: E402
-from app.sim.mocap.artifacts import MAX_SPEED, Glitch, clean_runs, find_glitches  # noqa: E402
+from app.sim.mocap.artifacts import MAX_SPEED, Artifact, clean_runs, find_artifacts  # noqa: E402
 from app.sim.mocap.bvh import read_bvh  # noqa: E402
 from app.sim.mocap.importer import ImportedMotion, Spread, read_motion  # noqa: E402
 from app.sim.mocap.inverse_kinematics import body_angles  # noqa: E402
@@ -55,7 +55,7 @@ SPOKEN = {
 }
 """Watched points in words."""
 NEIGHBOURS = 0.12
-"""Glitches nearer to each other than this share of the file are named together."""
+"""Artifacts nearer to each other than this share of the file are named together."""
 TIMINGS = 3
 """Imports of each file, of which the fastest counts."""
 Json = dict[str, Any]
@@ -75,18 +75,18 @@ class Course:
     """Distance of points of the model from the file's own [mm], shape (n,) each."""
     fixed: Vec
     """The farther wrist's where the pelvis stays at its standing height [mm], shape (n,)."""
-    glitches: tuple[Glitch, ...]
+    artifacts: tuple[Artifact, ...]
     """What was found, in order."""
     dropped: tuple[tuple[float, float], ...]
-    """Spans between glitches that are too short to keep [s]."""
+    """Spans between artifacts that are too short to keep [s]."""
 
 
 def course(path: Path) -> Course:
     """Return how the import of a BVH file goes along its frames."""
     track, _ = body_track(read_bvh(path.read_text(encoding="utf-8-sig")))
     size, n = measure(track.points), len(track.times)
-    glitches = find_glitches(track.times, track.points)
-    spans = clean_runs(track.times, glitches)
+    artifacts = find_artifacts(track.times, track.points)
+    spans = clean_runs(track.times, artifacts)
     q, height = np.full((n, 18), np.nan), np.full(n, np.nan)
     for first, last in spans:
         part = slice(first, last + 1)
@@ -107,19 +107,19 @@ def course(path: Path) -> Course:
             "elbows": 1e3 * away[:, [ELBOW_R, ELBOW_L]].max(axis=1),
         },
         fixed=1e3 * level[:, [WRIST_R, WRIST_L]].max(axis=1),
-        glitches=glitches,
-        dropped=_dropped(times, glitches, spans),
+        artifacts=artifacts,
+        dropped=_dropped(times, artifacts, spans),
     )
 
 
 def _dropped(
-    times: Vec, glitches: tuple[Glitch, ...], spans: tuple[tuple[int, int], ...]
+    times: Vec, artifacts: tuple[Artifact, ...], spans: tuple[tuple[int, int], ...]
 ) -> tuple[tuple[float, float], ...]:
-    """Return the spans that lie between glitches and are kept nowhere [s]."""
+    """Return the spans that lie between artifacts and are kept nowhere [s]."""
     gone: NDArray[np.bool_] = np.ones(len(times), dtype=bool)
     for first, last in spans:
         gone[first : last + 1] = False
-    for one in glitches:
+    for one in artifacts:
         gone[one.first : one.last + 1] = False
     edges = np.flatnonzero(np.diff(np.concatenate([[False], gone, [False]]).astype(int)))
     ends = edges.reshape(-1, 2) - np.array([0, 1])
@@ -144,7 +144,7 @@ def row(path: Path) -> Json:
         "frames": found.n_frames,
         "clean": found.n_clean,
         "runs": len(found.runs),
-        "glitches": _told(found),
+        "artifacts": _told(found),
         "import_s": round(min(seconds), 3),
         "wrists_p50_p99_worst_mm": _spread(found.wrists, 2),
         "at_one_height_mm": _spread(found.wrists_at_fixed_height, 0),
@@ -154,10 +154,10 @@ def row(path: Path) -> Json:
 
 
 def _told(found: ImportedMotion) -> str:
-    if not found.glitches:
+    if not found.artifacts:
         return "0"
-    fastest = max(found.glitches, key=lambda one: one.speed)
-    return f"{len(found.glitches)} (`{fastest.parts[0]}` {fastest.speed:.1f} m/s)"
+    fastest = max(found.artifacts, key=lambda one: one.speed)
+    return f"{len(found.artifacts)} (`{fastest.parts[0]}` {fastest.speed:.1f} m/s)"
 
 
 def _spread(found: Spread, digits: int) -> str:
@@ -166,7 +166,7 @@ def _spread(found: Spread, digits: int) -> str:
 
 
 def draw(found: Course) -> Figure:
-    """Draw speeds, glitches and errors along a file."""
+    """Draw speeds, artifacts and errors along a file."""
     figure, axes = panels(3, 1, 6.6, sharex=True, height_ratios=(1.0, 1.1, 1.0))
     speed, error, rest = axes[:, 0]
     _draw_speeds(speed, found)
@@ -207,21 +207,21 @@ def _draw_speeds(axis: Axes, found: Course) -> None:
     axis.set(ylabel="recorded speed [m/s]", ylim=(0.0, None))
     axis.set_title(f"{found.name}: what is cut out", pad=18)
     axis.legend(loc="upper right", ncols=4, bbox_to_anchor=(1.0, 1.36))
-    _name_glitches(axis, found)
+    _name_artifacts(axis, found)
 
 
 def _shade(axis: Axes, found: Course) -> None:
     for first, last in found.dropped:
         axis.axvspan(first, last, color=RED, alpha=0.10, lw=0, zorder=0)
-    for one in found.glitches:
+    for one in found.artifacts:
         first, last = found.times[one.first], found.times[one.last]
         axis.axvspan(first, last, color=RED, alpha=0.22, lw=0, zorder=0)
 
 
-def _name_glitches(axis: Axes, found: Course) -> None:
-    """Write over glitches what was too fast, and how fast; neighbours share a line."""
-    groups: list[list[Glitch]] = []
-    for one in found.glitches:
+def _name_artifacts(axis: Axes, found: Course) -> None:
+    """Write over artifacts what was too fast, and how fast; neighbours share a line."""
+    groups: list[list[Artifact]] = []
+    for one in found.artifacts:
         near = NEIGHBOURS * found.times[-1]
         if groups and found.times[one.first] - found.times[groups[-1][-1].last] < near:
             groups[-1].append(one)
@@ -241,8 +241,8 @@ def _name_glitches(axis: Axes, found: Course) -> None:
 
 
 def shown_of(found: list[Course]) -> Course:
-    """Return the course that is drawn: with glitches, and most clean frames."""
-    return max(found, key=lambda one: (bool(one.glitches), int(np.isfinite(one.fixed).sum())))
+    """Return the course that is drawn: with artifacts, and most clean frames."""
+    return max(found, key=lambda one: (bool(one.artifacts), int(np.isfinite(one.fixed).sum())))
 
 
 def main() -> None:

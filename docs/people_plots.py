@@ -26,11 +26,11 @@ from app.sim.cells.cell import Cell, load_cell  # noqa: E402
 from app.sim.core.arrays import Vec  # noqa: E402
 from app.sim.human import model as human  # noqa: E402
 from app.sim.human.anthropometry import percentile_body  # noqa: E402
-from app.sim.primitives.demonstrations import PHASES, STYLES, between, draw_node  # noqa: E402
+from app.sim.primitives.demonstrations import PHASES, STYLES, between, draw_keyframe  # noqa: E402
 from app.sim.primitives.library_file import FILE, HANDS, load_primitives, read_header  # noqa: E402
-from app.sim.primitives.primitive_library import TaskLibrary, task_library  # noqa: E402
+from app.sim.primitives.primitive_library import MotionLibrary, motion_library  # noqa: E402
 from docs.world_plots import BLUE, GREEN, GREY, LIGHT, ORANGE, panels, save  # noqa: E402
-from tests.sim.library_motions import LegMotion, random_leg, random_legs  # noqa: E402
+from tests.sim.library_motions import LegMotion, random_segment, random_segments  # noqa: E402
 
 SEED, LEGS = 11, 4000
 DRAWN = 10
@@ -48,9 +48,9 @@ BONES = (
 Json = dict[str, Any]
 
 
-def measure(cell: Cell, library: TaskLibrary) -> Json:
+def measure(cell: Cell, library: MotionLibrary) -> Json:
     """Return what random legs between random nodes are like, and the list of primitives."""
-    legs = random_legs(cell, library, LEGS, SEED)
+    legs = random_segments(cell, library, LEGS, SEED)
     rng = np.random.default_rng(SEED)
     ratios = [leg.path / max(leg.straight, 0.05) for leg in legs]
     swings = [leg.swing for leg in legs]
@@ -92,12 +92,12 @@ def _farther(leg: LegMotion) -> float:
     return float(np.linalg.norm(leg.nodes[1] - leg.nodes[0], axis=1).max())
 
 
-def _duration(library: TaskLibrary, leg: LegMotion, rng: np.random.Generator) -> float:
+def _duration(library: MotionLibrary, leg: LegMotion, rng: np.random.Generator) -> float:
     mean, spread = library.duration[library.legs[leg.leg][0]]
     return float(np.exp(mean + spread * rng.standard_normal()))
 
 
-def draw_kind(cell: Cell, library: TaskLibrary, kind: str) -> Figure:
+def draw_kind(cell: Cell, library: MotionLibrary, kind: str) -> Figure:
     """Draw palm paths of every primitive of a kind, from above and from a side."""
     ways: dict[tuple[str, str], None] = {}
     for one in load_primitives():
@@ -116,7 +116,7 @@ def draw_kind(cell: Cell, library: TaskLibrary, kind: str) -> Figure:
             for a, b in ((start, end), (end, start)):
                 way = order[a], order[b], hand
                 for _ in range(DRAWN // 2):
-                    palm = random_leg(cell, library, way, rng).palms[:, hand]
+                    palm = random_segment(cell, library, way, rng).palms[:, hand]
                     top.plot(palm[:, 0], palm[:, 1], color=colour, lw=0.6, alpha=0.7)
                     below.plot(palm[:, side], palm[:, 2], color=colour, lw=0.6, alpha=0.7)
         _above(top, cell, f"{start} – {end}")
@@ -151,8 +151,10 @@ def draw_styles(cell: Cell) -> Figure:
     target, rng = np.array(cell.station("cube2").position), np.random.default_rng(SEED)
     figure, axes = panels(1, len(STYLES), 2.3, sharey=True)
     for axis, style in zip(axes[0], STYLES, strict=True):
-        first = draw_node(cell, size, None, "r", rng, style)
-        q, _ = between(size, first, draw_node(cell, size, target, "r", rng, style), style, rng)
+        first = draw_keyframe(cell, size, None, "r", rng, style)
+        q, _ = between(
+            size, first, draw_keyframe(cell, size, target, "r", rng, style), style, rng
+        )
         for k, colour in zip((0, len(PHASES) // 2, -1), ("#c5cad1", GREY, BLUE), strict=True):
             _stick(axis, human.joint_points(q[k], size), colour)
         palm = np.array([human.joint_points(row, size)["hand_r"] for row in q])
@@ -233,7 +235,7 @@ def main() -> None:
     parser.add_argument("--page", action="store_true", help="measure and draw nothing")
     if not parser.parse_args().page:
         cell = load_cell()
-        library = task_library(cell, 0)
+        library = motion_library(cell, 0)
         text = json.dumps(measure(cell, library), indent=1) + "\n"
         (RESULTS / "task-primitives.json").write_text(text, encoding="utf-8")
         for kind in KINDS:

@@ -13,7 +13,7 @@ from app.sim.cells.cell import Cell, load_cell
 from app.sim.collision.fcl_recheck import robot_ends
 from app.sim.geometry.capsules import ends_of
 from app.sim.people.kernels.pedestrian import WALKING
-from app.sim.people.pedestrian import Walk, WalkerSettings, walk
+from app.sim.people.pedestrian import PedestrianSettings, Walk, walk
 from app.sim.pick.batch import step_robot
 from app.sim.robot.actions import ActionSettings
 from app.sim.robot.capsules import TOOL, load_robot_capsules
@@ -167,12 +167,12 @@ def limits(seed: int) -> tuple[Json, Arm, dict[int, Episode]]:
     return numbers, arm, shown
 
 
-def walker(seed: int, seconds: float = 15.0) -> tuple[Json, Walk, WalkerSettings]:
+def walker(seed: int, seconds: float = 15.0) -> tuple[Json, Walk, PedestrianSettings]:
     """Return what the cylinder keeps to over many walks, and one that shows it all.
 
     The walk returned is the first that never stays and is both clipped and stands at times.
     """
-    settings = WalkerSettings()
+    settings = PedestrianSettings()
     many = [walk(settings, seed, seconds, episode=k) for k in range(200)]
     speeds = [np.hypot(*one.velocity.T) for one in many]
     shown = next(

@@ -15,7 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Rectangle
 
 from app.sim.cells.cell import Cell, load_cell
-from app.sim.people.pedestrian import Walk, WalkerSettings
+from app.sim.people.pedestrian import PedestrianSettings, Walk
 from app.sim.robot.capsules import TOOL
 from app.sim.robot.kernels.arm import Arm
 from docs.world_measures import EXTENT, Episode, ReachMap
@@ -149,7 +149,7 @@ def _say(axis: Axes, text: str) -> None:
     axis.text(0.5, 0.5, text, transform=axis.transAxes, ha="center", va="center", color=GREY)
 
 
-def walker(one: Walk, rules: WalkerSettings) -> Figure:
+def walker(one: Walk, rules: PedestrianSettings) -> Figure:
     """Draw the way of a walking cylinder, its speed and its radius."""
     figure = Figure(figsize=(WIDTH, 4.2))
     grid = figure.add_gridspec(2, 2, width_ratios=(1.15, 1.0))

@@ -23,7 +23,7 @@ from app.sim.mocap.read_options import NOTHING_STATED, ReadOptions
 from app.store.records import MotionRecord, NewMotion
 
 MAX_GLITCHES = 1000
-"""Most glitches of a motion that are kept with their place; all are counted."""
+"""Most artifacts of a motion that are kept with their place; all are counted."""
 
 _SPREADS = ("wrists", "elbows", "pelvis", "wrists_at_fixed_height", "fixed_body")
 
@@ -38,7 +38,7 @@ def summary_of(found: ImportedMotion) -> dict[str, Any]:
         "body_m": {name: lengths[name] for name in MEASURED},
         "error_mm": {name: _mm(getattr(found, name)) for name in _SPREADS},
         "clean_frames": found.n_clean,
-        "n_glitches": len(found.glitches),
+        "n_artifacts": len(found.artifacts),
         "beyond_limits": {
             name: {"share": share, "farthest_rad": farthest}
             for name, (share, farthest) in found.beyond_limits.items()
@@ -47,9 +47,9 @@ def summary_of(found: ImportedMotion) -> dict[str, Any]:
 
 
 def detail_of(found: ImportedMotion) -> dict[str, Any]:
-    """Return the runs and glitches of an import as JSON data."""
+    """Return the runs and artifacts of an import as JSON data."""
     return {
-        "glitches": [asdict(one) for one in found.glitches],
+        "artifacts": [asdict(one) for one in found.artifacts],
         "clean_runs": [
             {
                 "first": first,
@@ -78,7 +78,7 @@ def packed(
         options: What was stated about its file.
     """
     detail = detail_of(found)
-    detail["glitches"] = detail["glitches"][:MAX_GLITCHES]
+    detail["artifacts"] = detail["artifacts"][:MAX_GLITCHES]
     detail["recorded"] = {
         "name": found.name,
         "size": asdict(found.size),

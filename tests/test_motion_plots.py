@@ -24,27 +24,27 @@ def found(clip: Path) -> Course:
 def test_row_names_the_fault_and_its_speed(clip: Path) -> None:
     shown = row(clip)
     assert shown["name"] == name_of(clip)
-    assert shown["glitches"].startswith("1 (`wrist_r` ")
+    assert shown["artifacts"].startswith("1 (`wrist_r` ")
     assert shown["frames"] == 200 and 150 < shown["clean"] < 198
 
 
 def test_errors_are_those_of_the_clean_frames_alone(found: Course) -> None:
-    (glitch,) = found.glitches
+    (artifact,) = found.artifacts
     wrist = found.errors["right wrist"]
-    assert np.isnan(wrist[glitch.first : glitch.last + 1]).all()
+    assert np.isnan(wrist[artifact.first : artifact.last + 1]).all()
     assert 0.0 <= np.nanmax(wrist) < 1.0
     assert np.isfinite(wrist[[0, -1]]).all()
 
 
 def test_frames_beside_a_glitch_are_told_as_dropped(found: Course) -> None:
-    (glitch,) = found.glitches
+    (artifact,) = found.artifacts
     before, after = found.dropped
-    assert before[1] < found.times[glitch.first] < found.times[glitch.last] < after[0]
+    assert before[1] < found.times[artifact.first] < found.times[artifact.last] < after[0]
 
 
 def test_clip_that_is_drawn_has_a_glitch(found: Course, tmp_path: Path) -> None:
     clean = tmp_path / "clean.bvh"
     clean.write_text(with_leap(slice(0, 0)), encoding="utf-8")
     other = course(clean)
-    assert other.glitches == ()
+    assert other.artifacts == ()
     assert shown_of([other, found]) is found

@@ -25,7 +25,7 @@ def test_import_tells_frames_error_and_runs(
     assert main(["motions", "import", str(clip)]) == 0
     told = capsys.readouterr().out
     assert "someone: 200 frames, 3.98 s, bvh in mm" in told
-    assert "0 glitches" in told
+    assert "0 artifacts" in told
     assert "frames 0 to 199: 3.98 s" in told
 
 

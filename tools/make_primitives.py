@@ -24,8 +24,8 @@ from app.sim.primitives.library_file import (
     HANDS,
     Leg,
     TaskPrimitive,
-    legs_of,
     place_of,
+    segments_of,
     write_primitives,
 )
 
@@ -86,7 +86,7 @@ def main() -> None:
     """Demonstrate every leg of the shipped cells and write the data file."""
     made = []
     for cell in map(load_cell, cell_names()):
-        for leg in legs_of(cell):
+        for leg in segments_of(cell):
             made.append(make_primitive(cell, leg))
             logger.info("%s: %s to %s, %s", cell.name, leg.start, leg.end, leg.hand)
     about = {

@@ -31,13 +31,13 @@ from app.sim.people.kernels.pedestrian import (
     PAST_SPEED,
     VX,
     VY,
+    PedestrianRules,
+    PedestrianState,
     R,
-    WalkerRules,
-    WalkerState,
-    advance_walker,
-    start_walker,
+    advance_pedestrian,
+    start_pedestrian,
 )
-from app.sim.people.pedestrian import walker_rules, walker_state
+from app.sim.people.pedestrian import pedestrian_rules, pedestrian_state
 from app.sim.prediction.kernels.networks import (
     N_IN,
     N_TIMES,
@@ -50,7 +50,7 @@ from app.sim.prediction.kernels.networks import (
     see_past,
 )
 from app.sim.prediction.weights import write_networks
-from app.sim.scene.scene import walker_settings
+from app.sim.scene.scene import pedestrian_settings
 
 logger = logging.getLogger(__name__)
 
@@ -95,8 +95,8 @@ class Moments:
 
 @kernel(nogil=True)
 def _watch(
-    rules: WalkerRules,
-    state: WalkerState,
+    rules: PedestrianRules,
+    state: PedestrianState,
     kinds: NDArray[np.int64],
     periods: NDArray[np.int64],
     seed: int,
@@ -110,9 +110,9 @@ def _watch(
     for n in range(kinds.shape[0]):
         p = kinds[n]
         random.start_stream(seed, n, 0, stream)
-        start_walker(rules, state, 0, p, stream)
+        start_pedestrian(rules, state, 0, p, stream)
         for _ in range(periods[n]):
-            advance_walker(rules, state, 0, p, DT)
+            advance_pedestrian(rules, state, 0, p, DT)
         r, v = rows[0, p, R], math.hypot(rows[0, p, VX], rows[0, p, VY])
         see_past(
             r,
@@ -136,7 +136,7 @@ def _watch(
         for i in range(N_TIMES):
             while done < round(STEP_S * (i + 1) / DT):
                 gone += DT * math.hypot(rows[0, p, VX], rows[0, p, VY])
-                advance_walker(rules, state, 0, p, DT)
+                advance_pedestrian(rules, state, 0, p, DT)
                 done += 1
             radius[n, i] = (rows[0, p, R] - r) / RADIUS_SCALE
             way[n, i] = (gone / (STEP_S * (i + 1)) - v) / SPEED_SCALE
@@ -150,9 +150,9 @@ def watched(n: int, seed: int) -> Moments:
         seed: Seed of who they are.
     """
     rng = np.random.default_rng(seed)
-    person = walker_settings(load_cell(CELL).cylinders[0])
+    person = pedestrian_settings(load_cell(CELL).cylinders[0])
     usual, constant = person, type(person)(kind="constant")
-    rules, state = walker_rules([usual, constant]), walker_state(1, 2)
+    rules, state = pedestrian_rules([usual, constant]), pedestrian_state(1, 2)
     kinds = (rng.random(n) < CONSTANT_SHARE).astype(np.int64)
     periods = rng.integers(1, MOST_PERIODS, n)
     seen = np.zeros((2, n, N_IN), dtype=np.float32)
@@ -231,16 +231,16 @@ def network_of(net: nn.Sequential) -> Network:
     return Network(*arrays)
 
 
-def make(n_walkers: int, n_updates: int, seed: int) -> tuple[Network, Network]:
+def make(n_pedestrians: int, n_updates: int, seed: int) -> tuple[Network, Network]:
     """Return new networks for radius and way.
 
     Args:
-        n_walkers: Moments learned from.
+        n_pedestrians: Moments learned from.
         n_updates: Minibatches for each.
         seed: Seed of everything random.
     """
     torch.manual_seed(seed)
-    moments, rate = watched(n_walkers, seed), MOST_NOISE / 0.05
+    moments, rate = watched(n_pedestrians, seed), MOST_NOISE / 0.05
     radius = MOST_NOISE / RADIUS_SCALE, rate
     speed = 5.0 * MOST_NOISE / SPEED_SCALE, 0.0
     return (
@@ -261,7 +261,7 @@ def going_on_as_now(moments: Moments) -> tuple[Floats, Floats]:
     """Return these errors of a steady growth within the limits, and of a steady speed."""
     middle, scale = np.float32(RADIUS_MIDDLE), np.float32(RADIUS_SCALE)
     now, growth = scale * moments.radius_seen[:, :1] + middle, moments.radius_seen[:, 1:2]
-    settings = walker_settings(load_cell(CELL).cylinders[0])
+    settings = pedestrian_settings(load_cell(CELL).cylinders[0])
     grown = (
         np.clip(now + growth * AHEAD.astype(np.float32), settings.r_min, settings.r_max) - now
     )

@@ -33,11 +33,11 @@ from app.sim.people.kernels.people import MAX_PEOPLE
 from app.sim.perception.keypoints import keypoints_of
 from app.sim.perception.observed_people import (
     as_monitored,
-    as_person,
     checked_person,
     nearest_index,
     person_anywhere,
-    standing_in,
+    person_from_cylinder,
+    person_from_estimate,
 )
 from app.sim.perception.person_estimator import PersonEstimate
 from app.sim.perception.single_frame import estimate_once
@@ -152,7 +152,7 @@ def _known(
         )
     if isinstance(entry, CylinderPerson):
         seen = entry.x, entry.y, entry.vx, entry.vy, entry.r, entry.growth
-        person = standing_in(*seen, past=entry.remembered())
+        person = person_from_cylinder(*seen, past=entry.remembered())
         return KnownPerson(person=person, observed=person, source="cylinder", speeds="given")
     if isinstance(entry, KeypointsPerson):
         return _from_keypoints(entry, place, cell)
@@ -164,7 +164,7 @@ def _from_keypoints(entry: KeypointsPerson, place: str, cell: Cell) -> KnownPers
     size = cell.body if entry.body is None else entry.body.size(cell)
     speeds = entry.speeds()
     estimate = estimate_once(points, size, trust, speeds, place, cell.floor_z)
-    person = as_person(estimate)
+    person = person_from_estimate(estimate)
     assert person is not None  # estimate_once always tells a cylinder
     said: Speeds = "zero" if speeds is None else "given"
     return KnownPerson(
@@ -199,7 +199,7 @@ def _from_tracker(
     if observed is None and "stale" in estimate.flags:
         observed = person_anywhere()
     return KnownPerson(
-        person=as_person(estimate),
+        person=person_from_estimate(estimate),
         observed=observed,
         age_s=known.observed_age_s[i],
         source="tracker",
@@ -212,7 +212,9 @@ def warm_up(cell: Cell) -> None:
     """Compile what key-points and several people need, before the first request."""
     q = human.rest_posture(0.0, 1.5, -1.5)
     points = keypoints_of(q, cell.body, cell.floor_z)
-    seen = as_person(estimate_once(points, cell.body, velocities=np.zeros_like(points)))
+    seen = person_from_estimate(
+        estimate_once(points, cell.body, velocities=np.zeros_like(points))
+    )
     assert seen is not None
-    people = (seen, standing_in(1.0, 1.5, 0.0, 0.0, 0.4))
+    people = (seen, person_from_cylinder(1.0, 1.5, 0.0, 0.0, 0.4))
     nearest_index(arm_of(cell), people_of(cell), np.array(cell.robot.home_q), people)

@@ -61,7 +61,7 @@ def list_all(services: ServicesDep) -> MotionList:
 
 @router.get("/{name}", summary="One imported motion")
 def get_one(name: str, services: ServicesDep) -> MotionPublic:
-    """Return one motion with its clean runs and the glitches that were cut out."""
+    """Return one motion with its clean runs and the artifacts that were cut out."""
     return MotionPublic.from_domain(services.motions.record(name))
 
 

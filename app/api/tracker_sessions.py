@@ -17,7 +17,7 @@ from dataclasses import dataclass, field, replace
 
 from app.errors import Conflict, NotFound
 from app.sim.core.arrays import Vec
-from app.sim.perception.multi_person_tracker import PeopleEstimator, Unfollowed
+from app.sim.perception.multi_person_tracker import MultiPersonTracker, Unfollowed
 from app.sim.perception.person_estimator import Flag, PersonEstimate
 from app.sim.perception.stamp_timeline import StampTimeline
 
@@ -66,7 +66,7 @@ class TrackerSession:
     """Name of the work cell it watches."""
     n_people: int
     """Most people it follows."""
-    estimator: PeopleEstimator
+    estimator: MultiPersonTracker
     """Estimates its people, on the timeline."""
     timeline: StampTimeline
     """Maps its stamps to time."""
@@ -97,7 +97,7 @@ class TrackerSession:
 
         Raises:
             ClockJump: ``t`` does not continue the frames before; the frame is not taken.
-            InvalidInput: See :meth:`PeopleEstimator.update`; the frame is not taken.
+            InvalidInput: See :meth:`MultiPersonTracker.update`; the frame is not taken.
         """
         with self.lock:
             at = self.timeline.offer(t, arrived)
@@ -183,7 +183,7 @@ class TrackerSessions:
             id=secrets.token_hex(8),
             cell=cell,
             n_people=n_people,
-            estimator=PeopleEstimator(n_people, size, floor_z=floor_z),
+            estimator=MultiPersonTracker(n_people, size, floor_z=floor_z),
             timeline=StampTimeline(self.clock()),
             clock=self.clock,
         )

@@ -9,7 +9,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from app.sim.cells.cell import Cell
-from app.sim.collision.contact import Contact, contact, walker_distances, worker_distances
+from app.sim.collision.contact import Contact, contact, pedestrian_distances, worker_distances
 from app.sim.core.arrays import Vec
 from app.sim.human.kernels import kinematics as body
 from app.sim.pick import batch as pick
@@ -136,7 +136,7 @@ class LiveArm:
         shared = self._people._replace(columns=body.capsule_columns(len(here.q)))
         found = [
             *worker_distances(self.arm, shared, self.q, here.q, here.sizes).tolist(),
-            *walker_distances(self.arm, shared, self.q, here.cylinders).tolist(),
+            *pedestrian_distances(self.arm, shared, self.q, here.cylinders).tolist(),
         ]
         return dict(zip(people.ids, found, strict=True))
 

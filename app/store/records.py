@@ -207,7 +207,7 @@ class NewMotion:
     summary: Mapping[str, Any]
     """What a list shows of it: measures and errors."""
     detail: Mapping[str, Any]
-    """What is said of each run and each glitch."""
+    """What is said of each run and each artifact."""
     tensors: bytes
     """The runs, as safetensors bytes."""
 
@@ -233,7 +233,7 @@ class MotionRecord:
     summary: Mapping[str, Any]
     """What a list shows of it: measures and errors."""
     detail: Mapping[str, Any] | None = None
-    """What is said of each run and each glitch; None in lists."""
+    """What is said of each run and each artifact; None in lists."""
     size: int
     """Length of the runs [bytes]."""
     created_at: datetime

@@ -45,8 +45,8 @@ def test_posted_motion_says_what_was_found(posted: dict[str, Any]) -> None:
     assert first["duration_s"] == pytest.approx(0.02 * first["last"])
     n_clean = sum(run["last"] - run["first"] + 1 for run in posted["clean_runs"])
     assert posted["clean_frames"] == n_clean < 200
-    (glitch,) = posted["glitches"]
-    assert "wrist_r" in glitch["parts"] and glitch["speed"] > 3.0
+    (artifact,) = posted["artifacts"]
+    assert "wrist_r" in artifact["parts"] and artifact["speed"] > 3.0
     assert 0.0 <= posted["error_mm"]["wrists"]["p99"] < 1.0
     assert posted["body_m"]["forearm_r"] == pytest.approx(0.26)
 
@@ -56,7 +56,7 @@ def test_posted_motion_is_kept_listed_and_removed(
 ) -> None:
     assert client.get("/v1/motions/leap-1").json() == posted
     (item,) = client.get("/v1/motions").json()["items"]
-    assert item == {k: v for k, v in posted.items() if k not in ("clean_runs", "glitches")}
+    assert item == {k: v for k, v in posted.items() if k not in ("clean_runs", "artifacts")}
     assert client.delete("/v1/motions/leap-1").status_code == 204
     assert client.get("/v1/motions/leap-1").status_code == 404
     assert client.delete("/v1/motions/leap-1").status_code == 404

@@ -17,19 +17,23 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from app.sim.perception.keypoint_sensor_model import TrackerSettings
+from app.sim.perception.keypoint_sensor_model import KeypointSensorSettings
 from app.sim.perception.person_estimator import EstimatorSettings
 from tests.benchmarks.measure import Row, arguments, report
 from tests.sim.tracker_errors import SECONDS, SEEDS, errors
 
 BENCH = "tracker"
-NOISY = TrackerSettings(noise=0.02, missing=0.2, latency_s=0.0)
-ROWS: dict[str, tuple[TrackerSettings, float, float | None]] = {
-    "exact": (TrackerSettings(noise=0.0, missing=0.0, latency_s=0.0), 50.0, None),
+NOISY = KeypointSensorSettings(noise=0.02, missing=0.2, latency_s=0.0)
+ROWS: dict[str, tuple[KeypointSensorSettings, float, float | None]] = {
+    "exact": (KeypointSensorSettings(noise=0.0, missing=0.0, latency_s=0.0), 50.0, None),
     "20mm-20%": (NOISY, 50.0, None),
-    "20mm-20%-100ms": (TrackerSettings(noise=0.02, missing=0.2, latency_s=0.1), 50.0, None),
+    "20mm-20%-100ms": (
+        KeypointSensorSettings(noise=0.02, missing=0.2, latency_s=0.1),
+        50.0,
+        None,
+    ),
     "20mm-20%-100ms-gaps": (
-        TrackerSettings(noise=0.02, missing=0.2, missing_s=0.2, lost=0.1, latency_s=0.1),
+        KeypointSensorSettings(noise=0.02, missing=0.2, missing_s=0.2, lost=0.1, latency_s=0.1),
         50.0,
         None,
     ),

@@ -25,7 +25,7 @@ from app.policies.inference.motion_decision import MotionDecider
 from app.policies.inference.reach_policy import ReachPolicy
 from app.sim.core.arrays import Vec
 from app.sim.people.kernels.pedestrian import GROWTH, VX, VY, R, X, Y
-from app.sim.perception.observed_people import standing_in
+from app.sim.perception.observed_people import person_from_cylinder
 from app.sim.reach.batch import VIEWS, ReachBatch, ReachSettings
 from app.sim.reach.motion_types import MotionQuestion
 from app.sim.safety.layer import SafetySettings
@@ -62,7 +62,7 @@ def questions(one: MotionDecider, seed: int) -> list[MotionQuestion]:
             q=state.q[e].copy(),
             qd=state.qd[e].copy(),
             goal=state.goal[e].copy(),
-            people=(standing_in(*walkers[e].tolist()),),
+            people=(person_from_cylinder(*walkers[e].tolist()),),
             safety=SafetySettings(),
             time_left_s=float(state.time_left[e]),
         )

@@ -14,7 +14,7 @@ from app.sim.robot.kernels.arm import (
     place_robot,
     table_clearance,
 )
-from app.sim.scene.scene import arm_of, crowd_of, people_of
+from app.sim.scene.scene import arm_of, people_geometry_of, people_of
 from tests.benchmarks.mujoco_pick import INSTALLED, MujocoPick
 
 pytestmark = pytest.mark.skipif(not INSTALLED, reason="MuJoCo comes with the dev extra")
@@ -36,7 +36,7 @@ def by_kernels(q: np.ndarray, human_q: np.ndarray) -> Iterator[np.ndarray]:
     robot = new_robot_pose(arm)
     for robot_q, person_q in zip(q, human_q, strict=True):
         place_robot(arm, robot_q, robot)
-        crowd = crowd_of(people, person_q[None], np.zeros((0, 3)))
+        crowd = people_geometry_of(people, person_q[None], np.zeros((0, 3)))
         n = len(arm.link)
         found = np.empty((n, crowd.columns.shape[1]))
         for k in range(n):

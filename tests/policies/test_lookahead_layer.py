@@ -21,7 +21,7 @@ from app.policies.inference.rollout import (
 from app.policies.networks.actor_critic import BASE_WEIGHT
 from app.sim.cells.cell import load_cell
 from app.sim.people.kernels.pedestrian import GAIT, STILL, VX, VY, X, Y
-from app.sim.perception.observed_people import standing_in
+from app.sim.perception.observed_people import person_from_cylinder
 from app.sim.prediction.weights import new_forecaster
 from app.sim.reach.batch import ReachBatch, ReachSettings
 from app.sim.reach.crossings import crossings
@@ -136,7 +136,7 @@ def test_a_decision_heeds_the_layer_it_is_monitored_by() -> None:
         q=decider.arm.home.copy(),
         qd=np.zeros(6),
         goal=np.array([0.0, 0.9, 0.3]),
-        people=(standing_in(1.1, 0.66, -0.9, 0.0, 0.2),),
+        people=(person_from_cylinder(1.1, 0.66, -0.9, 0.0, 0.2),),
         safety=MEASURED,
     )
     began = [

@@ -10,7 +10,7 @@ from app.policies.inference.motion_decision import MotionDecider
 from app.policies.inference.reach_policy import ReachPolicy
 from app.sim.cells.cell import load_cell
 from app.sim.human.person import Person
-from app.sim.perception.observed_people import standing_in
+from app.sim.perception.observed_people import person_from_cylinder
 from app.sim.reach.motion_types import MotionDecision, MotionQuestion
 from app.sim.robot.actions import ActionSettings
 from app.sim.safety.layer import SafetySettings
@@ -21,7 +21,7 @@ HOME, DT = np.array(CELL.robot.home_q), CELL.robot.dt
 LOW, HIGH = np.array(CELL.robot.q_min), np.array(CELL.robot.q_max)
 FAST, HARD = np.array(CELL.robot.qd_max), np.array(CELL.robot.qdd_max)
 GOAL = np.array([0.05, 0.75, 0.31])
-WALKER = standing_in(0.3, 1.6, 0.0, -0.5, 0.3)
+WALKER = person_from_cylinder(0.3, 1.6, 0.0, -0.5, 0.3)
 ACTIONS = {
     "speed": ActionSettings(),
     "coefficient": ActionSettings(meaning="coefficient"),
@@ -122,7 +122,10 @@ def test_a_joint_left_outside_comes_back_and_every_step_is_answered(
 
 def test_monitoring_lets_a_robot_go_on_that_is_measured_a_hair_too_fast() -> None:
     """Nobody is near: a percent of noise must not brake the robot every second time."""
-    one, far = MotionDecider(RandomActor(), CELL), standing_in(-1.8, 4.0, 0.0, 0.0, 0.3)
+    one, far = (
+        MotionDecider(RandomActor(), CELL),
+        person_from_cylinder(-1.8, 4.0, 0.0, 0.0, 0.3),
+    )
     rng = np.random.default_rng(5)
     for _ in range(60):
         qd = rng.choice([-1.0, 1.0], 6) * FAST * (1.0 + rng.normal(0.0, 0.01, 6))
@@ -173,7 +176,7 @@ def test_a_faster_measured_robot_needs_more_distance_and_is_never_let_run_faster
     one, found = MotionDecider(RandomActor(), CELL), []
     for share in (1.0, 1.02, 1.05):
         qd = share * FAST * [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]
-        person = standing_in(0.2, away, 0.0, 0.0, 0.3)
+        person = person_from_cylinder(0.2, away, 0.0, 0.0, 0.3)
         decision = one.decide(question(qd=qd, people=(person,)))
         assert decision.safe is not None and decision.terms is not None
         found.append(
@@ -234,7 +237,7 @@ def test_far_people_are_seen_at_five_metres_and_kept_where_they_are(
     one = MotionDecider(RandomActor(), CELL)
     people: dict[float, Person] = {}
     for x in (away, 5.0):
-        person = standing_in(x, 0.2 * x, 0.0, 0.0, 0.3)
+        person = person_from_cylinder(x, 0.2 * x, 0.0, 0.0, 0.3)
         people[x] = person if known_by == "cylinder" else replace(person, cylinder=None)
     far, near = (one.decide(question(people=(people[x],))) for x in (away, 5.0))
     np.testing.assert_array_equal(far.act, near.act)
@@ -245,7 +248,7 @@ def test_far_people_are_seen_at_five_metres_and_kept_where_they_are(
 
 def test_a_wide_cylinder_stops_the_robot_however_far_its_axis_is() -> None:
     one = MotionDecider(RandomActor(), CELL)
-    wide = standing_in(20.0, 3.0, 0.0, 0.0, 25.0)
+    wide = person_from_cylinder(20.0, 3.0, 0.0, 0.0, 25.0)
     decision = one.decide(question(people=(wide,), qd=np.full(6, 0.2)))
     assert decision.safe is not None and decision.safe.override == 0.0
     assert decision.met[0].separation < 0.0

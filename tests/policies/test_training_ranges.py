@@ -3,12 +3,12 @@
 from app.policies.checkpoints.training_range import Ranges
 from app.policies.training.pick import states_met
 from app.sim.cells.cell import load_cell
-from app.sim.people.human_motion_config import WorkSettings
+from app.sim.people.human_motion_config import HumanMotionConfig
 from app.sim.pick.batch import PickBatch, PickSettings
 
 
 def test_people_who_are_not_there_widen_no_range() -> None:
-    ranges, work = Ranges(None), WorkSettings(absent=0.5)
+    ranges, work = Ranges(None), HumanMotionConfig(absent=0.5)
     batch = PickBatch(load_cell(), 64, 1, PickSettings(work=work))
     batch.reset()
     ranges.look(states_met(batch))
@@ -18,7 +18,7 @@ def test_people_who_are_not_there_widen_no_range() -> None:
 
 
 def test_a_cell_in_which_nobody_is_ever_met_has_no_range_of_people() -> None:
-    ranges, work = Ranges(None), WorkSettings(absent=1.0)
+    ranges, work = Ranges(None), HumanMotionConfig(absent=1.0)
     batch = PickBatch(load_cell(), 8, 1, PickSettings(work=work))
     batch.reset()
     ranges.look(states_met(batch))

@@ -13,7 +13,7 @@ from app.sim.cells.cell import load_cell
 from app.sim.collision.fcl_recheck import robot_ends, segment_distances
 from app.sim.geometry.capsules import distances
 from app.sim.human import model as human
-from app.sim.people.kernels.people import new_crowd, people_clearance, place_workers
+from app.sim.people.kernels.people import new_people_geometry, people_clearance, place_workers
 from app.sim.robot.capsules import load_robot_capsules
 from app.sim.robot.kernels.arm import new_robot_pose, place_robot
 from app.sim.robot.ur10 import Robot
@@ -56,7 +56,7 @@ def chunk(number: int) -> Iterator[Case]:
         person_at[:, None, :, 1],
     )
     expected = expected - RADII[:, None] - human.CAPSULE_RADII
-    pose, crowd = new_robot_pose(arm), new_crowd(people, 1, 0)
+    pose, crowd = new_robot_pose(arm), new_people_geometry(people, 1, 0)
     found = np.empty((len(RADII), crowd.columns.shape[1]))
     for k in range(CHUNK):
         place_robot(arm, q[k], pose)

@@ -12,7 +12,7 @@ from app.sim.core.arrays import Vec
 from app.sim.human import model as human
 from app.sim.primitives import promp
 from app.sim.primitives.demonstrations import height_over_table
-from app.sim.primitives.primitive_library import TaskLibrary, leg_weights
+from app.sim.primitives.primitive_library import MotionLibrary, segment_weights
 
 PHASES = np.linspace(0.0, 1.0, 41)
 LOW = ("elbow_r", "wrist_r", "elbow_l", "wrist_l")
@@ -65,17 +65,18 @@ class LegMotion:
         return float(np.maximum(low - angles, angles - high).max())
 
 
-def random_legs(cell: Cell, library: TaskLibrary, n: int, seed: int) -> list[LegMotion]:
+def random_segments(cell: Cell, library: MotionLibrary, n: int, seed: int) -> list[LegMotion]:
     """Return n legs, each of a random person, primitive, sample and pair of nodes."""
     rng = np.random.default_rng(seed)
     ways = np.argwhere(library.legs[..., 0] >= 0)
     return [
-        random_leg(cell, library, tuple(ways[rng.integers(len(ways))]), rng) for _ in range(n)
+        random_segment(cell, library, tuple(ways[rng.integers(len(ways))]), rng)
+        for _ in range(n)
     ]
 
 
-def random_leg(
-    cell: Cell, library: TaskLibrary, leg: tuple[int, int, int], rng: np.random.Generator
+def random_segment(
+    cell: Cell, library: MotionLibrary, leg: tuple[int, int, int], rng: np.random.Generator
 ) -> LegMotion:
     """Return a leg of a random person between random nodes."""
     start, end, hand = leg
@@ -84,7 +85,7 @@ def random_leg(
     ranges = library.of_station[person, [start, end], hand]
     nodes = [int(one + rng.integers(some)) for one, some in ranges]
     sample = int(first + rng.integers(count))
-    weights = leg_weights(library, primitive, sample, library.postures[nodes])
+    weights = segment_weights(library, primitive, sample, library.postures[nodes])
     phi = promp.basis(PHASES, promp.N_BASIS, promp.usual_width(promp.N_BASIS))
     q = phi @ weights.T
     size = library.bodies[person]

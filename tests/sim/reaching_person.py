@@ -5,7 +5,7 @@ import numpy as np
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
 from app.sim.core.kernels import rng as random
-from app.sim.people.reach_script import Script, build_library
+from app.sim.people.reach_script import Script, build_reach_library
 from app.sim.primitives.kernels import script
 
 
@@ -18,7 +18,7 @@ class ReachingPerson:
     """
 
     def __init__(self, cell: Cell, seed: int) -> None:
-        self._library = build_library(cell, seed)
+        self._library = build_reach_library(cell, seed)
         self._seed = seed
         self._block = 0
         self._begin = 0.0

@@ -8,7 +8,7 @@ import numpy as np
 from app.sim.cells.cell import Cell
 from app.sim.human import model as human
 from app.sim.perception.bounding_cylinder import SafetyCylinder, safety_cylinder
-from app.sim.perception.keypoint_sensor_model import Tracker, TrackerSettings, follow
+from app.sim.perception.keypoint_sensor_model import KeypointSensorSettings, Tracker, follow
 from app.sim.perception.keypoints import keypoints_of
 from app.sim.perception.person_estimator import PersonEstimate, PersonEstimator
 from tests.sim.tracked_person import RATE_HZ, cell_of, motion, work
@@ -37,7 +37,7 @@ class Errors:
 
 @lru_cache(maxsize=16)
 def errors(
-    settings: TrackerSettings, percentile: float = 50.0, assumed: float | None = None
+    settings: KeypointSensorSettings, percentile: float = 50.0, assumed: float | None = None
 ) -> Errors:
     """Compare three people at work for 12 s with what a tracker makes of them.
 

@@ -6,7 +6,7 @@ from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
 from app.sim.human.anthropometry import MEDIAN, BodySize
 from app.sim.mocap.importer import Motion
-from app.sim.people.human_motion_config import WorkSettings, at_the_table
+from app.sim.people.human_motion_config import HumanMotionConfig, at_the_table
 from tests.sim.recorded_person import working
 
 
@@ -29,7 +29,7 @@ def run_of(
     )
 
 
-def recorded_work(cell: Cell, n: int = 700) -> WorkSettings:
+def recorded_work(cell: Cell, n: int = 700) -> HumanMotionConfig:
     """Two people of two sizes who work at the cell's table, 14 s each."""
     tall = BodySize(pelvis=1.02, upper_arm_r=0.32, upper_arm_l=0.32)
     runs = (
@@ -37,4 +37,4 @@ def recorded_work(cell: Cell, n: int = 700) -> WorkSettings:
         run_of(working(n, seed=1), pelvis_z=-0.05, size=tall, name="b"),
     )
     placed = tuple(at_the_table(run, cell) for run in runs)
-    return WorkSettings(motion="recorded", recorded=placed)
+    return HumanMotionConfig(motion="recorded", recorded=placed)

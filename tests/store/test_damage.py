@@ -27,7 +27,7 @@ WAVE = NewMotion(
     n_frames=250,
     duration=4.98,
     summary={"unit": "cm", "n": 1},
-    detail={"glitches": [], "n": 1},
+    detail={"artifacts": [], "n": 1},
     tensors=CONTENT,
 )
 

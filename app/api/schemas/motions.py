@@ -37,14 +37,14 @@ class BeyondPublic(Answer):
 
 
 class RunPublic(Answer):
-    """One clean run, between two glitches."""
+    """One clean run, between two artifacts."""
 
     first: int = Field(description="its first frame in the file, from 0")
     last: int = Field(description="its last frame")
     duration_s: float = Field(description="how long it takes [s]")
 
 
-class GlitchPublic(Answer):
+class ArtifactPublic(Answer):
     """Frames that were cut out."""
 
     first: int = Field(description="first frame of the fault, from 0")
@@ -91,7 +91,7 @@ class MotionItem(Answer):
     duration_s: float = Field(description="of the file [s]")
     n_runs: int = Field(description="clean runs")
     clean_frames: int = Field(description="frames of all clean runs")
-    n_glitches: int = Field(description="faults that were cut out")
+    n_artifacts: int = Field(description="faults that were cut out")
     body_m: dict[str, float] = Field(
         description="lengths of the recorded person [m]; the median's for files of angles"
     )
@@ -107,10 +107,10 @@ class MotionItem(Answer):
 
 
 class MotionPublic(MotionItem):
-    """One stored motion with each run and glitch."""
+    """One stored motion with each run and artifact."""
 
     clean_runs: list[RunPublic]
-    glitches: list[GlitchPublic] = Field(description="the first 1000")
+    artifacts: list[ArtifactPublic] = Field(description="the first 1000")
 
     @classmethod
     def from_domain(cls, record: MotionRecord) -> Self:
@@ -119,7 +119,7 @@ class MotionPublic(MotionItem):
         return cls(
             **_members(record),
             clean_runs=record.detail["clean_runs"],
-            glitches=record.detail["glitches"],
+            artifacts=record.detail["artifacts"],
         )
 
 

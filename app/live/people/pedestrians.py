@@ -21,7 +21,7 @@ from app.live.commands import FIRST, Command, Mode, MoveHuman, SetBody, SetMotio
 from app.live.people.worker import frozen
 from app.live.snapshot import BodyView, CylinderView, PersonView
 from app.sim.cells.cell import Cell
-from app.sim.collision.contact import walker_distances
+from app.sim.collision.contact import pedestrian_distances
 from app.sim.core.arrays import Vec
 from app.sim.core.kernels.rng import start_stream
 from app.sim.human.anthropometry import MEDIAN
@@ -50,13 +50,18 @@ from app.sim.people.kernels.pedestrian import (
     R,
     X,
     Y,
-    advance_walker,
-    start_walker,
+    advance_pedestrian,
+    start_pedestrian,
 )
 from app.sim.people.kernels.people import MAX_PEOPLE
-from app.sim.people.pedestrian import AUTHORS_WALK, WalkerSettings, walker_rules, walker_state
-from app.sim.perception.observed_people import standing_in
-from app.sim.scene.scene import arm_of, people_of, walker_settings
+from app.sim.people.pedestrian import (
+    AUTHORS_WALK,
+    PedestrianSettings,
+    pedestrian_rules,
+    pedestrian_state,
+)
+from app.sim.perception.observed_people import person_from_cylinder
+from app.sim.scene.scene import arm_of, pedestrian_settings, people_of
 
 DRAG_SPEED = 1.2
 """Greatest speed of a cylinder that is dragged [m/s]."""
@@ -101,13 +106,13 @@ class LiveWalkers:
         self.robot_q = np.array(self._arm.home)
         """Where the robot is [rad], shape (6,); who comes in does so away from it."""
         settings = live_settings(cell)
-        self._rules = walker_rules([settings] * MAX_PEOPLE)
+        self._rules = pedestrian_rules([settings] * MAX_PEOPLE)
         self._own_kind = float(self._rules.rows[0, KIND])
         self.height = max([one.height for one in cell.cylinders], default=2.0)
         """Height of the cylinders [m]."""
         self.speed: float | None = None
         """Speed that a visitor gave all of them [m/s]; None as METHOD 2.1."""
-        self._state = walker_state(1, MAX_PEOPLE)
+        self._state = pedestrian_state(1, MAX_PEOPLE)
         self._drawn = np.zeros((MAX_PEOPLE, RADIUS - SPEED))
         self._episode = 0
         self._everyone: dict[int, LiveWalker] = {}
@@ -160,7 +165,7 @@ class LiveWalkers:
     def move(self, dt: float) -> None:
         """Move everyone for ``dt`` [s]."""
         for one in self:
-            advance_walker(self._rules, self._state, 0, one.id, dt)
+            advance_pedestrian(self._rules, self._state, 0, one.id, dt)
             one.after(dt)
 
     def move_while_paused(self, dt: float) -> bool:
@@ -186,10 +191,12 @@ class LiveWalkers:
             self._episode += 1
             stream = np.zeros(1, dtype=np.uint64)
             start_stream(self._seed, 0, self._episode, stream)
-            start_walker(self._rules, self._state, 0, id, stream)
+            start_pedestrian(self._rules, self._state, 0, id, stream)
             row = self._state.rows[0, id]
             apart = all(math.hypot(row[X] - o[X], row[Y] - o[Y]) > BESIDE for o in others)
-            gap = walker_distances(self._arm, self._shared, self.robot_q, row[None, [X, Y, R]])
+            gap = pedestrian_distances(
+                self._arm, self._shared, self.robot_q, row[None, [X, Y, R]]
+            )
             if apart and gap[0] >= START_ROOM_M:
                 break
         self._drawn[id] = self._state.rows[0, id, SPEED:RADIUS]
@@ -256,7 +263,7 @@ class LiveWalker:
     def seen(self) -> Person:
         """Return the person as a policy sees it."""
         x, y, vx, vy, r = (float(self.row[i]) for i in (X, Y, VX, VY, R))
-        return standing_in(x, y, vx, vy, r)
+        return person_from_cylinder(x, y, vx, vy, r)
 
     def drag(self, command: MoveHuman) -> None:
         """Follow a dragged pelvis; a cylinder has no hands."""
@@ -349,9 +356,9 @@ class LiveWalker:
         )
 
 
-def live_settings(cell: Cell) -> WalkerSettings:
+def live_settings(cell: Cell) -> PedestrianSettings:
     """Return how somebody walks in a live cell: as its first person, but without end."""
-    known = walker_settings(cell.cylinders[0]) if cell.cylinders else WalkerSettings()
+    known = pedestrian_settings(cell.cylinders[0]) if cell.cylinders else PedestrianSettings()
     return replace(known, p_still=0.0, p_go_on=AUTHORS_WALK["p_go_on"])
 
 

@@ -13,9 +13,9 @@ from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
 from app.sim.core.kernels import rng as random
 from app.sim.human.anthropometry import BodySize
-from app.sim.people.human_motion_config import WorkSettings
+from app.sim.people.human_motion_config import HumanMotionConfig
 from app.sim.people.kernels.people import worker_at
-from app.sim.primitives.kernels.primitives import draw_legs
+from app.sim.primitives.kernels.primitives import draw_segments
 from app.sim.primitives.kernels.script import draw_pause
 from app.sim.primitives.primitive_library import VARIANTS
 from app.sim.scene.scene import new_people_state, people_of, with_people
@@ -35,7 +35,9 @@ class TaskCycle:
         self, cell: Cell, seed: int, size: BodySize | None = None, variants: int = VARIANTS
     ) -> None:
         alone = with_people(cell, ("worker",))
-        work = WorkSettings(seed=seed, bodies=(size or cell.human.size,), variants=variants)
+        work = HumanMotionConfig(
+            seed=seed, bodies=(size or cell.human.size,), variants=variants
+        )
         self._people = people_of(alone, work)
         self._state = new_people_state(alone, self._people, 1)
         self._seed, self._block, self._begin = seed, 0, 0.0
@@ -47,9 +49,9 @@ class TaskCycle:
         people, state, rng = self._people, self._state, np.zeros(1, dtype=np.uint64)
         random.start_stream(self._seed, 0, self._block, rng)
         legs, start, duration = state.legs, state.start[0, 0], state.duration[0, 0]
-        n = draw_legs(
+        n = draw_segments(
             rng,
-            people.repertoire,
+            people.primitive_library,
             people.of_station[0],
             people.n_cubes,
             first,

@@ -8,7 +8,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
-from app.sim.people.kernels.pedestrian import WalkerState
+from app.sim.people.kernels.pedestrian import PedestrianState
 from app.sim.pick.batch import OUTCOMES, PickBatch
 from app.sim.prediction.kernels.privileged import N_AHEAD, look_ahead_of_walkers
 from app.sim.reach.batch import ReachBatch
@@ -71,9 +71,9 @@ class Foresight:
     def __init__(self, batch: ReachBatch) -> None:
         people = batch.state.people.walkers
         self._rules, self._dt, self._walkers = batch.world.people.walkers, batch.arm.dt, people
-        self._copy = WalkerState(people.rows.copy(), people.stream.copy())
-        n_envs, n_walkers = people.rows.shape[:2]
-        self.size = n_walkers * N_AHEAD
+        self._copy = PedestrianState(people.rows.copy(), people.stream.copy())
+        n_envs, n_pedestrians = people.rows.shape[:2]
+        self.size = n_pedestrians * N_AHEAD
         """Numbers per row."""
         self._ahead = np.zeros((n_envs, self.size))
 

@@ -43,7 +43,7 @@ PROTOCOLS: Mapping[str, Protocol] = MappingProxyType(
         "pick-choice": pick.run_choice,
         "pick-tracker": tracker.run_tracker,
         "pick-people": people.run_people,
-        "pick-courtesy": people.run_courtesy,
+        "pick-yielding": people.run_yielding,
         "pick-mocap": people.run_mocap,
         "safety-ssm": safety.run_safety,
         "sorting-grid": sorting.run_grid,

@@ -29,7 +29,7 @@ from app.sim.perception.observed_people import (
     as_known,
     checked_people,
     checked_vector,
-    standing_in,
+    person_from_cylinder,
 )
 from app.sim.pick.batch import Piece
 from app.sim.reach.batch import goal_region_of
@@ -151,7 +151,7 @@ class MotionDecider:
         q, goal = self.arm.home.copy(), np.array(goal_region_of(self.cell).center)
         people = (
             Person(q=human.rest_posture(*FAR_AWAY), qd=np.zeros(18)),
-            standing_in(-1.5, 2.0, 0.0, 0.0, 0.3),
+            person_from_cylinder(-1.5, 2.0, 0.0, 0.0, 0.3),
         )
         qdd = np.zeros(6)
         for seen in ((), people[:1], people[1:]):

@@ -176,7 +176,7 @@ class TaskChooser:
         """Choose one candidate; see :class:`~app.sim.ports.TaskPolicy`.
 
         The checkpoint knows one person: it sees the one nearest to the robot, in the person's
-        own size (``seen_people.py``). The others count for nothing in this choice, and nor
+        own size (``observed_people.py``). The others count for nothing in this choice, and nor
         does anybody who is farther away than policies know people to be.
         """
         started = time.perf_counter()

@@ -19,7 +19,7 @@ from app.policies.training.reporter import Reporter
 from app.policies.training.run import Parts, TrainingRun
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
-from app.sim.people.human_motion_config import WorkSettings
+from app.sim.people.human_motion_config import HumanMotionConfig
 from app.sim.people.kernels.people import ABSENT
 from app.sim.pick.batch import OUTCOMES, PickBatch, PickSettings
 from app.sim.pick.kernels.observation import BODY_SIZES, SIZES
@@ -46,18 +46,18 @@ def states_met(batch: PickBatch) -> dict[str, Vec]:
     return met
 
 
-def work_of(preset: Mapping[str, Any], seed: int = 0) -> WorkSettings:
+def work_of(preset: Mapping[str, Any], seed: int = 0) -> HumanMotionConfig:
     """Return what the workers do under a preset, as a manifest holds it.
 
     Args:
         preset: Fields of the preset; one from before task primitives has no ``human_motion``.
         seed: Seed of their postures and samples.
     """
-    return WorkSettings(
+    return HumanMotionConfig(
         motion=preset.get("human_motion", "library"),
         seed=seed,
         pace=preset.get("human_pace", 1.0),
-        courtesy=preset.get("human_courtesy", 0.0),
+        yielding=preset.get("human_courtesy", 0.0),
         roaming=preset.get("human_roaming", 0.0),
         absent=preset.get("human_absent", 0.0),
         augmentation=preset.get("augmentation", "sampled") == "sampled",

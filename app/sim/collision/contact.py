@@ -16,12 +16,12 @@ from app.sim.geometry.cylinder import cylinder_clearance
 from app.sim.human import model as human
 from app.sim.human.kernels.kinematics import N_CAPSULES, PELVIS_Z
 from app.sim.people.kernels import people as people_kernel
-from app.sim.people.kernels.people import Crowd, People
+from app.sim.people.kernels.people import People, PeopleGeometry
 from app.sim.robot.capsules import load_robot_capsules
 from app.sim.robot.kernels import arm as arm_kernel
 from app.sim.robot.kernels.arm import Arm
 from app.sim.robot.kernels.joints import JointPath
-from app.sim.scene.scene import NO_CYLINDERS, crowd_of, own, require_finite
+from app.sim.scene.scene import NO_CYLINDERS, own, people_geometry_of, require_finite
 
 CONTACT_KINDS = ("none", "human", "cell", "self")
 
@@ -79,7 +79,7 @@ def clearance(
     """
     robot = arm_kernel.new_robot_pose(arm)
     arm_kernel.place_robot(arm, own(q), robot)
-    crowd = crowd_of(people, human_q, cylinders, sizes)
+    crowd = people_geometry_of(people, human_q, cylinders, sizes)
     to_people, to_cell, to_self = kernel.clearances(arm, people, robot, crowd)
     return Clearance(people_m=to_people, cell_m=to_cell, self_m=to_self)
 
@@ -114,7 +114,7 @@ def contact(
     q0, qd0, c, d = path
     robot = arm_kernel.new_robot_pose(arm)
     arm_kernel.place_robot(arm, q0, robot)
-    crowd = crowd_of(people, human_q[0], cylinders[0], before)
+    crowd = people_geometry_of(people, human_q[0], cylinders[0], before)
     crowd.pelvis_z[:] = crowd.size[:, PELVIS_Z]
     crowd.q0[:], crowd.cylinders0[:] = human_q[0], cylinders[0]
     clear = np.array(kernel.clearances(arm, people, robot, crowd))
@@ -153,13 +153,13 @@ def worker_distances(arm: Arm, people: People, q: Vec, human_q: Vec, sizes: Vec)
         return np.zeros(0)
     robot = arm_kernel.new_robot_pose(arm)
     arm_kernel.place_robot(arm, own(q), robot)
-    crowd = crowd_of(people, human_q, NO_CYLINDERS, sizes)
+    crowd = people_geometry_of(people, human_q, NO_CYLINDERS, sizes)
     capsule_clearances(robot.columns, crowd.columns, crowd.gap)
     parts = crowd.gap[: n_workers * N_CAPSULES].reshape(n_workers, N_CAPSULES)
     return np.asarray(parts.min(axis=1))
 
 
-def walker_distances(arm: Arm, people: People, q: Vec, cylinders: Vec) -> Vec:
+def pedestrian_distances(arm: Arm, people: People, q: Vec, cylinders: Vec) -> Vec:
     """Return the distance of the robot at ``q`` to each walking cylinder [m], shape (C,).
 
     Args:
@@ -179,7 +179,7 @@ def walker_distances(arm: Arm, people: People, q: Vec, cylinders: Vec) -> Vec:
 
 
 def _who(
-    arm: Arm, people: People, kind: int, robot: arm_kernel.RobotPose, crowd: Crowd
+    arm: Arm, people: People, kind: int, robot: arm_kernel.RobotPose, crowd: PeopleGeometry
 ) -> tuple[str, str, int | None, int | None]:
     """Return the names of the capsule and of what it touches or is nearest to, and of whom.
 

@@ -17,7 +17,7 @@ from app.sim.people.kernels.people import PeopleState
 from app.sim.robot.capsules import load_robot_capsules
 from app.sim.robot.kernels import arm as arm_kernel
 from app.sim.scenario.kernels.episode import SUCCESS_DISTANCE
-from app.sim.scene.scene import arm_of, crowd_of, own, people_of
+from app.sim.scene.scene import arm_of, own, people_geometry_of, people_of
 from app.sim.sorting.layout import block_height, half_size, is_sorting
 from app.sim.sorting.state import NULL, SortingShape, SortingState
 
@@ -171,7 +171,7 @@ def worker_solids(cell: Cell, q: Vec, sizes: Vec | None = None) -> list[Solid]:
         q: Their joints [m, rad], shape (W, 18).
         sizes: Their sizes [m], shape (W, body.N_SIZE); None for the cell's person.
     """
-    crowd = crowd_of(people_of(cell), q, np.zeros((0, 3)), sizes)
+    crowd = people_geometry_of(people_of(cell), q, np.zeros((0, 3)), sizes)
     n = len(q) * body.N_CAPSULES
     colours = [
         CYLINDERS[w % len(CYLINDERS)] if part in _VEST else _PARTS.get(part, SLEEVE)

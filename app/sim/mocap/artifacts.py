@@ -1,8 +1,8 @@
-"""Glitches of motion capture: found by speed, cut out, the clean runs between them kept.
+"""Artifacts of motion capture: found by speed, cut out, the clean runs between them kept.
 
 A marker that is lost and found again, or taken for another, leaps. Hands, forearms and hips of
 people at work stay below 3 m/s (clean hands of the TUM clips reach 2.7 m/s): whatever is faster
-between two frames is a glitch, and so is a hole in the time column.
+between two frames is an artifact, and so is a hole in the time column.
 """
 
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ MAX_SPEED = 3.0
 JUMP_SPEED = 10.0
 """A point faster than this has jumped [m/s]: no hand at work does that."""
 MARGIN = 0.05
-"""Cut away on either side of a glitch [s]: markers are bad before they are lost."""
+"""Cut away on either side of an artifact [s]: markers are bad before they are lost."""
 MIN_RUN = 1.0
 """Shortest run that is kept [s]."""
 MAX_GAP = 0.1
@@ -30,7 +30,7 @@ WATCHED = ("pelvis", "elbow_r", "wrist_r", "elbow_l", "wrist_l")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Glitch:
+class Artifact:
     """Frames that are cut out, and why."""
 
     first: int
@@ -46,8 +46,8 @@ class Glitch:
     """One sentence part: ``"wrist_r at 41.2 m/s: jumps"``."""
 
 
-def find_glitches(times: Vec, points: Vec) -> tuple[Glitch, ...]:
-    """Return all glitches in the order of time; those closer than two margins are one.
+def find_artifacts(times: Vec, points: Vec) -> tuple[Artifact, ...]:
+    """Return all artifacts in the order of time; those closer than two margins are one.
 
     Args:
         times: Rising [s], shape (n,).
@@ -61,18 +61,18 @@ def find_glitches(times: Vec, points: Vec) -> tuple[Glitch, ...]:
     if not bad.size:
         return ()
     parted = np.flatnonzero(np.diff(times[bad]) > 2.0 * MARGIN) + 1
-    return tuple(_glitch(group, speeds, holes, dt) for group in np.split(bad, parted))
+    return tuple(_artifact(group, speeds, holes, dt) for group in np.split(bad, parted))
 
 
-def clean_runs(times: Vec, glitches: Sequence[Glitch]) -> tuple[tuple[int, int], ...]:
-    """Return first and last frame of every run without glitches, at least MIN_RUN long.
+def clean_runs(times: Vec, artifacts: Sequence[Artifact]) -> tuple[tuple[int, int], ...]:
+    """Return first and last frame of every run without artifacts, at least MIN_RUN long.
 
     Args:
         times: Rising [s], shape (n,).
-        glitches: From :func:`find_glitches`.
+        artifacts: From :func:`find_artifacts`.
     """
     good = np.ones(len(times), dtype=bool)
-    for one in glitches:
+    for one in artifacts:
         after, before = times - times[one.first], times[one.last] - times
         # Half a nanosecond more, so that rounding does not decide about a frame.
         good[(np.minimum(after, before)) >= -(MARGIN + 0.5e-9)] = False
@@ -82,12 +82,12 @@ def clean_runs(times: Vec, glitches: Sequence[Glitch]) -> tuple[tuple[int, int],
 
 
 def merged(
-    found: Sequence[Glitch], missing: Sequence[Glitch], frames: NDArray[np.int64]
-) -> tuple[Glitch, ...]:
-    """Return all glitches in frames of the file, in their order.
+    found: Sequence[Artifact], missing: Sequence[Artifact], frames: NDArray[np.int64]
+) -> tuple[Artifact, ...]:
+    """Return all artifacts in frames of the file, in their order.
 
     Args:
-        found: From :func:`find_glitches`, in rows that have all values.
+        found: From :func:`find_artifacts`, in rows that have all values.
         missing: Frames that lack a value; the holes that they leave are told by them.
         frames: Frame of the file that each row is, shape (n,).
     """
@@ -103,18 +103,18 @@ def merged(
     return tuple(sorted([*told, *missing], key=lambda one: (one.first, one.last)))
 
 
-def _glitch(
+def _artifact(
     steps: NDArray[np.signedinteger], speeds: Vec, holes: NDArray[np.bool_], dt: Vec
-) -> Glitch:
+) -> Artifact:
     first, last = int(steps[0]), int(steps[-1]) + 1
     peaks = speeds[steps].max(axis=0)
     order = [int(k) for k in np.argsort(-peaks) if peaks[k] > MAX_SPEED]
     if not order:
         gap = float(dt[steps][holes[steps]].max())
         reason = f"{gap:.2f} s without a frame"
-        return Glitch(first=first, last=last, parts=("time",), speed=0.0, reason=reason)
+        return Artifact(first=first, last=last, parts=("time",), speed=0.0, reason=reason)
     speed = float(peaks[order[0]])
     what = "jumps" if speed > JUMP_SPEED else f"faster than {MAX_SPEED:g} m/s"
     parts = tuple(WATCHED[k] for k in order)
     reason = f"{parts[0]} at {speed:.1f} m/s: {what}"
-    return Glitch(first=first, last=last, parts=parts, speed=speed, reason=reason)
+    return Artifact(first=first, last=last, parts=parts, speed=speed, reason=reason)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from app.errors import digits
 from app.sim.core.arrays import Vec
 from app.sim.human.model import JOINT_NAMES
-from app.sim.mocap.artifacts import Glitch
+from app.sim.mocap.artifacts import Artifact
 from app.sim.mocap.bvh import check_dt, shown
 from app.sim.mocap.csv_text import CsvText, read_csv_text
 from app.sim.mocap.tables import Table, bad, complete_rows, missing_values
@@ -53,7 +53,7 @@ class AngleTrack:
     """Frame of the file that each row is, counted from 0, shape (n,)."""
     n_frames: int
     """Frames of the file, with those that lack a value."""
-    missing: tuple[Glitch, ...]
+    missing: tuple[Artifact, ...]
     """Frames that lack a value; they are left out."""
     names: Mapping[str, str]
     """Columns whose name in the file is not ours, by our name."""

@@ -24,7 +24,7 @@ from app.errors import BadMotion, Fault
 from app.sim.core.arrays import Vec
 from app.sim.human.anthropometry import BodySize
 from app.sim.human.model import JOINT_NAMES, Q_MAX, Q_MIN
-from app.sim.mocap.artifacts import MIN_RUN, Glitch, clean_runs, find_glitches, merged
+from app.sim.mocap.artifacts import MIN_RUN, Artifact, clean_runs, find_artifacts, merged
 from app.sim.mocap.bvh import read_bvh
 from app.sim.mocap.csv_tables import AngleTrack, read_csv
 from app.sim.mocap.inverse_kinematics import body_angles
@@ -103,7 +103,7 @@ class ImportedMotion:
     """Clean runs, at least one."""
     spans: tuple[tuple[int, int], ...]
     """First and last frame of each run, counted from 0 in the file."""
-    glitches: tuple[Glitch, ...]
+    artifacts: tuple[Artifact, ...]
     """What was cut out."""
     wrists: Spread
     """Wrists of the model, with the recorded lengths, against the file's own."""
@@ -146,11 +146,11 @@ def read_motion(
     size = measure(track.points) if angles is None else BodySize()
     frames = np.arange(len(track.times)) if angles is None else angles.frames
     missing = () if angles is None else angles.missing
-    found = find_glitches(track.times, track.points)
+    found = find_artifacts(track.times, track.points)
     spans = clean_runs(track.times, found)
-    glitches = merged(found, missing, frames)
+    artifacts = merged(found, missing, frames)
     if not spans:
-        raise _no_run(track, glitches)
+        raise _no_run(track, artifacts)
     name = PurePath(file_name).stem[:100]
     origin = f"{PurePath(file_name).name[:100]} ({digest})"
     pieces = [_converted(track, angles, size, span) for span in spans]
@@ -167,7 +167,7 @@ def read_motion(
         size=size,
         runs=joined.motions(name, origin, in_file),
         spans=in_file,
-        glitches=glitches,
+        artifacts=artifacts,
         wrists=joined.error((WRIST_R, WRIST_L)),
         elbows=joined.error((ELBOW_R, ELBOW_L)),
         wrists_at_fixed_height=joined.error((WRIST_R, WRIST_L), carry_height=False),
@@ -325,10 +325,14 @@ def _require_names_only(options: ReadOptions) -> None:
             raise _bad(name, repr(stated), "goes with .bvh only: places of a table are metres")
 
 
-def _no_run(track: BodyTrack, glitches: Sequence[Glitch]) -> BadMotion:
+def _no_run(track: BodyTrack, artifacts: Sequence[Artifact]) -> BadMotion:
     value = f"<{len(track.times)} frames, {track.times[-1] - track.times[0]:.2f} s>"
-    rule = f"has no run of {MIN_RUN:g} s without a glitch"
-    hint = f"{len(glitches)} glitches, first: {glitches[0].reason}" if glitches else "too short"
+    rule = f"has no run of {MIN_RUN:g} s without an artifact"
+    hint = (
+        f"{len(artifacts)} artifacts, first: {artifacts[0].reason}"
+        if artifacts
+        else "too short"
+    )
     return _bad("frames", value, rule, hint)
 
 

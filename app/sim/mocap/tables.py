@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from app.errors import BadMotion, Fault, digits
 from app.sim.core.arrays import Vec
-from app.sim.mocap.artifacts import Glitch
+from app.sim.mocap.artifacts import Artifact
 from app.sim.mocap.bvh import MAX_FAULTS, MAX_FRAMES, MAX_NUMBER, shown
 
 PADDING = ',;|\t "'
@@ -311,7 +311,7 @@ def complete_rows(columns: Mapping[str, Vec], place: str) -> NDArray[np.bool_]:
     return np.asarray(good)
 
 
-def missing_values(columns: Mapping[str, Vec], good: NDArray[np.bool_]) -> tuple[Glitch, ...]:
+def missing_values(columns: Mapping[str, Vec], good: NDArray[np.bool_]) -> tuple[Artifact, ...]:
     """Return the runs of rows that lack a value, with the columns that lack it.
 
     Args:
@@ -325,7 +325,7 @@ def missing_values(columns: Mapping[str, Vec], good: NDArray[np.bool_]) -> tuple
         also = f" and {len(parts) - 3} more" if len(parts) > 3 else ""
         reason = f"no value of {', '.join(parts[:3])}{also}"
         first, last = int(group[0]), int(group[-1])
-        found.append(Glitch(first=first, last=last, parts=parts, speed=0.0, reason=reason))
+        found.append(Artifact(first=first, last=last, parts=parts, speed=0.0, reason=reason))
     return tuple(found)
 
 

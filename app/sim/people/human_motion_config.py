@@ -1,9 +1,9 @@
 """What the workers of a cell do: their motion, sizes and manners, as settings and as data.
 
-Three sources of motion. ``library``: task primitives (``task_library.py``), the usual one;
-``reaches``: the first, synthetic reaches (``work_cycle.py``), kept as a variant; ``recorded``:
+Three sources of motion. ``library``: task primitives (``primitive_library.py``), the usual one;
+``reaches``: the first, synthetic reaches (``reach_script.py``), kept as a variant; ``recorded``:
 imported motion (``motions.py``), placed in the cell. A share of the workers may roam instead
-(``roaming.py``). On top come how large the workers are and how far they give way to the arm.
+(``off_task_motion.py``). On top come how large the workers are and how far they give way to the arm.
 """
 
 import math
@@ -22,33 +22,33 @@ from app.sim.mocap.importer import Motion, placed
 from app.sim.people.kernels import people
 from app.sim.people.kernels.people import People, Tracks
 from app.sim.people.off_task_motion import roaming
-from app.sim.people.reach_script import build_library
-from app.sim.primitives.kernels.primitives import Repertoire
-from app.sim.primitives.primitive_library import VARIANTS, task_library
+from app.sim.people.reach_script import build_reach_library
+from app.sim.primitives.kernels.primitives import PrimitiveLibrary
+from app.sim.primitives.primitive_library import VARIANTS, motion_library
 
-WorkMotion = Literal["library", "reaches", "recorded"]
-MOTIONS: tuple[WorkMotion, ...] = ("library", "reaches", "recorded")
+MotionSource = Literal["library", "reaches", "recorded"]
+MOTIONS: tuple[MotionSource, ...] = ("library", "reaches", "recorded")
 TRACK_DT = 0.02
 """Step to which recorded motion is brought [s]; 50 Hz, above what people's hands hold."""
 NEEDED_S = 10.0
 """How long a track should go on after an episode's start: an evaluation's episode [s]."""
-N_ROAMERS = 24
-"""Motions that roamers draw from, a minute each."""
+N_OFF_TASK = 24
+"""Motions that off_task_recordings draw from, a minute each."""
 NO_TRACKS = Tracks(np.zeros((1, 19)), np.array([[0, 1, -1]]), TRACK_DT, 0.0)
 """The tracks of workers who follow none."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class WorkSettings:
+class HumanMotionConfig:
     """What the workers of a cell do."""
 
-    motion: WorkMotion = "library"
+    motion: MotionSource = "library"
     """Where their motion comes from."""
     seed: int = 0
     """Seed of their postures and of the samples of their primitives."""
     pace: float = 1.0
     """Speed relative to their scripts."""
-    courtesy: float = 0.0
+    yielding: float = 0.0
     """How far they give way to the arm, from 0 (they do not see it) to 1."""
     roaming: float = 0.0
     """Share of the workers who roam instead of working, drawn each episode anew."""
@@ -56,7 +56,7 @@ class WorkSettings:
     """Share of the workers who are not there, drawn each episode anew."""
     bodies: tuple[BodySize, ...] | None = None
     """Sizes drawn from, each episode anew; None for those of the library
-    (``task_library.BODIES``), and in synthetic reaches for the cell's own person."""
+    (``motion_library.BODIES``), and in synthetic reaches for the cell's own person."""
     augmentation: bool = True
     """Whether primitives are sampled and varied (METHOD 3.4); if not, the library's
     demonstrations are replayed as they are."""
@@ -68,7 +68,7 @@ class WorkSettings:
     def __post_init__(self) -> None:
         if self.motion not in MOTIONS:
             raise InvalidInput("motion", self.motion, "must be a source of motion", MOTIONS)
-        for name in ("courtesy", "roaming", "absent"):
+        for name in ("yielding", "roaming", "absent"):
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise InvalidInput(name, getattr(self, name), "must lie in [0, 1]")
         if not (np.isfinite(self.pace) and self.pace > 0.0):
@@ -79,13 +79,13 @@ class WorkSettings:
             raise InvalidInput("recorded", 0, "must hold at least one run of recorded motion")
 
 
-USUAL = WorkSettings()
+USUAL = HumanMotionConfig()
 """The library's people."""
-REACHING = WorkSettings(motion="reaches")
+REACHING = HumanMotionConfig(motion="reaches")
 """The first people: synthetic reaches of the cell's own person."""
 
 
-def with_work(shared: People, cell: Cell, settings: WorkSettings) -> People:
+def with_human_motion(shared: People, cell: Cell, settings: HumanMotionConfig) -> People:
     """Return shared data of people whose workers do what the settings say.
 
     Args:
@@ -94,19 +94,19 @@ def with_work(shared: People, cell: Cell, settings: WorkSettings) -> People:
         settings: What they do.
     """
     shared = shared._replace(
-        pace=settings.pace, courtesy=settings.courtesy, absent_share=settings.absent
+        pace=settings.pace, yielding=settings.yielding, absent_share=settings.absent
     )
     if settings.motion == "recorded":
         tracks, lengths = tracks_of(settings.recorded, cell.floor_z)
         return shared._replace(tracks=tracks, track_share=1.0, bodies=lengths)
     if settings.roaming > 0.0:
-        tracks, _ = tracks_of(roamers(cell, settings.seed), cell.floor_z)
+        tracks, _ = tracks_of(off_task_recordings(cell, settings.seed), cell.floor_z)
         tracks.spans[:, 2] = -1  # Anybody may roam.
         shared = shared._replace(tracks=tracks, track_share=settings.roaming)
     if settings.motion == "library":
         return _with_library(shared, cell, settings)
     sizes = settings.bodies or (cell.human.size,)
-    library = build_library(cell, settings.seed, sizes)
+    library = build_reach_library(cell, settings.seed, sizes)
     return shared._replace(
         source=people.REACHES,
         bodies=np.stack([size.vector(cell.floor_z) for size in sizes]),
@@ -117,8 +117,8 @@ def with_work(shared: People, cell: Cell, settings: WorkSettings) -> People:
     )
 
 
-def _with_library(shared: People, cell: Cell, settings: WorkSettings) -> People:
-    library = task_library(
+def _with_library(shared: People, cell: Cell, settings: HumanMotionConfig) -> People:
+    library = motion_library(
         cell,
         settings.seed,
         settings.bodies,
@@ -134,7 +134,7 @@ def _with_library(shared: People, cell: Cell, settings: WorkSettings) -> People:
         hands=np.array(library.hands),
         of_station=np.array(library.of_station),
         n_cubes=library.n_cubes,
-        repertoire=Repertoire(
+        primitive_library=PrimitiveLibrary(
             samples=np.ascontiguousarray(library.samples),
             gain=np.array(library.gain),
             legs=np.array(library.legs),
@@ -145,9 +145,9 @@ def _with_library(shared: People, cell: Cell, settings: WorkSettings) -> People:
 
 
 @lru_cache(maxsize=4)
-def roamers(cell: Cell, seed: int) -> tuple[Motion, ...]:
-    """Return the motions of a cell's roamers."""
-    return roaming(cell, cell.human.size, seed, N_ROAMERS)
+def off_task_recordings(cell: Cell, seed: int) -> tuple[Motion, ...]:
+    """Return the motions of a cell's off_task_recordings."""
+    return roaming(cell, cell.human.size, seed, N_OFF_TASK)
 
 
 def tracks_of(motions: Sequence[Motion], floor_z: float) -> tuple[Tracks, Vec]:

@@ -28,17 +28,17 @@ from app.sim.people.kernels.pedestrian import (
     VX,
     VY,
     WALKER,
+    PedestrianRules,
+    PedestrianState,
     R,
-    WalkerRules,
-    WalkerState,
     X,
     Y,
-    advance_walker,
-    start_walker,
+    advance_pedestrian,
+    start_pedestrian,
 )
 
-WalkerKind = Literal["walker", "constant", "fixed-speed"]
-WALKER_KINDS: dict[WalkerKind, int] = {
+PedestrianKind = Literal["walker", "constant", "fixed-speed"]
+PEDESTRIAN_KINDS: dict[PedestrianKind, int] = {
     "walker": WALKER,
     "constant": CONSTANT,
     "fixed-speed": FIXED_SPEED,
@@ -53,14 +53,14 @@ _RANGES = (("v_min", "v_max"), ("r_min", "r_max"), ("x_min", "x_max"), ("y_min",
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class WalkerSettings:
+class PedestrianSettings:
     """One person who is a walking cylinder (METHOD 2.1).
 
     Raises:
         InvalidInput: A value that is not finite, out of its range, or above its upper partner.
     """
 
-    kind: WalkerKind = "walker"
+    kind: PedestrianKind = "walker"
     """Which variant."""
     v_min: float = 0.3
     """Least walking speed; slower counts as standing [m/s]."""
@@ -100,9 +100,9 @@ class WalkerSettings:
     """Probability, per period, of walking on after having stayed at a target."""
 
     def __post_init__(self) -> None:
-        if self.kind not in WALKER_KINDS:
+        if self.kind not in PEDESTRIAN_KINDS:
             raise InvalidInput(
-                "kind", self.kind, "must be a kind of walker", list(WALKER_KINDS)
+                "kind", self.kind, "must be a kind of walker", list(PEDESTRIAN_KINDS)
             )
         for field in fields(self)[1:]:
             value = getattr(self, field.name)
@@ -139,22 +139,22 @@ class Walk:
     """WALKING, STAYING or STILL, shape (n + 1,)."""
 
 
-def walker_rules(walkers: Sequence[WalkerSettings]) -> WalkerRules:
+def pedestrian_rules(walkers: Sequence[PedestrianSettings]) -> PedestrianRules:
     """Return what the kernels know of a cell's walkers."""
-    rows = [(WALKER_KINDS[walker.kind], *astuple(walker)[1:]) for walker in walkers]
-    return WalkerRules(rows=np.array(rows, dtype=np.float64).reshape(-1, N_RULES))
+    rows = [(PEDESTRIAN_KINDS[walker.kind], *astuple(walker)[1:]) for walker in walkers]
+    return PedestrianRules(rows=np.array(rows, dtype=np.float64).reshape(-1, N_RULES))
 
 
-def walker_state(n_envs: int, n_walkers: int) -> WalkerState:
+def pedestrian_state(n_envs: int, n_pedestrians: int) -> PedestrianState:
     """Return rows for the walkers of ``n_envs`` environments, not started yet."""
-    return WalkerState(
-        rows=np.zeros((n_envs, n_walkers, N_STATE)),
-        stream=np.zeros((n_envs, n_walkers, 1), dtype=np.uint64),
+    return PedestrianState(
+        rows=np.zeros((n_envs, n_pedestrians, N_STATE)),
+        stream=np.zeros((n_envs, n_pedestrians, 1), dtype=np.uint64),
     )
 
 
 def walk(
-    walker: WalkerSettings,
+    walker: PedestrianSettings,
     seed: int,
     seconds: float,
     dt: float = 0.02,
@@ -182,7 +182,7 @@ def walk(
     stream = np.zeros(1, dtype=np.uint64)
     start_stream(seed, env, episode, stream)
     rows = np.empty((round(seconds / dt) + 1, N_STATE))
-    _record(walker_rules([walker]), walker_state(1, 1), stream, dt, rows)
+    _record(pedestrian_rules([walker]), pedestrian_state(1, 1), stream, dt, rows)
     return Walk(
         time=rows[:, TIME],
         position=rows[:, X : Y + 1],
@@ -193,10 +193,12 @@ def walk(
     )
 
 
-def _record(rules: WalkerRules, state: WalkerState, stream: State, dt: float, out: Vec) -> None:
+def _record(
+    rules: PedestrianRules, state: PedestrianState, stream: State, dt: float, out: Vec
+) -> None:
     """Write the state at the ends of all periods, shape (n + 1, N_STATE)."""
-    start_walker(rules, state, 0, 0, stream)
+    start_pedestrian(rules, state, 0, 0, stream)
     out[0] = state.rows[0, 0]
     for row in out[1:]:
-        advance_walker(rules, state, 0, 0, dt)
+        advance_pedestrian(rules, state, 0, 0, dt)
         row[:] = state.rows[0, 0]

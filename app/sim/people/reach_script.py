@@ -4,11 +4,11 @@ A *library* holds many postures per place and hand, with random stance, elbow an
 visits them at random pace with pauses (``primitives/kernels/script.py``). The other hand rests
 at the table's edge while the trunk leans.
 
-``WorkSettings(motion="reaches")`` selects this motion; :func:`reach_script` makes the single
+``HumanMotionConfig(motion="reaches")`` selects this motion; :func:`reach_script` makes the single
 reaches of the case studies.
 
 Source: METHOD 3.2 and 3.4. Deviates: the thesis replays motion capture through movement
-primitives; these reaches are synthetic (``task_library.py`` has the primitives).
+primitives; these reaches are synthetic (``primitive_library.py`` has the primitives).
 """
 
 import math
@@ -48,7 +48,7 @@ class Library:
 
 
 @lru_cache(maxsize=8)
-def build_library(
+def build_reach_library(
     cell: Cell, seed: int, bodies: tuple[BodySize, ...] | None = None, variants: int = 24
 ) -> Library:
     """Make ``variants`` random postures for each body, place and hand of a cell.

@@ -35,7 +35,7 @@ N_STATE = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CylinderTrackerSettings:
+class CylinderSensorSettings:
     """How good a tracker is.
 
     Raises:
@@ -74,7 +74,7 @@ class CylinderTrackerSettings:
         return float(alpha), float(beta / period)
 
 
-class CylinderTracker:
+class CylinderSensorModel:
     """Cameras and filters of ``n`` cells with ``n_people`` cylinders each.
 
     Args:
@@ -85,7 +85,7 @@ class CylinderTracker:
     """
 
     def __init__(
-        self, settings: CylinderTrackerSettings, n: int, n_people: int, seed: int
+        self, settings: CylinderSensorSettings, n: int, n_people: int, seed: int
     ) -> None:
         self._settings, self._rng = settings, np.random.default_rng(seed)
         self._gains = settings.gains()

@@ -24,7 +24,7 @@ Motion = Callable[[float], Vec]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TrackerSettings:
+class KeypointSensorSettings:
     """How good a tracker is."""
 
     rate_hz: float = 30.0
@@ -83,7 +83,7 @@ class Tracker:
 
     def __init__(
         self,
-        settings: TrackerSettings,
+        settings: KeypointSensorSettings,
         seed: int | Sequence[int],
         size: Vec,
         floor_z: float,

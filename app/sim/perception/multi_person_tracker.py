@@ -94,7 +94,7 @@ def _from_base(points: Vec) -> float:
     return float(np.min(away, where=np.isfinite(away), initial=np.inf))
 
 
-class PeopleEstimator:
+class MultiPersonTracker:
     """The estimates of several people whose frames come together, in any order.
 
     Args:

@@ -29,7 +29,7 @@ from app.sim.perception.keypoints import FARTHEST_M
 from app.sim.perception.person_estimator import PersonEstimate
 from app.sim.robot.kernels import arm as arm_kernel
 from app.sim.robot.kernels.arm import Arm
-from app.sim.scene.scene import crowd_of, own
+from app.sim.scene.scene import own, people_geometry_of
 
 FASTEST = 50.0
 """Greatest speed of a person's joints, cylinder or radius [m/s, rad/s]."""
@@ -59,7 +59,7 @@ _KNOWN_LOW[_YAW], _KNOWN_HIGH[_YAW] = -_MOST_YAW, _MOST_YAW
 _KNOWN_PAST = np.array([KNOWN_RADIUS, KNOWN_WALK])
 
 
-def standing_in(
+def person_from_cylinder(
     x: float,
     y: float,
     vx: float,
@@ -93,7 +93,7 @@ def standing_in(
     )
 
 
-def as_person(estimate: PersonEstimate) -> Person | None:
+def person_from_estimate(estimate: PersonEstimate) -> Person | None:
     """Return the person that an estimate is seen as; None where there never was one.
 
     Where pelvis and trunk were never seen together there are no joint angles; then the person
@@ -116,7 +116,7 @@ def as_monitored(observed: PersonEstimate) -> Person | None:
     Args:
         observed: The estimate at the last frame that showed the person.
     """
-    return _in_cylinder(observed) if observed.held else as_person(observed)
+    return _in_cylinder(observed) if observed.held else person_from_estimate(observed)
 
 
 def _in_cylinder(estimate: PersonEstimate) -> Person | None:
@@ -126,13 +126,13 @@ def _in_cylinder(estimate: PersonEstimate) -> Person | None:
         return None
     x, y = np.clip(cylinder.center, -FARTHEST_M, FARTHEST_M).tolist()
     vx, vy = np.clip(cylinder.velocity, -FASTEST, FASTEST).tolist()
-    person = standing_in(x, y, vx, vy, min(cylinder.radius, WIDEST), measured=False)
+    person = person_from_cylinder(x, y, vx, vy, min(cylinder.radius, WIDEST), measured=False)
     return replace(person, top=cylinder.top)
 
 
 def person_anywhere() -> Person:
     """Return the person that a safety layer assumes where nothing is known: it stops."""
-    return standing_in(0.0, 0.0, 0.0, 0.0, WIDEST, measured=False)
+    return person_from_cylinder(0.0, 0.0, 0.0, 0.0, WIDEST, measured=False)
 
 
 def degradations(person: Person) -> tuple[str, ...]:
@@ -287,7 +287,7 @@ def nearest_index(arm: Arm, shared: People, q: Vec, people: Sequence[Person]) ->
     workers = [i for i, person in enumerate(people) if person.cylinder is None]
     walkers = [i for i, person in enumerate(people) if person.cylinder is not None]
     sizes = [shared.bodies[0] if (s := people[i].size) is None else s for i in workers]
-    crowd = crowd_of(
+    crowd = people_geometry_of(
         shared,
         np.array([people[i].q for i in workers]).reshape(-1, 18),
         np.array([people[i].cylinder for i in walkers], dtype=np.float64).reshape(-1, 3),

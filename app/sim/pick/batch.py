@@ -16,8 +16,8 @@ from app.errors import InvalidInput
 from app.sim.cells.cell import Cell, lacks_stations
 from app.sim.core.arrays import Vec
 from app.sim.geometry.segments import FAR
-from app.sim.people.human_motion_config import USUAL, WorkSettings
-from app.sim.people.kernels.people import People, PeopleState, new_crowd, record_palms
+from app.sim.people.human_motion_config import USUAL, HumanMotionConfig
+from app.sim.people.kernels.people import People, PeopleState, new_people_geometry, record_palms
 from app.sim.pick.kernels import episode as pick
 from app.sim.pick.kernels import observation as features
 from app.sim.pick.kernels.observation import N_FEATURES, N_WITH_BODY
@@ -75,8 +75,8 @@ class PickSettings:
     """Fewest and most targets offered per episode."""
     people: tuple[HumanKind, ...] | None = None
     """Who is in the cell, 0 to 4 people; None for the cell's own."""
-    work: WorkSettings = field(default=USUAL)
-    """What the workers do: their motion, sizes and courtesy."""
+    work: HumanMotionConfig = field(default=USUAL)
+    """What the workers do: their motion, sizes and yielding."""
     start: StartRule = "clearance"
     """Where people may start: ``clearance`` (``start_clearance_m`` from the robot), ``uniform``
     (anywhere, even in contact)."""
@@ -306,10 +306,10 @@ def hand_speeds(
         n_scripts: Scripts looked at.
         seconds: Time looked at per script [s].
     """
-    people, tick = batch.world.people._replace(courtesy=0.0), 0.01
+    people, tick = batch.world.people._replace(yielding=0.0), 0.01
     state = new_people_state(batch.cell, people, 1)
     n_workers = state.q.shape[1]
-    crowd = new_crowd(people, n_workers, state.cylinders.shape[1])
+    crowd = new_people_geometry(people, n_workers, state.cylinders.shape[1])
     palms, rng = np.zeros((int(seconds / tick), n_workers, 2, 3)), np.zeros(1, dtype=np.uint64)
     rates = []
     for number in range(n_scripts):

@@ -16,7 +16,7 @@ from app.sim.people.kernels.people import people_clearance
 from app.sim.people.reach_script import Script, reach_script
 from app.sim.robot.kernels import arm as arm_kernel
 from app.sim.robot.kernels import kinematics
-from app.sim.scene.scene import NO_CYLINDERS, arm_of, crowd_of, people_of
+from app.sim.scene.scene import NO_CYLINDERS, arm_of, people_geometry_of, people_of
 
 CASES_CELL = "pick-and-place"
 """The cell whose layout the cases were chosen for."""
@@ -175,7 +175,7 @@ def geometry(cell: Cell, case: Case) -> CaseGeometry:
     clearance = np.empty((3, len(times)))
     for k, t in enumerate(times):
         human_q, _ = script.at(float(t))
-        crowd = crowd_of(people, human_q[None], NO_CYLINDERS)
+        crowd = people_geometry_of(people, human_q[None], NO_CYLINDERS)
         for i, posture in enumerate(postures):
             arm_kernel.place_robot(arm, posture, pose)
             clearance[i, k] = people_clearance(people, pose.columns, crowd)

@@ -7,7 +7,7 @@ bowed a little, while the stance moves ahead of the hand or behind it. What is n
 motion (a jump, a joint limit, a hand or an elbow in the table) is drawn again.
 
 A *style* is a manner of doing this. A demonstration begins in one style and ends, now and then,
-in another, as do the people of ``task_library.py``. Their postures are drawn here as
+in another, as do the people of ``primitive_library.py``. Their postures are drawn here as
 well, so that queries of a primitive lie in the distribution to which it was fitted.
 
 Measured on the recorded clips (six clips, Vicon, 100 Hz; 65 reaches of 0.15 m or more from rest
@@ -51,7 +51,7 @@ LARGEST_STEP = 0.25
 """Largest change of a joint from one phase to the next [rad]."""
 OVER_TABLE = 0.015
 """Least height of palms, wrists and elbows over the table [m]."""
-NODE_TRIES, TRIES = 20, 40
+KEYFRAME_TRIES, TRIES = 20, 40
 """Draws after which a posture or a motion is given up."""
 
 _LOW_POINTS = (
@@ -126,7 +126,7 @@ def draw_style(rng: np.random.Generator) -> Style:
     return STYLES[rng.integers(len(STYLES))]
 
 
-def draw_node(
+def draw_keyframe(
     cell: Cell,
     size: Vec,
     target: Vec | None,
@@ -149,7 +149,7 @@ def draw_node(
         that was tried, whose palm may fall short of the place.
     """
     style = draw_style(rng) if style is None else style
-    for _ in range(NODE_TRIES):
+    for _ in range(KEYFRAME_TRIES):
         if target is None:
             node, reached = _home(cell, size, style, rng)
         else:
@@ -258,8 +258,8 @@ def demonstrate(
     """
     for _ in range(TRIES):
         last = draw_style(rng) if rng.uniform() < CHANGES_STYLE else style
-        first = draw_node(cell, size, ends[0], hand, rng, style)
-        then = draw_node(cell, size, ends[1], hand, rng, last)
+        first = draw_keyframe(cell, size, ends[0], hand, rng, style)
+        then = draw_keyframe(cell, size, ends[1], hand, rng, last)
         q, reached = between(size, first, then, style, rng)
         steps = np.abs(np.diff(q[:, 3:], axis=0)).max()
         clear = all(_over_table(cell, row, size) for row in q)

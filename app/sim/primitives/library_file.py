@@ -67,7 +67,7 @@ class TaskPrimitive:
         return promp.of_weights(self.weights, self.durations, residual=self.residual)
 
 
-def legs_of(cell: Cell) -> tuple[Leg, ...]:
+def segments_of(cell: Cell) -> tuple[Leg, ...]:
     """Return the legs of a worker's task in a cell, stored direction; none without a worker."""
     if not cell.workers:
         return ()

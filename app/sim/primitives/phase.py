@@ -49,7 +49,9 @@ def monotone(x: Vec, knots: Vec, phases: Vec) -> Vec:
     return np.asarray(np.clip(law(np.clip(x, 0.0, 1.0)), 0.0, 1.0))
 
 
-def random_law(x: Vec, rng: np.random.Generator, spread: float = 0.25, n_parts: int = 4) -> Vec:
+def random_phase_profile(
+    x: Vec, rng: np.random.Generator, spread: float = 0.25, n_parts: int = 4
+) -> Vec:
     """Return a random phase law: every part of the motion at a pace of its own.
 
     The durations of ``n_parts`` equal parts of the phase are each multiplied by

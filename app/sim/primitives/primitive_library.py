@@ -33,14 +33,14 @@ from app.sim.core.arrays import Vec
 from app.sim.human import model as human
 from app.sim.human.anthropometry import MEDIAN, BodySize, percentile_body
 from app.sim.primitives import promp
-from app.sim.primitives.demonstrations import draw_node
+from app.sim.primitives.demonstrations import draw_keyframe
 from app.sim.primitives.library_file import (
     HANDS,
     HOME,
     TaskPrimitive,
-    legs_of,
     place_of,
     primitive_for,
+    segments_of,
 )
 from app.sim.primitives.sampling import GRID, sample
 from app.sim.primitives.via_points import points_of
@@ -67,7 +67,7 @@ N_SAMPLES = 24
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TaskLibrary:
+class MotionLibrary:
     """What a worker's motion in one cell is put together from; arrays are read-only."""
 
     postures: Vec
@@ -107,14 +107,14 @@ def people_sizes(
 
 
 @lru_cache(maxsize=8)
-def task_library(
+def motion_library(
     cell: Cell,
     seed: int,
     bodies: tuple[BodySize, ...] | None = None,
     n_samples: int = N_SAMPLES,
     augmentation: bool = True,
     variants: int = VARIANTS,
-) -> TaskLibrary:
+) -> MotionLibrary:
     """Put a cell's library together.
 
     Args:
@@ -139,7 +139,7 @@ def task_library(
     samples, gains, legs, duration = _legs(cell, n_samples, augmentation, rng)
     for array in (postures, hands, of_station, vectors, samples, gains, legs, duration):
         array.setflags(write=False)
-    return TaskLibrary(
+    return MotionLibrary(
         postures=postures,
         hands=hands,
         of_station=of_station,
@@ -169,7 +169,7 @@ def _nodes(
                     of_station[person, place, column] = of_station[person, place, 0]
                     continue
                 for _ in range(variants):
-                    node = draw_node(cell, size, point, hand, rng)
+                    node = draw_keyframe(cell, size, point, hand, rng)
                     postures.append(node.q)
                     hands.append(_palms(node.q, size))
     return np.array(postures), np.array(hands), of_station
@@ -191,7 +191,7 @@ def _legs(
     gains: list[Vec] = []
     durations: list[tuple[float, float]] = []
     first = 0
-    for leg in legs_of(cell):
+    for leg in segments_of(cell):
         found = primitive_for(cell, leg)
         logs = np.log(found.durations)
         some = draw_samples(found, 2 * n_samples, rng) if augmentation else found.weights
@@ -235,7 +235,7 @@ def draw_samples(found: TaskPrimitive, n: int, rng: np.random.Generator) -> Vec:
     return np.array([*kept, *rest])
 
 
-def leg_weights(library: TaskLibrary, primitive: int, sample: int, ends: Vec) -> Vec:
+def segment_weights(library: MotionLibrary, primitive: int, sample: int, ends: Vec) -> Vec:
     """Return the weights of one leg between two nodes, as the kernels make them, (18, 12).
 
     Args:

@@ -17,9 +17,9 @@ from app.sim.cells.parts import GoalRegion, Station
 from app.sim.cells.people import Worker
 from app.sim.core.arrays import Vec
 from app.sim.geometry.segments import FAR
-from app.sim.people.human_motion_config import REACHING, WorkSettings
+from app.sim.people.human_motion_config import REACHING, HumanMotionConfig
 from app.sim.people.kernels.people import People, PeopleState
-from app.sim.people.pedestrian import AUTHORS_WALK, walker_rules
+from app.sim.people.pedestrian import AUTHORS_WALK, pedestrian_rules
 from app.sim.prediction.weights import new_forecaster
 from app.sim.reach.goal_sets import N_HALTON, halton_targets
 from app.sim.reach.kernels import episode as reach
@@ -38,10 +38,10 @@ from app.sim.scene.scene import (
     new_people_state,
     own,
     own_index,
+    pedestrian_settings,
     people_of,
     require_finite,
     require_shape,
-    walker_settings,
     with_people,
 )
 
@@ -98,8 +98,8 @@ class ReachSettings:
     collision_ends: bool = True
     """Whether a collision ends the episode. If not, it goes on until the goal is reached or
     time is up, and then counts as a collision, not as a success."""
-    work: WorkSettings = field(default=REACHING)
-    """What the workers do: their motion, sizes and courtesy."""
+    work: HumanMotionConfig = field(default=REACHING)
+    """What the workers do: their motion, sizes and yielding."""
     action: ActionSettings = field(default=DEFAULT_ACTION)
     """What actions mean (METHOD 2.2)."""
     observation: ViewName = "features"
@@ -211,8 +211,10 @@ def _people_of(cell: Cell, settings: ReachSettings) -> People:
     people = people_of(cell, settings.work)
     if settings.start != "authors":
         return people
-    walkers = [replace(walker_settings(person), **AUTHORS_WALK) for person in cell.cylinders]
-    return people._replace(walkers=walker_rules(walkers))
+    walkers = [
+        replace(pedestrian_settings(person), **AUTHORS_WALK) for person in cell.cylinders
+    ]
+    return people._replace(walkers=pedestrian_rules(walkers))
 
 
 def world_of(cell: Cell, people: People, targets: Vec) -> reach.ReachWorld:

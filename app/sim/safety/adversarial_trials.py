@@ -15,7 +15,7 @@ from app.errors import InvalidInput
 from app.sim.cells.cell import Cell, load_cell
 from app.sim.core.arrays import Vec
 from app.sim.people.human_motion_config import REACHING
-from app.sim.people.kernels.people import new_crowd
+from app.sim.people.kernels.people import new_people_geometry
 from app.sim.robot.actions import ActionSettings
 from app.sim.safety.kernels import adversarial_trials as safety_trial
 from app.sim.safety.kernels import separation_check as watch
@@ -146,7 +146,7 @@ def run_trial(
     cell = _cell_of(settings)
     arm, people = arm_of(cell), people_of(cell, REACHING)
     state = new_people_state(cell, people, 1)
-    crowd = new_crowd(people, len(cell.workers), len(cell.cylinders))
+    crowd = new_people_geometry(people, len(cell.workers), len(cell.cylinders))
     n_late = ceil(settings.true_delay / arm.dt - 1e-9)
     shape = (people.columns.shape[1], len(cell.cylinders))
     spaces = (watch.new_ssm_workspace(arm, *shape), watch.new_ssm_workspace(arm, *shape))

@@ -86,10 +86,10 @@ class CellBatch(ABC):
         """Take the state of another batch over.
 
         Copied arrays are writable. Kernels are compiled once more, for minutes, where one is
-        that was not, so the shared repertoire is made read-only again.
+        that was not, so the shared primitive_library is made read-only again.
         """
         self.__dict__.update(state)
-        self._world.people.repertoire.samples.setflags(write=False)
+        self._world.people.primitive_library.samples.setflags(write=False)
 
     @property
     def episode(self) -> Rows:

@@ -25,12 +25,12 @@ from app.sim.core.arrays import Vec
 from app.sim.geometry.capsules import new_columns
 from app.sim.human import model as human
 from app.sim.human.kernels import kinematics as body
-from app.sim.people.human_motion_config import NO_TRACKS, WorkSettings, with_work
+from app.sim.people.human_motion_config import NO_TRACKS, HumanMotionConfig, with_human_motion
 from app.sim.people.kernels import people
 from app.sim.people.kernels.people import MAX_PEOPLE, People, PeopleState
-from app.sim.people.pedestrian import WalkerSettings, walker_rules, walker_state
+from app.sim.people.pedestrian import PedestrianSettings, pedestrian_rules, pedestrian_state
 from app.sim.primitives.kernels import script
-from app.sim.primitives.kernels.primitives import new_legs, no_repertoire
+from app.sim.primitives.kernels.primitives import empty_primitive_library, new_segment_state
 from app.sim.robot.capsules import levers, load_robot_capsules, self_pairs
 from app.sim.robot.kernels.arm import Arm
 from app.sim.robot.kernels.joints import JointLimits
@@ -112,7 +112,7 @@ def with_people(cell: Cell, kinds: Sequence[HumanKind]) -> Cell:
 
 def _cylinder_of(cell: Cell, kind: HumanKind) -> CylinderPerson:
     """Return a cylinder of a kind that walks where a cell's first person may be."""
-    where = cell.people[0] if cell.people else WalkerSettings()
+    where = cell.people[0] if cell.people else PedestrianSettings()
     area = {name: getattr(where, name) for name in ("x_min", "x_max", "y_min", "y_max")}
     if kind == "walker":
         return Walker(kind=kind, **area)
@@ -133,10 +133,12 @@ _WALKER_FIELDS = {
 }
 
 
-def walker_settings(person: CylinderPerson) -> WalkerSettings:
+def pedestrian_settings(person: CylinderPerson) -> PedestrianSettings:
     """Return how a cell's cylinder walks."""
     values = person.model_dump(exclude={"height"})
-    return WalkerSettings(**{_WALKER_FIELDS.get(name, name): v for name, v in values.items()})
+    return PedestrianSettings(
+        **{_WALKER_FIELDS.get(name, name): v for name, v in values.items()}
+    )
 
 
 @lru_cache(maxsize=8)
@@ -178,7 +180,7 @@ def boxes_of(cell: Cell) -> Vec:
     return np.array(rows, dtype=np.float64).reshape(-1, 7)
 
 
-def people_of(cell: Cell, work: WorkSettings | None = None) -> People:
+def people_of(cell: Cell, work: HumanMotionConfig | None = None) -> People:
     """Return what the kernels know of a cell's people.
 
     Args:
@@ -198,15 +200,15 @@ def people_of(cell: Cell, work: WorkSettings | None = None) -> People:
         source=people.REACHES,
         track_share=0.0,
         absent_share=0.0,
-        repertoire=no_repertoire(),
+        primitive_library=empty_primitive_library(),
         tracks=NO_TRACKS,
         limits=np.stack([human.Q_MIN, human.Q_MAX]),
-        courtesy=0.0,
+        yielding=0.0,
         pace=1.0,
-        walkers=walker_rules([walker_settings(person) for person in cell.cylinders]),
+        walkers=pedestrian_rules([pedestrian_settings(person) for person in cell.cylinders]),
         nobody=human.rest_posture(*FAR_AWAY),
     )
-    return with_work(shared, cell, work) if workers and work is not None else shared
+    return with_human_motion(shared, cell, work) if workers and work is not None else shared
 
 
 def new_people_state(cell: Cell, shared: People, n_envs: int) -> PeopleState:
@@ -229,20 +231,20 @@ def new_people_state(cell: Cell, shared: People, n_envs: int) -> PeopleState:
         near=rows(workers),
         lean=rows(workers, 4),
         track=counts(workers) + people.SCRIPTED,
-        legs=new_legs(n_envs, workers),
+        legs=new_segment_state(n_envs, workers),
         move=counts(workers),
         n_moves=counts(workers),
         start=rows(workers, script.MAX_MOVES),
         duration=rows(workers, script.MAX_MOVES),
         chosen=counts(workers, script.MAX_MOVES + 1),
-        walkers=walker_state(n_envs, walkers),
+        walkers=pedestrian_state(n_envs, walkers),
         cylinders=rows(walkers, 3),
     )
 
 
-def crowd_of(
+def people_geometry_of(
     shared: People, human_q: Vec, cylinders: Vec, sizes: Vec | None = None
-) -> people.Crowd:
+) -> people.PeopleGeometry:
     """Return people placed as shapes.
 
     Args:
@@ -253,7 +255,7 @@ def crowd_of(
     """
     if len(human_q) * body.N_CAPSULES > shared.columns.shape[1]:  # more than the cell's own
         shared = shared._replace(columns=body.capsule_columns(len(human_q)))
-    crowd = people.new_crowd(shared, len(human_q), len(cylinders))
+    crowd = people.new_people_geometry(shared, len(human_q), len(cylinders))
     if sizes is not None:
         crowd.size[:] = sizes
     people.place_workers(shared, own(human_q), crowd)

@@ -4,7 +4,7 @@ Blocks are as high as a level of the towers and narrower than the clutter's cell
 point is where the tcp is when the magnet touches the top of the block there; the pick policy
 brings the tool to APPROACH_M above it.
 
-To the pick scenario (``pick.py``, ``task_library.py``) a sorting cell is one whose clutter
+To the pick scenario (``pick.py``, ``primitive_library.py``) a sorting cell is one whose clutter
 cells are cubes and whose towers are docks (:func:`reaching_cell`): so people work there, and so
 policies can be trained and measured there.
 """

@@ -25,7 +25,7 @@ from app.sim.people.kernels.pedestrian import (
     X,
     Y,
 )
-from app.sim.perception.observed_people import standing_in
+from app.sim.perception.observed_people import person_from_cylinder
 from app.sim.reach.batch import ReachBatch, ReachSettings
 from app.sim.reach.goal_sets import halton_targets
 from app.sim.reach.motion_types import MotionDecision, MotionQuestion
@@ -36,7 +36,7 @@ from tests.policies.reach_actor import RandomActor
 CELL = load_cell("shared-workspace")
 HOME = np.array(CELL.robot.home_q)
 GOAL = np.array([0.05, 0.75, 0.31])
-FAR_PERSON = standing_in(-1.5, 1.9, 0.3, 0.0, 0.3)
+FAR_PERSON = person_from_cylinder(-1.5, 1.9, 0.3, 0.0, 0.3)
 
 
 def decider(goals: str = "grid", **other: Any) -> MotionDecider:
@@ -66,7 +66,7 @@ def told(batch: ReachBatch, e: int) -> MotionQuestion:
         Person(q=q.copy(), qd=qd.copy()) for q, qd in zip(rows.q[e], rows.qd[e], strict=True)
     ]
     for walker in rows.walkers.rows[e]:
-        people.append(standing_in(*walker[[X, Y, VX, VY, R, GROWTH]]))
+        people.append(person_from_cylinder(*walker[[X, Y, VX, VY, R, GROWTH]]))
     return MotionQuestion(
         q=state.q[e].copy(),
         qd=state.qd[e].copy(),
@@ -176,7 +176,7 @@ def test_states_and_people_outside_training_are_flagged_by_name() -> None:
         "q": {"low": [-3.0] * 6, "high": [3.0, 3.0, 1.5, 3.0, 3.0, 3.0]},
         "human": {"low": [-2.0, 0.5, -1.0, -1.0, 0.2], "high": [1.0, 2.0, 1.0, 1.0, 0.5]},
     }
-    people = (FAR_PERSON, standing_in(0.4, 1.2, 0.0, 1.8, 0.3))
+    people = (FAR_PERSON, person_from_cylinder(0.4, 1.2, 0.0, 1.8, 0.3))
     decision = decider(trained_range=trained).decide(question(people=people))
     assert decision.seen == 1
     assert [one.field for one in decision.outside] == ["robot.q[2]", "people[1].vy"]
@@ -185,7 +185,7 @@ def test_states_and_people_outside_training_are_flagged_by_name() -> None:
 
 
 def inside_robot() -> Person:
-    return standing_in(0.2, 0.2, 0.0, 0.0, 0.5)
+    return person_from_cylinder(0.2, 0.2, 0.0, 0.0, 0.5)
 
 
 def test_people_inside_the_robot_are_refused_without_monitoring() -> None:
@@ -210,7 +210,7 @@ def test_with_monitoring_somebody_inside_the_robot_is_a_stop(speed: float) -> No
 
 def test_monitoring_tells_the_terms_that_make_up_the_distance() -> None:
     settings = SafetySettings(human_speed=1.2, intrusion_distance=0.05, robot_uncertainty=0.02)
-    person = standing_in(0.3, 1.3, 0.0, -0.5, 0.3)
+    person = person_from_cylinder(0.3, 1.3, 0.0, -0.5, 0.3)
     asked = question(qd=np.full(6, 0.5), people=(person,), safety=settings, age_s=0.04)
     decision = decider().decide(asked)
     terms = decision.terms
@@ -228,7 +228,7 @@ def test_monitoring_tells_the_terms_that_make_up_the_distance() -> None:
 def test_only_a_measured_velocity_takes_the_place_of_the_assumed_one(
     measured: bool, speed: float
 ) -> None:
-    person = standing_in(0.3, 1.3, 0.0, 0.0, 0.3, measured=measured)
+    person = person_from_cylinder(0.3, 1.3, 0.0, 0.0, 0.3, measured=measured)
     asked = question(people=(person,), safety=SafetySettings(measured=True))
     terms = decider().decide(asked).terms
     assert terms is not None and terms.human_speed == pytest.approx(speed)
@@ -273,7 +273,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"beside": "farthest"}, "choices: nearest, averaged"),
     ({"people": (FAR_PERSON,) * 5}, "at most 4"),
     ({"people": (Person(q=np.full(18, np.nan), qd=np.zeros(18)),)}, r"people\[0\]\.q\[0\]"),
-    ({"people": (standing_in(0.0, 1.0, 99.0, 0.0, 0.3),)}, r"people\[0\]\.qd\[0\]"),
+    ({"people": (person_from_cylinder(0.0, 1.0, 99.0, 0.0, 0.3),)}, r"people\[0\]\.qd\[0\]"),
 ]
 
 
@@ -352,7 +352,9 @@ def random_question(rng: np.random.Generator) -> MotionQuestion:
     for _ in range(rng.integers(0, 5)):
         x, y = rng.uniform(-2.0, 2.0, 2)
         if rng.uniform() < 0.6:
-            people.append(standing_in(x, y, *rng.uniform(-3, 3, 2), rng.uniform(0.01, 1.0)))
+            people.append(
+                person_from_cylinder(x, y, *rng.uniform(-3, 3, 2), rng.uniform(0.01, 1.0))
+            )
         else:
             q = rng.uniform(human.Q_MIN, human.Q_MAX)
             people.append(Person(q=q, qd=rng.normal(0.0, 1.0, 18)))

@@ -9,7 +9,7 @@ from app.sim.cells.cell import load_cell
 from app.sim.envs import PEOPLE_IDS
 from app.sim.envs.single_env import SingleEnv
 from app.sim.envs.vector_env import BatchVectorEnv
-from app.sim.people.human_motion_config import WorkSettings
+from app.sim.people.human_motion_config import HumanMotionConfig
 from app.sim.pick.batch import PickSettings
 from app.sim.reach.batch import ReachSettings
 from tests.sim.working_people import recorded_work
@@ -114,14 +114,14 @@ def test_any_mix_of_people_equals_its_row_of_a_batch_bit_for_bit(env_id: str) ->
     assert len(env.batch.cell.people) == 4
 
 
-@pytest.mark.parametrize("people", ["library", "recorded", "courteous", "three"])
+@pytest.mark.parametrize("people", ["library", "recorded", "yielding", "three"])
 def test_whatever_people_do_a_single_environment_equals_its_row_bit_for_bit(
     people: str,
 ) -> None:
     work = {
         "recorded": recorded_work(load_cell()),
-        "courteous": WorkSettings(courtesy=1.0),
-    }.get(people, WorkSettings())
+        "yielding": HumanMotionConfig(yielding=1.0),
+    }.get(people, HumanMotionConfig())
     settings = PickSettings(time_limit_s=1.0, observation="body", work=work)
     who = {"people": ("worker",) * 3} if people == "three" else {}
     assert assert_single_equals_row("tandem/Pick-v0", settings, 2, 90, **who) >= 3

@@ -11,7 +11,7 @@ from app.errors import NotFound, SimulationError
 from app.sim.cells.cell import load_cell
 from app.sim.envs.pick import PickEnv, PickVectorEnv
 from app.sim.human.anthropometry import MEDIAN, percentile_body
-from app.sim.people.human_motion_config import WorkSettings
+from app.sim.people.human_motion_config import HumanMotionConfig
 from app.sim.pick.batch import PickBatch, PickSettings
 from app.sim.pick.kernels.observation import N_FEATURES, N_WITH_BODY
 
@@ -100,7 +100,7 @@ def test_environment_that_tells_the_size_passes_both_checks() -> None:
 
 @pytest.mark.parametrize("size", [MEDIAN, percentile_body(95.0), percentile_body(5.0, 40.0)])
 def test_observation_ends_with_the_size_of_the_person(size) -> None:
-    work = WorkSettings(bodies=(size,))
+    work = HumanMotionConfig(bodies=(size,))
     env = PickEnv(settings=PickSettings(observation="body", work=work))
     plain = PickEnv(settings=PickSettings(work=work))
     (obs, _), (known, _) = env.reset(seed=2), plain.reset(seed=2)

@@ -3,7 +3,14 @@ import pytest
 
 from app.sim.core.arrays import Vec
 from app.sim.human.anthropometry import BodySize
-from app.sim.mocap.artifacts import MARGIN, MAX_SPEED, Glitch, clean_runs, find_glitches, merged
+from app.sim.mocap.artifacts import (
+    MARGIN,
+    MAX_SPEED,
+    Artifact,
+    clean_runs,
+    find_artifacts,
+    merged,
+)
 from app.sim.mocap.joint_centres import ELBOW_L, WRIST_L, WRIST_R, model_points
 from tests.sim.recorded_person import working
 
@@ -17,57 +24,57 @@ def points_of_somebody(n: int = 600) -> tuple[Vec, Vec]:
 
 def test_person_at_work_has_no_glitch_and_is_one_run() -> None:
     times, points = points_of_somebody()
-    assert find_glitches(times, points) == ()
+    assert find_artifacts(times, points) == ()
     assert clean_runs(times, ()) == ((0, 599),)
 
 
 def test_marker_that_leaps_for_some_frames_is_named_and_cut_out() -> None:
     times, points = points_of_somebody()
     points[250:256, WRIST_R] += [0.0, 0.8, 0.0]
-    (glitch,) = find_glitches(times, points)
-    assert (glitch.first, glitch.last) == (249, 256)
-    assert glitch.parts == ("wrist_r",)
-    assert "jumps" in glitch.reason
-    (first, second) = clean_runs(times, [glitch])
+    (artifact,) = find_artifacts(times, points)
+    assert (artifact.first, artifact.last) == (249, 256)
+    assert artifact.parts == ("wrist_r",)
+    assert "jumps" in artifact.reason
+    (first, second) = clean_runs(times, [artifact])
     assert first == (0, 243) and second == (262, 599)
-    assert times[glitch.first] - times[first[1]] > MARGIN
+    assert times[artifact.first] - times[first[1]] > MARGIN
 
 
 def test_parts_stand_in_the_order_of_their_speed() -> None:
     times, points = points_of_somebody()
     points[300, WRIST_L] += 0.09
     points[300, ELBOW_L] += 0.04
-    (glitch,) = find_glitches(times, points)
-    assert glitch.parts == ("wrist_l", "elbow_l")
-    assert glitch.speed == pytest.approx(0.09 * np.sqrt(3.0) / DT, rel=0.1)
+    (artifact,) = find_artifacts(times, points)
+    assert artifact.parts == ("wrist_l", "elbow_l")
+    assert artifact.speed == pytest.approx(0.09 * np.sqrt(3.0) / DT, rel=0.1)
 
 
 def test_speed_just_below_the_limit_is_clean() -> None:
     times = DT * np.arange(300)
     points = np.zeros((300, 8, 3))
     points[:, WRIST_R, 0] = 0.99 * MAX_SPEED * times
-    assert find_glitches(times, points) == ()
+    assert find_artifacts(times, points) == ()
     points[:, WRIST_R, 0] = 1.01 * MAX_SPEED * times
-    (glitch,) = find_glitches(times, points)
-    assert "faster than 3 m/s" in glitch.reason
-    assert clean_runs(times, [glitch]) == ()
+    (artifact,) = find_artifacts(times, points)
+    assert "faster than 3 m/s" in artifact.reason
+    assert clean_runs(times, [artifact]) == ()
 
 
 def test_hole_in_the_times_parts_two_runs() -> None:
     times, points = points_of_somebody()
     times = times + np.where(np.arange(600) >= 300, 0.5, 0.0)
-    (glitch,) = find_glitches(times, points)
-    assert (glitch.first, glitch.last, glitch.parts) == (299, 300, ("time",))
-    assert "0.51 s without a frame" in glitch.reason
-    assert [b - a for a, b in clean_runs(times, [glitch])] == [293, 293]
+    (artifact,) = find_artifacts(times, points)
+    assert (artifact.first, artifact.last, artifact.parts) == (299, 300, ("time",))
+    assert "0.51 s without a frame" in artifact.reason
+    assert [b - a for a, b in clean_runs(times, [artifact])] == [293, 293]
 
 
 def test_missing_values_stand_among_glitches_in_frames_of_the_file() -> None:
     times, points = points_of_somebody(200)
     frames = np.delete(np.arange(200), range(60, 90))
-    missing = Glitch(first=60, last=89, parts=("elbow_r",), speed=0.0, reason="no value")
+    missing = Artifact(first=60, last=89, parts=("elbow_r",), speed=0.0, reason="no value")
     points[150:152, WRIST_R] += 0.8
-    found = find_glitches(times[frames], points[frames])
+    found = find_artifacts(times[frames], points[frames])
     assert [one.parts[0] for one in found] == ["time", "wrist_r"]
     told = merged(found, [missing], frames)
     assert [(one.first, one.last) for one in told] == [(60, 89), (149, 152)]
@@ -76,12 +83,12 @@ def test_missing_values_stand_among_glitches_in_frames_of_the_file() -> None:
 def test_hole_without_missing_values_is_told_as_before() -> None:
     times, points = points_of_somebody(200)
     times = times + np.where(np.arange(200) >= 100, 0.5, 0.0)
-    found = find_glitches(times, points)
+    found = find_artifacts(times, points)
     assert merged(found, (), np.arange(200)) == found
 
 
 def test_runs_shorter_than_a_second_are_dropped() -> None:
     times, points = points_of_somebody()
     points[[200, 280], WRIST_R] += 0.5
-    runs = clean_runs(times, find_glitches(times, points))
+    runs = clean_runs(times, find_artifacts(times, points))
     assert runs == ((0, 193), (287, 599))

@@ -44,7 +44,7 @@ def test_angles_of_a_known_person_are_found_in_a_bvh_file() -> None:
     assert np.abs(points - truth).max() < 1e-3
     assert found.wrists.p99 < 1e-3 and found.elbows.worst < 1e-6
     assert (found.name, found.reading.unit, found.n_frames) == ("someone", "mm", 200)
-    assert found.glitches == ()
+    assert found.artifacts == ()
 
 
 def test_angles_of_a_table_come_back_as_they_are() -> None:
@@ -64,7 +64,7 @@ def without_values(first: int, last: int, word: str = "NaN") -> str:
 
 def test_rows_without_a_value_are_cut_out_and_named() -> None:
     found = read_motion(without_values(100, 101).encode(), "someone.csv")
-    (gap,) = found.glitches
+    (gap,) = found.artifacts
     assert (gap.first, gap.last, gap.parts) == (100, 101, ("elbow_l",))
     assert (found.spans, found.n_frames, found.n_clean) == (((0, 199),), 200, 198)
     (run,) = found.runs
@@ -74,7 +74,7 @@ def test_rows_without_a_value_are_cut_out_and_named() -> None:
 
 def test_long_gap_of_values_parts_two_runs_and_is_told_once() -> None:
     found = read_motion(without_values(90, 110, "").encode(), "someone.csv")
-    (gap,) = found.glitches
+    (gap,) = found.artifacts
     assert (gap.first, gap.last) == (90, 110)
     (_, before), (after, last) = found.spans
     assert before < 90 and after > 110 and last == 199
@@ -85,7 +85,7 @@ def test_long_gap_of_values_parts_two_runs_and_is_told_once() -> None:
 def test_rows_without_a_value_at_both_ends_count_as_frames() -> None:
     text = re.sub(r"\n3\.9\d*", "\nNA", without_values(0, 9))
     found = read_motion(text.encode(), "someone.csv")
-    assert [(one.first, one.last) for one in found.glitches] == [(0, 9), (195, 199)]
+    assert [(one.first, one.last) for one in found.artifacts] == [(0, 9), (195, 199)]
     assert (found.spans, found.n_frames) == (((10, 194),), 200)
 
 
@@ -95,7 +95,7 @@ def test_leap_after_missing_values_is_told_in_frames_of_the_file() -> None:
     cells[1] = "9.0"
     lines[150 + 2] = ",".join(cells)
     found = read_motion("\n".join(lines).encode(), "someone.csv")
-    gap, leap = found.glitches
+    gap, leap = found.artifacts
     assert (gap.first, gap.last) == (20, 22)
     assert (leap.first, leap.last) == (149, 151) and "jumps" in leap.reason
 
@@ -145,8 +145,8 @@ def test_person_of_another_size_keeps_the_angles_and_the_difference_is_told() ->
 
 def test_leap_is_cut_out_and_the_runs_say_where_they_stand() -> None:
     found = read_motion(with_leap(slice(100, 103)).encode(), "leap.bvh")
-    assert len(found.glitches) == 1
-    assert "wrist_r" in found.glitches[0].parts
+    assert len(found.artifacts) == 1
+    assert "wrist_r" in found.artifacts[0].parts
     first, second = found.runs
     assert first.first_frame == 0 and 103 < second.first_frame < 110
     assert found.n_clean == len(first.times) + len(second.times) < 200
@@ -156,12 +156,14 @@ def test_leap_is_cut_out_and_the_runs_say_where_they_stand() -> None:
 
 
 def test_clip_that_leaps_all_the_time_has_no_clean_run() -> None:
-    with pytest.raises(BadMotion, match="has no run of 1 s without a glitch .* first: .*_r at"):
+    with pytest.raises(
+        BadMotion, match="has no run of 1 s without an artifact .* first: .*_r at"
+    ):
         read_motion(with_leap(slice(0, 200, 20)).encode(), "leap.bvh")
 
 
 def test_clip_of_half_a_second_is_too_short() -> None:
-    with pytest.raises(BadMotion, match="has no run of 1 s without a glitch .too short"):
+    with pytest.raises(BadMotion, match="has no run of 1 s without an artifact .too short"):
         read_motion(bvh_text(working(25)).encode(), "short.bvh")
 
 
@@ -219,7 +221,7 @@ if CLIPS:  # without clips there is no test to skip
         assert (found.reading.unit, found.reading.up) == ("mm", "y")
         assert found.wrists.p99 < 0.01
         assert found.elbows.worst < 1e-6
-        assert all(one.speed > MAX_SPEED for one in found.glitches)
+        assert all(one.speed > MAX_SPEED for one in found.artifacts)
         assert all(np.isfinite(run.q).all() for run in found.runs)
 
 

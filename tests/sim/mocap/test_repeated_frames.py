@@ -70,7 +70,7 @@ def test_repeated_frames_are_no_glitches_and_the_real_rate_is_told() -> None:
     rows = [line for line in lines[start:] for _ in range(4)]
     text = "\n".join([*lines[: start - 2], "Frames: 400", lines[start - 1], *rows])
     found = read_motion(text.encode(), "clip.bvh")
-    assert (found.n_frames, len(found.glitches), found.n_clean) == (100, 0, 100)
+    assert (found.n_frames, len(found.artifacts), found.n_clean) == (100, 0, 100)
     assert found.duration == pytest.approx(3.3)
     assert found.reading.rate_hz == pytest.approx(30.0)
     assert "frames repeat, real rate 30 Hz" in found.reading.notes[0]

@@ -10,7 +10,12 @@ from app.sim.collision.contact import clearance
 from app.sim.human import model as human
 from app.sim.human.anthropometry import BodySize, percentile_body
 from app.sim.human.kernels.kinematics import PELVIS_Z
-from app.sim.people.human_motion_config import TRACK_DT, WorkSettings, at_the_table, tracks_of
+from app.sim.people.human_motion_config import (
+    TRACK_DT,
+    HumanMotionConfig,
+    at_the_table,
+    tracks_of,
+)
 from app.sim.people.kernels.people import ABSENT
 from app.sim.pick.batch import OUTCOMES, PickBatch, PickSettings
 from app.sim.pick.kernels.observation import LAYOUT
@@ -19,7 +24,7 @@ from app.sim.scene.scene import arm_of, people_of
 from tests.sim.recorded_person import working
 from tests.sim.working_people import recorded_work, run_of
 
-NO_WALKERS = np.zeros((0, 3))
+NO_PEDESTRIANS = np.zeros((0, 3))
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +32,9 @@ def cell() -> Cell:
     return load_cell()
 
 
-def batch_of(cell: Cell, work: WorkSettings, n_envs: int = 24, **more: object) -> PickBatch:
+def batch_of(
+    cell: Cell, work: HumanMotionConfig, n_envs: int = 24, **more: object
+) -> PickBatch:
     batch = PickBatch(cell, n_envs, 5, PickSettings(work=work, **more))  # type: ignore[arg-type]
     batch.reset()
     return batch
@@ -53,7 +60,7 @@ def test_tracks_hold_the_positions_at_their_samples(cell: Cell) -> None:
 def test_a_recorded_joint_may_leave_its_limits(cell: Cell) -> None:
     q = working(60)
     q[:, 13] = 4.0
-    work = WorkSettings(motion="recorded", recorded=(at_the_table(run_of(q), cell),))
+    work = HumanMotionConfig(motion="recorded", recorded=(at_the_table(run_of(q), cell),))
     state = batch_of(cell, work, 4).state.people
     assert human.Q_MAX[13] < 4.0
     np.testing.assert_array_equal(state.q[:, 0, 13], 4.0)
@@ -94,7 +101,7 @@ def test_every_track_is_played_with_the_body_that_was_recorded(cell: Cell) -> No
 
 def test_past_the_end_of_a_track_the_person_stands_still(cell: Cell) -> None:
     run = at_the_table(run_of(working(60)), cell)
-    batch = batch_of(cell, WorkSettings(motion="recorded", recorded=(run,)))
+    batch = batch_of(cell, HumanMotionConfig(motion="recorded", recorded=(run,)))
     assert (batch.state.people.clock == 0.0).all()
     stand(batch, 40)
     running = batch.state.outcome == OUTCOMES.index("running")
@@ -109,7 +116,7 @@ def test_a_person_who_crouches_has_lower_capsules(cell: Cell) -> None:
     heights = {}
     for rise in (0.0, -0.4):
         run = run_of(q, pelvis_z=rise)
-        batch = batch_of(cell, WorkSettings(motion="recorded", recorded=(run,)), 2)
+        batch = batch_of(cell, HumanMotionConfig(motion="recorded", recorded=(run,)), 2)
         size = batch.state.people.size[0, 0]
         assert size[PELVIS_Z] == pytest.approx(cell.body[PELVIS_Z] + rise)
         heights[rise] = batch.state.people.columns[0, 2].copy()
@@ -128,13 +135,14 @@ def test_a_hand_that_sinks_past_the_tool_within_one_period_is_a_contact(cell: Ce
     sizes = np.tile(cell.body, (3, 1))
     sizes[:, PELVIS_Z] += (0.45, 0.0, -0.3)
     gaps = [
-        clearance(arm, people, home, q[None], NO_WALKERS, size[None]).people_m for size in sizes
+        clearance(arm, people, home, q[None], NO_PEDESTRIANS, size[None]).people_m
+        for size in sizes
     ]
     assert gaps[0] > 0.1 and gaps[1] < 0.0 and gaps[2] > 0.1
     height = np.full(60, -0.3)
     height[0] = 0.45
     run = run_of(np.tile(q, (60, 1)), pelvis_z=height)
-    work = WorkSettings(motion="recorded", recorded=(run,))
+    work = HumanMotionConfig(motion="recorded", recorded=(run,))
     batch = batch_of(cell, work, start="uniform")
     at_home = (batch.state.q == home).all(axis=1)
     np.testing.assert_allclose(batch.state.clear[at_home, 0], gaps[0])
@@ -170,7 +178,7 @@ def test_at_the_table_the_person_faces_it_and_comes_as_near_as_a_worker(
 
 
 def test_legs_of_the_library_begin_and_end_in_their_postures_at_rest(cell: Cell) -> None:
-    batch = batch_of(cell, WorkSettings(), 8)
+    batch = batch_of(cell, HumanMotionConfig(), 8)
     people, state = batch.world.people, batch.state.people
     state.move[:] = 0
     for k in range(6):
@@ -187,7 +195,7 @@ def test_legs_of_the_library_begin_and_end_in_their_postures_at_rest(cell: Cell)
 
 
 def test_library_people_of_all_sizes_are_drawn(cell: Cell) -> None:
-    batch = batch_of(cell, WorkSettings(), 80, people=("worker", "worker"))
+    batch = batch_of(cell, HumanMotionConfig(), 80, people=("worker", "worker"))
     people, state = batch.world.people, batch.state.people
     assert len(people.bodies) == len(set(state.body.ravel())) == 6
     assert (state.body[:, 0] != state.body[:, 1]).mean() > 0.5
@@ -197,14 +205,18 @@ def test_library_people_of_all_sizes_are_drawn(cell: Cell) -> None:
 def test_kernels_are_compiled_once_whatever_people_do(cell: Cell) -> None:
     kinds = {
         str(typeof(people_of(cell, work)))
-        for work in (None, WorkSettings(motion="library"), WorkSettings(motion="reaches"))
+        for work in (
+            None,
+            HumanMotionConfig(motion="library"),
+            HumanMotionConfig(motion="reaches"),
+        )
     }
     assert len(kinds) == 1
 
 
 def test_sizes_that_are_asked_for_are_the_only_ones(cell: Cell) -> None:
     large = percentile_body(95.0)
-    batch = batch_of(cell, WorkSettings(bodies=(large,)), 8)
+    batch = batch_of(cell, HumanMotionConfig(bodies=(large,)), 8)
     expected = np.tile(large.vector(cell.floor_z), (8, 1, 1))
     np.testing.assert_array_equal(batch.state.people.size, expected)
     assert expected[0, 0, PELVIS_Z] > cell.body[PELVIS_Z] + 0.05
@@ -213,7 +225,7 @@ def test_sizes_that_are_asked_for_are_the_only_ones(cell: Cell) -> None:
 def test_same_seed_is_the_same_motion_and_another_seed_is_not(cell: Cell) -> None:
     paths = []
     for seed in (1, 1, 2):
-        batch = batch_of(cell, WorkSettings(seed=seed), 6, start_clearance_m=-10.0)
+        batch = batch_of(cell, HumanMotionConfig(seed=seed), 6, start_clearance_m=-10.0)
         start = batch.state.people.q.copy()
         stand(batch, 20)
         paths.append(np.stack([start, batch.state.people.q]))
@@ -222,8 +234,8 @@ def test_same_seed_is_the_same_motion_and_another_seed_is_not(cell: Cell) -> Non
 
 
 def test_without_augmentation_legs_last_as_long_as_demonstrated(cell: Cell) -> None:
-    batch = batch_of(cell, WorkSettings(augmentation=False), 12)
-    shared, state = batch.world.people.repertoire, batch.state.people
+    batch = batch_of(cell, HumanMotionConfig(augmentation=False), 12)
+    shared, state = batch.world.people.primitive_library, batch.state.people
     assert not state.clock.any() and not state.legs.stop.any()
     for e in range(12):
         n = int(state.n_moves[e, 0])
@@ -234,10 +246,10 @@ def test_without_augmentation_legs_last_as_long_as_demonstrated(cell: Cell) -> N
 
 
 def test_with_augmentation_legs_vary_pause_and_begin_anywhere(cell: Cell) -> None:
-    state = batch_of(cell, WorkSettings(), 12).state.people
+    state = batch_of(cell, HumanMotionConfig(), 12).state.people
     assert len(np.unique(state.clock)) == 12
     assert 0.02 < (state.legs.stop[:, 0, :8, 1] > 0.0).mean() < 0.5
-    shared = batch_of(cell, WorkSettings(), 1).world.people.repertoire
+    shared = batch_of(cell, HumanMotionConfig(), 1).world.people.primitive_library
     usual = np.exp(shared.duration[state.legs.primitive[:, 0, :8], 0])
     assert (np.abs(state.duration[:, 0, :8] / usual - 1.0) > 0.01).mean() > 0.5
 
@@ -246,9 +258,9 @@ def test_with_augmentation_legs_vary_pause_and_begin_anywhere(cell: Cell) -> Non
     ("settings", "field"),
     [
         ({"motion": "dance"}, "motion"),
-        ({"courtesy": -0.1}, "courtesy"),
-        ({"courtesy": 1.5}, "courtesy"),
-        ({"courtesy": float("nan")}, "courtesy"),
+        ({"yielding": -0.1}, "yielding"),
+        ({"yielding": 1.5}, "yielding"),
+        ({"yielding": float("nan")}, "yielding"),
         ({"pace": 0.0}, "pace"),
         ({"pace": -1.0}, "pace"),
         ({"pace": float("inf")}, "pace"),
@@ -260,12 +272,12 @@ def test_settings_that_cannot_be_are_refused_by_name(
     settings: dict[str, object], field: str
 ) -> None:
     with pytest.raises(InvalidInput) as caught:
-        WorkSettings(**settings)  # type: ignore[arg-type]
+        HumanMotionConfig(**settings)  # type: ignore[arg-type]
     assert caught.value.field == field
 
 
 def test_the_asked_share_of_people_is_not_there_and_is_never_touched() -> None:
-    settings = PickSettings(people=("worker",) * 2, work=WorkSettings(absent=0.35))
+    settings = PickSettings(people=("worker",) * 2, work=HumanMotionConfig(absent=0.35))
     batch = PickBatch(load_cell(), 400, 5, settings)
     batch.reset()
     absent = batch.state.people.track == ABSENT
@@ -280,7 +292,7 @@ def test_the_asked_share_of_people_is_not_there_and_is_never_touched() -> None:
 
 
 def test_who_is_not_there_looks_like_nobody_in_an_empty_cell() -> None:
-    away = PickBatch(load_cell(), 4, 5, PickSettings(work=WorkSettings(absent=1.0)))
+    away = PickBatch(load_cell(), 4, 5, PickSettings(work=HumanMotionConfig(absent=1.0)))
     empty = PickBatch(load_cell(), 4, 5, PickSettings(people=()))
     person = slice(LAYOUT["human_q"].start, LAYOUT["human_qd"].stop)
     np.testing.assert_allclose(away.reset()[:, person], empty.reset()[:, person])

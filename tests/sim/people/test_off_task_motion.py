@@ -7,7 +7,7 @@ from app.errors import InvalidInput
 from app.sim.cells.cell import load_cell
 from app.sim.human import model as human
 from app.sim.human.anthropometry import MEDIAN
-from app.sim.people.human_motion_config import WorkSettings
+from app.sim.people.human_motion_config import HumanMotionConfig
 from app.sim.people.off_task_motion import BACK, DEEPEST, TRACK_S, roaming
 from app.sim.pick.batch import PickBatch, PickSettings
 
@@ -51,7 +51,7 @@ def test_same_seed_roams_alike_and_another_does_not() -> None:
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
 def test_the_asked_share_of_people_roams(share: float) -> None:
-    batch = PickBatch(CELL, 400, 5, PickSettings(work=WorkSettings(roaming=share)))
+    batch = PickBatch(CELL, 400, 5, PickSettings(work=HumanMotionConfig(roaming=share)))
     batch.reset()
     roam = (batch.state.people.track >= 0).mean()
     assert abs(roam - share) < 4.0 * np.sqrt(share * (1.0 - share) / 400) + 1e-9
@@ -61,4 +61,4 @@ def test_the_asked_share_of_people_roams(share: float) -> None:
 
 def test_a_share_that_is_none_is_refused() -> None:
     with pytest.raises(InvalidInput, match="roaming"):
-        WorkSettings(roaming=1.5)
+        HumanMotionConfig(roaming=1.5)

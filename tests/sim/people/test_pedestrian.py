@@ -7,13 +7,13 @@ import pytest
 
 from app.errors import InvalidInput
 from app.sim.people.kernels.pedestrian import STAYING, STILL, WALKING
-from app.sim.people.pedestrian import Walk, WalkerSettings, walk
+from app.sim.people.pedestrian import PedestrianSettings, Walk, walk
 
-DEFAULT = WalkerSettings()
-RESTLESS = WalkerSettings(p_still=0.0, p_stay=0.0)
+DEFAULT = PedestrianSettings()
+RESTLESS = PedestrianSettings(p_still=0.0, p_stay=0.0)
 
 
-def walks(settings: WalkerSettings, n: int, seconds: float = 10.0) -> list[Walk]:
+def walks(settings: PedestrianSettings, n: int, seconds: float = 10.0) -> list[Walk]:
     return [walk(settings, 1, seconds, episode=episode) for episode in range(n)]
 
 
@@ -116,7 +116,7 @@ def test_fixed_speed_passes_by_both_limits_of_the_speed(speed: float) -> None:
 
 
 def test_authors_targets_are_apart_and_a_radius_inside_the_area() -> None:
-    settings = WalkerSettings(p_still=0.0, p_stay=0.0, apart=0.5, inside=1.0)
+    settings = PedestrianSettings(p_still=0.0, p_stay=0.0, apart=0.5, inside=1.0)
     for one in walks(settings, 40, 20.0):
         new = np.flatnonzero(np.any(np.diff(one.target, axis=0) != 0.0, axis=1)) + 1
         for k in (0, *new):
@@ -129,13 +129,13 @@ def test_authors_targets_are_apart_and_a_radius_inside_the_area() -> None:
 
 def test_area_too_small_for_the_margin_leaves_its_middle() -> None:
     narrow = {"x_min": 0.0, "x_max": 0.4, "r_min": 0.3, "r_max": 0.5, "p_still": 0.0}
-    one = walk(WalkerSettings(**narrow, inside=1.0, apart=5.0), 1, 5.0)
+    one = walk(PedestrianSettings(**narrow, inside=1.0, apart=5.0), 1, 5.0)
     np.testing.assert_allclose(one.target[:, 0], 0.2)
 
 
 def test_hurried_walker_is_never_slower_than_v_min_in_the_first_period() -> None:
     def first(hurried: bool) -> np.ndarray:
-        settings = WalkerSettings(p_still=0.0, hurried=hurried)
+        settings = PedestrianSettings(p_still=0.0, hurried=hurried)
         return np.array([speeds(walk(settings, 5, 0.02, episode=k))[0] for k in range(300)])
 
     as_drawn, quick = first(False), first(True)
@@ -146,14 +146,14 @@ def test_hurried_walker_is_never_slower_than_v_min_in_the_first_period() -> None
 
 
 def test_walker_goes_on_after_it_stayed_with_the_given_chance_per_period() -> None:
-    settings = WalkerSettings(p_still=0.0, p_stay=1.0, p_go_on=0.01)
+    settings = PedestrianSettings(p_still=0.0, p_stay=1.0, p_go_on=0.01)
     stays, leaves = 0, 0
     for one in walks(settings, 60, 40.0):
         staying = one.gait == STAYING
         stays += int(staying[:-1].sum())
         leaves += int((staying[:-1] & (one.gait[1:] == WALKING)).sum())
     assert leaves / stays == pytest.approx(0.01, abs=0.002)
-    for_good = WalkerSettings(p_still=0.0, p_stay=1.0)
+    for_good = PedestrianSettings(p_still=0.0, p_stay=1.0)
     for one in walks(for_good, 20, 20.0):
         assert not np.any((one.gait[:-1] == STAYING) & (one.gait[1:] == WALKING))
 
@@ -207,7 +207,7 @@ def test_starts_are_uniform_in_the_area() -> None:
 )
 def test_wrong_setting_is_refused_with_its_rule(field: str, value: object) -> None:
     with pytest.raises(InvalidInput, match="must "):
-        WalkerSettings(**{field: value})
+        PedestrianSettings(**{field: value})
 
 
 @pytest.mark.parametrize(("seconds", "dt"), [(1.0, 0.0), (1.0, float("nan")), (-1.0, 0.02)])

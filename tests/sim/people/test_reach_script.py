@@ -7,13 +7,13 @@ from app.sim.cells.cell import load_cell
 from app.sim.core.kernels import rng as random
 from app.sim.human import model as human
 from app.sim.human.anthropometry import MEDIAN, percentile_body
-from app.sim.people.reach_script import build_library
+from app.sim.people.reach_script import build_reach_library
 
 
 @pytest.mark.parametrize("stature", [5.0, 50.0, 95.0])
 def test_library_reaches_the_stations_inside_the_limits(stature: float) -> None:
     cell = load_cell()
-    library = build_library(cell, 0, (MEDIAN, percentile_body(stature)))
+    library = build_reach_library(cell, 0, (MEDIAN, percentile_body(stature)))
     assert (library.postures >= human.Q_MIN).all() and (library.postures <= human.Q_MAX).all()
     misses = []
     for place, station in enumerate(cell.stations):
@@ -27,7 +27,7 @@ def test_library_reaches_the_stations_inside_the_limits(stature: float) -> None:
 
 def test_library_cannot_be_changed() -> None:
     with pytest.raises(ValueError, match="read-only"):
-        build_library(load_cell(), 0).postures[0] = 0.0
+        build_reach_library(load_cell(), 0).postures[0] = 0.0
 
 
 def draw(seed: int, env: int, episode: int, n: int = 5) -> list[float]:

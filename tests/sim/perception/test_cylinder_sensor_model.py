@@ -4,20 +4,20 @@ import numpy as np
 import pytest
 
 from app.errors import InvalidInput
-from app.sim.perception.cylinder_sensor_model import CylinderTracker, CylinderTrackerSettings
+from app.sim.perception.cylinder_sensor_model import CylinderSensorModel, CylinderSensorSettings
 
 DT = 0.02
 
 
 def follow(
-    settings: CylinderTrackerSettings, n: int, seconds: float, predicted: bool = True
+    settings: CylinderSensorSettings, n: int, seconds: float, predicted: bool = True
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Straight walks at 1 m/s; returns what is seen, how it changes and what is true."""
     rng, rows = np.random.default_rng(3), np.arange(n)
     start = rng.uniform(-1.0, 1.0, (n, 1, 3))
     course = rng.uniform(0.0, 2.0 * np.pi, n)
     velocity = np.stack([np.cos(course), np.sin(course), np.zeros(n)], axis=1)[:, None]
-    tracker = CylinderTracker(settings, n, 1, 7)
+    tracker = CylinderSensorModel(settings, n, 1, 7)
     tracker.start(rows, start, velocity)
     seen, change, true = [tracker.seen(rows)[0]], [tracker.seen(rows)[1]], [start]
     for k in range(1, round(seconds / DT) + 1):
@@ -31,14 +31,14 @@ def follow(
 
 @pytest.mark.parametrize("latency", [0.0, 0.1, 0.25])
 def test_a_straight_walk_is_known_exactly_however_late(latency: float) -> None:
-    settings = CylinderTrackerSettings(latency_s=latency, noise=0.0)
+    settings = CylinderSensorSettings(latency_s=latency, noise=0.0)
     seen, change, true = follow(settings, 5, 2.0)
     np.testing.assert_allclose(seen, true, atol=1e-9)
     np.testing.assert_allclose(np.linalg.norm(change, axis=-1), 1.0, atol=1e-9)
 
 
 def test_the_newest_frame_is_as_old_as_latency_and_rate_say() -> None:
-    settings = CylinderTrackerSettings(latency_s=0.1, noise=0.0)
+    settings = CylinderSensorSettings(latency_s=0.1, noise=0.0)
     seen, _, true = follow(settings, 40, 1.0, predicted=False)
     behind = np.linalg.norm(seen - true, axis=-1)[1:]  # at 1 m/s, metres are seconds
     assert behind.min() >= 0.1 - 1e-9
@@ -47,14 +47,14 @@ def test_the_newest_frame_is_as_old_as_latency_and_rate_say() -> None:
 
 
 def test_cameras_have_phases_of_their_own() -> None:
-    settings = CylinderTrackerSettings(latency_s=0.0, noise=0.0)
+    settings = CylinderSensorSettings(latency_s=0.0, noise=0.0)
     seen, _, true = follow(settings, 40, 1.0, predicted=False)
     behind = np.linalg.norm(seen - true, axis=-1)[25, :, 0]
     assert len(np.unique(np.round(behind, 6))) > 30
 
 
 def test_the_filter_lessens_noise_in_place_and_knows_the_speed() -> None:
-    settings = CylinderTrackerSettings(latency_s=0.0, noise=0.02)
+    settings = CylinderSensorSettings(latency_s=0.0, noise=0.02)
     seen, change, true = follow(settings, 300, 2.0)
     assert 0.005 < (seen - true)[10:].std() < 0.02
     off = change[50:] - (true[1] - true[0]) / DT
@@ -63,8 +63,8 @@ def test_the_filter_lessens_noise_in_place_and_knows_the_speed() -> None:
 
 
 def test_a_turn_is_noticed_after_the_latency() -> None:
-    settings = CylinderTrackerSettings(latency_s=0.1, noise=0.0)
-    tracker, rows = CylinderTracker(settings, 1, 1, 7), np.arange(1)
+    settings = CylinderSensorSettings(latency_s=0.1, noise=0.0)
+    tracker, rows = CylinderSensorModel(settings, 1, 1, 7), np.arange(1)
     there, walk = np.array([[[0.0, 1.0, 0.3]]]), np.array([[[1.0, 0.0, 0.0]]])
     tracker.start(rows, there, walk)
     speeds = []
@@ -76,8 +76,8 @@ def test_a_turn_is_noticed_after_the_latency() -> None:
 
 
 def test_other_cells_go_on_while_one_starts_anew() -> None:
-    settings = CylinderTrackerSettings(latency_s=0.1, noise=0.0)
-    tracker, rows = CylinderTracker(settings, 3, 2, 7), np.arange(3)
+    settings = CylinderSensorSettings(latency_s=0.1, noise=0.0)
+    tracker, rows = CylinderSensorModel(settings, 3, 2, 7), np.arange(3)
     there = np.random.default_rng(4).uniform(-1, 1, (3, 2, 3))
     tracker.start(rows, there, np.zeros_like(there))
     tracker.look(rows, np.full(3, DT), there)
@@ -89,7 +89,7 @@ def test_other_cells_go_on_while_one_starts_anew() -> None:
 
 
 def test_same_seed_gives_the_same_disturbances() -> None:
-    settings = CylinderTrackerSettings()
+    settings = CylinderSensorSettings()
     one, other = (follow(settings, 4, 0.5)[0] for _ in range(2))
     np.testing.assert_array_equal(one, other)
 
@@ -100,5 +100,5 @@ def test_same_seed_gives_the_same_disturbances() -> None:
 )
 def test_an_impossible_tracker_is_refused_by_its_field(field: str, value: float) -> None:
     with pytest.raises(InvalidInput) as caught:
-        CylinderTrackerSettings(**{field: value})
+        CylinderSensorSettings(**{field: value})
     assert caught.value.field == field

@@ -4,14 +4,21 @@ import numpy as np
 import pytest
 
 from app.errors import InvalidInput
-from app.sim.perception.keypoint_sensor_model import Frame, Tracker, TrackerSettings, follow
+from app.sim.perception.keypoint_sensor_model import (
+    Frame,
+    KeypointSensorSettings,
+    Tracker,
+    follow,
+)
 from app.sim.perception.person_estimator import PersonEstimator
 from tests.sim.tracked_person import CELL, motion, seen
 
-EXACT = TrackerSettings(noise=0.0, missing=0.0, latency_s=0.0)
+EXACT = KeypointSensorSettings(noise=0.0, missing=0.0, latency_s=0.0)
 
 
-def frames(settings: TrackerSettings, seed: int = 4, end: float = 10.0) -> tuple[Frame, ...]:
+def frames(
+    settings: KeypointSensorSettings, seed: int = 4, end: float = 10.0
+) -> tuple[Frame, ...]:
     tracker = Tracker(settings, seed, CELL.body, CELL.floor_z)
     return tracker.frames(end, motion(1, 12.0))
 
@@ -24,7 +31,7 @@ def test_an_exact_tracker_says_what_is_there() -> None:
 
 
 def test_frames_come_after_the_latency_each_once_whatever_the_worlds_step() -> None:
-    settings = TrackerSettings(latency_s=0.1)
+    settings = KeypointSensorSettings(latency_s=0.1)
     tracker = Tracker(settings, 4, CELL.body, CELL.floor_z)
     got = []
     for t in np.arange(0, 201) * 0.05:
@@ -37,7 +44,7 @@ def test_frames_come_after_the_latency_each_once_whatever_the_worlds_step() -> N
 
 
 def test_noise_and_loss_have_the_size_asked_for() -> None:
-    truth, found = motion(1, 12.0), frames(TrackerSettings(lost=0.25))
+    truth, found = motion(1, 12.0), frames(KeypointSensorSettings(lost=0.25))
     assert abs(len(found) / 301 - 0.75) < 0.08
     errors = np.array([frame.keypoints - seen(truth(frame.t)) for frame in found])
     assert np.nanstd(errors) == pytest.approx(0.02, rel=0.05)
@@ -47,7 +54,7 @@ def test_noise_and_loss_have_the_size_asked_for() -> None:
 
 
 def test_long_gaps_have_the_share_and_the_length_asked_for() -> None:
-    found = frames(TrackerSettings(missing=0.2, missing_s=0.3))
+    found = frames(KeypointSensorSettings(missing=0.2, missing_s=0.3))
     missing = np.array([frame.confidences == 0.0 for frame in found])
     assert missing.mean() == pytest.approx(0.2, abs=0.05)
     starts = (missing[1:] & ~missing[:-1]).sum()
@@ -55,7 +62,7 @@ def test_long_gaps_have_the_share_and_the_length_asked_for() -> None:
 
 
 def test_same_seed_disturbs_alike_and_another_does_not() -> None:
-    one, two, three = (frames(TrackerSettings(), seed, 1.0) for seed in (4, 4, 5))
+    one, two, three = (frames(KeypointSensorSettings(), seed, 1.0) for seed in (4, 4, 5))
     for a, b in zip(one, two, strict=True):
         np.testing.assert_array_equal(a.keypoints, b.keypoints)
     assert not np.array_equal(one[3].keypoints, three[3].keypoints, equal_nan=True)
@@ -73,7 +80,7 @@ def test_what_was_seen_comes_back_as_the_person_who_was_there() -> None:
 
 
 def test_a_tracker_that_delivers_nothing_leaves_the_person_unseen() -> None:
-    tracker = Tracker(TrackerSettings(lost=1.0), 4, CELL.body, CELL.floor_z)
+    tracker = Tracker(KeypointSensorSettings(lost=1.0), 4, CELL.body, CELL.floor_z)
     estimator = PersonEstimator(CELL.body)
     for estimate in follow(motion(1, 12.0), [0.0, 0.5, 1.0], tracker, estimator):
         assert estimate.stale and estimate.flags == ("never-seen",)
@@ -94,5 +101,5 @@ def test_a_tracker_that_delivers_nothing_leaves_the_person_unseen() -> None:
 )
 def test_settings_without_sense_are_refused_by_name(name: str, value: float) -> None:
     with pytest.raises(InvalidInput) as caught:
-        TrackerSettings(**{name: value})
+        KeypointSensorSettings(**{name: value})
     assert caught.value.field == name

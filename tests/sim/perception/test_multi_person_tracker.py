@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from app.errors import InvalidInput
-from app.sim.perception.multi_person_tracker import PeopleEstimator, match_people
+from app.sim.perception.multi_person_tracker import MultiPersonTracker, match_people
 from app.sim.perception.person_estimator import PersonEstimate
 from tests.sim.postures import posture
 from tests.sim.tracked_person import CELL, seen, work
@@ -15,10 +15,10 @@ from tests.sim.tracked_person import CELL, seen, work
 DT = 1.0 / 30.0
 
 
-def two_people() -> tuple[PeopleEstimator, np.ndarray, np.ndarray]:
+def two_people() -> tuple[MultiPersonTracker, np.ndarray, np.ndarray]:
     """Two people tracked for a second, 0.9 m apart."""
     one, other = work(1, 12.0)[1], work(2, 12.0)[1] + np.eye(18)[0] * 0.9
-    people = PeopleEstimator(2, CELL.body)
+    people = MultiPersonTracker(2, CELL.body)
     for k in range(30):
         for estimate in people.update(k * DT, [seen(one[k]), seen(other[k])]):
             assert estimate.flags == ()
@@ -45,7 +45,7 @@ def test_one_of_two_people_missing_is_stale_and_the_other_goes_on() -> None:
 
 def test_a_new_person_takes_the_free_track() -> None:
     one, other = work(1, 12.0)[1], work(2, 12.0)[1] + np.eye(18)[0] * 0.9
-    people = PeopleEstimator(2, CELL.body)
+    people = MultiPersonTracker(2, CELL.body)
     first, second = people.update(0.0, [seen(one[0])])
     assert first.flags == () and second.flags == ("never-seen",)
     first, second = people.update(DT, [seen(other[1]), seen(one[1])])
@@ -71,7 +71,7 @@ def test_wrong_people_are_refused_by_place_and_leave_no_trace() -> None:
 @pytest.mark.parametrize("n", [0, 5])
 def test_more_people_than_a_cell_holds_are_refused(n: int) -> None:
     with pytest.raises(InvalidInput, match="n_people"):
-        PeopleEstimator(n, CELL.body)
+        MultiPersonTracker(n, CELL.body)
 
 
 def at(distance: float, x: float = 0.0) -> np.ndarray:
@@ -113,7 +113,7 @@ def test_the_match_is_the_best_of_all_assignments(seed: int) -> None:
 
 
 def test_of_a_crowd_the_nearest_are_followed_and_the_rest_is_named() -> None:
-    people = PeopleEstimator(2, CELL.body, floor_z=CELL.floor_z)
+    people = MultiPersonTracker(2, CELL.body, floor_z=CELL.floor_z)
     crowd = [at(4.0), at(1.2), at(6.0), at(2.5), at(9.0)]
     estimates = people.update(0.0, crowd)
     assert following(estimates) == [1.2, 2.5]
@@ -129,7 +129,7 @@ def test_of_a_crowd_the_nearest_are_followed_and_the_rest_is_named() -> None:
 
 
 def test_a_person_who_comes_nearer_than_the_farthest_followed_takes_that_track() -> None:
-    people = PeopleEstimator(1, CELL.body, floor_z=CELL.floor_z)
+    people = MultiPersonTracker(1, CELL.body, floor_z=CELL.floor_z)
     followed, replaced = [], []
     for k in range(90):  # one stands at 2 m, another walks past to 1 m
         y = 3.5 - 1.0 * k * DT
@@ -143,7 +143,7 @@ def test_a_person_who_comes_nearer_than_the_farthest_followed_takes_that_track()
 
 def test_two_people_at_one_distance_do_not_take_turns() -> None:
     rng = np.random.default_rng(5)
-    people, n = PeopleEstimator(1, CELL.body, floor_z=CELL.floor_z), 0
+    people, n = MultiPersonTracker(1, CELL.body, floor_z=CELL.floor_z), 0
     for k in range(90):
         crowd = [at(2.0, x) + 0.02 * rng.standard_normal((25, 3)) for x in (-0.6, 0.6)]
         n += "replaced" in people.update(k * DT, crowd)[0].flags
@@ -151,7 +151,7 @@ def test_two_people_at_one_distance_do_not_take_turns() -> None:
 
 
 def test_a_ghost_of_one_frame_takes_no_track() -> None:
-    people = PeopleEstimator(1, CELL.body, floor_z=CELL.floor_z)
+    people = MultiPersonTracker(1, CELL.body, floor_z=CELL.floor_z)
     for k in range(20):
         crowd = [at(2.0), at(0.8)] if k % 5 == 4 else [at(2.0)]
         (estimate,) = people.update(k * DT, crowd)
@@ -164,7 +164,7 @@ def test_nobody_unfollowed_is_nearer_for_long_whatever_people_do(
 ) -> None:
     """Six people walk to and fro at 1.5 m/s, and are listed in any order."""
     rng = np.random.default_rng(n_tracks)
-    people = PeopleEstimator(n_tracks, CELL.body, floor_z=CELL.floor_z)
+    people = MultiPersonTracker(n_tracks, CELL.body, floor_z=CELL.floor_z)
     phases, paces = rng.uniform(0.0, 6.0, 6), rng.uniform(0.4, 0.8, 6)
     nearer_s = 0.0
     for k in range(round(8.0 * rate_hz)):
@@ -183,7 +183,7 @@ def test_nobody_unfollowed_is_nearer_for_long_whatever_people_do(
 
 
 def test_a_newcomer_takes_the_track_of_somebody_lost_only_where_it_may_be_the_same() -> None:
-    people = PeopleEstimator(1, CELL.body, floor_z=CELL.floor_z)
+    people = MultiPersonTracker(1, CELL.body, floor_z=CELL.floor_z)
     people.update(0.0, [at(1.0)])
     for k in range(1, 90):
         (estimate,) = people.update(k * DT, [at(5.0), at(3.0)] if k > 15 else [])
@@ -197,7 +197,7 @@ def test_a_newcomer_takes_the_track_of_somebody_lost_only_where_it_may_be_the_sa
 
 
 def test_a_newcomer_starts_a_track_of_nobody_and_the_person_lost_comes_back() -> None:
-    people = PeopleEstimator(2, CELL.body, floor_z=CELL.floor_z)
+    people = MultiPersonTracker(2, CELL.body, floor_z=CELL.floor_z)
     people.update(0.0, [at(1.0)])
     for k in range(1, 60):
         lost, new = people.update(k * DT, [at(5.0)] if k > 18 else [])
@@ -207,7 +207,7 @@ def test_a_newcomer_starts_a_track_of_nobody_and_the_person_lost_comes_back() ->
 
 
 def test_somebody_nearer_than_the_lost_may_be_is_followed() -> None:
-    people = PeopleEstimator(1, CELL.body, floor_z=CELL.floor_z)
+    people = MultiPersonTracker(1, CELL.body, floor_z=CELL.floor_z)
     people.update(0.0, [at(6.0)])
     for k in range(1, 25):
         (estimate,) = people.update(k * DT, [at(1.0)] if k > 20 else [])
@@ -225,7 +225,7 @@ def test_a_skeleton_in_another_frame_costs_nobody_else_anything() -> None:
 
 
 def test_a_tracker_of_another_frame_has_never_seen_anybody() -> None:
-    people = PeopleEstimator(1, CELL.body, floor_z=CELL.floor_z)
+    people = MultiPersonTracker(1, CELL.body, floor_z=CELL.floor_z)
     for k in range(60):
         points = posture("standing", CELL.floor_z) + [0.0, 0.0, 2.0]
         (estimate,) = people.update(k * DT, [points])
@@ -234,6 +234,6 @@ def test_a_tracker_of_another_frame_has_never_seen_anybody() -> None:
 
 
 def test_an_empty_skeleton_takes_no_track() -> None:
-    people = PeopleEstimator(1, CELL.body, floor_z=CELL.floor_z)
+    people = MultiPersonTracker(1, CELL.body, floor_z=CELL.floor_z)
     (estimate,) = people.update(0.0, [np.full((25, 3), np.nan), at(1.5), np.zeros((25, 3))])
     assert following((estimate,)) == [1.5] and people.unfollowed == ()

@@ -12,7 +12,11 @@ from app.sim.human import model as human
 from app.sim.human.anthropometry import percentile_body
 from app.sim.human.person import Person
 from app.sim.people.kernels.pedestrian import VX, VY, X, Y
-from app.sim.perception.observed_people import checked_people, nearest_index, standing_in
+from app.sim.perception.observed_people import (
+    checked_people,
+    nearest_index,
+    person_from_cylinder,
+)
 from app.sim.pick.batch import PickBatch, PickSettings, observe
 from app.sim.pick.kernels.observation import N_FEATURES
 from app.sim.scene.scene import NO_CYLINDERS, arm_of, people_of
@@ -44,7 +48,7 @@ def test_the_person_seen_is_the_one_whom_a_batch_sees() -> None:
                 )
                 for w in range(2)
             ),
-            standing_in(x, y, walker[VX], walker[VY], r),
+            person_from_cylinder(x, y, walker[VX], walker[VY], r),
         ]
         index = nearest_index(batch.arm, batch.world.people, state.q[e], people)
         assert index is not None
@@ -87,7 +91,7 @@ def test_nobody_is_seen_where_nobody_is_and_a_single_person_always() -> None:
 
 
 def test_a_person_in_a_cylinder_faces_the_robot_and_has_its_velocity() -> None:
-    person = standing_in(0.5, 1.0, 0.2, -0.3, 0.4)
+    person = person_from_cylinder(0.5, 1.0, 0.2, -0.3, 0.4)
     facing = np.array([np.cos(person.q[2]), np.sin(person.q[2])])
     np.testing.assert_allclose(facing, -person.q[:2] / np.linalg.norm(person.q[:2]))
     np.testing.assert_array_equal(person.qd[:3], [0.2, -0.3, 0.0])
@@ -101,7 +105,7 @@ def test_a_person_in_a_cylinder_faces_the_robot_and_has_its_velocity() -> None:
         ([replace(standing(0.0, 1.0), qd=np.full(18, np.nan))], "people[0].qd[0]"),
         ([replace(standing(0.0, 1.0), size=np.ones(11))], "people[0].size"),
         ([replace(standing(0.0, 1.0), size=np.zeros(12))], "people[0].size[1]"),
-        ([standing_in(0.0, 1.0, 0.0, 0.0, 0.0)], "people[0].cylinder[2]"),
+        ([person_from_cylinder(0.0, 1.0, 0.0, 0.0, 0.0)], "people[0].cylinder[2]"),
     ],
 )
 def test_people_who_cannot_be_are_refused_by_name(people: list[Person], field: str) -> None:

@@ -6,7 +6,7 @@ import pytest
 from app.errors import InvalidInput
 from app.sim.human import model as human
 from app.sim.perception.bounding_cylinder import safety_cylinder
-from app.sim.perception.keypoint_sensor_model import TrackerSettings
+from app.sim.perception.keypoint_sensor_model import KeypointSensorSettings
 from app.sim.perception.keypoints import K, swap_sides
 from app.sim.perception.person_estimator import EstimatorSettings, PersonEstimator
 from tests.sim.postures import POSTURES, posture
@@ -17,8 +17,8 @@ DT = 1.0 / 30.0
 NOBODY = np.full((25, 3), np.nan)
 
 
-NOISY = TrackerSettings(noise=0.02, missing=0.2, latency_s=0.0)
-LATE = TrackerSettings(noise=0.02, missing=0.2, missing_s=0.2, lost=0.1, latency_s=0.1)
+NOISY = KeypointSensorSettings(noise=0.02, missing=0.2, latency_s=0.0)
+LATE = KeypointSensorSettings(noise=0.02, missing=0.2, missing_s=0.2, lost=0.1, latency_s=0.1)
 
 
 def test_center_of_noisy_incomplete_people_is_within_50_mm() -> None:
@@ -61,7 +61,7 @@ def test_late_frames_and_long_gaps_keep_to_the_same_numbers() -> None:
 
 
 def test_speeds_of_a_person_seen_exactly_are_the_true_ones() -> None:
-    found = errors(TrackerSettings(noise=0.0, missing=0.0, latency_s=0.0))
+    found = errors(KeypointSensorSettings(noise=0.0, missing=0.0, latency_s=0.0))
     assert np.median(found.qd) < 0.05
     assert np.percentile(found.velocity, 50) < 0.08
 

@@ -6,7 +6,7 @@ import pytest
 from app.errors import InvalidInput
 from app.sim.human import model as human
 from app.sim.perception.keypoints import BODY_25, K, keypoints_of, swap_sides
-from app.sim.perception.observed_people import as_person
+from app.sim.perception.observed_people import person_from_estimate
 from app.sim.perception.single_frame import estimate_once
 from tests.sim.postures import FRAMES, POSTURES, posture
 from tests.sim.tracked_person import CELL, seen, work
@@ -60,7 +60,7 @@ def test_without_a_trunk_the_person_is_as_good_as_the_cylinder() -> None:
     points[[K["wrist_l"], K["elbow_l"]]] = POINTS[[K["wrist_l"], K["elbow_l"]]]
     estimate = estimate_once(points, CELL.body)
     assert estimate.person is None and estimate.cylinder is not None
-    person = as_person(estimate)
+    person = person_from_estimate(estimate)
     assert person is not None and person.cylinder is not None
     assert not person.measured
     np.testing.assert_allclose(person.q[:2], estimate.cylinder.center)
@@ -81,7 +81,7 @@ def test_somebody_of_unknown_place_may_be_anywhere(points: np.ndarray, flag: str
     estimate = estimate_once(points, CELL.body, velocities=velocities, floor_z=CELL.floor_z)
     assert flag in estimate.flags and estimate.person is None
     assert (estimate.implausible is not None) is (flag == "foreign-frame")
-    person = as_person(estimate)
+    person = person_from_estimate(estimate)
     assert person is not None and person.cylinder is not None
     x, y, r = person.cylinder
     assert r - np.hypot(x, y) > 2.0  # the robot is inside, wherever it reaches

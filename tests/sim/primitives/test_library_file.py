@@ -10,16 +10,16 @@ from app.sim.primitives import promp
 from app.sim.primitives.demonstrations import PHASES, STYLES
 from app.sim.primitives.library_file import (
     FILE,
-    legs_of,
     load_primitives,
     primitive_for,
     read_header,
+    segments_of,
     write_primitives,
 )
 
 
 def test_every_leg_of_every_shipped_cell_has_its_primitive() -> None:
-    wanted = {(name, leg) for name in cell_names() for leg in legs_of(load_cell(name))}
+    wanted = {(name, leg) for name in cell_names() for leg in segments_of(load_cell(name))}
     assert {(one.cell, one.leg) for one in load_primitives()} == wanted
     assert len(load_primitives()) == len(wanted) == 40
 

@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 
 from app.errors import InvalidInput
-from app.sim.primitives.phase import min_jerk, min_jerk_rate, monotone, random_law, read
+from app.sim.primitives.phase import (
+    min_jerk,
+    min_jerk_rate,
+    monotone,
+    random_phase_profile,
+    read,
+)
 
 X = np.linspace(0.0, 1.0, 501)
 
@@ -48,14 +54,14 @@ def test_law_that_turns_back_or_ends_short_is_named(
 
 def test_random_laws_differ_and_none_turns_back() -> None:
     rng = np.random.default_rng(4)
-    laws = np.array([random_law(X, rng) for _ in range(50)])
+    laws = np.array([random_phase_profile(X, rng) for _ in range(50)])
     assert (np.diff(laws, axis=1) >= -1e-12).all()
     np.testing.assert_allclose(laws[:, [0, -1]], [[0.0, 1.0]] * 50, atol=1e-12)
     assert laws[:, 250].std() > 0.03
 
 
 def test_random_law_without_spread_is_linear() -> None:
-    law = random_law(X, np.random.default_rng(0), spread=0.0)
+    law = random_phase_profile(X, np.random.default_rng(0), spread=0.0)
     np.testing.assert_allclose(law, X, atol=1e-12)
 
 

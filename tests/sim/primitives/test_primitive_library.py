@@ -8,9 +8,14 @@ from app.sim.cells.cell import Cell, load_cell
 from app.sim.human import model as human
 from app.sim.human.anthropometry import BodySize
 from app.sim.primitives import promp
-from app.sim.primitives.library_file import legs_of, load_primitives, primitive_for
-from app.sim.primitives.primitive_library import BODIES, TaskLibrary, people_sizes, task_library
-from tests.sim.library_motions import LegMotion, random_legs
+from app.sim.primitives.library_file import load_primitives, primitive_for, segments_of
+from app.sim.primitives.primitive_library import (
+    BODIES,
+    MotionLibrary,
+    motion_library,
+    people_sizes,
+)
+from tests.sim.library_motions import LegMotion, random_segments
 
 N = 600
 
@@ -21,13 +26,13 @@ def cell() -> Cell:
 
 
 @pytest.fixture(scope="module")
-def library(cell: Cell) -> TaskLibrary:
-    return task_library(cell, 0)
+def library(cell: Cell) -> MotionLibrary:
+    return motion_library(cell, 0)
 
 
 @pytest.fixture(scope="module")
-def motions(cell: Cell, library: TaskLibrary) -> list[LegMotion]:
-    return random_legs(cell, library, N, 1)
+def motions(cell: Cell, library: MotionLibrary) -> list[LegMotion]:
+    return random_segments(cell, library, N, 1)
 
 
 def moved(cell: Cell, way: tuple[float, float], jitter: float, seed: int = 0) -> Cell:
@@ -57,8 +62,8 @@ def test_every_leg_meets_its_nodes(motions: list[LegMotion]) -> None:
     assert max(motion.end_miss for motion in motions) < 1e-3
 
 
-def test_every_leg_ends_in_its_nodes_joints(cell: Cell, library: TaskLibrary) -> None:
-    for motion in random_legs(cell, library, 100, 5):
+def test_every_leg_ends_in_its_nodes_joints(cell: Cell, library: MotionLibrary) -> None:
+    for motion in random_segments(cell, library, 100, 5):
         ends = [np.abs(library.postures - motion.q[k]).max(axis=1).min() for k in (0, -1)]
         assert max(ends) < 1e-3
 
@@ -81,12 +86,12 @@ def test_no_joint_swings_out_on_the_way(motions: list[LegMotion]) -> None:
     assert np.median(swings) < 0.3 and np.percentile(swings, 99) < 0.9
 
 
-def test_gains_are_tame(library: TaskLibrary) -> None:
+def test_gains_are_tame(library: MotionLibrary) -> None:
     assert np.abs(library.gain).max() < 2.0
 
 
 def test_gain_leaves_the_sample_free_where_it_already_meets_the_nodes(
-    library: TaskLibrary,
+    library: MotionLibrary,
 ) -> None:
     phi = promp.basis(np.array([0.0, 1.0]), promp.N_BASIS, promp.usual_width(promp.N_BASIS))
     rows = np.kron(np.eye(18), phi[:, None, :]).reshape(2, 18, 18 * promp.N_BASIS)
@@ -94,7 +99,7 @@ def test_gain_leaves_the_sample_free_where_it_already_meets_the_nodes(
         np.testing.assert_allclose(rows.reshape(36, -1) @ gain, np.eye(36), atol=1e-6)
 
 
-def test_legs_join_home_cubes_and_docks_with_both_hands(library: TaskLibrary) -> None:
+def test_legs_join_home_cubes_and_docks_with_both_hands(library: MotionLibrary) -> None:
     there = library.legs[..., 0] >= 0
     home, cubes = library.n_stations, range(library.n_cubes)
     docks = range(library.n_cubes, library.n_stations)
@@ -110,12 +115,12 @@ def test_legs_join_home_cubes_and_docks_with_both_hands(library: TaskLibrary) ->
     assert rows[:, 2].sum() == len(library.samples)
 
 
-def test_backward_leg_takes_as_long_as_forward(library: TaskLibrary) -> None:
+def test_backward_leg_takes_as_long_as_forward(library: MotionLibrary) -> None:
     forth, back = library.legs[8, 2, 0, 0], library.legs[2, 8, 0, 0]
     np.testing.assert_array_equal(library.duration[forth], library.duration[back])
 
 
-def test_nodes_of_every_person_reach_the_stations(cell: Cell, library: TaskLibrary) -> None:
+def test_nodes_of_every_person_reach_the_stations(cell: Cell, library: MotionLibrary) -> None:
     for person in range(len(library.bodies)):
         for place, station in enumerate(cell.pick_stations):
             for hand in range(2):
@@ -124,11 +129,11 @@ def test_nodes_of_every_person_reach_the_stations(cell: Cell, library: TaskLibra
                 assert np.linalg.norm(palms - station.position, axis=1).max() < 0.09
 
 
-def test_nodes_are_inside_the_limits(library: TaskLibrary) -> None:
+def test_nodes_are_inside_the_limits(library: MotionLibrary) -> None:
     assert (library.postures >= human.Q_MIN).all() and (library.postures <= human.Q_MAX).all()
 
 
-def test_samples_keep_the_joint_limits(library: TaskLibrary) -> None:
+def test_samples_keep_the_joint_limits(library: MotionLibrary) -> None:
     phi = promp.basis(
         np.linspace(0.0, 1.0, 61), promp.N_BASIS, promp.usual_width(promp.N_BASIS)
     )
@@ -145,22 +150,22 @@ def test_default_people_differ_and_lie_between_the_5th_and_95th_percentile(cell:
 
 def test_library_is_fixed_by_its_seed(cell: Cell) -> None:
     bodies = (BodySize(),)
-    one = task_library(cell, 3, bodies, 2, True, 1)
-    task_library.cache_clear()
-    again, other = (task_library(cell, seed, bodies, 2, True, 1) for seed in (3, 4))
+    one = motion_library(cell, 3, bodies, 2, True, 1)
+    motion_library.cache_clear()
+    again, other = (motion_library(cell, seed, bodies, 2, True, 1) for seed in (3, 4))
     np.testing.assert_array_equal(one.samples, again.samples)
     np.testing.assert_array_equal(one.postures, again.postures)
     assert not np.array_equal(one.samples, other.samples)
 
 
 def test_without_augmentation_samples_are_the_demonstrations(cell: Cell) -> None:
-    library = task_library(cell, 0, (BodySize(),), augmentation=False, variants=1)
+    library = motion_library(cell, 0, (BodySize(),), augmentation=False, variants=1)
     first = load_primitives()[0]
     np.testing.assert_array_equal(library.samples[: len(first.weights)], first.weights)
     np.testing.assert_array_equal(library.duration[:, 1], 0.0)
 
 
-def test_library_cannot_be_changed(library: TaskLibrary) -> None:
+def test_library_cannot_be_changed(library: MotionLibrary) -> None:
     for name in ("postures", "samples", "gain", "legs"):
         with pytest.raises(ValueError, match="read-only"):
             getattr(library, name)[...] = 0
@@ -168,7 +173,7 @@ def test_library_cannot_be_changed(library: TaskLibrary) -> None:
 
 def test_moved_cell_has_the_same_motion_elsewhere(cell: Cell) -> None:
     other = moved(cell, (0.5, 0.2), 0.0)
-    for leg in legs_of(cell)[::7]:
+    for leg in segments_of(cell)[::7]:
         ours, theirs = primitive_for(cell, leg), primitive_for(other, leg)
         assert ours.leg == theirs.leg
         shift = theirs.weights - ours.weights
@@ -179,8 +184,8 @@ def test_moved_cell_has_the_same_motion_elsewhere(cell: Cell) -> None:
 
 def test_stations_of_ones_own_are_served_by_the_nearest_primitives(cell: Cell) -> None:
     other = moved(cell, (0.3, 0.1), 0.1)
-    library = task_library(other, 0, None, 6, True, 4)
-    motions = random_legs(other, library, 300, 2)
+    library = motion_library(other, 0, None, 6, True, 4)
+    motions = random_segments(other, library, 300, 2)
     assert max(motion.end_miss for motion in motions) < 1e-3
     assert np.mean([motion.lowest < -0.01 for motion in motions]) < 0.02
     assert np.percentile([m.path - 2.0 * m.straight for m in motions], 99) < 0.2
@@ -189,9 +194,9 @@ def test_stations_of_ones_own_are_served_by_the_nearest_primitives(cell: Cell) -
 
 def test_cell_without_cubes_and_docks_is_refused() -> None:
     with pytest.raises(InvalidInput, match="sorting-e0.*at least one station of kind cube"):
-        task_library(load_cell("sorting-e0"), 0)
+        motion_library(load_cell("sorting-e0"), 0)
 
 
 def test_cell_without_a_worker_is_refused(cell: Cell) -> None:
     with pytest.raises(NotFound, match="worker"):
-        task_library(cell.model_copy(update={"people": ()}), 0)
+        motion_library(cell.model_copy(update={"people": ()}), 0)

@@ -16,7 +16,7 @@ from app.sim.people.kernels.pedestrian import (
     X,
     Y,
 )
-from app.sim.perception.observed_people import standing_in
+from app.sim.perception.observed_people import person_from_cylinder
 from app.sim.reach.batch import ReachBatch, ReachSettings
 from app.sim.reach.query_state import Stage
 from app.sim.robot.measured_state import Joints
@@ -40,7 +40,7 @@ def people_of(batch: ReachBatch, e: int) -> list[Person]:
     for row in rows.walkers.rows[e]:
         assert row[AGE] == 0.0  # or the last moment remembered is not now
         past = np.stack([row[PAST_RADIUS:PAST_SPEED], row[PAST_SPEED:]], axis=1)[1:]
-        walkers.append(standing_in(*row[[X, Y, VX, VY, R, GROWTH]], past=past))
+        walkers.append(person_from_cylinder(*row[[X, Y, VX, VY, R, GROWTH]], past=past))
     return bodies + walkers
 
 
@@ -79,7 +79,7 @@ def test_what_is_not_remembered_was_as_the_oldest_that_is() -> None:
         "grew": np.array([[0.25, 0.5], [0.2, 0.5]]),
         "grew long ago": np.array([[0.25, 0.5], *[[0.2, 0.5]] * 14]),
     }.items():
-        person = standing_in(0.1, 1.4, 0.3, 0.4, 0.3, 0.0, past)
+        person = person_from_cylinder(0.1, 1.4, 0.3, 0.4, 0.3, 0.0, past)
         stage.put(Joints(q, np.zeros(6), np.zeros(6)), [person], 5.0)
         seen[name] = stage.observe(np.array(goal)).copy()
     np.testing.assert_array_equal(seen["nothing"], seen["no moment"])
@@ -101,7 +101,10 @@ def test_a_persons_own_size_counts() -> None:
 
 def test_shapes_are_the_people_with_the_height_of_the_cell() -> None:
     stage = Stage(CELL, 0, 2, "state")
-    people = [standing_in(0.1, 1.2, 0.0, 0.0, 0.3), standing_in(-1.0, 1.5, 0.0, 0.0, 0.4)]
+    people = [
+        person_from_cylinder(0.1, 1.2, 0.0, 0.0, 0.3),
+        person_from_cylinder(-1.0, 1.5, 0.0, 0.0, 0.4),
+    ]
     stage.put(Joints(np.array(CELL.robot.home_q), np.zeros(6), np.zeros(6)), people, 5.0)
     top = CELL.floor_z + CELL.cylinders[0].height
     np.testing.assert_allclose(

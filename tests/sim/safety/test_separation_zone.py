@@ -3,7 +3,7 @@ import pytest
 
 from app.sim.cells.cell import load_cell
 from app.sim.collision.checker import Shapes, no_people
-from app.sim.collision.contact import walker_distances
+from app.sim.collision.contact import pedestrian_distances
 from app.sim.safety.layer import SafetyLayer, safety_settings
 from app.sim.safety.separation_zone import required_distances, separation_zone
 from app.sim.scene.scene import arm_of, people_of
@@ -43,7 +43,7 @@ def test_person_outside_the_zone_is_farther_away_than_any_capsule_asks_for() -> 
             )
             if (side >= 0.0).all():
                 continue
-            gap = walker_distances(ARM, shared, q, np.array([[*place, 1e-3]]))[0]
+            gap = pedestrian_distances(ARM, shared, q, np.array([[*place, 1e-3]]))[0]
             assert gap > least - 5e-3
 
 

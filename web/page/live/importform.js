@@ -73,21 +73,21 @@ export function ImportForm({ onDone }) {
 }
 
 /** The first frames that were cut out, and why. */
-function cutOut(glitches) {
-  const listed = glitches.slice(0, MAX_LISTED).map(({ first, last, reason }) =>
+function cutOut(artifacts) {
+  const listed = artifacts.slice(0, MAX_LISTED).map(({ first, last, reason }) =>
     `${first === last ? `frame ${first}` : `frames ${first} to ${last}`}: ${reason}`);
-  return [...listed, ...(glitches.length > MAX_LISTED ? ["…"] : [])].join("; ");
+  return [...listed, ...(artifacts.length > MAX_LISTED ? ["…"] : [])].join("; ");
 }
 
 /** How a file was read, in sentences. */
-function told({ name, reading, n_runs: runs, n_glitches: n, glitches }) {
+function told({ name, reading, n_runs: runs, n_artifacts: n, artifacts }) {
   if (!reading) return `${name} is stored already; an older version read it.`;
   const parts = [
     `${reading.unit}, ${reading.up} up`,
     reading.root_unit !== reading.unit && `root's path in ${reading.root_unit}`,
     `${Number(reading.rate_hz.toPrecision(4))} frames/s`,
     reading.stature !== null && `${reading.stature.toFixed(2)} m tall`,
-    `${runs} clean ${runs === 1 ? "run" : "runs"}, ${n} cut out${n ? ` (${cutOut(glitches)})` : ""}`,
+    `${runs} clean ${runs === 1 ? "run" : "runs"}, ${n} cut out${n ? ` (${cutOut(artifacts)})` : ""}`,
   ].filter(Boolean);
   return [`${name} read as: ${parts.join(", ")}.`, ...reading.notes].join(" ");
 }

@@ -79,7 +79,7 @@ _WEIGHTS: Mapping[str, Callable[[Vec], dict[str, Vec]]] = {
     "jacket": skeleton.upper_weights,
     "vest": skeleton.spine_weights,
     "stripes": skeleton.spine_weights,
-    "trousers": skeleton.leg_weights,
+    "trousers": skeleton.segment_weights,
 }
 
 

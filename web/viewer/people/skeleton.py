@@ -226,7 +226,7 @@ def spine_weights(vertices: Vec) -> dict[str, Vec]:
     return {name: _hat(share, i, 4) for i, name in enumerate(names)}
 
 
-def leg_weights(vertices: Vec) -> dict[str, Vec]:
+def segment_weights(vertices: Vec) -> dict[str, Vec]:
     """Return skin weights of trouser vertices in the bind pose by bone, each of shape (n,)."""
     z = vertices[:, 2]
     thigh = 1.0 - _ramp(z, -0.19, 0.0)

@@ -17,8 +17,8 @@ from app.policies.evaluation.statistics import wilson
 from app.policies.inference.task_selection import ValueNetworks
 from app.sim.cells.cell import Cell
 from app.sim.collision.fcl_recheck import Trajectory
-from app.sim.people.human_motion_config import WorkSettings
-from app.sim.people.kernels.people import new_crowd, see_rows
+from app.sim.people.human_motion_config import HumanMotionConfig
+from app.sim.people.kernels.people import new_people_geometry, see_rows
 from app.sim.pick.batch import OUTCOMES, PickBatch, PickSettings
 from app.sim.pick.kernels.observation import LAYOUT, observe_batch
 from app.sim.scenario.kernels import episode as kernel
@@ -73,7 +73,9 @@ def seen_exactly(batch: PickBatch, rows: Index) -> Sight:
     seen = Sight(
         q=np.empty((n, 18)), qd=np.empty((n, 18)), size=np.empty((n, shared.bodies.shape[1]))
     )
-    crowd = new_crowd(shared, state.people.q.shape[1], state.people.cylinders.shape[1])
+    crowd = new_people_geometry(
+        shared, state.people.q.shape[1], state.people.cylinders.shape[1]
+    )
     see_rows(shared, state.people, state.robot, rows, crowd, seen.q, seen.qd, seen.size)
     np.clip(seen.q[:, 3:], shared.limits[0, 3:], shared.limits[1, 3:], out=seen.q[:, 3:])
     return seen
@@ -124,7 +126,9 @@ def settings_for(n_candidates: tuple[int, int], preset: Mapping[str, Any]) -> Pi
         time_limit_s=10.0,
         start_clearance_m=0.05,
         n_candidates=n_candidates,
-        work=WorkSettings(seed=EVALUATION_LIBRARY, pace=float(preset.get("human_pace", 1.0))),
+        work=HumanMotionConfig(
+            seed=EVALUATION_LIBRARY, pace=float(preset.get("human_pace", 1.0))
+        ),
         action=action_of(preset),
     )
 

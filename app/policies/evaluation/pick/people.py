@@ -1,4 +1,4 @@
-"""Protocols ``pick-people``, ``pick-mocap``, ``pick-courtesy``: a policy beside other people.
+"""Protocols ``pick-people``, ``pick-mocap``, ``pick-yielding``: a policy beside other people.
 
 All choose among 2-3 random targets by the critic with hysteresis, as ``pick-choice`` does, and
 differ in who is in the cell. A policy for one person sees the nearest. Several workers share
@@ -7,7 +7,7 @@ the table and do not see one another, so they may stand in each other's place.
 ``pick-people``: nobody; one to four people of the library's sizes; one and three people of the
 5th and of the 95th percentile; a worker and a walking cylinder; the first, synthetic reaches.
 ``pick-mocap``: recorded motion, placed at the table, each run by itself and all together.
-``pick-courtesy``: people who give way to the arm, from not at all (the source's) to fully, and
+``pick-yielding``: people who give way to the arm, from not at all (the source's) to fully, and
 how far the same policy leans on it.
 
 Beside every row stands how often the same people touch a robot that never moves.
@@ -33,7 +33,7 @@ from app.policies.evaluation.statistics import wilson
 from app.policies.inference.task_selection import HYSTERESIS, ValueNetworks
 from app.sim.human.anthropometry import percentile_body
 from app.sim.mocap.importer import Motion
-from app.sim.people.human_motion_config import WorkSettings, at_the_table
+from app.sim.people.human_motion_config import HumanMotionConfig, at_the_table
 from app.sim.pick.batch import PickBatch, PickSettings
 from app.sim.robot.kernels.arm import CONTROLLED
 from app.sim.scenario.kernels.episode import COLLISION, RUNNING
@@ -41,7 +41,7 @@ from app.sim.scene.scene import HumanKind
 
 DEFAULT_EPISODES = 1000
 CANDIDATES = (2, 3)
-COURTESIES = (0.0, 0.5, 1.0)
+YIELDING = (0.0, 0.5, 1.0)
 """Strengths compared."""
 MAX_RECORDED_S = 36_000
 """Most recorded motion of one evaluation [s]; the tracks of so much are 274 MB."""
@@ -91,7 +91,7 @@ def _touched_at_rest(batch: PickBatch) -> dict[str, float]:
     return wilson(int((batch.state.outcome == COLLISION).sum()), batch.n_envs)
 
 
-def _sized(work: WorkSettings, percentile: float, pelvis: float) -> WorkSettings:
+def _sized(work: HumanMotionConfig, percentile: float, pelvis: float) -> HumanMotionConfig:
     return replace(work, bodies=(percentile_body(percentile, pelvis=pelvis),))
 
 
@@ -110,7 +110,7 @@ def run_people(
     usual, pelvis = bench.usual, bench.cell.human.pelvis_height
     small, large = (_sized(usual.work, share, pelvis) for share in (SMALL, LARGE))
 
-    def beside(*people: HumanKind, work: WorkSettings = usual.work) -> PickSettings:
+    def beside(*people: HumanKind, work: HumanMotionConfig = usual.work) -> PickSettings:
         return replace(usual, people=people, work=work)
 
     worker: HumanKind = "worker"
@@ -124,7 +124,7 @@ def run_people(
     return bench.all(rows)
 
 
-def run_courtesy(
+def run_yielding(
     checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = untold
 ) -> dict[str, Any]:
     """Evaluate beside people who give way to the arm by 0, one half and fully.
@@ -139,9 +139,9 @@ def run_courtesy(
     usual = bench.usual
 
     def beside(strength: float) -> PickSettings:
-        return replace(usual, work=replace(usual.work, courtesy=strength))
+        return replace(usual, work=replace(usual.work, yielding=strength))
 
-    return bench.all({f"courtesy-{strength:g}": beside(strength) for strength in COURTESIES})
+    return bench.all({f"yielding-{strength:g}": beside(strength) for strength in YIELDING})
 
 
 def run_mocap(

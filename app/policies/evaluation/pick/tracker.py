@@ -31,7 +31,7 @@ from app.policies.evaluation.rows import OnRow, untold
 from app.policies.inference.task_selection import HYSTERESIS
 from app.sim.core.arrays import Vec
 from app.sim.human import model as human
-from app.sim.perception.keypoint_sensor_model import Tracker, TrackerSettings
+from app.sim.perception.keypoint_sensor_model import KeypointSensorSettings, Tracker
 from app.sim.perception.person_estimator import PersonEstimator
 from app.sim.pick.batch import PickBatch
 
@@ -46,15 +46,15 @@ to have come to the start at the speed they have there."""
 class TrackedRow:
     """How one row of the result sees people."""
 
-    tracker: TrackerSettings
+    tracker: KeypointSensorSettings
     """How good the tracker is."""
     predicted: bool = True
     """Whether the estimate is for now, or for the time of the newest frame."""
 
 
-def _late(seconds: float, **disturbed: float) -> TrackerSettings:
+def _late(seconds: float, **disturbed: float) -> KeypointSensorSettings:
     clean = {"noise": 0.0, "missing": 0.0, **disturbed}
-    return TrackerSettings(rate_hz=RATE_HZ, latency_s=seconds, **clean)
+    return KeypointSensorSettings(rate_hz=RATE_HZ, latency_s=seconds, **clean)
 
 
 ROWS = {

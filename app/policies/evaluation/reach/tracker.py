@@ -30,7 +30,7 @@ from app.policies.evaluation.rows import OnRow, untold
 from app.policies.inference.controllers import Mover, mover_of
 from app.sim.core.arrays import Vec
 from app.sim.people.kernels.pedestrian import AGE, GROWTH, N_PAST, PAST_S, VX, VY, R, X, Y
-from app.sim.perception.cylinder_sensor_model import CylinderTracker, CylinderTrackerSettings
+from app.sim.perception.cylinder_sensor_model import CylinderSensorModel, CylinderSensorSettings
 from app.sim.reach.batch import ReachBatch
 
 DEFAULT_EPISODES = 5400
@@ -44,14 +44,14 @@ RATE_HZ = 30.0
 class TrackedRow:
     """How one row of the result sees people."""
 
-    tracker: CylinderTrackerSettings
+    tracker: CylinderSensorSettings
     """How good the tracker is."""
     predicted: bool = True
     """Whether people are predicted to now, or taken as in the newest frame."""
 
 
-def _late(latency_s: float, noise: float = 0.0) -> CylinderTrackerSettings:
-    return CylinderTrackerSettings(rate_hz=RATE_HZ, latency_s=latency_s, noise=noise)
+def _late(latency_s: float, noise: float = 0.0) -> CylinderSensorSettings:
+    return CylinderSensorSettings(rate_hz=RATE_HZ, latency_s=latency_s, noise=noise)
 
 
 ROWS = {
@@ -77,7 +77,7 @@ class ThroughTracker:
 
     def __init__(self, mover: Mover, row: TrackedRow, seed: int) -> None:
         self._mover, self._row, self._seed = mover, row, seed
-        self._tracker: CylinderTracker | None = None
+        self._tracker: CylinderSensorModel | None = None
         self._rng = np.random.default_rng([seed, 1])
         self._past: Vec | None = None
         self.errors: list[Vec] = []
@@ -90,7 +90,7 @@ class ThroughTracker:
         true = rows[:, :, [X, Y, R]]
         if self._tracker is None:
             n, n_people = true.shape[:2]
-            self._tracker = CylinderTracker(self._row.tracker, n, n_people, self._seed)
+            self._tracker = CylinderSensorModel(self._row.tracker, n, n_people, self._seed)
         fresh = np.flatnonzero(t == 0.0)
         self._tracker.start(fresh, true[fresh], rows[fresh][:, :, [VX, VY, GROWTH]])
         later, every = np.flatnonzero(t > 0.0), np.arange(batch.n_envs)

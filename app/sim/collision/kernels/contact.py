@@ -14,8 +14,8 @@ from app.sim.core.jit import kernel
 from app.sim.geometry.capsules import copy_rows
 from app.sim.human.kernels.kinematics import PELVIS_Z
 from app.sim.people.kernels.people import (
-    Crowd,
     People,
+    PeopleGeometry,
     people_clearance,
     people_speed_bound,
     place_workers,
@@ -51,7 +51,7 @@ class PeriodMotion(NamedTuple):
 
 
 @kernel(inline="always")
-def clearances(arm: Arm, people: People, robot: RobotPose, crowd: Crowd) -> Clear:
+def clearances(arm: Arm, people: People, robot: RobotPose, crowd: PeopleGeometry) -> Clear:
     """Return the distances of a placed robot to people, cell and itself [m]."""
     return (
         people_clearance(people, robot.columns, crowd),
@@ -81,7 +81,7 @@ def sweep(
     crowd0: Vec,
     clear: Vec,
     robot: RobotPose,
-    crowd: Crowd,
+    crowd: PeopleGeometry,
 ) -> tuple[int, float]:
     """Test one whole period for contact, between its ends too.
 
@@ -129,7 +129,7 @@ def _search(
     end: Clear,
     speeds: tuple[float, float],
     robot: RobotPose,
-    crowd: Crowd,
+    crowd: PeopleGeometry,
 ) -> tuple[int, float, Clear]:
     """Halve the period until every interval is free or too short to be halved.
 
@@ -175,7 +175,7 @@ def _place_at(
     motion: PeriodMotion,
     x: float,
     robot: RobotPose,
-    crowd: Crowd,
+    crowd: PeopleGeometry,
 ) -> None:
     """Place robot and people at time ``x`` of the period [s]."""
     q, part = crowd.robot_q, x / arm.dt

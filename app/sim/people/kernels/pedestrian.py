@@ -98,14 +98,14 @@ newest first."""
 N_STATE = PAST_SPEED + N_PAST
 
 
-class WalkerRules(NamedTuple):
+class PedestrianRules(NamedTuple):
     """How each of a cell's W walkers walks."""
 
     rows: Vec
     """Rules named above, shape (W, N_RULES)."""
 
 
-class WalkerState(NamedTuple):
+class PedestrianState(NamedTuple):
     """The walkers of all environments."""
 
     rows: Vec
@@ -172,7 +172,9 @@ def _between(stream: State, low: float, high: float) -> float:
 
 
 @kernel()
-def start_walker(rules: WalkerRules, state: WalkerState, e: int, p: int, stream: State) -> None:
+def start_pedestrian(
+    rules: PedestrianRules, state: PedestrianState, e: int, p: int, stream: State
+) -> None:
     """Draw an episode of one walker: place, gait, first target, the two functions.
 
     The place is uniform in the walking area. Where a start needs clearance from the robot, the
@@ -209,7 +211,9 @@ def start_walker(rules: WalkerRules, state: WalkerState, e: int, p: int, stream:
 
 
 @kernel(error_model="numpy", fastmath=FAST)
-def advance_walker(rules: WalkerRules, state: WalkerState, e: int, p: int, dt: float) -> None:
+def advance_pedestrian(
+    rules: PedestrianRules, state: PedestrianState, e: int, p: int, dt: float
+) -> None:
     """Move one walker on by one control period, never past its target.
 
     Args:
@@ -282,7 +286,7 @@ def _remember_before(rule: Vec, rows: Vec, e: int, p: int) -> None:
 
 
 @kernel()
-def _arrive(rules: WalkerRules, state: WalkerState, e: int, p: int) -> None:
+def _arrive(rules: PedestrianRules, state: PedestrianState, e: int, p: int) -> None:
     """Stay at the target for good, or go on to a new one."""
     own = state.stream[e, p]
     if uniform(own) < rules.rows[p, P_STAY]:
@@ -292,7 +296,7 @@ def _arrive(rules: WalkerRules, state: WalkerState, e: int, p: int) -> None:
 
 
 @kernel()
-def _go_on(rules: WalkerRules, state: WalkerState, e: int, p: int) -> None:
+def _go_on(rules: PedestrianRules, state: PedestrianState, e: int, p: int) -> None:
     """Perhaps leave the target at which the walker stays."""
     own = state.stream[e, p]
     if uniform(own) < rules.rows[p, P_GO_ON]:

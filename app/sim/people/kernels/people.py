@@ -3,11 +3,11 @@
 A cell holds up to four people: *workers*, 18-DoF bodies, and *walkers*, the vertical cylinders
 of METHOD 2.1. Workers become twelve capsules each, in one set of columns; walkers stay
 cylinders. A worker either follows a script, of synthetic reaches (``script.py``) or
-task primitives (``repertoire.py``), or a track: recorded motion, or any other given by samples.
+task primitives (``primitives.py``), or a track: recorded motion, or any other given by samples.
 
 People do not react to the robot, so that an episode's whole human motion is fixed when it
-starts; unless they are courteous (METHOD 4): then a worker slows and leans away as the arm
-comes close (``courtesy.py``).
+starts; unless they are yielding (METHOD 4): then a worker slows and leans away as the arm
+comes close (``yielding.py``).
 """
 
 import math
@@ -32,21 +32,21 @@ from app.sim.human.kernels import kinematics as body
 from app.sim.people.kernels.pedestrian import (
     VX,
     VY,
+    PedestrianRules,
+    PedestrianState,
     R,
-    WalkerRules,
-    WalkerState,
     X,
     Y,
-    advance_walker,
-    start_walker,
+    advance_pedestrian,
+    start_pedestrian,
 )
-from app.sim.people.kernels.yielding import closeness, give_way
+from app.sim.people.kernels.yielding import closeness, lean_away
 from app.sim.primitives.kernels import script
 from app.sim.primitives.kernels.primitives import (
+    PrimitiveLibrary,
     SegmentState,
-    Repertoire,
     condition,
-    draw_legs,
+    draw_segments,
     follow,
     law,
 )
@@ -95,7 +95,7 @@ class People(NamedTuple):
     """Places that are cubes; they come first."""
     source: int
     """What the workers' scripts are made of: REACHES or LIBRARY."""
-    repertoire: Repertoire
+    primitive_library: PrimitiveLibrary
     """What they can do, for LIBRARY."""
     tracks: Tracks
     """What workers without a script do."""
@@ -105,11 +105,11 @@ class People(NamedTuple):
     """Chance that a worker is not there in an episode."""
     limits: Vec
     """Lower and upper joint limits of a worker [m, rad], shape (2, 18)."""
-    courtesy: float
+    yielding: float
     """How much the workers give way to the arm, from 0 to 1."""
     pace: float
     """Speed of the workers relative to their scripts."""
-    walkers: WalkerRules
+    walkers: PedestrianRules
     """How the walkers walk."""
     nobody: Vec
     """Posture of a person who stands too far away to matter [m, rad], shape (18,)."""
@@ -133,7 +133,7 @@ class PeopleState(NamedTuple):
     near: Vec
     """Each worker's distance to the robot as the contact test last saw it [m], (n_envs, W)."""
     lean: Vec
-    """How far each worker leans away, ``courtesy.give_way`` [rad, rad/s], (n_envs, W, 4)."""
+    """How far each worker leans away, ``yielding.lean_away`` [rad, rad/s], (n_envs, W, 4)."""
     track: NDArray[np.int64]
     """Track of each worker, SCRIPTED or ABSENT, shape (n_envs, W)."""
     legs: SegmentState
@@ -148,13 +148,13 @@ class PeopleState(NamedTuple):
     """Duration of each move [s], shape (n_envs, W, MAX_MOVES)."""
     chosen: NDArray[np.int64]
     """Postures of the scripts, shape (n_envs, W, MAX_MOVES + 1)."""
-    walkers: WalkerState
+    walkers: PedestrianState
     """The walkers, rows (n_envs, C)."""
     cylinders: Vec
     """The walkers' x, y and radius at this moment [m], shape (n_envs, C, 3)."""
 
 
-class Crowd(NamedTuple):
+class PeopleGeometry(NamedTuple):
     """Work space of one pose of all people; made once, filled again and again."""
 
     q: Vec
@@ -195,9 +195,9 @@ class Crowd(NamedTuple):
     """Clearances there [m], shape (DEEPEST, 3)."""
 
 
-def new_crowd(people: People, n_workers: int, n_walkers: int) -> Crowd:
+def new_people_geometry(people: People, n_workers: int, n_pedestrians: int) -> PeopleGeometry:
     """Return work space, not placed yet."""
-    return Crowd(
+    return PeopleGeometry(
         np.empty((n_workers, 18)),
         np.tile(people.bodies[0], (n_workers, 1)),
         np.zeros((2, n_workers)),
@@ -206,9 +206,9 @@ def new_crowd(people: People, n_workers: int, n_walkers: int) -> Crowd:
         np.empty((3, 16)),
         people.columns.copy(),
         np.empty(people.columns.shape[1]),
-        np.empty((n_walkers, 3)),
+        np.empty((n_pedestrians, 3)),
         np.empty((n_workers, 18)),
-        np.empty((n_walkers, 3)),
+        np.empty((n_pedestrians, 3)),
         np.empty(6),
         np.empty(36),
         np.empty(18),
@@ -220,7 +220,7 @@ def new_crowd(people: People, n_workers: int, n_walkers: int) -> Crowd:
 
 
 @kernel(inline="always")
-def place_workers(people: People, q: Vec, crowd: Crowd) -> None:
+def place_workers(people: People, q: Vec, crowd: PeopleGeometry) -> None:
     """Fill the capsules of ``crowd`` for the workers' joints [m, rad], shape (W, 18).
 
     Their sizes are those of ``crowd.size``.
@@ -233,7 +233,7 @@ def place_workers(people: People, q: Vec, crowd: Crowd) -> None:
 
 
 @kernel(inline="always")
-def people_clearance(people: People, robot: Vec, crowd: Crowd) -> float:
+def people_clearance(people: People, robot: Vec, crowd: PeopleGeometry) -> float:
     """Return the distance of robot and nearest person [m]; FAR where there is nobody.
 
     Args:
@@ -305,7 +305,7 @@ def worker_at(
     if people.source == REACHES:
         script.move_at(when, start[move], duration[move], before, after, rate, q, qd)
         return
-    legs, shared = state.legs, people.repertoire
+    legs, shared = state.legs, people.primitive_library
     weights = legs.weights[e, w]
     if legs.ready[e, w] != move:
         sample, gain = legs.sample[e, w, move], shared.gain[legs.primitive[e, w, move]]
@@ -353,12 +353,14 @@ def _draw_work(people: People, state: PeopleState, e: int, w: int, rng: random.S
         who = span[2] if span[2] >= 0 else who
     elif people.source == LIBRARY:
         legs = state.legs
-        state.n_moves[e, w] = draw_legs(
-            rng, people.repertoire, people.of_station[who], people.n_cubes, -1,
+        state.n_moves[e, w] = draw_segments(
+            rng, people.primitive_library, people.of_station[who], people.n_cubes, -1,
             state.start[e, w], state.duration[e, w], state.chosen[e, w],
             legs.primitive[e, w], legs.sample[e, w], legs.stop[e, w],
         )  # fmt: skip
-        state.clock[e, w] = 12.0 * random.uniform(rng) if people.repertoire.varied else 0.0
+        state.clock[e, w] = (
+            12.0 * random.uniform(rng) if people.primitive_library.varied else 0.0
+        )
         legs.ready[e, w] = -1
     else:
         state.n_moves[e, w] = script.draw_script(
@@ -374,14 +376,14 @@ def _draw_work(people: People, state: PeopleState, e: int, w: int, rng: random.S
 
 @kernel()
 def start_people(
-    people: People, state: PeopleState, e: int, rng: random.State, crowd: Crowd
+    people: People, state: PeopleState, e: int, rng: random.State, crowd: PeopleGeometry
 ) -> None:
     """Draw an episode of all people of environment ``e`` and place them."""
     for w in range(state.q.shape[1]):
         _draw_work(people, state, e, w, rng)
         worker_at(people, state, e, w, state.clock[e, w], people.pace, crowd.away)
     for k in range(state.cylinders.shape[1]):
-        start_walker(people.walkers, state.walkers, e, k, rng)
+        start_pedestrian(people.walkers, state.walkers, e, k, rng)
         _keep_cylinder(state, e, k)
     place_people(people, state, e, crowd)
 
@@ -401,22 +403,22 @@ def advance_people(
         away: Work space, shape (36,).
     """
     for w in range(state.q.shape[1]):
-        strength = people.courtesy * closeness(state.near[e, w])
+        strength = people.yielding * closeness(state.near[e, w])
         rate = people.pace * (1.0 - strength)
         state.clock[e, w] += rate * dt
         worker_at(people, state, e, w, state.clock[e, w], rate, away)
-        if people.courtesy > 0.0:
-            give_way(
+        if people.yielding > 0.0:
+            lean_away(
                 state.q[e, w], state.qd[e, w], state.lean[e, w], strength, robot,
                 people.limits[0], people.limits[1], dt,
             )  # fmt: skip
     for k in range(state.cylinders.shape[1]):
-        advance_walker(people.walkers, state.walkers, e, k, dt)
+        advance_pedestrian(people.walkers, state.walkers, e, k, dt)
         _keep_cylinder(state, e, k)
 
 
 @kernel(inline="always")
-def keep_distances(state: PeopleState, e: int, crowd: Crowd) -> None:
+def keep_distances(state: PeopleState, e: int, crowd: PeopleGeometry) -> None:
     """Remember how near each worker of environment ``e`` came, from ``crowd.gap``."""
     for w in range(state.q.shape[1]):
         part = crowd.gap[w * body.N_CAPSULES : (w + 1) * body.N_CAPSULES]
@@ -431,7 +433,7 @@ def _keep_cylinder(state: PeopleState, e: int, k: int) -> None:
 
 
 @kernel(inline="always")
-def place_people(people: People, state: PeopleState, e: int, crowd: Crowd) -> None:
+def place_people(people: People, state: PeopleState, e: int, crowd: PeopleGeometry) -> None:
     """Fill ``crowd`` with the people of environment ``e`` as they are now."""
     copy_rows(state.size[e], crowd.size)
     place_workers(people, state.q[e], crowd)
@@ -439,7 +441,7 @@ def place_people(people: People, state: PeopleState, e: int, crowd: Crowd) -> No
 
 
 @kernel()
-def person_clearance(people: People, robot: Vec, crowd: Crowd, who: int) -> float:
+def person_clearance(people: People, robot: Vec, crowd: PeopleGeometry, who: int) -> float:
     """Return the distance of robot and one person [m]: workers first, then walkers.
 
     Args:
@@ -457,7 +459,7 @@ def person_clearance(people: People, robot: Vec, crowd: Crowd, who: int) -> floa
 
 
 @kernel()
-def nearest_person(people: People, robot: Vec, crowd: Crowd) -> int:
+def nearest_person(people: People, robot: Vec, crowd: PeopleGeometry) -> int:
     """Return the person nearest to the robot: workers first, then walkers; -1 for nobody.
 
     Args:
@@ -465,13 +467,13 @@ def nearest_person(people: People, robot: Vec, crowd: Crowd) -> int:
         robot: The robot's capsules as columns, shape (9, n).
         crowd: The people, placed.
     """
-    n_workers, n_walkers = crowd.q.shape[0], crowd.cylinders.shape[0]
-    if n_workers + n_walkers < 2:
-        return int(n_workers + n_walkers - 1)
+    n_workers, n_pedestrians = crowd.q.shape[0], crowd.cylinders.shape[0]
+    if n_workers + n_pedestrians < 2:
+        return int(n_workers + n_pedestrians - 1)
     best, nearest = FAR, 0
     if n_workers > 0:
         capsule_clearances(robot, crowd.columns, crowd.gap)
-    for who in range(n_workers + n_walkers):
+    for who in range(n_workers + n_pedestrians):
         d = person_clearance(people, robot, crowd, who)
         if d < best:
             best, nearest = d, who
@@ -479,7 +481,9 @@ def nearest_person(people: People, robot: Vec, crowd: Crowd) -> int:
 
 
 @kernel(inline="always")
-def see_nearest(people: People, state: PeopleState, e: int, robot: Vec, crowd: Crowd) -> None:
+def see_nearest(
+    people: People, state: PeopleState, e: int, robot: Vec, crowd: PeopleGeometry
+) -> None:
     """Write the nearest person of environment ``e`` into ``crowd.seen_q``, ``_qd``, ``_size``.
 
     A walker is seen as a person who stands in the cylinder, facing the robot's base; nobody, as
@@ -514,7 +518,7 @@ def see_rows(
     state: PeopleState,
     robots: Vec,
     rows: NDArray[np.int64],
-    crowd: Crowd,
+    crowd: PeopleGeometry,
     q: Vec,
     qd: Vec,
     size: Vec,
@@ -549,7 +553,7 @@ def record_palms(
     rng: random.State,
     robot: Vec,
     dt: float,
-    crowd: Crowd,
+    crowd: PeopleGeometry,
     palms: Vec,
 ) -> None:
     """Write where the workers' palms are over a time that begins like an episode.

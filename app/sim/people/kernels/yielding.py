@@ -1,7 +1,7 @@
 """A person who gives way to the arm: slows and leans away as it comes close, compiled.
 
 With clearance ``d`` between person and robot, closeness is ``u = (D_SLOW - d) / (D_SLOW -
-D_STOP)`` in [0, 1]. A person of courtesy ``k`` goes through its work at ``1 - k u`` of its pace
+D_STOP)`` in [0, 1]. A person of yielding ``k`` goes through its work at ``1 - k u`` of its pace
 and leans its trunk away from the tool by ``k u LEAN``, with a first-order lag of ``LAG``.
 Courtesy 0 is the source's person, who sees no robot; 1 stands still at ``D_STOP``.
 
@@ -37,7 +37,7 @@ def closeness(distance: float) -> float:
 
 
 @kernel(error_model="numpy")
-def give_way(
+def lean_away(
     q: Vec, qd: Vec, lean: Vec, strength: float, robot: Vec, q_min: Vec, q_max: Vec, dt: float
 ) -> None:
     """Lean a person away from the robot's tool.

@@ -15,10 +15,10 @@ from app.sim.core.jit import kernel
 from app.sim.core.kernels import rng as random
 from app.sim.geometry.capsules import copy_values
 from app.sim.people.kernels.people import (
-    Crowd,
     People,
+    PeopleGeometry,
     PeopleState,
-    new_crowd,
+    new_people_geometry,
     place_people,
     see_nearest,
     start_people,
@@ -139,7 +139,7 @@ class Work(NamedTuple):
 
     robot: RobotPose
     """A pose of the robot."""
-    crowd: Crowd
+    crowd: PeopleGeometry
     """A pose of the people."""
     sight: Sight
     """What an observation looks at."""
@@ -162,7 +162,7 @@ def new_work(world: PickWorld, state: PickState) -> Work:
     people = state.people
     return Work(
         new_robot_pose(world.arm),
-        new_crowd(world.people, people.q.shape[1], people.cylinders.shape[1]),
+        new_people_geometry(world.people, people.q.shape[1], people.cylinders.shape[1]),
         new_sight(),
         np.zeros(6),
         np.zeros(6),

@@ -1,6 +1,6 @@
 """What a walker's radius and way will be, from how they went so far, compiled.
 
-Radius and speed change by sums of sines (``occupancy.py``) whose constants nobody is told, but
+Radius and speed change by sums of sines (``pedestrian.py``) whose constants nobody is told, but
 who has watched for a second and a half can tell how they go on. Two small networks say that:
 one from the radii remembered, one from the speeds. They know nothing of where a person turns.
 

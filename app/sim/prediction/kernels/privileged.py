@@ -8,12 +8,12 @@ from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
 from app.sim.people.kernels.pedestrian import (
     N_STATE,
+    PedestrianRules,
+    PedestrianState,
     R,
-    WalkerRules,
-    WalkerState,
     X,
     Y,
-    advance_walker,
+    advance_pedestrian,
 )
 
 AHEAD_S = (0.25, 0.5, 1.0, 2.0)
@@ -24,7 +24,7 @@ N_AHEAD = 3 * len(AHEAD_S)
 
 @kernel(nogil=True)
 def look_ahead_of_walkers(
-    rules: WalkerRules, state: WalkerState, copy: WalkerState, dt: float, out: Vec
+    rules: PedestrianRules, state: PedestrianState, copy: PedestrianState, dt: float, out: Vec
 ) -> None:
     """Write where all walkers will be.
 
@@ -44,7 +44,7 @@ def look_ahead_of_walkers(
             for ahead in AHEAD_S:
                 until = round(ahead / dt)
                 while done < until:
-                    advance_walker(rules, copy, e, p, dt)
+                    advance_pedestrian(rules, copy, e, p, dt)
                     done += 1
                 out[e, k] = copy.rows[e, p, X] - state.rows[e, p, X]
                 out[e, k + 1] = copy.rows[e, p, Y] - state.rows[e, p, Y]

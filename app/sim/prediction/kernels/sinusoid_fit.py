@@ -1,6 +1,6 @@
 """The function behind what was seen of a walker, where it can be told, compiled.
 
-Radius and speed of a walker are sums of three sines (``occupancy.py``) of five constants. Who
+Radius and speed of a walker are sums of three sines (``pedestrian.py``) of five constants. Who
 remembers some moments knows them: the frequency is looked for on a grid, with the six factors
 of sines and cosines by least squares; from the best ones Levenberg's method finds all five
 constants together. Moments at a limit only say that the function is beyond it.

@@ -33,7 +33,7 @@ N_BASIS = 12
 """Gaussians per joint; those of ``promp.N_BASIS``."""
 WIDTH = 0.7 / (N_BASIS - 1)
 """Their width [phase]; that of ``promp.usual_width``."""
-SHORTEST_LEG = 0.35
+SHORTEST_SEGMENT = 0.35
 """Least duration of a leg [s]."""
 P_STOP = 0.15
 """Chance of a pause on the way of a leg."""
@@ -44,7 +44,7 @@ _SCALE = np.exp(-0.5 * (np.linspace(0.0, 1.0, N_BASIS) / WIDTH) ** 2)
 _SCALE.setflags(write=False)
 
 
-class Repertoire(NamedTuple):
+class PrimitiveLibrary(NamedTuple):
     """What all workers of a cell can do."""
 
     samples: Vec
@@ -76,15 +76,15 @@ class SegmentState(NamedTuple):
     """The leg these weights are of, -1 for none, shape (n_envs, W)."""
 
 
-def no_repertoire() -> Repertoire:
-    """Return the repertoire of workers who use none.
+def empty_primitive_library() -> PrimitiveLibrary:
+    """Return the primitive_library of workers who use none.
 
     Its samples are read-only, like a library's: all that kernels are handed is then of one
     type, and they are compiled once.
     """
     samples = np.zeros((1, 18, N_BASIS))
     samples.setflags(write=False)
-    return Repertoire(
+    return PrimitiveLibrary(
         samples=samples,
         gain=np.zeros((1, 18 * N_BASIS, 36)),
         legs=np.full((1, 1, 2, 3), -1, dtype=np.int64),
@@ -93,7 +93,7 @@ def no_repertoire() -> Repertoire:
     )
 
 
-def new_legs(n_envs: int, n_workers: int) -> SegmentState:
+def new_segment_state(n_envs: int, n_workers: int) -> SegmentState:
     """Return rows for the legs of workers, no script drawn yet."""
     return SegmentState(
         primitive=np.zeros((n_envs, n_workers, MAX_MOVES), dtype=np.int64),
@@ -200,9 +200,9 @@ def law(t: float, duration: float, stop_at: float, stop_s: float) -> tuple[float
 
 
 @kernel()
-def draw_legs(
+def draw_segments(
     rng: State,
-    repertoire: Repertoire,
+    primitive_library: PrimitiveLibrary,
     of_station: Index,
     n_cubes: int,
     first: int,
@@ -217,7 +217,7 @@ def draw_legs(
 
     Args:
         rng: Random stream.
-        repertoire: What the worker can do.
+        primitive_library: What the worker can do.
         of_station: First posture and count of each place and hand, shape (n + 1, 2, 2).
         n_cubes: Number of cubes; they come first among the places.
         first: Posture to start from, one at home; -1 draws one.
@@ -231,7 +231,7 @@ def draw_legs(
     Returns:
         Number of legs; the last one ends at home.
     """
-    home, varied = of_station.shape[0] - 1, repertoire.varied
+    home, varied = of_station.shape[0] - 1, primitive_library.varied
     chosen[0] = first if first >= 0 else draw_posture(rng, of_station, home, 0)
     place, hand, at_cube = home, 0, False
     t, n = 0.2 + 1.5 * uniform(rng) if varied else 0.5, 0
@@ -251,12 +251,12 @@ def draw_legs(
                 then = below(rng, n_cubes)
                 if not at_cube:
                     then = n_cubes + below(rng, home - n_cubes)
-            row = repertoire.legs[place, then, hand]
+            row = primitive_library.legs[place, then, hand]
             primitive[n] = row[0]
             sample[n] = row[1] + below(rng, row[2])
             chosen[n + 1] = draw_posture(rng, of_station, then, hand)
             start[n] = t
-            duration[n] = _draw_duration(rng, repertoire, row[0])
+            duration[n] = _draw_duration(rng, primitive_library, row[0])
             stop[n, 0], stop[n, 1] = 0.0, 0.0
             if varied and uniform(rng) < P_STOP:
                 stop[n, 0] = 0.25 + 0.5 * uniform(rng)
@@ -269,8 +269,11 @@ def draw_legs(
 
 
 @kernel()
-def _draw_duration(rng: State, repertoire: Repertoire, primitive: int) -> float:
+def _draw_duration(rng: State, primitive_library: PrimitiveLibrary, primitive: int) -> float:
     """Draw a leg's duration [s], log-normal, no draw beyond two standard deviations."""
-    mean, spread = repertoire.duration[primitive, 0], repertoire.duration[primitive, 1]
-    away = min(2.0, max(-2.0, normal(rng))) if repertoire.varied else 0.0
-    return max(SHORTEST_LEG, math.exp(mean + spread * away))
+    mean, spread = (
+        primitive_library.duration[primitive, 0],
+        primitive_library.duration[primitive, 1],
+    )
+    away = min(2.0, max(-2.0, normal(rng))) if primitive_library.varied else 0.0
+    return max(SHORTEST_SEGMENT, math.exp(mean + spread * away))

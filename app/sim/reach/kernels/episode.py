@@ -16,10 +16,10 @@ from app.sim.core.jit import kernel
 from app.sim.core.kernels import rng as random
 from app.sim.geometry.capsules import copy_values
 from app.sim.people.kernels.people import (
-    Crowd,
     People,
+    PeopleGeometry,
     PeopleState,
-    new_crowd,
+    new_people_geometry,
     people_clearance,
     start_people,
 )
@@ -114,7 +114,7 @@ class Work(NamedTuple):
 
     robot: RobotPose
     """A pose of the robot."""
-    crowd: Crowd
+    crowd: PeopleGeometry
     """A pose of the people."""
     sight: ReachSight
     """What an observation looks at."""
@@ -139,7 +139,7 @@ def new_work(world: ReachWorld, state: ReachState, forecaster: Forecaster) -> Wo
     people = state.people
     return Work(
         new_robot_pose(world.arm),
-        new_crowd(world.people, people.q.shape[1], people.cylinders.shape[1]),
+        new_people_geometry(world.people, people.q.shape[1], people.cylinders.shape[1]),
         new_reach_sight(world.arm),
         new_ways(world.arm, forecaster),
         np.zeros(6),

@@ -30,7 +30,7 @@ from app.sim.human.kernels import kinematics as body
 from app.sim.people.kernels.pedestrian import GROWTH, VX, VY, R
 from app.sim.people.kernels.pedestrian import X as WALKER_X
 from app.sim.people.kernels.pedestrian import Y as WALKER_Y
-from app.sim.people.kernels.people import Crowd, People, PeopleState
+from app.sim.people.kernels.people import People, PeopleGeometry, PeopleState
 from app.sim.pick.kernels.observation import HORIZONS, Sight, look_ahead, new_sight, see_person
 from app.sim.reach.kernels import base_controller as reach_prospect
 from app.sim.reach.kernels.base_controller import Prospect, new_prospect, put_prospect
@@ -126,7 +126,7 @@ def enclosing_radius(columns: Vec, first: int, n: int, x: float, y: float) -> fl
 
 
 @kernel(inline="always")
-def show_person(state: PeopleState, e: int, who: int, crowd: Crowd, seen: Vec) -> None:
+def show_person(state: PeopleState, e: int, who: int, crowd: PeopleGeometry, seen: Vec) -> None:
     """Write one person of environment ``e`` as a cylinder.
 
     Args:

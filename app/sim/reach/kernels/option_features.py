@@ -23,7 +23,7 @@ from app.sim.geometry.capsules import copy_values
 from app.sim.geometry.cylinder import cylinder_clearance
 from app.sim.geometry.segments import FAR
 from app.sim.people.kernels.pedestrian import AGE, N_PAST, PAST_RADIUS, PAST_SPEED
-from app.sim.people.kernels.people import MAX_PEOPLE, Crowd, PeopleState
+from app.sim.people.kernels.people import MAX_PEOPLE, PeopleGeometry, PeopleState
 from app.sim.prediction.kernels.networks import N_TIMES, STEP_S, Forecaster, forecast
 from app.sim.reach.kernels.base_controller import Prospect, base_motion
 from app.sim.reach.kernels.observation import EVERYBODY, N_SEEN, Obs, show_person
@@ -107,7 +107,9 @@ def new_ways(arm: Arm, forecaster: Forecaster) -> Ways:
 
 
 @kernel()
-def foresee(state: PeopleState, e: int, who: int, seen: int, crowd: Crowd, ways: Ways) -> None:
+def foresee(
+    state: PeopleState, e: int, who: int, seen: int, crowd: PeopleGeometry, ways: Ways
+) -> None:
     """Fill ``ways.now``, ``ahead`` and ``number`` with everybody who counts.
 
     Args:

@@ -18,7 +18,7 @@ from app.sim.cells.cell import Cell
 from app.sim.collision.checker import Shapes
 from app.sim.core.arrays import Vec
 from app.sim.people.kernels.pedestrian import GROWTH, VX, VY
-from app.sim.people.kernels.people import new_crowd
+from app.sim.people.kernels.people import new_people_geometry
 from app.sim.reach.batch import ReachBatch, ReachSettings
 from app.sim.reach.monitored.kernels import step as guarded_reach
 from app.sim.reach.monitored.kernels.step import (
@@ -137,7 +137,7 @@ class GuardedReach(ReachBatch):
                 self.arm,
                 people,
                 new_people_state(self.cell, people, 1),
-                new_crowd(people, len(self.cell.workers), len(self.cell.cylinders)),
+                new_people_geometry(people, len(self.cell.workers), len(self.cell.cylinders)),
                 (
                     watch.new_ssm_workspace(self.arm, *shape),
                     watch.new_ssm_workspace(self.arm, *shape),

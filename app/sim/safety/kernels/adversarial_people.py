@@ -36,8 +36,14 @@ from app.sim.geometry.capsules import (
 )
 from app.sim.geometry.segments import segment_nearest
 from app.sim.human.kernels import kinematics as body
-from app.sim.people.kernels.pedestrian import R, advance_walker
-from app.sim.people.kernels.people import Crowd, People, PeopleState, place_workers, worker_at
+from app.sim.people.kernels.pedestrian import R, advance_pedestrian
+from app.sim.people.kernels.people import (
+    People,
+    PeopleGeometry,
+    PeopleState,
+    place_workers,
+    worker_at,
+)
 from app.sim.robot.kernels.actions import ActionRule
 from app.sim.robot.kernels.arm import CONTROLLED, Arm
 from app.sim.robot.kernels.joints import JointState
@@ -71,7 +77,7 @@ class TrialWorkspace(NamedTuple):
 
     state: PeopleState
     """Scripts and walks, one row."""
-    crowd: Crowd
+    crowd: PeopleGeometry
     """A pose of the people."""
     columns0: Vec
     """The people's capsules at the start of a period, shape (9, m)."""
@@ -233,7 +239,7 @@ def advance_cylinders(
     most, runs = BELOW * trial.human_speed * dt, mode != SCRIPT and t >= work.plan[2]
     for k in range(work.cylinders0.shape[0]):
         old, new, rows = work.cylinders0[k], work.cylinders1[k], work.state.walkers.rows
-        advance_walker(people.walkers, work.state.walkers, 0, k, dt)
+        advance_pedestrian(people.walkers, work.state.walkers, 0, k, dt)
         for i in range(2):
             new[i] = rows[0, k, i]
         new[2] = rows[0, k, R]
@@ -266,13 +272,13 @@ def new_trial_work(
     arm: Arm,
     people: People,
     state: PeopleState,
-    crowd: Crowd,
+    crowd: PeopleGeometry,
     spaces: tuple[SsmWorkspace, SsmWorkspace],
     n_late: int,
 ) -> TrialWorkspace:
     """Return work space for people of one row of ``state``."""
-    n_workers, n_walkers = state.q.shape[1], state.cylinders.shape[1]
-    columns, cylinders = people.columns, np.zeros((n_walkers, 4))
+    n_workers, n_pedestrians = state.q.shape[1], state.cylinders.shape[1]
+    columns, cylinders = people.columns, np.zeros((n_pedestrians, 4))
     return TrialWorkspace(
         state=state,
         crowd=crowd,

@@ -12,8 +12,8 @@ from app.sim.core.jit import kernel
 from app.sim.geometry.capsules import copy_rows
 from app.sim.human.kernels.kinematics import PELVIS_Z
 from app.sim.people.kernels.people import (
-    Crowd,
     People,
+    PeopleGeometry,
     PeopleState,
     advance_people,
     keep_distances,
@@ -61,7 +61,7 @@ class Space(Protocol):
     @property
     def robot(self) -> RobotPose: ...  # noqa: D102
     @property
-    def crowd(self) -> Crowd: ...  # noqa: D102
+    def crowd(self) -> PeopleGeometry: ...  # noqa: D102
     @property
     def c(self) -> Vec: ...  # noqa: D102
     @property
@@ -127,7 +127,7 @@ def move(
     if kind != NO_CONTACT:
         place_robot(arm, work.q, robot)
         place_people(everybody, people, e, crowd)
-    if everybody.courtesy > 0.0:
+    if everybody.yielding > 0.0:
         keep_distances(people, e, crowd)
     copy_capsules(robot.columns, state.robot[e])
     copy_capsules(crowd.columns, people.columns[e])

@@ -11,12 +11,12 @@ from app.sim.cells.cell import load_cell
 from app.sim.collision.contact import clearance
 from app.sim.human import model as human
 from app.sim.human.anthropometry import percentile_body
-from app.sim.people.human_motion_config import WorkSettings, at_the_table
+from app.sim.people.human_motion_config import HumanMotionConfig, at_the_table
 from app.sim.pick.batch import PickBatch, PickSettings
 from tests.sim.recorded_person import working
 from tests.sim.working_people import run_of
 
-NO_WALKERS = np.zeros((0, 3))
+NO_PEDESTRIANS = np.zeros((0, 3))
 
 
 def test_the_nearest_of_several_workers_is_seen_in_their_own_size():
@@ -27,7 +27,12 @@ def test_the_nearest_of_several_workers_is_seen_in_their_own_size():
     for k, e in enumerate(rows):
         gaps = [
             clearance(
-                batch.arm, batch.world.people, batch.state.q[e], q[None], NO_WALKERS, size[None]
+                batch.arm,
+                batch.world.people,
+                batch.state.q[e],
+                q[None],
+                NO_PEDESTRIANS,
+                size[None],
             ).people_m
             for q, size in zip(people.q[e], people.size[e], strict=True)
         ]
@@ -51,7 +56,7 @@ def test_an_angle_beyond_its_limit_is_told_as_the_limit():
     cell, q = load_cell(), working(60)
     q[:, 13], q[:, 3] = 4.0, 0.3
     run = at_the_table(run_of(q), cell)
-    work = WorkSettings(motion="recorded", recorded=(run,))
+    work = HumanMotionConfig(motion="recorded", recorded=(run,))
     batch = PickBatch(cell, 3, 7, PickSettings(work=work))
     batch.reset()
     sight = seen_exactly(batch, np.arange(3))
@@ -67,7 +72,7 @@ def two_sizes():
     settings = PickSettings(
         time_limit_s=usual.time_limit_s,
         people=("worker", "worker"),
-        work=WorkSettings(bodies=bodies),
+        work=HumanMotionConfig(bodies=bodies),
     )
     networks = ValueNetworks(pretrained.load("pick"))
     evaluator = Evaluator(networks, load_cell(), 8, 3, settings)

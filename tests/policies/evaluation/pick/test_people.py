@@ -1,4 +1,4 @@
-"""The protocols of several, courteous and recorded people: rows, people, and what differs."""
+"""The protocols of several, yielding and recorded people: rows, people, and what differs."""
 
 from dataclasses import replace
 
@@ -71,9 +71,9 @@ def test_every_row_is_told_as_soon_as_it_is_known(beside_people, told):
 
 
 def test_courteous_people_touch_a_robot_at_rest_less_often():
-    result = evaluate("pick-courtesy", pretrained.load("pick"), episodes=80, seed=5)
+    result = evaluate("pick-yielding", pretrained.load("pick"), episodes=80, seed=5)
     assert [row["name"] for row in result["results"]] == [
-        "courtesy-0", "courtesy-0.5", "courtesy-1"
+        "yielding-0", "yielding-0.5", "yielding-1"
     ]  # fmt: skip
     touched = [row["touched_at_rest"]["mean"] for row in result["results"]]
     assert touched[0] > touched[2] + 0.05

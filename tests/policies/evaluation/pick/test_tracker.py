@@ -13,7 +13,7 @@ from app.policies.evaluation.registry import evaluate
 from app.policies.inference.task_selection import ValueNetworks
 from app.sim.cells.cell import load_cell
 from app.sim.human import model as human
-from app.sim.perception.keypoint_sensor_model import TrackerSettings
+from app.sim.perception.keypoint_sensor_model import KeypointSensorSettings
 
 N = 6
 
@@ -51,7 +51,7 @@ def test_a_motion_between_two_states_meets_both_and_goes_straight_on_before():
 
 
 def test_an_exact_tracker_without_delay_shows_nearly_the_true_state(evaluator):
-    clean = TrackedRow(tracker=TrackerSettings(latency_s=0.0, noise=0.0, missing=0.0))
+    clean = TrackedRow(tracker=KeypointSensorSettings(latency_s=0.0, noise=0.0, missing=0.0))
     found, _ = misses(evaluator, clean)
     assert np.median(found) < 0.02
 

@@ -6,7 +6,7 @@ import pytest
 from app.policies.evaluation.reach.tracker import ROWS, ThroughTracker, TrackedRow
 from app.sim.cells.cell import load_cell
 from app.sim.people.kernels.pedestrian import VX, VY, R, X, Y
-from app.sim.perception.cylinder_sensor_model import CylinderTrackerSettings
+from app.sim.perception.cylinder_sensor_model import CylinderSensorSettings
 from app.sim.reach.batch import ReachBatch, ReachSettings
 from tests.policies.straight_mover import Straight
 
@@ -52,9 +52,7 @@ def off(watching: Watching, true: np.ndarray) -> float:
 
 
 def test_fast_and_clean_frames_show_people_where_they_are() -> None:
-    perfect = TrackedRow(
-        tracker=CylinderTrackerSettings(rate_hz=50.0, latency_s=0.0, noise=0.0)
-    )
+    perfect = TrackedRow(tracker=CylinderSensorSettings(rate_hz=50.0, latency_s=0.0, noise=0.0))
     watching, true, _ = watched(perfect)
     assert off(watching, true) < 5e-3
 

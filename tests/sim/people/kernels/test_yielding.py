@@ -1,12 +1,12 @@
-"""A courteous person slows and leans away from the tool; one without does not see it."""
+"""A yielding person slows and leans away from the tool; one without does not see it."""
 
 import numpy as np
 import pytest
 
 from app.sim.cells.cell import load_cell
 from app.sim.human import model as human
-from app.sim.people.human_motion_config import WorkSettings
-from app.sim.people.kernels.yielding import D_SLOW, D_STOP, LEAN, closeness, give_way
+from app.sim.people.human_motion_config import HumanMotionConfig
+from app.sim.people.kernels.yielding import D_SLOW, D_STOP, LEAN, closeness, lean_away
 from app.sim.pick.batch import PickBatch, PickSettings
 from app.sim.pick.kernels.observation import LAYOUT
 from app.sim.scenario.kernels.episode import RUNNING
@@ -25,7 +25,7 @@ def leaned(yaw: float, tool: tuple[float, float], seconds: float = 3.0) -> np.nd
     lean, q, qd = np.zeros(4), np.empty(18), np.empty(18)
     for _ in range(int(seconds / DT)):
         q[:], qd[:] = human.rest_posture(0.0, 0.0, yaw), 0.0
-        give_way(q, qd, lean, 1.0, robot_at(*tool), human.Q_MIN, human.Q_MAX, DT)
+        lean_away(q, qd, lean, 1.0, robot_at(*tool), human.Q_MIN, human.Q_MAX, DT)
     return q[3:5]
 
 
@@ -53,9 +53,9 @@ def test_a_lean_grows_smoothly_up_to_its_bound() -> None:
     assert flex[3] == pytest.approx(-LEAN, abs=1e-3)
 
 
-def after(courtesy: float, robot_moves: bool, steps: int = 40) -> tuple[np.ndarray, np.ndarray]:
+def after(yielding: float, robot_moves: bool, steps: int = 40) -> tuple[np.ndarray, np.ndarray]:
     """Joints of the workers after a while, and which episodes have not ended by then."""
-    work = WorkSettings(motion="reaches", courtesy=courtesy)
+    work = HumanMotionConfig(motion="reaches", yielding=yielding)
     batch = PickBatch(load_cell(), 64, 3, PickSettings(work=work))
     act, still = batch.reset()[:, LAYOUT["base"]], np.zeros((64, 5), dtype=np.float32)
     for _ in range(steps):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from app.sim.cells.cell import load_cell
-from app.sim.people.kernels.pedestrian import R, WalkerState, X, Y
+from app.sim.people.kernels.pedestrian import PedestrianState, R, X, Y
 from app.sim.prediction.kernels.privileged import AHEAD_S, N_AHEAD, look_ahead_of_walkers
 from app.sim.reach.batch import ReachBatch, ReachSettings
 
@@ -15,7 +15,7 @@ def test_walkers_go_where_they_were_foreseen(start):
     batch = ReachBatch(load_cell("shared-workspace"), 40, 3, settings)
     batch.reset()
     walkers, dt = batch.state.people.walkers, batch.arm.dt
-    copy = WalkerState(walkers.rows.copy(), walkers.stream.copy())
+    copy = PedestrianState(walkers.rows.copy(), walkers.stream.copy())
     ahead, before = np.zeros((40, 2 * N_AHEAD)), walkers.rows.copy()
     look_ahead_of_walkers(batch.world.people.walkers, walkers, copy, dt, ahead)
     assert np.array_equal(walkers.rows, before)

@@ -6,9 +6,9 @@ import pytest
 from app.sim.core.kernels import rng as random
 from app.sim.primitives.kernels.primitives import (
     N_BASIS,
-    Repertoire,
+    PrimitiveLibrary,
     condition,
-    draw_legs,
+    draw_segments,
     follow,
     law,
 )
@@ -99,7 +99,7 @@ def drawn(seed: int, varied: bool) -> dict[str, np.ndarray]:
                 if kinds[a] != kinds[b]:
                     legs[a, b, hand] = number, 2 * number, 2
                     number += 1
-    repertoire = Repertoire(
+    primitive_library = PrimitiveLibrary(
         np.zeros((2 * number, 18, N_BASIS)),
         np.zeros((number, 216, 36)),
         legs,
@@ -118,7 +118,7 @@ def drawn(seed: int, varied: bool) -> dict[str, np.ndarray]:
         "sample": np.zeros(MAX_MOVES, dtype=np.int64),
         "stop": np.zeros((MAX_MOVES, 2)),
     }
-    moves = draw_legs(rng, repertoire, of_station, 3, -1, *out.values())
+    moves = draw_segments(rng, primitive_library, of_station, 3, -1, *out.values())
     return {**out, "n": np.array(moves), "legs": legs}
 
 
