@@ -16,8 +16,9 @@ class Person:
     size: Vec | None = None
     """Lengths of the body [m], shape (12,) (``BodySize.vector``); None: the cell's person."""
     cylinder: Vec | None = None
-    """x, y and radius [m], shape (3,), of the cylinder that is all that is known of this person
-    (``seen_people.person_from_cylinder``); then distances count to it. None: a body of 18 joints."""
+    """x, y and radius [m], shape (3,), of a person known only as a cylinder
+    (``observed_people.person_from_cylinder``); distances are then to the cylinder. None: a body
+    of 18 joints."""
     top: float | None = None
     """Height of the top of that cylinder [m], as safety layers take it; None: as high as the
     cell's people, or 2 m over the floor."""

@@ -1,9 +1,9 @@
-"""What the workers of a cell do: their motion, sizes and manners, as settings and as data.
+"""Configuration of the workers' motion, body sizes and yielding, and its data for the kernels.
 
-Three sources of motion. ``library``: task primitives (``primitive_library.py``), the usual one;
-``reaches``: the first, synthetic reaches (``reach_script.py``), kept as a variant; ``recorded``:
-imported motion (``motions.py``), placed in the cell. A share of the workers may roam instead
-(``off_task_motion.py``). On top come how large the workers are and how far they give way to the arm.
+Sources of motion: ``library``, movement primitives (``primitive_library.py``), the default;
+``reaches``, synthetic reaches (``reach_script.py``); ``recorded``, imported recordings
+(``mocap/importer.py``), placed in the cell. A share of the workers may show off-task motion
+instead (``off_task_motion.py``).
 """
 
 import math

@@ -4,8 +4,8 @@ A *library* holds many postures per place and hand, with random stance, elbow an
 visits them at random pace with pauses (``primitives/kernels/script.py``). The other hand rests
 at the table's edge while the trunk leans.
 
-``HumanMotionConfig(motion="reaches")`` selects this motion; :func:`reach_script` makes the single
-reaches of the case studies.
+``HumanMotionConfig(motion="reaches")`` selects this motion; :func:`reach_script` makes the
+single reaches of the case studies.
 
 Source: METHOD 3.2 and 3.4. Deviates: the thesis replays motion capture through movement
 primitives; these reaches are synthetic (``primitive_library.py`` has the primitives).

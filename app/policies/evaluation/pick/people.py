@@ -41,7 +41,7 @@ from app.sim.scene.scene import HumanKind
 
 DEFAULT_EPISODES = 1000
 CANDIDATES = (2, 3)
-YIELDING = (0.0, 0.5, 1.0)
+YIELDING_LEVELS = (0.0, 0.5, 1.0)
 """Strengths compared."""
 MAX_RECORDED_S = 36_000
 """Most recorded motion of one evaluation [s]; the tracks of so much are 274 MB."""
@@ -141,7 +141,9 @@ def run_yielding(
     def beside(strength: float) -> PickSettings:
         return replace(usual, work=replace(usual.work, yielding=strength))
 
-    return bench.all({f"yielding-{strength:g}": beside(strength) for strength in YIELDING})
+    return bench.all(
+        {f"yielding-{strength:g}": beside(strength) for strength in YIELDING_LEVELS}
+    )
 
 
 def run_mocap(
