@@ -172,7 +172,7 @@ def run_train(options: argparse.Namespace) -> int:
     from app.policies.configs import presets
     from app.policies.training.train import train
 
-    preset = presets.resolve(options.preset, parsed_sets(options.sets))
+    preset = presets.resolve(options.preset, presets.nested(parsed_sets(options.sets)))
     cell = named_cell(preset.cell, settings)
     options.output.mkdir(parents=True, exist_ok=True)
     torch.set_num_threads(1)

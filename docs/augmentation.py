@@ -38,7 +38,7 @@ from app.policies.checkpoints.checkpoint import Checkpoint, load  # noqa: E402
 from app.policies.checkpoints.trained_cell import cell_of  # noqa: E402
 from app.policies.evaluation.pick import selection_rules as choice_rules  # noqa: E402
 from app.policies.evaluation.pick.episodes import Evaluator, settings_for  # noqa: E402
-from app.policies.inference.task_selection import HYSTERESIS, ValueNetworks  # noqa: E402
+from app.policies.inference.task_selection import HYSTERESIS, ValueNetworks, pick_preset_of  # noqa: E402
 from app.sim.mocap.importer import Motion  # noqa: E402
 from app.sim.people.human_motion_config import at_the_table  # noqa: E402
 from app.sim.pick.batch import PickSettings  # noqa: E402
@@ -63,10 +63,12 @@ def trained(folder: Path, kind: str) -> dict[int, Checkpoint]:
     for path in sorted(folder.glob(f"{kind}-*/policy.json")):
         manifest = json.loads(path.read_text(encoding="utf-8"))
         preset, place = manifest["preset"], path.parent.name
-        if preset["augmentation"] != kind:
-            raise InvalidInput(place, preset["augmentation"], f"must be trained with {kind}")
-        if manifest["step"] < preset["total_steps"]:
-            raise InvalidInput(place, manifest["step"], f"must reach {preset['total_steps']}")
+        augmentation = preset["people"]["augmentation"]
+        total_steps = preset["learning"]["total_steps"]
+        if augmentation != kind:
+            raise InvalidInput(place, augmentation, f"must be trained with {kind}")
+        if manifest["step"] < total_steps:
+            raise InvalidInput(place, manifest["step"], f"must reach {total_steps}")
         tensors = path.with_suffix(".safetensors").read_bytes()
         found[int(manifest["seed"])] = load(manifest, tensors)
     if len(found) < 2:
@@ -97,7 +99,7 @@ def successes(checkpoint: Checkpoint, motions: Sequence[Motion], episodes: int) 
     """Return a policy's rate of success in each test."""
     cell = cell_of(checkpoint.manifest)
     recorded = tuple(at_the_table(motion, cell) for motion in motions)
-    usual = settings_for((2, 3), checkpoint.manifest["preset"])
+    usual = settings_for((2, 3), pick_preset_of(checkpoint))
     networks, rates = ValueNetworks(checkpoint), {}
     for name, settings in tests(usual, recorded).items():
         evaluator = Evaluator(networks, cell, episodes, SEED, settings)

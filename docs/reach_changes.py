@@ -40,25 +40,27 @@ from docs.training_curves import read_if_there, record  # noqa: E402
 
 RESULTS = ROOT / "docs/results/reach-changes.json"
 BASE = "reach-td3"
-SHORT = {"total_steps": 1_280_000, "checkpoint_steps": 1_280_000, "progress_steps": 320_000}
+SHORT = {
+    "learning.total_steps": 1_280_000,
+    "learning.checkpoint_steps": 1_280_000,
+    "learning.progress_steps": 320_000,
+}
 """What all trainings share: 9,800 updates."""
 CHANGES: Mapping[str, Mapping[str, Any]] = {
     BASE: {},
-    "without the straight way": {"actor": "plain"},
-    "without forecasts": {"observation": "features"},
-    "prioritised replay": {"alpha": 0.6},
-    "distributional critics": {"critic": "quantiles"},
-    "five critics": {"n_critics": 5},
-    "twice the width": {"width": 512},
-    "critics that see the future": {"critic_sees": "future"},
-    "no averaged weights": {"ema": 0.0},
-    "an actor's update every other": {"policy_delay": 2},
-    "minibatches of 512": {"batch_size": 512},
-    "one-step returns": {"n_steps": 1},
-    "gamma 0.997": {"gamma": 0.997},
-    "random options": {"option_rate": 0.02},
-    "people start anywhere": {"start": "uniform"},
-    "no normalisation in critics": {"critic_norm": "none"},
+    "without the straight way": {"networks.actor": "plain"},
+    "without forecasts": {"episode.observation": "features"},
+    "prioritised replay": {"learning.alpha": 0.6},
+    "distributional critics": {"networks.critic": "quantiles"},
+    "five critics": {"networks.n_critics": 5},
+    "twice the width": {"networks.width": 512},
+    "no averaged weights": {"learning.ema": 0.0},
+    "an actor's update every other": {"learning.policy_delay": 2},
+    "minibatches of 512": {"learning.batch_size": 512},
+    "one-step returns": {"learning.n_steps": 1},
+    "gamma 0.997": {"learning.gamma": 0.997},
+    "people start anywhere": {"episode.start": "uniform"},
+    "no normalisation in critics": {"networks.critic_norm": "none"},
 }
 """Fields of the preset that each variant changes."""
 PER_TARGET = 50
@@ -74,7 +76,7 @@ def folder_of(root: Path, name: str, seed: int) -> Path:
 
 def policy_of(folder: Path) -> Checkpoint | None:
     """Return the policy of a finished training; None where it is not finished."""
-    return read_if_there(folder / f"step-{SHORT['total_steps']:09d}")
+    return read_if_there(folder / f"step-{SHORT['learning.total_steps']:09d}")
 
 
 def train_missing(root: Path, names: Sequence[str], seeds: Sequence[int]) -> None:
@@ -84,7 +86,8 @@ def train_missing(root: Path, names: Sequence[str], seeds: Sequence[int]) -> Non
             folder = folder_of(root, name, seed)
             if policy_of(folder) is None:
                 shutil.rmtree(folder, ignore_errors=True)
-                record(presets.resolve(BASE, {**SHORT, **CHANGES[name]}), seed, folder)
+                preset = presets.resolve(BASE, presets.nested({**SHORT, **CHANGES[name]}))
+                record(preset, seed, folder)
 
 
 def played(policy: Checkpoint, per_target: int) -> Json:

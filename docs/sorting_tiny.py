@@ -13,7 +13,6 @@ import re
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -26,9 +25,11 @@ sys.path.insert(0, str(ROOT))
 
 from app.machine import describe  # noqa: E402 - the line above lets it be found
 from app.policies.algorithms.dqn import SortingDQN  # noqa: E402
-from app.policies.algorithms.sorting_vecenv import SortingVecEnv  # noqa: E402
+from app.policies.algorithms.vecenv import BatchVecEnv  # noqa: E402
 from app.policies.configs.sorting import SortingPreset  # noqa: E402
+from app.sim.cells.cell import load_cell  # noqa: E402
 from app.sim.core.arrays import Vec  # noqa: E402
+from app.sim.envs.sorting import SortingTask  # noqa: E402
 from app.sim.sorting.batch import (  # noqa: E402
     OUTCOMES,
     SortingBatch,
@@ -175,39 +176,47 @@ def q_learning(model: Model, seed: int) -> Vec:
 
 
 def preset() -> SortingPreset:
-    """Return the project's own recipe at this size: no advice, nobody interferes.
+    """Return ``sorting-e0-dqn`` at this size: no expert labels, no interference.
 
-    Deviates: five updates per step of all tasks, half of the moves at random to the end,
-    one-step returns. Those over several attempts are of the moves that were tried,
-    not of the best ones, and with much exploration their values are too low.
+    Deviates: five updates per step of all environments, half of the moves random to the end,
+    one-step returns. Returns over several attempts are those of the moves that were tried, not
+    of the best ones, so that their values are too low with much exploration.
     """
-    return replace(
-        SortingPreset(),
-        name="sorting-tiny-dqn",
-        total_steps=192_000,
-        n_envs=64,
-        gradient_steps=5,
-        buffer_size=50_000,
-        learning_starts=2_000,
-        lr_end=1e-5,
-        gamma=GAMMA,
-        n_steps=1,
-        width=64,
-        eps_end=0.5,
-        solved_episodes=0.0,
-        disturbed_share=SETTINGS.disturbed_share,
-        even_share=SETTINGS.even_share,
-        human_rate=0.0,
-        random_map_share=0.0,
-    )
+    base = SortingPreset()
+    learning = {
+        "total_steps": 192_000,
+        "n_envs": 64,
+        "gradient_steps": 5,
+        "buffer_size": 50_000,
+        "learning_starts": 2_000,
+        "lr_end": 1e-5,
+        "gamma": GAMMA,
+        "n_steps": 1,
+    }
+    episode = {
+        "solved_episodes": 0.0,
+        "disturbed_share": SETTINGS.disturbed_share,
+        "even_share": SETTINGS.even_share,
+        "random_map_share": 0.0,
+    }
+    groups = {
+        "name": "sorting-tiny-dqn",
+        "learning": base.learning.model_copy(update=learning),
+        "networks": base.networks.model_copy(update={"width": 64}),
+        "exploration": base.exploration.model_copy(update={"eps_end": 0.5}),
+        "episode": base.episode.model_copy(update=episode),
+        "people": base.people.model_copy(update={"human_rate": 0.0}),
+    }
+    return base.model_copy(update=groups)
 
 
 def dqn(model: Model, seed: int) -> Vec:
     """Return the values that the DQN finds."""
     chosen = preset()
-    batch = SortingBatch(SHAPE, FAIL, chosen.n_envs, seed, SETTINGS)
-    learner = SortingDQN(chosen, SortingVecEnv(batch), seed)
-    learner.learn(chosen.total_steps)
+    batch = SortingBatch(SHAPE, FAIL, chosen.learning.n_envs, seed, SETTINGS)
+    env = BatchVecEnv(SortingTask(load_cell("sorting-e0"), batch))
+    learner = SortingDQN(chosen, env, batch, seed)
+    learner.learn(chosen.learning.total_steps)
     obs = torch.as_tensor(np.array([observe(state) for state in model.states]))
     with torch.inference_mode():
         q = learner.q_net(obs).numpy().astype(np.float64)
@@ -299,7 +308,7 @@ def measure(seed: int) -> Json:
         "example_plan": [
             move_text(action) for action in solve(model.states[shown], SHAPE).first
         ],
-        "attempts": {"tabular": TABLE_ENVS * TABLE_STEPS, "DQN": preset().total_steps},
+        "attempts": {"tabular": TABLE_ENVS * TABLE_STEPS, "DQN": preset().learning.total_steps},
         "machine": describe(),
     }
 

@@ -36,7 +36,7 @@ def main() -> None:
     parser.add_argument("--set", action="append", default=[], dest="sets")
     options = parser.parse_args()
     torch.set_num_threads(1)
-    preset = presets.resolve(options.preset, parsed_sets(options.sets))
+    preset = presets.resolve(options.preset, presets.nested(parsed_sets(options.sets)))
     record(preset, options.seed, options.output)
 
 

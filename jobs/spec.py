@@ -1,6 +1,7 @@
 """Job specs: what may be posted, checked in full before anything is queued.
 
-    {"kind": "train", "preset": "pick-td3", "seed": 1, "overrides": {"total_steps": 20000}}
+    {"kind": "train", "preset": "pick-td3", "seed": 1,
+     "overrides": {"learning": {"total_steps": 20480}}}
     {"kind": "evaluate", "protocol": "pick-single", "episodes": 1000, "seed": 11,
      "checkpoint": "pick"}
     {"kind": "evaluate", "protocol": "pick-mocap", "motions": ["wave", "walk"]}
@@ -108,14 +109,14 @@ def new_job(body: Mapping[str, Any]) -> NewJob:
 def _parse_train(body: Mapping[str, Any]) -> TrainSpec:
     overrides = body.get("overrides", {})
     if not isinstance(overrides, Mapping):
-        raise InvalidInput("overrides", overrides, "must be an object of preset fields")
+        raise InvalidInput("overrides", overrides, "must be an object of groups of fields")
     preset = _text(body, "preset", tuple(presets.PRESETS))
     resolved = presets.resolve(preset, overrides)
     return TrainSpec(
         preset=preset,
         seed=_seed(body),
         overrides=overrides,
-        total_steps=resolved.total_steps,
+        total_steps=resolved.learning.total_steps,
     )
 
 

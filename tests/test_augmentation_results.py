@@ -40,7 +40,7 @@ def test_training_that_does_not_count_is_refused(
 ) -> None:
     folder = tmp_path / "sampled-21"
     folder.mkdir()
-    preset = {"augmentation": kind, "total_steps": 1024}
+    preset = {"people": {"augmentation": kind}, "learning": {"total_steps": 1024}}
     manifest = {"seed": 21, "step": step, "preset": preset}
     (folder / "policy.json").write_text(json.dumps(manifest), encoding="utf-8")
     with pytest.raises(InvalidInput, match=rule):

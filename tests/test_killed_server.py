@@ -23,14 +23,16 @@ TRAINING = {
     "preset": "pick-td3",
     "seed": 5,
     "overrides": {
-        "total_steps": 6144,
-        "n_envs": 16,
-        "buffer_size": 2000,
-        "batch_size": 64,
-        "learning_starts": 256,
-        "width": 64,
-        "progress_steps": 256,
-        "checkpoint_steps": 512,
+        "learning": {
+            "total_steps": 6144,
+            "n_envs": 16,
+            "buffer_size": 2000,
+            "batch_size": 64,
+            "learning_starts": 256,
+            "progress_steps": 256,
+            "checkpoint_steps": 512,
+        },
+        "networks": {"width": 64},
     },
 }
 

@@ -8,6 +8,7 @@ from scipy import stats
 
 from app.errors import InvalidInput
 from app.policies.configs import presets
+from app.policies.configs.fields import entries
 from app.policies.evaluation.statistics import wilson
 from docs.augmentation import over_seeds
 from docs.reach_changes import BASE, CHANGES, SHORT, folder_of, measured, row_of, welch
@@ -26,9 +27,10 @@ def run(success: float, *, cpu_min: float) -> dict[str, Any]:
 
 @pytest.mark.parametrize("name", CHANGES)
 def test_a_variant_changes_one_field_of_the_recipe(name: str) -> None:
-    base = presets.resolve(BASE, SHORT)
-    varied = presets.resolve(BASE, {**SHORT, **CHANGES[name]})
-    fields = [one for one in base.__slots__ if getattr(base, one) != getattr(varied, one)]
+    base = presets.resolve(BASE, presets.nested(SHORT))
+    varied = presets.resolve(BASE, presets.nested({**SHORT, **CHANGES[name]}))
+    pairs = zip(entries(base), entries(varied), strict=True)
+    fields = [one.path for one, other in pairs if one.value != other.value]
     assert fields == list(CHANGES[name])
     assert len(fields) == (name != BASE)
 

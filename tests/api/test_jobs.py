@@ -6,7 +6,14 @@ from fastapi.testclient import TestClient
 
 from tests.sim.recorded_person import csv_text, working
 
-TINY = {"total_steps": 1280, "n_envs": 128, "learning_starts": 0, "progress_steps": 128}
+TINY = {
+    "learning": {
+        "total_steps": 1280,
+        "n_envs": 128,
+        "learning_starts": 0,
+        "progress_steps": 128,
+    }
+}
 TRAIN = {"kind": "train", "preset": "pick-td3", "seed": 1}
 
 
@@ -19,11 +26,11 @@ def queued(client: TestClient) -> dict[str, Any]:
 
 
 def test_posted_job_is_accepted_with_its_place(client: TestClient) -> None:
-    answer = client.post("/v1/jobs", json={**TRAIN, "overrides": {"gamma": 0.99}})
+    answer = client.post("/v1/jobs", json={**TRAIN, "overrides": {"learning": {"gamma": 0.99}}})
     job = answer.json()
     assert answer.status_code == 202
     assert answer.headers["location"] == f"/v1/jobs/{job['id']}"
-    assert job["spec"] == {**TRAIN, "overrides": {"gamma": 0.99}}
+    assert job["spec"] == {**TRAIN, "overrides": {"learning": {"gamma": 0.99}}}
     cancelled = client.post(f"/v1/jobs/{job['id']}/cancel")
     assert cancelled.status_code == 202
     assert cancelled.json()["state"] in ("cancelling", "cancelled")
@@ -45,8 +52,8 @@ def test_same_key_never_makes_a_second_job(client: TestClient) -> None:
         ({"kind": "bake"}, "kind"),
         ({"preset": "pick-td4"}, "preset"),
         ({"overrides": {"gama": 0.9}}, "overrides.gama"),
-        ({"overrides": {"gamma": 2.0}}, "overrides.gamma"),
-        ({"overrides": {"gamma": "high"}}, "overrides.gamma"),
+        ({"overrides": {"learning": {"gamma": 2.0}}}, "overrides.learning.gamma"),
+        ({"overrides": {"learning": {"gamma": "high"}}}, "overrides.learning.gamma"),
         ({"seed": -1}, "seed"),
         ({"seed": "1"}, "seed"),
         ({"colour": "red"}, "colour"),
@@ -63,10 +70,10 @@ def test_bad_training_is_refused_by_field(
 
 
 def test_override_that_is_not_finite_is_refused(client: TestClient) -> None:
-    body = '{"kind": "train", "preset": "pick-td3", "overrides": {"gamma": NaN}}'
+    body = '{"kind": "train", "preset": "pick-td3", "overrides": {"learning": {"gamma": NaN}}}'
     answer = client.post("/v1/jobs", content=body, headers={"Content-Type": "application/json"})
     assert answer.status_code == 422
-    assert answer.json()["field"] == "overrides.gamma"
+    assert answer.json()["field"] == "overrides.learning.gamma"
 
 
 @pytest.mark.parametrize(
@@ -171,15 +178,15 @@ def test_stream_of_a_job_can_be_resumed_and_ends_with_it(client: TestClient) -> 
 def test_presets_are_described_for_a_form(client: TestClient) -> None:
     preset = client.get("/v1/presets").json()["items"][0]
     assert preset["name"] == "pick-td3"
-    field = {one["name"]: one for one in preset["fields"]}["total_steps"]
+    field = {one["name"]: one for one in preset["fields"]}["learning.total_steps"]
     assert field["minimum"] <= field["default"] <= field["maximum"]
-    assert field["unit"] and field["help"]
+    assert field["unit"] and field["title"]
 
 
 def test_a_preset_lists_the_names_that_a_choice_takes(client: TestClient) -> None:
     preset = client.get("/v1/presets").json()["items"][0]
     fields = {one["name"]: one for one in preset["fields"]}
-    assert fields["action_bounds"]["choices"] == ["viable", "one-step"]
-    assert fields["action_bounds"]["default"] == "viable"
-    assert fields["action_meaning"]["minimum"] is None
-    assert fields["action_degree"]["choices"] is None
+    assert fields["action.bounds"]["choices"] == ["viable", "one-step"]
+    assert fields["action.bounds"]["default"] == "viable"
+    assert fields["action.meaning"]["minimum"] is None
+    assert fields["action.degree"]["choices"] is None

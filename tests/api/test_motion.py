@@ -56,7 +56,7 @@ def policies(client: TestClient) -> dict[str, str]:
     made = {
         GRID: with_ranges(untrained_reach()),
         BOX: with_ranges(untrained_reach(goals="box")),
-        JERK: untrained_reach(action_degree=3),
+        JERK: untrained_reach(degree=3),
     }
     for alias, one in made.items():
         new = NewCheckpoint(sha256=one.sha256, manifest=one.manifest, tensors=one.tensors)

@@ -13,14 +13,14 @@ from app.store.records import NewCheckpoint
 from tests import workshop
 
 TINY = {
-    "total_steps": 1024,
-    "n_envs": 16,
-    "buffer_size": 2000,
-    "batch_size": 32,
-    "learning_starts": 256,
-    "width": 32,
-    "progress_steps": 256,
-    "checkpoint_steps": 512,
+    "learning.total_steps": 1024,
+    "learning.n_envs": 16,
+    "learning.buffer_size": 2000,
+    "learning.batch_size": 32,
+    "learning.learning_starts": 256,
+    "networks.width": 32,
+    "learning.progress_steps": 256,
+    "learning.checkpoint_steps": 512,
     "cell": "workshop",
 }
 """Nothing is learned by so little; everything is run through."""
@@ -30,7 +30,7 @@ TINY = {
 def checkpoint(client: TestClient) -> str:
     """A policy that was trained in the own cell, in the store of the service."""
     made = train(
-        presets.resolve("pick-td3", TINY),
+        presets.resolve("pick-td3", presets.nested(TINY)),
         seed=2,
         resume=None,
         on_progress=lambda _: None,

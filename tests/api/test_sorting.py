@@ -34,7 +34,9 @@ TASK: dict[str, Any] = {
 @pytest.fixture(scope="module")
 def sorter(client: TestClient) -> str:
     """A policy at the start of its training, in the store of the service."""
-    preset = presets.resolve("sorting-e0-dqn", {"width": 16, "n_envs": 8})
+    preset = presets.resolve(
+        "sorting-e0-dqn", {"networks": {"width": 16}, "learning": {"n_envs": 8}}
+    )
     assert isinstance(preset, SortingPreset)
     made, _ = start(preset, 4, None, load_cell("sorting-e0"))[0].checkpoints()
     new = NewCheckpoint(sha256=made.sha256, manifest=made.manifest, tensors=made.tensors)

@@ -63,15 +63,15 @@ def test_stream_of_a_world_ends_when_it_is_started_anew(address: str) -> None:
 
 
 def test_job_streams_its_curve_without_gap_or_duplicate_and_then_ends(address: str) -> None:
-    overrides = {
+    learning = {
         "total_steps": 1280,
         "progress_steps": 128,
         "checkpoint_steps": 640,
         "buffer_size": 2048,
         "learning_starts": 640,
         "batch_size": 16,
-        "width": 16,
     }
+    overrides = {"learning": learning, "networks": {"width": 16}}
     body = {"kind": "train", "preset": "pick-td3", "seed": 1, "overrides": overrides}
     job = patient_http.post(f"{address}/v1/jobs", json=body).json()["id"]
     with patient_http.stream("GET", f"{address}/v1/jobs/{job}/events") as response:

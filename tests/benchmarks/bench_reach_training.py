@@ -50,12 +50,16 @@ def ours(seed: int) -> tuple[ReachPreset, BaseAlgorithm]:
 def batched(preset: ReachPreset, seed: int) -> Subject:
     """Return the compiled batch; it acts at random."""
     cell, settings = load_cell(preset.cell), reach_training.settings_of(preset)
-    batch = ReachBatch(cell, preset.n_envs, seed, settings)
-    drawn = np.random.default_rng(seed).uniform(-1.0, 1.0, (RECORDED, preset.n_envs, N_ACT))
+    batch = ReachBatch(cell, preset.learning.n_envs, seed, settings)
+    drawn = np.random.default_rng(seed).uniform(
+        -1.0, 1.0, (RECORDED, preset.learning.n_envs, N_ACT)
+    )
     acts = itertools.cycle(drawn.astype(np.float32))
     batch.reset()
     return Subject(
-        name="tandem/reach-env", batch=preset.n_envs, run=lambda: batch.step(next(acts))
+        name="tandem/reach-env",
+        batch=preset.learning.n_envs,
+        run=lambda: batch.step(next(acts)),
     )
 
 
@@ -81,11 +85,11 @@ def main() -> None:
     preset, model = ours(options.seed)
     rows = rates(
         f"tandem/{PRESET}",
-        preset.n_envs,
+        preset.learning.n_envs,
         model,
-        preset.total_steps,
+        preset.learning.total_steps,
         options,
-        least_updates=preset.actor_frozen_updates,
+        least_updates=preset.learning.actor_frozen_updates,
     )
     for name, kind in (("td3", TD3), ("ddpg", DDPG)):
         stock = kind("MlpPolicy", gymnasium.make(ENV), seed=options.seed, device="cpu")

@@ -43,7 +43,9 @@ def main() -> None:
     options = trainer_arguments(BENCH)
     torch.set_num_threads(1)
     preset, model = ours(options.seed)
-    rows = rates(f"tandem/{PRESET}", preset.n_envs, model, preset.total_steps, options)
+    rows = rates(
+        f"tandem/{PRESET}", preset.learning.n_envs, model, preset.learning.total_steps, options
+    )
     rows += rates(f"sb3-plain/{CELL}", 1, stock(CELL, options.seed), FOR_EVER, options)
     alone = [
         batched("tandem/sorting-e0-env", "sorting-e0", options.seed),

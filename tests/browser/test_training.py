@@ -13,7 +13,7 @@ pytestmark = pytest.mark.browser
 
 GROWTH_MS = 240_000
 """Time for a job to start its process, warm up and report several points [ms]."""
-FINE = {"progress_steps": 5120, "checkpoint_steps": 5120}
+FINE = {"learning": {"progress_steps": 5120, "checkpoint_steps": 5120}}
 """Points and checkpoints close together, so that the curve grows while one looks."""
 
 
@@ -35,8 +35,8 @@ def test_posted_job_appears_and_its_curve_grows(
     open_form(page)
     page.fill("#train-seed", "7")
     page.click("form.train summary")
-    for name, value in FINE.items():
-        page.fill(f"#train-{name}", str(value))
+    for name, value in FINE["learning"].items():
+        page.fill(f"#train-learning-{name}", str(value))
     page.click("form.train button[type=submit]")
     job_id = page.get_attribute(".job.is-open", "data-job")
     page.wait_for_selector("[data-points]", timeout=GROWTH_MS)
@@ -120,7 +120,7 @@ def test_error_of_a_field_stays_while_another_is_edited(open_page: Callable[...,
     page.click("form.train summary")
     page.click("form.train button[type=submit]")
     expect(page.locator("#train-seed-error")).to_be_visible()
-    page.fill("#train-progress_steps", "5120")
+    page.fill("#train-learning-progress_steps", "5120")
     expect(page.locator("#train-seed-error")).to_be_visible()
 
 
@@ -148,8 +148,9 @@ def test_override_out_of_range_is_explained_at_its_field(
     page = open_page(scene=False)
     open_form(page)
     page.evaluate("document.querySelectorAll('form.train details').forEach(d => d.open = true)")
-    page.fill(f"#train-{field['name']}", str(int(field["maximum"]) + 1000))
+    group, name = field["name"].split(".")
+    page.fill(f"#train-{group}-{name}", str(int(field["maximum"]) + 1000))
     page.click("form.train button[type=submit]")
-    expect(page.locator(f"#train-{field['name']}-error")).not_to_be_empty()
+    expect(page.locator(f"#train-{group}-{name}-error")).not_to_be_empty()
     jobs = patient_http.get(f"{server}/v1/jobs").json()["items"]
-    assert all(field["name"] not in job["overrides"] for job in jobs)
+    assert all(name not in job["overrides"].get(group, {}) for job in jobs)

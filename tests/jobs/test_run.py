@@ -9,6 +9,7 @@ import pytest
 
 from app.policies.checkpoints import pretrained
 from app.policies.checkpoints.trained_cell import is_for
+from app.policies.configs.presets import nested
 from app.store import attempts, checkpoints, jobs, metrics
 from app.store.engine import Store
 from app.store.records import NewCheckpoint
@@ -22,14 +23,14 @@ from tests.policies.evaluation.sorting_players import untrained
 from tests.sim.recorded_person import csv_text, working
 
 TINY = {
-    "total_steps": 2048,
-    "n_envs": 8,
-    "progress_steps": 128,
-    "checkpoint_steps": 512,
-    "learning_starts": 512,
-    "buffer_size": 2000,
-    "batch_size": 16,
-    "width": 16,
+    "learning.total_steps": 2048,
+    "learning.n_envs": 8,
+    "learning.progress_steps": 128,
+    "learning.checkpoint_steps": 512,
+    "learning.learning_starts": 512,
+    "learning.buffer_size": 2000,
+    "learning.batch_size": 16,
+    "networks.width": 16,
 }
 """Nothing is learned by so little; everything is run through."""
 
@@ -44,7 +45,12 @@ def supervisor(store: Store, tmp_path: Path) -> Iterator[Supervisor]:
 
 
 def train(store: Store, **overrides: float | str) -> str:
-    body = {"kind": "train", "preset": "pick-td3", "seed": 4, "overrides": TINY | overrides}
+    body = {
+        "kind": "train",
+        "preset": "pick-td3",
+        "seed": 4,
+        "overrides": nested(TINY | overrides),
+    }
     return jobs.create_job(store, new_job(body)).id
 
 
@@ -63,7 +69,9 @@ def test_training_stores_its_curve_and_policies(store: Store) -> None:
 @pytest.mark.usefixtures("supervisor")
 def test_training_in_a_cell_of_one_s_own_gives_a_policy_of_that_cell(store: Store) -> None:
     CellCatalog(store).add(workshop.cell())
-    job = wait_until_final(store, train(store, cell="workshop", total_steps=1024))
+    job = wait_until_final(
+        store, train(store, cell="workshop", **{"learning.total_steps": 1024})
+    )
     assert (job.state, job.error) == ("succeeded", None)
     assert job.result is not None
     record = checkpoints.get_checkpoint(store, job.result["checkpoint"])

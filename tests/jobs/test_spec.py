@@ -9,7 +9,12 @@ from app.policies.configs.presets import PRESETS
 from jobs.spec import MAX_SEED, EvaluateSpec, TrainSpec, new_job, parse_spec
 
 EVALUATE = {"kind": "evaluate", "protocol": "pick-single", "episodes": 10, "seed": 11}
-TRAIN = {"kind": "train", "preset": "pick-td3", "seed": 1, "overrides": {"width": 64}}
+TRAIN = {
+    "kind": "train",
+    "preset": "pick-td3",
+    "seed": 1,
+    "overrides": {"networks": {"width": 64}},
+}
 
 
 def test_training_becomes_a_job_with_its_body_unchanged() -> None:
@@ -18,10 +23,10 @@ def test_training_becomes_a_job_with_its_body_unchanged() -> None:
         "train",
         "pick-td3",
         1,
-        {"width": 64},
+        {"networks": {"width": 64}},
     )
     assert job.spec == TRAIN
-    assert job.total_steps == PRESETS["pick-td3"].total_steps
+    assert job.total_steps == PRESETS["pick-td3"].learning.total_steps
 
 
 def test_seed_and_overrides_may_be_left_out() -> None:
@@ -46,9 +51,13 @@ def test_seed_and_overrides_may_be_left_out() -> None:
         ({"seed": True}, "seed", "must be an integer in"),
         ({"seed": "1"}, "seed", "must be an integer in"),
         ({"overrides": [1]}, "overrides", "must be an object"),
-        ({"overrides": {"wdith": 64}}, "overrides.wdith", "is no field of pick-td3"),
-        ({"overrides": {"width": 7}}, "overrides.width", "must lie in"),
-        ({"overrides": {"gamma": math.nan}}, "overrides.gamma", "must be finite"),
+        ({"overrides": {"wdith": 64}}, "overrides.wdith", "is no field"),
+        ({"overrides": {"networks": {"width": 7}}}, "overrides.networks.width", "must lie in"),
+        (
+            {"overrides": {"learning": {"gamma": math.nan}}},
+            "overrides.learning.gamma",
+            "must be finite",
+        ),
     ],
 )
 def test_bad_training_names_field_and_rule(

@@ -4,21 +4,30 @@ import pytest
 
 from app.policies.configs import presets
 from app.policies.configs.pick import PickPreset
+from app.policies.configs.presets import Preset
 from app.policies.training.progress import Progress
 from app.policies.training.train import train
 
 TINY = {
-    "total_steps": 1536,
-    "n_envs": 16,
-    "buffer_size": 2000,
-    "batch_size": 32,
-    "learning_starts": 256,
-    "actor_frozen_updates": 8,
-    "width": 32,
-    "progress_steps": 256,
-    "checkpoint_steps": 512,
+    "learning.total_steps": 1536,
+    "learning.n_envs": 16,
+    "learning.buffer_size": 2000,
+    "learning.batch_size": 32,
+    "learning.learning_starts": 256,
+    "learning.actor_frozen_updates": 8,
+    "networks.width": 32,
+    "learning.progress_steps": 256,
+    "learning.checkpoint_steps": 512,
 }
 """Overrides that make a training last seconds."""
+
+
+def preset_of(name: str, *fields: dict[str, object]) -> Preset:
+    """Return a preset with fields changed, by dotted names; later changes win."""
+    changed: dict[str, object] = {}
+    for one in fields:
+        changed |= one
+    return presets.resolve(name, presets.nested(changed))
 
 
 class Recorder:
@@ -29,7 +38,7 @@ class Recorder:
         self.checkpoints = []
         self._stop_at = stop_at
 
-    def run(self, preset: PickPreset, resume=None, seed: int = 3):
+    def run(self, preset: Preset, resume=None, seed: int = 3):
         return train(
             preset,
             seed=seed,
@@ -48,7 +57,7 @@ class Recorder:
 
 @pytest.fixture(scope="session")
 def tiny_preset() -> PickPreset:
-    return presets.resolve("pick-td3", TINY)
+    return preset_of("pick-td3", TINY)
 
 
 @pytest.fixture(scope="session")

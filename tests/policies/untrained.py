@@ -1,10 +1,8 @@
-"""Checkpoints for tests of what stands around policies: untrained, or trained otherwise.
+"""Checkpoints for tests of the code around policies: untrained, or with other manifests.
 
-Who looks ahead with an untrained policy finds a contact at every turn, and tries every other
-way: where a test plays episodes so, the shipped policy takes a fraction of the time.
+Rollouts of an untrained policy end in collisions, so that every candidate is simulated; tests
+of episodes with rollouts take a fraction of the time with the shipped policy.
 """
-
-from dataclasses import asdict
 
 import torch
 
@@ -14,11 +12,21 @@ from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.checkpoints.model_state import weights_of
 from app.policies.checkpoints.trained_cell import manifest_fields
 from app.policies.configs import presets
+from app.policies.configs.fields import entries
 from app.policies.configs.reach import ReachPreset
 from app.policies.inference.reach_policy import LAYOUTS
 from app.policies.training.reach import networks_of
 from app.sim.cells.cell import Cell, load_cell
 from app.sim.reach.batch import N_ACT
+
+
+def reach_preset(**overrides: object) -> ReachPreset:
+    """Return ``reach-td3`` with fields changed; they go by their own names, without groups."""
+    paths = {one.path.split(".")[1]: one.path for one in entries(presets.get("reach-td3"))}
+    changed = {paths[name]: value for name, value in overrides.items()}
+    preset = presets.resolve("reach-td3", presets.nested(changed))
+    assert isinstance(preset, ReachPreset)
+    return preset
 
 
 def untrained_reach(seed: int = 0, cell: Cell | None = None, **overrides: object) -> Checkpoint:
@@ -27,27 +35,26 @@ def untrained_reach(seed: int = 0, cell: Cell | None = None, **overrides: object
     Args:
         seed: Seed of its weights.
         cell: Work cell; the preset's own by default.
-        overrides: Fields of the preset, such as ``goals="box"`` or ``width=32``.
+        overrides: Fields of the preset by their own names, such as ``width=32``.
     """
-    preset = presets.resolve("reach-td3", overrides)
-    assert isinstance(preset, ReachPreset)
-    layout = LAYOUTS[preset.observation]
+    preset = reach_preset(**overrides)
+    layout = LAYOUTS[preset.episode.observation]
     n_obs = sum(size for _, size in layout)
     generator = torch.random.get_rng_state()
     torch.manual_seed(seed)
-    actor = networks_of(preset, n_obs, n_obs).actor()
+    actor = networks_of(preset, n_obs).actor()
     with torch.no_grad():
         actor.net[-1].weight.mul_(40.0)
     torch.random.set_rng_state(generator)
     manifest = {
         "format": formats.FORMAT,
         "kind": "policy",
-        "preset": asdict(preset),
+        "preset": preset.model_dump(),
         "seed": seed,
         **manifest_fields(cell or load_cell(preset.cell)),
         "layout": layout,
         "act_size": N_ACT,
-        "width": preset.width,
+        "width": preset.networks.width,
         "step": 0,
         "updates": 0,
         "trained_range": {},
@@ -56,7 +63,8 @@ def untrained_reach(seed: int = 0, cell: Cell | None = None, **overrides: object
 
 
 def shipped_as(**fields: object) -> Checkpoint:
-    """Return the shipped reach policy as if its preset had other fields, such as ``goals``."""
+    """Return the shipped reach policy as if its episodes had other ``fields``."""
     shipped = pretrained.load("reach")
-    preset = shipped.manifest["preset"] | fields
+    preset = shipped.manifest["preset"]
+    preset = {**preset, "episode": preset["episode"] | fields}
     return formats.load({**shipped.manifest, "preset": preset}, shipped.tensors)

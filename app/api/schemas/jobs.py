@@ -22,7 +22,7 @@ class TrainJobCreate(Body):
     preset: str = Field(max_length=64, description="name of GET /v1/presets")
     seed: Seed = Field(0, description="seed of every random stream")
     overrides: dict[str, Any] = Field(
-        default_factory=dict, description="fields of the preset with other values"
+        default_factory=dict, description="fields that differ from the preset, by group"
     )
 
     def to_domain(self) -> NewJob:

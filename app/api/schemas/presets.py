@@ -1,4 +1,4 @@
-"""Presets as the service shows them: what a form needs to ask for their fields."""
+"""Presets with the declarations of their fields, as the training form needs them."""
 
 from collections.abc import Sequence
 from typing import Self
@@ -6,27 +6,47 @@ from typing import Self
 from pydantic import Field
 
 from app.api.schemas.numbers import Answer
-from app.policies.configs.presets import PRESETS, fields
+from app.policies.configs.fields import PresetEntry, entries
+from app.policies.configs.presets import PRESETS
 
 
 class PresetField(Answer):
-    """One value of a preset that an override may change."""
+    """One field of a preset that an override may change."""
 
-    name: str
+    name: str = Field(description="group and field, `learning.gamma`; `cell` has no group")
     type: str = Field(description="int, float or choice")
     default: int | float | str
     minimum: int | float | None = Field(description="null for a choice")
     maximum: int | float | None = Field(description="null for a choice")
-    unit: str = Field(description="empty for a plain number")
-    help: str = Field(description="what it does, for people")
-    choices: Sequence[str] | None = Field(description="what may be chosen; null for a number")
+    unit: str = Field(description="empty for a dimensionless number")
+    title: str = Field(description="label, with the symbol where there is one")
+    help: str = Field(description="what the field does; may be empty")
+    choices: Sequence[str] | None = Field(description="allowed values; null for a number")
+
+    @classmethod
+    def from_entry(cls, entry: PresetEntry) -> Self:
+        """Describe one field."""
+        title, _, text = (entry.info.description or "").partition(": ")
+        low, high = entry.bounds or (None, None)
+        number = "int" if isinstance(entry.value, int) else "float"
+        return cls(
+            name=entry.path,
+            type="choice" if entry.choices else number,
+            default=entry.value,
+            minimum=low,
+            maximum=high,
+            unit=entry.unit,
+            title=title,
+            help=text,
+            choices=entry.choices,
+        )
 
 
 class PresetPublic(Answer):
     """One preset."""
 
     name: str
-    cell: str = Field(description="work cell trained in")
+    cell: str = Field(description="work cell of the training")
     fields: list[PresetField]
 
     @classmethod
@@ -35,14 +55,10 @@ class PresetPublic(Answer):
 
         Args:
             name: Name of the preset.
-            cells: Work cells it can be trained in; a field where there is a choice.
+            cells: Work cells that it can be trained in; a field where there are several.
         """
         own = PRESETS[name].cell
-        keys = PresetField.model_fields
-        listed = [
-            PresetField.model_validate({key: getattr(one, key) for key in keys})
-            for one in fields(name)
-        ]
+        listed = [PresetField.from_entry(one) for one in entries(PRESETS[name])]
         if len(cells) > 1:
             choice = PresetField(
                 name="cell",
@@ -51,7 +67,8 @@ class PresetPublic(Answer):
                 minimum=None,
                 maximum=None,
                 unit="",
-                help="Work cell trained in.",
+                title="Work cell",
+                help="",
                 choices=list(cells),
             )
             listed.insert(0, choice)

@@ -1,15 +1,14 @@
-"""DQN on Stable-Baselines3, with what it lacks added at its extension points.
+"""DQN on Stable-Baselines3, extended at its extension points.
 
-Double Q-learning, dueling networks, prioritised replay with n-step returns in one buffer, masks
-of valid moves in exploration, targets and prediction, and advice: in a part of each minibatch
-the exact planner marks every move that is best in the states met, and a margin loss asks that
-one of them be worth more than all others.
+Double Q-learning, dueling networks, prioritised replay with n-step returns, action masks in
+exploration, targets and prediction, and expert labels: in a part of each minibatch the exact
+planner marks all optimal moves, and a large-margin loss raises one of them above the others.
 
 The double target is ``r + gamma^n Q_target(s', argmax_a Q_online(s', a))``.
 
 Source: van Hasselt, Guez, Silver, *Deep reinforcement learning with double Q-learning* (2016);
 Hester et al., *Deep Q-learning from demonstrations* (2018); METHOD 1.4 with its corrections.
-Deviates: advice marks sets of moves, in the states the learner meets (as in Ross, Gordon,
+Deviates: labels mark sets of moves, in the states that the learner visits (as in Ross, Gordon,
 Bagnell, *A reduction of imitation learning to no-regret online learning*, 2011).
 """
 
@@ -26,19 +25,19 @@ from torch import Tensor
 from torch.nn import functional
 
 from app.policies.algorithms.prioritized_replay import PrioritisedReplay
-from app.policies.algorithms.sorting_vecenv import SortingVecEnv
+from app.policies.algorithms.vecenv import BatchVecEnv
 from app.policies.configs.sorting import SortingPreset
 from app.policies.networks.sorting_q import NETWORKS, NEVER, PrintedNetwork, SharedNetwork
 from app.sim.sorting.batch import SortingBatch
 from app.sim.sorting.state import SortingShape
 
-Adviser = Callable[[NDArray[np.uint8]], NDArray[np.bool_]]
+Expert = Callable[[NDArray[np.uint8]], NDArray[np.bool_]]
 """Marks the best moves of observations, shape (n, obs_size): shape (n, n_actions)."""
 
 
 def network_of(preset: SortingPreset, shape: SortingShape) -> SharedNetwork | PrintedNetwork:
     """Return a new network as a preset describes it."""
-    return NETWORKS[preset.network](shape, preset.width)
+    return NETWORKS[preset.networks.kind](shape, preset.networks.width)
 
 
 class _SB3QNetwork(QNetwork):
@@ -73,59 +72,57 @@ class SortingDQNPolicy(DQNPolicy):
 
 
 class SortingDQN(DQN):
-    """Double, dueling, prioritised, masked DQN that may ask for advice.
+    """Double, dueling, prioritised, masked DQN with optional expert labels.
 
     Args:
         preset: Hyper-parameters.
-        env: The batched task.
+        env: The environments.
+        tasks: Their batch.
         seed: Seed of networks, replay and exploration.
-        adviser: Marks best moves; needed where the preset takes advice.
+        expert: Marks optimal moves; needed where the preset uses labels.
     """
 
     def __init__(
         self,
         preset: SortingPreset,
-        env: SortingVecEnv,
+        env: BatchVecEnv,
+        tasks: SortingBatch,
         seed: int,
-        adviser: Adviser | None = None,
+        expert: Expert | None = None,
     ) -> None:
-        start, end = preset.lr_start, preset.lr_end
-        self.preset, self._tasks, self._adviser = preset, env, adviser
+        learning, exploration = preset.learning, preset.exploration
+        start, end = learning.lr_start, learning.lr_end
+        self.preset, self.tasks, self._expert = preset, tasks, expert
         self._random = np.random.default_rng(seed)
         super().__init__(
             SortingDQNPolicy,
             env,
             learning_rate=lambda remaining: end * (start / end) ** remaining,
-            buffer_size=preset.buffer_size,
-            learning_starts=preset.learning_starts,
-            batch_size=preset.batch_size,
-            gamma=preset.gamma,
+            buffer_size=learning.buffer_size,
+            learning_starts=learning.learning_starts,
+            batch_size=learning.batch_size,
+            gamma=learning.gamma,
             train_freq=1,
-            gradient_steps=preset.gradient_steps,
+            gradient_steps=learning.gradient_steps,
             replay_buffer_class=PrioritisedReplay,
             replay_buffer_kwargs={
-                "n_steps": preset.n_steps,
-                "gamma": preset.gamma,
-                "alpha": preset.alpha,
+                "n_steps": learning.n_steps,
+                "gamma": learning.gamma,
+                "alpha": learning.alpha,
                 "seed": seed,
             },
-            exploration_initial_eps=preset.eps_start,
-            exploration_final_eps=preset.eps_end,
-            exploration_fraction=preset.eps_share,
-            max_grad_norm=preset.max_grad_norm,
+            exploration_initial_eps=exploration.eps_start,
+            exploration_final_eps=exploration.eps_end,
+            exploration_fraction=exploration.eps_share,
+            max_grad_norm=learning.max_grad_norm,
             policy_kwargs={
                 "preset": preset,
-                "shape": env.batch.shape,
+                "shape": tasks.shape,
                 "optimizer_kwargs": {"fused": True},
             },
             seed=seed,
             device="cpu",
         )
-
-    @property
-    def tasks(self) -> SortingBatch:
-        """The tasks it learns on."""
-        return self._tasks.batch
 
     @property
     def memory(self) -> PrioritisedReplay:
@@ -144,8 +141,8 @@ class SortingDQN(DQN):
         n_envs: int = 1,
     ) -> tuple[NDArray[Any], NDArray[Any]]:
         """Act greedily or at random among the moves, row by row."""
-        masked = self.preset.network == "shared"
-        moves = self._tasks.action_masks()
+        masked = self.preset.networks.kind == "shared"
+        moves = self.tasks.masks()
         chance = 1.0 if self.num_timesteps < learning_starts else self.exploration_rate
         at_random = self._random.random(n_envs) < chance
         scores = self._random.random(moves.shape, dtype=np.float32)
@@ -162,11 +159,11 @@ class SortingDQN(DQN):
         self.policy.set_training_mode(True)
         self._update_learning_rate(self.policy.optimizer)
         done = 1.0 - self._current_progress_remaining
-        beta = self.preset.beta + done * (1.0 - self.preset.beta)
+        beta = self.preset.learning.beta + done * (1.0 - self.preset.learning.beta)
         for _ in range(gradient_steps):
             self._update(batch_size, beta)
             self._n_updates += 1
-            if self._n_updates % self.preset.target_every == 0:
+            if self._n_updates % self.preset.learning.target_update_interval == 0:
                 self.q_net_target.load_state_dict(self.q_net.state_dict())
 
     def _update(self, batch_size: int, beta: float) -> None:
@@ -179,11 +176,13 @@ class SortingDQN(DQN):
         taken = values.gather(1, drawn.actions[:, None])[:, 0]
         error = functional.smooth_l1_loss(taken, target, reduction="none")
         loss = (drawn.weights * error).mean()
-        if self._adviser is not None:
-            n = round(self.preset.advice_share * batch_size)
-            best = self._adviser(drawn.observations[:n].numpy())
-            short = margin_loss(values[:n], torch.as_tensor(best), self.preset.advice_margin)
-            loss = loss + self.preset.advice_weight * short
+        if self._expert is not None:
+            n = round(self.preset.expert.share * batch_size)
+            best = self._expert(drawn.observations[:n].numpy())
+            short = large_margin_loss(
+                values[:n], torch.as_tensor(best), self.preset.expert.margin
+            )
+            loss = loss + self.preset.expert.weight * short
         self.policy.optimizer.zero_grad()
         loss.backward()  # type: ignore[no-untyped-call]
         torch.nn.utils.clip_grad_norm_(self.policy.parameters(), self.max_grad_norm)
@@ -192,7 +191,7 @@ class SortingDQN(DQN):
             self.memory.update(drawn.indices, (taken - target).abs().numpy())
 
 
-def margin_loss(values: Tensor, best: Tensor, margin: float) -> Tensor:
+def large_margin_loss(values: Tensor, best: Tensor, margin: float) -> Tensor:
     """Return by how much the best moves fall short of all others by a margin, on average.
 
     Args:

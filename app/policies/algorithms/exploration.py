@@ -1,13 +1,12 @@
-"""Exploration over batched cells: correlated noise on a ladder, and random options.
+"""Exploration in parallel environments: noise with a scale per environment, and options.
 
-Row by row the noise grows from none (the first rows, which act as the policy does) to
-``sigma_max``; it is an AR(1) process, so that motions stay smooth. In every second noisy row,
-now and then an *option* takes over for 4 to 29 steps: hold still, go home, go to a posture
-nearby, go to where another task would be. Options meet people in places the policy alone would
-not seek.
+The scale of the AR(1) noise grows from 0 in the first, greedy environments to ``sigma_max`` in
+the last. In half of the noisy environments a random *option* takes over from time to time, for
+4 to 29 control cycles: hold still, move home, move to a configuration nearby or to that of
+another task. Options reach states near people that the policy alone would not visit.
 
 Deviates: the thesis explores by parameter-space noise (section 5.3.4) and by an
-Ornstein-Uhlenbeck process (table 4.2), which is here too, the same in every row.
+Ornstein-Uhlenbeck process (table 4.2), which is here too.
 """
 
 import math
@@ -16,58 +15,52 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from app.policies.configs.td3 import NoiseExploration
 from app.sim.core.arrays import Vec
 from app.sim.pick.batch import PickBatch
 from app.sim.pick.kernels.observation import BASE_GAIN
-from app.sim.reach.batch import ReachBatch
 
 HOLD, HOME, NEARBY, ELSEWHERE = range(4)
 OPTION_STEPS = (4, 30)
-"""Shortest length of an option and the end of the range."""
+"""Shortest duration of an option and end of the range [control cycles]."""
 
 
-class Explorer(Protocol):
-    """Changes a policy's actions so that other ones are tried."""
+class Exploration(Protocol):
+    """Perturbs the actions of a policy."""
 
     n_greedy: int
-    """Rows without exploration, the first ones."""
+    """Environments without exploration, the first ones."""
 
     def apply(self, act: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return the actions to take, shape (n_envs, n_act), given the policy's."""
+        """Return perturbed actions, shape (n_envs, n_act)."""
 
 
-class LadderNoise:
-    """AR(1) noise whose strength grows with the row; keeps its state between steps.
+class PerEnvAR1Noise:
+    """AR(1) noise whose scale grows with the number of the environment.
 
     Args:
-        n_envs: Rows.
-        n_act: Numbers of an action.
-        dt: Control period [s].
-        sigma_max: Strength in the last row.
-        time_s: Correlation time [s].
-        greedy_share: Share of rows without noise; at least one row.
+        shape: Environments and numbers of an action, (n_envs, n_act).
+        dt: Control cycle [s].
+        config: Largest scale, correlation time and greedy share.
         rng: Random numbers.
     """
 
     def __init__(
         self,
-        n_envs: int,
-        n_act: int,
+        shape: tuple[int, int],
         dt: float,
-        *,
-        sigma_max: float,
-        time_s: float,
-        greedy_share: float,
+        config: NoiseExploration,
         rng: np.random.Generator,
     ) -> None:
-        self.n_greedy = max(1, round(greedy_share * n_envs))
-        ladder = np.geomspace(0.1, 1.0, max(1, n_envs - self.n_greedy)) * sigma_max
-        self._sigma = np.concatenate([np.zeros(self.n_greedy), ladder])[:n_envs, None]
-        self._memory = math.exp(-dt / time_s)
-        self._noise, self._rng = np.zeros((n_envs, n_act)), rng
+        n_envs = shape[0]
+        self.n_greedy = max(1, round(config.greedy_share * n_envs))
+        scales = np.geomspace(0.1, 1.0, max(1, n_envs - self.n_greedy)) * config.sigma_max
+        self._sigma = np.concatenate([np.zeros(self.n_greedy), scales])[:n_envs, None]
+        self._memory = math.exp(-dt / config.noise_time_s)
+        self._noise, self._rng = np.zeros(shape), rng
 
     def apply(self, act: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return the actions to take, shape (n_envs, n_act), given the policy's."""
+        """Return perturbed actions, shape (n_envs, n_act)."""
         fresh = self._rng.standard_normal(self._noise.shape)
         spread = math.sqrt(1.0 - self._memory**2) * self._sigma
         self._noise = self._memory * self._noise + spread * fresh
@@ -78,57 +71,56 @@ class OUNoise:
     """The noise of thesis table 4.2: ``x += theta (0 - x) + sigma N(0, 1)`` per period.
 
     Args:
-        n_envs: Rows; all explore.
-        n_act: Numbers of an action.
-        theta: Pull toward 0 per period.
-        sigma: Strength of the push per period.
+        shape: Environments and numbers of an action, (n_envs, n_act).
+        theta: Rate toward 0 per period.
+        sigma: Scale per period.
         rng: Random numbers.
     """
 
     n_greedy = 0
 
     def __init__(
-        self, n_envs: int, n_act: int, theta: float, sigma: float, rng: np.random.Generator
+        self, shape: tuple[int, int], theta: float, sigma: float, rng: np.random.Generator
     ) -> None:
         self._theta, self._sigma, self._rng = theta, sigma, rng
-        self._noise = np.zeros((n_envs, n_act))
+        self._noise = np.zeros(shape)
 
     def apply(self, act: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return the actions to take, shape (n_envs, n_act), given the policy's."""
+        """Return perturbed actions, shape (n_envs, n_act)."""
         fresh = self._rng.standard_normal(self._noise.shape)
         self._noise += self._sigma * fresh - self._theta * self._noise
         return np.clip(act + self._noise, -1.0, 1.0).astype(np.float32)
 
 
-class OptionNoise:
-    """Ladder noise, and random options in every second noisy row.
+class OptionExploration:
+    """AR(1) noise, and temporally extended options in every second noisy environment.
 
     Args:
         noise: The noise.
-        batch: The cells that are stepped.
-        postures: Where options may lead besides home [rad], shape (n, 6).
-        rate: Chance per period that an option starts.
+        batch: The environments.
+        configurations: Goals of options besides home [rad], shape (n, 6).
+        rate: Probability per control cycle that an option starts.
         rng: Random numbers.
     """
 
     def __init__(
         self,
-        noise: LadderNoise,
-        batch: PickBatch | ReachBatch,
-        postures: Vec,
+        noise: PerEnvAR1Noise,
+        batch: PickBatch,
+        configurations: Vec,
         rate: float,
         rng: np.random.Generator,
     ) -> None:
         self._noise, self._batch, self._rng = noise, batch, rng
-        self._postures, self._rate = postures, rate
+        self._configurations, self._rate = configurations, rate
         self.n_greedy = noise.n_greedy
-        rows = np.arange(batch.n_envs)
-        self._may_option = (rows >= self.n_greedy) & (rows % 2 == 0)
+        envs = np.arange(batch.n_envs)
+        self._may_option = (envs >= self.n_greedy) & (envs % 2 == 0)
         self._left = np.zeros(batch.n_envs, dtype=np.int64)
         self._goal = np.zeros((batch.n_envs, batch.n_act))
 
     def apply(self, act: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return the actions to take, shape (n_envs, n_act), given the policy's."""
+        """Return perturbed actions, shape (n_envs, n_act)."""
         noisy = self._noise.apply(act)
         self._start_options()
         active = self._left > 0
@@ -139,14 +131,13 @@ class OptionNoise:
 
     def _start_options(self) -> None:
         draw = self._rng.random(len(self._left)) < self._rate
-        starting = np.flatnonzero(draw & self._may_option & (self._left == 0))
-        for row in starting:
-            self._goal[row] = self._draw_goal(int(row))
-            self._left[row] = self._rng.integers(*OPTION_STEPS)
+        for env in np.flatnonzero(draw & self._may_option & (self._left == 0)):
+            self._goal[env] = self._draw_goal(int(env))
+            self._left[env] = self._rng.integers(*OPTION_STEPS)
 
-    def _draw_goal(self, row: int) -> Vec:
+    def _draw_goal(self, env: int) -> Vec:
         n = self._batch.n_act
-        q = self._batch.state.q[row, :n]
+        q = self._batch.state.q[env, :n]
         kind = self._rng.integers(4)
         if kind == HOLD:
             return q.copy()
@@ -154,10 +145,10 @@ class OptionNoise:
             return self._batch.arm.home[:n]
         if kind == NEARBY:
             return q + self._rng.normal(0.0, 0.3, n)
-        return self._postures[self._rng.integers(len(self._postures)), :n]
+        return self._configurations[self._rng.integers(len(self._configurations)), :n]
 
     def _toward_goals(self) -> Vec:
         away = self._goal - self._batch.state.q[:, : self._batch.n_act]
         widest = np.maximum(np.abs(away).max(axis=1, keepdims=True), 1e-9)
-        pace = np.minimum(1.0, BASE_GAIN * widest / self._batch.arm.limits.qd_max[0])
-        return np.asarray(away / widest * pace)
+        speed = np.minimum(1.0, BASE_GAIN * widest / self._batch.arm.limits.qd_max[0])
+        return np.asarray(away / widest * speed)

@@ -1,9 +1,8 @@
-"""TD3 on Stable-Baselines3, with what it lacks added at its extension points.
+"""TD3 on Stable-Baselines3, extended at its extension points.
 
-Own networks, exploration over batched rows in place of one action noise, and an actor that may
-stay frozen until the critics mean something. One class serves every scenario that moves the
-arm, and DDPG too: that is TD3 with one critic, no delay and no noise on targets. Replay with
-n-step returns is Stable-Baselines3's own, or ``replay.py`` where it is prioritised.
+Added are own networks, exploration per environment, an actor that is frozen at first, an
+averaged actor and prioritised replay (``replay.py``); uniform replay with n-step returns is
+Stable-Baselines3's. DDPG is TD3 with one critic, no delay and no target noise.
 
 Source: Fujimoto, van Hoof, Meger, *Addressing function approximation error in actor-critic
 methods* (2018); Lillicrap et al., *Continuous control with deep reinforcement learning* (2016);
@@ -13,7 +12,7 @@ thesis sections 2.7.2 and 4.4.
 from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import torch
 from numpy.typing import NDArray
@@ -23,41 +22,11 @@ from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.td3.policies import Actor, TD3Policy
 from torch import Tensor, nn
 
-from app.policies.algorithms.exploration import Explorer
+from app.policies.algorithms.exploration import Exploration
 from app.policies.algorithms.prioritized_replay import Ints, PrioritisedReplay
-from app.policies.algorithms.vecenv import CellVecEnv
+from app.policies.algorithms.vecenv import BatchVecEnv
+from app.policies.configs.td3 import TD3Learning
 from app.policies.networks.actor_critic import Critics
-
-
-class TD3Numbers(Protocol):
-    """The hyper-parameters of TD3; ``PickPreset`` and ``ReachPreset`` say what they are."""
-
-    @property
-    def buffer_size(self) -> int: ...  # noqa: D102
-    @property
-    def batch_size(self) -> int: ...  # noqa: D102
-    @property
-    def learning_starts(self) -> int: ...  # noqa: D102
-    @property
-    def lr_start(self) -> float: ...  # noqa: D102
-    @property
-    def lr_end(self) -> float: ...  # noqa: D102
-    @property
-    def gamma(self) -> float: ...  # noqa: D102
-    @property
-    def n_steps(self) -> int: ...  # noqa: D102
-    @property
-    def tau(self) -> float: ...  # noqa: D102
-    @property
-    def policy_delay(self) -> int: ...  # noqa: D102
-    @property
-    def target_noise(self) -> float: ...  # noqa: D102
-    @property
-    def target_noise_clip(self) -> float: ...  # noqa: D102
-    @property
-    def actor_frozen_updates(self) -> int: ...  # noqa: D102
-    @property
-    def width(self) -> int: ...  # noqa: D102
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,33 +37,14 @@ class Networks:
     """Returns a new actor."""
     critic: Callable[[], Critics]
     """Returns new critics."""
+    width: int
+    """Units per hidden layer."""
     fused: bool = False
-    """Whether Adam's steps are fused: the same formula, rounded otherwise, in less time."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Extras:
-    """What a training may have beyond plain TD3; nothing by default."""
-
-    update_every: int = 1
-    """Vector steps per update."""
-    actor_lr_ratio: float = 1.0
-    """Learning rate of the actor over that of the critics."""
-    alpha: float = 0.0
-    """Exponent of replay priorities; 0 draws evenly."""
-    beta: float = 1.0
-    """Exponent of the importance weights at the start; it grows to 1."""
-    ema: float = 0.0
-    """Share of the actor's averaged weights that one update leaves; 0 keeps none."""
-    bfloat16: bool = False
-    """Whether networks are trained with products in bfloat16; weights stay float32."""
-
-
-PLAIN = Extras()
+    """Whether Adam runs fused: faster, and rounded differently."""
 
 
 class Minibatch(NamedTuple):
-    """What one update learns from, ``B`` n-step transitions."""
+    """Minibatch of ``B`` n-step transitions."""
 
     obs: Tensor
     """(B, obs_size)."""
@@ -103,17 +53,17 @@ class Minibatch(NamedTuple):
     rewards: Tensor
     """Discounted sums of rewards, (B, 1)."""
     next_obs: Tensor
-    """Where the sums end, (B, obs_size)."""
+    """Observations at the end of the sums, (B, obs_size)."""
     discounts: Tensor
-    """What the value there is multiplied by; 0 where the episode ended, (B, 1)."""
+    """Factors of the values there; 0 where the episode ended, (B, 1)."""
     weights: Tensor | None = None
-    """Importance weights, (B, 1); None: all equal."""
+    """Importance weights, (B, 1); None for equal ones."""
     indices: Ints | None = None
-    """Places in a prioritised replay memory, (B,)."""
+    """Places in a prioritised replay buffer, (B,)."""
 
 
 class _SB3Actor(Actor):
-    """Stable-Baselines3's actor with one of ours in place of its own network."""
+    """Stable-Baselines3's actor with another network."""
 
     def __init__(self, *args: Any, networks: Networks, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
@@ -121,7 +71,7 @@ class _SB3Actor(Actor):
 
 
 class _SB3Critic(ContinuousCritic):
-    """Stable-Baselines3's critic with :class:`Critics` in place of its own networks."""
+    """Stable-Baselines3's critic with :class:`Critics` as its networks."""
 
     def __init__(self, *args: Any, networks: Networks, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
@@ -132,58 +82,56 @@ class _SB3Critic(ContinuousCritic):
 
 
 def critics_of(critic: ContinuousCritic) -> Critics:
-    """Return this project's networks inside one of Stable-Baselines3's critics."""
+    """Return the networks inside a critic of Stable-Baselines3."""
     assert isinstance(critic, _SB3Critic)
     return critic.own
 
 
 class OwnPolicy(TD3Policy):
-    """Builds the networks of this project instead of Stable-Baselines3's defaults."""
+    """Policy with the networks of this project."""
 
     def __init__(self, *args: Any, networks: Networks, **kwargs: Any) -> None:
         self._networks = networks
         super().__init__(*args, **kwargs)
 
     def make_actor(self, features_extractor: BaseFeaturesExtractor | None = None) -> Actor:
-        """Return an actor of ours."""
+        """Return an actor with the network of this project."""
         kwargs = self._update_features_extractor(self.actor_kwargs, features_extractor)
         return _SB3Actor(**kwargs, networks=self._networks).to(self.device)
 
     def make_critic(
         self, features_extractor: BaseFeaturesExtractor | None = None
     ) -> ContinuousCritic:
-        """Return critics of ours."""
+        """Return critics with the networks of this project."""
         kwargs = self._update_features_extractor(self.critic_kwargs, features_extractor)
         return _SB3Critic(**kwargs, networks=self._networks).to(self.device)
 
 
 class BatchTD3(TD3):
-    """TD3 with row-wise exploration and a frozen start of the actor.
+    """TD3 with exploration per environment, a frozen start and an averaged actor.
 
     Args:
-        preset: Hyper-parameters.
-        env: The batched scenario.
+        learning: Hyper-parameters.
+        env: The environments.
         seed: Seed of networks and replay.
-        exploration: Changes the actions that are tried.
+        exploration: Perturbs the actions.
         networks: How actor and critics are made.
-        extras: What goes beyond plain TD3.
     """
 
     def __init__(
         self,
-        preset: TD3Numbers,
-        env: CellVecEnv,
+        learning: TD3Learning,
+        env: BatchVecEnv,
         seed: int,
         *,
-        exploration: Explorer,
+        exploration: Exploration,
         networks: Networks,
-        extras: Extras = PLAIN,
     ) -> None:
-        start, end = preset.lr_start, preset.lr_end
-        self.preset, self.exploration, self.extras = preset, exploration, extras
-        replay: dict[str, Any] = {"n_steps": preset.n_steps}
-        if extras.alpha > 0.0:
-            own = {"gamma": preset.gamma, "alpha": extras.alpha, "seed": seed}
+        start, end = learning.lr_start, learning.lr_end
+        self.learning, self.exploration = learning, exploration
+        replay: dict[str, Any] = {"n_steps": learning.n_steps}
+        if learning.alpha > 0.0:
+            own = {"gamma": learning.gamma, "alpha": learning.alpha, "seed": seed}
             replay = {
                 "replay_buffer_class": PrioritisedReplay,
                 "replay_buffer_kwargs": {**replay, **own},
@@ -192,18 +140,18 @@ class BatchTD3(TD3):
             OwnPolicy,
             env,
             learning_rate=lambda remaining: end * (start / end) ** remaining,
-            buffer_size=preset.buffer_size,
-            learning_starts=preset.learning_starts,
-            batch_size=preset.batch_size,
-            tau=preset.tau,
-            gamma=preset.gamma,
+            buffer_size=learning.buffer_size,
+            learning_starts=learning.learning_starts,
+            batch_size=learning.batch_size,
+            tau=learning.tau,
+            gamma=learning.gamma,
             train_freq=1,
             gradient_steps=1,
-            policy_delay=preset.policy_delay,
-            target_policy_noise=preset.target_noise,
-            target_noise_clip=preset.target_noise_clip,
+            policy_delay=learning.policy_delay,
+            target_policy_noise=learning.target_noise,
+            target_noise_clip=learning.target_noise_clip,
             policy_kwargs={
-                "net_arch": [preset.width, preset.width],
+                "net_arch": [networks.width, networks.width],
                 "networks": networks,
                 "optimizer_kwargs": {"fused": True} if networks.fused else {},
             },
@@ -211,18 +159,18 @@ class BatchTD3(TD3):
             device="cpu",
             **replay,
         )
-        self.averaged = deepcopy(self.actor.mu) if extras.ema > 0.0 else None
-        """The actor with averaged weights, if they are kept."""
+        self.ema_actor = deepcopy(self.actor.mu) if learning.ema > 0.0 else None
+        """The actor with averaged weights; None where no average is kept."""
 
     @property
-    def decider(self) -> nn.Module:
-        """The actor that checkpoints and curves are made of."""
-        return self.actor.mu if self.averaged is None else self.averaged
+    def evaluated_actor(self) -> nn.Module:
+        """The actor of checkpoints and learning curves."""
+        return self.actor.mu if self.ema_actor is None else self.ema_actor
 
     def _sample_action(
         self, learning_starts: int, action_noise: Any = None, n_envs: int = 1
     ) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Return actions and what to store; the untrained policy explores like any other."""
+        """Return actions, twice: to take and to store. There is no uniform warm-up phase."""
         assert self._last_obs is not None
         with torch.inference_mode():
             act = self.actor(torch.as_tensor(self._last_obs)).numpy()
@@ -230,31 +178,30 @@ class BatchTD3(TD3):
         return explored, explored
 
     def train(self, gradient_steps: int, batch_size: int = 512) -> None:
-        """Update critics, and every ``policy_delay``-th time actor and targets.
+        """Update the critics, and every ``policy_delay``-th time actor and targets.
 
-        Deviates: Stable-Baselines3's loop, where a frozen actor would freeze the target critics
-        with it.
+        Deviates: in Stable-Baselines3's loop a frozen actor would freeze the target critics.
         """
-        if self.num_timesteps // self.n_envs % self.extras.update_every:
+        if self.num_timesteps // self.n_envs % self.learning.update_every:
             return
         self._update_learning_rate([self.actor.optimizer, self.critic.optimizer])
         for group in self.actor.optimizer.param_groups:
-            group["lr"] *= self.extras.actor_lr_ratio
+            group["lr"] *= self.learning.actor_lr_ratio
         for _ in range(gradient_steps):
             self._n_updates += 1
             data = self._draw(batch_size)
             self._update_critics(data)
             if self._n_updates % self.policy_delay == 0:
-                if self._n_updates > self.preset.actor_frozen_updates:
+                if self._n_updates > self.learning.actor_frozen_updates:
                     self._update_actor(data.obs)
-                _follow(self.critic_target, self.critic, self.tau)
-                _follow(self.actor_target, self.actor, self.tau)
+                _polyak_update(self.critic_target, self.critic, self.tau)
+                _polyak_update(self.actor_target, self.actor, self.tau)
 
     def _draw(self, batch_size: int) -> Minibatch:
         memory = self.replay_buffer
         if isinstance(memory, PrioritisedReplay):
             done = 1.0 - self._current_progress_remaining
-            beta = self.extras.beta + done * (1.0 - self.extras.beta)
+            beta = self.learning.beta + done * (1.0 - self.learning.beta)
             drawn = memory.draw(batch_size, beta)
             return Minibatch(
                 obs=drawn.observations,
@@ -278,14 +225,13 @@ class BatchTD3(TD3):
 
     def _update_critics(self, data: Minibatch) -> None:
         critics = critics_of(self.critic)
-        with torch.no_grad(), self._precision():
+        with torch.no_grad():
             noise = torch.randn_like(data.act) * self.target_policy_noise
             noise = noise.clamp(-self.target_noise_clip, self.target_noise_clip)
             act = (self.actor_target(data.next_obs) + noise).clamp(-1.0, 1.0)
-            values = critics_of(self.critic_target).targets(data.next_obs, act).float()
+            values = critics_of(self.critic_target).targets(data.next_obs, act)
         target = data.rewards + data.discounts * values
-        with self._precision():
-            loss, errors = critics.loss(data.obs, data.act, target, data.weights)
+        loss, errors = critics.loss(data.obs, data.act, target, data.weights)
         self.critic.optimizer.zero_grad()
         loss.backward()  # type: ignore[no-untyped-call]
         self.critic.optimizer.step()
@@ -295,25 +241,21 @@ class BatchTD3(TD3):
 
     def _update_actor(self, obs: Tensor) -> None:
         critics = critics_of(self.critic)
-        with self._precision():
-            loss = -critics.first(obs, self.actor(obs)).mean()
+        loss = -critics.first(obs, self.actor(obs)).mean()
         self.actor.optimizer.zero_grad()
-        learning = list(self.actor.mu.parameters())  # and not the critics it goes through
-        loss.backward(inputs=learning)  # type: ignore[no-untyped-call]
+        updated = list(self.actor.mu.parameters())  # the critics keep their gradients
+        loss.backward(inputs=updated)  # type: ignore[no-untyped-call]
         self.actor.optimizer.step()
-        if self.averaged is not None:
-            learned = (self._n_updates - self.preset.actor_frozen_updates) / self.policy_delay
-            decay = min(self.extras.ema, learned / (learned + 9.0))
-            _follow(self.averaged, self.actor.mu, 1.0 - decay)
-
-    def _precision(self) -> torch.autocast:
-        return torch.autocast("cpu", torch.bfloat16, enabled=self.extras.bfloat16)
+        if self.ema_actor is not None:
+            learned = (self._n_updates - self.learning.actor_frozen_updates) / self.policy_delay
+            decay = min(self.learning.ema, learned / (learned + 9.0))
+            _polyak_update(self.ema_actor, self.actor.mu, 1.0 - decay)
 
 
-def _follow(behind: nn.Module, ahead: nn.Module, share: float) -> None:
-    """Move the weights of one network by a share of the way to those of another.
+def _polyak_update(target: nn.Module, source: nn.Module, tau: float) -> None:
+    """Move the weights of one network toward those of another by a share.
 
-    Deviates: Stable-Baselines3's ``polyak_update`` says the same one tensor at a time.
+    Deviates: Stable-Baselines3's ``polyak_update`` does the same one tensor at a time.
     """
     with torch.no_grad():
-        torch._foreach_lerp_(list(behind.parameters()), list(ahead.parameters()), share)
+        torch._foreach_lerp_(list(target.parameters()), list(source.parameters()), tau)

@@ -1,19 +1,17 @@
-"""Presets: every number of an experiment, frozen and named (STYLE 3.5).
+"""Presets: every number of an experiment, frozen and named.
 
-A training job names a preset, a seed and overrides. Overrides are checked here, field by field;
-this module imports no learning library, so that the service can check and describe presets
-cheaply. What a preset holds is said where its class is: ``pick_preset.py``,
-``reach_preset.py``, ``sorting_preset.py``.
+A training job names a preset, a seed and overrides, objects of fields by group:
+``{"learning": {"gamma": 0.98}}``. The fields and their bounds are declared by the models in
+``pick_preset.py``, ``reach_preset.py`` and ``sorting_preset.py``. No learning library is
+imported here, so that the service can check and describe presets cheaply.
 """
 
-import dataclasses
-import re
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
 from app.errors import InvalidInput, NotFound
-from app.policies.configs.fields import FieldInfo, checked, describe
+from app.policies.configs.fields import read_config
 from app.policies.configs.pick import PickPreset
 from app.policies.configs.reach import REACH_PRESETS, ReachPreset
 from app.policies.configs.sorting import SORTING_PRESETS, SortingPreset
@@ -37,45 +35,36 @@ def get(name: str) -> Preset:
     return PRESETS[name]
 
 
-def fields(name: str) -> list[FieldInfo]:
-    """Return the fields of a preset that a job may override, in order.
-
-    Raises:
-        NotFound: No preset has that name.
-    """
-    preset = get(name)
-    return [describe(entry, preset) for entry in dataclasses.fields(preset) if entry.metadata]
-
-
 def resolve(name: str, overrides: Mapping[str, object]) -> Preset:
     """Return a preset with overrides applied.
 
     Args:
         name: Name of the preset.
-        overrides: Field to value.
+        overrides: Fields by group, and the name of the work cell as ``cell``.
 
     Raises:
         NotFound: No preset has that name.
-        InvalidInput: An unknown field, or a value outside its bounds.
+        InvalidInput: A field is unknown, breaks its rule or contradicts another one.
     """
-    known = {info.name: info for info in fields(name)}
-    taken: dict[str, Any] = {}
+    preset = get(name)
+    data: dict[str, Any] = preset.model_dump()
     for key, value in overrides.items():
-        if key == "cell":
-            taken[key] = _checked_cell(value)
-            continue
-        if key not in known:
-            raise InvalidInput(
-                f"overrides.{key}", value, f"is no field of {name}", ("cell", *known)
-            )
-        taken[key] = checked(known[key], value)
-    preset = dataclasses.replace(get(name), **taken)
-    preset.check()
-    return preset
+        group = data.get(key)
+        if key == "name":
+            raise InvalidInput("overrides.name", value, "is no field")
+        data[key] = (
+            group | value if isinstance(group, dict) and isinstance(value, dict) else value
+        )
+    return read_config(type(preset), data, "overrides")
 
 
-def _checked_cell(value: object) -> str:
-    """Return the name of a cell; whether there is one of that name is for others to say."""
-    if not isinstance(value, str) or not re.fullmatch(r"[a-z][a-z0-9-]{0,63}", value):
-        raise InvalidInput("overrides.cell", value, "must be the name of a work cell")
-    return value
+def nested(fields: Mapping[str, object]) -> dict[str, Any]:
+    """Return overrides by group, of fields with dotted names such as ``learning.gamma``."""
+    overrides: dict[str, Any] = {}
+    for path, value in fields.items():
+        group, dot, name = path.partition(".")
+        if dot:
+            overrides.setdefault(group, {})[name] = value
+        else:
+            overrides[group] = value
+    return overrides

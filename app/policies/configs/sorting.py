@@ -1,226 +1,233 @@
-"""The presets of the sorting task: every number of a training, frozen (METHOD 1.4)."""
+"""Training configurations of the sorting task: DQN (docs/method.md 1.4).
 
-from dataclasses import dataclass
+Double, dueling and prioritised as in the source. Deviates: network, action mask, n-step
+returns, disturbed starts, people in the training and expert labels are ours; the source's
+recipe has its own presets.
+"""
+
+from typing import Literal, Self
+
+from pydantic import model_validator
 
 from app.errors import InvalidInput, digits
-from app.policies.configs.fields import check_learning, check_rounds, choice, number
+from app.policies.configs.fields import (
+    CellName,
+    FieldGroup,
+    Learning,
+    TrainingConfig,
+    Whole,
+    choice,
+    number,
+)
 from app.sim.sorting.batch import SortingSettings
 from app.sim.sorting.kernels.reward import SortingWeights
 
-NETWORKS = ("shared", "printed")
 
+class DQNLearning(Learning):
+    """Double DQN with prioritised replay; ``gamma`` and ``n_steps`` are per attempt."""
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SortingPreset:
-    """DQN on the sorting task: all that a training run depends on besides its seed.
-
-    The defaults are those of ``sorting-e0-dqn``. Double, dueling and prioritised as in the
-    source. Deviates: network, mask, n-step returns, disturbed starts, people in the training
-    and the advice of the exact planner are ours; the source's recipe has its own presets.
-    """
-
-    name: str = "sorting-e0-dqn"
-    """Name in requests."""
-    cell: str = "sorting-e0"
-    """Work cell trained in."""
-
-    total_steps: int = number(
-        1_280_000, 1_000, 100_000_000, "env steps", "length of the training"
+    gradient_steps: Whole = number(
+        1, 1, 1024, "updates", "Gradient steps: updates per step of all environments"
     )
-    n_envs: int = number(128, 1, 4096, "", "tasks stepped together")
-    gradient_steps: int = number(1, 1, 1024, "updates", "updates per step of all tasks")
-    buffer_size: int = number(
-        200_000, 2_000, 2_000_000, "transitions", "size of the replay memory"
+    target_update_interval: Whole = number(200, 1, 100_000, "updates", "Target update interval")
+    max_grad_norm: float = number(10.0, 0.01, 1000.0, "", "Largest norm of a gradient")
+    progress_episodes: Whole = number(
+        500, 10, 100_000, "episodes", "Curve episodes: greedy episodes behind a point"
     )
-    batch_size: int = number(256, 16, 4096, "transitions", "minibatch of an update")
-    learning_starts: int = number(
-        6_400, 0, 1_000_000, "env steps", "steps before the first update"
-    )
-    lr_start: float = number(1e-3, 1e-6, 1e-2, "", "learning rate at the start")
-    lr_end: float = number(2e-5, 1e-7, 1e-2, "", "learning rate at the end")
-    gamma: float = number(0.95, 0.5, 0.9999, "per attempt", "discount")
-    n_steps: int = number(3, 1, 20, "attempts", "length of n-step returns")
-    target_every: int = number(
-        200, 1, 100_000, "updates", "updates between two copies into the target network"
-    )
-    alpha: float = number(0.6, 0.0, 1.0, "", "exponent of the priorities; 0 draws evenly")
-    beta: float = number(0.4, 0.0, 1.0, "", "exponent of the importance weights at the start")
-    max_grad_norm: float = number(10.0, 0.01, 1000.0, "", "greatest norm of a gradient")
 
-    network: str = choice(
+
+class QNetworks(FieldGroup):
+    """Kind and size of the network."""
+
+    kind: Literal["shared", "printed"] = choice(
         "shared",
-        NETWORKS,
-        "weights shared over towers, valid moves only; or the source's two plain layers",
+        "Network: weights shared between towers with an action mask, or two plain layers",
     )
-    width: int = number(128, 16, 1024, "units", "width of the hidden layers")
-    eps_start: float = number(1.0, 0.0, 1.0, "", "share of random moves at the start")
-    eps_end: float = number(0.02, 0.0, 1.0, "", "share of random moves in the end")
+    width: Whole = number(128, 16, 1024, "units", "Width of the hidden layers")
+
+
+class EpsilonGreedy(FieldGroup):
+    """Share of random moves."""
+
+    eps_start: float = number(1.0, 0.0, 1.0, "", "Initial share ε of random moves")
+    eps_end: float = number(0.02, 0.0, 1.0, "", "Final share ε of random moves")
     eps_share: float = number(
-        0.2, 0.001, 1.0, "", "share of the training over which it falls, N_t"
+        0.2, 0.001, 1.0, "", "Decay time N_t: share of the training over which ε falls"
     )
+
+
+class SortingEpisode(FieldGroup):
+    """Starts, disturbances and ends of episodes, with the curriculum."""
 
     solved_episodes: float = number(
-        0.3, 0.0, 1.0, "", "share of episodes that start partly solved at first, e_s"
+        0.3, 0.0, 1.0, "", "Curriculum e_s: initial share of episodes that start partly solved"
     )
     solved_share: float = number(
-        0.8, 0.0, 1.0, "", "share of their goal that is done at first, g_s"
+        0.8, 0.0, 1.0, "", "Curriculum g_s: initially solved share of their goal"
     )
     even_share: float = number(
-        0.5, 0.0, 1.0, "", "share of episodes whose sizes are drawn evenly, not triangular"
+        0.5, 0.0, 1.0, "", "Share of episodes with uniform, not triangular sizes"
     )
     disturbed_share: float = number(
-        0.6, 0.0, 1.0, "", "share of episodes with junk on towers and goals partly built"
-    )
-    human_rate: float = number(
-        0.02, 0.0, 1.0, "per attempt", "how often a person adds, removes, moves or asks anew"
+        0.6, 0.0, 1.0, "", "Share of episodes with disturbed towers and partly built goals"
     )
     localisation_rate: float = number(
-        0.0, 0.0, 1.0, "per pick", "how often another object is moved than was meant"
+        0.0, 0.0, 1.0, "per pick", "Localisation errors: another object is moved"
     )
     random_map_share: float = number(
-        0.3, 0.0, 1.0, "", "share of episodes with a failure map drawn at random"
+        0.3, 0.0, 1.0, "", "Share of episodes with a random map of failure probabilities"
     )
     horizon_factor: float = number(
-        4.0, 1.0, 100.0, "attempts per cell", "length at which episodes are cut off"
+        4.0, 1.0, 100.0, "attempts per cell", "Horizon: length at which episodes are truncated"
     )
 
-    advice_share: float = number(
-        0.25,
-        0.0,
-        1.0,
-        "",
-        "share of a minibatch in which the exact planner marks the best moves",
-    )
-    advice_margin: float = number(
-        0.05, 0.0, 10.0, "", "by how much one of them shall be worth more than others (DQfD)"
-    )
-    advice_weight: float = number(1.0, 0.0, 100.0, "", "weight of that in the loss")
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        """Check that the shares of solved and disturbed episodes fit together.
 
-    c_move: float = number(0.05, 0.0, 10.0, "", "cost of an attempt")
-    c_empty: float = number(0.3, 0.0, 10.0, "", "cost of picking where nothing is")
-    c_stuck: float = number(0.3, 0.0, 10.0, "", "cost of putting an object back")
-    c_fail: float = number(0.01, 0.0, 10.0, "", "cost of a failed pick")
-    c_back: float = number(0.01, 0.0, 10.0, "", "cost of a move from a tower to the clutter")
+        Raises:
+            InvalidInput: Their sum exceeds 1.
+        """
+        if self.solved_episodes + self.disturbed_share > 1.0:
+            rule = f"must not exceed 1 - disturbed_share = {digits(1.0 - self.disturbed_share)}"
+            raise InvalidInput("episode.solved_episodes", self.solved_episodes, rule)
+        return self
+
+
+class SortingPeople(FieldGroup):
+    """Interference by a person."""
+
+    human_rate: float = number(
+        0.02, 0.0, 1.0, "per attempt", "Interference: objects or goals changed by a person"
+    )
+
+
+class ExpertLabels(FieldGroup):
+    """Labels of the exact planner with a large-margin loss (DQfD)."""
+
+    share: float = number(0.25, 0.0, 1.0, "", "Labelled share of a minibatch")
+    margin: float = number(0.05, 0.0, 10.0, "", "Margin of the best moves over the others")
+    weight: float = number(1.0, 0.0, 100.0, "", "Weight of the large-margin loss")
+
+
+class SortingReward(FieldGroup):
+    """Coefficients of the reward."""
+
+    c_move: float = number(0.05, 0.0, 10.0, "", "Move cost c_move: per attempt")
+    c_empty: float = number(0.3, 0.0, 10.0, "", "Empty pick cost c_empty")
+    c_stuck: float = number(0.3, 0.0, 10.0, "", "Put-back cost c_stuck")
+    c_fail: float = number(0.01, 0.0, 10.0, "", "Failed pick cost c_fail")
+    c_back: float = number(0.01, 0.0, 10.0, "", "Return cost c_back: tower to clutter")
     c_distance: float = number(
-        0.01, 0.0, 10.0, "", "cost per attempt, of all levels differing from the goal"
+        0.01, 0.0, 10.0, "", "Distance cost c_distance: levels that differ from the goal"
     )
-    c_success: float = number(1.0, 0.0, 100.0, "", "bonus of a goal that is met")
-
-    progress_steps: int = number(
-        12_800, 1, 10_000_000, "env steps", "steps between two points of the curve"
-    )
-    checkpoint_steps: int = number(
-        256_000, 1, 10_000_000, "env steps", "steps between two checkpoints"
-    )
-    progress_episodes: int = number(
-        500, 10, 100_000, "episodes", "greedy episodes behind a point of the curve"
-    )
+    c_success: float = number(1.0, 0.0, 100.0, "", "Success bonus c_success")
 
     @property
     def weights(self) -> SortingWeights:
-        """Coefficients of the reward."""
-        return SortingWeights(
-            move=self.c_move,
-            empty=self.c_empty,
-            stuck=self.c_stuck,
-            fail=self.c_fail,
-            back=self.c_back,
-            distance=self.c_distance,
-            success=self.c_success,
-        )
+        """The same for the kernels."""
+        return SortingWeights(**{k.removeprefix("c_"): v for k, v in self})
+
+
+class SortingPreset(TrainingConfig):
+    """DQN on the sorting task; the defaults are those of ``sorting-e0-dqn``."""
+
+    name: str = "sorting-e0-dqn"
+    cell: CellName = "sorting-e0"
+    learning: DQNLearning = DQNLearning(
+        buffer_size=200_000,
+        learning_starts=6_400,
+        lr_start=1e-3,
+        gamma=0.95,
+        n_steps=3,
+        alpha=0.6,
+        progress_steps=12_800,
+        checkpoint_steps=256_000,
+    )
+    networks: QNetworks = QNetworks()
+    exploration: EpsilonGreedy = EpsilonGreedy()
+    episode: SortingEpisode = SortingEpisode()
+    people: SortingPeople = SortingPeople()
+    expert: ExpertLabels = ExpertLabels()
+    reward: SortingReward = SortingReward()
 
     def settings(self, done: float) -> SortingSettings:
-        """Return the task's settings; the curriculum fades linearly (METHOD 1.4).
+        """Return the task's settings; the curriculum fades linearly.
 
         Args:
-            done: How far the training is, from 0 to 1.
+            done: Elapsed share of the curriculum, 0 or more.
         """
-        left = max(0.0, 1.0 - done)
+        left, episode = max(0.0, 1.0 - done), self.episode
         return SortingSettings(
-            horizon_factor=self.horizon_factor,
-            disturbed_share=self.disturbed_share,
-            solved_episodes=left * self.solved_episodes,
-            solved_share=left * self.solved_share,
-            even_share=self.even_share,
-            human_rate=self.human_rate,
-            localisation_rate=self.localisation_rate,
-            random_map_share=self.random_map_share,
-            weights=self.weights,
+            horizon_factor=episode.horizon_factor,
+            disturbed_share=episode.disturbed_share,
+            solved_episodes=left * episode.solved_episodes,
+            solved_share=left * episode.solved_share,
+            even_share=episode.even_share,
+            human_rate=self.people.human_rate,
+            localisation_rate=episode.localisation_rate,
+            random_map_share=episode.random_map_share,
+            weights=self.reward.weights,
         )
-
-    def check(self) -> None:
-        """Check the fields against each other.
-
-        Raises:
-            InvalidInput: Two of them do not go together.
-        """
-        check_rounds(self.total_steps, self.progress_steps, self.checkpoint_steps, self.n_envs)
-        check_learning(self.learning_starts, self.total_steps, self.buffer_size, self.n_envs)
-        if self.solved_episodes + self.disturbed_share > 1.0:
-            most = 1.0 - self.disturbed_share
-            rule = f"must not exceed 1 - disturbed_share = {digits(most)}"
-            raise InvalidInput("overrides.solved_episodes", self.solved_episodes, rule)
 
 
 def _printed(name: str, cell: str, total_steps: int) -> SortingPreset:
     """Return table 3.1.
 
-    What it does not print: an update every fourth attempt, and a reward in which parking and
-    failures cost as much as a move.
+    Not printed and chosen here: an update every fourth attempt, and a reward in which parking
+    and failures cost as much as a move.
     """
     return SortingPreset(
         name=name,
         cell=cell,
-        total_steps=total_steps,
-        n_envs=40,
-        gradient_steps=10,
-        buffer_size=100_000,
-        batch_size=256,
-        learning_starts=2_000,
-        lr_start=1e-4,
-        lr_end=1e-4,
-        gamma=0.92,
-        n_steps=1,
-        target_every=500,
-        network="printed",
-        width=128,
-        advice_share=0.0,
-        eps_start=1.0,
-        eps_end=0.05,
-        eps_share=1.0,
-        c_fail=0.05,
-        c_back=0.05,
-        c_distance=0.1,
-        solved_episodes=0.5,
-        even_share=0.0,
-        disturbed_share=0.0,
-        human_rate=0.0,
-        random_map_share=0.0,
-        progress_steps=50_000,
-        checkpoint_steps=250_000,
+        learning=DQNLearning(
+            total_steps=total_steps,
+            n_envs=40,
+            gradient_steps=10,
+            buffer_size=100_000,
+            learning_starts=2_000,
+            lr_start=1e-4,
+            lr_end=1e-4,
+            gamma=0.92,
+            n_steps=1,
+            alpha=0.6,
+            target_update_interval=500,
+            progress_steps=50_000,
+            checkpoint_steps=250_000,
+        ),
+        networks=QNetworks(kind="printed"),
+        exploration=EpsilonGreedy(eps_end=0.05, eps_share=1.0),
+        episode=SortingEpisode(
+            solved_episodes=0.5, even_share=0.0, disturbed_share=0.0, random_map_share=0.0
+        ),
+        people=SortingPeople(human_rate=0.0),
+        expert=ExpertLabels(share=0.0),
+        reward=SortingReward(c_fail=0.05, c_back=0.05, c_distance=0.1),
     )
 
 
+E0 = SortingPreset()
+E1_LEARNING = E0.learning.model_copy(update={"total_steps": 2_048_000})
+E1 = SortingPreset(
+    name="sorting-e1-dqn",
+    cell="sorting-e1",
+    learning=E1_LEARNING,
+    expert=ExpertLabels(share=0.5, margin=0.1),
+)
+E1_PURE = SortingPreset(
+    name="sorting-e1-dqn-pure",
+    cell="sorting-e1",
+    learning=E1_LEARNING.model_copy(update={"batch_size": 384}),
+    networks=QNetworks(width=192),
+    episode=SortingEpisode(solved_episodes=0.2, disturbed_share=0.7),
+    people=SortingPeople(human_rate=0.0),
+    expert=ExpertLabels(share=0.0),
+)
+"""``sorting-e1-dqn`` without expert labels."""
 SORTING_PRESETS = (
-    SortingPreset(),
-    SortingPreset(
-        name="sorting-e1-dqn",
-        cell="sorting-e1",
-        total_steps=2_048_000,
-        advice_share=0.5,
-        advice_margin=0.1,
-    ),
-    SortingPreset(
-        name="sorting-e1-dqn-pure",
-        cell="sorting-e1",
-        total_steps=2_048_000,
-        batch_size=384,
-        width=192,
-        solved_episodes=0.2,
-        disturbed_share=0.7,
-        human_rate=0.0,
-        advice_share=0.0,
-    ),
+    E0,
+    E1,
+    E1_PURE,
     _printed("sorting-e0-thesis", "sorting-e0", 2_000_000),
     _printed("sorting-e1-thesis", "sorting-e1", 8_000_000),
 )

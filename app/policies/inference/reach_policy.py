@@ -6,7 +6,7 @@ see ``checkpoint.py``.
 """
 
 from collections.abc import Callable, Mapping
-from typing import Any, cast, get_args
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,14 +20,15 @@ from app.policies.checkpoints.checkpoint import (
     task_of,
 )
 from app.policies.checkpoints.trained_cell import cell_of
-from app.policies.configs.reach import ACTORS, action_of
+from app.policies.configs.fields import read_config
+from app.policies.configs.reach import ReachPreset
 from app.policies.networks.actor_critic import BASE_WEIGHT, CROWD_WIDTH, CrowdShape
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import direct
 from app.sim.people.kernels.people import MAX_PEOPLE
 from app.sim.prediction.kernels.networks import Network
 from app.sim.reach.batch import N_ACT, GoalRule, ViewName, goal_region_of
-from app.sim.reach.goal_sets import MOST_HALTON, N_HALTON, halton_targets
+from app.sim.reach.goal_sets import halton_targets
 from app.sim.reach.kernels import option_features as reach_ways
 from app.sim.reach.kernels import people_set as reach_crowd
 from app.sim.reach.kernels.observation import BASE_START, N_FEATURES, SIZES, STATE_SIZES
@@ -72,21 +73,22 @@ class ReachPolicy:
     def __init__(self, checkpoint: Checkpoint) -> None:
         require_purpose(checkpoint, REACHING)
         manifest = checkpoint.manifest
-        preset, cell = manifest["preset"], cell_of(manifest)
+        preset = read_config(ReachPreset, manifest["preset"], "manifest.preset")
+        cell = cell_of(manifest)
         self._checkpoint, self._cell = checkpoint, (cell.name, cell.sha256)
-        self.view = cast(ViewName, _named(preset, "observation", get_args(ViewName)))
+        self.view: ViewName = preset.episode.observation
         """What it sees."""
         expect_layout(checkpoint, LAYOUTS[self.view], N_ACT)
-        self.goals = cast(GoalRule, _named(preset, "goals", get_args(GoalRule)))
+        self.goals: GoalRule = preset.episode.goals
         """Where the goals of its training were drawn from."""
-        self.action: ActionSettings = action_of(preset)
+        self.action: ActionSettings = preset.action.settings
         """What its actions mean (METHOD 2.2)."""
         self.targets: Vec | None = None
         """The goals it was trained on [m], shape (n, 3); None for a whole box."""
         if self.goals == "grid":
             self.targets = goal_region_of(cell).targets()
         elif self.goals == "halton":
-            self.targets = halton_targets(goal_region_of(cell), _n_halton(preset))
+            self.targets = halton_targets(goal_region_of(cell), preset.episode.n_halton)
         self.n_obs = sum(size for _, size in manifest["layout"])
         """Length of an observation."""
         arrays, n_seen = checkpoint.arrays(), self.n_obs
@@ -95,7 +97,7 @@ class ReachPolicy:
             self._crowd = _layers_of(arrays, CROWD_LAYERS, CROWD.n_block, CROWD_WIDTH)
             n_seen = CROWD.first + CROWD_WIDTH
         self._layers = _layers_of(arrays, ACTOR_LAYERS, n_seen, N_ACT)
-        self._residual = _named(preset, "actor", ACTORS) == "residual"
+        self._residual = preset.networks.actor == "residual"
         self._few = self.kernel_network
         self._answers: Callable[..., None] | None = None
 
@@ -185,23 +187,6 @@ def _hidden(rows: Floats, layers: tuple[Layer, ...]) -> Floats:
         rows += bias
         np.maximum(rows, 0.0, out=rows)
     return rows
-
-
-def _named(preset: Mapping[str, Any], field: str, choices: tuple[str, ...]) -> str:
-    """Return a choice that a manifest's preset names."""
-    value = preset.get(field)
-    if value not in choices:
-        raise InvalidInput(f"manifest.preset.{field}", value, "must be a known rule", choices)
-    return str(value)
-
-
-def _n_halton(preset: Mapping[str, Any]) -> int:
-    """Return the number of points of the Halton set that a manifest's preset names."""
-    n = preset.get("n_halton", N_HALTON)
-    if not isinstance(n, int) or not 1 <= n <= MOST_HALTON:
-        rule = f"must be a number in [1, {MOST_HALTON}]"
-        raise InvalidInput("manifest.preset.n_halton", n, rule)
-    return n
 
 
 def _layers_of(

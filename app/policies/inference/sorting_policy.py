@@ -17,6 +17,8 @@ from app.policies.checkpoints.checkpoint import (
 )
 from app.policies.checkpoints.model_state import under
 from app.policies.checkpoints.trained_cell import cell_of
+from app.policies.configs.fields import read_config
+from app.policies.configs.sorting import SortingPreset
 from app.policies.networks.sorting_q import NETWORKS, layout_of
 from app.sim.sorting.batch import Obs, shape_of
 from app.sim.sorting.state import SortingShape
@@ -39,16 +41,14 @@ class SortingPolicy:
 
     def __init__(self, checkpoint: Checkpoint) -> None:
         require_purpose(checkpoint, SORTING)
-        kind = str(checkpoint.manifest["preset"].get("network"))
-        if kind not in NETWORKS:
-            raise CheckpointMismatch("preset.network", sorted(NETWORKS), kind)
+        manifest = checkpoint.manifest
+        preset = read_config(SortingPreset, manifest["preset"], "manifest.preset")
         cell = cell_of(checkpoint.manifest)
         self._checkpoint, self._cell = checkpoint, (cell.name, cell.sha256)
         self.shape: SortingShape = shape_of(cell)
         """Size of the tasks it knows."""
         expect_layout(checkpoint, layout_of(self.shape), self.shape.n_actions)
-        manifest = checkpoint.manifest
-        self._network = NETWORKS[kind](self.shape, int(manifest["width"]))
+        self._network = NETWORKS[preset.networks.kind](self.shape, preset.networks.width)
         try:
             self._network.load_state_dict(under(checkpoint.arrays(), "q"))
         except RuntimeError as error:

@@ -16,11 +16,17 @@ import torch
 from numpy.typing import NDArray
 
 from app.errors import CheckpointMismatch, InvalidInput
-from app.policies.checkpoints.checkpoint import Checkpoint, expect_layout
+from app.policies.checkpoints.checkpoint import (
+    CHOOSING,
+    Checkpoint,
+    expect_layout,
+    require_purpose,
+)
+from app.policies.checkpoints.model_state import under
 from app.policies.checkpoints.trained_cell import cell_of
-from app.policies.configs.pick import action_of
-from app.policies.networks.actor_critic import Critics, ResidualActor
-from app.policies.training.pick import LAYOUTS
+from app.policies.configs.fields import read_config
+from app.policies.configs.pick import PickPreset
+from app.policies.training.pick import LAYOUTS, actor_of, critics_for
 from app.sim.cells.cell import Cell, require_cell
 from app.sim.core.arrays import Vec
 from app.sim.core.out_of_range import OutsideField
@@ -52,6 +58,16 @@ _NOBODY = Person(q=human.rest_posture(*FAR_AWAY), qd=np.zeros(18))
 """Who is seen where nobody is."""
 
 
+def pick_preset_of(checkpoint: Checkpoint) -> PickPreset:
+    """Return the training configuration of a checkpoint of the pick scenario.
+
+    Raises:
+        InvalidInput: It is no such configuration.
+    """
+    require_purpose(checkpoint, CHOOSING)
+    return read_config(PickPreset, checkpoint.manifest["preset"], "manifest.preset")
+
+
 class ValueNetworks:
     """Actor and critics of a checkpoint, for inference.
 
@@ -63,23 +79,16 @@ class ValueNetworks:
     """
 
     def __init__(self, checkpoint: Checkpoint) -> None:
-        kind = checkpoint.manifest["preset"].get("observation", "features")
-        expect_layout(checkpoint, LAYOUTS.get(kind, LAYOUTS["features"]), CONTROLLED)
-        width = int(checkpoint.manifest["width"])
+        preset = pick_preset_of(checkpoint)
+        expect_layout(checkpoint, LAYOUTS[preset.episode.observation], CONTROLLED)
         self.n_obs = sum(size for _, size in checkpoint.manifest["layout"])
         """Length of the observations."""
-        self.actor = ResidualActor(width, self.n_obs)
-        self.critic = Critics(width, self.n_obs)
+        self.actor = actor_of(preset.networks, self.n_obs)
+        self.critic = critics_for(preset.networks, self.n_obs)
         arrays = checkpoint.arrays()
         for name, module in (("actor", self.actor), ("critic", self.critic)):
-            start = f"{name}."
-            tensors = {
-                key.removeprefix(start): torch.as_tensor(value)
-                for key, value in arrays.items()
-                if key.startswith(start)
-            }
             try:
-                module.load_state_dict(tensors)
+                module.load_state_dict(under(arrays, name))
             except RuntimeError as error:
                 raise CheckpointMismatch("tensors", f"those of {name}", str(error)) from error
             module.eval()
@@ -143,7 +152,7 @@ class TaskChooser:
     @property
     def action(self) -> ActionSettings:
         """What its actions mean (METHOD 2.2)."""
-        return action_of(self._checkpoint.manifest["preset"])
+        return pick_preset_of(self._checkpoint).action.settings
 
     @property
     def title(self) -> str:
@@ -246,7 +255,7 @@ class _TrainedRanges:
 
     def __init__(self, checkpoint: Checkpoint) -> None:
         ranges = checkpoint.manifest["trained_range"]
-        self._met_nobody = checkpoint.manifest["preset"].get("human_absent", 0.0) > 0.0
+        self._met_nobody = pick_preset_of(checkpoint).people.human_absent > 0.0
         self._low = {name: np.array(entry["low"]) for name, entry in ranges.items()}
         self._high = {name: np.array(entry["high"]) for name, entry in ranges.items()}
 

@@ -1,9 +1,9 @@
-"""What is done between two steps of a training: count, report, keep, stop."""
+"""Callback between two steps of a training: learning curve, checkpoints, stop."""
 
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback
@@ -38,41 +38,42 @@ class Run(Protocol):
         """CPU time so far [s]."""
 
     def checkpoints(self) -> tuple[Checkpoint, Checkpoint]:
-        """Return the policy and what resuming needs."""
+        """Return the ``policy`` and the ``resume`` checkpoint."""
+
+
+class Callbacks(NamedTuple):
+    """Receivers of what a training reports."""
+
+    on_progress: Callable[[Progress], None]
+    """Takes the points of the learning curve."""
+    on_checkpoint: Callable[[int, Checkpoint, Checkpoint], None]
+    """Takes the step, the ``policy`` and the ``resume`` checkpoint."""
+    should_stop: Callable[[], bool]
+    """Called after every step of the environments; whether the training stops."""
 
 
 class Reporter(BaseCallback, ABC):
-    """Calls out on the grid of ``progress_steps``; scenarios say what they count.
+    """Reports every ``progress_steps``; scenarios define the rates.
 
     Args:
         run: The attempt.
-        on_progress: Takes the points of the curve.
-        on_checkpoint: Takes the step, the policy and what resuming needs.
-        should_stop: Asked after every step.
+        callbacks: Receivers of the curve and of checkpoints.
     """
 
-    def __init__(
-        self,
-        run: Run,
-        on_progress: Callable[[Progress], None],
-        on_checkpoint: Callable[[int, Checkpoint, Checkpoint], None],
-        should_stop: Callable[[], bool],
-    ) -> None:
+    def __init__(self, run: Run, callbacks: Callbacks) -> None:
         super().__init__()
         self.stopped = False
         """Whether the training was asked to stop before its end."""
-        self._attempt = run
-        self._on_progress, self._on_checkpoint = on_progress, on_checkpoint
-        self._should_stop = should_stop
+        self._attempt, self._callbacks = run, callbacks
         self._begin_window()
 
     @abstractmethod
     def watch(self, rewards: Any) -> None:
-        """Look at the step that was just done; ``rewards`` are its rows', (n_envs,)."""
+        """Process the last step; ``rewards`` have the shape (n_envs,)."""
 
     @abstractmethod
     def rates(self) -> dict[str, Any]:
-        """Return episodes, success, collision, timeout and reward of the window; clear it."""
+        """Return episodes, success, collision, timeout and reward since the last point."""
 
     def _begin_window(self) -> None:
         self._wall, self._window_step = time.monotonic(), self._attempt.step
@@ -85,19 +86,19 @@ class Reporter(BaseCallback, ABC):
                 f"non-finite reward at step {self.num_timesteps}, seed {self._attempt.seed}"
             )
         self.watch(rewards)
-        step, preset = self.num_timesteps, self._attempt.preset
-        if step % preset.progress_steps == 0:
-            self._on_progress(self._point(step))
+        step, intervals = self.num_timesteps, self._attempt.preset.learning
+        if step % intervals.progress_steps == 0:
+            self._callbacks.on_progress(self._point(step))
             self._begin_window()
-            if step % preset.checkpoint_steps == 0:
-                self._on_checkpoint(step, *self._attempt.checkpoints())
-        self.stopped = self._should_stop()
+            if step % intervals.checkpoint_steps == 0:
+                self._callbacks.on_checkpoint(step, *self._attempt.checkpoints())
+        self.stopped = self._callbacks.should_stop()
         return not self.stopped
 
     def _point(self, step: int) -> Progress:
         wall = max(1e-6, time.monotonic() - self._wall)
         speed = (step - self._window_step) / wall
-        total, updates = self._attempt.preset.total_steps, self._attempt.updates
+        total, updates = self._attempt.preset.learning.total_steps, self._attempt.updates
         has_rate = updates > self._window_updates or step >= total
         return Progress(
             step=step,

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import torch
@@ -103,12 +103,12 @@ class TrainingRun:
     def _manifest(self) -> dict[str, Any]:
         return {
             "format": formats.FORMAT,
-            "preset": asdict(self.preset),
+            "preset": self.preset.model_dump(),
             "seed": self.seed,
             **manifest_fields(self.cell),
             "layout": [list(entry) for entry in self._parts.layout],
             "act_size": self._parts.act_size,
-            "width": self.preset.width,
+            "width": self.preset.networks.width,
             "step": self.step,
             "updates": self.updates,
             "cpu_s": round(self.cpu_s, 1),
@@ -120,8 +120,8 @@ class TrainingRun:
         manifest, parts = resume.manifest, self._parts
         if manifest["kind"] != "resume":
             raise CheckpointMismatch("kind", "resume", manifest["kind"])
-        if manifest["preset"] != asdict(self.preset):
-            raise CheckpointMismatch("preset", asdict(self.preset), manifest["preset"])
+        if manifest["preset"] != self.preset.model_dump():
+            raise CheckpointMismatch("preset", self.preset.model_dump(), manifest["preset"])
         if cell_of(manifest) != self.cell:
             raise CheckpointMismatch("cell", self.cell.sha256, cell_of(manifest).sha256)
         layout = [list(entry) for entry in parts.layout]
@@ -133,9 +133,9 @@ class TrainingRun:
 
     def refill(self) -> None:
         """Fill the replay memory with the restored policy; these steps are not counted."""
-        model, step = self.model, self.step
-        _, silent = model._setup_learn(self.preset.total_steps, None, False)
-        n_steps = max(1, min(REFILL_STEPS, self.preset.buffer_size) // self.preset.n_envs)
+        model, step, learning = self.model, self.step, self.preset.learning
+        _, silent = model._setup_learn(learning.total_steps, None, False)
+        n_steps = max(1, min(REFILL_STEPS, learning.buffer_size) // learning.n_envs)
         assert model.replay_buffer is not None
         model.collect_rollouts(
             self._env,

@@ -5,22 +5,21 @@ in training, the same ones at every point. The CPU time that takes is not counte
 """
 
 import time
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from app.policies.algorithms.dqn import Adviser, SortingDQN
-from app.policies.algorithms.sorting_vecenv import SortingVecEnv
+from app.policies.algorithms.dqn import Expert, SortingDQN
+from app.policies.algorithms.vecenv import BatchVecEnv
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.configs.sorting import SortingPreset
 from app.policies.networks.sorting_q import layout_of
-from app.policies.training.progress import Progress
-from app.policies.training.reporter import Reporter
+from app.policies.training.reporter import Callbacks, Reporter
 from app.policies.training.run import Parts, TrainingRun
 from app.sim.cells.cell import Cell
+from app.sim.envs.sorting import SortingTask
 from app.sim.sorting.batch import OUTCOMES, SortingBatch, SortingSettings, batch_in
 from app.sim.sorting.kernels.planner import mark_rows, new_work
 from app.sim.sorting.kernels.task import FAILURE_SCALE
@@ -49,11 +48,10 @@ def start(
         InvalidInput: There is nothing to sort in the cell.
     """
     first = 0 if resume is None else int(resume.manifest["step"])
-    batch = batch_in(cell, preset.n_envs, seed + first, preset.settings(0.0))
-    env = SortingVecEnv(batch)
-
-    adviser = adviser_of(batch.shape) if preset.advice_share else None
-    model = SortingDQN(preset, env, seed + first, adviser)
+    batch = batch_in(cell, preset.learning.n_envs, seed + first, preset.settings(0.0))
+    env = BatchVecEnv(SortingTask(cell, batch))
+    expert = expert_of(batch.shape) if preset.expert.share else None
+    model = SortingDQN(preset, env, batch, seed + first, expert)
     parts = Parts(
         policy={"q": model.q_net.q_net},
         targets={"q_target": model.q_net_target.q_net},
@@ -65,12 +63,12 @@ def start(
     return TrainingRun(preset, seed, cell, model, env, parts, resume), model
 
 
-def adviser_of(shape: SortingShape) -> Adviser:
-    """Return what marks the moves with which plans of the fewest moves begin."""
+def expert_of(shape: SortingShape) -> Expert:
+    """Return the expert that marks the first moves of all shortest plans."""
     k, c = shape.n_cells, shape.n_colours
     work = new_work(k, c, shape.n_sizes)
 
-    def advise(obs: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    def label(obs: NDArray[np.uint8]) -> NDArray[np.bool_]:
         n, codes = len(obs), obs.astype(np.int8)
         clutter = np.ascontiguousarray(codes[:, :k])
         towers = np.ascontiguousarray(codes[:, k : k + c * k].reshape(n, c, k))
@@ -81,7 +79,7 @@ def adviser_of(shape: SortingShape) -> Adviser:
         mark_rows(clutter, towers, heights, goal, wanted, fail, work, first)
         return first
 
-    return advise
+    return label
 
 
 class SortingReporter(Reporter):
@@ -89,32 +87,24 @@ class SortingReporter(Reporter):
 
     Args:
         run: The attempt.
-        on_progress: Takes the points of the curve.
-        on_checkpoint: Takes the step, the policy and what resuming needs.
-        should_stop: Asked after every step.
+        callbacks: Receivers of the curve and of checkpoints.
         trained: The model.
     """
 
-    def __init__(
-        self,
-        run: TrainingRun,
-        on_progress: Callable[[Progress], None],
-        on_checkpoint: Callable[[int, Checkpoint, Checkpoint], None],
-        should_stop: Callable[[], bool],
-        trained: SortingDQN,
-    ) -> None:
-        super().__init__(run, on_progress, on_checkpoint, should_stop)
+    def __init__(self, run: TrainingRun, callbacks: Callbacks, trained: SortingDQN) -> None:
+        super().__init__(run, callbacks)
         self._run, self._trained, self._preset = run, trained, trained.preset
         settings = SortingSettings(
-            horizon_factor=self._preset.horizon_factor, weights=self._preset.weights
+            horizon_factor=self._preset.episode.horizon_factor,
+            weights=self._preset.reward.weights,
         )
-        n = self._preset.progress_episodes
+        n = self._preset.learning.progress_episodes
         self._played = batch_in(run.cell, n, CURVE_SEED, settings)
 
     def watch(self, rewards: NDArray[np.floating]) -> None:
         """Let the curriculum fade with the steps."""
         if (self.num_timesteps // len(rewards)) % FADE_EVERY == 0:
-            done = self.num_timesteps / (FADE * self._preset.total_steps)
+            done = self.num_timesteps / (FADE * self._preset.learning.total_steps)
             self._trained.tasks.settings = self._preset.settings(done)
 
     def rates(self) -> dict[str, Any]:

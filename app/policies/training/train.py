@@ -1,10 +1,9 @@
 """The one training path: from a preset and a seed to checkpoints.
 
-Stable-Baselines3's ``learn`` drives; a callback counts on a fixed grid of environment steps,
-reports progress, hands out checkpoints and listens for a stop. A run that is resumed refills
-its replay memory with the policy it had before it updates again; those steps are not counted.
-What is particular to a scenario is in ``pick_training.py``, ``reach_training.py`` and
-``sorting_training.py``.
+Stable-Baselines3's ``learn`` runs the loop; a callback reports progress and checkpoints on a
+fixed grid of environment steps and stops the training. A resumed run first refills its replay
+buffer with the restored policy; these steps are not counted. Parts of the scenarios are in
+``pick_training.py``, ``reach_training.py`` and ``sorting_training.py``.
 """
 
 from collections.abc import Callable
@@ -25,7 +24,7 @@ from app.policies.training import (
     sorting as sorting_training,
 )
 from app.policies.training.progress import Progress, TrainResult
-from app.policies.training.reporter import Reporter
+from app.policies.training.reporter import Callbacks, Reporter
 from app.sim.cells.cell import Cell, load_cell
 
 
@@ -58,23 +57,23 @@ def train(
     """
     torch.set_flush_denormal(True)  # Adam's moments of rare inputs fade into slow numbers
     place = cell or load_cell(preset.cell)
-    calls = (on_progress, on_checkpoint, should_stop)
+    calls = Callbacks(on_progress, on_checkpoint, should_stop)
     reporter: Reporter
     if isinstance(preset, SortingPreset):
         run, model = sorting_training.start(preset, seed, resume, place)
-        reporter = sorting_training.SortingReporter(run, *calls, model)
+        reporter = sorting_training.SortingReporter(run, calls, model)
     elif isinstance(preset, ReachPreset):
-        run, reached = reach_training.start(preset, seed, resume, place)
-        reporter = reach_training.ReachReporter(run, *calls, reached)
+        run, monitor = reach_training.start(preset, seed, resume, place)
+        reporter = reach_training.ReachReporter(run, calls, monitor)
     else:
-        run, watched = pick_training.start(preset, seed, resume, place)
-        reporter = pick_training.PickReporter(run, *calls, watched)
+        run, monitor = pick_training.start(preset, seed, resume, place)
+        reporter = pick_training.PickReporter(run, calls, monitor)
     if resume is not None:
         run.refill()
-    left = preset.total_steps - run.step
+    left = preset.learning.total_steps - run.step
     if left > 0:
         run.model.learn(left, callback=reporter, reset_num_timesteps=resume is None)
     policy, state = run.checkpoints()
-    if run.step % preset.checkpoint_steps:
+    if run.step % preset.learning.checkpoint_steps:
         on_checkpoint(run.step, policy, state)
     return TrainResult(checkpoint=policy, step=run.step, stopped=reporter.stopped)

@@ -13,14 +13,7 @@ from app.sim.envs.rendering import block_solids, picture, standing_workers
 from app.sim.envs.single_env import SingleEnv
 from app.sim.envs.tasks import Infos, Mask, Rows, cell_of
 from app.sim.envs.vector_env import BatchVectorEnv
-from app.sim.sorting.batch import (
-    OUTCOMES,
-    Obs,
-    SortingBatch,
-    SortingSettings,
-    fail_of,
-    shape_of,
-)
+from app.sim.sorting.batch import OUTCOMES, Obs, SortingBatch, SortingSettings, batch_in
 from app.sim.sorting.kernels.task import FAILURE_SCALE, TIMEOUT
 from app.sim.sorting.state import SortingShape
 
@@ -34,18 +27,14 @@ class SortingTask:
 
     Args:
         cell: Work cell.
-        n_envs: Number of tasks.
-        settings: Starts, disturbances, rewards and ends.
-        first_env: Number of the first task.
+        batch: The tasks.
     """
 
-    def __init__(
-        self, cell: Cell, n_envs: int, settings: SortingSettings | None, first_env: int
-    ) -> None:
-        self._cell, shape = cell, shape_of(cell)
-        self.batch = SortingBatch(shape, fail_of(cell), n_envs, 0, settings, first_env)
-        self.action_space = cast("spaces.Space[Any]", spaces.Discrete(shape.n_actions))
-        self.observation_space = _obs_space(shape)
+    def __init__(self, cell: Cell, batch: SortingBatch) -> None:
+        self._cell, self.batch = cell, batch
+        n_actions = batch.shape.n_actions
+        self.action_space = cast("spaces.Space[Any]", spaces.Discrete(n_actions))
+        self.observation_space = _obs_space(batch.shape)
 
     def actions(self, given: Any) -> NDArray[np.int64]:
         """Return actions as the batch takes them, shape (n_envs,)."""
@@ -170,9 +159,9 @@ class SortingEnv(SingleEnv):
         first_env: int = 0,
         render_mode: str | None = None,
     ) -> None:
-        task = SortingTask(cell_of(cell), 1, settings, first_env)
-        self.batch = task.batch
-        super().__init__(task, render_mode, RENDER_FPS)
+        chosen = cell_of(cell)
+        self.batch = batch_in(chosen, 1, 0, settings, first_env)
+        super().__init__(SortingTask(chosen, self.batch), render_mode, RENDER_FPS)
 
     def action_masks(self) -> NDArray[np.bool_]:
         """Return which moves would change something, shape (n_actions,)."""
@@ -205,8 +194,9 @@ class SortingVectorEnv(BatchVectorEnv):
         max_episode_steps: int | None = None,
         render_mode: str | None = None,
     ) -> None:
-        task = SortingTask(cell_of(cell), num_envs, settings, first_env)
-        self.batch = task.batch
+        chosen = cell_of(cell)
+        self.batch = batch_in(chosen, num_envs, 0, settings, first_env)
+        task = SortingTask(chosen, self.batch)
         super().__init__(task, render_mode, RENDER_FPS, autoreset_mode, max_episode_steps)
 
     def action_masks(self) -> NDArray[np.bool_]:

@@ -14,6 +14,7 @@ from app.sim.envs.raycast import Image
 from app.sim.envs.rendering import people_solids, picture, target_solids
 from app.sim.pick.batch import OUTCOMES, PickBatch, PickSettings
 from app.sim.reach.batch import ReachBatch, ReachSettings
+from app.sim.reach.mixed_batch import ReachRows
 from app.sim.scene.scene import HumanKind
 
 Rows = NDArray[np.int64]
@@ -29,7 +30,15 @@ TIMEOUT = OUTCOMES.index("timeout")
 
 
 class Result(Protocol):
-    """What one batched step gave."""
+    """Result of a batched step; the arrays are overwritten by the next one."""
+
+    @property
+    def obs(self) -> NDArray[Any]:
+        """Observations, of new episodes where one ended, shape (n_envs, obs_size)."""
+
+    @property
+    def last_obs(self) -> NDArray[Any]:
+        """Final observations of the episodes that ended, shape (n_envs, obs_size)."""
 
     @property
     def rew(self) -> NDArray[np.float32]:
@@ -40,10 +49,21 @@ class Result(Protocol):
         """Outcome of the episodes that ended now, 0 elsewhere, shape (n_envs,)."""
 
 
-class Batch(Protocol):
-    """Rows that are stepped together and draw their episodes from one seed."""
+class SteppedBatch(Protocol):
+    """Environments that are stepped together."""
 
     n_envs: int
+
+    def reset(self) -> NDArray[Any]:
+        """Start episode 0 in every environment; return the observations."""
+
+    def step(self, act: Any, *, auto_reset: bool = True) -> Result:
+        """Step every environment whose episode has not ended."""
+
+
+class Batch(SteppedBatch, Protocol):
+    """Environments that draw their episodes from one seed."""
+
     seed: int
 
     @property
@@ -55,18 +75,15 @@ class Batch(Protocol):
         """Observations, shape (n_envs, obs_size); overwritten."""
 
     def start(self, rows: Rows) -> NDArray[Any]:
-        """Start the episodes numbered by ``episode`` in some rows."""
-
-    def step(self, act: Any, *, auto_reset: bool = True) -> Result:
-        """Step every row whose episode has not ended."""
+        """Start the episodes numbered by ``episode`` in some environments."""
 
 
-class Task(Protocol):
-    """A batch, and how it looks from outside."""
+class SteppedTask(Protocol):
+    """A batch with its spaces, for training."""
 
     @property
-    def batch(self) -> Batch:
-        """The rows."""
+    def batch(self) -> SteppedBatch:
+        """The environments."""
 
     @property
     def action_space(self) -> spaces.Space[Any]:
@@ -82,6 +99,14 @@ class Task(Protocol):
     def cut(self, ended: Rows) -> Mask:
         """Return which of these outcomes truncate an episode, shape (n_envs,)."""
 
+
+class Task(SteppedTask, Protocol):
+    """A batch with its spaces, infos and images."""
+
+    @property
+    def batch(self) -> Batch:
+        """The environments."""
+
     def infos(self) -> Infos:
         """Return what ``info`` says, an entry per row; nothing of it is overwritten."""
 
@@ -89,29 +114,52 @@ class Task(Protocol):
         """Return an image of one row."""
 
 
-class CellTask:
-    """Cells with a robot, people and a target.
+class ArmTask:
+    """A batch of robots with its spaces, for training.
 
     Args:
-        batch: The cells.
-        sees_time: Whether the time left is observed. A time-out then terminates, since it is
-            part of the task; otherwise it truncates.
+        batch: The environments.
+        sees_time: Whether the time left is observed. If so, a time-out terminates an episode,
+            otherwise it truncates it.
     """
 
-    def __init__(self, batch: PickBatch | ReachBatch, *, sees_time: bool) -> None:
-        self.batch, self._sees_time = batch, sees_time
+    def __init__(self, batch: PickBatch | ReachRows, *, sees_time: bool) -> None:
+        self._stepped, self._sees_time = batch, sees_time
         self.action_space = _box(1.0, batch.n_act)
         self.observation_space = _box(OBS_BOUND, batch.obs_size)
 
+    @property
+    def batch(self) -> SteppedBatch:
+        """The environments."""
+        return self._stepped
+
     def actions(self, given: Any) -> NDArray[np.float32]:
         """Return actions as the batch takes them, shape (n_envs, n_act)."""
-        shape = self.batch.n_envs, self.batch.n_act
+        shape = self._stepped.n_envs, self._stepped.n_act
         return np.asarray(given, dtype=np.float32).reshape(shape)
 
     def cut(self, ended: Rows) -> Mask:
         """Return which of these outcomes truncate an episode, shape (n_envs,)."""
         late: Mask = (ended == TIMEOUT) & (not self._sees_time)
         return late
+
+
+class CellTask(ArmTask):
+    """A batch of robots, people and targets.
+
+    Args:
+        batch: The environments.
+        sees_time: Whether the time left is observed; see :class:`ArmTask`.
+    """
+
+    def __init__(self, batch: PickBatch | ReachBatch, *, sees_time: bool) -> None:
+        super().__init__(batch, sees_time=sees_time)
+        self._cells = batch
+
+    @property
+    def batch(self) -> PickBatch | ReachBatch:
+        """The environments."""
+        return self._cells
 
     def infos(self) -> Infos:
         """Return what ``info`` says, an entry per cell."""

@@ -318,10 +318,14 @@ class SortingBatch:
 
 
 def batch_in(
-    cell: Cell, n_envs: int, seed: int, settings: SortingSettings | None = None
+    cell: Cell,
+    n_envs: int,
+    seed: int,
+    settings: SortingSettings | None = None,
+    first_env: int = 0,
 ) -> SortingBatch:
     """Return a batch with the size and the failure map of a work cell."""
-    return SortingBatch(shape_of(cell), fail_of(cell), n_envs, seed, settings)
+    return SortingBatch(shape_of(cell), fail_of(cell), n_envs, seed, settings, first_env)
 
 
 def observe(state: SortingState) -> Obs:

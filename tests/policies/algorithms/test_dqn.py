@@ -4,31 +4,37 @@ import numpy as np
 import pytest
 import torch
 
-from app.policies.algorithms.dqn import SortingDQN, margin_loss
-from app.policies.algorithms.sorting_vecenv import SortingVecEnv
+from app.policies.algorithms.dqn import SortingDQN, large_margin_loss
+from app.policies.algorithms.vecenv import BatchVecEnv
 from app.policies.configs import presets
+from app.policies.configs.fields import entries
 from app.policies.networks.sorting_q import NEVER
-from app.policies.training.sorting import adviser_of
+from app.policies.training.sorting import expert_of
 from app.sim.cells.cell import load_cell
+from app.sim.envs.sorting import SortingTask
 from app.sim.sorting.batch import SortingSettings, batch_in
 from app.sim.sorting.planner import solve
+from tests.policies.conftest import preset_of
 
 SMALL = {
-    "n_envs": 16,
-    "buffer_size": 2_000,
-    "batch_size": 64,
-    "learning_starts": 64,
-    "width": 32,
+    "learning.n_envs": 16,
+    "learning.buffer_size": 2_000,
+    "learning.batch_size": 64,
+    "learning.learning_starts": 64,
+    "networks.width": 32,
 }
 
 
 def model_of(name: str = "sorting-e0-dqn", **overrides) -> SortingDQN:
-    small = {**SMALL, "total_steps": 51_200, **overrides}
-    preset = presets.resolve(name, small)
+    paths = {one.path.split(".")[1]: one.path for one in entries(presets.get(name))}
+    overrides = {paths[key]: value for key, value in overrides.items()}
+    small = {**SMALL, "learning.total_steps": 51_200, **overrides}
+    preset = preset_of(name, small)
     cell = load_cell(preset.cell)
-    batch = batch_in(cell, preset.n_envs, 1, preset.settings(0.0))
-    adviser = adviser_of(batch.shape) if preset.advice_share else None
-    return SortingDQN(preset, SortingVecEnv(batch), 1, adviser)
+    batch = batch_in(cell, preset.learning.n_envs, 1, preset.settings(0.0))
+    env = BatchVecEnv(SortingTask(cell, batch))
+    expert = expert_of(batch.shape) if preset.expert.share else None
+    return SortingDQN(preset, env, batch, 1, expert)
 
 
 def test_random_and_greedy_moves_are_valid_moves():
@@ -58,7 +64,7 @@ def test_the_double_target_takes_the_online_networks_move():
 
 
 def test_the_target_network_is_copied_every_so_many_updates():
-    model = model_of(target_every=7)
+    model = model_of(target_update_interval=7)
     model.learn(64 + 16 * 6)
     before = model.q_net_target.state_dict()["q_net.value.bias"].clone()
     model.train(7 - model._n_updates % 7, 64)
@@ -71,7 +77,7 @@ def test_the_target_network_is_copied_every_so_many_updates():
 def test_advice_marks_all_moves_that_begin_a_shortest_plan():
     settings = SortingSettings(disturbed_share=0.6, random_map_share=0.5)
     batch = batch_in(load_cell("sorting-e1"), 40, 3, settings)
-    marks = adviser_of(batch.shape)(batch.reset())
+    marks = expert_of(batch.shape)(batch.reset())
     for e in range(40):
         assert tuple(np.flatnonzero(marks[e])) == solve(batch.state_of(e), batch.shape).first
 
@@ -82,22 +88,22 @@ def test_advice_marks_all_moves_that_begin_a_shortest_plan():
 )
 def test_the_margin_asks_one_best_move_to_be_worth_more(values, short):
     best = torch.tensor([[True, False, False]])
-    assert float(margin_loss(torch.tensor([values]), best, 0.1)) == pytest.approx(short)
+    assert float(large_margin_loss(torch.tensor([values]), best, 0.1)) == pytest.approx(short)
 
 
 def test_several_best_moves_need_not_be_told_apart():
     best = torch.tensor([[True, True, False]])
     values = torch.tensor([[0.1, 1.0, 0.5]])
-    assert float(margin_loss(values, best, 0.1)) == 0.0
+    assert float(large_margin_loss(values, best, 0.1)) == 0.0
 
 
 def test_advice_makes_best_moves_likelier():
     settings = SortingSettings(disturbed_share=0.5)
     obs = batch_in(load_cell("sorting-e0"), 400, 9, settings).reset()
-    marks = adviser_of(model_of().tasks.shape)(obs)
+    marks = expert_of(model_of().tasks.shape)(obs)
     shares = []
     for share in (0.0, 1.0):
-        model = model_of(advice_share=share)
+        model = model_of(share=share)
         model.learn(64 + 16 * 150)
         with torch.no_grad():
             moves = model.q_net(torch.as_tensor(obs)).argmax(dim=1).numpy()

@@ -4,17 +4,18 @@ import numpy as np
 import pytest
 import torch
 
-from app.policies.algorithms.exploration import OUNoise
+from app.policies.algorithms.exploration import OptionExploration, OUNoise, PerEnvAR1Noise
 from app.policies.algorithms.prioritized_replay import PrioritisedReplay
 from app.policies.algorithms.td3 import BatchTD3, critics_of
-from app.policies.configs import presets
+from app.policies.configs.td3 import NoiseExploration
 from app.policies.networks.actor_critic import Critics, PlainActor, ResidualActor
 from app.policies.training import pick as pick_training
 from app.policies.training import reach as reach_training
 from app.policies.training.run import TrainingRun
 from app.sim.cells.cell import load_cell
+from app.sim.pick.batch import PickBatch, PickSettings
 from app.sim.pick.kernels.observation import LAYOUT, N_FEATURES
-from app.sim.reach.batch import ReachBatch
+from tests.policies.conftest import preset_of
 
 
 def model_of(run: TrainingRun) -> BatchTD3:
@@ -45,11 +46,12 @@ def test_the_least_of_both_critics_is_the_value():
 
 
 def test_the_actor_stays_frozen_while_the_critics_learn(model, tiny_preset):
+    learning = tiny_preset.learning
     actor = [p.clone() for p in model.actor.parameters()]
     target = [p.clone() for p in model.critic_target.parameters()]
-    steps = tiny_preset.learning_starts + 16 * (tiny_preset.actor_frozen_updates - 1)
+    steps = learning.learning_starts + 16 * (learning.actor_frozen_updates - 1)
     model.learn(steps)
-    assert 0 < model._n_updates < tiny_preset.actor_frozen_updates
+    assert 0 < model._n_updates < learning.actor_frozen_updates
     assert all(torch.equal(a, b) for a, b in zip(actor, model.actor.parameters(), strict=True))
     moved = zip(target, model.critic_target.parameters(), strict=True)
     assert any(not torch.equal(a, b) for a, b in moved)
@@ -64,7 +66,7 @@ def test_stable_baselines_trains_the_same_modules_that_decide(model):
 
 def test_greedy_rows_explore_nothing_and_noise_grows_with_the_row(model):
     exploration = model.exploration
-    act = np.zeros((model.preset.n_envs, 5), dtype=np.float32)
+    act = np.zeros((model.n_envs, 5), dtype=np.float32)
     taken = np.stack([exploration.apply(act) for _ in range(200)])
     spread = taken.std(axis=(0, 2))
     assert np.all(spread[: exploration.n_greedy] == 0.0)
@@ -88,15 +90,15 @@ def test_critics_learn_the_value_of_an_episode_that_ends_at_once(model):
 def ddpg() -> BatchTD3:
     """The thesis recipe with small networks."""
     small = {
-        "total_steps": 4000,
-        "progress_steps": 1000,
-        "checkpoint_steps": 1000,
-        "buffer_size": 2000,
-        "learning_starts": 100,
-        "width": 16,
-        "batch_size": 16,
+        "learning.total_steps": 4000,
+        "learning.progress_steps": 1000,
+        "learning.checkpoint_steps": 1000,
+        "learning.buffer_size": 2000,
+        "learning.learning_starts": 100,
+        "networks.width": 16,
+        "learning.batch_size": 16,
     }
-    preset = presets.resolve("reach-ddpg-thesis", small)
+    preset = preset_of("reach-ddpg-thesis", small)
     run, _ = reach_training.start(preset, 3, None, load_cell("shared-workspace"))
     return model_of(run)
 
@@ -129,14 +131,14 @@ def test_the_plain_actor_sees_the_first_numbers_and_holds_still_at_first():
 
 
 def test_options_take_over_in_every_second_noisy_row():
-    preset = presets.resolve("reach-td3", {"n_envs": 16, "option_rate": 0.5, "sigma_max": 0.0})
-    cell = load_cell("shared-workspace")
-    batch = ReachBatch(cell, 16, 1, reach_training.settings_of(preset))
+    batch = PickBatch(load_cell("pick-and-place"), 16, 1, PickSettings())
     batch.reset()
-    explorer = reach_training.explorer_of(preset, batch, 3)
-    still = np.zeros((16, 6), dtype=np.float32)
+    rng, silent = np.random.default_rng(3), NoiseExploration(sigma_max=0.0)
+    noise = PerEnvAR1Noise((16, 5), batch.arm.dt, silent, rng)
+    explorer = OptionExploration(noise, batch, batch.world.station_q, 0.5, rng)
+    still = np.zeros((16, 5), dtype=np.float32)
     changed = np.zeros(16, dtype=bool)
-    for _ in range(60):
+    for _ in range(200):
         taken = explorer.apply(still)
         assert np.abs(taken).max() <= 1.0
         changed |= taken.any(axis=1)
@@ -145,7 +147,7 @@ def test_options_take_over_in_every_second_noisy_row():
 
 
 def test_ornstein_uhlenbeck_noise_settles_where_push_and_pull_balance():
-    noise, still = OUNoise(64, 6, 0.3, 0.1, np.random.default_rng(2)), np.zeros((64, 6))
+    noise, still = OUNoise((64, 6), 0.3, 0.1, np.random.default_rng(2)), np.zeros((64, 6))
     taken = np.stack([noise.apply(still.astype(np.float32)) for _ in range(400)])[50:]
     assert taken.std() == pytest.approx(0.1 / np.sqrt(1.0 - 0.7**2), rel=0.03)
     one, later = taken[:-1].ravel(), taken[1:].ravel()

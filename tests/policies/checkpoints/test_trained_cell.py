@@ -1,7 +1,5 @@
 """Which cell a policy belongs to, and that it refuses every other."""
 
-from dataclasses import replace
-
 import pytest
 
 from app.errors import BadCell, CheckpointMismatch, InvalidInput, NotFound
@@ -12,12 +10,13 @@ from app.policies.inference.task_selection import TaskChooser
 from app.policies.training.train import train
 from app.sim.cells.cell import load_cell
 from tests import workshop
+from tests.policies.conftest import TINY, preset_of
 
 
 @pytest.fixture(scope="module")
-def own_policy(tiny_preset):
+def own_policy():
     """The policy of a tiny training in a cell of the user's own."""
-    preset = replace(tiny_preset, cell="workshop", total_steps=512)
+    preset = preset_of("pick-td3", TINY, {"cell": "workshop", "learning.total_steps": 1024})
     return train(
         preset,
         seed=1,

@@ -8,16 +8,24 @@ import pytest
 
 from app.errors import InvalidInput, NotFound
 from app.policies.configs import presets
+from app.policies.configs.fields import entries, read_config
 from app.sim.robot.actions import ActionSettings
 
 
 @pytest.mark.parametrize("name", presets.PRESETS)
 def test_every_default_lies_inside_its_own_bounds(name):
-    for info in presets.fields(name):
-        if info.type == "choice":
-            assert info.default in info.choices, info.name
+    for entry in entries(presets.get(name)):
+        if entry.bounds is None:
+            assert entry.value in entry.choices, entry.path
         else:
-            assert info.minimum <= info.default <= info.maximum, info.name
+            low, high = entry.bounds
+            assert low <= entry.value <= high, entry.path
+
+
+@pytest.mark.parametrize("name", presets.PRESETS)
+def test_a_preset_is_read_from_its_own_data(name):
+    preset = presets.get(name)
+    assert read_config(type(preset), preset.model_dump(), "manifest.preset") == preset
 
 
 def test_resolving_without_overrides_gives_the_preset():
@@ -33,20 +41,23 @@ def test_an_unknown_preset_names_the_known_ones():
     ("overrides", "field"),
     [
         ({"colour": 1}, "overrides.colour"),
-        ({"gamma": 2.0}, "overrides.gamma"),
-        ({"gamma": math.nan}, "overrides.gamma"),
-        ({"gamma": "0.9"}, "overrides.gamma"),
-        ({"gamma": True}, "overrides.gamma"),
-        ({"n_envs": 16.5}, "overrides.n_envs"),
-        ({"total_steps": 10_001}, "overrides.total_steps"),
-        ({"checkpoint_steps": 1_280}, "overrides.checkpoint_steps"),
-        ({"buffer_size": 2_000}, "overrides.buffer_size"),
-        ({"time_limit_s": 5.0}, "overrides.short_limit_s"),
-        ({"action_degree": 4}, "overrides.action_degree"),
-        ({"action_bounds": "none"}, "overrides.action_bounds"),
-        ({"action_meaning": 1}, "overrides.action_meaning"),
-        ({"action_degree": 3, "action_bounds": "one-step"}, "overrides.action_bounds"),
-        ({"total_steps": 12_800, "progress_steps": 12_800}, "overrides.learning_starts"),
+        ({"learning": {"gamma": 2.0}}, "overrides.learning.gamma"),
+        ({"learning": {"gamma": math.nan}}, "overrides.learning.gamma"),
+        ({"learning": {"gamma": "0.9"}}, "overrides.learning.gamma"),
+        ({"learning": {"gamma": True}}, "overrides.learning.gamma"),
+        ({"learning": {"n_envs": 16.5}}, "overrides.learning.n_envs"),
+        ({"learning": {"total_steps": 10_001}}, "overrides.learning.total_steps"),
+        ({"learning": {"checkpoint_steps": 1_280}}, "overrides.learning.checkpoint_steps"),
+        ({"learning": {"buffer_size": 2_000}}, "overrides.learning.buffer_size"),
+        ({"episode": {"time_limit_s": 5.0}}, "overrides.episode.short_limit_s"),
+        ({"action": {"degree": 4}}, "overrides.action.degree"),
+        ({"action": {"bounds": "none"}}, "overrides.action.bounds"),
+        ({"action": {"meaning": 1}}, "overrides.action.meaning"),
+        ({"action": {"degree": 3, "bounds": "one-step"}}, "overrides.action.bounds"),
+        (
+            {"learning": {"total_steps": 12_800, "progress_steps": 12_800}},
+            "overrides.learning.learning_starts",
+        ),
     ],
 )
 def test_a_bad_override_is_refused_by_name(overrides, field):
@@ -65,11 +76,11 @@ def test_presets_load_no_learning_library():
 
 
 def test_default_action_is_the_viable_speed_of_degree_two():
-    assert presets.get("pick-td3").action == ActionSettings()
+    assert presets.get("pick-td3").action.settings == ActionSettings()
 
 
 def test_overrides_choose_the_action():
-    chosen = {"action_bounds": "one-step", "action_meaning": "coefficient"}
-    action = presets.resolve("pick-td3", chosen).action
+    chosen = {"action": {"bounds": "one-step", "meaning": "coefficient"}}
+    action = presets.resolve("pick-td3", chosen).action.settings
     assert action == ActionSettings(bounds="one-step", meaning="coefficient")
-    assert presets.resolve("pick-td3", {"action_degree": 3}).action.degree == 3
+    assert presets.resolve("pick-td3", {"action": {"degree": 3}}).action.degree == 3

@@ -1,7 +1,6 @@
 """Who plays the sorting task in tests: as well as can be, badly in a known way, untrained."""
 
 from collections.abc import Callable
-from dataclasses import asdict
 from itertools import count
 
 import numpy as np
@@ -9,6 +8,7 @@ import torch
 
 from app.policies.checkpoints.checkpoint import FORMAT, Checkpoint, pack
 from app.policies.configs import presets
+from app.policies.configs.sorting import SortingPreset
 from app.policies.networks.sorting_q import NETWORKS, layout_of
 from app.sim.cells.cell import load_cell
 from app.sim.sorting.batch import shape_of
@@ -82,14 +82,15 @@ def at_random(shape: SortingShape, seed: int):
 
 def untrained(cell: str = "sorting-e0") -> Checkpoint:
     """Return a sorting policy that has learned nothing."""
-    preset = presets.get("sorting-e0-dqn")
+    preset = presets.resolve("sorting-e0-dqn", {"networks": {"width": 16}})
+    assert isinstance(preset, SortingPreset)
     shape = shape_of(load_cell(cell))
     torch.manual_seed(1)
-    network = NETWORKS[preset.network](shape, 16)
+    network = NETWORKS[preset.networks.kind](shape, 16)
     manifest = {
         "format": FORMAT,
         "kind": "policy",
-        "preset": asdict(preset),
+        "preset": preset.model_dump(),
         "seed": 1,
         "cell": cell,
         "layout": layout_of(shape),

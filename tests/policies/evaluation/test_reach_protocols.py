@@ -139,7 +139,7 @@ def test_a_row_per_tracker_stands_beside_the_exact_state() -> None:
 
 
 def test_a_jerk_limited_policy_is_measured_as_such() -> None:
-    policy = untrained_reach(width=16, action_degree=3)
+    policy = untrained_reach(width=16, degree=3)
     result = evaluate("reach-smoothness", policy, episodes=N, seed=5)
     (row,) = result["results"]
     assert row["name"] == "degree-3"

@@ -10,7 +10,6 @@ from app.errors import CheckpointMismatch, InvalidInput
 from app.policies.checkpoints import checkpoint as formats
 from app.policies.checkpoints import pretrained
 from app.policies.checkpoints.model_state import under
-from app.policies.configs import presets
 from app.policies.inference.reach_policy import CROWD, ReachPolicy, is_reach
 from app.policies.training.reach import networks_of
 from app.sim.cells.cell import load_cell
@@ -19,9 +18,7 @@ from app.sim.reach.goal_sets import halton_targets
 from app.sim.reach.reach_actor import ReachActor
 from app.sim.reach.rollout.kernels.actor import FEW
 from app.sim.robot.actions import ActionSettings
-from tests.policies.untrained import untrained_reach
-
-SEEN = {"observation": "forecast"}
+from tests.policies.untrained import reach_preset, untrained_reach
 
 
 @pytest.fixture(scope="module")
@@ -38,8 +35,8 @@ def changed(checkpoint, **fields):
 def test_it_acts_as_the_network_that_was_trained(layers, kind):
     checkpoint = untrained_reach(seed=4, width=48, layers=layers, actor=kind)
     policy = ReachPolicy(checkpoint)
-    preset = presets.resolve("reach-td3", {"width": 48, "layers": layers, "actor": kind})
-    actor = networks_of(preset, policy.n_obs, policy.n_obs).actor()
+    preset = reach_preset(width=48, layers=layers, actor=kind)
+    actor = networks_of(preset, policy.n_obs).actor()
     actor.load_state_dict(under(checkpoint.arrays(), "actor"))
     obs = np.random.default_rng(1).normal(size=(300, policy.n_obs)).astype(np.float32)
     with torch.no_grad():
@@ -82,8 +79,8 @@ def test_it_says_what_it_is(checkpoint):
 def test_people_as_a_set_have_no_order_and_nobody_counts_for_nothing(kind):
     checkpoint = untrained_reach(seed=4, width=48, actor=kind, observation="crowd")
     policy = ReachPolicy(checkpoint)
-    preset = presets.resolve("reach-td3", {"width": 48, "actor": kind, "observation": "crowd"})
-    actor = networks_of(preset, policy.n_obs, policy.n_obs).actor()
+    preset = reach_preset(width=48, actor=kind, observation="crowd")
+    actor = networks_of(preset, policy.n_obs).actor()
     actor.load_state_dict(under(checkpoint.arrays(), "actor"))
     obs = np.random.default_rng(1).normal(size=(50, policy.n_obs)).astype(np.float32)
     blocks = obs[:, CROWD.first :].reshape(50, CROWD.n_people, CROWD.n_block)
@@ -134,9 +131,9 @@ def test_a_policy_of_another_task_is_refused():
     [
         ({"act_size": 5}, "act_size"),
         ({"layout": [["human", 5]]}, "layout"),
-        ({"preset": {**SEEN, "goals": "moon"}}, "manifest.preset.goals"),
-        ({"preset": {**SEEN, "goals": "halton", "n_halton": "1"}}, "n_halton"),
-        ({"preset": {"goals": "grid"}}, "manifest.preset.observation"),
+        ({"preset": {"episode": {"goals": "moon"}}}, r"manifest\.preset\.episode\.goals"),
+        ({"preset": {"episode": {"goals": "halton", "n_halton": "1"}}}, "n_halton"),
+        ({"preset": {"goals": "grid"}}, r"manifest\.preset\.goals"),
     ],
 )
 def test_a_manifest_that_does_not_fit_is_named(checkpoint, fields, fault):

@@ -144,7 +144,8 @@ def test_nobody_in_the_cell_is_answered(chooser):
 
 def test_a_policy_that_never_met_nobody_says_so():
     checkpoint = pretrained.load("pick")
-    preset = {**checkpoint.manifest["preset"], "human_absent": 0.0}
+    preset = checkpoint.manifest["preset"]
+    preset = {**preset, "people": {**preset["people"], "human_absent": 0.0}}
     always_beside = replace(checkpoint, manifest={**checkpoint.manifest, "preset": preset})
     decision = TaskChooser(always_beside).decide(HOME, np.zeros(6), [], cubes("cube0"))
     assert {one.field for one in decision.outside} >= {"people[0].q.pelvis_y"}

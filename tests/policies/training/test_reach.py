@@ -5,33 +5,33 @@ import pytest
 import torch
 
 from app.errors import CheckpointMismatch, InvalidInput
-from app.policies.algorithms.vecenv import CellVecEnv
+from app.policies.algorithms.vecenv import BatchVecEnv
 from app.policies.configs import presets
 from app.policies.inference.reach_policy import ReachPolicy
-from app.policies.training import reach as reach_training
-from app.policies.training.reach import batch_of, play, settings_of, states_met
+from app.policies.training.reach import batch_of, play, settings_of, visited_states
 from app.sim.cells.cell import load_cell
+from app.sim.envs.tasks import ArmTask
 from app.sim.reach.batch import THESIS_WEIGHTS, ReachBatch, ReachSettings
 from app.sim.reach.monitored.batch import GuardedReach
-from tests.policies.conftest import Recorder
+from tests.policies.conftest import Recorder, preset_of
 
 TINY = {
-    "total_steps": 1536,
-    "n_envs": 16,
-    "buffer_size": 2000,
-    "batch_size": 32,
-    "learning_starts": 256,
-    "actor_frozen_updates": 8,
-    "width": 32,
-    "progress_steps": 256,
-    "progress_episodes": 8,
-    "checkpoint_steps": 512,
+    "learning.total_steps": 1536,
+    "learning.n_envs": 16,
+    "learning.buffer_size": 2000,
+    "learning.batch_size": 32,
+    "learning.learning_starts": 256,
+    "learning.actor_frozen_updates": 8,
+    "networks.width": 32,
+    "learning.progress_steps": 256,
+    "learning.progress_episodes": 8,
+    "learning.checkpoint_steps": 512,
 }
 
 
 @pytest.fixture(scope="module")
 def preset():
-    return presets.resolve("reach-td3", TINY)
+    return preset_of("reach-td3", TINY)
 
 
 @pytest.fixture(scope="module")
@@ -78,12 +78,12 @@ def test_what_was_trained_decides_as_a_policy(preset, ran):
 
 
 def test_the_monitored_preset_trains_and_is_counted_under_the_layer():
-    preset = presets.resolve("reach-td3-monitored", TINY)
+    preset = preset_of("reach-td3-monitored", TINY)
     batch = batch_of(preset, load_cell("shared-workspace"), 16, 3)
     assert isinstance(batch, GuardedReach)
-    assert batch.settings.weights.c_o == preset.c_o > 0.0
+    assert batch.settings.weights.c_o == preset.reward.c_o > 0.0
     assert not isinstance(
-        batch_of(presets.resolve("reach-td3", TINY), batch.cell, 4, 3), GuardedReach
+        batch_of(preset_of("reach-td3", TINY), batch.cell, 4, 3), GuardedReach
     )
     ran = Recorder().run(preset)
     assert ReachPolicy(ran.checkpoint).acts(batch.reset()).shape == (16, 6)
@@ -91,8 +91,10 @@ def test_the_monitored_preset_trains_and_is_counted_under_the_layer():
 
 
 def test_monitoring_nobody_is_refused():
-    with pytest.raises(InvalidInput, match=r"overrides\.safety = 'ssm' needs somebody"):
-        presets.resolve("reach-td3-monitored", {"n_people": 0})
+    with pytest.raises(
+        InvalidInput, match=r"overrides\.episode\.safety = 'ssm' needs n_people above 0"
+    ):
+        preset_of("reach-td3-monitored", {"people.n_people": 0})
 
 
 def test_the_reward_of_what_is_played_is_that_of_the_batch(preset):
@@ -105,14 +107,15 @@ def test_the_reward_of_what_is_played_is_that_of_the_batch(preset):
     steps = np.rint(batch.state.elapsed / batch.arm.dt)
     collided = ended == 2
     np.testing.assert_allclose(
-        returns, -preset.c_step * steps - preset.c_c * collided, atol=1e-4
+        returns, -preset.reward.c_step * steps - preset.reward.c_c * collided, atol=1e-4
     )
 
 
 @pytest.mark.parametrize(("sees_time", "cut"), [(True, False), (False, True)])
 def test_only_where_time_is_not_seen_is_a_time_out_no_true_end(sees_time, cut):
     settings = ReachSettings(time_limit_s=0.04, people=())
-    env = CellVecEnv(ReachBatch(load_cell("shared-workspace"), 2, 1, settings), sees_time)
+    batch = ReachBatch(load_cell("shared-workspace"), 2, 1, settings)
+    env = BatchVecEnv(ArmTask(batch, sees_time=sees_time))
     env.reset()
     for _ in range(2):
         _, _, done, infos = env.step(np.zeros((2, 6), dtype=np.float32))
@@ -122,10 +125,10 @@ def test_only_where_time_is_not_seen_is_a_time_out_no_true_end(sees_time, cut):
 
 
 def test_without_people_there_is_no_range_of_them():
-    settings = settings_of(presets.resolve("reach-td3", {**TINY, "n_people": 0}))
+    settings = settings_of(preset_of("reach-td3", {**TINY, "people.n_people": 0}))
     batch = ReachBatch(load_cell("shared-workspace"), 2, 1, settings)
     batch.reset()
-    assert set(states_met(batch)) == {"q", "qd", "goal"}
+    assert set(visited_states(batch)) == {"q", "qd", "goal"}
 
 
 def test_the_thesis_preset_is_table_4_2():
@@ -134,51 +137,52 @@ def test_the_thesis_preset_is_table_4_2():
     assert settings.weights == THESIS_WEIGHTS
     assert (settings.observation, settings.collision_ends) == ("state", False)
     assert (settings.action.bounds, settings.action.meaning) == ("one-step", "coefficient")
-    assert (preset.layers, preset.width, preset.batch_size) == (10, 400, 128)
-    assert preset.lr_start * preset.actor_lr_ratio == pytest.approx(1e-3)
-    preset.check()
+    assert (preset.networks.layers, preset.networks.width, preset.learning.batch_size) == (
+        10,
+        400,
+        128,
+    )
+    assert preset.learning.lr_start * preset.learning.actor_lr_ratio == pytest.approx(1e-3)
 
 
 @pytest.mark.parametrize(
     ("overrides", "field"),
     [
-        ({"goals": "moon"}, "overrides.goals"),
-        ({"n_people": 5}, "overrides.n_people"),
-        ({"gamma": 1.0}, "overrides.gamma"),
-        ({"action_degree": 3, "action_bounds": "one-step"}, "overrides.action_bounds"),
-        ({"width": 1024, "layers": 8}, "overrides.width"),
+        ({"episode.goals": "moon"}, "overrides.episode.goals"),
+        ({"people.n_people": 5}, "overrides.people.n_people"),
+        ({"learning.gamma": 1.0}, "overrides.learning.gamma"),
+        ({"action.degree": 3, "action.bounds": "one-step"}, "overrides.action.bounds"),
+        ({"networks.width": 1024, "networks.layers": 8}, "overrides.networks.width"),
+        ({"episode.observation": "state"}, "overrides.networks.actor"),
+        ({"networks.dropped_quantiles": 25}, "overrides.networks.dropped_quantiles"),
+        ({"people.count": "up-to", "people.n_people": 0}, "overrides.people.count"),
+        ({"people.count": "up-to", "episode.safety": "ssm"}, "overrides.people.count"),
         (
-            {"critic_sees": "future", "observation": "state", "actor": "plain"},
-            "overrides.critic_sees",
+            {"learning.learning_starts": 900_000, "learning.total_steps": 512_000},
+            "overrides.learning.learning_starts",
         ),
-        ({"dropped_quantiles": 25}, "overrides.dropped_quantiles"),
-        ({"people": "up-to", "n_people": 0}, "overrides.people"),
-        ({"people": "up-to", "option_rate": 0.01}, "overrides.people"),
-        ({"learning_starts": 900_000, "total_steps": 512_000}, "overrides.learning_starts"),
     ],
 )
 def test_a_bad_override_is_refused_by_name(overrides, field):
     with pytest.raises(InvalidInput) as refused:
-        presets.resolve("reach-td3", overrides)
+        preset_of("reach-td3", overrides)
     assert refused.value.field == field
 
 
 @pytest.mark.parametrize(
     "option",
     [
-        {"critic": "quantiles", "n_quantiles": 8},
-        {"critic_sees": "future"},
-        {"precision": "bfloat16"},
-        {"alpha": 0.5, "n_steps": 3},
-        {"n_critics": 3, "layers": 3},
-        {"goals": "halton", "n_people": 2},
-        {"observation": "crowd", "n_people": 3, "people": "up-to"},
+        {"networks.critic": "quantiles", "networks.n_quantiles": 8},
+        {"learning.alpha": 0.5, "learning.n_steps": 3},
+        {"networks.n_critics": 3, "networks.layers": 3},
+        {"episode.goals": "halton", "people.n_people": 2},
+        {"episode.observation": "crowd", "people.n_people": 3, "people.count": "up-to"},
     ],
 )
 def test_every_option_trains_and_moves_the_actor(option):
-    short = {**TINY, "total_steps": 1024, "checkpoint_steps": 256, **option}
+    short = {**TINY, "learning.total_steps": 1024, "learning.checkpoint_steps": 256, **option}
     recorder = Recorder()
-    recorder.run(presets.resolve("reach-td3", short))
+    recorder.run(preset_of("reach-td3", short))
     before, after = recorder.checkpoints[0][1].arrays(), recorder.checkpoints[-1][1].arrays()
     assert all(np.isfinite(array).all() for array in after.values())
     assert not np.array_equal(before["actor.net.0.weight"], after["actor.net.0.weight"])
@@ -186,7 +190,7 @@ def test_every_option_trains_and_moves_the_actor(option):
 
 
 def test_averaged_weights_are_what_is_shown_and_kept():
-    preset = presets.resolve("reach-td3", {**TINY, "ema": 0.99})
+    preset = preset_of("reach-td3", {**TINY, "learning.ema": 0.99})
     stopped = Recorder(stop_at=768)
     stopped.run(preset)
     _, policy, state = stopped.checkpoints[-1]
@@ -195,22 +199,4 @@ def test_averaged_weights_are_what_is_shown_and_kept():
     assert not np.array_equal(shown, arrays["actor_learned.net.0.weight"])
     resumed = Recorder()
     resumed.run(preset, resume=state)
-    assert resumed.progress[-1].step == preset.total_steps
-
-
-def test_critics_that_see_the_future_stand_beside_an_actor_that_does_not(preset):
-    ahead = presets.resolve("reach-td3", {**TINY, "critic_sees": "future"})
-    run, _ = reach_training.start(ahead, 1, None, load_cell("shared-workspace"))
-    plain, _ = reach_training.start(preset, 1, None, load_cell("shared-workspace"))
-    shapes = [
-        {name: array.shape for name, array in one.checkpoints()[0].arrays().items()}
-        for one in (run, plain)
-    ]
-    assert shapes[0]["actor.net.0.weight"] == shapes[1]["actor.net.0.weight"]
-    assert shapes[0]["critic.q1.0.weight"][1] == shapes[1]["critic.q1.0.weight"][1] + 12
-    env = run.model.get_env()
-    obs = env.reset()
-    with torch.no_grad():
-        act = run.model.actor(torch.as_tensor(obs))
-        obs[:, -12:] += 1.0
-        assert torch.equal(act, run.model.actor(torch.as_tensor(obs)))
+    assert resumed.progress[-1].step == preset.learning.total_steps

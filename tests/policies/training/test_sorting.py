@@ -5,22 +5,21 @@ import pytest
 import torch
 
 from app.errors import CheckpointMismatch, InvalidInput
-from app.policies.configs import presets
 from app.policies.inference.sorting_policy import SortingPolicy, is_sorting
 from app.sim.cells.cell import load_cell
 from app.sim.sorting.batch import OUTCOMES, SortingSettings, batch_in
-from tests.policies.conftest import Recorder
+from tests.policies.conftest import Recorder, preset_of
 
 SMALL = {
-    "total_steps": 12_800,
-    "n_envs": 64,
-    "buffer_size": 12_800,
-    "batch_size": 128,
-    "learning_starts": 1_280,
-    "width": 64,
-    "progress_steps": 6_400,
-    "checkpoint_steps": 6_400,
-    "progress_episodes": 100,
+    "learning.total_steps": 12_800,
+    "learning.n_envs": 64,
+    "learning.buffer_size": 12_800,
+    "learning.batch_size": 128,
+    "learning.learning_starts": 1_280,
+    "networks.width": 64,
+    "learning.progress_steps": 6_400,
+    "learning.checkpoint_steps": 6_400,
+    "learning.progress_episodes": 100,
 }
 """Overrides that make a training last seconds."""
 
@@ -28,7 +27,7 @@ SMALL = {
 @pytest.fixture(scope="module")
 def small_run():
     recorder = Recorder()
-    recorder.result = recorder.run(presets.resolve("sorting-e0-dqn", SMALL))
+    recorder.result = recorder.run(preset_of("sorting-e0-dqn", SMALL))
     return recorder
 
 
@@ -41,12 +40,12 @@ def test_the_curve_counts_steps_updates_and_greedy_episodes(small_run):
 
 
 def test_the_same_seed_trains_the_same_bits(small_run):
-    again = Recorder().run(presets.resolve("sorting-e0-dqn", SMALL))
+    again = Recorder().run(preset_of("sorting-e0-dqn", SMALL))
     assert again.checkpoint.tensors == small_run.result.checkpoint.tensors
 
 
 def test_a_stopped_run_goes_on():
-    preset = presets.resolve("sorting-e0-dqn", SMALL)
+    preset = preset_of("sorting-e0-dqn", SMALL)
     stopped = Recorder(stop_at=6_400)
     stopped.run(preset)
     step, _, state = stopped.checkpoints[-1]
@@ -55,7 +54,7 @@ def test_a_stopped_run_goes_on():
     assert (step, result.step) == (6_400, 12_800)
     assert [point.step for point in resumed.progress] == [12_800]
     with pytest.raises(CheckpointMismatch, match="preset"):
-        other = presets.resolve("sorting-e0-dqn", {**SMALL, "gamma": 0.9})
+        other = preset_of("sorting-e0-dqn", {**SMALL, "learning.gamma": 0.9})
         Recorder().run(other, resume=state)
 
 
@@ -79,9 +78,18 @@ def test_a_policy_that_moves_is_no_policy_that_sorts(tiny_run):
 
 @pytest.mark.parametrize("name", ["sorting-e0-thesis", "sorting-e1-dqn"])
 def test_other_presets_train_too(name):
-    steps = {"total_steps": 8_000, "progress_steps": 8_000, "checkpoint_steps": 8_000}
-    small = {**steps, "learning_starts": 4_000, "n_envs": 40, "progress_episodes": 20}
-    result = Recorder().run(presets.resolve(name, small))
+    steps = {
+        "learning.total_steps": 8_000,
+        "learning.progress_steps": 8_000,
+        "learning.checkpoint_steps": 8_000,
+    }
+    small = {
+        **steps,
+        "learning.learning_starts": 4_000,
+        "learning.n_envs": 40,
+        "learning.progress_episodes": 20,
+    }
+    result = Recorder().run(preset_of(name, small))
     arrays = result.checkpoint.arrays()
     assert all(np.isfinite(array).all() for array in arrays.values())
     assert SortingPolicy(result.checkpoint).values(
@@ -104,11 +112,11 @@ def test_a_minute_of_training_sorts_ten_objects():
     """Reproduces the learning curve of sorting-e0-dqn: above 0.99 by 256,000 steps."""
     torch.set_num_threads(1)
     short = {
-        "total_steps": 256_000,
-        "progress_steps": 51_200,
-        "checkpoint_steps": 256_000,
+        "learning.total_steps": 256_000,
+        "learning.progress_steps": 51_200,
+        "learning.checkpoint_steps": 256_000,
     }
-    result = Recorder().run(presets.resolve("sorting-e0-dqn", short))
+    result = Recorder().run(preset_of("sorting-e0-dqn", short))
     policy = SortingPolicy(result.checkpoint)
     assert greedy_success(policy, 10, 10) > 0.99
     assert greedy_success(policy, 10, 3) > 0.99

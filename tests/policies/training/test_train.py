@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from app.errors import CheckpointMismatch
-from app.policies.configs import presets
 from app.policies.inference.task_selection import TaskChooser, ValueNetworks
 from app.policies.training.pick import LAYOUTS
 from app.sim.cells.cell import load_cell
@@ -15,7 +14,7 @@ from app.sim.human.anthropometry import percentile_body
 from app.sim.human.person import Person
 from app.sim.pick.kernels.observation import N_FEATURES, N_WITH_BODY
 from app.sim.pick.task_policy import Candidate
-from tests.policies.conftest import TINY, Recorder
+from tests.policies.conftest import TINY, Recorder, preset_of
 
 
 def test_the_curve_lies_on_the_grid_and_counts_updates(tiny_run):
@@ -41,9 +40,13 @@ def test_rates_of_a_point_sum_to_one_where_episodes_ended(tiny_run):
 
 def test_a_training_counts_episodes_that_end_unfeasible():
     """One-step bounds can become empty, which is a fifth outcome."""
-    overrides = {**TINY, "action_bounds": "one-step", "total_steps": 12 * TINY["total_steps"]}
+    overrides = {
+        **TINY,
+        "action.bounds": "one-step",
+        "learning.total_steps": 12 * TINY["learning.total_steps"],
+    }
     recorder = Recorder()
-    recorder.run(presets.resolve("pick-td3", overrides))
+    recorder.run(preset_of("pick-td3", overrides))
     ended = [point for point in recorder.progress if point.episodes]
     shares = [point.success + point.collision + point.timeout for point in ended]
     assert min(shares) < 1.0 and max(shares) <= 1.0 + 1e-12
@@ -78,9 +81,9 @@ def test_a_resumed_run_starts_from_the_weights_it_had(tiny_preset):
     assert any(name.startswith("critic_adam") for name in after)
 
 
-def test_a_checkpoint_of_another_preset_is_refused(tiny_preset, tiny_run):
+def test_a_checkpoint_of_another_preset_is_refused(tiny_run):
     _, _, state = tiny_run.checkpoints[0]
-    other = dataclasses.replace(tiny_preset, gamma=0.9)
+    other = preset_of("pick-td3", TINY, {"learning.gamma": 0.9})
     with pytest.raises(CheckpointMismatch, match="preset"):
         Recorder().run(other, resume=state)
 
@@ -94,7 +97,9 @@ def test_a_policy_checkpoint_does_not_resume(tiny_preset, tiny_run):
 @pytest.fixture(scope="module")
 def body_policy():
     """A policy that is told the size of the person, hardly trained."""
-    preset = presets.resolve("pick-td3", {**TINY, "total_steps": 1024, "observation": "body"})
+    preset = preset_of(
+        "pick-td3", {**TINY, "learning.total_steps": 1024, "episode.observation": "body"}
+    )
     return Recorder().run(preset).checkpoint
 
 
@@ -130,6 +135,7 @@ def test_a_checkpoint_of_another_layout_is_refused(body_policy, tiny_run, kind):
     with pytest.raises(CheckpointMismatch, match="layout"):
         ValueNetworks(dataclasses.replace(policy, manifest=other))
     # Who lies about both still has tensors of the wrong width.
-    preset = {**policy.manifest["preset"], "observation": kind}
+    preset = policy.manifest["preset"]
+    preset = {**preset, "episode": {**preset["episode"], "observation": kind}}
     with pytest.raises(CheckpointMismatch, match="tensors"):
         ValueNetworks(dataclasses.replace(policy, manifest={**other, "preset": preset}))

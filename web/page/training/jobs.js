@@ -209,7 +209,9 @@ function Legend({ lines, row, show }) {
 }
 
 function Speed({ job, row }) {
-  const changed = Object.entries(job.overrides ?? {});
+  const changed = Object.entries(job.overrides ?? {}).flatMap(([group, value]) =>
+    typeof value === "object" && value !== null
+      ? Object.entries(value).map(([name, v]) => [`${group}.${name}`, v]) : [[group, value]]);
   return html`<dl class="facts">
     ${row && [
       ["Updates", format.steps(row.updates)],

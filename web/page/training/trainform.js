@@ -3,7 +3,7 @@ import { html, useEffect, useRef, useState } from "../vendor/htm-preact-standalo
 import { get, post } from "../api.js";
 import { Icon } from "../icons.js";
 
-const FIRST_FIELDS = 4;
+const FIRST_FIELDS = ["cell", "learning.total_steps", "learning.n_envs", "learning.lr_start"];
 
 export function usePresets(link) {
   const [state, setState] = useState({ presets: null, error: null });
@@ -56,7 +56,8 @@ export function TrainForm({ presets, error, cell, onStarted, onClose }) {
   if (!preset) return html`<div class="skeleton tall" aria-busy="true"></div>`;
   const faults = faultsByField(problem, preset);
   const fields = preset.fields ?? [];
-  const inRest = fields.slice(FIRST_FIELDS).some((f) => faults[f.name] || changed(f, texts));
+  const rest = fields.filter((f) => !FIRST_FIELDS.includes(f.name));
+  const inRest = rest.some((f) => faults[f.name] || changed(f, texts));
   const type = (name, text) => {
     setTyped((now) => ({ ...now, [name]: text }));
     setProblem((now) => without(now, name, preset));
@@ -80,15 +81,16 @@ export function TrainForm({ presets, error, cell, onStarted, onClose }) {
       <p class="field-help" id="preset-help">${preset.title ?? preset.help ?? preset.description}</p>
       ${faults.preset && html`<p class="field-error" role="alert">${faults.preset}</p>`}
     </div>
-    <${Field} field=${{ name: "seed", default: 1, help: "Same seed, same job: the same curve." }}
+    <${Field} field=${{ name: "seed", default: 1, help: "Runs are reproducible for a given seed." }}
       text=${seed} fault=${faults.seed} onText=${(text) => {
         setSeed(text);
         setProblem((now) => without(now, "seed", preset));
       }} />
-    ${fields.slice(0, FIRST_FIELDS).map(row)}
-    ${fields.length > FIRST_FIELDS && html`<details class="more" open=${inRest || undefined}>
-      <summary><${Icon} name="chevron" />${fields.length - FIRST_FIELDS} more settings</summary>
-      ${fields.slice(FIRST_FIELDS).map(row)}
+    ${fields.filter((f) => FIRST_FIELDS.includes(f.name)).map(row)}
+    ${rest.length > 0 && html`<details class="more" open=${inRest || undefined}>
+      <summary><${Icon} name="chevron" />${rest.length} more settings</summary>
+      ${byGroup(rest).map(([group, members]) => html`<fieldset key=${group}>
+        <legend>${capital(group)}</legend>${members.map(row)}</fieldset>`)}
     </details>`}
     <div class="train-foot">
       <button type="submit" class="primary" disabled=${busy}>
@@ -99,11 +101,11 @@ export function TrainForm({ presets, error, cell, onStarted, onClose }) {
 }
 
 function Field({ field, text, fault, onText }) {
-  const id = `train-${field.name}`;
+  const id = `train-${field.name.replace(".", "-")}`;
   const own = text !== undefined && changed(field, { [field.name]: text });
   const described = [fault && `${id}-error`, `${id}-help`].filter(Boolean).join(" ");
   return html`<div class=${`field ${own ? "is-changed" : ""}`}>
-    <label for=${id}>${label(field.name)}${field.unit && html`<span class="unit"> [${field.unit}]</span>`}</label>
+    <label for=${id}>${field.title ?? capital(field.name)}${field.unit && html`<span class="unit"> [${field.unit}]</span>`}</label>
     ${isChoice(field)
       ? html`<select id=${id} name=${field.name} value=${text ?? String(field.default)}
           onChange=${(e) => onText(e.target.value)}>
@@ -144,9 +146,14 @@ function choices(field) {
   return field.type === "bool" ? ["true", "false"] : field.choices.map(String);
 }
 
-function label(name) {
-  const text = name.replaceAll("_", " ").replaceAll(".", ": ");
-  return text[0].toUpperCase() + text.slice(1);
+/** Fields by their group, in order: pairs of the group's name and its fields. */
+function byGroup(fields) {
+  const groups = new Map();
+  for (const field of fields) {
+    const group = field.name.split(".")[0];
+    groups.set(group, [...(groups.get(group) ?? []), field]);
+  }
+  return [...groups];
 }
 
 function show(v) {
@@ -169,8 +176,13 @@ function changed(field, texts) {
 }
 
 function overrides(preset, texts) {
-  const own = (preset.fields ?? []).filter((f) => changed(f, texts));
-  return Object.fromEntries(own.map((f) => [f.name, parsed(texts[f.name])]));
+  const found = {};
+  for (const field of (preset.fields ?? []).filter((f) => changed(f, texts))) {
+    const [group, name] = field.name.split(".");
+    const value = parsed(texts[field.name]);
+    found[group] = name ? { ...found[group], [name]: value } : value;
+  }
+  return found;
 }
 
 /** The single faults that a problem lists. */
@@ -182,7 +194,8 @@ function faultsOf(problem) {
 function fieldOf(fault, preset) {
   const names = new Set(["seed", "preset", ...(preset.fields ?? []).map((f) => f.name)]);
   const path = String(fault.field ?? "");
-  return [path.replace(/^overrides\./, ""), path.split(".").at(-1)].find((n) => names.has(n)) ?? "";
+  const name = path.replace(/^overrides\./, "");
+  return names.has(name) ? name : "";
 }
 
 /** What is left of a problem once a field was edited: the faults of the other fields. */

@@ -8,10 +8,10 @@ from app.policies.checkpoints import checkpoint as formats
 from app.policies.checkpoints.checkpoint import Checkpoint
 
 SHA256 = {
-    "pick": "7565621f985090e11ec1c3e052fe6896b028bf3e0cd565bc1f98a6b7fd12f735",
-    "sorting-e0": "7946cf565e6e963d18cfd27ce21e11b93fc8708eebe318a80e9f20da91d7cbdb",
-    "sorting-e1": "75f5cceef540e55ac1175b35a774d8a1c9e97a5dba1f88a678f167f0837fe978",
-    "reach": "95cb0e5cd14c2937cf04b8c55d6085b7e47c73b65def0650327bdc349b6f31e8",
+    "pick": "74e22399847a625f344678388956f7d8bed3047a57709506352c87d950c2bd63",
+    "sorting-e0": "7f1ffee69a2a4e1ab6eda76b5b4ff158a7b35ac23c60adecb4a3b5d0cbcb9555",
+    "sorting-e1": "932b690abc9780c13a1a3eb5287f4d0f0d5715c846c23ae7f89bcfb7f68d9b9a",
+    "reach": "bf71d378c94a098dcf4a810bb45e19756308491bc67c483719b91699a5521a17",
 }
 """Names of the shipped checkpoints and their ids."""
 ALIASES = tuple(SHA256)

@@ -4,14 +4,13 @@ Every episode is one row of a batch that stops when it ends; episode ``k`` of a 
 same whatever rule is measured, so that rules are compared on the same cells.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from app.policies.configs.pick import action_of
+from app.policies.configs.pick import PickPreset
 from app.policies.evaluation.pick.recorded_people import Trace
 from app.policies.evaluation.statistics import wilson
 from app.policies.inference.task_selection import ValueNetworks
@@ -112,7 +111,7 @@ class Episodes:
         }
 
 
-def settings_for(n_candidates: tuple[int, int], preset: Mapping[str, Any]) -> PickSettings:
+def settings_for(n_candidates: tuple[int, int], preset: PickPreset) -> PickSettings:
     """Return the evaluation's settings: 10 s, start clearance 0.05 m, the library's people.
 
     Their postures and samples were never seen in training, and they mind no robot, whatever
@@ -120,16 +119,14 @@ def settings_for(n_candidates: tuple[int, int], preset: Mapping[str, Any]) -> Pi
 
     Args:
         n_candidates: Fewest and most targets offered.
-        preset: The checkpoint's preset, as its manifest holds it.
+        preset: Training configuration of the checkpoint.
     """
     return PickSettings(
         time_limit_s=10.0,
         start_clearance_m=0.05,
         n_candidates=n_candidates,
-        work=HumanMotionConfig(
-            seed=EVALUATION_LIBRARY, pace=float(preset.get("human_pace", 1.0))
-        ),
-        action=action_of(preset),
+        work=HumanMotionConfig(seed=EVALUATION_LIBRARY, pace=preset.people.human_pace),
+        action=preset.action.settings,
     )
 
 

@@ -30,7 +30,7 @@ from app.policies.evaluation.pick.episodes import Evaluator, settings_for
 from app.policies.evaluation.pick.tasks import settings_of
 from app.policies.evaluation.rows import OnRow, untold
 from app.policies.evaluation.statistics import wilson
-from app.policies.inference.task_selection import HYSTERESIS, ValueNetworks
+from app.policies.inference.task_selection import HYSTERESIS, ValueNetworks, pick_preset_of
 from app.sim.human.anthropometry import percentile_body
 from app.sim.mocap.importer import Motion
 from app.sim.people.human_motion_config import HumanMotionConfig, at_the_table
@@ -57,7 +57,7 @@ class _Bench:
     ) -> None:
         self._networks = ValueNetworks(checkpoint)
         self.cell = cell_of(checkpoint.manifest)
-        self.usual = settings_for(CANDIDATES, checkpoint.manifest["preset"])
+        self.usual = settings_for(CANDIDATES, pick_preset_of(checkpoint))
         self._n, self._seed, self._on_row = episodes or DEFAULT_EPISODES, seed, on_row
 
     def row(self, name: str, settings: PickSettings) -> tuple[dict[str, Any], dict[str, Any]]:

@@ -16,7 +16,7 @@ from app.policies.evaluation.pick import selection_rules as choice_rules
 from app.policies.evaluation.pick.episodes import Episodes, Evaluator, Rule, settings_for
 from app.policies.evaluation.pick.recorded_people import recheck
 from app.policies.evaluation.rows import OnRow, untold
-from app.policies.inference.task_selection import HYSTERESIS, ValueNetworks
+from app.policies.inference.task_selection import HYSTERESIS, ValueNetworks, pick_preset_of
 from app.sim.pick.batch import OUTCOMES, hand_speeds
 from app.sim.scenario.kernels import episode as kernel
 from app.sim.scene.scene import kinds_of
@@ -36,10 +36,9 @@ def evaluator_of(
     checkpoint: Checkpoint, n_candidates: tuple[int, int], episodes: int | None, seed: int
 ) -> Evaluator:
     """Return the episodes of a checkpoint; by default 1000."""
-    manifest = checkpoint.manifest
-    settings = settings_for(n_candidates, manifest["preset"])
+    settings = settings_for(n_candidates, pick_preset_of(checkpoint))
     n = episodes or DEFAULT_EPISODES
-    return Evaluator(ValueNetworks(checkpoint), cell_of(manifest), n, seed, settings)
+    return Evaluator(ValueNetworks(checkpoint), cell_of(checkpoint.manifest), n, seed, settings)
 
 
 def settings_of(evaluator: Evaluator) -> dict[str, object]:

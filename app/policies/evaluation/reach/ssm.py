@@ -434,7 +434,7 @@ def movers_of(
         movers[AHEAD] = Ahead(direct, actor, layer)
         if layer != NO_LAYER:
             movers["policy-heedless"] = Ahead(direct, actor)
-    if checkpoint.manifest["preset"].get("safety") == "ssm":
+    if checkpoint.manifest["preset"].get("episode", {}).get("safety") == "ssm":
         other = ReachPolicy(pretrained.load("reach"))
         if (other.action, other.view) == (actor.action, actor.view):
             movers["policy-unaware"] = mover_of(other, "direct")

@@ -1,0 +1,119 @@
+"""The TD3 set-up of the pick and the reach scenario: model, checkpoints and monitored data."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import torch
+
+from app.policies.algorithms.exploration import Exploration
+from app.policies.algorithms.td3 import BatchTD3, Networks, critics_of
+from app.policies.algorithms.vecenv import BatchVecEnv
+from app.policies.checkpoints.checkpoint import Checkpoint
+from app.policies.checkpoints.training_range import Ranges
+from app.policies.configs.pick import PickPreset
+from app.policies.configs.reach import ReachPreset
+from app.policies.training.run import Parts, TrainingRun
+from app.sim.cells.cell import Cell
+from app.sim.core.arrays import Vec
+from app.sim.envs.tasks import ArmTask
+
+RANGE_EVERY = 8
+"""Steps of all environments between two updates of the training range."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TD3Scenario:
+    """Parts of a training that depend on the scenario."""
+
+    task: ArmTask
+    """The environments."""
+    exploration: Exploration
+    """Perturbs the actions."""
+    networks: Networks
+    """How actor and critics are made."""
+    layout: list[list[Any]]
+    """Names and sizes of the groups of an observation."""
+    act_size: int
+    """Numbers of an action."""
+    visited_states: Callable[[], Mapping[str, Vec]]
+    """Returns the present states of all environments, for the training range."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrainingMonitor:
+    """Data behind the learning curve of a TD3 training."""
+
+    n_greedy: int
+    """Environments without exploration, the first ones."""
+    env: BatchVecEnv
+    """The environments."""
+    actor: torch.nn.Module
+    """The actor of checkpoints."""
+    ranges: Ranges
+    """Training range of the states."""
+    visited_states: Callable[[], Mapping[str, Vec]]
+    """Returns the present states of all environments."""
+
+    def update_ranges(self, num_timesteps: int) -> None:
+        """Extend the training range by the present states, every RANGE_EVERY-th step."""
+        if (num_timesteps // self.env.num_envs) % RANGE_EVERY == 0:
+            self.ranges.look(self.visited_states())
+
+
+def first_step(resume: Checkpoint | None) -> int:
+    """Return the environment step at which an attempt starts; it offsets the seed."""
+    return 0 if resume is None else int(resume.manifest["step"])
+
+
+def start_td3(
+    preset: PickPreset | ReachPreset,
+    seed: int,
+    resume: Checkpoint | None,
+    cell: Cell,
+    scenario: TD3Scenario,
+) -> tuple[TrainingRun, TrainingMonitor]:
+    """Return a training from the start or from a checkpoint, and its monitor.
+
+    Args:
+        preset: All hyper-parameters.
+        seed: Seed of all random numbers.
+        resume: The last ``resume`` checkpoint of an interrupted attempt.
+        cell: Work cell of the training.
+        scenario: Environments, exploration and networks.
+    """
+    env = BatchVecEnv(scenario.task)
+    model = BatchTD3(
+        preset.learning,
+        env,
+        seed + first_step(resume),
+        exploration=scenario.exploration,
+        networks=scenario.networks,
+    )
+    targets = {
+        "actor_target": model.actor_target.mu,
+        "critic_target": critics_of(model.critic_target),
+    }
+    if model.ema_actor is not None:
+        targets["actor_learned"] = model.actor.mu
+    ranges = Ranges(resume.manifest["trained_range"] if resume else None)
+    parts = Parts(
+        policy={"actor": model.evaluated_actor, "critic": critics_of(model.critic)},
+        targets=targets,
+        optimizers={
+            "actor_adam": model.actor.optimizer,
+            "critic_adam": model.critic.optimizer,
+        },
+        layout=scenario.layout,
+        act_size=scenario.act_size,
+        trained_range=ranges.as_json,
+    )
+    run = TrainingRun(preset, seed, cell, model, env, parts, resume)
+    monitor = TrainingMonitor(
+        n_greedy=model.exploration.n_greedy,
+        env=env,
+        actor=model.evaluated_actor,
+        ranges=ranges,
+        visited_states=scenario.visited_states,
+    )
+    return run, monitor
