@@ -18,13 +18,13 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from app.policies.checkpoints import checkpoint as formats  # noqa: E402 - the line above lets it be found
-from app.policies.checkpoints.checkpoint import CHOOSING, REACHING, purpose_of  # noqa: E402
+from app.policies.checkpoints.checkpoint import CHOOSING, SORTING, purpose_of  # noqa: E402
 from app.policies.configs.fields import FieldGroup, TrainingConfig, read_config  # noqa: E402
 from app.policies.configs.pick import PickPreset  # noqa: E402
 from app.policies.configs.reach import ReachPreset  # noqa: E402
 from app.policies.configs.sorting import SortingPreset  # noqa: E402
 
-PRETRAINED = ROOT / "app/policies/pretrained"
+PRETRAINED = ROOT / "app/policies/checkpoints/pretrained"
 FIELDS = {
     "action_degree": "action.degree",
     "action_bounds": "action.bounds",
@@ -72,8 +72,10 @@ def main() -> None:
 
 def convert(manifest: dict[str, Any]) -> dict[str, Any]:
     """Return a manifest with the present names."""
-    kinds = {CHOOSING: PickPreset, REACHING: ReachPreset}
-    kind = kinds.get(purpose_of(manifest), SortingPreset)
+    purpose = purpose_of(manifest)
+    kind: type[PickPreset | ReachPreset | SortingPreset] = SortingPreset
+    if purpose != SORTING:
+        kind = PickPreset if purpose == CHOOSING else ReachPreset
     layout = [[GROUPS.get(name, name), size] for name, size in manifest["layout"]]
     preset = manifest["preset"]
     if "learning" not in preset:
