@@ -110,7 +110,7 @@ def contact(
     require_finite("q, qd, c, d", np.concatenate(path))
     require_finite("human_q", np.concatenate(human_q))
     require_finite("cylinders", np.concatenate(cylinders))
-    path = JointPath(*map(own, path))
+    path = JointPath(own(path.q), own(path.qd), own(path.c), own(path.d))
     q0, qd0, c, d = path
     robot = arm_kernel.new_robot_pose(arm)
     arm_kernel.place_robot(arm, q0, robot)
