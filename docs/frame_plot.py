@@ -23,7 +23,7 @@ from app.sim.geometry.capsules import RADIUS, ends_of  # noqa: E402
 from app.sim.human.kernels.kinematics import N_CAPSULES  # noqa: E402
 from app.sim.human.model import rest_posture  # noqa: E402
 from app.sim.robot.kernels.arm import new_robot_pose, place_robot  # noqa: E402
-from app.sim.scene.scene import arm_of, own, people_geometry_of, people_of  # noqa: E402
+from app.sim.scene.scene import arm_of, people_geometry_of, people_of  # noqa: E402
 from docs.world_plots import BLUE, GREEN, GREY, LIGHT, ORANGE, RED, panels, save  # noqa: E402
 
 IMAGE = ROOT / "docs/img/frame.png"
@@ -94,7 +94,7 @@ def _outline(start: Vec, end: Vec, radius: float) -> Vec:
 def _robot(cell: Cell) -> tuple[Vec, Vec]:
     arm = arm_of(cell)
     pose, n = new_robot_pose(arm), len(arm.link)
-    place_robot(arm, own(arm.home), pose)
+    place_robot(arm, arm.home, pose)
     return ends_of(pose.columns, n), pose.columns[RADIUS, :n]
 
 

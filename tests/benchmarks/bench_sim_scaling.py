@@ -24,6 +24,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from app.sim.cells.cell import load_cell
+from app.sim.core.arrays import as_kernel_array, as_kernel_index
 from app.sim.geometry.capsules import new_columns
 from app.sim.human.kernels.kinematics import N_CAPSULES
 from app.sim.pick.batch import DEFAULT_ACTION, DEFAULT_WEIGHTS, PickBatch, PickSettings
@@ -31,7 +32,7 @@ from app.sim.pick.kernels import episode as pick
 from app.sim.robot.capsules import load_robot_capsules
 from app.sim.robot.kernels.arm import FIRST_OVER_TABLE, Arm
 from app.sim.scenario.kernels.episode import PLAIN
-from app.sim.scene.scene import HumanKind, own, own_index
+from app.sim.scene.scene import HumanKind
 from tests.benchmarks.measure import Row, Subject, arguments, report, rounds_over, row
 
 BENCH = "sim-scaling"
@@ -111,14 +112,14 @@ def with_capsules(arm: Arm, pieces: int) -> Arm:
         for pair in itertools.product(place.get(a, ()), place.get(b, ()))
     ]
     return arm._replace(
-        link=own_index(arm.link[source]),
-        p0=own(arm.p0[source] + np.array(start)[:, None] * arm.span[source]),
-        span=own(span),
+        link=as_kernel_index(arm.link[source]),
+        p0=as_kernel_array(arm.p0[source] + np.array(start)[:, None] * arm.span[source]),
+        span=as_kernel_array(span),
         columns=new_columns(
             len(source), load_robot_capsules().radius[source], (span**2).sum(1)
         ),
-        first=own_index(np.array([a for a, _ in pairs])),
-        second=own_index(np.array([b for _, b in pairs])),
+        first=as_kernel_index(np.array([a for a, _ in pairs])),
+        second=as_kernel_index(np.array([b for _, b in pairs])),
     )
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.sim.collision.kernels import contact as kernel
-from app.sim.core.arrays import Vec
+from app.sim.core.arrays import Vec, as_kernel_array
 from app.sim.geometry.capsules import capsule_clearances, distances
 from app.sim.geometry.cylinder import cylinder_clearance
 from app.sim.human import model as human
@@ -21,7 +21,7 @@ from app.sim.robot.capsules import load_robot_capsules
 from app.sim.robot.kernels import arm as arm_kernel
 from app.sim.robot.kernels.arm import Arm
 from app.sim.robot.kernels.joints import JointPath
-from app.sim.scene.scene import NO_CYLINDERS, own, people_geometry_of, require_finite
+from app.sim.scene.scene import NO_CYLINDERS, people_geometry_of, require_finite
 
 CONTACT_KINDS = ("none", "human", "cell", "self")
 
@@ -78,7 +78,7 @@ def clearance(
         sizes: The workers' sizes [m], shape (W, body.N_SIZE); None for the cell's person.
     """
     robot = arm_kernel.new_robot_pose(arm)
-    arm_kernel.place_robot(arm, own(q), robot)
+    arm_kernel.place_robot(arm, as_kernel_array(q), robot)
     crowd = people_geometry_of(people, human_q, cylinders, sizes)
     to_people, to_cell, to_self = kernel.clearances(arm, people, robot, crowd)
     return Clearance(people_m=to_people, cell_m=to_cell, self_m=to_self)
@@ -110,7 +110,12 @@ def contact(
     require_finite("q, qd, c, d", np.concatenate(path))
     require_finite("human_q", np.concatenate(human_q))
     require_finite("cylinders", np.concatenate(cylinders))
-    path = JointPath(own(path.q), own(path.qd), own(path.c), own(path.d))
+    path = JointPath(
+        as_kernel_array(path.q),
+        as_kernel_array(path.qd),
+        as_kernel_array(path.c),
+        as_kernel_array(path.d),
+    )
     q0, qd0, c, d = path
     robot = arm_kernel.new_robot_pose(arm)
     arm_kernel.place_robot(arm, q0, robot)
@@ -122,7 +127,9 @@ def contact(
     if after is not None:
         crowd.size[:] = after
     q1 = q0 + arm.dt * (qd0 + arm.dt * (c + arm.dt * d))
-    motion = kernel.PeriodMotion(path, q1, own(human_q[1]), own(cylinders[1]))
+    motion = kernel.PeriodMotion(
+        path, q1, as_kernel_array(human_q[1]), as_kernel_array(cylinders[1])
+    )
     kind, x = kernel.sweep(
         arm, people, motion, robot.columns.copy(), columns0, clear, robot, crowd
     )
@@ -152,7 +159,7 @@ def worker_distances(arm: Arm, people: People, q: Vec, human_q: Vec, sizes: Vec)
     if n_workers == 0:
         return np.zeros(0)
     robot = arm_kernel.new_robot_pose(arm)
-    arm_kernel.place_robot(arm, own(q), robot)
+    arm_kernel.place_robot(arm, as_kernel_array(q), robot)
     crowd = people_geometry_of(people, human_q, NO_CYLINDERS, sizes)
     capsule_clearances(robot.columns, crowd.columns, crowd.gap)
     parts = crowd.gap[: n_workers * N_CAPSULES].reshape(n_workers, N_CAPSULES)
@@ -169,7 +176,7 @@ def pedestrian_distances(arm: Arm, people: People, q: Vec, cylinders: Vec) -> Ve
         cylinders: x, y and radius of each [m], shape (C, 3).
     """
     robot = arm_kernel.new_robot_pose(arm)
-    arm_kernel.place_robot(arm, own(q), robot)
+    arm_kernel.place_robot(arm, as_kernel_array(q), robot)
     return np.array(
         [
             cylinder_clearance(robot.columns, 0, x, y, r, people.top_z)[0]

@@ -7,7 +7,7 @@ import numpy as np
 
 from app.sim.cells.cell import Cell
 from app.sim.cells.parts import Table
-from app.sim.core.arrays import Vec
+from app.sim.core.arrays import Vec, as_kernel_array
 from app.sim.envs.raycast import Camera, Image, Raycaster
 from app.sim.envs.solids import Box, Capsule, Cylinder, Rgb, Solid
 from app.sim.geometry.capsules import RADIUS, ends_of
@@ -17,7 +17,7 @@ from app.sim.people.kernels.people import PeopleState
 from app.sim.robot.capsules import load_robot_capsules
 from app.sim.robot.kernels import arm as arm_kernel
 from app.sim.scenario.kernels.episode import SUCCESS_DISTANCE
-from app.sim.scene.scene import arm_of, own, people_geometry_of, people_of
+from app.sim.scene.scene import arm_of, people_geometry_of, people_of
 from app.sim.sorting.layout import block_height, half_size, is_sorting
 from app.sim.sorting.state import NULL, SortingShape, SortingState
 
@@ -128,7 +128,7 @@ def _robot_solids(cell: Cell, q: Vec) -> list[Solid]:
     arm, mount = arm_of(cell), cell.robot
     capsules = load_robot_capsules(mount.tool_length, mount.tool_radius)
     pose = arm_kernel.new_robot_pose(arm)
-    arm_kernel.place_robot(arm, own(q), pose)
+    arm_kernel.place_robot(arm, as_kernel_array(q), pose)
     ends = ends_of(pose.columns, len(capsules.name))
     colours = [JOINT if name in _JOINTS else ALUMINIUM for name in capsules.name[:-1]]
     return _capsules(ends, capsules.radius, [*colours, TOOL])

@@ -18,7 +18,7 @@ from dataclasses import replace
 import numpy as np
 
 from app.errors import InvalidInput, digits, interval
-from app.sim.core.arrays import Vec
+from app.sim.core.arrays import Vec, as_kernel_array
 from app.sim.human import model as human
 from app.sim.human.kernels.kinematics import N_SIZE, PELVIS_Z
 from app.sim.human.person import Person
@@ -29,7 +29,7 @@ from app.sim.perception.keypoints import FARTHEST_M
 from app.sim.perception.person_estimator import PersonEstimate
 from app.sim.robot.kernels import arm as arm_kernel
 from app.sim.robot.kernels.arm import Arm
-from app.sim.scene.scene import own, people_geometry_of
+from app.sim.scene.scene import people_geometry_of
 
 FASTEST = 50.0
 """Greatest speed of a person's joints, cylinder or radius [m/s, rad/s]."""
@@ -294,7 +294,7 @@ def nearest_index(arm: Arm, shared: People, q: Vec, people: Sequence[Person]) ->
         np.array(sizes).reshape(-1, N_SIZE),
     )
     robot = arm_kernel.new_robot_pose(arm)
-    arm_kernel.place_robot(arm, own(q), robot)
+    arm_kernel.place_robot(arm, as_kernel_array(q), robot)
     return (workers + walkers)[people_kernel.nearest_person(shared, robot.columns, crowd)]
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from app.errors import InvalidInput
 from app.sim.cells.cell import Cell, lacks_stations
-from app.sim.core.arrays import Vec
+from app.sim.core.arrays import Vec, as_kernel_array
 from app.sim.geometry.segments import FAR
 from app.sim.people.human_motion_config import USUAL, HumanMotionConfig
 from app.sim.people.kernels.people import People, PeopleState, new_people_geometry, record_palms
@@ -33,7 +33,6 @@ from app.sim.scene.scene import (
     HumanKind,
     arm_of,
     new_people_state,
-    own,
     people_of,
     require_finite,
     with_people,
@@ -211,7 +210,9 @@ class PickBatch(CellBatch):
     def set_goals(self, rows: Rows, goals: Vec) -> None:
         """Send the robots of ``rows`` to new targets [m], shape (len(rows), 3)."""
         for row, goal in zip(rows, goals, strict=True):
-            pick.set_goal(self.world, self.state, int(row), own(goal), self._work.robot)
+            pick.set_goal(
+                self.world, self.state, int(row), as_kernel_array(goal), self._work.robot
+            )
 
 
 def observe(
@@ -243,17 +244,17 @@ def observe(
     Returns:
         Observations, shape (n, n_obs), and whether each target is reachable, (n,).
     """
-    n, targets = len(goals), own(goals)
+    n, targets = len(goals), as_kernel_array(goals)
     q_goals, reachable = kinematics.ik_vertical_batch(arm.lengths, arm.limits, targets)
     obs = np.empty((n, n_obs), dtype=np.float32)
     features.observe_batch(
         arm,
         people.floor_z,
-        np.tile(own(q), (n, 1)),
-        np.tile(own(qd), (n, 1)),
-        np.tile(own(human_q), (n, 1)),
-        np.tile(own(human_qd), (n, 1)),
-        np.tile(own(people.bodies[0] if size is None else size), (n, 1)),
+        np.tile(as_kernel_array(q), (n, 1)),
+        np.tile(as_kernel_array(qd), (n, 1)),
+        np.tile(as_kernel_array(human_q), (n, 1)),
+        np.tile(as_kernel_array(human_qd), (n, 1)),
+        np.tile(as_kernel_array(people.bodies[0] if size is None else size), (n, 1)),
         targets,
         q_goals,
         np.full(n, time_left_s, dtype=np.float64),
@@ -281,7 +282,7 @@ def step_robot(
     require_finite("q, qd, qdd, act", np.concatenate([q, qd, qdd, act]))
     segment = actions.Coefficients(np.empty(6), np.empty(6))
     end = JointState(np.empty(6), np.empty(6), np.empty(6))
-    start = JointState(own(q), own(qd), own(qdd))
+    start = JointState(as_kernel_array(q), as_kernel_array(qd), as_kernel_array(qdd))
     commanded = np.array(act, dtype=np.float32)
     actions.advance(action.rule(), arm.limits, arm.dt, start, commanded, segment, end)
     return Piece(c=segment.c, d=segment.d, q=end.q, qd=end.qd, qdd=end.qdd)
@@ -290,9 +291,9 @@ def step_robot(
 def tool_state(arm: Arm, q: Vec, qd: Vec, goal: Vec) -> tuple[float, float, float, bool]:
     """Return distance to a target [m], tilt [rad], tcp speed [m/s] and whether it succeeds."""
     pose = arm_kernel.new_robot_pose(arm)
-    arm_kernel.place_robot(arm, own(q), pose)
-    distance, tilt = distance_to(own(goal), pose), arm_kernel.robot_tilt(pose)
-    speed = arm_kernel.tcp_speed(pose, own(qd))
+    arm_kernel.place_robot(arm, as_kernel_array(q), pose)
+    distance, tilt = distance_to(as_kernel_array(goal), pose), arm_kernel.robot_tilt(pose)
+    speed = arm_kernel.tcp_speed(pose, as_kernel_array(qd))
     return distance, tilt, speed, bool(pick.succeeded(distance, tilt, speed))
 
 

@@ -22,14 +22,13 @@ import numpy as np
 
 from app.errors import InvalidInput
 from app.sim.collision.checker import Checker, Shapes
-from app.sim.core.arrays import Vec
+from app.sim.core.arrays import Vec, as_kernel_array
 from app.sim.planning.ompl_planners import Plan, PlanSettings, plan
 from app.sim.planning.path_tracking import Tracker, straight_stop
 from app.sim.planning.time_parameterization import Limits, stopping_point, time_free_path
 from app.sim.robot.kernels import acceleration_bounds as polynomial
 from app.sim.robot.kernels.arm import Arm
 from app.sim.robot.kernels.joints import JointState
-from app.sim.scene.scene import own
 
 STATES = ("waiting", "following", "braking", "arrived", "lost")
 """``waiting``: no plan, at rest or braking to rest. ``braking``: slows down along a path that
@@ -264,7 +263,7 @@ def _after_period(follower: ReplanningExecutor, q: Vec, qd: Vec) -> tuple[Vec, V
     else:
         wanted = tracker.wanted(q, qd, brake=follower.blocked)
     end = JointState(np.empty(6), np.empty(6), np.empty(6))
-    start = JointState(own(q), own(qd), np.zeros(6))
+    start = JointState(as_kernel_array(q), as_kernel_array(qd), np.zeros(6))
     polynomial.advance_to_speeds(arm.limits, arm.dt, start, wanted, np.empty(6), end)
     return end.q, end.qd
 

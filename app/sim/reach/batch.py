@@ -15,7 +15,7 @@ from app.errors import InvalidInput
 from app.sim.cells.cell import Cell
 from app.sim.cells.parts import GoalRegion, Station
 from app.sim.cells.people import Worker
-from app.sim.core.arrays import Vec
+from app.sim.core.arrays import Vec, as_kernel_array, as_kernel_index
 from app.sim.geometry.segments import FAR
 from app.sim.people.human_motion_config import REACHING, HumanMotionConfig
 from app.sim.people.kernels.people import People, PeopleState
@@ -36,8 +36,6 @@ from app.sim.scene.scene import (
     arm_of,
     kinds_of,
     new_people_state,
-    own,
-    own_index,
     pedestrian_settings,
     people_of,
     require_finite,
@@ -228,7 +226,7 @@ def world_of(cell: Cell, people: People, targets: Vec) -> reach.ReachWorld:
     region = goal_region_of(cell)
     middle, half = np.array(region.center), 0.5 * np.array(region.size)
     return reach.ReachWorld(
-        targets=own(targets),
+        targets=as_kernel_array(targets),
         low=middle - half,
         high=middle + half,
         arm=arm_of(cell),
@@ -331,7 +329,9 @@ class ReachBatch(CellBatch):
         require_finite("goals", np.asarray(goals, dtype=np.float64))
         checked = self._checked(rows)
         for row, goal in zip(checked, goals, strict=True):
-            reach.set_goal(self.world, self.state, int(row), own(goal), self._work.robot)
+            reach.set_goal(
+                self.world, self.state, int(row), as_kernel_array(goal), self._work.robot
+            )
         return self._look(checked)
 
     def observe_goals(
@@ -356,7 +356,9 @@ class ReachBatch(CellBatch):
         out = np.empty((*shape[:2], self.obs_size), dtype=np.float32)
         if who is not None and not 0 <= who < self.n_people:
             raise InvalidInput("who", who, f"must be one of {self.n_people} people")
-        self._see(self._checked(rows), EVERYBODY if who is None else who, own(goals), out)
+        self._see(
+            self._checked(rows), EVERYBODY if who is None else who, as_kernel_array(goals), out
+        )
         return out
 
     def _observe(self, rows: Rows, out: NDArray[np.float32]) -> None:
@@ -396,7 +398,7 @@ class ReachBatch(CellBatch):
         return len(self.cell.people)
 
     def _checked(self, rows: Rows) -> Rows:
-        numbers = own_index(np.asarray(rows, dtype=np.int64))
+        numbers = as_kernel_index(np.asarray(rows, dtype=np.int64))
         wrong = numbers[(numbers < 0) | (numbers >= self.n_envs)]
         if wrong.size:
             raise InvalidInput("rows", int(wrong[0]), f"must be one of {self.n_envs} cells")

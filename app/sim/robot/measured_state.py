@@ -18,13 +18,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from app.errors import InvalidInput, interval
-from app.sim.core.arrays import Vec
+from app.sim.core.arrays import Vec, as_kernel_array
 from app.sim.core.out_of_range import OutsideField
 from app.sim.robot.kernels.arm import Arm
 from app.sim.robot.kernels.joints import JointLimits
 from app.sim.robot.kernels.override import stop_time
 from app.sim.robot.ur10 import JOINT_NAMES
-from app.sim.scene.scene import own
 
 SLACK = 1e-6
 """Excess over a limit that is taken for rounding and not flagged [rad, rad/s, rad/s^2]."""
@@ -206,8 +205,8 @@ def admitting(arm: Arm, q: Vec, qd: Vec) -> Arm:
     ):
         return arm
     wider = arm.limits._replace(
-        q_min=own(np.minimum(arm.limits.q_min, low)),
-        q_max=own(np.maximum(arm.limits.q_max, high)),
-        qd_max=own(np.maximum(arm.limits.qd_max, fast)),
+        q_min=as_kernel_array(np.minimum(arm.limits.q_min, low)),
+        q_max=as_kernel_array(np.maximum(arm.limits.q_max, high)),
+        qd_max=as_kernel_array(np.maximum(arm.limits.qd_max, fast)),
     )
     return arm._replace(limits=wider)

@@ -4,10 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.sim.core.arrays import Vec
+from app.sim.core.arrays import Vec, as_kernel_array
 from app.sim.robot.kernels import override
 from app.sim.robot.kernels.joints import JointPath
-from app.sim.scene.scene import own
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,7 +57,7 @@ class SafetyDecision:
             t: Time since its start [s].
         """
         there, speeds = np.empty(6), np.empty(6)
-        path = JointPath(own(q), own(qd), self.c, self.d)
+        path = JointPath(as_kernel_array(q), as_kernel_array(qd), self.c, self.d)
         override.motion_at(path, self.path_deceleration, t, there, speeds)
         return there, speeds
 

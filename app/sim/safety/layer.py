@@ -23,7 +23,7 @@ import numpy as np
 from app.errors import InvalidInput
 from app.sim.cells.cell import Cell
 from app.sim.collision.checker import Shapes
-from app.sim.core.arrays import Vec
+from app.sim.core.arrays import Vec, as_kernel_array
 from app.sim.geometry.capsules import distances, least
 from app.sim.geometry.cylinder import cylinder_clearance, swept_clearance
 from app.sim.human.kernels import kinematics as body
@@ -37,7 +37,7 @@ from app.sim.safety.decision import SafetyDecision, SeparationTerms
 from app.sim.safety.kernels import separation_check as watch_kernel
 from app.sim.safety.kernels import ssm
 from app.sim.safety.kernels.separation_check import PeopleShapes
-from app.sim.scene.scene import own, require_finite
+from app.sim.scene.scene import require_finite
 
 UNITS = {
     "human_speed": "m/s",
@@ -214,9 +214,13 @@ class SafetyLayer:
         require_finite("people", people.cylinders.ravel())
         if age < 0.0:
             raise InvalidInput("age", age, "must not be negative")
-        path = JointPath(own(q), own(qd), own(c), own(d))
+        path = JointPath(
+            as_kernel_array(q), as_kernel_array(qd), as_kernel_array(c), as_kernel_array(d)
+        )
         self._load_people(people)
-        shapes = PeopleShapes(own(people.columns), own(people.cylinders))
+        shapes = PeopleShapes(
+            as_kernel_array(people.columns), as_kernel_array(people.cylinders)
+        )
         arm = admitting(self.arm, path.q, path.qd)
         chosen = ssm.decide(arm, self._rule, age, shapes, path, self._space)
         return self._decision(chosen, path.qd, people, age)
@@ -327,7 +331,7 @@ class SafetyLayer:
         """Return the observed distance of a part of the people [m], and the nearest capsule."""
         robot, out = self._space.columns[watch_kernel.NOW], np.empty(self.arm.columns.shape[1])
         if column < people.columns.shape[1]:
-            distances(own(people.columns), column, robot, out)
+            distances(as_kernel_array(people.columns), column, robot, out)
             return float(self._space.gap[watch_kernel.NOW, column]), int(least(out)[1])
         x, y, r, top = people.cylinders[column - people.columns.shape[1]]
         separation, nearest = cylinder_clearance(robot, 0, x, y, r, top)

@@ -8,13 +8,12 @@ Source: METHOD 2.7; ISO/TS 15066:2016, 5.5.4.
 
 import numpy as np
 
-from app.sim.core.arrays import Vec
+from app.sim.core.arrays import Vec, as_kernel_array
 from app.sim.geometry.capsules import RADIUS, UX, UY, X, Y
 from app.sim.robot.kernels import arm as arm_kernel
 from app.sim.robot.kernels import override
 from app.sim.robot.kernels.arm import Arm
 from app.sim.safety.layer import SafetySettings
-from app.sim.scene.scene import own
 
 N_DIRECTIONS = 72
 """Corners of the outline."""
@@ -28,7 +27,7 @@ def required_distances(arm: Arm, settings: SafetySettings, qd: Vec) -> Vec:
         settings: Assumptions.
         qd: Joint speeds [rad/s], shape (6,).
     """
-    t_stop = float(override.stop_time(own(qd), arm.limits.qdd_max))
+    t_stop = float(override.stop_time(as_kernel_array(qd), arm.limits.qdd_max))
     t_r = arm.dt + settings.latency
     fastest = np.concatenate([[0.0], np.cumsum(np.abs(qd) * arm.lever)])
     v_r = fastest[arm.link]
@@ -51,7 +50,7 @@ def separation_zone(arm: Arm, settings: SafetySettings, q: Vec, qd: Vec) -> Vec:
         Corners, counter-clockwise [m], shape (N_DIRECTIONS, 2).
     """
     robot = arm_kernel.new_robot_pose(arm)
-    arm_kernel.place_robot(arm, own(q), robot)
+    arm_kernel.place_robot(arm, as_kernel_array(q), robot)
     n = len(arm.link)
     start, along = robot.columns[[X, Y], :n].T, robot.columns[[UX, UY], :n].T
     points = np.concatenate([start, start + along])

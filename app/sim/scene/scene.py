@@ -10,7 +10,7 @@ from functools import lru_cache
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from app.errors import InvalidInput, SimulationError
 from app.sim.cells.cell import Cell
@@ -21,7 +21,7 @@ from app.sim.cells.people import (
     Walker,
     Worker,
 )
-from app.sim.core.arrays import Vec
+from app.sim.core.arrays import Vec, as_kernel_array, as_kernel_index
 from app.sim.geometry.capsules import new_columns
 from app.sim.human import model as human
 from app.sim.human.kernels import kinematics as body
@@ -56,15 +56,6 @@ def require_shape(name: str, values: NDArray[Any], shape: tuple[int, ...]) -> No
     """Raise InvalidInput for an array of another shape: kernels would read beyond its end."""
     if values.shape != shape:
         raise InvalidInput(name, values.shape, f"must have the shape {shape}")
-
-
-def own(values: ArrayLike) -> Vec:
-    """Return a copy of one kind, float64, contiguous and writable.
-
-    Kernels are compiled anew for read-only, strided or integer arrays: half a minute in the
-    middle of a live cell.
-    """
-    return np.array(values, dtype=np.float64, order="C")
 
 
 def check_people(kinds: Sequence[str]) -> None:
@@ -158,20 +149,15 @@ def arm_of(cell: Cell) -> Arm:
         home=np.array(mount.home_q),
         dt=mount.dt,
         lengths=Robot(mount.tool_length).lengths(),
-        link=own_index(capsules.link),
-        p0=own(capsules.p0),
-        span=own(span),
+        link=as_kernel_index(capsules.link),
+        p0=as_kernel_array(capsules.p0),
+        span=as_kernel_array(span),
         columns=new_columns(len(capsules.link), capsules.radius, (span**2).sum(axis=1)),
-        first=own_index(pairs[:, 0]),
-        second=own_index(pairs[:, 1]),
+        first=as_kernel_index(pairs[:, 0]),
+        second=as_kernel_index(pairs[:, 1]),
         lever=levers(mount.tool_length, mount.tool_radius),
         boxes=boxes_of(cell),
     )
-
-
-def own_index(values: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return a contiguous, writable copy of integers."""
-    return np.array(values, dtype=np.int64, order="C")
 
 
 def boxes_of(cell: Cell) -> Vec:
@@ -189,7 +175,7 @@ def people_of(cell: Cell, work: HumanMotionConfig | None = None) -> People:
     """
     workers = len(cell.workers)
     shared = People(
-        bodies=own(cell.body[None]),
+        bodies=as_kernel_array(cell.body[None]),
         floor_z=cell.floor_z,
         top_z=cell.floor_z + max([p.height for p in cell.cylinders], default=2.0),
         columns=body.capsule_columns(workers),
@@ -258,6 +244,6 @@ def people_geometry_of(
     crowd = people.new_people_geometry(shared, len(human_q), len(cylinders))
     if sizes is not None:
         crowd.size[:] = sizes
-    people.place_workers(shared, own(human_q), crowd)
+    people.place_workers(shared, as_kernel_array(human_q), crowd)
     crowd.cylinders[:] = cylinders
     return crowd

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from app.errors import InvalidInput
 from app.sim.cells.cell import Cell
 from app.sim.collision.checker import Shapes
-from app.sim.core.arrays import Vec
+from app.sim.core.arrays import Vec, as_kernel_array
 from app.sim.people.kernels.pedestrian import GROWTH, VX, VY
 from app.sim.people.kernels.people import new_people_geometry
 from app.sim.reach.batch import ReachBatch, ReachSettings
@@ -45,7 +45,7 @@ from app.sim.safety.kernels.adversarial_trials import MOVING
 from app.sim.safety.layer import SafetySettings, separation_rule
 from app.sim.scenario.batch import Rows, StepResult
 from app.sim.scenario.kernels.episode import SUCCESS
-from app.sim.scene.scene import new_people_state, own, require_finite, require_shape
+from app.sim.scene.scene import new_people_state, require_finite, require_shape
 
 HORIZON_S = 5.0
 """Time left that policies are shown at most [s]: the length of an episode of METHOD 2.3."""
@@ -131,7 +131,7 @@ class GuardedReach(ReachBatch):
             rest_ends=rest_ends,
             horizon=horizon_s,
             measured=safety.measured,
-            tracks=np.zeros((0, 1, 3)) if tracks is None else own(tracks),
+            tracks=np.zeros((0, 1, 3)) if tracks is None else as_kernel_array(tracks),
             period=np.zeros(n_envs, dtype=np.int64),
             trial=new_trial_work(
                 self.arm,
@@ -222,8 +222,12 @@ class GuardedReach(ReachBatch):
         require_finite("wanted", wanted)
         arm, state = self.arm, self.state
         pieces, end = np.empty((1, 6)), JointState(np.empty(6), np.empty(6), np.empty(6))
-        start = JointState(own(state.q[row]), own(state.qd[row]), np.zeros(6))
-        polynomial.advance_to_speeds(arm.limits, arm.dt, start, own(wanted), pieces[0], end)
+        start = JointState(
+            as_kernel_array(state.q[row]), as_kernel_array(state.qd[row]), np.zeros(6)
+        )
+        polynomial.advance_to_speeds(
+            arm.limits, arm.dt, start, as_kernel_array(wanted), pieces[0], end
+        )
         self._step(np.array([row]), np.empty((0, 6), dtype=np.float32), pieces)
 
     def people_shapes(self, row: int) -> Shapes:
@@ -231,7 +235,7 @@ class GuardedReach(ReachBatch):
         walkers = self.state.people.cylinders[row]
         top = np.full((len(walkers), 1), self.world.people.top_z)
         return Shapes(
-            columns=own(self.state.people.columns[row]),
+            columns=as_kernel_array(self.state.people.columns[row]),
             cylinders=np.hstack([walkers, top]),
             going=self.state.people.walkers.rows[row][:, [VX, VY, GROWTH]],
         )
