@@ -109,7 +109,7 @@ class Checker:
         self, arm: Arm, people: Shapes, margin: float = 0.0, cell_margin: float = CELL_MARGIN
     ) -> None:
         self.arm, self.people, self.margin, self.cell_margin = arm, people, margin, cell_margin
-        self._around = free.Around(
+        self._around = free.Obstacles(
             people.columns,
             np.empty(people.columns.shape[1]),
             people.cylinders,
@@ -130,7 +130,7 @@ class Checker:
     def clearance(self, q: Vec) -> Clearance:
         """Return the distances at ``q`` [rad], shape (6,)."""
         self.n_poses += 1
-        people, cell, own = free.gaps_at(self.arm, q, self._around, self._pose)
+        people, cell, own = free.clearances_at(self.arm, q, self._around, self._pose)
         return Clearance(people=people, cell=cell, own=own)
 
     def edge_free(self, q0: Vec, q1: Vec) -> bool:

@@ -23,13 +23,13 @@ APART = 0.1
 """Postures nearer than this are taken for one [rad]."""
 
 
-def vertical_posture(arm: Arm, target: Vec) -> Vec:
+def vertical_configuration(arm: Arm, target: Vec) -> Vec:
     """Return the posture, if any, with the tool down at ``target`` [m], shape (0 or 1, 6)."""
     q = Robot(arm.lengths.tool).ik_vertical(target, arm.limits.q_min, arm.limits.q_max)
     return np.zeros((0, 6)) if q is None else q[None]
 
 
-def goal_postures(
+def goal_configurations(
     arm: Arm,
     target: Vec,
     rng: np.random.Generator,

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.sim.core.arrays import Vec
-from app.sim.planning.goal_configurations import goal_postures
+from app.sim.planning.goal_configurations import goal_configurations
 from app.sim.reach.batch import ReachBatch
 from app.sim.robot.kernels.arm import Arm
 from app.sim.scenario.kernels.episode import COLLISION, RUNNING, SUCCESS, SUCCESS_DISTANCE
@@ -116,7 +116,9 @@ class Hindsight:
         self._copies = ReachBatch(batch.cell, n_copies, seed, batch.settings)
         goals, self._which = np.unique(batch.state.goal, axis=0, return_inverse=True)
         found = [
-            goal_postures(self._arm, goal, np.random.default_rng([seed, k]), spread=SPREAD)
+            goal_configurations(
+                self._arm, goal, np.random.default_rng([seed, k]), spread=SPREAD
+            )
             for k, goal in enumerate(goals)
         ]
         home = np.array(self._arm.home)[None]

@@ -3,7 +3,11 @@
 import numpy as np
 
 from app.sim.cells.cell import load_cell
-from app.sim.planning.goal_configurations import APART, goal_postures, vertical_posture
+from app.sim.planning.goal_configurations import (
+    APART,
+    goal_configurations,
+    vertical_configuration,
+)
 from app.sim.robot.ur10 import Robot
 from app.sim.scene.scene import arm_of
 
@@ -14,7 +18,7 @@ TARGET = np.array(CELL.station("cube2").position)
 
 def test_postures_reach_the_target_inside_the_limits_and_differ() -> None:
     robot = Robot(ARM.lengths.tool)
-    postures = goal_postures(ARM, TARGET, np.random.default_rng(0))
+    postures = goal_configurations(ARM, TARGET, np.random.default_rng(0))
     assert len(postures) >= 4
     assert np.all((postures >= ARM.limits.q_min) & (postures <= ARM.limits.q_max))
     for k, q in enumerate(postures):
@@ -24,7 +28,7 @@ def test_postures_reach_the_target_inside_the_limits_and_differ() -> None:
 
 def test_a_spread_stays_within_its_radius_and_is_used() -> None:
     robot = Robot(ARM.lengths.tool)
-    postures = goal_postures(ARM, TARGET, np.random.default_rng(0), spread=0.05)
+    postures = goal_configurations(ARM, TARGET, np.random.default_rng(0), spread=0.05)
     misses = [np.linalg.norm(robot.tcp_pose(q)[:3, 3] - TARGET) for q in postures]
     assert max(misses) <= 0.0502
     assert np.mean(misses) > 0.02
@@ -33,17 +37,17 @@ def test_a_spread_stays_within_its_radius_and_is_used() -> None:
 def test_a_bound_on_the_tilt_holds() -> None:
     robot = Robot(ARM.lengths.tool)
     rng = np.random.default_rng(0)
-    postures = goal_postures(ARM, TARGET, rng, n_starts=60, tilt_max=0.8)
+    postures = goal_configurations(ARM, TARGET, rng, n_starts=60, tilt_max=0.8)
     assert len(postures) >= 1
     assert all(robot.tcp_pose(q)[2, 2] <= -np.cos(0.8) for q in postures)
 
 
 def test_out_of_reach_gives_no_posture() -> None:
     far = np.array([0.0, 2.5, 0.3])
-    assert goal_postures(ARM, far, np.random.default_rng(0)).shape == (0, 6)
-    assert vertical_posture(ARM, far).shape == (0, 6)
+    assert goal_configurations(ARM, far, np.random.default_rng(0)).shape == (0, 6)
+    assert vertical_configuration(ARM, far).shape == (0, 6)
 
 
 def test_the_vertical_posture_points_down() -> None:
-    (q,) = vertical_posture(ARM, TARGET)
+    (q,) = vertical_configuration(ARM, TARGET)
     assert Robot(ARM.lengths.tool).tcp_pose(q)[2, 2] < -1.0 + 1e-9

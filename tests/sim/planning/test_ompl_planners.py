@@ -12,7 +12,7 @@ from app.sim.collision.fcl_reference import CollisionReference
 from app.sim.core.arrays import Vec
 from app.sim.human import model as human
 from app.sim.planning import ompl_planners as planners
-from app.sim.planning.goal_configurations import goal_postures, vertical_posture
+from app.sim.planning.goal_configurations import goal_configurations, vertical_configuration
 from app.sim.planning.ompl_planners import PLANNERS, PlanSettings, plan
 from app.sim.planning.time_parameterization import Limits, time_free_path
 from app.sim.scene.scene import arm_of
@@ -23,7 +23,7 @@ MARGIN = 0.05
 
 
 def station(name: str) -> Vec:
-    return vertical_posture(ARM, np.array(CELL.station(name).position))[0]
+    return vertical_configuration(ARM, np.array(CELL.station(name).position))[0]
 
 
 def reaching_person() -> Vec:
@@ -160,7 +160,7 @@ def test_outside_limits_and_no_goal_have_names() -> None:
 
 
 def test_one_of_several_goals_is_reached_and_named() -> None:
-    goals = goal_postures(
+    goals = goal_configurations(
         ARM, np.array(CELL.station("cube0").position), np.random.default_rng(0)
     )
     checker = Checker(ARM, in_the_way(), MARGIN)
@@ -172,10 +172,10 @@ def test_one_of_several_goals_is_reached_and_named() -> None:
 def test_a_cylinder_in_the_shared_workspace_is_planned_round_within_its_limits() -> None:
     cell = load_cell("shared-workspace")
     arm, rng = arm_of(cell), np.random.default_rng(0)
-    goals = goal_postures(arm, np.array([-0.4, 0.7, 0.3]), rng)
+    goals = goal_configurations(arm, np.array([-0.4, 0.7, 0.3]), rng)
     people = shapes_of(cell, None, np.array([[0.0, 0.6, 0.2, cell.floor_z + 2.0]]))
     checker = Checker(arm, people, MARGIN)
-    start = goal_postures(arm, np.array([0.4, 0.7, 0.3]), rng)
+    start = goal_configurations(arm, np.array([0.4, 0.7, 0.3]), rng)
     start = start[[checker.is_free(q) for q in start]][0]
     answer = plan(checker, start, goals, PlanSettings(max_poses=20_000))
     assert answer.solved and len(answer.path) > 2

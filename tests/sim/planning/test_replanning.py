@@ -13,7 +13,7 @@ from app.sim.collision.checker import Checker, Shapes, no_people, shapes_of
 from app.sim.collision.fcl_reference import CollisionReference
 from app.sim.core.arrays import Vec
 from app.sim.human import model as human
-from app.sim.planning.goal_configurations import vertical_posture
+from app.sim.planning.goal_configurations import vertical_configuration
 from app.sim.planning.ompl_planners import PLANNERS, PlanSettings
 from app.sim.planning.replanning import ROLES, ReplanningExecutor, ReplanningSettings
 from app.sim.robot.kernels import acceleration_bounds as polynomial
@@ -27,7 +27,7 @@ NOBODY = no_people()
 
 
 def station(name: str) -> Vec:
-    return vertical_posture(ARM, np.array(CELL.station(name).position))[0]
+    return vertical_configuration(ARM, np.array(CELL.station(name).position))[0]
 
 
 def posture_at(palm: tuple[float, float, float]) -> Vec:

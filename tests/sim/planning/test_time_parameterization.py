@@ -10,7 +10,7 @@ from app.errors import InvalidInput
 from app.sim.cells.cell import load_cell
 from app.sim.collision.checker import Checker, capsule_shapes, no_people
 from app.sim.core.arrays import Vec
-from app.sim.planning.goal_configurations import vertical_posture
+from app.sim.planning.goal_configurations import vertical_configuration
 from app.sim.planning.ompl_planners import planning_limits
 from app.sim.planning.time_parameterization import (
     Limits,
@@ -145,7 +145,7 @@ def test_a_stop_takes_the_time_of_the_slowest_joint() -> None:
 
 def corner_beside_a_ball() -> tuple[Checker, Vec]:
     """A path and a ball that its rounded corner comes nearer to than the path itself."""
-    (corner,) = vertical_posture(ARM, np.array(CELL.station("cube2").position))
+    (corner,) = vertical_configuration(ARM, np.array(CELL.station("cube2").position))
     path = np.stack([corner] * 3)
     path[0, 0] -= 0.6
     path[2, 1] -= 0.5

@@ -28,7 +28,7 @@ RESOLUTION = 1e-3
 """Farthest that any point of the robot moves between two poses of a walked motion [m]."""
 
 
-class Around(NamedTuple):
+class Obstacles(NamedTuple):
     """People at one moment, the distances to keep, and work space."""
 
     columns: Vec
@@ -50,7 +50,7 @@ class Around(NamedTuple):
 
 
 @kernel()
-def people_gap(around: Around, pose: RobotPose) -> float:
+def distance_to_people(around: Obstacles, pose: RobotPose) -> float:
     """Return the distance of the placed robot to people [m]; FAR without any."""
     best = FAR
     if around.columns.shape[1] > 0:
@@ -65,7 +65,9 @@ def people_gap(around: Around, pose: RobotPose) -> float:
 
 
 @kernel()
-def gaps_at(arm: Arm, q: Vec, around: Around, pose: RobotPose) -> tuple[float, float, float]:
+def clearances_at(
+    arm: Arm, q: Vec, around: Obstacles, pose: RobotPose
+) -> tuple[float, float, float]:
     """Return the distances to people, to the cell and of the robot to itself [m].
 
     Args:
@@ -75,19 +77,19 @@ def gaps_at(arm: Arm, q: Vec, around: Around, pose: RobotPose) -> tuple[float, f
         pose: Work space.
     """
     place_robot(arm, q, pose)
-    people = people_gap(around, pose)
+    people = distance_to_people(around, pose)
     cell, _, _ = cell_clearance(arm, pose.columns)
     own, _ = self_clearance(arm, pose)
     return people, cell, own
 
 
 @kernel()
-def slack_at(arm: Arm, q: Vec, around: Around, pose: RobotPose) -> float:
+def spare_clearance(arm: Arm, q: Vec, around: Obstacles, pose: RobotPose) -> float:
     """Return how far any point of the robot may move before something is too near [m].
 
     Of two parts of the robot that approach each other both move, so their slack counts half.
     """
-    people, cell, own = gaps_at(arm, q, around, pose)
+    people, cell, own = clearances_at(arm, q, around, pose)
     return min(
         people - around.margin,
         cell - around.cell_margin,
@@ -96,14 +98,14 @@ def slack_at(arm: Arm, q: Vec, around: Around, pose: RobotPose) -> float:
 
 
 @kernel()
-def free_at(arm: Arm, q: Vec, around: Around, pose: RobotPose) -> bool:
+def free_at(arm: Arm, q: Vec, around: Obstacles, pose: RobotPose) -> bool:
     """Tell whether a pose is free."""
-    return bool(slack_at(arm, q, around, pose) > 0.5 * RESOLUTION)
+    return bool(spare_clearance(arm, q, around, pose) > 0.5 * RESOLUTION)
 
 
 @kernel()
 def motion_free(
-    arm: Arm, q0: Vec, qd0: Vec, c: Vec, duration: float, around: Around, pose: RobotPose
+    arm: Arm, q0: Vec, qd0: Vec, c: Vec, duration: float, around: Obstacles, pose: RobotPose
 ) -> tuple[bool, int]:
     """Tell whether ``q0 + qd0 x + c x^2`` is free for all x from 0 to ``duration``.
 
@@ -137,7 +139,7 @@ def motion_free(
     while x < duration:
         _along(q0, qd0, c, x, q)
         looked += 1
-        slack = slack_at(arm, q, around, pose)
+        slack = spare_clearance(arm, q, around, pose)
         if slack <= 0.5 * RESOLUTION:
             return False, looked
         x += max(slack, RESOLUTION) / max(speed, 1e-9)
@@ -145,7 +147,9 @@ def motion_free(
 
 
 @kernel()
-def edge_free(arm: Arm, q0: Vec, q1: Vec, around: Around, pose: RobotPose) -> tuple[bool, int]:
+def edge_free(
+    arm: Arm, q0: Vec, q1: Vec, around: Obstacles, pose: RobotPose
+) -> tuple[bool, int]:
     """Tell whether the straight joint motion from ``q0`` to ``q1`` is free; see motion_free."""
     for j in range(6):
         around.qd[j], around.c[j] = q1[j] - q0[j], 0.0
@@ -154,7 +158,7 @@ def edge_free(arm: Arm, q0: Vec, q1: Vec, around: Around, pose: RobotPose) -> tu
 
 @kernel()
 def first_blocked(
-    arm: Arm, q: Vec, qd: Vec, dt: float, first: int, around: Around, pose: RobotPose
+    arm: Arm, q: Vec, qd: Vec, dt: float, first: int, around: Obstacles, pose: RobotPose
 ) -> int:
     """Return the first period of a timed path that is not free, or their number if all are.
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from app.sim.collision.checker import Shapes, no_people
 from app.sim.core.arrays import Vec
-from app.sim.planning.goal_configurations import goal_postures
+from app.sim.planning.goal_configurations import goal_configurations
 from app.sim.planning.replanning import ReplanningExecutor, ReplanningReport, ReplanningSettings
 from app.sim.reach.monitored.batch import GuardedReach
 from app.sim.robot.kernels.arm import Arm
@@ -31,7 +31,7 @@ def postures_of(arm: Arm, goals: Vec, seed: int) -> list[Vec]:
         seed: Seed of the search; each goal's postures are fixed by (seed, number).
     """
     return [
-        goal_postures(arm, goal, np.random.default_rng([seed, k]), spread=GOAL_SPREAD)
+        goal_configurations(arm, goal, np.random.default_rng([seed, k]), spread=GOAL_SPREAD)
         for k, goal in enumerate(goals)
     ]
 

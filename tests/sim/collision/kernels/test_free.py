@@ -19,12 +19,12 @@ def arm() -> Arm:
     return arm_of(load_cell())
 
 
-def around(people: Shapes, margin: float = 0.0, cell_margin: float = 0.0) -> free.Around:
+def around(people: Shapes, margin: float = 0.0, cell_margin: float = 0.0) -> free.Obstacles:
     gap, work = np.empty(people.columns.shape[1]), np.empty((3, 6))
-    return free.Around(people.columns, gap, people.cylinders, margin, cell_margin, *work)
+    return free.Obstacles(people.columns, gap, people.cylinders, margin, cell_margin, *work)
 
 
-def some_people(rng: np.random.Generator) -> free.Around:
+def some_people(rng: np.random.Generator) -> free.Obstacles:
     """Three short capsules and a cylinder somewhere in the robot's reach."""
     start = rng.uniform([-0.8, 0.2, 0.1], [0.8, 1.0, 0.9], size=(3, 3))
     ends = np.stack([start, start + rng.uniform(-0.3, 0.3, size=(3, 3))], axis=1)
@@ -44,7 +44,7 @@ def test_free_motions_have_slack_everywhere(arm: Arm) -> None:
         verdicts.append(verdict)
         if verdict:
             slacks = [
-                free.slack_at(arm, q0 + qd0 * x + c * x * x, people, pose)
+                free.spare_clearance(arm, q0 + qd0 * x + c * x * x, people, pose)
                 for x in np.linspace(0.0, 0.8, 200)
             ]
             assert min(slacks) > 0.0
@@ -66,7 +66,7 @@ def test_first_blocked_period_is_where_the_person_stands(arm: Arm) -> None:
     qd[:, 0] = (turn[1, 0] - turn[0, 0]) / arm.dt
     pose = arm_kernel.new_robot_pose(arm)
     nobody = around(no_people())
-    free.gaps_at(arm, turn[30], nobody, pose)
+    free.clearances_at(arm, turn[30], nobody, pose)
     tool = ends_of(pose.columns[:, -1:], 1)
     person = around(capsule_shapes(tool, np.array([0.02])))
     assert free.first_blocked(arm, turn, qd, arm.dt, 0, nobody, pose) == 80
