@@ -174,11 +174,11 @@ def test_who_is_seen_to_walk_past_does_not_hold_the_robot_where_velocities_are_m
         found: dict[str, Any] = answer["safety"]
         return found
 
-    assumed, measured = told(0.0), told(0.0, measured=True)
+    assumed, measured = told(0.0), told(0.0, use_measured_velocity=True)
     assert assumed["override"] < measured["override"] == 1.0
     assert assumed["terms"]["human_speed"] == 1.6
     assert measured["terms"]["human_speed"] == pytest.approx(0.1)
-    toward = told(-1.0, measured=True, speed_change=0.3)
+    toward = told(-1.0, use_measured_velocity=True, speed_change=0.3)
     assert toward["terms"]["human_speed"] == pytest.approx(1.3, abs=0.05)
     assert toward["override"] < 1.0
 

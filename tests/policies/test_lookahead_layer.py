@@ -34,7 +34,7 @@ from app.sim.safety.layer import SafetySettings, safety_settings
 
 CELL = load_cell("shared-workspace")
 POLICY = ReachPolicy(pretrained.load("reach"))
-MEASURED = replace(safety_settings(CELL), measured=True)
+MEASURED = replace(safety_settings(CELL), use_measured_velocity=True)
 DT = CELL.robot.dt
 
 

@@ -36,27 +36,27 @@ class ArmState(RobotState):
 
 
 class SafetyInput(Body):
-    """What speed and separation monitoring assumes; what is null is as the cell says."""
+    """Assumptions of speed and separation monitoring; null keeps the value of the cell."""
 
     human_speed: Annotated[float, Field(ge=0.0, le=10.0)] | None = Field(
         default=None, description="greatest speed of any point of a person, v_h [m/s]"
     )
-    measured: bool | None = Field(
+    use_measured_velocity: bool | None = Field(
         default=None,
-        description="whether people given as cylinders are taken to go on at their own "
-        "velocity (`vx`, `vy`, `growth`), which must then be measured, instead of at "
-        "`human_speed` in any direction; people known in other ways are not",
+        description="whether people given as cylinders are extrapolated with their own "
+        "velocity (`vx`, `vy`, `growth`), which must then be measured, instead of with "
+        "`human_speed` in any direction; people in other forms are not",
     )
     speed_change: Annotated[float, Field(ge=0.0, le=10.0)] | None = Field(
         default=None,
-        description="how much faster than that they may be, in any direction [m/s]",
+        description="assumed excess over that velocity, in any direction [m/s]",
     )
     reaction_time: Seconds | None = Field(
-        default=None, description="from a decision to its effect, a part of T_r [s]"
+        default=None, description="time from a decision to its effect, a part of T_r [s]"
     )
     tracker_delay: Seconds | None = Field(
         default=None,
-        description="age of what the tracker says when it says it, a part of T_r [s]",
+        description="age of the tracker's data on arrival, a part of T_r [s]",
     )
     intrusion_distance: Metres | None = Field(default=None, description="C [m]")
     person_uncertainty: Metres | None = Field(default=None, description="Z_d [m]")
@@ -70,7 +70,7 @@ class SafetyInput(Body):
     )
 
     def to_domain(self, own: SafetySettings) -> SafetySettings:
-        """Return the cell's settings with what is given in their place."""
+        """Return the settings of the cell with the given values in their place."""
         given = self.model_dump(exclude_none=True)
         return replace(own, **given) if given else own
 

@@ -170,7 +170,7 @@ class ReachWorld:
     def _go_by(self, measured: bool | None) -> None:
         """Let the safety layer go by measured velocities or not; None leaves it."""
         if measured is not None:
-            settings = replace(self._layer.settings, measured=measured)
+            settings = replace(self._layer.settings, use_measured_velocity=measured)
             self._layer = SafetyLayer(self._layer.arm, settings)
 
     def _goals_drawn(self) -> Vec | None:
@@ -314,7 +314,7 @@ class ReachWorld:
             if terms
             else None,
             margin=layer.settings.margin,
-            measured=layer.settings.measured,
+            measured=layer.settings.use_measured_velocity,
             human_speed=layer.settings.other_speed,
             stop_time=told.stop_time,
             zone=frozen(separation_zone(layer.arm, layer.settings, robot.q, robot.qd)),

@@ -72,7 +72,7 @@ def layer_of(settings: SafetySettings | None, dt: float, age: float = 0.0) -> La
         dt: Control period [s].
         age: How old people are beyond the tracker's delay [s].
     """
-    if settings is None or not settings.measured:
+    if settings is None or not settings.use_measured_velocity:
         return NO_LAYER
     ahead = min(LONGEST_AHEAD, settings.latency + dt + age)
     return Layer(settings.margin + settings.speed_change * ahead + SPARE_M, ahead)

@@ -16,7 +16,7 @@ from pydantic import BaseModel, ValidationError
 from app.errors import BadCell, Fault
 from app.sim.cell_validation.checks import check_cell
 from app.sim.cells.cell import LIMITS, Cell, load_cell
-from app.sim.cells.parts import GoalRegion, Obstacle, RobotMount, SafetySettings, Station, Table
+from app.sim.cells.parts import CellSafety, GoalRegion, Obstacle, RobotMount, Station, Table
 from app.sim.cells.people import ConstantWalker, FixedSpeedWalker, Walker, Worker
 
 MAX_BYTES = 256 * 1024
@@ -32,7 +32,7 @@ _PARTS: Mapping[str, type[BaseModel]] = {
     "table": Table,
     "robot": RobotMount,
     "goal_region": GoalRegion,
-    "safety": SafetySettings,
+    "safety": CellSafety,
     "stations": Station,
     "obstacles": Obstacle,
 }

@@ -21,11 +21,11 @@ from pydantic import Field, ValidationError
 from app.errors import CheckpointMismatch, InvalidInput, NotFound
 from app.sim.cells.parts import (
     CellData,
+    CellSafety,
     GoalRegion,
     Label,
     Obstacle,
     RobotMount,
-    SafetySettings,
     Station,
     Table,
 )
@@ -50,7 +50,7 @@ class Cell(CellData):
     goal_region: GoalRegion | None = Field(default=None, description="box of goals, or null")
     obstacles: tuple[Obstacle, ...] = Field(default=(), description="fixed boxes, at most 32")
     people: tuple[Person, ...] = Field(default=(), description="who may be there, at most 4")
-    safety: SafetySettings = SafetySettings()
+    safety: CellSafety = CellSafety()
 
     @property
     def floor_z(self) -> float:

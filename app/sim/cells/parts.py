@@ -185,15 +185,15 @@ class RobotMount(CellData):
     dt: Annotated[float, Within(0.002, 0.2, "s")] = Field(description="control period [s]")
 
 
-class SafetySettings(CellData):
-    """What speed and separation monitoring assumes in this cell (METHOD 2.7)."""
+class CellSafety(CellData):
+    """Assumptions of speed and separation monitoring in this cell (docs/method.md 2.7)."""
 
     protective_distance: Uncertainty = Field(
-        default=0.3, description="least distance to anyone, on top of the rule [m]"
+        default=0.3, description="least distance to people, added to the rule [m]"
     )
     human_speed: Speed = Field(default=1.6, description="assumed speed of a person, v_h [m/s]")
     reaction_time: Seconds = Field(default=0.1, description="reaction time, T_r [s]")
-    tracker_delay: Seconds = Field(default=0.0, description="age of what the tracker says [s]")
+    tracker_delay: Seconds = Field(default=0.0, description="age of the tracker's data [s]")
     intrusion_distance: Uncertainty = Field(default=0.0, description="intrusion, C [m]")
     person_uncertainty: Uncertainty = Field(
         default=0.0, description="uncertainty of a person's position, Z_d [m]"

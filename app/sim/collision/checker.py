@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from app.errors import InvalidInput
 from app.sim.cells.cell import Cell
+from app.sim.collision.contact import Clearance
 from app.sim.collision.kernels import free
 from app.sim.core.arrays import Vec
 from app.sim.geometry.capsules import N_ROWS, capsules_soa, padded_size
@@ -81,18 +82,6 @@ def shapes_of(
     return replace(workers, cylinders=tubes)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Clearance:
-    """Distances at one pose [m]; 1e3 where there is nothing."""
-
-    people: float
-    """To the nearest person."""
-    cell: float
-    """Of the moving links to table and obstacles."""
-    own: float
-    """Of the robot to itself."""
-
-
 class Checker:
     """Asks the compiled kernels about poses and motions among people who stand still.
 
@@ -109,7 +98,7 @@ class Checker:
         self, arm: Arm, people: Shapes, margin: float = 0.0, cell_margin: float = CELL_MARGIN
     ) -> None:
         self.arm, self.people, self.margin, self.cell_margin = arm, people, margin, cell_margin
-        self._around = free.Obstacles(
+        self._obstacles = free.Obstacles(
             people.columns,
             np.empty(people.columns.shape[1]),
             people.cylinders,
@@ -125,17 +114,17 @@ class Checker:
     def is_free(self, q: Vec) -> bool:
         """Tell whether everything keeps its distance at ``q`` [rad], shape (6,)."""
         self.n_poses += 1
-        return bool(free.free_at(self.arm, q, self._around, self._pose))
+        return bool(free.free_at(self.arm, q, self._obstacles, self._pose))
 
     def clearance(self, q: Vec) -> Clearance:
         """Return the distances at ``q`` [rad], shape (6,)."""
         self.n_poses += 1
-        people, cell, own = free.clearances_at(self.arm, q, self._around, self._pose)
-        return Clearance(people=people, cell=cell, own=own)
+        people, cell, own = free.clearances_at(self.arm, q, self._obstacles, self._pose)
+        return Clearance(people_m=people, cell_m=cell, self_m=own)
 
     def edge_free(self, q0: Vec, q1: Vec) -> bool:
         """Tell whether the straight joint motion between two positions [rad] is free."""
-        verdict, looked = free.edge_free(self.arm, q0, q1, self._around, self._pose)
+        verdict, looked = free.edge_free(self.arm, q0, q1, self._obstacles, self._pose)
         self.n_poses += looked
         return bool(verdict)
 
@@ -152,5 +141,5 @@ class Checker:
             first: Period to begin with.
         """
         return int(
-            free.first_blocked(self.arm, q, qd, self.arm.dt, first, self._around, self._pose)
+            free.first_blocked(self.arm, q, qd, self.arm.dt, first, self._obstacles, self._pose)
         )

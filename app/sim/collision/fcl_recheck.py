@@ -16,8 +16,8 @@ from app.sim.cells.cell import Cell
 from app.sim.collision.fcl_reference import (
     BODY_NAMES,
     CollisionReference,
-    Contact,
     Kind,
+    MeshContact,
     walker_name,
 )
 from app.sim.core.arrays import Vec
@@ -67,7 +67,7 @@ class FirstContact:
     """Row of the trajectory."""
     time_s: float
     """Time since the first row [s]."""
-    contacts: tuple[Contact, ...]
+    contacts: tuple[MeshContact, ...]
     """All contacts in that row."""
 
 
@@ -203,7 +203,7 @@ class Recheck:
 
     def _ask(
         self, trajectory: Trajectory, row: int, pairs: set[tuple[str, str, Kind]]
-    ) -> tuple[Contact, ...]:
+    ) -> tuple[MeshContact, ...]:
         if not pairs:
             return ()
         self._reference.place_robot(trajectory.q_robot[row])
@@ -213,7 +213,7 @@ class Recheck:
             self._reference.place_walkers(trajectory.walkers[row])
         order = sorted(pairs, key=lambda pair: (BODY_NAMES.index(pair[0]), pair[1]))
         return tuple(
-            Contact(kind=kind, link=link, body=body)
+            MeshContact(kind=kind, link=link, body=body)
             for link, body, kind in order
             if self._reference.touching(link, body)
         )

@@ -45,7 +45,7 @@ column."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Contact:
+class MeshContact:
     """Two things that touch."""
 
     kind: Kind
@@ -215,7 +215,7 @@ class CollisionReference:
             for k, (x, y, r) in enumerate(cylinders.tolist())
         }
 
-    def contacts(self, q: Vec, human_q: Vec | None = None) -> list[Contact]:
+    def contacts(self, q: Vec, human_q: Vec | None = None) -> list[MeshContact]:
         """Return everything the robot touches, itself included.
 
         Args:
@@ -229,7 +229,7 @@ class CollisionReference:
         if human_q is not None:
             pairs += [(link, body, "human") for link in BODY_NAMES for body in self._person]
         return [
-            Contact(kind=kind, link=link, body=body)
+            MeshContact(kind=kind, link=link, body=body)
             for link, body, kind in pairs
             if self.touching(link, body)
         ]

@@ -32,7 +32,7 @@ class CylinderSettings:
     """What is ours about the safety cylinder."""
 
     flesh_margin: float = 0.17
-    """Added to the radius and to the top [m]. Obstacles exact key-points of a person at work,
+    """Added to the radius and to the top [m]. Around exact key-points of a person at work,
     0.131 m hold the whole surface of the median body, 0.145 m that of the 95th percentile
     (stature, arms and shoulders): crown and fingertips ask for most. The rest is for noise."""
     growth: float = 1.6

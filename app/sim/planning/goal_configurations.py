@@ -1,9 +1,8 @@
-"""Postures that bring the tool to a target: the goals of the planners.
+"""Joint configurations that bring the tool to a target: the goals of the planners.
 
-Where the tool shall point down, the closed form of ``robot/kernels/kinematics.py`` gives the
-posture
-that training uses. Where any tilt will do, damped least squares from random starts (Pinocchio)
-finds several, which a planner may choose among.
+With the tool pointing down, the closed form of ``robot/kernels/kinematics.py`` gives the
+configuration that training uses. For any tilt, damped least squares from random starts
+(Pinocchio) finds several, among which a planner may choose.
 """
 
 import numpy as np
@@ -13,18 +12,18 @@ from app.sim.robot.kernels.arm import CONTROLLED, Arm
 from app.sim.robot.ur10 import Robot
 
 DAMPING = 0.05
-"""Damping of the least squares [m/rad]: keeps steps short near singular postures."""
+"""Damping of the least squares [m/rad]: keeps steps short near singular configurations."""
 LONGEST_STEP = 0.3
 """Longest step of a joint per iteration [rad]."""
 ITERATIONS = 60
 CLOSE = 1e-4
 """Distance of tcp and target at which the iteration ends [m]."""
 APART = 0.1
-"""Postures nearer than this are taken for one [rad]."""
+"""Configurations nearer than this count as one [rad]."""
 
 
 def vertical_configuration(arm: Arm, target: Vec) -> Vec:
-    """Return the posture, if any, with the tool down at ``target`` [m], shape (0 or 1, 6)."""
+    """Return the configuration with the tool down at ``target`` [m], shape (0 or 1, 6)."""
     q = Robot(arm.lengths.tool).ik_vertical(target, arm.limits.q_min, arm.limits.q_max)
     return np.zeros((0, 6)) if q is None else q[None]
 
@@ -38,20 +37,20 @@ def goal_configurations(
     spread: float = 0.0,
     tilt_max: float | None = None,
 ) -> Vec:
-    """Return postures whose tcp lies at a target, of any tilt up to a bound.
+    """Return configurations whose tcp is at a target, of any tilt up to a bound.
 
     Args:
         arm: From ``scene.arm_of``.
-        target: Where the tcp shall be [m], shape (3,).
-        rng: Draws the starts of the search, and points near the target.
+        target: Position of the tcp [m], shape (3,).
+        rng: Source of the starts of the search and of points near the target.
         n_starts: Random starts; the first one is the cell's home.
-        spread: Postures may miss the target by so much [m]; a success counts within 0.1 m.
+        spread: Greatest distance of the tcp to the target [m]; success counts within 0.1 m.
         tilt_max: Largest angle of the tool to the vertical [rad]; None for any.
 
     Returns:
-        Postures inside the joint limits that differ by APART at least [rad], shape (k, 6), with
-        the joints beyond the controlled ones at home; k = 0 where none was found. Neither
-        people nor contact are looked at.
+        Configurations inside the joint limits that differ by at least APART [rad], shape
+        (k, 6), with the joints beyond the controlled ones at home; k = 0 where none was found.
+        People and contacts are not considered.
     """
     robot = Robot(arm.lengths.tool)
     found: list[Vec] = []
@@ -62,8 +61,8 @@ def goal_configurations(
             q[:CONTROLLED] = rng.uniform(np.maximum(low, -np.pi), np.minimum(high, np.pi))
         point = np.array(target, dtype=np.float64)
         if k > 0 and spread > 0.0:
-            way = rng.normal(size=3)
-            point += spread * rng.uniform() ** (1.0 / 3.0) * way / np.linalg.norm(way)
+            offset = rng.normal(size=3)
+            point += spread * rng.uniform() ** (1.0 / 3.0) * offset / np.linalg.norm(offset)
         posture = _descend(robot, arm, point, q)
         if posture is None or not _upright(robot, posture, tilt_max):
             continue
@@ -73,7 +72,7 @@ def goal_configurations(
 
 
 def _descend(robot: Robot, arm: Arm, point: Vec, q: Vec) -> Vec | None:
-    """Return the posture that damped least squares reaches from ``q``; None if it fails."""
+    """Return the configuration found by damped least squares from ``q``; None if none."""
     moving = slice(0, CONTROLLED)
     for _ in range(ITERATIONS):
         miss = point - robot.tcp_pose(q)[:3, 3]

@@ -86,7 +86,7 @@ class PlanSettings:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Plan:
+class MotionPlan:
     """The answer to one query."""
 
     outcome: str
@@ -114,8 +114,8 @@ class Plan:
 
 def plan(
     checker: Checker, start: Vec, goals: Vec, settings: PlanSettings, seed: int = 1
-) -> Plan:
-    """Plan from one posture to any of several.
+) -> MotionPlan:
+    """Plan from one configuration to any of several.
 
     Args:
         checker: People, margins and the robot; people stand still while it plans.
@@ -201,14 +201,14 @@ class _Clock:
         path: Vec | None = None,
         goals: Vec | None = None,
         first: float | None = None,
-    ) -> Plan:
+    ) -> MotionPlan:
         """Return the plan with the time and poses spent so far."""
         path = np.zeros((0, 6)) if path is None else path
         goal = -1
         if outcome == "solved" and goals is not None:
             goal = int(np.argmin(np.linalg.norm(goals - path[-1], axis=1)))
         length = path_length(path)
-        return Plan(
+        return MotionPlan(
             outcome=outcome,
             planner=self._settings.planner,
             path=path,

@@ -1,57 +1,56 @@
-"""Follows a timed path from wherever the robot really is on it, period by period.
+"""Path following: tracks a timed path from the robot's actual position, period by period.
 
-As long as nobody slows the robot down, each period's wanted speeds are the next knot's, and
-the motion is the timed path to rounding. A safety layer may scale a period or stop (METHOD
-2.7); then the tracker finds the place on the path from the robot's position and goes on from
-there at the greatest rate ``o`` in [0, 1] of the path's own speed that the acceleration limits
-allow:
+Without a safety layer, the target speeds of each period are those of the next knot, and the
+motion is the timed path to rounding. A safety layer may scale a period or stop (docs/method.md
+2.7); the follower then finds the robot's place on the path and continues from there at the
+greatest rate ``o`` in [0, 1] of the path's own speed that the acceleration limits allow:
 
     qd_wanted = o' p'(s') + GAIN (p(s') - q - (qd + o' p'(s')) dt / 2) / dt,
     s' = s + (o + o') dt / 2,
 
-with ``o`` the present rate. A timed path can be followed at any rate below 1, since speeds
-scale with o and accelerations with o^2; the second term takes back what is lost where a period
-straddles two pieces: a few milliradians at worst. The bounded actions
+with ``o`` the current rate. A timed path can be followed at any rate below 1, since speeds
+scale with o and accelerations with o^2; the second term corrects the error of a period that
+spans two segments, a few milliradians at most. The bounded actions
 (``robot/kernels/acceleration_bounds.py``) keep the limits in any case.
 """
 
 import numpy as np
 
 from app.sim.core.arrays import Vec
-from app.sim.planning.time_parameterization import Limits, TimedPath, stop_periods
+from app.sim.planning.time_parameterization import TimedPath, TimingLimits, stop_periods
 
 GAIN = 0.3
-"""Part of the position error that is taken back per period; ours."""
+"""Share of the position error that is corrected per period; ours."""
 RATES = np.linspace(0.0, 1.0, 41)
 """Rates tried."""
 ON_PLAN = 1e-7
 """Differences in position [rad] and speed [rad/s] below which the robot is at a knot."""
 
 
-class Tracker:
+class PathFollower:
     """The follower of one timed path.
 
     Args:
         timed: The path.
-        limits: Limits of the robot.
+        limits: TimingLimits of the robot.
     """
 
-    def __init__(self, timed: TimedPath, limits: Limits) -> None:
+    def __init__(self, timed: TimedPath, limits: TimingLimits) -> None:
         self.timed, self._limits = timed, limits
         self.place = 0.0
-        """Where on the path the robot is, as the path's own time [s]."""
+        """Place of the robot on the path, as the path's own time [s]."""
         self._expected = 0.0
         self.error_rad = 0.0
         """Distance of the robot from the path, greatest joint [rad]."""
 
     @property
     def remaining(self) -> float:
-        """What is left of the path, in its own time [s]."""
+        """Rest of the path, in its own time [s]."""
         return max(0.0, self.timed.duration - self.place)
 
     @property
     def period(self) -> int:
-        """The period of the path that the robot is in."""
+        """Period of the path at the robot's place."""
         return min(int(self.place / self.timed.dt + 1e-6), self.timed.n_periods)
 
     def locate(self, q: Vec) -> None:
@@ -70,12 +69,12 @@ class Tracker:
         self.error_rad = float(np.abs(q - self.timed.at(self.place)[0]).max())
 
     def wanted(self, q: Vec, qd: Vec, brake: bool = False) -> Vec:
-        """Return the joint speeds to have after this period [rad/s], shape (6,).
+        """Return the target joint speeds after this period [rad/s], shape (6,).
 
         Args:
             q: Joint positions [rad], shape (6,), as given to :meth:`locate`.
             qd: Joint speeds [rad/s], shape (6,).
-            brake: Come to rest along the path instead, as soon as the limits allow.
+            brake: Whether to come to rest along the path as soon as the limits allow.
         """
         timed, dt = self.timed, self.timed.dt
         k = round(self.place / dt)
@@ -112,7 +111,7 @@ class Tracker:
         return min(1.0, max(0.0, float(speed @ qd) / square))
 
 
-def straight_stop(qd: Vec, limits: Limits) -> Vec:
+def straight_stop(qd: Vec, limits: TimingLimits) -> Vec:
     """Return the joint speeds after one period of a straight stop [rad/s], shape (6,)."""
     n = stop_periods(qd, limits)
     return np.asarray(qd * (1.0 - 1.0 / n)) if n > 1 else np.zeros(6)

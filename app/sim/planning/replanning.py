@@ -23,9 +23,9 @@ import numpy as np
 from app.errors import InvalidInput
 from app.sim.collision.checker import Checker, Shapes
 from app.sim.core.arrays import Vec, as_kernel_array
-from app.sim.planning.ompl_planners import Plan, PlanSettings, plan
-from app.sim.planning.path_tracking import Tracker, straight_stop
-from app.sim.planning.time_parameterization import Limits, stopping_point, time_free_path
+from app.sim.planning.ompl_planners import MotionPlan, PlanSettings, plan
+from app.sim.planning.path_tracking import PathFollower, straight_stop
+from app.sim.planning.time_parameterization import TimingLimits, stopping_point, time_free_path
 from app.sim.robot.kernels import acceleration_bounds as polynomial
 from app.sim.robot.kernels.arm import Arm
 from app.sim.robot.kernels.joints import JointState
@@ -33,29 +33,29 @@ from app.sim.robot.kernels.joints import JointState
 STATES = ("waiting", "following", "braking", "arrived", "lost")
 """``waiting``: no plan, at rest or braking to rest. ``braking``: slows down along a path that
 is blocked. ``lost``: farther from the path than ``lost_rad``, braking to rest."""
-AGAIN_BUDGET_S = {"plan-once": 0.0, "replan-on-blocked": 0.2, "replan-every-cycle": 0.02}
+REPLAN_BUDGET_S = {"plan-once": 0.0, "replan-on-blocked": 0.2, "replan-every-cycle": 0.02}
 """Budget of later plans by role [s]; ours."""
-EASED = 0.005
-"""Where the robot is nearer to people than the margin, a margin this much below its clearance
-holds instead [m]: it may leave, and pass by no nearer than it stands."""
+REDUCTION = 0.005
+"""Amount by which the margin is below the current clearance, where that is below the margin
+[m]: the robot may leave, and pass people no nearer than now."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReplanningSettings:
-    """How a planner follows and plans again."""
+    """Settings of a replanning executor."""
 
     role: str = "plan-once"
     """One of ROLES."""
     plan: PlanSettings = field(default_factory=PlanSettings)
-    """How the first path is planned."""
-    again_budget_s: float | None = None
-    """Budget of later plans [s]; that of the role (AGAIN_BUDGET_S) if None."""
+    """Settings of the first plan."""
+    replan_budget_s: float | None = None
+    """Budget of later plans [s]; that of the role (REPLAN_BUDGET_S) if None."""
     margin: float = 0.05
     """Distance at which people block the path [m]."""
     extra_margin: float = 0.02
-    """What plans keep beyond the margin [m], so that a new path is not blocked at once."""
-    look_every_s: float = 0.1
-    """How often ``replan-on-blocked`` looks at the rest of its path [s]."""
+    """Distance beyond the margin that plans keep [m], so that new paths are not blocked."""
+    check_every_s: float = 0.1
+    """Interval at which ``replan-on-blocked`` checks the rest of its path [s]."""
     better_share: float = 0.05
     """Least share of the time left that a new path saves in ``replan-every-cycle``."""
     arrived_rad: float = 1e-3
@@ -66,36 +66,36 @@ class ReplanningSettings:
 
 @dataclass(slots=True, kw_only=True)
 class ReplanningReport:
-    """What happened so far; grows with every period."""
+    """Report of an executor, updated every period."""
 
     state: str = "waiting"
     """One of STATES."""
     outcome: str = ""
     """Outcome of the last plan, one of ``planners.OUTCOMES``; empty before the first."""
     n_plans: int = 0
-    """Plans asked for."""
+    """Number of plans."""
     n_solved: int = 0
     """Plans that found a path."""
     n_changes: int = 0
-    """Times it turned to a new path."""
+    """Switches to a new path."""
     planning_s: float = 0.0
     """Wall time spent planning [s]."""
     longest_plan_s: float = 0.0
     """Longest plan [s]."""
     blocked_s: float = 0.0
-    """Time during which it braked or stood because the path was blocked [s]."""
+    """Time braking or at rest because the path was blocked [s]."""
     margin: float = 0.0
-    """Margin of the last plan [m], eased where the robot stood nearer to people."""
+    """Margin of the last plan [m], reduced where the robot was nearer to people."""
     error_rad: float = 0.0
     """Greatest distance from the path so far [rad]."""
 
 
 class ReplanningExecutor:
-    """A planner that acts like a policy: state and people in, wanted joint speeds out.
+    """Planner with the interface of a policy: state and people in, target joint speeds out.
 
     Args:
         arm: From ``scene.arm_of``.
-        goals: Postures to reach one of [rad], shape (k, 6).
+        goals: Goal configurations, of which one is to be reached [rad], shape (k, 6).
         settings: Role, margins, budgets.
         seed: Seed of the first plan; each later one adds 1.
 
@@ -109,33 +109,35 @@ class ReplanningExecutor:
         if settings.role not in ROLES:
             raise InvalidInput("role", settings.role, "is not known", tuple(ROLES))
         self.arm, self.goals, self.settings, self.seed = arm, goals, settings, seed
-        self.limits = Limits(qd_max=arm.limits.qd_max, qdd_max=arm.limits.qdd_max, dt=arm.dt)
+        self.limits = TimingLimits(
+            qd_max=arm.limits.qd_max, qdd_max=arm.limits.qdd_max, dt=arm.dt
+        )
         self.report = ReplanningReport(margin=settings.margin)
-        self.tracker: Tracker | None = None
+        self.path_follower: PathFollower | None = None
         self.blocked = False
-        self.pending: tuple[float, Plan] | None = None
-        self.next_look = -math.inf
+        self.pending: tuple[float, MotionPlan] | None = None
+        self.next_check = -math.inf
 
     def act(self, q: Vec, qd: Vec, people: Shapes, t: float) -> Vec:
-        """Return the joint speeds to have after this period [rad/s], shape (6,).
+        """Return the target joint speeds after this period [rad/s], shape (6,).
 
         Args:
             q: Joint positions [rad], shape (6,).
             qd: Joint speeds [rad/s], shape (6,).
-            people: Where people are now.
+            people: People at this moment.
             t: Time since the start [s].
         """
         if self.report.n_plans == 0:
             first = self.ask(people, stopping_point(q, qd, self.limits), self.settings.plan)
             self.turn_to(first, q, qd, people)
-        if self.tracker is not None:
-            self.tracker.locate(q)
-            self.report.error_rad = max(self.report.error_rad, self.tracker.error_rad)
+        if self.path_follower is not None:
+            self.path_follower.locate(q)
+            self.report.error_rad = max(self.report.error_rad, self.path_follower.error_rad)
         ROLES[self.settings.role](self, q, qd, people, t)
         return self._order(q, qd)
 
-    def ask(self, people: Shapes, start: Vec, settings: PlanSettings) -> Plan:
-        """Plan from a posture at rest [rad], shape (6,), among people as they are now."""
+    def ask(self, people: Shapes, start: Vec, settings: PlanSettings) -> MotionPlan:
+        """Plan from a configuration at rest [rad], shape (6,), among the current people."""
         margin = self.settings.margin + self.settings.extra_margin
         checker = self.checker(people, start, margin)
         answer = plan(checker, start, self.goals, settings, self.seed + self.report.n_plans)
@@ -147,10 +149,10 @@ class ReplanningExecutor:
         return answer
 
     def again(self, people: Shapes, q: Vec, qd: Vec, t: float) -> None:
-        """Plan from where a straight stop from a state would end; used after the budget."""
-        budget = self.settings.again_budget_s
+        """Plan from the end of a straight stop from a state; used after the budget."""
+        budget = self.settings.replan_budget_s
         if budget is None:
-            budget = AGAIN_BUDGET_S[self.settings.role]
+            budget = REPLAN_BUDGET_S[self.settings.role]
         later = replace(self.settings.plan, budget_s=budget)
         answer = self.ask(people, stopping_point(q, qd, self.limits), later)
         if answer.solved:
@@ -158,19 +160,19 @@ class ReplanningExecutor:
 
     def checker(self, people: Shapes, q: Vec, margin: float) -> Checker:
         """Return the checker for a margin [m], eased where the robot at ``q`` is nearer."""
-        clearance = Checker(self.arm, people).clearance(q).people
-        return Checker(self.arm, people, max(0.0, min(margin, clearance - EASED)))
+        clearance = Checker(self.arm, people).clearance(q).people_m
+        return Checker(self.arm, people, max(0.0, min(margin, clearance - REDUCTION)))
 
     def is_blocked(self, people: Shapes, q: Vec) -> bool:
         """Tell whether people are nearer to the rest of the path than the margin."""
-        if self.tracker is None:
+        if self.path_follower is None:
             return True
         checker = self.checker(people, q, self.settings.margin)
-        timed, first = self.tracker.timed, self.tracker.period
+        timed, first = self.path_follower.timed, self.path_follower.period
         return checker.first_blocked(timed.q, timed.qd, first) < timed.n_periods
 
     def turn_to(
-        self, answer: Plan, q: Vec, qd: Vec, people: Shapes, within_s: float = math.inf
+        self, answer: MotionPlan, q: Vec, qd: Vec, people: Shapes, within_s: float = math.inf
     ) -> bool:
         """Follow a plan from the present state if its motion is free and short enough.
 
@@ -178,7 +180,7 @@ class ReplanningExecutor:
             answer: A plan from where the robot was to stop.
             q: Joint positions [rad], shape (6,).
             qd: Joint speeds [rad/s], shape (6,).
-            people: Where people are now.
+            people: People at this moment.
             within_s: Longest motion taken [s].
         """
         if not answer.solved:
@@ -191,35 +193,35 @@ class ReplanningExecutor:
                 timed = time_free_path(checker, path, self.limits, qd)
                 if timed is None or timed.duration > within_s:
                     return False
-                self.tracker, self.blocked = Tracker(timed, self.limits), False
+                self.path_follower, self.blocked = PathFollower(timed, self.limits), False
                 self.report.n_changes += 1
                 return True
         return False
 
     def _order(self, q: Vec, qd: Vec) -> Vec:
         """Return the wanted speeds of the present state of affairs."""
-        report, tracker = self.report, self.tracker
-        if tracker is None:
+        report, path_follower = self.report, self.path_follower
+        if path_follower is None:
             report.state = "waiting"
             return straight_stop(qd, self.limits)
-        if tracker.error_rad > self.settings.lost_rad:
-            report.state, self.tracker = "lost", None
+        if path_follower.error_rad > self.settings.lost_rad:
+            report.state, self.path_follower = "lost", None
             return straight_stop(qd, self.limits)
-        near = float(np.abs(q - tracker.timed.q[-1]).max()) <= self.settings.arrived_rad
+        near = float(np.abs(q - path_follower.timed.q[-1]).max()) <= self.settings.arrived_rad
         if near and float(np.abs(qd).max()) <= self.settings.arrived_rad:
             report.state = "arrived"
         else:
             report.state = "braking" if self.blocked else "following"
         if report.state == "braking":
             report.blocked_s += self.arm.dt
-        return tracker.wanted(q, qd, brake=report.state == "braking")
+        return path_follower.wanted(q, qd, brake=report.state == "braking")
 
 
 def _once(follower: ReplanningExecutor, q: Vec, qd: Vec, people: Shapes, t: float) -> None:
     """Leave the path as it is."""
 
 
-def _when_blocked(
+def _on_blocked(
     follower: ReplanningExecutor, q: Vec, qd: Vec, people: Shapes, t: float
 ) -> None:
     """Look at the rest of the path; plan again where it is blocked."""
@@ -227,28 +229,28 @@ def _when_blocked(
         return
     if follower.pending is not None and t >= follower.pending[0] - 1e-9:
         answer, follower.pending = follower.pending[1], None
-        if follower.blocked or follower.tracker is None:
+        if follower.blocked or follower.path_follower is None:
             follower.turn_to(answer, q, qd, people)
-    if t < follower.next_look - 1e-9:
+    if t < follower.next_check - 1e-9:
         return
-    follower.next_look = t + follower.settings.look_every_s
+    follower.next_check = t + follower.settings.check_every_s
     follower.blocked = follower.is_blocked(people, q)
     if follower.blocked and follower.pending is None:
         follower.again(people, q, qd, t)
 
 
-def _every_tick(
+def _every_cycle(
     follower: ReplanningExecutor, q: Vec, qd: Vec, people: Shapes, t: float
 ) -> None:
-    """Plan again for the state after this period; turn to what was planned for this one."""
+    """Plan for the state after this period; switch to the plan for this one."""
     if follower.report.state == "arrived":
         return
     follower.blocked = follower.is_blocked(people, q)
     if follower.pending is not None and t >= follower.pending[0] - 1e-9:
         answer, follower.pending = follower.pending[1], None
         left = math.inf
-        if follower.tracker is not None and not follower.blocked:
-            left = follower.tracker.remaining * (1.0 - follower.settings.better_share)
+        if follower.path_follower is not None and not follower.blocked:
+            left = follower.path_follower.remaining * (1.0 - follower.settings.better_share)
         follower.turn_to(answer, q, qd, people, left)
     if follower.pending is None:
         after_q, after_qd = _after_period(follower, q, qd)
@@ -256,12 +258,12 @@ def _every_tick(
 
 
 def _after_period(follower: ReplanningExecutor, q: Vec, qd: Vec) -> tuple[Vec, Vec]:
-    """Return positions [rad] and speeds [rad/s] after this period if nobody slows it down."""
-    arm, tracker = follower.arm, follower.tracker
-    if tracker is None:
+    """Return positions [rad] and speeds [rad/s] after this period without a safety layer."""
+    arm, path_follower = follower.arm, follower.path_follower
+    if path_follower is None:
         wanted = straight_stop(qd, follower.limits)
     else:
-        wanted = tracker.wanted(q, qd, brake=follower.blocked)
+        wanted = path_follower.wanted(q, qd, brake=follower.blocked)
     end = JointState(np.empty(6), np.empty(6), np.empty(6))
     start = JointState(as_kernel_array(q), as_kernel_array(qd), np.zeros(6))
     polynomial.advance_to_speeds(arm.limits, arm.dt, start, wanted, np.empty(6), end)
@@ -270,6 +272,6 @@ def _after_period(follower: ReplanningExecutor, q: Vec, qd: Vec) -> tuple[Vec, V
 
 ROLES: dict[str, Callable[[ReplanningExecutor, Vec, Vec, Shapes, float], None]] = {
     "plan-once": _once,
-    "replan-on-blocked": _when_blocked,
-    "replan-every-cycle": _every_tick,
+    "replan-on-blocked": _on_blocked,
+    "replan-every-cycle": _every_cycle,
 }

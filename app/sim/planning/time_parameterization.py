@@ -70,7 +70,7 @@ class TimedPath:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Limits:
+class TimingLimits:
     """What a motion keeps, per joint."""
 
     qd_max: Vec
@@ -81,18 +81,18 @@ class Limits:
     """Control period [s]."""
 
 
-def stop_periods(qd: Vec, limits: Limits) -> int:
+def stop_periods(qd: Vec, limits: TimingLimits) -> int:
     """Return the periods of a straight stop: all joints slow down evenly and rest together."""
     return math.ceil(float(np.max(np.abs(qd) / (limits.qdd_max * limits.dt))) - 1e-9)
 
 
-def stopping_point(q: Vec, qd: Vec, limits: Limits) -> Vec:
+def stopping_point(q: Vec, qd: Vec, limits: TimingLimits) -> Vec:
     """Return where a straight stop from ``q`` [rad] and ``qd`` [rad/s] ends [rad], (6,)."""
     return np.asarray(q + 0.5 * stop_periods(qd, limits) * limits.dt * qd)
 
 
 def time_path(
-    path: Vec, limits: Limits, qd0: Vec | None = None, stops: frozenset[int] = frozenset()
+    path: Vec, limits: TimingLimits, qd0: Vec | None = None, stops: frozenset[int] = frozenset()
 ) -> TimedPath:
     """Time a path within limits, from a state in motion or at rest to rest.
 
@@ -126,7 +126,7 @@ def time_path(
 
 
 def time_free_path(
-    checker: Checker, path: Vec, limits: Limits, qd0: Vec | None = None
+    checker: Checker, path: Vec, limits: TimingLimits, qd0: Vec | None = None
 ) -> TimedPath | None:
     """Time a path so that the timed motion is free too, stopping at corners where it must.
 
@@ -158,7 +158,7 @@ def time_free_path(
     return best
 
 
-def _run(path: Vec, limits: Limits, qd0: Vec) -> TimedPath:
+def _run(path: Vec, limits: TimingLimits, qd0: Vec) -> TimedPath:
     """Time a path without stops between its ends."""
     apart = np.abs(np.diff(path, axis=0)).max(axis=1) > SAME
     path = np.vstack([path[:1], path[1:][apart]])
@@ -182,7 +182,7 @@ def _run(path: Vec, limits: Limits, qd0: Vec) -> TimedPath:
     return TimedPath(dt=limits.dt, q=np.array(q), qd=np.array(qd), corner_rad=corner, n_stops=0)
 
 
-def _blends(ways: Vec, limits: Limits, qd0: Vec) -> tuple[list[int], Vec, list[int]]:
+def _blends(ways: Vec, limits: TimingLimits, qd0: Vec) -> tuple[list[int], Vec, list[int]]:
     """Return the blends [periods], the speeds after each corner, and the periods at them.
 
     Args:

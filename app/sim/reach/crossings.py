@@ -340,9 +340,9 @@ def _clear_of_home(cell: Cell, track: Vec) -> bool:
     home = np.array(arm.home)
     every = track[:: max(1, round(0.1 / cell.robot.dt))]
     rows = np.hstack([every, np.full((len(every), 1), top)])
-    first = Checker(arm, shapes_of(cell, None, rows[:1])).clearance(home).people
+    first = Checker(arm, shapes_of(cell, None, rows[:1])).clearance(home).people_m
     near = rows[np.hypot(rows[:, 0], rows[:, 1]) < 2.0]
     return (
         first >= AT_START
-        and Checker(arm, shapes_of(cell, None, near)).clearance(home).people >= CLEAR
+        and Checker(arm, shapes_of(cell, None, near)).clearance(home).people_m >= CLEAR
     )

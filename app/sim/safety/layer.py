@@ -41,7 +41,7 @@ from app.sim.scene.scene import require_finite
 
 UNITS = {
     "human_speed": "m/s",
-    "measured": "",
+    "use_measured_velocity": "",
     "speed_change": "m/s",
     "reaction_time": "s",
     "tracker_delay": "s",
@@ -66,7 +66,7 @@ class SafetySettings:
 
     human_speed: float = 1.6
     """Greatest speed of any point of a person, v_h [m/s]."""
-    measured: bool = False
+    use_measured_velocity: bool = False
     """Whether a cylinder of known velocity is extrapolated with it, instead of with v_h."""
     speed_change: float = 0.1
     """Assumed excess over that velocity, in any direction [m/s]."""
@@ -103,7 +103,7 @@ class SafetySettings:
     @property
     def other_speed(self) -> float:
         """Assumed speed in any direction; of a cylinder beyond its velocity, if used [m/s]."""
-        return self.speed_change if self.measured else self.human_speed
+        return self.speed_change if self.use_measured_velocity else self.human_speed
 
     @property
     def latency(self) -> float:
@@ -228,7 +228,7 @@ class SafetyLayer:
     def _load_people(self, people: Shapes) -> None:
         """Allocate work space for the people and load the velocities of cylinders."""
         shape = (people.columns.shape[1], len(people.cylinders))
-        going = people.going if self.settings.measured else None
+        going = people.going if self.settings.use_measured_velocity else None
         known = going is not None
         if (shape, known) != (self._shape, self._known):
             self._shape, self._known = shape, known

@@ -229,7 +229,7 @@ def test_only_a_measured_velocity_takes_the_place_of_the_assumed_one(
     measured: bool, speed: float
 ) -> None:
     person = person_from_cylinder(0.3, 1.3, 0.0, 0.0, 0.3, measured=measured)
-    asked = question(people=(person,), safety=SafetySettings(measured=True))
+    asked = question(people=(person,), safety=SafetySettings(use_measured_velocity=True))
     terms = decider().decide(asked).terms
     assert terms is not None and terms.human_speed == pytest.approx(speed)
 

@@ -43,7 +43,7 @@ def test_clearance_to_people_is_that_of_fcl_on_the_same_shapes() -> None:
         tube = np.array([*rng.uniform([-0.8, 0.6], [0.8, 1.2]), 0.15, rng.uniform(0.2, 0.9)])
         q = ARM.home + rng.uniform(-0.8, 0.8, 6)
         expected = fcl_distance(q, human_q, tube)
-        found = Checker(ARM, shapes_of(CELL, human_q[None], tube[None])).clearance(q).people
+        found = Checker(ARM, shapes_of(CELL, human_q[None], tube[None])).clearance(q).people_m
         if expected > 0.0:
             apart += 1
             assert found == pytest.approx(expected, abs=1e-5)
@@ -68,23 +68,23 @@ def test_two_people_of_different_kinds_both_count() -> None:
     rest = human.rest_posture(0.0, 1.2, -1.57)[None]
     tube = np.array([[0.6, 0.9, 0.2, 1.0]])
     alone = [
-        Checker(ARM, shapes_of(CELL, rest, None)).clearance(ARM.home).people,
-        Checker(ARM, shapes_of(CELL, None, tube)).clearance(ARM.home).people,
+        Checker(ARM, shapes_of(CELL, rest, None)).clearance(ARM.home).people_m,
+        Checker(ARM, shapes_of(CELL, None, tube)).clearance(ARM.home).people_m,
     ]
-    both = Checker(ARM, shapes_of(CELL, rest, tube)).clearance(ARM.home).people
+    both = Checker(ARM, shapes_of(CELL, rest, tube)).clearance(ARM.home).people_m
     assert alone[0] != alone[1]
     assert both == min(alone)
 
 
 def test_a_pose_is_free_up_to_its_margin_and_not_beyond() -> None:
     people = shapes_of(CELL, human.rest_posture(0.0, 1.3, -1.57)[None])
-    d = Checker(ARM, people).clearance(ARM.home).people
+    d = Checker(ARM, people).clearance(ARM.home).people_m
     assert Checker(ARM, people, d - 0.001).is_free(ARM.home)
     assert not Checker(ARM, people, d).is_free(ARM.home)
 
 
 def test_an_empty_cell_is_infinitely_far_from_people() -> None:
-    assert Checker(ARM, no_people()).clearance(ARM.home).people == 1e3
+    assert Checker(ARM, no_people()).clearance(ARM.home).people_m == 1e3
 
 
 def test_a_path_with_one_blocked_edge_is_not_free() -> None:

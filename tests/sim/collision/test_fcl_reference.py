@@ -7,7 +7,7 @@ from app.sim.cells.cell import Cell, load_cell
 from app.sim.collision.fcl_reference import (
     SELF_BODY_PAIRS,
     CollisionReference,
-    Contact,
+    MeshContact,
     collision_mesh,
     make_capsule,
 )
@@ -52,12 +52,12 @@ def test_hand_at_the_tool_is_reported_with_both_names(
     assert q is not None
     rest = human.rest_posture(*cell.human.home)
     posture = human.reach("r", np.array([0.1, 0.74, 0.18]), rest, cell.body)
-    assert Contact(kind="human", link="tool", body="hand_r") in raw.contacts(q, posture.q)
+    assert MeshContact(kind="human", link="tool", body="hand_r") in raw.contacts(q, posture.q)
 
 
 def test_arm_stretched_flat_down_hits_the_table(raw: CollisionReference) -> None:
     contacts = raw.contacts(np.array([1.5, 0.1, 0.0, 0.0, 0.0, 0.0]))
-    assert Contact(kind="cell", link="forearm_link", body="table") in contacts
+    assert MeshContact(kind="cell", link="forearm_link", body="table") in contacts
     assert all(contact.link != "base_link" for contact in contacts)
 
 

@@ -14,7 +14,7 @@ from app.sim.human import model as human
 from app.sim.planning import ompl_planners as planners
 from app.sim.planning.goal_configurations import goal_configurations, vertical_configuration
 from app.sim.planning.ompl_planners import PLANNERS, PlanSettings, plan
-from app.sim.planning.time_parameterization import Limits, time_free_path
+from app.sim.planning.time_parameterization import TimingLimits, time_free_path
 from app.sim.scene.scene import arm_of
 
 CELL = load_cell()
@@ -36,7 +36,7 @@ def in_the_way() -> Shapes:
     return shapes_of(CELL, reaching_person()[None])
 
 
-def ask(people: Shapes, settings: PlanSettings, seed: int = 1) -> planners.Plan:
+def ask(people: Shapes, settings: PlanSettings, seed: int = 1) -> planners.MotionPlan:
     checker = Checker(ARM, people, MARGIN)
     return plan(checker, station("cube5"), station("cube0")[None], settings, seed)
 
@@ -179,7 +179,7 @@ def test_a_cylinder_in_the_shared_workspace_is_planned_round_within_its_limits()
     start = start[[checker.is_free(q) for q in start]][0]
     answer = plan(checker, start, goals, PlanSettings(max_poses=20_000))
     assert answer.solved and len(answer.path) > 2
-    limits = Limits(qd_max=arm.limits.qd_max, qdd_max=arm.limits.qdd_max, dt=arm.dt)
+    limits = TimingLimits(qd_max=arm.limits.qd_max, qdd_max=arm.limits.qdd_max, dt=arm.dt)
     timed = time_free_path(checker, answer.path, limits)
     assert timed is not None
     assert np.all(np.abs(timed.qd) <= arm.limits.qd_max + 1e-9)

@@ -6,14 +6,14 @@ import numpy as np
 
 from app.sim.cells.cell import load_cell
 from app.sim.core.arrays import Vec
-from app.sim.planning.path_tracking import Tracker, straight_stop
-from app.sim.planning.time_parameterization import Limits, time_path
+from app.sim.planning.path_tracking import PathFollower, straight_stop
+from app.sim.planning.time_parameterization import TimingLimits, time_path
 from app.sim.robot.kernels import acceleration_bounds as polynomial
 from app.sim.robot.kernels.joints import JointState
 from app.sim.scene.scene import arm_of
 
 ARM = arm_of(load_cell())
-LIMITS = Limits(qd_max=ARM.limits.qd_max, qdd_max=ARM.limits.qdd_max, dt=ARM.dt)
+LIMITS = TimingLimits(qd_max=ARM.limits.qd_max, qdd_max=ARM.limits.qdd_max, dt=ARM.dt)
 
 
 def move(q: Vec, qd: Vec, wanted: Vec) -> tuple[Vec, Vec, Vec]:
@@ -31,27 +31,27 @@ def some_path(seed: int) -> Vec:
 
 def follow(
     seed: int, scale: Callable[[int], float], n_periods: int = 1000
-) -> tuple[Tracker, list[float], Vec]:
+) -> tuple[PathFollower, list[float], Vec]:
     """Follow a path while somebody scales the wanted speeds; the limits are asserted."""
-    tracker, errors = Tracker(time_path(some_path(seed), LIMITS), LIMITS), []
-    q, qd = tracker.timed.q[0].copy(), np.zeros(6)
+    path_follower, errors = PathFollower(time_path(some_path(seed), LIMITS), LIMITS), []
+    q, qd = path_follower.timed.q[0].copy(), np.zeros(6)
     for k in range(n_periods):
-        tracker.locate(q)
-        errors.append(tracker.error_rad)
-        if tracker.remaining <= 0.0 and np.abs(qd).max() < 1e-4:
+        path_follower.locate(q)
+        errors.append(path_follower.error_rad)
+        if path_follower.remaining <= 0.0 and np.abs(qd).max() < 1e-4:
             break
-        c, q, qd = move(q, qd, scale(k) * tracker.wanted(q, qd))
+        c, q, qd = move(q, qd, scale(k) * path_follower.wanted(q, qd))
         assert np.all(np.abs(qd) <= ARM.limits.qd_max + 1e-9)
         assert np.all(np.abs(2.0 * c) <= ARM.limits.qdd_max + 1e-9)
-    return tracker, errors, q
+    return path_follower, errors, q
 
 
 def test_undisturbed_the_motion_is_the_timed_path() -> None:
     for seed in range(10):
-        tracker, errors, q = follow(seed, lambda _: 1.0)
+        path_follower, errors, q = follow(seed, lambda _: 1.0)
         assert max(errors) < 1e-12
-        assert len(errors) == tracker.timed.n_periods + 1
-        np.testing.assert_allclose(q, tracker.timed.q[-1], atol=1e-12)
+        assert len(errors) == path_follower.timed.n_periods + 1
+        np.testing.assert_allclose(q, path_follower.timed.q[-1], atol=1e-12)
 
 
 def test_slowed_down_and_stopped_it_stays_within_five_milliradians_and_arrives() -> None:
@@ -76,14 +76,14 @@ def test_erratic_scaling_stays_within_ten_milliradians_and_arrives() -> None:
 
 def test_braking_rests_on_the_path_and_goes_on_from_there() -> None:
     for seed in range(5):
-        tracker = Tracker(time_path(some_path(seed), LIMITS), LIMITS)
-        q, qd = tracker.timed.q[0].copy(), np.zeros(6)
+        path_follower = PathFollower(time_path(some_path(seed), LIMITS), LIMITS)
+        q, qd = path_follower.timed.q[0].copy(), np.zeros(6)
         for k in range(1000):
-            tracker.locate(q)
+            path_follower.locate(q)
             if 30 <= k < 60 and k >= 38:
                 assert np.abs(qd).max() < 1e-2
-            _, q, qd = move(q, qd, tracker.wanted(q, qd, brake=30 <= k < 60))
-            assert tracker.error_rad < 5e-3
+            _, q, qd = move(q, qd, path_follower.wanted(q, qd, brake=30 <= k < 60))
+            assert path_follower.error_rad < 5e-3
         np.testing.assert_allclose(q, some_path(seed)[-1], atol=1e-3)
 
 

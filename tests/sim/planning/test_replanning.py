@@ -81,7 +81,7 @@ def drive(
         assert np.all(np.abs(qd_out) <= ARM.limits.qd_max + 1e-9)
         assert np.all(np.abs(2.0 * c) <= ARM.limits.qdd_max + 1e-9)
         q, qd, t = q_out.copy(), qd_out.copy(), t + ARM.dt
-        least = min(least, Checker(ARM, people(t)).clearance(q).people)
+        least = min(least, Checker(ARM, people(t)).clearance(q).people_m)
     return Run(follower, t, least, states, q, way)
 
 
@@ -175,7 +175,7 @@ def test_a_layer_that_slows_and_stops_the_robot_does_not_lose_it(role: str) -> N
 @pytest.mark.parametrize("role", REPLANNING)
 def test_from_within_the_margin_it_may_leave_with_an_eased_margin(role: str) -> None:
     near = reaching_to((0.5, 0.85, 0.3))
-    clearance = Checker(ARM, near).clearance(station("cube5")).people
+    clearance = Checker(ARM, near).clearance(station("cube5")).people_m
     assert 0.0 < clearance < 0.05
     run = drive(role, lambda _: near)
     assert run.states[-1] == "arrived"

@@ -13,8 +13,8 @@ from app.sim.core.arrays import Vec
 from app.sim.planning.goal_configurations import vertical_configuration
 from app.sim.planning.ompl_planners import planning_limits
 from app.sim.planning.time_parameterization import (
-    Limits,
     TimedPath,
+    TimingLimits,
     stop_periods,
     stopping_point,
     time_free_path,
@@ -27,7 +27,7 @@ from app.sim.scene.scene import arm_of
 
 CELL = load_cell()
 ARM = arm_of(CELL)
-LIMITS = Limits(qd_max=ARM.limits.qd_max, qdd_max=ARM.limits.qdd_max, dt=ARM.dt)
+LIMITS = TimingLimits(qd_max=ARM.limits.qd_max, qdd_max=ARM.limits.qdd_max, dt=ARM.dt)
 SLUGGISH = replace(LIMITS, qdd_max=0.1 * ARM.limits.qdd_max)
 """With a tenth of the acceleration corners are rounded widely enough to touch something."""
 
@@ -158,8 +158,8 @@ def corner_beside_a_ball() -> tuple[Checker, Vec]:
         ball = tcp + 0.15 * way / np.linalg.norm(way)
         people = capsule_shapes(np.array([[ball, ball]]), np.array([0.03]))
         checker = Checker(ARM, people, 0.0, 0.0)
-        near = min(checker.clearance(q).people for q in rounded)
-        far = min(checker.clearance(q).people for q in sharp)
+        near = min(checker.clearance(q).people_m for q in rounded)
+        far = min(checker.clearance(q).people_m for q in sharp)
         if near < far - 0.002:
             return Checker(ARM, people, 0.5 * (near + far), 0.0), path
     raise AssertionError("no such ball")

@@ -36,7 +36,7 @@ def clearances_at_home(track: np.ndarray) -> np.ndarray:
         [
             Checker(arm, shapes_of(CELL, None, np.array([[*row, top]])))
             .clearance(np.array(arm.home))
-            .people
+            .people_m
             for row in track
         ]
     )

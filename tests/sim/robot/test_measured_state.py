@@ -131,10 +131,10 @@ def test_what_monitoring_executes_from_outside_the_limits_keeps_every_person_cle
         checker = Checker(ARM, people)
         for t in np.linspace(0.0, ARM.dt, 5):
             reach = settings.human_speed * (settings.latency + t) + settings.margin
-            assert checker.clearance(safe.at(q, qd, t)[0]).people > reach - 1e-9
+            assert checker.clearance(safe.at(q, qd, t)[0]).people_m > reach - 1e-9
         stop_s = float((np.abs(safe.qd) / ARM.limits.qdd_max).max())
         for t in np.linspace(0.0, stop_s, 9):
             there = safe.q + safe.qd * (t - 0.5 * t * t / max(stop_s, 1e-9))
             reach = settings.human_speed * (settings.latency + ARM.dt + t) + settings.margin
-            assert checker.clearance(there).people > reach - 1e-9
+            assert checker.clearance(there).people_m > reach - 1e-9
     assert 20 < admitted < 110

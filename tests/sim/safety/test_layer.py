@@ -89,7 +89,7 @@ def test_every_assumption_costs_its_own_distance(change, more):
     assert least_full_distance(settings, NONE, NONE) == pytest.approx(0.54 + more, abs=1e-6)
 
 
-WALKS = replace(SafetySettings(), measured=True)
+WALKS = replace(SafetySettings(), use_measured_velocity=True)
 
 
 def walker(distance, toward=0.0, across=0.0, growth=0.0):
@@ -105,7 +105,7 @@ def walker(distance, toward=0.0, across=0.0, growth=0.0):
 
 def apart(people):
     """How far people are from the robot at rest now [m]."""
-    return Checker(ARM, people).clearance(REST).people
+    return Checker(ARM, people).clearance(REST).people_m
 
 
 @pytest.mark.parametrize(
@@ -148,7 +148,7 @@ def test_the_speed_told_is_the_one_toward_the_robot_and_the_change(toward, told)
 
 @pytest.mark.parametrize("settings", [WALKS, SafetySettings()])
 def test_who_is_not_known_to_go_on_is_taken_to_be_as_fast_as_assumed(settings):
-    people = replace(walker(0.5), going=None) if settings.measured else walker(0.5)
+    people = replace(walker(0.5), going=None) if settings.use_measured_velocity else walker(0.5)
     layer = SafetyLayer(ARM, settings)
     decision = layer.decide(REST, NONE, NONE, NONE, people)
     assert decision.override == 0.0

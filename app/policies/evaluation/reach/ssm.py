@@ -515,7 +515,7 @@ def run_ssm(
     if motions:
         sets[" recorded"] = recorded_crossings(cell, motions, min(N_RECORDED, n_random))
     assumed = safety_settings(cell)
-    layers = {"": assumed, MEASURED: replace(assumed, measured=True)}
+    layers = {"": assumed, MEASURED: replace(assumed, use_measured_velocity=True)}
     acting = {
         end: movers_of(checkpoint, actor, safety, cell.robot.dt)
         for end, safety in layers.items()
@@ -565,7 +565,7 @@ def stated(safety: SafetySettings, n: int, sources: Sequence[str]) -> Json:
         "random_s": RANDOM_S,
         "planner_margin_m": MARGIN,
         "safety": safety.describe(),
-        "measured": replace(safety, measured=True).describe(),
+        "measured": replace(safety, use_measured_velocity=True).describe(),
         "motions": list(sources),
     }
 

@@ -1,12 +1,12 @@
-"""Whether the robot is free of people, cell and itself, at a pose and along a motion, compiled.
+"""Collision check of planners: clearance at a configuration and along a motion, compiled.
 
-What a planner asks thousands of times. People stand still here: capsules and upright cylinders
-at one moment. *Slack* is the clearance beyond what is asked for: distance to people less their
-margin, distance to the cell and of the robot to itself less another. A pose is free when its
-slack is more than half of RESOLUTION; a motion is free when poses no farther apart than
-RESOLUTION, or than the slack at the last one allows, are free. Between two such poses no point
-moves farther than half the resolution from the nearer of both, so a free motion has slack above
-zero everywhere: the test can be early by half a millimetre, never late.
+People are static here: capsules and vertical cylinders at one moment. The *spare clearance* is
+the distance to people beyond their margin, or that to the cell and of the robot to itself
+beyond another. A configuration is free when its spare clearance exceeds half of RESOLUTION; a
+motion is free when configurations no farther apart than RESOLUTION, or than the spare clearance
+of the last one permits, are free. Between two of them no point moves farther than half the
+resolution from the nearer one, so the spare clearance of a free motion is positive everywhere:
+the check may refuse half a millimetre early, never late.
 """
 
 from typing import NamedTuple
@@ -25,11 +25,11 @@ from app.sim.robot.kernels.arm import (
 )
 
 RESOLUTION = 1e-3
-"""Farthest that any point of the robot moves between two poses of a walked motion [m]."""
+"""Greatest displacement of any point between two configurations that are checked [m]."""
 
 
 class Obstacles(NamedTuple):
-    """People at one moment, the distances to keep, and work space."""
+    """People at one moment, distances to keep, and work space."""
 
     columns: Vec
     """The people's capsules, shape (9, m)."""
@@ -42,7 +42,7 @@ class Obstacles(NamedTuple):
     cell_margin: float
     """Distance to keep from the cell and of the robot from itself [m]."""
     q: Vec
-    """Work space: a position on the way [rad], shape (6,)."""
+    """Work space: joint positions on a motion [rad], shape (6,)."""
     qd: Vec
     """Work space: speeds of a motion [rad/s], shape (6,)."""
     c: Vec
@@ -50,15 +50,15 @@ class Obstacles(NamedTuple):
 
 
 @kernel()
-def distance_to_people(around: Obstacles, pose: RobotPose) -> float:
+def distance_to_people(obstacles: Obstacles, pose: RobotPose) -> float:
     """Return the distance of the placed robot to people [m]; FAR without any."""
     best = FAR
-    if around.columns.shape[1] > 0:
-        capsule_clearances(pose.columns, around.columns, around.gap)
-        best, _ = least(around.gap)
-    for k in range(around.cylinders.shape[0]):
-        x, y = around.cylinders[k, 0], around.cylinders[k, 1]
-        r, top = around.cylinders[k, 2], around.cylinders[k, 3]
+    if obstacles.columns.shape[1] > 0:
+        capsule_clearances(pose.columns, obstacles.columns, obstacles.gap)
+        best, _ = least(obstacles.gap)
+    for k in range(obstacles.cylinders.shape[0]):
+        x, y = obstacles.cylinders[k, 0], obstacles.cylinders[k, 1]
+        r, top = obstacles.cylinders[k, 2], obstacles.cylinders[k, 3]
         d, _ = cylinder_clearance(pose.columns, 0, x, y, r, top)
         best = min(best, d)
     return best
@@ -66,99 +66,99 @@ def distance_to_people(around: Obstacles, pose: RobotPose) -> float:
 
 @kernel()
 def clearances_at(
-    arm: Arm, q: Vec, around: Obstacles, pose: RobotPose
+    arm: Arm, q: Vec, obstacles: Obstacles, pose: RobotPose
 ) -> tuple[float, float, float]:
     """Return the distances to people, to the cell and of the robot to itself [m].
 
     Args:
         arm: Robot in its cell.
         q: Joint positions [rad], shape (6,).
-        around: People.
+        obstacles: People.
         pose: Work space.
     """
     place_robot(arm, q, pose)
-    people = distance_to_people(around, pose)
+    people = distance_to_people(obstacles, pose)
     cell, _, _ = cell_clearance(arm, pose.columns)
     own, _ = self_clearance(arm, pose)
     return people, cell, own
 
 
 @kernel()
-def spare_clearance(arm: Arm, q: Vec, around: Obstacles, pose: RobotPose) -> float:
-    """Return how far any point of the robot may move before something is too near [m].
+def spare_clearance(arm: Arm, q: Vec, obstacles: Obstacles, pose: RobotPose) -> float:
+    """Return how far any point of the robot may move before a margin is violated [m].
 
-    Of two parts of the robot that approach each other both move, so their slack counts half.
+    Two parts of the robot that approach each other both move, so theirs counts half.
     """
-    people, cell, own = clearances_at(arm, q, around, pose)
+    people, cell, own = clearances_at(arm, q, obstacles, pose)
     return min(
-        people - around.margin,
-        cell - around.cell_margin,
-        0.5 * (own - around.cell_margin),
+        people - obstacles.margin,
+        cell - obstacles.cell_margin,
+        0.5 * (own - obstacles.cell_margin),
     )
 
 
 @kernel()
-def free_at(arm: Arm, q: Vec, around: Obstacles, pose: RobotPose) -> bool:
-    """Tell whether a pose is free."""
-    return bool(spare_clearance(arm, q, around, pose) > 0.5 * RESOLUTION)
+def free_at(arm: Arm, q: Vec, obstacles: Obstacles, pose: RobotPose) -> bool:
+    """Return whether a configuration is free."""
+    return bool(spare_clearance(arm, q, obstacles, pose) > 0.5 * RESOLUTION)
 
 
 @kernel()
 def motion_free(
-    arm: Arm, q0: Vec, qd0: Vec, c: Vec, duration: float, around: Obstacles, pose: RobotPose
+    arm: Arm, q0: Vec, qd0: Vec, c: Vec, duration: float, obstacles: Obstacles, pose: RobotPose
 ) -> tuple[bool, int]:
-    """Tell whether ``q0 + qd0 x + c x^2`` is free for all x from 0 to ``duration``.
+    """Return whether ``q0 + qd0 x + c x^2`` is free for all x from 0 to ``duration``.
 
-    The end and the middle are looked at first, where most motions that are not free fail.
+    The end and the middle are checked first, where most motions that are not free fail.
 
     Args:
         arm: Robot in its cell.
         q0: Joint positions at the start [rad], shape (6,).
         qd0: Joint speeds at the start [rad/s], shape (6,).
         c: Coefficients [rad/s^2], shape (6,).
-        duration: How long the motion takes [s].
-        around: People.
+        duration: Duration of the motion [s].
+        obstacles: People.
         pose: Work space.
 
     Returns:
-        Whether it is free, and the number of poses looked at.
+        Whether it is free, and the number of configurations checked.
     """
-    q, speed = around.q, 0.0
+    q, speed = obstacles.q, 0.0
     for j in range(6):
         fastest = max(abs(qd0[j]), abs(qd0[j] + 2.0 * c[j] * duration))
         speed += fastest * arm.lever[j]
-    looked = 0
+    checked = 0
     for part in (1.0, 0.5, 0.25, 0.75):
         _along(q0, qd0, c, part * duration, q)
-        looked += 1
-        if not free_at(arm, q, around, pose):
-            return False, looked
+        checked += 1
+        if not free_at(arm, q, obstacles, pose):
+            return False, checked
         if speed * duration <= RESOLUTION:
             break
     x = 0.0
     while x < duration:
         _along(q0, qd0, c, x, q)
-        looked += 1
-        slack = spare_clearance(arm, q, around, pose)
-        if slack <= 0.5 * RESOLUTION:
-            return False, looked
-        x += max(slack, RESOLUTION) / max(speed, 1e-9)
-    return True, looked
+        checked += 1
+        spare = spare_clearance(arm, q, obstacles, pose)
+        if spare <= 0.5 * RESOLUTION:
+            return False, checked
+        x += max(spare, RESOLUTION) / max(speed, 1e-9)
+    return True, checked
 
 
 @kernel()
 def edge_free(
-    arm: Arm, q0: Vec, q1: Vec, around: Obstacles, pose: RobotPose
+    arm: Arm, q0: Vec, q1: Vec, obstacles: Obstacles, pose: RobotPose
 ) -> tuple[bool, int]:
-    """Tell whether the straight joint motion from ``q0`` to ``q1`` is free; see motion_free."""
+    """Return whether the straight motion from ``q0`` to ``q1`` is free; see motion_free."""
     for j in range(6):
-        around.qd[j], around.c[j] = q1[j] - q0[j], 0.0
-    return motion_free(arm, q0, around.qd, around.c, 1.0, around, pose)
+        obstacles.qd[j], obstacles.c[j] = q1[j] - q0[j], 0.0
+    return motion_free(arm, q0, obstacles.qd, obstacles.c, 1.0, obstacles, pose)
 
 
 @kernel()
 def first_blocked(
-    arm: Arm, q: Vec, qd: Vec, dt: float, first: int, around: Obstacles, pose: RobotPose
+    arm: Arm, q: Vec, qd: Vec, dt: float, first: int, obstacles: Obstacles, pose: RobotPose
 ) -> int:
     """Return the first period of a timed path that is not free, or their number if all are.
 
@@ -168,14 +168,14 @@ def first_blocked(
         qd: Joint speeds between periods [rad/s], shape (n + 1, 6).
         dt: Period [s].
         first: Period to begin with.
-        around: People.
+        obstacles: People.
         pose: Work space.
     """
     n = int(q.shape[0]) - 1
     for k in range(first, n):
         for j in range(6):
-            around.c[j] = (qd[k + 1, j] - qd[k, j]) / (2.0 * dt)
-        free, _ = motion_free(arm, q[k], qd[k], around.c, dt, around, pose)
+            obstacles.c[j] = (qd[k + 1, j] - qd[k, j]) / (2.0 * dt)
+        free, _ = motion_free(arm, q[k], qd[k], obstacles.c, dt, obstacles, pose)
         if not free:
             return k
     return n

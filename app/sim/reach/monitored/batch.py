@@ -126,11 +126,11 @@ class GuardedReach(ReachBatch):
         people = self.world.people
         shape = (people.columns.shape[1], len(self.cell.cylinders))
         self._guard = Guard(
-            safety=separation_rule(safety, *shape, safety.measured),
+            safety=separation_rule(safety, *shape, safety.use_measured_velocity),
             guarded=guarded,
             rest_ends=rest_ends,
             horizon=horizon_s,
-            measured=safety.measured,
+            measured=safety.use_measured_velocity,
             tracks=np.zeros((0, 1, 3)) if tracks is None else as_kernel_array(tracks),
             period=np.zeros(n_envs, dtype=np.int64),
             trial=new_trial_work(

@@ -87,7 +87,7 @@ def test_a_period_that_is_stopped_costs_what_the_weights_say():
     assert n_stopped > 20
 
 
-@pytest.mark.parametrize("safety", [SAFETY, replace(SAFETY, measured=True)])
+@pytest.mark.parametrize("safety", [SAFETY, replace(SAFETY, use_measured_velocity=True)])
 def test_each_period_is_what_the_layer_decides(safety):
     batch = GuardedReach(
         CELL, 1, 0, replace(BOX, people=("walker",)), safety, tracks=passing(1, y=0.8)
