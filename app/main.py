@@ -27,7 +27,7 @@ from app.api.registry import (
 )
 from app.api.services import Services
 from app.errors import Damaged, ServiceError
-from app.live.reach.interfaces import ReachPilot
+from app.live.reach.interfaces import LiveReachPolicy
 from app.policies.checkpoints import pretrained
 from app.policies.checkpoints.checkpoint import CHOOSING, SORTING, load, require_purpose
 from app.policies.checkpoints.trained_cell import cell_of
@@ -175,11 +175,13 @@ def start_world(
     world_id: str,
     cell: Cell,
     policy: TaskPolicy | None,
-    sorter: SortingValues | None = None,
-    pilot: ReachPilot | None = None,
+    sorting_policy: SortingValues | None = None,
+    reach_policy: LiveReachPolicy | None = None,
 ) -> LiveCell:
     """Start a live cell with its viewer; whoever asked stops it."""
-    live = LiveCell(cell, policy, id=world_id, sorter=sorter, pilot=pilot)
+    live = LiveCell(
+        cell, policy, id=world_id, sorting_policy=sorting_policy, reach_policy=reach_policy
+    )
     live.start()
     return live
 

@@ -12,9 +12,9 @@ from multiprocessing import get_context
 
 import numpy as np
 
-from app.live.commands import MoveHuman
+from app.live.commands import MovePerson
 from app.live.factory import new_world
-from app.live.pick.world import World
+from app.live.pick.world import PickWorld
 from app.live.reach.world import ReachWorld
 from app.policies.checkpoints import pretrained
 from app.policies.checkpoints.checkpoint import CHOOSING, REACHING, Checkpoint, purpose_of
@@ -53,10 +53,10 @@ def _choosing() -> None:
     for checkpoint in _shipped(CHOOSING):
         policy = TaskChooser(checkpoint)
         cell = load_cell(policy.cell)
-        world = World(cell, policy, seed=0)
+        world = PickWorld(cell, policy, seed=0)
         world.step()
         x, y, z = cell.stations[0].position
-        world.apply(MoveHuman(right=(x, y, z + 0.1)))
+        world.apply(MovePerson(right=(x, y, z + 0.1)))
         world.step()
         batch = PickBatch(cell, N_ENVS, seed=0, settings=PickSettings())
         batch.reset()

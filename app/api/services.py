@@ -12,7 +12,7 @@ from starlette.requests import HTTPConnection
 from app.api.registry import CheckpointNames, PolicyRegistry
 from app.api.tracker_sessions import TrackerSessions
 from app.errors import NotFound, NotReady
-from app.live.reach.interfaces import ReachPilot
+from app.live.reach.interfaces import LiveReachPolicy
 from app.live.world_handle import WorldHandle
 from app.policies.inference.motion_decision import MotionDecider
 from app.sim.cells.cell import Cell
@@ -51,7 +51,7 @@ class LiveWorld(Protocol):
 
 
 StartWorld = Callable[
-    [str, Cell, TaskPolicy | None, SortingValues | None, ReachPilot | None], LiveWorld
+    [str, Cell, TaskPolicy | None, SortingValues | None, LiveReachPolicy | None], LiveWorld
 ]
 """Starts a world of an id, in a cell, with what chooses tasks, sorts and reaches there; the
 caller stops it."""

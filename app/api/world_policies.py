@@ -1,4 +1,4 @@
-"""Which checkpoints may act in a live world: one that moves the arm, sorts or reaches.
+"""Policies and recordings that commands to a live world name.
 
 A policy moves the arm in the cell it was trained in, and in sorting cells that differ from it
 in nothing but their stations (``sorting_cell.same_workspace``).
@@ -8,7 +8,11 @@ import logging
 
 from app.api.registry import REACH_ALIAS, SORTERS, P, PolicyRegistry
 from app.api.services import Services
-from app.errors import CheckpointMismatch, Damaged, NotFound
+from app.errors import CheckpointMismatch, Damaged, InvalidInput, NotFound
+from app.live.commands import LoadingCommand, SetMotion, SetPolicy
+from app.live.playback import Recording
+from app.live.reach.commands import is_reaching
+from app.live.sorting.commands import SetSortingPolicy
 from app.policies.checkpoints.checkpoint import CHOOSING, REACHING, purpose_of
 from app.policies.checkpoints.trained_cell import is_for
 from app.policies.inference.live_reach_policy import ReachPilot
@@ -21,8 +25,47 @@ from app.store.checkpoints import list_checkpoints
 
 logger = logging.getLogger(__name__)
 
+MAX_CHOICES = 20
+"""Maximum number of choices in an error."""
 MAX_LOOKED_AT = 200
 """Newest checkpoints that are looked through for one of a cell."""
+
+
+def load_for(command: LoadingCommand, cell: Cell, services: Services) -> object:
+    """Return the stored object that a command names; None where it names none.
+
+    Raises:
+        InvalidInput: Nothing has that name, or the recording has no such run.
+        CheckpointMismatch: The policy is of another kind or cell.
+    """
+    match command:
+        case SetMotion():
+            return _recording(command, services)
+        case SetPolicy(checkpoint=str(name)) if is_reaching(cell):
+            return pilot_of(name, cell, services)
+        case SetPolicy(checkpoint=str(name)):
+            policy = services.policies.load(name)
+            if policy.cell != cell.name and not may_move(policy, cell, services):
+                rule = f"must decide in the cell {cell.name}, not in {policy.cell}"
+                raise InvalidInput("checkpoint", name, rule)
+            require_mover(policy, cell, services)
+            return policy
+        case SetSortingPolicy(checkpoint=str(name)):
+            sorter = services.sorters.load(name)
+            require_sorter(sorter, cell)
+            return sorter
+    return None
+
+
+def _recording(command: SetMotion, services: Services) -> Recording:
+    if command.name not in (known := services.motions.names()):
+        raise InvalidInput("name", command.name, "is no stored motion", known[:MAX_CHOICES])
+    runs = services.motions.get(command.name)
+    if command.run >= len(runs):
+        choices = [str(run) for run in range(min(len(runs), MAX_CHOICES))]
+        rule = f"is no run of this motion: it has {len(runs)}, counted from 0"
+        raise InvalidInput("run", command.run, rule, choices)
+    return Recording(runs[command.run], command.name, command.run, len(runs))
 
 
 def require_mover(policy: TaskPolicy, cell: Cell, services: Services) -> None:

@@ -8,16 +8,8 @@ from fastapi import APIRouter, Depends
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
-from app.api.schemas.live_sorting import SetSorter
 from app.api.schemas.worlds import (
-    MAX_CHOICES,
     CommandAccepted,
-    CommandCreate,
-    SetCandidates,
-    SetMotion,
-    SetPolicy,
-    StartCase,
-    ToggleCandidate,
     WorldCell,
     WorldLight,
     WorldList,
@@ -26,7 +18,7 @@ from app.api.schemas.worlds import (
 )
 from app.api.services import LiveWorld, Services, ServicesDep
 from app.api.world_policies import (
-    may_move,
+    load_for,
     mover_for,
     pilot_for,
     pilot_of,
@@ -35,12 +27,12 @@ from app.api.world_policies import (
     sorter_for,
 )
 from app.errors import InvalidInput, NotReady
+from app.live.command_checks import CommandMessage
+from app.live.commands import LoadingCommand
 from app.live.factory import lacks_for_live
-from app.live.reach.commands import SetPilot, is_reaching
-from app.live.reach.interfaces import ReachPilot
+from app.live.reach.commands import is_reaching
+from app.live.reach.interfaces import LiveReachPolicy
 from app.sim.cells.cell import Cell
-from app.sim.mocap.importer import Motion
-from app.sim.pick.cases import cases_of
 from app.sim.pick.task_policy import TaskPolicy
 from app.sim.sorting.sorting_values import SortingValues
 
@@ -72,37 +64,13 @@ async def get_one(world: WorldDep) -> WorldPublic:
 
 @router.post("/{world_id}/commands", status_code=202, summary="Change a live world")
 async def command(
-    world: WorldDep, body: CommandCreate, services: ServicesDep
+    world: WorldDep, body: CommandMessage, services: ServicesDep
 ) -> CommandAccepted:
     """Queue one command; the world applies it before its next tick."""
-    snapshot = world.handle.snapshot()
-    _check_names(body, world.cell)
-    if isinstance(body, SetPolicy) and is_reaching(world.cell):
-        pilot = None
-        if body.checkpoint is not None:
-            pilot = await run_in_threadpool(pilot_of, body.checkpoint, world.cell, services)
-        number = world.handle.submit(SetPilot(pilot=pilot))
-    elif isinstance(body, SetPolicy):
-        policy = None
-        if body.checkpoint is not None:
-            policy = await run_in_threadpool(services.policies.load, body.checkpoint)
-            if policy.cell != snapshot.cell and not may_move(policy, world.cell, services):
-                rule = f"must decide in the cell {snapshot.cell}, not in {policy.cell}"
-                raise InvalidInput("checkpoint", body.checkpoint, rule)
-            require_mover(policy, world.cell, services)
-        number = world.handle.submit(body.to_domain(policy))
-    elif isinstance(body, SetSorter):
-        sorter = None
-        if body.checkpoint is not None:
-            sorter = await run_in_threadpool(services.sorters.load, body.checkpoint)
-            require_sorter(sorter, world.cell)
-        number = world.handle.submit(body.to_domain(sorter))
-    elif isinstance(body, SetMotion):
-        runs = await run_in_threadpool(_runs_of, body.name, services)
-        number = world.handle.submit(body.to_domain(runs))
-    else:
-        number = world.handle.submit(body.to_domain())
-    return CommandAccepted(tag=body.tag, number=number, tick=snapshot.tick)
+    tick, cell = world.handle.snapshot().tick, world.cell
+    if isinstance(body, LoadingCommand):
+        body = body.with_loaded(await run_in_threadpool(load_for, body, cell, services))
+    return CommandAccepted(tag=body.tag, number=world.handle.submit(body), tick=tick)
 
 
 @router.get(
@@ -140,8 +108,8 @@ def set_cell(world_id: str, body: WorldCell, services: ServicesDep) -> WorldSumm
     if (lack := lacks_for_live(cell)) is not None:
         raise InvalidInput("cell", cell.name, f"cannot be shown live: it {lack}")
     if is_reaching(cell):
-        if body.sorter is not None:
-            require_sorter(services.sorters.load(body.sorter), cell)
+        if body.sorting_policy is not None:
+            require_sorter(services.sorters.load(body.sorting_policy), cell)
         reference = body.checkpoint
         pilot = pilot_of(reference, cell, services) if reference else pilot_for(cell, services)
         return _replace_world(world_id, cell, None, None, pilot, services)
@@ -150,10 +118,10 @@ def set_cell(world_id: str, body: WorldCell, services: ServicesDep) -> WorldSumm
     else:
         policy = services.policies.load(body.checkpoint)
         require_mover(policy, cell, services)
-    if body.sorter is None:
+    if body.sorting_policy is None:
         sorter = sorter_for(cell, services)
     else:
-        sorter = services.sorters.load(body.sorter)
+        sorter = services.sorters.load(body.sorting_policy)
         require_sorter(sorter, cell)
     return _replace_world(world_id, cell, policy, sorter, None, services)
 
@@ -162,36 +130,15 @@ def _replace_world(
     world_id: str,
     cell: Cell,
     policy: TaskPolicy | None,
-    sorter: SortingValues | None,
-    pilot: ReachPilot | None,
+    sorting_policy: SortingValues | None,
+    reach_policy: LiveReachPolicy | None,
     services: Services,
 ) -> WorldSummary:
     """Start the world of an id anew, and stop the one that was there."""
     with services.replacing:
         if services.stopping.is_set():
             raise NotReady("stopping")
-        new = services.start_world(world_id, cell, policy, sorter, pilot)
+        new = services.start_world(world_id, cell, policy, sorting_policy, reach_policy)
         old, services.worlds[world_id] = services.worlds[world_id], new
     old.stop()
     return WorldSummary.from_domain(new.handle.snapshot())
-
-
-def _runs_of(name: str, services: Services) -> tuple[Motion, ...]:
-    """Return the clean runs of a stored motion."""
-    if name not in (known := services.motions.names()):
-        raise InvalidInput("name", name, "is no stored motion", known[:MAX_CHOICES])
-    return services.motions.get(name)
-
-
-def _check_names(body: CommandCreate, cell: Cell) -> None:
-    stations = cell.station_ids
-    if isinstance(body, ToggleCandidate) and body.id not in stations:
-        raise InvalidInput("id", body.id, "is no station of this cell", stations)
-    if isinstance(body, SetCandidates):
-        for index, name in enumerate(body.ids):
-            if name not in stations:
-                rule = "is no station of this cell"
-                raise InvalidInput(f"ids[{index}]", name, rule, stations)
-    cases = tuple(case.id for case in cases_of(cell))
-    if isinstance(body, StartCase) and body.id not in cases:
-        raise InvalidInput("id", body.id, "is no case study of this cell", cases)

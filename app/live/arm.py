@@ -22,7 +22,7 @@ GAIN = 3.0
 """Joint speed per joint error on the way to a posture [1/s]."""
 
 
-class Bodies(NamedTuple):
+class HumanGeometry(NamedTuple):
     """Where people are at one moment."""
 
     q: Vec
@@ -33,7 +33,7 @@ class Bodies(NamedTuple):
     """x, y and radius of those who are cylinders [m], shape (C, 3)."""
 
 
-class Everyone(Protocol):
+class PeopleInCell(Protocol):
     """The people of a live cell, workers first."""
 
     @property
@@ -41,7 +41,7 @@ class Everyone(Protocol):
         """Ids of the people who are there, in order."""
 
     @property
-    def bodies(self) -> Bodies:
+    def bodies(self) -> HumanGeometry:
         """Where they are."""
 
 
@@ -81,7 +81,7 @@ class LiveArm:
         """Stand still at once, as after a contact."""
         self.qd = np.zeros(6)
 
-    def touches(self, people: Everyone) -> bool:
+    def touches(self, people: PeopleInCell) -> bool:
         """Whether it touches anything where it is; the clearance is measured anew."""
         rest, here = np.zeros(6), people.bodies
         return self._test(rest, rest, rest, here, here).kind != "none"
@@ -89,8 +89,8 @@ class LiveArm:
     def advance(
         self,
         act: Vec,
-        people: Everyone,
-        before: Bodies,
+        people: PeopleInCell,
+        before: HumanGeometry,
         *,
         straight: bool = False,
     ) -> Contact:
@@ -109,14 +109,16 @@ class LiveArm:
         rule = pick.DEFAULT_ACTION if straight else self.action
         return pick.step_robot(self.arm, self.q, self.qd, self.qdd, act, rule)
 
-    def follow(self, piece: pick.Piece, people: Everyone, before: Bodies) -> Contact:
+    def follow(self, piece: pick.Piece, people: PeopleInCell, before: HumanGeometry) -> Contact:
         """Carry out a piece of motion, unless something is touched; see :meth:`advance`."""
         found = self._test(self.qd, piece.c, piece.d, before, people.bodies)
         if found.kind == "none":
             self.q, self.qd, self.qdd = piece.q, piece.qd, piece.qdd
         return found
 
-    def _test(self, qd: Vec, c: Vec, d: Vec, before: Bodies, after: Bodies) -> Contact:
+    def _test(
+        self, qd: Vec, c: Vec, d: Vec, before: HumanGeometry, after: HumanGeometry
+    ) -> Contact:
         """Test a period that began with the robot here and the people as they were then."""
         found = contact(
             self.arm,
@@ -130,7 +132,7 @@ class LiveArm:
         self.clearance_m = found.clearance_m if anybody else None
         return found
 
-    def distances(self, people: Everyone) -> dict[int, float]:
+    def distances(self, people: PeopleInCell) -> dict[int, float]:
         """Return the distance to each person by id [m]."""
         here = people.bodies
         shared = self._people._replace(columns=body.capsule_columns(len(here.q)))

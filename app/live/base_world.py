@@ -1,16 +1,18 @@
-"""What live worlds share: clock, people, robot, the policy's last decision, contacts.
+"""Base class of live worlds: clock, people, robot, decisions of the policy, contacts.
 
-The worlds (``world.py`` pick and place, ``sorting_world.py`` sorting) say what the robot shall
-do; here is how it is carried out and seen. Pure numpy, no thread, no screen.
+A world advances in control periods of ``cell.robot.dt``. In each period the people move, the
+robot executes the motion decided for the previous state, contact is tested over the whole
+period, and the policy decides again (docs/method.md 3.1). Pure numpy: no thread, no screen.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Any, Generic, Protocol, TypeVar
 
 from app.errors import ServiceError
 from app.live import commands
-from app.live.arm import Bodies, Everyone, LiveArm
+from app.live.arm import HumanGeometry, LiveArm, PeopleInCell
+from app.live.command_checks import Command, check
 from app.live.people.worker import frozen
 from app.live.snapshot import (
     CandidateView,
@@ -22,34 +24,25 @@ from app.live.snapshot import (
 )
 from app.sim.cells.cell import Cell
 from app.sim.collision.contact import Contact
+from app.sim.core.arrays import Vec
 from app.sim.human.person import Person
 from app.sim.pick import batch as pick
 from app.sim.pick.task_policy import Candidate, Decision, TaskPolicy
 
 TIME_LIMIT_S = 20.0
-"""Length of a motion of the policy [s] (table 5.2)."""
+"""Time limit of one motion of the policy [s] (thesis table 5.2)."""
 CONTACT_HOLD_S = 2.0
-"""How long a contact is shown [s]."""
+"""Time for which a contact is shown [s]."""
 NOTE_S = 2.5
-"""How long a change of mind is told [s]."""
+"""Time for which a note is shown [s]."""
 NEAR_M = 0.25
-"""Clearance below which a motion by inverse kinematics is broken off, so that the policy can
+"""Separation distance below which a motion by inverse kinematics ends, so that the policy can
 move away [m]."""
 
-PeopleCommand = (
-    commands.MoveHuman
-    | commands.SetMode
-    | commands.SetMotion
-    | commands.SetBody
-    | commands.AddPerson
-    | commands.RemovePerson
-)
-ClockCommand = commands.Pause | commands.Resume | commands.StepOnce | commands.Reset
-
-_BODIES = {"cell": "table", "self": "robot"}
+_TOUCHED = {"cell": "table", "self": "robot"}
 
 
-class Somebody(Protocol):
+class PersonLike(Protocol):
     """One person of a live cell."""
 
     @property
@@ -57,43 +50,46 @@ class Somebody(Protocol):
         """Number of the person."""
 
     def seen(self) -> Person:
-        """Return the person as a policy sees it."""
+        """Return the person as observed by a policy."""
 
-    def drag(self, command: commands.MoveHuman) -> None:
-        """Aim at a dragged posture."""
+    def drag(self, command: commands.MovePerson) -> None:
+        """Set dragged targets."""
 
     def enter(self, mode: commands.Mode) -> None:
-        """Change who moves the person."""
+        """Set the motion source."""
 
     def play(self, command: commands.SetMotion) -> None:
-        """Move as recorded."""
+        """Play a recording."""
 
-    def grow(self, command: commands.SetBody) -> None:
-        """Become as large as asked for."""
+    def resize(self, command: commands.SetAnthropometry) -> None:
+        """Change the body dimensions."""
 
     def view(self, clearance_m: float, *, nearest: bool) -> PersonView:
-        """Return what is known of the person."""
+        """Return the read model of the person."""
 
 
-class People(Everyone, Protocol):
-    """The people of a live cell, as a stage moves them."""
+class MovingPeople(PeopleInCell, Protocol):
+    """The people of a live cell, as a world moves them."""
 
-    def __iter__(self) -> Iterator[Somebody]: ...
+    def __iter__(self) -> Iterator[PersonLike]: ...
 
-    def __getitem__(self, id: int) -> Somebody: ...
+    def __getitem__(self, id: int) -> PersonLike: ...
 
     def move(self, dt: float) -> None:
-        """Move everyone for ``dt`` [s]."""
+        """Move all people for ``dt`` [s]."""
 
-    def change(self, command: commands.Command) -> None:
-        """Let people come and leave as a command says."""
+    def move_while_paused(self, dt: float) -> bool:
+        """Move dragged people for ``dt`` [s]; return whether one moved."""
+
+    def change(self, command: commands.AddPerson | commands.RemovePerson) -> None:
+        """Add or remove a person."""
 
 
-P = TypeVar("P", bound=People)
+P = TypeVar("P", bound=MovingPeople)
 
 
-class LiveStage(Generic[P]):
-    """Clock, people and robot of one live cell.
+class BaseWorld(ABC, Generic[P]):
+    """Clock, people and robot of one live cell; scenarios fill in the hooks.
 
     Args:
         cell: Work cell.
@@ -120,31 +116,131 @@ class LiveStage(Generic[P]):
         self.tick = 0
         self._note, self._note_until = "", -1.0
 
-    # People and clock.
+    # Hooks of the scenarios.
 
-    def change_people(self, command: PeopleCommand) -> None:
-        """Carry out a command about people."""
+    @abstractmethod
+    def _reset_scenario(self) -> None:
+        """Return people, task and counters to the start."""
+
+    @abstractmethod
+    def _change(self, command: Command) -> None:
+        """Apply a command that only this scenario has."""
+
+    @abstractmethod
+    def _begin(self, status: Status = "moving") -> None:
+        """Begin the next motion, or wait in another status."""
+
+    @abstractmethod
+    def _move_robot(self, before: HumanGeometry) -> None:
+        """Execute one control period of the robot.
+
+        Args:
+            before: The people at the start of the period.
+        """
+
+    @abstractmethod
+    def _decide(self) -> None:
+        """Query the policy for the present state."""
+
+    @abstractmethod
+    def snapshot(self) -> WorldSnapshot:
+        """Return the read model of the present state."""
+
+    def _refresh(self) -> None:
+        """Decide again after people or policy changed."""
+        if self.status == "moving":
+            self._decide()
+
+    def _start_configuration(self) -> Vec:
+        """Return the joint positions from which the robot starts [rad], shape (6,)."""
+        return self.robot.home
+
+    def _prepare_restart(self) -> None:
+        """Return the task to a state in which the robot can start."""
+
+    def _end_contact(self) -> None:
+        """Continue after a contact was shown."""
+        self._restart_robot()
+
+    # Commands and time.
+
+    def apply(self, command: Command) -> None:
+        """Apply one command.
+
+        Raises:
+            ServiceError: The command does not fit this world; nothing has changed.
+        """
+        check(command, self.cell, self.people.ids)
         match command:
-            case commands.MoveHuman():
-                self.people[command.person].drag(command)
-            case commands.SetMode():
-                self.people[command.person].enter(command.mode)
-            case commands.SetMotion():
-                self.people[command.person].play(command)
-            case commands.SetBody():
-                self.people[command.person].grow(command)
-            case commands.AddPerson() | commands.RemovePerson():
-                self.people.change(command)
-                self.robot.touches(self.people)
+            case commands.Pause() | commands.Resume():
+                self.paused = isinstance(command, commands.Pause)
+            case commands.StepOnce():
+                self.paused = True
+                self._advance()
+            case commands.Reset():
+                self._reset()
+            case commands.SetSpeed():
+                pass  # the loop's own
+            case _ if isinstance(command, commands.PeopleCommand):
+                self._change_people(command)
+            case _:
+                self._change(command)
 
-    def pass_period(self) -> Bodies:
-        """Let one control period go by for people and clock; return where people were."""
+    def step(self) -> None:
+        """Advance by one control period; while paused only dragged people move."""
+        if not self.paused:
+            self._advance()
+        elif self.people.move_while_paused(self.robot.dt):
+            self.touches_here()
+            self._refresh()
+
+    def _advance(self) -> None:
         before = self.people.bodies
         self.people.move(self.robot.dt)
         self.tick += 1
         self.t += self.robot.dt
         self.status_s += self.robot.dt
-        return before
+        if self.status in ("contact", "blocked", "case done"):
+            self._wait()
+        else:
+            self._move_robot(before)
+        self._after_period()
+
+    def _after_period(self) -> None:
+        if self.status == "moving":
+            self._decide()
+
+    def _wait(self) -> None:
+        if self.status == "contact" and self.status_s >= CONTACT_HOLD_S:
+            self._end_contact()
+        elif self.status == "blocked" and not self.touches_here():
+            self._begin()
+
+    def _reset(self) -> None:
+        self.t, self.counters = 0.0, Counters()
+        self._reset_scenario()
+        self._restart_robot()
+
+    def _restart_robot(self) -> None:
+        self.robot.put(self._start_configuration())
+        self.contact = None
+        self._prepare_restart()
+        self._begin("blocked" if self.touches_here() else "moving")
+
+    def _change_people(self, command: commands.PeopleCommand) -> None:
+        match command:
+            case commands.MovePerson():
+                self.people[command.person].drag(command)
+            case commands.SetMode():
+                self.people[command.person].enter(command.mode)
+            case commands.SetMotion():
+                self.people[command.person].play(command)
+            case commands.SetAnthropometry():
+                self.people[command.person].resize(command)
+            case commands.AddPerson() | commands.RemovePerson():
+                self.people.change(command)
+                self.touches_here()
+        self._refresh()
 
     def enter(self, status: Status) -> None:
         """Begin another status."""
@@ -153,34 +249,33 @@ class LiveStage(Generic[P]):
     # The robot.
 
     def use(self, policy: TaskPolicy | None) -> None:
-        """Let another policy choose and move."""
+        """Replace the policy."""
         self.policy = policy
         self.robot.action = pick.DEFAULT_ACTION if policy is None else policy.action
 
     def touches_here(self) -> bool:
-        """Whether the robot touches anything where it is."""
+        """Return whether the robot is in contact, and measure the separation distance."""
         return self.robot.touches(self.people)
 
     @property
     def near(self) -> bool:
-        """Whether a person is so near that a motion by inverse kinematics is broken off."""
+        """Whether a person is too near for a motion by inverse kinematics."""
         clearance = self.robot.clearance_m
         return clearance is not None and clearance < NEAR_M
 
     def note_contact(self, found: Contact) -> None:
-        """Show a contact and let the robot stand still."""
+        """Stop the robot and show a contact."""
         self.contact = ContactView(
             kind=found.kind,
             link=found.link,
-            body=found.part if found.kind == "human" else _BODIES[found.kind],
-            person=self._whom(found),
+            body=found.part if found.kind == "human" else _TOUCHED[found.kind],
+            person=self._touched_person(found),
         )
         self.count(contacts=1)
         self.robot.halt()
         self.enter("contact")
 
-    def _whom(self, found: Contact) -> int | None:
-        """Return the id of the person who was touched."""
+    def _touched_person(self, found: Contact) -> int | None:
         if found.kind != "human":
             return None
         index = found.worker
@@ -193,23 +288,22 @@ class LiveStage(Generic[P]):
     ) -> None:
         """Add to the counters."""
         so_far = self.counters
-        self.counters = replace(
-            so_far,
+        self.counters = Counters(
             reached=so_far.reached + reached,
-            timeouts=so_far.timeouts + timeouts,
             contacts=so_far.contacts + contacts,
+            timeouts=so_far.timeouts + timeouts,
             switches=so_far.switches + switches,
         )
 
     # Deciding.
 
     def begin_motion(self) -> None:
-        """Give the policy a new motion, with all its time and nothing chosen."""
+        """Start a new motion of the policy, with the whole time limit and no decision."""
         self.time_left = TIME_LIMIT_S
         self.decision = None
 
-    def decide(self, offered: tuple[Candidate, ...]) -> str | None:
-        """Ask the policy about this very state; return what was chosen before, if left now."""
+    def query(self, offered: tuple[Candidate, ...]) -> str | None:
+        """Query the policy for the present state; return the previous choice if it changed."""
         before = self.decision.chosen if self.decision is not None else None
         names = tuple(candidate.id for candidate in offered)
         self.offered = offered
@@ -227,7 +321,7 @@ class LiveStage(Generic[P]):
                 time_left_s=self.time_left,
             )
         except ServiceError as error:
-            self.tell(error.message)
+            self.set_message(error.message)
             return None
         self.decision, self.decided_s = decision, self.t
         if self.previous is None or decision.chosen == self.previous:
@@ -235,19 +329,19 @@ class LiveStage(Generic[P]):
         self.count(switches=1)
         return self.previous
 
-    # What is seen.
+    # Read model.
 
-    def tell(self, note: str, seconds: float = NOTE_S) -> None:
-        """Show a note for a while."""
-        self._note, self._note_until = note, self.t + seconds
+    def set_message(self, note: str) -> None:
+        """Show a note for NOTE_S."""
+        self._note, self._note_until = note, self.t + NOTE_S
 
-    def forget_note(self) -> None:
-        """Show no note any more."""
+    def clear_message(self) -> None:
+        """Remove the note."""
         self._note, self._note_until = "", -1.0
 
     @property
     def note(self) -> str | None:
-        """The note that is shown now."""
+        """The note shown at present."""
         return self._note if self.t < self._note_until else None
 
     def _candidate(self, index: int, candidate: Candidate) -> CandidateView:
@@ -269,14 +363,8 @@ class LiveStage(Generic[P]):
             for person in self.people
         )
 
-    def snapshot(self, status: Status, message: str, **scenario: Any) -> WorldSnapshot:
-        """Return what is known now, frozen.
-
-        Args:
-            status: What the robot is doing, as it is shown.
-            message: Why, in one sentence.
-            scenario: The fields that only the scenario knows.
-        """
+    def _snapshot(self, status: Status, message: str, **scenario: Any) -> WorldSnapshot:
+        """Return the snapshot with the fields that only the scenario knows."""
         decision, policy = self.decision, self.policy
         return WorldSnapshot(
             id=self.id,

@@ -7,6 +7,7 @@ that differs, and by how much at the wrists, is told.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,32 +28,35 @@ HALF_SPAN_S = 0.025
 """Half of the time over which speeds are taken [s]."""
 
 
+class Recording(NamedTuple):
+    """One run of a stored recording."""
+
+    motion: Motion
+    """The run."""
+    name: str
+    """Name of the recording."""
+    run: int = 0
+    """Index of the run."""
+    n_runs: int = 1
+    """Number of its clean runs."""
+
+
 class PlayedMotion:
-    """One run of a recorded motion in a cell.
+    """One run of a recording, played in a cell.
 
     Args:
-        motion: The run.
-        place: The cell with the home at which it is played.
-        worker: Whose walking area it may leave.
-        name: Name of the stored motion.
-        run: Which of its runs, from 0.
-        n_runs: How many it has.
+        recording: The run.
+        place: Cell with the home position of the person.
+        worker: Person whose walking area the run may leave.
     """
 
-    def __init__(
-        self,
-        motion: Motion,
-        place: Cell,
-        worker: Worker,
-        name: str,
-        run: int = 0,
-        n_runs: int = 1,
-    ) -> None:
+    def __init__(self, recording: Recording, place: Cell, worker: Worker) -> None:
+        motion = recording.motion
         self.size = motion.size
         """Lengths of the recorded person."""
         self.duration = float(motion.times[-1])
         """Of the run [s]."""
-        self._name, self._run, self._n_runs = name, run, n_runs
+        self._recording = recording
         path = at_the_table(motion, place).q
         self._times, self._rise = motion.times, motion.pelvis_z
         self._q = path.copy()
@@ -98,9 +102,9 @@ class PlayedMotion:
     def view(self, t: float) -> MotionView:
         """Return what is known of it at ``t`` [s]."""
         return MotionView(
-            name=self._name,
-            run=self._run,
-            n_runs=self._n_runs,
+            name=self._recording.name,
+            run=self._recording.run,
+            n_runs=self._recording.n_runs,
             t_s=min(t, self.duration),
             duration_s=self.duration,
             outside_share=self._outside_share,

@@ -199,9 +199,9 @@ class WorldSnapshot:
     """Tool centre point, robot base frame [m], shape (3,), read-only."""
     people: tuple[PersonView, ...]
     """The people in the cell, 0 to 4, in the order of their ids."""
-    gripping: bool
+    gripping: bool = False
     """Whether the fingers are closed."""
-    selected: tuple[str, ...]
+    selected: tuple[str, ...] = ()
     """Stations the visitor allows; those reached this round are missing in ``candidates``."""
     candidates: tuple[CandidateView, ...]
     """Stations the robot may choose now, in the cell's order."""
@@ -223,7 +223,7 @@ class WorldSnapshot:
     """Its short text for people."""
     elapsed_ms: float | None
     """Time the decision took [ms]."""
-    case: str | None
+    case: str | None = None
     """Id of the running case study."""
     counters: Counters
     """What happened since the last reset."""

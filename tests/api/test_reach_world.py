@@ -48,9 +48,9 @@ def test_world_shows_goal_safety_layer_and_cylinders(client: TestClient) -> None
         [],
     )
     assert reach["tolerance"] == 0.1
-    assert reach["ways"] == []
+    assert reach["inference_modes"] == []
     safety = reach["safety"]
-    total = safety["person_way"] + safety["robot_way"] + safety["margin"]
+    total = safety["person_distance"] + safety["robot_distance"] + safety["margin"]
     assert safety["required"] == pytest.approx(total)
     assert 0.2 <= person["cylinder"]["radius"] <= 0.5
     assert world["state"] is None
@@ -60,16 +60,16 @@ def test_goal_safety_and_people_are_changed(client: TestClient) -> None:
     send(client, tag="set-goal-mode", mode="follow")
     assert send(client, tag="move-goal", position=[0.5, 0.6, 0.1]).status_code == 202
     send(client, tag="set-safety", on=False)
-    send(client, tag="set-walk", speed=0.25)
+    send(client, tag="set-walking-speed", speed=0.25)
     send(client, tag="add-person")
     now = until(client, lambda one: one["reach"]["walk_speed"] == 0.25)
     until(client, lambda one: len(one["people"]) == 2)
     assert now["reach"]["goal"] == pytest.approx([0.5, 0.6, 0.1])
     assert (now["reach"]["goal_mode"], now["reach"]["safety"]["on"]) == ("follow", False)
     send(client, tag="remove-person", person=1)
-    send(client, tag="set-safety", on=True, measured=True)
-    until(client, lambda one: one["reach"]["safety"]["measured"])
-    send(client, tag="set-walk", speed=None)
+    send(client, tag="set-safety", on=True, use_measured_velocity=True)
+    until(client, lambda one: one["reach"]["safety"]["use_measured_velocity"])
+    send(client, tag="set-walking-speed", speed=None)
     until(client, lambda one: len(one["people"]) == 1)
     send(client, tag="new-goal")
     until(client, lambda one: one["reach"]["goal"] != now["reach"]["goal"])
@@ -84,12 +84,15 @@ def test_policy_is_named_and_asked_in_its_ways(client: TestClient) -> None:
     )
     assert send(client, tag="set-policy", checkpoint=made.sha256).status_code == 202
     acting = until(client, lambda one: one["checkpoint"] == made.sha256)
-    assert acting["reach"]["way"] == "interpolated-ahead"
-    assert "averaged" in acting["reach"]["ways"]
-    assert send(client, tag="set-way", way="direct").status_code == 202
-    until(client, lambda one: one["reach"]["way"] == "direct")
-    refused = send(client, tag="set-way", way="sideways").json()
-    assert (refused["field"], refused["choices"]) == ("way", acting["reach"]["ways"])
+    assert acting["reach"]["inference_mode"] == "interpolated-ahead"
+    assert "averaged" in acting["reach"]["inference_modes"]
+    assert send(client, tag="set-inference-mode", inference_mode="direct").status_code == 202
+    until(client, lambda one: one["reach"]["inference_mode"] == "direct")
+    refused = send(client, tag="set-inference-mode", inference_mode="sideways").json()
+    assert (refused["field"], refused["choices"]) == (
+        "inference_mode",
+        acting["reach"]["inference_modes"],
+    )
     send(client, tag="set-policy", checkpoint=None)
     until(client, lambda one: one["checkpoint"] is None)
 
@@ -98,14 +101,14 @@ def test_policy_is_named_and_asked_in_its_ways(client: TestClient) -> None:
     ("command", "field"),
     [
         ({"tag": "move-goal", "position": [0.0, 1.3, 0.3]}, "position.y"),
-        ({"tag": "move-goal", "position": [0.0, 0.8]}, "position"),
+        ({"tag": "move-goal", "position": [0.0, 0.8]}, "position[2]"),
         ({"tag": "move-goal"}, "position"),
         ({"tag": "set-goal-mode", "mode": "run"}, "mode"),
         ({"tag": "set-safety", "on": "perhaps"}, "on"),
-        ({"tag": "set-walk", "speed": -1.0}, "speed"),
-        ({"tag": "set-way", "way": "direct"}, "way"),
-        ({"tag": "set-body", "stature": 50.0}, "tag"),
-        ({"tag": "move-human", "left": [0.0, 0.0, 0.0]}, "left"),
+        ({"tag": "set-walking-speed", "speed": -1.0}, "speed"),
+        ({"tag": "set-inference-mode", "inference_mode": "direct"}, "inference_mode"),
+        ({"tag": "set-anthropometry", "stature": 50.0}, "tag"),
+        ({"tag": "move-person", "left": [0.0, 0.0, 0.0]}, "left"),
         ({"tag": "toggle-goal", "id": "red-large"}, "tag"),
         ({"tag": "set-candidates", "ids": []}, "tag"),
         ({"tag": "set-policy", "checkpoint": "nobody"}, "checkpoint"),

@@ -94,12 +94,12 @@ def test_test_is_started(client: TestClient) -> None:
     assert len(pieces(world)) == 10
 
 
-def test_planner_decides_alone_where_no_sorter_is_set(client: TestClient) -> None:
-    assert send(client, tag="set-sorter", checkpoint=None).status_code == 202
+def test_planner_decides_alone_where_no_sorting_policy_is_set(client: TestClient) -> None:
+    assert send(client, tag="set-sorting-policy", checkpoint=None).status_code == 202
     send(client, tag="toggle-goal", id=next(iter(pieces(client.get(WORLD).json()))))
     world = until(client, lambda now: now["sorting"]["move"] is not None)
     assert world["sorting"]["decided_by"] == "planner"
-    assert world["sorting"]["sorter"] is None
+    assert world["sorting"]["sorting_policy"] is None
 
 
 @pytest.mark.parametrize(
@@ -113,7 +113,7 @@ def test_planner_decides_alone_where_no_sorter_is_set(client: TestClient) -> Non
         ({"tag": "set-goal", "towers": {"red": ["large"] * 10}}, "towers"),
         ({"tag": "toggle-goal", "id": "purple-large"}, "id"),
         ({"tag": "start-test", "id": "test-9"}, "id"),
-        ({"tag": "set-sorter", "checkpoint": "nothing"}, "checkpoint"),
+        ({"tag": "set-sorting-policy", "checkpoint": "nothing"}, "checkpoint"),
         ({"tag": "set-candidates", "ids": ["cell0"]}, "tag"),
     ],
 )
@@ -125,7 +125,7 @@ def test_bad_command_is_a_problem_that_names_the_field(
 
 
 def test_policy_that_chooses_tasks_does_not_sort(client: TestClient) -> None:
-    refused = send(client, tag="set-sorter", checkpoint="pick")
+    refused = send(client, tag="set-sorting-policy", checkpoint="pick")
     assert refused.status_code in (409, 422)
 
 

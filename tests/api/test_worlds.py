@@ -72,7 +72,7 @@ def test_candidates_are_toggled(client: TestClient) -> None:
 
 def test_person_is_moved(client: TestClient) -> None:
     pelvis = [0.3, 1.5, -1.5708]
-    client.post(COMMANDS, json={"tag": "move-human", "pelvis": pelvis})
+    client.post(COMMANDS, json={"tag": "move-person", "pelvis": pelvis})
     moved = until(
         client, lambda world: abs(world["state"]["people"][0]["q"][0] - pelvis[0]) < 0.02
     )
@@ -95,7 +95,9 @@ def test_case_study_is_started(client: TestClient) -> None:
 
 def test_second_person_works_and_the_state_repeats_the_choice(client: TestClient) -> None:
     client.post(COMMANDS, json={"tag": "add-person"})
-    client.post(COMMANDS, json={"tag": "set-body", "person": 1, "stature": 95, "arms": 20})
+    client.post(
+        COMMANDS, json={"tag": "set-anthropometry", "person": 1, "stature": 95, "arms": 20}
+    )
 
     def there(now: dict[str, Any]) -> bool:
         tall = len(now["people"]) == 2 and now["people"][1]["body"]["stature"] == 95
@@ -115,7 +117,7 @@ def test_second_person_works_and_the_state_repeats_the_choice(client: TestClient
         assert {one["id"]: one["value"] for one in asked["candidates"]} == values
     finally:
         client.post(COMMANDS, json={"tag": "remove-person", "person": 1})
-        client.post(COMMANDS, json={"tag": "set-body", "stature": 50})
+        client.post(COMMANDS, json={"tag": "set-anthropometry", "stature": 50})
     until(client, lambda now: len(now["people"]) == 1)
 
 
@@ -150,10 +152,10 @@ def test_imported_motion_is_played(client: TestClient) -> None:
     [
         ({"tag": "set-mode", "mode": "recorded"}, "mode"),
         ({"tag": "set-mode", "mode": "auto", "person": 1}, "person"),
-        ({"tag": "move-human", "person": -1}, "person"),
+        ({"tag": "move-person", "person": -1}, "person"),
         ({"tag": "remove-person"}, "person"),
-        ({"tag": "set-body", "stature": 100}, "stature"),
-        ({"tag": "set-body", "arms": 0.5}, "arms"),
+        ({"tag": "set-anthropometry", "stature": 100}, "stature"),
+        ({"tag": "set-anthropometry", "arms": 0.5}, "arms"),
         ({"tag": "set-motion", "name": "nothing-there"}, "name"),
         ({"tag": "set-motion", "name": "x", "run": -1}, "run"),
         ({"tag": "fly"}, "tag"),
@@ -163,7 +165,7 @@ def test_imported_motion_is_played(client: TestClient) -> None:
         ({"tag": "set-candidates", "ids": ["cube0", "x"]}, "ids[1]"),
         ({"tag": "start-case", "id": "case-9"}, "id"),
         ({"tag": "set-policy", "checkpoint": "best"}, "checkpoint"),
-        ({"tag": "move-human", "pelvis": [0.0, 1.0]}, "pelvis"),
+        ({"tag": "move-person", "pelvis": [0.0, 1.0]}, "pelvis[2]"),
         ({"tag": "pause", "why": "tea"}, "why"),
     ],
 )
@@ -176,7 +178,7 @@ def test_bad_command_is_refused_by_field(
 
 
 def test_infinite_position_is_refused(client: TestClient) -> None:
-    body = '{"tag": "move-human", "right": [Infinity, 0.0, 0.3]}'
+    body = '{"tag": "move-person", "right": [Infinity, 0.0, 0.3]}'
     answer = client.post(COMMANDS, content=body, headers={"Content-Type": "application/json"})
     assert answer.status_code == 422
     assert answer.json()["field"] == "right[0]"

@@ -21,7 +21,7 @@ def one_person(server: str) -> Iterator[str]:
     commands = f"{server}/v1/worlds/main/commands"
     for other in state(server)["people"][1:]:
         patient_http.post(commands, json={"tag": "remove-person", "person": other["id"]})
-    patient_http.post(commands, json={"tag": "set-body", "stature": 50})
+    patient_http.post(commands, json={"tag": "set-anthropometry", "stature": 50})
     patient_http.post(commands, json={"tag": "set-mode", "mode": "auto"})
     patient_http.delete(f"{server}/v1/motions/visit")
 

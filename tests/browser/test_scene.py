@@ -77,7 +77,7 @@ def test_scene_goes_on_in_two_windows_while_people_come_and_go(
     until(shown, lambda now: len(now["people"]) == 1, LIMIT_S)
     for page in pages:
         expect_drawing(page)
-    tell(shown, {"tag": "set-body", "stature": 95}, {"tag": "add-person"})
+    tell(shown, {"tag": "set-anthropometry", "stature": 95}, {"tag": "add-person"})
     tell(shown, {"tag": "remove-person", "person": 0}, {"tag": "remove-person", "person": 1})
     until(shown, lambda now: now["people"] == [], LIMIT_S)
     tell(shown, {"tag": "add-person"}, {"tag": "add-person"})

@@ -17,12 +17,14 @@ Goal = Mapping[str, Sequence[str]]
 
 
 def empty_world(
-    policy: TaskPolicy | None = None, seed: int = 1, sorter: SortingValues | None = None
+    policy: TaskPolicy | None = None, seed: int = 1, sorting_policy: SortingValues | None = None
 ) -> SortingWorld:
     """Return a world without blocks, whose person stands back."""
     cell = load_cell("sorting-e0")
-    world = SortingWorld(cell, policy or StraightPolicy(cell), seed, sorter=sorter)
-    world.apply(commands.MoveHuman(pelvis=(0.0, 2.4, -1.57)))
+    world = SortingWorld(
+        cell, policy or StraightPolicy(cell), seed, sorting_policy=sorting_policy
+    )
+    world.apply(commands.MovePerson(pelvis=(0.0, 2.4, -1.57)))
     world.apply(SetGoal(towers={}))
     for piece in world.snapshot().sorting.pieces:
         world.apply(RemoveObject(id=piece.id))

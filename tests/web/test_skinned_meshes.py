@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from app.live import commands
-from app.live.commands import Command
+from app.live.command_checks import Command
 from app.live.factory import new_world
 from app.sim.cells.cell import load_cell
 from tests.web.viewer_client import ViewerClient
@@ -38,12 +38,12 @@ LIVES: dict[str, Sequence[Command]] = {
         *[commands.AddPerson()] * commands.MAX_PEOPLE,
     ],
     "a person grows and shrinks": [
-        commands.SetBody(stature=95.0),
-        commands.SetBody(stature=5.0, arms=90.0),
+        commands.SetAnthropometry(stature=95.0),
+        commands.SetAnthropometry(stature=5.0, arms=90.0),
     ],
     "a tall person leaves and a median one comes": [
         commands.AddPerson(),
-        commands.SetBody(person=1, stature=99.0),
+        commands.SetAnthropometry(person=1, stature=99.0),
         commands.RemovePerson(person=1),
         commands.AddPerson(),
     ],
@@ -62,7 +62,7 @@ def cases() -> Iterator[object]:
     """Yield cells and lives; the reach cell's people are cylinders, which keep their size."""
     for cell in ("pick-and-place", "shared-workspace", "sorting-e0"):
         for name, life in LIVES.items():
-            sized = any(isinstance(one, commands.SetBody) for one in life)
+            sized = any(isinstance(one, commands.SetAnthropometry) for one in life)
             if not (sized and cell == "shared-workspace"):
                 yield pytest.param(cell, life, id=f"{cell}: {name}")
 
@@ -77,7 +77,7 @@ def test_skinned_meshes_stay(server: ViewerServer, cell: str, life: Sequence[Com
         visitor.wait_until_heard(server)
         for k, command in enumerate(life):
             world.apply(command)
-            for _ in range(STEPS if isinstance(command, commands.SetBody) else 1):
+            for _ in range(STEPS if isinstance(command, commands.SetAnthropometry) else 1):
                 world.step()
                 scene.draw(world.snapshot(), work_cell.robot.dt)
             # What is sent late is never sent: a mesh that goes before its window was told.
@@ -118,7 +118,10 @@ def test_person_of_a_reused_number_has_its_own_size_place_and_feet(
 
     act(commands.AddPerson())
     median = height()
-    act(commands.SetBody(person=1, stature=99.0), commands.SetMode(person=1, mode="manual"))
+    act(
+        commands.SetAnthropometry(person=1, stature=99.0),
+        commands.SetMode(person=1, mode="manual"),
+    )
     assert height() > 1.04 * median
     act(commands.RemovePerson(person=1), commands.AddPerson())
     assert height() == pytest.approx(median)

@@ -36,13 +36,13 @@ function App() {
   const visited = useRef(false);
   visited.current ||= roomy || tab === "training";
   const acting = world?.checkpoint;
-  const sorter = world?.sorting?.sorter;
+  const sortingPolicy = world?.sorting?.sorting_policy;
   const training = useMemo(() => {
     const act = ({ purpose, sha256 }) =>
-      cell.send({ tag: purpose === "sorting" ? "set-sorter" : "set-policy", checkpoint: sha256 });
+      cell.send({ tag: purpose === "sorting" ? "set-sorting-policy" : "set-policy", checkpoint: sha256 });
     return html`<${Training} link=${link} jobs=${jobs} error=${error} refresh=${refresh}
-      cell=${cell.cell?.name} acting=${[acting, sorter]} onAct=${act} />`;
-  }, [link, jobs, error, acting, sorter, cell.cell?.name]);
+      cell=${cell.cell?.name} acting=${[acting, sortingPolicy]} onAct=${act} />`;
+  }, [link, jobs, error, acting, sortingPolicy, cell.cell?.name]);
   if (link === "signin") return html`<${SignIn} />`;
   return html`<div class="frame" data-link=${link}>
     <header class="topbar">

@@ -15,7 +15,7 @@ const TRIES = {
       if (!at || people.length === 0) return [];
       const person = people[0].id;
       return [{ tag: "set-mode", person, mode: "manual" },
-        { tag: "move-human", person, [at[0] < 0 ? "right" : "left"]: at }];
+        { tag: "move-person", person, [at[0] < 0 ? "right" : "left"]: at }];
     },
   },
   reach: {
@@ -26,7 +26,7 @@ const TRIES = {
       const person = people[0].id;
       const [x, y] = reach.goal;
       return [{ tag: "set-mode", person, mode: "manual" },
-        { tag: "move-human", person, pelvis: [x, y + BESIDE_M, 0] }];
+        { tag: "move-person", person, pelvis: [x, y + BESIDE_M, 0] }];
     },
   },
   sorting: {

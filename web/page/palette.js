@@ -34,7 +34,7 @@ export const OVERRIDES = [
 ];
 
 /** The terms of the protective separation distance; as in reach.css. */
-export const TERMS = { walk: "rgb(240 176 92)", way: "rgb(104 150 210)", margin: "rgb(160 172 184)" };
+export const TERMS = { person: "rgb(240 176 92)", robot: "rgb(104 150 210)", margin: "rgb(160 172 184)" };
 
 /** Colour of a robot that goes at this share of its speed. */
 export function overrideColour(override) {

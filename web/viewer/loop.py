@@ -19,12 +19,12 @@ import rich
 
 from app.errors import ServiceError
 from app.live import commands
-from app.live.commands import Command
-from app.live.factory import check_on_table, new_world
-from app.live.reach.commands import SetWay
-from app.live.reach.interfaces import ReachPilot
+from app.live.command_checks import Command, check, check_state, people_after
+from app.live.factory import new_world
+from app.live.reach.commands import SetInferenceMode
+from app.live.reach.interfaces import LiveReachPolicy
 from app.live.snapshot import WorldSnapshot
-from app.live.sorting.commands import SORTING_COMMANDS
+from app.live.sorting.commands import TableCommand
 from app.sim.cells.cell import Cell
 from app.sim.pick.task_policy import TaskPolicy
 from app.sim.sorting.sorting_values import SortingValues
@@ -75,14 +75,14 @@ class LiveHandle:
             ServiceError: The command does not fit this cell.
         """
         with self._lock:
-            commands.check(command, self._cell, self._people)
-            if isinstance(command, SetWay):
-                check_on_table(command, self._cell, self._last)
-            if isinstance(command, SORTING_COMMANDS):
+            check(command, self._cell, self._people)
+            if isinstance(command, SetInferenceMode):
+                check_state(command, self._cell, self._last)
+            if isinstance(command, TableCommand):
                 if not any(self._unseen):
-                    check_on_table(command, self._cell, self._last)
+                    check_state(command, self._cell, self._last)
                 self._unseen[0] += 1
-            self._people = commands.people_after(command, self._people)
+            self._people = people_after(command, self._people)
             self._queue.put(command)
             self._submitted += 1
             return self._submitted
@@ -115,8 +115,8 @@ class LiveCell:
         policy: Acts at first; None lets the robot rest.
         seed: Seed of the people's work.
         id: Name of the world in URLs.
-        sorter: Values the moves of a sorting cell; None leaves them to the exact planner.
-        pilot: Moves the arm of a reach cell; None goes straight.
+        sorting_policy: Values the moves of a sorting cell; None leaves them to the planner.
+        reach_policy: Moves the arm of a reach cell; None moves straight to the goals.
     """
 
     def __init__(
@@ -126,13 +126,13 @@ class LiveCell:
         *,
         seed: int = 0,
         id: str = "main",
-        sorter: SortingValues | None = None,
-        pilot: ReachPilot | None = None,
+        sorting_policy: SortingValues | None = None,
+        reach_policy: LiveReachPolicy | None = None,
     ) -> None:
         self._cell = cell
         # The first one compiles what is not in the kernels' cache yet.
-        new_world(cell, policy, seed, id, sorter, pilot).step()
-        self._world = new_world(cell, policy, seed, id, sorter, pilot)
+        new_world(cell, policy, seed, id, sorting_policy, reach_policy).step()
+        self._world = new_world(cell, policy, seed, id, sorting_policy, reach_policy)
         self.handle = LiveHandle(id, cell, self._world.snapshot())
         """Commands in, snapshots out."""
         self._speed = 1

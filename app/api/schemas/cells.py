@@ -5,7 +5,8 @@ from typing import Any, Self
 from pydantic import Field
 
 from app.api.schemas.numbers import Answer
-from app.live.factory import lacks_for_live, tests_of
+from app.live.command_checks import tests_of
+from app.live.factory import lacks_for_live
 from app.sim.cells.cell import Cell, cell_names, lacks_for_pick
 from app.sim.pick.cases import cases_of
 

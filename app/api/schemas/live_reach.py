@@ -1,13 +1,11 @@
 """A live reach cell: what it shows beyond robot and people, and what may be done to it."""
 
-from typing import Literal, Self
+from typing import Self
 
 from pydantic import Field
 
-from app.api.schemas.numbers import Answer, Body, Finite, Vector3
-from app.live import commands
-from app.live.reach import commands as reach_commands
-from app.live.reach.snapshot import GoalMode, ReachView, SafetyView
+from app.api.schemas.numbers import Answer
+from app.live.reach.snapshot import ReachView, SafetyView
 
 
 class SafetyLive(Answer):
@@ -22,10 +20,10 @@ class SafetyLive(Answer):
     required: float | None = Field(
         description="protective separation distance S_p of that link [m], sum of three terms"
     )
-    person_way: float | None = Field(description="v_h (T_r + T_s) [m]")
-    robot_way: float | None = Field(description="v_r T_r + B [m]")
+    person_distance: float | None = Field(description="v_h (T_r + T_s) [m]")
+    robot_distance: float | None = Field(description="v_r T_r + B [m]")
     margin: float = Field(description="C + Z_d + Z_r and the protective distance [m]")
-    measured: bool = Field(
+    use_measured_velocity: bool = Field(
         description="the layer goes by the velocities that people are seen with"
     )
     human_speed: float = Field(
@@ -58,8 +56,8 @@ class ReachLive(Answer):
     distance: float = Field(description="tool centre point to goal [m]")
     tolerance: float = Field(description="distance that counts as reached [m]")
     time_left_s: float = Field(description="time left to reach it [s]")
-    way: str = Field(description="how the policy is asked; empty without one")
-    ways: list[str] = Field(description="how it can be asked")
+    inference_mode: str = Field(description="how the policy is asked; empty without one")
+    inference_modes: list[str] = Field(description="how it can be asked")
     walk_speed: float | None = Field(
         description="speed of all people that was asked for [m/s]; null: it varies"
     )
@@ -70,87 +68,16 @@ class ReachLive(Answer):
     def from_domain(cls, view: ReachView) -> Self:
         """Make it from the world's view."""
         same = (
-            "goal_mode", "on_target", "distance", "tolerance", "time_left_s", "way",
+            "goal_mode", "on_target", "distance", "tolerance", "time_left_s", "inference_mode",
             "walk_speed",
         )  # fmt: skip
         counters = ReachCountersPublic.model_fields
         return cls(
             **{name: getattr(view, name) for name in same},
             goal=view.goal.tolist(),
-            ways=list(view.ways),
+            inference_modes=list(view.inference_modes),
             safety=SafetyLive.from_domain(view.safety),
             counters=ReachCountersPublic(
                 **{name: getattr(view.counters, name) for name in counters}
             ),
         )
-
-
-class MoveGoal(Body):
-    """Put the goal of a reach cell elsewhere, while the robot moves."""
-
-    tag: Literal["move-goal"]
-    position: Vector3 = Field(description="inside the cell's goal region [m]")
-
-    def to_domain(self) -> commands.Command:
-        """Return the world's command."""
-        x, y, z = self.position
-        return reach_commands.MoveGoal(position=(x, y, z))
-
-
-class NewGoal(Body):
-    """Draw another goal."""
-
-    tag: Literal["new-goal"]
-
-    def to_domain(self) -> commands.Command:
-        """Return the world's command."""
-        return reach_commands.NewGoal()
-
-
-class SetGoalMode(Body):
-    """Say where the goal is next once it is reached."""
-
-    tag: Literal["set-goal-mode"]
-    mode: GoalMode = Field(description="jump to another one, or stay and follow a drag")
-
-    def to_domain(self) -> commands.Command:
-        """Return the world's command."""
-        return reach_commands.SetGoalMode(mode=self.mode)
-
-
-class SetSafety(Body):
-    """Let the robot obey the safety layer, or see what happens without."""
-
-    tag: Literal["set-safety"]
-    on: bool = Field(description="whether the robot obeys the layer")
-    measured: bool | None = Field(
-        None,
-        description="whether the layer goes by the velocities that people are seen with, "
-        "instead of a speed in every direction; null leaves that as it is",
-    )
-
-    def to_domain(self) -> commands.Command:
-        """Return the world's command."""
-        return reach_commands.SetSafety(on=self.on, measured=self.measured)
-
-
-class SetWay(Body):
-    """Say how the policy is asked for goals and people it was not trained on."""
-
-    tag: Literal["set-way"]
-    way: str = Field(max_length=64, description="one of the world's `reach.ways`")
-
-    def to_domain(self) -> commands.Command:
-        """Return the world's command."""
-        return reach_commands.SetWay(way=self.way)
-
-
-class SetWalk(Body):
-    """Give all people of a reach cell one walking speed."""
-
-    tag: Literal["set-walk"]
-    speed: Finite | None = Field(description="0 to 2 [m/s]; null: it varies, as in training")
-
-    def to_domain(self) -> commands.Command:
-        """Return the world's command."""
-        return reach_commands.SetWalk(speed=self.speed)

@@ -1,19 +1,11 @@
 """The sorting task of a live world: what it shows, and what may be done to it."""
 
-from typing import Annotated, Any, Literal, Self
+from typing import Any, Self
 
 from pydantic import Field
 
-from app.api.schemas.numbers import Answer, Body
-from app.live import commands
-from app.live.sorting import commands as sorting_commands
+from app.api.schemas.numbers import Answer
 from app.live.sorting.snapshot import GoalBlockView, MoveView, PieceView, SortingView
-from app.sim.sorting.sorting_values import SortingValues
-
-MAX_TOWERS = 5
-"""Most towers that a goal names."""
-Name = Annotated[str, Field(max_length=64)]
-"""Name of a colour, a size, a station, a block or a test."""
 
 
 class PieceLive(Answer):
@@ -83,7 +75,7 @@ class SortingCountersPublic(Answer):
     moves: int
     attempts: int = Field(description="grasps tried, the failed ones included")
     failures: int
-    hand_overs: int = Field(description="times at which the exact planner took over")
+    planner_fallbacks: int = Field(description="times at which the exact planner took over")
 
 
 class SortingLive(Answer):
@@ -97,13 +89,15 @@ class SortingLive(Answer):
     move: MoveLive | None = Field(description="the move that is carried out")
     phase: str = Field(description="idle, approach, grasp, carry or place")
     decided_by: str | None = Field(description="policy or planner")
-    twins: list[str] = Field(description="blocks that the sorter calls equal")
+    duplicates: list[str] = Field(description="blocks that the sorter calls equal")
     ranked: list[MoveLive] = Field(description="the best valid moves, best first")
     moves_to_go: int = Field(description="fewest moves to the goal")
     attempts_to_go: float = Field(description="expected grasps, failed ones included")
     counters: SortingCountersPublic
-    sorter: str | None = Field(description="SHA-256 of the sorter; null: the planner alone")
-    sorter_title: str | None
+    sorting_policy: str | None = Field(
+        description="SHA-256 of the sorter; null: the planner alone"
+    )
+    sorting_policy_title: str | None
     test: str | None = Field(description="id of the running test")
     solved: bool
 
@@ -111,12 +105,12 @@ class SortingLive(Answer):
     def from_domain(cls, view: SortingView) -> Self:
         """Make it from the world's view."""
         same = (
-            "phase", "decided_by", "moves_to_go", "attempts_to_go", "sorter", "sorter_title",
-            "test", "solved",
+            "phase", "decided_by", "moves_to_go", "attempts_to_go", "sorting_policy",
+            "sorting_policy_title", "test", "solved",
         )  # fmt: skip
         counters = SortingCountersPublic.model_fields
         members: dict[str, Any] = {name: getattr(view, name) for name in same}
-        for name in ("failure", "colours", "sizes", "twins"):
+        for name in ("failure", "colours", "sizes", "duplicates"):
             members[name] = list(getattr(view, name))
         return cls(
             **members,
@@ -128,91 +122,3 @@ class SortingLive(Answer):
                 **{name: getattr(view.counters, name) for name in counters}
             ),
         )
-
-
-class AddObject(Body):
-    """Put another block into a sorting cell."""
-
-    tag: Literal["add-object"]
-    colour: Name
-    size: Name
-    at: Name | None = Field(
-        None, description="free clutter cell or tower; null takes the first free cell"
-    )
-
-    def to_domain(self) -> commands.Command:
-        """Return the world's command."""
-        return sorting_commands.AddObject(colour=self.colour, size=self.size, at=self.at)
-
-
-class RemoveObject(Body):
-    """Take a block out; a goal that nothing else meets shrinks."""
-
-    tag: Literal["remove-object"]
-    id: Name = Field(description="id of the block")
-
-    def to_domain(self) -> commands.Command:
-        """Return the world's command."""
-        return sorting_commands.RemoveObject(id=self.id)
-
-
-class MoveObject(Body):
-    """Put a block elsewhere, as a person would."""
-
-    tag: Literal["move-object"]
-    id: Name = Field(description="id of the block")
-    to: Name = Field(description="free clutter cell, or tower")
-
-    def to_domain(self) -> commands.Command:
-        """Return the world's command."""
-        return sorting_commands.MoveObject(id=self.id, to=self.to)
-
-
-class SetGoal(Body):
-    """Say what the towers shall be; those not named shall be empty."""
-
-    tag: Literal["set-goal"]
-    towers: dict[Name, Annotated[list[Name], Field(max_length=64)]] = Field(
-        max_length=MAX_TOWERS, description="sizes from the bottom, by tower"
-    )
-
-    def to_domain(self) -> commands.Command:
-        """Return the world's command."""
-        return sorting_commands.SetGoal(
-            towers={tower: tuple(sizes) for tower, sizes in self.towers.items()}
-        )
-
-
-class ToggleGoal(Body):
-    """Put a block into the goal, or take it out."""
-
-    tag: Literal["toggle-goal"]
-    id: Name = Field(description="id of a block, or a kind such as `red-large`")
-
-    def to_domain(self) -> commands.Command:
-        """Return the world's command."""
-        return sorting_commands.ToggleGoal(id=self.id)
-
-
-class StartTest(Body):
-    """Start one of the six sorting tests."""
-
-    tag: Literal["start-test"]
-    id: Name = Field(description="test-1 to test-6")
-
-    def to_domain(self) -> commands.Command:
-        """Return the world's command."""
-        return sorting_commands.StartTest(id=self.id)
-
-
-class SetSorter(Body):
-    """Let another sorter choose the moves."""
-
-    tag: Literal["set-sorter"]
-    checkpoint: str | None = Field(
-        max_length=64, description="SHA-256 or alias; null: the exact planner alone"
-    )
-
-    def to_domain(self, sorter: SortingValues | None) -> commands.Command:
-        """Return the world's command with the loaded sorter."""
-        return sorting_commands.SetSorter(sorter=sorter)

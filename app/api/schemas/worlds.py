@@ -1,30 +1,13 @@
 """Live worlds: what they show, and what may be done to them."""
 
-from typing import Annotated, Any, Literal, Self
+from typing import Any, Self
 
 from pydantic import Field
 
 from app.api.schemas.live_people import PersonLight, PersonLive
-from app.api.schemas.live_reach import (
-    MoveGoal,
-    NewGoal,
-    ReachLive,
-    SetGoalMode,
-    SetSafety,
-    SetWalk,
-    SetWay,
-)
-from app.api.schemas.live_sorting import (
-    AddObject,
-    MoveObject,
-    RemoveObject,
-    SetGoal,
-    SetSorter,
-    SortingLive,
-    StartTest,
-    ToggleGoal,
-)
-from app.api.schemas.numbers import Answer, Body, Finite, Vector3
+from app.api.schemas.live_reach import ReachLive
+from app.api.schemas.live_sorting import SortingLive
+from app.api.schemas.numbers import Answer, Body
 from app.api.schemas.robot_state import RobotState
 from app.api.schemas.task_selection import (
     CandidateState,
@@ -32,17 +15,8 @@ from app.api.schemas.task_selection import (
     PersonState,
     TaskSelectionRequest,
 )
-from app.errors import InvalidInput
-from app.live import commands
 from app.live.snapshot import CandidateView, WorldSnapshot
-from app.sim.human.anthropometry import PERCENTILES
-from app.sim.mocap.importer import Motion
 from app.sim.pick.case_verdict import Verdict
-from app.sim.pick.task_policy import TaskPolicy
-
-MAX_CHOICES = 20
-"""Most choices that an error lists."""
-Percentile = Annotated[float, Field(ge=PERCENTILES[0], le=PERCENTILES[1])]
 
 
 class CandidateLive(Answer):
@@ -229,7 +203,7 @@ class WorldCell(Body):
     checkpoint: str | None = Field(
         None, max_length=64, description="SHA-256 or alias of what decides; see above if null"
     )
-    sorter: str | None = Field(
+    sorting_policy: str | None = Field(
         None, max_length=64, description="SHA-256 or alias of what sorts; see above if null"
     )
 
@@ -306,216 +280,9 @@ def light_members(snapshot: WorldSnapshot) -> dict[str, Any]:
     }
 
 
-Who = Annotated[int, Field(description="id of the person; the first is 0")]
-
-
-class MoveHuman(Body):
-    """Ask a person to take a posture; what is null stays where it is."""
-
-    tag: Literal["move-human"]
-    person: Who = commands.FIRST
-    pelvis: Vector3 | None = Field(None, description="pelvis x [m], y [m], yaw [rad]")
-    right: Vector3 | None = Field(None, description="point for the right hand [m]")
-    left: Vector3 | None = Field(None, description="point for the left hand [m]")
-
-    def to_domain(self) -> commands.Command:
-        """Return the world's command."""
-        return commands.MoveHuman(
-            person=self.person,
-            pelvis=_triple(self.pelvis),
-            right=_triple(self.right),
-            left=_triple(self.left),
-        )
-
-
-class SetMode(Body):
-    """Say who moves a person."""
-
-    tag: Literal["set-mode"]
-    mode: commands.PlainMode
-    person: Who = commands.FIRST
-
-    def to_domain(self) -> commands.Command:
-        """Return the world's command."""
-        return commands.SetMode(mode=self.mode, person=self.person)
-
-
-class SetMotion(Body):
-    """Let a person move as recorded, again and again."""
-
-    tag: Literal["set-motion"]
-    name: str = Field(max_length=64, description="name of a stored motion")
-    run: int = Field(0, ge=0, description="which of its clean runs, from 0")
-    person: Who = commands.FIRST
-
-    def to_domain(self, runs: tuple[Motion, ...]) -> commands.Command:
-        """Return the world's command.
-
-        Args:
-            runs: The motion's clean runs.
-
-        Raises:
-            InvalidInput: The motion has no such run.
-        """
-        if self.run >= len(runs):
-            choices = [str(run) for run in range(min(len(runs), MAX_CHOICES))]
-            rule = f"is no run of this motion: it has {len(runs)}, counted from 0"
-            raise InvalidInput("run", self.run, rule, choices)
-        return commands.SetMotion(
-            motion=runs[self.run],
-            name=self.name,
-            run=self.run,
-            n_runs=len(runs),
-            person=self.person,
-        )
-
-
-class SetBody(Body):
-    """Give a person another size; what is null stays as it is."""
-
-    tag: Literal["set-body"]
-    stature: Percentile | None = Field(None, description="percentile of adults")
-    arms: Percentile | None = Field(None, description="of the arms' length at that stature")
-    shoulders: Percentile | None = Field(
-        None, description="of the shoulders' width at that stature"
-    )
-    recorded: bool = Field(
-        False, description="take the recorded person's lengths while a motion is played"
-    )
-    person: Who = commands.FIRST
-
-    def to_domain(self) -> commands.Command:
-        """Return the world's command."""
-        return commands.SetBody(
-            stature=self.stature,
-            arms=self.arms,
-            shoulders=self.shoulders,
-            recorded=self.recorded,
-            person=self.person,
-        )
-
-
-class RemovePerson(Body):
-    """Let a person leave."""
-
-    tag: Literal["remove-person"]
-    person: Who
-
-    def to_domain(self) -> commands.Command:
-        """Return the world's command."""
-        return commands.RemovePerson(person=self.person)
-
-
-class Plain(Body):
-    """A command without arguments."""
-
-    tag: Literal["pause", "resume", "step", "reset", "add-person"]
-
-    def to_domain(self) -> commands.Command:
-        """Return the world's command."""
-        plain: dict[str, commands.Command] = {
-            "pause": commands.Pause(),
-            "resume": commands.Resume(),
-            "step": commands.StepOnce(),
-            "reset": commands.Reset(),
-            "add-person": commands.AddPerson(),
-        }
-        return plain[self.tag]
-
-
-class SetSpeed(Body):
-    """Let the clock run faster than the one on the wall."""
-
-    tag: Literal["set-speed"]
-    factor: Literal[1, 2, 4, 8] = Field(description="simulated seconds per second")
-
-    def to_domain(self) -> commands.Command:
-        """Return the world's command."""
-        return commands.SetSpeed(factor=self.factor)
-
-
-class SetCandidates(Body):
-    """Say which stations the robot may choose among."""
-
-    tag: Literal["set-candidates"]
-    ids: list[str] = Field(max_length=1000, description="station ids; empty lets it rest")
-
-    def to_domain(self) -> commands.Command:
-        """Return the world's command."""
-        return commands.SetCandidates(ids=tuple(self.ids))
-
-
-class ToggleCandidate(Body):
-    """Add a station to the candidates, or take it out."""
-
-    tag: Literal["toggle-candidate"]
-    id: str = Field(description="station id")
-
-    def to_domain(self) -> commands.Command:
-        """Return the world's command."""
-        return commands.ToggleCandidate(id=self.id)
-
-
-class StartCase(Body):
-    """Start one of the case studies."""
-
-    tag: Literal["start-case"]
-    id: str = Field(description="case-1 to case-4")
-
-    def to_domain(self) -> commands.Command:
-        """Return the world's command."""
-        return commands.StartCase(id=self.id)
-
-
-class SetPolicy(Body):
-    """Let another checkpoint decide."""
-
-    tag: Literal["set-policy"]
-    checkpoint: str | None = Field(
-        max_length=64, description="SHA-256 or alias; null lets the robot rest"
-    )
-
-    def to_domain(self, policy: TaskPolicy | None) -> commands.Command:
-        """Return the world's command with the loaded policy."""
-        return commands.SetPolicy(policy=policy)
-
-
-CommandCreate = Annotated[
-    MoveHuman
-    | SetMode
-    | SetMotion
-    | SetBody
-    | RemovePerson
-    | Plain
-    | SetSpeed
-    | SetCandidates
-    | ToggleCandidate
-    | StartCase
-    | SetPolicy
-    | AddObject
-    | RemoveObject
-    | MoveObject
-    | SetGoal
-    | ToggleGoal
-    | StartTest
-    | SetSorter
-    | MoveGoal
-    | NewGoal
-    | SetGoalMode
-    | SetSafety
-    | SetWay
-    | SetWalk,
-    Field(discriminator="tag"),
-]
-
-
 class CommandAccepted(Answer):
     """The command is queued; the world applies it before its next tick."""
 
     tag: str
     number: int = Field(description="a snapshot whose `commands` is as high shows its effect")
     tick: int = Field(description="the world's last tick when the command was queued")
-
-
-def _triple(values: list[Finite] | None) -> tuple[float, float, float] | None:
-    return None if values is None else (values[0], values[1], values[2])

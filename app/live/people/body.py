@@ -52,7 +52,7 @@ class LiveBody:
         """Whether the lengths are those that were asked for."""
         return self._left_s == 0.0
 
-    def grow(self, stature: float, arms: float, shoulders: float) -> None:
+    def resize(self, stature: float, arms: float, shoulders: float) -> None:
         """Glide to the person of these percentiles."""
         self._percentiles, self._recorded = (stature, arms, shoulders), None
         self._glide_to(self._wanted())
@@ -76,8 +76,8 @@ class LiveBody:
             return False
         share = min(dt / self._left_s, 1.0)
         self._left_s = 0.0 if share == 1.0 else self._left_s - dt
-        way = share * (self._goal - self._lengths)
-        self._lengths = self._goal if self.settled else self._lengths + way
+        step = share * (self._goal - self._lengths)
+        self._lengths = self._goal if self.settled else self._lengths + step
         return True
 
     def rise_to(self, rise: float, dt: float) -> bool:

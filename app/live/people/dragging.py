@@ -6,7 +6,7 @@ with bounded joint speeds, so that the speeds a policy sees are those of the mov
 
 import numpy as np
 
-from app.live.commands import MoveHuman
+from app.live.commands import MovePerson
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
 from app.sim.human import model as human
@@ -45,7 +45,7 @@ class DraggedPerson:
         """Follow a posture [m, rad], shape (18,)."""
         self._target = np.array(q)
 
-    def drag(self, command: MoveHuman, size: Vec) -> None:
+    def drag(self, command: MovePerson, size: Vec) -> None:
         """Take what was dragged as the new target; dragged hands stay where they were put.
 
         Args:

@@ -16,8 +16,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.live.arm import Bodies
-from app.live.commands import FIRST, Command, Mode, MoveHuman, SetBody, SetMotion, people_after
+from app.live.arm import HumanGeometry
+from app.live.command_checks import people_after
+from app.live.commands import (
+    AddPerson,
+    Mode,
+    MovePerson,
+    RemovePerson,
+    SetAnthropometry,
+    SetMotion,
+)
 from app.live.people.worker import frozen
 from app.live.snapshot import BodyView, CylinderView, PersonView
 from app.sim.cells.cell import Cell
@@ -115,28 +123,28 @@ class LiveWalkers:
         self._state = pedestrian_state(1, MAX_PEOPLE)
         self._drawn = np.zeros((MAX_PEOPLE, RADIUS - SPEED))
         self._episode = 0
-        self._everyone: dict[int, LiveWalker] = {}
+        self._people: dict[int, LiveWalker] = {}
         for id in range(len(cell.people)):
             self._let_in(id)
 
     def __iter__(self) -> Iterator["LiveWalker"]:
-        return iter(self._everyone.values())
+        return iter(self._people.values())
 
     def __len__(self) -> int:
-        return len(self._everyone)
+        return len(self._people)
 
     def __getitem__(self, id: int) -> "LiveWalker":
-        return self._everyone[id]
+        return self._people[id]
 
     @property
     def ids(self) -> tuple[int, ...]:
         """Ids of the people who are there, in order."""
-        return tuple(self._everyone)
+        return tuple(self._people)
 
     @property
     def rows(self) -> Vec:
         """State of those who are there, as the kernels keep it, shape (n, N_STATE)."""
-        return self._state.rows[0, list(self._everyone)]
+        return self._state.rows[0, list(self._people)]
 
     @property
     def cylinders(self) -> Vec:
@@ -144,9 +152,9 @@ class LiveWalkers:
         return self.rows[:, [X, Y, R]]
 
     @property
-    def bodies(self) -> Bodies:
+    def bodies(self) -> HumanGeometry:
         """Where they are; nobody has joints."""
-        return Bodies(np.zeros((0, 18)), np.zeros((0, N_SIZE)), self.cylinders)
+        return HumanGeometry(np.zeros((0, 18)), np.zeros((0, N_SIZE)), self.cylinders)
 
     def restart(self) -> None:
         """Let everyone who walks begin anew somewhere; who is dragged or stands stays."""
@@ -154,13 +162,13 @@ class LiveWalkers:
             if one.mode == "auto":
                 self._place(one.id)
 
-    def change(self, command: Command) -> None:
+    def change(self, command: AddPerson | RemovePerson) -> None:
         """Let people come and leave as a command says."""
         ids = people_after(command, self.ids)
         for id in ids:
-            if id not in self._everyone:
+            if id not in self._people:
                 self._let_in(id)
-        self._everyone = {id: self._everyone[id] for id in ids}
+        self._people = {id: self._people[id] for id in ids}
 
     def move(self, dt: float) -> None:
         """Move everyone for ``dt`` [s]."""
@@ -180,7 +188,7 @@ class LiveWalkers:
             self._pace(one.id)
 
     def _let_in(self, id: int) -> None:
-        self._everyone[id] = LiveWalker(self, id, self._state.rows[0, id])
+        self._people[id] = LiveWalker(self, id, self._state.rows[0, id])
         self._place(id)
 
     def _place(self, id: int) -> None:
@@ -201,7 +209,7 @@ class LiveWalkers:
                 break
         self._drawn[id] = self._state.rows[0, id, SPEED:RADIUS]
         self._pace(id)
-        self._everyone[id].placed()
+        self._people[id].placed()
 
     def _pace(self, id: int) -> None:
         """Let somebody walk with the speed that holds for all, or that of its own function."""
@@ -265,7 +273,7 @@ class LiveWalker:
         x, y, vx, vy, r = (float(self.row[i]) for i in (X, Y, VX, VY, R))
         return person_from_cylinder(x, y, vx, vy, r)
 
-    def drag(self, command: MoveHuman) -> None:
+    def drag(self, command: MovePerson) -> None:
         """Follow a dragged pelvis; a cylinder has no hands."""
         self.enter("manual")
         if command.pelvis is not None:
@@ -287,7 +295,7 @@ class LiveWalker:
     def play(self, command: SetMotion) -> None:
         """Nothing: ``commands.check`` refuses it in a reach cell."""
 
-    def grow(self, command: SetBody) -> None:
+    def resize(self, command: SetAnthropometry) -> None:
         """Nothing: ``commands.check`` refuses it in a reach cell."""
 
     def _set_course(self, target: Vec) -> None:
@@ -360,8 +368,3 @@ def live_settings(cell: Cell) -> PedestrianSettings:
     """Return how somebody walks in a live cell: as its first person, but without end."""
     known = pedestrian_settings(cell.cylinders[0]) if cell.cylinders else PedestrianSettings()
     return replace(known, p_still=0.0, p_go_on=AUTHORS_WALK["p_go_on"])
-
-
-def first_ids(cell: Cell) -> tuple[int, ...]:
-    """Return the ids of the people whom a cell begins with."""
-    return tuple(range(FIRST, len(cell.people)))

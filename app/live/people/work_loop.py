@@ -21,7 +21,7 @@ from app.sim.primitives.primitive_library import VARIANTS
 from app.sim.scene.scene import new_people_state, people_of, with_people
 
 
-class TaskCycle:
+class WorkLoop:
     """A person who works on and on.
 
     Args:

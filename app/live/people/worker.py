@@ -8,10 +8,10 @@ from typing import Protocol
 
 import numpy as np
 
-from app.live.commands import Mode, MoveHuman, SetBody, SetMotion
+from app.live.commands import Mode, MovePerson, SetAnthropometry, SetMotion
 from app.live.people.body import LiveBody
 from app.live.people.dragging import DraggedPerson
-from app.live.people.work_loop import TaskCycle
+from app.live.people.work_loop import WorkLoop
 from app.live.playback import PlayedMotion, is_outside
 from app.live.snapshot import PersonView
 from app.sim.cells.cell import Cell
@@ -28,7 +28,7 @@ THERE_M = 0.005
 """Height of the pelvis from which on it counts as arrived [m]."""
 
 
-class Work(Protocol):
+class PostureSource(Protocol):
     """What moves a person who works: a work cycle or the script of a case study."""
 
     def at(self, t: float) -> tuple[Vec, Vec]:
@@ -57,7 +57,7 @@ class LivePerson:
         """How large the person is."""
         self._cell, self._place, self._seed = cell, place, seed
         self._played: PlayedMotion | None = None
-        self._work: Work = self._new_work()
+        self._work: PostureSource = self._new_work()
         self._t, self._joining = 0.0, q is not None
         self._limbs = DraggedPerson(cell, self._work.at(0.0)[0] if q is None else q)
 
@@ -121,28 +121,21 @@ class LivePerson:
 
     def play(self, command: SetMotion) -> None:
         """Move as recorded, from the beginning of the run, with the recorded lengths."""
-        self._played = PlayedMotion(
-            command.motion,
-            self._place,
-            self._cell.human,
-            command.name,
-            command.run,
-            command.n_runs,
-        )
+        self._played = PlayedMotion(command.loaded, self._place, self._cell.human)
         self.mode = "recorded"
         self.body.become(self._played.size)
         self._join_run()
 
-    def drag(self, command: MoveHuman) -> None:
+    def drag(self, command: MovePerson) -> None:
         """Aim at a dragged posture."""
         self.enter("manual")
         self._limbs.drag(command, self.size)
 
-    def grow(self, command: SetBody) -> None:
+    def resize(self, command: SetAnthropometry) -> None:
         """Become as large as asked for."""
         asked = (command.stature, command.arms, command.shoulders)
         now = self.body.percentiles
-        self.body.grow(
+        self.body.resize(
             *(old if new is None else new for new, old in zip(asked, now, strict=True))
         )
         if command.recorded and self.mode == "recorded" and self._played is not None:
@@ -152,13 +145,13 @@ class LivePerson:
         self._work = self._new_work()
         self._t, self._joining = 0.0, self.mode == "auto"
 
-    def _new_work(self) -> TaskCycle:
+    def _new_work(self) -> WorkLoop:
         worker = self._place.human
         stature, arms, shoulders = self.body.percentiles
         size = percentile_body(stature, arms, shoulders, worker.pelvis_height)
         own = self._place == self._cell and size == worker.size
         variants = VARIANTS if own else FEWER_VARIANTS
-        return TaskCycle(self._place, self._seed, size, variants)
+        return WorkLoop(self._place, self._seed, size, variants)
 
     def _join_run(self) -> None:
         self._t, self._joining = 0.0, True
@@ -191,8 +184,8 @@ class LivePerson:
         if not self.body.glide(dt):
             return False
         if self.mode == "manual":
-            self._limbs.drag(MoveHuman(), self.size)
-        elif self.mode == "auto" and self.body.settled and isinstance(self._work, TaskCycle):
+            self._limbs.drag(MovePerson(), self.size)
+        elif self.mode == "auto" and self.body.settled and isinstance(self._work, WorkLoop):
             self._begin_work()
         return True
 

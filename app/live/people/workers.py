@@ -10,8 +10,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from app.live.arm import Bodies
-from app.live.commands import FIRST, Command, people_after
+from app.live.arm import HumanGeometry
+from app.live.command_checks import people_after
+from app.live.commands import FIRST, AddPerson, RemovePerson
 from app.live.people.dragging import STEP_BACK
 from app.live.people.worker import LivePerson
 from app.sim.cells.cell import Cell
@@ -40,21 +41,21 @@ class LivePeople:
 
     def __init__(self, cell: Cell, seed: int) -> None:
         self._cell, self._seed = cell, seed
-        self._everyone = {FIRST: LivePerson(cell, place_of(cell, 0, 1), FIRST, seed)}
+        self._people = {FIRST: LivePerson(cell, place_of(cell, 0, 1), FIRST, seed)}
 
     def __iter__(self) -> Iterator[LivePerson]:
-        return iter(self._everyone.values())
+        return iter(self._people.values())
 
     def __len__(self) -> int:
-        return len(self._everyone)
+        return len(self._people)
 
     def __getitem__(self, id: int) -> LivePerson:
-        return self._everyone[id]
+        return self._people[id]
 
     @property
     def ids(self) -> tuple[int, ...]:
         """Ids of the people who are there, in order."""
-        return tuple(self._everyone)
+        return tuple(self._people)
 
     @property
     def q(self) -> Vec:
@@ -67,23 +68,23 @@ class LivePeople:
         return np.array([one.size for one in self]).reshape(-1, N_SIZE)
 
     @property
-    def bodies(self) -> Bodies:
+    def bodies(self) -> HumanGeometry:
         """Where they are; nobody is a cylinder."""
-        return Bodies(self.q, self.sizes, NO_CYLINDERS)
+        return HumanGeometry(self.q, self.sizes, NO_CYLINDERS)
 
     def only_first(self) -> LivePerson:
         """Leave the first person alone, as the cell describes it, and return it."""
         place = place_of(self._cell, 0, 1)
-        self._everyone = {FIRST: LivePerson(self._cell, place, FIRST, self._seed)}
-        return self._everyone[FIRST]
+        self._people = {FIRST: LivePerson(self._cell, place, FIRST, self._seed)}
+        return self._people[FIRST]
 
-    def change(self, command: Command) -> None:
+    def change(self, command: AddPerson | RemovePerson) -> None:
         """Let people come and leave as a command says, and the others move up."""
         ids = people_after(command, self.ids)
         places = [place_of(self._cell, k, len(ids)) for k in range(len(ids))]
-        everyone = {}
+        people = {}
         for id, place in zip(ids, places, strict=True):
-            known = self._everyone.get(id)
+            known = self._people.get(id)
             if known is None:
                 known = LivePerson(
                     self._cell,
@@ -94,8 +95,8 @@ class LivePeople:
                 )
             else:
                 known.move_to(place)
-            everyone[id] = known
-        self._everyone = everyone
+            people[id] = known
+        self._people = people
 
     def _entrance(self, worker: Worker) -> Vec:
         """Return a posture at home, or behind it, where nobody stands; else the freest."""

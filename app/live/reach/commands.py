@@ -1,110 +1,78 @@
-"""What may be done to a live reach cell, as data (see ``commands.py``)."""
+"""Commands to a live reach cell; see ``commands.py``."""
 
-import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import Annotated, Literal
 
 import numpy as np
+from pydantic import Field
 
-from app.errors import InvalidInput, interval
-from app.live.reach.snapshot import GOAL_MODES, GoalMode
+from app.live.commands import ClockCommand, CylinderCommand, LiveCommand, Name, SetPolicy
+from app.live.reach.snapshot import GoalMode
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
 
-if TYPE_CHECKING:
-    from app.live.reach.interfaces import ReachPilot
-
-WALK_SPEEDS = (0.0, 2.0)
-"""Least and greatest speed that a visitor may give the people [m/s]."""
-AXES = ("x", "y", "z")
+MAX_WALKING_SPEED = 2.0
+"""Maximum walking speed that a visitor can set [m/s]."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MoveGoal:
-    """Put the goal elsewhere, while the robot moves."""
+class MoveGoal(LiveCommand):
+    """Move the goal while the robot moves."""
 
-    tag: ClassVar[str] = "move-goal"
+    tag: Literal["move-goal"] = "move-goal"
     position: tuple[float, float, float]
-    """Where the tcp shall be, inside the cell's goal region [m]."""
+    """target of the tool centre point, inside the cell's goal region [m]"""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class NewGoal:
-    """Draw another goal."""
+class NewGoal(LiveCommand):
+    """Draw another goal at random."""
 
-    tag: ClassVar[str] = "new-goal"
+    tag: Literal["new-goal"] = "new-goal"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SetGoalMode:
-    """Say where the goal is next once it is reached."""
+class SetGoalMode(LiveCommand):
+    """Set whether a reached goal is replaced (`jump`) or stays until dragged (`follow`)."""
 
-    tag: ClassVar[str] = "set-goal-mode"
+    tag: Literal["set-goal-mode"] = "set-goal-mode"
     mode: GoalMode
-    """``jump`` to another one, or stay and ``follow`` whoever drags it."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SetSafety:
-    """Let the robot obey the safety layer, or see what happens without."""
+class SetSafety(LiveCommand):
+    """Enable or disable speed and separation monitoring."""
 
-    tag: ClassVar[str] = "set-safety"
+    tag: Literal["set-safety"] = "set-safety"
     on: bool
-    """Whether it does."""
-    measured: bool | None = None
-    """Whether the layer goes by the velocities that people are seen with; None as before."""
+    """whether the robot obeys the safety layer"""
+    use_measured_velocity: bool | None = None
+    """whether S_p uses people's measured velocities instead of an assumed speed in every
+    direction; null keeps the setting"""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SetWay:
-    """Say how the policy is asked for goals and people it was not trained on."""
+class SetInferenceMode(LiveCommand):
+    """Set how the policy is evaluated for goals and people outside its training set."""
 
-    tag: ClassVar[str] = "set-way"
-    way: str
-    """One of the policy's ways."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SetWalk:
-    """Give all people one walking speed."""
-
-    tag: ClassVar[str] = "set-walk"
-    speed: float | None
-    """Speed [m/s], in WALK_SPEEDS; None as METHOD 2.1 says."""
+    tag: Literal["set-inference-mode"] = "set-inference-mode"
+    inference_mode: Name
+    """one of the world's `reach.inference_modes`"""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SetPilot:
-    """Let another reach policy move the robot.
+class SetWalkingSpeed(LiveCommand):
+    """Set one walking speed for all people."""
 
-    Over HTTP this is ``set-policy`` with a checkpoint's id or alias; the service loads it.
-    """
-
-    tag: ClassVar[str] = "set-policy"
-    pilot: "ReachPilot | None"
-    """What moves from now on; None goes straight to the goal's posture."""
+    tag: Literal["set-walking-speed"] = "set-walking-speed"
+    speed: Annotated[float, Field(ge=0.0, le=MAX_WALKING_SPEED)] | None
+    """walking speed [m/s]; null: variable, as in training"""
 
 
-ReachCommand = MoveGoal | NewGoal | SetGoalMode | SetSafety | SetWay | SetWalk | SetPilot
-
-REACH_COMMANDS: tuple[type[ReachCommand], ...] = (
-    MoveGoal,
-    NewGoal,
-    SetGoalMode,
-    SetSafety,
-    SetWay,
-    SetWalk,
-    SetPilot,
-)
+ReachOnly = MoveGoal | NewGoal | SetGoalMode | SetSafety | SetInferenceMode | SetWalkingSpeed
+ReachCommand = CylinderCommand | ClockCommand | SetPolicy | ReachOnly
 
 
 def is_reaching(cell: Cell) -> bool:
-    """Whether a cell has goals to reach, and nothing to pick or sort."""
+    """Return whether a cell has a goal region and no stations."""
     return cell.goal_region is not None and not cell.stations
 
 
 def lacks_for_reaching(cell: Cell) -> str | None:
-    """Say what a reach cell lacks to be shown live; None where nothing."""
+    """Return what a live reach cell still needs, as a sentence part; None if nothing."""
     if cell.goal_region is None:
         return "needs a goal_region"
     if cell.workers:
@@ -112,45 +80,8 @@ def lacks_for_reaching(cell: Cell) -> str | None:
     return None
 
 
-def check_reaching(command: ReachCommand, cell: Cell) -> None:
-    """Refuse a command that no reach cell, or not this one, could carry out.
-
-    Raises:
-        InvalidInput: Nothing is reached for here, or a value out of its range.
-    """
-    if not is_reaching(cell):
-        rule = f"needs a cell with goals to reach: {cell.name} is none"
-        raise InvalidInput("tag", command.tag, rule)
-    match command:
-        case MoveGoal():
-            _check_goal(command.position, cell)
-        case SetGoalMode() if command.mode not in GOAL_MODES:
-            raise InvalidInput("mode", command.mode, "is no mode of the goal", GOAL_MODES)
-        case SetWalk() if command.speed is not None:
-            low, high = WALK_SPEEDS
-            if not low <= command.speed <= high:
-                raise InvalidInput(
-                    "speed", command.speed, f"must lie in {interval(low, high)} m/s"
-                )
-        case _:
-            pass
-
-
-def _check_goal(position: tuple[float, float, float], cell: Cell) -> None:
-    assert cell.goal_region is not None
-    low, high = goal_box(cell)
-    for axis, value, least, most in zip(AXES, position, low, high, strict=True):
-        field = f"position.{axis}"
-        if not math.isfinite(value):
-            raise InvalidInput(field, value, "must be finite")
-        if not least - 1e-9 <= value <= most + 1e-9:
-            miss = max(least - value, value - most)
-            rule = f"must lie in the goal region [{least:g}, {most:g}] m: {miss:.3g} m outside"
-            raise InvalidInput(field, value, rule)
-
-
 def goal_box(cell: Cell) -> tuple[Vec, Vec]:
-    """Return the corners of a cell's goal region [m], shape (3,) each."""
+    """Return the lower and upper corner of a cell's goal region [m], shape (3,) each."""
     assert cell.goal_region is not None
     middle, half = np.array(cell.goal_region.center), 0.5 * np.array(cell.goal_region.size)
     return middle - half, middle + half

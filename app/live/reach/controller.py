@@ -1,10 +1,10 @@
-"""What moves the robot of a live reach cell: a policy, or a straight way to a posture.
+"""Controller of a live reach cell: a reach policy, or straight motion in joint space.
 
-The policy sees what it saw in training: the row of a :class:`~app.sim.reach.batch.ReachBatch`
-is
-filled with robot, people and goal as they are, and observed. Without a policy the robot goes
-straight in joint space to the posture with its tool pointing down at the goal, whoever stands
-in the way.
+The policy receives the observation it was trained with: a
+:class:`~app.sim.reach.batch.ReachBatch`
+of one environment is filled with robot, people and goal. Without a policy the robot moves
+straight in joint space to the configuration with its tool pointing down at the goal, regardless
+of people.
 """
 
 import time
@@ -12,7 +12,7 @@ import time
 import numpy as np
 
 from app.live.arm import GAIN, LiveArm
-from app.live.reach.interfaces import ReachPilot
+from app.live.reach.interfaces import LiveReachPolicy
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
 from app.sim.people.kernels.pedestrian import R, X, Y
@@ -22,34 +22,32 @@ from app.sim.safety.layer import SafetySettings
 from app.sim.scene.scene import HumanKind
 
 TIME_LIMIT_S = 5.0
-"""Time to reach a goal [s] (METHOD 2.3)."""
+"""Time limit of a goal [s] (docs/method.md 2.3)."""
 
 
-class LiveReacher:
-    """Asks a policy about the live state.
+class ReachController:
+    """Queries a policy for the live state.
 
     Args:
         cell: Cell with a goal region.
-        pilot: Moves; None goes straight.
+        policy: Moves the robot; None moves straight to the goal.
     """
 
-    def __init__(self, cell: Cell, pilot: ReachPilot | None) -> None:
+    def __init__(self, cell: Cell, policy: LiveReachPolicy | None) -> None:
         self._cell = cell
-        self.elapsed_ms: float | None = None
-        """Time the last decision took [ms]."""
-        self.use(pilot)
+        self.use(policy)
 
-    def use(self, pilot: ReachPilot | None) -> None:
-        """Let another policy move."""
-        self.pilot = pilot
-        self.way = "" if pilot is None else usual_way(pilot)
-        self.elapsed_ms = None
+    def use(self, policy: LiveReachPolicy | None) -> None:
+        """Replace the policy."""
+        self.policy = policy
+        self.inference_mode = "" if policy is None else default_mode(policy)
+        self.elapsed_ms: float | None = None
         self._batch: ReachBatch | None = None
 
     @property
-    def ways(self) -> tuple[str, ...]:
-        """How the policy can be asked."""
-        return () if self.pilot is None else self.pilot.ways
+    def inference_modes(self) -> tuple[str, ...]:
+        """Inference modes of the policy."""
+        return () if self.policy is None else self.policy.inference_modes
 
     def act(
         self,
@@ -61,39 +59,41 @@ class LiveReacher:
         elapsed: float,
         safety: SafetySettings | None,
     ) -> Vec:
-        """Return the action for the period to come, in [-1, 1], shape (6,).
+        """Return the action of the next period, in [-1, 1], shape (6,).
 
         Args:
-            robot: Where the robot is.
-            walkers: The people, shape (n, N_STATE) of ``people/kernels/pedestrian.py``.
-            goal: Where the tcp shall be [m], shape (3,).
-            clear_m: Distance of robot and people [m].
-            time_left: Time left to reach it [s].
-            elapsed: Time for which it has been sought [s].
-            safety: What the safety layer assumes that the robot obeys; None without one.
+            robot: State of the robot.
+            walkers: States of the people, shape (n, N_STATE) of
+            ``people/kernels/pedestrian.py``.
+            goal: Target of the tcp [m], shape (3,).
+            clear_m: Separation distance [m].
+            time_left: Time left to reach the goal [s].
+            elapsed: Time since the motion began [s].
+            safety: Safety layer that limits the action; None without one.
         """
-        if self.pilot is None:
+        if self.policy is None:
             return straight(robot.arm, robot.q, robot.posture_at(goal)[0])
         started = time.perf_counter()
-        batch = self._filled(self.pilot, robot, walkers, clear_m, time_left)
+        batch = self._filled(self.policy, robot, walkers, clear_m, time_left)
         batch.state.elapsed[0] = elapsed
         batch.state.goal[0] = goal
-        act = np.asarray(self.pilot.acts(batch, self.way, safety)[0], dtype=np.float64)
+        found = self.policy.acts(batch, self.inference_mode, safety)[0]
+        act = np.asarray(found, dtype=np.float64)
         self.elapsed_ms = 1e3 * (time.perf_counter() - started)
         return np.clip(act, -1.0, 1.0)
 
     def _filled(
-        self, pilot: ReachPilot, robot: LiveArm, walkers: Vec, clear_m: float, left: float
+        self, policy: LiveReachPolicy, robot: LiveArm, walkers: Vec, clear_m: float, left: float
     ) -> ReachBatch:
-        """Return the batch with its one row as the live cell is."""
+        """Return the batch with the live state in its one environment."""
         n = len(walkers)
         if self._batch is None or self._batch.state.people.walkers.rows.shape[1] != n:
             people: tuple[HumanKind, ...] = tuple("walker" for _ in range(n))
             settings = ReachSettings(
                 people=people,
                 time_limit_s=TIME_LIMIT_S,
-                observation=pilot.view,
-                action=pilot.action,
+                observation=policy.view,
+                action=policy.action,
                 start="uniform",
             )
             self._batch = ReachBatch(self._cell, 1, 0, settings)
@@ -106,14 +106,15 @@ class LiveReacher:
         return self._batch
 
 
-def usual_way(pilot: ReachPilot) -> str:
-    """Return how a policy is asked at first: between its targets and ahead where it can be."""
-    wanted = ("interpolated-ahead", "direct-ahead", "interpolated")
-    return next((way for way in wanted if way in pilot.ways), pilot.ways[0])
+def default_mode(policy: LiveReachPolicy) -> str:
+    """Return the initial inference mode: interpolated and with rollout where available."""
+    preferred = ("interpolated-ahead", "direct-ahead", "interpolated")
+    modes = policy.inference_modes
+    return next((mode for mode in preferred if mode in modes), modes[0])
 
 
 def straight(arm: Arm, q: Vec, posture: Vec) -> Vec:
-    """Return the action that leads straight, in joint space, to a posture [rad], shape (6,)."""
+    """Return the action straight in joint space to a configuration [rad], shape (6,)."""
     speed = GAIN * (posture - q)
     fastest = float(np.max(np.abs(speed) / arm.limits.qd_max))
     return np.asarray(speed / arm.limits.qd_max / max(1.0, fastest))

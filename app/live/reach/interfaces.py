@@ -1,4 +1,4 @@
-"""What a live reach cell needs of a policy; ``app.policies`` implements it."""
+"""Interface of policies of a live reach cell; ``app.policies`` implements it."""
 
 from typing import TYPE_CHECKING, Protocol
 
@@ -12,20 +12,20 @@ if TYPE_CHECKING:  # the batch needs the ports first
     from app.sim.safety.layer import SafetySettings
 
 
-class ReachPilot(ReachKnown, Protocol):
-    """A reach policy with the ways in which it can be asked; used by one thread at a time."""
+class LiveReachPolicy(ReachKnown, Protocol):
+    """A reach policy with its inference modes; used by one thread at a time."""
 
     @property
-    def ways(self) -> tuple[str, ...]:
-        """Names of the inference modes (``app.policies.inference.controllers``)."""
+    def inference_modes(self) -> tuple[str, ...]:
+        """Available inference modes, ``direct`` among them."""
 
     def acts(
-        self, batch: "ReachBatch", way: str, safety: "SafetySettings | None"
+        self, batch: "ReachBatch", inference_mode: str, safety: "SafetySettings | None"
     ) -> NDArray[np.float32]:
         """Return the actions for every environment of a batch, shape (n_envs, 6).
 
         Args:
             batch: Robots, people and goals.
-            way: One of ``ways``.
-            safety: What the safety layer assumes that they go through; None without one.
+            inference_mode: One of ``inference_modes``.
+            safety: Safety layer that limits the actions; None without one.
         """

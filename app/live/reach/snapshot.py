@@ -28,13 +28,13 @@ class SafetyView:
     """Their distance [m]."""
     required: float | None
     """Protective separation distance S_p for that link [m], the sum of the three terms."""
-    person_way: float | None
+    person_distance: float | None
     """What the person covers until the robot rests, v_h (T_r + T_s) [m]."""
-    robot_way: float | None
+    robot_distance: float | None
     """What the robot covers until then, v_r T_r + B [m]."""
     margin: float
     """Distance to keep, C + Z_d + Z_r and the protective distance [m]."""
-    measured: bool
+    use_measured_velocity: bool
     """Whether the layer goes by the velocities that people are seen with."""
     human_speed: float
     """Speed assumed for people, v_h; where measured what is added to theirs [m/s]."""
@@ -77,9 +77,9 @@ class ReachView:
     """Distance that counts as reached [m]."""
     time_left_s: float
     """Time left to reach it [s]."""
-    way: str
+    inference_mode: str
     """How the policy is asked: one of ``ways``."""
-    ways: tuple[str, ...]
+    inference_modes: tuple[str, ...]
     """How it can be asked; empty without a policy."""
     walk_speed: float | None
     """Speed of all people that a visitor asked for [m/s]; None as METHOD 2.1."""

@@ -1,11 +1,10 @@
-"""Who chooses the moves of a live sorting cell: the sorter's policy, watched, or the planner.
+"""Choice of moves in a live sorting cell: by the monitored sorting policy, or by the planner.
 
-A decision is made anew whenever an attempt is over or a person changed something. Where the
-sorter calls moves equal the motion policy's critic may take any of them: twins in clutter cells
-whose grasps fail about as often (ALIKE), and other first moves of shortest plans that are worth
-as much (MARGIN).
+A new decision follows every attempt and every change of the task. Among moves of equal value
+the critic of the motion policy decides: identical blocks in clutter cells whose grasps fail
+about as often (ALIKE), and first moves of shortest plans of about the same value (MARGIN).
 
-Source: METHOD 1.4, 3.1 and 4 (the critic's values used for the symbolic choice as well).
+Source: docs/method.md 1.4, 3.1 and 4 (the critic's values also decide the symbolic choice).
 """
 
 from dataclasses import dataclass
@@ -19,59 +18,59 @@ from app.sim.sorting.sorting_values import SortingValues
 from app.sim.sorting.state import Move
 
 ALIKE = 0.02
-"""Difference of failure probabilities up to which twins count as equal."""
+"""Difference of failure probabilities up to which identical blocks count as equal."""
 MARGIN = 0.01
-"""Difference up to which moves are worth as much: of Q, or of the planner's attempts."""
-HAND_OVER: tuple[Why, ...] = ("repeated", "patience")
-"""Reasons that mean that the planner took over from a policy that may decide here."""
+"""Difference up to which moves count as equal: of Q, or of the planner's attempts."""
+FALLBACK_REASONS: tuple[Why, ...] = ("repeated", "patience")
+"""Reasons for a planner fallback: the policy may decide here but makes no progress."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Choice:
-    """The move that shall be carried out."""
+class MoveChoice:
+    """The chosen move."""
 
     move: Move
-    """From where to where."""
+    """Pick and place position."""
     block: Block
-    """The block that is meant."""
+    """The block to move."""
     options: tuple[tuple[Block, Move], ...]
-    """Blocks that may be taken as well, each with its move; itself first."""
+    """Blocks of equal value, each with its move; the chosen one first."""
     back: bool = False
-    """Whether a held block is only put back where it counts."""
+    """Whether a held block only returns to where it counts."""
 
 
-class LiveSorter:
-    """Decides, remembers, and hands over.
+class SortController:
+    """Chooses moves, monitors progress and falls back to the planner.
 
     Args:
-        sorter: The policy; None leaves it to the planner.
+        policy: Values the moves; None leaves them to the planner.
     """
 
-    def __init__(self, sorter: SortingValues | None) -> None:
-        self.sorter = sorter
+    def __init__(self, policy: SortingValues | None) -> None:
+        self.policy = policy
         """The policy."""
         self.decision: SortingDecision | None = None
         """The last decision."""
-        self.hand_overs = 0
-        """Times at which the planner took over."""
+        self.planner_fallbacks = 0
+        """Number of planner fallbacks."""
         self._before: SortingWatch | None = None
         self._after: SortingWatch | None = None
         self._attempted = False
         self._avoid: set[int] = set()
 
     def begin(self) -> None:
-        """Begin another task."""
-        self.decision, self.hand_overs = None, 0
+        """Start another task."""
+        self.decision, self.planner_fallbacks = None, 0
         self._before = self._after = None
         self._attempted = False
         self._avoid.clear()
 
     def avoid(self, pick: int) -> None:
-        """Take another block next, if another move is as short: this one was not reached."""
+        """Prefer another move of a shortest plan next: this block was not reached."""
         self._avoid.add(pick)
 
     def note_attempt(self, table: SortingTable, move: Move) -> None:
-        """Note the move that is tried now, before it is: the critic may have taken a twin."""
+        """Note the move before its grasp; the critic may have chosen an identical block."""
         self._avoid.clear()
         if self._after is not None:
             state = table.state
@@ -79,15 +78,15 @@ class LiveSorter:
             self._after = note_move(self._after, key, can_fail=failure_of(state, move) > 0.0)
 
     def end_attempt(self) -> None:
-        """Note that the attempt is over: the grasp failed, or the block is where it should."""
+        """Note that the attempt is over: the grasp failed, or the block is placed."""
         self._attempted = True
 
-    def choose(self, table: SortingTable, kept: Move | None = None) -> Choice | None:
-        """Decide on the next move; None where the goal is reached.
+    def choose(self, table: SortingTable, kept: Move | None = None) -> MoveChoice | None:
+        """Return the next move; None if the goal is reached.
 
         Args:
             table: The table as it is now.
-            kept: What a held block was on its way to; it goes on if that still is as short.
+            kept: Present move of a held block; continued while it is on a shortest plan.
         """
         decision = self._decide(table)
         if table.held is not None:
@@ -98,24 +97,24 @@ class LiveSorter:
         block = table.top(move.pick)
         assert block is not None
         options = (
-            {block: move} | _twins(table, move, block) | self._equal(table, decision, move)
+            {block: move} | _duplicates(table, move, block) | self._equal(table, decision, move)
         )
-        return Choice(move=move, block=block, options=tuple(options.items()))
+        return MoveChoice(move=move, block=block, options=tuple(options.items()))
 
     def _decide(self, table: SortingTable) -> SortingDecision:
-        if self._attempted:  # Otherwise the same question is asked again.
+        if self._attempted:  # Otherwise the state is the same.
             self._before, self._attempted = self._after, False
-        handed = self.decision is not None and self.decision.why in HAND_OVER
-        decision = decide(self.sorter, table.state, table.shape, self._before)
+        fell_back = self.decision is not None and self.decision.why in FALLBACK_REASONS
+        decision = decide(self.policy, table.state, table.shape, self._before)
         self.decision, self._after = decision, decision.watch
-        if decision.why in HAND_OVER and not handed:
-            self.hand_overs += 1
+        if decision.why in FALLBACK_REASONS and not fell_back:
+            self.planner_fallbacks += 1
         return decision
 
     def _equal(
         self, table: SortingTable, decision: SortingDecision, move: Move
     ) -> dict[Block, Move]:
-        """Return other blocks whose moves begin a shortest plan and are worth as much."""
+        """Return other blocks whose moves begin a shortest plan and have an equal value."""
         values = {one.move: one.value for one in decision.ranked if one.fewest}
         best, found = values.get(move), dict[Block, Move]()
         for other, value in values.items():
@@ -127,7 +126,7 @@ class LiveSorter:
         return found
 
     def _move_of(self, decision: SortingDecision) -> Move:
-        """Return the best move, or one as short in place of one that was not reached."""
+        """Return the best move, or one as short if its block was not reached."""
         others = [
             one for one in decision.ranked if one.fewest and one.move.pick not in self._avoid
         ]
@@ -135,8 +134,8 @@ class LiveSorter:
         return others[0].move if best.move.pick in self._avoid and others else best.move
 
 
-def has_safer_twin(table: SortingTable, cell: int) -> bool:
-    """Return whether a block like the one in a clutter cell lies in a safer cell."""
+def has_safer_duplicate(table: SortingTable, cell: int) -> bool:
+    """Return whether an identical block lies in a safer clutter cell."""
     block, least = table.clutter[cell], table.fail[cell] - ALIKE
     return block is not None and any(
         one is not None and one.code == block.code and fail < least
@@ -144,8 +143,8 @@ def has_safer_twin(table: SortingTable, cell: int) -> bool:
     )
 
 
-def _twins(table: SortingTable, move: Move, block: Block) -> dict[Block, Move]:
-    """Return blocks like the one in a clutter cell that fail about as often."""
+def _duplicates(table: SortingTable, move: Move, block: Block) -> dict[Block, Move]:
+    """Return identical blocks in clutter cells with about the same failure probability."""
     if move.pick >= table.shape.n_cells:
         return {}
     fail = table.fail[move.pick]
@@ -156,26 +155,26 @@ def _twins(table: SortingTable, move: Move, block: Block) -> dict[Block, Move]:
     }
 
 
-def _for_held(table: SortingTable, decision: SortingDecision, kept: Move | None) -> Choice:
-    """Return where the held block goes: on, elsewhere, or back to where it counts."""
+def _for_held(table: SortingTable, decision: SortingDecision, kept: Move | None) -> MoveChoice:
+    """Return the place of the held block: the same, another, or back to where it counts."""
     block, seat = table.held, table.seat
     assert block is not None
 
-    def going(place: int, *, back: bool = False) -> Choice:
+    def going(place: int, *, back: bool = False) -> MoveChoice:
         move = Move(seat, place)
-        return Choice(move=move, block=block, options=((block, move),), back=back)
+        return MoveChoice(move=move, block=block, options=((block, move),), back=back)
 
     own = [one for one in decision.ranked if one.move.pick == seat]
     if kept is not None and _is_fewest(own, kept.place):
         return going(kept.place)
     best = decision.move
-    if best is not None and (best.pick == seat or _is_twin(table, best, block)):
+    if best is not None and (best.pick == seat or _is_duplicate(table, best, block)):
         if _is_fewest(own, best.place) or best.pick == seat:
             return going(best.place)
     return going(seat, back=True)
 
 
-def _is_twin(table: SortingTable, move: Move, block: Block) -> bool:
+def _is_duplicate(table: SortingTable, move: Move, block: Block) -> bool:
     other = table.top(move.pick)
     return other is not None and other.code == block.code
 

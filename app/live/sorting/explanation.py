@@ -1,17 +1,17 @@
-"""Says in one sentence what a live sorting robot does and why."""
+"""Status messages of a live sorting cell, one sentence each."""
 
-from app.live.sorting.controller import HAND_OVER, Choice, LiveSorter
+from app.live.sorting.controller import FALLBACK_REASONS, MoveChoice, SortController
 from app.live.sorting.snapshot import Phase
 from app.live.sorting.table import Block, SortingTable
 from app.sim.cells.cell import Cell
 from app.sim.sorting.decision_types import REASONS
 
-NO_GOAL = "Nothing to do: click blocks to put them into the goal."
-DONE = "Done: every tower is as the goal asks."
+NO_GOAL = "Nothing to do: click blocks to add them to the goal."
+DONE = "Done: every tower matches the goal."
 
 
-class Teller:
-    """Puts the sorting task into words.
+class StatusMessages:
+    """Builds the messages of one sorting cell.
 
     Args:
         cell: Sorting cell.
@@ -34,49 +34,49 @@ class Teller:
         label = self._labels[position]
         return f"the {label}" if position >= self._table.shape.n_cells else label
 
-    def doing(self, phase: Phase, choice: Choice, sorter: LiveSorter) -> str:
-        """Return what the robot does with a block, why, and how many moves are left."""
-        what, move = self.block(choice.block), choice.move
+    def doing(self, phase: Phase, choice: MoveChoice, controller: SortController) -> str:
+        """Return the present motion, its reason and the number of remaining moves."""
+        block, move = self.block(choice.block), choice.move
         place = self.place(move.place)
         if choice.back:
-            return f"Puts {what} back to {place}: the goal needs another move first."
+            return f"Returning {block} to {place}: the goal needs another move first."
         if phase in ("carry", "place"):
-            verb = "Carries" if phase == "carry" else "Puts"
-            text = f"{verb} {what} {'to' if phase == 'carry' else 'on'} {place}"
-            return f"{text}: {self._left(sorter)}.{self._who(sorter)}"
-        verb = "Goes for" if phase == "approach" else "Takes"
-        pick = self.place(move.pick)
+            verb = "Carrying" if phase == "carry" else "Placing"
+            text = f"{verb} {block} {'to' if phase == 'carry' else 'on'} {place}"
+            return f"{text}: {self._left(controller)}.{self._fallback(controller)}"
+        verb = "Moving to" if phase == "approach" else "Grasping"
         inside = "in" if move.pick < self._table.shape.n_cells else "on"
-        text = f"{verb} {what} {inside} {pick}, for {place}: {self._left(sorter)}."
-        return f"{text}{self._twin(choice)}{self._who(sorter)}"
+        text = f"{verb} {block} {inside} {self.place(move.pick)}, to be placed on {place}: "
+        text += f"{self._left(controller)}."
+        return f"{text}{self._duplicates(choice)}{self._fallback(controller)}"
 
     def missed(self, block: Block, risk: float) -> str:
         """Return that a grasp failed."""
-        return f"The magnet missed {self.block(block)}; trying again ({risk:.0%} fail here)."
+        return f"Grasp of {self.block(block)} failed ({risk:.0%} fail here): trying again."
 
-    def late(self, choice: Choice) -> str:
-        """Return that a motion took too long."""
-        return f"Time is up on the way to {self.block(choice.block)}: trying again."
+    def late(self, choice: MoveChoice) -> str:
+        """Return that a motion reached the time limit."""
+        return f"Timed out on the motion to {self.block(choice.block)}: trying again."
 
-    def fell(self, block: Block, position: int) -> str:
-        """Return where a held block falls back after a contact."""
+    def returned(self, block: Block, position: int) -> str:
+        """Return the place of a held block after a contact."""
         text = self.block(block)
         return f"{text[0].upper()}{text[1:]} is back at {self.place(position)}."
 
     def shrunk(self, block: Block) -> str:
-        """Return that the goal lost a block that is gone."""
+        """Return that the goal lost a removed block."""
         text = self.block(block)
-        return f"{text[0].upper()}{text[1:]} is gone, and the goal does without it."
+        return f"{text[0].upper()}{text[1:]} was removed, also from the goal."
 
-    def _left(self, sorter: LiveSorter) -> str:
-        moves = 0 if sorter.decision is None else sorter.decision.fewest_moves
+    def _left(self, controller: SortController) -> str:
+        moves = 0 if controller.decision is None else controller.decision.fewest_moves
         return "1 move to go" if moves == 1 else f"{moves} moves to go"
 
-    def _twin(self, choice: Choice) -> str:
-        """Return what is said about blocks like the one that is taken."""
+    def _duplicates(self, choice: MoveChoice) -> str:
+        """Return a comparison with identical blocks."""
         table = self._table
         if len(choice.options) > 1:
-            return f" Of {len(choice.options)} that are as good it is the easiest to reach now."
+            return f" Of {len(choice.options)} equivalent blocks it is the easiest to reach."
         if choice.move.pick >= table.shape.n_cells:
             return ""
         least = table.fail[choice.move.pick]
@@ -88,12 +88,12 @@ class Teller:
         if not risks:
             return ""
         label, risk = next(iter(risks.items()))
-        return f" Its twin in {label} fails more often ({risk:.0%})."
+        return f" Its duplicate in {label} fails more often ({risk:.0%})."
 
-    def _who(self, sorter: LiveSorter) -> str:
-        """Return why the planner decides where a policy was asked."""
-        decision = sorter.decision
-        if decision is None or decision.by == "policy" or sorter.sorter is None:
+    def _fallback(self, controller: SortController) -> str:
+        """Return why the planner decides in place of the policy."""
+        decision = controller.decision
+        if decision is None or decision.by == "policy" or controller.policy is None:
             return ""
-        took = " The exact planner took over." if decision.why in HAND_OVER else ""
+        took = " Fallback to the exact planner." if decision.why in FALLBACK_REASONS else ""
         return f" {REASONS[decision.why]}{took}"

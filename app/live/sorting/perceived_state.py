@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.live.people.worker import frozen
-from app.live.sorting.controller import Choice, LiveSorter
+from app.live.sorting.controller import MoveChoice, SortController
 from app.live.sorting.snapshot import (
     HELD,
     MAX_RANKED,
@@ -25,14 +25,14 @@ from app.sim.sorting.state import NULL, Move
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Sight:
+class SnapshotInputs:
     """What a view is made of."""
 
     table: SortingTable
     """Blocks and goal."""
-    sorter: LiveSorter
-    """Who decides, with the last decision."""
-    choice: Choice | None
+    controller: SortController
+    """Chooses the moves; has the last decision."""
+    choice: MoveChoice | None
     """What is carried out."""
     phase: Phase
     """How far it is."""
@@ -44,28 +44,28 @@ class Sight:
     """Where the tool is [m], shape (3,)."""
 
 
-def view_of(sight: Sight) -> SortingView:
+def view_of(inputs: SnapshotInputs) -> SortingView:
     """Return the sorting task as it is now."""
-    table, decision = sight.table, sight.sorter.decision
-    sorter, choice = sight.sorter.sorter, sight.choice
+    table, decision = inputs.table, inputs.controller.decision
+    policy, choice = inputs.controller.policy, inputs.choice
     ranked = () if decision is None else decision.ranked[:MAX_RANKED]
     return SortingView(
-        pieces=tuple(_piece(sight, one) for one in table.blocks),
-        goal=_goal(sight),
+        pieces=tuple(_piece(inputs, one) for one in table.blocks),
+        goal=_goal(inputs),
         failure=tuple(table.fail.tolist()),
         colours=table.names.colours,
         sizes=table.names.sizes,
-        move=None if choice is None else _current(sight, choice),
-        phase=sight.phase,
+        move=None if choice is None else _current(inputs, choice),
+        phase=inputs.phase,
         decided_by=None if choice is None or decision is None else decision.by,
-        twins=() if choice is None else tuple(block.id for block, _ in choice.options),
+        duplicates=() if choice is None else tuple(block.id for block, _ in choice.options),
         ranked=tuple(_ranked(table, one) for one in ranked),
         moves_to_go=0 if decision is None else decision.fewest_moves,
         attempts_to_go=0.0 if decision is None else decision.expected_attempts,
-        counters=sight.counters,
-        sorter=None if sorter is None else sorter.checkpoint,
-        sorter_title=None if sorter is None else sorter.title,
-        test=sight.test,
+        counters=inputs.counters,
+        sorting_policy=None if policy is None else policy.checkpoint,
+        sorting_policy_title=None if policy is None else policy.title,
+        test=inputs.test,
         solved=is_solved(table),
     )
 
@@ -90,12 +90,12 @@ def table_of(cell: Cell, view: SortingView) -> SortingTable:
     return table
 
 
-def _piece(sight: Sight, block: Block) -> PieceView:
-    table = sight.table
+def _piece(inputs: SnapshotInputs, block: Block) -> PieceView:
+    table = inputs.table
     size = table.shape.size_of(block.code)
     half = half_size(table.cell, size, table.shape.n_sizes)
     held = block == table.held
-    place, level, top = HELD, 0, sight.tcp
+    place, level, top = HELD, 0, inputs.tcp
     if not held:
         position, level = table.place_of(block)
         place = table.names.stations[position]
@@ -113,8 +113,8 @@ def _piece(sight: Sight, block: Block) -> PieceView:
     )
 
 
-def _goal(sight: Sight) -> tuple[GoalBlockView, ...]:
-    table, found = sight.table, []
+def _goal(inputs: SnapshotInputs) -> tuple[GoalBlockView, ...]:
+    table, found = inputs.table, []
     for c, codes in enumerate(table.goal.tolist()):
         good = True
         for level, code in enumerate(codes):
@@ -145,13 +145,13 @@ def _ranked(table: SortingTable, one: RankedMove) -> MoveView:
     return _view(table, one.move, block, one.value, one.fewest)
 
 
-def _current(sight: Sight, choice: Choice) -> MoveView:
-    decision = sight.sorter.decision
+def _current(inputs: SnapshotInputs, choice: MoveChoice) -> MoveView:
+    decision = inputs.controller.decision
     same = [
         one for one in (() if decision is None else decision.ranked) if one.move == choice.move
     ]
     value, best = (same[0].value, same[0].fewest) if same else (None, False)
-    return _view(sight.table, choice.move, choice.block, value, best)
+    return _view(inputs.table, choice.move, choice.block, value, best)
 
 
 def _view(

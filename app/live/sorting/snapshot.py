@@ -90,7 +90,7 @@ class SortingCounters:
     """Grasps tried, the failed ones included."""
     failures: int = 0
     """Grasps that failed."""
-    hand_overs: int = 0
+    planner_fallbacks: int = 0
     """Times at which the exact planner took over from the policy."""
 
 
@@ -114,7 +114,7 @@ class SortingView:
     """How far it is."""
     decided_by: Decider | None
     """Who chose it; None while nothing is carried out."""
-    twins: tuple[str, ...]
+    duplicates: tuple[str, ...]
     """Ids of the pieces whose moves the sorter calls equal; of two or more the critic chose."""
     ranked: tuple[MoveView, ...]
     """The best valid moves, best first, at most MAX_RANKED."""
@@ -124,9 +124,9 @@ class SortingView:
     """Expected grasps of that plan, failed ones included."""
     counters: SortingCounters
     """What the sorter did since the task began."""
-    sorter: str | None
+    sorting_policy: str | None
     """SHA-256 of the sorter's checkpoint; None: the exact planner alone."""
-    sorter_title: str | None
+    sorting_policy_title: str | None
     """Its short text for people."""
     test: str | None
     """Id of the running test."""

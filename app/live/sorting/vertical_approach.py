@@ -23,7 +23,7 @@ DOWN_S, HOLD_S, UP_S = 4.0, 0.3, 2.0
 
 
 @dataclass(slots=True)
-class Descent:
+class VerticalApproach:
     """A way down and up again."""
 
     point: Vec

@@ -1,19 +1,19 @@
-"""One live sorting cell: the robot carries out what the sorter chooses, whatever people do.
+"""Live sorting world: the robot executes the moves that policy or planner choose.
 
-A move has two halves: to the block and with it. In each the pick policy brings the tool over
-the place, beside the people (``approach``, ``carry``); inverse kinematics under the same limits
-does the last centimetres, down and up again (``grasp``, ``place``). A grasp fails with the
-cell's probability, drawn from (seed, task, attempt). After every attempt, and whenever somebody
-changed blocks, goal or sorter, the sorter decides anew; a block at the magnet goes on, goes
+A move has two halves: to the block and with the block. In each half the pick policy moves the
+tool over the place (``approach``, ``carry``), and inverse kinematics within the same limits
+covers the last centimetres down and up again (``grasp``, ``place``). A grasp fails with the
+cell's probability, drawn from (seed, task, attempt). After every attempt and after every change
+of blocks, goal or policy the next move is chosen again; a held block then continues, goes
 elsewhere, or back to where it counts (``sorting_table.py``).
 
-A person nearer than NEAR_M breaks inverse kinematics off, and the policy goes on.
-With nothing to do the robot goes home. A motion that takes longer than TIME_LIMIT_S begins
-again, for another block if one is as good; from less than SHORT_WAY_M it is then ended by
-inverse kinematics. After a contact the robot starts again from home, and a held block falls
-back to where it counts. Blocks and towers are no obstacles.
+A person nearer than NEAR_M interrupts inverse kinematics, and the policy continues. Without a
+move the robot returns home. A motion that reaches the time limit starts again, with another
+block of equal value if there is one; within SHORT_M of the goal inverse kinematics completes
+it. After a contact the robot starts again from home, and a held block returns to where it
+counts. Blocks and towers are no obstacles.
 
-Source: METHOD 1.2, 1.5, 3.1 and section 4 (real pick and place instead of reaching).
+Source: docs/method.md 1.2, 1.5, 3.1 and 4 (real pick and place instead of reaching).
 """
 
 from dataclasses import replace
@@ -21,21 +21,21 @@ from dataclasses import replace
 import numpy as np
 
 from app.errors import ServiceError
-from app.live import commands
-from app.live.arm import Bodies
-from app.live.base_world import CONTACT_HOLD_S, LiveStage, PeopleCommand
-from app.live.commands import Command
+from app.live.arm import HumanGeometry
+from app.live.base_world import BaseWorld
+from app.live.command_checks import Command
+from app.live.commands import SetPolicy
 from app.live.people.workers import LivePeople
 from app.live.pick import explanation
-from app.live.snapshot import Counters, Status, WorldSnapshot
-from app.live.sorting import commands as sorting_commands
-from app.live.sorting.benchmark_run import SortingTrial, random_task
-from app.live.sorting.controller import Choice, LiveSorter, has_safer_twin
-from app.live.sorting.explanation import DONE, NO_GOAL, Teller
-from app.live.sorting.perceived_state import Sight, is_solved, view_of
+from app.live.snapshot import Status, WorldSnapshot
+from app.live.sorting.benchmark_run import SortingTestRun, random_task
+from app.live.sorting.commands import SetSortingPolicy, StartTest, TableCommand, change_table
+from app.live.sorting.controller import MoveChoice, SortController, has_safer_duplicate
+from app.live.sorting.explanation import DONE, NO_GOAL, StatusMessages
+from app.live.sorting.perceived_state import SnapshotInputs, is_solved, view_of
 from app.live.sorting.snapshot import Phase, SortingCounters
 from app.live.sorting.table import SortingTable
-from app.live.sorting.vertical_approach import Descent
+from app.live.sorting.vertical_approach import VerticalApproach
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
 from app.sim.pick.task_policy import Candidate, TaskPolicy
@@ -43,19 +43,19 @@ from app.sim.sorting.layout import above, reaching_cell
 from app.sim.sorting.sorting_values import SortingValues
 from app.sim.sorting.state import NULL
 
-SHORT_WAY_M = 0.35
-"""Distance from which a motion that took too long is ended by inverse kinematics [m]."""
+SHORT_M = 0.35
+"""Distance from which inverse kinematics completes a motion that reached its limit [m]."""
 
 
-class SortingWorld:
-    """One live sorting cell; see ``live_world.py``.
+class SortingWorld(BaseWorld[LivePeople]):
+    """One live sorting cell.
 
     Args:
         cell: Sorting cell, see ``sorting_cell.lacks_for_sorting``.
-        policy: Moves the arm, and chooses among twins; None lets the robot rest.
+        policy: Moves the arm and chooses among equal moves; None lets the robot rest.
         seed: Seed of tasks, grasps and the people's work.
         id: Name of the world in URLs.
-        sorter: Values the moves; None leaves them to the exact planner.
+        sorting_policy: Values the moves; None leaves them to the exact planner.
     """
 
     def __init__(
@@ -64,309 +64,262 @@ class SortingWorld:
         policy: TaskPolicy | None,
         seed: int,
         id: str = "main",
-        sorter: SortingValues | None = None,
+        sorting_policy: SortingValues | None = None,
     ) -> None:
-        self.cell, self.id, self._seed = cell, id, seed
-        self._stage = LiveStage(cell, policy, id, LivePeople(reaching_cell(cell), seed))
+        super().__init__(cell, policy, id, LivePeople(reaching_cell(cell), seed))
+        self._seed = seed
         self._table = SortingTable(cell)
-        self._teller = Teller(cell, self._table)
-        self._sorter = LiveSorter(sorter)
-        self._choice: Choice | None = None
-        self._descent: Descent | None = None
+        self._messages = StatusMessages(cell, self._table)
+        self._controller = SortController(sorting_policy)
+        self._choice: MoveChoice | None = None
+        self._vertical: VerticalApproach | None = None
         self._n_tasks = self._version = 0
         self._reset()
 
     # Starts and ends.
 
-    def _reset(self) -> None:
-        """Begin a random task, with everybody where they start."""
-        self._stage.t, self._stage.counters = 0.0, Counters()
-        for person in self._stage.people:
+    def _reset_scenario(self) -> None:
+        for person in self.people:
             person.start(None)
         start = random_task(self._table.shape, self._table.fail, self._seed, self._n_tasks)
         self._begin_task(None)
         self._table.begin(start)
-        self._stage.forget_note()
-        self._restart_robot()
+        self.clear_message()
 
-    def _begin_task(self, trial: SortingTrial | None) -> None:
+    def _begin_task(self, test: SortingTestRun | None) -> None:
         self._n_tasks += 1
-        self._trial, self._counts = trial, SortingCounters()
-        self._sorter.begin()
+        self._test, self._counts = test, SortingCounters()
+        self._controller.begin()
 
-    def _restart_robot(self) -> None:
-        """Start from home; a held block falls back to where it counts."""
-        stage, table = self._stage, self._table
-        stage.robot.put(stage.robot.home)
-        stage.contact = None
+    def _prepare_restart(self) -> None:
+        table = self._table
         if table.held is not None:
             block, seat = table.held, table.seat
             table.drop(seat)
-            stage.tell(self._teller.fell(block, seat))
-        self._think("blocked" if stage.touches_here() else "moving")
+            self.set_message(self._messages.returned(block, seat))
 
     # Commands.
 
-    def apply(self, command: Command) -> None:
-        """Carry out one command; what does not fit is also told in the message.
-
-        Raises:
-            ServiceError: The command does not fit this cell; nothing has changed.
-        """
-        stage = self._stage
-        commands.check(command, self.cell, stage.people.ids)
-        if isinstance(command, PeopleCommand):
-            stage.change_people(command)
-            self._refresh()
-            return
+    def _change(self, command: Command) -> None:
         match command:
-            case commands.Pause() | commands.Resume():
-                stage.paused = isinstance(command, commands.Pause)
-            case commands.StepOnce():
-                stage.paused = True
-                self._advance()
-            case commands.Reset():
-                self._reset()
-            case commands.SetPolicy():
-                stage.use(command.policy)
+            case SetPolicy():
+                self.use(command.loaded)
                 self._refresh()
-            case sorting_commands.StartTest():
+            case StartTest():
                 self._start_test(command.id)
-            case sorting_commands.SetSorter():
-                self._sorter.sorter = command.sorter
-                self._changed()
-            case _:
+            case SetSortingPolicy():
+                self._controller.policy = command.loaded
+                self._replan()
+            case _ if isinstance(command, TableCommand):
                 self._change_table(command)
+            case _:
+                pass
 
-    def _change_table(self, command: Command) -> None:
+    def _change_table(self, command: TableCommand) -> None:
         try:
-            gone = sorting_commands.carry_out(command, self._table)
+            gone = change_table(command, self._table)
         except ServiceError as error:
-            self._stage.tell(f"Ignored: {error.message}")
+            self.set_message(f"Ignored: {error.message}")
             raise
         if gone is not None:
-            self._stage.tell(self._teller.shrunk(gone))
-        if self._trial is not None:
-            self._trial.note_visitor()
-        self._changed()
+            self.set_message(self._messages.shrunk(gone))
+        if self._test is not None:
+            self._test.note_visitor()
+        self._replan()
 
     def _start_test(self, name: str) -> None:
-        trial = SortingTrial(name, (self._seed, self._n_tasks))
-        state = trial.start(self._table.shape, self._table.fail)
-        self._begin_task(trial)
+        test = SortingTestRun(name, (self._seed, self._n_tasks))
+        state = test.start(self._table.shape, self._table.fail)
+        self._begin_task(test)
         self._table.begin(state)
-        self._stage.paused = False
-        self._stage.tell(trial.text)
-        self._changed()
+        self.paused = False
+        self.set_message(test.text)
+        self._replan()
 
-    def _changed(self) -> None:
-        """Decide anew after somebody changed the task."""
-        if self._stage.status == "moving":
-            self._think()
-        elif self._descent is not None and self._descent.step == "down":
-            self._look_below(self._descent)
+    def _replan(self) -> None:
+        """Choose the next move again after the task changed."""
+        if self.status == "moving":
+            self._begin()
+        elif self._vertical is not None and self._vertical.step == "down":
+            self._check_vertical(self._vertical)
 
-    def _look_below(self, descent: Descent) -> None:
-        """See whether a grasp or place that has begun is still right; else go up again."""
+    def _check_vertical(self, vertical: VerticalApproach) -> None:
+        """Continue a grasp or place that is still chosen; otherwise move up again."""
         old = self._choice
         if old is not None:
-            new = self._sorter.choose(self._table, old.move)
-            if self._is_same(descent, old, new):
+            new = self._controller.choose(self._table, old.move)
+            if self._is_same(vertical, old, new):
                 self._version = self._table.version
                 return
         self._choice = None
-        descent.begin("up", self._stage.status_s)
+        vertical.begin("up", self.status_s)
 
-    def _is_same(self, descent: Descent, old: Choice, new: Choice | None) -> bool:
+    def _is_same(
+        self, vertical: VerticalApproach, old: MoveChoice, new: MoveChoice | None
+    ) -> bool:
         if new is None or (old.block, old.move) not in new.options:
             return False
-        if descent.phase == "grasp":
+        if vertical.phase == "grasp":
             point = self._table.point_of(old.block)
-            return point is not None and np.array_equal(point, descent.point)
+            return point is not None and np.array_equal(point, vertical.point)
         return self._table.held is not None and np.array_equal(
-            self._table.point_at(new.move.place), descent.point
+            self._table.point_at(new.move.place), vertical.point
         )
 
     # Time.
 
-    def step(self) -> None:
-        """Advance by one control period; while paused only dragged people move."""
-        stage = self._stage
-        if not stage.paused:
-            self._advance()
-        elif stage.people.move_while_paused(stage.robot.dt):
-            stage.touches_here()
-            self._refresh()
-
-    def _advance(self) -> None:
-        stage = self._stage
-        before = stage.pass_period()
-        if stage.status in ("contact", "blocked"):
-            self._wait()
-        else:
-            self._move_robot(before)
-        if stage.status == "moving":
+    def _after_period(self) -> None:
+        if self.status == "moving":
             self._let_interfere()
             self._decide()
 
-    def _wait(self) -> None:
-        stage = self._stage
-        if stage.status == "contact" and stage.status_s >= CONTACT_HOLD_S:
-            self._restart_robot()
-        elif stage.status == "blocked" and not stage.touches_here():
-            self._think()
-
-    def _move_robot(self, before: Bodies) -> None:
-        """Carry out the action, the people having moved from where they were."""
-        stage, descent = self._stage, self._descent
-        straight = descent is not None or stage.decision is None
-        found = stage.robot.advance(self._action(), stage.people, before, straight=straight)
+    def _move_robot(self, before: HumanGeometry) -> None:
+        vertical = self._vertical
+        straight = vertical is not None or self.decision is None
+        found = self.robot.advance(self._action(), self.people, before, straight=straight)
         if found.kind != "none":
-            self._descent = None
-            stage.note_contact(found)
-            if self._trial is not None:
-                self._trial.note_contact()
-        elif descent is not None:
-            self._follow(descent)
-        elif stage.decision is not None:
-            stage.time_left -= stage.robot.dt
-            self._judge(stage.decision.index)
+            self._vertical = None
+            self.note_contact(found)
+            if self._test is not None:
+                self._test.note_contact()
+        elif vertical is not None:
+            self._continue_vertical(vertical)
+        elif self.decision is not None:
+            self.time_left -= self.robot.dt
+            self._end_motion(self.decision.index)
 
     def _action(self) -> Vec:
-        """Return the wanted joint speeds over their limits, shape (5,)."""
-        stage = self._stage
-        if self._descent is not None:
-            aim = self._descent.aim(stage.robot.tcp())
-            return stage.robot.toward(stage.robot.posture_at(aim)[0])
-        if self._choice is None and stage.policy is not None:
-            return stage.robot.toward(stage.robot.home)
-        if stage.decision is not None:
-            return np.asarray(stage.decision.actions[stage.decision.index], dtype=np.float64)
+        """Return joint speeds over their limits, in [-1, 1], shape (5,)."""
+        if self._vertical is not None:
+            aim = self._vertical.aim(self.robot.tcp())
+            return self.robot.toward(self.robot.posture_at(aim)[0])
+        if self._choice is None and self.policy is not None:
+            return self.robot.toward(self.robot.home)
+        if self.decision is not None:
+            return np.asarray(self.decision.actions[self.decision.index], dtype=np.float64)
         return np.zeros(5)
 
     # Halves of a move.
 
-    def _think(self, status: Status = "moving") -> None:
-        """Decide on the next move and begin its motion."""
+    def _begin(self, status: Status = "moving") -> None:
+        """Choose the next move and begin its motion."""
         kept = self._choice.move if self._choice is not None else None
-        self._choice = self._sorter.choose(self._table, kept)
+        self._choice = self._controller.choose(self._table, kept)
         self._version = self._table.version
-        self._begin_motion(status)
+        self._start_motion(status)
 
-    def _begin_motion(self, status: Status = "moving") -> None:
-        self._descent = None
-        self._stage.enter(status)
-        self._stage.begin_motion()
+    def _start_motion(self, status: Status = "moving") -> None:
+        self._vertical = None
+        self.enter(status)
+        self.begin_motion()
         self._decide()
 
-    def _judge(self, index: int) -> None:
-        """See whether the policy's motion ends at this state."""
-        stage = self._stage
-        target = stage.offered[index]
-        late = stage.time_left <= 0.0
-        short = np.linalg.norm(stage.robot.tcp() - target.position) < SHORT_WAY_M
-        if not stage.near and (stage.robot.reached(target.position) or (late and short)):
-            stage.count(reached=1)
-            self._go_down(target.id)
+    def _end_motion(self, index: int) -> None:
+        """End the policy's motion at its target or at the time limit."""
+        target = self.offered[index]
+        late = self.time_left <= 0.0
+        short = np.linalg.norm(self.robot.tcp() - target.position) < SHORT_M
+        if not self.near and (self.robot.reached(target.position) or (late and short)):
+            self.count(reached=1)
+            self._begin_vertical(target.id)
         elif late:
             self._give_up()
 
     def _give_up(self) -> None:
-        """Begin anew what took too long, with another block where one is as good."""
-        stage, choice = self._stage, self._choice
-        stage.count(timeouts=1)
+        """Start again after the time limit, with another block of equal value if any."""
+        choice = self._choice
+        self.count(timeouts=1)
         if choice is None:
             return
         if self._table.held is None:
-            self._sorter.avoid(choice.move.pick)
-        stage.tell(self._teller.late(choice))
-        self._think()
+            self._controller.avoid(choice.move.pick)
+        self.set_message(self._messages.late(choice))
+        self._begin()
 
-    def _go_down(self, name: str) -> None:
-        """Go down to the block of that id, or to put the held one on its place."""
+    def _begin_vertical(self, name: str) -> None:
+        """Move down to the block of that id, or to the place of the held one."""
         table, choice = self._table, self._choice
         assert choice is not None
         if table.held is not None:
-            descent = Descent(table.point_at(choice.move.place), "place")
+            vertical = VerticalApproach(table.point_at(choice.move.place), "place")
         else:
             block, move = next(one for one in choice.options if one[0].id == name)
             self._choice = replace(choice, block=block, move=move)
-            descent = Descent(table.point(*table.place_of(block)), "grasp")
-        self._descent = descent
-        self._stage.enter("picking")
+            vertical = VerticalApproach(table.point(*table.place_of(block)), "grasp")
+        self._vertical = vertical
+        self.enter("picking")
 
-    def _follow(self, descent: Descent) -> None:
-        """Go on with a way down and up."""
-        stage = self._stage
-        tcp, over = stage.robot.tcp(), descent.is_over(stage.robot.tcp(), stage.status_s)
-        if descent.step == "down" and not stage.near and descent.is_down(tcp):
-            self._touch_down(descent)
-        elif descent.step == "down" and (over or stage.near):
-            self._begin_motion()
-        elif descent.step == "hold" and over:
-            descent.begin("up", stage.status_s)
-        elif descent.step == "up" and (over or stage.near):
-            self._after_rise()
+    def _continue_vertical(self, vertical: VerticalApproach) -> None:
+        """Continue a vertical approach or retreat."""
+        tcp, over = self.robot.tcp(), vertical.is_over(self.robot.tcp(), self.status_s)
+        if vertical.step == "down" and not self.near and vertical.is_down(tcp):
+            self._actuate_gripper(vertical)
+        elif vertical.step == "down" and (over or self.near):
+            self._start_motion()
+        elif vertical.step == "hold" and over:
+            vertical.begin("up", self.status_s)
+        elif vertical.step == "up" and (over or self.near):
+            self._end_vertical()
 
-    def _touch_down(self, descent: Descent) -> None:
-        """Let the magnet close or open; it may miss."""
-        descent.begin("hold", self._stage.status_s)
+    def _actuate_gripper(self, vertical: VerticalApproach) -> None:
+        """Close or open the gripper; a grasp may fail."""
+        vertical.begin("hold", self.status_s)
         choice = self._choice
         assert choice is not None
-        if descent.phase == "grasp":
+        if vertical.phase == "grasp":
             self._grasp(choice)
             return
         self._table.drop(choice.move.place)
         if not choice.back:
             self._counts = replace(self._counts, moves=self._counts.moves + 1)
-            self._sorter.end_attempt()
+            self._controller.end_attempt()
 
-    def _grasp(self, choice: Choice) -> None:
+    def _grasp(self, choice: MoveChoice) -> None:
         table, pick = self._table, choice.move.pick
-        self._sorter.note_attempt(table, choice.move)
+        self._controller.note_attempt(table, choice.move)
         rng = np.random.default_rng((self._seed, self._n_tasks, self._counts.attempts))
         risk = float(table.fail[pick]) if pick < table.shape.n_cells else 0.0
-        if self._trial is not None and pick < table.shape.n_cells:
-            self._trial.note_pick(riskier=has_safer_twin(table, pick))
+        if self._test is not None and pick < table.shape.n_cells:
+            self._test.note_pick(riskier=has_safer_duplicate(table, pick))
         self._counts = replace(self._counts, attempts=self._counts.attempts + 1)
         if rng.random() >= risk:
             table.lift(pick)
             return
         self._counts = replace(self._counts, failures=self._counts.failures + 1)
-        self._sorter.end_attempt()
-        self._stage.tell(self._teller.missed(choice.block, risk))
+        self._controller.end_attempt()
+        self.set_message(self._messages.missed(choice.block, risk))
 
-    def _after_rise(self) -> None:
+    def _end_vertical(self) -> None:
         same = self._version == self._table.version
         if self._table.held is not None and self._choice is not None and same:
-            self._begin_motion()
+            self._start_motion()
         else:
-            self._think()
+            self._begin()
 
     def _let_interfere(self) -> None:
-        """Let the running test's person do what is due."""
-        if self._trial is None or self._table.held is not None:
+        """Apply the next interference of the running test when it is due."""
+        if self._test is None or self._table.held is not None:
             return
-        idle_s = self._stage.status_s if self._choice is None else 0.0
-        done = self._trial.interfere(self._table.state, self._counts.moves, idle_s)
+        idle_s = self.status_s if self._choice is None else 0.0
+        done = self._test.interfere(self._table.state, self._counts.moves, idle_s)
         if done is not None:
             self._table.adopt(done.state)
-            self._stage.tell(done.text)
-            self._changed()
+            self.set_message(done.text)
+            self._replan()
 
     # Deciding.
 
     @property
     def _phase(self) -> Phase:
-        if self._descent is not None:
-            return self._descent.phase
+        if self._vertical is not None:
+            return self._vertical.phase
         if self._choice is None:
             return "idle"
         return "carry" if self._table.held is not None else "approach"
 
-    def _chosen(self) -> Choice | None:
-        """Return the move with the block that the critic goes for now."""
-        choice, decision = self._choice, self._stage.decision
+    def _chosen(self) -> MoveChoice | None:
+        """Return the move with the block that the critic prefers at present."""
+        choice, decision = self._choice, self.decision
         if choice is None or decision is None or self._phase != "approach":
             return choice
         found = [one for one in choice.options if one[0].id == decision.chosen]
@@ -386,33 +339,25 @@ class SortingWorld:
         )
 
     def _decide(self) -> None:
-        """Ask the policy about this very state."""
-        if self._stage.status != "picking":
-            self._stage.decide(self._candidates())
+        if self.status != "picking":
+            self.query(self._candidates())
 
-    def _refresh(self) -> None:
-        """Decide afresh after people or the policy changed."""
-        if self._stage.status == "moving":
-            self._decide()
-
-    # What is seen.
+    # Read model.
 
     def _shown_status(self) -> Status:
-        stage = self._stage
-        if stage.status != "moving" or stage.decision is not None:
-            return stage.status
+        if self.status != "moving" or self.decision is not None:
+            return self.status
         if self._choice is not None:
             return "no policy"
         return "solved" if (self._table.goal != NULL).any() else "no candidates"
 
     def _message(self, status: Status) -> str:
-        stage = self._stage
-        if status == "contact" and stage.contact is not None:
-            return explanation.touched(stage.contact, final=False)
-        if stage.note is not None and status != "blocked":
-            return stage.note
+        if status == "contact" and self.contact is not None:
+            return explanation.touched(self.contact, final=False)
+        if self.note is not None and status != "blocked":
+            return self.note
         if status in ("moving", "picking") and (chosen := self._chosen()) is not None:
-            return self._teller.doing(self._phase, chosen, self._sorter)
+            return self._messages.doing(self._phase, chosen, self._controller)
         if status == "solved":
             return DONE
         if status == "no candidates":
@@ -420,26 +365,26 @@ class SortingWorld:
         return explanation.resting(status, None, str)
 
     def snapshot(self) -> WorldSnapshot:
-        """Return what is known now, frozen."""
-        stage, status = self._stage, self._shown_status()
-        closing = self._descent is not None and self._descent.step == "hold"
-        sight = Sight(
+        """Return the read model of the present state."""
+        status = self._shown_status()
+        closing = self._vertical is not None and self._vertical.step == "hold"
+        inputs = SnapshotInputs(
             table=self._table,
-            sorter=self._sorter,
+            controller=self._controller,
             choice=self._chosen(),
             phase=self._phase,
-            counters=replace(self._counts, hand_overs=self._sorter.hand_overs),
-            test=None if self._trial is None else self._trial.name,
-            tcp=stage.robot.tcp(),
+            counters=replace(
+                self._counts, planner_fallbacks=self._controller.planner_fallbacks
+            ),
+            test=None if self._test is None else self._test.name,
+            tcp=self.robot.tcp(),
         )
-        return stage.snapshot(
+        return self._snapshot(
             status,
             self._message(status),
             gripping=self._table.held is not None or (closing and self._phase == "grasp"),
-            selected=(),
-            case=None,
-            sorting=view_of(sight),
+            sorting=view_of(inputs),
             verdict=None
-            if self._trial is None
-            else self._trial.verdict(solved=is_solved(self._table), moves=self._counts.moves),
+            if self._test is None
+            else self._test.verdict(solved=is_solved(self._table), moves=self._counts.moves),
         )

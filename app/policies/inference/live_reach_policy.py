@@ -64,21 +64,21 @@ class ReachPilot:
         return self._actor.targets
 
     @property
-    def ways(self) -> tuple[str, ...]:
-        """How it can be asked."""
+    def inference_modes(self) -> tuple[str, ...]:
+        """Available inference modes."""
         return tuple(self._movers)
 
     def acts(
-        self, batch: ReachBatch, way: str, safety: SafetySettings | None
+        self, batch: ReachBatch, inference_mode: str, safety: SafetySettings | None
     ) -> NDArray[np.float32]:
         """Return the actions for every environment of a batch, shape (n_envs, 6).
 
         Args:
             batch: Robots, people and goals.
-            way: One of ``ways``.
+            inference_mode: One of ``inference_modes``.
             safety: What the safety layer assumes that they go through; None without one.
         """
-        mover = self._movers[way]
+        mover = self._movers[inference_mode]
         if isinstance(mover, Ahead):
             mover.layer = layer_of(safety, batch.arm.dt)
         return mover.acts(batch)

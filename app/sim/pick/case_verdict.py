@@ -18,7 +18,7 @@ robot was through with it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Choice:
+class TargetChoice:
     """A goal that was chosen, and when."""
 
     t_s: float
@@ -31,7 +31,7 @@ class Choice:
 class CaseRun:
     """What happened in a case study so far."""
 
-    choices: tuple[Choice, ...] = ()
+    choices: tuple[TargetChoice, ...] = ()
     """The first choice and every change of mind, in order."""
     end: End | None = None
     """How it ended; None while it runs."""
@@ -42,7 +42,7 @@ class CaseRun:
         """Return the run with the choice at a time [s]; the same where it is the last one."""
         if self.end is not None or (self.choices and self.choices[-1].goal == goal):
             return self
-        return replace(self, choices=(*self.choices, Choice(t_s=t_s, goal=goal)))
+        return replace(self, choices=(*self.choices, TargetChoice(t_s=t_s, goal=goal)))
 
     def finish(self, end: End, t_s: float) -> "CaseRun":
         """Return the run with its end at a time [s]; the first end counts."""
@@ -59,7 +59,7 @@ class Verdict:
     """What happened so far, one sentence."""
     as_expected: bool | None
     """The verdict; None while it is open."""
-    choices: tuple[Choice, ...] = ()
+    choices: tuple[TargetChoice, ...] = ()
     """In a case study, the first choice and every change of mind."""
 
 

@@ -36,7 +36,7 @@ def test_nobody_stays_for_good(walkers: LiveWalkers) -> None:
 
 
 def test_dragged_person_follows_with_bounded_speed_and_arrives(walkers: LiveWalkers) -> None:
-    walkers[0].drag(commands.MoveHuman(pelvis=(0.5, 1.5, 0.0)))
+    walkers[0].drag(commands.MovePerson(pelvis=(0.5, 1.5, 0.0)))
     for _ in range(300):
         before = walkers.cylinders[0, :2].copy()
         told = walkers[0].seen().qd[:2].copy()
@@ -48,7 +48,7 @@ def test_dragged_person_follows_with_bounded_speed_and_arrives(walkers: LiveWalk
 
 
 def test_person_is_not_dragged_out_of_sight(walkers: LiveWalkers) -> None:
-    walkers[0].drag(commands.MoveHuman(pelvis=(50.0, -50.0, 0.0)))
+    walkers[0].drag(commands.MovePerson(pelvis=(50.0, -50.0, 0.0)))
     for _ in range(500):
         walkers.move(DT)
     x, y, _ = walkers.cylinders[0]

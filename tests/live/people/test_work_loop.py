@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from app.live.people.work_loop import TaskCycle
+from app.live.people.work_loop import WorkLoop
 from app.sim.cells.cell import load_cell
 from app.sim.human import model as human
 from app.sim.human.anthropometry import percentile_body
@@ -13,7 +13,7 @@ CELL = load_cell()
 
 @pytest.mark.parametrize("stature", [5.0, 50.0, 95.0])
 def test_work_goes_on_without_a_jump_inside_the_limits(stature: float) -> None:
-    cycle, dt = TaskCycle(CELL, 3, percentile_body(stature), variants=3), 0.02
+    cycle, dt = WorkLoop(CELL, 3, percentile_body(stature), variants=3), 0.02
     states = [cycle.at(k * dt) for k in range(9000)]
     q, qd = (np.array(rows) for rows in zip(*states, strict=True))
     assert (q >= human.Q_MIN).all() and (q <= human.Q_MAX).all()
@@ -26,7 +26,7 @@ def test_work_goes_on_without_a_jump_inside_the_limits(stature: float) -> None:
 
 def test_the_palms_come_to_cubes_and_docks() -> None:
     size = percentile_body(95.0)
-    cycle, vector = TaskCycle(CELL, 4, size, variants=4), size.vector(CELL.floor_z)
+    cycle, vector = WorkLoop(CELL, 4, size, variants=4), size.vector(CELL.floor_z)
     palms = []
     for k in range(2400):
         points = human.joint_points(cycle.at(0.05 * k)[0], vector)
@@ -36,6 +36,6 @@ def test_the_palms_come_to_cubes_and_docks() -> None:
 
 
 def test_same_seed_works_alike_and_another_seed_does_not() -> None:
-    one, two, three = (TaskCycle(CELL, seed, variants=2) for seed in (3, 3, 4))
+    one, two, three = (WorkLoop(CELL, seed, variants=2) for seed in (3, 3, 4))
     np.testing.assert_array_equal(one.at(7.3)[0], two.at(7.3)[0])
     assert not np.array_equal(one.at(8.0)[0], three.at(8.0)[0])

@@ -5,7 +5,8 @@ import pytest
 
 from app.errors import InvalidInput
 from app.live import commands
-from app.live.reach.commands import MoveGoal, NewGoal, SetGoalMode, SetSafety, SetWalk, SetWay
+from app.live.command_checks import Command
+from app.live.reach.commands import MoveGoal, NewGoal, SetGoalMode, SetInferenceMode, SetSafety
 from app.live.reach.world import LONG_LIMIT_S, ReachWorld
 from app.live.snapshot import WorldSnapshot
 from app.sim.cells.cell import load_cell
@@ -25,7 +26,7 @@ def empty_world() -> ReachWorld:
 def standing_at(world: ReachWorld, x: float, y: float) -> None:
     """Let the first person stand somewhere, the clock being stopped meanwhile."""
     world.apply(commands.Pause())
-    world.apply(commands.MoveHuman(pelvis=(x, y, 0.0)))
+    world.apply(commands.MovePerson(pelvis=(x, y, 0.0)))
     for _ in range(250):
         world.step()
     world.apply(commands.Resume())
@@ -44,7 +45,7 @@ def until(
 def test_robot_without_a_policy_goes_from_goal_to_goal_and_says_so() -> None:
     world = empty_world()
     first = world.snapshot()
-    assert "No trained policy acts here" in first.message
+    assert "No reach policy is active" in first.message
     reached = until(world, lambda now: now.status == "reached")
     assert float(np.linalg.norm(reached.tcp - first.reach.goal)) < reached.reach.tolerance
     then = until(world, lambda now: now.counters.reached == 2)
@@ -86,7 +87,7 @@ def test_person_beside_the_robot_slows_it_down_and_the_message_says_by_how_much(
     safety = slow.reach.safety
     assert slow.message.startswith(f"Slowed to {100 * safety.override:.0f} %")
     assert f"{safety.separation:.2f} m from the" in slow.message
-    total = safety.person_way + safety.robot_way + safety.margin
+    total = safety.person_distance + safety.robot_distance + safety.margin
     assert safety.required == pytest.approx(total)
     assert (safety.person, safety.on) == (0, True)
 
@@ -96,7 +97,7 @@ def test_robot_stops_before_a_person_who_stays_on_its_way_and_goes_on_afterwards
     standing_at(world, 0.0, 0.9)
     stopped = until(world, lambda now: now.reach.safety.override == 0.0)
     assert stopped.message.startswith("Stopped:")
-    world.apply(commands.MoveHuman(pelvis=FAR_CORNER))
+    world.apply(commands.MovePerson(pelvis=FAR_CORNER))
     end = until(world, lambda now: now.counters.reached == 1)
     assert end.counters.contacts == 0
     assert end.reach.counters.stopped_s > 0.0
@@ -107,7 +108,7 @@ def test_person_who_walks_into_the_standing_robot_is_no_contact() -> None:
     standing_at(world, 0.0, 1.2)
     until(world, lambda now: now.reach.safety.override == 0.0)
     x, y, _ = world.snapshot().tcp
-    world.apply(commands.MoveHuman(pelvis=(float(x), float(y), 0.0)))
+    world.apply(commands.MovePerson(pelvis=(float(x), float(y), 0.0)))
     hit = until(world, lambda now: now.reach.counters.touched == 1)
     assert np.allclose(hit.robot_qd, 0.0, atol=1e-3)
     for _ in range(50):
@@ -136,15 +137,15 @@ def test_who_stands_near_does_not_hold_the_robot_where_velocities_are_measured()
     x, y, _ = world.snapshot().tcp
     standing_at(world, float(x), float(y) + 0.75)
     assumed = world.snapshot().reach.safety
-    world.apply(SetSafety(on=True, measured=True))
+    world.apply(SetSafety(on=True, use_measured_velocity=True))
     measured = world.snapshot().reach.safety
     assert assumed.advised < measured.advised == 1.0
-    assert (assumed.measured, measured.measured) == (False, True)
+    assert (assumed.use_measured_velocity, measured.measured) == (False, True)
     assert (assumed.human_speed, measured.human_speed) == (1.6, pytest.approx(0.1))
     assert measured.required < assumed.required
     assert np.ptp(measured.zone, axis=0).max() < np.ptp(assumed.zone, axis=0).max() - 0.3
     world.apply(SetSafety(on=False))
-    assert world.snapshot().reach.safety.measured
+    assert world.snapshot().reach.safety.use_measured_velocity
 
 
 def test_goal_that_is_not_reached_in_time_counts_and_is_tried_again() -> None:
@@ -192,19 +193,14 @@ def test_reset_begins_anew_with_everything_at_zero() -> None:
     ("command", "field"),
     [
         (MoveGoal(position=(0.0, 1.3, 0.3)), "position.y"),
-        (MoveGoal(position=(float("nan"), 0.8, 0.3)), "position.x"),
-        (SetWay(way="direct"), "way"),
-        (SetWalk(speed=2.5), "speed"),
-        (SetWalk(speed=float("inf")), "speed"),
-        (commands.SetBody(stature=50.0), "tag"),
-        (commands.MoveHuman(right=(0.0, 0.0, 0.0)), "right"),
+        (SetInferenceMode(inference_mode="direct"), "inference_mode"),
+        (commands.SetAnthropometry(stature=50.0), "tag"),
+        (commands.MovePerson(right=(0.0, 0.0, 0.0)), "right"),
         (commands.ToggleCandidate(id="cube1"), "tag"),
         (commands.SetMode(mode="still", person=3), "person"),
     ],
 )
-def test_what_the_cell_cannot_do_is_refused_by_name(
-    command: commands.Command, field: str
-) -> None:
+def test_what_the_cell_cannot_do_is_refused_by_name(command: Command, field: str) -> None:
     world = ReachWorld(CELL, None, seed=3)
     before = world.snapshot()
     with pytest.raises(InvalidInput) as refused:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from app.errors import InvalidInput
-from app.live.sorting.benchmark_run import PAUSE_S, SortingTrial, random_task
+from app.live.sorting.benchmark_run import PAUSE_S, SortingTestRun, random_task
 from app.sim.cells.cell import load_cell
 from app.sim.sorting.batch import fail_of, shape_of
 from app.sim.sorting.benchmark_tasks import TESTS, sorting_test
@@ -24,7 +24,7 @@ def test_random_task_has_six_blocks_in_the_clutter_and_a_goal() -> None:
 
 
 def test_person_acts_once_the_goal_was_shown_for_a_while() -> None:
-    trial = SortingTrial("test-4", (1, 2))
+    trial = SortingTestRun("test-4", (1, 2))
     state = trial.start(SHAPE, FAIL)
     done = type(state)(
         clutter=np.zeros_like(state.clutter), towers=state.goal, goal=state.goal, fail=FAIL
@@ -37,7 +37,7 @@ def test_person_acts_once_the_goal_was_shown_for_a_while() -> None:
 
 
 def test_person_whose_part_a_visitor_made_impossible_does_nothing() -> None:
-    trial = SortingTrial("test-6", (1, 2))
+    trial = SortingTestRun("test-6", (1, 2))
     state = trial.start(SHAPE, FAIL)
     empty = type(state)(
         clutter=np.zeros_like(state.clutter), towers=state.goal, goal=state.goal, fail=FAIL
@@ -47,11 +47,11 @@ def test_person_whose_part_a_visitor_made_impossible_does_nothing() -> None:
 
 def test_test_that_does_not_fit_the_cell_is_refused() -> None:
     with pytest.raises(InvalidInput, match="test-2"):
-        SortingTrial("test-2", (1,)).start(SortingShape(n_cells=8, n_colours=2), np.zeros(8))
+        SortingTestRun("test-2", (1,)).start(SortingShape(n_cells=8, n_colours=2), np.zeros(8))
 
 
-def begun(name: str) -> SortingTrial:
-    trial = SortingTrial(name, (1, 2))
+def begun(name: str) -> SortingTestRun:
+    trial = SortingTestRun(name, (1, 2))
     trial.start(SHAPE, FAIL)
     return trial
 

@@ -1,6 +1,6 @@
 import pytest
 
-from app.live.sorting.controller import LiveSorter
+from app.live.sorting.controller import SortController
 from app.live.sorting.table import SortingTable
 from app.sim.cells.cell import load_cell
 from app.sim.sorting.state import Move
@@ -21,7 +21,7 @@ def table() -> SortingTable:
 def test_twins_that_fail_as_rarely_are_options_and_riskier_ones_are_not(
     table: SortingTable,
 ) -> None:
-    choice = LiveSorter(None).choose(table)
+    choice = SortController(None).choose(table)
     assert choice is not None
     moves = {move for _, move in choice.options}
     assert moves == {Move(5, RED), Move(9, RED)}
@@ -29,7 +29,7 @@ def test_twins_that_fail_as_rarely_are_options_and_riskier_ones_are_not(
 
 
 def test_block_that_was_not_reached_is_left_for_one_as_good(table: SortingTable) -> None:
-    sorter = LiveSorter(None)
+    sorter = SortController(None)
     first = sorter.choose(table)
     assert first is not None
     sorter.avoid(first.move.pick)
@@ -41,7 +41,7 @@ def test_block_that_was_not_reached_is_left_for_one_as_good(table: SortingTable)
 
 def test_held_block_goes_on_while_its_way_is_as_short_as_any(table: SortingTable) -> None:
     table.lift(9)
-    on = LiveSorter(None).choose(table, Move(9, RED))
+    on = SortController(None).choose(table, Move(9, RED))
     assert on is not None
     assert (on.move, on.back) == (Move(9, RED), False)
 
@@ -51,13 +51,13 @@ def test_held_block_goes_back_where_it_counts_once_nothing_asks_for_it(
 ) -> None:
     table.lift(9)
     table.set_goal({})
-    back = LiveSorter(None).choose(table, Move(9, RED))
+    back = SortController(None).choose(table, Move(9, RED))
     assert back is not None
     assert (back.move, back.back) == (Move(9, 9), True)
 
 
 def test_held_block_takes_the_place_that_a_twin_was_meant_for(table: SortingTable) -> None:
     table.lift(2)
-    choice = LiveSorter(None).choose(table)
+    choice = SortController(None).choose(table)
     assert choice is not None
     assert (choice.move, choice.back) == (Move(2, RED), False)

@@ -5,13 +5,14 @@ import pytest
 
 from app.errors import InvalidInput
 from app.live import commands
+from app.live.command_checks import Command
 from app.live.snapshot import WorldSnapshot
 from app.live.sorting.commands import (
     AddObject,
     MoveObject,
     RemoveObject,
     SetGoal,
-    SetSorter,
+    SetSortingPolicy,
     StartTest,
     ToggleGoal,
 )
@@ -70,7 +71,7 @@ def test_block_at_the_magnet_that_is_removed_leaves_the_robot_with_a_smaller_goa
     assert [one.id for one in after.sorting.pieces if one.held] == []
     assert after.sorting.goal == ()
     assert after.status == "no candidates"
-    assert "does without it" in after.message
+    assert "also from the goal" in after.message
 
 
 def test_held_block_goes_back_when_the_goal_does_not_ask_for_it_any_more() -> None:
@@ -180,7 +181,7 @@ def test_critic_may_take_any_twin_that_fails_as_rarely() -> None:
     world = empty_world()
     ids = lay(world, {"cell5": "red-large", "cell9": "red-large"}, {"red": ("large",)})
     going = until(world, phase("approach"))
-    assert set(going.sorting.twins) == set(ids.values())
+    assert set(going.sorting.duplicates) == set(ids.values())
     assert {one.id for one in going.candidates} == set(ids.values())
     taken = until(world, phase("grasp")).sorting.move
     assert taken.piece == going.chosen
@@ -191,10 +192,10 @@ def test_twin_in_a_riskier_cell_is_left_and_the_message_says_so() -> None:
     world = empty_world()
     ids = lay(world, {"cell2": "red-large", "cell9": "red-large"}, {"red": ("large",)})
     going = until(world, phase("approach"))
-    assert going.sorting.twins == (ids["cell9"],)
+    assert going.sorting.duplicates == (ids["cell9"],)
     assert going.message == (
-        "Goes for the large red block in cell 9, for the red tower: 1 move to go. "
-        "Its twin in cell 2 fails more often (40%)."
+        "Moving to the large red block in cell 9, to be placed on the red tower: 1 move to go. "
+        "Its duplicate in cell 2 fails more often (40%)."
     )
 
 
@@ -202,31 +203,31 @@ def test_planner_takes_over_from_a_sorter_that_goes_in_circles() -> None:
     shape = SortingShape(n_cells=10, n_colours=2)
     to_blue = [Move(k, 11) for k in range(10)]
     back = [Move(11, k) for k in range(10)]
-    world = empty_world(sorter=FixedValues(shape, [*to_blue, *back]))
+    world = empty_world(sorting_policy=FixedValues(shape, [*to_blue, *back]))
     lay(world, {"cell5": "red-large", "cell9": "red-small"}, {"red": ("large", "small")})
     assert until(world, phase("approach")).sorting.decided_by == "policy"
     end = until(world, solved, 6000)
-    assert end.sorting.counters.hand_overs == 1
+    assert end.sorting.counters.planner_fallbacks == 1
     assert towers(end)["red"] == ["red-large", "red-small"]
 
 
 def test_setting_the_same_goal_again_is_no_repeated_state() -> None:
     shape = SortingShape(n_cells=10, n_colours=2)
-    world = empty_world(sorter=FixedValues(shape, [Move(5, 10)]))
+    world = empty_world(sorting_policy=FixedValues(shape, [Move(5, 10)]))
     lay(world, {"cell5": "red-large"}, {"red": ("large",)})
     for _ in range(3):
         world.apply(SetGoal(towers={"red": ("large",)}))
         world.step()
     now = world.snapshot().sorting
-    assert (now.decided_by, now.counters.hand_overs) == ("policy", 0)
-    world.apply(SetSorter(sorter=None))
+    assert (now.decided_by, now.counters.planner_fallbacks) == ("policy", 0)
+    world.apply(SetSortingPolicy(checkpoint=None))
     assert world.snapshot().sorting.decided_by == "planner"
 
 
 def test_person_of_a_test_adds_a_larger_block_at_the_goal() -> None:
     world = empty_world()
     world.apply(StartTest(id="test-4"))
-    world.apply(commands.MoveHuman(pelvis=(0.0, 2.4, -1.57)))
+    world.apply(commands.MovePerson(pelvis=(0.0, 2.4, -1.57)))
     first = until(world, solved, 6000)
     assert len(first.sorting.pieces) == 5
     more = until(world, lambda now: len(now.sorting.pieces) == 6)
@@ -243,9 +244,9 @@ def test_person_of_a_test_adds_a_larger_block_at_the_goal() -> None:
 def test_contact_lets_a_held_block_fall_back_where_it_came_from() -> None:
     world = empty_world()
     lay(world, {"cell7": "red-large"}, {"red": ("large",)})
-    world.apply(commands.MoveHuman(pelvis=(-0.7, 1.12, -1.57)))
+    world.apply(commands.MovePerson(pelvis=(-0.7, 1.12, -1.57)))
     until(world, phase("carry"))
-    world.apply(commands.MoveHuman(right=(-0.5, 0.5, 0.2), left=(-0.6, 0.6, 0.2)))
+    world.apply(commands.MovePerson(right=(-0.5, 0.5, 0.2), left=(-0.6, 0.6, 0.2)))
     until(world, lambda now: now.status == "contact")
     after = until(world, lambda now: now.status in ("moving", "blocked"))
     assert [one.place for one in after.sorting.pieces] == ["cell7"]
@@ -255,14 +256,14 @@ def test_contact_lets_a_held_block_fall_back_where_it_came_from() -> None:
 def test_nothing_is_grasped_while_a_hand_is_near() -> None:
     world = empty_world()
     lay(world, {"cell5": "red-large"}, {"red": ("large",)})
-    world.apply(commands.MoveHuman(pelvis=(-0.5, 1.12, -1.57)))
-    world.apply(commands.MoveHuman(right=(-0.55, 0.78, 0.1), left=(-0.5, 0.85, 0.1)))
+    world.apply(commands.MovePerson(pelvis=(-0.5, 1.12, -1.57)))
+    world.apply(commands.MovePerson(right=(-0.55, 0.78, 0.1), left=(-0.5, 0.85, 0.1)))
     for _ in range(200):
         world.step()
     now = world.snapshot()
     assert now.clearance_m < 0.25
     assert now.sorting.counters.attempts == 0
-    world.apply(commands.MoveHuman(pelvis=(0.0, 2.4, -1.57)))
+    world.apply(commands.MovePerson(pelvis=(0.0, 2.4, -1.57)))
     assert towers(until(world, solved))["red"] == ["red-large"]
 
 
@@ -274,7 +275,7 @@ def test_critic_may_choose_which_tower_comes_first() -> None:
         {"red": ("large",), "blue": ("large",)},
     )
     going = until(world, phase("approach"))
-    assert set(going.sorting.twins) == set(ids.values())
+    assert set(going.sorting.duplicates) == set(ids.values())
     end = until(world, solved)
     assert towers(end) == {"red": ["red-large"], "blue": ["blue-large"]}
     assert end.sorting.counters.moves == 2
@@ -314,7 +315,7 @@ def test_robot_rests_without_a_policy() -> None:
     ],
 )
 def test_command_that_does_not_fit_is_named_and_changes_nothing(
-    command: commands.Command, field: str
+    command: Command, field: str
 ) -> None:
     world = empty_world()
     lay(world, {"cell5": "red-large"}, {})

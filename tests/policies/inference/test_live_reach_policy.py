@@ -3,8 +3,9 @@ import pytest
 from numpy.typing import NDArray
 
 from app.live import commands
-from app.live.reach.commands import SetPilot, SetSafety, SetWay
-from app.live.reach.controller import TIME_LIMIT_S, LiveReacher
+from app.live.commands import SetPolicy
+from app.live.reach.commands import SetInferenceMode, SetSafety
+from app.live.reach.controller import TIME_LIMIT_S, ReachController
 from app.live.reach.world import ReachWorld
 from app.policies.inference.controllers import Ahead, mover_of
 from app.policies.inference.live_reach_policy import ReachPilot
@@ -25,7 +26,7 @@ def policy() -> ReachPolicy:
 
 def test_policy_without_targets_cannot_be_interpolated() -> None:
     pilot = ReachPilot(ReachPolicy(untrained_reach(width=32, goals="box")))
-    assert pilot.ways == ("direct", "averaged", "direct-ahead", "averaged-ahead")
+    assert pilot.inference_modes == ("direct", "averaged", "direct-ahead", "averaged-ahead")
 
 
 def test_live_state_is_seen_as_the_batch_sees_it(policy: ReachPolicy) -> None:
@@ -35,11 +36,11 @@ def test_live_state_is_seen_as_the_batch_sees_it(policy: ReachPolicy) -> None:
     for _ in range(5):
         batch.step(np.full((1, 6), 0.3, dtype=np.float32))
     world = ReachWorld(CELL, pilot, seed=1)
-    robot, reacher = world._stage.robot, LiveReacher(CELL, pilot)
+    robot, reacher = world.robot, ReachController(CELL, pilot)
     state = batch.state
     robot.q, robot.qd, robot.qdd = state.q[0], state.qd[0], state.qdd[0]
-    for way in pilot.ways:
-        reacher.way = way
+    for way in pilot.inference_modes:
+        reacher.inference_mode = way
         act = reacher.act(
             robot,
             state.people.walkers.rows[0],
@@ -72,8 +73,8 @@ def test_looking_ahead_is_told_of_the_layer_that_is_obeyed(
 ) -> None:
     pilot = ReachPilot(policy)
     world = ReachWorld(CELL, pilot, seed=1)
-    world.apply(SetWay(way="direct-ahead"))
-    world.apply(SetSafety(on=on, measured=measured))
+    world.apply(SetInferenceMode(inference_mode="direct-ahead"))
+    world.apply(SetSafety(on=on, use_measured_velocity=measured))
     mover = pilot._movers["direct-ahead"]
     assert isinstance(mover, Ahead)
     assert (mover.layer != NO_LAYER) == (on and measured)
@@ -84,7 +85,7 @@ def test_under_the_layer_the_policy_has_its_usual_time_and_looking_ahead_the_tru
 ) -> None:
     pilot = Noting(policy)
     world = ReachWorld(CELL, pilot, seed=1)
-    world.apply(SetWay(way="direct"))
+    world.apply(SetInferenceMode(inference_mode="direct"))
     pilot.told.clear()
     while world.snapshot().status == "moving" and len(pilot.told) < 90:
         world.step()
@@ -99,12 +100,15 @@ def test_policy_moves_the_robot_of_a_live_cell_with_any_number_of_people(
 ) -> None:
     pilot = ReachPilot(policy)
     world = ReachWorld(CELL, None, seed=1)
-    world.apply(SetPilot(pilot=pilot))
+    world.apply(SetPolicy(checkpoint=None).with_loaded(pilot))
     shown = world.snapshot()
-    assert (shown.checkpoint, shown.reach.way) == (pilot.checkpoint, "interpolated-ahead")
-    assert shown.reach.ways == pilot.ways
+    assert (shown.checkpoint, shown.reach.inference_mode) == (
+        pilot.checkpoint,
+        "interpolated-ahead",
+    )
+    assert shown.reach.inference_modes == pilot.inference_modes
     world.apply(commands.AddPerson())
-    world.apply(SetWay(way="averaged-interpolated"))
+    world.apply(SetInferenceMode(inference_mode="averaged-interpolated"))
     world.step()
     for id in (0, 1):
         world.apply(commands.RemovePerson(person=id))
@@ -121,7 +125,7 @@ def test_goals_jump_among_the_targets_unless_the_policy_is_interpolated(
     world = ReachWorld(CELL, ReachPilot(policy), seed=1)
     on_target = []
     for way in ("direct", "interpolated"):
-        world.apply(SetWay(way=way))
+        world.apply(SetInferenceMode(inference_mode=way))
         world._goal.jump()
         on_target.append(world.snapshot().reach.on_target)
     assert on_target == [True, False]

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import pytest
 
 from app.live import commands
-from app.live.pick.world import World
+from app.live.pick.world import PickWorld
 from app.sim.cells.cell import load_cell
 from app.sim.pick.case_verdict import CaseRun, End, is_as_expected, judge
 from app.sim.pick.cases import find_case
@@ -71,7 +71,7 @@ def test_verdict_tells_order_and_times_of_what_was_chosen() -> None:
 
 def test_live_case_is_judged_when_it_is_done_and_anew_under_another_policy() -> None:
     cell = load_cell()
-    world = World(cell, StraightPolicy(cell), seed=2)
+    world = PickWorld(cell, StraightPolicy(cell), seed=2)
     assert world.snapshot().verdict is None
     world.apply(commands.StartCase(id="case-4"))
     now = world.snapshot()
@@ -90,7 +90,7 @@ def test_live_case_is_judged_when_it_is_done_and_anew_under_another_policy() -> 
     reached = now.counters.reached == 1 and now.contact is None
     assert now.verdict.as_expected is (reached and chosen == ["cube1", "dock0"])
     assert ("not as expected" in now.message) is (reached and not now.verdict.as_expected)
-    world.apply(commands.SetPolicy(policy=StraightPolicy(cell)))
+    world.apply(commands.SetPolicy(checkpoint="straight").with_loaded(StraightPolicy(cell)))
     again = world.snapshot()
     assert again.t_s == 0.0
     assert again.verdict is not None
@@ -99,7 +99,7 @@ def test_live_case_is_judged_when_it_is_done_and_anew_under_another_policy() -> 
 
 def test_values_carry_the_time_at_which_they_were_decided() -> None:
     cell = load_cell()
-    world = World(cell, StraightPolicy(cell), seed=2)
+    world = PickWorld(cell, StraightPolicy(cell), seed=2)
     for _ in range(400):
         world.step()
         now = world.snapshot()

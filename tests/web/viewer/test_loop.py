@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
-from app.errors import InvalidInput, NotFound
+from app.errors import InvalidInput
 from app.live import commands
 from app.live.sorting import commands as commands_of_sorting
 from app.sim.cells.cell import load_cell
@@ -75,7 +75,7 @@ def test_snapshot_says_which_commands_it_shows(live: LiveCell) -> None:
     wait_for(lambda: live.handle.snapshot().commands >= numbers[-1])
     assert ("cube3" in live.handle.snapshot().selected) != ("cube3" in before)
     with pytest.raises(InvalidInput):
-        live.handle.submit(commands.SetSpeed(factor=3))
+        live.handle.submit(commands.RemovePerson(person=3))
     assert live.handle.submit(commands.Resume()) == numbers[-1] + 1
     wait_for(lambda: live.handle.snapshot().commands == numbers[-1] + 1)
     assert live.handle.snapshot().refused is None
@@ -99,20 +99,18 @@ def test_command_that_fits_no_more_when_its_turn_comes_is_named() -> None:
 
 
 def test_bad_commands_are_refused_at_the_door(live: LiveCell) -> None:
-    with pytest.raises(NotFound):
+    with pytest.raises(InvalidInput, match="cube9"):
         live.handle.submit(commands.ToggleCandidate(id="cube9"))
-    with pytest.raises(InvalidInput):
-        live.handle.submit(commands.MoveHuman(pelvis=(float("inf"), 0.0, 0.0)))
     with pytest.raises(InvalidInput, match="person"):
-        live.handle.submit(commands.SetBody(person=3, stature=40.0))
+        live.handle.submit(commands.SetAnthropometry(person=3, stature=40.0))
 
 
 def test_person_can_be_changed_as_soon_as_it_was_added(live: LiveCell) -> None:
     live.handle.submit(commands.AddPerson())
-    live.handle.submit(commands.SetBody(person=1, stature=90.0))
+    live.handle.submit(commands.SetAnthropometry(person=1, stature=90.0))
     wait_for(lambda: live.handle.snapshot().people[-1].body.stature == 90.0)
     live.handle.submit(commands.RemovePerson(person=1))
-    with pytest.raises(InvalidInput, match="nobody"):
+    with pytest.raises(InvalidInput, match="no person"):
         live.handle.submit(commands.SetMode(person=1, mode="still"))
     wait_for(lambda: len(live.handle.snapshot().people) == 1)
 
@@ -129,7 +127,7 @@ def test_click_on_a_cube_toggles_it_as_candidate(live: LiveCell) -> None:
 
 def test_drag_of_a_hand_moves_the_person(live: LiveCell) -> None:
     live.handle.submit(commands.SetMode(mode="manual"))
-    live.handle.submit(commands.MoveHuman(pelvis=(0.0, 1.3, -1.5708)))
+    live.handle.submit(commands.MovePerson(pelvis=(0.0, 1.3, -1.5708)))
     wait_for(lambda: abs(live.handle.snapshot().people[0].q[1] - 1.3) < 0.02)
 
     def away() -> float:
@@ -168,8 +166,3 @@ def test_faster_clock_takes_so_many_steps_between_two_pictures(live: LiveCell) -
     live.handle.submit(commands.SetSpeed(factor=1))
     wait_for(lambda: live.handle.snapshot().speed == 1)
     assert {(tick - first) % 4 for tick in seen} == {0}
-
-
-def test_clock_does_not_run_at_any_speed(live: LiveCell) -> None:
-    with pytest.raises(InvalidInput, match="factor"):
-        live.handle.submit(commands.SetSpeed(factor=3))

@@ -43,7 +43,7 @@ export function People({ world, send, children }) {
           data-action="add-person" onClick=${() => send({ tag: "add-person" })}>
           <${Icon} name="plus" />Add</button>`}
       </div>
-      ${tracked && !world.reach?.way.includes("averaged") && html`<p class="dock-hint" title="This policy knows one person at a time.">
+      ${tracked && !world.reach?.inference_mode.includes("averaged") && html`<p class="dock-hint" title="This policy knows one person at a time.">
         The policy sees the nearest: ${nameOf(tracked.id)}.</p>`}
       <span class="spacer"></span>
       ${children}
@@ -145,7 +145,7 @@ function Size({ person, send }) {
   const { id, body, mode } = person;
   const [local, setLocal] = useState({});
   const change = useThrottled((name, value) =>
-    send({ tag: "set-body", person: id, [name]: value }));
+    send({ tag: "set-anthropometry", person: id, [name]: value }));
   useEffect(() => {
     if (Object.entries(local).every(([name, value]) => body[name] === value)) setLocal({});
   }, [body.stature, body.arms, body.shoulders]);
@@ -169,7 +169,7 @@ function Size({ person, send }) {
       data-action="recorded-size" title="Take the lengths of the person who was recorded"
       onClick=${() => {
         setLocal({});
-        send({ tag: "set-body", person: id, recorded: !recorded });
+        send({ tag: "set-anthropometry", person: id, recorded: !recorded });
       }}>${recorded ? html`<${Icon} name="check" />` : ""}As recorded</button>`}
   </div>`;
 }

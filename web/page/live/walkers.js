@@ -22,7 +22,7 @@ export function WalkerMover({ person, name, world, send }) {
       onPick=${(one) => send({ tag: "set-mode", person: id, mode: one })} />
     <label class="dock-pair"><span class="dock-label dock-label-free">Speed</span>
       <select data-role="walk-speed" value=${String(speed ?? "")} title="How fast all people walk; as in training it varies between 0.3 and 1 m/s"
-        onChange=${(e) => send({ tag: "set-walk", speed: e.target.value === "" ? null : Number(e.target.value) })}>
+        onChange=${(e) => send({ tag: "set-walking-speed", speed: e.target.value === "" ? null : Number(e.target.value) })}>
         ${SPEEDS.map(([value, label]) => html`<option key=${value} value=${value}>${label}</option>`)}
         ${!known && html`<option value=${String(speed)}>${speed} m/s</option>`}
       </select></label>

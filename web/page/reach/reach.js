@@ -40,8 +40,8 @@ function Safety({ world, history }) {
       <h2 id="safety-title">How fast it may go</h2>
       <span class="hint" tabindex="0" aria-describedby="safety-help">speed and separation
         <span class="tip tip-left" role="tooltip" id="safety-help">The robot must be able to stop
-          before a person ${safety.measured ? "who goes on as seen, or up to" : "walking at"}
-          ${safety.human_speed.toFixed(1)} m/s${safety.measured ? " faster," : ""} could reach it. The layer
+          before a person ${safety.use_measured_velocity ? "who goes on as seen, or up to" : "walking at"}
+          ${safety.human_speed.toFixed(1)} m/s${safety.use_measured_velocity ? " faster," : ""} could reach it. The layer
           looks at the very path ahead; the sum S_p is the standard’s bound for it, so near the
           limit the two differ a little, and a robot that moves away may be faster. S_p adds what
           the person and the robot may cover until it rests, and a distance to keep free.
@@ -79,14 +79,14 @@ function Gauge({ safety }) {
 }
 
 function Terms({ safety, people }) {
-  const { person, link, separation, required, person_way: walk, robot_way: way, margin } = safety;
+  const { person, link, separation, required, person_distance: person_m, robot_distance: robot_m, margin } = safety;
   if (person === null) {
     return html`<p class="empty">Nobody is in the cell. Add a person below the scene.</p>`;
   }
   const whom = people.length > 1 ? nameOf(person) : "Person";
   const rows = [
-    ["walk", "person’s way", walk],
-    ["way", "robot’s way", way],
+    ["person", "human contribution Sh", person_m],
+    ["robot", "robot reaction and stopping Sr + Ss", robot_m],
     ["margin", "to keep free", margin],
   ];
   return html`<dl class="terms">

@@ -26,13 +26,13 @@ const AHEAD = [
 ];
 
 export function ReachControls({ world, send }) {
-  const { goal_mode: mode, safety, way, ways } = world.reach;
-  const between = way.includes("interpolated");
-  const averaged = way.includes("averaged");
-  const ahead = way.endsWith("-ahead");
+  const { goal_mode: mode, safety, inference_mode: current, inference_modes: modes } = world.reach;
+  const between = current.includes("interpolated");
+  const averaged = current.includes("averaged");
+  const ahead = current.endsWith("-ahead");
   const ask = (all, mixed, played) => {
     const asked = [all && "averaged", mixed && "interpolated"].filter(Boolean).join("-") || "direct";
-    send({ tag: "set-way", way: played ? `${asked}-ahead` : asked });
+    send({ tag: "set-inference-mode", inference_mode: played ? `${asked}-ahead` : asked });
   };
   return html`<div class="dock-row dock-wrap">
     <span class="dock-label" id="goal-label">Goal</span>
@@ -42,16 +42,16 @@ export function ReachControls({ world, send }) {
       onClick=${() => send({ tag: "new-goal" })}><${Icon} name="reset" />New goal</button>
     <span class="dock-pair"><span class="dock-label dock-label-free" id="layer-label">Safety layer</span>
       <${Segmented} labelledby="layer-label" mark=${marked("safety")} value=${layerOf(safety)} items=${SAFETY}
-        onPick=${(one) => send({ tag: "set-safety", on: one !== "off", ...(one !== "off" && { measured: one === "measured" }) })} /></span>
-    ${ways.includes("interpolated") && html`<span class="dock-pair">
+        onPick=${(one) => send({ tag: "set-safety", on: one !== "off", ...(one !== "off" && { use_measured_velocity: one === "measured" }) })} /></span>
+    ${modes.includes("interpolated") && html`<span class="dock-pair">
       <span class="dock-label dock-label-free" id="between-label">Interpolation</span>
       <${Segmented} labelledby="between-label" mark=${marked("between")} value=${between} items=${BETWEEN}
         onPick=${(one) => ask(averaged, one, ahead)} /></span>`}
-    ${ways.includes("direct-ahead") && html`<span class="dock-pair">
+    ${modes.includes("direct-ahead") && html`<span class="dock-pair">
       <span class="dock-label dock-label-free" id="ahead-label">Look ahead</span>
       <${Segmented} labelledby="ahead-label" mark=${marked("ahead")} value=${ahead} items=${AHEAD}
         onPick=${(one) => ask(averaged, between, one)} /></span>`}
-    ${ways.includes("averaged") && world.people.length > 1 && html`<span class="dock-pair">
+    ${modes.includes("averaged") && world.people.length > 1 && html`<span class="dock-pair">
       <span class="dock-label dock-label-free" id="beside-label">Policy sees</span>
       <${Segmented} labelledby="beside-label" mark=${marked("beside")} value=${averaged} items=${BESIDE}
         onPick=${(one) => ask(one, between, ahead)} /></span>`}
@@ -59,7 +59,7 @@ export function ReachControls({ world, send }) {
 }
 
 /** Which of the choices holds for the safety layer. */
-function layerOf({ on, measured }) {
+function layerOf({ on, use_measured_velocity: measured }) {
   if (!on) return "off";
   return measured ? "measured" : "assumed";
 }

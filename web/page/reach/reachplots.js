@@ -60,13 +60,13 @@ export function SeparationPlot({ history }) {
         axis(theme, { size: 44, splits: () => [0, 0.5, 1, 1.5],
           values: (_, ticks) => ticks.map((v) => `${v} m`) }),
       ],
-      series: [{}, area("walk"), area("way"), area("margin"),
+      series: [{}, area("person"), area("robot"), area("margin"),
         { label: "separation", stroke: theme.ink, width: 2, points: { show: false } }],
     };
   }, [theme]);
   const data = useMemo(() => history.columns([
     (s) => s.required,
-    (s) => s.margin + s.robot_way,
+    (s) => s.margin + s.robot_distance,
     (s) => (s.required === null ? null : s.margin),
     (s) => Math.max(0, s.separation),
   ].map((f) => (s) => (Number.isFinite(s.separation) ? f(s) : null))), [history.tick]);

@@ -4,7 +4,7 @@ export const SAFETY_SPAN_S = 20;
 
 /** A jump longer than this is drawn as a gap [s]. */
 const GAP_S = 2;
-const KEYS = ["override", "advised", "separation", "required", "person_way", "robot_way", "margin"];
+const KEYS = ["override", "advised", "separation", "required", "person_distance", "robot_distance", "margin"];
 
 export class SafetyHistory {
   constructor() {

@@ -1,4 +1,4 @@
-// The sorter's moves: the one that is carried out, who decided it, and the ranking behind it.
+// Sorting moves: the present move, its source (policy or planner), and the ranking.
 import { html } from "../vendor/htm-preact-standalone.module.js";
 import { Block, capital, nameOf, placeName } from "./blockshape.js";
 import { Sorter } from "../training/checkpoints.js";
@@ -29,7 +29,7 @@ export function Moves({ sorting, cell }) {
             sorting=${sorting} cell=${cell} chosen=${isChosen(one)}
             share=${Number.isFinite(one.value) ? share(one.value) : 0} />`)}
         </ol>`}
-    ${sorting.twins.length > 1 && html`<p class="faint twins">${sorting.twins.length} equal blocks
+    ${sorting.duplicates.length > 1 && html`<p class="faint duplicates">${sorting.duplicates.length} equal blocks
       would do; the motion’s critic chose which.</p>`}
   </section>`;
 }
@@ -40,19 +40,19 @@ function idle(sorting) {
 }
 
 function Decider({ sorting }) {
-  const { decided_by: by, phase, sorter, counters } = sorting;
-  if (!by) return html`<span class="faint">${sorter ? "learned policy" : "exact planner"}</span>`;
-  const over = by === "planner" && sorter !== null;
+  const { decided_by: by, phase, sorting_policy: policy, counters } = sorting;
+  if (!by) return html`<span class="faint">${policy ? "learned policy" : "exact planner"}</span>`;
+  const over = by === "planner" && policy !== null;
   const text = by === "policy" ? "by the policy" : over ? "handed over to the planner" : "by the planner";
   const help = by === "policy"
     ? "The learned policy valued every move and chose the best."
     : over
       ? "The policy went in a circle or took too long, so the exact planner took over."
-      : "No learned sorter acts here: the exact planner finds the fewest moves. A move’s value is minus the grasps it expects.";
+      : "No sorting policy is active: the exact planner finds the fewest moves. The value of a move is minus its expected number of grasps.";
   return html`<span class=${over ? "hint is-over" : "hint"} tabindex="0" data-role="decider"
     data-by=${by} aria-describedby="decider-help">${text}${PHASES[phase] ? `, ${PHASES[phase]}` : ""}
-    <span class="tip tip-left" role="tooltip" id="decider-help">${help}${counters.hand_overs > 0
-      ? ` It has happened ${counters.hand_overs === 1 ? "once" : `${counters.hand_overs} times`}.`
+    <span class="tip tip-left" role="tooltip" id="decider-help">${help}${counters.planner_fallbacks > 0
+      ? ` It has happened ${counters.planner_fallbacks === 1 ? "once" : `${counters.planner_fallbacks} times`}.`
       : ""}</span></span>`;
 }
 
@@ -89,7 +89,7 @@ function worth(value, by) {
 export function SortingSmallPrint({ world, cell, checkpoints, jobs, send }) {
   const { counters } = world.sorting;
   const shown = [["attempts", "Grasps"], ["failures", "Failed"], ["moves", "Moves"],
-    ["hand_overs", "Hand-overs"]];
+    ["planner_fallbacks", "Planner fallbacks"]];
   return html`<section class="card small-print" aria-label="Counters and provenance">
     <dl class="tiles">
       ${shown.map(([key, label]) => html`<div key=${key}>

@@ -39,17 +39,17 @@ export function Acting({ world, checkpoints, jobs, send }) {
   </label>`;
 }
 
-/** Who chooses the moves: a sorter that was trained for this cell, or the exact planner. */
+/** Task planner: a sorting policy trained for this cell, or the exact planner. */
 export function Sorter({ sorting, cell, checkpoints, jobs, send }) {
-  const now = sorting.sorter;
+  const now = sorting.sorting_policy;
   const mine = checkpoints.list.filter((c) => c.purpose === SORTING && c.manifest.cell === cell.name);
   const groups = grouped(mine, jobs, now);
   const known = mine.some((c) => c.sha256 === now);
-  return html`<label class="sorter"><span>Moves are chosen by</span>
-    <select value=${now ?? ""} data-role="sorter" onFocus=${checkpoints.refresh}
-      onChange=${(e) => send({ tag: "set-sorter", checkpoint: e.target.value || null })}>
+  return html`<label class="sorting-policy"><span>Task planner</span>
+    <select value=${now ?? ""} data-role="sorting-policy" onFocus=${checkpoints.refresh}
+      onChange=${(e) => send({ tag: "set-sorting-policy", checkpoint: e.target.value || null })}>
       <option value="">the exact planner</option>
-      ${now && !known && html`<option value=${now}>${sorting.sorter_title ?? format.short(now)}</option>`}
+      ${now && !known && html`<option value=${now}>${sorting.sorting_policy_title ?? format.short(now)}</option>`}
       ${groups.map((group) => html`<optgroup key=${group.label} label=${group.label}>
         ${group.items.map((c) => html`<option key=${c.sha256} value=${c.sha256}>
           ${name(c, group.job)}</option>`)}</optgroup>`)}

@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 import viser
 
-from app.live.commands import MoveHuman
+from app.live.commands import MovePerson
 from app.live.snapshot import PersonView
 from app.sim.human import model as human
 from web.viewer.poses import Vec, upright, yaw_of
@@ -36,7 +36,7 @@ class Gizmos:
         self,
         server: viser.ViserServer,
         person: int,
-        submit: Callable[[MoveHuman], object],
+        submit: Callable[[MovePerson], object],
         *,
         jointed: bool = True,
     ) -> None:
@@ -74,7 +74,7 @@ class Gizmos:
             self._hold("pelvis", event.phase)
             x, y, _ = (float(value) for value in self._pelvis.position)
             self._submit(
-                MoveHuman(person=self._person, pelvis=(x, y, yaw_of(self._pelvis.wxyz)))
+                MovePerson(person=self._person, pelvis=(x, y, yaw_of(self._pelvis.wxyz)))
             )
 
         for name, gizmo in self._hands.items():
@@ -86,9 +86,9 @@ class Gizmos:
             self._hold(name, event.phase)
             x, y, z = (float(value) for value in gizmo.position)
             if name == "right":
-                self._submit(MoveHuman(person=self._person, right=(x, y, z)))
+                self._submit(MovePerson(person=self._person, right=(x, y, z)))
             else:
-                self._submit(MoveHuman(person=self._person, left=(x, y, z)))
+                self._submit(MovePerson(person=self._person, left=(x, y, z)))
 
     def _hold(self, name: str, phase: str) -> None:
         self._released[name] = time.monotonic() + (SETTLE_S if phase == "end" else HOLD_S)

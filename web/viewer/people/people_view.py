@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import viser
 
-from app.live.commands import MoveHuman
+from app.live.commands import MovePerson
 from app.live.snapshot import PersonView as Seen
 from app.live.snapshot import WorldSnapshot
 from app.sim.cells.cell import Cell
@@ -22,7 +22,7 @@ class PeopleView:
     """
 
     def __init__(
-        self, server: viser.ViserServer, cell: Cell, submit: Callable[[MoveHuman], object]
+        self, server: viser.ViserServer, cell: Cell, submit: Callable[[MovePerson], object]
     ) -> None:
         self._server, self._cell, self._submit = server, cell, submit
         self._drawn: dict[int, tuple[PersonView, Gizmos]] = {}

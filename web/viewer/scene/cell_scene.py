@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import viser
 
-from app.live.commands import Command
+from app.live.command_checks import Command
 from app.live.reach.commands import is_reaching
 from app.live.snapshot import WorldSnapshot
 from app.sim.cells.cell import Cell

@@ -8,7 +8,7 @@ import pytest
 import viser
 
 from app.live import commands
-from app.live.commands import Command
+from app.live.command_checks import Command
 from app.live.reach.commands import MoveGoal, SetSafety, goal_box
 from app.live.reach.world import ReachWorld
 from app.live.snapshot import WorldSnapshot

@@ -8,8 +8,8 @@ import pytest
 import viser
 from viser.infra import WebsockServer
 
-from app.live.commands import Command
-from app.live.pick.world import World
+from app.live.command_checks import Command
+from app.live.pick.world import PickWorld
 from app.live.snapshot import WorldSnapshot
 from app.live.sorting.commands import ToggleGoal
 from app.live.sorting.snapshot import HELD, SortingView
@@ -47,7 +47,7 @@ def scene(server: viser.ViserServer, cell: Cell, queued: list[Command]) -> CellS
 
 @pytest.fixture(scope="module")
 def still() -> WorldSnapshot:
-    return World(load_cell(), None, seed=2).snapshot()
+    return PickWorld(load_cell(), None, seed=2).snapshot()
 
 
 def node(server: viser.ViserServer, name: str) -> Any:
