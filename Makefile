@@ -43,7 +43,7 @@ SAY := @printf '==> %s\n'
 
 export PYTHONUNBUFFERED = 1
 
-.PHONY: help run setup test test-browser test-slow check format bench tables world lock clean
+.PHONY: help run setup test test-browser test-slow check format bench tables world docs lock clean
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*## ' Makefile | sed -E 's/:.*## /\t/' | expand -t 16
@@ -68,7 +68,7 @@ check: $(VENV)/dev.stamp ## format, lint, types, layers
 	@$(PY) -m mypy
 	@PYTHONPATH=. $(VENV)/bin/lint-imports
 
-format: $(VENV)/dev.stamp ## rewrite the sources the way `check` wants them
+format: $(VENV)/dev.stamp ## format the sources as `check` requires
 	@$(PY) -m ruff format .
 	@$(PY) -m ruff check --fix .
 
@@ -76,17 +76,20 @@ bench: $(VENV)/dev.stamp ## every benchmark, as tables
 	@for f in tests/benchmarks/bench_*.py; do \
 		name=$$(basename $$f .py | sed 's/^bench_//; s/_/-/g'); $(PY) -m app bench $$name || exit 1; done
 
+docs: $(VENV)/dev.stamp ## build the site of the documents in build/site, strictly
+	@NO_MKDOCS_2_WARNING=1 $(PY) -m mkdocs build --quiet --config-file tools/docs/mkdocs.yml
+
 tables: $(VENV)/dev.stamp ## write the tables of README, docs and model cards from docs/results
-	@$(PY) docs/make_tables.py
-	@$(PY) docs/make_world_page.py --page
+	@$(PY) -m tools.docs.tables
+	@$(PY) -m tools.docs.world_page --page
 
-world: $(VENV)/dev.stamp ## measure and draw docs/world.md anew
-	@$(PY) docs/make_world_page.py
+world: $(VENV)/dev.stamp ## measure, draw and write docs/world.md
+	@$(PY) -m tools.docs.world_page
 
-lock: $(VENV)/dev.stamp ## resolve the lock files anew (UPGRADE=--upgrade: newest versions)
+lock: $(VENV)/dev.stamp ## resolve the lock files (UPGRADE=--upgrade: newest versions)
 	@$(PIP) install --quiet uv==$(UV)
 	@$(RESOLVE) -o requirements.lock
-	@$(RESOLVE) --extra dev -c requirements.lock -o requirements-dev.lock
+	@$(RESOLVE) --extra dev --extra docs -c requirements.lock -o requirements-dev.lock
 
 clean: ## remove the virtual environment and the caches
 	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

@@ -14,8 +14,8 @@ SUFFIXES = {".py", ".md", ".js", ".html", ".css", ".json", ".pddl", ".toml", ".y
 CITING = ("app", "jobs", "web", "docs", "tests")
 NUMBER = r"\d+(?:\.\d+)*"
 BETWEEN = r"(?:\s*,\s*(?:and\s+)?|\s+and\s+|\s+to\s+|\s*-\s*)"
-CITED = re.compile(rf"\bMETHOD[\s#*/]+({NUMBER}(?:{BETWEEN}{NUMBER}\b)*)")
-LINK = re.compile(r"\]\(([^)\s]+)\)")
+CITATION = r"\b(?:METHOD|docs/method\.md`{0,2})[\s#*/]+"
+CITED = re.compile(rf"{CITATION}({NUMBER}(?:{BETWEEN}{NUMBER}\b)*)")
 HEADING = re.compile(r"^(#+) (.+)$", re.MULTILINE)
 MATH = re.compile(r"\$\$(.+?)\$\$|\$([^$\n]+?)\$", re.DOTALL)
 
@@ -59,29 +59,6 @@ def expected(found: list[str]) -> list[str]:
     return out
 
 
-def slugs(text: str) -> set[str]:
-    """Anchors of a page's headings, as GitHub makes them."""
-    return {
-        re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-")
-        for _, title in HEADING.findall(text)
-    }
-
-
-def broken_links(page: Path, text: str) -> list[str]:
-    """Links to files or anchors that do not exist."""
-    broken = []
-    for link in LINK.findall(text):
-        if re.match(r"[a-z]+:", link):
-            continue
-        name, _, anchor = link.partition("#")
-        target = page.parent / name if name else page
-        if not target.exists():
-            broken.append(link)
-        elif anchor and anchor not in slugs(text if not name else target.read_text("utf-8")):
-            broken.append(link)
-    return broken
-
-
 def unbalanced(formula: str) -> bool:
     """Whether braces, brackets or a formula's \\left and \\right do not match."""
     pairs, open_ones = {")": "(", "]": "[", "}": "{"}, []
@@ -103,6 +80,9 @@ def unbalanced(formula: str) -> bool:
         ("stop (METHOD\n2.7)", ["2.7"]),
         ("METHOD 2.8 (30 Hz)", ["2.8"]),
         ("METHODS 3", []),
+        ("Source: docs/method.md 2.1 to 2.3; thesis eq. (4.29).", ["2.1", "2.3"]),
+        ("``docs/method.md`` 3.4", ["3.4"]),
+        ("docs/method.md has 2 parts", []),
     ],
 )
 def test_citations_are_found_in_every_form(text: str, sections: list[str]) -> None:
@@ -154,23 +134,3 @@ def test_no_formula_has_characters_that_markdown_takes_for_its_own() -> None:
 @pytest.mark.parametrize("formula", ["(a", "a]", r"\frac{a}{b", "{(a})"])
 def test_an_unbalanced_formula_is_seen(formula: str) -> None:
     assert unbalanced(formula)
-
-
-def test_every_relative_link_resolves() -> None:
-    assert broken_links(DOCS / "method.md", TEXT) == []
-
-
-def test_links_to_the_method_from_other_pages_resolve() -> None:
-    pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *DOCS.glob("**/*.md")]
-    linking = 0
-    for page in pages:
-        text = page.read_text("utf-8")
-        links = [link for link in broken_links(page, text) if "method.md" in link]
-        assert links == [], page
-        linking += any("method.md" in link for link in LINK.findall(text))
-    assert linking >= 4
-
-
-@pytest.mark.parametrize("link", ["no.md", "#no-heading", "method.md#no-heading"])
-def test_a_broken_link_is_seen(link: str) -> None:
-    assert broken_links(DOCS / "method.md", f"# Title\n[one]({link})") == [link]

@@ -1,4 +1,4 @@
-"""What the README says about the surface is so: settings, routes, commands, requests."""
+"""README, set-up page and HTTP page agree with the service."""
 
 import json
 import re
@@ -21,6 +21,8 @@ from app.sim.envs import IDS
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+SETUP = (ROOT / "docs/setup.md").read_text(encoding="utf-8")
+HTTP = (ROOT / "docs/http.md").read_text(encoding="utf-8")
 METHODS = ("get", "post", "put", "patch", "delete")
 
 
@@ -30,7 +32,7 @@ def app(tmp_path_factory: pytest.TempPathFactory) -> FastAPI:
 
 
 def commands() -> Iterator[list[str]]:
-    for block in re.findall(r"```sh\n(.*?)```", README, re.DOTALL):
+    for block in re.findall(r"```sh\n(.*?)```", README + SETUP, re.DOTALL):
         # One command runs on over ends of line that are quoted or escaped.
         text = ""
         for line in block.splitlines(keepends=True):
@@ -59,13 +61,17 @@ def without_names(path: str) -> str:
     return re.sub(r"\{[^}]*\}", "{}", path)
 
 
-def test_readme_lists_every_setting_and_no_other() -> None:
+def test_readme_is_at_most_160_lines() -> None:
+    assert len(README.splitlines()) <= 160
+
+
+def test_setup_page_lists_every_setting_and_no_other() -> None:
     known = {PREFIX + name.upper() for name in Settings.model_fields}
-    assert set(re.findall(r"^\| `(TANDEM_\w+)`", README, re.MULTILINE)) == known
-    assert set(re.findall(r"TANDEM_[A-Z_]+", README)) == known
+    assert set(re.findall(r"^\| `(TANDEM_\w+)`", SETUP, re.MULTILINE)) == known
+    assert set(re.findall(r"TANDEM_[A-Z_]+", README + SETUP)) == known
 
 
-def test_readme_lists_every_route_and_no_other(app: FastAPI) -> None:
+def test_http_page_lists_every_route_and_no_other(app: FastAPI) -> None:
     paths = app.openapi()["paths"]
     offered = {
         (method.upper(), without_names(path))
@@ -73,16 +79,17 @@ def test_readme_lists_every_route_and_no_other(app: FastAPI) -> None:
         for method in operations
         if method in METHODS and path.startswith("/v1/")
     }
-    told = {
+    table = HTTP.split("## Routes\n")[1].split("\n## ")[0]
+    listed = {
         (method, without_names(path))
-        for method, path in re.findall(r"`(GET|POST|PUT|PATCH|DELETE) (/v1/[^`]+)`", README)
+        for method, path in re.findall(r"`(GET|POST|PUT|PATCH|DELETE) (/v1/[^`]+)`", table)
     }
-    assert told == offered
+    assert listed == offered
 
 
-def test_routes_named_alone_in_the_readme_exist(app: FastAPI) -> None:
+def test_routes_without_method_exist(app: FastAPI) -> None:
     for path in ("/healthz", "/readyz"):
-        assert f"`{path}`" in README
+        assert f"`{path}`" in HTTP
         assert path in app.openapi()["paths"]
     assert "`/docs`" in README
     assert TestClient(app, base_url="http://127.0.0.1").get("/docs").status_code == 200

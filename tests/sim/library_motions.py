@@ -1,6 +1,6 @@
 """Motions a task library is made for: random legs between random nodes, and what they are like.
 
-Used by the library's tests and by ``docs/people_plots.py``.
+Used by the library's tests and by ``tools/docs/people_plots.py``.
 """
 
 from dataclasses import dataclass

@@ -1,0 +1,52 @@
+"""``docs/world.md`` shows what ``docs/results`` says, and its pictures are there."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from tools.docs.world_page import IMAGES, PAGE, RESULTS, page, values
+
+
+def read(name: str) -> dict:
+    return json.loads((RESULTS / f"{name}.json").read_text(encoding="utf-8"))
+
+
+def test_page_is_what_the_results_give() -> None:
+    assert PAGE.read_text(encoding="utf-8") == page(RESULTS)
+
+
+def test_every_number_of_the_page_follows_the_results(tmp_path: Path) -> None:
+    for path in RESULTS.glob("*.json"):
+        (tmp_path / path.name).write_text(path.read_text(encoding="utf-8"), encoding="utf-8")
+    world = read("world")
+    world["gap"]["links"]["mean_mm"], world["fast_hands"]["late"] = 77.7, 5
+    (tmp_path / "world.json").write_text(json.dumps(world), encoding="utf-8")
+    text = page(tmp_path)
+    assert "the difference is 77.7 mm on average" in " ".join(text.split())
+    assert "5 of these were reported later" in " ".join(text.split())
+
+
+def test_page_shows_every_picture_and_no_other() -> None:
+    shown = set(re.findall(r"\]\(img/world/([a-z-]+\.png)\)", page(RESULTS)))
+    assert shown == {path.name for path in IMAGES.glob("*.png")}
+
+
+def test_results_hold_to_what_the_page_claims() -> None:
+    world = read("world")
+    found = values(world, read("sim-scaling"))
+    assert world["gap"]["all"]["min_mm"] > -1e-6
+    assert found["gap_mean"] < 15.0
+    assert max(found["ends"], found["distances"]) < 1e-9
+    assert max(found["over"], found["excess"]) < 1e-9
+    assert world["fast_hands"]["late"] == 0
+    assert world["fast_hands"]["touching"] > 100
+    assert found["moving"] >= found["protective"] > found["resting"]
+
+
+@pytest.mark.parametrize("name", ["world", "sim-steps", "sim-scaling", "mesh-gap"])
+def test_results_say_where_they_were_measured(name: str) -> None:
+    result = read(name)
+    assert result["seed"] == 11
+    assert {"cpu", "cores", "commit"} <= set(result["machine"])

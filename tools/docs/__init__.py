@@ -1,0 +1,1 @@
+"""Scripts that measure, draw and write the result pages of ``docs``."""

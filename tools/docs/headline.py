@@ -1,0 +1,107 @@
+"""The table of headline results in the README: six results with their baselines.
+
+Numbers come from ``docs/results/*.json``; baselines of the thesis are constants of this module.
+"""
+
+import json
+from pathlib import Path
+from typing import Any
+
+Json = dict[str, Any]
+
+FILES = (
+    "pick-single",
+    "pick-choice",
+    "reach-targets",
+    "reach-ssm",
+    "sorting-grid-e1",
+    "safety-ssm",
+)
+MEASURED = " measured"
+"""Suffix of the rows of ``reach-ssm`` under the layer with measured velocities."""
+THESIS = {"pick-single": "75 %", "pick-choice": "about 90 %", "reach-targets": "91.76 %"}
+"""Success rates that the thesis reports."""
+
+
+def percent(rate: Json, digits: int = 1) -> str:
+    """Return a rate with its interval in percent."""
+    mean, low, high = (f"{100.0 * rate[key]:.{digits}f}" for key in ("mean", "low", "high"))
+    return f"{mean} % ({low}-{high})"
+
+
+def share(rate: Json) -> str:
+    """Return a rate in percent without its interval."""
+    return f"{100.0 * rate['mean']:.1f} %"
+
+
+def lines(results: Path) -> list[list[str]] | None:
+    """Return the table as lines of cells, the header first; None where a result is missing.
+
+    Args:
+        results: Folder of the JSON files.
+    """
+    found: dict[str, dict[str, Json]] = {}
+    for name in FILES:
+        path = results / f"{name}.json"
+        if not path.exists():
+            return None
+        rows = json.loads(path.read_text(encoding="utf-8"))["results"]
+        found[name] = {row["name"]: row for row in rows}
+    pick, choice, reach, ssm, sorting, safety = (found[name] for name in FILES)
+    rollout, planner = ssm[f"policy-ahead{MEASURED}"], ssm[f"rrt-star-once{MEASURED}"]
+    return [
+        ["task", "measure", "n", "Tandem", "baseline"],
+        [
+            "[pick](docs/results/pick.md), one target",
+            "success",
+            f"{pick['policy']['n']:,}",
+            percent(pick["policy"]["success"]),
+            f"thesis: {THESIS['pick-single']}",
+        ],
+        [
+            "pick, selection among 2 or 3 targets",
+            "success",
+            f"{choice['critic']['n']:,}",
+            percent(choice["critic"]["success"]),
+            f"nearest: {share(choice['nearest']['success'])}, "
+            f"oracle: {share(choice['rollout']['success'])}, thesis: {THESIS['pick-choice']}",
+        ],
+        [
+            "[reach](docs/results/reach.md), 54 targets",
+            "success",
+            f"{reach['clearance']['n']:,}",
+            percent(reach["clearance"]["success"]),
+            f"thesis: {THESIS['reach-targets']}",
+        ],
+        [
+            "reach under SSM, crossing people, measured velocity",
+            "robot brought to standstill",
+            f"{rollout['n']:,}",
+            f"{percent(_opposite(rollout['never_held']))}; {rollout['time_s']['mean']:.2f} s",
+            f"RRT*: {share(_opposite(planner['never_held']))}; "
+            f"{planner['time_s']['mean']:.2f} s",
+        ],
+        [
+            "[sorting](docs/results/sorting.md), 20 objects, disturbed starts",
+            "success; moves / minimum",
+            f"{sorting['disturbed']['n']:,}",
+            f"{percent(sorting['disturbed']['success'], 2)}; "
+            f"{sorting['disturbed']['moves_over_minimum']['mean']:.4f}",
+            f"exact planner: {sorting['disturbed-planner']['moves_over_minimum']['mean']:.4f}",
+        ],
+        [
+            "[SSM](docs/results/safety.md), adversarial people",
+            "contact with a moving link",
+            f"{safety['inside']['n']:,}",
+            percent(safety["inside"]["moving_rate"], 3),
+            f"without SSM: {share(safety['unguarded']['moving_rate'])}",
+        ],
+    ]
+
+
+def _opposite(rate: Json) -> Json:
+    return {
+        "mean": 1.0 - rate["mean"],
+        "low": 1.0 - rate["high"],
+        "high": 1.0 - rate["low"],
+    }

@@ -1,0 +1,269 @@
+"""Draw the pictures of ``docs/results/reach.md`` from ``docs/results/reach*.json``.
+
+    python -m tools.docs.reach_plots
+
+Writes ``docs/img/reach/*.png``: heat maps of success and collisions over the targets at three
+heights (thesis fig. 4.5 and 4.6), episode durations, goals between targets, other people and
+trackers, joint trajectories of an episode, and learning curves. Pictures without results are
+skipped.
+"""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import Colormap, LinearSegmentedColormap, Normalize
+from matplotlib.figure import Figure
+
+from tools.docs.reach_other_plots import curves, others, smoothness
+from tools.docs.reach_style import (
+    BLUE,
+    GREEN,
+    GREY,
+    INK,
+    MODES,
+    ORANGE,
+    PURPLE,
+    RED,
+    Json,
+    bars,
+    panels,
+    percent,
+    save,
+)
+from tools.docs.reach_tables import policy_of, siblings
+
+ROOT = Path(__file__).resolve().parents[2]
+
+RESULTS, IMAGES = ROOT / "docs/results", ROOT / "docs/img/reach"
+FLOOR, CEILING = 0.90, 0.10
+"""Success at and below which, and collisions at and above which, the colour saturates."""
+MISSES = LinearSegmentedColormap.from_list(
+    "misses", ["#7f1d1d", "#d9622b", "#f3c567", "#dcebd8", "#9ccfb0"]
+)
+"""From many failures to none."""
+HITS = LinearSegmentedColormap.from_list("hits", ["#f4f5f7", "#f3c567", "#d9622b", "#7f1d1d"])
+"""From no collision to many."""
+
+
+def read(name: str) -> Json | None:
+    """Return a result, or None if it does not exist."""
+    path = RESULTS / f"{name}.json"
+    return json.loads(path.read_text(encoding="utf-8")) if path.exists() else None
+
+
+def read_all(name: str) -> list[Json]:
+    """Return a result and those of other checkpoints."""
+    first = read(name)
+    return [] if first is None else [first, *siblings(RESULTS / f"{name}.json")]
+
+
+def heat_maps(result: Json) -> Figure:
+    """Draw success and collisions of each target, one panel per height."""
+    row = result["results"][0]
+    heights = sorted({cell["height_m"] for cell in row["targets"]})
+    figure, axes = panels(2, len(heights), 3.7, sharex=True, sharey=True)
+    kinds: tuple[tuple[str, Colormap, Normalize], ...] = (
+        ("success", MISSES, Normalize(FLOOR, 1.0)),
+        ("collision", HITS, Normalize(0.0, CEILING)),
+    )
+    for line, (kind, colours, norm) in enumerate(kinds):
+        for column, height in enumerate(heights):
+            cells = [cell for cell in row["targets"] if cell["height_m"] == height]
+            image = _layer(axes[line, column], cells, kind, colours, norm)
+            mean = np.mean([cell[kind]["mean"] for cell in cells])
+            axes[line, column].set_title(f"z = {height:.1f} m: {100.0 * mean:.1f} %")
+        axes[line, 0].set_ylabel(f"{'success' if kind == 'success' else 'collisions'}\ny [m]")
+        bar = figure.colorbar(
+            image,
+            ax=list(axes[line]),
+            extend="min" if kind == "success" else "max",
+            aspect=14,
+            shrink=0.9,
+        )
+        bar.outline.set_visible(False)
+        percent(bar.ax.yaxis)
+    for axis in axes[1]:
+        axis.set_xlabel("x [m]")
+    return figure
+
+
+def _layer(
+    axis: Axes, cells: Sequence[Json], kind: str, colours: Colormap, norm: Normalize
+) -> Any:
+    """Draw the targets of one height as squares with their rates in percent."""
+    xs = sorted({cell["goal"][0] for cell in cells})
+    ys = sorted({cell["goal"][1] for cell in cells})
+    grid = np.full((len(ys), len(xs)), np.nan)
+    for cell in cells:
+        x, y, _ = cell["goal"]
+        value = cell[kind]["mean"]
+        grid[ys.index(y), xs.index(x)] = value
+        red, green, blue, _ = colours(norm(value))
+        dark = 0.3 * red + 0.6 * green + 0.1 * blue < 0.55
+        axis.text(
+            x,
+            y,
+            f"{100.0 * value:.0f}",
+            ha="center",
+            va="center",
+            fontsize=8,
+            color="white" if dark else "#1f2937",
+        )
+    half = 0.5 * (xs[1] - xs[0])
+    edges = [np.append(np.array(one) - half, one[-1] + half) for one in (xs, ys)]
+    image = axis.pcolormesh(*edges, grid, cmap=colours, norm=norm, ec="white", lw=1.2)
+    axis.set(aspect="equal", xticks=xs, yticks=ys)
+    axis.grid(False)
+    axis.tick_params(length=0)
+    for spine in axis.spines.values():
+        spine.set_visible(False)
+    return image
+
+
+def start_rules(result: Json) -> Figure:
+    """Draw outcomes under each start rule, and durations of episodes under the first."""
+    figure, axes = panels(1, 2, 3.1, width_ratios=(1.0, 1.15))
+    left, right = axes[0]
+    rows = result["results"][::-1]
+    names = {"clearance": "0.05 m away", "uniform": "anywhere", "authors": "authors' code"}
+    names |= {f"{name}-ahead": f"{words}, rollout" for name, words in names.items()}
+    for k, row in enumerate(rows):
+        start = 0.0
+        for kind, colour in (("collision", RED), ("timeout", GREY)):
+            value = row[kind]["mean"]
+            left.barh(k, value, left=start, color=colour, height=0.55)
+            start += value
+        if contact := row["begun_in_contact"]["mean"]:
+            left.plot([contact, contact], [k - 0.37, k + 0.37], color=INK, lw=2)
+        left.text(start, k, f"  {100.0 * row['success']['mean']:.1f} % success", va="center")
+    left.set_yticks(range(len(rows)), [names.get(row["name"], row["name"]) for row in rows])
+    most = max(1.0 - row["success"]["mean"] for row in rows)
+    left.set(xlim=(0.0, 1.6 * max(most, 1e-3)), title="Failures by start rule of people")
+    left.grid(False, axis="y")
+    left.tick_params(axis="y", length=0)
+    percent(left.xaxis)
+    handles = [left.barh(0, 0, color=RED), left.barh(0, 0, color=GREY)]
+    handles += left.plot([], [], "|", color=INK, ms=9, mew=2)
+    names_of = ["collision", "timeout", "initial contact"]
+    below = {"loc": "upper center", "bbox_to_anchor": (0.45, -0.1), "ncols": 3}
+    left.legend(handles, names_of, fontsize=8, columnspacing=1.2, **below)
+    _ends(right, result["results"][0])
+    return figure
+
+
+def _ends(axis: Axes, row: Json) -> None:
+    ends, n = row["ends"], row["n"]
+    step = ends[0]["until_s"]
+    middle = [one["until_s"] - 0.5 * step for one in ends]
+    for kind, colour, label in (
+        ("success", GREEN, "success"),
+        ("collision", RED, "collision"),
+    ):
+        shares = [one[kind] / n for one in ends]
+        axis.bar(middle, shares, width=step, color=colour, label=label)
+    mean, p95 = row["time_to_goal_s"], row["time_to_goal_p95_s"]
+    if mean is not None:
+        axis.axvline(mean, color=INK, lw=1.0)
+        axis.axvline(p95, color=INK, lw=1.0, ls=":")
+        top = 1.12 * axis.get_ylim()[1]
+        axis.set_ylim(0.0, top)
+        axis.text(mean, 0.98 * top, f"mean {mean:.2f} s ", va="top", ha="right", color=INK)
+        axis.text(p95, 0.98 * top, f" 95 % within {p95:.2f} s", va="top", color=INK)
+    axis.set(title="Duration of episodes", xlabel="time since the start [s]")
+    axis.set(ylabel=f"share of episodes per {step:g} s")
+    axis.legend(loc="center right")
+    percent(axis.yaxis)
+
+
+def modes_of(result: Json) -> dict[str, Json]:
+    """Return the rows of random goals within 5 s, by inference mode."""
+    return {row["name"]: row for row in result["results"] if "between" in row}
+
+
+def own_mode(result: Json) -> str:
+    """Return the inference mode that a policy was trained for, with rollout if available."""
+    modes = list(modes_of(result))
+    return ([mode for mode in modes if mode.startswith("interpolated")] or modes)[-1]
+
+
+def between_targets(results: Sequence[Json]) -> Figure:
+    """Draw success on goals between targets, by inference mode and by distance to the grid.
+
+    Of several policies, the right panel shows each in the mode it was trained for.
+    """
+    several = len(results) > 1
+    n_modes = sum(len(modes_of(result)) for result in results)
+    figure, axes = panels(1, 2, max(3.3, 0.9 + 0.26 * n_modes), width_ratios=(1.0, 1.2))
+    left, right = axes[0]
+    labels: list[str] = []
+    for number, result in enumerate(results):
+        for mode, row in modes_of(result).items():
+            words, colour, mark = MODES[mode]
+            if several:
+                words = f"{policy_of(result)}, {words}"
+                colour = (BLUE, ORANGE, GREEN, PURPLE, RED)[number % 5]
+            k, gain = -len(labels), row["against_targets"]
+            labels.append(words)
+            left.plot([100.0 * gain["low"], 100.0 * gain["high"]], [k, k], color=colour, lw=2.0)
+            left.plot(100.0 * gain["mean"], k, mark, color=colour, ms=6)
+            if not several or mode == own_mode(result):
+                _by_distance(right, row["between"], 2.5 * number, colour, mark, words)
+    left.axvline(0.0, color=GREY, lw=1.0)
+    left.axvline(-0.5, color=RED, lw=1.0, ls=":")
+    left.set_yticks([-k for k in range(len(labels))], labels)
+    title = f"{next(iter(modes_of(results[0]).values()))['n']} random goals minus targets"
+    left.set(ylim=(0.6 - len(labels), 0.6), title=title)
+    left.set(xlabel="success rate, points")
+    left.grid(False, axis="y")
+    right.set(title="By distance to the grid", ylabel="success")
+    right.set(xlabel="goal to the nearest target [mm]")
+    percent(right.yaxis)
+    if several:
+        right.legend(loc="lower left")
+    return figure
+
+
+def _by_distance(
+    axis: Axes, groups: Sequence[Json], aside: float, colour: str, mark: str, words: str
+) -> None:
+    """Draw success by the distance to the nearest target, shifted by ``aside`` [mm]."""
+    rates = [one["success"] for one in groups]
+    axis.errorbar(
+        [500.0 * (one["low_m"] + one["high_m"]) + aside for one in groups],
+        [rate["mean"] for rate in rates],
+        bars(rates),
+        fmt=f"{mark}-",
+        color=colour,
+        ms=4.5,
+        elinewidth=0.9,
+        label=words,
+    )
+
+
+def main() -> None:
+    """Draw the pictures of all existing results."""
+    if targets := read("reach-targets"):
+        save(heat_maps, IMAGES / "targets.png", targets)
+        save(start_rules, IMAGES / "starts.png", targets)
+    if randoms := read_all("reach-random"):
+        save(between_targets, IMAGES / "between.png", randoms)
+    three = read_all("reach-people"), read("reach-speeds"), read("reach-tracker")
+    if any(three):
+        save(others, IMAGES / "others.png", *three)
+    smooth = {
+        one["settings"]["action"]["degree"]: one
+        for one in reversed(read_all("reach-smoothness"))
+        if one["example"]
+    }
+    if smooth:
+        save(smoothness, IMAGES / "smoothness.png", [smooth[k] for k in sorted(smooth)])
+    if trained := read("reach-curves"):
+        save(curves, IMAGES / "curves.png", trained["curves"])
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,74 @@
+"""Evaluate several training seeds of one preset on all targets.
+
+    python -m tools.docs.reach_seeds RUN ... [--seed N] [--episodes N]
+
+A RUN is a folder written by ``training_curves.py``. Its last policy is evaluated on the row
+``clearance`` of ``reach-targets``, with and without rollout, beside the same people. The result
+also holds the training time and the time at which the curve first exceeded the 91.76 % of the
+thesis (greedy episodes on the goals of the training) [CPU min]. Writes
+``docs/results/reach-seeds.json``.
+"""
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from app.machine import describe
+from app.policies.evaluation.reach.bench import ReachBench, direct_ways, ending
+from tools.docs.reach_curves import lines
+from tools.docs.training_curves import read
+
+ROOT = Path(__file__).resolve().parents[2]
+
+RESULTS = ROOT / "docs/results/reach-seeds.json"
+THESIS_SUCCESS = 0.9176
+"""Success on the targets in the thesis."""
+PER_TARGET = 100
+Json = dict[str, Any]
+
+
+def rows_of(folder: Path, seed: int, per_target: int) -> tuple[str, list[Json]]:
+    """Return the checkpoint of a run and one row per inference mode."""
+    checkpoint = read(sorted(folder.glob("step-*.json"))[-1])
+    manifest = checkpoint.manifest
+    points = lines(folder / "curve.jsonl")
+    passed = [
+        one["cpu_s"] / 60.0 for one in points if (one["success"] or 0.0) >= THESIS_SUCCESS
+    ]
+    bench = ReachBench(checkpoint, seed)
+    goals, rows = bench.target_goals(per_target * len(bench.targets)), []
+    for mode in direct_ways(bench.actor):
+        played = bench.play(bench.usual, goals, mode)
+        row = played.row(f"seed-{manifest['seed']}{ending(mode)}")
+        spent = {"cpu_min": manifest["cpu_s"] / 60.0, "updates": manifest["updates"]}
+        rows.append({**row, **spent, "to_source_min": passed[0] if passed else None})
+    return checkpoint.sha256, rows
+
+
+def main() -> None:
+    """Evaluate runs and write the result."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("runs", nargs="+", type=Path, metavar="RUN")
+    parser.add_argument("--seed", type=int, default=11, help="of the episodes")
+    parser.add_argument("--episodes", type=int, default=PER_TARGET, help="per target")
+    options = parser.parse_args()
+    torch.set_num_threads(1)
+    found = [rows_of(folder, options.seed, options.episodes) for folder in options.runs]
+    result = {
+        "protocol": "reach-seeds",
+        "command": "python -m tools.docs.reach_seeds RUN ...",
+        "policy": "reach-td3",
+        "checkpoints": [name for name, _ in found],
+        "seed": options.seed,
+        "episodes": options.episodes,
+        "results": [row for _, rows in found for row in rows],
+        "machine": describe(),
+    }
+    RESULTS.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
