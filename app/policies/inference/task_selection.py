@@ -26,7 +26,7 @@ from app.policies.checkpoints.model_state import under
 from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.configs.fields import read_config
 from app.policies.configs.pick import PickPreset
-from app.policies.training.pick import LAYOUTS, actor_of, critics_for
+from app.policies.networks.pick import LAYOUTS, actor_of, critics_for
 from app.sim.cells.cell import Cell, require_cell
 from app.sim.core.arrays import Vec
 from app.sim.core.out_of_range import OutsideField

@@ -9,8 +9,7 @@ from app.policies.algorithms.exploration import OptionExploration, PerEnvAR1Nois
 from app.policies.algorithms.td3 import Networks
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.configs.pick import PickPeople, PickPreset
-from app.policies.configs.td3 import ActorCriticNetworks
-from app.policies.networks.actor_critic import Critics, ResidualActor
+from app.policies.networks.pick import LAYOUTS, actor_of, critics_for
 from app.policies.training.reporter import Callbacks, Reporter
 from app.policies.training.run import TrainingRun
 from app.policies.training.td3 import TD3Scenario, TrainingMonitor, first_step, start_td3
@@ -20,16 +19,9 @@ from app.sim.envs.tasks import ArmTask
 from app.sim.people.human_motion_config import HumanMotionConfig
 from app.sim.people.kernels.people import ABSENT
 from app.sim.pick.batch import OUTCOMES, PickBatch, PickSettings
-from app.sim.pick.kernels.observation import BODY_SIZES, SIZES
 from app.sim.pick.kernels.reward import RewardWeights
 from app.sim.robot.kernels.arm import CONTROLLED
 from app.sim.scene.scene import HumanKind
-
-LAYOUTS = {
-    "features": [[name, size] for name, size in SIZES],
-    "body": [[name, size] for name, size in BODY_SIZES],
-}
-"""Names and sizes of the groups of each kind of observation, as manifests carry them."""
 
 
 def visited_states(batch: PickBatch) -> dict[str, Vec]:
@@ -101,19 +93,6 @@ def start(
         visited_states=lambda: visited_states(batch),
     )
     return start_td3(preset, seed, resume, cell, scenario)
-
-
-def actor_of(sizes: ActorCriticNetworks, n_obs: int) -> ResidualActor:
-    """Return a new actor for observations of a length."""
-    return ResidualActor(sizes.width, n_obs, layers=sizes.layers)
-
-
-def critics_for(sizes: ActorCriticNetworks, n_obs: int) -> Critics:
-    """Return new critics for observations of a length."""
-    normed = sizes.critic_norm == "layer"
-    return Critics(
-        sizes.width, n_obs, n_critics=sizes.n_critics, layers=sizes.layers, normed=normed
-    )
 
 
 class PickReporter(Reporter):

@@ -7,7 +7,7 @@ import pytest
 
 from app.errors import CheckpointMismatch
 from app.policies.inference.task_selection import TaskChooser, ValueNetworks
-from app.policies.training.pick import LAYOUTS
+from app.policies.networks.pick import LAYOUTS
 from app.sim.cells.cell import load_cell
 from app.sim.human import model as human
 from app.sim.human.anthropometry import percentile_body
