@@ -208,9 +208,9 @@ def _reach(sound: Sound) -> Iterator[Fault]:
     cell = sound.cell.model_copy(update={"obstacles": sound.obstacles})
     found = list(Reach(cell).touching(np.array(cell.robot.home_q)))
     yield from _home_contacts(cell, found)
-    # What touches the robot at home would only be told again for every station.
-    in_the_way = {one.other for one in found if one.kind == "obstacle"}
-    apart = tuple(box for box in sound.obstacles if box.id not in in_the_way)
+    # Obstacles that touch the robot at home would be reported again for every station.
+    touching = {one.other for one in found if one.kind == "obstacle"}
+    apart = tuple(box for box in sound.obstacles if box.id not in touching)
     reach = Reach(cell.model_copy(update={"obstacles": apart}))
     for station in sound.stations:
         yield from _station_reach(reach, station)

@@ -16,7 +16,14 @@ from pydantic import BaseModel, ValidationError
 from app.errors import BadCell, Fault
 from app.sim.cell_validation.checks import check_cell
 from app.sim.cells.cell import LIMITS, Cell, load_cell
-from app.sim.cells.parts import CellSafety, GoalRegion, Obstacle, RobotMount, Station, Table
+from app.sim.cells.parts import (
+    CellSafety,
+    GoalRegion,
+    Obstacle,
+    RobotMount,
+    Station,
+    TableGeometry,
+)
 from app.sim.cells.people import ConstantWalker, FixedSpeedWalker, Walker, Worker
 
 MAX_BYTES = 256 * 1024
@@ -29,7 +36,7 @@ MAX_SHOWN = 60
 """Longest value that a message repeats [characters]."""
 
 _PARTS: Mapping[str, type[BaseModel]] = {
-    "table": Table,
+    "table": TableGeometry,
     "robot": RobotMount,
     "goal_region": GoalRegion,
     "safety": CellSafety,
@@ -193,7 +200,7 @@ def _without(raw: dict[str, Any], places: Sequence[tuple[Any, ...]]) -> dict[str
     """Return the cell without the parts that cannot be read; None where too little is left.
 
     Fields of robot and table that cannot be read take the values of a shipped cell, so that
-    their neighbours can be checked; ``check_cell`` is told not to build on them.
+    their neighbours can be checked; ``check_cell`` excludes them.
     """
     rest, dropped = copy.deepcopy(dict(raw)), set()
     spare = load_cell().definition()

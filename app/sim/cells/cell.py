@@ -27,7 +27,7 @@ from app.sim.cells.parts import (
     Obstacle,
     RobotMount,
     Station,
-    Table,
+    TableGeometry,
 )
 from app.sim.cells.people import CylinderPerson, Person, Worker
 from app.sim.core.arrays import Vec
@@ -44,7 +44,7 @@ class Cell(CellData):
 
     name: str = Field(pattern=r"^[a-z][a-z0-9-]{0,63}$", description="name in requests")
     title: Label = Field(description="name for people")
-    table: Table
+    table: TableGeometry
     robot: RobotMount
     stations: tuple[Station, ...] = Field(default=(), description="named places, at most 128")
     goal_region: GoalRegion | None = Field(default=None, description="box of goals, or null")
@@ -163,10 +163,10 @@ def lacks_for_pick(cell: Cell) -> str | None:
 
 
 def lacks_for_reach(cell: Cell) -> str | None:
-    """Say what a cell lacks to train a policy that reaches goals; None where nothing.
+    """Return what a cell lacks to train a policy that reaches goals; None if nothing.
 
-    Who walks is for the preset to say: where the cell has no walker, people walk where its
-    first person may be.
+    The preset defines the walkers: in a cell without one, people walk in the area of its first
+    person.
     """
     return "needs a goal_region" if cell.goal_region is None else None
 
@@ -207,5 +207,5 @@ def parse_definition(definition: object) -> Cell:
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         place = ".".join(str(part) for part in first["loc"])
-        rule = "was stored by another version of Tandem and does not fit this one: add it anew"
+        rule = "was stored by another version of Tandem and does not fit this one: add it again"
         raise InvalidInput(f"cell.{place}", first["msg"], rule) from error

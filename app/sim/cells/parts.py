@@ -73,7 +73,7 @@ class CellData(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True)
 
 
-class Table(CellData):
+class TableGeometry(CellData):
     """A rectangular table top; its upper face is the plane z = 0."""
 
     x_min: Length = Field(description="left edge [m]")

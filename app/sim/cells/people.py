@@ -64,7 +64,7 @@ class Worker(_Walking):
         return percentile_body(self.stature, self.arms, self.shoulders, self.pelvis_height)
 
 
-class _Cylinder(_Walking):
+class _CylinderOnFloor(_Walking):
     """A vertical cylinder that walks to random targets of its area (METHOD 2.1)."""
 
     radius_min: Radius = Field(default=0.2, description="least radius [m]")
@@ -79,7 +79,7 @@ class _Cylinder(_Walking):
     p_stay: Share = Field(default=0.1, description="chance to stay at a target it reached")
 
 
-class Walker(_Cylinder):
+class Walker(_CylinderOnFloor):
     """A cylinder whose speed and radius change all the time, eq. (4.1), (4.2)."""
 
     kind: Literal["walker"] = Field(description="speed and radius change with time")
@@ -93,7 +93,7 @@ class Walker(_Cylinder):
     )
 
 
-class ConstantWalker(_Cylinder):
+class ConstantWalker(_CylinderOnFloor):
     """A cylinder with one speed and one radius per episode, both drawn from their range."""
 
     kind: Literal["constant"] = Field(description="speed and radius constant per episode")
@@ -101,7 +101,7 @@ class ConstantWalker(_Cylinder):
     speed_max: Speed = Field(default=1.0, description="greatest speed [m/s]")
 
 
-class FixedSpeedWalker(_Cylinder):
+class FixedSpeedWalker(_CylinderOnFloor):
     """A cylinder with a given speed, below ``speed_min`` of the others too (METHOD 2.1)."""
 
     kind: Literal["fixed-speed"] = Field(description="given speed, radius changes with time")

@@ -27,15 +27,15 @@ CELL_MARGIN = 0.002
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shapes:
-    """Where people are at one moment, of any kind and number."""
+    """Shapes of any number of people of any kind at one moment."""
 
     columns: Vec
-    """Their capsules, shape (9, m); see ``geometry/capsules.py``."""
+    """Capsules, shape (9, m); see ``geometry/capsules.py``."""
     cylinders: Vec
     """Upright cylinders on the floor: x, y, radius, top [m], shape (n, 4)."""
     going: Vec | None = None
-    """How the cylinders go on: vx, vy and growth of the radius [m/s], shape (n, 3); NaN in the
-    row of one of whom that is not known, None where it is known of nobody."""
+    """Velocities of the cylinders: vx, vy and growth of the radius [m/s], shape (n, 3); NaN in
+    rows of unknown velocity, None where all are unknown."""
 
 
 def no_people() -> Shapes:
@@ -83,13 +83,13 @@ def shapes_of(
 
 
 class Checker:
-    """Asks the compiled kernels about poses and motions among people who stand still.
+    """Collision checks of configurations and motions among static people.
 
-    Not thread-safe: it owns a work space and counts what it looks at.
+    Not thread-safe: it has a work space and counts configurations.
 
     Args:
         arm: From ``scene.arm_of``.
-        people: Where people are.
+        people: Shapes of the people.
         margin: Distance to keep from people [m].
         cell_margin: Distance to keep from the cell and of the robot from itself [m].
     """
@@ -112,7 +112,7 @@ class Checker:
         self.n_poses = 0
 
     def is_free(self, q: Vec) -> bool:
-        """Tell whether everything keeps its distance at ``q`` [rad], shape (6,)."""
+        """Return whether all margins hold at ``q`` [rad], shape (6,)."""
         self.n_poses += 1
         return bool(free.free_at(self.arm, q, self._obstacles, self._pose))
 

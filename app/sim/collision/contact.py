@@ -1,8 +1,7 @@
-"""Contact and clearance of one state, for the live cell, deciding, safety and planners.
+"""Contact and clearance of one state, for live cell, decisions, safety layer and planners.
 
-The same kernels as the batches (``collision/kernels/contact.py``), so that what was trained
-with is what
-is reported.
+The same kernels as those of the batches (``kernels/contact.py``), so that reports agree with
+training.
 """
 
 from dataclasses import dataclass
@@ -39,8 +38,8 @@ class Contact:
     link: str
     """Robot capsule that touches, or is nearest to a person."""
     part: str
-    """What it touches or is nearest to: a capsule of a worker (CAPSULE_NAMES), ``walker``,
-    ``table``, ``obstacle``, another capsule of the robot, or ``nobody``."""
+    """Touched or nearest part: a capsule of a worker (CAPSULE_NAMES), ``walker``, ``table``,
+    ``obstacle``, another capsule of the robot, or ``no-person``."""
     worker: int | None = None
     """The worker whose capsule that is, from 0."""
     walker: int | None = None
@@ -188,10 +187,7 @@ def pedestrian_distances(arm: Arm, people: People, q: Vec, cylinders: Vec) -> Ve
 def _who(
     arm: Arm, people: People, kind: int, robot: arm_kernel.RobotPose, crowd: PeopleGeometry
 ) -> tuple[str, str, int | None, int | None]:
-    """Return the names of the capsule and of what it touches or is nearest to, and of whom.
-
-    Whom is a worker or a walker.
-    """
+    """Return names of the robot capsule and the nearest part, and the worker or walker."""
     names = load_robot_capsules().name
     if kind == kernel.SELF_CONTACT:
         _, pair = arm_kernel.self_clearance(arm, robot)
@@ -201,7 +197,7 @@ def _who(
         return names[link], "table" if box < 0 else "obstacle", None, None
     who = people_kernel.nearest_person(people, robot.columns, crowd)
     if who < 0:
-        return names[-1], "nobody", None, None
+        return names[-1], "no-person", None, None
     if who >= len(crowd.q):
         walker = who - len(crowd.q)
         x, y, r = crowd.cylinders[walker]

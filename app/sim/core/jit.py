@@ -1,8 +1,8 @@
-"""How the kernels are compiled: cached on disk, and without counting references.
+"""Compilation of kernels: cached on disk, and without reference counting.
 
-A kernel is handed tuples of dozens of arrays, and counting their references at every call (an
-atomic instruction per array) took more than half of a step's time. Without the counting a
-kernel can make no arrays: what it works on is made by its caller, once per batch.
+Kernels take tuples of dozens of arrays, and counting their references at every call (an atomic
+instruction per array) took more than half of a step's time. Without reference counting a kernel
+cannot allocate arrays: its caller allocates the work space, once per batch.
 """
 
 from collections.abc import Callable
@@ -15,7 +15,7 @@ R = TypeVar("R")
 
 
 def kernel(**options: Any) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Return numba's decorator for a kernel that makes no arrays; ``options`` are njit's."""
+    """Return numba's decorator for kernels that allocate no arrays; ``options`` are njit's."""
     compile_with: Any = njit  # its types do not know _nrt
     decorate: Callable[[Callable[P, R]], Callable[P, R]] = compile_with(
         cache=True, _nrt=False, **options
@@ -24,15 +24,15 @@ def kernel(**options: Any) -> Callable[[Callable[P, R]], Callable[P, R]]:
 
 
 def direct(compiled: Callable[..., R], arguments: tuple[Any, ...]) -> Callable[..., R]:
-    """Return a kernel compiled for arguments of these types, without looking at types again.
+    """Return a kernel compiled for arguments of these types, without type checks.
 
-    At every ordinary call numba works out the types of all arguments anew; for tuples of a
-    hundred arrays that takes five times as long as the rest of the call. What is returned
-    checks nothing: an array of another type or layout is read as if it were of this one.
+    An ordinary call determines the types of all arguments; for tuples of a hundred arrays that
+    takes five times as long as the rest of the call. The returned function checks nothing: an
+    array of another type or layout is read as if it were of this one.
 
     Args:
         compiled: Kernel.
-        arguments: What it will be called with.
+        arguments: Arguments of the types of later calls.
     """
     dispatcher: Any = compiled
     kind_of: Any = typeof

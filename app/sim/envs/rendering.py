@@ -6,7 +6,7 @@ from functools import lru_cache
 import numpy as np
 
 from app.sim.cells.cell import Cell
-from app.sim.cells.parts import Table
+from app.sim.cells.parts import TableGeometry
 from app.sim.core.arrays import Vec, as_kernel_array
 from app.sim.envs.raycast import Camera, Image, Raycaster
 from app.sim.envs.solids import Box, Capsule, Cylinder, Rgb, Solid
@@ -103,7 +103,7 @@ def _furniture(cell: Cell) -> tuple[Solid, ...]:
     return tuple(solids)
 
 
-def _table_solids(table: Table) -> list[Solid]:
+def _table_solids(table: TableGeometry) -> list[Solid]:
     x, y = 0.5 * (table.x_min + table.x_max), 0.5 * (table.y_min + table.y_max)
     half = (0.5 * (table.x_max - table.x_min), 0.5 * (table.y_max - table.y_min))
     middle, thick = (x, y, -0.5 * table.thickness), 0.5 * table.thickness

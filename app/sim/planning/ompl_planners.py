@@ -3,16 +3,16 @@
 A query asks for a path of straight joint motions from one posture to any of several. Three
 planners: RRT-Connect (the first path found), RRT* (Karaman and Frazzoli 2011; the shortest path
 its time allows, as in the source's comparison) and AORRTC (Wilson et al. 2025; almost-surely
-optimal RRT-Connect). Path length is in joint space [rad], Euclidean. OMPL is asked only where
+optimal RRT-Connect). Path length is in joint space [rad], Euclidean. OMPL is used only where
 the straight motion to the nearest goal is not free: no path is shorter than that (and AORRTC of
 2.0.1 returns paths that do not begin at the start where a goal can be reached straight).
-Whatever happens, the answer is a :class:`Plan` whose ``outcome`` has a name; only malformed
-numbers raise.
+The result is always a :class:`MotionPlan` with a named ``outcome``; only malformed numbers
+raise.
 
-Time: the search ends before its budget of wall time is spent, so that the path can be looked at
-once more within it; only a step of OMPL that is under way, or a busy machine, makes it a few
-milliseconds longer. With ``max_poses`` it ends after so many poses instead, which makes plans
-repeatable.
+Time: the search ends before its budget of wall time is spent, so that the path can be
+checked once more within it; a step of OMPL in progress, or a busy machine, makes it a few
+milliseconds longer. With ``max_poses`` it ends after that many poses instead, which makes
+plans repeatable.
 
 Seeds: OMPL keeps one seed generator per process. It is set before each plan, and all of a
 plan's random generators are made new from it, under a lock, so equal queries with equal seeds
@@ -80,23 +80,23 @@ class PlanSettings:
     range_rad: float = 0.5
     """Longest motion of a tree's branch [rad]; 0 lets OMPL choose."""
     detour_rad: float = 1.5
-    """How far each joint may go beyond start and goals [rad]; the cell's limits hold anyway."""
+    """Range of each joint beyond start and goals [rad], within the cell's limits."""
     n_joints: int = CONTROLLED
     """Joints that move, from the base on; the others stay as they are at the start."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionPlan:
-    """The answer to one query."""
+    """Result of one query."""
 
     outcome: str
     """One of OUTCOMES."""
     planner: str
-    """The planner asked."""
+    """Name of the planner."""
     path: Vec
     """Postures joined by straight motions [rad], shape (n, 6); n = 0 without a path."""
     goal: int
-    """Place of the reached goal among those given; -1 where none is reached."""
+    """Index of the reached goal; -1 where none is reached."""
     length_rad: float
     """Length of the path [rad]."""
     first_length_rad: float
@@ -104,7 +104,7 @@ class MotionPlan:
     planning_s: float
     """Wall time spent [s]."""
     n_poses: int
-    """Poses looked at."""
+    """Number of configurations checked."""
 
     @property
     def solved(self) -> bool:

@@ -11,8 +11,8 @@ a bounded polynomial action (METHOD 2.2) like those of a policy. The ``b_i`` are
 
 found by lengthening the blends that are too short until none is. A blend leaves the path near
 its corner, by ``|v_i - v_{i-1}| b_i dt / 8`` at most; where that is in contact, the motion
-stops at the corner instead. A motion already under way begins with its blend: the first corner
-is where a straight stop would end.
+stops at the corner instead. A robot in motion begins with a blend: the first corner is the end
+of its straight stop.
 
 Not the time-optimal parametrisation of the path: speeds are constant along a segment and
 durations whole periods. On straight lines between few corners little is lost. TOPP-RA's wheel
@@ -71,7 +71,7 @@ class TimedPath:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TimingLimits:
-    """What a motion keeps, per joint."""
+    """Limits of a timed motion, per joint."""
 
     qd_max: Vec
     """Speed [rad/s], shape (6,)."""
@@ -99,7 +99,7 @@ def time_path(
     Args:
         path: Postures joined by straight motions [rad], shape (n, 6), n >= 1. For a start in
             motion the first one is :func:`stopping_point`.
-        limits: What to keep.
+        limits: Limits of the motion.
         qd0: Joint speeds at the start [rad/s], shape (6,), inside the limits; at rest if None.
         stops: Corners (places in ``path``) to stop at; 0 means to brake before anything else.
 
@@ -133,7 +133,7 @@ def time_free_path(
     Args:
         checker: People and margins.
         path: A free path; see :func:`time_path`.
-        limits: What to keep.
+        limits: Limits of the motion.
         qd0: Joint speeds at the start [rad/s], shape (6,); at rest if None.
 
     Returns:
@@ -182,16 +182,16 @@ def _run(path: Vec, limits: TimingLimits, qd0: Vec) -> TimedPath:
     return TimedPath(dt=limits.dt, q=np.array(q), qd=np.array(qd), corner_rad=corner, n_stops=0)
 
 
-def _blends(ways: Vec, limits: TimingLimits, qd0: Vec) -> tuple[list[int], Vec, list[int]]:
+def _blends(segments: Vec, limits: TimingLimits, qd0: Vec) -> tuple[list[int], Vec, list[int]]:
     """Return the blends [periods], the speeds after each corner, and the periods at them.
 
     Args:
-        ways: The segments [rad], shape (n, 6).
-        limits: What to keep.
+        segments: The segments [rad], shape (n, 6).
+        limits: Limits of the motion.
         qd0: Joint speeds before the first corner [rad/s], shape (6,).
     """
-    n, dt = len(ways), limits.dt
-    least = np.max(np.abs(ways) / limits.qd_max, axis=1, initial=0.0) / dt
+    n, dt = len(segments), limits.dt
+    least = np.max(np.abs(segments) / limits.qd_max, axis=1, initial=0.0) / dt
     moving = stop_periods(qd0, limits)
     blends = np.array([moving if moving > 0 else min(n, 1), *[1] * n], dtype=np.float64)
     speeds = np.zeros((n + 1, 6))
@@ -199,7 +199,7 @@ def _blends(ways: Vec, limits: TimingLimits, qd0: Vec) -> tuple[list[int], Vec, 
         ends = 0.5 * (blends[:-1] + blends[1:])
         cruise = np.maximum(0.0, np.ceil(least - ends - 1e-9))
         if n:
-            speeds[:n] = ways / ((cruise + ends) * dt)[:, None]
+            speeds[:n] = segments / ((cruise + ends) * dt)[:, None]
         turns = np.diff(speeds, axis=0, prepend=qd0[None])
         short = np.max(np.abs(turns) / (limits.qdd_max * dt), axis=1) > blends + 1e-9
         if not short.any():

@@ -1,9 +1,9 @@
 """The protective separation distance around the whole robot, as a zone on the floor.
 
-``SafetyLayer.terms`` gives S_p for one person and the nearest link; here is S_p of every
-capsule of the robot, as fast as its joints could make it, and what it covers seen from above.
+``SafetyLayer.terms`` gives S_p for one person and the nearest link. This module gives S_p of
+every capsule, at the bound on its speed, and the area that it covers on the floor.
 
-Source: METHOD 2.7; ISO/TS 15066:2016, 5.5.4.
+Source: docs/method.md 2.7; ISO/TS 15066:2016, 5.5.4.
 """
 
 import numpy as np
@@ -31,14 +31,14 @@ def required_distances(arm: Arm, settings: SafetySettings, qd: Vec) -> Vec:
     t_r = arm.dt + settings.latency
     fastest = np.concatenate([[0.0], np.cumsum(np.abs(qd) * arm.lever)])
     v_r = fastest[arm.link]
-    way = v_r * (t_r + 0.5 * t_stop)
-    return np.asarray(settings.other_speed * (t_r + t_stop) + way + settings.margin)
+    robot_distance = v_r * (t_r + 0.5 * t_stop)
+    return np.asarray(settings.other_speed * (t_r + t_stop) + robot_distance + settings.margin)
 
 
 def separation_zone(arm: Arm, settings: SafetySettings, q: Vec, qd: Vec) -> Vec:
-    """Return the outline of where a person would be nearer than S_p.
+    """Return the outline of the area in which a person is nearer than S_p.
 
-    The convex hull, seen from above, of all capsules, each grown by its own S_p.
+    The convex hull, in the horizontal plane, of all capsules, each grown by its own S_p.
 
     Args:
         arm: Robot in its cell.

@@ -79,8 +79,8 @@ def kinds_of(cell: Cell) -> tuple[HumanKind, ...]:
 def with_people(cell: Cell, kinds: Sequence[HumanKind]) -> Cell:
     """Return a cell with other people in it.
 
-    Who the cell already describes is taken over, in order and as often as asked for; other
-    kinds walk, with the constants of METHOD 2.1, where the cell's people may be.
+    People that the cell describes are reused, in order and as often as requested; other kinds
+    walk in the area of the cell's people, with the constants of docs/method.md 2.1.
 
     Raises:
         InvalidInput: An unknown kind, too many people, or a worker where the cell has none.

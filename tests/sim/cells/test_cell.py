@@ -136,8 +136,8 @@ def test_cell_without_a_worker_says_so() -> None:
 def test_only_a_cell_with_cubes_docks_and_a_worker_is_one_to_pick_in() -> None:
     assert lacks_for_pick(load_cell("pick-and-place")) is None
     assert "kind cube" in (lacks_for_pick(load_cell("sorting-e0")) or "")
-    nobody = load_cell().model_copy(update={"people": ()})
-    assert "kind worker" in (lacks_for_pick(nobody) or "")
+    no_people = load_cell().model_copy(update={"people": ()})
+    assert "kind worker" in (lacks_for_pick(no_people) or "")
 
 
 def test_unknown_cell_is_named_with_the_known_ones() -> None:

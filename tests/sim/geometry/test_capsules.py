@@ -79,7 +79,7 @@ def test_capsule_distance_is_symmetric_and_never_above_that_of_sampled_points(
         assert sampled - d < 0.06
 
 
-def test_sets_give_the_least_of_all_pairs_each_way() -> None:
+def test_set_distances_are_the_least_of_all_pairs() -> None:
     rng = np.random.default_rng(42)
     for n, m in [(12, 16), (12, 12), (5, 24), (1, 8), (12, 48)]:
         a, b = rng.uniform(-0.6, 0.6, (n, 2, 3)), rng.uniform(-0.6, 0.6, (m, 2, 3))
@@ -115,7 +115,7 @@ def test_columns_that_fill_up_a_set_are_nowhere_near() -> None:
     assert (out[:3] < 5.0).all() and (out[3:] > 900.0).all()
 
 
-def test_longest_way_is_that_of_the_end_that_moved_farthest() -> None:
+def test_greatest_displacement_is_that_of_the_farthest_moved_end() -> None:
     rng = np.random.default_rng(46)
     before, after = rng.uniform(-1, 1, (2, 7, 2, 3))
     found = columns.greatest_displacement(

@@ -86,7 +86,7 @@ def test_least_of_many_is_the_least_of_each() -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_distance_to_all_of_a_way_is_the_least_along_it(kind: str) -> None:
+def test_swept_distance_is_the_least_along_the_path(kind: str) -> None:
     rng = np.random.default_rng(13)
     for ends in random_ends(60, 14, kind):
         robot = capsules_soa(ends[None], np.array([0.05]))
@@ -99,7 +99,7 @@ def test_distance_to_all_of_a_way_is_the_least_along_it(kind: str) -> None:
         assert min(along) - 0.5 * np.hypot(sx, sy) / 400 <= found <= min(along) + 1e-9
 
 
-def test_distance_to_a_way_is_never_more_than_over_the_top() -> None:
+def test_swept_distance_is_never_more_than_over_the_top() -> None:
     robot = capsules_soa(np.array([[[0.0, 0.0, 2.0], [0.3, 0.0, 2.2]]]), np.array([0.05]))
     over, _ = cylinder_clearance(robot, 0, 0.1, 0.0, 0.3, 1.3)
     assert swept_clearance(robot, 0.1, 0.0, 1e-3, 0.0, 0.3) < over

@@ -27,12 +27,12 @@ def station(name: str) -> Vec:
 
 
 def reaching_person() -> Vec:
-    """A person whose hand lies on the straight joint way from cube5 to cube0."""
+    """A person whose hand lies on the straight joint motion from cube5 to cube0."""
     rest = human.rest_posture(*CELL.human.home)
     return human.reach("r", np.array([-0.1, 0.7, 0.2]), rest, CELL.body).q
 
 
-def in_the_way() -> Shapes:
+def blocking_people() -> Shapes:
     return shapes_of(CELL, reaching_person()[None])
 
 
@@ -42,7 +42,7 @@ def ask(people: Shapes, settings: PlanSettings, seed: int = 1) -> planners.Motio
 
 
 @pytest.mark.parametrize("planner", PLANNERS)
-def test_a_free_way_is_taken_straight(planner: str) -> None:
+def test_a_free_path_is_straight(planner: str) -> None:
     answer = ask(no_people(), PlanSettings(planner=planner))
     assert answer.solved
     np.testing.assert_array_equal(answer.path, [station("cube5"), station("cube0")])
@@ -51,7 +51,7 @@ def test_a_free_way_is_taken_straight(planner: str) -> None:
 @pytest.mark.parametrize("planner", PLANNERS)
 def test_of_a_blocked_and_a_free_goal_the_shorter_path_counts(planner: str) -> None:
     goals = np.stack([station("cube0"), station("dock0")])
-    checker = Checker(ARM, in_the_way(), MARGIN)
+    checker = Checker(ARM, blocking_people(), MARGIN)
     answer = plan(
         checker, station("cube5"), goals, PlanSettings(planner=planner, max_poses=9_000)
     )
@@ -70,7 +70,7 @@ def test_of_a_blocked_and_a_free_goal_the_shorter_path_counts(planner: str) -> N
 
 @pytest.mark.parametrize("planner", PLANNERS)
 def test_a_path_round_a_person_is_free_for_the_reference_on_raw_meshes(planner: str) -> None:
-    answer = ask(in_the_way(), PlanSettings(planner=planner, max_poses=20_000))
+    answer = ask(blocking_people(), PlanSettings(planner=planner, max_poses=20_000))
     assert answer.solved and answer.goal == 0
     np.testing.assert_array_equal(answer.path[[0, -1]], [station("cube5"), station("cube0")])
     reference, human_q = CollisionReference(CELL), reaching_person()
@@ -91,7 +91,7 @@ def test_the_reference_sees_the_contact_that_the_path_avoids() -> None:
 def test_more_looking_gives_shorter_paths_on_average(planner: str) -> None:
     def mean(poses: int) -> float:
         settings = PlanSettings(planner=planner, max_poses=poses)
-        answers = [ask(in_the_way(), settings, seed) for seed in range(1, 7)]
+        answers = [ask(blocking_people(), settings, seed) for seed in range(1, 7)]
         return float(np.mean([a.length_rad for a in answers if a.solved]))
 
     assert mean(40_000) < mean(4_000)
@@ -100,20 +100,20 @@ def test_more_looking_gives_shorter_paths_on_average(planner: str) -> None:
 @pytest.mark.parametrize("planner", PLANNERS)
 def test_the_same_seed_gives_the_same_path_whatever_was_planned_before(planner: str) -> None:
     settings = PlanSettings(planner=planner, max_poses=6_000)
-    first = ask(in_the_way(), settings, seed=5)
-    other = ask(in_the_way(), settings, seed=6)
-    again = ask(in_the_way(), settings, seed=5)
+    first = ask(blocking_people(), settings, seed=5)
+    other = ask(blocking_people(), settings, seed=6)
+    again = ask(blocking_people(), settings, seed=5)
     np.testing.assert_array_equal(first.path, again.path)
     assert first.path.shape != other.path.shape or np.abs(first.path - other.path).max() > 1e-3
 
 
 def test_threads_do_not_disturb_each_other() -> None:
     settings = PlanSettings(max_poses=4_000)
-    alone = [ask(in_the_way(), settings, seed).path for seed in (1, 2)]
+    alone = [ask(blocking_people(), settings, seed).path for seed in (1, 2)]
     beside: dict[int, Vec] = {}
 
     def work(seed: int) -> None:
-        beside[seed] = ask(in_the_way(), settings, seed).path
+        beside[seed] = ask(blocking_people(), settings, seed).path
 
     threads = [threading.Thread(target=work, args=(seed,)) for seed in (1, 2)]
     for thread in threads:
@@ -126,16 +126,16 @@ def test_threads_do_not_disturb_each_other() -> None:
 
 @pytest.mark.parametrize("planner", PLANNERS)
 def test_no_budget_is_said_and_no_more_is_looked_at(planner: str) -> None:
-    answer = ask(in_the_way(), PlanSettings(planner=planner, max_poses=10))
+    answer = ask(blocking_people(), PlanSettings(planner=planner, max_poses=10))
     assert answer.outcome in ("out-of-time", "approximate")
     assert answer.goal == -1
     assert answer.n_poses < 200
 
 
 @pytest.mark.parametrize("planner", PLANNERS)
-def test_a_goal_without_a_way_ends_with_the_budget(planner: str) -> None:
+def test_an_unreachable_goal_ends_with_the_budget(planner: str) -> None:
     boxed_in = PlanSettings(planner=planner, budget_s=0.1, detour_rad=0.0)
-    answer = ask(in_the_way(), boxed_in)
+    answer = ask(blocking_people(), boxed_in)
     assert answer.outcome in ("out-of-time", "approximate")
     assert answer.n_poses > 100
 
@@ -163,7 +163,7 @@ def test_one_of_several_goals_is_reached_and_named() -> None:
     goals = goal_configurations(
         ARM, np.array(CELL.station("cube0").position), np.random.default_rng(0)
     )
-    checker = Checker(ARM, in_the_way(), MARGIN)
+    checker = Checker(ARM, blocking_people(), MARGIN)
     answer = plan(checker, station("cube5"), goals, PlanSettings(max_poses=20_000))
     assert answer.solved
     np.testing.assert_allclose(answer.path[-1, :5], goals[answer.goal, :5], atol=1e-12)
@@ -189,7 +189,7 @@ def test_a_cylinder_in_the_shared_workspace_is_planned_round_within_its_limits()
 def test_joints_that_stay_do_not_move() -> None:
     start = station("cube5")
     start[5] = 0.7
-    checker = Checker(ARM, in_the_way(), MARGIN)
+    checker = Checker(ARM, blocking_people(), MARGIN)
     answer = plan(checker, start, station("cube0")[None], PlanSettings(max_poses=6_000))
     assert answer.solved
     np.testing.assert_array_equal(answer.path[:, 5], 0.7)
@@ -198,7 +198,7 @@ def test_joints_that_stay_do_not_move() -> None:
 def test_six_joints_can_be_planned() -> None:
     goal = station("cube0")
     goal[5] = 1.0
-    checker = Checker(ARM, in_the_way(), MARGIN)
+    checker = Checker(ARM, blocking_people(), MARGIN)
     settings = PlanSettings(max_poses=20_000, n_joints=6)
     answer = plan(checker, station("cube5"), goal[None], settings)
     assert answer.solved and answer.path[-1, 5] == 1.0
@@ -228,7 +228,7 @@ def test_bad_numbers_are_named() -> None:
         plan(checker, start, start[None], PlanSettings(), seed=0)
 
 
-def test_a_machine_without_ompl_is_told_so(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_machine_without_ompl_gets_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(planners, "ob", None)
     with pytest.raises(MissingPackage, match="pip install ompl"):
         ask(no_people(), PlanSettings())

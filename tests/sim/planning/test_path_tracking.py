@@ -91,10 +91,10 @@ def test_a_straight_stop_keeps_the_direction_and_the_limits() -> None:
     rng = np.random.default_rng(0)
     for _ in range(100):
         qd = rng.uniform(-1.0, 1.0, 6) * ARM.limits.qd_max
-        way = qd / np.linalg.norm(qd)
+        track = qd / np.linalg.norm(qd)
         for _ in range(4):
             after = straight_stop(qd, LIMITS)
             assert np.all(np.abs(after - qd) <= ARM.limits.qdd_max * ARM.dt + 1e-12)
-            np.testing.assert_allclose(after, (after @ way) * way, atol=1e-12)
+            np.testing.assert_allclose(after, (after @ track) * track, atol=1e-12)
             qd = after
         np.testing.assert_array_equal(qd, np.zeros(6))

@@ -1,4 +1,4 @@
-"""The three roles do what they are named for when a person reaches into the way."""
+"""The three roles do what they are named for when a person reaches into the visited."""
 
 import itertools
 from collections.abc import Callable
@@ -23,7 +23,7 @@ from app.sim.scene.scene import arm_of
 CELL = load_cell()
 ARM = arm_of(CELL)
 REPLANNING = ["replan-on-blocked", "replan-every-cycle"]
-NOBODY = no_people()
+NO_PEOPLE = no_people()
 
 
 def station(name: str) -> Vec:
@@ -39,7 +39,7 @@ def reaching_to(palm: tuple[float, float, float]) -> Shapes:
     return shapes_of(CELL, posture_at(palm)[None])
 
 
-IN_THE_WAY = reaching_to((-0.1, 0.7, 0.2))
+BLOCKING = reaching_to((-0.1, 0.7, 0.2))
 AT_THE_GOAL = reaching_to((-0.5, 0.7, 0.2))
 
 
@@ -50,7 +50,7 @@ class Run:
     least_m: float
     states: list[str]
     q: Vec
-    way: list[Vec]
+    visited: list[Vec]
 
 
 def drive(
@@ -66,12 +66,12 @@ def drive(
     )
     follower = ReplanningExecutor(ARM, station("cube0")[None], settings)
     q, qd, t, least = station("cube5"), np.zeros(6), 0.0, 9.0
-    states, way = [], []
+    states, visited = [], []
     c, q_out, qd_out = np.empty(6), np.empty(6), np.empty(6)
     while t < limit_s:
         wanted = follower.act(q, qd, people(t), t) * scale(t)
         states.append(follower.report.state)
-        way.append(q)
+        visited.append(q)
         if states[-1] == "arrived":
             break
         start = JointState(q, qd, np.zeros(6))
@@ -82,24 +82,24 @@ def drive(
         assert np.all(np.abs(2.0 * c) <= ARM.limits.qdd_max + 1e-9)
         q, qd, t = q_out.copy(), qd_out.copy(), t + ARM.dt
         least = min(least, Checker(ARM, people(t)).clearance(q).people_m)
-    return Run(follower, t, least, states, q, way)
+    return Run(follower, t, least, states, q, visited)
 
 
 def from_time(start_s: float, shapes: Shapes, end_s: float = 99.0) -> Callable[[float], Shapes]:
-    return lambda t: shapes if start_s <= t < end_s else NOBODY
+    return lambda t: shapes if start_s <= t < end_s else NO_PEOPLE
 
 
 @pytest.mark.parametrize("role", ROLES)
 def test_every_role_arrives_in_an_empty_cell_in_the_same_time(role: str) -> None:
-    run = drive(role, lambda _: NOBODY)
+    run = drive(role, lambda _: NO_PEOPLE)
     assert run.states[-1] == "arrived"
-    assert run.seconds == pytest.approx(drive("plan-once", lambda _: NOBODY).seconds)
+    assert run.seconds == pytest.approx(drive("plan-once", lambda _: NO_PEOPLE).seconds)
     np.testing.assert_allclose(run.q, station("cube0"), atol=1e-3)
     assert run.follower.report.error_rad < 1e-9
 
 
-def test_once_plans_once_and_goes_through_whoever_comes() -> None:
-    run = drive("plan-once", from_time(0.3, IN_THE_WAY))
+def test_plan_once_ignores_people_that_arrive_later() -> None:
+    run = drive("plan-once", from_time(0.3, BLOCKING))
     assert run.states[-1] == "arrived"
     assert run.follower.report.n_plans == 1
     assert run.least_m < 0.0
@@ -108,7 +108,7 @@ def test_once_plans_once_and_goes_through_whoever_comes() -> None:
 @pytest.mark.parametrize("role", REPLANNING)
 @pytest.mark.parametrize("planner", PLANNERS)
 def test_replanning_roles_go_round_a_person_who_comes(role: str, planner: str) -> None:
-    run = drive(role, from_time(0.3, IN_THE_WAY), planner)
+    run = drive(role, from_time(0.3, BLOCKING), planner)
     report = run.follower.report
     assert run.states[-1] == "arrived"
     assert report.n_changes >= 2
@@ -118,21 +118,21 @@ def test_replanning_roles_go_round_a_person_who_comes(role: str, planner: str) -
 
 @pytest.mark.parametrize("role", REPLANNING)
 def test_the_motion_driven_is_free_for_the_reference_on_raw_meshes(role: str) -> None:
-    run, reference = drive(role, from_time(0.3, IN_THE_WAY)), CollisionReference(CELL)
+    run, reference = drive(role, from_time(0.3, BLOCKING)), CollisionReference(CELL)
     human_q = posture_at((-0.1, 0.7, 0.2))
-    for before, after in itertools.pairwise(run.way):
+    for before, after in itertools.pairwise(run.visited):
         for s in (0.0, 0.25, 0.5, 0.75):
             assert reference.contacts(before + s * (after - before), human_q) == []
 
 
 def test_when_blocked_plans_only_when_blocked() -> None:
-    run = drive("replan-on-blocked", from_time(0.3, IN_THE_WAY))
+    run = drive("replan-on-blocked", from_time(0.3, BLOCKING))
     assert run.follower.report.n_plans <= 4
-    assert drive("replan-on-blocked", lambda _: NOBODY).follower.report.n_plans == 1
+    assert drive("replan-on-blocked", lambda _: NO_PEOPLE).follower.report.n_plans == 1
 
 
 def test_every_tick_plans_in_every_period() -> None:
-    run = drive("replan-every-cycle", lambda _: NOBODY)
+    run = drive("replan-every-cycle", lambda _: NO_PEOPLE)
     assert run.follower.report.n_plans >= len(run.states) - 1
 
 
@@ -155,8 +155,8 @@ def test_without_a_plan_the_robot_rests_and_says_why(role: str) -> None:
     np.testing.assert_array_equal(run.q, station("cube5"))
 
 
-def test_once_takes_the_way_round_people_who_stand_there_at_the_start() -> None:
-    run = drive("plan-once", lambda _: IN_THE_WAY)
+def test_plan_once_avoids_people_present_at_the_start() -> None:
+    run = drive("plan-once", lambda _: BLOCKING)
     assert run.states[-1] == "arrived"
     assert run.least_m > run.follower.settings.margin
 
@@ -166,7 +166,7 @@ def test_a_layer_that_slows_and_stops_the_robot_does_not_lose_it(role: str) -> N
     def halting(t: float) -> float:
         return 0.0 if 1.0 <= t < 1.6 else 0.6 if t < 2.5 else 1.0
 
-    run = drive(role, lambda _: IN_THE_WAY, scale=halting)
+    run = drive(role, lambda _: BLOCKING, scale=halting)
     assert run.states[-1] == "arrived"
     assert run.least_m > run.follower.settings.margin - 0.005
     assert run.follower.report.error_rad < 5e-3
@@ -186,12 +186,12 @@ def test_a_robot_pushed_off_its_path_is_lost_and_planned_for_again() -> None:
     settings = ReplanningSettings(role="replan-on-blocked", plan=PlanSettings(max_poses=3_000))
     follower = ReplanningExecutor(ARM, station("cube0")[None], settings)
     q, qd = station("cube5"), np.zeros(6)
-    follower.act(q, qd, NOBODY, 0.0)
+    follower.act(q, qd, NO_PEOPLE, 0.0)
     pushed = q - np.array([0.3, 0.3, 0.0, 0.0, 0.0, 0.0])
-    follower.act(pushed, qd, NOBODY, ARM.dt)
+    follower.act(pushed, qd, NO_PEOPLE, ARM.dt)
     assert follower.report.state == "lost"
     for k in range(2, 14):
-        follower.act(pushed, qd, NOBODY, k * ARM.dt)
+        follower.act(pushed, qd, NO_PEOPLE, k * ARM.dt)
     assert follower.report.state == "following"
     assert follower.report.n_plans == 2
 

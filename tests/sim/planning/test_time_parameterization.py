@@ -154,8 +154,8 @@ def corner_beside_a_ball() -> tuple[Checker, Vec]:
     tcp = Robot(ARM.lengths.tool).tcp_pose(corner)[:3, 3]
     rng = np.random.default_rng(0)
     for _ in range(100):
-        way = rng.normal(size=3)
-        ball = tcp + 0.15 * way / np.linalg.norm(way)
+        offset = rng.normal(size=3)
+        ball = tcp + 0.15 * offset / np.linalg.norm(offset)
         people = capsule_shapes(np.array([[ball, ball]]), np.array([0.03]))
         checker = Checker(ARM, people, 0.0, 0.0)
         near = min(checker.clearance(q).people_m for q in rounded)

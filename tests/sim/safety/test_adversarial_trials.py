@@ -17,7 +17,7 @@ PLACES = pytest.mark.parametrize("place", [WORKER, WALKER], ids=["worker", "walk
 
 
 @PLACES
-def test_inside_the_assumptions_nobody_meets_a_link_in_motion(place):
+def test_inside_the_assumptions_no_contact_finds_a_link_in_motion(place):
     """1,000 episodes each; the slow test and ``evaluate safety-ssm`` run 100,000."""
     result = run_trial(place, 1000, seed=5)
     assert result.n_contacts > 300
@@ -72,7 +72,7 @@ def test_without_the_layer_the_same_people_are_hit():
     assert free.stopped_share == 0.0
 
 
-def test_every_policy_and_every_way_to_run_takes_part_evenly():
+def test_every_policy_and_every_behaviour_takes_part_evenly():
     result = run_trial(WORKER, 64, seed=1)
     for policy in POLICIES:
         for mode in MODES:
@@ -85,7 +85,7 @@ def test_the_same_seed_gives_the_same_bits_in_any_cut():
     assert np.array_equal(whole, np.concatenate(parts))
 
 
-def test_no_episodes_and_nobody_are_refused():
+def test_no_episodes_and_no_people_are_refused():
     with pytest.raises(InvalidInput, match="episodes"):
         run_trial(WORKER, 0, seed=1)
     with pytest.raises(InvalidInput, match="people"):

@@ -24,10 +24,10 @@ NO_MARGINS = SafetySettings(reaction_time=0.0, protective_distance=0.0)
 
 
 def tool(q=REST):
-    """Where the tool's tip is [m], and which way it goes when the base turns."""
+    """Where the tool's tip is [m], and which offset it goes when the base turns."""
     tip = Robot(ARM.lengths.tool).tcp_pose(q)[:3, 3]
-    way = np.array([-tip[1], tip[0], 0.0])
-    return tip, way / np.linalg.norm(way), np.hypot(tip[0], tip[1])
+    offset = np.array([-tip[1], tip[0], 0.0])
+    return tip, offset / np.linalg.norm(offset), np.hypot(tip[0], tip[1])
 
 
 def ball(center):
@@ -43,8 +43,8 @@ def both(*shapes):
 
 def ahead(distance):
     """A ball before the turning tool, ``distance`` from its surface."""
-    tip, way, _ = tool()
-    return ball(tip + (distance + RADIUS + CELL.robot.tool_radius) * way)
+    tip, offset, _ = tool()
+    return ball(tip + (distance + RADIUS + CELL.robot.tool_radius) * offset)
 
 
 def least_full_distance(settings, qd, c, age=0.0):
@@ -95,10 +95,10 @@ WALKS = replace(SafetySettings(), use_measured_velocity=True)
 def walker(distance, toward=0.0, across=0.0, growth=0.0):
     """A cylinder before the robot at rest, and how it goes on."""
     tip = tool()[0]
-    way = tip[:2] / np.linalg.norm(tip[:2])
+    offset = tip[:2] / np.linalg.norm(tip[:2])
     radius = 0.3
-    x, y = tip[:2] + (distance + radius + CELL.robot.tool_radius) * way
-    going = np.append(-toward * way + across * np.array([-way[1], way[0]]), growth)
+    x, y = tip[:2] + (distance + radius + CELL.robot.tool_radius) * offset
+    going = np.append(-toward * offset + across * np.array([-offset[1], offset[0]]), growth)
     cylinders = np.array([[x, y, radius, 3.0]])
     return replace(no_people(), cylinders=cylinders, going=going[None])
 
@@ -137,12 +137,12 @@ def test_who_walks_past_needs_hardly_more_than_who_stands():
     assert layer.decide(REST, NONE, NONE, NONE, walker(0.34, toward=1.0)).override == 0.0
 
 
-@pytest.mark.parametrize(("toward", "told"), [(0.8, 0.9), (0.0, 0.1), (-0.8, 0.1)])
-def test_the_speed_told_is_the_one_toward_the_robot_and_the_change(toward, told):
+@pytest.mark.parametrize(("toward", "stated"), [(0.8, 0.9), (0.0, 0.1), (-0.8, 0.1)])
+def test_the_stated_speed_is_that_toward_the_robot_plus_the_change(toward, stated):
     layer, people = SafetyLayer(ARM, WALKS), walker(0.4, toward=toward)
     decision = layer.decide(REST, NONE, NONE, NONE, people)
     _, terms = layer.terms(decision, NONE, people)
-    assert terms.human_speed == pytest.approx(told, abs=3e-3)
+    assert terms.human_speed == pytest.approx(stated, abs=3e-3)
     assert terms.separation == pytest.approx(apart(people), abs=1e-9)
 
 
@@ -178,8 +178,8 @@ def test_old_data_count_as_distance_lost():
 
 def test_override_falls_as_a_person_comes_nearer():
     layer = SafetyLayer(ARM, SafetySettings())
-    way = np.linspace(1.6, 0.0, 161)
-    falling = [layer.decide(REST, PAN, NONE, NONE, ahead(x)).override for x in way]
+    offset = np.linspace(1.6, 0.0, 161)
+    falling = [layer.decide(REST, PAN, NONE, NONE, ahead(x)).override for x in offset]
     assert falling[0] == 1.0
     assert falling[-1] == 0.0
     assert (np.diff(falling) <= 0.0).all()
@@ -194,7 +194,7 @@ def test_override_is_zero_when_a_person_is_inside_the_protective_distance(distan
     assert decision.qd[0] < PAN[0]
 
 
-def test_nobody_there_means_full_speed():
+def test_without_people_the_robot_runs_at_full_speed():
     decision = SafetyLayer(ARM, SafetySettings()).decide(REST, PAN, NONE, NONE, no_people())
     assert decision.override == 1.0
     assert decision.q == pytest.approx(REST + 0.05 * PAN)
@@ -240,8 +240,8 @@ def test_a_decision_names_person_part_link_and_distances():
 def test_power_and_force_limiting_lets_the_robot_go_on_slowly():
     """A hand in contact may be met at 1.347 m/s, a head at 0.129 m/s."""
     settings = replace(NO_MARGINS, pfl=True)
-    tip, way, lever = tool()
-    place = tip + (RADIUS + CELL.robot.tool_radius + 0.001) * way
+    tip, offset, lever = tool()
+    place = tip + (RADIUS + CELL.robot.tool_radius + 0.001) * offset
     far = np.full((body.N_CAPSULES, 2, 3), 50.0)
     overrides = {}
     for part in (body.C_HAND_R, body.C_HEAD):
@@ -259,7 +259,7 @@ def test_power_and_force_limiting_lets_the_robot_go_on_slowly():
     assert overrides[body.C_HEAD, 0.5] == 0.0
 
 
-def test_without_power_and_force_limiting_nobody_may_be_met_at_all():
+def test_without_power_and_force_limiting_no_contact_is_permitted():
     decision = SafetyLayer(ARM, NO_MARGINS).decide(REST, 0.2 * PAN, NONE, NONE, ahead(0.001))
     assert decision.override == 0.0
 
@@ -302,11 +302,11 @@ def test_no_running_person_found_by_search_meets_a_robot_in_motion():
     assert nearest < 0.02  # the search does come close
 
 
-def test_a_cell_s_assumptions_are_taken_over_and_told_with_units():
-    told = safety_settings(CELL).describe()
-    assert told["human_speed [m/s]"] == CELL.safety.human_speed
-    assert told["protective_distance [m]"] == CELL.safety.protective_distance
-    assert set(CELL.safety.model_dump()) <= {name.split(" ")[0] for name in told}
+def test_assumptions_of_a_cell_are_stated_with_units():
+    stated = safety_settings(CELL).describe()
+    assert stated["human_speed [m/s]"] == CELL.safety.human_speed
+    assert stated["protective_distance [m]"] == CELL.safety.protective_distance
+    assert set(CELL.safety.model_dump()) <= {name.split(" ")[0] for name in stated}
 
 
 @pytest.mark.parametrize("value", [-0.1, float("nan"), float("inf")])

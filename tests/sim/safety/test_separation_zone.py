@@ -26,8 +26,8 @@ def test_every_capsule_asks_for_what_the_safety_layer_tells_of_it() -> None:
     layer, rest = SafetyLayer(ARM, SETTINGS), np.zeros(6)
     for q, qd in states(12):
         people = Shapes(columns=no_people().columns, cylinders=np.array([[0.2, 1.6, 0.3, 1.3]]))
-        told = layer.decide(q, qd, rest, rest, people)
-        _, terms = layer.terms(told, qd, people)
+        decision = layer.decide(q, qd, rest, rest, people)
+        _, terms = layer.terms(decision, qd, people)
         assert np.abs(required_distances(ARM, SETTINGS, qd) - terms.required).min() < 1e-12
 
 

@@ -108,7 +108,7 @@ def run_safety(
         episodes: Number of episodes inside the assumptions, by default 100,000; every other
             row runs a tenth of that.
         seed: Seed of the episodes.
-        on_row: Told of each row once it is known.
+        on_row: Called with each row when it is complete.
     """
     n_inside = episodes or DEFAULT_EPISODES
     rows, settings = [], {}

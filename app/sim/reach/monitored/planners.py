@@ -51,7 +51,7 @@ def drive_planner(
         postures: Postures each row's planner may choose among [rad], shape (k, 6) each.
         settings: Planner, role and margins.
         seed: Seed of the planners.
-        blind: Whether the planner is told of nobody.
+        blind: Whether the planner ignores people.
 
     Returns:
         Override of each row's periods, in [0, 1], and what each planner reports.
@@ -67,9 +67,8 @@ def drive_planner(
 def _drive(batch: GuardedReach, row: int, follower: ReplanningExecutor, blind: bool) -> Vec:
     """Drive one row to the end of its episode; return its overrides."""
     state, found = batch.state, []
-    nobody: Shapes = no_people()
     while state.outcome[row] == RUNNING:
-        people = nobody if blind else batch.people_shapes(row)
+        people: Shapes = no_people() if blind else batch.people_shapes(row)
         q, qd = state.q[row].copy(), state.qd[row].copy()
         wanted = follower.act(q, qd, people, float(state.elapsed[row]))
         batch.step_speeds(row, wanted)

@@ -1,4 +1,4 @@
-"""The contact test may be early, never late: held against FCL on the raw meshes."""
+"""The contact test may be early, never late: compared with FCL on the raw meshes."""
 
 import numpy as np
 import pytest
@@ -123,7 +123,7 @@ def test_standing_still_at_home_reports_no_contact_and_the_distance(cell: Cell) 
 def test_sweep_beside_walkers_is_never_later_than_poses_every_millisecond(cell: Cell) -> None:
     cell = with_people(cell, ("walker", "walker"))
     rng, robot, arm, people = np.random.default_rng(66), Robot(), arm_of(cell), people_of(cell)
-    nobody, zero, verdicts = np.zeros((0, 18)), np.zeros(6), []
+    no_worker, zero, verdicts = np.zeros((0, 18)), np.zeros(6), []
     for _ in range(300):
         period = Period(cell, rng, robot, 1.0)
         at = np.column_stack([rng.uniform(-0.9, 0.9, 2), rng.uniform(0.5, 1.6, 2)])
@@ -133,13 +133,13 @@ def test_sweep_beside_walkers_is_never_later_than_poses_every_millisecond(cell: 
             arm,
             people,
             JointPath(period.q, period.qd, period.c, zero),
-            (nobody, nobody),
+            (no_worker, no_worker),
             (before, after),
         )
         touches = False
         parts = np.linspace(0.0, 1.0, SUBSTEPS + 1)
         for part, q in zip(parts, period.rows(SUBSTEPS).q_robot, strict=True):
-            free = clearance(arm, people, q, nobody, before + part * (after - before))
+            free = clearance(arm, people, q, no_worker, before + part * (after - before))
             touches = touches or min(free.people_m, free.cell_m, free.self_m) <= 0.0
         assert not (touches and found.kind == "none")
         verdicts.append((found.kind != "none", touches))

@@ -52,10 +52,10 @@ def test_free_motions_have_slack_everywhere(arm: Arm) -> None:
 
 
 def test_motions_far_from_everything_take_few_poses(arm: Arm) -> None:
-    nobody = around(no_people())
+    no_one = around(no_people())
     pose = arm_kernel.new_robot_pose(arm)
     up = np.array([0.0, -1.57, 0.0, -1.57, 0.0, 0.0])
-    verdict, looked = free.edge_free(arm, up, up + 0.01, nobody, pose)
+    verdict, looked = free.edge_free(arm, up, up + 0.01, no_one, pose)
     assert verdict and looked <= 6
 
 
@@ -65,10 +65,10 @@ def test_first_blocked_period_is_where_the_person_stands(arm: Arm) -> None:
     qd = np.zeros((81, 6))
     qd[:, 0] = (turn[1, 0] - turn[0, 0]) / arm.dt
     pose = arm_kernel.new_robot_pose(arm)
-    nobody = around(no_people())
-    free.clearances_at(arm, turn[30], nobody, pose)
+    no_one = around(no_people())
+    free.clearances_at(arm, turn[30], no_one, pose)
     tool = ends_of(pose.columns[:, -1:], 1)
     person = around(capsule_shapes(tool, np.array([0.02])))
-    assert free.first_blocked(arm, turn, qd, arm.dt, 0, nobody, pose) == 80
+    assert free.first_blocked(arm, turn, qd, arm.dt, 0, no_one, pose) == 80
     assert 15 < free.first_blocked(arm, turn, qd, arm.dt, 0, person, pose) <= 30
     assert free.first_blocked(arm, turn, qd, arm.dt, 78, person, pose) == 80

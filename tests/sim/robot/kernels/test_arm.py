@@ -35,8 +35,8 @@ def test_speed_bound_holds_for_every_point_of_the_robot(degree: int) -> None:
         for x in np.linspace(0.0, arm.dt, 9):
             kernel.place_robot(arm, at(x), now)
             kernel.place_robot(arm, at(x + tick), soon)
-            way = ends_of(soon.columns, 12) - ends_of(now.columns, 12)
-            assert np.linalg.norm(way, axis=2).max() / tick <= bound + 1e-4
+            moved = ends_of(soon.columns, 12) - ends_of(now.columns, 12)
+            assert np.linalg.norm(moved, axis=2).max() / tick <= bound + 1e-4
 
 
 def test_tool_speed_and_tilt_are_those_of_pinocchio() -> None:

@@ -68,7 +68,7 @@ def path_of(q, qd, c, d, rate, times):
     return poses
 
 
-def test_nobody_can_come_near_on_an_admitted_path():
+def test_people_cannot_come_near_on_an_admitted_path():
     space, admitted = watch.new_ssm_workspace(ARM, 8, 0), 0
     rule = watch.SeparationRule(np.full(8, 0.5), 0.02, 0.05, np.zeros(8))
     for k, (q, qd, c, d, people) in enumerate(motions(400, 1)):
@@ -87,19 +87,22 @@ def test_nobody_can_come_near_on_an_admitted_path():
 def test_people_of_known_velocity_are_not_met_on_an_admitted_path():
     """Cylinders with known velocities: anywhere on their path, and a little faster."""
     rng, space, admitted = np.random.default_rng(9), watch.new_ssm_workspace(ARM, 0, 2), 0
-    rule, nobody = watch.SeparationRule(np.full(2, 0.1), 0.02, 0.05, np.zeros(2)), no_columns()
+    rule, no_capsules = (
+        watch.SeparationRule(np.full(2, 0.1), 0.02, 0.05, np.zeros(2)),
+        no_columns(),
+    )
     for k, (q, qd, c, d, _) in enumerate(motions(400, 10)):
         rate, cylinders = (1.0, 0.9)[k % 2], np.full((2, 4), 1.3)
         cylinders[:, :2], cylinders[:, 2] = rng.uniform(-1.5, 1.5, (2, 2)), 0.2
         space.velocity[:] = rng.uniform([-1.0, -1.0, -0.3], [1.0, 1.0, 0.3], (2, 3))
         going, growth = space.velocity[:, :2], np.maximum(0.0, space.velocity[:, 2])
         space.known_speed[:] = np.hypot(*going.T) + np.abs(space.velocity[:, 2])
-        watch.place_node(ARM, PeopleShapes(nobody, cylinders), q, watch.NOW, 0.02, space)
+        watch.place_node(ARM, PeopleShapes(no_capsules, cylinders), q, watch.NOW, 0.02, space)
         if not ssm.admissible(
             ARM,
             rule,
             0.02,
-            PeopleShapes(nobody, cylinders),
+            PeopleShapes(no_capsules, cylinders),
             JointPath(q, qd, c, d),
             rate,
             space,
@@ -112,7 +115,9 @@ def test_people_of_known_velocity_are_not_met_on_an_admitted_path():
                 there[:, :2] += since * going
                 there[:, 2] += since * growth
                 other = watch.new_ssm_workspace(ARM, 0, 2)
-                watch.place_node(ARM, PeopleShapes(nobody, there), pose, watch.NOW, 0.0, other)
+                watch.place_node(
+                    ARM, PeopleShapes(no_capsules, there), pose, watch.NOW, 0.0, other
+                )
                 assert other.gap[watch.NOW].min() > 0.05 + 0.1 * (0.02 + t) - 1e-9
     assert 40 < admitted < 360
 
