@@ -329,7 +329,7 @@ def test_planner_and_a_checkpoint_at_once_are_refused(client: TestClient) -> Non
         ("attempts", -1, "watch.attempts"),
         ("attempts", 10**30, "watch.attempts"),
         ("budget", -1.0, "watch.budget"),
-        ("handed_over", "bribed", "watch.handed_over"),
+        ("planner_fallback", "bribed", "watch.planner_fallback"),
         ("more", 1, "watch.more"),
     ],
 )

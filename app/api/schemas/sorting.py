@@ -13,7 +13,7 @@ from app.sim.core.arrays import Vec
 from app.sim.sorting.batch import SortingSettings
 from app.sim.sorting.decision_types import REASONS, By, RankedMove, SortingDecision, Why
 from app.sim.sorting.names import NamedObject, SortingNames, fail_with, state_from_names
-from app.sim.sorting.progress_monitor import MAX_SEEN, HandOver, SortingWatch
+from app.sim.sorting.progress_monitor import MAX_SEEN, HandOver, ProgressMonitor
 from app.sim.sorting.sorting_values import SortingValues
 from app.sim.sorting.state import (
     MAX_CELLS,
@@ -96,14 +96,14 @@ class SortingRecord(Body):
     budget: Finite = Field(
         ge=0.0, le=1e6, description="attempts after which the planner takes over"
     )
-    handed_over: HandOver | None = Field(description="why the planner decides, or null")
+    planner_fallback: HandOver | None = Field(description="why the planner decides, or null")
 
-    def to_domain(self) -> SortingWatch:
+    def to_domain(self) -> ProgressMonitor:
         """Return it as the simulator's data."""
-        return SortingWatch(**{**dict(self), "seen": tuple(self.seen)})
+        return ProgressMonitor(**{**dict(self), "seen": tuple(self.seen)})
 
     @classmethod
-    def from_domain(cls, watch: SortingWatch) -> Self:
+    def from_domain(cls, watch: ProgressMonitor) -> Self:
         """Make it from the simulator's data."""
         return cls(
             checkpoint=watch.checkpoint,
@@ -113,7 +113,7 @@ class SortingRecord(Body):
             seen=list(watch.seen),
             attempts=watch.attempts,
             budget=watch.budget,
-            handed_over=watch.handed_over,
+            planner_fallback=watch.planner_fallback,
         )
 
 

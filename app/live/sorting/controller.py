@@ -13,7 +13,7 @@ from app.live.sorting.table import Block, SortingTable
 from app.sim.sorting.batch import apply
 from app.sim.sorting.decision import decide, failure_of
 from app.sim.sorting.decision_types import RankedMove, SortingDecision, Why
-from app.sim.sorting.progress_monitor import SortingWatch, note_move, state_key
+from app.sim.sorting.progress_monitor import ProgressMonitor, note_move, state_key
 from app.sim.sorting.sorting_values import SortingValues
 from app.sim.sorting.state import Move
 
@@ -53,8 +53,8 @@ class SortController:
         """The last decision."""
         self.planner_fallbacks = 0
         """Number of planner fallbacks."""
-        self._before: SortingWatch | None = None
-        self._after: SortingWatch | None = None
+        self._before: ProgressMonitor | None = None
+        self._after: ProgressMonitor | None = None
         self._attempted = False
         self._avoid: set[int] = set()
 

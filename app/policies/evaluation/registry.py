@@ -30,7 +30,7 @@ from app.policies.evaluation.reach import (
 from app.policies.evaluation.reach import (
     tracker as reach_tracker,
 )
-from app.policies.evaluation.rows import OnRow, untold
+from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.evaluation.safety import ssm as safety
 from app.policies.evaluation.sorting import runs as sorting
 from app.sim.mocap.importer import Motion
@@ -56,7 +56,7 @@ PROTOCOLS: Mapping[str, Protocol] = MappingProxyType(
         "reach-people": reach_people.run_people,
         "reach-tracker": reach_tracker.run_tracker,
         "reach-ssm": reach_ssm.run_ssm,
-        "reach-ceiling": reach_ceiling.run_ceiling,
+        "reach-ceiling": reach_ceiling.run_oracle,
     }
 )
 """Protocol by name; each takes a checkpoint, ``episodes``, ``seed`` and ``on_row``."""
@@ -88,7 +88,7 @@ def evaluate(
     episodes: int | None = None,
     seed: int = 11,
     motions: Sequence[Motion] = (),
-    on_row: OnRow = untold,
+    on_row: OnRow = ignore_row,
 ) -> dict[str, Any]:
     """Run a protocol and return its result, ready for JSON.
 

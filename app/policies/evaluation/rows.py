@@ -9,5 +9,5 @@ OnRow = Callable[[int, int, Row], None]
 """Called with the number of rows done, the number of rows in all, and the newest row."""
 
 
-def untold(_done: int, _total: int, _row: Row) -> None:
+def ignore_row(_done: int, _total: int, _row: Row) -> None:
     """Tell nobody."""

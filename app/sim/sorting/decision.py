@@ -18,7 +18,7 @@ from app.sim.sorting.kernels.action_costs import attempts_by_move
 from app.sim.sorting.kernels.planner import Objects, Task, new_work
 from app.sim.sorting.kernels.shortest_paths import most_states
 from app.sim.sorting.planner import Plan, solve
-from app.sim.sorting.progress_monitor import SortingWatch, look, note_move, state_key
+from app.sim.sorting.progress_monitor import ProgressMonitor, look, note_move, state_key
 from app.sim.sorting.sorting_values import SortingValues
 from app.sim.sorting.state import NULL, Codes, Move, SortingShape, SortingState, empty_state
 
@@ -32,7 +32,7 @@ def decide(
     policy: SortingValues | None,
     state: SortingState,
     shape: SortingShape,
-    watch: SortingWatch | None = None,
+    watch: ProgressMonitor | None = None,
     *,
     ask_planner: bool = False,
 ) -> SortingDecision:
@@ -48,13 +48,13 @@ def decide(
     begin = time.perf_counter()
     plan = solve(state, shape)
     outside = outside_goal(state.goal, shape)
-    noted: SortingWatch | None = None
+    noted: ProgressMonitor | None = None
     ranked: tuple[RankedMove, ...] = ()
     trusted, why = _trusted(policy, shape, plan, outside, ask_planner)
     if trusted is not None:
         noted = look(watch, state_key(state), plan.attempts, trusted.checkpoint)
-        if noted.handed_over is not None:
-            trusted, why = None, noted.handed_over
+        if noted.planner_fallback is not None:
+            trusted, why = None, noted.planner_fallback
     if plan.best is not None:
         ranked = (
             rank_by_planner(state, shape, plan)
@@ -220,7 +220,7 @@ def _ranked(
 
 
 def _noted_move(
-    watch: SortingWatch, state: SortingState, shape: SortingShape, move: Move
-) -> SortingWatch:
+    watch: ProgressMonitor, state: SortingState, shape: SortingShape, move: Move
+) -> ProgressMonitor:
     expected = state_key(apply(state, shape, move))
     return note_move(watch, expected, can_fail=failure_of(state, move) > 0.0)

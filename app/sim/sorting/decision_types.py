@@ -7,7 +7,7 @@ exact planner's plan.
 from dataclasses import dataclass
 from typing import Literal
 
-from app.sim.sorting.progress_monitor import SortingWatch
+from app.sim.sorting.progress_monitor import ProgressMonitor
 from app.sim.sorting.state import Move
 
 By = Literal["policy", "planner"]
@@ -86,7 +86,7 @@ class SortingDecision:
     """What of the goal lies outside what policies are trained for."""
     checkpoint: str | None
     """SHA-256 of the policy that was asked; None without one."""
-    watch: SortingWatch | None
+    watch: ProgressMonitor | None
     """Record to hand back with the next state of this task; None when none is needed."""
     elapsed_ms: float
     """Time the decision took [ms]."""

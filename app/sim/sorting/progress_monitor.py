@@ -39,7 +39,7 @@ HandOver = Literal["repeated", "patience"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SortingWatch:
+class ProgressMonitor:
     """The record of one task since it began, or since somebody interfered."""
 
     checkpoint: str
@@ -56,7 +56,7 @@ class SortingWatch:
     """Moves tried since the record began or, after a hand-over, since then."""
     budget: float
     """Attempts after which the planner takes over."""
-    handed_over: HandOver | None
+    planner_fallback: HandOver | None
     """Why the planner decides; None while the policy does."""
 
 
@@ -70,7 +70,7 @@ def state_key(state: SortingState) -> str:
     return digest.hexdigest()
 
 
-def begin_watch(key: str, expected_attempts: float, checkpoint: str) -> SortingWatch:
+def begin_monitor(key: str, expected_attempts: float, checkpoint: str) -> ProgressMonitor:
     """Return the record of a task that begins now.
 
     Args:
@@ -78,7 +78,7 @@ def begin_watch(key: str, expected_attempts: float, checkpoint: str) -> SortingW
         expected_attempts: Attempts that the exact planner expects from here.
         checkpoint: SHA-256 of the policy that decides.
     """
-    return SortingWatch(
+    return ProgressMonitor(
         checkpoint=checkpoint,
         last=key,
         expected="",
@@ -86,13 +86,13 @@ def begin_watch(key: str, expected_attempts: float, checkpoint: str) -> SortingW
         seen=(key,),
         attempts=0,
         budget=PATIENCE * expected_attempts,
-        handed_over=None,
+        planner_fallback=None,
     )
 
 
 def look(
-    watch: SortingWatch | None, key: str, expected_attempts: float, checkpoint: str
-) -> SortingWatch:
+    watch: ProgressMonitor | None, key: str, expected_attempts: float, checkpoint: str
+) -> ProgressMonitor:
     """Return the record after a look at the present state.
 
     Args:
@@ -102,12 +102,12 @@ def look(
         checkpoint: SHA-256 of the policy that would decide.
     """
     if watch is None or watch.checkpoint != checkpoint:
-        return begin_watch(key, expected_attempts, checkpoint)
+        return begin_monitor(key, expected_attempts, checkpoint)
     moved = key == watch.expected
     if not moved and key != watch.last:
-        return begin_watch(key, expected_attempts, checkpoint)
+        return begin_monitor(key, expected_attempts, checkpoint)
     now = dataclasses.replace(watch, last=key, attempts=watch.attempts + 1)
-    if now.handed_over is not None:
+    if now.planner_fallback is not None:
         return now
     repeated = key in watch.seen if moved else not watch.can_fail
     if repeated:
@@ -117,7 +117,7 @@ def look(
     return dataclasses.replace(now, seen=(*now.seen, key)) if moved else now
 
 
-def note_move(watch: SortingWatch, expected: str, *, can_fail: bool) -> SortingWatch:
+def note_move(watch: ProgressMonitor, expected: str, *, can_fail: bool) -> ProgressMonitor:
     """Return the record with the move that was chosen.
 
     Args:
@@ -128,5 +128,5 @@ def note_move(watch: SortingWatch, expected: str, *, can_fail: bool) -> SortingW
     return dataclasses.replace(watch, expected=expected, can_fail=can_fail)
 
 
-def _hand_over(watch: SortingWatch, why: HandOver) -> SortingWatch:
-    return dataclasses.replace(watch, handed_over=why, attempts=0, seen=())
+def _hand_over(watch: ProgressMonitor, why: HandOver) -> ProgressMonitor:
+    return dataclasses.replace(watch, planner_fallback=why, attempts=0, seen=())

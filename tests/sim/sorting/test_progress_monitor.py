@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 
 from app.sim.sorting.batch import apply, valid_moves
-from app.sim.sorting.progress_monitor import MAX_SEEN, SortingWatch, look, note_move, state_key
+from app.sim.sorting.progress_monitor import (
+    MAX_SEEN,
+    ProgressMonitor,
+    look,
+    note_move,
+    state_key,
+)
 from app.sim.sorting.state import Move, SortingShape, SortingState, empty_state
 
 SHAPE = SortingShape(n_cells=4, n_colours=2)
@@ -20,12 +26,12 @@ def start() -> SortingState:
 
 
 def seen(
-    watch: SortingWatch | None, state: SortingState, attempts: float = 10.0
-) -> SortingWatch:
+    watch: ProgressMonitor | None, state: SortingState, attempts: float = 10.0
+) -> ProgressMonitor:
     return look(watch, state_key(state), attempts, POLICY)
 
 
-def after_move(watch: SortingWatch, state: SortingState, move: Move) -> SortingWatch:
+def after_move(watch: ProgressMonitor, state: SortingState, move: Move) -> ProgressMonitor:
     fail = state.fail[move.pick] if move.pick < SHAPE.n_cells else 0.0
     return note_move(watch, state_key(apply(state, SHAPE, move)), can_fail=bool(fail > 0.0))
 
@@ -33,20 +39,20 @@ def after_move(watch: SortingWatch, state: SortingState, move: Move) -> SortingW
 def test_record_begins_with_the_state_and_one_and_a_half_times_the_attempts() -> None:
     watch = seen(None, start(), attempts=4.0)
     assert watch.seen == (state_key(start()),)
-    assert (watch.attempts, watch.budget, watch.handed_over) == (0, 6.0, None)
+    assert (watch.attempts, watch.budget, watch.planner_fallback) == (0, 6.0, None)
 
 
 def test_failed_pick_explains_that_the_state_stayed() -> None:
     watch = after_move(seen(None, start()), start(), Move(0, 4))
     for attempt in range(1, 5):
         watch = after_move(seen(watch, start()), start(), Move(0, 4))
-        assert (watch.handed_over, watch.attempts) == (None, attempt)
+        assert (watch.planner_fallback, watch.attempts) == (None, attempt)
 
 
 def test_state_that_stayed_though_the_pick_cannot_fail_hands_over() -> None:
     state = apply(start(), SHAPE, Move(0, 5))
     watch = after_move(seen(None, state), state, Move(5, 1))
-    assert seen(watch, state).handed_over == "repeated"
+    assert seen(watch, state).planner_fallback == "repeated"
 
 
 def test_state_that_comes_back_by_the_moves_alone_hands_over() -> None:
@@ -54,7 +60,7 @@ def test_state_that_comes_back_by_the_moves_alone_hands_over() -> None:
     second = apply(first, SHAPE, Move(0, 5))
     watch = after_move(seen(None, first), first, Move(0, 5))
     watch = after_move(seen(watch, second), second, Move(5, 0))
-    assert seen(watch, first).handed_over == "repeated"
+    assert seen(watch, first).planner_fallback == "repeated"
 
 
 def test_record_begins_anew_when_somebody_interferes() -> None:
@@ -82,7 +88,7 @@ def test_planner_takes_over_after_one_and_a_half_times_the_expected_attempts() -
     whys = []
     for _ in range(4):
         watch = after_move(seen(watch, start(), attempts=2.0), start(), Move(0, 4))
-        whys.append((watch.handed_over, watch.attempts))
+        whys.append((watch.planner_fallback, watch.attempts))
     assert whys == [(None, 1), (None, 2), ("patience", 0), ("patience", 1)]
 
 
@@ -91,8 +97,8 @@ def test_planner_keeps_deciding_until_somebody_interferes() -> None:
     watch = seen(after_move(seen(None, state), state, Move(5, 1)), state)
     on_its_way = apply(state, SHAPE, Move(5, 4))
     watch = seen(after_move(watch, state, Move(5, 4)), on_its_way)
-    assert watch.handed_over == "repeated"
-    assert seen(after_move(watch, on_its_way, Move(4, 2)), start()).handed_over is None
+    assert watch.planner_fallback == "repeated"
+    assert seen(after_move(watch, on_its_way, Move(4, 2)), start()).planner_fallback is None
 
 
 def test_record_never_grows_beyond_its_bound() -> None:
@@ -100,7 +106,7 @@ def test_record_never_grows_beyond_its_bound() -> None:
     full = dataclasses.replace(watch, seen=tuple(f"{k:016x}" for k in range(MAX_SEEN)))
     second = apply(start(), SHAPE, Move(0, 5))
     handed = seen(after_move(full, start(), Move(0, 5)), second)
-    assert handed.handed_over == "patience"
+    assert handed.planner_fallback == "patience"
     assert len(handed.seen) <= MAX_SEEN
 
 

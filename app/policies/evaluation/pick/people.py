@@ -28,7 +28,7 @@ from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.evaluation.pick import selection_rules as choice_rules
 from app.policies.evaluation.pick.episodes import Evaluator, settings_for
 from app.policies.evaluation.pick.tasks import settings_of
-from app.policies.evaluation.rows import OnRow, untold
+from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.evaluation.statistics import wilson
 from app.policies.inference.task_selection import HYSTERESIS, ValueNetworks, pick_preset_of
 from app.sim.human.anthropometry import percentile_body
@@ -96,7 +96,7 @@ def _sized(work: HumanMotionConfig, percentile: float, pelvis: float) -> HumanMo
 
 
 def run_people(
-    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = untold
+    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> dict[str, Any]:
     """Evaluate beside 0 to 4 people and people of several sizes.
 
@@ -125,7 +125,7 @@ def run_people(
 
 
 def run_yielding(
-    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = untold
+    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> dict[str, Any]:
     """Evaluate beside people who give way to the arm by 0, one half and fully.
 
@@ -152,7 +152,7 @@ def run_mocap(
     episodes: int | None,
     seed: int,
     motions: Sequence[Motion] = (),
-    on_row: OnRow = untold,
+    on_row: OnRow = ignore_row,
 ) -> dict[str, Any]:
     """Evaluate beside recorded people, with the library's people as the first row.
 

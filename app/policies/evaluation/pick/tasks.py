@@ -15,7 +15,7 @@ from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.evaluation.pick import selection_rules as choice_rules
 from app.policies.evaluation.pick.episodes import Episodes, Evaluator, Rule, settings_for
 from app.policies.evaluation.pick.recorded_people import recheck
-from app.policies.evaluation.rows import OnRow, untold
+from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.inference.task_selection import HYSTERESIS, ValueNetworks, pick_preset_of
 from app.sim.pick.batch import OUTCOMES, hand_speeds
 from app.sim.scenario.kernels import episode as kernel
@@ -57,7 +57,7 @@ def settings_of(evaluator: Evaluator) -> dict[str, object]:
 
 
 def run_single(
-    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = untold
+    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> dict[str, object]:
     """Evaluate one random target per episode.
 
@@ -79,7 +79,7 @@ def run_single(
 
 
 def run_choice(
-    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = untold
+    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> dict[str, object]:
     """Evaluate the choice among 2-3 random targets, against other rules on the same episodes.
 

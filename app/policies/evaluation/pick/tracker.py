@@ -27,7 +27,7 @@ from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.evaluation.pick import selection_rules as choice_rules
 from app.policies.evaluation.pick.episodes import Index, Seen, Sight, seen_exactly
 from app.policies.evaluation.pick.tasks import evaluator_of, settings_of
-from app.policies.evaluation.rows import OnRow, untold
+from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.inference.task_selection import HYSTERESIS
 from app.sim.core.arrays import Vec
 from app.sim.human import model as human
@@ -167,7 +167,7 @@ class ThroughTracker:
 
 
 def run_tracker(
-    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = untold
+    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> dict[str, object]:
     """Evaluate the choice among 2-3 random targets beside people seen by a tracker.
 

@@ -13,14 +13,14 @@ from app.errors import InvalidInput
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.evaluation.reach.episodes import (
-    TOLD_S,
+    REPORTED_TIME_LEFT_S,
     ReachEpisodes,
     play,
     random_goals,
     recheck_contacts,
     target_goals,
 )
-from app.policies.evaluation.rows import OnRow, untold
+from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.inference.controllers import AHEAD, How, Mover, hows_of, mover_of
 from app.policies.inference.reach_policy import ReachPolicy
 from app.sim.cells.cell import Cell
@@ -68,7 +68,7 @@ class ReachBench:
         on_row: Told of each row once it is known.
     """
 
-    def __init__(self, checkpoint: Checkpoint, seed: int, on_row: OnRow = untold) -> None:
+    def __init__(self, checkpoint: Checkpoint, seed: int, on_row: OnRow = ignore_row) -> None:
         self.actor = ReachPolicy(checkpoint)
         self.cell = cell_of(checkpoint.manifest)
         region = goal_region_of(self.cell)
@@ -165,7 +165,7 @@ class ReachBench:
                 "cell": self.cell.name,
                 "base_height_m": self.cell.table.height,
                 "success_distance_m": SUCCESS_DISTANCE,
-                "time_told_s": TOLD_S,
+                "time_told_s": REPORTED_TIME_LEFT_S,
                 "trained_goals": self.actor.goals,
                 "observation": self.actor.view,
                 "action": asdict(self.actor.action),

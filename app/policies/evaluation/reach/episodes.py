@@ -24,7 +24,7 @@ from app.sim.scenario.kernels import episode as kernel
 Index = NDArray[np.int64]
 N_ENVS = 500
 """Most rows of a batch: which person an episode meets hangs on it, so it is never varied."""
-TOLD_S = 5.0
+REPORTED_TIME_LEFT_S = 5.0
 """Most time left that a policy is told [s]: what episodes of training have. In longer episodes
 it is told this much until no more is left."""
 N_RECHECKED = 200
@@ -118,8 +118,8 @@ class _Play:
         self._start[which] = state.clear[rows, 0]
         self._redrawn[which] = state.n_redrawn[rows]
         self._steps[rows] = 0
-        self._patience[rows] = max(0.0, self._limit - TOLD_S)
-        state.time_left[rows] = min(self._limit, TOLD_S)
+        self._patience[rows] = max(0.0, self._limit - REPORTED_TIME_LEFT_S)
+        state.time_left[rows] = min(self._limit, REPORTED_TIME_LEFT_S)
         self._batch.set_goals(rows, self._goals[which])
 
     def _period(self) -> None:

@@ -30,7 +30,7 @@ import numpy as np
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.evaluation.reach.bench import ReachBench
 from app.policies.evaluation.reach.episodes import N_ENVS
-from app.policies.evaluation.rows import OnRow, untold
+from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.evaluation.statistics import wilson
 from app.policies.inference.controllers import Mover, mover_of
 from app.sim.cells.cell import Cell
@@ -150,8 +150,8 @@ def verdict(search: Hindsight, never: Any, targets: Vec, goals: Vec) -> Json:
     }
 
 
-def run_ceiling(
-    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = untold
+def run_oracle(
+    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> Json:
     """Search for what was possible in the episodes of ``reach-targets``.
 

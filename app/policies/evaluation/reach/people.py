@@ -19,7 +19,7 @@ from typing import Any
 
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.evaluation.reach.bench import ReachBench, direct_ways, ending, walker_of
-from app.policies.evaluation.rows import OnRow, untold
+from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.inference.controllers import How, hows_of
 from app.sim.cells.cell import Cell
 from app.sim.cells.people import FixedSpeedWalker
@@ -39,7 +39,7 @@ SPEEDS = (0.25, 0.5, 1.0)
 
 
 def run_people(
-    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = untold
+    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> dict[str, Any]:
     """Evaluate beside nobody to four walkers.
 
@@ -71,7 +71,7 @@ def run_people(
 
 
 def run_constant(
-    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = untold
+    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> dict[str, Any]:
     """Evaluate beside people whose speed and radius are constant in each episode.
 
@@ -93,7 +93,7 @@ def run_constant(
 
 
 def run_speeds(
-    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = untold
+    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> dict[str, Any]:
     """Evaluate beside people of a given speed.
 

@@ -27,7 +27,7 @@ import numpy as np
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.evaluation.reach.bench import ReachBench, direct_ways, ending, goal_ways
 from app.policies.evaluation.reach.episodes import ReachEpisodes, against
-from app.policies.evaluation.rows import OnRow, untold
+from app.policies.evaluation.rows import OnRow, ignore_row
 from app.sim.core.arrays import Vec
 
 DEFAULT_EPISODES = 5000
@@ -50,7 +50,7 @@ def between(episodes: ReachEpisodes, targets: Vec) -> list[dict[str, Any]]:
 
 
 def run_random(
-    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = untold
+    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> dict[str, Any]:
     """Evaluate on goals anywhere in the box.
 

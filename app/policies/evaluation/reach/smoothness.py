@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.evaluation.reach.bench import ReachBench
-from app.policies.evaluation.rows import OnRow, untold
+from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.evaluation.statistics import wilson
 from app.policies.inference.controllers import Mover, mover_of
 from app.sim.core.arrays import Vec
@@ -175,7 +175,7 @@ def shown_episode(paths: Paths, dt: float) -> dict[str, Any] | None:
 
 
 def run_smoothness(
-    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = untold
+    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> dict[str, Any]:
     """Measure how smoothly a policy moves.
 

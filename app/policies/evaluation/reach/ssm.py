@@ -55,7 +55,7 @@ from app.policies.checkpoints import pretrained
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.evaluation.reach.episodes import N_ENVS, random_goals
-from app.policies.evaluation.rows import OnRow, untold
+from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.evaluation.statistics import mean_of, wilson
 from app.policies.inference.controllers import Ahead, Mover, mover_of
 from app.policies.inference.reach_policy import ReachPolicy
@@ -495,7 +495,7 @@ def run_ssm(
     episodes: int | None,
     seed: int,
     motions: Sequence[Motion] = (),
-    on_row: OnRow = untold,
+    on_row: OnRow = ignore_row,
 ) -> Json:
     """Compare a policy with planners under the safety layer.
 
@@ -570,7 +570,7 @@ def stated(safety: SafetySettings, n: int, sources: Sequence[str]) -> Json:
     }
 
 
-def measure_planners(n: int = N_CROSSINGS, seed: int = 11, on_row: OnRow = untold) -> Json:
+def measure_planners(n: int = N_CROSSINGS, seed: int = 11, on_row: OnRow = ignore_row) -> Json:
     """Run the planners alone over the crossings, without any policy."""
     cell = load_cell("shared-workspace")
     comparison = Comparison(

@@ -27,7 +27,7 @@ import numpy as np
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.evaluation.reach.bench import ReachBench, direct_ways, ending
 from app.policies.evaluation.reach.episodes import ReachEpisodes
-from app.policies.evaluation.rows import OnRow, untold
+from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.evaluation.statistics import wilson
 from app.sim.core.arrays import Vec
 from app.sim.reach.batch import StartRule
@@ -90,7 +90,7 @@ def reached_after_contact(episodes: ReachEpisodes) -> dict[str, float]:
 
 
 def run_targets(
-    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = untold
+    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> Json:
     """Evaluate on all targets of the grid, under three rules of starting.
 

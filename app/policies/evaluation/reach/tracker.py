@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.evaluation.reach.bench import ReachBench, direct_ways, ending, walker_of
-from app.policies.evaluation.rows import OnRow, untold
+from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.inference.controllers import Mover, mover_of
 from app.sim.core.arrays import Vec
 from app.sim.people.kernels.pedestrian import AGE, GROWTH, N_PAST, PAST_S, VX, VY, R, X, Y
@@ -145,7 +145,7 @@ class ThroughTracker:
 
 
 def run_tracker(
-    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = untold
+    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> dict[str, Any]:
     """Evaluate round all targets beside people seen by a tracker.
 

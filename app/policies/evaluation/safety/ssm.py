@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from app.policies.checkpoints.checkpoint import Checkpoint
-from app.policies.evaluation.rows import OnRow, untold
+from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.evaluation.statistics import wilson
 from app.sim.cells.cell import load_cell
 from app.sim.safety.adversarial_trials import TrialResult, TrialSettings, run_trial
@@ -99,7 +99,7 @@ def run_safety(
     *,
     episodes: int | None,
     seed: int,
-    on_row: OnRow = untold,
+    on_row: OnRow = ignore_row,
 ) -> dict[str, Any]:
     """Run all rows.
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from app.errors import InvalidInput
-from app.policies.evaluation.rows import OnRow, untold
+from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.evaluation.sorting.episodes import (
     ENDLESS,
     Chooser,
@@ -86,7 +86,7 @@ def run_test(
     batch = SortingBatch(shape, fail, n, seed, SortingSettings(horizon_factor=ENDLESS))
     start_test(batch, test, fail, seed)
     alone = run_episodes(batch, choose, script=Person(test, n, seed))
-    called = alone.handed_over
+    called = alone.planner_fallback
     if not called.any():
         return alone, alone
     start_test(batch, test, fail, seed)
@@ -109,7 +109,7 @@ def row_of(name: str, episodes: SortingEpisodes) -> dict[str, Any]:
         "riskier_pick": share(episodes.riskier, episodes.picks),
         "safest_of_twins": wilson(choices - riskier, choices) if choices else None,
         "failed_pick": share(episodes.failed, episodes.picks),
-        "handover": wilson(int(episodes.handed_over.sum()), n),
+        "handover": wilson(int(episodes.planner_fallback.sum()), n),
         "repeated": wilson(int(episodes.repeated.sum()), n),
     }
 
@@ -120,7 +120,7 @@ def trials(
     fail: Vec,
     episodes: int | None,
     seed: int,
-    on_row: OnRow = untold,
+    on_row: OnRow = ignore_row,
 ) -> dict[str, Any]:
     """Put a policy to the tests; those that need a larger task are left out.
 

@@ -18,7 +18,7 @@ from typing import Any, Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from app.policies.evaluation.sorting.optimal_baseline import by_planner, measure
+from app.policies.evaluation.sorting.optimal_baseline import choose_by_planner, measure
 from app.policies.evaluation.sorting.planner_fallback import HandOver, state_keys
 from app.sim.sorting.batch import SortingBatch, SortingSettings
 from app.sim.sorting.kernels.task import RUNNING, SUCCESS, TIMEOUT
@@ -88,7 +88,7 @@ class SortingEpisodes:
     """Of the picks, those with twins of different risk to choose from."""
     riskier: Index
     """Of these, those that did not take the least risky twin."""
-    handed_over: Flags
+    planner_fallback: Flags
     """Whether the rule called for the exact planner."""
     repeated: Flags
     """Whether it did so because a state came back."""
@@ -173,7 +173,7 @@ class _Run:
             moves=rows.moves.copy(),
             attempts=rows.steps.copy(),
             expected=self._expected,
-            handed_over=self._called,
+            planner_fallback=self._called,
             repeated=self._repeated,
             **self._counts,
         )
@@ -196,11 +196,11 @@ class _Run:
 
     def _decide(self, which: Index) -> Index:
         act = np.zeros(len(which), dtype=np.int64)
-        over = self._watch.handed_over[which] & self._obey
+        over = self._watch.planner_fallback[which] & self._obey
         if (~over).any():
             act[~over] = self._choose(self._batch, which[~over])
         if over.any():
-            act[over] = by_planner(self._batch, which[over])
+            act[over] = choose_by_planner(self._batch, which[over])
         return act
 
     def _count_picks(self, which: Index, act: Index) -> Flags:

@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from app.policies.evaluation.rows import OnRow, untold
+from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.evaluation.sorting.episodes import (
     HORIZON_FACTOR,
     Chooser,
@@ -33,7 +33,7 @@ from app.policies.evaluation.sorting.episodes import (
     joined,
     run_episodes,
 )
-from app.policies.evaluation.sorting.optimal_baseline import by_planner
+from app.policies.evaluation.sorting.optimal_baseline import choose_by_planner
 from app.policies.evaluation.sorting.pairs import SMALL, grid_batches, pairs_of
 from app.policies.evaluation.statistics import mean_of, wilson
 from app.sim.core.arrays import Vec
@@ -74,13 +74,13 @@ def run_kind(batches: Iterable[SortingBatch], choose: Chooser) -> Kind:
     for batch in batches:
         alone.append(run_episodes(batch, choose))
         handed.append(alone[-1])
-        called = alone[-1].handed_over
+        called = alone[-1].planner_fallback
         if called.any():
             batch.reset()
             again = run_episodes(batch, choose, obey=True, only=called)
             handed[-1] = alone[-1].with_those(again, called)
         batch.reset()
-        planned.append(run_episodes(batch, by_planner))
+        planned.append(run_episodes(batch, choose_by_planner))
     return Kind(alone=joined(alone), handed=joined(handed), planned=joined(planned))
 
 
@@ -117,7 +117,7 @@ def row_of(name: str, episodes: SortingEpisodes, pairs: Index, least: float) -> 
         "attempts_over_expected": mean_of(good.attempts / good.expected),
         "riskier_pick": share(episodes.riskier, episodes.picks),
         "failed_pick": share(episodes.failed, episodes.picks),
-        "handover": wilson(int(episodes.handed_over.sum()), n),
+        "handover": wilson(int(episodes.planner_fallback.sum()), n),
         "repeated": wilson(int(episodes.repeated.sum()), n),
         "mean_return": float(episodes.rewards.mean()),
         "pairs": cells,
@@ -153,7 +153,7 @@ def grid(
     fail: Vec,
     episodes: int | None,
     seed: int,
-    on_row: OnRow = untold,
+    on_row: OnRow = ignore_row,
 ) -> dict[str, Any]:
     """Evaluate a policy on every pair.
 

@@ -37,7 +37,7 @@ def measure(batch: SortingBatch, which: Index) -> tuple[Index, NDArray[np.float6
     return fewest, attempts
 
 
-def by_planner(batch: SortingBatch, which: Index) -> Index:
+def choose_by_planner(batch: SortingBatch, which: Index) -> Index:
     """Choose the moves of some rows as the exact planner does; none of them at its goal."""
     rows, best = batch.rows, np.zeros(len(which), dtype=np.int64)
     plan_rows(

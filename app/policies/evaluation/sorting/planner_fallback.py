@@ -37,7 +37,7 @@ class HandOver:
     """
 
     def __init__(self, n: int) -> None:
-        self.handed_over: Flags = np.zeros(n, dtype=np.bool_)
+        self.planner_fallback: Flags = np.zeros(n, dtype=np.bool_)
         """Where the exact planner decides, shape (n,)."""
         self._seen: Keys = np.zeros((n, MAX_SEEN), dtype=np.uint64)
         self._n_seen: Index = np.zeros(n, dtype=np.int64)
@@ -52,7 +52,7 @@ class HandOver:
             keys: Of their states, shape (len(which),).
             expected_attempts: Attempts the exact planner expects from there, same shape.
         """
-        self.handed_over[which] = False
+        self.planner_fallback[which] = False
         self._seen[which, 0], self._n_seen[which] = keys, 1
         self._attempts[which], self._budget[which] = 0, PATIENCE * expected_attempts
 
@@ -68,14 +68,14 @@ class HandOver:
             The tasks that are handed over now, and whether a repeated state is why.
         """
         self._attempts[which] += 1
-        mine = ~self.handed_over[which]
+        mine = ~self.planner_fallback[which]
         which, keys, moved = which[mine], keys[mine], moved[mine]
         width = int(self._n_seen[which].max(initial=0))
         known = np.arange(width) < self._n_seen[which, None]
         repeated = moved & (known & (self._seen[which, :width] == keys[:, None])).any(axis=1)
         spent = self._attempts[which] >= self._budget[which]
         over = repeated | spent | (self._n_seen[which] >= MAX_SEEN)
-        self.handed_over[which[over]] = True
+        self.planner_fallback[which[over]] = True
         new = which[moved & ~over]
         self._seen[new, self._n_seen[new]] = keys[moved & ~over]
         self._n_seen[new] += 1

@@ -8,7 +8,7 @@ from typing import Any
 
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.checkpoints.trained_cell import cell_of
-from app.policies.evaluation.rows import OnRow, untold
+from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.evaluation.sorting.benchmark_tasks import trials
 from app.policies.evaluation.sorting.grid import grid
 from app.policies.inference.sorting_policy import SortingPolicy
@@ -16,7 +16,7 @@ from app.sim.sorting.batch import fail_of
 
 
 def run_grid(
-    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = untold
+    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> dict[str, Any]:
     """Evaluate a sorting policy on every pair (K_E, K_G).
 
@@ -34,7 +34,7 @@ def run_grid(
 
 
 def run_tests(
-    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = untold
+    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> dict[str, Any]:
     """Evaluate a sorting policy in the six tests.
 

@@ -6,7 +6,7 @@ pick, and then what a plan by the rules from the state it gives costs.
 
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
-from app.sim.sorting.kernels.planner import Objects, PlannerWork, Task, rough_plan
+from app.sim.sorting.kernels.planner import Objects, PlannerWork, Task, plan_by_rules
 from app.sim.sorting.kernels.shortest_paths import Ints, lay_out
 
 
@@ -60,7 +60,7 @@ def attempts_by_move(
     for i in range(len(moves)):
         pick, place = moves[i, 0], moves[i, 1]
         _shift(pick, place, objects)
-        _, after = rough_plan(objects, task, work)
+        _, after = plan_by_rules(objects, task, work)
         _shift(place, pick, objects)
         risk = task.fail[pick] if pick < len(task.fail) else 0.0
         attempts[i] = after + 1.0 / (1.0 - risk)

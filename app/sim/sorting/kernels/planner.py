@@ -352,7 +352,7 @@ def plan_state(objects: Objects, task: Task, work: PlannerWork) -> tuple[int, fl
 
 
 @kernel(nogil=True)
-def rough_plan(objects: Objects, task: Task, work: PlannerWork) -> tuple[int, float]:
+def plan_by_rules(objects: Objects, task: Task, work: PlannerWork) -> tuple[int, float]:
     """Plan one state by the rules alone: as many moves, sometimes a few more attempts.
 
     Args:

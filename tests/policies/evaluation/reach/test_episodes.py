@@ -7,7 +7,7 @@ import pytest
 
 from app.policies.evaluation.reach import episodes as reach_episodes
 from app.policies.evaluation.reach.episodes import (
-    TOLD_S,
+    REPORTED_TIME_LEFT_S,
     against,
     play,
     random_goals,
@@ -86,7 +86,7 @@ def test_in_long_episodes_no_more_time_is_told_than_training_had() -> None:
     assert waited.any()
     np.testing.assert_allclose(played.duration_s[waited], 7.0)
     told = np.array(still.told)[:, np.flatnonzero(waited)[0]]
-    np.testing.assert_allclose(told[: round(2.0 / 0.02) + 1], TOLD_S)
+    np.testing.assert_allclose(told[: round(2.0 / 0.02) + 1], REPORTED_TIME_LEFT_S)
     np.testing.assert_allclose(told[-1], 0.02)
 
 

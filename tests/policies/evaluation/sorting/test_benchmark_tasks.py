@@ -12,7 +12,7 @@ from app.policies.evaluation.sorting.benchmark_tasks import (
     trials,
 )
 from app.policies.evaluation.sorting.episodes import ENDLESS, greedy, run_episodes
-from app.policies.evaluation.sorting.optimal_baseline import by_planner
+from app.policies.evaluation.sorting.optimal_baseline import choose_by_planner
 from app.sim.sorting.batch import SortingBatch, SortingSettings
 from app.sim.sorting.benchmark_tasks import TESTS, sorting_test
 from app.sim.sorting.state import SortingShape
@@ -24,7 +24,7 @@ FAIL = np.linspace(0.0, 0.4, 10)
 
 @pytest.mark.parametrize("test", TESTS, ids=lambda test: test.name)
 def test_the_exact_planner_passes_with_the_fewest_moves(test):
-    alone, handed = run_test(test, by_planner, SHAPE, FAIL, 60, 4)
+    alone, handed = run_test(test, choose_by_planner, SHAPE, FAIL, 60, 4)
     for found in (alone, handed):
         assert found.success.all()
         assert np.array_equal(found.moves, found.fewest)
@@ -38,7 +38,7 @@ def test_the_person_does_everything_once_and_a_goal_is_not_the_end_before(name):
     batch = SortingBatch(SHAPE, FAIL, n, 4, SortingSettings(horizon_factor=ENDLESS))
     start_test(batch, test, FAIL, 4)
     before = [batch.state_of(e) for e in range(n)]
-    found = run_episodes(batch, by_planner, script=Person(test, n, 4))
+    found = run_episodes(batch, choose_by_planner, script=Person(test, n, 4))
     for e in range(n):
         after = batch.state_of(e)
         assert after.solved
@@ -71,7 +71,7 @@ def test_a_move_too_many_in_any_part_is_not_the_fewest():
     wasted = {"done": False}
 
     def once_to_and_fro(batch, which):
-        act = by_planner(batch, which)
+        act = choose_by_planner(batch, which)
         if len(which) == 1 and batch.rows.moves[0] >= 4 and not wasted["done"]:
             k, c = SHAPE.n_cells, SHAPE.n_colours
             tower = int(batch.rows.heights[0].argmax())

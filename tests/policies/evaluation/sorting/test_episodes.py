@@ -12,7 +12,7 @@ from app.policies.evaluation.sorting.episodes import (
     joined,
     run_episodes,
 )
-from app.policies.evaluation.sorting.optimal_baseline import by_planner
+from app.policies.evaluation.sorting.optimal_baseline import choose_by_planner
 from app.sim.sorting.batch import SortingBatch, SortingSettings
 from app.sim.sorting.state import SortingShape, empty_state
 from tests.policies.evaluation.sorting_players import (
@@ -47,7 +47,7 @@ def test_the_exact_planner_reaches_every_goal_with_the_fewest_moves(disturbed):
 
 
 def test_values_of_the_planner_and_the_planner_itself_play_the_same():
-    one, other = played(exactly), run_episodes(batch_of(200), by_planner)
+    one, other = played(exactly), run_episodes(batch_of(200), choose_by_planner)
     assert np.array_equal(one.attempts, other.attempts)
     assert np.allclose(one.rewards, other.rewards)
 
@@ -82,7 +82,7 @@ def test_a_pick_without_a_twin_is_no_choice():
     batch, state = batch_of(1), empty_state(SHAPE)
     state.clutter[5] = state.goal[0, 0] = 1
     batch.put(0, replace(state, fail=FAIL))
-    found = run_episodes(batch, by_planner)
+    found = run_episodes(batch, choose_by_planner)
     assert (found.choices[0], found.riskier[0]) == (0, 0)
     assert found.picks[0] >= 1
 
@@ -92,20 +92,20 @@ def test_a_policy_in_circles_runs_out_of_attempts():
     lost = ~found.success
     assert lost.mean() > 0.9
     assert (found.attempts[lost] == 4 * SHAPE.n_cells).all()
-    assert found.handed_over[lost].all() and found.repeated[lost].any()
+    assert found.planner_fallback[lost].all() and found.repeated[lost].any()
 
 
 def test_with_hand_over_the_planner_ends_what_went_in_circles():
     found = played(in_circles, n=30, obey=True, n_objects=4)
     assert found.success.all()
-    assert found.handed_over.sum() > 20 and found.repeated.any()
+    assert found.planner_fallback.sum() > 20 and found.repeated.any()
     assert (found.moves[found.repeated] > found.fewest[found.repeated]).all()
 
 
 def test_only_the_rows_asked_for_are_run():
     only = np.arange(20) % 4 == 0
-    all_of_them = run_episodes(batch_of(20), by_planner)
-    some = run_episodes(batch_of(20), by_planner, only=only)
+    all_of_them = run_episodes(batch_of(20), choose_by_planner)
+    some = run_episodes(batch_of(20), choose_by_planner, only=only)
     assert not some.success[~only].any() and some.attempts[~only].sum() == 0
     assert np.array_equal(some.attempts[only], all_of_them.attempts[only])
 

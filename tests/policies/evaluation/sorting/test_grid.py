@@ -6,7 +6,7 @@ import pytest
 from app.policies.evaluation.sorting.curve import curve_point
 from app.policies.evaluation.sorting.episodes import SortingEpisodes, run_episodes
 from app.policies.evaluation.sorting.grid import grid, row_of, share
-from app.policies.evaluation.sorting.optimal_baseline import by_planner
+from app.policies.evaluation.sorting.optimal_baseline import choose_by_planner
 from app.policies.evaluation.sorting.pairs import CHUNK, grid_batches, pairs_of
 from app.policies.evaluation.statistics import mean_of
 from app.sim.sorting.state import NULL, SortingShape
@@ -30,7 +30,7 @@ def episodes(**given) -> SortingEpisodes:
         "choices": np.array([0, 0, 2, 2]),
         "riskier": np.array([0, 0, 0, 0]),
     }
-    flags = {name: np.zeros(4, dtype=bool) for name in ("handed_over", "repeated")}
+    flags = {name: np.zeros(4, dtype=bool) for name in ("planner_fallback", "repeated")}
     return SortingEpisodes(**{"success": np.ones(4, dtype=bool), **numbers, **flags, **given})
 
 
@@ -101,9 +101,11 @@ def test_every_pair_has_its_episodes_of_its_numbers(disturbed):
 
 
 def test_episodes_are_the_same_however_they_are_cut_into_batches(monkeypatch):
-    whole = run_episodes(next(grid_batches(SHAPE, FAIL, 6, 3, 0.0)), by_planner)
+    whole = run_episodes(next(grid_batches(SHAPE, FAIL, 6, 3, 0.0)), choose_by_planner)
     monkeypatch.setattr("app.policies.evaluation.sorting.pairs.CHUNK", 25)
-    parts = [run_episodes(one, by_planner) for one in grid_batches(SHAPE, FAIL, 6, 3, 0.0)]
+    parts = [
+        run_episodes(one, choose_by_planner) for one in grid_batches(SHAPE, FAIL, 6, 3, 0.0)
+    ]
     assert CHUNK > 60 and [len(one.moves) for one in parts] == [25, 25, 10]
     assert np.array_equal(whole.attempts, np.concatenate([one.attempts for one in parts]))
 

@@ -9,7 +9,7 @@ from app.policies.evaluation.sorting.planner_fallback import state_keys
 from app.sim.sorting.batch import SortingBatch, SortingSettings, apply
 from app.sim.sorting.benchmark_tasks import sorting_test
 from app.sim.sorting.planner import solve
-from app.sim.sorting.progress_monitor import SortingWatch, look, note_move, state_key
+from app.sim.sorting.progress_monitor import ProgressMonitor, look, note_move, state_key
 from app.sim.sorting.state import SortingShape
 from tests.policies.evaluation.sorting_players import at_random, exactly, state_in
 
@@ -22,7 +22,7 @@ class Followed(SortingBatch):
     """A batch that keeps the record of each of its tasks, one by one."""
 
     def follow(self) -> None:
-        self.records: dict[int, SortingWatch] = {}
+        self.records: dict[int, ProgressMonitor] = {}
         self.asked: set[int] = set()
         self.verdicts: list[tuple[bool, bool]] = []
 
@@ -31,7 +31,7 @@ class Followed(SortingBatch):
             state = self.state_of(e)
             plan = solve(state, self.shape)
             record = look(self.records.get(e), state_key(state), plan.attempts, POLICY)
-            self.verdicts.append((record.handed_over is not None, e not in self.asked))
+            self.verdicts.append((record.planner_fallback is not None, e not in self.asked))
             move = self.shape.move_of(int(act[e]))
             risk = state.fail[move.pick] if move.pick < self.shape.n_cells else 0.0
             after = state_key(apply(state, self.shape, move))
@@ -70,7 +70,7 @@ def test_every_verdict_is_that_of_the_rule_for_one_task(name):
     single, together = np.array(batch.verdicts).T
     assert np.array_equal(single, together)
     assert 0 < single.sum() < len(single)
-    assert found.handed_over.any()
+    assert found.planner_fallback.any()
 
 
 def test_different_states_have_different_keys():

@@ -9,9 +9,9 @@ from app.sim.sorting.kernels.planner import (
     Task,
     mark_rows,
     new_work,
+    plan_by_rules,
     plan_rows,
     plan_state,
-    rough_plan,
 )
 from app.sim.sorting.kernels.shortest_paths import lay_out, most_states, new_progress
 from app.sim.sorting.planner import solve
@@ -75,7 +75,7 @@ def test_a_rough_plan_has_as_many_moves_and_no_fewer_attempts() -> None:
     for state in tasks(200, seed=14):
         objects = Objects(state.clutter, state.towers, state.heights)
         wanted = Task(state.goal, np.count_nonzero(state.goal, axis=1), state.fail)
-        rough, careful = rough_plan(objects, wanted, work), plan_state(objects, wanted, work)
+        rough, careful = plan_by_rules(objects, wanted, work), plan_state(objects, wanted, work)
         assert rough[0] == careful[0]
         assert careful[1] <= rough[1] + 1e-9
         more += careful[1] < rough[1] - 1e-9
