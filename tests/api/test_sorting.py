@@ -161,7 +161,7 @@ def test_planner_takes_over_and_the_goal_is_reached(client: TestClient) -> None:
         task = {**carried_out(task, answer["move"]), "watch": answer["watch"]}
     assert answer["solved"]
     assert deciders[0] == "policy"
-    assert deciders[-1] in ("repeated", "patience")
+    assert deciders[-1] in ("repeated", "attempts-exceeded")
 
 
 @pytest.mark.usefixtures("sorter")

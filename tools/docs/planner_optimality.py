@@ -20,7 +20,8 @@ import numpy as np
 
 from app.machine import describe
 from app.sim.sorting.batch import apply
-from app.sim.sorting.kernels.planner import new_work, plan_rows
+from app.sim.sorting.kernels.planner import new_work
+from app.sim.sorting.kernels.planner_batch import TaskBatch, plan_rows
 from app.sim.sorting.planner import attempts_of, solve
 from app.sim.sorting.state import Move, SortingShape, SortingState
 from tests.sim.sorting_search import (
@@ -121,16 +122,17 @@ def times(n_cells: int, n_colours: int, on_towers: float, seed: int) -> Json:
     )
     work = new_work(n_cells, n_colours, shape.n_sizes)
     best, fewest = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
-    plan_rows(clutter, towers, heights, asked, goal_heights, fail, work, best, fewest)
+    batch = TaskBatch(clutter, towers, heights, asked, goal_heights, fail)
+    plan_rows(batch, work, best, fewest)
     began = time.process_time()
-    plan_rows(clutter, towers, heights, asked, goal_heights, fail, work, best, fewest)
+    plan_rows(batch, work, best, fewest)
     batched = time.process_time() - began
     single = []
     for state in states:
         began = time.process_time()
         solve(state, shape)
         single.append(time.process_time() - began)
-    arrays = (*work.progress, *work.now, *work.trial, work.at, work.first, work.actions)
+    arrays = (*work.paths, *work.now, *work.trial, work.at, work.first, work.actions)
     return {
         "n_cells": n_cells,
         "n_colours": n_colours,

@@ -13,7 +13,7 @@ from app.sim.core.arrays import Vec
 from app.sim.sorting.batch import SortingSettings
 from app.sim.sorting.decision_types import REASONS, By, RankedMove, SortingDecision, Why
 from app.sim.sorting.names import NamedObject, SortingNames, fail_with, state_from_names
-from app.sim.sorting.progress_monitor import MAX_SEEN, HandOver, ProgressMonitor
+from app.sim.sorting.progress_monitor import MAX_SEEN, FallbackReason, ProgressMonitor
 from app.sim.sorting.sorting_values import SortingValues
 from app.sim.sorting.state import (
     MAX_CELLS,
@@ -96,7 +96,9 @@ class SortingRecord(Body):
     budget: Finite = Field(
         ge=0.0, le=1e6, description="attempts after which the planner takes over"
     )
-    planner_fallback: HandOver | None = Field(description="why the planner decides, or null")
+    planner_fallback: FallbackReason | None = Field(
+        description="why the planner decides, or null"
+    )
 
     def to_domain(self) -> ProgressMonitor:
         """Return it as the simulator's data."""

@@ -13,7 +13,7 @@ from app.live.sorting.table import Block, SortingTable
 from app.sim.sorting.batch import apply
 from app.sim.sorting.decision import decide, failure_of
 from app.sim.sorting.decision_types import RankedMove, SortingDecision, Why
-from app.sim.sorting.progress_monitor import ProgressMonitor, note_move, state_key
+from app.sim.sorting.progress_monitor import ProgressMonitor, expect_state, state_key
 from app.sim.sorting.sorting_values import SortingValues
 from app.sim.sorting.state import Move
 
@@ -21,7 +21,7 @@ ALIKE = 0.02
 """Difference of failure probabilities up to which identical blocks count as equal."""
 MARGIN = 0.01
 """Difference up to which moves count as equal: of Q, or of the planner's attempts."""
-FALLBACK_REASONS: tuple[Why, ...] = ("repeated", "patience")
+FALLBACK_REASONS: tuple[Why, ...] = ("repeated", "attempts-exceeded")
 """Reasons for a planner fallback: the policy may decide here but makes no progress."""
 
 
@@ -75,7 +75,7 @@ class SortController:
         if self._after is not None:
             state = table.state
             key = state_key(apply(state, table.shape, move))
-            self._after = note_move(self._after, key, can_fail=failure_of(state, move) > 0.0)
+            self._after = expect_state(self._after, key, can_fail=failure_of(state, move) > 0.0)
 
     def end_attempt(self) -> None:
         """Note that the attempt is over: the grasp failed, or the block is placed."""

@@ -1,41 +1,28 @@
-"""Rates with intervals, as every result carries them.
-
-Source: Wilson, *Probable inference, the law of succession, and statistical inference* (1927).
-"""
-
-import math
+"""Rates and means with 95 % intervals, as results carry them."""
 
 import numpy as np
 from numpy.typing import ArrayLike
-
-Z95 = 1.959963984540054
-"""Quantile of the standard normal distribution for a two-sided 95 % interval."""
+from scipy.stats import binomtest, norm
 
 
 def wilson(hits: int, n: int) -> dict[str, float]:
     """Return a rate and its 95 % Wilson interval.
 
     Args:
-        hits: Number of episodes in which it happened.
-        n: Number of episodes, at least one.
+        hits: Number of episodes counted.
+        n: Number of episodes, at least 1.
 
     Raises:
         ValueError: ``hits`` is not between 0 and ``n``, or ``n`` is 0.
     """
     if n < 1 or not 0 <= hits <= n:
         raise ValueError(f"a rate needs 0 <= hits <= n and n >= 1, got {hits} of {n}")
-    rate = hits / n
-    spread = Z95 * math.sqrt(rate * (1.0 - rate) / n + (Z95 / (2.0 * n)) ** 2)
-    centre, scale = rate + Z95**2 / (2.0 * n), 1.0 + Z95**2 / n
-    return {
-        "mean": rate,
-        "low": 0.0 if hits == 0 else max(0.0, (centre - spread) / scale),
-        "high": 1.0 if hits == n else min(1.0, (centre + spread) / scale),
-    }
+    interval = binomtest(hits, n).proportion_ci(0.95, method="wilson")
+    return {"mean": hits / n, "low": float(interval.low), "high": float(interval.high)}
 
 
 def mean_of(values: ArrayLike) -> dict[str, float] | None:
-    """Return a mean and its 95 % interval, by the normal approximation; None without values.
+    """Return a mean and its 95 % interval by the normal approximation; None without values.
 
     Args:
         values: One number per episode, shape (n,).
@@ -43,6 +30,6 @@ def mean_of(values: ArrayLike) -> dict[str, float] | None:
     x = np.asarray(values, dtype=np.float64)
     if len(x) == 0:
         return None
-    mean = float(x.mean())
-    spread = Z95 * float(x.std(ddof=1)) / math.sqrt(len(x)) if len(x) > 1 else 0.0
-    return {"mean": mean, "low": mean - spread, "high": mean + spread}
+    mean, error = float(x.mean()), float(x.std(ddof=1)) / len(x) ** 0.5 if len(x) > 1 else 0.0
+    low, high = norm.interval(0.95, loc=mean, scale=error) if error else (mean, mean)
+    return {"mean": mean, "low": float(low), "high": float(high)}

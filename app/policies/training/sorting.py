@@ -21,7 +21,8 @@ from app.policies.training.run import Parts, TrainingRun
 from app.sim.cells.cell import Cell
 from app.sim.envs.sorting import SortingTask
 from app.sim.sorting.batch import OUTCOMES, SortingBatch, SortingSettings, batch_in
-from app.sim.sorting.kernels.planner import mark_rows, new_work
+from app.sim.sorting.kernels.planner import new_work
+from app.sim.sorting.kernels.planner_batch import TaskBatch, mark_rows
 from app.sim.sorting.kernels.task import FAILURE_SCALE
 from app.sim.sorting.state import NULL, SortingShape
 
@@ -76,7 +77,8 @@ def expert_of(shape: SortingShape) -> Expert:
         heights, wanted = (towers != NULL).sum(axis=2), (goal != NULL).sum(axis=2)
         first = np.zeros((n, shape.n_actions), dtype=np.bool_)
         fail = obs[:, k + 2 * c * k :] / FAILURE_SCALE
-        mark_rows(clutter, towers, heights, goal, wanted, fail, work, first)
+        tasks = TaskBatch(clutter, towers, heights, goal, wanted, fail)
+        mark_rows(tasks, work, first)
         return first
 
     return label

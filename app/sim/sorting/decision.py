@@ -18,7 +18,12 @@ from app.sim.sorting.kernels.action_costs import attempts_by_move
 from app.sim.sorting.kernels.planner import Objects, Task, new_work
 from app.sim.sorting.kernels.shortest_paths import most_states
 from app.sim.sorting.planner import Plan, solve
-from app.sim.sorting.progress_monitor import ProgressMonitor, look, note_move, state_key
+from app.sim.sorting.progress_monitor import (
+    ProgressMonitor,
+    expect_state,
+    observe_transition,
+    state_key,
+)
 from app.sim.sorting.sorting_values import SortingValues
 from app.sim.sorting.state import NULL, Codes, Move, SortingShape, SortingState, empty_state
 
@@ -52,7 +57,7 @@ def decide(
     ranked: tuple[RankedMove, ...] = ()
     trusted, why = _trusted(policy, shape, plan, outside, ask_planner)
     if trusted is not None:
-        noted = look(watch, state_key(state), plan.attempts, trusted.checkpoint)
+        noted = observe_transition(watch, state_key(state), plan.attempts, trusted.checkpoint)
         if noted.planner_fallback is not None:
             trusted, why = None, noted.planner_fallback
     if plan.best is not None:
@@ -223,4 +228,4 @@ def _noted_move(
     watch: ProgressMonitor, state: SortingState, shape: SortingShape, move: Move
 ) -> ProgressMonitor:
     expected = state_key(apply(state, shape, move))
-    return note_move(watch, expected, can_fail=failure_of(state, move) > 0.0)
+    return expect_state(watch, expected, can_fail=failure_of(state, move) > 0.0)

@@ -20,7 +20,7 @@ Why = Literal[
     "other-shape",
     "untrained-goal",
     "repeated",
-    "patience",
+    "attempts-exceeded",
 ]
 """Why it was the policy, or the planner; :data:`REASONS` says it in a sentence."""
 REASONS: dict[Why, str] = {
@@ -31,7 +31,7 @@ REASONS: dict[Why, str] = {
     "other-shape": "The policy was trained for another number of cells, colours or sizes.",
     "untrained-goal": "The policy was not trained for a goal like this one.",
     "repeated": "A state came back that no failed pick and no person explains.",
-    "patience": "It took 1.5 times the attempts that were expected.",
+    "attempts-exceeded": "It took 1.5 times the attempts that were expected.",
 }
 
 

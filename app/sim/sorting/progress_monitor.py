@@ -1,67 +1,66 @@
-"""When the exact planner takes over from a policy: a record of one task, as plain data.
+"""Loop and stall monitor of a sorting policy: when the exact planner takes over.
 
-A greedy policy may go in circles. The record holds the states it decided in and what each move
-was meant to give; the next state then tells what happened:
+A greedy policy can repeat a cycle of moves. The monitor of one task stores the visited states
+and the expected effect of the last move; the next state is then classified:
 
-| next state | what happened | record |
+| next state | meaning | effect |
 |---|---|---|
-| what the move gives | it worked | goes on; a state met before hands over |
-| as before, the pick can fail | a failed pick | goes on |
-| as before, the pick cannot fail | a repeated state | hands over |
-| any other | a person, or another object moved than meant | begins anew |
+| the expected one | the move succeeded | a state visited before triggers the fallback |
+| unchanged, the pick can fail | failed pick | continues |
+| unchanged, the pick cannot fail | repeated state | triggers the fallback |
+| any other | a person interfered, or another object moved | restarts the monitor |
 
-States are compared with their goal and failure map: a change of these is a person's, too. The
-planner also takes over after :data:`PATIENCE` times the expected attempts. It then decides
-until the goal is reached or the record begins anew. The record is small and travels in JSON:
-who asks gets it with the answer and hands it back with the next question.
+A state includes its goal and failure map, so that a change of these restarts the monitor too.
+The fallback also triggers after :data:`ATTEMPT_FACTOR` times the expected attempts. The planner
+then decides until the goal is reached or the monitor restarts. The monitor is plain data: a
+client receives it with a decision and returns it with the next request.
 
-Source: ours (the method has no such rule); expected attempts are the exact planner's.
+Source: ours (the method has no such rule); expected attempts are those of the exact planner.
 """
 
-import dataclasses
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from app.sim.sorting.state import SortingState
 
-PATIENCE = 1.5
+ATTEMPT_FACTOR = 1.5
 """Attempts granted to a policy, as a multiple of the expected ones."""
 MAX_SEEN = 256
-"""Most states a record holds; a policy that meets more hands over."""
+"""Largest number of stored states; a further one triggers the fallback."""
 KEY_BYTES = 8
 """Length of a state's key; its text has twice as many characters."""
 
-HandOver = Literal["repeated", "patience"]
-"""Why the planner took over: a repeated state, or too many attempts."""
+FallbackReason = Literal["repeated", "attempts-exceeded"]
+"""Reason of the planner fallback: a repeated state, or too many attempts."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProgressMonitor:
-    """The record of one task since it began, or since somebody interfered."""
+    """Transitions of one task since its start or the last interference."""
 
     checkpoint: str
-    """SHA-256 of the policy that is watched."""
+    """SHA-256 of the monitored policy."""
     last: str
-    """Key of the state decided in last."""
+    """Key of the last decision's state."""
     expected: str
-    """Key of the state that the move chosen there gives; empty until it is chosen."""
+    """Key of the state that the move chosen there leads to; empty before the choice."""
     can_fail: bool
     """Whether that move's pick can fail."""
     seen: tuple[str, ...]
-    """Keys of the states met, each once, at most :data:`MAX_SEEN`."""
+    """Keys of the visited states, each once, at most :data:`MAX_SEEN`."""
     attempts: int
-    """Moves tried since the record began or, after a hand-over, since then."""
+    """Attempts since the start or, after a fallback, since then."""
     budget: float
-    """Attempts after which the planner takes over."""
-    planner_fallback: HandOver | None
-    """Why the planner decides; None while the policy does."""
+    """Number of attempts that triggers the fallback."""
+    planner_fallback: FallbackReason | None
+    """Reason of the fallback; None while the policy decides."""
 
 
 def state_key(state: SortingState) -> str:
-    """Return a short name of a state with its goal and failure map, hexadecimal."""
+    """Return a hexadecimal hash of a state with its goal and failure map."""
     digest = hashlib.blake2b(digest_size=KEY_BYTES)
     digest.update(bytes(state.towers.shape))
     for codes in (state.clutter, state.towers, state.goal):
@@ -71,12 +70,12 @@ def state_key(state: SortingState) -> str:
 
 
 def begin_monitor(key: str, expected_attempts: float, checkpoint: str) -> ProgressMonitor:
-    """Return the record of a task that begins now.
+    """Return the monitor of a task that starts now.
 
     Args:
-        key: Of its state.
-        expected_attempts: Attempts that the exact planner expects from here.
-        checkpoint: SHA-256 of the policy that decides.
+        key: Key of the present state.
+        expected_attempts: Expected attempts of the exact planner from here.
+        checkpoint: SHA-256 of the policy.
     """
     return ProgressMonitor(
         checkpoint=checkpoint,
@@ -85,48 +84,48 @@ def begin_monitor(key: str, expected_attempts: float, checkpoint: str) -> Progre
         can_fail=False,
         seen=(key,),
         attempts=0,
-        budget=PATIENCE * expected_attempts,
+        budget=ATTEMPT_FACTOR * expected_attempts,
         planner_fallback=None,
     )
 
 
-def look(
-    watch: ProgressMonitor | None, key: str, expected_attempts: float, checkpoint: str
+def observe_transition(
+    monitor: ProgressMonitor | None, key: str, expected_attempts: float, checkpoint: str
 ) -> ProgressMonitor:
-    """Return the record after a look at the present state.
+    """Return the monitor updated with the present state.
 
     Args:
-        watch: As :func:`note_move` left it; None where there is none yet.
-        key: Of the present state.
-        expected_attempts: Attempts that the exact planner expects from here.
-        checkpoint: SHA-256 of the policy that would decide.
+        monitor: Result of :func:`expect_state` at the last decision; None at the first.
+        key: Key of the present state.
+        expected_attempts: Expected attempts of the exact planner from here.
+        checkpoint: SHA-256 of the policy.
     """
-    if watch is None or watch.checkpoint != checkpoint:
+    if monitor is None or monitor.checkpoint != checkpoint:
         return begin_monitor(key, expected_attempts, checkpoint)
-    moved = key == watch.expected
-    if not moved and key != watch.last:
+    moved = key == monitor.expected
+    if not moved and key != monitor.last:
         return begin_monitor(key, expected_attempts, checkpoint)
-    now = dataclasses.replace(watch, last=key, attempts=watch.attempts + 1)
+    now = replace(monitor, last=key, attempts=monitor.attempts + 1)
     if now.planner_fallback is not None:
         return now
-    repeated = key in watch.seen if moved else not watch.can_fail
+    repeated = key in monitor.seen if moved else not monitor.can_fail
     if repeated:
-        return _hand_over(now, "repeated")
+        return _fall_back(now, "repeated")
     if now.attempts >= now.budget or len(now.seen) >= MAX_SEEN:
-        return _hand_over(now, "patience")
-    return dataclasses.replace(now, seen=(*now.seen, key)) if moved else now
+        return _fall_back(now, "attempts-exceeded")
+    return replace(now, seen=(*now.seen, key)) if moved else now
 
 
-def note_move(watch: ProgressMonitor, expected: str, *, can_fail: bool) -> ProgressMonitor:
-    """Return the record with the move that was chosen.
+def expect_state(monitor: ProgressMonitor, expected: str, *, can_fail: bool) -> ProgressMonitor:
+    """Return the monitor with the expected effect of the chosen move.
 
     Args:
-        watch: As :func:`look` gave it.
-        expected: Key of the state that the move gives.
+        monitor: Result of :func:`observe_transition`.
+        expected: Key of the state that the move leads to.
         can_fail: Whether its pick can fail.
     """
-    return dataclasses.replace(watch, expected=expected, can_fail=can_fail)
+    return replace(monitor, expected=expected, can_fail=can_fail)
 
 
-def _hand_over(watch: ProgressMonitor, why: HandOver) -> ProgressMonitor:
-    return dataclasses.replace(watch, planner_fallback=why, attempts=0, seen=())
+def _fall_back(monitor: ProgressMonitor, reason: FallbackReason) -> ProgressMonitor:
+    return replace(monitor, planner_fallback=reason, attempts=0, seen=())

@@ -135,7 +135,7 @@ def test_failed_picks_alone_do_not_hand_over_before_the_patience_ends() -> None:
     for _ in range(6):
         decision = decide(policy, start(), SHAPE, watch)
         watch, whys = decision.watch, [*whys, decision.why]
-    assert whys == ["policy"] * 5 + ["patience"]
+    assert whys == ["policy"] * 5 + ["attempts-exceeded"]
 
 
 def test_policy_is_trusted_again_after_somebody_interferes() -> None:

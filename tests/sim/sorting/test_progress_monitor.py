@@ -7,8 +7,8 @@ from app.sim.sorting.batch import apply, valid_moves
 from app.sim.sorting.progress_monitor import (
     MAX_SEEN,
     ProgressMonitor,
-    look,
-    note_move,
+    expect_state,
+    observe_transition,
     state_key,
 )
 from app.sim.sorting.state import Move, SortingShape, SortingState, empty_state
@@ -28,12 +28,12 @@ def start() -> SortingState:
 def seen(
     watch: ProgressMonitor | None, state: SortingState, attempts: float = 10.0
 ) -> ProgressMonitor:
-    return look(watch, state_key(state), attempts, POLICY)
+    return observe_transition(watch, state_key(state), attempts, POLICY)
 
 
 def after_move(watch: ProgressMonitor, state: SortingState, move: Move) -> ProgressMonitor:
     fail = state.fail[move.pick] if move.pick < SHAPE.n_cells else 0.0
-    return note_move(watch, state_key(apply(state, SHAPE, move)), can_fail=bool(fail > 0.0))
+    return expect_state(watch, state_key(apply(state, SHAPE, move)), can_fail=bool(fail > 0.0))
 
 
 def test_record_begins_with_the_state_and_one_and_a_half_times_the_attempts() -> None:
@@ -80,7 +80,7 @@ def test_record_begins_anew_when_goal_or_failure_map_change(part: str) -> None:
 
 def test_record_begins_anew_for_another_policy() -> None:
     watch = after_move(seen(None, start()), start(), Move(0, 4))
-    assert look(watch, state_key(start()), 10.0, "b" * 64).attempts == 0
+    assert observe_transition(watch, state_key(start()), 10.0, "b" * 64).attempts == 0
 
 
 def test_planner_takes_over_after_one_and_a_half_times_the_expected_attempts() -> None:
@@ -89,7 +89,7 @@ def test_planner_takes_over_after_one_and_a_half_times_the_expected_attempts() -
     for _ in range(4):
         watch = after_move(seen(watch, start(), attempts=2.0), start(), Move(0, 4))
         whys.append((watch.planner_fallback, watch.attempts))
-    assert whys == [(None, 1), (None, 2), ("patience", 0), ("patience", 1)]
+    assert whys == [(None, 1), (None, 2), ("attempts-exceeded", 0), ("attempts-exceeded", 1)]
 
 
 def test_planner_keeps_deciding_until_somebody_interferes() -> None:
@@ -106,7 +106,7 @@ def test_record_never_grows_beyond_its_bound() -> None:
     full = dataclasses.replace(watch, seen=tuple(f"{k:016x}" for k in range(MAX_SEEN)))
     second = apply(start(), SHAPE, Move(0, 5))
     handed = seen(after_move(full, start(), Move(0, 5)), second)
-    assert handed.planner_fallback == "patience"
+    assert handed.planner_fallback == "attempts-exceeded"
     assert len(handed.seen) <= MAX_SEEN
 
 

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.policies.evaluation.sorting.optimal_baseline import choose_by_planner, measure
-from app.policies.evaluation.sorting.planner_fallback import HandOver, state_keys
+from app.policies.evaluation.sorting.planner_fallback import BatchProgressMonitor, state_keys
 from app.sim.sorting.batch import SortingBatch, SortingSettings
 from app.sim.sorting.kernels.task import RUNNING, SUCCESS, TIMEOUT
 
@@ -142,7 +142,7 @@ class _Run:
         n = batch.n_envs
         self._batch, self._choose, self._script, self._obey = batch, choose, script, obey
         self._horizon = round(HORIZON_FACTOR * batch.shape.n_cells)
-        self._watch = HandOver(n)
+        self._monitor = BatchProgressMonitor(n)
         self._since = np.zeros(n, dtype=np.int64)
         self._moves_before = np.zeros(n, dtype=np.int64)
         self._rewards, self._expected = np.zeros(n), np.zeros(n)
@@ -160,7 +160,7 @@ class _Run:
         self._counts["fewest"][which] += fewest
         self._expected[which] += attempts
         self._since[which], self._moves_before[which] = 0, self._batch.rows.moves[which]
-        self._watch.begin(which, state_keys(self._batch.rows, which), attempts)
+        self._monitor.begin(which, state_keys(self._batch.rows, which), attempts)
 
     def to_the_end(self) -> SortingEpisodes:
         """Make attempts until every row has ended."""
@@ -190,13 +190,13 @@ class _Run:
         self._counts["failed"][which] += picked & ~moved
         self._since[which] += 1
         self._disturb(which)
-        self._hand_over(which, moved)
+        self._observe(which, moved)
         late = (self._since[which] >= self._horizon) & (rows.outcome[which] == RUNNING)
         rows.outcome[which[late]] = TIMEOUT
 
     def _decide(self, which: Index) -> Index:
         act = np.zeros(len(which), dtype=np.int64)
-        over = self._watch.planner_fallback[which] & self._obey
+        over = self._monitor.planner_fallback[which] & self._obey
         if (~over).any():
             act[~over] = self._choose(self._batch, which[~over])
         if over.any():
@@ -232,12 +232,14 @@ class _Run:
             self._script.interfere(self._batch, e)
         self._begin(due)
 
-    def _hand_over(self, which: Index, moved: Flags) -> None:
+    def _observe(self, which: Index, moved: Flags) -> None:
         """Take in what the attempts gave, in rows that go on as they did."""
         rows = self._batch.rows
         same = (rows.outcome[which] == RUNNING) & (self._since[which] > 0)
         looked = which[same]
-        called, repeated = self._watch.look(looked, state_keys(rows, looked), moved[same])
+        called, repeated = self._monitor.observe_transitions(
+            looked, state_keys(rows, looked), moved[same]
+        )
         self._called[called] = True
         self._repeated[called[repeated]] = True
         if self._obey:

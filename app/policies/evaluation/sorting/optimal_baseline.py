@@ -1,4 +1,4 @@
-"""The exact planner as the yardstick of sorting episodes: fewest moves, expected attempts."""
+"""Optimal baseline of sorting episodes: the exact planner's moves and expected attempts."""
 
 from functools import cache
 
@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from app.errors import SimulationError
 from app.sim.sorting.batch import SortingBatch
 from app.sim.sorting.kernels.optimal_costs import measure_rows
-from app.sim.sorting.kernels.planner import PlannerWork, new_work, plan_rows
+from app.sim.sorting.kernels.planner import PlannerWork, new_work
+from app.sim.sorting.kernels.planner_batch import TaskBatch, plan_rows
 from app.sim.sorting.state import SortingShape
 
 Index = NDArray[np.int64]
@@ -40,15 +41,13 @@ def measure(batch: SortingBatch, which: Index) -> tuple[Index, NDArray[np.float6
 def choose_by_planner(batch: SortingBatch, which: Index) -> Index:
     """Choose the moves of some rows as the exact planner does; none of them at its goal."""
     rows, best = batch.rows, np.zeros(len(which), dtype=np.int64)
-    plan_rows(
-        rows.clutter[which],
-        rows.towers[which],
-        rows.heights[which],
-        rows.goal[which],
-        rows.goal_heights[which],
-        rows.fail[which],
-        _work(batch.shape),
-        best,
-        np.zeros_like(best),
+    tasks = TaskBatch(
+        clutter=rows.clutter[which],
+        towers=rows.towers[which],
+        heights=rows.heights[which],
+        goal=rows.goal[which],
+        goal_heights=rows.goal_heights[which],
+        fail=rows.fail[which],
     )
+    plan_rows(tasks, _work(batch.shape), best, np.zeros_like(best))
     return best

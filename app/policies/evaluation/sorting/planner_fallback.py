@@ -1,15 +1,15 @@
-"""The hand-over rule of ``app/sim/sorting/progress_monitor.py`` for many sorting tasks at once.
+"""Progress monitor (``app/sim/sorting/progress_monitor.py``) of many sorting tasks at once.
 
-A test walks random episodes and compares every verdict with that of the rule for one task. In
-evaluations picks fail as the failure map says and nobody moves another object than was meant,
-so a state that stays as it was is a failed pick; people interfere at known times.
+A test compares every result on random episodes with that of the monitor of one task.
+In evaluations a pick fails by the failure map and no other object moves, so that an unchanged
+state is a failed pick; interference comes at known times.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.sim.sorting.kernels.task import SortingRows
-from app.sim.sorting.progress_monitor import MAX_SEEN, PATIENCE
+from app.sim.sorting.progress_monitor import ATTEMPT_FACTOR, MAX_SEEN
 
 Index = NDArray[np.int64]
 Flags = NDArray[np.bool_]
@@ -20,7 +20,7 @@ def state_keys(rows: SortingRows, which: Index) -> Keys:
     """Return a number for each state, equal for equal clutter and towers, shape (n,).
 
     A sum of codes times fixed odd 64-bit numbers, modulo 2^64: two states of a task share a
-    key with a chance of about one in 10^18.
+    key with a probability of about 1e-18.
     """
     n, k, c = len(which), rows.clutter.shape[1], rows.towers.shape[1]
     draw = np.random.default_rng(0)
@@ -29,43 +29,41 @@ def state_keys(rows: SortingRows, which: Index) -> Keys:
     return np.asarray((codes.astype(np.uint64) * odd).sum(axis=1, dtype=np.uint64))
 
 
-class HandOver:
-    """Who of many tasks has to be handed over to the exact planner.
-
-    Args:
-        n: Number of tasks.
-    """
+class BatchProgressMonitor:
+    """Progress monitors of ``n`` tasks."""
 
     def __init__(self, n: int) -> None:
         self.planner_fallback: Flags = np.zeros(n, dtype=np.bool_)
-        """Where the exact planner decides, shape (n,)."""
+        """Tasks of the exact planner, shape (n,)."""
         self._seen: Keys = np.zeros((n, MAX_SEEN), dtype=np.uint64)
         self._n_seen: Index = np.zeros(n, dtype=np.int64)
         self._attempts: Index = np.zeros(n, dtype=np.int64)
         self._budget = np.zeros(n)
 
     def begin(self, which: Index, keys: Keys, expected_attempts: NDArray[np.float64]) -> None:
-        """Begin anew, at a start or after somebody interfered.
+        """Restart monitors at a start or after an interference.
 
         Args:
-            which: Tasks.
-            keys: Of their states, shape (len(which),).
-            expected_attempts: Attempts the exact planner expects from there, same shape.
+            which: Tasks, shape (m,).
+            keys: Keys of their states, shape (m,).
+            expected_attempts: Expected attempts of the exact planner from there, shape (m,).
         """
         self.planner_fallback[which] = False
         self._seen[which, 0], self._n_seen[which] = keys, 1
-        self._attempts[which], self._budget[which] = 0, PATIENCE * expected_attempts
+        self._attempts[which], self._budget[which] = 0, ATTEMPT_FACTOR * expected_attempts
 
-    def look(self, which: Index, keys: Keys, moved: Flags) -> tuple[Index, Flags]:
-        """Take in what an attempt gave.
+    def observe_transitions(
+        self, which: Index, keys: Keys, moved: Flags
+    ) -> tuple[Index, Flags]:
+        """Update monitors with the results of attempts.
 
         Args:
-            which: Tasks.
-            keys: Of their states after the attempt, shape (len(which),).
-            moved: Whether the attempt moved an object; otherwise the pick failed, same shape.
+            which: Tasks, shape (m,).
+            keys: Keys of their states after the attempt, shape (m,).
+            moved: Whether the attempt moved an object; otherwise the pick failed, shape (m,).
 
         Returns:
-            The tasks that are handed over now, and whether a repeated state is why.
+            Tasks with a new fallback, and whether a repeated state is the reason.
         """
         self._attempts[which] += 1
         mine = ~self.planner_fallback[which]

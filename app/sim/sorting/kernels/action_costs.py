@@ -53,7 +53,7 @@ def attempts_by_move(
         objects.heights,
         task.goal,
         task.goal_heights,
-        work.progress,
+        work.paths,
     )
     if size * len(moves) > most:
         return False

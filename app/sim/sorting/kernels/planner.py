@@ -20,10 +20,10 @@ from app.sim.core.jit import kernel
 from app.sim.sorting.kernels.shortest_paths import (
     Bytes,
     Ints,
-    Progress,
+    ShortestPaths,
     fill,
     lay_out,
-    new_progress,
+    new_shortest_paths,
     state_number,
     ties_on_tower,
 )
@@ -35,7 +35,7 @@ from app.sim.sorting.kernels.tie_breaking import (
     worst_free,
 )
 
-MOST_STATES = 20_000
+MAX_STATES = 20_000
 """Tasks with more states are planned by the rules alone: looking ahead would take seconds."""
 LESS = 1e-9
 """Attempts by which a plan must be better to be preferred."""
@@ -68,7 +68,7 @@ class Task(NamedTuple):
 class PlannerWork(NamedTuple):
     """Work space of the planner; made once, for any task of its shape."""
 
-    progress: Progress
+    paths: ShortestPaths
     """States of the task."""
     at: Ints
     """Work space of sweeps, shape (C,)."""
@@ -94,7 +94,7 @@ def _new_objects(n_cells: int, n_colours: int) -> Objects:
 def new_work(n_cells: int, n_colours: int, n_sizes: int) -> PlannerWork:
     """Return work space: 30 kB for K = 20, C = 3; 10 MB for K = 40, C = 5."""
     return PlannerWork(
-        progress=new_progress(n_cells, n_colours, n_sizes),
+        paths=new_shortest_paths(n_cells, n_colours, n_sizes),
         at=np.zeros(n_colours, dtype=np.int64),
         now=_new_objects(n_cells, n_colours),
         trial=_new_objects(n_cells, n_colours),
@@ -104,7 +104,7 @@ def new_work(n_cells: int, n_colours: int, n_sizes: int) -> PlannerWork:
 
 
 @kernel()
-def _copy(source: Objects, target: Objects) -> None:
+def copy_objects(source: Objects, target: Objects) -> None:
     """Copy where the objects are."""
     for k in range(len(source.clutter)):
         target.clutter[k] = source.clutter[k]
@@ -115,7 +115,7 @@ def _copy(source: Objects, target: Objects) -> None:
 
 
 @kernel()
-def _lay_out(objects: Objects, task: Task, work: PlannerWork) -> int:
+def lay_out_task(objects: Objects, task: Task, work: PlannerWork) -> int:
     """Write the states of a task and the fewest moves from them; return their number."""
     size = lay_out(
         objects.clutter,
@@ -123,15 +123,15 @@ def _lay_out(objects: Objects, task: Task, work: PlannerWork) -> int:
         objects.heights,
         task.goal,
         task.goal_heights,
-        work.progress,
+        work.paths,
     )
     if size > 0:
-        fill(size, work.at, work.progress)
+        fill(size, work.at, work.paths)
     return size
 
 
 @kernel()
-def _locate(objects: Objects, task: Task, p: Progress) -> None:
+def _locate(objects: Objects, task: Task, p: ShortestPaths) -> None:
     """Write the towers' progress."""
     for c in range(len(objects.heights)):
         height, level = objects.heights[c], 0
@@ -141,13 +141,13 @@ def _locate(objects: Objects, task: Task, p: Progress) -> None:
 
 
 @kernel()
-def _carry_out(action: int, objects: Objects, task: Task, work: PlannerWork) -> bool:
+def _apply_action(action: int, objects: Objects, task: Task, work: PlannerWork) -> bool:
     """Carry an action out, and note the towers' progress.
 
     Returns:
         Whether the states had to be written anew: an object waits on a tower.
     """
-    p, n_cells, n_towers = work.progress, len(objects.clutter), len(objects.heights)
+    p, n_cells, n_towers = work.paths, len(objects.clutter), len(objects.heights)
     moves = n_cells * n_towers
     d = action % n_towers
     if action < moves:
@@ -172,7 +172,7 @@ def _carry_out(action: int, objects: Objects, task: Task, work: PlannerWork) -> 
     if p.want[d, p.at[d]] == code:
         p.at[d] += 1
         return False
-    _lay_out(objects, task, work)
+    lay_out_task(objects, task, work)
     return True
 
 
@@ -184,7 +184,7 @@ def _attempts(action: int, task: Task) -> float:
 
 
 @kernel()
-def _choose(objects: Objects, task: Task, p: Progress) -> int:
+def _choose(objects: Objects, task: Task, p: ShortestPaths) -> int:
     """Return the next action by the rules, -1 at the goal."""
     return choose(objects.clutter, task.goal, task.goal_heights, task.fail, p)
 
@@ -199,15 +199,15 @@ def _try(action: int, best: float, task: Task, work: PlannerWork) -> float:
         task: What is asked for.
         work: Work space; its states fit where the objects are now, and do so again.
     """
-    p = work.progress
-    _copy(work.now, work.trial)
+    p = work.paths
+    copy_objects(work.now, work.trial)
     attempts, anew = 0.0, False
     while action >= 0 and attempts < best:
         attempts += _attempts(action, task)
-        anew = _carry_out(action, work.trial, task, work) or anew
+        anew = _apply_action(action, work.trial, task, work) or anew
         action = _choose(work.trial, task, p)
     if anew:
-        _lay_out(work.now, task, work)
+        lay_out_task(work.now, task, work)
     else:
         _locate(work.now, task, p)
     return attempts
@@ -257,7 +257,7 @@ def _try_cells(c: int, best: float, task: Task, work: PlannerWork) -> tuple[int,
 
 
 @kernel()
-def _waiting(c: int, removed: int, p: Progress) -> int:
+def _waiting(c: int, removed: int, p: ShortestPaths) -> int:
     """Return a tower where the top of another may wait at no cost, -1 where none is.
 
     Args:
@@ -273,14 +273,14 @@ def _waiting(c: int, removed: int, p: Progress) -> int:
 
 
 @kernel()
-def _look_ahead(task: Task, work: PlannerWork) -> int:
+def _best_of_alternatives(task: Task, work: PlannerWork) -> int:
     """Return the next action of the plan, -1 at the goal.
 
     Args:
         task: What is asked for.
         work: Work space; its states fit where the objects are now.
     """
-    p, now = work.progress, work.now
+    p, now = work.paths, work.now
     chosen = _choose(now, task, p)
     n_cells, n_towers = len(now.clutter), len(now.heights)
     moves = n_cells * n_towers
@@ -307,7 +307,7 @@ def _look_ahead(task: Task, work: PlannerWork) -> int:
 
 
 @kernel()
-def _next_action(size: int, task: Task, work: PlannerWork) -> int:
+def next_action(size: int, task: Task, work: PlannerWork) -> int:
     """Return the next action of the plan, -1 at the goal.
 
     Args:
@@ -315,9 +315,9 @@ def _next_action(size: int, task: Task, work: PlannerWork) -> int:
         task: What is asked for.
         work: Work space; its states fit where the objects are now.
     """
-    if size > MOST_STATES:
-        return _choose(work.now, task, work.progress)
-    return _look_ahead(task, work)
+    if size > MAX_STATES:
+        return _choose(work.now, task, work.paths)
+    return _best_of_alternatives(task, work)
 
 
 @kernel(nogil=True)
@@ -332,21 +332,21 @@ def plan_state(objects: Objects, task: Task, work: PlannerWork) -> tuple[int, fl
     Returns:
         Fewest moves, and expected attempts of the plan; -1 and 0 where the goal cannot be met.
     """
-    p = work.progress
-    size = _lay_out(objects, task, work)
+    p = work.paths
+    size = lay_out_task(objects, task, work)
     if size == 0:
         return NONE, 0.0
     mark_first(objects.clutter, p, work.first)
     fewest = p.table[state_number(p)]
-    _copy(objects, work.now)
+    copy_objects(objects, work.now)
     attempts, count = 0.0, 0
     while count < len(work.actions):
-        action = _next_action(size, task, work)
+        action = next_action(size, task, work)
         work.actions[count] = action
         if action < 0:
             break
         attempts += _attempts(action, task)
-        _carry_out(action, work.now, task, work)
+        _apply_action(action, work.now, task, work)
         count += 1
     return fewest, attempts
 
@@ -363,78 +363,10 @@ def plan_by_rules(objects: Objects, task: Task, work: PlannerWork) -> tuple[int,
     Returns:
         Fewest moves, and expected attempts of the plan; -1 and 0 where the goal cannot be met.
     """
-    p = work.progress
-    if _lay_out(objects, task, work) == 0:
+    p = work.paths
+    if lay_out_task(objects, task, work) == 0:
         return NONE, 0.0
-    _copy(objects, work.now)
+    copy_objects(objects, work.now)
     action = _choose(work.now, task, p)
     fewest = p.table[state_number(p)]
     return fewest, _try(action, np.inf, task, work) if action >= 0 else 0.0
-
-
-@kernel(nogil=True)
-def plan_rows(
-    clutter: Bytes,
-    towers: Bytes,
-    heights: Ints,
-    goal: Bytes,
-    goal_heights: Ints,
-    fail: Vec,
-    work: PlannerWork,
-    best: Ints,
-    fewest: Ints,
-) -> None:
-    """Write the next action of the plan for every row of a batch.
-
-    Args:
-        clutter: Objects in the cells, shape (n, K).
-        towers: Objects on the towers, lowest first, shape (n, C, K).
-        heights: Objects per tower, shape (n, C).
-        goal: What the towers shall be, shape (n, C, K).
-        goal_heights: Objects per tower there, shape (n, C).
-        fail: Failure probabilities of the cells, shape (n, K).
-        work: Work space of the shape.
-        best: Next action, -1 where solved or unsolvable, shape (n,), written.
-        fewest: Fewest moves, -1 where the goal cannot be met, shape (n,), written.
-    """
-    p = work.progress
-    for e in range(len(clutter)):
-        best[e], fewest[e] = NONE, NONE
-        objects = Objects(clutter[e], towers[e], heights[e])
-        task = Task(goal[e], goal_heights[e], fail[e])
-        size = _lay_out(objects, task, work)
-        if size > 0:
-            fewest[e] = p.table[state_number(p)]
-            _copy(objects, work.now)
-            best[e] = _next_action(size, task, work)
-
-
-@kernel(nogil=True)
-def mark_rows(
-    clutter: Bytes,
-    towers: Bytes,
-    heights: Ints,
-    goal: Bytes,
-    goal_heights: Ints,
-    fail: Vec,
-    work: PlannerWork,
-    first: NDArray[np.bool_],
-) -> None:
-    """Mark the moves with which plans of the fewest moves begin, for every row of a batch.
-
-    Args:
-        clutter: Objects in the cells, shape (n, K).
-        towers: Objects on the towers, lowest first, shape (n, C, K).
-        heights: Objects per tower, shape (n, C).
-        goal: What the towers shall be, shape (n, C, K).
-        goal_heights: Objects per tower there, shape (n, C).
-        fail: Failure probabilities of the cells, shape (n, K).
-        work: Work space of the shape.
-        first: Marks, shape (n, actions), written; all false where solved or unsolvable.
-    """
-    for e in range(len(clutter)):
-        for action in range(first.shape[1]):
-            first[e, action] = False
-        objects = Objects(clutter[e], towers[e], heights[e])
-        if _lay_out(objects, Task(goal[e], goal_heights[e], fail[e]), work) > 0:
-            mark_first(clutter[e], work.progress, first[e])

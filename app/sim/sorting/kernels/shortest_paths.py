@@ -38,7 +38,7 @@ FAR = 10_000
 """Moves from a state that was not reached yet."""
 
 
-class Progress(NamedTuple):
+class ShortestPaths(NamedTuple):
     """The states of one task, and work space; made once, for any task of its shape."""
 
     n: Ints
@@ -77,11 +77,11 @@ def most_states(n_cells: int, n_colours: int) -> int:
     return int((each + 2) ** more * (each + 1) ** (n_colours - more))
 
 
-def new_progress(n_cells: int, n_colours: int, n_sizes: int) -> Progress:
+def new_shortest_paths(n_cells: int, n_colours: int, n_sizes: int) -> ShortestPaths:
     """Return work space for tasks of a shape: 7 bytes per state, 10 MB for K = 40, C = 5."""
     c, length = n_colours, 2 * n_cells + 1
     n_codes, size = 1 + n_colours * n_sizes, most_states(n_cells, n_colours)
-    return Progress(
+    return ShortestPaths(
         n=np.zeros(c, dtype=np.int64),
         stride=np.zeros(c, dtype=np.int64),
         junk=np.zeros(c, dtype=np.int64),
@@ -110,7 +110,7 @@ def _stands(codes: Bytes, lowest: int, end: int, code: int) -> bool:
 
 @kernel()
 def _lends(
-    a: int, towers: Bytes, heights: Ints, goal: Bytes, goal_heights: Ints, p: Progress
+    a: int, towers: Bytes, heights: Ints, goal: Bytes, goal_heights: Ints, p: ShortestPaths
 ) -> bool:
     """Tell whether tower ``a`` might lend its object at level ``cut`` (module docstring)."""
     code = goal[a, p.cut[a]]
@@ -125,7 +125,7 @@ def _lends(
 
 @kernel()
 def _find_cuts(
-    towers: Bytes, heights: Ints, goal: Bytes, goal_heights: Ints, p: Progress
+    towers: Bytes, heights: Ints, goal: Bytes, goal_heights: Ints, p: ShortestPaths
 ) -> None:
     """Write matching levels and cuts.
 
@@ -159,7 +159,7 @@ def _add(held: NDArray[np.int16], source: int, target: int, code: int) -> None:
 
 
 @kernel()
-def _lay_tower(c: int, tower: Bytes, goal: Bytes, goal_height: int, p: Progress) -> None:
+def _lay_tower(c: int, tower: Bytes, goal: Bytes, goal_height: int, p: ShortestPaths) -> None:
     """Write the states of one tower: top, want, below and held."""
     junk, match, cut = p.junk[c], p.match[c], p.cut[c]
     held = p.held[c]
@@ -210,7 +210,12 @@ def _can_be_met(
 
 @kernel()
 def lay_out(
-    clutter: Bytes, towers: Bytes, heights: Ints, goal: Bytes, goal_heights: Ints, p: Progress
+    clutter: Bytes,
+    towers: Bytes,
+    heights: Ints,
+    goal: Bytes,
+    goal_heights: Ints,
+    p: ShortestPaths,
 ) -> int:
     """Write the states of a task.
 
@@ -237,7 +242,7 @@ def lay_out(
 
 
 @kernel()
-def _count_left(c: int, at: Ints, p: Progress) -> None:
+def _count_left(c: int, at: Ints, p: ShortestPaths) -> None:
     """Write ``left`` of tower ``c`` and those before it, the first one excepted."""
     for d in range(c, 0, -1):
         for x in range(p.left.shape[1]):
@@ -245,7 +250,7 @@ def _count_left(c: int, at: Ints, p: Progress) -> None:
 
 
 @kernel()
-def _fewest_from(index: int, at: Ints, p: Progress) -> int:
+def _fewest_from(index: int, at: Ints, p: ShortestPaths) -> int:
     """Return the fewest moves from a state by what is known of its successors."""
     best = FAR
     for c in range(len(at)):
@@ -264,7 +269,7 @@ def _fewest_from(index: int, at: Ints, p: Progress) -> int:
 
 
 @kernel()
-def _sweep(size: int, at: Ints, p: Progress) -> bool:
+def _sweep(size: int, at: Ints, p: ShortestPaths) -> bool:
     """Improve all states once, from the goal on; tell whether any has become better."""
     better = False
     for c in range(len(at)):
@@ -286,7 +291,7 @@ def _sweep(size: int, at: Ints, p: Progress) -> bool:
 
 
 @kernel()
-def fill(size: int, at: Ints, p: Progress) -> None:
+def fill(size: int, at: Ints, p: ShortestPaths) -> None:
     """Write the fewest moves from every state.
 
     Args:
@@ -305,7 +310,7 @@ def fill(size: int, at: Ints, p: Progress) -> None:
 
 
 @kernel()
-def state_number(p: Progress) -> int:
+def state_number(p: ShortestPaths) -> int:
     """Return the number of the state that the towers are in now."""
     index = 0
     for c in range(len(p.at)):
@@ -314,7 +319,7 @@ def state_number(p: Progress) -> int:
 
 
 @kernel()
-def in_clutter(index: int, code: int, p: Progress) -> int:
+def in_clutter(index: int, code: int, p: ShortestPaths) -> int:
     """Return how many objects of a code lie in the clutter in a state."""
     n_towers = len(p.n)
     count: int = p.left[n_towers, code]
@@ -324,7 +329,7 @@ def in_clutter(index: int, code: int, p: Progress) -> int:
 
 
 @kernel()
-def _meet(index: int, found: int, p: Progress) -> int:
+def _meet(index: int, found: int, p: ShortestPaths) -> int:
     """Note a state to be searched, once; return how many there are."""
     if p.seen[index] == 0:
         p.seen[index] = 1
@@ -334,7 +339,7 @@ def _meet(index: int, found: int, p: Progress) -> int:
 
 
 @kernel()
-def _search_from(index: int, still: int, code: int, found: int, p: Progress) -> int:
+def _search_from(index: int, still: int, code: int, found: int, p: ShortestPaths) -> int:
     """Note the states that shortest plans reach from one while tower ``still`` stands.
 
     Returns:
@@ -365,7 +370,7 @@ def _search_from(index: int, still: int, code: int, found: int, p: Progress) -> 
 
 
 @kernel()
-def ties_on_tower(index: int, still: int, code: int, p: Progress) -> bool:
+def ties_on_tower(index: int, still: int, code: int, p: ShortestPaths) -> bool:
     """Tell whether a removed object may as well be put on a tower where it is not wanted.
 
     There it is as good as in the clutter if, in some shortest plan, an object of its code is

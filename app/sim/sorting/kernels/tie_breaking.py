@@ -18,7 +18,7 @@ from app.sim.core.jit import kernel
 from app.sim.sorting.kernels.shortest_paths import (
     Bytes,
     Ints,
-    Progress,
+    ShortestPaths,
     state_number,
     ties_on_tower,
 )
@@ -48,7 +48,7 @@ def worst_free(clutter: Bytes, fail: Vec) -> int:
 
 
 @kernel()
-def still_wanted(code: int, goal: Bytes, goal_heights: Ints, p: Progress) -> int:
+def still_wanted(code: int, goal: Bytes, goal_heights: Ints, p: ShortestPaths) -> int:
     """Return how many objects of a code the towers still lack."""
     count = 0
     for c in range(len(p.at)):
@@ -91,7 +91,7 @@ def _cell_for(code: int, wanted: int, clutter: Bytes, fail: Vec) -> int:
 
 
 @kernel()
-def _transfer(index: int, p: Progress) -> int:
+def _transfer(index: int, p: ShortestPaths) -> int:
     """Return a tower-to-tower move of a shortest plan as ``c * C + d``, -1 where none is."""
     n_towers = len(p.at)
     for c in range(n_towers):
@@ -107,7 +107,7 @@ def _transfer(index: int, p: Progress) -> int:
 
 
 @kernel()
-def _placement(index: int, clutter: Bytes, fail: Vec, p: Progress) -> int:
+def _placement(index: int, clutter: Bytes, fail: Vec, p: ShortestPaths) -> int:
     """Return the least risky placement of a shortest plan as ``k * C + c``, -1 if none is."""
     n_towers = len(p.at)
     best, least = NONE, 2.0
@@ -123,7 +123,7 @@ def _placement(index: int, clutter: Bytes, fail: Vec, p: Progress) -> int:
 
 @kernel()
 def _removal(
-    index: int, clutter: Bytes, goal: Bytes, goal_heights: Ints, fail: Vec, p: Progress
+    index: int, clutter: Bytes, goal: Bytes, goal_heights: Ints, fail: Vec, p: ShortestPaths
 ) -> int:
     """Return the least risky removal of a shortest plan as an action, -1 where none is."""
     n_cells, n_towers = len(clutter), len(p.at)
@@ -146,7 +146,7 @@ def _removal(
 
 
 @kernel()
-def choose(clutter: Bytes, goal: Bytes, goal_heights: Ints, fail: Vec, p: Progress) -> int:
+def choose(clutter: Bytes, goal: Bytes, goal_heights: Ints, fail: Vec, p: ShortestPaths) -> int:
     """Return the next action of the plan, -1 at the goal.
 
     Args:
@@ -170,7 +170,7 @@ def choose(clutter: Bytes, goal: Bytes, goal_heights: Ints, fail: Vec, p: Progre
 
 
 @kernel()
-def mark_first(clutter: Bytes, p: Progress, first: NDArray[np.bool_]) -> None:
+def mark_first(clutter: Bytes, p: ShortestPaths, first: NDArray[np.bool_]) -> None:
     """Mark every action with which some shortest plan begins.
 
     Args:

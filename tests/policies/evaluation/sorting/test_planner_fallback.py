@@ -9,7 +9,12 @@ from app.policies.evaluation.sorting.planner_fallback import state_keys
 from app.sim.sorting.batch import SortingBatch, SortingSettings, apply
 from app.sim.sorting.benchmark_tasks import sorting_test
 from app.sim.sorting.planner import solve
-from app.sim.sorting.progress_monitor import ProgressMonitor, look, note_move, state_key
+from app.sim.sorting.progress_monitor import (
+    ProgressMonitor,
+    expect_state,
+    observe_transition,
+    state_key,
+)
 from app.sim.sorting.state import SortingShape
 from tests.policies.evaluation.sorting_players import at_random, exactly, state_in
 
@@ -30,12 +35,14 @@ class Followed(SortingBatch):
         for e in np.flatnonzero(self.rows.outcome == 0).tolist():
             state = self.state_of(e)
             plan = solve(state, self.shape)
-            record = look(self.records.get(e), state_key(state), plan.attempts, POLICY)
+            record = observe_transition(
+                self.records.get(e), state_key(state), plan.attempts, POLICY
+            )
             self.verdicts.append((record.planner_fallback is not None, e not in self.asked))
             move = self.shape.move_of(int(act[e]))
             risk = state.fail[move.pick] if move.pick < self.shape.n_cells else 0.0
             after = state_key(apply(state, self.shape, move))
-            self.records[e] = note_move(record, after, can_fail=bool(risk > 0.0))
+            self.records[e] = expect_state(record, after, can_fail=bool(risk > 0.0))
         self.asked.clear()
         return super().step(act, auto_reset=auto_reset)
 

@@ -7,13 +7,12 @@ import numpy as np
 from app.sim.sorting.kernels.planner import (
     Objects,
     Task,
-    mark_rows,
     new_work,
     plan_by_rules,
-    plan_rows,
     plan_state,
 )
-from app.sim.sorting.kernels.shortest_paths import lay_out, most_states, new_progress
+from app.sim.sorting.kernels.planner_batch import TaskBatch, mark_rows, plan_rows
+from app.sim.sorting.kernels.shortest_paths import lay_out, most_states, new_shortest_paths
 from app.sim.sorting.planner import solve
 from app.sim.sorting.state import SortingShape, SortingState
 from tests.sim.sorting_search import random_task
@@ -39,7 +38,7 @@ def rows_of(states: list[SortingState]) -> tuple[np.ndarray, ...]:
 def planned(rows: tuple[np.ndarray, ...]) -> tuple[list[int], list[int]]:
     """Best actions and fewest moves of a batch."""
     best, fewest = (np.zeros(len(rows[0]), dtype=np.int64) for _ in range(2))
-    plan_rows(*rows, new_work(8, 3, 2), best, fewest)
+    plan_rows(TaskBatch(*rows), new_work(8, 3, 2), best, fewest)
     return best.tolist(), fewest.tolist()
 
 
@@ -65,7 +64,8 @@ def test_marks_of_rows_are_all_first_actions() -> None:
     states = tasks(50, seed=13)
     first = np.zeros((50, SHAPE.n_actions), dtype=np.bool_)
     clutter, towers, heights, goal, goal_heights, fail = rows_of(states)
-    mark_rows(clutter, towers, heights, goal, goal_heights, fail, new_work(8, 3, 2), first)
+    batch = TaskBatch(clutter, towers, heights, goal, goal_heights, fail)
+    mark_rows(batch, new_work(8, 3, 2), first)
     for state, marks in zip(states, first, strict=True):
         assert tuple(np.flatnonzero(marks).tolist()) == solve(state, SHAPE).first
 
@@ -85,7 +85,7 @@ def test_a_rough_plan_has_as_many_moves_and_no_fewer_attempts() -> None:
 def test_no_task_has_more_states_than_the_work_space_holds() -> None:
     for n_cells, n_colours in itertools.product((1, 2, 5), (1, 2, 3)):
         shape = SortingShape(n_cells=n_cells, n_colours=n_colours, n_sizes=1)
-        p, rng = new_progress(n_cells, n_colours, 1), np.random.default_rng(15)
+        p, rng = new_shortest_paths(n_cells, n_colours, 1), np.random.default_rng(15)
         for _ in range(100):
             row = rows_of([random_task(shape, rng, n_cells)])
             assert lay_out(*(part[0] for part in row[:5]), p) <= most_states(n_cells, n_colours)
