@@ -1,15 +1,19 @@
-"""Make the shipped task primitives anew; run ``python -m tools.make_primitives``.
+"""Generate the shipped task primitives: ``python -m tools.make_primitives``.
 
-For each leg of each shipped cell with a worker and pick stations, N_DEMONSTRATIONS motions are
-demonstrated (``demonstrations.py``): the styles in turn, and people whose stature, arms and
-shoulders are drawn between the 5th and the 95th percentile, stature in even strata. Each leg
-has a random stream of its own, so that one can be made again alone. All take three quarters of
-a minute on one core.
+For each segment of each shipped cell with a worker and pick stations, N_DEMONSTRATIONS motions
+are generated (``demonstrations.py``): the styles in turn, and people whose stature, arms and
+shoulders are drawn between the 5th and the 95th percentile, stature in even strata. Each
+segment has its own random stream, so that it can be generated alone. The whole takes 45 s on
+one core.
 
-The result is committed as ``primitives_data/task_primitives.npz``;
-``tests/tools/test_make_primitives.py`` makes one leg again and compares.
+``--elbow-spread`` varies the elbow of the working arm at the same palm path (thesis 5.3.3,
+``augmentation.py``); the shipped primitives use 0, since their styles vary the elbow already.
+
+The result is committed as ``app/sim/primitives/data/task_primitives.npz``;
+``tests/tools/test_make_primitives.py`` generates one segment again and compares.
 """
 
+import argparse
 import logging
 
 import numpy as np
@@ -18,16 +22,18 @@ from app.sim.cells.cell import Cell, cell_names, load_cell
 from app.sim.core.arrays import Vec
 from app.sim.human.anthropometry import percentile_body
 from app.sim.primitives import promp
+from app.sim.primitives.augmentation import draw_swivel, vary_elbow
 from app.sim.primitives.demonstrations import PHASES, STYLES, demonstrate
 from app.sim.primitives.library_file import (
     FILE,
     HANDS,
-    Leg,
     TaskPrimitive,
+    TaskSegment,
     place_of,
     segments_of,
     write_primitives,
 )
+from app.sim.primitives.via_points import points_of
 
 logger = logging.getLogger(__name__)
 
@@ -36,33 +42,41 @@ VERSION = 1
 SEED = 4
 """Of all streams."""
 N_DEMONSTRATIONS = 60
-"""Demonstrations of each leg, the styles in turn."""
+"""Demonstrations of each segment, the styles in turn."""
 PERCENTILES = (5.0, 95.0)
 """Range of people's percentiles."""
 
 
-def make_primitive(cell: Cell, leg: Leg, n: int = N_DEMONSTRATIONS) -> TaskPrimitive:
-    """Demonstrate one leg of a cell and return its weights.
+def make_primitive(
+    cell: Cell, segment: TaskSegment, n: int = N_DEMONSTRATIONS, elbow_spread: float = 0.0
+) -> TaskPrimitive:
+    """Demonstrate one segment of a cell and return its weights.
 
     Args:
         cell: Work cell with a worker.
-        leg: One of its legs.
+        segment: One of its segments.
         n: Number of demonstrations.
+        elbow_spread: Standard deviation of the added swivel of the working arm [rad].
     """
-    name = f"{cell.name}/{leg.start}/{leg.end}".encode()
-    rng = np.random.default_rng([SEED, HANDS.index(leg.hand), *name])
-    ends = place_of(cell, leg.start), place_of(cell, leg.end)
-    motions = [
-        demonstrate(cell, size, ends, leg.hand, STYLES[i % len(STYLES)], rng)
-        for i, size in enumerate(draw_people(cell, n, rng))
-    ]
+    name = f"{cell.name}/{segment.start}/{segment.end}".encode()
+    rng = np.random.default_rng([SEED, HANDS.index(segment.hand), *name])
+    ends = place_of(cell, segment.start), place_of(cell, segment.end)
+    motions, paths = [], []
+    for i, size in enumerate(draw_people(cell, n, rng)):
+        motion = demonstrate(cell, size, ends, segment.hand, STYLES[i % len(STYLES)], rng)
+        q = motion.q
+        if elbow_spread > 0.0:
+            swivel = draw_swivel(len(q), rng, elbow_spread)
+            q = vary_elbow(q, segment.hand, swivel, points_of(size))
+        motions.append(motion)
+        paths.append(q)
     durations = np.array([one.duration_s for one in motions])
     phi = promp.basis(PHASES, promp.N_BASIS, promp.usual_width(promp.N_BASIS))
-    weights = np.array([promp.weights_of(one.q, phi) for one in motions])
-    left = np.array([one.q for one in motions]) - phi @ np.swapaxes(weights, 1, 2)
+    weights = np.array([promp.weights_of(q, phi) for q in paths])
+    left = np.array(paths) - phi @ np.swapaxes(weights, 1, 2)
     return TaskPrimitive(
         cell=cell.name,
-        leg=leg,
+        segment=segment,
         weights=weights,
         durations=durations,
         residual=np.sqrt(np.mean(left**2, axis=(0, 1))),
@@ -83,17 +97,23 @@ def draw_people(cell: Cell, n: int, rng: np.random.Generator) -> list[Vec]:
 
 
 def main() -> None:
-    """Demonstrate every leg of the shipped cells and write the data file."""
+    """Generate the primitives of all segments of the shipped cells and write the data file."""
+    parser = argparse.ArgumentParser(description="Generate the shipped task primitives.")
+    parser.add_argument(
+        "--elbow-spread", type=float, default=0.0, help="swivel of the elbow, std. dev. [rad]"
+    )
+    elbow_spread = parser.parse_args().elbow_spread
     made = []
     for cell in map(load_cell, cell_names()):
-        for leg in segments_of(cell):
-            made.append(make_primitive(cell, leg))
-            logger.info("%s: %s to %s, %s", cell.name, leg.start, leg.end, leg.hand)
+        for segment in segments_of(cell):
+            made.append(make_primitive(cell, segment, elbow_spread=elbow_spread))
+            logger.info("%s: %s to %s, %s", cell.name, segment.start, segment.end, segment.hand)
     about = {
         "made_by": "python -m tools.make_primitives",
         "version": VERSION,
         "seed": SEED,
         "demonstrations": N_DEMONSTRATIONS,
+        **({"elbow_spread": elbow_spread} if elbow_spread else {}),
         "styles": [style.name for style in STYLES],
         "percentiles": {name: list(PERCENTILES) for name in ("stature", "arms", "shoulders")},
         "basis": {"n": promp.N_BASIS, "ridge": promp.RIDGE},

@@ -42,7 +42,7 @@ ROWS: dict[str, tuple[KeypointSensorSettings, float, float | None]] = {
     "20mm-20%-p95": (NOISY, 95.0, None),
     "20mm-20%-p95-taken-for-median": (NOISY, 95.0, 50.0),
 }
-"""Tracker, percentile of the people, percentile they are taken for."""
+"""KeypointSensorModel, percentile of the people, percentile they are taken for."""
 
 
 def measured(name: str) -> Row:

@@ -1,4 +1,4 @@
-"""Motions a task library is made for: random legs between random nodes, and what they are like.
+"""Random segments of a motion library between random keyframes, and their properties.
 
 Used by the library's tests and by ``tools/docs/people_plots.py``.
 """
@@ -19,10 +19,10 @@ LOW = ("elbow_r", "wrist_r", "elbow_l", "wrist_l")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LegMotion:
-    """One leg as a worker does it."""
+class SegmentMotion:
+    """One segment as a worker does it."""
 
-    leg: tuple[int, int, int]
+    segment: tuple[int, int, int]
     """From, to and hand."""
     person: int
     """Whose size it has."""
@@ -30,15 +30,15 @@ class LegMotion:
     """Joint positions at PHASES, before they are clipped to the limits [m, rad], (41, 18)."""
     palms: Vec
     """Palms at PHASES, of the clipped joints [m], shape (41, 2, 3)."""
-    nodes: Vec
-    """Palms of the nodes at both ends [m], shape (2, 2, 3)."""
+    keyframes: Vec
+    """Palms of the keyframes at both ends [m], shape (2, 2, 3)."""
     lowest: float
     """Least height of palms, wrists and elbows over the table [m]."""
 
     @property
     def end_miss(self) -> float:
-        """How far a palm is from its node at an end at most [m]."""
-        return float(np.linalg.norm(self.palms[[0, -1]] - self.nodes, axis=-1).max())
+        """How far a palm is from its keyframe at an end at most [m]."""
+        return float(np.linalg.norm(self.palms[[0, -1]] - self.keyframes, axis=-1).max())
 
     @property
     def beyond(self) -> float:
@@ -49,13 +49,13 @@ class LegMotion:
     @property
     def path(self) -> float:
         """Length of the working palm's path [m]."""
-        steps = np.diff(self.palms[:, self.leg[2]], axis=0)
+        steps = np.diff(self.palms[:, self.segment[2]], axis=0)
         return float(np.linalg.norm(steps, axis=1).sum())
 
     @property
     def straight(self) -> float:
         """Distance of its ends [m]."""
-        return float(np.linalg.norm(np.subtract(*self.nodes[:, self.leg[2]])))
+        return float(np.linalg.norm(np.subtract(*self.keyframes[:, self.segment[2]])))
 
     @property
     def swing(self) -> float:
@@ -65,10 +65,12 @@ class LegMotion:
         return float(np.maximum(low - angles, angles - high).max())
 
 
-def random_segments(cell: Cell, library: MotionLibrary, n: int, seed: int) -> list[LegMotion]:
-    """Return n legs, each of a random person, primitive, sample and pair of nodes."""
+def random_segments(
+    cell: Cell, library: MotionLibrary, n: int, seed: int
+) -> list[SegmentMotion]:
+    """Return n segments, each of a random person, primitive, sample and pair of keyframes."""
     rng = np.random.default_rng(seed)
-    ways = np.argwhere(library.legs[..., 0] >= 0)
+    ways = np.argwhere(library.segments[..., 0] >= 0)
     return [
         random_segment(cell, library, tuple(ways[rng.integers(len(ways))]), rng)
         for _ in range(n)
@@ -76,16 +78,16 @@ def random_segments(cell: Cell, library: MotionLibrary, n: int, seed: int) -> li
 
 
 def random_segment(
-    cell: Cell, library: MotionLibrary, leg: tuple[int, int, int], rng: np.random.Generator
-) -> LegMotion:
-    """Return a leg of a random person between random nodes."""
-    start, end, hand = leg
-    primitive, first, count = library.legs[leg]
+    cell: Cell, library: MotionLibrary, segment: tuple[int, int, int], rng: np.random.Generator
+) -> SegmentMotion:
+    """Return a segment of a random person between random keyframes."""
+    start, end, hand = segment
+    primitive, first, count = library.segments[segment]
     person = int(rng.integers(len(library.bodies)))
     ranges = library.of_station[person, [start, end], hand]
-    nodes = [int(one + rng.integers(some)) for one, some in ranges]
+    keyframes = [int(one + rng.integers(some)) for one, some in ranges]
     sample = int(first + rng.integers(count))
-    weights = segment_weights(library, primitive, sample, library.postures[nodes])
+    weights = segment_weights(library, primitive, sample, library.postures[keyframes])
     phi = promp.basis(PHASES, promp.N_BASIS, promp.usual_width(promp.N_BASIS))
     q = phi @ weights.T
     size = library.bodies[person]
@@ -93,11 +95,11 @@ def random_segment(
     palms = np.array([[row["hand_r"], row["hand_l"]] for row in rows])
     low = np.array([[row[name] for name in LOW] for row in rows])
     heights = height_over_table(cell, np.concatenate([palms, low], axis=1))
-    return LegMotion(
-        leg=leg,
+    return SegmentMotion(
+        segment=segment,
         person=person,
         q=q,
         palms=palms,
-        nodes=library.hands[nodes],
+        keyframes=library.hands[keyframes],
         lowest=float(heights.min()),
     )

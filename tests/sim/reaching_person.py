@@ -5,7 +5,7 @@ import numpy as np
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
 from app.sim.core.kernels import rng as random
-from app.sim.people.reach_script import Script, build_reach_library
+from app.sim.people.reach_script import ReachScript, build_reach_library
 from app.sim.primitives.kernels import script
 
 
@@ -24,26 +24,22 @@ class ReachingPerson:
         self._begin = 0.0
         self._script, self._last = self._draw(-1)
 
-    def _draw(self, first: int) -> tuple[Script, int]:
+    def _draw(self, first: int) -> tuple[ReachScript, int]:
         state = np.zeros(1, dtype=np.uint64)
         random.start_stream(self._seed, 0, self._block, state)
-        start, duration = np.zeros(script.MAX_MOVES), np.ones(script.MAX_MOVES)
-        chosen = np.zeros(script.MAX_MOVES + 1, dtype=np.int64)
+        moves = script.Moves(
+            np.zeros(script.MAX_MOVES),
+            np.ones(script.MAX_MOVES),
+            np.zeros(script.MAX_MOVES + 1, dtype=np.int64),
+        )
+        start, duration, chosen = moves
         library = self._library
         n = script.draw_script(
-            state,
-            library.of_station[0],
-            library.n_stations,
-            library.n_cubes,
-            library.hands,
-            first,
-            start,
-            duration,
-            chosen,
+            state, library.of_station[0], library.n_cubes, library.hands, first, moves
         )
         postures = library.postures[chosen[: n + 1]]
         self._end = float(start[n - 1] + duration[n - 1])
-        return Script(start[:n], duration[:n], postures), int(chosen[n])
+        return ReachScript(start[:n], duration[:n], postures), int(chosen[n])
 
     def at(self, t: float) -> tuple[Vec, Vec]:
         """Return joint positions [m, rad] and speeds [m/s, rad/s], (18,) each.

@@ -8,7 +8,11 @@ import numpy as np
 from app.sim.cells.cell import Cell
 from app.sim.human import model as human
 from app.sim.perception.bounding_cylinder import SafetyCylinder, safety_cylinder
-from app.sim.perception.keypoint_sensor_model import KeypointSensorSettings, Tracker, follow
+from app.sim.perception.keypoint_sensor_model import (
+    KeypointSensorModel,
+    KeypointSensorSettings,
+    follow,
+)
 from app.sim.perception.keypoints import keypoints_of
 from app.sim.perception.person_estimator import PersonEstimate, PersonEstimator
 from tests.sim.tracked_person import RATE_HZ, cell_of, motion, work
@@ -50,7 +54,7 @@ def errors(
     taken_for = cell if assumed is None else cell_of(assumed)
     for seed in SEEDS:
         times, q, qd = work(seed, SECONDS, percentile)
-        tracker = Tracker(settings, seed, cell.body, cell.floor_z)
+        tracker = KeypointSensorModel(settings, seed, cell.body, cell.floor_z)
         estimator = PersonEstimator(taken_for.body)
         estimates = follow(motion(seed, SECONDS, percentile), times, tracker, estimator)
         for k, estimate in enumerate(estimates):

@@ -25,7 +25,7 @@ from app.sim.human.anthropometry import percentile_body
 from app.sim.primitives.demonstrations import PHASES, STYLES, between, draw_keyframe
 from app.sim.primitives.library_file import FILE, HANDS, load_primitives, read_header
 from app.sim.primitives.primitive_library import MotionLibrary, motion_library
-from tests.sim.library_motions import LegMotion, random_segment, random_segments
+from tests.sim.library_motions import SegmentMotion, random_segment, random_segments
 from tools.docs.world_plots import BLUE, GREEN, GREY, LIGHT, ORANGE, panels, save
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -86,12 +86,12 @@ def measure(cell: Cell, library: MotionLibrary) -> Json:
     }
 
 
-def _farther(leg: LegMotion) -> float:
+def _farther(leg: SegmentMotion) -> float:
     return float(np.linalg.norm(leg.nodes[1] - leg.nodes[0], axis=1).max())
 
 
-def _duration(library: MotionLibrary, leg: LegMotion, rng: np.random.Generator) -> float:
-    mean, spread = library.duration[library.legs[leg.leg][0]]
+def _duration(library: MotionLibrary, leg: SegmentMotion, rng: np.random.Generator) -> float:
+    mean, spread = library.duration[library.segments[leg.segment][0]]
     return float(np.exp(mean + spread * rng.standard_normal()))
 
 

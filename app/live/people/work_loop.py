@@ -14,8 +14,7 @@ from app.sim.core.arrays import Vec
 from app.sim.core.kernels import rng as random
 from app.sim.human.anthropometry import BodySize
 from app.sim.people.human_motion_config import HumanMotionConfig
-from app.sim.people.kernels.people import worker_at
-from app.sim.primitives.kernels.primitives import draw_segments
+from app.sim.people.kernels.motion import draw_script_of, worker_at
 from app.sim.primitives.kernels.script import draw_pause
 from app.sim.primitives.primitive_library import VARIANTS
 from app.sim.scene.scene import new_people_state, people_of, with_people
@@ -48,23 +47,10 @@ class WorkLoop:
         """Draw the next script, from posture ``first`` on; return when it ends [s]."""
         people, state, rng = self._people, self._state, np.zeros(1, dtype=np.uint64)
         random.start_stream(self._seed, 0, self._block, rng)
-        legs, start, duration = state.legs, state.start[0, 0], state.duration[0, 0]
-        n = draw_segments(
-            rng,
-            people.primitive_library,
-            people.of_station[0],
-            people.n_cubes,
-            first,
-            start,
-            duration,
-            state.chosen[0, 0],
-            legs.primitive[0, 0],
-            legs.sample[0, 0],
-            legs.stop[0, 0],
-        )
-        state.n_moves[0, 0], state.move[0, 0], legs.ready[0, 0] = n, 0, -1
-        last = n - 1
-        whole = float(start[last] + duration[last] + legs.stop[0, 0, last, 1])
+        draw_script_of(people, state, 0, 0, 0, first, rng)
+        start, duration = state.start[0, 0], state.duration[0, 0]
+        last = state.n_moves[0, 0] - 1
+        whole = float(start[last] + duration[last] + state.segments.stop[0, 0, last, 1])
         return whole + draw_pause(rng, True)
 
     def at(self, t: float) -> tuple[Vec, Vec]:

@@ -18,7 +18,7 @@ from app.sim.human.model import JOINT_NAMES
 from app.sim.mocap.artifacts import Artifact
 from app.sim.mocap.bvh import check_dt, shown
 from app.sim.mocap.csv_text import CsvText, read_csv_text
-from app.sim.mocap.tables import Table, bad, complete_rows, missing_values
+from app.sim.mocap.tables import TextTable, bad, complete_rows, missing_values
 
 CSV_COLUMNS = ("time", *JOINT_NAMES, "pelvis_z")
 """Columns that a CSV file can have."""
@@ -98,7 +98,7 @@ def read_csv(text: str, names: Mapping[str, str] | None = None) -> AngleTrack:
     )
 
 
-def _columns(table: Table, names: Mapping[str, str]) -> dict[str, int]:
+def _columns(table: TextTable, names: Mapping[str, str]) -> dict[str, int]:
     """Return the index of each column by our name; all must be known."""
     columns = table.columns(CSV_COLUMNS, names)
     place = f"line {table.line}"
@@ -182,7 +182,7 @@ def require_places(places: Mapping[str, Vec], most: float = MAX_PLACE) -> None:
             raise bad(f"column {name}", f"{far:.4g}", rule, hint if far > 100.0 else "")
 
 
-def check_times(times: Vec, table: Table, good: NDArray[np.bool_]) -> Vec:
+def check_times(times: Vec, table: TextTable, good: NDArray[np.bool_]) -> Vec:
     """Return a column of times [s].
 
     Args:

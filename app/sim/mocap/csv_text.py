@@ -11,7 +11,15 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from app.sim.mocap.bvh import lines_of
-from app.sim.mocap.tables import MAX_COLUMNS, MISSING, PADDING, Table, bad, named_columns, plain
+from app.sim.mocap.tables import (
+    MAX_COLUMNS,
+    MISSING,
+    PADDING,
+    TextTable,
+    bad,
+    named_columns,
+    plain,
+)
 
 SEPARATORS = (",", ";", "\t", "|")
 """Between columns; white space where none of them is there."""
@@ -33,7 +41,7 @@ class CsvText:
 
     said: Mapping[str, str]
     """Declarations, ``# key = value``, in lower case."""
-    table: Table
+    table: TextTable
     """Columns and rows, without the row of units."""
     units: Mapping[int, str]
     """Unit that the file states of a column, by index: in its name or in a row of its own."""
@@ -65,7 +73,7 @@ def read_csv_text(text: str, known: Sequence[str]) -> CsvText:
         units, rows = {**units, **below}, rows[1:]
     return CsvText(
         said=dict(_declared(line) for _, line in comments),
-        table=Table(
+        table=TextTable(
             names=names,
             labels=tuple("" if _is_index(name) else name for name in names),
             line=head[0],

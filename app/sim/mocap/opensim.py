@@ -25,7 +25,7 @@ from app.sim.mocap.csv_tables import AngleTrack, check_times, in_radians, requir
 from app.sim.mocap.inverse_kinematics import euler_angles, one_branch
 from app.sim.mocap.tables import (
     MAX_COLUMNS,
-    Table,
+    TextTable,
     bad,
     complete_rows,
     missing_values,
@@ -145,7 +145,7 @@ def _in_degrees(said: Mapping[str, str]) -> bool:
     return degrees
 
 
-def _table(rows: Sequence[tuple[int, str]]) -> Table:
+def _table(rows: Sequence[tuple[int, str]]) -> TextTable:
     line, head = rows[0]
     separator = next((one for one in "\t," if one in head), None)
     names = named_columns(head.split(separator, MAX_COLUMNS), line)
@@ -154,7 +154,7 @@ def _table(rows: Sequence[tuple[int, str]]) -> Table:
         here = separator if separator is None or separator in text else None
         return text.split(here, most)
 
-    return Table(
+    return TextTable(
         names=names,
         labels=tuple(coordinate(name) for name in names),
         line=line,
@@ -163,7 +163,7 @@ def _table(rows: Sequence[tuple[int, str]]) -> Table:
     )
 
 
-def _check_counts(said: Mapping[str, str], table: Table) -> None:
+def _check_counts(said: Mapping[str, str], table: TextTable) -> None:
     """Refuse a table that has not as many columns and rows as the head promises."""
     n_columns, n_rows = len(table.names), len(table.rows)
     if said.get("ncolumns", str(n_columns)) != str(n_columns):
@@ -179,7 +179,7 @@ def _check_counts(said: Mapping[str, str], table: Table) -> None:
         raise bad(place, f"<{n_rows}>", rule, hint)
 
 
-def _columns(table: Table, names: Mapping[str, str]) -> dict[str, int]:
+def _columns(table: TextTable, names: Mapping[str, str]) -> dict[str, int]:
     """Return the index of each column that is read, each part of the body under one name."""
     there = table.columns(KNOWN, names)
     lumbar = [LUMBAR] if _all(LUMBAR, there) else [one for one in LEVELS if _all(one, there)]

@@ -36,7 +36,13 @@ from app.sim.mocap.length_units import (
 )
 from app.sim.mocap.read_options import NOTHING_STATED, Reading, ReadOptions, metres
 from app.sim.mocap.repeated_frames import without_repeats
-from app.sim.mocap.up_axis import Posture, find_up_axis, require_not_head_down, rest_axis, z_up
+from app.sim.mocap.up_axis import (
+    BodyDirections,
+    find_up_axis,
+    require_not_head_down,
+    rest_axis,
+    z_up,
+)
 
 MAX_TILT = np.radians(30.0)
 """Lean of the trunk in a rest pose above which that pose is not taken for upright [rad]."""
@@ -68,7 +74,7 @@ def body_track(bvh: Bvh, options: ReadOptions = NOTHING_STATED) -> tuple[BodyTra
     _require_degrees(bvh)
     centres, rest = _centres(bvh, joints), _centres(_resting(bvh), joints)
     stature, found = _measured(centres, options)
-    standing, moving = _posture(rest), _posture(centres)
+    standing, moving = _directions(rest), _directions(centres)
     up = options.up or find_up_axis(moving, standing)
     require_not_head_down(moving, up)
     floor, root_unit = "", options.root_unit or found
@@ -151,7 +157,7 @@ def _with_root_scaled(bvh: Bvh, joints: Joints, factor: float) -> Bvh:
     return replace(bvh, values=np.where(moving, factor * bvh.values, bvh.values))
 
 
-def _posture(centres: Centres) -> Posture:
+def _directions(centres: Centres) -> BodyDirections:
     """Return the directions of a person's parts."""
 
     def both(a: str, b: str) -> Vec | None:
@@ -162,7 +168,7 @@ def _posture(centres: Centres) -> Posture:
         ]
         return np.concatenate(ways) if ways else None
 
-    return Posture(
+    return BodyDirections(
         trunk=unit(centres["neck"] - centres["pelvis"]),
         across=unit(centres["shoulder_l"] - centres["shoulder_r"]),
         legs=both("knee", "ankle") if "knee_r" in centres else both("hip", "ankle"),

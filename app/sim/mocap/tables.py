@@ -42,7 +42,7 @@ _UNIT = re.compile(r"\s*[(\[{][^)\]}]*[)\]}]\s*$")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Table:
+class TextTable:
     """A table as text: its columns are known by name, its values not read yet."""
 
     names: tuple[str, ...]

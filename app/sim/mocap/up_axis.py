@@ -30,7 +30,7 @@ MIN_LEAN, MAX_LEAN = -20.0, 110.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Posture:
+class BodyDirections:
     """Directions of a person's parts, in the frame of the file, each of shape (n, 3)."""
 
     trunk: Vec
@@ -43,7 +43,7 @@ class Posture:
     """Ankle to toe, of both feet; None where no toes were recorded."""
 
 
-def find_up_axis(motion: Posture, rest: Posture) -> str:
+def find_up_axis(motion: BodyDirections, rest: BodyDirections) -> str:
     """Return the axis that points up, one of FOUND.
 
     Args:
@@ -61,7 +61,7 @@ def find_up_axis(motion: Posture, rest: Posture) -> str:
     if not fits:
         if kneeling := _kneeling(resting, leaning, against):
             return kneeling
-        raise _nobody(motion, against, straight)
+        raise _no_axis(motion, against, straight)
     if len(fits) == 1 and (resting in (None, fits[0]) or leaning == fits[0]):
         return fits[0]
     if len(fits) == 1 and {"lower legs"} < against.get(resting or "", {}).keys() - {"toes"}:
@@ -71,7 +71,7 @@ def find_up_axis(motion: Posture, rest: Posture) -> str:
     raise _two(motion, fits, resting)
 
 
-def require_not_head_down(motion: Posture, axis: str) -> None:
+def require_not_head_down(motion: BodyDirections, axis: str) -> None:
     """Refuse an axis that is stated where the trunk points down along it.
 
     Raises:
@@ -94,7 +94,7 @@ def _kneeling(
     return None
 
 
-def rest_axis(rest: Posture) -> str | None:
+def rest_axis(rest: BodyDirections) -> str | None:
     """Return the direction along which the rest pose stands, one of UP_AXES.
 
     None where trunk and legs are not in line, or nothing is known.
@@ -125,7 +125,7 @@ def z_up(v: Vec, up: str) -> Vec:
     return np.asarray(v @ np.array(turns[up]).T)
 
 
-def _objections(motion: Posture, axis: str, straight: float) -> dict[str, str]:
+def _objections(motion: BodyDirections, axis: str, straight: float) -> dict[str, str]:
     """Return what contradicts an axis, by part, with its angle in words.
 
     Args:
@@ -146,7 +146,7 @@ def _objections(motion: Posture, axis: str, straight: float) -> dict[str, str]:
     return found
 
 
-def _lean(motion: Posture, axis: str) -> float:
+def _lean(motion: BodyDirections, axis: str) -> float:
     """Return the median lean of the trunk [deg], forward positive."""
     up = vector(axis)
     front = np.cross(motion.across, up)
@@ -155,7 +155,7 @@ def _lean(motion: Posture, axis: str) -> float:
     return float(np.degrees(np.arctan2(ahead, np.median(motion.trunk @ up))))
 
 
-def _leaning(motion: Posture, axis: str) -> str:
+def _leaning(motion: BodyDirections, axis: str) -> str:
     """Return the lean of the trunk in words."""
     lean = _lean(motion, axis)
     return f"leans {abs(lean):.0f} degrees {'forward' if lean > 0.0 else 'backward'}"
@@ -181,7 +181,9 @@ def _nearest(direction: Vec, within: float = NEAR) -> str | None:
     return axis if near else None
 
 
-def _nobody(motion: Posture, against: dict[str, dict[str, str]], straight: float) -> BadMotion:
+def _no_axis(
+    motion: BodyDirections, against: dict[str, dict[str, str]], straight: float
+) -> BadMotion:
     reasons = "; ".join(f"with {axis} up {', '.join(against[axis].values())}" for axis in FOUND)
     others = [
         one for one in UP_AXES if one not in FOUND and not _objections(motion, one, straight)
@@ -194,7 +196,7 @@ def _nobody(motion: Posture, against: dict[str, dict[str, str]], straight: float
     return _bad(motion, "pelvis to neck", rule, hint)
 
 
-def _two(motion: Posture, fits: list[str], resting: str | None) -> BadMotion:
+def _two(motion: BodyDirections, fits: list[str], resting: str | None) -> BadMotion:
     parts = [f"{axis} up by the motion (the trunk {_leaning(motion, axis)})" for axis in fits]
     named = fits
     if resting:
@@ -204,6 +206,6 @@ def _two(motion: Posture, fits: list[str], resting: str | None) -> BadMotion:
     return _bad(motion, "up axis: pelvis to neck", rule, hint)
 
 
-def _bad(motion: Posture, place: str, rule: str, hint: str) -> BadMotion:
+def _bad(motion: BodyDirections, place: str, rule: str, hint: str) -> BadMotion:
     value = "(" + ", ".join(f"{one:.2f}" for one in _direction(motion.trunk)) + ")"
     return BadMotion([Fault(place=place, value=value, rule=rule, hint=hint)])

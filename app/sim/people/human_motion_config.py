@@ -137,7 +137,7 @@ def _with_library(shared: People, cell: Cell, settings: HumanMotionConfig) -> Pe
         primitive_library=PrimitiveLibrary(
             samples=np.ascontiguousarray(library.samples),
             gain=np.array(library.gain),
-            legs=np.array(library.legs),
+            segments=np.array(library.segments),
             duration=np.array(library.duration),
             varied=settings.augmentation,
         ),

@@ -32,7 +32,7 @@ SHORTEST_REACH_S = 0.8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Library:
+class ReachLibrary:
     """Postures of one cell's work, read-only arrays."""
 
     postures: Vec
@@ -50,7 +50,7 @@ class Library:
 @lru_cache(maxsize=8)
 def build_reach_library(
     cell: Cell, seed: int, bodies: tuple[BodySize, ...] | None = None, variants: int = 24
-) -> Library:
+) -> ReachLibrary:
     """Make ``variants`` random postures for each body, place and hand of a cell.
 
     Args:
@@ -80,7 +80,7 @@ def build_reach_library(
     for array in (stacked, palms, of_station):
         array.setflags(write=False)
     n_cubes = sum(station.kind == "cube" for station in cell.pick_stations)
-    return Library(
+    return ReachLibrary(
         postures=stacked,
         hands=palms,
         of_station=of_station,
@@ -125,7 +125,7 @@ def _at_station(
     return posture.q
 
 
-class Script:
+class ReachScript:
     """A fixed sequence of moves, evaluated at any time.
 
     Args:
@@ -151,7 +151,7 @@ def reach_script(
     palms: tuple[Vec, Vec],
     pelvis_x: tuple[float | None, float | None] = (None, None),
     delay_s: float = 0.4,
-) -> Script:
+) -> ReachScript:
     """Return a single reach from one point to another, both postures without chance.
 
     Args:
@@ -167,7 +167,7 @@ def reach_script(
     ]
     way = float(np.linalg.norm(np.subtract(*palms)))
     duration = max(SHORTEST_REACH_S, way / REACH_PACE)
-    return Script(np.array([delay_s]), np.array([duration]), np.array(postures))
+    return ReachScript(np.array([delay_s]), np.array([duration]), np.array(postures))
 
 
 def _standing_reach(cell: Cell, palm: Vec, hand: Hand, pelvis_x: float | None) -> Vec:

@@ -70,7 +70,7 @@ class Frame:
     """1, or 0 where missing, shape (25,)."""
 
 
-class Tracker:
+class KeypointSensorModel:
     """A tracker of one person.
 
     Args:
@@ -145,7 +145,10 @@ class Tracker:
 
 
 def follow(
-    motion: Motion, times: Sequence[float], tracker: Tracker, estimator: PersonEstimator
+    motion: Motion,
+    times: Sequence[float],
+    tracker: KeypointSensorModel,
+    estimator: PersonEstimator,
 ) -> Iterator[PersonEstimate]:
     """Yield what is known of a person at each time, seen through a tracker.
 

@@ -17,7 +17,8 @@ from app.sim.cells.cell import Cell, lacks_stations
 from app.sim.core.arrays import Vec, as_kernel_array
 from app.sim.geometry.segments import FAR
 from app.sim.people.human_motion_config import USUAL, HumanMotionConfig
-from app.sim.people.kernels.people import People, PeopleState, new_people_geometry, record_palms
+from app.sim.people.kernels.motion import record_palms
+from app.sim.people.kernels.people import People, PeopleState, new_people_geometry
 from app.sim.pick.kernels import episode as pick
 from app.sim.pick.kernels import observation as features
 from app.sim.pick.kernels.observation import N_FEATURES, N_WITH_BODY
@@ -311,12 +312,10 @@ def hand_speeds(
     state = new_people_state(batch.cell, people, 1)
     n_workers = state.q.shape[1]
     crowd = new_people_geometry(people, n_workers, state.cylinders.shape[1])
-    palms, rng = np.zeros((int(seconds / tick), n_workers, 2, 3)), np.zeros(1, dtype=np.uint64)
+    palms = np.zeros((int(seconds / tick), n_workers, 2, 3))
     rates = []
     for number in range(n_scripts):
-        record_palms(
-            people, state, batch.seed, number, rng, batch.arm.columns, tick, crowd, palms
-        )
+        record_palms(people, state, batch.seed, number, batch.arm.columns, tick, crowd, palms)
         rates.append(np.linalg.norm(np.diff(palms, axis=0), axis=-1).ravel() / tick)
     speeds = np.concatenate(rates)
     moving = speeds[speeds > 0.05]

@@ -13,7 +13,7 @@ from app.errors import NotFound
 from app.sim.cells.cell import Cell
 from app.sim.human.model import Hand
 from app.sim.people.kernels.people import people_clearance
-from app.sim.people.reach_script import Script, reach_script
+from app.sim.people.reach_script import ReachScript, reach_script
 from app.sim.robot.kernels import arm as arm_kernel
 from app.sim.robot.kernels import kinematics
 from app.sim.scene.scene import NO_CYLINDERS, arm_of, people_geometry_of, people_of
@@ -140,7 +140,7 @@ def cases_of(cell: Cell) -> tuple[Case, ...]:
     return CASES if cell.name == CASES_CELL else ()
 
 
-def script_of(cell: Cell, case: Case) -> Script:
+def script_of(cell: Cell, case: Case) -> ReachScript:
     """Return the person's movement in a case study."""
     places = [case.human_from, case.human_to or case.human_from]
     palms = [np.add(cell.station(place).position, case.palm_offset) for place in places]

@@ -1,26 +1,23 @@
-"""Demonstrations of a task: a person's reaches from one place of the cell to another.
+"""Synthetic demonstrations: reaches of a person between two places of a cell.
 
-Two things are drawn. A *node* is a posture with one palm at a place: where the person stands,
-where the palms are, how far the elbows are turned out; the trunk leans as ``human.solve_hands``
-asks. A *demonstration* goes from node to node: along the straight line of each palm, lifted and
-bowed a little, while the stance moves ahead of the hand or behind it. What is not a sound
-motion (a jump, a joint limit, a hand or an elbow in the table) is drawn again.
+A *keyframe* is a posture with one palm at a place, with random stance, palms and elbow swivel.
+A *demonstration* connects two keyframes: each palm follows the straight line, lifted and
+curved, while the stance moves ahead of the hand or behind it. Motions with a jump, a joint at
+its limit, or a hand or elbow in the table are rejected.
 
-A *style* is a manner of doing this. A demonstration begins in one style and ends, now and then,
-in another, as do the people of ``primitive_library.py``. Their postures are drawn here as
-well, so that queries of a primitive lie in the distribution to which it was fitted.
+A *style* is a range of these parameters. A demonstration begins in one style and may end in
+another, like the keyframes of ``primitive_library.py``, so that queries of a primitive lie in
+the distribution to which it was fitted.
 
-Measured on the recorded clips (six clips, Vicon, 100 Hz; 65 reaches of 0.15 m or more from rest
-to rest; 5 %, median, 95 %): mean speed of the palm 0.25, 0.69, 1.15 m/s, standard deviation of
-its logarithm 0.48; path over straight distance 1.02, 1.10, 1.33; height over the straight line
-0, 0.01, 0.06 m; sideways bow 0.02, 0.12, 0.25 of the distance; elbow turned out of the vertical
-plane by 0.8, 1.3, 2.0 rad; pelvis moves by 0, 0.07, 0.31 m and turns by 0.01, 0.14, 0.41 rad.
+Reference, measured on recorded clips (six clips, Vicon, 100 Hz; 65 reaches of 0.15 m or more
+from rest to rest; 5 %, median, 95 %): mean palm speed 0.25, 0.69, 1.15 m/s, standard deviation
+of its logarithm 0.48; path over straight distance 1.02, 1.10, 1.33; height over the straight
+line 0, 0.01, 0.06 m; sideways deviation 0.02, 0.12, 0.25 of the distance; elbow swivel 0.8,
+1.3, 2.0 rad; pelvis displacement 0, 0.07, 0.31 m and rotation 0.01, 0.14, 0.41 rad.
 
-Source: METHOD 3.2 and 3.4. Deviates: the source records people; these demonstrations are
-synthetic, with those numbers as a guide. Bow and the spread of the pace are taken over, the
-median pace is that of ``primitives/kernels/script.py``. Elbows are turned out less: ours hang
-lower
-over the table, and hands are lifted more, because there are cubes on it.
+Source: docs/method.md 3.2 and 3.4. Deviates: the source records people; these demonstrations
+are synthetic. Path curvature and spread of the pace are those measured, the median pace is that
+of ``kernels/script.py``. Elbows hang lower and hands are lifted more, because of the cubes.
 """
 
 import math
@@ -41,18 +38,18 @@ PHASES = np.linspace(0.0, 1.0, 28)
 PHASES.setflags(write=False)
 PACE_SPREAD = 0.33
 """Standard deviation of the logarithm of the pace within a style; 0.4 over all styles."""
-BOW = 0.12
-"""Standard deviation of the sideways bow, relative to the distance."""
-LARGEST_BOW = 0.25
-"""Relative to the distance."""
-CHANGES_STYLE = 1.0 / 3.0
-"""Chance that a demonstration ends in another style than it began in."""
+PATH_CURVATURE = 0.12
+"""Standard deviation of the sideways deviation, relative to the distance."""
+MAX_PATH_CURVATURE = 0.25
+"""Largest sideways deviation, relative to the distance."""
+P_STYLE_CHANGE = 1.0 / 3.0
+"""Probability that a demonstration ends in a newly drawn style."""
 LARGEST_STEP = 0.25
 """Largest change of a joint from one phase to the next [rad]."""
 OVER_TABLE = 0.015
 """Least height of palms, wrists and elbows over the table [m]."""
 KEYFRAME_TRIES, TRIES = 20, 40
-"""Draws after which a posture or a motion is given up."""
+"""Largest number of draws of a keyframe and of a motion."""
 
 _LOW_POINTS = (
     body.ELBOW_R,
@@ -67,22 +64,22 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Style:
-    """A manner of reaching; ranges are drawn from evenly."""
+    """Parameters of a manner of reaching; ranges are sampled uniformly."""
 
     name: str
-    """For people."""
+    """Name of the style."""
     pace: float = 1.0
     """Speed relative to the median."""
     away: Range = (0.0, 0.08)
-    """How far from the table's side of the walking area the pelvis stands [m]."""
+    """Distance of the pelvis from the table side of the walking area [m]."""
     swivel: Range = (0.25, 0.8)
-    """Turn of the elbows out of the vertical plane [rad]."""
+    """Swivel of the elbows out of the vertical plane [rad]."""
     lift: Range = (0.02, 0.07)
     """Height of the palm over the straight line, half-way [m]."""
     lead: Range = (-0.2, 0.6)
-    """How far the stance is ahead of the hand: 1 would be a quarter of the way, half-way."""
+    """Lead of the stance over the hand; 1 is a quarter of the distance at half-way."""
     support: float = 0.6
-    """Chance that the other hand rests at the table's edge; else it is held before the body."""
+    """Probability that the other hand rests on the table's edge rather than free."""
 
 
 STYLES = (
@@ -92,37 +89,37 @@ STYLES = (
     Style(name="brisk", pace=1.45, lift=(0.01, 0.05), lead=(-0.3, 0.3)),
     Style(name="careful", pace=0.68, lift=(0.05, 0.12), lead=(0.0, 0.8)),
 )
-"""The styles that are demonstrated."""
+"""Styles of the demonstrations."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Node:
-    """A posture at a place, and what it was made from."""
+class Keyframe:
+    """Posture at a place and its parameters."""
 
     pelvis: Vec
     """Pelvis x [m], y [m], yaw [rad], shape (3,)."""
     palms: Vec
-    """Where the right and the left palm are [m], shape (2, 3)."""
+    """Right and left palm [m], shape (2, 3)."""
     swivel: float
-    """Turn of the elbows [rad]."""
+    """Swivel of the elbows [rad]."""
     q: Vec
     """Joint positions [m, rad], shape (18,)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Demonstration:
-    """One motion from a place to another."""
+    """One motion between two places."""
 
     q: Vec
     """Joint positions at PHASES [m, rad], shape (28, 18)."""
     duration_s: float
-    """How long it takes [s]."""
+    """Duration [s]."""
     style: str
-    """Style in which it begins."""
+    """Initial style."""
 
 
 def draw_style(rng: np.random.Generator) -> Style:
-    """Return a style, all alike likely."""
+    """Draw a style uniformly."""
     return STYLES[rng.integers(len(STYLES))]
 
 
@@ -133,7 +130,7 @@ def draw_keyframe(
     hand: Hand,
     rng: np.random.Generator,
     style: Style | None = None,
-) -> Node:
+) -> Keyframe:
     """Draw a posture with one palm at a place.
 
     Args:
@@ -141,27 +138,27 @@ def draw_keyframe(
         size: The person's size [m], shape (12,).
         target: Point of the station [m], shape (3,); None: at home.
         hand: The hand that works.
-        rng: Source of chance.
+        rng: Source of randomness.
         style: Style; None draws one.
 
     Returns:
-        A posture inside the limits and clear of the table; where a place allows none, the last
-        that was tried, whose palm may fall short of the place.
+        A posture within joint limits and clear of the table; if none is found, the last draw,
+        whose palm may not reach the place.
     """
     style = draw_style(rng) if style is None else style
     for _ in range(KEYFRAME_TRIES):
         if target is None:
-            node, reached = _home(cell, size, style, rng)
+            keyframe, reached = _home(cell, size, style, rng)
         else:
-            node, reached = _at_station(cell, size, style, target, hand, rng)
-        if reached and _inside(node.q) and _over_table(cell, node.q, size):
+            keyframe, reached = _at_station(cell, size, style, target, hand, rng)
+        if reached and _inside(keyframe.q) and _over_table(cell, keyframe.q, size):
             break
-    return node
+    return keyframe
 
 
-def _node(size: Vec, pelvis: Vec, palms: Vec, swivel: float) -> tuple[Node, bool]:
+def _keyframe(size: Vec, pelvis: Vec, palms: Vec, swivel: float) -> tuple[Keyframe, bool]:
     found = _solved(size, pelvis, palms, swivel)
-    return Node(pelvis=pelvis, palms=palms, swivel=swivel, q=found.q), found.reached
+    return Keyframe(pelvis=pelvis, palms=palms, swivel=swivel, q=found.q), found.reached
 
 
 def _solved(size: Vec, pelvis: Vec, palms: Vec, swivel: float) -> human.Posture:
@@ -170,8 +167,10 @@ def _solved(size: Vec, pelvis: Vec, palms: Vec, swivel: float) -> human.Posture:
     return human.solve_hands(start, size, right=palms[0], left=palms[1], swivel=swivel)
 
 
-def _home(cell: Cell, size: Vec, style: Style, rng: np.random.Generator) -> tuple[Node, bool]:
-    """Return a posture at home, the forearms lifted a little, as if ready to work."""
+def _home(
+    cell: Cell, size: Vec, style: Style, rng: np.random.Generator
+) -> tuple[Keyframe, bool]:
+    """Draw a posture at home with slightly lifted forearms."""
     x, y, yaw = cell.human.home
     area = cell.human
     pelvis = np.array(
@@ -182,20 +181,20 @@ def _home(cell: Cell, size: Vec, style: Style, rng: np.random.Generator) -> tupl
         ]
     )
     palms = np.stack([_held_palm(size, pelvis, side, rng, (0.14, 0.30)) for side in (-1, 1)])
-    return _node(size, pelvis, palms, float(rng.uniform(*style.swivel)))
+    return _keyframe(size, pelvis, palms, float(rng.uniform(*style.swivel)))
 
 
 def _held_palm(
     size: Vec, pelvis: Vec, side: int, rng: np.random.Generator, ahead: Range
 ) -> Vec:
-    """Return where a free palm is held [m]: before the hip, a good arm's length down.
+    """Draw the position of a free palm [m], in front of the hip.
 
     Args:
         size: The person's size [m], shape (12,).
         pelvis: Pelvis x [m], y [m], yaw [rad].
         side: -1 for the right hand, 1 for the left.
-        rng: Source of chance.
-        ahead: How far before the pelvis [m], for the median person.
+        rng: Source of randomness.
+        ahead: Range of the distance in front of the pelvis [m], for the median person.
     """
     arm = 0 if side < 0 else 1
     length = size[body.UPPER_ARM_R + arm] + size[body.FOREARM_R + arm] + size[body.HAND]
@@ -216,8 +215,8 @@ def _held_palm(
 
 def _at_station(
     cell: Cell, size: Vec, style: Style, target: Vec, hand: Hand, rng: np.random.Generator
-) -> tuple[Node, bool]:
-    """Return a posture with one palm at a station; the other supports the body or is free."""
+) -> tuple[Keyframe, bool]:
+    """Draw a posture with one palm at a station and the other supporting or free."""
     side = -1 if hand == "r" else 1
     area = cell.human
     grip = target + rng.uniform([-0.03, -0.03, -0.06], [0.03, 0.03, 0.05])
@@ -232,7 +231,7 @@ def _at_station(
     else:
         other = _held_palm(size, pelvis, -side, rng, (0.24, 0.38))
     palms = np.stack([grip, other] if hand == "r" else [other, grip])
-    return _node(size, pelvis, palms, float(rng.uniform(*style.swivel)))
+    return _keyframe(size, pelvis, palms, float(rng.uniform(*style.swivel)))
 
 
 def demonstrate(
@@ -243,38 +242,48 @@ def demonstrate(
     style: Style,
     rng: np.random.Generator,
 ) -> Demonstration:
-    """Draw a sound motion from one place to another.
+    """Draw a feasible motion between two places.
 
     Args:
         cell: Work cell with a worker.
         size: The person's size [m], shape (12,).
         ends: Points of the two stations [m], shape (3,) each; None: home.
         hand: The hand that works.
-        style: Style in which it begins.
-        rng: Source of chance.
+        style: Initial style.
+        rng: Source of randomness.
 
     Raises:
-        SimulationError: None was found; the place is out of this person's reach.
+        SimulationError: No feasible motion was found.
     """
     for _ in range(TRIES):
-        last = draw_style(rng) if rng.uniform() < CHANGES_STYLE else style
+        last = draw_style(rng) if rng.uniform() < P_STYLE_CHANGE else style
         first = draw_keyframe(cell, size, ends[0], hand, rng, style)
         then = draw_keyframe(cell, size, ends[1], hand, rng, last)
         q, reached = between(size, first, then, style, rng)
         steps = np.abs(np.diff(q[:, 3:], axis=0)).max()
         clear = all(_over_table(cell, row, size) for row in q)
         if reached and steps <= LARGEST_STEP and _inside(q) and clear:
-            way = float(np.linalg.norm(then.palms - first.palms, axis=1).max())
-            return Demonstration(q=q, duration_s=_duration(way, style, rng), style=style.name)
-    raise SimulationError(f"no sound motion of the {hand} hand from {ends[0]} to {ends[1]}")
+            distance = float(np.linalg.norm(then.palms - first.palms, axis=1).max())
+            duration = _duration(distance, style, rng)
+            return Demonstration(q=q, duration_s=duration, style=style.name)
+    raise SimulationError(f"no feasible motion of hand {hand!r} from {ends[0]} to {ends[1]}")
 
 
 def between(
-    size: Vec, first: Node, then: Node, style: Style, rng: np.random.Generator
+    size: Vec, first: Keyframe, then: Keyframe, style: Style, rng: np.random.Generator
 ) -> tuple[Vec, bool]:
-    """Return a motion from node to node [m, rad], shape (28, 18), and whether palms keep to it.
+    """Return the motion between two keyframes and whether the palms follow their paths.
 
-    Phases are even: with a minimum-jerk law of the phase the palm moves like Flash and Hogan's.
+    Args:
+        size: The person's size [m], shape (12,).
+        first: Initial keyframe.
+        then: Final keyframe.
+        style: Style of the motion.
+        rng: Source of randomness.
+
+    Returns:
+        Joint positions at PHASES [m, rad], shape (28, 18), and the flag. With a minimum-jerk
+        phase the palm moves as in Flash and Hogan (1985).
     """
     lead = rng.uniform(*style.lead)
     stance = PHASES + lead * PHASES * (1.0 - PHASES)
@@ -283,12 +292,12 @@ def between(
     hump = np.sin(math.pi * PHASES) ** 2
     palms = first.palms + PHASES[:, None, None] * (then.palms - first.palms)
     for hand in range(2):
-        way = then.palms[hand] - first.palms[hand]
-        distance = float(np.linalg.norm(way))
-        # A hand that stays where it is, is not lifted.
+        along = then.palms[hand] - first.palms[hand]
+        distance = float(np.linalg.norm(along))
+        # A resting hand is not lifted.
         share = min(1.0, distance / 0.3)
-        across = np.array([-way[1], way[0], 0.0]) * np.clip(
-            rng.normal(0.0, BOW), -LARGEST_BOW, LARGEST_BOW
+        across = np.array([-along[1], along[0], 0.0]) * np.clip(
+            rng.normal(0.0, PATH_CURVATURE), -MAX_PATH_CURVATURE, MAX_PATH_CURVATURE
         )
         up = np.array([0.0, 0.0, share * rng.uniform(*style.lift)])
         palms[:, hand] += hump[:, None] * (across + up)
@@ -300,19 +309,19 @@ def between(
 
 
 def _inside(q: Vec) -> bool:
-    """Return whether every joint is off its limits: ``solve_hands`` cuts off at them."""
+    """Return whether no joint is at a limit, where ``solve_hands`` clips."""
     return bool(((q > human.Q_MIN) & (q < human.Q_MAX)).all(axis=-1).all())
 
 
 def _over_table(cell: Cell, q: Vec, size: Vec) -> bool:
-    """Return whether palms, wrists and elbows are beside the table or above it."""
+    """Return whether palms, wrists and elbows are clear of the table."""
     named = human.joint_points(q, size)
     points = np.stack([named[human.POINT_NAMES[i]] for i in _LOW_POINTS])
     return bool((height_over_table(cell, points) >= OVER_TABLE).all())
 
 
 def height_over_table(cell: Cell, points: Vec) -> Vec:
-    """Return the height of points over the table [m], infinite beside it, shape (...).
+    """Return the height of points over the table [m], infinite beside the table, shape (...).
 
     Args:
         cell: Work cell.
@@ -324,8 +333,8 @@ def height_over_table(cell: Cell, points: Vec) -> Vec:
     return np.where(over, z, np.inf)
 
 
-def _duration(way: float, style: Style, rng: np.random.Generator) -> float:
-    """Draw how long a motion takes [s] from the farther palm's way [m] and the style's pace."""
+def _duration(distance: float, style: Style, rng: np.random.Generator) -> float:
+    """Draw the duration of a motion [s] from the larger palm displacement and the style."""
     pace = style.pace * script.PACE_MEDIAN * math.exp(PACE_SPREAD * rng.standard_normal())
     pace = min(script.PACE_MAX, max(script.PACE_MIN, pace))
-    return max(script.SHORTEST_MOVE, way / pace)
+    return max(script.SHORTEST_MOVE, distance / pace)

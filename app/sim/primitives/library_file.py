@@ -1,11 +1,12 @@
-"""The shipped task primitives: what a person does between two places of a cell, by one hand.
+"""Shipped task primitives: one movement primitive per segment of a worker's task.
 
-One file holds, for each leg of a worker's task (home - cube, home - dock, cube - dock; each
-hand), the weights of its demonstrations; the primitive is made of them as ``promp.fit`` makes
-it. A leg is stored in one direction; backward it is ``promp.reversed_primitive``. The file is
-written by ``make_primitives.py`` and holds numbers only: it is read without pickle.
+For each segment (home - cube, home - dock, cube - dock; each hand) the file holds the weights
+of its demonstrations, from which ``promp.of_weights`` makes the primitive. A segment is stored
+in one direction; reversed in time, its weights are in reverse order.
+``tools/make_primitives.py`` writes the file; it contains numbers only and is read without
+pickle.
 
-Source: METHOD 3.4 (a library of primitives, one per task).
+Source: docs/method.md 3.4 (a library of primitives, one per task).
 """
 
 import json
@@ -26,61 +27,64 @@ from app.sim.primitives.promp import ProMP
 
 FILE = Path(str(resources.files("app.sim.primitives"))) / "data" / "task_primitives.npz"
 HANDS: tuple[Hand, Hand] = ("r", "l")
-"""Order of hands in arrays."""
+"""Order of the hands in arrays."""
 HOME = "home"
-"""Name of the place where a person rests."""
+"""Name of the resting place."""
 
 Kind = Literal["home-cube", "home-dock", "cube-dock"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Leg:
-    """One leg of a task in one cell, in the direction in which it is stored."""
+class TaskSegment:
+    """One segment of a worker's task, in the stored direction."""
 
     kind: Kind
-    """What is at its ends."""
+    """Kinds of places at its ends."""
     start: str
-    """Name of the place where it begins: a station or HOME."""
+    """Initial place: a station or HOME."""
     end: str
-    """Name of the station where it ends."""
+    """Final station."""
     hand: Hand
-    """The hand that works."""
+    """Working hand."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TaskPrimitive:
-    """The demonstrations of one leg."""
+    """Demonstrations of one segment."""
 
     cell: str
-    """Name of the shipped cell in which they were made."""
-    leg: Leg
-    """What is done."""
+    """Name of the shipped cell of the demonstrations."""
+    segment: TaskSegment
+    """The segment."""
     weights: Vec
     """Weights of each demonstration [m, rad], shape (n, 18, n_basis)."""
     durations: Vec
-    """How long each took [s], shape (n,)."""
+    """Duration of each [s], shape (n,)."""
     residual: Vec
-    """What the regression left, root mean square per joint [m, rad], shape (18,)."""
+    """Root-mean-square residual of the regression per joint [m, rad], shape (18,)."""
 
     def primitive(self) -> ProMP:
         """Return the movement primitive of the demonstrations."""
         return promp.of_weights(self.weights, self.durations, residual=self.residual)
 
 
-def segments_of(cell: Cell) -> tuple[Leg, ...]:
-    """Return the legs of a worker's task in a cell, stored direction; none without a worker."""
+def segments_of(cell: Cell) -> tuple[TaskSegment, ...]:
+    """Return the segments of a worker's task in a cell, in the stored direction.
+
+    A cell without a worker has none.
+    """
     if not cell.workers:
         return ()
     cubes = [station.id for station in cell.stations_of("cube")]
     docks = [station.id for station in cell.stations_of("dock")]
-    ways: list[tuple[Kind, str, str]] = [
+    pairs: list[tuple[Kind, str, str]] = [
         *(("home-cube", HOME, cube) for cube in cubes),
         *(("home-dock", HOME, dock) for dock in docks),
         *(("cube-dock", cube, dock) for cube in cubes for dock in docks),
     ]
     return tuple(
-        Leg(kind=kind, start=start, end=end, hand=hand)
-        for kind, start, end in ways
+        TaskSegment(kind=kind, start=start, end=end, hand=hand)
+        for kind, start, end in pairs
         for hand in HANDS
     )
 
@@ -91,20 +95,20 @@ def place_of(cell: Cell, name: str) -> Vec | None:
 
 
 def write_primitives(path: Path, made: Sequence[TaskPrimitive], about: dict[str, Any]) -> None:
-    """Write primitives and a header.
+    """Write primitives to a file.
 
     Args:
         path: File to write.
-        made: Primitives, each with as many demonstrations.
-        about: What else the header says, as JSON data.
+        made: Primitives with equal numbers of demonstrations.
+        about: Additional members of the header, as JSON data.
     """
     tasks = [
         {
             "cell": one.cell,
-            "kind": one.leg.kind,
-            "start": one.leg.start,
-            "end": one.leg.end,
-            "hand": one.leg.hand,
+            "kind": one.segment.kind,
+            "start": one.segment.start,
+            "end": one.segment.end,
+            "hand": one.segment.hand,
         }
         for one in made
     ]
@@ -120,7 +124,7 @@ def write_primitives(path: Path, made: Sequence[TaskPrimitive], about: dict[str,
 
 @cache
 def read_header(path: Path = FILE) -> dict[str, Any]:
-    """Return what the file says about itself: seed, version, styles, sizes, tasks."""
+    """Return the header of the file: seed, version, styles, sizes, tasks."""
     with np.load(path, allow_pickle=False) as data:
         header: dict[str, Any] = json.loads(str(data["header"]))
     return header
@@ -139,7 +143,9 @@ def load_primitives(path: Path = FILE) -> tuple[TaskPrimitive, ...]:
     return tuple(
         TaskPrimitive(
             cell=task["cell"],
-            leg=Leg(**{name: task[name] for name in ("kind", "start", "end", "hand")}),
+            segment=TaskSegment(
+                **{name: task[name] for name in ("kind", "start", "end", "hand")}
+            ),
             weights=weights[i],
             durations=durations[i],
             residual=residual[i],
@@ -148,23 +154,25 @@ def load_primitives(path: Path = FILE) -> tuple[TaskPrimitive, ...]:
     )
 
 
-def primitive_for(cell: Cell, leg: Leg) -> TaskPrimitive:
-    """Return the shipped primitive for a leg of any cell.
+def primitive_for(cell: Cell, segment: TaskSegment) -> TaskPrimitive:
+    """Return the shipped primitive for a segment of any cell.
 
-    Of those of the same kind and hand, that whose places are nearest, seen from where the
-    person stands; its pelvis is moved to where the person of this cell stands.
+    Among the primitives of the same kind and hand, the one whose places are nearest relative to
+    the worker's stance is chosen; its pelvis is moved to the stance in this cell.
 
     Args:
         cell: Work cell with a worker.
-        leg: One of its legs.
+        segment: One of the segments of its task.
     """
 
     def apart(one: TaskPrimitive) -> float:
-        theirs, ours = ends_seen(load_cell(one.cell), one.leg), ends_seen(cell, leg)
+        theirs, ours = ends_seen(load_cell(one.cell), one.segment), ends_seen(cell, segment)
         return float(np.linalg.norm(theirs - ours, axis=1).sum())
 
     same = [
-        one for one in load_primitives() if (one.leg.kind, one.leg.hand) == (leg.kind, leg.hand)
+        one
+        for one in load_primitives()
+        if (one.segment.kind, one.segment.hand) == (segment.kind, segment.hand)
     ]
     nearest = min(same, key=apart)
     weights = nearest.weights.copy()
@@ -172,11 +180,11 @@ def primitive_for(cell: Cell, leg: Leg) -> TaskPrimitive:
     return replace(nearest, weights=weights)
 
 
-def ends_seen(cell: Cell, leg: Leg) -> Vec:
-    """Return a leg's two places as seen from where the person stands [m], shape (2, 3)."""
+def ends_seen(cell: Cell, segment: TaskSegment) -> Vec:
+    """Return a segment's two places relative to the worker's stance [m], shape (2, 3)."""
     x, y, _ = cell.human.home
     home = np.array([x, y, 0.0])
-    points = [place_of(cell, name) for name in (leg.start, leg.end)]
+    points = [place_of(cell, name) for name in (segment.start, segment.end)]
     return np.stack([home if point is None else point for point in points]) - _stand(cell)
 
 

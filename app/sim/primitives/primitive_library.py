@@ -1,24 +1,23 @@
-"""The library a worker's motion is put together from: node postures and task primitives.
+"""Motion library of a worker: keyframe postures and samples of task primitives.
 
-A person goes from place to place (stations, cubes first; the last place is home), each leg with
-one hand. At its ends stand *node postures*, drawn beforehand for people of several sizes. In
-between, joint positions follow weights, ``q(z) = W phi(z)``: a sample ``W_s`` of the leg's
-primitive, conditioned exactly on both nodes by Matheron's rule,
+A worker moves between places (stations, cubes first, home last) in segments, each with one
+hand. Both ends of a segment are *keyframe postures*, drawn beforehand for several body sizes.
+Between them the joint positions are ``q(z) = W phi(z)``: a sample ``W_s`` of the segment's
+primitive, conditioned exactly on both keyframes by Matheron's rule,
 
     W = W_s + K (ends - A W_s),   K = Sigma A^T (A Sigma A^T)^-1,
 
-with A the rows of all joints at z = 0 and z = 1. The kernels do that; here are samples, gains,
-nodes and durations, as arrays. A leg of a cell that is not shipped takes the primitive of the
-same kind whose places are nearest; its own nodes do the rest.
+with A the rows of all joints at z = 0 and z = 1. Kernels apply the rule; this module computes
+samples, gains, keyframes and durations. A segment of a cell that is not shipped uses the
+primitive of the same kind with the nearest places, between its own keyframes.
 
-Sigma in K is that of the demonstrations with a floor of GAIN_FLOOR, more than the primitive's
-own: 60 demonstrations say little about how 36 numbers at the ends go with the rest, and what
-they seem to say by chance would swing the joints of a person who is unlike them. Measured on
-4000 random legs between nodes, 80 demonstrations, floors of 0.01 and 0.06: largest |K| 3.4 and
-1.25; palm's path over straight distance, 99 %, 1.36 and 1.36, greatest 1.96 and 1.66; legs that
-leave joint limits by more than 1 mrad 0.05 % and none.
+Sigma in K has a floor of GAIN_FLOOR, above the primitive's own: 60 demonstrations determine the
+correlations with the 36 end values poorly, and spurious correlations would swing the joints of
+other bodies. Measured on 4000 random segments, 80 demonstrations, floors of 0.01 and 0.06:
+largest |K| 3.4 and 1.25; palm path over straight distance, 99 %, 1.36 and 1.36, largest 1.96
+and 1.66; segments beyond joint limits by more than 1 mrad: 0.05 % and none.
 
-Source: METHOD 3.4; ``promp.py``, ``sampling.py``.
+Source: docs/method.md 3.4; ``promp.py``, ``sampling.py``.
 """
 
 from dataclasses import dataclass
@@ -55,53 +54,53 @@ BODIES = (
     (70.0, 90.0, 65.0),
     (95.0, 60.0, 35.0),
 )
-"""People of the library by default: percentiles of stature, arms and shoulders."""
+"""Default bodies: percentiles of stature, arm length and shoulder width."""
 VARIANTS = 10
-"""Node postures for each person, place and hand."""
+"""Keyframe postures per body, place and hand."""
 GAIN_FLOOR = 0.05
-"""Standard deviation of the floor of the Sigma of which K is made [m, rad]."""
+"""Standard deviation of the floor of Sigma in K [m, rad]."""
 ROUNDS = 10
-"""Rounds of draws in which samples inside the limits are looked for."""
+"""Largest number of rounds of rejection sampling."""
 N_SAMPLES = 24
-"""Samples of each primitive and direction."""
+"""Samples per primitive and direction."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionLibrary:
-    """What a worker's motion in one cell is put together from; arrays are read-only."""
+    """Keyframes and primitive samples of one cell; arrays are read-only."""
 
     postures: Vec
-    """Node postures [m, rad], shape (n, 18)."""
+    """Keyframe postures [m, rad], shape (n, 18)."""
     hands: Vec
-    """Their palms, right then left [m], shape (n, 2, 3)."""
+    """Right and left palms of the keyframes [m], shape (n, 2, 3)."""
     of_station: Index
-    """First node and count of each person, place and hand, (n_bodies, n_places + 1, 2, 2)."""
+    """First keyframe and count of each body, place and hand, (n_bodies, n_places + 1, 2, 2)."""
     n_stations: int
-    """Number of stations, cubes first; the place after them is home."""
+    """Number of stations, cubes first; home is the place after them."""
     n_cubes: int
     """Number of cubes."""
     bodies: Vec
-    """The people's sizes as kernels take them [m], shape (n_bodies, 12)."""
+    """Sizes of the bodies [m], shape (n_bodies, 12)."""
     samples: Vec
     """Weights drawn from the primitives [m, rad], shape (n_samples, 18, 12)."""
     gain: Vec
-    """K of each primitive, shape (n_primitives, 216, 36): rows weights joint by joint, columns
-    18 joints at z = 0, then at z = 1."""
-    legs: Index
-    """Primitive, first sample and number of samples of each leg (from, to, hand), shape
-    (n_places + 1, n_places + 1, 2, 3); primitive -1: there is no such leg."""
+    """K of each primitive, shape (n_primitives, 216, 36): rows are weights, joint by joint;
+    columns are the 18 joints at z = 0, then at z = 1."""
+    segments: Index
+    """Primitive, first sample and number of samples of each segment (from, to, hand), shape
+    (n_places + 1, n_places + 1, 2, 3); primitive -1: there is no such segment."""
     duration: Vec
-    """Mean and standard deviation of the log of a leg's duration [s], (n_primitives, 2)."""
+    """Mean and standard deviation of the log of a segment's duration [s], (n_primitives, 2)."""
 
 
 def people_sizes(
     cell: Cell, percentiles: tuple[tuple[float, float, float], ...] = BODIES
 ) -> tuple[BodySize, ...]:
-    """Return people of given percentiles, standing as a cell's worker does.
+    """Return body sizes of given percentiles with the pelvis height of a cell's worker.
 
     Args:
         cell: Work cell with a worker.
-        percentiles: Of stature, arms and shoulders, one row for each person.
+        percentiles: Of stature, arms and shoulders, one row per body.
     """
     return tuple(percentile_body(*row, cell.human.pelvis_height) for row in percentiles)
 
@@ -115,29 +114,29 @@ def motion_library(
     augmentation: bool = True,
     variants: int = VARIANTS,
 ) -> MotionLibrary:
-    """Put a cell's library together.
+    """Build the motion library of a cell.
 
     Args:
         cell: Work cell with a worker.
-        seed: Seed of nodes and samples.
-        bodies: The people's sizes; None for those of BODIES.
-        n_samples: Samples of each primitive and direction.
-        augmentation: Whether samples are drawn from the primitives, and durations spread; if
-            not, the samples are the demonstrations as they are, and durations their mean.
+        seed: Seed of keyframes and samples.
+        bodies: Body sizes; None for BODIES.
+        n_samples: Samples per primitive and direction.
+        augmentation: Draw samples from the primitives and vary durations; otherwise the samples
+            are the demonstrations, with their mean duration.
         variants: Nodes for each person, place and hand.
 
     Raises:
-        InvalidInput: The cell has no cube or no dock, so there is no task.
-        NotFound: Nobody works in the cell.
+        InvalidInput: The cell has no cube or no dock.
+        NotFound: The cell has no worker.
     """
     if (lack := lacks_stations(cell)) is not None:
         raise InvalidInput("cell", cell.name, f"has no tasks for a worker: it {lack}")
     sizes = people_sizes(cell) if bodies is None else bodies
     vectors = np.array([size.vector(cell.floor_z) for size in sizes])
     rng = np.random.default_rng(seed)
-    postures, hands, of_station = _nodes(cell, vectors, variants, rng)
-    samples, gains, legs, duration = _legs(cell, n_samples, augmentation, rng)
-    for array in (postures, hands, of_station, vectors, samples, gains, legs, duration):
+    postures, hands, of_station = _keyframes(cell, vectors, variants, rng)
+    samples, gains, segments, duration = _segments(cell, n_samples, augmentation, rng)
+    for array in (postures, hands, of_station, vectors, samples, gains, segments, duration):
         array.setflags(write=False)
     return MotionLibrary(
         postures=postures,
@@ -148,15 +147,15 @@ def motion_library(
         bodies=vectors,
         samples=samples,
         gain=gains,
-        legs=legs,
+        segments=segments,
         duration=duration,
     )
 
 
-def _nodes(
+def _keyframes(
     cell: Cell, bodies: Vec, variants: int, rng: np.random.Generator
 ) -> tuple[Vec, Vec, Index]:
-    """Draw the node postures: their joints, their palms, and where each place's begin."""
+    """Draw the keyframes; return joints, palms and the index of each body, place and hand."""
     points = [place_of(cell, station.id) for station in cell.pick_stations]
     of_station = np.zeros((len(bodies), len(points) + 1, 2, 2), dtype=np.int64)
     postures: list[Vec] = []
@@ -165,13 +164,13 @@ def _nodes(
         for place, point in enumerate([*points, None]):
             for column, hand in enumerate(HANDS):
                 of_station[person, place, column] = len(postures), variants
-                if point is None and column == 1:  # at home no hand works
+                if point is None and column == 1:  # home has no working hand
                     of_station[person, place, column] = of_station[person, place, 0]
                     continue
                 for _ in range(variants):
-                    node = draw_keyframe(cell, size, point, hand, rng)
-                    postures.append(node.q)
-                    hands.append(_palms(node.q, size))
+                    keyframe = draw_keyframe(cell, size, point, hand, rng)
+                    postures.append(keyframe.q)
+                    hands.append(_palms(keyframe.q, size))
     return np.array(postures), np.array(hands), of_station
 
 
@@ -180,46 +179,46 @@ def _palms(q: Vec, size: Vec) -> Vec:
     return np.stack([points["hand_r"], points["hand_l"]])
 
 
-def _legs(
+def _segments(
     cell: Cell, n_samples: int, augmentation: bool, rng: np.random.Generator
 ) -> tuple[Vec, Vec, Index, Vec]:
-    """Return samples, gains, the table of legs, and the logs of the durations."""
+    """Return samples, gains, the table of segments, and moments of the log durations."""
     order = {station.id: i for i, station in enumerate(cell.pick_stations)}
     order[HOME] = n_places = len(order)
-    legs = np.full((n_places + 1, n_places + 1, 2, 3), -1, dtype=np.int64)
+    segments = np.full((n_places + 1, n_places + 1, 2, 3), -1, dtype=np.int64)
     samples: list[Vec] = []
     gains: list[Vec] = []
     durations: list[tuple[float, float]] = []
     first = 0
-    for leg in segments_of(cell):
-        found = primitive_for(cell, leg)
+    for segment in segments_of(cell):
+        found = primitive_for(cell, segment)
         logs = np.log(found.durations)
         some = draw_samples(found, 2 * n_samples, rng) if augmentation else found.weights
         n = n_samples if augmentation else len(some)
         spread = float(logs.std(ddof=1)) if augmentation else 0.0
-        start, end, column = order[leg.start], order[leg.end], HANDS.index(leg.hand)
-        for way, known, drawn in (
+        start, end, column = order[segment.start], order[segment.end], HANDS.index(segment.hand)
+        for ends, known, drawn in (
             ((start, end), found.weights, some[:n]),
             ((end, start), found.weights[..., ::-1], some[-n:, :, ::-1]),
         ):
-            legs[(*way, column)] = len(gains), first, n
+            segments[(*ends, column)] = len(gains), first, n
             samples.append(drawn)
             gains.append(promp.gain_of_ends(known, GAIN_FLOOR))
             durations.append((float(logs.mean()), spread))
             first += n
-    return np.concatenate(samples), np.array(gains), legs, np.array(durations)
+    return np.concatenate(samples), np.array(gains), segments, np.array(durations)
 
 
 def draw_samples(found: TaskPrimitive, n: int, rng: np.random.Generator) -> Vec:
-    """Draw weights that keep the joint limits, shape (n, 18, n_basis).
+    """Draw weights within the joint limits, shape (n, 18, n_basis).
 
-    Draws beyond the limits are rejected, as by ``sampling.sample``; what is missing after some
-    rounds is left to that.
+    Draws beyond the limits are rejected; ``sampling.sample`` supplies those missing after
+    ROUNDS.
 
     Args:
         found: Primitive.
         n: Number of draws.
-        rng: Source of chance.
+        rng: Source of randomness.
     """
     phi = promp.basis(GRID, promp.N_BASIS, promp.usual_width(promp.N_BASIS))
     kept: list[Vec] = []
@@ -230,18 +229,18 @@ def draw_samples(found: TaskPrimitive, n: int, rng: np.random.Generator) -> Vec:
         kept.extend(drawn[inside])
         if len(kept) >= n:
             return np.array(kept[:n])
-    points = points_of(MEDIAN.vector(0.0))  # no via points, so nobody's size matters
+    points = points_of(MEDIAN.vector(0.0))  # without via points the size is irrelevant
     rest = sample(found.primitive(), n - len(kept), rng, points)
     return np.array([*kept, *rest])
 
 
 def segment_weights(library: MotionLibrary, primitive: int, sample: int, ends: Vec) -> Vec:
-    """Return the weights of one leg between two nodes, as the kernels make them, (18, 12).
+    """Return the conditioned weights of a segment between two keyframes, shape (18, 12).
 
     Args:
         library: Library.
-        primitive: Number of the primitive.
-        sample: Number of the sample.
+        primitive: Index of the primitive.
+        sample: Index of the sample.
         ends: Joint positions at both ends [m, rad], shape (2, 18).
     """
     drawn = library.samples[sample]

@@ -258,25 +258,7 @@ def moments(promp: ProMP, phase: Vec) -> tuple[Vec, Vec]:
         Mean [m, rad], shape (m, n_joints), and covariance, shape (m, n_joints, n_joints),
         without the residual of the regression.
     """
-    return _moments(promp, basis(phase, promp.n_basis, promp.width))
-
-
-def speed_moments(promp: ProMP, phase: Vec, rate: Vec) -> tuple[Vec, Vec]:
-    """Return mean and covariance of the joint speeds at each phase.
-
-    Args:
-        promp: Primitive.
-        phase: Phases in [0, 1], shape (m,).
-        rate: dz/dt at each [1/s], shape (m,).
-
-    Returns:
-        Mean [m/s, rad/s], shape (m, n_joints), and covariance, (m, n_joints, n_joints).
-    """
-    slope = basis_slope(phase, promp.n_basis, promp.width)
-    return _moments(promp, slope * np.asarray(rate)[:, None])
-
-
-def _moments(promp: ProMP, rows: Vec) -> tuple[Vec, Vec]:
+    rows = basis(phase, promp.n_basis, promp.width)
     n, k = promp.n_joints, promp.n_basis
     half = np.tensordot(rows, promp.cov.reshape(n, k, n, k), axes=(1, 1))
     return rows @ promp.mean.T, np.einsum("mjkl,ml->mjk", half, rows)
@@ -378,18 +360,3 @@ def gain_of_ends(weights: Vec, floor: float = FLOOR, width: float | None = None)
     for joint in range(n_joints):
         spread[joint * n_basis : (joint + 1) * n_basis, joint::n_joints] += along
     return np.asarray(np.linalg.solve(total, spread.T).T)
-
-
-def draw_durations(promp: ProMP, n: int, rng: np.random.Generator) -> Vec:
-    """Draw execution times like those of the demonstrations [s], log-normal, shape (n,)."""
-    return np.asarray(promp.duration_s * np.exp(promp.duration_spread * rng.standard_normal(n)))
-
-
-def reversed_primitive(promp: ProMP) -> ProMP:
-    """Return the primitive of the same motions gone through backward.
-
-    The centres lie evenly about 1/2, so the weights of each joint change places end for end.
-    """
-    n, k = promp.n_joints, promp.n_basis
-    cov = promp.cov.reshape(n, k, n, k)[:, ::-1, :, ::-1].reshape(n * k, n * k)
-    return replace(promp, mean=promp.mean[:, ::-1].copy(), cov=cov.copy())

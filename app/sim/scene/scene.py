@@ -217,7 +217,7 @@ def new_people_state(cell: Cell, shared: People, n_envs: int) -> PeopleState:
         near=rows(workers),
         lean=rows(workers, 4),
         track=counts(workers) + people.SCRIPTED,
-        legs=new_segment_state(n_envs, workers),
+        segments=new_segment_state(n_envs, workers),
         move=counts(workers),
         n_moves=counts(workers),
         start=rows(workers, script.MAX_MOVES),

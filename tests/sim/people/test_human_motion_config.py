@@ -177,19 +177,19 @@ def test_at_the_table_the_person_faces_it_and_comes_as_near_as_a_worker(
     assert there[:, 1].min() == pytest.approx(cell.human.y_min)
 
 
-def test_legs_of_the_library_begin_and_end_in_their_postures_at_rest(cell: Cell) -> None:
+def test_segments_of_the_library_begin_and_end_in_their_postures_at_rest(cell: Cell) -> None:
     batch = batch_of(cell, HumanMotionConfig(), 8)
     people, state = batch.world.people, batch.state.people
     state.move[:] = 0
     for k in range(6):
         begin = state.start[:, :, k]
-        end = begin + state.duration[:, :, k] + state.legs.stop[:, :, k, 1]
+        end = begin + state.duration[:, :, k] + state.segments.stop[:, :, k, 1]
         assert (end <= state.start[:, :, k + 1]).all()
-        for when, node in ((begin, k), (end, k + 1)):
+        for when, keyframe in ((begin, k), (end, k + 1)):
             batch.state.outcome[:] = OUTCOMES.index("running")
             state.clock[:] = when - batch.arm.dt
             stand(batch)
-            posture = people.postures[state.chosen[:, 0, node]]
+            posture = people.postures[state.chosen[:, 0, keyframe]]
             np.testing.assert_allclose(state.q[:, 0], posture, atol=1e-5)
             np.testing.assert_allclose(state.qd, 0.0, atol=1e-4)
 
@@ -233,24 +233,24 @@ def test_same_seed_is_the_same_motion_and_another_seed_is_not(cell: Cell) -> Non
     assert not np.array_equal(paths[0], paths[2])
 
 
-def test_without_augmentation_legs_last_as_long_as_demonstrated(cell: Cell) -> None:
+def test_without_augmentation_segments_last_as_long_as_demonstrated(cell: Cell) -> None:
     batch = batch_of(cell, HumanMotionConfig(augmentation=False), 12)
     shared, state = batch.world.people.primitive_library, batch.state.people
-    assert not state.clock.any() and not state.legs.stop.any()
+    assert not state.clock.any() and not state.segments.stop.any()
     for e in range(12):
         n = int(state.n_moves[e, 0])
-        usual = np.exp(shared.duration[state.legs.primitive[e, 0, :n], 0])
+        usual = np.exp(shared.duration[state.segments.primitive[e, 0, :n], 0])
         np.testing.assert_allclose(state.duration[e, 0, :n], usual)
         rests = np.diff(state.start[e, 0, :n]) - state.duration[e, 0, : n - 1]
         np.testing.assert_allclose(rests, 0.5)
 
 
-def test_with_augmentation_legs_vary_pause_and_begin_anywhere(cell: Cell) -> None:
+def test_with_augmentation_segments_vary_pause_and_begin_anywhere(cell: Cell) -> None:
     state = batch_of(cell, HumanMotionConfig(), 12).state.people
     assert len(np.unique(state.clock)) == 12
-    assert 0.02 < (state.legs.stop[:, 0, :8, 1] > 0.0).mean() < 0.5
+    assert 0.02 < (state.segments.stop[:, 0, :8, 1] > 0.0).mean() < 0.5
     shared = batch_of(cell, HumanMotionConfig(), 1).world.people.primitive_library
-    usual = np.exp(shared.duration[state.legs.primitive[:, 0, :8], 0])
+    usual = np.exp(shared.duration[state.segments.primitive[:, 0, :8], 0])
     assert (np.abs(state.duration[:, 0, :8] / usual - 1.0) > 0.01).mean() > 0.5
 
 

@@ -6,8 +6,8 @@ import pytest
 from app.errors import InvalidInput
 from app.sim.perception.keypoint_sensor_model import (
     Frame,
+    KeypointSensorModel,
     KeypointSensorSettings,
-    Tracker,
     follow,
 )
 from app.sim.perception.person_estimator import PersonEstimator
@@ -19,7 +19,7 @@ EXACT = KeypointSensorSettings(noise=0.0, missing=0.0, latency_s=0.0)
 def frames(
     settings: KeypointSensorSettings, seed: int = 4, end: float = 10.0
 ) -> tuple[Frame, ...]:
-    tracker = Tracker(settings, seed, CELL.body, CELL.floor_z)
+    tracker = KeypointSensorModel(settings, seed, CELL.body, CELL.floor_z)
     return tracker.frames(end, motion(1, 12.0))
 
 
@@ -32,7 +32,7 @@ def test_an_exact_tracker_says_what_is_there() -> None:
 
 def test_frames_come_after_the_latency_each_once_whatever_the_worlds_step() -> None:
     settings = KeypointSensorSettings(latency_s=0.1)
-    tracker = Tracker(settings, 4, CELL.body, CELL.floor_z)
+    tracker = KeypointSensorModel(settings, 4, CELL.body, CELL.floor_z)
     got = []
     for t in np.arange(0, 201) * 0.05:
         new = tracker.frames(t, motion(1, 12.0))
@@ -69,7 +69,7 @@ def test_same_seed_disturbs_alike_and_another_does_not() -> None:
 
 
 def test_what_was_seen_comes_back_as_the_person_who_was_there() -> None:
-    tracker = Tracker(EXACT, 4, CELL.body, CELL.floor_z)
+    tracker = KeypointSensorModel(EXACT, 4, CELL.body, CELL.floor_z)
     times, truth = np.arange(201) * 0.05, motion(1, 12.0)
     estimator = PersonEstimator(CELL.body)
     errors = []
@@ -80,7 +80,7 @@ def test_what_was_seen_comes_back_as_the_person_who_was_there() -> None:
 
 
 def test_a_tracker_that_delivers_nothing_leaves_the_person_unseen() -> None:
-    tracker = Tracker(KeypointSensorSettings(lost=1.0), 4, CELL.body, CELL.floor_z)
+    tracker = KeypointSensorModel(KeypointSensorSettings(lost=1.0), 4, CELL.body, CELL.floor_z)
     estimator = PersonEstimator(CELL.body)
     for estimate in follow(motion(1, 12.0), [0.0, 0.5, 1.0], tracker, estimator):
         assert estimate.stale and estimate.flags == ("never-seen",)

@@ -59,7 +59,7 @@ def test_palm_goes_from_station_to_station(row: tuple[float, ...], hand: human.H
     assert np.linalg.norm(palms - ends, axis=1).max() < 0.08
 
 
-def test_motion_between_nodes_begins_and_ends_in_them() -> None:
+def test_motion_between_keyframes_begins_and_ends_in_them() -> None:
     rng, size = np.random.default_rng(5), PEOPLE[(50.0, 50.0, 50.0)]
     first = draw_keyframe(CELL, size, None, "r", rng)
     then = draw_keyframe(CELL, size, station("cube3"), "r", rng)
@@ -70,8 +70,8 @@ def test_motion_between_nodes_begins_and_ends_in_them() -> None:
 
 def test_palm_is_lifted_on_its_way() -> None:
     rng, size = np.random.default_rng(6), PEOPLE[(50.0, 50.0, 50.0)]
-    nodes = [draw_keyframe(CELL, size, station(name), "r", rng) for name in ("cube1", "dock0")]
-    q, _ = between(size, nodes[0], nodes[1], BY_NAME["careful"], rng)
+    ends = [draw_keyframe(CELL, size, station(name), "r", rng) for name in ("cube1", "dock0")]
+    q, _ = between(size, ends[0], ends[1], BY_NAME["careful"], rng)
     height = palms_of(q, size)[:, 0, 2]
     straight = np.linspace(height[0], height[-1], len(height))
     assert 0.04 < (height - straight).max() < 0.13
@@ -95,8 +95,8 @@ def test_elbows_go_out_in_their_style() -> None:
         """Return how far the right elbow is to the right of the arm's ends on average [m]."""
         found = []
         for _ in range(12):
-            node = draw_keyframe(CELL, size, station("cube2"), "r", rng, BY_NAME[name])
-            points = human.joint_points(node.q, size)
+            keyframe = draw_keyframe(CELL, size, station("cube2"), "r", rng, BY_NAME[name])
+            points = human.joint_points(keyframe.q, size)
             middle = 0.5 * (points["shoulder_r"] + points["hand_r"])
             found.append(middle[0] - points["elbow_r"][0])  # who faces the robot has -x there
         return float(np.mean(found))

@@ -18,9 +18,11 @@ from app.sim.primitives.library_file import (
 )
 
 
-def test_every_leg_of_every_shipped_cell_has_its_primitive() -> None:
-    wanted = {(name, leg) for name in cell_names() for leg in segments_of(load_cell(name))}
-    assert {(one.cell, one.leg) for one in load_primitives()} == wanted
+def test_every_segment_of_every_shipped_cell_has_its_primitive() -> None:
+    wanted = {
+        (name, segment) for name in cell_names() for segment in segments_of(load_cell(name))
+    }
+    assert {(one.cell, one.segment) for one in load_primitives()} == wanted
     assert len(load_primitives()) == len(wanted) == 40
 
 
@@ -68,8 +70,8 @@ def test_demonstrations_keep_the_joint_limits() -> None:
 def test_shipped_cell_gets_its_own_primitives() -> None:
     cell = load_cell()
     for one in load_primitives():
-        found = primitive_for(cell, one.leg)
-        assert found.leg == one.leg
+        found = primitive_for(cell, one.segment)
+        assert found.segment == one.segment
         np.testing.assert_array_equal(found.weights, one.weights)
 
 
@@ -78,6 +80,6 @@ def test_what_is_written_is_read_again(tmp_path: Path) -> None:
     write_primitives(path, made, {"seed": 1})
     assert read_header(path)["seed"] == 1
     for before, after in zip(made, load_primitives(path), strict=True):
-        assert before.leg == after.leg
+        assert before.segment == after.segment
         np.testing.assert_array_equal(before.weights, after.weights)
         np.testing.assert_array_equal(before.durations, after.durations)

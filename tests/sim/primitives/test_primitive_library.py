@@ -1,4 +1,4 @@
-"""The library a worker's motion is made of: nodes are met, tables avoided, limits kept."""
+"""The library a worker's motion is made of: keyframes are met, tables avoided, limits kept."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ from app.sim.primitives.primitive_library import (
     motion_library,
     people_sizes,
 )
-from tests.sim.library_motions import LegMotion, random_segments
+from tests.sim.library_motions import SegmentMotion, random_segments
 
 N = 600
 
@@ -31,7 +31,7 @@ def library(cell: Cell) -> MotionLibrary:
 
 
 @pytest.fixture(scope="module")
-def motions(cell: Cell, library: MotionLibrary) -> list[LegMotion]:
+def motions(cell: Cell, library: MotionLibrary) -> list[SegmentMotion]:
     return random_segments(cell, library, N, 1)
 
 
@@ -58,30 +58,30 @@ def moved(cell: Cell, way: tuple[float, float], jitter: float, seed: int = 0) ->
     )
 
 
-def test_every_leg_meets_its_nodes(motions: list[LegMotion]) -> None:
+def test_every_segment_meets_its_nodes(motions: list[SegmentMotion]) -> None:
     assert max(motion.end_miss for motion in motions) < 1e-3
 
 
-def test_every_leg_ends_in_its_nodes_joints(cell: Cell, library: MotionLibrary) -> None:
+def test_every_segment_ends_in_its_keyframes_joints(cell: Cell, library: MotionLibrary) -> None:
     for motion in random_segments(cell, library, 100, 5):
         ends = [np.abs(library.postures - motion.q[k]).max(axis=1).min() for k in (0, -1)]
         assert max(ends) < 1e-3
 
 
-def test_legs_keep_the_joint_limits(motions: list[LegMotion]) -> None:
+def test_segments_keep_the_joint_limits(motions: list[SegmentMotion]) -> None:
     assert np.mean([motion.beyond > 1e-3 for motion in motions]) <= 0.005
 
 
-def test_hands_and_elbows_stay_out_of_the_table(motions: list[LegMotion]) -> None:
+def test_hands_and_elbows_stay_out_of_the_table(motions: list[SegmentMotion]) -> None:
     assert min(motion.lowest for motion in motions) > -0.01
 
 
-def test_palms_make_no_detours(motions: list[LegMotion]) -> None:
+def test_palms_make_no_detours(motions: list[SegmentMotion]) -> None:
     longer = [motion.path - 2.0 * motion.straight for motion in motions]
     assert np.percentile(longer, 99) < 0.2
 
 
-def test_no_joint_swings_out_on_the_way(motions: list[LegMotion]) -> None:
+def test_no_joint_swings_out_on_the_way(motions: list[SegmentMotion]) -> None:
     swings = [motion.swing for motion in motions]
     assert np.median(swings) < 0.3 and np.percentile(swings, 99) < 0.9
 
@@ -99,8 +99,8 @@ def test_gain_leaves_the_sample_free_where_it_already_meets_the_nodes(
         np.testing.assert_allclose(rows.reshape(36, -1) @ gain, np.eye(36), atol=1e-6)
 
 
-def test_legs_join_home_cubes_and_docks_with_both_hands(library: MotionLibrary) -> None:
-    there = library.legs[..., 0] >= 0
+def test_segments_join_home_cubes_and_docks_with_both_hands(library: MotionLibrary) -> None:
+    there = library.segments[..., 0] >= 0
     home, cubes = library.n_stations, range(library.n_cubes)
     docks = range(library.n_cubes, library.n_stations)
     expected = np.zeros_like(there)
@@ -110,17 +110,17 @@ def test_legs_join_home_cubes_and_docks_with_both_hands(library: MotionLibrary) 
         for dock in docks:
             expected[cube, dock] = expected[dock, cube] = True
     np.testing.assert_array_equal(there, expected)
-    rows = library.legs[there]
+    rows = library.segments[there]
     assert len(np.unique(rows[:, 0])) == len(rows) == len(library.gain) == len(library.duration)
     assert rows[:, 2].sum() == len(library.samples)
 
 
-def test_backward_leg_takes_as_long_as_forward(library: MotionLibrary) -> None:
-    forth, back = library.legs[8, 2, 0, 0], library.legs[2, 8, 0, 0]
+def test_backward_segment_takes_as_long_as_forward(library: MotionLibrary) -> None:
+    forth, back = library.segments[8, 2, 0, 0], library.segments[2, 8, 0, 0]
     np.testing.assert_array_equal(library.duration[forth], library.duration[back])
 
 
-def test_nodes_of_every_person_reach_the_stations(cell: Cell, library: MotionLibrary) -> None:
+def test_keyframes_of_every_body_reach_stations(cell: Cell, library: MotionLibrary) -> None:
     for person in range(len(library.bodies)):
         for place, station in enumerate(cell.pick_stations):
             for hand in range(2):
@@ -129,7 +129,7 @@ def test_nodes_of_every_person_reach_the_stations(cell: Cell, library: MotionLib
                 assert np.linalg.norm(palms - station.position, axis=1).max() < 0.09
 
 
-def test_nodes_are_inside_the_limits(library: MotionLibrary) -> None:
+def test_keyframes_are_inside_the_limits(library: MotionLibrary) -> None:
     assert (library.postures >= human.Q_MIN).all() and (library.postures <= human.Q_MAX).all()
 
 
@@ -166,16 +166,16 @@ def test_without_augmentation_samples_are_the_demonstrations(cell: Cell) -> None
 
 
 def test_library_cannot_be_changed(library: MotionLibrary) -> None:
-    for name in ("postures", "samples", "gain", "legs"):
+    for name in ("postures", "samples", "gain", "segments"):
         with pytest.raises(ValueError, match="read-only"):
             getattr(library, name)[...] = 0
 
 
 def test_moved_cell_has_the_same_motion_elsewhere(cell: Cell) -> None:
     other = moved(cell, (0.5, 0.2), 0.0)
-    for leg in segments_of(cell)[::7]:
-        ours, theirs = primitive_for(cell, leg), primitive_for(other, leg)
-        assert ours.leg == theirs.leg
+    for segment in segments_of(cell)[::7]:
+        ours, theirs = primitive_for(cell, segment), primitive_for(other, segment)
+        assert ours.segment == theirs.segment
         shift = theirs.weights - ours.weights
         np.testing.assert_allclose(shift[:, 0], 0.5, atol=1e-12)
         np.testing.assert_allclose(shift[:, 1], 0.2, atol=1e-12)

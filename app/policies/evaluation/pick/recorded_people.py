@@ -22,7 +22,7 @@ from app.sim.scene.scene import FAR_AWAY
 Index = NDArray[np.int64]
 
 
-class Settings(Protocol):
+class RecordedSettings(Protocol):
     """What a recording needs to know of a scenario's settings."""
 
     @property
@@ -30,7 +30,7 @@ class Settings(Protocol):
         """What actions mean."""
 
 
-class Batch(Protocol):
+class RecordedBatch(Protocol):
     """What a recording needs of a scenario's batch."""
 
     @property
@@ -42,8 +42,8 @@ class Batch(Protocol):
         """Rows of robot and people."""
 
     @property
-    def settings(self) -> Settings:
-        """Settings."""
+    def settings(self) -> RecordedSettings:
+        """RecordedSettings."""
 
 
 class Trace:
@@ -55,7 +55,7 @@ class Trace:
         parts: Recorded poses per control period.
     """
 
-    def __init__(self, batch: Batch, n_recorded: int, parts: int = 5) -> None:
+    def __init__(self, batch: RecordedBatch, n_recorded: int, parts: int = 5) -> None:
         self._batch, self._n, self._parts = batch, n_recorded, parts
         self._robot: list[list[Vec]] = [[] for _ in range(n_recorded)]
         self._people: list[list[tuple[Vec, ...]]] = [[] for _ in range(n_recorded)]

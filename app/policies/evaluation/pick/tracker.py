@@ -31,7 +31,7 @@ from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.inference.task_selection import HYSTERESIS
 from app.sim.core.arrays import Vec
 from app.sim.human import model as human
-from app.sim.perception.keypoint_sensor_model import KeypointSensorSettings, Tracker
+from app.sim.perception.keypoint_sensor_model import KeypointSensorModel, KeypointSensorSettings
 from app.sim.perception.person_estimator import PersonEstimator
 from app.sim.pick.batch import PickBatch
 
@@ -43,7 +43,7 @@ to have come to the start at the speed they have there."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TrackedRow:
+class KeypointSensorRow:
     """How one row of the result sees people."""
 
     tracker: KeypointSensorSettings
@@ -58,11 +58,11 @@ def _late(seconds: float, **disturbed: float) -> KeypointSensorSettings:
 
 
 ROWS = {
-    "33ms": TrackedRow(tracker=_late(1.0 / RATE_HZ)),
-    "100ms": TrackedRow(tracker=_late(0.1)),
-    "200ms": TrackedRow(tracker=_late(0.2)),
-    "100ms-not-predicted": TrackedRow(tracker=_late(0.1), predicted=False),
-    "100ms-noise-missing": TrackedRow(tracker=_late(0.1, noise=0.02, missing=0.2)),
+    "33ms": KeypointSensorRow(tracker=_late(1.0 / RATE_HZ)),
+    "100ms": KeypointSensorRow(tracker=_late(0.1)),
+    "200ms": KeypointSensorRow(tracker=_late(0.2)),
+    "100ms-not-predicted": KeypointSensorRow(tracker=_late(0.1), predicted=False),
+    "100ms-noise-missing": KeypointSensorRow(tracker=_late(0.1, noise=0.02, missing=0.2)),
 }
 """The rows beside ``exact``."""
 
@@ -93,7 +93,7 @@ def between(
     return at
 
 
-class ThroughTracker:
+class KeypointObserver:
     """Shows the policy the first worker of each row as a tracker and an estimator know them.
 
     Made anew for every run.
@@ -103,9 +103,9 @@ class ThroughTracker:
         seed: Seed of the disturbances.
     """
 
-    def __init__(self, row: TrackedRow, seed: int) -> None:
+    def __init__(self, row: KeypointSensorRow, seed: int) -> None:
         self._row, self._seed = row, seed
-        self._trackers: dict[int, Tracker] = {}
+        self._trackers: dict[int, KeypointSensorModel] = {}
         self._estimators: dict[int, PersonEstimator] = {}
         self._frame_at: dict[int, float] = {}
         self._before: tuple[Vec, Vec, Vec] | None = None
@@ -136,7 +136,7 @@ class ThroughTracker:
         phases = np.random.default_rng(self._seed).random(batch.n_envs) / settings.rate_hz
         for e in rows.tolist():
             size = batch.state.people.size[e, 0].copy()
-            self._trackers[e] = Tracker(
+            self._trackers[e] = KeypointSensorModel(
                 settings,
                 (self._seed, e),
                 size,
@@ -180,10 +180,10 @@ def run_tracker(
     evaluator = evaluator_of(checkpoint, (2, 3), episodes or DEFAULT_EPISODES, seed)
     rule, results = choice_rules.critic(HYSTERESIS), []
     looks: dict[str, Seen] = {"exact": seen_exactly}
-    looks |= {name: ThroughTracker(row, seed) for name, row in ROWS.items()}
+    looks |= {name: KeypointObserver(row, seed) for name, row in ROWS.items()}
     for name, look in looks.items():
         row = evaluator.run(rule, seen=look).row(name)
-        errors = np.array(look.wrist_errors if isinstance(look, ThroughTracker) else [0.0])
+        errors = np.array(look.wrist_errors if isinstance(look, KeypointObserver) else [0.0])
         row["wrist_error_median_mm"] = 1e3 * float(np.median(errors))
         row["wrist_error_p95_mm"] = 1e3 * float(np.percentile(errors, 95))
         results.append(row)

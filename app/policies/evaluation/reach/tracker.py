@@ -41,7 +41,7 @@ RATE_HZ = 30.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TrackedRow:
+class CylinderSensorRow:
     """How one row of the result sees people."""
 
     tracker: CylinderSensorSettings
@@ -55,18 +55,18 @@ def _late(latency_s: float, noise: float = 0.0) -> CylinderSensorSettings:
 
 
 ROWS = {
-    "30hz": TrackedRow(tracker=_late(0.0)),
-    "100ms": TrackedRow(tracker=_late(0.1)),
-    "100ms-noise": TrackedRow(tracker=_late(0.1, 0.02)),
-    "200ms-noise": TrackedRow(tracker=_late(0.2, 0.02)),
-    "100ms-not-predicted": TrackedRow(tracker=_late(0.1), predicted=False),
+    "30hz": CylinderSensorRow(tracker=_late(0.0)),
+    "100ms": CylinderSensorRow(tracker=_late(0.1)),
+    "100ms-noise": CylinderSensorRow(tracker=_late(0.1, 0.02)),
+    "200ms-noise": CylinderSensorRow(tracker=_late(0.2, 0.02)),
+    "100ms-not-predicted": CylinderSensorRow(tracker=_late(0.1), predicted=False),
 }
 """The rows beside ``exact``."""
 LOOKED_AHEAD = ("30hz", "100ms-noise")
 """Those that are also played looking ahead, where the policy can."""
 
 
-class ThroughTracker:
+class CylinderObserver:
     """Asks another mover about people as a tracker knows them; made anew for every run.
 
     Args:
@@ -75,7 +75,7 @@ class ThroughTracker:
         seed: Seed of the disturbances.
     """
 
-    def __init__(self, mover: Mover, row: TrackedRow, seed: int) -> None:
+    def __init__(self, mover: Mover, row: CylinderSensorRow, seed: int) -> None:
         self._mover, self._row, self._seed = mover, row, seed
         self._tracker: CylinderSensorModel | None = None
         self._rng = np.random.default_rng([seed, 1])
@@ -167,7 +167,7 @@ def run_tracker(
     bench.add(bench.play(bench.usual, goals).row("exact"), bench.usual, "grid")
     for how, name in rows:
         tracked = ROWS[name]
-        mover = ThroughTracker(mover_of(bench.actor, how), tracked, seed)
+        mover = CylinderObserver(mover_of(bench.actor, how), tracked, seed)
         row = bench.play(bench.usual, goals, mover=mover).row(name + ending(how))
         median, p95 = np.percentile(1e3 * np.concatenate(mover.errors), [50, 95]).tolist()
         row |= {"axis_error_median_mm": median, "axis_error_p95_mm": p95}

@@ -14,6 +14,7 @@ from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
 from app.sim.core.kernels import rng as random
 from app.sim.geometry.capsules import copy_values
+from app.sim.people.kernels.motion import start_people
 from app.sim.people.kernels.people import (
     People,
     PeopleGeometry,
@@ -21,7 +22,6 @@ from app.sim.people.kernels.people import (
     new_people_geometry,
     place_people,
     see_nearest,
-    start_people,
 )
 from app.sim.pick.kernels.observation import Obs, Sight, new_sight, observe
 from app.sim.pick.kernels.reward import RewardWeights, reward

@@ -1,19 +1,19 @@
-"""A worker's task primitives, compiled: legs between places, played from sampled weights.
+"""Segments of task primitives between places, sampled and conditioned on both ends (compiled).
 
-A script is a chain of *legs*: home to a cube or a dock, cube to dock, dock to cube, and back
-home, each done by one hand; hands change at home only. Both ends of a leg are postures of the
-worker's library; between them the joints follow a movement primitive,
+A script is a chain of *segments*: home to a cube or dock, cube to dock, dock to cube, and back
+home, each done by one hand; the hand changes at home only. Both ends of a segment are postures
+of the worker's library; between them the joints follow a movement primitive,
 
     q(z) = W' phi(z),   W' = W + K ([q_0; q_1] - [W phi(0); W phi(1)]),
 
-with ``phi`` the normalised Gaussians of ``promp.py``, ``W`` a sample of the leg's primitive
-drawn beforehand and ``K`` the primitive's own gain for its two ends: conditioning by Matheron's
-rule, so that the leg begins and ends exactly in the two postures. The phase z goes by the
-minimum-jerk law; a leg may pause on its way.
+with ``phi`` the normalised Gaussians of ``promp.py``, ``W`` a weight sample of the segment's
+primitive and ``K`` the gain of that primitive for its two ends. By Matheron's rule the segment
+begins and ends exactly in the two postures. The phase z follows the minimum-jerk profile; a
+segment may pause.
 
-Source: METHOD 3.2 (cycle) and 3.4 (primitives; execution time, pauses, starting phase,
-reversal); Paraschos et al. 2013; Wilson et al. 2021 (pathwise conditioning). The weights come
-from ``app/sim/primitives/primitive_library.py``.
+Source: docs/method.md 3.2 (cycle) and 3.4 (primitives; execution time, pauses, starting phase,
+reversal); Paraschos et al. 2013; Wilson et al. 2021 (pathwise conditioning). Weights come from
+``app/sim/primitives/primitive_library.py``.
 """
 
 import math
@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
 from app.sim.core.kernels.rng import State, below, normal, uniform
-from app.sim.primitives.kernels.script import MAX_MOVES, draw_pause, draw_posture
+from app.sim.primitives.kernels.script import MAX_MOVES, Moves, draw_pause, draw_posture
 
 Index = NDArray[np.int64]
 
@@ -34,67 +34,79 @@ N_BASIS = 12
 WIDTH = 0.7 / (N_BASIS - 1)
 """Their width [phase]; that of ``promp.usual_width``."""
 SHORTEST_SEGMENT = 0.35
-"""Least duration of a leg [s]."""
+"""Shortest duration of a segment [s]."""
 P_STOP = 0.15
-"""Chance of a pause on the way of a leg."""
+"""Probability of a pause within a segment."""
 STOP_S = (0.2, 1.4)
-"""Least and greatest length of such a pause [s]."""
+"""Shortest and longest pause [s]."""
 
 _SCALE = np.exp(-0.5 * (np.linspace(0.0, 1.0, N_BASIS) / WIDTH) ** 2)
 _SCALE.setflags(write=False)
 
 
 class PrimitiveLibrary(NamedTuple):
-    """What all workers of a cell can do."""
+    """Movement primitives of all segments of a cell's task."""
 
     samples: Vec
     """Weights drawn from the primitives [m, rad], shape (n_samples, 18, N_BASIS)."""
     gain: Vec
     """K of each primitive, shape (n_primitives, 18 * N_BASIS, 36): weights joint by joint, by
     the 18 joints at the start, then those at the end."""
-    legs: Index
-    """Primitive, first sample and number of samples of each leg, (n + 1, n + 1, 2, 3): from
-    place, to place, hand; the last place is home; primitive -1 where there is no such leg."""
+    segments: Index
+    """Primitive, first sample and number of samples of each segment, shape (n_places, n_places,
+    2, 3), indexed by start place, end place and hand; home is the last place; primitive -1: no
+    such segment."""
     duration: Vec
-    """Mean and standard deviation of the log of a leg's duration [s], (n_primitives, 2)."""
+    """Mean and standard deviation of the log of a segment's duration [s], (n_primitives, 2)."""
     varied: bool
-    """Whether durations vary, legs pause and scripts begin anywhere (METHOD 3.4)."""
+    """Whether durations and starting times are random and segments may pause
+    (docs/method.md 3.4)."""
 
 
 class SegmentState(NamedTuple):
-    """The legs of all workers' scripts beyond what every script has; rows (n_envs, W, ...)."""
+    """Segments of all workers' scripts, rows (n_envs, W, ...)."""
 
     primitive: Index
-    """Primitive of each leg, shape (n_envs, W, MAX_MOVES)."""
+    """Primitive of each segment, shape (n_envs, W, MAX_MOVES)."""
     sample: Index
-    """Sample of each leg, shape (n_envs, W, MAX_MOVES)."""
+    """Weight sample of each segment, shape (n_envs, W, MAX_MOVES)."""
     stop: Vec
-    """Phase at which each leg pauses, 0: never, and how long [s], (n_envs, W, MAX_MOVES, 2)."""
+    """Phase (0: none) and length [s] of a pause in each, shape (n_envs, W, MAX_MOVES, 2)."""
     weights: Vec
-    """Weights of the leg each worker is in, shape (n_envs, W, 18, N_BASIS)."""
+    """Conditioned weights of each worker's current segment, shape (n_envs, W, 18, N_BASIS)."""
     ready: Index
-    """The leg these weights are of, -1 for none, shape (n_envs, W)."""
+    """Segment to which ``weights`` belongs, -1 for none, shape (n_envs, W)."""
+
+
+class Segments(NamedTuple):
+    """Segments of one script; arrays that :func:`draw_segments` fills."""
+
+    primitive: Index
+    """Primitive of each segment, shape (MAX_MOVES,)."""
+    sample: Index
+    """Weight sample of each segment, shape (MAX_MOVES,)."""
+    stop: Vec
+    """Phase and length [s] of a pause in each segment, shape (MAX_MOVES, 2)."""
 
 
 def empty_primitive_library() -> PrimitiveLibrary:
-    """Return the primitive_library of workers who use none.
+    """Return the library of workers that use no primitives.
 
-    Its samples are read-only, like a library's: all that kernels are handed is then of one
-    type, and they are compiled once.
+    Samples are read-only, as in other libraries, so that kernels are compiled for one type.
     """
     samples = np.zeros((1, 18, N_BASIS))
     samples.setflags(write=False)
     return PrimitiveLibrary(
         samples=samples,
         gain=np.zeros((1, 18 * N_BASIS, 36)),
-        legs=np.full((1, 1, 2, 3), -1, dtype=np.int64),
+        segments=np.full((1, 1, 2, 3), -1, dtype=np.int64),
         duration=np.zeros((1, 2)),
         varied=True,
     )
 
 
 def new_segment_state(n_envs: int, n_workers: int) -> SegmentState:
-    """Return rows for the legs of workers, no script drawn yet."""
+    """Return segment rows of all workers before any script is drawn."""
     return SegmentState(
         primitive=np.zeros((n_envs, n_workers, MAX_MOVES), dtype=np.int64),
         sample=np.zeros((n_envs, n_workers, MAX_MOVES), dtype=np.int64),
@@ -106,13 +118,13 @@ def new_segment_state(n_envs: int, n_workers: int) -> SegmentState:
 
 @kernel(error_model="numpy")
 def condition(sample: Vec, gain: Vec, before: Vec, after: Vec, away: Vec, out: Vec) -> None:
-    """Write the weights of a leg between two postures.
+    """Condition a weight sample on the two end postures of a segment.
 
     Args:
         sample: Weights W, shape (18, N_BASIS).
         gain: K of its primitive, shape (18 * N_BASIS, 36).
-        before: Posture it begins in [m, rad], shape (18,).
-        after: Posture it ends in [m, rad], shape (18,).
+        before: Posture at its start [m, rad], shape (18,).
+        after: Posture at its end [m, rad], shape (18,).
         away: Work space, shape (36,).
         out: Filled with W', shape (18, N_BASIS).
     """
@@ -137,7 +149,7 @@ def condition(sample: Vec, gain: Vec, before: Vec, after: Vec, away: Vec, out: V
 def follow(
     weights: Vec, phase: float, rate: float, q_min: Vec, q_max: Vec, q: Vec, qd: Vec
 ) -> None:
-    """Write joint positions and speeds at a phase, kept inside the joint limits.
+    """Write joint positions and speeds at a phase, clipped to the joint limits.
 
     ``phi_i(z)`` is proportional to ``s_i r^i`` with ``s_i = exp(-c_i^2 / (2 h^2))`` and
     ``r = exp(z D / h^2)``, D the distance of the centres: the factors that all have in common
@@ -174,17 +186,19 @@ def follow(
 
 
 @kernel(error_model="numpy")
-def law(t: float, duration: float, stop_at: float, stop_s: float) -> tuple[float, float]:
-    """Return phase and its rate [1/s] at a time of a leg.
+def phase_profile(
+    t: float, duration: float, stop_at: float, stop_s: float
+) -> tuple[float, float]:
+    """Return the phase and its rate [1/s] at a time of a segment.
 
-    Without a pause, minimum jerk from 0 to 1. With one, minimum jerk from 0 to ``stop_at`` and
-    from there to 1, each for its share of the duration, so that the leg is nowhere faster.
+    Minimum jerk from 0 to 1; with a pause, minimum jerk from 0 to ``stop_at`` and from there to
+    1, each with its share of the duration, so that the peak rate does not increase.
 
     Args:
-        t: Time since the leg began [s].
-        duration: Its duration, pauses not counted [s].
-        stop_at: Phase of its pause; 0 for none.
-        stop_s: Length of that [s].
+        t: Time since the start of the segment [s].
+        duration: Duration without pauses [s].
+        stop_at: Phase of the pause; 0 for none.
+        stop_s: Length of the pause [s].
     """
     begin, span = 0.0, 1.0
     if stop_at > 0.0:
@@ -202,37 +216,28 @@ def law(t: float, duration: float, stop_at: float, stop_s: float) -> tuple[float
 @kernel()
 def draw_segments(
     rng: State,
-    primitive_library: PrimitiveLibrary,
+    library: PrimitiveLibrary,
     of_station: Index,
     n_cubes: int,
     first: int,
-    start: Vec,
-    duration: Vec,
-    chosen: Index,
-    primitive: Index,
-    sample: Index,
-    stop: Vec,
+    moves: Moves,
+    segments: Segments,
 ) -> int:
-    """Draw a script of legs: home - cube - dock - home or reversed; some cycles skip home.
+    """Draw a script of cycles home - cube - dock - home and return its number of segments.
+
+    A cycle may be reversed, or omit the return to home; the last segment ends at home.
 
     Args:
         rng: Random stream.
-        primitive_library: What the worker can do.
-        of_station: First posture and count of each place and hand, shape (n + 1, 2, 2).
-        n_cubes: Number of cubes; they come first among the places.
-        first: Posture to start from, one at home; -1 draws one.
-        start: Filled: start of each leg [s], shape (MAX_MOVES,).
-        duration: Filled: its duration, pauses on the way not counted [s], (MAX_MOVES,).
-        chosen: Filled with the postures between the legs, shape (MAX_MOVES + 1,).
-        primitive: Filled, shape (MAX_MOVES,).
-        sample: Filled, shape (MAX_MOVES,).
-        stop: Filled: phase and length [s] of a pause on the way, shape (MAX_MOVES, 2).
-
-    Returns:
-        Number of legs; the last one ends at home.
+        library: Movement primitives of the cell.
+        of_station: First posture and count of each place and hand, shape (n_places, 2, 2).
+        n_cubes: Number of cubes; they are the first places.
+        first: Initial posture, one at home; -1 draws one.
+        moves: Filled; durations exclude pauses within segments.
+        segments: Filled.
     """
-    home, varied = of_station.shape[0] - 1, primitive_library.varied
-    chosen[0] = first if first >= 0 else draw_posture(rng, of_station, home, 0)
+    home, varied = of_station.shape[0] - 1, library.varied
+    moves.chosen[0] = first if first >= 0 else draw_posture(rng, of_station, home, 0)
     place, hand, at_cube = home, 0, False
     t, n = 0.2 + 1.5 * uniform(rng) if varied else 0.5, 0
     while n + 4 <= MAX_MOVES:
@@ -242,26 +247,26 @@ def draw_segments(
         else:
             reverse = at_cube  # From a cube to a dock, from a dock to a cube.
         skip_home = uniform(rng) < 0.3 and n + 8 <= MAX_MOVES
-        for leg in range(3):
-            if leg == 2 and skip_home:
+        for k in range(3):
+            if k == 2 and skip_home:
                 break
             then = home
-            if leg < 2:
-                at_cube = (leg == 0) != reverse
+            if k < 2:
+                at_cube = (k == 0) != reverse
                 then = below(rng, n_cubes)
                 if not at_cube:
                     then = n_cubes + below(rng, home - n_cubes)
-            row = primitive_library.legs[place, then, hand]
-            primitive[n] = row[0]
-            sample[n] = row[1] + below(rng, row[2])
-            chosen[n + 1] = draw_posture(rng, of_station, then, hand)
-            start[n] = t
-            duration[n] = _draw_duration(rng, primitive_library, row[0])
-            stop[n, 0], stop[n, 1] = 0.0, 0.0
+            row = library.segments[place, then, hand]
+            segments.primitive[n] = row[0]
+            segments.sample[n] = row[1] + below(rng, row[2])
+            moves.chosen[n + 1] = draw_posture(rng, of_station, then, hand)
+            moves.start[n] = t
+            moves.duration[n] = _draw_duration(rng, library, row[0])
+            segments.stop[n, 0], segments.stop[n, 1] = 0.0, 0.0
             if varied and uniform(rng) < P_STOP:
-                stop[n, 0] = 0.25 + 0.5 * uniform(rng)
-                stop[n, 1] = STOP_S[0] + (STOP_S[1] - STOP_S[0]) * uniform(rng)
-            t += duration[n] + stop[n, 1]
+                segments.stop[n, 0] = 0.25 + 0.5 * uniform(rng)
+                segments.stop[n, 1] = STOP_S[0] + (STOP_S[1] - STOP_S[0]) * uniform(rng)
+            t += moves.duration[n] + segments.stop[n, 1]
             t += draw_pause(rng, then == home) if varied else 0.5
             place = then
             n += 1
@@ -269,11 +274,8 @@ def draw_segments(
 
 
 @kernel()
-def _draw_duration(rng: State, primitive_library: PrimitiveLibrary, primitive: int) -> float:
-    """Draw a leg's duration [s], log-normal, no draw beyond two standard deviations."""
-    mean, spread = (
-        primitive_library.duration[primitive, 0],
-        primitive_library.duration[primitive, 1],
-    )
-    away = min(2.0, max(-2.0, normal(rng))) if primitive_library.varied else 0.0
+def _draw_duration(rng: State, library: PrimitiveLibrary, primitive: int) -> float:
+    """Draw a segment's duration [s], log-normal, truncated at two standard deviations."""
+    mean, spread = library.duration[primitive, 0], library.duration[primitive, 1]
+    away = min(2.0, max(-2.0, normal(rng))) if library.varied else 0.0
     return max(SHORTEST_SEGMENT, math.exp(mean + spread * away))

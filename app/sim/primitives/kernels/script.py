@@ -1,14 +1,14 @@
-"""A person's movements as a script of postures and minimum-jerk moves, compiled.
+"""Scripts of minimum-jerk moves between postures, and their random generation (compiled).
 
-A script is a list of moves: move ``k`` leaves posture ``k`` at ``start[k]``, arrives at
-posture ``k + 1`` after ``duration[k]``, and rests there until the next one starts. It does
-not depend on the robot, so an episode's whole human motion is fixed when the episode starts.
+Move ``k`` of a script leaves posture ``k`` at ``start[k]``, reaches posture ``k + 1`` after
+``duration[k]``, and rests there until the next move starts. Scripts do not depend on the robot.
 
-Source: METHOD 3.2 (cycle home - cube - dock and back) and 3.4 (timing, pauses, starting phase,
-reversal); minimum jerk after Flash and Hogan (1985).
+Source: docs/method.md 3.2 (cycle home - cube - dock and back) and 3.4 (timing, pauses, starting
+phase, reversal); minimum jerk: Flash and Hogan (1985).
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +20,9 @@ from app.sim.core.kernels.rng import State, below, normal, uniform
 Index = NDArray[np.int64]
 
 MAX_MOVES = 48
-"""Moves per script; enough for 20 s and a random starting phase."""
+"""Moves per script; enough for 20 s from a random starting phase."""
 PACE_MEDIAN = 0.55
-"""Median over moves of the mean hand speed [m/s]."""
+"""Median of the mean hand speed of a move [m/s]."""
 PACE_SPREAD = 0.42
 """Standard deviation of the logarithm of the mean hand speed."""
 PACE_MIN, PACE_MAX = 0.22, 1.05
@@ -31,14 +31,25 @@ SHORTEST_MOVE = 0.35
 """Least duration of a move [s]."""
 
 
+class Moves(NamedTuple):
+    """Moves of one script; arrays that :func:`draw_script` fills."""
+
+    start: Vec
+    """Start of each move [s], shape (MAX_MOVES,)."""
+    duration: Vec
+    """Duration of each move [s], shape (MAX_MOVES,)."""
+    chosen: Index
+    """Indices of the postures between the moves, shape (MAX_MOVES + 1,)."""
+
+
 @kernel()
 def script_at(
     t: float, n_moves: int, start: Vec, duration: Vec, postures: Vec, q: Vec, qd: Vec
 ) -> None:
-    """Write joint positions and speeds at one time.
+    """Write joint positions and speeds of a script at one time.
 
     Args:
-        t: Time [s]; before the first move the first posture is held.
+        t: Time [s]; before the first move the first posture holds.
         n_moves: Number of moves.
         start: Start of each move [s], shape (>= n_moves,).
         duration: Duration of each move [s], shape (>= n_moves,).
@@ -86,57 +97,44 @@ def move_at(
 
 @kernel()
 def draw_script(
-    state: State,
-    of_station: Index,
-    n_stations: int,
-    n_cubes: int,
-    hands: Vec,
-    first: int,
-    start: Vec,
-    duration: Vec,
-    chosen: Index,
+    state: State, of_station: Index, n_cubes: int, hands: Vec, first: int, moves: Moves
 ) -> int:
-    """Draw a script through a library of postures.
+    """Draw a script of cycles home - cube - dock - home and return its number of moves.
 
-    Cycles go home - cube - dock - home, or reversed; some skip home. Pace, pauses, hand and
-    variant of each posture are random.
+    A cycle may be reversed, or omit the return to home. Pace, pauses, hand and the variant of
+    each posture are random.
 
     Args:
         state: Random stream.
-        of_station: First posture of each (place, hand), shape (n_stations + 1, 2, 2): first
-            index and count; place ``n_stations`` is home.
-        n_stations: Number of stations, cubes first.
+        of_station: Index of the first posture and number of postures of each place and hand,
+            shape (n_places, 2, 2); cubes come first, home last.
         n_cubes: Number of cubes.
         hands: Palm positions of each posture [m], shape (n_postures, 2, 3).
-        first: Posture to start from; -1 draws one at home.
-        start: Filled [s], shape (MAX_MOVES,).
-        duration: Filled [s], shape (MAX_MOVES,).
-        chosen: Filled with posture numbers, shape (MAX_MOVES + 1,).
-
-    Returns:
-        Number of moves.
+        first: Initial posture; -1 draws one at home.
+        moves: Filled.
     """
+    home = of_station.shape[0] - 1
     hand = 0 if uniform(state) < 0.6 else 1
-    now = first if first >= 0 else draw_posture(state, of_station, n_stations, hand)
-    chosen[0] = now
+    now = first if first >= 0 else draw_posture(state, of_station, home, hand)
+    moves.chosen[0] = now
     t, n = 0.2 + 1.5 * uniform(state), 0
     while n + 3 <= MAX_MOVES:
         hand = 0 if uniform(state) < 0.6 else 1
         cube = below(state, n_cubes)
-        dock = n_cubes + below(state, n_stations - n_cubes)
+        dock = n_cubes + below(state, home - n_cubes)
         reverse = uniform(state) < 0.5
         skip_home = uniform(state) < 0.3
-        for leg in range(3):
-            place = n_stations
-            if leg < 2:
-                place = cube if (leg == 0) != reverse else dock
+        for k in range(3):
+            place = home
+            if k < 2:
+                place = cube if (k == 0) != reverse else dock
             elif skip_home:
                 break
             then = draw_posture(state, of_station, place, hand)
-            start[n] = t
-            duration[n] = _draw_duration(state, hands[now], hands[then])
-            chosen[n + 1] = then
-            t += duration[n] + draw_pause(state, place == n_stations)
+            moves.start[n] = t
+            moves.duration[n] = _draw_duration(state, hands[now], hands[then])
+            moves.chosen[n + 1] = then
+            t += moves.duration[n] + draw_pause(state, place == home)
             now = then
             n += 1
     return n
@@ -144,27 +142,27 @@ def draw_script(
 
 @kernel()
 def draw_posture(state: State, of_station: Index, place: int, hand: int) -> int:
-    """Draw one of the postures of a place and hand from ``of_station``, (n_places, 2, 2)."""
+    """Draw a posture of a place and hand from ``of_station``, shape (n_places, 2, 2)."""
     first, count = of_station[place, hand, 0], of_station[place, hand, 1]
     return int(first + below(state, count))
 
 
 @kernel()
 def _draw_duration(state: State, hands_from: Vec, hands_to: Vec) -> float:
-    """Draw a move's duration [s] from the farther hand's way and a random pace."""
-    way = 0.0
+    """Draw a move's duration [s] from the larger hand displacement and a random pace."""
+    longest = 0.0
     for hand in range(2):
         square = 0.0
         for i in range(3):
             square += (hands_to[hand, i] - hands_from[hand, i]) ** 2
-        way = max(way, math.sqrt(square))
+        longest = max(longest, math.sqrt(square))
     pace = PACE_MEDIAN * math.exp(PACE_SPREAD * normal(state))
-    return max(SHORTEST_MOVE, way / min(PACE_MAX, max(PACE_MIN, pace)))
+    return max(SHORTEST_MOVE, longest / min(PACE_MAX, max(PACE_MIN, pace)))
 
 
 @kernel()
 def draw_pause(state: State, at_home: bool) -> float:
-    """Draw the rest after a move [s]: short at a station, now and then long."""
+    """Draw the rest after a move [s]; at a station it is short, with occasional long rests."""
     if at_home:
         return 0.3 + 2.2 * uniform(state)
     if uniform(state) < 0.12:

@@ -15,13 +15,13 @@ from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
 from app.sim.core.kernels import rng as random
 from app.sim.geometry.capsules import copy_values
+from app.sim.people.kernels.motion import start_people
 from app.sim.people.kernels.people import (
     People,
     PeopleGeometry,
     PeopleState,
     new_people_geometry,
     people_clearance,
-    start_people,
 )
 from app.sim.prediction.kernels.networks import Forecaster
 from app.sim.reach.kernels.observation import ReachSight, new_reach_sight

@@ -36,14 +36,9 @@ from app.sim.geometry.capsules import (
 )
 from app.sim.geometry.segments import segment_nearest
 from app.sim.human.kernels import kinematics as body
+from app.sim.people.kernels.motion import worker_at
 from app.sim.people.kernels.pedestrian import R, advance_pedestrian
-from app.sim.people.kernels.people import (
-    People,
-    PeopleGeometry,
-    PeopleState,
-    place_workers,
-    worker_at,
-)
+from app.sim.people.kernels.people import People, PeopleGeometry, PeopleState, place_workers
 from app.sim.robot.kernels.actions import ActionRule
 from app.sim.robot.kernels.arm import CONTROLLED, Arm
 from app.sim.robot.kernels.joints import JointState

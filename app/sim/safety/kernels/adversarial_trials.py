@@ -19,7 +19,8 @@ from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
 from app.sim.core.kernels import rng as random
 from app.sim.geometry.capsules import UX, UY, UZ, X, Y, Z, copy_rows, distances, least
-from app.sim.people.kernels.people import People, start_people
+from app.sim.people.kernels.motion import start_people
+from app.sim.people.kernels.people import People
 from app.sim.robot.kernels.actions import Coefficients, advance
 from app.sim.robot.kernels.arm import CONTROLLED, Arm
 from app.sim.robot.kernels.joints import JointPath, JointState

@@ -11,13 +11,13 @@ from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
 from app.sim.geometry.capsules import copy_rows
 from app.sim.human.kernels.kinematics import PELVIS_Z
+from app.sim.people.kernels.motion import advance_people
 from app.sim.people.kernels.people import (
     People,
     PeopleGeometry,
     PeopleState,
-    advance_people,
-    keep_distances,
     place_people,
+    store_clearances,
 )
 from app.sim.robot.kernels.actions import ActionRule, Coefficients, advance
 from app.sim.robot.kernels.arm import Arm, RobotPose, copy_capsules, place_robot
@@ -128,7 +128,7 @@ def move(
         place_robot(arm, work.q, robot)
         place_people(everybody, people, e, crowd)
     if everybody.yielding > 0.0:
-        keep_distances(people, e, crowd)
+        store_clearances(people, e, crowd)
     copy_capsules(robot.columns, state.robot[e])
     copy_capsules(crowd.columns, people.columns[e])
     return kind != NO_CONTACT, unfeasible

@@ -8,7 +8,12 @@ import pytest
 from app.policies.checkpoints import pretrained
 from app.policies.evaluation.pick import selection_rules as choice_rules
 from app.policies.evaluation.pick.episodes import Evaluator, seen_exactly, settings_for
-from app.policies.evaluation.pick.tracker import ROWS, ThroughTracker, TrackedRow, between
+from app.policies.evaluation.pick.tracker import (
+    ROWS,
+    KeypointObserver,
+    KeypointSensorRow,
+    between,
+)
 from app.policies.evaluation.registry import evaluate
 from app.policies.inference.task_selection import ValueNetworks
 from app.sim.cells.cell import load_cell
@@ -26,7 +31,7 @@ def evaluator():
 
 def misses(evaluator, row, seed=1):
     """Greatest difference of seen and true joints at every step of every row [m, rad]."""
-    look, found = ThroughTracker(row, seed), []
+    look, found = KeypointObserver(row, seed), []
 
     def compared(batch, rows):
         seen, true = look(batch, rows), seen_exactly(batch, rows)
@@ -51,7 +56,9 @@ def test_a_motion_between_two_states_meets_both_and_goes_straight_on_before():
 
 
 def test_an_exact_tracker_without_delay_shows_nearly_the_true_state(evaluator):
-    clean = TrackedRow(tracker=KeypointSensorSettings(latency_s=0.0, noise=0.0, missing=0.0))
+    clean = KeypointSensorRow(
+        tracker=KeypointSensorSettings(latency_s=0.0, noise=0.0, missing=0.0)
+    )
     found, _ = misses(evaluator, clean)
     assert np.median(found) < 0.02
 
@@ -70,7 +77,7 @@ def test_the_same_seed_gives_the_same_episodes(evaluator):
 
 def test_a_tracker_that_delivers_nothing_shows_nobody(evaluator):
     blind = ROWS["100ms"]
-    look = ThroughTracker(replace(blind, tracker=replace(blind.tracker, lost=1.0)), 1)
+    look = KeypointObserver(replace(blind, tracker=replace(blind.tracker, lost=1.0)), 1)
     evaluator.batch.reset()
     seen = look(evaluator.batch, np.arange(N))
     np.testing.assert_array_equal(seen.q, np.tile(evaluator.batch.world.people.nobody, (N, 1)))
@@ -78,7 +85,7 @@ def test_a_tracker_that_delivers_nothing_shows_nobody(evaluator):
 
 
 def test_only_running_rows_are_looked_at(evaluator):
-    look = ThroughTracker(ROWS["33ms"], 1)
+    look = KeypointObserver(ROWS["33ms"], 1)
     evaluator.batch.reset()
     assert look(evaluator.batch, np.arange(N)).q.shape == (N, 18)
     assert look(evaluator.batch, np.array([1, 4])).q.shape == (2, 18)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from app.policies.evaluation.reach.tracker import ROWS, ThroughTracker, TrackedRow
+from app.policies.evaluation.reach.tracker import ROWS, CylinderObserver, CylinderSensorRow
 from app.sim.cells.cell import load_cell
 from app.sim.people.kernels.pedestrian import VX, VY, R, X, Y
 from app.sim.perception.cylinder_sensor_model import CylinderSensorSettings
@@ -29,12 +29,14 @@ class Watching(Straight):
         return super().acts(batch)
 
 
-def watched(row: TrackedRow | None, steps: int = 40) -> tuple[Watching, np.ndarray, ReachBatch]:
+def watched(
+    row: CylinderSensorRow | None, steps: int = 40
+) -> tuple[Watching, np.ndarray, ReachBatch]:
     """Run some steps; returns who watched, and where the people really were."""
     batch = ReachBatch(load_cell("shared-workspace"), N, 5, ReachSettings())
     batch.reset()
     watching, true = Watching(), []
-    mover = watching if row is None else ThroughTracker(watching, row, 5)
+    mover = watching if row is None else CylinderObserver(watching, row, 5)
     for _ in range(steps):
         true.append(batch.state.people.walkers.rows[:, 0][:, [X, Y, VX, VY, R]].copy())
         act = mover.acts(batch)
@@ -52,7 +54,9 @@ def off(watching: Watching, true: np.ndarray) -> float:
 
 
 def test_fast_and_clean_frames_show_people_where_they_are() -> None:
-    perfect = TrackedRow(tracker=CylinderSensorSettings(rate_hz=50.0, latency_s=0.0, noise=0.0))
+    perfect = CylinderSensorRow(
+        tracker=CylinderSensorSettings(rate_hz=50.0, latency_s=0.0, noise=0.0)
+    )
     watching, true, _ = watched(perfect)
     assert off(watching, true) < 5e-3
 

@@ -12,6 +12,7 @@ from app.sim.pick.kernels.observation import LAYOUT
 from app.sim.scenario.kernels.episode import RUNNING
 
 DT = 0.05
+LIMITS = np.stack([human.Q_MIN, human.Q_MAX])
 
 
 def robot_at(x: float, y: float) -> np.ndarray:
@@ -25,7 +26,7 @@ def leaned(yaw: float, tool: tuple[float, float], seconds: float = 3.0) -> np.nd
     lean, q, qd = np.zeros(4), np.empty(18), np.empty(18)
     for _ in range(int(seconds / DT)):
         q[:], qd[:] = human.rest_posture(0.0, 0.0, yaw), 0.0
-        lean_away(q, qd, lean, 1.0, robot_at(*tool), human.Q_MIN, human.Q_MAX, DT)
+        lean_away(q, qd, lean, 1.0, robot_at(*tool), LIMITS, DT)
     return q[3:5]
 
 

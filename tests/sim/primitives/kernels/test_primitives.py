@@ -1,4 +1,4 @@
-"""Compiled legs against the movement primitives they come from, in plain numpy."""
+"""Compiled segments against the movement primitives they come from, in plain numpy."""
 
 import numpy as np
 import pytest
@@ -7,12 +7,13 @@ from app.sim.core.kernels import rng as random
 from app.sim.primitives.kernels.primitives import (
     N_BASIS,
     PrimitiveLibrary,
+    Segments,
     condition,
     draw_segments,
     follow,
-    law,
+    phase_profile,
 )
-from app.sim.primitives.kernels.script import MAX_MOVES
+from app.sim.primitives.kernels.script import MAX_MOVES, Moves
 from app.sim.primitives.promp import (
     ProMP,
     basis,
@@ -31,8 +32,8 @@ FREE = np.full(18, 1e3)
 @pytest.fixture(scope="module")
 def promp() -> ProMP:
     rng, z = np.random.default_rng(5), np.linspace(0.0, 1.0, 60)[:, None]
-    a, b, bow = rng.normal(0.0, 0.3, (3, 8, 18))
-    motions = [a[i] + (b[i] - a[i]) * z**2 + bow[i] * np.sin(np.pi * z) for i in range(8)]
+    a, b, curvature = rng.normal(0.0, 0.3, (3, 8, 18))
+    motions = [a[i] + (b[i] - a[i]) * z**2 + curvature[i] * np.sin(np.pi * z) for i in range(8)]
     return fit(motions, np.full(8, 1.5))
 
 
@@ -60,7 +61,7 @@ def test_a_joint_held_at_its_limit_has_no_speed(promp: ProMP) -> None:
     assert (qd[(q == low) | (q == high)] == 0.0).all() and (qd != 0.0).any()
 
 
-def test_a_leg_meets_both_postures_and_is_the_conditioned_primitive(promp: ProMP) -> None:
+def test_a_segment_meets_both_postures_and_is_the_conditioned_primitive(promp: ProMP) -> None:
     rng, out, away = np.random.default_rng(6), np.empty((18, N_BASIS)), np.empty(36)
     q, qd = np.empty(18), np.empty(18)
     rows = rows_of_ends(promp)
@@ -76,11 +77,13 @@ def test_a_leg_meets_both_postures_and_is_the_conditioned_primitive(promp: ProMP
 
 
 @pytest.mark.parametrize("stop_at", [0.0, 0.3, 0.8])
-def test_a_leg_goes_from_rest_to_rest_and_nowhere_faster_for_a_pause(stop_at: float) -> None:
+def test_a_segment_goes_from_rest_to_rest_and_nowhere_faster_for_a_pause(
+    stop_at: float,
+) -> None:
     duration, stop_s = 1.6, 0.5
     whole = duration + (stop_s if stop_at else 0.0)
     times = np.linspace(-0.1, whole + 0.1, 4001)
-    phase, rate = np.array([law(t, duration, stop_at, stop_s) for t in times]).T
+    phase, rate = np.array([phase_profile(t, duration, stop_at, stop_s) for t in times]).T
     assert phase[0] == 0.0 and phase[-1] == 1.0 and (np.diff(phase) >= 0.0).all()
     assert rate[0] == rate[-1] == 0.0 and rate.max() <= 1.875 / duration + 1e-9
     np.testing.assert_allclose(np.gradient(phase, times)[1:-1], rate[1:-1], atol=6e-3)
@@ -90,19 +93,19 @@ def test_a_leg_goes_from_rest_to_rest_and_nowhere_faster_for_a_pause(stop_at: fl
 
 def drawn(seed: int, varied: bool) -> dict[str, np.ndarray]:
     """A script of a cell with three cubes and two docks."""
-    n, legs = 5, np.full((6, 6, 2, 3), -1, dtype=np.int64)
+    n, segments = 5, np.full((6, 6, 2, 3), -1, dtype=np.int64)
     kinds = ["cube"] * 3 + ["dock"] * 2 + ["home"]
     number = 0
     for a in range(n + 1):
         for b in range(n + 1):
             for hand in range(2):
                 if kinds[a] != kinds[b]:
-                    legs[a, b, hand] = number, 2 * number, 2
+                    segments[a, b, hand] = number, 2 * number, 2
                     number += 1
     primitive_library = PrimitiveLibrary(
         np.zeros((2 * number, 18, N_BASIS)),
         np.zeros((number, 216, 36)),
-        legs,
+        segments,
         np.tile([np.log(1.2), 0.3], (number, 1)),
         varied,
     )
@@ -110,19 +113,19 @@ def drawn(seed: int, varied: bool) -> dict[str, np.ndarray]:
     of_station[n, :] = 10 * n, 4
     rng = np.zeros(1, dtype=np.uint64)
     random.start_stream(seed, 0, 0, rng)
-    out = {
-        "start": np.zeros(MAX_MOVES),
-        "duration": np.zeros(MAX_MOVES),
-        "chosen": np.zeros(MAX_MOVES + 1, dtype=np.int64),
-        "primitive": np.zeros(MAX_MOVES, dtype=np.int64),
-        "sample": np.zeros(MAX_MOVES, dtype=np.int64),
-        "stop": np.zeros((MAX_MOVES, 2)),
-    }
-    moves = draw_segments(rng, primitive_library, of_station, 3, -1, *out.values())
-    return {**out, "n": np.array(moves), "legs": legs}
+    moves = Moves(
+        np.zeros(MAX_MOVES), np.zeros(MAX_MOVES), np.zeros(MAX_MOVES + 1, dtype=np.int64)
+    )
+    rows = Segments(
+        np.zeros(MAX_MOVES, dtype=np.int64),
+        np.zeros(MAX_MOVES, dtype=np.int64),
+        np.zeros((MAX_MOVES, 2)),
+    )
+    n_moves = draw_segments(rng, primitive_library, of_station, 3, -1, moves, rows)
+    return {**moves._asdict(), **rows._asdict(), "n": np.array(n_moves), "segments": segments}
 
 
-def test_scripts_are_chains_of_legs_that_exist_and_end_at_home() -> None:
+def test_scripts_are_chains_of_segments_that_exist_and_end_at_home() -> None:
     for seed in range(200):
         script = drawn(seed, varied=True)
         n = int(script["n"])
@@ -131,7 +134,7 @@ def test_scripts_are_chains_of_legs_that_exist_and_end_at_home() -> None:
         assert places[0] == places[n] == 5
         for k in range(n):
             hand = hands[k + 1] if places[k + 1] != 5 else hands[k]
-            row = script["legs"][places[k], places[k + 1], hand]
+            row = script["segments"][places[k], places[k + 1], hand]
             assert row[0] == script["primitive"][k] >= 0
             assert script["sample"][k] - row[1] in (0, 1)
         ends = script["start"][:n] + script["duration"][:n] + script["stop"][:n, 1]

@@ -21,6 +21,7 @@ from app.sim.collision.kernels.contact import clearances
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
 from app.sim.geometry.capsules import copy_rows
+from app.sim.people.kernels.motion import advance_people
 from app.sim.people.kernels.pedestrian import (
     GAIT,
     GROWTH,
@@ -34,7 +35,7 @@ from app.sim.people.kernels.pedestrian import (
     remember,
     remember_as_now,
 )
-from app.sim.people.kernels.people import advance_people, place_people
+from app.sim.people.kernels.people import place_people
 from app.sim.reach.kernels.episode import Indices, ReachRules, ReachState, ReachWorld, Work
 from app.sim.reach.kernels.reward import ReachWeights, reward
 from app.sim.robot.kernels.actions import ActionRule, Coefficients, advance
