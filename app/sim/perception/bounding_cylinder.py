@@ -29,7 +29,7 @@ RADIUS_FACTOR = 1.1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CylinderSettings:
-    """What is ours about the safety cylinder."""
+    """Margins of the safety cylinder."""
 
     flesh_margin: float = 0.17
     """Added to the radius and to the top [m]. Around exact key-points of a person at work,
@@ -48,7 +48,7 @@ class CylinderSettings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SafetyCylinder:
-    """An upright cylinder that holds a person."""
+    """A vertical cylinder around a person."""
 
     center: Vec
     """x, y of the axis [m], shape (2,)."""
@@ -67,7 +67,7 @@ class SafetyCylinder:
         return bool((away <= self.radius).all() and (points[:, 2] <= self.top).all())
 
     def after(self, seconds: float, growth: float) -> "SafetyCylinder":
-        """Return the cylinder moved on at its velocity for a while, and grown [m]."""
+        """Return the cylinder after a time at its velocity, with an increased radius [m]."""
         center = self.center + seconds * self.velocity
         return replace(self, center=center, radius=self.radius + growth)
 
@@ -81,29 +81,29 @@ _BONES = (
     ("nose", "neck", 0.30),
     *((f"{part}_{s}", "nose", 0.16) for part in ("eye", "ear") for s in "rl"),
 )
-"""Greatest lengths between key-points [m]: a tall man's (95th percentile) or longer."""
+"""Largest bone lengths [m], at least those of the 95th percentile of men."""
 _HIPS = tuple(K[name] for name in ("mid_hip", "hip_r", "hip_l"))
 _BOUNDED = tuple(
     k
     for k, name in enumerate(BODY_25)
     if k not in _HIPS and any(name in bone[:2] for bone in _BONES)
 )
-"""Key-points whose absence widens the cylinder: arms, neck and face."""
+"""Key-points that widen the cylinder when missing: arms, neck and face."""
 
 
-def _bone_ways() -> Vec:
-    """Return the way along the bones between any two key-points [m], shape (25, 25)."""
-    ways = np.full((N_KEYPOINTS, N_KEYPOINTS), np.inf)
-    np.fill_diagonal(ways, 0.0)
+def _bone_distances() -> Vec:
+    """Return the path length along bones between key-points [m], shape (25, 25)."""
+    lengths = np.full((N_KEYPOINTS, N_KEYPOINTS), np.inf)
+    np.fill_diagonal(lengths, 0.0)
     for one, other, length in _BONES:
-        ways[K[one], K[other]] = ways[K[other], K[one]] = length
+        lengths[K[one], K[other]] = lengths[K[other], K[one]] = length
     for k in range(N_KEYPOINTS):
-        ways = np.minimum(ways, ways[:, k : k + 1] + ways[k : k + 1])
-    ways.setflags(write=False)
-    return ways
+        lengths = np.minimum(lengths, lengths[:, k : k + 1] + lengths[k : k + 1])
+    lengths.setflags(write=False)
+    return lengths
 
 
-_WAYS = _bone_ways()
+_BONE_DISTANCES = _bone_distances()
 
 
 def bounding_box(points: Vec) -> Vec:
@@ -156,9 +156,9 @@ def _unseen_reach(points: Vec, seen: NDArray[np.bool_], center: Vec) -> tuple[fl
     if not unseen:
         return 0.0, -np.inf
     there = np.flatnonzero(seen)
-    ways = _WAYS[unseen][:, there]
-    if not np.isfinite(ways).any():  # Only legs are seen: the whole person is above them.
-        ways = np.full_like(ways, _WAYS[K["wrist_r"], K["mid_hip"]] + 1.0)
+    lengths = _BONE_DISTANCES[unseen][:, there]
+    if not np.isfinite(lengths).any():  # Only legs are seen: the whole person is above them.
+        lengths = np.full_like(lengths, _BONE_DISTANCES[K["wrist_r"], K["mid_hip"]] + 1.0)
     away = np.linalg.norm(points[there, :2] - center, axis=1)
-    wide = (away + ways).min(axis=1).max()
-    return float(wide), float((points[there, 2] + ways).min(axis=1).max())
+    wide = (away + lengths).min(axis=1).max()
+    return float(wide), float((points[there, 2] + lengths).min(axis=1).max())

@@ -1,15 +1,12 @@
-"""A model of a tracker of walking cylinders, for many cells at once.
+"""Sensor model of a tracker of pedestrians, for a batch of environments.
 
-A camera measures x, y and radius of every person at its own rate, each with noise, and hands a
-measurement over after its latency, stamped with the time it was taken at. A Kalman filter of
-constant speed turns that into where the person is now: the state predicted over the latency,
-with the velocity that a policy sees. Its gains are the steady ones of the noise and of how
-people turn.
+A camera measures x, y and radius of every person at its own rate with noise, and delivers each
+measurement after its latency, stamped with its sampling time. A constant-velocity Kalman filter
+with steady-state gains predicts the present position and velocity over the latency.
 
-The rows of a batch each have a camera with a phase of its own, so that nobody profits from
-frames that fall on control periods.
+Each environment has a camera with a random phase relative to the control periods.
 
-Source: METHOD 2.8 (30 Hz). Latency, noise and filter are ours.
+Source: docs/method.md 2.8 (30 Hz). Latency, noise and filter are ours.
 """
 
 from dataclasses import dataclass, fields
@@ -21,31 +18,29 @@ from app.errors import InvalidInput, digits
 from app.sim.core.arrays import Vec
 
 LOOKED_S = 0.5
-"""Time for which the camera has looked before an episode starts [s]. People are taken to have
-come to the start at the speed they have there."""
+"""Observation time before an episode starts [s], with people at their initial velocity."""
 TURN = 4.0
-"""Standard deviation of the acceleration that the filter reckons with [m/s^2]: who walks at
-1 m/s and turns around within half a second."""
+"""Standard deviation of the acceleration in the filter [m/s^2]: reversal of 1 m/s in 0.5 s."""
 EXACT = 1e-4
-"""Least noise that the filter reckons with [m]."""
+"""Smallest noise assumed by the filter [m]."""
 MAX_RATE_HZ = 50.0
-"""Most frames per second [Hz]: one per control period."""
+"""Highest frame rate [Hz]: one frame per control period."""
 N_STATE = 3
-"""Numbers measured of a person: x, y, radius [m]."""
+"""Number of measured values per person: x, y, radius [m]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CylinderSensorSettings:
-    """How good a tracker is.
+    """Rate, latency and noise of a tracker.
 
     Raises:
-        InvalidInput: A number that is not finite or out of its range.
+        InvalidInput: A value is not finite or out of range.
     """
 
     rate_hz: float = 30.0
     """Frames per second [Hz], at most MAX_RATE_HZ."""
     latency_s: float = 0.1
-    """Time from taking a frame to handing it over [s]."""
+    """Time from sampling a frame to its delivery [s]."""
     noise: float = 0.02
     """Standard deviation of x, y and radius in each frame [m]."""
 
@@ -75,12 +70,12 @@ class CylinderSensorSettings:
 
 
 class CylinderSensorModel:
-    """Cameras and filters of ``n`` cells with ``n_people`` cylinders each.
+    """Cameras and filters of ``n`` environments with ``n_people`` pedestrians each.
 
     Args:
-        settings: How good they are.
-        n: Number of cells.
-        n_people: Cylinders in each.
+        settings: Rate, latency and noise.
+        n: Number of environments.
+        n_people: Pedestrians in each.
         seed: Seed of phases and noise.
     """
 
@@ -101,12 +96,12 @@ class CylinderSensorModel:
         self._state = np.zeros((2, n, *self._shape))
 
     def start(self, rows: NDArray[np.int64], people: Vec, velocity: Vec) -> None:
-        """Begin an episode in some cells, with what was seen before it.
+        """Start an episode in some environments, with observations before it.
 
         Args:
-            rows: Cells, shape (k,).
-            people: x, y and radius of everybody at the start [m], shape (k, n_people, 3).
-            velocity: Their change then [m/s], same shape.
+            rows: Environments, shape (k,).
+            people: Initial x, y and radius of all people [m], shape (k, n_people, 3).
+            velocity: Initial rates of change [m/s], same shape.
         """
         if not len(rows):
             return
@@ -121,13 +116,13 @@ class CylinderSensorModel:
             self.look(rows, np.full(len(rows), t), people + t * velocity)
 
     def look(self, rows: NDArray[np.int64], t: Vec, people: Vec) -> None:
-        """Let time pass in some cells, by no more than one frame.
+        """Advance the time of some environments, by at most one frame.
 
         Args:
-            rows: Cells, shape (k,).
-            t: Time in the episode now [s], shape (k,).
-            people: x, y and radius of everybody now [m], shape (k, n_people, 3); between the
-                last look and now they went straight.
+            rows: Environments, shape (k,).
+            t: Present time in the episode [s], shape (k,).
+            people: Present x, y and radius of all people [m], shape (k, n_people, 3);
+                interpolated linearly since the last call.
         """
         noise = self._settings.noise * self._rng.standard_normal((len(rows), *self._shape))
         span = np.maximum(t - self._now[rows], 1e-12)
@@ -145,7 +140,7 @@ class CylinderSensorModel:
         self._stamps[rows, place], self._queue[rows, place] = stamps, measured
 
     def _deliver(self, rows: NDArray[np.int64], t: Vec) -> None:
-        """Give the filters what the cameras hand over by now, the oldest frame first."""
+        """Update the filters with the delivered frames, oldest first."""
         while True:
             oldest = self._stamps[rows].argmin(axis=1)
             stamps = self._stamps[rows, oldest]
@@ -167,14 +162,14 @@ class CylinderSensorModel:
         self._time[rows] = stamps
 
     def seen(self, rows: NDArray[np.int64], *, predicted: bool = True) -> tuple[Vec, Vec]:
-        """Return everybody as they are known now, and how that changes.
+        """Return the estimated state of all people.
 
         Args:
-            rows: Cells, shape (k,).
-            predicted: Whether to go on to now from the newest frame.
+            rows: Environments, shape (k,).
+            predicted: Predict from the newest frame to the present time.
 
         Returns:
-            x, y, radius [m] and their change [m/s], each of shape (k, n_people, 3).
+            x, y, radius [m] and their rates of change [m/s], each of shape (k, n_people, 3).
         """
         position, speed = self._state[0, rows], self._state[1, rows]
         late = (self._now[rows] - self._time[rows])[:, None, None] if predicted else 0.0

@@ -1,18 +1,17 @@
-"""A causal filter of points that come late, noisy and not always: one Kalman filter each.
+"""Kalman filters of points with latency, noise and missing measurements.
 
-Per point and axis the state is position and speed; the speed forgets itself with a time
-constant (so that a point unseen for a while comes to rest instead of flying off), driven by
-white acceleration:
+Per point and axis the state is position and speed. The speed decays with a time constant, so
+that an unseen point comes to rest, and is driven by white acceleration:
 
     p' = p + tau (1 - e) v,   v' = e v,   e = exp(-dt / tau),
     Q = a^2 [dt^4/4, dt^3/2; dt^3/2, dt^2].
 
-The three axes of a point share one covariance. A measurement farther from the prediction than
-``gate + max_speed dt``, with dt since it was last offered, is refused: the point then counts as
-unseen, and is taken anew once the hold time is over.
+The three axes of a point share one covariance. Gating rejects a measurement farther from the
+prediction than ``gate + max_speed dt``, with dt since the last measurement: the point then
+counts as unseen, and restarts after the hold time.
 
 Source: Bar-Shalom et al., Estimation with Applications to Tracking and Navigation (2001),
-ch. 6; the forgetting speed is Singer's idea (1970) one order lower.
+ch. 6; Singer (1970) for the decay, here of the speed.
 """
 
 from dataclasses import dataclass, fields
@@ -26,7 +25,7 @@ from app.sim.core.arrays import Vec
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FilterSettings:
-    """Noise of state and measurement, and when to stop believing."""
+    """Noise of state and measurement, gate and times."""
 
     noise: float = 0.02
     """Standard deviation of a measurement at confidence 1, per axis [m]."""
@@ -35,9 +34,9 @@ class FilterSettings:
     memory_s: float = 0.4
     """Time constant tau of the speed [s]."""
     hold_s: float = 0.5
-    """Time for which an unseen point is carried on [s]."""
+    """Time for which an unseen point is predicted [s]."""
     gate: float = 0.2
-    """Distance from the prediction at which a measurement is refused at once [m]."""
+    """Distance from the prediction at which a measurement is rejected, without delay [m]."""
     max_speed: float = 4.0
     """Speed that widens the gate with the time since the point was seen [m/s]."""
 
@@ -61,13 +60,13 @@ class PointFilter:
         self.t = -np.inf
         """Time of the last update [s]."""
         self.seen_at = np.full(n, -np.inf)
-        """When each point was last seen [s], shape (n,)."""
-        self._offered_at = np.full(n, -np.inf)
+        """Time of the last measurement of each point [s], shape (n,)."""
+        self._measured_at = np.full(n, -np.inf)
         self._p, self._v = np.full((n, 3), np.nan), np.zeros((n, 3))
-        self._cov = np.zeros((n, 3))  # of position, position and speed, speed
+        self._cov = np.zeros((n, 3))  # position, position-speed, speed
 
     def known(self, t: float) -> NDArray[np.bool_]:
-        """Return which points were seen within the hold time before ``t`` [s], shape (n,)."""
+        """Return which points were measured within the hold time before ``t`` [s], (n,)."""
         return np.asarray(t - self.seen_at <= self.settings.hold_s + 1e-9)
 
     def at(self, t: float) -> tuple[Vec, Vec]:
@@ -84,11 +83,10 @@ class PointFilter:
         e = float(np.exp(-max(t - self.t, 0.0) / tau))
         return e, tau * (1.0 - e)
 
-    def refuse(self, t: float, points: Vec) -> NDArray[np.bool_]:
-        """Return which measurements are too far from where they were expected, shape (n,).
+    def gate(self, t: float, points: Vec) -> NDArray[np.bool_]:
+        """Return which measurements to reject for their distance to the prediction, shape (n,).
 
-        The gate widens while a point is unseen, not while it is refused: who stays where
-        nobody can have got to is not believed for waiting.
+        The gate widens while a point is unseen, but not while its measurements are rejected.
 
         Args:
             t: Time [s].
@@ -96,18 +94,18 @@ class PointFilter:
         """
         away = np.linalg.norm(points - self.at(t)[0], axis=1)
         with np.errstate(invalid="ignore"):
-            since = t - np.maximum(self._offered_at, self.seen_at)
+            since = t - np.maximum(self._measured_at, self.seen_at)
             too_far = np.asarray(away > self.settings.gate + self.settings.max_speed * since)
-        self._offered_at[np.isfinite(points).all(axis=1)] = t
+        self._measured_at[np.isfinite(points).all(axis=1)] = t
         return too_far
 
     def update(self, t: float, points: Vec, confidences: Vec) -> None:
-        """Take one frame in.
+        """Update with one frame.
 
         Args:
             t: Time of the frame [s], later than the last.
             points: Measurements [m], shape (n, 3), NaN where missing.
-            confidences: Trust in each in [0, 1], shape (n,); variance is divided by its square.
+            confidences: Confidences in [0, 1], shape (n,); their squares divide the variance.
         """
         known = self.known(t)
         if known.any():
@@ -134,7 +132,7 @@ class PointFilter:
         self.seen_at[seen], self.t = t, t
 
     def forget(self, members: list[int]) -> None:
-        """Take some points as never seen."""
+        """Mark some points as never seen."""
         self.seen_at[members] = -np.inf
 
     def _predict(self, t: float) -> None:

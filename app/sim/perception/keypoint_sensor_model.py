@@ -1,12 +1,11 @@
-"""A model of a key-point tracker, to be put between a world and whoever watches its people.
+"""Sensor model of a key-point tracker.
 
-A camera samples the true motion at its own rate, turns it into BODY_25 key-points
-(:func:`~app.sim.perception.keypoints.keypoints_of`), disturbs them, loses some of them and
-some whole
-frames, and hands each frame over after its latency, stamped with the time it was taken at
-(one clock for all). The same seed gives the same disturbances.
+A camera samples the true motion at its own rate as BODY_25 key-points
+(:func:`~app.sim.perception.keypoints.keypoints_of`), adds noise, drops key-points and whole
+frames, and delivers each frame after its latency, stamped with its sampling time (one common
+clock). Equal seeds give equal disturbances.
 
-Source: METHOD 2.8 (30 Hz). The numbers of noise and loss are ours, those the issue asks for.
+Source: docs/method.md 2.8 (30 Hz). Noise and loss rates are ours.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -25,12 +24,12 @@ Motion = Callable[[float], Vec]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KeypointSensorSettings:
-    """How good a tracker is."""
+    """Rate, latency, noise and losses of a key-point tracker."""
 
     rate_hz: float = 30.0
     """Frames per second [Hz]."""
     latency_s: float = 0.1
-    """Time from taking a frame to handing it over [s]."""
+    """Time from sampling a frame to its delivery [s]."""
     noise: float = 0.02
     """Standard deviation of each coordinate [m]."""
     missing: float = 0.2
@@ -38,7 +37,7 @@ class KeypointSensorSettings:
     missing_s: float = 0.0
     """Mean time for which a key-point stays missing [s]; below one frame: frame by frame."""
     lost: float = 0.0
-    """Share of frames that never arrive, in [0, 1]."""
+    """Share of lost frames, in [0, 1]."""
     sides_swapped: float = 0.0
     """Share of frames in which left and right are exchanged in arms, legs and face."""
 
@@ -58,12 +57,12 @@ class KeypointSensorSettings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Frame:
-    """What a tracker says of one person."""
+    """One frame of key-points of one person."""
 
     t: float
-    """When it was taken [s]."""
+    """Sampling time [s]."""
     delivered: float
-    """When it is handed over [s]."""
+    """Delivery time [s]."""
     keypoints: Vec
     """Key-points [m], shape (25, 3), NaN where missing."""
     confidences: Vec
@@ -71,10 +70,10 @@ class Frame:
 
 
 class KeypointSensorModel:
-    """A tracker of one person.
+    """Simulated tracker of one person.
 
     Args:
-        settings: How good it is.
+        settings: Rate, latency, noise and losses.
         seed: Seed of noise and losses.
         size: The person's size [m], shape (12,) (``Cell.body``).
         floor_z: Height of the floor in the cell [m].
@@ -97,12 +96,11 @@ class KeypointSensorModel:
         self._waiting: list[Frame] = []
 
     def frames(self, t: float, motion: Motion) -> tuple[Frame, ...]:
-        """Return the frames handed over up to ``t`` that were not returned before.
+        """Return the frames delivered since the last call, up to ``t``.
 
         Args:
             t: Present time [s].
-            motion: The true motion; asked at every frame's time since the last call, up to
-                ``t``. A world that goes in steps may give its states interpolated.
+            motion: The true motion, evaluated at the sampling times since the last call.
         """
         period = 1.0 / self.settings.rate_hz
         while self._start + self._n_taken * period <= t + 1e-9:
@@ -116,7 +114,7 @@ class KeypointSensorModel:
         return ready
 
     def _take(self, t: float, q: Vec) -> Frame | None:
-        """Return one frame, or None where it is lost; always draws alike."""
+        """Return one frame, or None if it is lost; the number of random draws is fixed."""
         settings, rng = self.settings, self._rng
         points = keypoints_of(q, self._size, self._floor_z)
         points += settings.noise * rng.standard_normal(points.shape)
@@ -132,10 +130,10 @@ class KeypointSensorModel:
         return Frame(t=t, delivered=t + settings.latency_s, keypoints=points, confidences=trust)
 
     def _loss_rates(self) -> tuple[float, float]:
-        """Return the chance to be missing after missing and after seen.
+        """Return the probabilities of a missing key-point after a missing and a seen one.
 
-        A chain of two states with ``missing`` as its long-run share and ``missing_s`` as the
-        mean stay in the first: out of it 1 / n, into it missing / (1 - missing) / n.
+        Two-state Markov chain with stationary share ``missing`` and mean duration
+        ``missing_s``: transition out 1 / n, transition in missing / (1 - missing) / n.
         """
         share = self.settings.missing
         n = self.settings.missing_s * self.settings.rate_hz
@@ -150,13 +148,13 @@ def follow(
     tracker: KeypointSensorModel,
     estimator: PersonEstimator,
 ) -> Iterator[PersonEstimate]:
-    """Yield what is known of a person at each time, seen through a tracker.
+    """Yield the estimate of a person at each time, from simulated frames.
 
     Args:
         motion: The true motion.
-        times: When to look [s], rising.
-        tracker: What lies between.
-        estimator: What turns its frames into a person.
+        times: Times of the estimates [s], increasing.
+        tracker: Sensor model.
+        estimator: Estimator of the person.
     """
     for t in times:
         for frame in tracker.frames(t, motion):

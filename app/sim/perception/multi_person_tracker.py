@@ -1,18 +1,16 @@
-"""From frames of key-points of several people to one estimate of each.
+"""Tracking of several people from frames of key-points: data association and track management.
 
-A tracker numbers its people anew in every frame, and exchanges them when they cross. Every
-person seen is given to the track it continues, by where that track's key-points were expected;
-so exchanged people are put right, and whose number has changed is named (``people-swapped``).
-The nearest of the others start the free tracks: that of a lost person who can have walked there
-at 1.6 m/s since, or one that never saw anybody. Each track degrades as ``person_estimate.py``
-says.
+A tracker may number people differently in every frame. Each detection is assigned to the track
+whose predicted key-points are nearest; a changed number is flagged (``people-swapped``).
+Remaining detections start free tracks: that of a lost person who can have walked there at
+1.6 m/s, or an unused one. ``person_estimator.py`` describes how each track degrades.
 
-A frame may show more people than there are tracks. Then the nearest are followed: somebody who
-was already there in the frame before and is nearer to the robot's base than the farthest one
-followed, by more than ``NEARER_M``, takes that track (``replaced``). The margin is above the
-noise of a tracker, so that two people at one distance do not take turns. All others are named
-(:class:`Unfollowed`, ``people-dropped``). A skeleton that cannot stand in the cell's frame
-continues no track; the tracks not seen in that frame say ``foreign-frame``.
+If a frame shows more people than tracks, the nearest are tracked: a detection present in the
+previous frame and nearer to the robot's base than the farthest tracked person by more than
+``NEARER_M`` takes over that track (``replaced``). The margin exceeds the noise of a tracker, so
+that two people at equal distance do not alternate. All others are listed (:class:`Unfollowed`,
+``people-dropped``). A skeleton that cannot stand in the cell's frame is assigned to no track;
+tracks not seen in that frame are flagged ``foreign-frame``.
 """
 
 import math
@@ -36,43 +34,41 @@ from app.sim.perception.person_estimator import (
 )
 
 MAX_SKELETONS = 64
-"""Most people that a frame may show."""
+"""Largest number of people in a frame."""
 NEARER_M = 0.1
-"""By how much nearer than the farthest person followed somebody takes that track [m]."""
+"""Difference in distance at which a nearer person takes over a track [m]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Unfollowed:
-    """A person in a frame that no track follows."""
+    """A detection assigned to no track."""
 
     index: int
-    """Place in the frame."""
+    """Index in the frame."""
     reason: Literal["farther", "jump", "foreign-frame"]
-    """Farther away than those who are followed are, or may be; not credible yet; in another
-    frame."""
+    """Farther away than all tracked people; not credible yet; in another frame."""
     distance_m: float | None
     """Horizontal distance of the nearest key-point to the robot's base [m]; None: unknown."""
     detail: str | None = None
-    """Why this cannot be a person in the cell's frame; None where it can."""
+    """Reason why the key-points cannot be in the cell's frame; None otherwise."""
 
 
 def match_people(
     expected: Sequence[Vec], seen: Sequence[Vec], gates: Sequence[float]
 ) -> list[int | None]:
-    """Return for every track which of the people seen continues it, or None.
+    """Return the detection assigned to each track, or None.
 
-    The assignment with the most matches counts, of those the one with the least sum of median
-    distances.
+    The assignment maximises the number of matches, then minimises the sum of median distances.
 
     Args:
-        expected: Key-points expected of each track [m], shape (25, 3) each, NaN unknown.
-        seen: Key-points of each person seen [m], shape (25, 3) each, NaN missing.
-        gates: Median distance beyond which a person is no continuation of each track [m].
+        expected: Predicted key-points of each track [m], shape (25, 3) each, NaN unknown.
+        seen: Detected key-points of each person [m], shape (25, 3) each, NaN missing.
+        gates: Largest median distance of a match for each track [m].
     """
-    cost = np.array([[_apart(track, one) for one in seen] for track in expected])
+    cost = np.array([[_median_distance(track, one) for one in seen] for track in expected])
     cost = cost.reshape(len(expected), len(seen))
     allowed = cost <= np.array(gates)[:, None]
-    # Dearer than all that is allowed together: one match more is worth any distance.
+    # Costlier than all allowed matches together: the number of matches comes first.
     cost[~allowed] = 1.0 + cost[allowed].sum()
     matched: list[int | None] = [None] * len(expected)
     for i, j in zip(*linear_sum_assignment(cost), strict=True):
@@ -81,8 +77,8 @@ def match_people(
     return matched
 
 
-def _apart(one: Vec, other: Vec) -> float:
-    """Return the median distance of key-points that both have [m]; inf where none is."""
+def _median_distance(one: Vec, other: Vec) -> float:
+    """Return the median distance of common key-points [m]; inf without any."""
     away = np.linalg.norm(one - other, axis=1)
     there = away[np.isfinite(away)]
     return float(np.median(there)) if len(there) else np.inf
@@ -95,13 +91,13 @@ def _from_base(points: Vec) -> float:
 
 
 class MultiPersonTracker:
-    """The estimates of several people whose frames come together, in any order.
+    """Tracks of several people from common frames.
 
     Args:
-        n_people: Most people followed at once, at most four.
+        n_people: Number of tracks, at most four.
         size: The person's size [m], shape (12,) (``Cell.body``).
-        settings: Noise, margins and times, the same for all.
-        floor_z: Height of the floor [m]; None: heights over it are not judged.
+        settings: Noise, margins and times of all tracks.
+        floor_z: Height of the floor [m]; None: heights are not checked.
     """
 
     def __init__(
@@ -119,11 +115,11 @@ class MultiPersonTracker:
         self._flags: list[tuple[Flag, ...]] = [()] * n_people
         self._foreign: str | None = None
         self.observed: list[PersonEstimate | None] = [None] * n_people
-        """Estimate of each track at the last frame that showed its person; None: none did."""
+        """Estimate of each track at the last frame that showed its person; None: never."""
         self._waiting: list[Vec] = []
         self._waiting_since = 0.0
         self.unfollowed: tuple[Unfollowed, ...] = ()
-        """People in the newest frame that no track follows, nearest first."""
+        """Detections of the newest frame assigned to no track, nearest first."""
 
     def update(
         self,
@@ -131,16 +127,16 @@ class MultiPersonTracker:
         people: Sequence[ArrayLike],
         confidences: Sequence[ArrayLike | None] | None = None,
     ) -> tuple[PersonEstimate, ...]:
-        """Take one frame of all people in and return the estimate of each track.
+        """Process one frame of all people and return the estimate of each track.
 
         Args:
-            t: When the frame was taken [s].
-            people: Key-points of each person seen [m], shape (25, 3) each, in the tracker's
-                order; nobody may be seen, or more than are followed.
-            confidences: Trust in them, shape (25,) each; 1 where None.
+            t: Time of the frame [s].
+            people: Key-points of each detection [m], shape (25, 3) each; any number up to 64.
+            confidences: Confidences of the key-points, shape (25,) each; 1 where None.
 
         Raises:
-            InvalidInput: As for one person, and more than 64 people; nothing is taken in.
+            InvalidInput: As for one person, or more than 64 people; the state is then
+            unchanged.
         """
         trust = [None] * len(people) if confidences is None else list(confidences)
         if len(people) > MAX_SKELETONS:
@@ -156,7 +152,7 @@ class MultiPersonTracker:
         order, replaced = self._assign(t, seen)
         for i, (track, j) in enumerate(zip(self._tracks, order, strict=True)):
             track.take_frame(t, UNSEEN if j is None else frames[j], fresh=i in replaced)
-        self._tell(t, frames, order, replaced)
+        self._set_flags(t, frames, order, replaced)
         estimates = self.at(t)
         for i, track in enumerate(self._tracks):
             if track.unseen_s(t) == 0.0:
@@ -164,7 +160,7 @@ class MultiPersonTracker:
         return estimates
 
     def _assign(self, t: float, seen: Mapping[int, Vec]) -> tuple[list[int | None], set[int]]:
-        """Return who continues each track, and which tracks are taken over by others."""
+        """Return the detection of each track, and the tracks taken over by other people."""
         limits = self.settings.filter
         expected = [track.expected(t) for track in self._tracks]
         gates = [
@@ -192,16 +188,16 @@ class MultiPersonTracker:
                 new.remove(one)
                 order[far], away[far] = one, _from_base(seen[one])
                 replaced.add(far)
-        for i, j in enumerate(order):  # The rest show up as jumps of those who are lost.
+        for i, j in enumerate(order):  # The others become jumps of lost tracks.
             if new and j is None and i not in unknown:
                 order[i] = new.pop(0)
         return order, replaced
 
     def _free_track(self, t: float, points: Vec, free: Sequence[int]) -> int | None:
-        """Return which of the tracks that expect nobody a newcomer starts; None for none.
+        """Return the free track that a new detection starts, or None.
 
-        The track of a lost person who can have walked there, else one that never saw anybody.
-        Other lost people are not forgotten for a newcomer: they may still be there.
+        It is the track of a lost person who can have walked there, else an unused track. Other
+        lost tracks are kept, since their people may still be present.
         """
         here = np.nanmedian(points, axis=0)
         apart = {
@@ -215,29 +211,29 @@ class MultiPersonTracker:
         return next((i for i in free if i not in apart), None)
 
     def _walked(self, t: float, i: int) -> float:
-        """Return how far the person of a track can have got unseen [m]."""
+        """Return the distance that the person of a track can have walked unseen [m]."""
         return self.settings.cylinder.growth * self._tracks[i].unseen_s(t)
 
     def _nearest(self, t: float, i: int) -> float:
-        """Return how near to the base the unseen person of a track may be [m]."""
+        """Return the smallest possible distance of a track's unseen person to the base [m]."""
         last = self._tracks[i].last_points
         return 0.0 if last is None else max(0.0, _from_base(last) - self._walked(t, i))
 
     def _was_waiting(self, t: float, points: Vec) -> bool:
-        """Return whether a person not followed was here in the frame before."""
+        """Return whether an untracked detection was present in the previous frame."""
         limits = self.settings.filter
         since = min(max(t - self._waiting_since, 0.0), limits.hold_s)
         gate = limits.gate + limits.max_speed * since
-        return any(_apart(points, before) <= gate for before in self._waiting)
+        return any(_median_distance(points, before) <= gate for before in self._waiting)
 
-    def _tell(
+    def _set_flags(
         self,
         t: float,
         frames: Sequence[Keypoints],
         order: Sequence[int | None],
         replaced: set[int],
     ) -> None:
-        """Note the people not followed, and the flags of each track that follow from them."""
+        """Store untracked detections and the flags of each track that follow from them."""
         jumps = {
             j
             for track, j in zip(self._tracks, order, strict=True)
@@ -270,7 +266,7 @@ class MultiPersonTracker:
             if dropped:
                 flags.append("people-dropped")
             if self._foreign and j is None:
-                # Somebody is there, and nothing is known of where: as old as can be.
+                # A person is present at an unknown place: the estimate counts as stale.
                 never = math.isinf(self._tracks[i].unseen_s(t))
                 flags += ["foreign-frame", "stale"] if never else ["foreign-frame"]
             self._flags[i] = tuple(flags)
@@ -279,12 +275,12 @@ class MultiPersonTracker:
     def at(self, t: float) -> tuple[PersonEstimate, ...]:
         """Return the estimates at ``t`` [s], not earlier than the last frame."""
         return tuple(
-            self._noted(track.at(t), flags)
+            self._flagged(track.at(t), flags)
             for track, flags in zip(self._tracks, self._flags, strict=True)
         )
 
-    def _noted(self, estimate: PersonEstimate, flags: tuple[Flag, ...]) -> PersonEstimate:
-        """Return the estimate of one track with the flags that come from all tracks."""
+    def _flagged(self, estimate: PersonEstimate, flags: tuple[Flag, ...]) -> PersonEstimate:
+        """Return the estimate of one track with the flags of the association."""
         if not flags:
             return estimate
         foreign = self._foreign if "foreign-frame" in flags else estimate.implausible

@@ -1,14 +1,14 @@
-"""People as they come from outside: checked, and as policies see them.
+"""Validation of people received from outside, and their form as policy observations.
 
-The same rules as in the batches (``people/kernels/people.py``, ``nearest_person`` and
-``see_nearest``): the person nearest to the robot is seen, by the distance of their capsules to
-the robot's, or of their cylinder where no more is known of them; a cylinder is seen as a person
-of the cell's size who stands in it and faces the robot's base.
+The rules are those of the batches (``people/kernels/people.py``): the observed person is the
+one nearest to the robot, by the distance of capsules, or of the cylinder for a person known
+only as a cylinder. A cylinder is observed as a person of the cell's size standing in it and
+facing the robot's base.
 
-What a person can physically be is taken as it is: anywhere in a hall, any number of turns
-about the vertical, joints somewhat beyond the model's limits. Distances and safety layers go by
-that. Policies know people within 5 m and inside the model's limits, so that they see the others
-there (:func:`as_known`), and answers say so (:func:`degradations`).
+Any physically possible person is accepted: anywhere in a hall, with any yaw, with joints
+somewhat beyond the model's limits. Distances and safety layers use these values. Policies were
+trained on people within 5 m and within the model's limits, so that observations are clipped
+(:func:`as_known`) and answers say so (:func:`degradations`).
 """
 
 import math
@@ -32,13 +32,13 @@ from app.sim.robot.kernels.arm import Arm
 from app.sim.scene.scene import people_geometry_of
 
 FASTEST = 50.0
-"""Greatest speed of a person's joints, cylinder or radius [m/s, rad/s]."""
+"""Largest speed of joints, cylinder axis or radius [m/s, rad/s]."""
 JOINT_TOLERANCE = 0.5
-"""How far beyond the model's limits the joint angles of a person may be [rad]."""
+"""Largest excess of joint angles over the model's limits [rad]."""
 WIDEST = 3.0 * FARTHEST_M
-"""Greatest radius of a cylinder [m]: one that grows while unseen then holds the whole hall."""
+"""Largest radius of a cylinder [m], which covers the whole hall."""
 KNOWN_RADIUS, KNOWN_GROWTH, KNOWN_WALK = 5.0, 5.0, 10.0
-"""Greatest radius [m], growth [m/s] and remembered walking speed [m/s] that policies see."""
+"""Largest radius [m], growth [m/s] and past walking speed [m/s] in observations."""
 _YAW, _MOST_YAW = 2, 1e6
 _SLACK = 1e-6
 _QD_LIMIT = np.full(18, FASTEST)
@@ -46,9 +46,9 @@ _Q_LOW, _Q_HIGH = human.Q_MIN - JOINT_TOLERANCE, human.Q_MAX + JOINT_TOLERANCE
 _Q_LOW[:2], _Q_HIGH[:2] = -FARTHEST_M, FARTHEST_M
 _Q_LOW[_YAW], _Q_HIGH[_YAW] = -_MOST_YAW, _MOST_YAW
 _SIZE_LOW, _SIZE_HIGH = np.full(N_SIZE, 0.01), np.full(N_SIZE, 3.0)
-_SIZE_LOW[PELVIS_Z] = -10.0  # counted from the cell's origin
+_SIZE_LOW[PELVIS_Z] = -10.0  # height over the cell's origin
 MOST_REMEMBERED = N_PAST - 1
-"""Most moments that are remembered of a cylinder, a tenth of a second apart."""
+"""Largest number of past samples of a cylinder, 0.1 s apart."""
 _CYLINDER_LOW = np.array([-FARTHEST_M, -FARTHEST_M, 0.01])
 _CYLINDER_HIGH = np.array([FARTHEST_M, FARTHEST_M, WIDEST])
 _PAST_HIGH = np.array([WIDEST, FASTEST])
@@ -69,17 +69,17 @@ def person_from_cylinder(
     past: Vec | None = None,
     measured: bool = True,
 ) -> Person:
-    """Return the person that a cylinder is seen as.
+    """Return the person by which a cylinder is observed.
 
     Args:
-        x: Axis of the cylinder, robot's base frame [m].
-        y: The same.
-        vx: Its velocity [m/s].
-        vy: The same.
-        r: Its radius [m].
-        growth: How fast the radius grows [m/s].
-        past: Radius [m] and walking speed [m/s] before, as in ``Person.past``.
-        measured: Whether a safety layer may go by the velocity.
+        x: Position of the axis in the robot's base frame [m].
+        y: Position of the axis [m].
+        vx: Velocity of the axis [m/s].
+        vy: Velocity of the axis [m/s].
+        r: Radius [m].
+        growth: Rate of change of the radius [m/s].
+        past: Past radii [m] and walking speeds [m/s], see ``Person.past``.
+        measured: Whether a safety layer may use the velocity.
     """
     qd = np.zeros(18)
     qd[:2] = vx, vy
@@ -94,33 +94,32 @@ def person_from_cylinder(
 
 
 def person_from_estimate(estimate: PersonEstimate) -> Person | None:
-    """Return the person that an estimate is seen as; None where there never was one.
+    """Return the person of an estimate; None if no person was ever seen.
 
-    Where pelvis and trunk were never seen together there are no joint angles; then the person
-    is as good as their safety cylinder.
+    Without joint angles (pelvis and trunk never seen together) it is the safety cylinder.
     """
     if estimate.person is None:
         return _in_cylinder(estimate)
-    # An estimate that is moved on for long must not cost the decision.
+    # Long extrapolation must not make the request invalid.
     person = estimate.person
     q, qd = np.clip(person.q, _Q_LOW, _Q_HIGH), np.clip(person.qd, -FASTEST, FASTEST)
     return replace(person, q=q, qd=qd)
 
 
 def as_monitored(observed: PersonEstimate) -> Person | None:
-    """Return the person that a safety layer takes an observation as; None where there is none.
+    """Return the person that a safety layer monitors; None without one.
 
-    A joint that nothing shows may have any angle; then the person is the safety cylinder, which
-    is as wide as the unseen limbs reach.
+    An unseen joint may have any angle: the person is then the safety cylinder, which covers the
+    reach of unseen limbs.
 
     Args:
-        observed: The estimate at the last frame that showed the person.
+        observed: Estimate at the last frame that showed the person.
     """
     return _in_cylinder(observed) if observed.held else person_from_estimate(observed)
 
 
 def _in_cylinder(estimate: PersonEstimate) -> Person | None:
-    """Return a person who stands in the safety cylinder of an estimate; None without one."""
+    """Return a person standing in the safety cylinder of an estimate; None without one."""
     cylinder = estimate.cylinder
     if cylinder is None:
         return None
@@ -131,27 +130,26 @@ def _in_cylinder(estimate: PersonEstimate) -> Person | None:
 
 
 def person_anywhere() -> Person:
-    """Return the person that a safety layer assumes where nothing is known: it stops."""
+    """Return the unknown person of a safety layer, which makes the robot stop."""
     return person_from_cylinder(0.0, 0.0, 0.0, 0.0, WIDEST, measured=False)
 
 
 def degradations(person: Person) -> tuple[str, ...]:
-    """Return in what policies see a person otherwise than given: ``far``, ``clamped``."""
+    """Return how an observation differs from the given person: ``far``, ``clamped``."""
     near = _brought_near(person)
     far = ("far",) if near is not person else ()
     return far if _is_known(near) else (*far, "clamped")
 
 
 def is_far(person: Person) -> bool:
-    """Return whether a person is farther away than policies know people to be."""
+    """Return whether a person is beyond the distance known to policies."""
     return _brought_near(person) is not person
 
 
 def as_known(person: Person) -> Person:
-    """Return a checked person as policies see them; the same object where that is as given.
+    """Return a person as observed by policies; the same object if nothing is clipped.
 
-    Beyond 5 m along x or y a person is seen at that distance, in the same direction from the
-    robot's base.
+    A person beyond 5 m along x or y is observed at that distance in the same direction.
     """
     if _is_known(person):
         return person
@@ -169,7 +167,7 @@ def as_known(person: Person) -> Person:
 
 
 def _brought_near(person: Person) -> Person:
-    """Return a person no farther than policies know; the same object where that is so."""
+    """Return a person within the known distance; the same object if it is within already."""
     cylinder = person.cylinder
     there = person.q[:2] if cylinder is None else cylinder[:2]
     away, most = float(np.abs(there).max()), float(human.Q_MAX[0])
@@ -182,7 +180,7 @@ def _brought_near(person: Person) -> Person:
 
 
 def _is_known(person: Person) -> bool:
-    """Tell in one comparison whether policies know such numbers; the yaw may be any."""
+    """Return whether all values are within the range known to policies, except the yaw."""
     parts: tuple[Vec, ...] = (person.q, person.qd)
     if person.cylinder is not None:
         parts = (person.q, person.qd, person.cylinder)
@@ -195,10 +193,10 @@ def _is_known(person: Person) -> bool:
 
 
 def checked_people(people: Sequence[Person]) -> tuple[Person, ...]:
-    """Return the people with checked arrays.
+    """Return validated people.
 
     Raises:
-        InvalidInput: More than four, or a number that no person can have.
+        InvalidInput: More than four people, or a value out of range.
     """
     if len(people) > MAX_PEOPLE:
         raise InvalidInput("people", len(people), f"must hold at most {MAX_PEOPLE} people")
@@ -206,16 +204,16 @@ def checked_people(people: Sequence[Person]) -> tuple[Person, ...]:
 
 
 def checked_person(person: Person, path: str) -> Person:
-    """Return a person with checked arrays.
+    """Return a validated person.
 
     Args:
-        person: The person.
-        path: Name of the field, for errors.
+        person: Person.
+        path: Name of the field in errors.
 
     Raises:
-        InvalidInput: A number that no person can have.
+        InvalidInput: A value out of range.
     """
-    if _right_as_it_is(person):
+    if _is_valid(person):
         return person
     size, cylinder = person.size, person.cylinder
     if size is not None:
@@ -237,8 +235,8 @@ def checked_person(person: Person, path: str) -> Person:
     )
 
 
-def _right_as_it_is(person: Person) -> bool:
-    """Tell in one comparison whether nothing is wrong with a person of ordinary arrays."""
+def _is_valid(person: Person) -> bool:
+    """Return whether a person is valid, by one quick comparison of ordinary arrays."""
     if person.size is not None or person.past is not None:
         return False
     parts: tuple[Vec, ...] = (person.q, person.qd)
@@ -274,43 +272,45 @@ def _checked_past(path: str, past: Vec) -> Vec:
 
 
 def nearest_index(arm: Arm, shared: People, q: Vec, people: Sequence[Person]) -> int | None:
-    """Return which person is nearest to the robot; None for nobody.
+    """Return the index of the person nearest to the robot; None without people.
 
     Args:
         arm: Robot in its cell.
         shared: From :func:`~app.sim.scene.scene.people_of`.
         q: The robot's joint positions [rad], shape (6,).
-        people: Any number.
+        people: People, any number.
     """
     if len(people) < 2:
         return len(people) - 1 if people else None
     workers = [i for i, person in enumerate(people) if person.cylinder is None]
-    walkers = [i for i, person in enumerate(people) if person.cylinder is not None]
+    pedestrians = [i for i, person in enumerate(people) if person.cylinder is not None]
     sizes = [shared.bodies[0] if (s := people[i].size) is None else s for i in workers]
-    crowd = people_geometry_of(
+    geometry = people_geometry_of(
         shared,
         np.array([people[i].q for i in workers]).reshape(-1, 18),
-        np.array([people[i].cylinder for i in walkers], dtype=np.float64).reshape(-1, 3),
+        np.array([people[i].cylinder for i in pedestrians], dtype=np.float64).reshape(-1, 3),
         np.array(sizes).reshape(-1, N_SIZE),
     )
     robot = arm_kernel.new_robot_pose(arm)
     arm_kernel.place_robot(arm, as_kernel_array(q), robot)
-    return (workers + walkers)[people_kernel.nearest_person(shared, robot.columns, crowd)]
+    return (workers + pedestrians)[
+        people_kernel.nearest_person(shared, robot.columns, geometry)
+    ]
 
 
 def checked_vector(path: str, values: Vec, size: int, low: Vec, high: Vec, unit: str) -> Vec:
-    """Return numbers as an array once they keep their rules.
+    """Return values as a validated array.
 
     Args:
-        path: Name of the field, for the error.
-        values: Numbers.
-        size: How many there must be.
-        low: Least of each, shape (size,).
-        high: Greatest of each, shape (size,).
-        unit: Unit, for the error.
+        path: Name of the field in errors.
+        values: Values.
+        size: Required number of values.
+        low: Lower bounds, shape (size,).
+        high: Upper bounds, shape (size,).
+        unit: Unit in errors.
 
     Raises:
-        InvalidInput: Another number of them, not finite, or outside the limits.
+        InvalidInput: Wrong number of values, or a value that is not finite or out of bounds.
     """
     vector = np.asarray(values, dtype=np.float64)
     if vector.shape != (size,):

@@ -1,31 +1,30 @@
-"""From a stream of key-points to a person: safety cylinder and 18 joint angles with speeds.
+"""Estimation of one person from key-points: safety cylinder and 18 joint angles with speeds.
 
-Per frame: check (``keypoint_check.py``), put confused sides right, refuse what nobody can do,
-filter every key-point (``keypoint_filter.py``), then both closed forms on the filtered points:
-``keypoint_cylinder.py`` and ``keypoint_angles.py``. Joint speeds are the derivative of the
-second along the filtered speeds. Nothing looks ahead; :meth:`PersonEstimator.at` tells the
-estimate at any later time, so latency is bridged by the filter's own prediction.
+Each frame is validated (``keypoint_check.py``), exchanged sides are corrected, outliers are
+rejected by gating, and every key-point is filtered (``kalman_filter.py``). Closed forms on the
+filtered points give the cylinder (``bounding_cylinder.py``) and the joint angles
+(``keypoint_angles.py``); joint speeds are their derivative along the filtered speeds. The
+estimator is causal; :meth:`PersonEstimator.at` predicts to any later time, which compensates
+latency.
 
-How it degrades, each step named in the estimate:
+Degradations, named in the estimate:
 
-- a key-point missing: carried on for ``hold_s``; then the joints it decides keep their angles
-  (``held``) and the cylinder widens to where it can be;
-- arms or legs with sides exchanged: exchanged back (``arms-swapped``, ...); if that goes
-  on for ``swap_s``, the group starts anew, judged by the way the person faces
-  (``sides-restarted``);
-- most key-points farther away than a person moves: the frame is refused (``jump``); after
-  ``hold_s`` without a credible frame the person is taken anew (``restarted``);
-- nothing seen for ``stale_s``: ``stale``; after ``hold_s`` the last cylinder grows at walking
-  speed and the joints rest;
-- the model fits the key-points badly: ``misfit`` (a person of another size, a bad tracker);
-  beyond ``unfit`` there are no joint angles (somebody kneels, sits or lies), and the cylinder
-  is all that is known;
-- the key-points are in another frame or unit: ``foreign-frame``; nothing is seen then;
-- arms and legs both contradict the way the person faces: ``mirrored``. Both are exchanged, or
-  the whole frame is mirrored, which puts people where they are not: after ``swap_s`` of
-  nothing else, such frames are in another frame, too.
+- a missing key-point is predicted for ``hold_s``; then the joints it determines keep their
+  angles (``held``) and the cylinder widens to the reach of the missing point;
+- arms or legs with exchanged sides are exchanged back (``arms-swapped``, ...); after ``swap_s``
+  the group is restarted, with sides from the direction the person faces (``sides-restarted``);
+- if most key-points moved faster than a person can, the frame is rejected (``jump``); after
+  ``hold_s`` without a credible frame the person is restarted (``restarted``);
+- without detection for ``stale_s``: ``stale``; after ``hold_s`` the last cylinder grows at
+  walking speed and the joints are at rest;
+- a poor fit of the model is a ``misfit`` (another body size, a bad tracker); beyond ``unfit``
+  (kneeling, sitting, lying) there are no joint angles, only the cylinder;
+- key-points in another frame or unit: ``foreign-frame``; the frame counts as empty;
+- arms and legs both contradict the facing direction: ``mirrored``. Either both are exchanged or
+  the frame is mirrored, which displaces people: after ``swap_s`` without other frames, such
+  frames count as ``foreign-frame``.
 
-Several people: ``people_estimate.py``.
+Several people: ``multi_person_tracker.py``.
 """
 
 import math
@@ -78,11 +77,9 @@ Flag = Literal[
     "misfit",
 ]
 _SWAPPED: dict[Group, Flag] = {"arms": "arms-swapped", "legs": "legs-swapped"}
-"""Groups whose sides are judged; eyes and ears are too near each other, and decide nothing."""
+"""Groups with a side check; eyes and ears are too close to each other for it."""
 _DECIDING = [K[name] for name in (*FITTED, "mid_hip", "hip_r", "hip_l")]
-"""Key-points that decide joint angles."""
-
-
+"""Key-points that determine joint angles."""
 _MIRRORED = "arms and legs are mirrored (does one axis point the other way here?)"
 
 
@@ -95,19 +92,19 @@ class EstimatorSettings:
     cylinder: CylinderSettings = field(default_factory=CylinderSettings)
     """Flesh margin and growth."""
     min_confidence: float = 0.1
-    """Trust below which a key-point counts as missing."""
+    """Confidence below which a key-point counts as missing."""
     stale_s: float = 0.25
     """Age of the newest credible key-point from which an estimate is stale [s]."""
     swap_s: float = 0.5
-    """Time for which sides are exchanged back before the group starts anew, and for which
-    somebody may be mirrored [s]."""
+    """Time until a group with exchanged sides is restarted, and a mirrored frame rejected
+    [s]."""
     misfit: float = 0.10
-    """Median distance of the model's joints from the key-points that is named [m]."""
+    """Median distance of the model's joints from the key-points that counts as misfit [m]."""
     unfit: float = 0.25
-    """Misfit of the trunk beyond which there are no joint angles [m]; between the 1st and the
-    99th percentile of stature, taken for the median, it is below 0.2 m."""
+    """Misfit of the trunk beyond which there are no joint angles [m]; the median model fits
+    statures between the 1st and 99th percentile within 0.2 m."""
     qd_max: float = 8.0
-    """Bound of estimated joint speeds [rad/s, m/s]; faster is noise near a singularity."""
+    """Bound of estimated joint speeds [rad/s, m/s], against noise near singularities."""
 
     def __post_init__(self) -> None:
         for name in ("min_confidence", "stale_s", "swap_s", "misfit", "unfit", "qd_max"):
@@ -118,48 +115,48 @@ class EstimatorSettings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PersonEstimate:
-    """What is known of one person at one time."""
+    """Estimate of one person at one time."""
 
     t: float
-    """Time the estimate is for [s]."""
+    """Time of the estimate [s]."""
     age_s: float
-    """Time since the newest credible key-point [s]; inf where there was none."""
+    """Time since the newest credible key-point [s]; inf without any."""
     cylinder: SafetyCylinder | None
-    """Safety cylinder of METHOD 2.8; None where nothing was ever seen."""
+    """Safety cylinder of METHOD 2.8; None if no person was ever seen."""
     person: Person | None
-    """Joint angles and speeds; None until pelvis and trunk were seen together once, and where
-    the model does not fit the key-points."""
+    """Joint angles and speeds; None before pelvis and trunk were seen together, and if the
+    model does not fit the key-points."""
     held: tuple[str, ...]
-    """Joints that keep their last angle because their key-points are missing."""
+    """Joints that keep their last angle for lack of key-points."""
     missing: tuple[str, ...]
     """Key-points unseen for longer than the hold time."""
     strays: tuple[str, ...]
-    """Key-points of the last frame that lay far from all others."""
+    """Key-points of the last frame far from all others."""
     misfit_m: float
     """Median distance of the model's joints from the filtered key-points [m]; NaN unknown."""
     flags: tuple[Flag, ...]
-    """How the estimate is degraded; empty where it is not."""
+    """Degradations of the estimate."""
     unusable: tuple[str, ...] = ()
-    """Key-points of the last frame whose numbers cannot be used."""
+    """Key-points of the last frame with unusable values."""
     implausible: str | None = None
-    """Why nobody can stand in this frame as the last key-points say; None: somebody can."""
+    """Reason why the last key-points cannot be in the cell's frame; None otherwise."""
     carried_s: float = 0.0
-    """Longest time for which a key-point of trunk or arms is carried on without having been
-    seen [s]; at most the hold time."""
+    """Longest prediction of an unseen key-point of trunk or arms [s], at most the hold
+    time."""
 
     @property
     def stale(self) -> bool:
-        """Whether nothing credible was seen lately."""
+        """Whether no credible key-point is recent."""
         return "stale" in self.flags or "never-seen" in self.flags
 
 
 class PersonEstimator:
-    """The estimate of one person from a stream of frames.
+    """Estimator of one person from a stream of frames.
 
     Args:
         size: The person's size [m], shape (12,) (``Cell.body``).
         settings: Noise, margins and times.
-        floor_z: Height of the floor [m]; None: heights over it are not judged.
+        floor_z: Height of the floor [m]; None: heights are not checked.
     """
 
     def __init__(
@@ -179,7 +176,7 @@ class PersonEstimator:
         self._swapped_at: dict[Group, float] = {}
         self._q: Vec | None = None
         self.last_points: Vec | None = None
-        """Key-points known at the last frame [m], shape (25, 3); None: nothing ever seen."""
+        """Known key-points at the last frame [m], shape (25, 3); None: never seen."""
         self._flags: tuple[Flag, ...] = ()
         self._frame: Keypoints | None = None
         self._unfit = False
@@ -188,24 +185,23 @@ class PersonEstimator:
     def update(
         self, t: float, keypoints: ArrayLike, confidences: ArrayLike | None = None
     ) -> PersonEstimate:
-        """Take one frame in and return the estimate at its time; see :meth:`take`."""
+        """Process one frame and return the estimate at its time; see :meth:`take`."""
         self.take(t, keypoints, confidences)
         return self.at(t)
 
     def take(
         self, t: float, keypoints: ArrayLike, confidences: ArrayLike | None = None
     ) -> None:
-        """Take one frame in.
+        """Process one frame.
 
         Args:
-            t: When the frame was taken [s]; later than the one before.
+            t: Time of the frame [s], later than the previous one.
             keypoints: Order of BODY_25, cell's frame [m], shape (25, 3); NaN where missing.
-            confidences: Trust in each in [0, 1], shape (25,); 1 where None.
+            confidences: Confidences in [0, 1], shape (25,); 1 where None.
 
         Raises:
-            InvalidInput: See :func:`~app.sim.perception.keypoint_check.check_keypoints`; or
-            ``t`` is not
-                later than the last. The estimate is then as if the frame had not come.
+            InvalidInput: See :func:`~app.sim.perception.keypoint_check.check_keypoints`, or
+                ``t`` is not later than the previous time; the state is unchanged.
         """
         least = self.settings.min_confidence
         self.take_frame(
@@ -213,16 +209,15 @@ class PersonEstimator:
         )
 
     def take_frame(self, t: float, frame: Keypoints, fresh: bool = False) -> None:
-        """Take one checked frame in; see :meth:`take`.
+        """Process one validated frame; see :meth:`take`.
 
         Args:
-            t: When the frame was taken [s]; later than the one before.
-            frame: The key-points.
-            fresh: Whether they are another person's than those before, who is forgotten.
+            t: Time of the frame [s], later than the previous one.
+            frame: Key-points.
+            fresh: Whether the frame shows another person, for whom the state is reset.
 
         Raises:
-            InvalidInput: ``t`` is not later than the last. The estimate is then as if the
-                frame had not come.
+            InvalidInput: ``t`` is not later than the previous time; the state is unchanged.
         """
         if not math.isfinite(t) or t <= self._t:
             raise InvalidInput("t", t, f"must be finite and later than {digits(self._t)} s")
@@ -240,17 +235,17 @@ class PersonEstimator:
             flags.append("foreign-frame")
         given = frame.points.copy(), frame.confidences.copy()
         points, trust = self._put_sides_right(t, *given, flags)
-        refused = self._points.refuse(t, points)
-        n_refused = int(refused.sum())
+        rejected = self._points.gate(t, points)
+        n_rejected = int(rejected.sum())
         n_judged = int((self._points.known(t) & (trust > 0.0)).sum())
-        if n_refused:
-            flags.append("jump" if 2 * n_refused > n_judged else "outliers")
-        # A jump refuses all: what happens to lie near belongs to the same wrong person.
-        drop = np.ones_like(refused) if "jump" in flags else refused
+        if n_rejected:
+            flags.append("jump" if 2 * n_rejected > n_judged else "outliers")
+        # A jump rejects the whole frame, since the rest belongs to the same wrong person.
+        drop = np.ones_like(rejected) if "jump" in flags else rejected
         points[drop], trust[drop] = np.nan, 0.0
-        anew = math.isfinite(self._seen_at) and not self._points.known(t).any()
+        restart = math.isfinite(self._seen_at) and not self._points.known(t).any()
         if (trust > 0.0).any():
-            if anew:
+            if restart:
                 flags.append("restarted")
             self._seen_at = t
         self._points.update(t, points, trust)
@@ -258,7 +253,7 @@ class PersonEstimator:
         self._remember(t)
 
     def _forget(self) -> None:
-        """Know nothing of anybody, as at the start."""
+        """Reset to the initial state."""
         self._points.forget(list(range(N_KEYPOINTS)))
         self._center.forget([0])
         self._seen_at, self._unfit = -math.inf, False
@@ -268,7 +263,7 @@ class PersonEstimator:
     def _put_sides_right(
         self, t: float, points: Vec, trust: Vec, flags: list[Flag]
     ) -> tuple[Vec, Vec]:
-        """Return key-points and trust with exchanged sides exchanged back."""
+        """Return key-points and confidences with corrected sides."""
         expected = self._points.at(t)[0]
         for group, flag in _SWAPPED.items():
             members = GROUPS[group]
@@ -294,7 +289,7 @@ class PersonEstimator:
         return points, trust
 
     def _remember(self, t: float) -> None:
-        """Keep what the next estimates build on: joint angles, the last cylinder."""
+        """Update joint angles and the centre of the cylinder."""
         points = self._points.at(t)[0]
         known = np.isfinite(points).all(axis=1)
         if not known.any():
@@ -306,22 +301,22 @@ class PersonEstimator:
             self._unfit = fit_errors(q, self._size, points)[1] > self.settings.unfit
         corners = bounding_box(points[known])
         center = 0.5 * (corners[:1] + corners[7:])
-        if self._center.refuse(t, center).any():
+        if self._center.gate(t, center).any():
             self._center.forget([0])
         self._center.update(t, center, np.ones(1))
         self.last_points = points
 
     @property
     def frame_flags(self) -> tuple[Flag, ...]:
-        """What the last frame was flagged with."""
+        """Flags of the last frame."""
         return self._flags
 
     def unseen_s(self, t: float) -> float:
-        """Return for how long nothing credible was seen [s]; inf: never."""
+        """Return the time since the last credible key-point [s]; inf: never."""
         return max(0.0, t - self._seen_at)
 
     def expected(self, t: float) -> Vec:
-        """Return where the key-points are expected at ``t`` [m], (25, 3), NaN where unknown."""
+        """Return the predicted key-points at ``t`` [m], shape (25, 3), NaN where unknown."""
         return self._points.at(t)[0]
 
     def _require_now(self, t: float) -> None:
@@ -331,7 +326,7 @@ class PersonEstimator:
             )
 
     def at(self, t: float) -> PersonEstimate:
-        """Return the estimate at ``t`` [s], not earlier than the last frame; changes nothing.
+        """Return the estimate at ``t`` [s], not earlier than the last frame.
 
         Raises:
             InvalidInput: ``t`` is earlier than the last frame, or not finite.
@@ -363,13 +358,13 @@ class PersonEstimator:
         )
 
     def _carried_at(self, t: float) -> float:
-        """Return for how long the key-points of trunk and arms are carried on at most [s]."""
+        """Return the longest current prediction of a key-point of trunk and arms [s]."""
         carried = t - self._points.seen_at[_DECIDING]
         known = carried <= self.settings.filter.hold_s
         return float(carried[known].max(initial=0.0))
 
     def person_at(self, t: float) -> Person | None:
-        """Return joint angles and speeds alone at ``t`` [s], as :meth:`at` has them."""
+        """Return only joint angles and speeds of :meth:`at` at ``t`` [s]."""
         self._require_now(t)
         if self._q is None:
             return None
@@ -380,14 +375,14 @@ class PersonEstimator:
     def _person(
         self, points: Vec, speeds: Vec
     ) -> tuple[Person | None, NDArray[np.bool_], float]:
-        """Return joint angles and speeds, which are held, and how badly they fit [m]."""
+        """Return joint angles and speeds, the held joints, and the misfit [m]."""
         if self._q is None:
             return None, np.ones(18, dtype=np.bool_), math.nan
         q, qd, held = joint_motion(points, speeds, self._q, self._size, self.settings.qd_max)
         return Person(q=q, qd=qd, size=self._size), held, fit_errors(q, self._size, points)[0]
 
     def _cylinder_at(self, t: float, points: Vec, age: float) -> SafetyCylinder | None:
-        """Return the cylinder at ``t``: around what is known, else the last one, grown."""
+        """Return the cylinder around known key-points at ``t``, else the last one, grown."""
         if self.last_points is None:
             return None
         settings = self.settings.cylinder

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from app.errors import InvalidInput
 from app.sim.cells.cell import Cell, lacks_stations
 from app.sim.core.arrays import Vec, as_kernel_array
+from app.sim.core.kernels.rng import start_stream
 from app.sim.geometry.segments import FAR
 from app.sim.people.human_motion_config import USUAL, HumanMotionConfig
 from app.sim.people.kernels.motion import record_palms
@@ -312,10 +313,11 @@ def hand_speeds(
     state = new_people_state(batch.cell, people, 1)
     n_workers = state.q.shape[1]
     crowd = new_people_geometry(people, n_workers, state.cylinders.shape[1])
-    palms = np.zeros((int(seconds / tick), n_workers, 2, 3))
+    palms, rng = np.zeros((int(seconds / tick), n_workers, 2, 3)), np.zeros(1, dtype=np.uint64)
     rates = []
     for number in range(n_scripts):
-        record_palms(people, state, batch.seed, number, batch.arm.columns, tick, crowd, palms)
+        start_stream(batch.seed, 1 << 20, number, rng)
+        record_palms(people, state, rng, batch.arm.columns, tick, crowd, palms)
         rates.append(np.linalg.norm(np.diff(palms, axis=0), axis=-1).ravel() / tick)
     speeds = np.concatenate(rates)
     moving = speeds[speeds > 0.05]

@@ -54,15 +54,15 @@ def test_prediction_in_one_step_or_many_is_the_same() -> None:
 def test_what_no_person_can_do_is_refused_until_the_hold_time_is_over() -> None:
     found = run(np.zeros((30, 1, 3)))
     far, now = np.array([[0.6, 0.0, 0.0]]), 30 * DT
-    assert not found.refuse(now, 0.4 * far).any()
+    assert not found.gate(now, 0.4 * far).any()
     for k in range(30, 44):
-        assert found.refuse(k * DT, far).all()
-    assert not found.refuse(now + 0.6, far).any()
+        assert found.gate(k * DT, far).all()
+    assert not found.gate(now + 0.6, far).any()
 
 
 def test_an_unseen_point_may_have_moved_the_farther_the_longer() -> None:
     far, now = np.array([[0.6, 0.0, 0.0]]), 30 * DT
-    assert not run(np.zeros((30, 1, 3))).refuse(now + 0.1, far).any()
+    assert not run(np.zeros((30, 1, 3))).gate(now + 0.1, far).any()
 
 
 def test_less_trust_moves_less() -> None:

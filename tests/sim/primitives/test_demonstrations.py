@@ -107,5 +107,5 @@ def test_elbows_go_out_in_their_style() -> None:
 def test_place_out_of_reach_is_told() -> None:
     rng, size = np.random.default_rng(9), PEOPLE[(5.0, 5.0, 5.0)]
     far = np.array([0.0, -0.4, 0.1])
-    with pytest.raises(SimulationError, match="no sound motion of the r hand"):
+    with pytest.raises(SimulationError, match="no feasible motion of hand 'r'"):
         demonstrate(CELL, size, (None, far), "r", STYLES[0], rng)

@@ -7,8 +7,6 @@ with yielding above 0 (docs/method.md 4) a worker slows and leans away near the 
 (``yielding.py``).
 """
 
-import numpy as np
-
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
 from app.sim.core.kernels import rng as random
@@ -206,8 +204,7 @@ def _copy_cylinder(state: PeopleState, e: int, k: int) -> None:
 def record_palms(
     people: People,
     state: PeopleState,
-    seed: int,
-    number: int,
+    rng: random.State,
     robot: Vec,
     dt: float,
     geometry: PeopleGeometry,
@@ -218,15 +215,12 @@ def record_palms(
     Args:
         people: Shared data.
         state: Rows; row 0 is used.
-        seed: Seed of the random stream.
-        number: Number of the random stream.
+        rng: Random stream of the episode.
         robot: The robot's capsules, shape (9, n).
         dt: Time between samples [s].
         geometry: Work space.
         palms: Filled with palm positions [m], shape (n_samples, W, 2, 3).
     """
-    rng = np.zeros(1, dtype=np.uint64)
-    random.start_stream(seed, 1 << 20, number, rng)
     start_people(people, state, 0, rng, geometry)
     for k in range(palms.shape[0]):
         advance_people(people, state, 0, robot, dt, geometry.away)
