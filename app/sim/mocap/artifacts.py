@@ -1,8 +1,8 @@
-"""Artifacts of motion capture: found by speed, cut out, the clean runs between them kept.
+"""Detection of motion-capture artefacts by speed, and the clean runs between them.
 
-A marker that is lost and found again, or taken for another, leaps. Hands, forearms and hips of
-people at work stay below 3 m/s (clean hands of the TUM clips reach 2.7 m/s): whatever is faster
-between two frames is an artifact, and so is a hole in the time column.
+A marker that is lost and found, or confused with another, jumps. Hips, forearms and hands of
+people at work stay below 3 m/s (clean hands of the TUM clips reach 2.7 m/s): faster motion
+between two frames is an artefact, and so is a gap in the time column.
 """
 
 from collections.abc import Sequence
@@ -15,42 +15,42 @@ from app.sim.core.arrays import Vec
 from app.sim.mocap.joint_centres import TRACK_NAMES
 
 MAX_SPEED = 3.0
-"""Fastest that hips, forearms and hands move [m/s]."""
+"""Largest credible speed of hips, forearms and hands [m/s]."""
 JUMP_SPEED = 10.0
-"""A point faster than this has jumped [m/s]: no hand at work does that."""
+"""Speed from which an artefact is called a jump [m/s]."""
 MARGIN = 0.05
-"""Cut away on either side of an artifact [s]: markers are bad before they are lost."""
+"""Time removed on either side of an artefact [s], where markers degrade."""
 MIN_RUN = 1.0
-"""Shortest run that is kept [s]."""
+"""Shortest clean run [s]."""
 MAX_GAP = 0.1
 """Longest time between two frames [s]."""
 
 WATCHED = ("pelvis", "elbow_r", "wrist_r", "elbow_l", "wrist_l")
-"""The points whose speed is watched: hips, forearms and hands."""
+"""Points whose speed is checked: hips, forearms and hands."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Artifact:
-    """Frames that are cut out, and why."""
+    """A removed span of frames and its reason."""
 
     first: int
-    """First frame of the fault, counted from 0."""
+    """First frame, counted from 0."""
     last: int
-    """Last frame of the fault."""
+    """Last frame."""
     parts: tuple[str, ...]
-    """Points that were too fast, the fastest first; ``("time",)`` for a hole in the times;
-    columns that lack a value."""
+    """Points that are too fast, the fastest first; ``("time",)`` for a gap; columns without a
+    value."""
     speed: float
-    """Highest speed [m/s]; 0 for a hole in the times and for missing values."""
+    """Highest speed [m/s]; 0 for gaps and missing values."""
     reason: str
-    """One sentence part: ``"wrist_r at 41.2 m/s: jumps"``."""
+    """Text such as ``"wrist_r at 41.2 m/s: jumps"``."""
 
 
 def find_artifacts(times: Vec, points: Vec) -> tuple[Artifact, ...]:
-    """Return all artifacts in the order of time; those closer than two margins are one.
+    """Return all artefacts in order of time; those closer than two margins are merged.
 
     Args:
-        times: Rising [s], shape (n,).
+        times: Increasing times [s], shape (n,).
         points: Joint centres [m], shape (n, 8, 3), order of TRACK_NAMES.
     """
     dt = np.diff(times)
@@ -65,16 +65,16 @@ def find_artifacts(times: Vec, points: Vec) -> tuple[Artifact, ...]:
 
 
 def clean_runs(times: Vec, artifacts: Sequence[Artifact]) -> tuple[tuple[int, int], ...]:
-    """Return first and last frame of every run without artifacts, at least MIN_RUN long.
+    """Return first and last frame of each run without artefacts of at least MIN_RUN.
 
     Args:
-        times: Rising [s], shape (n,).
+        times: Increasing times [s], shape (n,).
         artifacts: From :func:`find_artifacts`.
     """
     good = np.ones(len(times), dtype=bool)
     for one in artifacts:
         after, before = times - times[one.first], times[one.last] - times
-        # Half a nanosecond more, so that rounding does not decide about a frame.
+        # A tolerance of 0.5 ns makes the result independent of rounding.
         good[(np.minimum(after, before)) >= -(MARGIN + 0.5e-9)] = False
     edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(int)))
     runs = edges.reshape(-1, 2) - np.array([0, 1])
@@ -84,23 +84,23 @@ def clean_runs(times: Vec, artifacts: Sequence[Artifact]) -> tuple[tuple[int, in
 def merged(
     found: Sequence[Artifact], missing: Sequence[Artifact], frames: NDArray[np.int64]
 ) -> tuple[Artifact, ...]:
-    """Return all artifacts in frames of the file, in their order.
+    """Return all artefacts in order, with frame numbers of the file.
 
     Args:
-        found: From :func:`find_artifacts`, in rows that have all values.
-        missing: Frames that lack a value; the holes that they leave are told by them.
-        frames: Frame of the file that each row is, shape (n,).
+        found: From :func:`find_artifacts`, on the complete rows.
+        missing: Frames without a value; they replace the gaps that they cause.
+        frames: Frame number in the file of each row, shape (n,).
     """
     in_file = [
         replace(one, first=int(frames[one.first]), last=int(frames[one.last])) for one in found
     ]
     firsts = np.array([one.first for one in missing])
-    told = [
+    kept = [
         one
         for one in in_file
         if one.parts != ("time",) or not ((one.first < firsts) & (firsts < one.last)).any()
     ]
-    return tuple(sorted([*told, *missing], key=lambda one: (one.first, one.last)))
+    return tuple(sorted([*kept, *missing], key=lambda one: (one.first, one.last)))
 
 
 def _artifact(

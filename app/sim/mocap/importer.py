@@ -1,14 +1,15 @@
-"""Importing recorded human motion: a file in, clean runs of the 18-DoF model out.
+"""Import of recorded human motion as clean runs of the 18-DoF model.
 
-Three formats: BVH (joint centres, through ``skeletons.py`` and ``track_angles.py``), OpenSim's
-``.mot``/``.sto`` and our own CSV (angles). Whatever the file is, the answer is an
-:class:`ImportedMotion` or one :class:`~app.errors.BadMotion` that names place and rule.
+Formats: BVH (joint centres, ``skeletons.py`` and ``inverse_kinematics.py``), OpenSim's ``.mot``
+and ``.sto``, and the project's CSV (joint angles). The result is an :class:`ImportedMotion`, or
+one :class:`~app.errors.BadMotion` that names place and rule.
 
-Bodies of another size: **angles are kept, and the pelvis's path is kept in metres.** A person
-of the simulator's size makes the recorded gesture in the recorded place; where the recorded arm
-was longer, the simulated hand falls short by the difference, which ``fixed_body`` measures. The
-error of the conversion itself, ``wrists`` and ``elbows``, is measured on the recorded body.
-Source: METHOD 3.4.
+Other body sizes: **joint angles and the path of the pelvis in metres are kept.** A simulated
+person makes the recorded gesture at the recorded place; with a longer recorded arm, the
+simulated hand falls short by the difference, which ``fixed_body`` reports. The error of the
+conversion itself, ``wrists`` and ``elbows``, is measured on the recorded body.
+
+Source: docs/method.md 3.4.
 """
 
 import codecs
@@ -43,84 +44,84 @@ from app.sim.mocap.read_options import NOTHING_STATED, Reading, ReadOptions
 from app.sim.mocap.skeletons import body_track
 
 MAX_BYTES = 32 * 1024 * 1024
-"""Largest file that is read [bytes]."""
+"""Largest size of a file [bytes]."""
 FORMATS = (".bvh", ".mot", ".sto", ".csv")
-"""Endings of the names of files that can be read."""
+"""File name extensions of the supported formats."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Motion:
-    """One run of recorded motion of the 18-DoF person."""
+    """One run of motion of an 18-DoF person, usually recorded."""
 
     name: str
-    """The file's name without its ending."""
+    """File name without extension."""
     source: str
-    """Where it comes from: file, SHA-256 (12 digits) and frames."""
+    """Origin: file, SHA-256 (12 digits) and frames."""
     times: Vec
-    """From 0, rising [s], shape (n,)."""
+    """Increasing times from 0 [s], shape (n,)."""
     q: Vec
     """Joint positions [m, rad], shape (n, 18); continuous, not clipped to joint limits."""
     pelvis_z: Vec
-    """Height of the pelvis above its height in standing [m], shape (n,).
+    """Rise of the pelvis above its standing height [m], shape (n,).
 
-    Standing is the 95th percentile of the file's clean frames; our own tables state it.
+    The standing height is the 95th percentile of the clean frames; CSV tables state the rise.
     """
     size: BodySize
-    """Lengths of the recorded person."""
+    """Size of the recorded person."""
     first_frame: int
-    """Frame of the file with which the run begins, counted from 0."""
+    """First frame of the run in the file, counted from 0."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spread:
-    """How an error is spread over frames [m]."""
+    """Percentiles of an error over frames [m]."""
 
     p50: float
-    """Half of the frames are better."""
+    """Median."""
     p99: float
-    """One frame of a hundred is worse."""
+    """99th percentile."""
     worst: float
-    """The largest."""
+    """Maximum."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImportedMotion:
-    """What an import found in a file."""
+    """Result of an import."""
 
     name: str
-    """The file's name without its ending."""
+    """File name without extension."""
     format: str
-    """One of FORMATS, without its dot."""
+    """One of FORMATS without the dot."""
     reading: Reading
-    """How the file was read: units, up axis, names, rate."""
+    """Interpretation of the file: units, up axis, names, rate."""
     n_frames: int
-    """Frames in the file; those that repeat count once, those that lack a value do count."""
+    """Number of frames in the file; repeated frames count once."""
     duration: float
-    """Of the file [s]."""
+    """Duration of the file [s]."""
     size: BodySize
-    """Lengths of the recorded person; the simulator's own where only angles are given."""
+    """Size of the recorded person; the default size where only angles are given."""
     runs: tuple[Motion, ...]
     """Clean runs, at least one."""
     spans: tuple[tuple[int, int], ...]
     """First and last frame of each run, counted from 0 in the file."""
     artifacts: tuple[Artifact, ...]
-    """What was cut out."""
+    """Removed artefacts."""
     wrists: Spread
-    """Wrists of the model, with the recorded lengths, against the file's own."""
+    """Error of the model's wrists, with the recorded size, against the file."""
     elbows: Spread
-    """The same for the elbows."""
+    """Error of the elbows, likewise."""
     wrists_at_fixed_height: Spread
-    """Wrists where the pelvis's height is not carried along but stays that of standing."""
+    """Error of the wrists with the pelvis fixed at standing height."""
     pelvis: Spread
-    """The pelvis, which gives way so that the neck is met."""
+    """Error of the pelvis, which is displaced to match the neck."""
     fixed_body: Spread
-    """Wrists of the simulator's person, who has other lengths, against the file's."""
+    """Error of the wrists of a person of default size."""
     beyond_limits: dict[str, tuple[float, float]]
-    """Joints that leave the model's limits: share of the clean frames, farthest [rad]."""
+    """Joints beyond the model's limits: share of the clean frames, largest excess [rad]."""
 
     @property
     def n_clean(self) -> int:
-        """Frames of all clean runs."""
+        """Number of frames of all clean runs."""
         return sum(len(run.times) for run in self.runs)
 
 
@@ -130,12 +131,12 @@ def read_motion(
     """Import a file of recorded motion.
 
     Args:
-        content: The file, of whatever kind.
-        file_name: Its name; the ending says which format is meant.
-        options: What is stated about the file.
+        content: Content of the file.
+        file_name: Name of the file; its extension selects the format.
+        options: Stated properties of the file.
 
     Raises:
-        BadMotion: It is no sound motion; each fault names line or column and rule.
+        BadMotion: The file is invalid; each fault names line or column and rule.
     """
     ending = PurePath(file_name).suffix.lower()
     if ending not in FORMATS:
@@ -154,7 +155,7 @@ def read_motion(
     name = PurePath(file_name).stem[:100]
     origin = f"{PurePath(file_name).name[:100]} ({digest})"
     pieces = [_converted(track, angles, size, span) for span in spans]
-    # Our own tables count the height from standing; elsewhere that is the 95th percentile.
+    # CSV tables state heights relative to standing; elsewhere standing is estimated.
     standing = 0.0 if ending == ".csv" else None
     joined = _Pieces(track, size, spans, pieces, standing)
     in_file = tuple((int(frames[a]), int(frames[b])) for a, b in spans)
@@ -180,7 +181,7 @@ def read_motion(
 def _read(
     text: str, ending: str, options: ReadOptions
 ) -> tuple[BodyTrack, AngleTrack | None, Reading]:
-    """Return joint centres, joint angles where the file holds them, and how it was read."""
+    """Return joint centres, joint angles if the file has them, and its interpretation."""
     if ending == ".bvh":
         track, reading = body_track(read_bvh(text), options)
         return track, None, reading
@@ -197,13 +198,13 @@ def _read(
 
 
 def placed(motion: Motion, x: float, y: float, yaw: float) -> Motion:
-    """Return the motion moved so that it begins with the pelvis at a place, facing ``yaw``.
+    """Return the motion transformed so that the pelvis starts at a place with a given yaw.
 
     Args:
-        motion: A run as imported, in the frame of its file.
+        motion: Run in the frame of its file.
         x: Pelvis x at the first frame [m].
         y: Pelvis y at the first frame [m].
-        yaw: Direction faced at the first frame [rad].
+        yaw: Yaw at the first frame [rad].
     """
     q = motion.q.copy()
     turn = yaw - q[0, 2]

@@ -28,8 +28,14 @@ PELVIS, NECK, SHOULDER_R, ELBOW_R, WRIST_R, SHOULDER_L, ELBOW_L, WRIST_L = range
 ARM_POINTS = (ELBOW_R, WRIST_R, ELBOW_L, WRIST_L)
 """The points by which the error of an import is measured."""
 MEASURED = (
-    "trunk", "clavicle_r", "clavicle_l", "upper_arm_r", "upper_arm_l", "forearm_r", "forearm_l"
-)  # fmt: skip
+    "trunk",
+    "clavicle_r",
+    "clavicle_l",
+    "upper_arm_r",
+    "upper_arm_l",
+    "forearm_r",
+    "forearm_l",
+)
 """The lengths that joint centres tell; all others are the median person's."""
 SIDES = {"r": -1.0, "l": 1.0}
 """Sign of the body's lateral axis (y, to the left) on either side."""

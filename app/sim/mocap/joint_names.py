@@ -22,16 +22,14 @@ _CENTRE: Mapping[str, Sequence[str]] = {
     "neck": ("neck", "neck1", "neck01", "neckbase", "c7", "spineshoulder"),
 }
 _PARTS: Mapping[str, Sequence[str]] = {
-    "shoulder": (
-        "upperarm", "uparm", "arm", "shldr", "shldrbend", "shoulder", "humerus"
-    ),
+    "shoulder": ("upperarm", "uparm", "arm", "shldr", "shldrbend", "shoulder", "humerus"),
     "elbow": ("elbow", "forearm", "forearmbend", "lowerarm", "lowarm", "radius"),
     "wrist": ("wrist", "hand"),
     "hip": ("upleg", "upperleg", "thigh", "thighbend", "hip", "femur"),
     "knee": ("knee", "lowerleg", "lowleg", "shin", "calf", "tibia", "leg"),
     "ankle": ("ankle", "foot"),
     "toe": ("toebase", "toe", "toes", "toe0", "ball", "foot"),
-}  # fmt: skip
+}
 """Spellings of each part, the preferred first: with wrist and hand, the wrist counts."""
 
 

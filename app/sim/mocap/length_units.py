@@ -33,8 +33,11 @@ ANKLE_TO_NECK, ANKLE_TO_CROWN = 0.818 - 0.039, 1.0 - 0.039
 HEAD = (0.10, 0.25)
 """Range of neck to top of the head relative to stature; other end sites are not the top."""
 SHARES: Mapping[str, float] = {
-    "trunk": MEDIAN_TRUNK / STATURE, "clavicle": 0.105, "upper_arm": 0.172, "forearm": 0.149
-}  # fmt: skip
+    "trunk": MEDIAN_TRUNK / STATURE,
+    "clavicle": 0.105,
+    "upper_arm": 0.172,
+    "forearm": 0.149,
+}
 """Lengths relative to stature, by which it is found without legs."""
 PROPORTIONS: Mapping[str, tuple[float, float]] = {
     "trunk": (0.14, 0.42),

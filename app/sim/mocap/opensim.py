@@ -187,9 +187,13 @@ def _columns(table: TextTable, names: Mapping[str, str]) -> dict[str, int]:
         next((one for one in (ARMS[h], ELEVATED[h]) if _all(one, there)), ARMS[h]) for h in "rl"
     ]
     wanted = [
-        "time", *PELVIS, *PLACES, *(name for part in lumbar or [LUMBAR] for name in part),
-        *(name for part in shoulders for name in part), *ELBOWS.values(),
-    ]  # fmt: skip
+        "time",
+        *PELVIS,
+        *PLACES,
+        *(name for part in lumbar or [LUMBAR] for name in part),
+        *(name for part in shoulders for name in part),
+        *ELBOWS.values(),
+    ]
     missing = [name for name in wanted if name not in there]
     if missing:
         hint = table.near(missing, there)
