@@ -46,7 +46,7 @@ def work_of(people: PickPeople, seed: int = 0) -> HumanMotionConfig:
         seed=seed,
         pace=people.human_pace,
         yielding=people.human_yielding,
-        roaming=people.human_off_task,
+        off_task=people.human_off_task,
         absent=people.human_absent,
         augmentation=people.augmentation == "sampled",
     )

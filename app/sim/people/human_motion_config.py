@@ -21,7 +21,7 @@ from app.sim.human.anthropometry import BodySize
 from app.sim.mocap.importer import Motion, placed
 from app.sim.people.kernels import people
 from app.sim.people.kernels.people import People, Tracks
-from app.sim.people.off_task_motion import roaming
+from app.sim.people.off_task_motion import off_task_motions
 from app.sim.people.reach_script import build_reach_library
 from app.sim.primitives.kernels.primitives import PrimitiveLibrary
 from app.sim.primitives.primitive_library import VARIANTS, motion_library
@@ -29,46 +29,46 @@ from app.sim.primitives.primitive_library import VARIANTS, motion_library
 MotionSource = Literal["library", "reaches", "recorded"]
 MOTIONS: tuple[MotionSource, ...] = ("library", "reaches", "recorded")
 TRACK_DT = 0.02
-"""Step to which recorded motion is brought [s]; 50 Hz, above what people's hands hold."""
+"""Sampling step of tracks [s]; 50 Hz, above the bandwidth of hand motion."""
 NEEDED_S = 10.0
-"""How long a track should go on after an episode's start: an evaluation's episode [s]."""
+"""Desired length of a track after the start of an episode [s]."""
 N_OFF_TASK = 24
-"""Motions that off_task_recordings draw from, a minute each."""
+"""Number of off-task motions, one minute each."""
 NO_TRACKS = Tracks(np.zeros((1, 19)), np.array([[0, 1, -1]]), TRACK_DT, 0.0)
-"""The tracks of workers who follow none."""
+"""Tracks of workers without tracks."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HumanMotionConfig:
-    """What the workers of a cell do."""
+    """Motion, sizes and yielding of the workers of a cell."""
 
     motion: MotionSource = "library"
-    """Where their motion comes from."""
+    """Source of the motion."""
     seed: int = 0
-    """Seed of their postures and of the samples of their primitives."""
+    """Seed of postures and primitive samples."""
     pace: float = 1.0
-    """Speed relative to their scripts."""
+    """Speed relative to the scripts."""
     yielding: float = 0.0
-    """How far they give way to the arm, from 0 (they do not see it) to 1."""
-    roaming: float = 0.0
-    """Share of the workers who roam instead of working, drawn each episode anew."""
+    """Degree of yielding to the arm, from 0 (none) to 1."""
+    off_task: float = 0.0
+    """Share of workers with off-task motion, drawn per episode."""
     absent: float = 0.0
-    """Share of the workers who are not there, drawn each episode anew."""
+    """Share of absent workers, drawn per episode."""
     bodies: tuple[BodySize, ...] | None = None
     """Sizes drawn from, each episode anew; None for those of the library
     (``motion_library.BODIES``), and in synthetic reaches for the cell's own person."""
     augmentation: bool = True
-    """Whether primitives are sampled and varied (METHOD 3.4); if not, the library's
-    demonstrations are replayed as they are."""
+    """Whether primitives are sampled and varied (docs/method.md 3.4); otherwise demonstrations
+    are replayed."""
     variants: int = VARIANTS
-    """Postures for each body, place and hand of the library."""
+    """Keyframes per body, place and hand."""
     recorded: tuple[Motion, ...] = ()
-    """The runs drawn from, for ``recorded``, placed in the cell."""
+    """Runs placed in the cell, for ``recorded``."""
 
     def __post_init__(self) -> None:
         if self.motion not in MOTIONS:
-            raise InvalidInput("motion", self.motion, "must be a source of motion", MOTIONS)
-        for name in ("yielding", "roaming", "absent"):
+            raise InvalidInput("motion", self.motion, "must be a motion source", MOTIONS)
+        for name in ("yielding", "off_task", "absent"):
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise InvalidInput(name, getattr(self, name), "must lie in [0, 1]")
         if not (np.isfinite(self.pace) and self.pace > 0.0):
@@ -80,18 +80,18 @@ class HumanMotionConfig:
 
 
 USUAL = HumanMotionConfig()
-"""The library's people."""
+"""Workers with the motion library."""
 REACHING = HumanMotionConfig(motion="reaches")
-"""The first people: synthetic reaches of the cell's own person."""
+"""Synthetic reaches of the cell's own person."""
 
 
 def with_human_motion(shared: People, cell: Cell, settings: HumanMotionConfig) -> People:
-    """Return shared data of people whose workers do what the settings say.
+    """Return shared data of people with the configured motion of the workers.
 
     Args:
-        shared: People who do nothing yet.
+        shared: Data of people without motion.
         cell: Work cell with at least one worker.
-        settings: What they do.
+        settings: Configuration.
     """
     shared = shared._replace(
         pace=settings.pace, yielding=settings.yielding, absent_share=settings.absent
@@ -99,10 +99,10 @@ def with_human_motion(shared: People, cell: Cell, settings: HumanMotionConfig) -
     if settings.motion == "recorded":
         tracks, lengths = tracks_of(settings.recorded, cell.floor_z)
         return shared._replace(tracks=tracks, track_share=1.0, bodies=lengths)
-    if settings.roaming > 0.0:
+    if settings.off_task > 0.0:
         tracks, _ = tracks_of(off_task_recordings(cell, settings.seed), cell.floor_z)
-        tracks.spans[:, 2] = -1  # Anybody may roam.
-        shared = shared._replace(tracks=tracks, track_share=settings.roaming)
+        tracks.spans[:, 2] = -1
+        shared = shared._replace(tracks=tracks, track_share=settings.off_task)
     if settings.motion == "library":
         return _with_library(shared, cell, settings)
     sizes = settings.bodies or (cell.human.size,)
@@ -125,8 +125,8 @@ def _with_library(shared: People, cell: Cell, settings: HumanMotionConfig) -> Pe
         augmentation=settings.augmentation,
         variants=settings.variants,
     )
-    # Copies: for read-only arrays the kernels would be compiled anew. Samples are read-only
-    # everywhere, since they are large.
+    # Copies, because kernels are compiled separately for read-only arrays. Samples are large,
+    # and read-only everywhere.
     return shared._replace(
         source=people.LIBRARY,
         bodies=np.array(library.bodies),
@@ -146,17 +146,17 @@ def _with_library(shared: People, cell: Cell, settings: HumanMotionConfig) -> Pe
 
 @lru_cache(maxsize=4)
 def off_task_recordings(cell: Cell, seed: int) -> tuple[Motion, ...]:
-    """Return the motions of a cell's off_task_recordings."""
-    return roaming(cell, cell.human.size, seed, N_OFF_TASK)
+    """Return the off-task motions of a cell."""
+    return off_task_motions(cell, cell.human.size, seed, N_OFF_TASK)
 
 
 def tracks_of(motions: Sequence[Motion], floor_z: float) -> tuple[Tracks, Vec]:
-    """Return recorded runs as the kernels play them, and the sizes of who was recorded.
+    """Return runs as resampled tracks, and the sizes of their people.
 
-    Joints may leave the model's limits: the body is where it was recorded.
+    Joints may exceed the model's limits, as recorded.
 
     Args:
-        motions: Runs, placed in the cell (``motions.placed``).
+        motions: Runs, placed in the cell (``importer.placed``).
         floor_z: Height of the cell's floor [m].
 
     Returns:
@@ -166,7 +166,7 @@ def tracks_of(motions: Sequence[Motion], floor_z: float) -> tuple[Tracks, Vec]:
     spans: list[tuple[int, int, int]] = []
     first = 0
     for number, motion in enumerate(motions):
-        # The last frame is kept; a hair more than a whole number of steps is that number.
+        # The last frame is kept; the tolerance absorbs rounding.
         n = max(2, math.ceil(motion.times[-1] / TRACK_DT - 1e-6) + 1)
         at = np.minimum(np.arange(n) * TRACK_DT, motion.times[-1])
         values = np.column_stack([motion.q, motion.pelvis_z])
@@ -185,11 +185,10 @@ def tracks_of(motions: Sequence[Motion], floor_z: float) -> tuple[Tracks, Vec]:
 
 
 def at_the_table(motion: Motion, cell: Cell) -> Motion:
-    """Return a recorded run placed as if it had been made at the cell's table.
+    """Return a recorded run placed at the cell's table.
 
-    The median of where the person looked is where the cell's worker looks; seen along the
-    table, the median place is the worker's home; where the pelvis came nearest to the table is
-    where a worker stands nearest to it.
+    The median yaw becomes that of the cell's worker, the median position along the table the
+    worker's home, and the closest pelvis position the near edge of the walking area.
     """
     home_x, _, yaw = cell.human.home
     start = float(motion.q[0, 2])

@@ -1,13 +1,11 @@
-"""People who do anything but the task: they stand about, look elsewhere, reach over the table.
+"""Off-task motion: people who stand about, look elsewhere, or reach over the table.
 
-Task primitives are what a person at work does; a recorded person does more: holds a hand over
-the table for seconds, uses both, turns away, walks off and comes back. A policy that met only
-the task is lost beside them. A *roamer* goes from posture to posture by minimum jerk, each for
-a random time: one hand or both somewhere over the table, or standing anywhere in the area with
-the arms anywhere comfortable.
+Task primitives cover people at work. Recorded people also hold a hand over the table for
+seconds, use both hands, turn away, walk off and return; policies trained on the task alone
+generalise poorly to them. Off-task motion connects random postures by minimum jerk and holds
+each for a random time: one or both hands over the table, or standing anywhere in the area.
 
-Source: ours. METHOD 3.4 knows tasks only; what recorded people do besides (METHOD 3.4's motion
-capture) is the reason, their data is not used.
+Source: ours; motivated by recordings (docs/method.md 3.4), whose data is not used.
 """
 
 import math
@@ -22,40 +20,40 @@ from app.sim.mocap.importer import Motion
 from app.sim.primitives.phase import min_jerk
 
 TRACK_S = 60.0
-"""Length of one roamer's motion [s]."""
+"""Length of one motion [s]."""
 DT = 0.04
-"""Step between samples [s]."""
+"""Sampling step [s]."""
 P_OVER_TABLE = 0.6
 """Share of the postures with a hand over the table."""
 P_BOTH = 0.35
-"""Share of these in which the other hand is over the table too."""
+"""Share of these with both hands over the table."""
 DEEPEST = 0.75
-"""How far over the table from its edge a hand goes [m]."""
+"""Largest distance of a hand from the table's edge [m]."""
 HIGHEST = 0.45
-"""How high over the table [m]."""
+"""Largest height of a hand over the table [m]."""
 BACK = 0.6
-"""How far behind the working area a roamer may stand [m]."""
+"""Extension of the standing area behind the working area [m]."""
 TURN = 0.7
-"""Standard deviation of where a standing roamer looks [rad]."""
+"""Standard deviation of the yaw of a standing person [rad]."""
 WALK, SPIN = 0.8, 1.6
-"""Paces of walking [m/s] and turning [rad/s]."""
+"""Speeds of walking [m/s] and turning [rad/s]."""
 PACE = (0.3, 1.2)
-"""Least and greatest mean pace of a hand [m/s]."""
+"""Range of the mean hand speed [m/s]."""
 HOLDS = (0.0, 4.0)
-"""Least and greatest time for which a posture is held [s]."""
+"""Range of the holding time of a posture [s]."""
 ARM_LOW = np.array([-0.2, 0.05, -0.5, 0.1])
 ARM_HIGH = np.array([1.3, 0.8, 0.6, 1.8])
-"""Range of the angles of an arm that does nothing certain [rad]."""
+"""Range of the joint angles of an idle arm [rad]."""
 
 
-def roaming(cell: Cell, size: BodySize, seed: int, n: int) -> tuple[Motion, ...]:
-    """Return motions of people who roam about a cell's worker's place.
+def off_task_motions(cell: Cell, size: BodySize, seed: int, n: int) -> tuple[Motion, ...]:
+    """Return random off-task motions near the place of a cell's worker.
 
     Args:
         cell: Work cell with a worker.
-        size: Size of the people.
-        seed: Seed of all of them.
-        n: How many.
+        size: Body size.
+        seed: Seed of all motions.
+        n: Number of motions.
     """
     return tuple(
         _motion(cell, size, np.random.default_rng([seed, number]), number)
@@ -75,7 +73,7 @@ def _motion(cell: Cell, size: BodySize, rng: np.random.Generator, number: int) -
         q = then
     stacked = np.concatenate(rows)[: int(TRACK_S / DT) + 1]
     return Motion(
-        name=f"roamer-{number}",
+        name=f"off-task-{number}",
         source="drawn",
         times=DT * np.arange(len(stacked), dtype=np.float64),
         q=stacked,
@@ -90,7 +88,7 @@ def _steps(seconds: float) -> int:
 
 
 def _seconds(q: Vec, then: Vec, size: Vec, rng: np.random.Generator) -> float:
-    """Draw how long the way between two postures takes [s]."""
+    """Draw the duration of the move between two postures [s]."""
     before, after = (human.joint_points(one, size) for one in (q, then))
     way = max(float(np.linalg.norm(after[p] - before[p])) for p in ("hand_r", "hand_l"))
     walk, turn = float(np.linalg.norm(then[:2] - q[:2])), abs(float(then[2] - q[2]))
@@ -121,7 +119,7 @@ def _posture(cell: Cell, size: Vec, rng: np.random.Generator) -> Vec:
 
 
 def _over_table(cell: Cell, x: float, side: float, rng: np.random.Generator) -> Vec:
-    """Draw a point over the table within reach of somebody who stands at ``x`` [m], (3,)."""
+    """Draw a point over the table within reach of a person at ``x`` [m], shape (3,)."""
     table = cell.table
     aside = x + side * 0.15 + rng.normal(0.0, 0.2)
     return np.array(

@@ -1,8 +1,8 @@
-"""People as walking cylinders: their settings, and walks for tests, plots and replay.
+"""Pedestrians as vertical cylinders: settings, and walks for tests and plots.
 
-The arithmetic is ``people/kernels/pedestrian.py``, compiled. Source: METHOD 2.1; the defaults
-are the
-constants given there.
+``people/kernels/pedestrian.py`` computes the motion.
+
+Source: docs/method.md 2.1, with its constants as defaults.
 """
 
 import math
@@ -43,37 +43,37 @@ PEDESTRIAN_KINDS: dict[PedestrianKind, int] = {
     "constant": CONSTANT,
     "fixed-speed": FIXED_SPEED,
 }
-"""Speed and radius by METHOD 2.1; both constant per episode; a given speed."""
+"""Speed and radius of docs/method.md 2.1; both constant per episode; a given speed."""
 
 
 AUTHORS_WALK: dict[str, Any] = {"apart": 0.5, "inside": 1.0, "hurried": True, "p_go_on": 0.01}
-"""What the authors' public code does besides METHOD 2.1, as fields of the settings."""
+"""Settings of the authors' public code beyond docs/method.md 2.1."""
 
 _RANGES = (("v_min", "v_max"), ("r_min", "r_max"), ("x_min", "x_max"), ("y_min", "y_max"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PedestrianSettings:
-    """One person who is a walking cylinder (METHOD 2.1).
+    """One pedestrian (docs/method.md 2.1).
 
     Raises:
-        InvalidInput: A value that is not finite, out of its range, or above its upper partner.
+        InvalidInput: A value is not finite, out of range, or above its upper bound.
     """
 
     kind: PedestrianKind = "walker"
-    """Which variant."""
+    """Variant of the motion."""
     v_min: float = 0.3
-    """Least walking speed; slower counts as standing [m/s]."""
+    """Lowest walking speed; slower counts as standing [m/s]."""
     v_max: float = 1.0
-    """Greatest walking speed [m/s]."""
+    """Highest walking speed [m/s]."""
     r_min: float = 0.2
-    """Least radius [m]."""
+    """Smallest radius [m]."""
     r_max: float = 0.5
-    """Greatest radius [m]."""
+    """Largest radius [m]."""
     f_speed_max: float = 1.0
-    """Greatest frequency of the speed's function [Hz]."""
+    """Highest frequency of the speed function [Hz]."""
     f_radius_max: float = 0.5
-    """Greatest frequency of the radius' function [Hz]."""
+    """Highest frequency of the radius function [Hz]."""
     x_min: float = -2.0
     """Walking area, left edge [m]."""
     x_max: float = 1.0
@@ -87,22 +87,22 @@ class PedestrianSettings:
     p_still: float = 0.05
     """Probability of standing still for a whole episode."""
     p_stay: float = 0.1
-    """Probability of staying for good at a target that was reached."""
+    """Probability of staying at a reached target for the rest of the episode."""
     fixed_speed: float = 0.5
     """Speed of kind ``fixed-speed`` [m/s]; the limits of the speed do not apply to it."""
     apart: float = 0.0
-    """Least way to a new target [m]."""
+    """Smallest distance to a new target [m]."""
     inside: float = 0.0
-    """Targets lie this many radii inside the walking area."""
+    """Distance of targets from the edges of the walking area, in radii."""
     hurried: bool = False
-    """Whether the first period is never slower than ``v_min``."""
+    """Whether the speed is at least ``v_min`` in the first period."""
     p_go_on: float = 0.0
-    """Probability, per period, of walking on after having stayed at a target."""
+    """Probability per period of leaving a target after staying at it."""
 
     def __post_init__(self) -> None:
         if self.kind not in PEDESTRIAN_KINDS:
             raise InvalidInput(
-                "kind", self.kind, "must be a kind of walker", list(PEDESTRIAN_KINDS)
+                "kind", self.kind, "must be a kind of pedestrian", list(PEDESTRIAN_KINDS)
             )
         for field in fields(self)[1:]:
             value = getattr(self, field.name)
@@ -123,7 +123,7 @@ class PedestrianSettings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Walk:
-    """One walker's episode, at the ends of n control periods."""
+    """Motion of one pedestrian, sampled at n control periods."""
 
     time: Vec
     """Time since the start [s], shape (n + 1,)."""
@@ -134,19 +134,19 @@ class Walk:
     radius: Vec
     """Radius [m], shape (n + 1,); linear between."""
     target: Vec
-    """Where it is going [m], shape (n + 1, 2)."""
+    """Target [m], shape (n + 1, 2)."""
     gait: NDArray[np.int64]
     """WALKING, STAYING or STILL, shape (n + 1,)."""
 
 
 def pedestrian_rules(walkers: Sequence[PedestrianSettings]) -> PedestrianRules:
-    """Return what the kernels know of a cell's walkers."""
+    """Return the rules of pedestrians as kernels take them."""
     rows = [(PEDESTRIAN_KINDS[walker.kind], *astuple(walker)[1:]) for walker in walkers]
     return PedestrianRules(rows=np.array(rows, dtype=np.float64).reshape(-1, N_RULES))
 
 
 def pedestrian_state(n_envs: int, n_pedestrians: int) -> PedestrianState:
-    """Return rows for the walkers of ``n_envs`` environments, not started yet."""
+    """Return zeroed state of the pedestrians of ``n_envs`` environments."""
     return PedestrianState(
         rows=np.zeros((n_envs, n_pedestrians, N_STATE)),
         stream=np.zeros((n_envs, n_pedestrians, 1), dtype=np.uint64),
@@ -162,15 +162,15 @@ def walk(
     env: int = 0,
     episode: int = 0,
 ) -> Walk:
-    """Return one walker's episode, without a robot and without a rule about the start.
+    """Simulate one pedestrian without a robot or a constraint on its start.
 
     Args:
-        walker: How it walks.
+        walker: Settings of the pedestrian.
         seed: Seed of the batch.
-        seconds: How long; rounded to whole periods [s].
+        seconds: Duration [s], rounded to whole periods.
         dt: Control period [s].
-        env: Environment in the batch.
-        episode: Number of the episode.
+        env: Index of the environment.
+        episode: Index of the episode.
 
     Raises:
         InvalidInput: ``dt`` is not positive, or ``seconds`` is negative.
@@ -196,7 +196,7 @@ def walk(
 def _record(
     rules: PedestrianRules, state: PedestrianState, stream: State, dt: float, out: Vec
 ) -> None:
-    """Write the state at the ends of all periods, shape (n + 1, N_STATE)."""
+    """Write the state after each period, shape (n + 1, N_STATE)."""
     start_pedestrian(rules, state, 0, 0, stream)
     out[0] = state.rows[0, 0]
     for row in out[1:]:

@@ -1,14 +1,14 @@
-"""The synthetic person: reaches by inverse kinematics, home -> cube -> dock and back.
+"""Synthetic reaches by inverse kinematics: home, cube, dock and back.
 
-A *library* holds many postures per place and hand, with random stance, elbow and grip. A script
-visits them at random pace with pauses (``primitives/kernels/script.py``). The other hand rests
-at the table's edge while the trunk leans.
+A :class:`ReachLibrary` holds postures per place and hand with random stance, elbow and grip. A
+script visits them at random pace with pauses (``primitives/kernels/script.py``). The other hand
+rests at the table's edge while the trunk leans.
 
 ``HumanMotionConfig(motion="reaches")`` selects this motion; :func:`reach_script` makes the
 single reaches of the case studies.
 
-Source: METHOD 3.2 and 3.4. Deviates: the thesis replays motion capture through movement
-primitives; these reaches are synthetic (``primitive_library.py`` has the primitives).
+Source: docs/method.md 3.2 and 3.4. Deviates: the thesis replays motion capture through movement
+primitives (``primitive_library.py``); these reaches are synthetic.
 """
 
 import math
@@ -28,12 +28,12 @@ HANDS: tuple[Hand, Hand] = ("r", "l")
 REACH_PACE = 0.5
 """Mean palm speed of a single reach [m/s]."""
 SHORTEST_REACH_S = 0.8
-"""Least duration of a single reach [s]."""
+"""Shortest duration of a single reach [s]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReachLibrary:
-    """Postures of one cell's work, read-only arrays."""
+    """Postures of the work in one cell; arrays are read-only."""
 
     postures: Vec
     """Joint positions [m, rad], shape (n, 18)."""
@@ -42,7 +42,7 @@ class ReachLibrary:
     of_station: script.Index
     """First posture and count of each body, place and hand, (n_bodies, n_places, 2, 2)."""
     n_stations: int
-    """Number of stations, cubes first; the place after them is home."""
+    """Number of stations, cubes first; home is the place after them."""
     n_cubes: int
     """Number of cubes."""
 
@@ -51,13 +51,13 @@ class ReachLibrary:
 def build_reach_library(
     cell: Cell, seed: int, bodies: tuple[BodySize, ...] | None = None, variants: int = 24
 ) -> ReachLibrary:
-    """Make ``variants`` random postures for each body, place and hand of a cell.
+    """Draw ``variants`` postures for each body, place and hand of a cell.
 
     Args:
         cell: Work cell.
         seed: Seed of stances, elbows and grips.
-        bodies: Sizes of the people; None for the cell's own.
-        variants: Postures per place and hand.
+        bodies: Body sizes; None for the cell's own.
+        variants: Postures per body, place and hand.
     """
     rng = np.random.default_rng(seed)
     sizes = [size.vector(cell.floor_z) for size in bodies or (cell.human.size,)]
@@ -126,7 +126,7 @@ def _at_station(
 
 
 class ReachScript:
-    """A fixed sequence of moves, evaluated at any time.
+    """A fixed sequence of moves as a function of time.
 
     Args:
         start: Start of each move [s], shape (n,).
@@ -152,21 +152,21 @@ def reach_script(
     pelvis_x: tuple[float | None, float | None] = (None, None),
     delay_s: float = 0.4,
 ) -> ReachScript:
-    """Return a single reach from one point to another, both postures without chance.
+    """Return a single reach between two points with deterministic postures.
 
     Args:
         cell: Work cell.
-        hand: The hand that works.
-        palms: Where its palm is at first and at last [m], shape (3,) each; equal to rest.
-        pelvis_x: Where the person stands at first and at last [m]; None follows the palm.
+        hand: Working hand.
+        palms: Initial and final palm position [m], shape (3,) each; equal for no motion.
+        pelvis_x: Initial and final pelvis x [m]; None follows the palm.
         delay_s: Rest before the move [s].
     """
     postures = [
         _standing_reach(cell, palm, hand, stand)
         for palm, stand in zip(palms, pelvis_x, strict=True)
     ]
-    way = float(np.linalg.norm(np.subtract(*palms)))
-    duration = max(SHORTEST_REACH_S, way / REACH_PACE)
+    distance = float(np.linalg.norm(np.subtract(*palms)))
+    duration = max(SHORTEST_REACH_S, distance / REACH_PACE)
     return ReachScript(np.array([delay_s]), np.array([duration]), np.array(postures))
 
 

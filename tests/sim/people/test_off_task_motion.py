@@ -8,7 +8,7 @@ from app.sim.cells.cell import load_cell
 from app.sim.human import model as human
 from app.sim.human.anthropometry import MEDIAN
 from app.sim.people.human_motion_config import HumanMotionConfig
-from app.sim.people.off_task_motion import BACK, DEEPEST, TRACK_S, roaming
+from app.sim.people.off_task_motion import BACK, DEEPEST, TRACK_S, off_task_motions
 from app.sim.pick.batch import PickBatch, PickSettings
 
 CELL = load_cell()
@@ -17,7 +17,7 @@ SIZE = MEDIAN.vector(CELL.floor_z)
 
 def test_roamers_stay_inside_limits_area_and_paces() -> None:
     area = CELL.human
-    for motion in roaming(CELL, MEDIAN, 7, 3):
+    for motion in off_task_motions(CELL, MEDIAN, 7, 3):
         q, dt = motion.q, float(motion.times[1])
         assert motion.times[-1] == pytest.approx(TRACK_S, abs=0.1)
         assert (q >= human.Q_MIN).all() and (q <= human.Q_MAX).all()
@@ -32,7 +32,7 @@ def test_roamers_stay_inside_limits_area_and_paces() -> None:
 
 def test_hands_come_over_the_whole_reach_of_the_table() -> None:
     table, found = CELL.table, []
-    for motion in roaming(CELL, MEDIAN, 8, 4):
+    for motion in off_task_motions(CELL, MEDIAN, 8, 4):
         for row in motion.q[::25]:
             points = human.joint_points(row, SIZE)
             found += [points["hand_r"], points["hand_l"]]
@@ -44,14 +44,14 @@ def test_hands_come_over_the_whole_reach_of_the_table() -> None:
 
 
 def test_same_seed_roams_alike_and_another_does_not() -> None:
-    one, two, other = (roaming(CELL, MEDIAN, seed, 1)[0].q for seed in (3, 3, 4))
+    one, two, other = (off_task_motions(CELL, MEDIAN, seed, 1)[0].q for seed in (3, 3, 4))
     np.testing.assert_array_equal(one, two)
     assert one.shape != other.shape or not np.array_equal(one, other)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
 def test_the_asked_share_of_people_roams(share: float) -> None:
-    batch = PickBatch(CELL, 400, 5, PickSettings(work=HumanMotionConfig(roaming=share)))
+    batch = PickBatch(CELL, 400, 5, PickSettings(work=HumanMotionConfig(off_task=share)))
     batch.reset()
     roam = (batch.state.people.track >= 0).mean()
     assert abs(roam - share) < 4.0 * np.sqrt(share * (1.0 - share) / 400) + 1e-9
@@ -60,5 +60,5 @@ def test_the_asked_share_of_people_roams(share: float) -> None:
 
 
 def test_a_share_that_is_none_is_refused() -> None:
-    with pytest.raises(InvalidInput, match="roaming"):
-        HumanMotionConfig(roaming=1.5)
+    with pytest.raises(InvalidInput, match="off_task"):
+        HumanMotionConfig(off_task=1.5)
