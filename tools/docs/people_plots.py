@@ -48,17 +48,17 @@ Json = dict[str, Any]
 
 def measure(cell: Cell, library: MotionLibrary) -> Json:
     """Return statistics of random segments between random keyframes, and the primitives."""
-    legs = random_segments(cell, library, LEGS, SEED)
+    segments = random_segments(cell, library, LEGS, SEED)
     rng = np.random.default_rng(SEED)
-    ratios = [leg.path / max(leg.straight, 0.05) for leg in legs]
-    swings = [leg.swing for leg in legs]
-    paces = [_farther(leg) / _duration(library, leg, rng) for leg in legs]
+    ratios = [segment.path / max(segment.straight, 0.05) for segment in segments]
+    swings = [segment.swing for segment in segments]
+    paces = [_farther(segment) / _duration(library, segment, rng) for segment in segments]
     rows = [
         {
-            "kind": one.leg.kind,
-            "start": one.leg.start,
-            "end": one.leg.end,
-            "hand": one.leg.hand,
+            "kind": one.segment.kind,
+            "start": one.segment.start,
+            "end": one.segment.end,
+            "hand": one.segment.hand,
             "demonstrations": len(one.durations),
             "duration_s": float(np.exp(np.log(one.durations).mean())),
             "duration_log_sd": float(np.log(one.durations).std(ddof=1)),
@@ -72,9 +72,9 @@ def measure(cell: Cell, library: MotionLibrary) -> Json:
         "legs": LEGS,
         "people": len(library.bodies),
         "nodes": len(library.postures),
-        "end_miss_m": max(leg.end_miss for leg in legs),
-        "beyond_share": float(np.mean([leg.beyond > 1e-3 for leg in legs])),
-        "lowest_m": min(leg.lowest for leg in legs),
+        "end_miss_m": max(segment.end_miss for segment in segments),
+        "beyond_share": float(np.mean([segment.beyond > 1e-3 for segment in segments])),
+        "lowest_m": min(segment.lowest for segment in segments),
         "path_ratio": np.percentile(ratios, [50, 99, 100]).tolist(),
         "swing_rad": np.percentile(swings, [50, 99, 100]).tolist(),
         "pace_m_s": np.percentile(paces, [5, 50, 95]).tolist(),
@@ -86,12 +86,14 @@ def measure(cell: Cell, library: MotionLibrary) -> Json:
     }
 
 
-def _farther(leg: SegmentMotion) -> float:
-    return float(np.linalg.norm(leg.nodes[1] - leg.nodes[0], axis=1).max())
+def _farther(segment: SegmentMotion) -> float:
+    return float(np.linalg.norm(segment.keyframes[1] - segment.keyframes[0], axis=1).max())
 
 
-def _duration(library: MotionLibrary, leg: SegmentMotion, rng: np.random.Generator) -> float:
-    mean, spread = library.duration[library.segments[leg.segment][0]]
+def _duration(
+    library: MotionLibrary, segment: SegmentMotion, rng: np.random.Generator
+) -> float:
+    mean, spread = library.duration[library.segments[segment.segment][0]]
     return float(np.exp(mean + spread * rng.standard_normal()))
 
 
@@ -99,8 +101,8 @@ def draw_kind(cell: Cell, library: MotionLibrary, kind: str) -> Figure:
     """Draw palm paths of all primitives of a kind, from above and from the side."""
     pairs: dict[tuple[str, str], None] = {}
     for one in load_primitives():
-        if one.leg.kind == kind:
-            pairs[one.leg.start, one.leg.end] = None
+        if one.segment.kind == kind:
+            pairs[one.segment.start, one.segment.end] = None
     blocks, columns = KINDS[kind]
     side = 0 if kind == "cube-dock" else 1
     figure, axes = panels(2 * blocks, columns, 3.9 * blocks, sharex=False, sharey="row")

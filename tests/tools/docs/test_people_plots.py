@@ -26,7 +26,7 @@ def test_section_describes_the_shipped_primitives() -> None:
     assert found["header"]["seed"] == SEED
     assert found["header"]["demonstrations"] == N_DEMONSTRATIONS
     legs = [(one["start"], one["end"], one["hand"]) for one in found["primitives"]]
-    assert legs == [(p.leg.start, p.leg.end, p.leg.hand) for p in load_primitives()]
+    assert legs == [(p.segment.start, p.segment.end, p.segment.hand) for p in load_primitives()]
 
 
 def test_section_shows_a_small_picture_of_every_kind_of_leg() -> None:
