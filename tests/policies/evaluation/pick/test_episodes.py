@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from app.policies.checkpoints import pretrained
+from app.policies.configs.pick import PickPreset
 from app.policies.evaluation.pick import selection_rules as choice_rules
 from app.policies.evaluation.pick.episodes import Evaluator, seen_exactly, settings_for
 from app.policies.inference.task_selection import ValueNetworks
@@ -68,7 +69,7 @@ def test_an_angle_beyond_its_limit_is_told_as_the_limit():
 @pytest.fixture(scope="module")
 def two_sizes():
     bodies = (percentile_body(5.0), percentile_body(95.0))
-    usual = settings_for((1, 1), {})
+    usual = settings_for((1, 1), PickPreset())
     settings = PickSettings(
         time_limit_s=usual.time_limit_s,
         people=("worker", "worker"),

@@ -7,6 +7,7 @@ import pytest
 
 from app.errors import InvalidInput, NotFound
 from app.policies.checkpoints import pretrained
+from app.policies.configs.pick import PickPreset
 from app.policies.evaluation.pick import selection_rules as choice_rules
 from app.policies.evaluation.pick.episodes import Evaluator, View, seen_exactly, settings_for
 from app.policies.evaluation.registry import evaluate
@@ -17,7 +18,9 @@ from app.sim.cells.cell import load_cell
 @pytest.fixture(scope="module")
 def evaluator():
     networks = ValueNetworks(pretrained.load("pick"))
-    return Evaluator(networks, load_cell("pick-and-place"), 24, 99, settings_for((2, 3), {}))
+    return Evaluator(
+        networks, load_cell("pick-and-place"), 24, 99, settings_for((2, 3), PickPreset())
+    )
 
 
 def view(values, chosen, first=False):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from app.policies.checkpoints import pretrained
+from app.policies.configs.pick import PickPreset
 from app.policies.evaluation.pick import selection_rules as choice_rules
 from app.policies.evaluation.pick.episodes import Evaluator, seen_exactly, settings_for
 from app.policies.evaluation.pick.tracker import (
@@ -26,7 +27,9 @@ N = 6
 @pytest.fixture(scope="module")
 def evaluator():
     networks = ValueNetworks(pretrained.load("pick"))
-    return Evaluator(networks, load_cell("pick-and-place"), N, 99, settings_for((2, 3), {}))
+    return Evaluator(
+        networks, load_cell("pick-and-place"), N, 99, settings_for((2, 3), PickPreset())
+    )
 
 
 def misses(evaluator, row, seed=1):
