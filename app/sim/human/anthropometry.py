@@ -9,10 +9,11 @@ the shoulders, both relative to stature. With ``z`` the normal quantile of a per
 is ``1.72 m (1 + 0.054 z)``, the arms ``1 + 0.04 z`` and the shoulders ``1 + 0.05 z`` of what
 goes with it, so the 5th to 95th percentile of stature spans 1.57 to 1.87 m.
 
-Source: METHOD 4 (a human model whose dimensions are part of the state). Spreads: women and men
-pooled, from the means and standard deviations of stature, radiale-stylion plus acromion-radiale
-length and biacromial breadth of ANSUR II (Gordon et al., *2012 Anthropometric Survey of U.S.
-Army Personnel*, 2014), rounded. Deviates: the three are drawn independently of one another.
+Source: docs/method.md 4 (a human model whose dimensions are part of the state). Spreads: women
+and men pooled, from the means and standard deviations of stature, radiale-stylion plus
+acromion-radiale length and biacromial breadth of ANSUR II (Gordon et al., *2012 Anthropometric
+Survey of U.S. Army Personnel*, 2014), rounded. Deviates: the three are drawn independently of
+one another.
 """
 
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""The 18-DoF person of METHOD 3.4: names, limits, capsules and inverse kinematics.
+"""The 18-DoF person of docs/method.md 3.4: names, limits, capsules and inverse kinematics.
 
 The arithmetic of the forward direction lives in ``human/kernels/kinematics.py``, compiled;
 this module
@@ -122,7 +122,7 @@ def arm_lengths(size: Vec, hand: str) -> tuple[float, float]:
 
 def _forward(q: Vec, size: Vec) -> tuple[Vec, Vec]:
     points, frames = np.empty((body.N_POINTS, 3)), np.empty((body.N_FRAMES, 3, 3))
-    # A copy: for a read-only array the kernel would be compiled anew.
+    # A copy, because the kernel is compiled separately for read-only arrays.
     joints, trig = np.array(q, dtype=np.float64), np.empty((3, 16))
     body.points_and_frames(joints, np.array(size, dtype=np.float64), trig, points, frames)
     return points, frames

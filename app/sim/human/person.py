@@ -7,7 +7,7 @@ from app.sim.core.arrays import Vec
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Person:
-    """One person in the cell, as the 18-DoF model of METHOD 3.4."""
+    """One person in the cell, as the 18-DoF model of docs/method.md 3.4."""
 
     q: Vec
     """Joint positions [m, rad], shape (18,), order of ``human.JOINT_NAMES``."""
@@ -29,4 +29,4 @@ class Person:
     n at most ``occupancy.N_PAST - 1``; None where nothing is remembered."""
     measured: bool = False
     """Whether a safety layer may go by the velocity of that cylinder: it was measured, and is
-    not 0 for want of knowing."""
+    not 0 because it is unknown."""

@@ -338,7 +338,7 @@ def _no_run(track: BodyTrack, artifacts: Sequence[Artifact]) -> BadMotion:
 
 
 def _own(values: Vec) -> Vec:
-    """Return an array of its own that nobody can write to."""
+    """Return a read-only copy."""
     kept = np.array(values, dtype=np.float64)
     kept.setflags(write=False)
     return kept

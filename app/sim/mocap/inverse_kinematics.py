@@ -1,4 +1,4 @@
-"""From joint centres to the 18 angles, in closed form (METHOD 3.4).
+"""From joint centres to the 18 angles, in closed form (docs/method.md 3.4).
 
 Yaw from the hip line (the shoulder line where no legs were recorded); abdomen from the torso's
 frame after yaw, counted from the skeleton's rest pose; clavicles from azimuth and elevation of
@@ -161,7 +161,7 @@ def one_branch(angles: Vec, first: int) -> Vec:
 
 
 def _cheapest(nodes: list[list[float]], edges: list[list[list[float]]]) -> list[int]:
-    """Return the cheapest way through two states (Viterbi).
+    """Return the cheapest path through two states (Viterbi).
 
     Args:
         nodes: Cost of each state at each frame, n times 2.

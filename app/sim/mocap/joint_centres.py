@@ -36,7 +36,7 @@ MEASURED = (
     "forearm_r",
     "forearm_l",
 )
-"""The lengths that joint centres tell; all others are the median person's."""
+"""Lengths determined by joint centres; all others are those of the median person."""
 SIDES = {"r": -1.0, "l": 1.0}
 """Sign of the body's lateral axis (y, to the left) on either side."""
 
@@ -115,10 +115,10 @@ def model_points(q: Vec, pelvis_z: Vec, size: BodySize) -> Vec:
         shoulder = SHOULDER_R if hand == "r" else SHOULDER_L
         protract, elevate = q[:, clavicle], q[:, clavicle + 1]
         level = np.cos(elevate)
-        way = np.stack(
+        direction = np.stack(
             [level * np.sin(protract), side * level * np.cos(protract), np.sin(elevate)], axis=1
         )
-        step = lengths[f"clavicle_{hand}"] * np.einsum("nij,nj->ni", torso, way)
+        step = lengths[f"clavicle_{hand}"] * np.einsum("nij,nj->ni", torso, direction)
         points[:, shoulder] = points[:, NECK] + step
         flex, abduct, rotate, bend = q[:, arm : arm + 4].T
         upper = torso @ euler_turns(-flex, side * abduct, rotate)

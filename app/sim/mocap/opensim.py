@@ -227,7 +227,7 @@ def _onto_model(values: Mapping[str, Vec]) -> Vec:
 def _elevated(values: Mapping[str, Vec], hand: str, side: float, first: int) -> Vec:
     """Return our shoulder [rad], shape (n, 3), of plane of elevation, elevation, rotation.
 
-    The left shoulder turns about the right one's axes, the other way round.
+    The left shoulder turns about the right one's axes, with opposite sign.
     """
     plane, elevation, axial = (-side * values[name] for name in ELEVATED[hand])
     turns = axis_turns(2, plane) @ axis_turns(0, -elevation)

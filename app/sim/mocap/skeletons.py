@@ -47,7 +47,7 @@ from app.sim.mocap.up_axis import (
 MAX_TILT = np.radians(30.0)
 """Lean of the trunk in a rest pose above which that pose is not taken for upright [rad]."""
 MAX_DEGREES_IN_RADIANS = 6.2832
-"""A file none of whose angles exceeds this is one in radians, or nobody moves in it."""
+"""Largest angle of a file in radians, or without motion."""
 MAX_FAR = 100.0
 """Farthest from the file's origin that a pelvis stands [m]."""
 MAX_BACKWARD = 0.3
@@ -66,7 +66,7 @@ def body_track(bvh: Bvh, options: ReadOptions = NOTHING_STATED) -> tuple[BodyTra
 
     Raises:
         BadMotion: It is no upright person in a known unit and in degrees, or it can be read in
-            two ways; the fault names both.
+            two interpretations; the fault names both.
     """
     bvh, repeated = without_repeats(bvh)
     names = [joint.name for joint in bvh.joints]
@@ -161,12 +161,12 @@ def _directions(centres: Centres) -> BodyDirections:
     """Return the directions of a person's parts."""
 
     def both(a: str, b: str) -> Vec | None:
-        ways = [
+        directions = [
             unit(centres[b + side] - centres[a + side])
             for side in ("_r", "_l")
             if a + side in centres and b + side in centres
         ]
-        return np.concatenate(ways) if ways else None
+        return np.concatenate(directions) if directions else None
 
     return BodyDirections(
         trunk=unit(centres["neck"] - centres["pelvis"]),

@@ -3,7 +3,7 @@
 Asked are the skeleton's rest pose (legs below the pelvis, trunk above it) and the motion: legs
 and feet of a person who stands or sits, the line across the shoulders, and the lean of the
 trunk. A trunk alone cannot tell: a worker bent forward by 90 degrees in a file with y up has
-the trunk of one who stands in a file with z up. Where both fit, the file is refused.
+the trunk of one who stands in a file with z up. If both fit, the file is rejected.
 """
 
 from dataclasses import dataclass

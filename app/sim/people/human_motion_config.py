@@ -55,8 +55,8 @@ class HumanMotionConfig:
     absent: float = 0.0
     """Share of absent workers, drawn per episode."""
     bodies: tuple[BodySize, ...] | None = None
-    """Sizes drawn from, each episode anew; None for those of the library
-    (``motion_library.BODIES``), and in synthetic reaches for the cell's own person."""
+    """Body sizes, drawn per episode; None: ``primitive_library.BODIES``, or the cell's own
+    person for synthetic reaches."""
     augmentation: bool = True
     """Whether primitives are sampled and varied (docs/method.md 3.4); otherwise demonstrations
     are replayed."""

@@ -90,9 +90,9 @@ def _steps(seconds: float) -> int:
 def _seconds(q: Vec, then: Vec, size: Vec, rng: np.random.Generator) -> float:
     """Draw the duration of the move between two postures [s]."""
     before, after = (human.joint_points(one, size) for one in (q, then))
-    way = max(float(np.linalg.norm(after[p] - before[p])) for p in ("hand_r", "hand_l"))
+    distance = max(float(np.linalg.norm(after[p] - before[p])) for p in ("hand_r", "hand_l"))
     walk, turn = float(np.linalg.norm(then[:2] - q[:2])), abs(float(then[2] - q[2]))
-    return max(way / rng.uniform(*PACE), walk / WALK, turn / SPIN, 0.4)
+    return max(distance / rng.uniform(*PACE), walk / WALK, turn / SPIN, 0.4)
 
 
 def _posture(cell: Cell, size: Vec, rng: np.random.Generator) -> Vec:

@@ -1,4 +1,4 @@
-"""The safety volume of METHOD 2.8: an upright cylinder around a person's key-points.
+"""The safety volume of docs/method.md 2.8: an upright cylinder around a person's key-points.
 
 The singular value decomposition of the centred key-points gives the axes of a box; the box is
 the bound of the key-points along them. Seen from above, the box is symmetric about its centre,
@@ -24,7 +24,7 @@ from app.sim.core.arrays import Vec
 from app.sim.perception.keypoints import BODY_25, N_KEYPOINTS, K
 
 RADIUS_FACTOR = 1.1
-"""METHOD 2.8."""
+"""docs/method.md 2.8."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -130,7 +130,7 @@ def safety_cylinder(
         velocity: Velocity of the cylinder's axis [m/s], shape (2,); zero where None.
         settings: Margins.
 
-    Source: METHOD 2.8. Deviates: see the head of this file.
+    Source: docs/method.md 2.8. Deviates: see the head of this file.
     """
     settings = settings or CylinderSettings()
     seen = np.asarray(np.isfinite(points).all(axis=1))

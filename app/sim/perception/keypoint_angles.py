@@ -13,7 +13,7 @@ What is missing keeps the angles it had, and is named. The arithmetic is compile
 goes
 through ``track_angles.py``, by the same formulas (``human/kernels/joint_angles.py``).
 
-Source: METHOD 2.8 and 3.4; the inverse of ``human/kernels/kinematics.py``.
+Source: docs/method.md 2.8 and 3.4; the inverse of ``human/kernels/kinematics.py``.
 """
 
 import math
@@ -29,7 +29,7 @@ from app.sim.perception.keypoints import K
 _STEP_S = 0.005
 """Step of the derivative of the joint angles [s]."""
 _Q_MIN, _Q_MAX = human.Q_MIN.copy(), human.Q_MAX.copy()
-"""Limits as the kernel takes them: writable, or it would be compiled anew."""
+"""Joint limits, writable, because the kernel is compiled separately for read-only arrays."""
 _Q_MIN[:2], _Q_MAX[:2] = -np.inf, np.inf  # a person far away is there, not at the model's 5 m
 
 

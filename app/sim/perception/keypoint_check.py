@@ -1,6 +1,6 @@
 """Checks of key-points from outside: missing points, unusable ones, people in another frame.
 
-Trackers write a missing point in many ways; :func:`check_keypoints` takes them all. A single
+Trackers write a missing point in many forms; :func:`check_keypoints` takes them all. A single
 point that cannot be used costs that point, and is named. Only another number of points is an
 error.
 
@@ -88,7 +88,7 @@ class Keypoints:
     unusable: tuple[str, ...] = ()
     """Names of key-points dropped because their numbers cannot be used."""
     implausible: str | None = None
-    """Why nobody can stand like this in the cell's frame, with numbers; None: somebody can.
+    """Reason why the key-points cannot be in the cell's frame, with numbers; None: they can.
     All key-points are missing then."""
 
     @property
@@ -259,7 +259,7 @@ def why_implausible(points: Vec, floor_z: float | None) -> str | None:
 
 
 def _why_not_standing(points: Vec, floor_z: float) -> str | None:
-    """Return why nobody is supported by the floor like this, or None."""
+    """Return why the floor cannot support a person like this, or None."""
     heights = {part: float(_middle(points, part)[2] - floor_z) for part in _PARTS}
     for part, height in heights.items():
         high = _PARTS[part][1]

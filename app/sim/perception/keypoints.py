@@ -1,7 +1,7 @@
 """Key-points of a depth camera in the layout BODY_25: names, sides, our body's own.
 
 A frame is 25 points [m] in the cell's frame, NaN where a point is missing, as OpenPose with a
-depth image gives them (METHOD 2.8). ``keypoint_check.py`` checks frames from outside.
+depth image gives them (docs/method.md 2.8). ``keypoint_check.py`` checks frames from outside.
 
 :func:`keypoints_of` gives the key-points of our 18-DoF person. Shoulders, elbows, wrists, neck
 and mid-hip are joints of the model. The model has no face, knees or feet, so these are placed
@@ -9,7 +9,7 @@ by proportion: the face rigid on the torso (the model's head does not turn), the
 distance to either side of the pelvis, and under each hip a straight upright leg, as its
 capsule, with the knee half-way and the foot pointing where the pelvis faces.
 
-Source: Cao et al., OpenPose (2019), output format BODY_25; METHOD 2.8.
+Source: Cao et al., OpenPose (2019), output format BODY_25; docs/method.md 2.8.
 """
 
 from typing import Literal
@@ -123,9 +123,9 @@ def swapped_against(points: Vec, expected: Vec, group: Group, margin: float = 0.
 
 
 def faces_backward(points: Vec, group: Group) -> bool:
-    """Return whether a group's sides contradict the way the person faces; no history needed.
+    """Return whether a group's sides contradict the facing direction, from one frame.
 
-    Shoulders are held against the nose before the ears, hips against the toes before the
+    Shoulders are compared with the nose before the ears, hips with the toes before the
     heels; these directions stay right where left and right are mistaken.
 
     Args:

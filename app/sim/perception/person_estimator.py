@@ -122,7 +122,7 @@ class PersonEstimate:
     age_s: float
     """Time since the newest credible key-point [s]; inf without any."""
     cylinder: SafetyCylinder | None
-    """Safety cylinder of METHOD 2.8; None if no person was ever seen."""
+    """Safety cylinder of docs/method.md 2.8; None if no person was ever seen."""
     person: Person | None
     """Joint angles and speeds; None before pelvis and trunk were seen together, and if the
     model does not fit the key-points."""

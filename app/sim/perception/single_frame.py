@@ -33,7 +33,7 @@ FASTEST_POINT = 20.0
 _ANYWHERE = SafetyCylinder(
     center=np.zeros(2), radius=5.0, bottom=-5.0, top=5.0, velocity=np.zeros(2)
 )
-"""Where somebody may be of whose place nothing is known."""
+"""Cylinder of a person at an unknown place."""
 _STEP_S = 0.005
 """Step of the derivative of the cylinder's centre [s]."""
 
@@ -46,7 +46,7 @@ def estimate_once(
     place: str = "",
     floor_z: float | None = None,
 ) -> PersonEstimate:
-    """Return what one frame tells of a person.
+    """Return the estimate of a person from one frame.
 
     Args:
         keypoints: Order of BODY_25, cell's frame [m], shape (25, 3); NaN where missing.

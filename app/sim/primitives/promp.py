@@ -14,9 +14,9 @@ mu is their mean, Sigma their covariance and a small smooth floor. From there, i
     observing  y = A w + e, e ~ N(0, R):  K = Sigma A^T (A Sigma A^T + R)^-1,
                mu* = mu + K (y - A mu),       Sigma* = (I - K A) Sigma (I - K A)^T + K R K^T
 
-Source: METHOD 3.4; Paraschos, Daniel, Peters, Neumann, "Probabilistic Movement Primitives",
-NIPS 2013, eqs. (1)-(6), and "Using probabilistic movement primitives in robotics", Autonomous
-Robots 42, 2018, sections 3.1-3.3.
+Source: docs/method.md 3.4; Paraschos, Daniel, Peters, Neumann, "Probabilistic Movement
+Primitives", NIPS 2013, eqs. (1)-(6), and "Using probabilistic movement primitives in robotics",
+Autonomous Robots 42, 2018, sections 3.1-3.3.
 
 Deviates: lambda is per sample, so that it means the same for long and short demonstrations. The
 floor ``floor^2 (I x exp(-(c_i - c_k)^2 / (2 l^2)))`` is added to Sigma: n demonstrations span
@@ -59,7 +59,7 @@ class ProMP:
     duration_spread: float
     """Standard deviation of the log of the durations."""
     residual: Vec
-    """What the regression left, root mean square per joint [m, rad], shape (n_joints,)."""
+    """Root-mean-square residual of the regression per joint [m, rad], shape (n_joints,)."""
 
     def __post_init__(self) -> None:
         for array in (self.mean, self.cov, self.residual):
@@ -169,7 +169,7 @@ def of_weights(
         durations: How long each took [s], shape (n,).
         width: Width of the Gaussians [phase]; None: :func:`usual_width`.
         floor: Standard deviation added to every weight, smoothly along the phase [m, rad].
-        residual: What the regression left [m, rad], shape (n_joints,); None: nothing.
+        residual: Residual of the regression [m, rad], shape (n_joints,); None: nothing.
     """
     n, n_joints, n_basis = weights.shape
     away = (weights - weights.mean(axis=0)).reshape(n, -1)
@@ -269,7 +269,7 @@ def gain(promp: ProMP, rows: Vec, noise: Vec) -> Vec:
 
     Args:
         promp: Primitive.
-        rows: What is observed of the weights, A, shape (m, n_weights).
+        rows: Observation matrix A of the weights, shape (m, n_weights).
         noise: Covariance R of the observation, shape (m, m); EXACT is added.
     """
     spread = rows @ promp.cov
@@ -304,7 +304,7 @@ def weight_root(promp: ProMP) -> Vec:
 def draw_weights(
     promp: ProMP, n: int, rng: np.random.Generator, root: Vec | None = None
 ) -> Vec:
-    """Draw weights, heedless of joint limits, shape (n, n_joints, n_basis).
+    """Draw weights without regard to joint limits, shape (n, n_joints, n_basis).
 
     Args:
         promp: Primitive.

@@ -5,10 +5,11 @@ distribution cut off at the limits. After ``tries`` draws one is *projected* ins
 joint leaves its limits most, the limit becomes a via point, again and again.
 
 Joint via points are linear and met at once, by Matheron's rule; each draw then goes its own
-way to the places of the body (``via_points.meet``).
+path to the places of the body (``via_points.meet``).
 
-Source: METHOD 3.4; Paraschos et al. 2018, section 3.3; Wilson et al., "Pathwise conditioning
-of Gaussian processes", JMLR 22, 2021. Deviates: the source's primitives know no joint limits.
+Source: docs/method.md 3.4; Paraschos et al. 2018, section 3.3; Wilson et al., "Pathwise
+conditioning of Gaussian processes", JMLR 22, 2021. Deviates: the source's primitives know no
+joint limits.
 """
 
 from collections.abc import Callable, Sequence
@@ -43,7 +44,7 @@ AnyVia = TypeVar("AnyVia", JointVia, PointVia)
 
 
 def beyond_limits(promp: ProMP, weights: Vec) -> Vec:
-    """Return how far each joint leaves its limits on the way [m, rad], shape (..., m, 18)."""
+    """Return the excess of each joint over its limits [m, rad], shape (..., m, 18)."""
     q = positions(promp, weights, GRID)
     over = np.maximum(human.Q_MIN - q, q - human.Q_MAX)
     return np.asarray(np.maximum(over, 0.0))

@@ -12,8 +12,8 @@ itself go on until the body's own kinematics meet ``p*``. With the mean as ``w_0
 the primitive; with a draw from the primitive as ``w_0`` it makes a sample (Matheron's rule),
 and then every *sample* meets the points, not only their mean.
 
-Source: METHOD 3.4; Paraschos et al. 2018, sections 3.3 and 3.4; iterated update: Bell and
-Cathey 1993; Matheron's rule: Wilson et al. 2021. Deviates: Paraschos conditions on the task
+Source: docs/method.md 3.4; Paraschos et al. 2018, sections 3.3 and 3.4; iterated update: Bell
+and Cathey 1993; Matheron's rule: Wilson et al. 2021. Deviates: Paraschos conditions on the task
 space through samples of an extended model; linearising needs none and is exact at its end.
 """
 
@@ -228,7 +228,7 @@ def meet(
 def _change(
     promp: ProMP, start: Vec, weights: Vec, vias: Sequence[Via], points: PointsOf
 ) -> Vec:
-    """Return the way from ``weights`` to the update of ``start`` linearised there."""
+    """Return the step from ``weights`` to the update of ``start`` linearised there."""
     rows, values = _stacked(promp, vias, weights, points)
     full = start.ravel() + gain(promp, rows, noise_of(vias)) @ (values - rows @ start.ravel())
     change = full.reshape(start.shape) - weights

@@ -192,7 +192,7 @@ def people_of(cell: Cell, work: HumanMotionConfig | None = None) -> People:
         yielding=0.0,
         pace=1.0,
         walkers=pedestrian_rules([pedestrian_settings(person) for person in cell.cylinders]),
-        nobody=human.rest_posture(*FAR_AWAY),
+        no_person=human.rest_posture(*FAR_AWAY),
     )
     return with_human_motion(shared, cell, work) if workers and work is not None else shared
 

@@ -288,7 +288,7 @@ def test_the_asked_share_of_people_is_not_there_and_is_never_touched() -> None:
     assert alone.sum() > 20
     assert (batch.state.outcome[alone] != COLLISION).all()
     assert (batch.state.outcome[~alone] == COLLISION).mean() > 0.1
-    assert (batch.state.people.q[absent] == batch.world.people.nobody).all()
+    assert (batch.state.people.q[absent] == batch.world.people.no_person).all()
 
 
 def test_who_is_not_there_looks_like_nobody_in_an_empty_cell() -> None:

@@ -157,7 +157,7 @@ class KeypointObserver:
         if e in self._frame_at:
             person = estimator.person_at(t if self._row.predicted else self._frame_at[e])
         if person is None:
-            return batch.world.people.nobody, np.zeros(18)
+            return batch.world.people.no_person, np.zeros(18)
         return person.q, person.qd
 
     def _measure(self, seen: Vec, true: Vec, size: Vec) -> None:

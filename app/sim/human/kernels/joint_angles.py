@@ -12,7 +12,7 @@ left by ``asin(u_y)`` (abduction on the left, minus abduction on the right); its
 the arm's first axis to where the elbow bends. (flex, abduct, rotate) and (flex + pi, pi -
 abduct, rotate + pi) turn an arm alike.
 
-Source: METHOD 3.4.
+Source: docs/method.md 3.4.
 """
 
 import math
@@ -33,7 +33,7 @@ def unit_range(value: float) -> float:
 
 @kernel(inline="always")
 def heading(x: float, y: float) -> float:
-    """Return the yaw [rad] of somebody whose left side lies along (x, y)."""
+    """Return the yaw [rad] of a person whose left side points along (x, y)."""
     return math.atan2(-x, y)
 
 

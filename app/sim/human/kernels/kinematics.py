@@ -4,7 +4,7 @@ Tree: pelvis (x, y, yaw) - abdomen (flexion, side bend, twist) - clavicles (prot
 elevation) - shoulders (flexion, abduction, rotation) - elbows. Body axes: x forward, y left,
 z up. The abdomen turns by ``Ry(flex) Rx(side) Rz(twist)``; an upper arm hangs along -z and
 turns by ``Ry(-flex) Rx(-+abduct) Rz(rotate)`` (right, left), the forearm by ``Ry(-elbow)``.
-Joint order: ``app.sim.human.model.JOINT_NAMES``. Source: METHOD 3.4, thesis fig. 5.2.
+Joint order: ``app.sim.human.model.JOINT_NAMES``. Source: docs/method.md 3.4, thesis fig. 5.2.
 """
 
 import numpy as np

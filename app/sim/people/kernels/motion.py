@@ -52,7 +52,7 @@ def worker_at(
     """
     if state.track[e, w] == ABSENT:
         for j in range(18):
-            state.q[e, w, j], state.qd[e, w, j] = people.nobody[j], 0.0
+            state.q[e, w, j], state.qd[e, w, j] = people.no_person[j], 0.0
         return
     if state.track[e, w] >= 0:
         _track_at(people, state, e, w, when, rate)

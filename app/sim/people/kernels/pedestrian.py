@@ -1,30 +1,27 @@
-"""The walking cylinder: a person who walks about with pseudo-random speed and radius, compiled.
+"""Pedestrian: a vertical cylinder with pseudo-random speed and radius (compiled).
 
 Speed and radius follow, each with its own constants (thesis eq. 4.1, 4.2)::
 
     f(t) = m + 0.5 a sin(w t + p1) + 0.3 a sin(3 w t + p2) + 0.2 a sin(4 w t + p3)
 
-with ``m`` the middle of the range, ``a`` drawn from the range, ``w / 2 pi`` up to a greatest
-frequency and the phases free, all once per episode. A speed below ``v_min`` counts as
-standing, one above ``v_max`` as ``v_max``; the radius is clipped. The way leads straight to a
-target drawn from the walking area, and on to the next within a tolerance. The cylinder does not
-react to the robot. Source: METHOD 2.1.
+with ``m`` the middle of the range, ``a`` drawn from the range, ``w / 2 pi`` up to a maximum
+frequency and free phases, drawn once per episode. A speed below ``v_min`` is standing; speeds
+are limited to ``v_max`` and radii to their range. The path leads straight to a target drawn
+from the walking area, and to the next one within a tolerance. Pedestrians do not react to the
+robot.
 
-The speed at the start of a period holds for the whole period, and the radius changes linearly
-in it: x, y, vx, vy, r tell where the axis is one period later.
+The speed at the start of a period holds for the period, and the radius changes linearly: x, y,
+vx, vy determine the axis one period later. With sine and cosine of ``w t`` the multiples are
+products, and ``a sin(k w t + p) = (a cos p) sin(k w t) + (a sin p) cos(k w t)``.
 
-The three sines need one sine and one cosine: with those of ``w t`` the ones of its multiples
-are products, and ``a sin(k w t + p) = (a cos p) sin(k w t) + (a sin p) cos(k w t)``. A walker
-is one row of one array, so that a state is handed on as a whole.
+A row also stores the past 1.5 s, radius and walking speed every 0.1 s, including the time
+before the episode.
 
-Deviates: the authors' public code draws the constants of the speed anew at every step, which
-is not the continuous function that the text describes, and uses 0.1 for the third amplitude;
-this is the printed function, drawn once per episode. ``a`` is "a random value within the range"
-in the text: uniform in [v_min, v_max] and in [r_min, r_max] here, frequencies uniform from 0.
-What else that code does is there to be chosen, in the rules APART to P_GO_ON, off by default.
-
-A row also keeps what a watcher would remember of the last 1.5 s: radius and walking speed every
-tenth of a second. People are watched before an episode starts, and walk then already.
+Source: docs/method.md 2.1. Deviates: the authors' public code redraws the constants of the
+speed at every step, which is not the continuous function of the text, and uses 0.1 for the
+third amplitude; this is the printed function, drawn once per episode. ``a``, "a random value
+within the range", is uniform in [v_min, v_max] and [r_min, r_max], frequencies uniform from 0.
+The rules APART to P_GO_ON select other features of that code; they are off by default.
 """
 
 import math
@@ -36,10 +33,10 @@ from app.sim.core.kernels.rng import State, split_stream, uniform
 from app.sim.geometry.segments import FAST
 
 WALKER, CONSTANT, FIXED_SPEED = range(3)
-"""Kinds: METHOD 2.1; speed and radius constant per episode; a given speed, to which the limits
-of the speed do not apply, with a radius as METHOD 2.1."""
+"""Kinds: docs/method.md 2.1; constant speed and radius per episode; a given speed without
+limits, and a radius of docs/method.md 2.1."""
 WALKING, STAYING, STILL = range(3)
-"""Gaits: on the way; at a target it reached, for good; never moves in this episode."""
+"""Gaits: walking; staying at a reached target; standing still for the whole episode."""
 AMPLITUDES = (0.5, 0.3, 0.2)
 """Shares of the three sines, eq. (4.1), (4.2)."""
 
@@ -178,7 +175,7 @@ def start_pedestrian(
     """Draw an episode of one walker: place, gait, first target, the two functions.
 
     The place is uniform in the walking area. Where a start needs clearance from the robot, the
-    caller draws again: that is a rule of the scenario (METHOD 2.1, open).
+    caller draws again: that is a rule of the scenario (docs/method.md 2.1, open).
 
     Args:
         rules: How the walkers walk.
@@ -225,8 +222,8 @@ def advance_pedestrian(
     """
     rule, rows = rules.rows, state.rows
     if rows[e, p, GAIT] == WALKING:
-        way = rows[e, p, VX] * rows[e, p, COURSE_X] + rows[e, p, VY] * rows[e, p, COURSE_Y]
-        left = rows[e, p, LEFT] - dt * way
+        speed = rows[e, p, VX] * rows[e, p, COURSE_X] + rows[e, p, VY] * rows[e, p, COURSE_Y]
+        left = rows[e, p, LEFT] - dt * speed
         if left > 0.0:
             rows[e, p, X] += dt * rows[e, p, VX]
             rows[e, p, Y] += dt * rows[e, p, VY]

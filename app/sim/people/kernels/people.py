@@ -85,7 +85,7 @@ class People(NamedTuple):
     """Speed of the workers relative to their scripts."""
     walkers: PedestrianRules
     """Rules of the pedestrians."""
-    nobody: Vec
+    no_person: Vec
     """Posture of a person beyond any interaction, in place of no person [m, rad], (18,)."""
 
 
@@ -325,7 +325,7 @@ def see_nearest(
         return
     copy_values(people.bodies[0], geometry.seen_size)
     for j in range(18):
-        geometry.seen_q[j], geometry.seen_qd[j] = people.nobody[j], 0.0
+        geometry.seen_q[j], geometry.seen_qd[j] = people.no_person[j], 0.0
     if who >= 0:
         rows, k = state.walkers.rows, who - n_workers
         x, y = rows[e, k, X], rows[e, k, Y]

@@ -113,14 +113,14 @@ def _either(points: Vec, middle: int, right: int, left: int) -> Point:
 
 @kernel(inline="always")
 def _across(points: Vec, right: int, left: int, middle: int) -> Point:
-    """Return the way from right to left of a pair, or from its middle where one is missing."""
+    """Return the direction from right to left of a pair, or from or to its middle."""
     r, l, m = _row(points, right), _row(points, left), _row(points, middle)
-    way = _minus(l, r)
-    if _unknown(way):
-        way = _minus(l, m)
-    if _unknown(way):
-        way = _minus(m, r)
-    return way
+    direction = _minus(l, r)
+    if _unknown(direction):
+        direction = _minus(l, m)
+    if _unknown(direction):
+        direction = _minus(m, r)
+    return direction
 
 
 @kernel(inline="always")
@@ -151,7 +151,7 @@ def fit_joints(
         q_max: Upper joint limits [m, rad], shape (18,).
         space: Work space.
         q: The last joint positions; overwritten by the new ones [m, rad], shape (18,).
-        held: Overwritten: which kept their value for want of key-points, shape (18,).
+        held: Overwritten: joints without key-points, which keep their value, shape (18,).
     """
     for j in range(18):
         held[j] = False
@@ -167,8 +167,8 @@ def fit_joints(
     torso = space.frames[body.F_TORSO]
     for arm in range(2):
         side, first = (-1.0, 6) if arm == 0 else (1.0, 8)
-        way = _minus(_row(points, SHOULDERS[arm]), _row(points, NECK))
-        bar, length = _inside(torso, way), _length(way)
+        direction = _minus(_row(points, SHOULDERS[arm]), _row(points, NECK))
+        bar, length = _inside(torso, direction), _length(direction)
         if not length > 1e-6:  # NaN, or all in one place.
             held[first] = held[first + 1] = True
             continue

@@ -49,7 +49,7 @@ def test_nobody_is_seen_as_somebody_far_away():
     batch = PickBatch(load_cell(), 2, 7, PickSettings(people=()))
     batch.reset()
     sight = seen_exactly(batch, np.arange(2))
-    np.testing.assert_array_equal(sight.q, np.tile(batch.world.people.nobody, (2, 1)))
+    np.testing.assert_array_equal(sight.q, np.tile(batch.world.people.no_person, (2, 1)))
     assert sight.q[0, 1] > 3.0 and not sight.qd.any()
 
 

@@ -83,7 +83,8 @@ def test_a_tracker_that_delivers_nothing_shows_nobody(evaluator):
     look = KeypointObserver(replace(blind, tracker=replace(blind.tracker, lost=1.0)), 1)
     evaluator.batch.reset()
     seen = look(evaluator.batch, np.arange(N))
-    np.testing.assert_array_equal(seen.q, np.tile(evaluator.batch.world.people.nobody, (N, 1)))
+    no_person = evaluator.batch.world.people.no_person
+    np.testing.assert_array_equal(seen.q, np.tile(no_person, (N, 1)))
     assert not seen.qd.any()
 
 
