@@ -50,7 +50,7 @@ Actions = NDArray[np.float32]
 Rows = NDArray[np.int64]
 
 
-class Mover(Protocol):
+class Controller(Protocol):
     """Moves the robots of a batch."""
 
     def acts(self, batch: ReachBatch) -> Actions:
@@ -81,7 +81,7 @@ class Direct:
         self._actor = actor
 
     def acts(self, batch: ReachBatch) -> Actions:
-        """Return actions for every cell; see :class:`Mover`."""
+        """Return actions for every cell; see :class:`Controller`."""
         return _for_running(self, batch)
 
     def ask(self, batch: ReachBatch, rows: Rows, who: int | None) -> Actions:
@@ -105,7 +105,7 @@ class Interpolated:
         self._between = Interpolation(actor)
 
     def acts(self, batch: ReachBatch) -> Actions:
-        """Return actions for every cell; see :class:`Mover`.
+        """Return actions for every cell; see :class:`Controller`.
 
         Raises:
             GoalOutside: A goal lies outside the targets.
@@ -132,7 +132,7 @@ class Averaged:
         self._asked = asked
 
     def acts(self, batch: ReachBatch) -> Actions:
-        """Return actions for every cell; see :class:`Mover`."""
+        """Return actions for every cell; see :class:`Controller`."""
         return _for_running(self, batch)
 
     def ask(self, batch: ReachBatch, rows: Rows, who: int | None) -> Actions:
@@ -158,11 +158,11 @@ class Ahead:
         InvalidInput: The policy cannot be played ahead.
     """
 
-    def __init__(self, mover: Mover, actor: ReachActor, layer: Layer = NO_LAYER) -> None:
+    def __init__(self, mover: Controller, actor: ReachActor, layer: Layer = NO_LAYER) -> None:
         self._mover, self._ahead, self.layer = mover, Lookahead(actor), layer
 
     def acts(self, batch: ReachBatch) -> Actions:
-        """Return actions for every cell; see :class:`Mover`."""
+        """Return actions for every cell; see :class:`Controller`."""
         act = self._mover.acts(batch)
         self._ahead.layer = self.layer
         self._ahead.improve(batch, act)
@@ -183,7 +183,7 @@ def person_weights(distances: Vec) -> Vec:
     return shares
 
 
-def mover_of(actor: ReachActor, how: How | None = None) -> Mover:
+def controller_of(actor: ReachActor, how: How | None = None) -> Controller:
     """Return a way to move by a policy.
 
     Args:
@@ -202,7 +202,7 @@ def mover_of(actor: ReachActor, how: How | None = None) -> Mover:
     return Ahead(mover, actor) if how.endswith(AHEAD) else mover
 
 
-def hows_of(actor: ReachActor) -> tuple[How, ...]:
+def inference_modes_of(actor: ReachActor) -> tuple[How, ...]:
     """Return the ways in which a policy can be asked."""
     between, ahead = interpolates(actor), looks_ahead(actor)
     return tuple(

@@ -3,7 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from app.policies.inference.controllers import Ahead, Mover, hows_of, mover_of
+from app.policies.inference.controllers import (
+    Ahead,
+    Controller,
+    controller_of,
+    inference_modes_of,
+)
 from app.policies.inference.rollout import layer_of
 from app.sim.core.arrays import Vec
 from app.sim.reach.batch import GoalRule, ReachBatch, ViewName
@@ -21,7 +26,9 @@ class ReachPilot:
 
     def __init__(self, actor: ReachActor) -> None:
         self._actor = actor
-        self._movers: dict[str, Mover] = {how: mover_of(actor, how) for how in hows_of(actor)}
+        self._movers: dict[str, Controller] = {
+            how: controller_of(actor, how) for how in inference_modes_of(actor)
+        }
 
     @property
     def checkpoint(self) -> str:

@@ -7,8 +7,8 @@ from app.errors import CheckpointMismatch, GoalOutside, InvalidInput
 from app.policies.inference.controllers import (
     HOWS,
     NEAREST_M,
-    hows_of,
-    mover_of,
+    controller_of,
+    inference_modes_of,
     person_weights,
 )
 from app.policies.inference.target_interpolation import Interpolation
@@ -43,7 +43,7 @@ def random_goals(n: int, seed: int = 4) -> np.ndarray:
 def test_direct_is_the_policy_on_the_ordinary_observation(view: str) -> None:
     batch, actor = batch_of(observation=view), RandomActor(view=view)
     obs = batch.restart()
-    np.testing.assert_array_equal(mover_of(actor, "direct").acts(batch), actor.acts(obs))
+    np.testing.assert_array_equal(controller_of(actor, "direct").acts(batch), actor.acts(obs))
 
 
 @pytest.mark.parametrize("goals", ["grid", "halton"])
@@ -51,7 +51,8 @@ def test_at_a_target_the_interpolated_action_is_the_policys(goals: str) -> None:
     batch, actor = batch_of(n_envs=54), RandomActor(goals)
     send(batch, TARGETS[goals])
     np.testing.assert_array_equal(
-        mover_of(actor, "interpolated").acts(batch), mover_of(actor, "direct").acts(batch)
+        controller_of(actor, "interpolated").acts(batch),
+        controller_of(actor, "direct").acts(batch),
     )
 
 
@@ -60,18 +61,18 @@ def test_between_targets_it_is_the_weighted_mean_of_actions_for_them(goals: str)
     batch, actor = batch_of(n_envs=6), RandomActor(goals)
     wanted = random_goals(6)
     send(batch, wanted)
-    found = mover_of(actor, "interpolated").acts(batch)
+    found = controller_of(actor, "interpolated").acts(batch)
     mix = Interpolation(actor).cells.mix(wanted)
     mean = np.zeros((6, 6))
     for k in range(mix.which.shape[1]):
         send(batch, actor.targets[mix.which[:, k]])
-        mean += mix.weights[:, k, None] * mover_of(actor, "direct").acts(batch)
+        mean += mix.weights[:, k, None] * controller_of(actor, "direct").acts(batch)
     np.testing.assert_allclose(found, mean, atol=1e-6)
 
 
 @pytest.mark.parametrize("goals", ["grid", "halton"])
 def test_actions_are_continuous_over_the_borders_of_cells(goals: str) -> None:
-    batch, mover = batch_of(n_envs=400), mover_of(RandomActor(goals))
+    batch, mover = batch_of(n_envs=400), controller_of(RandomActor(goals))
     state = batch.state
     for name in ("q", "qd", "clear", "time_left"):
         getattr(state, name)[:] = getattr(state, name)[:1]
@@ -86,25 +87,27 @@ def test_a_goal_outside_the_grid_is_refused_with_axis_and_distance() -> None:
     batch = batch_of(n_envs=2)
     send(batch, np.array([[0.0, 0.8, 0.3], [0.0, 1.3, 0.3]]))
     with pytest.raises(GoalOutside, match=r"0\.3 m outside along y"):
-        mover_of(RandomActor("grid")).acts(batch)
-    assert mover_of(RandomActor("box")).acts(batch).shape == (2, 6)
+        controller_of(RandomActor("grid")).acts(batch)
+    assert controller_of(RandomActor("box")).acts(batch).shape == (2, 6)
 
 
 def test_a_policy_without_targets_cannot_interpolate() -> None:
     with pytest.raises(InvalidInput, match="no targets"):
-        mover_of(RandomActor("box"), "interpolated")
+        controller_of(RandomActor("box"), "interpolated")
     with pytest.raises(InvalidInput, match="choices: direct"):
-        mover_of(RandomActor("box"), "sideways")
+        controller_of(RandomActor("box"), "sideways")
 
 
 def test_only_policies_that_can_look_ahead_do() -> None:
-    assert hows_of(RandomActor()) == tuple(how for how in HOWS if not how.endswith("ahead"))
-    assert hows_of(RandomActor("box")) == ("direct", "averaged")
+    assert inference_modes_of(RandomActor()) == tuple(
+        how for how in HOWS if not how.endswith("ahead")
+    )
+    assert inference_modes_of(RandomActor("box")) == ("direct", "averaged")
 
 
-@pytest.mark.parametrize("how", hows_of(RandomActor()))
+@pytest.mark.parametrize("how", inference_modes_of(RandomActor()))
 def test_ended_cells_get_no_action_and_the_others_the_same(how: str) -> None:
-    batch, mover = batch_of(("walker", "constant")), mover_of(RandomActor(), how)
+    batch, mover = batch_of(("walker", "constant")), controller_of(RandomActor(), how)
     before = mover.acts(batch)
     batch.state.outcome[[1, 4]] = 1
     after = mover.acts(batch)
@@ -122,13 +125,13 @@ def test_beside_one_person_averaging_changes_nothing(
     send(batch, random_goals(12))
     averaged = "averaged" if inner == "direct" else "averaged-interpolated"
     np.testing.assert_array_equal(
-        mover_of(actor, averaged).acts(batch), mover_of(actor, inner).acts(batch)
+        controller_of(actor, averaged).acts(batch), controller_of(actor, inner).acts(batch)
     )
 
 
 def test_averaged_is_the_mean_of_actions_beside_each_person_alone() -> None:
     batch, actor = batch_of(("walker", "constant", "fixed-speed")), RandomActor()
-    found, rows = mover_of(actor, "averaged").acts(batch), np.arange(12)
+    found, rows = controller_of(actor, "averaged").acts(batch), np.arange(12)
     weights = person_weights(batch.person_distances(rows))
     mean = np.zeros((12, 6))
     for who in range(3):
@@ -152,4 +155,4 @@ def test_weights_fall_with_the_square_of_the_distance() -> None:
 
 def test_a_batch_that_observes_something_else_is_refused() -> None:
     with pytest.raises(CheckpointMismatch, match="view"):
-        mover_of(RandomActor(view="state")).acts(batch_of())
+        controller_of(RandomActor(view="state")).acts(batch_of())

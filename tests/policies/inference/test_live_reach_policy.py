@@ -7,7 +7,7 @@ from app.live.commands import SetPolicy
 from app.live.reach.commands import SetInferenceMode, SetSafety
 from app.live.reach.controller import TIME_LIMIT_S, ReachController
 from app.live.reach.world import ReachWorld
-from app.policies.inference.controllers import Ahead, mover_of
+from app.policies.inference.controllers import Ahead, controller_of
 from app.policies.inference.live_reach_policy import ReachPilot
 from app.policies.inference.reach_policy import ReachPolicy
 from app.policies.inference.rollout import NO_LAYER
@@ -50,7 +50,7 @@ def test_live_state_is_seen_as_the_batch_sees_it(policy: ReachPolicy) -> None:
             float(state.elapsed[0]),
             None,
         )
-        assert np.allclose(act, mover_of(policy, way).acts(batch)[0], atol=1e-6)
+        assert np.allclose(act, controller_of(policy, way).acts(batch)[0], atol=1e-6)
 
 
 class Noting(ReachPilot):

@@ -8,7 +8,7 @@ import pytest
 
 from app.errors import CheckpointMismatch, GoalOutside, InvalidInput
 from app.policies.checkpoints import pretrained
-from app.policies.inference.controllers import mover_of
+from app.policies.inference.controllers import controller_of
 from app.policies.inference.motion_decision import MotionDecider
 from app.policies.inference.reach_policy import ReachPolicy
 from app.sim.cells.cell import load_cell
@@ -97,7 +97,7 @@ def test_one_state_gives_the_action_and_piece_that_training_gives(
 ) -> None:
     batch, actor = driven(6, people), RandomActor()
     running = np.flatnonzero(batch.state.outcome == 0)
-    expected, decide = mover_of(actor, way).acts(batch), MotionDecider(actor, CELL).decide
+    expected, decide = controller_of(actor, way).acts(batch), MotionDecider(actor, CELL).decide
     found = {int(e): decide(replace(told(batch, e), way=way)) for e in running}
     clear, distance = batch.state.clear.copy(), batch.state.distance.copy()
     batch.step(expected, auto_reset=False)
@@ -126,7 +126,7 @@ def test_people_may_come_in_any_order() -> None:
 
 def test_averaged_is_what_the_mover_does() -> None:
     batch, actor = driven(5, ("walker", "constant", "fixed-speed")), RandomActor()
-    expected = mover_of(actor, "averaged-interpolated").acts(batch)
+    expected = controller_of(actor, "averaged-interpolated").acts(batch)
     decide = MotionDecider(actor, CELL).decide
     for e in np.flatnonzero(batch.state.outcome == 0):
         decision = decide(replace(told(batch, e), beside="averaged"))

@@ -6,7 +6,7 @@ import pytest
 from app.errors import InvalidInput
 from app.policies.checkpoints import pretrained
 from app.policies.evaluation.reach.episodes import play, target_goals
-from app.policies.inference.controllers import hows_of, mover_of
+from app.policies.inference.controllers import controller_of, inference_modes_of
 from app.policies.inference.reach_policy import ReachPolicy
 from app.policies.inference.rollout import OTHERS, PASSED, Lookahead, looks_ahead
 from app.policies.networks.actor_critic import BASE_WEIGHT
@@ -38,7 +38,7 @@ def batch_of(n_envs: int, *people: str, seed: int = 3) -> ReachBatch:
 
 def walked(batch: ReachBatch, periods: int) -> ReachBatch:
     """Let the policy move on, so that robots are on their way."""
-    mover = mover_of(POLICY, "direct")
+    mover = controller_of(POLICY, "direct")
     for _ in range(periods):
         batch.step(mover.acts(batch), auto_reset=False)
     return batch
@@ -62,7 +62,7 @@ def test_what_is_played_is_what_happens_beside_constant_people() -> None:
     look = played_ways.new_lookahead(batch.arm, network, BASE_WEIGHT, 150)
     work = new_work(batch.world, batch.state, new_forecaster())
     rule, told = batch.settings.action.rule(), {}
-    acts = mover_of(POLICY, "direct").acts(batch)
+    acts = controller_of(POLICY, "direct").acts(batch)
     for row in live:
         n = foretell(batch.world, batch.state, row, MOMENTS, work, look.foretold)
         look.begun[:] = acts[row]
@@ -196,7 +196,7 @@ def test_a_dart_like_another_one_stays_within_the_joints() -> None:
 
 def test_looking_ahead_draws_the_same_again() -> None:
     batch = walked(batch_of(60, "walker"), 70)
-    acts = mover_of(POLICY, "direct").acts(batch)
+    acts = controller_of(POLICY, "direct").acts(batch)
     first, again = acts.copy(), acts.copy()
     chosen = [Lookahead(POLICY).improve(batch, given) for given in (first, again)]
     np.testing.assert_array_equal(*chosen)
@@ -228,7 +228,7 @@ def test_a_way_into_the_table_is_changed(people: tuple[str, ...]) -> None:
 
 def test_a_way_begun_is_gone_on_with_for_no_longer_than_it_lasts() -> None:
     batch, ahead, goes_on = batch_of(300, "walker"), Lookahead(POLICY), 0
-    mover = mover_of(POLICY, "direct")
+    mover = controller_of(POLICY, "direct")
     periods, before = round(STEP_S / batch.arm.dt), np.zeros((300, 6), dtype=np.float32)
     for _ in range(90):
         acts = mover.acts(batch)
@@ -257,7 +257,7 @@ def test_fewer_contacts_than_alone() -> None:
     """Beside two people, where there are enough contacts to tell by so few episodes."""
     goals = target_goals(POLICY.targets, 270)
     settings = batch_of(1, "walker", "walker").settings
-    ends = [play(CELL, settings, mover_of(POLICY, how), goals, 5).outcome for how in (
+    ends = [play(CELL, settings, controller_of(POLICY, how), goals, 5).outcome for how in (
         "direct", "direct-ahead")]  # fmt: skip
     alone, ahead = ((end == COLLISION).sum() for end in ends)
     assert ahead < alone
@@ -266,7 +266,7 @@ def test_fewer_contacts_than_alone() -> None:
 
 def test_nobody_to_look_out_for() -> None:
     batch = walked(batch_of(4), 3)
-    acts = mover_of(POLICY, "direct").acts(batch)
+    acts = controller_of(POLICY, "direct").acts(batch)
     kept = acts.copy()
     assert (Lookahead(POLICY).improve(batch, acts) == PASSED).all()
     np.testing.assert_array_equal(acts, kept)
@@ -275,7 +275,7 @@ def test_nobody_to_look_out_for() -> None:
 @pytest.mark.parametrize("people", [("walker", "walker"), ("worker", "walker")])
 def test_with_several_people_actions_stay_actions(people: tuple[str, ...]) -> None:
     batch = walked(batch_of(40, *people), 10)
-    acts = mover_of(POLICY, "direct").acts(batch)
+    acts = controller_of(POLICY, "direct").acts(batch)
     chosen = Lookahead(POLICY).improve(batch, acts)
     assert np.abs(acts).max() <= 1.0
     assert ((chosen >= PASSED) & (chosen < len(OTHERS))).all()
@@ -290,6 +290,8 @@ def test_the_names_of_the_other_ways() -> None:
 def test_other_policies_cannot() -> None:
     actor = RandomActor()
     assert looks_ahead(POLICY) and not looks_ahead(actor)
-    assert "direct-ahead" in hows_of(POLICY) and "direct-ahead" not in hows_of(actor)
+    assert "direct-ahead" in inference_modes_of(
+        POLICY
+    ) and "direct-ahead" not in inference_modes_of(actor)
     with pytest.raises(InvalidInput, match="look ahead"):
-        mover_of(actor, "direct-ahead")
+        controller_of(actor, "direct-ahead")

@@ -21,7 +21,13 @@ from app.policies.evaluation.reach.episodes import (
     target_goals,
 )
 from app.policies.evaluation.rows import OnRow, ignore_row
-from app.policies.inference.controllers import AHEAD, How, Mover, hows_of, mover_of
+from app.policies.inference.controllers import (
+    AHEAD,
+    Controller,
+    How,
+    controller_of,
+    inference_modes_of,
+)
 from app.policies.inference.reach_policy import ReachPolicy
 from app.sim.cells.cell import Cell
 from app.sim.cells.people import CylinderPerson
@@ -34,12 +40,12 @@ Json = dict[str, Any]
 
 def goal_ways(actor: ReachPolicy) -> tuple[How, ...]:
     """Return the ways of asking a policy for goals between those it was trained on."""
-    return tuple(how for how in hows_of(actor) if "averaged" not in how)
+    return tuple(how for how in inference_modes_of(actor) if "averaged" not in how)
 
 
 def direct_ways(actor: ReachPolicy) -> tuple[How, ...]:
     """Return the ways of asking a policy for the goal itself: alone, and looking ahead."""
-    return tuple(how for how in hows_of(actor) if how.startswith("direct"))
+    return tuple(how for how in inference_modes_of(actor) if how.startswith("direct"))
 
 
 def ending(how: How) -> str:
@@ -108,7 +114,7 @@ class ReachBench:
         how: How = "direct",
         *,
         cell: Cell | None = None,
-        mover: Mover | None = None,
+        mover: Controller | None = None,
     ) -> ReachEpisodes:
         """Play an episode per goal.
 
@@ -119,12 +125,12 @@ class ReachBench:
             cell: Work cell, where it is not the checkpoint's.
             mover: What stands between, where the policy is not asked alone.
         """
-        asked = mover or mover_of(self.actor, how)
+        asked = mover or controller_of(self.actor, how)
         return play(cell or self.cell, settings, asked, goals, self._seed)
 
     def recheck(self, settings: ReachSettings, goals: Vec, how: How = "direct") -> None:
         """Ask FCL about the poses of the first episodes; the result will say what it found."""
-        asked = mover_of(self.actor, how)
+        asked = controller_of(self.actor, how)
         self._recheck = recheck_contacts(self.cell, settings, asked, goals, self._seed)
 
     def add(

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from app.policies.evaluation.pick.recorded_people import Trace, recheck
 from app.policies.evaluation.statistics import mean_of, wilson
-from app.policies.inference.controllers import Mover
+from app.policies.inference.controllers import Controller
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
 from app.sim.reach.batch import ReachBatch, ReachSettings
@@ -100,7 +100,7 @@ class _Play:
         goals: Goal of each episode [m], shape (n, 3).
     """
 
-    def __init__(self, batch: ReachBatch, mover: Mover, goals: Vec) -> None:
+    def __init__(self, batch: ReachBatch, mover: Controller, goals: Vec) -> None:
         n, rows = len(goals), batch.n_envs
         self._batch, self._mover, self._goals = batch, mover, goals
         self._limit = batch.settings.time_limit_s
@@ -155,7 +155,7 @@ class _Play:
 
 
 def play(
-    cell: Cell, settings: ReachSettings, mover: Mover, goals: Vec, seed: int
+    cell: Cell, settings: ReachSettings, mover: Controller, goals: Vec, seed: int
 ) -> ReachEpisodes:
     """Play one episode per goal.
 
@@ -171,7 +171,7 @@ def play(
 
 
 def recheck_contacts(
-    cell: Cell, settings: ReachSettings, mover: Mover, goals: Vec, seed: int
+    cell: Cell, settings: ReachSettings, mover: Controller, goals: Vec, seed: int
 ) -> dict[str, int]:
     """Play the first episodes once more and ask FCL whether the kernels missed a contact.
 

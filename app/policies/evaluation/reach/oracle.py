@@ -32,7 +32,7 @@ from app.policies.evaluation.reach.bench import ReachBench
 from app.policies.evaluation.reach.episodes import N_ENVS
 from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.evaluation.statistics import wilson
-from app.policies.inference.controllers import Mover, mover_of
+from app.policies.inference.controllers import Controller, controller_of
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
 from app.sim.reach.batch import ReachBatch, ReachSettings
@@ -113,7 +113,7 @@ class Ceiling:
         self.rows.append(row)
         self._on_row(len(self.rows), self._n_stages, row)
 
-    def run(self, mover: Mover) -> None:
+    def run(self, mover: Controller) -> None:
         """Run all stages."""
         search = self.search
         self.stage("policy", lambda: search.undisturbed(mover.acts))
@@ -167,7 +167,7 @@ def run_oracle(
     batch = started(cell, settings, goals, seed)
     n_stages = len(SCRIPTED) + 4
     ceiling = Ceiling(batch, seed, n_stages, on_row)
-    ceiling.run(mover_of(bench.actor, "direct"))
+    ceiling.run(controller_of(bench.actor, "direct"))
     arm = batch.arm
     soonest = soonest_arrivals(cell, settings, goals, seed)
     base = load_robot_capsules(cell.robot.tool_length, cell.robot.tool_radius).radius[0]

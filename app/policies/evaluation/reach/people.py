@@ -20,7 +20,7 @@ from typing import Any
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.evaluation.reach.bench import ReachBench, direct_ways, ending, walker_of
 from app.policies.evaluation.rows import OnRow, ignore_row
-from app.policies.inference.controllers import How, hows_of
+from app.policies.inference.controllers import How, inference_modes_of
 from app.sim.cells.cell import Cell
 from app.sim.cells.people import FixedSpeedWalker
 from app.sim.people.kernels.people import MAX_PEOPLE
@@ -50,7 +50,7 @@ def run_people(
         on_row: Told of each row once it is known.
     """
     bench = ReachBench(checkpoint, seed, on_row)
-    ways = [how for how in WAYS if how in hows_of(bench.actor)]
+    ways = [how for how in WAYS if how in inference_modes_of(bench.actor)]
     rows = [
         (n, how)
         for n in range(MAX_PEOPLE + 1)

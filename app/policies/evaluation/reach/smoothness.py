@@ -23,7 +23,7 @@ from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.evaluation.reach.bench import ReachBench
 from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.evaluation.statistics import wilson
-from app.policies.inference.controllers import Mover, mover_of
+from app.policies.inference.controllers import Controller, controller_of
 from app.sim.core.arrays import Vec
 from app.sim.reach.batch import ReachBatch
 from app.sim.robot.kernels.arm import Arm
@@ -56,7 +56,7 @@ class Paths:
     """Index into OUTCOMES, shape (n,)."""
 
 
-def drive(batch: ReachBatch, mover: Mover, goals: Vec) -> Paths:
+def drive(batch: ReachBatch, mover: Controller, goals: Vec) -> Paths:
     """Play one episode in every row of a batch and keep the whole way.
 
     Args:
@@ -188,7 +188,7 @@ def run_smoothness(
     bench = ReachBench(checkpoint, seed, on_row)
     settings, n = bench.usual, episodes or DEFAULT_EPISODES
     batch = ReachBatch(bench.cell, n, seed, settings)
-    paths = drive(batch, mover_of(bench.actor, "direct"), bench.target_goals(n))
+    paths = drive(batch, controller_of(bench.actor, "direct"), bench.target_goals(n))
     row = {
         "name": f"degree-{settings.action.degree}",
         "n": n,

@@ -57,7 +57,7 @@ from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.evaluation.reach.episodes import N_ENVS, random_goals
 from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.evaluation.statistics import mean_of, wilson
-from app.policies.inference.controllers import Ahead, Mover, mover_of
+from app.policies.inference.controllers import Ahead, Controller, controller_of
 from app.policies.inference.reach_policy import ReachPolicy
 from app.policies.inference.rollout import NO_LAYER, layer_of, looks_ahead
 from app.sim.cells.cell import Cell, load_cell
@@ -198,7 +198,7 @@ def against(one: GuardedRuns, other: GuardedRuns) -> Json:
     return {"all": saving(every), "untouched": saving(untouched)}
 
 
-def drive(batch: GuardedReach, mover: Mover) -> Course:
+def drive(batch: GuardedReach, mover: Controller) -> Course:
     """Run a batch that was just reset to the end of every row's episode."""
     found: list[Vec] = []
     while (batch.state.outcome == RUNNING).any():
@@ -281,7 +281,7 @@ class Comparison:
             self._postures = postures_of(arm_of(self.cell), self.crossed.goals, self.seed)
         return self._postures
 
-    def policy(self, mover: Mover, *, alone: bool = False) -> Course:
+    def policy(self, mover: Controller, *, alone: bool = False) -> Course:
         """Run a policy over all crossings."""
         return drive(self.batch(alone=alone), mover)
 
@@ -339,7 +339,12 @@ def _least(runs: GuardedRuns, cost: Vec) -> GuardedRuns:
 
 
 def random_runs(
-    cell: Cell, settings: ReachSettings, safety: SafetySettings, mover: Mover, n: int, seed: int
+    cell: Cell,
+    settings: ReachSettings,
+    safety: SafetySettings,
+    mover: Controller,
+    n: int,
+    seed: int,
 ) -> list[GuardedRuns]:
     """Run the episodes of ``reach-random`` under the safety layer."""
     settings = replace(settings, time_limit_s=RANDOM_S)
@@ -426,9 +431,9 @@ def example_of(courses: Mapping[str, Course], dt: float) -> Json:
 
 def movers_of(
     checkpoint: Checkpoint, actor: ReachPolicy, safety: SafetySettings, dt: float
-) -> dict[str, Mover]:
+) -> dict[str, Controller]:
     """Return who stands in for the policy, by row; see the head of this file."""
-    direct, layer = mover_of(actor, "direct"), layer_of(safety, dt)
+    direct, layer = controller_of(actor, "direct"), layer_of(safety, dt)
     movers = {"policy": direct}
     if looks_ahead(actor):
         movers[AHEAD] = Ahead(direct, actor, layer)
@@ -437,7 +442,7 @@ def movers_of(
     if checkpoint.manifest["preset"].get("episode", {}).get("safety") == "ssm":
         other = ReachPolicy(pretrained.load("reach"))
         if (other.action, other.view) == (actor.action, actor.view):
-            movers["policy-unaware"] = mover_of(other, "direct")
+            movers["policy-unaware"] = controller_of(other, "direct")
     return movers
 
 
@@ -455,7 +460,7 @@ class _Rows:
 
 
 def compare(
-    comparison: Comparison, movers: Mapping[str, Mover], rows: _Rows, suffix: str = ""
+    comparison: Comparison, movers: Mapping[str, Controller], rows: _Rows, suffix: str = ""
 ) -> dict[str, Course]:
     """Run policies and planners over one set of crossings; return their courses by row."""
     jobs: dict[str, Callable[[], Course]] = {
@@ -532,7 +537,7 @@ def run_ssm(
                 result["seconds"][end.strip()] = seconds_of(courses)
                 result["example"][end.strip()] = example_of(courses, cell.robot.dt)
     policy = acting[""]["policy"]
-    trials: dict[str, tuple[Mover, SafetySettings]] = {
+    trials: dict[str, tuple[Controller, SafetySettings]] = {
         "random": (policy, layers[""]),
         "random-still": (_Still(), layers[""]),
         "random" + MEASURED: (policy, layers[MEASURED]),
@@ -546,7 +551,9 @@ def run_ssm(
     }
 
 
-def paired_of(courses: Mapping[str, Course], movers: Mapping[str, Mover], end: str) -> Json:
+def paired_of(
+    courses: Mapping[str, Course], movers: Mapping[str, Controller], end: str
+) -> Json:
     """Return what each mover saves against each planner, by names of rows."""
     return {
         f"{mine} against {name}{end}": against(courses[mine].runs, courses[name].runs)

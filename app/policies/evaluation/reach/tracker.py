@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.evaluation.reach.bench import ReachBench, direct_ways, ending, walker_of
 from app.policies.evaluation.rows import OnRow, ignore_row
-from app.policies.inference.controllers import Mover, mover_of
+from app.policies.inference.controllers import Controller, controller_of
 from app.sim.core.arrays import Vec
 from app.sim.people.kernels.pedestrian import AGE, GROWTH, N_PAST, PAST_S, VX, VY, R, X, Y
 from app.sim.perception.cylinder_sensor_model import CylinderSensorModel, CylinderSensorSettings
@@ -75,7 +75,7 @@ class CylinderObserver:
         seed: Seed of the disturbances.
     """
 
-    def __init__(self, mover: Mover, row: CylinderSensorRow, seed: int) -> None:
+    def __init__(self, mover: Controller, row: CylinderSensorRow, seed: int) -> None:
         self._mover, self._row, self._seed = mover, row, seed
         self._tracker: CylinderSensorModel | None = None
         self._rng = np.random.default_rng([seed, 1])
@@ -167,7 +167,7 @@ def run_tracker(
     bench.add(bench.play(bench.usual, goals).row("exact"), bench.usual, "grid")
     for how, name in rows:
         tracked = ROWS[name]
-        mover = CylinderObserver(mover_of(bench.actor, how), tracked, seed)
+        mover = CylinderObserver(controller_of(bench.actor, how), tracked, seed)
         row = bench.play(bench.usual, goals, mover=mover).row(name + ending(how))
         median, p95 = np.percentile(1e3 * np.concatenate(mover.errors), [50, 95]).tolist()
         row |= {"axis_error_median_mm": median, "axis_error_p95_mm": p95}
