@@ -7,7 +7,7 @@ import pytest
 
 from app.policies.checkpoints import pretrained
 from app.policies.evaluation.reach.ssm import Comparison
-from app.policies.inference.controllers import Ahead, controller_of
+from app.policies.inference.controllers import RolloutController, controller_of
 from app.policies.inference.motion_decision import MotionDecider
 from app.policies.inference.reach_policy import ReachPolicy
 from app.policies.inference.rollout import (
@@ -120,7 +120,7 @@ def test_people_who_cross_hold_the_robot_less_and_walk_into_it_less() -> None:
     comparison = Comparison(CELL, crossings(CELL, 12, seed=77), settings, MEASURED, seed=11)
     direct = controller_of(POLICY, "direct")
     heedless, heeding = (
-        comparison.policy(Ahead(direct, POLICY, layer)).runs
+        comparison.policy(RolloutController(direct, POLICY, layer)).runs
         for layer in (NO_LAYER, layer_of(MEASURED, DT))
     )
     assert heeding.arrived.all() and not heeding.touched_moving.any()

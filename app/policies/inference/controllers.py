@@ -1,21 +1,19 @@
-"""Ways to move the robot by one trained policy: directly, between targets, beside people.
+"""Controllers of the robot made of one trained policy, by inference mode.
 
-direct                  the policy on its own observation; of several people it sees the nearest
-interpolated            the mean of its actions for the training targets around the goal
-averaged                the mean over people of its actions beside each of them alone
-averaged-interpolated   both
-...-ahead               any of them, played ahead with the policy, and changed where that ends
-                        in a contact (``lookahead.py``)
+A mode is a set of three independent switches (docs/method.md 2.4):
 
-A mover looks at a batch as it is and gives an action for every cell in it. The policy need not
-have met more than one person in training.
+interpolated   mean of the policy's actions for the training targets around the goal
+averaged       distance-weighted mean over people of its actions beside each of them alone;
+               otherwise the nearest person is observed
+ahead          rollout policy improvement of the resulting action (``rollout.py``)
 
-Source: METHOD 2.4; for several people the outlook of thesis 4.5, "deploying a policy for each
-person inside the robot workspace and then averaging the action based on the distance between
-human and robot", which leaves the weights open.
+Source: for several people the outlook of thesis 4.5, "deploying a policy for each person inside
+the robot workspace and then averaging the action based on the distance between human and
+robot", which leaves the weights open.
 """
 
-from typing import Literal, Protocol, get_args
+from enum import StrEnum
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,50 +26,67 @@ from app.sim.reach.batch import ReachBatch
 from app.sim.reach.reach_actor import ReachActor
 from app.sim.scenario.kernels.episode import RUNNING
 
-How = Literal[
-    "direct",
-    "interpolated",
-    "averaged",
-    "averaged-interpolated",
-    "direct-ahead",
-    "interpolated-ahead",
-    "averaged-ahead",
-    "averaged-interpolated-ahead",
-]
-HOWS: tuple[How, ...] = get_args(How)
-"""Names of the ways."""
-AHEAD = "-ahead"
-"""End of the names of those that look ahead."""
+
+class InferenceMode(StrEnum):
+    """All combinations of the switches; without one the policy is queried directly."""
+
+    DIRECT = "direct"
+    INTERPOLATED = "interpolated"
+    AVERAGED = "averaged"
+    AVERAGED_INTERPOLATED = "averaged-interpolated"
+    DIRECT_ROLLOUT = "direct-ahead"
+    INTERPOLATED_ROLLOUT = "interpolated-ahead"
+    AVERAGED_ROLLOUT = "averaged-ahead"
+    AVERAGED_INTERPOLATED_ROLLOUT = "averaged-interpolated-ahead"
+
+    @property
+    def interpolated(self) -> bool:
+        """Whether actions are interpolated between training targets."""
+        return "interpolated" in self.value
+
+    @property
+    def averaged(self) -> bool:
+        """Whether actions are averaged over people."""
+        return "averaged" in self.value
+
+    @property
+    def rollout(self) -> bool:
+        """Whether actions are improved by rollouts."""
+        return self.value.endswith(ROLLOUT)
+
+
+ROLLOUT = "-ahead"
+"""End of the names of modes with rollouts."""
 NEAREST_M = 0.05
-"""People nearer than this weigh no more [m]."""
+"""Distance below which weights stop growing [m]."""
 POWER = 2.0
-"""Weights of people fall with this power of their distance."""
+"""Weights fall with this power of the distance."""
 Actions = NDArray[np.float32]
 Rows = NDArray[np.int64]
 
 
 class Controller(Protocol):
-    """Moves the robots of a batch."""
+    """Chooses actions for a batch."""
 
     def acts(self, batch: ReachBatch) -> Actions:
-        """Return actions in [-1, 1] for every cell, shape (n_envs, 6); 0 where it has ended."""
+        """Return actions in [-1, 1], shape (n_envs, 6); 0 where the episode has ended."""
 
 
-class Asked(Protocol):
-    """A policy asked beside people who are there, or beside one of them alone."""
+class PolicyQuery(Protocol):
+    """Actions of a policy beside all people, or beside one of them alone."""
 
-    def ask(self, batch: ReachBatch, rows: Rows, who: int | None) -> Actions:
+    def query(self, batch: ReachBatch, rows: Rows, who: int | None) -> Actions:
         """Return actions, shape (k, 6).
 
         Args:
-            batch: Cells.
-            rows: Which of them, shape (k,).
-            who: The person who is there alone; None for all as they are.
+            batch: All environments.
+            rows: Numbers of the queried ones, shape (k,).
+            who: Number of the only person; None for all people.
         """
 
 
 class Direct:
-    """The policy on its own observation.
+    """The policy for its own goal.
 
     Args:
         actor: A policy.
@@ -81,11 +96,11 @@ class Direct:
         self._actor = actor
 
     def acts(self, batch: ReachBatch) -> Actions:
-        """Return actions for every cell; see :class:`Controller`."""
+        """Return actions; see :class:`Controller`."""
         return _for_running(self, batch)
 
-    def ask(self, batch: ReachBatch, rows: Rows, who: int | None) -> Actions:
-        """Return actions of some cells; see :class:`Asked`."""
+    def query(self, batch: ReachBatch, rows: Rows, who: int | None) -> Actions:
+        """Return actions; see :class:`PolicyQuery`."""
         _require_view(self._actor, batch)
         obs = batch.observe_goals(rows, batch.state.goal[rows][:, None], who)
         return self._actor.acts(obs[:, 0])
@@ -105,75 +120,75 @@ class Interpolated:
         self._between = Interpolation(actor)
 
     def acts(self, batch: ReachBatch) -> Actions:
-        """Return actions for every cell; see :class:`Controller`.
+        """Return actions; see :class:`Controller`.
 
         Raises:
             GoalOutside: A goal lies outside the targets.
         """
         return _for_running(self, batch)
 
-    def ask(self, batch: ReachBatch, rows: Rows, who: int | None) -> Actions:
-        """Return actions of some cells; see :class:`Asked`."""
+    def query(self, batch: ReachBatch, rows: Rows, who: int | None) -> Actions:
+        """Return actions; see :class:`PolicyQuery`."""
         _require_view(self._between.actor, batch)
         mix, places = self._between.around(batch.state.goal[rows], "goals")
         return self._between.acts(batch.observe_goals(rows, places, who), mix)
 
 
-class Averaged:
-    """The mean over people of what is done beside each of them alone.
+class DistanceWeighted:
+    """The distance-weighted mean over people of the actions beside each of them alone.
 
-    With one person it is what is asked, exactly.
+    With one person it is the query itself, exactly.
 
     Args:
-        asked: What is done beside one person.
+        query: Actions beside one person.
     """
 
-    def __init__(self, asked: Asked) -> None:
-        self._asked = asked
+    def __init__(self, query: PolicyQuery) -> None:
+        self._query = query
 
     def acts(self, batch: ReachBatch) -> Actions:
-        """Return actions for every cell; see :class:`Controller`."""
+        """Return actions; see :class:`Controller`."""
         return _for_running(self, batch)
 
-    def ask(self, batch: ReachBatch, rows: Rows, who: int | None) -> Actions:
-        """Return actions of some cells; see :class:`Asked`."""
+    def query(self, batch: ReachBatch, rows: Rows, who: int | None) -> Actions:
+        """Return actions; see :class:`PolicyQuery`."""
         if who is not None or batch.n_people < 2:
-            return self._asked.ask(batch, rows, who)
+            return self._query.query(batch, rows, who)
         weights = person_weights(batch.person_distances(rows))
         mean = np.zeros((len(rows), 6))
         for person in range(batch.n_people):
-            mean += weights[:, person, None] * self._asked.ask(batch, rows, person)
+            mean += weights[:, person, None] * self._query.query(batch, rows, person)
         return mean.astype(np.float32)
 
 
-class Ahead:
-    """What is asked, played ahead and changed where that ends in a contact.
+class RolloutController:
+    """Rollout policy improvement of another controller.
 
     Args:
-        mover: Who says what to do.
-        actor: The policy it is played with.
-        layer: The safety layer that it acts under.
+        base: The other controller.
+        actor: Policy of the rollouts.
+        layer: Safety layer of the robot.
 
     Raises:
-        InvalidInput: The policy cannot be played ahead.
+        InvalidInput: The policy cannot be simulated by the kernels.
     """
 
-    def __init__(self, mover: Controller, actor: ReachActor, layer: Layer = NO_LAYER) -> None:
-        self._mover, self._ahead, self.layer = mover, Lookahead(actor), layer
+    def __init__(self, base: Controller, actor: ReachActor, layer: Layer = NO_LAYER) -> None:
+        self._base, self._improvement, self.layer = base, Lookahead(actor), layer
 
     def acts(self, batch: ReachBatch) -> Actions:
-        """Return actions for every cell; see :class:`Controller`."""
-        act = self._mover.acts(batch)
-        self._ahead.layer = self.layer
-        self._ahead.improve(batch, act)
+        """Return actions; see :class:`Controller`."""
+        act = self._base.acts(batch)
+        self._improvement.layer = self.layer
+        self._improvement.improve(batch, act)
         return act
 
 
 def person_weights(distances: Vec) -> Vec:
-    """Return how much each person counts: the inverse square of the distance, as shares.
+    """Return the weights of people: the inverse square of the distance, normalised.
 
     Args:
-        distances: Of robot and people [m], shape (n, n_people), at least one.
+        distances: Distances of robot and people [m], shape (n, n_people), at least one.
 
     Returns:
         Weights, which sum to one in every row, shape (n, n_people).
@@ -183,49 +198,50 @@ def person_weights(distances: Vec) -> Vec:
     return shares
 
 
-def controller_of(actor: ReachActor, how: How | None = None) -> Controller:
-    """Return a way to move by a policy.
+def controller_of(actor: ReachActor, mode: str | None = None) -> Controller:
+    """Return the controller of a policy in an inference mode.
 
     Args:
         actor: The policy.
-        how: The way; None interpolates where the policy has targets, else goes directly.
+        mode: The mode; None interpolates where the policy has training targets.
 
     Raises:
-        InvalidInput: There is no such way, or there are no targets to interpolate between.
+        InvalidInput: There is no such mode, or the policy does not allow it.
     """
-    if how is None:
-        how = "interpolated" if interpolates(actor) else "direct"
-    if how not in HOWS:
-        raise InvalidInput("how", how, "must name a way to move", HOWS)
-    asked = Interpolated(actor) if "interpolated" in how else Direct(actor)
-    mover = Averaged(asked) if "averaged" in how else asked
-    return Ahead(mover, actor) if how.endswith(AHEAD) else mover
+    if mode is None:
+        mode = InferenceMode.INTERPOLATED if interpolates(actor) else InferenceMode.DIRECT
+    if mode not in tuple(InferenceMode):
+        raise InvalidInput("inference_mode", mode, "must be a mode", tuple(InferenceMode))
+    chosen = InferenceMode(mode)
+    query = Interpolated(actor) if chosen.interpolated else Direct(actor)
+    base = DistanceWeighted(query) if chosen.averaged else query
+    return RolloutController(base, actor) if chosen.rollout else base
 
 
-def inference_modes_of(actor: ReachActor) -> tuple[How, ...]:
-    """Return the ways in which a policy can be asked."""
-    between, ahead = interpolates(actor), looks_ahead(actor)
+def inference_modes_of(actor: ReachActor) -> tuple[InferenceMode, ...]:
+    """Return the inference modes that a policy allows."""
+    targets, rollouts = interpolates(actor), looks_ahead(actor)
     return tuple(
-        how
-        for how in HOWS
-        if (between or "interpolated" not in how) and (ahead or not how.endswith(AHEAD))
+        mode
+        for mode in InferenceMode
+        if (targets or not mode.interpolated) and (rollouts or not mode.rollout)
     )
 
 
-def _for_running(asked: Asked, batch: ReachBatch) -> Actions:
-    """Return what is asked where episodes go on, and 0 elsewhere, shape (n_envs, 6)."""
+def _for_running(query: PolicyQuery, batch: ReachBatch) -> Actions:
+    """Return the actions of running environments, 0 elsewhere, shape (n_envs, 6)."""
     act = np.zeros((batch.n_envs, 6), dtype=np.float32)
     rows = np.flatnonzero(batch.state.outcome == RUNNING)
     if rows.size:
-        act[rows] = asked.ask(batch, rows, None)
+        act[rows] = query.query(batch, rows, None)
     return act
 
 
 def _require_view(actor: ReachActor, batch: ReachBatch) -> None:
-    """Raise unless a batch observes what a policy was trained on.
+    """Check that a batch has the observation of the policy.
 
     Raises:
-        CheckpointMismatch: It observes something else.
+        CheckpointMismatch: It has another one.
     """
     if batch.settings.observation != actor.view:
         raise CheckpointMismatch("view", batch.settings.observation, actor.view)

@@ -1,11 +1,11 @@
-"""A reach policy as the live cell drives it: with all the ways in which it can be asked."""
+"""A reach policy in the live cell, with all its inference modes."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.policies.inference.controllers import (
-    Ahead,
     Controller,
+    RolloutController,
     controller_of,
     inference_modes_of,
 )
@@ -18,7 +18,7 @@ from app.sim.safety.layer import SafetySettings
 
 
 class ReachPilot:
-    """One policy and its movers; used by one thread at a time.
+    """One policy and its controllers; used by one thread at a time.
 
     Args:
         actor: The policy.
@@ -26,8 +26,8 @@ class ReachPilot:
 
     def __init__(self, actor: ReachActor) -> None:
         self._actor = actor
-        self._movers: dict[str, Controller] = {
-            how: controller_of(actor, how) for how in inference_modes_of(actor)
+        self._controllers: dict[str, Controller] = {
+            mode: controller_of(actor, mode) for mode in inference_modes_of(actor)
         }
 
     @property
@@ -73,7 +73,7 @@ class ReachPilot:
     @property
     def inference_modes(self) -> tuple[str, ...]:
         """Available inference modes."""
-        return tuple(self._movers)
+        return tuple(self._controllers)
 
     def acts(
         self, batch: ReachBatch, inference_mode: str, safety: SafetySettings | None
@@ -85,7 +85,7 @@ class ReachPilot:
             inference_mode: One of ``inference_modes``.
             safety: What the safety layer assumes that they go through; None without one.
         """
-        mover = self._movers[inference_mode]
-        if isinstance(mover, Ahead):
-            mover.layer = layer_of(safety, batch.arm.dt)
-        return mover.acts(batch)
+        controller = self._controllers[inference_mode]
+        if isinstance(controller, RolloutController):
+            controller.layer = layer_of(safety, batch.arm.dt)
+        return controller.acts(batch)

@@ -1,12 +1,12 @@
-"""Ways to move by one policy: directly, between targets, beside several people."""
+"""Controllers of one policy: direct, between targets, beside several people."""
 
 import numpy as np
 import pytest
 
 from app.errors import CheckpointMismatch, GoalOutside, InvalidInput
 from app.policies.inference.controllers import (
-    HOWS,
     NEAREST_M,
+    InferenceMode,
     controller_of,
     inference_modes_of,
     person_weights,
@@ -98,9 +98,9 @@ def test_a_policy_without_targets_cannot_interpolate() -> None:
         controller_of(RandomActor("box"), "sideways")
 
 
-def test_only_policies_that_can_look_ahead_do() -> None:
+def test_only_policies_that_kernels_simulate_allow_rollouts() -> None:
     assert inference_modes_of(RandomActor()) == tuple(
-        how for how in HOWS if not how.endswith("ahead")
+        mode for mode in InferenceMode if not mode.rollout
     )
     assert inference_modes_of(RandomActor("box")) == ("direct", "averaged")
 

@@ -7,7 +7,7 @@ from app.live.commands import SetPolicy
 from app.live.reach.commands import SetInferenceMode, SetSafety
 from app.live.reach.controller import TIME_LIMIT_S, ReachController
 from app.live.reach.world import ReachWorld
-from app.policies.inference.controllers import Ahead, controller_of
+from app.policies.inference.controllers import RolloutController, controller_of
 from app.policies.inference.live_reach_policy import ReachPilot
 from app.policies.inference.reach_policy import ReachPolicy
 from app.policies.inference.rollout import NO_LAYER
@@ -75,8 +75,8 @@ def test_looking_ahead_is_told_of_the_layer_that_is_obeyed(
     world = ReachWorld(CELL, pilot, seed=1)
     world.apply(SetInferenceMode(inference_mode="direct-ahead"))
     world.apply(SetSafety(on=on, use_measured_velocity=measured))
-    mover = pilot._movers["direct-ahead"]
-    assert isinstance(mover, Ahead)
+    mover = pilot._controllers["direct-ahead"]
+    assert isinstance(mover, RolloutController)
     assert (mover.layer != NO_LAYER) == (on and measured)
 
 

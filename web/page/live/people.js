@@ -52,13 +52,13 @@ export function People({ world, send, children }) {
       <p class="dock-hint">Nobody is in the cell.</p></div>`}
     ${person?.cylinder && html`<${WalkerMover} key=${person.id} person=${person}
       name=${nameOf(person.id)} world=${world} send=${send} />`}
-    ${person && !person.cylinder && html`<${Controller} key=${person.id} person=${person} send=${send}
+    ${person && !person.cylinder && html`<${MotionSource} key=${person.id} person=${person} send=${send}
       sized=${sized} onSized=${() => setSized(!sized)} />`}
     ${person && !person.cylinder && sized && html`<${Size} key=${`size-${person.id}`} person=${person} send=${send} />`}`;
 }
 
 /** Who moves a person; with a recording, which one and how far it is. */
-function Controller({ person, send, sized, onSized }) {
+function MotionSource({ person, send, sized, onSized }) {
   const { id, mode } = person;
   const [open, setOpen] = useState(false);
   const { list, error, refresh } = useMotions();

@@ -22,9 +22,9 @@ from app.policies.evaluation.reach.episodes import (
 )
 from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.inference.controllers import (
-    AHEAD,
+    ROLLOUT,
     Controller,
-    How,
+    InferenceMode,
     controller_of,
     inference_modes_of,
 )
@@ -38,19 +38,21 @@ from app.sim.scenario.kernels.episode import SUCCESS_DISTANCE
 Json = dict[str, Any]
 
 
-def goal_ways(actor: ReachPolicy) -> tuple[How, ...]:
+def goal_ways(actor: ReachPolicy) -> tuple[InferenceMode, ...]:
     """Return the ways of asking a policy for goals between those it was trained on."""
-    return tuple(how for how in inference_modes_of(actor) if "averaged" not in how)
+    return tuple(mode for mode in inference_modes_of(actor) if not mode.averaged)
 
 
-def direct_ways(actor: ReachPolicy) -> tuple[How, ...]:
+def direct_ways(actor: ReachPolicy) -> tuple[InferenceMode, ...]:
     """Return the ways of asking a policy for the goal itself: alone, and looking ahead."""
-    return tuple(how for how in inference_modes_of(actor) if how.startswith("direct"))
+    return tuple(
+        mode for mode in inference_modes_of(actor) if not (mode.averaged or mode.interpolated)
+    )
 
 
-def ending(how: How) -> str:
+def ending(mode: InferenceMode) -> str:
     """Return what the names of rows end with: nothing for the policy alone."""
-    return AHEAD if how.endswith(AHEAD) else ""
+    return ROLLOUT if mode.rollout else ""
 
 
 def walker_of(cell: Cell) -> CylinderPerson:
@@ -111,7 +113,7 @@ class ReachBench:
         self,
         settings: ReachSettings,
         goals: Vec,
-        how: How = "direct",
+        how: InferenceMode = InferenceMode.DIRECT,
         *,
         cell: Cell | None = None,
         mover: Controller | None = None,
@@ -128,7 +130,9 @@ class ReachBench:
         asked = mover or controller_of(self.actor, how)
         return play(cell or self.cell, settings, asked, goals, self._seed)
 
-    def recheck(self, settings: ReachSettings, goals: Vec, how: How = "direct") -> None:
+    def recheck(
+        self, settings: ReachSettings, goals: Vec, how: InferenceMode = InferenceMode.DIRECT
+    ) -> None:
         """Ask FCL about the poses of the first episodes; the result will say what it found."""
         asked = controller_of(self.actor, how)
         self._recheck = recheck_contacts(self.cell, settings, asked, goals, self._seed)
@@ -138,7 +142,7 @@ class ReachBench:
         row: Json,
         settings: ReachSettings,
         goals: str,
-        how: How = "direct",
+        how: InferenceMode = InferenceMode.DIRECT,
         *,
         cell: Cell | None = None,
         **more: Any,

@@ -20,7 +20,7 @@ from typing import Any
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.evaluation.reach.bench import ReachBench, direct_ways, ending, walker_of
 from app.policies.evaluation.rows import OnRow, ignore_row
-from app.policies.inference.controllers import How, inference_modes_of
+from app.policies.inference.controllers import InferenceMode, inference_modes_of
 from app.sim.cells.cell import Cell
 from app.sim.cells.people import FixedSpeedWalker
 from app.sim.people.kernels.people import MAX_PEOPLE
@@ -30,7 +30,7 @@ DEFAULT_EPISODES = 1000
 """METHOD 2.6."""
 TARGET_EPISODES = 5400
 """Episodes of each row of ``reach-constant``: as many as ``reach-targets`` plays."""
-WAYS: tuple[How, ...] = ("direct", "averaged", "direct-ahead")
+WAYS = (InferenceMode.DIRECT, InferenceMode.AVERAGED, InferenceMode.DIRECT_ROLLOUT)
 """Ways of asking a policy about several people; ``direct`` sees the nearest."""
 KINDS: tuple[HumanKind, ...] = ("walker", "constant")
 """Who walks: as usual, and with one speed and radius per episode."""

@@ -57,7 +57,7 @@ from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.evaluation.reach.episodes import N_ENVS, random_goals
 from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.evaluation.statistics import mean_of, wilson
-from app.policies.inference.controllers import Ahead, Controller, controller_of
+from app.policies.inference.controllers import Controller, RolloutController, controller_of
 from app.policies.inference.reach_policy import ReachPolicy
 from app.policies.inference.rollout import NO_LAYER, layer_of, looks_ahead
 from app.sim.cells.cell import Cell, load_cell
@@ -436,9 +436,9 @@ def movers_of(
     direct, layer = controller_of(actor, "direct"), layer_of(safety, dt)
     movers = {"policy": direct}
     if looks_ahead(actor):
-        movers[AHEAD] = Ahead(direct, actor, layer)
+        movers[AHEAD] = RolloutController(direct, actor, layer)
         if layer != NO_LAYER:
-            movers["policy-heedless"] = Ahead(direct, actor)
+            movers["policy-heedless"] = RolloutController(direct, actor)
     if checkpoint.manifest["preset"].get("episode", {}).get("safety") == "ssm":
         other = ReachPolicy(pretrained.load("reach"))
         if (other.action, other.view) == (actor.action, actor.view):
