@@ -12,12 +12,12 @@ from fastapi import FastAPI, Request
 from starlette.responses import Response, StreamingResponse
 from starlette.websockets import WebSocket
 
-from app import http_limits
 from app.api.bodies import BodyRules
 from app.api.problems import install
 from app.api.security import Guard
-from app.listening import address_of, listen
-from app.serving import server_of
+from app.cli import http_limits
+from app.cli.preflight import address_of, listen
+from app.cli.uvicorn_server import new_server
 
 TOKEN = "a token of the tests"
 LARGE = bytes(64 * 1024 * 1024)
@@ -71,4 +71,4 @@ if __name__ == "__main__":
     http_limits.DRAIN_S = float(os.environ.get("DRAIN_S", http_limits.DRAIN_S))
     sock = listen("127.0.0.1", 0)
     print(address_of(sock), flush=True)
-    server_of(app).run(sockets=[sock])
+    new_server(app).run(sockets=[sock])

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from app.__main__ import main
+from app.cli.entry import main
 from app.sim.cell_validation.reader import read_cell
 from app.sim.cells.cell import Cell, cell_names, lacks_for_pick
 

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 
 from fastapi import FastAPI
 
-from app.listening import address_of, listen
-from app.serving import Server, server_of
+from app.cli.preflight import address_of, listen
+from app.cli.uvicorn_server import Server, new_server
 from tests import patient_http
 
 START_S = 30.0
@@ -20,7 +20,7 @@ WARM_UP_S = 900.0
 def running(app: FastAPI, *, root_path: str = "") -> Iterator[tuple[Server, str]]:
     """Run ``app`` on a free port; yields the server and its address."""
     sock = listen("127.0.0.1", 0)
-    server = server_of(app, root_path=root_path)
+    server = new_server(app, root_path=root_path)
     thread = threading.Thread(target=server.run, kwargs={"sockets": [sock]})
     thread.start()
     give_up = time.monotonic() + START_S

@@ -10,7 +10,7 @@ import pytest
 from fastapi.testclient import TestClient
 from safetensors.numpy import load
 
-from app.__main__ import find_checkpoint
+from app.cli.evaluate import find_checkpoint
 from app.errors import Damaged
 from app.main import create_app
 from app.policies.checkpoints import pretrained

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
-from app.machine import describe
+from app.provenance import describe
 
 Row = dict[str, object]
 

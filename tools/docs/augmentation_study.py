@@ -25,14 +25,14 @@ import numpy as np
 import torch
 from scipy.stats import t as student
 
+from app.cli.recordings import clean_runs
 from app.errors import InvalidInput
-from app.machine import describe
-from app.motion_verbs import runs_of
 from app.policies.checkpoints.checkpoint import Checkpoint, load
 from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.evaluation.pick import selection_rules as choice_rules
 from app.policies.evaluation.pick.episodes import Evaluator, settings_for
 from app.policies.inference.task_selection import HYSTERESIS, ValueNetworks, pick_preset_of
+from app.provenance import describe
 from app.sim.mocap.importer import Motion
 from app.sim.people.human_motion_config import at_the_table
 from app.sim.pick.batch import PickSettings
@@ -151,7 +151,7 @@ def main() -> None:
     options = parser.parse_args()
     torch.set_num_threads(1)
     policies = {kind: trained(options.folder, kind) for kind in KINDS}
-    motions = runs_of(options.motions)
+    motions = clean_runs(options.motions)
     rates = {
         kind: {seed: successes(one, motions, options.episodes) for seed, one in found.items()}
         for kind, found in policies.items()

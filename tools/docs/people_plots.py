@@ -17,7 +17,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from app.machine import describe
+from app.provenance import describe
 from app.sim.cells.cell import Cell, load_cell
 from app.sim.core.arrays import Vec
 from app.sim.human import model as human

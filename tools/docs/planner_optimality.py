@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from app.machine import describe
+from app.provenance import describe
 from app.sim.sorting.batch import apply
 from app.sim.sorting.kernels.planner import new_work
 from app.sim.sorting.kernels.planner_batch import TaskBatch, plan_rows

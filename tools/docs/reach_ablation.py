@@ -25,10 +25,10 @@ import torch
 from scipy import stats
 
 from app.errors import InvalidInput
-from app.machine import describe
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.configs import presets
 from app.policies.evaluation.reach.bench import ReachBench
+from app.provenance import describe
 from tools.docs.augmentation_study import over_seeds
 from tools.docs.reach_curves import ENDS
 from tools.docs.training_curves import read_if_there, record

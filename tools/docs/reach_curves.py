@@ -19,9 +19,9 @@ from typing import Any
 
 import torch
 
-from app.machine import describe
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.evaluation.reach.bench import ReachBench
+from app.provenance import describe
 from tools.docs.training_curves import read
 
 ROOT = Path(__file__).resolve().parents[2]

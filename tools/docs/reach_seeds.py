@@ -16,8 +16,8 @@ from typing import Any
 
 import torch
 
-from app.machine import describe
 from app.policies.evaluation.reach.bench import ReachBench, direct_ways, ending
+from app.provenance import describe
 from tools.docs.reach_curves import lines
 from tools.docs.training_curves import read
 

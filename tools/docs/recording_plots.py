@@ -20,7 +20,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from app.machine import describe
+from app.provenance import describe
 from app.sim.core.arrays import Vec
 from app.sim.mocap.artifacts import MAX_SPEED, Artifact, clean_runs, find_artifacts
 from app.sim.mocap.bvh import read_bvh

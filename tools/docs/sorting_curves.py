@@ -20,11 +20,11 @@ from typing import Any
 
 import torch
 
-from app.machine import describe
 from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.configs import presets
 from app.policies.evaluation.sorting.curve import curve_episodes, curve_point
 from app.policies.inference.sorting_policy import SortingPolicy
+from app.provenance import describe
 from app.sim.sorting.batch import fail_of
 from tools.docs.training_curves import read
 

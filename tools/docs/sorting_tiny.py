@@ -18,10 +18,10 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from app.machine import describe
 from app.policies.algorithms.dqn import SortingDQN
 from app.policies.algorithms.vecenv import BatchVecEnv
 from app.policies.configs.sorting import SortingPreset
+from app.provenance import describe
 from app.sim.cells.cell import load_cell
 from app.sim.core.arrays import Vec
 from app.sim.envs.sorting import SortingTask

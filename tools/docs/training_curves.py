@@ -15,7 +15,7 @@ from pathlib import Path
 
 import torch
 
-from app.__main__ import parsed_sets
+from app.cli.train import parse_overrides
 from app.policies.checkpoints import checkpoint as formats
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.configs import presets
@@ -35,7 +35,7 @@ def main() -> None:
     parser.add_argument("--set", action="append", default=[], dest="sets")
     options = parser.parse_args()
     torch.set_num_threads(1)
-    preset = presets.resolve(options.preset, presets.nested(parsed_sets(options.sets)))
+    preset = presets.resolve(options.preset, presets.nested(parse_overrides(options.sets)))
     record(preset, options.seed, options.output)
 
 

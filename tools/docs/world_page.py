@@ -14,7 +14,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from app.machine import describe
+from app.provenance import describe
 from tools.docs import world_measures, world_override, world_plots
 from tools.docs.tables import render
 

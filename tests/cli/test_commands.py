@@ -10,15 +10,17 @@ from pathlib import Path
 
 import pytest
 
-from app.__main__ import main, parsed_sets, table
+from app.cli.entry import main
+from app.cli.output import table
+from app.cli.preflight import address_of, listen
+from app.cli.train import parse_overrides
 from app.errors import InvalidInput
-from app.listening import address_of, listen
-from app.warm_up import PARTS
+from app.precompile import PARTS
 from tests import workshop
 from tests.policies.evaluation.sorting_players import untrained
 from tests.sim.recorded_person import csv_text, working
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 START_S, COMPILE_S = 240.0, 1200.0
 
 
@@ -119,10 +121,10 @@ def test_setup_makes_the_database_and_compiles_every_part(tmp_path: Path) -> Non
         ["cells", "show", "kitchen"],
         ["cells", "remove", "kitchen"],
         ["cells", "add", "/"],
-        ["motions"],
-        ["motions", "import"],
-        ["motions", "import", "nobody.bvh"],
-        ["motions", "import", "/"],
+        ["recordings"],
+        ["recordings", "import"],
+        ["recordings", "import", "nobody.bvh"],
+        ["recordings", "import", "/"],
         ["train", "pick-td3", "--set", "cell=kitchen"],
     ],
 )
@@ -133,11 +135,7 @@ def test_wrong_call_ends_with_status_2(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setenv("TANDEM_DATA", str(tmp_path))
-    try:
-        status = main(arguments)
-    except SystemExit as end:
-        status = end.code if isinstance(end.code, int) else -1
-    assert status == 2
+    assert main(arguments) == 2
     assert capsys.readouterr().err
 
 
@@ -318,9 +316,9 @@ def test_cell_with_a_taken_name_is_refused(
 
 
 def test_values_of_overrides_are_json_where_they_can_be() -> None:
-    assert parsed_sets(["gamma=0.9", "name=x"]) == {"gamma": 0.9, "name": "x"}
+    assert parse_overrides(["gamma=0.9", "name=x"]) == {"gamma": 0.9, "name": "x"}
     with pytest.raises(InvalidInput, match="FIELD=VALUE"):
-        parsed_sets(["gamma"])
+        parse_overrides(["gamma"])
 
 
 def test_address_of_an_open_server_is_one_that_a_browser_takes() -> None:

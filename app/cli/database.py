@@ -1,4 +1,4 @@
-"""The database as verbs of the command line open it, beside a server or without one."""
+"""The database as commands open it, beside a running server or without one."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,7 +12,7 @@ from app.store.schema import check_schema
 
 
 def has_database(settings: Settings) -> bool:
-    """Whether there is a database, as far as that can be told without opening it."""
+    """Whether a database is configured, or its file exists."""
     return settings.database_url is not None or (settings.data / "tandem.db").exists()
 
 
@@ -22,8 +22,8 @@ def opened(settings: Settings, noun: str, *, create: bool = False) -> Iterator[S
 
     Args:
         settings: Where it is.
-        noun: What is looked for in it, such as ``"motion"``, for the message.
-        create: Whether to make one that is not there yet, and to upgrade an older one.
+        noun: The object of the command, such as ``"recording"``, for the message.
+        create: Whether to create a missing database and to upgrade an older one.
 
     Raises:
         NotFound: There is no database.
@@ -40,12 +40,21 @@ def opened(settings: Settings, noun: str, *, create: bool = False) -> Iterator[S
         except Conflict:
             if not create:
                 raise
-            lock = ServerLock(store, settings.data)
-            lock.acquire()
-            try:
-                migrate(store)
-            finally:
-                lock.release()
+            upgrade(store, settings)
         yield store
     finally:
         store.close()
+
+
+def upgrade(store: Store, settings: Settings) -> None:
+    """Create the tables, or bring them to this version.
+
+    Raises:
+        Conflict: A server uses the database.
+    """
+    lock = ServerLock(store, settings.data)
+    lock.acquire()
+    try:
+        migrate(store)
+    finally:
+        lock.release()

@@ -1,6 +1,6 @@
 import json
 
-from app.machine import describe
+from app.provenance import describe
 
 
 def test_description_names_processor_cores_and_versions_as_json() -> None:

@@ -1,4 +1,4 @@
-"""What a server needs for itself, checked before anything else is loaded: port and database."""
+"""Checks before the server loads anything else: its port and its database are unused."""
 
 import errno
 import ipaddress
@@ -21,7 +21,7 @@ def listen(host: str, port: int) -> socket.socket:
 
     Raises:
         Conflict: Another program listens there.
-        InvalidInput: This machine has no such address, or the port is not for us.
+        InvalidInput: This machine has no such address, or the port needs other rights.
     """
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(
@@ -41,18 +41,18 @@ def listen(host: str, port: int) -> socket.socket:
 
 
 def address_of(sock: socket.socket) -> str:
-    """Return the URL of a listening socket, as a browser on this machine takes it."""
+    """Return the URL of a listening socket for a browser on this machine."""
     host, port = sock.getsockname()[:2]
     if ipaddress.ip_address(host).is_unspecified:
         host = "127.0.0.1"
     return f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"
 
 
-def check_alone(settings: Settings) -> None:
-    """Make sure that no other server uses the data folder or database.
+def check_database_unused(settings: Settings) -> None:
+    """Check that no other server uses the data folder or the database.
 
     Raises:
-        Conflict: One does.
+        Conflict: Another server does.
     """
     settings.data.mkdir(parents=True, exist_ok=True)
     store = Store(settings.database)

@@ -3,9 +3,9 @@ from pathlib import Path
 
 import pytest
 
-from app.__main__ import main
+from app.cli.entry import main
+from app.cli.recordings import clean_runs
 from app.errors import BadMotion
-from app.motion_verbs import runs_of
 from app.sim.mocap.read_options import ReadOptions
 from tests.sim.recorded_person import bvh_text, csv_text, working
 from tests.sim.recorded_skeleton import Person, skeleton
@@ -22,7 +22,7 @@ def clip(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_import_tells_frames_error_and_runs(
     clip: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["motions", "import", str(clip)]) == 0
+    assert main(["recordings", "import", str(clip)]) == 0
     told = capsys.readouterr().out
     assert "someone: 200 frames, 3.98 s, bvh in mm" in told
     assert "0 artifacts" in told
@@ -30,7 +30,7 @@ def test_import_tells_frames_error_and_runs(
 
 
 def test_import_gives_the_same_as_data(clip: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["motions", "import", str(clip), "--json"]) == 0
+    assert main(["recordings", "import", str(clip), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["ok"] and found["frames"] == found["clean_frames"] == 200
     assert found["error_mm"]["wrists"]["p99"] < 1.0
@@ -42,7 +42,7 @@ def test_bad_file_is_told_with_line_and_rule(
     clip: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     clip.write_text(clip.read_text().replace("Frames: 200", "Frames: 300"), encoding="utf-8")
-    assert main(["motions", "import", str(clip), "--json"]) == 2
+    assert main(["recordings", "import", str(clip), "--json"]) == 2
     captured = capsys.readouterr()
     (fault,) = json.loads(captured.out)["faults"]
     assert "must be the 300" in fault["rule"]
@@ -52,42 +52,43 @@ def test_bad_file_is_told_with_line_and_rule(
 def test_file_that_is_not_there_is_a_wrong_call(
     clip: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["motions", "import", str(clip.with_name("nobody.bvh"))]) == 2
+    assert main(["recordings", "import", str(clip.with_name("nobody.bvh"))]) == 2
     assert "cannot be read: No such file" in capsys.readouterr().err
 
 
 def test_kept_motion_is_listed_shown_and_removed(
     clip: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["motions", "list"]) == 0
-    assert "no motion is stored" in capsys.readouterr().out
-    assert main(["motions", "import", str(clip), "--keep"]) == 0
+    assert main(["recordings", "list"]) == 0
+    assert "no recording is stored" in capsys.readouterr().out
+    assert main(["recordings", "import", str(clip), "--keep"]) == 0
     told = capsys.readouterr().out
     assert told.endswith("is stored as someone\n")
-    assert main(["motions", "import", str(clip), "--keep", "--json"]) == 0
+    assert main(["recordings", "import", str(clip), "--keep", "--json"]) == 0
     assert not json.loads(capsys.readouterr().out)["new"]
-    assert main(["motions", "list"]) == 0
+    assert main(["recordings", "list"]) == 0
     assert "1 clean runs, wrists p99 0.0" in capsys.readouterr().out
-    assert main(["motions", "show", "someone"]) == 0
+    assert main(["recordings", "show", "someone"]) == 0
     assert told.startswith(capsys.readouterr().out.strip())
-    assert main(["motions", "remove", "someone"]) == 0
-    assert main(["motions", "show", "someone"]) == 2
+    assert main(["recordings", "remove", "someone"]) == 0
+    assert main(["recordings", "show", "someone"]) == 2
     assert "no motion 'someone'" in capsys.readouterr().err
 
 
 def test_kept_motion_can_be_given_a_name(
     clip: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["motions", "import", str(clip), "--keep", "--name", "reach-1"]) == 0
+    assert main(["recordings", "import", str(clip), "--keep", "--name", "reach-1"]) == 0
     capsys.readouterr()
-    assert main(["motions", "list", "--json"]) == 0
-    (found,) = json.loads(capsys.readouterr().out)["motions"]
+    assert main(["recordings", "list", "--json"]) == 0
+    (found,) = json.loads(capsys.readouterr().out)["recordings"]
     assert (found["name"], found["file_name"]) == ("reach-1", "someone.bvh")
 
 
 def test_unit_and_up_axis_can_be_stated(clip: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert (
-        main(["motions", "import", str(clip), "--unit", "0.0011", "--up", "y", "--json"]) == 0
+        main(["recordings", "import", str(clip), "--unit", "0.0011", "--up", "y", "--json"])
+        == 0
     )
     found = json.loads(capsys.readouterr().out)
     assert found["unit"] == "0.0011"
@@ -98,17 +99,17 @@ def test_files_of_an_evaluation_are_read_as_stated(tmp_path: Path) -> None:
     path = tmp_path / "child.bvh"
     path.write_text(skeleton(Person(unit=0.0254, stature=0.98))[0], encoding="utf-8")
     with pytest.raises(BadMotion, match="fits two units, inch"):
-        runs_of([path])
-    (run,) = runs_of([path], ReadOptions(unit="inch"))
+        clean_runs([path])
+    (run,) = clean_runs([path], ReadOptions(unit="inch"))
     assert run.size.forearm_r == pytest.approx(0.149 * 0.98, rel=1e-3)
 
 
 def test_other_file_under_a_taken_name_is_refused(
     clip: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    main(["motions", "import", str(clip), "--keep"])
+    main(["recordings", "import", str(clip), "--keep"])
     clip.write_text(bvh_text(working(200, seed=1)), encoding="utf-8")
-    assert main(["motions", "import", str(clip), "--keep"]) == 1
+    assert main(["recordings", "import", str(clip), "--keep"]) == 1
     assert "from another file is stored: remove it first" in capsys.readouterr().err
 
 
@@ -118,7 +119,7 @@ def test_names_of_joints_and_columns_can_be_mapped(
     table = clip.with_suffix(".csv")
     text = csv_text(working(100)).replace("elbow_r", "coude d").replace("elbow_l", "coude g")
     table.write_text(text, encoding="utf-8")
-    asked = ["motions", "import", str(table), "--map", "coude d=elbow_r"]
+    asked = ["recordings", "import", str(table), "--map", "coude d=elbow_r"]
     assert main(asked) == 2
     assert "lacks the columns elbow_l (other columns: coude g" in capsys.readouterr().err
     assert main([*asked, "--map", "coude g = elbow_l", "--json"]) == 0
@@ -131,17 +132,17 @@ def test_names_of_joints_and_columns_can_be_mapped(
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (["list", "--map", "a=neck"], "--map = 'list' goes with import only"),
+        (["list", "--map", "a=neck"], "No such option: --map"),
         (["import", "{clip}", "--map", "a"], "map = 'a' must be theirs=ours"),
         (["import", "{clip}", "--map", "a=neck", "--map", "b=neck"], "the only name for neck"),
         (["import", "{clip}", "--name", "a"], "add --keep"),
         (["import", "{clip}", "--keep", "--name", "A"], "1 to 64 of the characters"),
-        (["list", "--keep"], "goes with import only"),
-        (["show", "someone", "--unit", "cm"], "--unit = 'show' goes with import only"),
+        (["list", "--keep"], "No such option: --keep"),
+        (["show", "someone", "--unit", "cm"], "No such option: --unit"),
         (["import", "{clip}", "--unit", "furlong"], "choices: m, cm, mm, inch, foot, cmu"),
         (["import", "{clip}", "--up", "up"], "choices: x, y, z, -x, -y, -z"),
-        (["show"], "must be given: motions show NAME"),
-        (["import"], "must be given: motions import FILE"),
+        (["show"], "Missing argument 'name'"),
+        (["import"], "Missing argument 'file'"),
         (["remove", "someone"], "there is no database at"),
     ],
 )
@@ -149,5 +150,5 @@ def test_wrong_call_is_told(
     clip: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], text: str
 ) -> None:
     given = [one.replace("{clip}", str(clip)) for one in arguments]
-    assert main(["motions", *given]) == 2
+    assert main(["recordings", *given]) == 2
     assert text in capsys.readouterr().err

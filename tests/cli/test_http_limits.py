@@ -16,11 +16,11 @@ import pytest
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from app import http_limits
+from app.cli import http_limits
 from tests import patient_http
 from tests.small_service import LARGE, TOKEN
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 MIB = 1024 * 1024
 MAX_GROWTH = 12 * MIB
 BEARER = f"Host: here\r\nAuthorization: Bearer {TOKEN}\r\n".encode()

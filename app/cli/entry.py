@@ -1,0 +1,59 @@
+"""The Typer application and its entry point.
+
+Results go to standard output (``--json``: one object), logs and errors to standard error.
+Exit status: 0 whatever the result, 1 where this machine is in the way (port taken, database
+in use), 2 for a wrong call.
+"""
+
+import logging
+import os
+import sys
+from collections.abc import Sequence
+
+import typer
+
+from app.cli import cells, evaluate, recordings, serve, train
+from app.errors import InvalidInput, NotFound, ServiceError
+
+app = typer.Typer(
+    help="Decisions and motions of a robot arm that shares its work cell with people.",
+    add_completion=False,
+    rich_markup_mode=None,
+)
+app.command()(serve.serve)
+app.command()(serve.setup)
+app.command()(train.train)
+app.command()(evaluate.evaluate)
+app.command(
+    context_settings={"allow_extra_args": True, "ignore_unknown_options": True},
+)(evaluate.bench)
+app.add_typer(cells.app, name="cells")
+app.add_typer(recordings.app, name="recordings")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command.
+
+    Args:
+        arguments: Command line; that of the process by default.
+
+    Returns:
+        The exit status.
+    """
+    logging.basicConfig(
+        level=logging.INFO,
+        stream=sys.stderr,
+        format="%(asctime)s %(levelname)s %(name)s: %(message)s",
+    )
+    for chatty in ("alembic", "websockets", "uvicorn"):
+        logging.getLogger(chatty).setLevel(logging.WARNING)
+    try:
+        app(arguments, prog_name="python -m app")
+    except SystemExit as end:
+        return int(end.code or 0)
+    except ServiceError as error:
+        print(f"tandem: {error.message}", file=sys.stderr)
+        return 2 if isinstance(error, InvalidInput | NotFound) else 1
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return 0

@@ -1,0 +1,62 @@
+"""Printing of results, as text or as one JSON object."""
+
+import json
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict
+from typing import Any
+
+import typer
+
+from app.errors import BadCell, BadMotion
+
+
+def print_result(text: str, data: Mapping[str, Any], *, as_json: bool) -> None:
+    """Print a result for people or as JSON."""
+    print(json.dumps(data) if as_json else text)
+
+
+@contextmanager
+def every_fault_printed(prefix: str, *, as_json: bool) -> Iterator[None]:
+    """End the command with status 2 where a file has faults, each printed on a line.
+
+    Args:
+        prefix: Text before each fault, such as ``"cell.json: "``.
+        as_json: Whether the faults are printed as one JSON object, too.
+    """
+    try:
+        yield
+    except (BadCell, BadMotion) as error:
+        for fault in error.faults:
+            print(f"{prefix}{fault.text}", file=sys.stderr)
+        if as_json:
+            print(json.dumps({"ok": False, "faults": [asdict(one) for one in error.faults]}))
+        raise typer.Exit(2) from error
+
+
+def table(result: Mapping[str, Any]) -> str:
+    """Return the result of an evaluation as a table of its rows, without nested lists."""
+    rows: Sequence[Mapping[str, Any]] = result["results"]
+    columns = list(
+        dict.fromkeys(key for row in rows for key in row if not isinstance(row[key], list))
+    )
+    lines = [columns, *([_cell(row.get(key)) for key in columns] for row in rows)]
+    widths = [max(len(line[k]) for line in lines) for k in range(len(columns))]
+    texts = [
+        "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip()
+        for line in lines
+    ]
+    head = f"{result['protocol']}, seed {result['seed']}, {result['episodes']} episodes"
+    tested = [f"checkpoint {result['checkpoint']}"] if "checkpoint" in result else []
+    return "\n".join([head, *tested, "", *texts])
+
+
+def _cell(value: Any) -> str:
+    """Return a value as text: a rate in percent with its interval, a number, or the text."""
+    if isinstance(value, Mapping) and {"mean", "low", "high"} <= value.keys():
+        mean, low, high = (100.0 * value[key] for key in ("mean", "low", "high"))
+        return f"{mean:.1f} % [{low:.1f}, {high:.1f}]"
+    if isinstance(value, float):
+        return f"{value:.3g}"
+    return "" if value is None else str(value)

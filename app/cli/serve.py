@@ -1,0 +1,50 @@
+"""The commands ``serve`` and ``setup``."""
+
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from app.cli.options import prepared_settings
+
+
+def serve(
+    host: Annotated[
+        str | None, typer.Option(help="Address to listen on (TANDEM_HOST).")
+    ] = None,
+    port: Annotated[int | None, typer.Option(help="Port (TANDEM_PORT).")] = None,
+    data: Annotated[Path | None, typer.Option(help="Data folder (TANDEM_DATA).")] = None,
+) -> None:
+    """Start the service."""
+    from app.cli.preflight import check_database_unused, listen
+    from app.settings import check_access
+
+    settings = prepared_settings(host=host, port=port, data=data)
+    check_access(settings)
+    sock = listen(settings.host, settings.port)
+    check_database_unused(settings)
+
+    from app.cli.uvicorn_server import run
+
+    run(settings, sock, report=lambda line: print(line, flush=True))
+
+
+def setup() -> None:
+    """Create or upgrade the database and compile the kernels."""
+    settings = prepared_settings()
+    from app.cli.database import upgrade
+    from app.precompile import PARTS, compile_all
+    from app.provenance import cores
+    from app.store.engine import Store
+
+    settings.data.mkdir(parents=True, exist_ok=True)
+    store = Store(settings.database)
+    upgrade(store, settings)
+    print(f"database: {store.shown_url}", flush=True)
+    store.close()
+    print("compiling the simulator's kernels (several minutes, once) ...", flush=True)
+    started = time.monotonic()
+    for n, (name, cpu_s) in enumerate(compile_all(cores()), 1):
+        print(f"    {n} of {len(PARTS)}: {name} ({cpu_s:.0f} CPU seconds)", flush=True)
+    print(f"kernels are ready ({time.monotonic() - started:.1f} s)", flush=True)

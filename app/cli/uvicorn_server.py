@@ -1,0 +1,93 @@
+"""The application on uvicorn: one process, one worker, a quick end.
+
+One worker, because the live world and its viewer live in this process. Frames of the viewer are
+not compressed: compression costs more time than it saves.
+"""
+
+import socket
+from collections.abc import Awaitable, Callable
+from types import FrameType
+
+import torch
+import uvicorn
+from fastapi import FastAPI
+
+from app.cli.http_limits import LimitedHttp
+from app.cli.preflight import address_of
+from app.main import create_app
+from app.settings import Settings
+
+GRACE_S = 3
+"""Time for open requests once the server stops [s]."""
+MAX_FRAME_BYTES = 16 * 1024 * 1024
+"""Largest WebSocket frame: a picture of the viewer's canvas; see ``app.api.viewer``."""
+
+
+class Server(uvicorn.Server):
+    """uvicorn's server; it ends open streams before it waits for them."""
+
+    def __init__(self, config: uvicorn.Config, app: FastAPI) -> None:
+        super().__init__(config)
+        self._app = app
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        """End the streams, then stop as uvicorn does."""
+        services = getattr(self._app.state, "services", None)
+        if services is not None:
+            services.stopping.set()
+        super().handle_exit(sig, frame)
+
+
+def new_server(
+    app: FastAPI, on_tick: Callable[[], Awaitable[None]] | None = None, *, root_path: str = ""
+) -> Server:
+    """Return the server that runs an application.
+
+    Args:
+        app: The application.
+        on_tick: Called once a second.
+        root_path: Path under which a reverse proxy shows the service and which it removes.
+    """
+    config = uvicorn.Config(
+        app,
+        http=LimitedHttp,
+        root_path=root_path,
+        log_config=None,
+        access_log=False,
+        ws_per_message_deflate=False,
+        ws_max_size=MAX_FRAME_BYTES,
+        timeout_graceful_shutdown=GRACE_S,
+        callback_notify=on_tick,
+        timeout_notify=0,
+        server_header=False,
+    )
+    return Server(config, app)
+
+
+def run(settings: Settings, sock: socket.socket, report: Callable[[str], None]) -> None:
+    """Run the service until it is stopped by a signal.
+
+    Args:
+        settings: Where and how it runs.
+        sock: Listening socket.
+        report: Called with the address at the start and once the service is ready, or with the
+            reason why it cannot decide.
+    """
+    report(f"Tandem starts: {address_of(sock)}")
+    # More threads do not speed up networks this small; waiting for a busy core costs 0.3 s.
+    torch.set_num_threads(1)
+    app = create_app(settings)
+    reported = False
+
+    async def report_readiness() -> None:
+        nonlocal reported
+        services = getattr(app.state, "services", None)
+        if services is None or reported or services.stopping.is_set():
+            return
+        if services.readiness.ready:
+            report(f"Tandem is ready: {address_of(sock)}")
+        elif services.readiness.failed:
+            report(f"Tandem cannot decide: {services.readiness.reason}")
+        reported = services.readiness.ready or services.readiness.failed
+
+    new_server(app, report_readiness, root_path=settings.root_path).run(sockets=[sock])
