@@ -4,7 +4,7 @@
     ├── NotFound             nothing has that name or id
     ├── InvalidInput         a value breaks a rule: field, value, rule, choices
     │   ├── BadCell          a work cell has faults: all of them, each with its place
-    │   ├── BadMotion        a motion file has faults: each with its place
+    │   ├── BadRecording        a motion file has faults: each with its place
     │   └── GoalOutside      a goal lies beyond what can be answered for: axes and by how much
     ├── Conflict             the request contradicts the present state
     │   ├── ClockJump        a frame's stamp does not continue those before
@@ -161,7 +161,7 @@ class BadCell(_Faulty):
     """A work cell has faults: all of them, at least one."""
 
 
-class BadMotion(_Faulty):
+class BadRecording(_Faulty):
     """A file of human motion has faults: at least one, each with its line or column."""
 
 

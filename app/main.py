@@ -45,7 +45,7 @@ from app.store.engine import Store
 from jobs.cells import CellCatalog
 from jobs.checkpoints import shipped
 from jobs.import_process import ImportProcess
-from jobs.motions import MotionCatalog
+from jobs.motions import RecordingCatalog
 from jobs.supervisor import Supervisor
 from web.viewer.loop import LiveCell
 
@@ -113,7 +113,7 @@ class Service:
             sorters=PolicyRegistry(names, build_sorter, SORTERS[0]),
             movers=PolicyRegistry(names, build_mover, REACH_ALIAS),
             cells=CellCatalog(store),
-            motions=MotionCatalog(store, self._imports),
+            motions=RecordingCatalog(store, self._imports),
             start_world=start_world,
         )
         self._warm_up = threading.Thread(target=self._start_cell, name="warm-up", daemon=True)

@@ -19,10 +19,10 @@ from collections.abc import Mapping
 from dataclasses import asdict, fields
 from typing import Any
 
-from app.errors import BadMotion, Fault, InvalidInput, NotReady, SimulationError
+from app.errors import BadRecording, Fault, InvalidInput, NotReady, SimulationError
 from app.sim.mocap.importer import read_motion
 from app.sim.mocap.read_options import NOTHING_STATED, ReadOptions
-from app.store.records import NewMotion
+from app.store.records import NewRecording
 from jobs.executor import PROJECT_ROOT, search_path
 from jobs.stored_motion import packed
 
@@ -50,7 +50,7 @@ class ImportProcess:
         name: str,
         sha256: str,
         options: ReadOptions = NOTHING_STATED,
-    ) -> NewMotion:
+    ) -> NewRecording:
         """Return a file's motion as it is stored; waits until it is imported.
 
         Args:
@@ -61,7 +61,7 @@ class ImportProcess:
             options: What is stated about the file.
 
         Raises:
-            BadMotion: It is no sound motion; each fault names line or column and rule.
+            BadRecording: It is no sound motion; each fault names line or column and rule.
             InvalidInput: It takes too long.
             NotReady: The server stops.
             SimulationError: The process ended without an answer.
@@ -127,11 +127,11 @@ def import_here(
     name: str,
     sha256: str,
     options: ReadOptions = NOTHING_STATED,
-) -> NewMotion:
+) -> NewRecording:
     """Return a file's motion as it is stored, imported in this process.
 
     Raises:
-        BadMotion: It is no sound motion; each fault names line or column and rule.
+        BadRecording: It is no sound motion; each fault names line or column and rule.
     """
     found = read_motion(content, file_name, options)
     return packed(found, name, file_name, sha256, options)
@@ -145,19 +145,19 @@ def main() -> None:
     asked["options"] = ReadOptions(**asked["options"])
     try:
         new = import_here(content, **asked)
-    except BadMotion as error:
+    except BadRecording as error:
         answer = _framed({"faults": [asdict(fault) for fault in error.faults]}, b"")
     else:
-        told = {entry.name: getattr(new, entry.name) for entry in fields(NewMotion)}
+        told = {entry.name: getattr(new, entry.name) for entry in fields(NewRecording)}
         answer = _framed({"motion": told}, told.pop("tensors"))
     sys.stdout.buffer.write(answer)
 
 
-def _answered(output: bytes) -> NewMotion:
+def _answered(output: bytes) -> NewRecording:
     head, tensors = _unframed(output)
     if "faults" in head:
-        raise BadMotion([Fault(**fault) for fault in head["faults"]])
-    return NewMotion(**head["motion"], tensors=tensors)
+        raise BadRecording([Fault(**fault) for fault in head["faults"]])
+    return NewRecording(**head["motion"], tensors=tensors)
 
 
 def _framed(head: Mapping[str, Any], payload: bytes) -> bytes:

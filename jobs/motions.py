@@ -13,7 +13,7 @@ from app.sim.mocap.importer import Motion
 from app.sim.mocap.read_options import NOTHING_STATED, ReadOptions
 from app.store import motions as kept
 from app.store.engine import Store
-from app.store.records import MotionRecord, NewMotion
+from app.store.records import NewRecording, StoredRecording
 from jobs.import_process import import_here
 from jobs.stored_motion import unpacked
 
@@ -22,14 +22,14 @@ MAX_CACHED_FRAMES = 500_000
 MAX_FILE_NAME = 255
 """Longest file name [characters]."""
 
-Importer = Callable[[bytes, str, str, str, ReadOptions], NewMotion]
+Importer = Callable[[bytes, str, str, str, ReadOptions], NewRecording]
 """Turns a file, its name, the motion's name, the file's SHA-256 and what is stated about the
 file into what is stored."""
 
 _NAME = re.compile(r"[a-z0-9][a-z0-9-]{0,63}")
 
 
-class MotionCatalog:
+class RecordingCatalog:
     """Finds motions by name; safe to use from any thread.
 
     Args:
@@ -46,13 +46,13 @@ class MotionCatalog:
 
     def names(self) -> tuple[str, ...]:
         """Return the names of all motions."""
-        return kept.motion_names(self._store)
+        return kept.recording_names(self._store)
 
-    def all(self) -> tuple[MotionRecord, ...]:
+    def all(self) -> tuple[StoredRecording, ...]:
         """Return what is known of all motions, by name, without their runs."""
-        return kept.list_motions(self._store)
+        return kept.list_recordings(self._store)
 
-    def record(self, name: str) -> MotionRecord:
+    def record(self, name: str) -> StoredRecording:
         """Return what is known of one motion, without its runs.
 
         Raises:
@@ -72,7 +72,7 @@ class MotionCatalog:
         """
         try:
             # The number tells whether another one took the name, by whatever process.
-            number = kept.motion_number(self._store, _possible(name))
+            number = kept.recording_number(self._store, _possible(name))
             with self._lock:
                 if number in self._cached:
                     self._cached.move_to_end(number)
@@ -114,7 +114,7 @@ class MotionCatalog:
         file_name: str,
         name: str | None = None,
         options: ReadOptions = NOTHING_STATED,
-    ) -> tuple[MotionRecord, bool]:
+    ) -> tuple[StoredRecording, bool]:
         """Import a file and keep its motion.
 
         Args:
@@ -128,13 +128,13 @@ class MotionCatalog:
             name again is harmless.
 
         Raises:
-            BadMotion: The file is no sound motion; each fault names line or column and rule.
+            BadRecording: The file is no sound motion; each fault names line or column and rule.
             InvalidInput: The name cannot be one.
             Conflict: Another file, or this one with other options, has that name, or there are
                 too many motions.
         """
         file_name = checked_file_name(file_name)
-        name = motion_name(file_name) if name is None else checked_name(name)
+        name = recording_name(file_name) if name is None else checked_name(name)
         sha256 = hashlib.sha256(content).hexdigest()
         same = kept.find_same(self._store, name, sha256)
         ending = PurePath(file_name).suffix.lower()
@@ -144,7 +144,7 @@ class MotionCatalog:
             return _read_alike(same, options), False
         with self._importing:  # one at a time: its memory is a multiple of the file's
             new = self._import(content, file_name, name, sha256, options)
-        is_new = kept.put_motion(self._store, new)
+        is_new = kept.put_recording(self._store, new)
         return _read_alike(kept.read_runs(self._store, name)[0], options), is_new
 
     def remove(self, name: str) -> None:
@@ -154,7 +154,7 @@ class MotionCatalog:
             NotFound: No motion has that name.
         """
         try:
-            kept.remove_motion(self._store, _possible(name))
+            kept.remove_recording(self._store, _possible(name))
         except NotFound:
             raise NotFound("motion", name, self.names()) from None
 
@@ -191,7 +191,7 @@ def checked_name(name: str) -> str:
     return name
 
 
-def motion_name(file_name: str) -> str:
+def recording_name(file_name: str) -> str:
     """Return the name of a motion whose file is called so: ``"Clip 3.bvh"`` is ``clip-3``.
 
     Raises:
@@ -205,7 +205,7 @@ def motion_name(file_name: str) -> str:
     return name
 
 
-def _read_alike(record: MotionRecord, options: ReadOptions) -> MotionRecord:
+def _read_alike(record: StoredRecording, options: ReadOptions) -> StoredRecording:
     """Return a stored motion, unless its file was read with other options."""
     before = record.summary.get("options", {})
     if before != options.stated():

@@ -24,7 +24,7 @@ from app.store.records import NewCheckpoint, ResumeState
 from jobs.attempt import main
 from jobs.cells import CellCatalog
 from jobs.checkpoints import read_sound
-from jobs.motions import MotionCatalog
+from jobs.motions import RecordingCatalog
 from jobs.spec import EvaluateSpec, parse_spec
 from jobs.worker import Runner, Worker
 
@@ -82,7 +82,7 @@ def evaluate(worker: Worker) -> dict[str, Any]:
         _stored(worker.store, spec.checkpoint),
         episodes=spec.episodes,
         seed=spec.seed,
-        motions=MotionCatalog(worker.store).runs_of(spec.motions),
+        motions=RecordingCatalog(worker.store).runs_of(spec.motions),
         on_row=on_row,
     )
 

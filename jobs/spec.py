@@ -27,7 +27,7 @@ from app.store.records import NewJob
 MAX_SEED = 2**31 - 1
 """Greatest seed; every random stream accepts it."""
 
-MAX_MOTIONS = 32
+MAX_RECORDINGS = 32
 """Most stored motions of one evaluation."""
 
 _FIELDS = {
@@ -141,8 +141,8 @@ def _motions(body: Mapping[str, Any], protocol: str) -> tuple[str, ...]:
     names = body.get("motions", ())
     if not isinstance(names, list | tuple):
         raise InvalidInput("motions", names, "must be a list of names of stored motions")
-    if len(names) > MAX_MOTIONS:
-        raise InvalidInput("motions", len(names), f"must be at most {MAX_MOTIONS} names")
+    if len(names) > MAX_RECORDINGS:
+        raise InvalidInput("motions", len(names), f"must be at most {MAX_RECORDINGS} names")
     for place, name in enumerate(names):
         if not isinstance(name, str) or not name:
             raise InvalidInput(f"motions[{place}]", name, "must be the name of a stored motion")

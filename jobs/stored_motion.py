@@ -20,7 +20,7 @@ from app.sim.human.anthropometry import BodySize
 from app.sim.mocap.importer import ImportedMotion, Motion, Spread
 from app.sim.mocap.joint_centres import MEASURED
 from app.sim.mocap.read_options import NOTHING_STATED, ReadOptions
-from app.store.records import MotionRecord, NewMotion
+from app.store.records import NewRecording, StoredRecording
 
 MAX_GLITCHES = 1000
 """Most artifacts of a motion that are kept with their place; all are counted."""
@@ -67,7 +67,7 @@ def packed(
     file_name: str,
     sha256: str,
     options: ReadOptions = NOTHING_STATED,
-) -> NewMotion:
+) -> NewRecording:
     """Return an import as it is stored.
 
     Args:
@@ -93,7 +93,7 @@ def packed(
             "first_frames": np.array([run.first_frame for run in found.runs], dtype=np.int64),
         }
     )
-    return NewMotion(
+    return NewRecording(
         name=name,
         sha256=sha256,
         file_name=file_name,
@@ -106,7 +106,7 @@ def packed(
     )
 
 
-def unpacked(record: MotionRecord, tensors: bytes) -> tuple[Motion, ...]:
+def unpacked(record: StoredRecording, tensors: bytes) -> tuple[Motion, ...]:
     """Return the runs of a stored motion, arrays read-only.
 
     Args:

@@ -6,12 +6,12 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 from starlette.concurrency import run_in_threadpool
 
 from app.api.bodies import FILE_TYPES
-from app.api.schemas.motions import MotionItem, MotionList, MotionPublic
+from app.api.schemas.motions import RecordingItem, RecordingList, RecordingPublic
 from app.api.services import MAX_UPLOADS, Services, ServicesDep
 from app.errors import NotReady
 from app.sim.mocap.importer import FORMATS, MAX_BYTES
 from app.sim.mocap.read_options import UNITS, UP_AXES, ReadOptions, name_map
-from app.store.records import MotionRecord
+from app.store.records import StoredRecording
 
 router = APIRouter(prefix="/v1/motions", tags=["motions"])
 
@@ -54,15 +54,17 @@ def stated_options(
 
 
 @router.get("", summary="List the imported motions")
-def list_all(services: ServicesDep) -> MotionList:
+def list_all(services: ServicesDep) -> RecordingList:
     """Return every stored motion with its measures and the error of its import."""
-    return MotionList(items=[MotionItem.from_domain(one) for one in services.motions.all()])
+    return RecordingList(
+        items=[RecordingItem.from_domain(one) for one in services.motions.all()]
+    )
 
 
 @router.get("/{name}", summary="One imported motion")
-def get_one(name: str, services: ServicesDep) -> MotionPublic:
+def get_one(name: str, services: ServicesDep) -> RecordingPublic:
     """Return one motion with its clean runs and the artifacts that were cut out."""
-    return MotionPublic.from_domain(services.motions.record(name))
+    return RecordingPublic.from_domain(services.motions.record(name))
 
 
 @router.post("", status_code=201, summary="Import a recorded motion", openapi_extra=BODY)
@@ -78,13 +80,13 @@ async def create(
         str | None,
         Query(description="name of the motion, a-z 0-9 -; made from the file's if missing"),
     ] = None,
-) -> MotionPublic:
+) -> RecordingPublic:
     """Import the file that is the body, and keep it; the same one again answers 200."""
     record, new = await _taken_in(request, services, file_name, name, options)
     if not new:
         response.status_code = 200
     response.headers["Location"] = f"{router.prefix}/{record.name}"
-    return MotionPublic.from_domain(record)
+    return RecordingPublic.from_domain(record)
 
 
 @router.delete("/{name}", status_code=204, summary="Remove an imported motion")
@@ -99,7 +101,7 @@ async def _taken_in(
     file_name: str,
     name: str | None,
     options: ReadOptions,
-) -> tuple[MotionRecord, bool]:
+) -> tuple[StoredRecording, bool]:
     """Read the body and have it imported while a thread waits, a few at a time."""
     if not services.uploads.acquire(blocking=False):
         raise NotReady(f"{MAX_UPLOADS} files are being imported: post again in a moment")

@@ -20,7 +20,7 @@ from app.sim.pick.task_policy import TaskPolicy
 from app.sim.sorting.sorting_values import SortingValues
 from app.store.engine import Store
 from jobs.cells import CellCatalog
-from jobs.motions import MotionCatalog
+from jobs.motions import RecordingCatalog
 from jobs.supervisor import Supervisor
 
 MAX_UPLOADS = 4
@@ -96,7 +96,7 @@ class Services:
     """Those that move the arm to goals."""
     cells: CellCatalog
     """The work cells by name."""
-    motions: MotionCatalog
+    motions: RecordingCatalog
     """The imported human motions by name."""
     start_world: StartWorld
     """Starts a live world."""

@@ -9,7 +9,7 @@ from typing import Any
 
 import typer
 
-from app.errors import BadCell, BadMotion
+from app.errors import BadCell, BadRecording
 
 
 def print_result(text: str, data: Mapping[str, Any], *, as_json: bool) -> None:
@@ -27,7 +27,7 @@ def every_fault_printed(prefix: str, *, as_json: bool) -> Iterator[None]:
     """
     try:
         yield
-    except (BadCell, BadMotion) as error:
+    except (BadCell, BadRecording) as error:
         for fault in error.faults:
             print(f"{prefix}{fault.text}", file=sys.stderr)
         if as_json:

@@ -10,12 +10,12 @@ import typer
 from app.cli.cells import file_content
 from app.cli.options import Json, Map, RootUnit, Unit, Up, prepared_settings, read_options
 from app.cli.output import every_fault_printed, print_result
-from app.errors import BadMotion, Fault, InvalidInput
+from app.errors import BadRecording, Fault, InvalidInput
 
 if TYPE_CHECKING:
     from app.sim.mocap.importer import Motion
     from app.sim.mocap.read_options import ReadOptions
-    from app.store.records import MotionRecord
+    from app.store.records import StoredRecording
 
 app = typer.Typer(help="Import, list, show or remove recorded human motion.")
 Name = Annotated[str, typer.Argument(show_default=False)]
@@ -43,7 +43,7 @@ def import_recording(
     settings = prepared_settings()
     from app.cli.database import opened
     from app.sim.mocap.importer import MAX_BYTES, read_motion
-    from jobs.motions import MotionCatalog
+    from jobs.motions import RecordingCatalog
     from jobs.stored_motion import detail_of, summary_of
 
     with every_fault_printed(f"{file}: ", as_json=as_json):
@@ -51,7 +51,7 @@ def import_recording(
         content = file_content(file, MAX_BYTES)
         if keep:
             with opened(settings, NOUN, create=True) as store:
-                record, new = MotionCatalog(store).add(content, file.name, name, options)
+                record, new = RecordingCatalog(store).add(content, file.name, name, options)
             data = {**_data(record), "new": new}
             stored = "is stored" if new else "was stored already"
             text = f"{_description(data)}\n{stored} as {record.name}"
@@ -74,12 +74,12 @@ def list_recordings(as_json: Json = False) -> None:
     """List the stored recordings."""
     settings = prepared_settings()
     from app.cli.database import has_database, opened
-    from jobs.motions import MotionCatalog
+    from jobs.motions import RecordingCatalog
 
-    found: tuple[MotionRecord, ...] = ()
+    found: tuple[StoredRecording, ...] = ()
     if has_database(settings):
         with opened(settings, NOUN) as store:
-            found = MotionCatalog(store).all()
+            found = RecordingCatalog(store).all()
     lines = [
         f"{one.name:24} {one.duration:8.2f} s, {one.n_runs} clean runs, wrists p99 "
         f"{one.summary['error_mm']['wrists']['p99']:.2f} mm"
@@ -94,10 +94,10 @@ def show(name: Name, as_json: Json = False) -> None:
     """Print what is known of a stored recording."""
     settings = prepared_settings()
     from app.cli.database import opened
-    from jobs.motions import MotionCatalog
+    from jobs.motions import RecordingCatalog
 
     with opened(settings, NOUN) as store:
-        data = _data(MotionCatalog(store).record(name))
+        data = _data(RecordingCatalog(store).record(name))
     print_result(_description(data), data, as_json=as_json)
 
 
@@ -106,10 +106,10 @@ def remove(name: Name, as_json: Json = False) -> None:
     """Remove a stored recording."""
     settings = prepared_settings()
     from app.cli.database import opened
-    from jobs.motions import MotionCatalog
+    from jobs.motions import RecordingCatalog
 
     with opened(settings, NOUN) as store:
-        MotionCatalog(store).remove(name)
+        RecordingCatalog(store).remove(name)
     print_result(f"{name} is removed", {"name": name, "removed": True}, as_json=as_json)
 
 
@@ -123,7 +123,7 @@ def clean_runs(
         options: How all of them are read; found from each file by default.
 
     Raises:
-        BadMotion: A file is unsound; carries every fault of every file, with its path.
+        BadRecording: A file is unsound; carries every fault of every file, with its path.
         InvalidInput: A file cannot be read.
     """
     from app.sim.mocap.importer import MAX_BYTES, read_motion
@@ -137,16 +137,16 @@ def clean_runs(
         content = file_content(path, MAX_BYTES)
         try:
             found = read_motion(content, path.name, options or NOTHING_STATED)
-        except BadMotion as error:
+        except BadRecording as error:
             faults += [replace(one, place=f"{path}: {one.place}") for one in error.faults]
             continue
         runs.extend(replace(run, name=name) for run in found.runs)
     if faults:
-        raise BadMotion(faults)
+        raise BadRecording(faults)
     return tuple(runs)
 
 
-def _data(record: "MotionRecord") -> dict[str, Any]:
+def _data(record: "StoredRecording") -> dict[str, Any]:
     detail = record.detail or {}
     return {
         "ok": True,

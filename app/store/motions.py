@@ -13,12 +13,12 @@ import sqlalchemy as sa
 from app.digests import digest, has_digest
 from app.errors import Conflict, Damaged, InvalidInput, NotFound
 from app.store.engine import Store
-from app.store.records import MotionRecord, NewMotion
+from app.store.records import NewRecording, StoredRecording
 from app.store.tables import motions
 
 logger = logging.getLogger(__name__)
 
-MAX_MOTIONS = 200
+MAX_RECORDINGS = 200
 """Most motions that are kept."""
 MAX_TENSORS = 40 * 1024 * 1024
 """Largest motion that goes into the database [bytes]; 200 000 frames are 31 MiB."""
@@ -29,7 +29,7 @@ _LISTED = [column for column in motions.c if column.name not in ("digest", "tens
 _DETAILED = [*_LISTED, motions.c.detail]
 
 
-def put_motion(store: Store, new: NewMotion) -> bool:
+def put_recording(store: Store, new: NewRecording) -> bool:
     """Store a motion; the same file under the same name again is harmless.
 
     Args:
@@ -70,7 +70,7 @@ def put_motion(store: Store, new: NewMotion) -> bool:
     return True
 
 
-def find_same(store: Store, name: str, sha256: str) -> MotionRecord | None:
+def find_same(store: Store, name: str, sha256: str) -> StoredRecording | None:
     """Return what is stored of a file under a name; None where it could be stored now.
 
     Args:
@@ -85,7 +85,7 @@ def find_same(store: Store, name: str, sha256: str) -> MotionRecord | None:
         return _same(connection, name, sha256)
 
 
-def read_runs(store: Store, name: str) -> tuple[MotionRecord, bytes]:
+def read_runs(store: Store, name: str) -> tuple[StoredRecording, bytes]:
     """Return one motion with its detail and the safetensors bytes of its runs.
 
     Raises:
@@ -101,7 +101,7 @@ def read_runs(store: Store, name: str) -> tuple[MotionRecord, bytes]:
     return _record(row), tensors
 
 
-def motion_number(store: Store, name: str) -> int:
+def recording_number(store: Store, name: str) -> int:
     """Return the running number of a motion, which tells it from later ones of its name.
 
     Raises:
@@ -111,7 +111,7 @@ def motion_number(store: Store, name: str) -> int:
         return int(_row(connection, name, [motions.c.number])["number"])
 
 
-def list_motions(store: Store) -> tuple[MotionRecord, ...]:
+def list_recordings(store: Store) -> tuple[StoredRecording, ...]:
     """Return all motions whose summary is undamaged, by name, without detail and runs."""
     with store.reading() as connection:
         rows = connection.execute(sa.select(*_LISTED).order_by(motions.c.name)).mappings().all()
@@ -124,14 +124,14 @@ def list_motions(store: Store) -> tuple[MotionRecord, ...]:
     return tuple(found)
 
 
-def motion_names(store: Store) -> tuple[str, ...]:
+def recording_names(store: Store) -> tuple[str, ...]:
     """Return the names of all motions."""
     with store.reading() as connection:
         query = sa.select(motions.c.name).order_by(motions.c.name)
         return tuple(connection.execute(query).scalars())
 
 
-def remove_motion(store: Store, name: str) -> None:
+def remove_recording(store: Store, name: str) -> None:
     """Remove a motion.
 
     Raises:
@@ -142,8 +142,8 @@ def remove_motion(store: Store, name: str) -> None:
             raise NotFound("motion", name)
 
 
-def _record(row: Any) -> MotionRecord:
-    return MotionRecord(**{name: row[name] for name in row if "digest" not in name})
+def _record(row: Any) -> StoredRecording:
+    return StoredRecording(**{name: row[name] for name in row if "digest" not in name})
 
 
 def _row(connection: sa.Connection, name: str, columns: list[sa.Column[Any]]) -> Any:
@@ -154,7 +154,7 @@ def _row(connection: sa.Connection, name: str, columns: list[sa.Column[Any]]) ->
     return row
 
 
-def _same(connection: sa.Connection, name: str, sha256: str) -> MotionRecord | None:
+def _same(connection: sa.Connection, name: str, sha256: str) -> StoredRecording | None:
     query = sa.select(*_DETAILED).where(motions.c.name == name)
     row = connection.execute(query).mappings().first()
     if row is not None:
@@ -166,8 +166,10 @@ def _same(connection: sa.Connection, name: str, sha256: str) -> MotionRecord | N
         )
     held = sa.select(sa.func.count(), sa.func.coalesce(sa.func.sum(motions.c.size), 0))
     n_motions, total = connection.execute(held.select_from(motions)).one()
-    if n_motions >= MAX_MOTIONS:
-        raise Conflict(f"{MAX_MOTIONS} motions are stored, no more are kept: remove one first")
+    if n_motions >= MAX_RECORDINGS:
+        raise Conflict(
+            f"{MAX_RECORDINGS} motions are stored, no more are kept: remove one first"
+        )
     if total >= MAX_TOTAL:
         raise Conflict(
             f"the stored motions take {total} bytes, from {MAX_TOTAL} on no more are kept: "

@@ -189,7 +189,7 @@ class CellRecord:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class NewMotion:
+class NewRecording:
     """An imported motion to be stored; the store never opens it."""
 
     name: str
@@ -213,7 +213,7 @@ class NewMotion:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MotionRecord:
+class StoredRecording:
     """A stored motion, without its runs."""
 
     number: int

@@ -277,6 +277,6 @@ def test_description_of_the_api_tells_the_units(client: TestClient) -> None:
     api = client.get("/openapi.json").json()
     body = api["paths"]["/v1/motions"]["post"]["requestBody"]["content"]
     assert set(body) == {"application/octet-stream", "text/plain", "text/csv"}
-    fields = api["components"]["schemas"]["MotionPublic"]["properties"]
+    fields = api["components"]["schemas"]["RecordingPublic"]["properties"]
     assert "[mm]" in fields["error_mm"]["description"]
     assert "[m]" in fields["body_m"]["description"]

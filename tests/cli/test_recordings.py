@@ -5,7 +5,7 @@ import pytest
 
 from app.cli.entry import main
 from app.cli.recordings import clean_runs
-from app.errors import BadMotion
+from app.errors import BadRecording
 from app.sim.mocap.read_options import ReadOptions
 from tests.sim.recorded_person import bvh_text, csv_text, working
 from tests.sim.recorded_skeleton import Person, skeleton
@@ -98,7 +98,7 @@ def test_unit_and_up_axis_can_be_stated(clip: Path, capsys: pytest.CaptureFixtur
 def test_files_of_an_evaluation_are_read_as_stated(tmp_path: Path) -> None:
     path = tmp_path / "child.bvh"
     path.write_text(skeleton(Person(unit=0.0254, stature=0.98))[0], encoding="utf-8")
-    with pytest.raises(BadMotion, match="fits two units, inch"):
+    with pytest.raises(BadRecording, match="fits two units, inch"):
         clean_runs([path])
     (run,) = clean_runs([path], ReadOptions(unit="inch"))
     assert run.size.forearm_r == pytest.approx(0.149 * 0.98, rel=1e-3)

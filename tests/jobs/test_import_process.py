@@ -3,7 +3,7 @@ import time
 
 import pytest
 
-from app.errors import BadMotion, InvalidInput, NotReady, SimulationError
+from app.errors import BadRecording, InvalidInput, NotReady, SimulationError
 from app.sim.mocap.read_options import ReadOptions
 from jobs import import_process
 from jobs.import_process import ImportProcess, import_here
@@ -26,9 +26,9 @@ def test_what_is_stated_about_a_file_goes_to_the_process() -> None:
 
 
 def test_faults_come_back_whole() -> None:
-    with pytest.raises(BadMotion) as here:
+    with pytest.raises(BadRecording) as here:
         import_here(CLIP[:-3000], "动 作.bvh", "nod", "a" * 64)
-    with pytest.raises(BadMotion) as apart:
+    with pytest.raises(BadRecording) as apart:
         ImportProcess()(CLIP[:-3000], "动 作.bvh", "nod", "a" * 64)
     assert apart.value.faults == here.value.faults
 

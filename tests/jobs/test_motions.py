@@ -4,15 +4,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.errors import BadMotion, Conflict, InvalidInput, NotFound
+from app.errors import BadRecording, Conflict, InvalidInput, NotFound
 from app.sim.mocap.importer import Motion, read_motion
 from app.sim.mocap.read_options import ReadOptions
 from app.store.engine import Store
-from app.store.motions import put_motion
-from app.store.records import NewMotion
+from app.store.motions import put_recording
+from app.store.records import NewRecording
 from jobs import motions as motions_module
 from jobs.import_process import import_here
-from jobs.motions import MotionCatalog
+from jobs.motions import RecordingCatalog
 from jobs.stored_motion import packed
 from tests.sim.mocap.test_importer import CLIPS, with_leap
 from tests.sim.recorded_person import bvh_text, csv_text, working
@@ -21,8 +21,8 @@ CLIP = csv_text(working(100)).encode()
 
 
 @pytest.fixture
-def catalog(store: Store) -> MotionCatalog:
-    return MotionCatalog(store)
+def catalog(store: Store) -> RecordingCatalog:
+    return RecordingCatalog(store)
 
 
 def same(a: tuple[Motion, ...], b: tuple[Motion, ...]) -> bool:
@@ -34,16 +34,16 @@ def same(a: tuple[Motion, ...], b: tuple[Motion, ...]) -> bool:
     )
 
 
-def test_runs_come_back_as_they_were_imported(store: Store, catalog: MotionCatalog) -> None:
+def test_runs_come_back_as_they_were_imported(store: Store, catalog: RecordingCatalog) -> None:
     content = with_leap(slice(100, 103)).encode()
     _, new = catalog.add(content, "leap.bvh")
     found = read_motion(content, "leap.bvh")
     assert new and len(found.runs) == 2
     assert same(catalog.get("leap"), found.runs)
-    assert same(MotionCatalog(store).get("leap"), found.runs)
+    assert same(RecordingCatalog(store).get("leap"), found.runs)
 
 
-def test_record_says_what_was_found(catalog: MotionCatalog) -> None:
+def test_record_says_what_was_found(catalog: RecordingCatalog) -> None:
     record, _ = catalog.add(bvh_text(working(200)).encode(), "some one.bvh")
     assert (record.name, record.n_runs, record.n_frames) == ("some-one", 1, 200)
     assert record.summary["error_mm"]["wrists"]["p99"] < 1.0
@@ -60,17 +60,17 @@ def test_same_file_again_is_not_new_and_is_not_imported_again(
 
     def counted(
         content: bytes, file_name: str, name: str, sha256: str, options: ReadOptions
-    ) -> NewMotion:
+    ) -> NewRecording:
         calls.append(file_name)
         return import_here(content, file_name, name, sha256, options)
 
-    catalog = MotionCatalog(store, counted)
+    catalog = RecordingCatalog(store, counted)
     first, _ = catalog.add(CLIP, "nod.csv")
     assert catalog.add(CLIP, "Nod.csv") == (first, False)
     assert calls == ["nod.csv"]
 
 
-def test_same_file_with_other_options_is_another_motion(catalog: MotionCatalog) -> None:
+def test_same_file_with_other_options_is_another_motion(catalog: RecordingCatalog) -> None:
     clip, metres = bvh_text(working(100), unit=1.0).encode(), ReadOptions(unit="m")
     first, _ = catalog.add(clip, "nod.bvh", options=metres)
     assert first.summary["options"] == {"unit": "m"}
@@ -81,13 +81,15 @@ def test_same_file_with_other_options_is_another_motion(catalog: MotionCatalog) 
     assert new and larger.summary["body_m"]["forearm_r"] == pytest.approx(0.286)
 
 
-def test_same_file_with_a_wrong_ending_is_refused_all_the_same(catalog: MotionCatalog) -> None:
+def test_same_file_with_a_wrong_ending_is_refused_all_the_same(
+    catalog: RecordingCatalog,
+) -> None:
     catalog.add(CLIP, "nod.csv")
-    with pytest.raises(BadMotion, match="must end with"):
+    with pytest.raises(BadRecording, match="must end with"):
         catalog.add(CLIP, "nod.txt")
 
 
-def test_another_file_under_the_name_is_a_conflict(catalog: MotionCatalog) -> None:
+def test_another_file_under_the_name_is_a_conflict(catalog: RecordingCatalog) -> None:
     catalog.add(CLIP, "nod.csv")
     other = csv_text(working(100, seed=1)).encode()
     with pytest.raises(Conflict, match="'nod' from another file"):
@@ -96,7 +98,7 @@ def test_another_file_under_the_name_is_a_conflict(catalog: MotionCatalog) -> No
     assert catalog.names() == ("nod", "nod-2")
 
 
-def test_arrays_of_a_stored_motion_cannot_be_written_to(catalog: MotionCatalog) -> None:
+def test_arrays_of_a_stored_motion_cannot_be_written_to(catalog: RecordingCatalog) -> None:
     catalog.add(CLIP, "nod.csv")
     (run,) = catalog.get("nod")
     for array in (run.times, run.q, run.pelvis_z):
@@ -105,12 +107,12 @@ def test_arrays_of_a_stored_motion_cannot_be_written_to(catalog: MotionCatalog) 
 
 
 def test_motion_is_kept_in_memory_until_another_takes_its_name(
-    store: Store, catalog: MotionCatalog
+    store: Store, catalog: RecordingCatalog
 ) -> None:
     catalog.add(CLIP, "nod.csv")
     runs = catalog.get("nod")
     assert catalog.get("nod") is runs
-    elsewhere = MotionCatalog(store)
+    elsewhere = RecordingCatalog(store)
     elsewhere.remove("nod")
     other = csv_text(working(120, seed=1)).encode()
     elsewhere.add(other, "nod.csv")
@@ -118,7 +120,7 @@ def test_motion_is_kept_in_memory_until_another_takes_its_name(
 
 
 def test_memory_is_given_back_beyond_so_many_frames(
-    catalog: MotionCatalog, monkeypatch: pytest.MonkeyPatch
+    catalog: RecordingCatalog, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(motions_module, "MAX_CACHED_FRAMES", 150)
     for name in ("a", "b"):
@@ -128,7 +130,7 @@ def test_memory_is_given_back_beyond_so_many_frames(
     assert catalog.get("a") is not first
 
 
-def test_unknown_motion_names_the_known_ones(catalog: MotionCatalog) -> None:
+def test_unknown_motion_names_the_known_ones(catalog: RecordingCatalog) -> None:
     catalog.add(CLIP, "nod.csv")
     for ask in (catalog.get, catalog.record, catalog.remove):
         for name in ("walk", "../nod", "nod\n", ""):
@@ -136,7 +138,9 @@ def test_unknown_motion_names_the_known_ones(catalog: MotionCatalog) -> None:
                 ask(name)
 
 
-def test_runs_of_several_motions_are_called_as_they_are_stored(catalog: MotionCatalog) -> None:
+def test_runs_of_several_motions_are_called_as_they_are_stored(
+    catalog: RecordingCatalog,
+) -> None:
     catalog.add(CLIP, "nod.csv", "first")
     catalog.add(csv_text(working(120, seed=1)).encode(), "nod.csv", "second")
     found = catalog.runs_of(("second", "first"))
@@ -144,7 +148,9 @@ def test_runs_of_several_motions_are_called_as_they_are_stored(catalog: MotionCa
     assert catalog.runs_of(()) == ()
 
 
-def test_motions_that_are_not_stored_are_named_with_their_place(catalog: MotionCatalog) -> None:
+def test_motions_that_are_not_stored_are_named_with_their_place(
+    catalog: RecordingCatalog,
+) -> None:
     with pytest.raises(InvalidInput, match=r"motions\[0\] = 'a' is no stored motion: there is"):
         catalog.check(["a"])
     catalog.add(CLIP, "nod.csv")
@@ -167,17 +173,17 @@ def test_motions_that_are_not_stored_are_named_with_their_place(catalog: MotionC
     ],
 )
 def test_name_is_made_from_the_file_s(file_name: str, name: str) -> None:
-    assert motions_module.motion_name(file_name) == name
+    assert motions_module.recording_name(file_name) == name
 
 
-def test_file_without_letters_needs_a_name(catalog: MotionCatalog) -> None:
+def test_file_without_letters_needs_a_name(catalog: RecordingCatalog) -> None:
     with pytest.raises(InvalidInput, match="name = '' must be given: the file's name has none"):
         catalog.add(CLIP, "动作.csv")
     assert catalog.add(CLIP, "动作.csv", "gesture")[0].file_name == "动作.csv"
 
 
 @pytest.mark.parametrize("name", ["", "-a", "A", "a b", "a/b", "a\n", "x" * 65, "."])
-def test_name_that_cannot_be_one_is_refused(catalog: MotionCatalog, name: str) -> None:
+def test_name_that_cannot_be_one_is_refused(catalog: RecordingCatalog, name: str) -> None:
     with pytest.raises(InvalidInput, match="1 to 64 of the characters a-z 0-9 -"):
         catalog.add(CLIP, "nod.csv", name)
 
@@ -193,14 +199,14 @@ def test_name_that_cannot_be_one_is_refused(catalog: MotionCatalog, name: str) -
     ],
 )
 def test_file_name_that_cannot_be_one_is_refused(
-    catalog: MotionCatalog, file_name: str, rule: str
+    catalog: RecordingCatalog, file_name: str, rule: str
 ) -> None:
     with pytest.raises(InvalidInput, match=rule):
         catalog.add(CLIP, file_name)
 
 
-def test_bad_file_leaves_nothing_behind(catalog: MotionCatalog) -> None:
-    with pytest.raises(BadMotion):
+def test_bad_file_leaves_nothing_behind(catalog: RecordingCatalog) -> None:
+    with pytest.raises(BadRecording):
         catalog.add(CLIP[:300], "nod.csv")
     assert catalog.names() == ()
 
@@ -211,31 +217,33 @@ def test_bad_file_leaves_nothing_behind(catalog: MotionCatalog) -> None:
     ids=["empty", "pickle", "huge header", "no arrays"],
 )
 def test_stored_bytes_that_are_no_runs_are_named(
-    store: Store, catalog: MotionCatalog, tensors: bytes
+    store: Store, catalog: RecordingCatalog, tensors: bytes
 ) -> None:
     new = packed(read_motion(CLIP, "nod.csv"), "nod", "nod.csv", "a" * 64)
-    put_motion(store, replace(new, tensors=tensors))
+    put_recording(store, replace(new, tensors=tensors))
     with pytest.raises(InvalidInput, match="motion = 'nod' was stored by another version"):
         catalog.get("nod")
 
 
 def test_stored_body_of_another_version_is_read_as_far_as_it_is_known(
-    store: Store, catalog: MotionCatalog
+    store: Store, catalog: RecordingCatalog
 ) -> None:
     found = read_motion(CLIP, "nod.csv")
     new = packed(found, "nod", "nod.csv", "a" * 64)
     size = {**asdict(found.size), "tail": 0.7, "trunk": 0.5}
     del size["forearm_l"]
     recorded = {**new.detail["recorded"], "size": size}
-    put_motion(store, replace(new, detail={**new.detail, "recorded": recorded}))
+    put_recording(store, replace(new, detail={**new.detail, "recorded": recorded}))
     (run,) = catalog.get("nod")
     assert run.size == replace(found.size, trunk=0.5)
 
 
-def test_stored_runs_that_do_not_add_up_are_named(store: Store, catalog: MotionCatalog) -> None:
+def test_stored_runs_that_do_not_add_up_are_named(
+    store: Store, catalog: RecordingCatalog
+) -> None:
     new = packed(read_motion(CLIP, "nod.csv"), "nod", "nod.csv", "a" * 64)
     recorded = {**new.detail["recorded"], "sources": ["a", "b"]}
-    put_motion(store, replace(new, detail={**new.detail, "recorded": recorded}))
+    put_recording(store, replace(new, detail={**new.detail, "recorded": recorded}))
     with pytest.raises(InvalidInput, match="post it anew"):
         catalog.get("nod")
 
@@ -244,7 +252,7 @@ if CLIPS:  # without clips there is no test to skip
 
     @pytest.mark.parametrize("path", CLIPS, ids=lambda path: f"{path.parent.name}/{path.name}")
     def test_recorded_clip_comes_back_as_it_was_imported(
-        catalog: MotionCatalog, path: Path
+        catalog: RecordingCatalog, path: Path
     ) -> None:
         catalog.add(path.read_bytes(), path.name)
         (name,) = catalog.names()

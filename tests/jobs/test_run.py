@@ -14,7 +14,7 @@ from app.store import attempts, checkpoints, jobs, metrics
 from app.store.engine import Store
 from app.store.records import NewCheckpoint
 from jobs.cells import CellCatalog
-from jobs.motions import MotionCatalog
+from jobs.motions import RecordingCatalog
 from jobs.spec import new_job
 from jobs.supervisor import Supervisor
 from tests import workshop
@@ -119,7 +119,7 @@ def test_evaluation_of_an_unknown_checkpoint_fails_by_name(store: Store) -> None
 def test_evaluation_beside_stored_motions_tells_row_by_row(
     store: Store,
 ) -> None:
-    motions = MotionCatalog(store)
+    motions = RecordingCatalog(store)
     for name, seed in (("nods", 0), ("waves", 1)):
         motions.add(csv_text(working(100, seed=seed)).encode(), "clip.csv", name)
     policy = pretrained.load("pick")

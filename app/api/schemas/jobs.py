@@ -10,7 +10,7 @@ from app.errors import InvalidInput
 from app.policies.configs.presets import PRESETS
 from app.policies.evaluation.registry import default_checkpoint
 from app.store.records import JobRecord, MetricRow, NewJob
-from jobs.spec import MAX_MOTIONS, new_job
+from jobs.spec import MAX_RECORDINGS, new_job
 
 Seed = Annotated[int, Field(strict=True, ge=0, le=2**32 - 1)]
 
@@ -54,7 +54,7 @@ class EvaluateJobCreate(Body):
     seed: Seed = Field(0, description="seed of the episodes")
     motions: list[Annotated[str, Field(max_length=64)]] = Field(
         default_factory=list,
-        max_length=MAX_MOTIONS,
+        max_length=MAX_RECORDINGS,
         description="names of GET /v1/motions, for pick-mocap",
     )
 

@@ -6,7 +6,7 @@ from typing import Any, Self
 from pydantic import Field
 
 from app.api.schemas.numbers import Answer
-from app.store.records import MotionRecord
+from app.store.records import StoredRecording
 
 
 class SpreadPublic(Answer):
@@ -72,7 +72,7 @@ class ReadingPublic(Answer):
     notes: list[str] = Field(description="what else was found, for people")
 
 
-class MotionItem(Answer):
+class RecordingItem(Answer):
     """One stored motion, in short."""
 
     name: str
@@ -101,19 +101,19 @@ class MotionItem(Answer):
     )
 
     @classmethod
-    def from_domain(cls, record: MotionRecord) -> Self:
+    def from_domain(cls, record: StoredRecording) -> Self:
         """Make it from the store's record."""
         return cls(**_members(record))
 
 
-class MotionPublic(MotionItem):
+class RecordingPublic(RecordingItem):
     """One stored motion with each run and artifact."""
 
     clean_runs: list[RunPublic]
     artifacts: list[ArtifactPublic] = Field(description="the first 1000")
 
     @classmethod
-    def from_domain(cls, record: MotionRecord) -> Self:
+    def from_domain(cls, record: StoredRecording) -> Self:
         """Make it from the store's record, which carries its detail."""
         assert record.detail is not None
         return cls(
@@ -123,13 +123,13 @@ class MotionPublic(MotionItem):
         )
 
 
-class MotionList(Answer):
+class RecordingList(Answer):
     """All stored motions, by name."""
 
-    items: list[MotionItem]
+    items: list[RecordingItem]
 
 
-def _members(record: MotionRecord) -> dict[str, Any]:
+def _members(record: StoredRecording) -> dict[str, Any]:
     return {
         **record.summary,
         "name": record.name,

@@ -1,6 +1,6 @@
 """Reading BVH files: a skeleton as a tree of joints, and its channels frame by frame.
 
-The text is anybody's: what cannot be read is a :class:`~app.errors.BadMotion` whose faults
+The text is anybody's: what cannot be read is a :class:`~app.errors.BadRecording` whose faults
 name the line. Angles of a BVH file are degrees; lengths are in no unit that the file tells.
 Source: Biovision's format as described by Meredith and Maddock, "Motion capture file formats
 explained" (2001).
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.errors import BadMotion, Fault, digits
+from app.errors import BadRecording, Fault, digits
 from app.sim.core.arrays import Vec
 
 MAX_JOINTS = 300
@@ -76,7 +76,7 @@ def read_bvh(text: str) -> Bvh:
         text: The file's content.
 
     Raises:
-        BadMotion: It is no sound BVH; the faults name lines.
+        BadRecording: It is no sound BVH; the faults name lines.
     """
     lines = lines_of(text)
     start = next((k for k, line in enumerate(lines) if line.split()[:1] == ["MOTION"]), None)
@@ -96,7 +96,7 @@ def lines_of(text: str) -> list[str]:
     """Return the lines of a text.
 
     Raises:
-        BadMotion: It has many more than a file of MAX_FRAMES frames.
+        BadRecording: It has many more than a file of MAX_FRAMES frames.
     """
     n_ends = sum(text.count(end) for end in "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029")
     if n_ends > MAX_LINE_ENDS:
@@ -183,7 +183,7 @@ def read_rows(
         separator: Between numbers; white space where None.
 
     Raises:
-        BadMotion: A line has too few or too many numbers, or something else.
+        BadRecording: A line has too few or too many numbers, or something else.
     """
     if len(lines) > MAX_FRAMES or (n_rows or 0) > MAX_FRAMES:
         value = f"<{max(len(lines), n_rows or 0)} frames>"
@@ -211,7 +211,7 @@ def read_rows(
         place = f"frames, last line {lines[-1][0]}" if lines else "frames"
         faults.append(Fault(place=place, value=f"<{len(lines)}>", rule=rule, hint=hint))
     if faults:
-        raise BadMotion(faults[:MAX_FAULTS])
+        raise BadRecording(faults[:MAX_FAULTS])
     if len(values) < 2:
         raise _bad("frames", f"<{len(values)}>", "must be at least 2", "one frame is no motion")
     return values
@@ -252,7 +252,7 @@ def check_dt(dt: float, place: str) -> float:
     """Return the time between two frames [s].
 
     Raises:
-        BadMotion: Motion capture has no such rate.
+        BadRecording: Motion capture has no such rate.
     """
     if MIN_DT <= dt <= MAX_DT:
         return dt
@@ -384,6 +384,6 @@ class _Tree:
         return word
 
 
-def _bad(place: int | str, value: str, rule: str, hint: str = "") -> BadMotion:
+def _bad(place: int | str, value: str, rule: str, hint: str = "") -> BadRecording:
     where = f"line {place}" if isinstance(place, int) else place
-    return BadMotion([Fault(place=where, value=value, rule=rule, hint=hint)])
+    return BadRecording([Fault(place=where, value=value, rule=rule, hint=hint)])

@@ -67,7 +67,7 @@ def read_csv(text: str, names: Mapping[str, str] | None = None) -> AngleTrack:
         names: Name map, theirs to ours.
 
     Raises:
-        BadMotion: It is no sound table; the faults name lines and columns.
+        BadRecording: It is no sound table; the faults name lines and columns.
     """
     names = names or {}
     file = read_csv_text(text, (*CSV_COLUMNS, *names))
@@ -145,7 +145,7 @@ def in_radians(angles: Mapping[str, Vec], degrees: bool) -> Vec:
         degrees: The declared unit.
 
     Raises:
-        BadMotion: The numbers fit the other unit.
+        BadRecording: The numbers fit the other unit.
     """
     turning = ("pelvis_yaw", "pelvis_rotation")
     largest = {
@@ -172,7 +172,7 @@ def require_places(places: Mapping[str, Vec], most: float = MAX_PLACE) -> None:
     """Refuse positions that are no metres.
 
     Raises:
-        BadMotion: One lies farther than ``most`` [m] from the origin.
+        BadRecording: One lies farther than ``most`` [m] from the origin.
     """
     for name, column in places.items():
         far = float(np.abs(column).max())
@@ -191,7 +191,7 @@ def check_times(times: Vec, table: TextTable, good: NDArray[np.bool_]) -> Vec:
         good: Which rows have all values.
 
     Raises:
-        BadMotion: They do not rise, or at no rate of motion capture.
+        BadRecording: They do not rise, or at no rate of motion capture.
     """
     dt = np.diff(times)
     stuck = np.flatnonzero(dt <= 0.0)

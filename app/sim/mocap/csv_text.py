@@ -55,7 +55,7 @@ def read_csv_text(text: str, known: Sequence[str]) -> CsvText:
         known: Names of columns by which the line of names and the separator are found.
 
     Raises:
-        BadMotion: It holds no table.
+        BadRecording: It holds no table.
     """
     comments, table = _lines(text)
     if not table:

@@ -2,7 +2,7 @@
 
 Formats: BVH (joint centres, ``skeletons.py`` and ``inverse_kinematics.py``), OpenSim's ``.mot``
 and ``.sto``, and the project's CSV (joint angles). The result is an :class:`ImportedMotion`, or
-one :class:`~app.errors.BadMotion` that names place and rule.
+one :class:`~app.errors.BadRecording` that names place and rule.
 
 Other body sizes: **joint angles and the path of the pelvis in metres are kept.** A simulated
 person makes the recorded gesture at the recorded place; with a longer recorded arm, the
@@ -21,7 +21,7 @@ from pathlib import PurePath
 
 import numpy as np
 
-from app.errors import BadMotion, Fault
+from app.errors import BadRecording, Fault
 from app.sim.core.arrays import Vec
 from app.sim.human.anthropometry import BodySize
 from app.sim.human.model import JOINT_NAMES, Q_MAX, Q_MIN
@@ -136,7 +136,7 @@ def read_motion(
         options: Stated properties of the file.
 
     Raises:
-        BadMotion: The file is invalid; each fault names line or column and rule.
+        BadRecording: The file is invalid; each fault names line or column and rule.
     """
     ending = PurePath(file_name).suffix.lower()
     if ending not in FORMATS:
@@ -326,7 +326,7 @@ def _require_names_only(options: ReadOptions) -> None:
             raise _bad(name, repr(stated), "goes with .bvh only: places of a table are metres")
 
 
-def _no_run(track: BodyTrack, artifacts: Sequence[Artifact]) -> BadMotion:
+def _no_run(track: BodyTrack, artifacts: Sequence[Artifact]) -> BadRecording:
     value = f"<{len(track.times)} frames, {track.times[-1] - track.times[0]:.2f} s>"
     rule = f"has no run of {MIN_RUN:g} s without an artifact"
     hint = (
@@ -344,5 +344,5 @@ def _own(values: Vec) -> Vec:
     return kept
 
 
-def _bad(place: str, value: str, rule: str, hint: str = "") -> BadMotion:
-    return BadMotion([Fault(place=place, value=value, rule=rule, hint=hint)])
+def _bad(place: str, value: str, rule: str, hint: str = "") -> BadRecording:
+    return BadRecording([Fault(place=place, value=value, rule=rule, hint=hint)])

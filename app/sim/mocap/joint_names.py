@@ -9,7 +9,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from difflib import get_close_matches
 
-from app.errors import BadMotion, Fault
+from app.errors import BadRecording, Fault
 from app.sim.mocap.joint_centres import TRACK_NAMES
 
 Joints = dict[str, tuple[int, ...]]
@@ -65,7 +65,7 @@ def find_joints(
         stated: Roles of joints by the skeleton's own name; they need not be known names.
 
     Raises:
-        BadMotion: Joints are missing; the hint lists what the file has.
+        BadRecording: Joints are missing; the hint lists what the file has.
     """
     given = _stated_joints(names, stated or {})
     plain = [_plain(name) for name in names]
@@ -82,7 +82,7 @@ def find_joints(
         listed = ", ".join(names[:40])[:300]
         hint = f"the file's joints are {listed}; a name map says which is which: theirs=ours"
         rule = f"has no joint that is known as {', '.join(missing)}"
-        raise BadMotion([Fault(place="HIERARCHY", value="", rule=rule, hint=hint)])
+        raise BadRecording([Fault(place="HIERARCHY", value="", rule=rule, hint=hint)])
     return joints
 
 
@@ -116,7 +116,7 @@ def _stated_joints(names: Sequence[str], stated: Mapping[str, str]) -> dict[str,
     """Return the joints of the roles that a caller states.
 
     Raises:
-        BadMotion: A joint is not in the file, or a role is none.
+        BadRecording: A joint is not in the file, or a role is none.
     """
     faults, found = [], {}
     for theirs, ours in stated.items():
@@ -129,7 +129,7 @@ def _stated_joints(names: Sequence[str], stated: Mapping[str, str]) -> dict[str,
         else:
             found[ours] = names.index(theirs)
     if faults:
-        raise BadMotion(faults)
+        raise BadRecording(faults)
     return found
 
 

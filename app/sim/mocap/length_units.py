@@ -18,7 +18,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from app.errors import BadMotion, Fault
+from app.errors import BadRecording, Fault
 from app.sim.core.arrays import Vec
 from app.sim.human.anthropometry import STATURE
 from app.sim.human.kernels.kinematics import MEDIAN_TRUNK
@@ -132,7 +132,7 @@ def find_unit(stature: Stature) -> str:
     """Return the unit in which a skeleton is a person's, one of UNITS.
 
     Raises:
-        BadMotion: None fits, or two do; the fault names them with the statures.
+        BadRecording: None fits, or two do; the fault names them with the statures.
     """
     low, high = MIN_STATURE / (1.0 + stature.doubt), MAX_STATURE * (1.0 + stature.doubt)
     tall = {unit: factor * stature.value for unit, factor in UNITS.items()}
@@ -155,7 +155,7 @@ def require_proportions(lengths: Mapping[str, float], stature: Stature, unit: st
     """Refuse a skeleton that is no person's, in proportion or in a unit that is stated.
 
     Raises:
-        BadMotion: The fault names the part and its length.
+        BadRecording: The fault names the part and its length.
     """
     tall = metres(unit) * stature.value
     low, high = STATED_STATURE
@@ -196,7 +196,7 @@ def require_one_unit(
         A sentence where the file's zero is not the floor, else an empty text.
 
     Raises:
-        BadMotion: Another unit fits and this one does not; the fault names both.
+        BadRecording: Another unit fits and this one does not; the fault names both.
     """
     own, planted, cosine, span = metres(unit), 0.0, 0.0, HIGH_PELVIS
     legs = own * stature.value
@@ -274,5 +274,5 @@ def _part(name: str) -> str:
     return name.removesuffix("_r").removesuffix("_l")
 
 
-def _bad(place: str, value: str, rule: str, hint: str = "") -> BadMotion:
-    return BadMotion([Fault(place=place, value=value, rule=rule, hint=hint)])
+def _bad(place: str, value: str, rule: str, hint: str = "") -> BadRecording:
+    return BadRecording([Fault(place=place, value=value, rule=rule, hint=hint)])

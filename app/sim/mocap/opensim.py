@@ -75,7 +75,7 @@ def read_opensim(text: str, names: Mapping[str, str] | None = None) -> AngleTrac
         names: Name map, theirs to ours.
 
     Raises:
-        BadMotion: It is no sound table of those coordinates; the faults name lines, columns.
+        BadRecording: It is no sound table of those coordinates; the faults name lines, columns.
     """
     lines = lines_of(text)
     end = next((k for k, line in enumerate(lines) if line.strip() == "endheader"), None)
@@ -125,7 +125,7 @@ def _head(lines: Sequence[str]) -> dict[str, str]:
     """Return what the head says, by key in lower case.
 
     Raises:
-        BadMotion: It is the head of a file of speeds or accelerations.
+        BadRecording: It is the head of a file of speeds or accelerations.
     """
     title = next((line.strip() for line in lines if line.strip()), "")
     if title.lower() in _RATES:

@@ -25,7 +25,7 @@ def without_repeats(bvh: Bvh) -> tuple[Bvh, str]:
     """Return a file at its real rate, and a sentence about it; empty where none repeats.
 
     Raises:
-        BadMotion: The real rate is none of motion capture.
+        BadRecording: The real rate is none of motion capture.
     """
     changes = np.flatnonzero((np.diff(bvh.values, axis=0) != 0.0).any(axis=1)) + 1
     if len(changes) < MIN_CHANGES:

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.errors import BadMotion, Fault
+from app.errors import BadRecording, Fault
 from app.sim.core.arrays import Vec
 from app.sim.mocap.bvh import Bvh, forward
 from app.sim.mocap.joint_centres import (
@@ -65,7 +65,7 @@ def body_track(bvh: Bvh, options: ReadOptions = NOTHING_STATED) -> tuple[BodyTra
         options: What is stated about it.
 
     Raises:
-        BadMotion: It is no upright person in a known unit and in degrees, or it can be read in
+        BadRecording: It is no upright person in a known unit and in degrees, or it can be read in
             two interpretations; the fault names both.
     """
     bvh, repeated = without_repeats(bvh)
@@ -186,7 +186,7 @@ def _require_degrees(bvh: Bvh) -> None:
     )
     hint = "looks like radians: write degrees"
     place = f"frames from line {bvh.first_line}"
-    raise BadMotion([Fault(place=place, value=f"{largest:.4g}", rule=rule, hint=hint)])
+    raise BadRecording([Fault(place=place, value=f"{largest:.4g}", rule=rule, hint=hint)])
 
 
 def _upright(rest: Centres, axis: str | None) -> Vec:
@@ -216,9 +216,9 @@ def _require_a_body(points: Vec) -> None:
         rule = f"must lie within {MAX_FAR:g} m of the file's origin"
         hint = "positions and offsets are probably in two units"
         value = f"{far:.4g} m"
-        raise BadMotion([Fault(place="pelvis", value=value, rule=rule, hint=hint)])
+        raise BadRecording([Fault(place="pelvis", value=value, rule=rule, hint=hint)])
     if not np.isfinite(points).all() or np.ptp(points[:, ELBOW_R], axis=0).max() <= 0.0:
-        raise BadMotion([Fault(place="frames", value="", rule="show nobody who moves")])
+        raise BadRecording([Fault(place="frames", value="", rule="show nobody who moves")])
 
 
 def _require_elbows(points: Vec) -> None:
@@ -237,4 +237,4 @@ def _require_elbows(points: Vec) -> None:
         rule = f"must be at most {MAX_BACKWARD} of what elbows can bend"
         hint = "left and right are mixed up, or the file shows a mirror image"
         place = "elbows, bent backward"
-        raise BadMotion([Fault(place=place, value=f"{backward:.2f}", rule=rule, hint=hint)])
+        raise BadRecording([Fault(place=place, value=f"{backward:.2f}", rule=rule, hint=hint)])

@@ -13,7 +13,7 @@ from operator import itemgetter
 import numpy as np
 from numpy.typing import NDArray
 
-from app.errors import BadMotion, Fault, digits
+from app.errors import BadRecording, Fault, digits
 from app.sim.core.arrays import Vec
 from app.sim.mocap.artifacts import Artifact
 from app.sim.mocap.bvh import MAX_FAULTS, MAX_FRAMES, MAX_NUMBER, shown
@@ -72,7 +72,7 @@ class TextTable:
             names: Name map, theirs to ours; goes before what the names say.
 
         Raises:
-            BadMotion: The map names a column that is not there, or what is none of ours; or
+            BadRecording: The map names a column that is not there, or what is none of ours; or
                 a name is there twice.
         """
         ours = list(ours)
@@ -96,7 +96,7 @@ class TextTable:
             columns: Indices by our name, at least two.
 
         Raises:
-            BadMotion: A row has too few or too many cells, or a cell is no number.
+            BadRecording: A row has too few or too many cells, or a cell is no number.
         """
         found = np.empty((len(self.rows), len(columns)))
         pick = itemgetter(*columns.values())
@@ -113,7 +113,7 @@ class TextTable:
             if len(faults) >= MAX_FAULTS:
                 break
         if faults:
-            raise BadMotion(faults[:MAX_FAULTS])
+            raise BadRecording(faults[:MAX_FAULTS])
         return dict(zip(columns, found.T, strict=True))
 
     def foreign(self, columns: Mapping[str, int]) -> dict[str, str]:
@@ -204,7 +204,7 @@ def named_columns(cells: Sequence[str], line: int) -> tuple[str, ...]:
     """Return the names of columns, without the empty ones behind the last.
 
     Raises:
-        BadMotion: There are too many.
+        BadRecording: There are too many.
     """
     last = max((k for k, cell in enumerate(cells) if cell.strip()), default=-1)
     if last >= MAX_COLUMNS:
@@ -250,7 +250,7 @@ def check_map(names: Mapping[str, str], ours: Sequence[str]) -> None:
         ours: The choices.
 
     Raises:
-        BadMotion: It does; the hint lists the choices.
+        BadRecording: It does; the hint lists the choices.
     """
     for theirs, own in names.items():
         if own not in ours:
@@ -258,7 +258,7 @@ def check_map(names: Mapping[str, str], ours: Sequence[str]) -> None:
             raise bad("name map", shown(f"{theirs}={own}"), "must end with one of ours", hint)
 
 
-def no_such_name(theirs: str, there: Sequence[str], what: str) -> BadMotion:
+def no_such_name(theirs: str, there: Sequence[str], what: str) -> BadRecording:
     """Return the fault that a name map names what the file does not have.
 
     Args:
@@ -298,7 +298,7 @@ def complete_rows(columns: Mapping[str, Vec], place: str) -> NDArray[np.bool_]:
         place: Where the table stands, for the message.
 
     Raises:
-        BadMotion: A column has no value, or fewer than two rows are complete.
+        BadRecording: A column has no value, or fewer than two rows are complete.
     """
     empty = [name for name, column in columns.items() if np.isnan(column).all()]
     if empty and len(columns[empty[0]]):
@@ -329,9 +329,9 @@ def missing_values(columns: Mapping[str, Vec], good: NDArray[np.bool_]) -> tuple
     return tuple(found)
 
 
-def bad(place: str, value: str, rule: str, hint: str = "") -> BadMotion:
+def bad(place: str, value: str, rule: str, hint: str = "") -> BadRecording:
     """Return the error of one fault."""
-    return BadMotion([Fault(place=place, value=value, rule=rule, hint=hint)])
+    return BadRecording([Fault(place=place, value=value, rule=rule, hint=hint)])
 
 
 def _likeness(one: str, other: str) -> float:

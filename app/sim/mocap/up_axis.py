@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.errors import BadMotion, Fault
+from app.errors import BadRecording, Fault
 from app.sim.core.arrays import Vec
 from app.sim.mocap.read_options import UP_AXES
 
@@ -51,7 +51,7 @@ def find_up_axis(motion: BodyDirections, rest: BodyDirections) -> str:
         rest: In the rest pose; zero where the file does not tell it.
 
     Raises:
-        BadMotion: None fits, or two do; the fault names them.
+        BadRecording: None fits, or two do; the fault names them.
     """
     resting, leaning = rest_axis(rest), _nearest(_direction(motion.trunk))
     straight = _lean(rest, resting) if resting else 0.0  # the hip is often a marker on the belt
@@ -75,11 +75,11 @@ def require_not_head_down(motion: BodyDirections, axis: str) -> None:
     """Refuse an axis that is stated where the trunk points down along it.
 
     Raises:
-        BadMotion: It does in most frames.
+        BadRecording: It does in most frames.
     """
     if _elevation(motion.trunk, axis) < -NEAR:
         rule = f"turns the person head down: the trunk {_leaning(motion, axis)}"
-        raise BadMotion([Fault(place="up", value=axis, rule=rule)])
+        raise BadRecording([Fault(place="up", value=axis, rule=rule)])
 
 
 def _kneeling(
@@ -183,7 +183,7 @@ def _nearest(direction: Vec, within: float = NEAR) -> str | None:
 
 def _no_axis(
     motion: BodyDirections, against: dict[str, dict[str, str]], straight: float
-) -> BadMotion:
+) -> BadRecording:
     reasons = "; ".join(f"with {axis} up {', '.join(against[axis].values())}" for axis in FOUND)
     others = [
         one for one in UP_AXES if one not in FOUND and not _objections(motion, one, straight)
@@ -196,7 +196,7 @@ def _no_axis(
     return _bad(motion, "pelvis to neck", rule, hint)
 
 
-def _two(motion: BodyDirections, fits: list[str], resting: str | None) -> BadMotion:
+def _two(motion: BodyDirections, fits: list[str], resting: str | None) -> BadRecording:
     parts = [f"{axis} up by the motion (the trunk {_leaning(motion, axis)})" for axis in fits]
     named = fits
     if resting:
@@ -206,6 +206,6 @@ def _two(motion: BodyDirections, fits: list[str], resting: str | None) -> BadMot
     return _bad(motion, "up axis: pelvis to neck", rule, hint)
 
 
-def _bad(motion: BodyDirections, place: str, rule: str, hint: str) -> BadMotion:
+def _bad(motion: BodyDirections, place: str, rule: str, hint: str) -> BadRecording:
     value = "(" + ", ".join(f"{one:.2f}" for one in _direction(motion.trunk)) + ")"
-    return BadMotion([Fault(place=place, value=value, rule=rule, hint=hint)])
+    return BadRecording([Fault(place=place, value=value, rule=rule, hint=hint)])

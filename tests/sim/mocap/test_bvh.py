@@ -3,7 +3,7 @@ import re
 import numpy as np
 import pytest
 
-from app.errors import BadMotion
+from app.errors import BadRecording
 from app.sim.mocap.bvh import MAX_FRAMES, MAX_JOINTS, check_dt, forward, read_bvh
 from tests.sim.recorded_person import bvh_text, working
 
@@ -33,7 +33,7 @@ FIRST = PERSON.splitlines().index("Frame Time: 0.02") + 2
 
 
 def fault(text: str) -> str:
-    with pytest.raises(BadMotion) as caught:
+    with pytest.raises(BadRecording) as caught:
         read_bvh(text)
     return caught.value.faults[0].text
 
@@ -140,7 +140,7 @@ def test_all_faulty_lines_are_told_at_once() -> None:
     lines = PERSON.splitlines()
     lines[FIRST - 1] += " 7"
     lines[FIRST + 1] = "1 2"
-    with pytest.raises(BadMotion) as caught:
+    with pytest.raises(BadRecording) as caught:
         read_bvh("\n".join(lines))
     assert [one.place for one in caught.value.faults] == [f"line {FIRST}", f"line {FIRST + 2}"]
 
@@ -159,7 +159,7 @@ def test_garbled_file_is_read_or_refused_but_never_crashes(seed: int) -> None:
         letters[place] = rng.choice(list(b"{}0-e.nX \n:9"))
     try:
         points = forward(read_bvh(letters.decode()), range(5))
-    except BadMotion as error:
+    except BadRecording as error:
         assert error.faults[0].place and error.faults[0].rule
     else:
         assert np.isfinite(points).all()
@@ -176,5 +176,5 @@ def test_skeleton_without_end_is_refused() -> None:
 
 def test_rate_is_what_motion_capture_delivers() -> None:
     assert check_dt(0.01, "dt") == 0.01
-    with pytest.raises(BadMotion, match="or frames per second: in s that is 0.0166667"):
+    with pytest.raises(BadRecording, match="or frames per second: in s that is 0.0166667"):
         check_dt(60.0, "dt")

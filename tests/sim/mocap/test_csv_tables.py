@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from app.errors import BadMotion
+from app.errors import BadRecording
 from app.sim.human.model import JOINT_NAMES
 from app.sim.mocap.csv_tables import read_csv
 from tests.sim.recorded_person import csv_text, working
@@ -11,7 +11,7 @@ TEXT = csv_text(Q)
 
 
 def fault(text: str) -> str:
-    with pytest.raises(BadMotion) as caught:
+    with pytest.raises(BadRecording) as caught:
         read_csv(text)
     return caught.value.faults[0].text
 

@@ -3,7 +3,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from app.errors import BadMotion
+from app.errors import BadRecording
 from app.sim.human.model import JOINT_NAMES
 from app.sim.mocap.csv_tables import CSV_COLUMNS, read_csv
 from tests.sim.recorded_person import csv_text, working
@@ -14,7 +14,7 @@ HEAD = TEXT.splitlines()[1]
 
 
 def fault(text: str) -> str:
-    with pytest.raises(BadMotion) as caught:
+    with pytest.raises(BadRecording) as caught:
         read_csv(text)
     return caught.value.faults[0].text
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.errors import BadMotion
+from app.errors import BadRecording
 from app.sim.core.arrays import Vec
 from app.sim.human.anthropometry import BodySize
 from app.sim.human.model import Q_MAX
@@ -101,7 +101,7 @@ def test_leap_after_missing_values_is_told_in_frames_of_the_file() -> None:
 
 
 def test_table_with_values_for_less_than_a_second_has_no_run() -> None:
-    with pytest.raises(BadMotion, match="no run of 1 s .*no value of elbow_l"):
+    with pytest.raises(BadRecording, match="no run of 1 s .*no value of elbow_l"):
         read_motion(without_values(30, 199).encode(), "someone.csv")
 
 
@@ -109,7 +109,7 @@ def test_table_with_values_for_less_than_a_second_has_no_run() -> None:
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\x0b", "\u2028"])
 def test_file_of_far_too_many_lines_is_refused(ending: str, end: str) -> None:
     content = (f"1{end}" * (4 * MAX_FRAMES + 10_001)).encode()
-    with pytest.raises(BadMotion, match=f"ends of lines> must be at most {MAX_FRAMES}"):
+    with pytest.raises(BadRecording, match=f"ends of lines> must be at most {MAX_FRAMES}"):
         read_motion(content, f"long{ending}")
 
 
@@ -157,13 +157,13 @@ def test_leap_is_cut_out_and_the_runs_say_where_they_stand() -> None:
 
 def test_clip_that_leaps_all_the_time_has_no_clean_run() -> None:
     with pytest.raises(
-        BadMotion, match="has no run of 1 s without an artifact .* first: .*_r at"
+        BadRecording, match="has no run of 1 s without an artifact .* first: .*_r at"
     ):
         read_motion(with_leap(slice(0, 200, 20)).encode(), "leap.bvh")
 
 
 def test_clip_of_half_a_second_is_too_short() -> None:
-    with pytest.raises(BadMotion, match="has no run of 1 s without an artifact .too short"):
+    with pytest.raises(BadRecording, match="has no run of 1 s without an artifact .too short"):
         read_motion(bvh_text(working(25)).encode(), "short.bvh")
 
 
@@ -181,7 +181,7 @@ def test_clip_of_half_a_second_is_too_short() -> None:
     ],
 )
 def test_what_is_no_motion_is_a_named_fault(content: bytes, name: str, text: str) -> None:
-    with pytest.raises(BadMotion) as caught:
+    with pytest.raises(BadRecording) as caught:
         read_motion(content, name)
     assert text in caught.value.faults[0].text
 
@@ -228,7 +228,7 @@ if CLIPS:  # without clips there is no test to skip
 @pytest.mark.parametrize("stated", [{"unit": "cm"}, {"root_unit": "m"}, {"up": "z"}])
 def test_unit_of_a_file_of_angles_cannot_be_stated(stated: dict[str, str]) -> None:
     (field,) = stated
-    with pytest.raises(BadMotion, match=rf"{field} = .* goes with \.bvh only"):
+    with pytest.raises(BadRecording, match=rf"{field} = .* goes with \.bvh only"):
         read_motion(csv_text(working(100)).encode(), "a.csv", ReadOptions(**stated))
 
 
@@ -256,7 +256,7 @@ def test_garbled_skeleton_is_read_or_refused_but_never_crashes(seed: int) -> Non
             words[place] = str(rng.choice(["0", "1e9", "-1e-9", "1e3", "3", "-0"]))
     try:
         found = read_motion(" ".join(words).encode(), "garbled.bvh")
-    except BadMotion as error:
+    except BadRecording as error:
         assert error.faults[0].place and error.faults[0].rule
     else:
         assert all(np.isfinite(run.q).all() for run in found.runs)

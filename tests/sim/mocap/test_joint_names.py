@@ -3,7 +3,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from app.errors import BadMotion
+from app.errors import BadRecording
 from app.sim.mocap.bvh import read_bvh
 from app.sim.mocap.joint_names import find_joints
 from app.sim.mocap.read_options import ReadOptions
@@ -143,7 +143,7 @@ def test_joints_of_any_name_can_be_stated() -> None:
 def test_stated_name_that_is_none_is_refused_with_the_nearest(
     stated: dict[str, str], told: str
 ) -> None:
-    with pytest.raises(BadMotion) as caught:
+    with pytest.raises(BadRecording) as caught:
         body_track(read_bvh(skeleton(Person())[0]), ReadOptions(names=stated))
     assert caught.value.faults[0].text.startswith(told)
     assert "there are " in caught.value.faults[0].hint

@@ -4,7 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.errors import BadMotion
+from app.errors import BadRecording
 from app.sim.mocap.bvh import read_bvh
 from app.sim.mocap.read_options import UNITS, ReadOptions
 from app.sim.mocap.skeletons import body_track
@@ -12,7 +12,7 @@ from tests.sim.recorded_skeleton import Person, skeleton
 
 
 def fault(who: Person, options: ReadOptions | None = None) -> str:
-    with pytest.raises(BadMotion) as caught:
+    with pytest.raises(BadRecording) as caught:
         body_track(read_bvh(skeleton(who)[0]), options or ReadOptions())
     return caught.value.faults[0].text
 
@@ -63,7 +63,7 @@ def test_part_out_of_proportion_is_named(offset: float, rule: str) -> None:
     at = lines.index(next(line for line in lines if line.endswith(f"JOINT {role}"))) + 2
     words = lines[at].split()
     lines[at] = " ".join([words[0], *(repr(offset * float(one)) for one in words[1:])])
-    with pytest.raises(BadMotion) as caught:
+    with pytest.raises(BadRecording) as caught:
         body_track(read_bvh("\n".join(lines)))
     told = caught.value.faults[0].text
     assert told.startswith(rule) and "for a stature of 1.7" in told
@@ -137,7 +137,7 @@ def test_any_person_is_read_right_or_refused_with_what_is_meant() -> None:
         text, truth = skeleton(who)
         try:
             track, reading = body_track(read_bvh(text))
-        except BadMotion as error:
+        except BadRecording as error:
             meant = {"unit": unit, "root_unit": root, "up": up}
             asked = re.match(r"state (\w+) = ([^;,]+)", hint := error.faults[0].hint)
             assert asked and meant[asked[1]] in asked[2].split(" or "), (who, hint)

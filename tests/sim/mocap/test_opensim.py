@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from app.errors import BadMotion
+from app.errors import BadRecording
 from app.sim.core.arrays import Vec
 from app.sim.human.anthropometry import MEDIAN
 from app.sim.human.model import body_frames
@@ -24,7 +24,7 @@ def coordinates(n: int = 20, seed: int = 0) -> dict[str, Vec]:
 
 
 def fault(text: str) -> str:
-    with pytest.raises(BadMotion) as caught:
+    with pytest.raises(BadRecording) as caught:
         read_opensim(text)
     return caught.value.faults[0].text
 

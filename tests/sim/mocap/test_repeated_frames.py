@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.errors import BadMotion
+from app.errors import BadRecording
 from app.sim.mocap.bvh import Bvh, read_bvh
 from app.sim.mocap.importer import read_motion
 from app.sim.mocap.repeated_frames import without_repeats
@@ -58,7 +58,7 @@ def test_sound_recording_is_left_as_it_is() -> None:
 
 def test_real_rate_that_is_no_rate_of_motion_capture_is_refused() -> None:
     slow = replace(CLIP, dt=0.2)
-    with pytest.raises(BadMotion, match="frames repeat, and the time between those that do"):
+    with pytest.raises(BadRecording, match="frames repeat, and the time between those that do"):
         without_repeats(rewritten(60.0, recorded=slow))
 
 

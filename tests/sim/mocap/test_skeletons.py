@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from app.errors import BadMotion
+from app.errors import BadRecording
 from app.sim.human.anthropometry import BodySize
 from app.sim.mocap.bvh import read_bvh
 from app.sim.mocap.joint_centres import model_points
@@ -16,7 +16,7 @@ TRUTH = model_points(working(10), np.full(10, 0.95), BodySize())
 
 
 def fault(text: str) -> str:
-    with pytest.raises(BadMotion) as caught:
+    with pytest.raises(BadRecording) as caught:
         body_track(read_bvh(text))
     return caught.value.faults[0].text
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from app.errors import BadMotion
+from app.errors import BadRecording
 from app.sim.human.model import JOINT_NAMES
 from app.sim.mocap.csv_tables import read_csv
 from app.sim.mocap.opensim import COORDINATES, read_opensim
@@ -29,7 +29,7 @@ def names() -> dict[str, str]:
 
 
 def fault(text: str, stated: dict[str, str]) -> str:
-    with pytest.raises(BadMotion) as caught:
+    with pytest.raises(BadRecording) as caught:
         read_csv(text, stated)
     return caught.value.faults[0].text
 

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.errors import BadMotion
+from app.errors import BadRecording
 from app.sim.mocap.bvh import read_bvh
 from app.sim.mocap.read_options import UP_AXES, ReadOptions
 from app.sim.mocap.skeletons import body_track
@@ -12,7 +12,7 @@ from tests.sim.recorded_skeleton import Person, skeleton
 
 
 def fault(who: Person) -> str:
-    with pytest.raises(BadMotion) as caught:
+    with pytest.raises(BadRecording) as caught:
         body_track(read_bvh(skeleton(who)[0]))
     return caught.value.faults[0].text
 
@@ -90,7 +90,7 @@ def test_person_who_sits_squats_or_kneels_is_upright(
 
 @pytest.mark.parametrize(("up", "stated"), [("y", "-y"), ("z", "-z"), ("-y", "y")])
 def test_axis_that_turns_the_person_head_down_cannot_be_stated(up: str, stated: str) -> None:
-    with pytest.raises(BadMotion, match=f"up = {stated} turns the person head down"):
+    with pytest.raises(BadRecording, match=f"up = {stated} turns the person head down"):
         body_track(read_bvh(skeleton(Person(up=up))[0]), ReadOptions(up=stated))
 
 
