@@ -42,10 +42,10 @@ from app.sim.sorting.decision import warm_up as warm_up_sorting
 from app.sim.sorting.sorting_values import SortingValues
 from app.store.checkpoints import find_damaged
 from app.store.engine import Store
-from jobs.cells import CellCatalog
+from jobs.cell_catalog import CellCatalog
 from jobs.checkpoints import shipped
 from jobs.import_process import ImportProcess
-from jobs.motions import RecordingCatalog
+from jobs.recording_catalog import RecordingCatalog
 from jobs.supervisor import Supervisor
 from web.viewer.loop import LiveCell
 
@@ -113,7 +113,7 @@ class Service:
             sorters=PolicyRegistry(names, build_sorter, SORTERS[0]),
             movers=PolicyRegistry(names, build_mover, REACH_ALIAS),
             cells=CellCatalog(store),
-            motions=RecordingCatalog(store, self._imports),
+            recordings=RecordingCatalog(store, self._imports),
             start_world=start_world,
         )
         self._warm_up = threading.Thread(target=self._start_cell, name="warm-up", daemon=True)

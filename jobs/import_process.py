@@ -1,11 +1,10 @@
-"""Importing a file in a process of its own: ``python -m jobs.import_process``.
+"""Import of a file in its own process: ``python -m jobs.import_process``.
 
-Parsing tens of megabytes holds Python's lock for a second at a time; in the server's process
-the live cell would stand still as long. A process costs a second of start-up and stalls nobody;
-it may run out of memory alone, and gives way to the live cell. One that lost its server ends
-with its file.
+Parsing tens of megabytes holds Python's global lock for a second at a time, which would stall
+the live cell in the server's process. The import process has a lower priority, and running out
+of memory ends only itself. It reads one file; without its server it ends after that file.
 
-What goes in and what comes out is a head in JSON, with its length before it, and bytes behind.
+Input and output are a JSON head, preceded by its length, and bytes.
 """
 
 import json
@@ -24,19 +23,19 @@ from app.sim.mocap.importer import read_motion
 from app.sim.mocap.read_options import NOTHING_STATED, ReadOptions
 from app.store.records import NewRecording
 from jobs.executor import PROJECT_ROOT, search_path
-from jobs.stored_motion import packed
+from jobs.recording_format import packed
 
 logger = logging.getLogger(__name__)
 
 MAX_IMPORT_S = 120.0
-"""Longest that an import may take [s]; the largest file takes about a tenth of that."""
+"""Longest time for an import [s]; the largest file takes about a tenth of it."""
 NICENESS = 10
-"""By how much an import gives way to the live cell."""
+"""Niceness of the process, below the priority of the live cell."""
 _LENGTH = 8
 
 
 class ImportProcess:
-    """Imports files, each in a process of its own; safe to use from any thread."""
+    """Imports files, each in its own process; safe to use from any thread."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -51,17 +50,17 @@ class ImportProcess:
         sha256: str,
         options: ReadOptions = NOTHING_STATED,
     ) -> NewRecording:
-        """Return a file's motion as it is stored; waits until it is imported.
+        """Import a file; waits for the result.
 
         Args:
-            content: The file, of whatever kind.
-            file_name: Its name; the ending says which format is meant.
-            name: Name under which the motion will be stored.
+            content: The file.
+            file_name: Its name; the suffix gives the format.
+            name: Name of the recording.
             sha256: Of the file.
-            options: What is stated about the file.
+            options: How the file is read.
 
         Raises:
-            BadRecording: It is no sound motion; each fault names line or column and rule.
+            BadRecording: It is unsound; each fault names line or column and rule.
             InvalidInput: It takes too long.
             NotReady: The server stops.
             SimulationError: The process ended without an answer.
@@ -74,7 +73,7 @@ class ImportProcess:
             "options": options.stated(),
         }
         try:
-            output, words = process.communicate(_framed(head, content), MAX_IMPORT_S)
+            output, log = process.communicate(_framed(head, content), MAX_IMPORT_S)
         except subprocess.TimeoutExpired as error:
             rule = f"takes more than {MAX_IMPORT_S:g} s to import: cut it into parts"
             raise InvalidInput("file", f"<{len(content)} bytes>", rule) from error
@@ -83,15 +82,15 @@ class ImportProcess:
         if self._stopped:
             raise NotReady("stopping")
         if process.returncode != 0:
-            logger.error("an import ended: %s", words.decode(errors="replace")[-4000:].strip())
+            logger.error("an import ended: %s", log.decode(errors="replace")[-4000:].strip())
             raise SimulationError(
                 f"the import of {file_name!r} ended without an answer (exit status "
-                f"{process.returncode}); the server's log has its last words"
+                f"{process.returncode}); the server's log has its output"
             )
         return _answered(output)
 
     def stop(self) -> None:
-        """End what runs; later imports are refused."""
+        """End all imports; later ones are refused."""
         with self._lock:
             self._stopped = True
             for process in self._running:
@@ -128,28 +127,28 @@ def import_here(
     sha256: str,
     options: ReadOptions = NOTHING_STATED,
 ) -> NewRecording:
-    """Return a file's motion as it is stored, imported in this process.
+    """Import a file in this process.
 
     Raises:
-        BadRecording: It is no sound motion; each fault names line or column and rule.
+        BadRecording: It is unsound; each fault names line or column and rule.
     """
     found = read_motion(content, file_name, options)
     return packed(found, name, file_name, sha256, options)
 
 
 def main() -> None:
-    """Import the file of the standard input; the answer goes to the standard output."""
+    """Import the file on standard input; write the answer to standard output."""
     os.nice(NICENESS)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    asked, content = _unframed(sys.stdin.buffer.read())
-    asked["options"] = ReadOptions(**asked["options"])
+    request, content = _unframed(sys.stdin.buffer.read())
+    request["options"] = ReadOptions(**request["options"])
     try:
-        new = import_here(content, **asked)
+        new = import_here(content, **request)
     except BadRecording as error:
         answer = _framed({"faults": [asdict(fault) for fault in error.faults]}, b"")
     else:
-        told = {entry.name: getattr(new, entry.name) for entry in fields(NewRecording)}
-        answer = _framed({"motion": told}, told.pop("tensors"))
+        members = {entry.name: getattr(new, entry.name) for entry in fields(NewRecording)}
+        answer = _framed({"recording": members}, members.pop("tensors"))
     sys.stdout.buffer.write(answer)
 
 
@@ -157,7 +156,7 @@ def _answered(output: bytes) -> NewRecording:
     head, tensors = _unframed(output)
     if "faults" in head:
         raise BadRecording([Fault(**fault) for fault in head["faults"]])
-    return NewRecording(**head["motion"], tensors=tensors)
+    return NewRecording(**head["recording"], tensors=tensors)
 
 
 def _framed(head: Mapping[str, Any], payload: bytes) -> bytes:

@@ -22,9 +22,9 @@ from app.settings import load_settings
 from app.store.engine import Store
 from app.store.records import NewCheckpoint, ResumeState
 from jobs.attempt import main
-from jobs.cells import CellCatalog
+from jobs.cell_catalog import CellCatalog
 from jobs.checkpoints import read_sound
-from jobs.motions import RecordingCatalog
+from jobs.recording_catalog import RecordingCatalog
 from jobs.spec import EvaluateSpec, parse_spec
 from jobs.worker import Runner, Worker
 
@@ -72,7 +72,7 @@ def evaluate(worker: Worker) -> dict[str, Any]:
     """Measure the job's checkpoint by its protocol; a step is a row of the result."""
     worker.end_at_once()
     spec = parse_spec(worker.job.spec)
-    assert isinstance(spec, EvaluateSpec)
+    assert isinstance(spec, EvaluateSpec) and spec.checkpoint is not None
 
     def on_row(done: int, total: int, row: Row) -> None:
         worker.record_progress(done, _rates(row), total_steps=total)
@@ -82,7 +82,7 @@ def evaluate(worker: Worker) -> dict[str, Any]:
         _stored(worker.store, spec.checkpoint),
         episodes=spec.episodes,
         seed=spec.seed,
-        motions=RecordingCatalog(worker.store).runs_of(spec.motions),
+        motions=RecordingCatalog(worker.store).runs_of(spec.recordings),
         on_row=on_row,
     )
 

@@ -1,18 +1,16 @@
-"""Job specs: what may be posted, checked in full before anything is queued.
+"""Job specs: the body of ``POST /v1/jobs``, stored unchanged with the job.
 
-    {"kind": "train", "preset": "pick-td3", "seed": 1,
-     "overrides": {"learning": {"total_steps": 20480}}}
-    {"kind": "evaluate", "protocol": "pick-single", "episodes": 1000, "seed": 11,
-     "checkpoint": "pick"}
-    {"kind": "evaluate", "protocol": "pick-mocap", "motions": ["wave", "walk"]}
-
-An unknown field is an error. Motions are names of stored ones, never paths. The body is stored
-unchanged with the job.
+{"kind": "train", "preset": "pick-td3", "seed": 1,
+ "overrides": {"learning": {"total_steps": 20480}}}
+{"kind": "evaluate", "protocol": "pick-single", "episodes": 1000, "seed": 11,
+ "checkpoint": "pick"}
+{"kind": "evaluate", "protocol": "pick-mocap", "recordings": ["wave", "walk"]}
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
 from app.errors import InvalidInput
 from app.policies.configs import presets
@@ -26,144 +24,97 @@ from app.store.records import NewJob
 
 MAX_SEED = 2**31 - 1
 """Greatest seed; every random stream accepts it."""
-
 MAX_RECORDINGS = 32
-"""Most stored motions of one evaluation."""
+"""Most recordings of one evaluation."""
 
-_FIELDS = {
-    "train": ("kind", "preset", "seed", "overrides"),
-    "evaluate": ("kind", "protocol", "episodes", "seed", "checkpoint", "motions"),
-}
+Seed = Annotated[int, Field(strict=True, ge=0, le=MAX_SEED)]
+Name = Annotated[str, Field(min_length=1, max_length=64)]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TrainSpec:
-    """Train a policy by a preset."""
+class _Spec(BaseModel):
+    """A body without unknown fields and non-finite numbers."""
 
-    preset: str
-    """Name of the preset."""
-    seed: int
-    """Seed of every random stream."""
-    overrides: Mapping[str, Any]
-    """Changes to the preset's fields."""
-    total_steps: int
-    """Environment steps it will take."""
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True)
+
+    def _body(self) -> dict[str, Any]:
+        return self.model_dump(mode="json", exclude_unset=True)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class EvaluateSpec:
-    """Measure a checkpoint by a protocol."""
+class TrainSpec(_Spec):
+    """Train a policy: a preset, a seed, and fields that differ from the preset."""
 
-    protocol: str
-    """Name of the protocol."""
-    checkpoint: str
-    """SHA-256 or alias of the checkpoint."""
-    episodes: int | None
-    """Number of episodes; None for the protocol's own."""
-    seed: int
-    """Seed of every random stream."""
-    motions: tuple[str, ...] = ()
-    """Names of stored motions, for the protocols that take some."""
+    kind: Literal["train"]
+    preset: Name = Field(description="name of GET /v1/presets")
+    seed: Seed = Field(0, description="seed of every random stream")
+    overrides: dict[str, Any] = Field(
+        default_factory=dict, description="fields that differ from the preset, by group"
+    )
+
+    def new_job(self) -> NewJob:
+        """Return the job to queue.
+
+        Raises:
+            InvalidInput: An unknown preset or override, or a value outside its bounds.
+        """
+        if self.preset not in presets.PRESETS:
+            raise InvalidInput("preset", self.preset, "is no preset", tuple(presets.PRESETS))
+        return NewJob(
+            kind=self.kind,
+            spec=self._body(),
+            preset=self.preset,
+            seed=self.seed,
+            overrides=self.overrides,
+            total_steps=presets.resolve(self.preset, self.overrides).learning.total_steps,
+        )
+
+
+class EvaluateSpec(_Spec):
+    """Evaluate a checkpoint by a protocol."""
+
+    kind: Literal["evaluate"]
+    protocol: Name = Field(description="name of the protocol")
+    checkpoint: Name | None = Field(
+        None, description="SHA-256 or alias; the protocol's own if null"
+    )
+    episodes: int | None = Field(
+        None, strict=True, ge=1, description="episodes; the protocol's own if null"
+    )
+    seed: Seed = Field(0, description="seed of the episodes")
+    recordings: list[Name] = Field(
+        default_factory=list,
+        max_length=MAX_RECORDINGS,
+        description="names of GET /v1/recordings, for pick-mocap",
+    )
+
+    def new_job(self) -> NewJob:
+        """Return the job to queue, with the checkpoint in its spec.
+
+        Raises:
+            InvalidInput: An unknown protocol, too many episodes, or recordings that the
+                protocol does not take.
+        """
+        if self.protocol not in PROTOCOLS:
+            raise InvalidInput("protocol", self.protocol, "is no protocol", tuple(PROTOCOLS))
+        most = most_episodes(self.protocol)
+        if self.episodes is not None and self.episodes > most:
+            raise InvalidInput("episodes", self.episodes, f"must lie in [1, {most}]")
+        for place, name in enumerate(self.recordings):
+            if name in self.recordings[:place]:
+                raise InvalidInput(f"recordings[{place}]", name, "must be named once")
+        check_motions(self.protocol, self.recordings, "recordings")
+        checkpoint = self.checkpoint or default_checkpoint(self.protocol)
+        spec = {**self._body(), "checkpoint": checkpoint}
+        return NewJob(kind=self.kind, spec=spec, seed=self.seed)
+
+
+JobSpec = Annotated[TrainSpec | EvaluateSpec, Field(discriminator="kind")]
+_JOB_SPEC: TypeAdapter[TrainSpec | EvaluateSpec] = TypeAdapter(JobSpec)
 
 
 def parse_spec(body: Mapping[str, Any]) -> TrainSpec | EvaluateSpec:
-    """Check a posted body.
-
-    Args:
-        body: The JSON object.
+    """Return the spec of a stored or posted body.
 
     Raises:
-        InvalidInput: A field is missing, unknown or breaks a rule.
-        NotFound: There is no such preset.
+        pydantic.ValidationError: A field is missing, unknown or breaks a rule.
     """
-    kind = body.get("kind")
-    if not isinstance(kind, str) or kind not in _FIELDS:
-        raise InvalidInput("kind", kind, "must be a kind of job", tuple(_FIELDS))
-    for name, value in body.items():
-        if name not in _FIELDS[kind]:
-            rule = f"is no field of a job of kind {kind}"
-            raise InvalidInput(name, value, rule, _FIELDS[kind])
-    return _parse_train(body) if kind == "train" else _parse_evaluate(body)
-
-
-def new_job(body: Mapping[str, Any]) -> NewJob:
-    """Check a posted body and make of it what the store queues.
-
-    Raises:
-        InvalidInput: A field is missing, unknown or breaks a rule.
-        NotFound: There is no such preset.
-    """
-    spec = parse_spec(body)
-    if isinstance(spec, EvaluateSpec):
-        return NewJob(kind="evaluate", spec=body, seed=spec.seed)
-    return NewJob(
-        kind="train",
-        spec=body,
-        preset=spec.preset,
-        seed=spec.seed,
-        overrides=spec.overrides,
-        total_steps=spec.total_steps,
-    )
-
-
-def _parse_train(body: Mapping[str, Any]) -> TrainSpec:
-    overrides = body.get("overrides", {})
-    if not isinstance(overrides, Mapping):
-        raise InvalidInput("overrides", overrides, "must be an object of groups of fields")
-    preset = _text(body, "preset", tuple(presets.PRESETS))
-    resolved = presets.resolve(preset, overrides)
-    return TrainSpec(
-        preset=preset,
-        seed=_seed(body),
-        overrides=overrides,
-        total_steps=resolved.learning.total_steps,
-    )
-
-
-def _parse_evaluate(body: Mapping[str, Any]) -> EvaluateSpec:
-    protocol = _text(body, "protocol", tuple(PROTOCOLS))
-    if protocol not in PROTOCOLS:
-        raise InvalidInput("protocol", protocol, "must name a protocol", tuple(PROTOCOLS))
-    episodes = body.get("episodes")
-    if episodes is not None:
-        _check_integer("episodes", episodes, 1, most_episodes(protocol))
-    return EvaluateSpec(
-        protocol=protocol,
-        checkpoint=_text({"checkpoint": default_checkpoint(protocol), **body}, "checkpoint"),
-        episodes=episodes,
-        seed=_seed(body),
-        motions=_motions(body, protocol),
-    )
-
-
-def _motions(body: Mapping[str, Any], protocol: str) -> tuple[str, ...]:
-    """Return the names of the motions; whether they are stored is for others to say."""
-    names = body.get("motions", ())
-    if not isinstance(names, list | tuple):
-        raise InvalidInput("motions", names, "must be a list of names of stored motions")
-    if len(names) > MAX_RECORDINGS:
-        raise InvalidInput("motions", len(names), f"must be at most {MAX_RECORDINGS} names")
-    for place, name in enumerate(names):
-        if not isinstance(name, str) or not name:
-            raise InvalidInput(f"motions[{place}]", name, "must be the name of a stored motion")
-        if name in names[:place]:
-            raise InvalidInput(f"motions[{place}]", name, "must be named once")
-    check_motions(protocol, names)
-    return tuple(names)
-
-
-def _text(body: Mapping[str, Any], name: str, choices: tuple[str, ...] = ()) -> str:
-    value = body.get(name)
-    if not isinstance(value, str) or not value:
-        raise InvalidInput(name, value, "must be a name", choices)
-    return value
-
-
-def _seed(body: Mapping[str, Any]) -> int:
-    return _check_integer("seed", body.get("seed", 0), 0, MAX_SEED)
-
-
-def _check_integer(name: str, value: Any, low: int, high: int) -> int:
-    if not isinstance(value, int) or isinstance(value, bool) or not low <= value <= high:
-        raise InvalidInput(name, value, f"must be an integer in [{low}, {high}]")
-    return value
+    return _JOB_SPEC.validate_python(body)

@@ -10,15 +10,14 @@ from typing import Any
 import pytest
 from fastapi import FastAPI
 from fastapi.testclient import TestClient
-from pydantic import TypeAdapter
 from typer.main import get_command
 
-from app.api.schemas.jobs import JobCreate
 from app.api.schemas.task_selection import TaskSelectionRequest
 from app.cli.entry import app as command_line
 from app.main import create_app
 from app.settings import PREFIX, Settings
 from app.sim.envs import IDS
+from jobs.spec import parse_spec
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -117,7 +116,7 @@ def test_readme_commands_are_ones_that_exist() -> None:
 
 def test_readme_requests_are_ones_the_service_takes() -> None:
     bodies = requests()
-    job = TypeAdapter[Any](JobCreate).validate_python(bodies["/v1/jobs"])
+    job = parse_spec(bodies["/v1/jobs"]).new_job()
     assert (job.kind, job.preset) == ("train", "pick-td3")
     state = TaskSelectionRequest.model_validate(bodies["/v1/task-selection"])
     _, _, candidates = state.to_domain()

@@ -15,9 +15,9 @@ from app.api import (
     health,
     jobs,
     motion,
-    motions,
     presets,
     problems,
+    recordings,
     reference,
     session,
     sorting,
@@ -71,7 +71,7 @@ def build_app(*, lifespan: Lifespan, static: Path, token: str | None, version: s
         checkpoints,
         presets,
         cells,
-        motions,
+        recordings,
         health,
         session,
         viewer,
@@ -79,7 +79,7 @@ def build_app(*, lifespan: Lifespan, static: Path, token: str | None, version: s
     ):
         app.include_router(part.router)
     add_page(app, static)
-    app.add_middleware(BodyRules, files=motions.FILES)
+    app.add_middleware(BodyRules, files=recordings.FILES)
     open_paths = (SESSION_PATH, ICON_PATH, *health.PATHS)
     app.add_middleware(Guard, token=token, open_paths=open_paths)
     app.add_middleware(Answers)

@@ -8,12 +8,13 @@ from fastapi import APIRouter, Depends, Header, Query, Response
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
-from app.api.schemas.jobs import EvaluateJobCreate, JobCreate, JobList, JobPublic, MetricsPublic
+from app.api.schemas.jobs import JobList, JobPublic, MetricsPublic
 from app.api.services import Services, ServicesDep
 from app.policies.configs import presets
 from app.store import events, jobs, metrics
 from app.store.cursors import MAX_INTEGER
 from app.store.records import JobEvent, JobRecord, JobState, MetricRow
+from jobs.spec import EvaluateSpec, JobSpec
 
 POLL_S = 0.3
 """How often an open stream looks for news [s]."""
@@ -31,7 +32,7 @@ JobDep = Annotated[JobRecord, Depends(job_of_path)]
 
 @router.post("", status_code=202, summary="Post a job")
 def create(
-    body: JobCreate,
+    body: JobSpec,
     services: ServicesDep,
     response: Response,
     idempotency_key: Annotated[
@@ -39,11 +40,11 @@ def create(
     ] = None,
 ) -> JobPublic:
     """Queue a training or an evaluation; ``Location`` says where to follow it."""
-    if isinstance(body, EvaluateJobCreate) and body.checkpoint is not None:
+    if isinstance(body, EvaluateSpec) and body.checkpoint is not None:
         services.checkpoints.read(body.checkpoint)
-    new = body.to_domain()
-    if isinstance(body, EvaluateJobCreate):
-        services.motions.check(body.motions)
+    new = body.new_job()
+    if isinstance(body, EvaluateSpec):
+        services.recordings.check(body.recordings)
     if new.preset is not None:
         preset = presets.resolve(new.preset, new.overrides or {})
         services.cells.to_train_in(preset)

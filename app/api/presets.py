@@ -5,7 +5,7 @@ from fastapi import APIRouter
 from app.api.schemas.presets import PresetList, PresetPublic
 from app.api.services import ServicesDep
 from app.policies.configs.presets import PRESETS
-from jobs.cells import lacks_for_training
+from jobs.cell_catalog import lacks_for_training
 
 router = APIRouter(prefix="/v1/presets", tags=["jobs"])
 

@@ -19,14 +19,14 @@ from app.sim.cells.cell import Cell
 from app.sim.pick.task_policy import TaskPolicy
 from app.sim.sorting.sorting_values import SortingValues
 from app.store.engine import Store
-from jobs.cells import CellCatalog
-from jobs.motions import RecordingCatalog
+from jobs.cell_catalog import CellCatalog
+from jobs.recording_catalog import RecordingCatalog
 from jobs.supervisor import Supervisor
 
 MAX_UPLOADS = 4
 """Most files that are taken in at once; each is held in memory."""
 MAX_STREAMS = 16
-"""Most sockets that ask for motion at once."""
+"""Most sockets that ask for recording at once."""
 MAX_VIEWERS = 16
 """Most 3D viewers that are open at once."""
 
@@ -96,8 +96,8 @@ class Services:
     """Those that move the arm to goals."""
     cells: CellCatalog
     """The work cells by name."""
-    motions: RecordingCatalog
-    """The imported human motions by name."""
+    recordings: RecordingCatalog
+    """The imported recorded human motion by name."""
     start_world: StartWorld
     """Starts a live world."""
     worlds: dict[str, LiveWorld] = field(default_factory=dict)
@@ -115,7 +115,7 @@ class Services:
     motion_streams: threading.BoundedSemaphore = field(
         default_factory=lambda: threading.BoundedSemaphore(MAX_STREAMS)
     )
-    """Held by every open socket that asks for motion."""
+    """Held by every open socket that asks for recording."""
     viewers: threading.BoundedSemaphore = field(
         default_factory=lambda: threading.BoundedSemaphore(MAX_VIEWERS)
     )

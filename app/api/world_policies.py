@@ -58,9 +58,9 @@ def load_for(command: LoadingCommand, cell: Cell, services: Services) -> object:
 
 
 def _recording(command: SetMotion, services: Services) -> Recording:
-    if command.name not in (known := services.motions.names()):
+    if command.name not in (known := services.recordings.names()):
         raise InvalidInput("name", command.name, "is no stored motion", known[:MAX_CHOICES])
-    runs = services.motions.get(command.name)
+    runs = services.recordings.get(command.name)
     if command.run >= len(runs):
         choices = [str(run) for run in range(min(len(runs), MAX_CHOICES))]
         rule = f"is no run of this motion: it has {len(runs)}, counted from 0"

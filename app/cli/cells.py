@@ -26,7 +26,7 @@ def list_cells(as_json: Json = False) -> None:
     settings = prepared_settings()
     from app.cli.database import has_database, opened
     from app.sim.cells.cell import cell_names, lacks_for_pick, load_cell
-    from jobs.cells import CellCatalog
+    from jobs.cell_catalog import CellCatalog
 
     cells = [load_cell(name) for name in cell_names()]
     if has_database(settings):
@@ -64,7 +64,7 @@ def add(file: File, as_json: Json = False) -> None:
     """Check a file and store its cell."""
     settings = prepared_settings()
     from app.cli.database import opened
-    from jobs.cells import CellCatalog
+    from jobs.cell_catalog import CellCatalog
 
     cell = _read(file, as_json)
     with opened(settings, NOUN, create=True) as store:
@@ -77,7 +77,7 @@ def remove(name: Name, as_json: Json = False) -> None:
     """Remove a cell of your own."""
     settings = prepared_settings()
     from app.cli.database import opened
-    from jobs.cells import CellCatalog
+    from jobs.cell_catalog import CellCatalog
 
     with opened(settings, NOUN) as store:
         CellCatalog(store).remove(name)
@@ -92,7 +92,7 @@ def named_cell(name: str, settings: "Settings") -> "Cell":
     """
     from app.cli.database import has_database, opened
     from app.sim.cells.cell import cell_names, load_cell
-    from jobs.cells import CellCatalog
+    from jobs.cell_catalog import CellCatalog
 
     if name in cell_names():
         return load_cell(name)

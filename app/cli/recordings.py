@@ -43,8 +43,8 @@ def import_recording(
     settings = prepared_settings()
     from app.cli.database import opened
     from app.sim.mocap.importer import MAX_BYTES, read_motion
-    from jobs.motions import RecordingCatalog
-    from jobs.stored_motion import detail_of, summary_of
+    from jobs.recording_catalog import RecordingCatalog
+    from jobs.recording_format import detail_of, summary_of
 
     with every_fault_printed(f"{file}: ", as_json=as_json):
         options = read_options(unit, root_unit, up, names)
@@ -74,7 +74,7 @@ def list_recordings(as_json: Json = False) -> None:
     """List the stored recordings."""
     settings = prepared_settings()
     from app.cli.database import has_database, opened
-    from jobs.motions import RecordingCatalog
+    from jobs.recording_catalog import RecordingCatalog
 
     found: tuple[StoredRecording, ...] = ()
     if has_database(settings):
@@ -94,7 +94,7 @@ def show(name: Name, as_json: Json = False) -> None:
     """Print what is known of a stored recording."""
     settings = prepared_settings()
     from app.cli.database import opened
-    from jobs.motions import RecordingCatalog
+    from jobs.recording_catalog import RecordingCatalog
 
     with opened(settings, NOUN) as store:
         data = _data(RecordingCatalog(store).record(name))
@@ -106,7 +106,7 @@ def remove(name: Name, as_json: Json = False) -> None:
     """Remove a stored recording."""
     settings = prepared_settings()
     from app.cli.database import opened
-    from jobs.motions import RecordingCatalog
+    from jobs.recording_catalog import RecordingCatalog
 
     with opened(settings, NOUN) as store:
         RecordingCatalog(store).remove(name)

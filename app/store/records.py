@@ -190,7 +190,7 @@ class CellRecord:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NewRecording:
-    """An imported motion to be stored; the store never opens it."""
+    """An imported recording to be stored; the store never opens it."""
 
     name: str
     """Its name, unique."""
@@ -214,7 +214,7 @@ class NewRecording:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StoredRecording:
-    """A stored motion, without its runs."""
+    """A stored recording, without its runs."""
 
     number: int
     """Running number, in the order of storing; never given twice."""

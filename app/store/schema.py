@@ -5,7 +5,7 @@ import sqlalchemy as sa
 from app.errors import Conflict
 from app.store.engine import Store
 
-REVISION = "0004"
+REVISION = "0005"
 """The newest migration."""
 
 

@@ -25,6 +25,7 @@ from sqlalchemy import (
     Table,
     Text,
     TypeDecorator,
+    UniqueConstraint,
 )
 
 logger = logging.getLogger(__name__)
@@ -169,11 +170,11 @@ cells = Table(
     Column("created_at", UtcDateTime, nullable=False),
 )
 
-motions = Table(
-    "motions",
+recordings = Table(
+    "recordings",
     metadata,
     Column("number", Integer, primary_key=True, autoincrement=True),
-    Column("name", String(64), nullable=False, unique=True),
+    Column("name", String(64), nullable=False),
     Column("sha256", String(64), nullable=False),
     Column("file_name", String(255), nullable=False),
     Column("n_runs", Integer, nullable=False),
@@ -186,6 +187,7 @@ motions = Table(
     Column("summary_digest", String(64)),
     Column("digest", String(64)),
     Column("tensors", LargeBinary, nullable=False),
+    UniqueConstraint("name", name="uq_motions_name"),  # the table's name before migration 0005
     sqlite_autoincrement=True,
 )
 

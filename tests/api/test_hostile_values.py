@@ -219,4 +219,4 @@ def test_signing_in_with_anything_is_refused(service: TestClient, raw: bytes) ->
 @pytest.mark.parametrize("raw", [b"", b"\0" * 200, b"\xff" * 200, b"[" * 100_000])
 def test_files_of_anything_are_refused(service: TestClient, raw: bytes) -> None:
     for name in ("a.bvh", "a.csv", "a.mot", "%F0%9F%98%80.bvh"):
-        answered(service, "post", f"/v1/motions?file_name={name}", content=raw)
+        answered(service, "post", f"/v1/recordings?file_name={name}", content=raw)

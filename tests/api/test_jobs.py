@@ -92,32 +92,36 @@ def test_bad_evaluation_is_refused_by_field(
 
 @pytest.fixture(scope="module")
 def wave(client: TestClient) -> Iterator[str]:
-    """A stored motion."""
+    """A stored recording."""
     content = csv_text(working(100)).encode()
     client.post(
-        "/v1/motions?file_name=wave.csv&name=wave-of-jobs",
+        "/v1/recordings?file_name=wave.csv&name=wave-of-jobs",
         content=content,
         headers={"Content-Type": "text/csv"},
     ).raise_for_status()
     yield "wave-of-jobs"
-    client.delete("/v1/motions/wave-of-jobs").raise_for_status()
+    client.delete("/v1/recordings/wave-of-jobs").raise_for_status()
 
 
 @pytest.mark.parametrize(
     ("change", "field", "text"),
     [
-        ({}, "motions", "at least one motion"),
-        ({"motions": []}, "motions", "at least one motion"),
-        ({"motions": ["nobody"]}, "motions[0]", "wave-of-jobs"),
-        ({"motions": ["wave-of-jobs", "../../etc/passwd"]}, "motions[1]", "wave-of-jobs"),
-        ({"motions": ["wave-of-jobs"] * 2}, "motions[1]", "named once"),
-        ({"motions": [f"m{k}" for k in range(33)]}, "motions", "32"),
-        ({"motions": ["x" * 65]}, "motions[0]", "64"),
-        ({"motions": "wave-of-jobs"}, "motions", "list"),
-        ({"motions": ["wave-of-jobs"], "protocol": "pick-people"}, "motions", "pick-mocap"),
+        ({}, "recordings", "at least one motion"),
+        ({"recordings": []}, "recordings", "at least one motion"),
+        ({"recordings": ["nobody"]}, "recordings[0]", "wave-of-jobs"),
+        ({"recordings": ["wave-of-jobs", "../../etc/passwd"]}, "recordings[1]", "wave-of-jobs"),
+        ({"recordings": ["wave-of-jobs"] * 2}, "recordings[1]", "named once"),
+        ({"recordings": [f"m{k}" for k in range(33)]}, "recordings", "32"),
+        ({"recordings": ["x" * 65]}, "recordings[0]", "64"),
+        ({"recordings": "wave-of-jobs"}, "recordings", "list"),
+        (
+            {"recordings": ["wave-of-jobs"], "protocol": "pick-people"},
+            "recordings",
+            "pick-mocap",
+        ),
     ],
 )
-def test_bad_motions_are_refused_by_field(
+def test_bad_recordings_are_refused_by_field(
     client: TestClient, wave: str, change: dict[str, Any], field: str, text: str
 ) -> None:
     body = {"kind": "evaluate", "protocol": "pick-mocap", "episodes": 2, **change}
@@ -127,8 +131,10 @@ def test_bad_motions_are_refused_by_field(
     assert text in answer.text
 
 
-def test_evaluation_beside_a_stored_motion_is_accepted(client: TestClient, wave: str) -> None:
-    body = {"kind": "evaluate", "protocol": "pick-mocap", "motions": [wave], "episodes": 2}
+def test_evaluation_beside_a_stored_recording_is_accepted(
+    client: TestClient, wave: str
+) -> None:
+    body = {"kind": "evaluate", "protocol": "pick-mocap", "recordings": [wave], "episodes": 2}
     answer = client.post("/v1/jobs", json=body)
     job = answer.json()
     assert answer.status_code == 202

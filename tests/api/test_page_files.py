@@ -124,7 +124,7 @@ def test_rules_on_bodies_hold_below_the_path(below: TestClient) -> None:
     assert text.status_code == 415
     large = below.post(f"{PREFIX}/v1/jobs", json={"x": "a" * (1 << 20)})
     assert large.status_code == 413
-    motion = below.post(f"{PREFIX}/v1/motions?file_name=a.bvh", content=b"a" * (2 << 20))
+    motion = below.post(f"{PREFIX}/v1/recordings?file_name=a.bvh", content=b"a" * (2 << 20))
     assert motion.status_code == 422
 
 

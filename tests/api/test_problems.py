@@ -125,7 +125,7 @@ def test_body_over_the_limit_without_a_length_is_refused(client: TestClient) -> 
 
 
 @pytest.mark.parametrize("encoding", ["gzip", "br", "deflate", "GZIP", "identity, gzip"])
-@pytest.mark.parametrize("path", ["/v1/trackers", "/v1/motions?file_name=a.bvh"])
+@pytest.mark.parametrize("path", ["/v1/trackers", "/v1/recordings?file_name=a.bvh"])
 def test_compressed_bodies_are_refused(client: TestClient, path: str, encoding: str) -> None:
     body = gzip.compress(b'{"cell": "pick-and-place"}')
     headers = {"Content-Encoding": encoding}

@@ -63,7 +63,7 @@ def test_what_is_no_json_is_left_to_the_parser(body: bytes) -> None:
     [
         ("/v1/cells/a\0", b"", "path"),
         ("/\udcff", b"", "path"),
-        ("/v1/motions", b"x=1&file_name=a%00.bvh", "file_name"),
+        ("/v1/recordings", b"x=1&file_name=a%00.bvh", "file_name"),
         ("/v1/jobs", b"cursor=\0", "cursor"),
         ("/v1/jobs", b"%00=1", "\\x00"),
     ],
@@ -110,7 +110,7 @@ def test_the_greatest_cursor_is_one() -> None:
 
 @pytest.mark.parametrize(
     "path",
-    ["/v1/cells/a%00", "/v1/checkpoints/%00", "/v1/jobs/a%00b", "/v1/motions?file_name=%00"],
+    ["/v1/cells/a%00", "/v1/checkpoints/%00", "/v1/jobs/a%00b", "/v1/recordings?file_name=%00"],
 )
 def test_nul_in_an_address_is_refused_before_any_database_sees_it(
     client: TestClient, path: str

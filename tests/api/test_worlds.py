@@ -123,7 +123,7 @@ def test_second_person_works_and_the_state_repeats_the_choice(client: TestClient
 
 def test_imported_motion_is_played(client: TestClient) -> None:
     posted = client.post(
-        "/v1/motions",
+        "/v1/recordings",
         params={"file_name": "played.csv"},
         content=csv_text(working()),
         headers={"Content-Type": "text/csv"},
@@ -144,7 +144,7 @@ def test_imported_motion_is_played(client: TestClient) -> None:
         unknown = client.post(COMMANDS, json={"tag": "set-motion", "name": "unknown"}).json()
         assert (unknown["field"], unknown["choices"]) == ("name", ["played"])
     finally:
-        client.delete("/v1/motions/played")
+        client.delete("/v1/recordings/played")
 
 
 @pytest.mark.parametrize(

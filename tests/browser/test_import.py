@@ -18,7 +18,7 @@ def emptied(server: str) -> Iterator[str]:
     """The server; what was imported is removed again and the person works."""
     yield server
     for name in ("mixed", "angles", "foreign"):
-        patient_http.delete(f"{server}/v1/motions/{name}")
+        patient_http.delete(f"{server}/v1/recordings/{name}")
     patient_http.post(
         f"{server}/v1/worlds/main/commands", json={"tag": "set-mode", "mode": "auto"}
     )
@@ -82,5 +82,5 @@ def test_visitor_says_what_foreign_columns_are(
     expect(page.locator('[data-role="import-result"]')).to_contain_text(
         "1 clean run, 1 cut out (frame 48: no value of elbow_l)"
     )
-    stored = page.evaluate("fetch('v1/motions/foreign').then((one) => one.json())")
+    stored = page.evaluate("fetch('v1/recordings/foreign').then((one) => one.json())")
     assert stored["options"] == {"names": {"coude d": "elbow_r", "elbow_left": "elbow_l"}}

@@ -23,7 +23,7 @@ def one_person(server: str) -> Iterator[str]:
         patient_http.post(commands, json={"tag": "remove-person", "person": other["id"]})
     patient_http.post(commands, json={"tag": "set-anthropometry", "stature": 50})
     patient_http.post(commands, json={"tag": "set-mode", "mode": "auto"})
-    patient_http.delete(f"{server}/v1/motions/visit")
+    patient_http.delete(f"{server}/v1/recordings/visit")
 
 
 def test_visitor_adds_a_person_changes_its_size_and_plays_a_recording(
@@ -32,7 +32,7 @@ def test_visitor_adds_a_person_changes_its_size_and_plays_a_recording(
     server = one_person
     page = open_page(scene=False)
     page.click('[data-mode="recorded"]')
-    expect(page.locator('[data-role="empty-motions"]')).to_contain_text("motions import")
+    expect(page.locator('[data-role="empty-motions"]')).to_contain_text("recordings import")
     page.click('[data-action="add-person"]')
     page.click('[data-person="1"]')
     page.click('[data-action="size"]')
@@ -41,7 +41,7 @@ def test_visitor_adds_a_person_changes_its_size_and_plays_a_recording(
     now = until(server, lambda world: world["people"][1]["size"][11] > 1.08, LIMIT_S)
     assert [one["body"]["stature"] for one in now["people"]] == [50.0, 95.0]
     posted = patient_http.post(
-        f"{server}/v1/motions",
+        f"{server}/v1/recordings",
         params={"file_name": "visit.csv"},
         content=csv_text(working()),
         headers={"Content-Type": "text/csv"},

@@ -56,7 +56,7 @@ def test_file_that_is_not_there_is_a_wrong_call(
     assert "cannot be read: No such file" in capsys.readouterr().err
 
 
-def test_kept_motion_is_listed_shown_and_removed(
+def test_kept_recording_is_listed_shown_and_removed(
     clip: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["recordings", "list"]) == 0
@@ -72,10 +72,10 @@ def test_kept_motion_is_listed_shown_and_removed(
     assert told.startswith(capsys.readouterr().out.strip())
     assert main(["recordings", "remove", "someone"]) == 0
     assert main(["recordings", "show", "someone"]) == 2
-    assert "no motion 'someone'" in capsys.readouterr().err
+    assert "no recording 'someone'" in capsys.readouterr().err
 
 
-def test_kept_motion_can_be_given_a_name(
+def test_kept_recording_can_be_given_a_name(
     clip: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["recordings", "import", str(clip), "--keep", "--name", "reach-1"]) == 0

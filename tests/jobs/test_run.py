@@ -13,9 +13,9 @@ from app.policies.configs.presets import nested
 from app.store import attempts, checkpoints, jobs, metrics
 from app.store.engine import Store
 from app.store.records import NewCheckpoint
-from jobs.cells import CellCatalog
-from jobs.motions import RecordingCatalog
-from jobs.spec import new_job
+from jobs.cell_catalog import CellCatalog
+from jobs.recording_catalog import RecordingCatalog
+from jobs.spec import parse_spec
 from jobs.supervisor import Supervisor
 from tests import workshop
 from tests.jobs.machinery import PATIENCE, wait_for, wait_until_final, worker_pids
@@ -45,13 +45,9 @@ def supervisor(store: Store, tmp_path: Path) -> Iterator[Supervisor]:
 
 
 def train(store: Store, **overrides: float | str) -> str:
-    body = {
-        "kind": "train",
-        "preset": "pick-td3",
-        "seed": 4,
-        "overrides": nested(TINY | overrides),
-    }
-    return jobs.create_job(store, new_job(body)).id
+    fields = nested(TINY | overrides)
+    body = {"kind": "train", "preset": "pick-td3", "seed": 4, "overrides": fields}
+    return jobs.create_job(store, parse_spec(body).new_job()).id
 
 
 @pytest.mark.usefixtures("supervisor")
@@ -99,7 +95,7 @@ def test_killed_training_goes_on_and_its_policy_can_be_evaluated(store: Store) -
     assert steps == list(range(8192, 0, -512))
     assert job.result is not None
     body = {"kind": "evaluate", "protocol": "pick-single", "episodes": 5, "seed": 3}
-    spec = new_job({**body, "checkpoint": job.result["checkpoint"]})
+    spec = parse_spec({**body, "checkpoint": job.result["checkpoint"]}).new_job()
     found = wait_until_final(store, jobs.create_job(store, spec).id)
     assert found.result is not None
     assert (found.result["checkpoint"], found.result["episodes"]) == (
@@ -111,22 +107,22 @@ def test_killed_training_goes_on_and_its_policy_can_be_evaluated(store: Store) -
 @pytest.mark.usefixtures("supervisor")
 def test_evaluation_of_an_unknown_checkpoint_fails_by_name(store: Store) -> None:
     body = {"kind": "evaluate", "protocol": "pick-single", "checkpoint": "nobody"}
-    job = wait_until_final(store, jobs.create_job(store, new_job(body)).id)
+    job = wait_until_final(store, jobs.create_job(store, parse_spec(body).new_job()).id)
     assert (job.state, job.error) == ("failed", "no checkpoint 'nobody'")
 
 
 @pytest.mark.usefixtures("supervisor")
-def test_evaluation_beside_stored_motions_tells_row_by_row(
+def test_evaluation_beside_stored_recordings_tells_row_by_row(
     store: Store,
 ) -> None:
-    motions = RecordingCatalog(store)
+    recordings = RecordingCatalog(store)
     for name, seed in (("nods", 0), ("waves", 1)):
-        motions.add(csv_text(working(100, seed=seed)).encode(), "clip.csv", name)
+        recordings.add(csv_text(working(100, seed=seed)).encode(), "clip.csv", name)
     policy = pretrained.load("pick")
     new = NewCheckpoint(sha256=policy.sha256, manifest=policy.manifest, tensors=policy.tensors)
     checkpoints.put_checkpoint(store, new)
     body = {"kind": "evaluate", "protocol": "pick-mocap", "checkpoint": policy.sha256}
-    spec = new_job({**body, "episodes": 4, "motions": ["waves", "nods"]})
+    spec = parse_spec({**body, "episodes": 4, "recordings": ["waves", "nods"]}).new_job()
     job = wait_until_final(store, jobs.create_job(store, spec).id)
     assert (job.state, job.error) == ("succeeded", None)
     assert job.result is not None
@@ -140,15 +136,15 @@ def test_evaluation_beside_stored_motions_tells_row_by_row(
 
 
 @pytest.mark.usefixtures("supervisor")
-def test_evaluation_beside_a_motion_that_is_gone_fails_by_name(store: Store) -> None:
+def test_evaluation_beside_a_recording_that_is_gone_fails_by_name(store: Store) -> None:
     policy = pretrained.load("pick")
     new = NewCheckpoint(sha256=policy.sha256, manifest=policy.manifest, tensors=policy.tensors)
     checkpoints.put_checkpoint(store, new)
-    body = {"kind": "evaluate", "protocol": "pick-mocap", "motions": ["waves"]}
-    spec = new_job({**body, "checkpoint": policy.sha256, "episodes": 4})
+    body = {"kind": "evaluate", "protocol": "pick-mocap", "recordings": ["waves"]}
+    spec = parse_spec({**body, "checkpoint": policy.sha256, "episodes": 4}).new_job()
     job = wait_until_final(store, jobs.create_job(store, spec).id)
     assert job.state == "failed"
-    assert "motions[0] = 'waves' is no stored motion" in (job.error or "")
+    assert "recordings[0] = 'waves' is no stored recording" in (job.error or "")
 
 
 @pytest.mark.usefixtures("supervisor")
@@ -162,7 +158,7 @@ def test_evaluation_of_sorting_tells_row_by_row_and_refuses_a_policy_that_picks(
         )
         checkpoints.put_checkpoint(store, stored)
         body = {"kind": "evaluate", "protocol": "sorting-tests", "episodes": 2}
-        spec = new_job({**body, "checkpoint": policy.sha256})
+        spec = parse_spec({**body, "checkpoint": policy.sha256}).new_job()
         ids.append(jobs.create_job(store, spec).id)
     sorts, picks = (wait_until_final(store, one) for one in ids)
     assert (sorts.state, sorts.error, sorts.step) == ("succeeded", None, 12)

@@ -11,7 +11,7 @@ from alembic import command
 
 from app.digests import digest
 from app.errors import Damaged, NotFound, StorageUnavailable
-from app.store import attempts, cells, checkpoints, endings, jobs, metrics, motions
+from app.store import attempts, cells, checkpoints, endings, jobs, metrics, recordings
 from app.store.engine import Store
 from app.store.migrate import alembic_config, migrate
 from app.store.records import Claim, NewCheckpoint, NewRecording, ResumeState
@@ -105,18 +105,18 @@ def test_damaged_cell_is_named_and_can_be_stored_again(store: Store, change: Cha
 @pytest.mark.parametrize(
     ("column", "change"), every({"tensors": TENSORS, "summary": JSON, "detail": JSON})
 )
-def test_damaged_motion_is_named_and_can_be_stored_again(
+def test_damaged_recording_is_named_and_can_be_stored_again(
     store: Store, column: str, change: Change
 ) -> None:
-    motions.put_recording(store, WAVE)
-    harm(store, "motions", column, change)
-    with pytest.raises(Damaged, match="motion 'wave' is damaged.*import its file again"):
-        motions.read_runs(store, "wave")
-    shown = [one.name for one in motions.list_recordings(store)]
+    recordings.put_recording(store, WAVE)
+    harm(store, "recordings", column, change)
+    with pytest.raises(Damaged, match="recording 'wave' is damaged.*import its file again"):
+        recordings.read_runs(store, "wave")
+    shown = [one.name for one in recordings.list_recordings(store)]
     assert shown == ([] if column == "summary" else ["wave"])
-    motions.remove_recording(store, "wave")
-    assert motions.put_recording(store, WAVE)
-    assert motions.read_runs(store, "wave")[1] == CONTENT
+    recordings.remove_recording(store, "wave")
+    assert recordings.put_recording(store, WAVE)
+    assert recordings.read_runs(store, "wave")[1] == CONTENT
 
 
 def train_on(store: Store, claim: Claim, *steps: int) -> None:
@@ -193,12 +193,12 @@ def test_damaged_times_keep_no_list_from_being_read(
 ) -> None:
     checkpoints.put_checkpoint(store, policy())
     cells.put_cell(store, "mine", DEFINITION)
-    motions.put_recording(store, WAVE)
-    for table in ("jobs", "checkpoints", "cells", "motions"):
+    recordings.put_recording(store, WAVE)
+    for table in ("jobs", "checkpoints", "cells", "recordings"):
         harm(store, table, "created_at", change)
     assert len(checkpoints.list_checkpoints(store).items) == 1
     assert len(jobs.list_jobs(store).items) == 1
-    assert len(cells.list_cells(store)) == len(motions.list_recordings(store)) == 1
+    assert len(cells.list_cells(store)) == len(recordings.list_recordings(store)) == 1
     assert checkpoints.read_checkpoint(store, policy().sha256)[1] == CONTENT
     assert jobs.get_job(store, claim.job_id).created_at.tzinfo is not None
 
@@ -225,7 +225,7 @@ def test_pages_that_are_no_database_are_storage_that_cannot_be_used(
 
 def test_what_an_older_version_stored_counts_as_undamaged(store: Store, claim: Claim) -> None:
     cells.put_cell(store, "mine", DEFINITION)
-    motions.put_recording(store, WAVE)
+    recordings.put_recording(store, WAVE)
     train_on(store, claim, 10, 20)
     config = alembic_config()
     with store.writing() as connection:
@@ -235,6 +235,6 @@ def test_what_an_older_version_stored_counts_as_undamaged(store: Store, claim: C
         assert "digest" not in names
     migrate(store)
     assert cells.get_cell(store, "mine").definition == DEFINITION
-    assert motions.read_runs(store, "wave")[1] == CONTENT
+    assert recordings.read_runs(store, "wave")[1] == CONTENT
     resume = attempts.load_resume(store, claim.job_id)
     assert resume is not None and resume.step == 20

@@ -1,75 +1,12 @@
-"""Jobs: what is posted, what is shown."""
+"""Jobs as they are shown."""
 
 from datetime import datetime
-from typing import Annotated, Any, Literal, Self
+from typing import Any, Self
 
 from pydantic import Field
 
-from app.api.schemas.numbers import Answer, Body
-from app.errors import InvalidInput
-from app.policies.configs.presets import PRESETS
-from app.policies.evaluation.registry import default_checkpoint
-from app.store.records import JobRecord, MetricRow, NewJob
-from jobs.spec import MAX_RECORDINGS, new_job
-
-Seed = Annotated[int, Field(strict=True, ge=0, le=2**32 - 1)]
-
-
-class TrainJobCreate(Body):
-    """Train a policy: a preset, a seed, and what differs from the preset."""
-
-    kind: Literal["train"]
-    preset: str = Field(max_length=64, description="name of GET /v1/presets")
-    seed: Seed = Field(0, description="seed of every random stream")
-    overrides: dict[str, Any] = Field(
-        default_factory=dict, description="fields that differ from the preset, by group"
-    )
-
-    def to_domain(self) -> NewJob:
-        """Check what a schema cannot and return the job.
-
-        Raises:
-            InvalidInput: An unknown preset, an unknown override, one outside its bounds.
-        """
-        if self.preset not in PRESETS:
-            raise InvalidInput("preset", self.preset, "is no preset", tuple(PRESETS))
-        return new_job(self.model_dump(mode="json", exclude_unset=True))
-
-
-class EvaluateJobCreate(Body):
-    """Evaluate a checkpoint by a protocol."""
-
-    kind: Literal["evaluate"]
-    protocol: str = Field(max_length=64, description="name of the protocol")
-    checkpoint: str | None = Field(
-        None, max_length=64, description="SHA-256 or alias; the protocol's own if null"
-    )
-    episodes: int | None = Field(
-        None,
-        strict=True,
-        ge=1,
-        le=1_000_000,
-        description="episodes; the protocol's own if null",
-    )
-    seed: Seed = Field(0, description="seed of the episodes")
-    motions: list[Annotated[str, Field(max_length=64)]] = Field(
-        default_factory=list,
-        max_length=MAX_RECORDINGS,
-        description="names of GET /v1/motions, for pick-mocap",
-    )
-
-    def to_domain(self) -> NewJob:
-        """Check what a schema cannot and return the job.
-
-        Raises:
-            InvalidInput: An unknown protocol, or motions that do not go with it.
-        """
-        given = self.model_dump(mode="json", exclude_unset=True)
-        checkpoint = self.checkpoint or default_checkpoint(self.protocol)
-        return new_job({**given, "checkpoint": checkpoint})
-
-
-JobCreate = Annotated[TrainJobCreate | EvaluateJobCreate, Field(discriminator="kind")]
+from app.api.schemas.numbers import Answer
+from app.store.records import JobRecord, MetricRow
 
 
 class JobPublic(Answer):

@@ -32,7 +32,7 @@ export function ImportForm({ onDone }) {
     ];
     setAnswer({ busy: true });
     try {
-      const motion = await postFile(`v1/motions?${new URLSearchParams(asked)}`, file);
+      const motion = await postFile(`v1/recordings?${new URLSearchParams(asked)}`, file);
       setAnswer({ motion });
       setFile(null);
       onDone(motion);

@@ -99,7 +99,7 @@ function Recording({ person, list, error, send }) {
   if (list === null) return html`<${Note}>Looking for recordings …</${Note}>`;
   if (list.length === 0 && !motion) {
     return html`<${Note} role="empty-motions">No recordings yet. Import one here, or with
-      ${" "}<code>python -m app motions import FILE --keep</code>.</${Note}>`;
+      ${" "}<code>python -m app recordings import FILE --keep</code>.</${Note}>`;
   }
   const known = list.some((one) => one.name === motion?.name);
   return html`<div class="dock-row recording">
@@ -183,7 +183,7 @@ function Note({ children, role }) {
 function useMotions() {
   const [found, setFound] = useState({ list: null, error: null });
   const refresh = useCallback(() => {
-    get("v1/motions").then(
+    get("v1/recordings").then(
       (answer) => setFound({ list: answer.items, error: null }),
       (problem) => setFound({ list: null, error: problem.message }));
   }, []);

@@ -5,7 +5,7 @@ from app.policies.configs.presets import resolve
 from app.sim.cells.cell import cell_names, load_cell
 from app.store.cells import put_cell
 from app.store.engine import Store
-from jobs.cells import CellCatalog
+from jobs.cell_catalog import CellCatalog
 from tests import workshop
 
 

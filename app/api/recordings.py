@@ -1,4 +1,4 @@
-"""Imported human motions: post a file, see what is in it, list and remove."""
+"""Recordings of human motion: import a file, list, show, remove."""
 
 from typing import Annotated, Any
 
@@ -6,17 +6,17 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 from starlette.concurrency import run_in_threadpool
 
 from app.api.bodies import FILE_TYPES
-from app.api.schemas.motions import RecordingItem, RecordingList, RecordingPublic
+from app.api.schemas.recordings import RecordingItem, RecordingList, RecordingPublic
 from app.api.services import MAX_UPLOADS, Services, ServicesDep
 from app.errors import NotReady
 from app.sim.mocap.importer import FORMATS, MAX_BYTES
 from app.sim.mocap.read_options import UNITS, UP_AXES, ReadOptions, name_map
 from app.store.records import StoredRecording
 
-router = APIRouter(prefix="/v1/motions", tags=["motions"])
+router = APIRouter(prefix="/v1/recordings", tags=["recordings"])
 
 FILES = {router.prefix: MAX_BYTES}
-"""Path to which a file is posted, and the largest one [bytes]."""
+"""Route that takes files, and the largest file [bytes]."""
 BODY: dict[str, Any] = {
     "requestBody": {
         "required": True,
@@ -27,10 +27,10 @@ BODY: dict[str, Any] = {
 }
 """The body is the file itself."""
 UNIT = f"{', '.join(UNITS)}, or metres per unit"
-"""What a unit can be stated as."""
+"""Choices of a unit."""
 
 
-def stated_options(
+def read_options(
     unit: Annotated[
         str | None, Query(description=f"unit of the lengths: {UNIT}; found if missing")
     ] = None,
@@ -45,69 +45,69 @@ def stated_options(
         list[str] | None,
         Query(
             alias="map",
-            description="what a joint or column of the file is, theirs=ours; may be repeated",
+            description="meaning of a joint or column, theirs=ours; may be repeated",
         ),
     ] = None,
 ) -> ReadOptions:
-    """Return what a request states about its file."""
+    """Return how the file of a request is read."""
     return ReadOptions(unit=unit, root_unit=root_unit, up=up, names=name_map(names or []))
 
 
-@router.get("", summary="List the imported motions")
+@router.get("", summary="List the recordings")
 def list_all(services: ServicesDep) -> RecordingList:
-    """Return every stored motion with its measures and the error of its import."""
+    """Return every recording with its measures and the error of its import."""
     return RecordingList(
-        items=[RecordingItem.from_domain(one) for one in services.motions.all()]
+        items=[RecordingItem.from_domain(one) for one in services.recordings.all()]
     )
 
 
-@router.get("/{name}", summary="One imported motion")
+@router.get("/{name}", summary="One recording")
 def get_one(name: str, services: ServicesDep) -> RecordingPublic:
-    """Return one motion with its clean runs and the artifacts that were cut out."""
-    return RecordingPublic.from_domain(services.motions.record(name))
+    """Return one recording with its clean runs and the artifacts cut out of it."""
+    return RecordingPublic.from_domain(services.recordings.record(name))
 
 
-@router.post("", status_code=201, summary="Import a recorded motion", openapi_extra=BODY)
+@router.post("", status_code=201, summary="Import a recording", openapi_extra=BODY)
 async def create(
     request: Request,
     services: ServicesDep,
     response: Response,
-    options: Annotated[ReadOptions, Depends(stated_options)],
+    options: Annotated[ReadOptions, Depends(read_options)],
     file_name: Annotated[
         str, Query(description=f"name of the file; ends with {', '.join(FORMATS)}")
     ],
     name: Annotated[
         str | None,
-        Query(description="name of the motion, a-z 0-9 -; made from the file's if missing"),
+        Query(description="name of the recording, a-z 0-9 -; made from the file's if missing"),
     ] = None,
 ) -> RecordingPublic:
-    """Import the file that is the body, and keep it; the same one again answers 200."""
-    record, new = await _taken_in(request, services, file_name, name, options)
+    """Import the file in the body and store it; the same file again answers 200."""
+    record, new = await _import(request, services, file_name, name, options)
     if not new:
         response.status_code = 200
     response.headers["Location"] = f"{router.prefix}/{record.name}"
     return RecordingPublic.from_domain(record)
 
 
-@router.delete("/{name}", status_code=204, summary="Remove an imported motion")
+@router.delete("/{name}", status_code=204, summary="Remove a recording")
 def remove(name: str, services: ServicesDep) -> None:
-    """Forget a motion."""
-    services.motions.remove(name)
+    """Remove a recording."""
+    services.recordings.remove(name)
 
 
-async def _taken_in(
+async def _import(
     request: Request,
     services: Services,
     file_name: str,
     name: str | None,
     options: ReadOptions,
 ) -> tuple[StoredRecording, bool]:
-    """Read the body and have it imported while a thread waits, a few at a time."""
+    """Import the body on a thread, a few at a time."""
     if not services.uploads.acquire(blocking=False):
         raise NotReady(f"{MAX_UPLOADS} files are being imported: post again in a moment")
     try:
         content = await request.body()
-        add = services.motions.add
+        add = services.recordings.add
         return await run_in_threadpool(add, content, file_name, name, options)
     finally:
         services.uploads.release()

@@ -1,7 +1,7 @@
-"""Imported human motions, as bytes under their names; the store never opens them.
+"""Imported human motion, as bytes under a name; the store never opens them.
 
-A stored motion never changes: another file under the same name is refused until the first is
-removed, so that what was measured with a motion is what its name meant.
+A stored recording never changes: another file under the same name is refused until the first
+is removed, so that results keep the meaning of the names they cite.
 """
 
 import logging
@@ -14,39 +14,35 @@ from app.digests import digest, has_digest
 from app.errors import Conflict, Damaged, InvalidInput, NotFound
 from app.store.engine import Store
 from app.store.records import NewRecording, StoredRecording
-from app.store.tables import motions
+from app.store.tables import recordings
 
 logger = logging.getLogger(__name__)
 
 MAX_RECORDINGS = 200
-"""Most motions that are kept."""
+"""Largest number of recordings."""
 MAX_TENSORS = 40 * 1024 * 1024
-"""Largest motion that goes into the database [bytes]; 200 000 frames are 31 MiB."""
+"""Largest recording [bytes]; 200 000 frames are 31 MiB."""
 MAX_TOTAL = 2 * 1024 * 1024 * 1024
-"""Most that all motions together take [bytes]."""
+"""Limit of the size of all recordings [bytes]."""
 
-_LISTED = [column for column in motions.c if column.name not in ("digest", "tensors", "detail")]
-_DETAILED = [*_LISTED, motions.c.detail]
+_LISTED = [one for one in recordings.c if one.name not in ("digest", "tensors", "detail")]
+_DETAILED = [*_LISTED, recordings.c.detail]
 
 
 def put_recording(store: Store, new: NewRecording) -> bool:
-    """Store a motion; the same file under the same name again is harmless.
-
-    Args:
-        store: The database.
-        new: The motion.
+    """Store a recording; the same file under the same name again has no effect.
 
     Returns:
         Whether it is new.
 
     Raises:
         InvalidInput: It is too large.
-        Conflict: Another file has that name, or there is too much.
+        Conflict: Another file has that name, or the limits are reached.
         StorageFull: No room is left.
     """
     if len(new.tensors) > MAX_TENSORS:
-        rule = f"bytes exceed the limit of {MAX_TENSORS} bytes per motion"
-        raise InvalidInput("motion", len(new.tensors), rule)
+        rule = f"bytes exceed the limit of {MAX_TENSORS} bytes per recording"
+        raise InvalidInput("recording", len(new.tensors), rule)
     with store.writing() as connection:
         if _same(connection, new.name, new.sha256) is not None:
             return False
@@ -66,80 +62,82 @@ def put_recording(store: Store, new: NewRecording) -> bool:
             "digest": digest({"summary": summary, "detail": detail}, new.tensors),
             "tensors": new.tensors,
         }
-        connection.execute(sa.insert(motions).values(values))
+        connection.execute(sa.insert(recordings).values(values))
     return True
 
 
 def find_same(store: Store, name: str, sha256: str) -> StoredRecording | None:
-    """Return what is stored of a file under a name; None where it could be stored now.
+    """Return the recording of a file under a name; None where it could be stored now.
 
     Args:
         store: The database.
-        name: Name of the motion.
+        name: Name of the recording.
         sha256: Of the file.
 
     Raises:
-        Conflict: Another file has that name, or there is too much.
+        Conflict: Another file has that name, or the limits are reached.
     """
     with store.reading() as connection:
         return _same(connection, name, sha256)
 
 
 def read_runs(store: Store, name: str) -> tuple[StoredRecording, bytes]:
-    """Return one motion with its detail and the safetensors bytes of its runs.
+    """Return a recording with its detail, and the safetensors bytes of its runs.
 
     Raises:
-        NotFound: No motion has that name.
-        Damaged: It is not what was stored.
+        NotFound: No recording has that name.
+        Damaged: Its digest does not match.
     """
     with store.reading() as connection:
-        row = dict(_row(connection, name, list(motions.c)))
+        row = dict(_row(connection, name, list(recordings.c)))
     content = {"summary": row["summary"], "detail": row["detail"]}
     if not has_digest(row["digest"], content, row["tensors"]):
-        raise Damaged("motion", name, "remove it, and import its file again")
+        raise Damaged("recording", name, "remove it, and import its file again")
     tensors: bytes = row.pop("tensors")
     return _record(row), tensors
 
 
 def recording_number(store: Store, name: str) -> int:
-    """Return the running number of a motion, which tells it from later ones of its name.
+    """Return the running number of a recording; a later one of its name has another number.
 
     Raises:
-        NotFound: No motion has that name.
+        NotFound: No recording has that name.
     """
     with store.reading() as connection:
-        return int(_row(connection, name, [motions.c.number])["number"])
+        return int(_row(connection, name, [recordings.c.number])["number"])
 
 
 def list_recordings(store: Store) -> tuple[StoredRecording, ...]:
-    """Return all motions whose summary is undamaged, by name, without detail and runs."""
+    """Return all recordings with an undamaged summary, by name, without detail and runs."""
+    query = sa.select(*_LISTED).order_by(recordings.c.name)
     with store.reading() as connection:
-        rows = connection.execute(sa.select(*_LISTED).order_by(motions.c.name)).mappings().all()
+        rows = connection.execute(query).mappings().all()
     found = []
     for row in rows:
         if has_digest(row["summary_digest"], {"summary": row["summary"]}):
             found.append(_record(row))
         else:
-            logger.error("motion %s is damaged and left out", row["name"])
+            logger.error("recording %s is damaged and left out", row["name"])
     return tuple(found)
 
 
 def recording_names(store: Store) -> tuple[str, ...]:
-    """Return the names of all motions."""
+    """Return the names of all recordings."""
     with store.reading() as connection:
-        query = sa.select(motions.c.name).order_by(motions.c.name)
+        query = sa.select(recordings.c.name).order_by(recordings.c.name)
         return tuple(connection.execute(query).scalars())
 
 
 def remove_recording(store: Store, name: str) -> None:
-    """Remove a motion.
+    """Remove a recording.
 
     Raises:
-        NotFound: No motion has that name.
+        NotFound: No recording has that name.
     """
+    query = sa.delete(recordings).where(recordings.c.name == name)
     with store.writing() as connection:
-        if not connection.execute(sa.delete(motions).where(motions.c.name == name)).rowcount:
-            raise NotFound("motion", name)
+        if not connection.execute(query).rowcount:
+            raise NotFound("recording", name)
 
 
 def _record(row: Any) -> StoredRecording:
@@ -147,32 +145,29 @@ def _record(row: Any) -> StoredRecording:
 
 
 def _row(connection: sa.Connection, name: str, columns: list[sa.Column[Any]]) -> Any:
-    query = sa.select(*columns).where(motions.c.name == name)
+    query = sa.select(*columns).where(recordings.c.name == name)
     row = connection.execute(query).mappings().first()
     if row is None:
-        raise NotFound("motion", name)
+        raise NotFound("recording", name)
     return row
 
 
 def _same(connection: sa.Connection, name: str, sha256: str) -> StoredRecording | None:
-    query = sa.select(*_DETAILED).where(motions.c.name == name)
+    query = sa.select(*_DETAILED).where(recordings.c.name == name)
     row = connection.execute(query).mappings().first()
     if row is not None:
         if row["sha256"] == sha256:
             return _record(row)
         raise Conflict(
-            f"a motion named {name!r} from another file is stored: remove it first, or choose "
-            "another name"
+            f"a recording named {name!r} from another file is stored: remove it first, or "
+            "choose another name"
         )
-    held = sa.select(sa.func.count(), sa.func.coalesce(sa.func.sum(motions.c.size), 0))
-    n_motions, total = connection.execute(held.select_from(motions)).one()
-    if n_motions >= MAX_RECORDINGS:
-        raise Conflict(
-            f"{MAX_RECORDINGS} motions are stored, no more are kept: remove one first"
-        )
+    held = sa.select(sa.func.count(), sa.func.coalesce(sa.func.sum(recordings.c.size), 0))
+    count, total = connection.execute(held.select_from(recordings)).one()
+    if count >= MAX_RECORDINGS:
+        raise Conflict(f"{MAX_RECORDINGS} recordings are stored, the limit: remove one first")
     if total >= MAX_TOTAL:
         raise Conflict(
-            f"the stored motions take {total} bytes, from {MAX_TOTAL} on no more are kept: "
-            "remove one first"
+            f"the stored recordings take {total} of at most {MAX_TOTAL} bytes: remove one first"
         )
     return None

@@ -1,4 +1,4 @@
-"""Imported human motions as the service shows them."""
+"""Recordings of human motion as they are shown."""
 
 from datetime import datetime
 from typing import Any, Self
@@ -10,38 +10,38 @@ from app.store.records import StoredRecording
 
 
 class SpreadPublic(Answer):
-    """How an error is spread over the clean frames."""
+    """Distribution of an error over the clean frames."""
 
-    p50: float = Field(description="half of the frames are better [mm]")
-    p99: float = Field(description="one frame of a hundred is worse [mm]")
-    worst: float = Field(description="the largest [mm]")
+    p50: float = Field(description="median [mm]")
+    p99: float = Field(description="99th percentile [mm]")
+    worst: float = Field(description="maximum [mm]")
 
 
 class ErrorPublic(Answer):
-    """How far points of the model lie from the file's own; 0 where the file holds angles."""
+    """Distance of the model's points from the file's; 0 for files of joint angles."""
 
     wrists: SpreadPublic = Field(description="wrists, with the recorded lengths [mm]")
     elbows: SpreadPublic = Field(description="elbows, with the recorded lengths [mm]")
-    pelvis: SpreadPublic = Field(description="pelvis, which gives way to the neck [mm]")
+    pelvis: SpreadPublic = Field(description="pelvis; the neck has priority [mm]")
     wrists_at_fixed_height: SpreadPublic = Field(
-        description="wrists where the pelvis's height is not carried along [mm]"
+        description="wrists with the pelvis at a fixed height [mm]"
     )
     fixed_body: SpreadPublic = Field(description="wrists of the median person's body [mm]")
 
 
 class BeyondPublic(Answer):
-    """A joint that leaves the model's limits; its angles are kept as they were recorded."""
+    """A joint outside the model's limits; its recorded angles are kept."""
 
     share: float = Field(description="share of the clean frames, 0 to 1")
-    farthest_rad: float = Field(description="by how much at most [rad]")
+    farthest_rad: float = Field(description="largest excess [rad]")
 
 
 class RunPublic(Answer):
     """One clean run, between two artifacts."""
 
-    first: int = Field(description="its first frame in the file, from 0")
-    last: int = Field(description="its last frame")
-    duration_s: float = Field(description="how long it takes [s]")
+    first: int = Field(description="first frame in the file, from 0")
+    last: int = Field(description="last frame")
+    duration_s: float = Field(description="duration [s]")
 
 
 class ArtifactPublic(Answer):
@@ -50,16 +50,16 @@ class ArtifactPublic(Answer):
     first: int = Field(description="first frame of the fault, from 0")
     last: int = Field(description="last frame of the fault")
     parts: list[str] = Field(
-        description="points that were too fast, the fastest first; columns without a value"
+        description="points that are too fast, the fastest first; columns without a value"
     )
     speed: float = Field(
-        description="highest speed [m/s]; 0 for a hole in the times and for missing values"
+        description="highest speed [m/s]; 0 for a gap in the times and for missing values"
     )
-    reason: str = Field(description="what is wrong, for people")
+    reason: str = Field(description="reason as text")
 
 
 class ReadingPublic(Answer):
-    """How a file was read: what was stated, else what was found."""
+    """How a file was read: stated options, detected values otherwise."""
 
     unit: str = Field(description="unit of lengths: a name, or metres per unit")
     root_unit: str = Field(description="unit of the root's path")
@@ -67,25 +67,25 @@ class ReadingPublic(Answer):
     rate_hz: float = Field(description="frames per second; those that repeat count once [Hz]")
     names: dict[str, str] = Field(description="joints of the file, by our names")
     stature: float | None = Field(
-        description="of the recorded person, by the skeleton [m]; null for files of angles"
+        description="of the person, from the skeleton [m]; null for files of angles"
     )
-    notes: list[str] = Field(description="what else was found, for people")
+    notes: list[str] = Field(description="further observations as text")
 
 
 class RecordingItem(Answer):
-    """One stored motion, in short."""
+    """One recording, in short."""
 
     name: str
     file_name: str = Field(description="name of the file it was imported from")
     sha256: str = Field(description="of that file")
     created_at: datetime
     format: str = Field(description="bvh, mot, sto or csv")
-    unit: str = Field(description="unit of the file's lengths, as it was found")
+    unit: str = Field(description="unit of the file's lengths")
     reading: ReadingPublic | None = Field(
         default=None, description="how the file was read; null where an older version read it"
     )
     options: dict[str, Any] = Field(
-        default_factory=dict, description="what was stated about the file when it was posted"
+        default_factory=dict, description="options stated when the file was posted"
     )
     frames: int = Field(description="frames of the file")
     duration_s: float = Field(description="of the file [s]")
@@ -97,24 +97,24 @@ class RecordingItem(Answer):
     )
     error_mm: ErrorPublic = Field(description="error of the import [mm]")
     beyond_limits: dict[str, BeyondPublic] = Field(
-        description="joints that leave the model's limits, by name"
+        description="joints outside the model's limits, by name"
     )
 
     @classmethod
     def from_domain(cls, record: StoredRecording) -> Self:
-        """Make it from the store's record."""
+        """Return the schema of a record."""
         return cls(**_members(record))
 
 
 class RecordingPublic(RecordingItem):
-    """One stored motion with each run and artifact."""
+    """One recording with each run and artifact."""
 
     clean_runs: list[RunPublic]
     artifacts: list[ArtifactPublic] = Field(description="the first 1000")
 
     @classmethod
     def from_domain(cls, record: StoredRecording) -> Self:
-        """Make it from the store's record, which carries its detail."""
+        """Return the schema of a record with its detail."""
         assert record.detail is not None
         return cls(
             **_members(record),
@@ -124,7 +124,7 @@ class RecordingPublic(RecordingItem):
 
 
 class RecordingList(Answer):
-    """All stored motions, by name."""
+    """All recordings, by name."""
 
     items: list[RecordingItem]
 

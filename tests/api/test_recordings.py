@@ -19,24 +19,24 @@ FILE = {"Content-Type": "application/octet-stream"}
 
 
 def post(client: TestClient, content: bytes, **asked: str) -> Any:
-    return client.post("/v1/motions", params=asked, content=content, headers=FILE)
+    return client.post("/v1/recordings", params=asked, content=content, headers=FILE)
 
 
 @pytest.fixture
 def posted(client: TestClient) -> Iterator[dict[str, Any]]:
-    """The answer to a motion that was posted; the motion is removed again."""
+    """The answer to a recording that was posted; the recording is removed again."""
     answer = post(client, with_leap(slice(100, 103)).encode(), file_name="Leap 1.bvh")
     assert answer.status_code == 201
-    assert answer.headers["Location"] == "/v1/motions/leap-1"
+    assert answer.headers["Location"] == "/v1/recordings/leap-1"
     yield answer.json()
-    client.delete("/v1/motions/leap-1")
+    client.delete("/v1/recordings/leap-1")
 
 
-def test_without_motions_the_list_is_empty(client: TestClient) -> None:
-    assert client.get("/v1/motions").json() == {"items": []}
+def test_without_recordings_the_list_is_empty(client: TestClient) -> None:
+    assert client.get("/v1/recordings").json() == {"items": []}
 
 
-def test_posted_motion_says_what_was_found(posted: dict[str, Any]) -> None:
+def test_posted_recording_says_what_was_found(posted: dict[str, Any]) -> None:
     assert (posted["name"], posted["file_name"]) == ("leap-1", "Leap 1.bvh")
     assert (posted["format"], posted["unit"], posted["frames"]) == ("bvh", "mm", 200)
     assert posted["duration_s"] == pytest.approx(3.98)
@@ -51,29 +51,29 @@ def test_posted_motion_says_what_was_found(posted: dict[str, Any]) -> None:
     assert posted["body_m"]["forearm_r"] == pytest.approx(0.26)
 
 
-def test_posted_motion_is_kept_listed_and_removed(
+def test_posted_recording_is_kept_listed_and_removed(
     client: TestClient, posted: dict[str, Any]
 ) -> None:
-    assert client.get("/v1/motions/leap-1").json() == posted
-    (item,) = client.get("/v1/motions").json()["items"]
+    assert client.get("/v1/recordings/leap-1").json() == posted
+    (item,) = client.get("/v1/recordings").json()["items"]
     assert item == {k: v for k, v in posted.items() if k not in ("clean_runs", "artifacts")}
-    assert client.delete("/v1/motions/leap-1").status_code == 204
-    assert client.get("/v1/motions/leap-1").status_code == 404
-    assert client.delete("/v1/motions/leap-1").status_code == 404
+    assert client.delete("/v1/recordings/leap-1").status_code == 204
+    assert client.get("/v1/recordings/leap-1").status_code == 404
+    assert client.delete("/v1/recordings/leap-1").status_code == 404
 
 
-def test_runs_of_a_posted_motion_are_there_for_the_service(
+def test_runs_of_a_posted_recording_are_there_for_the_service(
     client: TestClient, posted: dict[str, Any]
 ) -> None:
     services = client.app.state.services  # type: ignore[attr-defined]
-    runs = services.motions.get(posted["name"])
+    runs = services.recordings.get(posted["name"])
     assert [run.first_frame for run in runs] == [run["first"] for run in posted["clean_runs"]]
     assert all(run.q.shape == (len(run.times), 18) for run in runs)
 
 
 def test_unit_and_up_axis_can_be_stated(client: TestClient) -> None:
     answer = post(client, CLIP, file_name="stated.bvh", unit="0.0011", up="y")
-    client.delete("/v1/motions/stated")
+    client.delete("/v1/recordings/stated")
     assert answer.status_code == 201
     assert answer.json()["options"] == {"unit": "0.0011", "up": "y"}
     assert answer.json()["body_m"]["forearm_r"] == pytest.approx(0.286)
@@ -82,8 +82,8 @@ def test_unit_and_up_axis_can_be_stated(client: TestClient) -> None:
 def test_columns_can_be_mapped(client: TestClient) -> None:
     text = csv_text(working(100)).replace("elbow_r", "coude d").replace("elbow_l", "coude g")
     asked = {"file_name": "coude.csv", "map": ["coude d=elbow_r", "coude g=elbow_l"]}
-    answer = client.post("/v1/motions", params=asked, content=text.encode(), headers=FILE)
-    client.delete("/v1/motions/coude")
+    answer = client.post("/v1/recordings", params=asked, content=text.encode(), headers=FILE)
+    client.delete("/v1/recordings/coude")
     assert answer.status_code == 201, answer.json()
     assert answer.json()["options"] == {"names": {"coude d": "elbow_r", "coude g": "elbow_l"}}
 
@@ -106,7 +106,7 @@ def test_map_that_does_not_fit_is_a_problem(
     query = urlencode(
         [("file_name", "a.csv"), *(("map", one) for one in pairs)], errors="surrogatepass"
     )
-    answer = client.post(f"/v1/motions?{query}", content=content, headers=FILE)
+    answer = client.post(f"/v1/recordings?{query}", content=content, headers=FILE)
     assert answer.status_code == 422
     assert text in json.dumps(answer.json(), ensure_ascii=False)
 
@@ -124,7 +124,7 @@ def test_joints_beyond_their_limits_are_told(client: TestClient) -> None:
     q = working(100)
     q[:, 13] = Q_MAX[13] + 0.2
     answer = post(client, csv_text(q).encode(), file_name="bent.csv")
-    client.delete("/v1/motions/bent")
+    client.delete("/v1/recordings/bent")
     beyond = answer.json()["beyond_limits"]["elbow_r"]
     assert beyond == {"share": 1.0, "farthest_rad": pytest.approx(0.2, abs=1e-6)}
 
@@ -139,7 +139,7 @@ def test_same_file_again_is_fine_and_another_one_a_conflict(
     assert other.status_code == 409
     assert "'leap-1' from another file is stored: remove it first" in other.json()["detail"]
     named = post(client, CLIP, file_name="leap-1.bvh", name="leap-2")
-    client.delete("/v1/motions/leap-2")
+    client.delete("/v1/recordings/leap-2")
     assert named.status_code == 201
 
 
@@ -147,18 +147,18 @@ def test_same_file_posted_by_two_at_once_is_stored_once(client: TestClient) -> N
     with ThreadPoolExecutor(2) as pool:
         both = [pool.submit(post, client, CLIP, file_name="twice.bvh") for _ in range(2)]
         answers = [one.result() for one in both]
-    client.delete("/v1/motions/twice")
+    client.delete("/v1/recordings/twice")
     assert sorted(one.status_code for one in answers) == [200, 201]
     assert answers[0].json() == answers[1].json()
 
 
-def test_unknown_motion_is_not_found_with_the_known_ones(
+def test_unknown_recording_is_not_found_with_the_known_ones(
     client: TestClient, posted: dict[str, Any]
 ) -> None:
     for name, status in (("walk", 404), ("..%2Fleap-1", 404), ("%00", 422)):
-        answer = client.get(f"/v1/motions/{name}")
+        answer = client.get(f"/v1/recordings/{name}")
         assert answer.status_code == status
-    assert client.get("/v1/motions/walk").json()["known"] == [posted["name"]]
+    assert client.get("/v1/recordings/walk").json()["known"] == [posted["name"]]
 
 
 TWICE = CLIP.replace(b"Frames: 200", b"Frames: 300")
@@ -189,7 +189,7 @@ IN_RADIANS = csv_text(working(100), degrees=False).replace("radians", "degrees")
         (CLIP, "动作.bvh", "name", "must be given"),
     ],
 )
-def test_file_that_is_no_motion_is_named_with_place_and_rule(
+def test_file_that_is_no_recording_is_named_with_place_and_rule(
     client: TestClient, content: bytes, file_name: str, field: str, rule: str
 ) -> None:
     answer = post(client, content, file_name=file_name)
@@ -199,7 +199,7 @@ def test_file_that_is_no_motion_is_named_with_place_and_rule(
     assert problem["field"].startswith(field)
     assert rule in problem["rule"] + str(problem.get("errors", ""))
     assert {"value", "choices"} <= problem.keys()
-    assert client.get("/v1/motions").json() == {"items": []}
+    assert client.get("/v1/recordings").json() == {"items": []}
 
 
 def test_unit_that_is_nobody_s_is_named(client: TestClient) -> None:
@@ -215,18 +215,18 @@ def test_name_that_cannot_be_one_is_refused(client: TestClient) -> None:
 
 
 def test_file_name_is_asked_for(client: TestClient) -> None:
-    answer = client.post("/v1/motions", content=CLIP, headers=FILE)
+    answer = client.post("/v1/recordings", content=CLIP, headers=FILE)
     assert answer.status_code == 422
     assert (answer.json()["field"], answer.json()["rule"]) == ("file_name", "is required")
 
 
 def test_file_over_the_limit_is_refused(client: TestClient) -> None:
     length = {**FILE, "Content-Length": str(MAX_BYTES + 1)}
-    answer = client.post("/v1/motions?file_name=a.bvh", content=b"x", headers=length)
+    answer = client.post("/v1/recordings?file_name=a.bvh", content=b"x", headers=length)
     assert answer.status_code == 413
     assert (answer.json()["field"], str(MAX_BYTES) in answer.json()["rule"]) == ("body", True)
     chunks = (b" " * (1 << 20) for _ in range(33))
-    answer = client.post("/v1/motions?file_name=a.bvh", content=chunks, headers=FILE)
+    answer = client.post("/v1/recordings?file_name=a.bvh", content=chunks, headers=FILE)
     assert answer.status_code == 413
 
 
@@ -236,15 +236,15 @@ def test_file_over_the_limit_of_json_is_read(client: TestClient) -> None:
 
 
 def test_form_is_no_file(client: TestClient) -> None:
-    answer = client.post("/v1/motions?file_name=a.bvh", files={"file": CLIP})
+    answer = client.post("/v1/recordings?file_name=a.bvh", files={"file": CLIP})
     assert answer.status_code == 415
     assert answer.json()["field"] == "Content-Type"
     assert "application/octet-stream" in answer.json()["choices"]
 
 
 def test_file_of_no_stated_type_is_taken(client: TestClient) -> None:
-    answer = client.post("/v1/motions?file_name=plain.bvh", content=CLIP)
-    client.delete("/v1/motions/plain")
+    answer = client.post("/v1/recordings?file_name=plain.bvh", content=CLIP)
+    client.delete("/v1/recordings/plain")
     assert "content-type" not in answer.request.headers
     assert answer.status_code == 201
 
@@ -266,7 +266,7 @@ def test_refused_files_leave_room_for_the_next(client: TestClient) -> None:
     for _ in range(MAX_UPLOADS + 1):
         assert post(client, b"", file_name="a.bvh").status_code == 422
     chunks = (b" " * (1 << 20) for _ in range(33))
-    client.post("/v1/motions?file_name=a.bvh", content=chunks, headers=FILE)
+    client.post("/v1/recordings?file_name=a.bvh", content=chunks, headers=FILE)
     uploads = client.app.state.services.uploads  # type: ignore[attr-defined]
     for _ in range(MAX_UPLOADS):
         assert uploads.acquire(blocking=False)
@@ -275,7 +275,7 @@ def test_refused_files_leave_room_for_the_next(client: TestClient) -> None:
 
 def test_description_of_the_api_tells_the_units(client: TestClient) -> None:
     api = client.get("/openapi.json").json()
-    body = api["paths"]["/v1/motions"]["post"]["requestBody"]["content"]
+    body = api["paths"]["/v1/recordings"]["post"]["requestBody"]["content"]
     assert set(body) == {"application/octet-stream", "text/plain", "text/csv"}
     fields = api["components"]["schemas"]["RecordingPublic"]["properties"]
     assert "[mm]" in fields["error_mm"]["description"]

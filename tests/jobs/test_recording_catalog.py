@@ -8,12 +8,12 @@ from app.errors import BadRecording, Conflict, InvalidInput, NotFound
 from app.sim.mocap.importer import Motion, read_motion
 from app.sim.mocap.read_options import ReadOptions
 from app.store.engine import Store
-from app.store.motions import put_recording
+from app.store.recordings import put_recording
 from app.store.records import NewRecording
-from jobs import motions as motions_module
+from jobs import recording_catalog
 from jobs.import_process import import_here
-from jobs.motions import RecordingCatalog
-from jobs.stored_motion import packed
+from jobs.recording_catalog import RecordingCatalog
+from jobs.recording_format import packed
 from tests.sim.mocap.test_importer import CLIPS, with_leap
 from tests.sim.recorded_person import bvh_text, csv_text, working
 
@@ -70,7 +70,7 @@ def test_same_file_again_is_not_new_and_is_not_imported_again(
     assert calls == ["nod.csv"]
 
 
-def test_same_file_with_other_options_is_another_motion(catalog: RecordingCatalog) -> None:
+def test_same_file_with_other_options_is_another_recording(catalog: RecordingCatalog) -> None:
     clip, metres = bvh_text(working(100), unit=1.0).encode(), ReadOptions(unit="m")
     first, _ = catalog.add(clip, "nod.bvh", options=metres)
     assert first.summary["options"] == {"unit": "m"}
@@ -98,7 +98,7 @@ def test_another_file_under_the_name_is_a_conflict(catalog: RecordingCatalog) ->
     assert catalog.names() == ("nod", "nod-2")
 
 
-def test_arrays_of_a_stored_motion_cannot_be_written_to(catalog: RecordingCatalog) -> None:
+def test_arrays_of_a_stored_recording_cannot_be_written_to(catalog: RecordingCatalog) -> None:
     catalog.add(CLIP, "nod.csv")
     (run,) = catalog.get("nod")
     for array in (run.times, run.q, run.pelvis_z):
@@ -106,7 +106,7 @@ def test_arrays_of_a_stored_motion_cannot_be_written_to(catalog: RecordingCatalo
             array[0] = 1.0
 
 
-def test_motion_is_kept_in_memory_until_another_takes_its_name(
+def test_recording_is_kept_in_memory_until_another_takes_its_name(
     store: Store, catalog: RecordingCatalog
 ) -> None:
     catalog.add(CLIP, "nod.csv")
@@ -122,7 +122,7 @@ def test_motion_is_kept_in_memory_until_another_takes_its_name(
 def test_memory_is_given_back_beyond_so_many_frames(
     catalog: RecordingCatalog, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(motions_module, "MAX_CACHED_FRAMES", 150)
+    monkeypatch.setattr(recording_catalog, "MAX_CACHED_FRAMES", 150)
     for name in ("a", "b"):
         catalog.add(CLIP, "nod.csv", name)
     first, second = catalog.get("a"), catalog.get("b")
@@ -130,7 +130,7 @@ def test_memory_is_given_back_beyond_so_many_frames(
     assert catalog.get("a") is not first
 
 
-def test_unknown_motion_names_the_known_ones(catalog: RecordingCatalog) -> None:
+def test_unknown_recording_names_the_known_ones(catalog: RecordingCatalog) -> None:
     catalog.add(CLIP, "nod.csv")
     for ask in (catalog.get, catalog.record, catalog.remove):
         for name in ("walk", "../nod", "nod\n", ""):
@@ -138,7 +138,7 @@ def test_unknown_motion_names_the_known_ones(catalog: RecordingCatalog) -> None:
                 ask(name)
 
 
-def test_runs_of_several_motions_are_called_as_they_are_stored(
+def test_runs_of_several_recordings_are_called_as_they_are_stored(
     catalog: RecordingCatalog,
 ) -> None:
     catalog.add(CLIP, "nod.csv", "first")
@@ -148,10 +148,12 @@ def test_runs_of_several_motions_are_called_as_they_are_stored(
     assert catalog.runs_of(()) == ()
 
 
-def test_motions_that_are_not_stored_are_named_with_their_place(
+def test_recordings_that_are_not_stored_are_named_with_their_place(
     catalog: RecordingCatalog,
 ) -> None:
-    with pytest.raises(InvalidInput, match=r"motions\[0\] = 'a' is no stored motion: there is"):
+    with pytest.raises(
+        InvalidInput, match=r"recordings\[0\] = 'a' is no stored recording: there is"
+    ):
         catalog.check(["a"])
     catalog.add(CLIP, "nod.csv")
     catalog.check(["nod"])
@@ -159,7 +161,7 @@ def test_motions_that_are_not_stored_are_named_with_their_place(
         for ask in (catalog.check, catalog.runs_of):
             with pytest.raises(InvalidInput) as caught:
                 ask(["nod", name])
-            assert (caught.value.field, caught.value.choices) == ("motions[1]", ("nod",))
+            assert (caught.value.field, caught.value.choices) == ("recordings[1]", ("nod",))
 
 
 @pytest.mark.parametrize(
@@ -173,7 +175,7 @@ def test_motions_that_are_not_stored_are_named_with_their_place(
     ],
 )
 def test_name_is_made_from_the_file_s(file_name: str, name: str) -> None:
-    assert motions_module.recording_name(file_name) == name
+    assert recording_catalog.recording_name(file_name) == name
 
 
 def test_file_without_letters_needs_a_name(catalog: RecordingCatalog) -> None:
@@ -221,7 +223,7 @@ def test_stored_bytes_that_are_no_runs_are_named(
 ) -> None:
     new = packed(read_motion(CLIP, "nod.csv"), "nod", "nod.csv", "a" * 64)
     put_recording(store, replace(new, tensors=tensors))
-    with pytest.raises(InvalidInput, match="motion = 'nod' was stored by another version"):
+    with pytest.raises(InvalidInput, match="recording = 'nod' was stored by another version"):
         catalog.get("nod")
 
 
@@ -244,7 +246,7 @@ def test_stored_runs_that_do_not_add_up_are_named(
     new = packed(read_motion(CLIP, "nod.csv"), "nod", "nod.csv", "a" * 64)
     recorded = {**new.detail["recorded"], "sources": ["a", "b"]}
     put_recording(store, replace(new, detail={**new.detail, "recorded": recorded}))
-    with pytest.raises(InvalidInput, match="post it anew"):
+    with pytest.raises(InvalidInput, match="post it again"):
         catalog.get("nod")
 
 

@@ -1,8 +1,8 @@
-"""An imported motion as it is stored, and back.
+"""The stored form of a recording.
 
-The runs are a safetensors file, which holds numbers and nothing else: the frames of all runs
-one after the other in ``times``, ``q`` and ``pelvis_z``, and ``lengths`` and ``first_frames``
-with a number per run. Names, measures and errors are JSON beside them.
+The runs are a safetensors file: the frames of all runs one after the other in ``times``, ``q``
+and ``pelvis_z``; ``lengths`` and ``first_frames`` have a number per run. Names, measures and
+errors are JSON beside them.
 """
 
 from collections.abc import Mapping
@@ -23,7 +23,7 @@ from app.sim.mocap.read_options import NOTHING_STATED, ReadOptions
 from app.store.records import NewRecording, StoredRecording
 
 MAX_GLITCHES = 1000
-"""Most artifacts of a motion that are kept with their place; all are counted."""
+"""Largest number of artifacts stored with their place; all are counted."""
 
 _SPREADS = ("wrists", "elbows", "pelvis", "wrists_at_fixed_height", "fixed_body")
 
@@ -68,14 +68,14 @@ def packed(
     sha256: str,
     options: ReadOptions = NOTHING_STATED,
 ) -> NewRecording:
-    """Return an import as it is stored.
+    """Return the stored form of an import.
 
     Args:
         found: The import.
-        name: Name under which it is stored.
+        name: Name of the recording.
         file_name: Name of its file.
         sha256: Of its file.
-        options: What was stated about its file.
+        options: Options with which the file was read.
     """
     detail = detail_of(found)
     detail["artifacts"] = detail["artifacts"][:MAX_GLITCHES]
@@ -107,10 +107,10 @@ def packed(
 
 
 def unpacked(record: StoredRecording, tensors: bytes) -> tuple[Motion, ...]:
-    """Return the runs of a stored motion, arrays read-only.
+    """Return the runs of a stored recording, arrays read-only.
 
     Args:
-        record: What is known of it, with its detail.
+        record: The recording, with its detail.
         tensors: Its safetensors bytes.
 
     Raises:
@@ -122,8 +122,10 @@ def unpacked(record: StoredRecording, tensors: bytes) -> tuple[Motion, ...]:
         size = _size(recorded["size"])
         arrays = _arrays(tensors, len(sources))
     except (SafetensorError, KeyError, TypeError, ValueError) as error:
-        rule = "was stored by another version of Tandem and does not fit this one: post it anew"
-        raise InvalidInput("motion", record.name, rule) from error
+        rule = (
+            "was stored by another version of Tandem and does not fit this one: post it again"
+        )
+        raise InvalidInput("recording", record.name, rule) from error
     stops = np.cumsum(arrays["lengths"])
     spans = [slice(stop - n, stop) for stop, n in zip(stops, arrays["lengths"], strict=True)]
     return tuple(
@@ -141,7 +143,11 @@ def unpacked(record: StoredRecording, tensors: bytes) -> tuple[Motion, ...]:
 
 
 def _arrays(tensors: bytes, n_runs: int) -> dict[str, NDArray[Any]]:
-    """Return the arrays of a stored motion, of the right shapes and finite."""
+    """Return the arrays of a stored recording.
+
+    Raises:
+        ValueError: A shape or type is wrong, or a number is not finite.
+    """
     arrays = load_tensors(tensors)
     n = len(arrays["times"])
     expected: dict[str, tuple[tuple[int, ...], type]] = {
@@ -162,7 +168,7 @@ def _arrays(tensors: bytes, n_runs: int) -> dict[str, NDArray[Any]]:
 
 
 def _size(lengths: Mapping[str, float]) -> BodySize:
-    """Return a body from its stored lengths; those it did not have then are the median's."""
+    """Return a body from its stored lengths; missing ones are those of the median person."""
     known = {entry.name for entry in fields(BodySize)}
     return BodySize(**{name: float(one) for name, one in lengths.items() if name in known})
 
