@@ -21,7 +21,7 @@ from app.api.known_people import warm_up
 from app.api.registry import (
     DEFAULT_ALIAS,
     REACH_ALIAS,
-    SORTERS,
+    SORTING_ALIASES,
     CheckpointNames,
     PolicyRegistry,
 )
@@ -109,9 +109,9 @@ class Service:
             store=store,
             supervisor=supervisor,
             checkpoints=names,
-            policies=PolicyRegistry(names, build_policy, DEFAULT_ALIAS),
-            sorters=PolicyRegistry(names, build_sorter, SORTERS[0]),
-            movers=PolicyRegistry(names, build_mover, REACH_ALIAS),
+            policies=PolicyRegistry(names, build_task_policy, DEFAULT_ALIAS),
+            sorters=PolicyRegistry(names, build_sorting_policy, SORTING_ALIASES[0]),
+            movers=PolicyRegistry(names, build_reach_policy, REACH_ALIAS),
             cells=CellCatalog(store),
             recordings=RecordingCatalog(store, self._imports),
             start_world=start_world,
@@ -143,7 +143,7 @@ class Service:
             policy = self.parts.policies.load(DEFAULT_ALIAS)
             warm_up(load_cell(LIVE_CELL))
             warm_up_sorting()
-            for name in SORTERS:
+            for name in SORTING_ALIASES:
                 warm_up_sorting(self.parts.sorters.load(name))
             self.parts.movers.load(REACH_ALIAS)
             cell = LiveCell(load_cell(LIVE_CELL), policy, id=WORLD_ID)
@@ -186,21 +186,21 @@ def start_world(
     return live
 
 
-def build_policy(manifest: Mapping[str, Any], tensors: bytes) -> TaskPolicy:
+def build_task_policy(manifest: Mapping[str, Any], tensors: bytes) -> TaskPolicy:
     """Make the object that chooses tasks from a checkpoint's manifest and tensors."""
     checkpoint = load(manifest, tensors)
     require_purpose(checkpoint, CHOOSING)
     return TaskChooser(checkpoint)
 
 
-def build_sorter(manifest: Mapping[str, Any], tensors: bytes) -> SortingValues:
+def build_sorting_policy(manifest: Mapping[str, Any], tensors: bytes) -> SortingValues:
     """Make the object that values sorting moves from a checkpoint's manifest and tensors."""
     checkpoint = load(manifest, tensors)
     require_purpose(checkpoint, SORTING)
     return SortingPolicy(checkpoint)
 
 
-def build_mover(manifest: Mapping[str, Any], tensors: bytes) -> MotionDecider:
+def build_reach_policy(manifest: Mapping[str, Any], tensors: bytes) -> MotionDecider:
     """Make the object that moves to goals from a checkpoint's manifest and tensors."""
     actor = ReachPolicy(load(manifest, tensors))
     decider = MotionDecider(actor, cell_of(manifest))

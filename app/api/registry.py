@@ -23,7 +23,7 @@ MAX_POLICIES = 32
 """Most objects that a registry keeps."""
 DEFAULT_ALIAS = "pick"
 """The policy that chooses tasks where none is named."""
-SORTERS = ("sorting-e0", "sorting-e1")
+SORTING_ALIASES = ("sorting-e0", "sorting-e1")
 """The shipped policies that sort; each goes by the name of its work cell."""
 REACH_ALIAS = "reach"
 """The policy that moves to goals where none is named; it may not be shipped yet."""

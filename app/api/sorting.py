@@ -6,7 +6,7 @@ import numpy as np
 from fastapi import APIRouter
 from starlette.concurrency import run_in_threadpool
 
-from app.api.registry import SORTERS
+from app.api.registry import SORTING_ALIASES
 from app.api.schemas.sorting import SortingAnswer, SortingRequest, outside_of
 from app.api.services import Services, ServicesDep
 from app.api.task_selection import known_cell
@@ -69,7 +69,7 @@ async def _policy_of(request: SortingRequest, services: Services) -> SortingValu
         CheckpointMismatch: It does not sort.
     """
     name = request.checkpoint
-    if name is None and request.cell in SORTERS:
+    if name is None and request.cell in SORTING_ALIASES:
         name = request.cell if request.cell in services.checkpoints.aliases else None
     if name is None or request.decider == "planner":
         return None

@@ -9,7 +9,7 @@ from starlette.concurrency import run_in_threadpool
 from app.api.known_people import known_people, nearest_places, renumbered, take_time
 from app.api.schemas.task_selection import TaskSelection, TaskSelectionRequest
 from app.api.services import Services, ServicesDep
-from app.api.world_policies import require_mover
+from app.api.world_policies import require_task_policy
 from app.errors import InvalidInput, NotFound
 from app.sim.cells.cell import Cell, cell_names
 
@@ -30,7 +30,7 @@ async def choose(request: TaskSelectionRequest, services: ServicesDep) -> TaskSe
     policy = services.policies.loaded(request.checkpoint)
     if policy is None:
         policy = await run_in_threadpool(services.policies.load, request.checkpoint)
-    require_mover(policy, cell, services)
+    require_task_policy(policy, cell, services)
     decide = partial(
         policy.decide,
         q,

@@ -6,7 +6,7 @@ in nothing but their stations (``sorting_cell.same_workspace``).
 
 import logging
 
-from app.api.registry import REACH_ALIAS, SORTERS, P, PolicyRegistry
+from app.api.registry import REACH_ALIAS, SORTING_ALIASES, P, PolicyRegistry
 from app.api.services import Services
 from app.errors import CheckpointMismatch, Damaged, InvalidInput, NotFound
 from app.live.commands import LoadingCommand, SetMotion, SetPolicy
@@ -42,17 +42,17 @@ def load_for(command: LoadingCommand, cell: Cell, services: Services) -> object:
         case SetMotion():
             return _recording(command, services)
         case SetPolicy(checkpoint=str(name)) if is_reaching(cell):
-            return pilot_of(name, cell, services)
+            return named_reach_policy(name, cell, services)
         case SetPolicy(checkpoint=str(name)):
             policy = services.policies.load(name)
-            if policy.cell != cell.name and not may_move(policy, cell, services):
+            if policy.cell != cell.name and not may_select_tasks(policy, cell, services):
                 rule = f"must decide in the cell {cell.name}, not in {policy.cell}"
                 raise InvalidInput("checkpoint", name, rule)
-            require_mover(policy, cell, services)
+            require_task_policy(policy, cell, services)
             return policy
         case SetSortingPolicy(checkpoint=str(name)):
             sorter = services.sorters.load(name)
-            require_sorter(sorter, cell)
+            require_sorting_policy(sorter, cell)
             return sorter
     return None
 
@@ -68,7 +68,7 @@ def _recording(command: SetMotion, services: Services) -> Recording:
     return Recording(runs[command.run], command.name, command.run, len(runs))
 
 
-def require_mover(policy: TaskPolicy, cell: Cell, services: Services) -> None:
+def require_task_policy(policy: TaskPolicy, cell: Cell, services: Services) -> None:
     """Make sure that a policy may move the arm in a cell.
 
     Raises:
@@ -85,22 +85,22 @@ def require_mover(policy: TaskPolicy, cell: Cell, services: Services) -> None:
     require_workspace(cell, trained)
 
 
-def may_move(policy: TaskPolicy, cell: Cell, services: Services) -> bool:
+def may_select_tasks(policy: TaskPolicy, cell: Cell, services: Services) -> bool:
     """Whether a policy may move the arm in a cell."""
     try:
-        require_mover(policy, cell, services)
+        require_task_policy(policy, cell, services)
     except CheckpointMismatch:
         return False
     return True
 
 
-def mover_for(cell: Cell, services: Services) -> TaskPolicy | None:
+def task_policy_for(cell: Cell, services: Services) -> TaskPolicy | None:
     """Return the newest policy of a cell; the default one goes first where it may act."""
     default = services.policies.load(None)
-    if default.cell == cell.name and may_move(default, cell, services):
+    if default.cell == cell.name and may_select_tasks(default, cell, services):
         return default
     newest = newest_for(cell, CHOOSING, services.policies, services)
-    return newest or (default if may_move(default, cell, services) else None)
+    return newest or (default if may_select_tasks(default, cell, services) else None)
 
 
 def newest_for(
@@ -116,7 +116,7 @@ def newest_for(
     return None
 
 
-def require_sorter(sorter: SortingValues, cell: Cell) -> None:
+def require_sorting_policy(sorter: SortingValues, cell: Cell) -> None:
     """Make sure that a sorter knows tasks as large as a cell's.
 
     Raises:
@@ -129,15 +129,15 @@ def require_sorter(sorter: SortingValues, cell: Cell) -> None:
         raise CheckpointMismatch("shape", text.format(here), text.format(known))
 
 
-def sorter_for(cell: Cell, services: Services) -> SortingValues | None:
+def sorting_policy_for(cell: Cell, services: Services) -> SortingValues | None:
     """Return the shipped sorter of a cell; None leaves its moves to the exact planner."""
-    if cell.name not in SORTERS or cell.name not in services.checkpoints.aliases:
+    if cell.name not in SORTING_ALIASES or cell.name not in services.checkpoints.aliases:
         return None
     sorter = services.sorters.load(cell.name)
     return sorter if is_sorting(cell) and sorter.shape == shape_of(cell) else None
 
 
-def pilot_of(reference: str, cell: Cell, services: Services) -> ReachPilot:
+def named_reach_policy(reference: str, cell: Cell, services: Services) -> ReachPilot:
     """Return the reach policy that is named, ready to act in a cell.
 
     Raises:
@@ -149,7 +149,7 @@ def pilot_of(reference: str, cell: Cell, services: Services) -> ReachPilot:
     return ReachPilot(actor)
 
 
-def pilot_for(cell: Cell, services: Services) -> ReachPilot | None:
+def reach_policy_for(cell: Cell, services: Services) -> ReachPilot | None:
     """Return the reach policy of a cell: the shipped one, else the newest trained in it."""
     if REACH_ALIAS in services.checkpoints.aliases:
         actor = services.movers.load(REACH_ALIAS).actor

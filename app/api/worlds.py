@@ -19,12 +19,12 @@ from app.api.schemas.worlds import (
 from app.api.services import LiveWorld, Services, ServicesDep
 from app.api.world_policies import (
     load_for,
-    mover_for,
-    pilot_for,
-    pilot_of,
-    require_mover,
-    require_sorter,
-    sorter_for,
+    named_reach_policy,
+    reach_policy_for,
+    require_sorting_policy,
+    require_task_policy,
+    sorting_policy_for,
+    task_policy_for,
 )
 from app.errors import InvalidInput, NotReady
 from app.live.command_checks import CommandMessage
@@ -109,20 +109,24 @@ def set_cell(world_id: str, body: WorldCell, services: ServicesDep) -> WorldSumm
         raise InvalidInput("cell", cell.name, f"cannot be shown live: it {lack}")
     if is_reaching(cell):
         if body.sorting_policy is not None:
-            require_sorter(services.sorters.load(body.sorting_policy), cell)
+            require_sorting_policy(services.sorters.load(body.sorting_policy), cell)
         reference = body.checkpoint
-        pilot = pilot_of(reference, cell, services) if reference else pilot_for(cell, services)
+        pilot = (
+            named_reach_policy(reference, cell, services)
+            if reference
+            else reach_policy_for(cell, services)
+        )
         return _replace_world(world_id, cell, None, None, pilot, services)
     if body.checkpoint is None:
-        policy = mover_for(cell, services)
+        policy = task_policy_for(cell, services)
     else:
         policy = services.policies.load(body.checkpoint)
-        require_mover(policy, cell, services)
+        require_task_policy(policy, cell, services)
     if body.sorting_policy is None:
-        sorter = sorter_for(cell, services)
+        sorter = sorting_policy_for(cell, services)
     else:
         sorter = services.sorters.load(body.sorting_policy)
-        require_sorter(sorter, cell)
+        require_sorting_policy(sorter, cell)
     return _replace_world(world_id, cell, policy, sorter, None, services)
 
 
