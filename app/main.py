@@ -109,9 +109,9 @@ class Service:
             store=store,
             supervisor=supervisor,
             checkpoints=names,
-            policies=PolicyRegistry(names, build_task_policy, DEFAULT_ALIAS),
-            sorters=PolicyRegistry(names, build_sorting_policy, SORTING_ALIASES[0]),
-            movers=PolicyRegistry(names, build_reach_policy, REACH_ALIAS),
+            task_policies=PolicyRegistry(names, build_task_policy, DEFAULT_ALIAS),
+            sorting_policies=PolicyRegistry(names, build_sorting_policy, SORTING_ALIASES[0]),
+            reach_policies=PolicyRegistry(names, build_reach_policy, REACH_ALIAS),
             cells=CellCatalog(store),
             recordings=RecordingCatalog(store, self._imports),
             start_world=start_world,
@@ -140,12 +140,12 @@ class Service:
             readiness.reason = "warming up: loading the shipped checkpoints"
             publish_shipped(self.parts.checkpoints)
             readiness.reason = "warming up: compiling the simulator's kernels"
-            policy = self.parts.policies.load(DEFAULT_ALIAS)
+            policy = self.parts.task_policies.load(DEFAULT_ALIAS)
             warm_up(load_cell(LIVE_CELL))
             warm_up_sorting()
             for name in SORTING_ALIASES:
-                warm_up_sorting(self.parts.sorters.load(name))
-            self.parts.movers.load(REACH_ALIAS)
+                warm_up_sorting(self.parts.sorting_policies.load(name))
+            self.parts.reach_policies.load(REACH_ALIAS)
             cell = LiveCell(load_cell(LIVE_CELL), policy, id=WORLD_ID)
             if self.parts.stopping.is_set():
                 return

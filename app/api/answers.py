@@ -1,7 +1,7 @@
-"""What every answer has, whichever layer gives it: the outermost ASGI layer.
+"""Outermost ASGI layer: completes every answer.
 
-Security headers; a ``Location`` below the root path; a problem where an error was not foreseen;
-and an answer to ``HEAD`` wherever ``GET`` has one, with the same headers and without a body.
+Adds security headers and the root path of ``Location``, turns an unexpected error into a
+problem, and answers ``HEAD`` with the headers of ``GET``, without a body.
 """
 
 import logging
@@ -21,7 +21,7 @@ PAGE_POLICY = (
     "script-src 'self'; connect-src 'self'; object-src 'none'; base-uri 'none'; "
     "form-action 'self'; frame-src 'self'; frame-ancestors 'self'"
 )
-HEADERS = {  # where an answer does not set its own
+HEADERS = {  # defaults
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "SAMEORIGIN",
     "Referrer-Policy": "same-origin",
@@ -36,14 +36,14 @@ class Answers:
     """ASGI layer around all others.
 
     Args:
-        app: What answers.
+        app: The inner layers.
     """
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Let a request through and complete its answer."""
+        """Pass a request on and complete its answer."""
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
@@ -56,7 +56,7 @@ class Answers:
                 await send(message)
                 if message["type"] == "http.response.start":
                     await send({"type": "http.response.body", "body": b""})
-                    answering.cancel()  # nothing more is wanted, not even of a stream
+                    answering.cancel()  # also ends a stream
                     await anyio.lowlevel.checkpoint()
 
             await self._answer({**scope, "method": "GET"}, receive, send_head)
@@ -82,5 +82,5 @@ class Answers:
             logger.exception("%s %s could not be answered", scope["method"], path)
             if started:
                 raise
-            detail = "an unforeseen error; the server's log has the trace"
+            detail = "an unexpected error; the server's log has the trace"
             await problem(500, detail, instance=path)(scope, receive, send_complete)

@@ -1,4 +1,4 @@
-"""The HTTP application: routers, problems, guard and pages around the parts of the service."""
+"""The HTTP application: routers, error handlers, access control and the page."""
 
 from collections.abc import Callable
 from contextlib import AbstractAsyncContextManager
@@ -31,23 +31,23 @@ from app.api.bodies import BodyRules
 from app.api.security import SESSION_PATH, Guard
 
 ICON_PATH = "/favicon.ico"
-"""Where browsers look for an icon of a page that names none; open, as the sign-in page is."""
+"""Default path of a page's icon; open, as the sign-in page is."""
 Lifespan = Callable[[FastAPI], AbstractAsyncContextManager[None]]
 
 DESCRIPTION = (
-    "A robot arm and a person share a work cell; Tandem chooses what the robot does next and "
-    "how it moves. SI units and radians; positions in the robot's base frame. Every error is a "
+    "Decisions of a robot arm that shares its work cell with people: its next task and its "
+    "motion. SI units and radians; positions in the robot's base frame. Every error is a "
     "problem document (RFC 9457)."
 )
 
 
 def build_app(*, lifespan: Lifespan, static: Path, token: str | None, version: str) -> FastAPI:
-    """Put the application together; its lifespan sets ``app.state.services``.
+    """Return the application; its lifespan sets ``app.state.services``.
 
     Args:
-        lifespan: Starts and stops the parts behind the routes.
+        lifespan: Starts and stops the parts of the service.
         static: Folder of the page.
-        token: The token that every request must prove; None on loopback.
+        token: The token required of every request; None on loopback.
         version: Version of the service.
     """
     app = FastAPI(
@@ -87,9 +87,9 @@ def build_app(*, lifespan: Lifespan, static: Path, token: str | None, version: s
 
 
 def add_page(app: FastAPI, static: Path) -> None:
-    """Serve the page at ``/`` and what it loads under ``/static``.
+    """Serve the page at ``/`` and its files under ``/static``.
 
-    Browsers keep both and ask each time whether they have changed (``ETag``, ``no-cache``).
+    Browsers cache both and revalidate them at each request (``ETag``, ``no-cache``).
     """
     files = StaticFiles(directory=static)
 

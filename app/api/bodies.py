@@ -1,8 +1,7 @@
-"""What a request may hold: an address and a body that no part of the service stumbles over.
+"""ASGI layer that checks address and body of a request before its route.
 
-Bodies are JSON, or a file where one is taken, uncompressed and not more than a limit. Wrong
-encoding, type and size, and text and integers that nothing takes (``texts.py``), are refused
-before a route sees them, as problems.
+A body is JSON or, on some routes, a file; uncompressed and of limited size. Wrong encoding,
+type or size and unstorable text or integers (``texts.py``) are answered by problems.
 """
 
 from collections.abc import Mapping
@@ -19,20 +18,20 @@ from app.api.validation import member
 MAX_BODY_BYTES = 1 << 20
 JSON_ONLY_PREFIX = "/v1/"
 FILE_TYPES = ("application/octet-stream", "text/plain", "text/csv")
-"""Content types of a file that is posted as it is; none is one, too."""
+"""Content types of an uploaded file; none is allowed, too."""
 FORM = "application/x-www-form-urlencoded"
 
 
 class BodyRules:
-    """ASGI layer that refuses requests that nothing behind it takes.
+    """ASGI layer that refuses unacceptable requests.
 
-    Bodies that are too large (413), compressed or of a wrong type (415); text and integers that
-    cannot be kept (422).
+    Status 413 for large bodies, 415 for compressed ones or a wrong type, 422 for unstorable
+    text and integers.
 
     Args:
-        app: What it protects.
-        max_bytes: Largest JSON body that is read.
-        files: Paths to which files are posted, each with its largest one [bytes].
+        app: The inner layers.
+        max_bytes: Largest JSON body.
+        files: Routes that take files, each with its largest file [bytes].
     """
 
     def __init__(
@@ -47,7 +46,7 @@ class BodyRules:
         self.files = dict(files or {})
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Let a request through with a counted body, or answer it here."""
+        """Pass a request on with a counted body, or answer it here."""
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
@@ -67,7 +66,7 @@ class BodyRules:
 def _refused_head(
     scope: Scope, headers: Headers, takes_file: bool, max_bytes: int
 ) -> ProblemResponse | None:
-    """Return the problem that address, size, encoding or type are, or None."""
+    """Return the problem of address, size, encoding or type; None where there is none."""
     path = path_of(scope)
     fault = fault_in_address(path, scope["query_string"])
     if fault is not None:
@@ -96,13 +95,13 @@ def _has_body(headers: Headers) -> bool:
 
 
 def _exceeds(length: str, most: int) -> bool:
-    """Return whether a number of any length is greater than another."""
+    """Return whether a decimal of any length is greater than a number."""
     digits = length.lstrip("0")
     return len(digits) > len(str(most)) or int(digits or "0") > most
 
 
 async def _whole(receive: Receive, max_bytes: int) -> tuple[Receive, bytes]:
-    """Read a body, one byte beyond the limit at most; return it, and what receives it again."""
+    """Read a body, at most one byte over the limit; return it and a replay of its messages."""
     messages: list[Message] = []
     body = b""
     while len(body) <= max_bytes:
@@ -120,7 +119,7 @@ async def _whole(receive: Receive, max_bytes: int) -> tuple[Receive, bytes]:
 
 
 def _refused_json(body: bytes, path: str, max_bytes: int) -> ProblemResponse | None:
-    """Return the problem that a body is, or None."""
+    """Return the problem of a body; None where there is none."""
     if len(body) > max_bytes:
         return _too_large(f"more than {max_bytes} bytes", max_bytes, path)
     fault = fault_in_json(body)

@@ -1,4 +1,4 @@
-"""The work cells the service knows, shipped ones and the user's own, as data."""
+"""Work cells as data, shipped ones and the user's own."""
 
 from typing import Any
 
@@ -18,7 +18,7 @@ BODY: dict[str, Any] = {
         "content": {"application/json": {"schema": cell_schema()}},
     }
 }
-"""The body is read as bytes, so that its faults can be told with their place in the text."""
+"""The body is read as bytes, so that its faults carry their place in the text."""
 
 
 @router.get("", summary="List the work cells")
@@ -35,7 +35,7 @@ def get_one(name: str, services: ServicesDep) -> CellPublic:
 
 @router.post("", status_code=201, summary="Add a work cell of your own", openapi_extra=BODY)
 async def create(request: Request, services: ServicesDep, response: Response) -> CellPublic:
-    """Check a cell and keep it; the same one again answers 200, faults are all in `errors`."""
+    """Check a cell and store it; the same cell again answers 200; `errors` has all faults."""
     content = await request.body()
     cell = await run_in_threadpool(read_cell, content)
     if not await run_in_threadpool(services.cells.add, cell):
@@ -46,7 +46,7 @@ async def create(request: Request, services: ServicesDep, response: Response) ->
 
 @router.delete("/{name}", status_code=204, summary="Remove a work cell of your own")
 def remove(name: str, services: ServicesDep) -> None:
-    """Forget a cell; policies that were trained in it carry a copy and stay."""
+    """Remove a cell; policies trained in it have their own copy."""
     _require_unused(services, name)
     services.cells.remove(name)
 
@@ -55,6 +55,6 @@ def _require_unused(services: Services, name: str) -> None:
     for world_id, world in services.worlds.items():
         if world.cell.name == name:
             raise Conflict(
-                f"cell {name!r} is shown by the live world {world_id!r}: let it show another "
-                "cell first"
+                f"cell {name!r} is shown by the live world {world_id!r}: show another cell "
+                "there first"
             )

@@ -1,4 +1,4 @@
-"""Trained policies: list them, read them, download them."""
+"""Trained policies: list, read, download."""
 
 from typing import Annotated, Any
 
@@ -20,7 +20,7 @@ def list_some(
     cursor: Annotated[str | None, Query(description="next_cursor of the page before")] = None,
     limit: Annotated[int, Query(description="length of the page, 1 to 200")] = 50,
 ) -> CheckpointList:
-    """Return one page, newest first; shipped ones are among them."""
+    """Return one page, newest first, shipped ones included."""
     page = list_checkpoints(services.store, job_id=job_id, cursor=cursor, limit=limit)
     return CheckpointList.from_domain(page)
 
@@ -32,9 +32,9 @@ def get_one(reference: str, services: ServicesDep) -> CheckpointPublic:
     return CheckpointPublic.from_domain(record)
 
 
-@router.get("/{reference}/manifest", summary="A checkpoint's manifest alone")
+@router.get("/{reference}/manifest", summary="A checkpoint's manifest")
 def get_manifest(reference: str, services: ServicesDep) -> dict[str, Any]:
-    """Return the manifest that belongs to the tensors."""
+    """Return the manifest of the tensors."""
     record, _ = read_sound(services.store, reference)
     return dict(record.manifest)
 

@@ -1,6 +1,6 @@
-"""Whether the service lives, and whether it can decide.
+"""Liveness and readiness, for monitors.
 
-Both routes are open, for monitors without the token; these learn nothing but that.
+Both routes are open; without the token they tell nothing else.
 """
 
 from typing import Any
@@ -12,36 +12,36 @@ from app.errors import NotReady
 
 router = APIRouter(tags=["health"])
 HEALTH, READY = PATHS = ("/healthz", "/readyz")
-"""Paths that are answered without the token."""
+"""Paths answered without the token."""
 
 
 @router.get(HEALTH, summary="200 when the service can decide")
 async def health(request: Request, services: ServicesDep) -> dict[str, Any]:
     """Answer 200 when the service can decide, a 503 problem otherwise.
 
-    With the token, where there is one, it names the live worlds, and the problem says why.
+    With the token, it names the live worlds, and the problem contains the reason.
     """
-    if _told_all(request, services):
+    if _is_trusted(request, services):
         return {"status": "ok", "worlds": list(services.worlds)}
     return {"status": "ok"}
 
 
-@router.get(READY, summary="503 while the kernels warm up")
+@router.get(READY, summary="503 while the kernels are compiled")
 async def ready(request: Request, services: ServicesDep) -> dict[str, Any]:
-    """Answer 200 once everything is warm, a 503 problem until then.
+    """Answer 200 once the kernels are compiled, a 503 problem until then.
 
-    With the token, where there is one, the problem says what is going on, and ``degraded``
-    names stored checkpoints that are damaged; all others decide.
+    With the token, the problem contains the present activity, and ``degraded`` names damaged
+    checkpoints; all others can be used.
     """
-    damaged = services.checkpoints.damaged if _told_all(request, services) else ()
+    damaged = services.checkpoints.damaged if _is_trusted(request, services) else ()
     return {"status": "degraded", "damaged": damaged} if damaged else {"status": "ready"}
 
 
-def _told_all(request: Request, services: Services) -> bool:
-    """Return whether the caller may learn details.
+def _is_trusted(request: Request, services: Services) -> bool:
+    """Return whether the caller may see details.
 
     Raises:
-        NotReady: The service cannot decide; says why to those who may.
+        NotReady: The service cannot decide; a trusted caller gets the reason.
     """
     trusted = bool(request.state.trusted)
     if not trusted and not services.readiness.ready:

@@ -1,9 +1,8 @@
-"""From the people of a request to the people a policy decides beside.
+"""Conversion of the people of a request to person states.
 
-Every description becomes a :class:`~app.sim.ports.Person`, with a note of how good it is. The
-policy sees a person as estimated for the present; a safety layer takes them as last observed,
-with the age of that observation, and assumes the worst of what was not seen since. Key-points
-take some milliseconds: away from the event loop.
+A policy uses a person's state estimated for the present; a safety layer uses the last
+observation and its age, with worst-case motion since. Key-points take some milliseconds and are
+not processed on the event loop.
 """
 
 import re
@@ -48,27 +47,27 @@ _PERSON = re.compile(r"^people\[(\d+)\]")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KnownPerson:
-    """One person of a request, as a policy and a safety layer take them."""
+    """One person of a request, for a policy and for a safety layer."""
 
     person: Person | None
-    """As the policy sees them at present; None: a tracker has never seen this person."""
+    """State at present, for the policy; None: a tracker has never seen this person."""
     observed: Person | None
-    """As a safety layer takes them: where they were last observed; None: nobody is there."""
+    """Last observed state, for a safety layer; None: no person."""
     age_s: float = 0.0
     """Age of that observation [s]."""
     source: Source
-    """What the request told."""
+    """Kind of description in the request."""
     speeds: Speeds
-    """Where the speeds are from."""
+    """Origin of the speeds."""
     estimate: PersonEstimate | None = None
-    """What key-points told; None where there were none."""
+    """Estimate from key-points; None without key-points."""
 
     def use(self, seen: bool, dropped: bool = False) -> PersonUse:
-        """Return what the answer says of this person.
+        """Return the answer's member about this person.
 
         Args:
-            seen: Whether the policy sees this person.
-            dropped: Whether the request holds more people than count, and not this one.
+            seen: Whether the policy uses this person.
+            dropped: Whether this person is left out because the request has too many.
         """
         use = PersonUse.from_domain(
             self.source, seen, self.speeds, self.person, self.observed, self.estimate
@@ -82,12 +81,12 @@ def known_people(
     """Return the people of a request.
 
     Args:
-        entries: As the request has them.
-        cell: The work cell it names.
-        trackers: Those that are listened to.
+        entries: Their descriptions.
+        cell: The work cell.
+        trackers: The open trackers.
 
     Raises:
-        InvalidInput: Somebody who cannot be, with the place in the request.
+        InvalidInput: An impossible state, with its place in the request.
     """
     return tuple(
         _known(entry, f"people[{i}].", cell, trackers) for i, entry in enumerate(entries)
@@ -95,15 +94,15 @@ def known_people(
 
 
 def nearest_places(people: Mapping[int, Person], cell: Cell, q: Vec) -> list[int]:
-    """Return the places of at most four people, those nearest to the robot, in order.
+    """Return the indices of at most four people, those nearest to the robot, ascending.
 
     Args:
-        people: People by their places in the request.
+        people: People by their index in the request.
         cell: The work cell.
         q: The robot's joint positions [rad], shape (6,).
 
     Raises:
-        InvalidInput: Of more than four, somebody who cannot be, with the place in the request.
+        InvalidInput: An impossible state among more than four, with its place.
     """
     if len(people) <= MAX_PEOPLE:
         return list(people)
@@ -112,7 +111,7 @@ def nearest_places(people: Mapping[int, Person], cell: Cell, q: Vec) -> list[int
     while len(near) < MAX_PEOPLE:
         places = list(left)
         nearest = nearest_index(arm, shared, q, list(left.values()))
-        assert nearest is not None  # somebody is left
+        assert nearest is not None  # there are more people than selected
         near.append(places[nearest])
         del left[places[nearest]]
     return sorted(near)
@@ -121,11 +120,11 @@ def nearest_places(people: Mapping[int, Person], cell: Cell, q: Vec) -> list[int
 def renumbered(
     outside: Sequence[OutsideField], places: Sequence[int]
 ) -> tuple[OutsideField, ...]:
-    """Return fields of a decision by the numbers that people have in the request.
+    """Return fields of a decision with the request's indices of people.
 
     Args:
-        outside: Fields; ``people[i]`` is the ``i``-th person whom the policy sees.
-        places: Place in the request of each person whom the policy sees.
+        outside: Fields; ``people[i]`` is the ``i``-th person used by the policy.
+        places: Index in the request of each person used by the policy.
     """
 
     def in_request(found: re.Match[str]) -> str:
@@ -138,7 +137,7 @@ def renumbered(
 
 
 def take_time(entries: Sequence[PersonInput]) -> bool:
-    """Return whether making persons of these takes more than a moment."""
+    """Whether the conversion of people takes milliseconds."""
     return any(isinstance(entry, KeypointsPerson | TrackedPerson) for entry in entries)
 
 
@@ -165,13 +164,12 @@ def _from_keypoints(entry: KeypointsPerson, place: str, cell: Cell) -> KnownPers
     speeds = entry.speeds()
     estimate = estimate_once(points, size, trust, speeds, place, cell.floor_z)
     person = person_from_estimate(estimate)
-    assert person is not None  # estimate_once always tells a cylinder
-    said: Speeds = "zero" if speeds is None else "given"
+    assert person is not None  # estimate_once always returns a cylinder
     return KnownPerson(
         person=person,
         observed=as_monitored(estimate) if estimate.held else person,
         source="keypoints",
-        speeds=said,
+        speeds="zero" if speeds is None else "given",
         estimate=estimate,
     )
 
@@ -185,13 +183,13 @@ def _from_tracker(
     try:
         session = trackers.get(entry.tracker)
     except NotFound:
-        rule = f"is no open tracker; one that nobody uses ends after {IDLE_S:g} s"
+        rule = f"is no open tracker; an unused one is deleted after {IDLE_S:g} s"
         raise refused("tracker", entry.tracker, rule) from None
     if session.cell != cell.name:
-        rule = f"must watch the cell {cell.name}, not {session.cell}"
+        rule = f"must be a tracker of the cell {cell.name}, not {session.cell}"
         raise refused("tracker", entry.tracker, rule)
     if entry.person >= session.n_people:
-        rule = f"must be less than {session.n_people}, the people this tracker follows"
+        rule = f"must be less than {session.n_people}, the tracker's number of people"
         raise refused("person", entry.person, rule)
     known, i = session.people(entry.t), entry.person
     estimate, last = known.estimates[i], known.observed[i]
@@ -209,7 +207,7 @@ def _from_tracker(
 
 
 def warm_up(cell: Cell) -> None:
-    """Compile what key-points and several people need, before the first request."""
+    """Compile the kernels for key-points and several people."""
     q = human.rest_posture(0.0, 1.5, -1.5)
     points = keypoints_of(q, cell.body, cell.floor_z)
     seen = person_from_estimate(

@@ -1,8 +1,10 @@
-"""The next piece of motion toward a goal, for other programs (thesis chapter 4, METHOD 2).
+"""Motion decisions: the next trajectory segment toward a goal (thesis chapter 4).
 
-``POST /v1/motion`` answers one state. The socket ``/v1/motion/stream`` takes the same requests
-as text messages, one after the other, and gives the same answers in their order: for loops at
-50 Hz. What cannot be answered is answered by a problem, and the socket lives on.
+``POST /v1/motion`` answers one state. The WebSocket ``/v1/motion/stream`` takes the same
+requests as text messages and answers them in order, for loops at 50 Hz. An error is answered by
+a problem, and the socket stays open.
+
+Source: docs/method.md 2.
 """
 
 import asyncio
@@ -40,21 +42,21 @@ logger = logging.getLogger(__name__)
 
 PATH = "/v1/motion"
 MAX_MESSAGE = 1 << 16
-"""Longest message taken on a socket [characters]."""
+"""Longest message on a socket [characters]."""
 MAX_STAMP, MAX_TIME = 64, 1e18
-"""Longest text and greatest number that a stamp in a problem may be."""
-LOOK_S = 0.2
-"""How often an idle socket looks whether the server stops [s]."""
+"""Longest text and greatest number of a stamp in a problem."""
+CHECK_S = 0.2
+"""Period at which an idle socket checks whether the server stops [s]."""
 
 router = APIRouter(prefix=PATH, tags=["deciding"])
 
 
 @router.post("", summary="Decide how the robot moves next")
 async def move(request: MotionRequest, services: ServicesDep) -> MotionAnswer:
-    """Return the next polynomial piece of every joint, the override and what set it.
+    """Return the next trajectory segment, the speed override and its reason.
 
-    Nothing is remembered between two calls: state, people and goal may change at any time. For
-    loops, `/v1/motion/stream` takes the same over a WebSocket.
+    Calls are independent: state, people and goal may change at any time. For loops,
+    `/v1/motion/stream` takes the same requests over a WebSocket.
     """
     return await answer(request, services)
 
@@ -63,45 +65,45 @@ async def answer(request: MotionRequest, services: Services) -> MotionAnswer:
     """Return the answer to one request.
 
     Raises:
-        ServiceError: There is none; says why.
+        ServiceError: The request cannot be answered.
     """
     services.readiness.require()
     cell = await known_cell(request.cell, services)
     decider = await _decider(request.checkpoint, services)
     require_cell(cell, decider.actor.cell, decider.actor.cell_sha256)
     decided = partial(decide, request, cell, decider, services.trackers)
-    # A decision without looking ahead takes less than a millisecond: right here then.
+    # Without a rollout a decision takes less than a millisecond, on the event loop.
     if request.ahead is not False or take_time(request.people):
         return await run_in_threadpool(decided)
     return decided()
 
 
 async def _decider(name: str | None, services: Services) -> MotionDecider:
-    """Return the policy that is named, or the shipped one.
+    """Return a reach policy by name, by default the shipped one.
 
     Raises:
-        InvalidInput: Nothing has that name.
-        CheckpointMismatch: It does not reach goals.
+        InvalidInput: No checkpoint has that name.
+        CheckpointMismatch: It is no reach policy.
     """
-    found = services.movers.loaded(name)
+    found = services.reach_policies.loaded(name)
     if found is None:
-        found = await run_in_threadpool(services.movers.load, name)
+        found = await run_in_threadpool(services.reach_policies.load, name)
     return found
 
 
 def decide(
     request: MotionRequest, cell: Cell, decider: MotionDecider, trackers: TrackerSessions
 ) -> MotionAnswer:
-    """Return the answer to one request by a policy of its cell.
+    """Return the answer to one request.
 
     Args:
         request: State, people and goal.
-        cell: The work cell it names.
+        cell: Its work cell.
         decider: The policy, trained in that cell.
-        trackers: Those that requests may name.
+        trackers: The open trackers.
 
     Raises:
-        ServiceError: There is none; says why.
+        ServiceError: The request cannot be answered.
     """
     people = known_people(request.people, cell, trackers)
     as_seen = all(one.observed is one.person for one in people)
@@ -135,26 +137,28 @@ def decide(
 
 @router.websocket("/stream")
 async def stream(client: WebSocket) -> None:
-    """Answer requests, one message each, until the caller leaves or the server stops."""
+    """Answer requests, one per message, until the socket closes or the server stops."""
     services = services_of(client)
     if not services.motion_streams.acquire(blocking=False):
-        await refuse(client, f"{MAX_STREAMS} sockets ask for motion already: close one of them")
+        await refuse(
+            client, f"{MAX_STREAMS} motion sockets are open already: close one of them"
+        )
         return
     try:
         await client.accept()
         await _serve(client, services)
     except WebSocketDisconnect:
-        logger.debug("a socket that asked for motion has left")
+        logger.debug("a motion socket was closed by its client")
     finally:
         services.motion_streams.release()
 
 
 async def _serve(client: WebSocket, services: Services) -> None:
-    """Take messages and answer them in their order."""
+    """Receive messages and answer them in order."""
     while not services.stopping.is_set():
         incoming = asyncio.ensure_future(client.receive())
         while not incoming.done() and not services.stopping.is_set():
-            await asyncio.wait((incoming,), timeout=LOOK_S)
+            await asyncio.wait((incoming,), timeout=CHECK_S)
         if not incoming.done():
             incoming.cancel()
             break
@@ -169,8 +173,8 @@ async def reply(message: Mapping[str, Any], services: Services) -> str:
     """Return the answer to one message as JSON: a :class:`MotionAnswer` or a problem.
 
     Args:
-        message: As ASGI hands it over.
-        services: The parts behind the routes.
+        message: The ASGI message.
+        services: The parts of the service.
     """
     path, text = f"{PATH}/stream", message.get("text")
     stamp: dict[str, object] = {}
@@ -198,14 +202,14 @@ async def reply(message: Mapping[str, Any], services: Services) -> str:
         refused = service_problem(error, path)
     except Exception:
         logger.exception("a message on %s could not be answered", path)
-        detail = "an unforeseen error; the server's log has the trace"
+        detail = "an unexpected error; the server's log has the trace"
         refused = problem(500, detail, instance=path)
     content: dict[str, object] = json.loads(bytes(refused.body))
     return json.dumps(content | stamp)
 
 
 def _stamp_of(body: object) -> dict[str, object]:
-    """Return the caller's stamp where it is one, so that a problem can be told apart."""
+    """Return the stamp of a request, which identifies a problem on a socket."""
     stamp = body.get("stamp") if isinstance(body, dict) else None
     is_text = isinstance(stamp, str) and len(stamp) <= MAX_STAMP
     is_time = isinstance(stamp, int | float) and -MAX_TIME < stamp < MAX_TIME

@@ -1,4 +1,4 @@
-"""The presets a training can start from, with the limits of every field."""
+"""Presets of training jobs, with the limits of every field."""
 
 from fastapi import APIRouter
 

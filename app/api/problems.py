@@ -1,7 +1,7 @@
-"""Every error as a problem document (RFC 9457, ``application/problem+json``).
+"""Errors as problem documents (RFC 9457, ``application/problem+json``).
 
-Routes contain no ``try``: what they raise comes here. Members beyond the standard's five are
-the error's data; bad input always carries ``field``, ``value``, ``rule`` and ``choices``.
+Routes contain no ``try``; exception handlers here answer their errors. Members beyond the
+standard's five are the error's data; bad input has ``field``, ``value``, ``rule``, ``choices``.
 """
 
 import http
@@ -67,12 +67,12 @@ class ProblemResponse(JSONResponse):
     media_type = MEDIA_TYPE
 
     def render(self, content: object) -> bytes:
-        """Write JSON; half a surrogate pair that a caller sent is escaped again."""
+        """Return JSON; a lone surrogate of the request is escaped again."""
         return _JSON.encode(content).encode("utf-8", "backslashreplace")
 
 
 class Problem(BaseModel):
-    """A problem document, as the API description shows it (RFC 9457)."""
+    """A problem document (RFC 9457), for the API description."""
 
     type: str
     title: str
@@ -94,7 +94,7 @@ def problem(
     data: Mapping[str, object] | None = None,
     headers: Mapping[str, str] | None = None,
 ) -> ProblemResponse:
-    """Build one problem document.
+    """Return a problem document.
 
     Args:
         status: HTTP status.
@@ -125,7 +125,7 @@ def member_problem(
     instance: str,
     headers: Mapping[str, str] | None = None,
 ) -> ProblemResponse:
-    """Build the problem of one faulty member.
+    """Return the problem of one faulty member.
 
     Args:
         status: HTTP status.
@@ -139,7 +139,7 @@ def member_problem(
 
 
 def service_problem(error: ServiceError, instance: str) -> ProblemResponse:
-    """Turn an error of the tree into its problem."""
+    """Return the problem of an error."""
     status, kind = 500, "service-error"
     for error_type, its_status, its_kind in STATUS:
         if isinstance(error, error_type):
@@ -157,7 +157,7 @@ def service_problem(error: ServiceError, instance: str) -> ProblemResponse:
 
 
 async def on_service_error(request: Request, error: Exception) -> ProblemResponse:
-    """Answer an error that Tandem raised on purpose."""
+    """Answer an error of Tandem."""
     assert isinstance(error, ServiceError)
     answer = service_problem(error, request.url.path)
     if answer.status_code >= 500 and not isinstance(error, NotReady):
@@ -166,7 +166,7 @@ async def on_service_error(request: Request, error: Exception) -> ProblemRespons
 
 
 async def on_validation_error(request: Request, error: Exception) -> ProblemResponse:
-    """Answer input that does not fit its schema."""
+    """Answer a request that does not match its schema."""
     assert isinstance(error, RequestValidationError)
     return validation_problem(error.errors(), body_models(request), request.url.path)
 
@@ -174,11 +174,11 @@ async def on_validation_error(request: Request, error: Exception) -> ProblemResp
 def validation_problem(
     errors: Sequence[dict[str, Any]], models: Sequence[type[BaseModel]], instance: str
 ) -> ProblemResponse:
-    """Turn what a schema refused into its problem.
+    """Return the problem of schema errors.
 
     Args:
-        errors: Pydantic's, with locations that begin with ``body``; at least one.
-        models: The models that the body may have.
+        errors: Pydantic's errors, with locations that begin with ``body``; at least one.
+        models: The possible models of the body.
         instance: Path of the request.
     """
     cut = [without_tag(one, models) for one in errors[:MAX_LISTED_ERRORS]]
@@ -196,11 +196,11 @@ def validation_problem(
 
 
 async def on_http_error(request: Request, error: Exception) -> ProblemResponse:
-    """Answer what the framework refuses: unknown path, wrong method, too large a body."""
+    """Answer an error of the framework: unknown path, wrong method, large body."""
     assert isinstance(error, HTTPException)
     detail = {
-        404: f"nothing is at {request.url.path}; /docs lists what is",
-        405: f"{request.method} is not answered at {request.url.path}",
+        404: f"there is no route {request.url.path}; /docs lists all",
+        405: f"{request.url.path} has no method {request.method}",
     }.get(error.status_code, str(error.detail))
     data: dict[str, object] = {}
     headers = dict(error.headers or {})
@@ -218,7 +218,7 @@ async def on_http_error(request: Request, error: Exception) -> ProblemResponse:
 
 
 def _methods_at(request: Request) -> list[str]:
-    """List the methods that the path of a request answers, over all routes."""
+    """Return the methods of a path over all routes."""
     routes = request.app.routes
     return [
         method
@@ -232,12 +232,12 @@ def _methods_at(request: Request) -> list[str]:
 
 
 async def on_disconnect(request: Request, _error: Exception) -> ProblemResponse:
-    """End a request whose client left, or was disconnected, before its body was complete."""
+    """Answer a request that ended before its body was complete."""
     return problem(400, "the body of the request is incomplete", instance=request.url.path)
 
 
 def install(app: FastAPI) -> None:
-    """Make ``app`` answer every error that is foreseen with a problem; see ``answers.py``."""
+    """Register the handlers; unexpected errors are answered by ``answers.py``."""
     app.add_exception_handler(ServiceError, on_service_error)
     app.add_exception_handler(RequestValidationError, on_validation_error)
     app.add_exception_handler(HTTPException, on_http_error)

@@ -1,8 +1,7 @@
-"""``/docs``: the API's description as one plain page, rendered here, with no outside scripts.
+"""``/docs``: the API description as one static page without external scripts.
 
-Swagger's usual page loads itself from a content delivery network: blank on a machine without
-internet, and barred by the security headers. The full machine-readable description stays at
-``/openapi.json``.
+Swagger's page loads its scripts from a content delivery network, which needs internet access
+and is forbidden by the security headers. ``/openapi.json`` is the machine-readable description.
 """
 
 from collections.abc import Iterator, Mapping
@@ -46,7 +45,7 @@ async def docs(request: Request) -> HTMLResponse:
 
 
 def render(api: Node) -> str:
-    """Write an OpenAPI description as HTML."""
+    """Return an OpenAPI description as HTML."""
     groups: dict[str, list[str]] = {}
     for path, methods in api["paths"].items():
         for method, operation in methods.items():
@@ -92,7 +91,7 @@ def _operation(api: Node, method: str, path: str, operation: Node) -> str:
 
 
 def _fields(api: Node, schema: Node, prefix: str = "", depth: int = 0) -> Iterator[str]:
-    """Write one row per field of a schema, nested ones with their path."""
+    """Yield one row per field of a schema, nested ones with their path."""
     schema = _resolved(api, schema)
     for variant in schema.get("oneOf", []):
         yield from _fields(api, variant, prefix, depth)
@@ -106,7 +105,7 @@ def _fields(api: Node, schema: Node, prefix: str = "", depth: int = 0) -> Iterat
 
 
 def _inside(api: Node, member: Node) -> Node:
-    """Return the object that a member holds: itself, its items, or its non-null choice."""
+    """Return the object schema of a member: itself, its items, or its non-null choice."""
     for choice in member.get("anyOf", []):
         if choice.get("type") != "null":
             member = choice

@@ -1,8 +1,7 @@
-"""Checkpoints as objects that decide, kept once loaded.
+"""Cache of loaded policies, and names of stored checkpoints.
 
-A registry holds objects of one kind: those that choose tasks (``ports.TaskPolicy``) and those
-that sort (``ports.SortingValues``) each have their own, over the same names. Live worlds and
-the routes that decide get the very same objects from here, so that one state gives one choice.
+Task selection, sorting and reaching have a registry each, over the same checkpoint names. Live
+worlds and routes share the loaded objects, so that equal states give equal decisions.
 """
 
 import logging
@@ -20,53 +19,53 @@ from jobs.checkpoints import read_sound
 logger = logging.getLogger(__name__)
 
 MAX_POLICIES = 32
-"""Most objects that a registry keeps."""
+"""Largest number of policies in a registry."""
 DEFAULT_ALIAS = "pick"
-"""The policy that chooses tasks where none is named."""
+"""Default policy for task selection."""
 SORTING_ALIASES = ("sorting-e0", "sorting-e1")
-"""The shipped policies that sort; each goes by the name of its work cell."""
+"""Shipped policies for sorting; each has the name of its work cell."""
 REACH_ALIAS = "reach"
-"""The policy that moves to goals where none is named; it may not be shipped yet."""
+"""Default policy for reaching."""
 
 
 class Loaded(Protocol):
-    """What a registry holds."""
+    """A loaded policy."""
 
     @property
     def checkpoint(self) -> str:
-        """SHA-256 of the checkpoint it was made of."""
+        """SHA-256 of its checkpoint."""
 
 
 P = TypeVar("P", bound=Loaded)
 Build = Callable[[Mapping[str, Any], bytes], P]
-"""Makes an object that decides from a manifest and safetensors bytes."""
+"""Makes a policy from a manifest and safetensors bytes."""
 
 
 class CheckpointNames:
     """The aliases of stored checkpoints, in memory; safe to use from any thread.
 
     Args:
-        store: Where checkpoints are kept.
+        store: The database.
     """
 
     def __init__(self, store: Store) -> None:
         self.store = store
-        """Where checkpoints are kept."""
+        """The database."""
         self._lock = threading.Lock()
         self._aliases: dict[str, str] = list_aliases(store)
         self._damaged: dict[str, str] = {}
 
     def publish(self, alias: str, checkpoint: NewCheckpoint) -> None:
-        """Store a checkpoint that came with the service and point its alias to it."""
+        """Store a shipped checkpoint under its alias."""
         put_checkpoint(self.store, checkpoint)
         self.point(alias, checkpoint.sha256)
 
     def point(self, alias: str, sha256: str) -> None:
-        """Let an alias name another checkpoint from now on.
+        """Set the checkpoint of an alias.
 
         Raises:
             NotFound: There is no such checkpoint.
-            InvalidInput: The alias is no name.
+            InvalidInput: The alias is not a valid name.
         """
         if self._aliases.get(alias) != sha256:
             set_alias(self.store, alias, sha256)
@@ -75,11 +74,11 @@ class CheckpointNames:
 
     @property
     def aliases(self) -> Mapping[str, str]:
-        """The SHA-256 behind every alias."""
+        """SHA-256 of each alias."""
         return self._aliases
 
     def read(self, name: str) -> tuple[CheckpointRecord, bytes]:
-        """Return a checkpoint that a caller named, with its tensors.
+        """Return a checkpoint with its tensors.
 
         Raises:
             InvalidInput: Nothing has that name.
@@ -104,17 +103,17 @@ class CheckpointNames:
 
     @property
     def damaged(self) -> tuple[str, ...]:
-        """Names of the damaged checkpoints that were met."""
+        """Names of the checkpoints found damaged."""
         return tuple(sorted(self._damaged.values()))
 
 
 class PolicyRegistry(Generic[P]):
-    """The policies of one kind that are loaded; safe to use from any thread.
+    """Loaded policies of one kind; safe to use from any thread.
 
     Args:
         names: The stored checkpoints.
         build: Makes a policy from a manifest and safetensors bytes; refuses other kinds.
-        default: Alias of the policy that is meant where none is named.
+        default: Alias of the default policy.
     """
 
     def __init__(self, names: CheckpointNames, build: Build[P], default: str) -> None:
@@ -125,7 +124,7 @@ class PolicyRegistry(Generic[P]):
         self._policies: OrderedDict[str, P] = OrderedDict()
 
     def loaded(self, reference: str | None) -> P | None:
-        """Return a policy by SHA-256 or alias if it is in memory; never waits for a disk."""
+        """Return a policy by SHA-256 or alias if it is in memory, without disk access."""
         sha256 = self._names.aliases.get(reference or self._default, reference)
         with self._lock:
             policy = self._policies.get(sha256 or "")
@@ -134,7 +133,7 @@ class PolicyRegistry(Generic[P]):
             return policy
 
     def load(self, reference: str | None) -> P:
-        """Return a policy by SHA-256 or alias, reading it from the store if need be.
+        """Return a policy by SHA-256 or alias, from the store if it is not in memory.
 
         Args:
             reference: SHA-256 or alias; the default policy if None.

@@ -1,10 +1,9 @@
-"""Who may talk to the service: one ASGI layer around every route, mount and socket.
+"""Access control: one ASGI layer around every route, mount and socket.
 
-On loopback no token is asked for, but the ``Host`` must be a loopback name (a page elsewhere
-cannot rebind its own name to this machine) and an ``Origin``, where a browser sends one, must
-be this very site. With a token every request needs it: as ``Authorization: Bearer``, or, for
-browsers, whose sockets and event streams cannot carry that header, as the cookie that
-``POST /session`` gives in exchange for it.
+On loopback no token is required, but ``Host`` must be a loopback name (against DNS rebinding)
+and an ``Origin`` must be this site. With a token every request must carry it: as
+``Authorization: Bearer`` or as the cookie of ``POST /session``, for browsers, whose sockets and
+event streams cannot set that header.
 """
 
 import hashlib
@@ -33,18 +32,18 @@ def _sign_in_page(root_path: str) -> str:
 
 
 def path_of(scope: Scope) -> str:
-    """Return the path of a request below the service's root path, as routes state it."""
+    """Return the path of a request below the service's root path."""
     path: str = scope["path"]
     return path.removeprefix(scope.get("root_path", ""))
 
 
 def session_value(token: str) -> str:
-    """Return what the session cookie holds: proof of the token, not the token."""
+    """Return the content of the session cookie: a proof of the token, not the token."""
     return hmac.new(token.encode(), b"tandem session", hashlib.sha256).hexdigest()
 
 
 def is_loopback_name(host: str | None) -> bool:
-    """Whether a host name, without its port, can only mean this machine."""
+    """Whether a host name, without its port, always means this machine."""
     if host == "localhost":
         return True
     try:
@@ -57,10 +56,10 @@ class Guard:
     """ASGI layer that checks Host, Origin and token.
 
     Args:
-        app: What it protects.
+        app: The inner layers.
         token: The token, or None on loopback.
-        open_paths: Paths answered without the token (health checks, sign-in);
-            ``request.state.trusted`` tells them whether it was proven.
+        open_paths: Paths answered without the token (health checks, sign-in); they read
+            ``request.state.trusted``.
     """
 
     def __init__(self, app: ASGIApp, *, token: str | None, open_paths: Iterable[str]) -> None:
@@ -69,7 +68,7 @@ class Guard:
         self.open_paths = frozenset(open_paths)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Let a request through, or answer it here."""
+        """Pass a request on, or answer it here."""
         if scope["type"] not in ("http", "websocket"):
             await self.app(scope, receive, send)
             return
@@ -93,7 +92,7 @@ class Guard:
     def refusal(
         self, scope: Scope, headers: Headers
     ) -> tuple[int, str, str, dict[str, object]] | None:
-        """Say why a request is refused (status, kind, detail, data), or None."""
+        """Return status, kind, detail and data of a refusal, or None."""
         host = headers.get("host", "")
         if self.token is None and not is_loopback_name(_hostname(host)):
             rule = "must be a loopback name: this server is open to this machine only"

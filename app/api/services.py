@@ -1,4 +1,4 @@
-"""What the routes work with, handed over by ``app.main`` when it wires the service."""
+"""Parts of the service that routes use; ``app.main`` creates them."""
 
 import threading
 from collections.abc import Callable
@@ -24,15 +24,15 @@ from jobs.recording_catalog import RecordingCatalog
 from jobs.supervisor import Supervisor
 
 MAX_UPLOADS = 4
-"""Most files that are taken in at once; each is held in memory."""
+"""Largest number of uploads at once; each file is held in memory."""
 MAX_STREAMS = 16
-"""Most sockets that ask for recording at once."""
+"""Largest number of open motion sockets."""
 MAX_VIEWERS = 16
-"""Most 3D viewers that are open at once."""
+"""Largest number of open 3D viewers."""
 
 
 class LiveWorld(Protocol):
-    """One live world and its viewer; ``web.viewer.loop.LiveCell`` is one."""
+    """A live world and its viewer; implemented by ``web.viewer.loop.LiveCell``."""
 
     @property
     def handle(self) -> WorldHandle:
@@ -40,39 +40,39 @@ class LiveWorld(Protocol):
 
     @property
     def cell(self) -> Cell:
-        """The work cell it shows."""
+        """Its work cell."""
 
     @property
     def viewer_address(self) -> Path:
         """Unix socket of its 3D viewer."""
 
     def stop(self) -> None:
-        """End world and viewer."""
+        """Stop the world and its viewer."""
 
 
 StartWorld = Callable[
     [str, Cell, TaskPolicy | None, SortingValues | None, LiveReachPolicy | None], LiveWorld
 ]
-"""Starts a world of an id, in a cell, with what chooses tasks, sorts and reaches there; the
+"""Starts a world: its id, cell, and policies for task selection, sorting and reaching. The
 caller stops it."""
 
 
 @dataclass(slots=True)
 class Readiness:
-    """How far the start has come; written by one thread, read by all."""
+    """State of the start; written by one thread, read by all."""
 
     ready: bool = False
     """Whether the service can decide."""
     reason: str = "starting"
-    """What it is doing, or why it cannot, for people."""
+    """Present activity, or the reason why it cannot decide, as text."""
     failed: bool = False
-    """Whether the start broke off."""
+    """Whether the start failed."""
 
     def require(self) -> None:
-        """Raise unless the service can decide.
+        """Check that the service can decide.
 
         Raises:
-            NotReady: It cannot; says why.
+            NotReady: It cannot; contains the reason.
         """
         if not self.ready:
             raise NotReady(self.reason)
@@ -80,54 +80,54 @@ class Readiness:
 
 @dataclass(slots=True, kw_only=True)
 class Services:
-    """The parts behind the routes."""
+    """Parts of the service that routes use."""
 
     store: Store
     """The database."""
     supervisor: Supervisor
-    """Runs the jobs; is woken when one is posted."""
+    """Runs the jobs; woken when one is posted."""
     checkpoints: CheckpointNames
-    """The stored checkpoints by name."""
-    policies: PolicyRegistry[TaskPolicy]
-    """Those that choose tasks, as objects that decide."""
-    sorters: PolicyRegistry[SortingValues]
-    """Those that sort."""
-    movers: PolicyRegistry[MotionDecider]
-    """Those that move the arm to goals."""
+    """Stored checkpoints by name."""
+    task_policies: PolicyRegistry[TaskPolicy]
+    """Loaded policies for task selection."""
+    sorting_policies: PolicyRegistry[SortingValues]
+    """Loaded policies for sorting."""
+    reach_policies: PolicyRegistry[MotionDecider]
+    """Loaded policies for reaching."""
     cells: CellCatalog
-    """The work cells by name."""
+    """Work cells by name."""
     recordings: RecordingCatalog
-    """The imported recorded human motion by name."""
+    """Recordings of human motion by name."""
     start_world: StartWorld
     """Starts a live world."""
     worlds: dict[str, LiveWorld] = field(default_factory=dict)
-    """The live worlds by id; empty until the kernels are warm."""
+    """Live worlds by id; empty until the kernels are compiled."""
     trackers: TrackerSessions = field(default_factory=TrackerSessions)
-    """The trackers that are listened to."""
+    """Open trackers."""
     readiness: Readiness = field(default_factory=Readiness)
     """Whether the service can decide."""
     replacing: threading.Lock = field(default_factory=threading.Lock)
-    """Held by whoever starts a world anew, or stops them all."""
+    """Held while a world is replaced, or all are stopped."""
     uploads: threading.BoundedSemaphore = field(
         default_factory=lambda: threading.BoundedSemaphore(MAX_UPLOADS)
     )
-    """Held by whoever posts a file."""
+    """Held during an upload."""
     motion_streams: threading.BoundedSemaphore = field(
         default_factory=lambda: threading.BoundedSemaphore(MAX_STREAMS)
     )
-    """Held by every open socket that asks for recording."""
+    """Held by every open motion socket."""
     viewers: threading.BoundedSemaphore = field(
         default_factory=lambda: threading.BoundedSemaphore(MAX_VIEWERS)
     )
     """Held by every open viewer."""
     stopping: threading.Event = field(default_factory=threading.Event)
-    """Set when the server goes down: open streams end."""
+    """Set when the server stops; open streams end."""
 
     def world(self, world_id: str) -> LiveWorld:
         """Return a live world.
 
         Raises:
-            NotReady: Worlds start once the kernels are warm.
+            NotReady: The kernels are not compiled yet.
             NotFound: There is no such world.
         """
         found = self.worlds.get(world_id)
@@ -138,7 +138,7 @@ class Services:
 
 
 def services_of(connection: HTTPConnection) -> Services:
-    """Return the parts behind the app that answers ``connection``."""
+    """Return the services of the application that handles a connection."""
     services: Services = connection.app.state.services
     return services
 

@@ -1,4 +1,4 @@
-"""Signing in with a browser: the token is exchanged for a session cookie."""
+"""Sign-in of a browser: exchanges the token for a session cookie."""
 
 import hmac
 import json

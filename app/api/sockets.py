@@ -1,4 +1,4 @@
-"""Refusing a WebSocket so that its caller learns why."""
+"""Refusal of a WebSocket with a reason."""
 
 from starlette.websockets import WebSocket
 
@@ -7,7 +7,7 @@ TRY_AGAIN = 1013
 
 
 async def refuse(client: WebSocket, reason: str) -> None:
-    """Open a socket only to close it: a browser learns the reason of no other refusal.
+    """Open and close a socket; a browser sees the reason of no other refusal.
 
     Args:
         client: Socket that is not open yet.

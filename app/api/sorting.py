@@ -1,4 +1,7 @@
-"""The next sorting move, for other programs (thesis chapter 3, METHOD 1)."""
+"""Sorting decisions: the next move of a sorting task (thesis chapter 3).
+
+Source: docs/method.md 1.
+"""
 
 from functools import partial
 
@@ -22,13 +25,12 @@ router = APIRouter(prefix="/v1/sorting", tags=["deciding"])
 
 @router.post("", summary="Choose the next move of a sorting task")
 async def next_move(request: SortingRequest, services: ServicesDep) -> SortingAnswer:
-    """Return the next move, who chose it and why, and every valid move with its value.
+    """Return the next move with its reason, and every valid move with its value.
 
-    Nothing is remembered between two calls: goal and objects may change at any time. Whoever
-    carries the moves out hands `watch` back, so that the exact planner can take over from a
-    policy that goes in circles.
+    Calls are independent: goal and objects may change at any time. A caller that returns
+    `watch` with the next request lets the exact planner replace a policy that repeats moves.
     """
-    # A policy decides in less than a millisecond: right here, as for a task selection.
+    # A policy decides in less than a millisecond, on the event loop.
     services.readiness.require()
     names, own = await _task_of(request, services)
     state = request.to_domain(names, own)
@@ -48,7 +50,7 @@ async def next_move(request: SortingRequest, services: ServicesDep) -> SortingAn
 
 
 async def _task_of(request: SortingRequest, services: Services) -> tuple[SortingNames, Vec]:
-    """Return the words of the task that a request names, and its failure probabilities."""
+    """Return the names of a request's task, and its failure probabilities."""
     layout = request.layout
     if (request.cell is None) == (layout is None):
         rule = "must be given where `layout` is not, and only there"
@@ -62,18 +64,18 @@ async def _task_of(request: SortingRequest, services: Services) -> tuple[Sorting
 
 
 async def _policy_of(request: SortingRequest, services: Services) -> SortingValues | None:
-    """Return the policy that is named, or shipped for the cell; None where the planner decides.
+    """Return a policy by name, by default the cell's shipped one; None for the planner.
 
     Raises:
-        InvalidInput: Nothing has that name.
-        CheckpointMismatch: It does not sort.
+        InvalidInput: No checkpoint has that name.
+        CheckpointMismatch: It is no sorting policy.
     """
     name = request.checkpoint
     if name is None and request.cell in SORTING_ALIASES:
         name = request.cell if request.cell in services.checkpoints.aliases else None
     if name is None or request.decider == "planner":
         return None
-    policy = services.sorters.loaded(name)
+    policy = services.sorting_policies.loaded(name)
     if policy is None:
-        policy = await run_in_threadpool(services.sorters.load, name)
+        policy = await run_in_threadpool(services.sorting_policies.load, name)
     return policy

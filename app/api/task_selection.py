@@ -1,4 +1,7 @@
-"""The critic's choice among tasks, for other programs (thesis chapter 5, METHOD 3.1)."""
+"""Task selection by the critic's values (thesis chapter 5).
+
+Source: docs/method.md 3.1.
+"""
 
 from dataclasses import replace
 from functools import partial
@@ -14,22 +17,21 @@ from app.errors import InvalidInput, NotFound
 from app.sim.cells.cell import Cell, cell_names
 
 MAX_INLINE_CANDIDATES = 32
-"""More than this many are decided on a thread, so that streams and other callers go on."""
+"""Larger requests are processed on a thread, so that the event loop is not blocked."""
 
 router = APIRouter(prefix="/v1/task-selection", tags=["deciding"])
 
 
 @router.post("", summary="Choose what the robot does next")
 async def choose(request: TaskSelectionRequest, services: ServicesDep) -> TaskSelection:
-    """Return the chosen candidate, every candidate's value and what the policy would do."""
-    # A few candidates beside people in joint angles take about a millisecond: right here,
-    # since handing them to a thread costs more than it saves.
+    """Return the selected candidate, every candidate's value and the policy's action."""
+    # A few candidates take about a millisecond, less than a change of thread.
     services.readiness.require()
     cell = await known_cell(request.cell, services)
     q, qd, candidates = request.to_domain()
-    policy = services.policies.loaded(request.checkpoint)
+    policy = services.task_policies.loaded(request.checkpoint)
     if policy is None:
-        policy = await run_in_threadpool(services.policies.load, request.checkpoint)
+        policy = await run_in_threadpool(services.task_policies.load, request.checkpoint)
     require_task_policy(policy, cell, services)
     decide = partial(
         policy.decide,
@@ -62,7 +64,7 @@ async def choose(request: TaskSelectionRequest, services: ServicesDep) -> TaskSe
 
 
 async def known_cell(name: str, services: Services) -> Cell:
-    """Return the cell that a request names; a shipped one without waiting for the disk.
+    """Return a cell by name; a shipped one without disk access.
 
     Raises:
         InvalidInput: No cell has that name.

@@ -1,7 +1,7 @@
-"""What no part of the service takes, whichever route it is sent to, found before any sees it.
+"""Detection of JSON that no route accepts.
 
-JSON that is not UTF-8 or nested too deeply; characters that cannot be stored or sent on (NUL,
-lone surrogates); integers that no column of the database holds.
+JSON that is not UTF-8 or nested too deeply; characters that cannot be stored or sent (NUL, lone
+surrogates); integers beyond the database's range.
 """
 
 import json
@@ -15,21 +15,21 @@ from app.api.validation import Member, dotted, member, shown
 from app.store.cursors import MAX_INTEGER
 
 MAX_DEPTH = 64
-"""How deeply lists and objects of a body may be nested."""
+"""Largest depth of nested lists and objects in a body."""
 _TEXT_RULE = "must hold neither NUL nor half of a surrogate pair"
 _WRONG = re.compile("[\0\ud800-\udfff]")
-# Only bodies that hold one of these are read a second time.
+# Only bodies with one of these are parsed a second time.
 _SUSPECT = re.compile(rb"\\u(?:d[89a-f]|0000)|[0-9]{19}", re.IGNORECASE)
-# An unterminated string ends with the body: no text is looked at twice.
+# An unterminated string ends with the body, so that matching takes linear time.
 _STRING = re.compile(rb'"(?:[^"\\]++|\\.)*+(?:"|\\?\Z)', re.DOTALL)
 _STEPS = bytes.maketrans(b"[{]}", b"\x01\x01\xff\xff")
 _OTHERS = bytes(set(range(256)) - set(b"[{]}"))
 
 
 def fault_in_json(body: bytes) -> Member | None:
-    """Return field, value, rule and choices of what is wrong with a JSON body, or None.
+    """Return field, value, rule and choices of a fault in a JSON body, or None.
 
-    Text that is no JSON at all is left to the parser.
+    Invalid JSON is left to the parser.
 
     Args:
         body: The whole body.
@@ -53,7 +53,7 @@ def fault_in_json(body: bytes) -> Member | None:
 
 
 def _depth(body: bytes) -> int:
-    """Return how deeply the lists and objects of a text are nested."""
+    """Return the depth of nested lists and objects in a text."""
     if body.count(b"[") + body.count(b"{") <= MAX_DEPTH:
         return 0
     steps = _STRING.sub(b"", body).translate(_STEPS, _OTHERS)
@@ -61,7 +61,7 @@ def _depth(body: bytes) -> int:
 
 
 def _faults(value: object, place: Sequence[str | int]) -> Iterator[Member]:
-    """Yield what is wrong with the texts and integers of a JSON value."""
+    """Yield the faults of texts and integers in a JSON value."""
     if isinstance(value, str):
         if _WRONG.search(value):
             yield member(_field(place), shown(value), _TEXT_RULE)
@@ -83,11 +83,11 @@ def _field(place: Sequence[str | int]) -> str:
 
 
 def fault_in_address(path: str, query: bytes) -> Member | None:
-    """Return field, value, rule and choices of what is wrong with an address, or None.
+    """Return field, value, rule and choices of a fault in an address, or None.
 
     Args:
         path: Its path, decoded.
-        query: Its query as it was sent.
+        query: Its query, encoded.
     """
     if _WRONG.search(path):
         return member("path", shown(path), _TEXT_RULE)

@@ -1,12 +1,11 @@
-"""Sessions of trackers: the estimators of their people, kept between frames.
+"""Sessions of trackers: the estimators of people, kept between frames.
 
-A session is opened, fed frame by frame and closed; an unused one ends by itself. Their number
-is limited. A session's estimates are made under its own lock, so that frames of one camera come
-in order and different cameras do not wait for each other.
+The number of sessions is limited, and an unused one is deleted. Each session has its own lock,
+so that the frames of one camera are in order and cameras do not wait for each other.
 
-The age of what a tracker reports counts from the arrival of its newest frame
-(:mod:`app.sim.perception.stamp_timeline`), on a clock that goes on while the machine is
-suspended.
+The age of a tracker's observations counts from the arrival of its newest frame
+(:mod:`app.sim.perception.stamp_timeline`), on a clock that includes the time of a suspended
+machine.
 """
 
 import secrets
@@ -22,16 +21,15 @@ from app.sim.perception.person_estimator import Flag, PersonEstimate
 from app.sim.perception.stamp_timeline import StampTimeline
 
 MAX_SESSIONS = 32
-"""Most trackers at once."""
+"""Largest number of trackers."""
 IDLE_S = 300.0
-"""Time after which a tracker that nobody used ends [s]."""
+"""Time after which an unused tracker is deleted [s]."""
 
 
 def service_clock() -> float:
     """Return the time of the service's clock [s].
 
-    It never runs backwards, and on Linux it counts the time for which the machine was
-    suspended: people have moved on meanwhile.
+    It is monotonic and, on Linux, includes the time for which the machine was suspended.
     """
     if hasattr(time, "CLOCK_BOOTTIME"):
         return time.clock_gettime(time.CLOCK_BOOTTIME)
@@ -40,32 +38,32 @@ def service_clock() -> float:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrackedPeople:
-    """A tracker's people at one moment."""
+    """State of a tracker's people at one time."""
 
     t: float | None
-    """The moment, on the tracker's clock [s]; None before the first frame."""
+    """The time, on the tracker's clock [s]; None before the first frame."""
     since_frame_s: float
-    """Time since the newest frame, or since the tracker was opened where none has come [s]."""
+    """Time since the newest frame, or since the tracker was opened without a frame [s]."""
     estimates: tuple[PersonEstimate, ...]
-    """Estimate of each track, predicted for the moment."""
+    """Estimate of each track, predicted for the time."""
     observed: tuple[PersonEstimate | None, ...]
-    """Estimate of each track at the last frame that showed its person; None: no frame did."""
+    """Estimate of each track at the last frame with its person; None without such a frame."""
     observed_age_s: tuple[float, ...]
-    """Age of each observation at the moment [s]; without one, ``since_frame_s``."""
+    """Age of each observation [s]; without one, ``since_frame_s``."""
     unfollowed: tuple[Unfollowed, ...]
-    """People in the newest frame who are not followed, nearest first."""
+    """People of the newest frame without a track, nearest first."""
 
 
 @dataclass(slots=True, kw_only=True)
 class TrackerSession:
-    """One tracker: what it has told so far."""
+    """One tracker with the estimator of its people."""
 
     id: str
-    """Its name in URLs."""
+    """Its id in URLs."""
     cell: str
-    """Name of the work cell it watches."""
+    """Name of its work cell."""
     n_people: int
-    """Most people it follows."""
+    """Largest number of tracks."""
     estimator: MultiPersonTracker
     """Estimates its people, on the timeline."""
     timeline: StampTimeline
@@ -73,9 +71,9 @@ class TrackerSession:
     clock: Callable[[], float]
     """The service's clock [s]."""
     n_frames: int = 0
-    """Frames taken."""
+    """Number of accepted frames."""
     used_at: float = 0.0
-    """When it was last used, on the service's clock [s]."""
+    """Time of the last use, on the service's clock [s]."""
     lock: threading.Lock = field(default_factory=threading.Lock)
     """Held while its estimator works."""
 
@@ -87,17 +85,17 @@ class TrackerSession:
     def take(
         self, t: float, arrived: float, people: Sequence[Vec], confidences: Sequence[Vec]
     ) -> TrackedPeople:
-        """Take one frame of all people and return what is known at its time.
+        """Update the estimates with a frame and return them for its time.
 
         Args:
-            t: When the frame was taken, tracker's clock [s].
-            arrived: When it arrived, service's clock [s].
+            t: Stamp of the frame, tracker's clock [s].
+            arrived: Time of its arrival, service's clock [s].
             people: Key-points of each person [m], shape (25, 3) each, NaN where missing.
-            confidences: Trust in them, shape (25,) each.
+            confidences: Confidence of each key-point, shape (25,) each.
 
         Raises:
-            ClockJump: ``t`` does not continue the frames before; the frame is not taken.
-            InvalidInput: See :meth:`MultiPersonTracker.update`; the frame is not taken.
+            ClockJump: ``t`` does not continue the frames before; the frame is refused.
+            InvalidInput: See :meth:`MultiPersonTracker.update`; the frame is refused.
         """
         with self.lock:
             at = self.timeline.offer(t, arrived)
@@ -107,11 +105,11 @@ class TrackerSession:
             return self._tracked(estimates, 0.0)
 
     def people(self, t: float | None = None) -> TrackedPeople:
-        """Return what is known of its people now.
+        """Return the estimates for the present.
 
         Args:
-            t: The present on the tracker's clock, as the caller has it [s]. It counts where it
-                makes people older than the arrival of the newest frame does.
+            t: Present on the tracker's clock [s]; used where it gives a greater age than the
+                arrival of the newest frame.
         """
         with self.lock:
             since = self.timeline.ahead(self.clock(), t)
@@ -120,7 +118,7 @@ class TrackerSession:
     def _tracked(
         self, estimates: tuple[PersonEstimate, ...], since_frame_s: float
     ) -> TrackedPeople:
-        """Return estimates for a moment after the newest frame, with all that is known then."""
+        """Return the state at a time after the newest frame."""
         newest, observed = self.timeline.stamp, tuple(self.estimator.observed)
         at = (self.timeline.time or 0.0) + since_frame_s
         ages = [
@@ -138,9 +136,9 @@ class TrackerSession:
     def _flagged(
         self, estimates: tuple[PersonEstimate, ...], since_frame_s: float
     ) -> tuple[PersonEstimate, ...]:
-        """Return estimates that also name the silence of the tracker and a jump of its clock.
+        """Return estimates with flags for a silent tracker and a jump of its clock.
 
-        A person who was never seen is only known to be absent while frames arrive.
+        The absence of a person is only known while frames arrive.
         """
         added: list[Flag] = []
         if self.timeline.out_of_step or self.timeline.jumped:
@@ -156,10 +154,10 @@ class TrackerSession:
 
 
 class TrackerSessions:
-    """The sessions that are open; safe to use from any thread.
+    """The open sessions; safe to use from any thread.
 
     Args:
-        clock: Returns the time [s]; must never run backwards.
+        clock: Returns the time [s]; must be monotonic.
     """
 
     def __init__(self, clock: Callable[[], float] = service_clock) -> None:
@@ -172,12 +170,12 @@ class TrackerSessions:
 
         Args:
             cell: Name of the work cell.
-            n_people: Most people at once.
-            size: Size of these people [m], shape (12,).
+            n_people: Largest number of tracks.
+            size: Body lengths [m], shape (12,).
             floor_z: Height of the cell's floor [m].
 
         Raises:
-            Conflict: There are as many as there may be.
+            Conflict: The limit is reached.
         """
         session = TrackerSession(
             id=secrets.token_hex(8),
@@ -191,8 +189,8 @@ class TrackerSessions:
             self._forget_idle()
             if len(self._sessions) >= MAX_SESSIONS:
                 raise Conflict(
-                    f"{MAX_SESSIONS} trackers are open, the most there may be: delete one, or "
-                    f"wait: one that nobody uses ends after {IDLE_S:g} s"
+                    f"{MAX_SESSIONS} trackers are open, the limit: delete one, or wait; an "
+                    f"unused one is deleted after {IDLE_S:g} s"
                 )
             session.used_at = self.clock()
             self._sessions[session.id] = session
@@ -202,7 +200,7 @@ class TrackerSessions:
         """Return a session and count it as used.
 
         Raises:
-            NotFound: There is no such session, or it ended unused.
+            NotFound: There is no such session, or it was deleted as unused.
         """
         with self._lock:
             self._forget_idle()

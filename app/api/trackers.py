@@ -1,4 +1,7 @@
-"""Trackers of key-points, listened to frame by frame (METHOD 2.8)."""
+"""Trackers of key-points, updated frame by frame.
+
+Source: docs/method.md 2.8.
+"""
 
 from typing import Annotated
 
@@ -18,11 +21,11 @@ from app.api.task_selection import known_cell
 router = APIRouter(prefix="/v1/trackers", tags=["trackers"])
 
 
-@router.post("", status_code=201, summary="Listen to a tracker")
+@router.post("", status_code=201, summary="Open a tracker")
 async def create(
     body: TrackerCreate, services: ServicesDep, response: Response
 ) -> TrackerPublic:
-    """Open a tracker; its people can then be named in /v1/task-selection."""
+    """Open a tracker; requests of decisions can then name its people."""
     services.readiness.require()
     cell = await known_cell(body.cell, services)
     size = cell.body if body.body is None else body.body.size(cell)
@@ -33,22 +36,22 @@ async def create(
 
 @router.get("", summary="List the trackers")
 async def list_all(services: ServicesDep) -> TrackerList:
-    """Return every tracker that is listened to."""
+    """Return every open tracker."""
     return TrackerList(
         items=[TrackerPublic.from_domain(one) for one in services.trackers.all()]
     )
 
 
-@router.post("/{tracker_id}/frames", summary="Hand one frame over")
-async def take_frame(
+@router.post("/{tracker_id}/frames", summary="Submit a frame")
+async def submit_frame(
     tracker_id: str, body: FrameCreate, services: ServicesDep
 ) -> EstimatesPublic:
     """Take one frame of all people in and return what is known of each at its time.
 
-    Who is who is found out from where people were, so their order means nothing; what is
-    missing, held, exchanged or not credible is named, and so are people who are not followed.
-    A frame whose stamp does not continue the frames before is not taken (409); the third such
-    frame in a row is, as a change of the tracker's clock.
+    People are associated by position; their order has no meaning. The answer flags missing,
+    held, exchanged and implausible data, and people who are not followed. A frame with a stamp
+    that does not continue the frames before is refused (409); the third such frame in a row is
+    accepted, as a change of the tracker's clock.
     """
     arrived = services.trackers.clock()
     session = services.trackers.get(tracker_id)
@@ -58,7 +61,7 @@ async def take_frame(
     return EstimatesPublic.from_domain(tracker_id, known)
 
 
-@router.get("/{tracker_id}", summary="What is known of a tracker's people")
+@router.get("/{tracker_id}", summary="Estimates of a tracker's people")
 async def get_one(
     tracker_id: str,
     services: ServicesDep,
@@ -66,8 +69,8 @@ async def get_one(
         float | None,
         Query(
             allow_inf_nan=False,
-            description="the present on the tracker's clock [s]: it counts where it makes the "
-            "people older than the arrival of the newest frame does",
+            description="present on the tracker's clock [s]; used where it gives a greater "
+            "age than the arrival of the newest frame",
         ),
     ] = None,
 ) -> EstimatesPublic:
@@ -80,7 +83,7 @@ async def get_one(
     return EstimatesPublic.from_domain(tracker_id, known)
 
 
-@router.delete("/{tracker_id}", status_code=204, summary="Listen to a tracker no longer")
+@router.delete("/{tracker_id}", status_code=204, summary="Delete a tracker")
 async def remove(tracker_id: str, services: ServicesDep) -> None:
-    """Forget a tracker and what it told."""
+    """Delete a tracker and its estimates."""
     services.trackers.close(tracker_id)

@@ -1,6 +1,6 @@
-"""What a validation error says: field, value, rule and choices, in the caller's own terms.
+"""Conversion of pydantic's validation errors to field, value, rule and choices.
 
-Pydantic's errors name places inside our models; a caller thinks in the JSON that was sent.
+Pydantic's locations are inside our models; fields are paths in the JSON of the request.
 """
 
 import math
@@ -18,7 +18,7 @@ Member = dict[str, object]
 
 
 def dotted(location: Sequence[str | int]) -> str:
-    """Write a pydantic location as a path: ``("body", "robot", "q", 3)`` -> ``robot.q[3]``."""
+    """Return a pydantic location as a path: ``("body", "robot", "q", 3)`` -> ``robot.q[3]``."""
     path = ""
     for part in location[1:] or location:
         if isinstance(part, int):
@@ -29,7 +29,7 @@ def dotted(location: Sequence[str | int]) -> str:
 
 
 def shown(value: object) -> str:
-    """Write a value so that it fits a problem: long ones shortened, never a secret dump."""
+    """Return a value as text of limited length."""
     if isinstance(value, list | tuple | dict) and len(value) > MAX_LISTED_ITEMS:
         return f"<{type(value).__name__} of {len(value)}>"
     if isinstance(value, bytes):
@@ -41,7 +41,7 @@ def shown(value: object) -> str:
 
 
 def validation_member(error: Mapping[str, Any], body: type[BaseModel] | None) -> Member:
-    """Say field, value, rule and choices of one validation error."""
+    """Return field, value, rule and choices of a validation error."""
     kind, context = str(error["type"]), error.get("ctx", {})
     place, inside, way = without_inner_tags(error["loc"], body)
     location, value = tuple(place), error.get("input")
@@ -74,12 +74,12 @@ def validation_member(error: Mapping[str, Any], body: type[BaseModel] | None) ->
 
 
 def member(field: str, value: str, rule: str, choices: Sequence[str] = ()) -> Member:
-    """Return the four members that bad input always carries."""
+    """Return the four members of bad input."""
     return {"field": field, "value": value, "rule": rule, "choices": list(choices)}
 
 
 def _tag_member(location: tuple[str | int, ...], context: Mapping[str, Any]) -> Member:
-    """Say that the member which tells the kinds of a body apart is missing or unknown."""
+    """Return the fault of a missing or unknown discriminator."""
     field = dotted((*location, context["discriminator"].strip("'")))
     if "tag" not in context:
         return member(field, NOTHING, "is required")
@@ -92,7 +92,7 @@ def _listed(expected: str) -> list[str]:
 
 
 def known_fields(model: type[BaseModel] | None, path: Sequence[str | int]) -> list[str]:
-    """List the fields of the model at ``path`` inside ``model``; empty where unknown."""
+    """Return the fields of the model at ``path`` inside ``model``; empty where unknown."""
     for part in path:
         if model is None or isinstance(part, int):
             continue
@@ -103,7 +103,7 @@ def known_fields(model: type[BaseModel] | None, path: Sequence[str | int]) -> li
 
 
 def _tagged(annotation: Any) -> dict[str, type[BaseModel]]:
-    """Return the models of the union that an annotation holds, by their tags."""
+    """Return the models of an annotation's tagged union, by tag."""
     found: dict[str, type[BaseModel]] = {}
     tags = [one.tag for one in get_args(annotation) if isinstance(one, Tag)]
     for argument in get_args(annotation):
@@ -116,14 +116,14 @@ def _tagged(annotation: Any) -> dict[str, type[BaseModel]]:
 def without_inner_tags(
     location: Sequence[str | int], model: type[BaseModel] | None
 ) -> tuple[list[str | int], type[BaseModel] | None, list[str | int]]:
-    """Take the tags of unions inside a body out of a location; callers never sent them.
+    """Remove the tags of unions inside a body from a location.
 
     Args:
-        location: Where the error is, ``body`` first.
-        model: The body's.
+        location: Location of the error, ``body`` first.
+        model: The body's model.
 
     Returns:
-        The location; the model that the last tag meant, or the body's; the way from there.
+        The location; the model of the last tag, or the body's; the path inside that model.
     """
     place, way = list(location[:1]), list[str | int]()
     variants = dict[str, type[BaseModel]]()
@@ -140,7 +140,7 @@ def without_inner_tags(
 
 
 def _models(annotation: Any) -> Iterator[type[BaseModel]]:
-    """Yield the models named anywhere in an annotation."""
+    """Yield the models in an annotation."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         yield annotation
     for argument in get_args(annotation):
@@ -150,7 +150,7 @@ def _models(annotation: Any) -> Iterator[type[BaseModel]]:
 def without_tag(
     error: dict[str, Any], variants: Sequence[type[BaseModel]]
 ) -> tuple[dict[str, Any], type[BaseModel] | None]:
-    """Take the tag out of a location inside a tagged union; return the variant it names."""
+    """Return an error without the tag of a body's union, and the tag's variant."""
     location = error["loc"]
     if len(variants) < 2 or len(location) < 2:
         return error, variants[0] if variants else None
@@ -162,6 +162,6 @@ def without_tag(
 
 
 def body_models(request: Request) -> list[type[BaseModel]]:
-    """Return the models that the body of a request may have."""
+    """Return the possible models of a request's body."""
     field = getattr(request.scope.get("route"), "body_field", None)
     return list(_models(field.field_info.annotation)) if field else []

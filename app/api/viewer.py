@@ -1,9 +1,9 @@
-"""The 3D viewer of a world, through this service's own port.
+"""Proxy for the 3D viewer of a world, on the service's port.
 
-The viewer (viser 1.1.1) listens on a Unix socket of this process's user and checks nothing
-itself, so a browser reaches it only through here: behind :mod:`app.api.security`, with frames
-of the types a viewer sends and of a bounded size. Its page is served with one style sheet and
-script of ours that hide the library's own notices and start a broken scene again.
+The viewer (viser 1.1.1) has no access control and listens on a Unix socket of this process's
+user. The proxy stands behind :mod:`app.api.security` and limits types and sizes of frames. The
+viewer's page gets a style sheet and a script that hide the library's notices and restart a
+broken scene.
 """
 
 import asyncio
@@ -41,13 +41,13 @@ TYPES = {
     "ViewerCameraMessage",
     "GetRenderResponseMessage",
 }
-"""Messages that a browser may send: no request for a public tunnel, no upload."""
+"""Allowed messages of a browser: no uploads, no requests for a public tunnel."""
 MAX_FRAME_BYTES = 64 * 1024
-"""Largest frame that is not a picture."""
+"""Largest frame other than a picture."""
 SMALL_BYTES = 1024
-"""Frames up to this size are decoded on the event loop, in microseconds."""
-# The viewer's page is one inline script that unpacks itself, and the glue of its WebAssembly
-# builds functions from text; both stay inside its own frame and talk to this server only.
+"""Largest frame decoded on the event loop, in microseconds."""
+# The viewer's page is one inline script that unpacks itself, and its WebAssembly loader
+# evaluates text; both are restricted to the viewer's frame and to this server.
 POLICY = (
     "default-src 'self'; img-src 'self' data: blob:; font-src 'self' data:; "
     "style-src 'self' 'unsafe-inline'; worker-src 'self' blob: data:; "
@@ -59,7 +59,7 @@ POLICY = (
 
 @router.get("/viewer/{world_id}")
 async def add_slash(world_id: str, services: ServicesDep) -> RedirectResponse:
-    """Send a browser on to the address with the slash that relative names need."""
+    """Redirect to the address with a trailing slash, for relative names."""
     services.world(world_id)
     return RedirectResponse(f"/viewer/{world_id}/")
 
@@ -71,7 +71,7 @@ async def page(
     accept_encoding: Annotated[str, Header()] = "",
     if_none_match: Annotated[str, Header()] = "",
 ) -> Response:
-    """Return the viewer's one page."""
+    """Return the viewer's page."""
     services.world(world_id)
     plain, packed, etag = await run_in_threadpool(viewer_page)
     headers = {
@@ -91,7 +91,7 @@ async def page(
 
 @lru_cache(maxsize=1)
 def viewer_page() -> tuple[bytes, bytes, str]:
-    """Return the viewer's page with our style and script: plain, gzip-packed, its ETag."""
+    """Return the viewer's page with our style and script: plain, compressed, and its ETag."""
     content = (resources.files("viser") / "client" / "build" / "index.html").read_bytes()
     extra = (resources.files("app.api") / "viewer_extra.html").read_bytes()
     plain = content.replace(b"<script", extra + b"<script", 1)
@@ -101,7 +101,7 @@ def viewer_page() -> tuple[bytes, bytes, str]:
 @router.websocket("/viewer/{world_id}")
 @router.websocket("/viewer/{world_id}/")
 async def socket(client: WebSocket, world_id: str) -> None:
-    """Pass frames between a browser and the viewer until one of them leaves."""
+    """Pass frames between a browser and the viewer until one side closes."""
     services = services_of(client)
     try:
         world = services.world(world_id)
@@ -119,7 +119,7 @@ async def socket(client: WebSocket, world_id: str) -> None:
 
 
 async def connect_viewer(client: WebSocket, world: LiveWorld) -> None:
-    """Open the viewer's own socket and pass frames."""
+    """Connect to the viewer's socket and pass frames."""
     offered = [Subprotocol(one) for one in client.scope.get("subprotocols", [])]
     try:
         viewer = await unix_connect(
@@ -139,7 +139,7 @@ async def connect_viewer(client: WebSocket, world: LiveWorld) -> None:
 
 
 async def pass_frames(client: WebSocket, viewer: ClientConnection) -> None:
-    """Pass frames both ways; when one side ends, end the other."""
+    """Pass frames in both directions; when one side ends, end the other."""
     tasks = {
         asyncio.create_task(to_viewer(client, viewer)),
         asyncio.create_task(to_client(client, viewer)),
@@ -162,7 +162,7 @@ async def pass_frames(client: WebSocket, viewer: ClientConnection) -> None:
 
 
 async def to_viewer(client: WebSocket, viewer: ClientConnection) -> None:
-    """Pass on what the browser may send; end the connection at a frame that is too large."""
+    """Pass allowed frames of the browser on; close the connection at one that is too large."""
     while True:
         message = await client.receive()
         if message["type"] == "websocket.disconnect":
@@ -175,36 +175,35 @@ async def to_viewer(client: WebSocket, viewer: ClientConnection) -> None:
         if allowed:
             await viewer.send(frame)
             continue
-        logger.warning("dropped a frame from a browser that the viewer must not get")
+        logger.warning("dropped a forbidden frame of a browser")
         if len(frame or message.get("text") or "") > MAX_FRAME_BYTES:
             await client.close(1009, f"a frame has at most {MAX_FRAME_BYTES} bytes")
             return
 
 
 async def to_client(client: WebSocket, viewer: ClientConnection) -> None:
-    """Pass on what the viewer sends; waits for a slow browser."""
+    """Pass the viewer's frames on, at the pace of the browser."""
     async for frame in viewer:
         await client.send_bytes(frame if isinstance(frame, bytes) else frame.encode())
 
 
 class Picture(msgspec.Struct, forbid_unknown_fields=True):
-    """A picture of the canvas, as the viewer asks for it."""
+    """A picture of the canvas, requested by the viewer."""
 
     type: Literal["GetRenderResponseMessage"]
     """Name of the message."""
     payload: bytes
     """The picture, JPEG or PNG."""
     render_uuid: str
-    """Which request it answers."""
+    """Id of the request."""
 
 
 def is_allowed(frame: bytes) -> bool:
     """Return whether a browser's frame may reach the viewer.
 
-    A frame is one msgpack map whose ``type`` names the message. A frame of at most
-    ``MAX_FRAME_BYTES`` is read by the decoder that the viewer uses, so that both see the same
-    ``type``; a larger one must be a picture and nothing else, which is decided at its first
-    other member.
+    A frame is one msgpack map with the name of the message in ``type``. A frame of at most
+    ``MAX_FRAME_BYTES`` is decoded as the viewer does, so that both see the same ``type``; a
+    larger one must be a picture without further members.
     """
     try:
         if len(frame) > MAX_FRAME_BYTES:

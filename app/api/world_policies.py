@@ -44,14 +44,14 @@ def load_for(command: LoadingCommand, cell: Cell, services: Services) -> object:
         case SetPolicy(checkpoint=str(name)) if is_reaching(cell):
             return named_reach_policy(name, cell, services)
         case SetPolicy(checkpoint=str(name)):
-            policy = services.policies.load(name)
+            policy = services.task_policies.load(name)
             if policy.cell != cell.name and not may_select_tasks(policy, cell, services):
                 rule = f"must decide in the cell {cell.name}, not in {policy.cell}"
                 raise InvalidInput("checkpoint", name, rule)
             require_task_policy(policy, cell, services)
             return policy
         case SetSortingPolicy(checkpoint=str(name)):
-            sorter = services.sorters.load(name)
+            sorter = services.sorting_policies.load(name)
             require_sorting_policy(sorter, cell)
             return sorter
     return None
@@ -96,10 +96,10 @@ def may_select_tasks(policy: TaskPolicy, cell: Cell, services: Services) -> bool
 
 def task_policy_for(cell: Cell, services: Services) -> TaskPolicy | None:
     """Return the newest policy of a cell; the default one goes first where it may act."""
-    default = services.policies.load(None)
+    default = services.task_policies.load(None)
     if default.cell == cell.name and may_select_tasks(default, cell, services):
         return default
-    newest = newest_for(cell, CHOOSING, services.policies, services)
+    newest = newest_for(cell, CHOOSING, services.task_policies, services)
     return newest or (default if may_select_tasks(default, cell, services) else None)
 
 
@@ -133,7 +133,7 @@ def sorting_policy_for(cell: Cell, services: Services) -> SortingValues | None:
     """Return the shipped sorter of a cell; None leaves its moves to the exact planner."""
     if cell.name not in SORTING_ALIASES or cell.name not in services.checkpoints.aliases:
         return None
-    sorter = services.sorters.load(cell.name)
+    sorter = services.sorting_policies.load(cell.name)
     return sorter if is_sorting(cell) and sorter.shape == shape_of(cell) else None
 
 
@@ -144,7 +144,7 @@ def named_reach_policy(reference: str, cell: Cell, services: Services) -> ReachP
         InvalidInput: Nothing has that name.
         CheckpointMismatch: It does not reach goals, or was trained elsewhere.
     """
-    actor = services.movers.load(reference).actor
+    actor = services.reach_policies.load(reference).actor
     require_cell(cell, actor.cell, actor.cell_sha256)
     return ReachPilot(actor)
 
@@ -152,8 +152,8 @@ def named_reach_policy(reference: str, cell: Cell, services: Services) -> ReachP
 def reach_policy_for(cell: Cell, services: Services) -> ReachPilot | None:
     """Return the reach policy of a cell: the shipped one, else the newest trained in it."""
     if REACH_ALIAS in services.checkpoints.aliases:
-        actor = services.movers.load(REACH_ALIAS).actor
+        actor = services.reach_policies.load(REACH_ALIAS).actor
         if (actor.cell, actor.cell_sha256) == (cell.name, cell.sha256):
             return ReachPilot(actor)
-    newest = newest_for(cell, REACHING, services.movers, services)
+    newest = newest_for(cell, REACHING, services.reach_policies, services)
     return None if newest is None else ReachPilot(newest.actor)

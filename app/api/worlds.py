@@ -109,7 +109,7 @@ def set_cell(world_id: str, body: WorldCell, services: ServicesDep) -> WorldSumm
         raise InvalidInput("cell", cell.name, f"cannot be shown live: it {lack}")
     if is_reaching(cell):
         if body.sorting_policy is not None:
-            require_sorting_policy(services.sorters.load(body.sorting_policy), cell)
+            require_sorting_policy(services.sorting_policies.load(body.sorting_policy), cell)
         reference = body.checkpoint
         pilot = (
             named_reach_policy(reference, cell, services)
@@ -120,12 +120,12 @@ def set_cell(world_id: str, body: WorldCell, services: ServicesDep) -> WorldSumm
     if body.checkpoint is None:
         policy = task_policy_for(cell, services)
     else:
-        policy = services.policies.load(body.checkpoint)
+        policy = services.task_policies.load(body.checkpoint)
         require_task_policy(policy, cell, services)
     if body.sorting_policy is None:
         sorter = sorting_policy_for(cell, services)
     else:
-        sorter = services.sorters.load(body.sorting_policy)
+        sorter = services.sorting_policies.load(body.sorting_policy)
         require_sorting_policy(sorter, cell)
     return _replace_world(world_id, cell, policy, sorter, None, services)
 

@@ -116,7 +116,7 @@ def test_damaged_policies_of_other_kinds_are_not_loaded(
     service: TestClient, data: Path, alias: str
 ) -> None:
     services = service.app.state.services  # type: ignore[attr-defined]
-    registry = services.movers if alias == "reach" else services.sorters
+    registry = services.reach_policies if alias == "reach" else services.sorting_policies
     sha256 = keep(services.store, f"my-{alias}", alias)
     damage(data / "tandem.db", "checkpoints", "tensors", f"sha256 = '{sha256}'", flip(500))
     with pytest.raises(Damaged, match=f"my-{alias}"):
