@@ -424,7 +424,7 @@ def test_only_so_many_sockets_are_open_at_once(client: TestClient) -> None:
             with pytest.raises(WebSocketDisconnect) as caught:
                 one_too_many.receive_text()
         assert caught.value.code == 1013
-        assert "16 sockets ask for motion already" in caught.value.reason
+        assert "16 motion sockets are open already" in caught.value.reason
     finally:
         for _ in range(held):
             slots.release()
