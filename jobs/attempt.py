@@ -1,6 +1,6 @@
-"""One attempt of a job in a process of its own: arguments, logging, end.
+"""One attempt of a job in its own process: arguments, logging, exit status.
 
-``jobs.run`` is the entry point; it brings the runners.
+``jobs.run`` is the entry point and passes the runners.
 """
 
 import argparse
@@ -22,7 +22,7 @@ from jobs.worker import Runner, Worker, die_with_parent
 logger = logging.getLogger(__name__)
 
 NICENESS = 10
-"""Training yields to the server and its live cell."""
+"""Niceness of a worker, below the priority of the server and its live cell."""
 
 
 def main(
@@ -30,20 +30,20 @@ def main(
     database_url: str,
     arguments: Sequence[str] | None = None,
 ) -> int:
-    """Run the attempt that the command line names.
+    """Run the attempt of the command line.
 
     Args:
-        runners: How each kind of job is run.
-        database_url: The database that holds the job.
+        runners: Runner of each kind of job.
+        database_url: The database with the job.
         arguments: Command line; that of the process by default.
 
     Returns:
-        The exit status: 0 when the job's row tells how it ended.
+        The exit status: 0 when the job's row contains the result.
     """
     parser = argparse.ArgumentParser(description="Run one attempt of a job.")
     parser.add_argument("--job", required=True, help="id of the job")
-    parser.add_argument("--attempt", required=True, type=int, help="attempt that was claimed")
-    parser.add_argument("--parent", type=int, help="process to die with")
+    parser.add_argument("--attempt", required=True, type=int, help="claimed attempt")
+    parser.add_argument("--parent", type=int, help="server process that ends this one")
     options = parser.parse_args(arguments)
     if options.parent is not None:
         die_with_parent(options.parent)

@@ -1,4 +1,4 @@
-"""Every work cell by name: the shipped ones and the user's own, from the database."""
+"""Work cells by name: the shipped ones, and the user's own from the database."""
 
 import logging
 
@@ -22,7 +22,7 @@ logger = logging.getLogger(__name__)
 
 
 def lacks_for_training(preset: Preset, cell: Cell) -> str | None:
-    """Say what a cell lacks to train a preset in; None where nothing."""
+    """Return the cell's missing requirement for training a preset; None where complete."""
     if isinstance(preset, SortingPreset):
         return lacks_for_tasks(cell)
     return lacks_for_reach(cell) if isinstance(preset, ReachPreset) else lacks_for_pick(cell)
@@ -32,7 +32,7 @@ class CellCatalog:
     """Finds cells by name; safe to use from any thread.
 
     Args:
-        store: Where the user's cells are kept.
+        store: The database.
     """
 
     def __init__(self, store: Store) -> None:
@@ -57,7 +57,7 @@ class CellCatalog:
         return (*cell_names(), *(record.name for record in list_cells(self._store)))
 
     def all(self) -> list[Cell]:
-        """Return all cells, shipped ones first; those that do not fit are left out."""
+        """Return all cells of this version, shipped ones first."""
         found = [load_cell(name) for name in cell_names()]
         for record in list_cells(self._store):
             try:
@@ -67,10 +67,10 @@ class CellCatalog:
         return found
 
     def to_train_in(self, preset: Preset) -> Cell:
-        """Return the cell that a preset names, if it can be trained in by that preset.
+        """Return the cell of a preset.
 
         Raises:
-            InvalidInput: No cell has that name, or it lacks something.
+            InvalidInput: No cell has that name, or the preset cannot be trained in it.
         """
         name = preset.cell
         try:
@@ -83,10 +83,10 @@ class CellCatalog:
         return cell
 
     def add(self, cell: Cell) -> bool:
-        """Keep a checked cell of the user's own.
+        """Store a checked cell of the user's own.
 
         Returns:
-            Whether it is new; the same one again is harmless.
+            Whether it is new; the same one again has no effect.
 
         Raises:
             Conflict: The name is taken.
@@ -95,11 +95,11 @@ class CellCatalog:
         return put_cell(self._store, cell.name, cell.definition())
 
     def remove(self, name: str) -> None:
-        """Forget a cell of the user's own.
+        """Remove a cell of the user's own.
 
         Raises:
             NotFound: No cell has that name.
-            Conflict: It is shipped, or a job that has not ended trains in it.
+            Conflict: It is shipped, or a queued or running job trains in it.
         """
         self._require_own(name)
         remove_cell(self._store, name)

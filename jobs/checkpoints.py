@@ -1,4 +1,4 @@
-"""Stored checkpoints as everything reads them: undamaged, or not at all."""
+"""Reading of stored checkpoints; a damaged shipped one is restored."""
 
 import logging
 
@@ -14,10 +14,10 @@ logger = logging.getLogger(__name__)
 def read_sound(store: Store, reference: str) -> tuple[CheckpointRecord, bytes]:
     """Return a checkpoint, by SHA-256 or alias, with its safetensors bytes.
 
-    A damaged one that is shipped is stored again from the package.
+    A damaged shipped one is stored again from the package.
 
     Raises:
-        NotFound: Nothing has that name.
+        NotFound: No checkpoint has that name.
         Damaged: It is damaged, and not shipped.
     """
     try:
@@ -31,7 +31,7 @@ def read_sound(store: Store, reference: str) -> tuple[CheckpointRecord, bytes]:
 
 
 def shipped(alias: str) -> NewCheckpoint:
-    """Return a checkpoint that comes with the service.
+    """Return a shipped checkpoint.
 
     Raises:
         NotFound: None is shipped under that alias.

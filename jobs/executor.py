@@ -1,7 +1,7 @@
-"""Where an attempt runs: an executor of three methods. Here: one local process per attempt.
+"""Executors of attempts: the interface, and one local process per attempt.
 
-The child watches its parent itself (``jobs.worker.die_with_parent``), so a killed server
-leaves no training behind.
+The child ends with its parent (``jobs.worker.die_with_parent``), so that a killed server leaves
+no training behind.
 """
 
 import os
@@ -16,24 +16,23 @@ from typing import Protocol
 from app.store.records import Claim
 
 PROJECT_ROOT = Path(__file__).resolve().parent.parent
-"""Folder from which ``python -m jobs.run`` works."""
-
+"""Working folder of ``python -m jobs.run``."""
 TAIL_BYTES = 4000
-"""How much of a dead worker's last words is kept."""
+"""Length of the end of a worker's output in an error [bytes]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Exit:
-    """How an attempt's process ended."""
+    """End of an attempt's process."""
 
     code: int
     """Exit status; negative: the signal that killed it."""
     tail: str
-    """The end of what it wrote."""
+    """End of its output."""
 
     @property
     def reason(self) -> str:
-        """The end, for people."""
+        """The end as text."""
         if self.code >= 0:
             ended = f"the worker ended with exit status {self.code} and no result"
         else:
@@ -42,7 +41,7 @@ class Exit:
 
 
 class Handle(Protocol):
-    """One started attempt, as its executor knows it."""
+    """A started attempt of an executor."""
 
     @property
     def claim(self) -> Claim:
@@ -50,16 +49,16 @@ class Handle(Protocol):
 
 
 class Executor(Protocol):
-    """Starts attempts and tells how they end."""
+    """Starts, polls and stops attempts."""
 
     def start(self, claim: Claim) -> Handle:
         """Start an attempt; returns at once."""
 
     def poll(self, handle: Handle) -> Exit | None:
-        """Return how the attempt ended; None while it runs."""
+        """Return the end of the attempt; None while it runs."""
 
     def stop(self, handle: Handle, *, force: bool) -> None:
-        """Ask the attempt to end at its next step, or end it now; returns at once."""
+        """Stop the attempt at its next step, or at once by force; returns at once."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,20 +68,20 @@ class LocalHandle:
     claim: Claim
     """The attempt."""
     process: subprocess.Popen[bytes]
-    """The process; never mistaken for another, since we have not reaped it."""
+    """The process; its id is not reused before it is reaped here."""
     log: Path
-    """Where its output goes."""
+    """File of its output."""
     log_start: int
     """Length of the log before this attempt [bytes]."""
 
 
 class LocalProcess:
-    """Runs every attempt in a process of its own on this machine.
+    """Runs every attempt in its own process on this machine.
 
     Args:
         database_url: The database, for the child.
         data_dir: The data folder; output of job ``ID`` goes to ``logs/ID.log`` in it.
-        command: How to start a worker, before its arguments.
+        command: Command of a worker, before its arguments.
     """
 
     def __init__(
@@ -99,7 +98,7 @@ class LocalProcess:
             "TANDEM_DATABASE_URL": database_url,
             "PYTHONPATH": search_path(os.environ),
             "PYTHONUNBUFFERED": "1",
-            # One job trains on one core; it must not crowd out the server.
+            # One job trains on one core and leaves the others to the server.
             "OMP_NUM_THREADS": "1",
             "MKL_NUM_THREADS": "1",
             "NUMBA_NUM_THREADS": "1",
@@ -118,7 +117,7 @@ class LocalProcess:
                 stdin=subprocess.DEVNULL,
                 stdout=output,
                 stderr=output,
-                start_new_session=True,  # Ctrl-C is for the server, which then asks politely
+                start_new_session=True,  # Ctrl-C goes to the server, which stops its workers
             )
             return LocalHandle(
                 claim=claim,
@@ -128,7 +127,7 @@ class LocalProcess:
             )
 
     def poll(self, handle: Handle) -> Exit | None:
-        """Return how the process ended; None while it runs."""
+        """Return the end of the process; None while it runs."""
         assert isinstance(handle, LocalHandle)
         code = handle.process.poll()
         return None if code is None else Exit(code=code, tail=_tail(handle))
@@ -150,7 +149,7 @@ def _tail(handle: LocalHandle) -> str:
 
 
 def search_path(environment: Mapping[str, str]) -> str:
-    """Return the ``PYTHONPATH`` by which a child finds this project."""
+    """Return the ``PYTHONPATH`` of a child process."""
     earlier = environment.get("PYTHONPATH")
     return os.pathsep.join([str(PROJECT_ROOT), *([earlier] if earlier else [])])
 

@@ -1,7 +1,7 @@
-"""The one entry point that runs a job: ``python -m jobs.run --job ID --attempt N``.
+"""Entry point of a job's process: ``python -m jobs.run --job ID --attempt N``.
 
-Started by an executor, never by hand. Settings come from the environment, what to do from the
-job's row. This is the only module of ``jobs`` that imports learning libraries.
+Executors start it. Settings come from the environment, the spec from the job's row. This is the
+only module of ``jobs`` that imports learning libraries.
 """
 
 import sys
@@ -69,7 +69,7 @@ def _new(policy: Checkpoint) -> NewCheckpoint:
 
 
 def evaluate(worker: Worker) -> dict[str, Any]:
-    """Measure the job's checkpoint by its protocol; a step is a row of the result."""
+    """Evaluate the job's checkpoint by its protocol; a step is a row of the result."""
     worker.end_at_once()
     spec = parse_spec(worker.job.spec)
     assert isinstance(spec, EvaluateSpec) and spec.checkpoint is not None
@@ -98,7 +98,7 @@ def _stored(store: Store, reference: str) -> Checkpoint:
 
 
 RUNNERS: Mapping[str, Runner] = {"train": train, "evaluate": evaluate}
-"""How each kind of job is run."""
+"""Runner of each kind of job."""
 
 
 if __name__ == "__main__":

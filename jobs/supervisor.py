@@ -1,7 +1,7 @@
-"""The supervisor: a thread in the server that starts, watches and settles the workers.
+"""The supervisor: a thread of the server that starts, monitors and stops workers.
 
-Rows in the database are the truth. The supervisor keeps nothing that a new one could not find
-again: a server that was killed starts, takes the lock, queues the orphans and goes on.
+The database has the complete state: after a kill the next server acquires the lock, queues the
+orphaned jobs and continues.
 """
 
 import logging
@@ -13,7 +13,7 @@ from datetime import datetime
 from pathlib import Path
 
 from app.errors import NotFound, StaleAttempt, StorageFull, StorageUnavailable
-from app.store import attempts, endings
+from app.store import attempts, completion
 from app.store.engine import Store
 from app.store.lock import ServerLock
 from app.store.migrate import migrate
@@ -24,24 +24,24 @@ logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Patience:
-    """How long the supervisor waits."""
+class Timeouts:
+    """Timeouts of the supervisor."""
 
     tick_s: float = 0.25
-    """Time between two looks at the workers [s]."""
+    """Period of the supervisor [s]."""
     cancel_s: float = 30.0
-    """Time a worker has to stop by itself after a cancel, before it is killed [s]."""
+    """Time from a cancel until the worker is killed [s]."""
     silence_s: float = 300.0
-    """Time without a heartbeat after which a worker counts as stuck and is killed [s]."""
+    """Time without a heartbeat until a worker is killed [s]."""
     shutdown_s: float = 8.0
-    """Time the workers have to write a last checkpoint when the server stops [s]."""
+    """Time for the workers' last checkpoints when the server stops [s]."""
     max_failures: int = 3
-    """A job fails with its crash number ``max_failures``."""
+    """A job fails with this number of crashes."""
 
 
 @dataclass(slots=True, kw_only=True)
 class _Worker:
-    """One running attempt. The clock is monotonic: it stands still while a laptop sleeps."""
+    """A running attempt. Times are on the monotonic clock, which stops during suspend."""
 
     handle: Handle
     heartbeat_at: datetime | None = None
@@ -56,9 +56,9 @@ class Supervisor:
     Args:
         store: The database.
         data_dir: The data folder: holds the server's lock and the logs of the jobs.
-        max_running: How many jobs may run at once.
-        executor: Where they run; local processes by default.
-        patience: How long to wait for what.
+        max_running: Largest number of running jobs.
+        executor: Runs the attempts; local processes by default.
+        timeouts: Timeouts.
     """
 
     def __init__(
@@ -68,13 +68,13 @@ class Supervisor:
         *,
         max_running: int = 1,
         executor: Executor | None = None,
-        patience: Patience | None = None,
+        timeouts: Timeouts | None = None,
     ) -> None:
         self._store = store
         self._lock = ServerLock(store, data_dir)
         self._max_running = max_running
         self._executor = executor or LocalProcess(store.url, data_dir)
-        self._patience = patience or Patience()
+        self._timeouts = timeouts or Timeouts()
         self._workers: dict[Claim, _Worker] = {}
         self._wake = threading.Event()
         self._stopping = threading.Event()
@@ -82,7 +82,7 @@ class Supervisor:
         self._trouble: str | None = None
 
     def start(self) -> None:
-        """Take the lock, bring the database up to date, queue orphans, start working.
+        """Acquire the lock, upgrade the database, queue orphaned jobs, start the thread.
 
         Raises:
             Conflict: Another server uses this folder or database, or a newer version wrote it.
@@ -90,19 +90,19 @@ class Supervisor:
         self._lock.acquire()
         try:
             migrate(self._store)
-            orphans = endings.requeue_orphans(self._store)
+            orphans = completion.requeue_orphans(self._store)
             self._fill_reserve()
         except BaseException:
             self._lock.release()
             raise
         for job_id in orphans:
-            logger.info("job %s was interrupted with the last server: it goes on", job_id)
+            logger.info("job %s was interrupted with the last server: it resumes", job_id)
         self._stopping.clear()
         self._thread = threading.Thread(target=self._run, name="job-supervisor", daemon=True)
         self._thread.start()
 
     def stop(self) -> None:
-        """Let the workers write a last checkpoint, queue their jobs again, free the lock."""
+        """Stop the workers after a last checkpoint, queue their jobs, release the lock."""
         self._stopping.set()
         self._wake.set()
         if self._thread is not None:
@@ -111,18 +111,18 @@ class Supervisor:
         self._lock.release()
 
     def wake(self) -> None:
-        """Look at the queue now, because a job was queued or cancelled."""
+        """Check the queue now, because a job was queued or cancelled."""
         self._wake.set()
 
     @property
     def is_alive(self) -> bool:
-        """Whether the supervisor works."""
+        """Whether the thread runs."""
         return self._thread is not None and self._thread.is_alive()
 
     def _run(self) -> None:
         while not self._stopping.is_set():
             self._guarded(self._tick)
-            self._wake.wait(self._patience.tick_s)
+            self._wake.wait(self._timeouts.tick_s)
             self._wake.clear()
         self._shut_down()
 
@@ -133,15 +133,15 @@ class Supervisor:
             pass
 
     def _guarded(self, act: Callable[[], object]) -> None:
-        """Survive trouble with the database: say it once, try again at the next tick."""
+        """Log an error of the database once and try again at the next tick."""
         try:
             act()
         except (StorageFull, StorageUnavailable, OSError) as error:
             if self._trouble != str(error):
-                logger.error("the supervisor cannot go on for now: %s", error)
+                logger.error("the supervisor waits for the database: %s", error)
             self._trouble = str(error)
         except Exception:
-            logger.exception("the supervisor met a bug and goes on")
+            logger.exception("unexpected error in the supervisor")
         else:
             self._trouble = None
 
@@ -155,8 +155,8 @@ class Supervisor:
             handle = self._executor.start(claim)
         except OSError as error:
             reason = f"the worker could not be started: {error}"
-            failures = self._patience.max_failures
-            endings.crash(self._store, claim, reason, max_failures=failures)
+            failures = self._timeouts.max_failures
+            completion.crash(self._store, claim, reason, max_failures=failures)
             return False
         self._workers[claim] = _Worker(handle=handle, heartbeat_seen=time.monotonic())
         return True
@@ -169,12 +169,12 @@ class Supervisor:
                 del self._workers[claim]
 
     def _settle(self, claim: Claim, ended: Exit) -> None:
-        """Make the row say how the attempt ended, if its worker has not."""
-        failures = self._patience.max_failures
+        """Record the end of an attempt, if its worker has not."""
+        failures = self._timeouts.max_failures
         try:
-            job = endings.crash(self._store, claim, ended.reason, max_failures=failures)
+            job = completion.crash(self._store, claim, ended.reason, max_failures=failures)
         except StaleAttempt:
-            return  # the worker settled it: the normal case
+            return  # the worker recorded it: the normal case
         logger.warning(
             "job %s: attempt %d crashed, the job is %s now: %s",
             claim.job_id,
@@ -185,30 +185,30 @@ class Supervisor:
 
     def _watch(self) -> None:
         now = time.monotonic()
-        rows = {watch.claim: watch for watch in attempts.watch_running(self._store)}
+        rows = {job.claim: job for job in attempts.running_jobs(self._store)}
         for claim, worker in self._workers.items():
             row = rows.get(claim)
-            if row is None:  # settled, and about to exit; if it hangs there, end it
+            if row is None:  # ended, and about to exit
                 worker.leaving_since = worker.leaving_since or now
             elif row.cancel_requested and worker.leaving_since is None:
                 worker.leaving_since = now
                 self._executor.stop(worker.handle, force=False)
             elif row.heartbeat_at != worker.heartbeat_at:
                 worker.heartbeat_at, worker.heartbeat_seen = row.heartbeat_at, now
-            if self._lost_patience(worker, now):
-                logger.warning("job %s: its worker does not react, killing it", claim.job_id)
+            if self._timed_out(worker, now):
+                logger.warning("job %s: its worker timed out and is killed", claim.job_id)
                 self._executor.stop(worker.handle, force=True)
         for claim in rows.keys() - self._workers.keys():  # claimed, but never started
             self._give_back(claim)
 
-    def _lost_patience(self, worker: _Worker, now: float) -> bool:
+    def _timed_out(self, worker: _Worker, now: float) -> bool:
         leaving = worker.leaving_since
-        if leaving is not None and now - leaving > self._patience.cancel_s:
+        if leaving is not None and now - leaving > self._timeouts.cancel_s:
             return True
-        return now - worker.heartbeat_seen > self._patience.silence_s
+        return now - worker.heartbeat_seen > self._timeouts.silence_s
 
     def _shut_down(self) -> None:
-        deadline = time.monotonic() + self._patience.shutdown_s
+        deadline = time.monotonic() + self._timeouts.shutdown_s
         for worker in self._workers.values():
             self._executor.stop(worker.handle, force=False)
         while self._alive() and time.monotonic() < deadline:
@@ -226,12 +226,12 @@ class Supervisor:
 
     def _give_back(self, claim: Claim) -> None:
         try:
-            endings.give_back(self._store, claim)
+            completion.give_back(self._store, claim)
         except (StaleAttempt, NotFound):
-            return  # the worker did so itself
+            return  # the worker recorded it
 
     def _fill_reserve(self) -> None:
         try:
-            endings.fill_reserve(self._store)
+            completion.fill_reserve(self._store)
         except StorageFull as error:
             logger.error("%s", error)

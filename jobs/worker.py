@@ -1,7 +1,7 @@
-"""The worker's side of a job: one attempt in one process.
+"""The worker of a job: one attempt in one process.
 
-A beat thread looks at the job's row twice a second: it tells the runner to stop after a
-cancel, sends heartbeats, and ends the process at once when the server is gone.
+A thread reads the job's row twice a second: it stops the runner after a cancel and writes
+heartbeats.
 """
 
 import ctypes
@@ -16,31 +16,30 @@ from types import FrameType
 from typing import Any
 
 from app.errors import ServiceError, StaleAttempt, StorageFull, StorageUnavailable
-from app.store import attempts, endings, fences
+from app.store import attempts, completion, fencing
 from app.store.engine import Store
 from app.store.jobs import get_job
 from app.store.records import Claim, JobRecord, NewCheckpoint, ResumeState
 
 logger = logging.getLogger(__name__)
 
-LOOK_S = 0.5
-"""Time between two looks for a cancel [s]."""
-
+CANCEL_CHECK_S = 0.5
+"""Period of the check for a cancel [s]."""
 HEARTBEAT_S = 5.0
-"""Time between two heartbeats [s]."""
+"""Period of the heartbeats [s]."""
 
 _PR_SET_PDEATHSIG = 1
 
 Runner = Callable[["Worker"], Mapping[str, Any] | None]
-"""Does the work of one kind of job; returns its result."""
+"""Runs one kind of job and returns its result."""
 
 
 class Worker:
-    """What a runner may do for its job. Writes are fenced by the attempt.
+    """Interface of a runner to its job. Writes are fenced by the attempt.
 
     Args:
         store: The database, opened by this process.
-        claim: The attempt that this process is.
+        claim: The attempt of this process.
 
     Raises:
         NotFound: There is no such job.
@@ -49,7 +48,7 @@ class Worker:
 
     def __init__(self, store: Store, claim: Claim) -> None:
         get_job(store, claim.job_id)
-        self.job: JobRecord = fences.peek(store, claim)
+        self.job: JobRecord = fencing.peek(store, claim)
         self.store = store
         self._claim = claim
         self._cancelled = threading.Event()
@@ -58,7 +57,7 @@ class Worker:
         self._stop_seen = False
 
     def resume(self) -> ResumeState | None:
-        """Return what to go on from; None to start afresh."""
+        """Return the state to resume from; None for a new start."""
         return attempts.load_resume(self.store, self._claim.job_id)
 
     def record_progress(
@@ -67,7 +66,7 @@ class Worker:
         """Add a point to the job's curve.
 
         Raises:
-            StaleAttempt: The job was taken away.
+            StaleAttempt: The attempt no longer holds the job.
             StorageFull: No room is left.
         """
         attempts.record_progress(self.store, self._claim, step, values, total_steps=total_steps)
@@ -75,33 +74,33 @@ class Worker:
     def record_checkpoint(
         self, step: int, policy: NewCheckpoint, resume: ResumeState | None
     ) -> None:
-        """Store a policy and what a new attempt needs to go on from here.
+        """Store a policy and the state to resume from.
 
         Raises:
-            StaleAttempt: The job was taken away.
+            StaleAttempt: The attempt no longer holds the job.
             StorageFull: No room is left.
         """
         attempts.record_checkpoint(self.store, self._claim, step, policy, resume)
 
     def should_stop(self) -> bool:
-        """Whether to write a last checkpoint and return; cheap enough for every step."""
+        """Whether the runner must write a last checkpoint and return; for every step."""
         stop = self._cancelled.is_set() or self._interrupted.is_set() or self._lost.is_set()
         self._stop_seen = self._stop_seen or stop
         return stop
 
     def interrupt(self, _signal: int = 0, _frame: FrameType | None = None) -> None:
-        """Stop as the server does: the job goes on with the next attempt."""
+        """Stop the runner; the job resumes with the next attempt."""
         self._interrupted.set()
 
     def end_at_once(self) -> None:
-        """Let a cancel or a stop of the server end this process, for runners that never ask."""
+        """End this process at SIGTERM, for runners without ``should_stop``."""
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
     def execute(self, runner: Runner) -> int:
-        """Run the job to its end and write down how it ended.
+        """Run the job and record its end.
 
         Returns:
-            The process's exit status: 0 when the job's row tells the end.
+            The process's exit status: 0 when the job's row contains the end.
         """
         beat = threading.Thread(target=self._beat, name="beat", daemon=True)
         beat.start()
@@ -111,27 +110,27 @@ class Worker:
         except StaleAttempt as error:
             logger.warning("%s", error)
         except StorageUnavailable:
-            raise  # worth another attempt
+            raise  # the supervisor starts another attempt
         except ServiceError as error:
             logger.error("the job fails: %s", error.message)
             return self._fail(error.message)
         return 0
 
     def _settle(self, result: Mapping[str, Any] | None) -> None:
-        cancelled = fences.peek(self.store, self._claim).cancel_requested
+        cancelled = fencing.peek(self.store, self._claim).cancel_requested
         if self._stop_seen and cancelled:
-            endings.finish(self.store, self._claim, state="cancelled", result=result)
+            completion.finish(self.store, self._claim, state="cancelled", result=result)
             logger.info("cancelled")
         elif self._stop_seen:
-            endings.give_back(self.store, self._claim)
-            logger.info("interrupted: the job goes on with the next attempt")
+            completion.give_back(self.store, self._claim)
+            logger.info("interrupted: the job resumes with the next attempt")
         else:
-            endings.finish(self.store, self._claim, result=result)
+            completion.finish(self.store, self._claim, result=result)
             logger.info("succeeded")
 
     def _fail(self, message: str) -> int:
         try:
-            endings.fail(self.store, self._claim, message)
+            completion.fail(self.store, self._claim, message)
         except StaleAttempt as error:
             logger.warning("%s", error)
         except (StorageFull, StorageUnavailable) as error:
@@ -141,10 +140,10 @@ class Worker:
 
     def _beat(self) -> None:
         next_heartbeat = time.monotonic() + HEARTBEAT_S
-        while not self._lost.wait(LOOK_S):
+        while not self._lost.wait(CANCEL_CHECK_S):
             due = time.monotonic() >= next_heartbeat
             try:
-                look = attempts.heartbeat if due else fences.peek
+                look = attempts.heartbeat if due else fencing.peek
                 job = look(self.store, self._claim)
             except StaleAttempt:
                 self._lost.set()
@@ -159,14 +158,14 @@ class Worker:
 
 
 def die_with_parent(parent: int) -> None:
-    """Let the kernel kill this process when the server that started it dies.
+    """Request the kernel to kill this process when the server ends.
 
-    Linux only; elsewhere the fence alone keeps a left-over worker from writing.
+    Linux only; elsewhere fencing alone prevents writes of a left-over worker.
 
     Args:
         parent: Process id of the server.
     """
     if sys.platform == "linux":
         ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != parent:  # it died before the kernel was told
+    if os.getppid() != parent:  # it ended before the request
         raise SystemExit(f"the server (process {parent}) is gone")

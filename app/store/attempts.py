@@ -1,6 +1,6 @@
-"""What a running attempt writes: its claim, heartbeats, progress, checkpoints.
+"""Writes of a running attempt: its claim, heartbeats, progress, checkpoints.
 
-Every write is fenced (``app.store.fences``). How attempts end is in ``app.store.endings``.
+Every write is fenced (``app.store.fencing``). ``app.store.completion`` ends attempts.
 """
 
 import logging
@@ -17,7 +17,7 @@ from app.errors import InvalidInput
 from app.store.checkpoints import drop_job_checkpoints, insert_checkpoint
 from app.store.engine import Store
 from app.store.events import append_event
-from app.store.fences import change_state, fenced_update
+from app.store.fencing import change_state, fenced_update
 from app.store.jobs import job_from_row, read_job
 from app.store.records import Claim, JobRecord, NewCheckpoint, ResumeState
 from app.store.tables import events, job_checkpoints, jobs, metrics, resume_states
@@ -29,22 +29,22 @@ MAX_RESUME = 900 * 1024 * 1024
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Watch:
-    """The little that a supervisor needs to watch over a running job."""
+class RunningJob:
+    """State of a running job for its supervisor."""
 
     claim: Claim
-    """The attempt that runs."""
+    """The running attempt."""
     cancel_requested: bool
-    """Whether somebody asked to cancel it."""
+    """Whether a cancel was requested."""
     heartbeat_at: datetime | None
-    """Last sign of life of its worker."""
+    """Last heartbeat of its worker."""
 
 
 def claim_next(store: Store) -> tuple[Claim, JobRecord] | None:
-    """Take the oldest queued job and start its next attempt.
+    """Claim the oldest queued job for its next attempt.
 
-    Points of the curve and checkpoints beyond the last resume state are dropped, since the
-    new attempt will write those steps again.
+    Points of the curve and checkpoints beyond the last resume state are deleted, since the new
+    attempt repeats those steps.
 
     Returns:
         The claim and the job, or None if nothing is queued.
@@ -70,7 +70,7 @@ def claim_next(store: Store) -> tuple[Claim, JobRecord] | None:
 
 
 def heartbeat(store: Store, claim: Claim) -> JobRecord:
-    """Note that the worker lives and return its job, with ``cancel_requested``.
+    """Record a heartbeat and return the job, with ``cancel_requested``.
 
     Raises:
         StaleAttempt: The attempt no longer holds the job.
@@ -88,18 +88,18 @@ def record_progress(
     *,
     total_steps: int | None = None,
 ) -> None:
-    """Add one point to the job's curve.
+    """Add a point to the job's curve.
 
     Args:
         store: The database.
         claim: The attempt that writes.
-        step: Steps done, above every step recorded before.
-        values: Named numbers; None where not defined. No NaN, no infinity.
+        step: Steps done, above every recorded step.
+        values: Named finite numbers; None where not defined.
         total_steps: Steps to do, where known.
 
     Raises:
         StaleAttempt: The attempt no longer holds the job.
-        InvalidInput: The step lies not above the one recorded last, or a value is not finite.
+        InvalidInput: The step is not above the last recorded one, or a value is not finite.
         StorageFull: No room is left.
     """
     for name, value in values.items():
@@ -127,18 +127,18 @@ def record_checkpoint(
     policy: NewCheckpoint,
     resume: ResumeState | None = None,
 ) -> None:
-    """Store the policy of a step and, in the same transaction, what a new attempt needs.
+    """Store the policy of a step and, in the same transaction, the state to resume from.
 
     Args:
         store: The database.
         claim: The attempt that writes.
         step: Steps done; a checkpoint of the same step is replaced.
-        policy: The policy as it acts.
-        resume: Kept beside the job's last one; earlier ones are dropped.
+        policy: The policy.
+        resume: Stored beside the job's last one; earlier ones are deleted.
 
     Raises:
         StaleAttempt: The attempt no longer holds the job.
-        InvalidInput: Something is too large, or the steps differ.
+        InvalidInput: A size exceeds its limit, or the steps differ.
         StorageFull: No room is left; the earlier resume state stays.
     """
     if resume is not None and resume.step != step:
@@ -159,18 +159,18 @@ def record_checkpoint(
 
 
 def load_resume(store: Store, job_id: str) -> ResumeState | None:
-    """Return what a new attempt goes on from: the newest that is undamaged; None if none is."""
+    """Return the newest undamaged resume state of a job; None where there is none."""
     with store.reading() as connection:
         return _newest_sound(connection, job_id)
 
 
-def watch_running(store: Store) -> tuple[Watch, ...]:
-    """Return the running jobs, with what a supervisor looks at."""
+def running_jobs(store: Store) -> tuple[RunningJob, ...]:
+    """Return the running jobs."""
     query = sa.select(jobs).where(jobs.c.state == "running")
     with store.reading() as connection:
         found = [job_from_row(row) for row in connection.execute(query).mappings()]
     return tuple(
-        Watch(
+        RunningJob(
             claim=Claim(job_id=job.id, attempt=job.attempt),
             cancel_requested=job.cancel_requested,
             heartbeat_at=job.heartbeat_at,
@@ -180,7 +180,7 @@ def watch_running(store: Store) -> tuple[Watch, ...]:
 
 
 def _forget_beyond_resume(connection: sa.Connection, job_id: str) -> int:
-    """Drop what the dead attempt wrote after its last resume state; return that step."""
+    """Delete the last attempt's writes after its resume state; return the state's step."""
     found = _newest_sound(connection, job_id)
     step = -1 if found is None else found.step
     beyond = sa.and_(resume_states.c.job_id == job_id, resume_states.c.step > step)
@@ -217,7 +217,7 @@ def _newest_sound(connection: sa.Connection, job_id: str) -> ResumeState | None:
         if has_digest(row.digest, {"manifest": row.manifest}, row.tensors):
             return ResumeState(step=row.step, manifest=row.manifest, tensors=row.tensors)
         logger.warning(
-            "job %s: its state at step %d is damaged, it goes on from an earlier one",
+            "job %s: its state at step %d is damaged, it resumes from an earlier one",
             job_id,
             row.step,
         )

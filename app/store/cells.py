@@ -1,7 +1,7 @@
-"""Work cells of the user's own, as JSON under their names; the store never opens them.
+"""Work cells of the user's own, as JSON under a name; the store never opens them.
 
 A stored cell never changes: another one of the same name is refused until the first is removed,
-so that what a job trains in is what its name meant when it was posted.
+so that a job trains in the cell for which it was posted.
 """
 
 import logging
@@ -20,11 +20,11 @@ from app.store.tables import cells, jobs
 logger = logging.getLogger(__name__)
 
 MAX_CELLS = 200
-"""Most cells that are kept."""
+"""Largest number of cells."""
 
 
 def put_cell(store: Store, name: str, definition: Mapping[str, Any]) -> bool:
-    """Store a cell; the same one again is harmless.
+    """Store a cell; the same one again has no effect.
 
     Args:
         store: The database.
@@ -48,7 +48,7 @@ def put_cell(store: Store, name: str, definition: Mapping[str, Any]) -> bool:
                 "choose another name"
             )
         if len(known) >= MAX_CELLS:
-            raise Conflict(f"{MAX_CELLS} cells are stored, no more are kept: remove one first")
+            raise Conflict(f"{MAX_CELLS} cells are stored, the limit: remove one first")
         values = {
             "name": name,
             "definition": dict(definition),
@@ -64,7 +64,7 @@ def get_cell(store: Store, name: str) -> CellRecord:
 
     Raises:
         NotFound: No cell has that name.
-        Damaged: It is not what was stored.
+        Damaged: Its digest does not match.
     """
     query = sa.select(cells).where(cells.c.name == name)
     with store.reading() as connection:
@@ -77,7 +77,7 @@ def get_cell(store: Store, name: str) -> CellRecord:
 
 
 def list_cells(store: Store) -> tuple[CellRecord, ...]:
-    """Return all cells that are undamaged, by name."""
+    """Return all undamaged cells, by name."""
     with store.reading() as connection:
         rows = connection.execute(sa.select(cells).order_by(cells.c.name)).mappings().all()
     for row in rows:
@@ -96,11 +96,11 @@ def _record(row: sa.RowMapping) -> CellRecord:
 
 
 def remove_cell(store: Store, name: str) -> None:
-    """Remove a cell; what was trained in it carries a copy and stays.
+    """Remove a cell; policies trained in it have their own copy.
 
     Raises:
         NotFound: No cell has that name.
-        Conflict: A job that waits or runs trains in it.
+        Conflict: A queued or running job trains in it.
     """
     with store.writing() as connection:
         if (

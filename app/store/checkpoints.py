@@ -1,7 +1,7 @@
-"""Trained policies and the names that point to them.
+"""Trained policies and their aliases.
 
-A checkpoint is a JSON manifest and safetensors bytes under its SHA-256, which is compared each
-time both are read; the store never opens it. Two jobs that made the same bytes share one row.
+A checkpoint is a JSON manifest and safetensors bytes under their SHA-256, which is checked at
+each reading; the store never opens it. Jobs that made the same bytes share one row.
 """
 
 import logging
@@ -22,18 +22,18 @@ from app.store.tables import aliases, checkpoints, job_checkpoints
 logger = logging.getLogger(__name__)
 
 REMEDY = (
-    "restore the database from a backup, or train it again with its preset and seed: the same "
-    "weights take its place"
+    "restore the database from a backup, or train it again with its preset and seed, which "
+    "gives the same weights"
 )
 MAX_TENSORS = 16 * 1024 * 1024
-"""Largest policy that goes into the database [bytes]."""
+"""Largest checkpoint [bytes]."""
 
 _SHA256 = re.compile(r"[0-9a-f]{64}")
 _ALIAS = re.compile(r"[a-z0-9][a-z0-9._-]{0,63}")
 
 
 def put_checkpoint(store: Store, new: NewCheckpoint) -> CheckpointRecord:
-    """Store a checkpoint that no job made, such as a shipped one; again is harmless.
+    """Store a checkpoint without a job, such as a shipped one; again has no effect.
 
     Raises:
         InvalidInput: Its id is no SHA-256 or it is too large.
@@ -63,8 +63,7 @@ def read_checkpoint(store: Store, reference: str) -> tuple[CheckpointRecord, byt
 
     Raises:
         NotFound: Nothing has that name.
-        Damaged: Manifest and tensors are not those that were stored, or an alias names
-            nothing.
+        Damaged: The digest does not match, or an alias has no checkpoint.
     """
     with store.reading() as connection:
         sha256 = _resolve(connection, reference)
@@ -80,7 +79,7 @@ def read_checkpoint(store: Store, reference: str) -> tuple[CheckpointRecord, byt
 
 
 def find_damaged(store: Store) -> Iterator[Damaged | None]:
-    """Read all checkpoints; yields the error of each that is damaged, None for a sound one."""
+    """Read all checkpoints; yield the error of each damaged one, None for a sound one."""
     with store.reading() as connection:
         ids = connection.execute(sa.select(checkpoints.c.sha256)).scalars().all()
     for reference in (*ids, *list_aliases(store)):
@@ -101,12 +100,12 @@ def list_checkpoints(
 
     Args:
         store: The database.
-        job_id: Only those that this job made.
+        job_id: Only checkpoints of this job.
         cursor: ``next_cursor`` of the page before; None for the first.
         limit: Length of the page, 1 to 200.
 
     Raises:
-        InvalidInput: A cursor or limit that cannot be.
+        InvalidInput: The cursor or limit is invalid.
     """
     query = _described(job_id).order_by(checkpoints.c.number.desc())
     query = query.limit(check_limit(limit) + 1)
@@ -122,7 +121,7 @@ def list_checkpoints(
 
 
 def set_alias(store: Store, name: str, sha256: str) -> None:
-    """Let a name point to a checkpoint from now on.
+    """Set the checkpoint of an alias.
 
     Raises:
         NotFound: There is no such checkpoint.
@@ -141,7 +140,7 @@ def set_alias(store: Store, name: str, sha256: str) -> None:
 
 
 def list_aliases(store: Store) -> dict[str, str]:
-    """Return every alias with the SHA-256 it points to."""
+    """Return the SHA-256 of every alias."""
     query = sa.select(aliases.c.name, aliases.c.sha256).order_by(aliases.c.name)
     with store.reading() as connection:
         return {row.name: row.sha256 for row in connection.execute(query)}
@@ -150,9 +149,7 @@ def list_aliases(store: Store) -> dict[str, str]:
 def insert_checkpoint(
     connection: sa.Connection, new: NewCheckpoint, *, imported: bool = False
 ) -> None:
-    """Write a checkpoint inside a transaction, unless the same bytes are there already.
-
-    A damaged one of that id is replaced.
+    """Insert a checkpoint in a transaction, unless it is stored; replace a damaged one.
 
     Raises:
         InvalidInput: Its id is no SHA-256 or it is too large.
@@ -182,7 +179,7 @@ def insert_checkpoint(
 
 
 def drop_job_checkpoints(connection: sa.Connection, job_id: str, *, beyond: int) -> None:
-    """Forget the checkpoints a job made beyond a step, and bytes that nobody names any more."""
+    """Delete a job's checkpoints beyond a step, and their bytes where unreferenced."""
     mine = sa.and_(job_checkpoints.c.job_id == job_id, job_checkpoints.c.step > beyond)
     dropped = (
         connection.execute(sa.select(job_checkpoints.c.sha256).where(mine)).scalars().all()
@@ -216,7 +213,7 @@ def _names(connection: sa.Connection) -> dict[str, tuple[str, ...]]:
 
 
 def _described(job_id: str | None = None) -> sa.Select[Any]:
-    """Select checkpoints without tensors, each with the first job and step that made it."""
+    """Select checkpoints without tensors, each with its first job and step."""
     link = job_checkpoints.alias()
     makes = [link.c.sha256 == checkpoints.c.sha256]
     if job_id is not None:

@@ -1,4 +1,4 @@
-"""Cursors of lists: opaque text that stands for the number of the last item shown."""
+"""Cursors of lists: opaque text with the number of the last item of a page."""
 
 import base64
 import binascii
@@ -6,18 +6,18 @@ import binascii
 from app.errors import InvalidInput
 
 MAX_INTEGER = 2**63 - 1
-"""Greatest integer that the database holds."""
+"""Greatest integer of the database."""
 MAX_PAGE = 200
 """Longest page of a list."""
 
 
 def encode_cursor(number: int) -> str:
-    """Return the cursor that goes on below ``number``."""
+    """Return the cursor of the page below ``number``."""
     return base64.urlsafe_b64encode(f"n{number}".encode()).decode().rstrip("=")
 
 
 def decode_cursor(cursor: str | None) -> int | None:
-    """Return the number a cursor stands for; None for the first page.
+    """Return the number of a cursor; None for the first page.
 
     Raises:
         InvalidInput: The text was not made by :func:`encode_cursor`.
@@ -36,7 +36,7 @@ def decode_cursor(cursor: str | None) -> int | None:
 
 
 def check_limit(limit: int) -> int:
-    """Return ``limit`` if a page may be that long.
+    """Return ``limit`` if it is a valid length of a page.
 
     Raises:
         InvalidInput: It lies outside [1, MAX_PAGE].

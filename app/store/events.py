@@ -1,9 +1,8 @@
-"""What happened to a job, in order: the source of event streams.
+"""Events of jobs, the source of event streams.
 
-Ids rise strictly within a job and follow the order of commits, so a reader that asks for
-everything after the last id it saw misses nothing and sees nothing twice. When an attempt
-starts again from an earlier step, the progress beyond that step is forgotten here as in the
-curve, and the ``state`` event of the start says so (``resumed_from_step``).
+Ids increase strictly within a job in the order of commits, so that reading after the last known
+id gives every event once. When an attempt resumes from an earlier step, the progress beyond it
+is deleted here and in the curve; the ``state`` event of the start has ``resumed_from_step``.
 """
 
 from collections.abc import Mapping
@@ -26,8 +25,8 @@ def list_events(
     Args:
         store: The database.
         job_id: The job.
-        after: Id of the last event already seen (``Last-Event-ID``), 0 for all.
-        limit: At most so many; ask again with the last id for more.
+        after: Last known id (``Last-Event-ID``), 0 for all.
+        limit: Largest number of events.
 
     Raises:
         NotFound: There is no such job.
@@ -57,7 +56,7 @@ def append_event(
     data: Mapping[str, Any] | None = None,
     step: int | None = None,
 ) -> None:
-    """Write one event inside the transaction that raised ``jobs.last_event`` to its id."""
+    """Insert an event in the transaction that set ``jobs.last_event`` to its id."""
     connection.execute(
         sa.insert(events).values(
             job_id=job_id,

@@ -1,11 +1,11 @@
-"""Jobs as their owners see them: submit, look, cancel.
+"""Jobs: submit, read, cancel.
 
     queued ──claim──> running ──> succeeded | failed
       │ ^               │  └──cancel──> cancelling ──> cancelled
       │ └──crash, restart of the server──┘
       └──cancel──> cancelled
 
-What workers and the supervisor write is in ``app.store.attempts``.
+Writes of workers and of the supervisor are in ``app.store.attempts`` and ``.completion``.
 """
 
 import uuid
@@ -28,14 +28,12 @@ MAX_KEY_LENGTH = 255
 
 
 def create_job(store: Store, new: NewJob, *, idempotency_key: str | None = None) -> JobRecord:
-    """Queue a job.
-
-    The same key with the same spec returns the job that is already there.
+    """Queue a job; the same key with the same spec returns the existing job.
 
     Args:
         store: The database.
-        new: What to do.
-        idempotency_key: Name given by the caller to this submission.
+        new: The job.
+        idempotency_key: Identifies this submission.
 
     Raises:
         Conflict: The key was used for another spec.
@@ -101,7 +99,7 @@ def list_jobs(
         state: Only jobs in this state.
 
     Raises:
-        InvalidInput: A cursor or limit that cannot be.
+        InvalidInput: The cursor or limit is invalid.
     """
     query = sa.select(jobs).order_by(jobs.c.number.desc()).limit(check_limit(limit) + 1)
     below = decode_cursor(cursor)
@@ -117,11 +115,11 @@ def list_jobs(
 
 
 def request_cancel(store: Store, job_id: str) -> JobRecord:
-    """Cancel a queued job at once; ask a running one to stop; leave a finished one alone.
+    """Cancel a queued job at once; request the stop of a running one.
 
     Raises:
         NotFound: There is no such job.
-        Conflict: The job has succeeded or failed already.
+        Conflict: The job has succeeded or failed.
     """
     with store.writing() as connection:
         job = read_job(connection, job_id, for_update=True)
@@ -133,13 +131,13 @@ def request_cancel(store: Store, job_id: str) -> JobRecord:
 
 
 def read_job(connection: sa.Connection, job_id: str, *, for_update: bool = False) -> JobRecord:
-    """Return one job inside a transaction, locking its row if it is about to change.
+    """Return one job in a transaction; lock its row for an update.
 
     Raises:
         NotFound: There is no such job.
     """
     query = sa.select(jobs).where(jobs.c.id == job_id)
-    if for_update:  # SQLite has no row locks and needs none: writers are alone there
+    if for_update:  # SQLite has no row locks: there is one writer at a time
         query = query.with_for_update()
     row = connection.execute(query).mappings().first()
     if row is None:
@@ -148,7 +146,7 @@ def read_job(connection: sa.Connection, job_id: str, *, for_update: bool = False
 
 
 def job_from_row(row: Mapping[Any, Any]) -> JobRecord:
-    """Turn a row of the table into its record."""
+    """Return the record of a row."""
     fields = dict(row)
     if fields["state"] == "running" and fields["cancel_requested"]:
         fields["state"] = "cancelling"

@@ -1,8 +1,7 @@
-"""One server per data folder and database.
+"""Lock for one server per data folder and database.
 
-The lock is the kernel's (``flock``): it ends with the process that holds it, however that
-dies, so there is never a stale one to remove and no process id to trust. The id inside the
-file is for people. A PostgreSQL database is locked by an advisory lock of its own besides.
+The lock is the kernel's (``flock``) and ends with its process, so that it is never stale. The
+process id in the file is for error messages. A PostgreSQL database has an advisory lock, too.
 """
 
 import fcntl
@@ -19,7 +18,7 @@ _POSTGRESQL_KEY = 0x74616E64656D
 
 
 class ServerLock:
-    """The right to be the one server of a data folder and of a database.
+    """Exclusive use of a data folder and a database.
 
     Args:
         store: The database.
@@ -36,7 +35,7 @@ class ServerLock:
         self._session: sa.Connection | None = None
 
     def acquire(self) -> None:
-        """Take the lock, or say who has it.
+        """Acquire the lock.
 
         Raises:
             Conflict: Another server holds it.
@@ -54,7 +53,7 @@ class ServerLock:
             raise
 
     def release(self) -> None:
-        """Give the lock back; harmless when it is not held."""
+        """Release the lock, if it is held."""
         if self._session is not None:
             self._session.invalidate()  # ends the session and the lock with it
             self._session.close()
@@ -86,7 +85,7 @@ def _lock(path: Path) -> int:
         os.close(file)
         raise Conflict(
             f"another Tandem server (process {holder}) already uses {path.parent}: stop it, or "
-            "give this one a folder of its own with TANDEM_DATA"
+            "set another folder with TANDEM_DATA"
         ) from error
     os.ftruncate(file, 0)
     os.pwrite(file, f"{os.getpid()}\n".encode(), 0)

@@ -1,4 +1,4 @@
-"""The curve of a job: one row per step of its fixed grid, never two."""
+"""Learning curves of jobs: one row per step."""
 
 import sqlalchemy as sa
 
@@ -17,8 +17,8 @@ def list_metrics(
     Args:
         store: The database.
         job_id: The job.
-        after_step: The last step already known; -1 for all.
-        limit: At most so many; ask again with the last step for more.
+        after_step: Last known step; -1 for all.
+        limit: Largest number of points.
 
     Raises:
         NotFound: There is no such job.

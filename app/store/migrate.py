@@ -1,4 +1,4 @@
-"""Bring a database to the schema of this code, or say why that cannot be."""
+"""Creation and upgrade of the tables."""
 
 from pathlib import Path
 
@@ -16,11 +16,11 @@ _SCRIPTS = Path(__file__).parent / "migrations"
 
 
 def migrate(store: Store) -> None:
-    """Create or upgrade the tables; only the holder of the data lock may call it.
+    """Create or upgrade the tables; requires the server's lock.
 
     Raises:
-        Conflict: The database was written by a newer version of Tandem.
-        InvalidInput: It is no database.
+        Conflict: A newer version of Tandem wrote the database.
+        InvalidInput: The file is no database.
         StorageUnavailable: It does not answer.
         StorageFull: No room is left.
     """
@@ -33,7 +33,7 @@ def migrate(store: Store) -> None:
 
 
 def alembic_config() -> Config:
-    """Return the configuration that knows where the scripts are."""
+    """Return Alembic's configuration."""
     config = Config()
     config.set_main_option("script_location", str(_SCRIPTS).replace("%", "%%"))
     return config

@@ -1,6 +1,6 @@
-"""What the store hands out and takes in: frozen data, no database rows.
+"""Data types of the store: frozen dataclasses, no database rows.
 
-Times are aware ``datetime`` in UTC. JSON values are plain dicts, lists and numbers.
+Times are aware ``datetime`` in UTC. JSON values are dicts, lists and numbers.
 """
 
 from collections.abc import Mapping
@@ -14,7 +14,7 @@ JobState = Literal["queued", "running", "cancelling", "succeeded", "failed", "ca
 """``cancelling`` is a running job whose cancel was requested."""
 
 FINAL_STATES: tuple[JobState, ...] = ("succeeded", "failed", "cancelled")
-"""States that a job never leaves."""
+"""Final states."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,30 +24,30 @@ class Page(Generic[Item]):
     items: tuple[Item, ...]
     """The items of this page."""
     next_cursor: str | None
-    """Pass it back for the next page; None on the last one."""
+    """Cursor of the next page; None on the last one."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NewJob:
-    """What is needed to queue a job; made by ``jobs.spec`` from a checked body."""
+    """A job to queue; made by ``jobs.spec`` from a checked body."""
 
     kind: str
     """``"train"`` or ``"evaluate"``."""
     spec: Mapping[str, Any]
-    """The body as it was posted, kept unchanged."""
+    """The posted body."""
     preset: str | None = None
     """Name of the preset, for jobs that have one."""
     seed: int = 0
-    """Seed of every random stream of the job."""
+    """Seed of every random stream."""
     overrides: Mapping[str, Any] | None = None
     """Changes to the preset's fields."""
     total_steps: int | None = None
-    """Steps the job will take, where known beforehand."""
+    """Steps of the job, where known beforehand."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JobRecord:
-    """One job as the database knows it."""
+    """A job."""
 
     id: str
     """UUID as text."""
@@ -58,79 +58,76 @@ class JobRecord:
     preset: str | None
     """Name of the preset."""
     seed: int
-    """Seed of every random stream of the job."""
+    """Seed of every random stream."""
     overrides: Mapping[str, Any]
     """Changes to the preset's fields."""
     spec: Mapping[str, Any]
-    """The body as it was posted."""
+    """The posted body."""
     state: JobState
-    """Where the job stands."""
+    """Its state."""
     attempt: int
-    """How often it was started; 0 while it was never claimed."""
+    """Number of starts; 0 before the first claim."""
     failures: int
-    """How many of its attempts crashed (deaths of the server do not count)."""
+    """Number of crashed attempts (deaths of the server do not count)."""
     created_at: datetime
-    """When it was submitted."""
+    """Time of submission."""
     started_at: datetime | None
-    """When it was first claimed."""
+    """Time of the first claim."""
     finished_at: datetime | None
-    """When it reached a final state."""
+    """Time of the final state."""
     heartbeat_at: datetime | None
-    """Last sign of life of its worker."""
+    """Last heartbeat of its worker."""
     error: str | None
-    """Why it failed, for people."""
+    """Cause of the failure, as text."""
     step: int
     """Steps done."""
     total_steps: int | None
     """Steps to do, where known."""
     cancel_requested: bool
-    """Whether somebody asked to cancel it."""
+    """Whether a cancel was requested."""
     idempotency_key: str | None
-    """Key under which it was submitted."""
+    """Key of its submission."""
     result: Mapping[str, Any] | None
-    """What it found, once succeeded: an evaluation's JSON, a training's summary."""
+    """Result once succeeded: an evaluation's JSON, a training's summary."""
     last_event: int
     """Id of its newest event."""
 
     @property
     def is_final(self) -> bool:
-        """Whether the job will never change again."""
+        """Whether the state is final."""
         return self.state in FINAL_STATES
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Claim:
-    """The right to write about one job: the fence of every write by a worker.
-
-    A write counts only while the job is running and has this attempt number.
-    """
+    """The right of one attempt to write about its job, while the job runs that attempt."""
 
     job_id: str
     """The job."""
     attempt: int
-    """The attempt that holds it."""
+    """Number of the attempt."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MetricRow:
-    """One point of a job's curve."""
+    """A point of a job's curve."""
 
     step: int
     """Environment steps done; strictly increasing within a job."""
     values: Mapping[str, float | None]
-    """Named numbers of that moment, such as ``success``; None where not defined yet."""
+    """Named numbers, such as ``success``; None where not defined."""
     at: datetime
-    """When it was recorded."""
+    """Time of recording."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JobEvent:
-    """One thing that happened to a job, for event streams."""
+    """An event of a job, for event streams."""
 
     id: int
     """Strictly increasing within the job, in the order of commits."""
     kind: Literal["state", "progress", "checkpoint"]
-    """What happened.
+    """Kind of event.
 
     ``state``: ``data`` has state, attempt, error, resumed_from_step (drop every point of the
     curve beyond it; None: not a start). ``progress``: step and the curve's values.
@@ -139,15 +136,15 @@ class JobEvent:
     data: Mapping[str, Any]
     """The details."""
     at: datetime
-    """When."""
+    """Time of the event."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NewCheckpoint:
-    """A checkpoint to be stored; the store never opens it."""
+    """A checkpoint to store."""
 
     sha256: str
-    """Its identity, computed by whoever made it."""
+    """Digest of manifest and tensors."""
     manifest: Mapping[str, Any]
     """Its JSON manifest."""
     tensors: bytes
@@ -159,11 +156,11 @@ class CheckpointRecord:
     """A stored checkpoint, without its tensors."""
 
     sha256: str
-    """Its identity."""
+    """Digest of manifest and tensors."""
     number: int
     """Running number, in the order of storing."""
     job_id: str | None
-    """The job that made it; None for one that was imported."""
+    """The job that made it; None for an imported one."""
     step: int | None
     """The step of that job."""
     manifest: Mapping[str, Any]
@@ -171,9 +168,9 @@ class CheckpointRecord:
     size: int
     """Length of the tensors [bytes]."""
     created_at: datetime
-    """When it was stored."""
+    """Time of storing."""
     aliases: tuple[str, ...]
-    """Names that point to it."""
+    """Its aliases."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -185,29 +182,29 @@ class CellRecord:
     definition: Mapping[str, Any]
     """Its content, JSON data."""
     created_at: datetime
-    """When it was stored."""
+    """Time of storing."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NewRecording:
-    """An imported recording to be stored; the store never opens it."""
+    """A recording to store."""
 
     name: str
     """Its name, unique."""
     sha256: str
-    """Of the file that it was imported from."""
+    """Digest of its file."""
     file_name: str
-    """Name of that file."""
+    """Name of its file."""
     n_runs: int
-    """Clean runs."""
+    """Number of clean runs."""
     n_frames: int
-    """Frames of the file."""
+    """Number of frames of the file."""
     duration: float
-    """Of the file [s]."""
+    """Duration of the file [s]."""
     summary: Mapping[str, Any]
-    """What a list shows of it: measures and errors."""
+    """Measures and errors, shown in lists."""
     detail: Mapping[str, Any]
-    """What is said of each run and each artifact."""
+    """Each run and each artifact."""
     tensors: bytes
     """The runs, as safetensors bytes."""
 
@@ -217,35 +214,35 @@ class StoredRecording:
     """A stored recording, without its runs."""
 
     number: int
-    """Running number, in the order of storing; never given twice."""
+    """Running number, in the order of storing; never used twice."""
     name: str
     """Its name, unique."""
     sha256: str
-    """Of the file that it was imported from."""
+    """Digest of its file."""
     file_name: str
-    """Name of that file."""
+    """Name of its file."""
     n_runs: int
-    """Clean runs."""
+    """Number of clean runs."""
     n_frames: int
-    """Frames of the file."""
+    """Number of frames of the file."""
     duration: float
-    """Of the file [s]."""
+    """Duration of the file [s]."""
     summary: Mapping[str, Any]
-    """What a list shows of it: measures and errors."""
+    """Measures and errors, shown in lists."""
     detail: Mapping[str, Any] | None = None
-    """What is said of each run and each artifact; None in lists."""
+    """Each run and each artifact; None in lists."""
     size: int
     """Length of the runs [bytes]."""
     created_at: datetime
-    """When it was stored."""
+    """Time of storing."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ResumeState:
-    """Everything a new attempt needs to go on from ``step``."""
+    """State of a training from which a new attempt resumes."""
 
     step: int
-    """Steps done when it was taken."""
+    """Steps done."""
     manifest: Mapping[str, Any]
     """Its JSON manifest."""
     tensors: bytes

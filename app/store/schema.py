@@ -1,4 +1,4 @@
-"""Whether a database has the tables of this code; for workers, which never change them."""
+"""Check of the database's schema, for workers, which never change it."""
 
 import sqlalchemy as sa
 
@@ -10,10 +10,10 @@ REVISION = "0005"
 
 
 def check_schema(store: Store) -> None:
-    """Make sure that the tables are those of this code, without changing anything.
+    """Check that the tables have this version, without changing them.
 
     Raises:
-        Conflict: They are not.
+        Conflict: They have another version.
         StorageUnavailable: The database does not answer.
     """
     with store.reading() as connection:

@@ -1,7 +1,7 @@
 """The tables. Migrations in ``app/store/migrations`` build exactly these (a test compares).
 
-Every table of a job hangs on ``jobs.id``. ``jobs.last_event`` numbers the events of a job: it
-is raised in the same UPDATE that fences the write, so ids follow the order of commits.
+Every table of a job refers to ``jobs.id``. ``jobs.last_event`` numbers the events of a job: the
+UPDATE that fences a write increments it, so that ids follow the order of commits.
 """
 
 import logging
@@ -47,11 +47,11 @@ class UtcDateTime(TypeDecorator[datetime]):
     cache_ok = True
 
     def process_bind_param(self, value: datetime | None, dialect: Dialect) -> datetime | None:
-        """Drop the zone, after moving to UTC."""
+        """Convert to UTC and drop the zone."""
         return None if value is None else value.astimezone(UTC).replace(tzinfo=None)
 
     def result_processor(self, dialect: Dialect, coltype: object) -> Any:
-        """Read a damaged time as the year 1, so that other rows are still read."""
+        """Read a damaged time as year 1, so that other rows can be read."""
         read = super().result_processor(dialect, coltype)
 
         def process(value: Any) -> Any:
@@ -64,7 +64,7 @@ class UtcDateTime(TypeDecorator[datetime]):
         return process
 
     def process_result_value(self, value: datetime | None, dialect: Dialect) -> datetime | None:
-        """Put the zone back."""
+        """Add the zone."""
         return None if value is None else value.replace(tzinfo=UTC)
 
 
@@ -151,7 +151,7 @@ resume_states = Table(
     Column("digest", String(64)),
     Column("tensors", LargeBinary, nullable=False),
 )
-"""The newest two of each job, so that damage to one does not cost the training."""
+"""The newest two of each job, against damage to one."""
 
 aliases = Table(
     "aliases",
@@ -197,4 +197,4 @@ reserve = Table(
     Column("id", Integer, primary_key=True, autoincrement=False),
     Column("filler", LargeBinary, nullable=False),
 )
-"""Room that is given up when the database is full, so that a job can still be marked failed."""
+"""Space that is freed in a full database, so that a job can be marked failed."""

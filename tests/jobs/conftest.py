@@ -27,7 +27,7 @@ def executor(store: Store, tmp_path: Path) -> LocalProcess:
 @pytest.fixture
 def supervisor(store: Store, tmp_path: Path, executor: LocalProcess) -> Iterator[Supervisor]:
     """A supervisor that runs counting jobs."""
-    started = Supervisor(store, tmp_path, executor=executor, patience=PATIENCE)
+    started = Supervisor(store, tmp_path, executor=executor, timeouts=PATIENCE)
     started.start()
     yield started
     started.stop()

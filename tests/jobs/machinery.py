@@ -11,10 +11,10 @@ from app.store import checkpoints, jobs, metrics
 from app.store.engine import Store
 from app.store.records import JobRecord, NewJob
 from jobs.executor import PROJECT_ROOT
-from jobs.supervisor import Patience
+from jobs.supervisor import Timeouts
 from tests.jobs.counting_worker import CHECKPOINT_EVERY, FACTOR, GRID, MODULUS
 
-PATIENCE = Patience(tick_s=0.05, cancel_s=1.0, shutdown_s=5.0)
+PATIENCE = Timeouts(tick_s=0.05, cancel_s=1.0, shutdown_s=5.0)
 WAIT_S = 600.0
 """Far above what anything takes, compiling kernels included; only a hang reaches it."""
 

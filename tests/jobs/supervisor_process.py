@@ -6,7 +6,7 @@ from pathlib import Path
 
 from app.store.engine import Store
 from jobs.executor import LocalProcess
-from jobs.supervisor import Patience, Supervisor
+from jobs.supervisor import Supervisor, Timeouts
 
 COUNTING = (sys.executable, "-m", "tests.jobs.counting_worker")
 
@@ -14,7 +14,7 @@ COUNTING = (sys.executable, "-m", "tests.jobs.counting_worker")
 def main(data_dir: Path) -> None:
     store = Store(f"sqlite:///{data_dir}/tandem.db")
     executor = LocalProcess(store.url, data_dir, COUNTING)
-    supervisor = Supervisor(store, data_dir, executor=executor, patience=Patience(tick_s=0.05))
+    supervisor = Supervisor(store, data_dir, executor=executor, timeouts=Timeouts(tick_s=0.05))
     supervisor.start()
     print("ready", flush=True)
     threading.Event().wait()

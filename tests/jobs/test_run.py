@@ -38,7 +38,7 @@ TINY = {
 @pytest.fixture
 def supervisor(store: Store, tmp_path: Path) -> Iterator[Supervisor]:
     """A supervisor that runs real jobs."""
-    started = Supervisor(store, tmp_path, patience=PATIENCE)
+    started = Supervisor(store, tmp_path, timeouts=PATIENCE)
     started.start()
     yield started
     started.stop()

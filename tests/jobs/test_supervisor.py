@@ -64,7 +64,7 @@ def test_job_that_always_crashes_fails_with_its_last_words(store: Store) -> None
     job_id = queue(store, steps=40, raise_at=25)
     job = wait_until_final(store, job_id)
     assert (job.state, job.attempt) == ("failed", 3)
-    assert job.error is not None and "crashed 3 times" in job.error
+    assert job.error is not None and "Failed after 3 attempts" in job.error
     assert "RuntimeError: deliberate crash at step 25" in job.error
     assert [c.step for c in checkpoints.list_checkpoints(store).items] == [20]
 
@@ -107,8 +107,8 @@ def test_deaf_worker_is_killed_after_the_grace_time(store: Store) -> None:
 def test_worker_without_a_sign_of_life_is_killed_and_the_job_goes_on(
     store: Store, tmp_path: Path, executor: LocalProcess
 ) -> None:
-    patience = replace(PATIENCE, silence_s=20.0)
-    supervisor = Supervisor(store, tmp_path, executor=executor, patience=patience)
+    timeouts = replace(PATIENCE, silence_s=20.0)
+    supervisor = Supervisor(store, tmp_path, executor=executor, timeouts=timeouts)
     supervisor.start()
     job_id = queue(store, steps=100, hold_at=[27])
     wait_for(store, job_id, lambda job: job.step == 25)
@@ -123,7 +123,7 @@ def test_stopped_server_queues_its_job_again_and_the_next_one_finishes_it(
     store: Store, tmp_path: Path, executor: LocalProcess
 ) -> None:
     job_id = queue(store, steps=100, hold_at=[27])
-    first = Supervisor(store, tmp_path, executor=executor, patience=PATIENCE)
+    first = Supervisor(store, tmp_path, executor=executor, timeouts=PATIENCE)
     first.start()
     wait_for(store, job_id, lambda job: job.step == 25)
     first.stop()
@@ -131,7 +131,7 @@ def test_stopped_server_queues_its_job_again_and_the_next_one_finishes_it(
     resume = attempts.load_resume(store, job_id)
     assert (job.state, job.failures) == ("queued", 0)
     assert resume is not None and resume.step == 27
-    second = Supervisor(store, tmp_path, executor=executor, patience=PATIENCE)
+    second = Supervisor(store, tmp_path, executor=executor, timeouts=PATIENCE)
     second.start()
     assert wait_until_final(store, job_id).failures == 0
     second.stop()
@@ -184,7 +184,7 @@ def test_row_left_running_without_a_worker_is_started_again(store: Store) -> Non
 
 def test_worker_that_cannot_be_started_fails_the_job(store: Store, tmp_path: Path) -> None:
     executor = LocalProcess(store.url, tmp_path, ("/no/such/program",))
-    supervisor = Supervisor(store, tmp_path, executor=executor, patience=PATIENCE)
+    supervisor = Supervisor(store, tmp_path, executor=executor, timeouts=PATIENCE)
     supervisor.start()
     job = wait_until_final(store, queue(store, steps=20))
     supervisor.stop()

@@ -5,7 +5,7 @@ import pytest
 
 from app.digests import digest
 from app.errors import InvalidInput, StaleAttempt
-from app.store import attempts, checkpoints, endings, events, fences, jobs, metrics
+from app.store import attempts, checkpoints, completion, events, fencing, jobs, metrics
 from app.store.engine import Store
 from app.store.records import Claim, NewCheckpoint, NewJob, ResumeState
 
@@ -29,7 +29,7 @@ def curve(store: Store, claim: Claim) -> list[int]:
 
 
 def claim_again(store: Store) -> Claim:
-    endings.requeue_orphans(store)
+    completion.requeue_orphans(store)
     found = attempts.claim_next(store)
     assert found is not None
     return found[0]
@@ -82,12 +82,12 @@ STALE_WRITES: dict[str, Callable[[Store, Claim], object]] = {
     "checkpoint": lambda store, claim: attempts.record_checkpoint(
         store, claim, 99, policy(), resume(99)
     ),
-    "finish": lambda store, claim: endings.finish(store, claim, result={"stale": True}),
-    "fail": lambda store, claim: endings.fail(store, claim, "stale"),
-    "crash": lambda store, claim: endings.crash(store, claim, "stale", max_failures=3),
-    "give back": lambda store, claim: endings.give_back(store, claim),
+    "finish": lambda store, claim: completion.finish(store, claim, result={"stale": True}),
+    "fail": lambda store, claim: completion.fail(store, claim, "stale"),
+    "crash": lambda store, claim: completion.crash(store, claim, "stale", max_failures=3),
+    "give back": lambda store, claim: completion.give_back(store, claim),
     "heartbeat": lambda store, claim: attempts.heartbeat(store, claim),
-    "peek": lambda store, claim: fences.peek(store, claim),
+    "peek": lambda store, claim: fencing.peek(store, claim),
 }
 
 
@@ -99,9 +99,9 @@ def test_stale_attempt_can_change_nothing(
     if ending == "taken over":
         claim_again(store)
     elif ending == "ended":
-        endings.finish(store, claim)
+        completion.finish(store, claim)
     else:
-        endings.give_back(store, claim)
+        completion.give_back(store, claim)
     before = jobs.get_job(store, claim.job_id)
     with pytest.raises(StaleAttempt, match="attempt 1 no longer holds job"):
         write(store, claim)
@@ -152,7 +152,7 @@ def test_checkpoint_of_the_same_step_replaces_the_earlier(store: Store, claim: C
 
 def test_resume_state_goes_when_the_job_ends(store: Store, claim: Claim) -> None:
     attempts.record_checkpoint(store, claim, 10, policy(), resume(10))
-    endings.finish(store, claim, result={"success": 0.9})
+    completion.finish(store, claim, result={"success": 0.9})
     job = jobs.get_job(store, claim.job_id)
     assert attempts.load_resume(store, claim.job_id) is None
     assert (job.state, job.result) == ("succeeded", {"success": 0.9})
@@ -172,17 +172,17 @@ def test_death_of_the_server_is_no_failure_of_the_job(store: Store, claim: Claim
 
 def test_job_fails_with_its_third_crash(store: Store, claim: Claim) -> None:
     for _ in range(2):
-        assert endings.crash(store, claim, "boom", max_failures=3).state == "queued"
+        assert completion.crash(store, claim, "boom", max_failures=3).state == "queued"
         claim = claim_again(store)
-    job = endings.crash(store, claim, "boom: the last words", max_failures=3)
+    job = completion.crash(store, claim, "boom: the last words", max_failures=3)
     assert job.state == "failed" and job.error is not None
-    assert "crashed 3 times" in job.error and "the last words" in job.error
+    assert "Failed after 3 attempts" in job.error and "the last words" in job.error
 
 
 def test_success_after_a_crash_clears_the_error(store: Store, claim: Claim) -> None:
-    endings.crash(store, claim, "boom", max_failures=3)
+    completion.crash(store, claim, "boom", max_failures=3)
     claim = claim_again(store)
-    endings.finish(store, claim)
+    completion.finish(store, claim)
     job = jobs.get_job(store, claim.job_id)
     assert (job.state, job.error, job.failures) == ("succeeded", None, 1)
 
@@ -192,11 +192,11 @@ def test_job_to_be_cancelled_is_not_queued_again(store: Store, claim: Claim, how
     attempts.record_checkpoint(store, claim, 10, policy(), resume(10))
     jobs.request_cancel(store, claim.job_id)
     if how == "orphan":
-        endings.requeue_orphans(store)
+        completion.requeue_orphans(store)
     elif how == "crash":
-        endings.crash(store, claim, "killed", max_failures=3)
+        completion.crash(store, claim, "killed", max_failures=3)
     else:
-        endings.give_back(store, claim)
+        completion.give_back(store, claim)
     assert jobs.get_job(store, claim.job_id).state == "cancelled"
     assert attempts.load_resume(store, claim.job_id) is None
 
@@ -210,7 +210,7 @@ def test_events_follow_the_commits_without_gap_or_repetition(
     record(store, claim, 10)
     second = claim_again(store)
     record(store, second, 10)
-    endings.finish(store, second)
+    completion.finish(store, second)
     later = events.list_events(store, claim.job_id, after=seen[-1].id)
     kinds = [(e.kind, e.data.get("state", e.data.get("step"))) for e in (*seen, *later)]
     assert kinds == [

@@ -1,7 +1,7 @@
 import pytest
 
 from app.errors import Conflict, NotFound
-from app.store import attempts, cells, endings, jobs
+from app.store import attempts, cells, completion, jobs
 from app.store.engine import Store
 from app.store.records import NewJob
 
@@ -49,7 +49,7 @@ def test_cell_stays_while_a_job_waits_or_trains_in_it(store: Store) -> None:
     assert found is not None
     with pytest.raises(Conflict, match="in use by job"):
         cells.remove_cell(store, "kitchen")
-    endings.finish(store, found[0])
+    completion.finish(store, found[0])
     cells.remove_cell(store, "kitchen")
 
 
@@ -57,5 +57,5 @@ def test_only_so_many_cells_are_kept(store: Store, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(cells, "MAX_CELLS", 2)
     for name in ("a", "b"):
         cells.put_cell(store, name, {"name": name})
-    with pytest.raises(Conflict, match="no more are kept"):
+    with pytest.raises(Conflict, match="the limit"):
         cells.put_cell(store, "c", {"name": "c"})

@@ -2,7 +2,7 @@ import pytest
 
 from app.digests import digest
 from app.errors import InvalidInput, NotFound
-from app.store import attempts, checkpoints, endings, jobs
+from app.store import attempts, checkpoints, completion, jobs
 from app.store.engine import Store
 from app.store.records import Claim, NewCheckpoint, NewJob, ResumeState
 
@@ -117,7 +117,7 @@ def test_dropped_checkpoint_stays_while_somebody_names_it(store: Store, claim: C
     )
     checkpoints.set_alias(store, "kept", policy(b"named").sha256)
     checkpoints.put_checkpoint(store, policy(b"imported"))
-    endings.requeue_orphans(store)
+    completion.requeue_orphans(store)
     assert attempts.claim_next(store) is not None
     left = {item.sha256 for item in checkpoints.list_checkpoints(store).items}
     assert left == {policy(c).sha256 for c in (b"shared", b"named", b"imported")}

@@ -11,7 +11,7 @@ from alembic import command
 
 from app.digests import digest
 from app.errors import Damaged, NotFound, StorageUnavailable
-from app.store import attempts, cells, checkpoints, endings, jobs, metrics, recordings
+from app.store import attempts, cells, checkpoints, completion, jobs, metrics, recordings
 from app.store.engine import Store
 from app.store.migrate import alembic_config, migrate
 from app.store.records import Claim, NewCheckpoint, NewRecording, ResumeState
@@ -127,7 +127,7 @@ def train_on(store: Store, claim: Claim, *steps: int) -> None:
 
 
 def claim_again(store: Store) -> Claim:
-    endings.requeue_orphans(store)
+    completion.requeue_orphans(store)
     found = attempts.claim_next(store)
     assert found is not None
     return found[0]
@@ -172,7 +172,7 @@ def test_two_states_of_a_training_are_kept_and_none_of_an_ended_one(
     train_on(store, claim, 10, 20, 30, 40)
     with store.reading() as connection:
         assert connection.execute(kept).scalars().all() == [30, 40]
-    endings.finish(store, claim)
+    completion.finish(store, claim)
     with store.reading() as connection:
         assert connection.execute(kept).scalars().all() == []
 

@@ -6,7 +6,7 @@ import sqlalchemy as sa
 from sqlalchemy import event
 
 from app.errors import InvalidInput, StorageFull
-from app.store import attempts, endings, jobs, metrics
+from app.store import attempts, completion, jobs, metrics
 from app.store.engine import Store
 from app.store.migrate import migrate
 from app.store.records import Claim, NewCheckpoint, NewJob, ResumeState
@@ -120,12 +120,12 @@ def test_full_database_refuses_new_jobs_with_a_reason(store: Store) -> None:
 def test_job_can_fail_in_a_full_database_with_room_set_aside(
     store: Store, claim: Claim
 ) -> None:
-    endings.fill_reserve(store)
+    completion.fill_reserve(store)
     fill_up(store, spare_pages=10)
     record_until_full(store, claim)
-    endings.fail(store, claim, "e" * endings.MAX_ERROR)
+    completion.fail(store, claim, "e" * completion.MAX_ERROR)
     job = jobs.get_job(store, claim.job_id)
-    assert (job.state, job.error) == ("failed", "e" * endings.MAX_ERROR)
+    assert (job.state, job.error) == ("failed", "e" * completion.MAX_ERROR)
 
 
 def test_full_database_keeps_the_earlier_resume_state(store: Store, claim: Claim) -> None:
@@ -141,8 +141,8 @@ def test_full_database_keeps_the_earlier_resume_state(store: Store, claim: Claim
 
 
 def test_reserve_is_filled_once(store: Store) -> None:
-    endings.fill_reserve(store)
-    endings.fill_reserve(store)
+    completion.fill_reserve(store)
+    completion.fill_reserve(store)
     migrate(store)
     with store.reading() as connection:
         assert connection.execute(sa.text("SELECT count(*) FROM reserve")).scalar() == 1

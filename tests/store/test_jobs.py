@@ -1,7 +1,7 @@
 import pytest
 
 from app.errors import Conflict, InvalidInput, NotFound
-from app.store import attempts, endings, jobs
+from app.store import attempts, completion, jobs
 from app.store.engine import Store
 from app.store.records import Claim, NewJob
 
@@ -111,6 +111,6 @@ def test_cancelling_twice_changes_nothing(store: Store) -> None:
 
 
 def test_finished_job_cannot_be_cancelled(store: Store, claim: Claim) -> None:
-    endings.finish(store, claim)
+    completion.finish(store, claim)
     with pytest.raises(Conflict, match="has already succeeded"):
         jobs.request_cancel(store, claim.job_id)

@@ -1,6 +1,6 @@
-"""How attempts end: well, cancelled, failed, crashed, interrupted, orphaned.
+"""Ends of attempts: succeeded, cancelled, failed, crashed, interrupted, orphaned.
 
-Deaths of the server are not counted against a job; crashes of its worker are.
+Crashes of its worker count as failures of a job; deaths of the server do not.
 """
 
 from collections.abc import Mapping
@@ -11,16 +11,15 @@ import sqlalchemy as sa
 
 from app.errors import StorageFull
 from app.store.engine import Store
-from app.store.fences import change_state, fenced_update, peek
+from app.store.fencing import change_state, fenced_update, peek
 from app.store.jobs import read_job
 from app.store.records import Claim, JobRecord
 from app.store.tables import jobs, reserve, resume_states
 
 MAX_ERROR = 4000
-"""Longest error text kept with a job [characters]."""
-
+"""Longest error text of a job [characters]."""
 RESERVE_BYTES = 128 * 1024
-"""Room set aside for marking a job failed in a full database [bytes]."""
+"""Space reserved for marking a job failed in a full database [bytes]."""
 
 
 def finish(
@@ -30,7 +29,7 @@ def finish(
     state: Literal["succeeded", "cancelled"] = "succeeded",
     result: Mapping[str, Any] | None = None,
 ) -> None:
-    """End a job well, or as cancelled.
+    """End a job as succeeded or cancelled.
 
     Raises:
         StaleAttempt: The attempt no longer holds the job.
@@ -43,14 +42,14 @@ def finish(
 
 
 def fail(store: Store, claim: Claim, error: str) -> None:
-    """End a job with an error that no further attempt would cure.
+    """End a job with a permanent error.
 
-    On a full database the room reserved for this moment is given up; the supervisor sets it
-    aside again when it next starts.
+    On a full database the reserved space is freed; the supervisor reserves it again at its next
+    start.
 
     Raises:
         StaleAttempt: The attempt no longer holds the job.
-        StorageFull: Not even that was enough.
+        StorageFull: The reserved space was not sufficient.
     """
     changes = {"error": error[-MAX_ERROR:]}
     try:
@@ -65,13 +64,13 @@ def fail(store: Store, claim: Claim, error: str) -> None:
 
 
 def crash(store: Store, claim: Claim, error: str, *, max_failures: int) -> JobRecord:
-    """Note that an attempt died; queue the job again unless that happened too often.
+    """Record the crash of an attempt; queue the job again up to a number of crashes.
 
     Args:
         store: The database.
-        claim: The attempt that died.
-        error: Why, as far as known.
-        max_failures: The job fails with its crash number ``max_failures``.
+        claim: The crashed attempt.
+        error: The cause, as far as known.
+        max_failures: The job fails with this number of crashes.
 
     Raises:
         StaleAttempt: The attempt no longer holds the job.
@@ -80,7 +79,7 @@ def crash(store: Store, claim: Claim, error: str, *, max_failures: int) -> JobRe
     job = peek(store, claim)
     failures = job.failures + 1
     if failures >= max_failures:
-        fail(store, claim, f"crashed {failures} times, the last time so: {error}")
+        fail(store, claim, f"Failed after {failures} attempts. Last error: {error}")
     else:
         with store.writing() as connection:
             changes = {"failures": failures, "error": error[-MAX_ERROR:]}
@@ -91,7 +90,7 @@ def crash(store: Store, claim: Claim, error: str, *, max_failures: int) -> JobRe
 
 
 def give_back(store: Store, claim: Claim) -> None:
-    """Queue a job again whose worker was stopped on purpose; not counted as a failure.
+    """Queue the job of a stopped worker again, without counting a failure.
 
     Raises:
         StaleAttempt: The attempt no longer holds the job.
@@ -102,10 +101,10 @@ def give_back(store: Store, claim: Claim) -> None:
 
 
 def requeue_orphans(store: Store) -> tuple[str, ...]:
-    """Queue again what an earlier server left running; call it while holding the data lock.
+    """Queue the running jobs of an earlier server again; requires the server's lock.
 
-    No process is looked for or killed: the raised attempt number fences off whatever may
-    still run. Nothing is counted as a failure. Jobs that were to be cancelled are cancelled.
+    The higher attempt number fences off a worker that still runs. Nothing is counted as a
+    failure. A job with a requested cancel is cancelled.
 
     Returns:
         The ids of these jobs.
@@ -119,7 +118,7 @@ def requeue_orphans(store: Store) -> tuple[str, ...]:
 
 
 def fill_reserve(store: Store) -> None:
-    """Set room aside, so that a job can be marked failed when the database is full."""
+    """Reserve space, so that a job can be marked failed in a full database."""
     with store.writing() as connection:
         if connection.execute(sa.select(reserve.c.id)).first() is None:
             filler = bytes(RESERVE_BYTES)
@@ -152,7 +151,7 @@ def _requeue(connection: sa.Connection, job_id: str, changes: Mapping[str, Any])
 
 
 def _drop_resume(connection: sa.Connection, claim: Claim) -> None:
-    """Free the resume state first: on a full database this makes room for what follows."""
+    """Delete the resume state first, which frees space in a full database."""
     fenced_update(connection, claim, {}, counts=False)
     mine = resume_states.c.job_id == claim.job_id
     connection.execute(sa.delete(resume_states).where(mine))

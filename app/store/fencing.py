@@ -1,7 +1,7 @@
-"""The fence: the one UPDATE through which every write about a running job goes.
+"""Fencing of writes about a running job by its attempt number.
 
-``WHERE id = ? AND attempt = ? AND state = 'running'``, in the same transaction as the write
-itself: an attempt that lost its job, for whatever reason, can change nothing any more.
+Every write contains an ``UPDATE ... WHERE id = ? AND attempt = ? AND state = 'running'`` in the
+same transaction, so that an attempt that lost its job cannot change anything.
 """
 
 from collections.abc import Mapping
@@ -20,7 +20,7 @@ from app.store.tables import jobs
 def fenced_update(
     connection: sa.Connection, claim: Claim, changes: Mapping[str, Any], *, counts: bool = True
 ) -> int:
-    """Change the job's row if the claim still holds it; return the id for the event."""
+    """Change the job's row if the claim holds it; return the id for the event."""
     statement = (
         sa.update(jobs)
         .where(jobs.c.id == claim.job_id, jobs.c.attempt == claim.attempt)
@@ -41,7 +41,7 @@ def change_state(
     changes: Mapping[str, Any],
     data: Mapping[str, Any],
 ) -> None:
-    """Move a job to another state and tell it as an event, inside a transaction."""
+    """Change the state of a job and append the event, inside a transaction."""
     values = {**changes, "state": state, "last_event": jobs.c.last_event + 1}
     statement = sa.update(jobs).where(jobs.c.id == job_id).values(values)
     event_id = connection.execute(statement.returning(jobs.c.last_event)).scalar_one()
