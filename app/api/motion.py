@@ -73,7 +73,7 @@ async def answer(request: MotionRequest, services: Services) -> MotionAnswer:
     require_cell(cell, decider.actor.cell, decider.actor.cell_sha256)
     decided = partial(decide, request, cell, decider, services.trackers)
     # Without a rollout a decision takes less than a millisecond, on the event loop.
-    if request.ahead is not False or take_time(request.people):
+    if request.rollout is not False or take_time(request.people):
         return await run_in_threadpool(decided)
     return decided()
 

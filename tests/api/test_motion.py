@@ -91,7 +91,7 @@ def test_answer_is_a_piece_per_joint_and_what_explains_it(
 ) -> None:
     answer = asked(client, stamp="t0")
     assert answer["checkpoint"] == policies[GRID] and answer["stamp"] == "t0"
-    assert answer["way"] == "interpolated" and answer["dt"] == 0.02
+    assert answer["inference_mode"] == "interpolated" and answer["dt"] == 0.02
     assert sum(one["weight"] for one in answer["targets"]) == pytest.approx(1.0)
     assert [len(one) for one in answer["commanded"]["coefficients"]] == [3] * 6
     np.testing.assert_allclose(at(answer["commanded"], 0.0), HOME)
@@ -117,7 +117,7 @@ def test_the_page_shows_every_member_of_the_answer_to_its_example(client: TestCl
     body = json.loads(command.split("-d '")[1].rstrip().removesuffix("'"))
     answer, shown = asked(client, **body), json.loads(sample)
     assert members(answer) == members(shown)
-    for name in ("piece", "targets", "safety", "people", "clearance", "distance"):
+    for name in ("segment", "targets", "safety", "people", "clearance", "distance"):
         assert rounded(answer[name]) == shown[name]
 
 
@@ -133,7 +133,7 @@ def rounded(value: Any) -> Any:
 def test_without_anybody_the_whole_piece_is_executed(client: TestClient) -> None:
     answer = asked(client, people=[])
     assert answer["safety"]["override"] == 1.0 and answer["safety"]["terms"] is None
-    assert answer["piece"] == answer["commanded"]
+    assert answer["segment"] == answer["commanded"]
     assert answer["clearance"]["people"] == 1000.0
 
 
@@ -142,7 +142,7 @@ def test_executed_piece_is_a_polynomial_in_time_that_ends_where_it_says(
 ) -> None:
     qd = [0.8, -0.4, 0.6, 0.1, 0.0, -0.9]
     answer = asked(client, robot={"q": HOME, "qd": qd}, people=[{**WALKER, "y": 1.3}])
-    safety, piece = answer["safety"], answer["piece"]
+    safety, piece = answer["safety"], answer["segment"]
     assert 0.0 <= safety["override"] < 1.0 and safety["set_by"] == 0
     np.testing.assert_allclose(at(piece, 0.02), piece["q"], atol=1e-12)
     slope = (at(piece, 0.02) - at(piece, 0.02 - 1e-7)) / 1e-7
@@ -191,17 +191,17 @@ def test_somebody_inside_the_robot_is_a_stop_with_monitoring_and_a_problem_witho
     assert answer["safety"]["override"] == 0.0 and answer["safety"]["set_by"] == 1
     assert answer["people"][1]["separation"] < 0.0
     # 0.05 rad/s is gone after 0.01 s: the robot rests within the period.
-    assert answer["piece"]["until"] == pytest.approx(0.01)
-    assert answer["piece"]["qd"] == [0.0] * 6
+    assert answer["segment"]["until"] == pytest.approx(0.01)
+    assert answer["segment"]["qd"] == [0.0] * 6
     problem = refused(client, robot=robot, people=people, safety=None)
     assert problem["field"] == "people[1]" and "inside" in problem["rule"]
 
 
 def test_several_people_of_any_kind_are_taken(client: TestClient) -> None:
     people = [FAR, STANDING, WALKER, {**FAR, "x": 0.9}]
-    nearest = asked(client, people=people, ahead=False)
+    nearest = asked(client, people=people, rollout=False)
     assert sum(one["seen"] for one in nearest["people"]) == 1
-    averaged = asked(client, people=people, beside="averaged", ahead=False)
+    averaged = asked(client, people=people, beside="averaged", rollout=False)
     weights = [one["weight"] for one in averaged["people"]]
     assert sum(weights) == pytest.approx(1.0) and min(weights) > 0.0
     seen = [one["seen"] for one in averaged["people"]].index(True)
@@ -211,10 +211,10 @@ def test_several_people_of_any_kind_are_taken(client: TestClient) -> None:
 
 def test_a_decision_is_played_ahead_unless_told_not_to(client: TestClient) -> None:
     there = asked(client)
-    assert there["ahead"] is True
-    alone = asked(client, ahead=False)
-    assert alone["ahead"] is False and alone["began"] is None
-    if there["began"] is None:
+    assert there["rollout"] is True
+    alone = asked(client, rollout=False)
+    assert alone["rollout"] is False and alone["alternative"] is None
+    if there["alternative"] is None:
         assert there["act"] == pytest.approx(alone["act"], abs=1e-6)
 
 
@@ -231,12 +231,12 @@ def test_goals_outside_are_refused_by_interpolation_with_axis_and_distance(
     assert "0.12 m outside along x" in problem["detail"]
 
 
-@pytest.mark.parametrize("changes", [{"way": "direct"}, {"checkpoint": BOX}])
+@pytest.mark.parametrize("changes", [{"inference_mode": "direct"}, {"checkpoint": BOX}])
 def test_goals_outside_are_answered_directly_with_a_flag(
     client: TestClient, changes: dict[str, Any]
 ) -> None:
     answer = asked(client, goal=[0.0, 1.6, 0.3], **changes)
-    assert answer["way"] == "direct" and answer["targets"] == []
+    assert answer["inference_mode"] == "direct" and answer["targets"] == []
     (flag,) = answer["outside"]
     assert (flag["field"], flag["value"], flag["high"]) == ("goal.y", 1.6, 1.0)
     assert answer["beyond_reach"] == pytest.approx(0.1593, abs=1e-4)
@@ -252,7 +252,7 @@ def test_a_policy_that_limits_jerk_asks_for_accelerations(client: TestClient) ->
     assert refused(client, checkpoint=JERK)["field"] == "robot.qdd"
     robot = {"q": HOME, "qd": [0.0] * 6, "qdd": [0.2] * 6}
     answer = asked(client, checkpoint=JERK, robot=robot, people=[])
-    assert [len(one) for one in answer["piece"]["coefficients"]] == [4] * 6
+    assert [len(one) for one in answer["segment"]["coefficients"]] == [4] * 6
 
 
 BAD: list[tuple[dict[str, Any], int, str]] = [
@@ -277,8 +277,8 @@ BAD: list[tuple[dict[str, Any], int, str]] = [
     ({"goal": [0.0, float("inf"), 0.3]}, 422, "goal[1]"),
     ({"goal": [0.0, 1e300, 0.3]}, 422, "goal[1]"),
     ({"goal": "there"}, 422, "goal"),
-    ({"way": "around"}, 422, "way"),
-    ({"way": "interpolated", "checkpoint": BOX}, 422, "way"),
+    ({"inference_mode": "around"}, 422, "inference_mode"),
+    ({"inference_mode": "interpolated", "checkpoint": BOX}, 422, "inference_mode"),
     ({"beside": "farthest"}, 422, "beside"),
     ({"time_left_s": -1e12}, 422, "time_left_s"),
     ({"elapsed_s": -1}, 422, "elapsed_s"),
@@ -340,7 +340,7 @@ def test_whatever_numbers_come_the_answer_is_an_answer_or_a_named_problem(
         if answer.status_code == 422:
             assert answer.json()["field"].startswith(("robot.q", "goal", "people[1].q"))
         else:
-            assert np.isfinite(answer.json()["piece"]["q"]).all()
+            assert np.isfinite(answer.json()["segment"]["q"]).all()
     assert {200, 422} == set(statuses)
 
 
@@ -395,7 +395,7 @@ def test_bytes_are_no_message(socket: WebSocketTestSession) -> None:
     socket.send_bytes(json.dumps(TASK).encode())
     assert socket.receive_json()["status"] == 400
     socket.send_json(TASK)
-    assert socket.receive_json()["way"] == "interpolated"
+    assert socket.receive_json()["inference_mode"] == "interpolated"
 
 
 def test_problems_on_the_socket_are_those_of_the_route(
@@ -430,7 +430,7 @@ def test_only_so_many_sockets_are_open_at_once(client: TestClient) -> None:
             slots.release()
     with client.websocket_connect(SOCKET) as one:
         one.send_json(TASK)
-        assert one.receive_json()["way"] == "interpolated"
+        assert one.receive_json()["inference_mode"] == "interpolated"
 
 
 @pytest.mark.parametrize(
@@ -454,14 +454,14 @@ def test_a_socket_outlives_text_and_integers_that_nothing_takes(
             one.send_text(text)
             assert one.receive_json()["status"] in (400, 422)
         one.send_json(TASK)
-        assert one.receive_json()["way"] == "interpolated"
+        assert one.receive_json()["inference_mode"] == "interpolated"
 
 
 def test_a_stopping_server_ends_its_sockets(client: TestClient) -> None:
     stopping = client.app.state.services.stopping  # type: ignore[attr-defined]
     with client.websocket_connect(SOCKET) as one:
         one.send_json(TASK)
-        assert one.receive_json()["way"] == "interpolated"
+        assert one.receive_json()["inference_mode"] == "interpolated"
         stopping.set()
         try:
             assert one.receive()["code"] == 1001
@@ -471,7 +471,7 @@ def test_a_stopping_server_ends_its_sockets(client: TestClient) -> None:
 
 def test_growth_of_a_cylinder_is_seen(client: TestClient) -> None:
     acts = [
-        asked(client, people=[{**WALKER, "growth": growth}], ahead=False)["act"]
+        asked(client, people=[{**WALKER, "growth": growth}], rollout=False)["act"]
         for growth in (0.0, 0.3)
     ]
     assert acts[0] != acts[1]
@@ -481,7 +481,7 @@ def test_growth_of_a_cylinder_is_seen(client: TestClient) -> None:
 def test_the_past_of_a_cylinder_is_seen_by_a_policy_that_forecasts(client: TestClient) -> None:
     grown = [[0.3 - 0.02 * k, 0.5] for k in range(1, 6)]
     acts = [
-        asked(client, people=[{**WALKER, "past": past}], ahead=False)["act"]
+        asked(client, people=[{**WALKER, "past": past}], rollout=False)["act"]
         for past in ([], [[0.3, 0.5]] * 15, grown)
     ]
     assert acts[0] == acts[1] != acts[2]

@@ -86,19 +86,19 @@ def test_all_joints_over_their_limits_are_answered(
     assert len(beyond_limits(answer)) == 12
     if url == "/v1/motion":
         assert answer["unfeasible"]
-        starts = [row[:2] for row in answer["piece"]["coefficients"]]
+        starts = [row[:2] for row in answer["segment"]["coefficients"]]
         assert starts == [list(pair) for pair in zip(q, qd, strict=True)]
-        assert all(now > then for now, then in zip(qd, answer["piece"]["qd"], strict=True))
+        assert all(now > then for now, then in zip(qd, answer["segment"]["qd"], strict=True))
 
 
 def test_the_socket_answers_them_as_the_route_does(client: TestClient) -> None:
     url = "/v1/motion"
-    body = {**TASKS[url], "robot": robot(url, qd=[1.001, 0, 0, 0, 0, 0]), "ahead": False}
+    body = {**TASKS[url], "robot": robot(url, qd=[1.001, 0, 0, 0, 0, 0]), "rollout": False}
     with client.websocket_connect(SOCKET) as socket:
         socket.send_json(body)
         answer = socket.receive_json()
     answer.pop("elapsed_ms")
-    assert answer == asked(client, url, robot=body["robot"], ahead=False)
+    assert answer == asked(client, url, robot=body["robot"], rollout=False)
 
 
 def test_a_state_in_degrees_or_a_turn_away_is_refused_with_a_hint(

@@ -110,7 +110,7 @@ class Scene:
             },
             "goal": [0.05, 0.75, 0.31],
             "people": [{"tracker": self.session.id, "person": 0, "t": t}],
-            "ahead": False,
+            "rollout": False,
         }
         request = MotionRequest.model_validate(body)
         answer = decide(request, CELL, policy(), self.trackers)

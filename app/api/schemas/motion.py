@@ -1,4 +1,4 @@
-"""``POST /v1/motion``: state, people and goal in, the next piece of motion out."""
+"""``POST /v1/motion``: state, people and goal in, the next trajectory segment out."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -26,12 +26,12 @@ Seconds = Annotated[float, Field(ge=0.0, le=5.0)]
 
 
 class ArmState(RobotState):
-    """The robot as measured."""
+    """Measured state of the robot, with accelerations."""
 
     qdd: Vector6 | None = Field(
         None,
-        description="joint accelerations [rad/s^2], in the same order; needed by a policy that "
-        "limits jerk",
+        description="joint accelerations [rad/s^2], in the same order; required by policies "
+        "with jerk limits",
     )
 
 
@@ -62,11 +62,12 @@ class SafetyInput(Body):
     person_uncertainty: Metres | None = Field(default=None, description="Z_d [m]")
     robot_uncertainty: Metres | None = Field(default=None, description="Z_r [m]")
     protective_distance: Metres | None = Field(
-        default=None, description="least distance to anyone while the robot moves, on top [m]"
+        default=None, description="additional distance to people while the robot moves [m]"
     )
     pfl: bool | None = Field(
         default=None,
-        description="whether people may be touched, as slowly as their parts allow",
+        description="power and force limiting: whether contact is allowed at the speed limits "
+        "of body parts",
     )
 
     def to_domain(self, own: SafetySettings) -> SafetySettings:
@@ -76,7 +77,7 @@ class SafetyInput(Body):
 
 
 class MotionRequest(Body):
-    """A state and a goal at this moment; nothing is remembered of the request before."""
+    """A state and a goal; requests are independent."""
 
     model_config = shows(MOTION)
 
@@ -84,49 +85,49 @@ class MotionRequest(Body):
         max_length=64, description="name of the work cell", examples=["shared-workspace"]
     )
     frame: FrameName = Field("robot-base", description=FRAME_TEXT)
-    stamp: Stamp = Field(None, description="your time of the state; comes back unchanged")
+    stamp: Stamp = Field(None, description="your time of the state; returned unchanged")
     robot: ArmState
     people: Sequence[PersonInput] = Field(
         max_length=MAX_SKELETONS,
-        description="the people in the cell, each by joint angles, key-points, a cylinder or a "
-        "tracker; of more than four the nearest four count, the others are flagged `dropped`",
+        description="people in the cell, each as joint angles, key-points, a cylinder or a "
+        "track; of more than four the nearest four are used, the others are flagged `dropped`",
     )
-    goal: Vector3 = Field(description="where the tool shall be, in `frame` [m]")
-    way: Way | None = Field(
+    goal: Vector3 = Field(description="goal of the tool, in `frame` [m]")
+    inference_mode: Way | None = Field(
         None,
-        description="`interpolated`: the mean of the policy's actions for the training targets "
-        "around the goal; `direct`: its action for the goal itself; null interpolates where "
-        "the policy has targets",
+        description="`interpolated`: weighted mean of the policy's actions for the training "
+        "targets around the goal; `direct`: its action for the goal itself; null: interpolated "
+        "where the policy has targets",
     )
     beside: Beside = Field(
         "nearest",
-        description="several people: the policy sees the nearest, or its actions beside each "
-        "of them alone are averaged by their distances",
+        description="several people: the policy's action for the nearest, or the mean of its "
+        "actions for each, weighted by distance",
     )
-    ahead: bool | None = Field(
+    rollout: bool | None = Field(
         None,
-        description="whether the decision is played ahead with the policy, beside people who "
-        "go on as forecast, and changed where that ends in a contact; null does where the "
-        "policy allows it",
+        description="whether the decision is simulated forward with the policy beside people "
+        "of predicted motion, and replaced where that ends in a contact; null: where the "
+        "policy supports it",
     )
     time_left_s: Annotated[float, Field(ge=-1e9, le=1e9)] = Field(
         5.0,
-        description="time left to reach the goal [s]; the policy sees 0 to 5",
+        description="time left to reach the goal [s]; clamped to 0 to 5 for the policy",
     )
     elapsed_s: Annotated[float, Field(ge=0.0, le=1e9)] = Field(
         0.0,
-        description="time for which this goal has been sought [s]: from 1 on, other ways are "
-        "tried, too, where the policy's leads neither to the goal nor into a contact",
+        description="time since this goal was set [s]; from 1 on, alternatives are simulated "
+        "also where the policy's motion neither succeeds nor collides",
     )
     safety: SafetyInput | None = Field(
         SafetyInput(),
-        description="speed and separation monitoring: by default as the cell says; null leaves "
-        "it out, and people inside the robot are then refused",
+        description="speed and separation monitoring: the cell's settings by default; null "
+        "disables it, and people who overlap the robot are then refused",
     )
     age_s: Annotated[float, Field(ge=0.0, le=1e9)] = Field(
         0.0,
-        description="how old the people are beyond `tracker_delay` [s]; the age of a tracker's "
-        "observation, which counts from the arrival of its frame, is added",
+        description="age of the observations beyond `tracker_delay` [s]; the age of a "
+        "tracker's observation is added",
     )
     checkpoint: str | None = Field(
         None, max_length=64, description="SHA-256 or alias; the shipped policy if null"
@@ -142,10 +143,10 @@ class MotionRequest(Body):
         """Return the question.
 
         Args:
-            people: Those of the request, as the policy sees them.
-            observed: As last observed; None: like ``people``.
-            own: What the cell says about safety.
-            age_s: Age of the oldest observation, by its tracker [s].
+            people: The people for the policy.
+            observed: The people as last observed; None: like ``people``.
+            own: The cell's safety settings.
+            age_s: Age of the oldest observation of a tracker [s].
         """
         robot = self.robot
         return MotionQuestion(
@@ -155,9 +156,9 @@ class MotionRequest(Body):
             goal=np.array(self.goal),
             people=people,
             observed=observed,
-            way=self.way,
+            way=self.inference_mode,
             beside=self.beside,
-            ahead=self.ahead,
+            ahead=self.rollout,
             time_left_s=self.time_left_s,
             elapsed_s=self.elapsed_s,
             safety=None if self.safety is None else self.safety.to_domain(own),
@@ -165,15 +166,14 @@ class MotionRequest(Body):
         )
 
 
-class MotionPiece(Answer):
-    """One control period of the robot as polynomials in time, and where it ends."""
+class SegmentPublic(Answer):
+    """Trajectory of one control period as polynomials in time, and its end."""
 
     coefficients: list[list[float]] = Field(
         description="per joint, base to wrist 3, the coefficients of t^0, t^1, ... [rad/s^n]"
     )
     until: float = Field(
-        description="time up to which they hold [s]: the period, or less where the robot comes "
-        "to rest in it and stays there"
+        description="end of their validity [s]: the period, or less where the robot stops in it"
     )
     q: Vector6 = Field(description="joint positions at the end of the period [rad]")
     qd: Vector6 = Field(description="joint speeds there [rad/s]")
@@ -181,7 +181,7 @@ class MotionPiece(Answer):
 
     @classmethod
     def commanded(cls, piece: Piece, question: MotionQuestion, dt: float) -> Self:
-        """Make it from what the policy commands."""
+        """Return the segment commanded by the policy."""
         parts = [question.q, question.qd, piece.c]
         if piece.d.any():
             parts.append(piece.d)
@@ -195,7 +195,7 @@ class MotionPiece(Answer):
 
     @classmethod
     def executed(cls, safe: SafetyDecision, question: MotionQuestion, dt: float) -> Self:
-        """Make it from what monitoring lets through."""
+        """Return the segment scaled by monitoring."""
         powers = powers_of_time(safe, question.q, question.qd)
         used = np.flatnonzero(powers.any(axis=0))
         n = max(3, int(used[-1]) + 1 if used.size else 0)
@@ -209,37 +209,37 @@ class MotionPiece(Answer):
 
 
 class Target(Answer):
-    """One training target that the action is made from."""
+    """A training target of the interpolation."""
 
     position: Vector3 = Field(description="[m]")
-    weight: float = Field(description="its share of the action; all together are 1")
+    weight: float = Field(description="its weight; the sum is 1")
 
 
 class Terms(Answer):
-    """S_p of the standard, term by term, for one person and one link."""
+    """Protective separation distance S_p of ISO/TS 15066, term by term."""
 
-    person: int = Field(description="whose: place in `people`")
-    link: str = Field(description="the robot's link that is nearest")
-    separation: float = Field(description="distance as seen [m]")
+    person: int = Field(description="index in `people`")
+    link: str = Field(description="nearest link of the robot")
+    separation: float = Field(description="observed distance [m]")
     required: float = Field(
         description="v_h (T_r + T_s) + v_r T_r + B + C + Z_d + Z_r + protective distance [m]"
     )
     human_speed: float = Field(
-        description="v_h [m/s]; of a measured velocity what leads to the link, and "
-        "`speed_change`"
+        description="v_h [m/s]; the measured velocity's component toward the link plus "
+        "`speed_change`, where velocities are measured"
     )
-    robot_speed: float = Field(description="v_r, a bound on that link's speed [m/s]")
+    robot_speed: float = Field(description="v_r, bound of that link's speed [m/s]")
     reaction_time: float = Field(description="T_r: period, reaction, delay and age [s]")
     stop_time: float = Field(description="T_s [s]")
     braking: float = Field(description="B [m]")
     intrusion: float = Field(description="C [m]")
     person_uncertainty: float = Field(description="Z_d [m]")
     robot_uncertainty: float = Field(description="Z_r [m]")
-    protective_distance: float = Field(description="least distance, on top [m]")
+    protective_distance: float = Field(description="additional distance [m]")
 
     @classmethod
     def from_domain(cls, person: int, terms: SeparationTerms) -> Self:
-        """Make it from the simulator's data."""
+        """Return the schema of the simulator's terms."""
         return cls(
             person=person,
             link=terms.link,
@@ -258,102 +258,100 @@ class Terms(Answer):
 
 
 class Override(Answer):
-    """How much of the commanded motion monitoring lets through, and why."""
+    """Speed override by monitoring, and its cause."""
 
-    override: float = Field(description="rate at the end of the period, 0 (a stop) to 1")
-    set_by: int | None = Field(description="who set it: place in `people`; null: nobody did")
-    part: str | None = Field(description="which part of that person; null for a cylinder")
+    override: float = Field(description="override at the end of the period, 0 (a stop) to 1")
+    set_by: int | None = Field(description="person that limits it: index in `people`, or null")
+    part: str | None = Field(description="body part of that person; null for a cylinder")
     lacking: float = Field(
-        description="by how much that person could have come too near on the motion that was "
-        "refused [m]"
+        description="violation of the separation distance on the refused motion [m]"
     )
     stop_distance: float = Field(
-        description="bound on how far any point of the robot goes in a stop from now [m]"
+        description="bound of the distance of any point of the robot in a stop [m]"
     )
     terms: Terms | None = Field(
-        description="S_p for who set it, else for the nearest person; null for nobody"
+        description="S_p of that person, else of the nearest; null without people"
     )
 
     @classmethod
     def from_domain(cls, decision: MotionDecision) -> Self | None:
-        """Make it from a decision; None without monitoring."""
+        """Return the override of a decision; None without monitoring."""
         safe, whose, terms = decision.safe, decision.terms_of, decision.terms
         if safe is None:
             return None
-        told = None if whose is None or terms is None else Terms.from_domain(whose, terms)
+        public = None if whose is None or terms is None else Terms.from_domain(whose, terms)
         return cls(
             override=safe.override,
             set_by=None if safe.person is None else whose,
             part=None if safe.part is None else CAPSULE_NAMES[safe.part],
             lacking=safe.lacking,
             stop_distance=safe.stop_distance,
-            terms=told,
+            terms=public,
         )
 
 
 class Distances(Answer):
-    """Distances of the robot as it stands [m]; 1000 where there is nobody."""
+    """Clearances of the robot at its position [m]; 1000 without people."""
 
     people: float
     cell: float
-    robot: float = Field(description="of its own links to each other")
+    robot: float = Field(description="between its own links")
 
 
 class PersonMet(PersonUse):
-    """What was made of one person, and how near."""
+    """Use of one person, with distance and weight."""
 
     separation: float | None = Field(
-        description="distance to the robot [m]; below 0: inside it; null: never seen, or "
+        description="distance to the robot [m], negative for an overlap; null: never seen, or "
         "dropped"
     )
-    weight: float = Field(description="share of the action beside this person")
+    weight: float = Field(description="weight of the action beside this person")
 
     @classmethod
     def from_use(cls, use: PersonUse, met: Met | None) -> Self:
-        """Make it from what was made of a person; ``met`` is None without distance."""
+        """Return the use of a person with its distance, if known."""
         separation, weight = (None, 0.0) if met is None else met
         return cls(**dict(use), separation=separation, weight=weight)
 
 
 class MotionAnswer(Answer):
-    """The next piece of motion and all that explains it."""
+    """The next trajectory segment with its explanation."""
 
     joints: list[str] = Field(
-        default=list(ROS_NAMES),
-        description="the joints in the order of all vectors of this answer",
+        default=list(ROS_NAMES), description="order of the joints in all vectors"
     )
     dt: float = Field(description="control period [s]")
-    piece: MotionPiece = Field(description="what the robot shall execute")
-    commanded: MotionPiece = Field(description="what the policy asked for, before scaling")
+    segment: SegmentPublic = Field(description="trajectory to execute")
+    commanded: SegmentPublic = Field(description="trajectory of the policy, before scaling")
     act: Vector6 = Field(
-        description="the action, -1 to 1 per joint: the policy's, or the first of the way begun"
+        description="action, -1 to 1 per joint: the policy's, or the first of the alternative"
     )
-    way: Way
-    ahead: bool = Field(description="whether the decision was played ahead")
-    began: str | None = Field(
-        description="the way begun instead of the policy's action, by where it leads first and "
-        "for how long, or what pan, shoulder and elbow do (f: forward, b: back, h: held); "
-        "null: the policy's action passed"
+    inference_mode: Way
+    rollout: bool = Field(description="whether the decision was simulated forward")
+    alternative: str | None = Field(
+        description="candidate executed instead of the policy's action: its first waypoint and "
+        "duration, or the motion of pan, shoulder and elbow (f: forward, b: back, h: held); "
+        "null: the policy's action"
     )
-    targets: list[Target] = Field(description="what was interpolated; empty for `direct`")
-    safety: Override | None = Field(description="null where monitoring was left out")
-    people: list[PersonMet] = Field(description="what was made of each person")
+    targets: list[Target] = Field(description="interpolated targets; empty for `direct`")
+    safety: Override | None = Field(description="null where monitoring is disabled")
+    people: list[PersonMet] = Field(description="use of each person")
     clearance: Distances
     distance: float = Field(description="tool to goal [m]")
     beyond_reach: float = Field(
-        description="by how much the goal is farther away than the arm is long [m]"
+        description="distance of the goal beyond the reach of the arm [m]"
     )
     unfeasible: bool = Field(
-        description="whether a joint cannot keep its limits from this state: it brakes, or "
-        "returns to them"
+        description="whether a joint cannot keep its limits from this state; it then brakes, "
+        "or returns to them"
     )
     state_outside: list[Outside] = Field(
-        description="measured joints outside their limits: the policy sees them clamped; "
-        "`piece` starts at the measured positions and speeds, and monitoring goes by those"
+        description="measured joints outside their limits, clamped for the policy; `segment` "
+        "and monitoring use the measured positions and speeds"
     )
-    outside: list[Outside] = Field(description="inputs outside what was met in training")
-    checkpoint: str = Field(description="SHA-256 of the checkpoint that decided")
-    elapsed_ms: float = Field(description="time the decision took [ms]")
+    outside: list[Outside] = Field(description="inputs outside the training range")
+    checkpoint: str = Field(description="SHA-256 of the checkpoint")
+    elapsed_ms: float = Field(description="time of the decision [ms]")
     stamp: Stamp = None
 
     @classmethod
@@ -365,20 +363,20 @@ class MotionAnswer(Answer):
         dt: float,
         stamp: Stamp,
     ) -> Self:
-        """Make it from a decision, what was asked and what was made of the people."""
-        commanded = MotionPiece.commanded(decision.piece, question, dt)
-        piece, safe = commanded, decision.safe
+        """Return the answer of a decision."""
+        segment, safe = SegmentPublic.commanded(decision.piece, question, dt), decision.safe
+        commanded = segment
         if safe is not None and safe.override < 1.0:
-            piece = MotionPiece.executed(safe, question, dt)
+            segment = SegmentPublic.executed(safe, question, dt)
         to_people, to_cell, to_itself = decision.clearance
         return cls(
             dt=dt,
-            piece=piece,
+            segment=segment,
             commanded=commanded,
             act=_numbers(decision.act),
-            way=decision.way,
-            ahead=decision.ahead,
-            began=decision.began,
+            inference_mode=decision.way,
+            rollout=decision.ahead,
+            alternative=decision.began,
             targets=[
                 Target(position=list(one.position), weight=one.weight)
                 for one in decision.targets

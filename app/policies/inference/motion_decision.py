@@ -187,16 +187,16 @@ class MotionDecider:
         if asked is None:
             return "direct" if self._between is None else "interpolated"
         if asked not in WAYS:
-            raise InvalidInput("way", asked, "must name a way", WAYS)
+            raise InvalidInput("inference_mode", asked, "must be a mode", WAYS)
         if asked == "interpolated" and self._between is None:
             rule = "needs training targets, and this policy was trained on all of a box"
-            raise InvalidInput("way", asked, rule, ("direct",))
+            raise InvalidInput("inference_mode", asked, rule, ("direct",))
         return asked
 
     def _looks(self, asked: bool | None) -> bool:
         if asked and not self._able:
             rule = "needs a policy that sees forecasts of people, with two hidden layers"
-            raise InvalidInput("ahead", True, rule, ("false",))
+            raise InvalidInput("rollout", True, rule, ("false",))
         return self._able if asked is None else asked
 
     def _improve(

@@ -293,7 +293,7 @@ def test_a_policy_of_a_box_cannot_be_asked_to_interpolate() -> None:
 def test_a_policy_that_cannot_look_ahead_says_so() -> None:
     with pytest.raises(InvalidInput, match="sees forecasts") as refused:
         decider().decide(question(ahead=True))
-    assert refused.value.field == "ahead"
+    assert refused.value.field == "rollout"
     assert decider().decide(question()).ahead is False
 
 
