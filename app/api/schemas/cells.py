@@ -1,4 +1,4 @@
-"""A work cell as the service shows it, and as it takes it."""
+"""Work cells as they are shown and posted."""
 
 from typing import Any, Self
 
@@ -12,49 +12,49 @@ from app.sim.pick.cases import cases_of
 
 
 class CasePublic(Answer):
-    """One case study of the cell."""
+    """A scenario of the thesis in the cell."""
 
     id: str
     title: str
-    text: str = Field(description="what happens, for people")
-    goals: list[str] = Field(description="stations the robot may choose")
-    expected: str = Field(description="the goal it should end at")
+    text: str = Field(description="the scenario as text")
+    goals: list[str] = Field(description="candidate stations")
+    expected: str = Field(description="expected goal")
 
 
 class SortingTestPublic(Answer):
-    """One sorting test that can be started in a live cell."""
+    """A sorting test for a live cell."""
 
     id: str
     title: str
-    text: str = Field(description="what happens, for people")
+    text: str = Field(description="the test as text")
 
 
 class CellPublic(Answer):
-    """One work cell: the file's own content, its identity and its case studies."""
+    """A work cell: its definition, identity and scenarios."""
 
     name: str
     title: str
-    shipped: bool = Field(description="whether it came with the service")
-    sha256: str = Field(description="identity of its content")
+    shipped: bool = Field(description="whether it is part of the service")
+    sha256: str = Field(description="digest of its content")
     lacks_for_pick: str | None = Field(
-        description="why no policy can be trained or shown in it; null where one can"
+        description="missing requirement of pick policies; null where complete"
     )
     lacks_for_live: str | None = Field(
-        description="why it cannot be shown live; null where it can"
+        description="missing requirement of a live world; null where complete"
     )
     table: dict[str, Any] = Field(description="table top [m]")
     robot: dict[str, Any] = Field(description="home, limits and tool [rad, rad/s, m]")
     stations: list[dict[str, Any]] = Field(description="named places, positions [m]")
     goal_region: dict[str, Any] | None = Field(description="box of goals and its grid [m]")
     obstacles: list[dict[str, Any]] = Field(description="fixed boxes [m, rad]")
-    people: list[dict[str, Any]] = Field(description="who may be there, and where [m, rad]")
-    safety: dict[str, Any] = Field(description="what safety assumes [m, m/s, s]")
+    people: list[dict[str, Any]] = Field(description="people and their places [m, rad]")
+    safety: dict[str, Any] = Field(description="safety settings [m, m/s, s]")
     cases: list[CasePublic]
     sorting_tests: list[SortingTestPublic]
 
     @classmethod
     def from_domain(cls, cell: Cell) -> Self:
-        """Make it from the cell's data."""
+        """Return the schema of a cell."""
         cases = [
             CasePublic(
                 id=case.id,
@@ -86,7 +86,7 @@ class CellList(Answer):
 
 
 def cell_schema() -> dict[str, Any]:
-    """Return the JSON schema of a cell that is posted, without references."""
+    """Return the JSON schema of a posted cell, without references."""
     schema = Cell.model_json_schema()
     parts = schema.pop("$defs")
 
@@ -100,7 +100,7 @@ def cell_schema() -> dict[str, Any]:
             if "prefixItems" in node:  # a vector; its numbers are alike
                 node = {**node, "items": node["prefixItems"][0]}
                 del node["prefixItems"]
-            # The mapping of a discriminator points to the parts that are gone.
+            # The mapping of a discriminator refers to the removed parts.
             return {k: inlined(v) for k, v in node.items() if k != "discriminator"}
         return [inlined(one) for one in node] if isinstance(node, list) else node
 

@@ -1,4 +1,4 @@
-"""Checkpoints as the service shows them."""
+"""Checkpoints as they are shown."""
 
 from datetime import datetime
 from typing import Any, Self
@@ -11,12 +11,12 @@ from app.store.records import CheckpointRecord, Page
 
 
 class CheckpointPublic(Answer):
-    """One stored checkpoint, without its tensors."""
+    """A stored checkpoint, without its tensors."""
 
     sha256: str
     number: int = Field(description="running number")
-    aliases: list[str] = Field(description="names that point to it")
-    job_id: str | None = Field(description="the job that made it; null for a shipped one")
+    aliases: list[str] = Field(description="its aliases")
+    job_id: str | None = Field(description="job that made it; null for a shipped one")
     step: int | None = Field(description="environment steps of that job")
     preset: str | None
     purpose: str = Field(
@@ -24,12 +24,12 @@ class CheckpointPublic(Answer):
     )
     size: int = Field(description="length of the tensors [bytes]")
     created_at: datetime
-    tensors: str = Field(description="where its safetensors bytes are")
+    tensors: str = Field(description="path of its safetensors bytes")
     manifest: dict[str, Any]
 
     @classmethod
     def from_domain(cls, record: CheckpointRecord) -> Self:
-        """Make it from the store's record."""
+        """Return the schema of a record."""
         preset = record.manifest.get("preset", {})
         return cls(
             sha256=record.sha256,
@@ -50,10 +50,10 @@ class CheckpointList(Answer):
     """One page of checkpoints, newest first."""
 
     items: list[CheckpointPublic]
-    next_cursor: str | None = Field(description="pass it as `cursor` for the next page")
+    next_cursor: str | None = Field(description="`cursor` of the next page")
 
     @classmethod
     def from_domain(cls, page: Page[CheckpointRecord]) -> Self:
-        """Make it from the store's page."""
+        """Return the schema of a page."""
         items = [CheckpointPublic.from_domain(one) for one in page.items]
         return cls(items=items, next_cursor=page.next_cursor)

@@ -1,4 +1,4 @@
-"""Whole requests that the OpenAPI document shows; a test posts each of them."""
+"""Example requests of the OpenAPI document; a test posts each of them."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ KEYPOINTS: list[list[float] | None] = [
     [0.18, 1.45, 0.64], [0.23, 1.41, 0.36], [0.26, 1.22, 0.19],
     [0.0, 1.45, 0.2], [-0.09, 1.45, 0.2], None, None, [0.09, 1.45, 0.2], *[None] * 12,
 ]  # fmt: skip
-"""Somebody at the table of ``pick-and-place``, the left hand forward [m]."""
+"""A person at the table of ``pick-and-place``, left hand forward [m]."""
 TASK_SELECTION: dict[str, Any] = {
     "cell": "pick-and-place",
     "robot": {"q": [0.99, -2.33, 2.08, -1.32, -1.57, 0.0], "qd": [0.0] * 6},
@@ -40,5 +40,5 @@ FRAME: dict[str, Any] = {"t": 12.3, "people": [{"keypoints": KEYPOINTS}]}
 
 
 def shows(example: dict[str, Any]) -> ConfigDict:
-    """Return the configuration of a request that shows an example."""
+    """Return the configuration of a request with an example."""
     return ConfigDict(json_schema_extra={"examples": [example]})

@@ -10,7 +10,7 @@ from app.store.records import JobRecord, MetricRow
 
 
 class JobPublic(Answer):
-    """One job as it stands."""
+    """A job."""
 
     id: str
     number: int = Field(description="running number")
@@ -18,12 +18,12 @@ class JobPublic(Answer):
     preset: str | None
     seed: int
     overrides: dict[str, Any]
-    spec: dict[str, Any] = Field(description="the body as it was posted")
+    spec: dict[str, Any] = Field(description="the posted body")
     state: str = Field(
         description="queued, running, cancelling, succeeded, failed or cancelled"
     )
-    attempt: int = Field(description="how often it was started")
-    failures: int = Field(description="how many attempts crashed")
+    attempt: int = Field(description="number of starts")
+    failures: int = Field(description="number of crashed attempts")
     created_at: datetime
     started_at: datetime | None
     finished_at: datetime | None
@@ -38,7 +38,7 @@ class JobPublic(Answer):
 
     @classmethod
     def from_domain(cls, job: JobRecord, latest: MetricRow | None = None) -> Self:
-        """Make it from the store's record."""
+        """Return the schema of a record."""
         names = (name for name in cls.model_fields if name != "latest")
         members = {name: getattr(job, name) for name in names}
         return cls(**members, latest=dict(latest.values) if latest else None)
@@ -48,15 +48,15 @@ class JobList(Answer):
     """One page of jobs, newest first."""
 
     items: list[JobPublic]
-    next_cursor: str | None = Field(description="pass it as `cursor` for the next page")
+    next_cursor: str | None = Field(description="`cursor` of the next page")
 
 
 class MetricsPublic(Answer):
-    """Points of a job's curve, in order of steps."""
+    """Points of a job's learning curve, by step."""
 
     items: list[dict[str, Any]] = Field(description="step, at and the named numbers")
 
     @classmethod
     def from_domain(cls, rows: tuple[MetricRow, ...]) -> Self:
-        """Make it from the store's rows."""
+        """Return the schema of the store's rows."""
         return cls(items=[{"step": row.step, **row.values, "at": row.at} for row in rows])

@@ -1,4 +1,4 @@
-"""Number types of the schemas: finite always, so that NaN and infinity name their field."""
+"""Base classes and number types of the schemas."""
 
 from typing import Annotated
 
@@ -12,12 +12,12 @@ Vector18 = Annotated[list[Finite], Field(min_length=18, max_length=18)]
 
 
 class Body(BaseModel):
-    """Root of what comes in: unknown fields and non-finite numbers are errors."""
+    """Base of requests: unknown fields and non-finite numbers are errors."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True)
 
 
 class Answer(BaseModel):
-    """Root of what goes out."""
+    """Base of answers."""
 
     model_config = ConfigDict(frozen=True)

@@ -1,7 +1,9 @@
-"""People in a request, by whatever is known of them (METHOD 2.8), and what was made of it.
+"""People in a request, and their use by a policy.
 
-An entry is told apart by its members: ``q`` (joint angles), ``keypoints`` (BODY_25), ``r`` (a
-cylinder) or ``tracker`` (somebody whom a tracker of ``/v1/trackers`` follows).
+The members of an entry give its kind: ``q`` (joint angles), ``keypoints`` (BODY_25), ``r`` (a
+cylinder) or ``tracker`` (a track of ``/v1/trackers``).
+
+Source: docs/method.md 2.8.
 """
 
 import math
@@ -40,13 +42,13 @@ UNUSABLE = (
     "outside [0, 1]"
 )
 IMPLAUSIBLE = (
-    "why nobody can stand in this frame as the key-points say (`foreign-frame`): another frame "
-    "or unit; null where somebody can"
+    "reason why the key-points are impossible in this frame (`foreign-frame`): another frame "
+    "or unit; null where they are possible"
 )
 
 
 def _in_order(value: object) -> object:
-    """Return key-points given by name as a list in the order of BODY_25, None where absent."""
+    """Return named key-points as a list in the order of BODY_25, None where absent."""
     if not isinstance(value, Mapping):
         return value
     unknown = [name for name in value if name not in BODY_25]
@@ -66,10 +68,10 @@ OfKeypoints = Annotated[
 
 
 def _rows(values: list[Keypoint], width: int) -> Vec:
-    """Return rows of numbers, shape (25, width), NaN where there is none.
+    """Return rows of numbers, shape (25, width), NaN where missing.
 
-    A row of another length than 3 to ``width`` has lost its order: its coordinates become
-    infinite, which no tracker means by missing.
+    A row of another length than 3 to ``width`` is unusable: its coordinates become infinite,
+    which differs from missing.
     """
     rows = np.full((N_KEYPOINTS, width), np.nan)
     for k, value in enumerate(values):
@@ -85,11 +87,11 @@ class BodyPercentiles(Body):
     """A person's size, as percentiles of adults."""
 
     stature: Percentile = Field(50.0, description="percentile of the stature")
-    arms: Percentile = Field(50.0, description="of the arms' length, at that stature")
-    shoulders: Percentile = Field(50.0, description="of the shoulders' width, at that stature")
+    arms: Percentile = Field(50.0, description="of the arm length, at that stature")
+    shoulders: Percentile = Field(50.0, description="of the shoulder width, at that stature")
 
     def size(self, cell: Cell) -> Vec:
-        """Return the lengths of this person in a cell [m], shape (12,)."""
+        """Return the body lengths in a cell [m], shape (12,)."""
         workers = cell.workers
         pelvis = workers[0].pelvis_height if workers else 0.95
         body = percentile_body(self.stature, self.arms, self.shoulders, pelvis)
@@ -97,13 +99,13 @@ class BodyPercentiles(Body):
 
 
 class PersonState(Body):
-    """One person as tracked, in the 18 joints of the body model."""
+    """A person as 18 joint angles of the human model."""
 
     q: Vector18 = Field(description="joint positions [m, rad]: " + ", ".join(human.JOINT_NAMES))
     qd: Vector18 = Field(description="joint speeds [m/s, rad/s]")
     body: Annotated[
         BodyPercentiles | None,
-        Field(description="the person's size; the cell's person if null"),
+        Field(description="the person's size; that of the cell's person if null"),
     ] = None
     size: Annotated[
         Lengths | None,
@@ -116,7 +118,7 @@ class PersonState(Body):
         """Return the person as arrays.
 
         Raises:
-            InvalidInput: Both ``body`` and ``size`` are given.
+            InvalidInput: ``body`` and ``size`` are both given.
         """
         if self.size is not None and self.body is not None:
             raise InvalidInput(f"{place}size", "given", "must be left out beside `body`")
@@ -127,13 +129,13 @@ class PersonState(Body):
 
 
 class KeypointsSeen(Body):
-    """One person in one frame of a tracker of key-points."""
+    """A person in one frame of a key-point tracker."""
 
     keypoints: OfKeypoints = Field(
         description="[x, y, z] in m, in the robot's `base_link`, or [x, y, z, confidence] with "
         "a confidence in [0, 1]. Missing: null, [], null or NaN in all coordinates, 0 or -1 in "
-        "all three, confidence 0. A point that cannot be used otherwise is dropped and named. "
-        f"In the order of BODY_25: {ORDER}; or a mapping of these names, absent where missing"
+        "all three, confidence 0. Other unusable points are dropped and named. In the order "
+        f"of BODY_25: {ORDER}; or a mapping of these names, absent where missing"
     )
 
     def points(self) -> tuple[Vec, Vec]:
@@ -144,27 +146,27 @@ class KeypointsSeen(Body):
 
 
 class KeypointsPerson(KeypointsSeen):
-    """One person by the key-points of a single frame; nothing is remembered."""
+    """A person as the key-points of a single frame."""
 
     velocities: OfKeypoints | None = Field(
         None,
         description="velocities of the key-points [m/s], in the same form; null, [] or NaN "
-        "where unknown, taken as zero",
+        "where unknown, replaced by zero",
     )
     body: BodyPercentiles | None = Field(
-        None, description="the person's size; the cell's person if null"
+        None, description="the person's size; that of the cell's person if null"
     )
 
     def speeds(self) -> Vec | None:
-        """Return the velocities [m/s], (25, 3), NaN where unknown; None where none is known."""
+        """Return the velocities [m/s], (25, 3), NaN where unknown; None if all are unknown."""
         rows = None if self.velocities is None else _rows(self.velocities, 3)
         return None if rows is None or np.isnan(rows).all() else rows
 
 
 class CylinderPerson(Body):
-    """One person of whom only an upright cylinder is known (METHOD 2.8).
+    """A person as an upright cylinder.
 
-    Seen as a person of the cell's size who stands in it and faces the robot's base.
+    Converted to a person of the cell's size at rest in it, facing the robot's base.
     """
 
     x: Place = Field(description="axis [m]")
@@ -172,29 +174,27 @@ class CylinderPerson(Body):
     vx: Speed = Field(description="velocity [m/s]")
     vy: Speed = Field(description="velocity [m/s]")
     r: Annotated[float, Field(ge=0.01, le=FARTHEST_M)] = Field(description="radius [m]")
-    growth: Speed = Field(
-        0.0, description="how fast the radius grows [m/s]; read by policies that move the arm"
-    )
+    growth: Speed = Field(0.0, description="rate of the radius [m/s]; used by reach policies")
     past: Annotated[list[tuple[Radius, Walk]], Field(max_length=MOST_REMEMBERED)] = Field(
         [],
         description="radius [m] and walking speed [m/s] 0.1 s, 0.2 s, ... ago, the newest "
-        "first; before that it was as the last; read by policies that forecast",
+        "first; constant before the last; used by policies with motion prediction",
     )
 
     def remembered(self) -> Vec | None:
-        """Return the past, shape (n, 2); None where nothing is remembered."""
+        """Return the past, shape (n, 2); None where it is empty."""
         return np.array(self.past) if self.past else None
 
 
 class TrackedPerson(Body):
-    """Somebody whom a tracker of `/v1/trackers` follows."""
+    """A track of `/v1/trackers`."""
 
     tracker: str = Field(max_length=64, description="id of the tracker")
-    person: Annotated[int, Field(ge=0, le=3)] = Field(description="which of its people")
+    person: Annotated[int, Field(ge=0, le=3)] = Field(description="index of the track")
     t: Time | None = Field(
         None,
-        description="the present on the clock of its frames [s]: it counts where it makes the "
-        "person older than the arrival of the newest frame does",
+        description="present on the tracker's clock [s]; used where it gives a greater age "
+        "than the arrival of the newest frame",
     )
 
 
@@ -209,7 +209,7 @@ _MARKS: dict[str, Source] = {
 
 
 def source_of(entry: Any) -> Source | None:
-    """Return how an entry describes its person, by the members it has."""
+    """Return the kind of an entry from its members."""
     if isinstance(entry, Mapping):
         return next((_MARKS[name] for name in _MARKS if name in entry), None)
     kinds: dict[type, Source] = {
@@ -236,25 +236,24 @@ PersonInput = Annotated[
 
 
 class PersonUse(Answer):
-    """What was made of one person of the request."""
+    """Use of one person of a request."""
 
     by: Source
-    seen: bool = Field(description="whether this one was seen by the policy: the nearest")
+    seen: bool = Field(description="whether the policy uses this person: the nearest")
     as_cylinder: bool = Field(
-        description="whether no joint angles are known: seen as standing in a cylinder"
+        description="whether no joint angles are known and a cylinder is used"
     )
     monitored_as_cylinder: bool = Field(
-        description="whether speed and separation monitoring takes this person as a cylinder: "
-        "no joint angles are known, or an arm is not seen and may be anywhere in it"
+        description="whether speed and separation monitoring uses a cylinder: no joint angles "
+        "are known, or an arm is not observed"
     )
-    speeds: Speeds = Field(description="where the speeds are from; zero: nothing is known")
+    speeds: Speeds = Field(description="origin of the speeds; zero: unknown")
     flags: list[str] = Field(
-        description="how the estimate is degraded; `far`: the policy sees this person at 5 m, "
-        "or nobody there; `clamped`: it sees angles, radius, growth or past at the bounds it "
-        "knows"
+        description="degradations of the estimate; `far`: the policy uses this person at 5 m, "
+        "or not at all; `clamped`: angles, radius, growth or past are at their bounds"
     )
-    held: list[str] = Field(description="joints taken at rest or as before: nothing shows them")
-    missing: list[str] = Field(description="key-points that are not known")
+    held: list[str] = Field(description="unobserved joints, at rest or at their last angle")
+    missing: list[str] = Field(description="unknown key-points")
     strays: list[str] = Field(description="key-points dropped: too far from all others")
     unusable: list[str] = Field(description=UNUSABLE)
     implausible: str | None = Field(description=IMPLAUSIBLE)
@@ -272,15 +271,15 @@ class PersonUse(Answer):
         observed: Person | None,
         estimate: PersonEstimate | None,
     ) -> Self:
-        """Make it from what was decided with.
+        """Return the use of a person.
 
         Args:
-            source: What the request states.
-            seen: Whether the policy sees this person.
-            speeds: Where the speeds are from.
-            person: As the policy sees them; None: not at all.
-            observed: As monitoring takes them; None: not at all.
-            estimate: From key-points; None without.
+            source: Kind of description in the request.
+            seen: Whether the policy uses this person.
+            speeds: Origin of the speeds.
+            person: State for the policy; None: not used.
+            observed: State for monitoring; None: not used.
+            estimate: Estimate from key-points; None without key-points.
         """
         return cls(
             by=source,

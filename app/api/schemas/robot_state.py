@@ -1,4 +1,4 @@
-"""The robot's joints in a request: base to wrist 3, or in any order by name."""
+"""Joints of the robot in a request: base to wrist 3, or in any order by name."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,12 +14,12 @@ from app.sim.core.arrays import Vec
 from app.sim.robot.ur10 import JOINT_NAMES
 
 ROS_NAMES = tuple(f"{name}_joint" for name in JOINT_NAMES)
-"""The joints as ROS calls them, base to wrist 3."""
+"""Names of the joints in ROS, base to wrist 3."""
 _FIELDS = ("q", "qd", "qdd")
 
 
 class RobotState(Body):
-    """The robot as measured."""
+    """Measured state of the robot."""
 
     names: Annotated[list[str], Field(max_length=32)] | None = Field(
         default=None,
@@ -53,18 +53,18 @@ class RobotState(Body):
         """Return numbers of the joints from base to wrist 3, shape (6,).
 
         Args:
-            values: In the order of the request.
+            values: Numbers in the order of the request.
         """
         return np.array(values)[self._order()]
 
     def _order(self) -> list[int]:
-        """Return the places of the joints, base to wrist 3, in the request."""
+        """Return the indices of the joints, base to wrist 3, in the request."""
         names = self.names
         return list(range(6)) if names is None else [names.index(one) for one in ROS_NAMES]
 
     @contextmanager
     def faults_in_place(self) -> Iterator[Self]:
-        """Let errors name joints by their places in the request."""
+        """Replace joint indices in errors by those of the request."""
         try:
             yield self
         except InvalidInput as error:

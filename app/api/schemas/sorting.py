@@ -1,4 +1,4 @@
-"""``POST /v1/sorting``: objects and goal in, the next move out."""
+"""``POST /v1/sorting``: objects and goal in, next move out."""
 
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Self
@@ -49,25 +49,25 @@ class SortingLayout(Body):
 
 
 class SortingObject(Body):
-    """One object and where it is."""
+    """An object and its place."""
 
-    colour: Word = Field(description="colour, as the cell's towers have them")
+    colour: Word = Field(description="colour, one of the towers'")
     size: Word = Field(description="`small`, `medium` or `large` in a work cell")
-    at: Word = Field(description="id of the clutter cell or of the tower it is on")
+    at: Word = Field(description="id of its clutter cell or tower")
     level: int | None = Field(
-        None, ge=0, lt=MAX_CELLS, description="level on a tower, 0 the lowest; null elsewhere"
+        None, ge=0, lt=MAX_CELLS, description="level on a tower from 0; null in the clutter"
     )
-    id: Word | None = Field(None, description="your name for it; comes back with the move")
+    id: Word | None = Field(None, description="your name for it; returned with the move")
 
     def to_domain(self) -> NamedObject:
-        """Return it as the simulator's data."""
+        """Return the simulator's data."""
         return NamedObject(
             colour=self.colour, size=self.size, at=self.at, level=self.level, id=self.id
         )
 
 
 class GoalObject(Body):
-    """One object that a tower shall have."""
+    """An object of a goal tower."""
 
     size: Word
     colour: Word | None = Field(None, description="colour; the tower's own if null")
@@ -83,30 +83,28 @@ GoalEntry = Annotated[
 
 
 class SortingRecord(Body):
-    """What decides when the exact planner takes over: from the answer before, unchanged."""
+    """State of the progress monitor, from the answer before, unchanged."""
 
     checkpoint: str = Field(
-        pattern=r"^[0-9a-f]{64}$", description="SHA-256 of the policy that is watched"
+        pattern=r"^[0-9a-f]{64}$", description="SHA-256 of the monitored policy"
     )
-    last: Key = Field(description="key of the state decided in last")
-    expected: Key = Field(description="key of the state that the move was to give")
+    last: Key = Field(description="key of the last state")
+    expected: Key = Field(description="key of the state after a successful move")
     can_fail: bool = Field(description="whether its pick can fail")
-    seen: list[Key] = Field(max_length=MAX_SEEN, description="keys of the states met")
-    attempts: int = Field(ge=0, le=1_000_000, description="moves tried since the task began")
-    budget: Finite = Field(
-        ge=0.0, le=1e6, description="attempts after which the planner takes over"
-    )
+    seen: list[Key] = Field(max_length=MAX_SEEN, description="keys of the visited states")
+    attempts: int = Field(ge=0, le=1_000_000, description="attempted moves of this task")
+    budget: Finite = Field(ge=0.0, le=1e6, description="attempts until the planner fallback")
     planner_fallback: FallbackReason | None = Field(
-        description="why the planner decides, or null"
+        description="cause of the planner fallback, or null"
     )
 
     def to_domain(self) -> ProgressMonitor:
-        """Return it as the simulator's data."""
+        """Return the simulator's data."""
         return ProgressMonitor(**{**dict(self), "seen": tuple(self.seen)})
 
     @classmethod
     def from_domain(cls, watch: ProgressMonitor) -> Self:
-        """Make it from the simulator's data."""
+        """Return the schema of the simulator's data."""
         return cls(
             checkpoint=watch.checkpoint,
             last=watch.last,
@@ -120,12 +118,12 @@ class SortingRecord(Body):
 
 
 class SortingRequest(Body):
-    """A sorting task as it is at this moment."""
+    """State of a sorting task."""
 
     cell: str | None = Field(
         None,
         max_length=64,
-        description="name of the work cell whose stations the objects are on; or `layout`",
+        description="name of the work cell; or `layout`",
         examples=["sorting-e0"],
     )
     layout: SortingLayout | None = Field(
@@ -133,44 +131,44 @@ class SortingRequest(Body):
     )
     objects: list[SortingObject] = Field(
         max_length=MAX_CELLS,
-        description="every object there is, at most one per clutter cell of the task",
+        description="all objects, at most one per clutter cell of the task",
     )
     goal: dict[str, Annotated[list[GoalEntry], Field(max_length=MAX_CELLS)]] = Field(
         max_length=MAX_COLOURS,
         description="by tower, from the bottom: a size, of the tower's own colour, or a size "
-        "and a colour. Towers that are not named shall be empty; objects that no tower asks "
-        "for belong into the clutter",
+        "and a colour. Other towers are empty in the goal; all other objects belong in the "
+        "clutter",
     )
     failure_map: dict[str, Finite] = Field(
         default_factory=dict,
         max_length=MAX_CELLS,
-        description="chance that a pick from a clutter cell fails, 0 to 0.99, by cell; those "
-        "that are not named keep the work cell's, or 0",
+        description="failure probability of a pick by clutter cell, 0 to 0.99; the work "
+        "cell's, or 0, for other cells",
     )
     watch: SortingRecord | None = Field(
-        None, description="`watch` of the answer before, in the same task; null at its start"
+        None, description="`watch` of the last answer in the same task; null at its start"
     )
-    decider: By = Field("policy", description="who decides: a policy, or the exact planner")
+    decider: By = Field("policy", description="a policy, or the exact planner")
     checkpoint: str | None = Field(
         None,
         max_length=64,
-        description="SHA-256 or alias of a policy that sorts; if null the one that is shipped "
-        "for the cell, else the exact planner",
+        description="SHA-256 or alias of a sorting policy; if null the cell's shipped one, or "
+        "the exact planner",
     )
-    stamp: Stamp = Field(None, description="your time of the state; comes back unchanged")
+    stamp: Stamp = Field(None, description="your time of the state; returned unchanged")
 
     def to_domain(self, names: SortingNames, fail: Vec) -> SortingState:
-        """Check what a schema cannot, and return the state.
+        """Return the state.
 
         Args:
-            names: The words of the task.
-            fail: The cell's own failure probabilities, shape (K,).
+            names: Names of the task.
+            fail: The cell's failure probabilities, shape (K,).
 
         Raises:
-            InvalidInput: It cannot be, with the field.
+            InvalidInput: An impossible state, with the field.
         """
         if self.decider == "planner" and self.checkpoint is not None:
-            rule = "must be null where the planner is to decide"
+            rule = "must be null where the planner decides"
             raise InvalidInput("checkpoint", self.checkpoint, rule)
         goal = {
             tower: [(one.colour, one.size) for one in wanted]
@@ -181,14 +179,14 @@ class SortingRequest(Body):
 
 
 class SortingPlace(Answer):
-    """Where an object is picked or placed."""
+    """Place of a pick or of a placement."""
 
     station: str = Field(description="id of the clutter cell or tower")
-    level: int | None = Field(description="level on a tower, 0 the lowest; null in the clutter")
+    level: int | None = Field(description="level on a tower from 0; null in the clutter")
 
 
 class SortingMove(Answer):
-    """One move: pick the object here, place it there."""
+    """A move: where an object is picked and placed."""
 
     pick: SortingPlace
     place: SortingPlace
@@ -198,44 +196,43 @@ class SortingMove(Answer):
 
 
 class SortingValue(SortingMove):
-    """One valid move with its value."""
+    """A valid move with its value."""
 
     value: float | None = Field(
-        description="policy: Q, expected discounted reward; planner: minus the attempts "
-        "expected to the goal if this move comes first, null where the task is too large for "
-        "working that out for every move"
+        description="policy: Q, expected discounted reward; planner: minus the expected number "
+        "of attempts to the goal with this move first, null in tasks too large for it"
     )
-    fewest: bool = Field(description="whether a plan of the fewest moves begins with it")
+    fewest: bool = Field(description="whether a plan with the fewest moves begins with it")
 
 
 class OutsideTraining(Answer):
-    """One input outside what the policy was trained on."""
+    """An input outside the training range."""
 
     field: str
     value: str
-    rule: str = Field(description="what held in training")
+    rule: str = Field(description="the training range")
 
 
 class SortingAnswer(Answer):
-    """The next move and all that explains it."""
+    """The next move with its explanation."""
 
-    solved: bool = Field(description="whether every tower is as the goal asks")
+    solved: bool = Field(description="whether every tower equals the goal")
     move: SortingMove | None = Field(description="the next move; null when solved")
-    by: By = Field(description="who decided")
-    why: Why = Field(description="why it was the policy or the planner, in a word")
-    because: str = Field(description="the same in a sentence")
+    by: By = Field(description="policy or planner")
+    why: Why = Field(description="reason for policy or planner, as a keyword")
+    because: str = Field(description="the reason as a sentence")
     moves: list[SortingValue] = Field(description="all valid moves, the chosen one first")
-    fewest_moves: int = Field(description="moves to the goal at least, if no pick fails")
+    fewest_moves: int = Field(description="fewest moves to the goal without failed picks")
     expected_attempts: float = Field(
-        description="attempts to the goal that the exact planner expects, failed picks included"
+        description="the exact planner's expected attempts to the goal, with failed picks"
     )
-    outside: list[OutsideTraining] = Field(description="inputs outside the policy's training")
+    outside: list[OutsideTraining] = Field(description="inputs outside the training range")
     watch: SortingRecord | None = Field(
-        description="hand it back with the next state of this task, so that the planner can "
-        "take over from a policy that goes in circles; null when there is nothing to watch"
+        description="send it with the next state of this task, so that the planner can replace "
+        "a policy that repeats moves; null where nothing is monitored"
     )
     checkpoint: str | None = Field(description="SHA-256 of the policy; null without one")
-    elapsed_ms: float = Field(description="time the decision took [ms]")
+    elapsed_ms: float = Field(description="time of the decision [ms]")
     stamp: Stamp = None
 
     @classmethod
@@ -247,7 +244,7 @@ class SortingAnswer(Answer):
         names: SortingNames,
         outside: Sequence[OutsideTraining],
     ) -> Self:
-        """Make it from a decision, the state it was made in and the words of both."""
+        """Return the answer of a decision in a state."""
         ids = {(one.at, one.level): one.id for one in request.objects}
         moves = [_valued(one, state, names, ids) for one in decision.ranked]
         watch = decision.watch
@@ -269,7 +266,7 @@ class SortingAnswer(Answer):
 
 
 Ids = Mapping[tuple[str, int | None], str | None]
-"""The caller's names of objects, by station and level."""
+"""Names of objects in the request, by station and level."""
 
 
 def outside_of(
@@ -279,14 +276,14 @@ def outside_of(
     policy: SortingValues | None,
     own: Vec,
 ) -> list[OutsideTraining]:
-    """Return what lies outside what the policy was trained on; nothing without a policy.
+    """Return the inputs outside the training range; none without a policy.
 
     Args:
         decision: The decision.
-        state: The state it was made in.
-        names: The words of the task.
-        policy: The policy that was asked.
-        own: The cell's own failure probabilities, shape (K,).
+        state: Its state.
+        names: Names of the task.
+        policy: Its policy.
+        own: The cell's failure probabilities, shape (K,).
     """
     if policy is None:
         return []
@@ -330,7 +327,7 @@ def _move(move: Move, state: SortingState, names: SortingNames, ids: Ids) -> Sor
 def _place(
     position: int, state: SortingState, names: SortingNames, *, top: bool
 ) -> SortingPlace:
-    """Return a position in words; of a tower the level on top, or the free one above it."""
+    """Return a place; on a tower the highest level, or the free one above it."""
     tower = position - names.shape.n_cells
     if tower < 0:
         return SortingPlace(station=names.cells[position], level=None)

@@ -1,4 +1,4 @@
-"""``POST /v1/task-selection``: the state in, the decision out."""
+"""``POST /v1/task-selection``: state in, decision out."""
 
 from collections.abc import Sequence
 from typing import Annotated, Literal, Self
@@ -29,49 +29,46 @@ Stamp = Finite | Annotated[str, Field(max_length=64)] | None
 
 
 class CandidateState(Body):
-    """One task the robot may take."""
+    """A task of the robot."""
 
     id: str = Field(min_length=1, max_length=128, description="your name for it")
     position: Vector3 = Field(description="point the tool must reach, in `frame` [m]")
 
 
 class TaskSelectionRequest(Body):
-    """What is known at the moment of choice."""
+    """State of the cell, and the candidate tasks."""
 
     model_config = shows(TASK_SELECTION)
 
     cell: str = Field(description="name of the work cell", examples=["pick-and-place"])
     frame: FrameName = Field("robot-base", description=FRAME_TEXT)
-    stamp: Stamp = Field(None, description="your time of the state; comes back unchanged")
+    stamp: Stamp = Field(None, description="your time of the state; returned unchanged")
     robot: RobotState
     people: Sequence[PersonInput] = Field(
         max_length=MAX_SKELETONS,
-        description="the people in the cell, each by joint angles, key-points, a cylinder or a "
-        "tracker; a policy that knows one person sees the one nearest to the robot; of more "
-        "than four the nearest four count, the others are flagged `dropped`",
+        description="people in the cell, each as joint angles, key-points, a cylinder or a "
+        "track; a policy for one person uses the one nearest to the robot; of more than four "
+        "the nearest four are used, the others are flagged `dropped`",
     )
     candidates: list[CandidateState] = Field(
-        min_length=1, max_length=MAX_CANDIDATES, description="what may be chosen"
+        min_length=1, max_length=MAX_CANDIDATES, description="the candidate tasks"
     )
     previous: str | None = Field(
-        None, max_length=128, description="id chosen last, for hysteresis; null chooses afresh"
+        None, max_length=128, description="last chosen id, for hysteresis; null: none"
     )
     time_left_s: Annotated[float, Field(ge=-1e9, le=1e9)] = Field(
         10.0,
-        description="time left to reach the target [s]; the policy sees 0 where it is over, at "
-        "most 60",
+        description="time left to reach the target [s]; clamped to 0 to 60 for the policy",
     )
     checkpoint: str | None = Field(
         None, max_length=64, description="SHA-256 or alias; the shipped policy if null"
     )
 
     def to_domain(self) -> tuple[Vec, Vec, tuple[Candidate, ...]]:
-        """Check what a schema cannot, and return q, qd and candidates as arrays.
-
-        The people need more than the request: ``app/api/known_people.py``.
+        """Return q, qd and candidates as arrays; ``known_people`` converts the people.
 
         Raises:
-            InvalidInput: An id given twice.
+            InvalidInput: An id occurs twice.
         """
         self._check_ids_are_unique()
         return (
@@ -92,51 +89,49 @@ class TaskSelectionRequest(Body):
 
 
 class Outside(Answer):
-    """One input outside what the checkpoint was trained on, or a joint outside its limits."""
+    """An input outside the training range, or a joint outside its limits."""
 
     field: str
     value: float
-    low: float = Field(description="least value met in training, or the joint's lower limit")
-    high: float = Field(description="greatest value met in training, or its upper limit")
-    of: Literal["training", "limits"] = Field(
-        "training", description="what `low` and `high` are"
-    )
+    low: float = Field(description="least value of training, or the joint's lower limit")
+    high: float = Field(description="greatest value of training, or its upper limit")
+    of: Literal["training", "limits"] = Field("training", description="kind of the bounds")
 
     @classmethod
     def from_domain(cls, outside: OutsideField) -> Self:
-        """Make it from the simulator's data."""
+        """Return the schema of the simulator's data."""
         return cls(**{name: getattr(outside, name) for name in cls.model_fields})
 
 
 class Action(Answer):
-    """What the policy would do now for one candidate."""
+    """The policy's action for a candidate."""
 
-    qd_target: Vector6 = Field(description="joint speeds asked for [rad/s]")
+    qd_target: Vector6 = Field(description="target joint speeds [rad/s]")
 
 
 class CandidateValue(Answer):
-    """What the critic says about one candidate."""
+    """The critic's value of a candidate."""
 
     id: str
     value: float = Field(description="expected discounted reward Q(s, pi(s))")
     chosen: bool
-    reachable: bool = Field(description="whether a posture with vertical tool exists there")
+    reachable: bool = Field(description="whether a configuration with vertical tool exists")
     action: Action
-    outside: list[Outside] = Field(description="how its position leaves the training range")
+    outside: list[Outside] = Field(description="coordinates outside the training range")
 
 
 class TaskSelection(Answer):
-    """The choice and all that explains it."""
+    """The decision with its explanation."""
 
     chosen: str = Field(description="id of the chosen candidate")
     candidates: list[CandidateValue]
-    people: list[PersonUse] = Field(description="what was made of each person")
+    people: list[PersonUse] = Field(description="use of each person")
     state_outside: list[Outside] = Field(
-        description="measured joints outside their limits, which the policy sees clamped, and "
-        "state fields outside the training range"
+        description="measured joints outside their limits, clamped for the policy, and state "
+        "fields outside the training range"
     )
-    checkpoint: str = Field(description="SHA-256 of the checkpoint that decided")
-    elapsed_ms: float = Field(description="time the decision took [ms]")
+    checkpoint: str = Field(description="SHA-256 of the checkpoint")
+    elapsed_ms: float = Field(description="time of the decision [ms]")
     stamp: Stamp = None
 
     @classmethod
@@ -147,7 +142,7 @@ class TaskSelection(Answer):
         people: list[PersonUse],
         stamp: Stamp,
     ) -> Self:
-        """Make it from a decision, what could be chosen and what was made of the people."""
+        """Return the answer of a decision."""
         return cls(
             chosen=decision.chosen,
             candidates=[

@@ -16,28 +16,30 @@ from app.sim.perception.person_estimator import PersonEstimate
 
 
 class TrackerCreate(Body):
-    """A tracker to be listened to."""
+    """A tracker to open."""
 
     cell: str = Field(description="name of the work cell", examples=["pick-and-place"])
-    n_people: Annotated[int, Field(ge=1, le=4)] = Field(1, description="most people at once")
+    n_people: Annotated[int, Field(ge=1, le=4)] = Field(
+        1, description="largest number of people"
+    )
     body: BodyPercentiles | None = Field(
-        None, description="size of these people; the cell's person if null"
+        None, description="size of these people; that of the cell's person if null"
     )
 
 
 class TrackerPublic(Answer):
-    """One tracker that is listened to."""
+    """An open tracker."""
 
     id: str
     cell: str
     n_people: int
-    n_frames: int = Field(description="frames taken in")
+    n_frames: int = Field(description="number of accepted frames")
     t: float | None = Field(description="time of its newest frame [s]")
-    idle_limit_s: float = Field(description="unused for so long it ends [s]")
+    idle_limit_s: float = Field(description="time until an unused tracker is deleted [s]")
 
     @classmethod
     def from_domain(cls, session: TrackerSession) -> Self:
-        """Make it from a session."""
+        """Return the schema of a session."""
         return cls(
             id=session.id,
             cell=session.cell,
@@ -49,36 +51,36 @@ class TrackerPublic(Answer):
 
 
 class TrackerList(Answer):
-    """All trackers that are listened to."""
+    """All open trackers."""
 
     items: list[TrackerPublic]
 
 
 class FrameCreate(Body):
-    """One frame of all people, in any order."""
+    """A frame of all people, in any order."""
 
     model_config = shows(FRAME)
 
-    t: Time = Field(description="when the frame was taken, on the tracker's clock [s]")
+    t: Time = Field(description="time of the frame, on the tracker's clock [s]")
     people: list[KeypointsSeen] = Field(
         max_length=MAX_SKELETONS,
-        description="people in the frame; nobody: an empty list; of more than the tracker "
-        "follows, the nearest to the robot's base are followed",
+        description="people in the frame, may be empty; of more people than tracks, the "
+        "nearest to the robot's base are followed",
     )
 
 
 class CylinderPublic(Answer):
-    """The safety cylinder of METHOD 2.8."""
+    """Safety cylinder of a person (docs/method.md 2.8)."""
 
     center: list[float] = Field(description="x, y of the axis [m]")
     radius: float = Field(description="radius with factor and flesh margin [m]")
-    bottom: float = Field(description="lowest point of what is seen [m]")
-    top: float = Field(description="highest point with the flesh margin [m]")
+    bottom: float = Field(description="lowest observed point [m]")
+    top: float = Field(description="highest observed point plus flesh margin [m]")
     velocity: list[float] = Field(description="velocity of the axis [m/s]")
 
     @classmethod
     def from_domain(cls, cylinder: SafetyCylinder) -> Self:
-        """Make it from the estimate's."""
+        """Return the schema of a cylinder."""
         return cls(
             center=cylinder.center.tolist(),
             radius=cylinder.radius,
@@ -89,21 +91,21 @@ class CylinderPublic(Answer):
 
 
 class EstimatePublic(Answer):
-    """What is known of one person."""
+    """Estimate of one person."""
 
-    person: int = Field(description="which of the tracker's people")
+    person: int = Field(description="index of the track")
     q: list[float] | None = Field(
-        description="joint positions [m, rad]; null: not known yet, or the model does not fit"
+        description="joint positions [m, rad]; null: unknown yet, or the model does not fit"
     )
     qd: list[float] | None = Field(description="joint speeds [m/s, rad/s]")
-    cylinder: CylinderPublic | None = Field(description="null where nobody was ever seen")
+    cylinder: CylinderPublic | None = Field(description="null before the first observation")
     age_s: float | None = Field(
         description="time since the newest credible key-point [s]; null where there was none"
     )
-    stale: bool = Field(description="whether nothing credible was seen lately")
-    flags: list[str] = Field(description="how the estimate is degraded; empty where it is not")
-    held: list[str] = Field(description="joints that keep their angle: nothing shows them")
-    missing: list[str] = Field(description="key-points unseen for longer than the hold time")
+    stale: bool = Field(description="whether the last credible observation is too old")
+    flags: list[str] = Field(description="degradations of the estimate")
+    held: list[str] = Field(description="unobserved joints at their last angle")
+    missing: list[str] = Field(description="key-points missing for longer than the hold time")
     strays: list[str] = Field(description="key-points dropped: too far from all others")
     unusable: list[str] = Field(description=UNUSABLE)
     implausible: str | None = Field(description=IMPLAUSIBLE)
@@ -113,7 +115,7 @@ class EstimatePublic(Answer):
 
     @classmethod
     def from_domain(cls, index: int, estimate: PersonEstimate) -> Self:
-        """Make it from the estimate."""
+        """Return the schema of an estimate."""
         person, cylinder = estimate.person, estimate.cylinder
         return cls(
             person=index,
@@ -133,12 +135,12 @@ class EstimatePublic(Answer):
 
 
 class UnfollowedPublic(Answer):
-    """A person in the newest frame that the tracker does not follow."""
+    """A person of the newest frame without a track."""
 
-    index: int = Field(description="place in the frame's `people`")
+    index: int = Field(description="index in the frame's `people`")
     reason: Literal["farther", "jump", "foreign-frame"] = Field(
-        description="farther away than those who are followed are, or may be where they are "
-        "not seen; not credible yet, as in `jump`; another frame or unit"
+        description="farther away than all tracks are or may be; not credible yet; another "
+        "frame or unit"
     )
     distance_m: float | None = Field(
         description="horizontal distance of the nearest key-point to the robot's base [m]; "
@@ -148,21 +150,21 @@ class UnfollowedPublic(Answer):
 
 
 class EstimatesPublic(Answer):
-    """What is known of a tracker's people at one time."""
+    """Estimates of a tracker's people at one time."""
 
     tracker: str
     t: float | None = Field(
-        description="time the estimates are for, on the tracker's clock [s]; null before the "
-        "first frame"
+        description="time of the estimates, on the tracker's clock [s]; null before the first "
+        "frame"
     )
     people: list[EstimatePublic]
     unfollowed: list[UnfollowedPublic] = Field(
-        description="people in the newest frame that are not followed, nearest first"
+        description="people of the newest frame without a track, nearest first"
     )
 
     @classmethod
     def from_domain(cls, tracker: str, known: TrackedPeople) -> Self:
-        """Make it from what is known of a tracker's people."""
+        """Return the schema of a tracker's people."""
         people = [EstimatePublic.from_domain(i, one) for i, one in enumerate(known.estimates)]
         rest = [UnfollowedPublic(**asdict(one)) for one in known.unfollowed]
         return cls(tracker=tracker, t=known.t, people=people, unfollowed=rest)
