@@ -1,4 +1,4 @@
-"""SHA-256 of stored data: JSON in one spelling, followed by bytes."""
+"""SHA-256 of stored data: canonical JSON followed by bytes."""
 
 import hashlib
 import json
@@ -6,7 +6,7 @@ from typing import Any
 
 
 def canonical(value: Any) -> str:
-    """Return JSON data as text with one spelling.
+    """Return JSON data in canonical form: sorted keys, no spaces.
 
     Raises:
         ValueError: A number is not finite.
@@ -26,8 +26,8 @@ def digest(value: Any, content: bytes = b"") -> str:
 
 
 def has_digest(expected: str | None, value: Any, content: bytes = b"") -> bool:
-    """Whether JSON data and bytes that were read have the digest that was stored with them."""
+    """Whether JSON data and bytes have a digest."""
     try:
         return digest(value, content) == expected
-    except (TypeError, ValueError):  # what was read is no JSON data any more
+    except (TypeError, ValueError):  # damaged beyond JSON
         return False

@@ -1,24 +1,23 @@
-"""The errors of Tandem, as one tree.
+"""The error hierarchy.
 
     ServiceError
-    ├── NotFound             nothing has that name or id
+    ├── NotFound             no object with that name or id
     ├── InvalidInput         a value breaks a rule: field, value, rule, choices
-    │   ├── BadCell          a work cell has faults: all of them, each with its place
-    │   ├── BadRecording        a motion file has faults: each with its place
-    │   └── GoalOutside      a goal lies beyond what can be answered for: axes and by how much
+    │   ├── BadCell          faults of a work cell, each with its place
+    │   ├── BadRecording     faults of a motion file, each with its place
+    │   └── GoalOutside      a goal outside the targets: axes and distances
     ├── Conflict             the request contradicts the present state
     │   ├── ClockJump        a frame's stamp does not continue those before
-    │   └── StaleAttempt     a worker writes about a job that is no longer its own
+    │   └── StaleAttempt     a worker no longer holds its job
     ├── StorageUnavailable   the database does not answer for now
-    ├── StorageFull          the database or the disk has no room left
-    ├── Damaged              stored data are not what was stored: what, name, remedy
+    ├── StorageFull          the database or the disk is full
+    ├── Damaged              stored data with a wrong digest: kind, name, remedy
     ├── NotReady             the service cannot answer yet, or not now
     ├── MissingPackage       an optional library is not installed
-    ├── SimulationError      the simulator met a state it must never meet
-    └── CheckpointMismatch   a checkpoint does not fit what it is asked to do
+    ├── SimulationError      the simulator reached an impossible state
+    └── CheckpointMismatch   a checkpoint does not fit its use
 
-Every error keeps its data as attributes and gives them by ``problem()``, from which the HTTP
-border builds an RFC 9457 problem.
+Every error has its data as attributes and as ``problem()``, the members of an RFC 9457 problem.
 """
 
 import math
@@ -29,11 +28,7 @@ from typing import Protocol
 
 
 def digits(value: float) -> str:
-    """Return a number as it is compared: all its digits, without an exponent where they fit.
-
-    Args:
-        value: A bound, or another number of a rule.
-    """
+    """Return a number with all its digits, without an exponent below 1e21."""
     number = value if isinstance(value, int) else float(value)
     if math.isfinite(number) and abs(number) < 1e21:
         return f"{Decimal(repr(number or 0)).normalize():f}"
@@ -46,10 +41,10 @@ def interval(low: float, high: float) -> str:
 
 
 class ServiceError(Exception):
-    """Root of every error that Tandem raises on purpose.
+    """Base of all errors of Tandem.
 
     Args:
-        message: One sentence for people, with the value, the rule and the choices.
+        message: A sentence with the value, the rule and the choices.
     """
 
     def __init__(self, message: str) -> None:
@@ -57,17 +52,17 @@ class ServiceError(Exception):
         self.message = message
 
     def problem(self) -> dict[str, object]:
-        """Return the error's data, as extension members of a problem document."""
+        """Return the error's data as extension members of a problem document."""
         return {}
 
 
 class NotFound(ServiceError):
-    """Nothing has that name or id.
+    """No object has that name or id.
 
     Args:
-        what: The noun, such as ``"preset"``.
-        name: The name that was asked for.
-        known: Names that exist, where the list is short enough to print.
+        what: Kind of object, such as ``"preset"``.
+        name: The unknown name.
+        known: Existing names, where there are few.
     """
 
     def __init__(self, what: str, name: str, known: Sequence[str] = ()) -> None:
@@ -76,7 +71,7 @@ class NotFound(ServiceError):
         self.what, self.name, self.known = what, name, tuple(known)
 
     def problem(self) -> dict[str, object]:
-        """Return noun, name and the known names."""
+        """Return kind, name and the known names."""
         return {"what": self.what, "name": self.name, "known": list(self.known)}
 
 
@@ -87,7 +82,7 @@ class InvalidInput(ServiceError):
         field: Dotted path of the field, such as ``"robot.q[3]"``.
         value: The offending value.
         rule: The rule it breaks, as a sentence part: ``"must lie in [-3.1, 3.1] rad"``.
-        choices: Allowed values, where they can be listed.
+        choices: Allowed values, where there are few.
     """
 
     def __init__(
@@ -110,26 +105,26 @@ class InvalidInput(ServiceError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fault:
-    """One thing that is wrong with a work cell or a file, for its author to mend."""
+    """A fault of a work cell or a file."""
 
     place: str
-    """Where: ``"stations.cube3.position[2]"``, ``"line 57"``."""
+    """Its place: ``"stations.cube3.position[2]"``, ``"line 57"``."""
     value: str
-    """What stands there, as text; empty where nothing does."""
+    """The value there as text; empty where there is none."""
     rule: str
     """The rule it breaks, as a sentence part: ``"must lie in [-3, 3] m"``."""
     hint: str = ""
-    """What is probably meant, or what would do; may be empty."""
+    """Probable intention or remedy; may be empty."""
 
     @property
     def text(self) -> str:
-        """One sentence."""
+        """The fault as a sentence."""
         given = f" = {self.value}" if self.value else ""
         return f"{self.place}{given} {self.rule}" + (f" ({self.hint})" if self.hint else "")
 
 
 class _Faulty(InvalidInput):
-    """Something that people wrote has faults.
+    """A file has faults.
 
     Args:
         faults: All of them, at least one.
@@ -158,11 +153,11 @@ class _Faulty(InvalidInput):
 
 
 class BadCell(_Faulty):
-    """A work cell has faults: all of them, at least one."""
+    """Faults of a work cell."""
 
 
 class BadRecording(_Faulty):
-    """A file of human motion has faults: at least one, each with its line or column."""
+    """Faults of a file of human motion, each with its line or column."""
 
 
 class Beyond(Protocol):
@@ -179,12 +174,12 @@ class Beyond(Protocol):
 
 
 class GoalOutside(InvalidInput):
-    """A goal lies outside the targets that an answer is made from.
+    """A goal outside the targets of a policy.
 
     Args:
         field: Path of the goal.
         value: The goal [m].
-        beyond: The coordinates that lie outside, at least one.
+        beyond: Its coordinates outside the range, at least one.
     """
 
     def __init__(self, field: str, value: Sequence[float], beyond: Sequence[Beyond]) -> None:
@@ -198,11 +193,11 @@ class GoalOutside(InvalidInput):
             for one in beyond
         )
         part = "{by_m:.3g} m outside along {axis}, which must lie in [{low:g}, {high:g}] m"
-        told = [part.format(**one) for one in self.beyond]
-        super().__init__(field, list(value), "lies " + "; ".join(told))
+        parts = [part.format(**one) for one in self.beyond]
+        super().__init__(field, list(value), "lies " + "; ".join(parts))
 
     def problem(self) -> dict[str, object]:
-        """Return field, value and rule, and each axis with how far outside it is [m]."""
+        """Return field, value and rule, and each axis with its distance outside [m]."""
         return {**super().problem(), "outside": [dict(one) for one in self.beyond]}
 
 
@@ -211,14 +206,14 @@ class Conflict(ServiceError):
 
 
 class ClockJump(Conflict):
-    """The stamp of a frame does not continue the stamps before it; the frame is not taken.
+    """The stamp of a refused frame does not continue the stamps before it.
 
     Args:
         stamp: Stamp of the frame, on the tracker's clock [s].
-        newest: Stamp of the newest frame taken [s].
-        silence: How long ago that frame arrived [s].
-        count: How many frames in a row continue each other like this.
-        needed: How many of them make the tracker's clock count as changed.
+        newest: Stamp of the newest accepted frame [s].
+        silence: Time since the arrival of that frame [s].
+        count: Number of consecutive frames that continue each other.
+        needed: Number of them that is accepted as a change of the clock.
     """
 
     def __init__(
@@ -227,18 +222,18 @@ class ClockJump(Conflict):
         self.stamp, self.newest, self.silence = stamp, newest, silence
         self.count, self.needed = count, needed
         self.rule = (
-            f"must be later than {newest!r} s, the stamp of the frame taken {silence:.3g} s "
-            "ago, by about as much"
+            f"must be about {silence:.3g} s later than {newest!r} s, the stamp of the newest "
+            "frame"
         )
         super().__init__(
-            f"t = {stamp!r} {self.rule}; this frame is not taken, and people count as stale. "
-            f"Send on: {needed} frames in a row whose stamps (in seconds) continue each other "
-            f"are taken as a change of the clock; this is number {count}. Or delete the "
-            "tracker and open a new one"
+            f"t = {stamp!r} {self.rule}; this frame is refused, and people are stale. After "
+            f"{needed} frames in a row with stamps (in seconds) that continue each other a "
+            f"change of the clock is accepted; this is number {count}. Or delete the tracker "
+            "and open a new one"
         )
 
     def problem(self) -> dict[str, object]:
-        """Return field, value and rule, and how far the resynchronisation is."""
+        """Return field, value and rule, and the state of the resynchronisation."""
         return {
             "field": "t",
             "value": repr(self.stamp),
@@ -251,24 +246,24 @@ class ClockJump(Conflict):
 
 
 class Damaged(ServiceError):
-    """Stored data do not have the checksum that was stored with them.
+    """Stored data do not have their checksum.
 
     Args:
-        what: The noun, such as ``"checkpoint"``.
+        what: Kind of object, such as ``"checkpoint"``.
         name: Its name or id.
-        remedy: What to do about it.
-        sha256: The checksum that it should have.
+        remedy: What to do.
+        sha256: The stored checksum.
     """
 
     def __init__(self, what: str, name: str, remedy: str, sha256: str = "") -> None:
         super().__init__(
-            f"{what} {name!r} is damaged: its content does not have its checksum and is not "
+            f"{what} {name!r} is damaged: its content does not match its checksum and is not "
             f"used; {remedy}"
         )
         self.what, self.name, self.remedy, self.sha256 = what, name, remedy, sha256
 
     def problem(self) -> dict[str, object]:
-        """Return noun, name, checksum and remedy."""
+        """Return kind, name, checksum and remedy."""
         return {
             "what": self.what,
             "name": self.name,
@@ -278,21 +273,21 @@ class Damaged(ServiceError):
 
 
 class NotReady(ServiceError):
-    """The service cannot answer yet, or not now; asking again later may help."""
+    """The service cannot answer yet, or not now; a later request may succeed."""
 
 
 class StaleAttempt(Conflict):
-    """A worker writes about a job that is no longer its own: the write is refused.
+    """The refused write of a worker that no longer holds its job.
 
     Args:
         job_id: The job.
-        attempt: The attempt that tried to write.
+        attempt: The attempt of the worker.
     """
 
     def __init__(self, job_id: str, attempt: int) -> None:
         super().__init__(
-            f"attempt {attempt} no longer holds job {job_id}: it was cancelled, ended or "
-            "started again, and this write is refused"
+            f"attempt {attempt} no longer holds job {job_id}, which was cancelled, ended or "
+            "started again: this write is refused"
         )
         self.job_id, self.attempt = job_id, attempt
 
@@ -305,8 +300,8 @@ class StorageUnavailable(ServiceError):
     """The database does not answer for now: locked for too long, unreachable, unreadable.
 
     Args:
-        database: Which one, as a URL without its password.
-        reason: What the database said.
+        database: Its URL without password.
+        reason: Its error.
     """
 
     def __init__(self, database: str, reason: str) -> None:
@@ -314,36 +309,36 @@ class StorageUnavailable(ServiceError):
         self.database, self.reason = database, reason
 
     def problem(self) -> dict[str, object]:
-        """Return the database and its reason."""
+        """Return the database and the reason."""
         return {"database": self.database, "reason": self.reason}
 
 
 class StorageFull(ServiceError):
-    """The database or the disk has no room left.
+    """The database or the disk is full.
 
     Args:
-        database: What is full, as a URL without its password.
+        database: Its URL without password.
     """
 
     def __init__(self, database: str) -> None:
         super().__init__(
-            f"no room left in {database} (database or disk is full): free some space or point "
-            "TANDEM_DATA to a larger disk"
+            f"no room left in {database} (database or disk is full): free some space or set "
+            "TANDEM_DATA to a folder of a larger disk"
         )
         self.database = database
 
     def problem(self) -> dict[str, object]:
-        """Return what is full."""
+        """Return the database."""
         return {"database": self.database}
 
 
 class MissingPackage(ServiceError):
-    """An optional library is not installed on this machine.
+    """An optional library is not installed.
 
     Args:
         package: Its name.
-        what: What needs it, such as ``"planning"``.
-        remedy: What to do about it.
+        what: The feature, such as ``"planning"``.
+        remedy: What to do.
     """
 
     def __init__(self, package: str, what: str, remedy: str) -> None:
@@ -351,21 +346,21 @@ class MissingPackage(ServiceError):
         self.package, self.what, self.remedy = package, what, remedy
 
     def problem(self) -> dict[str, object]:
-        """Return the package, what needs it and the remedy."""
+        """Return package, feature and remedy."""
         return {"package": self.package, "what": self.what, "remedy": self.remedy}
 
 
 class SimulationError(ServiceError):
-    """The simulator met a state it must never meet; a bug, with the seed to reproduce it."""
+    """The simulator reached an impossible state: a bug, with the seed to reproduce it."""
 
 
 class CheckpointMismatch(ServiceError):
-    """A checkpoint does not fit what it is asked to do.
+    """A checkpoint does not fit its use.
 
     Args:
-        field: The property that differs, such as ``"cell"``.
-        expected: What is asked for.
-        actual: What the checkpoint says.
+        field: The differing property, such as ``"cell"``.
+        expected: The required value.
+        actual: The checkpoint's value.
     """
 
     def __init__(self, field: str, expected: object, actual: object) -> None:

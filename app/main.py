@@ -1,8 +1,8 @@
-"""The one place where the parts of the service are wired together.
+"""Composition root: creates the parts of the service.
 
 ``create_app`` builds the HTTP application around a :class:`Service`, which opens the store,
-starts the supervisor, warms the compiled kernels on a thread of its own and then starts the
-live cell. Everything it opens it closes; several apps may live in one process.
+starts the supervisor, compiles the kernels on a thread and then starts the live cell. Several
+applications may exist in one process.
 """
 
 import logging
@@ -55,7 +55,7 @@ VERSION = "0.1.0"
 WORLD_ID = "main"
 LIVE_CELL = "pick-and-place"
 STOP_S = 5.0
-"""How long a stopping service waits for kernels that are being compiled [s]."""
+"""Time for the compilation of kernels to end when the service stops [s]."""
 STATIC = Path(web.__file__).parent / "page"
 
 
@@ -66,7 +66,7 @@ def create_app(settings: Settings) -> FastAPI:
         settings: Where and how the service runs.
 
     Raises:
-        InvalidInput: Settings that would open the service to strangers.
+        InvalidInput: The settings give unprotected access.
     """
     check_access(settings)
 
@@ -84,7 +84,7 @@ def create_app(settings: Settings) -> FastAPI:
 
 
 class Service:
-    """The running parts behind one application.
+    """The running parts of one application.
 
     Args:
         settings: Where and how the service runs.
@@ -134,7 +134,7 @@ class Service:
         self.parts.store.close()
 
     def _start_cell(self) -> None:
-        """Warm up and start the live cell; say in ``readiness`` how that goes."""
+        """Compile the kernels and start the live cell; update ``readiness``."""
         readiness = self.parts.readiness
         try:
             readiness.reason = "warming up: loading the shipped checkpoints"
@@ -162,7 +162,7 @@ class Service:
             logger.exception("the live cell could not start")
 
     def _look_for_damage(self) -> None:
-        """Note which stored checkpoints are damaged, before they are asked for."""
+        """Record the damaged checkpoints of the store."""
         names = self.parts.checkpoints
         for damage in find_damaged(names.store):
             if self.parts.stopping.is_set():
@@ -178,7 +178,7 @@ def start_world(
     sorting_policy: SortingValues | None = None,
     reach_policy: LiveReachPolicy | None = None,
 ) -> LiveCell:
-    """Start a live cell with its viewer; whoever asked stops it."""
+    """Start a live cell with its viewer; the caller stops it."""
     live = LiveCell(
         cell, policy, id=world_id, sorting_policy=sorting_policy, reach_policy=reach_policy
     )
@@ -187,21 +187,21 @@ def start_world(
 
 
 def build_task_policy(manifest: Mapping[str, Any], tensors: bytes) -> TaskPolicy:
-    """Make the object that chooses tasks from a checkpoint's manifest and tensors."""
+    """Return the task-selection policy of a checkpoint."""
     checkpoint = load(manifest, tensors)
     require_purpose(checkpoint, CHOOSING)
     return TaskChooser(checkpoint)
 
 
 def build_sorting_policy(manifest: Mapping[str, Any], tensors: bytes) -> SortingValues:
-    """Make the object that values sorting moves from a checkpoint's manifest and tensors."""
+    """Return the sorting policy of a checkpoint."""
     checkpoint = load(manifest, tensors)
     require_purpose(checkpoint, SORTING)
     return SortingPolicy(checkpoint)
 
 
 def build_reach_policy(manifest: Mapping[str, Any], tensors: bytes) -> MotionDecider:
-    """Make the object that moves to goals from a checkpoint's manifest and tensors."""
+    """Return the reach policy of a checkpoint, with compiled kernels."""
     actor = ReachPolicy(load(manifest, tensors))
     decider = MotionDecider(actor, cell_of(manifest))
     decider.warm_up()
@@ -209,13 +209,13 @@ def build_reach_policy(manifest: Mapping[str, Any], tensors: bytes) -> MotionDec
 
 
 def publish_shipped(names: CheckpointNames) -> None:
-    """Put the checkpoints that come with the service into its store, under their aliases.
+    """Store the shipped checkpoints under their aliases.
 
-    Those that are damaged there are stored again; one whose file in the package is damaged is
-    taken as an earlier start stored it.
+    Damaged ones in the store are replaced; for a damaged file of the package the stored one is
+    used.
 
     Raises:
-        NotFound: A file in the package is damaged, and none is stored.
+        NotFound: A file of the package is damaged, and the checkpoint is not stored.
     """
     for alias, sha256 in pretrained.SHA256.items():
         try:

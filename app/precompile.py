@@ -1,8 +1,7 @@
-"""Compiling everything the simulator compiles, once, into the cache on disk.
+"""Compilation of all kernels into the cache on disk.
 
-Done by set-up and by the image, so that later starts of the server, of training jobs and of
-evaluations only read what is there. The parts share few kernels: each is compiled in a process
-of its own, as many at once as there are cores.
+Set-up and the image run it, so that servers, training jobs and evaluations start quickly. The
+parts share few kernels; each is compiled in its own process, one per core at a time.
 """
 
 import time
@@ -40,7 +39,7 @@ def _shipped(purpose: str) -> list[Checkpoint]:
 
 
 def _moving() -> None:
-    """Decide about motion beside nobody, a body and a cylinder; run the live reach cell."""
+    """Decide motion without people, beside a body and a cylinder; step the live reach cell."""
     for checkpoint in _shipped(REACHING):
         reacher, cell = ReachPolicy(checkpoint), cell_of(checkpoint.manifest)
         MotionDecider(reacher, cell).warm_up()
@@ -49,7 +48,7 @@ def _moving() -> None:
 
 
 def _choosing() -> None:
-    """Run the live pick and sorting cells, and a batch as training does."""
+    """Step the live pick and sorting cells, and a batch of environments."""
     for checkpoint in _shipped(CHOOSING):
         policy = TaskChooser(checkpoint)
         cell = load_cell(policy.cell)
@@ -65,7 +64,7 @@ def _choosing() -> None:
 
 
 def _sorting() -> None:
-    """Play sorting, in batches and by search."""
+    """Step a batch of sorting environments; run the exact planner."""
     tasks = batch_in(load_cell(SORTING_CELL), N_ENVS, seed=0)
     tasks.reset()
     tasks.masks()
@@ -78,24 +77,24 @@ PARTS: dict[str, Callable[[], None]] = {
     "choosing": _choosing,
     "sorting": _sorting,
 }
-"""What is compiled, the longest first."""
+"""Parts to compile, the longest first."""
 
 
 def compile_part(name: str) -> float:
-    """Use every kernel of a part once; return the CPU time that took [s]."""
+    """Run every kernel of a part once; return the CPU time [s]."""
     started = time.process_time()
     PARTS[name]()
     return time.process_time() - started
 
 
 def compile_all(n_processes: int) -> Iterator[tuple[str, float]]:
-    """Compile all parts in processes of their own.
+    """Compile each part in its own process.
 
     Args:
-        n_processes: How many at once.
+        n_processes: Number of processes at once.
 
     Yields:
-        Name and CPU time [s] of each part, as soon as it is ready.
+        Name and CPU time [s] of each compiled part.
     """
     with ProcessPoolExecutor(n_processes, mp_context=get_context("spawn")) as pool:
         begun = {pool.submit(compile_part, name): name for name in PARTS}

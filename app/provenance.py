@@ -1,4 +1,4 @@
-"""What a number was measured on: printed with every result, so that it can be compared."""
+"""Machine, versions and commit of a measurement, printed with every result."""
 
 import os
 import platform
@@ -8,17 +8,17 @@ from importlib import metadata
 from pathlib import Path
 
 PACKAGES = ("numpy", "numba", "torch", "stable-baselines3", "pin", "python-fcl", "mujoco")
-"""Packages whose version changes what is measured."""
+"""Packages with an effect on measurements."""
 
 
 @cache
 def describe() -> dict[str, object]:
-    """Describe this machine: processor, cores, memory, Python, packages, commit.
+    """Describe this machine as JSON data.
 
     Returns:
-        JSON-ready members ``cpu``, ``cores`` (that this process may use), ``memory_gib``,
-        ``system``, ``python``, ``packages`` and ``commit`` (None outside a checkout; with
-        ``+`` behind it when the tree differs from it).
+        ``cpu``, ``cores`` (of this process), ``memory_gib``, ``system``, ``python``,
+        ``packages`` and ``commit`` (None outside a checkout; with a trailing ``+`` for a
+        modified tree).
     """
     return {
         "cpu": _cpu_model(),
@@ -41,7 +41,7 @@ def _cpu_model() -> str:
 
 
 def cores() -> int:
-    """Return how many cores this process may use."""
+    """Return the number of cores of this process."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

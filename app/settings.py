@@ -1,7 +1,6 @@
-"""Where and how the service runs: the ``TANDEM_*`` environment variables, checked at start.
+"""Settings of the service: the ``TANDEM_*`` environment variables, checked at start.
 
-Only ``app.main``, ``app.__main__`` and the entry of ``jobs.run`` read this; every other part
-gets plain arguments.
+Only ``app.main``, ``app.cli`` and ``jobs.run`` read them; every other part has plain arguments.
 """
 
 import ipaddress
@@ -18,7 +17,7 @@ MIN_TOKEN_LENGTH = 16
 
 
 class Settings(BaseSettings):
-    """The settings of one server, one attribute per variable."""
+    """Settings of a server, one attribute per variable."""
 
     model_config = SettingsConfigDict(env_prefix=PREFIX, frozen=True, extra="forbid")
 
@@ -39,7 +38,7 @@ class Settings(BaseSettings):
 
     @property
     def is_loopback(self) -> bool:
-        """Whether only programs on this machine can reach the server."""
+        """Whether the server is accessible from this machine only."""
         if self.host == "localhost":
             return True
         try:
@@ -49,12 +48,12 @@ class Settings(BaseSettings):
 
     @property
     def database(self) -> str:
-        """The database URL that is used."""
+        """The effective database URL."""
         return self.database_url or f"sqlite:///{self.data.resolve() / 'tandem.db'}"
 
     @property
     def secret(self) -> str | None:
-        """The token in plain text, None without one."""
+        """The token as text, or None."""
         return self.token.get_secret_value() if self.token else None
 
 
@@ -62,10 +61,10 @@ def load_settings(**overrides: object) -> Settings:
     """Read the settings from the environment and check them.
 
     Args:
-        **overrides: Values that win over the environment (command line options).
+        **overrides: Values in place of the environment's; None is ignored.
 
     Raises:
-        InvalidInput: A variable is unknown or breaks a rule; names it, its value, the rule.
+        InvalidInput: A variable is unknown or breaks a rule.
     """
     known = [PREFIX + name.upper() for name in Settings.model_fields]
     for name in sorted(os.environ):
@@ -81,7 +80,7 @@ def load_settings(**overrides: object) -> Settings:
 
 
 def check_access(settings: Settings) -> None:
-    """Refuse to serve with settings that would open the service to strangers.
+    """Check that the settings protect the service.
 
     Raises:
         InvalidInput: A token is missing or too short.

@@ -1,8 +1,8 @@
-"""Limits of the HTTP connection: size of a request head, time, progress, number of clients.
+"""Limits of HTTP connections: size of the request head, time, progress, number of clients.
 
-uvicorn's parser (httptools 0.9) accepts a head of any size and waits for it without end, and
-joins a header that arrives in pieces at quadratic cost. This protocol refuses both before the
-application, and with it the token, is reached. A WebSocket handshake is parsed here as well.
+uvicorn's parser (httptools 0.9) accepts a head of any size, waits for it without limit and
+joins fragments of a header at quadratic cost. This protocol enforces limits before the
+application and its access control. WebSocket handshakes are parsed here, too.
 """
 
 import asyncio
@@ -14,23 +14,23 @@ from app.api.answers import HEADERS
 from app.api.problems import problem
 
 HEAD_BYTES = 32 * 1024
-"""Longest head of a request: URL and headers, trailers included [bytes]."""
+"""Limit of a request's head: URL and headers, trailers included [bytes]."""
 HEAD_S = 10.0
-"""Longest time from a connection, or the first byte of a further request, to its head [s]."""
+"""Time limit from a connection, or the first byte of a further request, to its head [s]."""
 BODY_S = 10.0
-"""Time in which a body must progress by BODY_BYTES or end [s]."""
+"""Period in which a body must progress by BODY_BYTES or end [s]."""
 BODY_BYTES = 5000
-"""Least progress of a body in BODY_S [bytes]."""
+"""Minimum progress of a body in BODY_S [bytes]."""
 UNREAD_BYTES = 1 << 20
-"""Most that is still read of what follows an answer or a refusal [bytes]."""
+"""Limit of the data read after an answer or a refusal [bytes]."""
 DRAIN_S = 60.0
-"""Longest time in which a client may take nothing of its answer [s]."""
+"""Time limit for a client that reads nothing of its answer [s]."""
 LINGER_S = 2.0
-"""Time for a client to read a refusal while what it sends is dropped [s]."""
+"""Time for a client to read a refusal [s]."""
 MAX_PIPELINED = 32
-"""Most requests of a connection that wait for the answer to an earlier one."""
+"""Limit of pipelined requests of a connection."""
 MAX_CONNECTIONS = 512
-"""Most open connections, WebSockets included."""
+"""Limit of open connections, WebSockets included."""
 
 
 class LimitedHttp(HttpToolsProtocol):
@@ -39,23 +39,23 @@ class LimitedHttp(HttpToolsProtocol):
     _timer: asyncio.TimerHandle | None = None
     _drain_timer: asyncio.TimerHandle | None = None
     _begun = False
-    """Whether a request has begun and not ended."""
+    """Whether a request is being received."""
     _in_body = False
     """Whether the head of this request is complete."""
     _ended = False
-    """Whether no further request is taken; what still arrives is dropped or left unread."""
+    """Whether further requests are ignored."""
     _head = 0
     """Length of the parsed part of the head [bytes]."""
     _pending = 0
-    """What arrived since a whole header or a piece of a body did [bytes]."""
+    """Data since the last complete header or part of a body [bytes]."""
     _progress = 0
-    """What arrived of the body since the timer was set [bytes]."""
+    """Data of the body since the timer was set [bytes]."""
     _unread = 0
-    """What arrived after the answer or the refusal [bytes]."""
+    """Data after the answer or the refusal [bytes]."""
     _refusal = (400, "bad-request", "the request is not valid HTTP/1.1")
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Take a client; where there are too many, close the one that is idle for longest."""
+        """Accept a client; over the limit, close the client with the longest idle time."""
         super().connection_made(transport)
         self._idle_since = self.loop.time()
         self._set_timer(HEAD_S, self._head_is_late)
@@ -71,10 +71,10 @@ class LimitedHttp(HttpToolsProtocol):
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
-        """Parse what arrived, within the limits."""
+        """Parse data within the limits."""
         if self._ended:
             self._unread += len(data)
-            if self._unread > UNREAD_BYTES:  # reading on costs others more than it helps
+            if self._unread > UNREAD_BYTES:
                 self.flow.pause_reading()
             return
         self._pending += len(data)
@@ -90,7 +90,7 @@ class LimitedHttp(HttpToolsProtocol):
             self._set_timer(HEAD_S, self._head_is_late)
 
     def on_message_begin(self) -> None:
-        """Begin to count."""
+        """Reset the counters."""
         self._begun, self._head, self._pending, self._unread = True, 0, 0, 0
         super().on_message_begin()
 
@@ -105,7 +105,7 @@ class LimitedHttp(HttpToolsProtocol):
         super().on_header(name, value)
 
     def on_headers_complete(self) -> None:
-        """Start the request, unless too many wait already."""
+        """Start the request, within the limit of pipelined ones."""
         self._stop_timer()
         if len(self.pipeline) >= MAX_PIPELINED:
             self._refusal = 503, "too-many-requests-at-once", "too many pipelined requests"
@@ -114,7 +114,7 @@ class LimitedHttp(HttpToolsProtocol):
         self._in_body = True
 
     def on_body(self, body: bytes) -> None:
-        """Note that the body goes on."""
+        """Count the progress of the body."""
         self._pending = 0
         self._progress += len(body)
         super().on_body(body)
@@ -136,7 +136,7 @@ class LimitedHttp(HttpToolsProtocol):
         super().on_response_complete()
 
     def handle_websocket_upgrade(self) -> None:
-        """Hand the connection to the WebSocket protocol, which has limits of its own."""
+        """Pass the connection to the WebSocket protocol, which has its own limits."""
         self._stop_timer()
         self._ended = True
         super().handle_websocket_upgrade()
@@ -146,19 +146,19 @@ class LimitedHttp(HttpToolsProtocol):
             self.transport.close()
 
     def pause_writing(self) -> None:
-        """Give a client that reads nothing some time."""
+        """Start the time limit of a client that does not read."""
         super().pause_writing()
         self._drain_timer = self.loop.call_later(DRAIN_S, self.transport.abort)
 
     def resume_writing(self) -> None:
-        """Go on: the client has read."""
+        """Stop the time limit of a client that does not read."""
         super().resume_writing()
         if self._drain_timer is not None:
             self._drain_timer.cancel()
             self._drain_timer = None
 
     def send_400_response(self, msg: str) -> None:
-        """Answer what the parser, or a limit in its callbacks, refused."""
+        """Answer an error of the parser, or of a limit in its callbacks."""
         self._refuse(*self._refusal)
 
     def _is_idle(self) -> bool:
@@ -168,7 +168,7 @@ class LimitedHttp(HttpToolsProtocol):
     def _make_room(self) -> None:
         self._ended = True
         if self.cycle is None:
-            detail = f"the server has {MAX_CONNECTIONS} connections, no more are taken"
+            detail = f"the server has {MAX_CONNECTIONS} connections, the limit"
             self.transport.write(_refusal(503, "too-many-connections", detail))
         self.transport.close()
 
@@ -196,7 +196,7 @@ class LimitedHttp(HttpToolsProtocol):
         self._refuse(408, "request-too-slow", detail)
 
     def _refuse(self, status: int, kind: str, detail: str) -> None:
-        """Take no further request; say why, unless an earlier answer is on its way."""
+        """End the connection with a problem, or after the answer that is being sent."""
         self._ended = True
         self._unset_keepalive_if_required()
         self._stop_timer()
@@ -207,7 +207,7 @@ class LimitedHttp(HttpToolsProtocol):
             cycle.keep_alive = False  # the connection ends with this earlier answer
             self.flow.pause_reading()
             return
-        if self.pipeline:  # of this request, whose turn to be answered does not come
+        if self.pipeline:  # this request is behind others and is not answered
             self.transport.close()
             return
         if cycle is not None:
@@ -237,7 +237,7 @@ _HEAD_TOO_LARGE = (
 
 
 def _refusal(status: int, kind: str, detail: str) -> bytes:
-    """Return a whole HTTP/1.1 response that ends the connection."""
+    """Return an HTTP/1.1 response that ends the connection."""
     headers = {**HEADERS, "Connection": "close"}
     if status == 503:
         headers["Retry-After"] = "2"
