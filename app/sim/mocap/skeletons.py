@@ -65,8 +65,8 @@ def body_track(bvh: Bvh, options: ReadOptions = NOTHING_STATED) -> tuple[BodyTra
         options: What is stated about it.
 
     Raises:
-        BadRecording: It is no upright person in a known unit and in degrees, or it can be read in
-            two interpretations; the fault names both.
+        BadRecording: It is no upright person in a known unit and in degrees, or it has two
+            interpretations; the fault names both.
     """
     bvh, repeated = without_repeats(bvh)
     names = [joint.name for joint in bvh.joints]
