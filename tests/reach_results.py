@@ -194,7 +194,7 @@ def ceiling() -> Json:
         "replays": 123456,
         "worst_targets": [{"goal": [0.1, 1.0, 0.1], "solvable": 0.9}],
     }
-    return result("reach-ceiling", [one])
+    return result("reach-oracle", [one])
 
 
 def ssm() -> Json:

@@ -3,7 +3,7 @@
 ``motion`` is one decision between training targets, eight states in one batch, as
 ``MotionDecider.decide`` gives it: checks, observations, network, weights, the piece and its
 limits. ``motion-monitored`` adds speed and separation monitoring, ``motion-direct`` asks for
-one state, ``motion-ahead`` plays the decision ahead. ``motion-sb3-predict`` is
+one state, ``motion-rollout`` plays the decision ahead. ``motion-sb3-predict`` is
 Stable-Baselines3's own ``predict`` of a network of that size, called once for each of eight
 observations that are ready: without observing, weighing and the piece.
 
@@ -105,7 +105,7 @@ def motion_times(seed: int, seconds: float) -> tuple[dict[str, Vec], str]:
             ("motion", lambda: one.decide(alone)),
             ("motion-monitored", lambda: one.decide(question)),
             ("motion-direct", lambda: one.decide(direct)),
-            ("motion-ahead", lambda: one.decide(replace(alone, ahead=True))),
+            ("motion-rollout", lambda: one.decide(replace(alone, ahead=True))),
             ("motion-sb3-predict", predict),
         )
 

@@ -48,7 +48,7 @@ def lines(results: Path) -> list[list[str]] | None:
         rows = json.loads(path.read_text(encoding="utf-8"))["results"]
         found[name] = {row["name"]: row for row in rows}
     pick, choice, reach, ssm, sorting, safety = (found[name] for name in FILES)
-    rollout, planner = ssm[f"policy-ahead{MEASURED}"], ssm[f"rrt-star-once{MEASURED}"]
+    rollout, planner = ssm[f"policy-rollout{MEASURED}"], ssm[f"rrtstar-once{MEASURED}"]
     return [
         ["task", "measure", "n", "Tandem", "baseline"],
         [
@@ -94,7 +94,7 @@ def lines(results: Path) -> list[list[str]] | None:
             "contact with a moving link",
             f"{safety['inside']['n']:,}",
             percent(safety["inside"]["moving_rate"], 3),
-            f"without SSM: {share(safety['unguarded']['moving_rate'])}",
+            f"without SSM: {share(safety['no-ssm']['moving_rate'])}",
         ],
     ]
 

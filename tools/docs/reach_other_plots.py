@@ -26,7 +26,7 @@ from tools.docs.reach_style import (
     percent,
 )
 
-PEOPLE = {"direct": "nearest person", "direct-ahead": "nearest, rollout"}
+PEOPLE = {"direct": "nearest person", "direct-rollout": "nearest, rollout"}
 """Labels of two modes beside several people."""
 TRACKERS = {
     "exact": "exact state",
@@ -35,8 +35,8 @@ TRACKERS = {
     "100ms-noise": "100 ms, noise 20 mm",
     "200ms-noise": "200 ms, noise 20 mm",
     "100ms-not-predicted": "100 ms, no prediction",
-    "30hz-ahead": "30 Hz, rollout",
-    "100ms-noise-ahead": "100 ms, 20 mm, rollout",
+    "30hz-rollout": "30 Hz, rollout",
+    "100ms-noise-rollout": "100 ms, 20 mm, rollout",
 }
 """Labels of the rows of ``reach-tracker``."""
 PRESET_COLOURS = {"td3": BLUE, "thesis": ORANGE, "stock": GREY}
@@ -101,13 +101,13 @@ def _by_people(result: Json, mode: str) -> list[tuple[int, Json]]:
 def _for_all(row: Json, mode: str) -> bool:
     """Return whether a row counts for a mode that differs only beside more people."""
     n = len(row["people"])
-    return n == 0 or (n == 1 and row["asked"] == "direct" and not mode.endswith("-ahead"))
+    return n == 0 or (n == 1 and row["asked"] == "direct" and not mode.endswith("-rollout"))
 
 
 def _speeds(axis: Axes, result: Json) -> None:
     asked, rows = result["settings"]["rows"], result["results"]
     speeds = list(dict.fromkeys(one["speed_m_s"] for one in asked.values()))
-    ahead = [row["name"].endswith("-ahead") for row in rows]
+    ahead = [row["name"].endswith("-rollout") for row in rows]
     shift, width = (0.2, 0.36) if any(ahead) else (0.0, 0.6)
     for row, rollout in zip(rows, ahead, strict=True):
         x = speeds.index(asked[row["name"]]["speed_m_s"]) + (shift if rollout else -shift)

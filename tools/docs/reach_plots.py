@@ -130,7 +130,7 @@ def start_rules(result: Json) -> Figure:
     left, right = axes[0]
     rows = result["results"][::-1]
     names = {"clearance": "0.05 m away", "uniform": "anywhere", "authors": "authors' code"}
-    names |= {f"{name}-ahead": f"{words}, rollout" for name, words in names.items()}
+    names |= {f"{name}-rollout": f"{words}, rollout" for name, words in names.items()}
     for k, row in enumerate(rows):
         start = 0.0
         for kind, colour in (("collision", RED), ("timeout", GREY)):

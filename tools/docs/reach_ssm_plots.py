@@ -22,20 +22,20 @@ ROOT = Path(__file__).resolve().parents[2]
 RESULT = ROOT / "docs/results/reach-ssm.json"
 IMAGES = ROOT / "docs/img/reach"
 ROWS = {
-    "policy-ahead": ("policy with rollout", BLUE, "-"),
-    "policy-heedless": ("rollout without SSM", BLUE, "--"),
+    "policy-rollout": ("policy with rollout", BLUE, "-"),
+    "policy-rollout-ssm-agnostic": ("rollout without SSM", BLUE, "--"),
     "policy": ("policy without rollout", BLUE, ":"),
-    "rrt-star-once": ("RRT*, planned once", ORANGE, "-"),
+    "rrtstar-once": ("RRT*, planned once", ORANGE, "-"),
     "rrt-connect": ("RRT-Connect, replan when blocked", RED, "-"),
     "aorrtc": ("AORRTC, replan when blocked", RED, ":"),
     "replan-every-cycle": ("RRT-Connect, replan every cycle", GREEN, "-"),
-    "policy-alone": ("policy, no person", GREY, "-"),
+    "policy-no-person": ("policy, no person", GREY, "-"),
     "hindsight": ("oracle", GREY, ":"),
 }
 """Label, colour and line style of each row."""
 LAYER = "measured"
 """Assumption of the safety layer in the pictures."""
-SHOWN = ("policy-ahead", "rrt-star-once")
+SHOWN = ("policy-rollout", "rrtstar-once")
 """Rows of the override picture."""
 Json = dict[str, Any]
 

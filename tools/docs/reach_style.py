@@ -34,8 +34,8 @@ MODES = {
     "interpolated": ("interpolated", ORANGE, "s"),
     "averaged": ("distance-weighted", ORANGE, "s"),
     "set": ("set encoding", PURPLE, "^"),
-    "direct-ahead": ("direct, rollout", GREEN, "D"),
-    "interpolated-ahead": ("interpolated, rollout", PURPLE, "^"),
+    "direct-rollout": ("direct, rollout", GREEN, "D"),
+    "interpolated-rollout": ("interpolated, rollout", PURPLE, "^"),
 }
 """Label, colour and marker of each inference mode."""
 

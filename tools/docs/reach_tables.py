@@ -66,7 +66,7 @@ COLUMNS: Mapping[str, Mapping[str, str]] = {
         "rms_acceleration_rad_s2": "RMS acceleration [rad/s²]",
         "success": "success",
     },
-    "reach-ceiling": {
+    "reach-oracle": {
         "n": "n",
         "solvable": "solvable",
         "never": "proven unsolvable",

@@ -21,7 +21,7 @@ GRID: Mapping[str, str] = {
     "attempts_over_expected": "attempts / expected",
     "riskier_pick": "riskier picks",
     "failed_pick": "failed picks",
-    "handover": "planner fallbacks",
+    "planner_fallback": "planner fallbacks",
     "repeated": "... for repeated states",
     "mean_return": "return",
 }
@@ -32,8 +32,8 @@ TESTS: Mapping[str, str] = {
     "fewest": "minimum number of moves",
     "moves_over_minimum": "moves / minimum",
     "riskier_pick": "riskier picks",
-    "safest_of_twins": "safest of identical objects",
-    "handover": "planner fallbacks",
+    "safest_identical": "safest of identical objects",
+    "planner_fallback": "planner fallbacks",
 }
 """Measures of the six benchmark tasks and their column headers."""
 

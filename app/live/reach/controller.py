@@ -108,7 +108,7 @@ class ReachController:
 
 def default_mode(policy: LiveReachPolicy) -> str:
     """Return the initial inference mode: interpolated and with rollout where available."""
-    preferred = ("interpolated-ahead", "direct-ahead", "interpolated")
+    preferred = ("interpolated-rollout", "direct-rollout", "interpolated")
     modes = policy.inference_modes
     return next((mode for mode in preferred if mode in modes), modes[0])
 

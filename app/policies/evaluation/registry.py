@@ -56,7 +56,7 @@ PROTOCOLS: Mapping[str, Protocol] = MappingProxyType(
         "reach-people": reach_people.run_people,
         "reach-tracker": reach_tracker.run_tracker,
         "reach-ssm": reach_ssm.run_ssm,
-        "reach-ceiling": reach_ceiling.run_oracle,
+        "reach-oracle": reach_ceiling.run_oracle,
     }
 )
 """Protocol by name; each takes a checkpoint, ``episodes``, ``seed`` and ``on_row``."""
@@ -76,7 +76,7 @@ MAX_SORTING_EPISODES = 10_000
 """Most episodes of one pair or one test of the sorting task."""
 FEWER_EPISODES: Mapping[str, int] = MappingProxyType(
     {**dict.fromkeys(OF_SORTING, MAX_SORTING_EPISODES), "reach-targets": 2_000}
-    | {"reach-smoothness": 5_000, "reach-ssm": 20_000, "reach-ceiling": 200}
+    | {"reach-smoothness": 5_000, "reach-ssm": 20_000, "reach-oracle": 200}
 )
 """Most episodes of protocols that count them per pair or target, or keep whole paths."""
 

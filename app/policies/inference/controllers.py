@@ -34,10 +34,10 @@ class InferenceMode(StrEnum):
     INTERPOLATED = "interpolated"
     AVERAGED = "averaged"
     AVERAGED_INTERPOLATED = "averaged-interpolated"
-    DIRECT_ROLLOUT = "direct-ahead"
-    INTERPOLATED_ROLLOUT = "interpolated-ahead"
-    AVERAGED_ROLLOUT = "averaged-ahead"
-    AVERAGED_INTERPOLATED_ROLLOUT = "averaged-interpolated-ahead"
+    DIRECT_ROLLOUT = "direct-rollout"
+    INTERPOLATED_ROLLOUT = "interpolated-rollout"
+    AVERAGED_ROLLOUT = "averaged-rollout"
+    AVERAGED_INTERPOLATED_ROLLOUT = "averaged-interpolated-rollout"
 
     @property
     def interpolated(self) -> bool:
@@ -55,7 +55,7 @@ class InferenceMode(StrEnum):
         return self.value.endswith(ROLLOUT)
 
 
-ROLLOUT = "-ahead"
+ROLLOUT = "-rollout"
 """End of the names of modes with rollouts."""
 NEAREST_M = 0.05
 """Distance below which weights stop growing [m]."""

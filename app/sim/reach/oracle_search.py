@@ -9,7 +9,7 @@ known. A replay is one of
   straight to one of the postures at the goal;
 - *disturbed*: to some posture until some moment, then a policy, with noise on its actions.
 
-For what no replay solves, two bounds (METHOD 2.6, ``reach-ceiling``): an episode is *never*
+For what no replay solves, two bounds (METHOD 2.6, ``reach-oracle``): an episode is *never*
 possible where the goal is covered by a person, or the robot's base is touched, before anybody
 could have arrived and until the end; and its collision is *unavoided* where all replays,
 retreats among them, end in one.

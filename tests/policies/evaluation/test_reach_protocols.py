@@ -70,7 +70,7 @@ def test_every_target_is_counted_under_each_rule_of_starting() -> None:
     result, _ = run("reach-targets")
     assert result["episodes"] == 2
     names = [row["name"] for row in result["results"]]
-    assert names == [*STARTS, *(f"{start}-ahead" for start in STARTS)]
+    assert names == [*STARTS, *(f"{start}-rollout" for start in STARTS)]
     for row in result["results"]:
         goals = {tuple(cell["goal"]) for cell in row["targets"]}
         assert len(goals) == 54
@@ -95,9 +95,9 @@ def test_random_goals_are_reached_by_every_way_the_policy_allows() -> None:
     on_grid, _ = run("reach-random")
     in_box = evaluate("reach-random", shipped_as(goals="box"), episodes=N, seed=5)
     names = [row["name"] for row in in_box["results"]]
-    assert names[:4] == ["targets", "targets-ahead", "direct", "direct-25s"]
-    assert names[4:] == ["direct-ahead", "direct-ahead-25s"]
-    ways = ["direct", "interpolated", "direct-ahead", "interpolated-ahead"]
+    assert names[:4] == ["targets", "targets-rollout", "direct", "direct-25s"]
+    assert names[4:] == ["direct-rollout", "direct-rollout-25s"]
+    ways = ["direct", "interpolated", "direct-rollout", "interpolated-rollout"]
     names = [row["name"] for row in on_grid["results"]][2:]
     assert names == [f"{way}{limit}" for way in ways for limit in ("", "-25s")]
     direct = in_box["results"][2]
@@ -133,7 +133,7 @@ def test_people_of_a_given_speed_walk_at_it() -> None:
 def test_a_row_per_tracker_stands_beside_the_exact_state() -> None:
     result, _ = run("reach-tracker")
     names = [row["name"] for row in result["results"]]
-    assert names == ["exact", *ROWS, *(f"{name}-ahead" for name in LOOKED_AHEAD)]
+    assert names == ["exact", *ROWS, *(f"{name}-rollout" for name in LOOKED_AHEAD)]
     errors = [row["axis_error_median_mm"] for row in result["results"][1:]]
     assert np.all(np.diff(errors[:4]) > 0.0)
 

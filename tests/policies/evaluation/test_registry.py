@@ -103,5 +103,5 @@ def test_a_sorting_result_states_task_policy_and_seed(name, n_rows):
     )
     if name == "sorting-grid":
         assert len(result["results"][0]["pairs"]) == settings["pairs"] == 55
-    handed = [row for row in result["results"] if row["name"].endswith("-handover")]
+    handed = [row for row in result["results"] if row["name"].endswith("-planner-fallback")]
     assert all(row["success"]["mean"] == 1.0 for row in handed)

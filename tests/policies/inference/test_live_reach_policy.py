@@ -26,7 +26,7 @@ def policy() -> ReachPolicy:
 
 def test_policy_without_targets_cannot_be_interpolated() -> None:
     pilot = ReachPilot(ReachPolicy(untrained_reach(width=32, goals="box")))
-    assert pilot.inference_modes == ("direct", "averaged", "direct-ahead", "averaged-ahead")
+    assert pilot.inference_modes == ("direct", "averaged", "direct-rollout", "averaged-rollout")
 
 
 def test_live_state_is_seen_as_the_batch_sees_it(policy: ReachPolicy) -> None:
@@ -73,9 +73,9 @@ def test_looking_ahead_is_told_of_the_layer_that_is_obeyed(
 ) -> None:
     pilot = ReachPilot(policy)
     world = ReachWorld(CELL, pilot, seed=1)
-    world.apply(SetInferenceMode(inference_mode="direct-ahead"))
+    world.apply(SetInferenceMode(inference_mode="direct-rollout"))
     world.apply(SetSafety(on=on, use_measured_velocity=measured))
-    mover = pilot._controllers["direct-ahead"]
+    mover = pilot._controllers["direct-rollout"]
     assert isinstance(mover, RolloutController)
     assert (mover.layer != NO_LAYER) == (on and measured)
 
@@ -104,7 +104,7 @@ def test_policy_moves_the_robot_of_a_live_cell_with_any_number_of_people(
     shown = world.snapshot()
     assert (shown.checkpoint, shown.reach.inference_mode) == (
         pilot.checkpoint,
-        "interpolated-ahead",
+        "interpolated-rollout",
     )
     assert shown.reach.inference_modes == pilot.inference_modes
     world.apply(commands.AddPerson())

@@ -258,7 +258,7 @@ def test_fewer_contacts_than_alone() -> None:
     goals = target_goals(POLICY.targets, 270)
     settings = batch_of(1, "walker", "walker").settings
     ends = [play(CELL, settings, controller_of(POLICY, how), goals, 5).outcome for how in (
-        "direct", "direct-ahead")]  # fmt: skip
+        "direct", "direct-rollout")]  # fmt: skip
     alone, ahead = ((end == COLLISION).sum() for end in ends)
     assert ahead < alone
     assert (ends[1] == SUCCESS).mean() >= (ends[0] == SUCCESS).mean()
@@ -290,8 +290,8 @@ def test_the_names_of_the_other_ways() -> None:
 def test_other_policies_cannot() -> None:
     actor = RandomActor()
     assert looks_ahead(POLICY) and not looks_ahead(actor)
-    assert "direct-ahead" in inference_modes_of(
+    assert "direct-rollout" in inference_modes_of(
         POLICY
-    ) and "direct-ahead" not in inference_modes_of(actor)
+    ) and "direct-rollout" not in inference_modes_of(actor)
     with pytest.raises(InvalidInput, match="look ahead"):
-        controller_of(actor, "direct-ahead")
+        controller_of(actor, "direct-rollout")

@@ -31,7 +31,7 @@ def results(tmp_path: Path) -> Path:
         "reach-people.set": made.people(),
         "reach-speeds": made.speeds(),
         "reach-tracker": made.tracker(),
-        "reach-ceiling": made.ceiling(),
+        "reach-oracle": made.ceiling(),
         "reach-ssm": made.ssm(),
         "reach-smoothness": made.smoothness(),
         "reach-smoothness.jerk": made.smoothness(3),
@@ -99,7 +99,7 @@ def test_rows_of_measured_velocities_have_a_table_of_their_own(results: Path) ->
     (results / "reach-ssm.json").write_text(json.dumps(result))
     blocks = "".join(
         f"<!-- begin {name} -->\n<!-- end {name} -->\n"
-        for name in ("reach-ssm", "reach-ssm-measured")
+        for name in ("reach-ssm", "reach-ssm-directed")
     )
     lines = render(blocks, results).splitlines()
     found = [line.split("|")[1].strip() for line in lines if line.startswith("| `")]

@@ -8,7 +8,7 @@ from tools.docs.reach_ssm_plots import arrivals, override
 def test_the_override_is_drawn_in_percent_until_each_arrives():
     example = {
         "dt_s": 0.5,
-        "override": {"policy-ahead": [1.0, 0.2], "rrt-star-once": [1.0, 0, 0, 1]},
+        "override": {"policy-rollout": [1.0, 0.2], "rrtstar-once": [1.0, 0, 0, 1]},
     }
     upper, lower = override(example).axes
     for axis, seconds, values in ((upper, 1.0, [100, 20]), (lower, 2.0, [100, 0, 0, 100])):

@@ -29,10 +29,10 @@ export function ReachControls({ world, send }) {
   const { goal_mode: mode, safety, inference_mode: current, inference_modes: modes } = world.reach;
   const between = current.includes("interpolated");
   const averaged = current.includes("averaged");
-  const ahead = current.endsWith("-ahead");
+  const ahead = current.endsWith("-rollout");
   const ask = (all, mixed, played) => {
     const asked = [all && "averaged", mixed && "interpolated"].filter(Boolean).join("-") || "direct";
-    send({ tag: "set-inference-mode", inference_mode: played ? `${asked}-ahead` : asked });
+    send({ tag: "set-inference-mode", inference_mode: played ? `${asked}-rollout` : asked });
   };
   return html`<div class="dock-row dock-wrap">
     <span class="dock-label" id="goal-label">Goal</span>
@@ -47,7 +47,7 @@ export function ReachControls({ world, send }) {
       <span class="dock-label dock-label-free" id="between-label">Interpolation</span>
       <${Segmented} labelledby="between-label" mark=${marked("between")} value=${between} items=${BETWEEN}
         onPick=${(one) => ask(averaged, one, ahead)} /></span>`}
-    ${modes.includes("direct-ahead") && html`<span class="dock-pair">
+    ${modes.includes("direct-rollout") && html`<span class="dock-pair">
       <span class="dock-label dock-label-free" id="ahead-label">Look ahead</span>
       <${Segmented} labelledby="ahead-label" mark=${marked("ahead")} value=${ahead} items=${AHEAD}
         onPick=${(one) => ask(averaged, between, one)} /></span>`}

@@ -1,4 +1,4 @@
-"""Protocol ``reach-ceiling``: how much success is possible at all, by hindsight search.
+"""Protocol ``reach-oracle``: how much success is possible at all, by hindsight search.
 
 The episodes are those of ``reach-targets`` (54 targets x 100, start clearance 0.05 m, 5 s): the
 same people, the same motion. What the policy does not solve is replayed, moved differently each

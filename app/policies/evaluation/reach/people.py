@@ -6,7 +6,7 @@ all averaged. Nobody and one person are the same by both.
 ``reach-speeds``: a person of 0.25, 0.5 and 1.0 m/s; the speed's limits do not apply, else
 0.25 m/s would be standing still (METHOD 2.1).
 
-``-ahead`` looks ahead with the policy (``lookahead.py``), at all people at once.
+``-rollout`` looks ahead with the policy (``lookahead.py``), at all people at once.
 
 All go round the grid's targets, with the same goals in every row.
 

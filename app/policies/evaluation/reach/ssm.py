@@ -8,23 +8,23 @@ distance of the source's comparison.
 
 ===================  ========================================================================
 ``policy``           the checkpoint, asked every 20 ms
-``policy-ahead``     the same, each decision played ahead (``lookahead.py``) for contacts with
+``policy-rollout``     the same, each decision played ahead (``lookahead.py``) for contacts with
                      people, cell and itself, and, where velocities are measured, for those whom
                      the layer would hold the robot for
-``policy-heedless``  there the same, but what is played knows nothing of the layer
-``policy-unaware``   the shipped policy that knows of no safety layer, where the checkpoint was
+``policy-rollout-ssm-agnostic``  there the same, but what is played knows nothing of the layer
+``policy-trained-without-ssm``   the shipped policy that knows of no safety layer, where the checkpoint was
                      trained under it
-``rrt-star-once``    planned once among people as they stand at the start, as in the source
+``rrtstar-once``    planned once among people as they stand at the start, as in the source
 ``rrt-connect``      planned again where its path is blocked
 ``aorrtc``           the same with an anytime planner
 ``replan-every-cycle``       planned again every period, in 20 ms of wall time
-``policy-alone``     the policy with nobody near (ASIDE): the unhindered time
-``planner-alone``    a planned path, likewise
-``planner-bare``     a path planned for nobody, followed without a safety layer: how often these
+``policy-no-person``     the policy with nobody near (ASIDE): the unhindered time
+``planner-no-person``    a planned path, likewise
+``planner-no-ssm``     a path planned for nobody, followed without a safety layer: how often these
                      people would be hit
 ``hindsight``        the soonest untouched one of N_HINDSIGHT scripted replays of each crossing:
                      what could have been done at least by who knew the person's way
-``hindsight-free``   of the same replays the one that the layer holds least
+``oracle-least-stopped``   of the same replays the one that the layer holds least
 ===================  ========================================================================
 
 Rows that end in ``measured`` have the same layer going by measured velocities, the others take
@@ -82,7 +82,7 @@ from app.sim.scenario.kernels.episode import RUNNING, TIMEOUT
 from app.sim.scene.scene import arm_of
 
 Json = dict[str, Any]
-AHEAD = "policy-ahead"
+AHEAD = "policy-rollout"
 """Row of the policy where it looks ahead."""
 MEASURED = " measured"
 """End of the rows in which the layer goes by measured velocities."""
@@ -104,7 +104,7 @@ ASIDE = (-2.0, 2.0, 0.2)
 """x, y, radius of who stands aside where nobody shall be near [m]: far corner of the walking
 area of METHOD 2.1, not an empty cell, for policies need not have met one in training."""
 PLANNERS: Mapping[str, ReplanningSettings] = {
-    "rrt-star-once": ReplanningSettings(
+    "rrtstar-once": ReplanningSettings(
         role="plan-once", margin=MARGIN, plan=PlanSettings(planner="rrt-star", budget_s=1.0)
     ),
     "rrt-connect": ReplanningSettings(
@@ -330,7 +330,7 @@ def best_replays(
         soonest.append(_least(runs, np.where(good, runs.seconds, np.inf)))
         held = runs.stopped_s + 1e-3 * runs.seconds
         freest.append(_least(runs, np.where(runs.arrived, held, np.inf)))
-    return {"hindsight": joined(soonest), "hindsight-free": joined(freest)}
+    return {"hindsight": joined(soonest), "oracle-least-stopped": joined(freest)}
 
 
 def _least(runs: GuardedRuns, cost: Vec) -> GuardedRuns:
@@ -412,7 +412,7 @@ class _Still:
 def example_of(courses: Mapping[str, Course], dt: float) -> Json:
     """Return how the override went in one crossing: that of the median saving of time."""
     one = courses[AHEAD if AHEAD in courses else "policy"].runs
-    other = courses["rrt-star-once"].runs
+    other = courses["rrtstar-once"].runs
     both = np.flatnonzero(one.arrived & other.arrived)
     if len(both) == 0:
         return {}
@@ -438,11 +438,11 @@ def movers_of(
     if looks_ahead(actor):
         movers[AHEAD] = RolloutController(direct, actor, layer)
         if layer != NO_LAYER:
-            movers["policy-heedless"] = RolloutController(direct, actor)
+            movers["policy-rollout-ssm-agnostic"] = RolloutController(direct, actor)
     if checkpoint.manifest["preset"].get("episode", {}).get("safety") == "ssm":
         other = ReachPolicy(pretrained.load("reach"))
         if (other.action, other.view) == (actor.action, actor.view):
-            movers["policy-unaware"] = controller_of(other, "direct")
+            movers["policy-trained-without-ssm"] = controller_of(other, "direct")
     return movers
 
 
@@ -469,9 +469,9 @@ def compare(
     for name, settings in PLANNERS.items():
         jobs[name] = partial(comparison.planner, settings)
     if "policy" in movers:
-        jobs["policy-alone"] = partial(comparison.policy, movers["policy"], alone=True)
-    jobs["planner-alone"] = lambda: comparison.planner(ALONE, alone=True)
-    jobs["planner-bare"] = lambda: comparison.planner(ALONE, blind=True, guarded=False)
+        jobs["policy-no-person"] = partial(comparison.policy, movers["policy"], alone=True)
+    jobs["planner-no-person"] = lambda: comparison.planner(ALONE, alone=True)
+    jobs["planner-no-ssm"] = lambda: comparison.planner(ALONE, blind=True, guarded=False)
     courses = {}
     for name, job in jobs.items():
         courses[name] = job()

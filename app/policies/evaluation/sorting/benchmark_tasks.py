@@ -1,6 +1,6 @@
 """Protocol ``sorting-tests``: many episodes of each benchmark task of the thesis (3.4.3).
 
-Rows ``test-1`` to ``test-6`` are the policy alone, ``test-1-handover`` and so on the policy
+Rows ``test-1`` to ``test-6`` are the policy alone, ``test-1-planner-fallback`` and so on the policy
 until it goes in circles, then the exact planner. Picks fail as the work cell says. An episode
 is a success when the last goal is reached, and ``fewest`` when no part of it took a move more
 than the exact planner needs. Each part has 4 K attempts.
@@ -107,9 +107,9 @@ def row_of(name: str, episodes: SortingEpisodes) -> dict[str, Any]:
         "fewest": wilson(int((good.moves == good.fewest).sum()), n),
         "moves_over_minimum": mean_of(good.moves / good.fewest),
         "riskier_pick": share(episodes.riskier, episodes.picks),
-        "safest_of_twins": wilson(choices - riskier, choices) if choices else None,
+        "safest_identical": wilson(choices - riskier, choices) if choices else None,
         "failed_pick": share(episodes.failed, episodes.picks),
-        "handover": wilson(int(episodes.planner_fallback.sum()), n),
+        "planner_fallback": wilson(int(episodes.planner_fallback.sum()), n),
         "repeated": wilson(int(episodes.repeated.sum()), n),
     }
 
@@ -143,7 +143,7 @@ def trials(
     for test in fitting:
         one, other = run_test(test, greedy(values), shape, fail, n, seed)
         alone.append(row_of(test.name, one))
-        handed.append(row_of(f"{test.name}-handover", other))
+        handed.append(row_of(f"{test.name}-planner-fallback", other))
         on_row(len(alone), 2 * len(fitting), alone[-1])
     for k, row in enumerate(handed):
         on_row(len(alone) + k + 1, 2 * len(fitting), row)

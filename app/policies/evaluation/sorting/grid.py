@@ -5,8 +5,8 @@ For every pair ``1 <= K_G <= K_E <= K``, the same episodes in every row of a kin
 =======================  ===================================================================
 ``clean``                the policy alone, from starts with everything in the clutter
 ``disturbed``            the same from starts with junk on towers and goals partly built
-``clean-handover``       the policy until it goes in circles, then the exact planner
-``disturbed-handover``   the same from disturbed starts
+``clean-planner-fallback``       the policy until it goes in circles, then the exact planner
+``disturbed-planner-fallback``   the same from disturbed starts
 ``clean-planner``        the exact planner alone, a yardstick
 ``disturbed-planner``    the same from disturbed starts
 =======================  ===================================================================
@@ -42,7 +42,7 @@ from app.sim.sorting.state import SortingShape
 
 STARTS: Mapping[str, float] = {"clean": 0.0, "disturbed": 1.0}
 """Share of disturbed starts by the kind of row."""
-WHO = ("", "-handover", "-planner")
+WHO = ("", "-planner-fallback", "-planner")
 """Who decides, as the end of a row's name."""
 
 
@@ -117,7 +117,7 @@ def row_of(name: str, episodes: SortingEpisodes, pairs: Index, least: float) -> 
         "attempts_over_expected": mean_of(good.attempts / good.expected),
         "riskier_pick": share(episodes.riskier, episodes.picks),
         "failed_pick": share(episodes.failed, episodes.picks),
-        "handover": wilson(int(episodes.planner_fallback.sum()), n),
+        "planner_fallback": wilson(int(episodes.planner_fallback.sum()), n),
         "repeated": wilson(int(episodes.repeated.sum()), n),
         "mean_return": float(episodes.rewards.mean()),
         "pairs": cells,

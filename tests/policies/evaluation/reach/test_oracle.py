@@ -59,7 +59,7 @@ def test_nobody_arrives_sooner_than_with_nobody_there():
 
 @pytest.mark.usefixtures("short")
 def test_the_protocol_tells_what_is_possible():
-    result = evaluate("reach-ceiling", untrained_reach(width=16), episodes=1, seed=6)
+    result = evaluate("reach-oracle", untrained_reach(width=16), episodes=1, seed=6)
     (row,) = result["results"]
     assert row["n"] == result["episodes"] == 54
     assert row["solvable"]["low"] <= row["solvable"]["mean"] <= row["solvable"]["high"]

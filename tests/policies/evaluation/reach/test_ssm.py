@@ -65,7 +65,7 @@ def test_with_nobody_there_it_is_never_slowed(comparison):
 
 def test_hindsight_takes_the_soonest_run_that_nobody_touches(comparison, straight):
     found = best_replays(comparison, 12, np.random.default_rng(2))
-    best, free = found["hindsight"], found["hindsight-free"]
+    best, free = found["hindsight"], found["oracle-least-stopped"]
     assert free.arrived.all()
     assert (free.stopped_s <= best.stopped_s + 1e-3 * best.seconds + 1e-9).all()
     assert free.stopped_s.sum() < best.stopped_s.sum()
@@ -88,10 +88,10 @@ def test_the_protocol_runs_policy_planners_recordings_and_random_episodes(monkey
     short = PlanSettings(planner="rrt-star", budget_s=0.02)
     few = {
         name: replace(PLANNERS[name], plan=short)
-        for name in ("rrt-star-once", "replan-every-cycle")
+        for name in ("rrtstar-once", "replan-every-cycle")
     }
     monkeypatch.setattr(reach_ssm, "PLANNERS", few)
-    monkeypatch.setattr(reach_ssm, "ALONE", few["rrt-star-once"])
+    monkeypatch.setattr(reach_ssm, "ALONE", few["rrtstar-once"])
     monkeypatch.setattr(reach_ssm, "CAP_S", 3.0)
     monkeypatch.setattr(reach_ssm, "RANDOM_S", 0.5)
     told = []
@@ -104,9 +104,16 @@ def test_the_protocol_runs_policy_planners_recordings_and_random_episodes(monkey
         on_row=lambda *row: told.append(row),
     )
     names = [row["name"] for row in result["results"]]
-    assert names[:4] == ["policy", "policy-ahead", "rrt-star-once", "replan-every-cycle"]
-    assert {"policy recorded", "policy measured", "policy-heedless measured"} <= set(names)
-    assert "policy-heedless" not in names and "policy-ahead recorded measured" in names
+    assert names[:4] == ["policy", "policy-rollout", "rrtstar-once", "replan-every-cycle"]
+    assert {
+        "policy recorded",
+        "policy measured",
+        "policy-rollout-ssm-agnostic measured",
+    } <= set(names)
+    assert (
+        "policy-rollout-ssm-agnostic" not in names
+        and "policy-rollout recorded measured" in names
+    )
     assert names[-3:] == ["random", "random-still", "random measured"]
     assert [total for _, total, _ in told] == [len(names)] * len(names)
     assert all(
@@ -116,6 +123,6 @@ def test_the_protocol_runs_policy_planners_recordings_and_random_episodes(monkey
     assert {f"{mine} against replan-every-cycle recorded" for mine in names[:2]} <= set(
         result["paired"]
     )
-    assert "policy-ahead against replan-every-cycle measured" in result["paired"]
-    assert len(result["seconds"][""]["policy-ahead"]) == 2
+    assert "policy-rollout against replan-every-cycle measured" in result["paired"]
+    assert len(result["seconds"][""]["policy-rollout"]) == 2
     assert set(result["example"]) == {"", "measured"}

@@ -15,7 +15,7 @@ def test_only_rows_outside_the_assumptions_have_moving_contacts(result):
     rows = {row["name"]: row for row in result["results"]}
     assert rows["inside"]["contacts"] > 40
     assert rows["inside"]["contacts_moving"] == rows["touch-limited"]["contacts_moving"] == 0
-    assert rows["unguarded"]["contacts_moving"] > 0
+    assert rows["no-ssm"]["contacts_moving"] > 0
     assert rows["late-tracker"]["contacts_moving"] > 0
     assert rows["inside"]["n"] == result["episodes"] == 160
 

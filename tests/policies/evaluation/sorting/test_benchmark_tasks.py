@@ -64,7 +64,7 @@ def test_who_takes_the_riskier_twin_is_seen_in_the_third_test():
     row = row_of("test-3", run_test(sorting_test("test-3"), choose, SHAPE, FAIL, 20, 4)[0])
     assert row["success"]["mean"] == row["fewest"]["mean"] == 1.0
     assert row["riskier_pick"]["mean"] > 0.9
-    assert row["safest_of_twins"]["mean"] < 0.1
+    assert row["safest_identical"]["mean"] < 0.1
 
 
 def test_a_move_too_many_in_any_part_is_not_the_fewest():
@@ -91,12 +91,12 @@ def test_rows_are_told_in_order_and_hand_over_ends_what_goes_in_circles():
     )
     names = [test.name for test in TESTS]
     rows = {row["name"]: row for row in found["results"]}
-    assert list(rows) == names + [f"{name}-handover" for name in names]
+    assert list(rows) == names + [f"{name}-planner-fallback" for name in names]
     assert [(done, total) for done, total, _ in told] == [(k + 1, 12) for k in range(12)]
     assert [row for _, _, row in told] == found["results"]
     for name in names:
         assert rows[name]["success"]["mean"] == 0.0
-        assert rows[f"{name}-handover"]["success"]["mean"] == 1.0
+        assert rows[f"{name}-planner-fallback"]["success"]["mean"] == 1.0
 
 
 def test_tests_that_are_too_large_are_left_out_and_named():

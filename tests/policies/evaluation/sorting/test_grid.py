@@ -113,7 +113,9 @@ def test_episodes_are_the_same_however_they_are_cut_into_batches(monkeypatch):
 def test_rows_are_told_in_order_and_the_planner_needs_no_hand_over():
     told = []
     found = grid(values_of(exactly, SHAPE), SHAPE, FAIL, 3, 5, lambda *what: told.append(what))
-    names = [f"{a}{b}" for a in ("clean", "disturbed") for b in ("", "-handover", "-planner")]
+    names = [
+        f"{a}{b}" for a in ("clean", "disturbed") for b in ("", "-planner-fallback", "-planner")
+    ]
     assert [row["name"] for row in found["results"]] == names
     assert [(done, total) for done, total, _ in told] == [(k + 1, 6) for k in range(6)]
     assert [row for _, _, row in told] == found["results"]
@@ -128,10 +130,10 @@ def test_with_hand_over_every_goal_is_reached_by_whoever_goes_in_circles():
     found = grid(values_of(in_circles, SHAPE), SHAPE, FAIL, 3, 5)["results"]
     rows = {row["name"]: row for row in found}
     for start in ("clean", "disturbed"):
-        alone, handed = rows[start], rows[f"{start}-handover"]
+        alone, handed = rows[start], rows[f"{start}-planner-fallback"]
         assert alone["success"]["mean"] < 0.5
         assert handed["success"]["mean"] == 1.0
-        assert handed["handover"]["mean"] == alone["handover"]["mean"] > 0.5
+        assert handed["planner_fallback"]["mean"] == alone["planner_fallback"]["mean"] > 0.5
         assert handed["moves_over_minimum"]["mean"] > 1.1
 
 
