@@ -186,7 +186,7 @@ def curves() -> Json:
 
 def ceiling() -> Json:
     one = {
-        "name": "ceiling",
+        "name": "oracle",
         "n": 5400,
         "solvable": wilson(5330, 5400),
         "never": wilson(8, 5400),

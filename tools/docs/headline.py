@@ -17,7 +17,7 @@ FILES = (
     "sorting-grid-e1",
     "safety-ssm",
 )
-MEASURED = " measured"
+DIRECTED = "-directed"
 """Suffix of the rows of ``reach-ssm`` under the layer with measured velocities."""
 THESIS = {"pick-single": "75 %", "pick-choice": "about 90 %", "reach-targets": "91.76 %"}
 """Success rates that the thesis reports."""
@@ -48,7 +48,7 @@ def lines(results: Path) -> list[list[str]] | None:
         rows = json.loads(path.read_text(encoding="utf-8"))["results"]
         found[name] = {row["name"]: row for row in rows}
     pick, choice, reach, ssm, sorting, safety = (found[name] for name in FILES)
-    rollout, planner = ssm[f"policy-rollout{MEASURED}"], ssm[f"rrtstar-once{MEASURED}"]
+    rollout, planner = ssm[f"policy-rollout{DIRECTED}"], ssm[f"rrtstar-once{DIRECTED}"]
     return [
         ["task", "measure", "n", "Tandem", "baseline"],
         [
@@ -64,7 +64,7 @@ def lines(results: Path) -> list[list[str]] | None:
             f"{choice['critic']['n']:,}",
             percent(choice["critic"]["success"]),
             f"nearest: {share(choice['nearest']['success'])}, "
-            f"oracle: {share(choice['rollout']['success'])}, thesis: {THESIS['pick-choice']}",
+            f"oracle: {share(choice['oracle']['success'])}, thesis: {THESIS['pick-choice']}",
         ],
         [
             "[reach](docs/results/reach.md), 54 targets",

@@ -26,14 +26,14 @@ ROWS = {
     "policy-rollout-ssm-agnostic": ("rollout without SSM", BLUE, "--"),
     "policy": ("policy without rollout", BLUE, ":"),
     "rrtstar-once": ("RRT*, planned once", ORANGE, "-"),
-    "rrt-connect": ("RRT-Connect, replan when blocked", RED, "-"),
-    "aorrtc": ("AORRTC, replan when blocked", RED, ":"),
+    "rrtconnect-blocked": ("RRT-Connect, replan when blocked", RED, "-"),
+    "aorrtc-blocked": ("AORRTC, replan when blocked", RED, ":"),
     "replan-every-cycle": ("RRT-Connect, replan every cycle", GREEN, "-"),
     "policy-no-person": ("policy, no person", GREY, "-"),
-    "hindsight": ("oracle", GREY, ":"),
+    "oracle": ("oracle", GREY, ":"),
 }
 """Label, colour and line style of each row."""
-LAYER = "measured"
+LAYER = "directed"
 """Assumption of the safety layer in the pictures."""
 SHOWN = ("policy-rollout", "rrtstar-once")
 """Rows of the override picture."""

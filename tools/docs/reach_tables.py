@@ -92,8 +92,8 @@ COLUMNS: Mapping[str, Mapping[str, str]] = {
     },
 }
 """Measures of each evaluation and their column headers."""
-PART, MEASURED = "-measured", " measured"
-"""Suffixes of a table and of its rows in which the safety layer uses measured velocities."""
+DIRECTED = "-directed"
+"""Suffix of a table and of its rows in which the safety layer uses measured velocities."""
 INSTEAD = {"arrived": "success"}
 """Measure to show where a row lacks the first one."""
 TURNED = frozenset({"reach-smoothness"})
@@ -103,11 +103,11 @@ SHARES = frozenset({"starts_redrawn", "worst_seed", "best_seed"})
 """Rates without an interval."""
 
 
-def part_of(result: Json, *, measured: bool) -> Json:
-    """Return a result with only the rows ending in ``measured``, or only the others."""
-    rows = [row for row in result["results"] if row["name"].endswith(MEASURED) == measured]
-    if measured:
-        rows = [{**row, "name": row["name"].removesuffix(MEASURED)} for row in rows]
+def part_of(result: Json, *, directed: bool) -> Json:
+    """Return a result with only the rows ending in ``-directed``, or only the others."""
+    rows = [row for row in result["results"] if row["name"].endswith(DIRECTED) == directed]
+    if directed:
+        rows = [{**row, "name": row["name"].removesuffix(DIRECTED)} for row in rows]
     return {**result, "results": rows}
 
 

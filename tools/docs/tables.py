@@ -51,13 +51,13 @@ def render(text: str, results: Path) -> str:
         if match[2] == HEADLINE:
             lines = headline.lines(results)
             return match[0] if lines is None else f"{match[1]}{_table(lines)}\n{match[3]}"
-        path = results / f"{match[2].removesuffix(reach_tables.PART)}.json"
+        path = results / f"{match[2].removesuffix(reach_tables.DIRECTED)}.json"
         if not path.exists():
             return match[0]
         found = json.loads(path.read_text(encoding="utf-8"))
         if "results" not in found:
             return match[0]
-        found = reach_tables.part_of(found, measured=match[2].endswith(reach_tables.PART))
+        found = reach_tables.part_of(found, directed=match[2].endswith(reach_tables.DIRECTED))
         others = reach_tables.siblings(path) if reach_tables.is_reach(found) else []
         return f"{match[1]}{table(found, others)}\n{match[3]}"
 

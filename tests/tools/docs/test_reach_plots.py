@@ -95,7 +95,7 @@ def test_times_under_the_safety_layer_have_their_spread_and_no_row_is_empty() ->
 
 def test_rows_of_measured_velocities_have_a_table_of_their_own(results: Path) -> None:
     result = made.ssm()
-    result["results"].append({**result["results"][0], "name": "policy measured"})
+    result["results"].append({**result["results"][0], "name": "policy-directed"})
     (results / "reach-ssm.json").write_text(json.dumps(result))
     blocks = "".join(
         f"<!-- begin {name} -->\n<!-- end {name} -->\n"

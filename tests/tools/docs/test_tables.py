@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from tools.docs.reach_tables import PART
+from tools.docs.reach_tables import DIRECTED
 from tools.docs.tables import BLOCK, HEADLINE, ROOT, conditions, header, pages, render, table
 
 RATE = {"mean": 0.9712, "low": 0.959, "high": 0.98}
@@ -81,7 +81,7 @@ def test_tables_equal_what_the_results_give(page: Path) -> None:
 @pytest.mark.parametrize("page", pages(), ids=lambda page: page.name)
 def test_every_table_has_its_result(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
-    names = {match[2].removesuffix(PART) for match in BLOCK.finditer(text)}
+    names = {match[2].removesuffix(DIRECTED) for match in BLOCK.finditer(text)}
     assert {
         name for name in names - {HEADLINE} if not (ROOT / f"docs/results/{name}.json").exists()
     } == set()

@@ -97,7 +97,7 @@ def run_choice(
     for name, rule in OTHER_RULES.items():
         rows.append(evaluator.run(rule(seed, n)).row(name))
         on_row(len(rows), 2 + len(OTHER_RULES), rows[-1])
-    rows.append(_in_hindsight([evaluator.run(choice_rules.fixed(k)) for k in range(3)]))
+    rows.append(_oracle([evaluator.run(choice_rules.fixed(k)) for k in range(3)]))
     on_row(len(rows), len(rows), rows[-1])
     return {
         "settings": {**settings_of(evaluator), "hysteresis": HYSTERESIS},
@@ -106,7 +106,7 @@ def run_choice(
     }
 
 
-def _in_hindsight(runs: list[Episodes]) -> dict[str, object]:
+def _oracle(runs: list[Episodes]) -> dict[str, object]:
     """Return the row of the best fixed candidate per episode, known only afterwards."""
     rank = np.zeros(len(OUTCOMES))
     rank[[kernel.TIMEOUT, kernel.UNFEASIBLE, kernel.COLLISION]] = 1, 2, 3
@@ -118,4 +118,4 @@ def _in_hindsight(runs: list[Episodes]) -> dict[str, object]:
         switches=np.zeros(len(rows), dtype=np.int64),
         trajectories=(),
     )
-    return pooled.row("rollout")
+    return pooled.row("oracle")

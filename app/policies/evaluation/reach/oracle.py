@@ -139,7 +139,7 @@ def verdict(search: Hindsight, never: Any, targets: Vec, goals: Vec) -> Json:
             worst.append({"goal": target.tolist(), "solvable": float(solved[of_it].mean())})
     worst.sort(key=lambda one: one["solvable"])
     return {
-        "name": "ceiling",
+        "name": "oracle",
         "n": n,
         "solvable": wilson(int(solved.sum()), n),
         "never": wilson(int((never & ~solved).sum()), n),

@@ -6,29 +6,31 @@ fixed before anything was tuned on them, and as many from recordings as are give
 has the same joint limits and the same speed and separation monitoring, with the protective
 distance of the source's comparison.
 
-===================  ========================================================================
-``policy``           the checkpoint, asked every 20 ms
-``policy-rollout``     the same, each decision played ahead (``lookahead.py``) for contacts with
-                     people, cell and itself, and, where velocities are measured, for those whom
-                     the layer would hold the robot for
-``policy-rollout-ssm-agnostic``  there the same, but what is played knows nothing of the layer
-``policy-trained-without-ssm``   the shipped policy that knows of no safety layer, where the checkpoint was
-                     trained under it
-``rrtstar-once``    planned once among people as they stand at the start, as in the source
-``rrt-connect``      planned again where its path is blocked
-``aorrtc``           the same with an anytime planner
-``replan-every-cycle``       planned again every period, in 20 ms of wall time
-``policy-no-person``     the policy with nobody near (ASIDE): the unhindered time
-``planner-no-person``    a planned path, likewise
-``planner-no-ssm``     a path planned for nobody, followed without a safety layer: how often these
-                     people would be hit
-``hindsight``        the soonest untouched one of N_HINDSIGHT scripted replays of each crossing:
-                     what could have been done at least by who knew the person's way
-``oracle-least-stopped``   of the same replays the one that the layer holds least
-===================  ========================================================================
+``policy``
+    The checkpoint, queried every 20 ms.
+``policy-rollout``
+    The same with rollout checks (``app/policies/inference/rollout.py``) for contacts with
+    people, cell and itself; under measured velocities also for stops by the safety layer.
+``policy-rollout-ssm-agnostic``
+    The rollout under measured velocities without a model of the safety layer.
+``policy-trained-without-ssm``
+    The shipped policy trained without the layer, if the checkpoint was trained under it.
+``rrtstar-once``
+    Planned once around people at their start positions, as in the source.
+``rrtconnect-blocked``, ``aorrtc-blocked``
+    Replanned when the path is blocked.
+``replan-every-cycle``
+    Replanned in every control period, in 20 ms of wall time.
+``policy-no-person``, ``planner-no-person``
+    The person stands aside (ASIDE): unhindered times.
+``planner-no-ssm``
+    A path planned without people and followed without the safety layer: contact rate.
+``oracle``, ``oracle-least-stopped``
+    Of N_HINDSIGHT scripted resimulations of each crossing, the fastest without contact, and
+    the one with the shortest stops: bounds with the person's motion known.
 
-Rows that end in ``measured`` have the same layer going by measured velocities, the others take
-people to come at 1.6 m/s from wherever they are, as where nothing is known of their speed.
+In rows ending in ``-directed`` the layer uses measured velocities; in all others people are
+assumed to approach at 1.6 m/s from any position. ``-recorded`` rows use recorded crossings.
 
 The time to the goal is that of the runs which arrive; ``time_capped_s`` is over all runs and
 counts those not there in CAP_S as CAP_S. People give way to nothing, so they may walk into a
@@ -60,7 +62,7 @@ from app.policies.evaluation.statistics import mean_of, wilson
 from app.policies.inference.controllers import Controller, RolloutController, controller_of
 from app.policies.inference.reach_policy import ReachPolicy
 from app.policies.inference.rollout import NO_LAYER, layer_of, looks_ahead
-from app.sim.cells.cell import Cell, load_cell
+from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
 from app.sim.mocap.importer import Motion
 from app.sim.planning.ompl_planners import PlanSettings
@@ -84,8 +86,8 @@ from app.sim.scene.scene import arm_of
 Json = dict[str, Any]
 AHEAD = "policy-rollout"
 """Row of the policy where it looks ahead."""
-MEASURED = " measured"
-"""End of the rows in which the layer goes by measured velocities."""
+DIRECTED = "-directed"
+"""Suffix of rows in which the safety layer uses measured velocities."""
 CAP_S = 20.0
 """Longest run of a crossing [s]."""
 RANDOM_EPISODES = 10_000
@@ -107,10 +109,10 @@ PLANNERS: Mapping[str, ReplanningSettings] = {
     "rrtstar-once": ReplanningSettings(
         role="plan-once", margin=MARGIN, plan=PlanSettings(planner="rrt-star", budget_s=1.0)
     ),
-    "rrt-connect": ReplanningSettings(
+    "rrtconnect-blocked": ReplanningSettings(
         role="replan-on-blocked", margin=MARGIN, plan=PlanSettings(planner="rrt-connect")
     ),
-    "aorrtc": ReplanningSettings(
+    "aorrtc-blocked": ReplanningSettings(
         role="replan-on-blocked", margin=MARGIN, plan=PlanSettings(planner="aorrtc")
     ),
     "replan-every-cycle": ReplanningSettings(
@@ -330,7 +332,7 @@ def best_replays(
         soonest.append(_least(runs, np.where(good, runs.seconds, np.inf)))
         held = runs.stopped_s + 1e-3 * runs.seconds
         freest.append(_least(runs, np.where(runs.arrived, held, np.inf)))
-    return {"hindsight": joined(soonest), "oracle-least-stopped": joined(freest)}
+    return {"oracle": joined(soonest), "oracle-least-stopped": joined(freest)}
 
 
 def _least(runs: GuardedRuns, cost: Vec) -> GuardedRuns:
@@ -518,9 +520,9 @@ def run_ssm(
     n = min(N_CROSSINGS, n_random)
     sets = {"": crossings(cell, n)}
     if motions:
-        sets[" recorded"] = recorded_crossings(cell, motions, min(N_RECORDED, n_random))
+        sets["-recorded"] = recorded_crossings(cell, motions, min(N_RECORDED, n_random))
     assumed = safety_settings(cell)
-    layers = {"": assumed, MEASURED: replace(assumed, use_measured_velocity=True)}
+    layers = {"": assumed, DIRECTED: replace(assumed, use_measured_velocity=True)}
     acting = {
         end: movers_of(checkpoint, actor, safety, cell.robot.dt)
         for end, safety in layers.items()
@@ -534,13 +536,14 @@ def run_ssm(
             courses = compare(comparison, acting[end], rows, name + end)
             result["paired"] |= paired_of(courses, acting[end], name + end)
             if not name:
-                result["seconds"][end.strip()] = seconds_of(courses)
-                result["example"][end.strip()] = example_of(courses, cell.robot.dt)
+                layer = "directed" if end else "worst-case"
+                result["seconds"][layer] = seconds_of(courses)
+                result["example"][layer] = example_of(courses, cell.robot.dt)
     policy = acting[""]["policy"]
     trials: dict[str, tuple[Controller, SafetySettings]] = {
         "random": (policy, layers[""]),
         "random-still": (_Still(), layers[""]),
-        "random" + MEASURED: (policy, layers[MEASURED]),
+        "random" + DIRECTED: (policy, layers[DIRECTED]),
     }
     for name, (mover, safety) in trials.items():
         rows.add(random_row(name, random_runs(cell, settings, safety, mover, n_random, seed)))
@@ -556,7 +559,7 @@ def paired_of(
 ) -> Json:
     """Return what each mover saves against each planner, by names of rows."""
     return {
-        f"{mine} against {name}{end}": against(courses[mine].runs, courses[name].runs)
+        f"{mine}{end} against {name}{end}": against(courses[mine].runs, courses[name].runs)
         for mine in movers
         for name in PLANNERS
     }
@@ -572,17 +575,6 @@ def stated(safety: SafetySettings, n: int, sources: Sequence[str]) -> Json:
         "random_s": RANDOM_S,
         "planner_margin_m": MARGIN,
         "safety": safety.describe(),
-        "measured": replace(safety, use_measured_velocity=True).describe(),
+        "directed": replace(safety, use_measured_velocity=True).describe(),
         "motions": list(sources),
     }
-
-
-def measure_planners(n: int = N_CROSSINGS, seed: int = 11, on_row: OnRow = ignore_row) -> Json:
-    """Run the planners alone over the crossings, without any policy."""
-    cell = load_cell("shared-workspace")
-    comparison = Comparison(
-        cell, crossings(cell, n), ReachSettings(), safety_settings(cell), seed
-    )
-    rows = _Rows(len(PLANNERS) + 4, on_row)
-    compare(comparison, {}, rows)
-    return {"settings": stated(comparison.safety, n, ()), "results": rows.rows}

@@ -1,7 +1,7 @@
 """Protocol ``sorting-tests``: many episodes of each benchmark task of the thesis (3.4.3).
 
-Rows ``test-1`` to ``test-6`` are the policy alone, ``test-1-planner-fallback`` and so on the policy
-until it goes in circles, then the exact planner. Picks fail as the work cell says. An episode
+Rows ``test-1`` to ``test-6`` are the policy alone; in ``test-1-planner-fallback`` etc. the
+exact planner takes over from a cycling policy. Picks fail as the work cell says. An episode
 is a success when the last goal is reached, and ``fewest`` when no part of it took a move more
 than the exact planner needs. Each part has 4 K attempts.
 

@@ -64,4 +64,4 @@ def test_the_protocol_tells_what_is_possible():
     assert row["n"] == result["episodes"] == 54
     assert row["solvable"]["low"] <= row["solvable"]["mean"] <= row["solvable"]["high"]
     assert result["stages"][0]["solved"]["mean"] <= row["solvable"]["mean"]
-    assert result["settings"]["rows"]["ceiling"]["start_clearance_m"] == 0.05
+    assert result["settings"]["rows"]["oracle"]["start_clearance_m"] == 0.05

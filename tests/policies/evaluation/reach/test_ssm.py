@@ -65,7 +65,7 @@ def test_with_nobody_there_it_is_never_slowed(comparison):
 
 def test_hindsight_takes_the_soonest_run_that_nobody_touches(comparison, straight):
     found = best_replays(comparison, 12, np.random.default_rng(2))
-    best, free = found["hindsight"], found["oracle-least-stopped"]
+    best, free = found["oracle"], found["oracle-least-stopped"]
     assert free.arrived.all()
     assert (free.stopped_s <= best.stopped_s + 1e-3 * best.seconds + 1e-9).all()
     assert free.stopped_s.sum() < best.stopped_s.sum()
@@ -106,23 +106,23 @@ def test_the_protocol_runs_policy_planners_recordings_and_random_episodes(monkey
     names = [row["name"] for row in result["results"]]
     assert names[:4] == ["policy", "policy-rollout", "rrtstar-once", "replan-every-cycle"]
     assert {
-        "policy recorded",
-        "policy measured",
-        "policy-rollout-ssm-agnostic measured",
+        "policy-recorded",
+        "policy-directed",
+        "policy-rollout-ssm-agnostic-directed",
     } <= set(names)
     assert (
         "policy-rollout-ssm-agnostic" not in names
-        and "policy-rollout recorded measured" in names
+        and "policy-rollout-recorded-directed" in names
     )
-    assert names[-3:] == ["random", "random-still", "random measured"]
+    assert names[-3:] == ["random", "random-still", "random-directed"]
     assert [total for _, total, _ in told] == [len(names)] * len(names)
     assert all(
-        row["contacts_moving"] == 0 for row in result["results"] if "bare" not in row["name"]
+        row["contacts_moving"] == 0 for row in result["results"] if "no-ssm" not in row["name"]
     )
     assert result["settings"]["crossings"] == 2
-    assert {f"{mine} against replan-every-cycle recorded" for mine in names[:2]} <= set(
-        result["paired"]
-    )
-    assert "policy-rollout against replan-every-cycle measured" in result["paired"]
-    assert len(result["seconds"][""]["policy-rollout"]) == 2
-    assert set(result["example"]) == {"", "measured"}
+    assert {
+        f"{mine}-recorded against replan-every-cycle-recorded" for mine in names[:2]
+    } <= set(result["paired"])
+    assert "policy-rollout-directed against replan-every-cycle-directed" in result["paired"]
+    assert len(result["seconds"]["worst-case"]["policy-rollout"]) == 2
+    assert set(result["example"]) == {"worst-case", "directed"}
