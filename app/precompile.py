@@ -13,8 +13,8 @@ import numpy as np
 
 from app.live.commands import MovePerson
 from app.live.factory import new_world
-from app.live.pick.world import PickWorld
-from app.live.reach.world import ReachWorld
+from app.live.pick.world import LivePickWorld
+from app.live.reach.world import LiveReachWorld
 from app.policies.checkpoints import pretrained
 from app.policies.checkpoints.checkpoint import CHOOSING, REACHING, Checkpoint, purpose_of
 from app.policies.checkpoints.trained_cell import cell_of
@@ -43,7 +43,7 @@ def _moving() -> None:
     for checkpoint in _shipped(REACHING):
         reacher, cell = ReachPolicy(checkpoint), cell_of(checkpoint.manifest)
         MotionDecider(reacher, cell).warm_up()
-        ReachWorld(cell, ReachPilot(reacher), seed=0).step()
+        LiveReachWorld(cell, ReachPilot(reacher), seed=0).step()
     new_world(load_cell(REACH_CELL), None, seed=0).step()
 
 
@@ -52,7 +52,7 @@ def _choosing() -> None:
     for checkpoint in _shipped(CHOOSING):
         policy = TaskChooser(checkpoint)
         cell = load_cell(policy.cell)
-        world = PickWorld(cell, policy, seed=0)
+        world = LivePickWorld(cell, policy, seed=0)
         world.step()
         x, y, z = cell.stations[0].position
         world.apply(MovePerson(right=(x, y, z + 0.1)))

@@ -172,8 +172,8 @@ class BaseWorld(ABC, Generic[P]):
         """
         check(command, self.cell, self.people.ids)
         match command:
-            case commands.Pause() | commands.Resume():
-                self.paused = isinstance(command, commands.Pause)
+            case commands.PauseClock() | commands.ResumeClock():
+                self.paused = isinstance(command, commands.PauseClock)
             case commands.StepOnce():
                 self.paused = True
                 self._advance()

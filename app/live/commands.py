@@ -134,13 +134,13 @@ class RemovePerson(LiveCommand):
     """id of the person"""
 
 
-class Pause(LiveCommand):
+class PauseClock(LiveCommand):
     """Stop the clock; people can still be dragged, and the values follow."""
 
     tag: Literal["pause"] = "pause"
 
 
-class Resume(LiveCommand):
+class ResumeClock(LiveCommand):
     """Start the clock."""
 
     tag: Literal["resume"] = "resume"
@@ -201,7 +201,7 @@ class StartCase(LiveCommand):
     """case-1 to case-4"""
 
 
-ClockCommand = Pause | Resume | StepOnce | Reset | SetSpeed
+ClockCommand = PauseClock | ResumeClock | StepOnce | Reset | SetSpeed
 CylinderCommand = MovePerson | SetMode | AddPerson | RemovePerson
 """Commands to people that are known as walking cylinders."""
 PeopleCommand = CylinderCommand | SetMotion | SetAnthropometry

@@ -1,17 +1,17 @@
 """Live world of a cell: sorting, reaching or pick-and-place, by its stations."""
 
 from app.live.command_checks import scenario_of
-from app.live.pick.world import PickWorld
+from app.live.pick.world import LivePickWorld
 from app.live.reach.commands import lacks_for_reaching
 from app.live.reach.interfaces import LiveReachPolicy
-from app.live.reach.world import ReachWorld
-from app.live.sorting.world import SortingWorld
+from app.live.reach.world import LiveReachWorld
+from app.live.sorting.world import LiveSortingWorld
 from app.sim.cells.cell import Cell, lacks_for_pick
 from app.sim.pick.task_policy import TaskPolicy
 from app.sim.sorting.layout import lacks_for_sorting
 from app.sim.sorting.sorting_values import SortingValues
 
-AnyWorld = PickWorld | ReachWorld | SortingWorld
+AnyWorld = LivePickWorld | LiveReachWorld | LiveSortingWorld
 
 
 def new_world(
@@ -34,11 +34,11 @@ def new_world(
     """
     match scenario_of(cell):
         case "reach":
-            return ReachWorld(cell, reach_policy, seed, id)
+            return LiveReachWorld(cell, reach_policy, seed, id)
         case "sorting":
-            return SortingWorld(cell, policy, seed, id, sorting_policy)
+            return LiveSortingWorld(cell, policy, seed, id, sorting_policy)
         case "pick":
-            return PickWorld(cell, policy, seed, id)
+            return LivePickWorld(cell, policy, seed, id)
 
 
 def lacks_for_live(cell: Cell) -> str | None:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from app.live import commands
 from app.live.snapshot import WorldSnapshot
 from app.live.sorting.commands import AddObject, RemoveObject, SetGoal
-from app.live.sorting.world import SortingWorld
+from app.live.sorting.world import LiveSortingWorld
 from app.sim.cells.cell import load_cell
 from app.sim.pick.task_policy import TaskPolicy
 from app.sim.sorting.sorting_values import SortingValues
@@ -18,10 +18,10 @@ Goal = Mapping[str, Sequence[str]]
 
 def empty_world(
     policy: TaskPolicy | None = None, seed: int = 1, sorting_policy: SortingValues | None = None
-) -> SortingWorld:
+) -> LiveSortingWorld:
     """Return a world without blocks, whose person stands back."""
     cell = load_cell("sorting-e0")
-    world = SortingWorld(
+    world = LiveSortingWorld(
         cell, policy or StraightPolicy(cell), seed, sorting_policy=sorting_policy
     )
     world.apply(commands.MovePerson(pelvis=(0.0, 2.4, -1.57)))
@@ -33,7 +33,7 @@ def empty_world(
     return world
 
 
-def lay(world: SortingWorld, blocks: Mapping[str, str], goal: Goal) -> dict[str, str]:
+def lay(world: LiveSortingWorld, blocks: Mapping[str, str], goal: Goal) -> dict[str, str]:
     """Add blocks (kind by place) and set the goal; return the blocks' ids by place."""
     for place, kind in blocks.items():
         colour, size = kind.split("-")
@@ -43,7 +43,7 @@ def lay(world: SortingWorld, blocks: Mapping[str, str], goal: Goal) -> dict[str,
 
 
 def until(
-    world: SortingWorld, holds: Callable[[WorldSnapshot], bool], limit: int = 3000
+    world: LiveSortingWorld, holds: Callable[[WorldSnapshot], bool], limit: int = 3000
 ) -> WorldSnapshot:
     """Step until ``holds``; return the snapshot of then."""
     for _ in range(limit // LOOK):

@@ -6,12 +6,12 @@ import { FirstUse } from "./firstuse.js";
 import { useFrameFocus } from "./framefocus.js";
 import { Icon, Logo } from "./icons.js";
 import { isActive, useJobs } from "./training/jobs.js";
-import { useCell, WORLD } from "./live/live.js";
+import { useCell, WORLD } from "./live/world-stream.js";
 import { goalColours } from "./palette.js";
 import { ReachDecision } from "./reach/reach.js";
 import { SignIn } from "./signin.js";
 import { SortingDecision } from "./sorting/sorting.js";
-import { SmallPrint, Story } from "./live/story.js";
+import { SmallPrint, StatusPanel } from "./live/status.js";
 import { Training } from "./training/training.js";
 import { Values } from "./live/values.js";
 import { Viewer } from "./viewer.js";
@@ -107,7 +107,7 @@ function useMedia(condition) {
   return matches;
 }
 
-/** Live, stale or what else; commands that wait longer than a moment are told here. */
+/** Live, stale or what else; commands that wait longer than a moment are shown here. */
 function Link({ cell: { link, world, heardAt, pending } }) {
   const waiting = useLate(pending > 0 && link === "live");
   const [text, tone] = waiting ? ["Waiting", "warn"] : LINKS[link];
@@ -224,7 +224,7 @@ function Decision({ cell, checkpoints, jobs }) {
       checkpoints=${checkpoints} jobs=${jobs} />`;
   }
   if (cell.world.reach) return html`<${ReachDecision} world=${cell.world} />`;
-  return html`<${Story} world=${cell.world} />
+  return html`<${StatusPanel} world=${cell.world} />
     <${Values} world=${cell.world} cell=${cell.cell} history=${cell.history} ...${goals} />
     <${SmallPrint} world=${cell.world} />`;
 }

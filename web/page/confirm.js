@@ -29,7 +29,7 @@ export class Unconfirmed {
     }
   }
 
-  /** The world that was told is gone: its commands went with it. */
+  /** The world of the commands is gone: its commands went with it. */
   drop() {
     for (const one of [...this.#waiting]) one.done();
   }

@@ -8,8 +8,8 @@ const BESIDE_M = 0.3;
 /** What to try in a kind of cell: `ask` gives the commands that set it up. */
 const TRIES = {
   choice: {
-    text: "Put a hand on the goal the robot goes for: it takes another one.",
-    button: "Put a hand in its way",
+    text: "Put a hand on the robot's target: it switches to another one.",
+    button: "Block the target",
     ask({ candidates, chosen, people }) {
       const at = (candidates.find(({ id }) => id === chosen) ?? candidates[0])?.position;
       if (!at || people.length === 0) return [];
@@ -19,8 +19,8 @@ const TRIES = {
     },
   },
   reach: {
-    text: "Step between the robot and its goal: it slows down, and stops before it touches you.",
-    button: "Step in its way",
+    text: "Step between the robot and its goal: it slows down and stops before contact.",
+    button: "Block the path",
     ask({ people, reach }) {
       if (people.length === 0) return [];
       const person = people[0].id;
@@ -30,8 +30,8 @@ const TRIES = {
     },
   },
   sorting: {
-    text: "Ask for blocks under “Goal” and change your mind meanwhile: the robot replans.",
-    button: "Let it sort five blocks",
+    text: "Add blocks to the goal and change it while the robot works: it replans.",
+    button: "Sort five blocks",
     ask: (_, cell) => (cell?.sorting_tests ?? []).slice(0, 1)
       .map(({ id }) => ({ tag: "start-test", id })),
   },

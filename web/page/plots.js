@@ -2,7 +2,7 @@
 import { html, useEffect, useMemo, useRef, useState } from "./vendor/htm-preact-standalone.module.js";
 import * as format from "./format.js";
 import { SPAN_S } from "./live/history.js";
-import { drawValues } from "./live/valuelines.js";
+import { drawValues } from "./live/value-plot.js";
 import { themeColours } from "./palette.js";
 
 const FONT = "11px Inter, system-ui, sans-serif";

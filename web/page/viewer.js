@@ -14,11 +14,11 @@ const NOTE_MS = 20000;
  */
 export function Viewer({ src, epoch, link, frame }) {
   const [round, setRound] = useState(0);
-  const [told, setTold] = useState({ state: "", reason: "" });
+  const [report, setReport] = useState({ state: "", reason: "" });
   const [note, setNote] = useState(false);
   const died = useRef(false);
   const again = () => {
-    setTold({ state: "", reason: "" });
+    setReport({ state: "", reason: "" });
     setRound((n) => n + 1);
   };
 
@@ -26,7 +26,7 @@ export function Viewer({ src, epoch, link, frame }) {
     const hear = ({ data, origin, source }) => {
       const ours = origin === location.origin && source === frame.current?.contentWindow;
       if (!ours || data?.from !== "tandem-scene") return;
-      setTold(data);
+      setReport(data);
       died.current ||= data.state === "dead";
       if (data.state !== "up" || !died.current) return;
       died.current = false;
@@ -38,16 +38,16 @@ export function Viewer({ src, epoch, link, frame }) {
 
   // The link was lost: the frame's own connection may hang without having noticed.
   useEffect(() => {
-    if (epoch > 1 && told.state === "up") again();
+    if (epoch > 1 && report.state === "up") again();
   }, [epoch]);
 
   // The frame shows an error page, or its script did not get as far as to speak.
-  const mute = link === "live" && !["loading", "up"].includes(told.state);
+  const mute = link === "live" && !["loading", "up"].includes(report.state);
   useEffect(() => {
     if (!mute) return undefined;
     const timer = setTimeout(again, MUTE_MS);
     return () => clearTimeout(timer);
-  }, [mute, told, round]);
+  }, [mute, report, round]);
 
   useEffect(() => {
     if (!note) return undefined;
@@ -55,9 +55,9 @@ export function Viewer({ src, epoch, link, frame }) {
     return () => clearTimeout(timer);
   }, [note]);
 
-  const text = link === "live" ? trouble(told, died.current) : null;
+  const text = link === "live" ? trouble(report, died.current) : null;
   return html`<iframe key=${round} ref=${frame} src=${src} data-role="viewer"
-      data-state=${told.state} title="Live 3D view of robot and person"></iframe>
+      data-state=${report.state} title="Live 3D view of robot and person"></iframe>
     ${text && html`<div class="veil" role="status" data-role="scene-trouble">
       <i class="spinner"></i><p><b>${text[0]}</b></p><p class="faint">${text[1]}</p></div>`}
     ${note && html`<p class="scene-note" role="status" data-role="scene-note">

@@ -1,5 +1,5 @@
 // What this window shows over the scene. The viewer in the frame tells what can be shown or
-// hidden; what was chosen here is kept for this window, and told to every new viewer.
+// hidden; what was chosen here is kept for this window, and sent to every new viewer.
 import { html, useEffect, useRef, useState } from "./vendor/htm-preact-standalone.module.js";
 import { Icon } from "./icons.js";
 

@@ -27,7 +27,7 @@ PICK_S = (0.9, 1.3, 2.0)
 """Times at which the tool is down, the fingers have closed, the tool is up again [s]."""
 
 
-class PickWorld(BaseWorld[LivePeople]):
+class LivePickWorld(BaseWorld[LivePeople]):
     """One live pick-and-place cell.
 
     Args:

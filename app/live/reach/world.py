@@ -55,7 +55,7 @@ APART_M = 0.02
 """Separation distance from which a contact at standstill is over [m]."""
 
 
-class ReachWorld(BaseWorld[LiveWalkers]):
+class LiveReachWorld(BaseWorld[LiveWalkers]):
     """One live reach cell.
 
     Args:

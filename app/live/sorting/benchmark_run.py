@@ -40,7 +40,7 @@ def random_task(shape: SortingShape, fail: Vec, seed: int, number: int) -> Sorti
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Interference:
+class AppliedInterference:
     """What a person did."""
 
     state: SortingState
@@ -89,7 +89,9 @@ class SortingTestRun:
         self._shape = shape
         return self._test.start(shape, fail, self._rng)
 
-    def interfere(self, state: SortingState, moves: int, idle_s: float) -> Interference | None:
+    def interfere(
+        self, state: SortingState, moves: int, idle_s: float
+    ) -> AppliedInterference | None:
         """Do what is due; None where nothing is.
 
         Args:
@@ -105,7 +107,9 @@ class SortingTestRun:
             return None
         now, self._moves = self._waiting.pop(0), moves
         try:
-            return Interference(state=now.change(state, self._shape, self._rng), text=now.text)
+            return AppliedInterference(
+                state=now.change(state, self._shape, self._rng), text=now.text
+            )
         except InvalidInput:  # A visitor left nothing that this person could do.
             self._spoilt = "the person could not do what the test says"
             return None

@@ -47,7 +47,7 @@ SHORT_M = 0.35
 """Distance from which inverse kinematics completes a motion that reached its limit [m]."""
 
 
-class SortingWorld(BaseWorld[LivePeople]):
+class LiveSortingWorld(BaseWorld[LivePeople]):
     """One live sorting cell.
 
     Args:

@@ -7,7 +7,7 @@ from app.errors import InvalidInput
 from app.live import commands
 from app.live.command_checks import Command
 from app.live.people.workers import LivePeople, place_of
-from app.live.pick.world import PickWorld
+from app.live.pick.world import LivePickWorld
 from app.live.playback import PlayedMotion, Recording
 from app.live.snapshot import PersonView, WorldSnapshot
 from app.sim.cells.cell import Cell, load_cell
@@ -28,17 +28,17 @@ def cell() -> Cell:
 
 
 @pytest.fixture
-def world(cell: Cell) -> PickWorld:
-    return PickWorld(cell, StraightPolicy(cell), seed=3)
+def world(cell: Cell) -> LivePickWorld:
+    return LivePickWorld(cell, StraightPolicy(cell), seed=3)
 
 
-def run(world: PickWorld, ticks: int) -> WorldSnapshot:
+def run(world: LivePickWorld, ticks: int) -> WorldSnapshot:
     for _ in range(ticks):
         world.step()
     return world.snapshot()
 
 
-def play(world: PickWorld, person: int = 0, **how: float) -> WorldSnapshot:
+def play(world: LivePickWorld, person: int = 0, **how: float) -> WorldSnapshot:
     """Play a recording and wait until the person has come to its beginning."""
     world.apply(
         commands.SetMotion(name="made-up", person=person).with_loaded(
@@ -69,7 +69,7 @@ def gap(first: PersonView, second: PersonView, floor_z: float) -> float:
     return float((away.min(axis=(2, 3)) - radii[:, None] - radii).min())
 
 
-def test_a_person_who_is_added_works_beside_the_first(world: PickWorld, cell: Cell) -> None:
+def test_a_person_who_is_added_works_beside_the_first(world: LivePickWorld, cell: Cell) -> None:
     world.apply(commands.AddPerson())
     first, second = world.snapshot().people
     assert (first.id, second.id) == (0, 1)
@@ -82,7 +82,7 @@ def test_a_person_who_is_added_works_beside_the_first(world: PickWorld, cell: Ce
 
 
 @pytest.mark.parametrize("n", [2, 3, 4])
-def test_people_stand_apart_at_the_start(world: PickWorld, cell: Cell, n: int) -> None:
+def test_people_stand_apart_at_the_start(world: LivePickWorld, cell: Cell, n: int) -> None:
     for _ in range(n - 1):
         world.apply(commands.AddPerson())
     world.apply(commands.Reset())
@@ -109,7 +109,7 @@ def test_ids_stay_when_somebody_leaves_and_are_given_again(cell: Cell) -> None:
     assert people.ids == (0, 1, 2)
 
 
-def test_nobody_jumps_when_somebody_comes_or_leaves(world: PickWorld) -> None:
+def test_nobody_jumps_when_somebody_comes_or_leaves(world: LivePickWorld) -> None:
     run(world, 60)
     for command in (
         commands.AddPerson(),
@@ -124,7 +124,7 @@ def test_nobody_jumps_when_somebody_comes_or_leaves(world: PickWorld) -> None:
             last = now
 
 
-def test_empty_cell_has_no_clearance_and_the_robot_works(world: PickWorld) -> None:
+def test_empty_cell_has_no_clearance_and_the_robot_works(world: LivePickWorld) -> None:
     world.apply(commands.RemovePerson(person=0))
     after = run(world, 100)
     assert after.people == ()
@@ -135,7 +135,7 @@ def test_empty_cell_has_no_clearance_and_the_robot_works(world: PickWorld) -> No
 
 
 def test_nearest_person_is_named_and_distances_are_those_of_each_alone(
-    world: PickWorld, cell: Cell
+    world: LivePickWorld, cell: Cell
 ) -> None:
     world.apply(commands.AddPerson())
     world.apply(commands.MovePerson(person=0, pelvis=(0.0, 2.4, -1.57)))
@@ -153,7 +153,7 @@ def test_nearest_person_is_named_and_distances_are_those_of_each_alone(
         assert alone.people_m == pytest.approx(one.clearance_m)
 
 
-def test_contact_names_the_person_who_was_touched(world: PickWorld) -> None:
+def test_contact_names_the_person_who_was_touched(world: LivePickWorld) -> None:
     world.apply(commands.AddPerson())
     world.apply(commands.MovePerson(person=0, pelvis=(-0.6, 2.4, -1.57)))
     world.apply(commands.SetCandidates(ids=("cube2",)))
@@ -168,7 +168,7 @@ def test_contact_names_the_person_who_was_touched(world: PickWorld) -> None:
     assert (found.kind, found.person) == ("human", 1)
 
 
-def test_size_glides_to_what_was_asked_for(world: PickWorld, cell: Cell) -> None:
+def test_size_glides_to_what_was_asked_for(world: LivePickWorld, cell: Cell) -> None:
     world.apply(commands.SetAnthropometry(stature=95.0, arms=90.0, shoulders=10.0))
     wanted = percentile_body(95.0, 90.0, 10.0).vector(cell.floor_z)
     sizes = [world.snapshot().people[0].size]
@@ -182,7 +182,7 @@ def test_size_glides_to_what_was_asked_for(world: PickWorld, cell: Cell) -> None
     assert body.stature_m == pytest.approx(1.87, abs=0.01)
 
 
-def test_hands_do_not_jump_while_a_working_person_grows(world: PickWorld) -> None:
+def test_hands_do_not_jump_while_a_working_person_grows(world: LivePickWorld) -> None:
     run(world, 30)
     world.apply(commands.SetAnthropometry(stature=5.0))
     last = palms(world.snapshot().people[0])
@@ -192,7 +192,9 @@ def test_hands_do_not_jump_while_a_working_person_grows(world: PickWorld) -> Non
         last = now
 
 
-def test_dragged_hand_stays_where_it_was_put_while_the_person_grows(world: PickWorld) -> None:
+def test_dragged_hand_stays_where_it_was_put_while_the_person_grows(
+    world: LivePickWorld,
+) -> None:
     target = np.array([-0.2, 0.9, 0.2])
     world.apply(commands.MovePerson(pelvis=(0.0, 1.2, -1.57), right=(-0.2, 0.9, 0.2)))
     run(world, 60)
@@ -200,8 +202,8 @@ def test_dragged_hand_stays_where_it_was_put_while_the_person_grows(world: PickW
     assert np.linalg.norm(palms(run(world, 40).people[0])[0] - target) < 0.02
 
 
-def test_size_changes_while_the_clock_stands(world: PickWorld) -> None:
-    world.apply(commands.Pause())
+def test_size_changes_while_the_clock_stands(world: LivePickWorld) -> None:
+    world.apply(commands.PauseClock())
     world.apply(commands.SetAnthropometry(stature=95.0))
     before = world.snapshot()
     after = run(world, 15)
@@ -210,7 +212,7 @@ def test_size_changes_while_the_clock_stands(world: PickWorld) -> None:
 
 
 def test_recorded_motion_is_played_at_the_table_at_its_own_pace_and_size_of_path(
-    world: PickWorld, cell: Cell
+    world: LivePickWorld, cell: Cell
 ) -> None:
     start = play(world).people[0]
     places, yaws, times = [start.q[:2]], [], []
@@ -228,7 +230,7 @@ def test_recorded_motion_is_played_at_the_table_at_its_own_pace_and_size_of_path
     assert np.allclose(np.diff(times), DT)
 
 
-def test_recorded_motion_carries_pelvis_and_lengths(world: PickWorld, cell: Cell) -> None:
+def test_recorded_motion_carries_pelvis_and_lengths(world: LivePickWorld, cell: Cell) -> None:
     play(world)
     recorded_size = recorded().size.vector(cell.floor_z)
     heights = []
@@ -243,7 +245,7 @@ def test_recorded_motion_carries_pelvis_and_lengths(world: PickWorld, cell: Cell
     assert world.snapshot().people[0].mode == "recorded"
 
 
-def test_recorded_motion_loops_without_a_jump(world: PickWorld) -> None:
+def test_recorded_motion_loops_without_a_jump(world: LivePickWorld) -> None:
     last = play(world, turn=5.0).people[0]
     begun = 0
     for _ in range(300):
@@ -254,7 +256,7 @@ def test_recorded_motion_loops_without_a_jump(world: PickWorld) -> None:
     assert begun >= 2
 
 
-def test_recorded_path_that_leaves_the_area_is_told(world: PickWorld) -> None:
+def test_recorded_path_that_leaves_the_area_is_told(world: LivePickWorld) -> None:
     play(world, walk=1.0)
     seen = [run(world, 1).people[0] for _ in range(39)]
     assert seen[0].motion is not None
@@ -264,7 +266,7 @@ def test_recorded_path_that_leaves_the_area_is_told(world: PickWorld) -> None:
 
 
 def test_body_is_where_it_was_recorded_and_policies_are_told_the_limits(
-    world: PickWorld,
+    world: LivePickWorld,
 ) -> None:
     start = play(world, shoulder=3.5).people[0]
     assert start.motion is not None
@@ -288,16 +290,16 @@ def test_speeds_of_a_recording_stay_within_what_a_policy_takes(cell: Cell) -> No
     assert fastest == 50.0
 
 
-def test_recorded_motion_stands_while_paused(world: PickWorld) -> None:
+def test_recorded_motion_stands_while_paused(world: LivePickWorld) -> None:
     play(world)
-    world.apply(commands.Pause())
+    world.apply(commands.PauseClock())
     before = run(world, 1).people[0]
     after = run(world, 20).people[0]
     assert np.array_equal(before.q, after.q)
     assert before.motion == after.motion
 
 
-def test_person_of_mode_still_goes_home_and_stays(world: PickWorld, cell: Cell) -> None:
+def test_person_of_mode_still_goes_home_and_stays(world: LivePickWorld, cell: Cell) -> None:
     run(world, 100)
     world.apply(commands.SetMode(mode="still"))
     rest = run(world, 150).people[0]
@@ -305,7 +307,9 @@ def test_person_of_mode_still_goes_home_and_stays(world: PickWorld, cell: Cell) 
     assert np.allclose(run(world, 20).people[0].q, rest.q, atol=0.01)
 
 
-def test_case_study_keeps_one_person_of_the_cells_size(world: PickWorld, cell: Cell) -> None:
+def test_case_study_keeps_one_person_of_the_cells_size(
+    world: LivePickWorld, cell: Cell
+) -> None:
     world.apply(commands.SetAnthropometry(stature=95.0))
     world.apply(commands.AddPerson())
     run(world, 5)
@@ -324,21 +328,21 @@ def test_case_study_keeps_one_person_of_the_cells_size(world: PickWorld, cell: C
     ],
 )
 def test_command_that_does_not_fit_the_people_is_refused(
-    world: PickWorld, command: Command, field: str
+    world: LivePickWorld, command: Command, field: str
 ) -> None:
     with pytest.raises(InvalidInput) as caught:
         world.apply(command)
     assert caught.value.field == field
 
 
-def test_fifth_person_is_refused(world: PickWorld) -> None:
+def test_fifth_person_is_refused(world: LivePickWorld) -> None:
     for _ in range(3):
         world.apply(commands.AddPerson())
     with pytest.raises(InvalidInput, match="at most 4"):
         world.apply(commands.AddPerson())
 
 
-def test_nobody_can_be_moved_in_an_empty_cell(world: PickWorld) -> None:
+def test_nobody_can_be_moved_in_an_empty_cell(world: LivePickWorld) -> None:
     world.apply(commands.RemovePerson(person=0))
     with pytest.raises(InvalidInput, match="empty"):
         world.apply(commands.SetMode(mode="manual"))

@@ -4,7 +4,7 @@ from pydantic import ValidationError
 
 from app.errors import InvalidInput
 from app.live import commands
-from app.live.pick.world import PickWorld
+from app.live.pick.world import LivePickWorld
 from app.live.snapshot import WorldSnapshot
 from app.sim.cells.cell import Cell, load_cell
 from app.sim.human import model as human
@@ -19,22 +19,22 @@ def cell() -> Cell:
 
 
 @pytest.fixture
-def world(cell: Cell) -> PickWorld:
+def world(cell: Cell) -> LivePickWorld:
     """A world whose person stands back, so that nothing is in the robot's way."""
-    world = PickWorld(cell, StraightPolicy(cell), seed=3)
+    world = LivePickWorld(cell, StraightPolicy(cell), seed=3)
     world.apply(commands.MovePerson(pelvis=(0.0, 2.4, -1.57)))
     run(world, 40)
     world.apply(commands.Reset())
     return world
 
 
-def run(world: PickWorld, ticks: int) -> WorldSnapshot:
+def run(world: LivePickWorld, ticks: int) -> WorldSnapshot:
     for _ in range(ticks):
         world.step()
     return world.snapshot()
 
 
-def until(world: PickWorld, status: str, limit: int = 400) -> WorldSnapshot:
+def until(world: LivePickWorld, status: str, limit: int = 400) -> WorldSnapshot:
     for _ in range(limit):
         world.step()
         if world.snapshot().status == status:
@@ -47,7 +47,7 @@ def palm(snapshot: WorldSnapshot, cell: Cell, hand: str) -> np.ndarray:
 
 
 def test_robot_reaches_a_candidate_and_the_next_episode_offers_the_others(
-    world: PickWorld,
+    world: LivePickWorld,
 ) -> None:
     world.apply(commands.SetCandidates(ids=("cube1", "cube4")))
     first = until(world, "picking")
@@ -59,7 +59,7 @@ def test_robot_reaches_a_candidate_and_the_next_episode_offers_the_others(
 
 
 def test_tool_goes_down_to_the_cube_and_closes_before_the_next_episode(
-    world: PickWorld,
+    world: LivePickWorld,
 ) -> None:
     until(world, "picking")
     heights, closed = [], False
@@ -72,7 +72,7 @@ def test_tool_goes_down_to_the_cube_and_closes_before_the_next_episode(
 
 
 def test_decision_in_a_snapshot_is_the_one_for_its_own_state(
-    world: PickWorld, cell: Cell
+    world: LivePickWorld, cell: Cell
 ) -> None:
     snapshot = run(world, 25)
     again = StraightPolicy(cell).decide(
@@ -88,7 +88,7 @@ def test_decision_in_a_snapshot_is_the_one_for_its_own_state(
 
 
 def test_joint_limits_hold_over_a_minute_of_work(cell: Cell) -> None:
-    world = PickWorld(cell, StraightPolicy(cell), seed=5)
+    world = LivePickWorld(cell, StraightPolicy(cell), seed=5)
     for _ in range(1200):
         world.step()
         snapshot = world.snapshot()
@@ -98,12 +98,12 @@ def test_joint_limits_hold_over_a_minute_of_work(cell: Cell) -> None:
 
 
 def test_hand_on_the_chosen_cube_changes_the_choice_and_counts_a_switch(
-    world: PickWorld, cell: Cell
+    world: LivePickWorld, cell: Cell
 ) -> None:
     world.apply(commands.SetCandidates(ids=("cube1", "cube4")))
     world.apply(commands.MovePerson(pelvis=(0.0, 1.2, -1.57)))
     run(world, 5)
-    world.apply(commands.Pause())
+    world.apply(commands.PauseClock())
     before = world.snapshot().chosen
     assert before is not None
     x, y, z = cell.station(before).position
@@ -114,7 +114,7 @@ def test_hand_on_the_chosen_cube_changes_the_choice_and_counts_a_switch(
     assert "Switched to" in after.message
 
 
-def test_dragged_hand_arrives_with_bounded_speed(world: PickWorld, cell: Cell) -> None:
+def test_dragged_hand_arrives_with_bounded_speed(world: LivePickWorld, cell: Cell) -> None:
     world.apply(commands.MovePerson(pelvis=(0.0, 1.2, -1.57)))
     run(world, 60)
     world.apply(commands.MovePerson(right=(-0.2, 0.8, 0.2)))
@@ -127,7 +127,7 @@ def test_dragged_hand_arrives_with_bounded_speed(world: PickWorld, cell: Cell) -
     assert 0.3 < max(speeds) < 4.0
 
 
-def test_speed_given_to_the_policy_is_the_speed_of_the_movement(world: PickWorld) -> None:
+def test_speed_given_to_the_policy_is_the_speed_of_the_movement(world: LivePickWorld) -> None:
     world.apply(commands.MovePerson(pelvis=(0.3, 1.6, -1.2)))
     before = run(world, 3)
     after = run(world, 1)
@@ -135,7 +135,7 @@ def test_speed_given_to_the_policy_is_the_speed_of_the_movement(world: PickWorld
 
 
 def test_contact_is_told_and_the_robot_starts_again_from_home(
-    world: PickWorld, cell: Cell
+    world: LivePickWorld, cell: Cell
 ) -> None:
     world.apply(commands.SetCandidates(ids=("cube2",)))
     world.apply(commands.MovePerson(pelvis=(0.0, 1.15, -1.57), right=(-0.1, 0.62, 0.2)))
@@ -149,8 +149,8 @@ def test_contact_is_told_and_the_robot_starts_again_from_home(
     assert again.counters.contacts == 1
 
 
-def test_paused_clock_stands_while_the_dragged_person_moves(world: PickWorld) -> None:
-    world.apply(commands.Pause())
+def test_paused_clock_stands_while_the_dragged_person_moves(world: LivePickWorld) -> None:
+    world.apply(commands.PauseClock())
     before = world.snapshot()
     world.apply(commands.MovePerson(pelvis=(0.5, 1.8, -1.0)))
     after = run(world, 30)
@@ -160,7 +160,7 @@ def test_paused_clock_stands_while_the_dragged_person_moves(world: PickWorld) ->
     assert not after.person_qd.any()
 
 
-def test_step_once_advances_by_one_period_and_stays_paused(world: PickWorld) -> None:
+def test_step_once_advances_by_one_period_and_stays_paused(world: LivePickWorld) -> None:
     before = world.snapshot()
     world.apply(commands.StepOnce())
     after = run(world, 5)
@@ -168,7 +168,7 @@ def test_step_once_advances_by_one_period_and_stays_paused(world: PickWorld) -> 
     assert after.paused
 
 
-def test_person_does_not_jump_when_it_goes_back_to_work(world: PickWorld) -> None:
+def test_person_does_not_jump_when_it_goes_back_to_work(world: LivePickWorld) -> None:
     world.apply(commands.SetMode(mode="auto"))
     q = world.snapshot().person_q
     for _ in range(200):
@@ -178,7 +178,7 @@ def test_person_does_not_jump_when_it_goes_back_to_work(world: PickWorld) -> Non
 
 
 def test_case_study_starts_at_its_station_and_ends_with_a_verdict(cell: Cell) -> None:
-    world = PickWorld(cell, StraightPolicy(cell), seed=1)
+    world = LivePickWorld(cell, StraightPolicy(cell), seed=1)
     world.apply(commands.StartCase(id="case-1"))
     start = world.snapshot()
     assert np.allclose(start.tcp, cell.station("cube5").position, atol=1e-6)
@@ -189,7 +189,7 @@ def test_case_study_starts_at_its_station_and_ends_with_a_verdict(cell: Cell) ->
 
 
 def test_leaving_a_case_brings_back_the_visitors_candidates(cell: Cell) -> None:
-    world = PickWorld(cell, StraightPolicy(cell), seed=1)
+    world = LivePickWorld(cell, StraightPolicy(cell), seed=1)
     world.apply(commands.SetCandidates(ids=("cube3", "dock0")))
     world.apply(commands.StartCase(id="case-2"))
     world.apply(commands.SetMode(mode="manual"))
@@ -199,7 +199,7 @@ def test_leaving_a_case_brings_back_the_visitors_candidates(cell: Cell) -> None:
 
 
 def test_without_policy_or_candidates_the_robot_rests_and_says_why(cell: Cell) -> None:
-    world = PickWorld(cell, None, seed=1)
+    world = LivePickWorld(cell, None, seed=1)
     assert run(world, 20).status == "no policy"
     world.apply(commands.SetPolicy(checkpoint="straight").with_loaded(StraightPolicy(cell)))
     world.apply(commands.SetCandidates(ids=()))
@@ -208,7 +208,7 @@ def test_without_policy_or_candidates_the_robot_rests_and_says_why(cell: Cell) -
     assert np.allclose(after.robot_q, cell.robot.home_q)
 
 
-def test_toggling_adds_and_removes_a_candidate_in_the_cells_order(world: PickWorld) -> None:
+def test_toggling_adds_and_removes_a_candidate_in_the_cells_order(world: LivePickWorld) -> None:
     world.apply(commands.SetCandidates(ids=("cube4",)))
     world.apply(commands.ToggleCandidate(id="cube1"))
     assert world.snapshot().selected == ("cube1", "cube4")
@@ -216,7 +216,7 @@ def test_toggling_adds_and_removes_a_candidate_in_the_cells_order(world: PickWor
     assert world.snapshot().selected == ("cube1",)
 
 
-def test_commands_that_do_not_fit_are_refused_and_change_nothing(world: PickWorld) -> None:
+def test_commands_that_do_not_fit_are_refused_and_change_nothing(world: LivePickWorld) -> None:
     before = world.snapshot()
     with pytest.raises(InvalidInput, match="cube9"):
         world.apply(commands.ToggleCandidate(id="cube9"))
@@ -226,7 +226,7 @@ def test_commands_that_do_not_fit_are_refused_and_change_nothing(world: PickWorl
     assert world.snapshot().mode == before.mode
 
 
-def test_snapshots_cannot_be_written(world: PickWorld) -> None:
+def test_snapshots_cannot_be_written(world: LivePickWorld) -> None:
     with pytest.raises(ValueError, match="read-only"):
         world.snapshot().robot_q[0] = 1.0
 
@@ -234,7 +234,7 @@ def test_snapshots_cannot_be_written(world: PickWorld) -> None:
 @pytest.mark.parametrize("point", [(1e308, 1e308, 0.0), (0.0, -1e155, 0.0), (0.0, 0.0, 600.0)])
 @pytest.mark.parametrize("part", ["pelvis", "right", "left"])
 def test_a_place_that_is_in_no_hall_is_refused(
-    world: PickWorld, part: str, point: tuple[float, float, float]
+    world: LivePickWorld, part: str, point: tuple[float, float, float]
 ) -> None:
     with pytest.raises(ValidationError, match=part):
         world.apply(commands.MovePerson(**{part: point}))
@@ -242,7 +242,7 @@ def test_a_place_that_is_in_no_hall_is_refused(
 
 
 @pytest.mark.parametrize("far", [60.0, -99.9])
-def test_a_place_far_away_in_the_hall_is_reached_for(world: PickWorld, far: float) -> None:
+def test_a_place_far_away_in_the_hall_is_reached_for(world: LivePickWorld, far: float) -> None:
     world.apply(commands.MovePerson(pelvis=(far, far, far), right=(far, far, far)))
     world.apply(commands.MovePerson(left=(-far, far, -far)))
     assert np.isfinite(run(world, 80).people[0].q).all()

@@ -7,7 +7,7 @@ from app.errors import InvalidInput
 from app.live import commands
 from app.live.command_checks import Command
 from app.live.reach.commands import MoveGoal, NewGoal, SetGoalMode, SetInferenceMode, SetSafety
-from app.live.reach.world import LONG_LIMIT_S, ReachWorld
+from app.live.reach.world import LONG_LIMIT_S, LiveReachWorld
 from app.live.snapshot import WorldSnapshot
 from app.sim.cells.cell import load_cell
 
@@ -16,24 +16,24 @@ FAR_CORNER = (-2.0, 2.0, 0.0)
 MIDDLE = (0.0, 0.8, 0.3)
 
 
-def empty_world() -> ReachWorld:
+def empty_world() -> LiveReachWorld:
     """A cell that everybody has left."""
-    world = ReachWorld(CELL, None, seed=3)
+    world = LiveReachWorld(CELL, None, seed=3)
     world.apply(commands.RemovePerson(person=0))
     return world
 
 
-def standing_at(world: ReachWorld, x: float, y: float) -> None:
+def standing_at(world: LiveReachWorld, x: float, y: float) -> None:
     """Let the first person stand somewhere, the clock being stopped meanwhile."""
-    world.apply(commands.Pause())
+    world.apply(commands.PauseClock())
     world.apply(commands.MovePerson(pelvis=(x, y, 0.0)))
     for _ in range(250):
         world.step()
-    world.apply(commands.Resume())
+    world.apply(commands.ResumeClock())
 
 
 def until(
-    world: ReachWorld, holds: Callable[[WorldSnapshot], bool], seconds: float = 30.0
+    world: LiveReachWorld, holds: Callable[[WorldSnapshot], bool], seconds: float = 30.0
 ) -> WorldSnapshot:
     for _ in range(round(seconds / CELL.robot.dt)):
         world.step()
@@ -81,7 +81,7 @@ def test_goal_can_be_drawn_anew_while_the_robot_moves() -> None:
 
 
 def test_person_beside_the_robot_slows_it_down_and_the_message_says_by_how_much() -> None:
-    world = ReachWorld(CELL, None, seed=3)
+    world = LiveReachWorld(CELL, None, seed=3)
     standing_at(world, -0.35, 1.5)
     slow = until(world, lambda now: 0.0 < now.reach.safety.override < 0.9)
     safety = slow.reach.safety
@@ -93,7 +93,7 @@ def test_person_beside_the_robot_slows_it_down_and_the_message_says_by_how_much(
 
 
 def test_robot_stops_before_a_person_who_stays_on_its_way_and_goes_on_afterwards() -> None:
-    world = ReachWorld(CELL, None, seed=3)
+    world = LiveReachWorld(CELL, None, seed=3)
     standing_at(world, 0.0, 0.9)
     stopped = until(world, lambda now: now.reach.safety.override == 0.0)
     assert stopped.message.startswith("Stopped:")
@@ -104,7 +104,7 @@ def test_robot_stops_before_a_person_who_stays_on_its_way_and_goes_on_afterwards
 
 
 def test_person_who_walks_into_the_standing_robot_is_no_contact() -> None:
-    world = ReachWorld(CELL, None, seed=3)
+    world = LiveReachWorld(CELL, None, seed=3)
     standing_at(world, 0.0, 1.2)
     until(world, lambda now: now.reach.safety.override == 0.0)
     x, y, _ = world.snapshot().tcp
@@ -119,7 +119,7 @@ def test_person_who_walks_into_the_standing_robot_is_no_contact() -> None:
 
 
 def test_without_the_layer_the_robot_runs_into_whom_it_does_not_see() -> None:
-    world = ReachWorld(CELL, None, seed=3)
+    world = LiveReachWorld(CELL, None, seed=3)
     world.apply(SetSafety(on=False))
     world.apply(SetGoalMode(mode="follow"))
     world.apply(MoveGoal(position=(-0.5, 0.8, 0.3)))
@@ -133,7 +133,7 @@ def test_without_the_layer_the_robot_runs_into_whom_it_does_not_see() -> None:
 
 
 def test_who_stands_near_does_not_hold_the_robot_where_velocities_are_measured() -> None:
-    world = ReachWorld(CELL, None, seed=3)
+    world = LiveReachWorld(CELL, None, seed=3)
     x, y, _ = world.snapshot().tcp
     standing_at(world, float(x), float(y) + 0.75)
     assumed = world.snapshot().reach.safety
@@ -149,7 +149,7 @@ def test_who_stands_near_does_not_hold_the_robot_where_velocities_are_measured()
 
 
 def test_goal_that_is_not_reached_in_time_counts_and_is_tried_again() -> None:
-    world = ReachWorld(CELL, None, seed=3)
+    world = LiveReachWorld(CELL, None, seed=3)
     standing_at(world, 0.0, 0.8)
     world.apply(MoveGoal(position=MIDDLE))
     late = until(world, lambda now: now.counters.timeouts == 1)
@@ -159,8 +159,8 @@ def test_goal_that_is_not_reached_in_time_counts_and_is_tried_again() -> None:
 
 
 def test_paused_cell_answers_to_a_person_who_is_dragged() -> None:
-    world = ReachWorld(CELL, None, seed=3)
-    world.apply(commands.Pause())
+    world = LiveReachWorld(CELL, None, seed=3)
+    world.apply(commands.PauseClock())
     before = world.snapshot()
     standing_at(world, 0.3, 1.0)
     after = world.snapshot()
@@ -172,7 +172,7 @@ def test_paused_cell_answers_to_a_person_who_is_dragged() -> None:
 def test_same_seed_gives_the_same_run() -> None:
     ends = []
     for _ in range(2):
-        world = ReachWorld(CELL, None, seed=5)
+        world = LiveReachWorld(CELL, None, seed=5)
         for _ in range(150):
             world.step()
         ends.append(world.snapshot())
@@ -201,7 +201,7 @@ def test_reset_begins_anew_with_everything_at_zero() -> None:
     ],
 )
 def test_what_the_cell_cannot_do_is_refused_by_name(command: Command, field: str) -> None:
-    world = ReachWorld(CELL, None, seed=3)
+    world = LiveReachWorld(CELL, None, seed=3)
     before = world.snapshot()
     with pytest.raises(InvalidInput) as refused:
         world.apply(command)
@@ -211,4 +211,4 @@ def test_what_the_cell_cannot_do_is_refused_by_name(command: Command, field: str
 
 def test_goal_outside_says_which_axis_and_by_how_much() -> None:
     with pytest.raises(InvalidInput, match=r"position.y.*0\.6, 1\] m: 0\.3 m outside"):
-        ReachWorld(CELL, None, seed=3).apply(MoveGoal(position=(0.0, 1.3, 0.3)))
+        LiveReachWorld(CELL, None, seed=3).apply(MoveGoal(position=(0.0, 1.3, 0.3)))

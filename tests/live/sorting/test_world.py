@@ -16,7 +16,7 @@ from app.live.sorting.commands import (
     StartTest,
     ToggleGoal,
 )
-from app.live.sorting.world import SortingWorld
+from app.live.sorting.world import LiveSortingWorld
 from app.policies.checkpoints import pretrained
 from app.policies.inference.task_selection import TaskChooser
 from app.sim.cells.cell import load_cell
@@ -149,7 +149,7 @@ def test_limits_of_the_joints_hold_along_the_whole_way() -> None:
 def test_same_seed_and_commands_give_the_same_snapshots() -> None:
     def run() -> list[WorldSnapshot]:
         cell = load_cell("sorting-e0")
-        world = SortingWorld(cell, StraightPolicy(cell), seed=4)
+        world = LiveSortingWorld(cell, StraightPolicy(cell), seed=4)
         seen = []
         for tick in range(150):
             if tick == 40:
@@ -167,7 +167,7 @@ def test_same_seed_and_commands_give_the_same_snapshots() -> None:
 
 def test_reset_draws_another_task_with_a_goal() -> None:
     cell = load_cell("sorting-e0")
-    world = SortingWorld(cell, None, seed=1)
+    world = LiveSortingWorld(cell, None, seed=1)
     first = world.snapshot().sorting
     world.apply(commands.Reset())
     second = world.snapshot().sorting
@@ -290,7 +290,7 @@ def test_robot_goes_home_with_nothing_to_do() -> None:
 
 
 def test_robot_rests_without_a_policy() -> None:
-    world = SortingWorld(load_cell("sorting-e0"), None, seed=1)
+    world = LiveSortingWorld(load_cell("sorting-e0"), None, seed=1)
     before = world.snapshot()
     for _ in range(20):
         world.step()

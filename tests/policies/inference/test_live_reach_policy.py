@@ -6,7 +6,7 @@ from app.live import commands
 from app.live.commands import SetPolicy
 from app.live.reach.commands import SetInferenceMode, SetSafety
 from app.live.reach.controller import TIME_LIMIT_S, ReachController
-from app.live.reach.world import ReachWorld
+from app.live.reach.world import LiveReachWorld
 from app.policies.inference.controllers import RolloutController, controller_of
 from app.policies.inference.live_reach_policy import ReachPilot
 from app.policies.inference.reach_policy import ReachPolicy
@@ -35,7 +35,7 @@ def test_live_state_is_seen_as_the_batch_sees_it(policy: ReachPolicy) -> None:
     batch.reset()
     for _ in range(5):
         batch.step(np.full((1, 6), 0.3, dtype=np.float32))
-    world = ReachWorld(CELL, pilot, seed=1)
+    world = LiveReachWorld(CELL, pilot, seed=1)
     robot, reacher = world.robot, ReachController(CELL, pilot)
     state = batch.state
     robot.q, robot.qd, robot.qdd = state.q[0], state.qd[0], state.qdd[0]
@@ -72,7 +72,7 @@ def test_looking_ahead_is_told_of_the_layer_that_is_obeyed(
     policy: ReachPolicy, on: bool, measured: bool
 ) -> None:
     pilot = ReachPilot(policy)
-    world = ReachWorld(CELL, pilot, seed=1)
+    world = LiveReachWorld(CELL, pilot, seed=1)
     world.apply(SetInferenceMode(inference_mode="direct-rollout"))
     world.apply(SetSafety(on=on, use_measured_velocity=measured))
     mover = pilot._controllers["direct-rollout"]
@@ -84,7 +84,7 @@ def test_under_the_layer_the_policy_has_its_usual_time_and_looking_ahead_the_tru
     policy: ReachPolicy,
 ) -> None:
     pilot = Noting(policy)
-    world = ReachWorld(CELL, pilot, seed=1)
+    world = LiveReachWorld(CELL, pilot, seed=1)
     world.apply(SetInferenceMode(inference_mode="direct"))
     pilot.told.clear()
     while world.snapshot().status == "moving" and len(pilot.told) < 90:
@@ -99,7 +99,7 @@ def test_policy_moves_the_robot_of_a_live_cell_with_any_number_of_people(
     policy: ReachPolicy,
 ) -> None:
     pilot = ReachPilot(policy)
-    world = ReachWorld(CELL, None, seed=1)
+    world = LiveReachWorld(CELL, None, seed=1)
     world.apply(SetPolicy(checkpoint=None).with_loaded(pilot))
     shown = world.snapshot()
     assert (shown.checkpoint, shown.reach.inference_mode) == (
@@ -122,7 +122,7 @@ def test_policy_moves_the_robot_of_a_live_cell_with_any_number_of_people(
 def test_goals_jump_among_the_targets_unless_the_policy_is_interpolated(
     policy: ReachPolicy,
 ) -> None:
-    world = ReachWorld(CELL, ReachPilot(policy), seed=1)
+    world = LiveReachWorld(CELL, ReachPilot(policy), seed=1)
     on_target = []
     for way in ("direct", "interpolated"):
         world.apply(SetInferenceMode(inference_mode=way))

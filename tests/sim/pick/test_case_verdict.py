@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import pytest
 
 from app.live import commands
-from app.live.pick.world import PickWorld
+from app.live.pick.world import LivePickWorld
 from app.sim.cells.cell import load_cell
 from app.sim.pick.case_verdict import CaseRun, End, is_as_expected, judge
 from app.sim.pick.cases import find_case
@@ -71,7 +71,7 @@ def test_verdict_tells_order_and_times_of_what_was_chosen() -> None:
 
 def test_live_case_is_judged_when_it_is_done_and_anew_under_another_policy() -> None:
     cell = load_cell()
-    world = PickWorld(cell, StraightPolicy(cell), seed=2)
+    world = LivePickWorld(cell, StraightPolicy(cell), seed=2)
     assert world.snapshot().verdict is None
     world.apply(commands.StartCase(id="case-4"))
     now = world.snapshot()
@@ -99,7 +99,7 @@ def test_live_case_is_judged_when_it_is_done_and_anew_under_another_policy() -> 
 
 def test_values_carry_the_time_at_which_they_were_decided() -> None:
     cell = load_cell()
-    world = PickWorld(cell, StraightPolicy(cell), seed=2)
+    world = LivePickWorld(cell, StraightPolicy(cell), seed=2)
     for _ in range(400):
         world.step()
         now = world.snapshot()

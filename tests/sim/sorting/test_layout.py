@@ -4,8 +4,8 @@ import pytest
 from app.errors import CheckpointMismatch
 from app.live import command_checks
 from app.live.factory import lacks_for_live, new_world
-from app.live.pick.world import PickWorld
-from app.live.sorting.world import SortingWorld
+from app.live.pick.world import LivePickWorld
+from app.live.sorting.world import LiveSortingWorld
 from app.sim.cells.cell import lacks_for_pick, load_cell
 from app.sim.robot.kernels import kinematics
 from app.sim.scene.scene import arm_of
@@ -25,12 +25,12 @@ def test_shipped_sorting_cells_can_be_shown_live(name: str) -> None:
     assert lacks_for_sorting(cell) is None
     assert lacks_for_live(cell) is None
     assert len(command_checks.tests_of(cell)) == 6
-    assert isinstance(new_world(cell, None, 1), SortingWorld)
+    assert isinstance(new_world(cell, None, 1), LiveSortingWorld)
 
 
 def test_other_cells_are_shown_by_their_own_world() -> None:
     cell = load_cell()
-    assert isinstance(new_world(cell, None, 1), PickWorld)
+    assert isinstance(new_world(cell, None, 1), LivePickWorld)
     assert command_checks.tests_of(cell) == ()
     assert "clutter" in (lacks_for_sorting(cell) or "")
 

@@ -68,7 +68,7 @@ def test_commands_are_carried_out_in_order(live: LiveCell) -> None:
 
 
 def test_snapshot_says_which_commands_it_shows(live: LiveCell) -> None:
-    live.handle.submit(commands.Pause())
+    live.handle.submit(commands.PauseClock())
     numbers = [live.handle.submit(commands.ToggleCandidate(id="cube3")) for _ in range(3)]
     assert numbers == list(range(numbers[0], numbers[0] + 3))
     before = live.handle.snapshot().selected
@@ -76,7 +76,7 @@ def test_snapshot_says_which_commands_it_shows(live: LiveCell) -> None:
     assert ("cube3" in live.handle.snapshot().selected) != ("cube3" in before)
     with pytest.raises(InvalidInput):
         live.handle.submit(commands.RemovePerson(person=3))
-    assert live.handle.submit(commands.Resume()) == numbers[-1] + 1
+    assert live.handle.submit(commands.ResumeClock()) == numbers[-1] + 1
     wait_for(lambda: live.handle.snapshot().commands == numbers[-1] + 1)
     assert live.handle.snapshot().refused is None
 

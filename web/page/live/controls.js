@@ -1,4 +1,4 @@
-// What a visitor can do to the cell: the people, the clock, the goals, the cases.
+// Controls of the cell: people, clock, goals, scenarios.
 import { html } from "../vendor/htm-preact-standalone.module.js";
 import { Icon } from "../icons.js";
 import { People } from "./people.js";
@@ -31,17 +31,17 @@ export function Controls({ world, cell, cases, send, colourOf, labelOf }) {
     </${People}>
     ${world.reach ? html`<${ReachControls} world=${world} send=${send} />`
       : world.sorting
-      ? html`<${Presets} label="Tests" items=${cell?.sorting_tests ?? []} tag="start-test"
+      ? html`<${Presets} label="Benchmark tasks" items=${cell?.sorting_tests ?? []} tag="start-test"
           running=${world.sorting.test} send=${send}
-          hint="Six tests of the study: the cell is laid out again and the robot sorts." />`
+          hint="Six sorting tests of the thesis: the cell is set up and the robot sorts." />`
       : html`<div class="dock-row">
           <span class="dock-label" id="goals-label">Goals</span>
           <${Goals} world=${world} cell=${cell} send=${send} colourOf=${colourOf}
             labelOf=${labelOf} />
         </div>
-        ${cases.length > 0 && html`<${Presets} label="Cases" items=${cases} tag="start-case"
+        ${cases.length > 0 && html`<${Presets} label="Scenarios" items=${cases} tag="start-case"
           running=${world.case} send=${send}
-          hint="Four situations of the study: the person reaches in, the robot picks the better goal." />`}`}
+          hint="Four case studies of thesis table 5.3: the person reaches in, the robot selects the better goal." />`}`}
   </section>`;
 }
 

@@ -62,13 +62,13 @@ export class History {
     return [x, ...ids.map((id) => this.samples.map((s) => s.values.get(id) ?? null))];
   }
 
-  /** Where another goal was chosen than before; `mind` where the old one was still to be had. */
+  /** Target switches; `open` where the previous target was still a candidate. */
   switches() {
     let last = null;
     return this.samples.flatMap(({ chosen, values }, i) => {
       const before = last;
       last = chosen ?? last;
-      return before && chosen && before !== chosen ? [{ i, mind: values.has(before) }] : [];
+      return before && chosen && before !== chosen ? [{ i, open: values.has(before) }] : [];
     });
   }
 

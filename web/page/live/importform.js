@@ -68,7 +68,7 @@ export function ImportForm({ onDone }) {
     ${answer.problem && html`<p class="field-error" role="alert" data-role="import-error">
       ${answer.problem.message}</p>`}
     ${answer.motion && html`<p class="result" role="status" data-role="import-result">
-      ${told(answer.motion)}</p>`}
+      ${summary(answer.motion)}</p>`}
   </form>`;
 }
 
@@ -80,7 +80,7 @@ function cutOut(artifacts) {
 }
 
 /** How a file was read, in sentences. */
-function told({ name, reading, n_runs: runs, n_artifacts: n, artifacts }) {
+function summary({ name, reading, n_runs: runs, n_artifacts: n, artifacts }) {
   if (!reading) return `${name} is stored already; an older version read it.`;
   const parts = [
     `${reading.unit}, ${reading.up} up`,

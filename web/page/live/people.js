@@ -6,14 +6,14 @@ import * as format from "../format.js";
 import { Icon } from "../icons.js";
 import { ImportForm } from "./importform.js";
 import { VESTS } from "../palette.js";
-import { WalkerMover } from "./walkers.js";
+import { PedestrianControls } from "./walkers.js";
 
 const MAX_PEOPLE = 4;
 const MODES = [
-  ["manual", "By hand", "You drag the handles in the scene", "hand"],
+  ["manual", "Manual", "You drag the handles in the scene", "hand"],
   ["auto", "Work cycle", "Reaches for cubes and docks, on and on", "walk"],
   ["recorded", "Recording", "Moves as somebody was recorded", "film"],
-  ["still", "Stands", "Goes home and rests", "stand"],
+  ["still", "Idle", "Goes home and rests", "stand"],
 ];
 const SLIDERS = [
   ["stature", "Stature", (body) => metres(body.stature_m)],
@@ -50,7 +50,7 @@ export function People({ world, send, children }) {
     </div>
     ${!person && html`<div class="dock-row"><span class="dock-label"></span>
       <p class="dock-hint">Nobody is in the cell.</p></div>`}
-    ${person?.cylinder && html`<${WalkerMover} key=${person.id} person=${person}
+    ${person?.cylinder && html`<${PedestrianControls} key=${person.id} person=${person}
       name=${nameOf(person.id)} world=${world} send=${send} />`}
     ${person && !person.cylinder && html`<${MotionSource} key=${person.id} person=${person} send=${send}
       sized=${sized} onSized=${() => setSized(!sized)} />`}
@@ -74,7 +74,7 @@ function MotionSource({ person, send, sized, onSized }) {
     else refresh();
   };
   return html`<div class="dock-row">
-      <span class="dock-label" id="mode-label">Moved by</span>
+      <span class="dock-label" id="mode-label">Motion source</span>
       <${Segmented} labelledby="mode-label" value=${open && !playing ? "recorded" : mode}
         items=${MODES} onPick=${pick} mark=${(one) => ({ "data-mode": one })} />
       ${mode === "manual" && !open && html`<p class="dock-hint">Drag the handles in the scene.</p>`}
@@ -129,7 +129,7 @@ function Progress({ person, motion }) {
       `${percent(motion.outside_share)} of the path leaves the walking area.`,
     motion.clipped_share > 0.001 &&
       `${percent(motion.clipped_share)} of the frames bend a joint beyond the model's limit; the
-      policy is told the limit, with a wrist up to ${format.distance(motion.clipped_m)} off.`,
+      policy observes the limit, with a wrist up to ${format.distance(motion.clipped_m)} off.`,
   ].filter(Boolean);
   return html`<span class="played"><i style=${{ transform: `scaleX(${share})` }}></i></span>
     <span class="played-text" data-role="progress">${person.joining

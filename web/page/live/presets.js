@@ -1,10 +1,10 @@
-// A row of situations to start with one click; what happens in one is told when it is pointed at.
+// A row of scenarios that start with one click; the description of one is shown on hover.
 import { html, useState } from "../vendor/htm-preact-standalone.module.js";
 
 /** `items` with id, title and text; `tag` is the command that starts one. */
 export function Presets({ label, hint, items, running, tag, send }) {
   const [pointed, setPointed] = useState(null);
-  const told = items.find((one) => one.id === (pointed ?? running));
+  const shown = items.find((one) => one.id === (pointed ?? running));
   const point = (id) => ({
     onMouseEnter: () => setPointed(id),
     onMouseLeave: () => setPointed(null),
@@ -20,7 +20,7 @@ export function Presets({ label, hint, items, running, tag, send }) {
           data-case=${one.id} ...${point(one.id)} onClick=${() => send({ tag, id: one.id })}>
           <b>${i + 1}</b><span>${one.title}</span></button>`)}
       </div>
-      <p class="case-text">${told ? told.text : hint}</p>
+      <p class="case-text">${shown ? shown.text : hint}</p>
     </div>
   </div>`;
 }

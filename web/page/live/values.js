@@ -1,9 +1,9 @@
-// What the critic expects from each candidate: bars, explained on hover, and a running plot.
+// Value estimates of the candidates: bars with explanations, and a plot over time.
 import { html, useMemo, useState } from "../vendor/htm-preact-standalone.module.js";
 import * as format from "../format.js";
 import { SPAN_S } from "./history.js";
 import { ValuePlot } from "../plots.js";
-import { outsideText } from "./story.js";
+import { outsideText } from "./status.js";
 
 export function Values({ world, cell, history, colourOf, labelOf }) {
   const [at, setAt] = useState(null);
@@ -16,13 +16,13 @@ export function Values({ world, cell, history, colourOf, labelOf }) {
   const past = history.samples[at] ?? null;
   return html`<section class="card" aria-labelledby="values-title">
     <header class="card-head">
-      <h2 id="values-title">What each goal is worth${Number.isFinite(world.decided_s)
+      <h2 id="values-title">Value estimates${Number.isFinite(world.decided_s)
         && html`, <span class="decided" data-role="decided">at ${world.decided_s.toFixed(1)} s</span>`}</h2>
-      <span class="hint" tabindex="0" aria-describedby="values-help">critic’s value
-        <span class="tip tip-left" role="tooltip" id="values-help">The trained critic estimates, for
-          each candidate, the discounted reward the robot can expect if it goes there now: reaching
-          counts, delay and contact cost. The highest one is chosen; a small bonus for the current
-          choice keeps it from wavering.</span>
+      <span class="hint" tabindex="0" aria-describedby="values-help">Q(s, π(s))
+        <span class="tip tip-left" role="tooltip" id="values-help">The critic estimates the expected
+          discounted reward of moving to each candidate now: reaching it is rewarded, delay and
+          contact cost. The highest value is chosen; a small bonus for the present target prevents
+          oscillation.</span>
       </span>
     </header>
     ${rows.length === 0
@@ -36,7 +36,7 @@ export function Values({ world, cell, history, colourOf, labelOf }) {
       <span>last ${SPAN_S} s</span>
       <span class="readout" aria-hidden="true">${past
         ? html`<${Readout} past=${past} age=${history.age(at)} labelOf=${labelOf} />`
-        : html`<span class="faint"><i class="switch-mark"></i>change of mind</span>`}</span>
+        : html`<span class="faint"><i class="switch-mark"></i>target switch</span>`}</span>
     </div>
     <${ValuePlot} history=${history} ids=${ids} labelOf=${labelOf} colourOf=${colourOf}
       chosen=${world.chosen} onHover=${setAt} />
@@ -84,24 +84,24 @@ function rankOf({ value }, rows) {
 function note(isChosen, reachable, outside) {
   if (isChosen) return html`<b class="tag tag-chosen">chosen</b>`;
   if (reachable === false) return html`<b class="tag tag-warn">out of reach</b>`;
-  if (outside.length) return html`<b class="tag tag-warn">untrained</b>`;
+  if (outside.length) return html`<b class="tag tag-warn">out of distribution</b>`;
   return "";
 }
 
 function explain({ id, value, reachable, outside = [] }, chosen, label) {
   const parts = [];
   if (Number.isFinite(value)) {
-    parts.push(`Expected discounted reward if the robot goes for ${label} now: ` +
+    parts.push(`Expected discounted reward of moving to ${label} now: ` +
       `${format.value(value)}.`);
     if (chosen && chosen.id !== id && Number.isFinite(chosen.value)) {
       const gap = value - chosen.value;
       parts.push(gap < 0
         ? `${format.value(-gap)} less than the chosen one.`
-        : `${format.value(gap)} more than the chosen one: not enough to change course yet.`);
-    } else if (chosen?.id === id) parts.push("The robot is going there.");
+        : `${format.value(gap)} more than the chosen one: not enough to switch yet.`);
+    } else if (chosen?.id === id) parts.push("It is the present target.");
   } else parts.push(`No value for ${label} yet.`);
-  if (reachable === false) parts.push("No posture with the tool pointing down reaches it.");
-  for (const o of outside) parts.push(`Outside training: ${outsideText(o).join(" ")}.`);
+  if (reachable === false) parts.push("No configuration with the tool pointing down reaches it.");
+  for (const o of outside) parts.push(`Out of distribution: ${outsideText(o).join(" ")}.`);
   return parts.join(" ");
 }
 

@@ -1,4 +1,4 @@
-// A reach cell as the page shows it: what the robot does, how fast it may go and why, outcomes.
+// Panel of a reach cell: status, speed and separation monitoring, outcomes.
 import { html, useRef } from "../vendor/htm-preact-standalone.module.js";
 import * as format from "../format.js";
 import { Icon } from "../icons.js";
@@ -6,7 +6,7 @@ import { overrideColour } from "../palette.js";
 import { nameOf } from "../live/people.js";
 import { OverridePlot, SeparationPlot } from "./reachplots.js";
 import { SAFETY_SPAN_S, SafetyHistory } from "./safetyhistory.js";
-import { Story } from "../live/story.js";
+import { StatusPanel } from "../live/status.js";
 
 const SLOW = 0.995;
 const ARC = 2 * Math.PI * 40 * 0.75;
@@ -16,10 +16,10 @@ const LINKS = { base_link: "base", shoulder_link: "shoulder", upper_arm_link: "u
 export function ReachDecision({ world }) {
   const history = useRef(new SafetyHistory()).current;
   history.add(world);
-  return html`<${Story} world=${world} chip=${chip(world)} />
-    ${!world.checkpoint && html`<div class="notice warn" data-role="no-pilot"><${Icon} name="alert" />
-      <span>No trained policy acts here. The robot goes straight to the goal and does not see
-        people; only the safety layer does. Train <b>reach-td3</b> under Training, or choose a
+  return html`<${StatusPanel} world=${world} chip=${chip(world)} />
+    ${!world.checkpoint && html`<div class="notice warn" data-role="no-policy"><${Icon} name="alert" />
+      <span>No reach policy is active. The robot moves straight to the goal without avoiding
+        people; only the safety layer slows it down. Train <b>reach-td3</b> under Training, or choose a
         checkpoint above.</span></div>`}
     <${Safety} world=${world} history=${history} />
     <${Outcomes} world=${world} />`;
@@ -37,15 +37,14 @@ function Safety({ world, history }) {
   const { safety } = world.reach;
   return html`<section class="card" aria-labelledby="safety-title">
     <header class="card-head">
-      <h2 id="safety-title">How fast it may go</h2>
-      <span class="hint" tabindex="0" aria-describedby="safety-help">speed and separation
+      <h2 id="safety-title">Speed and separation monitoring</h2>
+      <span class="hint" tabindex="0" aria-describedby="safety-help">ISO 10218-2
         <span class="tip tip-left" role="tooltip" id="safety-help">The robot must be able to stop
-          before a person ${safety.use_measured_velocity ? "who goes on as seen, or up to" : "walking at"}
-          ${safety.human_speed.toFixed(1)} m/s${safety.use_measured_velocity ? " faster," : ""} could reach it. The layer
-          looks at the very path ahead; the sum S_p is the standard’s bound for it, so near the
-          limit the two differ a little, and a robot that moves away may be faster. S_p adds what
-          the person and the robot may cover until it rests, and a distance to keep free.
-          Not a certified safety function.</span>
+          before a person ${safety.use_measured_velocity ? "at the measured velocity plus" : "walking at"}
+          ${safety.human_speed.toFixed(1)} m/s can reach it. The layer checks the path ahead; S_p is the
+          bound of the standard, so near the limit the two differ slightly, and a robot that moves
+          away may be faster. S_p is the sum of the distances that person and robot cover until
+          the robot has stopped, and of the margins. Not a certified safety function.</span>
       </span>
     </header>
     <div class="safety">
@@ -53,10 +52,10 @@ function Safety({ world, history }) {
       <${Terms} safety=${safety} people=${world.people ?? []} />
     </div>
     <div class="plot-head"><span>Override, last ${SAFETY_SPAN_S} s</span>
-      ${!safety.on && html`<span class="faint"><i class="dash-mark"></i>what the layer would set</span>`}
+      ${!safety.on && html`<span class="faint"><i class="dashed-mark"></i>override of the layer</span>`}
     </div>
     <${OverridePlot} history=${history} on=${safety.on} />
-    <div class="plot-head"><span>Distance to the nearest person, and what is needed</span></div>
+    <div class="plot-head"><span>Separation distance and S<sub>p</sub></span></div>
     <${SeparationPlot} history=${history} />
   </section>`;
 }
@@ -74,26 +73,26 @@ function Gauge({ safety }) {
         stroke-dasharray=${`${ARC * override} 400`} />`}
     </svg>
     <b>${percent}<small> %</small></b>
-    <span>${on ? "of its speed" : `layer off, would be ${Math.round(advised * 100)} %`}</span>
+    <span>${on ? "speed override" : `disabled, would be ${Math.round(advised * 100)} %`}</span>
   </div>`;
 }
 
 function Terms({ safety, people }) {
   const { person, link, separation, required, person_distance: person_m, robot_distance: robot_m, margin } = safety;
   if (person === null) {
-    return html`<p class="empty">Nobody is in the cell. Add a person below the scene.</p>`;
+    return html`<p class="empty">No person in the cell. Add a person below the scene.</p>`;
   }
-  const whom = people.length > 1 ? nameOf(person) : "Person";
+  const subject = people.length > 1 ? nameOf(person) : "Person";
   const rows = [
     ["person", "human contribution Sh", person_m],
     ["robot", "robot reaction and stopping Sr + Ss", robot_m],
-    ["margin", "to keep free", margin],
+    ["margin", "margins C + Z", margin],
   ];
   return html`<dl class="terms">
     <div class=${separation < required ? "terms-top is-short" : "terms-top"}>
-      <dt>${whom} to ${LINKS[link] ?? "robot"}</dt>
+      <dt>${subject} to ${LINKS[link] ?? "robot"}</dt>
       <dd data-role="separation">${format.gap(separation)}</dd></div>
-    <div class="terms-top"><dt>Needed, S<sub>p</sub></dt><dd data-role="required">${metres(required)}</dd></div>
+    <div class="terms-top"><dt>Protective separation distance S<sub>p</sub></dt><dd data-role="required">${metres(required)}</dd></div>
     ${rows.map(([key, label, value]) => html`<div key=${key}><dt><i class=${`term term-${key}`}></i>${label}</dt>
       <dd>${metres(value)}</dd></div>`)}
   </dl>`;
@@ -106,8 +105,8 @@ function Outcomes({ world }) {
   const tiles = [
     ["reached", "Reached", counters.reached],
     ["contacts", "Contacts", counters.contacts],
-    ["touched", "Walked into it", more.touched],
-    ["timeouts", "Out of time", counters.timeouts],
+    ["touched", "Contact at standstill", more.touched],
+    ["timeouts", "Timed out", counters.timeouts],
   ];
   const share = (seconds) => (more.moving_s > 0 ? format.percent(seconds / more.moving_s, 0) : "–");
   return html`<section class="card small-print" aria-label="Outcomes and provenance">
@@ -121,8 +120,8 @@ function Outcomes({ world }) {
       <div><dt>Below half speed</dt><dd>${share(more.slowed_s)}</dd></div>
       <div><dt>Stopped</dt><dd>${share(more.stopped_s)}</dd></div>
     </dl>
-    <p class="range"><${Icon} name="alert" /><span>“Walked into it”: somebody met the robot while it
-      stood still. People here do not look where they go.</span></p>
+    <p class="range"><${Icon} name="alert" /><span>Contact at standstill: a person touched the robot
+      while it stood still. People in this cell do not avoid the robot.</span></p>
     ${world.checkpoint && html`<p class="provenance">Decided in
       ${` ${format.number(world.elapsed_ms, 2)} ms by checkpoint `}
       <code title=${world.checkpoint}>${format.short(world.checkpoint)}</code></p>`}

@@ -1,28 +1,28 @@
-// What a visitor can do to a reach cell besides people and clock: goal, safety layer, policy.
+// Controls of a reach cell: goal, safety layer, inference mode.
 import { html } from "../vendor/htm-preact-standalone.module.js";
 import { Segmented } from "../choice.js";
 import { Icon } from "../icons.js";
 
 const GOAL_MODES = [
-  ["jump", "Jumps on", "As soon as it is reached there is another one"],
-  ["follow", "Follows me", "It stays where you drag it: take the arrows in the scene"],
+  ["jump", "New target when reached", "A reached goal is replaced by a random one"],
+  ["follow", "Manual target", "The goal stays where you drag it with the arrows in the scene"],
 ];
 const SAFETY = [
-  ["assumed", "Worst case", "The robot obeys the safety layer: anybody may come from anywhere at the assumed speed"],
-  ["measured", "As seen", "The layer goes by the velocities that people are seen with, and the policy keeps clear of it"],
-  ["off", "Off", "See what happens without"],
+  ["assumed", "Assumed speed", "The safety layer assumes a walking speed in every direction"],
+  ["measured", "Measured velocity", "The safety layer uses the measured velocities of people; the rollout takes it into account"],
+  ["off", "Disabled", "The robot moves without a safety layer"],
 ];
 const BETWEEN = [
-  [true, "On", "The policy is asked about the targets around the goal, and their mean is taken"],
-  [false, "Off", "The policy is asked about this very goal"],
+  [true, "On", "Actions for the training targets around the goal are interpolated"],
+  [false, "Off", "The policy is queried for the goal itself"],
 ];
 const BESIDE = [
-  [false, "the nearest", "The policy sees the nearest person"],
-  [true, "everyone", "The policy is asked beside each person alone; the nearer one counts more"],
+  [false, "Nearest person", "The observation contains the nearest person"],
+  [true, "All people", "One action per person, weighted by inverse distance"],
 ];
 const AHEAD = [
-  [true, "On", "Each decision is played ahead for a second, and changed where that ends in a contact"],
-  [false, "Off", "The policy's action is taken as it is"],
+  [true, "On", "Each decision is simulated for 1 s; on a predicted contact an alternative is executed"],
+  [false, "Off", "The action of the policy is executed unchanged"],
 ];
 
 export function ReachControls({ world, send }) {
@@ -38,17 +38,17 @@ export function ReachControls({ world, send }) {
     <span class="dock-label" id="goal-label">Goal</span>
     <${Segmented} labelledby="goal-label" mark=${marked("goal-mode")} value=${mode} items=${GOAL_MODES}
       onPick=${(one) => send({ tag: "set-goal-mode", mode: one })} />
-    <button type="button" class="tool" data-action="new-goal" title="Draw another goal"
-      onClick=${() => send({ tag: "new-goal" })}><${Icon} name="reset" />New goal</button>
+    <button type="button" class="tool" data-action="new-goal" title="Draw a random goal"
+      onClick=${() => send({ tag: "new-goal" })}><${Icon} name="reset" />Random target</button>
     <span class="dock-pair"><span class="dock-label dock-label-free" id="layer-label">Safety layer</span>
       <${Segmented} labelledby="layer-label" mark=${marked("safety")} value=${layerOf(safety)} items=${SAFETY}
         onPick=${(one) => send({ tag: "set-safety", on: one !== "off", ...(one !== "off" && { use_measured_velocity: one === "measured" }) })} /></span>
     ${modes.includes("interpolated") && html`<span class="dock-pair">
-      <span class="dock-label dock-label-free" id="between-label">Interpolation</span>
+      <span class="dock-label dock-label-free" id="between-label">Target interpolation</span>
       <${Segmented} labelledby="between-label" mark=${marked("between")} value=${between} items=${BETWEEN}
         onPick=${(one) => ask(averaged, one, ahead)} /></span>`}
     ${modes.includes("direct-rollout") && html`<span class="dock-pair">
-      <span class="dock-label dock-label-free" id="ahead-label">Look ahead</span>
+      <span class="dock-label dock-label-free" id="ahead-label">Rollout check (1 s)</span>
       <${Segmented} labelledby="ahead-label" mark=${marked("ahead")} value=${ahead} items=${AHEAD}
         onPick=${(one) => ask(averaged, between, one)} /></span>`}
     ${modes.includes("averaged") && world.people.length > 1 && html`<span class="dock-pair">

@@ -1,7 +1,7 @@
 // The blocks that are there: a plan of the clutter on its failure map, from which blocks are
 // picked to be moved or taken away, and a shelf from which more are added.
 import { html } from "../vendor/htm-preact-standalone.module.js";
-import { Block, capital, kindOf, nameOf, placeName, plural } from "./blockshape.js";
+import { Block, capital, kindOf, nameOf, placeName, plural } from "./block-icon.js";
 import { failureColours, failureGradient } from "../palette.js";
 
 export function Blocks({ sorting, cell, send, picked, onPick }) {
@@ -20,7 +20,7 @@ export function Blocks({ sorting, cell, send, picked, onPick }) {
       ? html`<${Picked} key=${piece.id} piece=${piece} cells=${cells} cell=${cell}
           sorting=${sorting} send=${send} onPick=${onPick} />`
       : html`<${Shelf} sorting=${sorting} at=${at} cells=${cells} send=${send} />`}
-    ${held && html`<p class="faint" data-role="held">The ${nameOf(held)} hangs at the magnet.</p>`}
+    ${held && html`<p class="faint" data-role="held">The ${nameOf(held)} is held by the gripper.</p>`}
   </section>`;
 }
 
@@ -54,7 +54,7 @@ function Legend({ failure }) {
   return html`<p class="map-legend"><span>Grasps fail: never</span>
     <i style=${{ background: failureGradient(most) }}></i>
     <span>${Math.round(100 * most)} %</span><span class="spacer"></span>
-    <span>robot’s side below</span></p>`;
+    <span>robot at bottom</span></p>`;
 }
 
 /** What can be done with the block that was picked. */

@@ -1,7 +1,7 @@
 // The goal, tower by tower: what stands there now beside what shall stand there. Blocks are
 // clicked in from below and out of the tower; the largest always lies at the bottom.
 import { html, useEffect, useRef, useState } from "../vendor/htm-preact-standalone.module.js";
-import { Block, capital, kindOf, nameOf, plural } from "./blockshape.js";
+import { Block, capital, kindOf, nameOf, plural } from "./block-icon.js";
 import * as format from "../format.js";
 
 const SETTLE_MS = 2000;
@@ -94,9 +94,9 @@ function Offer({ colour, size, sizes, sorting, asked, onAdd }) {
 function useGoal(sorting, send) {
   const [draft, setDraft] = useState(null);
   const timer = useRef(0);
-  const told = {};
-  for (const one of sorting.goal) (told[one.tower] ??= [])[one.level] = one.size;
-  const agrees = draft !== null && written(draft) === written(told);
+  const known = {};
+  for (const one of sorting.goal) (known[one.tower] ??= [])[one.level] = one.size;
+  const agrees = draft !== null && written(draft) === written(known);
   useEffect(() => {
     if (agrees) setDraft(null);
   }, [agrees]);
@@ -108,7 +108,7 @@ function useGoal(sorting, send) {
     timer.current = setTimeout(() => setDraft(null), SETTLE_MS);
     send({ tag: "set-goal", towers: asked });
   };
-  return [draft ?? told, change];
+  return [draft ?? known, change];
 }
 
 function written(towers) {

@@ -1,15 +1,15 @@
-// The sorting task as the page shows it: what the robot does, the goal, the blocks, the moves.
+// Panel of a sorting cell: status, goal, blocks, ranking of moves.
 import { html, useEffect, useState } from "../vendor/htm-preact-standalone.module.js";
 import { Blocks } from "./blocks.js";
 import { GoalEditor } from "./goaleditor.js";
-import { Moves, SortingSmallPrint } from "./moves.js";
-import { Story } from "../live/story.js";
+import { Moves, SortingSmallPrint } from "./ranking.js";
+import { StatusPanel } from "../live/status.js";
 
 const PHASES = {
-  approach: ["On its way", "accent"],
+  approach: ["Moving to target", "accent"],
   grasp: ["Grasping", "accent"],
   carry: ["Carrying", "accent"],
-  place: ["Putting down", "accent"],
+  place: ["Placing", "accent"],
 };
 
 export function SortingDecision({ world, cell, send, checkpoints, jobs }) {
@@ -22,7 +22,7 @@ export function SortingDecision({ world, cell, send, checkpoints, jobs }) {
   }, [there]);
   const pick = (id) => setPicked(id === picked ? null : id);
   const shared = { sorting, cell, send, picked, onPick: pick };
-  return html`<${Story} world=${world} chip=${chip(world)} />
+  return html`<${StatusPanel} world=${world} chip=${chip(world)} />
     <${GoalEditor} ...${shared} />
     <${Blocks} ...${shared} />
     <${Moves} sorting=${sorting} cell=${cell} />

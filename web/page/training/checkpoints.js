@@ -1,4 +1,4 @@
-// Which checkpoint acts in the cell, and which one chooses the moves where blocks are sorted.
+// Active policy of the cell, and task planner of a sorting cell.
 import { html, useCallback, useEffect, useState } from "../vendor/htm-preact-standalone.module.js";
 import { get } from "../api.js";
 import * as format from "../format.js";
@@ -25,11 +25,11 @@ export function Acting({ world, checkpoints, jobs, send }) {
   const groups = grouped(checkpoints.list.filter((c) => c.purpose === purpose), jobs, now);
   const known = groups.some((g) => g.items.some((c) => c.sha256 === now));
   return html`<label class="acting">
-    <span>Acting</span>
-    <select value=${now ?? ""} data-role="acting" aria-label="Checkpoint that acts in the cell"
+    <span>Active policy</span>
+    <select value=${now ?? ""} data-role="acting" aria-label="Checkpoint of the active policy"
       onFocus=${checkpoints.refresh} title=${world.policy_title ?? ""}
       onChange=${(e) => send({ tag: "set-policy", checkpoint: e.target.value || null })}>
-      ${world.reach && html`<option value="">straight to the goal</option>`}
+      ${world.reach && html`<option value="">none: straight to the goal</option>`}
       ${!now && !world.reach && html`<option value="" disabled>no policy</option>`}
       ${now && !known && html`<option value=${now}>${world.policy_title ?? format.short(now)}</option>`}
       ${groups.map((group) => html`<optgroup key=${group.label} label=${group.label}>
@@ -40,7 +40,7 @@ export function Acting({ world, checkpoints, jobs, send }) {
 }
 
 /** Task planner: a sorting policy trained for this cell, or the exact planner. */
-export function Sorter({ sorting, cell, checkpoints, jobs, send }) {
+export function TaskPlanner({ sorting, cell, checkpoints, jobs, send }) {
   const now = sorting.sorting_policy;
   const mine = checkpoints.list.filter((c) => c.purpose === SORTING && c.manifest.cell === cell.name);
   const groups = grouped(mine, jobs, now);

@@ -164,8 +164,8 @@ function Act({ job, newest, acting, onAct }) {
   const acts = loaded && acting.includes(loaded.sha256);
   return html`<button type="button" class="tool" data-action="act"
       disabled=${acting.includes(newest) && !isActive(job)} onClick=${act}>
-      ${acts && isActive(job) ? "Load its newest checkpoint" : "Let it act in the cell"}</button>
-    ${acts && html`<span class="faint" role="status" data-role="acts">Acts in the cell, with
+      ${acts && isActive(job) ? "Load its newest checkpoint" : "Deploy to cell"}</button>
+    ${acts && html`<span class="faint" role="status" data-role="acts">Deployed, with
       ${` ${format.steps(loaded.step)} `}steps.</span>`}
     ${error && html`<span class="field-error" role="alert">${error.message}</span>`}`;
 }
@@ -205,7 +205,7 @@ function Evaluation({ job, onChanged }) {
 
 function Legend({ lines, row, show }) {
   return html`<p class="legend">${lines.map((l) => html`<span key=${l.key}>
-    <i class=${`dash ${l.colour}`}></i>${l.label}<b>${show(row?.[l.key])}</b></span>`)}</p>`;
+    <i class=${`line-mark ${l.colour}`}></i>${l.label}<b>${show(row?.[l.key])}</b></span>`)}</p>`;
 }
 
 function Speed({ job, row }) {

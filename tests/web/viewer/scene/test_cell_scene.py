@@ -6,7 +6,7 @@ import viser
 
 from app.live import commands
 from app.live.command_checks import Command
-from app.live.pick.world import PickWorld
+from app.live.pick.world import LivePickWorld
 from app.sim.cells.cell import Cell, load_cell
 from app.sim.human import model as human
 from app.sim.robot.ur10 import LINK_NAMES, Robot
@@ -41,8 +41,8 @@ def scene(server: viser.ViserServer, cell: Cell, queued: list[Command]) -> CellS
 
 
 @pytest.fixture
-def world(cell: Cell) -> PickWorld:
-    return PickWorld(cell, StraightPolicy(cell), seed=2)
+def world(cell: Cell) -> LivePickWorld:
+    return LivePickWorld(cell, StraightPolicy(cell), seed=2)
 
 
 def node(server: viser.ViserServer, name: str) -> viser.SceneNodeHandle:
@@ -52,7 +52,7 @@ def node(server: viser.ViserServer, name: str) -> viser.SceneNodeHandle:
 
 
 def test_links_are_placed_where_pinocchio_says(
-    scene: CellScene, server: viser.ViserServer, world: PickWorld, cell: Cell
+    scene: CellScene, server: viser.ViserServer, world: LivePickWorld, cell: Cell
 ) -> None:
     for _ in range(20):
         world.step()
@@ -64,7 +64,7 @@ def test_links_are_placed_where_pinocchio_says(
 
 
 def test_chosen_station_is_ringed_and_goals_have_their_own_colours(
-    scene: CellScene, server: viser.ViserServer, world: PickWorld, cell: Cell
+    scene: CellScene, server: viser.ViserServer, world: LivePickWorld, cell: Cell
 ) -> None:
     world.apply(commands.SetCandidates(ids=("cube0", "cube4")))
     snapshot = world.snapshot()
@@ -84,7 +84,7 @@ def test_chosen_station_is_ringed_and_goals_have_their_own_colours(
 
 
 def test_gizmos_are_seen_in_manual_mode_only_and_sit_on_the_hands(
-    scene: CellScene, server: viser.ViserServer, world: PickWorld, cell: Cell
+    scene: CellScene, server: viser.ViserServer, world: LivePickWorld, cell: Cell
 ) -> None:
     scene.draw(world.snapshot(), 0.05)
     assert not node(server, "/gizmos/0/right").visible
@@ -96,7 +96,7 @@ def test_gizmos_are_seen_in_manual_mode_only_and_sit_on_the_hands(
 
 
 def test_contact_shows_what_touched_in_red(
-    scene: CellScene, server: viser.ViserServer, world: PickWorld, cell: Cell
+    scene: CellScene, server: viser.ViserServer, world: LivePickWorld, cell: Cell
 ) -> None:
     world.apply(commands.SetCandidates(ids=("cube2",)))
     world.apply(commands.MovePerson(pelvis=(0.0, 1.15, -1.57), right=(-0.1, 0.62, 0.2)))
@@ -120,7 +120,7 @@ def test_contact_shows_what_touched_in_red(
 
 
 def test_collision_shapes_lie_over_the_person_when_asked_for(
-    scene: CellScene, server: viser.ViserServer, world: PickWorld, cell: Cell
+    scene: CellScene, server: viser.ViserServer, world: LivePickWorld, cell: Cell
 ) -> None:
     snapshot = world.snapshot()
     scene.draw(snapshot, 0.05, shapes=True)
@@ -141,7 +141,7 @@ def test_path_runs_from_the_tool_to_the_target() -> None:
 
 
 def test_two_people_are_drawn_and_one_who_leaves_is_taken_out(
-    scene: CellScene, server: viser.ViserServer, world: PickWorld
+    scene: CellScene, server: viser.ViserServer, world: LivePickWorld
 ) -> None:
     world.apply(commands.AddPerson())
     world.apply(commands.SetMode(mode="manual", person=1))
@@ -157,7 +157,7 @@ def test_two_people_are_drawn_and_one_who_leaves_is_taken_out(
 
 
 def test_mannequin_and_capsules_grow_with_the_person(
-    scene: CellScene, server: viser.ViserServer, world: PickWorld
+    scene: CellScene, server: viser.ViserServer, world: LivePickWorld
 ) -> None:
     scene.draw(world.snapshot(), 0.05)
     before = np.ptp(node(server, "/people/0/head").vertices[:, 2])

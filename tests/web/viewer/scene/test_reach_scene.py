@@ -10,7 +10,7 @@ import viser
 from app.live import commands
 from app.live.command_checks import Command
 from app.live.reach.commands import MoveGoal, SetSafety, goal_box
-from app.live.reach.world import ReachWorld
+from app.live.reach.world import LiveReachWorld
 from app.live.snapshot import WorldSnapshot
 from app.sim.cells.cell import load_cell
 from tests.web.viewer_client import ViewerClient
@@ -42,8 +42,8 @@ def scene(server: viser.ViserServer, queued: list[Command]) -> CellScene:
 
 
 @pytest.fixture
-def world() -> ReachWorld:
-    return ReachWorld(CELL, None, seed=3)
+def world() -> LiveReachWorld:
+    return LiveReachWorld(CELL, None, seed=3)
 
 
 def node(server: viser.ViserServer, name: str) -> Any:
@@ -60,7 +60,7 @@ def slowed(snapshot: WorldSnapshot, override: float) -> WorldSnapshot:
 
 
 def test_cylinder_is_where_the_person_counts_and_as_wide(
-    scene: CellScene, server: viser.ViserServer, world: ReachWorld
+    scene: CellScene, server: viser.ViserServer, world: LiveReachWorld
 ) -> None:
     for _ in range(30):
         world.step()
@@ -75,7 +75,7 @@ def test_cylinder_is_where_the_person_counts_and_as_wide(
 
 
 def test_touched_cylinder_turns_red(
-    scene: CellScene, server: viser.ViserServer, world: ReachWorld
+    scene: CellScene, server: viser.ViserServer, world: LiveReachWorld
 ) -> None:
     now = world.snapshot()
     hit = (replace(now.people[0], clearance_m=-0.01),)
@@ -86,7 +86,7 @@ def test_touched_cylinder_turns_red(
 
 
 def test_people_come_and_leave_with_their_cylinders(
-    scene: CellScene, server: viser.ViserServer, world: ReachWorld
+    scene: CellScene, server: viser.ViserServer, world: LiveReachWorld
 ) -> None:
     world.apply(commands.AddPerson())
     scene.draw(world.snapshot(), 0.02)
@@ -97,7 +97,7 @@ def test_people_come_and_leave_with_their_cylinders(
 
 
 def test_goal_is_drawn_with_its_tolerance_and_the_handle_follows(
-    scene: CellScene, server: viser.ViserServer, world: ReachWorld
+    scene: CellScene, server: viser.ViserServer, world: LiveReachWorld
 ) -> None:
     world.apply(MoveGoal(position=(0.25, 0.7, 0.2)))
     now = world.snapshot()
@@ -108,7 +108,7 @@ def test_goal_is_drawn_with_its_tolerance_and_the_handle_follows(
 
 
 def test_targets_and_goal_region_are_shown(
-    scene: CellScene, server: viser.ViserServer, world: ReachWorld
+    scene: CellScene, server: viser.ViserServer, world: LiveReachWorld
 ) -> None:
     now, (low, high) = world.snapshot(), goal_box(CELL)
     scene.draw(now, 0.02)
@@ -120,7 +120,7 @@ def test_targets_and_goal_region_are_shown(
 
 
 def test_gauge_is_as_full_as_the_override_and_the_zone_has_its_colour(
-    scene: CellScene, server: viser.ViserServer, world: ReachWorld
+    scene: CellScene, server: viser.ViserServer, world: LiveReachWorld
 ) -> None:
     now = slowed(world.snapshot(), 0.4)
     scene.draw(now, 0.02)
@@ -135,7 +135,7 @@ def test_gauge_is_as_full_as_the_override_and_the_zone_has_its_colour(
 
 
 def test_scene_says_that_the_layer_is_off(
-    scene: CellScene, server: viser.ViserServer, world: ReachWorld
+    scene: CellScene, server: viser.ViserServer, world: LiveReachWorld
 ) -> None:
     world.apply(SetSafety(on=False))
     now = slowed(world.snapshot(), 1.0)
@@ -145,7 +145,7 @@ def test_scene_says_that_the_layer_is_off(
 
 
 def test_zone_is_gone_when_nobody_is_there(
-    scene: CellScene, server: viser.ViserServer, world: ReachWorld
+    scene: CellScene, server: viser.ViserServer, world: LiveReachWorld
 ) -> None:
     world.apply(commands.RemovePerson(person=0))
     scene.draw(slowed(world.snapshot(), 1.0), 0.02)
@@ -153,7 +153,7 @@ def test_zone_is_gone_when_nobody_is_there(
 
 
 def test_trail_follows_the_tool(
-    scene: CellScene, server: viser.ViserServer, world: ReachWorld
+    scene: CellScene, server: viser.ViserServer, world: LiveReachWorld
 ) -> None:
     world.apply(commands.RemovePerson(person=0))
     for _ in range(40):

@@ -9,7 +9,7 @@ import viser
 from viser.infra import WebsockServer
 
 from app.live.command_checks import Command
-from app.live.pick.world import PickWorld
+from app.live.pick.world import LivePickWorld
 from app.live.snapshot import WorldSnapshot
 from app.live.sorting.commands import ToggleGoal
 from app.live.sorting.snapshot import HELD, SortingView
@@ -47,7 +47,7 @@ def scene(server: viser.ViserServer, cell: Cell, queued: list[Command]) -> CellS
 
 @pytest.fixture(scope="module")
 def still() -> WorldSnapshot:
-    return PickWorld(load_cell(), None, seed=2).snapshot()
+    return LivePickWorld(load_cell(), None, seed=2).snapshot()
 
 
 def node(server: viser.ViserServer, name: str) -> Any:

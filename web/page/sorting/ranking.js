@@ -1,14 +1,14 @@
 // Sorting moves: the present move, its source (policy or planner), and the ranking.
 import { html } from "../vendor/htm-preact-standalone.module.js";
-import { Block, capital, nameOf, placeName } from "./blockshape.js";
-import { Sorter } from "../training/checkpoints.js";
+import { Block, capital, nameOf, placeName } from "./block-icon.js";
+import { TaskPlanner } from "../training/checkpoints.js";
 import * as format from "../format.js";
 
 const PHASES = {
-  approach: "on the way to it",
+  approach: "moving to it",
   grasp: "grasping",
   carry: "carrying",
-  place: "putting down",
+  place: "placing",
 };
 
 export function Moves({ sorting, cell }) {
@@ -29,30 +29,30 @@ export function Moves({ sorting, cell }) {
             sorting=${sorting} cell=${cell} chosen=${isChosen(one)}
             share=${Number.isFinite(one.value) ? share(one.value) : 0} />`)}
         </ol>`}
-    ${sorting.duplicates.length > 1 && html`<p class="faint duplicates">${sorting.duplicates.length} equal blocks
-      would do; the motion’s critic chose which.</p>`}
+    ${sorting.duplicates.length > 1 && html`<p class="faint duplicates">${sorting.duplicates.length} equivalent blocks;
+      the critic of the pick policy selected one.</p>`}
   </section>`;
 }
 
 function idle(sorting) {
   if (sorting.goal.length === 0) return "Nothing to do: there is no goal.";
-  return sorting.solved ? "Nothing to do: the goal is reached." : "No move is being weighed.";
+  return sorting.solved ? "Nothing to do: the goal is reached." : "No move is evaluated.";
 }
 
 function Decider({ sorting }) {
   const { decided_by: by, phase, sorting_policy: policy, counters } = sorting;
   if (!by) return html`<span class="faint">${policy ? "learned policy" : "exact planner"}</span>`;
   const over = by === "planner" && policy !== null;
-  const text = by === "policy" ? "by the policy" : over ? "handed over to the planner" : "by the planner";
+  const text = by === "policy" ? "by the policy" : over ? "planner fallback" : "by the planner";
   const help = by === "policy"
-    ? "The learned policy valued every move and chose the best."
+    ? "The sorting policy values every move; the best is chosen."
     : over
-      ? "The policy went in a circle or took too long, so the exact planner took over."
+      ? "The policy made no progress: fallback to the exact planner."
       : "No sorting policy is active: the exact planner finds the fewest moves. The value of a move is minus its expected number of grasps.";
   return html`<span class=${over ? "hint is-over" : "hint"} tabindex="0" data-role="decider"
     data-by=${by} aria-describedby="decider-help">${text}${PHASES[phase] ? `, ${PHASES[phase]}` : ""}
     <span class="tip tip-left" role="tooltip" id="decider-help">${help}${counters.planner_fallbacks > 0
-      ? ` It has happened ${counters.planner_fallbacks === 1 ? "once" : `${counters.planner_fallbacks} times`}.`
+      ? ` Fallbacks so far: ${counters.planner_fallbacks}.`
       : ""}</span></span>`;
 }
 
@@ -68,7 +68,7 @@ function Rank({ move, sorting, cell, chosen, share }) {
     data-chosen=${String(chosen)} title=${why}>
     <span class="sr">${what}</span>
     ${piece ? html`<${Block} ...${piece} sizes=${sorting.sizes} />` : html`<span></span>`}
-    <span class="rank-way">${from} <i aria-hidden="true">→</i><span class="sr">to</span> ${to}</span>
+    <span class="rank-path">${from} <i aria-hidden="true">→</i><span class="sr">to</span> ${to}</span>
     <span class="bar-track" aria-hidden="true">
       <i class="bar-fill" style=${{ left: 0, width: `${100 * share}%` }}></i></span>
     <span class="bar-value">${format.value(move.value)}</span>
@@ -81,11 +81,11 @@ function Rank({ move, sorting, cell, chosen, share }) {
 function worth(value, by) {
   if (!Number.isFinite(value)) return "";
   return by === "planner"
-    ? `${format.number(-value, 2)} grasps to the goal are expected if it comes first.`
+    ? `${format.number(-value, 2)} expected grasps to the goal if it comes first.`
     : `Expected discounted reward if it comes first: ${format.value(value)}.`;
 }
 
-/** Attempts, failures, moves, hand-overs, and who decides. */
+/** Counters and the task planner. */
 export function SortingSmallPrint({ world, cell, checkpoints, jobs, send }) {
   const { counters } = world.sorting;
   const shown = [["attempts", "Grasps"], ["failures", "Failed"], ["moves", "Moves"],
@@ -95,7 +95,7 @@ export function SortingSmallPrint({ world, cell, checkpoints, jobs, send }) {
       ${shown.map(([key, label]) => html`<div key=${key}>
         <dt>${label}</dt><dd data-counter=${key}>${counters[key]}</dd></div>`)}
     </dl>
-    <${Sorter} sorting=${world.sorting} cell=${cell} checkpoints=${checkpoints} jobs=${jobs}
+    <${TaskPlanner} sorting=${world.sorting} cell=${cell} checkpoints=${checkpoints} jobs=${jobs}
       send=${send} />
     <p class="range">${world.checkpoint
       ? html`<span>Motions between them by ${world.policy_title ?? "checkpoint"}

@@ -38,7 +38,7 @@ export function useCell() {
     return () => stop.abort();
   }, []);
 
-  const told = useCallback(async (request) => {
+  const report = useCallback(async (request) => {
     setPending((n) => n + 1);
     try {
       await request;
@@ -52,9 +52,9 @@ export function useCell() {
   useEffect(() => {
     if (state.link === "live") setError((now) => (now instanceof Unreachable ? null : now));
   }, [state.link]);
-  const send = useCallback((command) => told(carryOut(command, unconfirmed.current)), []);
+  const send = useCallback((command) => report(carryOut(command, unconfirmed.current)), []);
   const show = useCallback((name) =>
-    told(put(`v1/worlds/${WORLD}/cell`, { cell: name }, { patience: CELL_MS })), []);
+    report(put(`v1/worlds/${WORLD}/cell`, { cell: name }, { patience: CELL_MS })), []);
   const dismiss = () => setError(null);
   return { ...state, epoch, pending, history: history.current, send, show, error, dismiss };
 }

@@ -1,24 +1,26 @@
-// What the robot does and why, in one sentence, and the few numbers that matter beside it.
+// Status panel: what the robot does and why, in one sentence, with the main numbers.
 import { html } from "../vendor/htm-preact-standalone.module.js";
 import * as format from "../format.js";
 import { Icon } from "../icons.js";
 import { nameOf } from "./people.js";
 
 const STATUS = {
-  moving: ["On its way", "accent"],
+  moving: ["Moving to target", "accent"],
   picking: ["Picking", "good"],
   contact: ["Contact", "bad"],
   blocked: ["Waiting", "warn"],
-  "case done": ["Case done", "good"],
+  "case done": ["Scenario ended", "good"],
   "no candidates": ["No goals", "quiet"],
   "no policy": ["No policy", "warn"],
   solved: ["Goal reached", "good"],
   reached: ["Goal reached", "good"],
 };
 const CLEARANCE_SCALE_M = 1.0;
+const NOUNS = { protract: "protraction", elevate: "elevation", flex: "flexion", abduct: "abduction",
+  rotate: "rotation" };
 
-/** `chip` says what the status is called where its own name is too coarse. */
-export function Story({ world, chip = null }) {
+/** `chip` replaces the name of the status where a more specific one exists. */
+export function StatusPanel({ world, chip = null }) {
   const [text, tone] = chip ?? judged(world) ?? STATUS[world.status] ?? [String(world.status), "quiet"];
   return html`<section class="story" aria-labelledby="story-title">
     <h2 id="story-title" class="sr">What the robot does and why</h2>
@@ -34,13 +36,13 @@ export function Story({ world, chip = null }) {
   </section>`;
 }
 
-/** A case that is done is called by its verdict. */
+/** The verdict of a scenario that has ended. */
 function judged({ status, verdict }) {
   if (status !== "case done" || !verdict) return null;
   return verdict.as_expected ? ["As expected", "good"] : ["Not as expected", "bad"];
 }
 
-/** What a case study or a test expects, what was observed, and whether both agree. */
+/** Expected and observed behaviour of a scenario or benchmark task, and the verdict. */
 function Verdict({ expected, observed, as_expected: agrees }) {
   const [text, tone] = agrees === null ? ["open", "quiet"]
     : agrees ? ["as expected", "good"] : ["not as expected", "bad"];
@@ -53,13 +55,13 @@ function Verdict({ expected, observed, as_expected: agrees }) {
 
 function Clearance({ metres, people }) {
   const nearest = people.length > 1 && people.find((one) => one.nearest);
-  const whom = nearest ? nameOf(nearest.id) : "the person";
+  const person = nearest ? nameOf(nearest.id) : "the person";
   const known = Number.isFinite(metres);
   const share = known ? Math.min(1, Math.max(0, metres / CLEARANCE_SCALE_M)) : 0;
   const tone = !known ? "" : metres < 0.05 ? "bad" : metres < 0.15 ? "warn" : "good";
   return html`<div class="clearance">
-    <span class="label">${people.length ? `Clearance to ${whom}` : "Nobody is in the cell"}</span>
-    <span class="meter" role="meter" aria-label="Clearance to the nearest person in metres"
+    <span class="label">${people.length ? `Separation distance to ${person}` : "No person in the cell"}</span>
+    <span class="meter" role="meter" aria-label="Separation distance to the nearest person in metres"
       aria-valuemin="0" aria-valuemax=${CLEARANCE_SCALE_M}
       aria-valuenow=${(share * CLEARANCE_SCALE_M).toFixed(2)} aria-valuetext=${format.gap(metres)}>
       <i class=${`meter-fill ${tone}`} style=${{ transform: `scaleX(${share})` }}></i>
@@ -68,20 +70,20 @@ function Clearance({ metres, people }) {
   </div>`;
 }
 
-/** Counters, trained range and provenance: the small print under the plot. */
+/** Counters, training range and provenance. */
 export function SmallPrint({ world }) {
   const counters = world.counters ?? {};
   const outside = world.outside ?? [];
   return html`<section class="card small-print" aria-label="Counters and provenance">
     <dl class="tiles">
-      ${[["reached", "Reached"], ["contacts", "Contacts"], ["timeouts", "Out of time"],
-        ["switches", "Changed mind"]].map(([key, label]) => html`<div key=${key}>
+      ${[["reached", "Reached"], ["contacts", "Contacts"], ["timeouts", "Timed out"],
+        ["switches", "Target switches"]].map(([key, label]) => html`<div key=${key}>
           <dt>${label}</dt><dd data-counter=${key}>${counters[key] ?? 0}</dd></div>`)}
     </dl>
     ${world.checkpoint && outside.length === 0 && html`<p class="range good"><${Icon} name="check" />
-          The state lies inside what this policy was trained on.</p>`}
+          In distribution: all inputs within the training range.</p>`}
     ${outside.length > 0 && html`<div class="range warn"><${Icon} name="alert" /><div>
-          Outside what this policy was trained on:
+          Out of distribution: inputs outside the training range
           <ul>${outside.slice(0, 4).map(outsideText).map(([name, text]) => html`<li key=${name}>
             <b>${name}</b> ${text}</li>`)}
             ${outside.length > 4 && html`<li>and ${outside.length - 4} more</li>`}
@@ -92,10 +94,10 @@ export function SmallPrint({ world }) {
   </section>`;
 }
 
-/** "people[0].q.elbow_r" = 2.7 -> "person’s elbow r 155°, trained 0° to 149°". */
+/** "people[0].q.elbow_r" = 2.7 -> "right elbow 155°, training range 0° to 149°". */
 export function outsideText({ field, value, low, high }) {
   const show = inUnits(field);
-  return [fieldName(field), `${show(value)}, trained ${show(low)} to ${show(high)}`];
+  return [fieldName(field), `${show(value)}, training range ${show(low)} to ${show(high)}`];
 }
 
 function inUnits(field) {
@@ -107,10 +109,10 @@ function inUnits(field) {
 
 function fieldName(field) {
   return String(field)
-    .replace(/^people\[\d+\]\.q(d?)[.[]?/, (_, d) => (d ? "person’s speed of " : "person’s "))
-    .replace(/^robot\.q(d?)[.[]?/, (_, d) => (d ? "robot’s speed of joint " : "robot’s joint "))
-    .replace(/([a-z]+)_([rl])(?:_([a-z]+))?\]?$/, (_, joint, side, way) =>
-      `${side === "r" ? "right" : "left"} ${joint} ${way ?? ""}`.trim())
+    .replace(/^people\[\d+\]\.q(d?)[.[]?/, (_, d) => (d ? "speed of " : ""))
+    .replace(/^robot\.q(d?)[.[]?/, (_, d) => (d ? "robot speed of joint " : "robot joint "))
+    .replace(/([a-z]+)_([rl])(?:_([a-z]+))?\]?$/, (_, joint, side, direction) =>
+      `${side === "r" ? "right" : "left"} ${joint} ${NOUNS[direction] ?? direction ?? ""}`.trim())
     .replace(/[\]]/g, "")
     .replaceAll("_", " ");
 }

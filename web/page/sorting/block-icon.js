@@ -8,9 +8,9 @@ const NARROWEST = 0.46;
 export const kindOf = ({ colour, size }) => `${colour}-${size}`;
 export const nameOf = ({ colour, size }) => `${size} ${colour} block`;
 
-/** "Cell 3", "red tower", "the magnet". */
+/** "Cell 3", "red tower", "the gripper". */
 export function placeName(cell, id) {
-  if (id === "held") return "the magnet";
+  if (id === "held") return "the gripper";
   const station = cell?.stations.find((one) => one.id === id);
   if (station?.kind === "cluster") return `${station.colour} tower`;
   return station?.label ?? id;

@@ -1,5 +1,5 @@
-// The lines of the running plot, drawn piece by piece: each goal in its colour, as in the scene;
-// thickness says chosen; a dashed rule marks a change of mind.
+// Lines of the value plot: each goal in its colour, as in the scene; the chosen one is thicker;
+// a dashed line marks a target switch.
 
 const FONT = "px Inter, system-ui, sans-serif";
 const LABEL_GAP = 13;
@@ -49,13 +49,13 @@ function drawPieces(ctx, column, at, wanted) {
   ctx.stroke();
 }
 
-/** A dashed rule where it changed its mind: the goal it left was still to be had. */
+/** A dashed line at a switch away from a goal that was still a candidate. */
 function markSwitches(ctx, bbox, switches, xAt, theme, dpr) {
   ctx.strokeStyle = theme.faint;
   ctx.lineWidth = dpr;
   ctx.setLineDash([2 * dpr, 3 * dpr]);
-  for (const { i, mind } of switches) {
-    if (!mind) continue;
+  for (const { i, open } of switches) {
+    if (!open) continue;
     ctx.beginPath();
     ctx.moveTo(xAt(i), bbox.top);
     ctx.lineTo(xAt(i), bbox.top + bbox.height);
@@ -64,7 +64,7 @@ function markSwitches(ctx, bbox, switches, xAt, theme, dpr) {
   ctx.setLineDash([]);
 }
 
-/** A ring where the new choice begins. */
+/** A ring at the start of a new choice. */
 function markChoices(ctx, switches, at, theme, dpr) {
   ctx.fillStyle = theme.panel;
   ctx.strokeStyle = theme.ink;
