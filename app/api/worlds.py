@@ -11,10 +11,11 @@ from starlette.concurrency import run_in_threadpool
 from app.api.schemas.worlds import (
     CommandAccepted,
     WorldCell,
-    WorldLight,
     WorldList,
-    WorldPublic,
+    WorldState,
     WorldSummary,
+    state_of,
+    stream_json,
 )
 from app.api.services import LiveWorld, Services, ServicesDep
 from app.api.world_policies import (
@@ -57,9 +58,9 @@ async def list_all(services: ServicesDep) -> WorldList:
 
 
 @router.get("/{world_id}", summary="One live world, with the state a decision needs")
-async def get_one(world: WorldDep) -> WorldPublic:
+async def get_one(world: WorldDep) -> WorldState:
     """Return the last snapshot; its ``state`` can be posted to /v1/task-selection as it is."""
-    return WorldPublic.from_domain(world.handle.snapshot())
+    return state_of(world.handle.snapshot())
 
 
 @router.post("/{world_id}/commands", status_code=202, summary="Change a live world")
@@ -88,8 +89,9 @@ async def stream(world: WorldDep, services: ServicesDep) -> AsyncIterator[Server
             return
         if snapshot is not last:
             last = snapshot
-            light = WorldLight.from_domain(snapshot)
-            yield ServerSentEvent(event="snapshot", id=str(snapshot.tick), data=light)
+            yield ServerSentEvent(
+                event="snapshot", id=str(snapshot.tick), raw_data=stream_json(snapshot)
+            )
         await asyncio.sleep(STREAM_PERIOD_S)
 
 

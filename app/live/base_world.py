@@ -15,10 +15,10 @@ from app.live.arm import HumanGeometry, LiveArm, PeopleInCell
 from app.live.command_checks import Command, check
 from app.live.people.worker import frozen
 from app.live.snapshot import (
-    CandidateView,
-    ContactView,
+    CandidateSnapshot,
+    ContactSnapshot,
     Counters,
-    PersonView,
+    PersonSnapshot,
     Status,
     WorldSnapshot,
 )
@@ -64,7 +64,7 @@ class PersonLike(Protocol):
     def resize(self, command: commands.SetAnthropometry) -> None:
         """Change the body dimensions."""
 
-    def view(self, clearance_m: float, *, nearest: bool) -> PersonView:
+    def view(self, clearance_m: float, *, nearest: bool) -> PersonSnapshot:
         """Return the read model of the person."""
 
 
@@ -105,7 +105,7 @@ class BaseWorld(ABC, Generic[P]):
         self.paused = False
         self.status: Status = "moving"
         self.status_s = 0.0
-        self.contact: ContactView | None = None
+        self.contact: ContactSnapshot | None = None
         self.counters = Counters()
         self.time_left = TIME_LIMIT_S
         self.offered: tuple[Candidate, ...] = ()
@@ -265,7 +265,7 @@ class BaseWorld(ABC, Generic[P]):
 
     def note_contact(self, found: Contact) -> None:
         """Stop the robot and show a contact."""
-        self.contact = ContactView(
+        self.contact = ContactSnapshot(
             kind=found.kind,
             link=found.link,
             body=found.part if found.kind == "human" else _TOUCHED[found.kind],
@@ -344,9 +344,9 @@ class BaseWorld(ABC, Generic[P]):
         """The note shown at present."""
         return self._note if self.t < self._note_until else None
 
-    def _candidate(self, index: int, candidate: Candidate) -> CandidateView:
+    def _candidate(self, index: int, candidate: Candidate) -> CandidateSnapshot:
         decision = self.decision
-        return CandidateView(
+        return CandidateSnapshot(
             id=candidate.id,
             position=frozen(candidate.position),
             value=None if decision is None else decision.values[index],
@@ -355,7 +355,7 @@ class BaseWorld(ABC, Generic[P]):
             outside=() if decision is None else decision.outside_candidates[index],
         )
 
-    def _people_views(self) -> tuple[PersonView, ...]:
+    def _people_views(self) -> tuple[PersonSnapshot, ...]:
         distances = self.robot.distances(self.people)
         nearest = min(distances, key=lambda id: distances[id], default=None)
         return tuple(
@@ -365,7 +365,7 @@ class BaseWorld(ABC, Generic[P]):
 
     def _snapshot(self, status: Status, message: str, **scenario: Any) -> WorldSnapshot:
         """Return the snapshot with the fields that only the scenario knows."""
-        decision, policy = self.decision, self.policy
+        decision, policy, people = self.decision, self.policy, self._people_views()
         return WorldSnapshot(
             id=self.id,
             cell=self.cell.name,
@@ -377,7 +377,8 @@ class BaseWorld(ABC, Generic[P]):
             robot_q=frozen(self.robot.q),
             robot_qd=frozen(self.robot.qd),
             tcp=frozen(self.robot.tcp()),
-            people=self._people_views(),
+            mode=people[0].mode if people else None,
+            people=people,
             candidates=tuple(self._candidate(i, c) for i, c in enumerate(self.offered)),
             chosen=None if decision is None else decision.chosen,
             previous=self.previous,

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from app.live.snapshot import MotionView
+from app.live.snapshot import PlaybackSnapshot
 from app.sim.cells.cell import Cell
 from app.sim.cells.people import Worker
 from app.sim.core.arrays import Vec
@@ -99,9 +99,9 @@ class PlayedMotion:
         full = 2.0 * math.pi
         self._q[:, YAW] += full * round((yaw - self._q[0, YAW]) / full)
 
-    def view(self, t: float) -> MotionView:
+    def view(self, t: float) -> PlaybackSnapshot:
         """Return what is known of it at ``t`` [s]."""
-        return MotionView(
+        return PlaybackSnapshot(
             name=self._recording.name,
             run=self._recording.run,
             n_runs=self._recording.n_runs,

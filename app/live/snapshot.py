@@ -1,15 +1,16 @@
-"""What is known about a live world at one tick, frozen, for any thread to read.
+"""Immutable state of a live world at one tick, for any thread and as JSON of the HTTP API.
 
-Robot, people, ``previous`` and ``time_left_s`` are exactly the inputs of the decision beside
-them: sending them to ``POST /v1/task-selection`` gives the same choice and the same values.
+Robot, people, ``previous`` and ``time_left_s`` are the inputs of the decision in the same
+snapshot: ``POST /v1/task-selection`` returns the same choice and values for them.
 """
 
 from dataclasses import dataclass
 from typing import Literal
 
 from app.live.commands import Mode
-from app.live.reach.snapshot import ReachView
-from app.live.sorting.snapshot import SortingView
+from app.live.reach.snapshot import ReachSnapshot
+from app.live.read_model import Internal, Numbers, ReadModel
+from app.live.sorting.snapshot import SortingSnapshot
 from app.sim.core.arrays import Vec
 from app.sim.core.out_of_range import OutsideField
 from app.sim.pick.case_verdict import Verdict
@@ -26,243 +27,250 @@ Status = Literal[
     "reached",
 ]
 """``picking``: the target is reached, the tool goes down and up again; ``blocked``: the robot
-waits at home because a person is in its way. In ``picking``, ``contact`` and ``case done``
-the last decision stays as it was; in ``moving`` it belongs to this very state. In a sorting
-cell ``picking`` is ``grasp`` and ``place``, and ``solved`` says that every tower is as the goal
-asks. In a reach cell ``reached`` says that the tool is at the goal."""
+waits at home for a person to leave. In ``picking``, ``contact`` and ``case done`` the last
+decision stays; in ``moving`` it belongs to the present state. In a sorting cell ``picking`` is
+``grasp`` and ``place``, and ``solved`` means that every tower matches the goal. In a reach cell
+``reached`` means that the tool is at the goal."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CandidateView:
-    """One station the robot may choose now, with what the critic says about it."""
+class CandidateSnapshot(ReadModel):
+    """One station that the robot can choose, with its value estimate."""
 
     id: str
-    """Station id."""
-    position: Vec
-    """Point the tcp must reach, robot base frame [m], shape (3,), read-only."""
+    """station id"""
+    position: Numbers
+    """target of the tool centre point, robot base frame [m]"""
     value: float | None
-    """``Q(s, pi(s))``, discounted reward; None without a decision."""
+    """Q(s, π(s)), expected discounted reward; null without a decision"""
     chosen: bool
-    """Whether the robot goes there."""
+    """whether the robot moves there"""
     reachable: bool | None
-    """Whether a vertical-tool posture exists; None without a decision."""
+    """whether a configuration with vertical tool exists; null without a decision"""
     outside: tuple[OutsideField, ...]
-    """Where the candidate lies outside what the checkpoint was trained on."""
+    """inputs of the candidate outside the training range"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ContactView:
+class ContactSnapshot(ReadModel):
     """The contact that ended an episode."""
 
     kind: str
-    """What the robot touched: ``human``, ``cell`` or ``self``."""
+    """human, cell or self"""
     link: str
-    """Robot link that touched."""
+    """robot link in contact"""
     body: str
-    """The person's capsule that was touched, ``table`` or ``robot``."""
+    """capsule of the person, `table` or `robot`"""
     person: int | None = None
-    """Id of the person who was touched."""
+    """id of the touched person"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class BodyView:
-    """How large a person is, or is becoming within half a second."""
+class AnthropometrySnapshot(ReadModel):
+    """Body dimensions of a person, present or reached within half a second."""
 
     stature: float
-    """Percentile of the stature that was asked for last."""
+    """percentile requested last"""
     arms: float
-    """Percentile of the arms' length, likewise."""
+    """percentile of the arm length requested last, at that stature"""
     shoulders: float
-    """Percentile of the shoulders' width, likewise."""
+    """percentile of the shoulder width requested last, at that stature"""
     recorded: bool
-    """Whether a recorded person's lengths hold instead of the percentiles."""
+    """whether the lengths of a recorded person replace the percentiles"""
     stature_m: float
-    """Height of the head's top above the floor, standing upright [m]."""
+    """height, standing upright [m]"""
     trunk_m: float
-    """Pelvis to the base of the neck [m]."""
+    """pelvis to the base of the neck [m]"""
     arm_m: float
-    """Shoulder to palm [m], mean of both."""
+    """shoulder to palm, mean of both arms [m]"""
     shoulders_m: float
-    """From shoulder joint to shoulder joint [m]."""
+    """distance of the shoulder joints [m]"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MotionView:
-    """A recorded motion that is being played."""
+class PlaybackSnapshot(ReadModel):
+    """A recording that is being played."""
 
     name: str
-    """Name of the stored motion."""
+    """name of the stored recording"""
     run: int
-    """Which of its runs, from 0."""
+    """index of the run"""
     n_runs: int
-    """How many clean runs it has."""
+    """number of its clean runs"""
     t_s: float
-    """How far it has come [s]."""
+    """elapsed time of the run [s]"""
     duration_s: float
-    """Length of the run [s]."""
+    """duration of the run [s]"""
     outside_share: float
-    """Share of its frames whose pelvis lies outside the walking area."""
+    """share of frames with the pelvis outside the walking area"""
     clipped_share: float
-    """Share of its frames with an angle beyond a joint's limit; policies are told the limit."""
+    """share of frames with an angle beyond a joint limit; policies observe the limit"""
     clipped_m: float
-    """How far a wrist told so is from the true one at most [m]."""
+    """maximum error of an observed wrist position by that [m]"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CylinderView:
-    """A person of whom no more than an upright cylinder is known."""
+class CylinderSnapshot(ReadModel):
+    """A person known only as an upright cylinder."""
 
     x: float
-    """Axis, robot base frame [m]."""
+    """axis [m]"""
     y: float
-    """The same."""
+    """axis [m]"""
     vx: float
-    """Velocity in the period to come [m/s]."""
+    """velocity in the next period [m/s]"""
     vy: float
-    """The same."""
+    """velocity in the next period [m/s]"""
     radius: float
-    """Radius [m]."""
+    """radius [m]"""
     height: float
-    """Height above the floor [m]."""
+    """height above the floor [m]"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PersonView:
+class PersonSnapshot(ReadModel):
     """One person in a live cell."""
 
     id: int
-    """Number of the person, kept as long as the person is there; the first is 0."""
+    """number of the person, constant; the first is 0"""
     mode: Mode
-    """Who moves the person."""
-    q: Vec
-    """Joint positions inside their limits, as policies are told them [m, rad], shape (18,),
-    read-only; yaw within half a turn of home's."""
-    posture: Vec
-    """Where the body is [m, rad], shape (18,), read-only: recorded people leave the limits."""
-    qd: Vec
-    """Joint speeds [m/s, rad/s], shape (18,), read-only."""
-    size: Vec
-    """Size at this moment [m], shape (12,), read-only; the pelvis as high as it is now."""
-    body: BodyView
-    """How large the person is."""
-    motion: MotionView | None
-    """What is played in mode ``recorded``."""
+    """motion source"""
+    q: Numbers
+    """observed joint positions, inside the joint limits [m, rad], shape (18,), in the order of
+    `human.JOINT_NAMES`"""
+    posture: Internal
+    """joint positions [m, rad], shape (18,); recordings exceed the limits"""
+    qd: Numbers
+    """joint speeds [m/s, rad/s], shape (18,)"""
+    size: Numbers
+    """body lengths at this moment [m], shape (12,)"""
+    anthropometry: AnthropometrySnapshot
+    """body dimensions"""
+    motion: PlaybackSnapshot | None
+    """recording in mode `recorded`"""
     joining: bool
-    """Whether the person is on the way to where work, motion or rest begin."""
+    """whether the person moves to the start of work, recording or rest"""
     outside_area: bool
-    """Whether the pelvis lies outside the walking area now."""
+    """whether the pelvis is outside the walking area"""
     clearance_m: float
-    """Distance of the robot to this person [m]."""
+    """distance to the robot [m]"""
     nearest: bool
-    """Whether nobody is nearer to the robot: the one a policy for one person sees."""
-    cylinder: CylinderView | None = None
-    """What counts for contact in a reach cell; posture and size are then only a picture."""
+    """whether this is the person nearest to the robot"""
+    cylinder: CylinderSnapshot | None = None
+    """collision geometry in a reach cell; posture and size are only drawn there"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Counters:
-    """What happened since the last reset."""
+class Counters(ReadModel):
+    """Events since the last reset."""
 
     reached: int = 0
-    """Targets reached."""
+    """targets reached"""
     contacts: int = 0
-    """Episodes that ended in a contact."""
+    """episodes that ended in a contact"""
     timeouts: int = 0
-    """Episodes that ran out of time."""
+    """episodes that reached the time limit"""
     switches: int = 0
-    """Changes of mind within an episode."""
+    """target switches within an episode"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class WorldSnapshot:
+class RefusedCommand(ReadModel):
+    """A command that was valid when queued and was refused when its turn came."""
+
+    number: int
+    """number of the command"""
+    reason: str
+    """error message"""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorldSnapshot(ReadModel):
     """One live world at one tick."""
 
     id: str
-    """Name of the world in URLs."""
+    """name of the world in URLs"""
     cell: str
-    """Name of the work cell."""
+    """name of the work cell"""
     tick: int
-    """Control periods since the world was made; never goes back."""
+    """control periods since the start; never decreases"""
     t_s: float
-    """Simulated time since the last reset [s]."""
+    """simulated time since the last reset [s]"""
+    mode: Mode | None
+    """motion source of the first person; null without people"""
+    people: tuple[PersonSnapshot, ...]
+    """0 to 4 people, in the order of their ids"""
     paused: bool
-    """Whether the clock stands still."""
-    status: Status
-    """What the robot is doing."""
-    message: str
-    """Why, in one sentence for people."""
-    robot_q: Vec
-    """Robot joint positions [rad], shape (6,), read-only."""
-    robot_qd: Vec
-    """Robot joint speeds [rad/s], shape (6,), read-only."""
-    tcp: Vec
-    """Tool centre point, robot base frame [m], shape (3,), read-only."""
-    people: tuple[PersonView, ...]
-    """The people in the cell, 0 to 4, in the order of their ids."""
-    gripping: bool = False
-    """Whether the fingers are closed."""
-    selected: tuple[str, ...] = ()
-    """Stations the visitor allows; those reached this round are missing in ``candidates``."""
-    candidates: tuple[CandidateView, ...]
-    """Stations the robot may choose now, in the cell's order."""
-    chosen: str | None
-    """Id of the chosen candidate."""
-    previous: str | None
-    """The choice one tick earlier, as given to the policy."""
-    time_left_s: float
-    """Time left in the episode, as given to the policy [s]."""
-    outside: tuple[OutsideField, ...]
-    """Fields of the state outside what the checkpoint was trained on."""
-    clearance_m: float | None
-    """Least distance between robot and people [m]; None where nobody is there."""
-    contact: ContactView | None
-    """The contact that is shown at the moment."""
-    checkpoint: str | None
-    """SHA-256 of the checkpoint that decides."""
-    policy_title: str | None
-    """Its short text for people."""
-    elapsed_ms: float | None
-    """Time the decision took [ms]."""
-    case: str | None = None
-    """Id of the running case study."""
-    counters: Counters
-    """What happened since the last reset."""
-    decided_s: float | None = None
-    """When the last decision was made, as ``t_s``; None without one."""
-    verdict: Verdict | None = None
-    """What the running case study or sorting test expects, and what happened so far."""
+    """whether the clock is stopped"""
     speed: int = 1
-    """Simulated seconds per second that were asked for last."""
+    """simulated seconds per second, as requested last"""
     commands: int = 0
-    """Number of the last command that was carried out or refused; they count from 1."""
-    refused: tuple[int, str] | None = None
-    """Number of the last command that was refused after it had been queued, and why."""
-    sorting: SortingView | None = None
-    """The sorting task; None in a cell without one."""
-    reach: ReachView | None = None
-    """Goal, safety layer and outcomes of a reach cell; None in other cells."""
+    """number of the last command that was applied or refused, from 1"""
+    refused: RefusedCommand | None = None
+    """last command that was refused after it had been queued"""
+    status: Status
+    """what the robot does"""
+    message: str
+    """the reason, in one sentence"""
+    gripping: bool = False
+    """whether the fingers are closed"""
+    selected: tuple[str, ...] = ()
+    """selected stations; those reached this round are missing in `candidates`"""
+    candidates: tuple[CandidateSnapshot, ...]
+    """stations that the robot can choose, in the order of the cell"""
+    chosen: str | None
+    """id of the chosen candidate"""
+    outside: tuple[OutsideField, ...]
+    """inputs of the state outside the training range"""
+    decided_s: float | None = None
+    """time of the last decision, as `t_s` [s]; null without one"""
+    clearance_m: float | None
+    """separation distance of robot and people [m]; 0 or less: contact; null without people"""
+    contact: ContactSnapshot | None
+    """contact that is shown at present"""
+    checkpoint: str | None
+    """SHA-256 of the active checkpoint"""
+    policy_title: str | None
+    """title of the active policy"""
+    elapsed_ms: float | None
+    """duration of the decision [ms]"""
+    case: str | None = None
+    """id of the running case study"""
+    verdict: Verdict | None = None
+    """expectation and outcome of the running case study or sorting test"""
+    counters: Counters
+    """events since the last reset"""
+    sorting: SortingSnapshot | None = None
+    """sorting task; null in other cells"""
+    reach: ReachSnapshot | None = None
+    """goal, safety layer and outcomes of a reach cell; null in other cells"""
+    robot_q: Internal
+    """joint positions of the robot [rad], shape (6,)"""
+    robot_qd: Internal
+    """joint speeds of the robot [rad/s], shape (6,)"""
+    previous: str | None
+    """choice one tick earlier, as observed by the policy"""
+    time_left_s: float
+    """time left in the episode, as observed by the policy [s]"""
+    tcp: Numbers
+    """tool centre point, robot base frame [m]"""
 
     @property
     def values(self) -> dict[str, float]:
-        """The critic's value per candidate id."""
+        """Value estimate per candidate id."""
         return {c.id: c.value for c in self.candidates if c.value is not None}
 
     @property
-    def nearest(self) -> PersonView | None:
-        """The person nearest to the robot; None where nobody is there."""
+    def nearest(self) -> PersonSnapshot | None:
+        """The person nearest to the robot; None without people."""
         return next((person for person in self.people if person.nearest), None)
 
     @property
-    def mode(self) -> Mode | None:
-        """Who moves the first person; None where nobody is there."""
-        return self.people[0].mode if self.people else None
-
-    @property
     def person_q(self) -> Vec:
-        """The first person's joint positions [m, rad], shape (18,)."""
+        """Joint positions of the first person [m, rad], shape (18,)."""
         return self.people[0].q
 
     @property
     def person_qd(self) -> Vec:
-        """The first person's joint speeds [m/s, rad/s], shape (18,)."""
+        """Joint speeds of the first person [m/s, rad/s], shape (18,)."""
         return self.people[0].qd

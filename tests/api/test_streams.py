@@ -48,7 +48,11 @@ def test_stream_tells_of_the_people_without_their_joints(address: str) -> None:
     with patient_http.stream("GET", f"{address}/v1/worlds/main/events") as response:
         _, _, data = next(events(response))
     (person,) = data["people"]
-    assert (person["id"], person["mode"], person["body"]["stature"]) == (0, "auto", 50.0)
+    assert (person["id"], person["mode"], person["anthropometry"]["stature"]) == (
+        0,
+        "auto",
+        50.0,
+    )
     assert "q" not in person
 
 

@@ -100,14 +100,14 @@ def test_second_person_works_and_the_state_repeats_the_choice(client: TestClient
     )
 
     def there(now: dict[str, Any]) -> bool:
-        tall = len(now["people"]) == 2 and now["people"][1]["body"]["stature"] == 95
+        tall = len(now["people"]) == 2 and now["people"][1]["anthropometry"]["stature"] == 95
         return tall and now["status"] == "moving"
 
     try:
         world = until(client, there)
         assert [one["id"] for one in world["people"]] == [0, 1]
         assert sum(one["nearest"] for one in world["people"]) == 1
-        body = world["people"][1]["body"]
+        body = world["people"][1]["anthropometry"]
         assert (body["stature"], body["arms"], body["shoulders"]) == (95, 20, 50)
         assert body["stature_m"] == pytest.approx(1.87, abs=0.01)
         assert len(world["state"]["people"]) == 2
@@ -138,7 +138,7 @@ def test_imported_motion_is_played(client: TestClient) -> None:
         motion = moving["people"][0]["motion"]
         assert (motion["name"], motion["run"], motion["n_runs"]) == ("played", 0, 1)
         assert motion["duration_s"] == pytest.approx(3.98)
-        assert moving["people"][0]["body"]["recorded"]
+        assert moving["people"][0]["anthropometry"]["recorded"]
         refused = client.post(COMMANDS, json={"tag": "set-motion", "name": "played", "run": 4})
         assert (refused.status_code, refused.json()["field"]) == (422, "run")
         unknown = client.post(COMMANDS, json={"tag": "set-motion", "name": "unknown"}).json()

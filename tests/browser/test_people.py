@@ -39,7 +39,7 @@ def test_visitor_adds_a_person_changes_its_size_and_plays_a_recording(
     page.locator('[data-size="stature"] input').fill("95")
     expect(page.locator('[data-role="stature-text"]')).to_have_text("1.87 m")
     now = until(server, lambda world: world["people"][1]["size"][11] > 1.08, LIMIT_S)
-    assert [one["body"]["stature"] for one in now["people"]] == [50.0, 95.0]
+    assert [one["anthropometry"]["stature"] for one in now["people"]] == [50.0, 95.0]
     posted = patient_http.post(
         f"{server}/v1/recordings",
         params={"file_name": "visit.csv"},

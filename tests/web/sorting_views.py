@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 
 from app.live.sorting.snapshot import (
-    GoalBlockView,
-    MoveView,
-    PieceView,
+    GoalBlockSnapshot,
+    MoveSnapshot,
+    PieceSnapshot,
     SortingCounters,
-    SortingView,
+    SortingSnapshot,
 )
 from app.sim.cells.cell import Cell
 
@@ -30,9 +30,9 @@ def centre(cell: Cell, place: str, level: int) -> np.ndarray:
     return np.array([x, y, z - half + level * 2.0 * half])
 
 
-def piece(cell: Cell, id: str, kind: str, place: str, level: int = 0) -> PieceView:
+def piece(cell: Cell, id: str, kind: str, place: str, level: int = 0) -> PieceSnapshot:
     colour, size = kind.split("-")
-    return PieceView(
+    return PieceSnapshot(
         id=id,
         colour=colour,
         size=size,
@@ -45,8 +45,8 @@ def piece(cell: Cell, id: str, kind: str, place: str, level: int = 0) -> PieceVi
     )
 
 
-def goal_block(cell: Cell, tower: str, level: int, size: str) -> GoalBlockView:
-    return GoalBlockView(
+def goal_block(cell: Cell, tower: str, level: int, size: str) -> GoalBlockSnapshot:
+    return GoalBlockSnapshot(
         tower=tower,
         level=level,
         colour=str(cell.station(tower).colour),
@@ -58,8 +58,8 @@ def goal_block(cell: Cell, tower: str, level: int, size: str) -> GoalBlockView:
 
 
 def a_view(
-    cell: Cell, pieces: Sequence[PieceView] = (), goal: Sequence[GoalBlockView] = ()
-) -> SortingView:
+    cell: Cell, pieces: Sequence[PieceSnapshot] = (), goal: Sequence[GoalBlockSnapshot] = ()
+) -> SortingSnapshot:
     """Return a task of five blocks, the first of which is being fetched."""
     pieces = pieces or (
         piece(cell, "block1", "red-large", "cell2"),
@@ -74,9 +74,11 @@ def a_view(
         replace(goal_block(cell, "blue", 0, "large"), done=True),
         goal_block(cell, "blue", 1, "medium"),
     )
-    move = MoveView(pick=pieces[0].place, place="red", piece=pieces[0].id, value=0.8, best=True)
+    move = MoveSnapshot(
+        pick=pieces[0].place, place="red", piece=pieces[0].id, value=0.8, best=True
+    )
     stations = [one for one in cell.stations if one.kind == "clutter"]
-    return SortingView(
+    return SortingSnapshot(
         pieces=tuple(pieces),
         goal=tuple(goal),
         failure=tuple(float(one.failure_probability or 0.0) for one in stations),

@@ -23,7 +23,7 @@ from app.live.command_checks import Command, check, check_state, people_after
 from app.live.factory import new_world
 from app.live.reach.commands import SetInferenceMode
 from app.live.reach.interfaces import LiveReachPolicy
-from app.live.snapshot import WorldSnapshot
+from app.live.snapshot import RefusedCommand, WorldSnapshot
 from app.live.sorting.commands import TableCommand
 from app.sim.cells.cell import Cell
 from app.sim.pick.task_policy import TaskPolicy
@@ -138,7 +138,7 @@ class LiveCell:
         self._speed = 1
         self._turn, self._undrawn_s = 0, 0.0
         self._done = 0
-        self._refused: tuple[int, str] | None = None
+        self._refused: RefusedCommand | None = None
         self._stop = threading.Event()
         self._server: ViewerServer | None = None
         self._thread: threading.Thread | None = None
@@ -194,7 +194,7 @@ class LiveCell:
             try:
                 self._obey(command)
             except ServiceError as error:
-                self._refused = self._done, error.message
+                self._refused = RefusedCommand(number=self._done, reason=error.message)
                 logger.warning("command %s was refused: %s", command.tag, error.message)
         for _ in range(self._speed):
             self._world.step()

@@ -6,7 +6,7 @@ motion is played. The contact test of each period uses the lengths of that momen
 
 import numpy as np
 
-from app.live.snapshot import BodyView
+from app.live.snapshot import AnthropometrySnapshot
 from app.sim.cells.people import Worker
 from app.sim.core.arrays import Vec
 from app.sim.human.anthropometry import BodySize, percentile_body
@@ -86,11 +86,11 @@ class LiveBody:
         self.rise += step
         return step != 0.0
 
-    def view(self) -> BodyView:
+    def view(self) -> AnthropometrySnapshot:
         """Return what is known of the size that was asked for."""
         size = self._wanted()
         stature, arms, shoulders = self._percentiles
-        return BodyView(
+        return AnthropometrySnapshot(
             stature=stature,
             arms=arms,
             shoulders=shoulders,

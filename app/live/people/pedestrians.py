@@ -27,7 +27,7 @@ from app.live.commands import (
     SetMotion,
 )
 from app.live.people.worker import frozen
-from app.live.snapshot import BodyView, CylinderView, PersonView
+from app.live.snapshot import AnthropometrySnapshot, CylinderSnapshot, PersonSnapshot
 from app.sim.cells.cell import Cell
 from app.sim.collision.contact import pedestrian_distances
 from app.sim.core.arrays import Vec
@@ -87,7 +87,7 @@ BESIDE = 0.9
 """Distance of the axes of two people that leaves room at the start [m]."""
 DRAG_ROOM = 0.6
 """How far beyond the walking area somebody may be dragged [m]."""
-UPRIGHT = BodyView(
+UPRIGHT = AnthropometrySnapshot(
     stature=50.0,
     arms=50.0,
     shoulders=50.0,
@@ -333,7 +333,7 @@ class LiveWalker:
         self.row[VX], self.row[VY] = self._velocity()
         self.yaw = yaw
 
-    def view(self, clearance_m: float, *, nearest: bool) -> PersonView:
+    def view(self, clearance_m: float, *, nearest: bool) -> PersonSnapshot:
         """Return what is known of the person.
 
         Args:
@@ -345,20 +345,20 @@ class LiveWalker:
         qd = np.zeros(18)
         qd[:2] = vx, vy
         posture = frozen(rest_posture(x, y, self.yaw))
-        return PersonView(
+        return PersonSnapshot(
             id=self.id,
             mode=self.mode,
             q=posture,
             posture=posture,
             qd=frozen(qd),
             size=frozen(among.body),
-            body=UPRIGHT,
+            anthropometry=UPRIGHT,
             motion=None,
             joining=False,
             outside_area=among.is_outside(x, y),
             clearance_m=clearance_m,
             nearest=nearest,
-            cylinder=CylinderView(
+            cylinder=CylinderSnapshot(
                 x=x, y=y, vx=vx, vy=vy, radius=float(row[R]), height=among.height
             ),
         )

@@ -13,7 +13,7 @@ from app.live.people.body import LiveBody
 from app.live.people.dragging import DraggedPerson
 from app.live.people.work_loop import WorkLoop
 from app.live.playback import PlayedMotion, is_outside
-from app.live.snapshot import PersonView
+from app.live.snapshot import PersonSnapshot
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
 from app.sim.human import model as human
@@ -216,7 +216,7 @@ class LivePerson:
         """Forget the speed: the clock stands."""
         self._limbs.qd = self._limbs.qd * 0.0
 
-    def view(self, clearance_m: float, *, nearest: bool) -> PersonView:
+    def view(self, clearance_m: float, *, nearest: bool) -> PersonSnapshot:
         """Return what is known of the person.
 
         Args:
@@ -225,14 +225,14 @@ class LivePerson:
         """
         seen = self.seen()
         played = self._played if self.mode == "recorded" else None
-        return PersonView(
+        return PersonSnapshot(
             id=self.id,
             mode=self.mode,
             q=frozen(seen.q),
             posture=frozen(self._limbs.q),
             qd=frozen(seen.qd),
             size=frozen(self.size),
-            body=self.body.view(),
+            anthropometry=self.body.view(),
             motion=None if played is None else played.view(self._t),
             joining=self._joining,
             outside_area=is_outside(self.q, self._cell.human),

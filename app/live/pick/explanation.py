@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from app.live.snapshot import ContactView, Status
+from app.live.snapshot import ContactSnapshot, Status
 from app.sim.pick.case_verdict import Verdict
 from app.sim.pick.task_policy import Decision
 
@@ -50,7 +50,7 @@ def going(decision: Decision, names: tuple[str, ...], label: Label) -> str:
     return f"{text}; next: {label(names[second])} ({decision.values[second]:.2f})."
 
 
-def touched(contact: ContactView, *, final: bool) -> str:
+def touched(contact: ContactSnapshot, *, final: bool) -> str:
     """Return the message on a contact; ``final`` if it ends a case study."""
     link = contact.link.replace("_", " ")
     body = _TOUCHED.get(contact.body, contact.body)

@@ -1,6 +1,6 @@
 """Status messages of a live reach cell, one sentence each."""
 
-from app.live.reach.snapshot import ReachView, SafetyView
+from app.live.reach.snapshot import ReachSnapshot, SafetySnapshot
 from app.live.snapshot import Status
 
 FULL = 0.995
@@ -17,7 +17,7 @@ _LINKS = {
 }
 
 
-def doing(status: Status, view: ReachView, *, has_policy: bool, n_people: int) -> str:
+def doing(status: Status, view: ReachSnapshot, *, has_policy: bool, n_people: int) -> str:
     """Return the status message.
 
     Args:
@@ -37,7 +37,7 @@ def doing(status: Status, view: ReachView, *, has_policy: bool, n_people: int) -
     return f"Moving to the goal, {left}." if has_policy else f"{NO_POLICY}, {left}."
 
 
-def slowed(safety: SafetyView, n_people: int) -> str | None:
+def slowed(safety: SafetySnapshot, n_people: int) -> str | None:
     """Return why the safety layer reduces the speed; None if it does not."""
     if not safety.on or safety.override >= FULL or safety.separation is None:
         return None

@@ -1,89 +1,88 @@
-"""What a live reach cell shows beyond robot and people: goal, way of deciding, safety layer."""
+"""State of a live reach cell beyond robot and people: goal, inference mode, safety layer."""
 
 from dataclasses import dataclass
 from typing import Literal
 
-from app.sim.core.arrays import Vec
+from app.live.read_model import Internal, Numbers, ReadModel
 
 GoalMode = Literal["jump", "follow"]
-"""Where the goal is next: somewhere else as soon as it is reached, or where it is dragged."""
-GOAL_MODES: tuple[GoalMode, ...] = ("jump", "follow")
+"""``jump``: a reached goal is replaced by another one; ``follow``: it stays until dragged."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SafetyView:
-    """What the safety layer says of this very state (METHOD 2.7)."""
+class SafetySnapshot(ReadModel):
+    """Speed and separation monitoring of the present state (docs/method.md 2.7)."""
 
     on: bool
-    """Whether the robot obeys it."""
+    """whether the robot obeys the safety layer"""
     override: float
-    """Rate at which the commanded piece is executed; 1 where the layer is off."""
+    """executed speed override, 0 to 1; 1 with the layer disabled"""
     advised: float
-    """Rate that the layer would set, on or off."""
+    """override of the layer, enabled or not"""
     person: int | None
-    """Id of the person nearest to the robot; None where nobody is there."""
+    """id of the person nearest to the robot; null without people"""
     link: str | None
-    """The link that is nearest to that person."""
+    """link nearest to that person"""
     separation: float | None
-    """Their distance [m]."""
+    """separation distance [m]"""
     required: float | None
-    """Protective separation distance S_p for that link [m], the sum of the three terms."""
+    """protective separation distance S_p of that link, the sum of the three terms [m]"""
     person_distance: float | None
-    """What the person covers until the robot rests, v_h (T_r + T_s) [m]."""
+    """human contribution S_h = v_h (T_r + T_s) [m]"""
     robot_distance: float | None
-    """What the robot covers until then, v_r T_r + B [m]."""
+    """robot reaction and stopping S_r + S_s = v_r T_r + B [m]"""
     margin: float
-    """Distance to keep, C + Z_d + Z_r and the protective distance [m]."""
+    """C + Z_d + Z_r and the protective distance [m]"""
     use_measured_velocity: bool
-    """Whether the layer goes by the velocities that people are seen with."""
+    """whether S_p uses the measured velocities of people"""
     human_speed: float
-    """Speed assumed for people, v_h; where measured what is added to theirs [m/s]."""
+    """assumed speed of people v_h; added to measured velocities [m/s]"""
     stop_time: float
-    """How long a stop takes from now, T_s [s]."""
-    zone: Vec
-    """Outline on the floor of where a person would be nearer than S_p [m], where velocities are
-    measured one who stands; shape (n, 2), read-only."""
+    """stopping time from now T_s [s]"""
+    zone: Internal
+    """outline on the floor of the positions nearer than S_p [m], shape (n, 2); for a standing
+    person where velocities are measured"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ReachCounters:
-    """What happened since the last reset, besides ``snapshot.Counters``."""
+class ReachCounters(ReadModel):
+    """Events since the last reset, besides ``counters``."""
 
     touched: int = 0
-    """Times somebody walked into the robot while it stood still."""
+    """contacts of a person with the standing robot"""
     moving_s: float = 0.0
-    """Time on the way to goals [s]."""
+    """time of the motions to goals [s]"""
     slowed_s: float = 0.0
-    """Part of it with the override below one half, standing included [s]."""
+    """part of it with the override below 0.5, standstill included [s]"""
     stopped_s: float = 0.0
-    """Part of it with the override at 0 [s]."""
+    """part of it with the override at 0 [s]"""
     reaching_s: float = 0.0
-    """Time of the episodes that reached their goal [s]."""
+    """time of the episodes that reached their goal [s]"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ReachView:
-    """A live reach cell at one tick."""
+class ReachSnapshot(ReadModel):
+    """Goal, safety layer and outcomes at one tick."""
 
-    goal: Vec
-    """Where the tcp shall be [m], shape (3,), read-only."""
+    goal: Numbers
+    """target of the tool centre point [m]"""
     goal_mode: GoalMode
-    """Where the goal is next."""
+    """`jump` or `follow`"""
     on_target: bool
-    """Whether the goal is one of the cell's targets."""
+    """whether the goal is one of the cell's targets"""
     distance: float
-    """tcp to goal [m]."""
+    """tool centre point to goal [m]"""
     tolerance: float
-    """Distance that counts as reached [m]."""
+    """distance that counts as reached [m]"""
     time_left_s: float
-    """Time left to reach it [s]."""
+    """time left to reach the goal [s]"""
     inference_mode: str
-    """How the policy is asked: one of ``ways``."""
+    """inference mode of the policy; empty without one"""
     inference_modes: tuple[str, ...]
-    """How it can be asked; empty without a policy."""
+    """available inference modes"""
     walk_speed: float | None
-    """Speed of all people that a visitor asked for [m/s]; None as METHOD 2.1."""
-    safety: SafetyView
-    """The safety layer."""
+    """walking speed of all people [m/s]; null: variable, as in training"""
+    safety: SafetySnapshot
+    """speed and separation monitoring"""
     counters: ReachCounters
-    """What happened."""
+    """events since the last reset"""

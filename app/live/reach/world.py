@@ -29,7 +29,7 @@ from app.live.reach import explanation as reach_explanation
 from app.live.reach.controller import TIME_LIMIT_S, ReachController
 from app.live.reach.goal import LiveGoal
 from app.live.reach.interfaces import LiveReachPolicy
-from app.live.reach.snapshot import ReachCounters, ReachView, SafetyView
+from app.live.reach.snapshot import ReachCounters, ReachSnapshot, SafetySnapshot
 from app.live.snapshot import Status, WorldSnapshot
 from app.sim.cells.cell import Cell
 from app.sim.collision.checker import Shapes, no_people
@@ -234,12 +234,12 @@ class LiveReachWorld(BaseWorld[LiveWalkers]):
             going=people.rows[:, [VX, VY, GROWTH]],
         )
 
-    def _safety_view(self, filtered: SafetyDecision, shapes: Shapes) -> SafetyView:
+    def _safety_view(self, filtered: SafetyDecision, shapes: Shapes) -> SafetySnapshot:
         """Return the layer's decision with the terms of S_p."""
         layer, robot = self._layer, self.robot
         found = layer.terms(filtered, robot.qd, shapes)
         nearest, terms = (None, None) if found is None else found
-        return SafetyView(
+        return SafetySnapshot(
             on=self._obeys,
             override=filtered.override if self._obeys else 1.0,
             advised=filtered.override,
@@ -260,7 +260,7 @@ class LiveReachWorld(BaseWorld[LiveWalkers]):
 
     # Read model.
 
-    def _message(self, view: ReachView) -> str:
+    def _message(self, view: ReachSnapshot) -> str:
         if self.status == "contact" and self.contact is not None:
             return explanation.touched(self.contact, final=False)
         has_policy = self._controller.policy is not None
@@ -271,7 +271,7 @@ class LiveReachWorld(BaseWorld[LiveWalkers]):
     def snapshot(self) -> WorldSnapshot:
         """Return the read model of the present state."""
         goal, controller = self._goal, self._controller
-        view = ReachView(
+        view = ReachSnapshot(
             goal=frozen(goal.position),
             goal_mode=goal.mode,
             on_target=goal.on_target,

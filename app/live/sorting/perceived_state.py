@@ -9,12 +9,12 @@ from app.live.sorting.controller import MoveChoice, SortController
 from app.live.sorting.snapshot import (
     HELD,
     MAX_RANKED,
-    GoalBlockView,
-    MoveView,
+    GoalBlockSnapshot,
+    MoveSnapshot,
     Phase,
-    PieceView,
+    PieceSnapshot,
     SortingCounters,
-    SortingView,
+    SortingSnapshot,
 )
 from app.live.sorting.table import Block, SortingTable
 from app.sim.cells.cell import Cell
@@ -44,12 +44,12 @@ class SnapshotInputs:
     """Where the tool is [m], shape (3,)."""
 
 
-def view_of(inputs: SnapshotInputs) -> SortingView:
+def view_of(inputs: SnapshotInputs) -> SortingSnapshot:
     """Return the sorting task as it is now."""
     table, decision = inputs.table, inputs.controller.decision
     policy, choice = inputs.controller.policy, inputs.choice
     ranked = () if decision is None else decision.ranked[:MAX_RANKED]
-    return SortingView(
+    return SortingSnapshot(
         pieces=tuple(_piece(inputs, one) for one in table.blocks),
         goal=_goal(inputs),
         failure=tuple(table.fail.tolist()),
@@ -76,7 +76,7 @@ def is_solved(table: SortingTable) -> bool:
     return state.solved and bool((state.goal != NULL).any()) and table.held is None
 
 
-def table_of(cell: Cell, view: SortingView) -> SortingTable:
+def table_of(cell: Cell, view: SortingSnapshot) -> SortingTable:
     """Return a table as a view shows it, to try a change on."""
     table = SortingTable(cell)
     for piece in sorted(view.pieces, key=lambda one: one.level):
@@ -90,7 +90,7 @@ def table_of(cell: Cell, view: SortingView) -> SortingTable:
     return table
 
 
-def _piece(inputs: SnapshotInputs, block: Block) -> PieceView:
+def _piece(inputs: SnapshotInputs, block: Block) -> PieceSnapshot:
     table = inputs.table
     size = table.shape.size_of(block.code)
     half = half_size(table.cell, size, table.shape.n_sizes)
@@ -100,7 +100,7 @@ def _piece(inputs: SnapshotInputs, block: Block) -> PieceView:
         position, level = table.place_of(block)
         place = table.names.stations[position]
         top = table.point(position, level)
-    return PieceView(
+    return PieceSnapshot(
         id=block.id,
         colour=table.names.colours[table.shape.colour_of(block.code)],
         size=table.names.sizes[size],
@@ -113,7 +113,7 @@ def _piece(inputs: SnapshotInputs, block: Block) -> PieceView:
     )
 
 
-def _goal(inputs: SnapshotInputs) -> tuple[GoalBlockView, ...]:
+def _goal(inputs: SnapshotInputs) -> tuple[GoalBlockSnapshot, ...]:
     table, found = inputs.table, []
     for c, codes in enumerate(table.goal.tolist()):
         good = True
@@ -126,7 +126,7 @@ def _goal(inputs: SnapshotInputs) -> tuple[GoalBlockView, ...]:
             half = half_size(table.cell, size, table.shape.n_sizes)
             top = table.point(table.shape.n_cells + c, level)
             found.append(
-                GoalBlockView(
+                GoalBlockSnapshot(
                     tower=table.names.towers[c],
                     level=level,
                     colour=table.names.colours[table.shape.colour_of(code)],
@@ -139,13 +139,13 @@ def _goal(inputs: SnapshotInputs) -> tuple[GoalBlockView, ...]:
     return tuple(found)
 
 
-def _ranked(table: SortingTable, one: RankedMove) -> MoveView:
+def _ranked(table: SortingTable, one: RankedMove) -> MoveSnapshot:
     held = table.held is not None and one.move.pick == table.seat
     block = table.held if held else table.top(one.move.pick)
     return _view(table, one.move, block, one.value, one.fewest)
 
 
-def _current(inputs: SnapshotInputs, choice: MoveChoice) -> MoveView:
+def _current(inputs: SnapshotInputs, choice: MoveChoice) -> MoveSnapshot:
     decision = inputs.controller.decision
     same = [
         one for one in (() if decision is None else decision.ranked) if one.move == choice.move
@@ -156,10 +156,10 @@ def _current(inputs: SnapshotInputs, choice: MoveChoice) -> MoveView:
 
 def _view(
     table: SortingTable, move: Move, block: Block | None, value: float | None, best: bool
-) -> MoveView:
+) -> MoveSnapshot:
     if value is not None and not np.isfinite(value):
         value = None
-    return MoveView(
+    return MoveSnapshot(
         pick=table.names.stations[move.pick],
         place=table.names.stations[move.place],
         piece=None if block is None else block.id,

@@ -1,138 +1,135 @@
-"""What is known about the sorting task of a live cell at one tick, frozen.
+"""State of the sorting task of a live cell at one tick.
 
-Pieces are blocks with an id that stays theirs; the sorter knows only their codes
-(``sorting_state.py``). Places are the ids of stations: ``cell3`` a clutter cell, ``red`` a
-tower. Lengths are metres in the robot's base frame.
+Blocks have constant ids; the sorting policy knows only colour and size. Places are
+station ids: ``cell3`` is a clutter cell, ``red`` a tower. Lengths are in the robot base frame.
 """
 
 from dataclasses import dataclass
 from typing import Literal
 
-from app.sim.core.arrays import Vec
+from app.live.read_model import Numbers, ReadModel
 
 HELD = "held"
-"""Place of the piece that hangs at the magnet."""
+"""Place of the block in the gripper."""
 Phase = Literal["idle", "approach", "grasp", "carry", "place"]
-"""``approach``: the pick policy brings the tool over a piece; ``grasp``: down to it, the magnet
-closes, up again; ``carry``: the policy brings it over its place; ``place``: down, the magnet
-opens, up again; ``idle``: nothing to do, or nobody to do it."""
+"""``approach``: the pick policy moves the tool over a block; ``grasp``: down, the gripper
+closes, up; ``carry``: the policy moves the block over its place; ``place``: down, the gripper
+opens, up; ``idle``: no move or no policy."""
 Decider = Literal["policy", "planner"]
-"""Who chose the current move."""
+"""Source of the present move."""
+MAX_RANKED = 5
+"""Maximum number of ranked moves in a snapshot."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PieceView:
+class PieceSnapshot(ReadModel):
     """One block."""
 
     id: str
-    """Name, never used again: ``block1``, ``block2``, ..."""
+    """name, never reused: `block1`, `block2`, ..."""
     colour: str
-    """Colour; the cell's towers say which there are."""
+    """colour of one of the towers"""
     size: str
-    """Size: ``small``, ``medium`` or ``large``."""
+    """small, medium or large"""
     place: str
-    """Id of the station it is on, or HELD."""
+    """id of the station it is on, or `held`"""
     level: int
-    """Level on a tower, 0 the lowest; 0 in the clutter and at the magnet."""
-    position: Vec
-    """Centre [m], shape (3,), read-only."""
-    half_size: Vec
-    """Half of length, width and height [m], shape (3,), read-only."""
+    """level on a tower, 0 the lowest; 0 elsewhere"""
+    position: Numbers
+    """centre [m]"""
+    half_size: Numbers
+    """half of length, width and height [m]"""
     held: bool
-    """Whether it hangs at the magnet."""
+    """whether the gripper holds it"""
     in_goal: bool
-    """Whether the goal asks for it; of twins as many as the goal asks for."""
+    """whether it is part of the goal; of duplicates as many as the goal contains"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class GoalBlockView:
-    """One block that the goal asks for, where it shall stand."""
+class GoalBlockSnapshot(ReadModel):
+    """One block of the goal."""
 
     tower: str
-    """Id of the tower."""
+    """id of the tower"""
     level: int
-    """Level, 0 the lowest."""
+    """level, 0 the lowest"""
     colour: str
-    """Colour."""
+    """colour"""
     size: str
-    """Size."""
-    position: Vec
-    """Centre [m], shape (3,), read-only."""
-    half_size: Vec
-    """Half of length, width and height [m], shape (3,), read-only."""
+    """size"""
+    position: Numbers
+    """centre [m]"""
+    half_size: Numbers
+    """half of length, width and height [m]"""
     done: bool
-    """Whether such a block stands there, on nothing wrong."""
+    """whether such a block is there, with no wrong one below"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MoveView:
-    """One move that the sorter may choose."""
+class MoveSnapshot(ReadModel):
+    """One move that can be chosen."""
 
     pick: str
-    """Station a piece is taken from."""
+    """station of the block"""
     place: str
-    """Station it is put on."""
+    """station it is placed on"""
     piece: str | None
-    """Id of the piece; None where it is not known any more."""
+    """id of the block; null if it is gone"""
     value: float | None
-    """The sorter's value ``Q(s, a)``; None where the planner alone knows."""
+    """Q(s, a) of the sorting policy; null if only the planner decides"""
     best: bool
-    """Whether the exact planner counts it among the first moves of a shortest plan."""
+    """whether it begins a shortest plan of the exact planner"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SortingCounters:
-    """What the sorter did since the task began (a reset or a test)."""
+class SortingCounters(ReadModel):
+    """Events since the task began (a reset or a test)."""
 
     moves: int = 0
-    """Pieces that were carried to where they should go."""
+    """blocks placed"""
     attempts: int = 0
-    """Grasps tried, the failed ones included."""
+    """grasps, the failed ones included"""
     failures: int = 0
-    """Grasps that failed."""
+    """failed grasps"""
     planner_fallbacks: int = 0
-    """Times at which the exact planner took over from the policy."""
+    """fallbacks from the policy to the exact planner"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SortingView:
+class SortingSnapshot(ReadModel):
     """The sorting task at one tick."""
 
-    pieces: tuple[PieceView, ...]
-    """The blocks, in the order of their ids; the held one too."""
-    goal: tuple[GoalBlockView, ...]
-    """What the towers shall be, tower by tower from the lowest level."""
+    pieces: tuple[PieceSnapshot, ...]
+    """blocks in the order of their ids, the held one included"""
+    goal: tuple[GoalBlockSnapshot, ...]
+    """goal, tower by tower from the lowest level"""
     failure: tuple[float, ...]
-    """Chance that a grasp fails, by clutter cell in the cell's order."""
+    """probability that a grasp fails, by clutter cell"""
     colours: tuple[str, ...]
-    """The colours there are, in the order of the towers."""
+    """colours, in the order of the towers"""
     sizes: tuple[str, ...]
-    """The sizes there are, from the smallest."""
-    move: MoveView | None
-    """The move that is carried out; None while nothing is."""
+    """sizes, from the smallest"""
+    move: MoveSnapshot | None
+    """present move"""
     phase: Phase
-    """How far it is."""
+    """phase of the move: idle, approach, grasp, carry or place"""
     decided_by: Decider | None
-    """Who chose it; None while nothing is carried out."""
+    """source of the move; null without one"""
     duplicates: tuple[str, ...]
-    """Ids of the pieces whose moves the sorter calls equal; of two or more the critic chose."""
-    ranked: tuple[MoveView, ...]
-    """The best valid moves, best first, at most MAX_RANKED."""
+    """ids of blocks of equal value; of several the critic selects one"""
+    ranked: tuple[MoveSnapshot, ...]
+    """best valid moves, best first"""
     moves_to_go: int
-    """Fewest moves to the goal, as the pieces lie; the held one counts where it was."""
+    """fewest moves to the goal; a held block counts at its former place"""
     attempts_to_go: float
-    """Expected grasps of that plan, failed ones included."""
+    """expected grasps of that plan, failed ones included"""
     counters: SortingCounters
-    """What the sorter did since the task began."""
+    """events since the task began"""
     sorting_policy: str | None
-    """SHA-256 of the sorter's checkpoint; None: the exact planner alone."""
+    """SHA-256 of the sorting policy; null: the exact planner alone"""
     sorting_policy_title: str | None
-    """Its short text for people."""
+    """title of the sorting policy"""
     test: str | None
-    """Id of the running test."""
+    """id of the running test"""
     solved: bool
-    """Whether every tower is as the goal asks; a cell without a goal is not solved."""
-
-
-MAX_RANKED = 5
-"""Most moves that a snapshot ranks."""
+    """whether every tower matches the goal; false without a goal"""

@@ -9,7 +9,7 @@ from app.live.command_checks import Command
 from app.live.people.workers import LivePeople, place_of
 from app.live.pick.world import LivePickWorld
 from app.live.playback import PlayedMotion, Recording
-from app.live.snapshot import PersonView, WorldSnapshot
+from app.live.snapshot import PersonSnapshot, WorldSnapshot
 from app.sim.cells.cell import Cell, load_cell
 from app.sim.collision.contact import clearance
 from app.sim.human import model as human
@@ -52,12 +52,12 @@ def play(world: LivePickWorld, person: int = 0, **how: float) -> WorldSnapshot:
     raise AssertionError("the person never begins")
 
 
-def palms(person: PersonView) -> np.ndarray:
+def palms(person: PersonSnapshot) -> np.ndarray:
     points = human.joint_points(person.q, person.size)
     return np.stack([points["hand_r"], points["hand_l"]])
 
 
-def gap(first: PersonView, second: PersonView, floor_z: float) -> float:
+def gap(first: PersonSnapshot, second: PersonSnapshot, floor_z: float) -> float:
     """Least distance of two people's capsules, by sampling their axes [m]."""
     shares = np.linspace(0.0, 1.0, 9)[:, None]
     lines = []

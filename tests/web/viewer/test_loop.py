@@ -94,8 +94,8 @@ def test_command_that_fits_no_more_when_its_turn_comes_is_named() -> None:
     refused = live.handle.snapshot().refused
     live.stop()
     assert refused is not None
-    assert refused[0] == number
-    assert "cell5" in refused[1]
+    assert refused.number == number
+    assert "cell5" in refused.reason
 
 
 def test_bad_commands_are_refused_at_the_door(live: LiveCell) -> None:
@@ -108,7 +108,7 @@ def test_bad_commands_are_refused_at_the_door(live: LiveCell) -> None:
 def test_person_can_be_changed_as_soon_as_it_was_added(live: LiveCell) -> None:
     live.handle.submit(commands.AddPerson())
     live.handle.submit(commands.SetAnthropometry(person=1, stature=90.0))
-    wait_for(lambda: live.handle.snapshot().people[-1].body.stature == 90.0)
+    wait_for(lambda: live.handle.snapshot().people[-1].anthropometry.stature == 90.0)
     live.handle.submit(commands.RemovePerson(person=1))
     with pytest.raises(InvalidInput, match="no person"):
         live.handle.submit(commands.SetMode(person=1, mode="still"))

@@ -142,7 +142,7 @@ function Progress({ person, motion }) {
 
 /** Sliders in percentiles of adults, with the centimetres they come to. */
 function Size({ person, send }) {
-  const { id, body, mode } = person;
+  const { id, anthropometry: body, mode } = person;
   const [local, setLocal] = useState({});
   const change = useThrottled((name, value) =>
     send({ tag: "set-anthropometry", person: id, [name]: value }));
@@ -153,7 +153,7 @@ function Size({ person, send }) {
   return html`<div class="dock-row sizes">
     <span class="dock-label">Size</span>
     ${SLIDERS.map(([name, label, shown]) => html`<label key=${name} class="size" data-size=${name}>
-      <span><span>${label}${recorded ? "" : ` ${Math.round(local[name] ?? body[name])} %`}</span>
+      <span><span>${label}${recorded ? "" : ` P${Math.round(local[name] ?? body[name])}`}</span>
         <b data-role=${`${name}-text`}>${shown(body)}</b></span>
       <input type="range" min=${PERCENTILES[0]} max=${PERCENTILES[1]} step="1"
         class=${recorded ? "is-idle" : ""}

@@ -11,7 +11,7 @@ import numpy as np
 import viser
 
 from app.live.commands import MovePerson
-from app.live.snapshot import PersonView
+from app.live.snapshot import PersonSnapshot
 from app.sim.human import model as human
 from web.viewer.poses import Vec, upright, yaw_of
 
@@ -100,7 +100,7 @@ class Gizmos:
         """Take the gizmos out of the scene."""
         self._frame.remove()
 
-    def draw(self, person: PersonView) -> None:
+    def draw(self, person: PersonSnapshot) -> None:
         """Show the gizmos in manual mode, each where its body is."""
         manual = person.mode == "manual"
         for gizmo in (self._pelvis, *self._hands.values()):

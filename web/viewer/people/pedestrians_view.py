@@ -3,7 +3,7 @@
 import numpy as np
 import viser
 
-from app.live.snapshot import PersonView, WorldSnapshot
+from app.live.snapshot import PersonSnapshot, WorldSnapshot
 from app.sim.cells.cell import Cell
 from web.viewer.people.mannequin import VESTS, Rgb
 from web.viewer.scene.solid_meshes import disc, torus
@@ -46,7 +46,7 @@ class WalkersView:
 class _Cylinder:
     """One cylinder of radius 1, stretched to the person's."""
 
-    def __init__(self, scene: viser.SceneApi, person: PersonView, floor: float) -> None:
+    def __init__(self, scene: viser.SceneApi, person: PersonSnapshot, floor: float) -> None:
         assert person.cylinder is not None
         root, color = f"/cylinders/{person.id}", VESTS[person.id % len(VESTS)]
         self._color: Rgb = color
@@ -92,7 +92,7 @@ class _Cylinder:
         """Take it out of the scene."""
         self._frame.remove()
 
-    def draw(self, person: PersonView, *, hit: bool) -> None:
+    def draw(self, person: PersonSnapshot, *, hit: bool) -> None:
         """Show it where the person is."""
         one = person.cylinder
         assert one is not None

@@ -5,8 +5,7 @@ from collections.abc import Callable
 import viser
 
 from app.live.commands import MovePerson
-from app.live.snapshot import PersonView as Seen
-from app.live.snapshot import WorldSnapshot
+from app.live.snapshot import PersonSnapshot, WorldSnapshot
 from app.sim.cells.cell import Cell
 from web.viewer.people.gizmos import Gizmos
 from web.viewer.people.person_view import PersonView
@@ -53,7 +52,7 @@ class PeopleView:
             view.show_capsules(shapes, contact.body if contact and touched else None)
             gizmos.draw(person)
 
-    def _add(self, person: Seen) -> tuple[PersonView, Gizmos]:
+    def _add(self, person: PersonSnapshot) -> tuple[PersonView, Gizmos]:
         """Show a person that was not there at the last call."""
         view = self._hidden.pop(person.id, None)
         if view is None:

@@ -10,7 +10,7 @@ gets its meshes by adding them under the same names, which the client takes as a
 import numpy as np
 import viser
 
-from app.live.snapshot import PersonView as Seen
+from app.live.snapshot import PersonSnapshot
 from app.sim.cells.cell import Cell
 from app.sim.human import model as human
 from app.sim.human.kernels.kinematics import GIRTH, PELVIS_Z
@@ -32,7 +32,7 @@ class PersonView:
         person: Who is drawn.
     """
 
-    def __init__(self, server: viser.ViserServer, cell: Cell, person: Seen) -> None:
+    def __init__(self, server: viser.ViserServer, cell: Cell, person: PersonSnapshot) -> None:
         self._scene, self._cell, self._id = server.scene, cell, person.id
         self._root = f"/people/{person.id}"
         self._gait = Gait(cell.floor_z)
@@ -49,7 +49,7 @@ class PersonView:
         self._frame.visible = False
         self.show_capsules(False, None)
 
-    def show(self, person: Seen) -> None:
+    def show(self, person: PersonSnapshot) -> None:
         """Show a person that was hidden, or another one of the same number."""
         self._gait = Gait(self._cell.floor_z)
         self._drawn = None
@@ -58,7 +58,7 @@ class PersonView:
             self._fit(person)
         self._frame.visible = True
 
-    def _fit(self, person: Seen) -> None:
+    def _fit(self, person: PersonSnapshot) -> None:
         """Give the mannequin the person's size."""
         self._fitted = _lengths(person.size)
         bind = skeleton.bind_bones(person.size)
@@ -105,7 +105,7 @@ class PersonView:
             color=part.color,
         )
 
-    def draw(self, person: Seen, dt: float) -> None:
+    def draw(self, person: PersonSnapshot, dt: float) -> None:
         """Show the person in a posture.
 
         Args:
@@ -131,7 +131,7 @@ class PersonView:
             solid.position = bones[name][:3, 3]
         self._capsules.place(human.capsules(q, size, self._cell.floor_z))
 
-    def _follow_size(self, person: Seen) -> None:
+    def _follow_size(self, person: PersonSnapshot) -> None:
         """Fit the skin once the size stands still; until then the bones alone move."""
         lengths, before = _lengths(person.size), self._lengths
         self._lengths = lengths

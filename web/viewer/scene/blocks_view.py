@@ -6,7 +6,7 @@ import numpy as np
 import viser
 
 from app.live.sorting.commands import ToggleGoal
-from app.live.sorting.snapshot import PieceView
+from app.live.sorting.snapshot import PieceSnapshot
 from web.viewer.poses import Vec
 from web.viewer.scene.sorting_bodies import BLOCKS, block_body
 
@@ -28,7 +28,7 @@ class BlocksView:
         self._scene, self._submit = server.scene, submit
         self._drawn: dict[str, tuple[viser.GlbHandle, Vec]] = {}
 
-    def draw(self, pieces: tuple[PieceView, ...]) -> None:
+    def draw(self, pieces: tuple[PieceSnapshot, ...]) -> None:
         """Show the blocks where they are."""
         here = {piece.id for piece in pieces}
         for id in self._drawn.keys() - here:
@@ -42,7 +42,7 @@ class BlocksView:
                 handle.position = piece.position
                 self._drawn[piece.id] = handle, piece.position
 
-    def _add(self, piece: PieceView) -> viser.GlbHandle:
+    def _add(self, piece: PieceSnapshot) -> viser.GlbHandle:
         x, y, z = piece.half_size.tolist()
         body = self._scene.add_glb(
             f"/blocks/{piece.id}",

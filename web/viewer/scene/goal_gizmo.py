@@ -11,7 +11,7 @@ import numpy as np
 import viser
 
 from app.live.reach.commands import MoveGoal, goal_box
-from app.live.reach.snapshot import ReachView
+from app.live.reach.snapshot import ReachSnapshot
 from app.sim.cells.cell import Cell
 from web.viewer.people.gizmos import HOLD_S, SETTLE_S
 from web.viewer.people.mannequin import Rgb
@@ -70,7 +70,7 @@ class GoalGizmo:
         x, y, z = np.clip(position, self._low, self._high).tolist()
         return x, y, z
 
-    def draw(self, view: ReachView, *, reached: bool) -> None:
+    def draw(self, view: ReachSnapshot, *, reached: bool) -> None:
         """Show the goal, and bring a handle that nobody holds to it."""
         color = REACHED if reached else GOAL
         if np.abs(self._frame.position - view.goal).max() > 1e-4:

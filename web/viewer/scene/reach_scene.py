@@ -11,7 +11,7 @@ import numpy as np
 import viser
 
 from app.live.reach.commands import MoveGoal, goal_box
-from app.live.reach.snapshot import ReachView, SafetyView
+from app.live.reach.snapshot import ReachSnapshot, SafetySnapshot
 from app.live.snapshot import WorldSnapshot
 from app.sim.cells.cell import Cell
 from app.sim.reach.batch import goal_region_of
@@ -39,7 +39,7 @@ TRAIL_M = 4e-3
 BACK: Rgb = (226, 230, 235)
 
 
-def override_color(safety: SafetyView) -> Rgb:
+def override_color(safety: SafetySnapshot) -> Rgb:
     """Return the colour of the robot's rate; grey where the layer is off."""
     if not safety.on:
         return OFF
@@ -110,7 +110,7 @@ class _Zone:
         )
         self._key: tuple[object, ...] = ()
 
-    def draw(self, view: ReachView, *, visible: bool) -> None:
+    def draw(self, view: ReachSnapshot, *, visible: bool) -> None:
         """Show the zone of this state."""
         for part in (self._area, self._edge):
             if part.visible != visible:
@@ -150,7 +150,7 @@ class _Gauge:
         )
         self._key: tuple[object, ...] = ()
 
-    def draw(self, view: ReachView) -> None:
+    def draw(self, view: ReachSnapshot) -> None:
         """Show the override of this state."""
         safety, color = view.safety, override_color(view.safety)
         full = round(N_GAUGE * safety.override)

@@ -10,7 +10,7 @@ import viser
 
 from app.live.snapshot import WorldSnapshot
 from app.live.sorting.commands import ToggleGoal
-from app.live.sorting.snapshot import SortingView
+from app.live.sorting.snapshot import SortingSnapshot
 from app.sim.cells.cell import Cell
 from web.viewer.poses import Vec
 from web.viewer.scene.arc import Arc
@@ -76,7 +76,7 @@ class SortingScene:
             ring.position = at
 
 
-def _ends(view: SortingView, cell: Cell, floor: float) -> tuple[Vec, Vec, bool] | None:
+def _ends(view: SortingSnapshot, cell: Cell, floor: float) -> tuple[Vec, Vec, bool] | None:
     """Return where the block is and where it will stand [m], and whether it is held."""
     if view.move is None or view.phase == "idle":
         return None
@@ -88,7 +88,7 @@ def _ends(view: SortingView, cell: Cell, floor: float) -> tuple[Vec, Vec, bool] 
     return start, _place(view, cell, floor), piece.held
 
 
-def _place(view: SortingView, cell: Cell, floor: float) -> Vec:
+def _place(view: SortingSnapshot, cell: Cell, floor: float) -> Vec:
     """Return the middle of the free place that the move ends on [m], shape (3,)."""
     assert view.move is not None
     station = cell.station(view.move.place)

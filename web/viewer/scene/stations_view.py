@@ -12,7 +12,7 @@ import trimesh
 import viser
 
 from app.live.commands import ToggleCandidate
-from app.live.snapshot import CandidateView, WorldSnapshot
+from app.live.snapshot import CandidateSnapshot, WorldSnapshot
 from app.sim.cells.cell import Cell
 from app.sim.cells.parts import Station
 from web.viewer.people.mannequin import Rgb
@@ -145,7 +145,7 @@ class StationsView:
                 self._marker.position = (x, y, 0.0)
 
 
-def _text(station: Station, candidate: CandidateView | None, values: list[float]) -> str:
+def _text(station: Station, candidate: CandidateSnapshot | None, values: list[float]) -> str:
     if candidate is None or candidate.value is None:
         return station.label
     sign = "\N{BLACK RIGHT-POINTING SMALL TRIANGLE} " if candidate.chosen else ""

@@ -3,7 +3,7 @@
 import numpy as np
 import viser
 
-from app.live.sorting.snapshot import GoalBlockView
+from app.live.sorting.snapshot import GoalBlockSnapshot
 from app.sim.cells.cell import Cell
 from web.viewer.scene.clutter_view import tray_height
 from web.viewer.scene.sorting_bodies import BLOCKS, ghost_body, tower_plate
@@ -32,7 +32,7 @@ class TowersView:
                 )
         self._ghosts: dict[tuple[str, int], tuple[Kind, viser.MeshHandle]] = {}
 
-    def draw(self, goal: tuple[GoalBlockView, ...]) -> None:
+    def draw(self, goal: tuple[GoalBlockSnapshot, ...]) -> None:
         """Show what is wanted and not there yet."""
         wanted = {(one.tower, one.level): one for one in goal if not one.done}
         for place in self._ghosts.keys() - wanted.keys():
@@ -46,7 +46,7 @@ class TowersView:
                 known[1].remove()
             self._ghosts[place] = kind, self._add(block)
 
-    def _add(self, block: GoalBlockView) -> viser.MeshHandle:
+    def _add(self, block: GoalBlockSnapshot) -> viser.MeshHandle:
         x, y, z = block.half_size.tolist()
         mesh = ghost_body((x, y, z))
         return self._scene.add_mesh_simple(

@@ -12,7 +12,7 @@ from app.live.command_checks import Command
 from app.live.pick.world import LivePickWorld
 from app.live.snapshot import WorldSnapshot
 from app.live.sorting.commands import ToggleGoal
-from app.live.sorting.snapshot import HELD, SortingView
+from app.live.sorting.snapshot import HELD, SortingSnapshot
 from app.sim.cells.cell import Cell, load_cell
 from tests.web.sorting_views import a_view, centre, piece
 from tests.web.viewer_client import ViewerClient
@@ -122,7 +122,7 @@ def test_rings_mark_the_block_and_the_top_of_its_tower(
 def test_nothing_is_marked_while_nothing_is_carried_out(
     scene: CellScene, server: viser.ViserServer, still: WorldSnapshot, cell: Cell
 ) -> None:
-    idle: SortingView = replace(a_view(cell), move=None, phase="idle")
+    idle: SortingSnapshot = replace(a_view(cell), move=None, phase="idle")
     scene.draw(replace(still, sorting=idle), 0.05)
     for name in ("/marks/pick", "/marks/place", "/move/arc"):
         assert not node(server, name).visible
