@@ -140,7 +140,7 @@ def test_who_stands_near_does_not_hold_the_robot_where_velocities_are_measured()
     world.apply(SetSafety(on=True, use_measured_velocity=True))
     measured = world.snapshot().reach.safety
     assert assumed.advised < measured.advised == 1.0
-    assert (assumed.use_measured_velocity, measured.measured) == (False, True)
+    assert (assumed.use_measured_velocity, measured.use_measured_velocity) == (False, True)
     assert (assumed.human_speed, measured.human_speed) == (1.6, pytest.approx(0.1))
     assert measured.required < assumed.required
     assert np.ptp(measured.zone, axis=0).max() < np.ptp(assumed.zone, axis=0).max() - 0.3
