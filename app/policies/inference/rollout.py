@@ -119,13 +119,11 @@ class Lookahead:
         self._call: Callable[..., None] = kernel.look_ahead_batch
 
     def forget(self) -> None:
-        """Forget what was begun and found before: the next decision stands for itself."""
+        """Forget what was begun before: the next decision stands for itself."""
         if self._work is None:
             return
         look = self._work[1]
         look.plan[:], look.drawn[:], look.nearest[:] = PASSED, 0, 0.0
-        told = look.foretold
-        told.found[:], told.since[:], told.course[:] = 0.0, 0.0, 0.0
 
     def improve(self, cells: Cells, act: Actions) -> NDArray[np.int64]:
         """Replace actions that end in a contact by the first ones of better ways.

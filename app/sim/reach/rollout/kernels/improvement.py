@@ -288,7 +288,6 @@ def look_ahead_batch(
         chosen[e] = PASSED
         if state.outcome[e] != RUNNING:
             continue
-        look.foretold.since[e] += world.arm.dt
         if state.elapsed[e] == 0.0:
             look.plan[e, 0] = PASSED
             look.drawn[e], look.nearest[e, 0] = 0, 0.0

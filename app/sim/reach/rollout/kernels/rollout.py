@@ -149,7 +149,7 @@ def new_lookahead(arm: Arm, net: Network, base_weight: float, n_envs: int) -> Lo
 
     return Lookahead(
         actor=new_residual_actor(net, base_weight),
-        foretold=new_foretold(n_envs),
+        foretold=new_foretold(),
         aim=aim,
         q=np.zeros(6),
         qd=np.zeros(6),
