@@ -24,7 +24,7 @@ from app.sim.human import model as human
 from app.sim.perception.keypoints import BODY_25, keypoints_of
 from app.sim.perception.observed_people import as_monitored
 from app.sim.perception.single_frame import estimate_once
-from app.sim.reach.query_state import Stage
+from app.sim.reach.query_state import QueryState
 from app.sim.robot.measured_state import Joints
 from app.sim.safety.layer import SafetyLayer, safety_settings
 from app.sim.scene.scene import arm_of
@@ -280,7 +280,7 @@ def test_a_raised_arm_is_monitored_to_its_full_height() -> None:
     person = as_monitored(estimate_once(points, CELL.body, floor_z=CELL.floor_z))
     assert person is not None and person.cylinder is not None
     assert person.top is not None and person.top > 1.6
-    stage = Stage(CELL, 0, 1, policy().actor.view)
+    stage = QueryState(CELL, 0, 1, policy().actor.view)
     stage.put(Joints(np.array(CELL.robot.home_q), np.zeros(6), np.zeros(6)), [person], 5.0)
     assert stage.shapes.cylinders[0, 3] == person.top > stage.top_z
     stage.put(

@@ -11,18 +11,18 @@ from app.policies.inference.controllers import RolloutController, controller_of
 from app.policies.inference.motion_decision import MotionDecider
 from app.policies.inference.reach_policy import ReachPolicy
 from app.policies.inference.rollout import (
-    LONGEST_AHEAD,
-    NO_LAYER,
-    SPARE_M,
+    LONGEST_HORIZON,
+    NO_CONSTRAINT,
+    SPARE_DISTANCE,
     Layer,
     Lookahead,
-    layer_of,
+    ssm_constraint_of,
 )
 from app.policies.networks.actor_critic import BASE_WEIGHT
 from app.sim.cells.cell import load_cell
 from app.sim.people.kernels.pedestrian import GAIT, STILL, VX, VY, X, Y
 from app.sim.perception.observed_people import person_from_cylinder
-from app.sim.prediction.weights import new_forecaster
+from app.sim.prediction.weights import new_motion_predictor
 from app.sim.reach.batch import ReachBatch, ReachSettings
 from app.sim.reach.crossings import crossings
 from app.sim.reach.kernels.episode import new_work
@@ -53,7 +53,7 @@ def heeded(batch: ReachBatch, layer: Layer) -> list[tuple[float, np.ndarray]]:
     network = POLICY.kernel_network
     assert network is not None
     look = played_ways.new_lookahead(batch.arm, network, BASE_WEIGHT, batch.n_envs)
-    work, found = new_work(batch.world, batch.state, new_forecaster()), []
+    work, found = new_work(batch.world, batch.state, new_motion_predictor()), []
     look.layer[:] = layer
     for e in range(batch.n_envs):
         n = foretell(batch.world, batch.state, e, LONG_MOMENTS, work, look.foretold)
@@ -66,20 +66,20 @@ def heeded(batch: ReachBatch, layer: Layer) -> list[tuple[float, np.ndarray]]:
 def test_nothing_is_known_where_people_may_come_from_anywhere(
     settings: SafetySettings | None,
 ) -> None:
-    assert layer_of(settings, DT) == NO_LAYER
+    assert ssm_constraint_of(settings, DT) == NO_CONSTRAINT
 
 
 def test_what_is_kept_follows_from_what_the_layer_assumes() -> None:
     settings = replace(MEASURED, speed_change=0.5, intrusion_distance=0.05)
     ahead = 0.1 + 0.02 + 0.03
-    layer = layer_of(settings, 0.02, age=0.03)
+    layer = ssm_constraint_of(settings, 0.02, age=0.03)
     assert layer.ahead == pytest.approx(ahead)
-    assert layer.distance == pytest.approx(0.35 + 0.5 * ahead + SPARE_M)
-    assert layer_of(settings, 0.02, age=60.0).ahead == LONGEST_AHEAD
+    assert layer.distance == pytest.approx(0.35 + 0.5 * ahead + SPARE_DISTANCE)
+    assert ssm_constraint_of(settings, 0.02, age=60.0).ahead == LONGEST_HORIZON
 
 
 def test_whoever_is_nearer_already_is_left_to_the_layer() -> None:
-    layer = layer_of(MEASURED, DT)
+    layer = ssm_constraint_of(MEASURED, DT)
     near, far = heeded(standing((0.1, 0.95), (0.1, 1.8)), layer)
     assert near[0] == 0.0 and far[0] == layer.distance
 
@@ -90,7 +90,9 @@ def test_a_posture_is_found_at_every_target() -> None:
     batch = standing(*[(-2.0, 2.0)] * 54)
     batch.set_goals(np.arange(54), targets)
     pose = new_robot_pose(batch.arm)
-    for goal, (_, posture) in zip(targets, heeded(batch, layer_of(MEASURED, DT)), strict=True):
+    for goal, (_, posture) in zip(
+        targets, heeded(batch, ssm_constraint_of(MEASURED, DT)), strict=True
+    ):
         place_robot(batch.arm, posture, pose)
         assert np.linalg.norm(pose.tcp - goal) < 0.1
         assert (batch.arm.limits.q_min <= posture).all() and (
@@ -107,7 +109,7 @@ def test_looking_farther_changes_nothing_of_what_is_foretold_sooner() -> None:
         network = POLICY.kernel_network
         assert network is not None
         look = played_ways.new_lookahead(batch.arm, network, BASE_WEIGHT, 40)
-        work = new_work(batch.world, batch.state, new_forecaster())
+        work = new_work(batch.world, batch.state, new_motion_predictor())
         for e in range(40):
             foretell(batch.world, batch.state, e, moments, work, look.foretold)
             told.append(look.foretold.places[:MOMENTS, 0].copy())
@@ -121,7 +123,7 @@ def test_people_who_cross_hold_the_robot_less_and_walk_into_it_less() -> None:
     direct = controller_of(POLICY, "direct")
     heedless, heeding = (
         comparison.policy(RolloutController(direct, POLICY, layer)).runs
-        for layer in (NO_LAYER, layer_of(MEASURED, DT))
+        for layer in (NO_CONSTRAINT, ssm_constraint_of(MEASURED, DT))
     )
     assert heeding.arrived.all() and not heeding.touched_moving.any()
     assert heeding.stopped_s.sum() < 0.5 * heedless.stopped_s.sum()
@@ -149,7 +151,7 @@ def test_a_decision_heeds_the_layer_it_is_monitored_by() -> None:
 def test_the_layer_is_told_anew_at_every_call() -> None:
     batch = standing((0.1, 1.8))
     ahead, acts = Lookahead(POLICY), np.zeros((1, 6), dtype=np.float32)
-    for layer in (layer_of(MEASURED, DT), NO_LAYER):
+    for layer in (ssm_constraint_of(MEASURED, DT), NO_CONSTRAINT):
         ahead.layer = layer
         ahead.improve(batch, acts.copy())
         assert ahead._work is not None

@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from app.sim.prediction.kernels.networks import N_PAST, N_TIMES, RADIUS_MIDDLE, RADIUS_SCALE
-from app.sim.prediction.weights import new_forecaster
+from app.sim.prediction.weights import new_motion_predictor
 from tools import train_motion_predictor as make_forecasts
 from tools.train_motion_predictor import disturbed, errors, fitted, going_on_as_now, watched
 
@@ -26,7 +26,7 @@ def test_a_moment_is_what_it_says() -> None:
 
 
 def test_the_shipped_networks_do_much_better_than_going_on_as_now() -> None:
-    net = new_forecaster()
+    net = new_motion_predictor()
     radius = errors(net.radius, OTHERS.radius_seen, OTHERS.radius)
     way = errors(net.way, OTHERS.way_seen, OTHERS.way)
     linear, constant = going_on_as_now(OTHERS)

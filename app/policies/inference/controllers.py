@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.errors import CheckpointMismatch, InvalidInput
-from app.policies.inference.rollout import NO_LAYER, Layer, Lookahead, looks_ahead
+from app.policies.inference.rollout import NO_CONSTRAINT, Layer, Lookahead, can_roll_out
 from app.policies.inference.target_interpolation import Interpolation, interpolates
 from app.sim.core.arrays import Vec
 from app.sim.reach.batch import ReachBatch
@@ -173,7 +173,9 @@ class RolloutController:
         InvalidInput: The policy cannot be simulated by the kernels.
     """
 
-    def __init__(self, base: Controller, actor: ReachActor, layer: Layer = NO_LAYER) -> None:
+    def __init__(
+        self, base: Controller, actor: ReachActor, layer: Layer = NO_CONSTRAINT
+    ) -> None:
         self._base, self._improvement, self.layer = base, Lookahead(actor), layer
 
     def acts(self, batch: ReachBatch) -> Actions:
@@ -220,7 +222,7 @@ def controller_of(actor: ReachActor, mode: str | None = None) -> Controller:
 
 def inference_modes_of(actor: ReachActor) -> tuple[InferenceMode, ...]:
     """Return the inference modes that a policy allows."""
-    targets, rollouts = interpolates(actor), looks_ahead(actor)
+    targets, rollouts = interpolates(actor), can_roll_out(actor)
     return tuple(
         mode
         for mode in InferenceMode

@@ -9,7 +9,7 @@ from app.policies.inference.controllers import (
     controller_of,
     inference_modes_of,
 )
-from app.policies.inference.rollout import layer_of
+from app.policies.inference.rollout import ssm_constraint_of
 from app.sim.core.arrays import Vec
 from app.sim.reach.batch import GoalRule, ReachBatch, ViewName
 from app.sim.reach.reach_actor import ReachActor
@@ -87,5 +87,5 @@ class ReachPilot:
         """
         controller = self._controllers[inference_mode]
         if isinstance(controller, RolloutController):
-            controller.layer = layer_of(safety, batch.arm.dt)
+            controller.layer = ssm_constraint_of(safety, batch.arm.dt)
         return controller.acts(batch)

@@ -16,7 +16,13 @@ import numpy as np
 from app.errors import InvalidInput
 from app.policies.checkpoints.trained_values import Seen, TrainedValues, as_told
 from app.policies.inference.controllers import person_weights
-from app.policies.inference.rollout import OTHERS, PASSED, Lookahead, layer_of, looks_ahead
+from app.policies.inference.rollout import (
+    OTHERS,
+    PASSED,
+    Lookahead,
+    can_roll_out,
+    ssm_constraint_of,
+)
 from app.policies.inference.target_interpolation import Interpolation, interpolates
 from app.sim.cell_validation.reachability import LONGEST_REACH, SHOULDER
 from app.sim.cells.cell import Cell, require_cell
@@ -43,7 +49,7 @@ from app.sim.reach.motion_types import (
     TargetWeight,
     Way,
 )
-from app.sim.reach.query_state import Stage
+from app.sim.reach.query_state import QueryState
 from app.sim.reach.reach_actor import ReachActor
 from app.sim.robot.kernels import actions
 from app.sim.robot.kernels.joints import JointState
@@ -72,14 +78,14 @@ class MotionDecider:
         require_cell(cell, actor.cell, actor.cell_sha256)
         self.actor, self.cell, self.arm = actor, cell, arm_of(cell)
         self._between = Interpolation(actor) if interpolates(actor) else None
-        self._able = looks_ahead(actor)
+        self._able = can_roll_out(actor)
         self._rule = actor.action.rule()
         self._advance: Callable[..., bool] | None = None
         self._limits = StateLimits(self.arm, limits_jerk=actor.action.degree == 3)
         self._met = TrainedValues(actor.trained_range)
-        self._stages: dict[tuple[int, int], Stage] = {}
-        self._last: dict[tuple[int, int], Stage] = {}
-        self._aheads: dict[Stage, Lookahead] = {}
+        self._stages: dict[tuple[int, int], QueryState] = {}
+        self._last: dict[tuple[int, int], QueryState] = {}
+        self._aheads: dict[QueryState, Lookahead] = {}
         self._layer = SafetyLayer(self.arm, SafetySettings())
         self._busy = threading.Lock()
 
@@ -200,14 +206,14 @@ class MotionDecider:
         return self._able if asked is None else asked
 
     def _improve(
-        self, stage: Stage, question: MotionQuestion, goal: Vec, act: Vec
+        self, stage: QueryState, question: MotionQuestion, goal: Vec, act: Vec
     ) -> str | None:
         """Play an action ahead; change it where another way is better, and return its name."""
         if stage not in self._aheads:
             self._aheads[stage] = Lookahead(self.actor)
         ahead = self._aheads[stage]
         ahead.forget()
-        ahead.layer = layer_of(question.safety, self.arm.dt, question.age_s)
+        ahead.layer = ssm_constraint_of(question.safety, self.arm.dt, question.age_s)
         state = stage.state
         state.goal[0], state.elapsed[0] = goal, question.elapsed_s
         played = act[None].astype(np.float32)
@@ -230,15 +236,17 @@ class MotionDecider:
         stage.put(robot.measured, last, 0.0)
         return stage.shapes, places
 
-    def _stage(self, people: Sequence[Person], stages: dict[tuple[int, int], Stage]) -> Stage:
+    def _stage(
+        self, people: Sequence[Person], stages: dict[tuple[int, int], QueryState]
+    ) -> QueryState:
         n_bodies = sum(person.cylinder is None for person in people)
         kinds = (n_bodies, len(people) - n_bodies)
         if kinds not in stages:
-            stages[kinds] = Stage(self.cell, *kinds, self.actor.view)
+            stages[kinds] = QueryState(self.cell, *kinds, self.actor.view)
         return stages[kinds]
 
     def _act(
-        self, stage: Stage, question: MotionQuestion, goal: Vec, way: Way
+        self, stage: QueryState, question: MotionQuestion, goal: Vec, way: Way
     ) -> tuple[Vec, tuple[TargetWeight, ...], list[float], list[Seen]]:
         """Return action, targets, weights of the people and who was seen, as what."""
         apart = stage.apart

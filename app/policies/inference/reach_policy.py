@@ -42,7 +42,7 @@ LAYOUTS = {
     "crowd": [[name, size] for name, size in (*SIZES, *reach_ways.SIZES, *reach_crowd.SIZES)],
 }
 """Names and sizes of the groups of each kind of observation, as manifests carry them."""
-CROWD = CrowdShape(N_FEATURES + reach_ways.N_WAYS, MAX_PEOPLE, reach_crowd.N_BLOCK)
+CROWD = CrowdShape(N_FEATURES + reach_ways.N_OPTION_FEATURES, MAX_PEOPLE, reach_crowd.N_BLOCK)
 """Where everybody stands as a set in the observation of that name."""
 MAX_LAYERS = 16
 """Most layers of a network taken from a checkpoint."""

@@ -15,7 +15,7 @@ from app.policies.inference.reach_policy import ReachPolicy
 from app.policies.networks.actor_critic import BASE_WEIGHT
 from app.sim.core.jit import direct
 from app.sim.prediction.kernels.networks import STEP_S, Network
-from app.sim.prediction.weights import new_forecaster
+from app.sim.prediction.weights import new_motion_predictor
 from app.sim.reach.kernels.episode import ReachState, ReachWorld, Work, new_work
 from app.sim.reach.reach_actor import ReachActor
 from app.sim.reach.rollout.kernels import candidates as other_ways
@@ -51,20 +51,20 @@ class Layer(NamedTuple):
     """How long they go on until a motion that is asked for now is over [s]."""
 
 
-NO_LAYER = Layer(0.0, 0.0)
+NO_CONSTRAINT = Layer(0.0, 0.0)
 """No layer, or one that takes people to come at once from wherever they are: nothing that is
 known of their way says where it would not hold the robot."""
 
 
-SPARE_M = 0.04
+SPARE_DISTANCE = 0.04
 """People are kept so much farther away than a robot at rest is asked to [m]: one that moves
 must be able to stop. With 0.02 m the time to the goal fell from 4.29 to 4.20 s, and the share
 of runs never stopped from 60 to 43 %, on the first 100 crossings of seed 77."""
-LONGEST_AHEAD = 1.0
+LONGEST_HORIZON = 1.0
 """Longest time ahead for which people's way counts [s]."""
 
 
-def layer_of(settings: SafetySettings | None, dt: float, age: float = 0.0) -> Layer:
+def ssm_constraint_of(settings: SafetySettings | None, dt: float, age: float = 0.0) -> Layer:
     """Return what looking ahead knows of a safety layer.
 
     Args:
@@ -73,16 +73,16 @@ def layer_of(settings: SafetySettings | None, dt: float, age: float = 0.0) -> La
         age: How old people are beyond the tracker's delay [s].
     """
     if settings is None or not settings.use_measured_velocity:
-        return NO_LAYER
-    ahead = min(LONGEST_AHEAD, settings.latency + dt + age)
-    return Layer(settings.margin + settings.speed_change * ahead + SPARE_M, ahead)
+        return NO_CONSTRAINT
+    ahead = min(LONGEST_HORIZON, settings.latency + dt + age)
+    return Layer(settings.margin + settings.speed_change * ahead + SPARE_DISTANCE, ahead)
 
 
 def _network_of(actor: ReachActor) -> Network | None:
     return actor.kernel_network if isinstance(actor, ReachPolicy) else None
 
 
-def looks_ahead(actor: ReachActor) -> bool:
+def can_roll_out(actor: ReachActor) -> bool:
     """Whether a policy can be played ahead: one of ours that sees forecasts."""
     return _network_of(actor) is not None
 
@@ -112,7 +112,7 @@ class Lookahead:
             rule = "must be a residual actor of two layers that sees forecasts, to look ahead"
             raise InvalidInput("checkpoint", actor.checkpoint, rule)
         self._network, self._rule = network, actor.action.rule()
-        self.layer = NO_LAYER
+        self.layer = NO_CONSTRAINT
         """The safety layer that what is played goes through."""
         self._cells: Cells | None = None
         self._work: tuple[Work, played_ways.Lookahead] | None = None
@@ -138,7 +138,10 @@ class Lookahead:
         world, state, chosen = cells.world, cells.state, np.empty(len(act), dtype=np.int64)
         if self._work is None or self._cells is not cells:
             look = played_ways.new_lookahead(world.arm, self._network, BASE_WEIGHT, len(act))
-            self._cells, self._work = cells, (new_work(world, state, new_forecaster()), look)
+            self._cells, self._work = (
+                cells,
+                (new_work(world, state, new_motion_predictor()), look),
+            )
             self._call = direct(
                 kernel.look_ahead_batch, (world, self._rule, state, act, *self._work, chosen)
             )

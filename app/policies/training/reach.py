@@ -29,8 +29,8 @@ from app.sim.pick.batch import OUTCOMES
 from app.sim.reach.batch import N_ACT, ReachBatch, ReachSettings
 from app.sim.reach.kernels.observation import BASE_START
 from app.sim.reach.kernels.reward import ReachWeights
-from app.sim.reach.mixed_batch import ReachMix, ReachRows
-from app.sim.reach.monitored.batch import GuardedReach
+from app.sim.reach.mixed_batch import MixedReachBatch, ReachEnvironments
+from app.sim.reach.monitored.batch import MonitoredReachBatch
 from app.sim.safety.layer import safety_settings
 from app.sim.scene.scene import HumanKind
 
@@ -56,17 +56,19 @@ def settings_of(preset: ReachPreset) -> ReachSettings:
     )
 
 
-def batch_of(preset: ReachPreset, cell: Cell, n_envs: int, seed: int) -> ReachRows:
+def batch_of(preset: ReachPreset, cell: Cell, n_envs: int, seed: int) -> ReachEnvironments:
     """Return the environments of a preset, for training or for its learning curve."""
     settings = settings_of(preset)
     if preset.episode.safety == "ssm":
-        return GuardedReach(cell, n_envs, seed, settings, safety_settings(cell))
+        return MonitoredReachBatch(cell, n_envs, seed, settings, safety_settings(cell))
     if preset.people.count == "up-to":
-        return ReachMix(cell, n_envs, seed, settings)
+        return MixedReachBatch(cell, n_envs, seed, settings)
     return ReachBatch(cell, n_envs, seed, settings)
 
 
-def exploration_of(config: ReachExploration, batch: ReachRows, seed: int) -> Exploration:
+def exploration_of(
+    config: ReachExploration, batch: ReachEnvironments, seed: int
+) -> Exploration:
     """Return the exploration of a preset."""
     rng, shape = np.random.default_rng(seed), (batch.n_envs, N_ACT)
     if config.noise == "ou":
@@ -151,9 +153,9 @@ class ReachReporter(Reporter):
         }
 
 
-def visited_states(batch: ReachRows) -> dict[str, Vec]:
+def visited_states(batch: ReachEnvironments) -> dict[str, Vec]:
     """Return the present states of all environments."""
-    parts = batch.parts if isinstance(batch, ReachMix) else (batch,)
+    parts = batch.parts if isinstance(batch, MixedReachBatch) else (batch,)
     states = [part.state for part in parts]
     visited = {
         "q": np.concatenate([state.q for state in states]),
@@ -168,7 +170,7 @@ def visited_states(batch: ReachRows) -> dict[str, Vec]:
 
 
 def play(
-    actor: torch.nn.Module, batch: ReachRows
+    actor: torch.nn.Module, batch: ReachEnvironments
 ) -> tuple[NDArray[np.int64], NDArray[np.floating]]:
     """Play one greedy episode in every row of a batch.
 

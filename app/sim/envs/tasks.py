@@ -14,7 +14,7 @@ from app.sim.envs.raycast import Image
 from app.sim.envs.rendering import people_solids, picture, target_solids
 from app.sim.pick.batch import OUTCOMES, PickBatch, PickSettings
 from app.sim.reach.batch import ReachBatch, ReachSettings
-from app.sim.reach.mixed_batch import ReachRows
+from app.sim.reach.mixed_batch import ReachEnvironments
 from app.sim.scene.scene import HumanKind
 
 Rows = NDArray[np.int64]
@@ -123,7 +123,7 @@ class ArmTask:
             otherwise it truncates it.
     """
 
-    def __init__(self, batch: PickBatch | ReachRows, *, sees_time: bool) -> None:
+    def __init__(self, batch: PickBatch | ReachEnvironments, *, sees_time: bool) -> None:
         self._stepped, self._sees_time = batch, sees_time
         self.action_space = _box(1.0, batch.n_act)
         self.observation_space = _box(OBS_BOUND, batch.obs_size)
@@ -144,7 +144,7 @@ class ArmTask:
         return late
 
 
-class CellTask(ArmTask):
+class RobotTask(ArmTask):
     """A batch of robots, people and targets.
 
     Args:

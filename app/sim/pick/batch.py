@@ -29,7 +29,7 @@ from app.sim.robot.kernels import actions, kinematics
 from app.sim.robot.kernels import arm as arm_kernel
 from app.sim.robot.kernels.arm import CONTROLLED, Arm
 from app.sim.robot.kernels.joints import JointState
-from app.sim.scenario.batch import CellBatch, Rows
+from app.sim.scenario.batch import EnvBatch, Rows
 from app.sim.scenario.kernels.episode import FEATURES, PLAIN, distance_to
 from app.sim.scene.scene import (
     HumanKind,
@@ -168,7 +168,7 @@ def _new_state(world: pick.PickWorld, people: PeopleState, n_envs: int) -> pick.
     )
 
 
-class PickBatch(CellBatch):
+class PickBatch(EnvBatch):
     """Many independent pick cells, stepped together by one thread.
 
     Args:

@@ -20,7 +20,7 @@ def _arrays() -> dict[str, NDArray[np.float32]]:
         return {name: np.ascontiguousarray(data[name], dtype=np.float32) for name in data.files}
 
 
-def new_forecaster() -> Forecaster:
+def new_motion_predictor() -> Forecaster:
     """Return the shipped networks with work space of their own."""
     arrays = _arrays()
     networks = [

@@ -20,16 +20,16 @@ from app.sim.geometry.segments import FAR
 from app.sim.people.human_motion_config import REACHING, HumanMotionConfig
 from app.sim.people.kernels.people import People, PeopleState
 from app.sim.people.pedestrian import AUTHORS_WALK, pedestrian_rules
-from app.sim.prediction.weights import new_forecaster
+from app.sim.prediction.weights import new_motion_predictor
 from app.sim.reach.goal_sets import N_HALTON, halton_targets
 from app.sim.reach.kernels import episode as reach
 from app.sim.reach.kernels import queries as reach_views
 from app.sim.reach.kernels.observation import EVERYBODY, N_FEATURES, N_STATE
-from app.sim.reach.kernels.option_features import N_WAYS
+from app.sim.reach.kernels.option_features import N_OPTION_FEATURES
 from app.sim.reach.kernels.people_set import N_CROWD
 from app.sim.reach.kernels.reward import ReachWeights
 from app.sim.robot.actions import ActionSettings
-from app.sim.scenario.batch import CellBatch, Rows
+from app.sim.scenario.batch import EnvBatch, Rows
 from app.sim.scenario.kernels.episode import CROWD, FEATURES, FORECAST, PLAIN
 from app.sim.scene.scene import (
     HumanKind,
@@ -51,8 +51,8 @@ ViewName = Literal["features", "state", "forecast", "crowd"]
 VIEWS = {
     "state": (PLAIN, N_STATE),
     "features": (FEATURES, N_FEATURES),
-    "forecast": (FORECAST, N_FEATURES + N_WAYS),
-    "crowd": (CROWD, N_FEATURES + N_WAYS + N_CROWD),
+    "forecast": (FORECAST, N_FEATURES + N_OPTION_FEATURES),
+    "crowd": (CROWD, N_FEATURES + N_OPTION_FEATURES + N_CROWD),
 }
 """What observations hold: the plain state (4.30), that and features, those and what comes of
 every way beside people who go on as forecast, or all that and everybody as a set; and their
@@ -271,7 +271,7 @@ def new_state(world: reach.ReachWorld, people: PeopleState, n_envs: int) -> reac
     )
 
 
-class ReachBatch(CellBatch):
+class ReachBatch(EnvBatch):
     """Many independent reach cells, stepped together by one thread.
 
     Args:
@@ -302,7 +302,7 @@ class ReachBatch(CellBatch):
                 settings.action.rule(),
                 settings.weights,
                 self.state,
-                reach.new_work(self.world, self.state, new_forecaster()),
+                reach.new_work(self.world, self.state, new_motion_predictor()),
             ),
             n_envs=n_envs,
             n_act=N_ACT,

@@ -15,7 +15,7 @@ from app.sim.reach.batch import N_ACT, ReachBatch, ReachSettings
 from app.sim.scenario.batch import StepResult
 
 
-class ReachMix:
+class MixedReachBatch:
     """Cells in as many parts as there are people at most.
 
     Args:
@@ -59,7 +59,7 @@ class ReachMix:
         return np.concatenate([part.reset() for part in self.parts])
 
     def step(self, act: NDArray[np.float32], *, auto_reset: bool = True) -> StepResult:
-        """Move every cell through one control period; as :meth:`CellBatch.step`."""
+        """Move every cell through one control period; as :meth:`EnvBatch.step`."""
         each = [
             part.step(some, auto_reset=auto_reset)
             for part, some in zip(self.parts, np.split(act, self._ends), strict=True)
@@ -72,5 +72,5 @@ class ReachMix:
         )
 
 
-ReachRows = ReachBatch | ReachMix
+ReachEnvironments = ReachBatch | MixedReachBatch
 """What a policy learns in."""

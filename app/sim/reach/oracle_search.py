@@ -52,15 +52,15 @@ Acts = Callable[[ReachBatch], NDArray[np.float32]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Replays:
+class Resimulations:
     """How many copies of each episode did what."""
 
     n: Index
-    """Replays played, shape (n,)."""
+    """Resimulations played, shape (n,)."""
     reached: Index
-    """Replays that came to the goal, shape (n,)."""
+    """Resimulations that came to the goal, shape (n,)."""
     untouched: Index
-    """Replays without a collision, shape (n,)."""
+    """Resimulations without a collision, shape (n,)."""
     soonest: Vec
     """Least time to the goal [s]; infinity where none came, shape (n,)."""
 
@@ -81,7 +81,7 @@ def copy_rows(source: Any, rows: Index, target: Any, first: int = 0) -> None:
             new[first : first + len(rows)] = old[rows]
 
 
-def draw_detours(
+def sample_detours(
     arm: Arm, rng: np.random.Generator, k: int, longest: float = LONGEST_WAIT
 ) -> tuple[Vec, Vec]:
     """Draw where replays go first [rad], shape (k, 6), and until when [s], shape (k,)."""
@@ -100,8 +100,8 @@ def toward(arm: Arm, q: Vec, aim: Vec) -> NDArray[np.float32]:
     return np.clip(GAIN * (aim - q) / arm.limits.qd_max, -1.0, 1.0).astype(np.float32)
 
 
-class Hindsight:
-    """Replays the episodes of one batch, as it was when they started.
+class OracleSearch:
+    """Resimulations the episodes of one batch, as it was when they started.
 
     Args:
         batch: Rows at the start of their episodes; not changed.
@@ -123,7 +123,7 @@ class Hindsight:
         ]
         home = np.array(self._arm.home)[None]
         self._postures = [each if len(each) else home for each in found]
-        self.replays = Replays(
+        self.replays = Resimulations(
             n=np.zeros(self.n, dtype=np.int64),
             reached=np.zeros(self.n, dtype=np.int64),
             untouched=np.zeros(self.n, dtype=np.int64),
@@ -139,11 +139,11 @@ class Hindsight:
 
         Args:
             episodes: Which.
-            n_each: Replays of each.
+            n_each: Resimulations of each.
             at_once: Whether all go to the goal at once.
         """
         for rows in self._parts(episodes, n_each):
-            first, until = draw_detours(self._arm, self._rng, len(rows))
+            first, until = sample_detours(self._arm, self._rng, len(rows))
             if at_once:
                 until[:] = 0.0
             last = self._at_goal(rows)
@@ -154,11 +154,11 @@ class Hindsight:
 
         Args:
             episodes: Which.
-            n_each: Replays of each.
+            n_each: Resimulations of each.
             acts: The policy: actions of all rows from a batch.
         """
         for rows in self._parts(episodes, n_each):
-            first, until = draw_detours(self._arm, self._rng, len(rows))
+            first, until = sample_detours(self._arm, self._rng, len(rows))
             until[self._rng.uniform(size=len(rows)) < 0.5] = 0.0
             sigma = self._rng.choice(SIGMAS, size=len(rows))[:, None]
             noise = np.zeros((len(rows), 6))
@@ -228,7 +228,7 @@ class Hindsight:
         np.minimum.at(found.soonest, rows, seconds)
 
 
-def walks_of(batch: ReachBatch, n_periods: int) -> Vec:
+def future_cylinders(batch: ReachBatch, n_periods: int) -> Vec:
     """Return where the walkers of a batch will be: x, y, radius [m], shape (n + 1, rows, W, 3).
 
     Args:
@@ -244,7 +244,7 @@ def walks_of(batch: ReachBatch, n_periods: int) -> Vec:
     return np.array(found)
 
 
-def never_possible(
+def provably_unsolvable(
     walks: Vec, goals: Vec, soonest: Vec, dt: float, tool_radius: float, base_radius: float
 ) -> NDArray[np.bool_]:
     """Return the episodes that nobody could have solved, for one of two reasons, shape (n,).
@@ -254,7 +254,7 @@ def never_possible(
     before the tool could be there.
 
     Args:
-        walks: From :func:`walks_of`, shape (n_periods + 1, n, W, 3).
+        walks: From :func:`future_cylinders`, shape (n_periods + 1, n, W, 3).
         goals: Goals [m], shape (n, 3).
         soonest: Least time in which anybody could be at each goal [s], shape (n,).
         dt: Control period [s].

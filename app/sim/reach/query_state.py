@@ -1,6 +1,6 @@
 """A state that somebody tells, seen as the reach scenario's policies see it in training.
 
-:class:`Stage` holds one row of the scenario (``reach.py``) for so many people of each kind:
+:class:`QueryState` holds one row of the scenario (``reach.py``) for so many people of each kind:
 whoever is told is put into it, and the same kernels look at it that look in training, so that
 one state gives one observation wherever it comes from.
 """
@@ -28,7 +28,7 @@ from app.sim.people.kernels.pedestrian import (
     Y,
     remember_as_now,
 )
-from app.sim.prediction.weights import new_forecaster
+from app.sim.prediction.weights import new_motion_predictor
 from app.sim.reach.batch import VIEWS, ViewName, new_state, with_workplace, world_of
 from app.sim.reach.kernels import (
     episode as reach,
@@ -46,7 +46,7 @@ from app.sim.scene.scene import HumanKind, new_people_state, people_of, with_peo
 _ROW = np.zeros(1, dtype=np.int64)
 
 
-class Stage:
+class QueryState:
     """One state with a number of bodies and cylinders in it; not thread-safe.
 
     Args:
@@ -64,7 +64,7 @@ class Stage:
         shared = people_of(staged)
         self.world = world_of(staged, shared, np.zeros((0, 3)))
         self.state = new_state(self.world, new_people_state(staged, shared, 1), 1)
-        self._work = reach.new_work(self.world, self.state, new_forecaster())
+        self._work = reach.new_work(self.world, self.state, new_motion_predictor())
         self._view, self.obs_size = VIEWS[view]
         self.arm, self.top_z = self.world.arm, shared.top_z
         self._own_size = shared.bodies[0]

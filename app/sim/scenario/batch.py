@@ -38,7 +38,7 @@ class StepResult:
     """Index into OUTCOMES of episodes that ended now, 0 elsewhere, (n_envs,)."""
 
 
-class CellBatch(ABC):
+class EnvBatch(ABC):
     """Restarts and steps the rows of a scenario.
 
     Copies (``copy.deepcopy``, ``pickle``) go on bit by bit as the original would.

@@ -10,7 +10,7 @@ from app.live.reach.world import LiveReachWorld
 from app.policies.inference.controllers import RolloutController, controller_of
 from app.policies.inference.live_reach_policy import ReachPilot
 from app.policies.inference.reach_policy import ReachPolicy
-from app.policies.inference.rollout import NO_LAYER
+from app.policies.inference.rollout import NO_CONSTRAINT
 from app.sim.cells.cell import load_cell
 from app.sim.reach.batch import ReachBatch, ReachSettings
 from app.sim.safety.layer import SafetySettings
@@ -77,7 +77,7 @@ def test_looking_ahead_is_told_of_the_layer_that_is_obeyed(
     world.apply(SetSafety(on=on, use_measured_velocity=measured))
     mover = pilot._controllers["direct-rollout"]
     assert isinstance(mover, RolloutController)
-    assert (mover.layer != NO_LAYER) == (on and measured)
+    assert (mover.layer != NO_CONSTRAINT) == (on and measured)
 
 
 def test_under_the_layer_the_policy_has_its_usual_time_and_looking_ahead_the_true_one(

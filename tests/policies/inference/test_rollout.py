@@ -8,13 +8,13 @@ from app.policies.checkpoints import pretrained
 from app.policies.evaluation.reach.episodes import play, target_goals
 from app.policies.inference.controllers import controller_of, inference_modes_of
 from app.policies.inference.reach_policy import ReachPolicy
-from app.policies.inference.rollout import OTHERS, PASSED, Lookahead, looks_ahead
+from app.policies.inference.rollout import OTHERS, PASSED, Lookahead, can_roll_out
 from app.policies.networks.actor_critic import BASE_WEIGHT
 from app.sim.cells.cell import load_cell
 from app.sim.core.kernels import rng as random
 from app.sim.people.kernels.pedestrian import GAIT, STILL, VX, VY, X, Y
 from app.sim.prediction.kernels.networks import STEP_S, Network
-from app.sim.prediction.weights import new_forecaster
+from app.sim.prediction.weights import new_motion_predictor
 from app.sim.reach.batch import ReachBatch, ReachSettings
 from app.sim.reach.kernels.episode import Work, new_work
 from app.sim.reach.rollout.kernels import candidates as other_ways
@@ -50,7 +50,7 @@ def looked(n_envs: int, *people: str) -> tuple[played_ways.Lookahead, Work, Reac
     network = POLICY.kernel_network
     assert network is not None
     look = played_ways.new_lookahead(batch.arm, network, BASE_WEIGHT, n_envs)
-    return look, new_work(batch.world, batch.state, new_forecaster()), batch
+    return look, new_work(batch.world, batch.state, new_motion_predictor()), batch
 
 
 def test_what_is_played_is_what_happens_beside_constant_people() -> None:
@@ -60,7 +60,7 @@ def test_what_is_played_is_what_happens_beside_constant_people() -> None:
     network = POLICY.kernel_network
     assert network is not None
     look = played_ways.new_lookahead(batch.arm, network, BASE_WEIGHT, 150)
-    work = new_work(batch.world, batch.state, new_forecaster())
+    work = new_work(batch.world, batch.state, new_motion_predictor())
     rule, told = batch.settings.action.rule(), {}
     acts = controller_of(POLICY, "direct").acts(batch)
     for row in live:
@@ -87,7 +87,7 @@ def test_dashes_end_as_they_are_played() -> None:
     network = POLICY.kernel_network
     assert network is not None
     look = played_ways.new_lookahead(batch.arm, network, BASE_WEIGHT, dashes)
-    work = new_work(batch.world, batch.state, new_forecaster())
+    work = new_work(batch.world, batch.state, new_motion_predictor())
     rule, told = batch.settings.action.rule(), np.zeros(dashes, dtype=np.int64)
     for row in live:
         n = foretell(batch.world, batch.state, row, MOMENTS, work, look.foretold)
@@ -212,7 +212,7 @@ def test_a_way_into_the_table_is_changed(people: tuple[str, ...]) -> None:
     lowers[1] = 3.0
     layers = [np.zeros(shape, dtype=np.float32) for shape in ((n_obs, 4), 4, (4, 4), 4, (4, 6))]
     look = played_ways.new_lookahead(batch.arm, Network(*layers, lowers), 0.0, 1)
-    work = new_work(batch.world, batch.state, new_forecaster())
+    work = new_work(batch.world, batch.state, new_motion_predictor())
     rule, act = batch.settings.action.rule(), np.tanh(lowers)[None]
     way = np.full(1, PASSED)
     for _ in range(100):
@@ -289,7 +289,7 @@ def test_the_names_of_the_other_ways() -> None:
 
 def test_other_policies_cannot() -> None:
     actor = RandomActor()
-    assert looks_ahead(POLICY) and not looks_ahead(actor)
+    assert can_roll_out(POLICY) and not can_roll_out(actor)
     assert "direct-rollout" in inference_modes_of(
         POLICY
     ) and "direct-rollout" not in inference_modes_of(actor)

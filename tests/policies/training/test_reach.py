@@ -12,7 +12,7 @@ from app.policies.training.reach import batch_of, play, settings_of, visited_sta
 from app.sim.cells.cell import load_cell
 from app.sim.envs.tasks import ArmTask
 from app.sim.reach.batch import THESIS_WEIGHTS, ReachBatch, ReachSettings
-from app.sim.reach.monitored.batch import GuardedReach
+from app.sim.reach.monitored.batch import MonitoredReachBatch
 from tests.policies.conftest import Recorder, preset_of
 
 TINY = {
@@ -80,10 +80,10 @@ def test_what_was_trained_decides_as_a_policy(preset, ran):
 def test_the_monitored_preset_trains_and_is_counted_under_the_layer():
     preset = preset_of("reach-td3-monitored", TINY)
     batch = batch_of(preset, load_cell("shared-workspace"), 16, 3)
-    assert isinstance(batch, GuardedReach)
+    assert isinstance(batch, MonitoredReachBatch)
     assert batch.settings.weights.c_o == preset.reward.c_o > 0.0
     assert not isinstance(
-        batch_of(preset_of("reach-td3", TINY), batch.cell, 4, 3), GuardedReach
+        batch_of(preset_of("reach-td3", TINY), batch.cell, 4, 3), MonitoredReachBatch
     )
     ran = Recorder().run(preset)
     assert ReachPolicy(ran.checkpoint).acts(batch.reset()).shape == (16, 6)

@@ -8,14 +8,14 @@ import pytest
 from app.errors import InvalidInput
 from app.sim.cells.cell import load_cell
 from app.sim.reach.batch import ReachBatch, ReachSettings
-from app.sim.reach.mixed_batch import ReachMix
+from app.sim.reach.mixed_batch import MixedReachBatch
 
 CELL = load_cell("shared-workspace")
 SETTINGS = ReachSettings(observation="crowd", people=("walker",) * 3)
 
 
 def test_each_share_of_the_cells_is_a_batch_of_its_own():
-    mix = ReachMix(CELL, 8, 4, SETTINGS)
+    mix = MixedReachBatch(CELL, 8, 4, SETTINGS)
     assert [part.n_envs for part in mix.parts] == [2, 3, 3]
     assert [part.n_people for part in mix.parts] == [1, 2, 3]
     first = mix.reset()
@@ -34,4 +34,4 @@ def test_each_share_of_the_cells_is_a_batch_of_its_own():
 @pytest.mark.parametrize("people", [(), ("walker",) * 4])
 def test_nobody_or_more_parts_than_cells_is_refused(people):
     with pytest.raises(InvalidInput, match="people"):
-        ReachMix(CELL, 3, 1, replace(SETTINGS, people=people))
+        MixedReachBatch(CELL, 3, 1, replace(SETTINGS, people=people))

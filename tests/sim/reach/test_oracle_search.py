@@ -1,11 +1,16 @@
-"""Replays are of the same episodes, and only what cannot be done stays unsolved."""
+"""Resimulations are of the same episodes, and only what cannot be done stays unsolved."""
 
 import numpy as np
 import pytest
 
 from app.sim.cells.cell import load_cell
 from app.sim.reach.batch import ReachBatch, ReachSettings
-from app.sim.reach.oracle_search import Hindsight, copy_rows, never_possible, walks_of
+from app.sim.reach.oracle_search import (
+    OracleSearch,
+    copy_rows,
+    future_cylinders,
+    provably_unsolvable,
+)
 from app.sim.scenario.kernels.episode import RUNNING, SUCCESS
 from tests.policies.straight_mover import Straight
 
@@ -41,7 +46,7 @@ def test_a_copied_episode_goes_exactly_as_the_first():
 
 def test_a_policy_replayed_by_itself_ends_as_it_does_without_the_search():
     batch, mover = batch_of(40), Straight()
-    search = Hindsight(batch, 1, SMALL)
+    search = OracleSearch(batch, 1, SMALL)
     search.undisturbed(mover.acts)
     while (batch.state.outcome == RUNNING).any():
         batch.step(mover.acts(batch), auto_reset=False)
@@ -52,7 +57,7 @@ def test_a_policy_replayed_by_itself_ends_as_it_does_without_the_search():
 
 
 def test_replays_solve_what_straight_moves_do_not():
-    search = Hindsight(batch_of(40), 1, SMALL)
+    search = OracleSearch(batch_of(40), 1, SMALL)
     search.undisturbed(Straight().acts)
     before = search.unsolved()
     search.scripted(before, 24)
@@ -64,7 +69,7 @@ def test_replays_solve_what_straight_moves_do_not():
 
 
 def test_noise_and_detours_change_what_a_policy_does():
-    search = Hindsight(batch_of(20), 1, SMALL)
+    search = OracleSearch(batch_of(20), 1, SMALL)
     search.disturbed(np.arange(20), 8, Straight().acts)
     assert (search.replays.n == 8).all()
     assert ((search.replays.reached > 0) & (search.replays.reached < 8)).any()
@@ -73,7 +78,7 @@ def test_noise_and_detours_change_what_a_policy_does():
 def test_the_search_leaves_the_episodes_as_they_were():
     batch = batch_of(10)
     q, people = batch.state.q.copy(), batch.state.people.cylinders.copy()
-    Hindsight(batch, 1, SMALL).scripted(np.arange(10), 2)
+    OracleSearch(batch, 1, SMALL).scripted(np.arange(10), 2)
     np.testing.assert_array_equal(batch.state.q, q)
     np.testing.assert_array_equal(batch.state.people.cylinders, people)
 
@@ -81,7 +86,7 @@ def test_the_search_leaves_the_episodes_as_they_were():
 @pytest.mark.parametrize("rest", [0.0, 0.5])
 def test_a_walk_is_what_the_replays_meet(rest: float):
     batch, played = batch_of(5), batch_of(5)
-    walks = walks_of(batch, 50)
+    walks = future_cylinders(batch, 50)
     for k in range(50):
         np.testing.assert_array_equal(walks[k], played.state.people.cylinders)
         played.state.outcome[:] = RUNNING
@@ -99,15 +104,15 @@ def test_what_is_covered_for_good_or_pinned_at_the_base_is_never_possible():
     walks[:, 3, 0] = (0.0, 3.0, 0.4)
     walks[60:, 3, 0] = (0.0, 0.4, 0.4)
     soonest = np.full(4, 1.0)
-    found = never_possible(walks, goals, soonest, 0.02, 0.04, 0.08)
+    found = provably_unsolvable(walks, goals, soonest, 0.02, 0.04, 0.08)
     assert found.tolist() == [True, False, True, False]
 
 
 def test_what_was_never_possible_is_never_solved():
     batch = batch_of(300)
-    search = Hindsight(batch, 1, 1024)
+    search = OracleSearch(batch, 1, 1024)
     search.scripted(np.arange(300), 12)
-    walks = walks_of(batch_of(300), 250)
+    walks = future_cylinders(batch_of(300), 250)
     soonest = np.full(300, 0.5)
-    never = never_possible(walks, batch.state.goal, soonest, CELL.robot.dt, 0.04, 0.08)
+    never = provably_unsolvable(walks, batch.state.goal, soonest, CELL.robot.dt, 0.04, 0.08)
     assert not (never & (search.replays.reached > 0)).any()

@@ -18,7 +18,7 @@ from app.sim.people.kernels.pedestrian import (
 )
 from app.sim.perception.observed_people import person_from_cylinder
 from app.sim.reach.batch import ReachBatch, ReachSettings
-from app.sim.reach.query_state import Stage
+from app.sim.reach.query_state import QueryState
 from app.sim.robot.measured_state import Joints
 
 CELL = load_cell("shared-workspace")
@@ -50,7 +50,7 @@ def test_observations_and_distances_are_those_of_the_batch(
     people: tuple[str, ...], view: str
 ) -> None:
     batch, n_bodies = driven(people, view), people.count("worker")
-    stage = Stage(CELL, n_bodies, len(people) - n_bodies, view)
+    stage = QueryState(CELL, n_bodies, len(people) - n_bodies, view)
     rows, state = np.arange(5), batch.state
     goals = np.random.default_rng(4).uniform(-1, 1, (5, 3, 3))
     for who in (None, *range(len(people))):
@@ -70,7 +70,11 @@ def test_observations_and_distances_are_those_of_the_batch(
 
 
 def test_what_is_not_remembered_was_as_the_oldest_that_is() -> None:
-    stage, q, goal = Stage(CELL, 0, 1, "forecast"), np.array(CELL.robot.home_q), [[0, 0.8, 1.0]]
+    stage, q, goal = (
+        QueryState(CELL, 0, 1, "forecast"),
+        np.array(CELL.robot.home_q),
+        [[0, 0.8, 1.0]],
+    )
     seen = {}
     for name, past in {
         "nothing": None,
@@ -89,7 +93,7 @@ def test_what_is_not_remembered_was_as_the_oldest_that_is() -> None:
 
 
 def test_a_persons_own_size_counts() -> None:
-    stage, q = Stage(CELL, 1, 0, "features"), np.array(CELL.robot.home_q)
+    stage, q = QueryState(CELL, 1, 0, "features"), np.array(CELL.robot.home_q)
     batch = driven(("worker",), "features")
     (one,) = people_of(batch, 0)
     stage.put(Joints(q, np.zeros(6), np.zeros(6)), [one], 5.0)
@@ -100,7 +104,7 @@ def test_a_persons_own_size_counts() -> None:
 
 
 def test_shapes_are_the_people_with_the_height_of_the_cell() -> None:
-    stage = Stage(CELL, 0, 2, "state")
+    stage = QueryState(CELL, 0, 2, "state")
     people = [
         person_from_cylinder(0.1, 1.2, 0.0, 0.0, 0.3),
         person_from_cylinder(-1.0, 1.5, 0.0, 0.0, 0.4),

@@ -36,7 +36,12 @@ from app.policies.inference.controllers import Controller, controller_of
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
 from app.sim.reach.batch import ReachBatch, ReachSettings
-from app.sim.reach.oracle_search import Hindsight, copy_rows, never_possible, walks_of
+from app.sim.reach.oracle_search import (
+    OracleSearch,
+    copy_rows,
+    future_cylinders,
+    provably_unsolvable,
+)
 from app.sim.robot.capsules import load_robot_capsules
 
 Json = dict[str, Any]
@@ -45,11 +50,11 @@ PER_TARGET = 100
 SCRIPTED = (64, 256)
 """Scripted replays of each episode in the first two rounds."""
 DISTURBED = 32
-"""Replays of the policy."""
+"""Resimulations of the policy."""
 LONG = 2048
 """Scripted replays in the last round."""
 SOONEST_TRIES = 256
-"""Replays with nobody there, of which the soonest says when anybody could be at a target."""
+"""Resimulations with nobody there, of which the soonest says when anybody could be at a target."""
 
 
 def started(cell: Cell, settings: ReachSettings, goals: Vec, seed: int) -> ReachBatch:
@@ -80,7 +85,7 @@ def soonest_arrivals(cell: Cell, settings: ReachSettings, goals: Vec, seed: int)
     alone = ReachBatch(cell, len(different), seed, rules)
     alone.reset()
     alone.set_goals(np.arange(len(different)), different)
-    search = Hindsight(alone, seed)
+    search = OracleSearch(alone, seed)
     search.scripted(np.arange(len(different)), SOONEST_TRIES, at_once=True)
     return np.asarray(search.replays.soonest[which])
 
@@ -96,7 +101,7 @@ class Ceiling:
     """
 
     def __init__(self, batch: ReachBatch, seed: int, n_stages: int, on_row: OnRow) -> None:
-        self.search, self._n_stages, self._on_row = Hindsight(batch, seed), n_stages, on_row
+        self.search, self._n_stages, self._on_row = OracleSearch(batch, seed), n_stages, on_row
         self.rows: list[Json] = []
 
     def stage(self, name: str, replay: Callable[[], None]) -> None:
@@ -128,7 +133,7 @@ class Ceiling:
         self.search.scripted(self.search.unsolved(), n_each)
 
 
-def verdict(search: Hindsight, never: Any, targets: Vec, goals: Vec) -> Json:
+def verdict(search: OracleSearch, never: Any, targets: Vec, goals: Vec) -> Json:
     """Return what is solvable, what never was, and what nobody knows, with intervals."""
     n, solved = search.n, search.replays.reached > 0
     undecided = ~solved & ~never
@@ -171,8 +176,10 @@ def run_oracle(
     arm = batch.arm
     soonest = soonest_arrivals(cell, settings, goals, seed)
     base = load_robot_capsules(cell.robot.tool_length, cell.robot.tool_radius).radius[0]
-    walks = walks_of(batch, round(settings.time_limit_s / arm.dt))
-    never = never_possible(walks, goals, soonest, arm.dt, cell.robot.tool_radius, float(base))
+    walks = future_cylinders(batch, round(settings.time_limit_s / arm.dt))
+    never = provably_unsolvable(
+        walks, goals, soonest, arm.dt, cell.robot.tool_radius, float(base)
+    )
     row = verdict(ceiling.search, never, bench.targets, goals)
     on_row(n_stages, n_stages, row)
     bench.add(row, settings, "training targets in turn")

@@ -61,7 +61,7 @@ from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.evaluation.statistics import mean_of, wilson
 from app.policies.inference.controllers import Controller, RolloutController, controller_of
 from app.policies.inference.reach_policy import ReachPolicy
-from app.policies.inference.rollout import NO_LAYER, layer_of, looks_ahead
+from app.policies.inference.rollout import NO_CONSTRAINT, can_roll_out, ssm_constraint_of
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
 from app.sim.mocap.importer import Motion
@@ -75,9 +75,9 @@ from app.sim.reach.crossings import (
     crossings,
     recorded_crossings,
 )
-from app.sim.reach.monitored.batch import HORIZON_S, GuardedReach, GuardedRuns
+from app.sim.reach.monitored.batch import HORIZON_S, MonitoredEpisodes, MonitoredReachBatch
 from app.sim.reach.monitored.planners import drive_planner, postures_of
-from app.sim.reach.oracle_search import draw_detours, toward
+from app.sim.reach.oracle_search import sample_detours, toward
 from app.sim.robot.actions import ActionSettings
 from app.sim.safety.layer import SafetySettings, safety_settings
 from app.sim.scenario.kernels.episode import RUNNING, TIMEOUT
@@ -129,13 +129,13 @@ ALONE = ReplanningSettings(
 class Course:
     """Runs of one row, and how the override went in each."""
 
-    runs: GuardedRuns
+    runs: MonitoredEpisodes
     """What happened."""
     overrides: list[Vec]
     """Override of every period of each run, in [0, 1]."""
 
 
-def course_row(name: str, runs: GuardedRuns) -> Json:
+def course_row(name: str, runs: MonitoredEpisodes) -> Json:
     """Return the row of some runs; see the head of this file."""
     n, arrived = len(runs.arrived), runs.arrived
     capped = np.where(arrived, runs.seconds, CAP_S)
@@ -158,7 +158,7 @@ def course_row(name: str, runs: GuardedRuns) -> Json:
     }
 
 
-def contacts_of(runs: GuardedRuns) -> Json:
+def contacts_of(runs: MonitoredEpisodes) -> Json:
     """Return the contacts of some runs, apart by whether the robot moved."""
     return {
         "contacts": int((runs.touched_moving | runs.touched_at_rest).sum()),
@@ -178,7 +178,7 @@ def _spread(values: NDArray[np.floating]) -> dict[str, float] | None:
     return {**found, "sd": float(values.std(ddof=1)) if len(values) > 1 else 0.0}
 
 
-def against(one: GuardedRuns, other: GuardedRuns) -> Json:
+def against(one: MonitoredEpisodes, other: MonitoredEpisodes) -> Json:
     """Return how much sooner ``one`` arrives than ``other``, run by run.
 
     ``all``: over all runs, those that do not arrive counted as CAP_S; ``untouched``: over those
@@ -200,7 +200,7 @@ def against(one: GuardedRuns, other: GuardedRuns) -> Json:
     return {"all": saving(every), "untouched": saving(untouched)}
 
 
-def drive(batch: GuardedReach, mover: Controller) -> Course:
+def drive(batch: MonitoredReachBatch, mover: Controller) -> Course:
     """Run a batch that was just reset to the end of every row's episode."""
     found: list[Vec] = []
     while (batch.state.outcome == RUNNING).any():
@@ -237,7 +237,7 @@ class Comparison:
         )
         self._postures: list[Vec] | None = None
 
-    def batch(self, *, alone: bool = False, guarded: bool = True) -> GuardedReach:
+    def batch(self, *, alone: bool = False, guarded: bool = True) -> MonitoredReachBatch:
         """Return a batch at the start of all crossings.
 
         Args:
@@ -246,7 +246,7 @@ class Comparison:
         """
         n = len(self.crossed.goals)
         aside = np.tile(np.array(ASIDE), (n, 2, 1))
-        batch = GuardedReach(
+        batch = MonitoredReachBatch(
             self.cell,
             n,
             self.seed,
@@ -260,10 +260,10 @@ class Comparison:
         batch.set_goals(np.arange(n), self.crossed.goals)
         return batch
 
-    def copies(self, number: int, n: int) -> GuardedReach:
+    def copies(self, number: int, n: int) -> MonitoredReachBatch:
         """Return a batch of ``n`` rows at the start of one crossing; actions mean speeds."""
         one = np.repeat(self.crossed.tracks[number][None], n, axis=0)
-        batch = GuardedReach(
+        batch = MonitoredReachBatch(
             self.cell,
             n,
             self.seed,
@@ -305,7 +305,7 @@ class Comparison:
 
 def best_replays(
     comparison: Comparison, n_each: int, rng: np.random.Generator
-) -> dict[str, GuardedRuns]:
+) -> dict[str, MonitoredEpisodes]:
     """Return the best replays of each crossing under the safety layer, by row.
 
     Where no replay is both untouched and there in time, the first one stands for all; the one
@@ -313,13 +313,13 @@ def best_replays(
 
     Args:
         comparison: Crossings.
-        n_each: Replays of each.
+        n_each: Resimulations of each.
         rng: Draws them.
     """
     postures, soonest, freest = comparison.postures(), [], []
     for number, some in enumerate(postures):
         batch = comparison.copies(number, n_each)
-        first, until = draw_detours(batch.arm, rng, n_each, LONGEST_WAIT)
+        first, until = sample_detours(batch.arm, rng, n_each, LONGEST_WAIT)
         until[0] = 0.0
         last = some[rng.integers(len(some), size=n_each)]
         k = 0
@@ -335,7 +335,7 @@ def best_replays(
     return {"oracle": joined(soonest), "oracle-least-stopped": joined(freest)}
 
 
-def _least(runs: GuardedRuns, cost: Vec) -> GuardedRuns:
+def _least(runs: MonitoredEpisodes, cost: Vec) -> MonitoredEpisodes:
     """Return the run that costs least."""
     return picked(runs, np.argmin(cost, keepdims=True))
 
@@ -347,10 +347,10 @@ def random_runs(
     mover: Controller,
     n: int,
     seed: int,
-) -> list[GuardedRuns]:
+) -> list[MonitoredEpisodes]:
     """Run the episodes of ``reach-random`` under the safety layer."""
     settings = replace(settings, time_limit_s=RANDOM_S)
-    batch = GuardedReach(cell, N_ENVS, seed, settings, safety)
+    batch = MonitoredReachBatch(cell, N_ENVS, seed, settings, safety)
     goals, found = random_goals(*goal_box(cell), n, seed), []
     for number, first in enumerate(range(0, n, N_ENVS)):
         some = goals[first : first + N_ENVS]
@@ -370,7 +370,7 @@ def goal_box(cell: Cell) -> tuple[Vec, Vec]:
     return middle - half, middle + half
 
 
-def random_row(name: str, parts: Sequence[GuardedRuns]) -> Json:
+def random_row(name: str, parts: Sequence[MonitoredEpisodes]) -> Json:
     """Return the row of random episodes."""
     runs = joined(parts)
     n = len(runs.arrived)
@@ -387,20 +387,20 @@ def random_row(name: str, parts: Sequence[GuardedRuns]) -> Json:
     }
 
 
-def joined(parts: Sequence[GuardedRuns]) -> GuardedRuns:
+def joined(parts: Sequence[MonitoredEpisodes]) -> MonitoredEpisodes:
     """Return several sets of runs as one."""
-    names = GuardedRuns.__dataclass_fields__
+    names = MonitoredEpisodes.__dataclass_fields__
     values: Any = {
         name: np.concatenate([getattr(part, name) for part in parts]) for name in names
     }
-    return GuardedRuns(**values)
+    return MonitoredEpisodes(**values)
 
 
-def picked(runs: GuardedRuns, which: NDArray[np.int64]) -> GuardedRuns:
+def picked(runs: MonitoredEpisodes, which: NDArray[np.int64]) -> MonitoredEpisodes:
     """Return some of some runs."""
-    names = GuardedRuns.__dataclass_fields__
+    names = MonitoredEpisodes.__dataclass_fields__
     values: Any = {name: getattr(runs, name)[which] for name in names}
-    return GuardedRuns(**values)
+    return MonitoredEpisodes(**values)
 
 
 class _Still:
@@ -435,11 +435,11 @@ def movers_of(
     checkpoint: Checkpoint, actor: ReachPolicy, safety: SafetySettings, dt: float
 ) -> dict[str, Controller]:
     """Return who stands in for the policy, by row; see the head of this file."""
-    direct, layer = controller_of(actor, "direct"), layer_of(safety, dt)
+    direct, layer = controller_of(actor, "direct"), ssm_constraint_of(safety, dt)
     movers = {"policy": direct}
-    if looks_ahead(actor):
+    if can_roll_out(actor):
         movers[AHEAD] = RolloutController(direct, actor, layer)
-        if layer != NO_LAYER:
+        if layer != NO_CONSTRAINT:
             movers["policy-rollout-ssm-agnostic"] = RolloutController(direct, actor)
     if checkpoint.manifest["preset"].get("episode", {}).get("safety") == "ssm":
         other = ReachPolicy(pretrained.load("reach"))

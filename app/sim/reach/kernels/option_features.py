@@ -58,7 +58,7 @@ SIZES = (
 """Names and sizes of the groups of features; of each way the least clearance comes last."""
 LAYOUT = slices_of(SIZES)
 """Slice of each group among these features."""
-N_WAYS = sum(size for _, size in SIZES)
+N_OPTION_FEATURES = sum(size for _, size in SIZES)
 WAY, OTHERS = LAYOUT["way_clearance"].start, LAYOUT["aside_clearance"].start
 GAP, GROWTH = LAYOUT["goal_gap_ahead"].start, LAYOUT["radius_ahead"].start
 
@@ -229,7 +229,7 @@ def put_ways(
         prospect: Work space.
         ways: Work space.
         k: Where to begin.
-        out: Filled, shape (>= k + N_WAYS,).
+        out: Filled, shape (>= k + N_OPTION_FEATURES,).
     """
     rate = base_motion(arm, robot, goal, prospect)
     arrival, least, slot = 1.0 / rate, FAR, ways.number[1]

@@ -24,7 +24,12 @@ from app.sim.reach.kernels.observation import (
     put_state,
     show_person,
 )
-from app.sim.reach.kernels.option_features import N_WAYS, foresee, look_aside, put_ways
+from app.sim.reach.kernels.option_features import (
+    N_OPTION_FEATURES,
+    foresee,
+    look_aside,
+    put_ways,
+)
 from app.sim.reach.kernels.people_set import put_crowd
 from app.sim.robot.kernels.arm import place_robot
 from app.sim.scenario.kernels.episode import CROWD, FORECAST, PLAIN
@@ -85,7 +90,7 @@ def _write(
             N_FEATURES, out,
         )  # fmt: skip
     if view == CROWD:
-        put_crowd(top, goal, work.robot, work.ways, N_FEATURES + N_WAYS, out)
+        put_crowd(top, goal, work.robot, work.ways, N_FEATURES + N_OPTION_FEATURES, out)
 
 
 @kernel(nogil=True)

@@ -1,6 +1,6 @@
 """The reach scenario under the safety layer: what is commanded, SSM scales or stops.
 
-:class:`GuardedReach` is a :class:`~app.sim.reach.batch.ReachBatch` whose periods go through
+:class:`MonitoredReachBatch` is a :class:`~app.sim.reach.batch.ReachBatch` whose periods go through
 speed and
 separation monitoring (``reach/monitored/kernels/step.py``), so whatever drives the one drives
 the
@@ -52,7 +52,7 @@ HORIZON_S = 5.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class GuardedRuns:
+class MonitoredEpisodes:
     """What happened in n episodes under the safety layer; arrays of shape (n,)."""
 
     arrived: NDArray[np.bool_]
@@ -83,7 +83,7 @@ class GuardedRuns:
     """Greatest speed of any point of the people [m/s]."""
 
 
-class GuardedReach(ReachBatch):
+class MonitoredReachBatch(ReachBatch):
     """Many independent reach cells under the safety layer, stepped together by one thread.
 
     Args:
@@ -240,11 +240,11 @@ class GuardedReach(ReachBatch):
             going=self.state.people.walkers.rows[row][:, [VX, VY, GROWTH]],
         )
 
-    def runs(self) -> GuardedRuns:
+    def runs(self) -> MonitoredEpisodes:
         """Return what happened in the episode of every cell, once all have ended."""
         account, dt = self._guard.closed, self.arm.dt
         person, moving = account[:, CONTACT] == PERSON, account[:, SPEED] > MOVING
-        return GuardedRuns(
+        return MonitoredEpisodes(
             arrived=self.state.outcome == SUCCESS,
             seconds=dt * account[:, PERIODS],
             stopped_s=dt * account[:, STOPPED],

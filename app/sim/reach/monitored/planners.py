@@ -1,7 +1,7 @@
 """Planners in place of a policy, under the same safety layer and limits (docs/method.md 2.6).
 
 One :class:`~app.sim.planning.replanning.ReplanningExecutor` drives each environment of a
-:class:`~app.sim.reach.monitored.batch.GuardedReach` to configurations of any tilt whose tcp
+:class:`~app.sim.reach.monitored.batch.MonitoredReachBatch` to configurations of any tilt whose tcp
 lies within
 the success distance of the goal: planners may choose whatever a policy may choose.
 """
@@ -14,7 +14,7 @@ from app.sim.collision.checker import Shapes, no_people
 from app.sim.core.arrays import Vec
 from app.sim.planning.goal_configurations import goal_configurations
 from app.sim.planning.replanning import ReplanningExecutor, ReplanningReport, ReplanningSettings
-from app.sim.reach.monitored.batch import GuardedReach
+from app.sim.reach.monitored.batch import MonitoredReachBatch
 from app.sim.robot.kernels.arm import Arm
 from app.sim.scenario.kernels.episode import RUNNING
 
@@ -37,7 +37,7 @@ def postures_of(arm: Arm, goals: Vec, seed: int) -> list[Vec]:
 
 
 def drive_planner(
-    batch: GuardedReach,
+    batch: MonitoredReachBatch,
     postures: Sequence[Vec],
     settings: ReplanningSettings,
     seed: int,
@@ -64,7 +64,9 @@ def drive_planner(
     return overrides, reports
 
 
-def _drive(batch: GuardedReach, row: int, follower: ReplanningExecutor, blind: bool) -> Vec:
+def _drive(
+    batch: MonitoredReachBatch, row: int, follower: ReplanningExecutor, blind: bool
+) -> Vec:
     """Drive one row to the end of its episode; return its overrides."""
     state, found = batch.state, []
     while state.outcome[row] == RUNNING:

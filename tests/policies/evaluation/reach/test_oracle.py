@@ -9,7 +9,7 @@ from app.policies.evaluation.reach.oracle import Ceiling, soonest_arrivals, star
 from app.policies.evaluation.registry import evaluate
 from app.sim.cells.cell import load_cell
 from app.sim.reach.batch import ReachSettings, goal_region_of
-from app.sim.reach.oracle_search import Hindsight
+from app.sim.reach.oracle_search import OracleSearch
 from app.sim.scenario.kernels.episode import SUCCESS
 from tests.policies.straight_mover import Straight
 from tests.policies.untrained import untrained_reach
@@ -21,7 +21,7 @@ RULES = ReachSettings()
 
 def test_the_first_states_are_those_of_the_episodes_played():
     goals = target_goals(TARGETS, 530)
-    search = Hindsight(started(CELL, RULES, goals, 6), 1, 600)
+    search = OracleSearch(started(CELL, RULES, goals, 6), 1, 600)
     search.undisturbed(Straight().acts)
     played = play(CELL, RULES, Straight(), goals, 6)
     np.testing.assert_array_equal(search.replays.reached > 0, played.outcome == SUCCESS)

@@ -13,7 +13,7 @@ from app.sim.prediction.kernels.networks import (
     STEP_S,
     forecast,
 )
-from app.sim.prediction.weights import new_forecaster
+from app.sim.prediction.weights import new_motion_predictor
 
 TIMES = STEP_S * np.arange(1, N_TIMES + 1)
 
@@ -22,7 +22,7 @@ def told(
     r: float, growth: float, speed: float, age: float, radii: np.ndarray, speeds: np.ndarray
 ) -> np.ndarray:
     out = np.full((N_TIMES, 2), np.nan)
-    forecast(new_forecaster(), r, growth, speed, age, radii, speeds, out)
+    forecast(new_motion_predictor(), r, growth, speed, age, radii, speeds, out)
     return out
 
 
@@ -31,7 +31,7 @@ def test_the_kernel_computes_the_networks() -> None:
     for _ in range(20):
         radii, speeds = rng.uniform(0.2, 0.5, N_PAST), rng.uniform(0.0, 1.0, N_PAST)
         r, growth, speed, age = 0.3, 0.7, 0.8, 0.04
-        net = new_forecaster()
+        net = new_motion_predictor()
         seen = np.r_[(r - RADIUS_MIDDLE) / RADIUS_SCALE, growth, age / 0.1]
         seen = np.r_[seen, (radii - RADIUS_MIDDLE) / RADIUS_SCALE]
         radius = r + RADIUS_SCALE * _said(net.radius, seen)

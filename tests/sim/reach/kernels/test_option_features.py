@@ -18,7 +18,7 @@ from app.sim.people.kernels.pedestrian import (
     Y,
 )
 from app.sim.prediction.kernels.networks import N_TIMES, STEP_S, forecast
-from app.sim.prediction.weights import new_forecaster
+from app.sim.prediction.weights import new_motion_predictor
 from app.sim.reach.batch import ReachBatch
 from app.sim.reach.kernels import option_features as reach_ways
 from app.sim.reach.kernels.observation import N_FEATURES
@@ -41,7 +41,7 @@ def ahead(batch: ReachBatch, e: int) -> np.ndarray:
         out = np.zeros((N_TIMES, 2))
         speed = np.hypot(row[VX], row[VY])
         past = row[PAST_RADIUS:PAST_SPEED].copy(), row[PAST_SPEED:].copy()
-        forecast(new_forecaster(), row[R], row[GROWTH], speed, row[AGE], *past, out)
+        forecast(new_motion_predictor(), row[R], row[GROWTH], speed, row[AGE], *past, out)
         course = row[[COURSE_X, COURSE_Y]] * (speed > 0.0)
         found.append(np.c_[row[[X, Y]] + out[:, 1:] * course, out[:, 0]])
     return np.array(found).swapaxes(0, 1)[LOOKS - 1]

@@ -11,7 +11,7 @@ from app.sim.collision.checker import no_people
 from app.sim.collision.contact import clearance
 from app.sim.people.kernels.pedestrian import AGE, N_PAST, PAST_RADIUS, PAST_SPEED
 from app.sim.reach.batch import ReachBatch, ReachSettings
-from app.sim.reach.monitored.batch import GuardedReach
+from app.sim.reach.monitored.batch import MonitoredReachBatch
 from app.sim.robot.kernels.kinematics import ik_vertical_batch
 from app.sim.safety.layer import SafetyLayer, safety_settings
 from app.sim.scenario.kernels.episode import COLLISION, RUNNING, SUCCESS, TIMEOUT
@@ -45,7 +45,10 @@ def passing(n: int, y: float = 1.2, speed: float = 1.0) -> np.ndarray:
 
 
 def test_with_nobody_there_it_moves_as_without_the_layer():
-    guarded, plain = GuardedReach(CELL, 6, 3, ALONE, SAFETY), ReachBatch(CELL, 6, 3, ALONE)
+    guarded, plain = (
+        MonitoredReachBatch(CELL, 6, 3, ALONE, SAFETY),
+        ReachBatch(CELL, 6, 3, ALONE),
+    )
     np.testing.assert_array_equal(guarded.reset(), plain.reset())
     for _ in range(60):
         one = guarded.step(straight(guarded), auto_reset=False)
@@ -57,7 +60,7 @@ def test_with_nobody_there_it_moves_as_without_the_layer():
 
 
 def test_people_walk_as_they_do_without_the_layer():
-    guarded, plain = GuardedReach(CELL, 8, 5, BOX, SAFETY), ReachBatch(CELL, 8, 5, BOX)
+    guarded, plain = MonitoredReachBatch(CELL, 8, 5, BOX, SAFETY), ReachBatch(CELL, 8, 5, BOX)
     guarded.reset(), plain.reset()
     act = np.zeros((8, 6), dtype=np.float32)
     for _ in range(40):
@@ -72,8 +75,8 @@ def test_people_walk_as_they_do_without_the_layer():
 def test_a_period_that_is_stopped_costs_what_the_weights_say():
     dear = replace(BOX, weights=BOX.weights._replace(c_o=0.5))
     cheap, costly = (
-        GuardedReach(CELL, 8, 5, BOX, SAFETY),
-        GuardedReach(CELL, 8, 5, dear, SAFETY),
+        MonitoredReachBatch(CELL, 8, 5, BOX, SAFETY),
+        MonitoredReachBatch(CELL, 8, 5, dear, SAFETY),
     )
     cheap.reset(), costly.reset()
     n_stopped = 0
@@ -89,7 +92,7 @@ def test_a_period_that_is_stopped_costs_what_the_weights_say():
 
 @pytest.mark.parametrize("safety", [SAFETY, replace(SAFETY, use_measured_velocity=True)])
 def test_each_period_is_what_the_layer_decides(safety):
-    batch = GuardedReach(
+    batch = MonitoredReachBatch(
         CELL, 1, 0, replace(BOX, people=("walker",)), safety, tracks=passing(1, y=0.8)
     )
     batch.reset()
@@ -109,7 +112,9 @@ def test_each_period_is_what_the_layer_decides(safety):
 
 def test_people_follow_their_tracks_and_are_seen_with_their_velocity():
     tracks = passing(3)
-    batch = GuardedReach(CELL, 3, 0, replace(BOX, people=("walker",)), SAFETY, tracks=tracks)
+    batch = MonitoredReachBatch(
+        CELL, 3, 0, replace(BOX, people=("walker",)), SAFETY, tracks=tracks
+    )
     obs = batch.reset().copy()
     np.testing.assert_array_equal(batch.state.people.cylinders[:, 0], tracks[:, 0])
     np.testing.assert_allclose(
@@ -122,7 +127,7 @@ def test_people_follow_their_tracks_and_are_seen_with_their_velocity():
 
 
 def test_the_robot_never_moves_while_a_person_is_nearer_than_the_protective_distance():
-    batch = GuardedReach(CELL, 30, 9, BOX, SAFETY)
+    batch = MonitoredReachBatch(CELL, 30, 9, BOX, SAFETY)
     batch.reset()
     people, near = people_of(batch.cell), 0
     for _ in range(150):
@@ -139,7 +144,7 @@ def test_the_robot_never_moves_while_a_person_is_nearer_than_the_protective_dist
 
 def test_a_person_at_the_robot_holds_it_and_the_account_says_so():
     settings = replace(BOX, people=("walker",), time_limit_s=1.0)
-    batch = GuardedReach(CELL, 2, 0, settings, SAFETY, tracks=standing(0.0, 0.8, n=2))
+    batch = MonitoredReachBatch(CELL, 2, 0, settings, SAFETY, tracks=standing(0.0, 0.8, n=2))
     batch.reset()
     to_the_end(batch)
     runs = batch.runs()
@@ -152,7 +157,7 @@ def test_a_person_at_the_robot_holds_it_and_the_account_says_so():
 
 
 def test_a_robot_that_arrives_has_its_way_and_time_counted():
-    batch = GuardedReach(CELL, 4, 2, ALONE, SAFETY)
+    batch = MonitoredReachBatch(CELL, 4, 2, ALONE, SAFETY)
     batch.reset()
     q, tips = [batch.state.q.copy()], []
     while (batch.state.outcome == RUNNING).any():
@@ -170,12 +175,12 @@ def test_a_robot_that_arrives_has_its_way_and_time_counted():
 def test_a_person_who_walks_into_a_robot_at_rest_is_told_from_one_who_meets_it_moving():
     settings = replace(BOX, people=("walker",), time_limit_s=4.0)
     tracks = passing(2, y=0.6)
-    held = GuardedReach(CELL, 2, 0, settings, SAFETY, tracks=tracks)
+    held = MonitoredReachBatch(CELL, 2, 0, settings, SAFETY, tracks=tracks)
     held.reset()
     to_the_end(held, still=True)
     assert (held.state.outcome == COLLISION).all()
     assert held.runs().touched_at_rest.all() and not held.runs().touched_moving.any()
-    bare = GuardedReach(CELL, 2, 0, settings, SAFETY, tracks=tracks, guarded=False)
+    bare = MonitoredReachBatch(CELL, 2, 0, settings, SAFETY, tracks=tracks, guarded=False)
     bare.reset()
     act = np.zeros((2, 6), dtype=np.float32)
     act[:, 0] = 0.3
@@ -187,7 +192,7 @@ def test_a_person_who_walks_into_a_robot_at_rest_is_told_from_one_who_meets_it_m
 
 def test_a_touched_robot_at_rest_may_go_on():
     settings = replace(BOX, people=("walker",), time_limit_s=10.0)
-    batch = GuardedReach(
+    batch = MonitoredReachBatch(
         CELL, 2, 0, settings, SAFETY, tracks=passing(2, y=0.6), rest_ends=False
     )
     batch.reset()
@@ -199,7 +204,9 @@ def test_a_touched_robot_at_rest_may_go_on():
 
 
 def test_policies_are_told_of_no_more_time_than_their_horizon():
-    batch = GuardedReach(CELL, 1, 0, replace(ALONE, time_limit_s=12.0), SAFETY, horizon_s=5.0)
+    batch = MonitoredReachBatch(
+        CELL, 1, 0, replace(ALONE, time_limit_s=12.0), SAFETY, horizon_s=5.0
+    )
     batch.reset()
     told = [batch.state.time_left[0]]
     for _ in range(600):
@@ -211,7 +218,7 @@ def test_policies_are_told_of_no_more_time_than_their_horizon():
 
 
 def test_a_planner_s_wanted_speeds_are_met_exactly():
-    batch = GuardedReach(CELL, 2, 0, ALONE, SAFETY)
+    batch = MonitoredReachBatch(CELL, 2, 0, ALONE, SAFETY)
     batch.reset()
     assert batch.people_shapes(0).cylinders.shape == no_people().cylinders.shape
     wanted = np.array([0.05, -0.03, 0.0, 0.1, -0.1, 0.02])
@@ -223,10 +230,10 @@ def test_a_planner_s_wanted_speeds_are_met_exactly():
 def test_tracks_that_do_not_fit_are_refused():
     walker = replace(BOX, people=("walker",))
     with pytest.raises(InvalidInput, match="one cylinder"):
-        GuardedReach(CELL, 1, 0, ALONE, SAFETY, tracks=standing(0.0, 1.0))
+        MonitoredReachBatch(CELL, 1, 0, ALONE, SAFETY, tracks=standing(0.0, 1.0))
     with pytest.raises(InvalidInput, match="shape"):
-        GuardedReach(CELL, 2, 0, walker, SAFETY, tracks=standing(0.0, 1.0))
-    batch = GuardedReach(CELL, 1, 0, walker, SAFETY, tracks=standing(0.0, 1.0))
+        MonitoredReachBatch(CELL, 2, 0, walker, SAFETY, tracks=standing(0.0, 1.0))
+    batch = MonitoredReachBatch(CELL, 1, 0, walker, SAFETY, tracks=standing(0.0, 1.0))
     batch.reset()
     with pytest.raises(InvalidInput, match="auto_reset"):
         batch.step(np.zeros((1, 6), dtype=np.float32))
@@ -236,7 +243,7 @@ def test_tracks_that_do_not_fit_are_refused():
 def test_people_on_tracks_are_remembered():
     tracks = passing(2, speed=0.8)
     tracks[:, :, 2] += 0.001 * np.arange(250)
-    batch = GuardedReach(CELL, 2, 3, BOX, SAFETY, tracks=tracks)
+    batch = MonitoredReachBatch(CELL, 2, 3, BOX, SAFETY, tracks=tracks)
     batch.reset()
     act = np.zeros((2, 6), dtype=np.float32)
     for _ in range(40):

@@ -8,7 +8,7 @@ from app.sim.cells.cell import load_cell
 from app.sim.planning.ompl_planners import PlanSettings
 from app.sim.planning.replanning import ReplanningSettings
 from app.sim.reach.batch import ReachSettings
-from app.sim.reach.monitored.batch import GuardedReach
+from app.sim.reach.monitored.batch import MonitoredReachBatch
 from app.sim.reach.monitored.planners import GOAL_SPREAD, drive_planner, postures_of
 from app.sim.robot.ur10 import Robot
 from app.sim.safety.layer import safety_settings
@@ -31,9 +31,9 @@ def in_the_way(leaves_s: float) -> np.ndarray:
     )
 
 
-def run(role: str, tracks: np.ndarray | None, **more: bool) -> GuardedReach:
+def run(role: str, tracks: np.ndarray | None, **more: bool) -> MonitoredReachBatch:
     rules = RULES if tracks is not None else replace(RULES, people=())
-    batch = GuardedReach(
+    batch = MonitoredReachBatch(
         CELL, 2, 0, rules, safety_settings(CELL), tracks=tracks, rest_ends=False
     )
     batch.reset()

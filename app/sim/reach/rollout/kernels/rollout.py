@@ -30,7 +30,7 @@ from app.sim.prediction.kernels.networks import N_TIMES, STEP_S, Floats, Network
 from app.sim.reach.kernels.base_controller import base_motion
 from app.sim.reach.kernels.episode import ReachState, ReachWorld, Work
 from app.sim.reach.kernels.observation import N_FEATURES, Obs, describe
-from app.sim.reach.kernels.option_features import N_WAYS, look_aside, put_ways
+from app.sim.reach.kernels.option_features import N_OPTION_FEATURES, look_aside, put_ways
 from app.sim.reach.rollout.kernels.actor import ResidualActor, answer, new_residual_actor
 from app.sim.reach.rollout.kernels.candidates import (
     DART,
@@ -156,7 +156,7 @@ def new_lookahead(arm: Arm, net: Network, base_weight: float, n_envs: int) -> Lo
         qdd=np.zeros(6),
         c=np.zeros(6),
         d=np.zeros(6),
-        obs=room(N_FEATURES + N_WAYS),
+        obs=room(N_FEATURES + N_OPTION_FEATURES),
         act=room(6),
         found=room(6),
         begun=room(6),

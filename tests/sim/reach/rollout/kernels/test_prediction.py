@@ -21,7 +21,7 @@ from app.sim.people.kernels.pedestrian import (
     remember_as_now,
 )
 from app.sim.prediction.kernels.networks import STEP_S
-from app.sim.prediction.weights import new_forecaster
+from app.sim.prediction.weights import new_motion_predictor
 from app.sim.reach.batch import ReachBatch, ReachSettings
 from app.sim.reach.kernels.episode import new_work
 from app.sim.reach.kernels.observation import NOBODY
@@ -45,7 +45,7 @@ def watched(batch: ReachBatch, periods: int) -> tuple[Vec, Vec]:
     Returns:
         Places, shape (periods, n_envs, MOMENTS, 3), and walkers, (periods, n_envs, N_STATE).
     """
-    work, foretold = new_work(batch.world, batch.state, new_forecaster()), new_foretold()
+    work, foretold = new_work(batch.world, batch.state, new_motion_predictor()), new_foretold()
     told, rows = [], []
     for _ in range(periods):
         now = np.empty((N_ENVS, MOMENTS, 3))
@@ -86,7 +86,7 @@ def test_who_is_smaller_or_larger_than_walkers_are_is_foretold_to_stay_so(times:
     batch = batch_of(7)
     rule, rows = batch.world.people.walkers.rows[0], batch.state.people.walkers.rows
     rows[:, 0, R] = r = times * rule[R_MIN if times < 1.0 else R_MAX]
-    work, foretold = new_work(batch.world, batch.state, new_forecaster()), new_foretold()
+    work, foretold = new_work(batch.world, batch.state, new_motion_predictor()), new_foretold()
     for e in range(N_ENVS):
         remember_as_now(rows, e, 0)
         foretell(batch.world, batch.state, e, MOMENTS, work, foretold)
