@@ -1,19 +1,18 @@
-"""Make the shipped forecasts of walkers anew; run ``python -m tools.train_motion_predictor``.
+"""Train the shipped motion predictor of pedestrians.
 
-Walkers of the cell ``CELL`` are started as in episodes and looked at at random moments: what a
-row remembers goes in, how radius and way go on comes out. A tenth of them have constant
-speed and radius, a tenth have been watched for a shorter time, and in a fifth what is
-remembered is noisy, as from a tracker. The squared errors of two small networks are made small.
+Pedestrians of the cell ``CELL`` start as in episodes and are sampled at random moments: the
+remembered motion is the input, the later motion the target. A tenth of them have constant speed
+and radius, a tenth a shorter past, and a fifth a past with noise as of a tracker. The two
+networks are trained on the mean squared error.
 
-Takes about eight minutes on one core. The result is committed as ``forecasts_data/walker.npz``;
-``tests/tools/test_train_motion_predictor.py`` trains for a moment and holds the shipped
-networks to
-errors on walkers they were not made from.
+Takes about eight minutes on one core and writes ``forecasts_data/walker.npz``, which is
+committed. A test trains for a moment and checks the errors of the shipped networks on other
+pedestrians.
 """
 
 import logging
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -47,7 +46,7 @@ from app.sim.prediction.kernels.networks import (
     SPEED_SCALE,
     STEP_S,
     Network,
-    see_past,
+    write_predictor_input,
 )
 from app.sim.prediction.weights import write_networks
 from app.sim.scene.scene import pedestrian_settings
@@ -59,38 +58,37 @@ SEED = 6
 WIDTH = 192
 """Units of each hidden layer."""
 N_WALKERS = 1_000_000
-"""Moments learned from."""
+"""Moments to train on."""
 N_UPDATES = 40_000
 BATCH = 1024
 LR = 2e-3
 MOST_PERIODS = 250
-"""Latest moment looked at, in periods."""
+"""Latest moment [control cycles]."""
 DT = 0.02
-"""Control period [s]."""
+"""Control cycle [s]."""
 CONSTANT_SHARE, SHORT_SHARE, NOISY_SHARE = 0.1, 0.1, 0.2
 MOST_NOISE = 0.02
-"""Greatest standard deviation of noise on radii [m]; five times that on speeds [m/s]."""
+"""Largest standard deviation of the noise of radii [m]; five times that for speeds [m/s]."""
 
 AHEAD = STEP_S * np.arange(1, N_TIMES + 1)
-"""Times of the forecasts [s]."""
-TOLD = [2, 5, 8, 12, 17, 23, 31]
-"""Which of them errors are told at."""
+"""Times of the predictions [s]."""
+REPORTED = [2, 5, 8, 12, 17, 23, 31]
+"""Indices of the times at which errors are reported."""
 
 Floats = NDArray[np.float32]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Moments:
-    """What was seen of walkers at some moment, and how they went on."""
+class Moments(NamedTuple):
+    """Inputs and targets of the networks at n moments."""
 
     radius_seen: Floats
-    """Inputs of the radius' network, (n, N_IN)."""
-    way_seen: Floats
-    """Inputs of the way's network, (n, N_IN)."""
+    """Inputs of the radius network, (n, N_IN)."""
+    path_seen: Floats
+    """Inputs of the path network, (n, N_IN)."""
     radius: Floats
-    """What the first should say, (n, N_TIMES)."""
-    way: Floats
-    """What the second should say, (n, N_TIMES)."""
+    """Targets of the radius network, (n, N_TIMES)."""
+    path: Floats
+    """Targets of the path network, (n, N_TIMES)."""
 
 
 @kernel(nogil=True)
@@ -101,11 +99,9 @@ def _watch(
     periods: NDArray[np.int64],
     seed: int,
     stream: NDArray[np.uint64],
-    radius_seen: Floats,
-    way_seen: Floats,
-    radius: Floats,
-    way: Floats,
+    out: Moments,
 ) -> None:
+    """Fill ``out`` with pedestrians of given kinds after given numbers of control cycles."""
     rows = state.rows
     for n in range(kinds.shape[0]):
         p = kinds[n]
@@ -113,41 +109,30 @@ def _watch(
         start_pedestrian(rules, state, 0, p, stream)
         for _ in range(periods[n]):
             advance_pedestrian(rules, state, 0, p, DT)
-        r, v = rows[0, p, R], math.hypot(rows[0, p, VX], rows[0, p, VY])
-        see_past(
-            r,
-            rows[0, p, GROWTH],
-            rows[0, p, AGE],
-            rows[0, p, PAST_RADIUS : PAST_RADIUS + N_PAST],
-            RADIUS_MIDDLE,
-            RADIUS_SCALE,
-            radius_seen[n],
-        )
-        see_past(
-            v,
-            0.0,
-            rows[0, p, AGE],
-            rows[0, p, PAST_SPEED : PAST_SPEED + N_PAST],
-            SPEED_MIDDLE,
-            SPEED_SCALE,
-            way_seen[n],
-        )
-        done, gone = 0, 0.0
+        row = rows[0, p]
+        r, v, age = row[R], math.hypot(row[VX], row[VY]), row[AGE]
+        radii = row[PAST_RADIUS : PAST_RADIUS + N_PAST]
+        speeds = row[PAST_SPEED : PAST_SPEED + N_PAST]
+        x = out.radius_seen[n]
+        write_predictor_input(r, row[GROWTH], age, radii, RADIUS_MIDDLE, RADIUS_SCALE, x)
+        x = out.path_seen[n]
+        write_predictor_input(v, 0.0, age, speeds, SPEED_MIDDLE, SPEED_SCALE, x)
+        done, length = 0, 0.0
         for i in range(N_TIMES):
             while done < round(STEP_S * (i + 1) / DT):
-                gone += DT * math.hypot(rows[0, p, VX], rows[0, p, VY])
+                length += DT * math.hypot(row[VX], row[VY])
                 advance_pedestrian(rules, state, 0, p, DT)
                 done += 1
-            radius[n, i] = (rows[0, p, R] - r) / RADIUS_SCALE
-            way[n, i] = (gone / (STEP_S * (i + 1)) - v) / SPEED_SCALE
+            out.radius[n, i] = (row[R] - r) / RADIUS_SCALE
+            out.path[n, i] = (length / (STEP_S * (i + 1)) - v) / SPEED_SCALE
 
 
 def watched(n: int, seed: int) -> Moments:
-    """Return walkers at random moments, exactly as they are.
+    """Return noiseless inputs and targets of ``n`` pedestrians at random moments.
 
     Args:
-        n: How many.
-        seed: Seed of who they are.
+        n: Number of pedestrians.
+        seed: Seed.
     """
     rng = np.random.default_rng(seed)
     person = pedestrian_settings(load_cell(CELL).cylinders[0])
@@ -157,21 +142,21 @@ def watched(n: int, seed: int) -> Moments:
     periods = rng.integers(1, MOST_PERIODS, n)
     seen = np.zeros((2, n, N_IN), dtype=np.float32)
     said = np.zeros((2, n, N_TIMES), dtype=np.float32)
-    stream = np.zeros(1, dtype=np.uint64)
-    _watch(rules, state, kinds, periods, seed, stream, seen[0], seen[1], said[0], said[1])
-    return Moments(radius_seen=seen[0], way_seen=seen[1], radius=said[0], way=said[1])
+    out = Moments(seen[0], seen[1], said[0], said[1])
+    _watch(rules, state, kinds, periods, seed, np.zeros(1, dtype=np.uint64), out)
+    return out
 
 
 def disturbed(
     seen: torch.Tensor, said: torch.Tensor, noise: float, rate_noise: float
 ) -> tuple[torch.Tensor, torch.Tensor]:
-    """Return moments, some with a shorter past and some seen through noise.
+    """Return inputs and targets, some with a shorter past and some with noise.
 
     Args:
-        seen: Inputs, (n, N_IN); left alone.
-        said: What the network should say, (n, N_TIMES); left alone.
-        noise: Greatest standard deviation of the values, in the network's units.
-        rate_noise: That of the rate.
+        seen: Inputs, (n, N_IN); not changed.
+        said: Targets, (n, N_TIMES); not changed.
+        noise: Largest standard deviation of the values, in the network's units.
+        rate_noise: Largest standard deviation of the rate.
     """
     n, seen, said = len(seen), seen.clone(), said.clone()
     short = torch.rand(n) < SHORT_SHARE
@@ -191,11 +176,11 @@ def disturbed(
 def fitted(
     seen: Floats, said: Floats, noise: float, rate_noise: float, n_updates: int
 ) -> nn.Sequential:
-    """Return a network that says ``said`` where it sees ``seen``.
+    """Return a network trained on inputs and targets.
 
     Args:
         seen: Inputs, (n, N_IN).
-        said: Outputs, (n, N_TIMES).
+        said: Targets, (n, N_TIMES).
         noise: As in :func:`disturbed`.
         rate_noise: See there.
         n_updates: Number of minibatches.
@@ -222,7 +207,7 @@ def fitted(
 
 
 def network_of(net: nn.Sequential) -> Network:
-    """Return a network as the kernels take it."""
+    """Return a network in the form of the kernels."""
     arrays: list[Floats] = []
     for layer in (net[0], net[2], net[4]):
         assert isinstance(layer, nn.Linear)
@@ -232,12 +217,12 @@ def network_of(net: nn.Sequential) -> Network:
 
 
 def make(n_pedestrians: int, n_updates: int, seed: int) -> tuple[Network, Network]:
-    """Return new networks for radius and way.
+    """Return trained networks for radius and path length.
 
     Args:
-        n_pedestrians: Moments learned from.
-        n_updates: Minibatches for each.
-        seed: Seed of everything random.
+        n_pedestrians: Moments to train on.
+        n_updates: Minibatches for each network.
+        seed: Seed.
     """
     torch.manual_seed(seed)
     moments, rate = watched(n_pedestrians, seed), MOST_NOISE / 0.05
@@ -245,20 +230,20 @@ def make(n_pedestrians: int, n_updates: int, seed: int) -> tuple[Network, Networ
     speed = 5.0 * MOST_NOISE / SPEED_SCALE, 0.0
     return (
         network_of(fitted(moments.radius_seen, moments.radius, *radius, n_updates)),
-        network_of(fitted(moments.way_seen, moments.way, *speed, n_updates)),
+        network_of(fitted(moments.path_seen, moments.path, *speed, n_updates)),
     )
 
 
 def errors(network: Network, seen: Floats, said: Floats) -> Floats:
-    """Return the root mean square errors of a network at each time, (N_TIMES,)."""
+    """Return the root mean square error of a network at each time, (N_TIMES,)."""
     hidden = np.maximum(seen @ network.w1 + network.b1, 0.0)
     hidden = np.maximum(hidden @ network.w2 + network.b2, 0.0)
     off: Floats = hidden @ network.w3 + network.b3 - said
     return np.asarray(np.sqrt((off**2).mean(axis=0)), dtype=np.float32)
 
 
-def going_on_as_now(moments: Moments) -> tuple[Floats, Floats]:
-    """Return these errors of a steady growth within the limits, and of a steady speed."""
+def constant_motion_errors(moments: Moments) -> tuple[Floats, Floats]:
+    """Return the errors of constant growth within the limits, and of constant speed."""
     middle, scale = np.float32(RADIUS_MIDDLE), np.float32(RADIUS_SCALE)
     now, growth = scale * moments.radius_seen[:, :1] + middle, moments.radius_seen[:, 1:2]
     settings = pedestrian_settings(load_cell(CELL).cylinders[0])
@@ -266,14 +251,14 @@ def going_on_as_now(moments: Moments) -> tuple[Floats, Floats]:
         np.clip(now + growth * AHEAD.astype(np.float32), settings.r_min, settings.r_max) - now
     )
     radius = np.sqrt(((grown / scale - moments.radius) ** 2).mean(axis=0))
-    return np.asarray(radius), np.asarray(np.sqrt((moments.way**2).mean(axis=0)))
+    return np.asarray(radius), np.asarray(np.sqrt((moments.path**2).mean(axis=0)))
 
 
 def main() -> None:
-    """Train, tell errors on other walkers, and write."""
+    """Train, report errors on other pedestrians, and write the networks."""
     logging.basicConfig(level=logging.INFO, format="%(message)s")
     torch.set_num_threads(1)
-    radius, way = make(N_WALKERS, N_UPDATES, SEED)
+    radius, path = make(N_WALKERS, N_UPDATES, SEED)
     other = watched(50_000, SEED + 1)
     kinds = (
         (
@@ -281,17 +266,17 @@ def main() -> None:
             np.full(N_TIMES, 1e3 * RADIUS_SCALE),
             errors(radius, other.radius_seen, other.radius),
         ),
-        ("way", 1e3 * SPEED_SCALE * AHEAD, errors(way, other.way_seen, other.way)),
+        ("path length", 1e3 * SPEED_SCALE * AHEAD, errors(path, other.path_seen, other.path)),
     )
-    for (name, unit, off), plain in zip(kinds, going_on_as_now(other), strict=True):
+    for (name, unit, off), plain in zip(kinds, constant_motion_errors(other), strict=True):
         logger.info(
-            "%s off by, root mean square [mm], at %s s: %s; going on as now: %s",
+            "%s: root mean square error [mm] at %s s: %s; of constant motion: %s",
             name,
-            AHEAD[TOLD].round(2),
-            (unit * off)[TOLD].round(1),
-            (unit * plain)[TOLD].round(1),
+            AHEAD[REPORTED].round(2),
+            (unit * off)[REPORTED].round(1),
+            (unit * plain)[REPORTED].round(1),
         )  # fmt: skip
-    write_networks(radius, way)
+    write_networks(radius, path)
 
 
 if __name__ == "__main__":

@@ -29,9 +29,10 @@ from app.sim.geometry.capsules import new_columns
 from app.sim.human.kernels.kinematics import N_CAPSULES
 from app.sim.pick.batch import DEFAULT_ACTION, DEFAULT_WEIGHTS, PickBatch, PickSettings
 from app.sim.pick.kernels import episode as pick
+from app.sim.pick.kernels.observation import new_pick_observation_workspace
 from app.sim.robot.capsules import load_robot_capsules
 from app.sim.robot.kernels.arm import FIRST_OVER_TABLE, Arm
-from app.sim.scenario.kernels.episode import PLAIN
+from app.sim.scenario.kernels.episode import PLAIN, new_step_workspace
 from app.sim.scene.scene import HumanKind
 from tests.benchmarks.measure import Row, Subject, arguments, report, rounds_over, row
 
@@ -129,8 +130,10 @@ def with_robot(pieces: int, seed: int) -> tuple[Subject, Row]:
     arm = with_capsules(batch.arm, pieces)
     world = batch.world._replace(arm=arm)
     state = batch.state._replace(robot=np.repeat(arm.columns[None], BATCH, axis=0))
-    work, action = pick.new_work(world, state), DEFAULT_ACTION.rule()
+    work = new_step_workspace(arm, world.people, state.people)
+    sight = new_pick_observation_workspace()
     rules = pick.PickRules(20.0, 10.0, 0.0, 0.05, 0.0, 0.0, 1, 1)
+    task = pick.PickTask(rules, DEFAULT_ACTION.rule(), DEFAULT_WEIGHTS)
     obs = np.zeros((BATCH, pick.N_PLAIN), dtype=np.float32)
     rew = np.zeros(BATCH, dtype=np.float32)
     ended, turn = np.zeros(BATCH, dtype=np.int64), acts(BATCH, seed)
@@ -138,10 +141,8 @@ def with_robot(pieces: int, seed: int) -> tuple[Subject, Row]:
     pick.reset_rows(world, rules, seed, 0, state, every, work)
 
     def step() -> None:
-        pick.step_batch(
-            world, rules, action, DEFAULT_WEIGHTS, state, work, next(turn), rew, ended
-        )
-        pick.observe_rows(world, state, every, work, PLAIN, obs)
+        pick.step_batch(world, task, state, work, next(turn), rew, ended)
+        pick.observe_rows(world, state, every, work, sight, PLAIN, obs)
         done = np.flatnonzero(ended)
         if len(done):
             state.episode[done] += 1

@@ -141,7 +141,7 @@ def test_noisy_measurements_of_a_closed_loop_never_lose_a_decision() -> None:
     goals = (np.array([-0.45, 0.65, 0.15]), np.array([0.45, 0.95, 0.45]))
     for k in range(240):
         seen = qd * (1.0 + rng.uniform(-0.01, 0.01, 6))
-        asked = question(q=q, qd=seen, goal=goals[k // 60 % 2], people=(), ahead=False)
+        asked = question(q=q, qd=seen, goal=goals[k // 60 % 2], people=(), rollout=False)
         decision = one.decide(asked)
         safe = decision.safe
         assert safe is not None

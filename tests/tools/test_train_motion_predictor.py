@@ -7,7 +7,13 @@ import torch
 from app.sim.prediction.kernels.networks import N_PAST, N_TIMES, RADIUS_MIDDLE, RADIUS_SCALE
 from app.sim.prediction.weights import new_motion_predictor
 from tools import train_motion_predictor as make_forecasts
-from tools.train_motion_predictor import disturbed, errors, fitted, going_on_as_now, watched
+from tools.train_motion_predictor import (
+    constant_motion_errors,
+    disturbed,
+    errors,
+    fitted,
+    watched,
+)
 
 OTHERS = watched(4000, 99)
 """People the shipped networks were not made from."""
@@ -15,7 +21,7 @@ OTHERS = watched(4000, 99)
 
 def test_a_moment_is_what_it_says() -> None:
     assert OTHERS.radius_seen.shape == (4000, 3 + N_PAST)
-    assert OTHERS.radius.shape == OTHERS.way.shape == (4000, N_TIMES)
+    assert OTHERS.radius.shape == OTHERS.path.shape == (4000, N_TIMES)
     r = RADIUS_MIDDLE + RADIUS_SCALE * OTHERS.radius_seen[:, [0]]
     later = r + RADIUS_SCALE * OTHERS.radius
     assert later.min() > 0.2 - 1e-6 and later.max() < 0.5 + 1e-6
@@ -25,11 +31,11 @@ def test_a_moment_is_what_it_says() -> None:
     np.testing.assert_array_equal(newest[:, 0], newest[:, 3])
 
 
-def test_the_shipped_networks_do_much_better_than_going_on_as_now() -> None:
+def test_the_shipped_networks_do_much_better_than_constant_motion_errors() -> None:
     net = new_motion_predictor()
     radius = errors(net.radius, OTHERS.radius_seen, OTHERS.radius)
-    way = errors(net.way, OTHERS.way_seen, OTHERS.way)
-    linear, constant = going_on_as_now(OTHERS)
+    way = errors(net.path, OTHERS.path_seen, OTHERS.path)
+    linear, constant = constant_motion_errors(OTHERS)
     assert (radius[5:] < 0.5 * linear[5:]).all()
     assert (way[5:] < 0.6 * constant[5:]).all()
 

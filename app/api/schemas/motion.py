@@ -17,7 +17,13 @@ from app.sim.human.model import CAPSULE_NAMES
 from app.sim.human.person import Person
 from app.sim.perception.multi_person_tracker import MAX_SKELETONS
 from app.sim.pick.batch import Piece
-from app.sim.reach.motion_types import Beside, Met, MotionDecision, MotionQuestion, Way
+from app.sim.reach.motion_types import (
+    Beside,
+    MotionDecision,
+    MotionMode,
+    MotionQuestion,
+    PersonWeight,
+)
 from app.sim.safety.decision import SafetyDecision, SeparationTerms, powers_of_time
 from app.sim.safety.layer import SafetySettings
 
@@ -93,7 +99,7 @@ class MotionRequest(Body):
         "track; of more than four the nearest four are used, the others are flagged `dropped`",
     )
     goal: Vector3 = Field(description="goal of the tool, in `frame` [m]")
-    inference_mode: Way | None = Field(
+    inference_mode: MotionMode | None = Field(
         None,
         description="`interpolated`: weighted mean of the policy's actions for the training "
         "targets around the goal; `direct`: its action for the goal itself; null: interpolated "
@@ -156,9 +162,9 @@ class MotionRequest(Body):
             goal=np.array(self.goal),
             people=people,
             observed=observed,
-            way=self.inference_mode,
+            inference_mode=self.inference_mode,
             beside=self.beside,
-            ahead=self.rollout,
+            rollout=self.rollout,
             time_left_s=self.time_left_s,
             elapsed_s=self.elapsed_s,
             safety=None if self.safety is None else self.safety.to_domain(own),
@@ -308,7 +314,7 @@ class PersonMet(PersonUse):
     weight: float = Field(description="weight of the action beside this person")
 
     @classmethod
-    def from_use(cls, use: PersonUse, met: Met | None) -> Self:
+    def from_use(cls, use: PersonUse, met: PersonWeight | None) -> Self:
         """Return the use of a person with its distance, if known."""
         separation, weight = (None, 0.0) if met is None else met
         return cls(**dict(use), separation=separation, weight=weight)
@@ -326,7 +332,7 @@ class MotionAnswer(Answer):
     act: Vector6 = Field(
         description="action, -1 to 1 per joint: the policy's, or the first of the alternative"
     )
-    inference_mode: Way
+    inference_mode: MotionMode
     rollout: bool = Field(description="whether the decision was simulated forward")
     alternative: str | None = Field(
         description="candidate executed instead of the policy's action: its first waypoint and "
@@ -374,9 +380,9 @@ class MotionAnswer(Answer):
             segment=segment,
             commanded=commanded,
             act=_numbers(decision.act),
-            inference_mode=decision.way,
-            rollout=decision.ahead,
-            alternative=decision.began,
+            inference_mode=decision.inference_mode,
+            rollout=decision.rollout,
+            alternative=decision.candidate,
             targets=[
                 Target(position=list(one.position), weight=one.weight)
                 for one in decision.targets

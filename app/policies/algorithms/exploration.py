@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from app.policies.configs.td3 import NoiseExploration
 from app.sim.core.arrays import Vec
 from app.sim.pick.batch import PickBatch
-from app.sim.pick.kernels.observation import BASE_GAIN
+from app.sim.scenario.kernels.person_observation import BASE_GAIN
 
 HOLD, HOME, NEARBY, ELSEWHERE = range(4)
 OPTION_STEPS = (4, 30)

@@ -212,7 +212,7 @@ away that the robot is allowed to move."""
 
 PEOPLE_SET = ReachPreset(
     name="reach-td3-people-set",
-    episode=ReachEpisode(observation="crowd"),
+    episode=ReachEpisode(observation="people-set"),
     people=ReachPeople(n_people=4, count="up-to"),
 )
 """``reach-td3`` beside one to four people, observed as a set."""

@@ -19,7 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.errors import CheckpointMismatch, InvalidInput
-from app.policies.inference.rollout import NO_CONSTRAINT, Layer, Lookahead, can_roll_out
+from app.policies.inference.rollout import (
+    NO_CONSTRAINT,
+    RolloutImprovement,
+    SsmConstraint,
+    can_roll_out,
+)
 from app.policies.inference.target_interpolation import Interpolation, interpolates
 from app.sim.core.arrays import Vec
 from app.sim.reach.batch import ReachBatch
@@ -174,14 +179,14 @@ class RolloutController:
     """
 
     def __init__(
-        self, base: Controller, actor: ReachActor, layer: Layer = NO_CONSTRAINT
+        self, base: Controller, actor: ReachActor, layer: SsmConstraint = NO_CONSTRAINT
     ) -> None:
-        self._base, self._improvement, self.layer = base, Lookahead(actor), layer
+        self._base, self._improvement, self.layer = base, RolloutImprovement(actor), layer
 
     def acts(self, batch: ReachBatch) -> Actions:
         """Return actions; see :class:`Controller`."""
         act = self._base.acts(batch)
-        self._improvement.layer = self.layer
+        self._improvement.constraint = self.layer
         self._improvement.improve(batch, act)
         return act
 

@@ -17,9 +17,9 @@ from app.errors import InvalidInput
 from app.policies.checkpoints.trained_values import Seen, TrainedValues, as_told
 from app.policies.inference.controllers import person_weights
 from app.policies.inference.rollout import (
-    OTHERS,
-    PASSED,
-    Lookahead,
+    CANDIDATES,
+    POLICY,
+    RolloutImprovement,
     can_roll_out,
     ssm_constraint_of,
 )
@@ -42,12 +42,12 @@ from app.sim.reach.batch import goal_region_of
 from app.sim.reach.monitored.batch import HORIZON_S
 from app.sim.reach.motion_types import (
     BESIDES,
-    WAYS,
-    Met,
+    MOTION_MODES,
     MotionDecision,
+    MotionMode,
     MotionQuestion,
+    PersonWeight,
     TargetWeight,
-    Way,
 )
 from app.sim.reach.query_state import QueryState
 from app.sim.reach.reach_actor import ReachActor
@@ -85,7 +85,7 @@ class MotionDecider:
         self._met = TrainedValues(actor.trained_range)
         self._stages: dict[tuple[int, int], QueryState] = {}
         self._last: dict[tuple[int, int], QueryState] = {}
-        self._aheads: dict[QueryState, Lookahead] = {}
+        self._aheads: dict[QueryState, RolloutImprovement] = {}
         self._layer = SafetyLayer(self.arm, SafetySettings())
         self._busy = threading.Lock()
 
@@ -105,22 +105,22 @@ class MotionDecider:
         started = time.perf_counter()
         robot, goal = self._numbers(question)
         people = checked_people(question.people)
-        way, looks = self._way(question.way), self._looks(question.ahead)
+        way, looks = self._way(question.inference_mode), self._looks(question.rollout)
         order = _bodies_first(people)
         known = [people[i] for i in order]
         with self._busy:
             stage = self._stage(known, self._stages)
             time_left = min(max(0.0, question.time_left_s), HORIZON_S)
-            stage.put(robot.measured, known, time_left)
-            apart, clearance = stage.apart.tolist(), stage.clear.tolist()
+            stage.load(robot.measured, known, time_left)
+            apart, clearance = stage.distances.tolist(), stage.clear.tolist()
             distance, shapes = math.dist(stage.tcp, goal), stage.shapes
             if question.safety is None:
                 _require_apart(apart, order)
             # Distances and monitoring go by what was measured, the policy by what it knows.
             viewed = [as_known(person) for person in known]
             if robot.outside or any(a is not b for a, b in zip(known, viewed, strict=True)):
-                stage.put(robot.clamped, viewed, time_left)
-            nearest = int(stage.apart.argmin()) if order else None
+                stage.load(robot.clamped, viewed, time_left)
+            nearest = int(stage.distances.argmin()) if order else None
             act, targets, weights, seen = self._act(stage, question, goal, way)
             began = self._improve(stage, question, goal, act) if looks else None
             piece, unfeasible = self._piece(robot, act)
@@ -128,15 +128,17 @@ class MotionDecider:
             safe, terms_of, terms = self._monitored(question, robot, piece, shapes, places)
             state = np.concatenate((robot.clamped.q, robot.clamped.qd, goal))
             outside = self._met.outside(state, as_told(seen, known, viewed), order)
-        met = [Met(separation=d, weight=w) for d, w in zip(apart, weights, strict=True)]
+        met = [
+            PersonWeight(separation=d, weight=w) for d, w in zip(apart, weights, strict=True)
+        ]
         place = sorted(range(len(order)), key=order.__getitem__)
         return MotionDecision(
             act=act,
-            ahead=looks,
-            began=began,
+            rollout=looks,
+            candidate=began,
             piece=piece,
             unfeasible=unfeasible,
-            way=way,
+            inference_mode=way,
             targets=targets,
             met=tuple(met[i] for i in place),
             seen=None if nearest is None else order[nearest],
@@ -189,11 +191,11 @@ class MotionDecider:
             raise InvalidInput("beside", question.beside, "must name a rule", BESIDES)
         return robot, goal
 
-    def _way(self, asked: Way | None) -> Way:
+    def _way(self, asked: MotionMode | None) -> MotionMode:
         if asked is None:
             return "direct" if self._between is None else "interpolated"
-        if asked not in WAYS:
-            raise InvalidInput("inference_mode", asked, "must be a mode", WAYS)
+        if asked not in MOTION_MODES:
+            raise InvalidInput("inference_mode", asked, "must be a mode", MOTION_MODES)
         if asked == "interpolated" and self._between is None:
             rule = "needs training targets, and this policy was trained on all of a box"
             raise InvalidInput("inference_mode", asked, rule, ("direct",))
@@ -210,18 +212,18 @@ class MotionDecider:
     ) -> str | None:
         """Play an action ahead; change it where another way is better, and return its name."""
         if stage not in self._aheads:
-            self._aheads[stage] = Lookahead(self.actor)
+            self._aheads[stage] = RolloutImprovement(self.actor)
         ahead = self._aheads[stage]
         ahead.forget()
-        ahead.layer = ssm_constraint_of(question.safety, self.arm.dt, question.age_s)
+        ahead.constraint = ssm_constraint_of(question.safety, self.arm.dt, question.age_s)
         state = stage.state
         state.goal[0], state.elapsed[0] = goal, question.elapsed_s
         played = act[None].astype(np.float32)
         chosen = int(ahead.improve(stage, played)[0])
-        if chosen == PASSED:
+        if chosen == POLICY:
             return None
         act[:] = played[0]
-        return OTHERS[chosen]
+        return CANDIDATES[chosen]
 
     def _observed(
         self, observed: Sequence[Person] | None, robot: MeasuredState
@@ -233,7 +235,7 @@ class MotionDecider:
         places = _bodies_first(people)
         last = [people[i] for i in places]
         stage = self._stage(last, self._last)
-        stage.put(robot.measured, last, 0.0)
+        stage.load(robot.measured, last, 0.0)
         return stage.shapes, places
 
     def _stage(
@@ -246,10 +248,10 @@ class MotionDecider:
         return stages[kinds]
 
     def _act(
-        self, stage: QueryState, question: MotionQuestion, goal: Vec, way: Way
+        self, stage: QueryState, question: MotionQuestion, goal: Vec, way: MotionMode
     ) -> tuple[Vec, tuple[TargetWeight, ...], list[float], list[Seen]]:
         """Return action, targets, weights of the people and who was seen, as what."""
-        apart = stage.apart
+        apart = stage.distances
         nearest = int(apart.argmin()) if len(apart) else None
         places, shares = goal[None], np.ones(1)
         if way == "interpolated":

@@ -32,17 +32,21 @@ from app.sim.reach.goal_sets import halton_targets
 from app.sim.reach.kernels import option_features as reach_ways
 from app.sim.reach.kernels import people_set as reach_crowd
 from app.sim.reach.kernels.observation import BASE_START, N_FEATURES, SIZES, STATE_SIZES
-from app.sim.reach.rollout.kernels.actor import FEW, answers, new_residual_actor
+from app.sim.reach.rollout.kernels.actor import FEW, act_batch, new_compiled_actor
 from app.sim.robot.actions import ActionSettings
 
 LAYOUTS = {
     "features": [[name, size] for name, size in SIZES],
     "state": [[name, size] for name, size in STATE_SIZES],
     "forecast": [[name, size] for name, size in (*SIZES, *reach_ways.SIZES)],
-    "crowd": [[name, size] for name, size in (*SIZES, *reach_ways.SIZES, *reach_crowd.SIZES)],
+    "people-set": [
+        [name, size] for name, size in (*SIZES, *reach_ways.SIZES, *reach_crowd.SIZES)
+    ],
 }
 """Names and sizes of the groups of each kind of observation, as manifests carry them."""
-CROWD = CrowdShape(N_FEATURES + reach_ways.N_OPTION_FEATURES, MAX_PEOPLE, reach_crowd.N_BLOCK)
+PEOPLE_SET = CrowdShape(
+    N_FEATURES + reach_ways.N_OPTION_FEATURES, MAX_PEOPLE, reach_crowd.N_BLOCK
+)
 """Where everybody stands as a set in the observation of that name."""
 MAX_LAYERS = 16
 """Most layers of a network taken from a checkpoint."""
@@ -93,9 +97,9 @@ class ReachPolicy:
         """Length of an observation."""
         arrays, n_seen = checkpoint.arrays(), self.n_obs
         self._crowd: tuple[Layer, ...] = ()
-        if self.view == "crowd":
-            self._crowd = _layers_of(arrays, CROWD_LAYERS, CROWD.n_block, CROWD_WIDTH)
-            n_seen = CROWD.first + CROWD_WIDTH
+        if self.view == "people-set":
+            self._crowd = _layers_of(arrays, CROWD_LAYERS, PEOPLE_SET.n_block, CROWD_WIDTH)
+            n_seen = PEOPLE_SET.first + CROWD_WIDTH
         self._layers = _layers_of(arrays, ACTOR_LAYERS, n_seen, N_ACT)
         self._residual = preset.networks.actor == "residual"
         self._few = self.kernel_network
@@ -165,9 +169,9 @@ class ReachPolicy:
         """Return what :meth:`acts` does, by the kernel."""
         seen = np.ascontiguousarray(obs, dtype=np.float32)
         acts = np.empty((len(seen), N_ACT), dtype=np.float32)
-        arguments = new_residual_actor(network, BASE_WEIGHT), seen, acts
+        arguments = new_compiled_actor(network, BASE_WEIGHT), seen, acts
         if self._answers is None:
-            self._answers = direct(answers, arguments)
+            self._answers = direct(act_batch, arguments)
         self._answers(*arguments)
         return acts
 
@@ -175,9 +179,9 @@ class ReachPolicy:
         """Return what the first layer sees: people as a set are described as one."""
         if not self._crowd:
             return obs
-        blocks = obs[:, CROWD.first :].reshape(-1, CROWD.n_people, CROWD.n_block)
+        blocks = obs[:, PEOPLE_SET.first :].reshape(-1, PEOPLE_SET.n_people, PEOPLE_SET.n_block)
         found = _hidden(blocks, self._crowd) * blocks[:, :, :1]
-        return np.concatenate([obs[:, : CROWD.first], found.max(axis=1)], axis=1)
+        return np.concatenate([obs[:, : PEOPLE_SET.first], found.max(axis=1)], axis=1)
 
 
 def _hidden(rows: Floats, layers: tuple[Layer, ...]) -> Floats:

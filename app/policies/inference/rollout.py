@@ -1,7 +1,8 @@
-"""Looking ahead with a policy: its actions, replaced where they would end in a contact.
+"""Rollout policy improvement of a trained reach policy.
 
-``app/sim/reach/rollout/kernels/improvement.py`` plays them forward; here it meets a policy and
-a batch.
+``app/sim/reach/rollout/kernels/improvement.py`` simulates the candidates; here it is applied
+to a policy and a
+batch of environments, or to one queried state.
 """
 
 from collections.abc import Callable
@@ -16,66 +17,73 @@ from app.policies.networks.actor_critic import BASE_WEIGHT
 from app.sim.core.jit import direct
 from app.sim.prediction.kernels.networks import STEP_S, Network
 from app.sim.prediction.weights import new_motion_predictor
-from app.sim.reach.kernels.episode import ReachState, ReachWorld, Work, new_work
+from app.sim.reach.kernels.episode import ReachCell
+from app.sim.reach.kernels.observation_workspace import new_observation_workspace
 from app.sim.reach.reach_actor import ReachActor
-from app.sim.reach.rollout.kernels import candidates as other_ways
+from app.sim.reach.rollout.kernels import candidates
 from app.sim.reach.rollout.kernels import improvement as kernel
-from app.sim.reach.rollout.kernels import rollout as played_ways
+from app.sim.reach.rollout.kernels.workspace import RolloutWorkspace, new_rollout_workspace
 from app.sim.safety.layer import SafetySettings
+from app.sim.scenario.kernels.episode import EpisodeState
 
-PASSED = other_ways.PASSED
-"""In place of the number of another way: the action passed as it is."""
+POLICY = candidates.POLICY
+"""In place of the number of a candidate: the policy's own action."""
 _LETTERS = {1.0: "f", -1.0: "b", 0.0: "h"}
-OTHERS = (
-    *(f"{name}-{n * STEP_S:.2g}s" for name in other_ways.NAMES for n in other_ways.LASTING),
+CANDIDATES = (
+    *(
+        f"{name}-{n * STEP_S:.2g}s"
+        for name in candidates.VIA_NAMES
+        for n in candidates.VIA_STEPS
+    ),
     "straight",
     *(
-        f"dash-{''.join(_LETTERS[sign] for sign in signs)}-{n * STEP_S:.2g}s"
-        for signs in other_ways.SIGNS
-        for n in other_ways.DASHING
+        f"bang-bang-{''.join(_LETTERS[sign] for sign in signs)}-{n * STEP_S:.2g}s"
+        for signs in candidates.SIGNS
+        for n in candidates.EVASION_STEPS
     ),
-    "dart",
+    "sampled",
 )
-"""Names of the other ways: where they lead first, and for how long. Of a dash, what pan,
-shoulder and elbow do: forward, back, or held. Where a dart leads is drawn."""
+"""Names of the candidates: via configuration or directions of pan, shoulder and elbow (forward,
+back, held), and duration of the first part."""
 
 Actions = NDArray[np.float32]
 
 
-class Layer(NamedTuple):
-    """What looking ahead knows of a safety layer."""
+class SsmConstraint(NamedTuple):
+    """Separation of moving robot and people that keeps the safety layer from stopping."""
 
     distance: float
-    """How far people are kept from a robot that moves [m]; 0 where nothing is known."""
-    ahead: float
-    """How long they go on until a motion that is asked for now is over [s]."""
+    """Distance that people must keep from a moving robot [m]; 0 for no constraint."""
+    horizon: float
+    """Time until a motion that is commanded now has ended [s]."""
 
 
-NO_CONSTRAINT = Layer(0.0, 0.0)
-"""No layer, or one that takes people to come at once from wherever they are: nothing that is
-known of their way says where it would not hold the robot."""
-
-
+NO_CONSTRAINT = SsmConstraint(0.0, 0.0)
+"""No layer, or one that assumes that people may come from anywhere: then their predicted motion
+does not tell where the layer would stop the robot."""
 SPARE_DISTANCE = 0.04
-"""People are kept so much farther away than a robot at rest is asked to [m]: one that moves
-must be able to stop. With 0.02 m the time to the goal fell from 4.29 to 4.20 s, and the share
-of runs never stopped from 60 to 43 %, on the first 100 crossings of seed 77."""
+"""Distance added for the stopping of a moving robot [m]. With 0.02 m instead, the time to goal
+fell from 4.29 to 4.20 s and the share of runs without a stop from 60 to 43 % (first 100
+crossings of seed 77)."""
 LONGEST_HORIZON = 1.0
-"""Longest time ahead for which people's way counts [s]."""
+"""Largest horizon of a constraint [s]."""
 
 
-def ssm_constraint_of(settings: SafetySettings | None, dt: float, age: float = 0.0) -> Layer:
-    """Return what looking ahead knows of a safety layer.
+def ssm_constraint_of(
+    settings: SafetySettings | None, dt: float, age: float = 0.0
+) -> SsmConstraint:
+    """Return the constraint of a safety layer.
 
     Args:
-        settings: What it assumes; None where there is none.
-        dt: Control period [s].
-        age: How old people are beyond the tracker's delay [s].
+        settings: Assumptions of the layer; None for no layer.
+        dt: Control cycle [s].
+        age: Age of the observation of people beyond the tracker's delay [s].
     """
     if settings is None or not settings.use_measured_velocity:
         return NO_CONSTRAINT
-    ahead = min(LONGEST_HORIZON, settings.latency + dt + age)
-    return Layer(settings.margin + settings.speed_change * ahead + SPARE_DISTANCE, ahead)
+    horizon = min(LONGEST_HORIZON, settings.latency + dt + age)
+    distance = settings.margin + settings.speed_change * horizon + SPARE_DISTANCE
+    return SsmConstraint(distance, horizon)
 
 
 def _network_of(actor: ReachActor) -> Network | None:
@@ -83,68 +91,68 @@ def _network_of(actor: ReachActor) -> Network | None:
 
 
 def can_roll_out(actor: ReachActor) -> bool:
-    """Whether a policy can be played ahead: one of ours that sees forecasts."""
+    """Return whether a policy can be simulated: a residual actor with option features."""
     return _network_of(actor) is not None
 
 
-class Cells(Protocol):
-    """Rows of the reach scenario: a batch, or a stage that somebody's state was put into."""
+class ReachEnvs(Protocol):
+    """Environments of the reach scenario: a batch, or one queried state."""
 
     @property
-    def world(self) -> ReachWorld: ...  # noqa: D102
+    def world(self) -> ReachCell: ...  # noqa: D102
     @property
-    def state(self) -> ReachState: ...  # noqa: D102
+    def state(self) -> EpisodeState: ...  # noqa: D102
 
 
-class Lookahead:
-    """Plays the actions of one policy ahead; used by one thread at a time.
+class RolloutImprovement:
+    """Improves the actions of one policy; used by one thread at a time.
 
     Args:
         actor: The policy.
 
     Raises:
-        InvalidInput: It cannot be played ahead.
+        InvalidInput: The policy cannot be simulated.
     """
 
     def __init__(self, actor: ReachActor) -> None:
         network = _network_of(actor)
         if network is None:
-            rule = "must be a residual actor of two layers that sees forecasts, to look ahead"
+            rule = "must be a residual actor of two layers with option features, for rollouts"
             raise InvalidInput("checkpoint", actor.checkpoint, rule)
         self._network, self._rule = network, actor.action.rule()
-        self.layer = NO_CONSTRAINT
-        """The safety layer that what is played goes through."""
-        self._cells: Cells | None = None
-        self._work: tuple[Work, played_ways.Lookahead] | None = None
-        self._call: Callable[..., None] = kernel.look_ahead_batch
+        self.constraint = NO_CONSTRAINT
+        """Constraint of the safety layer."""
+        self._envs: ReachEnvs | None = None
+        self._work: RolloutWorkspace | None = None
+        self._call: Callable[..., None] = kernel.improve_batch
 
     def forget(self) -> None:
-        """Forget what was begun before: the next decision stands for itself."""
-        if self._work is None:
-            return
-        look = self._work[1]
-        look.plan[:], look.drawn[:], look.nearest[:] = PASSED, 0, 0.0
+        """Clear the plans, so that the next decision is independent of the previous ones."""
+        if self._work is not None:
+            self._work.plan[:], self._work.n_sampled[:] = POLICY, 0
+            self._work.incumbent_info[:] = 0.0
 
-    def improve(self, cells: Cells, act: Actions) -> NDArray[np.int64]:
-        """Replace actions that end in a contact by the first ones of better ways.
+    def improve(self, envs: ReachEnvs, act: Actions) -> NDArray[np.int64]:
+        """Replace actions whose rollout collides by the first actions of better candidates.
 
         Args:
-            cells: Where they are asked for; rows whose episode has ended are left out.
+            envs: The environments; those whose episode has ended are skipped.
             act: The policy's actions, shape (n_envs, 6); changed.
 
         Returns:
-            Numbers of the ways begun instead, among ``OTHERS``, or PASSED, shape (n_envs,).
+            Number of the selected candidate in ``CANDIDATES``, or POLICY, shape (n_envs,).
         """
-        world, state, chosen = cells.world, cells.state, np.empty(len(act), dtype=np.int64)
-        if self._work is None or self._cells is not cells:
-            look = played_ways.new_lookahead(world.arm, self._network, BASE_WEIGHT, len(act))
-            self._cells, self._work = (
-                cells,
-                (new_work(world, state, new_motion_predictor()), look),
+        world, state, chosen = envs.world, envs.state, np.empty(len(act), dtype=np.int64)
+        if self._work is None or self._envs is not envs:
+            sight = new_observation_workspace(
+                world.arm, world.people, state.people, new_motion_predictor()
             )
-            self._call = direct(
-                kernel.look_ahead_batch, (world, self._rule, state, act, *self._work, chosen)
+            self._envs, self._work = (
+                envs,
+                new_rollout_workspace(world.arm, self._network, BASE_WEIGHT, sight, len(act)),
             )
-        self._work[1].layer[:] = self.layer
-        self._call(world, self._rule, state, act, *self._work, chosen)
+            arguments = world, self._rule, state, act, self._work, chosen
+            self._call = direct(kernel.improve_batch, arguments)
+        self._work.ssm[:] = self.constraint
+        self._call(world, self._rule, state, act, self._work, chosen)
         return chosen

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from app.errors import InvalidInput
 from app.sim.core.arrays import Vec
-from app.sim.reach.goal_sets import GoalCells, GoalMix, cells_of
+from app.sim.reach.goal_sets import InterpolationWeights, TargetInterpolation, interpolation_of
 from app.sim.reach.reach_actor import ReachActor
 
 INTERPOLATING = ("grid", "halton")
@@ -39,10 +39,10 @@ class Interpolation:
             raise InvalidInput("goals", actor.goals, rule, INTERPOLATING)
         self.actor = actor
         """The policy."""
-        self.cells: GoalCells = cells_of(actor.targets, actor.goals)
+        self.cells: TargetInterpolation = interpolation_of(actor.targets, actor.goals)
         """The cells between its targets."""
 
-    def around(self, goals: Vec, field: str = "goal") -> tuple[GoalMix, Vec]:
+    def around(self, goals: Vec, field: str = "goal") -> tuple[InterpolationWeights, Vec]:
         """Return the targets around goals, with weights and positions.
 
         Args:
@@ -58,7 +58,7 @@ class Interpolation:
         mix = self.cells.mix(goals, field)
         return mix, self.cells.targets[mix.which]
 
-    def acts(self, obs: NDArray[np.float32], mix: GoalMix) -> NDArray[np.float32]:
+    def acts(self, obs: NDArray[np.float32], mix: InterpolationWeights) -> NDArray[np.float32]:
         """Return the mean actions, shape (n, 6); targets without weight are not asked for.
 
         Args:

@@ -201,11 +201,9 @@ class TaskChooser:
             self._people,
             q,
             qd,
-            person.q,
-            person.qd,
+            (person.q, person.qd, person.size),
             goals,
             time_left_s,
-            person.size,
             self._networks.n_obs,
         )
         act, values = self._networks.act_and_value(obs)

@@ -62,7 +62,7 @@ def settings_of(preset: PickPreset) -> PickSettings:
         short_share=episode.short_share,
         start_clearance_m=episode.start_clearance_m,
         target_jitter_m=episode.target_jitter_m,
-        way_share=episode.on_path_share,
+        on_path_share=episode.on_path_share,
         people=None if n_people == 1 else (worker,) * n_people,
         work=work_of(preset.people),
         observation=episode.observation,

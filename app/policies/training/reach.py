@@ -16,7 +16,7 @@ from app.policies.algorithms.quantiles import QuantileCritics
 from app.policies.algorithms.td3 import Networks
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.configs.reach import ReachExploration, ReachPreset
-from app.policies.inference.reach_policy import CROWD, LAYOUTS
+from app.policies.inference.reach_policy import LAYOUTS, PEOPLE_SET
 from app.policies.networks.actor_critic import Critics, PlainActor, ResidualActor
 from app.policies.training.reporter import Callbacks, Reporter
 from app.policies.training.run import TrainingRun
@@ -80,7 +80,7 @@ def networks_of(preset: ReachPreset, n_obs: int) -> Networks:
     """Return how actor and critics are made for observations of a length."""
     sizes = preset.networks
     width, layers, normed = sizes.width, sizes.layers, sizes.critic_norm == "layer"
-    crowd = CROWD if preset.episode.observation == "crowd" else None
+    crowd = PEOPLE_SET if preset.episode.observation == "people-set" else None
 
     def actor() -> ResidualActor | PlainActor:
         if sizes.actor == "residual":

@@ -14,7 +14,7 @@ _PEOPLE = {
     "ReachFixedSpeed": ("fixed-speed",),
     "ReachAlone": (),
 }
-"""Ids and who is in the cell; None for the cell's own people."""
+"""Ids and the people in the cell; None for the cell's own people."""
 
 _SORTING = {"SortingE0": "sorting-e0", "SortingE1": "sorting-e1"}
 """Ids of the sorting task and their work cells."""

@@ -1,4 +1,4 @@
-"""The pick scenario as Gymnasium environments: one cell, or a batch."""
+"""The pick scenario as Gymnasium environments, single and vectorised."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -14,29 +14,29 @@ from app.sim.scene.scene import HumanKind
 
 
 class PickEnv(SingleEnv):
-    """A UR10 reaches for cubes and docks beside people; as a rule, one who works there too.
+    """A UR10 reaches for cubes and docks beside people, usually beside one worker.
 
-    | id | who is there |
-    |----|--------------|
+    | id | people |
+    |----|--------|
     | ``tandem/Pick-v0`` | the cell's own person: an 18-DoF worker at the same table |
-    | ``tandem/PickWalker-v0`` | a cylinder that walks, speed and radius vary (METHOD 2.1) |
-    | ``tandem/PickConstant-v0`` | a cylinder with speed and radius constant per episode |
-    | ``tandem/PickFixedSpeed-v0`` | a cylinder that walks at 0.5 m/s |
-    | ``tandem/PickAlone-v0`` | nobody |
+    | ``tandem/PickWalker-v0`` | a pedestrian of varying speed and radius (docs/method.md 2.1) |
+    | ``tandem/PickConstant-v0`` | a pedestrian of constant speed and radius per episode |
+    | ``tandem/PickFixedSpeed-v0`` | a pedestrian that walks at 0.5 m/s |
+    | ``tandem/PickAlone-v0`` | none |
 
-    ``people=("worker", "walker")`` makes any mix of up to four. ``gymnasium.make_vec`` gives
-    the batched :class:`PickVectorEnv`.
+    ``people=("worker", "walker")`` selects any combination of up to four people.
+    ``gymnasium.make_vec`` returns a :class:`PickVectorEnv`.
 
     ## Task
     Bring the tool within 0.1 m of the target, its axis within 0.2 rad of the vertical, slower
     than 0.1 m/s, without touching a person, the table or itself.
 
     ## Action space
-    ``Box(-1, 1, (5,), float32)``: wanted speeds of the first five joints at the end of the
-    control period (0.05 s), as shares of their limits (0.5 rad/s). They are clipped to what a
-    second-degree polynomial can reach without leaving position, speed and acceleration limits,
-    now or later; no action breaks a limit. The sixth joint is held at 0. ``settings.action``
-    chooses other meanings (METHOD 2.2).
+    ``Box(-1, 1, (5,), float32)``: desired speeds of the first five joints at the end of the
+    control cycle (0.05 s), as fractions of their limits (0.5 rad/s). They are clipped to those
+    that a second-degree polynomial can reach within position, speed and acceleration limits,
+    now and later; no action violates a limit. The sixth joint is held at 0. ``settings.action``
+    selects other action types (docs/method.md 2.2).
 
     | index | joint          | limits of the joint [rad] |
     |-------|----------------|---------------------------|
@@ -47,9 +47,9 @@ class PickEnv(SingleEnv):
     | 4     | wrist 2        | -6.2 .. 6.2               |
 
     ## Observation space
-    ``Box(-100, 100, (N_FEATURES,), float32)``; ``app.sim.pick.kernels.observation.LAYOUT``
-    gives the
-    slice of each group, in this order:
+    ``Box(-100, 100, (N_FEATURES,), float32)``; ``app.sim.pick.kernels.observation.LAYOUT`` has
+    the
+    slice of each group:
 
     | group | size | content |
     |-------|------|---------|
@@ -58,23 +58,23 @@ class PickEnv(SingleEnv):
     | tcp, goal_minus_tcp, tcp_velocity, tool_axis | 4 x 3 | tool and target [m, m/s] |
     | hands_and_elbows | 36 | hands and elbows from tcp, target, robot's elbow [m] |
     | hand_velocities | 6 | [m/s] |
-    | goal_posture_minus_q, base | 2 x 5 | way to the target's posture [rad], straight move |
-    | distance_tilt_clearance_time | 4 | how far, how tilted, how near the person, time left |
+    | goal_posture_minus_q, base | 2 x 5 | offset of the target's q [rad], base motion |
+    | distance_tilt_clearance_time | 4 | distance, tilt, clearance to the person, time left |
     | nearest_by_group | 16 | distance and direction of the person, four groups of links |
     | look_ahead_still, look_ahead_base | 2 x 3 | clearances in 0.25, 0.5 and 1 s |
-    | goal_clearance | 4 | clearance of the target's posture now and then |
+    | goal_clearance | 4 | clearance of the target's configuration, now and then |
 
-    Of several people the nearest is seen; a cylinder as a person who stands in it, nobody as
-    one far away. ``PickSettings(observation="state")`` gives the plain state (5.8), 51 numbers:
+    The nearest person is observed; a cylinder as a person standing in it, an empty cell as a
+    person far away. ``PickSettings(observation="state")`` is the raw state (5.8), 51 numbers:
     q, qd of the robot (2 x 6) and the person (2 x 18) [rad, rad/s, m, m/s], target [m].
-    ``PickSettings(observation="body")`` adds the size of the person seen to the features, 12
-    numbers: ``app.sim.human.anthropometry.NAMES`` [m], the pelvis's height as it is now, and
+    ``PickSettings(observation="body")`` adds the body dimensions of the observed person, 12
+    numbers: ``app.sim.human.anthropometry.NAMES`` [m], the present height of the pelvis, and
     the girth;
-    in all ``N_WITH_BODY``, groups as in ``features.BODY_SIZES``.
+    in total ``N_WITH_BODY``, groups as in ``features.BODY_SIZES``.
 
     ## Reward
     ``c_d (d_old - gamma d) + c_th (th_old - gamma th) - c_c [collision] - c_step
-    - c_v |v_tcp| [d <= d_v] + c_s [success]``; ``PickSettings.weights`` holds the coefficients.
+    - c_v |v_tcp| [d <= d_v] + c_s [success]``; coefficients in ``PickSettings.weights``.
 
     ## Start
     The robot rests at home, a cube or a dock in equal shares; the target is another station,
@@ -83,24 +83,24 @@ class PickEnv(SingleEnv):
     drawn again, unless ``settings.start`` is ``uniform``.
 
     ## End
-    Success, collision and time-out (20 s) *terminate*: the time left is observed, so a time-out
-    is part of the task. Where it is not (``observation="state"``), a time-out *truncates*.
-    ``info["outcome"]`` names the end; one-step bounds add *unfeasible*.
+    Success, collision and timeout (20 s) *terminate*: the time left is observed, so a timeout
+    is part of the task. Without it (``observation="state"``) a timeout *truncates*.
+    ``info["outcome"]`` names the outcome; myopic bounds add *unfeasible*.
 
     ## Randomness
-    Target, start and the people's motion. Episode ``k`` after ``reset(seed=s)`` is fixed by
-    (s, first_env, k) and equals episode ``k`` of row ``first_env`` of a ``PickVectorEnv`` with
-    that seed, bit for bit.
+    Target, start and the people's motion. Episode ``k`` after ``reset(seed=s)`` depends only on
+    (s, first_env, k) and equals episode ``k`` of environment ``first_env`` of a
+    ``PickVectorEnv`` with that seed, bit for bit.
 
     Args:
         cell: Name of a shipped work cell, or a work cell.
-        settings: Starts, ends and rewards.
-        people: Who is in the cell, 0 to 4 kinds of person; None for the settings'.
-        first_env: Which row of a vector environment this one equals.
+        settings: Settings of the scenario.
+        people: People in the cell, 0 to 4 kinds; None for those of the settings.
+        first_env: Number of the equal environment in a vector environment.
         render_mode: ``rgb_array`` or None; ``metadata["render_fps"]`` is the control rate.
 
     Source: thesis section 5.3. Deviates: features are added to the raw state (5.8), actions are
-    wanted speeds instead of coefficients (``pick/kernels/observation.py``,
+    desired speeds instead of coefficients (``pick/kernels/observation.py``,
     ``pick/kernels/reward.py``).
     """
 
@@ -121,17 +121,17 @@ class PickEnv(SingleEnv):
 
 
 class PickVectorEnv(BatchVectorEnv):
-    """Many cells of :class:`PickEnv`, stepped together; see there for spaces and rules.
+    """Many environments :class:`PickEnv`, stepped together.
 
     Args:
-        num_envs: Number of cells.
+        num_envs: Number of environments.
         cell: Name of a shipped work cell, or a work cell.
-        settings: Starts, ends and rewards.
-        people: Who is in each cell, 0 to 4 kinds of person; None for the settings'.
-        first_env: Number of the first cell.
-        autoreset_mode: What happens after an episode's end; see :class:`BatchVectorEnv`.
+        settings: Settings of the scenario.
+        people: People in each cell, 0 to 4 kinds; None for those of the settings.
+        first_env: Number of the first environment.
+        autoreset_mode: Autoreset mode; see :class:`BatchVectorEnv`.
         max_episode_steps: Steps after which an episode is truncated; None for no such limit.
-        render_mode: ``rgb_array`` (``render`` gives an image of every cell) or None.
+        render_mode: ``rgb_array`` (``render`` returns an image of each environment) or None.
     """
 
     def __init__(

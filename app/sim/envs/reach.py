@@ -1,4 +1,4 @@
-"""The reach scenario as Gymnasium environments: one cell, or a batch."""
+"""The reach scenario as Gymnasium environments, single and vectorised."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -14,28 +14,29 @@ from app.sim.scene.scene import HumanKind
 
 
 class ReachEnv(SingleEnv):
-    """A UR10 reaches goals over a table that people walk around and through.
+    """A UR10 reaches goals over a table while people walk through its workspace.
 
-    | id | who is there |
-    |----|--------------|
-    | ``tandem/Reach-v0`` | a cylinder that walks, speed and radius vary (METHOD 2.1) |
-    | ``tandem/ReachConstant-v0`` | a cylinder with speed and radius constant per episode |
-    | ``tandem/ReachFixedSpeed-v0`` | a cylinder that walks at 0.5 m/s |
-    | ``tandem/ReachWorker-v0`` | an 18-DoF worker who stands at the table and reaches over it |
-    | ``tandem/ReachAlone-v0`` | nobody |
+    | id | people |
+    |----|--------|
+    | ``tandem/Reach-v0`` | a pedestrian of varying speed and radius (docs/method.md 2.1) |
+    | ``tandem/ReachConstant-v0`` | a pedestrian of constant speed and radius per episode |
+    | ``tandem/ReachFixedSpeed-v0`` | a pedestrian that walks at 0.5 m/s |
+    | ``tandem/ReachWorker-v0`` | an 18-DoF worker at the table who reaches over it |
+    | ``tandem/ReachAlone-v0`` | none |
 
-    ``people=("worker", "walker")`` makes any mix of up to four. ``gymnasium.make_vec`` gives
-    the batched :class:`ReachVectorEnv`.
+    ``people=("worker", "walker")`` selects any combination of up to four people.
+    ``gymnasium.make_vec`` returns a :class:`ReachVectorEnv`.
 
     ## Task
-    Bring the tcp within 0.1 m of the goal without touching a person, the table or itself. How
-    the tool is turned and how fast it is do not matter.
+    Bring the tcp within 0.1 m of the goal without touching a person, the table or itself.
+    Orientation and speed of the tool are free.
 
     ## Action space
-    ``Box(-1, 1, (6,), float32)``: wanted speeds of the joints at the end of the control period
-    (0.02 s), as shares of their limits (1 rad/s). They are clipped to what a second-degree
-    polynomial can reach without leaving position, speed and acceleration limits, now or later;
-    no action breaks a limit. ``settings.action`` chooses other meanings (METHOD 2.2).
+    ``Box(-1, 1, (6,), float32)``: desired speeds of the joints at the end of the control cycle
+    (0.02 s), as fractions of their limits (1 rad/s). They are clipped to those that a
+    second-degree polynomial can reach within position, speed and acceleration limits, now and
+    later; no action violates a limit. ``settings.action`` selects other action types
+    (docs/method.md 2.2).
 
     | index | joint          | limits of the joint [rad] |
     |-------|----------------|---------------------------|
@@ -47,9 +48,8 @@ class ReachEnv(SingleEnv):
     | 5     | wrist 3        | -6.2 .. 6.2               |
 
     ## Observation space
-    ``Box(-100, 100, (N_FEATURES,), float32)``; ``app.sim.reach.kernels.observation.LAYOUT``
-    gives
-    the slice of each group, in this order:
+    ``Box(-100, 100, (N_FEATURES,), float32)``; ``app.sim.reach.kernels.observation.LAYOUT`` has
+    the slice of each group:
 
     | group | size | content |
     |-------|------|---------|
@@ -58,37 +58,37 @@ class ReachEnv(SingleEnv):
     | goal | 3 | [m] |
     | sin_q, cos_q | 2 x 6 | of the joints |
     | tcp | 3 | [m] |
-    | goal_minus_tcp | 3 | twice the way to the goal [m] |
+    | goal_minus_tcp | 3 | twice the offset of the goal [m] |
     | tcp_velocity | 3 | [m/s] |
     | human_minus_tcp, _elbow, _goal | 3 x 2 | the person's axis from each [m] |
     | clearance | 1 | distance of robot and people [0.5 m], at most 3 |
-    | look_ahead | 3 | the same in 0.25, 0.5, 1 s: robot still, people at constant velocity |
+    | look_ahead | 3 | the same in 0.25, 0.5, 1 s: robot at rest, people at constant velocity |
     | distance | 1 | twice the distance of tcp and goal [m] |
     | time_left | 1 | [2.5 s] |
-    | base | 6 | the straight way of the tcp to its goal, as an action |
-    | look_ahead_base | 3 | clearance in 0.25, 0.5, 1 s if the robot goes that way [0.5 m] |
+    | base | 6 | action of the base controller |
+    | look_ahead_base | 3 | clearance in 0.25, 0.5, 1 s along the base motion [0.5 m] |
     | human_growth | 1 | twice the growth of the radius [m/s] |
-    | approach | 4 x 2 | when [2 s] and how near [0.5 m] the person comes: to the tcp as it |
-    | | | moves and as it stands, to the elbow as it moves, to the goal |
+    | approach | 4 x 2 | time [2 s] and distance [0.5 m] of the closest approach to the |
+    | | | moving tcp, the tcp at rest, the moving elbow, the goal |
     | goal_gap | 4 | distance of person and goal now and in 0.25, 0.5, 1 s [0.5 m] |
-    | group_gap | 3 x 3 | gap [0.5 m] and direction of the person: upper arm, forearm, wrists |
+    | group_gap | 3 x 3 | distance [0.5 m] and direction of the person: arm, forearm, wrists |
 
-    ``ReachSettings(observation="forecast")`` has more behind these, ``LAYOUT`` of
-    ``app.sim.reach.kernels.option_features``, where people go on as
-    ``app.sim.prediction.kernels.networks`` says:
+    ``ReachSettings(observation="forecast")`` appends the option features (``LAYOUT`` of
+    ``app.sim.reach.kernels.option_features``), with people as
+    ``app.sim.prediction.kernels.networks`` predicts:
 
     | group | size | content |
     |-------|------|---------|
-    | arrival | 1 | time to the goal the straight way [s] |
-    | way_clearance | 9 | clearance that way in 0.06 to 1.3 s, and the least [0.2 m], -1 to 2 |
-    | aside_clearance | 4 x 9 | the same standing still, going home, to either side of home |
+    | arrival | 1 | time to the goal of the base motion [s] |
+    | way_clearance | 9 | clearance along it in 0.04 to 1.28 s, and the least [0.2 m], -1 to 2 |
+    | aside_clearance | 4 x 9 | the same at rest, toward home, and to either side of home |
     | goal_gap_ahead | 8 | distance of person and goal at these times [0.5 m] |
-    | radius_ahead | 8 | by how much the person is wider then [0.2 m] |
+    | radius_ahead | 8 | change of the person's radius [0.2 m] |
 
-    Of several people the nearest is seen; a worker as the cylinder about the pelvis that
-    contains the body, nobody as one far away. Clearances are those of all, exact.
+    The nearest person is observed; a worker as the cylinder about the pelvis that contains the
+    body, an empty cell as a person far away. Clearances are exact and consider all people.
 
-    ``ReachSettings(observation="state")`` gives the plain state (4.30), 20 numbers:
+    ``ReachSettings(observation="state")`` selects the raw state (4.30), 20 numbers:
 
     | index | content | unit |
     |-------|---------|------|
@@ -101,38 +101,38 @@ class ReachEnv(SingleEnv):
 
     ## Reward
     ``c_p (d_old - gamma d) - c_d d - c_a |c| - c_step - c_c [collision] + c_s [success]``, with
-    ``d`` the distance of tcp and goal [m], ``c`` the period's second coefficients [rad/s^2];
-    ``ReachSettings.weights`` holds the coefficients: ``THESIS_WEIGHTS`` (c_d 1, c_a 0.1, c_c 5,
-    c_s 20) or, to learn with, ``PROGRESS_WEIGHTS`` (c_p 1, c_step 0.004, c_c 4, c_s 4).
+    ``d`` the distance of tcp and goal [m], ``c`` the cycle's second coefficients [rad/s^2].
+    Coefficients in ``ReachSettings.weights``: ``THESIS_WEIGHTS`` (c_d 1, c_a 0.1, c_c 5, c_s
+    20) or, for training, ``PROGRESS_WEIGHTS`` (c_p 1, c_step 0.004, c_c 4, c_s 4).
 
     ## Start
     The robot rests at home; the goal is one of the 54 points of the cell's grid, one of the
     ``n_halton`` points of a Halton set (``goals="halton"``), or anywhere in the box of both
     (``goals="box"``). Cylinders start anywhere in their area, workers at a random time
-    of a random script of reaches. ``start="clearance"`` draws people again who are nearer than
-    0.05 m; ``"uniform"`` does not; ``"authors"`` does not either, and they walk as in the
-    authors' code.
+    of a random script of reaches. ``start="clearance"`` draws people again that are nearer than
+    0.05 m; ``"uniform"`` does not; ``"authors"`` does not, and people walk as in the authors'
+    code.
 
     ## End
-    Success and collision *terminate*; so does a time-out (5 s) where the time left is observed,
+    Success and collision *terminate*; so does a timeout (5 s) if the time left is observed;
     otherwise (``observation="state"``) it *truncates*. With ``collision_ends=False`` an episode
-    goes on after a collision, but counts as one at its end. ``info["outcome"]`` names the end;
-    one-step bounds add *unfeasible*.
+    continues after a collision and counts as a collision at its end. ``info["outcome"]`` names
+    the outcome; myopic bounds add *unfeasible*.
 
     ## Randomness
-    Goal, start and the people's motion. Episode ``k`` after ``reset(seed=s)`` is fixed by
-    (s, first_env, k) and equals episode ``k`` of row ``first_env`` of a ``ReachVectorEnv`` with
-    that seed, bit for bit.
+    Goal, start and the people's motion. Episode ``k`` after ``reset(seed=s)`` depends only on
+    (s, first_env, k) and equals episode ``k`` of environment ``first_env`` of a
+    ``ReachVectorEnv`` with that seed, bit for bit.
 
     Args:
         cell: Name of a shipped work cell with a goal region, or a work cell.
-        settings: Starts, ends and rewards.
-        people: Who is in the cell, 0 to 4 kinds of person; None for the settings'.
-        first_env: Which row of a vector environment this one equals.
+        settings: Settings of the scenario.
+        people: People in the cell, 0 to 4 kinds; None for those of the settings.
+        first_env: Number of the equal environment in a vector environment.
         render_mode: ``rgb_array`` or None; ``metadata["render_fps"]`` is the control rate.
 
-    Source: thesis chapter 4, METHOD 2.1 to 2.3. Deviates: features are added to the raw state
-    (4.30), actions are wanted speeds instead of coefficients, no action is *unfeasible*.
+    Source: thesis chapter 4, docs/method.md 2.1 to 2.3. Deviates: features are added to the raw
+    state (4.30), actions are desired speeds instead of coefficients, no action is *unfeasible*.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 50}
@@ -152,17 +152,17 @@ class ReachEnv(SingleEnv):
 
 
 class ReachVectorEnv(BatchVectorEnv):
-    """Many cells of :class:`ReachEnv`, stepped together; see there for spaces and rules.
+    """Many environments :class:`ReachEnv`, stepped together.
 
     Args:
-        num_envs: Number of cells.
+        num_envs: Number of environments.
         cell: Name of a shipped work cell with a goal region, or a work cell.
-        settings: Starts, ends and rewards.
-        people: Who is in each cell, 0 to 4 kinds of person; None for the settings'.
-        first_env: Number of the first cell.
-        autoreset_mode: What happens after an episode's end; see :class:`BatchVectorEnv`.
+        settings: Settings of the scenario.
+        people: People in each cell, 0 to 4 kinds; None for those of the settings.
+        first_env: Number of the first environment.
+        autoreset_mode: Autoreset mode; see :class:`BatchVectorEnv`.
         max_episode_steps: Steps after which an episode is truncated; None for no such limit.
-        render_mode: ``rgb_array`` (``render`` gives an image of every cell) or None.
+        render_mode: ``rgb_array`` (``render`` returns an image of each environment) or None.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Images of one cell of a batch: table, robot, people, and what the task is about."""
+"""Images of one environment: table, robot, people, and targets or blocks."""
 
 from collections.abc import Sequence
 from functools import lru_cache
@@ -38,12 +38,12 @@ STATION: Rgb = (150, 164, 182)
 TARGET: Rgb = (11, 127, 119)
 TRAY: Rgb = (206, 210, 214)
 CYLINDERS: tuple[Rgb, ...] = ((255, 116, 32), (196, 214, 48), (72, 164, 232), (232, 104, 168))
-"""Colour of cylinders, and of workers' vests, one after the other."""
+"""Colours of cylinders and of workers' vests, in order."""
 BLOCKS: dict[str, Rgb] = {"red": (205, 58, 62), "green": (112, 184, 92), "blue": (52, 104, 196)}
 UNNAMED: tuple[Rgb, ...] = ((205, 58, 62), (112, 184, 92), (52, 104, 196), *CYLINDERS[:2])
-"""Colour of towers for which the cell names none."""
+"""Colours of towers without a named colour."""
 FAILURES: tuple[Rgb, Rgb] = ((240, 237, 229), (176, 108, 48))
-"""Colours of clutter cells where grasps never fail, and where MOST_FAILURE do."""
+"""Colours of clutter slots with failure rates 0 and MOST_FAILURE."""
 MOST_FAILURE = 0.7
 
 SKIN: Rgb = (214, 164, 134)
@@ -60,12 +60,12 @@ _PARTS = {
     body.C_HAND_R: GLOVE,
     body.C_HAND_L: GLOVE,
 }
-"""Colours of a worker's capsules; the arms have SLEEVE, the trunk that of the vest."""
+"""Colours of a worker's capsules besides arms and trunk."""
 
 
 @lru_cache(maxsize=8)
 def raycaster_of(cell: Cell) -> Raycaster:
-    """Return what draws a cell: blocks are seen from nearer, walkers from farther off."""
+    """Return the raycaster of a cell; the camera distance depends on the scenario."""
     if is_sorting(cell):
         position, look_at = (2.05, -1.15, 1.7), (0.0, 0.62, 0.1)
     elif cell.goal_region is not None:
@@ -73,7 +73,7 @@ def raycaster_of(cell: Cell) -> Raycaster:
     else:
         position, look_at = (2.4, -1.1, 1.5), (-0.05, 0.6, 0.12)
     camera = Camera(position=position, look_at=look_at, fov=FOV)
-    return Raycaster(camera, WIDTH, HEIGHT, cell.floor_z, _furniture(cell))
+    return Raycaster(camera, WIDTH, HEIGHT, cell.floor_z, _static_solids(cell))
 
 
 def picture(cell: Cell, robot_q: Vec, people: Sequence[Solid], task: Sequence[Solid]) -> Image:
@@ -88,8 +88,8 @@ def picture(cell: Cell, robot_q: Vec, people: Sequence[Solid], task: Sequence[So
     return raycaster_of(cell).draw([*_robot_solids(cell, robot_q), *people, *task])
 
 
-def _furniture(cell: Cell) -> tuple[Solid, ...]:
-    """Return table, robot plate, obstacles and what stands at the stations of a pick cell."""
+def _static_solids(cell: Cell) -> tuple[Solid, ...]:
+    """Return table, robot plate, obstacles and the objects at pick stations."""
     solids: list[Solid] = [*_table_solids(cell.table)]
     solids.append(Box(center=(0, 0, 0.004), half_size=(0.15, 0.15, 0.004), colour=PLATE))
     for box in cell.obstacles:
@@ -140,12 +140,12 @@ def _capsules(ends: Vec, radii: Vec, colours: Sequence[Rgb]) -> list[Solid]:
 
 
 def people_solids(cell: Cell, state: PeopleState, row: int) -> list[Solid]:
-    """Return the people of one cell of a batch.
+    """Return the people of one environment.
 
     Args:
         cell: Work cell.
         state: People of the batch.
-        row: Which cell.
+        row: Number of the environment.
     """
     workers = worker_solids(cell, state.q[row], state.size[row])
     floor = cell.floor_z
@@ -182,16 +182,16 @@ def worker_solids(cell: Cell, q: Vec, sizes: Vec | None = None) -> list[Solid]:
 
 
 def standing_workers(cell: Cell) -> list[Solid]:
-    """Return a cell's workers where they stand at rest."""
+    """Return a cell's workers at rest at their workplaces."""
     postures = [human.rest_posture(*person.home) for person in cell.workers]
     return worker_solids(cell, np.array(postures).reshape(-1, 18))
 
 
 def target_solids(goal: Vec) -> list[Solid]:
-    """Return a target and the space around it in which it counts as reached.
+    """Return a target and the sphere of success around it.
 
     Args:
-        goal: Where it is [m], shape (3,).
+        goal: Position [m], shape (3,).
     """
     return [
         Capsule(start=goal, end=goal, radius=0.025, colour=TARGET),
@@ -200,12 +200,12 @@ def target_solids(goal: Vec) -> list[Solid]:
 
 
 def block_solids(cell: Cell, shape: SortingShape, state: SortingState) -> list[Solid]:
-    """Return clutter cells, towers and their blocks; what the goal asks for is translucent.
+    """Return clutter slots, towers and blocks; blocks of the goal are translucent.
 
     Args:
         cell: Sorting cell.
         shape: Size of its task.
-        state: What lies where, what is wanted, and where grasps fail.
+        state: Blocks, goal and failure rates.
     """
     level = block_height(cell) or 0.03
     named = [one.colour for one in cell.stations_of("cluster")]

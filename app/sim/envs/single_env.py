@@ -1,4 +1,4 @@
-"""One row of a batch as a Gymnasium environment; the scenarios add their data sheets."""
+"""One environment of a batch as a Gymnasium environment."""
 
 from typing import Any
 
@@ -14,17 +14,17 @@ ROW = np.zeros(1, dtype=np.int64)
 
 
 class SingleEnv(gymnasium.Env[NDArray[Any], Any]):
-    """A thin view of a batch of one row. Copies of it go on independently.
+    """A batch of one environment; copies continue independently.
 
-    ``gymnasium.wrappers.RecordVideo`` makes videos of it where moviepy is installed.
+    ``gymnasium.wrappers.RecordVideo`` records videos if moviepy is installed.
 
     Args:
-        task: The row.
+        task: The environment.
         render_mode: ``rgb_array``, or None.
         render_fps: Steps per second.
 
     Raises:
-        InvalidInput: There is no such render mode.
+        InvalidInput: The render mode is unknown.
     """
 
     def __init__(self, task: Task, render_mode: str | None, render_fps: int) -> None:
@@ -37,7 +37,7 @@ class SingleEnv(gymnasium.Env[NDArray[Any], Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[Any], dict[str, Any]]:
-        """Start episode 0 of a seed, or the next episode where no seed is given.
+        """Start episode 0 of a seed, or the next episode if no seed is given.
 
         Args:
             seed: Seed of this and the following episodes.
@@ -52,7 +52,7 @@ class SingleEnv(gymnasium.Env[NDArray[Any], Any]):
         return batch.obs[0].copy(), self._info()
 
     def step(self, action: Any) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
-        """Move through one control period, or make one attempt.
+        """Execute one control cycle, or one attempt of the sorting task.
 
         Args:
             action: See the action space.
@@ -60,7 +60,7 @@ class SingleEnv(gymnasium.Env[NDArray[Any], Any]):
         Raises:
             ResetNeeded: The episode has ended.
             SimulationError: The action is NaN or infinite.
-            InvalidInput: There is no such action.
+            InvalidInput: The action does not exist.
         """
         if not self._running:
             raise ResetNeeded("the episode has ended: call reset() before the next step()")
@@ -75,7 +75,7 @@ class SingleEnv(gymnasium.Env[NDArray[Any], Any]):
         """Return an image of the present state, uint8, shape (360, 480, 3).
 
         Returns:
-            None where the environment was made without a ``render_mode``.
+            None if the environment was made without a ``render_mode``.
 
         Raises:
             ResetNeeded: ``reset`` was never called.

@@ -1,4 +1,4 @@
-"""A batch as a Gymnasium vector environment, stepped by one compiled call."""
+"""A batch as a Gymnasium vector environment."""
 
 from typing import Any
 
@@ -18,7 +18,7 @@ Steps = tuple[NDArray[Any], NDArray[np.float64], Mask, Mask, dict[str, Any]]
 
 
 class BatchVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
-    """A batch with the autoreset modes of Gymnasium. Copies of it go on independently.
+    """A batch with the autoreset modes of Gymnasium; copies continue independently.
 
     | ``autoreset_mode`` | where an episode ended |
     |--------------------|------------------------|
@@ -27,12 +27,12 @@ class BatchVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
     | ``SameStep`` | the next episode starts within the same step: the observation returned is |
     | | its first, the last one is in ``infos["final_obs"]`` (an array of objects, None |
     | | elsewhere), the last infos in ``infos["final_info"]``; ``infos["_final_obs"]`` marks |
-    | | the rows. All else in ``infos`` tells of the episodes that run now |
+    | | the environments. All other entries describe the present episodes |
     | ``Disabled`` | the caller calls ``reset(options={"reset_mask": mask})`` before the next |
     | | step |
 
     Args:
-        task: The rows.
+        task: The environments.
         render_mode: ``rgb_array``, or None.
         render_fps: Steps per second.
         autoreset_mode: One of Gymnasium's modes, or its value.
@@ -40,7 +40,7 @@ class BatchVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
             ``gymnasium.wrappers.TimeLimit`` does it; None or -1 for no such limit.
 
     Raises:
-        InvalidInput: There is no such mode, or the limit is below 1.
+        InvalidInput: The mode is unknown, or the limit is below 1.
     """
 
     metadata: dict[str, Any] = {
@@ -76,19 +76,19 @@ class BatchVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[Any], dict[str, Any]]:
-        """Start episode 0 of a seed in every row, or the next one where no seed is given.
+        """Start episode 0 of a seed in every environment, or the next one without a seed.
 
         Args:
-            seed: Seed of all rows: row ``k`` equals a single environment with this seed and
+            seed: Seed of all: environment ``k`` equals a single environment with this seed and
                 ``first_env=k``.
             options: ``{"episode": n}`` starts episode ``n`` instead; ``{"reset_mask": mask}``
-                starts the next episodes only where the mask, bool of shape (num_envs,), says
-                so. ``infos["_outcome"]`` and the like then mark these rows.
+                starts the next episodes only where the mask, bool of shape (num_envs,), is
+                true. ``infos["_outcome"]`` etc. then mark these environments.
 
         Raises:
-            InvalidInput: The mask has another shape or type, marks no row, or comes with a
-                seed although it leaves rows out.
-            ResetNeeded: The first reset leaves rows out.
+            InvalidInput: The mask has another shape or type, is false everywhere, or is
+                combined with a seed although it is not true everywhere.
+            ResetNeeded: The first reset is partial.
         """
         options = options or {}
         chosen = self._chosen(options.get("reset_mask"), seed)
@@ -100,14 +100,14 @@ class BatchVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         return self._task.batch.obs.copy(), _marked(self._task.infos(), chosen)
 
     def _chosen(self, mask: Any, seed: int | None) -> Mask:
-        """Return which rows a reset starts."""
+        """Return the environments that a reset starts."""
         every = np.ones(self.num_envs, dtype=np.bool_)
         if mask is None:
             return every
         field, found = "options.reset_mask", np.asarray(mask)
         if found.dtype != np.bool_ or found.shape != (self.num_envs,):
-            told = f"{found.dtype} of shape {found.shape}"
-            raise InvalidInput(field, told, f"must be bool of shape ({self.num_envs},)")
+            given = f"{found.dtype} of shape {found.shape}"
+            raise InvalidInput(field, given, f"must be bool of shape ({self.num_envs},)")
         if not found.any():
             raise InvalidInput(field, found.tolist(), "must mark at least one environment")
         if not found.all():
@@ -119,7 +119,7 @@ class BatchVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         return found.copy()
 
     def _begin(self, chosen: Mask, seed: int | None = None, episode: int | None = None) -> None:
-        """Start episodes in the rows that are marked."""
+        """Start episodes in the marked environments."""
         self._steps[chosen], self._over[chosen] = 0, False
         next_episode(self._task.batch, np.flatnonzero(chosen), seed, episode)
 
@@ -166,18 +166,18 @@ class BatchVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
             )
 
     def _final(self, done: Mask) -> dict[str, Any]:
-        """Return what is told of the episodes that ended now, as Gymnasium does."""
+        """Return observations and infos of the episodes that ended now."""
         last = np.full(self.num_envs, None, dtype=object)
         for row in np.flatnonzero(done):
             last[row] = self._task.batch.obs[row].copy()
-        told = _marked(_only(self._task.infos(), done), done)
-        return _marked({"final_obs": last}, done) | {"final_info": told, "_final_info": done}
+        info = _marked(_only(self._task.infos(), done), done)
+        return _marked({"final_obs": last}, done) | {"final_info": info, "_final_info": done}
 
     def render(self) -> tuple[Image, ...] | None:
-        """Return an image of every row, uint8, shape (360, 480, 3) each.
+        """Return an image of every environment, uint8, shape (360, 480, 3) each.
 
         Returns:
-            None where the environment was made without a ``render_mode``.
+            None if the environment was made without a ``render_mode``.
 
         Raises:
             ResetNeeded: ``reset`` was never called.
@@ -191,12 +191,12 @@ class BatchVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
 
 
 def _marked(infos: dict[str, NDArray[Any]], rows: Mask) -> dict[str, Any]:
-    """Return infos with Gymnasium's marks of the rows that they tell of."""
+    """Return infos with Gymnasium's masks of the environments that they describe."""
     return infos | {f"_{name}": rows.copy() for name in infos}
 
 
 def _only(infos: dict[str, NDArray[Any]], rows: Mask) -> dict[str, NDArray[Any]]:
-    """Return infos with None or 0 in all rows but these."""
+    """Return infos with None or 0 in all other environments."""
     empty = {
         name: np.full_like(values, None if values.dtype == object else 0)
         for name, values in infos.items()
@@ -215,7 +215,7 @@ def _autoreset_of(mode: str | AutoresetMode) -> AutoresetMode:
 
 
 def _limit_of(steps: int | None) -> int:
-    """Return the most steps of an episode; a number that is never reached for no limit."""
+    """Return the largest number of steps of an episode."""
     if steps is None or steps == -1:
         return int(np.iinfo(np.int64).max)
     if isinstance(steps, bool) or not isinstance(steps, int | np.integer) or steps < 1:

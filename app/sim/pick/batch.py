@@ -1,9 +1,8 @@
 """The pick scenario of thesis chapter 5: one robot, one person, cubes and docks.
 
-:class:`PickBatch` steps many cells at once in compiled kernels (``pick/kernels/episode.py``);
-the
-functions below it do the same for one state, for the live cell and for deciding. Both use the
-same kernels, so that what was trained is what acts.
+:class:`PickBatch` steps many environments in compiled kernels (``pick/kernels/episode.py``).
+The
+functions evaluate one state with the same kernels, for the live world and task selection.
 """
 
 from dataclasses import dataclass, field
@@ -19,18 +18,23 @@ from app.sim.core.kernels.rng import start_stream
 from app.sim.geometry.segments import FAR
 from app.sim.people.human_motion_config import USUAL, HumanMotionConfig
 from app.sim.people.kernels.motion import record_palms
-from app.sim.people.kernels.people import People, PeopleState, new_people_geometry
-from app.sim.pick.kernels import episode as pick
-from app.sim.pick.kernels import observation as features
-from app.sim.pick.kernels.observation import N_FEATURES, N_WITH_BODY
+from app.sim.people.kernels.people import People, new_people_geometry
+from app.sim.pick.kernels import episode
+from app.sim.pick.kernels.observation import (
+    N_FEATURES,
+    N_WITH_BODY,
+    PickQuery,
+    new_pick_observation_workspace,
+    observe_batch,
+)
 from app.sim.pick.kernels.reward import RewardWeights
 from app.sim.robot.actions import ActionSettings
 from app.sim.robot.kernels import actions, kinematics
 from app.sim.robot.kernels import arm as arm_kernel
 from app.sim.robot.kernels.arm import CONTROLLED, Arm
 from app.sim.robot.kernels.joints import JointState
-from app.sim.scenario.batch import EnvBatch, Rows
-from app.sim.scenario.kernels.episode import FEATURES, PLAIN, distance_to
+from app.sim.scenario.batch import EnvBatch
+from app.sim.scenario.kernels.episode import FEATURES, PLAIN, Indices, distance_to
 from app.sim.scene.scene import (
     HumanKind,
     arm_of,
@@ -44,21 +48,21 @@ OUTCOMES = ("running", "success", "collision", "timeout", "unfeasible")
 StartRule = Literal["clearance", "uniform"]
 DEFAULT_ACTION = ActionSettings()
 VIEWS = {
-    "state": (PLAIN, pick.N_PLAIN),
+    "state": (PLAIN, episode.N_PLAIN),
     "features": (FEATURES, N_FEATURES),
     "body": (FEATURES, N_WITH_BODY),
 }
-"""What observations hold, and their lengths: the plain state of (5.8); that and features; those
-and the person's size."""
+"""Contents and lengths of observations: the raw state of (5.8); the raw state and features;
+those and the person's body dimensions."""
 DEFAULT_WEIGHTS = RewardWeights(
     c_d=0.5, c_th=0.5, c_c=1.0, c_step=0.02, c_v=1.0, d_v=0.1, c_s=1.0, gamma=1.0
 )
-"""The source's coefficients (table 5.1, signs mended); d_v, printed nowhere, is ours."""
+"""Coefficients of table 5.1 with corrected signs; the source does not print d_v."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PickSettings:
-    """How episodes of the scenario start and end."""
+    """Settings of the pick scenario."""
 
     time_limit_s: float = 20.0
     """Longest episode [s] (table 5.2)."""
@@ -67,27 +71,27 @@ class PickSettings:
     short_share: float = 0.0
     """Share of episodes that start with ``short_limit_s`` left."""
     start_clearance_m: float = 0.05
-    """Least distance of robot and person at the start [m]."""
+    """Least clearance of robot and person at the start [m]."""
     target_jitter_m: float = 0.0
     """Targets are drawn from a box of this half width around their station [m]."""
-    way_share: float = 0.0
-    """Share of episodes that start part of the way to the target."""
+    on_path_share: float = 0.0
+    """Share of episodes that start between the start configuration and the target."""
     n_candidates: tuple[int, int] = (1, 1)
     """Fewest and most targets offered per episode."""
     people: tuple[HumanKind, ...] | None = None
-    """Who is in the cell, 0 to 4 people; None for the cell's own."""
+    """People in the cell, 0 to 4; None for the cell's own."""
     work: HumanMotionConfig = field(default=USUAL)
-    """What the workers do: their motion, sizes and yielding."""
+    """Motion, body dimensions and yielding of the workers."""
     start: StartRule = "clearance"
-    """Where people may start: ``clearance`` (``start_clearance_m`` from the robot), ``uniform``
-    (anywhere, even in contact)."""
+    """Start of people: ``clearance`` (at least ``start_clearance_m`` from the robot) or
+    ``uniform`` (anywhere, even in contact)."""
     action: ActionSettings = field(default=DEFAULT_ACTION)
-    """What actions mean (METHOD 2.2)."""
+    """Action type (docs/method.md 2.2)."""
     observation: Literal["features", "state", "body"] = "features"
-    """What policies see: the plain state of (5.8), that and features, or the person's size
-    too."""
+    """Observation: the raw state of (5.8), the raw state and features, or the person's body
+    dimensions too."""
     weights: RewardWeights = field(default=DEFAULT_WEIGHTS)
-    """Reward coefficients (METHOD 3.3)."""
+    """Reward coefficients (docs/method.md 3.3)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,7 +110,7 @@ class Piece:
     """Joint accelerations at the end [rad/s^2], shape (6,)."""
 
 
-def _world_of(cell: Cell, settings: PickSettings) -> pick.PickWorld:
+def _world_of(cell: Cell, settings: PickSettings) -> episode.PickCell:
     if (lack := lacks_stations(cell)) is not None:
         raise InvalidInput("cell", cell.name, f"cannot be used for picking: it {lack}")
     arm, stations = arm_of(cell), cell.pick_stations
@@ -119,7 +123,7 @@ def _world_of(cell: Cell, settings: PickSettings) -> pick.PickWorld:
                 station.position,
                 "must be reachable by the robot with its tool pointing down",
             )
-    return pick.PickWorld(
+    return episode.PickCell(
         stations=positions,
         station_q=postures,
         n_cubes=len(cell.stations_of("cube")),
@@ -128,92 +132,60 @@ def _world_of(cell: Cell, settings: PickSettings) -> pick.PickWorld:
     )
 
 
-def _rules_of(settings: PickSettings) -> pick.PickRules:
-    return pick.PickRules(
+def _rules_of(settings: PickSettings) -> episode.PickRules:
+    return episode.PickRules(
         time_limit=settings.time_limit_s,
         short_limit=settings.short_limit_s,
         short_share=settings.short_share,
         start_clearance=settings.start_clearance_m if settings.start == "clearance" else -FAR,
         target_jitter=settings.target_jitter_m,
-        way_share=settings.way_share,
+        on_path_share=settings.on_path_share,
         n_candidates_min=settings.n_candidates[0],
         n_candidates_max=settings.n_candidates[1],
     )
 
 
-def _new_state(world: pick.PickWorld, people: PeopleState, n_envs: int) -> pick.PickState:
-    def rows(*shape: int) -> Vec:
-        return np.zeros((n_envs, *shape))
-
-    def counts(*shape: int) -> NDArray[np.int64]:
-        return np.zeros((n_envs, *shape), dtype=np.int64)
-
-    return pick.PickState(
-        q=rows(6),
-        qd=rows(6),
-        qdd=rows(6),
-        robot=np.repeat(world.arm.columns[None], n_envs, axis=0),
-        people=people,
-        goal=rows(3),
-        q_goal=rows(6),
-        candidates=counts(pick.MAX_CANDIDATES),
-        time_left=rows(),
-        elapsed=rows(),
-        distance=rows(),
-        tilt=rows(),
-        episode=counts(),
-        outcome=counts(),
-        clear=rows(3),
-        n_redrawn=counts(),
-    )
-
-
 class PickBatch(EnvBatch):
-    """Many independent pick cells, stepped together by one thread.
+    """Many independent pick environments, stepped together by one thread.
 
     Args:
         cell: Work cell.
-        n_envs: Number of cells.
-        seed: Seed; episode ``k`` of cell ``e`` is fixed by (seed, e, k).
-        settings: Starts, ends and rewards.
-        first_env: Number of the first cell: rows of a batch that starts at ``k`` equal rows
-            ``k`` and on of a batch that starts at 0, bit for bit.
+        n_envs: Number of environments.
+        seed: Seed; episode ``k`` of environment ``e`` is determined by (seed, e, k).
+        settings: Settings of the scenario.
+        first_env: Number of the first environment: environments of a batch that starts at ``k``
+            equal environments ``k`` and on of a batch that starts at 0, bit for bit.
     """
 
-    _kernel = pick
+    _kernel = episode
+    world: episode.PickCell
 
     def __init__(
         self, cell: Cell, n_envs: int, seed: int, settings: PickSettings, first_env: int = 0
     ) -> None:
         self.cell = cell if settings.people is None else with_people(cell, settings.people)
-        self.settings, self.world = settings, _world_of(self.cell, settings)
-        self.arm = self.world.arm
-        people = new_people_state(self.cell, self.world.people, n_envs)
-        self.state = _new_state(self.world, people, n_envs)
+        self.settings, world = settings, _world_of(self.cell, settings)
         super().__init__(
-            (
-                self.world,
-                _rules_of(settings),
-                settings.action.rule(),
-                settings.weights,
-                self.state,
-                pick.new_work(self.world, self.state),
-            ),
+            world,
+            episode.PickTask(_rules_of(settings), settings.action.rule(), settings.weights),
+            new_people_state(self.cell, world.people, n_envs),
             n_envs=n_envs,
             n_act=CONTROLLED,
             seed=seed,
             first_env=first_env,
             view=VIEWS[settings.observation],
         )
+        self._sight = new_pick_observation_workspace()
 
-    def _observe(self, rows: Rows, out: NDArray[np.float32]) -> None:
-        self._call(pick.observe_rows, self.world, self.state, rows, self._work, self._view, out)
+    def _observe(self, envs: Indices, out: NDArray[np.float32]) -> None:
+        work = self._work, self._sight
+        self._call(episode.observe_rows, self.world, self.state, envs, *work, self._view, out)
 
-    def set_goals(self, rows: Rows, goals: Vec) -> None:
-        """Send the robots of ``rows`` to new targets [m], shape (len(rows), 3)."""
-        for row, goal in zip(rows, goals, strict=True):
-            pick.set_goal(
-                self.world, self.state, int(row), as_kernel_array(goal), self._work.robot
+    def set_goals(self, envs: Indices, goals: Vec) -> None:
+        """Set new targets [m], shape (len(envs), 3), in some environments."""
+        for e, goal in zip(envs, goals, strict=True):
+            episode.set_goal(
+                self.world, self.state, int(e), as_kernel_array(goal), self._work.robot
             )
 
 
@@ -222,53 +194,42 @@ def observe(
     people: People,
     q: Vec,
     qd: Vec,
-    human_q: Vec,
-    human_qd: Vec,
+    person: tuple[Vec, Vec, Vec | None],
     goals: Vec,
     time_left_s: float,
-    size: Vec | None = None,
     n_obs: int = N_FEATURES,
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Return what the networks see of one state for each of n targets.
+    """Return the observation of one state for each of n targets.
 
     Args:
         arm: From :func:`~app.sim.scene.scene.arm_of`.
         people: From :func:`~app.sim.scene.scene.people_of`.
         q: Robot joint positions [rad], shape (6,).
         qd: Robot joint speeds [rad/s], shape (6,).
-        human_q: The person's joint positions [m, rad], shape (18,).
-        human_qd: The person's joint speeds [m/s, rad/s], shape (18,).
+        person: The person's joint positions [m, rad] and speeds [m/s, rad/s], shape (18,), and
+            body dimensions [m], shape (body.N_SIZE,); None for those of the cell's person.
         goals: Targets [m], shape (n, 3).
         time_left_s: Time left [s].
-        size: The person's size [m], shape (body.N_SIZE,); None for the cell's person.
-        n_obs: N_FEATURES, or N_WITH_BODY for networks that see the person's size.
+        n_obs: N_FEATURES, or N_WITH_BODY for networks that observe the body dimensions.
 
     Returns:
         Observations, shape (n, n_obs), and whether each target is reachable, (n,).
     """
     n, targets = len(goals), as_kernel_array(goals)
     q_goals, reachable = kinematics.ik_vertical_batch(arm.lengths, arm.limits, targets)
-    obs = np.empty((n, n_obs), dtype=np.float32)
-    features.observe_batch(
-        arm,
-        people.floor_z,
-        np.tile(as_kernel_array(q), (n, 1)),
-        np.tile(as_kernel_array(qd), (n, 1)),
-        np.tile(as_kernel_array(human_q), (n, 1)),
-        np.tile(as_kernel_array(human_qd), (n, 1)),
-        np.tile(as_kernel_array(people.bodies[0] if size is None else size), (n, 1)),
-        targets,
-        q_goals,
-        np.full(n, time_left_s, dtype=np.float64),
-        obs,
-    )
+    human_q, human_qd, size = person
+    one = (q, qd, human_q, human_qd, people.bodies[0] if size is None else size)
+    tiled = (np.tile(as_kernel_array(value), (n, 1)) for value in one)
+    states = PickQuery._make((*tiled, targets, q_goals))
+    obs, left = np.empty((n, n_obs), dtype=np.float32), np.full(n, float(time_left_s))
+    observe_batch(arm, people.floor_z, states, left, obs)
     return obs, reachable
 
 
 def step_robot(
     arm: Arm, q: Vec, qd: Vec, qdd: Vec, act: Vec, action: ActionSettings = DEFAULT_ACTION
 ) -> Piece:
-    """Move the robot through one control period.
+    """Move the robot through one control cycle.
 
     Args:
         arm: From :func:`~app.sim.scene.scene.arm_of`.
@@ -276,7 +237,7 @@ def step_robot(
         qd: Joint speeds [rad/s], shape (6,).
         qdd: Joint accelerations [rad/s^2], shape (6,); only degree 3 reads them.
         act: Action in [-1, 1], shape (5,).
-        action: What it means.
+        action: Action type.
 
     Raises:
         SimulationError: A number is NaN or infinite.
@@ -296,18 +257,18 @@ def tool_state(arm: Arm, q: Vec, qd: Vec, goal: Vec) -> tuple[float, float, floa
     arm_kernel.place_robot(arm, as_kernel_array(q), pose)
     distance, tilt = distance_to(as_kernel_array(goal), pose), arm_kernel.robot_tilt(pose)
     speed = arm_kernel.tcp_speed(pose, as_kernel_array(qd))
-    return distance, tilt, speed, bool(pick.succeeded(distance, tilt, speed))
+    return distance, tilt, speed, bool(episode.succeeded(distance, tilt, speed))
 
 
 def hand_speeds(
     batch: PickBatch, n_scripts: int = 200, seconds: float = 10.0
 ) -> dict[str, float]:
-    """Return how fast the workers' hands are, both hands, while faster than 0.05 m/s [m/s].
+    """Return statistics of the speed of the workers' hands while above 0.05 m/s [m/s].
 
     Args:
-        batch: The scenario whose person is meant.
-        n_scripts: Scripts looked at.
-        seconds: Time looked at per script [s].
+        batch: Environments with the workers.
+        n_scripts: Number of reach scripts.
+        seconds: Time simulated per script [s].
     """
     people, tick = batch.world.people._replace(yielding=0.0), 0.01
     state = new_people_state(batch.cell, people, 1)
@@ -321,7 +282,7 @@ def hand_speeds(
         rates.append(np.linalg.norm(np.diff(palms, axis=0), axis=-1).ravel() / tick)
     speeds = np.concatenate(rates)
     moving = speeds[speeds > 0.05]
-    if not moving.size:  # Nobody works there, or nobody moves.
+    if not moving.size:  # no worker, or none moves
         return {}
     return {
         "hand_speed_median_m_s": float(np.median(moving)),

@@ -1,8 +1,7 @@
-"""The four case studies of the critic's choice (METHOD 3.6, thesis table 5.3).
+"""The four case studies of task selection (docs/method.md 3.6, thesis table 5.3).
 
-The layout of the cell was chosen so that each case's geometry is what its text says;
-:func:`geometry` measures it (which goal is nearer, when each goal posture is blocked), and
-tests hold the cell to it.
+The layout of the cell was chosen so that the geometry of each case agrees with its text;
+:func:`geometry` measures it, and tests check it.
 """
 
 from dataclasses import dataclass
@@ -21,7 +20,7 @@ from app.sim.scene.scene import NO_CYLINDERS, arm_of, people_geometry_of, people
 CASES_CELL = "pick-and-place"
 """The cell whose layout the cases were chosen for."""
 BLOCKED_BELOW = 0.0
-"""A goal posture nearer to the person than this is blocked [m]."""
+"""Clearance below which a goal configuration is blocked [m]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,38 +30,38 @@ class Case:
     id: str
     """Name in requests."""
     title: str
-    """Name for people."""
+    """Title for display."""
     text: str
-    """What happens and what is expected, one sentence."""
+    """Course of events and expected behaviour, in one sentence."""
     robot_start: str
     """Station the robot starts from."""
     goals: tuple[str, str]
-    """Stations it may choose between."""
+    """Stations to choose from."""
     hand: Hand
     """The person's working hand."""
     human_from: str
-    """Station the palm starts at."""
+    """Station at which the palm starts."""
     human_to: str | None
-    """Station it moves to; None where it stays."""
+    """Station to which the palm moves; None if it stays."""
     expected: str
-    """The goal it should end at."""
+    """Goal at which the robot should end."""
     first: str | None = None
-    """The goal it should choose at first; None where any will do."""
+    """Goal that should be selected at first; None for any."""
     switches: tuple[int, int | None] = (0, None)
-    """Least and greatest number of changes of mind; None where there is no greatest."""
+    """Least and largest number of target switches; None for no limit."""
     palm_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Palm relative to its stations [m]."""
     pelvis_x: tuple[float | None, float | None] = (None, None)
-    """Where the person stands at first and at last [m]; None follows the palm."""
+    """The person's x at the start and at the end [m]; None follows the palm."""
 
 
 CASES = (
     Case(
         id="case-1",
-        title="Nearer and free of crossing",
+        title="Nearer, unobstructed",
         text=(
             "A hand rests beside cube 4; both cubes can be reached, and the robot should take "
-            "cube 4 from the start: it is nearer, and the way does not cross the person."
+            "cube 4 from the start: it is nearer, and the path does not cross the person."
         ),
         robot_start="cube5",
         goals=("cube0", "cube4"),
@@ -76,7 +75,7 @@ CASES = (
     ),
     Case(
         id="case-2",
-        title="Farther but safer",
+        title="Farther, clear of the hand",
         text=(
             "The right hand stays on cube 1, the nearer goal; the robot should end at cube 0, "
             "the farther and free one."
@@ -92,7 +91,7 @@ CASES = (
         id="case-3",
         title="Blocked for a while",
         text=(
-            "The right arm moves from cube 3 to dock 1 and stands in the way for a while; the "
+            "The right arm moves from cube 3 to dock 1 and obstructs the path for a while; the "
             "robot should switch while its goal is blocked."
         ),
         robot_start="cube5",
@@ -105,9 +104,9 @@ CASES = (
     ),
     Case(
         id="case-4",
-        title="A change of mind that stays",
+        title="Single switch, no oscillation",
         text=(
-            "The right arm moves from dock 1 to cube 0, across the way to cube 1; the robot "
+            "The right arm moves from dock 1 to cube 0, across the path to cube 1; the robot "
             "should start for cube 1, switch to dock 0 and stay with it."
         ),
         robot_start="cube3",
@@ -149,18 +148,18 @@ def script_of(cell: Cell, case: Case) -> ReachScript:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CaseGeometry:
-    """What a case study looks like in a cell, by goal."""
+    """Geometry of a case study in a cell, by goal."""
 
-    way_rad: dict[str, float]
-    """Greatest joint difference from the start to each goal posture [rad]."""
+    joint_distance_rad: dict[str, float]
+    """Largest joint difference from the start to each goal configuration [rad]."""
     distance_m: dict[str, float]
     """Distance from the start to each goal [m]."""
     blocked_s: dict[str, tuple[float, float] | None]
-    """First and last time each goal posture is blocked [s]; None where never."""
+    """First and last time at which each goal configuration is blocked [s]; None for never."""
     clearance_m: dict[str, float]
-    """Least clearance of each goal posture over the first 6 s [m]."""
+    """Least clearance of each goal configuration over the first 6 s [m]."""
     start_clearance_m: float
-    """Clearance of the robot's start posture at t = 0 [m]."""
+    """Clearance of the start configuration at t = 0 [m]."""
 
 
 def geometry(cell: Cell, case: Case) -> CaseGeometry:
@@ -168,7 +167,7 @@ def geometry(cell: Cell, case: Case) -> CaseGeometry:
     arm = arm_of(cell)
     names = (case.robot_start, *case.goals)
     positions = np.array([cell.station(name).position for name in names])
-    postures, _ = kinematics.ik_vertical_batch(arm.lengths, arm.limits, positions)
+    configurations, _ = kinematics.ik_vertical_batch(arm.lengths, arm.limits, positions)
     script = script_of(cell, case)
     times = np.arange(0.0, 6.0, 0.05)
     pose, people = arm_kernel.new_robot_pose(arm), people_of(cell)
@@ -176,8 +175,8 @@ def geometry(cell: Cell, case: Case) -> CaseGeometry:
     for k, t in enumerate(times):
         human_q, _ = script.at(float(t))
         crowd = people_geometry_of(people, human_q[None], NO_CYLINDERS)
-        for i, posture in enumerate(postures):
-            arm_kernel.place_robot(arm, posture, pose)
+        for i, configuration in enumerate(configurations):
+            arm_kernel.place_robot(arm, configuration, pose)
             clearance[i, k] = people_clearance(people, pose.columns, crowd)
     blocked = {}
     for i, name in enumerate(case.goals, start=1):
@@ -185,7 +184,9 @@ def geometry(cell: Cell, case: Case) -> CaseGeometry:
         blocked[name] = (float(when[0]), float(when[-1])) if when.size else None
     goals = list(enumerate(case.goals, start=1))
     return CaseGeometry(
-        way_rad={n: float(np.abs(postures[i] - postures[0]).max()) for i, n in goals},
+        joint_distance_rad={
+            n: float(np.abs(configurations[i] - configurations[0]).max()) for i, n in goals
+        },
         distance_m={n: float(np.linalg.norm(positions[i] - positions[0])) for i, n in goals},
         blocked_s=blocked,
         clearance_m={n: float(clearance[i].min()) for i, n in goals},

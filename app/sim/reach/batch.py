@@ -1,7 +1,7 @@
 """The reach scenario of thesis chapter 4: a robot reaches goals beside people who walk about.
 
-:class:`ReachBatch` steps many cells at once in compiled kernels (``reach/kernels/episode.py``).
-Source: METHOD 2.1 to 2.3.
+:class:`ReachBatch` steps many environments in compiled kernels (``reach/kernels/episode.py``).
+Source: docs/method.md 2.1 to 2.3.
 """
 
 import math
@@ -18,19 +18,19 @@ from app.sim.cells.people import Worker
 from app.sim.core.arrays import Vec, as_kernel_array, as_kernel_index
 from app.sim.geometry.segments import FAR
 from app.sim.people.human_motion_config import REACHING, HumanMotionConfig
-from app.sim.people.kernels.people import People, PeopleState
+from app.sim.people.kernels.people import People
 from app.sim.people.pedestrian import AUTHORS_WALK, pedestrian_rules
 from app.sim.prediction.weights import new_motion_predictor
 from app.sim.reach.goal_sets import N_HALTON, halton_targets
-from app.sim.reach.kernels import episode as reach
-from app.sim.reach.kernels import queries as reach_views
-from app.sim.reach.kernels.observation import EVERYBODY, N_FEATURES, N_STATE
+from app.sim.reach.kernels import episode, queries
+from app.sim.reach.kernels.observation import ALL_PEOPLE, N_FEATURES, N_STATE
+from app.sim.reach.kernels.observation_workspace import new_observation_workspace
 from app.sim.reach.kernels.option_features import N_OPTION_FEATURES
-from app.sim.reach.kernels.people_set import N_CROWD
+from app.sim.reach.kernels.people_set import N_PEOPLE_SET
 from app.sim.reach.kernels.reward import ReachWeights
 from app.sim.robot.actions import ActionSettings
-from app.sim.scenario.batch import EnvBatch, Rows
-from app.sim.scenario.kernels.episode import CROWD, FEATURES, FORECAST, PLAIN
+from app.sim.scenario.batch import EnvBatch
+from app.sim.scenario.kernels.episode import FEATURES, FORECAST, PEOPLE_SET, PLAIN, Indices
 from app.sim.scene.scene import (
     HumanKind,
     arm_of,
@@ -44,66 +44,66 @@ from app.sim.scene.scene import (
 )
 
 N_ACT = 6
-"""Joints a policy moves: all of them."""
+"""Joints that a policy moves: all."""
 StartRule = Literal["clearance", "uniform", "authors"]
 GoalRule = Literal["grid", "halton", "box"]
-ViewName = Literal["features", "state", "forecast", "crowd"]
+ViewName = Literal["features", "state", "forecast", "people-set"]
 VIEWS = {
     "state": (PLAIN, N_STATE),
     "features": (FEATURES, N_FEATURES),
     "forecast": (FORECAST, N_FEATURES + N_OPTION_FEATURES),
-    "crowd": (CROWD, N_FEATURES + N_OPTION_FEATURES + N_CROWD),
+    "people-set": (PEOPLE_SET, N_FEATURES + N_OPTION_FEATURES + N_PEOPLE_SET),
 }
-"""What observations hold: the plain state (4.30), that and features, those and what comes of
-every way beside people who go on as forecast, or all that and everybody as a set; and their
-lengths."""
+"""Contents and lengths of observations: the raw state (4.30); the raw state and features; those
+and the option features beside people who move as predicted; all that and the people as a
+set."""
 THESIS_WEIGHTS = ReachWeights(
     c_d=1.0, c_p=0.0, gamma=1.0, c_a=0.1, c_step=0.0, c_c=5.0, c_s=20.0
 )
-"""The source's coefficients (METHOD 2.3)."""
+"""Coefficients of the source (docs/method.md 2.3)."""
 PROGRESS_WEIGHTS = ReachWeights(
     c_d=0.0, c_p=1.0, gamma=1.0, c_a=0.0, c_step=0.004, c_c=4.0, c_s=4.0
 )
-"""Progress instead of distance: learned to 95 % within minutes in trials."""
+"""Progress instead of distance; in trials it reached 95 % within minutes."""
 DEFAULT_ACTION = ActionSettings()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReachSettings:
-    """How episodes of the scenario start and end.
+    """Settings of the reach scenario.
 
     Raises:
-        InvalidInput: An unknown rule, or a time that is not positive and finite.
+        InvalidInput: A rule is unknown, or a number is out of range.
     """
 
     time_limit_s: float = 5.0
     """Longest episode [s]."""
     goals: GoalRule = "grid"
-    """Where goals are drawn from: the grid points of the cell's goal region, the points of a
-    Halton set in it, or all of it."""
+    """Goals: the grid points of the cell's goal region, the points of a Halton set in it, or
+    uniform in it."""
     n_halton: int = N_HALTON
-    """Points of the Halton set; read where ``goals`` is ``halton``."""
+    """Number of points of the Halton set."""
     people: tuple[HumanKind, ...] | None = None
-    """Who is in the cell, 0 to 4 people; None for the cell's own. A worker whom the cell does
-    not describe stands at the table (:func:`with_workplace`)."""
+    """People in the cell, 0 to 4; None for the cell's own. A cell without workers gets a
+    workplace at the table (:func:`with_workplace`)."""
     start: StartRule = "clearance"
-    """Where people may start: ``clearance`` (``start_clearance_m`` from the robot), ``uniform``
-    (anywhere, even in contact), ``authors`` (anywhere, and they walk as in the authors' code:
-    targets at least 0.5 m away and a radius inside the area, the first period never slower than
-    v_min, a chance of 0.01 per period to walk on after having stayed at a target)."""
+    """Start of people: ``clearance`` (at least ``start_clearance_m`` from the robot),
+    ``uniform`` (anywhere, even in contact), or ``authors`` (anywhere, and walking as in the
+    authors' code: targets at least 0.5 m away and a radius inside the area, first cycle not
+    slower than v_min, probability 0.01 per cycle of leaving a target)."""
     start_clearance_m: float = 0.05
-    """Least distance of robot and people at the start under the rule ``clearance`` [m]."""
+    """Least clearance of robot and people at the start under the rule ``clearance`` [m]."""
     collision_ends: bool = True
-    """Whether a collision ends the episode. If not, it goes on until the goal is reached or
-    time is up, and then counts as a collision, not as a success."""
+    """Whether a collision ends the episode. If not, the episode continues until success or
+    timeout and then counts as a collision."""
     work: HumanMotionConfig = field(default=REACHING)
-    """What the workers do: their motion, sizes and yielding."""
+    """Motion, body dimensions and yielding of the workers."""
     action: ActionSettings = field(default=DEFAULT_ACTION)
-    """What actions mean (METHOD 2.2)."""
+    """Action type (docs/method.md 2.2)."""
     observation: ViewName = "features"
-    """What policies see: the plain state (4.30), or that and more; see VIEWS."""
+    """Observation; see VIEWS."""
     weights: ReachWeights = field(default=THESIS_WEIGHTS)
-    """Reward coefficients (METHOD 2.3)."""
+    """Reward coefficients (docs/method.md 2.3)."""
 
     def __post_init__(self) -> None:
         choices = (("goals", GoalRule), ("start", StartRule), ("observation", ViewName))
@@ -118,11 +118,11 @@ class ReachSettings:
 
 
 def stated_rules(cell: Cell, settings: ReachSettings) -> dict[str, Any]:
-    """Return the rules that move results by points, to be printed with every number.
+    """Return the rules that affect results, to be reported with every number.
 
     Args:
         cell: Work cell.
-        settings: Starts and ends.
+        settings: Settings of the scenario.
     """
     chosen = _with_people(cell, settings)
     stated: dict[str, Any] = {
@@ -143,11 +143,11 @@ def stated_rules(cell: Cell, settings: ReachSettings) -> dict[str, Any]:
 
 
 def with_workplace(cell: Cell) -> Cell:
-    """Return a cell with a worker who reaches for its goals, where it describes none.
+    """Return a cell with a worker who reaches for its goals.
 
     The worker stands at the far edge of the table, as far from it as in ``pick-and-place``, and
-    goes by the work cycle of METHOD 3.2: from goals of the lowest layer, except the row nearest
-    to the robot, to the two ends of that row.
+    follows reach scripts (docs/method.md 3.2) from goals of the lowest layer, except the row
+    nearest to the robot, to the two ends of that row.
     """
     targets = goal_region_of(cell).targets()
     lowest = targets[targets[:, 2] == targets[:, 2].min()]
@@ -184,7 +184,7 @@ def _with_people(cell: Cell, settings: ReachSettings) -> Cell:
 
 
 def goal_region_of(cell: Cell) -> GoalRegion:
-    """Return where a cell's goals are.
+    """Return the goal region of a cell.
 
     Raises:
         InvalidInput: The cell has no goal region.
@@ -215,17 +215,17 @@ def _people_of(cell: Cell, settings: ReachSettings) -> People:
     return people._replace(walkers=pedestrian_rules(walkers))
 
 
-def world_of(cell: Cell, people: People, targets: Vec) -> reach.ReachWorld:
-    """Return what the kernels know of a cell and its people.
+def reach_cell_of(cell: Cell, people: People, targets: Vec) -> episode.ReachCell:
+    """Return the data of a cell for the kernels.
 
     Args:
         cell: Work cell with a goal region.
         people: From :func:`~app.sim.scene.scene.people_of`.
-        targets: Goals that episodes draw from [m], shape (n, 3).
+        targets: Goals to draw from [m], shape (n, 3).
     """
     region = goal_region_of(cell)
     middle, half = np.array(region.center), 0.5 * np.array(region.size)
-    return reach.ReachWorld(
+    return episode.ReachCell(
         targets=as_kernel_array(targets),
         low=middle - half,
         high=middle + half,
@@ -234,8 +234,8 @@ def world_of(cell: Cell, people: People, targets: Vec) -> reach.ReachWorld:
     )
 
 
-def _rules_of(settings: ReachSettings) -> reach.ReachRules:
-    return reach.ReachRules(
+def _rules_of(settings: ReachSettings) -> episode.ReachRules:
+    return episode.ReachRules(
         time_limit=settings.time_limit_s,
         start_clearance=settings.start_clearance_m if settings.start == "clearance" else -FAR,
         anywhere=settings.goals == "box",
@@ -243,171 +243,131 @@ def _rules_of(settings: ReachSettings) -> reach.ReachRules:
     )
 
 
-def new_state(world: reach.ReachWorld, people: PeopleState, n_envs: int) -> reach.ReachState:
-    """Return rows for ``n_envs`` cells, not started yet."""
-
-    def rows(*shape: int) -> Vec:
-        return np.zeros((n_envs, *shape))
-
-    def counts() -> NDArray[np.int64]:
-        return np.zeros(n_envs, dtype=np.int64)
-
-    return reach.ReachState(
-        q=rows(6),
-        qd=rows(6),
-        qdd=rows(6),
-        robot=np.repeat(world.arm.columns[None], n_envs, axis=0),
-        people=people,
-        goal=rows(3),
-        target=counts(),
-        time_left=rows(),
-        elapsed=rows(),
-        distance=rows(),
-        touched=counts(),
-        episode=counts(),
-        outcome=counts(),
-        clear=rows(3),
-        n_redrawn=counts(),
-    )
-
-
 class ReachBatch(EnvBatch):
-    """Many independent reach cells, stepped together by one thread.
+    """Many independent reach environments, stepped together by one thread.
 
     Args:
         cell: Work cell with a goal region.
-        n_envs: Number of cells.
-        seed: Seed; episode ``k`` of cell ``e`` is fixed by (seed, e, k).
-        settings: Starts, ends and rewards.
-        first_env: Number of the first cell: rows of a batch that starts at ``k`` equal rows
-            ``k`` and on of a batch that starts at 0, bit for bit.
+        n_envs: Number of environments.
+        seed: Seed; episode ``k`` of environment ``e`` is determined by (seed, e, k).
+        settings: Settings of the scenario.
+        first_env: Number of the first environment: environments of a batch that starts at ``k``
+            equal environments ``k`` and on of a batch that starts at 0, bit for bit.
     """
 
-    _kernel = reach
+    _kernel = episode
+    world: episode.ReachCell
 
     def __init__(
         self, cell: Cell, n_envs: int, seed: int, settings: ReachSettings, first_env: int = 0
     ) -> None:
-        self.cell = _with_people(cell, settings)
+        self.cell, self.settings = _with_people(cell, settings), settings
         targets = targets_of(goal_region_of(self.cell), settings)
-        self.settings = settings
-        self.world = world_of(self.cell, _people_of(self.cell, settings), targets)
-        self.arm = self.world.arm
-        people = new_people_state(self.cell, self.world.people, n_envs)
-        self.state = new_state(self.world, people, n_envs)
+        world = reach_cell_of(self.cell, _people_of(self.cell, settings), targets)
+        people = new_people_state(self.cell, world.people, n_envs)
         super().__init__(
-            (
-                self.world,
-                _rules_of(settings),
-                settings.action.rule(),
-                settings.weights,
-                self.state,
-                reach.new_work(self.world, self.state, new_motion_predictor()),
-            ),
+            world,
+            episode.ReachTask(_rules_of(settings), settings.action.rule(), settings.weights),
+            people,
             n_envs=n_envs,
             n_act=N_ACT,
             seed=seed,
             first_env=first_env,
             view=VIEWS[settings.observation],
         )
+        self._sight = new_observation_workspace(
+            self.arm, world.people, people, new_motion_predictor()
+        )
 
-    def set_goals(self, rows: Rows, goals: Vec) -> NDArray[np.float32]:
-        """Send the robots of ``rows`` to other goals, until their episodes end.
+    def set_goals(self, envs: Indices, goals: Vec) -> NDArray[np.float32]:
+        """Set other goals in some environments, until their episodes end.
 
         Args:
-            rows: Cells, shape (n,).
-            goals: Where their tcp shall be [m], shape (n, 3).
+            envs: Numbers of the environments, shape (n,).
+            goals: Goals of the tcp [m], shape (n, 3).
 
         Returns:
-            Observations of all cells, (n_envs, obs_size).
+            Observations of all environments, (n_envs, obs_size).
 
         Raises:
-            InvalidInput: There is no such cell, or the goals have another shape.
+            InvalidInput: An environment does not exist, or the goals have another shape.
             SimulationError: A number is NaN or infinite.
         """
-        require_shape("goals", np.asarray(goals), (len(rows), 3))
+        require_shape("goals", np.asarray(goals), (len(envs), 3))
         require_finite("goals", np.asarray(goals, dtype=np.float64))
-        checked = self._checked(rows)
-        for row, goal in zip(checked, goals, strict=True):
-            reach.set_goal(
-                self.world, self.state, int(row), as_kernel_array(goal), self._work.robot
+        checked = self._checked(envs)
+        for e, goal in zip(checked, goals, strict=True):
+            episode.set_goal(
+                self.world, self.state, int(e), as_kernel_array(goal), self._work.robot
             )
         return self._look(checked)
 
     def observe_goals(
-        self, rows: Rows, goals: Vec, who: int | None = None
+        self, envs: Indices, goals: Vec, person: int | None = None
     ) -> NDArray[np.float32]:
-        """Return what a policy would observe in some cells if their goals were others.
+        """Return the observations of some environments with other goals.
 
         Args:
-            rows: Cells, shape (k,).
-            goals: Where each tcp shall be [m], shape (k, n, 3).
-            who: The person who is there alone, workers first; None for all as they are.
+            envs: Numbers of the environments, shape (k,).
+            goals: Goals of the tcp [m], shape (k, n, 3).
+            person: The only person that is present, workers first; None for all people.
 
         Returns:
-            Observations, (k, n, obs_size); equal, bit for bit, to the ordinary one where the
-            goal is the cell's own and nobody is left out.
+            Observations, (k, n, obs_size); with the environment's own goal and all people they
+            equal the ordinary observation bit for bit.
 
         Raises:
-            InvalidInput: There is no such cell or person, or the goals have another shape.
+            InvalidInput: An environment or person does not exist, or the goals have another
+                shape.
         """
-        shape = (len(rows), np.shape(goals)[1] if np.ndim(goals) == 3 else 0, 3)
+        shape = (len(envs), np.shape(goals)[1] if np.ndim(goals) == 3 else 0, 3)
         require_shape("goals", np.asarray(goals), shape)
         out = np.empty((*shape[:2], self.obs_size), dtype=np.float32)
-        if who is not None and not 0 <= who < self.n_people:
-            raise InvalidInput("who", who, f"must be one of {self.n_people} people")
-        self._see(
-            self._checked(rows), EVERYBODY if who is None else who, as_kernel_array(goals), out
-        )
+        if person is not None and not 0 <= person < self.n_people:
+            raise InvalidInput("person", person, f"must be one of {self.n_people} people")
+        which = ALL_PEOPLE if person is None else person
+        self._write(self._checked(envs), which, as_kernel_array(goals), out)
         return out
 
-    def _observe(self, rows: Rows, out: NDArray[np.float32]) -> None:
-        self._see(rows, EVERYBODY, self.state.goal[rows][:, None], out[:, None])
+    def _observe(self, envs: Indices, out: NDArray[np.float32]) -> None:
+        self._write(envs, ALL_PEOPLE, self.state.goal[envs][:, None], out[:, None])
 
-    def _see(self, rows: Rows, who: int, goals: Vec, out: NDArray[np.float32]) -> None:
-        """Write what policies would see for some goals, shape (k, n, obs_size)."""
-        self._call(
-            reach_views.observe_rows,
-            self.world,
-            self.state,
-            rows,
-            self._work,
-            self._view,
-            who,
-            goals,
-            out,
-        )
+    def _write(self, envs: Indices, which: int, goals: Vec, out: NDArray[np.float32]) -> None:
+        """Write the observations for some goals, shape (k, n, obs_size)."""
+        state = self.world, self.state, envs, self._sight
+        self._call(queries.observe_rows, *state, self._view, which, goals, out)
 
-    def person_distances(self, rows: Rows) -> Vec:
-        """Return the distances of robot and people in some cells [m], shape (k, n_people).
+    def person_distances(self, envs: Indices) -> Vec:
+        """Return the distance of the robot to each person in some environments.
 
         Args:
-            rows: Cells, shape (k,).
+            envs: Numbers of the environments, shape (k,).
+
+        Returns:
+            Distances [m], shape (k, n_people).
 
         Raises:
-            InvalidInput: There is no such cell.
+            InvalidInput: An environment does not exist.
         """
-        out = np.empty((len(rows), self.n_people))
-        checked = self._checked(rows)
-        reach_views.distances_of_rows(self.world, self.state, checked, self._work, out)
+        out = np.empty((len(envs), self.n_people))
+        checked = self._checked(envs)
+        queries.distances_of_rows(self.world, self.state, checked, self._sight, out)
         return out
 
     @property
     def n_people(self) -> int:
-        """People in each cell; workers come first."""
+        """Number of people in each environment; workers come first."""
         return len(self.cell.people)
 
-    def _checked(self, rows: Rows) -> Rows:
-        numbers = as_kernel_index(np.asarray(rows, dtype=np.int64))
+    def _checked(self, envs: Indices) -> Indices:
+        numbers = as_kernel_index(np.asarray(envs, dtype=np.int64))
         wrong = numbers[(numbers < 0) | (numbers >= self.n_envs)]
         if wrong.size:
-            raise InvalidInput("rows", int(wrong[0]), f"must be one of {self.n_envs} cells")
+            rule = f"must be one of {self.n_envs} environments"
+            raise InvalidInput("envs", int(wrong[0]), rule)
         return numbers
 
     def observe(self) -> NDArray[np.float32]:
-        """Measure distances to people and write all observations anew, (n_envs, obs_size).
-
-        For whoever changes rows from outside.
-        """
-        reach_views.measure_rows(self.world, self.state, self._all, self._work)
+        """Update all clearances and observations after the state was changed from outside."""
+        queries.measure_rows(self.world, self.state, self._all, self._sight)
         return self._look(self._all)

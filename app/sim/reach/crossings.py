@@ -1,30 +1,30 @@
-"""People who cross between the robot and its goal: the trials of ``reach-ssm`` (METHOD 2.6).
+"""People who cross between the robot and its goal: the episodes of ``reach-ssm``.
 
-A crossing is fixed by its seed and number, before anything was tuned on it. The robot starts at
-home. The goal is uniform in the cell's goal box. Seen from above, the person's axis comes
-straight at constant speed, crosses the segment from the tcp at home to the goal, stands there
-for a while, and goes straight on until it is far away:
+A crossing is determined by its seed and number. The robot starts at home; the goal is uniform
+in the cell's goal box. In plan view the person's axis moves straight at constant speed, crosses
+the segment from the tcp at home to the goal, stays there for a while, and continues straight
+(docs/method.md 2.6):
 
 =================  ==========================================================================
-speed              uniform in SPEED [m/s], the range of METHOD 2.1
-radius             uniform in RADIUS [m], the range of METHOD 2.1, constant
-dwell              uniform in DWELL [s], standing where the segment is crossed
-arrival            uniform in ARRIVAL [s]: when the axis reaches the segment; the unhindered
-                   robot needs about two seconds to the goal
-place              uniform in PLACE, as a share of the segment
+speed              uniform in SPEED [m/s], the range of docs/method.md 2.1
+radius             uniform in RADIUS [m], the range of docs/method.md 2.1, constant
+dwell              uniform in DWELL [s], at rest on the segment
+arrival            uniform in ARRIVAL [s]: when the axis reaches the segment; an unobstructed
+                   robot needs about 2 s to the goal
+place              uniform in PLACE, as a fraction of the segment
 direction          uniform within TILT [rad] of the normal to the segment, from either side
 =================  ==========================================================================
 
-Whoever would come nearer than CLEAR to the robot at home, or is nearer than AT_START when the
-run begins, is drawn anew, goal and all: a robot that waits at home is never touched, the safety
-layer lets everybody set out at full speed, and nobody in the way stands there for good. So near
-goals, between which and the robot nobody could pass, are rarer than in the box.
+Crossings in which the person would come nearer than CLEAR to the robot at home, or is nearer
+than AT_START when the run begins, are drawn again, goal included: a robot that waits at home is
+never touched, it can start at full speed, and no person stays between it and the goal. Near
+goals are therefore rarer than in the box.
 
-The second set is made of recorded people: every frame's key-points become the safety cylinder
-of METHOD 2.8 (without flesh margin), a run is turned and moved so that the person walks across
-as above, and once the recording ends the person walks away. These cylinders are 0.35 to 0.8 m
-wide in radius, too wide for their axis to pass between a robot at home and its goal: here the
-cylinder covers part of the segment, its axis may pass behind the goal.
+The second set uses recorded people: the key-points of each frame become the safety cylinder of
+docs/method.md 2.8 (without flesh margin); a run is rotated and moved so that the person walks
+across as above, and leaves after the recording ends. These cylinders have radii of 0.35 to
+0.8 m, so their axis cannot pass between a robot at home and its goal: here the cylinder covers
+part of the segment, and its axis may pass behind the goal.
 """
 
 import math
@@ -46,7 +46,7 @@ from app.sim.robot.ur10 import Robot
 from app.sim.scene.scene import arm_of
 
 SEED = 4104
-"""Seed of the crossings that are evaluated."""
+"""Seed of the evaluated crossings."""
 N_CROSSINGS = 200
 SPEED = (0.3, 1.0)
 RADIUS = (0.2, 0.5)
@@ -57,80 +57,80 @@ TILT = 0.25 * math.pi
 CLEAR = 0.05
 """Least distance of any person to the robot at home [m]."""
 AT_START = 0.8
-"""Least distance of anybody to the robot when the run begins [m]."""
+"""Least distance of any person to the robot when the run begins [m]."""
 FAR = 4.0
-"""Distance from the segment at which people have left [m]."""
+"""Distance from the segment at which a crossing ends [m]."""
 HEIGHT = 2.0
-"""Height of people above the floor [m], METHOD 2.1."""
+"""Height of people above the floor [m], docs/method.md 2.1."""
 TRIES = 10_000
-"""Draws before a crossing is given up."""
+"""Largest number of draws of a crossing."""
 LEAVE_SPEED = 1.0
 """Speed at which recorded people walk away [m/s]."""
 LONGEST_S = 8.0
-"""Most of a recording that is used for one crossing [s]."""
+"""Longest part of a recording in one crossing [s]."""
 LEAST_STEP = 0.15
-"""Recorded people go at least so far in the second around their arrival [m]."""
+"""Least distance that recorded people walk in the second around their arrival [m]."""
 BEHIND = (0.2, 3.0)
-"""Place of a recorded person's axis, as a share of the segment and beyond its end."""
+"""Place of a recorded person's axis, as a fraction of the segment."""
 ON_LINE = 1e-9
-"""An axis so near to a segment, as a share of its length, is on it."""
+"""Distance below which an axis is on a segment, as a fraction of its length."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Crossing:
-    """One person who crosses, and where the robot shall go meanwhile."""
+    """One crossing person and the goal of the robot."""
 
     number: int
     """Number in its set."""
     goal: Vec
-    """Where the tcp shall be [m], shape (3,)."""
+    """Goal of the tcp [m], shape (3,)."""
     track: Vec
-    """The person's x, y and radius at the ends of periods [m], shape (n + 1, 3)."""
+    """The person's x, y and radius at the ends of control cycles [m], shape (n + 1, 3)."""
     arrival: float
-    """When the axis reaches the segment from the tcp at home to the goal [s]."""
+    """Time when the axis reaches the segment [s]."""
     speed: float
     """Walking speed [m/s]; of a recorded person, at the crossing."""
     dwell: float
-    """How long the person stands there [s]; NaN for a recorded one."""
+    """Time at rest on the segment [s]; NaN for a recorded person."""
     source: str
-    """Recording it is made from; empty for a walk."""
+    """Recording; empty for a simulated walk."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CrossingSet:
-    """Crossings of one cell, as a batch runs them."""
+    """Crossings of one cell as arrays."""
 
     goals: Vec
     """Goals [m], shape (n, 3)."""
     tracks: Vec
-    """Cylinders: x, y, radius [m], shape (n, n_periods + 1, 3); the last one stays."""
+    """Cylinders: x, y, radius [m], shape (n, n_cycles + 1, 3); the last one repeats."""
     crossings: tuple[Crossing, ...]
-    """What they are made of."""
+    """The crossings."""
 
 
 def tcp_at_home(cell: Cell) -> Vec:
-    """Return where the tcp is when the robot is at home [m], shape (3,)."""
+    """Return the tcp of the robot at home [m], shape (3,)."""
     robot = Robot(cell.robot.tool_length)
     return np.asarray(robot.tcp_pose(np.array(cell.robot.home_q))[:3, 3])
 
 
 def crossing_time(track: Vec, start: Vec, goal: Vec, dt: float) -> float:
-    """Return when the axis first reaches a segment, seen from above [s]; infinity if never.
+    """Return when the axis first crosses a segment in plan view [s]; infinity if never.
 
     Args:
-        track: x, y and more at the ends of periods [m], shape (n + 1, >= 2).
+        track: x, y at the ends of control cycles [m], shape (n + 1, >= 2).
         start: Start of the segment [m], shape (>= 2,).
         goal: Its end [m], shape (>= 2,).
-        dt: Period [s].
+        dt: Control cycle [s].
     """
-    way = goal[:2] - start[:2]
-    square = float(way @ way)
+    segment = goal[:2] - start[:2]
+    square = float(segment @ segment)
     if square <= 0.0:
         return math.inf
     offset = track[:, :2] - start[:2]
-    side = (way[0] * offset[:, 1] - way[1] * offset[:, 0]) / square
+    side = (segment[0] * offset[:, 1] - segment[1] * offset[:, 0]) / square
     side[np.abs(side) < ON_LINE] = 0.0
-    along = offset @ way / square
+    along = offset @ segment / square
     before, after = side[:-1], side[1:]
     for k in np.flatnonzero((before * after <= 0.0) & (before != after)):
         part = before[k] / (before[k] - after[k])
@@ -140,22 +140,22 @@ def crossing_time(track: Vec, start: Vec, goal: Vec, dt: float) -> float:
 
 
 def covered(track: Vec, start: Vec, goal: Vec) -> NDArray[np.bool_]:
-    """Return when a cylinder covers part of a segment, seen from above, shape (n + 1,).
+    """Return when a cylinder covers part of a segment in plan view, shape (n + 1,).
 
     Args:
-        track: x, y, radius at the ends of periods [m], shape (n + 1, 3).
+        track: x, y, radius at the ends of control cycles [m], shape (n + 1, 3).
         start: Start of the segment [m], shape (>= 2,).
         goal: Its end [m], shape (>= 2,).
     """
-    way = goal[:2] - start[:2]
+    segment = goal[:2] - start[:2]
     offset = track[:, :2] - start[:2]
-    along = np.clip(offset @ way / max(float(way @ way), 1e-12), 0.0, 1.0)
-    away = np.linalg.norm(offset - along[:, None] * way, axis=1)
+    along = np.clip(offset @ segment / max(float(segment @ segment), 1e-12), 0.0, 1.0)
+    away = np.linalg.norm(offset - along[:, None] * segment, axis=1)
     return np.asarray(away < track[:, 2])
 
 
 def crossings(cell: Cell, n: int = N_CROSSINGS, seed: int = SEED) -> CrossingSet:
-    """Return the first ``n`` crossings of a seed; each is fixed by (seed, number).
+    """Return the first ``n`` crossings of a seed.
 
     Args:
         cell: Work cell with a goal region.
@@ -163,7 +163,7 @@ def crossings(cell: Cell, n: int = N_CROSSINGS, seed: int = SEED) -> CrossingSet
         seed: Seed.
 
     Raises:
-        InvalidInput: There shall be none, or the cell has no goal region or no room.
+        InvalidInput: ``n`` is 0, or the cell has no goal region or no space for a person.
     """
     if n < 1:
         raise InvalidInput("crossings", n, "must be at least 1")
@@ -178,12 +178,12 @@ def recorded_crossings(
 
     Args:
         cell: Work cell with a goal region.
-        motions: Clean runs of recorded motion.
+        motions: Runs of recorded motion without artifacts.
         n: Number of crossings.
-        seed: Seed; each crossing is fixed by (seed, number) and the motions.
+        seed: Seed; each crossing is determined by (seed, number) and the motions.
 
     Raises:
-        InvalidInput: There shall be none, there is no motion, or none of it crosses anything.
+        InvalidInput: ``n`` is 0, there is no motion, or no motion crosses the segment.
     """
     if n < 1:
         raise InvalidInput("crossings", n, "must be at least 1")
@@ -198,12 +198,14 @@ def recorded_crossings(
 
 
 def cylinder_track(motion: Motion, floor_z: float, dt: float) -> Vec:
-    """Return a recorded person as the cylinders of METHOD 2.8: x, y, radius [m], (n, 3).
+    """Return a recorded person as cylinders: x, y, radius [m], shape (n, 3).
+
+    Source: docs/method.md 2.8.
 
     Args:
         motion: One run.
         floor_z: Height of the floor [m].
-        dt: Step between cylinders [s].
+        dt: Time between cylinders [s].
     """
     settings = CylinderSettings(flesh_margin=0.0)
     size = motion.size.vector(floor_z)
@@ -231,7 +233,7 @@ def _set_of(found: Sequence[Crossing]) -> CrossingSet:
 
 
 def _walk(cell: Cell, home: Vec, seed: int, number: int) -> Crossing:
-    """Draw one crossing until it is clear of the robot at home."""
+    """Draw a crossing that is clear of the robot at home."""
     rng = np.random.default_rng([seed, number])
     for _ in range(TRIES):
         goal = _goal(cell, rng)
@@ -240,11 +242,11 @@ def _walk(cell: Cell, home: Vec, seed: int, number: int) -> Crossing:
         there, course = _across(home, goal, rng)
         dt = cell.robot.dt
         times = dt * np.arange(math.ceil((arrival + dwell + FAR / speed) / dt) + 1)
-        way = np.where(
+        signed = np.where(
             times < arrival, times - arrival, np.maximum(0.0, times - arrival - dwell)
         )
         track = np.empty((len(times), 3))
-        track[:, :2] = there + speed * way[:, None] * course
+        track[:, :2] = there + speed * signed[:, None] * course
         track[:, 2] = radius
         if _clear_of_home(cell, track):
             return Crossing(
@@ -256,7 +258,9 @@ def _walk(cell: Cell, home: Vec, seed: int, number: int) -> Crossing:
                 dwell=dwell,
                 source="",
             )
-    raise InvalidInput("cell", cell.name, "has no room between the robot and its goals")
+    raise InvalidInput(
+        "cell", cell.name, "has no space for a person between the robot and its goals"
+    )
 
 
 def _recorded(
@@ -267,7 +271,7 @@ def _recorded(
     seed: int,
     number: int,
 ) -> Crossing:
-    """Draw goal, recording and moment until they make a crossing clear of the robot at home."""
+    """Draw goal, recording and moment of a crossing that is clear of the robot at home."""
     rng, dt = np.random.default_rng([seed, number, 1]), cell.robot.dt
     for _ in range(TRIES):
         goal, which = _goal(cell, rng), int(rng.integers(len(motions)))
@@ -295,11 +299,11 @@ def _recorded(
                 source=f"{motions[which].source}, from {first * dt:.2f} s",
             )
     names = sorted({motion.name for motion in motions})
-    raise InvalidInput("motions", names, "must hold somebody who walks across the segment")
+    raise InvalidInput("motions", names, "must contain a person who walks across the segment")
 
 
 def _turn(run: Vec, lead: int, there: Vec, course: Vec, dt: float) -> float:
-    """Turn and move a run so that it is at a place on a course; return its speed then [m/s]."""
+    """Rotate and move a run onto a place and course; return the speed there [m/s]."""
     half = round(0.5 / dt)
     step = run[min(lead + half, len(run) - 1), :2] - run[max(lead - half, 0), :2]
     turn = math.atan2(course[1], course[0]) - math.atan2(step[1], step[0])
@@ -317,16 +321,18 @@ def _goal(cell: Cell, rng: np.random.Generator) -> Vec:
 def _across(
     home: Vec, goal: Vec, rng: np.random.Generator, place: tuple[float, float] = PLACE
 ) -> tuple[Vec, Vec]:
-    """Draw where the segment is crossed [m], shape (2,), and the course, a unit vector."""
-    way = goal[:2] - home[:2]
-    there = home[:2] + rng.uniform(*place) * way
+    """Draw the crossing point [m], shape (2,), and the course, a unit vector."""
+    segment = goal[:2] - home[:2]
+    there = home[:2] + rng.uniform(*place) * segment
     side = 1.0 if rng.uniform() < 0.5 else -1.0
-    course = math.atan2(way[1], way[0]) + side * 0.5 * math.pi + rng.uniform(-TILT, TILT)
+    course = (
+        math.atan2(segment[1], segment[0]) + side * 0.5 * math.pi + rng.uniform(-TILT, TILT)
+    )
     return there, np.array([math.cos(course), math.sin(course)])
 
 
 def _leaving(last: Vec, course: Vec, dt: float) -> Vec:
-    """Return how a person walks away from where a recording ends: along the course."""
+    """Return the track of a person who leaves along the course after a recording."""
     steps = np.arange(1, math.ceil(FAR / LEAVE_SPEED / dt) + 1)
     track = np.empty((len(steps), 3))
     track[:, :2] = last[:2] + LEAVE_SPEED * dt * steps[:, None] * course
@@ -335,7 +341,7 @@ def _leaving(last: Vec, course: Vec, dt: float) -> Vec:
 
 
 def _clear_of_home(cell: Cell, track: Vec) -> bool:
-    """Tell whether everybody on a track keeps CLEAR, and at first AT_START, of home."""
+    """Return whether a track keeps CLEAR, and at its start AT_START, of the robot at home."""
     arm, top = arm_of(cell), cell.floor_z + HEIGHT
     home = np.array(arm.home)
     every = track[:: max(1, round(0.1 / cell.robot.dt))]

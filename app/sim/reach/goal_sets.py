@@ -1,15 +1,15 @@
-"""Training targets in a box of goals, and the cells between them (METHOD 2.4, 4).
+"""Training targets in a box of goals, and interpolation between them (docs/method.md 2.4, 4).
 
-grid     every ``spacing`` along each axis           cells are boxes of 8 targets
-halton   a low-discrepancy sequence over the box     cells are tetrahedra of 4 targets
+grid     every ``spacing`` along each axis           boxes of 8 targets
+halton   a low-discrepancy sequence over the box     tetrahedra of 4 targets
 
-A goal between targets is reached by the weighted mean of the policy's actions for the targets
-of its cell. :class:`GridCells` and :class:`HaltonCells` say which those are.
+The action for a goal between targets is the weighted mean of the policy's actions for the
+targets of its box or tetrahedron.
 
 Source: thesis 4.3.4 and, for the Halton set, its outlook 4.5. Deviates: points of the sequence
-alone leave the faces of the box empty, and Delaunay's tetrahedra between them and the corners
-span the whole box. So the sequence fills a box that is larger by half the grid's spacing, as
-the grid's own cells do, and points outside are moved to the nearest point of the box.
+alone leave the faces of the box empty, and Delaunay tetrahedra between them and the corners
+would span the whole box. The sequence therefore fills a box that is larger by half the grid's
+spacing, and points outside are moved to the nearest point of the box.
 """
 
 import math
@@ -34,24 +34,24 @@ from app.sim.reach.kernels.interpolation_weights import (
 )
 
 N_HALTON = 54
-"""Targets of a Halton set: as many as the source's grid has."""
+"""Targets of a Halton set, as many as in the source's grid."""
 MOST_HALTON = 2000
-"""Most targets of a Halton set."""
+"""Largest number of targets of a Halton set."""
 AXES = ("x", "y", "z")
 BASES = (2, 3, 5)
 """Bases of the sequence along x, y and z."""
 N_CORNERS = 8
 SLACK = 1e-9
-"""How far outside a goal may be by rounding [m]."""
+"""Tolerance for rounding at the faces of the box [m]."""
 _FLAT = 1e-12
-"""Volume below which a tetrahedron is none [m^3]."""
+"""Volume below which a tetrahedron is dropped [m^3]."""
 
 
 def radical_inverse(numbers: NDArray[np.int64], base: int) -> Vec:
-    """Return the van der Corput sequence at some places: digits mirrored behind the point.
+    """Return the van der Corput sequence: digits mirrored about the point.
 
     Args:
-        numbers: Places, not negative, shape (n,).
+        numbers: Indices, not negative, shape (n,).
         base: Base of the digits.
 
     Returns:
@@ -70,10 +70,10 @@ def halton_targets(region: GoalRegion, n: int = N_HALTON) -> Vec:
 
     Args:
         region: Box of goals.
-        n: Number of targets, the 8 corners among them.
+        n: Number of targets, including the 8 corners.
 
     Raises:
-        InvalidInput: There are too few or too many, or the box has no volume.
+        InvalidInput: ``n`` is out of range, or the box has no volume.
     """
     if not N_CORNERS <= n <= MOST_HALTON:
         rule = f"must lie in [{N_CORNERS}, {MOST_HALTON}]: the corners are among them"
@@ -96,8 +96,8 @@ def halton_targets(region: GoalRegion, n: int = N_HALTON) -> Vec:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class GoalMix:
-    """Which targets goals lie between; K is 8 in a grid, 4 among scattered targets."""
+class InterpolationWeights:
+    """Targets and weights of n goals; K is 8 in a grid, 4 among scattered targets."""
 
     which: NDArray[np.int64]
     """Numbers of targets, shape (n, K)."""
@@ -105,35 +105,35 @@ class GoalMix:
     """Their weights, which sum to one, shape (n, K)."""
 
 
-class GoalCells(Protocol):
-    """Cells between training targets."""
+class TargetInterpolation(Protocol):
+    """Interpolation between training targets."""
 
     @property
     def targets(self) -> Vec:
         """The training targets [m], shape (n_targets, 3)."""
 
-    def mix(self, goals: Vec, field: str = "goal") -> GoalMix:
-        """Return which targets goals lie between, and with what weights.
+    def mix(self, goals: Vec, field: str = "goal") -> InterpolationWeights:
+        """Return the targets around goals and their weights.
 
         Args:
-            goals: [m], shape (n, 3).
-            field: What messages call a goal.
+            goals: Goals [m], shape (n, 3).
+            field: Name of a goal in error messages.
 
         Raises:
-            GoalOutside: A goal lies outside the targets; says along which axes.
-            InvalidInput: A goal is no three finite numbers.
+            GoalOutside: A goal lies outside the box of targets.
+            InvalidInput: A goal is not three finite numbers.
         """
 
 
 def _inside(low: Vec, high: Vec, goals: Vec, field: str) -> Vec:
-    """Return goals moved into the targets' box from as far as rounding puts them."""
+    """Return goals clipped to the box of targets within the rounding tolerance."""
     points = np.array(goals, dtype=np.float64, ndmin=2)
     if points.ndim != 2 or points.shape[1] != 3:
         raise InvalidInput(field, list(np.shape(goals)), "must have the shape [n, 3]")
     if ((points >= low) & (points <= high)).all():
         return points
     held = np.clip(points, low, high)
-    # Written so that NaN is refused too.
+    # negated so that NaN is rejected too
     wrong = np.flatnonzero(~(np.abs(held - points) <= SLACK).all(axis=1))
     for row in wrong[:1]:
         goal = points[row].tolist()
@@ -147,10 +147,10 @@ def outside_of(goal: Vec, low: Vec, high: Vec, field: str) -> tuple[OutsideField
     """Return the axes along which a goal lies outside a box.
 
     Args:
-        goal: [m], shape (3,).
+        goal: Goal [m], shape (3,).
         low: Lower corner of the box [m], shape (3,).
         high: Upper corner of the box [m], shape (3,).
-        field: What messages call the goal.
+        field: Name of the goal in error messages.
     """
     return tuple(
         OutsideField(
@@ -164,14 +164,14 @@ def outside_of(goal: Vec, low: Vec, high: Vec, field: str) -> tuple[OutsideField
     )
 
 
-class GridCells:
-    """Boxes of eight targets of a grid.
+class GridInterpolation:
+    """Trilinear interpolation in the boxes of a grid.
 
     Args:
-        targets: The grid's points [m], z running fastest, then y, shape (n_targets, 3).
+        targets: Points of the grid [m], z varying fastest, then y, shape (n_targets, 3).
 
     Raises:
-        InvalidInput: The targets are no such grid.
+        InvalidInput: The targets are not such a grid.
     """
 
     def __init__(self, targets: Vec) -> None:
@@ -183,11 +183,11 @@ class GridCells:
         planes = np.meshgrid(self._x, self._y, self._z, indexing="ij")
         points = np.stack(planes, axis=-1).reshape(-1, 3)
         if not np.array_equal(points, self.targets):
-            rule = "must be all points of a grid, z running fastest, then y"
+            rule = "must be all points of a grid, z varying fastest, then y"
             raise InvalidInput("targets", list(self.targets.shape), rule)
 
-    def mix(self, goals: Vec, field: str = "goal") -> GoalMix:
-        """Return the corners of each goal's box and trilinear weights; see GoalCells."""
+    def mix(self, goals: Vec, field: str = "goal") -> InterpolationWeights:
+        """Return the corners of each goal's box and their weights."""
         inside = _inside(self._low, self._high, goals, field)
         which = np.empty((len(inside), N_BOX), dtype=np.int64)
         weights = np.empty((len(inside), N_BOX))
@@ -195,17 +195,17 @@ class GridCells:
         if self._weigh is None:
             self._weigh = direct(box_weights, arguments)
         self._weigh(*arguments)
-        return GoalMix(which=which, weights=weights)
+        return InterpolationWeights(which=which, weights=weights)
 
 
-class HaltonCells:
-    """Tetrahedra of four targets: the Delaunay cells of scattered points.
+class DelaunayInterpolation:
+    """Barycentric interpolation in the Delaunay tetrahedra of scattered targets.
 
     Args:
         targets: Points whose hull is a box [m], shape (n_targets, 3).
 
     Raises:
-        InvalidInput: A corner of the box is no target.
+        InvalidInput: A corner of the box is not a target.
     """
 
     def __init__(self, targets: Vec) -> None:
@@ -225,23 +225,23 @@ class HaltonCells:
         self._last = self.targets[self.corners[:, 3]]
         self._inverse = np.ascontiguousarray(np.linalg.inv(edges[kept].transpose(0, 2, 1)))
 
-    def mix(self, goals: Vec, field: str = "goal") -> GoalMix:
-        """Return the corners of each goal's tetrahedron and its weights; see GoalCells."""
+    def mix(self, goals: Vec, field: str = "goal") -> InterpolationWeights:
+        """Return the corners of each goal's tetrahedron and their weights."""
         inside = _inside(self._low, self._high, goals, field)
         which = np.empty((len(inside), N_SIMPLEX), dtype=np.int64)
         weights = np.empty((len(inside), N_SIMPLEX))
         simplex_weights(self.corners, self._inverse, self._last, inside, which, weights)
-        return GoalMix(which=which, weights=weights)
+        return InterpolationWeights(which=which, weights=weights)
 
 
-def cells_of(targets: Vec, rule: str) -> GoalCells:
-    """Return the cells of targets by the rule that made them, ``"grid"`` or ``"halton"``.
+def interpolation_of(targets: Vec, rule: str) -> TargetInterpolation:
+    """Return the interpolation between targets of the rule ``"grid"`` or ``"halton"``.
 
     Raises:
-        InvalidInput: The rule gives no targets to interpolate between.
+        InvalidInput: The rule has no targets.
     """
     if rule == "grid":
-        return GridCells(targets)
+        return GridInterpolation(targets)
     if rule == "halton":
-        return HaltonCells(targets)
+        return DelaunayInterpolation(targets)
     raise InvalidInput("goals", rule, "has no targets to interpolate", ("grid", "halton"))

@@ -1,7 +1,7 @@
-"""Reach cells with different numbers of people, stepped together.
+"""Reach environments with different numbers of people, stepped together.
 
-A policy that shall work beside any number of people has to meet them in one training: an equal
-share of the cells has one person, of the next two, and so on.
+An equal share of the environments has one person, two people, and so on, so that a policy
+learns beside any number of people.
 """
 
 from dataclasses import replace
@@ -16,22 +16,24 @@ from app.sim.scenario.batch import StepResult
 
 
 class MixedReachBatch:
-    """Cells in as many parts as there are people at most.
+    """One batch for each number of people.
 
     Args:
         cell: Work cell with a goal region.
-        n_envs: Number of cells.
+        n_envs: Number of environments.
         seed: Seed; as in :class:`~app.sim.reach.batch.ReachBatch`.
-        settings: Starts, ends and rewards; ``people`` are those of the fullest cells.
+        settings: Settings of the scenario; ``people`` are those of the largest group.
 
     Raises:
-        InvalidInput: There is nobody, or there are fewer cells than parts.
+        InvalidInput: There are no people, or fewer environments than people.
     """
 
     def __init__(self, cell: Cell, n_envs: int, seed: int, settings: ReachSettings) -> None:
         people = settings.people or ()
         if not 0 < len(people) <= n_envs:
-            raise InvalidInput("people", len(people), f"must be 1 to {n_envs}, as the cells")
+            raise InvalidInput(
+                "people", len(people), f"must be 1 to {n_envs}, the number of environments"
+            )
         n = len(people)
         starts = [n_envs * k // n for k in range(n + 1)]
         self.parts = tuple(
@@ -44,7 +46,7 @@ class MixedReachBatch:
             )
             for k in range(n)
         )
-        """One batch for each number of people, fewest first."""
+        """One batch for each number of people, in increasing order."""
         self.n_envs, self.n_act, self.seed = n_envs, N_ACT, seed
         self.obs_size, self.settings = self.parts[0].obs_size, settings
         self.cell, self.arm, self.world = (
@@ -55,11 +57,11 @@ class MixedReachBatch:
         self._ends = starts[1:-1]
 
     def reset(self) -> NDArray[np.float32]:
-        """Start episode 0 in every cell; return observations, (n_envs, obs_size)."""
+        """Start episode 0 in every environment; return observations, (n_envs, obs_size)."""
         return np.concatenate([part.reset() for part in self.parts])
 
     def step(self, act: NDArray[np.float32], *, auto_reset: bool = True) -> StepResult:
-        """Move every cell through one control period; as :meth:`EnvBatch.step`."""
+        """Move every environment through one control cycle; see :meth:`EnvBatch.step`."""
         each = [
             part.step(some, auto_reset=auto_reset)
             for part, some in zip(self.parts, np.split(act, self._ends), strict=True)
@@ -73,4 +75,4 @@ class MixedReachBatch:
 
 
 ReachEnvironments = ReachBatch | MixedReachBatch
-"""What a policy learns in."""
+"""Environments in which a policy is trained."""

@@ -1,8 +1,4 @@
-"""How the robot moves next toward a goal: what is asked and what is answered (METHOD 2).
-
-``app.policies.inference.motion_decision`` answers; ``POST /v1/motion`` and its socket pass it
-on.
-"""
+"""Query and result of a motion decision of a reach policy (docs/method.md 2)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,104 +11,104 @@ from app.sim.pick.batch import Piece
 from app.sim.safety.decision import SafetyDecision, SeparationTerms
 from app.sim.safety.layer import SafetySettings
 
-Way = Literal["interpolated", "direct"]
-"""Between training targets, or the policy for the goal itself."""
-WAYS: tuple[Way, ...] = get_args(Way)
+MotionMode = Literal["interpolated", "direct"]
+"""Interpolation between training targets, or the policy queried for the goal itself."""
+MOTION_MODES: tuple[MotionMode, ...] = get_args(MotionMode)
 Beside = Literal["nearest", "averaged"]
-"""Of several people the nearest is seen, or actions beside each of them are averaged."""
+"""Several people: observe the nearest, or average the actions beside each of them."""
 BESIDES: tuple[Beside, ...] = get_args(Beside)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionQuestion:
-    """A state and a goal."""
+    """A state and a goal for which the next motion is queried."""
 
     q: Vec
     """Joint positions [rad], shape (6,)."""
     qd: Vec
     """Joint speeds [rad/s], shape (6,)."""
     goal: Vec
-    """Where the tcp shall be, robot's base frame [m], shape (3,)."""
+    """Goal of the tcp in the robot's base frame [m], shape (3,)."""
     people: Sequence[Person] = ()
-    """The people in the cell as the policy sees them, at most four."""
+    """The people in the cell as the policy observes them, at most four."""
     observed: Sequence[Person] | None = None
-    """The people as a safety layer takes them: as last observed, ``age_s`` ago, at most four;
-    None: as in ``people``."""
+    """The people for the safety layer: as last observed, ``age_s`` ago, at most four; None for
+    ``people``."""
     qdd: Vec | None = None
-    """Joint accelerations [rad/s^2], shape (6,); a policy that limits jerk needs them."""
-    way: Way | None = None
-    """None interpolates where the policy has targets, else asks it for the goal itself."""
+    """Joint accelerations [rad/s^2], shape (6,); required by policies that limit jerk."""
+    inference_mode: MotionMode | None = None
+    """None interpolates if the policy has targets, else queries it for the goal itself."""
     beside: Beside = "nearest"
-    """How several people are met by a policy that knows one."""
-    ahead: bool | None = None
-    """Whether the decision is played ahead; None does where the policy allows it."""
+    """Several people with a policy that observes one."""
+    rollout: bool | None = None
+    """Whether rollouts improve the action; None if the policy can be simulated."""
     time_left_s: float = 5.0
-    """Time left to reach the goal, which policies see [s]."""
+    """Time left to reach the goal, as policies observe it [s]."""
     elapsed_s: float = 0.0
-    """Time for which the goal has been sought: from 1 s on other ways are tried where the
-    policy's leads neither to it nor into a contact [s]."""
+    """Time since the goal was set [s]; from 1 s on, candidates are also simulated where the
+    policy's rollout neither succeeds nor collides."""
     safety: SafetySettings | None = None
-    """What speed and separation monitoring assumes; None leaves it out."""
+    """Assumptions of speed and separation monitoring; None for no monitoring."""
     age_s: float = 0.0
-    """How old the observation of the people is beyond the tracker's delay [s]."""
+    """Age of the observation of people beyond the tracker's delay [s]."""
 
 
 class TargetWeight(NamedTuple):
-    """One training target that the action is made from."""
+    """One training target of an interpolated action."""
 
     position: tuple[float, float, float]
     """The target [m]."""
     weight: float
-    """Its share of the action."""
+    """Its weight in the action."""
 
 
-class Met(NamedTuple):
-    """One person as the decision met them."""
+class PersonWeight(NamedTuple):
+    """One person and their weight in the action."""
 
     separation: float
     """Distance of robot and person [m]; below 0 where they overlap."""
     weight: float
-    """Share of the action beside this person alone; 1 for the one who is seen."""
+    """Weight of the action beside this person alone; 1 for the observed person."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionDecision:
-    """The next piece of motion, and all that explains it."""
+    """The next motion and its explanation."""
 
     act: Vec
-    """The action in [-1, 1], shape (6,): the policy's, or the first of a better way."""
-    ahead: bool
-    """Whether it was played ahead."""
-    began: str | None
-    """The way that is begun instead of the policy's action; None for that itself."""
+    """Action in [-1, 1], shape (6,): the policy's, or the first one of a better candidate."""
+    rollout: bool
+    """Whether rollouts were simulated."""
+    candidate: str | None
+    """Candidate executed instead of the policy's action; None for the policy's action."""
     piece: Piece
     """The commanded piece, before any scaling."""
     unfeasible: bool
     """Whether a joint had no admissible coefficient and brakes, or returns to its limits."""
-    way: Way
-    """How the action came about."""
+    inference_mode: MotionMode
+    """Mode that was used."""
     targets: tuple[TargetWeight, ...]
-    """The targets it was made from; none for ``direct``."""
-    met: tuple[Met, ...]
-    """The people, in the order of the question."""
+    """Targets of an interpolated action; empty for ``direct``."""
+    met: tuple[PersonWeight, ...]
+    """The people, in the order of the query."""
     seen: int | None
-    """Who is nearest; None for nobody."""
+    """Index of the nearest person; None in an empty cell."""
     safe: SafetyDecision | None
-    """What is executed of the piece; None without monitoring."""
+    """Executed part of the segment; None without monitoring."""
     terms: SeparationTerms | None
-    """S_p for whoever set the override, else for the nearest; None where nobody is there."""
+    """S_p of the person who set the override, else of the nearest; None in an empty cell."""
     terms_of: int | None
-    """Whose terms these are: place in ``observed`` of the question."""
+    """Index of that person in ``observed`` of the query."""
     clearance: tuple[float, float, float]
-    """Distances to people, cell and the robot itself [m]."""
+    """Clearances to people, cell and the robot itself [m]."""
     distance: float
     """tcp to goal [m]."""
     beyond_reach: float
-    """By how much the goal is farther away than the arm is long [m]; 0 within."""
+    """Distance of the goal beyond the reach of the arm [m]; 0 within reach."""
     state_outside: tuple[OutsideField, ...]
-    """Measured joints outside their limits; the policy sees them clamped."""
+    """Measured joints outside their limits; the policy observes them clipped."""
     outside: tuple[OutsideField, ...]
-    """Inputs outside what was met in training."""
+    """Inputs outside the training range."""
     checkpoint: str
     """SHA-256 of the checkpoint."""
     elapsed_ms: float

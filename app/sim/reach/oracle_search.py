@@ -1,18 +1,17 @@
-"""How much is possible at all: search by hindsight over replays of the same episodes.
+"""Oracle search: what is possible with knowledge of the future motion of people.
 
-People do not react to the robot, so an episode's whole human motion is fixed when it starts.
-Copies of its first state are played again and again, every copy moved differently, until one
-reaches the goal. What is found is possible; it says nothing about whether anyone could have
-known. A replay is one of
+People do not react to the robot, so the human motion of an episode is fixed when it starts.
+Copies of its first state are simulated again with different robot motions until one reaches the
+goal. A success proves that the episode is solvable, not that a policy without knowledge of the
+future can solve it. A resimulation is
 
-- *scripted*: to some posture (home, the start of a retreat, anywhere) until some moment, then
-  straight to one of the postures at the goal;
-- *disturbed*: to some posture until some moment, then a policy, with noise on its actions.
+- *scripted*: to a configuration (home, the start of a retreat, or random) until some time, then
+  straight to a configuration at the goal; or
+- *disturbed*: to a configuration until some time, then a policy with noise on its actions.
 
-For what no replay solves, two bounds (METHOD 2.6, ``reach-oracle``): an episode is *never*
-possible where the goal is covered by a person, or the robot's base is touched, before anybody
-could have arrived and until the end; and its collision is *unavoided* where all replays,
-retreats among them, end in one.
+For unsolved episodes there are two bounds (docs/method.md 2.6): an episode is *provably
+unsolvable* if a person covers the goal, or touches the robot's base, from before the earliest
+possible arrival; a collision is *unavoided* if all resimulations, including retreats, collide.
 """
 
 from collections.abc import Callable, Sequence
@@ -29,23 +28,23 @@ from app.sim.robot.kernels.arm import Arm
 from app.sim.scenario.kernels.episode import COLLISION, RUNNING, SUCCESS, SUCCESS_DISTANCE
 
 N_COPIES = 4096
-"""Rows of the batch that replays are played in."""
+"""Environments of the batch of resimulations."""
 GAIN = 5.0
-"""Speed wanted of a joint per distance from its posture [1/s]; the limits cut it."""
+"""Joint speed per remaining joint difference [1/s]."""
 SPREAD = 0.09
-"""Postures at a goal have the tcp within this distance of it [m]; success counts within 0.1."""
+"""Largest distance of the tcp to the goal in a configuration at the goal [m]."""
 AT_HOME = 0.3
-"""Share of scripted replays that wait at home first."""
+"""Share of resimulations that wait at home first."""
 NEAR_HOME = 0.4
-"""Share of those that first go to a posture within NEARBY of home."""
+"""Share of resimulations that first move to a configuration within NEARBY of home."""
 NEARBY = np.array([1.5, 0.8, 0.8, 0.8, 0.8, 0.0])
-"""How far such a posture may be from home [rad]."""
+"""Half width of that box around home [rad]."""
 LONGEST_WAIT = 4.0
-"""Latest moment at which a replay turns to its goal [s]."""
+"""Latest time at which a resimulation turns to its goal [s]."""
 SIGMAS = (0.0, 0.1, 0.3)
-"""Spreads of the noise on a policy's actions."""
+"""Standard deviations of the noise on a policy's actions."""
 CORRELATION = 0.9
-"""Correlation of the noise from period to period."""
+"""Correlation of the noise between control cycles."""
 
 Index = NDArray[np.int64]
 Acts = Callable[[ReachBatch], NDArray[np.float32]]
@@ -53,26 +52,26 @@ Acts = Callable[[ReachBatch], NDArray[np.float32]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Resimulations:
-    """How many copies of each episode did what."""
+    """Counts of resimulations of each episode."""
 
     n: Index
-    """Resimulations played, shape (n,)."""
+    """Resimulations, shape (n,)."""
     reached: Index
-    """Resimulations that came to the goal, shape (n,)."""
+    """Resimulations that reached the goal, shape (n,)."""
     untouched: Index
     """Resimulations without a collision, shape (n,)."""
     soonest: Vec
-    """Least time to the goal [s]; infinity where none came, shape (n,)."""
+    """Least time to the goal [s]; infinity where none reached it, shape (n,)."""
 
 
 def copy_rows(source: Any, rows: Index, target: Any, first: int = 0) -> None:
-    """Copy rows of a state, a tuple of arrays or of such tuples, into another.
+    """Copy environments of a state, a tuple of arrays or of such tuples, into another.
 
     Args:
-        source: From where.
-        rows: Rows of the source, shape (k,).
-        target: Of the same kind.
-        first: Row of the target where the copies begin.
+        source: State to copy from.
+        rows: Numbers of the environments, shape (k,).
+        target: State to copy into.
+        first: Number of the first copy in the target.
     """
     for old, new in zip(source, target, strict=True):
         if isinstance(old, tuple):
@@ -84,7 +83,7 @@ def copy_rows(source: Any, rows: Index, target: Any, first: int = 0) -> None:
 def sample_detours(
     arm: Arm, rng: np.random.Generator, k: int, longest: float = LONGEST_WAIT
 ) -> tuple[Vec, Vec]:
-    """Draw where replays go first [rad], shape (k, 6), and until when [s], shape (k,)."""
+    """Sample first configurations [rad], shape (k, 6), and their end times [s], shape (k,)."""
     kind, home = rng.uniform(size=k), np.repeat(np.array(arm.home)[None], k, axis=0)
     near = home + rng.uniform(-1.0, 1.0, (k, 6)) * NEARBY
     low, high = np.maximum(arm.limits.q_min, -np.pi), np.minimum(arm.limits.q_max, np.pi)
@@ -96,17 +95,17 @@ def sample_detours(
 
 
 def toward(arm: Arm, q: Vec, aim: Vec) -> NDArray[np.float32]:
-    """Return actions, shares of the speed limits, that lead straight to postures [rad]."""
+    """Return actions of straight joint motions to configurations [rad]."""
     return np.clip(GAIN * (aim - q) / arm.limits.qd_max, -1.0, 1.0).astype(np.float32)
 
 
 class OracleSearch:
-    """Resimulations the episodes of one batch, as it was when they started.
+    """Resimulates the episodes of a batch from their first states.
 
     Args:
-        batch: Rows at the start of their episodes; not changed.
+        batch: Environments at the start of their episodes; not changed.
         seed: Seed of the search.
-        n_copies: Rows of the batch that replays are played in.
+        n_copies: Environments of the batch of resimulations.
     """
 
     def __init__(self, batch: ReachBatch, seed: int, n_copies: int = N_COPIES) -> None:
@@ -122,8 +121,8 @@ class OracleSearch:
             for k, goal in enumerate(goals)
         ]
         home = np.array(self._arm.home)[None]
-        self._postures = [each if len(each) else home for each in found]
-        self.replays = Resimulations(
+        self._configurations = [each if len(each) else home for each in found]
+        self.resimulations = Resimulations(
             n=np.zeros(self.n, dtype=np.int64),
             reached=np.zeros(self.n, dtype=np.int64),
             untouched=np.zeros(self.n, dtype=np.int64),
@@ -131,31 +130,31 @@ class OracleSearch:
         )
 
     def unsolved(self) -> Index:
-        """Return the episodes in which no replay has reached the goal yet."""
-        return np.flatnonzero(self.replays.reached == 0)
+        """Return the episodes that no resimulation has solved."""
+        return np.flatnonzero(self.resimulations.reached == 0)
 
     def scripted(self, episodes: Index, n_each: int, *, at_once: bool = False) -> None:
-        """Play scripted replays of some episodes, ``n_each`` of each.
+        """Run scripted resimulations of some episodes.
 
         Args:
-            episodes: Which.
+            episodes: Numbers of the episodes.
             n_each: Resimulations of each.
-            at_once: Whether all go to the goal at once.
+            at_once: Whether all move to the goal immediately.
         """
         for rows in self._parts(episodes, n_each):
             first, until = sample_detours(self._arm, self._rng, len(rows))
             if at_once:
                 until[:] = 0.0
             last = self._at_goal(rows)
-            self._play(rows, lambda batch, k: np.zeros(0), first, until, last)
+            self._simulate(rows, lambda batch, k: np.zeros(0), first, until, last)
 
     def disturbed(self, episodes: Index, n_each: int, acts: Acts) -> None:
-        """Play replays of a policy, ``n_each`` of each episode.
+        """Run resimulations of some episodes with a policy.
 
         Args:
-            episodes: Which.
+            episodes: Numbers of the episodes.
             n_each: Resimulations of each.
-            acts: The policy: actions of all rows from a batch.
+            acts: The policy: actions of all environments of a batch.
         """
         for rows in self._parts(episodes, n_each):
             first, until = sample_detours(self._arm, self._rng, len(rows))
@@ -170,13 +169,13 @@ class OracleSearch:
                 noise[:] = CORRELATION * noise + np.sqrt(1.0 - CORRELATION**2) * fresh
                 return acts(batch)[:k] + sigma * noise
 
-            self._play(rows, policy, first, until, None)
+            self._simulate(rows, policy, first, until, None)
 
     def undisturbed(self, acts: Acts) -> None:
-        """Play every episode once as a policy does by itself."""
+        """Simulate every episode once with a policy alone."""
         for rows in self._parts(np.arange(self.n), 1):
             none = np.zeros(len(rows))
-            self._play(
+            self._simulate(
                 rows, lambda batch, k: acts(batch)[:k], self._home(len(rows)), none, None
             )
 
@@ -184,17 +183,17 @@ class OracleSearch:
         return np.repeat(np.array(self._arm.home)[None], k, axis=0)
 
     def _parts(self, episodes: Index, n_each: int) -> Sequence[Index]:
-        """Return the episodes of the replays, as many at a time as there are copies."""
+        """Split the resimulations into groups of at most ``n_copies`` episodes."""
         every = np.repeat(episodes, n_each)
         n = self._copies.n_envs
         return [every[k : k + n] for k in range(0, len(every), n)]
 
     def _at_goal(self, rows: Index) -> Vec:
         """Draw a posture at the goal of each replay [rad], shape (k, 6)."""
-        postures = [self._postures[self._which[row]] for row in rows]
+        postures = [self._configurations[self._which[row]] for row in rows]
         return np.stack([each[self._rng.integers(len(each))] for each in postures])
 
-    def _play(
+    def _simulate(
         self,
         rows: Index,
         policy: Callable[[ReachBatch, int], NDArray[np.floating]],
@@ -202,10 +201,10 @@ class OracleSearch:
         until: Vec,
         last: Vec | None,
     ) -> None:
-        """Play one replay per row: to ``first``, later to ``last`` or as the policy acts."""
+        """Simulate each row: to ``first``, from ``until`` on to ``last`` or with the policy."""
         batch, k = self._copies, len(rows)
         batch.reset()
-        batch.state.outcome[:] = COLLISION  # rows that are not needed stand still
+        batch.state.outcome[:] = COLLISION  # unused environments do not move
         copy_rows(self._batch.state, rows, batch.state)
         act, t = np.zeros((batch.n_envs, 6), dtype=np.float32), 0.0
         while (batch.state.outcome[:k] == RUNNING).any():
@@ -219,8 +218,8 @@ class OracleSearch:
         self._count(rows, batch)
 
     def _count(self, rows: Index, batch: ReachBatch) -> None:
-        """Add what came of the replays of some episodes."""
-        outcome, found = batch.state.outcome[: len(rows)], self.replays
+        """Count the outcomes of resimulations."""
+        outcome, found = batch.state.outcome[: len(rows)], self.resimulations
         np.add.at(found.n, rows, 1)
         np.add.at(found.reached, rows, outcome == SUCCESS)
         np.add.at(found.untouched, rows, outcome != COLLISION)
@@ -229,11 +228,11 @@ class OracleSearch:
 
 
 def future_cylinders(batch: ReachBatch, n_periods: int) -> Vec:
-    """Return where the walkers of a batch will be: x, y, radius [m], shape (n + 1, rows, W, 3).
+    """Return the future cylinders of pedestrians: x, y, radius [m], shape (n + 1, rows, W, 3).
 
     Args:
-        batch: Rows at the start of their episodes; played to the end, so use one of its own.
-        n_periods: Number of periods.
+        batch: Environments at the start of their episodes; simulated to the end.
+        n_periods: Number of control cycles.
     """
     still = np.zeros((batch.n_envs, 6), dtype=np.float32)
     found = [batch.state.people.cylinders.copy()]
@@ -247,17 +246,16 @@ def future_cylinders(batch: ReachBatch, n_periods: int) -> Vec:
 def provably_unsolvable(
     walks: Vec, goals: Vec, soonest: Vec, dt: float, tool_radius: float, base_radius: float
 ) -> NDArray[np.bool_]:
-    """Return the episodes that nobody could have solved, for one of two reasons, shape (n,).
+    """Return which episodes cannot be solved, shape (n,).
 
-    The tool would be inside a person wherever it counts as at the goal, in every period in
-    which it could be there; or a person touches the base, which cannot get out of the way,
-    before the tool could be there.
+    Either a person covers every position of success in every control cycle in which the tool
+    could be there, or a person touches the fixed base before the earliest possible arrival.
 
     Args:
         walks: From :func:`future_cylinders`, shape (n_periods + 1, n, W, 3).
         goals: Goals [m], shape (n, 3).
-        soonest: Least time in which anybody could be at each goal [s], shape (n,).
-        dt: Control period [s].
+        soonest: Least time to each goal in an empty cell [s], shape (n,).
+        dt: Control cycle [s].
         tool_radius: Radius of the tool about the tcp [m].
         base_radius: Radius of the base about its axis [m].
     """

@@ -1,8 +1,7 @@
-"""A state that somebody tells, seen as the reach scenario's policies see it in training.
+"""One state that a client sends, observed as the reach scenario's policies observe it.
 
-:class:`QueryState` holds one row of the scenario (``reach.py``) for so many people of each kind:
-whoever is told is put into it, and the same kernels look at it that look in training, so that
-one state gives one observation wherever it comes from.
+:class:`QueryState` holds one environment of the scenario (``batch.py``) with a given number of
+people of each kind. The same kernels observe it as in training.
 """
 
 from collections.abc import Callable, Sequence
@@ -29,60 +28,57 @@ from app.sim.people.kernels.pedestrian import (
     remember_as_now,
 )
 from app.sim.prediction.weights import new_motion_predictor
-from app.sim.reach.batch import VIEWS, ViewName, new_state, with_workplace, world_of
-from app.sim.reach.kernels import (
-    episode as reach,
-)
-from app.sim.reach.kernels import (
-    queries as reach_views,
-)
-from app.sim.reach.kernels import (
-    query_state as motion,
-)
-from app.sim.reach.kernels.observation import EVERYBODY
+from app.sim.reach.batch import VIEWS, ViewName, reach_cell_of, with_workplace
+from app.sim.reach.kernels import queries
+from app.sim.reach.kernels.observation import ALL_PEOPLE
+from app.sim.reach.kernels.observation_workspace import new_observation_workspace
+from app.sim.reach.kernels.query_state import load_state
 from app.sim.robot.measured_state import Joints
+from app.sim.scenario.kernels.episode import new_episode_state
 from app.sim.scene.scene import HumanKind, new_people_state, people_of, with_people
 
 _ROW = np.zeros(1, dtype=np.int64)
 
 
 class QueryState:
-    """One state with a number of bodies and cylinders in it; not thread-safe.
+    """One state with a number of bodies and cylinders; not thread-safe.
 
     Args:
         cell: Work cell with a goal region.
-        n_bodies: People by joint angles; they come first.
-        n_cylinders: People by cylinders.
-        view: What policies observe.
+        n_bodies: Number of people given by joint angles; they come first.
+        n_cylinders: Number of people given as cylinders.
+        view: Observation of the policy.
     """
 
     def __init__(self, cell: Cell, n_bodies: int, n_cylinders: int, view: ViewName) -> None:
         people: list[HumanKind] = ["worker"] * n_bodies
         people += ["walker"] * n_cylinders
-        staged = with_people(with_workplace(cell) if n_bodies else cell, people)
-        # What workers do in episodes is left out: here they are where they are told to be.
-        shared = people_of(staged)
-        self.world = world_of(staged, shared, np.zeros((0, 3)))
-        self.state = new_state(self.world, new_people_state(staged, shared, 1), 1)
-        self._work = reach.new_work(self.world, self.state, new_motion_predictor())
+        populated = with_people(with_workplace(cell) if n_bodies else cell, people)
+        shared = people_of(populated)
+        self.world = reach_cell_of(populated, shared, np.zeros((0, 3)))
+        rows = new_people_state(populated, shared, 1)
+        self.state = new_episode_state(self.world.arm, rows, 1)
+        self._work = new_observation_workspace(
+            self.world.arm, shared, rows, new_motion_predictor()
+        )
         self._view, self.obs_size = VIEWS[view]
         self.arm, self.top_z = self.world.arm, shared.top_z
         self._own_size = shared.bodies[0]
         self._measured = np.ones(n_cylinders, dtype=np.bool_)
         self._tops = np.full((n_cylinders, 1), self.top_z)
-        self.apart = np.zeros(n_bodies + n_cylinders)
+        self.distances = np.zeros(n_bodies + n_cylinders)
         """Distance of the robot to each person [m], bodies first, shape (n_people,)."""
         self._calls: dict[int, Callable[..., None]] = {}
-        self._room: dict[int, tuple[Vec, NDArray[np.float32]]] = {}
-        self._take_in = direct(motion.take_in, self._shared)
+        self._buffers: dict[int, tuple[Vec, NDArray[np.float32]]] = {}
+        self._load = direct(load_state, self._shared)
 
     @property
     def _shared(self) -> tuple[Any, ...]:
-        return self.world, self.state, self._work, self.apart
+        return self.world, self.state, self._work, self.distances
 
     @property
     def clear(self) -> Vec:
-        """Distances to people, cell and the robot itself [m], shape (3,)."""
+        """Clearances to people, cell and the robot itself [m], shape (3,)."""
         clear: Vec = self.state.clear[0]
         return clear
 
@@ -94,7 +90,7 @@ class QueryState:
     @property
     def seen(self) -> Vec:
         """The person observed last: x, y [m], vx, vy [m/s], r [m], growth [m/s], shape (6,)."""
-        return self._work.sight.seen
+        return self._work.seen
 
     @property
     def shapes(self) -> Shapes:
@@ -110,12 +106,12 @@ class QueryState:
             ),
         )
 
-    def put(self, robot: Joints, people: Sequence[Person], time_left_s: float) -> None:
-        """Take a state in and look at its distances.
+    def load(self, robot: Joints, people: Sequence[Person], time_left_s: float) -> None:
+        """Load a state and compute its clearances.
 
         Args:
             robot: Positions, speeds and accelerations of its joints.
-            people: Those with joint angles first, then cylinders, checked.
+            people: Checked people, those with joint angles first, then cylinders.
             time_left_s: Time left to reach the goal [s].
         """
         state = self.state
@@ -134,25 +130,25 @@ class QueryState:
             walker[VX], walker[VY], walker[GROWTH] = *person.qd[:2], person.growth
             remember_as_now(rows.walkers.rows, 0, i - first)
             if person.past is not None:
-                _remind(walker, person.past)
+                _load_past(walker, person.past)
             rows.cylinders[0, i - first] = person.cylinder
-        self._take_in(*self._shared)
+        self._load(*self._shared)
 
-    def observe(self, goals: Vec, who: int | None = None) -> NDArray[np.float32]:
-        """Return what a policy sees of the state for some goals.
+    def observe(self, goals: Vec, person: int | None = None) -> NDArray[np.float32]:
+        """Return the observations of the state for some goals.
 
         Args:
-            goals: Where the tcp shall be [m], shape (n, 3).
-            who: The person who is there alone, bodies first; None for all as they are.
+            goals: Goals of the tcp [m], shape (n, 3).
+            person: The only person that is present, bodies first; None for all people.
 
         Returns:
             Observations, shape (n, obs_size); overwritten by the next call.
         """
         n = len(goals)
-        if n not in self._room:
+        if n not in self._buffers:
             shape = (1, n, self.obs_size)
-            self._room[n] = (np.zeros((1, n, 3)), np.zeros(shape, dtype=np.float32))
-        places, out = self._room[n]
+            self._buffers[n] = (np.zeros((1, n, 3)), np.zeros(shape, dtype=np.float32))
+        places, out = self._buffers[n]
         places[0] = goals
         arguments = (
             self.world,
@@ -160,22 +156,22 @@ class QueryState:
             _ROW,
             self._work,
             self._view,
-            EVERYBODY if who is None else who,
+            ALL_PEOPLE if person is None else person,
             places,
             out,
         )
         if not self._calls:
-            self._calls[0] = direct(reach_views.observe_rows, arguments)
+            self._calls[0] = direct(queries.observe_rows, arguments)
         self._calls[0](*arguments)
         found: NDArray[np.float32] = out[0]
         return found
 
 
-def _remind(walker: Vec, past: Vec) -> None:
-    """Set what a walker's row, shape (N_STATE,), remembers; what is unknown stayed as it was.
+def _load_past(walker: Vec, past: Vec) -> None:
+    """Set the remembered radii and speeds of a pedestrian; older ones repeat the oldest.
 
     Args:
-        walker: The row; it remembers that all was as now.
+        walker: State of the pedestrian, shape (N_STATE,); its past equals the present.
         past: As in ``Person.past``.
     """
     known = np.concatenate([[[walker[PAST_RADIUS], walker[PAST_SPEED]]], past])

@@ -1,10 +1,10 @@
-"""Many cells of one scenario, stepped together by one thread.
+"""Many environments of one scenario, stepped together by one thread.
 
-What the batches of both scenarios share: buffers, restarts and steps around the compiled
-kernels of ``pick/kernels/episode.py`` and ``reach/kernels/episode.py``, which take the same
-arguments. A step
-is up to three kernels: all rows move, rows are observed, those that ended start again. In one
-kernel their code would be compiled, and optimised, once for every place that calls it.
+Buffers, resets and steps that the pick and reach scenarios share, around the kernels of
+``pick/kernels/episode.py`` and ``reach/kernels/episode.py``. A step calls up to three kernels:
+all environments
+move, are observed, and those whose episode ended are reset. One kernel for all three would be
+compiled once for each place that calls it.
 """
 
 from abc import ABC, abstractmethod
@@ -17,21 +17,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.sim.core.jit import direct
-from app.sim.scenario.kernels.episode import RUNNING
+from app.sim.people.kernels.people import PeopleState
+from app.sim.robot.kernels.arm import Arm
+from app.sim.scenario.kernels.episode import (
+    RUNNING,
+    EpisodeState,
+    Indices,
+    new_episode_state,
+    new_step_workspace,
+)
 from app.sim.scene.scene import require_finite, require_shape
-
-Rows = NDArray[np.int64]
-"""Numbers of environments."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StepResult:
-    """What one batched step gave; the arrays are overwritten by the next step."""
+    """Result of one batched step; the arrays are overwritten by the next step."""
 
     obs: NDArray[np.float32]
     """Observations after the step, of new episodes where one ended, (n_envs, obs_size)."""
     last_obs: NDArray[np.float32]
-    """Final observation of the rows that ended, (n_envs, obs_size)."""
+    """Final observations of the environments whose episode ended, (n_envs, obs_size)."""
     rew: NDArray[np.float32]
     """Rewards, (n_envs,)."""
     ended: NDArray[np.int64]
@@ -39,26 +44,29 @@ class StepResult:
 
 
 class EnvBatch(ABC):
-    """Restarts and steps the rows of a scenario.
+    """Resets and steps the environments of a scenario.
 
-    Copies (``copy.deepcopy``, ``pickle``) go on bit by bit as the original would.
+    Copies (``copy.deepcopy``, ``pickle``) continue bit by bit as the original would.
 
     Args:
-        shared: World, rules, action rule, reward weights, rows and work space, as they take
-            them.
-        n_envs: Number of cells.
-        n_act: Numbers per action.
-        seed: Seed; episode ``k`` of cell ``e`` is fixed by (seed, e, k).
-        first_env: Number of the first cell in the random streams.
-        view: What observations hold, and how many numbers they are.
+        world: Data that all environments share.
+        task: Rules, action type and reward coefficients.
+        people: State of the people.
+        n_envs: Number of environments.
+        n_act: Length of an action.
+        seed: Seed; episode ``k`` of environment ``e`` is determined by (seed, e, k).
+        first_env: Number of the first environment in the random streams.
+        view: Contents and length of an observation.
     """
 
     _kernel: ModuleType
-    """The scenario's kernels: ``reset_rows`` and ``step_batch``."""
+    """Kernels of the scenario: ``reset_rows`` and ``step_batch``."""
 
     def __init__(
         self,
-        shared: tuple[Any, Any, Any, Any, Any, Any],
+        world: Any,
+        task: Any,
+        people: PeopleState,
         *,
         n_envs: int,
         n_act: int,
@@ -66,10 +74,11 @@ class EnvBatch(ABC):
         first_env: int,
         view: tuple[int, int],
     ) -> None:
-        self.n_envs, self.seed = n_envs, seed
-        self.n_act = n_act
-        self._first = first_env
-        self._world, self._rules, self._action, self._weights, self._rows, self._work = shared
+        self.n_envs, self.n_act, self.seed = n_envs, n_act, seed
+        self.world, self._task, self._first = world, task, first_env
+        self.arm: Arm = world.arm
+        self.state: EpisodeState = new_episode_state(self.arm, people, n_envs)
+        self._work = new_step_workspace(self.arm, world.people, people)
         self._view, self.obs_size = view
         self._obs = np.zeros((n_envs, self.obs_size), dtype=np.float32)
         self._last = np.zeros_like(self._obs)
@@ -79,23 +88,22 @@ class EnvBatch(ABC):
         self._compiled: dict[Callable[..., None], Callable[..., None]] = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what a copy is made of; it finds its compiled kernels itself."""
+        """Return the state of a copy; a copy looks up its compiled kernels again."""
         return {**self.__dict__, "_compiled": {}}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Take the state of another batch over.
+        """Restore the state of another batch.
 
-        Copied arrays are writable. Kernels are compiled once more, for minutes, where one is
-        that was not, so the shared primitive_library is made read-only again.
+        Copied arrays are writable. Kernels would be compiled again for a writable primitive
+        library, so it is made read-only.
         """
         self.__dict__.update(state)
-        self._world.people.primitive_library.samples.setflags(write=False)
+        self.world.people.primitive_library.samples.setflags(write=False)
 
     @property
-    def episode(self) -> Rows:
-        """Numbers of the present episodes, (n_envs,); those that start next are set here."""
-        numbers: Rows = self._rows.episode
-        return numbers
+    def episode(self) -> Indices:
+        """Numbers of the present episodes, (n_envs,); set them to choose the next ones."""
+        return self.state.episode
 
     @property
     def obs(self) -> NDArray[np.float32]:
@@ -103,35 +111,35 @@ class EnvBatch(ABC):
         return self._obs
 
     def reset(self, seed: int | None = None) -> NDArray[np.float32]:
-        """Start episode 0 in every cell; return observations, (n_envs, obs_size)."""
+        """Start episode 0 in every environment; return observations, (n_envs, obs_size)."""
         self.seed = self.seed if seed is None else seed
-        self._rows.episode[:] = 0
+        self.state.episode[:] = 0
         return self.restart()
 
     def restart(self) -> NDArray[np.float32]:
         """Start the episodes numbered by ``episode``; return the observations."""
         return self.start(self._all)
 
-    def start(self, rows: Rows) -> NDArray[np.float32]:
-        """Start the episodes numbered by ``episode`` in some cells.
+    def start(self, envs: Indices) -> NDArray[np.float32]:
+        """Start the episodes numbered by ``episode`` in some environments.
 
         Args:
-            rows: Numbers of the cells, shape (k,).
+            envs: Numbers of the environments, shape (k,).
 
         Returns:
-            Observations of all cells, (n_envs, obs_size).
+            Observations of all environments, (n_envs, obs_size).
         """
-        self._start(rows)
-        return self._look(rows)
+        self._start(envs)
+        return self._look(envs)
 
     def step(
         self, act: NDArray[np.float32], *, auto_reset: bool = True, features: bool = True
     ) -> StepResult:
-        """Move every cell through one control period.
+        """Move every environment through one control cycle.
 
         Args:
-            act: Actions in [-1, 1], shape (n_envs, n_act); what they mean is in the settings.
-            auto_reset: Start the next episode where one ended; else its row stands still.
+            act: Actions in [-1, 1], shape (n_envs, n_act); the settings choose their type.
+            auto_reset: Start the next episode where one ended; else the environment stays.
             features: Whether observations are wanted.
 
         Raises:
@@ -140,63 +148,47 @@ class EnvBatch(ABC):
         """
         require_shape("act", act, (self.n_envs, self.n_act))
         require_finite("act", act)
-        live = np.flatnonzero(self._rows.outcome == RUNNING)
+        live = np.flatnonzero(self.state.outcome == RUNNING)
         self._move(np.array(act, dtype=np.float32, order="C"))
         if features:
             self._look(live)
         done = np.flatnonzero(self._ended)
         if auto_reset and len(done):
             self._last[done] = self._obs[done]
-            self._rows.episode[done] += 1
+            self.state.episode[done] += 1
             self._start(done)
             if features:
                 self._look(done)
         return StepResult(obs=self._obs, last_obs=self._last, rew=self._rew, ended=self._ended)
 
-    def _start(self, rows: Rows) -> None:
-        """Start episodes in some cells."""
+    def _start(self, envs: Indices) -> None:
+        """Start episodes in some environments."""
+        rules, reset = self._task.rules, self._kernel.reset_rows
         self._call(
-            self._kernel.reset_rows,
-            self._world,
-            self._rules,
-            self.seed,
-            self._first,
-            self._rows,
-            rows,
-            self._work,
+            reset, self.world, rules, self.seed, self._first, self.state, envs, self._work
         )
 
     def _move(self, act: NDArray[np.float32]) -> None:
-        """Move every cell that runs through one period; fill rewards and ends."""
-        self._call(
-            self._kernel.step_batch,
-            self._world,
-            self._rules,
-            self._action,
-            self._weights,
-            self._rows,
-            self._work,
-            act,
-            self._rew,
-            self._ended,
-        )
+        """Step every running environment; fill rewards and outcomes."""
+        shared = self.world, self._task, self.state, self._work
+        self._call(self._kernel.step_batch, *shared, act, self._rew, self._ended)
 
-    def _look(self, rows: Rows) -> NDArray[np.float32]:
-        """Write the observations of some cells; return those of all, (n_envs, obs_size)."""
-        if len(rows) == self.n_envs:
-            self._observe(rows, self._obs)
-        elif len(rows):
-            out = np.empty((len(rows), self.obs_size), dtype=np.float32)
-            self._observe(rows, out)
-            self._obs[rows] = out
+    def _look(self, envs: Indices) -> NDArray[np.float32]:
+        """Write the observations of some environments; return all, (n_envs, obs_size)."""
+        if len(envs) == self.n_envs:
+            self._observe(envs, self._obs)
+        elif len(envs):
+            out = np.empty((len(envs), self.obs_size), dtype=np.float32)
+            self._observe(envs, out)
+            self._obs[envs] = out
         return self._obs
 
     @abstractmethod
-    def _observe(self, rows: Rows, out: NDArray[np.float32]) -> None:
-        """Write the observations of some cells, shape (len(rows), obs_size)."""
+    def _observe(self, envs: Indices, out: NDArray[np.float32]) -> None:
+        """Write the observations of some environments, shape (len(envs), obs_size)."""
 
     def _call(self, kernel: Callable[..., None], *arguments: Any) -> None:
-        """Call a kernel that is always given arguments of the same types."""
+        """Call a kernel whose arguments always have the same types."""
         if kernel not in self._compiled:
             self._compiled[kernel] = direct(kernel, arguments)
         self._compiled[kernel](*arguments)

@@ -98,7 +98,7 @@ def test_one_state_gives_the_action_and_piece_that_training_gives(
     batch, actor = driven(6, people), RandomActor()
     running = np.flatnonzero(batch.state.outcome == 0)
     expected, decide = controller_of(actor, way).acts(batch), MotionDecider(actor, CELL).decide
-    found = {int(e): decide(replace(told(batch, e), way=way)) for e in running}
+    found = {int(e): decide(replace(told(batch, e), inference_mode=way)) for e in running}
     clear, distance = batch.state.clear.copy(), batch.state.distance.copy()
     batch.step(expected, auto_reset=False)
     assert len(found) > 2
@@ -139,7 +139,7 @@ def test_weights_of_targets_sum_to_one_and_give_the_goal_back() -> None:
         decision = decider(goals).decide(question())
         weights = np.array([one.weight for one in decision.targets])
         places = np.array([one.position for one in decision.targets])
-        assert decision.way == "interpolated" and 1 < len(weights) <= most
+        assert decision.inference_mode == "interpolated" and 1 < len(weights) <= most
         assert weights.sum() == pytest.approx(1.0)
         np.testing.assert_allclose(weights @ places, GOAL, atol=1e-12)
 
@@ -150,7 +150,8 @@ def test_at_a_training_target_both_ways_are_one(goals: str) -> None:
     targets = region.targets() if goals == "grid" else halton_targets(region)
     for target in targets[::7]:
         found = [
-            one.decide(question(goal=target, way=way)) for way in ("interpolated", "direct")
+            one.decide(question(goal=target, inference_mode=way))
+            for way in ("interpolated", "direct")
         ]
         np.testing.assert_array_equal(found[0].act, found[1].act)
         assert [target.weight for target in found[0].targets] == [1.0]
@@ -164,9 +165,11 @@ def test_interpolation_refuses_goals_outside_and_direct_flags_them() -> None:
     (axis,) = caught.value.problem()["outside"]
     assert (axis["axis"], axis["by_m"]) == ("y", pytest.approx(0.6))
     for goals, way in (("grid", "direct"), ("box", None)):
-        decision = decider(goals, trained_range=trained).decide(replace(far, way=way))
+        decision = decider(goals, trained_range=trained).decide(
+            replace(far, inference_mode=way)
+        )
         assert [one.field for one in decision.outside] == ["goal.y"]
-        assert decision.way == "direct"
+        assert decision.inference_mode == "direct"
         assert decision.beyond_reach == pytest.approx(np.hypot(1.6, 0.3 - 0.1273) - 1.45)
     assert decider().decide(question()).beyond_reach == 0.0
 
@@ -287,14 +290,14 @@ def test_what_cannot_be_answered_is_refused_by_name(
 
 def test_a_policy_of_a_box_cannot_be_asked_to_interpolate() -> None:
     with pytest.raises(InvalidInput, match="training targets"):
-        decider("box").decide(question(way="interpolated"))
+        decider("box").decide(question(inference_mode="interpolated"))
 
 
 def test_a_policy_that_cannot_look_ahead_says_so() -> None:
     with pytest.raises(InvalidInput, match="sees forecasts") as refused:
-        decider().decide(question(ahead=True))
+        decider().decide(question(rollout=True))
     assert refused.value.field == "rollout"
-    assert decider().decide(question()).ahead is False
+    assert decider().decide(question()).rollout is False
 
 
 def test_looking_ahead_answers_whatever_is_told() -> None:
@@ -304,8 +307,8 @@ def test_looking_ahead_answers_whatever_is_told() -> None:
     for _ in range(100):
         asked = random_question(rng)
         decision = one.decide(asked)
-        assert decision.ahead and keeps_limits(decision, asked)
-        began += decision.began is not None
+        assert decision.rollout and keeps_limits(decision, asked)
+        began += decision.candidate is not None
     assert 0 < began < 100
 
 
@@ -329,8 +332,8 @@ def test_who_has_sought_the_goal_for_long_tries_other_ways() -> None:
     tried = 0
     for _ in range(60):
         asked = random_question(rng)
-        if one.decide(asked).began is None:
-            tried += one.decide(replace(asked, elapsed_s=2.0)).began is not None
+        if one.decide(asked).candidate is None:
+            tried += one.decide(replace(asked, elapsed_s=2.0)).candidate is not None
     assert tried > 0
 
 

@@ -10,7 +10,7 @@ from app.errors import CheckpointMismatch, InvalidInput
 from app.policies.checkpoints import checkpoint as formats
 from app.policies.checkpoints import pretrained
 from app.policies.checkpoints.model_state import under
-from app.policies.inference.reach_policy import CROWD, ReachPolicy, is_reach
+from app.policies.inference.reach_policy import PEOPLE_SET, ReachPolicy, is_reach
 from app.policies.training.reach import networks_of
 from app.sim.cells.cell import load_cell
 from app.sim.reach.batch import ReachBatch, ReachSettings, goal_region_of
@@ -77,13 +77,13 @@ def test_it_says_what_it_is(checkpoint):
 
 @pytest.mark.parametrize("kind", ["residual", "plain"])
 def test_people_as_a_set_have_no_order_and_nobody_counts_for_nothing(kind):
-    checkpoint = untrained_reach(seed=4, width=48, actor=kind, observation="crowd")
+    checkpoint = untrained_reach(seed=4, width=48, actor=kind, observation="people-set")
     policy = ReachPolicy(checkpoint)
-    preset = reach_preset(width=48, actor=kind, observation="crowd")
+    preset = reach_preset(width=48, actor=kind, observation="people-set")
     actor = networks_of(preset, policy.n_obs).actor()
     actor.load_state_dict(under(checkpoint.arrays(), "actor"))
     obs = np.random.default_rng(1).normal(size=(50, policy.n_obs)).astype(np.float32)
-    blocks = obs[:, CROWD.first :].reshape(50, CROWD.n_people, CROWD.n_block)
+    blocks = obs[:, PEOPLE_SET.first :].reshape(50, PEOPLE_SET.n_people, PEOPLE_SET.n_block)
     blocks[:, :, 0] = [1.0, 1.0, 1.0, 0.0]
     act = policy.acts(obs)
     with torch.no_grad():
@@ -103,7 +103,7 @@ def test_people_as_a_set_have_no_order_and_nobody_counts_for_nothing(kind):
         ("forecast", "residual"),
         ("features", "residual"),
         ("state", "plain"),
-        ("crowd", "residual"),
+        ("people-set", "residual"),
     ],
 )
 def test_it_moves_the_robot_of_a_batch(view, actor):

@@ -5,7 +5,7 @@ import pytest
 
 from app.errors import GoalOutside, InvalidInput
 from app.policies.inference.target_interpolation import Interpolation, interpolates
-from app.sim.reach.goal_sets import GoalMix
+from app.sim.reach.goal_sets import InterpolationWeights
 from app.sim.reach.kernels.observation import N_FEATURES
 from tests.policies.reach_actor import RandomActor
 
@@ -24,7 +24,7 @@ def test_targets_without_weight_are_not_asked_for() -> None:
     obs[0, 2] = np.linspace(-1, 1, N_FEATURES)
     weights = np.zeros((1, 8))
     weights[0, 2] = 1.0
-    mix = GoalMix(which=np.arange(8)[None], weights=weights)
+    mix = InterpolationWeights(which=np.arange(8)[None], weights=weights)
     found = between.acts(obs, mix)
     np.testing.assert_array_equal(found, between.actor.acts(obs[:, 2]))
 

@@ -176,7 +176,7 @@ def test_a_bad_override_is_refused_by_name(overrides, field):
         {"learning.alpha": 0.5, "learning.n_steps": 3},
         {"networks.n_critics": 3, "networks.layers": 3},
         {"episode.goals": "halton", "people.n_people": 2},
-        {"episode.observation": "crowd", "people.n_people": 3, "people.count": "up-to"},
+        {"episode.observation": "people-set", "people.n_people": 3, "people.count": "up-to"},
     ],
 )
 def test_every_option_trains_and_moves_the_actor(option):

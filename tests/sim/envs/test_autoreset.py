@@ -63,15 +63,15 @@ def test_batch_equals_single_environments_side_by_side(
     mine = gymnasium.make_vec(env_id, N, autoreset_mode=mode, **kind)
     theirs = reference(env_id, mode, limit)
     assert mine.metadata["autoreset_mode"] is AutoresetMode(mode)
-    (obs, infos), (expected, told) = mine.reset(seed=4), theirs.reset(seed=[4] * N)
+    (obs, infos), (expected, marked) = mine.reset(seed=4), theirs.reset(seed=[4] * N)
     mine.action_space.seed(1)
     ends = 0
     for _ in range(80):
         np.testing.assert_array_equal(obs, expected)
-        assert_same_infos(infos, told)
+        assert_same_infos(infos, marked)
         act = mine.action_space.sample()
         obs, *rest, infos = mine.step(act)
-        expected, *others, told = theirs.step(act)
+        expected, *others, marked = theirs.step(act)
         for one, other in zip(rest, others, strict=True):
             np.testing.assert_array_equal(one, other)
         done = rest[1] | rest[2]
@@ -80,7 +80,7 @@ def test_batch_equals_single_environments_side_by_side(
             np.testing.assert_array_equal(obs, expected)
             obs, _ = mine.reset(options={"reset_mask": done})
             expected, _ = theirs.reset(options={"reset_mask": done.copy()})
-            infos, told = {}, {}
+            infos, marked = {}, {}
     assert ends > 2 * N
 
 

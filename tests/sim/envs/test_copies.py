@@ -31,13 +31,13 @@ COPIERS: dict[str, Copier] = {
 def stepped(env: Any, n_steps: int, seed: int = 11) -> list[Any]:
     """Everything an environment tells in some steps, resets after ends included."""
     env.action_space.seed(seed)
-    told: list[Any] = []
+    infos: list[Any] = []
     for _ in range(n_steps):
         result = env.step(env.action_space.sample())
-        told.append(result)
+        infos.append(result)
         if np.ndim(result[2]) == 0 and (result[2] or result[3]):
-            told.append(env.reset())
-    return told
+            infos.append(env.reset())
+    return infos
 
 
 def assert_same(one: Any, other: Any) -> None:

@@ -63,7 +63,7 @@ def test_single_environment_equals_its_row_of_a_batch_bit_for_bit(env_id: str) -
     assert n_episodes >= 4
 
 
-def test_masks_are_told_as_gymnasium_and_as_sb3_contrib_want_them() -> None:
+def test_masks_have_the_forms_of_gymnasium_and_sb3_contrib() -> None:
     env = SortingEnv()
     _, info = env.reset(seed=1)
     assert info["action_mask"].dtype == np.int8 and env.action_masks().dtype == np.bool_

@@ -58,11 +58,9 @@ def test_the_person_seen_is_the_one_whom_a_batch_sees() -> None:
             batch.world.people,
             state.q[e],
             state.qd[e],
-            people[index].q,
-            people[index].qd,
+            (people[index].q, people[index].qd, people[index].size),
             state.goal[e][None],
             state.time_left[e],
-            people[index].size,
         )
         assert found.shape == (1, N_FEATURES)
         np.testing.assert_allclose(found[0], obs[e], atol=1e-5)

@@ -148,10 +148,14 @@ def test_single_state_functions_do_what_the_batch_does(cell: Cell) -> None:
             )
             assert hit.kind == "none" and hit.clearance_m == state.clear[e, 0]
             seen, _ = pick.observe(
-                batch.arm, people, piece.q, piece.qd, state.people.q[e, 0],
-                state.people.qd[e, 0], state.goal[e : e + 1], state.time_left[e],
-                state.people.size[e, 0],
-            )  # fmt: skip
+                batch.arm,
+                people,
+                piece.q,
+                piece.qd,
+                (state.people.q[e, 0], state.people.qd[e, 0], state.people.size[e, 0]),
+                state.goal[e : e + 1],
+                state.time_left[e],
+            )
             np.testing.assert_array_equal(seen[0], result.obs[e])
 
 
@@ -192,7 +196,7 @@ def test_hands_are_fast_enough_to_be_a_problem(cell: Cell) -> None:
     assert speeds["hand_speed_p99_m_s"] >= 1.5
 
 
-def test_read_only_integer_and_strided_inputs_compile_nothing_anew(cell: Cell) -> None:
+def test_read_only_integer_and_strided_inputs_compile_nothing_again(cell: Cell) -> None:
     arm, people = arm_of(cell), people_of(cell)
     person = human.rest_posture(*cell.human.home)
     q, zero, goals = arm.home.copy(), np.zeros(6), cell.positions()
@@ -200,12 +204,12 @@ def test_read_only_integer_and_strided_inputs_compile_nothing_anew(cell: Cell) -
     def use() -> None:
         pick.step_robot(arm, q, zero, zero, zero[:5])
         contact(arm, people, JointPath(q, zero, zero, zero), (person[None], person[None]))
-        pick.observe(arm, people, q, zero, person, np.zeros(18), goals[::2], 10)
+        pick.observe(arm, people, q, zero, (person, np.zeros(18), None), goals[::2], 10)
         pick.tool_state(arm, q, zero, goals[0])
         human.capsules(person, cell.body, cell.floor_z)
 
     use()
-    kernels = (features.observe_rows, contact_kernel.sweep, actions.advance)
+    kernels = (features.observe_states, contact_kernel.sweep, actions.advance)
     before = [len(compiled.signatures) for compiled in kernels]
     zero, goals = np.zeros(6, dtype=np.int64), goals[:, :]
     for array in (q, person, goals):

@@ -11,27 +11,27 @@ CELL = load_cell("pick-and-place")
 
 def test_case_1_offers_a_nearer_goal_and_blocks_neither():
     shown = geometry(CELL, find_case("case-1"))
-    assert shown.way_rad["cube4"] < shown.way_rad["cube0"]
+    assert shown.joint_distance_rad["cube4"] < shown.joint_distance_rad["cube0"]
     assert shown.blocked_s == {"cube0": None, "cube4": None}
 
 
 def test_case_2_blocks_the_nearer_goal_for_good_and_leaves_the_farther_free():
     shown = geometry(CELL, find_case("case-2"))
-    assert shown.way_rad["cube1"] < shown.way_rad["cube0"]
+    assert shown.joint_distance_rad["cube1"] < shown.joint_distance_rad["cube0"]
     assert shown.blocked_s["cube1"] == pytest.approx((0.0, 5.95))
     assert shown.clearance_m["cube0"] > 0.05
 
 
 def test_case_3_blocks_the_nearer_goal_for_a_while():
     shown = geometry(CELL, find_case("case-3"))
-    assert shown.way_rad["cube1"] < shown.way_rad["cube0"]
+    assert shown.joint_distance_rad["cube1"] < shown.joint_distance_rad["cube0"]
     first, last = shown.blocked_s["cube1"]
     assert 0.5 < first < last < 2.0
 
 
 def test_case_4_crosses_the_nearer_goal_and_leaves_the_farther_free():
     shown = geometry(CELL, find_case("case-4"))
-    assert shown.way_rad["cube1"] < shown.way_rad["dock0"]
+    assert shown.joint_distance_rad["cube1"] < shown.joint_distance_rad["dock0"]
     first, _ = shown.blocked_s["cube1"]
     assert first > 0.5
     assert shown.clearance_m["dock0"] > 0.2

@@ -127,7 +127,7 @@ def test_given_goals_hold_until_the_episode_ends(cell: Cell) -> None:
     assert (batch.state.outcome == SUCCESS).all()
 
 
-def test_straight_moves_reach_every_target_where_nobody_is(cell: Cell) -> None:
+def test_straight_moves_reach_every_target_in_an_empty_cell(cell: Cell) -> None:
     batch = ReachBatch(cell, 300, 9, ReachSettings(people=()))
     batch.reset()
     for _ in range(250):

@@ -96,7 +96,7 @@ def test_an_axis_that_passes_behind_the_goal_does_not_cross():
     assert not covered(track - np.array([0.0, 0.15, 0.0]), HOME, goal).any()
 
 
-def test_recorded_people_become_cylinders_that_cover_the_way_to_the_goal():
+def test_recorded_people_become_cylinders_that_cover_the_segment():
     motion = recorded(4.0, walk=2.4, turn=0.0)
     run = cylinder_track(motion, CELL.floor_z, DT)
     assert np.linalg.norm(run[-1, :2] - run[0, :2]) == pytest.approx(2.4, abs=0.3)

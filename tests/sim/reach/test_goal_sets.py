@@ -12,11 +12,11 @@ from app.sim.reach.batch import ReachBatch, ReachSettings, stated_rules
 from app.sim.reach.goal_sets import (
     MOST_HALTON,
     N_HALTON,
-    GoalCells,
-    GridCells,
-    HaltonCells,
-    cells_of,
+    DelaunayInterpolation,
+    GridInterpolation,
+    TargetInterpolation,
     halton_targets,
+    interpolation_of,
     radical_inverse,
 )
 
@@ -25,15 +25,15 @@ HALF = 0.5 * np.array(REGION.size)
 LOW, HIGH = REGION.center - HALF, REGION.center + HALF
 
 
-def both() -> list[GoalCells]:
-    return [GridCells(REGION.targets()), HaltonCells(halton_targets(REGION))]
+def both() -> list[TargetInterpolation]:
+    return [GridInterpolation(REGION.targets()), DelaunayInterpolation(halton_targets(REGION))]
 
 
 def inside(n: int, seed: int = 3) -> np.ndarray:
     return np.random.default_rng(seed).uniform(LOW, HIGH, (n, 3))
 
 
-def mean_of(cells: GoalCells, values: np.ndarray, goals: np.ndarray) -> np.ndarray:
+def mean_of(cells: TargetInterpolation, values: np.ndarray, goals: np.ndarray) -> np.ndarray:
     mix = cells.mix(goals)
     return np.einsum("nk,nkd->nd", mix.weights, values[mix.which])
 
@@ -61,10 +61,10 @@ def test_halton_targets_are_spread_as_evenly_as_the_grid() -> None:
     goals, targets = inside(4000), halton_targets(REGION)
     assert len(targets) == N_HALTON == len(REGION.targets())
 
-    def way(points: np.ndarray) -> float:
+    def mean_distance(points: np.ndarray) -> float:
         return float(np.linalg.norm(goals[:, None] - points, axis=-1).min(axis=1).mean())
 
-    assert way(targets) < 1.05 * way(REGION.targets())
+    assert mean_distance(targets) < 1.05 * mean_distance(REGION.targets())
 
 
 @pytest.mark.parametrize("n", [7, 0, -1, MOST_HALTON + 1])
@@ -82,7 +82,7 @@ def test_a_flat_box_has_no_halton_targets() -> None:
 
 
 @pytest.mark.parametrize("cells", both())
-def test_weights_sum_to_one_and_give_the_goal_back(cells: GoalCells) -> None:
+def test_weights_sum_to_one_and_give_the_goal_back(cells: TargetInterpolation) -> None:
     goals = inside(3000)
     mix = cells.mix(goals)
     assert mix.weights.min() >= 0.0
@@ -91,7 +91,7 @@ def test_weights_sum_to_one_and_give_the_goal_back(cells: GoalCells) -> None:
 
 
 @pytest.mark.parametrize("cells", both())
-def test_at_a_target_it_has_all_the_weight(cells: GoalCells) -> None:
+def test_at_a_target_it_has_all_the_weight(cells: TargetInterpolation) -> None:
     mix = cells.mix(cells.targets)
     best = mix.weights.argmax(axis=1)
     rows = np.arange(len(cells.targets))
@@ -101,7 +101,7 @@ def test_at_a_target_it_has_all_the_weight(cells: GoalCells) -> None:
 
 
 @pytest.mark.parametrize("cells", both())
-def test_the_mean_is_continuous_across_the_box(cells: GoalCells) -> None:
+def test_the_mean_is_continuous_across_the_box(cells: TargetInterpolation) -> None:
     values = np.random.default_rng(5).uniform(-1, 1, (len(cells.targets), 6))
     for start, end in zip(inside(20, 7), inside(20, 8), strict=True):
         line = start + np.linspace(0, 1, 20_001)[:, None] * (end - start)
@@ -111,7 +111,7 @@ def test_the_mean_is_continuous_across_the_box(cells: GoalCells) -> None:
 
 
 def test_on_a_border_of_grid_cells_only_the_border_has_weight() -> None:
-    cells = GridCells(REGION.targets())
+    cells = GridInterpolation(REGION.targets())
     goals = inside(200)
     goals[:, 0] = np.unique(cells.targets[:, 0])[2]
     mix = cells.mix(goals)
@@ -120,7 +120,7 @@ def test_on_a_border_of_grid_cells_only_the_border_has_weight() -> None:
 
 
 def test_trilinear_weights_are_those_of_the_equation() -> None:
-    cells = GridCells(REGION.targets())
+    cells = GridInterpolation(REGION.targets())
     goal = np.array([[-0.5 + 0.2 * 1.25, 0.6 + 0.2 * 0.5, 0.1 + 0.2 * 1.75]])
     mix = cells.mix(goal)
     expected = {
@@ -135,7 +135,7 @@ def test_trilinear_weights_are_those_of_the_equation() -> None:
 
 
 def test_tetrahedra_are_those_of_delaunay_and_fill_the_box() -> None:
-    cells = HaltonCells(halton_targets(REGION))
+    cells = DelaunayInterpolation(halton_targets(REGION))
     known, goals = Delaunay(cells.targets), inside(2000)
     found = cells.mix(goals)
     home = known.simplices[known.find_simplex(goals)]
@@ -146,7 +146,7 @@ def test_tetrahedra_are_those_of_delaunay_and_fill_the_box() -> None:
 
 
 @pytest.mark.parametrize("cells", both())
-def test_goals_outside_are_refused_with_axis_and_distance(cells: GoalCells) -> None:
+def test_goals_outside_are_refused_with_axis_and_distance(cells: TargetInterpolation) -> None:
     with pytest.raises(GoalOutside) as caught:
         cells.mix(np.array([[0.0, 0.7, 0.3], [0.62, 0.7, 0.05]]))
     found = caught.value.problem()["outside"]
@@ -156,19 +156,19 @@ def test_goals_outside_are_refused_with_axis_and_distance(cells: GoalCells) -> N
 
 
 @pytest.mark.parametrize("cells", both())
-def test_goals_outside_by_rounding_are_taken(cells: GoalCells) -> None:
+def test_goals_outside_by_rounding_are_taken(cells: TargetInterpolation) -> None:
     np.testing.assert_allclose(cells.mix(HIGH[None] + 1e-12).weights.max(), 1.0)
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 @pytest.mark.parametrize("cells", both())
-def test_goals_that_are_no_numbers_are_refused(cells: GoalCells, bad: float) -> None:
+def test_goals_that_are_no_numbers_are_refused(cells: TargetInterpolation, bad: float) -> None:
     with pytest.raises(InvalidInput, match="must be finite"):
         cells.mix(np.array([[0.0, bad, 0.3]]))
 
 
 def test_a_flat_grid_has_cells_too() -> None:
-    flat = GridCells(
+    flat = GridInterpolation(
         GoalRegion(center=(0, 0.8, 0.3), size=(1.0, 0.4, 0.0), spacing=0.2).targets()
     )
     goals = inside(100)
@@ -180,11 +180,11 @@ def test_a_flat_grid_has_cells_too() -> None:
 
 def test_targets_that_are_no_grid_or_have_no_corners_are_refused() -> None:
     with pytest.raises(InvalidInput, match="grid"):
-        GridCells(halton_targets(REGION))
+        GridInterpolation(halton_targets(REGION))
     with pytest.raises(InvalidInput, match="corners"):
-        HaltonCells(inside(40))
+        DelaunayInterpolation(inside(40))
     with pytest.raises(InvalidInput, match="interpolate"):
-        cells_of(REGION.targets(), "box")
+        interpolation_of(REGION.targets(), "box")
 
 
 def test_halton_goals_are_drawn_uniformly_from_their_targets() -> None:

@@ -11,7 +11,7 @@ from app.sim.reach.batch import ReachBatch, ReachSettings
 from app.sim.reach.mixed_batch import MixedReachBatch
 
 CELL = load_cell("shared-workspace")
-SETTINGS = ReachSettings(observation="crowd", people=("walker",) * 3)
+SETTINGS = ReachSettings(observation="people-set", people=("walker",) * 3)
 
 
 def test_each_share_of_the_cells_is_a_batch_of_its_own():
@@ -32,6 +32,6 @@ def test_each_share_of_the_cells_is_a_batch_of_its_own():
 
 
 @pytest.mark.parametrize("people", [(), ("walker",) * 4])
-def test_nobody_or_more_parts_than_cells_is_refused(people):
+def test_no_people_or_more_parts_than_environments_are_refused(people):
     with pytest.raises(InvalidInput, match="people"):
         MixedReachBatch(CELL, 3, 1, replace(SETTINGS, people=people))

@@ -1,4 +1,4 @@
-"""Resimulations are of the same episodes, and only what cannot be done stays unsolved."""
+"""Oracle search: resimulations repeat the episodes; solvable episodes are solved."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ def still(batch: ReachBatch) -> np.ndarray:
     return np.zeros((batch.n_envs, 6), dtype=np.float32)
 
 
-def test_a_copied_episode_goes_exactly_as_the_first():
+def test_copied_episode_equals_the_original():
     first, other = batch_of(6), batch_of(4, seed=99)
     rows = np.array([5, 2, 2])
     copy_rows(first.state, rows, other.state, 1)
@@ -44,7 +44,7 @@ def test_a_copied_episode_goes_exactly_as_the_first():
     np.testing.assert_array_equal(other.state.outcome[1:], first.state.outcome[rows])
 
 
-def test_a_policy_replayed_by_itself_ends_as_it_does_without_the_search():
+def test_resimulated_policy_ends_as_without_the_search():
     batch, mover = batch_of(40), Straight()
     search = OracleSearch(batch, 1, SMALL)
     search.undisturbed(mover.acts)
@@ -52,11 +52,13 @@ def test_a_policy_replayed_by_itself_ends_as_it_does_without_the_search():
         batch.step(mover.acts(batch), auto_reset=False)
     solved = batch.state.outcome == SUCCESS
     assert 5 < solved.sum() < 40
-    np.testing.assert_array_equal(search.replays.reached > 0, solved)
-    np.testing.assert_allclose(search.replays.soonest[solved], batch.state.elapsed[solved])
+    np.testing.assert_array_equal(search.resimulations.reached > 0, solved)
+    np.testing.assert_allclose(
+        search.resimulations.soonest[solved], batch.state.elapsed[solved]
+    )
 
 
-def test_replays_solve_what_straight_moves_do_not():
+def test_resimulations_solve_what_straight_moves_do_not():
     search = OracleSearch(batch_of(40), 1, SMALL)
     search.undisturbed(Straight().acts)
     before = search.unsolved()
@@ -64,15 +66,15 @@ def test_replays_solve_what_straight_moves_do_not():
     after = search.unsolved()
     assert len(before) > 2 * len(after)
     assert set(after) <= set(before)
-    assert (search.replays.n[before] == 25).all()
-    assert (search.replays.untouched <= search.replays.n).all()
+    assert (search.resimulations.n[before] == 25).all()
+    assert (search.resimulations.untouched <= search.resimulations.n).all()
 
 
 def test_noise_and_detours_change_what_a_policy_does():
     search = OracleSearch(batch_of(20), 1, SMALL)
     search.disturbed(np.arange(20), 8, Straight().acts)
-    assert (search.replays.n == 8).all()
-    assert ((search.replays.reached > 0) & (search.replays.reached < 8)).any()
+    assert (search.resimulations.n == 8).all()
+    assert ((search.resimulations.reached > 0) & (search.resimulations.reached < 8)).any()
 
 
 def test_the_search_leaves_the_episodes_as_they_were():
@@ -115,4 +117,4 @@ def test_what_was_never_possible_is_never_solved():
     walks = future_cylinders(batch_of(300), 250)
     soonest = np.full(300, 0.5)
     never = provably_unsolvable(walks, batch.state.goal, soonest, CELL.robot.dt, 0.04, 0.08)
-    assert not (never & (search.replays.reached > 0)).any()
+    assert not (never & (search.resimulations.reached > 0)).any()

@@ -50,27 +50,27 @@ def test_observations_and_distances_are_those_of_the_batch(
     people: tuple[str, ...], view: str
 ) -> None:
     batch, n_bodies = driven(people, view), people.count("worker")
-    stage = QueryState(CELL, n_bodies, len(people) - n_bodies, view)
+    query = QueryState(CELL, n_bodies, len(people) - n_bodies, view)
     rows, state = np.arange(5), batch.state
     goals = np.random.default_rng(4).uniform(-1, 1, (5, 3, 3))
     for who in (None, *range(len(people))):
         expected = batch.observe_goals(rows, goals, who)
         for e in rows:
-            stage.put(
+            query.load(
                 Joints(state.q[e], state.qd[e], np.zeros(6)),
                 people_of(batch, e),
                 state.time_left[e],
             )
-            found = stage.observe(goals[e], who)
+            found = query.observe(goals[e], who)
             np.testing.assert_allclose(found, expected[e], atol=2e-7)
-            np.testing.assert_allclose(stage.clear, state.clear[e], atol=1e-12)
+            np.testing.assert_allclose(query.clear, state.clear[e], atol=1e-12)
     np.testing.assert_allclose(
-        stage.apart, batch.person_distances(np.array([4]))[0], atol=1e-12
+        query.distances, batch.person_distances(np.array([4]))[0], atol=1e-12
     )
 
 
 def test_what_is_not_remembered_was_as_the_oldest_that_is() -> None:
-    stage, q, goal = (
+    query, q, goal = (
         QueryState(CELL, 0, 1, "forecast"),
         np.array(CELL.robot.home_q),
         [[0, 0.8, 1.0]],
@@ -84,8 +84,8 @@ def test_what_is_not_remembered_was_as_the_oldest_that_is() -> None:
         "grew long ago": np.array([[0.25, 0.5], *[[0.2, 0.5]] * 14]),
     }.items():
         person = person_from_cylinder(0.1, 1.4, 0.3, 0.4, 0.3, 0.0, past)
-        stage.put(Joints(q, np.zeros(6), np.zeros(6)), [person], 5.0)
-        seen[name] = stage.observe(np.array(goal)).copy()
+        query.load(Joints(q, np.zeros(6), np.zeros(6)), [person], 5.0)
+        seen[name] = query.observe(np.array(goal)).copy()
     np.testing.assert_array_equal(seen["nothing"], seen["no moment"])
     np.testing.assert_array_equal(seen["nothing"], seen["always so"])
     np.testing.assert_array_equal(seen["grew"], seen["grew long ago"])
@@ -93,24 +93,24 @@ def test_what_is_not_remembered_was_as_the_oldest_that_is() -> None:
 
 
 def test_a_persons_own_size_counts() -> None:
-    stage, q = QueryState(CELL, 1, 0, "features"), np.array(CELL.robot.home_q)
+    query, q = QueryState(CELL, 1, 0, "features"), np.array(CELL.robot.home_q)
     batch = driven(("worker",), "features")
     (one,) = people_of(batch, 0)
-    stage.put(Joints(q, np.zeros(6), np.zeros(6)), [one], 5.0)
-    ordinary = stage.apart[0]
+    query.load(Joints(q, np.zeros(6), np.zeros(6)), [one], 5.0)
+    ordinary = query.distances[0]
     large = Person(q=one.q, qd=one.qd, size=CELL.body * 1.3)
-    stage.put(Joints(q, np.zeros(6), np.zeros(6)), [large], 5.0)
-    assert stage.apart[0] != ordinary
+    query.load(Joints(q, np.zeros(6), np.zeros(6)), [large], 5.0)
+    assert query.distances[0] != ordinary
 
 
 def test_shapes_are_the_people_with_the_height_of_the_cell() -> None:
-    stage = QueryState(CELL, 0, 2, "state")
+    query = QueryState(CELL, 0, 2, "state")
     people = [
         person_from_cylinder(0.1, 1.2, 0.0, 0.0, 0.3),
         person_from_cylinder(-1.0, 1.5, 0.0, 0.0, 0.4),
     ]
-    stage.put(Joints(np.array(CELL.robot.home_q), np.zeros(6), np.zeros(6)), people, 5.0)
+    query.load(Joints(np.array(CELL.robot.home_q), np.zeros(6), np.zeros(6)), people, 5.0)
     top = CELL.floor_z + CELL.cylinders[0].height
     np.testing.assert_allclose(
-        stage.shapes.cylinders, [[0.1, 1.2, 0.3, top], [-1.0, 1.5, 0.4, top]]
+        query.shapes.cylinders, [[0.1, 1.2, 0.3, top], [-1.0, 1.5, 0.4, top]]
     )

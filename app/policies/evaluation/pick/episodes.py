@@ -19,7 +19,7 @@ from app.sim.collision.fcl_recheck import Trajectory
 from app.sim.people.human_motion_config import HumanMotionConfig
 from app.sim.people.kernels.people import new_people_geometry, see_rows
 from app.sim.pick.batch import OUTCOMES, PickBatch, PickSettings
-from app.sim.pick.kernels.observation import LAYOUT, observe_batch
+from app.sim.pick.kernels.observation import LAYOUT, PickQuery, observe_batch
 from app.sim.scenario.kernels import episode as kernel
 
 Index = NDArray[np.int64]
@@ -198,9 +198,7 @@ class Evaluator:
         env, station = rows[owner], stations[owner, place]
         sight = seen(batch, rows)
         obs = np.empty((len(env), self._networks.n_obs), dtype=np.float32)
-        observe_batch(
-            batch.arm,
-            batch.world.people.floor_z,
+        states = PickQuery(
             state.q[env],
             state.qd[env],
             sight.q[owner],
@@ -208,9 +206,9 @@ class Evaluator:
             sight.size[owner],
             batch.world.stations[station],
             batch.world.station_q[station],
-            state.time_left[env],
-            obs,
         )
+        floor_z = batch.world.people.floor_z
+        observe_batch(batch.arm, floor_z, states, state.time_left[env], obs)
         act, value = self._networks.act_and_value(obs)
         actions = np.zeros((len(rows), width, act.shape[1]), dtype=np.float32)
         values = np.full((len(rows), width), -np.inf, dtype=np.float32)

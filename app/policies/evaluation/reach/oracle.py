@@ -54,7 +54,7 @@ DISTURBED = 32
 LONG = 2048
 """Scripted replays in the last round."""
 SOONEST_TRIES = 256
-"""Resimulations with nobody there, of which the soonest says when anybody could be at a target."""
+"""Resimulations in an empty cell, which give the least time to a target."""
 
 
 def started(cell: Cell, settings: ReachSettings, goals: Vec, seed: int) -> ReachBatch:
@@ -87,7 +87,7 @@ def soonest_arrivals(cell: Cell, settings: ReachSettings, goals: Vec, seed: int)
     alone.set_goals(np.arange(len(different)), different)
     search = OracleSearch(alone, seed)
     search.scripted(np.arange(len(different)), SOONEST_TRIES, at_once=True)
-    return np.asarray(search.replays.soonest[which])
+    return np.asarray(search.resimulations.soonest[which])
 
 
 class Ceiling:
@@ -107,7 +107,7 @@ class Ceiling:
     def stage(self, name: str, replay: Callable[[], None]) -> None:
         """Run a stage and tell what is solved after it."""
         replay()
-        found = self.search.replays
+        found = self.search.resimulations
         row = {
             "name": name,
             "n": self.search.n,
@@ -135,7 +135,7 @@ class Ceiling:
 
 def verdict(search: OracleSearch, never: Any, targets: Vec, goals: Vec) -> Json:
     """Return what is solvable, what never was, and what nobody knows, with intervals."""
-    n, solved = search.n, search.replays.reached > 0
+    n, solved = search.n, search.resimulations.reached > 0
     undecided = ~solved & ~never
     worst = []
     for target in targets:
@@ -149,8 +149,8 @@ def verdict(search: OracleSearch, never: Any, targets: Vec, goals: Vec) -> Json:
         "solvable": wilson(int(solved.sum()), n),
         "never": wilson(int((never & ~solved).sum()), n),
         "undecided": wilson(int(undecided.sum()), n),
-        "doomed": wilson(int((search.replays.untouched == 0).sum()), n),
-        "replays": int(search.replays.n.sum()),
+        "doomed": wilson(int((search.resimulations.untouched == 0).sum()), n),
+        "replays": int(search.resimulations.n.sum()),
         "worst_targets": worst[:5],
     }
 

@@ -75,7 +75,12 @@ from app.sim.reach.crossings import (
     crossings,
     recorded_crossings,
 )
-from app.sim.reach.monitored.batch import HORIZON_S, MonitoredEpisodes, MonitoredReachBatch
+from app.sim.reach.monitored.batch import (
+    HORIZON_S,
+    MonitoredEpisodes,
+    MonitoredReachBatch,
+    MonitoringSettings,
+)
 from app.sim.reach.monitored.planners import drive_planner, postures_of
 from app.sim.reach.oracle_search import sample_detours, toward
 from app.sim.robot.actions import ActionSettings
@@ -148,12 +153,12 @@ def course_row(name: str, runs: MonitoredEpisodes) -> Json:
         "time_untouched_s": _spread(runs.seconds[arrived & ~runs.touched_at_rest]),
         "below_half_s": _spread(runs.below_half_s),
         "stopped_s": _spread(runs.stopped_s),
-        "standing_s": _spread(runs.standing_s),
-        "held_s": _spread(runs.held_s),
+        "standing_s": _spread(runs.standstill_s),
+        "held_s": _spread(runs.standstill_stopped_s),
         "never_stopped": wilson(int((runs.stopped_s == 0.0).sum()), n),
-        "never_held": wilson(int((runs.held_s == 0.0).sum()), n),
-        "joint_way_rad": _spread(runs.joint_way[arrived]),
-        "tool_way_m": _spread(runs.tool_way[arrived]),
+        "never_held": wilson(int((runs.standstill_stopped_s == 0.0).sum()), n),
+        "joint_way_rad": _spread(runs.joint_path[arrived]),
+        "tool_way_m": _spread(runs.tool_path[arrived]),
         **contacts_of(runs),
     }
 
@@ -252,9 +257,8 @@ class Comparison:
             self.seed,
             self._settings,
             self.safety,
+            MonitoringSettings(active=guarded, rest_ends=False),
             tracks=aside if alone else self.crossed.tracks,
-            guarded=guarded,
-            rest_ends=False,
         )
         batch.reset()
         batch.set_goals(np.arange(n), self.crossed.goals)
@@ -269,8 +273,8 @@ class Comparison:
             self.seed,
             replace(self._settings, action=ActionSettings()),
             self.safety,
+            MonitoringSettings(rest_ends=False),
             tracks=one,
-            rest_ends=False,
         )
         batch.reset()
         goals = np.repeat(self.crossed.goals[number][None], n, axis=0)

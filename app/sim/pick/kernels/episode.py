@@ -1,7 +1,6 @@
-"""The pick scenario, batched: episodes, steps, ends and rewards (METHOD 3.2, 3.3), compiled.
+"""Episodes of the pick scenario: starts, steps, ends and rewards (compiled).
 
-Every environment is a row of the arrays in :class:`PickState`. An episode is fixed by (seed,
-environment, episode): target, start, the person's script and its phase; stepping draws nothing.
+Source: docs/method.md 3.2, 3.3. Stepping draws no random numbers.
 """
 
 from typing import NamedTuple
@@ -9,21 +8,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from app.sim.collision.kernels.contact import clearances
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
 from app.sim.core.kernels import rng as random
 from app.sim.geometry.capsules import copy_values
 from app.sim.people.kernels.motion import start_people
-from app.sim.people.kernels.people import (
-    People,
-    PeopleGeometry,
-    PeopleState,
-    new_people_geometry,
-    place_people,
-    see_nearest,
-)
-from app.sim.pick.kernels.observation import Obs, Sight, new_sight, observe
+from app.sim.people.kernels.people import People, place_people, see_nearest
+from app.sim.pick.kernels.observation import PickObservationWorkspace, PickQuery, observe
 from app.sim.pick.kernels.reward import RewardWeights, reward
 from app.sim.robot.kernels import kinematics
 from app.sim.robot.kernels.actions import MYOPIC, ActionRule
@@ -31,14 +22,13 @@ from app.sim.robot.kernels.arm import (
     CONTROLLED,
     Arm,
     RobotPose,
-    copy_capsules,
-    new_robot_pose,
     place_robot,
     robot_tilt,
     tcp_speed,
 )
 from app.sim.scenario.kernels.episode import (
     COLLISION,
+    MAX_CANDIDATES,
     PLAIN,
     RUNNING,
     START_TRIES,
@@ -46,28 +36,31 @@ from app.sim.scenario.kernels.episode import (
     SUCCESS_DISTANCE,
     TIMEOUT,
     UNFEASIBLE,
+    EpisodeState,
+    Indices,
+    StepWorkspace,
+    begin,
     distance_to,
+    measure,
     move,
 )
+from app.sim.scenario.kernels.person_observation import Obs
 
-Indices = NDArray[np.int64]
 N_PLAIN = 51
-"""Length of the plain observation: q, qd, the person's q, qd, target (5.8)."""
+"""Length of the raw state: q, qd, the person's q, qd, target (5.8)."""
 SUCCESS_TILT = 0.2
-"""Tool axis to the vertical [rad], thesis 5.3.1."""
+"""Largest angle of the tool axis to the vertical [rad], thesis 5.3.1."""
 SUCCESS_SPEED = 0.1
-"""tcp speed [m/s], thesis 5.3.1."""
-MAX_CANDIDATES = 3
-"""Most targets an episode offers (METHOD 3.6)."""
+"""Largest tcp speed [m/s], thesis 5.3.1."""
 
 
-class PickWorld(NamedTuple):
-    """What all environments share."""
+class PickCell(NamedTuple):
+    """Data that all environments of the pick scenario share."""
 
     stations: Vec
     """Positions of the stations, cubes first [m], shape (n_stations, 3)."""
     station_q: Vec
-    """Vertical-tool postures at the stations [rad], shape (n_stations, 6)."""
+    """Vertical-tool configurations at the stations [rad], shape (n_stations, 6)."""
     n_cubes: int
     """Number of cubes."""
     arm: Arm
@@ -77,7 +70,7 @@ class PickWorld(NamedTuple):
 
 
 class PickRules(NamedTuple):
-    """How episodes start and end."""
+    """Rules by which episodes start and end."""
 
     time_limit: float
     """Longest episode [s]."""
@@ -86,96 +79,31 @@ class PickRules(NamedTuple):
     short_share: float
     """Share of episodes that start with only ``short_limit`` left."""
     start_clearance: float
-    """Least distance of robot and person at the start [m]."""
+    """Least clearance of robot and person at the start [m]."""
     target_jitter: float
     """Half width of the box around a station from which targets are drawn [m]."""
-    way_share: float
-    """Share of episodes that start part of the way to the target."""
+    on_path_share: float
+    """Share of episodes that start between the start configuration and the target."""
     n_candidates_min: int
     """Fewest targets offered."""
     n_candidates_max: int
     """Most targets offered."""
 
 
-class PickState(NamedTuple):
-    """Rows of all environments."""
+class PickTask(NamedTuple):
+    """Rules of the episodes, action type and reward coefficients."""
 
-    q: Vec
-    """Joint positions [rad], shape (n_envs, 6)."""
-    qd: Vec
-    """Joint speeds [rad/s], shape (n_envs, 6)."""
-    qdd: Vec
-    """Joint accelerations [rad/s^2], shape (n_envs, 6)."""
-    robot: Vec
-    """The robot's capsules at this moment, shape (n_envs, 9, n)."""
-    people: PeopleState
-    """Rows of the people."""
-    goal: Vec
-    """Target being pursued [m], shape (n_envs, 3)."""
-    q_goal: Vec
-    """Posture at the target [rad], shape (n_envs, 6)."""
-    candidates: NDArray[np.int64]
-    """Stations offered, -1 where there are fewer, shape (n_envs, MAX_CANDIDATES)."""
-    time_left: Vec
-    """Time left [s], shape (n_envs,)."""
-    elapsed: Vec
-    """Time since the start [s], shape (n_envs,)."""
-    distance: Vec
-    """tcp to target [m], shape (n_envs,)."""
-    tilt: Vec
-    """Tool axis to the vertical [rad], shape (n_envs,)."""
-    episode: NDArray[np.int64]
-    """Number of the present episode, shape (n_envs,)."""
-    outcome: NDArray[np.int64]
-    """How the present episode stands (RUNNING ...), shape (n_envs,)."""
-    clear: Vec
-    """Distances to people, cell and the robot itself [m], shape (n_envs, 3)."""
-    n_redrawn: NDArray[np.int64]
-    """Starts rejected for want of clearance, shape (n_envs,)."""
-
-
-class Work(NamedTuple):
-    """Work space of one thread; made once per batch, used row after row."""
-
-    robot: RobotPose
-    """A pose of the robot."""
-    crowd: PeopleGeometry
-    """A pose of the people."""
-    sight: Sight
-    """What an observation looks at."""
-    c: Vec
-    """Second coefficients of a period [rad/s^2], shape (6,)."""
-    d: Vec
-    """Third coefficients of a period [rad/s^3], shape (6,)."""
-    q: Vec
-    """Joints at the end of a period [rad], shape (6,)."""
-    qd: Vec
-    """Joint speeds at the end of a period [rad/s], shape (6,)."""
-    qdd: Vec
-    """Joint accelerations at the end of a period [rad/s^2], shape (6,)."""
-    rng: random.State
-    """Random stream of the episode that starts, shape (1,)."""
-
-
-def new_work(world: PickWorld, state: PickState) -> Work:
-    """Return work space for a batch."""
-    people = state.people
-    return Work(
-        new_robot_pose(world.arm),
-        new_people_geometry(world.people, people.q.shape[1], people.cylinders.shape[1]),
-        new_sight(),
-        np.zeros(6),
-        np.zeros(6),
-        np.zeros(6),
-        np.zeros(6),
-        np.zeros(6),
-        np.zeros(1, dtype=np.uint64),
-    )
+    rules: PickRules
+    """Starts and ends."""
+    action: ActionRule
+    """Action type and bounds."""
+    weights: RewardWeights
+    """Reward coefficients."""
 
 
 @kernel()
-def set_goal(world: PickWorld, state: PickState, e: int, goal: Vec, robot: RobotPose) -> None:
-    """Give environment ``e`` a new target [m], shape (3,); the way to it is measured anew."""
+def set_goal(world: PickCell, state: EpisodeState, e: int, goal: Vec, robot: RobotPose) -> None:
+    """Set a new target [m], shape (3,), in environment ``e`` and measure the distance to it."""
     arm = world.arm
     for i in range(3):
         state.goal[e, i] = goal[i]
@@ -186,7 +114,7 @@ def set_goal(world: PickWorld, state: PickState, e: int, goal: Vec, robot: Robot
 
 @kernel()
 def _draw_candidates(
-    world: PickWorld, rules: PickRules, state: PickState, e: int, rng: random.State
+    world: PickCell, rules: PickRules, state: EpisodeState, e: int, rng: random.State
 ) -> None:
     n_stations = world.stations.shape[0]
     spread = rules.n_candidates_max - rules.n_candidates_min + 1
@@ -206,7 +134,7 @@ def _draw_candidates(
 
 @kernel()
 def _draw_start(
-    world: PickWorld, rules: PickRules, state: PickState, e: int, rng: random.State
+    world: PickCell, rules: PickRules, state: EpisodeState, e: int, rng: random.State
 ) -> None:
     """Draw the robot's start: home, a cube or a dock in equal shares, never a candidate."""
     n_stations = world.stations.shape[0]
@@ -224,7 +152,7 @@ def _draw_start(
         if not offered:
             copy_values(world.station_q[station], state.q[e])
             break
-    if random.uniform(rng) < rules.way_share:
+    if random.uniform(rng) < rules.on_path_share:
         u = random.uniform(rng)
         for j in range(CONTROLLED):
             state.q[e, j] += u * (state.q_goal[e, j] - state.q[e, j])
@@ -234,62 +162,55 @@ def _draw_start(
 
 @kernel(inline="always")
 def reset_env(
-    world: PickWorld,
+    world: PickCell,
     rules: PickRules,
     seed: int,
     first_env: int,
-    state: PickState,
+    state: EpisodeState,
     e: int,
-    work: Work,
+    work: StepWorkspace,
 ) -> None:
     """Start the next episode of environment ``e``."""
     rng = work.rng
     random.start_stream(seed, first_env + e, state.episode[e], rng)
     _draw_candidates(world, rules, state, e, rng)
-    goal = state.goal[e]
+    goal, arm = state.goal[e], world.arm
     copy_values(world.stations[state.candidates[e, 0]], goal)
     for i in range(3):
         goal[i] += rules.target_jitter * (2.0 * random.uniform(rng) - 1.0)
-    arm = world.arm
     kinematics.ik_vertical(arm.lengths, arm.limits, goal, state.q_goal[e])
     short = random.uniform(rng) < rules.short_share
-    state.time_left[e] = rules.short_limit if short else rules.time_limit
     for attempt in range(START_TRIES):
         _draw_start(world, rules, state, e, rng)
         place_robot(arm, state.q[e], work.robot)
         start_people(world.people, state.people, e, rng, work.crowd)
-        clear = clearances(arm, world.people, work.robot, work.crowd)
-        state.clear[e, 0], state.clear[e, 1], state.clear[e, 2] = clear
+        measure(arm, world.people, state, e, work)
         state.n_redrawn[e] = attempt
+        clear = state.clear[e]
         if clear[0] >= rules.start_clearance and min(clear[1], clear[2]) > 0.0:
             break
-    state.distance[e] = distance_to(goal, work.robot)
     state.tilt[e] = robot_tilt(work.robot)
-    copy_capsules(work.robot.columns, state.robot[e])
-    copy_capsules(work.crowd.columns, state.people.columns[e])
-    state.elapsed[e] = 0.0
-    state.outcome[e] = RUNNING
+    begin(state, e, rules.short_limit if short else rules.time_limit, work)
 
 
 @kernel()
 def succeeded(distance: float, tilt: float, speed: float) -> bool:
-    """Whether the tool is where it should be, upright and at rest (thesis 5.3.1)."""
+    """Return whether the tool is at the target, vertical and at rest (thesis 5.3.1)."""
     return distance < SUCCESS_DISTANCE and tilt < SUCCESS_TILT and speed < SUCCESS_SPEED
 
 
 @kernel(inline="always")
 def step_env(
-    world: PickWorld,
-    action: ActionRule,
-    weights: RewardWeights,
-    state: PickState,
+    world: PickCell,
+    task: PickTask,
+    state: EpisodeState,
     e: int,
     act: NDArray[np.float32],
-    work: Work,
+    work: StepWorkspace,
 ) -> float:
-    """Move environment ``e`` through one period, set its outcome, return the reward."""
+    """Step environment ``e``, set its outcome and return the reward."""
+    action, weights, robot = task.action, task.weights, work.robot
     collided, unfeasible = move(world.arm, world.people, action, state, e, act, work)
-    robot = work.robot
     d_old, tilt_old = state.distance[e], state.tilt[e]
     d, tilt = distance_to(state.goal[e], robot), robot_tilt(robot)
     state.distance[e], state.tilt[e] = d, tilt
@@ -307,111 +228,92 @@ def step_env(
     return reward(d_old, d, tilt_old, tilt, speed, collided, success, weights)
 
 
-@kernel(inline="always")
-def _write_obs(
-    world: PickWorld, state: PickState, e: int, work: Work, view: int, out: Obs
-) -> None:
-    """Write the observation of environment ``e``.
-
-    With several people the nearest one is described.
-
-    Args:
-        world: Shared data.
-        state: Rows.
-        e: Environment.
-        work: Robot and people are placed in it as they are now.
-        view: PLAIN (the state of (5.8), ``N_PLAIN`` numbers) or FEATURES.
-        out: Filled, shape (N_PLAIN,) or (N_FEATURES,).
-    """
-    crowd = work.crowd
-    see_nearest(world.people, state.people, e, work.robot.columns, crowd)
-    if view == PLAIN:
-        for j in range(6):
-            out[j], out[6 + j] = state.q[e, j], state.qd[e, j]
-        for j in range(18):
-            out[12 + j], out[30 + j] = crowd.seen_q[j], crowd.seen_qd[j]
-        for i in range(3):
-            out[48 + i] = state.goal[e, i]
-        return
-    observe(
-        world.arm,
-        world.people.floor_z,
-        state.q[e],
-        state.qd[e],
-        crowd.seen_q,
-        crowd.seen_qd,
-        crowd.seen_size,
-        state.goal[e],
-        state.q_goal[e],
-        state.time_left[e],
-        work.robot,
-        work.sight,
-        out,
-    )
-
-
 @kernel(nogil=True)
 def observe_rows(
-    world: PickWorld, state: PickState, rows: Indices, work: Work, view: int, out: Obs
+    world: PickCell,
+    state: EpisodeState,
+    envs: Indices,
+    work: StepWorkspace,
+    sight: PickObservationWorkspace,
+    view: int,
+    out: Obs,
 ) -> None:
-    """Write the observations of some environments.
+    """Write the observations of some environments; of several people the nearest is observed.
 
     Args:
         world: Shared data.
-        state: Rows.
-        rows: Which environments, shape (k,).
+        state: Environments.
+        envs: Numbers of the environments, shape (k,).
         work: Work space.
-        view: PLAIN or FEATURES.
+        sight: Work space.
+        view: PLAIN (the state of (5.8), ``N_PLAIN`` numbers) or FEATURES.
         out: Filled, shape (k, F).
     """
-    for k in range(rows.shape[0]):
-        place_robot(world.arm, state.q[rows[k]], work.robot)
-        place_people(world.people, state.people, rows[k], work.crowd)
-        _write_obs(world, state, rows[k], work, view, out[k])
+    crowd = work.crowd
+    for k in range(envs.shape[0]):
+        e, row = envs[k], out[k]
+        place_robot(world.arm, state.q[e], work.robot)
+        place_people(world.people, state.people, e, crowd)
+        see_nearest(world.people, state.people, e, work.robot.columns, crowd)
+        if view == PLAIN:
+            for j in range(6):
+                row[j], row[6 + j] = state.q[e, j], state.qd[e, j]
+            for j in range(18):
+                row[12 + j], row[30 + j] = crowd.seen_q[j], crowd.seen_qd[j]
+            for i in range(3):
+                row[48 + i] = state.goal[e, i]
+            continue
+        observed = PickQuery(
+            state.q[e],
+            state.qd[e],
+            crowd.seen_q,
+            crowd.seen_qd,
+            crowd.seen_size,
+            state.goal[e],
+            state.q_goal[e],
+        )
+        floor, left = world.people.floor_z, state.time_left[e]
+        observe(world.arm, floor, observed, left, work.robot, sight, row)
 
 
 @kernel(nogil=True)
 def reset_rows(
-    world: PickWorld,
+    world: PickCell,
     rules: PickRules,
     seed: int,
     first_env: int,
-    state: PickState,
-    rows: Indices,
-    work: Work,
+    state: EpisodeState,
+    envs: Indices,
+    work: StepWorkspace,
 ) -> None:
     """Start an episode in some environments, shape (k,)."""
-    for e in rows:
+    for e in envs:
         reset_env(world, rules, seed, first_env, state, e, work)
 
 
 @kernel(nogil=True)
 def step_batch(
-    world: PickWorld,
-    rules: PickRules,  # noqa: ARG001 - the reach scenario's needs them
-    action: ActionRule,
-    weights: RewardWeights,
-    state: PickState,
-    work: Work,
+    world: PickCell,
+    task: PickTask,
+    state: EpisodeState,
+    work: StepWorkspace,
     act: NDArray[np.float32],
     rew: NDArray[np.float32],
-    ended: NDArray[np.int64],
+    ended: Indices,
 ) -> None:
-    """Step all environments; rows that have ended stay as they are.
+    """Step all environments; environments whose episode has ended do not change.
 
     Args:
         world: Shared data.
-        rules: Not read; the kernels of both scenarios take the same arguments.
-        action: What actions mean.
-        weights: Reward coefficients.
-        state: Rows; changed.
+        task: Rules, action type and reward coefficients.
+        state: Environments; changed.
         work: Work space.
         act: Actions in [-1, 1], shape (n_envs, 5).
         rew: Filled with rewards, shape (n_envs,).
-        ended: Filled with the outcome of rows that ended now, RUNNING elsewhere.
+        ended: Filled with the outcome of episodes that ended now, RUNNING elsewhere.
     """
     for e in range(state.q.shape[0]):
         ended[e], rew[e] = RUNNING, 0.0
         if state.outcome[e] == RUNNING:
-            rew[e] = step_env(world, action, weights, state, e, act[e], work)
+            rew[e] = step_env(world, task, state, e, act[e], work)
             ended[e] = state.outcome[e]

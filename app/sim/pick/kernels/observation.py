@@ -1,37 +1,26 @@
-"""Features of the pick scenario: what the networks see of robot, person and target, compiled.
+"""Observation of the pick scenario: state of robot, person and target as features (compiled).
 
-Normalised to a few units, relative to target and person, with a straight-line base motion,
-nearest distances of four link groups, and clearances extrapolated at constant velocity. All
-follow from the state that a caller can send (METHOD 3.3: q, qd of robot and person, target) and
-the time left; no hidden history. ``LAYOUT`` names every slice. The person's size is in them
-through where hands, elbows and capsules are; with BODY_SIZES it is told outright (METHOD 4).
+The features are normalised and relative to target and person. They contain the joint move of
+the base controller, the distances of four groups of links to the person, and clearances
+extrapolated at constant velocity. All follow from the state (docs/method.md 3.3: q, qd of robot
+and person, target) and the time left; there is no hidden history. ``LAYOUT`` gives the slice of
+each group. The person's body dimensions affect positions and clearances; ``BODY_SIZES`` adds
+them explicitly (docs/method.md 4).
 
-Source: (5.8) for the raw state. Deviates: features are added to it, since raw state learned far
-more slowly (1 % against 90 % after 2.7 k updates in trials beside the walking cylinder).
+Source: (5.8) for the raw state. Deviates: features are added, because the raw state learned far
+more slowly (1 % against 90 % after 2.7 k updates in trials beside the pedestrian).
 """
 
 import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
 from app.sim.core.observation_layout import slices_of
-from app.sim.geometry.capsules import (
-    INVERSE,
-    RADIUS,
-    UU,
-    UX,
-    UY,
-    UZ,
-    X,
-    nearest_parts,
-    new_columns,
-    padded_size,
-)
-from app.sim.geometry.segments import FAR, FAST, segment_nearest
+from app.sim.geometry.capsules import nearest_parts, new_columns, padded_size
+from app.sim.geometry.segments import FAR, segment_nearest
 from app.sim.human.kernels import kinematics as body
 from app.sim.robot.kernels import kinematics
 from app.sim.robot.kernels.arm import (
@@ -43,19 +32,23 @@ from app.sim.robot.kernels.arm import (
     place_robot,
     robot_tilt,
 )
+from app.sim.scenario.kernels.person_observation import (
+    BASE_GAIN,
+    HORIZONS,
+    TICK,
+    Obs,
+    PersonWorkspace,
+    extrapolate_capsules,
+    new_person_workspace,
+    place_person,
+)
 
-Obs = NDArray[np.float32]
-
-HORIZONS = (0.25, 0.5, 1.0)
-"""Times ahead at which clearances are extrapolated [s]."""
-BASE_GAIN = 3.0
-"""Speed of the straight joint move per radian left [1/s]; it brakes within limits."""
 TIME_SCALE = 10.0
-"""Time left is given in units of this [s]."""
+"""Unit of the time left [s]."""
 DISTANCE_SCALE = 0.5
-"""Distances are given in units of this and cut at three units [m]."""
+"""Unit of distances [m]; they are clipped at three units."""
 FARTHEST = 3.0 * DISTANCE_SCALE
-"""Clearances are looked at up to here [m]."""
+"""Distance at which clearances are clipped [m]."""
 
 SIZES = (
     ("q", 5),
@@ -84,11 +77,23 @@ LAYOUT = slices_of(SIZES)
 N_FEATURES = sum(size for _, size in SIZES)
 """Length of the observation."""
 BODY_SIZES = (*SIZES, ("body", body.N_SIZE))
-"""The same with the person's size, for a policy that sees it."""
+"""Groups of the observation that includes the person's body dimensions."""
 N_WITH_BODY = N_FEATURES + body.N_SIZE
 """Length of that observation."""
 BASE_START = LAYOUT["base"].start
-"""Where the base motion starts, for the residual action."""
+"""Index of the base motion, for the residual action."""
+(ARMS, MOTION, SCALARS, NEAREST, STILL_AHEAD, BASE_AHEAD, AT_GOAL_AHEAD) = (
+    LAYOUT[name].start
+    for name in (
+        "hands_and_elbows",
+        "goal_posture_minus_q",
+        "distance_tilt_clearance_time",
+        "nearest_by_group",
+        "look_ahead_still",
+        "look_ahead_base",
+        "goal_clearance",
+    )
+)
 
 COARSE_LINK = np.array([2, 3, 4, 5, 6], dtype=np.int64)
 COARSE_P0 = np.array(
@@ -108,19 +113,77 @@ COARSE_FIRST = (0, 1, 2, 4, 5)
 """First coarse capsule of each of the four link groups, and their number."""
 N_COARSE = 5
 STILL, ALONG_BASE, AT_GOAL = 0, N_COARSE, 2 * N_COARSE
-"""First lane of three postures looked at together: now, along the base motion, at the goal."""
+"""First lane of three robot configurations that are evaluated together: now, along the base
+motion, at the goal."""
 N_LANES = padded_size(3 * N_COARSE)
 FIRST_PART, LAST_PART = body.C_ABDOMEN, body.C_HAND_L
-"""Human capsules the features look at: what stands above the table."""
-TICK = 1e-3
-"""Time by which the person is moved on to find how fast the capsules move [s]."""
+"""Human capsules used by the features: those above the table."""
+
+
+class PickQuery(NamedTuple):
+    """A state of robot, person and target; or n states, with a leading axis of n."""
+
+    q: Vec
+    """Joint positions [rad], shape (6,)."""
+    qd: Vec
+    """Joint speeds [rad/s], shape (6,)."""
+    human_q: Vec
+    """The person's joint positions [m, rad], shape (18,)."""
+    human_qd: Vec
+    """The person's joint speeds [m/s, rad/s], shape (18,)."""
+    size: Vec
+    """The person's body dimensions [m], shape (body.N_SIZE,)."""
+    goal: Vec
+    """Target of the tcp [m], shape (3,)."""
+    q_goal: Vec
+    """Vertical-tool configuration at the target [rad], shape (6,)."""
+
+
+class PickObservationWorkspace(NamedTuple):
+    """Work space of one observation."""
+
+    person: PersonWorkspace
+    """The observed person, now and extrapolated."""
+    lanes: Vec
+    """Coarse capsules of the robot in three configurations, shape (9, N_LANES)."""
+    gap: Vec
+    """Distance of each lane to the person [m], shape (N_LANES,)."""
+    part: Vec
+    """The person's capsule nearest to each lane, shape (N_LANES,)."""
+    rot: Vec
+    """R_world_link of another configuration, shape (7, 3, 3)."""
+    pos: Vec
+    """Origins of its links [m], shape (7, 3)."""
+    q: Vec
+    """Its joints [rad], shape (6,)."""
+    base: Vec
+    """The base motion, shape (6,)."""
+    gap_vector: Vec
+    """From robot to person [m], shape (3,)."""
+
+
+def new_pick_observation_workspace() -> PickObservationWorkspace:
+    """Return work space for one observation at a time."""
+    return PickObservationWorkspace(
+        person=new_person_workspace(),
+        lanes=new_columns(
+            N_LANES, np.tile(COARSE_RADIUS, 3), np.tile((COARSE_SPAN**2).sum(axis=1), 3)
+        ),
+        gap=np.zeros(N_LANES),
+        part=np.zeros(N_LANES),
+        rot=np.zeros((7, 3, 3)),
+        pos=np.zeros((7, 3)),
+        q=np.zeros(6),
+        base=np.zeros(6),
+        gap_vector=np.zeros(3),
+    )
 
 
 @kernel(inline="always")
 def base_motion(arm: Arm, q: Vec, q_goal: Vec, out: Vec) -> float:
-    """Write the straight joint move toward a posture as normalised speeds in [-1, 1].
+    """Write the straight joint move toward a configuration as normalised speeds in [-1, 1].
 
-    All controlled joints arrive together; the speed falls with the way left.
+    All controlled joints arrive together; the speed falls with the remaining difference.
 
     Returns:
         The greatest joint difference [rad].
@@ -138,116 +201,19 @@ def base_motion(arm: Arm, q: Vec, q_goal: Vec, out: Vec) -> float:
     return widest
 
 
-class Sight(NamedTuple):
-    """Work space of one observation; made once, filled again and again."""
-
-    trig: Vec
-    """Sines, cosines and more, shape (3, 16)."""
-    points: Vec
-    """The person's points now [m], shape (N_POINTS, 3)."""
-    points_later: Vec
-    """The same one ``TICK`` later [m], shape (N_POINTS, 3)."""
-    frames: Vec
-    """The person's orientations, shape (N_FRAMES, 3, 3)."""
-    now: Vec
-    """The person's capsules now, shape (9, 16)."""
-    later: Vec
-    """The same one ``TICK`` later, shape (9, 16)."""
-    moved: Vec
-    """The same at a time ahead, at constant velocity, shape (9, 16)."""
-    lanes: Vec
-    """Coarse capsules of the robot in three postures, shape (9, N_LANES)."""
-    gap: Vec
-    """Distance of each of them to the person [m], shape (N_LANES,)."""
-    part: Vec
-    """The person's capsule nearest to each, shape (N_LANES,)."""
-    rot: Vec
-    """R_world_link of a posture looked at, shape (7, 3, 3)."""
-    pos: Vec
-    """Origins of its links [m], shape (7, 3)."""
-    q: Vec
-    """Joints of a posture looked at [rad], shape (6,)."""
-    base: Vec
-    """The base motion, shape (6,)."""
-    human_q: Vec
-    """The person's joints a tick later [m, rad], shape (18,)."""
-    gap_vector: Vec
-    """From robot to person [m], shape (3,)."""
-
-
-def new_sight() -> Sight:
-    """Return work space, nothing seen yet."""
-    person = body.capsule_columns(1)
-    lanes = new_columns(
-        N_LANES, np.tile(COARSE_RADIUS, 3), np.tile((COARSE_SPAN**2).sum(axis=1), 3)
-    )
-    return Sight(
-        trig=np.zeros((3, 16)),
-        points=np.zeros((body.N_POINTS, 3)),
-        points_later=np.zeros((body.N_POINTS, 3)),
-        frames=np.zeros((body.N_FRAMES, 3, 3)),
-        now=person.copy(),
-        later=person.copy(),
-        moved=person.copy(),
-        lanes=lanes,
-        gap=np.zeros(N_LANES),
-        part=np.zeros(N_LANES),
-        rot=np.zeros((7, 3, 3)),
-        pos=np.zeros((7, 3)),
-        q=np.zeros(6),
-        base=np.zeros(6),
-        human_q=np.zeros(18),
-        gap_vector=np.zeros(3),
-    )
-
-
 @kernel(inline="always")
-def see_person(floor_z: float, human_q: Vec, human_qd: Vec, size: Vec, sight: Sight) -> None:
-    """Fill the person's part of ``sight``: points and capsules, now and a tick later."""
-    for j in range(18):
-        sight.human_q[j] = human_q[j] + TICK * human_qd[j]
-    body.points_and_frames(sight.human_q, size, sight.trig, sight.points_later, sight.frames)
-    body.capsules(sight.points_later, sight.frames, size, floor_z, 0, sight.later)
-    body.points_and_frames(human_q, size, sight.trig, sight.points, sight.frames)
-    body.capsules(sight.points, sight.frames, size, floor_z, 0, sight.now)
-
-
-@kernel(error_model="numpy", fastmath=FAST)
-def look_ahead(now: Vec, later: Vec, ahead: float, moved: Vec) -> None:
-    """Move capsules on at constant velocity.
-
-    Args:
-        now: Capsules as columns, shape (9, n).
-        later: The same one ``TICK`` later, shape (9, n).
-        ahead: Time ahead [s].
-        moved: Filled, shape (9, n).
-    """
-    part = ahead / TICK
-    for row in range(X, UU):
-        for k in range(now.shape[1]):
-            moved[row, k] = now[row, k] + part * (later[row, k] - now[row, k])
-    for k in range(now.shape[1]):
-        ux, uy, uz = moved[UX, k], moved[UY, k], moved[UZ, k]
-        square = ux * ux + uy * uy + uz * uz
-        moved[UU, k], moved[RADIUS, k] = square, now[RADIUS, k]
-        moved[INVERSE, k] = 1.0 / (square if square > 1e-12 else 1e30)
-
-
-@kernel(inline="always")
-def _place_lanes(arm: Arm, q: Vec, first: int, sight: Sight) -> None:
+def _place_lanes(arm: Arm, q: Vec, first: int, work: PickObservationWorkspace) -> None:
     """Place the robot's coarse capsules at ``q`` [rad], shape (6,), from lane ``first`` on."""
-    kinematics.link_poses(arm.lengths, q, sight.rot, sight.pos)
-    place_capsules(
-        sight.rot, sight.pos, COARSE_LINK, COARSE_P0, COARSE_SPAN, first, sight.lanes
-    )
+    kinematics.link_poses(arm.lengths, q, work.rot, work.pos)
+    place_capsules(work.rot, work.pos, COARSE_LINK, COARSE_P0, COARSE_SPAN, first, work.lanes)
 
 
 @kernel(inline="always")
-def _lane_clearance(first: int, sight: Sight) -> float:
-    """Return the clearance of one posture's lanes, in units of the scale."""
+def _lane_clearance(first: int, work: PickObservationWorkspace) -> float:
+    """Return the clearance of one configuration's lanes, in units of the scale."""
     best = FARTHEST
     for k in range(first, first + N_COARSE):
-        best = min(best, sight.gap[k])
+        best = min(best, work.gap[k])
     return best / DISTANCE_SCALE
 
 
@@ -257,7 +223,8 @@ def _scaled(d: float) -> float:
 
 
 @kernel(inline="always")
-def _put_joints(arm: Arm, q: Vec, qd: Vec, human_q: Vec, human_qd: Vec, out: Obs) -> int:
+def _write_joints(arm: Arm, state: PickQuery, out: Obs) -> None:
+    q, qd, human_q = state.q, state.qd, state.human_q
     for j in range(CONTROLLED):
         out[j] = q[j] / math.pi
         out[5 + j] = qd[j] / arm.limits.qd_max[j]
@@ -265,14 +232,13 @@ def _put_joints(arm: Arm, q: Vec, qd: Vec, human_q: Vec, human_qd: Vec, out: Obs
         out[15 + j] = math.cos(q[j])
     for j in range(18):
         out[20 + j] = human_q[j]
-        out[38 + j] = 0.5 * human_qd[j]
+        out[38 + j] = 0.5 * state.human_qd[j]
     out[21] = human_q[1] - 1.25
     out[22] = (human_q[2] + 1.5 * math.pi) % (2.0 * math.pi) - math.pi
-    return 56
 
 
 @kernel(inline="always")
-def _put_tool(qd: Vec, goal: Vec, robot: RobotPose, out: Obs) -> int:
+def _write_tool(qd: Vec, goal: Vec, robot: RobotPose, out: Obs) -> None:
     jacobian, tcp = robot.jacobian, robot.tcp
     kinematics.tcp_jacobian(robot.rot, robot.pos, tcp, jacobian)
     for i in range(3):
@@ -283,12 +249,11 @@ def _put_tool(qd: Vec, goal: Vec, robot: RobotPose, out: Obs) -> int:
         out[59 + i] = 2.0 * (goal[i] - tcp[i])
         out[62 + i] = 2.0 * speed
         out[65 + i] = robot.rot[6, i, 1]
-    return 68
 
 
 @kernel(inline="always")
-def _put_arms(sight: Sight, robot: RobotPose, goal: Vec, out: Obs) -> int:
-    k, now, later, pos, tcp = 68, sight.points, sight.points_later, robot.pos, robot.tcp
+def _write_human_arms(person: PersonWorkspace, robot: RobotPose, goal: Vec, out: Obs) -> None:
+    k, now, later, pos, tcp = ARMS, person.points, person.points_later, robot.pos, robot.tcp
     for point in (body.HAND_R, body.HAND_L, body.ELBOW_R, body.ELBOW_L):
         for i in range(3):
             out[k + i] = now[point, i] - tcp[i]
@@ -299,23 +264,23 @@ def _put_arms(sight: Sight, robot: RobotPose, goal: Vec, out: Obs) -> int:
         for i in range(3):
             out[k + i] = (later[point, i] - now[point, i]) / TICK
         k += 3
-    return k
 
 
 @kernel(inline="always")
-def _put_nearest(sight: Sight, k: int, out: Obs) -> float:
+def _write_nearest(work: PickObservationWorkspace, k: int, out: Obs) -> float:
     """Write distance and direction of the nearest human part per link group.
 
     Returns:
         The least distance [m].
     """
-    overall, gap, vector = FAR, sight.gap, sight.gap_vector
+    overall, gap, vector = FAR, work.gap, work.gap_vector
     for group in range(4):
         lane = COARSE_FIRST[group]
         for c in range(COARSE_FIRST[group] + 1, COARSE_FIRST[group + 1]):
             if gap[c] < gap[lane]:
                 lane = c
-        length = segment_nearest(sight.lanes, lane, sight.now, int(sight.part[lane]), vector)
+        part = int(work.part[lane])
+        length = segment_nearest(work.lanes, lane, work.person.now, part, vector)
         out[k + 4 * group] = _scaled(gap[lane])
         for i in range(3):
             out[k + 4 * group + 1 + i] = vector[i] / (length + 1e-9)
@@ -327,16 +292,10 @@ def _put_nearest(sight: Sight, k: int, out: Obs) -> float:
 def observe(
     arm: Arm,
     floor_z: float,
-    q: Vec,
-    qd: Vec,
-    human_q: Vec,
-    human_qd: Vec,
-    size: Vec,
-    goal: Vec,
-    q_goal: Vec,
+    state: PickQuery,
     time_left: float,
     robot: RobotPose,
-    sight: Sight,
+    work: PickObservationWorkspace,
     out: Obs,
 ) -> None:
     """Write the observation of one state, one person and one target.
@@ -344,110 +303,85 @@ def observe(
     Args:
         arm: Robot in its cell.
         floor_z: Height of the floor [m].
-        q: Joint positions [rad], shape (6,).
-        qd: Joint speeds [rad/s], shape (6,).
-        human_q: The person's joint positions [m, rad], shape (18,).
-        human_qd: The person's joint speeds [m/s, rad/s], shape (18,).
-        size: The person's size [m], shape (body.N_SIZE,).
-        goal: Where the tcp shall be [m], shape (3,).
-        q_goal: Vertical-tool posture at the goal [rad], shape (6,).
-        time_left: Time left to reach it [s].
-        robot: The robot, placed at ``q``.
-        sight: Work space.
+        state: The state.
+        time_left: Time left to reach the target [s].
+        robot: The robot, placed at ``state.q``.
+        work: Work space.
         out: Filled, shape (N_FEATURES,) or (N_WITH_BODY,).
     """
     if out.shape[0] > N_FEATURES:
         for i in range(body.N_SIZE):
-            out[N_FEATURES + i] = size[i]
-    see_person(floor_z, human_q, human_qd, size, sight)
-    _put_joints(arm, q, qd, human_q, human_qd, out)
-    _put_tool(qd, goal, robot, out)
-    k = _put_arms(sight, robot, goal, out)
-    base, tcp = sight.base, robot.tcp
+            out[N_FEATURES + i] = state.size[i]
+    q, goal, q_goal, person = state.q, state.goal, state.q_goal, work.person
+    place_person(floor_z, state.human_q, state.human_qd, state.size, person)
+    _write_joints(arm, state, out)
+    _write_tool(state.qd, goal, robot, out)
+    _write_human_arms(person, robot, goal, out)
+    base, tcp = work.base, robot.tcp
     base_motion(arm, q, q_goal, base)
     for j in range(CONTROLLED):
-        out[k + j] = q_goal[j] - q[j]
-        out[k + 5 + j] = base[j]
-    k += 10
-    out[k] = 2.0 * math.sqrt(
+        out[MOTION + j] = q_goal[j] - q[j]
+        out[BASE_START + j] = base[j]
+    out[SCALARS] = 2.0 * math.sqrt(
         (goal[0] - tcp[0]) ** 2 + (goal[1] - tcp[1]) ** 2 + (goal[2] - tcp[2]) ** 2
     )
-    out[k + 1] = robot_tilt(robot)
-    out[k + 3] = time_left / TIME_SCALE
-    place_capsules(
-        robot.rot, robot.pos, COARSE_LINK, COARSE_P0, COARSE_SPAN, STILL, sight.lanes
-    )
-    _place_lanes(arm, q_goal, AT_GOAL, sight)
-    nearest_parts(sight.lanes, sight.now, FIRST_PART, LAST_PART, sight.gap, sight.part)
-    out[k + 2] = _scaled(_put_nearest(sight, k + 4, out))
-    k += 20
-    out[k + 6] = _lane_clearance(AT_GOAL, sight)
-    sight.q[5] = q[5]
+    out[SCALARS + 1] = robot_tilt(robot)
+    out[SCALARS + 3] = time_left / TIME_SCALE
+    place_capsules(robot.rot, robot.pos, COARSE_LINK, COARSE_P0, COARSE_SPAN, STILL, work.lanes)
+    _place_lanes(arm, q_goal, AT_GOAL, work)
+    nearest_parts(work.lanes, person.now, FIRST_PART, LAST_PART, work.gap, work.part)
+    out[SCALARS + 2] = _scaled(_write_nearest(work, NEAREST, out))
+    out[AT_GOAL_AHEAD] = _lane_clearance(AT_GOAL, work)
+    work.q[5] = q[5]
     for i in range(3):
         for j in range(CONTROLLED):
-            way = base[j] * arm.limits.qd_max[j] * HORIZONS[i]
+            step = base[j] * arm.limits.qd_max[j] * HORIZONS[i]
             limit = abs(q_goal[j] - q[j])
-            sight.q[j] = q[j] + min(limit, max(-limit, way))
-        _place_lanes(arm, sight.q, ALONG_BASE, sight)
-        look_ahead(sight.now, sight.later, HORIZONS[i], sight.moved)
-        nearest_parts(sight.lanes, sight.moved, FIRST_PART, LAST_PART, sight.gap, sight.part)
-        out[k + i] = _lane_clearance(STILL, sight)
-        out[k + 3 + i] = _lane_clearance(ALONG_BASE, sight)
-        out[k + 7 + i] = _lane_clearance(AT_GOAL, sight)
+            work.q[j] = q[j] + min(limit, max(-limit, step))
+        _place_lanes(arm, work.q, ALONG_BASE, work)
+        extrapolate_capsules(person.now, person.later, HORIZONS[i], person.moved)
+        nearest_parts(work.lanes, person.moved, FIRST_PART, LAST_PART, work.gap, work.part)
+        out[STILL_AHEAD + i] = _lane_clearance(STILL, work)
+        out[BASE_AHEAD + i] = _lane_clearance(ALONG_BASE, work)
+        out[AT_GOAL_AHEAD + 1 + i] = _lane_clearance(AT_GOAL, work)
 
 
 @kernel()
-def observe_rows(
+def observe_states(
     arm: Arm,
     floor_z: float,
-    q: Vec,
-    qd: Vec,
-    human_q: Vec,
-    human_qd: Vec,
-    sizes: Vec,
-    goals: Vec,
-    q_goals: Vec,
+    states: PickQuery,
     time_left: Vec,
     robot: RobotPose,
-    sight: Sight,
+    work: PickObservationWorkspace,
     out: Obs,
 ) -> None:
-    """Apply :func:`observe` to n rows; ``robot`` and ``sight`` are work space."""
-    for i in range(q.shape[0]):
-        place_robot(arm, q[i], robot)
-        observe(
-            arm,
-            floor_z,
-            q[i],
-            qd[i],
-            human_q[i],
-            human_qd[i],
-            sizes[i],
-            goals[i],
-            q_goals[i],
-            time_left[i],
-            robot,
-            sight,
-            out[i],
+    """Apply :func:`observe` to n states; ``robot`` and ``work`` are work space."""
+    for i in range(states.q.shape[0]):
+        place_robot(arm, states.q[i], robot)
+        state = PickQuery(
+            states.q[i],
+            states.qd[i],
+            states.human_q[i],
+            states.human_qd[i],
+            states.size[i],
+            states.goal[i],
+            states.q_goal[i],
         )
+        observe(arm, floor_z, state, time_left[i], robot, work, out[i])
 
 
 def observe_batch(
-    arm: Arm,
-    floor_z: float,
-    q: Vec,
-    qd: Vec,
-    human_q: Vec,
-    human_qd: Vec,
-    sizes: Vec,
-    goals: Vec,
-    q_goals: Vec,
-    time_left: Vec,
-    out: Obs,
+    arm: Arm, floor_z: float, states: PickQuery, time_left: Vec, out: Obs
 ) -> None:
-    """Apply :func:`observe` to n rows; all arguments but two have a leading axis of n."""
-    robot, sight = new_robot_pose(arm), new_sight()
-    observe_rows(
-        arm, floor_z, q, qd, human_q, human_qd, sizes, goals, q_goals, time_left, robot, sight,
-        out,
-    )  # fmt: skip
+    """Apply :func:`observe` to n states.
+
+    Args:
+        arm: Robot in its cell.
+        floor_z: Height of the floor [m].
+        states: The states, arrays of shape (n, ...).
+        time_left: Time left in each [s], shape (n,).
+        out: Filled, shape (n, N_FEATURES) or (n, N_WITH_BODY).
+    """
+    work = new_pick_observation_workspace()
+    observe_states(arm, floor_z, states, time_left, new_robot_pose(arm), work, out)

@@ -1,7 +1,7 @@
-"""Reward of the pick scenario as named terms (METHOD 3.3), compiled.
+"""Reward of the pick scenario (docs/method.md 3.3, compiled).
 
 ``r = c_d (d_old - gamma d) + c_th (th_old - gamma th) - c_c [collision] - c_step - c_v
-|v_tcp| [d <= d_v] + c_s [success]``; ``gamma`` is 1 where undiscounted progress is wanted.
+|v_tcp| [d <= d_v] + c_s [success]``; ``gamma`` is 1 for undiscounted progress.
 
 Deviates: (5.11) prints ``d - d_old`` and table 5.1 prints ``c_c`` and ``c_v`` as -1, which
 would reward moving away and colliding; the text asks for the signs used here.
@@ -10,10 +10,11 @@ would reward moving away and colliding; the text asks for the signs used here.
 from typing import NamedTuple
 
 from app.sim.core.jit import kernel
+from app.sim.scenario.kernels.episode import progress
 
 
 class RewardWeights(NamedTuple):
-    """Coefficients of the terms; a preset gives them."""
+    """Coefficients of the reward terms; a preset sets them."""
 
     c_d: float
     """Progress toward the target [1/m]."""
@@ -22,21 +23,15 @@ class RewardWeights(NamedTuple):
     c_c: float
     """Cost of a collision."""
     c_step: float
-    """Cost of a control period."""
+    """Cost of a control cycle."""
     c_v: float
     """Cost of tcp speed near the target [s/m]."""
     d_v: float
-    """Distance within which tcp speed costs [m]."""
+    """Distance within which tcp speed is penalised [m]."""
     c_s: float
-    """Bonus of a success."""
+    """Bonus for success."""
     gamma: float
     """Discount of the progress terms."""
-
-
-@kernel()
-def progress(old: float, new: float, coefficient: float, gamma: float) -> float:
-    """Return the reward for coming closer: positive when ``new`` is less than ``old``."""
-    return coefficient * (old - gamma * new)
 
 
 @kernel()
@@ -56,7 +51,7 @@ def reward(
     succeeded: bool,
     weights: RewardWeights,
 ) -> float:
-    """Return the sum of all terms for one period.
+    """Return the reward of one control cycle.
 
     Args:
         d_old: Distance to the target before [m].
@@ -64,7 +59,7 @@ def reward(
         tilt_old: Angle of the tool to the vertical before [rad].
         tilt: Angle of the tool to the vertical after [rad].
         speed: Speed of the tcp after [m/s].
-        collided: Whether the period ended in a collision.
+        collided: Whether the cycle ended in a collision.
         succeeded: Whether it ended in success.
         weights: Coefficients.
     """

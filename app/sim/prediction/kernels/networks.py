@@ -1,10 +1,9 @@
-"""What a walker's radius and way will be, from how they went so far, compiled.
+"""Motion predictor: radius and path length of a pedestrian from its recent motion (compiled).
 
-Radius and speed change by sums of sines (``pedestrian.py``) whose constants nobody is told, but
-who has watched for a second and a half can tell how they go on. Two small networks say that:
-one from the radii remembered, one from the speeds. They know nothing of where a person turns.
+Two small networks predict the next 1.28 s: one the radius from the radii of the last 1.5 s, the
+other the path length from the speeds. They do not predict changes of direction.
 
-The networks are made by ``tools.train_motion_predictor``; ``app/sim/prediction/weights.py``
+``tools/train_motion_predictor.py`` trains the networks; ``app/sim/prediction/weights.py``
 loads them.
 """
 
@@ -19,15 +18,16 @@ from app.sim.geometry.segments import FAST
 from app.sim.people.kernels.pedestrian import N_PAST
 
 STEP_S = 0.04
-"""Time between two forecasts [s]."""
+"""Time between two predictions [s]."""
 N_TIMES = 32
-"""Number of times ahead; the first is one step from now."""
+"""Number of predictions; the first is one step from now."""
 N_IN = N_PAST + 3
-"""Inputs: the value now, its rate, the age of the newest moment remembered, and all of them."""
+"""Inputs of a network: present value, its rate, age of the newest remembered value, and the
+remembered values."""
 RADIUS_MIDDLE, RADIUS_SCALE = 0.35, 0.15
-"""Radii are given to the network less the one and in units of the other [m]."""
+"""Offset and unit of radii in the network's inputs and outputs [m]."""
 SPEED_MIDDLE, SPEED_SCALE = 0.65, 0.35
-"""The same for speeds [m/s]."""
+"""Offset and unit of speeds [m/s]."""
 RATE_SCALE = 1.0
 """Unit of the rate of the radius [m/s]."""
 AGE_SCALE = 0.1
@@ -37,7 +37,7 @@ Floats = NDArray[np.float32]
 
 
 class Network(NamedTuple):
-    """Two hidden layers of rectified units."""
+    """Network with two hidden layers of rectified linear units."""
 
     w1: Floats
     """(n_in, width)."""
@@ -53,33 +53,33 @@ class Network(NamedTuple):
     """(n_out,)."""
 
 
-class Forecaster(NamedTuple):
-    """Networks and work space; used by one thread at a time."""
+class MotionPredictor(NamedTuple):
+    """Networks and work space; for one thread."""
 
     radius: Network
-    """Says how the radius will differ from now, in units of RADIUS_SCALE."""
-    way: Network
-    """Says how the way will differ from that at constant speed, in units of SPEED_SCALE times
-    the time ahead."""
-    seen: Floats
-    """Work space, shape (N_IN,)."""
-    first: Floats
-    """Work space, shape (width,)."""
-    second: Floats
-    """Work space, shape (width,)."""
-    said: Floats
-    """Work space, shape (N_TIMES,)."""
+    """Predicts the change of the radius, in units of RADIUS_SCALE."""
+    path: Network
+    """Predicts the deviation of the mean speed from the present one, in units of
+    SPEED_SCALE."""
+    x: Floats
+    """Input, shape (N_IN,)."""
+    h1: Floats
+    """First hidden layer, shape (width,)."""
+    h2: Floats
+    """Second hidden layer, shape (width,)."""
+    y: Floats
+    """Output, shape (N_TIMES,)."""
 
 
 @kernel(fastmath=FAST)
 def layer(x: Floats, w: Floats, b: Floats, rectified: bool, out: Floats) -> None:
-    """Write one layer of a network.
+    """Write the output of one layer.
 
     Args:
         x: Inputs, shape (n,).
         w: Weights, shape (n, width).
         b: Biases, shape (width,).
-        rectified: Whether outputs below 0 become 0.
+        rectified: Whether negative outputs become 0.
         out: Filled, shape (width,).
     """
     for j in range(out.shape[0]):
@@ -95,15 +95,15 @@ def layer(x: Floats, w: Floats, b: Floats, rectified: bool, out: Floats) -> None
 
 
 @kernel()
-def _ask(net: Network, with_: Forecaster) -> None:
-    """Fill ``with_.said`` from ``with_.seen``."""
-    layer(with_.seen, net.w1, net.b1, True, with_.first)
-    layer(with_.first, net.w2, net.b2, True, with_.second)
-    layer(with_.second, net.w3, net.b3, False, with_.said)
+def _evaluate(net: Network, predictor: MotionPredictor) -> None:
+    """Fill ``predictor.y`` from ``predictor.x``."""
+    layer(predictor.x, net.w1, net.b1, True, predictor.h1)
+    layer(predictor.h1, net.w2, net.b2, True, predictor.h2)
+    layer(predictor.h2, net.w3, net.b3, False, predictor.y)
 
 
 @kernel(inline="always")
-def see_past(
+def write_predictor_input(
     now: float,
     rate: float,
     age: float,
@@ -112,15 +112,15 @@ def see_past(
     scale: float,
     out: Floats,
 ) -> None:
-    """Write what a network sees, shape (N_IN,)."""
+    """Write the input of a network, shape (N_IN,)."""
     out[0], out[1], out[2] = (now - middle) / scale, rate / RATE_SCALE, age / AGE_SCALE
     for k in range(N_PAST):
         out[3 + k] = (past[k] - middle) / scale
 
 
 @kernel()
-def forecast(
-    with_: Forecaster,
+def predict_pedestrian(
+    predictor: MotionPredictor,
     r: float,
     growth: float,
     speed: float,
@@ -129,23 +129,24 @@ def forecast(
     speeds: Vec,
     out: Vec,
 ) -> None:
-    """Write how a walker goes on.
+    """Predict radius and path length of a pedestrian.
 
     Args:
-        with_: Networks and work space.
-        r: Radius now [m].
-        growth: Its change [m/s].
-        speed: Speed now [m/s].
-        age: How long ago the newest moment remembered was [s].
-        radii: Radii remembered [m], the newest first, shape (N_PAST,).
-        speeds: Speeds remembered [m/s], shape (N_PAST,).
-        out: Filled with radius and way at each time ahead [m], shape (N_TIMES, 2).
+        predictor: Networks and work space.
+        r: Present radius [m].
+        growth: Rate of the radius [m/s].
+        speed: Present speed [m/s].
+        age: Age of the newest remembered value [s].
+        radii: Remembered radii [m], the newest first, shape (N_PAST,).
+        speeds: Remembered speeds [m/s], shape (N_PAST,).
+        out: Filled with radius and path length at each time [m], shape (N_TIMES, 2).
     """
-    see_past(r, growth, age, radii, RADIUS_MIDDLE, RADIUS_SCALE, with_.seen)
-    _ask(with_.radius, with_)
+    x, y = predictor.x, predictor.y
+    write_predictor_input(r, growth, age, radii, RADIUS_MIDDLE, RADIUS_SCALE, x)
+    _evaluate(predictor.radius, predictor)
     for i in range(N_TIMES):
-        out[i, 0] = r + RADIUS_SCALE * with_.said[i]
-    see_past(speed, 0.0, age, speeds, SPEED_MIDDLE, SPEED_SCALE, with_.seen)
-    _ask(with_.way, with_)
+        out[i, 0] = r + RADIUS_SCALE * y[i]
+    write_predictor_input(speed, 0.0, age, speeds, SPEED_MIDDLE, SPEED_SCALE, x)
+    _evaluate(predictor.path, predictor)
     for i in range(N_TIMES):
-        out[i, 1] = max(0.0, STEP_S * (i + 1) * (speed + SPEED_SCALE * with_.said[i]))
+        out[i, 1] = max(0.0, STEP_S * (i + 1) * (speed + SPEED_SCALE * y[i]))

@@ -1,7 +1,8 @@
-"""Where walkers will be: their own motion run ahead on a copy, compiled.
+"""True future of pedestrians, as privileged observation of a critic (compiled).
 
-A walker does not react to the robot and draws from its own stream, so that a copy of its state
-walks exactly as it will. Policies never see this; critics may, while they learn.
+A pedestrian does not react to the robot and draws from its own random stream, so a copy of its
+state walks exactly as the pedestrian will. Policies never observe this; an asymmetric critic
+may during training.
 """
 
 from app.sim.core.arrays import Vec
@@ -19,20 +20,20 @@ from app.sim.people.kernels.pedestrian import (
 AHEAD_S = (0.25, 0.5, 1.0, 2.0)
 """Times ahead [s]."""
 N_AHEAD = 3 * len(AHEAD_S)
-"""Numbers per walker: x and y relative to now [m] and radius [m] at each time."""
+"""Numbers per pedestrian: x and y relative to now [m] and radius [m] at each time."""
 
 
 @kernel(nogil=True)
-def look_ahead_of_walkers(
+def write_privileged_future(
     rules: PedestrianRules, state: PedestrianState, copy: PedestrianState, dt: float, out: Vec
 ) -> None:
-    """Write where all walkers will be.
+    """Write the future places of all pedestrians.
 
     Args:
-        rules: How the walkers walk.
-        state: The walkers as they are; left alone.
+        rules: Motion of the pedestrians.
+        state: The pedestrians; not changed.
         copy: Work space of the same shapes.
-        dt: Control period [s].
+        dt: Control cycle [s].
         out: Filled, shape (n_envs, W * N_AHEAD).
     """
     for e in range(state.rows.shape[0]):

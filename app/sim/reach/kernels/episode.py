@@ -1,8 +1,7 @@
-"""The reach scenario, batched: episodes, steps, ends and rewards (METHOD 2.1-2.3), compiled.
+"""Episodes of the reach scenario: starts, steps, ends and rewards (compiled).
 
-Every environment is a row of the arrays in :class:`ReachState`. An episode is fixed by (seed,
-environment, episode): goal, people and their whole motion; stepping draws only from a walker's
-own stream.
+Source: docs/method.md 2.1-2.3. Stepping draws random numbers only from a pedestrian's own
+stream.
 """
 
 from typing import NamedTuple
@@ -10,44 +9,36 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from app.sim.collision.kernels.contact import clearances
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
 from app.sim.core.kernels import rng as random
 from app.sim.geometry.capsules import copy_values
 from app.sim.people.kernels.motion import start_people
-from app.sim.people.kernels.people import (
-    People,
-    PeopleGeometry,
-    PeopleState,
-    new_people_geometry,
-    people_clearance,
-)
-from app.sim.prediction.kernels.networks import Forecaster
-from app.sim.reach.kernels.observation import ReachSight, new_reach_sight
-from app.sim.reach.kernels.option_features import Ways, new_ways
+from app.sim.people.kernels.people import People, people_clearance
 from app.sim.reach.kernels.reward import ReachWeights, reward
 from app.sim.robot.kernels.actions import MYOPIC, ActionRule
-from app.sim.robot.kernels.arm import Arm, RobotPose, copy_capsules, new_robot_pose, place_robot
+from app.sim.robot.kernels.arm import Arm, RobotPose, place_robot
 from app.sim.scenario.kernels.episode import (
     COLLISION,
+    NO_TARGET,
     RUNNING,
     START_TRIES,
     SUCCESS,
     SUCCESS_DISTANCE,
     TIMEOUT,
     UNFEASIBLE,
+    EpisodeState,
+    Indices,
+    StepWorkspace,
+    begin,
     distance_to,
+    measure,
     move,
 )
 
-Indices = NDArray[np.int64]
-NO_TARGET = -1
-"""Number of a goal that is none of the targets."""
 
-
-class ReachWorld(NamedTuple):
-    """What all environments share."""
+class ReachCell(NamedTuple):
+    """Data that all environments of the reach scenario share."""
 
     targets: Vec
     """Goals to draw from [m], shape (n_targets, 3)."""
@@ -62,98 +53,34 @@ class ReachWorld(NamedTuple):
 
 
 class ReachRules(NamedTuple):
-    """How episodes start and end."""
+    """Rules by which episodes start and end."""
 
     time_limit: float
     """Longest episode [s]."""
     start_clearance: float
-    """Least distance of robot and people at the start [m]."""
+    """Least clearance of robot and people at the start [m]."""
     anywhere: bool
-    """Whether goals are drawn from the whole box, not from the targets."""
+    """Whether goals are drawn from the whole box instead of the targets."""
     collision_ends: bool
     """Whether a collision ends the episode at once."""
 
 
-class ReachState(NamedTuple):
-    """Rows of all environments."""
+class ReachTask(NamedTuple):
+    """Rules of the episodes, action type and reward coefficients."""
 
-    q: Vec
-    """Joint positions [rad], shape (n_envs, 6)."""
-    qd: Vec
-    """Joint speeds [rad/s], shape (n_envs, 6)."""
-    qdd: Vec
-    """Joint accelerations [rad/s^2], shape (n_envs, 6)."""
-    robot: Vec
-    """The robot's capsules at this moment, shape (n_envs, 9, n)."""
-    people: PeopleState
-    """Rows of the people."""
-    goal: Vec
-    """Where the tcp shall be [m], shape (n_envs, 3)."""
-    target: NDArray[np.int64]
-    """Number of the goal among the targets, NO_TARGET where it is none, shape (n_envs,)."""
-    time_left: Vec
-    """Time left [s], shape (n_envs,)."""
-    elapsed: Vec
-    """Time since the start [s], shape (n_envs,)."""
-    distance: Vec
-    """tcp to goal [m], shape (n_envs,)."""
-    touched: NDArray[np.int64]
-    """Periods with a collision in the present episode, shape (n_envs,)."""
-    episode: NDArray[np.int64]
-    """Number of the present episode, shape (n_envs,)."""
-    outcome: NDArray[np.int64]
-    """How the present episode stands (RUNNING ...), shape (n_envs,)."""
-    clear: Vec
-    """Distances to people, cell and the robot itself [m], shape (n_envs, 3)."""
-    n_redrawn: NDArray[np.int64]
-    """Starts rejected for want of clearance, shape (n_envs,)."""
-
-
-class Work(NamedTuple):
-    """Work space of one thread; made once per batch, used row after row."""
-
-    robot: RobotPose
-    """A pose of the robot."""
-    crowd: PeopleGeometry
-    """A pose of the people."""
-    sight: ReachSight
-    """What an observation looks at."""
-    ways: Ways
-    """What comes of every way."""
-    c: Vec
-    """Second coefficients of a period [rad/s^2], shape (6,)."""
-    d: Vec
-    """Third coefficients of a period [rad/s^3], shape (6,)."""
-    q: Vec
-    """Joints at the end of a period [rad], shape (6,)."""
-    qd: Vec
-    """Joint speeds at the end of a period [rad/s], shape (6,)."""
-    qdd: Vec
-    """Joint accelerations at the end of a period [rad/s^2], shape (6,)."""
-    rng: random.State
-    """Random stream of the episode that starts, shape (1,)."""
-
-
-def new_work(world: ReachWorld, state: ReachState, forecaster: Forecaster) -> Work:
-    """Return work space for a batch."""
-    people = state.people
-    return Work(
-        new_robot_pose(world.arm),
-        new_people_geometry(world.people, people.q.shape[1], people.cylinders.shape[1]),
-        new_reach_sight(world.arm),
-        new_ways(world.arm, forecaster),
-        np.zeros(6),
-        np.zeros(6),
-        np.zeros(6),
-        np.zeros(6),
-        np.zeros(6),
-        np.zeros(1, dtype=np.uint64),
-    )
+    rules: ReachRules
+    """Starts and ends."""
+    action: ActionRule
+    """Action type and bounds."""
+    weights: ReachWeights
+    """Reward coefficients."""
 
 
 @kernel()
-def set_goal(world: ReachWorld, state: ReachState, e: int, goal: Vec, robot: RobotPose) -> None:
-    """Give environment ``e`` a new goal [m], shape (3,); the way to it is measured anew."""
+def set_goal(
+    world: ReachCell, state: EpisodeState, e: int, goal: Vec, robot: RobotPose
+) -> None:
+    """Set a new goal [m], shape (3,), in environment ``e`` and measure the distance to it."""
     for i in range(3):
         state.goal[e, i] = goal[i]
     state.target[e] = NO_TARGET
@@ -163,7 +90,7 @@ def set_goal(world: ReachWorld, state: ReachState, e: int, goal: Vec, robot: Rob
 
 @kernel()
 def _draw_goal(
-    world: ReachWorld, rules: ReachRules, state: ReachState, e: int, rng: random.State
+    world: ReachCell, rules: ReachRules, state: EpisodeState, e: int, rng: random.State
 ) -> None:
     if rules.anywhere:
         state.target[e] = NO_TARGET
@@ -177,13 +104,13 @@ def _draw_goal(
 
 @kernel(inline="always")
 def reset_env(
-    world: ReachWorld,
+    world: ReachCell,
     rules: ReachRules,
     seed: int,
     first_env: int,
-    state: ReachState,
+    state: EpisodeState,
     e: int,
-    work: Work,
+    work: StepWorkspace,
 ) -> None:
     """Start the next episode of environment ``e``: the robot at home, at rest."""
     rng, arm = work.rng, world.arm
@@ -198,26 +125,21 @@ def reset_env(
         clear = people_clearance(world.people, work.robot.columns, work.crowd)
         if clear >= rules.start_clearance:
             break
-    found = clearances(arm, world.people, work.robot, work.crowd)
-    state.clear[e, 0], state.clear[e, 1], state.clear[e, 2] = found
-    state.distance[e] = distance_to(state.goal[e], work.robot)
-    copy_capsules(work.robot.columns, state.robot[e])
-    copy_capsules(work.crowd.columns, state.people.columns[e])
-    state.time_left[e], state.elapsed[e] = rules.time_limit, 0.0
-    state.touched[e], state.outcome[e] = 0, RUNNING
+    measure(arm, world.people, state, e, work)
+    begin(state, e, rules.time_limit, work)
 
 
 @kernel()
 def outcome_of(
     collided: bool, touched: bool, near: bool, unfeasible: bool, time_left: float, ends: bool
 ) -> int:
-    """Return how an episode stands after a period.
+    """Return the outcome of an episode after a control cycle.
 
     Args:
-        collided: Whether there was a collision in this period.
-        touched: Whether there was one in the episode up to now; it is no success then.
+        collided: Whether there was a collision in this cycle.
+        touched: Whether there was a collision in the episode so far, which excludes success.
         near: Whether the tcp is within ``SUCCESS_DISTANCE`` of the goal.
-        unfeasible: Whether the one-step bounds left nothing to do.
+        unfeasible: Whether the one-step bounds left no admissible coefficient.
         time_left: Time left [s].
         ends: Whether a collision ends the episode at once.
     """
@@ -235,22 +157,20 @@ def outcome_of(
 
 @kernel(inline="always")
 def step_env(
-    world: ReachWorld,
-    rules: ReachRules,
-    action: ActionRule,
-    weights: ReachWeights,
-    state: ReachState,
+    world: ReachCell,
+    task: ReachTask,
+    state: EpisodeState,
     e: int,
     act: NDArray[np.float32],
-    work: Work,
+    work: StepWorkspace,
 ) -> float:
-    """Move environment ``e`` through one period, set its outcome, return the reward."""
-    collided, unfeasible = move(world.arm, world.people, action, state, e, act, work)
+    """Step environment ``e``, set its outcome and return the reward."""
+    arm, action, ends = world.arm, task.action, task.rules.collision_ends
+    collided, unfeasible = move(arm, world.people, action, state, e, act, work)
     if collided:
         state.touched[e] += 1
-        if not rules.collision_ends:
-            clear = clearances(world.arm, world.people, work.robot, work.crowd)
-            state.clear[e, 0], state.clear[e, 1], state.clear[e, 2] = clear
+        if not ends:
+            measure(arm, world.people, state, e, work)
     d_old, d = state.distance[e], distance_to(state.goal[e], work.robot)
     state.distance[e] = d
     state.outcome[e] = outcome_of(
@@ -259,53 +179,49 @@ def step_env(
         d < SUCCESS_DISTANCE,
         unfeasible and action.bounds == MYOPIC,
         state.time_left[e],
-        rules.collision_ends,
+        ends,
     )
-    return reward(d_old, d, work.c, collided, state.outcome[e] == SUCCESS, weights)
+    return reward(d_old, d, work.c, collided, state.outcome[e] == SUCCESS, task.weights)
 
 
 @kernel(nogil=True)
 def reset_rows(
-    world: ReachWorld,
+    world: ReachCell,
     rules: ReachRules,
     seed: int,
     first_env: int,
-    state: ReachState,
-    rows: Indices,
-    work: Work,
+    state: EpisodeState,
+    envs: Indices,
+    work: StepWorkspace,
 ) -> None:
     """Start an episode in some environments, shape (k,)."""
-    for e in rows:
+    for e in envs:
         reset_env(world, rules, seed, first_env, state, e, work)
 
 
 @kernel(nogil=True)
 def step_batch(
-    world: ReachWorld,
-    rules: ReachRules,
-    action: ActionRule,
-    weights: ReachWeights,
-    state: ReachState,
-    work: Work,
+    world: ReachCell,
+    task: ReachTask,
+    state: EpisodeState,
+    work: StepWorkspace,
     act: NDArray[np.float32],
     rew: NDArray[np.float32],
-    ended: NDArray[np.int64],
+    ended: Indices,
 ) -> None:
-    """Step all environments; rows that have ended stay as they are.
+    """Step all environments; environments whose episode has ended do not change.
 
     Args:
         world: Shared data.
-        rules: Starts and ends.
-        action: What actions mean.
-        weights: Reward coefficients.
-        state: Rows; changed.
+        task: Rules, action type and reward coefficients.
+        state: Environments; changed.
         work: Work space.
         act: Actions in [-1, 1], shape (n_envs, 6).
         rew: Filled with rewards, shape (n_envs,).
-        ended: Filled with the outcome of rows that ended now, RUNNING elsewhere.
+        ended: Filled with the outcome of episodes that ended now, RUNNING elsewhere.
     """
     for e in range(state.q.shape[0]):
         ended[e], rew[e] = RUNNING, 0.0
         if state.outcome[e] == RUNNING:
-            rew[e] = step_env(world, rules, action, weights, state, e, act[e], work)
+            rew[e] = step_env(world, task, state, e, act[e], work)
             ended[e] = state.outcome[e]

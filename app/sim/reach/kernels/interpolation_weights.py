@@ -1,11 +1,11 @@
-"""Which training targets a goal lies between, and with what weights, compiled.
+"""Interpolation weights of a goal between training targets (compiled).
 
-In a grid a goal lies in a box of eight targets: trilinear weights. Among scattered targets it
-lies in a tetrahedron of four: barycentric weights. Both sum to one, are continuous over the
-borders of cells, and at a target are exactly one for it and zero for the others.
+A goal inside a grid lies in a box of eight targets (trilinear weights), among scattered targets
+in a tetrahedron of four (barycentric weights). Both kinds of weights sum to one and are
+continuous across boxes; at a target its own weight is exactly one.
 
-Source: (4.29). Deviates: it divides ``p`` by the grid's spacing only where it stands as
-``1 - p/l``, so that its weights do not sum to one (METHOD 2.4).
+Source: (4.29). Deviates: the source divides ``p`` by the grid's spacing only in ``1 - p/l``, so
+that its weights do not sum to one (docs/method.md 2.4).
 """
 
 import numpy as np
@@ -17,16 +17,16 @@ from app.sim.core.jit import kernel
 Indices = NDArray[np.int64]
 
 N_BOX = 8
-"""Corners of a grid's cell."""
+"""Corners of a box of the grid."""
 N_SIMPLEX = 4
 """Corners of a tetrahedron."""
 _ROUNDING = 1e-12
-"""Barycentric weights below this are taken for zero."""
+"""Barycentric weights below this become zero."""
 
 
 @kernel(error_model="numpy")
 def _place(axis: Vec, value: float) -> tuple[int, int, float]:
-    """Return the grid's planes below and above a coordinate, and how far it is between them."""
+    """Return the grid planes below and above a coordinate and its fraction between them."""
     n = axis.shape[0]
     if n < 2:
         return 0, 0, 0.0
@@ -39,12 +39,12 @@ def _place(axis: Vec, value: float) -> tuple[int, int, float]:
 
 @kernel(error_model="numpy")
 def box_weights(x: Vec, y: Vec, z: Vec, goals: Vec, which: Indices, weights: Vec) -> None:
-    """Write the corners of each goal's cell and their trilinear weights.
+    """Write the corners of each goal's box and their trilinear weights.
 
     Args:
         x: Grid planes [m], ascending, shape (n_x,).
         y: See x.
-        z: See x; targets are numbered with z running fastest, then y.
+        z: See x; targets are numbered with z varying fastest, then y.
         goals: Inside the grid [m], shape (n, 3).
         which: Filled with the numbers of targets, shape (n, N_BOX).
         weights: Filled, shape (n, N_BOX).
@@ -68,7 +68,7 @@ def box_weights(x: Vec, y: Vec, z: Vec, goals: Vec, which: Indices, weights: Vec
 
 @kernel(error_model="numpy")
 def _barycentric(inverse: Vec, last: Vec, goal: Vec, out: Vec) -> float:
-    """Write a goal's barycentric coordinates in a tetrahedron; return the least of them."""
+    """Write a goal's barycentric coordinates in a tetrahedron; return the least one."""
     x, y, z = goal[0] - last[0], goal[1] - last[1], goal[2] - last[2]
     rest, least = 1.0, 1.0
     for i in range(3):

@@ -1,8 +1,7 @@
-"""What policies see of the reach scenario, for its goals or others, compiled.
+"""Observations of the reach scenario, for the goals of the episodes or others (compiled).
 
-Several people are seen as they are, or one of them alone. A policy between training targets is
-asked for several goals of one state, and beside several people once for each of them. What the
-goal does not change, the poses and what is seen of the people, is worked out once per state.
+Policies that interpolate between training targets are queried for several goals of one state,
+and beside several people once per person. Poses and people are evaluated once per state.
 """
 
 from app.sim.core.arrays import Vec
@@ -14,30 +13,33 @@ from app.sim.people.kernels.people import (
     person_clearance,
     place_people,
 )
-from app.sim.reach.kernels.episode import Indices, ReachState, ReachWorld, Work
+from app.sim.reach.kernels.episode import ReachCell
 from app.sim.reach.kernels.observation import (
-    EVERYBODY,
+    ALL_PEOPLE,
     N_FEATURES,
-    Obs,
-    clearances_ahead,
-    describe,
-    put_state,
-    show_person,
+    extrapolate_clearances,
+    write_features,
+    write_person,
+    write_raw_state,
 )
+from app.sim.reach.kernels.observation_workspace import ReachObservationWorkspace, ReachQuery
 from app.sim.reach.kernels.option_features import (
     N_OPTION_FEATURES,
-    foresee,
-    look_aside,
-    put_ways,
+    predict_motion,
+    predict_option_clearances,
+    write_option_features,
 )
-from app.sim.reach.kernels.people_set import put_crowd
+from app.sim.reach.kernels.people_set import write_people_set
 from app.sim.robot.kernels.arm import place_robot
-from app.sim.scenario.kernels.episode import CROWD, FORECAST, PLAIN
+from app.sim.scenario.kernels.episode import FORECAST, PEOPLE_SET, PLAIN, EpisodeState, Indices
+from app.sim.scenario.kernels.person_observation import Obs
 
 
 @kernel(inline="always")
-def _place(world: ReachWorld, state: ReachState, e: int, work: Work) -> None:
-    """Place robot and people of environment ``e``, and fill the workers' distances."""
+def place(
+    world: ReachCell, state: EpisodeState, e: int, work: ReachObservationWorkspace
+) -> None:
+    """Place robot and people of environment ``e``, and fill the distances of workers."""
     place_robot(world.arm, state.q[e], work.robot)
     place_people(world.people, state.people, e, work.crowd)
     if state.people.q.shape[1] > 0:
@@ -45,107 +47,101 @@ def _place(world: ReachWorld, state: ReachState, e: int, work: Work) -> None:
 
 
 @kernel(inline="always")
-def _look(
-    world: ReachWorld, state: ReachState, e: int, work: Work, view: int, who: int
+def _observe_people(
+    world: ReachCell,
+    state: EpisodeState,
+    e: int,
+    work: ReachObservationWorkspace,
+    view: int,
+    which: int,
 ) -> float:
-    """Fill what is seen of the people of environment ``e``; return their distance [m]."""
-    _place(world, state, e, work)
-    robot, crowd, sight = work.robot, work.crowd, work.sight
-    seen, clearance = who, state.clear[e, 0]
-    if who == EVERYBODY:
+    """Fill the people of environment ``e`` in ``work``; return their clearance [m]."""
+    place(world, state, e, work)
+    robot, crowd = work.robot, work.crowd
+    seen, clearance = which, state.clear[e, 0]
+    if which == ALL_PEOPLE:
         seen = nearest_person(world.people, robot.columns, crowd)
     elif crowd.q.shape[0] + crowd.cylinders.shape[0] > 1:
-        clearance = person_clearance(world.people, robot.columns, crowd, who)
-    show_person(state.people, e, seen, crowd, sight.seen)
+        clearance = person_clearance(world.people, robot.columns, crowd, which)
+    write_person(state.people, e, seen, crowd, work.seen)
     if view != PLAIN:
-        clearances_ahead(world.people, state.people, e, who, robot.columns, sight)
+        extrapolate_clearances(world.people, state.people, e, which, work)
     if view >= FORECAST:
-        foresee(state.people, e, who, seen, crowd, work.ways)
-        look_aside(world.arm, world.people.top_z, state.q[e], state.qd[e], work.ways)
+        predict_motion(state.people, e, which, seen, work)
+        top = world.people.top_z
+        predict_option_clearances(world.arm, top, state.q[e], state.qd[e], work)
     return float(clearance)
-
-
-@kernel(inline="always")
-def _write(
-    world: ReachWorld,
-    state: ReachState,
-    e: int,
-    work: Work,
-    view: int,
-    clearance: float,
-    goal: Vec,
-    out: Obs,
-) -> None:
-    """Write what was looked at as the observation for one goal [m], shape (3,)."""
-    q, qd, sight = state.q[e], state.qd[e], work.sight
-    if view == PLAIN:
-        put_state(q, qd, sight.seen, goal, out)
-        return
-    time_left = state.time_left[e]
-    top = world.people.top_z
-    describe(world.arm, top, q, qd, goal, clearance, time_left, work.robot, sight, out)
-    if view >= FORECAST:
-        put_ways(
-            world.arm, top, q, qd, sight.seen, goal, work.robot, sight.prospect, work.ways,
-            N_FEATURES, out,
-        )  # fmt: skip
-    if view == CROWD:
-        put_crowd(top, goal, work.robot, work.ways, N_FEATURES + N_OPTION_FEATURES, out)
 
 
 @kernel(nogil=True)
 def observe_rows(
-    world: ReachWorld,
-    state: ReachState,
-    rows: Indices,
-    work: Work,
+    world: ReachCell,
+    state: EpisodeState,
+    envs: Indices,
+    work: ReachObservationWorkspace,
     view: int,
-    who: int,
+    which: int,
     goals: Vec,
     out: Obs,
 ) -> None:
-    """Write the observations of some environments, each for its own goals.
+    """Write the observations of some environments, each for several goals.
 
     Args:
         world: Shared data.
-        state: Rows.
-        rows: Which environments, shape (k,).
+        state: Environments.
+        envs: Numbers of the environments, shape (k,).
         work: Work space.
-        view: PLAIN (4.30), FEATURES, FORECAST or CROWD.
-        who: EVERYBODY as ordinarily, the nearest seen and all counted; or the one person who
-            is there alone.
-        goals: Where each tcp shall be [m], shape (k, n, 3).
+        view: PLAIN (4.30), FEATURES, FORECAST or PEOPLE_SET.
+        which: ALL_PEOPLE (the nearest is observed and all count), or the number of the one
+            person that is present.
+        goals: Goals of the tcp [m], shape (k, n, 3).
         out: Filled, shape (k, n, F).
     """
-    for k in range(rows.shape[0]):
-        e = rows[k]
-        clearance = _look(world, state, e, work, view, who)
+    arm, top = world.arm, world.people.top_z
+    for k in range(envs.shape[0]):
+        e = envs[k]
+        clearance = _observe_people(world, state, e, work, view, which)
         for i in range(goals.shape[1]):
-            _write(world, state, e, work, view, clearance, goals[k, i], out[k, i])
+            query, row = ReachQuery(state.q[e], state.qd[e], goals[k, i]), out[k, i]
+            if view == PLAIN:
+                write_raw_state(query, work.seen, row)
+                continue
+            write_features(arm, top, query, clearance, state.time_left[e], work, row)
+            if view >= FORECAST:
+                write_option_features(arm, top, query, work, N_FEATURES, row)
+            if view == PEOPLE_SET:
+                start = N_FEATURES + N_OPTION_FEATURES
+                write_people_set(top, goals[k, i], work, start, row)
 
 
 @kernel(nogil=True)
-def measure_rows(world: ReachWorld, state: ReachState, rows: Indices, work: Work) -> None:
-    """Measure the distance of robot and people in some environments, shape (k,), anew."""
-    for e in rows:
-        _place(world, state, e, work)
+def measure_rows(
+    world: ReachCell, state: EpisodeState, envs: Indices, work: ReachObservationWorkspace
+) -> None:
+    """Store the clearance of robot and people in some environments, shape (k,)."""
+    for e in envs:
+        place(world, state, e, work)
         state.clear[e, 0] = people_clearance(world.people, work.robot.columns, work.crowd)
 
 
 @kernel(nogil=True)
 def distances_of_rows(
-    world: ReachWorld, state: ReachState, rows: Indices, work: Work, out: Vec
+    world: ReachCell,
+    state: EpisodeState,
+    envs: Indices,
+    work: ReachObservationWorkspace,
+    out: Vec,
 ) -> None:
-    """Write the distances of robot and people of some environments.
+    """Write the distance of the robot to each person in some environments.
 
     Args:
         world: Shared data.
-        state: Rows.
-        rows: Which environments, shape (k,).
+        state: Environments.
+        envs: Numbers of the environments, shape (k,).
         work: Work space.
-        out: Filled [m], workers first, then walkers, shape (k, n_people).
+        out: Filled [m], workers first, then pedestrians, shape (k, n_people).
     """
-    for k in range(rows.shape[0]):
-        _place(world, state, rows[k], work)
-        for who in range(out.shape[1]):
-            out[k, who] = person_clearance(world.people, work.robot.columns, work.crowd, who)
+    for k in range(envs.shape[0]):
+        place(world, state, envs[k], work)
+        for p in range(out.shape[1]):
+            out[k, p] = person_clearance(world.people, work.robot.columns, work.crowd, p)

@@ -1,9 +1,8 @@
 """Planners in place of a policy, under the same safety layer and limits (docs/method.md 2.6).
 
 One :class:`~app.sim.planning.replanning.ReplanningExecutor` drives each environment of a
-:class:`~app.sim.reach.monitored.batch.MonitoredReachBatch` to configurations of any tilt whose tcp
-lies within
-the success distance of the goal: planners may choose whatever a policy may choose.
+:class:`~app.sim.reach.monitored.batch.MonitoredReachBatch` to configurations of any tilt whose
+tcp lies within the success distance of the goal, as a policy may.
 """
 
 from collections.abc import Sequence

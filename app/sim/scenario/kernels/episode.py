@@ -1,14 +1,19 @@
-"""What episodes of both scenarios share: how they stand, and one period of robot and people."""
+"""State and step that the pick and reach scenarios share (compiled).
+
+Each environment is a row of the arrays in :class:`EpisodeState`. An episode is determined by
+(seed, environment, episode): target, start and the people's motion.
+"""
 
 import math
-from typing import Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from app.sim.collision.kernels.contact import NO_CONTACT, PeriodMotion, sweep
+from app.sim.collision.kernels.contact import NO_CONTACT, PeriodMotion, clearances, sweep
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
+from app.sim.core.kernels import rng as random
 from app.sim.geometry.capsules import copy_rows
 from app.sim.human.kernels.kinematics import PELVIS_Z
 from app.sim.people.kernels.motion import advance_people
@@ -16,122 +21,212 @@ from app.sim.people.kernels.people import (
     People,
     PeopleGeometry,
     PeopleState,
+    new_people_geometry,
     place_people,
     store_clearances,
 )
 from app.sim.robot.kernels.actions import ActionRule, Coefficients, advance
-from app.sim.robot.kernels.arm import Arm, RobotPose, copy_capsules, place_robot
+from app.sim.robot.kernels.arm import Arm, RobotPose, copy_capsules, new_robot_pose, place_robot
 from app.sim.robot.kernels.joints import JointPath, JointState
 
+Indices = NDArray[np.int64]
+
 RUNNING, SUCCESS, COLLISION, TIMEOUT, UNFEASIBLE = range(5)
-"""How an episode stands."""
-PLAIN, FEATURES, FORECAST, CROWD = range(4)
-"""What observations hold: the source's plain state, that and features, those and what is
-forecast, or all that and everybody as a set."""
+"""Outcomes of an episode."""
+PLAIN, FEATURES, FORECAST, PEOPLE_SET = range(4)
+"""Contents of observations: the source's raw state; the raw state and features; those and the
+option features; all that and the people as a set."""
 SUCCESS_DISTANCE = 0.1
 """tcp to target [m], thesis 4.3 and 5.3.1."""
 START_TRIES = 200
 """Starts drawn before the last one is taken whatever its clearance."""
+MAX_CANDIDATES = 3
+"""Most targets that an episode of the pick scenario offers (docs/method.md 3.6)."""
+NO_TARGET = -1
+"""Number of a goal that is not one of the targets."""
 
 
-class Rows(Protocol):
-    """The rows of a scenario that a period moves on; ``PickState`` says what they hold."""
+class EpisodeState(NamedTuple):
+    """State of all environments of a scenario."""
 
-    @property
-    def q(self) -> Vec: ...  # noqa: D102
-    @property
-    def qd(self) -> Vec: ...  # noqa: D102
-    @property
-    def qdd(self) -> Vec: ...  # noqa: D102
-    @property
-    def robot(self) -> Vec: ...  # noqa: D102
-    @property
-    def people(self) -> PeopleState: ...  # noqa: D102
-    @property
-    def clear(self) -> Vec: ...  # noqa: D102
-    @property
-    def elapsed(self) -> Vec: ...  # noqa: D102
-    @property
-    def time_left(self) -> Vec: ...  # noqa: D102
+    q: Vec
+    """Joint positions [rad], shape (n_envs, 6)."""
+    qd: Vec
+    """Joint speeds [rad/s], shape (n_envs, 6)."""
+    qdd: Vec
+    """Joint accelerations [rad/s^2], shape (n_envs, 6)."""
+    robot: Vec
+    """The robot's capsules at this moment, shape (n_envs, 9, n)."""
+    people: PeopleState
+    """State of the people."""
+    goal: Vec
+    """Target of the tcp [m], shape (n_envs, 3)."""
+    target: Indices
+    """Reach: number of the goal among the targets, or NO_TARGET, shape (n_envs,)."""
+    q_goal: Vec
+    """Pick: vertical-tool configuration at the target [rad], shape (n_envs, 6)."""
+    candidates: Indices
+    """Pick: stations offered, -1 where there are fewer, shape (n_envs, MAX_CANDIDATES)."""
+    time_left: Vec
+    """Time left [s], shape (n_envs,)."""
+    elapsed: Vec
+    """Time since the start [s], shape (n_envs,)."""
+    distance: Vec
+    """tcp to target [m], shape (n_envs,)."""
+    tilt: Vec
+    """Pick: angle of the tool axis to the vertical [rad], shape (n_envs,)."""
+    touched: Indices
+    """Reach: control cycles with a collision in the present episode, shape (n_envs,)."""
+    episode: Indices
+    """Number of the present episode, shape (n_envs,)."""
+    outcome: Indices
+    """Outcome of the present episode (RUNNING ...), shape (n_envs,)."""
+    clear: Vec
+    """Clearances to people, cell and the robot itself [m], shape (n_envs, 3)."""
+    n_redrawn: Indices
+    """Starts rejected because of too little clearance, shape (n_envs,)."""
 
 
-class Space(Protocol):
-    """The work space of a period; ``pick.Work`` says what it holds."""
+def new_episode_state(arm: Arm, people: PeopleState, n_envs: int) -> EpisodeState:
+    """Return the state of ``n_envs`` environments whose episodes have not started."""
 
-    @property
-    def robot(self) -> RobotPose: ...  # noqa: D102
-    @property
-    def crowd(self) -> PeopleGeometry: ...  # noqa: D102
-    @property
-    def c(self) -> Vec: ...  # noqa: D102
-    @property
-    def d(self) -> Vec: ...  # noqa: D102
-    @property
-    def q(self) -> Vec: ...  # noqa: D102
-    @property
-    def qd(self) -> Vec: ...  # noqa: D102
-    @property
-    def qdd(self) -> Vec: ...  # noqa: D102
+    def numbers(*shape: int) -> Vec:
+        return np.zeros((n_envs, *shape))
+
+    def counts(*shape: int) -> Indices:
+        return np.zeros((n_envs, *shape), dtype=np.int64)
+
+    return EpisodeState(
+        q=numbers(6),
+        qd=numbers(6),
+        qdd=numbers(6),
+        robot=np.repeat(arm.columns[None], n_envs, axis=0),
+        people=people,
+        goal=numbers(3),
+        target=counts(),
+        q_goal=numbers(6),
+        candidates=counts(MAX_CANDIDATES),
+        time_left=numbers(),
+        elapsed=numbers(),
+        distance=numbers(),
+        tilt=numbers(),
+        touched=counts(),
+        episode=counts(),
+        outcome=counts(),
+        clear=numbers(3),
+        n_redrawn=counts(),
+    )
+
+
+class StepWorkspace(NamedTuple):
+    """Work space of resets and steps; one per thread."""
+
+    robot: RobotPose
+    """A pose of the robot."""
+    crowd: PeopleGeometry
+    """A pose of the people."""
+    c: Vec
+    """Second coefficients of a control cycle [rad/s^2], shape (6,)."""
+    d: Vec
+    """Third coefficients of a control cycle [rad/s^3], shape (6,)."""
+    q: Vec
+    """Joint positions at the end of a control cycle [rad], shape (6,)."""
+    qd: Vec
+    """Joint speeds at the end of a control cycle [rad/s], shape (6,)."""
+    qdd: Vec
+    """Joint accelerations at the end of a control cycle [rad/s^2], shape (6,)."""
+    rng: random.State
+    """Random stream of the episode that starts, shape (1,)."""
+
+
+def new_step_workspace(arm: Arm, people: People, state: PeopleState) -> StepWorkspace:
+    """Return work space for environments with the people of ``state``."""
+    return StepWorkspace(
+        robot=new_robot_pose(arm),
+        crowd=new_people_geometry(people, state.q.shape[1], state.cylinders.shape[1]),
+        c=np.zeros(6),
+        d=np.zeros(6),
+        q=np.zeros(6),
+        qd=np.zeros(6),
+        qdd=np.zeros(6),
+        rng=np.zeros(1, dtype=np.uint64),
+    )
 
 
 @kernel(inline="always")
 def move(
     arm: Arm,
-    everybody: People,
+    people: People,
     action: ActionRule,
-    state: Rows,
+    state: EpisodeState,
     e: int,
     act: NDArray[np.float32],
-    work: Space,
+    work: StepWorkspace,
 ) -> tuple[bool, bool]:
-    """Move robot and people of environment ``e`` through one period.
+    """Move robot and people of environment ``e`` through one control cycle.
 
     Args:
         arm: Robot in its cell.
-        everybody: Shared data of the people.
-        action: What actions mean.
-        state: Rows; changed.
+        people: Shared data of the people.
+        action: Action type and bounds.
+        state: Environments; changed.
         e: Environment.
         act: Action in [-1, 1].
-        work: Holds the poses at the end afterwards, and the coefficients of the period.
+        work: Holds the poses at the end afterwards, and the coefficients of the cycle.
 
     Returns:
-        Whether anything touched, and whether some joint had no admissible coefficient.
+        Whether there was a contact, and whether a joint had no admissible coefficient.
     """
-    people, crowd, robot = state.people, work.crowd, work.robot
-    copy_rows(people.q[e], crowd.q0)
-    copy_rows(people.cylinders[e], crowd.cylinders0)
-    for w in range(people.q.shape[1]):
-        crowd.pelvis_z[0, w] = people.size[e, w, PELVIS_Z]
+    rows, crowd, robot = state.people, work.crowd, work.robot
+    copy_rows(rows.q[e], crowd.q0)
+    copy_rows(rows.cylinders[e], crowd.cylinders0)
+    for w in range(rows.q.shape[1]):
+        crowd.pelvis_z[0, w] = rows.size[e, w, PELVIS_Z]
     start = JointState(state.q[e], state.qd[e], state.qdd[e])
     segment, end = Coefficients(work.c, work.d), JointState(work.q, work.qd, work.qdd)
     unfeasible = advance(action, arm.limits, arm.dt, start, act, segment, end)
     state.elapsed[e] += arm.dt
     state.time_left[e] -= arm.dt
-    advance_people(everybody, people, e, state.robot[e], arm.dt, crowd.away)
-    copy_rows(people.size[e], crowd.size)
+    advance_people(people, rows, e, state.robot[e], arm.dt, crowd.away)
+    copy_rows(rows.size[e], crowd.size)
     path = JointPath(state.q[e], state.qd[e], work.c, work.d)
-    motion = PeriodMotion(path, work.q, people.q[e], people.cylinders[e])
-    kind, _ = sweep(
-        arm,
-        everybody,
-        motion,
-        state.robot[e],
-        people.columns[e],
-        state.clear[e],
-        robot,
-        crowd,
-    )
+    motion = PeriodMotion(path, work.q, rows.q[e], rows.cylinders[e])
+    capsules0, clear = state.robot[e], state.clear[e]
+    kind, _ = sweep(arm, people, motion, capsules0, rows.columns[e], clear, robot, crowd)
     for j in range(6):
         state.q[e, j], state.qd[e, j], state.qdd[e, j] = work.q[j], work.qd[j], work.qdd[j]
     if kind != NO_CONTACT:
         place_robot(arm, work.q, robot)
-        place_people(everybody, people, e, crowd)
-    if everybody.yielding > 0.0:
-        store_clearances(people, e, crowd)
+        place_people(people, rows, e, crowd)
+    if people.yielding > 0.0:
+        store_clearances(rows, e, crowd)
     copy_capsules(robot.columns, state.robot[e])
-    copy_capsules(crowd.columns, people.columns[e])
+    copy_capsules(crowd.columns, rows.columns[e])
     return kind != NO_CONTACT, unfeasible
+
+
+@kernel(inline="always")
+def measure(arm: Arm, people: People, state: EpisodeState, e: int, work: StepWorkspace) -> None:
+    """Store the clearances of the placed robot and people in environment ``e``."""
+    clear = clearances(arm, people, work.robot, work.crowd)
+    state.clear[e, 0], state.clear[e, 1], state.clear[e, 2] = clear
+
+
+@kernel(inline="always")
+def begin(state: EpisodeState, e: int, time_limit: float, work: StepWorkspace) -> None:
+    """Start an episode of environment ``e`` from the placed robot and people.
+
+    Args:
+        state: Environments; changed.
+        e: Environment.
+        time_limit: Time left at the start [s].
+        work: Holds the placed robot and people.
+    """
+    state.distance[e] = distance_to(state.goal[e], work.robot)
+    copy_capsules(work.robot.columns, state.robot[e])
+    copy_capsules(work.crowd.columns, state.people.columns[e])
+    state.time_left[e], state.elapsed[e] = time_limit, 0.0
+    state.touched[e], state.outcome[e] = 0, RUNNING
 
 
 @kernel(inline="always")
@@ -139,3 +234,9 @@ def distance_to(goal: Vec, robot: RobotPose) -> float:
     """Return the distance of a placed robot's tcp to a target [m]."""
     x, y, z = goal[0] - robot.tcp[0], goal[1] - robot.tcp[1], goal[2] - robot.tcp[2]
     return math.sqrt(x * x + y * y + z * z)
+
+
+@kernel(inline="always")
+def progress(old: float, new: float, coefficient: float, gamma: float) -> float:
+    """Return the progress reward: positive where ``new`` is less than ``old``."""
+    return coefficient * (old - gamma * new)

@@ -24,7 +24,7 @@ def test_the_first_states_are_those_of_the_episodes_played():
     search = OracleSearch(started(CELL, RULES, goals, 6), 1, 600)
     search.undisturbed(Straight().acts)
     played = play(CELL, RULES, Straight(), goals, 6)
-    np.testing.assert_array_equal(search.replays.reached > 0, played.outcome == SUCCESS)
+    np.testing.assert_array_equal(search.resimulations.reached > 0, played.outcome == SUCCESS)
 
 
 @pytest.fixture

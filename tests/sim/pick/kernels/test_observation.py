@@ -29,9 +29,10 @@ def state(cell: Cell) -> dict[str, np.ndarray]:
 
 
 def seen(cell: Cell, **changes: np.ndarray) -> np.ndarray:
-    return pick.observe(
-        arm_of(cell), people_of(cell), **(state(cell) | changes), time_left_s=7.0
-    )[0]
+    at = state(cell) | changes
+    person = at["human_q"], at["human_qd"], at.get("size")
+    robot = at["q"], at["qd"]
+    return pick.observe(arm_of(cell), people_of(cell), *robot, person, at["goals"], 7.0)[0]
 
 
 def test_layout_covers_the_observation_without_gap_or_overlap() -> None:
@@ -75,11 +76,11 @@ def test_base_motion_leads_to_the_posture_at_the_target(cell: Cell) -> None:
     at = state(cell)
     limits = np.array(cell.robot.q_min), np.array(cell.robot.q_max)
     for row, goal in zip(seen(cell), at["goals"], strict=True):
-        way = Robot().ik_vertical(goal, *limits)[:5] - at["q"][:5]
-        np.testing.assert_allclose(row[LAYOUT["goal_posture_minus_q"]], way, atol=1e-5)
+        offset = Robot().ik_vertical(goal, *limits)[:5] - at["q"][:5]
+        np.testing.assert_allclose(row[LAYOUT["goal_posture_minus_q"]], offset, atol=1e-5)
         base = row[LAYOUT["base"]]
         np.testing.assert_allclose(
-            base / np.abs(base).max(), way / np.abs(way).max(), atol=1e-5
+            base / np.abs(base).max(), offset / np.abs(offset).max(), atol=1e-5
         )
 
 

@@ -2,7 +2,8 @@
 
 import pytest
 
-from app.sim.pick.kernels.reward import RewardWeights, progress, reward, speed_near_target
+from app.sim.pick.kernels.reward import RewardWeights, reward, speed_near_target
+from app.sim.scenario.kernels.episode import progress
 
 WEIGHTS = RewardWeights(
     c_d=0.5, c_th=0.25, c_c=1.0, c_step=0.02, c_v=2.0, d_v=0.1, c_s=3.0, gamma=1.0

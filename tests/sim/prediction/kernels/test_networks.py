@@ -11,18 +11,18 @@ from app.sim.prediction.kernels.networks import (
     SPEED_MIDDLE,
     SPEED_SCALE,
     STEP_S,
-    forecast,
+    predict_pedestrian,
 )
 from app.sim.prediction.weights import new_motion_predictor
 
 TIMES = STEP_S * np.arange(1, N_TIMES + 1)
 
 
-def told(
+def predicted(
     r: float, growth: float, speed: float, age: float, radii: np.ndarray, speeds: np.ndarray
 ) -> np.ndarray:
     out = np.full((N_TIMES, 2), np.nan)
-    forecast(new_motion_predictor(), r, growth, speed, age, radii, speeds, out)
+    predict_pedestrian(new_motion_predictor(), r, growth, speed, age, radii, speeds, out)
     return out
 
 
@@ -37,9 +37,9 @@ def test_the_kernel_computes_the_networks() -> None:
         radius = r + RADIUS_SCALE * _said(net.radius, seen)
         seen = np.r_[(speed - SPEED_MIDDLE) / SPEED_SCALE, 0.0, age / 0.1]
         seen = np.r_[seen, (speeds - SPEED_MIDDLE) / SPEED_SCALE]
-        way = np.maximum(0.0, TIMES * (speed + SPEED_SCALE * _said(net.way, seen)))
-        found = told(r, growth, speed, age, radii, speeds)
-        np.testing.assert_allclose(found, np.stack([radius, way], axis=1), atol=2e-5)
+        path = np.maximum(0.0, TIMES * (speed + SPEED_SCALE * _said(net.path, seen)))
+        found = predicted(r, growth, speed, age, radii, speeds)
+        np.testing.assert_allclose(found, np.stack([radius, path], axis=1), atol=2e-5)
 
 
 def _said(net, seen: np.ndarray) -> np.ndarray:
@@ -49,13 +49,13 @@ def _said(net, seen: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("r", [0.22, 0.35, 0.48])
 def test_who_was_always_the_same_stays_about_so(r: float) -> None:
-    found = told(r, 0.0, 0.6, 0.0, np.full(N_PAST, r), np.full(N_PAST, 0.6))
+    found = predicted(r, 0.0, 0.6, 0.0, np.full(N_PAST, r), np.full(N_PAST, 0.6))
     assert np.abs(found[:12, 0] - r).max() < 0.06
     assert np.abs(found[:12, 1] - 0.6 * TIMES[:12]).max() < 0.08
 
 
 def test_who_stands_and_stood_goes_nowhere() -> None:
-    found = told(0.3, 0.0, 0.0, 0.0, np.full(N_PAST, 0.3), np.zeros(N_PAST))
+    found = predicted(0.3, 0.0, 0.0, 0.0, np.full(N_PAST, 0.3), np.zeros(N_PAST))
     assert found[:, 1].max() < 0.06
 
 
@@ -64,6 +64,6 @@ def test_a_wave_is_recognised() -> None:
     t = -0.1 * np.arange(N_PAST)
     wave = lambda s: 0.35 + 0.1 * np.sin(2.0 * np.pi * 0.5 * s + 0.3)  # noqa: E731
     growth = 0.1 * np.pi * np.cos(0.3)
-    found = told(wave(0.0), growth, 0.6, 0.0, wave(t), np.full(N_PAST, 0.6))
+    found = predicted(wave(0.0), growth, 0.6, 0.0, wave(t), np.full(N_PAST, 0.6))
     assert np.abs(found[:, 0] - wave(TIMES)).mean() < 0.06
     assert np.abs(found[:, 0] - wave(TIMES)).mean() < np.abs(wave(0.0) - wave(TIMES)).mean()

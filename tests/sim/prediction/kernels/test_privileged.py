@@ -5,7 +5,7 @@ import pytest
 
 from app.sim.cells.cell import load_cell
 from app.sim.people.kernels.pedestrian import PedestrianState, R, X, Y
-from app.sim.prediction.kernels.privileged import AHEAD_S, N_AHEAD, look_ahead_of_walkers
+from app.sim.prediction.kernels.privileged import AHEAD_S, N_AHEAD, write_privileged_future
 from app.sim.reach.batch import ReachBatch, ReachSettings
 
 
@@ -17,7 +17,7 @@ def test_walkers_go_where_they_were_foreseen(start):
     walkers, dt = batch.state.people.walkers, batch.arm.dt
     copy = PedestrianState(walkers.rows.copy(), walkers.stream.copy())
     ahead, before = np.zeros((40, 2 * N_AHEAD)), walkers.rows.copy()
-    look_ahead_of_walkers(batch.world.people.walkers, walkers, copy, dt, ahead)
+    write_privileged_future(batch.world.people.walkers, walkers, copy, dt, ahead)
     assert np.array_equal(walkers.rows, before)
     foreseen, done = ahead.reshape(40, 2, len(AHEAD_S), 3), 0
     still = np.zeros((40, 6), dtype=np.float32)
@@ -26,7 +26,7 @@ def test_walkers_go_where_they_were_foreseen(start):
             batch.step(still, auto_reset=False, features=False)
             done += 1
         goes_on = batch.state.outcome == 0
-        way = walkers.rows[:, :, [X, Y]] - before[:, :, [X, Y]]
-        np.testing.assert_array_equal(foreseen[goes_on, :, k, :2], way[goes_on])
+        offset = walkers.rows[:, :, [X, Y]] - before[:, :, [X, Y]]
+        np.testing.assert_array_equal(foreseen[goes_on, :, k, :2], offset[goes_on])
         np.testing.assert_array_equal(foreseen[goes_on, :, k, 2], walkers.rows[goes_on][..., R])
     assert goes_on.sum() > 20 and np.abs(foreseen[..., -1, 0]).max() > 0.5

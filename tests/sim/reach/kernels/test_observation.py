@@ -8,18 +8,18 @@ from app.sim.collision import contact
 from app.sim.geometry.capsules import RADIUS, ends_of
 from app.sim.human.kernels import kinematics as body
 from app.sim.people.kernels.pedestrian import VX, VY, R, X, Y
-from app.sim.pick.kernels.observation import HORIZONS
 from app.sim.reach.batch import ReachBatch, ReachSettings
 from app.sim.reach.kernels.observation import (
     CENTER_Y,
     LAYOUT,
     N_FEATURES,
     N_STATE,
-    NOBODY,
+    NO_PERSON,
     SCALE,
     enclosing_radius,
 )
 from app.sim.robot.ur10 import Robot
+from app.sim.scenario.kernels.person_observation import HORIZONS
 from app.sim.scene.scene import NO_CYLINDERS
 
 
@@ -129,9 +129,9 @@ def test_enclosing_radius_of_one_capsule_is_its_farther_end_and_radius() -> None
     assert enclosing_radius(columns, 0, 1, 3.0, 0.0) == 2.25
 
 
-def test_nobody_is_seen_far_away() -> None:
+def test_empty_cell_is_observed_as_a_person_far_away() -> None:
     obs = observed(batch_of(observation="state"))
-    np.testing.assert_allclose(obs[:, 12:17], np.tile(NOBODY[:5], (6, 1)), rtol=1e-6)
+    np.testing.assert_allclose(obs[:, 12:17], np.tile(NO_PERSON[:5], (6, 1)), rtol=1e-6)
     far = observed(batch_of())
     assert (far[:, LAYOUT["clearance"]] == 3.0).all()
     assert (far[:, LAYOUT["look_ahead"]] == 3.0).all()

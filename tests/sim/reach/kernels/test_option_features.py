@@ -1,4 +1,4 @@
-"""What comes of every way: against distances worked out one by one, and several people."""
+"""Option features, compared with distances computed one by one."""
 
 import numpy as np
 import pytest
@@ -17,17 +17,18 @@ from app.sim.people.kernels.pedestrian import (
     X,
     Y,
 )
-from app.sim.prediction.kernels.networks import N_TIMES, STEP_S, forecast
+from app.sim.prediction.kernels.networks import N_TIMES, STEP_S, predict_pedestrian
 from app.sim.prediction.weights import new_motion_predictor
 from app.sim.reach.batch import ReachBatch
-from app.sim.reach.kernels import option_features as reach_ways
+from app.sim.reach.kernels import observation_workspace, option_features
 from app.sim.reach.kernels.observation import N_FEATURES
 from tests.sim.reach.kernels.test_observation import batch_of, observed
 
-LAYOUT = reach_ways.LAYOUT
-LOOKS = np.array(reach_ways.LOOKS)
+LAYOUT = option_features.LAYOUT
+LOOKS = np.array(observation_workspace.LOOKS)
+RETREAT_PAN = observation_workspace.RETREAT_PAN
 TIMES = STEP_S * LOOKS
-"""When clearances are looked at [s]."""
+"""Times of the clearances [s]."""
 
 
 def features(batch: ReachBatch) -> np.ndarray:
@@ -41,7 +42,9 @@ def ahead(batch: ReachBatch, e: int) -> np.ndarray:
         out = np.zeros((N_TIMES, 2))
         speed = np.hypot(row[VX], row[VY])
         past = row[PAST_RADIUS:PAST_SPEED].copy(), row[PAST_SPEED:].copy()
-        forecast(new_motion_predictor(), row[R], row[GROWTH], speed, row[AGE], *past, out)
+        predict_pedestrian(
+            new_motion_predictor(), row[R], row[GROWTH], speed, row[AGE], *past, out
+        )
         course = row[[COURSE_X, COURSE_Y]] * (speed > 0.0)
         found.append(np.c_[row[[X, Y]] + out[:, 1:] * course, out[:, 0]])
     return np.array(found).swapaxes(0, 1)[LOOKS - 1]
@@ -49,12 +52,12 @@ def ahead(batch: ReachBatch, e: int) -> np.ndarray:
 
 def clearance(batch: ReachBatch, q: np.ndarray, walkers: np.ndarray) -> float:
     found = contact.clearance(batch.arm, batch.world.people, q, np.zeros((0, 18)), walkers)
-    return max(-1.0, min(2.0, found.people_m / reach_ways.NEAR))
+    return max(-1.0, min(2.0, found.people_m / option_features.NEAR))
 
 
 def rolled(batch: ReachBatch, e: int, t: float) -> np.ndarray:
     state = batch.state
-    return state.q[e] + 0.5 * state.qd[e] * min(t, reach_ways.ROLL_S)
+    return state.q[e] + 0.5 * state.qd[e] * min(t, option_features.ROLL_S)
 
 
 @pytest.mark.parametrize("people", [("walker",), ("constant", "fixed-speed", "walker")])
@@ -67,23 +70,23 @@ def test_clearances_of_staying_and_drawing_back(people: tuple[str, ...]) -> None
         for i, t in enumerate(TIMES):
             stay = rolled(batch, e, t)
             assert found[e, 0, i] == pytest.approx(clearance(batch, stay, walkers[i]), abs=1e-5)
-            for way, turn in ((1, 0.0), (2, reach_ways.ASIDE), (3, -reach_ways.ASIDE)):
+            for option, turn in ((1, 0.0), (2, RETREAT_PAN), (3, -RETREAT_PAN)):
                 refuge = home + [turn, 0, 0, 0, 0, 0]
                 longest = np.abs(refuge - q).max()
-                share = min(1.0, max(0.0, t - reach_ways.LAG_S) / longest)
+                share = min(1.0, max(0.0, t - option_features.LAG_S) / longest)
                 expected = clearance(batch, stay + share * (refuge - q), walkers[i])
-                assert found[e, way, i] == pytest.approx(expected, abs=1e-5)
+                assert found[e, option, i] == pytest.approx(expected, abs=1e-5)
     np.testing.assert_allclose(found[:, :, -1], found[:, :, :-1].min(axis=2), atol=1e-6)
 
 
-def test_the_straight_way_ends_at_the_goal() -> None:
+def test_base_motion_ends_at_the_goal() -> None:
     batch = batch_of("walker", observation="forecast")
     found = features(batch)
     arrival = found[:, 0]
     assert (arrival > 0.3).all()
     straight = found[:, LAYOUT["way_clearance"]]
     for e in range(batch.n_envs):
-        counted = [i for i, t in enumerate(TIMES) if t <= arrival[e] + reach_ways.AFTER_S]
+        counted = [i for i, t in enumerate(TIMES) if t <= arrival[e] + option_features.AFTER_S]
         assert straight[e, -1] == pytest.approx(straight[e, counted].min(), abs=1e-6)
 
 
@@ -93,14 +96,16 @@ def test_the_person_seen_is_followed_to_the_goal() -> None:
     for e in range(batch.n_envs):
         walkers = ahead(batch, e)[:, 0]
         away = np.linalg.norm(walkers[:, :2] - batch.state.goal[e, :2], axis=1)
-        gap = np.minimum(3.0, (away - walkers[:, 2]) / reach_ways.SCALE)
+        gap = np.minimum(3.0, (away - walkers[:, 2]) / option_features.SCALE)
         np.testing.assert_allclose(found[e, LAYOUT["goal_gap_ahead"]], gap, atol=1e-5)
-        wider = (walkers[:, 2] - batch.state.people.walkers.rows[e, 0, R]) / reach_ways.GROWN
+        wider = (
+            walkers[:, 2] - batch.state.people.walkers.rows[e, 0, R]
+        ) / option_features.GROWN
         np.testing.assert_allclose(found[e, LAYOUT["radius_ahead"]], wider, atol=1e-5)
 
 
 @pytest.mark.parametrize("people", [("walker", "walker"), ("worker", "walker", "constant")])
-def test_of_several_people_the_nearest_counts_way_by_way(people: tuple[str, ...]) -> None:
+def test_the_nearest_person_counts_for_each_option(people: tuple[str, ...]) -> None:
     batch = batch_of(*people, observation="forecast")
     observed(batch)
     rows, goals = np.arange(batch.n_envs), batch.state.goal[:, None]
@@ -114,7 +119,7 @@ def test_of_several_people_the_nearest_counts_way_by_way(people: tuple[str, ...]
         np.testing.assert_allclose(all_of[:, group], least, atol=1e-6)
 
 
-def test_nobody_is_never_in_the_way() -> None:
+def test_clearances_in_an_empty_cell() -> None:
     found = features(batch_of(observation="forecast"))
     assert (found[:, LAYOUT["way_clearance"]] == 2.0).all()
     assert (found[:, LAYOUT["radius_ahead"]] == 0.0).all()

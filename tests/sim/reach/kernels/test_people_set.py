@@ -14,7 +14,7 @@ CELL = load_cell("shared-workspace")
 
 
 def batch_of(n_people: int, seed: int = 5) -> ReachBatch:
-    settings = ReachSettings(observation="crowd", people=("walker",) * n_people)
+    settings = ReachSettings(observation="people-set", people=("walker",) * n_people)
     return ReachBatch(CELL, 12, seed, settings)
 
 
@@ -42,8 +42,8 @@ def test_a_block_says_where_the_person_is_and_will_be():
         np.testing.assert_allclose(block[:, BLOCK["velocity"]], rows[:, p, [VX, VY]], atol=1e-6)
         np.testing.assert_allclose(block[:, BLOCK["radius"]][:, 0], rows[:, p, R], atol=1e-6)
         ahead = block[:, BLOCK["ahead"]].reshape(-1, len(LOOKS), 3)
-        way = ahead[:, :, :2] + tcp[:, None, :2] - at[:, None]
-        fastest = np.hypot(*way.transpose(2, 0, 1)) / (STEP_S * np.array(LOOKS))
+        path = ahead[:, :, :2] + tcp[:, None, :2] - at[:, None]
+        fastest = np.hypot(*path.transpose(2, 0, 1)) / (STEP_S * np.array(LOOKS))
         assert fastest.max() < 1.2 and np.ptp(ahead[:, :, 2]) > 0.05
     near = batch.person_distances(np.arange(12))
     said = found[:, :3, BLOCK["clearance"].start] * SCALE
@@ -62,6 +62,6 @@ def test_other_goals_and_single_people_are_seen_alike():
     batch.reset()
     rows, goals = np.arange(12), batch.state.goal[:, None].copy()
     np.testing.assert_array_equal(batch.observe_goals(rows, goals)[:, 0], batch.obs)
-    alone = blocks_of(batch.observe_goals(rows, goals, who=1)[:, 0])
+    alone = blocks_of(batch.observe_goals(rows, goals, person=1)[:, 0])
     np.testing.assert_array_equal(alone[:, 0], blocks_of(batch.obs)[:, 1])
     assert (alone[:, 1:] == 0.0).all()

@@ -28,7 +28,7 @@ def ordinary(batch: ReachBatch) -> np.ndarray:
     return batch.step(np.zeros((batch.n_envs, 6), dtype=np.float32)).obs.copy()
 
 
-def everyone(batch: ReachBatch) -> np.ndarray:
+def all_envs(batch: ReachBatch) -> np.ndarray:
     return np.arange(batch.n_envs)
 
 
@@ -38,7 +38,7 @@ def test_for_the_same_goal_they_are_the_ordinary_bits(
     people: tuple[str, ...], observation: str
 ) -> None:
     batch = batch_of(people, observation)
-    obs, rows = ordinary(batch), everyone(batch)
+    obs, rows = ordinary(batch), all_envs(batch)
     found = batch.observe_goals(rows, batch.state.goal[:, None])
     np.testing.assert_array_equal(found[:, 0], obs)
 
@@ -46,7 +46,7 @@ def test_for_the_same_goal_they_are_the_ordinary_bits(
 @pytest.mark.parametrize("observation", ["features", "state"])
 def test_for_other_goals_they_are_those_after_setting_them(observation: str) -> None:
     batch = batch_of(("walker", "constant"), observation)
-    rows, own_goals = everyone(batch), batch.state.goal.copy()
+    rows, own_goals = all_envs(batch), batch.state.goal.copy()
     goals = np.random.default_rng(5).uniform(-1, 1, (len(rows), 3, 3))
     found = batch.observe_goals(rows, goals)
     np.testing.assert_array_equal(batch.state.goal, own_goals)
@@ -58,17 +58,17 @@ def test_for_other_goals_they_are_those_after_setting_them(observation: str) -> 
 @pytest.mark.parametrize("kind", ["walker", "worker"])
 def test_beside_the_only_person_they_are_the_ordinary_bits(kind: str, observation: str) -> None:
     batch = batch_of((kind,), observation)
-    obs, rows = ordinary(batch), everyone(batch)
-    found = batch.observe_goals(rows, batch.state.goal[:, None], who=0)
+    obs, rows = ordinary(batch), all_envs(batch)
+    found = batch.observe_goals(rows, batch.state.goal[:, None], person=0)
     np.testing.assert_array_equal(found[:, 0], obs)
 
 
 @pytest.mark.parametrize("who", range(3))
 def test_beside_one_of_several_only_that_person_counts(who: int) -> None:
     batch = batch_of(CROWD, "features")
-    obs, rows = ordinary(batch), everyone(batch)
+    obs, rows = ordinary(batch), all_envs(batch)
     alone = batch.observe_goals(rows, batch.state.goal[:, None], who)[:, 0]
-    # All others leave; whoever is left is then seen and counted as ordinarily.
+    # All others leave; the remaining person is then observed as usual.
     people = batch.state.people
     for worker in {0} - {who}:
         people.q[:, worker, 0] = 900.0
@@ -88,8 +88,8 @@ def test_beside_one_of_several_only_that_person_counts(who: int) -> None:
 def test_distances_are_those_to_each_person_and_the_nearest_is_the_least() -> None:
     batch = batch_of(CROWD, "features")
     state, people = batch.state, batch.world.people
-    found = batch.person_distances(everyone(batch))
-    for e in everyone(batch):
+    found = batch.person_distances(all_envs(batch))
+    for e in all_envs(batch):
         to_worker = contact.clearance(
             batch.arm, people, state.q[e], state.people.q[e], np.zeros((0, 3)),
             state.people.size[e],
@@ -101,7 +101,7 @@ def test_distances_are_those_to_each_person_and_the_nearest_is_the_least() -> No
         expected = [to_worker.people_m, *(one.people_m for one in to_walkers)]
         np.testing.assert_allclose(found[e], expected, atol=1e-12)
         batch.observe_goals(np.array([e]), state.goal[e : e + 1, None])
-        near = nearest_person(people, batch._work.robot.columns, batch._work.crowd)
+        near = nearest_person(people, batch._sight.robot.columns, batch._sight.crowd)
         assert near == int(np.argmin(found[e]))
 
 

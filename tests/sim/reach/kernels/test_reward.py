@@ -6,29 +6,20 @@ import pytest
 from app.sim.reach.batch import PROGRESS_WEIGHTS, THESIS_WEIGHTS
 from app.sim.reach.kernels import reward as kernel
 from app.sim.reach.kernels.reward import ReachWeights
+from app.sim.scenario.kernels.episode import progress
 
 C = np.array([3.0, 0.0, 0.0, -4.0, 0.0, 0.0])
 
 
-def test_distance_costs() -> None:
-    assert kernel.distance_cost(0.5, 2.0) == -1.0
-
-
 def test_progress_is_positive_when_coming_closer() -> None:
-    assert kernel.progress(0.5, 0.4, 2.0, 1.0) == pytest.approx(0.2)
-    assert kernel.progress(0.4, 0.5, 2.0, 1.0) == pytest.approx(-0.2)
-    assert kernel.progress(0.5, 0.4, 1.0, 0.9) == pytest.approx(0.14)
+    assert progress(0.5, 0.4, 2.0, 1.0) == pytest.approx(0.2)
+    assert progress(0.4, 0.5, 2.0, 1.0) == pytest.approx(-0.2)
+    assert progress(0.5, 0.4, 1.0, 0.9) == pytest.approx(0.14)
 
 
 def test_accelerating_costs_by_the_norm_of_the_coefficients() -> None:
     assert kernel.action_cost(C, 0.1) == pytest.approx(-0.5)
     assert kernel.action_cost(C, 0.0) == 0.0
-
-
-def test_ends_pay_and_cost() -> None:
-    assert kernel.end_reward(True, False, 5.0, 20.0) == -5.0
-    assert kernel.end_reward(False, True, 5.0, 20.0) == 20.0
-    assert kernel.end_reward(False, False, 5.0, 20.0) == 0.0
 
 
 def test_thesis_reward_is_that_of_method_2_3() -> None:

@@ -11,7 +11,7 @@ from app.sim.collision.checker import no_people
 from app.sim.collision.contact import clearance
 from app.sim.people.kernels.pedestrian import AGE, N_PAST, PAST_RADIUS, PAST_SPEED
 from app.sim.reach.batch import ReachBatch, ReachSettings
-from app.sim.reach.monitored.batch import MonitoredReachBatch
+from app.sim.reach.monitored.batch import MonitoredReachBatch, MonitoringSettings
 from app.sim.robot.kernels.kinematics import ik_vertical_batch
 from app.sim.safety.layer import SafetyLayer, safety_settings
 from app.sim.scenario.kernels.episode import COLLISION, RUNNING, SUCCESS, TIMEOUT
@@ -44,7 +44,7 @@ def passing(n: int, y: float = 1.2, speed: float = 1.0) -> np.ndarray:
     return np.repeat(np.column_stack([x, np.full(250, y), np.full(250, 0.3)])[None], n, axis=0)
 
 
-def test_with_nobody_there_it_moves_as_without_the_layer():
+def test_layer_changes_nothing_in_an_empty_cell():
     guarded, plain = (
         MonitoredReachBatch(CELL, 6, 3, ALONE, SAFETY),
         ReachBatch(CELL, 6, 3, ALONE),
@@ -151,12 +151,12 @@ def test_a_person_at_the_robot_holds_it_and_the_account_says_so():
     np.testing.assert_allclose(runs.seconds, 1.0)
     np.testing.assert_allclose(runs.stopped_s, 1.0)
     np.testing.assert_allclose(runs.below_half_s, 1.0)
-    np.testing.assert_allclose(runs.joint_way, 0.0)
+    np.testing.assert_allclose(runs.joint_path, 0.0)
     assert (batch.state.outcome == TIMEOUT).all()
     assert not runs.arrived.any()
 
 
-def test_a_robot_that_arrives_has_its_way_and_time_counted():
+def test_path_lengths_and_times_are_counted():
     batch = MonitoredReachBatch(CELL, 4, 2, ALONE, SAFETY)
     batch.reset()
     q, tips = [batch.state.q.copy()], []
@@ -165,14 +165,14 @@ def test_a_robot_that_arrives_has_its_way_and_time_counted():
         q.append(batch.state.q.copy())
         tips.append(batch.state.outcome.copy())
     runs = batch.runs()
-    ways = np.linalg.norm(np.diff(q, axis=0), axis=2).sum(axis=0)
-    np.testing.assert_allclose(runs.joint_way, ways)
+    paths = np.linalg.norm(np.diff(q, axis=0), axis=2).sum(axis=0)
+    np.testing.assert_allclose(runs.joint_path, paths)
     np.testing.assert_allclose(runs.seconds, 0.02 * (1 + (np.array(tips) == 0).sum(axis=0)))
     assert runs.arrived.all() and (batch.state.outcome == SUCCESS).all()
-    assert (runs.tool_way > 0.2).all() and (runs.tool_way < runs.joint_way * 1.5).all()
+    assert (runs.tool_path > 0.2).all() and (runs.tool_path < runs.joint_path * 1.5).all()
 
 
-def test_a_person_who_walks_into_a_robot_at_rest_is_told_from_one_who_meets_it_moving():
+def test_contacts_at_standstill_are_separate_from_contacts_in_motion():
     settings = replace(BOX, people=("walker",), time_limit_s=4.0)
     tracks = passing(2, y=0.6)
     held = MonitoredReachBatch(CELL, 2, 0, settings, SAFETY, tracks=tracks)
@@ -180,7 +180,9 @@ def test_a_person_who_walks_into_a_robot_at_rest_is_told_from_one_who_meets_it_m
     to_the_end(held, still=True)
     assert (held.state.outcome == COLLISION).all()
     assert held.runs().touched_at_rest.all() and not held.runs().touched_moving.any()
-    bare = MonitoredReachBatch(CELL, 2, 0, settings, SAFETY, tracks=tracks, guarded=False)
+    bare = MonitoredReachBatch(
+        CELL, 2, 0, settings, SAFETY, MonitoringSettings(active=False), tracks=tracks
+    )
     bare.reset()
     act = np.zeros((2, 6), dtype=np.float32)
     act[:, 0] = 0.3
@@ -193,7 +195,13 @@ def test_a_person_who_walks_into_a_robot_at_rest_is_told_from_one_who_meets_it_m
 def test_a_touched_robot_at_rest_may_go_on():
     settings = replace(BOX, people=("walker",), time_limit_s=10.0)
     batch = MonitoredReachBatch(
-        CELL, 2, 0, settings, SAFETY, tracks=passing(2, y=0.6), rest_ends=False
+        CELL,
+        2,
+        0,
+        settings,
+        SAFETY,
+        MonitoringSettings(rest_ends=False),
+        tracks=passing(2, y=0.6),
     )
     batch.reset()
     for _ in range(150):
@@ -203,17 +211,17 @@ def test_a_touched_robot_at_rest_may_go_on():
     assert runs.touched_at_rest.all() and runs.arrived.all()
 
 
-def test_policies_are_told_of_no_more_time_than_their_horizon():
+def test_policies_observe_no_more_time_than_their_horizon():
     batch = MonitoredReachBatch(
-        CELL, 1, 0, replace(ALONE, time_limit_s=12.0), SAFETY, horizon_s=5.0
+        CELL, 1, 0, replace(ALONE, time_limit_s=12.0), SAFETY, MonitoringSettings(horizon_s=5.0)
     )
     batch.reset()
-    told = [batch.state.time_left[0]]
+    seen = [batch.state.time_left[0]]
     for _ in range(600):
         batch.step(np.zeros((1, 6), dtype=np.float32), auto_reset=False)
-        told.append(batch.state.time_left[0])
-    assert max(told) == 5.0
-    assert told[349] == 5.0 and told[400] == pytest.approx(4.0)
+        seen.append(batch.state.time_left[0])
+    assert max(seen) == 5.0
+    assert seen[349] == 5.0 and seen[400] == pytest.approx(4.0)
     assert batch.state.outcome[0] == TIMEOUT
 
 

@@ -8,7 +8,7 @@ from app.sim.cells.cell import load_cell
 from app.sim.planning.ompl_planners import PlanSettings
 from app.sim.planning.replanning import ReplanningSettings
 from app.sim.reach.batch import ReachSettings
-from app.sim.reach.monitored.batch import MonitoredReachBatch
+from app.sim.reach.monitored.batch import MonitoredReachBatch, MonitoringSettings
 from app.sim.reach.monitored.planners import GOAL_SPREAD, drive_planner, postures_of
 from app.sim.robot.ur10 import Robot
 from app.sim.safety.layer import safety_settings
@@ -22,7 +22,7 @@ PLANNED = PlanSettings(planner="rrt-connect", max_poses=6_000)
 RULES = ReachSettings(goals="box", people=("walker",), time_limit_s=15.0)
 
 
-def in_the_way(leaves_s: float) -> np.ndarray:
+def obstructing(leaves_s: float) -> np.ndarray:
     """Somebody between robot and goals who walks off to the side after a while."""
     t = 0.02 * np.arange(600)
     x = 0.05 + np.maximum(0.0, t - leaves_s)
@@ -34,7 +34,13 @@ def in_the_way(leaves_s: float) -> np.ndarray:
 def run(role: str, tracks: np.ndarray | None, **more: bool) -> MonitoredReachBatch:
     rules = RULES if tracks is not None else replace(RULES, people=())
     batch = MonitoredReachBatch(
-        CELL, 2, 0, rules, safety_settings(CELL), tracks=tracks, rest_ends=False
+        CELL,
+        2,
+        0,
+        rules,
+        safety_settings(CELL),
+        MonitoringSettings(rest_ends=False),
+        tracks=tracks,
     )
     batch.reset()
     batch.set_goals(np.arange(2), GOALS)
@@ -66,14 +72,14 @@ def test_alone_every_role_arrives_at_once():
 
 
 def test_a_planner_waits_until_who_holds_it_has_gone():
-    runs = run("replan-on-blocked", in_the_way(2.0)).runs()
+    runs = run("replan-on-blocked", obstructing(2.0)).runs()
     assert runs.arrived.all()
     assert (runs.stopped_s > 2.0).all()
     assert (runs.seconds > 3.0).all()
 
 
-def test_a_blind_planner_is_told_of_nobody():
-    told = run("plan-once", in_the_way(2.0), blind=True).runs()
+def test_blind_planner_gets_no_people():
+    given = run("plan-once", obstructing(2.0), blind=True).runs()
     alone = run("plan-once", None).runs()
-    np.testing.assert_allclose(told.joint_way, alone.joint_way, atol=0.1)
-    assert (told.seconds > alone.seconds + 1.0).all()
+    np.testing.assert_allclose(given.joint_path, alone.joint_path, atol=0.1)
+    assert (given.seconds > alone.seconds + 1.0).all()

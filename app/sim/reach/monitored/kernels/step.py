@@ -1,14 +1,13 @@
-"""The reach scenario under speed and separation monitoring, batched and compiled.
+"""Steps of the reach scenario under speed and separation monitoring (compiled).
 
-One period is that of ``reach/kernels/episode.py`` with the safety layer between the command
-and the
-robot: the commanded piece goes through ``ssm.decide`` and what that admits is executed. People
-move as they do without it, or along given tracks of cylinders. Contacts are found between the
-ends of a period by conservative advancement along the motion that is really executed
-(``safety_trial.first_contact``), and the speed of the links that touch tells whether the robot
-was moving. Contact of the robot with its cell or itself is looked for at the ends of periods.
+A control cycle is that of ``reach.py`` with the safety layer between command and robot: the
+commanded segment passes through ``ssm.decide``, and the admitted motion is executed. People
+move as without the layer, or along given tracks of cylinders. Contacts with people between the
+ends of a cycle are found by conservative advancement along the executed motion
+(``safety_trial.first_contact``), and the speed of the touching link tells whether the robot was
+moving. Contact of the robot with its cell or itself is checked at the ends of cycles.
 
-Source: METHOD 2.6 (last row) and 2.7.
+Source: docs/method.md 2.6 (last row) and 2.7.
 """
 
 import math
@@ -17,7 +16,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from app.sim.collision.kernels.contact import clearances
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
 from app.sim.geometry.capsules import copy_rows
@@ -36,8 +34,8 @@ from app.sim.people.kernels.pedestrian import (
     remember_as_now,
 )
 from app.sim.people.kernels.people import place_people
-from app.sim.reach.kernels.episode import Indices, ReachRules, ReachState, ReachWorld, Work
-from app.sim.reach.kernels.reward import ReachWeights, reward
+from app.sim.reach.kernels.episode import ReachCell, ReachTask
+from app.sim.reach.kernels.reward import reward
 from app.sim.robot.kernels.actions import ActionRule, Coefficients, advance
 from app.sim.robot.kernels.arm import copy_capsules, place_robot
 from app.sim.robot.kernels.joints import JointPath, JointState
@@ -57,8 +55,12 @@ from app.sim.scenario.kernels.episode import (
     SUCCESS,
     SUCCESS_DISTANCE,
     TIMEOUT,
+    EpisodeState,
+    Indices,
+    StepWorkspace,
+    distance_to,
+    measure,
 )
-from app.sim.scenario.kernels.episode import distance_to as tcp_distance
 
 N_ACCOUNT = 11
 (
@@ -66,60 +68,78 @@ N_ACCOUNT = 11
     STOPPED,
     BELOW_HALF,
     SLOWED,
-    STANDING,
-    HELD,
-    JOINT_WAY,
-    TOOL_WAY,
+    STANDSTILL,
+    STANDSTILL_STOPPED,
+    JOINT_PATH,
+    TOOL_PATH,
     CONTACT,
     SPEED,
     FASTEST,
 ) = range(N_ACCOUNT)
-"""Of an episode: periods; those with override 0, below one half and below 1; those at whose end
-the robot stands, for whatever reason, and those of them with override 0; the way of the joints
+"""Account of an episode: control cycles; cycles with override 0, below one half and below 1;
+cycles that end at standstill, and those of them with override 0; path length of the joints
 [rad] and of the tcp [m]; NO_TOUCH, PERSON or CELL; speed of the touching link [m/s]; greatest
 speed of any person [m/s]."""
 NO_TOUCH, PERSON, CELL = range(3)
-"""What touched the robot in an episode; at its end, where that ends it."""
+"""Contacts of an episode."""
 AT_REST = 1e-3
-"""Joints slower than this stand [rad/s]."""
+"""Largest joint speed of a robot at standstill [rad/s]."""
 
 
-class Guard(NamedTuple):
-    """What a guarded batch has besides the rows of the scenario."""
+class MonitoredState(NamedTuple):
+    """Safety layer, tracks and accounts of the environments."""
 
     safety: SeparationRule
-    """What the safety layer assumes."""
-    guarded: bool
-    """Whether the layer acts; without it, pieces are executed as commanded."""
+    """Assumptions of the safety layer."""
+    active: bool
+    """Whether the layer acts; otherwise segments are executed as commanded."""
     rest_ends: bool
-    """Whether a person who walks into a robot at rest ends the episode; if not, that is noted,
-    and the episode goes on."""
+    """Whether a person who walks into a robot at standstill ends the episode."""
     horizon: float
-    """Most time left that a policy is shown [s]."""
+    """Largest time left that a policy observes [s]."""
     measured: bool
-    """Whether the layer is told how walkers go on."""
+    """Whether the layer uses the measured velocity of pedestrians."""
     tracks: Vec
-    """Cylinder in place of each row's first walker, at the ends of periods: x, y, radius [m],
-    shape (n_envs, n + 1, 3); no rows where people walk by themselves."""
+    """Cylinder in place of each environment's first pedestrian at the ends of control cycles:
+    x, y, radius [m], shape (n_envs, n + 1, 3); no rows where people walk by themselves."""
     period: NDArray[np.int64]
-    """Period of each row's track, shape (n_envs,)."""
+    """Control cycle of each track, shape (n_envs,)."""
     trial: TrialWorkspace
     """Work space of the contact search and the safety layer."""
     override: Vec
-    """Override of the last period, shape (n_envs,)."""
+    """Override of the last control cycle, shape (n_envs,)."""
     account: Vec
-    """What happened in the present episode, shape (n_envs, N_ACCOUNT)."""
+    """Account of the present episode, shape (n_envs, N_ACCOUNT)."""
     closed: Vec
-    """The same of each row's last episode that ended, shape (n_envs, N_ACCOUNT)."""
+    """Account of each environment's last completed episode, shape (n_envs, N_ACCOUNT)."""
+
+
+class Commands(NamedTuple):
+    """Commands of one control cycle: actions, or segments."""
+
+    act: NDArray[np.float32]
+    """Actions of all environments, shape (n_envs, 6)."""
+    segments: Vec
+    """Second coefficients of segments of degree 2, one per stepped environment [rad/s^2], shape
+    (k, 6); no rows for actions."""
+
+
+class StepResults(NamedTuple):
+    """Results of one control cycle; entries of other environments are left unchanged."""
+
+    rew: NDArray[np.float32]
+    """Rewards, shape (n_envs,)."""
+    ended: NDArray[np.int64]
+    """Outcome of episodes that ended now, RUNNING elsewhere, shape (n_envs,)."""
 
 
 @kernel(inline="always")
-def put_on_track(state: ReachState, e: int, guard: Guard, dt: float) -> None:
-    """Write the walker of environment ``e`` as its track has it now, and its velocity.
+def follow_track(state: EpisodeState, e: int, monitor: MonitoredState, dt: float) -> None:
+    """Move the pedestrian of environment ``e`` to the present place of its track.
 
-    Past its end a track stands still.
+    After its end a track stays where it is.
     """
-    track, k = guard.tracks[e], guard.period[e]
+    track, k = monitor.tracks[e], monitor.period[e]
     last = track.shape[0] - 1
     now, after = track[min(k, last)], track[min(k + 1, last)]
     row = state.people.walkers.rows[e, 0]
@@ -137,24 +157,25 @@ def put_on_track(state: ReachState, e: int, guard: Guard, dt: float) -> None:
 
 @kernel(inline="always")
 def begin_episode(
-    world: ReachWorld, state: ReachState, e: int, guard: Guard, work: Work
+    world: ReachCell, state: EpisodeState, e: int, monitor: MonitoredState, work: StepWorkspace
 ) -> None:
-    """Clear the account of environment ``e`` and put its person on the track, if any."""
+    """Clear the account of environment ``e`` and move its person onto the track, if any."""
     for k in range(N_ACCOUNT):
-        guard.account[e, k] = 0.0
-    guard.override[e], guard.period[e] = 1.0, 0
-    if guard.tracks.shape[0] > 0:
-        put_on_track(state, e, guard, world.arm.dt)
+        monitor.account[e, k] = 0.0
+    monitor.override[e], monitor.period[e] = 1.0, 0
+    if monitor.tracks.shape[0] > 0:
+        follow_track(state, e, monitor, world.arm.dt)
         place_robot(world.arm, state.q[e], work.robot)
         place_people(world.people, state.people, e, work.crowd)
-        clear = clearances(world.arm, world.people, work.robot, work.crowd)
-        state.clear[e, 0], state.clear[e, 1], state.clear[e, 2] = clear
-    state.time_left[e] = min(guard.horizon, state.time_left[e])
+        measure(world.arm, world.people, state, e, work)
+    state.time_left[e] = min(monitor.horizon, state.time_left[e])
 
 
 @kernel(inline="always")
-def _people_before(world: ReachWorld, state: ReachState, e: int, trial: TrialWorkspace) -> None:
-    """Keep where people are when a period begins."""
+def _people_before(
+    world: ReachCell, state: EpisodeState, e: int, trial: TrialWorkspace
+) -> None:
+    """Store the people at the start of a control cycle."""
     copy_rows(state.people.columns[e], trial.columns0)
     for k in range(trial.cylinders0.shape[0]):
         for i in range(3):
@@ -165,13 +186,13 @@ def _people_before(world: ReachWorld, state: ReachState, e: int, trial: TrialWor
 
 @kernel(inline="always")
 def _people_after(
-    world: ReachWorld, state: ReachState, e: int, guard: Guard, work: Work
+    world: ReachCell, state: EpisodeState, e: int, monitor: MonitoredState, work: StepWorkspace
 ) -> None:
-    """Move the people on by one period."""
-    arm, trial = world.arm, guard.trial
-    guard.period[e] += 1
-    if guard.tracks.shape[0] > 0:
-        put_on_track(state, e, guard, arm.dt)
+    """Move the people through one control cycle and store them at its end."""
+    arm, trial = world.arm, monitor.trial
+    monitor.period[e] += 1
+    if monitor.tracks.shape[0] > 0:
+        follow_track(state, e, monitor, arm.dt)
     else:
         advance_people(world.people, state.people, e, state.robot[e], arm.dt, work.crowd.away)
     place_people(world.people, state.people, e, work.crowd)
@@ -183,8 +204,8 @@ def _people_after(
 
 
 @kernel(inline="always")
-def _show_going(state: ReachState, e: int, space: SsmWorkspace) -> None:
-    """Tell the layer how the walkers of environment ``e`` go on, as measured."""
+def _pass_velocities(state: EpisodeState, e: int, space: SsmWorkspace) -> None:
+    """Pass the measured velocities of the pedestrians of environment ``e`` to the layer."""
     rows, m = state.people.walkers.rows, space.known_speed.shape[0] - space.velocity.shape[0]
     for k in range(space.velocity.shape[0]):
         row, going = rows[e, k], space.velocity[k]
@@ -193,28 +214,27 @@ def _show_going(state: ReachState, e: int, space: SsmWorkspace) -> None:
 
 
 @kernel(inline="always")
-def _execute(world: ReachWorld, state: ReachState, e: int, guard: Guard, work: Work) -> None:
-    """Ask the safety layer about the piece in ``work``; what is executed is in its watch."""
-    trial, account = guard.trial, guard.account[e]
-    watch, override = trial.ssm, 1.0
+def _execute(
+    world: ReachCell, state: EpisodeState, e: int, monitor: MonitoredState, work: StepWorkspace
+) -> None:
+    """Apply the safety layer to the segment in ``work``; ``trial.ssm`` has the motion."""
+    trial, account = monitor.trial, monitor.account[e]
+    space, override = trial.ssm, 1.0
     for j in range(6):
         trial.q[j], trial.qd[j] = state.q[e, j], state.qd[e, j]
-    if guard.measured:
-        _show_going(state, e, watch)
-    if guard.guarded:
+    if monitor.measured:
+        _pass_velocities(state, e, space)
+    if monitor.active:
         people = PeopleShapes(trial.columns0, trial.cylinders0)
         path = JointPath(trial.q, trial.qd, work.c, work.d)
-        override = decide(world.arm, guard.safety, 0.0, people, path, watch)
+        override = decide(world.arm, monitor.safety, 0.0, people, path, space)
     else:
-        watch.deceleration[0] = 0.0
+        end = space.end
+        space.deceleration[0] = 0.0
         for j in range(6):
-            watch.c[j], watch.d[j] = work.c[j], work.d[j]
-            watch.end.q[j], watch.end.qd[j], watch.end.qdd[j] = (
-                work.q[j],
-                work.qd[j],
-                work.qdd[j],
-            )
-    guard.override[e] = override
+            space.c[j], space.d[j] = work.c[j], work.d[j]
+            end.q[j], end.qd[j], end.qdd[j] = work.q[j], work.qd[j], work.qdd[j]
+    monitor.override[e] = override
     account[PERIODS] += 1.0
     account[STOPPED] += 1.0 if override <= 0.0 else 0.0
     account[BELOW_HALF] += 1.0 if override < 0.5 else 0.0
@@ -222,9 +242,9 @@ def _execute(world: ReachWorld, state: ReachState, e: int, guard: Guard, work: W
 
 
 @kernel(inline="always")
-def _touch(world: ReachWorld, guard: Guard, e: int) -> bool:
-    """Note whether people touch the robot, and how fast the link is; tell if it ends here."""
-    arm, trial, account = world.arm, guard.trial, guard.account[e]
+def _touch(world: ReachCell, monitor: MonitoredState, e: int) -> bool:
+    """Check for contact with people and account for it; return whether the episode ends."""
+    arm, trial, account = world.arm, monitor.trial, monitor.account[e]
     account[FASTEST] = max(account[FASTEST], people_speed(trial, arm.dt))
     if trial.cylinders0.shape[0] + trial.columns0.shape[1] == 0:
         return False
@@ -235,68 +255,66 @@ def _touch(world: ReachWorld, guard: Guard, e: int) -> bool:
         return False
     speed = touching_speed(arm, part, trial)
     account[CONTACT], account[SPEED] = PERSON, max(account[SPEED], speed)
-    return guard.rest_ends or speed > MOVING
+    return monitor.rest_ends or speed > MOVING
 
 
 @kernel(inline="always")
-def _arrive(world: ReachWorld, state: ReachState, e: int, guard: Guard, work: Work) -> float:
-    """Put the robot where the period ends and measure; return the distance to the goal [m]."""
-    arm, watch, account = world.arm, guard.trial.ssm, guard.account[e]
+def _arrive(
+    world: ReachCell, state: EpisodeState, e: int, monitor: MonitoredState, work: StepWorkspace
+) -> float:
+    """Move the robot to the end of the cycle; return the distance to the goal [m]."""
+    arm, end, account = world.arm, monitor.trial.ssm.end, monitor.account[e]
     place_robot(arm, state.q[e], work.robot)
     x, y, z = work.robot.tcp[0], work.robot.tcp[1], work.robot.tcp[2]
     square, fastest = 0.0, 0.0
     for j in range(6):
-        square += (watch.end.q[j] - state.q[e, j]) ** 2
-        fastest = max(fastest, abs(watch.end.qd[j]))
-        state.q[e, j], state.qd[e, j], state.qdd[e, j] = (
-            watch.end.q[j],
-            watch.end.qd[j],
-            watch.end.qdd[j],
-        )
-    account[JOINT_WAY] += math.sqrt(square)
+        square += (end.q[j] - state.q[e, j]) ** 2
+        fastest = max(fastest, abs(end.qd[j]))
+        state.q[e, j], state.qd[e, j], state.qdd[e, j] = end.q[j], end.qd[j], end.qdd[j]
+    account[JOINT_PATH] += math.sqrt(square)
     if fastest < AT_REST:
-        account[STANDING] += 1.0
-        account[HELD] += 1.0 if guard.override[e] <= 0.0 else 0.0
+        account[STANDSTILL] += 1.0
+        account[STANDSTILL_STOPPED] += 1.0 if monitor.override[e] <= 0.0 else 0.0
     place_robot(arm, state.q[e], work.robot)
     tcp = work.robot.tcp
-    account[TOOL_WAY] += math.sqrt((tcp[0] - x) ** 2 + (tcp[1] - y) ** 2 + (tcp[2] - z) ** 2)
+    account[TOOL_PATH] += math.sqrt((tcp[0] - x) ** 2 + (tcp[1] - y) ** 2 + (tcp[2] - z) ** 2)
     copy_capsules(work.robot.columns, state.robot[e])
-    clear = clearances(arm, world.people, work.robot, work.crowd)
-    state.clear[e, 0], state.clear[e, 1], state.clear[e, 2] = clear
-    return float(tcp_distance(state.goal[e], work.robot))
+    measure(arm, world.people, state, e, work)
+    return float(distance_to(state.goal[e], work.robot))
 
 
 @kernel(inline="always")
-def guarded_period(
-    world: ReachWorld, rules: ReachRules, weights: ReachWeights, state: ReachState, e: int,
-    guard: Guard, work: Work,
-) -> float:  # fmt: skip
-    """Run one period of environment ``e`` with the commanded piece in ``work.c, work.d``.
+def monitored_cycle(
+    world: ReachCell,
+    task: ReachTask,
+    state: EpisodeState,
+    e: int,
+    monitor: MonitoredState,
+    work: StepWorkspace,
+) -> float:
+    """Execute one control cycle of environment ``e``; return the reward.
 
     Args:
         world: Shared data.
-        rules: Time limit and ends.
-        weights: Reward coefficients.
-        state: Rows; changed.
+        task: Time limit and reward coefficients.
+        state: Environments; changed.
         e: Environment.
-        guard: Safety layer, tracks and accounts.
+        monitor: Safety layer, tracks and accounts.
         work: ``c``, ``d`` are the command; ``q``, ``qd``, ``qdd`` its end.
-
-    Returns:
-        The reward of the period.
     """
-    _people_before(world, state, e, guard.trial)
-    _execute(world, state, e, guard, work)
-    _people_after(world, state, e, guard, work)
-    touched = _touch(world, guard, e)
+    weights = task.weights
+    _people_before(world, state, e, monitor.trial)
+    _execute(world, state, e, monitor, work)
+    _people_after(world, state, e, monitor, work)
+    touched = _touch(world, monitor, e)
     before = state.distance[e]
-    d = _arrive(world, state, e, guard, work)
+    d = _arrive(world, state, e, monitor, work)
     state.distance[e] = d
     state.elapsed[e] += world.arm.dt
-    left = rules.time_limit - state.elapsed[e]
-    state.time_left[e] = min(guard.horizon, left)
+    left = task.rules.time_limit - state.elapsed[e]
+    state.time_left[e] = min(monitor.horizon, left)
     if not touched and min(state.clear[e, 1], state.clear[e, 2]) <= 0.0:
-        touched, guard.account[e, CONTACT] = True, CELL
+        touched, monitor.account[e, CONTACT] = True, CELL
     if touched:
         state.touched[e] += 1
         state.outcome[e] = COLLISION
@@ -304,34 +322,31 @@ def guarded_period(
         state.outcome[e] = SUCCESS
     elif left <= 1e-9:
         state.outcome[e] = TIMEOUT
-    stopped = weights.c_o if guard.override[e] <= 0.0 else 0.0
+    stopped = weights.c_o if monitor.override[e] <= 0.0 else 0.0
     return reward(before, d, work.c, touched, state.outcome[e] == SUCCESS, weights) - stopped
 
 
 @kernel(inline="always")
-def command(
-    world: ReachWorld, action: ActionRule, state: ReachState, e: int, act: NDArray[np.float32],
-    work: Work,
-) -> None:  # fmt: skip
-    """Write the piece that an action commands into the work space."""
+def _command_action(
+    world: ReachCell,
+    action: ActionRule,
+    state: EpisodeState,
+    e: int,
+    act: NDArray[np.float32],
+    work: StepWorkspace,
+) -> None:
+    """Write the segment that an action commands into the work space."""
     arm = world.arm
     start = JointState(state.q[e], state.qd[e], state.qdd[e])
     segment, end = Coefficients(work.c, work.d), JointState(work.q, work.qd, work.qdd)
     advance(action, arm.limits, arm.dt, start, act, segment, end)
 
 
-@kernel(nogil=True, error_model="numpy")
-def begin_rows(
-    world: ReachWorld, state: ReachState, rows: Indices, guard: Guard, work: Work
-) -> None:
-    """Begin the episodes of some environments, shape (k,), that were just reset."""
-    for e in rows:
-        begin_episode(world, state, e, guard, work)
-
-
 @kernel(inline="always")
-def take_piece(state: ReachState, e: int, c: Vec, dt: float, work: Work) -> None:
-    """Write a given piece of degree 2, by its second coefficients, into the work space."""
+def _command_segment(
+    state: EpisodeState, e: int, c: Vec, dt: float, work: StepWorkspace
+) -> None:
+    """Write a segment of degree 2, by its second coefficients, into the work space."""
     for j in range(6):
         work.c[j], work.d[j], work.qdd[j] = c[j], 0.0, 2.0 * c[j]
         work.q[j] = state.q[e, j] + dt * (state.qd[e, j] + dt * c[j])
@@ -339,50 +354,55 @@ def take_piece(state: ReachState, e: int, c: Vec, dt: float, work: Work) -> None
 
 
 @kernel(nogil=True, error_model="numpy")
-def step_rows(
-    world: ReachWorld,
-    rules: ReachRules,
-    action: ActionRule,
-    weights: ReachWeights,
-    state: ReachState,
-    guard: Guard,
-    work: Work,
-    rows: Indices,
-    act: NDArray[np.float32],
-    pieces: Vec,
-    rew: NDArray[np.float32],
-    ended: NDArray[np.int64],
+def begin_rows(
+    world: ReachCell,
+    state: EpisodeState,
+    envs: Indices,
+    monitor: MonitoredState,
+    work: StepWorkspace,
 ) -> None:
-    """Step some environments under the safety layer, by actions or given pieces.
+    """Begin the episodes of some environments, shape (k,), that were just reset."""
+    for e in envs:
+        begin_episode(world, state, e, monitor, work)
 
-    Both in one kernel: the period would be compiled twice in two.
+
+@kernel(nogil=True, error_model="numpy")
+def step_rows(
+    world: ReachCell,
+    task: ReachTask,
+    state: EpisodeState,
+    monitor: MonitoredState,
+    work: StepWorkspace,
+    envs: Indices,
+    commands: Commands,
+    results: StepResults,
+) -> None:
+    """Step some environments under the safety layer.
+
+    One kernel for actions and segments, because two would compile the control cycle twice.
 
     Args:
         world: Shared data.
-        rules: Time limit and ends.
-        action: How actions are read.
-        weights: Reward coefficients.
-        state: Rows; changed.
-        guard: Safety layer, tracks and accounts.
+        task: Rules, action type and reward coefficients.
+        state: Environments; changed.
+        monitor: Safety layer, tracks and accounts.
         work: Work space.
-        rows: Which environments, shape (k,).
-        act: Actions of all environments, shape (n_envs, 6).
-        pieces: In place of actions the second coefficients of pieces of degree 2 [rad/s^2],
-            shape (k, 6); none for actions.
-        rew: Filled for those environments, shape (n_envs,).
-        ended: Filled with how their episodes ended, or RUNNING, shape (n_envs,).
+        envs: Numbers of the environments, shape (k,).
+        commands: Actions or segments.
+        results: Filled for these environments.
     """
-    for k in range(rows.shape[0]):
-        e = rows[k]
+    rew, ended = results.rew, results.ended
+    for k in range(envs.shape[0]):
+        e = envs[k]
         ended[e], rew[e] = RUNNING, 0.0
         if state.outcome[e] != RUNNING:
             continue
-        if pieces.shape[0] > 0:
-            take_piece(state, e, pieces[k], world.arm.dt, work)
+        if commands.segments.shape[0] > 0:
+            _command_segment(state, e, commands.segments[k], world.arm.dt, work)
         else:
-            command(world, action, state, e, act[e], work)
-        rew[e] = guarded_period(world, rules, weights, state, e, guard, work)
+            _command_action(world, task.action, state, e, commands.act[e], work)
+        rew[e] = monitored_cycle(world, task, state, e, monitor, work)
         ended[e] = state.outcome[e]
         if ended[e] != RUNNING:
             for i in range(N_ACCOUNT):
-                guard.closed[e, i] = guard.account[e, i]
+                monitor.closed[e, i] = monitor.account[e, i]

@@ -1,9 +1,8 @@
-"""A policy's network asked for few states at once, compiled.
+"""Actor network evaluated for few states at once (compiled).
 
-The actor adds to the base motion (``reach_prospect.py``): ``tanh(net(obs) + atanh(w base))``,
-with two hidden layers of rectified units, three in four of which say nothing. A library's
-matrices cannot leave those out, and cost more than they do to call. Beyond ``FEW`` states they
-are as fast.
+The action adds to the base motion (``base_controller.py``): ``tanh(net(obs) + atanh(w base))``,
+with two hidden layers of rectified linear units. Three in four of the units are zero and are
+skipped, which a library's matrix product cannot do; a library is as fast beyond ``FEW`` states.
 """
 
 import math
@@ -13,40 +12,41 @@ import numpy as np
 
 from app.sim.core.jit import kernel
 from app.sim.prediction.kernels.networks import Floats, Network, layer
-from app.sim.reach.kernels.observation import BASE_START, Obs
+from app.sim.reach.kernels.observation import BASE_START
+from app.sim.scenario.kernels.person_observation import Obs
 
 N_ACT = 6
 """Joints."""
 FEW = 32
-"""States up to which the kernel is faster than a library: 8 targets beside each of 4 people."""
+"""Number of states up to which this kernel is faster: 8 targets beside each of 4 people."""
 
 
-class ResidualActor(NamedTuple):
-    """Network and work space; used by one thread at a time."""
+class CompiledActor(NamedTuple):
+    """Network and work space; for one thread."""
 
     net: Network
     """The network."""
     base_weight: float
-    """Share of the base motion in its action."""
+    """Weight of the base motion in the action."""
     h1: Floats
     """First hidden layer, shape (width,)."""
     h2: Floats
     """Second hidden layer, shape (width,)."""
 
 
-def new_residual_actor(net: Network, base_weight: float) -> ResidualActor:
-    """Return a network with work space of its own."""
+def new_compiled_actor(net: Network, base_weight: float) -> CompiledActor:
+    """Return a network with its own work space."""
     h1, h2 = np.zeros((2, len(net.b1)), dtype=np.float32)
-    return ResidualActor(net, base_weight, h1, h2)
+    return CompiledActor(net, base_weight, h1, h2)
 
 
 @kernel()
-def answer(actor: ResidualActor, obs: Obs, act: Floats) -> None:
+def act_once(actor: CompiledActor, obs: Obs, act: Floats) -> None:
     """Write the action for one state.
 
     Args:
         actor: Network and work space.
-        obs: What is observed, shape (n_obs,).
+        obs: Observation, shape (n_obs,).
         act: Filled, in [-1, 1], shape (N_ACT,).
     """
     net = actor.net
@@ -59,13 +59,13 @@ def answer(actor: ResidualActor, obs: Obs, act: Floats) -> None:
 
 
 @kernel(nogil=True)
-def answers(actor: ResidualActor, obs: Obs, acts: Floats) -> None:
-    """Write the actions for some states, each by itself: no answer hangs on the others.
+def act_batch(actor: CompiledActor, obs: Obs, acts: Floats) -> None:
+    """Write the actions for some states; each result is independent of the other states.
 
     Args:
         actor: Network and work space.
-        obs: What is observed, shape (n, n_obs).
+        obs: Observations, shape (n, n_obs).
         acts: Filled, in [-1, 1], shape (n, N_ACT).
     """
     for row in range(obs.shape[0]):
-        answer(actor, obs[row], acts[row])
+        act_once(actor, obs[row], acts[row])

@@ -1,27 +1,32 @@
-"""The ways that looking ahead tries in place of the policy's own, compiled.
+"""Candidate action sequences of the rollout policy improvement (compiled).
 
-A way leads the robot somewhere for some steps, and then goes on as ``lookahead.py`` says: to a
-posture, or to a stop, and then as the policy wants; straight to the goal; or it is a *dash*:
-pan, shoulder and elbow each at full speed forward or back, or held, and then a stop; or a
-*dart*: to a posture that is drawn, for a time that is drawn, and then straight to the goal.
+A candidate moves the robot for some steps and then continues as its kind says:
+
+- to a via configuration, or a stop, followed by the policy;
+- straight to the goal;
+- a *bang-bang* evasion: pan, shoulder and elbow each at full speed forward or backward, or
+  held, followed by a stop;
+- to a randomly sampled waypoint for a random time, followed by a straight motion to the goal
+  (random shooting).
 """
 
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
 from app.sim.core.kernels import rng as random
-from app.sim.reach.rollout.kernels.prediction import MOMENTS, N_PLAYED
+from app.sim.prediction.kernels.networks import Floats
+from app.sim.reach.rollout.kernels.prediction import HORIZON_STEPS, N_MOMENTS
 from app.sim.robot.kernels.arm import Arm
 
 GAIN = 5.0
-"""Speed wanted of a joint per way left to a posture [1/s]."""
-PASSED = -1
-"""In place of the number of a way, or of a posture: the policy's action passes as it is."""
-POSTURES = (
+"""Joint speed per remaining joint difference [1/s]."""
+POLICY = -1
+"""In place of the number or kind of a candidate: the policy's own action."""
+VIAS = (
     (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
     (0.0, 0.5, -0.5, 0.0, 0.0, 0.0),
     (0.0, -0.3, 0.7, 0.0, 0.0, 0.0),
@@ -29,77 +34,82 @@ POSTURES = (
     (-0.9, 0.0, 0.0, 0.0, 0.0, 0.0),
     (0.0, 0.6, 0.3, 0.0, 0.0, 0.0),
 )
-"""Where ways lead first, less home [rad]: home, ahead and low, drawn up, to either side, ahead
-and down."""
-NAMES = ("home", "low", "up", "left", "right", "down", "stop")
-"""Their names; the last is to stop where it is."""
-LASTING = (2, 8, 15)
-"""For how many steps they do."""
-N_POSTURES = len(POSTURES) + 1
-"""Postures, and the one at which it stops."""
-STOP = N_POSTURES - 1
-"""In place of a posture: to stop."""
-STRAIGHT = N_POSTURES
-"""In place of a posture: the tcp straight to the goal, all the time."""
-N_FIRST = N_POSTURES * len(LASTING) + 1
-"""Ways but the dashes: each posture for each time, then the policy; straight."""
-STRAIGHT_WAY = N_FIRST - 1
-"""Number of the straight one."""
+"""Via configurations relative to home [rad]."""
+VIA_NAMES = ("home", "low", "up", "left", "right", "down", "stop")
+"""Names of the via configurations and of the stop."""
+VIA_STEPS = (2, 8, 15)
+"""Durations of the motion to a via configuration [steps]."""
+N_VIAS = len(VIAS) + 1
+"""Via configurations and the stop."""
+STOP = N_VIAS - 1
+"""Kind: stop."""
+STRAIGHT = N_VIAS
+"""Kind: the tcp straight to the goal."""
+N_FIXED = N_VIAS * len(VIA_STEPS) + 1
+"""Candidates that are not evasions or samples: each via for each duration; straight."""
+STRAIGHT_CANDIDATE = N_FIXED - 1
+"""Number of the straight candidate."""
 SIGNS = tuple(signs for signs in product((0.0, 1.0, -1.0), repeat=3) if any(signs))
-"""Directions of the dashes: of pan, shoulder and elbow."""
+"""Directions of pan, shoulder and elbow in each bang-bang evasion."""
 DIRECTIONS = np.array(SIGNS)
-DASHING = (6, 15)
-"""For how many steps they last."""
-DASH = STRAIGHT + 1
-"""In place of a posture: the first of them."""
-DART = DASH + len(DIRECTIONS)
-"""In place of a posture: that of a dart."""
-N_DRAWN = N_FIRST + len(DIRECTIONS) * len(DASHING)
-"""Ways but the darts."""
-N_OTHERS = N_DRAWN + 1
-"""All ways; first those that the policy ends, then the dashes; the darts are the last one."""
-N_DARTS, N_DARTS_LAYERED = 32, 128
-"""Darts of one decision, and under a safety layer, where most of the ways begun are darts."""
-DART_PLAYED = MOMENTS - 1
-"""For how many steps a dart is played, and the longest that one leads away."""
-AROUND = np.array([1.5, 0.8, 0.8, 0.8, 0.8, 0.0])
-"""How far from home, or from where the robot is, a dart may lead [rad]."""
-WAITING = 0.25
-"""Share of those drawn that first stop."""
-VARIED = 0.7
-"""Share of the darts that are like the one that came nearest to the goal so far."""
+EVASION_STEPS = (6, 15)
+"""Durations of an evasion [steps]."""
+EVASION = STRAIGHT + 1
+"""Kind of the first evasion."""
+SAMPLE = EVASION + len(DIRECTIONS)
+"""Kind: sampled waypoint."""
+N_DETERMINISTIC = N_FIXED + len(DIRECTIONS) * len(EVASION_STEPS)
+"""Candidates that are not sampled."""
+N_CANDIDATES = N_DETERMINISTIC + 1
+"""All candidates: fixed ones, evasions, and one number for all samples."""
+N_SAMPLES, N_SAMPLES_SSM = 32, 128
+"""Samples per decision, without and with a speed and separation constraint."""
+SAMPLE_STEPS = N_MOMENTS - 1
+"""Steps of a sampled candidate, and the longest motion to its waypoint."""
+SPREAD = np.array([1.5, 0.8, 0.8, 0.8, 0.8, 0.0])
+"""Half width of the box around home or the present configuration in which waypoints are sampled
+[rad]."""
+STOP_SHARE = 0.25
+"""Share of samples whose waypoint is home or the present configuration itself."""
+PERTURBED_SHARE = 0.7
+"""Share of samples that perturb the incumbent, the best sample so far."""
 WIDEST, LONGEST = 0.3, 8.0
-"""By how much they differ from it at most, as a standard deviation: shares of AROUND, steps."""
-
-Floats = NDArray[np.float32]
+"""Largest standard deviation of a perturbation: as a share of SPREAD, and in steps."""
 
 
-@kernel()
-def way_of(k: int) -> tuple[int, int]:
-    """Return posture and number of steps of a way by its number, or of PASSED.
+class CandidateSequence(NamedTuple):
+    """One candidate action sequence."""
 
-    A dart's are drawn: see :func:`draw_dart`.
-    """
-    if k == PASSED:
-        return PASSED, 0
-    if k == N_DRAWN:
-        return DART, DART_PLAYED
-    if k >= N_FIRST:
-        k -= N_FIRST
-        return DASH + k // len(DASHING), DASHING[k % len(DASHING)]
-    if k == STRAIGHT_WAY:
-        return STRAIGHT, N_PLAYED
-    return k // len(LASTING), LASTING[k % len(LASTING)]
+    kind: int
+    """Number of a via configuration, STOP, STRAIGHT, EVASION + direction, SAMPLE or POLICY."""
+    steps: int
+    """Duration of its first part [steps]."""
 
 
 @kernel()
-def write_toward(arm: Arm, aim: Vec, q: Vec, act: Floats) -> None:
-    """Write the action that leads to a posture.
+def candidate_of(k: int) -> CandidateSequence:
+    """Return a candidate by its number; waypoint and duration of a sample are drawn later."""
+    if k == POLICY:
+        return CandidateSequence(POLICY, 0)
+    if k == N_DETERMINISTIC:
+        return CandidateSequence(SAMPLE, SAMPLE_STEPS)
+    if k >= N_FIXED:
+        k -= N_FIXED
+        n = len(EVASION_STEPS)
+        return CandidateSequence(EVASION + k // n, EVASION_STEPS[k % n])
+    if k == STRAIGHT_CANDIDATE:
+        return CandidateSequence(STRAIGHT, HORIZON_STEPS)
+    return CandidateSequence(k // len(VIA_STEPS), VIA_STEPS[k % len(VIA_STEPS)])
+
+
+@kernel()
+def write_joint_move(arm: Arm, aim: Vec, q: Vec, act: Floats) -> None:
+    """Write the action that moves all joints to a configuration.
 
     Args:
-        arm: Model and limits.
-        aim: The posture [rad], shape (6,).
-        q: Joints [rad], shape (6,).
+        arm: Robot in its cell.
+        aim: The configuration [rad], shape (6,).
+        q: Joint positions [rad], shape (6,).
         act: Filled, shape (6,).
     """
     for j in range(6):
@@ -107,43 +117,43 @@ def write_toward(arm: Arm, aim: Vec, q: Vec, act: Floats) -> None:
 
 
 @kernel()
-def write_dash(direction: int, lasts: bool, act: Floats) -> None:
-    """Write the action of a dash, or of the stop after it, shape (6,)."""
+def write_bang_bang(direction: int, moving: bool, act: Floats) -> None:
+    """Write the action of an evasion, or of the stop after it, shape (6,)."""
     for j in range(6):
-        act[j] = DIRECTIONS[direction, j] if lasts and j < 3 else 0.0
+        act[j] = DIRECTIONS[direction, j] if moving and j < 3 else 0.0
 
 
 @kernel()
-def draw_dart(arm: Arm, q: Vec, rng: random.State, aim: Vec) -> int:
-    """Draw where a dart leads first; return for how many steps.
+def sample_waypoint(arm: Arm, q: Vec, rng: random.State, aim: Vec) -> int:
+    """Sample a waypoint uniformly; return the duration of the motion to it [steps].
 
     Args:
-        arm: Model and limits.
-        q: Joints now [rad], shape (6,).
-        rng: Stream, shape (1,).
-        aim: Filled [rad], shape (6,).
+        arm: Robot in its cell.
+        q: Joint positions [rad], shape (6,).
+        rng: Random stream, shape (1,).
+        aim: Filled with the waypoint [rad], shape (6,).
     """
     kind = random.uniform(rng)
     for j in range(6):
-        away = 0.0 if kind < WAITING else AROUND[j] * (2.0 * random.uniform(rng) - 1.0)
-        middle = q[j] if kind < 0.5 * (1.0 + WAITING) else arm.home[j]
+        away = 0.0 if kind < STOP_SHARE else SPREAD[j] * (2.0 * random.uniform(rng) - 1.0)
+        middle = q[j] if kind < 0.5 * (1.0 + STOP_SHARE) else arm.home[j]
         aim[j] = min(arm.limits.q_max[j], max(arm.limits.q_min[j], middle + away))
-    return 1 + random.below(rng, DART_PLAYED - 1)
+    return 1 + random.below(rng, SAMPLE_STEPS - 1)
 
 
 @kernel()
-def vary_dart(arm: Arm, aim: Vec, lasting: int, rng: random.State, out: Vec) -> int:
-    """Draw a dart like another one; return for how many steps it leads away.
+def perturb_waypoint(arm: Arm, aim: Vec, steps: int, rng: random.State, out: Vec) -> int:
+    """Sample a waypoint near another one; return the duration of the motion to it [steps].
 
     Args:
-        arm: Model and limits.
-        aim: Where the other one leads first [rad], shape (6,).
-        lasting: For how many steps.
-        rng: Stream, shape (1,).
-        out: Filled [rad], shape (6,).
+        arm: Robot in its cell.
+        aim: The other waypoint [rad], shape (6,).
+        steps: Duration of the motion to the other waypoint [steps].
+        rng: Random stream, shape (1,).
+        out: Filled with the waypoint [rad], shape (6,).
     """
     share = random.uniform(rng)
     for j in range(6):
-        wanted = aim[j] + share * WIDEST * AROUND[j] * random.normal(rng)
+        wanted = aim[j] + share * WIDEST * SPREAD[j] * random.normal(rng)
         out[j] = min(arm.limits.q_max[j], max(arm.limits.q_min[j], wanted))
-    return max(0, lasting + int(share * LONGEST * random.normal(rng)))
+    return max(0, steps + int(share * LONGEST * random.normal(rng)))

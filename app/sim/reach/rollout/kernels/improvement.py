@@ -1,30 +1,26 @@
-"""Looking ahead: what comes of a policy's action, played with the policy itself, compiled.
+"""Rollout policy improvement for reaching (compiled).
 
-A network knows to some centimetres whether its way is free; played forward the same way is
-known to millimetres. So a decision is played ahead: the robot exactly as it moves, people as
-``foretold.py`` says, the policy asked again every ``STEP_S``. Where that ends in a contact,
-those of ``other_ways.py`` are played too, dashes and darts only where all before end in one.
-The best way is begun, for one period. The next decision looks anew, and what is left of the
-way begun is one of those looked at: it is gone on with until the policy's own way is better.
-An action of another way is held for ``STEP_S``, as it was played: so what is gone on with ends
-as it was told, beside people who do as foretold.
+At each decision the policy is simulated forward from the present state (``rollout.py``),
+beside people whose motion is predicted by ``prediction.py``. If that rollout collides, other
+action sequences (``candidates.py``) are simulated: fixed ones first, evasions and sampled
+waypoints only where all before collide. The best sequence is executed for one control cycle
+(receding horizon); its remainder is a candidate of the next decision (warm start). An action is
+held for ``STEP_S``, as in the simulation, so that a remainder ends as it was simulated.
 
-Later in an episode other ways are also played where the policy's leads neither to the goal nor
-into a contact: it may wait longer than it must. Only one that ends at the goal is begun then.
-Darts find ways around somebody who stands: most are drawn near the one that came nearest to the
-goal so far, so that they get better from decision to decision.
+Later in an episode candidates are also simulated where the policy's rollout neither succeeds
+nor collides, since the policy may wait longer than necessary; then only a candidate that
+succeeds is selected. Most sampled waypoints perturb the incumbent, the sample that came nearest
+to the goal so far, so that samples improve from decision to decision.
 
-Under a safety layer that goes by measured velocities (``played_ways.py``) the other ways are
-looked for wherever the policy's does not end at the goal soon, and what begins soonest to end
-there is begun: mostly a dart that gets out of somebody's way in time, and back as they pass.
+Under a speed and separation constraint candidates are simulated wherever the policy does not
+succeed soon, and the one that succeeds soonest is selected: mostly a sampled waypoint that
+leaves a person's path in time and returns as the person passes.
 
-What is foretold promises nothing: people turn. Speed and separation monitoring (``ssm.py``) is
-what keeps them safe.
+Predictions carry no guarantee; speed and separation monitoring (``ssm.py``) does.
 
-Source: rollout, or policy improvement on-line: Tesauro and Galperin, *On-line policy
-improvement using Monte-Carlo search* (1996); Bertsekas et al., *Rollout algorithms for
-combinatorial optimization* (1997). Deviates: one forecast instead of samples, and improvement
-only where it is needed.
+Source: Tesauro and Galperin, *On-line policy improvement using Monte-Carlo search* (1996);
+Bertsekas et al., *Rollout algorithms for combinatorial optimization* (1997). Deviates: one
+predicted motion instead of samples; candidates only where the policy's rollout fails.
 """
 
 import math
@@ -36,268 +32,258 @@ from app.sim.core.jit import kernel
 from app.sim.core.kernels import rng as random
 from app.sim.geometry.capsules import copy_values
 from app.sim.prediction.kernels.networks import STEP_S, Floats
-from app.sim.reach.kernels.episode import ReachState, ReachWorld, Work
+from app.sim.reach.kernels.episode import ReachCell
 from app.sim.reach.rollout.kernels.candidates import (
-    DART,
-    N_DARTS,
-    N_DARTS_LAYERED,
-    N_DRAWN,
-    N_FIRST,
-    PASSED,
-    VARIED,
-    draw_dart,
-    vary_dart,
-    way_of,
+    N_DETERMINISTIC,
+    N_FIXED,
+    N_SAMPLES,
+    N_SAMPLES_SSM,
+    PERTURBED_SHARE,
+    POLICY,
+    SAMPLE,
+    CandidateSequence,
+    candidate_of,
+    perturb_waypoint,
+    sample_waypoint,
 )
-from app.sim.reach.rollout.kernels.prediction import LONG_MOMENTS, MOMENTS, foretell
+from app.sim.reach.rollout.kernels.prediction import N_LONG_MOMENTS, N_MOMENTS, predict_people
 from app.sim.reach.rollout.kernels.rollout import (
-    AT_GOAL,
-    WAITED,
-    Lookahead,
-    heed_layer,
+    SSM_TIME_COST,
+    SUCCESS_SCORE,
+    Beginning,
+    apply_ssm_constraint,
     periods_of,
-    play,
+    simulate_candidate,
 )
+from app.sim.reach.rollout.kernels.workspace import DISTANCE, RolloutWorkspace
 from app.sim.robot.kernels.actions import ActionRule
-from app.sim.scenario.kernels.episode import COLLISION, RUNNING
+from app.sim.scenario.kernels.episode import COLLISION, RUNNING, EpisodeState
 
-NO_CONTACT = -1.0
-"""Worth more is every way that ends in no contact."""
+NO_COLLISION = -1.0
+"""Scores above this are those of rollouts without a collision."""
 BETTER = 0.02
-"""By how much another way must be worth more than the best so far."""
-WORTH_IT = 1.0
-"""Worth more is every way that ends at the goal."""
-PATIENCE_S, HURRY_S = 1.0, 4.0
-"""Ways other than dashes are played, too, where the policy's ends neither at the goal nor in
-a contact, from so long into an episode on, or when no more time than that is left [s]."""
-SOON_S = 1.5
-"""Under a safety layer no other way is played where one is at the goal so soon [s]."""
-KEPT_ON = 0.5
-"""Share of what is kept from people that counts on a way that is gone on with."""
-OWN, BEGUN, FIRST_OTHER = 0, 1, 2
-"""Ways in the order in which a decision plays them: the policy's own, what is left of the one
-begun last, the others by their numbers."""
-FIRST_DASH, FIRST_DART = FIRST_OTHER + N_FIRST, FIRST_OTHER + N_DRAWN
-LAST_DART = FIRST_DART + N_DARTS_LAYERED - 1
-N_LOOKED = LAST_DART + 1
-"""In place of the number of a way: no more is played."""
+"""Least improvement over the best score so far."""
+SUCCEEDS = 1.0
+"""Scores above this are those of rollouts that reach the goal."""
+STALL_TIME = 1.0
+"""Elapsed time after which a policy without success or collision counts as stalled [s]."""
+DEADLINE_TIME = 4.0
+"""Time left below which it counts as stalled, too [s]."""
+SOON = 1.5
+"""Under a constraint no candidate is simulated after one that succeeds within this time [s]."""
+WARM_START_MARGIN = 0.5
+"""Share of the prediction margin that applies to the warm start."""
+OWN, WARM_START, FIRST_CANDIDATE = 0, 1, 2
+"""Order of a decision: the policy's own action, the remainder of the previous plan, candidates
+by their numbers."""
+FIRST_EVASION, FIRST_SAMPLE = FIRST_CANDIDATE + N_FIXED, FIRST_CANDIDATE + N_DETERMINISTIC
+END = FIRST_SAMPLE + N_SAMPLES_SSM
+"""Position after the last candidate."""
 
 
 @kernel()
-def _left(e: int, look: Lookahead, dt: float) -> tuple[int, int]:
-    """Return what is left of the way begun in an environment, as :func:`way_of`; or PASSED."""
-    k = look.plan[e, 0]
-    posture, lasting = way_of(k)
-    look.plan[e, 1] += 1
-    gone = look.plan[e, 1] // periods_of(dt)
-    if k == PASSED or lasting <= gone:
-        return way_of(PASSED)
-    if posture == DART:
-        copy_values(look.darts[e], look.dart)
-        return posture, max(0, look.darting[e] - gone)
-    return posture, lasting - gone
+def remaining_plan(e: int, work: RolloutWorkspace, dt: float) -> CandidateSequence:
+    """Return the remainder of the previous plan of an environment, or POLICY."""
+    k = work.plan[e, 0]
+    candidate = candidate_of(k)
+    work.plan[e, 1] += 1
+    done = work.plan[e, 1] // periods_of(dt)
+    if k == POLICY or candidate.steps <= done:
+        return candidate_of(POLICY)
+    if candidate.kind == SAMPLE:
+        copy_values(work.plan_waypoint[e], work.waypoint)
+        return CandidateSequence(SAMPLE, max(0, work.plan_steps[e] - done))
+    return CandidateSequence(candidate.kind, candidate.steps - done)
 
 
 @kernel(inline="always")
-def _aim_dart(world: ReachWorld, state: ReachState, e: int, k: int, look: Lookahead) -> int:
-    """Draw dart ``k`` of a decision; return for how many steps it leads away.
-
-    The first is the one that came nearest to the goal so far, for as long as is left of it.
-    """
-    nearest = look.nearest[e]
-    if k == 0:
-        random.start_stream(0, 0, look.drawn[e], look.rng)
-        look.drawn[e] += 1
-        if nearest[0] > 0.0:
-            nearest[1] = max(0.0, nearest[1] - (state.elapsed[e] - nearest[2]) / STEP_S)
-            nearest[2] = state.elapsed[e]
-            copy_values(look.near[e], look.dart)
-            return int(nearest[1])
-    if nearest[0] > 0.0 and random.uniform(look.rng) < VARIED:
-        return vary_dart(world.arm, look.near[e], int(nearest[1]), look.rng, look.dart)
-    return draw_dart(world.arm, state.q[e], look.rng, look.dart)
-
-
-@kernel(inline="always")
-def _keep_nearest(
-    state: ReachState, e: int, k: int, lasting: int, worth: float, look: Lookahead
-) -> None:
-    """Keep dart ``k`` of a decision, just played, if it came nearer to the goal than others.
-
-    Under a safety layer: if it is worth more.
-    """
-    nearest, lacks = look.nearest[e], look.came[0]
-    if look.kept[0] > 0.0:
-        lacks = AT_GOAL - worth
-    if k == 0 or nearest[0] == 0.0 or lacks < nearest[0]:
-        nearest[0], nearest[1], nearest[2] = lacks, lasting, state.elapsed[e]
-        copy_values(look.dart, look.near[e])
-
-
-@kernel(inline="always")
-def _way_at(
-    world: ReachWorld, state: ReachState, e: int, k: int, look: Lookahead
-) -> tuple[int, int]:
-    """Return the way that is played as number ``k`` of a decision, as :func:`way_of`."""
-    if k == BEGUN:
-        return _left(e, look, world.arm.dt)
-    if k >= FIRST_DART:
-        return DART, _aim_dart(world, state, e, k - FIRST_DART, look)
-    return way_of(PASSED if k == OWN else k - FIRST_OTHER)
-
-
-@kernel()
-def _bar_for_others(state: ReachState, e: int, ended: int, worth: float) -> float:
-    """Return what other ways must be worth; infinite where none is looked for.
-
-    Args:
-        state: Rows.
-        e: Environment.
-        ended: How the best way so far ends: the policy's own, or what is left of the one begun.
-        worth: What it is worth.
-    """
-    if ended == COLLISION:
-        return worth + BETTER
-    late = state.elapsed[e] >= PATIENCE_S or state.time_left[e] <= HURRY_S
-    return WORTH_IT if ended == RUNNING and late else math.inf
-
-
-@kernel()
-def _next_way(k: int, bar: float, other: bool) -> int:
-    """Return which way is played after number ``k``; N_LOOKED for none.
-
-    Args:
-        k: Number of the way played.
-        bar: What others must be worth.
-        other: Whether one of them is chosen already.
-    """
-    k += 1
-    if bar == math.inf or k == FIRST_DART + N_DARTS:
-        return N_LOOKED
-    if k == FIRST_DASH and bar > NO_CONTACT:
-        k = FIRST_DART
-    if k == FIRST_DART and bar > NO_CONTACT and other:
-        return N_LOOKED
-    return k
-
-
-@kernel()
-def _next_under_layer(k: int, bar: float) -> int:
-    """Return what :func:`_next_way` does, under a safety layer: dashes come last."""
-    k += 1
-    if bar > AT_GOAL - WAITED * SOON_S or k == FIRST_DART:
-        return N_LOOKED
-    if k == FIRST_DASH:
-        return FIRST_DART
-    if k == LAST_DART + 1:
-        return N_LOOKED if bar > NO_CONTACT else FIRST_DASH
-    return k
-
-
-@kernel(inline="always")
-def _begin(e: int, k: int, lasting: int, look: Lookahead) -> int:
-    """Note that a way, by its place in the order, is the best so far; return its number."""
-    if k == OWN:
-        return PASSED
-    if k == BEGUN:
-        return int(look.plan[e, 0])
-    look.plan[e, 1] = 0
-    if k < FIRST_DART:
-        return k - FIRST_OTHER
-    copy_values(look.dart, look.darts[e])
-    look.darting[e] = lasting
-    return N_DRAWN
-
-
-@kernel(inline="always")
-def _look_ahead(
-    world: ReachWorld,
-    rule: ActionRule,
-    state: ReachState,
-    e: int,
-    n: int,
-    work: Work,
-    look: Lookahead,
+def _sample(
+    world: ReachCell, state: EpisodeState, e: int, k: int, work: RolloutWorkspace
 ) -> int:
-    """Choose the way begun in an environment; return its number, or PASSED.
+    """Fill ``work.waypoint`` with sample ``k`` of a decision; return its duration [steps].
 
-    The policy's own way and what is left of the one begun last are always played; others where
-    that ends in a contact, or late; dashes where each before ends in a contact; darts where no
-    other is chosen, or all end so. One loop, and one call of :func:`play`, because each call
-    would be optimised as a whole and cost half a minute of compilation.
+    The first one is the incumbent, for what remains of its duration.
+    """
+    info = work.incumbent_info[e]
+    if k == 0:
+        random.start_stream(0, 0, work.n_sampled[e], work.rng)
+        work.n_sampled[e] += 1
+        if info[0] > 0.0:
+            info[1] = max(0.0, info[1] - (state.elapsed[e] - info[2]) / STEP_S)
+            info[2] = state.elapsed[e]
+            copy_values(work.incumbent[e], work.waypoint)
+            return int(info[1])
+    if info[0] > 0.0 and random.uniform(work.rng) < PERTURBED_SHARE:
+        return perturb_waypoint(
+            world.arm, work.incumbent[e], int(info[1]), work.rng, work.waypoint
+        )
+    return sample_waypoint(world.arm, state.q[e], work.rng, work.waypoint)
+
+
+@kernel(inline="always")
+def _update_incumbent(
+    state: EpisodeState, e: int, k: int, steps: int, score: float, work: RolloutWorkspace
+) -> None:
+    """Store sample ``k`` of a decision, just simulated, if its shortfall is less."""
+    info, shortfall = work.incumbent_info[e], work.closest[0]
+    if work.ssm_distance[0] > 0.0:
+        shortfall = SUCCESS_SCORE - score
+    if k == 0 or info[0] == 0.0 or shortfall < info[0]:
+        info[0], info[1], info[2] = shortfall, steps, state.elapsed[e]
+        copy_values(work.waypoint, work.incumbent[e])
+
+
+@kernel(inline="always")
+def _candidate_at(
+    world: ReachCell, state: EpisodeState, e: int, k: int, work: RolloutWorkspace
+) -> CandidateSequence:
+    """Return the candidate at position ``k`` of a decision."""
+    if k == WARM_START:
+        return remaining_plan(e, work, world.arm.dt)
+    if k >= FIRST_SAMPLE:
+        return CandidateSequence(SAMPLE, _sample(world, state, e, k - FIRST_SAMPLE, work))
+    return candidate_of(POLICY if k == OWN else k - FIRST_CANDIDATE)
+
+
+@kernel()
+def _score_threshold(state: EpisodeState, e: int, outcome: int, score: float) -> float:
+    """Return the score that candidates must exceed; infinity if none is simulated.
+
+    Args:
+        state: Environments.
+        e: Environment.
+        outcome: Outcome of the better one of policy and warm start.
+        score: Its score.
+    """
+    if outcome == COLLISION:
+        return score + BETTER
+    stalled = state.elapsed[e] >= STALL_TIME or state.time_left[e] <= DEADLINE_TIME
+    return SUCCEEDS if outcome == RUNNING and stalled else math.inf
+
+
+@kernel()
+def _next(k: int, threshold: float, selected: bool) -> int:
+    """Return the position of the candidate to simulate after position ``k``; END for none.
+
+    Args:
+        k: Position.
+        threshold: Score that candidates must exceed.
+        selected: Whether a candidate is selected already.
+    """
+    k += 1
+    if threshold == math.inf or k == FIRST_SAMPLE + N_SAMPLES:
+        return END
+    if k == FIRST_EVASION and threshold > NO_COLLISION:
+        k = FIRST_SAMPLE
+    if k == FIRST_SAMPLE and threshold > NO_COLLISION and selected:
+        return END
+    return k
+
+
+@kernel()
+def _next_constrained(k: int, threshold: float) -> int:
+    """Return what :func:`_next` does, under a constraint: evasions come last."""
+    k += 1
+    if threshold > SUCCESS_SCORE - SSM_TIME_COST * SOON or k == FIRST_SAMPLE:
+        return END
+    if k == FIRST_EVASION:
+        return FIRST_SAMPLE
+    if k == END:
+        return END if threshold > NO_COLLISION else FIRST_EVASION
+    return k
+
+
+@kernel(inline="always")
+def _select(e: int, k: int, steps: int, work: RolloutWorkspace) -> int:
+    """Store the candidate at position ``k`` as the best so far; return its number."""
+    if k == OWN:
+        return POLICY
+    if k == WARM_START:
+        return int(work.plan[e, 0])
+    work.plan[e, 1] = 0
+    if k < FIRST_SAMPLE:
+        return k - FIRST_CANDIDATE
+    copy_values(work.waypoint, work.plan_waypoint[e])
+    work.plan_steps[e] = steps
+    return N_DETERMINISTIC
+
+
+@kernel(inline="always")
+def _improve(
+    world: ReachCell, rule: ActionRule, state: EpisodeState, e: int, work: RolloutWorkspace
+) -> int:
+    """Select a candidate for an environment; return its number, or POLICY.
+
+    One loop with one call of :func:`simulate_candidate`, because numba would compile each call
+    separately, for half a minute.
 
     Args:
         world: Shared data.
-        rule: How actions are read.
-        state: Rows.
+        rule: Action type and bounds.
+        state: Environments.
         e: Environment.
-        n: People, who are foretold.
-        work: Work space.
-        look: Network and work space; ``begun`` holds the policy's action, and then that of the
-            way chosen.
+        work: Work space; ``best_act`` holds the policy's action, then that of the selection.
     """
-    k, chosen, other, ended, bar = OWN, PASSED, False, RUNNING, -math.inf
-    while k < N_LOOKED:
-        posture, lasting = _way_at(world, state, e, k, look)
-        if k != BEGUN or posture != PASSED:
-            gone, kept = 0, 1.0
-            if k == BEGUN:
-                gone, kept = look.plan[e, 1] % periods_of(world.arm.dt), KEPT_ON
-            end, worth = play(
-                world, rule, state, e, posture, lasting, gone, kept, n, work, look
-            )
-            if k >= FIRST_DART:
-                _keep_nearest(state, e, k - FIRST_DART, lasting, worth, look)
-            if worth > bar:
-                copy_values(look.found, look.begun)
-                chosen, other = _begin(e, k, lasting, look), k >= FIRST_OTHER
-                ended, bar = end, worth + BETTER if other else worth
-        if look.kept[0] > 0.0:
-            k = _next_under_layer(k, bar)
+    k, chosen, selected, outcome, threshold = OWN, POLICY, False, RUNNING, -math.inf
+    while k < END:
+        candidate = _candidate_at(world, state, e, k, work)
+        if k != WARM_START or candidate.kind != POLICY:
+            beginning = Beginning(0, 1.0)
+            if k == WARM_START:
+                elapsed = work.plan[e, 1] % periods_of(world.arm.dt)
+                beginning = Beginning(elapsed, WARM_START_MARGIN)
+            end, score = simulate_candidate(world, rule, state, e, candidate, beginning, work)
+            if k >= FIRST_SAMPLE:
+                _update_incumbent(state, e, k - FIRST_SAMPLE, candidate.steps, score, work)
+            if score > threshold:
+                copy_values(work.first_act, work.best_act)
+                chosen = _select(e, k, candidate.steps, work)
+                selected = k >= FIRST_CANDIDATE
+                outcome, threshold = end, score + BETTER if selected else score
+        if work.ssm_distance[0] > 0.0:
+            k = _next_constrained(k, threshold)
             continue
-        if k == BEGUN:
-            bar = _bar_for_others(state, e, ended, bar)
-        k = _next_way(k, bar, other)
-    look.plan[e, 0] = chosen
-    copy_values(look.begun, look.last[e])
+        if k == WARM_START:
+            threshold = _score_threshold(state, e, outcome, threshold)
+        k = _next(k, threshold, selected)
+    work.plan[e, 0] = chosen
+    copy_values(work.best_act, work.last_act[e])
     return chosen
 
 
 @kernel(nogil=True)
-def look_ahead_batch(
-    world: ReachWorld,
+def improve_batch(
+    world: ReachCell,
     rule: ActionRule,
-    state: ReachState,
+    state: EpisodeState,
     act: Floats,
-    work: Work,
-    look: Lookahead,
+    work: RolloutWorkspace,
     chosen: NDArray[np.int64],
 ) -> None:
-    """Look ahead in every environment whose episode goes on.
+    """Improve the actions of all environments whose episode is running.
 
     Args:
         world: Shared data.
-        rule: How actions are read.
-        state: Rows.
-        act: Actions, shape (n_envs, 6); replaced where another way is better.
-        work: Work space.
-        look: Network and work space.
-        chosen: Filled with the number of the way begun instead, or PASSED, shape (n_envs,).
+        rule: Action type and bounds.
+        state: Environments.
+        act: Actions of the policy, shape (n_envs, 6); replaced where a candidate is better.
+        work: Policy and work space.
+        chosen: Filled with the number of the candidate selected, or POLICY, shape (n_envs,).
     """
     for e in range(state.q.shape[0]):
-        chosen[e] = PASSED
+        chosen[e] = POLICY
         if state.outcome[e] != RUNNING:
             continue
         if state.elapsed[e] == 0.0:
-            look.plan[e, 0] = PASSED
-            look.drawn[e], look.nearest[e, 0] = 0, 0.0
-        layered = look.layer[0] > 0.0
-        moments = LONG_MOMENTS if layered else MOMENTS
-        n = foretell(world, state, e, moments, work, look.foretold)
-        look.kept[0] = 0.0
-        if layered:
-            heed_layer(world, state, e, n, work, look)
-        copy_values(act[e], look.begun)
-        chosen[e] = _look_ahead(world, rule, state, e, n, work, look)
-        if chosen[e] != PASSED:
-            copy_values(look.begun, act[e])
+            work.plan[e, 0] = POLICY
+            work.n_sampled[e], work.incumbent_info[e, 0] = 0, 0.0
+        constrained = work.ssm[DISTANCE] > 0.0
+        moments = N_LONG_MOMENTS if constrained else N_MOMENTS
+        predict_people(world, state, e, moments, work.sight, work.people)
+        work.ssm_distance[0] = 0.0
+        if constrained:
+            apply_ssm_constraint(world, state, e, work)
+        copy_values(act[e], work.best_act)
+        chosen[e] = _improve(world, rule, state, e, work)
+        if chosen[e] != POLICY:
+            copy_values(work.best_act, act[e])
