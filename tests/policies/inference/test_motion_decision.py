@@ -272,7 +272,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"elapsed_s": -1.0}, "elapsed_s"),
     ({"elapsed_s": float("nan")}, "elapsed_s"),
     ({"age_s": float("inf")}, "age_s"),
-    ({"way": "around"}, "choices: interpolated, direct"),
+    ({"inference_mode": "around"}, "choices: interpolated, direct"),
     ({"beside": "farthest"}, "choices: nearest, averaged"),
     ({"people": (FAR_PERSON,) * 5}, "at most 4"),
     ({"people": (Person(q=np.full(18, np.nan), qd=np.zeros(18)),)}, r"people\[0\]\.q\[0\]"),
