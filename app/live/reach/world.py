@@ -35,7 +35,7 @@ from app.sim.cells.cell import Cell
 from app.sim.collision.checker import Shapes, no_people
 from app.sim.collision.contact import Contact
 from app.sim.core.arrays import Vec
-from app.sim.geometry.segments import FAR
+from app.sim.core.jit import FAR
 from app.sim.people.kernels.pedestrian import GROWTH, VX, VY
 from app.sim.pick.batch import Piece
 from app.sim.safety.decision import SafetyDecision, SeparationTerms

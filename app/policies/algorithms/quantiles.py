@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from app.policies.networks.actor_critic import Critics, CrowdShape
-from app.sim.core.jit import kernel
-from app.sim.geometry.segments import FAST
+from app.sim.core.jit import FAST, kernel
 
 
 class QuantileCritics(Critics):

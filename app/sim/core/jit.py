@@ -13,6 +13,11 @@ from numba import njit, typeof
 P = ParamSpec("P")
 R = TypeVar("R")
 
+FAST = {"contract", "nsz", "arcp"}
+"""Fast-math flags: fused multiply-add, signs of zero, reciprocals."""
+FAR = 1e3
+"""Distance where nothing is near [m]."""
+
 
 def kernel(**options: Any) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """Return numba's decorator for kernels that allocate no arrays; ``options`` are njit's."""

@@ -10,9 +10,9 @@ without iteration. Tests compare with python-fcl.
 import math
 
 from app.sim.core.arrays import Vec
-from app.sim.core.jit import kernel
+from app.sim.core.jit import FAR, FAST, kernel
 from app.sim.geometry.capsules import RADIUS, UX, UY, UZ, X, Y, Z
-from app.sim.geometry.segments import FAR, FAST, Point
+from app.sim.geometry.segments import Point
 
 
 @kernel(error_model="numpy", fastmath=FAST)

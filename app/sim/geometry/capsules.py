@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.sim.core.arrays import Vec
-from app.sim.core.jit import kernel
-from app.sim.geometry.segments import FAR, FAST, Point
+from app.sim.core.jit import FAR, FAST, kernel
+from app.sim.geometry.segments import Point
 
 Span = tuple[float, float, float, float, float]
 """Second end of a segment less the first [m], its square [m^2], and its inverse [1/m^2]."""

@@ -12,9 +12,8 @@ Tests compare with python-fcl.
 import math
 
 from app.sim.core.arrays import Vec
-from app.sim.core.jit import kernel
+from app.sim.core.jit import FAR, FAST, kernel
 from app.sim.geometry.capsules import RADIUS, UX, UY, UZ, X, Y, Z, segment_distance
-from app.sim.geometry.segments import FAR, FAST
 
 _POINT = 1e-12
 """Squared length in the plane below which a segment is upright [m^2]."""

@@ -7,13 +7,9 @@ capsules are in ``columns.py``.
 import math
 
 from app.sim.core.arrays import Vec
-from app.sim.core.jit import kernel
+from app.sim.core.jit import FAST, kernel
 
 Point = tuple[float, float, float]
-FAST = {"contract", "nsz", "arcp"}
-"""Fast-math flags: fused multiply-add, signs of zero, reciprocals."""
-FAR = 1e3
-"""Distance where nothing is near [m]."""
 
 
 @kernel(error_model="numpy", fastmath=FAST)

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from app.errors import InvalidInput
 from app.sim.cells.cell import Cell, lacks_stations
 from app.sim.core.arrays import Vec, as_kernel_array
+from app.sim.core.jit import FAR
 from app.sim.core.kernels.rng import start_stream
-from app.sim.geometry.segments import FAR
 from app.sim.people.human_motion_config import USUAL, HumanMotionConfig
 from app.sim.people.kernels.motion import record_palms
 from app.sim.people.kernels.people import People, new_people_geometry

@@ -16,7 +16,7 @@ from app.sim.cells.cell import Cell
 from app.sim.cells.parts import GoalRegion, Station
 from app.sim.cells.people import Worker
 from app.sim.core.arrays import Vec, as_kernel_array, as_kernel_index
-from app.sim.geometry.segments import FAR
+from app.sim.core.jit import FAR
 from app.sim.people.human_motion_config import REACHING, HumanMotionConfig
 from app.sim.people.kernels.people import People
 from app.sim.people.pedestrian import AUTHORS_WALK, pedestrian_rules

@@ -4,9 +4,9 @@ import fcl
 import numpy as np
 import pytest
 
+from app.sim.core.jit import FAR
 from app.sim.geometry.capsules import capsules_soa, new_columns
 from app.sim.geometry.cylinder import cylinder_clearance, swept_clearance
-from app.sim.geometry.segments import FAR
 from tests.sim.fcl_capsules import KINDS, check_against_fcl, random_ends
 
 HEIGHT = 6.0

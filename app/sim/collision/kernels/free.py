@@ -12,10 +12,9 @@ the check may refuse half a millimetre early, never late.
 from typing import NamedTuple
 
 from app.sim.core.arrays import Vec
-from app.sim.core.jit import kernel
+from app.sim.core.jit import FAR, kernel
 from app.sim.geometry.capsules import capsule_clearances, least
 from app.sim.geometry.cylinder import cylinder_clearance
-from app.sim.geometry.segments import FAR
 from app.sim.robot.kernels.arm import (
     Arm,
     RobotPose,

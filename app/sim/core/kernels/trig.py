@@ -11,8 +11,7 @@ import math
 import numpy as np
 
 from app.sim.core.arrays import Vec
-from app.sim.core.jit import kernel
-from app.sim.geometry.segments import FAST
+from app.sim.core.jit import FAST, kernel
 
 _QUARTER_HIGH = 1.5707963267341256
 """The leading bits of pi / 2, so that its multiples are exact."""

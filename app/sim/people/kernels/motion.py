@@ -8,10 +8,9 @@ with yielding above 0 (docs/method.md 4) a worker slows and leans away near the 
 """
 
 from app.sim.core.arrays import Vec
-from app.sim.core.jit import kernel
+from app.sim.core.jit import FAR, kernel
 from app.sim.core.kernels import rng as random
 from app.sim.geometry.capsules import copy_values
-from app.sim.geometry.segments import FAR
 from app.sim.human.kernels import kinematics as body
 from app.sim.people.kernels.pedestrian import R, X, Y, advance_pedestrian, start_pedestrian
 from app.sim.people.kernels.people import (

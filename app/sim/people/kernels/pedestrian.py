@@ -28,9 +28,8 @@ import math
 from typing import NamedTuple
 
 from app.sim.core.arrays import Vec
-from app.sim.core.jit import kernel
+from app.sim.core.jit import FAST, kernel
 from app.sim.core.kernels.rng import State, split_stream, uniform
-from app.sim.geometry.segments import FAST
 
 WALKER, CONSTANT, FIXED_SPEED = range(3)
 """Kinds: docs/method.md 2.1; constant speed and radius per episode; a given speed without

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.sim.core.arrays import Vec
-from app.sim.core.jit import kernel
+from app.sim.core.jit import FAR, kernel
 from app.sim.geometry.capsules import (
     capsule_clearances,
     copy_rows,
@@ -20,7 +20,6 @@ from app.sim.geometry.capsules import (
     least,
 )
 from app.sim.geometry.cylinder import cylinder_clearance
-from app.sim.geometry.segments import FAR
 from app.sim.human.kernels import kinematics as body
 from app.sim.people.kernels.pedestrian import VX, VY, PedestrianRules, PedestrianState, X, Y
 from app.sim.primitives.kernels.primitives import PrimitiveLibrary, SegmentState

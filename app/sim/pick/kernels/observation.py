@@ -17,10 +17,10 @@ from typing import NamedTuple
 import numpy as np
 
 from app.sim.core.arrays import Vec
-from app.sim.core.jit import kernel
+from app.sim.core.jit import FAR, kernel
 from app.sim.core.observation_layout import slices_of
 from app.sim.geometry.capsules import nearest_parts, new_columns, padded_size
-from app.sim.geometry.segments import FAR, segment_nearest
+from app.sim.geometry.segments import segment_nearest
 from app.sim.human.kernels import kinematics as body
 from app.sim.robot.kernels import kinematics
 from app.sim.robot.kernels.arm import (

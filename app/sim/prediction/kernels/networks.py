@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.sim.core.arrays import Vec
-from app.sim.core.jit import kernel
-from app.sim.geometry.segments import FAST
+from app.sim.core.jit import FAST, kernel
 from app.sim.people.kernels.pedestrian import N_PAST
 
 STEP_S = 0.04

@@ -16,12 +16,11 @@ against 90 % after 2.7 k updates in trials).
 import math
 
 from app.sim.core.arrays import Vec
-from app.sim.core.jit import kernel
+from app.sim.core.jit import FAR, kernel
 from app.sim.core.kernels.trig import sincos
 from app.sim.core.observation_layout import slices_of
 from app.sim.geometry.capsules import RADIUS, UX, UY, X, Y, capsule_clearances, least
 from app.sim.geometry.cylinder import cylinder_clearance
-from app.sim.geometry.segments import FAR
 from app.sim.human.kernels import kinematics as body
 from app.sim.people.kernels.pedestrian import GROWTH, VX, VY, R
 from app.sim.people.kernels.pedestrian import X as WALKER_X

@@ -12,11 +12,10 @@ over ``ROLL_S``, and each joint lags by ``LAG_S``.
 import math
 
 from app.sim.core.arrays import Vec
-from app.sim.core.jit import kernel
+from app.sim.core.jit import FAR, kernel
 from app.sim.core.observation_layout import slices_of
 from app.sim.geometry.capsules import copy_values
 from app.sim.geometry.cylinder import cylinder_clearance
-from app.sim.geometry.segments import FAR
 from app.sim.people.kernels.pedestrian import AGE, N_PAST, PAST_RADIUS, PAST_SPEED
 from app.sim.people.kernels.people import PeopleState
 from app.sim.prediction.kernels.networks import N_TIMES, STEP_S, predict_pedestrian

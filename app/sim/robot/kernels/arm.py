@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.sim.core.arrays import Vec
-from app.sim.core.jit import kernel
+from app.sim.core.jit import FAR, FAST, kernel
 from app.sim.geometry.box import box_clearance
 from app.sim.geometry.capsules import (
     RADIUS,
@@ -19,7 +19,6 @@ from app.sim.geometry.capsules import (
     least,
     pair_distances,
 )
-from app.sim.geometry.segments import FAR, FAST
 from app.sim.robot.kernels import kinematics
 from app.sim.robot.kernels.joints import JointLimits, JointPath
 

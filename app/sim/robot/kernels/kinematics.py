@@ -14,9 +14,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from app.sim.core.arrays import Vec
-from app.sim.core.jit import kernel
+from app.sim.core.jit import FAST, kernel
 from app.sim.core.kernels.trig import sincos
-from app.sim.geometry.segments import FAST
 from app.sim.robot.kernels.joints import JointLimits
 
 

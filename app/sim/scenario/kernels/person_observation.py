@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.sim.core.arrays import Vec
-from app.sim.core.jit import kernel
+from app.sim.core.jit import FAST, kernel
 from app.sim.geometry.capsules import INVERSE, RADIUS, UU, UX, UY, UZ, X
-from app.sim.geometry.segments import FAST
 from app.sim.human.kernels import kinematics as body
 
 Obs = NDArray[np.float32]

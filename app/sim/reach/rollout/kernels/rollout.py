@@ -16,10 +16,9 @@ whom the robot is stopped already is left to the layer.
 from typing import NamedTuple
 
 from app.sim.core.arrays import Vec
-from app.sim.core.jit import kernel
+from app.sim.core.jit import FAR, kernel
 from app.sim.geometry.capsules import copy_values
 from app.sim.geometry.cylinder import cylinder_clearance
-from app.sim.geometry.segments import FAR
 from app.sim.prediction.kernels.networks import N_TIMES, STEP_S
 from app.sim.reach.kernels.base_controller import base_motion
 from app.sim.reach.kernels.episode import ReachCell
