@@ -16,6 +16,7 @@ from app.sim.pick import batch as pick
 from app.sim.robot.actions import ActionSettings
 from app.sim.robot.kernels import kinematics
 from app.sim.robot.kernels.joints import JointPath
+from app.sim.robot.trajectory_segment import TrajectorySegment
 from app.sim.scene.scene import arm_of, people_of
 
 GAIN = 3.0
@@ -104,12 +105,14 @@ class LiveArm:
         """
         return self.follow(self.piece(act, straight=straight), people, before)
 
-    def piece(self, act: Vec, *, straight: bool = False) -> pick.Piece:
+    def piece(self, act: Vec, *, straight: bool = False) -> TrajectorySegment:
         """Return what an action asks for in the period to come; see :meth:`advance`."""
         rule = pick.DEFAULT_ACTION if straight else self.action
         return pick.step_robot(self.arm, self.q, self.qd, self.qdd, act, rule)
 
-    def follow(self, piece: pick.Piece, people: PeopleInCell, before: HumanGeometry) -> Contact:
+    def follow(
+        self, piece: TrajectorySegment, people: PeopleInCell, before: HumanGeometry
+    ) -> Contact:
         """Carry out a piece of motion, unless something is touched; see :meth:`advance`."""
         found = self._test(self.qd, piece.c, piece.d, before, people.bodies)
         if found.kind == "none":

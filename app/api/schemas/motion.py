@@ -16,7 +16,6 @@ from app.sim.core.arrays import Vec
 from app.sim.human.model import CAPSULE_NAMES
 from app.sim.human.person import Person
 from app.sim.perception.multi_person_tracker import MAX_SKELETONS
-from app.sim.pick.batch import Piece
 from app.sim.reach.motion_types import (
     Beside,
     MotionDecision,
@@ -24,6 +23,7 @@ from app.sim.reach.motion_types import (
     MotionQuestion,
     PersonWeight,
 )
+from app.sim.robot.trajectory_segment import TrajectorySegment
 from app.sim.safety.decision import SafetyDecision, SeparationTerms, powers_of_time
 from app.sim.safety.layer import SafetySettings
 
@@ -186,7 +186,7 @@ class SegmentPublic(Answer):
     qdd: Vector6 = Field(description="joint accelerations there [rad/s^2]")
 
     @classmethod
-    def commanded(cls, piece: Piece, question: MotionQuestion, dt: float) -> Self:
+    def commanded(cls, piece: TrajectorySegment, question: MotionQuestion, dt: float) -> Self:
         """Return the segment commanded by the policy."""
         parts = [question.q, question.qd, piece.c]
         if piece.d.any():

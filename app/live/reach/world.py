@@ -37,7 +37,7 @@ from app.sim.collision.contact import Contact
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import FAR
 from app.sim.people.kernels.pedestrian import GROWTH, VX, VY
-from app.sim.pick.batch import Piece
+from app.sim.robot.trajectory_segment import TrajectorySegment
 from app.sim.safety.decision import SafetyDecision, SeparationTerms
 from app.sim.safety.layer import SafetyLayer, safety_settings
 from app.sim.safety.separation_zone import separation_zone
@@ -305,10 +305,10 @@ def _at_standstill(qd: Vec) -> bool:
     return bool(np.abs(qd).max() < MOVING)
 
 
-def _executed(q: Vec, qd: Vec, filtered: SafetyDecision, dt: float) -> Piece:
+def _executed(q: Vec, qd: Vec, filtered: SafetyDecision, dt: float) -> TrajectorySegment:
     """Return the filtered motion of a period as a trajectory segment with the same ends.
 
     Within the period it differs from the filtered motion by less than 0.1 mrad.
     """
     c = (filtered.q - q - qd * dt) / dt**2
-    return Piece(c=c, d=np.zeros(6), q=filtered.q, qd=filtered.qd, qdd=filtered.qdd)
+    return TrajectorySegment(c=c, d=np.zeros(6), q=filtered.q, qd=filtered.qd, qdd=filtered.qdd)

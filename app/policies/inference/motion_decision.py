@@ -37,7 +37,6 @@ from app.sim.perception.observed_people import (
     checked_vector,
     person_from_cylinder,
 )
-from app.sim.pick.batch import Piece
 from app.sim.reach.batch import goal_region_of
 from app.sim.reach.monitored.batch import HORIZON_S
 from app.sim.reach.motion_types import (
@@ -54,6 +53,7 @@ from app.sim.reach.reach_actor import ReachActor
 from app.sim.robot.kernels import actions
 from app.sim.robot.kernels.joints import JointState
 from app.sim.robot.measured_state import MeasuredState, StateLimits, returning
+from app.sim.robot.trajectory_segment import TrajectorySegment
 from app.sim.safety.decision import SafetyDecision, SeparationTerms
 from app.sim.safety.layer import SafetyLayer, SafetySettings
 from app.sim.scene.scene import FAR_AWAY, arm_of
@@ -283,7 +283,7 @@ class MotionDecider:
             )
         return shares_of_acts @ acts.astype(np.float64), targets, weights, seen
 
-    def _piece(self, robot: MeasuredState, act: Vec) -> tuple[Piece, bool]:
+    def _piece(self, robot: MeasuredState, act: Vec) -> tuple[TrajectorySegment, bool]:
         """Return the commanded piece from the measured state, and whether it is unfeasible."""
         arm, (q, qd, _) = self.arm, robot.measured
         act, limits = returning(arm, q, act)
@@ -294,13 +294,13 @@ class MotionDecider:
         if self._advance is None:
             self._advance = direct(actions.advance, arguments)
         empty = self._advance(*arguments) or limits is not arm.limits
-        return Piece(c=c, d=d, q=q1, qd=qd1, qdd=qdd1), bool(empty)
+        return TrajectorySegment(c=c, d=d, q=q1, qd=qd1, qdd=qdd1), bool(empty)
 
     def _monitored(
         self,
         question: MotionQuestion,
         robot: MeasuredState,
-        piece: Piece,
+        piece: TrajectorySegment,
         people: Shapes,
         order: Sequence[int],
     ) -> Told:

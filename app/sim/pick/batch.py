@@ -33,6 +33,7 @@ from app.sim.robot.kernels import actions, kinematics
 from app.sim.robot.kernels import arm as arm_kernel
 from app.sim.robot.kernels.arm import CONTROLLED, Arm
 from app.sim.robot.kernels.joints import JointState
+from app.sim.robot.trajectory_segment import TrajectorySegment
 from app.sim.scenario.batch import EnvBatch
 from app.sim.scenario.kernels.episode import FEATURES, PLAIN, Indices, distance_to
 from app.sim.scene.scene import (
@@ -92,22 +93,6 @@ class PickSettings:
     dimensions too."""
     weights: RewardWeights = field(default=DEFAULT_WEIGHTS)
     """Reward coefficients (docs/method.md 3.3)."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Piece:
-    """One control period of the robot: ``q(x) = q + qd x + c x^2 + d x^3``."""
-
-    c: Vec
-    """Second coefficients [rad/s^2], shape (6,)."""
-    d: Vec
-    """Third coefficients [rad/s^3], shape (6,)."""
-    q: Vec
-    """Joint positions at the end [rad], shape (6,)."""
-    qd: Vec
-    """Joint speeds at the end [rad/s], shape (6,)."""
-    qdd: Vec
-    """Joint accelerations at the end [rad/s^2], shape (6,)."""
 
 
 def _world_of(cell: Cell, settings: PickSettings) -> episode.PickCell:
@@ -228,7 +213,7 @@ def observe(
 
 def step_robot(
     arm: Arm, q: Vec, qd: Vec, qdd: Vec, act: Vec, action: ActionSettings = DEFAULT_ACTION
-) -> Piece:
+) -> TrajectorySegment:
     """Move the robot through one control cycle.
 
     Args:
@@ -248,7 +233,7 @@ def step_robot(
     start = JointState(as_kernel_array(q), as_kernel_array(qd), as_kernel_array(qdd))
     commanded = np.array(act, dtype=np.float32)
     actions.advance(action.rule(), arm.limits, arm.dt, start, commanded, segment, end)
-    return Piece(c=segment.c, d=segment.d, q=end.q, qd=end.qd, qdd=end.qdd)
+    return TrajectorySegment(c=segment.c, d=segment.d, q=end.q, qd=end.qd, qdd=end.qdd)
 
 
 def tool_state(arm: Arm, q: Vec, qd: Vec, goal: Vec) -> tuple[float, float, float, bool]:

@@ -7,7 +7,7 @@ from typing import Literal, NamedTuple, get_args
 from app.sim.core.arrays import Vec
 from app.sim.core.out_of_range import OutsideField
 from app.sim.human.person import Person
-from app.sim.pick.batch import Piece
+from app.sim.robot.trajectory_segment import TrajectorySegment
 from app.sim.safety.decision import SafetyDecision, SeparationTerms
 from app.sim.safety.layer import SafetySettings
 
@@ -81,7 +81,7 @@ class MotionDecision:
     """Whether rollouts were simulated."""
     candidate: str | None
     """Candidate executed instead of the policy's action; None for the policy's action."""
-    piece: Piece
+    piece: TrajectorySegment
     """The commanded piece, before any scaling."""
     unfeasible: bool
     """Whether a joint had no admissible coefficient and brakes, or returns to its limits."""
