@@ -1,1 +1,15 @@
-"""Training and evaluation as jobs: specs, supervisor, executors and the one entry point."""
+"""Training and evaluation as jobs: specs, supervisor, executors and the one entry point.
+
+attempt            One attempt of a job in its own process: arguments, logging, exit status
+cell_catalog       Work cells by name: the shipped ones, and the user's own from the database
+checkpoints        Reading of stored checkpoints; a damaged shipped one is restored
+executor           Executors of attempts: the interface, and one local process per attempt
+import_process     Import of a file in its own process: ``python -m jobs.import_process``
+recording_catalog  Stored recordings by name: files in, runs of the 18-DoF human model out
+recording_format   The stored form of a recording
+run                Entry point of a job's process: ``python -m jobs.run --job ID --attempt N``
+spec               Job specs: the body of ``POST /v1/jobs``, stored unchanged with the job
+supervisor         The supervisor: a thread of the server that starts, monitors and stops
+                   workers
+worker             The worker of a job: one attempt in one process
+"""

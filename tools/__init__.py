@@ -1,1 +1,17 @@
-"""Offline generators, run by hand."""
+"""Offline generators, run by hand.
+
+check_vocabulary        Find words that the glossary replaces, and class names that occur twice
+convert_manifests       Convert the manifests of the shipped checkpoints to the present names,
+                        without retraining
+distance_fields         Smooth surfaces from a handful of round cones: how the person is
+                        modelled
+fit_capsules            Fit capsules that contain the UR10's collision meshes; run ``python -m
+                        tools.fit_capsules``
+import_contracts        Import-linter contract: compiled kernels import only kernels, ``core``
+                        and ``geometry``
+make_primitives         Generate the shipped task primitives: ``python -m
+                        tools.make_primitives``
+model_mannequin         Models the person: a worker made of round cones, in a helmet and a vest
+train_motion_predictor  Train the shipped motion predictor of pedestrians
+docs/                   Scripts that measure, draw and write the result pages of ``docs``
+"""

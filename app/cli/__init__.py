@@ -7,4 +7,21 @@
 * ``options``, ``output``, ``database``: shared options, printing, access to the database
 
 A command imports the modules it needs when it runs, so that ``--help`` is quick.
+
+cells           The command group ``cells``: list, show, check, add and remove work cells
+database        The database as commands open it, beside a running server or without one
+entry           The Typer application and its entry point
+evaluate        The commands ``evaluate`` and ``bench``
+http_limits     Limits of HTTP connections: size of the request head, time, progress, number of
+                clients
+options         Options that several commands have, and the environment that every command
+                prepares
+output          Printing of results, as text or as one JSON object
+preflight       Checks before the server loads anything else: its port and its database are
+                unused
+recordings      The command group ``recordings``: import, list, show and remove recorded human
+                motion
+serve           The commands ``serve`` and ``setup``
+train           The command ``train``: train a policy in this process, without a server
+uvicorn_server  The application on uvicorn: one process, one worker, a quick end
 """

@@ -1,1 +1,10 @@
-"""Learning and deciding: torch and Stable-Baselines3. Knows sim; nothing of web, api, store."""
+"""Learning and deciding: torch and Stable-Baselines3. Knows sim; nothing of web, api, store.
+
+algorithms/   TD3 and DQN on Stable-Baselines3
+checkpoints/  Checkpoint files and what they state
+configs/      Training configurations (presets)
+evaluation/   Evaluation: one module per protocol; each prints rates with 95 % intervals
+inference/    Decisions of trained policies
+networks/     Neural networks
+training/     Training runs
+"""

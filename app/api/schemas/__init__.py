@@ -1,1 +1,18 @@
-"""What goes over the wire: one pydantic model per direction, units in the descriptions."""
+"""What goes over the wire: one pydantic model per direction, units in the descriptions.
+
+cells           Work cells as they are shown and posted
+checkpoints     Checkpoints as they are shown
+examples        Example requests of the OpenAPI document; a test posts each of them
+jobs            Jobs as they are shown
+motion          ``POST /v1/motion``: state, people and goal in, the next trajectory segment out
+numbers         Base classes and number types of the schemas
+people          People in a request, and their use by a policy
+presets         Presets with the declarations of their fields, as the training form needs them
+recordings      Recordings of human motion as they are shown
+robot_state     Joints of the robot in a request: base to wrist 3, or in any order by name
+sorting         ``POST /v1/sorting``: objects and goal in, next move out
+task_selection  ``POST /v1/task-selection``: state in, decision out
+trackers        Trackers of key-points: frames in, estimates of people out
+worlds          Live worlds as answers of the API: the snapshot itself, with the request of its
+                decision
+"""

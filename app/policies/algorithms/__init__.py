@@ -1,1 +1,11 @@
-"""TD3 and DQN on Stable-Baselines3."""
+"""TD3 and DQN on Stable-Baselines3.
+
+dqn                 DQN on Stable-Baselines3, extended at its extension points
+exploration         Exploration in parallel environments: noise with a scale per environment,
+                    and options
+prioritized_replay  Replay memory with priorities and n-step returns, in one buffer
+quantiles           Distributional critics: each says quantiles of the return, and targets
+                    leave out the highest
+td3                 TD3 on Stable-Baselines3, extended at its extension points
+vecenv              A batch as Stable-Baselines3's ``VecEnv``, for every scenario
+"""

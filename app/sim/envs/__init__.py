@@ -1,4 +1,15 @@
-"""Gymnasium environments; importing this package registers their ids, single and batched."""
+"""Gymnasium environments; importing this package registers their ids, single and batched.
+
+pick        The pick scenario as Gymnasium environments, single and vectorised
+raycast     Shaded images of capsules, cylinders and boxes by ray casting, in numpy
+reach       The reach scenario as Gymnasium environments, single and vectorised
+rendering   Images of one environment: table, robot, people, and targets or blocks
+single_env  One environment of a batch as a Gymnasium environment
+solids      Convex solids that rays are intersected with: capsules, upright cylinders and boxes
+sorting     The sorting task as Gymnasium environments: one task, or a batch
+tasks       What single and vector environments ask of a batch of cells
+vector_env  A batch as a Gymnasium vector environment
+"""
 
 import gymnasium
 

@@ -1,1 +1,5 @@
-"""Prediction of human motion."""
+"""Prediction of human motion.
+
+weights   Networks of the shipped motion predictor, from ``forecasts_data/walker.npz``
+kernels/  Compiled predictors
+"""

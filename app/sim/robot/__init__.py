@@ -1,1 +1,13 @@
-"""The robot: model, kinematics, capsules, joint limits, actions."""
+"""The robot: model, kinematics, capsules, joint limits, actions.
+
+actions             Which action a scenario uses: degree, bounds and meaning, in one place
+                    (METHOD 2.2)
+capsules            Capsules that contain the collision meshes of the robot and its tool, for
+                    the kernels
+measured_state      The robot's state as it was measured: a little outside its limits, or far
+                    outside
+trajectory_segment  The robot's motion in one control period
+ur10                The UR10 on Pinocchio: the model from which the compiled kernels take their
+                    lengths
+kernels/            Compiled kinematics, action bounds and speed override
+"""

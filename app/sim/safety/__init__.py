@@ -1,1 +1,14 @@
-"""Speed and separation monitoring; power and force limiting."""
+"""Speed and separation monitoring; power and force limiting.
+
+adversarial_trials  Falsification trials of the safety layer: many episodes with adversarial
+                    people
+contact_limits      How fast a robot may touch which part of a person (power and force
+                    limiting)
+decision            Decision of the safety layer for one period, and the terms of the
+                    separation distance
+layer               Speed and separation monitoring, and power and force limiting, for any
+                    policy or planner
+separation_zone     The protective separation distance around the whole robot, as a zone on the
+                    floor
+kernels/            Compiled separation monitoring
+"""

@@ -1,1 +1,5 @@
-"""What the scenarios share."""
+"""What the scenarios share.
+
+batch     Many environments of one scenario, stepped together by one thread
+kernels/  Compiled episode steps that the scenarios share
+"""

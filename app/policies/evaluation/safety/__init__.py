@@ -1,1 +1,4 @@
-"""Falsification of the safety layer."""
+"""Falsification of the safety layer.
+
+ssm  Protocol ``safety-ssm``: falsification of speed and separation monitoring
+"""

@@ -1,1 +1,16 @@
-"""Evaluation of the sorting scenario."""
+"""Evaluation of the sorting scenario.
+
+benchmark_tasks   Protocol ``sorting-tests``: many episodes of each benchmark task of the
+                  thesis (3.4.3)
+curve             Learning curves by the source's protocol: every pair (K_E, K_G), greedily, no
+                  hand-over
+episodes          Runs sorting episodes to their ends, greedily, and counts what they cost
+grid              Protocol ``sorting-grid``: every pair of object and goal numbers (METHOD 1.5)
+optimal_baseline  Optimal baseline of sorting episodes: the exact planner's moves and expected
+                  attempts
+pairs             Episodes of every pair (K_E, K_G): so many objects, of which so many are in
+                  the goal
+planner_fallback  Progress monitor (``app/sim/sorting/progress_monitor.py``) of many sorting
+                  tasks at once
+runs              Protocols ``sorting-grid`` and ``sorting-tests`` of a checkpoint (METHOD 1.5)
+"""

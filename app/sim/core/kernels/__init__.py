@@ -1,1 +1,5 @@
-"""Compiled random numbers and trigonometry."""
+"""Compiled random numbers and trigonometry.
+
+rng   Counter-based random numbers: a stream per (seed, environment, episode), compiled
+trig  Sines and cosines without branches, compiled to vector instructions
+"""

@@ -1,1 +1,4 @@
-"""Compiled pose fit."""
+"""Compiled pose fit.
+
+pose_fit  The 18 joint angles of a person from key-points, compiled; see ``keypoint_angles.py``
+"""

@@ -1,1 +1,4 @@
-"""Rollout policy improvement for reaching."""
+"""Rollout policy improvement for reaching.
+
+kernels/  Compiled rollout policy improvement
+"""

@@ -1,1 +1,15 @@
-"""Compiled kinematics, action bounds and speed override."""
+"""Compiled kinematics, action bounds and speed override.
+
+acceleration_bounds  Bounds of quadratic joint trajectories for one control period, compiled
+actions              Motion of the joints in one period that an action of a policy commands,
+                     compiled
+arm                  The robot in its cell: limits, capsules, poses, clearances and speed
+                     bounds, compiled
+jerk_bounds          Bounds of cubic, jerk-limited trajectories of one joint, compiled
+                     (docs/method.md 2.2)
+joints               Limits, states and trajectories of the robot's joints, as tuples that
+                     kernels take
+kinematics           Forward and inverse kinematics of robots of the UR family, compiled
+override             Trajectory of one period executed at reduced speed along its own path,
+                     compiled
+"""

@@ -1,1 +1,11 @@
-"""Compiled separation monitoring."""
+"""Compiled separation monitoring.
+
+adversarial_people  Adversarial people: they try to hit the robot within the assumed speed,
+                    compiled
+adversarial_trials  Falsification of speed and separation monitoring by adversarial people,
+                    compiled
+separation_check    Separation of a moving robot from people whose possible position grows with
+                    time, compiled
+ssm                 Speed and separation monitoring of one control period, compiled
+                    (docs/method.md 2.7)
+"""

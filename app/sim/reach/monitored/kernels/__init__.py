@@ -1,1 +1,4 @@
-"""Compiled monitored reach step."""
+"""Compiled monitored reach step.
+
+step  Steps of the reach scenario under speed and separation monitoring (compiled)
+"""
