@@ -32,7 +32,7 @@ from tests.policies.inference.test_rollout import workspace
 
 CELL = load_cell("shared-workspace")
 ACTOR = ReachPolicy(pretrained.load("reach"))
-MEASURED = replace(safety_settings(CELL), measured=True)
+MEASURED = replace(safety_settings(CELL), use_measured_velocity=True)
 DT = CELL.robot.dt
 
 
