@@ -36,4 +36,4 @@ def test_intervals_and_values_of_cells_have_all_their_digits() -> None:
 
 def test_bounds_of_presets_have_all_their_digits() -> None:
     with pytest.raises(Exception, match=r"must lie in \[\d+, \d+\]"):
-        presets.resolve("pick-td3", {"total_steps": 10**15})
+        presets.resolve("pick-td3", {"learning": {"total_steps": 10**15}})
