@@ -196,5 +196,5 @@ def run_smoothness(
         **measure(paths, settings.action.degree, batch.arm),
     }
     bench.add(row, settings, "grid")
-    limits = {name: getattr(batch.arm, name).tolist() for name in ("q_min", "q_max")}
+    limits = {name: getattr(batch.arm.limits, name).tolist() for name in ("q_min", "q_max")}
     return {**bench.result(limits=limits), "example": shown_episode(paths, batch.arm.dt)}
