@@ -111,7 +111,7 @@ def members(value: Any) -> Any:
 
 
 def test_the_page_shows_every_member_of_the_answer_to_its_example(client: TestClient) -> None:
-    section = PAGE.split("## How to move next?")[1].split("\n## ")[0]
+    section = PAGE.split("## Motion\n")[1].split("\n## ")[0]
     (command,) = re.findall(r"```sh\n(.*?)```", section, re.DOTALL)
     (sample,) = re.findall(r"```json\n(.*?)```", section, re.DOTALL)
     body = json.loads(command.split("-d '")[1].rstrip().removesuffix("'"))

@@ -259,7 +259,7 @@ def cell_file(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
 def test_shipped_cell_file_is_good_and_a_broken_one_is_named(
     cell_file: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    shipped = ROOT / "app" / "sim" / "cells_data" / "sorting-e1.json"
+    shipped = ROOT / "app" / "sim" / "cells" / "data" / "sorting-e1.json"
     assert main(["cells", "check", str(shipped)]) == 0
     assert "23 stations" in capsys.readouterr().out
     cell_file.write_text(json.dumps(workshop.definition(wheels=4)), encoding="utf-8")
