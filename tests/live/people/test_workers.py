@@ -177,7 +177,7 @@ def test_size_glides_to_what_was_asked_for(world: LivePickWorld, cell: Cell) -> 
     steps = np.abs(np.diff(sizes, axis=0)).max(axis=0)
     assert np.allclose(sizes[-1], wanted)
     assert (steps <= 0.11 * np.abs(wanted - sizes[0]) + 1e-12).all()
-    body = world.snapshot().people[0].body
+    body = world.snapshot().people[0].anthropometry
     assert (body.stature, body.recorded) == (95.0, False)
     assert body.stature_m == pytest.approx(1.87, abs=0.01)
 
@@ -240,7 +240,7 @@ def test_recorded_motion_carries_pelvis_and_lengths(world: LivePickWorld, cell: 
         assert np.allclose(size[1:], recorded_size[1:])
     assert min(heights) == pytest.approx(-0.1, abs=0.005)
     world.apply(commands.SetAnthropometry(stature=50.0))
-    body = run(world, 15).people[0].body
+    body = run(world, 15).people[0].anthropometry
     assert not body.recorded
     assert world.snapshot().people[0].mode == "recorded"
 
