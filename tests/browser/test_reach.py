@@ -52,7 +52,7 @@ def test_visitor_opens_the_cell_sees_it_reach_and_gets_in_its_way(
     expect(page.locator(".sentence")).to_contain_text("Stopped: the person")
     expect(page.locator('[data-role="override"]')).to_have_attribute("data-override", "0.000")
     page.click('[data-choice="safety:off"]')
-    expect(page.locator('[data-role="override"]')).to_contain_text("layer off")
+    expect(page.locator('[data-role="override"]')).to_contain_text("disabled")
     page.click('[data-choice="safety:measured"]')
     page.click('[data-action="remove-person"]')
     expect(page.locator('[data-role="override"]')).to_have_attribute("data-override", "1.000")
