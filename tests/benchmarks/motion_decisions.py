@@ -98,14 +98,14 @@ def motion_times(seed: int, seconds: float) -> tuple[dict[str, Vec], str]:
     predict = predicting(one, seed)
 
     def asked(question: MotionQuestion) -> Sequence[tuple[str, Callable[[], object]]]:
-        question = replace(question, ahead=False)
+        question = replace(question, rollout=False)
         alone = replace(question, safety=None)
-        direct = replace(alone, way="direct")
+        direct = replace(alone, inference_mode="direct")
         return (
             ("motion", lambda: one.decide(alone)),
             ("motion-monitored", lambda: one.decide(question)),
             ("motion-direct", lambda: one.decide(direct)),
-            ("motion-rollout", lambda: one.decide(replace(alone, ahead=True))),
+            ("motion-rollout", lambda: one.decide(replace(alone, rollout=True))),
             ("motion-sb3-predict", predict),
         )
 
