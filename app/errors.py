@@ -161,7 +161,7 @@ class BadRecording(_Faulty):
 
 
 class Beyond(Protocol):
-    """One coordinate that lies outside its range; ``app.sim.ports.OutsideField`` is one."""
+    """One coordinate outside its range, such as an ``OutsideField`` of ``app.sim.core``."""
 
     @property
     def field(self) -> str: ...  # noqa: D102

@@ -41,9 +41,9 @@ def _shipped(purpose: str) -> list[Checkpoint]:
 def _moving() -> None:
     """Decide motion without people, beside a body and a cylinder; step the live reach cell."""
     for checkpoint in _shipped(REACHING):
-        reacher, cell = ReachPolicy(checkpoint), cell_of(checkpoint.manifest)
-        MotionDecider(reacher, cell).warm_up()
-        LiveReachWorld(cell, ReachPilot(reacher), seed=0).step()
+        policy, cell = ReachPolicy(checkpoint), cell_of(checkpoint.manifest)
+        MotionDecider(policy, cell).warm_up()
+        LiveReachWorld(cell, ReachPilot(policy), seed=0).step()
     new_world(load_cell(REACH_CELL), None, seed=0).step()
 
 

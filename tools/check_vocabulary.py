@@ -3,7 +3,7 @@
     python tools/check_vocabulary.py [PATH ...]    print file:line: word; status 1 if any
 
 Paths restrict the search to files below them; class names are compared in the whole repository.
-``docs/glossary.md`` lists the terms to use. ``tests/test_vocabulary.py`` runs the same checks.
+``docs/glossary.md`` lists the terms to use. A test runs the same checks.
 """
 
 import ast
@@ -39,7 +39,7 @@ EXCLUDED = re.compile(
 """Third-party files, pictures, lock files, licences, and the list itself."""
 
 WORDS = re.compile(
-    r"dart(?:s|ing)?|foret(?:old|ells?|elling)|heed(?:s|ed|less|ing)?|mover(?:s)?|sorter(?:s)?"
+    r"dart(?:s|ing)?|foret(?:old|ells?|elling)|heed(?:s|ed|less|ing)?|controller(?:s)?|sorter(?:s)?"
     r"|reacher(?:s)?|pilot(?:s)?|twin(?:s)?|yardstick(?:s)?|court(?:esy|eous)|glitch(?:es|y)"
     r"|glitc[h]|repertoire(?:s)?|hind(?:sight)|teller(?:s)?|(?:un)?(?:told)|room(?:s)|house(?:s)?"
     r"|furni(?:ture)|citizen(?:s)?|lesson(?:s)?|ane(?:w)|who(?:ever|m)"

@@ -5,9 +5,9 @@ by planes across their axis: every triangle that straddles a plane is split *on*
 part gets the capsule of least volume around its corners, and the union contains the whole
 surface, not just the vertices. The cuts are searched for the least sum of volumes.
 
-The result is committed as ``shapes_data/ur10_capsules.json``;
+The result is committed as ``app/sim/robot/data/ur10_capsules.json``;
 ``tests/sim/robot/test_capsules.py``
-checks the containment anew.
+checks the containment again.
 """
 
 import json

@@ -1,7 +1,7 @@
 """Models the person: a worker made of round cones, in a helmet and a vest.
 
 Run by hand after a change, ``python -m tools.model_mannequin``: writes
-``meshes/mannequin.npz``,
+``web/viewer/people/data/mannequin.npz``,
 which :mod:`web.viewer.people.mannequin` loads. Soft parts (jacket, vest, stripes, trousers)
 are in the bind
 pose of :mod:`web.viewer.people.skeleton`, rigid ones in the frame of the bone they follow.

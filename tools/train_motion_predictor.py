@@ -5,7 +5,7 @@ remembered motion is the input, the later motion the target. A tenth of them hav
 and radius, a tenth a shorter past, and a fifth a past with noise as of a tracker. The two
 networks are trained on the mean squared error.
 
-Takes about eight minutes on one core and writes ``forecasts_data/walker.npz``, which is
+Takes about eight minutes on one core and writes ``data/walker.npz``, which is
 committed. A test trains for a moment and checks the errors of the shipped networks on other
 pedestrians.
 """

@@ -85,7 +85,7 @@ async def stream(world: WorldDep, services: ServicesDep) -> AsyncIterator[Server
     while not services.stopping.is_set():
         snapshot = world.handle.snapshot()
         if services.worlds.get(world_id) is not world:
-            yield ServerSentEvent(event="end", data={"reason": "the world was started anew"})
+            yield ServerSentEvent(event="end", data={"reason": "the world was started again"})
             return
         if snapshot is not last:
             last = snapshot
@@ -95,7 +95,7 @@ async def stream(world: WorldDep, services: ServicesDep) -> AsyncIterator[Server
         await asyncio.sleep(STREAM_PERIOD_S)
 
 
-@router.put("/{world_id}/cell", summary="Start a live world anew in another cell")
+@router.put("/{world_id}/cell", summary="Start a live world again in another cell")
 def set_cell(world_id: str, body: WorldCell, services: ServicesDep) -> WorldSummary:
     """Stop the world and start it in a cell to pick and place, sort or reach in; streams end.
 
@@ -140,7 +140,7 @@ def _replace_world(
     reach_policy: LiveReachPolicy | None,
     services: Services,
 ) -> WorldSummary:
-    """Start the world of an id anew, and stop the one that was there."""
+    """Start the world of an id again, and stop the one that was there."""
     with services.replacing:
         if services.stopping.is_set():
             raise NotReady("stopping")

@@ -83,7 +83,7 @@ class LiveArm:
         self.qd = np.zeros(6)
 
     def touches(self, people: PeopleInCell) -> bool:
-        """Whether it touches anything where it is; the clearance is measured anew."""
+        """Whether it touches anything where it is; the clearance is measured again."""
         rest, here = np.zeros(6), people.bodies
         return self._test(rest, rest, rest, here, here).kind != "none"
 

@@ -12,7 +12,7 @@ pick/threads-N/BATCH            N Python threads, each steps its own N-th of the
 
 ``pairs`` counts the capsule pairs whose exact distance a pose asks for: of robot and people and
 of the robot with itself; a walker is a cylinder and counts as one shape. Random actions; an
-episode that ends starts anew.
+episode that ends starts again.
 """
 
 import itertools

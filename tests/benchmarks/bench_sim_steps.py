@@ -14,7 +14,7 @@ sorting-e0/numba     sorting 10 objects of two colours, random valid moves
 sorting-e1/numba     20 objects of three colours
 gymnasium/sorting-e0 one plain environment of the same task, see ``plain_sorting.py``
 
-The environments act at random, and episodes that end start anew. MuJoCo is posed along an
+The environments act at random, and episodes that end start again. MuJoCo is posed along an
 episode recorded from the kernels and does less than they do, see ``mujoco_pick.py``. The column
 *slower* says how many times as many steps ``pick/numba`` makes, the median over the rounds.
 """

@@ -6,7 +6,7 @@ Rows are named ``WHO/K-COLOURS[-disturbed]``, one per size of the task. A decisi
 or of the exact planner is one next move (and, of the planner, the whole plan); a PDDL planner
 plans from scratch. All see the same instances: K - 1 objects of random types, all of them asked
 for. *Disturbed*: half of the goal stands when a person puts one more object on a tower, which
-is planned anew. ``value`` is the median in milliseconds of processor time, of PDDL planners
+is planned again. ``value`` is the median in milliseconds of processor time, of PDDL planners
 that of all their processes, start included; ``found`` says how many of the instances were
 planned within ``--cap`` processor seconds, ``over`` the mean moves above the fewest. A size
 whose instances all timed out is the last one tried; ``--total`` bounds the whole of it.

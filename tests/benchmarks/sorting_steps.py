@@ -11,13 +11,13 @@ from tests.benchmarks.stock_dqn import plain
 
 BATCH = 128
 RECORDED = 512
-"""Steps after which the batch starts anew."""
+"""Steps after which the batch starts again."""
 
 
 def batched(name: str, cell_name: str, seed: int) -> Subject:
     """Return the compiled batch; it makes random valid moves.
 
-    The moves are drawn beforehand: the batch goes the same way whenever it starts anew.
+    The moves are drawn beforehand: the batch goes the same way whenever it starts again.
     """
     batch = batch_in(load_cell(cell_name), BATCH, seed)
     rng = np.random.default_rng(seed)

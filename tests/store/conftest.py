@@ -12,7 +12,7 @@ from app.store.records import Claim, NewJob
 
 @pytest.fixture(scope="session")
 def migrated(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An empty database with its tables; copying it is quicker than migrating anew."""
+    """An empty database with its tables; copying it is quicker than migrating again."""
     path = tmp_path_factory.mktemp("migrated") / "tandem.db"
     opened = Store(f"sqlite:///{path}")
     migrate(opened)

@@ -31,7 +31,7 @@ def test_stored_recording_comes_back_unchanged(store: Store) -> None:
 
 def test_same_file_again_is_harmless_and_another_one_refused(store: Store) -> None:
     recordings.put_recording(store, WAVE)
-    assert not recordings.put_recording(store, replace(WAVE, tensors=b"converted anew"))
+    assert not recordings.put_recording(store, replace(WAVE, tensors=b"converted again"))
     with pytest.raises(Conflict, match="'wave' from another file is stored: remove it"):
         recordings.put_recording(store, replace(WAVE, sha256="b" * 64))
     assert recordings.read_runs(store, "wave")[1] == WAVE.tensors

@@ -43,7 +43,7 @@ PICTURE_S = 0.04
 
 
 class LiveHandle:
-    """What other threads may do with a live cell; see ``app.sim.ports.WorldHandle``.
+    """What other threads may do with a live cell; see ``app.live.world_handle.WorldHandle``.
 
     Args:
         id: Name of the world in URLs.

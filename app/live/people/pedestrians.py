@@ -157,7 +157,7 @@ class LiveWalkers:
         return HumanGeometry(np.zeros((0, 18)), np.zeros((0, N_SIZE)), self.cylinders)
 
     def restart(self) -> None:
-        """Let everyone who walks begin anew somewhere; who is dragged or stands stays."""
+        """Let everyone who walks begin again somewhere; who is dragged or stands stays."""
         for one in self:
             if one.mode == "auto":
                 self._place(one.id)

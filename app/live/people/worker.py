@@ -179,7 +179,7 @@ class LivePerson:
     def glide(self, dt: float) -> bool:
         """Let the size go on changing for ``dt`` [s]; return whether it did.
 
-        A dragged hand stays where it was put; who works begins anew with the new arms.
+        A dragged hand stays where it was put; who works begins again with the new arms.
         """
         if not self.body.glide(dt):
             return False

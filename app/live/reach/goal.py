@@ -34,7 +34,7 @@ class LiveGoal:
         self.restart()
 
     def restart(self) -> None:
-        """Begin the same sequence of goals anew."""
+        """Begin the same sequence of goals again."""
         self._rng = np.random.default_rng(self._seed)
         self.position = self.targets[len(self.targets) // 2].copy()
         self.jump()

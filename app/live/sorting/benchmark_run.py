@@ -2,7 +2,7 @@
 
 A test's person acts without a visitor.
 
-Source: METHOD 1.5; ``sorting_tests.py``.
+Source: METHOD 1.5; ``benchmark_tasks.py``.
 """
 
 from dataclasses import dataclass

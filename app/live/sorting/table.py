@@ -28,7 +28,7 @@ class Block:
     id: str
     """Its name."""
     code: int
-    """Its colour and size, see ``sorting_state.py``."""
+    """Its colour and size, see ``state.py``."""
 
 
 class SortingTable:

@@ -5,7 +5,7 @@ tool over the place (``approach``, ``carry``), and inverse kinematics within the
 covers the last centimetres down and up again (``grasp``, ``place``). A grasp fails with the
 cell's probability, drawn from (seed, task, attempt). After every attempt and after every change
 of blocks, goal or policy the next move is chosen again; a held block then continues, goes
-elsewhere, or back to where it counts (``sorting_table.py``).
+elsewhere, or back to where it counts (``table.py``).
 
 A person nearer than NEAR_M interrupts inverse kinematics, and the policy continues. Without a
 move the robot returns home. A motion that reaches the time limit starts again, with another

@@ -1,8 +1,8 @@
 """TD3 on Stable-Baselines3, extended at its extension points.
 
 Added are own networks, exploration per environment, an actor that is frozen at first, an
-averaged actor and prioritised replay (``replay.py``); uniform replay with n-step returns is
-Stable-Baselines3's. DDPG is TD3 with one critic, no delay and no target noise.
+averaged actor and prioritised replay (``prioritized_replay.py``); uniform replay with n-step
+returns is Stable-Baselines3's. DDPG is TD3 with one critic, no delay and no target noise.
 
 Source: Fujimoto, van Hoof, Meger, *Addressing function approximation error in actor-critic
 methods* (2018); Lillicrap et al., *Continuous control with deep reinforcement learning* (2016);

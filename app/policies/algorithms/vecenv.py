@@ -1,6 +1,6 @@
 """A batch as Stable-Baselines3's ``VecEnv``, for every scenario.
 
-Spaces, actions and truncation are those of the Gymnasium environments (``envs/rows.py``). Ended
+Spaces, actions and truncation are those of the Gymnasium environments (``envs/tasks.py``). Ended
 environments restart within the step; their final observation is in
 ``infos[i]["terminal_observation"]``.
 """

@@ -2,7 +2,7 @@
 
 A training job names a preset, a seed and overrides, objects of fields by group:
 ``{"learning": {"gamma": 0.98}}``. The fields and their bounds are declared by the models in
-``pick_preset.py``, ``reach_preset.py`` and ``sorting_preset.py``. No learning library is
+``pick.py``, ``reach.py`` and ``sorting.py``. No learning library is
 imported here, so that the service can check and describe presets cheaply.
 """
 

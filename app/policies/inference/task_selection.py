@@ -118,7 +118,7 @@ def choose(values: NDArray[np.floating], previous: int | None, hysteresis: float
 
 
 class TaskChooser:
-    """A :class:`~app.sim.ports.TaskPolicy` made of one checkpoint.
+    """A :class:`~app.sim.pick.task_policy.TaskPolicy` made of one checkpoint.
 
     Args:
         checkpoint: A ``policy`` checkpoint.
@@ -182,7 +182,7 @@ class TaskChooser:
         previous: str | None = None,
         time_left_s: float = 10.0,
     ) -> Decision:
-        """Choose one candidate; see :class:`~app.sim.ports.TaskPolicy`.
+        """Choose one candidate; see :class:`~app.sim.pick.task_policy.TaskPolicy`.
 
         The checkpoint knows one person: it sees the one nearest to the robot, in the person's
         own size (``observed_people.py``). The others count for nothing in this choice, and nor

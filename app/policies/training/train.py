@@ -3,7 +3,7 @@
 Stable-Baselines3's ``learn`` runs the loop; a callback reports progress and checkpoints on a
 fixed grid of environment steps and stops the training. A resumed run first refills its replay
 buffer with the restored policy; these steps are not counted. Parts of the scenarios are in
-``pick_training.py``, ``reach_training.py`` and ``sorting_training.py``.
+``pick.py``, ``reach.py`` and ``sorting.py``.
 """
 
 from collections.abc import Callable

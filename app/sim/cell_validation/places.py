@@ -1,6 +1,6 @@
 """Where stations and people of a work cell stand: on the table, on an obstacle, on the floor.
 
-A part of ``cell_checks.py``.
+A part of ``checks.py``.
 """
 
 import math

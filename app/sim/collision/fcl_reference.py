@@ -1,8 +1,8 @@
 """The reference for contact: python-fcl on the UR10's real collision meshes.
 
-Slow and exact, where the kernels are fast and cautious. Tests and the second look of
-evaluations (``recheck.py``) ask here; training and live cells use the kernels alone. The checks
-of work cells use its obstacles and capsules. Two accuracies of the robot: ``raw`` (the
+Slow and exact, where the kernels are fast and conservative. Tests and the spot checks of
+evaluations (``fcl_recheck.py``) use it; training and live cells use the kernels alone. The
+checks of work cells use its obstacles and capsules. Two accuracies of the robot: ``raw`` (the
 triangles as they are, as a bounding volume tree) for verdicts, ``hull`` (convex hull of each
 link) where distances are wanted: a distance on raw meshes costs tens of milliseconds.
 

@@ -1,7 +1,7 @@
 """Nearest points of two segments, compiled; one pair at a time, for directions and names.
 
 Source: Ericson, *Real-Time Collision Detection* (2005), section 5.1.9. Distances of sets of
-capsules are in ``columns.py``.
+capsules are in ``capsules.py``.
 """
 
 import math

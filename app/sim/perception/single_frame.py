@@ -2,7 +2,7 @@
 
 What is missing is not carried on from anywhere: those joints rest as they do in a person who
 stands (``held``), the cylinder widens to where they can be, and speeds are zero unless the
-key-points come with their own. For streams: ``people_estimate.py``.
+key-points come with their own. For streams: ``multi_person_tracker.py``.
 
 Somebody is there, or there would be no frame. Where no key-point can be used (``never-seen``),
 or they are in another frame or unit (``foreign-frame``), the place is not known; the cylinder

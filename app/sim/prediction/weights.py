@@ -1,4 +1,4 @@
-"""Networks of the shipped motion predictor, from ``forecasts_data/walker.npz``."""
+"""Networks of the shipped motion predictor, from ``data/walker.npz``."""
 
 from functools import lru_cache
 from importlib import resources

@@ -1,7 +1,7 @@
 """Names of a sorting task's colours, sizes and places, and states written in them.
 
 Programs say ``red``, ``large``, ``cell3``; kernels and networks see codes and positions
-(``sorting_state.py``). What does not fit is refused in the caller's own words.
+(``state.py``). What does not fit is refused in the caller's own words.
 """
 
 from collections.abc import Mapping, Sequence

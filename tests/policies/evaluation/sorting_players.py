@@ -70,7 +70,7 @@ def in_circles(state: SortingState, shape: SortingShape) -> int:
 
 
 def at_random(shape: SortingShape, seed: int):
-    """Return values that are drawn anew for every question."""
+    """Return values that are drawn again for every question."""
     calls = count()
 
     def values(obs):

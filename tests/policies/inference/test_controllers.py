@@ -72,14 +72,14 @@ def test_between_targets_it_is_the_weighted_mean_of_actions_for_them(goals: str)
 
 @pytest.mark.parametrize("goals", ["grid", "halton"])
 def test_actions_are_continuous_over_the_borders_of_cells(goals: str) -> None:
-    batch, mover = batch_of(n_envs=400), controller_of(RandomActor(goals))
+    batch, controller = batch_of(n_envs=400), controller_of(RandomActor(goals))
     state = batch.state
     for name in ("q", "qd", "clear", "time_left"):
         getattr(state, name)[:] = getattr(state, name)[:1]
     state.people.walkers.rows[:] = state.people.walkers.rows[:1]
     state.people.cylinders[:] = state.people.cylinders[:1]
     send(batch, np.linspace(LOW + 1e-3, HIGH - 1e-3, 400))
-    jumps = np.abs(np.diff(mover.acts(batch), axis=0)).max(axis=1)
+    jumps = np.abs(np.diff(controller.acts(batch), axis=0)).max(axis=1)
     assert jumps.max() < 0.05 and jumps.min() > 0.0
 
 
@@ -107,10 +107,10 @@ def test_only_policies_that_kernels_simulate_allow_rollouts() -> None:
 
 @pytest.mark.parametrize("how", inference_modes_of(RandomActor()))
 def test_ended_cells_get_no_action_and_the_others_the_same(how: str) -> None:
-    batch, mover = batch_of(("walker", "constant")), controller_of(RandomActor(), how)
-    before = mover.acts(batch)
+    batch, controller = batch_of(("walker", "constant")), controller_of(RandomActor(), how)
+    before = controller.acts(batch)
     batch.state.outcome[[1, 4]] = 1
-    after = mover.acts(batch)
+    after = controller.acts(batch)
     assert not after[[1, 4]].any()
     others = [0, 2, 3, *range(5, 12)]
     np.testing.assert_allclose(after[others], before[others], atol=1e-6)

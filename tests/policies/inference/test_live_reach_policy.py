@@ -36,12 +36,12 @@ def test_live_state_is_seen_as_the_batch_sees_it(policy: ReachPolicy) -> None:
     for _ in range(5):
         batch.step(np.full((1, 6), 0.3, dtype=np.float32))
     world = LiveReachWorld(CELL, pilot, seed=1)
-    robot, reacher = world.robot, ReachController(CELL, pilot)
+    robot, driver = world.robot, ReachController(CELL, pilot)
     state = batch.state
     robot.q, robot.qd, robot.qdd = state.q[0], state.qd[0], state.qdd[0]
     for way in pilot.inference_modes:
-        reacher.inference_mode = way
-        act = reacher.act(
+        driver.inference_mode = way
+        act = driver.act(
             robot,
             state.people.walkers.rows[0],
             state.goal[0],
@@ -75,9 +75,9 @@ def test_looking_ahead_is_told_of_the_layer_that_is_obeyed(
     world = LiveReachWorld(CELL, pilot, seed=1)
     world.apply(SetInferenceMode(inference_mode="direct-rollout"))
     world.apply(SetSafety(on=on, use_measured_velocity=measured))
-    mover = pilot._controllers["direct-rollout"]
-    assert isinstance(mover, RolloutController)
-    assert (mover.layer != NO_CONSTRAINT) == (on and measured)
+    controller = pilot._controllers["direct-rollout"]
+    assert isinstance(controller, RolloutController)
+    assert (controller.layer != NO_CONSTRAINT) == (on and measured)
 
 
 def test_under_the_layer_the_policy_has_its_usual_time_and_looking_ahead_the_true_one(

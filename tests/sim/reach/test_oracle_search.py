@@ -12,7 +12,7 @@ from app.sim.reach.oracle_search import (
     provably_unsolvable,
 )
 from app.sim.scenario.kernels.episode import RUNNING, SUCCESS
-from tests.policies.straight_mover import Straight
+from tests.policies.straight_controller import Straight
 
 CELL = load_cell("shared-workspace")
 RULES = ReachSettings()
@@ -33,10 +33,10 @@ def test_copied_episode_equals_the_original():
     first, other = batch_of(6), batch_of(4, seed=99)
     rows = np.array([5, 2, 2])
     copy_rows(first.state, rows, other.state, 1)
-    mover = Straight()
+    controller = Straight()
     for _ in range(100):
-        first.step(mover.acts(first), auto_reset=False)
-        other.step(mover.acts(other), auto_reset=False)
+        first.step(controller.acts(first), auto_reset=False)
+        other.step(controller.acts(other), auto_reset=False)
     np.testing.assert_array_equal(other.state.q[1:], first.state.q[rows])
     np.testing.assert_array_equal(
         other.state.people.cylinders[1:], first.state.people.cylinders[rows]
@@ -45,11 +45,11 @@ def test_copied_episode_equals_the_original():
 
 
 def test_resimulated_policy_ends_as_without_the_search():
-    batch, mover = batch_of(40), Straight()
+    batch, controller = batch_of(40), Straight()
     search = OracleSearch(batch, 1, SMALL)
-    search.undisturbed(mover.acts)
+    search.undisturbed(controller.acts)
     while (batch.state.outcome == RUNNING).any():
-        batch.step(mover.acts(batch), auto_reset=False)
+        batch.step(controller.acts(batch), auto_reset=False)
     solved = batch.state.outcome == SUCCESS
     assert 5 < solved.sum() < 40
     np.testing.assert_array_equal(search.resimulations.reached > 0, solved)

@@ -158,7 +158,7 @@ class Evaluator:
         Args:
             rule: Chooses among the candidates.
             n_recorded: Rows whose poses are kept.
-            seen: The person the policy sees instead of the true one; made anew for every run
+            seen: The person the policy sees instead of the true one; made again for every run
                 where it remembers what it saw.
         """
         batch, n = self.batch, self.batch.n_envs

@@ -96,7 +96,7 @@ def between(
 class KeypointObserver:
     """Shows the policy the first worker of each row as a tracker and an estimator know them.
 
-    Made anew for every run.
+    Made again for every run.
 
     Args:
         row: How people are seen.

@@ -2,8 +2,8 @@
 
 bench         What the protocols of the reach scenario share: a policy, its cell, its rules,
               its rows
-episodes      Runs reach episodes to their ends under any mover, and counts how they ended
-oracle        Protocol ``reach-oracle``: how much success is possible at all, by hindsight
+episodes      Run reach episodes to their ends under any controller, and count the outcomes
+oracle        Protocol ``reach-oracle``: upper bound of success by search with a known future
               search
 people        Protocols ``reach-people``, ``reach-constant`` and ``reach-speeds``: other people
 random_goals  Protocol ``reach-random``: goals anywhere in the box, which no grid holds

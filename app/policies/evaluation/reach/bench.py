@@ -116,7 +116,7 @@ class ReachBench:
         how: InferenceMode = InferenceMode.DIRECT,
         *,
         cell: Cell | None = None,
-        mover: Controller | None = None,
+        controller: Controller | None = None,
     ) -> ReachEpisodes:
         """Play an episode per goal.
 
@@ -125,9 +125,9 @@ class ReachBench:
             goals: Goal of each episode [m], shape (n, 3).
             how: By which way the policy is asked.
             cell: Work cell, where it is not the checkpoint's.
-            mover: What stands between, where the policy is not asked alone.
+            controller: Controller in place of the inference mode; None: that of `how`.
         """
-        asked = mover or controller_of(self.actor, how)
+        asked = controller or controller_of(self.actor, how)
         return play(cell or self.cell, settings, asked, goals, self._seed)
 
     def recheck(

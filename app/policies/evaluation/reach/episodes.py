@@ -1,4 +1,4 @@
-"""Runs reach episodes to their ends under any mover, and counts how they ended.
+"""Run reach episodes to their ends under any controller, and count the outcomes.
 
 Episode ``i`` of a seed is played by row ``i mod N_ENVS`` of a batch as its number ``i //
 N_ENVS``: its people and their whole motion, and its goal, are the same whoever moves the robot,
@@ -96,13 +96,13 @@ class _Play:
 
     Args:
         batch: Not started.
-        mover: Who moves the robots.
+        controller: Controller of the robots.
         goals: Goal of each episode [m], shape (n, 3).
     """
 
-    def __init__(self, batch: ReachBatch, mover: Controller, goals: Vec) -> None:
+    def __init__(self, batch: ReachBatch, controller: Controller, goals: Vec) -> None:
         n, rows = len(goals), batch.n_envs
-        self._batch, self._mover, self._goals = batch, mover, goals
+        self._batch, self._controller, self._goals = batch, controller, goals
         self._limit = batch.settings.time_limit_s
         self._playing = np.arange(rows)
         self._patience = np.zeros(rows)
@@ -124,7 +124,7 @@ class _Play:
 
     def _period(self) -> None:
         batch, dt = self._batch, self._batch.arm.dt
-        act = self._mover.acts(batch)
+        act = self._controller.acts(batch)
         spare = np.minimum(self._patience, dt)
         np.add(batch.state.time_left, spare, out=batch.state.time_left)
         self._patience -= spare
@@ -155,23 +155,23 @@ class _Play:
 
 
 def play(
-    cell: Cell, settings: ReachSettings, mover: Controller, goals: Vec, seed: int
+    cell: Cell, settings: ReachSettings, controller: Controller, goals: Vec, seed: int
 ) -> ReachEpisodes:
     """Play one episode per goal.
 
     Args:
         cell: Work cell.
         settings: Starts, ends, people; where goals are drawn from does not matter.
-        mover: Who moves the robots.
+        controller: Controller of the robots.
         goals: Goal of each episode [m], shape (n, 3).
         seed: Seed of the episodes.
     """
     batch = ReachBatch(cell, min(N_ENVS, len(goals)), seed, settings)
-    return _Play(batch, mover, goals).to_the_end()
+    return _Play(batch, controller, goals).to_the_end()
 
 
 def recheck_contacts(
-    cell: Cell, settings: ReachSettings, mover: Controller, goals: Vec, seed: int
+    cell: Cell, settings: ReachSettings, controller: Controller, goals: Vec, seed: int
 ) -> dict[str, int]:
     """Play the first episodes once more and ask FCL whether the kernels missed a contact.
 
@@ -183,7 +183,7 @@ def recheck_contacts(
     batch.reset()
     batch.set_goals(np.arange(n), goals[:n])
     while (rows := np.flatnonzero(batch.state.outcome == kernel.RUNNING)).size:
-        act = mover.acts(batch)
+        act = controller.acts(batch)
         trace.before(rows)
         batch.step(act, auto_reset=False)
         trace.after()

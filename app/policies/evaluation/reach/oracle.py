@@ -1,4 +1,4 @@
-"""Protocol ``reach-oracle``: how much success is possible at all, by hindsight search.
+"""Protocol ``reach-oracle``: upper bound of success by search with a known future.
 
 The episodes are those of ``reach-targets`` (54 targets x 100, start clearance 0.05 m, 5 s): the
 same people, the same motion. What the policy does not solve is replayed, moved differently each
@@ -118,14 +118,14 @@ class Ceiling:
         self.rows.append(row)
         self._on_row(len(self.rows), self._n_stages, row)
 
-    def run(self, mover: Controller) -> None:
+    def run(self, controller: Controller) -> None:
         """Run all stages."""
         search = self.search
-        self.stage("policy", lambda: search.undisturbed(mover.acts))
+        self.stage("policy", lambda: search.undisturbed(controller.acts))
         for n_each in SCRIPTED:
             self.stage(f"scripted-{n_each}", partial(self._scripted, n_each))
         self.stage(
-            "disturbed", lambda: search.disturbed(search.unsolved(), DISTURBED, mover.acts)
+            "disturbed", lambda: search.disturbed(search.unsolved(), DISTURBED, controller.acts)
         )
         self.stage("long", partial(self._scripted, LONG))
 

@@ -1,12 +1,12 @@
 """Protocols ``reach-people``, ``reach-constant`` and ``reach-speeds``: other people.
 
-``reach-people``: nobody to four walking cylinders, without training anew, the nearest seen and
+``reach-people``: nobody to four walking cylinders, without training again, the nearest seen and
 all averaged. Nobody and one person are the same by both.
 ``reach-constant``: speed and radius constant in each episode, beside the usual person.
 ``reach-speeds``: a person of 0.25, 0.5 and 1.0 m/s; the speed's limits do not apply, else
 0.25 m/s would be standing still (METHOD 2.1).
 
-``-rollout`` looks ahead with the policy (``lookahead.py``), at all people at once.
+``-rollout`` looks ahead with the policy (``rollout.py``), at all people at once.
 
 All go round the grid's targets, with the same goals in every row.
 

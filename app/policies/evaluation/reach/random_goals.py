@@ -7,7 +7,7 @@ also be asked at those around the goal, and its actions interpolated.
 ====================  ======================================================================
 ``targets``           the grid's targets instead, asked directly, the same people, 5 s
 ``WAY``, ``WAY-25s``  random goals by each way that the checkpoint allows, 5 s and 25 s
-``...-rollout``         the same looking ahead with the policy (``lookahead.py``)
+``...-rollout``         the same looking ahead with the policy (``rollout.py``)
 ====================  ======================================================================
 
 ``between`` groups the episodes of 5 s by the way from their goals to the nearest target.

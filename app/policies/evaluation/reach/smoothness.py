@@ -56,12 +56,12 @@ class Paths:
     """Index into OUTCOMES, shape (n,)."""
 
 
-def drive(batch: ReachBatch, mover: Controller, goals: Vec) -> Paths:
+def drive(batch: ReachBatch, controller: Controller, goals: Vec) -> Paths:
     """Play one episode in every row of a batch and keep the whole way.
 
     Args:
         batch: Not started.
-        mover: Who moves the robots.
+        controller: Controller of the robots.
         goals: Goal of each row [m], shape (n_envs, 3).
     """
     batch.reset()
@@ -74,7 +74,7 @@ def drive(batch: ReachBatch, mover: Controller, goals: Vec) -> Paths:
         running = state.outcome == kernel.RUNNING
         if not running.any():
             break
-        batch.step(mover.acts(batch), auto_reset=False)
+        batch.step(controller.acts(batch), auto_reset=False)
     q, qd, qdd, clearance, distance = (
         np.array([period[i] for period in kept]) for i in range(5)
     )

@@ -205,11 +205,11 @@ def against(one: MonitoredEpisodes, other: MonitoredEpisodes) -> Json:
     return {"all": saving(every), "untouched": saving(untouched)}
 
 
-def drive(batch: MonitoredReachBatch, mover: Controller) -> Course:
+def drive(batch: MonitoredReachBatch, controller: Controller) -> Course:
     """Run a batch that was just reset to the end of every row's episode."""
     found: list[Vec] = []
     while (batch.state.outcome == RUNNING).any():
-        batch.step(mover.acts(batch), auto_reset=False, features=False)
+        batch.step(controller.acts(batch), auto_reset=False, features=False)
         found.append(batch.override.copy())
     runs, every = batch.runs(), np.array(found)
     periods = np.round(runs.seconds / batch.arm.dt).astype(int)
@@ -287,9 +287,9 @@ class Comparison:
             self._postures = postures_of(arm_of(self.cell), self.crossed.goals, self.seed)
         return self._postures
 
-    def policy(self, mover: Controller, *, alone: bool = False) -> Course:
+    def policy(self, controller: Controller, *, alone: bool = False) -> Course:
         """Run a policy over all crossings."""
-        return drive(self.batch(alone=alone), mover)
+        return drive(self.batch(alone=alone), controller)
 
     def planner(
         self,
@@ -348,7 +348,7 @@ def random_runs(
     cell: Cell,
     settings: ReachSettings,
     safety: SafetySettings,
-    mover: Controller,
+    controller: Controller,
     n: int,
     seed: int,
 ) -> list[MonitoredEpisodes]:
@@ -362,7 +362,7 @@ def random_runs(
         batch.restart()
         batch.set_goals(np.arange(len(some)), some)
         batch.state.outcome[len(some) :] = TIMEOUT  # nobody asks about these rows
-        runs = drive(batch, mover).runs
+        runs = drive(batch, controller).runs
         found.append(picked(runs, np.arange(len(some))))
     return found
 
@@ -440,16 +440,16 @@ def movers_of(
 ) -> dict[str, Controller]:
     """Return who stands in for the policy, by row; see the head of this file."""
     direct, layer = controller_of(actor, "direct"), ssm_constraint_of(safety, dt)
-    movers = {"policy": direct}
+    controllers = {"policy": direct}
     if can_roll_out(actor):
-        movers[AHEAD] = RolloutController(direct, actor, layer)
+        controllers[AHEAD] = RolloutController(direct, actor, layer)
         if layer != NO_CONSTRAINT:
-            movers["policy-rollout-ssm-agnostic"] = RolloutController(direct, actor)
+            controllers["policy-rollout-ssm-agnostic"] = RolloutController(direct, actor)
     if checkpoint.manifest["preset"].get("episode", {}).get("safety") == "ssm":
         other = ReachPolicy(pretrained.load("reach"))
         if (other.action, other.view) == (actor.action, actor.view):
-            movers["policy-trained-without-ssm"] = controller_of(other, "direct")
-    return movers
+            controllers["policy-trained-without-ssm"] = controller_of(other, "direct")
+    return controllers
 
 
 class _Rows:
@@ -466,16 +466,16 @@ class _Rows:
 
 
 def compare(
-    comparison: Comparison, movers: Mapping[str, Controller], rows: _Rows, suffix: str = ""
+    comparison: Comparison, controllers: Mapping[str, Controller], rows: _Rows, suffix: str = ""
 ) -> dict[str, Course]:
     """Run policies and planners over one set of crossings; return their courses by row."""
     jobs: dict[str, Callable[[], Course]] = {
-        name: partial(comparison.policy, mover) for name, mover in movers.items()
+        name: partial(comparison.policy, controller) for name, controller in controllers.items()
     }
     for name, settings in PLANNERS.items():
         jobs[name] = partial(comparison.planner, settings)
-    if "policy" in movers:
-        jobs["policy-no-person"] = partial(comparison.policy, movers["policy"], alone=True)
+    if "policy" in controllers:
+        jobs["policy-no-person"] = partial(comparison.policy, controllers["policy"], alone=True)
     jobs["planner-no-person"] = lambda: comparison.planner(ALONE, alone=True)
     jobs["planner-no-ssm"] = lambda: comparison.planner(ALONE, blind=True, guarded=False)
     courses = {}
@@ -531,7 +531,7 @@ def run_ssm(
         end: movers_of(checkpoint, actor, safety, cell.robot.dt)
         for end, safety in layers.items()
     }
-    each = sum(len(PLANNERS) + len(movers) + 5 for movers in acting.values())
+    each = sum(len(PLANNERS) + len(controllers) + 5 for controllers in acting.values())
     rows = _Rows(len(sets) * each + 3, on_row)
     result: Json = {"paired": {}, "seconds": {}, "example": {}}
     for name, crossed in sets.items():
@@ -549,8 +549,10 @@ def run_ssm(
         "random-still": (_Still(), layers[""]),
         "random" + DIRECTED: (policy, layers[DIRECTED]),
     }
-    for name, (mover, safety) in trials.items():
-        rows.add(random_row(name, random_runs(cell, settings, safety, mover, n_random, seed)))
+    for name, (controller, safety) in trials.items():
+        rows.add(
+            random_row(name, random_runs(cell, settings, safety, controller, n_random, seed))
+        )
     return {
         "settings": stated(assumed, n, [motion.source for motion in motions]),
         "results": rows.rows,
@@ -559,12 +561,12 @@ def run_ssm(
 
 
 def paired_of(
-    courses: Mapping[str, Course], movers: Mapping[str, Controller], end: str
+    courses: Mapping[str, Course], controllers: Mapping[str, Controller], end: str
 ) -> Json:
-    """Return what each mover saves against each planner, by names of rows."""
+    """Return what each controller saves against each planner, by names of rows."""
     return {
         f"{mine}{end} against {name}{end}": against(courses[mine].runs, courses[name].runs)
-        for mine in movers
+        for mine in controllers
         for name in PLANNERS
     }
 

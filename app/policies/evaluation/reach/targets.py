@@ -9,7 +9,7 @@
                an episode goes on after a contact
 =============  =============================================================================
 
-``-rollout`` are the same looking ahead (``lookahead.py``), where the policy can.
+``-rollout`` are the same looking ahead (``rollout.py``), where the policy can.
 
 An episode with a contact is no success in any row; ``reached_after_contact`` is the share that
 came to the goal all the same.

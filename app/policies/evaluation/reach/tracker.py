@@ -67,16 +67,16 @@ LOOKED_AHEAD = ("30hz", "100ms-noise")
 
 
 class CylinderObserver:
-    """Asks another mover about people as a tracker knows them; made anew for every run.
+    """Asks another controller about people as a tracker knows them; made again for every run.
 
     Args:
-        mover: Who moves the robots.
+        controller: Controller of the robots.
         row: How people are seen.
         seed: Seed of the disturbances.
     """
 
-    def __init__(self, mover: Controller, row: CylinderSensorRow, seed: int) -> None:
-        self._mover, self._row, self._seed = mover, row, seed
+    def __init__(self, controller: Controller, row: CylinderSensorRow, seed: int) -> None:
+        self._controller, self._row, self._seed = controller, row, seed
         self._tracker: CylinderSensorModel | None = None
         self._rng = np.random.default_rng([seed, 1])
         self._past: Vec | None = None
@@ -113,7 +113,7 @@ class CylinderObserver:
         )
         people.cylinders[:] = seen
         batch.observe()
-        act = self._mover.acts(batch)
+        act = self._controller.acts(batch)
         people.walkers.rows[:], people.cylinders[:], clear[:] = kept
         return act
 
@@ -167,9 +167,9 @@ def run_tracker(
     bench.add(bench.play(bench.usual, goals).row("exact"), bench.usual, "grid")
     for how, name in rows:
         tracked = ROWS[name]
-        mover = CylinderObserver(controller_of(bench.actor, how), tracked, seed)
-        row = bench.play(bench.usual, goals, mover=mover).row(name + ending(how))
-        median, p95 = np.percentile(1e3 * np.concatenate(mover.errors), [50, 95]).tolist()
+        controller = CylinderObserver(controller_of(bench.actor, how), tracked, seed)
+        row = bench.play(bench.usual, goals, controller=controller).row(name + ending(how))
+        median, p95 = np.percentile(1e3 * np.concatenate(controller.errors), [50, 95]).tolist()
         row |= {"axis_error_median_mm": median, "axis_error_p95_mm": p95}
         bench.add(row, bench.usual, "grid", how, tracker=asdict(tracked))
     return bench.result()

@@ -35,7 +35,7 @@ DEFAULT_EPISODES = 1000
 
 
 class Person:
-    """The person of a test, in every row of a batch; made anew for every run.
+    """The person of a test, in every row of a batch; made again for every run.
 
     Args:
         test: The test.

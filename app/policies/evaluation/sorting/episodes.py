@@ -30,7 +30,7 @@ Values = Callable[[NDArray[np.uint8]], NDArray[np.float32]]
 Chooser = Callable[[SortingBatch, Index], Index]
 """Chooses the moves of some rows of a batch."""
 HORIZON_FACTOR = SortingSettings().horizon_factor
-"""Attempts per clutter cell after which an episode is cut off; counted anew where a person
+"""Attempts per clutter cell after which an episode is cut off; counted again where a person
 interferes and at a hand-over."""
 ENDLESS = 1e6
 """Horizon factor of the batch itself: the end is decided here."""

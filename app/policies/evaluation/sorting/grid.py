@@ -11,7 +11,7 @@ For every pair ``1 <= K_G <= K_E <= K``, the same episodes in every row of a kin
 ``disturbed-planner``    the same from disturbed starts
 =======================  ===================================================================
 
-Episodes are cut off after 4 K attempts; a hand-over counts them anew.
+Episodes are cut off after 4 K attempts; a hand-over counts them again.
 
 Source: thesis 3.4.2, fig. 3.2. Deviates: disturbed starts, hand-over and yardstick are ours.
 """

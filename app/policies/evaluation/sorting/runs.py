@@ -1,6 +1,6 @@
 """Protocols ``sorting-grid`` and ``sorting-tests`` of a checkpoint (METHOD 1.5).
 
-What they measure is told in ``sorting_grid.py`` and ``sorting_trials.py``. The task and its
+What they measure is told in ``grid.py`` and ``benchmark_tasks.py``. The task and its
 failure probabilities are those of the cell the policy was trained in.
 """
 

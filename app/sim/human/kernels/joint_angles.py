@@ -1,8 +1,8 @@
 """From directions of limbs to the angles of the 18-DoF person, compiled.
 
 The inverse of ``human/kernels/kinematics.py``, part by part; used for key-points
-(``keypoint_fit.py``) and
-for recordings (``track_angles.py``). With the torso's axes x, y, z seen from the pelvis,
+(``pose_fit.py``) and
+for recordings (``inverse_kinematics.py``). With the torso's axes x, y, z seen from the pelvis,
 
     Ry(flex) Rx(side) Rz(twist):  flex = atan2(z_x, z_z),  side = -asin(z_y),
                                   twist = atan2(x_y, y_y);

@@ -1,8 +1,8 @@
 """Falsification of speed and separation monitoring by adversarial people, compiled.
 
 A robot under a policy and the safety layer moves beside people that follow a script or run at
-it (``trial_people.py``), never faster than the trial allows; there is no table and no goal. The
-only measure is whether a contact finds a link in motion.
+it (``adversarial_people.py``), never faster than the trial allows; there is no table and no
+goal. The only measure is whether a contact finds a link in motion.
 
 **Policies.** *Smooth*: speeds drift. *Constant*: full speed, until a limit. *Goals*: straight
 to random configurations. *Bang-bang*: each joint at full speed in either direction for random

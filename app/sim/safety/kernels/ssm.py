@@ -11,7 +11,7 @@ is the age of the people relative to the robot's state, including the controller
 of the data, tracker delay and reaction time. ``D = C + Z_d + Z_r`` plus the protective
 distance. A cylinder with a known velocity may be extrapolated instead: it counts along its
 whole path at that velocity since its observation, as if present everywhere on it, and ``v_h``
-is only the assumed excess over the observed speed (``watch.py``).
+is only the assumed excess over the observed speed (``separation_check.py``).
 
 ``T_r`` of the standard is the latency and the control period; ``T_s`` is the stop at the end of
 the path; ``v_r T_r + B`` are not bounded by a speed but computed from the poses themselves.
@@ -50,7 +50,7 @@ of 0: a part may be reached while no capsule's axis is faster than its limit any
 approaches an obstacle no faster than its axis moves. The whole robot counts as fast as its
 fastest axis; a person's own speed is not counted. Step 2 holds unchanged.
 
-Between poses the check is conservative, see ``watch.py``.
+Between poses the check is conservative, see ``separation_check.py``.
 
 Source: ISO/TS 15066:2016, 5.5.4 and 5.5.5 (docs/method.md 2.7).
 """

@@ -7,7 +7,7 @@ moves one with few expected attempts is found by rules
 (:mod:`app.sim.sorting.kernels.tie_breaking`)
 and by looking ahead: wherever the rules put an object aside that will be wanted again, each
 other way to put one aside is tried, the rules finish the plan, and the best one is taken.
-``docs/planner_nearness.py`` measures how near that comes to the fewest expected attempts.
+``tools/docs/planner_optimality.py`` compares it with the fewest expected attempts.
 """
 
 from typing import NamedTuple
@@ -145,7 +145,7 @@ def _apply_action(action: int, objects: Objects, task: Task, work: PlannerWork) 
     """Carry an action out, and note the towers' progress.
 
     Returns:
-        Whether the states had to be written anew: an object waits on a tower.
+        Whether the states had to be written again: an object waits on a tower.
     """
     p, n_cells, n_towers = work.paths, len(objects.clutter), len(objects.heights)
     moves = n_cells * n_towers
@@ -201,12 +201,12 @@ def _try(action: int, best: float, task: Task, work: PlannerWork) -> float:
     """
     p = work.paths
     copy_objects(work.now, work.trial)
-    attempts, anew = 0.0, False
+    attempts, rewritten = 0.0, False
     while action >= 0 and attempts < best:
         attempts += _attempts(action, task)
-        anew = _apply_action(action, work.trial, task, work) or anew
+        rewritten = _apply_action(action, work.trial, task, work) or rewritten
         action = _choose(work.trial, task, p)
-    if anew:
+    if rewritten:
         lay_out_task(work.now, task, work)
     else:
         _locate(work.now, task, p)

@@ -1,7 +1,7 @@
 """The sorting task in compiled rows: one attempt per row and call (METHOD 1.2, 1.3).
 
-Codes, positions and the numbering of actions are those of ``sorting_state.py``; episodes are
-drawn by ``sorting_start.py`` and the people's interference by ``sorting_people.py``.
+Codes, positions and the numbering of actions are those of ``state.py``; episodes are
+drawn by ``initial_states.py`` and the people's interference by ``interference.py``.
 
 Source: thesis eq. (3.13)-(3.19). Deviates: placing into an occupied clutter cell, which the
 source does not speak of, puts the object back where it was.

@@ -17,7 +17,7 @@ from app.policies.evaluation.reach.episodes import (
 from app.sim.cells.cell import load_cell
 from app.sim.reach.batch import ReachBatch, ReachSettings
 from app.sim.scenario.kernels.episode import COLLISION, RUNNING, SUCCESS, TIMEOUT
-from tests.policies.straight_mover import Straight
+from tests.policies.straight_controller import Straight
 
 CELL = load_cell("shared-workspace")
 TARGETS = CELL.goal_region.targets()
@@ -121,7 +121,9 @@ def test_a_row_counts_every_episode_once() -> None:
 
 def test_a_difference_is_paired() -> None:
     goals = target_goals(TARGETS, 100)
-    one, other = (play(CELL, USUAL, mover, goals, 5) for mover in (Straight(), Still()))
+    one, other = (
+        play(CELL, USUAL, controller, goals, 5) for controller in (Straight(), Still())
+    )
     same = against(one, one)
     assert same == {"mean": 0.0, "low": 0.0, "high": 0.0}
     assert against(one, other)["mean"] == pytest.approx((one.outcome == SUCCESS).mean())

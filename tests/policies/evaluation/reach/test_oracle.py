@@ -11,7 +11,7 @@ from app.sim.cells.cell import load_cell
 from app.sim.reach.batch import ReachSettings, goal_region_of
 from app.sim.reach.oracle_search import OracleSearch
 from app.sim.scenario.kernels.episode import SUCCESS
-from tests.policies.straight_mover import Straight
+from tests.policies.straight_controller import Straight
 from tests.policies.untrained import untrained_reach
 
 CELL = load_cell("shared-workspace")

@@ -11,7 +11,7 @@ from app.sim.cells.cell import load_cell
 from app.sim.reach.batch import ReachBatch, ReachSettings
 from app.sim.robot.actions import ActionSettings
 from app.sim.scenario.kernels.episode import SUCCESS
-from tests.policies.straight_mover import Straight
+from tests.policies.straight_controller import Straight
 
 CELL = load_cell("shared-workspace")
 GOALS = target_goals(CELL.goal_region.targets(), 20)

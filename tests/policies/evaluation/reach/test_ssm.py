@@ -22,7 +22,7 @@ from app.sim.planning.ompl_planners import PlanSettings
 from app.sim.reach.batch import ReachSettings
 from app.sim.reach.crossings import crossings
 from app.sim.safety.layer import safety_settings
-from tests.policies.straight_mover import Straight
+from tests.policies.straight_controller import Straight
 from tests.sim.recorded_motion import recorded
 
 CELL = load_cell("shared-workspace")

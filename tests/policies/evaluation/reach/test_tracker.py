@@ -8,7 +8,7 @@ from app.sim.cells.cell import load_cell
 from app.sim.people.kernels.pedestrian import VX, VY, R, X, Y
 from app.sim.perception.cylinder_sensor_model import CylinderSensorSettings
 from app.sim.reach.batch import ReachBatch, ReachSettings
-from tests.policies.straight_mover import Straight
+from tests.policies.straight_controller import Straight
 
 N = 8
 
@@ -36,10 +36,10 @@ def watched(
     batch = ReachBatch(load_cell("shared-workspace"), N, 5, ReachSettings())
     batch.reset()
     watching, true = Watching(), []
-    mover = watching if row is None else CylinderObserver(watching, row, 5)
+    controller = watching if row is None else CylinderObserver(watching, row, 5)
     for _ in range(steps):
         true.append(batch.state.people.walkers.rows[:, 0][:, [X, Y, VX, VY, R]].copy())
-        act = mover.acts(batch)
+        act = controller.acts(batch)
         now = batch.state.people.walkers.rows[:, 0][:, [X, Y, VX, VY, R]]
         np.testing.assert_array_equal(now, true[-1])
         np.testing.assert_array_equal(batch.state.people.cylinders[:, 0], now[:, [0, 1, 4]])

@@ -1,4 +1,4 @@
-"""A mover without learning: straight joint moves to a posture at the goal, seeing nobody."""
+"""A controller without learning: straight joint motion to a configuration at the goal."""
 
 import numpy as np
 from numpy.typing import NDArray
