@@ -1,7 +1,7 @@
 """A batch as Stable-Baselines3's ``VecEnv``, for every scenario.
 
-Spaces, actions and truncation are those of the Gymnasium environments (``envs/tasks.py``). Ended
-environments restart within the step; their final observation is in
+Spaces, actions and truncation are those of the Gymnasium environments (``envs/tasks.py``).
+Ended environments restart within the step; their final observation is in
 ``infos[i]["terminal_observation"]``.
 """
 

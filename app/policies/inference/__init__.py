@@ -10,4 +10,5 @@ sorting_policy        A trained sorting network, for inference
 target_interpolation  Actions for goals between training targets: the weighted mean of those
                       for targets around
 task_selection        The critic's choice among geometric tasks (METHOD 3.1)
+trained_policy        Identity of a policy that was loaded from a checkpoint
 """

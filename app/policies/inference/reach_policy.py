@@ -19,9 +19,9 @@ from app.policies.checkpoints.checkpoint import (
     require_purpose,
     task_of,
 )
-from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.configs.fields import read_config
 from app.policies.configs.reach import ReachPreset
+from app.policies.inference.trained_policy import TrainedPolicy
 from app.policies.networks.actor_critic import BASE_WEIGHT, CROWD_WIDTH, CrowdShape
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import direct
@@ -63,7 +63,7 @@ def is_reach(checkpoint: Checkpoint) -> bool:
     return task_of(checkpoint) == REACHING
 
 
-class ReachPolicy:
+class ReachPolicy(TrainedPolicy):
     """Says how to move toward a goal; safe to call from several threads.
 
     Args:
@@ -78,8 +78,7 @@ class ReachPolicy:
         require_purpose(checkpoint, REACHING)
         manifest = checkpoint.manifest
         preset = read_config(ReachPreset, manifest["preset"], "manifest.preset")
-        cell = cell_of(manifest)
-        self._checkpoint, self._cell = checkpoint, (cell.name, cell.sha256)
+        super().__init__(checkpoint)
         self.view: ViewName = preset.episode.observation
         """What it sees."""
         expect_layout(checkpoint, LAYOUTS[self.view], N_ACT)
@@ -90,9 +89,9 @@ class ReachPolicy:
         self.targets: Vec | None = None
         """The goals it was trained on [m], shape (n, 3); None for a whole box."""
         if self.goals == "grid":
-            self.targets = goal_region_of(cell).targets()
+            self.targets = goal_region_of(self._cell).targets()
         elif self.goals == "halton":
-            self.targets = halton_targets(goal_region_of(cell), preset.episode.n_halton)
+            self.targets = halton_targets(goal_region_of(self._cell), preset.episode.n_halton)
         self.n_obs = sum(size for _, size in manifest["layout"])
         """Length of an observation."""
         arrays, n_seen = checkpoint.arrays(), self.n_obs
@@ -104,28 +103,6 @@ class ReachPolicy:
         self._residual = preset.networks.actor == "residual"
         self._few = self.kernel_network
         self._answers: Callable[..., None] | None = None
-
-    @property
-    def checkpoint(self) -> str:
-        """SHA-256 of the checkpoint."""
-        return self._checkpoint.sha256
-
-    @property
-    def title(self) -> str:
-        """Short text for people."""
-        manifest = self._checkpoint.manifest
-        name = manifest["preset"].get("name", "policy")
-        return f"{name}, {manifest['step'] / 1e6:.2f} M steps"
-
-    @property
-    def cell(self) -> str:
-        """Name of the work cell it was trained for."""
-        return self._cell[0]
-
-    @property
-    def cell_sha256(self) -> str:
-        """Identity of that cell's content."""
-        return self._cell[1]
 
     @property
     def trained_range(self) -> Mapping[str, Mapping[str, list[float]]]:

@@ -16,9 +16,9 @@ from app.policies.checkpoints.checkpoint import (
     require_purpose,
 )
 from app.policies.checkpoints.model_state import under
-from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.configs.fields import read_config
 from app.policies.configs.sorting import SortingPreset
+from app.policies.inference.trained_policy import TrainedPolicy
 from app.policies.networks.sorting_q import NETWORKS, layout_of
 from app.sim.sorting.batch import Obs, shape_of
 from app.sim.sorting.state import SortingShape
@@ -29,7 +29,7 @@ def is_sorting(checkpoint: Checkpoint) -> bool:
     return purpose_of(checkpoint.manifest) == SORTING
 
 
-class SortingPolicy:
+class SortingPolicy(TrainedPolicy):
     """Values the moves of the sorting task; safe to call from several threads.
 
     Args:
@@ -43,9 +43,8 @@ class SortingPolicy:
         require_purpose(checkpoint, SORTING)
         manifest = checkpoint.manifest
         preset = read_config(SortingPreset, manifest["preset"], "manifest.preset")
-        cell = cell_of(checkpoint.manifest)
-        self._checkpoint, self._cell = checkpoint, (cell.name, cell.sha256)
-        self.shape: SortingShape = shape_of(cell)
+        super().__init__(checkpoint)
+        self.shape: SortingShape = shape_of(self._cell)
         """Size of the tasks it knows."""
         expect_layout(checkpoint, layout_of(self.shape), self.shape.n_actions)
         self._network = NETWORKS[preset.networks.kind](self.shape, preset.networks.width)
@@ -54,28 +53,6 @@ class SortingPolicy:
         except RuntimeError as error:
             raise CheckpointMismatch("tensors", "those of q", str(error)) from error
         self._network.eval()
-
-    @property
-    def checkpoint(self) -> str:
-        """SHA-256 of the checkpoint."""
-        return self._checkpoint.sha256
-
-    @property
-    def title(self) -> str:
-        """Short text for people."""
-        manifest = self._checkpoint.manifest
-        name = manifest["preset"].get("name", "policy")
-        return f"{name}, {manifest['step'] / 1e6:.2f} M steps"
-
-    @property
-    def cell(self) -> str:
-        """Name of the work cell it was trained for."""
-        return self._cell[0]
-
-    @property
-    def cell_sha256(self) -> str:
-        """Identity of that cell's content."""
-        return self._cell[1]
 
     def values(self, obs: Obs) -> NDArray[np.float32]:
         """Return the values of all moves, shape (n, n_actions).

@@ -23,9 +23,9 @@ from app.policies.checkpoints.checkpoint import (
     require_purpose,
 )
 from app.policies.checkpoints.model_state import under
-from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.configs.fields import read_config
 from app.policies.configs.pick import PickPreset
+from app.policies.inference.trained_policy import TrainedPolicy
 from app.policies.networks.pick import LAYOUTS, actor_of, critics_for
 from app.sim.cells.cell import Cell, require_cell
 from app.sim.core.arrays import Vec
@@ -117,7 +117,7 @@ def choose(values: NDArray[np.floating], previous: int | None, hysteresis: float
     return previous
 
 
-class TaskChooser:
+class TaskChooser(TrainedPolicy):
     """A :class:`~app.sim.pick.task_policy.TaskPolicy` made of one checkpoint.
 
     Args:
@@ -132,11 +132,10 @@ class TaskChooser:
     def __init__(
         self, checkpoint: Checkpoint, cell: Cell | None = None, hysteresis: float = HYSTERESIS
     ) -> None:
-        self._cell = cell_of(checkpoint.manifest)
+        super().__init__(checkpoint)
         if cell is not None:
-            require_cell(cell, self._cell.name, self._cell.sha256)
-        self._cell_sha256 = self._cell.sha256
-        self._checkpoint, self._hysteresis = checkpoint, hysteresis
+            require_cell(cell, self.cell, self.cell_sha256)
+        self._hysteresis = hysteresis
         self._networks = ValueNetworks(checkpoint)
         self._arm, self._people = arm_of(self._cell), people_of(self._cell)
         self._limits, self._ranges = (
@@ -145,32 +144,9 @@ class TaskChooser:
         )
 
     @property
-    def checkpoint(self) -> str:
-        """SHA-256 of the checkpoint."""
-        return self._checkpoint.sha256
-
-    @property
     def action(self) -> ActionSettings:
         """What its actions mean (METHOD 2.2)."""
         return pick_preset_of(self._checkpoint).action.settings
-
-    @property
-    def title(self) -> str:
-        """Short text for people."""
-        manifest = self._checkpoint.manifest
-        return (
-            f"{manifest['preset'].get('name', 'policy')}, {manifest['step'] / 1e6:.2f} M steps"
-        )
-
-    @property
-    def cell(self) -> str:
-        """Name of the work cell it was trained for."""
-        return self._cell.name
-
-    @property
-    def cell_sha256(self) -> str:
-        """Identity of that cell's content."""
-        return self._cell_sha256
 
     def decide(
         self,

@@ -4,7 +4,6 @@ bench         What the protocols of the reach scenario share: a policy, its cell
               its rows
 episodes      Run reach episodes to their ends under any controller, and count the outcomes
 oracle        Protocol ``reach-oracle``: upper bound of success by search with a known future
-              search
 people        Protocols ``reach-people``, ``reach-constant`` and ``reach-speeds``: other people
 random_goals  Protocol ``reach-random``: goals anywhere in the box, which no grid holds
 smoothness    Protocol ``reach-smoothness``: what the joints do along whole episodes
