@@ -135,6 +135,8 @@ class TaskChooser(TrainedPolicy):
         super().__init__(checkpoint)
         if cell is not None:
             require_cell(cell, self.cell, self.cell_sha256)
+        self.action: ActionSettings = pick_preset_of(checkpoint).action.settings
+        """Meaning of the actions (docs/method.md 2.2)."""
         self._hysteresis = hysteresis
         self._networks = ValueNetworks(checkpoint)
         self._arm, self._people = arm_of(self._cell), people_of(self._cell)
@@ -142,11 +144,6 @@ class TaskChooser(TrainedPolicy):
             StateLimits(self._arm, limits_jerk=False),
             _TrainedRanges(checkpoint),
         )
-
-    @property
-    def action(self) -> ActionSettings:
-        """What its actions mean (METHOD 2.2)."""
-        return pick_preset_of(self._checkpoint).action.settings
 
     def decide(
         self,
