@@ -95,7 +95,7 @@ def test_all_valid_moves_are_ranked_with_the_chosen_one_first(client: TestClient
     assert moves[0]["fewest"] and not moves[-1]["fewest"]
 
 
-def test_of_two_twins_the_planner_takes_the_safe_one(client: TestClient) -> None:
+def test_of_two_duplicates_the_planner_takes_the_safe_one(client: TestClient) -> None:
     objects = [one for one in TASK["objects"] if one["at"] != "red"]
     answer = asked(client, planned({**TASK, "objects": objects, "goal": {"red": ["large"]}}))
     assert answer["move"]["object"] == "b"

@@ -19,7 +19,7 @@ def scene() -> SortingState:
     return state
 
 
-def test_problem_counts_twins_and_names_what_towers_show() -> None:
+def test_problem_counts_duplicates_and_names_what_towers_show() -> None:
     text = problem(scene(), SHAPE)
     for fact in ("(spare c2 n1)", "(spare c1 n0)", "(height t0 n1)", "(shows t0 n0 c1)"):
         assert fact in text.split("(:goal")[0]

@@ -151,8 +151,8 @@ class Verdict:
     """States looked at."""
     fewest: int
     """States in which every best action begins a plan with the fewest moves."""
-    safest_twin: int
-    """States in which no best action picks an object whose twin lies safer."""
+    safest_duplicate: int
+    """States in which no best action picks an object whose duplicate lies safer."""
     least_attempts: int
     """States from which it needs the fewest expected attempts of all plans."""
     as_planned: int
@@ -169,12 +169,12 @@ def judged(model: Model, shape: SortingShape, fail: Floats, gamma: float) -> Ver
     off = best & (moves[model.after] != moves[:, None] - 1)
     spent = _attempts_of(model, q.argmax(axis=1))
     least, planned = attempts_to_go(model, None), attempts_to_go(model, moves)
-    risky = best & _has_safer_twin(model, shape, fail)
+    risky = best & _has_safer_duplicate(model, shape, fail)
     there = ~model.solved
     return Verdict(
         n=int(there.sum()),
         fewest=int((~off.any(axis=1))[there].sum()),
-        safest_twin=int((~risky.any(axis=1))[there].sum()),
+        safest_duplicate=int((~risky.any(axis=1))[there].sum()),
         least_attempts=int((spent <= least + 1e-6)[there].sum()),
         as_planned=int((spent <= planned + 1e-6)[there].sum()),
         worst_attempts=float((spent[there] / least[there]).max()),
@@ -191,12 +191,12 @@ def _attempts_of(model: Model, policy: Ints) -> Floats:
     return attempts
 
 
-def _has_safer_twin(model: Model, shape: SortingShape, fail: Floats) -> NDArray[np.bool_]:
-    """Return which actions pick an object whose twin lies in a safer cell, shape (n, A)."""
+def _has_safer_duplicate(model: Model, shape: SortingShape, fail: Floats) -> NDArray[np.bool_]:
+    """Return which actions pick an object with a duplicate in a safer cell, shape (n, A)."""
     risky = np.zeros(model.after.shape, dtype=np.bool_)
     clutter = model.codes[:, : shape.n_cells]
     for action in range(shape.n_cells * shape.n_colours):
         cell = action // shape.n_colours
-        twins = (clutter == clutter[:, [cell]]) & (clutter != 0)
-        risky[:, action] = (twins & (fail < fail[cell])).any(axis=1)
+        duplicates = (clutter == clutter[:, [cell]]) & (clutter != 0)
+        risky[:, action] = (duplicates & (fail < fail[cell])).any(axis=1)
     return risky

@@ -1,4 +1,4 @@
-"""The best policy of the sorting reward takes the fewest moves and the safest twin.
+"""The best policy of the sorting reward takes the fewest moves and the safest duplicate.
 
 By value iteration over all states of small tasks, with transitions and rewards of the batch.
 """
@@ -16,7 +16,7 @@ GAMMAS = (0.92, 0.95, 0.99)
 
 
 def tasks(shape: SortingShape, n: int, seed: int, n_objects: int) -> list[SortingState]:
-    """Tasks with twins, junk and goals of any towers, none of them solved."""
+    """Tasks with duplicates, junk and goals of any towers, none of them solved."""
     rng, found = np.random.default_rng(seed), []
     while len(found) < n:
         task = random_task(shape, rng, n_objects)
@@ -26,11 +26,11 @@ def tasks(shape: SortingShape, n: int, seed: int, n_objects: int) -> list[Sortin
 
 
 @pytest.mark.parametrize("gamma", GAMMAS)
-def test_best_policy_takes_fewest_moves_and_the_safest_twin(gamma: float) -> None:
+def test_best_policy_takes_fewest_moves_and_the_safest_duplicate(gamma: float) -> None:
     shape = SortingShape(n_cells=3, n_colours=2, n_sizes=2)
     for task in tasks(shape, 6, 31, 3):
         verdict = judged(model_of(task, shape, SortingWeights()), shape, task.fail, gamma)
-        assert verdict.fewest == verdict.safest_twin == verdict.n > 50
+        assert verdict.fewest == verdict.safest_duplicate == verdict.n > 50
 
 
 def test_planner_and_best_policy_agree_on_the_moves_to_begin_with() -> None:
@@ -67,7 +67,7 @@ def test_best_policy_takes_fewest_moves_in_every_state_of_larger_tasks(
 ) -> None:
     for task in tasks(shape, 10, 34, shape.n_cells):
         verdict = judged(model_of(task, shape, SortingWeights()), shape, task.fail, gamma)
-        assert verdict.fewest == verdict.safest_twin == verdict.n
+        assert verdict.fewest == verdict.safest_duplicate == verdict.n
         assert verdict.worst_attempts < 1.05
 
 

@@ -139,7 +139,7 @@ class SortingTestRun:
         if self._ended is not None:
             return self._ended
         over = solved and not self._waiting
-        good = self._contacts == 0 and not (self._test.safer_twins and self._riskier)
+        good = self._contacts == 0 and not (self._test.safer_duplicates and self._riskier)
         agrees = False if not good else True if over else None
         found = Verdict(
             expected=self._test.expected,
@@ -161,7 +161,7 @@ class SortingTestRun:
             f"{moves} {'move' if moves == 1 else 'moves'}",
             f"{self._contacts or 'no'} {'contact' if self._contacts == 1 else 'contacts'}",
         ]
-        if self._test.safer_twins:
+        if self._test.safer_duplicates:
             parts.append(f"{self._riskier} of {self._picks} grasps in a riskier cell")
         return f"{', '.join(parts)}.".capitalize()
 

@@ -4,7 +4,7 @@
 counted from that tower's own, and only at what is left to do: what must come off (from the top
 down) and what must go on (from the next level up). A pick fails and leaves everything as it
 was, so the true value of a pick is linear in the failure probability of its cell; the network
-says value and slope per type and tower, and never prefers the riskier of two twins.
+says value and slope per type and tower, and never prefers the riskier of two duplicates.
 
 :class:`PrintedNetwork` is the source's: one-hot numbers through two layers of 128 (table 3.1).
 

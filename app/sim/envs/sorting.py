@@ -86,7 +86,7 @@ class SortingEnv(SingleEnv):
 
     ## Task
     Make every tower what the goal asks for. A goal asks for *a* large blue object, never for a
-    certain one: objects of one colour and size are twins.
+    certain one: objects of one colour and size are duplicates.
 
     ## Action space
     ``Discrete(C (2 K + C))``, with ``K`` clutter cells and ``C`` towers:

@@ -5,7 +5,7 @@ name      K_E, K_G      what it asks
 ========= ============= ================================================================
 test-1    5, 5          sort everything
 test-2    10, 10        the same with twice the objects
-test-3    10, 5         every object of the goal has a twin in a riskier cell
+test-3    10, 5         every object of the goal has a duplicate in a riskier cell
 test-4    5, 5          at the goal a larger object is added below sorted ones
 test-5    8, 5          an alternative is added on the way, then the goal changes
 test-6    8, 3          three of one colour, then three of another as well
@@ -67,7 +67,7 @@ class SortingTest:
     """Draws the start."""
     expected: str
     """What it shows where all goes well, for people."""
-    safer_twins: bool = False
+    safer_duplicates: bool = False
     """Whether each pick shall take the safer one of two such objects."""
     interferences: tuple[Interference, ...] = ()
     """What a person does, in this order."""
@@ -123,8 +123,8 @@ def _sort_all(n: int) -> Start:
     return start
 
 
-def _with_twins(n: int) -> Start:
-    """Return a start in which each of ``n`` objects of the goal has a twin in a riskier cell.
+def _with_duplicates(n: int) -> Start:
+    """Return a start in which ``n`` objects of the goal have a duplicate in a riskier cell.
 
     The safer one of each couple stands in one of the safest ``n_cells // 2`` cells.
     """
@@ -208,7 +208,7 @@ def _add_below(state: SortingState, shape: SortingShape, rng: Generator) -> Sort
 
 
 def _add_alternative(state: SortingState, shape: SortingShape, rng: Generator) -> SortingState:
-    """Add a twin of an object that the towers still lack.
+    """Add a duplicate of an object that the towers still lack.
 
     Raises:
         InvalidInput: They lack nothing, or there is no room.
@@ -280,13 +280,13 @@ TESTS: tuple[SortingTest, ...] = (
     ),
     SortingTest(
         name="test-3",
-        title="Take the safer twin",
-        text="Each of five objects has a twin in a cell where picks fail more often.",
+        title="Choose the lower-risk duplicate",
+        text="Each of five objects has a duplicate in a cell where picks fail more often.",
         expected="Every object is sorted, each from the safer cell, without a contact.",
-        safer_twins=True,
+        safer_duplicates=True,
         n_objects=10,
         n_goal=5,
-        start=_with_twins(5),
+        start=_with_duplicates(5),
     ),
     SortingTest(
         name="test-4",
@@ -309,7 +309,7 @@ TESTS: tuple[SortingTest, ...] = (
     SortingTest(
         name="test-5",
         title="An alternative, then another goal",
-        text="A person adds a twin of an object on the way, and changes the goal at its end.",
+        text="A person adds a duplicate of an object, and changes the goal at its end.",
         expected="The goal is reached, and the changed goal as well, without a contact.",
         n_objects=8,
         n_goal=5,
@@ -317,7 +317,7 @@ TESTS: tuple[SortingTest, ...] = (
         interferences=(
             Interference(
                 after_moves=1,
-                text="A person adds a twin of an object that is still to be sorted.",
+                text="A person adds a duplicate of an object that is still to be sorted.",
                 change=_add_alternative,
             ),
             Interference(

@@ -1,9 +1,9 @@
 """The state of the sorting task as integers, and its moves (METHOD 1.1 and 1.2).
 
 An object is a *code*: 0 is the null object that fills every free place, others are ``1 +
-colour * n_sizes + size``, sizes from the smallest. Objects of one code are twins: goals ask for
-a code, never for one certain object. There are ``K`` clutter cells and one tower per colour,
-with ``K`` levels each; towers have no gaps. Any object may stand on any tower.
+colour * n_sizes + size``, sizes from the smallest. Objects of one code are duplicates: a goal
+names a code, not an object. There are ``K`` clutter cells and one tower per colour, with ``K``
+levels each; towers have no gaps. Any object may stand on any tower.
 
 A position is a number: ``k`` a clutter cell, ``K + c`` the top of tower ``c``. Moves are
 numbered without gaps, so that a network's outputs are the moves:

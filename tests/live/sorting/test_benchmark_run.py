@@ -84,15 +84,15 @@ def without(clutter: np.ndarray, towers: np.ndarray) -> np.ndarray:
     return rest
 
 
-def test_contact_or_a_riskier_twin_is_not_as_expected() -> None:
+def test_contact_or_a_riskier_duplicate_is_not_as_expected() -> None:
     touched = begun("test-1")
     touched.note_contact()
     assert touched.verdict(solved=True, moves=5).as_expected is False
-    twins = begun("test-3")
-    twins.note_pick(riskier=False)
-    assert twins.verdict(solved=False, moves=1).as_expected is None
-    twins.note_pick(riskier=True)
-    found = twins.verdict(solved=True, moves=5)
+    duplicates = begun("test-3")
+    duplicates.note_pick(riskier=False)
+    assert duplicates.verdict(solved=False, moves=1).as_expected is None
+    duplicates.note_pick(riskier=True)
+    found = duplicates.verdict(solved=True, moves=5)
     assert found.as_expected is False
     assert "1 of 2 grasps in a riskier cell" in found.observed
     elsewhere = begun("test-2")

@@ -18,7 +18,7 @@ def table() -> SortingTable:
     return table
 
 
-def test_twins_that_fail_as_rarely_are_options_and_riskier_ones_are_not(
+def test_duplicates_that_fail_as_rarely_are_options_and_riskier_ones_are_not(
     table: SortingTable,
 ) -> None:
     choice = SortController(None).choose(table)
@@ -56,7 +56,7 @@ def test_held_block_goes_back_where_it_counts_once_nothing_asks_for_it(
     assert (back.move, back.back) == (Move(9, 9), True)
 
 
-def test_held_block_takes_the_place_that_a_twin_was_meant_for(table: SortingTable) -> None:
+def test_held_block_takes_the_place_that_a_duplicate_was_meant_for(table: SortingTable) -> None:
     table.lift(2)
     choice = SortController(None).choose(table)
     assert choice is not None

@@ -58,7 +58,7 @@ def test_goal_loses_what_no_block_is_left_for(table: SortingTable) -> None:
     assert table.wanted == {"block2", "block3"}
 
 
-def test_twin_stands_in_for_a_block_that_is_removed(table: SortingTable) -> None:
+def test_duplicate_stands_in_for_a_block_that_is_removed(table: SortingTable) -> None:
     table.set_goal({"red": ("large",)})
     table.remove("block1")
     assert goal(table) == ["large red"]
@@ -82,7 +82,7 @@ def test_kind_is_toggled_one_by_one_and_then_out(table: SortingTable) -> None:
     assert seen == [1, 2, 0]
 
 
-def test_block_in_its_place_stands_for_the_goal_rather_than_its_twin(
+def test_block_in_its_place_stands_for_the_goal_rather_than_its_duplicate(
     table: SortingTable,
 ) -> None:
     table.toggle_goal("block1")

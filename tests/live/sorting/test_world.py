@@ -177,7 +177,7 @@ def test_reset_draws_another_task_with_a_goal() -> None:
     assert [one.place for one in first.pieces] != [one.place for one in second.pieces]
 
 
-def test_critic_may_take_any_twin_that_fails_as_rarely() -> None:
+def test_critic_may_take_any_duplicate_that_fails_as_rarely() -> None:
     world = empty_world()
     ids = lay(world, {"cell5": "red-large", "cell9": "red-large"}, {"red": ("large",)})
     going = until(world, phase("approach"))
@@ -188,7 +188,7 @@ def test_critic_may_take_any_twin_that_fails_as_rarely() -> None:
     assert until(world, solved).sorting.counters.moves == 1
 
 
-def test_twin_in_a_riskier_cell_is_left_and_the_message_says_so() -> None:
+def test_duplicate_in_a_riskier_cell_is_left_and_the_message_says_so() -> None:
     world = empty_world()
     ids = lay(world, {"cell2": "red-large", "cell9": "red-large"}, {"red": ("large",)})
     going = until(world, phase("approach"))

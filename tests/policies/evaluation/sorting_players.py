@@ -51,12 +51,12 @@ def exactly(state: SortingState, shape: SortingShape) -> int:
 
 
 def riskily(state: SortingState, shape: SortingShape) -> int:
-    """Choose as the exact planner does, but always the riskiest twin."""
+    """Choose as the exact planner does, but always the riskiest duplicate."""
     move = shape.move_of(exactly(state, shape))
     if move.pick >= shape.n_cells:
         return shape.action_of(move)
-    twins = np.flatnonzero(state.clutter == state.clutter[move.pick])
-    cell = int(twins[state.fail[twins].argmax()])
+    duplicates = np.flatnonzero(state.clutter == state.clutter[move.pick])
+    cell = int(duplicates[state.fail[duplicates].argmax()])
     return cell * shape.n_colours + move.place - shape.n_cells
 
 

@@ -1,4 +1,4 @@
-"""Networks of the sorting task: masks, duelling, symmetry, and twins."""
+"""Networks of the sorting task: masks, duelling, symmetry, and duplicates."""
 
 import numpy as np
 import pytest
@@ -43,7 +43,7 @@ def test_the_value_is_the_mean_over_valid_moves():
     assert after[valid] - before[valid] == pytest.approx(np.ones(valid.sum()), abs=1e-5)
 
 
-def with_twins() -> SortingState:
+def with_duplicates() -> SortingState:
     """Two large reds, in a risky and in a safe cell, and a goal that asks for one."""
     state = empty_state(SHAPE)
     red = SHAPE.code(0, 2)
@@ -54,16 +54,16 @@ def with_twins() -> SortingState:
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_the_riskier_of_two_twins_is_never_worth_more(seed):
-    values = values_of(network(seed=seed), with_twins())[0]
+def test_the_riskier_of_two_duplicates_is_never_worth_more(seed):
+    values = values_of(network(seed=seed), with_duplicates())[0]
     for tower in range(2):
         assert values[2 * 2 + tower] <= values[7 * 2 + tower]
 
 
 def test_the_value_of_a_pick_is_linear_in_its_failure_probability():
     states = []
-    for fail in (0.2, 0.3, 0.4):  # the safer twin stays at 0.1
-        state = with_twins()
+    for fail in (0.2, 0.3, 0.4):  # the safer duplicate stays at 0.1
+        state = with_duplicates()
         state.fail[2] = fail
         states.append(state)
     difference = np.diff(values_of(network(), *states)[:, [4, 14]], axis=1)[:, 0]
@@ -99,8 +99,8 @@ def test_turning_all_colours_turns_the_values(n_colours):
             place if place < 6 else 6 + (place - 6 + 1) % n_colours
             for place in (move.pick, move.place)
         ]
-        twin = shape.action_of(type(move)(*ends))
-        assert values[0, action] == pytest.approx(values[1, twin], abs=1e-5)
+        duplicate = shape.action_of(type(move)(*ends))
+        assert values[0, action] == pytest.approx(values[1, duplicate], abs=1e-5)
 
 
 def test_the_printed_network_has_two_layers_of_its_width():

@@ -82,9 +82,9 @@ def obstacle(*boxes: dict[str, Any]) -> Edit:
         (
             obstacle(
                 box([0.9, -0.3, 0.1], [0.05, 0.05, 0.1]),
-                box([0.9, -0.32, 0.1], [0.05, 0.05, 0.1], "twin"),
+                box([0.9, -0.32, 0.1], [0.05, 0.05, 0.1], "duplicate"),
             ),
-            "obstacles.twin.center",
+            "obstacles.duplicate.center",
             "it overlaps box",
         ),
         (

@@ -88,7 +88,7 @@ def test_a_task_that_is_too_small_fits_no_test_it_cannot_hold():
     assert not sorting_test("test-4").fits(SortingShape(n_cells=10, n_colours=2, n_sizes=1))
 
 
-def test_every_object_of_the_third_test_has_a_twin_in_a_riskier_cell():
+def test_every_object_of_the_third_test_has_a_duplicate_in_a_riskier_cell():
     for shape, state, _ in drawn("test-3"):
         for code in np.unique(state.clutter[state.clutter != NULL]):
             risks = np.sort(state.fail[state.clutter == code])
@@ -105,7 +105,7 @@ def test_the_fourth_test_adds_an_object_that_belongs_below_a_sorted_one():
         assert ((reached.towers != NULL) & (reached.towers != changed.goal)).any()
 
 
-def test_the_fifth_test_adds_a_twin_of_what_is_still_asked_for():
+def test_the_fifth_test_adds_a_duplicate_of_what_is_still_asked_for():
     for shape, state, rng in drawn("test-5"):
         first = sorting_test("test-5").interferences[0]
         changed = first.change(state, shape, rng)

@@ -47,7 +47,7 @@ def random_tasks(n: int, seed: int, most: int) -> list[Task]:
 
 
 def crowded_tasks(n: int, seed: int) -> list[Task]:
-    """Tasks of 4 cells whose 3 or 4 towers are full of twins, where goals partly stand."""
+    """Tasks of 4 cells whose 3 or 4 towers are full of duplicates, where goals partly stand."""
     rng = np.random.default_rng(seed)
     shapes = [SortingShape(n_cells=4, n_colours=3 + i % 2, n_sizes=1) for i in range(n)]
     return [(random_task(shape, rng, 4, on_towers=0.9), shape) for shape in shapes]
@@ -59,7 +59,7 @@ def test_fewest_moves_and_all_first_moves_are_those_of_brute_force() -> None:
         assert (plan.moves, plan.first) == first_moves(state, shape)
 
 
-def test_they_are_so_on_crowded_towers_with_twins() -> None:
+def test_they_are_so_on_crowded_towers_with_duplicates() -> None:
     for state, shape in crowded_tasks(40, seed=3):
         plan = solve(state, shape)
         assert (plan.moves, plan.first) == first_moves(state, shape)
@@ -111,7 +111,7 @@ def test_attempts_are_hardly_more_than_the_fewest_of_brute_force() -> None:
     assert max(excess) < 0.1
 
 
-def test_the_least_risky_of_twins_is_taken() -> None:
+def test_the_least_risky_of_duplicates_is_taken() -> None:
     state, shape = task([1, 1, 2, 0], [[], []], [[1], []])
     state.fail[:] = [0.4, 0.1, 0.0, 0.0]
     plan = solve(state, shape)
@@ -132,7 +132,7 @@ def test_an_object_wanted_no_more_leaves_the_good_cells_free() -> None:
     assert follow(state, shape) == [Move(3, 0), Move(3, 2)]
 
 
-def test_a_good_cell_is_kept_for_the_object_that_has_no_twin() -> None:
+def test_a_good_cell_is_kept_for_the_object_that_has_no_duplicate() -> None:
     state, shape = task([0, 2, 1, 0], [[1, 2]], [[2, 1, 1]])
     state.fail[:] = [0.37, 0.035, 0.28, 0.03]
     assert follow(state, shape)[:2] == [Move(4, 0), Move(4, 3)]

@@ -85,9 +85,9 @@ class SortingEpisodes:
     failed: Index
     """Of these, the ones that failed."""
     choices: Index
-    """Of the picks, those with twins of different risk to choose from."""
+    """Of the picks, those with duplicates of different risk to choose from."""
     riskier: Index
-    """Of these, those that did not take the least risky twin."""
+    """Of these, those that did not take the least risky duplicate."""
     planner_fallback: Flags
     """Whether the rule called for the exact planner."""
     repeated: Flags
@@ -210,9 +210,9 @@ class _Run:
         from_clutter, cells = which[picked], act[picked] // shape.n_colours
         clutter, fail = rows.clutter[from_clutter], rows.fail[from_clutter]
         mine = np.arange(len(cells))
-        twins = clutter == clutter[mine, cells][:, None]
-        least = np.where(twins, fail, np.inf).min(axis=1)
-        most = np.where(twins, fail, -np.inf).max(axis=1)
+        duplicates = clutter == clutter[mine, cells][:, None]
+        least = np.where(duplicates, fail, np.inf).min(axis=1)
+        most = np.where(duplicates, fail, -np.inf).max(axis=1)
         self._counts["picks"][from_clutter] += 1
         self._counts["choices"][from_clutter] += most > least
         self._counts["riskier"][from_clutter] += fail[mine, cells] > least

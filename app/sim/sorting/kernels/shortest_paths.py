@@ -18,7 +18,7 @@ short, see :func:`ties_on_tower`). One thing more can shorten a plan: to take ap
 *matches*. With towers ``a = X``, ``b`` empty, ``e = X W V`` and goals ``a = X``, ``b = X V W``
 the object of ``a`` is given to ``b`` and replaced at the end by that of ``e``: four moves, not
 five. In a shortest plan the lowest object so taken from ``a`` goes straight onto another tower
-``b``, and its twin comes straight from a third tower ``e`` (else leaving it alone is shorter).
+``b``, and its duplicate comes straight from a third tower ``e`` (else leaving it is shorter).
 ``cut`` is the lowest level for which such ``b`` and ``e`` exist; mostly there are none, ``cut``
 is ``m``, states follow one another in one order and one sweep is enough.
 

@@ -5,7 +5,7 @@ the
 rules prefer, in this order:
 
 1. tower to tower, where the object is wanted: nothing is risked;
-2. clutter to tower, the least risky twin of all that are wanted: it frees a good cell;
+2. clutter to tower, the least risky duplicate of all that are wanted: it frees a good cell;
 3. tower to clutter: of the removals the one whose object will be picked again at the least
    risk, into the best free cell; into the worst one if it will not be picked again.
 """
@@ -62,8 +62,8 @@ def still_wanted(code: int, goal: Bytes, goal_heights: Ints, p: ShortestPaths) -
 def _next_risk(code: int, wanted: int, clutter: Bytes, fail: Vec, free: int) -> float:
     """Return the risk that one object more in the clutter adds, -1 where it adds none.
 
-    With ``wanted`` picks to come, the object in the cell ``free`` and its twins serve them from
-    the least risky on: what counts is the last one's risk.
+    With ``wanted`` picks to come, the object in the cell ``free`` and its duplicates serve
+    them, the least risky first: what counts is the risk of the last one.
     """
     last = -1.0
     for k in range(len(clutter)):

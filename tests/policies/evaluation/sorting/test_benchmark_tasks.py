@@ -59,7 +59,7 @@ def test_the_person_comes_after_so_many_moves_or_at_the_goal():
     assert not person.due(which, moves, np.ones(4, dtype=bool)).any()
 
 
-def test_who_takes_the_riskier_twin_is_seen_in_the_third_test():
+def test_who_takes_the_riskier_duplicate_is_seen_in_the_third_test():
     choose = greedy(values_of(riskily, SHAPE))
     row = row_of("test-3", run_test(sorting_test("test-3"), choose, SHAPE, FAIL, 20, 4)[0])
     assert row["success"]["mean"] == row["fewest"]["mean"] == 1.0

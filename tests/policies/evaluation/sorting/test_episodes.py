@@ -59,7 +59,7 @@ def test_failed_picks_are_attempts_and_no_moves():
     assert (found.failed <= found.picks).all()
 
 
-def with_twins(n: int) -> SortingBatch:
+def with_duplicates(n: int) -> SortingBatch:
     """Return tasks of one object in the goal and two to choose from, one riskier."""
     state = empty_state(SHAPE)
     state.clutter[[0, 5]] = state.goal[0, 0] = 1
@@ -71,14 +71,14 @@ def with_twins(n: int) -> SortingBatch:
 
 
 @pytest.mark.parametrize(("choice", "share"), [(exactly, 0.0), (riskily, 1.0)])
-def test_riskier_picks_are_those_with_a_safer_twin(choice, share):
-    found = run_episodes(with_twins(40), greedy(values_of(choice, SHAPE)))
+def test_riskier_picks_are_those_with_a_safer_duplicate(choice, share):
+    found = run_episodes(with_duplicates(40), greedy(values_of(choice, SHAPE)))
     assert found.riskier.sum() / found.picks.sum() == share
     assert np.array_equal(found.choices, found.picks)
     assert found.success.all()
 
 
-def test_a_pick_without_a_twin_is_no_choice():
+def test_a_pick_without_a_duplicate_is_no_choice():
     batch, state = batch_of(1), empty_state(SHAPE)
     state.clutter[5] = state.goal[0, 0] = 1
     batch.put(0, replace(state, fail=FAIL))
