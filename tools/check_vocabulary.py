@@ -39,7 +39,7 @@ EXCLUDED = re.compile(
 """Third-party files, pictures, lock files, licences, and the list itself."""
 
 WORDS = re.compile(
-    r"dart(?:s|ing)?|foret(?:old|ells?|elling)|heed(?:s|ed|less|ing)?|controller(?:s)?|sorter(?:s)?"
+    r"dart(?:s|ing)?|foret(?:old|ells?|elling)|heed(?:s|ed|less|ing)?|move(?:rs?)|sorter(?:s)?"
     r"|reacher(?:s)?|pilot(?:s)?|twin(?:s)?|yardstick(?:s)?|court(?:esy|eous)|glitch(?:es|y)"
     r"|glitc[h]|repertoire(?:s)?|hind(?:sight)|teller(?:s)?|(?:un)?(?:told)|room(?:s)|house(?:s)?"
     r"|furni(?:ture)|citizen(?:s)?|lesson(?:s)?|ane(?:w)|who(?:ever|m)"
