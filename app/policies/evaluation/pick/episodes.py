@@ -1,7 +1,7 @@
-"""Runs pick episodes to their ends under any rule of choosing among candidates.
+"""Run pick episodes to their ends under a selection rule.
 
-Every episode is one row of a batch that stops when it ends; episode ``k`` of a seed starts the
-same whatever rule is measured, so that rules are compared on the same cells.
+Each episode is one environment of a batch and stops when it ends. Episode ``k`` of a seed has
+the same start under every rule, so that rules are compared on the same episodes.
 """
 
 from collections.abc import Callable
@@ -29,18 +29,18 @@ EVALUATION_LIBRARY = 1_000_003
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class View:
-    """What a rule of choosing sees: all running rows at one step."""
+    """Input of a selection rule: all running environments at one step."""
 
     values: NDArray[np.float32]
-    """Critic's value of every candidate, -inf where there are fewer, shape (n, k)."""
+    """Critic's value of each candidate, -inf where there are fewer, shape (n, k)."""
     distances: NDArray[np.float64]
-    """Distance from tcp to each candidate [half m], inf where there are fewer, (n, k)."""
+    """Distance from the TCP to each candidate [half m], inf where there are fewer, (n, k)."""
     chosen: Index
-    """Candidate pursued so far, shape (n,); meaningless at the first step."""
+    """Candidate pursued so far, shape (n,); undefined at the first step."""
     first: bool
     """Whether this is the first step."""
     rows: Index
-    """Which rows of the batch these are, shape (n,)."""
+    """Indices of the environments, shape (n,)."""
 
 
 Rule = Callable[[View], Index]
@@ -48,7 +48,7 @@ Rule = Callable[[View], Index]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sight:
-    """The person as the policy sees them, one per running row."""
+    """Observed person of each running environment."""
 
     q: NDArray[np.float64]
     """Joint positions [m, rad], shape (n, 18)."""
@@ -59,14 +59,14 @@ class Sight:
 
 
 Seen = Callable[[PickBatch, Index], Sight]
-"""What stands between the batch and the policy: asked once per step, for the running rows."""
+"""Observation model: called once per step for the running environments."""
 
 
 def seen_exactly(batch: PickBatch, rows: Index) -> Sight:
-    """Return the person nearest to each row's robot, as they are; far away for nobody.
+    """Return the true state of the person nearest to each robot; far away if there is none.
 
-    Angles beyond the model's limits, which recorded people have, are told as the limit, as the
-    live cell tells them.
+    Joint angles beyond the model's limits, which occur in recorded motion, are clipped to the
+    limits, as in the live cell.
     """
     shared, state, n = batch.world.people, batch.state, len(rows)
     seen = Sight(
@@ -89,9 +89,9 @@ class Episodes:
     duration_s: NDArray[np.float64]
     """Time to the end [s], shape (n,)."""
     switches: Index
-    """How often the choice changed, shape (n,)."""
+    """Number of changes of the target, shape (n,)."""
     trajectories: tuple[Trajectory, ...]
-    """Robot and each worker of the first rows, as long as each ran."""
+    """Robot and each worker of the recorded episodes."""
 
     def row(self, name: str) -> dict[str, object]:
         """Return the result row of these episodes, rates with 95 % intervals."""
@@ -112,13 +112,13 @@ class Episodes:
 
 
 def settings_for(n_candidates: tuple[int, int], preset: PickPreset) -> PickSettings:
-    """Return the evaluation's settings: 10 s, start clearance 0.05 m, the library's people.
+    """Return the settings of evaluations: 10 s, start clearance 0.05 m, people of the library.
 
-    Their postures and samples were never seen in training, and they mind no robot, whatever
-    people the checkpoint was trained beside.
+    Postures and samples of these people do not occur in training. They do not yield to the
+    robot, even if the checkpoint was trained beside yielding people.
 
     Args:
-        n_candidates: Fewest and most targets offered.
+        n_candidates: Minimum and maximum number of targets offered.
         preset: Training configuration of the checkpoint.
     """
     return PickSettings(
@@ -131,14 +131,14 @@ def settings_for(n_candidates: tuple[int, int], preset: PickPreset) -> PickSetti
 
 
 class Evaluator:
-    """Episodes of one seed, run as often as there are rules.
+    """Episodes of one seed, run once per selection rule.
 
     Args:
         networks: Actor and critics.
         cell: Work cell.
         n_episodes: Number of episodes.
         seed: Seed of the episodes.
-        settings: Starts and ends.
+        settings: Start and end conditions.
     """
 
     def __init__(
@@ -153,13 +153,12 @@ class Evaluator:
         self.batch = PickBatch(cell, n_episodes, seed, settings)
 
     def run(self, rule: Rule, n_recorded: int = 0, seen: Seen = seen_exactly) -> Episodes:
-        """Run all episodes under a rule; record the first ``n_recorded`` ones.
+        """Run all episodes under a rule; record poses of the first ``n_recorded``.
 
         Args:
-            rule: Chooses among the candidates.
-            n_recorded: Rows whose poses are kept.
-            seen: The person the policy sees instead of the true one; made again for every run
-                where it remembers what it saw.
+            rule: Selection rule.
+            n_recorded: Number of episodes with recorded poses.
+            seen: Observation model; a stateful one serves one run only.
         """
         batch, n = self.batch, self.batch.n_envs
         batch.reset()
@@ -189,7 +188,7 @@ class Evaluator:
     def _view(
         self, rows: Index, chosen: Index, first: bool, seen: Seen
     ) -> tuple[NDArray[np.float32], View]:
-        """Return the policy's action for every candidate, (n, k, 5), and what rules see."""
+        """Return the policy's action for each candidate, (n, k, 5), and the rule's input."""
         batch, state = self.batch, self.batch.state
         width = batch.settings.n_candidates[1]
         stations = state.candidates[rows, :width]

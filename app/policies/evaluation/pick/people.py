@@ -1,16 +1,15 @@
-"""Protocols ``pick-people``, ``pick-mocap``, ``pick-yielding``: a policy beside other people.
+"""Protocols ``pick-people``, ``pick-mocap``, ``pick-yielding``: other people in the cell.
 
-All choose among 2-3 random targets by the critic with hysteresis, as ``pick-choice`` does, and
-differ in who is in the cell. A policy for one person sees the nearest. Several workers share
-the table and do not see one another, so they may stand in each other's place.
+All protocols select among 2-3 random targets by the critic with hysteresis, as ``pick-choice``
+does, and differ in the people. A policy for one person observes the nearest. Several workers
+share the table and do not avoid one another, so they may overlap.
 
-``pick-people``: nobody; one to four people of the library's sizes; one and three people of the
-5th and of the 95th percentile; a worker and a walking cylinder; the first, synthetic reaches.
-``pick-mocap``: recorded motion, placed at the table, each run by itself and all together.
-``pick-yielding``: people who give way to the arm, from not at all (the source's) to fully, and
-how far the same policy leans on it.
+``pick-people``: no person; one to four people of the library's sizes; one and three people of
+the 5th and of the 95th percentile; a worker and a pedestrian; synthetic reaches.
+``pick-mocap``: recorded motion placed at the table, each recording alone and all together.
+``pick-yielding``: people that yield to the arm, from strength 0 (the source's people) to 1.
 
-Beside every row stands how often the same people touch a robot that never moves.
+Each row also states how often the same people touch a robot that never moves.
 
 Source: METHOD 3.4 and 4 (several people; a model whose dimensions are known; a human that
 reacts).
@@ -42,15 +41,15 @@ from app.sim.scene.scene import HumanKind
 DEFAULT_EPISODES = 1000
 CANDIDATES = (2, 3)
 YIELDING_LEVELS = (0.0, 0.5, 1.0)
-"""Strengths compared."""
+"""Strengths of yielding."""
 MAX_RECORDED_S = 36_000
-"""Most recorded motion of one evaluation [s]; the tracks of so much are 274 MB."""
+"""Maximum duration of recorded motion in one evaluation [s]; its tracks take 274 MB."""
 SMALL, LARGE = 5.0, 95.0
-"""Percentiles of stature compared; arms and shoulders go with it."""
+"""Percentiles of stature; arms and shoulders scale with it."""
 
 
 class _Bench:
-    """Evaluates one checkpoint under varied settings, on episodes of one seed."""
+    """Evaluate one checkpoint under several settings on episodes of one seed."""
 
     def __init__(
         self, checkpoint: Checkpoint, episodes: int | None, seed: int, on_row: OnRow
@@ -61,14 +60,14 @@ class _Bench:
         self._n, self._seed, self._on_row = episodes or DEFAULT_EPISODES, seed, on_row
 
     def row(self, name: str, settings: PickSettings) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Return the result row of some settings, and what it states of its episodes."""
+        """Return the result row of the settings, and the settings to state with it."""
         evaluator = Evaluator(self._networks, self.cell, self._n, self._seed, settings)
         row = evaluator.run(choice_rules.critic(HYSTERESIS)).row(name)
         row["touched_at_rest"] = _touched_at_rest(evaluator.batch)
         return row, settings_of(evaluator)
 
     def all(self, rows: Mapping[str, PickSettings]) -> dict[str, Any]:
-        """Return the result of several rows."""
+        """Return the result with one row per settings."""
         done: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {}
         for name, settings in rows.items():
             done[name] = self.row(name, settings)
@@ -83,7 +82,7 @@ class _Bench:
 
 
 def _touched_at_rest(batch: PickBatch) -> dict[str, float]:
-    """Return how often people touch a robot that stays where it starts: how bold they are."""
+    """Return the rate of contacts with a robot that stays at its start."""
     batch.reset()
     rest = np.zeros((batch.n_envs, CONTROLLED), dtype=np.float32)
     while (batch.state.outcome == RUNNING).any():
@@ -101,10 +100,10 @@ def run_people(
     """Evaluate beside 0 to 4 people and people of several sizes.
 
     Args:
-        checkpoint: What acts and chooses.
+        checkpoint: Policy and critic.
         episodes: Number of episodes of each row, by default 1000.
         seed: Seed of the episodes.
-        on_row: Told of each row once it is known.
+        on_row: Callback for each finished row.
     """
     bench = _Bench(checkpoint, episodes, seed, on_row)
     usual, pelvis = bench.usual, bench.cell.human.pelvis_height
@@ -127,13 +126,13 @@ def run_people(
 def run_yielding(
     checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> dict[str, Any]:
-    """Evaluate beside people who give way to the arm by 0, one half and fully.
+    """Evaluate beside people that yield to the arm with strength 0, 0.5 and 1.
 
     Args:
-        checkpoint: What acts and chooses.
+        checkpoint: Policy and critic.
         episodes: Number of episodes of each row, by default 1000.
         seed: Seed of the episodes.
-        on_row: Told of each row once it is known.
+        on_row: Callback for each finished row.
     """
     bench = _Bench(checkpoint, episodes, seed, on_row)
     usual = bench.usual
@@ -157,20 +156,20 @@ def run_mocap(
     """Evaluate beside recorded people, with the library's people as the first row.
 
     Args:
-        checkpoint: What acts and chooses.
+        checkpoint: Policy and critic.
         episodes: Number of episodes of each row, by default 1000.
         seed: Seed of the episodes.
-        motions: Clean runs of recorded motion; those of one name are evaluated together.
-        on_row: Told of each row once it is known.
+        motions: Recordings without artefacts; those of one name form one row.
+        on_row: Callback for each finished row.
 
     Raises:
-        InvalidInput: There is no motion, or too much.
+        InvalidInput: There is no recorded motion, or more than ``MAX_RECORDED_S``.
     """
     seconds = sum(float(motion.times[-1]) for motion in motions)
     if not motions:
-        raise InvalidInput("motions", 0, "must hold at least one run of recorded motion")
+        raise InvalidInput("motions", 0, "must hold at least one recording")
     if seconds > MAX_RECORDED_S:
-        rule = f"s of recorded motion are too much: at most {MAX_RECORDED_S} s at a time"
+        rule = f"s of recorded motion are too much: at most {MAX_RECORDED_S} s per evaluation"
         raise InvalidInput("motions", round(seconds), rule)
     bench = _Bench(checkpoint, episodes, seed, on_row)
     usual = bench.usual

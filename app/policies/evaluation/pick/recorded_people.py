@@ -1,7 +1,7 @@
-"""What is recorded of episodes for a second look: poses of robot and people, for FCL.
+"""Record poses of robot and people, and check them again with FCL.
 
-Both scenarios' evaluations keep the poses of some episodes and ask FCL on the raw meshes
-whether the kernels missed a contact.
+Evaluations of both scenarios keep the poses of some episodes and test with FCL on the raw
+meshes whether the kernels missed a contact.
 """
 
 from collections.abc import Sequence
@@ -23,15 +23,15 @@ Index = NDArray[np.int64]
 
 
 class RecordedSettings(Protocol):
-    """What a recording needs to know of a scenario's settings."""
+    """Settings of a scenario as a recording needs them."""
 
     @property
     def action(self) -> ActionSettings:
-        """What actions mean."""
+        """Meaning of actions."""
 
 
 class RecordedBatch(Protocol):
-    """What a recording needs of a scenario's batch."""
+    """Batch of a scenario as a recording needs it."""
 
     @property
     def arm(self) -> Arm:
@@ -39,19 +39,19 @@ class RecordedBatch(Protocol):
 
     @property
     def state(self) -> Any:
-        """Rows of robot and people."""
+        """States of robot and people."""
 
     @property
     def settings(self) -> RecordedSettings:
-        """RecordedSettings."""
+        """Settings of the episodes."""
 
 
 class Trace:
-    """Records robot and people of the first rows at a part of the control period.
+    """Record robot and people of the first environments several times per control period.
 
     Args:
-        batch: What is recorded.
-        n_recorded: How many of its rows.
+        batch: Environments.
+        n_recorded: Number of recorded environments.
         parts: Recorded poses per control period.
     """
 
@@ -61,7 +61,7 @@ class Trace:
         self._people: list[list[tuple[Vec, ...]]] = [[] for _ in range(n_recorded)]
 
     def before(self, rows: Index) -> None:
-        """Keep where the rows are that are about to move."""
+        """Store the states before a step of the environments ``rows``."""
         state, n = self._batch.state, self._n
         self._rows = rows[rows < n]
         self._q0, self._qd0 = state.q[:n].copy(), state.qd[:n].copy()
@@ -69,7 +69,7 @@ class Trace:
         self._people0 = tuple(part[:n].copy() for part in self._of_people())
 
     def after(self) -> None:
-        """Add the period's poses; a row that collided is left out, its contact is known."""
+        """Add the poses of the period, except where the episode ended in a contact."""
         state, dt = self._batch.state, self._batch.arm.dt
         for row in self._rows:
             if state.outcome[row] == COLLISION:
@@ -95,9 +95,9 @@ class Trace:
         return people.q, people.size, people.cylinders
 
     def trajectories(self) -> tuple[Trajectory, ...]:
-        """Return one trajectory for each worker of each recorded row, or one without any.
+        """Return one trajectory per worker of each recorded episode, or one without a worker.
 
-        Cylinders are part of a row's first.
+        The first trajectory of an episode contains its cylinders.
         """
         found = []
         for q, people in zip(self._robot, self._people, strict=True):
@@ -121,7 +121,7 @@ class Trace:
 
 
 def recheck(cell: Cell, trajectories: Sequence[Trajectory]) -> dict[str, int]:
-    """Ask FCL on raw meshes about every recorded pose without a reported contact."""
+    """Check every recorded pose without a reported contact with FCL on the raw meshes."""
     found = recheck_trajectories(cell, trajectories)
     return {
         "episodes": len(trajectories),

@@ -1,4 +1,4 @@
-"""Rules of choosing among candidates, to compare the critic's choice with (METHOD 3.6)."""
+"""Selection rules: the critic's with hysteresis, and rules to compare it with (METHOD 3.6)."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ def _n_candidates(view: View) -> Index:
 
 
 def critic(hysteresis: float) -> Rule:
-    """Return the critic's choice at every step; 0 is the source's rule."""
+    """Return the critic's rule, applied at every step; hysteresis 0 is the source's rule."""
 
     def rule(view: View) -> Index:
         best: Index = view.values.argmax(axis=1)
@@ -25,13 +25,13 @@ def critic(hysteresis: float) -> Rule:
 
 
 def nearest(view: View) -> Index:
-    """Choose, at every step, the candidate nearest to the tcp."""
+    """Select the candidate nearest to the TCP at every step."""
     choice: Index = view.distances.argmin(axis=1)
     return choice
 
 
 def at_random(seed: int, n_episodes: int) -> Rule:
-    """Return the rule that draws one candidate at the start and keeps it."""
+    """Return the rule that selects a random candidate at the start and keeps it."""
     draw = np.random.default_rng(seed).random(n_episodes)
 
     def rule(view: View) -> Index:

@@ -1,8 +1,8 @@
 """Protocols ``pick-single`` and ``pick-choice`` (METHOD 3.6).
 
-Time-out 10 s, start clearance 0.05 m, starts mixed evenly over home, cubes and docks, person
-with postures never seen in training. The hand speeds of the person are part of the result, and
-of the first 200 episodes FCL says on the raw meshes whether the kernels missed a contact.
+Timeout 10 s, start clearance 0.05 m, starts mixed evenly over home, cubes and docks, person
+with postures that do not occur in training. The result states the hand speeds of the person.
+FCL checks the poses of the first 200 episodes on the raw meshes for missed contacts.
 """
 
 from collections.abc import Callable, Mapping
@@ -23,26 +23,26 @@ from app.sim.scene.scene import kinds_of
 
 DEFAULT_EPISODES = 1000
 N_RECHECKED = 200
-"""Episodes whose poses go to FCL."""
+"""Number of episodes checked again with FCL."""
 OTHER_RULES: Mapping[str, Callable[[int, int], Rule]] = {
     "critic-each-step": lambda _seed, _n: choice_rules.critic(0.0),
     "nearest": lambda _seed, _n: choice_rules.nearest,
     "random": choice_rules.at_random,
 }
-"""What the critic's choice is compared with: rule by name, from seed and number of episodes."""
+"""Rules compared with the critic's, made from seed and number of episodes."""
 
 
 def evaluator_of(
     checkpoint: Checkpoint, n_candidates: tuple[int, int], episodes: int | None, seed: int
 ) -> Evaluator:
-    """Return the episodes of a checkpoint; by default 1000."""
+    """Return the evaluator of a checkpoint; by default of 1000 episodes."""
     settings = settings_for(n_candidates, pick_preset_of(checkpoint))
     n = episodes or DEFAULT_EPISODES
     return Evaluator(ValueNetworks(checkpoint), cell_of(checkpoint.manifest), n, seed, settings)
 
 
 def settings_of(evaluator: Evaluator) -> dict[str, object]:
-    """Return what a result states of its episodes."""
+    """Return the settings stated with a result."""
     settings, state = evaluator.batch.settings, evaluator.batch.state
     return {
         "time_limit_s": settings.time_limit_s,
@@ -62,10 +62,10 @@ def run_single(
     """Evaluate one random target per episode.
 
     Args:
-        checkpoint: What acts.
+        checkpoint: Policy.
         episodes: Number of episodes, by default 1000.
-        seed: Seed of the episodes; use one that nothing was tuned on.
-        on_row: Told of the row once it is known.
+        seed: Seed of the episodes; use one that was not used for tuning.
+        on_row: Callback for the finished row.
     """
     evaluator = evaluator_of(checkpoint, (1, 1), episodes, seed)
     outcome = evaluator.run(choice_rules.fixed(0), min(N_RECHECKED, evaluator.batch.n_envs))
@@ -81,13 +81,13 @@ def run_single(
 def run_choice(
     checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> dict[str, object]:
-    """Evaluate the choice among 2-3 random targets, against other rules on the same episodes.
+    """Evaluate task selection among 2-3 random targets and compare selection rules.
 
     Args:
-        checkpoint: What acts and chooses.
+        checkpoint: Policy and critic.
         episodes: Number of episodes, by default 1000.
-        seed: Seed of the episodes; use one that nothing was tuned on.
-        on_row: Told of each row once it is known.
+        seed: Seed of the episodes; use one that was not used for tuning.
+        on_row: Callback for each finished row.
     """
     evaluator = evaluator_of(checkpoint, (2, 3), episodes, seed)
     n = evaluator.batch.n_envs
@@ -107,7 +107,7 @@ def run_choice(
 
 
 def _oracle(runs: list[Episodes]) -> dict[str, object]:
-    """Return the row of the best fixed candidate per episode, known only afterwards."""
+    """Return the row of the best fixed candidate of each episode, selected afterwards."""
     rank = np.zeros(len(OUTCOMES))
     rank[[kernel.TIMEOUT, kernel.UNFEASIBLE, kernel.COLLISION]] = 1, 2, 3
     badness = np.stack([1e3 * rank[run.outcome] + run.duration_s for run in runs])

@@ -1,17 +1,16 @@
-"""Protocol ``pick-tracker``: what a policy loses when it sees people through a tracker.
+"""Protocol ``pick-tracker``: a policy that observes people through a tracker.
 
-Every row runs the same episodes of ``pick-choice``; contacts are the true person's, and only
-what the policy sees differs: BODY_25 key-points at 30 Hz
-(``app/sim/perception/keypoint_sensor_model.py``), turned back
-into joint angles and speeds by ``app/sim/perception/person_estimator.py``. Each row of the
-batch has its
-own tracker and estimator, and the tracker has looked for a while before the episode starts.
+All rows run the same episodes of ``pick-choice`` with contacts of the true person. They differ
+in the observation: BODY_25 key-points at 30 Hz
+(``app/sim/perception/keypoint_sensor_model.py``), from which
+``app/sim/perception/person_estimator.py`` estimates joint angles and speeds. Each environment
+has its own tracker and estimator; the tracker starts before the episode does.
 
 ========================  ==================================================================
 ``exact``                 the true state
-``33ms``                  one frame late, nothing else
-``100ms``, ``200ms``      later; the estimator predicts up to now
-``100ms-not-predicted``   as it was when the newest frame was taken, 0.1 s and more ago
+``33ms``                  latency of one frame
+``100ms``, ``200ms``      latencies of several frames; the estimator predicts the current state
+``100ms-not-predicted``   state at the time of the newest frame, at least 0.1 s old
 ``100ms-noise-missing``   100 ms, 20 mm noise per axis, 20 % of the key-points missing
 ========================  ==================================================================
 
@@ -38,18 +37,18 @@ from app.sim.pick.batch import PickBatch
 DEFAULT_EPISODES = 300
 RATE_HZ = 30.0
 LOOKED_S = 0.4
-"""Time for which the tracker has looked before its first frame counts [s]. The person is taken
-to have come to the start at the speed they have there."""
+"""Time for which the tracker runs before the episode [s]; the person moves at the initial speed
+until then."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KeypointSensorRow:
-    """How one row of the result sees people."""
+    """Observation model of one result row."""
 
     tracker: KeypointSensorSettings
-    """How good the tracker is."""
+    """Latency, noise and dropouts."""
     predicted: bool = True
-    """Whether the estimate is for now, or for the time of the newest frame."""
+    """Whether the estimate is for the current time instead of the newest frame's."""
 
 
 def _late(seconds: float, **disturbed: float) -> KeypointSensorSettings:
@@ -64,13 +63,13 @@ ROWS = {
     "100ms-not-predicted": KeypointSensorRow(tracker=_late(0.1), predicted=False),
     "100ms-noise-missing": KeypointSensorRow(tracker=_late(0.1, noise=0.02, missing=0.2)),
 }
-"""The rows beside ``exact``."""
+"""Rows other than ``exact``."""
 
 
 def between(
     t0: float, q0: Vec, qd0: Vec, t1: float, q1: Vec, qd1: Vec
 ) -> Callable[[float], Vec]:
-    """Return the motion between two states, cubic, and straight on before the first.
+    """Return the cubic motion between two states, extrapolated linearly before the first.
 
     Args:
         t0: Time of the first state [s].
@@ -94,12 +93,10 @@ def between(
 
 
 class KeypointObserver:
-    """Shows the policy the first worker of each row as a tracker and an estimator know them.
-
-    Made again for every run.
+    """Observe the first worker of each environment by tracker and estimator, for one run.
 
     Args:
-        row: How people are seen.
+        row: Observation model.
         seed: Seed of the disturbances.
     """
 
@@ -110,10 +107,10 @@ class KeypointObserver:
         self._frame_at: dict[int, float] = {}
         self._before: tuple[Vec, Vec, Vec] | None = None
         self.wrist_errors: list[float] = []
-        """Distance of seen and true wrists at every step of every row [m]."""
+        """Distance of observed and true wrists at each step of each environment [m]."""
 
     def __call__(self, batch: PickBatch, rows: Index) -> Sight:
-        """Take in the frames handed over by now and return what is known of each person."""
+        """Update the estimators with the frames available now and return their estimates."""
         people, t = batch.state.people, batch.state.elapsed
         if self._before is None:
             self._start(batch, rows)
@@ -148,7 +145,7 @@ class KeypointObserver:
     def _look(
         self, batch: PickBatch, e: int, t: float, motion: Callable[[float], Vec]
     ) -> tuple[Vec, Vec]:
-        """Return joint positions and speeds of one row's person as they are known at ``t``."""
+        """Return estimated joint positions and speeds of one environment's person at ``t``."""
         estimator = self._estimators[e]
         for frame in self._trackers[e].frames(t, motion):
             estimator.take(frame.t, frame.keypoints, frame.confidences)
@@ -169,13 +166,13 @@ class KeypointObserver:
 def run_tracker(
     checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> dict[str, object]:
-    """Evaluate the choice among 2-3 random targets beside people seen by a tracker.
+    """Evaluate task selection among 2-3 random targets with people observed by a tracker.
 
     Args:
-        checkpoint: What acts and chooses.
+        checkpoint: Policy and critic.
         episodes: Number of episodes per row, by default 300.
         seed: Seed of the episodes and of the disturbances.
-        on_row: Told of each row once it is known.
+        on_row: Callback for each finished row.
     """
     evaluator = evaluator_of(checkpoint, (2, 3), episodes or DEFAULT_EPISODES, seed)
     rule, results = choice_rules.critic(HYSTERESIS), []

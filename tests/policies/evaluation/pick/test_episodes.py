@@ -1,4 +1,4 @@
-"""Whom a policy sees among several people, and what is recorded of them."""
+"""Tests of pick episodes: the observed person and recorded trajectories."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def test_the_nearest_of_several_workers_is_seen_in_their_own_size():
     rows, people, seen = np.arange(3, 40, 2), batch.state.people, set()
     sight = seen_exactly(batch, rows)
     for k, e in enumerate(rows):
-        gaps = [
+        clearances = [
             clearance(
                 batch.arm,
                 batch.world.people,
@@ -37,7 +37,7 @@ def test_the_nearest_of_several_workers_is_seen_in_their_own_size():
             ).people_m
             for q, size in zip(people.q[e], people.size[e], strict=True)
         ]
-        nearest = int(np.argmin(gaps))
+        nearest = int(np.argmin(clearances))
         seen.add(nearest)
         np.testing.assert_array_equal(sight.q[k], people.q[e, nearest])
         np.testing.assert_array_equal(sight.qd[k], people.qd[e, nearest])
@@ -45,7 +45,7 @@ def test_the_nearest_of_several_workers_is_seen_in_their_own_size():
     assert seen == {0, 1, 2}
 
 
-def test_nobody_is_seen_as_somebody_far_away():
+def test_an_empty_cell_is_observed_as_a_person_far_away():
     batch = PickBatch(load_cell(), 2, 7, PickSettings(people=()))
     batch.reset()
     sight = seen_exactly(batch, np.arange(2))
@@ -53,7 +53,7 @@ def test_nobody_is_seen_as_somebody_far_away():
     assert sight.q[0, 1] > 3.0 and not sight.qd.any()
 
 
-def test_an_angle_beyond_its_limit_is_told_as_the_limit():
+def test_an_angle_beyond_its_limit_is_observed_as_the_limit():
     cell, q = load_cell(), working(60)
     q[:, 13], q[:, 3] = 4.0, 0.3
     run = at_the_table(run_of(q), cell)

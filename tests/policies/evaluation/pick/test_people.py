@@ -1,4 +1,4 @@
-"""The protocols of several, yielding and recorded people: rows, people, and what differs."""
+"""Tests of the protocols with several, yielding and recorded people."""
 
 from dataclasses import replace
 
@@ -21,18 +21,18 @@ PEOPLE = [
 
 
 @pytest.fixture(scope="module")
-def told():
+def reported():
     return []
 
 
 @pytest.fixture(scope="module")
-def beside_people(told):
+def beside_people(reported):
     return evaluate(
         "pick-people",
         pretrained.load("pick"),
         episodes=N,
         seed=5,
-        on_row=lambda *what: told.append(what),
+        on_row=lambda *what: reported.append(what),
     )
 
 
@@ -48,7 +48,7 @@ def test_people_have_a_row_for_every_number_and_size(beside_people):
     assert stated["worker-and-walker"]["people"] == ["worker", "walker"]
 
 
-def test_nobody_is_never_touched_and_the_more_people_the_bolder(beside_people):
+def test_contacts_at_rest_grow_with_the_number_of_people_from_zero(beside_people):
     rows = rows_of(beside_people)
     assert rows["0-people"]["touched_at_rest"]["mean"] == 0.0
     touched = [rows[f"{n}-people"]["touched_at_rest"]["mean"] for n in (0, 1, 4)]
@@ -65,12 +65,12 @@ def test_small_and_large_people_give_other_episodes(beside_people):
     assert speeds[0] != speeds[1]
 
 
-def test_every_row_is_told_as_soon_as_it_is_known(beside_people, told):
-    assert [(done, total) for done, total, _ in told] == [(k + 1, 11) for k in range(11)]
-    assert [row for _, _, row in told] == beside_people["results"]
+def test_every_row_is_reported_as_soon_as_it_is_known(beside_people, reported):
+    assert [(done, total) for done, total, _ in reported] == [(k + 1, 11) for k in range(11)]
+    assert [row for _, _, row in reported] == beside_people["results"]
 
 
-def test_courteous_people_touch_a_robot_at_rest_less_often():
+def test_yielding_people_touch_a_robot_at_rest_less_often():
     result = evaluate("pick-yielding", pretrained.load("pick"), episodes=80, seed=5)
     assert [row["name"] for row in result["results"]] == [
         "yielding-0", "yielding-0.5", "yielding-1"

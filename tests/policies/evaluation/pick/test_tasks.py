@@ -1,4 +1,4 @@
-"""The protocols: same episodes for every rule, complete rows, stated people."""
+"""Tests of the pick protocols: equal episodes for all rules, complete rows, stated people."""
 
 from dataclasses import replace
 
@@ -83,17 +83,17 @@ def test_no_episodes_is_refused():
         evaluate("pick-single", pretrained.load("pick"), episodes=0)
 
 
-def test_what_stands_between_is_asked_for_running_rows_only_and_changes_what_happens(evaluator):
+def test_the_observation_model_sees_running_rows_only_and_changes_episodes(evaluator):
     running = []
 
-    def nobody(batch, rows):
+    def no_person(batch, rows):
         running.append(batch.state.outcome[rows])
         sight = seen_exactly(batch, rows)
         q = sight.q.copy()
         q[:, :2] = 100.0
         return replace(sight, q=q, qd=np.zeros_like(q))
 
-    blind = evaluator.run(choice_rules.critic(0.2), seen=nobody)
+    blind = evaluator.run(choice_rules.critic(0.2), seen=no_person)
     assert not np.concatenate(running).any()
     assert not np.array_equal(
         blind.duration_s, evaluator.run(choice_rules.critic(0.2)).duration_s

@@ -1,4 +1,4 @@
-"""Episodes seen through a tracker: what stands between, and that it makes a difference."""
+"""Tests of episodes observed through a tracker."""
 
 from dataclasses import replace
 
@@ -33,7 +33,7 @@ def evaluator():
 
 
 def misses(evaluator, row, seed=1):
-    """Greatest difference of seen and true joints at every step of every row [m, rad]."""
+    """Return the largest difference of observed and true joints at each step [m, rad]."""
     look, found = KeypointObserver(row, seed), []
 
     def compared(batch, rows):
@@ -78,7 +78,7 @@ def test_the_same_seed_gives_the_same_episodes(evaluator):
     np.testing.assert_array_equal(first.duration_s, second.duration_s)
 
 
-def test_a_tracker_that_delivers_nothing_shows_nobody(evaluator):
+def test_a_tracker_without_frames_shows_no_person(evaluator):
     blind = ROWS["100ms"]
     look = KeypointObserver(replace(blind, tracker=replace(blind.tracker, lost=1.0)), 1)
     evaluator.batch.reset()
