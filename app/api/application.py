@@ -9,14 +9,16 @@ from starlette.middleware.gzip import GZipMiddleware
 from starlette.responses import FileResponse, Response
 from starlette.staticfiles import StaticFiles
 
-from app.api import (
+from app.api import problems
+from app.api.answers import Answers
+from app.api.bodies import BodyRules
+from app.api.routes import (
     cells,
     checkpoints,
     health,
     jobs,
     motion,
     presets,
-    problems,
     recordings,
     reference,
     session,
@@ -26,8 +28,6 @@ from app.api import (
     viewer,
     worlds,
 )
-from app.api.answers import Answers
-from app.api.bodies import BodyRules
 from app.api.security import SESSION_PATH, Guard
 
 ICON_PATH = "/favicon.ico"

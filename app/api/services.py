@@ -7,15 +7,16 @@ from pathlib import Path
 from typing import Annotated, Protocol
 
 from fastapi import Depends
+from starlette.concurrency import run_in_threadpool
 from starlette.requests import HTTPConnection
 
 from app.api.registry import CheckpointNames, PolicyRegistry
 from app.api.tracker_sessions import TrackerSessions
-from app.errors import NotFound, NotReady
+from app.errors import InvalidInput, NotFound, NotReady
 from app.live.reach.interfaces import LiveReachPolicy
 from app.live.world_handle import WorldHandle
 from app.policies.inference.motion_decision import MotionDecider
-from app.sim.cells.cell import Cell
+from app.sim.cells.cell import Cell, cell_names
 from app.sim.pick.task_policy import TaskPolicy
 from app.sim.sorting.sorting_values import SortingValues
 from app.store.engine import Store
@@ -135,6 +136,19 @@ class Services:
             self.readiness.require()
             raise NotFound("world", world_id, tuple(self.worlds))
         return found
+
+    async def known_cell(self, name: str) -> Cell:
+        """Return the cell a request names; a shipped one without disk access.
+
+        Raises:
+            InvalidInput: No cell has that name.
+        """
+        if name in cell_names():
+            return self.cells.get(name)
+        try:
+            return await run_in_threadpool(self.cells.get, name)
+        except NotFound as error:
+            raise InvalidInput("cell", name, "is no known work cell", error.known) from None
 
 
 def services_of(connection: HTTPConnection) -> Services:

@@ -20,7 +20,7 @@ from app.settings import Settings
 GRACE_S = 3
 """Time for open requests once the server stops [s]."""
 MAX_FRAME_BYTES = 16 * 1024 * 1024
-"""Largest WebSocket frame: a picture of the viewer's canvas; see ``app.api.viewer``."""
+"""Largest WebSocket frame: a picture of the viewer's canvas; see ``app.api.routes.viewer``."""
 
 
 class Server(uvicorn.Server):

@@ -9,7 +9,7 @@ from fastapi.testclient import TestClient
 from httpx import Response
 
 from app.sim.perception.keypoints import BODY_25, K
-from tests.api.test_task_selection import URL, refused
+from tests.api.routes.test_task_selection import URL, refused
 from tests.sim.postures import FRAMES
 from tests.sim.tracked_person import CELL, seen, work
 

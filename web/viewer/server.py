@@ -4,7 +4,7 @@ viser (1.1.1) listens on a TCP port and checks neither token nor ``Origin`` nor 
 page in a browser of this machine could open that port and drag a person of the live cell. Here
 it listens on a Unix socket in a directory of mode 0700 instead. The kernel lets only processes
 of the same user connect, browsers cannot address a Unix socket at all, and the one way in is
-the proxy in :mod:`app.api.viewer`, behind the service's own checks.
+the proxy in :mod:`app.api.routes.viewer`, behind the service's own checks.
 
 viser hands no listening option on, so ``serve`` of :mod:`websockets.asyncio.server`, which it
 looks up while it starts, is replaced for the time of its constructor; calls for another host

@@ -10,6 +10,7 @@ people          People in a request, and their use by a policy
 presets         Presets with the declarations of their fields, as the training form needs them
 recordings      Recordings of human motion as they are shown
 robot_state     Joints of the robot in a request: base to wrist 3, or in any order by name
+separation      Speed and separation monitoring in a motion request and in its answer
 sorting         ``POST /v1/sorting``: objects and goal in, next move out
 task_selection  ``POST /v1/task-selection``: state in, decision out
 trackers        Trackers of key-points: frames in, estimates of people out

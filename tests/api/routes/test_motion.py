@@ -22,7 +22,7 @@ from tests.policies.untrained import untrained_reach
 URL, STREAM = "/v1/motion", "/v1/motion/stream"
 SOCKET = ADDRESS.replace("http", "ws") + STREAM
 GRID, BOX, JERK = "untrained-grid", "untrained-box", "untrained-jerk"
-PAGE = (Path(__file__).parents[2] / "docs" / "http.md").read_text("utf-8")
+PAGE = (Path(__file__).parents[3] / "docs" / "http.md").read_text("utf-8")
 HOME = list(load_cell("shared-workspace").robot.home_q)
 WALKER = {"x": 0.3, "y": 1.5, "vx": 0.0, "vy": -0.5, "r": 0.3}
 FAR = {"x": -1.8, "y": 1.9, "vx": 0.0, "vy": 0.0, "r": 0.3}

@@ -9,7 +9,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.sim.perception.keypoints import K
-from tests.api.test_task_selection import URL, refused
+from tests.api.routes.test_task_selection import URL, refused
 from tests.sim.tracked_person import CELL, RATE_HZ, seen, work
 
 TRACKERS = "/v1/trackers"

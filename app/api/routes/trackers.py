@@ -16,7 +16,6 @@ from app.api.schemas.trackers import (
     TrackerPublic,
 )
 from app.api.services import ServicesDep
-from app.api.task_selection import known_cell
 
 router = APIRouter(prefix="/v1/trackers", tags=["trackers"])
 
@@ -27,7 +26,7 @@ async def create(
 ) -> TrackerPublic:
     """Open a tracker; requests of decisions can then name its people."""
     services.readiness.require()
-    cell = await known_cell(body.cell, services)
+    cell = await services.known_cell(body.cell)
     size = cell.body if body.body is None else body.body.size(cell)
     session = services.trackers.open(cell.name, body.n_people, size, cell.floor_z)
     response.headers["Location"] = f"/v1/trackers/{session.id}"

@@ -11,10 +11,8 @@ from starlette.concurrency import run_in_threadpool
 
 from app.api.known_people import known_people, nearest_places, renumbered, take_time
 from app.api.schemas.task_selection import TaskSelection, TaskSelectionRequest
-from app.api.services import Services, ServicesDep
+from app.api.services import ServicesDep
 from app.api.world_policies import require_task_policy
-from app.errors import InvalidInput, NotFound
-from app.sim.cells.cell import Cell, cell_names
 
 MAX_INLINE_CANDIDATES = 32
 """Larger requests are processed on a thread, so that the event loop is not blocked."""
@@ -27,7 +25,7 @@ async def choose(request: TaskSelectionRequest, services: ServicesDep) -> TaskSe
     """Return the selected candidate, every candidate's value and the policy's action."""
     # A few candidates take about a millisecond, less than a change of thread.
     services.readiness.require()
-    cell = await known_cell(request.cell, services)
+    cell = await services.known_cell(request.cell)
     q, qd, candidates = request.to_domain()
     policy = services.task_policies.loaded(request.checkpoint)
     if policy is None:
@@ -61,17 +59,3 @@ async def choose(request: TaskSelectionRequest, services: ServicesDep) -> TaskSe
 
     long = len(candidates) > MAX_INLINE_CANDIDATES or take_time(request.people)
     return await run_in_threadpool(answer) if long else answer()
-
-
-async def known_cell(name: str, services: Services) -> Cell:
-    """Return a cell by name; a shipped one without disk access.
-
-    Raises:
-        InvalidInput: No cell has that name.
-    """
-    if name in cell_names():
-        return services.cells.get(name)
-    try:
-        return await run_in_threadpool(services.cells.get, name)
-    except NotFound as error:
-        raise InvalidInput("cell", name, "is no known work cell", error.known) from None

@@ -93,7 +93,7 @@ async def page(
 def viewer_page() -> tuple[bytes, bytes, str]:
     """Return the viewer's page with our style and script: plain, compressed, and its ETag."""
     content = (resources.files("viser") / "client" / "build" / "index.html").read_bytes()
-    extra = (resources.files("app.api") / "viewer_extra.html").read_bytes()
+    extra = (resources.files("app.api.routes") / "viewer_extra.html").read_bytes()
     plain = content.replace(b"<script", extra + b"<script", 1)
     return plain, gzip.compress(plain, 6), f'"{hashlib.sha256(plain).hexdigest()[:32]}"'
 

@@ -11,8 +11,8 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol
 
+from app.api.routes.viewer import MAX_FRAME_BYTES, is_allowed
 from app.api.services import MAX_VIEWERS
-from app.api.viewer import MAX_FRAME_BYTES, is_allowed
 from app.main import create_app
 from app.settings import Settings
 from tests import patient_http

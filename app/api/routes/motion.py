@@ -30,7 +30,6 @@ from app.api.problems import (
 from app.api.schemas.motion import MotionAnswer, MotionRequest, PersonMet
 from app.api.services import MAX_STREAMS, Services, ServicesDep, services_of
 from app.api.sockets import refuse
-from app.api.task_selection import known_cell
 from app.api.texts import fault_in_json
 from app.api.tracker_sessions import TrackerSessions
 from app.errors import ServiceError
@@ -68,7 +67,7 @@ async def answer(request: MotionRequest, services: Services) -> MotionAnswer:
         ServiceError: The request cannot be answered.
     """
     services.readiness.require()
-    cell = await known_cell(request.cell, services)
+    cell = await services.known_cell(request.cell)
     decider = await _decider(request.checkpoint, services)
     require_cell(cell, decider.actor.cell, decider.actor.cell_sha256)
     decided = partial(decide, request, cell, decider, services.trackers)

@@ -12,7 +12,6 @@ from starlette.concurrency import run_in_threadpool
 from app.api.registry import SORTING_ALIASES
 from app.api.schemas.sorting import SortingAnswer, SortingRequest, outside_of
 from app.api.services import Services, ServicesDep
-from app.api.task_selection import known_cell
 from app.errors import InvalidInput
 from app.sim.core.arrays import Vec
 from app.sim.sorting.batch import fail_of
@@ -59,7 +58,7 @@ async def _task_of(request: SortingRequest, services: Services) -> tuple[Sorting
         names = plain_names(layout.n_cells, layout.colours, layout.sizes)
         return names, np.zeros(layout.n_cells)
     assert request.cell is not None
-    cell = await known_cell(request.cell, services)
+    cell = await services.known_cell(request.cell)
     return names_of(cell), fail_of(cell)
 
 
