@@ -89,29 +89,31 @@ def targets(seed: int = 5) -> Json:
     return result("reach-targets", rows)
 
 
-def random_goals(shift: float = 0.0, ways: tuple[str, ...] = ("direct",)) -> Json:
+def random_goals(shift: float = 0.0, methods: tuple[str, ...] = ("direct",)) -> Json:
     rows = [row("targets", 5000, 0.019)]
-    for k, how in enumerate(ways):
+    for k, method in enumerate(methods):
         worse = 0.003 + 0.007 * k + shift
         between = [
             {"low_m": low, "high_m": high, **rates(1000, 0.019 + worse * (1.0 + 4.0 * low))}
             for low, high in itertools.pairwise(RINGS)
         ]
         against = {"mean": -worse, "low": -worse - 0.004, "high": -worse + 0.004}
-        rows.append(row(how, 5000, 0.019 + worse, against_targets=against, between=between))
-        rows.append(row(f"{how}-25s", 5000, 0.012 + worse))
-    asked = ["direct", *(how for how in ways for _ in range(2))]
-    return result("reach-random", rows, [{"asked": how, "people": ["walker"]} for how in asked])
+        rows.append(row(method, 5000, 0.019 + worse, against_targets=against, between=between))
+        rows.append(row(f"{method}-25s", 5000, 0.012 + worse))
+    asked = ["direct", *(method for method in methods for _ in range(2))]
+    return result(
+        "reach-random", rows, [{"asked": method, "people": ["walker"]} for method in asked]
+    )
 
 
 def people() -> Json:
     rows, stated = [], []
     for n in range(5):
-        for how in ("direct", "averaged") if n > 1 else ("direct",):
-            name = f"{n}-people" + (f"-{how}" if n > 1 else "")
-            failed = 0.019 * n * (1.0 if how == "direct" else 1.3)
+        for method in ("direct", "averaged") if n > 1 else ("direct",):
+            name = f"{n}-people" + (f"-{method}" if n > 1 else "")
+            failed = 0.019 * n * (1.0 if method == "direct" else 1.3)
             rows.append(row(name, 1000, failed, starts_redrawn=0.07 * n))
-            stated.append({"asked": how, "people": ["walker"] * n})
+            stated.append({"asked": method, "people": ["walker"] * n})
     return result("reach-people", rows, stated)
 
 

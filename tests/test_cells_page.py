@@ -31,7 +31,7 @@ def test_example_is_a_cell_that_policies_can_act_in() -> None:
     assert lacks_for_pick(read_cell(block("json").encode())) is None
 
 
-def test_faults_are_told_as_shown(
+def test_faults_are_listed_as_shown(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     cell = json.loads(block("json"))

@@ -1,4 +1,4 @@
-"""The house itself: dependencies, locks and package data say what the code needs."""
+"""Dependencies, locks and package data say what the code needs."""
 
 import ast
 import re
@@ -12,7 +12,7 @@ from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-ROOMS = ("app", "jobs", "web")
+ROOTS = ("app", "jobs", "web")
 RUN_BY_HAND = {"tools/distance_fields.py"}
 """Modules of scripts that make committed data; they may use the development extras."""
 
@@ -29,7 +29,7 @@ def imported_roots(path: Path) -> set[str]:
             found |= {alias.name.split(".")[0] for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:
             found.add(node.module.split(".")[0])
-    return found - sys.stdlib_module_names - set(ROOMS)
+    return found - sys.stdlib_module_names - set(ROOTS)
 
 
 def names_in(lines: list[str]) -> set[str]:
@@ -40,7 +40,7 @@ def test_every_imported_package_is_declared() -> None:
     declared = names_in(PROJECT["project"]["dependencies"])
     by_hand = declared | names_in(PROJECT["project"]["optional-dependencies"]["dev"])
     owners = {**packages_distributions(), "pinocchio": ["pin"]}
-    for path in (path for room in ROOMS for path in (ROOT / room).rglob("*.py")):
+    for path in (path for folder in ROOTS for path in (ROOT / folder).rglob("*.py")):
         allowed = by_hand if path.relative_to(ROOT).as_posix() in RUN_BY_HAND else declared
         for root in imported_roots(path):
             packages = {canonicalize_name(name) for name in owners[root]}
@@ -90,7 +90,7 @@ def test_every_data_file_belongs_to_the_package() -> None:
         for pattern in patterns
         for path in (ROOT / package.replace(".", "/")).glob(pattern)
     }
-    for room in ROOMS:
-        for path in (ROOT / room).rglob("*"):
+    for folder in ROOTS:
+        for path in (ROOT / folder).rglob("*"):
             if path.is_file() and path.suffix != ".py" and path.parent.name != "__pycache__":
                 assert path in packaged, f"{path} is in no package-data pattern"

@@ -1,8 +1,6 @@
 """Offline generators, run by hand.
 
 check_vocabulary        Find words that the glossary replaces, and class names that occur twice
-convert_manifests       Convert the manifests of the shipped checkpoints to the present names,
-                        without retraining
 distance_fields         Smooth surfaces from a handful of round cones: how the person is
                         modelled
 fit_capsules            Fit capsules that contain the UR10's collision meshes; run ``python -m

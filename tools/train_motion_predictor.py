@@ -275,7 +275,7 @@ def main() -> None:
             AHEAD[REPORTED].round(2),
             (unit * off)[REPORTED].round(1),
             (unit * plain)[REPORTED].round(1),
-        )  # fmt: skip
+        )
     write_networks(radius, path)
 
 

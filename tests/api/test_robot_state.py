@@ -198,10 +198,14 @@ def test_far_people_cost_no_decision_and_are_flagged(
 def test_key_points_of_somebody_far_away_keep_their_place(client: TestClient) -> None:
     points: list[Any] = [None] * 25
     for k, (x, y, z) in {
-        0: (0.0, 1.33, 0.81), 1: (0.0, 1.45, 0.64), 2: (-0.18, 1.45, 0.64),
-        5: (0.18, 1.45, 0.64), 8: (0.0, 1.45, 0.20), 9: (-0.09, 1.45, 0.20),
+        0: (0.0, 1.33, 0.81),
+        1: (0.0, 1.45, 0.64),
+        2: (-0.18, 1.45, 0.64),
+        5: (0.18, 1.45, 0.64),
+        8: (0.0, 1.45, 0.20),
+        9: (-0.09, 1.45, 0.20),
         12: (0.09, 1.45, 0.20),
-    }.items():  # fmt: skip
+    }.items():
         points[k] = [x + 40.0, y, z]
     answer = asked(client, "/v1/motion", people=[{"keypoints": points}])
     assert answer["people"][0]["flags"] == ["far"]

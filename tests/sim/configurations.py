@@ -11,11 +11,12 @@ import numpy as np
 
 from app.sim.cells.cell import load_cell
 from app.sim.collision.fcl_recheck import robot_ends, segment_distances
+from app.sim.core.arrays import Vec
 from app.sim.geometry.capsules import distances
 from app.sim.human import model as human
 from app.sim.people.kernels.people import new_people_geometry, people_clearance, place_workers
 from app.sim.robot.capsules import load_robot_capsules
-from app.sim.robot.kernels.arm import new_robot_pose, place_robot
+from app.sim.robot.kernels.arm import Arm, new_robot_pose, place_robot
 from app.sim.robot.ur10 import Robot
 from app.sim.scene.scene import arm_of, people_of
 from tests.sim.person_reference import capsule_ends
@@ -23,6 +24,12 @@ from tests.sim.person_reference import capsule_ends
 CELL = load_cell()
 N, CHUNK = 20_000, 1000
 RADII = load_robot_capsules().radius
+
+
+def vertical_configuration(arm: Arm, target: Vec) -> Vec:
+    """Return the configuration with the tool down at ``target`` [m], shape (0 or 1, 6)."""
+    q = Robot(arm.lengths.tool).ik_vertical(target, arm.limits.q_min, arm.limits.q_max)
+    return np.zeros((0, 6)) if q is None else q[None]
 
 
 class Case(NamedTuple):

@@ -1,4 +1,4 @@
-"""Demonstrations of one task: from home to a cube, with the right hand, each in its own way."""
+"""Demonstrations of one task, from home to a cube with the right hand, on different paths."""
 
 import numpy as np
 

@@ -77,13 +77,13 @@ def draw(cell: Cell, rng: np.random.Generator, robot: Robot) -> Period | None:
     # link before and after, with the forearm behind it.
     side = human.joint_points(stand, cell.body)["neck"] - near + rng.normal(0.0, 0.05, 3)
     side /= np.linalg.norm(side)
-    way = np.cross(side, rng.normal(size=3))
-    way *= 0.5 * HAND_SPEED * dt / np.linalg.norm(way)
+    step = np.cross(side, rng.normal(size=3))
+    step *= 0.5 * HAND_SPEED * dt / np.linalg.norm(step)
     graze = rng.uniform(0.7, 1.05) * (capsules.radius[k] + HAND_RADIUS)
     middle = near + (graze + body.HAND_TIP - body.MEDIAN_HAND) * side
     hand, swivel = rng.choice(["r", "l"]), rng.uniform(0.0, 0.9)
     ends = [
-        human.reach(hand, middle + sign * way, stand, cell.body, swivel=swivel)
+        human.reach(hand, middle + sign * step, stand, cell.body, swivel=swivel)
         for sign in (-1.0, 1.0)
     ]
     if not all(one.reached for one in ends):
@@ -105,8 +105,8 @@ def rows(case: Period, dt: float) -> Trajectory:
 def palm_speed(cell: Cell, case: Period) -> float:
     """Mean speed of the faster palm [m/s]."""
     ends = [human.joint_points(q, cell.body) for q in (case.before, case.after)]
-    way = [np.linalg.norm(ends[1][name] - ends[0][name]) for name in ("hand_r", "hand_l")]
-    return float(max(way)) / cell.robot.dt
+    moved = [np.linalg.norm(ends[1][name] - ends[0][name]) for name in ("hand_r", "hand_l")]
+    return float(max(moved)) / cell.robot.dt
 
 
 def passes(cell: Cell, n: int, seed: int) -> Iterator[Pass]:

@@ -70,9 +70,9 @@ def random_segments(
 ) -> list[SegmentMotion]:
     """Return n segments, each of a random person, primitive, sample and pair of keyframes."""
     rng = np.random.default_rng(seed)
-    ways = np.argwhere(library.segments[..., 0] >= 0)
+    known = np.argwhere(library.segments[..., 0] >= 0)
     return [
-        random_segment(cell, library, tuple(ways[rng.integers(len(ways))]), rng)
+        random_segment(cell, library, tuple(known[rng.integers(len(known))]), rng)
         for _ in range(n)
     ]
 

@@ -58,11 +58,11 @@ def main() -> None:
         "cov_speed": _blocks(peer.cov_velocities(Z.copy())),
     }
     for k, variance in enumerate(VARIANCES):
-        told = Oracle(18, N_BASIS).from_weight_distribution(*weights)
+        oracle = Oracle(18, N_BASIS).from_weight_distribution(*weights)
         for phase, target in via_points(promp):
-            told = told.condition_position(target, y_cov=variance * np.eye(18), t=phase)
-        found[f"mean_{k}"] = told.mean_trajectory(Z.copy())
-        found[f"cov_{k}"] = _blocks(told.cov_trajectory(Z.copy()))
+            oracle = oracle.condition_position(target, y_cov=variance * np.eye(18), t=phase)
+        found[f"mean_{k}"] = oracle.mean_trajectory(Z.copy())
+        found[f"cov_{k}"] = _blocks(oracle.cov_trajectory(Z.copy()))
     np.savez_compressed(FILE, **found)
 
 

@@ -140,6 +140,6 @@ def _meshes(
             continue
         pose = poses[links[i]]
         ends = (person[j] - pose[:3, 3]) @ pose[:3, :3]
-        way = segment_to_triangles(*ends, triangles(LINK_NAMES[links[i]]))
-        best = min(best, max(way - float(human.CAPSULE_RADII[j]), 0.0))
+        distance = segment_to_triangles(*ends, triangles(LINK_NAMES[links[i]]))
+        best = min(best, max(distance - float(human.CAPSULE_RADII[j]), 0.0))
     return best

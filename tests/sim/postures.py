@@ -34,8 +34,8 @@ def posture(name: str, floor_z: float, scale: float = 1.0) -> np.ndarray:
     pose = STANDING | POSTURES[name]
     points = np.full((N_KEYPOINTS, 3), np.nan)
 
-    def put(joint: str, start: np.ndarray, way: object, length: float) -> np.ndarray:
-        direction = np.asarray(way, dtype=np.float64)
+    def put(joint: str, start: np.ndarray, axis: object, length: float) -> np.ndarray:
+        direction = np.asarray(axis, dtype=np.float64)
         points[K[joint]] = start + length * direction / np.linalg.norm(direction)
         return points[K[joint]]
 
@@ -46,11 +46,11 @@ def posture(name: str, floor_z: float, scale: float = 1.0) -> np.ndarray:
     for s, side in (("r", X), ("l", -X)):
         put(f"eye_{s}", nose, 0.03 * side + 0.03 * Z - 0.02 * Y, 0.05)
         put(f"ear_{s}", nose, 0.07 * side - 0.1 * Y, 0.14)
-        elbow_way, wrist_way = (
+        elbow_axis, wrist_axis = (
             side if isinstance(pose[part], str) else pose[part] for part in ("arm", "forearm")
         )
         shoulder = put(f"shoulder_{s}", neck, side, 0.18)
-        put(f"wrist_{s}", put(f"elbow_{s}", shoulder, elbow_way, 0.29), wrist_way, 0.26)
+        put(f"wrist_{s}", put(f"elbow_{s}", shoulder, elbow_axis, 0.29), wrist_axis, 0.26)
         hip = put(f"hip_{s}", hips, side, 0.09)
         ankle = put(
             f"ankle_{s}", put(f"knee_{s}", hip, pose["thigh"], 0.42), pose["shank"], 0.42

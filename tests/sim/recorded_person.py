@@ -63,9 +63,7 @@ DAZ = {
     "thigh": "{letter}Thigh",
     "foot": "{letter}Foot",
 }
-SKELETONS = {
-    "tum": TUM, "cmu": CMU, "mixamo": MIXAMO, "smpl": SMPL, "xsens": XSENS, "daz": DAZ
-}  # fmt: skip
+SKELETONS = {"tum": TUM, "cmu": CMU, "mixamo": MIXAMO, "smpl": SMPL, "xsens": XSENS, "daz": DAZ}
 
 TO_FILE = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 """From z up to y up."""
@@ -161,10 +159,15 @@ def opensim_text(angles: Mapping[str, Vec], dt: float = 0.02, degrees: bool = Tr
         metres = name in ("pelvis_tx", "pelvis_ty", "pelvis_tz")
         columns.append(np.degrees(values) if degrees and not metres else values)
     head = [
-        "Coordinates", "version=1", f"nRows={n}", f"nColumns={len(columns)}",
-        f"inDegrees={'yes' if degrees else 'no'}", "", "endheader",
+        "Coordinates",
+        "version=1",
+        f"nRows={n}",
+        f"nColumns={len(columns)}",
+        f"inDegrees={'yes' if degrees else 'no'}",
+        "",
+        "endheader",
         "\t".join(["time", *angles]),
-    ]  # fmt: skip
+    ]
     rows = ("\t".join(f"{value:.9f}" for value in row) for row in np.column_stack(columns))
     return "\n".join([*head, *rows]) + "\n"
 

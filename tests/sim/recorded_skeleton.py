@@ -38,11 +38,10 @@ _SIDE = (
 _CENTRES = dict(
     zip(
         TRACK_NAMES,
-        ("Hips", "Neck", "RightArm", "RightForeArm", "RightHand", "LeftArm", "LeftForeArm",
-         "LeftHand"),
+        "Hips Neck RightArm RightForeArm RightHand LeftArm LeftForeArm LeftHand".split(),
         strict=True,
     )
-)  # fmt: skip
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -134,8 +133,8 @@ def skeleton(who: Person) -> tuple[str, Vec]:
         in_file = Rotation.from_matrix(axes[parent] @ turn @ axes[role].T)
         with warnings.catch_warnings(action="ignore"):  # where two axes are in line
             columns.append(in_file.as_euler("ZXY", degrees=True))
-        for child, way in children.get(role, []):
-            write(child, way, role, depth + 1)
+        for child, offset in children.get(role, []):
+            write(child, offset, role, depth + 1)
         lines.append(f"{pad}}}")
 
     write("Hips", (0.0, 0.0, 0.0), "", 0)

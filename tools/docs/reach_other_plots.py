@@ -129,8 +129,9 @@ def _trackers(axis: Axes, result: Json) -> None:
     rows = result["results"]
     for k, row in enumerate(rows):
         axis.barh(-k, row["collision"]["mean"], color=RED, height=0.6)
-        axis.barh(-k, row["timeout"]["mean"], left=row["collision"]["mean"], color=GREY,
-                  height=0.6)  # fmt: skip
+        axis.barh(
+            -k, row["timeout"]["mean"], left=row["collision"]["mean"], color=GREY, height=0.6
+        )
         fails = 1.0 - row["success"]["mean"]
         axis.text(fails, -k, f" {100.0 * row['success']['mean']:.1f} %", va="center")
     axis.set_yticks(
@@ -167,8 +168,10 @@ def _episode(axes: Sequence[Axes], result: Json, first: bool) -> None:
         axes[1].plot(t, qd[:, joint], color=colour)
         style = "steps-pre" if degree == 2 else "default"
         axes[2].plot(t, qdd[:, joint], color=colour, drawstyle=style, lw=0.9)
-    for axis, limit in ((axes[1], row["speed_limit_rad_s"]),
-                        (axes[2], row["acceleration_limit_rad_s2"])):  # fmt: skip
+    for axis, limit in (
+        (axes[1], row["speed_limit_rad_s"]),
+        (axes[2], row["acceleration_limit_rad_s2"]),
+    ):
         for value in (-limit, limit):
             axis.axhline(value, color=RED, lw=0.9, ls=":")
         axis.set_ylim(-1.12 * limit, 1.12 * limit)
@@ -205,8 +208,15 @@ def curves(found: Sequence[Json]) -> Figure:
             rates = [point[kind] for point in points]
             axis.plot(minutes, rates, color=colour, lw=1.1, alpha=0.85, label=shown)
     left.axhline(THESIS_SUCCESS, color=RED, lw=0.9, ls=":")
-    left.text(0.98, THESIS_SUCCESS - 0.01, "thesis, after 47 h", color=RED, va="top",
-              ha="right", transform=left.get_yaxis_transform())  # fmt: skip
+    left.text(
+        0.98,
+        THESIS_SUCCESS - 0.01,
+        "thesis, after 47 h",
+        color=RED,
+        va="top",
+        ha="right",
+        transform=left.get_yaxis_transform(),
+    )
     left.set(title="Success", ylim=(0.0, 1.02))
     right.set(title="Collisions", ylim=(0.0, None))
     for axis in (left, right):

@@ -194,9 +194,18 @@ class PrioritisedReplay(ReplayBuffer):
         draw(self._tree, self._rng, leaves, chances)
         size = self.buffer_size if self.full else self.pos
         sum_returns(
-            leaves, self.n_envs, self.pos, self._n_steps, self._gamma,
-            self.rewards, self.dones, self.timeouts, returns, discounts, last,
-        )  # fmt: skip
+            leaves,
+            self.n_envs,
+            self.pos,
+            self._n_steps,
+            self._gamma,
+            self.rewards,
+            self.dones,
+            self.timeouts,
+            returns,
+            discounts,
+            last,
+        )
         rows, envs = leaves // self.n_envs, leaves % self.n_envs
         weights = (size * self.n_envs * chances) ** -beta
         return ReplaySamples(

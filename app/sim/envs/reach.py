@@ -80,7 +80,7 @@ class ReachEnv(SingleEnv):
     | group | size | content |
     |-------|------|---------|
     | arrival | 1 | time to the goal of the base motion [s] |
-    | way_clearance | 9 | clearance along it in 0.04 to 1.28 s, and the least [0.2 m], -1 to 2 |
+    | base_clearance | 9 | clearance along it in 0.04 to 1.28 s, the least [0.2 m], -1 to 2 |
     | aside_clearance | 4 x 9 | the same at rest, toward home, and to either side of home |
     | goal_gap_ahead | 8 | distance of person and goal at these times [0.5 m] |
     | radius_ahead | 8 | change of the person's radius [0.2 m] |

@@ -8,7 +8,7 @@ from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 from app.sim.envs.raycast import Image
-from app.sim.envs.tasks import Task, check_render_mode, next_episode
+from app.sim.envs.tasks import BatchTask, check_render_mode, next_episode
 
 ROW = np.zeros(1, dtype=np.int64)
 
@@ -27,7 +27,7 @@ class SingleEnv(gymnasium.Env[NDArray[Any], Any]):
         InvalidInput: The render mode is unknown.
     """
 
-    def __init__(self, task: Task, render_mode: str | None, render_fps: int) -> None:
+    def __init__(self, task: BatchTask, render_mode: str | None, render_fps: int) -> None:
         self._task = task
         self.action_space, self.observation_space = task.action_space, task.observation_space
         self.render_mode = check_render_mode(render_mode)

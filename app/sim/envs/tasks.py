@@ -100,7 +100,7 @@ class SteppedTask(Protocol):
         """Return which of these outcomes truncate an episode, shape (n_envs,)."""
 
 
-class Task(SteppedTask, Protocol):
+class BatchTask(SteppedTask, Protocol):
     """A batch with its spaces, infos and images."""
 
     @property

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from app.errors import InvalidInput
 from app.sim.envs.raycast import Image
-from app.sim.envs.tasks import Mask, Task, check_render_mode, next_episode
+from app.sim.envs.tasks import BatchTask, Mask, check_render_mode, next_episode
 
 MODES = tuple(mode.value for mode in AutoresetMode)
 Steps = tuple[NDArray[Any], NDArray[np.float64], Mask, Mask, dict[str, Any]]
@@ -50,7 +50,7 @@ class BatchVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
 
     def __init__(
         self,
-        task: Task,
+        task: BatchTask,
         render_mode: str | None,
         render_fps: int,
         autoreset_mode: str | AutoresetMode,

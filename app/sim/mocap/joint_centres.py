@@ -25,8 +25,6 @@ TRACK_NAMES = (
 )
 """The joint centres that the 18 angles are found from."""
 PELVIS, NECK, SHOULDER_R, ELBOW_R, WRIST_R, SHOULDER_L, ELBOW_L, WRIST_L = range(8)
-ARM_POINTS = (ELBOW_R, WRIST_R, ELBOW_L, WRIST_L)
-"""The points by which the error of an import is measured."""
 MEASURED = (
     "trunk",
     "clavicle_r",

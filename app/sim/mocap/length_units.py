@@ -1,7 +1,7 @@
 """The unit of a recorded skeleton, and whether the root's path is in the same.
 
-The unit is that in which the person is of a person's stature. With legs, the stature is told by
-the length from ankle to neck; without, by the median of trunk, clavicles, upper arms and
+The unit is that in which the person is of a person's stature. With legs, the stature is found
+from the length from ankle to neck; without, by the median of trunk, clavicles, upper arms and
 forearms. The parts have to be a person's in proportion. Where two units fit, the file is
 refused: a child in inches measures as much as a giant in CMU's units.
 
@@ -78,7 +78,7 @@ class Stature:
     """From the floor to the top of the head [the file's unit]."""
     doubt: float
     """How far it may be off, relative."""
-    told_by: str
+    basis: str
     """Lengths that it is found from."""
 
 
@@ -122,10 +122,10 @@ def find_stature(lengths: Mapping[str, float]) -> Stature:
         head = lengths.get("head", 0.0)
         if HEAD[0] * value <= head <= HEAD[1] * value:
             value = (value + (leg + lengths["hips_to_neck"] + head) / ANKLE_TO_CROWN) / 2.0
-        return Stature(value=value, doubt=DOUBT_WITH_LEGS, told_by="ankle to neck")
+        return Stature(value=value, doubt=DOUBT_WITH_LEGS, basis="ankle to neck")
     each = [lengths[name] / SHARES[_part(name)] for name in lengths if _part(name) in SHARES]
-    value, told_by = float(np.median(each)), "trunk and arms"
-    return Stature(value=value, doubt=DOUBT_WITHOUT, told_by=told_by)
+    value, basis = float(np.median(each)), "trunk and arms"
+    return Stature(value=value, doubt=DOUBT_WITHOUT, basis=basis)
 
 
 def find_unit(stature: Stature) -> str:
@@ -139,7 +139,7 @@ def find_unit(stature: Stature) -> str:
     fits = [unit for unit in UNITS if low <= tall[unit] <= high]
     if len(fits) == 1:
         return fits[0]
-    place, value = f"unit of the skeleton: stature by {stature.told_by}", f"{stature.value:.4g}"
+    place, value = f"unit of the skeleton: stature by {stature.basis}", f"{stature.value:.4g}"
     if fits:
         named = " and ".join(f"{unit} ({tall[unit]:.2f} m tall)" for unit in fits)
         hint = f"state unit = {' or '.join(fits)}"
@@ -168,7 +168,7 @@ def require_proportions(lengths: Mapping[str, float], stature: Stature, unit: st
         low, high = PROPORTIONS[_part(name)]
         if not low * stature.value <= length <= high * stature.value:
             rule = f"must be {low * tall:.3f} to {high * tall:.3f} m long for a stature of "
-            rule += f"{tall:.2f} m, by {stature.told_by}, in {unit}"
+            rule += f"{tall:.2f} m, by {stature.basis}, in {unit}"
             raise _bad(name, f"{metres(unit) * length:.3f} m", rule)
     low, high = FOREARM_TO_UPPER_ARM
     for side in ("_r", "_l"):

@@ -35,11 +35,11 @@ def without_repeats(bvh: Bvh) -> tuple[Bvh, str]:
         return bvh, ""
     step, kept = found
     dt = check_dt(step * bvh.dt, "frames repeat, and the time between those that do not")
-    told = (
+    note = (
         f"frames repeat, real rate {1.0 / dt:.4g} Hz (written at {1.0 / bvh.dt:.4g} Hz): "
         f"{len(bvh.values)} frames are read, and counted, as {len(kept)} at the real rate"
     )
-    return replace(bvh, dt=dt, values=bvh.values[kept]), told
+    return replace(bvh, dt=dt, values=bvh.values[kept]), note
 
 
 def _whole_step(changes: Frames, n: int) -> tuple[float, Frames] | None:

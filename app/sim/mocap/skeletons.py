@@ -2,7 +2,7 @@
 
 Names say which joint is which (``joint_names.py``), the person's stature the unit
 (``length_units.py``), rest pose, legs and trunk the axis that points up (``up_axis.py``).
-What a caller states goes before what is found; what was decided is told as a
+What a caller states goes before what is found; and what was decided is returned as a
 :class:`~app.sim.mocap.read_options.Reading`.
 """
 

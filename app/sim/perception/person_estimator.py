@@ -214,7 +214,7 @@ class PersonEstimator:
         Args:
             t: Time of the frame [s], later than the previous one.
             frame: Key-points.
-            fresh: Whether the frame shows another person, for whom the state is reset.
+            fresh: Whether the frame shows another person; the state is then reset.
 
         Raises:
             InvalidInput: ``t`` is not later than the previous time; the state is unchanged.

@@ -1,8 +1,8 @@
 """Joint configurations that bring the tool to a target: the goals of the planners.
 
-With the tool pointing down, the closed form of ``robot/kernels/kinematics.py`` gives the
-configuration that training uses. For any tilt, damped least squares from random starts
-(Pinocchio) finds several, among which a planner may choose.
+Damped least squares from random starts
+(Pinocchio) finds several configurations of any tilt, among which a planner may
+choose.
 """
 
 import numpy as np
@@ -20,12 +20,6 @@ CLOSE = 1e-4
 """Distance of tcp and target at which the iteration ends [m]."""
 APART = 0.1
 """Configurations nearer than this count as one [rad]."""
-
-
-def vertical_configuration(arm: Arm, target: Vec) -> Vec:
-    """Return the configuration with the tool down at ``target`` [m], shape (0 or 1, 6)."""
-    q = Robot(arm.lengths.tool).ik_vertical(target, arm.limits.q_min, arm.limits.q_max)
-    return np.zeros((0, 6)) if q is None else q[None]
 
 
 def goal_configurations(

@@ -97,10 +97,6 @@ class MotionPlan:
     """Postures joined by straight motions [rad], shape (n, 6); n = 0 without a path."""
     goal: int
     """Index of the reached goal; -1 where none is reached."""
-    length_rad: float
-    """Length of the path [rad]."""
-    first_length_rad: float
-    """Its length before shortening [rad]."""
     planning_s: float
     """Wall time spent [s]."""
     n_poses: int
@@ -159,7 +155,7 @@ def plan(
         found.outcome != "solved" or path_length(found.path) > path_length(straight)
     ):
         return clock.answer("solved", straight, goals)
-    return clock.answer(found.outcome, found.path, goals, found.first_length)
+    return clock.answer(found.outcome, found.path, goals)
 
 
 def planning_limits(checker: Checker, start: Vec) -> tuple[Vec, Vec]:
@@ -196,25 +192,18 @@ class _Clock:
         return time.perf_counter() - self._start >= share * search
 
     def answer(
-        self,
-        outcome: str,
-        path: Vec | None = None,
-        goals: Vec | None = None,
-        first: float | None = None,
+        self, outcome: str, path: Vec | None = None, goals: Vec | None = None
     ) -> MotionPlan:
         """Return the plan with the time and poses spent so far."""
         path = np.zeros((0, 6)) if path is None else path
         goal = -1
         if outcome == "solved" and goals is not None:
             goal = int(np.argmin(np.linalg.norm(goals - path[-1], axis=1)))
-        length = path_length(path)
         return MotionPlan(
             outcome=outcome,
             planner=self._settings.planner,
             path=path,
             goal=goal,
-            length_rad=length,
-            first_length_rad=length if first is None else first,
             planning_s=time.perf_counter() - self._start,
             n_poses=self._checker.n_poses - self._n0,
         )
@@ -222,11 +211,10 @@ class _Clock:
 
 @dataclass(frozen=True, slots=True)
 class _Found:
-    """What OMPL found: one of OUTCOMES, the path [rad], its length unshortened [rad]."""
+    """Result of OMPL: one of OUTCOMES and the path [rad]."""
 
     outcome: str
     path: Vec
-    first_length: float
 
 
 class _Query:
@@ -280,14 +268,13 @@ class _Query:
         algorithm.solve(ob.PlannerTerminationCondition(lambda: self._watch(share)))
         found = self._problem.getSolutionPath()
         if found is None:
-            return _Found("out-of-time", np.zeros((0, 6)), 0.0)
+            return _Found("out-of-time", np.zeros((0, 6)))
         if not self._problem.hasExactSolution():
             path = self._rows(found)
             if path_length(path) <= SAME or not self._checker.path_free(path):
-                return _Found("out-of-time", np.zeros((0, 6)), 0.0)
-            return _Found("approximate", path, path_length(path))
+                return _Found("out-of-time", np.zeros((0, 6)))
+            return _Found("approximate", path)
         self._keep(found)
-        first = self._kept[-1][0]
         if found.getStateCount() > 2 and not self._clock.over():
             over = ob.PlannerTerminationCondition(self._clock.over)
             og.PathSimplifier(self._info).simplify(found, over, False)
@@ -295,8 +282,8 @@ class _Query:
         for _, path in sorted(self._kept, key=lambda kept: kept[0]):
             # Ours is the last word: AORRTC may also end with a path of length 0 at the start.
             if self._reaches(path) and self._checker.path_free(path):
-                return _Found("solved", path, first)
-        return _Found("out-of-time", np.zeros((0, 6)), 0.0)
+                return _Found("solved", path)
+        return _Found("out-of-time", np.zeros((0, 6)))
 
     def _watch(self, share: float) -> bool:
         """Tell whether the planner's part of the budget is spent; keep what it has found.

@@ -30,9 +30,6 @@ from app.sim.robot.kernels import acceleration_bounds as polynomial
 from app.sim.robot.kernels.arm import Arm
 from app.sim.robot.kernels.joints import JointState
 
-STATES = ("waiting", "following", "braking", "arrived", "lost")
-"""``waiting``: no plan, at rest or braking to rest. ``braking``: slows down along a path that
-is blocked. ``lost``: farther from the path than ``lost_rad``, braking to rest."""
 REPLAN_BUDGET_S = {"plan-once": 0.0, "replan-on-blocked": 0.2, "replan-every-cycle": 0.02}
 """Budget of later plans by role [s]; ours."""
 REDUCTION = 0.005
@@ -69,9 +66,10 @@ class ReplanningReport:
     """Report of an executor, updated every period."""
 
     state: str = "waiting"
-    """One of STATES."""
+    """``waiting`` (no plan, at rest or braking), ``following``, ``braking`` (path
+    blocked), ``arrived``, or ``lost`` (farther from the path than ``lost_rad``, braking)."""
     outcome: str = ""
-    """Outcome of the last plan, one of ``planners.OUTCOMES``; empty before the first."""
+    """Outcome of the last plan, one of ``ompl_planners.OUTCOMES``; empty before the first."""
     n_plans: int = 0
     """Number of plans."""
     n_solved: int = 0

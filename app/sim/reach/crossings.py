@@ -114,31 +114,6 @@ def tcp_at_home(cell: Cell) -> Vec:
     return np.asarray(robot.tcp_pose(np.array(cell.robot.home_q))[:3, 3])
 
 
-def crossing_time(track: Vec, start: Vec, goal: Vec, dt: float) -> float:
-    """Return when the axis first crosses a segment in plan view [s]; infinity if never.
-
-    Args:
-        track: x, y at the ends of control cycles [m], shape (n + 1, >= 2).
-        start: Start of the segment [m], shape (>= 2,).
-        goal: Its end [m], shape (>= 2,).
-        dt: Control cycle [s].
-    """
-    segment = goal[:2] - start[:2]
-    square = float(segment @ segment)
-    if square <= 0.0:
-        return math.inf
-    offset = track[:, :2] - start[:2]
-    side = (segment[0] * offset[:, 1] - segment[1] * offset[:, 0]) / square
-    side[np.abs(side) < ON_LINE] = 0.0
-    along = offset @ segment / square
-    before, after = side[:-1], side[1:]
-    for k in np.flatnonzero((before * after <= 0.0) & (before != after)):
-        part = before[k] / (before[k] - after[k])
-        if 0.0 < along[k] + part * (along[k + 1] - along[k]) < 1.0:
-            return float((k + part) * dt)
-    return math.inf
-
-
 def covered(track: Vec, start: Vec, goal: Vec) -> NDArray[np.bool_]:
     """Return when a cylinder covers part of a segment in plan view, shape (n + 1,).
 

@@ -47,9 +47,13 @@ def _region(
     name: str, force: float, pressure: float, transient: float, stiffness: float, mass: float
 ) -> Region:
     return Region(
-        name=name, force=force, pressure=pressure, transient=transient, stiffness=stiffness,
+        name=name,
+        force=force,
+        pressure=pressure,
+        transient=transient,
+        stiffness=stiffness,
         mass=mass,
-    )  # fmt: skip
+    )
 
 
 REGIONS = {

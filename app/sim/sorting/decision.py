@@ -44,7 +44,7 @@ def decide(
     """Choose the next move.
 
     Args:
-        policy: Who decides as a rule; None leaves it to the planner.
+        policy: Policy that decides as a rule; None: the planner decides.
         state: The task now; ``sorting_state.check_state`` accepts it.
         shape: How large the task is.
         watch: ``watch`` of the decision before, in the same task; None at its beginning.

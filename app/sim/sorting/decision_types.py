@@ -11,7 +11,7 @@ from app.sim.sorting.progress_monitor import ProgressMonitor
 from app.sim.sorting.state import Move
 
 By = Literal["policy", "planner"]
-"""Who decided."""
+"""Decision maker."""
 Why = Literal[
     "policy",
     "solved",
@@ -73,7 +73,7 @@ class SortingDecision:
     move: Move | None
     """The move chosen."""
     by: By
-    """Who decided."""
+    """Decision maker."""
     why: Why
     """Why it was this one."""
     ranked: tuple[RankedMove, ...]

@@ -326,9 +326,11 @@ def test_whatever_numbers_come_the_answer_is_an_answer_or_a_named_problem(
     for _ in range(80):
         body = json.loads(json.dumps({**TASK, "people": [WALKER, STANDING]}))
         places = [
-            (body["robot"]["q"], 6), (body["robot"]["qd"], 6), (body["goal"], 3),
+            (body["robot"]["q"], 6),
+            (body["robot"]["qd"], 6),
+            (body["goal"], 3),
             (body["people"][1]["q"], 18),
-        ]  # fmt: skip
+        ]
         for _ in range(rng.integers(1, 3)):
             where, n = places[rng.integers(len(places))]
             where[rng.integers(n)] = strange[rng.integers(len(strange))]

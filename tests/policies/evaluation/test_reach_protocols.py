@@ -20,10 +20,11 @@ from tests.policies.untrained import shipped_as, untrained_reach
 N = 24
 EPISODES = {"reach-targets": 2}
 """Episodes of each target; of other protocols N."""
-MEASURED = sorted(name for name in OF_REACHING if name in {
-    "reach-targets", "reach-random", "reach-constant", "reach-speeds", "reach-smoothness",
-    "reach-people", "reach-tracker",
-})  # fmt: skip
+MEASURED = sorted(
+    f"reach-{name}"
+    for name in "targets random constant speeds smoothness people tracker".split()
+    if f"reach-{name}" in OF_REACHING
+)
 
 
 @pytest.fixture(autouse=True)
@@ -126,8 +127,10 @@ def test_people_of_a_given_speed_walk_at_it() -> None:
         own = cell.cylinders[0]
         assert (person.kind, person.speed) == ("fixed-speed", speed)
         assert (person.x_min, person.height, person.p_still) == (
-            own.x_min, own.height, own.p_still,
-        )  # fmt: skip
+            own.x_min,
+            own.height,
+            own.p_still,
+        )
 
 
 def test_a_row_per_tracker_stands_beside_the_exact_state() -> None:

@@ -275,7 +275,7 @@ def test_improved_actions_stay_in_range_beside_several_people(people: tuple[str,
 
 
 def test_every_candidate_has_a_name() -> None:
-    assert len(CANDIDATES) == len(set(CANDIDATES)) == candidates.N_CANDIDATES
+    assert len(CANDIDATES) == len(set(CANDIDATES)) == candidates.N_DETERMINISTIC + 1
     assert CANDIDATES[candidates.STRAIGHT_CANDIDATE] == "straight"
     assert CANDIDATES[0] == "home-0.08s"
     assert CANDIDATES[-2:] == ("bang-bang-bbb-0.6s", "sampled")

@@ -100,7 +100,7 @@ def test_mistake_is_one_fault_with_place_and_reason(edit: Edit, place: str, text
     assert text in faults[0].text
 
 
-def test_all_mistakes_are_told_at_once() -> None:
+def test_all_mistakes_are_reported_at_once() -> None:
     def edit(cell: dict[str, Any]) -> None:
         cell["robot"]["dt"] = 50.0
         cell["stations"][0]["position"] = [-500.0, 0.7, 0.12]

@@ -118,7 +118,7 @@ def test_unknown_cells_cells_without_towers_and_unknown_actions_are_refused() ->
 
 
 def plain_as(state: SortingState, fail: float) -> PlainSorting:
-    """A plain environment in a state, whose picks from the clutter fail as told."""
+    """A plain environment in a state, whose picks from the clutter fail as given."""
     k, c = state.clutter.size, len(state.towers)
     env = PlainSorting(np.full(k, fail), c)
     env.reset(seed=0)

@@ -132,9 +132,9 @@ def test_impossible_targets_give_a_posture_inside_the_limits(target: list[float]
 def test_dragging_both_hands_moves_the_person_without_jumps() -> None:
     cell = load_cell()
     q = human.rest_posture(*cell.human.home)
-    way, previous = np.linspace(0.0, 1.0, 200)[:, None], None
-    rights = [-0.15, 1.1, 0.2] + way * ([0.25, 0.75, 0.1] - np.array([-0.15, 1.1, 0.2]))
-    lefts = [0.2, 1.1, 0.3] + way * ([0.45, 0.85, 0.2] - np.array([0.2, 1.1, 0.3]))
+    share, previous = np.linspace(0.0, 1.0, 200)[:, None], None
+    rights = [-0.15, 1.1, 0.2] + share * ([0.25, 0.75, 0.1] - np.array([-0.15, 1.1, 0.2]))
+    lefts = [0.2, 1.1, 0.3] + share * ([0.45, 0.85, 0.2] - np.array([0.2, 1.1, 0.3]))
     for right, left in zip(rights, lefts, strict=True):
         q = human.solve_hands(q, SIZE, right=right, left=left).q
         points = human.joint_points(q, SIZE)

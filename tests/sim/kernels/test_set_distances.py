@@ -1,9 +1,9 @@
 """Distances of robot and person in 20,000 random configurations of the cell.
 
-Every one of the 144 pairs is held against plain numpy. python-fcl is asked about all of them in
-the first 1000 configurations and about the nearest one in all; the slow test asks it about all
-of them in all. FCL's search for distances ends early on round bodies; ``fcl_capsules.py`` says
-what is asked instead there.
+All 144 pairs are compared with plain numpy. python-fcl checks all of them in the first 1000
+configurations and the nearest one in each; the slow test checks all of them everywhere. FCL's
+search for distances ends early on round bodies; ``fcl_capsules.py`` says what is asked instead
+there.
 """
 
 import numpy as np

@@ -17,19 +17,19 @@ from tests.sim.recorded_person import working
 DT = 0.01
 
 
-def points_of_somebody(n: int = 600) -> tuple[Vec, Vec]:
+def points_of_person(n: int = 600) -> tuple[Vec, Vec]:
     q = working(n, DT)
     return DT * np.arange(n), model_points(q, np.full(n, 0.9), BodySize())
 
 
-def test_person_at_work_has_no_glitch_and_is_one_run() -> None:
-    times, points = points_of_somebody()
+def test_person_at_work_has_no_artifact_and_is_one_run() -> None:
+    times, points = points_of_person()
     assert find_artifacts(times, points) == ()
     assert clean_runs(times, ()) == ((0, 599),)
 
 
 def test_marker_that_leaps_for_some_frames_is_named_and_cut_out() -> None:
-    times, points = points_of_somebody()
+    times, points = points_of_person()
     points[250:256, WRIST_R] += [0.0, 0.8, 0.0]
     (artifact,) = find_artifacts(times, points)
     assert (artifact.first, artifact.last) == (249, 256)
@@ -41,7 +41,7 @@ def test_marker_that_leaps_for_some_frames_is_named_and_cut_out() -> None:
 
 
 def test_parts_stand_in_the_order_of_their_speed() -> None:
-    times, points = points_of_somebody()
+    times, points = points_of_person()
     points[300, WRIST_L] += 0.09
     points[300, ELBOW_L] += 0.04
     (artifact,) = find_artifacts(times, points)
@@ -61,7 +61,7 @@ def test_speed_just_below_the_limit_is_clean() -> None:
 
 
 def test_hole_in_the_times_parts_two_runs() -> None:
-    times, points = points_of_somebody()
+    times, points = points_of_person()
     times = times + np.where(np.arange(600) >= 300, 0.5, 0.0)
     (artifact,) = find_artifacts(times, points)
     assert (artifact.first, artifact.last, artifact.parts) == (299, 300, ("time",))
@@ -69,26 +69,26 @@ def test_hole_in_the_times_parts_two_runs() -> None:
     assert [b - a for a, b in clean_runs(times, [artifact])] == [293, 293]
 
 
-def test_missing_values_stand_among_glitches_in_frames_of_the_file() -> None:
-    times, points = points_of_somebody(200)
+def test_missing_values_are_listed_among_artifacts_in_frames_of_the_file() -> None:
+    times, points = points_of_person(200)
     frames = np.delete(np.arange(200), range(60, 90))
     missing = Artifact(first=60, last=89, parts=("elbow_r",), speed=0.0, reason="no value")
     points[150:152, WRIST_R] += 0.8
     found = find_artifacts(times[frames], points[frames])
     assert [one.parts[0] for one in found] == ["time", "wrist_r"]
-    told = merged(found, [missing], frames)
-    assert [(one.first, one.last) for one in told] == [(60, 89), (149, 152)]
+    spans = merged(found, [missing], frames)
+    assert [(one.first, one.last) for one in spans] == [(60, 89), (149, 152)]
 
 
-def test_hole_without_missing_values_is_told_as_before() -> None:
-    times, points = points_of_somebody(200)
+def test_hole_without_missing_values_is_reported_as_before() -> None:
+    times, points = points_of_person(200)
     times = times + np.where(np.arange(200) >= 100, 0.5, 0.0)
     found = find_artifacts(times, points)
     assert merged(found, (), np.arange(200)) == found
 
 
 def test_runs_shorter_than_a_second_are_dropped() -> None:
-    times, points = points_of_somebody()
+    times, points = points_of_person()
     points[[200, 280], WRIST_R] += 0.5
     runs = clean_runs(times, find_artifacts(times, points))
     assert runs == ((0, 193), (287, 599))

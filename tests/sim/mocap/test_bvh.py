@@ -96,9 +96,9 @@ def test_braces_and_line_ends_may_stand_as_they_like() -> None:
 )
 def test_fault_is_named_with_its_line(old: str, new: str, place: str, text: str) -> None:
     assert old in ARM
-    told = fault(ARM.replace(old, new, 1))
-    assert told.startswith(place)
-    assert text in told
+    message = fault(ARM.replace(old, new, 1))
+    assert message.startswith(place)
+    assert text in message
 
 
 @pytest.mark.parametrize(
@@ -112,8 +112,8 @@ def test_fault_is_named_with_its_line(old: str, new: str, place: str, text: str)
 )
 def test_commas_are_named(old: str, new: str, place: str, hint: str) -> None:
     assert old in ARM
-    told = fault(ARM.replace(old, new, 1))
-    assert told.startswith(place) and hint in told
+    message = fault(ARM.replace(old, new, 1))
+    assert message.startswith(place) and hint in message
 
 
 @pytest.mark.parametrize("name", ["Bip01 L UpperArm", "arm (left)", "a  b"])
@@ -129,14 +129,14 @@ def test_name_of_a_joint_may_have_several_words(name: str) -> None:
         assert [one.name for one in read.joints][1] == " ".join(name.split())
 
 
-def test_brace_that_is_missing_is_told_rather_than_read_as_a_name() -> None:
+def test_missing_brace_is_reported_rather_than_read_as_a_name() -> None:
     lines = ARM.splitlines()
     at = next(k for k, line in enumerate(lines) if "JOINT" in line)
     del lines[at + 1]
     assert "'OFFSET' must be {" in fault("\n".join(lines))
 
 
-def test_all_faulty_lines_are_told_at_once() -> None:
+def test_all_faulty_lines_are_reported_at_once() -> None:
     lines = PERSON.splitlines()
     lines[FIRST - 1] += " 7"
     lines[FIRST + 1] = "1 2"

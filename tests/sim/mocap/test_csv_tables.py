@@ -56,16 +56,16 @@ def test_fault_is_named_with_line_or_column(old: str, new: str, text: str) -> No
 
 
 def test_table_in_radians_that_says_degrees_is_refused() -> None:
-    told = fault(csv_text(Q, degrees=False).replace("= radians", "= degrees"))
-    assert "looks like radians" in told
+    message = fault(csv_text(Q, degrees=False).replace("= radians", "= degrees"))
+    assert "looks like radians" in message
 
 
 def test_pelvis_in_millimetres_is_refused() -> None:
     q = Q.copy()
     q[:, :2] *= 1000.0
-    told = fault(csv_text(q))
-    assert told.startswith("column pelvis_x")
-    assert "looks like millimetres" in told
+    message = fault(csv_text(q))
+    assert message.startswith("column pelvis_x")
+    assert "looks like millimetres" in message
 
 
 def test_times_in_milliseconds_are_refused() -> None:

@@ -122,8 +122,8 @@ def test_row_that_lacks_a_value_is_left_out_and_named(word: str, name: str) -> N
     np.testing.assert_array_equal(track.frames, left)
     np.testing.assert_allclose(track.q, Q[left], atol=1e-8)
     np.testing.assert_allclose(track.times, 0.02 * left)
-    told = [(one.first, one.last, one.parts) for one in track.missing]
-    assert told == [(10, 11, (name,)), (20, 20, (name,))]
+    spans = [(one.first, one.last, one.parts) for one in track.missing]
+    assert spans == [(10, 11, (name,)), (20, 20, (name,))]
     assert track.missing[0].reason == f"no value of {name}"
 
 
@@ -157,9 +157,9 @@ def test_column_that_is_nearly_known_is_named(old: str, new: str, text: str) -> 
 def test_thousands_separators_are_refused_with_a_hint(word: str) -> None:
     lines = semicolons().splitlines()
     lines[5] = word + lines[5][lines[5].index(";") :]
-    told = fault("\n".join(lines))
-    assert told.startswith(f"line 6, column time = {word!r} must be a number")
-    assert "without thousands separators" in told
+    message = fault("\n".join(lines))
+    assert message.startswith(f"line 6, column time = {word!r} must be a number")
+    assert "without thousands separators" in message
 
 
 @pytest.mark.parametrize("word", ["1,234.5", "1,234"])
@@ -169,20 +169,22 @@ def test_thousands_separators_beside_decimal_points_are_refused(word: str) -> No
     assert "without thousands separators" in fault("\n".join(lines))
 
 
-def test_decimal_commas_between_commas_are_told() -> None:
-    told = fault(each_row(lambda line: line.replace(".", ",")))
-    assert "line 3 = <38> must hold 19 values" in told and "decimal commas?" in told
+def test_decimal_commas_between_commas_are_reported() -> None:
+    message = fault(each_row(lambda line: line.replace(".", ",")))
+    assert "line 3 = <38> must hold 19 values" in message and "decimal commas?" in message
 
 
-def test_index_that_has_no_place_among_the_names_is_told() -> None:
-    told = fault(TEXT.replace("\n0.", "\n7,0."))
-    assert "line 3 = <20> must hold 19 values" in told and "a column without a name?" in told
+def test_index_column_without_a_name_is_reported() -> None:
+    message = fault(TEXT.replace("\n0.", "\n7,0."))
+    assert (
+        "line 3 = <20> must hold 19 values" in message and "a column without a name?" in message
+    )
 
 
 @pytest.mark.parametrize("word", ["inf", "1e300", "-Infinity"])
 def test_number_that_is_not_finite_is_no_missing_value(word: str) -> None:
-    told = fault(TEXT.replace("\n0.020000000,", f"\n{word},"))
-    assert f"line 4, column time = {word!r} must be a finite number" in told
+    message = fault(TEXT.replace("\n0.020000000,", f"\n{word},"))
+    assert f"line 4, column time = {word!r} must be a finite number" in message
 
 
 def test_column_without_any_value_is_named() -> None:

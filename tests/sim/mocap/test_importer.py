@@ -72,7 +72,7 @@ def test_rows_without_a_value_are_cut_out_and_named() -> None:
     assert np.diff(run.times).max() == pytest.approx(0.06)
 
 
-def test_long_gap_of_values_parts_two_runs_and_is_told_once() -> None:
+def test_long_gap_of_values_separates_two_runs_and_is_reported_once() -> None:
     found = read_motion(without_values(90, 110, "").encode(), "someone.csv")
     (gap,) = found.artifacts
     assert (gap.first, gap.last) == (90, 110)
@@ -89,7 +89,7 @@ def test_rows_without_a_value_at_both_ends_count_as_frames() -> None:
     assert (found.spans, found.n_frames) == (((10, 194),), 200)
 
 
-def test_leap_after_missing_values_is_told_in_frames_of_the_file() -> None:
+def test_leap_after_missing_values_is_reported_in_frames_of_the_file() -> None:
     lines = without_values(20, 22).splitlines()
     cells = lines[150 + 2].split(",")
     cells[1] = "9.0"
@@ -133,7 +133,7 @@ def test_error_without_the_pelvis_height_is_how_far_the_person_ducks() -> None:
     assert found.wrists_at_fixed_height.worst == pytest.approx(0.198, abs=2e-3)
 
 
-def test_person_of_another_size_keeps_the_angles_and_the_difference_is_told() -> None:
+def test_person_of_another_size_keeps_the_angles_and_the_difference_is_reported() -> None:
     text = bvh_text(working(200), unit=0.001 / 1.1)  # read as mm: a tenth larger
     found = read_motion(text.encode(), "someone.bvh")
     assert found.size.forearm_r == pytest.approx(0.286)

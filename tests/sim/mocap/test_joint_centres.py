@@ -16,9 +16,14 @@ def test_points_are_those_of_the_compiled_person() -> None:
 
 def test_lengths_are_measured_from_the_points() -> None:
     size = BodySize(
-        trunk=0.5, clavicle_r=0.15, clavicle_l=0.16, upper_arm_r=0.30, upper_arm_l=0.31,
-        forearm_r=0.25, forearm_l=0.24,
-    )  # fmt: skip
+        trunk=0.5,
+        clavicle_r=0.15,
+        clavicle_l=0.16,
+        upper_arm_r=0.30,
+        upper_arm_l=0.31,
+        forearm_r=0.25,
+        forearm_l=0.24,
+    )
     q = np.random.default_rng(2).uniform(Q_MIN, Q_MAX, (5, 18))
     measured = measure(model_points(q, np.zeros(5), size)).lengths()
     np.testing.assert_allclose(list(measured.values()), list(size.lengths().values()))

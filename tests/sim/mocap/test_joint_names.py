@@ -81,7 +81,7 @@ def test_names_of_other_tools_are_known(named: Callable[[str], str]) -> None:
     assert reading.names["toe_r"] == named("RightToeBase")
 
 
-def test_every_joint_that_is_read_is_told() -> None:
+def test_every_joint_that_is_read_is_reported() -> None:
     _, reading = body_track(read_bvh(skeleton(Person())[0]))
     assert reading.names["pelvis"] == "Hips"
     assert reading.names["knee_r"] == "RightLeg"
@@ -134,16 +134,16 @@ def test_joints_of_any_name_can_be_stated() -> None:
 
 
 @pytest.mark.parametrize(
-    ("stated", "told"),
+    ("stated", "message"),
     [
         ({"Hip": "pelvis"}, "joint of pelvis = 'Hip' must be the name of a joint of the file"),
         ({"Hips": "pelviss"}, "name of 'Hips' = 'pelviss' must be the name of one of our"),
     ],
 )
 def test_stated_name_that_is_none_is_refused_with_the_nearest(
-    stated: dict[str, str], told: str
+    stated: dict[str, str], message: str
 ) -> None:
     with pytest.raises(BadRecording) as caught:
         body_track(read_bvh(skeleton(Person())[0]), ReadOptions(names=stated))
-    assert caught.value.faults[0].text.startswith(told)
+    assert caught.value.faults[0].text.startswith(message)
     assert "there are " in caught.value.faults[0].hint

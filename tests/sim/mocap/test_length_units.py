@@ -34,9 +34,9 @@ def test_child_and_giant_are_read_in_any_unit(unit: str, stature: float, head: b
 
 def test_stature_between_a_child_and_a_giant_fits_two_units_and_is_refused() -> None:
     between = Person(unit=0.0254, stature=0.98)
-    told = fault(between)
-    assert "fits two units, inch (0.9" in told and "and cmu (2.1" in told
-    assert "state unit = inch or cmu" in told
+    message = fault(between)
+    assert "fits two units, inch (0.9" in message and "and cmu (2.1" in message
+    assert "state unit = inch or cmu" in message
     assert_read(between, "inch", ReadOptions(unit="inch"))
 
 
@@ -45,15 +45,15 @@ def test_skeleton_in_no_known_unit_is_refused_and_can_be_stated_as_a_number(
     unit: float,
 ) -> None:
     scaled = Person(unit=unit)
-    told = fault(scaled)
-    assert "must be 1.0 to 2.1 m in one of the units m, cm, mm" in told
-    assert "state unit = metres per unit" in told
+    message = fault(scaled)
+    assert "must be 1.0 to 2.1 m in one of the units m, cm, mm" in message
+    assert "state unit = metres per unit" in message
     assert_read(scaled, f"{unit}", ReadOptions(unit=f"{unit}"))
 
 
 def test_stated_unit_that_makes_no_person_is_refused_with_the_stature() -> None:
-    told = fault(Person(unit=0.01), ReadOptions(unit="m"))
-    assert told.startswith("unit = m makes the person 17") and "0.5 to 3.0 m" in told
+    message = fault(Person(unit=0.01), ReadOptions(unit="m"))
+    assert message.startswith("unit = m makes the person 17") and "0.5 to 3.0 m" in message
 
 
 @pytest.mark.parametrize(("offset", "rule"), [(12.0, "clavicle_l"), (0.3, "forearm_l")])
@@ -65,8 +65,8 @@ def test_part_out_of_proportion_is_named(offset: float, rule: str) -> None:
     lines[at] = " ".join([words[0], *(repr(offset * float(one)) for one in words[1:])])
     with pytest.raises(BadRecording) as caught:
         body_track(read_bvh("\n".join(lines)))
-    told = caught.value.faults[0].text
-    assert told.startswith(rule) and "for a stature of 1.7" in told
+    message = caught.value.faults[0].text
+    assert message.startswith(rule) and "for a stature of 1.7" in message
 
 
 MIXED = [("cm", "m"), ("cm", "mm"), ("m", "cm"), ("inch", "cm"), ("cm", "inch"), ("mm", "m")]
@@ -78,11 +78,11 @@ def test_root_path_in_another_unit_is_refused_naming_both(
     unit: str, root_unit: str, floor: float
 ) -> None:
     mixed = Person(unit=UNITS[unit], root_unit=UNITS[root_unit], floor=floor)
-    told = fault(mixed)
-    assert told.startswith("height of the pelvis, by the root's path")
-    assert f"m in {unit}, as the skeleton, or" in told and f"m in {root_unit}" in told
-    assert "must fit the legs, which hold it" in told
-    assert f"state root_unit = {unit} or" in told
+    message = fault(mixed)
+    assert message.startswith("height of the pelvis, by the root's path")
+    assert f"m in {unit}, as the skeleton, or" in message and f"m in {root_unit}" in message
+    assert "must fit the legs, which hold it" in message
+    assert f"state root_unit = {unit} or" in message
     assert_read(mixed, unit, ReadOptions(root_unit=root_unit))
     assert_read(mixed, unit, ReadOptions(unit=unit, root_unit=root_unit))
 
@@ -114,8 +114,8 @@ def test_any_person_is_read_right_or_refused_with_what_is_meant() -> None:
         root = str(rng.choice([*UNITS, unit, unit, unit, unit, unit]))
         legs, bend, share = bool(rng.random() < 0.7), rng.uniform(0.0, 90.0), rng.random()
         thigh, knee = rng.choice([(0.0, 0.0), (0.0, 20.0), (60.0, 110.0), (85.0, 85.0)])
-        told = legs or root == unit
-        if not told:  # only the height of a person who stands tells the unit
+        known = legs or root == unit
+        if not known:  # only the height of a standing person determines the unit
             thigh = knee = 0.0
         who = Person(
             stature=rng.uniform(1.05, 2.05),
@@ -124,7 +124,7 @@ def test_any_person_is_read_right_or_refused_with_what_is_meant() -> None:
             thigh=thigh,
             knee=knee,
             heading=rng.uniform(-np.pi, np.pi),
-            floor=float(rng.choice([0.0, 0.0, -0.9, 0.3])) if told else 0.0,
+            floor=float(rng.choice([0.0, 0.0, -0.9, 0.3])) if known else 0.0,
             unit=UNITS[unit],
             root_unit=UNITS[root],
             up=up,

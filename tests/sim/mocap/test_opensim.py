@@ -263,29 +263,29 @@ def test_arm_that_is_raised_in_its_plane_points_there() -> None:
     ],
 )
 def test_column_that_is_nearly_known_is_named(renamed: dict[str, str], text: str) -> None:
-    told = fault(with_names(TEXT, renamed))
-    assert text in told and "full-body" not in told
-    assert all(name in told for name in renamed)
+    message = fault(with_names(TEXT, renamed))
+    assert text in message and "full-body" not in message
+    assert all(name in message for name in renamed)
 
 
-def test_model_without_arms_is_told_that_arms_are_needed() -> None:
+def test_model_without_arms_is_refused_because_arms_are_needed() -> None:
     legs = {
         name: one
         for name, one in coordinates().items()
         if not name.startswith(("arm", "elbow"))
     }
-    told = fault(opensim_text(legs | {"hip_flexion_r": np.zeros(20)}))
-    assert "a full-body model with arms is needed" in told
+    message = fault(opensim_text(legs | {"hip_flexion_r": np.zeros(20)}))
+    assert "a full-body model with arms is needed" in message
 
 
 @pytest.mark.parametrize("title", ["Speeds", "Accelerations"])
 def test_file_of_speeds_is_not_taken_for_one_of_coordinates(title: str) -> None:
-    told = fault(TEXT.replace("Coordinates", title))
-    assert told.startswith(f"line 1 = '{title}' must be coordinates")
+    message = fault(TEXT.replace("Coordinates", title))
+    assert message.startswith(f"line 1 = '{title}' must be coordinates")
 
 
 @pytest.mark.parametrize("head", ["", "nRows=0\n", "nRows=00\n"])
 def test_table_without_rows_is_refused(head: str) -> None:
     names = TEXT.splitlines()[7]
-    told = fault(f"{head}inDegrees=yes\nendheader\n{names}\n")
-    assert told.startswith("frames = <0> must be at least 2 that have all values")
+    message = fault(f"{head}inDegrees=yes\nendheader\n{names}\n")
+    assert message.startswith("frames = <0> must be at least 2 that have all values")

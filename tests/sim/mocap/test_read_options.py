@@ -4,7 +4,7 @@ from app.errors import InvalidInput
 from app.sim.mocap.read_options import ReadOptions, metres, name_map
 
 
-def test_only_what_is_stated_is_told() -> None:
+def test_only_stated_options_are_listed() -> None:
     assert ReadOptions().stated() == {}
     said = {"unit": "cm", "names": {"Hüfte": "pelvis"}}
     assert ReadOptions(**said).stated() == said

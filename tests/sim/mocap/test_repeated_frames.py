@@ -21,11 +21,11 @@ def rewritten(rate_hz: float, first: int = 0, recorded: Bvh = CLIP) -> Bvh:
 
 @pytest.mark.parametrize("rate_hz", [60.0, 90.0, 120.0, 240.0, 75.0, 100.0, 50.0, 40.0])
 def test_frames_that_repeat_are_read_at_the_real_rate(rate_hz: float) -> None:
-    found, told = without_repeats(rewritten(rate_hz))
+    found, message = without_repeats(rewritten(rate_hz))
     assert 1.0 / found.dt == pytest.approx(30.0, rel=1e-2)
     np.testing.assert_array_equal(found.values, CLIP.values)
-    assert told.startswith("frames repeat, real rate 30")
-    assert f"written at {rate_hz:g} Hz" in told
+    assert message.startswith("frames repeat, real rate 30")
+    assert f"written at {rate_hz:g} Hz" in message
 
 
 @pytest.mark.parametrize("first", [1, 2, 3])
@@ -62,7 +62,7 @@ def test_real_rate_that_is_no_rate_of_motion_capture_is_refused() -> None:
         without_repeats(rewritten(60.0, recorded=slow))
 
 
-def test_repeated_frames_are_no_glitches_and_the_real_rate_is_told() -> None:
+def test_repeated_frames_are_no_artifacts_and_the_real_rate_is_reported() -> None:
     fast = working(100, dt=1 / 30)
     fast[:, 10] += 1.2 * np.sin(4.0 * np.arange(100) / 30.0)  # 1.7 m/s at the hand
     lines = bvh_text(fast, dt=1 / 120).splitlines()

@@ -52,9 +52,9 @@ def test_side_may_stand_before_or_behind_the_name() -> None:
 
 
 def test_missing_joint_is_named_beside_those_the_file_has() -> None:
-    told = fault(bvh_text(working(10)).replace("left_hand", "left_tentacle"))
-    assert "HIERARCHY has no joint that is known as wrist_l" in told
-    assert "left_tentacle" in told
+    message = fault(bvh_text(working(10)).replace("left_hand", "left_tentacle"))
+    assert "HIERARCHY has no joint that is known as wrist_l" in message
+    assert "left_tentacle" in message
 
 
 def test_angles_in_radians_are_refused() -> None:
@@ -64,9 +64,9 @@ def test_angles_in_radians_are_refused() -> None:
         row = np.array([float(word) for word in lines[k].split()])
         row[3:] = np.radians(row[3:])
         lines[k] = " ".join(f"{one:.6f}" for one in row)
-    told = fault("\n".join(lines))
-    assert told.startswith(f"frames from line {start + 1}")
-    assert "looks like radians" in told
+    message = fault("\n".join(lines))
+    assert message.startswith(f"frames from line {start + 1}")
+    assert "looks like radians" in message
 
 
 def test_positions_in_another_unit_than_the_skeleton_are_refused() -> None:

@@ -78,13 +78,15 @@ def test_name_map_can_name_a_column_that_no_model_calls_so() -> None:
         ({"RArmFlex": "shoulder_r_flex"}, "lacks the columns pelvis_x, elbow_l"),
     ],
 )
-def test_name_map_that_does_not_fit_is_told(stated: dict[str, str], text: str) -> None:
+def test_name_map_that_does_not_fit_is_reported(stated: dict[str, str], text: str) -> None:
     assert text in fault(renamed(), stated)
 
 
 def test_columns_that_are_not_nearly_known_are_listed() -> None:
-    told = fault(TEXT.replace("elbow_r", "xyzzy"), {})
-    assert told.endswith("(other columns: xyzzy; a name map says what they are: theirs=ours)")
+    message = fault(TEXT.replace("elbow_r", "xyzzy"), {})
+    assert message.endswith(
+        "(other columns: xyzzy; a name map says what they are: theirs=ours)"
+    )
 
 
 def test_nearly_known_names_keep_their_side_and_are_used_once() -> None:

@@ -65,10 +65,10 @@ def test_without_legs_rest_pose_and_trunk_tell_the_axis(up: str, bend: float) ->
 
 def test_without_legs_a_person_bent_down_may_stand_in_another_axis() -> None:
     bent = Person(bend=88.0, legs=False, heading=-1.5708)
-    told = fault(bent)
-    assert "fits y up by the motion (the trunk leans" in told
-    assert "forward) and z up by the motion" in told
-    assert "state up = y or z" in told
+    message = fault(bent)
+    assert "fits y up by the motion (the trunk leans" in message
+    assert "forward) and z up by the motion" in message
+    assert "state up = y or z" in message
     assert_read(bent, ReadOptions(up="y"))
 
 
@@ -96,7 +96,7 @@ def test_axis_that_turns_the_person_head_down_cannot_be_stated(up: str, stated: 
 
 def test_axis_that_is_not_looked_for_is_named_and_can_be_stated() -> None:
     hanging = Person(up="-y")
-    told = fault(hanging)
-    assert "with y up" in told and "lower legs are" in told
-    assert "state up = -y, which fits" in told
+    message = fault(hanging)
+    assert "with y up" in message and "lower legs are" in message
+    assert "state up = -y, which fits" in message
     assert_read(hanging, ReadOptions(up="-y"))

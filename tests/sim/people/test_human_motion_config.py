@@ -159,8 +159,8 @@ def test_at_the_table_moves_a_run_as_one_piece(cell: Cell) -> None:
     turn = there.q[:, 2] - run.q[:, 2]
     np.testing.assert_allclose(turn, turn[0], atol=1e-12)
     c, s = np.cos(turn[0]), np.sin(turn[0])
-    ways = (run.q[:, :2] - run.q[0, :2]) @ np.array([[c, s], [-s, c]])
-    np.testing.assert_allclose(there.q[:, :2] - there.q[0, :2], ways, atol=1e-9)
+    paths = (run.q[:, :2] - run.q[0, :2]) @ np.array([[c, s], [-s, c]])
+    np.testing.assert_allclose(there.q[:, :2] - there.q[0, :2], paths, atol=1e-9)
 
 
 @pytest.mark.parametrize("turned", [0.0, 2.0, -2.8])
@@ -291,7 +291,7 @@ def test_the_asked_share_of_people_is_not_there_and_is_never_touched() -> None:
     assert (batch.state.people.q[absent] == batch.world.people.no_person).all()
 
 
-def test_who_is_not_there_looks_like_nobody_in_an_empty_cell() -> None:
+def test_an_absent_person_looks_like_an_empty_cell() -> None:
     away = PickBatch(load_cell(), 4, 5, PickSettings(work=HumanMotionConfig(absent=1.0)))
     empty = PickBatch(load_cell(), 4, 5, PickSettings(people=()))
     person = slice(LAYOUT["human_q"].start, LAYOUT["human_qd"].stop)

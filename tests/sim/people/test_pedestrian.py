@@ -45,11 +45,11 @@ def test_walker_never_leaves_its_area() -> None:
 
 def test_velocity_leads_to_the_next_position() -> None:
     for one in walks(RESTLESS, 50):
-        way = np.diff(one.position, axis=0)
-        np.testing.assert_allclose(way, 0.02 * one.velocity[:-1], atol=1e-12)
+        path = np.diff(one.position, axis=0)
+        np.testing.assert_allclose(path, 0.02 * one.velocity[:-1], atol=1e-12)
 
 
-def test_way_leads_straight_to_the_target() -> None:
+def test_path_leads_straight_to_the_target() -> None:
     for one in walks(RESTLESS, 50):
         to_target, v = one.target - one.position, speeds(one)
         moving = (v > 0.0) & (np.hypot(*to_target.T) > 0.1)

@@ -75,7 +75,7 @@ def test_a_turn_is_noticed_after_the_latency() -> None:
     assert abs(speeds[-1]) < 0.05
 
 
-def test_other_cells_go_on_while_one_starts_anew() -> None:
+def test_other_cells_go_on_while_one_is_reset() -> None:
     settings = CylinderSensorSettings(latency_s=0.1, noise=0.0)
     tracker, rows = CylinderSensorModel(settings, 3, 2, 7), np.arange(3)
     there = np.random.default_rng(4).uniform(-1, 1, (3, 2, 3))

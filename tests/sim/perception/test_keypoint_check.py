@@ -18,7 +18,7 @@ NAN, INF = np.nan, np.inf
 CLIPS = sorted((Path(__file__).parents[4] / "shared" / "mocap").glob("*/*.bvh"))
 
 
-def someone() -> np.ndarray:
+def person() -> np.ndarray:
     return seen(work(1, 12.0)[1][100])
 
 
@@ -37,7 +37,7 @@ def test_what_is_not_numbers_is_refused(values: object) -> None:
 
 @pytest.mark.parametrize("point", [[NAN] * 3, [0.0] * 3, [-0.0] * 3, [-1.0] * 3])
 def test_a_missing_point_costs_that_point_and_needs_no_name(point: list[float]) -> None:
-    points = someone()
+    points = person()
     points[K["wrist_l"]] = point
     frame = check_keypoints(points, floor_z=FLOOR)
     assert np.flatnonzero(~frame.seen).tolist() == [K["wrist_l"]]
@@ -47,7 +47,7 @@ def test_a_missing_point_costs_that_point_and_needs_no_name(point: list[float]) 
 
 @pytest.mark.parametrize("trust", [0.0, 0.05, NAN, -0.005])
 def test_a_distrusted_point_is_missing_whatever_its_numbers(trust: float) -> None:
-    points, confidences = someone(), np.ones(25)
+    points, confidences = person(), np.ones(25)
     points[3, 1] = NAN
     confidences[3] = confidences[4] = trust
     frame = check_keypoints(points, confidences, floor_z=FLOOR)
@@ -60,7 +60,7 @@ def test_a_distrusted_point_is_missing_whatever_its_numbers(trust: float) -> Non
     + [[1e9, 0.0, 0.0], [-9999.0] * 3, [3.4e38] * 3],
 )
 def test_a_point_that_cannot_be_used_is_dropped_and_named(point: list[float]) -> None:
-    points = someone()
+    points = person()
     points[K["elbow_r"]] = point
     frame = check_keypoints(points, floor_z=FLOOR)
     assert frame.unusable == ("elbow_r",) and frame.implausible is None
@@ -71,17 +71,17 @@ def test_a_point_that_cannot_be_used_is_dropped_and_named(point: list[float]) ->
 def test_a_confidence_out_of_range_drops_its_point_and_names_it(trust: float) -> None:
     confidences = np.ones(25)
     confidences[3] = trust
-    frame = check_keypoints(someone(), confidences, floor_z=FLOOR)
+    frame = check_keypoints(person(), confidences, floor_z=FLOOR)
     assert frame.unusable == (BODY_25[3],) and frame.seen.sum() == 24
 
 
 def test_a_confidence_a_hair_above_one_is_one() -> None:
-    frame = check_keypoints(someone(), np.full(25, 1.0000001))
+    frame = check_keypoints(person(), np.full(25, 1.0000001))
     assert (frame.confidences == 1.0).all()
 
 
 def test_most_points_unusable_leave_the_others() -> None:
-    points = someone()
+    points = person()
     points[K["mid_hip"] :] = -9999.0
     frame = check_keypoints(points, floor_z=FLOOR)
     assert frame.implausible is None and frame.seen.sum() == K["mid_hip"]
@@ -94,14 +94,14 @@ def test_all_missing_is_a_frame_without_anybody() -> None:
 
 
 def test_a_keypoint_far_from_the_others_is_dropped_and_named() -> None:
-    points = someone()
+    points = person()
     points[K["ankle_r"]] = [50.0, 0.0, 0.0]
     frame = check_keypoints(points)
     assert frame.strays == ("ankle_r",)
     assert frame.seen.sum() == 24
 
 
-def test_nobody_at_work_has_strays_or_is_implausible() -> None:
+def test_no_person_at_work_has_strays_or_is_implausible() -> None:
     for seed in (1, 2, 3):
         for q in work(seed, 12.0)[1][::10]:
             frame = check_keypoints(seen(q), floor_z=FLOOR)
@@ -129,7 +129,7 @@ def test_the_feet_alone_or_the_face_alone_are_plausible() -> None:
 
 @pytest.mark.parametrize("name", ["standing", "reaching forward", "bent by 90 degrees"])
 @pytest.mark.parametrize("frame", FRAMES)
-def test_a_person_in_another_frame_is_implausible_and_the_numbers_are_told(
+def test_a_person_in_another_frame_is_implausible_and_the_numbers_are_reported(
     frame: str, name: str
 ) -> None:
     camera = np.array([0.2, -1.0, 0.8])
@@ -175,13 +175,13 @@ def test_a_person_who_lies_two_metres_over_the_table_is_implausible() -> None:
     [(1000.0, "millimetres"), (100.0, "centimetres"), (39.37, "inches"), (3.281, "feet")],
 )
 def test_other_units_are_named(factor: float, unit: str) -> None:
-    for points in (someone(), posture("kneeling", FLOOR)):
+    for points in (person(), posture("kneeling", FLOOR)):
         assert f"are these {unit}?" in str(check_keypoints(factor * points).implausible)
 
 
 @pytest.mark.parametrize("factor", [0.01, 0.001, 0.4, 2.0])
 def test_a_skeleton_of_no_persons_size_is_implausible(factor: float) -> None:
-    points = someone()
+    points = person()
     root = points[K["mid_hip"]]
     found = check_keypoints(root + factor * (points - root))
     assert "times those of the median adult" in str(found.implausible)

@@ -159,7 +159,7 @@ def test_a_ghost_of_one_frame_takes_no_track() -> None:
 
 
 @pytest.mark.parametrize(("n_tracks", "rate_hz"), [(1, 5.0), (1, 60.0), (2, 30.0), (4, 10.0)])
-def test_nobody_unfollowed_is_nearer_for_long_whatever_people_do(
+def test_no_unfollowed_person_is_nearer_for_long_whatever_people_do(
     n_tracks: int, rate_hz: float
 ) -> None:
     """Six people walk to and fro at 1.5 m/s, and are listed in any order."""
@@ -182,7 +182,7 @@ def test_nobody_unfollowed_is_nearer_for_long_whatever_people_do(
         assert len(following(estimates)) == n_tracks
 
 
-def test_a_newcomer_takes_the_track_of_somebody_lost_only_where_it_may_be_the_same() -> None:
+def test_a_newcomer_takes_the_track_of_a_lost_person_only_where_it_may_be_the_same() -> None:
     people = MultiPersonTracker(1, CELL.body, floor_z=CELL.floor_z)
     people.update(0.0, [at(1.0)])
     for k in range(1, 90):
@@ -196,7 +196,7 @@ def test_a_newcomer_takes_the_track_of_somebody_lost_only_where_it_may_be_the_sa
     assert [one.index for one in people.unfollowed] == [0]
 
 
-def test_a_newcomer_starts_a_track_of_nobody_and_the_person_lost_comes_back() -> None:
+def test_a_newcomer_starts_a_track_of_its_own_and_the_lost_person_comes_back() -> None:
     people = MultiPersonTracker(2, CELL.body, floor_z=CELL.floor_z)
     people.update(0.0, [at(1.0)])
     for k in range(1, 60):
@@ -206,7 +206,7 @@ def test_a_newcomer_starts_a_track_of_nobody_and_the_person_lost_comes_back() ->
     assert following(both) == [1.5, 5.0] and both[0].flags == ("restarted",)
 
 
-def test_somebody_nearer_than_the_lost_may_be_is_followed() -> None:
+def test_a_person_nearer_than_the_lost_may_be_is_followed() -> None:
     people = MultiPersonTracker(1, CELL.body, floor_z=CELL.floor_z)
     people.update(0.0, [at(6.0)])
     for k in range(1, 25):
@@ -214,7 +214,7 @@ def test_somebody_nearer_than_the_lost_may_be_is_followed() -> None:
     assert following((estimate,)) == [1.0] and not estimate.stale
 
 
-def test_a_skeleton_in_another_frame_costs_nobody_else_anything() -> None:
+def test_a_skeleton_in_another_frame_costs_no_other_person_anything() -> None:
     people, one, other = two_people()
     for k in range(30, 45):
         a, b = people.update(k * DT, [1000.0 * seen(one[k]), seen(other[k])])

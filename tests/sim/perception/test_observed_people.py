@@ -1,4 +1,4 @@
-"""Who is seen of several people: the rule of the batches, on single states."""
+"""Selection of the observed person: the rule of the batches, on single states."""
 
 from dataclasses import replace
 
@@ -30,7 +30,7 @@ def standing(x: float, y: float) -> Person:
     return Person(q=human.rest_posture(x, y, -1.57), qd=np.zeros(18))
 
 
-def test_the_person_seen_is_the_one_whom_a_batch_sees() -> None:
+def test_the_person_seen_is_the_one_a_batch_sees() -> None:
     settings = PickSettings(people=("worker", "worker", "walker"))
     batch = PickBatch(CELL, 40, 6, settings)
     obs = batch.reset().copy()
@@ -83,7 +83,7 @@ def test_size_counts_for_who_is_nearest() -> None:
     assert nearest_index(ARM, PEOPLE, HOME, people[::-1]) == 0
 
 
-def test_nobody_is_seen_where_nobody_is_and_a_single_person_always() -> None:
+def test_an_empty_cell_has_no_observed_person_and_a_single_person_is_always_observed() -> None:
     assert nearest_index(ARM, PEOPLE, HOME, []) is None
     assert nearest_index(ARM, PEOPLE, HOME, [standing(4.0, 4.0)]) == 0
 

@@ -14,7 +14,7 @@ from tests.sim.tracked_person import CELL, seen, work
 from tests.sim.tracker_errors import errors
 
 DT = 1.0 / 30.0
-NOBODY = np.full((25, 3), np.nan)
+UNSEEN = np.full((25, 3), np.nan)
 
 
 NOISY = KeypointSensorSettings(noise=0.02, missing=0.2, latency_s=0.0)
@@ -80,9 +80,9 @@ def tracked(n: int = 30, seed: int = 1) -> tuple[PersonEstimator, np.ndarray]:
     return estimator, q
 
 
-def test_before_anything_is_seen_there_is_nobody_and_it_is_said() -> None:
+def test_before_the_first_frame_no_person_is_estimated_and_it_is_reported() -> None:
     estimator = PersonEstimator(CELL.body)
-    for estimate in (estimator.at(0.0), estimator.update(1.0, NOBODY)):
+    for estimate in (estimator.at(0.0), estimator.update(1.0, UNSEEN)):
         assert estimate.cylinder is None and estimate.person is None
         assert estimate.flags == ("never-seen",) and estimate.stale
         assert estimate.age_s == np.inf
@@ -92,11 +92,11 @@ def test_all_missing_is_carried_on_then_held_then_grown_and_named() -> None:
     estimator, _ = tracked(30)
     last = 29 * DT
     before = estimator.at(last)
-    soon = estimator.update(last + 0.1, NOBODY)
+    soon = estimator.update(last + 0.1, UNSEEN)
     assert soon.flags == () and soon.held == ()
-    late = estimator.update(last + 0.4, NOBODY)
+    late = estimator.update(last + 0.4, UNSEEN)
     assert late.stale and late.age_s == pytest.approx(0.4)
-    gone = estimator.update(last + 1.5, NOBODY)
+    gone = estimator.update(last + 1.5, UNSEEN)
     assert gone.stale and set(gone.held) == set(human.JOINT_NAMES) and len(gone.missing) == 25
     assert (
         before.cylinder is not None and gone.cylinder is not None and late.cylinder is not None
@@ -105,7 +105,7 @@ def test_all_missing_is_carried_on_then_held_then_grown_and_named() -> None:
     assert gone.person is not None and (gone.person.qd == 0.0).all()
 
 
-def test_a_person_who_comes_back_after_long_is_taken_anew() -> None:
+def test_a_person_who_comes_back_after_long_is_a_new_person() -> None:
     estimator, q = tracked(30)
     estimate = estimator.update(60 * DT, seen(q[60]))
     assert estimate.flags == ("restarted",) and not estimate.stale
@@ -140,7 +140,9 @@ def test_exchanged_sides_are_exchanged_back_and_named(group: str, flag: str) -> 
     np.testing.assert_allclose(wrong.person.q, right.person.q)
 
 
-def test_exchanged_sides_in_the_first_frame_are_seen_by_the_way_the_person_faces() -> None:
+def test_exchanged_sides_in_the_first_frame_are_seen_by_the_direction_the_person_faces() -> (
+    None
+):
     q = work(1, 12.0)[1][0]
     estimate = PersonEstimator(CELL.body).update(0.0, swap_sides(seen(q), "arms"))
     assert estimate.flags == ("arms-swapped",)
@@ -162,7 +164,7 @@ def test_sides_taken_wrong_at_first_are_put_right_when_that_goes_on() -> None:
     np.testing.assert_allclose(person.q, q, atol=0.1)
 
 
-def test_another_person_in_place_of_this_one_is_refused_and_then_taken_anew() -> None:
+def test_another_person_in_place_of_this_one_is_refused_and_then_accepted() -> None:
     estimator, q = tracked(30)
     away = np.array([0.8, 0.5, 0.0])
     before, flags = estimator.at(29 * DT), []
@@ -223,7 +225,7 @@ def test_people_who_stand_are_given_joint_angles_and_those_who_lie_are_not() -> 
         assert (estimate.person is not None) is fits
 
 
-def test_a_frame_in_another_frame_is_unseen_and_told() -> None:
+def test_a_frame_in_another_frame_is_unseen_and_reported() -> None:
     estimator, q = tracked(30)
     estimate = estimator.update(30 * DT, 1000.0 * seen(q[30]))
     assert estimate.flags == ("foreign-frame",) and "millimetres" in str(estimate.implausible)

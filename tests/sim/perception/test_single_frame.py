@@ -76,7 +76,7 @@ def test_without_a_trunk_the_person_is_as_good_as_the_cylinder() -> None:
         (POINTS + [0.0, 0.0, 2.0], "foreign-frame"),
     ],
 )
-def test_somebody_of_unknown_place_may_be_anywhere(points: np.ndarray, flag: str) -> None:
+def test_a_person_of_unknown_place_may_be_anywhere(points: np.ndarray, flag: str) -> None:
     velocities = np.ones((25, 3))
     estimate = estimate_once(points, CELL.body, velocities=velocities, floor_z=CELL.floor_z)
     assert flag in estimate.flags and estimate.person is None

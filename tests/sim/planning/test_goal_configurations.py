@@ -6,10 +6,10 @@ from app.sim.cells.cell import load_cell
 from app.sim.planning.goal_configurations import (
     APART,
     goal_configurations,
-    vertical_configuration,
 )
 from app.sim.robot.ur10 import Robot
 from app.sim.scene.scene import arm_of
+from tests.sim.configurations import vertical_configuration
 
 CELL = load_cell()
 ARM = arm_of(CELL)

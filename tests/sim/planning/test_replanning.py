@@ -13,12 +13,12 @@ from app.sim.collision.checker import Checker, Shapes, no_people, shapes_of
 from app.sim.collision.fcl_reference import CollisionReference
 from app.sim.core.arrays import Vec
 from app.sim.human import model as human
-from app.sim.planning.goal_configurations import vertical_configuration
 from app.sim.planning.ompl_planners import PLANNERS, PlanSettings
 from app.sim.planning.replanning import ROLES, ReplanningExecutor, ReplanningSettings
 from app.sim.robot.kernels import acceleration_bounds as polynomial
 from app.sim.robot.kernels.joints import JointState
 from app.sim.scene.scene import arm_of
+from tests.sim.configurations import vertical_configuration
 
 CELL = load_cell()
 ARM = arm_of(CELL)

@@ -10,7 +10,6 @@ from app.errors import InvalidInput
 from app.sim.cells.cell import load_cell
 from app.sim.collision.checker import Checker, capsule_shapes, no_people
 from app.sim.core.arrays import Vec
-from app.sim.planning.goal_configurations import vertical_configuration
 from app.sim.planning.ompl_planners import planning_limits
 from app.sim.planning.time_parameterization import (
     TimedPath,
@@ -24,6 +23,7 @@ from app.sim.robot.kernels.acceleration_bounds import coefficient_interval
 from app.sim.robot.kernels.joints import AxisLimits
 from app.sim.robot.ur10 import Robot
 from app.sim.scene.scene import arm_of
+from tests.sim.configurations import vertical_configuration
 
 CELL = load_cell()
 ARM = arm_of(CELL)

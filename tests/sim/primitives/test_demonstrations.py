@@ -68,7 +68,7 @@ def test_motion_between_keyframes_begins_and_ends_in_them() -> None:
     np.testing.assert_allclose(q[[0, -1]], [first.q, then.q], atol=1e-9)
 
 
-def test_palm_is_lifted_on_its_way() -> None:
+def test_palm_is_lifted_on_its_path() -> None:
     rng, size = np.random.default_rng(6), PEOPLE[(50.0, 50.0, 50.0)]
     ends = [draw_keyframe(CELL, size, station(name), "r", rng) for name in ("cube1", "dock0")]
     q, _ = between(size, ends[0], ends[1], BY_NAME["careful"], rng)
@@ -104,7 +104,7 @@ def test_elbows_go_out_in_their_style() -> None:
     assert outward("elbow-out") > outward("upright") + 0.03
 
 
-def test_place_out_of_reach_is_told() -> None:
+def test_place_out_of_reach_is_reported() -> None:
     rng, size = np.random.default_rng(9), PEOPLE[(5.0, 5.0, 5.0)]
     far = np.array([0.0, -0.4, 0.1])
     with pytest.raises(SimulationError, match="no feasible motion of hand 'r'"):

@@ -35,20 +35,20 @@ def motions(cell: Cell, library: MotionLibrary) -> list[SegmentMotion]:
     return random_segments(cell, library, N, 1)
 
 
-def moved(cell: Cell, way: tuple[float, float], jitter: float, seed: int = 0) -> Cell:
+def moved(cell: Cell, offset: tuple[float, float], jitter: float, seed: int = 0) -> Cell:
     """Return a cell of which everything is moved, and the stations some more."""
     rng = np.random.default_rng(seed)
-    shift, person, table = np.array([*way, 0.0]), cell.human, cell.table
+    shift, person, table = np.array([*offset, 0.0]), cell.human, cell.table
     stations = []
     for station in cell.stations:
         x, y, z = np.array(station.position) + shift + rng.uniform(-jitter, jitter, 3)
         stations.append(station.model_copy(update={"position": (x, y, z)}))
     x, y, yaw = person.home
-    area = {f"x_{end}": getattr(person, f"x_{end}") + way[0] for end in ("min", "max")}
-    area |= {f"y_{end}": getattr(person, f"y_{end}") + way[1] for end in ("min", "max")}
-    edges = {f"x_{end}": getattr(table, f"x_{end}") + way[0] for end in ("min", "max")}
-    edges |= {f"y_{end}": getattr(table, f"y_{end}") + way[1] for end in ("min", "max")}
-    worker = person.model_copy(update={"home": (x + way[0], y + way[1], yaw), **area})
+    area = {f"x_{end}": getattr(person, f"x_{end}") + offset[0] for end in ("min", "max")}
+    area |= {f"y_{end}": getattr(person, f"y_{end}") + offset[1] for end in ("min", "max")}
+    edges = {f"x_{end}": getattr(table, f"x_{end}") + offset[0] for end in ("min", "max")}
+    edges |= {f"y_{end}": getattr(table, f"y_{end}") + offset[1] for end in ("min", "max")}
+    worker = person.model_copy(update={"home": (x + offset[0], y + offset[1], yaw), **area})
     return cell.model_copy(
         update={
             "stations": tuple(stations),
@@ -81,7 +81,7 @@ def test_palms_make_no_detours(motions: list[SegmentMotion]) -> None:
     assert np.percentile(longer, 99) < 0.2
 
 
-def test_no_joint_swings_out_on_the_way(motions: list[SegmentMotion]) -> None:
+def test_no_joint_swings_out_on_the_path(motions: list[SegmentMotion]) -> None:
     swings = [motion.swing for motion in motions]
     assert np.median(swings) < 0.3 and np.percentile(swings, 99) < 0.9
 

@@ -68,7 +68,7 @@ def test_speed_via_point_stops_the_joints(promp: ProMP) -> None:
 
 
 @pytest.mark.parametrize("point", ["hand_r", "hand_l", "elbow_r", "neck"])
-def test_jacobian_foretells_small_motions_of_a_point(promp: ProMP, point: str) -> None:
+def test_jacobian_predicts_small_motions_of_a_point(promp: ProMP, point: str) -> None:
     rng = np.random.default_rng(7)
     q = moments(promp, np.array([0.6]))[0][0]
     change = rng.normal(0.0, 1e-4, 18)

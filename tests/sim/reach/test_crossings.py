@@ -8,10 +8,10 @@ import pytest
 from app.errors import InvalidInput
 from app.sim.cells.cell import load_cell
 from app.sim.collision.checker import Checker, shapes_of
+from app.sim.core.arrays import Vec
 from app.sim.reach import crossings as crossing
 from app.sim.reach.crossings import (
     covered,
-    crossing_time,
     crossings,
     cylinder_track,
     recorded_crossings,
@@ -40,6 +40,31 @@ def clearances_at_home(track: np.ndarray) -> np.ndarray:
             for row in track
         ]
     )
+
+
+def crossing_time(track: Vec, start: Vec, goal: Vec, dt: float) -> float:
+    """Return when the axis first crosses a segment in plan view [s]; infinity if never.
+
+    Args:
+        track: x, y at the ends of control cycles [m], shape (n + 1, >= 2).
+        start: Start of the segment [m], shape (>= 2,).
+        goal: Its end [m], shape (>= 2,).
+        dt: Control cycle [s].
+    """
+    segment = goal[:2] - start[:2]
+    square = float(segment @ segment)
+    if square <= 0.0:
+        return math.inf
+    offset = track[:, :2] - start[:2]
+    side = (segment[0] * offset[:, 1] - segment[1] * offset[:, 0]) / square
+    side[np.abs(side) < crossing.ON_LINE] = 0.0
+    along = offset @ segment / square
+    before, after = side[:-1], side[1:]
+    for k in np.flatnonzero((before * after <= 0.0) & (before != after)):
+        part = before[k] / (before[k] - after[k])
+        if 0.0 < along[k] + part * (along[k + 1] - along[k]) < 1.0:
+            return float((k + part) * dt)
+    return math.inf
 
 
 def test_every_one_of_the_200_crosses_between_the_robot_and_its_goal(evaluated):

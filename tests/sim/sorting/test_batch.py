@@ -233,7 +233,7 @@ def test_whatever_people_do_the_goal_can_still_be_met() -> None:
     assert len(goals) > 3 and objects >= {2, 3, 4, 5, 6}
 
 
-def test_people_add_remove_move_and_ask_anew() -> None:
+def test_people_add_remove_move_and_change_the_goal() -> None:
     settings = SortingSettings(human_rate=1.0, n_objects=4, n_goal=2)
     batch = batch_of(1000, settings)
     start, total = batch.rows.goal.copy(), (batch.rows.clutter > 0).sum(axis=1)
@@ -274,7 +274,7 @@ def test_random_maps_replace_the_cells_own_in_their_share_of_episodes() -> None:
     assert batch.rows.fail[~own].max() <= 0.2
 
 
-def test_a_given_state_starts_anew_and_a_changed_one_goes_on() -> None:
+def test_a_given_state_starts_again_and_a_changed_one_goes_on() -> None:
     batch, rng = batch_of(2, SortingSettings(horizon_factor=100.0)), np.random.default_rng(6)
     given = states(batch_of(1, SortingSettings(disturbed_share=1.0), RISKY, seed=9))[0]
     for _ in range(3):

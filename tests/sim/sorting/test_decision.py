@@ -138,7 +138,7 @@ def test_failed_picks_alone_do_not_hand_over_before_the_patience_ends() -> None:
     assert whys == ["policy"] * 5 + ["attempts-exceeded"]
 
 
-def test_policy_is_trusted_again_after_somebody_interferes() -> None:
+def test_policy_is_trusted_again_after_a_person_interferes() -> None:
     policy = FixedValues(SHAPE, [Move(1, BLUE), Move(BLUE, 1)])
     handed = played(policy, start(), 3)[-1]
     changed = dataclasses.replace(start(), goal=np.roll(start().goal, 0, axis=0).copy())

@@ -63,7 +63,7 @@ def test_state_that_comes_back_by_the_moves_alone_hands_over() -> None:
     assert seen(watch, first).planner_fallback == "repeated"
 
 
-def test_record_begins_anew_when_somebody_interferes() -> None:
+def test_record_is_reset_when_a_person_interferes() -> None:
     watch = after_move(seen(None, start()), start(), Move(0, 4))
     moved = apply(apply(start(), SHAPE, Move(0, 5)), SHAPE, Move(5, 3))
     again = seen(watch, moved, attempts=2.0)
@@ -71,14 +71,14 @@ def test_record_begins_anew_when_somebody_interferes() -> None:
 
 
 @pytest.mark.parametrize("part", ["goal", "fail"])
-def test_record_begins_anew_when_goal_or_failure_map_change(part: str) -> None:
+def test_record_is_reset_when_goal_or_failure_map_change(part: str) -> None:
     watch = after_move(seen(None, start()), start(), Move(0, 4))
     other = dataclasses.replace(start(), **{part: getattr(start(), part).copy()})
     getattr(other, part).flat[1] = 0.2 if part == "fail" else SHAPE.code(0, 0)
     assert seen(watch, other).seen == (state_key(other),)
 
 
-def test_record_begins_anew_for_another_policy() -> None:
+def test_record_is_reset_for_another_policy() -> None:
     watch = after_move(seen(None, start()), start(), Move(0, 4))
     assert observe_transition(watch, state_key(start()), 10.0, "b" * 64).attempts == 0
 
@@ -92,13 +92,13 @@ def test_planner_takes_over_after_one_and_a_half_times_the_expected_attempts() -
     assert whys == [(None, 1), (None, 2), ("attempts-exceeded", 0), ("attempts-exceeded", 1)]
 
 
-def test_planner_keeps_deciding_until_somebody_interferes() -> None:
+def test_planner_keeps_deciding_until_a_person_interferes() -> None:
     state = apply(start(), SHAPE, Move(0, 5))
     watch = seen(after_move(seen(None, state), state, Move(5, 1)), state)
-    on_its_way = apply(state, SHAPE, Move(5, 4))
-    watch = seen(after_move(watch, state, Move(5, 4)), on_its_way)
+    moved = apply(state, SHAPE, Move(5, 4))
+    watch = seen(after_move(watch, state, Move(5, 4)), moved)
     assert watch.planner_fallback == "repeated"
-    assert seen(after_move(watch, on_its_way, Move(4, 2)), start()).planner_fallback is None
+    assert seen(after_move(watch, moved, Move(4, 2)), start()).planner_fallback is None
 
 
 def test_record_never_grows_beyond_its_bound() -> None:

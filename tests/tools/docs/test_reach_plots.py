@@ -139,10 +139,12 @@ def test_each_square_of_the_heat_maps_is_its_target() -> None:
     cells = [cell for cell in result["results"][0]["targets"] if cell["height_m"] == 1.0]
     mesh = figure.axes[1].collections[0].get_array()
     expected = [
-        [next(c for c in cells if c["goal"][:2] == [x, y])["success"]["mean"]
-         for x in (-0.5, -0.3, -0.1, 0.1, 0.3, 0.5)]
+        [
+            next(c for c in cells if c["goal"][:2] == [x, y])["success"]["mean"]
+            for x in (-0.5, -0.3, -0.1, 0.1, 0.3, 0.5)
+        ]
         for y in (0.6, 0.8, 1.0)
-    ]  # fmt: skip
+    ]
     np.testing.assert_allclose(mesh, expected)
     assert figure.axes[1].get_title().startswith("z = 1.0 m")
 
@@ -162,10 +164,17 @@ def test_a_run_replaces_the_curve_of_its_preset_and_seed() -> None:
 
 def test_points_before_the_first_collision_count_are_left_out(tmp_path: Path) -> None:
     points = [
-        {"preset": "reach-td3", "seed": 2, "step": step, "cpu_s": 0.1 * step,
-         "success": success, "collision": collision, "timeout": 0.1}
+        {
+            "preset": "reach-td3",
+            "seed": 2,
+            "step": step,
+            "cpu_s": 0.1 * step,
+            "success": success,
+            "collision": collision,
+            "timeout": 0.1,
+        }
         for step, success, collision in ((10, None, None), (20, 0.5, 0.4))
-    ]  # fmt: skip
+    ]
     text = "".join(json.dumps(one) + "\n" for one in points)
     (tmp_path / "curve.jsonl").write_text(text, encoding="utf-8")
     curve = reach_curves.curve_of_run(tmp_path, 1)

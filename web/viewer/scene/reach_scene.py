@@ -98,9 +98,16 @@ class _Zone:
         square = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
         vertices, faces = _fan(square, self._z)
         self._area = server.scene.add_mesh_simple(
-            "/zone/area", vertices, faces, color=OFF, opacity=0.22, side="double",
-            cast_shadow=False, receive_shadow=False, visible=False,
-        )  # fmt: skip
+            "/zone/area",
+            vertices,
+            faces,
+            color=OFF,
+            opacity=0.22,
+            side="double",
+            cast_shadow=False,
+            receive_shadow=False,
+            visible=False,
+        )
         self._edge = server.scene.add_line_segments(
             "/zone/edge",
             np.zeros((N_DIRECTIONS, 2, 3)),

@@ -11,7 +11,7 @@ SHA256 = {
     "pick": "74e22399847a625f344678388956f7d8bed3047a57709506352c87d950c2bd63",
     "sorting-e0": "7f1ffee69a2a4e1ab6eda76b5b4ff158a7b35ac23c60adecb4a3b5d0cbcb9555",
     "sorting-e1": "932b690abc9780c13a1a3eb5287f4d0f0d5715c846c23ae7f89bcfb7f68d9b9a",
-    "reach": "bf71d378c94a098dcf4a810bb45e19756308491bc67c483719b91699a5521a17",
+    "reach": "2b95d1957f4b7d51b6c5f7bb3f02a6992d64940d37505005569d532755ffa7ce",
 }
 """Names of the shipped checkpoints and their ids."""
 ALIASES = tuple(SHA256)

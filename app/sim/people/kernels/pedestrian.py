@@ -79,8 +79,8 @@ X, Y, VX, VY, R, GROWTH, GAIT, TARGET_X, TARGET_Y, COURSE_X, COURSE_Y, LEFT, TIM
     range(14)
 )
 """State of a walker: axis [m], velocity in the period to come [m/s], radius [m], its change in
-the period that passed [m/s], gait, target [m], direction to it, way left [m], time since the
-start [s]; then the constants of the speed's function, and from RADIUS on the radius'."""
+the period that passed [m/s], gait, target [m], direction to it, distance left [m], time since
+the start [s]; then the constants of the speed's function, and from RADIUS on the radius'."""
 RADIUS = SPEED + N_CONSTANTS
 N_PAST = 16
 """Moments of the past that are remembered."""

@@ -45,7 +45,7 @@ GROWN = 0.2
 """Unit of the change of a radius [m]."""
 SIZES = (
     ("arrival", 1),
-    ("way_clearance", N_LOOKS + 1),
+    ("base_clearance", N_LOOKS + 1),
     ("aside_clearance", N_ASIDE * (N_LOOKS + 1)),
     ("goal_gap_ahead", N_LOOKS),
     ("radius_ahead", N_LOOKS),
@@ -54,7 +54,7 @@ SIZES = (
 LAYOUT = slices_of(SIZES)
 """Slice of each group among these features."""
 N_OPTION_FEATURES = sum(size for _, size in SIZES)
-BASE, ASIDE = LAYOUT["way_clearance"].start, LAYOUT["aside_clearance"].start
+BASE, ASIDE = LAYOUT["base_clearance"].start, LAYOUT["aside_clearance"].start
 GOAL, GROWTH = LAYOUT["goal_gap_ahead"].start, LAYOUT["radius_ahead"].start
 
 

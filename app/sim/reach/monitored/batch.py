@@ -22,7 +22,7 @@ from app.sim.people.kernels.pedestrian import GROWTH, VX, VY
 from app.sim.people.kernels.people import new_people_geometry
 from app.sim.reach.batch import ReachBatch, ReachSettings
 from app.sim.reach.monitored.kernels import step
-from app.sim.reach.monitored.kernels.step import (
+from app.sim.reach.monitored.kernels.state import (
     BELOW_HALF,
     CELL,
     CONTACT,

@@ -22,7 +22,7 @@ five. In a shortest plan the lowest object so taken from ``a`` goes straight ont
 ``cut`` is the lowest level for which such ``b`` and ``e`` exist; mostly there are none, ``cut``
 is ``m``, states follow one another in one order and one sweep is enough.
 
-Source: METHOD 1.2; the fewest moves are held against breadth-first search in the tests.
+Source: METHOD 1.2; tests compare the number of moves with breadth-first search.
 """
 
 from typing import NamedTuple

@@ -44,13 +44,15 @@ def test_clavicles_of_either_side_give_their_angles_back() -> None:
     angles = np.random.default_rng(5).uniform(-0.5, 0.5, (20, 2))
     a, b = angles.T
     for side in (-1.0, 1.0):
-        ways = np.column_stack([np.cos(b) * np.sin(a), side * np.cos(b) * np.cos(a), np.sin(b)])
+        directions = np.column_stack(
+            [np.cos(b) * np.sin(a), side * np.cos(b) * np.cos(a), np.sin(b)]
+        )
         out = np.empty((20, 2))
-        joint_angles.clavicles_to_angles(ways, side, out)
+        joint_angles.clavicles_to_angles(directions, side, out)
         np.testing.assert_allclose(out, angles, atol=1e-12)
 
 
-def test_somebody_whose_left_is_y_heads_along_x() -> None:
+def test_person_whose_left_is_y_heads_along_x() -> None:
     across = np.array([[0.0, 0.3], [-0.3, 0.0], [0.0, -0.3]])
     np.testing.assert_allclose(joint_angles.headings(across), [0.0, np.pi / 2, -np.pi])
 

@@ -61,7 +61,7 @@ def test_capsules_are_those_of_the_tree_wherever_they_stand_among_the_columns() 
             assert np.abs(ends - expected[k].reshape(ends.shape)).max() < 1e-12
 
 
-def test_columns_know_lengths_and_radii_of_whoever_was_placed_last() -> None:
+def test_columns_know_lengths_and_radii_of_the_person_placed_last() -> None:
     trig, out = np.empty((3, 16)), body.capsule_columns(1)
     points, rotations = np.empty((body.N_POINTS, 3)), np.empty((body.N_FRAMES, 3, 3))
     for size in SIZES:

@@ -57,7 +57,7 @@ def test_clearance_is_that_of_the_nearest_person(kinds: tuple[HumanKind, ...]) -
 
 
 @pytest.mark.parametrize("kinds", MIXES)
-def test_starts_keep_clear_of_everybody(kinds: tuple[HumanKind, ...]) -> None:
+def test_starts_keep_clear_of_all_people(kinds: tuple[HumanKind, ...]) -> None:
     batch = PickBatch(CELL, 100, 5, PickSettings(people=kinds))
     assert np.isfinite(batch.reset()).all()
     assert (batch.state.clear[:, 0] >= 0.05).all()
@@ -84,7 +84,7 @@ def test_more_people_collide_more_often() -> None:
     assert shares[0] == 0.0 < shares[1] < shares[2]
 
 
-def test_policy_sees_the_nearest_person_whoever_it_is() -> None:
+def test_policy_sees_the_nearest_person_of_any_kind() -> None:
     batch = PickBatch(
         CELL, 40, 7, PickSettings(people=("worker", "worker", "walker"), observation="state")
     )
@@ -101,7 +101,7 @@ def test_policy_sees_the_nearest_person_whoever_it_is() -> None:
     assert seen == {0, 1, 2}
 
 
-def test_nobody_is_seen_as_somebody_too_far_away_to_matter() -> None:
+def test_an_empty_cell_is_seen_as_a_person_too_far_away_to_matter() -> None:
     batch = PickBatch(CELL, 2, 7, PickSettings(people=(), observation="state"))
     obs = batch.reset()
     np.testing.assert_allclose(obs[0, 12:30], human.rest_posture(*scene.FAR_AWAY), atol=1e-6)
@@ -127,13 +127,13 @@ def test_contact_names_the_person_that_is_touched() -> None:
 def test_a_walker_that_passes_between_two_poses_is_a_contact() -> None:
     cell = with_people(CELL, ("walker",))
     arm, people, zero = arm_of(cell), people_of(cell), np.zeros(6)
-    nobody = np.zeros((0, 18))
+    no_people = np.zeros((0, 18))
     before, after = np.array([[-1.5, 0.6, 0.2]]), np.array([[1.5, 0.6, 0.2]])
     q = PickBatch(CELL, 1, 0, PickSettings()).world.station_q[3]
     for cylinders in (before, after):
-        assert clearance(arm, people, q, nobody, cylinders).people_m > 0.3
+        assert clearance(arm, people, q, no_people, cylinders).people_m > 0.3
     found = contact(
-        arm, people, JointPath(q, zero, zero, zero), (nobody, nobody), (before, after)
+        arm, people, JointPath(q, zero, zero, zero), (no_people, no_people), (before, after)
     )
     assert found.kind == "human"
     assert 0.0 < found.time_s < arm.dt

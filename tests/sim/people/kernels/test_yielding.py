@@ -39,8 +39,8 @@ def test_closeness_goes_from_nothing_to_all() -> None:
 @pytest.mark.parametrize("yaw", [0.0, 1.0, -2.5])
 def test_the_head_moves_away_from_the_tool_wherever_it_comes_from(yaw: float) -> None:
     size = load_cell().body
-    for way in np.linspace(0.0, 2.0 * np.pi, 9):
-        tool = (0.6 * np.cos(way), 0.6 * np.sin(way))
+    for angle in np.linspace(0.0, 2.0 * np.pi, 9):
+        tool = (0.6 * np.cos(angle), 0.6 * np.sin(angle))
         q = human.rest_posture(0.0, 0.0, yaw)
         before = human.joint_points(q, size)["head"][:2]
         q[3:5] += leaned(yaw, tool)
@@ -65,14 +65,14 @@ def after(yielding: float, robot_moves: bool, steps: int = 40) -> tuple[np.ndarr
     return batch.state.people.q[:, 0].copy(), batch.state.outcome == RUNNING
 
 
-def test_without_courtesy_the_person_does_not_see_what_the_robot_does() -> None:
+def test_without_yielding_the_person_does_not_see_what_the_robot_does() -> None:
     (blind, there), (alone, here) = after(0.0, robot_moves=True), after(0.0, robot_moves=False)
     both = there & here
     assert both.sum() > 10
     np.testing.assert_array_equal(blind[both], alone[both])
 
 
-def test_with_courtesy_the_person_leaves_its_script_beside_the_arm() -> None:
+def test_with_yielding_the_person_leaves_its_script_beside_the_arm() -> None:
     (blind, there), (kind, here) = after(0.0, robot_moves=True), after(1.0, robot_moves=True)
     both = there & here
     apart = np.abs(kind[both] - blind[both]).max(axis=1)

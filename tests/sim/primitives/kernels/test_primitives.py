@@ -150,7 +150,7 @@ def test_a_hand_is_kept_until_the_worker_is_home_again() -> None:
         assert (left[1:] == left[:-1])[away].all()
 
 
-def test_without_variation_durations_are_the_primitives_own_and_nobody_pauses() -> None:
+def test_without_variation_durations_are_the_primitives_own_and_without_pauses() -> None:
     script = drawn(3, varied=False)
     n = int(script["n"])
     np.testing.assert_allclose(script["duration"][:n], 1.2)

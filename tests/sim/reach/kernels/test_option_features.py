@@ -84,7 +84,7 @@ def test_base_motion_ends_at_the_goal() -> None:
     found = features(batch)
     arrival = found[:, 0]
     assert (arrival > 0.3).all()
-    straight = found[:, LAYOUT["way_clearance"]]
+    straight = found[:, LAYOUT["base_clearance"]]
     for e in range(batch.n_envs):
         counted = [i for i, t in enumerate(TIMES) if t <= arrival[e] + option_features.AFTER_S]
         assert straight[e, -1] == pytest.approx(straight[e, counted].min(), abs=1e-6)
@@ -109,7 +109,7 @@ def test_the_nearest_person_counts_for_each_option(people: tuple[str, ...]) -> N
     batch = batch_of(*people, observation="forecast")
     observed(batch)
     rows, goals = np.arange(batch.n_envs), batch.state.goal[:, None]
-    groups = [LAYOUT["way_clearance"], LAYOUT["aside_clearance"]]
+    groups = [LAYOUT["base_clearance"], LAYOUT["aside_clearance"]]
     all_of = batch.observe_goals(rows, goals)[:, 0, N_FEATURES:]
     alone = [
         batch.observe_goals(rows, goals, who)[:, 0, N_FEATURES:] for who in range(len(people))
@@ -121,5 +121,5 @@ def test_the_nearest_person_counts_for_each_option(people: tuple[str, ...]) -> N
 
 def test_clearances_in_an_empty_cell() -> None:
     found = features(batch_of(observation="forecast"))
-    assert (found[:, LAYOUT["way_clearance"]] == 2.0).all()
+    assert (found[:, LAYOUT["base_clearance"]] == 2.0).all()
     assert (found[:, LAYOUT["radius_ahead"]] == 0.0).all()

@@ -91,9 +91,13 @@ def test_distances_are_those_to_each_person_and_the_nearest_is_the_least() -> No
     found = batch.person_distances(all_envs(batch))
     for e in all_envs(batch):
         to_worker = contact.clearance(
-            batch.arm, people, state.q[e], state.people.q[e], np.zeros((0, 3)),
+            batch.arm,
+            people,
+            state.q[e],
+            state.people.q[e],
+            np.zeros((0, 3)),
             state.people.size[e],
-        )  # fmt: skip
+        )
         to_walkers = [
             contact.clearance(batch.arm, people, state.q[e], np.zeros((0, 18)), row[None])
             for row in state.people.cylinders[e]

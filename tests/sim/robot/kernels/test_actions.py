@@ -62,9 +62,15 @@ SETS = {
     ),
 }
 PUSHES = (
-    "random", "up", "down", "flip each step", "ends at random", "nearest limit",
-    "away at the last moment", "urgency at random",
-)  # fmt: skip
+    "random",
+    "up",
+    "down",
+    "flip each step",
+    "ends at random",
+    "nearest limit",
+    "away at the last moment",
+    "urgency at random",
+)
 
 
 def pushes(kind: str, limit: Limits, n_steps: int, rng: np.random.Generator):
@@ -301,9 +307,13 @@ def test_a_state_beyond_its_limit_is_unfeasible_and_brakes(degree: int) -> None:
 def unfeasible_share(qdd_max: float, push: str, n: int) -> float:
     """Share of 5 s episodes whose interval becomes empty under the one-step bounds."""
     limit = Limits(
-        np.full(N, -2 * np.pi), np.full(N, 2 * np.pi), np.ones(N), np.full(N, qdd_max),
-        np.full(N, 50.0), 0.02,
-    )  # fmt: skip
+        np.full(N, -2 * np.pi),
+        np.full(N, 2 * np.pi),
+        np.ones(N),
+        np.full(N, qdd_max),
+        np.full(N, 50.0),
+        0.02,
+    )
     rng, rule = np.random.default_rng(19), ActionRule(2, MYOPIC, COEFFICIENT)
     out, ended = Coefficients(*np.empty((2, N))), 0
     for _ in range(n):

@@ -1,4 +1,5 @@
 """Compiled monitored reach step.
 
-step  Steps of the reach scenario under speed and separation monitoring (compiled)
+state  Data of the steps: accounts, command, results
+step   Steps of the reach scenario under speed and separation monitoring (compiled)
 """

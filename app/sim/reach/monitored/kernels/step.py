@@ -11,7 +11,6 @@ Source: docs/method.md 2.6 (last row) and 2.7.
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +35,25 @@ from app.sim.people.kernels.pedestrian import (
 from app.sim.people.kernels.people import place_people
 from app.sim.reach.kernels.episode import ReachCell, ReachTask
 from app.sim.reach.kernels.reward import reward
+from app.sim.reach.monitored.kernels.state import (
+    BELOW_HALF,
+    CELL,
+    CONTACT,
+    FASTEST,
+    JOINT_PATH,
+    N_ACCOUNT,
+    PERIODS,
+    PERSON,
+    SLOWED,
+    SPEED,
+    STANDSTILL,
+    STANDSTILL_STOPPED,
+    STOPPED,
+    TOOL_PATH,
+    Commands,
+    MonitoredState,
+    StepResults,
+)
 from app.sim.robot.kernels.actions import ActionRule, Coefficients, advance
 from app.sim.robot.kernels.arm import copy_capsules, place_robot
 from app.sim.robot.kernels.joints import JointPath, JointState
@@ -44,7 +62,6 @@ from app.sim.safety.kernels.adversarial_trials import MOVING, first_contact, tou
 from app.sim.safety.kernels.separation_check import (
     NOW,
     PeopleShapes,
-    SeparationRule,
     SsmWorkspace,
     place_node,
 )
@@ -62,75 +79,8 @@ from app.sim.scenario.kernels.episode import (
     measure,
 )
 
-N_ACCOUNT = 11
-(
-    PERIODS,
-    STOPPED,
-    BELOW_HALF,
-    SLOWED,
-    STANDSTILL,
-    STANDSTILL_STOPPED,
-    JOINT_PATH,
-    TOOL_PATH,
-    CONTACT,
-    SPEED,
-    FASTEST,
-) = range(N_ACCOUNT)
-"""Account of an episode: control cycles; cycles with override 0, below one half and below 1;
-cycles that end at standstill, and those of them with override 0; path length of the joints
-[rad] and of the tcp [m]; NO_TOUCH, PERSON or CELL; speed of the touching link [m/s]; greatest
-speed of any person [m/s]."""
-NO_TOUCH, PERSON, CELL = range(3)
-"""Contacts of an episode."""
 AT_REST = 1e-3
 """Largest joint speed of a robot at standstill [rad/s]."""
-
-
-class MonitoredState(NamedTuple):
-    """Safety layer, tracks and accounts of the environments."""
-
-    safety: SeparationRule
-    """Assumptions of the safety layer."""
-    active: bool
-    """Whether the layer acts; otherwise segments are executed as commanded."""
-    rest_ends: bool
-    """Whether a person who walks into a robot at standstill ends the episode."""
-    horizon: float
-    """Largest time left that a policy observes [s]."""
-    measured: bool
-    """Whether the layer uses the measured velocity of pedestrians."""
-    tracks: Vec
-    """Cylinder in place of each environment's first pedestrian at the ends of control cycles:
-    x, y, radius [m], shape (n_envs, n + 1, 3); no rows where people walk by themselves."""
-    period: NDArray[np.int64]
-    """Control cycle of each track, shape (n_envs,)."""
-    trial: TrialWorkspace
-    """Work space of the contact search and the safety layer."""
-    override: Vec
-    """Override of the last control cycle, shape (n_envs,)."""
-    account: Vec
-    """Account of the present episode, shape (n_envs, N_ACCOUNT)."""
-    closed: Vec
-    """Account of each environment's last completed episode, shape (n_envs, N_ACCOUNT)."""
-
-
-class Commands(NamedTuple):
-    """Commands of one control cycle: actions, or segments."""
-
-    act: NDArray[np.float32]
-    """Actions of all environments, shape (n_envs, 6)."""
-    segments: Vec
-    """Second coefficients of segments of degree 2, one per stepped environment [rad/s^2], shape
-    (k, 6); no rows for actions."""
-
-
-class StepResults(NamedTuple):
-    """Results of one control cycle; entries of other environments are left unchanged."""
-
-    rew: NDArray[np.float32]
-    """Rewards, shape (n_envs,)."""
-    ended: NDArray[np.int64]
-    """Outcome of episodes that ended now, RUNNING elsewhere, shape (n_envs,)."""
 
 
 @kernel(inline="always")

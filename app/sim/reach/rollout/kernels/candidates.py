@@ -60,8 +60,6 @@ SAMPLE = EVASION + len(DIRECTIONS)
 """Kind: sampled waypoint."""
 N_DETERMINISTIC = N_FIXED + len(DIRECTIONS) * len(EVASION_STEPS)
 """Candidates that are not sampled."""
-N_CANDIDATES = N_DETERMINISTIC + 1
-"""All candidates: fixed ones, evasions, and one number for all samples."""
 N_SAMPLES, N_SAMPLES_SSM = 32, 128
 """Samples per decision, without and with a speed and separation constraint."""
 SAMPLE_STEPS = N_MOMENTS - 1
