@@ -2,25 +2,19 @@
 
 artifacts           Detection of motion-capture artefacts by speed, and the clean runs between
                     them
-bvh                 Reading BVH files: a skeleton as a tree of joints, and its channels frame
-                    by frame
-csv_tables          Joint angles in tables: CSV with our own columns
-csv_text            The text of a CSV file as spreadsheets, statistics programs and people
-                    write it
+bvh                 Reader of BVH files
+csv_tables          Reader of joint angles in CSV files with the columns of this project
+csv_text            Reader of CSV text of spreadsheets and statistics programs
+faults              Errors of recordings: place, value and rule
 importer            Import of recorded human motion as clean runs of the 18-DoF model
-inverse_kinematics  From joint centres to the 18 angles, in closed form (docs/method.md 3.4)
-joint_centres       Joint centres of a recorded person, frame by frame, and the body measured
-                    from them
-joint_names         Which joint of a recorded skeleton is which, by the names of the skeletons
-                    in common use
-length_units        The unit of a recorded skeleton, and whether the root's path is in the same
-opensim             Reading OpenSim's tables of joint angles (``.mot``, ``.sto``) onto the
-                    18-DoF model
-read_options        What a caller states about a recording, and how it was read: units, axis,
-                    names
-repeated_frames     Motion that was written at a higher rate than recorded, by repeating frames
-skeletons           From a recorded skeleton to a person's joint centres in metres, z up
-tables              Tables of joint angles as other programs write them: columns by name,
-                    missing values found
-up_axis             Which axis of a recording points up
+inverse_kinematics  Inverse kinematics from joint centres to the 18 angles, in closed form
+joint_centres       Joint centres of a recorded person over time, and body lengths measured
+joint_names         Identification of the joints of a recorded skeleton by name
+length_units        Units of a recorded skeleton and of its root's path
+opensim             Reader of OpenSim's tables of joint angles (``.mot``, ``.sto``)
+read_options        Stated properties of a recording and its interpretation
+repeated_frames     Removal of repeated frames
+skeletons           Conversion of a recorded skeleton to joint centres in metres, z up
+tables              Tables of joint angles of other programs, with columns by name
+up_axis             Detection of the up axis of a recording
 """

@@ -60,8 +60,8 @@ def find_artifacts(times: Vec, points: Vec) -> tuple[Artifact, ...]:
     bad = np.flatnonzero((speeds > MAX_SPEED).any(axis=1) | holes)
     if not bad.size:
         return ()
-    parted = np.flatnonzero(np.diff(times[bad]) > 2.0 * MARGIN) + 1
-    return tuple(_artifact(group, speeds, holes, dt) for group in np.split(bad, parted))
+    split_at = np.flatnonzero(np.diff(times[bad]) > 2.0 * MARGIN) + 1
+    return tuple(_artifact(group, speeds, holes, dt) for group in np.split(bad, split_at))
 
 
 def clean_runs(times: Vec, artifacts: Sequence[Artifact]) -> tuple[tuple[int, int], ...]:

@@ -1,9 +1,8 @@
-"""Reading BVH files: a skeleton as a tree of joints, and its channels frame by frame.
+"""Reader of BVH files: a skeleton as a tree of joints, and its channels per frame.
 
-The text is anybody's: what cannot be read is a :class:`~app.errors.BadRecording` whose faults
-name the line. Angles of a BVH file are degrees; lengths are in no unit that the file tells.
-Source: Biovision's format as described by Meredith and Maddock, "Motion capture file formats
-explained" (2001).
+An invalid file raises :class:`~app.errors.BadRecording`, whose faults name the line. Angles are
+in degrees; the format does not state the unit of lengths. Source: Meredith and Maddock, "Motion
+capture file formats explained" (2001).
 """
 
 import re
@@ -14,21 +13,20 @@ import numpy as np
 
 from app.errors import BadRecording, Fault, digits
 from app.sim.core.arrays import Vec
+from app.sim.mocap.faults import MAX_FAULTS, bad, shown
 
 MAX_JOINTS = 300
-"""Most joints of a skeleton; one with all fingers has about 80."""
+"""Largest number of joints; a skeleton with all fingers has about 80."""
 MAX_DEPTH = 60
-"""Deepest nesting of joints."""
+"""Largest depth of the tree."""
 MAX_FRAMES = 200_000
-"""Most frames of a file: half an hour at 100 frames/s."""
+"""Largest number of frames: half an hour at 100 Hz."""
 MAX_LINE_ENDS = 4 * MAX_FRAMES + 10_000
-"""Most ends of lines of a file: two per line, and as many empty lines as frames."""
-MAX_FAULTS = 20
-"""Most faults that one answer lists."""
+"""Largest number of line ends: two per line, and as many empty lines as frames."""
 MAX_NUMBER = 1e9
-"""Largest number of a file, whatever its unit."""
+"""Largest number in a file, in any unit."""
 MIN_DT, MAX_DT = 1e-3, 0.1
-"""Time between two frames [s]: what motion capture delivers."""
+"""Range of the time between two frames in motion capture [s]."""
 
 _CHANNELS = ("Xposition", "Yposition", "Zposition", "Xrotation", "Yrotation", "Zrotation")
 _WORDS = ("HIERARCHY", "ROOT", "JOINT", "End", "OFFSET", "CHANNELS", "{", "}")
@@ -36,23 +34,23 @@ _WORDS = ("HIERARCHY", "ROOT", "JOINT", "End", "OFFSET", "CHANNELS", "{", "}")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BvhJoint:
-    """One joint of the tree; parents stand before their children."""
+    """One joint of the tree; parents precede their children."""
 
     name: str
-    """As in the file; an end site has the name of its joint and ``.end``."""
+    """Name in the file; of an end site, the name of its joint and ``.end``."""
     parent: int
     """Index of the parent; -1 for the root."""
     offset: tuple[float, float, float]
-    """From the parent, in the parent's frame [the file's unit]."""
+    """Position in the parent's frame [the file's unit]."""
     channels: tuple[str, ...]
-    """In the file's order, which is the order of multiplication."""
+    """Channels in the file's order, which is the order of multiplication."""
     line: int
     """Line of the file that opens the joint."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bvh:
-    """A whole file."""
+    """Content of a file."""
 
     joints: tuple[BvhJoint, ...]
     """The skeleton, root first."""
@@ -65,24 +63,21 @@ class Bvh:
 
     @property
     def channels(self) -> tuple[tuple[int, str], ...]:
-        """Joint and name of every column of ``values``."""
+        """Index of the joint and name of the channel, per column of ``values``."""
         return tuple((k, name) for k, one in enumerate(self.joints) for name in one.channels)
 
 
 def read_bvh(text: str) -> Bvh:
     """Return the skeleton and the channels of a file.
 
-    Args:
-        text: The file's content.
-
     Raises:
-        BadRecording: It is no sound BVH; the faults name lines.
+        BadRecording: The text is not a valid BVH file; the faults name lines.
     """
     lines = lines_of(text)
     start = next((k for k, line in enumerate(lines) if line.split()[:1] == ["MOTION"]), None)
     if start is None:
-        rule = "has no line MOTION, after which the frames stand"
-        raise _bad(len(lines), "", rule, "the file is cut off or no BVH")
+        rule = "has no line MOTION, which precedes the frames"
+        raise bad(len(lines), "", rule, "the file is cut off or not a BVH file")
     joints = _Tree(_words(lines[:start])).read()
     n_channels = sum(len(joint.channels) for joint in joints)
     head = [(k + 1, lines[k]) for k in range(start + 1, len(lines)) if lines[k].strip()]
@@ -96,24 +91,23 @@ def lines_of(text: str) -> list[str]:
     """Return the lines of a text.
 
     Raises:
-        BadRecording: It has many more than a file of MAX_FRAMES frames.
+        BadRecording: The text has more lines than a file of MAX_FRAMES frames.
     """
     n_ends = sum(text.count(end) for end in "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029")
     if n_ends > MAX_LINE_ENDS:
         rule = f"must be at most {MAX_FRAMES}"
-        raise _bad("frames", f"<{n_ends} ends of lines>", rule, "cut the file into parts")
+        raise bad("frames", f"<{n_ends} ends of lines>", rule, "cut the file into parts")
     return text.splitlines()
 
 
 def forward(bvh: Bvh, wanted: Sequence[int]) -> Vec:
     """Return the positions of some joints [the file's unit], shape (n, len(wanted), 3).
 
-    A joint with position channels stands where they say, in its parent's frame; its offset
-    counts only where it has none (as in most readers; of the root, offsets are zero).
+    Position channels replace the offset of a joint, as in most readers.
 
     Args:
-        bvh: The file.
-        wanted: Indices of joints.
+        bvh: Content of the file.
+        wanted: Indices of the joints.
     """
     needed = _with_ancestors(bvh, wanted)
     places: dict[int, Vec] = {}
@@ -144,7 +138,7 @@ def _with_ancestors(bvh: Bvh, wanted: Sequence[int]) -> set[int]:
 
 
 def _local(joint: BvhJoint, values: Vec) -> tuple[Vec, Vec | None]:
-    """Return place and rotation of a joint in its parent; None where it never turns."""
+    """Return position and rotation of a joint in its parent's frame; None: no rotation."""
     place, turn = np.tile(np.asarray(joint.offset), (len(values), 1)), None
     for name, value in zip(joint.channels, values.T, strict=True):
         axis = "XYZ".index(name[0])
@@ -176,18 +170,18 @@ def read_rows(
     """Return a table of finite numbers, shape (n, n_columns).
 
     Args:
-        lines: Line numbers and texts, none empty.
-        n_columns: Numbers that each line must hold.
-        n_rows: Lines that the file's head promises; None where it promises nothing.
-        what: What a line must hold, for the message.
-        separator: Between numbers; white space where None.
+        lines: Line numbers and texts, without empty lines.
+        n_columns: Number of values per line.
+        n_rows: Number of lines stated in the head of the file; None if not stated.
+        what: Required content of a line, for the message.
+        separator: Separator of numbers; None for white space.
 
     Raises:
-        BadRecording: A line has too few or too many numbers, or something else.
+        BadRecording: A line holds another number of values, or text.
     """
     if len(lines) > MAX_FRAMES or (n_rows or 0) > MAX_FRAMES:
         value = f"<{max(len(lines), n_rows or 0)} frames>"
-        raise _bad("frames", value, f"must be at most {MAX_FRAMES}", "cut the file into parts")
+        raise bad("frames", value, f"must be at most {MAX_FRAMES}", "cut the file into parts")
     faults: list[Fault] = []
     values = np.zeros((len(lines), n_columns))
     for k, (number, line) in enumerate(lines):
@@ -206,14 +200,14 @@ def read_rows(
         if len(faults) >= MAX_FAULTS:
             break
     if not faults and n_rows is not None and len(lines) != n_rows:
-        rule = f"must be the {n_rows} that the head of the file promises"
+        rule = f"must be the {n_rows} that the head of the file states"
         hint = "the file is cut off" if len(lines) < n_rows else ""
         place = f"frames, last line {lines[-1][0]}" if lines else "frames"
         faults.append(Fault(place=place, value=f"<{len(lines)}>", rule=rule, hint=hint))
     if faults:
         raise BadRecording(faults[:MAX_FAULTS])
     if len(values) < 2:
-        raise _bad("frames", f"<{len(values)}>", "must be at least 2", "one frame is no motion")
+        raise bad("frames", f"<{len(values)}>", "must be at least 2", "one frame is no motion")
     return values
 
 
@@ -226,7 +220,7 @@ def _bad_words(words: Sequence[str], line: int) -> Iterator[Fault]:
 
 
 def _number_rule(word: str) -> str:
-    """Return the rule that a word breaks; empty where it is a sound number."""
+    """Return the rule that a word violates; empty for a valid number."""
     try:
         value = float(word)
     except ValueError:
@@ -237,22 +231,17 @@ def _number_rule(word: str) -> str:
 
 
 def _comma_hint(text: str) -> str:
-    """Return what commas in a piece of a file mean; empty where it has none."""
+    """Return a hint about commas in a text; empty without commas."""
     if re.fullmatch(r"[-+]?\d*,\d*(e[-+]?\d+)?", text.strip(), re.IGNORECASE):
         return "decimal commas: write points"
     return "commas between numbers: write spaces" if "," in text else ""
 
 
-def shown(text: str) -> str:
-    """Return a piece of a file, short enough for a message."""
-    return repr(text if len(text) <= 40 else f"{text[:37]}...")
-
-
 def check_dt(dt: float, place: str) -> float:
-    """Return the time between two frames [s].
+    """Return the time between two frames [s], validated.
 
     Raises:
-        BadRecording: Motion capture has no such rate.
+        BadRecording: The time is outside [MIN_DT, MAX_DT].
     """
     if MIN_DT <= dt <= MAX_DT:
         return dt
@@ -262,24 +251,24 @@ def check_dt(dt: float, place: str) -> float:
     if dt > 0.0 and MIN_DT <= 1.0 / dt <= MAX_DT:
         guesses.append(f"frames per second: in s that is {1.0 / dt:g}")
     hint = f"looks like {' or '.join(guesses)}" if guesses else ""
-    raise _bad(place, f"{dt:g}", f"must lie in [{MIN_DT}, {MAX_DT}] s between frames", hint)
+    raise bad(place, f"{dt:g}", f"must lie in [{MIN_DT}, {MAX_DT}] s between frames", hint)
 
 
 def _frame_lines(head: list[tuple[int, str]], n_lines: int) -> tuple[int, float]:
-    """Read ``Frames: n`` and ``Frame Time: s``."""
+    """Return number of frames and frame time [s] from their two lines."""
     texts = [*head, (n_lines, ""), (n_lines, "")][:2]
     found = []
     for (line, text), name in zip(texts, ("Frames:", "Frame Time:"), strict=True):
         rest = text.strip()
         if not rest.startswith(name):
-            raise _bad(line, shown(rest), f'must be "{name}" with a number')
+            raise bad(line, shown(rest), f'must be "{name}" with a number')
         word = rest[len(name) :].strip()
         rule = _number_rule(word)
         if rule:
-            raise _bad(line, shown(word), rule, _comma_hint(word))
+            raise bad(line, shown(word), rule, _comma_hint(word))
         found.append(float(word))
     if found[0] < 0.0 or found[0] != int(found[0]):
-        raise _bad(texts[0][0], f"{found[0]:g}", "must be a whole number of frames")
+        raise bad(texts[0][0], f"{found[0]:g}", "must be a whole number of frames")
     return int(found[0]), check_dt(found[1], f"line {texts[1][0]}, Frame Time")
 
 
@@ -290,7 +279,7 @@ def _words(lines: list[str]) -> Iterator[tuple[int, str]]:
 
 
 class _Tree:
-    """Reads the words of the hierarchy into joints."""
+    """Parser of the hierarchy section."""
 
     def __init__(self, words: Iterator[tuple[int, str]]) -> None:
         self._words, self._line = words, 1
@@ -301,13 +290,13 @@ class _Tree:
     def read(self) -> tuple[BvhJoint, ...]:
         """Return all joints, the root first."""
         if self._next("HIERARCHY") != "HIERARCHY":
-            raise _bad(self._line, "", "must be HIERARCHY", "the file is no BVH")
+            raise bad(self._line, "", "must be HIERARCHY", "the file is not a BVH file")
         self._open_joint(self._next("ROOT"))
         while self._open:
             self._part(self._next("} or JOINT"))
         if self._ahead is not None:
-            rule = "must be MOTION: one skeleton is read from a file"
-            raise _bad(self._ahead[0], shown(self._ahead[1]), rule)
+            rule = "must be MOTION: a file must hold one skeleton"
+            raise bad(self._ahead[0], shown(self._ahead[1]), rule)
         return tuple(self._joints)
 
     def _part(self, word: str) -> None:
@@ -317,11 +306,11 @@ class _Tree:
             self._open_joint(word)
         else:
             rule = f"must be one of {', '.join(_WORDS[2:])}"
-            raise _bad(self._line, shown(word), rule)
+            raise bad(self._line, shown(word), rule)
 
     def _open_joint(self, word: str) -> None:
         if word not in ("ROOT", "JOINT", "End") or (word == "ROOT") != (not self._joints):
-            raise _bad(self._line, shown(word), "must be ROOT, and only once")
+            raise bad(self._line, shown(word), "must be ROOT, and only once")
         line, parent = self._line, self._open[-1] if self._open else -1
         name = self._name(word, parent)
         self._expect("{")
@@ -333,57 +322,52 @@ class _Tree:
         )
         if len(self._joints) > MAX_JOINTS or len(self._open) >= MAX_DEPTH:
             rule = f"must have at most {MAX_JOINTS} joints, nested at most {MAX_DEPTH} deep"
-            raise _bad(line, "", rule)
+            raise bad(line, "", rule)
         self._open.append(len(self._joints) - 1)
 
     def _name(self, word: str, parent: int) -> str:
-        """Read a joint's name, which may have several words, up to its brace."""
+        """Return a joint's name, which may have several words, up to its brace."""
         words = [self._next("a name")]
         if word == "End":
             return f"{self._joints[parent].name}.end"
         if words[0] in _WORDS:
-            raise _bad(self._line, shown(words[0]), "must be the name of a joint")
+            raise bad(self._line, shown(words[0]), "must be the name of a joint")
         line = self._line
         while self._ahead is not None and self._ahead[0] == line and self._ahead[1] != "{":
             words.append(self._next("a name"))
         name = " ".join(words)
         if any(one.name == name for one in self._joints):
-            raise _bad(line, shown(name), "is the name of two joints")
+            raise bad(line, shown(name), "is the name of two joints")
         return name
 
     def _channels(self) -> tuple[str, ...]:
         self._expect("CHANNELS")
         count = self._number()
         if count not in range(7):
-            raise _bad(self._line, f"{count:g}", "must be 0 to 6 channels")
+            raise bad(self._line, f"{count:g}", "must be 0 to 6 channels")
         names = tuple(self._next("a channel") for _ in range(int(count)))
         for name in names:
             if name not in _CHANNELS or names.count(name) > 1:
                 rule = f"must be one of {', '.join(_CHANNELS)}, each once"
-                raise _bad(self._line, shown(name), rule)
+                raise bad(self._line, shown(name), rule)
         return names
 
     def _number(self) -> float:
         word = self._next("a number")
         rule = _number_rule(word)
         if rule:
-            raise _bad(self._line, shown(word), rule, _comma_hint(word))
+            raise bad(self._line, shown(word), rule, _comma_hint(word))
         return float(word)
 
     def _expect(self, word: str) -> None:
         found = self._next(word)
         if found != word:
-            raise _bad(self._line, shown(found), f"must be {word}")
+            raise bad(self._line, shown(found), f"must be {word}")
 
     def _next(self, wanted: str) -> str:
         found, self._ahead = self._ahead, next(self._words, None)
         if found is None:
-            rule = f"ends where {wanted} must stand"
-            raise _bad(self._line, "", rule, "a } is missing or the file is cut off")
+            rule = f"ends where {wanted} must follow"
+            raise bad(self._line, "", rule, "a } is missing or the file is cut off")
         self._line, word = found
         return word
-
-
-def _bad(place: int | str, value: str, rule: str, hint: str = "") -> BadRecording:
-    where = f"line {place}" if isinstance(place, int) else place
-    return BadRecording([Fault(place=where, value=value, rule=rule, hint=hint)])

@@ -1,9 +1,9 @@
-"""Joint angles in tables: CSV with our own columns.
+"""Reader of joint angles in CSV files with the columns of this project.
 
-Declared are ``# angles = degrees`` (or ``radians``) and, where there is no column ``time``,
-``# rate_hz = 100``. A line names the columns: the 18 of ``human.JOINT_NAMES`` in any order,
-and, if wanted, ``time`` [s] and ``pelvis_z``, the height of the pelvis above its height in
-standing [m]. ``pelvis_x`` and ``pelvis_y`` are metres. ``csv_text.py`` reads the text.
+Comments declare ``# angles = degrees`` (or ``radians``) and, without a column ``time``,
+``# rate_hz = 100``. A line names the columns: the 18 of ``human.JOINT_NAMES`` in any order and,
+optionally, ``time`` [s] and ``pelvis_z``, the height of the pelvis above its standing height
+[m]. ``pelvis_x`` and ``pelvis_y`` are in metres.
 """
 
 from collections.abc import Mapping
@@ -16,23 +16,24 @@ from app.errors import digits
 from app.sim.core.arrays import Vec
 from app.sim.human.model import JOINT_NAMES
 from app.sim.mocap.artifacts import Artifact
-from app.sim.mocap.bvh import check_dt, shown
+from app.sim.mocap.bvh import check_dt
 from app.sim.mocap.csv_text import CsvText, read_csv_text
-from app.sim.mocap.tables import TextTable, bad, complete_rows, missing_values
+from app.sim.mocap.faults import bad, shown
+from app.sim.mocap.tables import TextTable, complete_rows, missing_values
 
 CSV_COLUMNS = ("time", *JOINT_NAMES, "pelvis_z")
-"""Columns that a CSV file can have."""
+"""Columns of a CSV file."""
 ANGLE_UNITS: Mapping[str, tuple[str, ...]] = {
     "degrees": ("deg", "degs", "degree", "degrees", "°"),
     "radians": ("rad", "rads", "radian", "radians"),
 }
-"""Units that angles can be declared in, and what files call them."""
+"""Units of angles, and their names in files."""
 MAX_RADIANS = 8.0
-"""A table in radians whose joint angles exceed this is in degrees [rad]."""
+"""Largest joint angle of a table in radians [rad]; larger ones indicate degrees."""
 MIN_DEGREES = 3.2
-"""A table in degrees none of whose joint angles exceeds this is in radians [deg]."""
+"""Least maximum of a table in degrees [deg]; a lower one indicates radians."""
 MAX_PLACE = 100.0
-"""Farthest from the origin that a pelvis stands [m]."""
+"""Largest distance of the pelvis from the origin [m]."""
 
 _SECONDS = ("s", "sec", "second", "seconds")
 _METRES = ("m", "metre", "metres", "meter", "meters")
@@ -41,33 +42,33 @@ _PLACES = ("pelvis_x", "pelvis_y", "pelvis_z")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AngleTrack:
-    """Joint angles over time, as a file gives them."""
+    """Joint angles over time, as given in a file."""
 
     times: Vec
-    """Rising [s], shape (n,)."""
+    """Increasing times [s], shape (n,)."""
     q: Vec
     """Joint positions of the 18-DoF model [m, rad], shape (n, 18)."""
     pelvis_z: Vec
     """Height of the pelvis [m], shape (n,)."""
     frames: NDArray[np.int64]
-    """Frame of the file that each row is, counted from 0, shape (n,)."""
+    """Frame number of each row, counted from 0, shape (n,)."""
     n_frames: int
-    """Frames of the file, with those that lack a value."""
+    """Number of frames in the file, with incomplete ones."""
     missing: tuple[Artifact, ...]
-    """Frames that lack a value; they are left out."""
+    """Incomplete frames, which are omitted."""
     names: Mapping[str, str]
-    """Columns whose name in the file is not ours, by our name."""
+    """Names in the file that differ from ours, by our name."""
 
 
 def read_csv(text: str, names: Mapping[str, str] | None = None) -> AngleTrack:
     """Return the joint angles of a CSV file.
 
     Args:
-        text: The file.
+        text: Content of the file.
         names: Name map, theirs to ours.
 
     Raises:
-        BadRecording: It is no sound table; the faults name lines and columns.
+        BadRecording: The table is invalid; the faults name lines and columns.
     """
     names = names or {}
     file = read_csv_text(text, (*CSV_COLUMNS, *names))
@@ -116,7 +117,7 @@ def _columns(table: TextTable, names: Mapping[str, str]) -> dict[str, int]:
 
 
 def _declared_degrees(file: CsvText, columns: Mapping[str, int]) -> bool:
-    """Return whether angles are declared in degrees, by a comment or by all their units."""
+    """Return whether a comment or all units declare angles in degrees."""
     said = file.said.get("angles", "")
     stated = {file.units.get(columns[name]) for name in JOINT_NAMES[2:]}
     for unit, spellings in ANGLE_UNITS.items():
@@ -127,7 +128,7 @@ def _declared_degrees(file: CsvText, columns: Mapping[str, int]) -> bool:
 
 
 def _check_units(file: CsvText, columns: Mapping[str, int], degrees: bool) -> None:
-    """Refuse units that the file states of its columns and that are not those we read."""
+    """Check the stated units of columns."""
     angles = ANGLE_UNITS["degrees" if degrees else "radians"]
     for name, k in columns.items():
         wanted = _SECONDS if name == "time" else _METRES if name in _PLACES else angles
@@ -141,11 +142,11 @@ def in_radians(angles: Mapping[str, Vec], degrees: bool) -> Vec:
     """Return joint angles [rad], shape (n, number of columns).
 
     Args:
-        angles: Columns by name, in the declared unit; the yaw may turn round and round.
-        degrees: The declared unit.
+        angles: Columns by name, in the declared unit; the yaw is not bounded.
+        degrees: Whether the declared unit is degrees.
 
     Raises:
-        BadRecording: The numbers fit the other unit.
+        BadRecording: The values fit the other unit.
     """
     turning = ("pelvis_yaw", "pelvis_rotation")
     largest = {
@@ -169,10 +170,10 @@ def in_radians(angles: Mapping[str, Vec], degrees: bool) -> Vec:
 
 
 def require_places(places: Mapping[str, Vec], most: float = MAX_PLACE) -> None:
-    """Refuse positions that are no metres.
+    """Check that positions are in metres.
 
     Raises:
-        BadRecording: One lies farther than ``most`` [m] from the origin.
+        BadRecording: A distance from the origin exceeds ``most`` [m].
     """
     for name, column in places.items():
         far = float(np.abs(column).max())
@@ -183,15 +184,16 @@ def require_places(places: Mapping[str, Vec], most: float = MAX_PLACE) -> None:
 
 
 def check_times(times: Vec, table: TextTable, good: NDArray[np.bool_]) -> Vec:
-    """Return a column of times [s].
+    """Return a column of times [s], validated.
 
     Args:
-        times: Of the rows that have all values, shape (n,).
-        table: The whole table.
-        good: Which rows have all values.
+        times: Times of the complete rows, shape (n,).
+        table: Table with all rows.
+        good: Whether each row is complete.
 
     Raises:
-        BadRecording: They do not rise, or at no rate of motion capture.
+        BadRecording: The times do not increase, or their interval is outside that of motion
+            capture.
     """
     dt = np.diff(times)
     stuck = np.flatnonzero(dt <= 0.0)

@@ -1,8 +1,8 @@
-"""The text of a CSV file as spreadsheets, statistics programs and people write it.
+"""Reader of CSV text of spreadsheets and statistics programs.
 
-The separator is the one under which the line of names holds most known names; ``csv.Sniffer``
-guesses it from the rows instead, and takes decimal commas for separators. Source: RFC 4180;
-spreadsheets deviate from it by ``;`` and tabs, decimal commas, padding and a line ``sep=;``.
+The separator is the one that yields most known names of columns. ``csv.Sniffer``, which uses
+the rows instead, confuses decimal commas with separators. Source: RFC 4180; spreadsheets
+deviate from it by ``;`` and tabs, decimal commas, padding and a line ``sep=;``.
 """
 
 import csv
@@ -11,51 +11,51 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from app.sim.mocap.bvh import lines_of
+from app.sim.mocap.faults import bad
 from app.sim.mocap.tables import (
     MAX_COLUMNS,
     MISSING,
     PADDING,
     TextTable,
-    bad,
     named_columns,
     plain,
 )
 
 SEPARATORS = (",", ";", "\t", "|")
-"""Between columns; white space where none of them is there."""
+"""Separators of columns; white space if a file has none of them."""
 INDEX_NAMES = frozenset(("index", "idx", "frame", "frameno", "framenumber", "row", "nr", "no"))
-"""Plain names of columns that count the rows; they are not read."""
+"""Plain names of columns with row numbers, which are ignored."""
 
 _ERRORS = tuple(word for word in MISSING if word.startswith("#"))
-"""What a spreadsheet writes for an error, which begins like a comment."""
+"""Error values of spreadsheets, which begin like a comment."""
 
 Split = Callable[[str, int], list[str]]
-"""Splits a line into cells, at so many places at most."""
+"""Function of a line and a largest number of splits that returns the cells."""
 Lines = list[tuple[int, str]]
 """Line numbers and texts."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CsvText:
-    """A CSV file: what its comments declare, and its table."""
+    """Declarations and table of a CSV file."""
 
     said: Mapping[str, str]
-    """Declarations, ``# key = value``, in lower case."""
+    """Declarations in comments, ``# key = value``, in lower case."""
     table: TextTable
     """Columns and rows, without the row of units."""
     units: Mapping[int, str]
-    """Unit that the file states of a column, by index: in its name or in a row of its own."""
+    """Unit of a column, by index, stated in its name or in a row of units."""
 
 
 def read_csv_text(text: str, known: Sequence[str]) -> CsvText:
     """Return the declarations and the table of a CSV file.
 
     Args:
-        text: The file.
-        known: Names of columns by which the line of names and the separator are found.
+        text: Content of the file.
+        known: Names of columns that identify the line of names and the separator.
 
     Raises:
-        BadRecording: It holds no table.
+        BadRecording: The file has no table.
     """
     comments, table = _lines(text)
     if not table:
@@ -86,7 +86,7 @@ def read_csv_text(text: str, known: Sequence[str]) -> CsvText:
 
 
 def _lines(text: str) -> tuple[Lines, Lines]:
-    """Return comments and table without lines that hold nothing around them."""
+    """Return comments and table, without empty lines around the table."""
     lines = [(k, line) for k, line in enumerate(lines_of(text), 1) if line.strip()]
     comments = [one for one in lines if _is_comment(one[1])]
     table = [one for one in lines if not _is_comment(one[1])]
@@ -102,7 +102,7 @@ def _is_comment(line: str) -> bool:
 
 
 def _known(line: str, keys: frozenset[str]) -> int:
-    """Return how many known names a line holds, under the best separator."""
+    """Return the number of known names in a line, for the best separator."""
     return _score(_splitter(line, keys)(line, MAX_COLUMNS), keys)
 
 
@@ -111,7 +111,7 @@ def _score(cells: Iterable[str], keys: frozenset[str]) -> int:
 
 
 def _splitter(line: str, keys: frozenset[str]) -> Split:
-    """Return what splits the lines of a file at its separator, and takes quotes away."""
+    """Return the function that splits lines at the separator and removes quotes."""
     found: list[tuple[int, int, Split]] = []
     for separator in SEPARATORS:
         split = _split_at(separator)
@@ -143,13 +143,13 @@ def _is_index(name: str) -> bool:
 
 
 def _bracketed(name: str) -> str:
-    """Return the unit in brackets behind a column's name."""
+    """Return the unit in brackets after a column's name."""
     found = re.search(r"[(\[{]([^)\]}]{1,20})[)\]}]\s*$", name[-30:])
     return found.group(1).strip().lower() if found else ""
 
 
 def _units_row(cells: Sequence[str]) -> dict[int, str]:
-    """Return the units that a row states; none where it holds numbers or nothing."""
+    """Return the units in a row; none if it holds numbers or is empty."""
     words = {k: cell.strip().strip("()[]{}").lower() for k, cell in enumerate(cells)}
     stated = {k: word for k, word in words.items() if word not in MISSING}
     sound = all(re.fullmatch("[a-z°/^]{1,10}", one) for one in stated.values())
@@ -157,7 +157,7 @@ def _units_row(cells: Sequence[str]) -> dict[int, str]:
 
 
 def _decimal(rows: Iterable[Sequence[str]]) -> str:
-    """Return the decimal sign of a table: the last sign of its first broken number."""
+    """Return the decimal sign of a table: the last sign of its first non-integer number."""
     for cells in rows:
         for cell in cells:
             if re.fullmatch(r"\s*[+-]?[\d.,'\s]*\d\s*", cell[:60]) and re.search("[.,]", cell):

@@ -21,13 +21,14 @@ from pathlib import PurePath
 
 import numpy as np
 
-from app.errors import BadRecording, Fault
+from app.errors import BadRecording
 from app.sim.core.arrays import Vec
 from app.sim.human.anthropometry import BodySize
 from app.sim.human.model import JOINT_NAMES, Q_MAX, Q_MIN
 from app.sim.mocap.artifacts import MIN_RUN, Artifact, clean_runs, find_artifacts, merged
 from app.sim.mocap.bvh import read_bvh
 from app.sim.mocap.csv_tables import AngleTrack, read_csv
+from app.sim.mocap.faults import bad
 from app.sim.mocap.inverse_kinematics import body_angles
 from app.sim.mocap.joint_centres import (
     ELBOW_L,
@@ -140,7 +141,7 @@ def read_motion(
     """
     ending = PurePath(file_name).suffix.lower()
     if ending not in FORMATS:
-        raise _bad("file name", repr(file_name[-60:]), f"must end with {', '.join(FORMATS)}")
+        raise bad("file name", repr(file_name[-60:]), f"must end with {', '.join(FORMATS)}")
     text = _text(content, ending)
     digest = hashlib.sha256(content).hexdigest()[:12]
     track, angles, reading = _read(text, ending, options)
@@ -154,10 +155,10 @@ def read_motion(
         raise _no_run(track, artifacts)
     name = PurePath(file_name).stem[:100]
     origin = f"{PurePath(file_name).name[:100]} ({digest})"
-    pieces = [_converted(track, angles, size, span) for span in spans]
+    segments = [_converted(track, angles, size, span) for span in spans]
     # CSV tables state heights relative to standing; elsewhere standing is estimated.
     standing = 0.0 if ending == ".csv" else None
-    joined = _Pieces(track, size, spans, pieces, standing)
+    joined = _Segments(track, size, spans, segments, standing)
     in_file = tuple((int(frames[a]), int(frames[b])) for a, b in spans)
     return ImportedMotion(
         name=name,
@@ -174,7 +175,7 @@ def read_motion(
         wrists_at_fixed_height=joined.error((WRIST_R, WRIST_L), carry_height=False),
         pelvis=joined.error((PELVIS,)),
         fixed_body=joined.error((WRIST_R, WRIST_L), body=BodySize()),
-        beyond_limits=beyond_limits(np.concatenate([q for q, _ in pieces])),
+        beyond_limits=beyond_limits(np.concatenate([q for q, _ in segments])),
     )
 
 
@@ -217,10 +218,10 @@ def placed(motion: Motion, x: float, y: float, yaw: float) -> Motion:
 
 
 def beyond_limits(q: Vec) -> dict[str, tuple[float, float]]:
-    """Return the joints that leave the model's limits: share of frames, farthest [rad].
+    """Return the joints beyond the model's limits: share of frames, largest excess [rad].
 
     Args:
-        q: Joint positions [m, rad], shape (n, 18); place and yaw have no limits here.
+        q: Joint positions [m, rad], shape (n, 18); position and yaw are not limited.
     """
     excess = np.maximum(Q_MIN - q, q - Q_MAX)[:, 3:]
     return {
@@ -230,30 +231,30 @@ def beyond_limits(q: Vec) -> dict[str, tuple[float, float]]:
     }
 
 
-class _Pieces:
-    """The clean runs of one track, to be measured together."""
+class _Segments:
+    """The clean runs of one track, with common errors."""
 
     def __init__(
         self,
         track: BodyTrack,
         size: BodySize,
         spans: Sequence[tuple[int, int]],
-        pieces: Sequence[tuple[Vec, Vec]],
+        segments: Sequence[tuple[Vec, Vec]],
         standing: float | None,
     ) -> None:
         self._track, self._size, self._spans = track, size, spans
-        self._q = np.concatenate([q for q, _ in pieces])
-        self._height = np.concatenate([height for _, height in pieces])
+        self._q = np.concatenate([q for q, _ in segments])
+        self._height = np.concatenate([height for _, height in segments])
         self._points = np.concatenate([track.points[a : b + 1] for a, b in spans])
         if standing is None:
             standing = float(np.percentile(self._height, 95.0))
         self._standing = standing
-        self._pieces = pieces
+        self._segments = segments
 
     def motions(
         self, name: str, origin: str, in_file: Sequence[tuple[int, int]]
     ) -> tuple[Motion, ...]:
-        """Return the runs; the pelvis's height counts from standing."""
+        """Return the runs, with the pelvis's height relative to standing."""
         return tuple(
             Motion(
                 name=name,
@@ -265,7 +266,7 @@ class _Pieces:
                 first_frame=first,
             )
             for (a, b), (first, last), (q, height) in zip(
-                self._spans, in_file, self._pieces, strict=True
+                self._spans, in_file, self._segments, strict=True
             )
         )
 
@@ -276,11 +277,11 @@ class _Pieces:
         body: BodySize | None = None,
         carry_height: bool = True,
     ) -> Spread:
-        """Return how far points of the model lie from the file's [m]."""
+        """Return the distances between points of the model and of the file [m]."""
         height = self._height if carry_height else np.full(len(self._height), self._standing)
         model = model_points(self._q, height, body or self._size)
-        gaps = np.linalg.norm((model - self._points)[:, list(which)], axis=2)
-        p50, p99, worst = (float(one) for one in np.percentile(gaps, (50.0, 99.0, 100.0)))
+        distances = np.linalg.norm((model - self._points)[:, list(which)], axis=2)
+        p50, p99, worst = (float(one) for one in np.percentile(distances, (50.0, 99.0, 100.0)))
         return Spread(p50=p50, p99=p99, worst=worst)
 
 
@@ -301,10 +302,10 @@ def _converted(
 
 
 def _text(content: bytes, ending: str) -> str:
-    """Return a file's text: UTF-8, UTF-16 with its mark, or a spreadsheet's Latin-1."""
+    """Return a file's text: UTF-8, UTF-16 with byte-order mark, or Latin-1 (CSV only)."""
     if len(content) > MAX_BYTES:
         rule = f"must have at most {MAX_BYTES} bytes (32 MB)"
-        raise _bad("file", f"<{len(content)} bytes>", rule, "cut it into parts")
+        raise bad("file", f"<{len(content)} bytes>", rule, "cut it into parts")
     marked = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     try:
         text = content.decode("utf-16" if marked else "utf-8-sig")
@@ -312,18 +313,20 @@ def _text(content: bytes, ending: str) -> str:
         if ending == ".csv" and not re.search(rb"[\x00-\x08\x0e-\x1f]", content):
             return content.decode("latin-1")
         value = f"<byte {content[error.start]:#04x} at {error.start}>"
-        raise _bad("file", value, "must be text in UTF-8") from error
+        raise bad("file", value, "must be text in UTF-8") from error
     if not text.strip():
-        raise _bad("file", f"<{len(content)} bytes>", "is empty")
+        raise bad("file", f"<{len(content)} bytes>", "is empty")
     return text
 
 
 def _require_names_only(options: ReadOptions) -> None:
-    """Refuse a unit or an axis that is stated of a table: its places are metres."""
+    """Check that neither unit nor axis is stated for a table, whose positions are in metres."""
     for name in ("unit", "root_unit", "up"):
         stated = getattr(options, name)
         if stated is not None:
-            raise _bad(name, repr(stated), "goes with .bvh only: places of a table are metres")
+            raise bad(
+                name, repr(stated), "applies to .bvh only: positions of a table are in metres"
+            )
 
 
 def _no_run(track: BodyTrack, artifacts: Sequence[Artifact]) -> BadRecording:
@@ -334,7 +337,7 @@ def _no_run(track: BodyTrack, artifacts: Sequence[Artifact]) -> BadRecording:
         if artifacts
         else "too short"
     )
-    return _bad("frames", value, rule, hint)
+    return bad("frames", value, rule, hint)
 
 
 def _own(values: Vec) -> Vec:
@@ -342,7 +345,3 @@ def _own(values: Vec) -> Vec:
     kept = np.array(values, dtype=np.float64)
     kept.setflags(write=False)
     return kept
-
-
-def _bad(place: str, value: str, rule: str, hint: str = "") -> BadRecording:
-    return BadRecording([Fault(place=place, value=value, rule=rule, hint=hint)])

@@ -1,22 +1,22 @@
-"""From joint centres to the 18 angles, in closed form (docs/method.md 3.4).
+"""Inverse kinematics from joint centres to the 18 angles, in closed form.
 
-Yaw from the hip line (the shoulder line where no legs were recorded); abdomen from the torso's
-frame after yaw, counted from the skeleton's rest pose; clavicles from azimuth and elevation of
-neck -> shoulder in that frame; shoulders from the upper arm and the plane of the elbow; elbows
-from their bend. With the person's own lengths, and the height of the pelvis carried beside the
-angles, what is left of an error comes from the plane of the elbow alone: a straight arm has
-none, so below 5 degrees of bend it is carried over from before and after, and it is low-passed
-at 6 Hz. The pelvis is placed so that the neck is met: where a recorded spine bends and the
-model's trunk does not, the pelvis gives way, never the hands.
+Yaw from the hip line (shoulder line without legs); abdomen from the torso's frame after yaw,
+relative to the rest pose; clavicles from azimuth and elevation of neck -> shoulder in that
+frame; shoulders from the upper arm and the plane of the elbow; elbows from their bend. The
+plane of the elbow is interpolated where the bend is below 5 degrees and low-passed at 6 Hz; it
+is the only source of error for the recorded body size. The pelvis is placed so that the neck
+position is exact: the bend of a recorded spine displaces the pelvis, not the hands.
 
-Deviates: the orientations that a file states are not read but for its rest pose, only where its
-joints are; so skeletons of any convention of axes give the same angles.
+Joint orientations in a file are not used, except for the rest pose, so that skeletons with
+other conventions of axes give the same angles.
+
+Source: docs/method.md 3.4.
 """
 
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
-from app.sim.core.arrays import Vec
+from app.sim.core.arrays import Vec, as_kernel_array
 from app.sim.human.anthropometry import BodySize
 from app.sim.human.kernels import joint_angles
 from app.sim.human.model import Q_MAX, Q_MIN
@@ -33,11 +33,11 @@ from app.sim.mocap.joint_centres import (
 )
 
 MIN_BEND = np.radians(5.0)
-"""Bend of the elbow below which its plane is not trusted [rad]."""
+"""Least bend of the elbow at which its plane is used [rad]."""
 CUTOFF_HZ = 6.0
-"""Cut-off of the low-pass on the elbow's plane: usual for arm movements in biomechanics."""
+"""Cut-off frequency of the elbow's plane, usual for arm movements in biomechanics."""
 _TURN_WEIGHT = 5.0
-"""Weight of turning against leaving the limits, in the choice between two shoulder triples."""
+"""Weight of rotation relative to excess over limits in the choice of shoulder triples."""
 
 
 def body_angles(track: BodyTrack, size: BodySize) -> tuple[Vec, Vec]:
@@ -65,7 +65,7 @@ def body_angles(track: BodyTrack, size: BodySize) -> tuple[Vec, Vec]:
         shoulder = SHOULDER_R if hand == "r" else SHOULDER_L
         inside = np.einsum("nji,nkj->nki", torso, _segments(points, shoulder))
         protract = np.empty((len(q), 2))
-        joint_angles.clavicles_to_angles(_own(inside[:, 0]), side, protract)
+        joint_angles.clavicles_to_angles(as_kernel_array(inside[:, 0]), side, protract)
         q[:, clavicle : clavicle + 2] = protract
         q[:, arm : arm + 4] = _arm(inside[:, 1], inside[:, 2], side, rate_hz, arm)
     return q, pelvis[:, 2]
@@ -74,18 +74,13 @@ def body_angles(track: BodyTrack, size: BodySize) -> tuple[Vec, Vec]:
 def euler_angles(turns: Vec) -> Vec:
     """Return a, b, c [rad] of ``Ry(a) Rx(b) Rz(c)``, shape (n, 3), ``|b| <= pi/2``."""
     angles = np.empty((len(turns), 3))
-    joint_angles.turns_to_angles(_own(turns), angles)
+    joint_angles.turns_to_angles(as_kernel_array(turns), angles)
     angles[:, ::2] = np.unwrap(angles[:, ::2], axis=0)
     return angles
 
 
-def _own(values: Vec) -> Vec:
-    """Return a copy as kernels take it: contiguous and writable."""
-    return np.array(values, dtype=np.float64, order="C")
-
-
 def _heading(across: Vec) -> Vec:
-    """Return the yaw [rad] of a line to the left; carried over where it is nearly upright."""
+    """Return the yaw [rad] of a line to the left; interpolated where it is nearly vertical."""
     level = np.linalg.norm(across[:, :2], axis=1)
     good = level > 0.2 * np.linalg.norm(across, axis=1)
     if not good.any():
@@ -117,20 +112,19 @@ def _arm(upper: Vec, fore: Vec, side: float, rate_hz: float, first: int) -> Vec:
     )
     toward = np.cross(_elbow_normal(upper, fore, bend, rate_hz), upper)
     shoulder = np.empty((len(bend), 3))
-    joint_angles.arms_to_angles(_own(upper), _own(toward), side, shoulder)
+    joint_angles.arms_to_angles(as_kernel_array(upper), as_kernel_array(toward), side, shoulder)
     return np.column_stack([one_branch(shoulder, first), bend])
 
 
 def _elbow_normal(upper: Vec, fore: Vec, bend: Vec, rate_hz: float) -> Vec:
-    """Return the normal of the elbow's plane, shape (n, 3), held and low-passed.
+    """Return the normal of the elbow's plane, shape (n, 3), interpolated and low-passed.
 
-    ``upper x fore`` has the length sin(bend): low-passed as it is, frames with a better known
-    plane count more.
+    ``upper x fore`` has the length sin(bend), so frames with a better known plane weigh more.
     """
     normal = np.cross(upper, fore)
     sure = np.sin(bend) >= np.sin(MIN_BEND)
     if not sure.any():
-        # Straight throughout: the elbow's axis lies as with the arm hanging at the side.
+        # Straight arm in all frames: elbow axis of an arm hanging at the side.
         return np.cross(upper, np.cross(np.array([0.0, -1.0, 0.0]), upper))
     frames = np.arange(len(normal))
     directions = unit(normal[sure])
@@ -144,10 +138,10 @@ def _elbow_normal(upper: Vec, fore: Vec, bend: Vec, rate_hz: float) -> Vec:
 
 
 def one_branch(angles: Vec, first: int) -> Vec:
-    """Return the same shoulders, shape (n, 3), without leaps between equal triples.
+    """Return the same shoulder orientations, shape (n, 3), as continuous angles.
 
-    (flex, abduct, rotate) and (flex + pi, pi - abduct, rotate + pi) are one orientation. The
-    path of least turning and least excess over the limits is found by dynamic programming.
+    (flex, abduct, rotate) and (flex + pi, pi - abduct, rotate + pi) are one orientation.
+    Dynamic programming finds the path of least rotation and least excess over the limits.
     """
     low, high = Q_MIN[first : first + 3], Q_MAX[first : first + 3]
     other = wrapped(angles * np.array([1.0, -1.0, 1.0]) + np.pi)

@@ -1,9 +1,4 @@
-"""Joint centres of a recorded person, frame by frame, and the body measured from them.
-
-A :class:`BodyTrack` is what every importer of positions delivers, in metres, z up;
-:func:`measure` finds the person's lengths in it, and :func:`model_points` is the model's
-forward kinematics for any lengths and many frames at once, with a pelvis that rises and falls.
-"""
+"""Joint centres of a recorded person over time, and body lengths measured from them."""
 
 from dataclasses import dataclass, field
 
@@ -23,7 +18,7 @@ TRACK_NAMES = (
     "elbow_l",
     "wrist_l",
 )
-"""The joint centres that the 18 angles are found from."""
+"""Joint centres that determine the 18 angles."""
 PELVIS, NECK, SHOULDER_R, ELBOW_R, WRIST_R, SHOULDER_L, ELBOW_L, WRIST_L = range(8)
 MEASURED = (
     "trunk",
@@ -44,16 +39,14 @@ class BodyTrack:
     """Joint centres over time."""
 
     times: Vec
-    """Rising [s], shape (n,)."""
+    """Increasing times [s], shape (n,)."""
     points: Vec
-    """Order of TRACK_NAMES, z up [m], shape (n, 8, 3)."""
+    """Joint centres in the order of TRACK_NAMES, z up [m], shape (n, 8, 3)."""
     upright: Vec = field(default_factory=lambda: np.eye(3))
-    """Trunk's frame (:func:`trunk_frame`) of the person standing upright, shape (3, 3).
-
-    Not the identity where the recorded pelvis lies before or behind the trunk's axis.
-    """
+    """Trunk's frame (:func:`trunk_frame`) in upright standing, shape (3, 3); not the identity
+    if the recorded pelvis is off the trunk's axis."""
     hips: Vec | None = None
-    """From the right to the left hip [m], shape (n, 3); None where no legs were recorded."""
+    """Vector from the right to the left hip [m], shape (n, 3); None without legs."""
 
 
 def measure(points: Vec) -> BodySize:

@@ -1,8 +1,8 @@
-"""Which joint of a recorded skeleton is which, by the names of the skeletons in common use.
+"""Identification of the joints of a recorded skeleton by name.
 
-Known are the names of the TUM clips, CMU, Mixamo, Biped, Xsens, SMPL, Daz, VRM, Kinect and
-Unreal. Case, punctuation and everything before a colon do not count, nor do a beginning and an
-end that all names have in common: ``mixamorigHips``, ``Bip01 L UpperArm``, ``J_Bip_L_Hand``.
+Supported are the names of the TUM clips, CMU, Mixamo, Biped, Xsens, SMPL, Daz, VRM, Kinect and
+Unreal. Case, punctuation, text before a colon, and a common prefix and suffix of all names are
+ignored: ``mixamorigHips``, ``Bip01 L UpperArm``, ``J_Bip_L_Hand``.
 """
 
 import re
@@ -10,10 +10,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from difflib import get_close_matches
 
 from app.errors import BadRecording, Fault
+from app.sim.mocap.faults import bad
 from app.sim.mocap.joint_centres import TRACK_NAMES
 
 Joints = dict[str, tuple[int, ...]]
-"""Indices of joints by role; where there are several, their mean is meant."""
+"""Indices of joints by role; several indices stand for their mean."""
 
 _CENTRE: Mapping[str, Sequence[str]] = {
     "pelvis": ("hips", "hip", "pelvis", "spinebase", "midhip", "root"),
@@ -30,11 +31,11 @@ _PARTS: Mapping[str, Sequence[str]] = {
     "ankle": ("ankle", "foot"),
     "toe": ("toebase", "toe", "toes", "toe0", "ball", "foot"),
 }
-"""Spellings of each part, the preferred first: with wrist and hand, the wrist counts."""
+"""Spellings of each part, in order of preference."""
 
 
 def _spellings() -> dict[str, tuple[str, ...]]:
-    """Return the spellings of each role, the preferred first."""
+    """Return the spellings of each role, in order of preference."""
     spelt = {role: (*names, *(f"c{one}" for one in names)) for role, names in _CENTRE.items()}
     for part, names in _PARTS.items():
         for letter, word in (("r", "right"), ("l", "left")):
@@ -49,7 +50,7 @@ def _spellings() -> dict[str, tuple[str, ...]]:
 
 SPELLINGS = _spellings()
 ROLES = tuple(SPELLINGS)
-"""The joints that are looked for; those of TRACK_NAMES must be there."""
+"""Roles of joints; those of TRACK_NAMES are required."""
 
 
 def find_joints(
@@ -57,15 +58,15 @@ def find_joints(
 ) -> Joints:
     """Return the joint of each role that the skeleton has.
 
-    Without a neck, the parents of both shoulders stand for it.
+    Without a neck, the parents of both shoulders replace it.
 
     Args:
-        names: The skeleton's own, such as ``mixamorig:LeftForeArm`` or ``left_forearm``.
+        names: Names of the joints, such as ``mixamorig:LeftForeArm`` or ``left_forearm``.
         parents: Index of each joint's parent; -1 for the root.
-        stated: Roles of joints by the skeleton's own name; they need not be known names.
+        stated: Stated roles of joints, by their name in the skeleton.
 
     Raises:
-        BadRecording: Joints are missing; the hint lists what the file has.
+        BadRecording: Joints are missing; the hint lists those of the file.
     """
     given = _stated_joints(names, stated or {})
     plain = [_plain(name) for name in names]
@@ -82,14 +83,14 @@ def find_joints(
         listed = ", ".join(names[:40])[:300]
         hint = f"the file's joints are {listed}; a name map says which is which: theirs=ours"
         rule = f"has no joint that is known as {', '.join(missing)}"
-        raise BadRecording([Fault(place="HIERARCHY", value="", rule=rule, hint=hint)])
+        raise bad("HIERARCHY", "", rule, hint)
     return joints
 
 
 def _found(
     plain: Sequence[str], before: str, behind: str, given: Mapping[str, int]
 ) -> dict[str, int]:
-    """Return the joint of each role, where all names begin and end so; no joint has two."""
+    """Return the joint of each role, for names with a prefix and suffix; no joint has two."""
     index = {name: k for k, name in reversed(list(enumerate(plain)))}
     found = dict(given)
     for role, spellings in SPELLINGS.items():
@@ -101,7 +102,7 @@ def _found(
 
 
 def _affixes(plain: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """Give what may stand before and behind every name, most likely first."""
+    """Yield possible prefixes and suffixes of all names, most likely first."""
     yield "", ""
     known = set()
     for name in plain:
@@ -113,10 +114,10 @@ def _affixes(plain: Sequence[str]) -> Iterator[tuple[str, str]]:
 
 
 def _stated_joints(names: Sequence[str], stated: Mapping[str, str]) -> dict[str, int]:
-    """Return the joints of the roles that a caller states.
+    """Return the joints of stated roles.
 
     Raises:
-        BadRecording: A joint is not in the file, or a role is none.
+        BadRecording: A joint is not in the file, or a role is unknown.
     """
     faults, found = [], {}
     for theirs, ours in stated.items():
@@ -140,5 +141,5 @@ def _unknown(place: str, value: str, rule: str, choices: Sequence[str]) -> Fault
 
 
 def _plain(name: str) -> str:
-    """Return a name without what stands before a colon, case and punctuation."""
+    """Return a name in lower case, without punctuation and text before a colon."""
     return re.sub(r"[^a-z0-9]", "", re.split(r"[:|]", name)[-1].lower())

@@ -1,12 +1,12 @@
-"""The unit of a recorded skeleton, and whether the root's path is in the same.
+"""Units of a recorded skeleton and of its root's path.
 
-The unit is that in which the person is of a person's stature. With legs, the stature is found
-from the length from ankle to neck; without, by the median of trunk, clavicles, upper arms and
-forearms. The parts have to be a person's in proportion. Where two units fit, the file is
-refused: a child in inches measures as much as a giant in CMU's units.
+The unit is the one that gives a human stature. With legs, the stature follows from the length
+from ankle to neck; without, from the median of trunk, clavicles, upper arms and forearms. The
+proportions must be human. If two units fit, the file is rejected: a child in inches has the
+same lengths as a giant in CMU's units.
 
-The root's path is checked by the legs: in its unit, the pelvis is as high over the floor as
-legs are long, or the lower foot does not slide while the pelvis moves.
+The root's path is checked with the legs: in its unit, either the height of the pelvis over the
+floor is the length of the legs, or the lower foot does not slide while the pelvis moves.
 
 Source of the proportions: Drillis and Contini (1966), as in Winter, "Biomechanics and Motor
 Control of Human Movement", fig. 4.1. Deviates: ranges that include joints of other definitions.
@@ -18,27 +18,27 @@ from itertools import pairwise
 
 import numpy as np
 
-from app.errors import BadRecording, Fault
 from app.sim.core.arrays import Vec
 from app.sim.human.anthropometry import STATURE
 from app.sim.human.kernels.kinematics import MEDIAN_TRUNK
+from app.sim.mocap.faults import bad
 from app.sim.mocap.read_options import UNITS, metres
 
 MIN_STATURE, MAX_STATURE = 1.0, 2.1
-"""Statures of people [m]: from children of four years on."""
+"""Range of statures [m], from children of four years on."""
 DOUBT_WITH_LEGS, DOUBT_WITHOUT = 0.08, 0.12
-"""How far a stature found from a skeleton is off, relative."""
+"""Relative error of a stature found from a skeleton, with and without legs."""
 ANKLE_TO_NECK, ANKLE_TO_CROWN = 0.818 - 0.039, 1.0 - 0.039
 """Heights of the neck's base and the top of the head over the ankle, relative to stature."""
 HEAD = (0.10, 0.25)
-"""Range of neck to top of the head relative to stature; other end sites are not the top."""
+"""Range of the length from neck to top of the head, relative to stature."""
 SHARES: Mapping[str, float] = {
     "trunk": MEDIAN_TRUNK / STATURE,
     "clavicle": 0.105,
     "upper_arm": 0.172,
     "forearm": 0.149,
 }
-"""Lengths relative to stature, by which it is found without legs."""
+"""Lengths relative to stature."""
 PROPORTIONS: Mapping[str, tuple[float, float]] = {
     "trunk": (0.14, 0.42),
     "clavicle": (0.03, 0.22),
@@ -46,44 +46,44 @@ PROPORTIONS: Mapping[str, tuple[float, float]] = {
     "forearm": (0.09, 0.24),
     "leg": (0.35, 0.62),
 }
-"""Lengths relative to stature, with room for markers that are no joint centres."""
+"""Ranges of lengths relative to stature; wide, as markers are not joint centres."""
 FOREARM_TO_UPPER_ARM = (0.55, 1.5)
-"""Range of the forearm relative to the upper arm."""
+"""Range of the length of the forearm relative to the upper arm."""
 STATED_STATURE = (0.5, 3.0)
-"""Range of the stature where the unit is stated [m]."""
+"""Range of the stature if the unit is stated [m]."""
 SOLE = 0.045
 """Height of the ankle over the floor, relative to stature."""
 STANDING = (0.85, 1.18)
-"""Range of the pelvis's height over the file's zero, relative to what legs make of it."""
+"""Range of the pelvis's height over the file's zero, relative to the length of the legs."""
 HIGH_PELVIS = (0.42, 0.62)
-"""Range of the pelvis's height relative to stature, where no legs were recorded."""
+"""Range of the pelvis's height relative to stature, for recordings without legs."""
 MIN_PLANTED, SURELY_PLANTED = 0.8, 0.95
-"""Cosines between the paths of pelvis and lower foot above which the foot stands: where nothing
-contradicts, and where the height of the pelvis does."""
+"""Least cosines between the paths of pelvis and lower foot for a planted foot, without and
+against the evidence of the pelvis's height."""
 SAME_FACTOR = (0.75, 1.33)
-"""Range of the root's unit relative to the skeleton's in which they are the same."""
+"""Range of the ratio of the root's unit to the skeleton's for equal units."""
 MAX_PACE = 3.0
-"""Fastest that a pelvis moves in most frames [m/s]."""
+"""Largest speed of a pelvis in most frames [m/s]."""
 MIN_EXTENT = 0.003
-"""Least that a pelvis moves in a recording, unless it is held [m]."""
+"""Least extent of the motion of a pelvis that is not fixed [m]."""
 MAX_HIGH = 3.0
-"""Farthest over or under the file's zero that a pelvis is, unless the legs tell so [m]."""
+"""Largest height of a pelvis above or below the file's zero, without evidence of legs [m]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stature:
-    """How tall a person is, by the lengths of a skeleton."""
+    """Stature of a person, found from the lengths of a skeleton."""
 
     value: float
-    """From the floor to the top of the head [the file's unit]."""
+    """Height of the top of the head [the file's unit]."""
     doubt: float
-    """How far it may be off, relative."""
+    """Relative error."""
     basis: str
-    """Lengths that it is found from."""
+    """Lengths from which it is found."""
 
 
 def find_lengths(points: Mapping[str, Vec]) -> dict[str, float]:
-    """Return the lengths of a person's parts [the file's unit].
+    """Return the lengths of body segments [the file's unit].
 
     Args:
         points: Joint centres by role, each of shape (n, 3).
@@ -111,7 +111,7 @@ def find_lengths(points: Mapping[str, Vec]) -> dict[str, float]:
 
 
 def find_stature(lengths: Mapping[str, float]) -> Stature:
-    """Return the stature that lengths tell, in their unit.
+    """Return the stature that follows from lengths, in their unit.
 
     Args:
         lengths: From :func:`find_lengths`.
@@ -129,10 +129,10 @@ def find_stature(lengths: Mapping[str, float]) -> Stature:
 
 
 def find_unit(stature: Stature) -> str:
-    """Return the unit in which a skeleton is a person's, one of UNITS.
+    """Return the unit, one of UNITS, in which a stature is human.
 
     Raises:
-        BadRecording: None fits, or two do; the fault names them with the statures.
+        BadRecording: No unit or two units fit; the fault names them with the statures.
     """
     low, high = MIN_STATURE / (1.0 + stature.doubt), MAX_STATURE * (1.0 + stature.doubt)
     tall = {unit: factor * stature.value for unit, factor in UNITS.items()}
@@ -143,25 +143,25 @@ def find_unit(stature: Stature) -> str:
     if fits:
         named = " and ".join(f"{unit} ({tall[unit]:.2f} m tall)" for unit in fits)
         hint = f"state unit = {' or '.join(fits)}"
-        raise _bad(place, value, f"fits two units, {named}", hint)
+        raise bad(place, value, f"fits two units, {named}", hint)
     rule = f"must be {MIN_STATURE} to {MAX_STATURE} m in one of the units {', '.join(UNITS)}"
     hint = "state unit = metres per unit, as a number"
     if stature.value > 0.0:
         hint += f": {STATURE / stature.value:.3g} makes the person {STATURE} m tall"
-    raise _bad(place, value, rule, hint)
+    raise bad(place, value, rule, hint)
 
 
 def require_proportions(lengths: Mapping[str, float], stature: Stature, unit: str) -> None:
-    """Refuse a skeleton that is no person's, in proportion or in a unit that is stated.
+    """Check that a skeleton is human in proportion and stature.
 
     Raises:
-        BadRecording: The fault names the part and its length.
+        BadRecording: It is not; the fault names the segment and its length.
     """
     tall = metres(unit) * stature.value
     low, high = STATED_STATURE
     if not low <= tall <= high:
         rule = f"makes the person {tall:.4g} m tall; must be {low} to {high} m"
-        raise _bad("unit", unit, rule)
+        raise bad("unit", unit, rule)
     for name, length in lengths.items():
         if _part(name) not in PROPORTIONS:
             continue
@@ -169,31 +169,31 @@ def require_proportions(lengths: Mapping[str, float], stature: Stature, unit: st
         if not low * stature.value <= length <= high * stature.value:
             rule = f"must be {low * tall:.3f} to {high * tall:.3f} m long for a stature of "
             rule += f"{tall:.2f} m, by {stature.basis}, in {unit}"
-            raise _bad(name, f"{metres(unit) * length:.3f} m", rule)
+            raise bad(name, f"{metres(unit) * length:.3f} m", rule)
     low, high = FOREARM_TO_UPPER_ARM
     for side in ("_r", "_l"):
         ratio = lengths[f"forearm{side}"] / lengths[f"upper_arm{side}"]
         if not low <= ratio <= high:
             hint = "elbow or wrist is another joint than the one of that name"
             rule = f"must be {low} to {high} times the upper arm"
-            raise _bad(f"forearm{side}", f"{ratio:.2f} times", rule, hint)
+            raise bad(f"forearm{side}", f"{ratio:.2f} times", rule, hint)
 
 
 def require_one_unit(
     pelvis: Vec, ankles: Vec | None, dt: float, stature: Stature, unit: str
 ) -> str:
-    """Refuse a root whose path is in another unit than the skeleton, or may be.
+    """Check that the root's path is in the unit of the skeleton.
 
     Args:
-        pelvis: Its path as the file has it [the root's unit], z up, shape (n, 3).
-        ankles: Relative to the pelvis [the skeleton's unit], z up, shape (n, 2, 3); None where
-            no legs were recorded.
+        pelvis: Path of the pelvis [the root's unit], z up, shape (n, 3).
+        ankles: Ankles relative to the pelvis [the skeleton's unit], z up, shape (n, 2, 3); None
+            without legs.
         dt: Time between two frames [s].
-        stature: Of the person.
-        unit: Of the skeleton.
+        stature: Stature of the person.
+        unit: Unit of the skeleton.
 
     Returns:
-        A sentence where the file's zero is not the floor, else an empty text.
+        A note if the file's zero is not the floor, otherwise an empty text.
 
     Raises:
         BadRecording: Another unit fits and this one does not; the fault names both.
@@ -226,16 +226,16 @@ def require_one_unit(
     ]
     if not others and possible(own):
         over = f"the file's zero is not the floor: the pelvis is {own * height:.2f} m over it"
-        return f"{over}; nothing tells whether its path is in {unit}"
+        return f"{over}; the unit of its path, {unit}, cannot be verified"
     others = others or [one for one, length in rest.items() if possible(length)]
     named = "".join(f", or {UNITS[one] * height:.3g} m in {one}" for one in others)
     value = f"{own * height:.3g} m in {unit}, as the skeleton{named}"
     hint = f"state root_unit = {' or '.join([unit, *others])}; the skeleton is in {unit}"
-    raise _bad("height of the pelvis, by the root's path", value, what, hint)
+    raise bad("height of the pelvis, by the root's path", value, what, hint)
 
 
 def _possible_path(pelvis: Vec, dt: float) -> Callable[[float], bool]:
-    """Return whether a path is a person's, for the length of its unit [m]."""
+    """Return the test whether a path is human, as a function of its unit [m]."""
     step = max(1, round(0.1 / dt))
     moved = np.linalg.norm(pelvis[step:] - pelvis[:-step], axis=1) / (step * dt)
     pace = float(np.percentile(moved, 95.0)) if len(moved) else 0.0
@@ -249,10 +249,10 @@ def _possible_path(pelvis: Vec, dt: float) -> Callable[[float], bool]:
 
 
 def _planted(pelvis: Vec, ankles: Vec, dt: float, stature: float) -> tuple[float, float]:
-    """Return by what the root's path must be multiplied so that the lower foot stands.
+    """Return the factor of the root's path for a planted lower foot, and its evidence.
 
-    And the cosine between that path and the foot's, relative to the pelvis: 1 where it stands;
-    0 where the pelvis does not move over its feet.
+    The evidence is the cosine between the path of the pelvis and that of the foot relative to
+    it: 1 for a planted foot, 0 if the pelvis does not move over its feet.
     """
     step = max(1, round(0.1 / dt))
     lower = ankles[:, :, 2].argmin(axis=1)[:-step]
@@ -272,7 +272,3 @@ def _within(value: float, span: tuple[float, float]) -> bool:
 
 def _part(name: str) -> str:
     return name.removesuffix("_r").removesuffix("_l")
-
-
-def _bad(place: str, value: str, rule: str, hint: str = "") -> BadRecording:
-    return BadRecording([Fault(place=place, value=value, rule=rule, hint=hint)])

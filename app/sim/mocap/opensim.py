@@ -1,15 +1,15 @@
-"""Reading OpenSim's tables of joint angles (``.mot``, ``.sto``) onto the 18-DoF model.
+"""Reader of OpenSim's tables of joint angles (``.mot``, ``.sto``) for the 18-DoF model.
 
 Coordinates are those of the full-body models (Hamner 2010, Rajagopal 2015, LaiUhlrich2022 of
-OpenCap, Pose2Sim): the pelvis's six, and trunk, shoulders and elbows each under one of the
-names below. OpenSim 4 names states by paths, ``/jointset/acromial_r/arm_flex_r/value``;
-speeds, activations, controls and multipliers are passed over, whatever they hold.
+OpenCap, Pose2Sim): six of the pelvis, and trunk, shoulders and elbows under the names below.
+OpenSim 4 names states by paths, ``/jointset/acromial_r/arm_flex_r/value``. Speeds, activations,
+controls and multipliers are ignored.
 
-OpenSim's x points forward, y up, z right. Our shoulder turns in the same order about the same
-axes as ``arm_flex``, ``arm_add``, ``arm_rot``, so these go over one to one; other shoulders are
-composed and taken apart again, and so are pelvis and lumbar rotations, into yaw and abdomen.
-Clavicles stay at zero. Sources: Rajagopal et al., "Full-body musculoskeletal model", IEEE TBME
-63(10), 2016; joints ``glenohumeral_r`` and ``_l`` of ``LaiUhlrich2022_shoulder.osim``.
+OpenSim's x points forward, y up, z right. ``arm_flex``, ``arm_add`` and ``arm_rot`` equal the
+model's shoulder angles; other shoulders are converted by rotation matrices, and so are pelvis
+and lumbar rotations (to yaw and abdomen). Clavicles stay at zero. Sources: Rajagopal et al.,
+"Full-body musculoskeletal model", IEEE TBME 63(10), 2016; joints ``glenohumeral_r`` and ``_l``
+of ``LaiUhlrich2022_shoulder.osim``.
 """
 
 import re
@@ -20,13 +20,13 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from app.sim.core.arrays import Vec
-from app.sim.mocap.bvh import axis_turns, lines_of, shown
+from app.sim.mocap.bvh import axis_turns, lines_of
 from app.sim.mocap.csv_tables import AngleTrack, check_times, in_radians, require_places
+from app.sim.mocap.faults import bad, shown
 from app.sim.mocap.inverse_kinematics import euler_angles, one_branch
 from app.sim.mocap.tables import (
     MAX_COLUMNS,
     TextTable,
-    bad,
     complete_rows,
     missing_values,
     named_columns,
@@ -39,13 +39,13 @@ LEVELS = tuple(
     tuple(f"{level}_{turn}" for turn in ("Flex_Ext", "Lat_Bending", "axial_rotation"))
     for level in ("L5_S1", "L4_L5", "L3_L4", "L2_L3", "L1_L2", "L1_T12")
 )
-"""Where a model bends the lumbar spine level by level instead, or at its lowest level only."""
+"""Alternative: lumbar rotations by level, or at the lowest level only."""
 ARMS = {hand: tuple(f"arm_{turn}_{hand}" for turn in ("flex", "add", "rot")) for hand in "rl"}
 ELEVATED = {
     hand: tuple(f"sh_{turn}_{hand}" for turn in ("plane_elev", "elev", "axial_rot"))
     for hand in "rl"
 }
-"""Shoulders by plane of elevation, elevation and axial rotation instead."""
+"""Alternative: shoulders by plane of elevation, elevation and axial rotation."""
 ELBOWS = {hand: f"elbow_flex_{hand}" for hand in "rl"}
 COORDINATES = (
     *PELVIS,
@@ -53,7 +53,7 @@ COORDINATES = (
     *PLACES,
     *(name for hand in "rl" for name in (*ARMS[hand], ELBOWS[hand])),
 )
-"""Columns that must be there, besides ``time``; others (legs, forces) are not read."""
+"""Required columns besides ``time``; others (legs, forces) are ignored."""
 KNOWN = (
     "time",
     *COORDINATES,
@@ -71,11 +71,11 @@ def read_opensim(text: str, names: Mapping[str, str] | None = None) -> AngleTrac
     """Return the joint angles of a ``.mot`` or ``.sto`` file.
 
     Args:
-        text: The file.
+        text: Content of the file.
         names: Name map, theirs to ours.
 
     Raises:
-        BadRecording: It is no sound table of those coordinates; the faults name lines, columns.
+        BadRecording: The table is invalid; the faults name lines and columns.
     """
     lines = lines_of(text)
     end = next((k for k, line in enumerate(lines) if line.strip() == "endheader"), None)
@@ -109,10 +109,10 @@ def read_opensim(text: str, names: Mapping[str, str] | None = None) -> AngleTrac
 
 
 def coordinate(column: str) -> str:
-    """Return the coordinate whose value a column holds; empty where it holds something else.
+    """Return the coordinate of a column; empty if the column is not a coordinate's value.
 
     Args:
-        column: A coordinate's name, or the path of a state or an output.
+        column: Name of a coordinate, or path of a state or an output.
     """
     parts = re.split(r"[/|]", column.strip("/"))
     if parts[-1] == "value" and len(parts) > 1:
@@ -122,10 +122,10 @@ def coordinate(column: str) -> str:
 
 
 def _head(lines: Sequence[str]) -> dict[str, str]:
-    """Return what the head says, by key in lower case.
+    """Return the declarations of the head, by key in lower case.
 
     Raises:
-        BadRecording: It is the head of a file of speeds or accelerations.
+        BadRecording: The file holds speeds or accelerations.
     """
     title = next((line.strip() for line in lines if line.strip()), "")
     if title.lower() in _RATES:
@@ -164,23 +164,23 @@ def _table(rows: Sequence[tuple[int, str]]) -> TextTable:
 
 
 def _check_counts(said: Mapping[str, str], table: TextTable) -> None:
-    """Refuse a table that has not as many columns and rows as the head promises."""
+    """Check the numbers of columns and rows against the head."""
     n_columns, n_rows = len(table.names), len(table.rows)
     if said.get("ncolumns", str(n_columns)) != str(n_columns):
-        rule = f"must be the nColumns={said['ncolumns'][:20]} that the head promises"
+        rule = f"must be the nColumns={said['ncolumns'][:20]} that the head states"
         raise bad(f"line {table.line}", f"<{n_columns} columns>", rule)
     word = said.get("nrows", said.get("datarows", str(n_rows)))
     if not word.isascii() or not word.isdigit():
         raise bad("head, nRows", shown(word), "must be a whole number")
     if (word.lstrip("0") or "0") != str(n_rows):
-        rule = f"must be the {word[:20]} that the head of the file promises"
+        rule = f"must be the {word[:20]} that the head of the file states"
         hint = "the file is cut off" if n_rows < int(word[:9]) else ""
         place = f"frames, last line {table.rows[-1][0]}" if table.rows else "frames"
         raise bad(place, f"<{n_rows}>", rule, hint)
 
 
 def _columns(table: TextTable, names: Mapping[str, str]) -> dict[str, int]:
-    """Return the index of each column that is read, each part of the body under one name."""
+    """Return the indices of the columns, by one set of names per part of the body."""
     there = table.columns(KNOWN, names)
     lumbar = [LUMBAR] if _all(LUMBAR, there) else [one for one in LEVELS if _all(one, there)]
     shoulders = [
@@ -225,9 +225,9 @@ def _onto_model(values: Mapping[str, Vec]) -> Vec:
 
 
 def _elevated(values: Mapping[str, Vec], hand: str, side: float, first: int) -> Vec:
-    """Return our shoulder [rad], shape (n, 3), of plane of elevation, elevation, rotation.
+    """Return shoulder angles [rad], shape (n, 3), from plane of elevation, elevation, rotation.
 
-    The left shoulder turns about the right one's axes, with opposite sign.
+    The left shoulder rotates about the axes of the right one, with opposite sign.
     """
     plane, elevation, axial = (-side * values[name] for name in ELEVATED[hand])
     turns = axis_turns(2, plane) @ axis_turns(0, -elevation)
@@ -238,12 +238,12 @@ def _elevated(values: Mapping[str, Vec], hand: str, side: float, first: int) -> 
 def trunk_angles(angle: Mapping[str, Vec]) -> tuple[Vec, Vec]:
     """Return yaw [rad], shape (n,), and abdomen [rad], shape (n, 3).
 
-    The yaw is where the pelvis's forward axis points, seen from above; the abdomen takes what
-    is left of pelvis and lumbar rotations together.
+    The yaw is the heading of the pelvis's forward axis; the abdomen is the remainder of pelvis
+    and lumbar rotations.
 
     Args:
-        angle: Rotations of the pelvis and of the lumbar joint, or of levels of the lumbar
-            spine, by name [rad], shape (n,).
+        angle: Rotations of the pelvis and of the lumbar joint or its levels, by name [rad],
+            shape (n,).
     """
     joints = [one for one in (PELVIS, LUMBAR, *LEVELS) if one[0] in angle]
     turns = [_turn(*(angle[name] for name in one)) for one in joints]

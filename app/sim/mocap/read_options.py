@@ -1,7 +1,7 @@
-"""What a caller states about a recording, and how it was read: units, axis, names.
+"""Stated properties of a recording and its interpretation: units, axis, names.
 
-Every reader takes a :class:`ReadOptions`. What is not stated is found from the file; where two
-readings fit, the file is refused, and the caller states which one is meant.
+Properties that are not stated are found from the file. If two interpretations fit, the file is
+rejected and one must be stated.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,32 +18,32 @@ UNITS: Mapping[str, float] = {
     "foot": 0.3048,
     "cmu": 0.0254 / 0.45,
 }
-"""Lengths that skeletons are written in [m]; ``cmu`` is an inch over 0.45."""
+"""Units of skeletons [m]; ``cmu`` is an inch divided by 0.45."""
 UP_AXES = ("x", "y", "z", "-x", "-y", "-z")
 """Directions of a file that can point up."""
 MAX_NAMES = 100
-"""Most names that are stated."""
+"""Largest number of stated names."""
 MIN_UNIT, MAX_UNIT = 1e-6, 10.0
-"""Range of a unit that is stated as a number [m]."""
+"""Range of a unit stated as a number [m]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReadOptions:
-    """What is stated about a recording; None and an empty map state nothing.
+    """Stated properties of a recording; None and an empty map state nothing.
 
     Raises:
-        InvalidInput: A unit is neither one of UNITS nor a number, the axis is none, or two of
-            the file's names stand for one of ours.
+        InvalidInput: A unit is neither one of UNITS nor a number, the axis is unknown, or two
+            names of the file map to one of ours.
     """
 
     unit: str | None = None
     """Unit of the skeleton's lengths: one of UNITS, or metres per unit as ``"0.045"``."""
     root_unit: str | None = None
-    """Unit of the root's path, where it is not the skeleton's."""
+    """Unit of the root's path, if it differs."""
     up: str | None = None
     """Direction of the file that points up, one of UP_AXES."""
     names: Mapping[str, str] = field(default_factory=dict)
-    """The file's names of joints or columns, and ours for them."""
+    """Our names of joints or columns, by the names in the file."""
 
     def __post_init__(self) -> None:
         for name in ("unit", "root_unit"):
@@ -59,38 +59,35 @@ class ReadOptions:
                 raise InvalidInput("map", f"{theirs[:60]}={own[:40]}", rule)
 
     def stated(self) -> dict[str, Any]:
-        """Return what is stated, by field, as JSON data."""
+        """Return the stated fields as JSON data."""
         return {name: value for name, value in asdict(self).items() if value}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reading:
-    """How a file was read: what was stated and what was found."""
+    """Interpretation of a file: stated and found properties."""
 
     unit: str
-    """Of lengths."""
+    """Unit of lengths."""
     root_unit: str
-    """Of the root's path."""
+    """Unit of the root's path."""
     up: str
     """Direction of the file that points up."""
     rate_hz: float
-    """Frames per second, those that repeat counted once."""
+    """Frame rate without repeated frames [Hz]."""
     names: Mapping[str, str] = field(default_factory=dict)
     """Joints or columns of the file, by our names."""
     stature: float | None = None
-    """Of the recorded person [m]; None where only angles are given."""
+    """Stature of the recorded person [m]; None for files of angles."""
     notes: tuple[str, ...] = ()
-    """What else was found, in sentences."""
+    """Further findings, as sentences."""
 
 
 def name_map(pairs: Sequence[str]) -> dict[str, str]:
-    """Return a name map from pairs as they are written.
-
-    Args:
-        pairs: ``"theirs=ours"`` each; the last ``=`` counts.
+    """Return a name map from pairs ``"theirs=ours"``, split at the last ``=``.
 
     Raises:
-        InvalidInput: One is no pair, a name is mapped twice, or there are too many.
+        InvalidInput: A pair is invalid, a name is mapped twice, or there are too many.
     """
     if len(pairs) > MAX_NAMES:
         raise InvalidInput("map", f"<{len(pairs)} names>", f"must be at most {MAX_NAMES}")
@@ -109,7 +106,7 @@ def name_map(pairs: Sequence[str]) -> dict[str, str]:
 
 
 NOTHING_STATED = ReadOptions()
-"""Everything is found from the file."""
+"""Options without stated properties."""
 
 
 def metres(unit: str, place: str = "unit") -> float:
@@ -117,10 +114,10 @@ def metres(unit: str, place: str = "unit") -> float:
 
     Args:
         unit: One of UNITS, or metres per unit as a number.
-        place: Field that states it, for the message.
+        place: Name of the field, for the message.
 
     Raises:
-        InvalidInput: It is neither.
+        InvalidInput: The unit is neither.
     """
     try:
         length = UNITS[unit] if unit in UNITS else float(unit)

@@ -1,8 +1,8 @@
-"""Motion that was written at a higher rate than recorded, by repeating frames.
+"""Removal of repeated frames from motion written at a higher rate than recorded.
 
-A recording at 30 Hz that is written at 120 Hz shows every frame four times: the speed between
-two frames is then zero three times and four times too high once. Such frames are found by the
-regular distance of the changes, which need not be a whole number (24 Hz at 60 Hz: 2, 3, 2, 3).
+A recording at 30 Hz written at 120 Hz repeats each frame four times, which makes speeds zero
+three times and four times too high once. Repeated frames are found by the regular interval of
+changes, which may be fractional (24 Hz at 60 Hz: 2, 3, 2, 3).
 """
 
 from dataclasses import replace
@@ -13,19 +13,19 @@ from numpy.typing import NDArray
 from app.sim.mocap.bvh import Bvh, check_dt
 
 MIN_CHANGES = 20
-"""Fewest changes of the channels from which a rate is found."""
+"""Least number of changes from which a rate is found."""
 MIN_STEP = 1.15
-"""Least distance of the changes [frames]; below, single frames repeat where a camera hung."""
+"""Least interval of changes [frames]; lower ones are due to single dropped frames."""
 MAX_STRAY = 0.05
-"""Share of the changes that may lie off the regular distance."""
+"""Largest share of changes off the regular interval."""
 Frames = NDArray[np.signedinteger]
 
 
 def without_repeats(bvh: Bvh) -> tuple[Bvh, str]:
-    """Return a file at its real rate, and a sentence about it; empty where none repeats.
+    """Return a file at its real rate, and a note; empty if no frames repeat.
 
     Raises:
-        BadRecording: The real rate is none of motion capture.
+        BadRecording: The real rate is outside the range of motion capture.
     """
     changes = np.flatnonzero((np.diff(bvh.values, axis=0) != 0.0).any(axis=1)) + 1
     if len(changes) < MIN_CHANGES:
@@ -43,13 +43,13 @@ def without_repeats(bvh: Bvh) -> tuple[Bvh, str]:
 
 
 def _whole_step(changes: Frames, n: int) -> tuple[float, Frames] | None:
-    """Return the distance of new frames and the new frames, where it is a whole number.
+    """Return the interval of new frames and the new frames, if it is a whole number.
 
-    A person who stands still repeats frames too, so the distance of the changes is a multiple.
+    Motionless people repeat frames too, so the interval of changes may be a multiple.
 
     Args:
-        changes: Frames that differ from the one before, rising.
-        n: Frames of the file.
+        changes: Frames that differ from the previous one, increasing.
+        n: Number of frames in the file.
     """
     step = int(np.bincount(np.diff(changes)).argmax())
     first = int(changes[0])
@@ -60,7 +60,7 @@ def _whole_step(changes: Frames, n: int) -> tuple[float, Frames] | None:
 
 
 def _fractional_step(changes: Frames) -> tuple[float, Frames] | None:
-    """Return the same where the distance is no whole number: changes lie along a line."""
+    """Return the same for a fractional interval, by a line through the changes."""
     count = np.arange(len(changes))
     step, start = np.polyfit(count, changes, 1)
     if step < MIN_STEP or np.ptp(changes - start - step * count) > 1.1:

@@ -1,9 +1,8 @@
-"""From a recorded skeleton to a person's joint centres in metres, z up.
+"""Conversion of a recorded skeleton to joint centres in metres, z up.
 
-Names say which joint is which (``joint_names.py``), the person's stature the unit
-(``length_units.py``), rest pose, legs and trunk the axis that points up (``up_axis.py``).
-What a caller states goes before what is found; and what was decided is returned as a
-:class:`~app.sim.mocap.read_options.Reading`.
+Joints are identified by name (``joint_names.py``), the unit by stature (``length_units.py``),
+and the up axis by rest pose, legs and trunk (``up_axis.py``). Stated properties take
+precedence. The interpretation is returned as a :class:`~app.sim.mocap.read_options.Reading`.
 """
 
 from collections.abc import Mapping
@@ -11,9 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.errors import BadRecording, Fault
 from app.sim.core.arrays import Vec
 from app.sim.mocap.bvh import Bvh, forward
+from app.sim.mocap.faults import bad
 from app.sim.mocap.joint_centres import (
     ELBOW_R,
     NECK,
@@ -45,28 +44,28 @@ from app.sim.mocap.up_axis import (
 )
 
 MAX_TILT = np.radians(30.0)
-"""Lean of the trunk in a rest pose above which that pose is not taken for upright [rad]."""
+"""Largest lean of the trunk in an upright rest pose [rad]."""
 MAX_DEGREES_IN_RADIANS = 6.2832
-"""Largest angle of a file in radians, or without motion."""
+"""Largest angle of a file in radians, or of one without motion."""
 MAX_FAR = 100.0
-"""Farthest from the file's origin that a pelvis stands [m]."""
+"""Largest distance of the pelvis from the file's origin [m]."""
 MAX_BACKWARD = 0.3
-"""Mean of the elbows' backward bend, from -1 to 1, above which sides are mixed up."""
+"""Mean backward bend of the elbows, from -1 to 1, above which sides are swapped."""
 
 Centres = Mapping[str, Vec]
 """Joint centres by role, each of shape (n, 3)."""
 
 
 def body_track(bvh: Bvh, options: ReadOptions = NOTHING_STATED) -> tuple[BodyTrack, Reading]:
-    """Return a file's joint centres [m], z up, and how it was read.
+    """Return a file's joint centres [m], z up, and its interpretation.
 
     Args:
-        bvh: The file.
-        options: What is stated about it.
+        bvh: Content of the file.
+        options: Stated properties of the file.
 
     Raises:
-        BadRecording: It is no upright person in a known unit and in degrees, or it has two
-            interpretations; the fault names both.
+        BadRecording: The file does not show an upright person in a known unit and in degrees,
+            or it has two interpretations; the fault names both.
     """
     bvh, repeated = without_repeats(bvh)
     names = [joint.name for joint in bvh.joints]
@@ -106,7 +105,7 @@ def body_track(bvh: Bvh, options: ReadOptions = NOTHING_STATED) -> tuple[BodyTra
 
 
 def _measured(centres: Centres, options: ReadOptions) -> tuple[Stature, str]:
-    """Return the stature [the file's unit] and the unit; refuse who is no person in it."""
+    """Return the stature [the file's unit] and the unit; check proportions."""
     lengths = find_lengths(centres)
     stature = find_stature(lengths)
     found = options.unit or find_unit(stature)
@@ -115,7 +114,7 @@ def _measured(centres: Centres, options: ReadOptions) -> tuple[Stature, str]:
 
 
 def _check_root(centres: Centres, up: str, dt: float, stature: Stature, found: str) -> str:
-    """Refuse a root in another unit; return a sentence where the file's zero is no floor."""
+    """Check the root's unit; return a note if the file's zero is not the floor."""
     pelvis, ankles = z_up(centres["pelvis"], up), None
     if {"ankle_r", "ankle_l"} <= centres.keys():
         both = np.stack([centres["ankle_r"], centres["ankle_l"]], axis=1)
@@ -139,7 +138,7 @@ def _stacked(centres: Centres) -> Vec:
 
 
 def _resting(bvh: Bvh) -> Bvh:
-    """Return a file of one frame: the rest pose, where all joints stand at their offsets."""
+    """Return a file of one frame, the rest pose: all joints at their offsets."""
     row = [
         bvh.joints[k].offset["XYZ".index(name[0])] if name.endswith("position") else 0.0
         for k, name in bvh.channels
@@ -148,7 +147,7 @@ def _resting(bvh: Bvh) -> Bvh:
 
 
 def _with_root_scaled(bvh: Bvh, joints: Joints, factor: float) -> Bvh:
-    """Return a file with the path of the pelvis multiplied."""
+    """Return a file with the path of the pelvis scaled."""
     path, k = set(), joints["pelvis"][0]
     while k >= 0:
         path.add(k)
@@ -158,7 +157,7 @@ def _with_root_scaled(bvh: Bvh, joints: Joints, factor: float) -> Bvh:
 
 
 def _directions(centres: Centres) -> BodyDirections:
-    """Return the directions of a person's parts."""
+    """Return the directions of body segments."""
 
     def both(a: str, b: str) -> Vec | None:
         directions = [
@@ -186,15 +185,15 @@ def _require_degrees(bvh: Bvh) -> None:
     )
     hint = "looks like radians: write degrees"
     place = f"frames from line {bvh.first_line}"
-    raise BadRecording([Fault(place=place, value=f"{largest:.4g}", rule=rule, hint=hint)])
+    raise bad(place, f"{largest:.4g}", rule, hint)
 
 
 def _upright(rest: Centres, axis: str | None) -> Vec:
-    """Return the trunk's frame in the rest pose, its heading taken out, shape (3, 3).
+    """Return the trunk's frame in the rest pose, without its heading, shape (3, 3).
 
     Args:
         rest: Joint centres of the rest pose.
-        axis: Direction in which it stands; None where it tells nothing.
+        axis: Up direction of the rest pose; None if unknown.
     """
     if axis is None:
         return np.eye(3)
@@ -210,22 +209,22 @@ def _upright(rest: Centres, axis: str | None) -> Vec:
 
 
 def _require_a_body(points: Vec) -> None:
-    """Refuse a person who is far away, or who never moves."""
+    """Check that the person is near the origin and moves."""
     far = float(np.abs(points[:, PELVIS]).max())
     if far > MAX_FAR:
         rule = f"must lie within {MAX_FAR:g} m of the file's origin"
         hint = "positions and offsets are probably in two units"
         value = f"{far:.4g} m"
-        raise BadRecording([Fault(place="pelvis", value=value, rule=rule, hint=hint)])
+        raise bad("pelvis", value, rule, hint)
     if not np.isfinite(points).all() or np.ptp(points[:, ELBOW_R], axis=0).max() <= 0.0:
-        raise BadRecording([Fault(place="frames", value="", rule="show nobody who moves")])
+        raise bad("frames", "", "must show a moving person")
 
 
 def _require_elbows(points: Vec) -> None:
-    """Refuse a person whose elbows bend backward: seen in a mirror, or sides mixed up.
+    """Check that elbows do not bend backward, as in mirror images or with swapped sides.
 
-    The elbow's axis points to the right of a person whose arms hang or are raised to the front;
-    with arms to the sides it is square to the line across the shoulders.
+    The elbow's axis points to the person's right with arms down or to the front, and is
+    perpendicular to the shoulder line with arms to the sides.
     """
     across = unit(points[:, SHOULDER_L] - points[:, SHOULDER_R])
     backward = 0.0
@@ -236,5 +235,4 @@ def _require_elbows(points: Vec) -> None:
     if backward > MAX_BACKWARD:
         rule = f"must be at most {MAX_BACKWARD} of what elbows can bend"
         hint = "left and right are mixed up, or the file shows a mirror image"
-        place = "elbows, bent backward"
-        raise BadRecording([Fault(place=place, value=f"{backward:.2f}", rule=rule, hint=hint)])
+        raise bad("elbows, bent backward", f"{backward:.2f}", rule, hint)

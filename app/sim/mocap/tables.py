@@ -1,7 +1,7 @@
-"""Tables of joint angles as other programs write them: columns by name, missing values found.
+"""Tables of joint angles of other programs, with columns by name and missing values.
 
-Case, punctuation and a unit in brackets do not count in the names of columns. Where names are
-foreign, a *name map* says which column is which: theirs to ours.
+Names of columns are compared without case, punctuation and a unit in brackets. A *name map*
+assigns other names of a file to the names of this project.
 """
 
 import re
@@ -16,26 +16,27 @@ from numpy.typing import NDArray
 from app.errors import BadRecording, Fault, digits
 from app.sim.core.arrays import Vec
 from app.sim.mocap.artifacts import Artifact
-from app.sim.mocap.bvh import MAX_FAULTS, MAX_FRAMES, MAX_NUMBER, shown
+from app.sim.mocap.bvh import MAX_FRAMES, MAX_NUMBER
+from app.sim.mocap.faults import MAX_FAULTS, bad, shown
 
 PADDING = ',;|\t "'
-"""Separators, quotes and blanks, which hold nothing."""
+"""Separators, quotes and blanks."""
 MAX_COLUMNS = 400
-"""Most columns of a table."""
+"""Largest number of columns."""
 MAX_NAME = 200
-"""Characters of a name that count."""
+"""Number of characters of a name that are compared."""
 MIN_LIKENESS = 0.6
-"""Two names are nearly the same from this ratio of ``difflib`` on."""
+"""Least ``difflib`` ratio of similar names."""
 MAX_OTHERS = 12
-"""Most columns that a hint lists which are not known at all."""
+"""Largest number of unknown columns in a hint."""
 MAX_PAIRS = 6
-"""Most pairs of nearly known names that a hint lists."""
+"""Largest number of pairs of similar names in a hint."""
 
 MISSING = frozenset(
     ("", "-", "--", "–", "—", ".", "?", "nan", "na", "n/a", "null", "none", "missing")
     + ("#n/a", "#na", "#value!", "#div/0!", "#num!", "#null!", "#ref!")
 )
-"""What programs write where a value is missing, in lower case."""
+"""Markers of missing values, in lower case."""
 
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}([.,'’\s]\d{3})+([.,]\d+)?|[+-]?\d+[.,]\d+[.,]\d+")
 _UNIT = re.compile(r"\s*[(\[{][^)\]}]*[)\]}]\s*$")
@@ -43,37 +44,36 @@ _UNIT = re.compile(r"\s*[(\[{][^)\]}]*[)\]}]\s*$")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TextTable:
-    """A table as text: its columns are known by name, its values not read yet."""
+    """A table as text, with the names of its columns."""
 
     names: tuple[str, ...]
-    """Names of the columns as in the file."""
+    """Names of the columns in the file."""
     labels: tuple[str, ...]
-    """The same without what surrounds a name, such as a path; empty: never read."""
+    """The same without path; empty for columns that are ignored."""
     line: int
-    """Line of the names."""
+    """Line number of the names."""
     rows: Sequence[tuple[int, str]]
-    """Line numbers and texts."""
+    """Line numbers and texts of the rows."""
     split: Callable[[str, int], list[str]]
-    """Splits a row into cells, at so many places at most."""
+    """Function of a row and a largest number of splits that returns its cells."""
     decimal: str = "."
     """Decimal sign, a point or a comma."""
 
     def __post_init__(self) -> None:
-        """Refuse a table that is too long."""
         if len(self.rows) > MAX_FRAMES:
             rule = f"must be at most {MAX_FRAMES}"
             raise bad("frames", f"<{len(self.rows)} frames>", rule, "cut the file into parts")
 
     def columns(self, ours: Iterable[str], names: Mapping[str, str]) -> dict[str, int]:
-        """Return the index of each column that is there, by our name.
+        """Return the index of each column that exists, by our name.
 
         Args:
-            ours: Names that are looked for.
-            names: Name map, theirs to ours; goes before what the names say.
+            ours: Names of the project.
+            names: Name map, theirs to ours; takes precedence over equal names.
 
         Raises:
-            BadRecording: The map names a column that is not there, or what is none of ours; or
-                a name is there twice.
+            BadRecording: The map names a column that does not exist or a name outside ``ours``,
+                or a name occurs twice.
         """
         ours = list(ours)
         check_map(names, ours)
@@ -90,13 +90,13 @@ class TextTable:
         return found
 
     def values(self, columns: Mapping[str, int]) -> dict[str, Vec]:
-        """Return the values of some columns, each of shape (n,); missing ones are NaN.
+        """Return the values of at least two columns, each of shape (n,); missing ones are NaN.
 
         Args:
-            columns: Indices by our name, at least two.
+            columns: Indices by our name.
 
         Raises:
-            BadRecording: A row has too few or too many cells, or a cell is no number.
+            BadRecording: A row has a wrong number of cells, or a cell is not a number.
         """
         found = np.empty((len(self.rows), len(columns)))
         pick = itemgetter(*columns.values())
@@ -117,20 +117,16 @@ class TextTable:
         return dict(zip(columns, found.T, strict=True))
 
     def foreign(self, columns: Mapping[str, int]) -> dict[str, str]:
-        """Return the names in the file, by our name, that are not ours themselves.
-
-        Args:
-            columns: Indices by our name.
-        """
+        """Return the names in the file that differ from ours, by our name."""
         names = {own: self.names[k][:MAX_NAME] for own, k in columns.items()}
         return {own: theirs for own, theirs in names.items() if theirs != own}
 
     def near(self, missing: Iterable[str], columns: Mapping[str, int]) -> str:
-        """Return a hint that pairs names that are missing with nearly known columns.
+        """Return a hint that pairs missing names with columns of similar names.
 
         Args:
-            missing: Our names.
-            columns: Indices of the columns that are known, by our name.
+            missing: Our names without a column.
+            columns: Indices of the known columns, by our name.
         """
         known = set(columns.values())
         free = [name for k, name in enumerate(self.labels) if name and k not in known]
@@ -153,7 +149,7 @@ class TextTable:
         raise no_such_name(theirs, [one for one in self.labels if one], "column")
 
     def _cells(self, text: str) -> list[str] | None:
-        """Return the cells of a row, or None where there are too few or too many."""
+        """Return the cells of a row; None if their number is wrong."""
         cells = self.split(text, len(self.names))
         beyond = cells[len(self.names) :]
         del cells[len(self.names) :]
@@ -161,7 +157,7 @@ class TextTable:
         return cells if is_padded and len(cells) == len(self.names) else None
 
     def _numbers(self, cells: Sequence[str], text: str) -> list[float]:
-        """Return numbers; NaN stands for what is missing, and infinity for what is none."""
+        """Return numbers; NaN for missing values, infinity for text."""
         if self.decimal == "." or "." not in text:
             try:
                 return [float(one) for one in self._pointed(cells)]
@@ -201,10 +197,10 @@ class TextTable:
 
 
 def named_columns(cells: Sequence[str], line: int) -> tuple[str, ...]:
-    """Return the names of columns, without the empty ones behind the last.
+    """Return the names of columns, without empty ones at the end.
 
     Raises:
-        BadRecording: There are too many.
+        BadRecording: The number of columns exceeds MAX_COLUMNS.
     """
     last = max((k for k, cell in enumerate(cells) if cell.strip()), default=-1)
     if last >= MAX_COLUMNS:
@@ -213,17 +209,12 @@ def named_columns(cells: Sequence[str], line: int) -> tuple[str, ...]:
 
 
 def plain(name: str) -> str:
-    """Return a name without case, punctuation and a unit in brackets."""
+    """Return a name in lower case without punctuation and unit in brackets."""
     return re.sub(r"[\W_]", "", _UNIT.sub("", name[:MAX_NAME]).lower())
 
 
 def near_names(missing: Iterable[str], there: Iterable[str]) -> list[tuple[str, str]]:
-    """Return pairs of theirs and ours that are nearly the same, each name at most once.
-
-    Args:
-        missing: Our names.
-        there: Theirs.
-    """
+    """Return pairs of similar names, theirs and ours, each name at most once."""
     there = list(there)
     likeness = sorted(
         (
@@ -243,14 +234,10 @@ def near_names(missing: Iterable[str], there: Iterable[str]) -> list[tuple[str, 
 
 
 def check_map(names: Mapping[str, str], ours: Sequence[str]) -> None:
-    """Refuse a name map that names what is none of ours.
-
-    Args:
-        names: Theirs to ours.
-        ours: The choices.
+    """Check that a name map, theirs to ours, maps to known names.
 
     Raises:
-        BadRecording: It does; the hint lists the choices.
+        BadRecording: It names another one; the hint lists the choices.
     """
     for theirs, own in names.items():
         if own not in ours:
@@ -259,12 +246,12 @@ def check_map(names: Mapping[str, str], ours: Sequence[str]) -> None:
 
 
 def no_such_name(theirs: str, there: Sequence[str], what: str) -> BadRecording:
-    """Return the fault that a name map names what the file does not have.
+    """Return the error of a name map with a name that the file does not have.
 
     Args:
-        theirs: The name.
-        there: Those that the file has.
-        what: What it is the name of, ``"column"``.
+        theirs: Name in the map.
+        there: Names in the file.
+        what: Kind of object that is named, such as ``"column"``.
     """
     likeness = {one: _likeness(theirs, one) for one in there}
     near = sorted(likeness, key=likeness.__getitem__, reverse=True)
@@ -275,10 +262,10 @@ def no_such_name(theirs: str, there: Sequence[str], what: str) -> BadRecording:
 
 
 def number(cell: str, decimal: str = ".") -> float:
-    """Return a cell's number; NaN where it is missing, infinity where it is no number.
+    """Return the number in a cell; NaN if it is missing, infinity for text.
 
     Args:
-        cell: Its text.
+        cell: Text of the cell.
         decimal: Decimal sign of the table.
     """
     word = cell.strip().replace("\u2212", "-")
@@ -295,7 +282,7 @@ def complete_rows(columns: Mapping[str, Vec], place: str) -> NDArray[np.bool_]:
 
     Args:
         columns: Values by name, each of shape (n,), missing ones NaN.
-        place: Where the table stands, for the message.
+        place: Name of the table, for the message.
 
     Raises:
         BadRecording: A column has no value, or fewer than two rows are complete.
@@ -312,11 +299,11 @@ def complete_rows(columns: Mapping[str, Vec], place: str) -> NDArray[np.bool_]:
 
 
 def missing_values(columns: Mapping[str, Vec], good: NDArray[np.bool_]) -> tuple[Artifact, ...]:
-    """Return the runs of rows that lack a value, with the columns that lack it.
+    """Return the runs of incomplete rows, with their columns without a value.
 
     Args:
         columns: Values by name, each of shape (n,), missing ones NaN.
-        good: Which rows have all values, shape (n,).
+        good: Whether each row has all values, shape (n,).
     """
     rows = np.flatnonzero(~good)
     found = []
@@ -327,11 +314,6 @@ def missing_values(columns: Mapping[str, Vec], good: NDArray[np.bool_]) -> tuple
         first, last = int(group[0]), int(group[-1])
         found.append(Artifact(first=first, last=last, parts=parts, speed=0.0, reason=reason))
     return tuple(found)
-
-
-def bad(place: str, value: str, rule: str, hint: str = "") -> BadRecording:
-    """Return the error of one fault."""
-    return BadRecording([Fault(place=place, value=value, rule=rule, hint=hint)])
 
 
 def _likeness(one: str, other: str) -> float:
@@ -346,7 +328,7 @@ def _number(word: str) -> float | None:
 
 
 def _side(name: str) -> str:
-    """Return ``"r"`` or ``"l"`` of a name that tells its side, and nothing of another."""
+    """Return the side in a name, ``"r"`` or ``"l"``; empty without a side."""
     words = re.split(r"[\W_]+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name[:MAX_NAME]).lower())
     for letter, word in (("r", "right"), ("l", "left")):
         if letter in words or any(one.startswith(word) or one.endswith(word) for one in words):

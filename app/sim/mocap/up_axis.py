@@ -1,57 +1,57 @@
-"""Which axis of a recording points up.
+"""Detection of the up axis of a recording.
 
-Asked are the skeleton's rest pose (legs below the pelvis, trunk above it) and the motion: legs
-and feet of a person who stands or sits, the line across the shoulders, and the lean of the
-trunk. A trunk alone cannot tell: a worker bent forward by 90 degrees in a file with y up has
-the trunk of one who stands in a file with z up. If both fit, the file is rejected.
+Evidence is the rest pose (legs below the pelvis, trunk above it) and the motion: legs and feet
+of standing or sitting people, the shoulder line, and the lean of the trunk. The trunk alone is
+ambiguous: bent forward by 90 degrees in a file with y up, it has the direction of an upright
+one in a file with z up. If both axes fit, the file is rejected.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from app.errors import BadRecording, Fault
+from app.errors import BadRecording
 from app.sim.core.arrays import Vec
+from app.sim.mocap.faults import bad
 from app.sim.mocap.read_options import UP_AXES
 
 FOUND = ("y", "z")
-"""Axes that are found; others have to be stated."""
+"""Axes that are detected; others must be stated."""
 NEAR, NEAR_AT_REST = 45.0, 35.0
-"""Angles below which a direction counts as that of an axis, in motion and at rest [deg]."""
+"""Largest angles between a direction and its axis, in motion and in the rest pose [deg]."""
 UPPER_BODY = {"shoulders", "trunk"}
-"""What contradicts an axis whether a person stands, sits or kneels."""
+"""Objections that hold for standing, sitting and kneeling people."""
 MAX_LEG = 50.0
-"""Most that lower legs are off the vertical in half of the frames [deg]."""
+"""Largest median angle between lower legs and vertical [deg]."""
 MAX_TOES = 35.0
-"""Most that toes are above the level of the ankle, seen from there [deg]."""
+"""Largest median elevation of the toes seen from the ankle [deg]."""
 MIN_LEAN, MAX_LEAN = -20.0, 110.0
-"""Range of the trunk's lean, forward positive and from the rest pose, in half of the frames
-[deg]."""
+"""Range of the trunk's median lean relative to the rest pose, forward positive [deg]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BodyDirections:
-    """Directions of a person's parts, in the frame of the file, each of shape (n, 3)."""
+    """Directions of body segments in the frame of the file, each of shape (n, 3)."""
 
     trunk: Vec
     """Pelvis to neck."""
     across: Vec
     """Right to left shoulder."""
     legs: Vec | None
-    """Knee to ankle, of both legs; None where no legs were recorded."""
+    """Knee to ankle, of both legs; None without legs."""
     toes: Vec | None
-    """Ankle to toe, of both feet; None where no toes were recorded."""
+    """Ankle to toe, of both feet; None without toes."""
 
 
 def find_up_axis(motion: BodyDirections, rest: BodyDirections) -> str:
-    """Return the axis that points up, one of FOUND.
+    """Return the up axis, one of FOUND.
 
     Args:
-        motion: In all frames.
-        rest: In the rest pose; zero where the file does not tell it.
+        motion: Directions in all frames.
+        rest: Directions in the rest pose; zero if unknown.
 
     Raises:
-        BadRecording: None fits, or two do; the fault names them.
+        BadRecording: No axis or two axes fit; the fault names them.
     """
     resting, leaning = rest_axis(rest), _nearest(_direction(motion.trunk))
     straight = _lean(rest, resting) if resting else 0.0  # the hip is often a marker on the belt
@@ -68,24 +68,24 @@ def find_up_axis(motion: BodyDirections, rest: BodyDirections) -> str:
         return fits[0]  # the rest pose lies in the frame of the motion
     if len(fits) == 2 and leaning in fits and resting in (None, leaning):
         return leaning
-    raise _two(motion, fits, resting)
+    raise _ambiguous(motion, fits, resting)
 
 
 def require_not_head_down(motion: BodyDirections, axis: str) -> None:
-    """Refuse an axis that is stated where the trunk points down along it.
+    """Check that the trunk does not point down along an axis.
 
     Raises:
         BadRecording: It does in most frames.
     """
     if _elevation(motion.trunk, axis) < -NEAR:
         rule = f"turns the person head down: the trunk {_leaning(motion, axis)}"
-        raise BadRecording([Fault(place="up", value=axis, rule=rule)])
+        raise bad("up", axis, rule)
 
 
 def _kneeling(
     resting: str | None, leaning: str | None, against: dict[str, dict[str, str]]
 ) -> str | None:
-    """Return the axis of a person who kneels or squats: only the lower legs are against it."""
+    """Return the axis of kneeling or squatting people, where only the lower legs object."""
     for axis, other in (FOUND, FOUND[::-1]):
         if against[axis].keys() == {"lower legs"} and resting in (None, axis):
             only = axis in (resting, leaning) and against[other].keys() & UPPER_BODY
@@ -95,10 +95,7 @@ def _kneeling(
 
 
 def rest_axis(rest: BodyDirections) -> str | None:
-    """Return the direction along which the rest pose stands, one of UP_AXES.
-
-    None where trunk and legs are not in line, or nothing is known.
-    """
+    """Return the up direction of the rest pose, one of UP_AXES; None if unknown."""
     axis = _nearest(_direction(rest.trunk), NEAR_AT_REST)
     if axis is None or abs(_elevation(rest.across, axis)) > NEAR_AT_REST:
         return None
@@ -113,7 +110,7 @@ def vector(axis: str) -> Vec:
 
 
 def z_up(v: Vec, up: str) -> Vec:
-    """Return vectors turned so that a direction of the file points along z."""
+    """Return vectors rotated so that the direction ``up`` of the file becomes z."""
     turns = {
         "x": [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]],
         "y": [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]],
@@ -126,10 +123,10 @@ def z_up(v: Vec, up: str) -> Vec:
 
 
 def _objections(motion: BodyDirections, axis: str, straight: float) -> dict[str, str]:
-    """Return what contradicts an axis, by part, with its angle in words.
+    """Return the objections to an axis, by body part, as text with the angle.
 
     Args:
-        motion: In all frames.
+        motion: Directions in all frames.
         axis: One of UP_AXES.
         straight: Lean of the trunk in the rest pose [deg].
     """
@@ -156,13 +153,13 @@ def _lean(motion: BodyDirections, axis: str) -> float:
 
 
 def _leaning(motion: BodyDirections, axis: str) -> str:
-    """Return the lean of the trunk in words."""
+    """Return the lean of the trunk as text."""
     lean = _lean(motion, axis)
     return f"leans {abs(lean):.0f} degrees {'forward' if lean > 0.0 else 'backward'}"
 
 
 def _elevation(directions: Vec, axis: str) -> float:
-    """Return the median angle of directions above the level [deg]."""
+    """Return the median elevation of directions [deg]."""
     return float(np.degrees(np.arcsin(np.clip(np.median(directions @ vector(axis)), -1, 1))))
 
 
@@ -172,9 +169,9 @@ def _direction(directions: Vec) -> Vec:
 
 
 def _nearest(direction: Vec, within: float = NEAR) -> str | None:
-    """Return the axis that a direction is near to; None where it is near to none."""
+    """Return the axis near a direction; None if there is none."""
     length = float(np.linalg.norm(direction))
-    if length < 0.5:  # unit vectors that point everywhere
+    if length < 0.5:  # no common direction
         return None
     axis = max(UP_AXES, key=lambda one: float(vector(one) @ direction))
     near = float(vector(axis) @ direction) > np.cos(np.radians(within)) * length
@@ -196,7 +193,7 @@ def _no_axis(
     return _bad(motion, "pelvis to neck", rule, hint)
 
 
-def _two(motion: BodyDirections, fits: list[str], resting: str | None) -> BadRecording:
+def _ambiguous(motion: BodyDirections, fits: list[str], resting: str | None) -> BadRecording:
     parts = [f"{axis} up by the motion (the trunk {_leaning(motion, axis)})" for axis in fits]
     named = fits
     if resting:
@@ -208,4 +205,4 @@ def _two(motion: BodyDirections, fits: list[str], resting: str | None) -> BadRec
 
 def _bad(motion: BodyDirections, place: str, rule: str, hint: str) -> BadRecording:
     value = "(" + ", ".join(f"{one:.2f}" for one in _direction(motion.trunk)) + ")"
-    return BadRecording([Fault(place=place, value=value, rule=rule, hint=hint)])
+    return bad(place, value, rule, hint)

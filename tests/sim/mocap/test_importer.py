@@ -228,7 +228,7 @@ if CLIPS:  # without clips there is no test to skip
 @pytest.mark.parametrize("stated", [{"unit": "cm"}, {"root_unit": "m"}, {"up": "z"}])
 def test_unit_of_a_file_of_angles_cannot_be_stated(stated: dict[str, str]) -> None:
     (field,) = stated
-    with pytest.raises(BadRecording, match=rf"{field} = .* goes with \.bvh only"):
+    with pytest.raises(BadRecording, match=rf"{field} = .* applies to \.bvh only"):
         read_motion(csv_text(working(100)).encode(), "a.csv", ReadOptions(**stated))
 
 

@@ -92,4 +92,4 @@ def test_person_whose_sides_are_mixed_up_is_refused() -> None:
 
 def test_frozen_file_is_refused() -> None:
     q = np.tile(working(1), (10, 1))
-    assert "show nobody who moves" in fault(bvh_text(q))
+    assert "must show a moving person" in fault(bvh_text(q))
