@@ -65,9 +65,9 @@ def read_csv_text(text: str, known: Sequence[str]) -> CsvText:
     if not _known(head[1], keys):  # numpy.savetxt writes the names as a comment
         named = [one for one in comments if _known(one[1].lstrip("# "), keys) > 2]
         head, rows = (named[-1], table) if named else (head, rows)
-    named = head[1].lstrip("# ").rstrip(",;|\t ")
-    split = _splitter(named, keys)
-    names = named_columns(split(named, MAX_COLUMNS), head[0])
+    header = head[1].lstrip("# ").rstrip(",;|\t ")
+    split = _splitter(header, keys)
+    names = named_columns(split(header, MAX_COLUMNS), head[0])
     units = {k: unit for k, name in enumerate(names) if (unit := _bracketed(name))}
     if rows and (below := _units_row(split(rows[0][1], len(names)))):
         units, rows = {**units, **below}, rows[1:]
