@@ -18,7 +18,7 @@ from app.live.reach.world import LiveReachWorld
 from app.policies.checkpoints import pretrained
 from app.policies.checkpoints.checkpoint import CHOOSING, REACHING, Checkpoint, purpose_of
 from app.policies.checkpoints.trained_cell import cell_of
-from app.policies.inference.live_reach_policy import ReachPilot
+from app.policies.inference.live_reach_policy import TrainedReachPolicy
 from app.policies.inference.motion_decision import MotionDecider
 from app.policies.inference.reach_policy import ReachPolicy
 from app.policies.inference.task_selection import TaskChooser
@@ -43,7 +43,7 @@ def _moving() -> None:
     for checkpoint in _shipped(REACHING):
         policy, cell = ReachPolicy(checkpoint), cell_of(checkpoint.manifest)
         MotionDecider(policy, cell).warm_up()
-        LiveReachWorld(cell, ReachPilot(policy), seed=0).step()
+        LiveReachWorld(cell, TrainedReachPolicy(policy), seed=0).step()
     new_world(load_cell(REACH_CELL), None, seed=0).step()
 
 

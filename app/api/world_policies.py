@@ -15,7 +15,7 @@ from app.live.reach.commands import is_reaching
 from app.live.sorting.commands import SetSortingPolicy
 from app.policies.checkpoints.checkpoint import CHOOSING, REACHING, purpose_of
 from app.policies.checkpoints.trained_cell import is_for
-from app.policies.inference.live_reach_policy import ReachPilot
+from app.policies.inference.live_reach_policy import TrainedReachPolicy
 from app.sim.cells.cell import Cell, require_cell
 from app.sim.pick.task_policy import TaskPolicy
 from app.sim.sorting.batch import shape_of
@@ -137,7 +137,7 @@ def sorting_policy_for(cell: Cell, services: Services) -> SortingValues | None:
     return sorter if is_sorting(cell) and sorter.shape == shape_of(cell) else None
 
 
-def named_reach_policy(reference: str, cell: Cell, services: Services) -> ReachPilot:
+def named_reach_policy(reference: str, cell: Cell, services: Services) -> TrainedReachPolicy:
     """Return the reach policy that is named, ready to act in a cell.
 
     Raises:
@@ -146,14 +146,14 @@ def named_reach_policy(reference: str, cell: Cell, services: Services) -> ReachP
     """
     actor = services.reach_policies.load(reference).actor
     require_cell(cell, actor.cell, actor.cell_sha256)
-    return ReachPilot(actor)
+    return TrainedReachPolicy(actor)
 
 
-def reach_policy_for(cell: Cell, services: Services) -> ReachPilot | None:
+def reach_policy_for(cell: Cell, services: Services) -> TrainedReachPolicy | None:
     """Return the reach policy of a cell: the shipped one, else the newest trained in it."""
     if REACH_ALIAS in services.checkpoints.aliases:
         actor = services.reach_policies.load(REACH_ALIAS).actor
         if (actor.cell, actor.cell_sha256) == (cell.name, cell.sha256):
-            return ReachPilot(actor)
+            return TrainedReachPolicy(actor)
     newest = newest_for(cell, REACHING, services.reach_policies, services)
-    return None if newest is None else ReachPilot(newest.actor)
+    return None if newest is None else TrainedReachPolicy(newest.actor)

@@ -17,7 +17,7 @@ from app.sim.robot.actions import ActionSettings
 from app.sim.safety.layer import SafetySettings
 
 
-class ReachPilot:
+class TrainedReachPolicy:
     """One policy and its controllers; used by one thread at a time.
 
     Args:

@@ -8,7 +8,7 @@ from app.live.reach.commands import SetInferenceMode, SetSafety
 from app.live.reach.controller import TIME_LIMIT_S, ReachController
 from app.live.reach.world import LiveReachWorld
 from app.policies.inference.controllers import RolloutController, controller_of
-from app.policies.inference.live_reach_policy import ReachPilot
+from app.policies.inference.live_reach_policy import TrainedReachPolicy
 from app.policies.inference.reach_policy import ReachPolicy
 from app.policies.inference.rollout import NO_CONSTRAINT
 from app.sim.cells.cell import load_cell
@@ -25,12 +25,12 @@ def policy() -> ReachPolicy:
 
 
 def test_policy_without_targets_cannot_be_interpolated() -> None:
-    pilot = ReachPilot(ReachPolicy(untrained_reach(width=32, goals="box")))
+    pilot = TrainedReachPolicy(ReachPolicy(untrained_reach(width=32, goals="box")))
     assert pilot.inference_modes == ("direct", "averaged", "direct-rollout", "averaged-rollout")
 
 
 def test_live_state_is_seen_as_the_batch_sees_it(policy: ReachPolicy) -> None:
-    pilot = ReachPilot(policy)
+    pilot = TrainedReachPolicy(policy)
     batch = ReachBatch(CELL, 1, 11, ReachSettings(observation=policy.view))
     batch.reset()
     for _ in range(5):
@@ -53,7 +53,7 @@ def test_live_state_is_seen_as_the_batch_sees_it(policy: ReachPolicy) -> None:
         assert np.allclose(act, controller_of(policy, way).acts(batch)[0], atol=1e-6)
 
 
-class Noting(ReachPilot):
+class Noting(TrainedReachPolicy):
     """Notes what it is told about time."""
 
     def __init__(self, actor: ReachPolicy) -> None:
@@ -71,7 +71,7 @@ class Noting(ReachPilot):
 def test_looking_ahead_is_told_of_the_layer_that_is_obeyed(
     policy: ReachPolicy, on: bool, measured: bool
 ) -> None:
-    pilot = ReachPilot(policy)
+    pilot = TrainedReachPolicy(policy)
     world = LiveReachWorld(CELL, pilot, seed=1)
     world.apply(SetInferenceMode(inference_mode="direct-rollout"))
     world.apply(SetSafety(on=on, use_measured_velocity=measured))
@@ -98,7 +98,7 @@ def test_under_the_layer_the_policy_has_its_usual_time_and_looking_ahead_the_tru
 def test_policy_moves_the_robot_of_a_live_cell_with_any_number_of_people(
     policy: ReachPolicy,
 ) -> None:
-    pilot = ReachPilot(policy)
+    pilot = TrainedReachPolicy(policy)
     world = LiveReachWorld(CELL, None, seed=1)
     world.apply(SetPolicy(checkpoint=None).with_loaded(pilot))
     shown = world.snapshot()
@@ -122,7 +122,7 @@ def test_policy_moves_the_robot_of_a_live_cell_with_any_number_of_people(
 def test_goals_jump_among_the_targets_unless_the_policy_is_interpolated(
     policy: ReachPolicy,
 ) -> None:
-    world = LiveReachWorld(CELL, ReachPilot(policy), seed=1)
+    world = LiveReachWorld(CELL, TrainedReachPolicy(policy), seed=1)
     on_target = []
     for way in ("direct", "interpolated"):
         world.apply(SetInferenceMode(inference_mode=way))
