@@ -17,7 +17,7 @@ from app.errors import InvalidInput, ServiceError
 from app.store.engine import Store
 from app.store.records import Claim
 from app.store.schema import check_schema
-from jobs.worker import Runner, Worker, die_with_parent
+from jobs.worker import JobWorker, Runner, die_with_parent
 
 logger = logging.getLogger(__name__)
 
@@ -53,7 +53,7 @@ def main(
     try:
         store = Store(database_url)
         check_schema(store)
-        worker = Worker(store, Claim(job_id=options.job, attempt=options.attempt))
+        worker = JobWorker(store, Claim(job_id=options.job, attempt=options.attempt))
     except ServiceError as error:
         logger.error("%s", error.message)
         return os.EX_CONFIG
@@ -63,7 +63,7 @@ def main(
 
 
 def _runner(kind: str, runners: Mapping[str, Runner]) -> Runner:
-    def refuse(_worker: Worker) -> Mapping[str, Any]:
+    def refuse(_worker: JobWorker) -> Mapping[str, Any]:
         raise InvalidInput("kind", kind, "must be a kind of job", sorted(runners))
 
     return runners.get(kind, refuse)

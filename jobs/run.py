@@ -26,10 +26,10 @@ from jobs.cell_catalog import CellCatalog
 from jobs.checkpoints import read_sound
 from jobs.recording_catalog import RecordingCatalog
 from jobs.spec import EvaluateSpec, parse_spec
-from jobs.worker import Runner, Worker
+from jobs.worker import JobWorker, Runner
 
 
-def train(worker: Worker) -> dict[str, Any]:
+def train(worker: JobWorker) -> dict[str, Any]:
     """Train the job's preset, from the start or from the last checkpoint."""
     job = worker.job
     assert job.preset is not None
@@ -68,7 +68,7 @@ def _new(policy: Checkpoint) -> NewCheckpoint:
     return NewCheckpoint(sha256=policy.sha256, manifest=policy.manifest, tensors=policy.tensors)
 
 
-def evaluate(worker: Worker) -> dict[str, Any]:
+def evaluate(worker: JobWorker) -> dict[str, Any]:
     """Evaluate the job's checkpoint by its protocol; a step is a row of the result."""
     worker.end_at_once()
     spec = parse_spec(worker.job.spec)

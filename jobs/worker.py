@@ -30,11 +30,11 @@ HEARTBEAT_S = 5.0
 
 _PR_SET_PDEATHSIG = 1
 
-Runner = Callable[["Worker"], Mapping[str, Any] | None]
+Runner = Callable[["JobWorker"], Mapping[str, Any] | None]
 """Runs one kind of job and returns its result."""
 
 
-class Worker:
+class JobWorker:
     """Interface of a runner to its job. Writes are fenced by the attempt.
 
     Args:

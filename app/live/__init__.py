@@ -10,7 +10,7 @@ playback        A recorded motion, played in a cell at the pace it was recorded
 read_model      Base class and array type of snapshots, which are also the JSON of the HTTP API
 snapshot        Immutable state of a live world at one tick, for any thread and as JSON of the
                 HTTP API
-world_handle    Interface of a live world for other threads
+world_handle    Interface of a live world for other threads: command queue and last snapshot
 people/         People of live worlds: workers, pedestrians, dragged people
 pick/           The live pick-and-place world
 reach/          The live reach world

@@ -9,7 +9,7 @@ kinematics, features, both networks.
 ``sorting`` is one move of the largest sorting cell with a shipped checkpoint, by that,
 ``sorting-planner`` one of ``sorting-e1`` by the exact planner, both as
 ``sorting_decision.decide`` gives them to the service: with the plan behind the expected
-attempts, all moves ranked and the hand-over watched. Half of the tasks are disturbed.
+attempts, all moves ranked and the planner fallback monitored. Half of the tasks are disturbed.
 
 ``motion-...`` is the next piece of motion toward a goal; see ``motion_decisions.py``.
 

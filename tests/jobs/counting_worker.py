@@ -19,14 +19,14 @@ from app.digests import digest
 from app.errors import InvalidInput
 from app.store.records import NewCheckpoint, ResumeState
 from jobs.attempt import main
-from jobs.worker import Worker
+from jobs.worker import JobWorker
 
 GRID = 5
 CHECKPOINT_EVERY = 20
 FACTOR, MODULUS = 48271, 2**31 - 1
 
 
-def count(worker: Worker) -> dict[str, int]:
+def count(worker: JobWorker) -> dict[str, int]:
     """Step a random-number generator ``steps`` times; progress every GRID steps."""
     wish = worker.job.overrides
     limit_database(worker, wish.get("max_pages"))
@@ -49,7 +49,7 @@ def load(resume: ResumeState) -> tuple[int, int]:
     return resume.step, int.from_bytes(resume.tensors[:8], "big")
 
 
-def save(worker: Worker, step: int, value: int) -> None:
+def save(worker: JobWorker, step: int, value: int) -> None:
     tensors = value.to_bytes(8, "big") + bytes(worker.job.overrides.get("padding", 0))
     manifest = {"job": worker.job.id, "step": step}
     sha256 = digest(manifest, tensors)
@@ -57,11 +57,11 @@ def save(worker: Worker, step: int, value: int) -> None:
     worker.record_checkpoint(step, policy, ResumeState(step=step, manifest={}, tensors=tensors))
 
 
-def asked_to_stop(worker: Worker) -> bool:
+def asked_to_stop(worker: JobWorker) -> bool:
     return not worker.job.overrides.get("deaf") and worker.should_stop()
 
 
-def hold(worker: Worker, step: int) -> None:
+def hold(worker: JobWorker, step: int) -> None:
     steps = worker.job.overrides.get("hold_at", [])
     attempt = worker.job.attempt
     while steps[attempt - 1 : attempt] == [step] and not asked_to_stop(worker):
@@ -75,7 +75,7 @@ def misbehave(wish: Mapping[str, Any], step: int) -> None:
         raise InvalidInput("refuse_at", step, "must not be reached")
 
 
-def limit_database(worker: Worker, max_pages: int | None) -> None:
+def limit_database(worker: JobWorker, max_pages: int | None) -> None:
     if max_pages is None:
         return
     engine = worker.store.engine

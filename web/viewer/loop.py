@@ -1,15 +1,14 @@
-"""The live cell: one thread that owns world and scene, and a door for everybody else.
+"""Live cell: the thread that owns a live world and draws its scene.
 
-The thread drains the queue of commands, steps the world at its control rate and draws. Other
-threads (HTTP routes, viser's callbacks) only queue commands and read the last snapshot.
+The thread drains the command queue, steps the world at its control rate and draws. Other
+threads (HTTP routes, viser's callbacks) queue commands and read the last snapshot.
 
-Simulated time follows the clock on the wall: after a stall the loop catches up by at most
-``MAX_BEHIND_S`` and then lets the rest go, so that a busy machine slows the cell down instead
-of making it jump. A visitor may let it run faster: then several steps are one picture.
+Simulated time follows the wall clock. After a stall the loop catches up by at most
+``MAX_BEHIND_S``, so that a busy machine slows the cell down without jumps. At higher speeds
+several steps are drawn as one frame.
 """
 
 import logging
-import queue
 import threading
 import time
 from dataclasses import replace
@@ -19,12 +18,11 @@ import rich
 
 from app.errors import ServiceError
 from app.live import commands
-from app.live.command_checks import Command, check, check_state, people_after
+from app.live.command_checks import Command
 from app.live.factory import new_world
-from app.live.reach.commands import SetInferenceMode
 from app.live.reach.interfaces import LiveReachPolicy
-from app.live.snapshot import RefusedCommand, WorldSnapshot
-from app.live.sorting.commands import TableCommand
+from app.live.snapshot import RefusedCommand
+from app.live.world_handle import WorldHandle
 from app.sim.cells.cell import Cell
 from app.sim.pick.task_policy import TaskPolicy
 from app.sim.sorting.sorting_values import SortingValues
@@ -35,88 +33,23 @@ from web.viewer.view_settings import COLLISION_SHAPES, ViewSettings
 logger = logging.getLogger(__name__)
 
 MAX_BEHIND_S = 0.2
-"""Lateness beyond which time is let go [s]."""
+"""Greatest delay that is caught up [s]."""
 ERROR_PAUSE_S = 1.0
-"""Rest after an unexpected error [s]."""
-PICTURE_S = 0.04
-"""Least time between two pictures [s]: a slow visitor would fall behind without bound."""
-
-
-class LiveHandle:
-    """What other threads may do with a live cell; see ``app.live.world_handle.WorldHandle``.
-
-    Args:
-        id: Name of the world in URLs.
-        cell: Work cell, against which commands are checked.
-        first: Snapshot until the first tick.
-    """
-
-    def __init__(self, id: str, cell: Cell, first: WorldSnapshot) -> None:
-        self._id, self._cell, self._last = id, cell, first
-        self._queue: queue.SimpleQueue[Command] = queue.SimpleQueue()
-        self._lock = threading.Lock()
-        self._submitted = 0
-        # Who will be there once all that waits is done.
-        self._people = tuple(person.id for person in first.people)
-        # Changes of the table that no snapshot shows yet: those that wait, those in work.
-        self._unseen = [0, 0]
-
-    @property
-    def id(self) -> str:
-        """Name of the world in URLs."""
-        return self._id
-
-    def submit(self, command: Command) -> int:
-        """Queue one command; returns its number at once.
-
-        A snapshot whose ``commands`` is as high shows its effect.
-
-        Raises:
-            ServiceError: The command does not fit this cell.
-        """
-        with self._lock:
-            check(command, self._cell, self._people)
-            if isinstance(command, SetInferenceMode):
-                check_state(command, self._cell, self._last)
-            if isinstance(command, TableCommand):
-                if not any(self._unseen):
-                    check_state(command, self._cell, self._last)
-                self._unseen[0] += 1
-            self._people = people_after(command, self._people)
-            self._queue.put(command)
-            self._submitted += 1
-            return self._submitted
-
-    def snapshot(self) -> WorldSnapshot:
-        """Return the last snapshot; never waits."""
-        return self._last
-
-    def publish(self, snapshot: WorldSnapshot) -> None:
-        """Replace the last snapshot; for the owner only."""
-        with self._lock:
-            self._last = snapshot
-            self._unseen[1] = 0
-
-    def drain(self) -> list[Command]:
-        """Take all waiting commands; for the owner only."""
-        waiting = []
-        with self._lock:
-            while not self._queue.empty():
-                waiting.append(self._queue.get())
-            self._unseen = [0, self._unseen[0] + self._unseen[1]]
-        return waiting
+"""Pause after an unexpected error [s]."""
+FRAME_S = 0.04
+"""Shortest time between two frames [s]; limits the backlog of slow clients."""
 
 
 class LiveCell:
-    """One live work cell with its viewer.
+    """A live work cell with its viewer.
 
     Args:
         cell: Work cell.
-        policy: Acts at first; None lets the robot rest.
-        seed: Seed of the people's work.
+        policy: Initial policy for task selection; None: the robot is idle.
+        seed: Seed of the human motion.
         id: Name of the world in URLs.
-        sorting_policy: Values the moves of a sorting cell; None leaves them to the planner.
-        reach_policy: Moves the arm of a reach cell; None moves straight to the goals.
+        sorting_policy: Policy of a sorting cell; None: the planner selects every move.
+        reach_policy: Policy of a reach cell; None: straight motion to the goals.
     """
 
     def __init__(
@@ -130,13 +63,13 @@ class LiveCell:
         reach_policy: LiveReachPolicy | None = None,
     ) -> None:
         self._cell = cell
-        # The first one compiles what is not in the kernels' cache yet.
+        # Compile the kernels that are not cached.
         new_world(cell, policy, seed, id, sorting_policy, reach_policy).step()
         self._world = new_world(cell, policy, seed, id, sorting_policy, reach_policy)
-        self.handle = LiveHandle(id, cell, self._world.snapshot())
+        self.handle = WorldHandle(id, cell, self._world.snapshot())
         """Commands in, snapshots out."""
         self._speed = 1
-        self._turn, self._undrawn_s = 0, 0.0
+        self._ticks, self._undrawn_s = 0, 0.0
         self._done = 0
         self._refused: RefusedCommand | None = None
         self._stop = threading.Event()
@@ -145,19 +78,19 @@ class LiveCell:
 
     @property
     def cell(self) -> Cell:
-        """The work cell it shows."""
+        """Its work cell."""
         return self._cell
 
     @property
     def viewer_address(self) -> Path:
-        """Unix socket the viewer listens on."""
+        """Unix socket of the viewer."""
         if self._server is None:
             raise RuntimeError("the viewer has not been started")
         return self._server.address
 
     def start(self) -> None:
         """Start viewer and thread."""
-        rich.get_console().quiet = True  # viser would print its own address, past the page
+        rich.get_console().quiet = True  # viser would print its own address
         self._server = ViewerServer()
         views = ViewSettings(self._server, self._cell)
         scene = CellScene(self._server, self._cell, self.handle.submit)
@@ -168,7 +101,7 @@ class LiveCell:
         self._thread.start()
 
     def stop(self) -> None:
-        """End thread and viewer; may be called twice."""
+        """Stop thread and viewer; may be called twice."""
         self._stop.set()
         if self._thread is not None:
             self._thread.join(timeout=5.0)
@@ -192,7 +125,7 @@ class LiveCell:
         for command in self.handle.drain():
             self._done += 1
             try:
-                self._obey(command)
+                self._apply(command)
             except ServiceError as error:
                 self._refused = RefusedCommand(number=self._done, reason=error.message)
                 logger.warning("command %s was refused: %s", command.tag, error.message)
@@ -205,15 +138,15 @@ class LiveCell:
             refused=self._refused,
         )
         self.handle.publish(snapshot)
-        self._turn += 1
+        self._ticks += 1
         self._undrawn_s += dt * self._speed
-        if self._turn % max(1, round(PICTURE_S / dt)) == 0:
+        if self._ticks % max(1, round(FRAME_S / dt)) == 0:
             shapes = views.is_seen(COLLISION_SHAPES)
             scene.draw(snapshot, self._undrawn_s, shapes=shapes)
             self._undrawn_s = 0.0
 
-    def _obey(self, command: Command) -> None:
-        """Carry out a command: the clock's speed is the loop's own, all else the world's."""
+    def _apply(self, command: Command) -> None:
+        """Apply a command; the speed of the clock belongs to the loop."""
         if isinstance(command, commands.SetSpeed):
             self._speed = command.factor
         else:

@@ -27,7 +27,7 @@ async def next_move(request: SortingRequest, services: ServicesDep) -> SortingAn
     """Return the next move with its reason, and every valid move with its value.
 
     Calls are independent: goal and objects may change at any time. A caller that returns
-    `watch` with the next request lets the exact planner replace a policy that repeats moves.
+    `monitor` with the next request lets the exact planner replace a policy that repeats moves.
     """
     # A policy decides in less than a millisecond, on the event loop.
     services.readiness.require()
@@ -39,7 +39,7 @@ async def next_move(request: SortingRequest, services: ServicesDep) -> SortingAn
         policy,
         state,
         names.shape,
-        None if request.watch is None else request.watch.to_domain(),
+        None if request.monitor is None else request.monitor.to_domain(),
         ask_planner=request.decider == "planner",
     )
     long = takes_time(names.shape)

@@ -103,17 +103,17 @@ class SortingRecord(Body):
         return ProgressMonitor(**{**dict(self), "seen": tuple(self.seen)})
 
     @classmethod
-    def from_domain(cls, watch: ProgressMonitor) -> Self:
+    def from_domain(cls, monitor: ProgressMonitor) -> Self:
         """Return the schema of the simulator's data."""
         return cls(
-            checkpoint=watch.checkpoint,
-            last=watch.last,
-            expected=watch.expected,
-            can_fail=watch.can_fail,
-            seen=list(watch.seen),
-            attempts=watch.attempts,
-            budget=watch.budget,
-            planner_fallback=watch.planner_fallback,
+            checkpoint=monitor.checkpoint,
+            last=monitor.last,
+            expected=monitor.expected,
+            can_fail=monitor.can_fail,
+            seen=list(monitor.seen),
+            attempts=monitor.attempts,
+            budget=monitor.budget,
+            planner_fallback=monitor.planner_fallback,
         )
 
 
@@ -145,8 +145,8 @@ class SortingRequest(Body):
         description="failure probability of a pick by clutter cell, 0 to 0.99; the work "
         "cell's, or 0, for other cells",
     )
-    watch: SortingRecord | None = Field(
-        None, description="`watch` of the last answer in the same task; null at its start"
+    monitor: SortingRecord | None = Field(
+        None, description="`monitor` of the last answer in the same task; null at its start"
     )
     decider: By = Field("policy", description="a policy, or the exact planner")
     checkpoint: str | None = Field(
@@ -227,7 +227,7 @@ class SortingAnswer(Answer):
         description="the exact planner's expected attempts to the goal, with failed picks"
     )
     outside: list[OutsideTraining] = Field(description="inputs outside the training range")
-    watch: SortingRecord | None = Field(
+    monitor: SortingRecord | None = Field(
         description="send it with the next state of this task, so that the planner can replace "
         "a policy that repeats moves; null where nothing is monitored"
     )
@@ -247,7 +247,7 @@ class SortingAnswer(Answer):
         """Return the answer of a decision in a state."""
         ids = {(one.at, one.level): one.id for one in request.objects}
         moves = [_valued(one, state, names, ids) for one in decision.ranked]
-        watch = decision.watch
+        monitor = decision.monitor
         return cls(
             solved=decision.solved,
             move=_move(decision.move, state, names, ids) if decision.move else None,
@@ -258,7 +258,7 @@ class SortingAnswer(Answer):
             fewest_moves=decision.fewest_moves,
             expected_attempts=decision.expected_attempts,
             outside=list(outside),
-            watch=None if watch is None else SortingRecord.from_domain(watch),
+            monitor=None if monitor is None else SortingRecord.from_domain(monitor),
             checkpoint=decision.checkpoint,
             elapsed_ms=decision.elapsed_ms,
             stamp=request.stamp,

@@ -106,7 +106,7 @@ class SortController:
             self._before, self._attempted = self._after, False
         fell_back = self.decision is not None and self.decision.why in FALLBACK_REASONS
         decision = decide(self.policy, table.state, table.shape, self._before)
-        self.decision, self._after = decision, decision.watch
+        self.decision, self._after = decision, decision.monitor
         if decision.why in FALLBACK_REASONS and not fell_back:
             self.planner_fallbacks += 1
         return decision

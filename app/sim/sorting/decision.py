@@ -37,7 +37,7 @@ def decide(
     policy: SortingValues | None,
     state: SortingState,
     shape: SortingShape,
-    watch: ProgressMonitor | None = None,
+    monitor: ProgressMonitor | None = None,
     *,
     ask_planner: bool = False,
 ) -> SortingDecision:
@@ -47,7 +47,7 @@ def decide(
         policy: Policy that decides as a rule; None: the planner decides.
         state: The task now; ``sorting_state.check_state`` accepts it.
         shape: How large the task is.
-        watch: ``watch`` of the decision before, in the same task; None at its beginning.
+        monitor: ``monitor`` of the decision before, in the same task; None at its beginning.
         ask_planner: Whether the planner shall decide whatever the policy could.
     """
     begin = time.perf_counter()
@@ -57,7 +57,7 @@ def decide(
     ranked: tuple[RankedMove, ...] = ()
     trusted, why = _trusted(policy, shape, plan, outside, ask_planner)
     if trusted is not None:
-        noted = observe_transition(watch, state_key(state), plan.attempts, trusted.checkpoint)
+        noted = observe_transition(monitor, state_key(state), plan.attempts, trusted.checkpoint)
         if noted.planner_fallback is not None:
             trusted, why = None, noted.planner_fallback
     if plan.best is not None:
@@ -79,7 +79,7 @@ def decide(
         expected_attempts=plan.attempts,
         outside=outside,
         checkpoint=None if policy is None else policy.checkpoint,
-        watch=noted,
+        monitor=noted,
         elapsed_ms=1e3 * (time.perf_counter() - begin),
     )
 
@@ -225,7 +225,7 @@ def _ranked(
 
 
 def _noted_move(
-    watch: ProgressMonitor, state: SortingState, shape: SortingShape, move: Move
+    monitor: ProgressMonitor, state: SortingState, shape: SortingShape, move: Move
 ) -> ProgressMonitor:
     expected = state_key(apply(state, shape, move))
-    return expect_state(watch, expected, can_fail=failure_of(state, move) > 0.0)
+    return expect_state(monitor, expected, can_fail=failure_of(state, move) > 0.0)

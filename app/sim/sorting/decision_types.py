@@ -86,7 +86,7 @@ class SortingDecision:
     """What of the goal lies outside what policies are trained for."""
     checkpoint: str | None
     """SHA-256 of the policy that was asked; None without one."""
-    watch: ProgressMonitor | None
+    monitor: ProgressMonitor | None
     """Record to hand back with the next state of this task; None when none is needed."""
     elapsed_ms: float
     """Time the decision took [ms]."""

@@ -144,7 +144,7 @@ def test_shipped_policy_of_the_cell_decides_where_none_is_named(client: TestClie
         answer = asked(client, task)
         assert answer["checkpoint"] == shipped
         deciders.append(answer["by"])
-        task = {**carried_out(task, answer["move"]), "watch": answer["watch"]}
+        task = {**carried_out(task, answer["move"]), "monitor": answer["monitor"]}
     assert asked(client, task)["solved"]
     assert deciders == ["policy"] * 4
 
@@ -158,7 +158,7 @@ def test_planner_takes_over_and_the_goal_is_reached(client: TestClient) -> None:
         if answer["solved"]:
             break
         deciders.append(answer["why"])
-        task = {**carried_out(task, answer["move"]), "watch": answer["watch"]}
+        task = {**carried_out(task, answer["move"]), "monitor": answer["monitor"]}
     assert answer["solved"]
     assert deciders[0] == "policy"
     assert deciders[-1] in ("repeated", "attempts-exceeded")
@@ -167,7 +167,7 @@ def test_planner_takes_over_and_the_goal_is_reached(client: TestClient) -> None:
 @pytest.mark.usefixtures("sorter")
 def test_without_the_record_nothing_is_remembered(client: TestClient) -> None:
     first, second = (asked(client, {**TASK, "checkpoint": ALIAS}) for _ in range(2))
-    assert first["watch"] == second["watch"]
+    assert first["monitor"] == second["monitor"]
     assert first["moves"] == second["moves"]
 
 
@@ -323,21 +323,23 @@ def test_planner_and_a_checkpoint_at_once_are_refused(client: TestClient) -> Non
 @pytest.mark.parametrize(
     ("member", "value", "field"),
     [
-        ("seen", ["0" * 16] * 1000, "watch.seen"),
-        ("seen", ["zero"], "watch.seen[0]"),
-        ("last", "0" * 4000, "watch.last"),
-        ("attempts", -1, "watch.attempts"),
-        ("attempts", 10**30, "watch.attempts"),
-        ("budget", -1.0, "watch.budget"),
-        ("planner_fallback", "bribed", "watch.planner_fallback"),
-        ("more", 1, "watch.more"),
+        ("seen", ["0" * 16] * 1000, "monitor.seen"),
+        ("seen", ["zero"], "monitor.seen[0]"),
+        ("last", "0" * 4000, "monitor.last"),
+        ("attempts", -1, "monitor.attempts"),
+        ("attempts", 10**30, "monitor.attempts"),
+        ("budget", -1.0, "monitor.budget"),
+        ("planner_fallback", "bribed", "monitor.planner_fallback"),
+        ("more", 1, "monitor.more"),
     ],
 )
 def test_record_that_was_tampered_with_is_refused(
     client: TestClient, member: str, value: Any, field: str
 ) -> None:
-    watch = asked(client, {**TASK, "checkpoint": ALIAS})["watch"]
-    problem = refused(client, {**TASK, "checkpoint": ALIAS, "watch": {**watch, member: value}})
+    monitor = asked(client, {**TASK, "checkpoint": ALIAS})["monitor"]
+    problem = refused(
+        client, {**TASK, "checkpoint": ALIAS, "monitor": {**monitor, member: value}}
+    )
     assert problem["field"] == field
 
 

@@ -33,7 +33,7 @@ def drawn(n: int, seed: int) -> list[SortingState]:
 
 def test_planner_decides_where_there_is_no_policy() -> None:
     decision = decide(None, start(), SHAPE)
-    assert (decision.by, decision.why, decision.watch) == ("planner", "no-policy", None)
+    assert (decision.by, decision.why, decision.monitor) == ("planner", "no-policy", None)
     assert decision.move == Move(0, RED)
     assert (decision.fewest_moves, decision.expected_attempts) == (2, pytest.approx(3.0))
 
@@ -76,7 +76,7 @@ def test_solved_task_asks_for_nothing() -> None:
     state.clutter[:2], state.towers[0, :2] = 0, (LARGE, SMALL)
     decision = decide(FixedValues(SHAPE, []), state, SHAPE)
     assert decision.solved
-    assert (decision.move, decision.ranked, decision.watch) == (None, (), None)
+    assert (decision.move, decision.ranked, decision.monitor) == (None, (), None)
     assert (decision.why, decision.fewest_moves, decision.expected_attempts) == ("solved", 0, 0)
 
 
@@ -88,7 +88,7 @@ def test_planner_decides_when_it_is_asked_for() -> None:
 def test_planner_decides_for_a_policy_of_another_shape() -> None:
     policy = FixedValues(SortingShape(n_cells=6, n_colours=2), [])
     decision = decide(policy, start(), SHAPE)
-    assert (decision.by, decision.why, decision.watch) == ("planner", "other-shape", None)
+    assert (decision.by, decision.why, decision.monitor) == ("planner", "other-shape", None)
 
 
 @pytest.mark.parametrize(
@@ -113,7 +113,7 @@ def played(policy: FixedValues, state: SortingState, n: int) -> list[SortingDeci
     """Decisions while every pick succeeds."""
     found: list[SortingDecision] = []
     for _ in range(n):
-        found.append(decide(policy, state, SHAPE, found[-1].watch if found else None))
+        found.append(decide(policy, state, SHAPE, found[-1].monitor if found else None))
         move = found[-1].move
         if move is None:
             break
@@ -131,10 +131,10 @@ def test_planner_takes_over_from_a_policy_in_circles_and_reaches_the_goal() -> N
 
 def test_failed_picks_alone_do_not_hand_over_before_the_patience_ends() -> None:
     policy = FixedValues(SHAPE, [Move(0, RED)])
-    watch, whys = None, []
+    monitor, whys = None, []
     for _ in range(6):
-        decision = decide(policy, start(), SHAPE, watch)
-        watch, whys = decision.watch, [*whys, decision.why]
+        decision = decide(policy, start(), SHAPE, monitor)
+        monitor, whys = decision.monitor, [*whys, decision.why]
     assert whys == ["policy"] * 5 + ["attempts-exceeded"]
 
 
@@ -143,7 +143,7 @@ def test_policy_is_trusted_again_after_a_person_interferes() -> None:
     handed = played(policy, start(), 3)[-1]
     changed = dataclasses.replace(start(), goal=np.roll(start().goal, 0, axis=0).copy())
     changed.goal[0, 1] = 0
-    assert decide(policy, changed, SHAPE, handed.watch).why == "policy"
+    assert decide(policy, changed, SHAPE, handed.monitor).why == "policy"
 
 
 def test_large_tasks_are_ranked_without_values_that_would_take_too_long() -> None:

@@ -26,84 +26,86 @@ def start() -> SortingState:
 
 
 def seen(
-    watch: ProgressMonitor | None, state: SortingState, attempts: float = 10.0
+    monitor: ProgressMonitor | None, state: SortingState, attempts: float = 10.0
 ) -> ProgressMonitor:
-    return observe_transition(watch, state_key(state), attempts, POLICY)
+    return observe_transition(monitor, state_key(state), attempts, POLICY)
 
 
-def after_move(watch: ProgressMonitor, state: SortingState, move: Move) -> ProgressMonitor:
+def after_move(monitor: ProgressMonitor, state: SortingState, move: Move) -> ProgressMonitor:
     fail = state.fail[move.pick] if move.pick < SHAPE.n_cells else 0.0
-    return expect_state(watch, state_key(apply(state, SHAPE, move)), can_fail=bool(fail > 0.0))
+    return expect_state(
+        monitor, state_key(apply(state, SHAPE, move)), can_fail=bool(fail > 0.0)
+    )
 
 
 def test_record_begins_with_the_state_and_one_and_a_half_times_the_attempts() -> None:
-    watch = seen(None, start(), attempts=4.0)
-    assert watch.seen == (state_key(start()),)
-    assert (watch.attempts, watch.budget, watch.planner_fallback) == (0, 6.0, None)
+    monitor = seen(None, start(), attempts=4.0)
+    assert monitor.seen == (state_key(start()),)
+    assert (monitor.attempts, monitor.budget, monitor.planner_fallback) == (0, 6.0, None)
 
 
 def test_failed_pick_explains_that_the_state_stayed() -> None:
-    watch = after_move(seen(None, start()), start(), Move(0, 4))
+    monitor = after_move(seen(None, start()), start(), Move(0, 4))
     for attempt in range(1, 5):
-        watch = after_move(seen(watch, start()), start(), Move(0, 4))
-        assert (watch.planner_fallback, watch.attempts) == (None, attempt)
+        monitor = after_move(seen(monitor, start()), start(), Move(0, 4))
+        assert (monitor.planner_fallback, monitor.attempts) == (None, attempt)
 
 
 def test_state_that_stayed_though_the_pick_cannot_fail_hands_over() -> None:
     state = apply(start(), SHAPE, Move(0, 5))
-    watch = after_move(seen(None, state), state, Move(5, 1))
-    assert seen(watch, state).planner_fallback == "repeated"
+    monitor = after_move(seen(None, state), state, Move(5, 1))
+    assert seen(monitor, state).planner_fallback == "repeated"
 
 
 def test_state_that_comes_back_by_the_moves_alone_hands_over() -> None:
     first = start()
     second = apply(first, SHAPE, Move(0, 5))
-    watch = after_move(seen(None, first), first, Move(0, 5))
-    watch = after_move(seen(watch, second), second, Move(5, 0))
-    assert seen(watch, first).planner_fallback == "repeated"
+    monitor = after_move(seen(None, first), first, Move(0, 5))
+    monitor = after_move(seen(monitor, second), second, Move(5, 0))
+    assert seen(monitor, first).planner_fallback == "repeated"
 
 
 def test_record_is_reset_when_a_person_interferes() -> None:
-    watch = after_move(seen(None, start()), start(), Move(0, 4))
+    monitor = after_move(seen(None, start()), start(), Move(0, 4))
     moved = apply(apply(start(), SHAPE, Move(0, 5)), SHAPE, Move(5, 3))
-    again = seen(watch, moved, attempts=2.0)
+    again = seen(monitor, moved, attempts=2.0)
     assert again == seen(None, moved, attempts=2.0)
 
 
 @pytest.mark.parametrize("part", ["goal", "fail"])
 def test_record_is_reset_when_goal_or_failure_map_change(part: str) -> None:
-    watch = after_move(seen(None, start()), start(), Move(0, 4))
+    monitor = after_move(seen(None, start()), start(), Move(0, 4))
     other = dataclasses.replace(start(), **{part: getattr(start(), part).copy()})
     getattr(other, part).flat[1] = 0.2 if part == "fail" else SHAPE.code(0, 0)
-    assert seen(watch, other).seen == (state_key(other),)
+    assert seen(monitor, other).seen == (state_key(other),)
 
 
 def test_record_is_reset_for_another_policy() -> None:
-    watch = after_move(seen(None, start()), start(), Move(0, 4))
-    assert observe_transition(watch, state_key(start()), 10.0, "b" * 64).attempts == 0
+    monitor = after_move(seen(None, start()), start(), Move(0, 4))
+    assert observe_transition(monitor, state_key(start()), 10.0, "b" * 64).attempts == 0
 
 
 def test_planner_takes_over_after_one_and_a_half_times_the_expected_attempts() -> None:
-    watch = after_move(seen(None, start(), attempts=2.0), start(), Move(0, 4))
+    monitor = after_move(seen(None, start(), attempts=2.0), start(), Move(0, 4))
     whys = []
     for _ in range(4):
-        watch = after_move(seen(watch, start(), attempts=2.0), start(), Move(0, 4))
-        whys.append((watch.planner_fallback, watch.attempts))
+        monitor = after_move(seen(monitor, start(), attempts=2.0), start(), Move(0, 4))
+        whys.append((monitor.planner_fallback, monitor.attempts))
     assert whys == [(None, 1), (None, 2), ("attempts-exceeded", 0), ("attempts-exceeded", 1)]
 
 
 def test_planner_keeps_deciding_until_a_person_interferes() -> None:
     state = apply(start(), SHAPE, Move(0, 5))
-    watch = seen(after_move(seen(None, state), state, Move(5, 1)), state)
+    monitor = seen(after_move(seen(None, state), state, Move(5, 1)), state)
     moved = apply(state, SHAPE, Move(5, 4))
-    watch = seen(after_move(watch, state, Move(5, 4)), moved)
-    assert watch.planner_fallback == "repeated"
-    assert seen(after_move(watch, moved, Move(4, 2)), start()).planner_fallback is None
+    monitor = seen(after_move(monitor, state, Move(5, 4)), moved)
+    assert monitor.planner_fallback == "repeated"
+    assert seen(after_move(monitor, moved, Move(4, 2)), start()).planner_fallback is None
 
 
 def test_record_never_grows_beyond_its_bound() -> None:
-    watch = seen(None, start(), attempts=1e6)
-    full = dataclasses.replace(watch, seen=tuple(f"{k:016x}" for k in range(MAX_SEEN)))
+    monitor = seen(None, start(), attempts=1e6)
+    full = dataclasses.replace(monitor, seen=tuple(f"{k:016x}" for k in range(MAX_SEEN)))
     second = apply(start(), SHAPE, Move(0, 5))
     handed = seen(after_move(full, start(), Move(0, 5)), second)
     assert handed.planner_fallback == "attempts-exceeded"

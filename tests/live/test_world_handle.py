@@ -3,31 +3,31 @@ import pytest
 from app.errors import InvalidInput
 from app.live.factory import new_world
 from app.live.sorting.commands import AddObject, MoveObject, RemoveObject
+from app.live.world_handle import WorldHandle
 from app.sim.cells.cell import load_cell
-from web.viewer.loop import LiveHandle
 
 
 @pytest.fixture
-def handle() -> LiveHandle:
+def handle() -> WorldHandle:
     cell = load_cell("sorting-e0")
-    return LiveHandle("main", cell, new_world(cell, None, 1).snapshot())
+    return WorldHandle("main", cell, new_world(cell, None, 1).snapshot())
 
 
-def test_command_that_does_not_fit_the_table_is_refused_at_once(handle: LiveHandle) -> None:
+def test_command_that_does_not_fit_the_table_is_refused_at_once(handle: WorldHandle) -> None:
     with pytest.raises(InvalidInput, match="is no block"):
         handle.submit(RemoveObject(id="block99"))
     assert handle.drain() == []
 
 
 def test_command_about_a_block_that_still_waits_is_left_to_the_world(
-    handle: LiveHandle,
+    handle: WorldHandle,
 ) -> None:
     handle.submit(AddObject(colour="red", size="small"))
     handle.submit(MoveObject(id="block7", to="red"))
     assert [one.tag for one in handle.drain()] == ["add-object", "move-object"]
 
 
-def test_table_counts_again_once_a_snapshot_shows_what_was_done(handle: LiveHandle) -> None:
+def test_table_counts_again_once_a_snapshot_shows_what_was_done(handle: WorldHandle) -> None:
     handle.submit(AddObject(colour="red", size="small"))
     handle.drain()
     handle.submit(RemoveObject(id="block99"))
