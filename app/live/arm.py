@@ -1,7 +1,7 @@
-"""The robot of a live cell: where it is, how it moves, what it touches.
+"""Robot of a live cell: state, motion of one control period, contact.
 
-One control period at a time: an action through the same kernels as training and their limits,
-then a test for contact between the ends of the period too.
+Actions pass through the kernels and limits of training; contact is tested over the whole
+period.
 """
 
 from typing import NamedTuple, Protocol
@@ -20,18 +20,18 @@ from app.sim.robot.trajectory_segment import TrajectorySegment
 from app.sim.scene.scene import arm_of, people_of
 
 GAIN = 3.0
-"""Joint speed per joint error on the way to a posture [1/s]."""
+"""Proportional gain from joint error to joint speed [1/s]."""
 
 
 class HumanGeometry(NamedTuple):
-    """Where people are at one moment."""
+    """Collision geometry of people at one time."""
 
     q: Vec
-    """Joints of those who have some [m, rad], shape (W, 18)."""
+    """Joint positions of workers [m, rad], shape (W, 18)."""
     sizes: Vec
-    """Their sizes [m], shape (W, N_SIZE)."""
+    """Body lengths of workers [m], shape (W, N_SIZE)."""
     cylinders: Vec
-    """x, y and radius of those who are cylinders [m], shape (C, 3)."""
+    """x, y and radius of cylinders [m], shape (C, 3)."""
 
 
 class PeopleInCell(Protocol):
@@ -39,34 +39,34 @@ class PeopleInCell(Protocol):
 
     @property
     def ids(self) -> tuple[int, ...]:
-        """Ids of the people who are there, in order."""
+        """Ids of the people, ascending."""
 
     @property
-    def bodies(self) -> HumanGeometry:
-        """Where they are."""
+    def geometry(self) -> HumanGeometry:
+        """Their collision geometry."""
 
 
 class LiveArm:
-    """Posture and speed of the robot.
+    """State of the robot: joint positions, speeds and accelerations.
 
     Args:
         cell: Work cell.
-        action: What the actions of its policy mean.
+        action: Interpretation of the actions of its policy.
     """
 
     def __init__(self, cell: Cell, action: ActionSettings) -> None:
         self.arm = arm_of(cell)
-        """What the kernels know of it."""
+        """Robot as kernels use it."""
         self.clearance_m: float | None = None
-        """Least distance to people, as last tested [m]; None where nobody is."""
+        """Separation distance at the last contact test [m]; None without people."""
         self.action = action
-        """What the actions of its policy mean."""
+        """Interpretation of the actions of its policy."""
         self._people = people_of(cell)
-        self.put(self.home)
+        self.place(self.home)
 
     @property
     def home(self) -> Vec:
-        """Home posture [rad], shape (6,)."""
+        """Home configuration [rad], shape (6,)."""
         return self.arm.home.copy()
 
     @property
@@ -74,17 +74,17 @@ class LiveArm:
         """Control period [s]."""
         return float(self.arm.dt)
 
-    def put(self, q: Vec) -> None:
-        """Be at rest at ``q`` [rad], shape (6,)."""
+    def place(self, q: Vec) -> None:
+        """Set the configuration to ``q`` [rad], shape (6,), at rest."""
         self.q, self.qd, self.qdd = q, np.zeros(6), np.zeros(6)
 
     def halt(self) -> None:
-        """Stand still at once, as after a contact."""
+        """Set the speed to 0, as after a contact."""
         self.qd = np.zeros(6)
 
-    def touches(self, people: PeopleInCell) -> bool:
-        """Whether it touches anything where it is; the clearance is measured again."""
-        rest, here = np.zeros(6), people.bodies
+    def in_contact(self, people: PeopleInCell) -> bool:
+        """Return whether the robot is in contact; updates the separation distance."""
+        rest, here = np.zeros(6), people.geometry
         return self._test(rest, rest, rest, here, here).kind != "none"
 
     def advance(
@@ -95,34 +95,34 @@ class LiveArm:
         *,
         straight: bool = False,
     ) -> Contact:
-        """Carry out one action, unless something is touched: then stay at the start.
+        """Execute one action; on contact the state stays that of the start.
 
         Args:
             act: Action in [-1, 1], shape (5,) or (6,).
-            people: The people, as they are at the end of the period.
-            before: Where they were at its start.
-            straight: Whether the action comes from :meth:`toward`, not from the policy.
+            people: People at the end of the period.
+            before: Their geometry at its start.
+            straight: Whether the action comes from :meth:`toward` instead of the policy.
         """
-        return self.follow(self.piece(act, straight=straight), people, before)
+        return self.follow(self.segment(act, straight=straight), people, before)
 
-    def piece(self, act: Vec, *, straight: bool = False) -> TrajectorySegment:
-        """Return what an action asks for in the period to come; see :meth:`advance`."""
+    def segment(self, act: Vec, *, straight: bool = False) -> TrajectorySegment:
+        """Return the trajectory segment of an action in the next period."""
         rule = pick.DEFAULT_ACTION if straight else self.action
         return pick.step_robot(self.arm, self.q, self.qd, self.qdd, act, rule)
 
     def follow(
-        self, piece: TrajectorySegment, people: PeopleInCell, before: HumanGeometry
+        self, segment: TrajectorySegment, people: PeopleInCell, before: HumanGeometry
     ) -> Contact:
-        """Carry out a piece of motion, unless something is touched; see :meth:`advance`."""
-        found = self._test(self.qd, piece.c, piece.d, before, people.bodies)
+        """Execute a trajectory segment; on contact the state stays that of the start."""
+        found = self._test(self.qd, segment.c, segment.d, before, people.geometry)
         if found.kind == "none":
-            self.q, self.qd, self.qdd = piece.q, piece.qd, piece.qdd
+            self.q, self.qd, self.qdd = segment.q, segment.qd, segment.qdd
         return found
 
     def _test(
         self, qd: Vec, c: Vec, d: Vec, before: HumanGeometry, after: HumanGeometry
     ) -> Contact:
-        """Test a period that began with the robot here and the people as they were then."""
+        """Test the period from the present state for contact."""
         found = contact(
             self.arm,
             self._people._replace(columns=body.capsule_columns(len(after.q))),
@@ -137,7 +137,7 @@ class LiveArm:
 
     def distances(self, people: PeopleInCell) -> dict[int, float]:
         """Return the distance to each person by id [m]."""
-        here = people.bodies
+        here = people.geometry
         shared = self._people._replace(columns=body.capsule_columns(len(here.q)))
         found = [
             *worker_distances(self.arm, shared, self.q, here.q, here.sizes).tolist(),
@@ -145,19 +145,19 @@ class LiveArm:
         ]
         return dict(zip(people.ids, found, strict=True))
 
-    def posture_at(self, point: Vec) -> tuple[Vec, bool]:
-        """Return the posture with the tool pointing down at a point, and whether it is exact.
+    def configuration_at(self, point: Vec) -> tuple[Vec, bool]:
+        """Return the configuration with vertical tool at a point, and whether it is exact.
 
         Args:
-            point: Where the tcp shall be [m], shape (3,).
+            point: Target of the tcp [m], shape (3,).
         """
         q, arm = np.empty(6), self.arm
         exact = kinematics.ik_vertical(arm.lengths, arm.limits, point, q)
         return q, bool(exact)
 
-    def toward(self, posture: Vec) -> Vec:
-        """Return the action that goes straight to a posture, shape (5,)."""
-        speed = GAIN * (posture - self.q) / self.arm.limits.qd_max
+    def toward(self, target: Vec) -> Vec:
+        """Return the action straight to a configuration [rad], joint by joint, shape (5,)."""
+        speed = GAIN * (target - self.q) / self.arm.limits.qd_max
         return np.asarray(np.clip(speed[:5], -1.0, 1.0))
 
     def tcp(self) -> Vec:
@@ -168,5 +168,5 @@ class LiveArm:
         return point
 
     def reached(self, point: Vec) -> bool:
-        """Whether the tool is at a point, upright and slow, as the pick scenario asks."""
+        """Return whether the tool is at a point [m], vertical and slow (pick scenario)."""
         return pick.tool_state(self.arm, self.q, self.qd, point)[3]

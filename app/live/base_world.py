@@ -13,7 +13,7 @@ from app.errors import ServiceError
 from app.live import commands
 from app.live.arm import HumanGeometry, LiveArm, PeopleInCell
 from app.live.command_checks import Command, check
-from app.live.people.worker import frozen
+from app.live.read_model import frozen
 from app.live.snapshot import (
     CandidateSnapshot,
     ContactSnapshot,
@@ -64,7 +64,7 @@ class PersonLike(Protocol):
     def resize(self, command: commands.SetAnthropometry) -> None:
         """Change the body dimensions."""
 
-    def view(self, clearance_m: float, *, nearest: bool) -> PersonSnapshot:
+    def snapshot(self, clearance_m: float, *, nearest: bool) -> PersonSnapshot:
         """Return the read model of the person."""
 
 
@@ -93,7 +93,7 @@ class BaseWorld(ABC, Generic[P]):
 
     Args:
         cell: Work cell.
-        policy: Chooses and moves; None lets the robot rest.
+        policy: Selects and executes tasks; None: the robot is idle.
         id: Name of the world in URLs.
         people: The people in it.
     """
@@ -191,11 +191,11 @@ class BaseWorld(ABC, Generic[P]):
         if not self.paused:
             self._advance()
         elif self.people.move_while_paused(self.robot.dt):
-            self.touches_here()
+            self.in_contact()
             self._refresh()
 
     def _advance(self) -> None:
-        before = self.people.bodies
+        before = self.people.geometry
         self.people.move(self.robot.dt)
         self.tick += 1
         self.t += self.robot.dt
@@ -213,7 +213,7 @@ class BaseWorld(ABC, Generic[P]):
     def _wait(self) -> None:
         if self.status == "contact" and self.status_s >= CONTACT_HOLD_S:
             self._end_contact()
-        elif self.status == "blocked" and not self.touches_here():
+        elif self.status == "blocked" and not self.in_contact():
             self._begin()
 
     def _reset(self) -> None:
@@ -222,10 +222,10 @@ class BaseWorld(ABC, Generic[P]):
         self._restart_robot()
 
     def _restart_robot(self) -> None:
-        self.robot.put(self._start_configuration())
+        self.robot.place(self._start_configuration())
         self.contact = None
         self._prepare_restart()
-        self._begin("blocked" if self.touches_here() else "moving")
+        self._begin("blocked" if self.in_contact() else "moving")
 
     def _change_people(self, command: commands.PeopleCommand) -> None:
         match command:
@@ -239,7 +239,7 @@ class BaseWorld(ABC, Generic[P]):
                 self.people[command.person].resize(command)
             case commands.AddPerson() | commands.RemovePerson():
                 self.people.change(command)
-                self.touches_here()
+                self.in_contact()
         self._refresh()
 
     def enter(self, status: Status) -> None:
@@ -253,9 +253,9 @@ class BaseWorld(ABC, Generic[P]):
         self.policy = policy
         self.robot.action = pick.DEFAULT_ACTION if policy is None else policy.action
 
-    def touches_here(self) -> bool:
+    def in_contact(self) -> bool:
         """Return whether the robot is in contact, and measure the separation distance."""
-        return self.robot.touches(self.people)
+        return self.robot.in_contact(self.people)
 
     @property
     def near(self) -> bool:
@@ -280,7 +280,7 @@ class BaseWorld(ABC, Generic[P]):
             return None
         index = found.worker
         if found.walker is not None:
-            index = len(self.people.bodies.q) + found.walker
+            index = len(self.people.geometry.q) + found.walker
         return None if index is None else self.people.ids[index]
 
     def count(
@@ -359,7 +359,7 @@ class BaseWorld(ABC, Generic[P]):
         distances = self.robot.distances(self.people)
         nearest = min(distances, key=lambda id: distances[id], default=None)
         return tuple(
-            person.view(distances[person.id], nearest=person.id == nearest)
+            person.snapshot(distances[person.id], nearest=person.id == nearest)
             for person in self.people
         )
 

@@ -1,7 +1,6 @@
 """Checks of a command against the work cell and the state of its world.
 
-The checks run twice: when a command is queued, for an immediate error, and again when its turn
-comes.
+The checks run when a command is queued, for an immediate error, and again when it is applied.
 """
 
 from collections.abc import Sequence
@@ -39,7 +38,7 @@ from app.live.sorting.commands import (
     TableCommand,
     change_table,
 )
-from app.live.sorting.perceived_state import table_of
+from app.live.sorting.task_snapshot import table_of
 from app.sim.cells.cell import Cell
 from app.sim.pick.cases import cases_of
 from app.sim.sorting.batch import shape_of
@@ -50,7 +49,7 @@ from app.sim.sorting.state import SIZE_NAMES
 Scenario = Literal["pick", "reach", "sorting"]
 Command = PickCommand | ReachCommand | SortingCommand
 CommandMessage = Annotated[Command, Field(discriminator="tag")]
-"""Any command, told apart by its tag: the body of ``POST /v1/worlds/{id}/commands``."""
+"""Any command, discriminated by its tag: body of ``POST /v1/worlds/{id}/commands``."""
 COMMANDS: dict[Scenario, UnionType] = {
     "pick": PickCommand,
     "reach": ReachCommand,

@@ -15,7 +15,7 @@ from app.sim.human.anthropometry import PERCENTILES
 from app.sim.perception.keypoints import FARTHEST_M
 
 Mode = Literal["manual", "auto", "still", "recorded"]
-"""Motion source of a person: a visitor; the work loop or a case study; none; a recording."""
+"""Motion source of a person: dragging; the work loop or a case study; none; a recording."""
 PlainMode = Literal["manual", "auto", "still"]
 """Motion sources without further data; ``recorded`` is set by :class:`SetMotion`."""
 MAX_PEOPLE = LIMITS["people"]
@@ -174,7 +174,7 @@ class SetPolicy(LoadingCommand):
 
     tag: Literal["set-policy"] = "set-policy"
     checkpoint: Name | None
-    """SHA-256 or alias; null: the robot rests, in a reach cell it moves straight to the goal"""
+    """SHA-256 or alias; null: the robot is idle; in a reach cell: straight to the goal"""
 
 
 class SetCandidates(LiveCommand):
@@ -182,7 +182,7 @@ class SetCandidates(LiveCommand):
 
     tag: Literal["set-candidates"] = "set-candidates"
     ids: Annotated[tuple[str, ...], Field(max_length=1000)]
-    """station ids; an empty list lets the robot rest"""
+    """station ids; empty: the robot is idle"""
 
 
 class ToggleCandidate(LiveCommand):

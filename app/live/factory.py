@@ -26,11 +26,11 @@ def new_world(
 
     Args:
         cell: Work cell that :func:`lacks_for_live` accepts.
-        policy: Moves the arm of a pick or sorting cell; None lets the robot rest.
+        policy: Moves the robot of a pick or sorting cell; None: the robot is idle.
         seed: Seed of people and tasks.
         id: Name of the world in URLs.
-        sorting_policy: Values the moves of a sorting cell; None leaves them to the planner.
-        reach_policy: Moves the arm of a reach cell; None moves straight to the goals.
+        sorting_policy: Policy of a sorting cell; None: the planner selects every move.
+        reach_policy: Policy of a reach cell; None: straight motion to the goals.
     """
     match scenario_of(cell):
         case "reach":

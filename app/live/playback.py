@@ -1,9 +1,9 @@
-"""A recorded motion, played in a cell at the pace it was recorded.
+"""Playback of a recorded motion in a cell, in real time.
 
-The run is put down at a person's place at the table (``worker_motion.at_the_table``); its path
-is kept in metres, wherever it leads, and the body is where it was recorded, even where that
-takes an angle beyond the model's limits. Policies are told angles inside the limits; how often
-that differs, and by how much at the wrists, is told.
+The run is placed at a person's home at the table (``human_motion_config.at_the_table``); its
+path stays metric and may leave the walking area. The body follows the recording, also beyond
+the joint limits of the model; policies observe angles clipped to the limits. The share of
+clipped frames and the resulting error at the wrists are part of the snapshot.
 """
 
 import math
@@ -21,11 +21,11 @@ from app.sim.mocap.joint_centres import WRIST_L, WRIST_R, model_points
 from app.sim.people.human_motion_config import at_the_table
 
 YAW = 2
-"""Place of the pelvis's yaw, which has no limit while a motion is played."""
+"""Index of the yaw of the pelvis, which is not clipped."""
 FASTEST = 50.0
-"""Greatest speed of a joint that is told, and that a policy takes [m/s, rad/s]."""
+"""Limit of the joint speeds in snapshots and observations [m/s, rad/s]."""
 HALF_SPAN_S = 0.025
-"""Half of the time over which speeds are taken [s]."""
+"""Half of the interval of the finite differences of speeds [s]."""
 
 
 class Recording(NamedTuple):
@@ -42,31 +42,31 @@ class Recording(NamedTuple):
 
 
 class PlayedMotion:
-    """One run of a recording, played in a cell.
+    """Playback of one run of a recording.
 
     Args:
         recording: The run.
         place: Cell with the home position of the person.
-        worker: Person whose walking area the run may leave.
+        worker: Person with the walking area.
     """
 
     def __init__(self, recording: Recording, place: Cell, worker: Worker) -> None:
         motion = recording.motion
         self.size = motion.size
-        """Lengths of the recorded person."""
+        """Body lengths of the recorded person."""
         self.duration = float(motion.times[-1])
-        """Of the run [s]."""
+        """Duration of the run [s]."""
         self._recording = recording
         path = at_the_table(motion, place).q
         self._times, self._rise = motion.times, motion.pelvis_z
         self._q = path.copy()
-        told = np.clip(path, Q_MIN, Q_MAX)
-        told[:, YAW] = path[:, YAW]
-        clipped = np.abs(told - path)[:, YAW + 1 :].max(axis=1) > 1e-6
+        observed = np.clip(path, Q_MIN, Q_MAX)
+        observed[:, YAW] = path[:, YAW]
+        clipped = np.abs(observed - path)[:, YAW + 1 :].max(axis=1) > 1e-6
         self._clipped_share = float(clipped.mean())
         wrists = [
             model_points(q, motion.pelvis_z, motion.size)[:, [WRIST_R, WRIST_L]]
-            for q in (path, told)
+            for q in (path, observed)
         ]
         self._clipped_m = float(np.linalg.norm(wrists[1] - wrists[0], axis=2).max())
         self._outside_share = float(np.mean([is_outside(q, worker) for q in self._q]))
@@ -74,8 +74,8 @@ class PlayedMotion:
     def at(self, t: float) -> tuple[Vec, Vec]:
         """Return joint positions [m, rad] and speeds [m/s, rad/s] at ``t`` [s], (18,) each.
 
-        Speeds are held within ``FASTEST``: where a shoulder's axes line up, its angles turn
-        faster than any joint, though the arm does not.
+        Speeds are clipped to ``FASTEST``: near the singularity of a shoulder its angles change
+        faster than the arm moves.
         """
         start = max(t - HALF_SPAN_S, 0.0)
         end = min(max(t, 0.0) + HALF_SPAN_S, self.duration)
@@ -84,7 +84,7 @@ class PlayedMotion:
         return self._between(t), np.clip(speed, -FASTEST, FASTEST)
 
     def rise_at(self, t: float) -> float:
-        """Return the height of the pelvis above standing at ``t`` [s] [m]."""
+        """Return the height of the pelvis relative to standing at ``t`` [s], in m."""
         return float(np.interp(t, self._times, self._rise))
 
     def _between(self, t: float) -> Vec:
@@ -95,12 +95,12 @@ class PlayedMotion:
         return np.asarray(self._q[k] + share * (self._q[k + 1] - self._q[k]))
 
     def turn_near(self, yaw: float) -> None:
-        """Turn the whole run by full turns so that it begins with a yaw near ``yaw`` [rad]."""
+        """Shift the yaw by full turns so that the run starts near ``yaw`` [rad]."""
         full = 2.0 * math.pi
         self._q[:, YAW] += full * round((yaw - self._q[0, YAW]) / full)
 
-    def view(self, t: float) -> PlaybackSnapshot:
-        """Return what is known of it at ``t`` [s]."""
+    def snapshot(self, t: float) -> PlaybackSnapshot:
+        """Return the read model at ``t`` [s]."""
         return PlaybackSnapshot(
             name=self._recording.name,
             run=self._recording.run,
@@ -114,12 +114,12 @@ class PlayedMotion:
 
 
 def is_outside(q: Vec, worker: Worker, slack: float = 0.02) -> bool:
-    """Whether a pelvis lies outside a person's walking area by more than ``slack`` [m].
+    """Return whether a pelvis is outside a walking area by more than a tolerance.
 
     Args:
         q: Joint positions [m, rad], shape (18,).
-        worker: Whose area.
-        slack: Distance that is not minded [m].
+        worker: Person with the walking area.
+        slack: Tolerance [m].
     """
     x, y = float(q[0]), float(q[1])
     inside_x = worker.x_min - slack <= x <= worker.x_max + slack

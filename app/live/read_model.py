@@ -1,4 +1,4 @@
-"""Base class and array type of snapshots, which are also the JSON of the HTTP API."""
+"""Base class and array types of snapshots, the JSON of the HTTP API."""
 
 from typing import Annotated, ClassVar
 
@@ -13,6 +13,13 @@ Numbers = Annotated[
 """Read-only array, a list of numbers in JSON."""
 Internal = Annotated[Numbers, Field(exclude=True)]
 """Read-only array for the viewer alone."""
+
+
+def frozen(values: Vec) -> Vec:
+    """Return a read-only copy."""
+    copy = np.array(values, dtype=np.float64)
+    copy.setflags(write=False)
+    return copy
 
 
 class ReadModel:

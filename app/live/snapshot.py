@@ -176,7 +176,7 @@ class Counters(ReadModel):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RefusedCommand(ReadModel):
-    """A command that was valid when queued and was refused when its turn came."""
+    """A command that was valid when queued and refused when applied."""
 
     number: int
     """number of the command"""

@@ -1,13 +1,9 @@
 """People of live worlds: workers, pedestrians, dragged people.
 
-body         How large a live person is, changed while the cell runs: lengths glide, they never
-             jump
-dragging     A person who is moved by hand: follows drags smoothly, with a speed that makes
-             sense
-pedestrians  The people of a live reach cell: none to four walking cylinders, or who drags them
-work_loop    The work of one live person: task primitives, one script after the other without a
-             jump
-worker       One person of a live cell: works, acts a case study, moves as recorded, rests, or
-             is dragged
-workers      The people of a live cell: none to four, each with a home and a part of the table
+anthropometry  Body dimensions of a live person, which change continuously
+dragging       Motion of a dragged person: low-pass filter with bounded joint speeds
+pedestrians    People of a live reach cell: up to four pedestrians as vertical cylinders
+work_loop      Continuous work of one person: random scripts of task primitives
+worker         One 18-DoF person of a live cell and the sources of its motion
+workers        People of a live pick or sorting cell: up to four workers with their work areas
 """

@@ -1,7 +1,7 @@
-"""A person who is moved by hand: follows drags smoothly, with a speed that makes sense.
+"""Motion of a dragged person.
 
-A drag jumps; a person does not. The posture follows its target through a first-order low pass
-with bounded joint speeds, so that the speeds a policy sees are those of the movement it sees.
+The posture follows its target by a first-order low-pass filter with bounded joint speeds, so
+that observed speeds and positions are consistent although targets jump.
 """
 
 import numpy as np
@@ -12,19 +12,19 @@ from app.sim.core.arrays import Vec
 from app.sim.human import model as human
 
 LAG_S = 0.1
-"""Time constant with which the posture follows [s]."""
+"""Time constant of the filter [s]."""
 Q_RATE = np.array([1.2, 1.2, 2.5, *([1.5] * 3), *([1.5] * 4), *([4.0] * 8)])
-"""Greatest joint speeds [m/s, rad/s]: walking, turning, bending, arms; shape (18,)."""
+"""Maximum joint speeds [m/s, rad/s]: walking, turning, bending, arms; shape (18,)."""
 STEP_BACK, STEP_ASIDE = 0.8, 0.6
-"""How far beyond the walking area a person may be dragged, away from the table [m]."""
+"""Margins of the walking area for dragging: away from the table, and to the sides [m]."""
 
 
 class DraggedPerson:
-    """Posture and speed of one person who follows targets.
+    """Joint positions and speeds of one person that follows targets.
 
     Args:
-        cell: Work cell the person stands in.
-        q: Posture at first [m, rad], shape (18,).
+        cell: Work cell.
+        q: Initial posture [m, rad], shape (18,).
     """
 
     def __init__(self, cell: Cell, q: Vec) -> None:
@@ -37,20 +37,20 @@ class DraggedPerson:
         self._hands: dict[str, Vec] = {}
 
     def place(self, q: Vec, qd: Vec) -> None:
-        """Take over a posture [m, rad] and its speed [m/s, rad/s], and stay there."""
+        """Set posture [m, rad] and speed [m/s, rad/s]; the posture becomes the target."""
         self.q, self.qd, self._target = np.array(q), np.array(qd), np.array(q)
         self._hands.clear()
 
     def aim(self, q: Vec) -> None:
-        """Follow a posture [m, rad], shape (18,)."""
+        """Set the target posture [m, rad], shape (18,)."""
         self._target = np.array(q)
 
     def drag(self, command: MovePerson, size: Vec) -> None:
-        """Take what was dragged as the new target; dragged hands stay where they were put.
+        """Set the target from dragged points; hands dragged before keep their targets.
 
         Args:
-            command: What was dragged.
-            size: The person's size [m], shape (12,).
+            command: Dragged points.
+            size: Body lengths [m], shape (12,).
         """
         pelvis = (
             self._walkable(command.pelvis)
@@ -79,7 +79,7 @@ class DraggedPerson:
         return x, y, yaw
 
     def _carry_hands(self, pelvis: tuple[float, float, float]) -> None:
-        """Move dragged hands along with the pelvis, as one body."""
+        """Move the targets of hands rigidly with the pelvis."""
         turn = pelvis[2] - self._target[2]
         c, s = np.cos(turn), np.sin(turn)
         for hand, point in self._hands.items():
@@ -89,13 +89,13 @@ class DraggedPerson:
 
     @property
     def arrived(self) -> bool:
-        """Whether the posture is its target, but for 1 cm or 0.01 rad."""
+        """Whether the posture is within 1 cm and 0.01 rad of its target."""
         return bool(np.abs(self._target - self.q).max() < 0.01)
 
     def follow(self, dt: float) -> bool:
-        """Move for ``dt`` [s]; return whether anything moved."""
-        way = (self._target - self.q) * (1.0 - np.exp(-dt / LAG_S))
-        step = np.clip(way, -Q_RATE * dt, Q_RATE * dt)
+        """Move for ``dt`` [s]; return whether a joint moved."""
+        step = (self._target - self.q) * (1.0 - np.exp(-dt / LAG_S))
+        step = np.clip(step, -Q_RATE * dt, Q_RATE * dt)
         step[np.abs(self._target - self.q) < 1e-5] = 0.0
         moved = bool(np.any(step) or np.any(self.qd))
         self.q = self.q + step

@@ -1,13 +1,11 @@
-"""The people of a live reach cell: none to four walking cylinders, or who drags them.
+"""People of a live reach cell: up to four pedestrians as vertical cylinders.
 
-They walk as METHOD 2.1 says, on and on: nobody stands still for a whole episode, since episodes
-of the robot follow each other without a break, and whoever stays at a target goes on after a
-while. A visitor may give all of them one speed, let one stand, or drag one; a dragged cylinder
-follows with bounded speed and never jumps, so that the velocity a policy sees is the true one.
-They avoid neither each other nor the robot.
+They walk continuously after docs/method.md 2.1 and avoid neither each other nor the robot. A
+visitor can set a common speed, stop a person or drag one; dragged cylinders follow with
+bounded speed, so that observed velocities are the true ones.
 
-Deviates: p_still is 0, and p_go_on of the authors' code (0.01 per period) holds; METHOD 2.1 has
-both per episode.
+Deviates: p_still is 0 and p_go_on is 0.01 per period, as in the authors' code; in
+docs/method.md 2.1 both are per episode.
 """
 
 import math
@@ -26,7 +24,7 @@ from app.live.commands import (
     SetAnthropometry,
     SetMotion,
 )
-from app.live.people.worker import frozen
+from app.live.read_model import frozen
 from app.live.snapshot import AnthropometrySnapshot, CylinderSnapshot, PersonSnapshot
 from app.sim.cells.cell import Cell
 from app.sim.collision.contact import pedestrian_distances
@@ -72,21 +70,21 @@ from app.sim.perception.observed_people import person_from_cylinder
 from app.sim.scene.scene import arm_of, pedestrian_settings, people_of
 
 DRAG_SPEED = 1.2
-"""Greatest speed of a cylinder that is dragged [m/s]."""
+"""Maximum speed of a dragged cylinder [m/s]."""
 DRAG_LAG_S = 0.12
-"""Time constant with which it follows [s]."""
+"""Time constant of a dragged cylinder [s]."""
 TURN_RATE = 4.0
-"""How fast somebody turns where they walk to [rad/s]; only seen, never computed with."""
+"""Turning rate of the mannequin [rad/s]; for drawing only."""
 SLOW = 0.05
-"""Speed below which nobody turns [m/s]."""
+"""Speed below which the mannequin keeps its heading [m/s]."""
 START_TRIES = 60
-"""Places drawn for somebody who comes in."""
-START_ROOM_M = 0.8
-"""Distance from the robot at which people begin [m]."""
-BESIDE = 0.9
-"""Distance of the axes of two people that leaves room at the start [m]."""
-DRAG_ROOM = 0.6
-"""How far beyond the walking area somebody may be dragged [m]."""
+"""Number of start positions drawn for a new person."""
+START_CLEARANCE_M = 0.8
+"""Minimum distance from the robot at the start [m]."""
+START_SPACING_M = 0.9
+"""Minimum distance between the axes of two people at the start [m]."""
+DRAG_MARGIN = 0.6
+"""Margin of the walking area for dragging [m]."""
 UPRIGHT = AnthropometrySnapshot(
     stature=50.0,
     arms=50.0,
@@ -97,102 +95,102 @@ UPRIGHT = AnthropometrySnapshot(
     arm_m=0.5 * (MEDIAN.arm("r") + MEDIAN.arm("l")),
     shoulders_m=MEDIAN.clavicle_r + MEDIAN.clavicle_l,
 )
-"""The size of the mannequin inside a cylinder."""
+"""Body dimensions of the mannequin inside a cylinder."""
 
 
-class LiveWalkers:
-    """The people of one live reach cell; row ``id`` of each array is that person's.
+class LivePedestrians:
+    """Pedestrians of one live reach cell; arrays are indexed by person id.
 
     Args:
-        cell: Work cell whose people, if any, are cylinders.
-        seed: Seed of their walks.
+        cell: Work cell without workers.
+        seed: Seed of the walks.
     """
 
     def __init__(self, cell: Cell, seed: int) -> None:
         self._cell, self._seed = cell, seed
         self._arm, self._shared = arm_of(cell), people_of(cell)
         self.robot_q = np.array(self._arm.home)
-        """Where the robot is [rad], shape (6,); who comes in does so away from it."""
+        """Configuration of the robot [rad], shape (6,); people start away from it."""
         settings = live_settings(cell)
         self._rules = pedestrian_rules([settings] * MAX_PEOPLE)
         self._own_kind = float(self._rules.rows[0, KIND])
         self.height = max([one.height for one in cell.cylinders], default=2.0)
         """Height of the cylinders [m]."""
         self.speed: float | None = None
-        """Speed that a visitor gave all of them [m/s]; None as METHOD 2.1."""
+        """Common walking speed [m/s]; None: variable (docs/method.md 2.1)."""
         self._state = pedestrian_state(1, MAX_PEOPLE)
         self._drawn = np.zeros((MAX_PEOPLE, RADIUS - SPEED))
         self._episode = 0
-        self._people: dict[int, LiveWalker] = {}
+        self._people: dict[int, LivePedestrian] = {}
         for id in range(len(cell.people)):
-            self._let_in(id)
+            self._add(id)
 
-    def __iter__(self) -> Iterator["LiveWalker"]:
+    def __iter__(self) -> Iterator["LivePedestrian"]:
         return iter(self._people.values())
 
     def __len__(self) -> int:
         return len(self._people)
 
-    def __getitem__(self, id: int) -> "LiveWalker":
+    def __getitem__(self, id: int) -> "LivePedestrian":
         return self._people[id]
 
     @property
     def ids(self) -> tuple[int, ...]:
-        """Ids of the people who are there, in order."""
+        """Ids of the people, ascending."""
         return tuple(self._people)
 
     @property
     def rows(self) -> Vec:
-        """State of those who are there, as the kernels keep it, shape (n, N_STATE)."""
+        """States of the people as kernels use them, shape (n, N_STATE)."""
         return self._state.rows[0, list(self._people)]
 
     @property
     def cylinders(self) -> Vec:
-        """x, y and radius of those who are there [m], shape (n, 3)."""
+        """x, y and radius of the people [m], shape (n, 3)."""
         return self.rows[:, [X, Y, R]]
 
     @property
-    def bodies(self) -> HumanGeometry:
-        """Where they are; nobody has joints."""
+    def geometry(self) -> HumanGeometry:
+        """Collision geometry: cylinders only."""
         return HumanGeometry(np.zeros((0, 18)), np.zeros((0, N_SIZE)), self.cylinders)
 
     def restart(self) -> None:
-        """Let everyone who walks begin again somewhere; who is dragged or stands stays."""
+        """Draw new starts for walking people; others keep their positions."""
         for one in self:
             if one.mode == "auto":
                 self._place(one.id)
 
     def change(self, command: AddPerson | RemovePerson) -> None:
-        """Let people come and leave as a command says."""
+        """Add or remove a person."""
         ids = people_after(command, self.ids)
         for id in ids:
             if id not in self._people:
-                self._let_in(id)
+                self._add(id)
         self._people = {id: self._people[id] for id in ids}
 
     def move(self, dt: float) -> None:
-        """Move everyone for ``dt`` [s]."""
+        """Move all people for ``dt`` [s]."""
         for one in self:
             advance_pedestrian(self._rules, self._state, 0, one.id, dt)
             one.after(dt)
 
     def move_while_paused(self, dt: float) -> bool:
-        """Move whoever is dragged; return whether anybody moved."""
+        """Move dragged people for ``dt`` [s]; return whether one moved."""
         moved = [one.after(dt) for one in self if one.mode == "manual"]
         return any(moved)
 
     def set_speed(self, speed: float | None) -> None:
-        """Let all walk with one speed [m/s], or as METHOD 2.1 says."""
+        """Set a common walking speed [m/s]; None: variable (docs/method.md 2.1)."""
         self.speed = speed
         for one in self:
-            self._pace(one.id)
+            self._set_pace(one.id)
 
-    def _let_in(self, id: int) -> None:
-        self._people[id] = LiveWalker(self, id, self._state.rows[0, id])
+    def _add(self, id: int) -> None:
+        self._people[id] = LivePedestrian(self, id, self._state.rows[0, id])
         self._place(id)
 
     def _place(self, id: int) -> None:
-        """Draw place, way and the two functions of somebody, away from robot and others."""
+        """Draw position, course, speed and radius profile, away from robot and people."""
         others = [one.row for one in self if one.id != id]
         self._rules.rows[id, KIND] = self._own_kind
         for _ in range(START_TRIES):
@@ -201,18 +199,19 @@ class LiveWalkers:
             start_stream(self._seed, 0, self._episode, stream)
             start_pedestrian(self._rules, self._state, 0, id, stream)
             row = self._state.rows[0, id]
-            apart = all(math.hypot(row[X] - o[X], row[Y] - o[Y]) > BESIDE for o in others)
+            spacing = [math.hypot(row[X] - o[X], row[Y] - o[Y]) for o in others]
             gap = pedestrian_distances(
                 self._arm, self._shared, self.robot_q, row[None, [X, Y, R]]
             )
-            if apart and gap[0] >= START_ROOM_M:
+            apart = min(spacing, default=np.inf) > START_SPACING_M
+            if apart and gap[0] >= START_CLEARANCE_M:
                 break
         self._drawn[id] = self._state.rows[0, id, SPEED:RADIUS]
-        self._pace(id)
+        self._set_pace(id)
         self._people[id].placed()
 
-    def _pace(self, id: int) -> None:
-        """Let somebody walk with the speed that holds for all, or that of its own function."""
+    def _set_pace(self, id: int) -> None:
+        """Set the speed profile of a person: the common speed, or its own profile."""
         rule, speed = self._rules.rows[id], self._state.rows[0, id, SPEED:RADIUS]
         if self.speed is None:
             rule[KIND], speed[:] = self._own_kind, self._drawn[id]
@@ -227,61 +226,61 @@ class LiveWalkers:
         return rng.uniform([walk.x_min, walk.y_min], [walk.x_max, walk.y_max])
 
     def walkable(self, x: float, y: float) -> tuple[float, float]:
-        """Return the point nearest to (x, y) [m] where somebody may be dragged to."""
+        """Return the point nearest to (x, y) [m] inside the area for dragging."""
         walk = live_settings(self._cell)
         return (
-            min(max(x, walk.x_min - DRAG_ROOM), walk.x_max + DRAG_ROOM),
-            min(max(y, walk.y_min - DRAG_ROOM), walk.y_max + DRAG_ROOM),
+            min(max(x, walk.x_min - DRAG_MARGIN), walk.x_max + DRAG_MARGIN),
+            min(max(y, walk.y_min - DRAG_MARGIN), walk.y_max + DRAG_MARGIN),
         )
 
     def is_outside(self, x: float, y: float) -> bool:
-        """Whether (x, y) [m] is outside the walking area."""
+        """Return whether (x, y) [m] is outside the walking area."""
         walk = live_settings(self._cell)
         return not (walk.x_min <= x <= walk.x_max and walk.y_min <= y <= walk.y_max)
 
     @property
     def body(self) -> Vec:
-        """Size of the mannequin inside a cylinder [m], shape (12,)."""
+        """Body lengths of the mannequin inside a cylinder [m], shape (12,)."""
         return self._cell.body
 
 
-class LiveWalker:
-    """One walking cylinder, on its own row of the walkers' state.
+class LivePedestrian:
+    """One pedestrian; a view of its row of the shared state.
 
     Args:
-        among: The people it belongs to.
+        among: All pedestrians of the cell.
         id: Number of the person.
-        row: Its state, shape (N_STATE,); changed in place.
+        row: State, shape (N_STATE,); changed in place.
     """
 
-    def __init__(self, among: LiveWalkers, id: int, row: Vec) -> None:
+    def __init__(self, among: LivePedestrians, id: int, row: Vec) -> None:
         self._among, self.id, self.row = among, id, row
         self.mode: Mode = "auto"
-        """Who moves the person."""
+        """Motion source."""
         self.yaw = -0.5 * math.pi
-        """Where the mannequin faces [rad]."""
+        """Heading of the mannequin [rad]."""
         self._aim = np.zeros(2)
         self._rng = np.random.default_rng(id)
 
     def placed(self) -> None:
-        """Face where it walks; called after it was put somewhere."""
+        """Set heading and drag target after a new start."""
         self.yaw = math.atan2(self.row[COURSE_Y], self.row[COURSE_X])
         self._aim = self.row[[X, Y]].copy()
 
     def seen(self) -> Person:
-        """Return the person as a policy sees it."""
+        """Return the person as observed by a policy."""
         x, y, vx, vy, r = (float(self.row[i]) for i in (X, Y, VX, VY, R))
         return person_from_cylinder(x, y, vx, vy, r)
 
     def drag(self, command: MovePerson) -> None:
-        """Follow a dragged pelvis; a cylinder has no hands."""
+        """Set the dragged position of the axis; hands are ignored."""
         self.enter("manual")
         if command.pelvis is not None:
             self._aim = np.array(self._among.walkable(*command.pelvis[:2]))
             self._head_for_aim(self.yaw)
 
     def enter(self, mode: Mode) -> None:
-        """Change who moves the person."""
+        """Set the motion source."""
         if mode == self.mode:
             return
         self.mode = mode
@@ -293,21 +292,21 @@ class LiveWalker:
         self._aim = self.row[[X, Y]].copy()
 
     def play(self, command: SetMotion) -> None:
-        """Nothing: ``commands.check`` refuses it in a reach cell."""
+        """Do nothing: ``command_checks.check`` refuses the command in a reach cell."""
 
     def resize(self, command: SetAnthropometry) -> None:
-        """Nothing: ``commands.check`` refuses it in a reach cell."""
+        """Do nothing: ``command_checks.check`` refuses the command in a reach cell."""
 
     def _set_course(self, target: Vec) -> None:
-        """Walk to a point [m], shape (2,), from now on."""
+        """Set the target of the walk [m], shape (2,)."""
         row = self.row
-        way = target - row[[X, Y]]
-        left = float(np.linalg.norm(way))
+        offset = target - row[[X, Y]]
+        left = float(np.linalg.norm(offset))
         row[TARGET_X], row[TARGET_Y], row[LEFT] = target[0], target[1], left
-        row[COURSE_X], row[COURSE_Y] = way / left if left > 0.0 else (0.0, 0.0)
+        row[COURSE_X], row[COURSE_Y] = offset / left if left > 0.0 else (0.0, 0.0)
 
     def after(self, dt: float) -> bool:
-        """Take the step of a dragged person and turn; return whether it was one."""
+        """Move a dragged person and turn the mannequin; return whether the person moved."""
         moved = False
         if self.mode == "manual":
             step = self._velocity() * dt
@@ -324,21 +323,21 @@ class LiveWalker:
         return moved
 
     def _velocity(self) -> Vec:
-        """Return the velocity toward where it is dragged [m/s], shape (2,)."""
-        way = self._aim - self.row[[X, Y]]
-        speed = float(np.linalg.norm(way)) / DRAG_LAG_S
-        return np.asarray(way / DRAG_LAG_S * min(1.0, DRAG_SPEED / max(speed, 1e-9)))
+        """Return the velocity toward the drag target [m/s], shape (2,)."""
+        offset = self._aim - self.row[[X, Y]]
+        speed = float(np.linalg.norm(offset)) / DRAG_LAG_S
+        return np.asarray(offset / DRAG_LAG_S * min(1.0, DRAG_SPEED / max(speed, 1e-9)))
 
     def _head_for_aim(self, yaw: float) -> None:
         self.row[VX], self.row[VY] = self._velocity()
         self.yaw = yaw
 
-    def view(self, clearance_m: float, *, nearest: bool) -> PersonSnapshot:
-        """Return what is known of the person.
+    def snapshot(self, clearance_m: float, *, nearest: bool) -> PersonSnapshot:
+        """Return the read model of the person.
 
         Args:
-            clearance_m: Distance of the robot [m].
-            nearest: Whether nobody is nearer to it.
+            clearance_m: Distance to the robot [m].
+            nearest: Whether this is the person nearest to the robot.
         """
         row, among = self.row, self._among
         x, y, vx, vy = (float(row[i]) for i in (X, Y, VX, VY))
@@ -365,6 +364,6 @@ class LiveWalker:
 
 
 def live_settings(cell: Cell) -> PedestrianSettings:
-    """Return how somebody walks in a live cell: as its first person, but without end."""
+    """Return the walk settings of a live cell: those of its first cylinder, without end."""
     known = pedestrian_settings(cell.cylinders[0]) if cell.cylinders else PedestrianSettings()
     return replace(known, p_still=0.0, p_go_on=AUTHORS_WALK["p_go_on"])

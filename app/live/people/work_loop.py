@@ -1,10 +1,10 @@
-"""The work of one live person: task primitives, one script after the other without a jump.
+"""Continuous work of one person: random scripts of task primitives.
 
-The same legs, postures and laws of time as in training (``primitives/kernels/primitives.py``),
-for one
-person of any size, asked for at any time.
+Segments, keyframes and phase profiles are those of training
+(``primitives/kernels/primitives.py``); each script starts from the last posture of the previous
+one.
 
-Source: METHOD 3.2 and 3.4.
+Source: docs/method.md 3.2 and 3.4.
 """
 
 import numpy as np
@@ -21,13 +21,13 @@ from app.sim.scene.scene import new_people_state, people_of, with_people
 
 
 class WorkLoop:
-    """A person who works on and on.
+    """Joint positions and speeds of a working person at any time.
 
     Args:
-        cell: Work cell with a worker, who is meant.
+        cell: Work cell with one worker.
         seed: Seed of postures, samples and scripts.
-        size: How large the person is; None for the cell's worker.
-        variants: Postures for each place and hand; fewer are made sooner.
+        size: Body dimensions; None: those of the worker of the cell.
+        variants: Keyframes per place and hand; fewer are generated faster.
     """
 
     def __init__(
@@ -44,7 +44,7 @@ class WorkLoop:
         self._end = self._draw(-1)
 
     def _draw(self, first: int) -> float:
-        """Draw the next script, from posture ``first`` on; return when it ends [s]."""
+        """Draw the next script from keyframe ``first``; return its end [s]."""
         people, state, rng = self._people, self._state, np.zeros(1, dtype=np.uint64)
         random.start_stream(self._seed, 0, self._block, rng)
         draw_script_of(people, state, 0, 0, 0, first, rng)
@@ -57,7 +57,7 @@ class WorkLoop:
         """Return joint positions [m, rad] and speeds [m/s, rad/s], (18,) each.
 
         Args:
-            t: Time [s]; must not go back beyond the script it is in.
+            t: Time [s]; not before the start of the present script.
         """
         state = self._state
         while t - self._begin > self._end:

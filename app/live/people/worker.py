@@ -1,6 +1,7 @@
-"""One person of a live cell: works, acts a case study, moves as recorded, rests, or is dragged.
+"""One 18-DoF person of a live cell and the sources of its motion.
 
-Going from one to the other the person moves, it never jumps; nor does its size.
+Sources are the work loop, the script of a case study, a recording, rest and dragging. Posture
+and size change continuously between them.
 """
 
 import math
@@ -9,10 +10,11 @@ from typing import Protocol
 import numpy as np
 
 from app.live.commands import Mode, MovePerson, SetAnthropometry, SetMotion
-from app.live.people.body import LiveBody
+from app.live.people.anthropometry import LiveAnthropometry
 from app.live.people.dragging import DraggedPerson
 from app.live.people.work_loop import WorkLoop
 from app.live.playback import PlayedMotion, is_outside
+from app.live.read_model import frozen
 from app.live.snapshot import PersonSnapshot
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
@@ -23,27 +25,27 @@ from app.sim.pick.cases import Case, script_of
 from app.sim.primitives.primitive_library import VARIANTS
 
 FEWER_VARIANTS = 4
-"""Postures per place and hand of a person who is not the cell's own: soon made."""
+"""Keyframes per place and hand of people other than the worker of the cell."""
 THERE_M = 0.005
-"""Height of the pelvis from which on it counts as arrived [m]."""
+"""Tolerance of the pelvis height at arrival [m]."""
 
 
 class PostureSource(Protocol):
-    """What moves a person who works: a work cycle or the script of a case study."""
+    """Trajectory of a working person: a work loop or the script of a case study."""
 
     def at(self, t: float) -> tuple[Vec, Vec]:
         """Return joint positions [m, rad] and speeds [m/s, rad/s] at ``t`` [s], (18,) each."""
 
 
-class LivePerson:
-    """Posture, speed, size and occupation of one person.
+class LiveWorker:
+    """Posture, speed, size and motion source of one person.
 
     Args:
         cell: Work cell.
-        place: The same cell as this person's own: home, part of the table and of the area.
+        place: The cell restricted to this person: home, stations and walking area.
         id: Number of the person.
-        seed: Seed of the person's work.
-        q: Posture from which the person walks to work; None is at work from the start.
+        seed: Seed of the work.
+        q: Initial posture [m, rad], shape (18,); None: already at work.
     """
 
     def __init__(
@@ -52,9 +54,9 @@ class LivePerson:
         self.id = id
         """Number of the person."""
         self.mode: Mode = "auto"
-        """Who moves the person."""
-        self.body = LiveBody(place.human, cell.floor_z)
-        """How large the person is."""
+        """Motion source."""
+        self.body = LiveAnthropometry(place.human, cell.floor_z)
+        """Body dimensions."""
         self._cell, self._place, self._seed = cell, place, seed
         self._played: PlayedMotion | None = None
         self._work: PostureSource = self._new_work()
@@ -68,23 +70,23 @@ class LivePerson:
 
     @property
     def size(self) -> Vec:
-        """Size at this moment [m], shape (12,)."""
+        """Present body lengths [m], shape (12,)."""
         return self.body.size
 
     def seen(self) -> Person:
-        """Return the person as a policy sees it, inside the joint limits.
+        """Return the person as observed by a policy, inside the joint limits.
 
-        The yaw lies within half a turn of home's.
+        The yaw is within half a turn of the home yaw.
         """
         q, full = self._limbs.q.copy(), 2.0 * math.pi
         q[2] -= full * round((q[2] - self._cell.human.home[2]) / full)
         q = np.clip(q, human.Q_MIN, human.Q_MAX)
         return Person(q=q, qd=self._limbs.qd, size=self.size)
 
-    # What the person does.
+    # Motion source.
 
     def start(self, case: Case | None) -> None:
-        """Start the occupation from its beginning, at once; a dragged person stays."""
+        """Restart work or the script of a case study; a dragged person stays."""
         if case is not None:
             self._work = script_of(self._cell, case)
         elif self.mode == "auto":
@@ -92,25 +94,25 @@ class LivePerson:
         self._t, self._joining = 0.0, False
         if self.mode != "manual":
             self.body.rise = self._rise()
-            self._limbs.place(*self._occupation(0.0))
+            self._limbs.place(*self._source_at(0.0))
 
     def enter(self, mode: Mode) -> None:
-        """Change who moves the person; ``recorded`` plays what :meth:`play` was given."""
+        """Set the motion source; ``recorded`` continues the recording of :meth:`play`."""
         if mode == self.mode:
             return
         if self.mode == "recorded":
-            self.body.become(None)
+            self.body.use_recorded(None)
         self.mode, self._joining = mode, mode != "manual"
         self._limbs.place(self.q, self._limbs.qd)
         if mode == "auto":
             self._begin_work()
 
     def leave_case(self) -> None:
-        """Go from a case study back to ordinary work."""
+        """Return from a case study to the work loop."""
         self._begin_work()
 
     def move_to(self, place: Cell) -> None:
-        """Take over another part of the table."""
+        """Set another home and other stations."""
         if place == self._place:
             return
         self._place = place
@@ -120,26 +122,26 @@ class LivePerson:
             self._joining = True
 
     def play(self, command: SetMotion) -> None:
-        """Move as recorded, from the beginning of the run, with the recorded lengths."""
+        """Play a recorded run from its start, with the recorded body lengths."""
         self._played = PlayedMotion(command.loaded, self._place, self._cell.human)
         self.mode = "recorded"
-        self.body.become(self._played.size)
+        self.body.use_recorded(self._played.size)
         self._join_run()
 
     def drag(self, command: MovePerson) -> None:
-        """Aim at a dragged posture."""
+        """Set dragged targets."""
         self.enter("manual")
         self._limbs.drag(command, self.size)
 
     def resize(self, command: SetAnthropometry) -> None:
-        """Become as large as asked for."""
-        asked = (command.stature, command.arms, command.shoulders)
+        """Change the body dimensions."""
+        requested = (command.stature, command.arms, command.shoulders)
         now = self.body.percentiles
         self.body.resize(
-            *(old if new is None else new for new, old in zip(asked, now, strict=True))
+            *(old if new is None else new for new, old in zip(requested, now, strict=True))
         )
         if command.recorded and self.mode == "recorded" and self._played is not None:
-            self.body.become(self._played.size)
+            self.body.use_recorded(self._played.size)
 
     def _begin_work(self) -> None:
         self._work = self._new_work()
@@ -161,27 +163,27 @@ class LivePerson:
     # Time.
 
     def move(self, dt: float) -> bool:
-        """Move for ``dt`` [s]; return whether the person did."""
-        grew = self.glide(dt)
+        """Move for ``dt`` [s]; return whether the person moved."""
+        resized = self.advance_size(dt)
         if self.mode in ("auto", "recorded") and not self._joining:
             self._t += dt
-            self._limbs.place(*self._occupation(self._t))
-            self._carry_on(dt)
+            self._limbs.place(*self._source_at(self._t))
+            self._after_source(dt)
             return True
         if self._joining:
-            self._limbs.aim(self._occupation(self._t)[0])
+            self._limbs.aim(self._source_at(self._t)[0])
         rose = self.body.rise_to(self._rise(), dt)
         moved = self._limbs.follow(dt)
         there = self.body.settled and abs(self.body.rise - self._rise()) < THERE_M
         self._joining = self._joining and not (there and self._limbs.arrived)
-        return moved or rose or grew
+        return moved or rose or resized
 
-    def glide(self, dt: float) -> bool:
-        """Let the size go on changing for ``dt`` [s]; return whether it did.
+    def advance_size(self, dt: float) -> bool:
+        """Continue a change of size for ``dt`` [s]; return whether there was one.
 
-        A dragged hand stays where it was put; who works begins again with the new arms.
+        Dragged hands keep their targets; work restarts with the new dimensions.
         """
-        if not self.body.glide(dt):
+        if not self.body.advance_size(dt):
             return False
         if self.mode == "manual":
             self._limbs.drag(MovePerson(), self.size)
@@ -189,8 +191,8 @@ class LivePerson:
             self._begin_work()
         return True
 
-    def _carry_on(self, dt: float) -> None:
-        """Raise or lower the pelvis; at its end a run goes back to its beginning."""
+    def _after_source(self, dt: float) -> None:
+        """Update the pelvis height; restart a recorded run at its end."""
         if self.mode != "recorded" or self._played is None:
             self.body.rise_to(0.0, dt)
             return
@@ -198,8 +200,8 @@ class LivePerson:
         if self._t >= self._played.duration:
             self._join_run()
 
-    def _occupation(self, t: float) -> tuple[Vec, Vec]:
-        """Return posture and speed of what the person does, ``t`` [s] after it began."""
+    def _source_at(self, t: float) -> tuple[Vec, Vec]:
+        """Return posture and speed of the motion source at ``t`` [s]."""
         if self.mode == "recorded" and self._played is not None:
             return self._played.at(t)
         if self.mode == "still":
@@ -207,21 +209,21 @@ class LivePerson:
         return self._work.at(t)
 
     def _rise(self) -> float:
-        """Return how high the pelvis shall be above standing now [m]."""
+        """Return the target height of the pelvis relative to standing [m]."""
         if self.mode == "recorded" and self._played is not None:
             return self._played.rise_at(self._t)
         return 0.0
 
     def freeze(self) -> None:
-        """Forget the speed: the clock stands."""
+        """Set the speed to 0 while the clock is paused."""
         self._limbs.qd = self._limbs.qd * 0.0
 
-    def view(self, clearance_m: float, *, nearest: bool) -> PersonSnapshot:
-        """Return what is known of the person.
+    def snapshot(self, clearance_m: float, *, nearest: bool) -> PersonSnapshot:
+        """Return the read model of the person.
 
         Args:
-            clearance_m: Distance of the robot [m].
-            nearest: Whether nobody is nearer to it.
+            clearance_m: Distance to the robot [m].
+            nearest: Whether this is the person nearest to the robot.
         """
         seen = self.seen()
         played = self._played if self.mode == "recorded" else None
@@ -232,17 +234,10 @@ class LivePerson:
             posture=frozen(self._limbs.q),
             qd=frozen(seen.qd),
             size=frozen(self.size),
-            anthropometry=self.body.view(),
-            motion=None if played is None else played.view(self._t),
+            anthropometry=self.body.snapshot(),
+            motion=None if played is None else played.snapshot(self._t),
             joining=self._joining,
             outside_area=is_outside(self.q, self._cell.human),
             clearance_m=clearance_m,
             nearest=nearest,
         )
-
-
-def frozen(values: Vec) -> Vec:
-    """Return a copy that nobody can write to."""
-    copy = np.array(values, dtype=np.float64)
-    copy.setflags(write=False)
-    return copy

@@ -1,9 +1,7 @@
-"""The people of a live cell: none to four, each with a home and a part of the table.
+"""People of a live pick or sorting cell: up to four workers with their work areas.
 
-The homes lie side by side along the walking area, so that nobody begins inside another one;
-whoever comes in later starts where there is room and walks to work. When somebody comes or
-leaves, those who work or stand still move up. People do not avoid each other: whoever is
-dragged, or moves as recorded, may walk into anybody.
+Homes lie side by side along the walking area. A new person starts at a free position and walks
+to work; work areas are divided again when people come or leave. People do not avoid each other.
 """
 
 from collections.abc import Iterator
@@ -14,7 +12,7 @@ from app.live.arm import HumanGeometry
 from app.live.command_checks import people_after
 from app.live.commands import FIRST, AddPerson, RemovePerson
 from app.live.people.dragging import STEP_BACK
-from app.live.people.worker import LivePerson
+from app.live.people.worker import LiveWorker
 from app.sim.cells.cell import Cell
 from app.sim.cells.parts import Station
 from app.sim.cells.people import Worker
@@ -23,70 +21,70 @@ from app.sim.human import model as human
 from app.sim.human.kernels.kinematics import N_SIZE
 from app.sim.scene.scene import NO_CYLINDERS
 
-ROOM = 0.7
-"""Distance of two homes that leaves room for shoulders and elbows [m]."""
+SPACING = 0.7
+"""Minimum distance of two homes [m]; leaves space for shoulders and elbows."""
 SIDEWAYS = 0.35
-"""How far beyond the own part of the table a person works [m]."""
+"""Overlap of the work areas of neighbours [m]."""
 SEED_STEP = 7919
-"""Between the seeds of two people's work."""
+"""Difference between the seeds of two people."""
 
 
-class LivePeople:
-    """The people of one live cell.
+class LiveWorkers:
+    """Workers of one live cell.
 
     Args:
         cell: Work cell with at least one worker.
-        seed: Seed of the first person's work.
+        seed: Seed of the first person.
     """
 
     def __init__(self, cell: Cell, seed: int) -> None:
         self._cell, self._seed = cell, seed
-        self._people = {FIRST: LivePerson(cell, place_of(cell, 0, 1), FIRST, seed)}
+        self._people = {FIRST: LiveWorker(cell, place_of(cell, 0, 1), FIRST, seed)}
 
-    def __iter__(self) -> Iterator[LivePerson]:
+    def __iter__(self) -> Iterator[LiveWorker]:
         return iter(self._people.values())
 
     def __len__(self) -> int:
         return len(self._people)
 
-    def __getitem__(self, id: int) -> LivePerson:
+    def __getitem__(self, id: int) -> LiveWorker:
         return self._people[id]
 
     @property
     def ids(self) -> tuple[int, ...]:
-        """Ids of the people who are there, in order."""
+        """Ids of the people, ascending."""
         return tuple(self._people)
 
     @property
     def q(self) -> Vec:
-        """Joint positions of all [m, rad], shape (n, 18)."""
+        """Joint positions [m, rad], shape (n, 18)."""
         return np.array([one.q for one in self]).reshape(-1, 18)
 
     @property
     def sizes(self) -> Vec:
-        """Sizes of all [m], shape (n, N_SIZE)."""
+        """Body lengths [m], shape (n, N_SIZE)."""
         return np.array([one.size for one in self]).reshape(-1, N_SIZE)
 
     @property
-    def bodies(self) -> HumanGeometry:
-        """Where they are; nobody is a cylinder."""
+    def geometry(self) -> HumanGeometry:
+        """Collision geometry: capsules only."""
         return HumanGeometry(self.q, self.sizes, NO_CYLINDERS)
 
-    def only_first(self) -> LivePerson:
-        """Leave the first person alone, as the cell describes it, and return it."""
+    def only_first(self) -> LiveWorker:
+        """Replace all people by the worker of the cell, and return it."""
         place = place_of(self._cell, 0, 1)
-        self._people = {FIRST: LivePerson(self._cell, place, FIRST, self._seed)}
+        self._people = {FIRST: LiveWorker(self._cell, place, FIRST, self._seed)}
         return self._people[FIRST]
 
     def change(self, command: AddPerson | RemovePerson) -> None:
-        """Let people come and leave as a command says, and the others move up."""
+        """Add or remove a person and divide the work areas again."""
         ids = people_after(command, self.ids)
         places = [place_of(self._cell, k, len(ids)) for k in range(len(ids))]
         people = {}
         for id, place in zip(ids, places, strict=True):
             known = self._people.get(id)
             if known is None:
-                known = LivePerson(
+                known = LiveWorker(
                     self._cell,
                     place,
                     id,
@@ -99,48 +97,51 @@ class LivePeople:
         self._people = people
 
     def _entrance(self, worker: Worker) -> Vec:
-        """Return a posture at home, or behind it, where nobody stands; else the freest."""
+        """Return a standing posture at or behind home, where no person stands."""
         x, y, yaw = worker.home
         back = self._cell.human.y_max + STEP_BACK
-        spots = [(x, y), *((x + dx, back) for dx in (0.0, ROOM, -ROOM, 2 * ROOM, -2 * ROOM))]
+        spots = [
+            (x, y),
+            *((x + dx, back) for dx in (0.0, SPACING, -SPACING, 2 * SPACING, -2 * SPACING)),
+        ]
         others = self.q[:, :2]
 
-        def room(spot: tuple[float, float]) -> float:
+        def clearance(spot: tuple[float, float]) -> float:
             gaps = np.linalg.norm(others - np.array(spot), axis=1)
             return float(min(gaps, default=np.inf))
 
-        free = [spot for spot in spots if room(spot) >= ROOM]
-        return human.rest_posture(*(free[0] if free else max(spots, key=room)), yaw)
+        free = [spot for spot in spots if clearance(spot) >= SPACING]
+        return human.rest_posture(*(free[0] if free else max(spots, key=clearance)), yaw)
 
     def move(self, dt: float) -> None:
-        """Move everyone for ``dt`` [s]."""
+        """Move all people for ``dt`` [s]."""
         for one in self:
             one.move(dt)
 
     def move_while_paused(self, dt: float) -> bool:
-        """Move whoever is dragged, and let sizes change; return whether anything did."""
+        """Move dragged people and continue changes of size; return whether anything changed."""
         moved = False
         for one in self:
-            if one.move(dt) if one.mode == "manual" else one.glide(dt):
+            if one.move(dt) if one.mode == "manual" else one.advance_size(dt):
                 one.freeze()
                 moved = True
         return moved
 
 
 def place_of(cell: Cell, index: int, count: int) -> Cell:
-    """Return a cell as one of its people sees it: own home, own part of table and area.
+    """Return a cell restricted to one person: home, stations and walking area.
 
     Args:
         cell: Work cell with at least one worker.
-        index: Which of the people, from 0, from left to right.
-        count: How many there are.
+        index: Index of the person, from left to right.
+        count: Number of people.
     """
     worker = cell.human
     if count == 1:
         return cell if cell.people == (worker,) else _with(cell, worker, cell.stations)
-    spacing = max((worker.x_max - worker.x_min) / count, ROOM)
+    spacing = max((worker.x_max - worker.x_min) / count, SPACING)
     x = 0.5 * (worker.x_min + worker.x_max) + spacing * (index - 0.5 * (count - 1))
-    free = max(0.5 * (spacing - ROOM), 0.03)
+    free = max(0.5 * (spacing - SPACING), 0.03)
     own = worker.model_copy(
         update={
             "home": (x, worker.home[1], worker.home[2]),

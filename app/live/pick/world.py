@@ -8,11 +8,11 @@ two seconds; then the robot starts again from home.
 
 import numpy as np
 
-from app.live import commands
+from app.live import commands, status_messages
 from app.live.arm import HumanGeometry
 from app.live.base_world import BaseWorld
 from app.live.command_checks import Command
-from app.live.people.workers import LivePeople
+from app.live.people.workers import LiveWorkers
 from app.live.pick import explanation
 from app.live.snapshot import Status, WorldSnapshot
 from app.sim.cells.cell import Cell
@@ -27,20 +27,20 @@ PICK_S = (0.9, 1.3, 2.0)
 """Times at which the tool is down, the fingers have closed, the tool is up again [s]."""
 
 
-class LivePickWorld(BaseWorld[LivePeople]):
+class LivePickWorld(BaseWorld[LiveWorkers]):
     """One live pick-and-place cell.
 
     Args:
         cell: Work cell.
-        policy: Chooses and moves; None lets the robot rest.
-        seed: Seed of the people's work.
+        policy: Selects and executes tasks; None: the robot is idle.
+        seed: Seed of the human motion.
         id: Name of the world in URLs.
     """
 
     def __init__(
         self, cell: Cell, policy: TaskPolicy | None, seed: int, id: str = "main"
     ) -> None:
-        super().__init__(cell, policy, id, LivePeople(cell, seed))
+        super().__init__(cell, policy, id, LiveWorkers(cell, seed))
         self._case: Case | None = None
         self._run = CaseRun()
         self._goal: str | None = None
@@ -68,7 +68,7 @@ class LivePickWorld(BaseWorld[LivePeople]):
         position = np.array(self.cell.station(station).position)
         if height is not None:
             position[2] = height
-        return self.robot.posture_at(position)[0]
+        return self.robot.configuration_at(position)[0]
 
     def _begin(self, status: Status = "moving") -> None:
         self.enter(status)
@@ -141,11 +141,11 @@ class LivePickWorld(BaseWorld[LivePeople]):
             self._end_episode(self.decision)
 
     def _action(self) -> Vec:
-        """Return the wanted joint speeds over their limits, shape (5,)."""
+        """Return joint speeds over their limits, in [-1, 1], shape (5,)."""
         if self.status == "picking" and self._goal is not None:
             down = self.status_s < PICK_S[1]
-            posture = self._configuration_over(self._goal, PICK_HEIGHT if down else None)
-            return self.robot.toward(posture)
+            configuration = self._configuration_over(self._goal, PICK_HEIGHT if down else None)
+            return self.robot.toward(configuration)
         if self.decision is not None:
             return np.asarray(self.decision.actions[self.decision.index], dtype=np.float64)
         return np.zeros(5)
@@ -215,7 +215,7 @@ class LivePickWorld(BaseWorld[LivePeople]):
 
     def _message(self, status: Status) -> str:
         if status == "contact" and self.contact is not None:
-            return explanation.touched(self.contact, final=self._case is not None)
+            return status_messages.touched(self.contact, final=self._case is not None)
         if self.note is not None and status in ("moving", "no policy"):
             return self.note
         if status == "moving" and self.decision is not None:
@@ -223,10 +223,10 @@ class LivePickWorld(BaseWorld[LivePeople]):
             return explanation.going(self.decision, names, self._label)
         if status == "case done" and self._case is not None:
             if self.contact is not None:
-                return explanation.touched(self.contact, final=True)
+                return status_messages.touched(self.contact, final=True)
             verdict = judge(self._case, self._run, self._label)
             return explanation.case_ended(verdict, self._goal, self._label)
-        return explanation.resting(status, self._goal, self._label)
+        return status_messages.resting(status, self._goal, self._label)
 
     def _verdict(self) -> Verdict | None:
         return None if self._case is None else judge(self._case, self._run, self._label)

@@ -3,7 +3,7 @@
 commands     Commands to a live reach cell; see ``commands.py``
 controller   Controller of a live reach cell: a reach policy, or straight motion in joint space
 explanation  Status messages of a live reach cell, one sentence each
-goal         The goal of a live reach cell: where it is, and where it goes next
+goal         Goal of a live reach cell: position and choice of the next one
 interfaces   Interface of policies of a live reach cell; ``app.policies`` implements it
 snapshot     State of a live reach cell beyond robot and people: goal, inference mode, safety
              layer

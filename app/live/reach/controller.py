@@ -1,10 +1,9 @@
 """Controller of a live reach cell: a reach policy, or straight motion in joint space.
 
 The policy receives the observation it was trained with: a
-:class:`~app.sim.reach.batch.ReachBatch`
-of one environment is filled with robot, people and goal. Without a policy the robot moves
-straight in joint space to the configuration with its tool pointing down at the goal, regardless
-of people.
+:class:`~app.sim.reach.batch.ReachBatch` of one environment is filled with robot, people and
+goal. Without a policy the robot moves straight in joint space to the configuration with
+vertical tool at the goal, regardless of people.
 """
 
 import time
@@ -72,7 +71,7 @@ class ReachController:
             safety: Safety layer that limits the action; None without one.
         """
         if self.policy is None:
-            return straight(robot.arm, robot.q, robot.posture_at(goal)[0])
+            return straight(robot.arm, robot.q, robot.configuration_at(goal)[0])
         started = time.perf_counter()
         batch = self._filled(self.policy, robot, walkers, clear_m, time_left)
         batch.state.elapsed[0] = elapsed
@@ -113,8 +112,8 @@ def default_mode(policy: LiveReachPolicy) -> str:
     return next((mode for mode in preferred if mode in modes), modes[0])
 
 
-def straight(arm: Arm, q: Vec, posture: Vec) -> Vec:
+def straight(arm: Arm, q: Vec, target: Vec) -> Vec:
     """Return the action straight in joint space to a configuration [rad], shape (6,)."""
-    speed = GAIN * (posture - q)
+    speed = GAIN * (target - q)
     fastest = float(np.max(np.abs(speed) / arm.limits.qd_max))
     return np.asarray(speed / arm.limits.qd_max / max(1.0, fastest))

@@ -1,4 +1,4 @@
-"""The goal of a live reach cell: where it is, and where it goes next."""
+"""Goal of a live reach cell: position and choice of the next one."""
 
 import numpy as np
 
@@ -9,13 +9,13 @@ from app.sim.core.arrays import Vec
 from app.sim.reach.batch import goal_region_of
 
 APART_M = 0.25
-"""Least way from one goal to the next [m]."""
+"""Minimum distance between successive goals [m]."""
 TRIES = 40
 ON_TARGET_M = 1e-3
 
 
 class LiveGoal:
-    """Where the tcp shall be.
+    """Target of the tcp.
 
     Args:
         cell: Cell with a goal region.
@@ -26,21 +26,21 @@ class LiveGoal:
         self.targets = goal_region_of(cell).targets()
         """The cell's targets [m], shape (n, 3)."""
         self.among: Vec | None = None
-        """Goals it jumps among [m], shape (n, 3); None for any point of the region."""
+        """Goals to draw from [m], shape (n, 3); None: any point of the goal region."""
         self.mode: GoalMode = "jump"
-        """Where the goal is next."""
+        """Rule for the next goal."""
         self._low, self._high = goal_box(cell)
         self._seed = seed
         self.restart()
 
     def restart(self) -> None:
-        """Begin the same sequence of goals again."""
+        """Restart the sequence of goals."""
         self._rng = np.random.default_rng(self._seed)
         self.position = self.targets[len(self.targets) // 2].copy()
         self.jump()
 
     def jump(self) -> None:
-        """Draw another goal, some way from this one."""
+        """Draw another goal at a distance of APART_M or more."""
         for _ in range(TRIES):
             new = self._drawn()
             if float(np.linalg.norm(new - self.position)) >= APART_M:
@@ -53,11 +53,11 @@ class LiveGoal:
         return np.array(self.among[self._rng.integers(len(self.among))])
 
     def put(self, position: tuple[float, float, float]) -> None:
-        """Put it elsewhere [m]."""
+        """Set the position [m], clipped to the goal region."""
         self.position = np.clip(np.array(position), self._low, self._high)
 
     @property
     def on_target(self) -> bool:
-        """Whether it is one of the targets."""
+        """Whether the goal is one of the targets."""
         gaps = np.linalg.norm(self.targets - self.position, axis=1)
         return bool(gaps.min() < ON_TARGET_M)

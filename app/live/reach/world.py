@@ -17,19 +17,19 @@ from dataclasses import replace
 
 import numpy as np
 
+from app.live import status_messages
 from app.live.arm import HumanGeometry
 from app.live.base_world import BaseWorld
 from app.live.command_checks import Command, check_inference_mode
 from app.live.commands import PeopleCommand, SetPolicy
-from app.live.people.pedestrians import LiveWalkers
-from app.live.people.worker import frozen
-from app.live.pick import explanation
+from app.live.people.pedestrians import LivePedestrians
 from app.live.reach import commands as reach_commands
-from app.live.reach import explanation as reach_explanation
+from app.live.reach import explanation
 from app.live.reach.controller import TIME_LIMIT_S, ReachController
 from app.live.reach.goal import LiveGoal
 from app.live.reach.interfaces import LiveReachPolicy
 from app.live.reach.snapshot import ReachCounters, ReachSnapshot, SafetySnapshot
+from app.live.read_model import frozen
 from app.live.snapshot import Status, WorldSnapshot
 from app.sim.cells.cell import Cell
 from app.sim.collision.checker import Shapes, no_people
@@ -55,12 +55,12 @@ APART_M = 0.02
 """Separation distance from which a contact at standstill is over [m]."""
 
 
-class LiveReachWorld(BaseWorld[LiveWalkers]):
+class LiveReachWorld(BaseWorld[LivePedestrians]):
     """One live reach cell.
 
     Args:
         cell: Cell with a goal region, see ``reach_commands.lacks_for_reaching``.
-        policy: Moves the robot; None moves straight to the goal in joint space.
+        policy: Moves the robot; None: straight motion in joint space.
         seed: Seed of goals and walks.
         id: Name of the world in URLs.
     """
@@ -68,7 +68,7 @@ class LiveReachWorld(BaseWorld[LiveWalkers]):
     def __init__(
         self, cell: Cell, policy: LiveReachPolicy | None, seed: int, id: str = "main"
     ) -> None:
-        super().__init__(cell, None, id, LiveWalkers(cell, seed))
+        super().__init__(cell, None, id, LivePedestrians(cell, seed))
         self._goal = LiveGoal(cell, seed)
         self._controller = ReachController(cell, policy)
         self._layer = SafetyLayer(self.robot.arm, safety_settings(cell))
@@ -154,8 +154,8 @@ class LiveReachWorld(BaseWorld[LiveWalkers]):
     # Time.
 
     def _move_robot(self, before: HumanGeometry) -> None:
-        at_standstill = _at_standstill(self.robot.qd) and _at_standstill(self._piece.qd)
-        found = self.robot.follow(self._piece, self.people, before)
+        at_standstill = _at_standstill(self.robot.qd) and _at_standstill(self._segment.qd)
+        found = self.robot.follow(self._segment, self.people, before)
         if found.kind == "human" and at_standstill:
             self._note_standstill_contact(found)
         elif found.kind != "none":
@@ -216,11 +216,11 @@ class LiveReachWorld(BaseWorld[LiveWalkers]):
                 self.status_s,
                 self._layer.settings if self._obeys else None,
             )
-            wanted = robot.piece(act, straight=self._controller.policy is None)
+            wanted = robot.segment(act, straight=self._controller.policy is None)
         else:
-            wanted = robot.piece(np.zeros(6), straight=True)
+            wanted = robot.segment(np.zeros(6), straight=True)
         filtered = self._layer.decide(robot.q, robot.qd, wanted.c, wanted.d, shapes)
-        self._piece = (
+        self._segment = (
             _executed(robot.q, robot.qd, filtered, robot.dt) if self._obeys else wanted
         )
         self._safety = self._safety_view(filtered, shapes)
@@ -262,9 +262,9 @@ class LiveReachWorld(BaseWorld[LiveWalkers]):
 
     def _message(self, view: ReachSnapshot) -> str:
         if self.status == "contact" and self.contact is not None:
-            return explanation.touched(self.contact, final=False)
+            return status_messages.touched(self.contact, final=False)
         has_policy = self._controller.policy is not None
-        return reach_explanation.doing(
+        return explanation.doing(
             self.status, view, has_policy=has_policy, n_people=len(self.people)
         )
 

@@ -1,8 +1,8 @@
-"""What a live sorting cell begins with: a random task, or one of the six tests.
+"""Start of a live sorting task: a random one, or one of the six tests.
 
-A test's person acts without a visitor.
+The interferences of a test are simulated.
 
-Source: METHOD 1.5; ``benchmark_tasks.py``.
+Source: docs/method.md 1.5; ``benchmark_tasks.py``.
 """
 
 from dataclasses import dataclass
@@ -17,21 +17,21 @@ from app.sim.sorting.benchmark_tasks import sorting_test
 from app.sim.sorting.state import SortingShape, SortingState
 
 N_BLOCKS = 6
-"""Blocks of a random task."""
+"""Number of blocks of a random task."""
 TASK_SEED = 7919
-"""Between the seeds of two tasks."""
+"""Difference between the seeds of two tasks."""
 PAUSE_S = 1.5
-"""How long a reached goal is shown before the person acts [s]."""
+"""Time for which a reached goal is shown before the next interference [s]."""
 
 
 def random_task(shape: SortingShape, fail: Vec, seed: int, number: int) -> SortingState:
-    """Draw blocks in the clutter and a goal for some of them, as episodes are drawn.
+    """Draw blocks and goal from the distribution of training episodes.
 
     Args:
         shape: Size of the task.
         fail: Failure probabilities of the clutter cells, shape (K,).
         seed: Seed of the world.
-        number: Tasks begun before.
+        number: Number of earlier tasks.
     """
     settings = SortingSettings(n_objects=min(N_BLOCKS, shape.n_cells))
     batch = SortingBatch(shape, fail, 1, seed + TASK_SEED * number, settings)
@@ -41,20 +41,20 @@ def random_task(shape: SortingShape, fail: Vec, seed: int, number: int) -> Sorti
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AppliedInterference:
-    """What a person did."""
+    """An interference that was applied."""
 
     state: SortingState
-    """The state after it."""
+    """State after it."""
     text: str
-    """What it was, for people."""
+    """Description for people."""
 
 
 class SortingTestRun:
-    """A running test.
+    """A running sorting test and its verdict.
 
     Args:
         name: ``test-1`` to ``test-6``.
-        seed: Seeds of what is drawn.
+        seed: Seeds of start and interferences.
 
     Raises:
         NotFound: There is no such test.
@@ -70,16 +70,16 @@ class SortingTestRun:
 
     @property
     def name(self) -> str:
-        """Its id."""
+        """Id of the test."""
         return self._test.name
 
     @property
     def text(self) -> str:
-        """What happens in it, for people."""
+        """Description for people."""
         return self._test.text
 
     def start(self, shape: SortingShape, fail: Vec) -> SortingState:
-        """Draw the start.
+        """Draw the initial state.
 
         Raises:
             InvalidInput: The cell is too small for the test.
@@ -92,12 +92,12 @@ class SortingTestRun:
     def interfere(
         self, state: SortingState, moves: int, idle_s: float
     ) -> AppliedInterference | None:
-        """Do what is due; None where nothing is.
+        """Apply the next interference if it is due; return None otherwise.
 
         Args:
-            state: The state now; nothing is held.
-            moves: Moves done in this test.
-            idle_s: How long the robot has had nothing to do [s].
+            state: Present state, without a held block.
+            moves: Number of moves in this test.
+            idle_s: Time for which the robot has been idle [s].
         """
         if not self._waiting:
             return None
@@ -110,31 +110,31 @@ class SortingTestRun:
             return AppliedInterference(
                 state=now.change(state, self._shape, self._rng), text=now.text
             )
-        except InvalidInput:  # A visitor left nothing that this person could do.
-            self._spoilt = "the person could not do what the test says"
+        except InvalidInput:  # Made impossible by a visitor.
+            self._spoilt = "an interference of the test was not possible"
             return None
 
-    # What it is judged by.
+    # Verdict.
 
     def note_contact(self) -> None:
-        """Note that the robot touched something."""
+        """Count a contact of the robot."""
         self._contacts += 1
 
     def note_pick(self, *, riskier: bool) -> None:
-        """Note a grasp in the clutter; ``riskier`` where such an object lay in a safer cell."""
+        """Count a grasp; ``riskier`` if a duplicate lies in a safer cell."""
         self._picks += 1
         self._riskier += riskier
 
     def note_visitor(self) -> None:
-        """Note that a visitor changed blocks or goal: what follows says nothing of the test."""
+        """Invalidate the test: a visitor changed blocks or goal."""
         self._spoilt = "a visitor changed blocks or goal"
 
     def verdict(self, *, solved: bool, moves: int) -> Verdict:
-        """Return what the test expects, what happened, and whether both agree.
+        """Return expectation, observation and whether they agree.
 
         Args:
-            solved: Whether every tower is as the goal asks now.
-            moves: Moves done in this test.
+            solved: Whether every tower matches the goal.
+            moves: Number of moves in this test.
         """
         if self._ended is not None:
             return self._ended
@@ -167,4 +167,4 @@ class SortingTestRun:
 
 
 def _reached(*, over: bool) -> str:
-    return "the goal is reached" if over else "the goal is not reached yet"
+    return "goal reached" if over else "goal not reached"

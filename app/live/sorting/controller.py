@@ -43,7 +43,7 @@ class SortController:
     """Chooses moves, monitors progress and falls back to the planner.
 
     Args:
-        policy: Values the moves; None leaves them to the planner.
+        policy: Sorting policy; None: the planner selects every move.
     """
 
     def __init__(self, policy: SortingValues | None) -> None:

@@ -1,10 +1,10 @@
-"""The blocks of a live sorting cell, its goal, and what robot and people do to them.
+"""Blocks and goal of a live sorting cell, and changes by robot and people.
 
-A block keeps its id wherever it goes; :attr:`SortingTable.state` forgets the ids, as the sorter
-does. A block at the magnet counts on its *seat*: where it came from or, if somebody took that
-place, on the first free clutter cell. There is always one: there are as many cells as blocks.
+Blocks have constant ids; :attr:`SortingTable.state` has no ids, like the observation of the
+sorting policy. A held block counts at its *seat*: its former place or, if that is occupied, the
+first free clutter cell. One is always free, since there are at most as many blocks as cells.
 
-Source: METHOD 1.1 and 1.2.
+Source: docs/method.md 1.1 and 1.2.
 """
 
 from collections.abc import Iterable, Mapping
@@ -26,9 +26,9 @@ class Block:
     """One block."""
 
     id: str
-    """Its name."""
+    """Name, never reused."""
     code: int
-    """Its colour and size, see ``state.py``."""
+    """Code of colour and size, see ``state.py``."""
 
 
 class SortingTable:
@@ -40,29 +40,29 @@ class SortingTable:
 
     def __init__(self, cell: Cell) -> None:
         self.cell = cell
-        """Where it stands."""
+        """Work cell."""
         self.names = names_of(cell)
-        """The words of the task."""
+        """Names of stations, colours and sizes."""
         self.shape = self.names.shape
-        """How large it is."""
+        """Size of the task."""
         self.fail = fail_of(cell)
         """Failure probability of each clutter cell, shape (K,)."""
         self.clutter: list[Block | None] = [None] * self.shape.n_cells
         self.towers: list[list[Block]] = [[] for _ in range(self.shape.n_colours)]
         self.goal = np.zeros((self.shape.n_colours, self.shape.n_cells), dtype=np.int8)
         self.held: Block | None = None
-        """The block at the magnet."""
+        """Held block."""
         self.version = 0
-        """Grows whenever a person changed something."""
+        """Number of changes by people."""
         self._origin = 0
         self._next = 1
         self._wanted: tuple[str, ...] = ()
 
-    # What there is.
+    # State.
 
     @property
     def blocks(self) -> tuple[Block, ...]:
-        """All blocks, the held one too, in the order of their making."""
+        """All blocks, the held one included, in the order of their ids."""
         found = [one for one in self.clutter if one is not None]
         found += [one for tower in self.towers for one in tower]
         found += [self.held] if self.held is not None else []
@@ -70,12 +70,12 @@ class SortingTable:
 
     @property
     def wanted(self) -> frozenset[str]:
-        """Ids of the blocks that stand for the goal."""
+        """Ids of the blocks assigned to the goal."""
         return frozenset(self._wanted)
 
     @property
     def seat(self) -> int:
-        """Position on which the held block counts."""
+        """Position at which the held block counts."""
         k = self.shape.n_cells
         if self._origin >= k or self.clutter[self._origin] is None:
             return self._origin
@@ -83,7 +83,7 @@ class SortingTable:
 
     @property
     def state(self) -> SortingState:
-        """The task as the sorter sees it."""
+        """The task as observed by the sorting policy."""
         clutter = np.array([one.code if one else NULL for one in self.clutter], dtype=np.int8)
         towers = np.zeros_like(self.goal)
         for c, tower in enumerate(self.towers):
@@ -98,68 +98,72 @@ class SortingTable:
         )
 
     def top(self, position: int) -> Block | None:
-        """Return the block that is picked at a position, if there is one."""
+        """Return the topmost block at a position, or None."""
         k = self.shape.n_cells
         if position < k:
             return self.clutter[position]
         return self.towers[position - k][-1] if self.towers[position - k] else None
 
     def place_of(self, block: Block) -> tuple[int, int]:
-        """Return the position and the level of a block that is not held."""
+        """Return position and level of a block.
+
+        Raises:
+            InvalidInput: The block is held or not on the table.
+        """
         for k, one in enumerate(self.clutter):
             if one == block:
                 return k, 0
         for c, tower in enumerate(self.towers):
             if block in tower:
                 return self.shape.n_cells + c, tower.index(block)
-        raise InvalidInput("id", block.id, "is held by the magnet")
+        raise InvalidInput("id", block.id, "is held by the gripper")
 
     def level_at(self, position: int) -> int:
-        """Return the level on which the next block is put at a position."""
+        """Return the level of the next block at a position."""
         k = self.shape.n_cells
         return 0 if position < k else len(self.towers[position - k])
 
     def is_free(self, position: int) -> bool:
-        """Whether a block can be put at a position."""
+        """Return whether a block can be placed at a position."""
         k = self.shape.n_cells
         return position >= k or self.clutter[position] is None
 
     def point(self, position: int, level: int) -> Vec:
-        """Return where the tcp touches the top of a block at a position and level [m], (3,)."""
+        """Return the top centre of a block at a position and level [m], shape (3,)."""
         return np.asarray(self.cell.station(self.names.stations[position]).points()[level])
 
     def point_at(self, position: int) -> Vec:
-        """Return where the tcp puts the next block at a position [m], shape (3,)."""
+        """Return the top centre of the next block at a position [m], shape (3,)."""
         return self.point(position, self.level_at(position))
 
     def point_of(self, block: Block) -> Vec | None:
-        """Return where the tcp takes a block [m], shape (3,); None where it is not."""
+        """Return the top centre of a block [m], shape (3,); None if held or removed."""
         if block not in self.blocks or block == self.held:
             return None
         return self.point(*self.place_of(block))
 
-    # What the robot does.
+    # Changes by the robot.
 
     def lift(self, position: int) -> Block:
-        """Take the block of a position to the magnet."""
+        """Grasp the topmost block of a position."""
         block = self._take(position)
         self.held, self._origin = block, position
         return block
 
     def drop(self, position: int) -> None:
-        """Put the held block at a position."""
+        """Place the held block at a position."""
         assert self.held is not None
         self._put(self.held, position)
         self.held = None
-        self._mark()
+        self._assign_goal()
 
-    # What people do.
+    # Changes by people.
 
     def add(self, colour: str, size: str, at: str | None) -> Block:
-        """Put another block on the table.
+        """Add a block.
 
         Raises:
-            InvalidInput: An unknown word, no room, or as many blocks as cells already.
+            InvalidInput: An unknown word, no free place, or as many blocks as clutter cells.
         """
         names = self.names
         code = self.shape.code(
@@ -175,32 +179,32 @@ class SortingTable:
         return block
 
     def remove(self, id: str) -> Block:
-        """Take a block out; the goal loses what can no longer be met.
+        """Remove a block, and goal blocks that no block matches any more.
 
         Raises:
             InvalidInput: There is no such block.
         """
         block = self._known(id)
-        self._pull(block)
-        self._meet()
+        self._detach(block)
+        self._shrink_goal()
         self._changed()
         return block
 
     def move(self, id: str, to: str) -> Block:
-        """Put a block elsewhere, from under others or off the magnet too.
+        """Move a block, also one below others or a held one.
 
         Raises:
-            InvalidInput: No such block or place, or the place is taken or its own.
+            InvalidInput: No such block or place, or the place is occupied.
         """
         block = self._known(id)
         position = self._free("to", to, block)
-        self._pull(block)
+        self._detach(block)
         self._put(block, position)
         self._changed()
         return block
 
     def set_goal(self, towers: Mapping[str, Iterable[str]]) -> None:
-        """Say what the towers shall be; those not named shall be empty.
+        """Set the goal; towers that are not named are empty in it.
 
         Args:
             towers: Sizes from the bottom, by tower.
@@ -218,12 +222,12 @@ class SortingTable:
             for level, size in enumerate(wanted):
                 field = f"towers.{name}[{level}]"
                 goal[c, level] = self.shape.code(c, _index(field, size, self.names.sizes))
-        self._require_met(goal)
+        self._require_matches(goal)
         self.goal, self._wanted = goal, ()
         self._changed()
 
     def toggle_goal(self, id: str) -> None:
-        """Put a block, or one more of a kind, into the goal or out of it.
+        """Add a block, or one more of a kind, to the goal, or remove it.
 
         Raises:
             InvalidInput: There is no such block or kind, or no block of the kind.
@@ -245,13 +249,13 @@ class SortingTable:
         self._changed()
 
     def begin(self, state: SortingState) -> None:
-        """Begin with a state, all blocks new."""
+        """Set a state with new blocks."""
         self.clutter = [None] * self.shape.n_cells
         self.towers = [[] for _ in range(self.shape.n_colours)]
         self.adopt(state)
 
     def adopt(self, state: SortingState) -> None:
-        """Make the table what a state says; blocks that stay where they were keep their ids."""
+        """Set a state; blocks that stay in place keep their ids."""
         for k, code in enumerate(state.clutter.tolist()):
             self.clutter[k] = self._kept(self.clutter[k], code)
         for c, codes in enumerate(state.towers.tolist()):
@@ -263,14 +267,14 @@ class SortingTable:
         self._changed()
 
     def show(self, block: Block, place: str | None) -> None:
-        """Put a block of another table on a station, or None: at the magnet."""
+        """Add a block of another table at a station; None: held."""
         if place is None:
             self.held = block
         else:
             self._put(block, self.names.stations.index(place))
         self._next = max(self._next, int(block.id.removeprefix("block")) + 1)
 
-    # Parts.
+    # Helper functions.
 
     def _kept(self, block: Block | None, code: int) -> Block | None:
         if code == NULL:
@@ -298,7 +302,7 @@ class SortingTable:
         else:
             self.clutter[position] = block
 
-    def _pull(self, block: Block) -> None:
+    def _detach(self, block: Block) -> None:
         if block == self.held:
             self.held = None
             return
@@ -327,7 +331,7 @@ class SortingTable:
         taken = self.seat if self.held is not None else None
         free = [k for k in range(self.shape.n_cells) if self.is_free(k) and k != taken]
         if not free:
-            raise InvalidInput("at", None, "is nowhere: no clutter cell is free")
+            raise InvalidInput("at", None, "has no default: no clutter cell is free")
         return free[0]
 
     def _free(self, field: str, place: str, block: Block | None = None) -> int:
@@ -346,15 +350,15 @@ class SortingTable:
         free = [name for k, name in enumerate(self.names.cells) if self.is_free(k)]
         return [*free, *self.names.towers]
 
-    def _require_met(self, goal: Codes) -> None:
-        lack = self._lack(goal)
-        if lack:
-            counts = {code: lack.count(code) for code in sorted(set(lack))}
+    def _require_matches(self, goal: Codes) -> None:
+        unmatched = self._unmatched(goal)
+        if unmatched:
+            counts = {code: unmatched.count(code) for code in sorted(set(unmatched))}
             words = ", ".join(f"{n} x {self.names.kind(code)}" for code, n in counts.items())
             rule = "must be met by the blocks: these are missing"
             raise InvalidInput("towers", words, rule)
 
-    def _lack(self, goal: Codes) -> list[int]:
+    def _unmatched(self, goal: Codes) -> list[int]:
         state = self.state
         counts = missing(
             SortingState(
@@ -364,19 +368,19 @@ class SortingTable:
         )
         return [code for code, n in enumerate(counts.tolist()) for _ in range(n)]
 
-    def _meet(self) -> None:
-        """Take out of the goal what no block is left for, the highest first."""
-        for code in self._lack(self.goal):
+    def _shrink_goal(self) -> None:
+        """Remove goal blocks that no block matches, from the top."""
+        for code in self._unmatched(self.goal):
             c, level = (int(found[-1]) for found in np.nonzero(self.goal == code))
             self.goal[c, level:-1] = self.goal[c, level + 1 :]
             self.goal[c, -1] = NULL
 
     def _changed(self) -> None:
         self.version += 1
-        self._mark()
+        self._assign_goal()
 
-    def _mark(self) -> None:
-        """Let blocks stand for the goal: those in place, those that did, then any."""
+    def _assign_goal(self) -> None:
+        """Assign blocks to the goal: those in place, those assigned before, then any."""
         counts = np.bincount(self.goal.ravel(), minlength=self.shape.n_types + 1)
         in_place = [
             one.id

@@ -21,20 +21,20 @@ from dataclasses import replace
 import numpy as np
 
 from app.errors import ServiceError
+from app.live import status_messages
 from app.live.arm import HumanGeometry
 from app.live.base_world import BaseWorld
 from app.live.command_checks import Command
 from app.live.commands import SetPolicy
-from app.live.people.workers import LivePeople
-from app.live.pick import explanation
+from app.live.people.workers import LiveWorkers
 from app.live.snapshot import Status, WorldSnapshot
 from app.live.sorting.benchmark_run import SortingTestRun, random_task
 from app.live.sorting.commands import SetSortingPolicy, StartTest, TableCommand, change_table
 from app.live.sorting.controller import MoveChoice, SortController, has_safer_duplicate
 from app.live.sorting.explanation import DONE, NO_GOAL, StatusMessages
-from app.live.sorting.perceived_state import SnapshotInputs, is_solved, view_of
 from app.live.sorting.snapshot import Phase, SortingCounters
 from app.live.sorting.table import SortingTable
+from app.live.sorting.task_snapshot import SnapshotInputs, is_solved, task_snapshot
 from app.live.sorting.vertical_approach import VerticalApproach
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
@@ -47,15 +47,15 @@ SHORT_M = 0.35
 """Distance from which inverse kinematics completes a motion that reached its limit [m]."""
 
 
-class LiveSortingWorld(BaseWorld[LivePeople]):
+class LiveSortingWorld(BaseWorld[LiveWorkers]):
     """One live sorting cell.
 
     Args:
-        cell: Sorting cell, see ``sorting_cell.lacks_for_sorting``.
-        policy: Moves the arm and chooses among equal moves; None lets the robot rest.
-        seed: Seed of tasks, grasps and the people's work.
+        cell: Sorting cell, see ``layout.lacks_for_sorting``.
+        policy: Moves the robot and selects among equal moves; None: the robot is idle.
+        seed: Seed of tasks, grasps and human motion.
         id: Name of the world in URLs.
-        sorting_policy: Values the moves; None leaves them to the exact planner.
+        sorting_policy: Sorting policy; None: the planner selects every move.
     """
 
     def __init__(
@@ -66,7 +66,7 @@ class LiveSortingWorld(BaseWorld[LivePeople]):
         id: str = "main",
         sorting_policy: SortingValues | None = None,
     ) -> None:
-        super().__init__(cell, policy, id, LivePeople(reaching_cell(cell), seed))
+        super().__init__(cell, policy, id, LiveWorkers(reaching_cell(cell), seed))
         self._seed = seed
         self._table = SortingTable(cell)
         self._messages = StatusMessages(cell, self._table)
@@ -192,7 +192,7 @@ class LiveSortingWorld(BaseWorld[LivePeople]):
         """Return joint speeds over their limits, in [-1, 1], shape (5,)."""
         if self._vertical is not None:
             aim = self._vertical.aim(self.robot.tcp())
-            return self.robot.toward(self.robot.posture_at(aim)[0])
+            return self.robot.toward(self.robot.configuration_at(aim)[0])
         if self._choice is None and self.policy is not None:
             return self.robot.toward(self.robot.home)
         if self.decision is not None:
@@ -353,7 +353,7 @@ class LiveSortingWorld(BaseWorld[LivePeople]):
 
     def _message(self, status: Status) -> str:
         if status == "contact" and self.contact is not None:
-            return explanation.touched(self.contact, final=False)
+            return status_messages.touched(self.contact, final=False)
         if self.note is not None and status != "blocked":
             return self.note
         if status in ("moving", "picking") and (chosen := self._chosen()) is not None:
@@ -362,7 +362,7 @@ class LiveSortingWorld(BaseWorld[LivePeople]):
             return DONE
         if status == "no candidates":
             return NO_GOAL
-        return explanation.resting(status, None, str)
+        return status_messages.resting(status, None, str)
 
     def snapshot(self) -> WorldSnapshot:
         """Return the read model of the present state."""
@@ -383,7 +383,7 @@ class LiveSortingWorld(BaseWorld[LivePeople]):
             status,
             self._message(status),
             gripping=self._table.held is not None or (closing and self._phase == "grasp"),
-            sorting=view_of(inputs),
+            sorting=task_snapshot(inputs),
             verdict=None
             if self._test is None
             else self._test.verdict(solved=is_solved(self._table), moves=self._counts.moves),

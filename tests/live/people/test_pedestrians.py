@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from app.live import commands
-from app.live.people.pedestrians import DRAG_SPEED, LiveWalkers
+from app.live.people.pedestrians import DRAG_SPEED, LivePedestrians
 from app.sim.cells.cell import load_cell
 
 CELL = load_cell("shared-workspace")
@@ -12,11 +12,11 @@ DT = CELL.robot.dt
 
 
 @pytest.fixture
-def walkers() -> LiveWalkers:
-    return LiveWalkers(CELL, seed=4)
+def walkers() -> LivePedestrians:
+    return LivePedestrians(CELL, seed=4)
 
 
-def test_velocity_tells_where_a_walker_is_one_period_later(walkers: LiveWalkers) -> None:
+def test_velocity_tells_where_a_walker_is_one_period_later(walkers: LivePedestrians) -> None:
     for _ in range(400):
         before = walkers[0].seen()
         walkers.move(DT)
@@ -26,7 +26,7 @@ def test_velocity_tells_where_a_walker_is_one_period_later(walkers: LiveWalkers)
         )
 
 
-def test_nobody_stays_for_good(walkers: LiveWalkers) -> None:
+def test_nobody_stays_for_good(walkers: LivePedestrians) -> None:
     last = walkers.cylinders[0, :2].copy()
     for _ in range(8):
         for _ in range(1500):
@@ -35,7 +35,9 @@ def test_nobody_stays_for_good(walkers: LiveWalkers) -> None:
         last = walkers.cylinders[0, :2].copy()
 
 
-def test_dragged_person_follows_with_bounded_speed_and_arrives(walkers: LiveWalkers) -> None:
+def test_dragged_person_follows_with_bounded_speed_and_arrives(
+    walkers: LivePedestrians,
+) -> None:
     walkers[0].drag(commands.MovePerson(pelvis=(0.5, 1.5, 0.0)))
     for _ in range(300):
         before = walkers.cylinders[0, :2].copy()
@@ -47,17 +49,17 @@ def test_dragged_person_follows_with_bounded_speed_and_arrives(walkers: LiveWalk
     assert np.allclose(walkers.cylinders[0, :2], (0.5, 1.5), atol=1e-3)
 
 
-def test_person_is_not_dragged_out_of_sight(walkers: LiveWalkers) -> None:
+def test_person_is_not_dragged_out_of_sight(walkers: LivePedestrians) -> None:
     walkers[0].drag(commands.MovePerson(pelvis=(50.0, -50.0, 0.0)))
     for _ in range(500):
         walkers.move(DT)
     x, y, _ = walkers.cylinders[0]
     assert (x, y) == pytest.approx((1.6, -0.1), abs=1e-3)
-    assert walkers[0].view(1.0, nearest=True).outside_area
+    assert walkers[0].snapshot(1.0, nearest=True).outside_area
 
 
 def test_all_walk_with_the_speed_that_was_asked_for_and_again_as_they_like(
-    walkers: LiveWalkers,
+    walkers: LivePedestrians,
 ) -> None:
     own = walkers.rows[0].copy()
     walkers.set_speed(1.6)
@@ -69,7 +71,7 @@ def test_all_walk_with_the_speed_that_was_asked_for_and_again_as_they_like(
     assert np.array_equal(walkers.rows[0, 13:21], own[13:21])
 
 
-def test_those_who_come_in_have_room_and_keep_their_ids(walkers: LiveWalkers) -> None:
+def test_those_who_come_in_have_room_and_keep_their_ids(walkers: LivePedestrians) -> None:
     for _ in range(3):
         walkers.change(commands.AddPerson())
     assert walkers.ids == (0, 1, 2, 3)
@@ -81,7 +83,7 @@ def test_those_who_come_in_have_room_and_keep_their_ids(walkers: LiveWalkers) ->
     assert np.array_equal(walkers.cylinders[:, :2], places[[0, 2, 3]])
 
 
-def test_person_who_shall_stand_stands_and_walks_again(walkers: LiveWalkers) -> None:
+def test_person_who_shall_stand_stands_and_walks_again(walkers: LivePedestrians) -> None:
     walkers[0].enter("still")
     before = walkers.cylinders[0, :2].copy()
     for _ in range(50):
@@ -93,7 +95,7 @@ def test_person_who_shall_stand_stands_and_walks_again(walkers: LiveWalkers) -> 
     assert not np.allclose(walkers.cylinders[0, :2], before)
 
 
-def test_mannequin_turns_where_it_walks(walkers: LiveWalkers) -> None:
+def test_mannequin_turns_where_it_walks(walkers: LivePedestrians) -> None:
     walkers.set_speed(0.5)
     for _ in range(100):
         walkers.move(DT)

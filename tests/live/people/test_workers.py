@@ -6,7 +6,7 @@ import pytest
 from app.errors import InvalidInput
 from app.live import commands
 from app.live.command_checks import Command
-from app.live.people.workers import LivePeople, place_of
+from app.live.people.workers import LiveWorkers, place_of
 from app.live.pick.world import LivePickWorld
 from app.live.playback import PlayedMotion, Recording
 from app.live.snapshot import PersonSnapshot, WorldSnapshot
@@ -100,7 +100,7 @@ def test_everyone_has_stations_of_both_kinds_and_all_are_shared_out(cell: Cell) 
 
 
 def test_ids_stay_when_somebody_leaves_and_are_given_again(cell: Cell) -> None:
-    people = LivePeople(cell, seed=1)
+    people = LiveWorkers(cell, seed=1)
     for _ in range(2):
         people.change(commands.AddPerson())
     people.change(commands.RemovePerson(person=1))

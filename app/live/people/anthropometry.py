@@ -1,7 +1,7 @@
-"""How large a live person is, changed while the cell runs: lengths glide, they never jump.
+"""Body dimensions of a live person, which change continuously.
 
-A person has the percentiles that were asked for, or the lengths of a recorded person whose
-motion is played. The contact test of each period uses the lengths of that moment.
+Dimensions follow from the percentiles requested last, or are those of a recorded person during
+playback. The contact test of a period uses the present lengths.
 """
 
 import numpy as np
@@ -12,17 +12,17 @@ from app.sim.core.arrays import Vec
 from app.sim.human.anthropometry import BodySize, percentile_body
 from app.sim.human.kernels.kinematics import PELVIS_Z
 
-GLIDE_S = 0.5
-"""Time in which one size becomes another [s]."""
+RESIZE_S = 0.5
+"""Duration of a change of size [s]."""
 RISE_RATE = 0.6
-"""Greatest speed of the pelvis up and down between motions [m/s]."""
+"""Maximum vertical speed of the pelvis between motions [m/s]."""
 
 
-class LiveBody:
-    """Lengths of one live person, and how high the pelvis is above standing.
+class LiveAnthropometry:
+    """Body lengths and pelvis height of one live person.
 
     Args:
-        worker: Whose size the person has at first.
+        worker: Person with the initial dimensions.
         floor_z: Height of the floor [m].
     """
 
@@ -33,45 +33,45 @@ class LiveBody:
         self._lengths = self._goal = worker.size.vector(floor_z)
         self._left_s = 0.0
         self.rise = 0.0
-        """Height of the pelvis above standing [m]."""
+        """Height of the pelvis relative to standing [m]."""
 
     @property
     def percentiles(self) -> tuple[float, float, float]:
-        """Percentiles of stature, arms and shoulders that were asked for last."""
+        """Percentiles of stature, arms and shoulders, as requested last."""
         return self._percentiles
 
     @property
     def size(self) -> Vec:
-        """The person's size at this moment, as kernels take it, shape (N_SIZE,)."""
+        """Present body lengths [m], shape (N_SIZE,)."""
         size = self._lengths.copy()
         size[PELVIS_Z] += self.rise
         return size
 
     @property
     def settled(self) -> bool:
-        """Whether the lengths are those that were asked for."""
+        """Whether the change of size is complete."""
         return self._left_s == 0.0
 
     def resize(self, stature: float, arms: float, shoulders: float) -> None:
-        """Glide to the person of these percentiles."""
+        """Change to a person of these percentiles."""
         self._percentiles, self._recorded = (stature, arms, shoulders), None
-        self._glide_to(self._wanted())
+        self._start_change(self._requested())
 
-    def become(self, recorded: BodySize | None) -> None:
-        """Glide to a recorded person's lengths; None goes back to the percentiles."""
+    def use_recorded(self, recorded: BodySize | None) -> None:
+        """Change to the lengths of a recorded person, or with None back to the percentiles."""
         self._recorded = recorded
-        self._glide_to(self._wanted())
+        self._start_change(self._requested())
 
-    def _wanted(self) -> BodySize:
+    def _requested(self) -> BodySize:
         return self._recorded or percentile_body(*self._percentiles, pelvis=self._pelvis)
 
-    def _glide_to(self, size: BodySize) -> None:
+    def _start_change(self, size: BodySize) -> None:
         goal = size.vector(self._floor_z)
         if not np.array_equal(goal, self._goal):
-            self._goal, self._left_s = goal, GLIDE_S
+            self._goal, self._left_s = goal, RESIZE_S
 
-    def glide(self, dt: float) -> bool:
-        """Go on gliding for ``dt`` [s]; return whether a length changed."""
+    def advance_size(self, dt: float) -> bool:
+        """Continue the change of size for ``dt`` [s]; return whether a length changed."""
         if self.settled:
             return False
         share = min(dt / self._left_s, 1.0)
@@ -81,14 +81,14 @@ class LiveBody:
         return True
 
     def rise_to(self, rise: float, dt: float) -> bool:
-        """Bring the pelvis nearer to a height above standing [m]; return whether it moved."""
+        """Move the pelvis toward a height relative to standing [m]; return whether it moved."""
         step = float(np.clip(rise - self.rise, -RISE_RATE * dt, RISE_RATE * dt))
         self.rise += step
         return step != 0.0
 
-    def view(self) -> AnthropometrySnapshot:
-        """Return what is known of the size that was asked for."""
-        size = self._wanted()
+    def snapshot(self) -> AnthropometrySnapshot:
+        """Return the read model of the requested dimensions."""
+        size = self._requested()
         stature, arms, shoulders = self._percentiles
         return AnthropometrySnapshot(
             stature=stature,

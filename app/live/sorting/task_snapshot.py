@@ -1,10 +1,10 @@
-"""Puts the sorting task of a live cell into a snapshot."""
+"""Read model of the sorting task of a live cell."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from app.live.people.worker import frozen
+from app.live.read_model import frozen
 from app.live.sorting.controller import MoveChoice, SortController
 from app.live.sorting.snapshot import (
     HELD,
@@ -26,26 +26,26 @@ from app.sim.sorting.state import NULL, Move
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SnapshotInputs:
-    """What a view is made of."""
+    """Parts of a live sorting world that the snapshot shows."""
 
     table: SortingTable
     """Blocks and goal."""
     controller: SortController
-    """Chooses the moves; has the last decision."""
+    """Controller with the last decision."""
     choice: MoveChoice | None
-    """What is carried out."""
+    """Present move."""
     phase: Phase
-    """How far it is."""
+    """Phase of the move."""
     counters: SortingCounters
-    """What was done since the task began."""
+    """Events since the task began."""
     test: str | None
     """Id of the running test."""
     tcp: Vec
-    """Where the tool is [m], shape (3,)."""
+    """Tool centre point [m], shape (3,)."""
 
 
-def view_of(inputs: SnapshotInputs) -> SortingSnapshot:
-    """Return the sorting task as it is now."""
+def task_snapshot(inputs: SnapshotInputs) -> SortingSnapshot:
+    """Return the read model of the sorting task."""
     table, decision = inputs.table, inputs.controller.decision
     policy, choice = inputs.controller.policy, inputs.choice
     ranked = () if decision is None else decision.ranked[:MAX_RANKED]
@@ -71,19 +71,19 @@ def view_of(inputs: SnapshotInputs) -> SortingSnapshot:
 
 
 def is_solved(table: SortingTable) -> bool:
-    """Return whether there is a goal, every tower is as it asks, and nothing is held."""
+    """Return whether there is a goal, every tower matches it, and no block is held."""
     state = table.state
     return state.solved and bool((state.goal != NULL).any()) and table.held is None
 
 
-def table_of(cell: Cell, view: SortingSnapshot) -> SortingTable:
-    """Return a table as a view shows it, to try a change on."""
+def table_of(cell: Cell, snapshot: SortingSnapshot) -> SortingTable:
+    """Return the table of a snapshot, to validate a change."""
     table = SortingTable(cell)
-    for piece in sorted(view.pieces, key=lambda one: one.level):
+    for piece in sorted(snapshot.pieces, key=lambda one: one.level):
         size = table.names.sizes.index(piece.size)
         code = table.shape.code(table.names.colours.index(piece.colour), size)
         table.show(Block(piece.id, code), None if piece.held else piece.place)
-    for block in view.goal:
+    for block in snapshot.goal:
         size = table.names.sizes.index(block.size)
         code = table.shape.code(table.names.colours.index(block.colour), size)
         table.goal[table.names.towers.index(block.tower), block.level] = code
@@ -142,7 +142,7 @@ def _goal(inputs: SnapshotInputs) -> tuple[GoalBlockSnapshot, ...]:
 def _ranked(table: SortingTable, one: RankedMove) -> MoveSnapshot:
     held = table.held is not None and one.move.pick == table.seat
     block = table.held if held else table.top(one.move.pick)
-    return _view(table, one.move, block, one.value, one.fewest)
+    return _move(table, one.move, block, one.value, one.fewest)
 
 
 def _current(inputs: SnapshotInputs, choice: MoveChoice) -> MoveSnapshot:
@@ -151,10 +151,10 @@ def _current(inputs: SnapshotInputs, choice: MoveChoice) -> MoveSnapshot:
         one for one in (() if decision is None else decision.ranked) if one.move == choice.move
     ]
     value, best = (same[0].value, same[0].fewest) if same else (None, False)
-    return _view(inputs.table, choice.move, choice.block, value, best)
+    return _move(inputs.table, choice.move, choice.block, value, best)
 
 
-def _view(
+def _move(
     table: SortingTable, move: Move, block: Block | None, value: float | None, best: bool
 ) -> MoveSnapshot:
     if value is not None and not np.isfinite(value):
