@@ -4,7 +4,7 @@
 
 pick/numba           18-DoF person, exact distances of all capsule pairs, plain observations
 pick/numba-features  the same with every feature, as it is trained
-reach/numba          a walking cylinder, the goal box of METHOD 2.3, plain observations
+reach/numba          a walking cylinder, the goal box of docs/method.md 2.3, plain observations
 reach/numba-features the same with every feature
 fcl/pick             one environment on Pinocchio and python-fcl, see ``fcl_pick.py``
 mujoco/pick          MuJoCo: kinematics and ``mj_geomDistance`` of the same pairs

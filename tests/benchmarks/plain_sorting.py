@@ -2,8 +2,8 @@
 
 What a careful user would write for stock Stable-Baselines3: plain Python and numpy, one episode
 at a time, no kernels, no mask. Rules, numbers of the moves, rewards, horizon and clean starts
-are those of METHOD 1 and of ``app/sim/sorting/state.py``; people and localisation failures are
-left out. A test holds it to the compiled batch move by move.
+are those of docs/method.md 1 and of ``app/sim/sorting/state.py``; people and localisation
+failures are left out. A test holds it to the compiled batch move by move.
 """
 
 from typing import Any

@@ -1,4 +1,4 @@
-; The sorting task of METHOD 1.1 and 1.2 for classical planners.
+; The sorting task of docs/method.md 1.1 and 1.2 for classical planners.
 ;
 ; Twins are counted, not named, and a move is a take and a put, which kept problems of ten objects
 ; smallest of the ways tried. Which clutter cell an object lies in is left out: there are as

@@ -1,10 +1,9 @@
 """The 18-DoF person a second time, in plain numpy: the reference for the kernels.
 
-A tree of homogeneous transforms from METHOD 3.4 for a person of any size; nothing is taken from
-``human/kernels/kinematics.py`` but the order of the capsules and their radii. A clavicle is a
-bar that
-turns about the torso's z by protraction and then lifts by elevation; it carries the shoulder's
-place, not its orientation.
+A tree of homogeneous transforms from docs/method.md 3.4 for a person of any size; nothing is
+taken from ``human/kernels/kinematics.py`` but the order of the capsules and their radii. A
+clavicle is a bar that turns about the torso's z by protraction and then lifts by elevation; it
+carries the shoulder's place, not its orientation.
 """
 
 import numpy as np

@@ -1,4 +1,5 @@
-"""Brute force on small sorting tasks: every state and move, by the rules of METHOD 1.2 alone.
+"""Brute force on small sorting tasks: every state and move, by the rules of docs/method.md 1.2
+alone.
 
 Nothing here knows of towers' progress. A state is ``(clutter, towers)`` as tuples of codes.
 """

@@ -40,7 +40,7 @@ def check_cell(cell: Cell, known: Sequence[Fault] = ()) -> list[Fault]:
     """Return everything that is wrong with a cell; nothing where all is well.
 
     Args:
-        cell: What is checked.
+        cell: Work cell.
         known: Faults found before, in reading; nothing is built on the values they name.
     """
     faults = [*_counts(cell, known), *_ids(cell), *numbers(cell)]

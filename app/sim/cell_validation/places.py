@@ -1,4 +1,4 @@
-"""Where stations and people of a work cell stand: on the table, on an obstacle, on the floor.
+"""Support of stations and people: the table, an obstacle or the floor.
 
 A part of ``checks.py``.
 """
@@ -84,7 +84,7 @@ def places(sound: Sound) -> Iterator[Fault]:
 
 
 def _hangs(cell: Cell, station: Station, under: Sequence[Obstacle]) -> str:
-    """Return how far a station hangs in the air; empty where something carries it."""
+    """Return the gap below a station as text; empty if it is supported."""
     z = station.position[2]
     tops = [(box.center[2] + box.half_size[2], box.id) for box in under]
     tops += [(0.0, "the table")] if _on_table(cell, station.position) else []

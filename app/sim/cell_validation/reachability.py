@@ -5,8 +5,8 @@ Postures are tested on the robot's capsules, as the simulator has them: against 
 against the fixed obstacles. Capsules and boxes meet in python-fcl, so that nothing is compiled.
 
 The tool points down where a station is reached (closed form, ``kernels.kinematics``); a goal of
-METHOD 2.3 may be reached in any posture (damped least squares on Pinocchio's Jacobian from
-several starts).
+docs/method.md 2.3 may be reached in any posture (damped least squares on Pinocchio's Jacobian
+from several starts).
 """
 
 from collections.abc import Iterator
@@ -45,7 +45,7 @@ class Touching:
 
     @property
     def text(self) -> str:
-        """What touches what, in words."""
+        """The contact as text."""
         link = self.link.replace("_", " ")
         if self.kind == "obstacle":
             return f"the robot's {link} touches the obstacle {self.other}"
@@ -55,7 +55,7 @@ class Touching:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reached:
-    """How an attempt to reach a point ended."""
+    """Result of an attempt to reach a point."""
 
     q: Vec | None
     """Joint positions [rad], shape (6,); None where no posture does it."""
@@ -122,7 +122,7 @@ class Reach:
         """Look for any posture with the tcp at ``point`` [m], shape (3,).
 
         Args:
-            point: Where the tcp shall be [m].
+            point: Target of the tcp [m].
             seed: Seed of the starts of the search.
         """
         if np.linalg.norm(point - SHOULDER) > self._longest:

@@ -5,7 +5,7 @@ A cell is a JSON file that a user may write; ``cell_file.read_cell`` reads it an
 ``cell_parts`` and ``cell_people``. Frame: the robot's base, x right, y toward the
 person, z up, table top at z = 0. SI units, radians.
 
-Source: METHOD 2.1 and 2.3 (``shared-workspace``), 3.2 (``pick-and-place``), 1.1
+Source: docs/method.md 2.1 and 2.3 (``shared-workspace``), 3.2 (``pick-and-place``), 1.1
 (``sorting-*``); coordinates that the source does not print are ours.
 """
 
@@ -152,7 +152,7 @@ def lacks_stations(cell: Cell) -> str | None:
 
 
 def lacks_for_pick(cell: Cell) -> str | None:
-    """Say what a cell lacks to train, decide and be shown (METHOD 3.2); None where nothing.
+    """Return the missing parts for training, decisions and display; None if complete.
 
     The simulator takes 0 to 4 people of any kind; the shipped policies know one worker. Fixed
     obstacles are not observed: they never move, so a policy learns where they are.
@@ -163,7 +163,7 @@ def lacks_for_pick(cell: Cell) -> str | None:
 
 
 def lacks_for_reach(cell: Cell) -> str | None:
-    """Return what a cell lacks to train a policy that reaches goals; None if nothing.
+    """Return the missing parts for training of a reach policy; None if complete.
 
     The preset defines the walkers: in a cell without one, people walk in the area of its first
     person.

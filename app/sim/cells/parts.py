@@ -136,7 +136,7 @@ class Station(CellData):
 
 
 class GoalRegion(CellData):
-    """A box of goals, with a grid of training targets in it (METHOD 2.3)."""
+    """A box of goals, with a grid of training targets in it (docs/method.md 2.3)."""
 
     center: Place = Field(description="centre of the box [m]")
     size: Annotated[Three, Within(0.0, 5.0, "m")] = Field(

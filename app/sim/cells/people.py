@@ -1,7 +1,7 @@
 """The people of a work cell: a worker with 18 joints, or one of three walking cylinders.
 
-Source: METHOD 2.1 (cylinders, with the constants of the authors' code as defaults) and 3.4
-(worker). Where a cylinder starts is not the cell's to say: it is a rule of the scenario.
+Source: docs/method.md 2.1 (cylinders, with the constants of the authors' code as defaults) and
+3.4 (worker). Where a cylinder starts is not the cell's to say: it is a rule of the scenario.
 """
 
 from typing import Annotated, Literal
@@ -25,7 +25,7 @@ Percentile = Annotated[float, Within(1.0, 99.0, "percentile")]
 
 
 class _Walking(CellData):
-    """Where a person may be; the walking area bounds the pelvis or the cylinder's axis."""
+    """Walking area: bounds of the pelvis or the cylinder's axis."""
 
     x_min: Length = Field(description="walking area, left edge [m]")
     x_max: Length = Field(description="walking area, right edge [m]")
@@ -34,7 +34,7 @@ class _Walking(CellData):
 
 
 class Worker(_Walking):
-    """An 18-DoF person who stands and works at the table (METHOD 3.4)."""
+    """An 18-DoF person at work at the table (docs/method.md 3.4)."""
 
     kind: Literal["worker"] = Field(default="worker", description="an 18-DoF person at work")
     home: Annotated[
@@ -60,12 +60,12 @@ class Worker(_Walking):
 
     @property
     def size(self) -> BodySize:
-        """How large the person is."""
+        """Body size."""
         return percentile_body(self.stature, self.arms, self.shoulders, self.pelvis_height)
 
 
 class _CylinderOnFloor(_Walking):
-    """A vertical cylinder that walks to random targets of its area (METHOD 2.1)."""
+    """A vertical cylinder that walks to random targets of its area (docs/method.md 2.1)."""
 
     radius_min: Radius = Field(default=0.2, description="least radius [m]")
     radius_max: Radius = Field(default=0.5, description="greatest radius [m]")
@@ -102,7 +102,7 @@ class ConstantWalker(_CylinderOnFloor):
 
 
 class FixedSpeedWalker(_CylinderOnFloor):
-    """A cylinder with a given speed, below ``speed_min`` of the others too (METHOD 2.1)."""
+    """A cylinder of fixed speed, possibly below that of others (docs/method.md 2.1)."""
 
     kind: Literal["fixed-speed"] = Field(description="given speed, radius changes with time")
     speed: Speed = Field(description="its speed [m/s]")

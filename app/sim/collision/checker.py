@@ -1,4 +1,4 @@
-"""What planners ask about collisions: people as shapes at one moment, free poses and motions.
+"""Collision queries of planners: people as shapes at one time, poses and motions.
 
 The checker uses the same compiled capsules as training (``collision/kernels/free.py``), so a
 planner and

@@ -55,7 +55,7 @@ class Clearance:
     cell_m: float
     """To table and obstacles [m]."""
     self_m: float
-    """Of its own links to each other [m]."""
+    """Least distance of links to each other [m]."""
 
 
 def clearance(

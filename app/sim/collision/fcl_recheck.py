@@ -61,7 +61,7 @@ class Trajectory:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FirstContact:
-    """Where a trajectory first touches something."""
+    """First contact of a trajectory."""
 
     index: int
     """Row of the trajectory."""
@@ -72,7 +72,7 @@ class FirstContact:
 
 
 class _Near(NamedTuple):
-    """What comes nearer than MARGIN in each row."""
+    """Pairs nearer than MARGIN, per row."""
 
     person: Pairs
     """Capsules of robot and person, shape (n_steps, n, m)."""
@@ -122,7 +122,7 @@ class Recheck:
 
     Args:
         cell: The work cell.
-        reference: What decides; FCL on raw meshes by default.
+        reference: Reference checker; FCL on raw meshes by default.
     """
 
     def __init__(self, cell: Cell, reference: CollisionReference | None = None) -> None:

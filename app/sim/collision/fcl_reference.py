@@ -49,7 +49,7 @@ class MeshContact:
     """Two things that touch."""
 
     kind: Kind
-    """What the robot touches: the person, the cell or itself."""
+    """Kind of contact: with the person, the cell or the robot itself."""
     link: str
     """Body of the robot, one of BODY_NAMES."""
     body: str
@@ -143,7 +143,7 @@ def make_cylinder(x: float, y: float, radius: float, low: float, high: float) ->
 
 
 def walker_name(number: int) -> str:
-    """Return what a walking cylinder is called in a contact."""
+    """Return the name of a walking cylinder in a contact."""
     return f"walker {number}"
 
 

@@ -1,4 +1,4 @@
-"""Where compiled kernels are kept between runs.
+"""Cache of compiled kernels between runs.
 
 numba compiles a function again when *its* file changes, but not when a function changes that it
 calls from another file: after an update it would go on with old code. So the folder's name is

@@ -1,4 +1,4 @@
-"""Where each group of features stands in an observation."""
+"""Slices of the groups of features in an observation."""
 
 from collections.abc import Iterable
 

@@ -17,4 +17,4 @@ class OutsideField:
     high: float
     """Greatest value met in training, or upper limit of the joint."""
     of: Literal["training", "limits"] = "training"
-    """What ``low`` and ``high`` are: the range met in training, or the joint's limits."""
+    """Meaning of ``low`` and ``high``: training range or joint limits."""

@@ -46,7 +46,7 @@ class Camera:
     """A camera that is held upright."""
 
     position: tuple[float, float, float]
-    """Where it is [m]."""
+    """Position [m]."""
     look_at: tuple[float, float, float]
     """Point in the middle of the image [m]."""
     fov: float = 0.7
@@ -58,7 +58,7 @@ def _linear(colour: Rgb) -> Floats:
 
 
 class _Hits(NamedTuple):
-    """What the rays from a camera hit, an entry per ray."""
+    """Hits of the rays of a camera, an entry per ray."""
 
     t: Floats
     """Distances [m], inf for the sky."""
@@ -74,7 +74,7 @@ class Raycaster:
     """Draws scenes that are seen by one camera.
 
     Args:
-        camera: Where it is and where it looks.
+        camera: Position and view.
         width: Columns of the images [px].
         height: Rows of the images [px].
         floor_z: Height of the floor [m].
@@ -185,9 +185,9 @@ class Raycaster:
         """Write 0 into ``lit`` where a solid keeps the light off, one ray per pixel.
 
         Args:
-            hits: What the rays from the camera hit.
+            hits: Hits of the camera's rays.
             lit: Share of the light that arrives, shape (height * width,); changed.
-            solids: What casts the shadows.
+            solids: Solids that cast shadows.
             rows: Pixels that may be in one; None for all.
         """
         if not solids:

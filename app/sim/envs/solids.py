@@ -34,7 +34,7 @@ class Solid(Protocol):
         """Intersect rays.
 
         Args:
-            origin: Where they begin [m], shape (3,) or (n, 3).
+            origin: Origins [m], shape (3,) or (n, 3).
             ray: Their unit directions, shape (n, 3) or (3,).
 
         Returns:
@@ -170,7 +170,7 @@ def dot(a: Floats, b: Floats) -> Floats:
 
 
 def _slab(start: Floats, ray: Floats, low: float, high: float) -> tuple[Floats, Floats]:
-    """Return where rays enter and leave the space between two parallel planes."""
+    """Return the distances at which rays enter and leave the space between two planes."""
     safe = np.where(np.abs(ray) < 1e-9, np.float32(1e-9), ray)
     first, second = (low - start) / safe, (high - start) / safe
     return np.minimum(first, second), np.maximum(first, second)

@@ -46,7 +46,7 @@ class SortingTask:
         return late
 
     def infos(self) -> Infos:
-        """Return what ``info`` says, an entry per task."""
+        """Return ``info``, an entry per task."""
         rows = self.batch.rows
         return {
             "outcome": NAMES[rows.outcome],
@@ -142,12 +142,12 @@ class SortingEnv(SingleEnv):
     Args:
         cell: Name of a shipped work cell, or a work cell.
         settings: Starts, disturbances, rewards and ends.
-        first_env: Which row of a vector environment this one equals.
+        first_env: Number of the equal row of a vector environment.
         render_mode: ``rgb_array`` or None: blocks in clutter and towers, those that the goal
             asks for translucent; clutter cells are darker the likelier a pick fails.
 
-    Source: thesis sections 3.3 and 3.4, METHOD 1. Deviates: coefficients and failure map are
-    not printed and chosen here; the failure map is observed.
+    Source: thesis sections 3.3 and 3.4, docs/method.md 1. Deviates: coefficients and failure
+    map are not printed and chosen here; the failure map is observed.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": RENDER_FPS}
@@ -179,7 +179,7 @@ class SortingVectorEnv(BatchVectorEnv):
         cell: Name of a shipped work cell, or a work cell.
         settings: Starts, disturbances, rewards and ends.
         first_env: Number of the first task.
-        autoreset_mode: What happens after an episode's end; see :class:`BatchVectorEnv`.
+        autoreset_mode: Autoreset mode; see :class:`BatchVectorEnv`.
         max_episode_steps: Steps after which an episode is truncated; None for no such limit.
         render_mode: ``rgb_array`` (``render`` gives an image of every task) or None.
     """

@@ -1,4 +1,4 @@
-"""What single and vector environments ask of a batch of cells."""
+"""Interface of batches for single and vector environments."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -108,7 +108,7 @@ class BatchTask(SteppedTask, Protocol):
         """The environments."""
 
     def infos(self) -> Infos:
-        """Return what ``info`` says, an entry per row; nothing of it is overwritten."""
+        """Return a new ``info``, an entry per row."""
 
     def picture(self, row: int) -> Image:
         """Return an image of one row."""
@@ -162,7 +162,7 @@ class RobotTask(ArmTask):
         return self._cells
 
     def infos(self) -> Infos:
-        """Return what ``info`` says, an entry per cell."""
+        """Return ``info``, an entry per environment."""
         state = self.batch.state
         return {
             "outcome": NAMES[state.outcome],

@@ -106,7 +106,7 @@ def _over_the_top(
         ux: Direction of the segment [m].
         uy: See ux.
         uz: See ux.
-        end: Where the segment is nearest to the axis, above the top, as a fraction.
+        end: Point of the segment nearest to the axis, above the top, as a fraction.
         r: Radius of the cylinder [m].
     """
     start = 0.0 if uz > 0.0 else 1.0

@@ -14,7 +14,7 @@ Point = tuple[float, float, float]
 
 @kernel(error_model="numpy", fastmath=FAST)
 def segment_parameters(u: Point, v: Point, w: Point) -> tuple[float, float]:
-    """Return where two segments are nearest, as fractions of their lengths.
+    """Return the nearest points of two segments, as fractions of their lengths.
 
     Args:
         u: End of the first segment less its start [m].

@@ -1,4 +1,4 @@
-"""How large a person is: the lengths of the 18-DoF model's segments.
+"""Body sizes: lengths of the segments of the 18-DoF model.
 
 The compiled person takes its lengths as an array, its *size*
 (``human/kernels/kinematics.py``); this file
@@ -27,7 +27,7 @@ from app.sim.core.arrays import Vec
 from app.sim.human.kernels import kinematics as body
 
 STATURE = 1.72
-"""Of the median person [m]."""
+"""Lengths of the median person [m]."""
 SPREADS = {"stature": 0.054, "arms": 0.04, "shoulders": 0.05}
 """Standard deviations, relative; arms and shoulders at given stature."""
 PERCENTILES = (1.0, 99.0)

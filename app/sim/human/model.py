@@ -183,8 +183,8 @@ def solve_hands(
     Args:
         q_now: Present joint positions [m, rad], shape (18,).
         size: The person's size [m], shape (12,) (``BodySize.vector``).
-        right: Where the right palm shall be [m], shape (3,).
-        left: Where the left palm shall be [m], shape (3,).
+        right: Target of the right palm [m], shape (3,).
+        left: Target of the left palm [m], shape (3,).
         pelvis: Pelvis x [m], y [m], yaw [rad]; as it is where None.
         swivel: Turn of the elbow out of the vertical plane through shoulder and hand [rad].
     """
@@ -309,7 +309,7 @@ def reach(
 
     Args:
         hand: ``"r"`` or ``"l"``.
-        position: Where the palm shall be [m], shape (3,).
+        position: Target of the palm [m], shape (3,).
         q_start: Joint positions to start from [m, rad], shape (18,).
         size: The person's size [m], shape (12,) (``BodySize.vector``).
         pelvis: Pelvis x [m], y [m], yaw [rad]; as it is where None.

@@ -23,7 +23,7 @@ class Person:
     """Height of the top of that cylinder [m], as safety layers take it; None: as high as the
     cell's people, or 2 m over the floor."""
     growth: float = 0.0
-    """How fast the radius of that cylinder grows [m/s]; 0 where nothing is known of it."""
+    """Growth rate of that cylinder's radius [m/s]; 0 if unknown."""
     past: Vec | None = None
     """Radius [m] and walking speed [m/s] of that cylinder 0.1 s, 0.2 s, ... ago, shape (n, 2),
     n at most ``occupancy.N_PAST - 1``; None where nothing is remembered."""

@@ -1,12 +1,12 @@
-"""From key-points and cylinders of a tracker to people.
+"""Estimation of people from key-points and cylinders of a tracker.
 
 bounding_cylinder      The safety volume of docs/method.md 2.8: an upright cylinder around a
                        person's key-points
 cylinder_sensor_model  Sensor model of a tracker of pedestrians, for a batch of environments
 kalman_filter          Kalman filters of points with latency, noise and missing measurements
 keypoint_angles        The 18 joint angles of our person from key-points, in closed form
-keypoint_check         Checks of key-points from outside: missing points, unusable ones, people
-                       in another frame
+keypoint_check         Validation of received key-points: missing and unusable points, wrong
+                       frames and units
 keypoint_sensor_model  Sensor model of a key-point tracker
 keypoints              Key-points of a depth camera in the layout BODY_25: names, sides, our
                        body's own

@@ -151,7 +151,7 @@ def safety_cylinder(
 
 
 def _unseen_reach(points: Vec, seen: NDArray[np.bool_], center: Vec) -> tuple[float, float]:
-    """Return how far from the axis and how high unseen arms and heads may be [m]."""
+    """Return bounds of the distance from the axis and height of unseen arms and heads [m]."""
     unseen = [k for k in _BOUNDED if not seen[k]]
     if not unseen:
         return 0.0, -np.inf

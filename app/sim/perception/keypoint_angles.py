@@ -81,7 +81,7 @@ def joint_motion(
 
 
 def fit_errors(q: Vec, size: Vec, points: Vec) -> tuple[float, float]:
-    """Return how far the model's joints are from key-points [m]; NaN where none is seen.
+    """Return the distances of the model's joints from key-points [m]; NaN if all are unseen.
 
     Args:
         q: Joint positions [m, rad], shape (18,).

@@ -1,15 +1,12 @@
-"""Checks of key-points from outside: missing points, unusable ones, people in another frame.
+"""Validation of received key-points: missing and unusable points, wrong frames and units.
 
-Trackers write a missing point in many forms; :func:`check_keypoints` takes them all. A single
-point that cannot be used costs that point, and is named. Only another number of points is an
-error.
+:func:`check_keypoints` accepts the usual markers of missing points; it drops and names unusable
+points; only a wrong number of points is an error.
 
-A skeleton in another frame (a camera's, with the depth along z; a floor's origin in place of
-the table's) or in another unit has the shape of a person in the wrong place. It is detected by
-:func:`why_implausible`: bone lengths, heights of the body's parts over the floor, and the pose
-that goes with them. People who stand, bend, kneel, sit, lie on the floor or on a table, reach
-up or stand on a step of half a metre pass. A skeleton that does not pass counts as unseen,
-since neither its place nor its posture can be relied on. Bounds are ours.
+:func:`why_implausible` detects skeletons in another frame (of a camera; with the floor as
+origin) or unit by bone lengths, heights of body parts over the floor, and pose. It accepts
+people who stand, bend, kneel, sit, lie on the floor or on a table, reach up, or stand on a step
+of half a metre. An implausible skeleton counts as unseen. Bounds are ours.
 """
 
 from dataclasses import dataclass
@@ -23,16 +20,15 @@ from app.sim.human.kernels.kinematics import MEDIAN_TRUNK
 from app.sim.perception.keypoints import BODY_25, FARTHEST_M, N_KEYPOINTS, K
 
 STRAY_M = 1.6
-"""Distance from the middle at which a key-point is no part of the person [m]; an arm stretched
-up or out is within 1.3 m."""
+"""Largest distance of a key-point from the median of all [m]; stretched arms reach 1.3 m."""
 _ENOUGH = 5
-"""Key-points from which on strays are looked for."""
+"""Least number of key-points for the detection of strays."""
 _PLACEHOLDERS = (0.0, -1.0)
-"""Values that trackers write into all three coordinates of a missing key-point."""
+"""Values of all three coordinates that mark a missing key-point."""
 _HUGE = 1e9
-"""Greater coordinates count as this [m]: their squares are numbers still."""
+"""Bound of coordinates [m], whose squares are finite."""
 _TRUST_SLACK = 0.01
-"""How far outside [0, 1] a confidence is still taken, as the nearer bound."""
+"""Tolerance of confidences outside [0, 1], which are clipped."""
 
 _BONES = (
     (K["neck"], K["mid_hip"], MEDIAN_TRUNK),
@@ -44,15 +40,15 @@ _BONES = (
 )
 """Pairs of key-points and their distance in the median person [m]."""
 _BONE_RATIO = (0.55, 1.6)
-"""Least and greatest median ratio of the bones seen to the median person's."""
+"""Range of the median ratio of bone lengths to those of the median person."""
 _ENOUGH_BONES = 3
-"""Bones from which on they are judged."""
+"""Least number of bones for that check."""
 _UNITS = {"millimetres": 1000.0, "centimetres": 100.0, "inches": 39.37, "feet": 3.281}
 
 _STEP_M = 0.5
-"""Height of a step or platform that a person may stand on [m]."""
+"""Largest height of a step or platform below a person [m]."""
 _BELOW_M = -0.3
-"""Height over the floor down to which any part may seem to be, by errors of a tracker [m]."""
+"""Least height of any part over the floor, with errors of a tracker [m]."""
 _PARTS: dict[str, tuple[tuple[int, ...], float]] = {
     "feet": (
         tuple(
@@ -67,38 +63,38 @@ _PARTS: dict[str, tuple[tuple[int, ...], float]] = {
     "elbows": ((K["elbow_r"], K["elbow_l"]), 2.6),
     "wrists": ((K["wrist_r"], K["wrist_l"]), 2.9),
 }
-"""Parts of the body: their key-points and how high over the floor they can be [m]: those of a
-person of 1.95 m on a step, arms raised."""
+"""Body parts: key-points, and largest height over the floor [m], of a person of 1.95 m on a
+step with raised arms."""
 _FLAT_HIPS_M = 1.25
-"""Height of the hips over the floor up to which the trunk may be level or head down [m]."""
+"""Largest height of the hips over the floor with the trunk level or head down [m]."""
 _INVERTED_M = 0.25
-"""How far shoulders may be below the hips while knees or feet are as far above them [m]."""
+"""Largest height of hips over shoulders while the legs are as far above the hips [m]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Keypoints:
-    """One checked frame of one person."""
+    """One validated frame of one person."""
 
     points: Vec
     """Key-points [m], shape (25, 3); rows of NaN are missing."""
     confidences: Vec
-    """Trust in each in (0, 1], 0 where it is missing, shape (25,)."""
+    """Confidences in (0, 1], 0 for missing key-points, shape (25,)."""
     strays: tuple[str, ...] = ()
-    """Names of key-points dropped because they lie too far from all others."""
+    """Names of key-points dropped because they are too far from all others."""
     unusable: tuple[str, ...] = ()
-    """Names of key-points dropped because their numbers cannot be used."""
+    """Names of key-points dropped because of unusable values."""
     implausible: str | None = None
-    """Reason why the key-points cannot be in the cell's frame, with numbers; None: they can.
-    All key-points are missing then."""
+    """Reason why the key-points cannot be in the cell's frame, in which case all are missing;
+    None if they can."""
 
     @property
     def seen(self) -> NDArray[np.bool_]:
-        """Which key-points are there, shape (25,)."""
+        """Whether each key-point is present, shape (25,)."""
         return self.confidences > 0.0
 
 
 UNSEEN = Keypoints(points=np.full((N_KEYPOINTS, 3), np.nan), confidences=np.zeros(N_KEYPOINTS))
-"""A frame without anybody."""
+"""Frame without a person."""
 
 
 def check_keypoints(
@@ -108,22 +104,21 @@ def check_keypoints(
     place: str = "",
     floor_z: float | None = None,
 ) -> Keypoints:
-    """Check one frame of one person as it comes from outside.
+    """Validate one received frame of one person.
 
-    Missing is: NaN in all coordinates; exactly (0, 0, 0) or (-1, -1, -1), as trackers write
-    it; a confidence below ``min_confidence`` or NaN. Unusable, and named, is a point with some
-    coordinates only, an infinite one, one beyond 100 m or with a confidence outside [0, 1]. A
-    frame in which all are missing is a valid frame.
+    A key-point is missing if all coordinates are NaN, if it is exactly (0, 0, 0) or
+    (-1, -1, -1), or if its confidence is NaN or below ``min_confidence``. It is unusable if it
+    has only some coordinates, is infinite, beyond 100 m, or has a confidence outside [0, 1].
 
     Args:
         keypoints: Order of BODY_25, cell's frame [m], shape (25, 3).
-        confidences: Trust in each in [0, 1], shape (25,); 1 where None.
-        min_confidence: Trust below which a key-point counts as missing.
-        place: Put before the field's name in errors, such as ``"people[1]."``.
-        floor_z: Height of the floor [m]; None: heights are not judged.
+        confidences: Confidences in [0, 1], shape (25,); 1 where None.
+        min_confidence: Confidence below which a key-point counts as missing.
+        place: Prefix of the field's name in errors, such as ``"people[1]."``.
+        floor_z: Height of the floor [m]; None: heights are not checked.
 
     Raises:
-        InvalidInput: Not numbers, or another shape.
+        InvalidInput: The values are not numbers, or have another shape.
     """
     points = _numbers(f"{place}keypoints", keypoints, (N_KEYPOINTS, 3))
     trust = np.ones(N_KEYPOINTS)
@@ -168,10 +163,10 @@ def _numbers(field: str, values: ArrayLike, shape: tuple[int, ...]) -> Vec:
 
 
 def _too_far(points: Vec, there: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return which key-points are placeholders or errors beyond ``FARTHEST_M``, shape (25,).
+    """Return whether each key-point is an error beyond ``FARTHEST_M``, shape (25,).
 
-    None, where most are that far: another unit, to be judged as a whole. Points that are the
-    same are placeholders, however many.
+    If most are that far, the unit is wrong and only repeated points, which are placeholders,
+    are errors.
     """
     far = np.zeros(N_KEYPOINTS, dtype=np.bool_)
     far[there] = np.abs(points[there]).max(axis=1) > FARTHEST_M
@@ -193,14 +188,14 @@ def _strays(points: Vec, seen: NDArray[np.bool_]) -> NDArray[np.intp]:
 
 
 def _bone_ratio(points: Vec) -> float:
-    """Return the median ratio of the bones seen to the median person's; NaN of too few."""
+    """Return the median ratio of bone lengths to the median person's; NaN for too few."""
     ratios = np.array([np.linalg.norm(points[a] - points[b]) / one for a, b, one in _BONES])
     there = ratios[np.isfinite(ratios)]
     return float(np.median(there)) if len(there) >= _ENOUGH_BONES else float("nan")
 
 
 def _unit_hint(ratio: float) -> str:
-    """Return which unit a skeleton of this size may be in; NaN: nothing is known of it."""
+    """Return a hint about the unit, by the ratio of bone lengths; NaN: unknown."""
     if np.isnan(ratio):
         return " (are these millimetres?)"
     for unit, per_metre in _UNITS.items():
@@ -210,7 +205,7 @@ def _unit_hint(ratio: float) -> str:
 
 
 def _axis_hint(points: Vec) -> str:
-    """Return which axis points up along the trunk or the legs, where that is not z."""
+    """Return a hint about the axis along trunk or legs if it is not z."""
     middles = [_middle(points, part) for part in ("shoulders", "hips", "knees", "feet")]
     there = [middle for middle in middles if np.isfinite(middle).all()]
     if len(there) < 2:
@@ -225,18 +220,18 @@ def _axis_hint(points: Vec) -> str:
 
 
 def _middle(points: Vec, part: str) -> Vec:
-    """Return the median of the key-points seen of a part [m], shape (3,), NaN where none is."""
+    """Return the median of the key-points of a part [m], shape (3,), NaN without any."""
     own = points[list(_PARTS[part][0])]
     there = own[np.isfinite(own).all(axis=1)]
     return np.median(there, axis=0) if len(there) else np.full(3, np.nan)
 
 
 def why_implausible(points: Vec, floor_z: float | None) -> str | None:
-    """Return why these cannot be a person in the cell's frame, or None where they can.
+    """Return the reason why key-points cannot be a person in the cell's frame, or None.
 
     Args:
         points: Key-points [m], shape (25, 3), NaN where missing.
-        floor_z: Height of the floor [m]; None: heights are not judged.
+        floor_z: Height of the floor [m]; None: heights are not checked.
     """
     there = points[np.isfinite(points).all(axis=1)]
     if len(there) == 0:
@@ -259,7 +254,7 @@ def why_implausible(points: Vec, floor_z: float | None) -> str | None:
 
 
 def _why_not_standing(points: Vec, floor_z: float) -> str | None:
-    """Return why the floor cannot support a person like this, or None."""
+    """Return the reason why heights over the floor are implausible, or None."""
     heights = {part: float(_middle(points, part)[2] - floor_z) for part in _PARTS}
     for part, height in heights.items():
         high = _PARTS[part][1]

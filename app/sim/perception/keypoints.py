@@ -111,9 +111,9 @@ def swapped_against(points: Vec, expected: Vec, group: Group, margin: float = 0.
 
     Args:
         points: Key-points seen [m], shape (25, 3), NaN where missing.
-        expected: Where they were expected [m], shape (25, 3), NaN where unknown.
-        group: Which of GROUPS.
-        margin: How much less the mean distance must be [m].
+        expected: Predicted key-points [m], shape (25, 3), NaN where unknown.
+        group: One of GROUPS.
+        margin: Least reduction of the mean distance [m].
     """
     members = list(GROUPS[group])
     given = np.linalg.norm(points[members] - expected[members], axis=1)

@@ -135,7 +135,7 @@ def person_anywhere() -> Person:
 
 
 def degradations(person: Person) -> tuple[str, ...]:
-    """Return how an observation differs from the given person: ``far``, ``clamped``."""
+    """Return the differences of an observation from the given person: ``far``, ``clamped``."""
     near = _brought_near(person)
     far = ("far",) if near is not person else ()
     return far if _is_known(near) else (*far, "clamped")

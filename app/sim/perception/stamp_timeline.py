@@ -83,7 +83,7 @@ class StampTimeline:
 
         Args:
             stamp: As offered [s].
-            time: What :meth:`offer` returned [s].
+            time: Time returned by :meth:`offer` [s].
             now: As offered [s].
         """
         self.jumped = len(self._pending) >= N_RESYNC
@@ -91,7 +91,7 @@ class StampTimeline:
         self.stamp, self.time, self.arrived = stamp, time, now
 
     def ahead(self, now: float, stamp: float | None = None) -> float:
-        """Return how much later than the newest frame a moment is [s], at least 0.
+        """Return the time since the newest frame [s], at least 0.
 
         Args:
             now: The moment on the service's clock [s].

@@ -3,7 +3,7 @@
 goal_configurations    Joint configurations that bring the tool to a target: the goals of the
                        planners
 ompl_planners          Sampling planners to compare policies with: OMPL on our own collision
-                       checker (METHOD 2.6)
+                       checker (docs/method.md 2.6)
 path_tracking          Path following: tracks a timed path from the robot's actual position,
                        period by period
 replanning             Replanning executors: planners in three roles, in place of a policy

@@ -1,4 +1,4 @@
-"""Sampling planners to compare policies with: OMPL on our own collision checker (METHOD 2.6).
+"""Sampling-based planners: OMPL with the project's collision checker (docs/method.md 2.6).
 
 A query asks for a path of straight joint motions from one posture to any of several. Three
 planners: RRT-Connect (the first path found), RRT* (Karaman and Frazzoli 2011; the shortest path
@@ -67,7 +67,7 @@ _SEEDING = threading.Lock()
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlanSettings:
-    """How to plan."""
+    """Settings of a planner."""
 
     planner: str = "rrt-connect"
     """One of PLANNERS."""
@@ -118,7 +118,7 @@ def plan(
         start: Joint positions [rad], shape (6,).
         goals: Joint positions to reach one of [rad], shape (k, 6); of the joints that stay, the
             start's values count.
-        settings: How to plan.
+        settings: Settings of the planner.
         seed: Seed, at least 1.
 
     Raises:
@@ -162,7 +162,7 @@ def planning_limits(checker: Checker, start: Vec) -> tuple[Vec, Vec]:
     """Return the joint limits that plans keep [rad], each of shape (6,).
 
     Half a period at full speed inside the cell's limits: there every timed path is viable
-    (METHOD 2.2), so that it can be followed to the letter. A start beyond them is kept.
+    (docs/method.md 2.2), so that it can be followed exactly. A start beyond them is kept.
     """
     inset = 0.5 * checker.arm.limits.qd_max * checker.arm.dt
     return (

@@ -5,7 +5,8 @@ section 7.3; LSPB) on the grid of the control period ``dt``: along segment i all
 constant speed ``v_i = D_i / T_i``; about corner i the speeds change evenly from ``v_{i-1}`` to
 ``v_i`` during ``b_i`` whole periods; the constant part lasts ``m_i`` whole periods, so that
 ``T_i = (m_i + (b_i + b_{i+1}) / 2) dt``. Every period is therefore one polynomial of degree 2,
-a bounded polynomial action (METHOD 2.2) like those of a policy. The ``b_i`` are the least with
+a bounded polynomial action (docs/method.md 2.2) like those of a policy. The ``b_i`` are the
+least with
 
     |v_i| <= qd_max   and   |v_i - v_{i-1}| <= qdd_max b_i dt   for every joint,
 
@@ -44,7 +45,7 @@ class TimedPath:
     qd: Vec
     """Joint speeds at the knots [rad/s], shape (n + 1, 6); the last are 0."""
     corner_rad: float
-    """How far the motion leaves the path at its corners at most, per joint [rad]."""
+    """Largest distance of the motion from the path at corners, per joint [rad]."""
     n_stops: int
     """Corners at which it stops."""
 
@@ -87,7 +88,7 @@ def stop_periods(qd: Vec, limits: TimingLimits) -> int:
 
 
 def stopping_point(q: Vec, qd: Vec, limits: TimingLimits) -> Vec:
-    """Return where a straight stop from ``q`` [rad] and ``qd`` [rad/s] ends [rad], (6,)."""
+    """Return the end of a straight stop from ``q`` [rad] and ``qd`` [rad/s] [rad], (6,)."""
     return np.asarray(q + 0.5 * stop_periods(qd, limits) * limits.dt * qd)
 
 

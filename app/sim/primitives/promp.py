@@ -39,7 +39,7 @@ RIDGE = 1e-7
 FLOOR = 0.01
 """Default standard deviation of the floor [m, rad]."""
 FLOOR_LENGTH = 0.25
-"""How far along the phase the floor is alike (l)."""
+"""Correlation length of the floor along the phase (l)."""
 EXACT = 1e-12
 """Variance of an observation called exact [m^2, rad^2]: one micrometre, one microradian."""
 
@@ -115,7 +115,7 @@ def fit(
 
     Args:
         demonstrations: Joint positions [m, rad], shape (T_i, n_joints) each; T_i may differ.
-        durations: How long each took [s], shape (n,).
+        durations: Durations [s], shape (n,).
         phases: Phase of every sample, shape (T_i,) each; None: evenly from 0 to 1.
         n_basis: Gaussians per joint.
         width: Their width [phase]; None: :func:`usual_width`.
@@ -166,7 +166,7 @@ def of_weights(
 
     Args:
         weights: Weights of each demonstration, shape (n, n_joints, n_basis).
-        durations: How long each took [s], shape (n,).
+        durations: Durations [s], shape (n,).
         width: Width of the Gaussians [phase]; None: :func:`usual_width`.
         floor: Standard deviation added to every weight, smoothly along the phase [m, rad].
         residual: Residual of the regression [m, rad], shape (n_joints,); None: nothing.

@@ -37,7 +37,7 @@ NEAR_M = 1e-4
 MET = 1e-3
 """An exact via point counts as met to this [m, rad]."""
 SLACK = 5e-4
-"""How far a weight vector may leave the joint limits [m, rad]; ``sampling.follow`` clips it."""
+"""Largest excess of weights over joint limits [m, rad]; ``sampling.follow`` clips it."""
 LONGEST = 0.5
 """Longest change of a weight in one step [m, rad]."""
 MAX_STEPS = 25
@@ -49,11 +49,11 @@ class JointVia:
     """Some joints at given values at one phase."""
 
     phase: float
-    """Where, in [0, 1]."""
+    """Phase in [0, 1]."""
     q: Vec
     """Values, shape (k,): positions [m, rad], or derivatives by the phase."""
     joints: tuple[str, ...] = human.JOINT_NAMES
-    """Which joints, k names."""
+    """Names of the k joints."""
     cov: Vec | None = None
     """Covariance of the values, shape (k, k); None: exactly."""
     derivative: Literal[0, 1] = 0
@@ -65,7 +65,7 @@ class PointVia:
     """A point of the body at a given place at one phase."""
 
     phase: float
-    """Where, in [0, 1]."""
+    """Phase in [0, 1]."""
     position: Vec
     """Place, robot base frame [m], shape (3,)."""
     point: str = "hand_r"

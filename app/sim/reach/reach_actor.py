@@ -12,7 +12,7 @@ from app.sim.robot.actions import ActionSettings
 
 
 class ReachKnown(Protocol):
-    """What is known of a policy that brings the tcp to a goal beside people."""
+    """Reach policy, as seen by the live world and planners."""
 
     @property
     def checkpoint(self) -> str:
@@ -32,15 +32,15 @@ class ReachKnown(Protocol):
 
     @property
     def view(self) -> "ViewName":
-        """What it sees."""
+        """Observation."""
 
     @property
     def action(self) -> "ActionSettings":
-        """What its actions mean."""
+        """Meaning of its actions."""
 
     @property
     def goals(self) -> "GoalRule":
-        """Where the goals of its training were drawn from."""
+        """Region of its training goals."""
 
     @property
     def targets(self) -> Vec | None:

@@ -1,7 +1,7 @@
 """The robot: model, kinematics, capsules, joint limits, actions.
 
 actions             Which action a scenario uses: degree, bounds and meaning, in one place
-                    (METHOD 2.2)
+                    (docs/method.md 2.2)
 capsules            Capsules that contain the collision meshes of the robot and its tool, for
                     the kernels
 measured_state      The robot's state as it was measured: a little outside its limits, or far

@@ -1,4 +1,4 @@
-"""Which action a scenario uses: degree, bounds and meaning, in one place (METHOD 2.2).
+"""Action types of the scenarios: degree, bounds and meaning (docs/method.md 2.2).
 
 degree 2   acceleration-limited, closed form           robot/kernels/acceleration_bounds.py
 degree 3   jerk-limited, ends by bisection             robot/kernels/jerk_bounds.py
@@ -20,12 +20,12 @@ DEGREES = (2, 3)
 BOUNDS = {"viable": VIABLE, "one-step": MYOPIC}
 """Kinds of bounds by name."""
 MEANINGS = {"speed": SPEED, "coefficient": COEFFICIENT}
-"""What an action stands for, by name."""
+"""Meanings of actions, by name."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ActionSettings:
-    """How a policy's action in [-1, 1] moves a joint.
+    """Motion of a joint by an action in [-1, 1].
 
     Raises:
         InvalidInput: An unknown choice, or one-step bounds for degree 3.

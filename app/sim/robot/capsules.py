@@ -108,7 +108,7 @@ LEVERS = (1.4432, 1.4319, 0.8199, 0.2476, 0.2123, 0.0469)
 
 
 def levers(tool_length: float = 0.12, tool_radius: float = 0.04) -> Vec:
-    """Return how far from each joint's axis the robot can reach at most [m], shape (6,).
+    """Return the largest distance of the robot from each joint's axis [m], shape (6,).
 
     A point moves at most at the sum of joint speeds times levers. A longer or thicker tool adds
     its excess; the last joint turns the tool about itself.

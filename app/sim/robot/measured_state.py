@@ -28,7 +28,7 @@ from app.sim.robot.ur10 import JOINT_NAMES
 SLACK = 1e-6
 """Excess over a limit that is taken for rounding and not flagged [rad, rad/s, rad/s^2]."""
 POSITION_TOLERANCE = 0.05
-"""How far outside a position limit a joint may be measured [rad], besides the way of a stop
+"""Tolerance of measured positions outside a limit [rad], besides the distance of a stop
 from the speed limit: a joint that passes its limit while it brakes is still answered."""
 LONGEST_OVERRUN = 0.2
 """Most that is added for that way [rad]."""
@@ -64,7 +64,7 @@ class MeasuredState(NamedTuple):
     clamped: Joints
     """Inside the limits: what policies see; the same object where nothing is outside."""
     outside: tuple[OutsideField, ...]
-    """What lies outside, with the limits of the joint."""
+    """Joints outside, with their limits."""
 
 
 class StateLimits:
@@ -140,7 +140,7 @@ class StateLimits:
         raise InvalidInput(field, value, rule + (f" ({hint})" if hint else ""))
 
     def _hint(self, part: int, joint: int, values: Vec) -> str:
-        """Return what may be wrong with one vector of a state; empty where that is unclear."""
+        """Return a hint about one vector of a state; empty without one."""
         low = self._low[part] - self._tolerance[part]
         high = self._high[part] + self._tolerance[part]
         value, turned = float(values[joint]), np.radians(values)

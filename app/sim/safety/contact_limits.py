@@ -1,4 +1,4 @@
-"""How fast a robot may touch which part of a person (power and force limiting).
+"""Speed limits of contact by body part (power and force limiting).
 
 A free part of the body and the robot are two masses with a spring between them. All energy of
 their relative motion goes into the spring, so the contact force stays below ``F`` for speeds up

@@ -1,4 +1,4 @@
-"""What the compiled kernels know of a work cell: its robot and its people.
+"""Kernel data of a work cell: robot and people.
 
 The kernels take plain tuples of arrays (``robot/kernels/arm.py``,
 ``people/kernels/people.py``); this file
@@ -38,8 +38,8 @@ from app.sim.robot.ur10 import Robot
 
 HumanKind = Literal["worker", "walker", "constant", "fixed-speed"]
 HUMAN_KINDS: tuple[HumanKind, ...] = ("worker", "walker", "constant", "fixed-speed")
-"""An 18-DoF person at work; a cylinder that walks (METHOD 2.1), with speed and radius that
-vary, that are constant per episode, or with a given speed."""
+"""An 18-DoF person at work; a cylinder that walks (docs/method.md 2.1), with speed and radius
+that vary, that are constant per episode, or with a given speed."""
 NO_CYLINDERS = np.zeros((0, 3))
 """Cylinders of a cell without walkers."""
 FAR_AWAY = (0.0, 4.0, -np.pi / 2.0)
@@ -125,7 +125,7 @@ _WALKER_FIELDS = {
 
 
 def pedestrian_settings(person: CylinderPerson) -> PedestrianSettings:
-    """Return how a cell's cylinder walks."""
+    """Return the motion settings of a cell's cylinder."""
     values = person.model_dump(exclude={"height"})
     return PedestrianSettings(
         **{_WALKER_FIELDS.get(name, name): v for name, v in values.items()}
@@ -134,7 +134,7 @@ def pedestrian_settings(person: CylinderPerson) -> PedestrianSettings:
 
 @lru_cache(maxsize=8)
 def arm_of(cell: Cell) -> Arm:
-    """Return what the kernels know of a cell's robot."""
+    """Return the kernel data of a cell's robot."""
     mount = cell.robot
     capsules = load_robot_capsules(mount.tool_length, mount.tool_radius)
     pairs, span = self_pairs(capsules), capsules.p1 - capsules.p0
@@ -167,11 +167,11 @@ def boxes_of(cell: Cell) -> Vec:
 
 
 def people_of(cell: Cell, work: HumanMotionConfig | None = None) -> People:
-    """Return what the kernels know of a cell's people.
+    """Return the kernel data of a cell's people.
 
     Args:
         cell: Work cell with 0 to 4 people.
-        work: What the workers do; None where they only stand where they are put.
+        work: Motion of the workers; None: they stand where they are placed.
     """
     workers = len(cell.workers)
     shared = People(

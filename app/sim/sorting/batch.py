@@ -1,8 +1,8 @@
-"""The sorting task: many of them stepped together, and what one state looks like (METHOD 1).
+"""Batch of sorting tasks (docs/method.md 1).
 
-A batch hands out observations of integers (cells, towers, goal, failure probabilities), masks
-of the moves that change something, rewards and ends. The people of METHOD 1.2, who add, remove
-and move objects or change the goal, are part of it (``human_rate``).
+A step returns observations of integers (cells, towers, goal, failure probabilities), masks of
+the moves that change the state, rewards and outcomes. ``human_rate`` includes people that add,
+remove and move objects or change the goal (docs/method.md 1.2).
 """
 
 from collections.abc import Callable
@@ -30,21 +30,21 @@ from app.sim.sorting.state import (
 )
 
 OUTCOMES = ("running", "success", "timeout")
-"""How an episode stands, by the number in ``rows.outcome``."""
+"""Names of the outcomes in ``rows.outcome``."""
 
 Obs = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SortingSettings:
-    """How episodes start, are disturbed, pay and end."""
+    """Starts, disturbances, rewards and ends of episodes."""
 
     horizon_factor: float = 4.0
     """Attempts per clutter cell after which an episode is cut off."""
     disturbed_share: float = 0.0
     """Share of episodes that start with junk on the towers and goals partly built."""
     solved_episodes: float = 0.0
-    """Share of episodes that start partly solved (e_s of METHOD 1.4)."""
+    """Share of episodes that start partly solved (e_s of docs/method.md 1.4)."""
     solved_share: float = 0.0
     """Share of their goal that is done (g_s)."""
     even_share: float = 0.0
@@ -58,7 +58,7 @@ class SortingSettings:
     failure_max: float = 0.4
     """Greatest failure probability of such a map."""
     n_objects: int = 0
-    """Objects per episode, K_E; 0 draws it (METHOD 1.4)."""
+    """Objects per episode, K_E; 0: drawn (docs/method.md 1.4)."""
     n_goal: int = 0
     """Objects in the goal, K_G; 0 draws it."""
     weights: SortingWeights = field(default_factory=SortingWeights)
@@ -67,7 +67,7 @@ class SortingSettings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SortingStep:
-    """What one batched step gave; the arrays are overwritten by the next step."""
+    """Result of a step; the next step overwrites the arrays."""
 
     obs: Obs
     """Observations after the step, of new episodes where one ended, (n_envs, obs_size)."""
@@ -80,7 +80,7 @@ class SortingStep:
 
 
 def shape_of(cell: Cell) -> SortingShape:
-    """Return how large the sorting task of a cell is: its clutter cells and its towers.
+    """Return the shape of a cell's sorting task: clutter cells and towers.
 
     Raises:
         InvalidInput: The cell has no clutter cells or no clusters.
@@ -182,7 +182,7 @@ class SortingBatch:
         self._step: Callable[..., None] | None = None
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what a copy is made of; it finds its compiled kernel itself."""
+        """Return the state to pickle, without the compiled kernel."""
         return {**self.__dict__, "_step": None}
 
     @property

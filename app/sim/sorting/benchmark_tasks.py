@@ -1,7 +1,7 @@
-"""The six tests of the sorting task, as data: a start, and what a person does meanwhile.
+"""The six tests of the sorting task: initial states and interference of people.
 
 ========= ============= ================================================================
-name      K_E, K_G      what it asks
+name      K_E, K_G      content
 ========= ============= ================================================================
 test-1    5, 5          sort everything
 test-2    10, 10        the same with twice the objects
@@ -14,8 +14,8 @@ test-6    8, 3          three of one colour, then three of another as well
 Evaluations and the live cell use the same definitions. Colours go to their own tower, the
 largest object lowest.
 
-Source: thesis 3.4.3, METHOD 1.5. Deviates: how a test's objects are drawn is not printed; each
-draw here is such that the test shows what it is for, whatever the seed.
+Source: thesis 3.4.3, docs/method.md 1.5. Deviates: the thesis does not state how objects are
+drawn; here every draw contains the situation that the test is about.
 """
 
 from collections.abc import Callable, Iterable
@@ -30,21 +30,21 @@ from app.sim.core.arrays import Vec
 from app.sim.sorting.state import NULL, Codes, SortingShape, SortingState, empty_state
 
 Start = Callable[[SortingShape, Vec, Generator], SortingState]
-"""Draws a start from the size of the task and the failure probabilities, shape (K,)."""
+"""Draws an initial state from the shape and the failure probabilities, shape (K,)."""
 Change = Callable[[SortingState, SortingShape, Generator], SortingState]
-"""Draws what a state is after a person interfered."""
+"""Draws the state after an interference."""
 DRAWS = 100
-"""Goals drawn before the one that always serves is taken."""
+"""Draws of a goal before the default one is used."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Interference:
-    """What a person does in a test, and when."""
+    """Interference of a person in a test."""
 
     after_moves: int | None
-    """Moves done since the last interference, or None: once the goal is reached."""
+    """Moves since the last interference; None: at the goal."""
     text: str
-    """What they do, for people."""
+    """Description."""
     change: Change
     """The state afterwards."""
 
@@ -56,9 +56,9 @@ class SortingTest:
     name: str
     """``test-1`` to ``test-6``."""
     title: str
-    """What it asks, in a few words."""
+    """Short title."""
     text: str
-    """What happens, for people."""
+    """Description of the course."""
     n_objects: int
     """Objects at the start, ``K_E``."""
     n_goal: int
@@ -66,11 +66,11 @@ class SortingTest:
     start: Start
     """Draws the start."""
     expected: str
-    """What it shows where all goes well, for people."""
+    """Expected behaviour."""
     safer_duplicates: bool = False
     """Whether each pick shall take the safer one of two such objects."""
     interferences: tuple[Interference, ...] = ()
-    """What a person does, in this order."""
+    """Interferences in order."""
     n_added: int = 0
     """Objects that are added meanwhile."""
     min_colours: int = 1

@@ -1,10 +1,9 @@
-"""The next move of the sorting task, by a learned policy or by the exact planner (METHOD 1).
+"""Decision about the next sorting move, by a policy or the exact planner (docs/method.md 1).
 
-The policy decides by the greatest Q among the valid moves. The planner decides where there is
-no policy, where its shape or the goal is not what it was trained for, and where
-:mod:`app.sim.sorting.progress_monitor` hands over. The answer always says who decided and why,
-and ranks
-every valid move with the decider's own values.
+The policy selects the valid move of greatest Q. The planner decides without a policy, for
+shapes and goals outside the policy's training, and if
+:mod:`app.sim.sorting.progress_monitor` detects a loop or stall. The result names decision maker
+and reason, and ranks every valid move.
 """
 
 import time
@@ -28,9 +27,9 @@ from app.sim.sorting.sorting_values import SortingValues
 from app.sim.sorting.state import NULL, Codes, Move, SortingShape, SortingState, empty_state
 
 MAX_PLANNED = 20_000
-"""Most states that the planner may look at to value every move: about a millisecond."""
+"""Largest number of states for which the planner values every move, in about 1 ms."""
 MAX_AT_ONCE = 4_000
-"""Most states of a task for which a decision takes a moment: ``sorting-e1`` has fewer."""
+"""Largest number of states of a task with immediate decisions; ``sorting-e1`` has fewer."""
 
 
 def decide(
@@ -44,11 +43,11 @@ def decide(
     """Choose the next move.
 
     Args:
-        policy: Policy that decides as a rule; None: the planner decides.
-        state: The task now; ``sorting_state.check_state`` accepts it.
-        shape: How large the task is.
-        monitor: ``monitor`` of the decision before, in the same task; None at its beginning.
-        ask_planner: Whether the planner shall decide whatever the policy could.
+        policy: Policy; None: the planner decides.
+        state: Present state, valid by ``state.check_state``.
+        shape: Shape of the task.
+        monitor: ``monitor`` of the previous decision in the same task; None for the first one.
+        ask_planner: Whether the planner decides in any case.
     """
     begin = time.perf_counter()
     plan = solve(state, shape)

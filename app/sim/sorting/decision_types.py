@@ -1,8 +1,4 @@
-"""What a decision about the next sorting move says (METHOD 1).
-
-``sorting_decision.decide`` makes it, of a policy's values (``ports.SortingValues``) or of the
-exact planner's plan.
-"""
+"""Data of a decision about the next sorting move (docs/method.md 1)."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -22,7 +18,7 @@ Why = Literal[
     "repeated",
     "attempts-exceeded",
 ]
-"""Why it was the policy, or the planner; :data:`REASONS` says it in a sentence."""
+"""Reason for the decision maker; :data:`REASONS` holds the sentences."""
 REASONS: dict[Why, str] = {
     "policy": "The policy's values choose.",
     "solved": "The goal is reached: there is nothing to move.",
@@ -37,56 +33,56 @@ REASONS: dict[Why, str] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RankedMove:
-    """One valid move and what it is worth."""
+    """One valid move and its value."""
 
     action: int
-    """Its number, as ``SortingShape.move_of`` takes it."""
+    """Number of the action."""
     move: Move
-    """From where to where."""
+    """The move."""
     value: float | None
-    """Policy: Q, expected discounted reward. Planner: minus the attempts expected to the goal
-    if this move comes first; None where the task is too large to say so for every move."""
+    """Policy: Q, expected discounted return. Planner: minus the expected attempts to the goal
+    with this move first; None if the task is too large."""
     fewest: bool
     """Whether a plan of the fewest moves begins with it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OutsideGoal:
-    """One object of a goal such as no policy was trained for."""
+    """One object of a goal outside the training range."""
 
     tower: int
-    """Tower it is asked for on."""
+    """Tower of the object in the goal."""
     level: int
     """Level there, 0 the lowest."""
     rule: str
-    """What goals met in training keep to, as a sentence part."""
+    """Rule of training goals, as part of a sentence."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SortingDecision:
-    """The next move and all that explains it."""
+    """The next move and its explanation."""
 
     solved: bool
-    """Whether the goal is reached: then there is no move, nor anything ranked."""
+    """Whether the goal is reached; then there are no moves."""
     action: int | None
-    """The move chosen, by its number."""
+    """Number of the selected move."""
     move: Move | None
-    """The move chosen."""
+    """The selected move."""
     by: By
     """Decision maker."""
     why: Why
-    """Why it was this one."""
+    """Reason for the decision maker."""
     ranked: tuple[RankedMove, ...]
-    """All valid moves: by value, the best first; the planner's own choice is always first."""
+    """Valid moves by descending value; the planner's own choice is always first."""
     fewest_moves: int
-    """Moves to the goal at least, if no pick fails."""
+    """Least number of moves to the goal without failed picks."""
     expected_attempts: float
-    """Attempts to the goal to be expected of the exact planner, failed picks included."""
+    """Expected attempts of the exact planner, with failed picks."""
     outside: tuple[OutsideGoal, ...]
-    """What of the goal lies outside what policies are trained for."""
+    """Objects of the goal outside the training range."""
     checkpoint: str | None
-    """SHA-256 of the policy that was asked; None without one."""
+    """SHA-256 of the queried policy; None without one."""
     monitor: ProgressMonitor | None
-    """Record to hand back with the next state of this task; None when none is needed."""
+    """Record for the next decision in this task; None if not needed."""
     elapsed_ms: float
     """Time the decision took [ms]."""

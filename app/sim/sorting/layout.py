@@ -20,7 +20,7 @@ from app.sim.core.arrays import Vec
 from app.sim.sorting.state import MAX_CELLS, MAX_COLOURS
 
 APPROACH_M = 0.07
-"""How far above the point of a grasp the pick policy brings the tool [m]."""
+"""Height of the pick policy's target above a grasp [m]."""
 HALF_WIDTHS = (0.02, 0.03, 0.04)
 """Half of the width of small, medium and large blocks [m]."""
 
@@ -121,7 +121,7 @@ def half_size(cell: Cell, size: int, n_sizes: int) -> Vec:
     Args:
         cell: Sorting cell.
         size: 0 the smallest.
-        n_sizes: How many sizes there are.
+        n_sizes: Number of sizes.
     """
     share = size / (n_sizes - 1) if n_sizes > 1 else 0.5
     width = HALF_WIDTHS[0] + share * (HALF_WIDTHS[-1] - HALF_WIDTHS[0])

@@ -30,7 +30,7 @@ class SortingNames:
     """The words of one sorting task."""
 
     shape: SortingShape
-    """How large it is."""
+    """Size."""
     cells: tuple[str, ...]
     """Clutter cells, in the order of their positions."""
     towers: tuple[str, ...]
@@ -121,7 +121,7 @@ def state_from_names(
 
     Args:
         names: The words of the task.
-        objects: What is where.
+        objects: Positions of the objects.
         goal: Colour (None: the tower's own) and size by level, from the bottom, by tower.
             Towers that are not named shall be empty.
         fail: Failure probability of a pick from each clutter cell, shape (K,).

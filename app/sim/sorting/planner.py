@@ -1,17 +1,14 @@
-"""The exact planner of the sorting task: fewest moves, all best next moves, a plan of low risk.
+"""Exact planner of the sorting task: fewest moves, with few expected attempts.
 
-A failed pick leaves the state as it is, so an expected pick costs ``1 / (1 - p)`` attempts, and
-the fewest moves do not depend on failures: they are shortest paths over the progress of the
-towers (:mod:`app.sim.sorting.kernels.shortest_paths`). Fewest moves are exact. Among plans
-with the
-fewest moves the planner keeps expected attempts low by rules
-(:mod:`app.sim.sorting.kernels.planner`); a plan with more moves and fewer expected attempts is
-not looked for.
+A failed pick does not change the state, so a pick costs ``1 / (1 - p)`` attempts on average and
+the fewest moves, shortest paths over the progress of the towers
+(:mod:`app.sim.sorting.kernels.shortest_paths`), do not depend on failures. Among plans with the
+fewest moves, rules (:mod:`app.sim.sorting.kernels.planner`) select one with few expected
+attempts. Plans with more moves and fewer attempts are not considered.
 
-Outside its model: localisation failures (another object is moved than the one meant), and
-whatever people do. Both only change the state, and from any state it plans again.
+Localisation failures and people are not modelled; the planner replans from the changed state.
 
-Source: METHOD 1.2. Deviates: the thesis has no planner; its baseline is learned.
+Source: docs/method.md 1.2. Deviates: the thesis has no planner; its baseline is learned.
 """
 
 from dataclasses import dataclass
@@ -26,20 +23,20 @@ from app.sim.sorting.state import Move, SortingShape, SortingState, missing
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plan:
-    """What the planner knows of a state."""
+    """Plan of a state."""
 
     moves: int
     """Fewest moves to the goal."""
     attempts: float
     """Expected attempts of the plan it follows, ``sum 1 / (1 - p)`` over its picks."""
     first: tuple[int, ...]
-    """Every action with which some plan of the fewest moves begins, ascending."""
+    """First actions of all plans with the fewest moves, ascending."""
     best: int | None
-    """The one of them it takes, None where the goal is reached."""
+    """First action of the selected plan; None at the goal."""
 
 
 def _solve(state: SortingState, shape: SortingShape) -> tuple[Plan, PlannerWork]:
-    """Return what is known of a state, and the work space that holds the plan."""
+    """Return the plan of a state, and the work space that holds it."""
     work = new_work(shape.n_cells, shape.n_colours, shape.n_sizes)
     heights = np.count_nonzero(state.towers, axis=1)
     task = Task(state.goal, np.count_nonzero(state.goal, axis=1), state.fail)
@@ -57,7 +54,7 @@ def _solve(state: SortingState, shape: SortingShape) -> tuple[Plan, PlannerWork]
 
 
 def _cannot_be_met(state: SortingState, shape: SortingShape) -> InvalidInput:
-    """Return why there is no plan."""
+    """Return the error of a goal without a plan."""
     lack = missing(state, shape)
     if not lack.any():
         return InvalidInput("objects", state.n_objects, f"must be at most {shape.n_cells}")

@@ -1,12 +1,11 @@
-"""The state of the sorting task as integers, and its moves (METHOD 1.1 and 1.2).
+"""State of the sorting task as integers, and its moves (docs/method.md 1.1 and 1.2).
 
-An object is a *code*: 0 is the null object that fills every free place, others are ``1 +
-colour * n_sizes + size``, sizes from the smallest. Objects of one code are duplicates: a goal
-names a code, not an object. There are ``K`` clutter cells and one tower per colour, with ``K``
-levels each; towers have no gaps. Any object may stand on any tower.
+An object is a *code*: 0 for a free place, others ``1 + colour * n_sizes + size``, with sizes
+from the smallest. Objects of one code are duplicates. There are ``K`` clutter cells and one
+tower per colour with ``K`` levels and no gaps, for any objects.
 
-A position is a number: ``k`` a clutter cell, ``K + c`` the top of tower ``c``. Moves are
-numbered without gaps, so that a network's outputs are the moves:
+Position ``k`` is a clutter cell, ``K + c`` the top of tower ``c``. Moves are numbered as the
+outputs of a network:
 
 | action | move |
 |---|---|
@@ -14,8 +13,8 @@ numbered without gaps, so that a network's outputs are the moves:
 | ``K * C + c * K + k`` | top of tower ``c`` to clutter cell ``k`` |
 | ``2 * K * C + c * C + d`` | top of tower ``c`` to ``d``; ``c == d`` is the *stuck* move |
 
-Source: thesis eq. (3.7)-(3.17). Deviates: tower to tower is a move (METHOD 1.2), and colours
-never count the null colour (METHOD 1.1).
+Source: thesis eq. (3.7)-(3.17). Deviates: tower to tower is a move (docs/method.md 1.2), and
+the number of colours excludes the null colour (1.1).
 """
 
 from dataclasses import dataclass
@@ -30,11 +29,11 @@ Codes = NDArray[np.int8]
 """Objects by code."""
 
 MAX_CELLS = 40
-"""Most clutter cells, and most objects."""
+"""Largest number of clutter cells and of objects."""
 MAX_COLOURS = 5
-"""Most colours, and most towers."""
+"""Largest number of colours and of towers."""
 MAX_SIZES = 5
-"""Most sizes."""
+"""Largest number of sizes."""
 NULL = 0
 """Code of the null object."""
 SIZE_NAMES = {
@@ -46,7 +45,7 @@ SIZE_NAMES = {
 }
 """Names of sizes by their number, from the smallest."""
 MAX_FAILURE = 0.99
-"""Greatest failure probability of a pick: at 1 no plan would end."""
+"""Largest failure probability of a pick; at 1 plans would not end."""
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -54,25 +53,25 @@ class Move:
     """Pick the object at one position and place it at another."""
 
     pick: int
-    """Position it is taken from."""
+    """Position of the pick."""
     place: int
-    """Position it is put on."""
+    """Position of the place."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SortingShape:
-    """How large a sorting task is.
+    """Shape of a sorting task.
 
     Raises:
         InvalidInput: A number outside its bounds.
     """
 
     n_cells: int
-    """Clutter cells, ``K``: most objects, and levels of a tower."""
+    """Number ``K`` of clutter cells, of levels of a tower, and largest number of objects."""
     n_colours: int
-    """Colours, ``C``: towers; the null colour is not counted."""
+    """Number ``C`` of colours and towers."""
     n_sizes: int = 3
-    """Sizes, ``S``."""
+    """Number ``S`` of sizes."""
 
     def __post_init__(self) -> None:
         for name, value, most in (
@@ -149,7 +148,7 @@ class SortingState:
     towers: Codes
     """Objects on the towers, lowest level first, shape (C, K)."""
     goal: Codes
-    """What the towers shall be, shape (C, K)."""
+    """Goal of the towers, shape (C, K)."""
     fail: Vec
     """Failure probability of a pick from each clutter cell, shape (K,)."""
 
@@ -181,12 +180,12 @@ def empty_state(shape: SortingShape) -> SortingState:
 
 
 def code_counts(codes: Codes, shape: SortingShape) -> NDArray[np.int64]:
-    """Return how many objects of each code there are; index 0 counts free places."""
+    """Return the number of objects per code; index 0: free places."""
     return np.bincount(codes.ravel().astype(np.int64), minlength=shape.n_types + 1)
 
 
 def missing(state: SortingState, shape: SortingShape) -> NDArray[np.int64]:
-    """Return how many objects of each code the goal asks for beyond those there are."""
+    """Return the number of missing objects per code of the goal."""
     there = code_counts(state.clutter, shape) + code_counts(state.towers, shape)
     lack = np.maximum(code_counts(state.goal, shape) - there, 0)
     lack[NULL] = 0

@@ -1,4 +1,4 @@
-"""Walks of the cylinder of METHOD 2.1: bounds, turns, rests, variants, coverage."""
+"""Walks of the cylinder of docs/method.md 2.1: bounds, turns, rests, variants, coverage."""
 
 import dataclasses
 

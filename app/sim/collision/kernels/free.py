@@ -84,7 +84,7 @@ def clearances_at(
 
 @kernel()
 def spare_clearance(arm: Arm, q: Vec, obstacles: Obstacles, pose: RobotPose) -> float:
-    """Return how far any point of the robot may move before a margin is violated [m].
+    """Return the distance any point of the robot can move before a margin is violated [m].
 
     Two parts of the robot that approach each other both move, so theirs counts half.
     """

@@ -16,7 +16,7 @@ from app.sim.core.jit import FAST, kernel
 _QUARTER_HIGH = 1.5707963267341256
 """The leading bits of pi / 2, so that its multiples are exact."""
 _QUARTER_LOW = 6.077100506506192e-11
-"""What is left of pi / 2."""
+"""Remainder of pi / 2."""
 
 
 @kernel(inline="always", error_model="numpy", fastmath=FAST)

@@ -109,7 +109,7 @@ def arms_to_angles(upper: Vec, toward: Vec, side: float, out: Vec) -> None:
 
     Args:
         upper: Shoulder to elbow in the torso, unit vectors, shape (n, 3).
-        toward: Where the elbow bends to, normal to ``upper``, shape (n, 3).
+        toward: Direction of the elbow's bend, normal to ``upper``, shape (n, 3).
         side: -1 right, 1 left.
         out: Filled.
     """

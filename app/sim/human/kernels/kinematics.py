@@ -40,7 +40,7 @@ MEDIAN_HEAD = 0.17
 HAND_TIP = 0.15
 """Wrist to the end of the median hand's capsule [m], without its rounding."""
 HIP_DROP = 0.05
-"""How far the legs begin below the pelvis [m]."""
+"""Height of the pelvis above the upper ends of the legs [m]."""
 
 N_POINTS = 14
 (

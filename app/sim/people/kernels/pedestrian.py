@@ -89,13 +89,12 @@ PAST_S = 0.1
 AGE = RADIUS + N_CONSTANTS
 PAST_RADIUS = AGE + 1
 PAST_SPEED = PAST_RADIUS + N_PAST
-"""What is remembered: how long ago the newest moment was [s], radii [m] and speeds [m/s], the
-newest first."""
+"""History: age of the newest sample [s], radii [m] and speeds [m/s], newest first."""
 N_STATE = PAST_SPEED + N_PAST
 
 
 class PedestrianRules(NamedTuple):
-    """How each of a cell's W walkers walks."""
+    """Motion of each of a cell's W walkers."""
 
     rows: Vec
     """Rules named above, shape (W, N_RULES)."""
@@ -118,7 +117,7 @@ def wave(rows: Vec, e: int, p: int, first: int, t: float) -> float:
         rows: State of all walkers, shape (n_envs, W, N_STATE).
         e: Environment.
         p: Walker.
-        first: Where the constants of the function start, SPEED or RADIUS.
+        first: Index of the function's first constant, SPEED or RADIUS.
         t: Time since the start [s].
     """
     turns = rows[e, p, first + FREQUENCY] * t
@@ -177,7 +176,7 @@ def start_pedestrian(
     caller draws again: that is a rule of the scenario (docs/method.md 2.1, open).
 
     Args:
-        rules: How the walkers walk.
+        rules: Motion of the walkers.
         state: The walkers; (e, p) is written.
         e: Environment.
         p: Walker.
@@ -213,7 +212,7 @@ def advance_pedestrian(
     """Move one walker on by one control period, never past its target.
 
     Args:
-        rules: How the walkers walk.
+        rules: Motion of the walkers.
         state: The walkers; (e, p) is changed.
         e: Environment.
         p: Walker.

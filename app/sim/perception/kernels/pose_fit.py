@@ -1,4 +1,4 @@
-"""The 18 joint angles of a person from key-points, compiled; see ``keypoint_angles.py``."""
+"""Joint angles of a person from key-points (compiled); see ``keypoint_angles.py``."""
 
 import math
 from typing import NamedTuple
@@ -21,23 +21,23 @@ from app.sim.human.kernels.joint_angles import (
 
 NECK, MID_HIP, HIP_R, HIP_L = 1, 8, 9, 12
 SHOULDERS = (2, 5)
-"""Right and left shoulder in BODY_25; elbow and wrist come after each."""
+"""Right and left shoulder in BODY_25; elbow and wrist follow each."""
 POLE_MEMORY = 0.04
-"""Distance of the elbow from the line shoulder - wrist below which its last direction counts
-too, the more the nearer [m]: with a nearly straight arm the seen one is all noise."""
+"""Distance of the elbow from the line shoulder - wrist below which its previous direction is
+blended in [m], since noise dominates the measured one of a nearly straight arm."""
 
 Mask = NDArray[np.bool_]
 
 
 class FitSpace(NamedTuple):
-    """Work space of a fit; made once."""
+    """Work space of a fit."""
 
     trig: Vec
-    """Shape (3, 16)."""
+    """Sines and cosines, shape (3, 16)."""
     joints: Vec
-    """The model's points [m], shape (body.N_POINTS, 3)."""
+    """Points of the model [m], shape (body.N_POINTS, 3)."""
     frames: Vec
-    """Its orientations, shape (body.N_FRAMES, 3, 3)."""
+    """Orientations of the model, shape (body.N_FRAMES, 3, 3)."""
 
 
 def new_fit_space() -> FitSpace:
@@ -104,7 +104,7 @@ def _inside(rot: Vec, a: Point) -> Point:
 
 @kernel(inline="always")
 def _either(points: Vec, middle: int, right: int, left: int) -> Point:
-    """Return a middle point, or what its two sides say where it is missing."""
+    """Return a middle point, or the mean of its two sides if it is missing."""
     here = _row(points, middle)
     if _unknown(here):
         here = _times(0.5, _plus(_row(points, right), 1.0, _row(points, left)))
@@ -125,7 +125,7 @@ def _across(points: Vec, right: int, left: int, middle: int) -> Point:
 
 @kernel(inline="always")
 def _near(angle: float, before: float, most: float) -> float:
-    """Return the angle by whole turns nearest to the last one, inside the yaw's limit."""
+    """Return the equivalent angle nearest to the previous one, inside the yaw's limit."""
     angle += 2.0 * math.pi * np.rint((before - angle) / (2.0 * math.pi))
     if abs(angle) > most:
         angle -= math.copysign(2.0 * math.pi, angle)
@@ -142,16 +142,16 @@ def _clip(q: Vec, first: int, last: int, q_min: Vec, q_max: Vec) -> None:
 def fit_joints(
     points: Vec, size: Vec, q_min: Vec, q_max: Vec, space: FitSpace, q: Vec, held: Mask
 ) -> None:
-    """Write the joint positions that fit key-points best, limb by limb.
+    """Write the joint positions that fit key-points, limb by limb.
 
     Args:
         points: Key-points [m], shape (25, 3), NaN where missing.
-        size: The person's size [m], shape (12,).
+        size: Body size [m], shape (12,).
         q_min: Lower joint limits [m, rad], shape (18,).
         q_max: Upper joint limits [m, rad], shape (18,).
         space: Work space.
-        q: The last joint positions; overwritten by the new ones [m, rad], shape (18,).
-        held: Overwritten: joints without key-points, which keep their value, shape (18,).
+        q: Previous joint positions, replaced by the new ones [m, rad], shape (18,).
+        held: Whether a joint keeps its value for lack of key-points; written, shape (18,).
     """
     for j in range(18):
         held[j] = False
@@ -169,7 +169,7 @@ def fit_joints(
         side, first = (-1.0, 6) if arm == 0 else (1.0, 8)
         direction = _minus(_row(points, SHOULDERS[arm]), _row(points, NECK))
         bar, length = _inside(torso, direction), _length(direction)
-        if not length > 1e-6:  # NaN, or all in one place.
+        if not length > 1e-6:  # NaN or coincident
             held[first] = held[first + 1] = True
             continue
         out = max(side * bar[1], 1e-6)
@@ -187,10 +187,10 @@ def _fit_trunk(points: Vec, spine: Point, most_yaw: float, q: Vec, held: Mask) -
 
     Args:
         points: Key-points [m], shape (25, 3).
-        spine: From pelvis to neck [m], NaN where unknown.
+        spine: Vector from pelvis to neck [m], NaN where unknown.
         most_yaw: Limit of the yaw [rad].
-        q: Joint positions, ``q[2:6]`` are written where seen, shape (18,).
-        held: Which are held; written, shape (18,).
+        q: Joint positions; ``q[2:6]`` are written where known, shape (18,).
+        held: As in :func:`fit_joints`, shape (18,).
     """
     hips = _across(points, HIP_R, HIP_L, MID_HIP)
     shoulders = _across(points, SHOULDERS[0], SHOULDERS[1], NECK)
@@ -198,10 +198,10 @@ def _fit_trunk(points: Vec, spine: Point, most_yaw: float, q: Vec, held: Mask) -
         q[2] = _near(heading(hips[0], hips[1]), q[2], most_yaw)
     else:
         held[2] = True
-        if not _unknown(shoulders):  # The hips are hidden: the trunk keeps its twist.
+        if not _unknown(shoulders):  # hidden hips: constant twist
             q[2] = _near(heading(shoulders[0], shoulders[1]) - q[5], q[2], most_yaw)
     length = _length(spine)
-    if not length > 1e-6:  # NaN, or all in one place.
+    if not length > 1e-6:  # NaN or coincident
         held[3] = held[4] = held[5] = True
         return
     c, s = math.cos(q[2]), math.sin(q[2])
@@ -234,7 +234,7 @@ def _fit_arm(
 ) -> None:
     """Write flexion, abduction, rotation and elbow of one arm, 0 right or 1 left.
 
-    The model stands in ``space`` with the arm's last angles.
+    ``space`` holds the model with the arm's previous angles.
     """
     first, side = (10, -1.0) if arm == 0 else (14, 1.0)
     torso = space.frames[body.F_TORSO]
@@ -274,7 +274,7 @@ def _fit_arm(
 
 @kernel(inline="always")
 def _pole(line: Point, elbow: Point, last: Point, torso: Vec) -> Point:
-    """Return the unit vector, normal to ``line``, toward which the elbow points."""
+    """Return the unit vector from ``line`` to the elbow, normal to the line."""
     pole = _plus(elbow, -_dot(elbow, line), line)
     weight = max(0.0, POLE_MEMORY - _length(pole))
     for k in range(3):
@@ -287,7 +287,7 @@ def _pole(line: Point, elbow: Point, last: Point, torso: Vec) -> Point:
         if length > 1e-6:
             pole = _plus(pole, weight / length, across)
             break
-    if _length(pole) < 1e-9:  # Seen and last direction are opposite and equal.
+    if _length(pole) < 1e-9:  # opposite measured and previous directions
         y = (torso[0, 1], torso[1, 1], torso[2, 1])
         if abs(_dot(line, y)) >= 0.9:
             y = (torso[0, 2], torso[1, 2], torso[2, 2])
@@ -306,20 +306,20 @@ def _write_shoulder(
     q_max: Vec,
     q: Vec,
 ) -> None:
-    """Write the shoulder's three angles.
+    """Write the three angles of a shoulder.
 
-    Two triples of angles turn an arm alike; the one inside the limits counts, of two the
-    nearer to the last.
+    Of the two equivalent triples, the one inside the limits or nearer to the previous one is
+    selected.
 
     Args:
         upper: Direction of the upper arm in the torso.
-        toward: Where the elbow bends to, normal to it.
-        bends: Whether that is known; the rotation stays where not.
+        toward: Direction of the elbow's bend, normal to ``upper``.
+        bends: Whether ``toward`` is known; otherwise the rotation is kept.
         side: -1 right, 1 left.
         first: Index of the flexion.
         q_min: Lower limits, shape (18,).
         q_max: Upper limits, shape (18,).
-        q: Last joint positions; ``q[first:first + 3]`` is written.
+        q: Previous joint positions; ``q[first:first + 3]`` is written.
     """
     flex, lift = arm_lift(upper)
     best, least = (q[first], q[first + 1], q[first + 2]), math.inf

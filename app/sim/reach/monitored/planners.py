@@ -18,7 +18,7 @@ from app.sim.robot.kernels.arm import Arm
 from app.sim.scenario.kernels.episode import RUNNING
 
 GOAL_SPREAD = 0.08
-"""How far from the goal a planner's postures have the tcp [m]; success counts within 0.1."""
+"""Largest distance of the tcp from the goal at a planner's goal configurations [m]."""
 
 
 def postures_of(arm: Arm, goals: Vec, seed: int) -> list[Vec]:

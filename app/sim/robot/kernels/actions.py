@@ -42,9 +42,9 @@ class Coefficients(NamedTuple):
     """Coefficients of one period's trajectory, each of shape (6,)."""
 
     c: Vec
-    """Of x^2 [rad/s^2]."""
+    """Coefficients of x^2 [rad/s^2]."""
     d: Vec
-    """Of x^3 [rad/s^3]; 0 for degree 2."""
+    """Coefficients of x^3 [rad/s^3]; 0 for degree 2."""
 
 
 @kernel(error_model="numpy", inline="always")

@@ -57,7 +57,7 @@ def ramp_sum(a: float, step: float) -> float:
 
 @kernel(error_model="numpy")
 def ramp_start(total: float, step: float) -> tuple[float, float]:
-    """Return where a ramp with a given sum starts, and its number of full steps.
+    """Return start and number of full steps of a ramp with a given sum.
 
     Args:
         total: Sum of the ramp's accelerations [rad/s^2], at least 0.
@@ -88,7 +88,7 @@ def settling_jerk(qd_off: float, qdd: float, acc: float, jerk: float, dt: float)
 
 @kernel(error_model="numpy")
 def ramp_steps(qdd: float, y: float, acc: float, step: float, dt: float) -> float:
-    """Return how many full steps down the manoeuvre takes before anything else.
+    """Return the number of full steps down at the start of the manoeuvre.
 
     A step from ``a`` to ``b = a - step`` is full while ``b >= -acc`` and ``y/T + F(b) > 0``:
     even after it the ramp to zero would not brake enough. The left side stays the same while
@@ -180,7 +180,7 @@ def _from_above(
 def manoeuvre_extremes(
     qd: float, qdd: float, acc: float, jerk: float, dt: float
 ) -> tuple[float, float, float, float]:
-    """Return how far and how fast a joint goes that brakes from now on, at any time.
+    """Return the largest position and speed of a joint that brakes from now on.
 
     Args:
         qd: Speed [rad/s].

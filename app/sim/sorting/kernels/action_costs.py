@@ -1,7 +1,7 @@
-"""What every valid move of the sorting task is worth to the exact planner, compiled.
+"""Expected attempts of the exact planner per first move (compiled).
 
-A move that comes first costs ``1 / (1 - p)`` attempts, ``p`` the failure probability of its
-pick, and then what a plan by the rules from the state it gives costs.
+A first move costs ``1 / (1 - p)`` attempts, with the failure probability ``p`` of its pick, and
+the attempts of a plan by the rules from the resulting state.
 """
 
 from app.sim.core.arrays import Vec
@@ -34,10 +34,10 @@ def _shift(source: int, target: int, objects: Objects) -> None:
 def attempts_by_move(
     objects: Objects, task: Task, moves: Ints, most: int, work: PlannerWork, attempts: Vec
 ) -> bool:
-    """Write the attempts expected to the goal by the move that comes first.
+    """Write the expected attempts to the goal per first move.
 
     Args:
-        objects: Where the objects are; as before at the end.
+        objects: Positions of the objects; restored at the end.
         task: What is asked for.
         moves: Valid moves as positions to pick and to place, shape (n, 2).
         most: States of the planner, over all moves, beyond which nothing is written.

@@ -1,4 +1,4 @@
-"""How episodes of the sorting task are drawn (METHOD 1.4).
+"""Initial states of sorting episodes (docs/method.md 1.4, compiled).
 
 The number of objects ``K_E`` is triangular on 1 to ``K`` with its mode at ``K``, the number in
 the goal ``K_G`` triangular on 1 to ``K_E`` with its mode at ``K_E``. Objects are drawn evenly
@@ -28,7 +28,7 @@ from app.sim.sorting.kernels.task import (
 )
 
 TRIES = 50
-"""Starts that are drawn before one without disturbance is taken."""
+"""Draws of a disturbed start before an undisturbed one is used."""
 
 
 @kernel()
@@ -51,7 +51,7 @@ def write_goal(rows: SortingRows, rules: SortingRules, e: int, wanted: Ints) -> 
         rows: Rows.
         rules: Rules.
         e: Row.
-        wanted: How many of each code, shape (types + 1,).
+        wanted: Number of objects per code, shape (types + 1,).
     """
     n_sizes = rules.n_sizes
     for c in range(rows.goal.shape[1]):
@@ -72,8 +72,8 @@ def draw_codes(rng: random.State, there: Ints, n: int, wanted: Ints) -> None:
 
     Args:
         rng: Random stream.
-        there: How many there are of each code, shape (types + 1,).
-        n: How many are drawn, at most those there are.
+        there: Number of existing objects per code, shape (types + 1,).
+        n: Number of draws, at most that of existing objects.
         wanted: Filled with how many of each code were drawn.
     """
     left = 0
@@ -157,7 +157,7 @@ def start_row(rows: SortingRows, rules: SortingRules, seed: int, row: int, e: in
 
     Args:
         rows: Rows; changed.
-        rules: How episodes start.
+        rules: Starts of episodes.
         seed: Seed of the batch.
         row: Number of the row in the random streams.
         e: Row.

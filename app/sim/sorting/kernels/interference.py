@@ -1,8 +1,8 @@
-"""What people do to a sorting task while the robot works (METHOD 1.2).
+"""Interference of people with a sorting task (docs/method.md 1.2, compiled).
 
-A person adds an object to the clutter, takes one away that the goal can spare, moves one from a
-clutter cell or the top of a tower to a free cell, or changes the goal; each as likely as the
-others. Every goal stays one that the objects can meet.
+With equal probability, a person adds an object to the clutter, removes one that the goal does
+not need, moves one from a clutter cell or the top of a tower to a free cell, or changes the
+goal. Goals remain feasible.
 """
 
 from app.sim.core.jit import kernel
@@ -19,7 +19,7 @@ from app.sim.sorting.kernels.task import (
 )
 
 GOAL_TRIES = 20
-"""Goals that are drawn before the old one stays."""
+"""Draws of a goal before the old one is kept."""
 
 
 @kernel()

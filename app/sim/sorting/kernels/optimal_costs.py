@@ -1,4 +1,4 @@
-"""What the exact planner needs from where many sorting tasks are, in one call."""
+"""Moves and expected attempts of the exact planner for many sorting tasks (compiled)."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +16,11 @@ def measure_rows(
     fewest: Ints,
     attempts: NDArray[np.float64],
 ) -> None:
-    """Write the fewest moves to the goal, and the attempts the planner expects for its plan.
+    """Write the fewest moves to the goal and the expected attempts of the plan.
 
     Args:
         rows: Rows of all tasks.
-        which: Rows that are measured, shape (m,).
+        which: Rows to evaluate, shape (m,).
         work: Work space of the shape.
         fewest: Fewest moves, -1 where the goal cannot be met, shape (m,), written.
         attempts: Expected attempts, shape (m,), written.

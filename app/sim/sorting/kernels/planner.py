@@ -1,13 +1,10 @@
-"""Exact plans of the sorting task: next moves for batches, whole plans and risk, compiled.
+"""Exact plans of the sorting task (compiled).
 
-A pick from cell ``k`` fails with probability ``fail[k]`` and leaves everything as it is, so it
-takes ``1 / (1 - fail[k])`` attempts on average, and a plan's expected attempts are the sum over
-its picks; picks from towers do not fail. Fewest moves come first. Of the plans with the fewest
-moves one with few expected attempts is found by rules
-(:mod:`app.sim.sorting.kernels.tie_breaking`)
-and by looking ahead: wherever the rules put an object aside that will be wanted again, each
-other way to put one aside is tried, the rules finish the plan, and the best one is taken.
-``tools/docs/planner_optimality.py`` compares it with the fewest expected attempts.
+A pick from cell ``k`` takes ``1 / (1 - fail[k])`` attempts on average; picks from towers do not
+fail. Among plans with the fewest moves, one with few expected attempts is found by rules
+(:mod:`app.sim.sorting.kernels.tie_breaking`) and one-step rollouts: where the rules put aside
+an object that is needed later, every alternative is simulated with the rules, and the best is
+selected. ``tools/docs/planner_optimality.py`` compares the result with the optimum.
 """
 
 from typing import NamedTuple
@@ -36,15 +33,15 @@ from app.sim.sorting.kernels.tie_breaking import (
 )
 
 MAX_STATES = 20_000
-"""Tasks with more states are planned by the rules alone: looking ahead would take seconds."""
+"""Largest number of states with rollouts; larger tasks would take seconds."""
 LESS = 1e-9
-"""Attempts by which a plan must be better to be preferred."""
+"""Least reduction of attempts by a preferred plan."""
 CELLS_TRIED = 3
-"""How many of the best free cells are tried for an object put aside, besides the worst one."""
+"""Number of best free cells tried for an object put aside, besides the worst one."""
 
 
 class Objects(NamedTuple):
-    """Where the objects are, while a plan is followed."""
+    """Positions of the objects in a plan."""
 
     clutter: Bytes
     """Objects in the cells, shape (K,)."""
@@ -55,29 +52,29 @@ class Objects(NamedTuple):
 
 
 class Task(NamedTuple):
-    """What is asked for, and at which risk."""
+    """Goal and failure probabilities."""
 
     goal: Bytes
-    """What the towers shall be, shape (C, K)."""
+    """Goal of the towers, shape (C, K)."""
     goal_heights: Ints
-    """Objects per tower there, shape (C,)."""
+    """Objects per tower of the goal, shape (C,)."""
     fail: Vec
     """Failure probabilities of the cells, shape (K,)."""
 
 
 class PlannerWork(NamedTuple):
-    """Work space of the planner; made once, for any task of its shape."""
+    """Work space of the planner for one shape."""
 
     paths: ShortestPaths
     """States of the task."""
     at: Ints
     """Work space of sweeps, shape (C,)."""
     now: Objects
-    """Where the objects are on the plan that is followed."""
+    """Objects along the present plan."""
     trial: Objects
-    """Where they are on a plan that is tried."""
+    """Objects along an alternative plan."""
     first: NDArray[np.bool_]
-    """Marks of the actions with which some shortest plan begins, shape (n_actions,)."""
+    """Whether some shortest plan begins with each action, shape (n_actions,)."""
     actions: Ints
     """The plan that was followed, then -1, shape (4 K + 1,)."""
 
@@ -196,7 +193,7 @@ def _try(action: int, best: float, task: Task, work: PlannerWork) -> float:
     Args:
         action: First action, from where the objects are now.
         best: Expected attempts that would have to be less for it to be taken.
-        task: What is asked for.
+        task: Goal and failure probabilities.
         work: Work space; its states fit where the objects are now, and do so again.
     """
     p = work.paths
@@ -233,7 +230,7 @@ def _try_cells(c: int, best: float, task: Task, work: PlannerWork) -> tuple[int,
     Args:
         c: The tower.
         best: Expected attempts that would have to be less.
-        task: What is asked for.
+        task: Goal and failure probabilities.
         work: Work space; its states fit where the objects are now.
 
     Returns:
@@ -277,7 +274,7 @@ def _best_of_alternatives(task: Task, work: PlannerWork) -> int:
     """Return the next action of the plan, -1 at the goal.
 
     Args:
-        task: What is asked for.
+        task: Goal and failure probabilities.
         work: Work space; its states fit where the objects are now.
     """
     p, now = work.paths, work.now
@@ -312,7 +309,7 @@ def next_action(size: int, task: Task, work: PlannerWork) -> int:
 
     Args:
         size: Number of states.
-        task: What is asked for.
+        task: Goal and failure probabilities.
         work: Work space; its states fit where the objects are now.
     """
     if size > MAX_STATES:
@@ -325,8 +322,8 @@ def plan_state(objects: Objects, task: Task, work: PlannerWork) -> tuple[int, fl
     """Plan one state to its end.
 
     Args:
-        objects: Where the objects are.
-        task: What is asked for.
+        objects: Positions of the objects.
+        task: Goal and failure probabilities.
         work: Work space; ``first`` and ``actions`` are written.
 
     Returns:
@@ -356,8 +353,8 @@ def plan_by_rules(objects: Objects, task: Task, work: PlannerWork) -> tuple[int,
     """Plan one state by the rules alone: as many moves, sometimes a few more attempts.
 
     Args:
-        objects: Where the objects are.
-        task: What is asked for.
+        objects: Positions of the objects.
+        task: Goal and failure probabilities.
         work: Work space.
 
     Returns:

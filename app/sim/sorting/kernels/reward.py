@@ -1,8 +1,8 @@
-"""The terms of the sorting reward (METHOD 1.3), each a function of its own.
+"""Terms of the sorting reward (docs/method.md 1.3, compiled).
 
 ``R = r_move + r_empty + r_stuck + r_fail + r_back + r_dist + r_succ``. All but the last are
-costs. The coefficients are open in the source; those of :class:`SortingWeights` keep the plan
-of fewest moves and least risk optimal, which value iteration checks on small instances
+costs. The source does not state coefficients; with those of :class:`SortingWeights` the plan of
+fewest moves and least risk is optimal, as value iteration verifies on small instances
 (``tests/sim/test_sorting_reward.py``).
 
 Source: thesis eq. (3.18), (3.19).
@@ -20,23 +20,23 @@ class SortingWeights(NamedTuple):
     """Coefficients of the reward; costs are given as positive numbers."""
 
     move: float = 0.05
-    """Cost of an attempt, whatever comes of it."""
+    """Cost of an attempt."""
     empty: float = 0.3
-    """Cost of picking where nothing is."""
+    """Cost of picking from an empty position."""
     stuck: float = 0.3
-    """Cost of putting an object back where it was, or where no room is."""
+    """Cost of placing an object at its old or at an occupied position."""
     fail: float = 0.01
-    """Cost of a pick that failed, or moved another object than was meant."""
+    """Cost of a failed pick or of moving another object."""
     back: float = 0.01
-    """Cost of sending an object from a tower back to the clutter."""
+    """Cost of moving an object from a tower to the clutter."""
     distance: float = 0.01
-    """Cost per share of the levels, of K, that differ from the goal after the attempt."""
+    """Cost of the share of K levels that differ from the goal after the attempt."""
     success: float = 1.0
-    """Bonus when every tower is as the goal asks."""
+    """Bonus at the goal."""
     colour: float = 0.5
-    """Share of a level's distance that a wrong colour makes."""
+    """Share of a wrong colour in a level's distance."""
     size: float = 0.5
-    """Share of a level's distance that a wrong size makes."""
+    """Share of a wrong size in a level's distance."""
 
 
 @kernel(inline="always")
@@ -77,7 +77,7 @@ def distance_cost(
 
     Args:
         towers: Objects on the towers, shape (C, K).
-        goal: What they shall be, shape (C, K).
+        goal: Goal of the towers, shape (C, K).
         n_sizes: Number of sizes.
         weights: Coefficients.
     """

@@ -22,7 +22,7 @@ five. In a shortest plan the lowest object so taken from ``a`` goes straight ont
 ``cut`` is the lowest level for which such ``b`` and ``e`` exist; mostly there are none, ``cut``
 is ``m``, states follow one another in one order and one sweep is enough.
 
-Source: METHOD 1.2; tests compare the number of moves with breadth-first search.
+Source: docs/method.md 1.2; tests compare the number of moves with breadth-first search.
 """
 
 from typing import NamedTuple
@@ -44,7 +44,7 @@ class ShortestPaths(NamedTuple):
     n: Ints
     """Number of states of each tower, shape (C,)."""
     stride: Ints
-    """What one step of each tower adds to a state's number, shape (C,)."""
+    """Increment of the state's number per step of each tower, shape (C,)."""
     junk: Ints
     """Objects above the matching levels at the start, ``R``, shape (C,)."""
     match: Ints
@@ -72,7 +72,7 @@ class ShortestPaths(NamedTuple):
 
 
 def most_states(n_cells: int, n_colours: int) -> int:
-    """Return how many states a task can have: removals and goals are at most K objects each."""
+    """Return the largest number of states of a task, with K removals and K goals."""
     each, more = divmod(2 * n_cells, n_colours)
     return int((each + 2) ** more * (each + 1) ** (n_colours - more))
 
@@ -223,7 +223,7 @@ def lay_out(
         clutter: Objects in the cells, shape (K,).
         towers: Objects on the towers, lowest first, shape (C, K).
         heights: Objects per tower, shape (C,).
-        goal: What the towers shall be, shape (C, K).
+        goal: Goal of the towers, shape (C, K).
         goal_heights: Objects per tower there, shape (C,).
         p: The states, written.
 
@@ -320,7 +320,7 @@ def state_number(p: ShortestPaths) -> int:
 
 @kernel()
 def in_clutter(index: int, code: int, p: ShortestPaths) -> int:
-    """Return how many objects of a code lie in the clutter in a state."""
+    """Return the number of objects of a code in the clutter."""
     n_towers = len(p.n)
     count: int = p.left[n_towers, code]
     for c in range(n_towers):

@@ -1,10 +1,10 @@
-"""The sorting task in compiled rows: one attempt per row and call (METHOD 1.2, 1.3).
+"""Steps of sorting tasks, one attempt per row and call (docs/method.md 1.2, 1.3, compiled).
 
 Codes, positions and the numbering of actions are those of ``state.py``; episodes are
 drawn by ``initial_states.py`` and the people's interference by ``interference.py``.
 
-Source: thesis eq. (3.13)-(3.19). Deviates: placing into an occupied clutter cell, which the
-source does not speak of, puts the object back where it was.
+Source: thesis eq. (3.13)-(3.19). Deviates: placing into an occupied clutter cell, not covered
+by the source, returns the object.
 """
 
 from typing import NamedTuple
@@ -30,13 +30,13 @@ Codes = NDArray[np.int8]
 Floats = NDArray[np.float64]
 
 RUNNING, SUCCESS, TIMEOUT = 0, 1, 2
-"""How an episode stands."""
+"""Outcomes of an episode."""
 FAILURE_SCALE = 250
 """Failure probabilities are observed in steps of one 250th."""
 
 
 class SortingRules(NamedTuple):
-    """How episodes start, are disturbed and end."""
+    """Starts, disturbances and ends of episodes."""
 
     n_sizes: int
     """Number of sizes."""
@@ -45,9 +45,9 @@ class SortingRules(NamedTuple):
     disturbed_share: float
     """Share of episodes that start with junk on the towers and goals partly built."""
     solved_episodes: float
-    """Share of episodes that start partly solved, e_s of METHOD 1.4."""
+    """Share of episodes that start partly solved, e_s of docs/method.md 1.4."""
     solved_share: float
-    """Share of their goal that is done, g_s of METHOD 1.4."""
+    """Share of their goal that is done, g_s of docs/method.md 1.4."""
     even_share: float
     """Share of episodes whose K_E and K_G are drawn evenly."""
     human_rate: float
@@ -70,7 +70,7 @@ class SortingRows(NamedTuple):
     heights: Ints
     """Objects per tower, shape (n, C)."""
     goal: Codes
-    """What the towers shall be, shape (n, C, K)."""
+    """Goal of the towers, shape (n, C, K)."""
     goal_heights: Ints
     """Objects per tower of the goal, shape (n, C)."""
     fail: Floats
@@ -88,11 +88,11 @@ class SortingRows(NamedTuple):
     failures: Ints
     """Attempts that failed, shape (n,)."""
     interferences: Ints
-    """What people did so far, shape (n,)."""
+    """Number of interferences, shape (n,)."""
     episode: Ints
     """Number of the present episode, shape (n,)."""
     outcome: Ints
-    """How it stands: RUNNING, SUCCESS or TIMEOUT, shape (n,)."""
+    """Outcomes: RUNNING, SUCCESS or TIMEOUT, shape (n,)."""
     rng: NDArray[np.uint64]
     """Random stream of the present episode, shape (n, 1)."""
     counts: Ints
@@ -142,7 +142,7 @@ def nth_cell(rows: SortingRows, e: int, wanted: int, occupied: bool) -> int:
 
 @kernel()
 def n_cells(rows: SortingRows, e: int, occupied: bool) -> int:
-    """Return how many clutter cells are occupied or free."""
+    """Return the number of occupied or free clutter cells."""
     found = 0
     for k in range(rows.clutter.shape[1]):
         if (rows.clutter[e, k] != 0) == occupied:

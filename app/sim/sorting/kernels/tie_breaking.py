@@ -1,13 +1,12 @@
-"""Which move of the shortest plans comes next, by rules that keep the risk low, compiled.
+"""Selection of the next move among shortest plans, by rules of low risk (compiled).
 
-All shortest plans come from :mod:`app.sim.sorting.kernels.shortest_paths`. Of their next moves
-the
-rules prefer, in this order:
+Shortest plans come from :mod:`app.sim.sorting.kernels.shortest_paths`. The rules prefer, in
+this order:
 
-1. tower to tower, where the object is wanted: nothing is risked;
-2. clutter to tower, the least risky duplicate of all that are wanted: it frees a good cell;
-3. tower to clutter: of the removals the one whose object will be picked again at the least
-   risk, into the best free cell; into the worst one if it will not be picked again.
+1. tower to tower, without risk;
+2. clutter to tower, the least risky of all wanted objects, which frees a good cell;
+3. tower to clutter: the object with the least risk when picked again, into the best free cell;
+   an object that is not needed again into the worst free cell.
 """
 
 import numpy as np
@@ -24,7 +23,7 @@ from app.sim.sorting.kernels.shortest_paths import (
 )
 
 NONE = -1
-"""No action: solved, or the goal cannot be met."""
+"""No action: solved or infeasible."""
 
 
 @kernel()
@@ -49,7 +48,7 @@ def worst_free(clutter: Bytes, fail: Vec) -> int:
 
 @kernel()
 def still_wanted(code: int, goal: Bytes, goal_heights: Ints, p: ShortestPaths) -> int:
-    """Return how many objects of a code the towers still lack."""
+    """Return the number of missing objects of a code on the towers."""
     count = 0
     for c in range(len(p.at)):
         level = p.match[c] if p.at[c] < p.junk[c] else p.at[c] - p.junk[c] + p.cut[c]
@@ -151,7 +150,7 @@ def choose(clutter: Bytes, goal: Bytes, goal_heights: Ints, fail: Vec, p: Shorte
 
     Args:
         clutter: Objects in the cells, shape (K,).
-        goal: What the towers shall be, shape (C, K).
+        goal: Goal of the towers, shape (C, K).
         goal_heights: Objects per tower there, shape (C,).
         fail: Failure probabilities of the cells, shape (K,).
         p: The states, ``table`` filled, the towers at ``at``.

@@ -182,7 +182,7 @@ def _next(k: int, threshold: float, selected: bool) -> int:
 
 @kernel()
 def _next_constrained(k: int, threshold: float) -> int:
-    """Return what :func:`_next` does, under a constraint: evasions come last."""
+    """Return the same as :func:`_next` under a constraint, with evasions last."""
     k += 1
     if threshold > SUCCESS_SCORE - SSM_TIME_COST * SOON or k == FIRST_SAMPLE:
         return END
