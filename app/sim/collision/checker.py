@@ -1,9 +1,8 @@
 """Collision queries of planners: people as shapes at one time, poses and motions.
 
 The checker uses the same compiled capsules as training (``collision/kernels/free.py``), so a
-planner and
-a policy meet the same robot, table and people. All that touches the kernels stands in
-:class:`Checker`.
+planner and a policy meet the same robot, table and people. All that touches the kernels stands
+in :class:`Checker`.
 """
 
 from dataclasses import dataclass, replace

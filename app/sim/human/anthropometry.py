@@ -1,8 +1,7 @@
 """Body sizes: lengths of the segments of the 18-DoF model.
 
-The compiled person takes its lengths as an array, its *size*
-(``human/kernels/kinematics.py``); this file
-gives them names and makes people of any stature. The median person is 1.72 m tall.
+The compiled person takes its lengths as an array, its *size* (``human/kernels/kinematics.py``);
+this file gives them names and makes people of any stature. The median person is 1.72 m tall.
 
 A person is described by three percentiles of adults: stature; length of the arms and width of
 the shoulders, both relative to stature. With ``z`` the normal quantile of a percentile, stature

@@ -1,10 +1,9 @@
 """The 18-DoF person of docs/method.md 3.4: names, limits, capsules and inverse kinematics.
 
-The arithmetic of the forward direction lives in ``human/kernels/kinematics.py``, compiled;
-this module
-names its numbers and adds the inverse: where must the joints be for a hand to be *there*. The
-torso leans and twists toward what the arm alone cannot reach, then each arm is solved in closed
-form; the elbow's free turn about the line shoulder-hand is the ``swivel``.
+The arithmetic of the forward direction lives in ``human/kernels/kinematics.py``, compiled; this
+module names its numbers and adds the inverse: where must the joints be for a hand to be
+*there*. The torso leans and twists toward what the arm alone cannot reach, then each arm is
+solved in closed form; the elbow's free turn about the line shoulder-hand is the ``swivel``.
 """
 
 import math

@@ -10,8 +10,8 @@ the clavicles.
 
 What is missing keeps the angles it had, and is named. The arithmetic is compiled
 (``perception/kernels/pose_fit.py``); a recording, whose every joint is seen in every frame,
-goes
-through ``inverse_kinematics.py``, by the same formulas (``human/kernels/joint_angles.py``).
+goes through ``inverse_kinematics.py``, by the same formulas
+(``human/kernels/joint_angles.py``).
 
 Source: docs/method.md 2.8 and 3.4; the inverse of ``human/kernels/kinematics.py``.
 """

@@ -141,8 +141,7 @@ class PersonEstimate:
     implausible: str | None = None
     """Reason why the last key-points cannot be in the cell's frame; None otherwise."""
     carried_s: float = 0.0
-    """Longest prediction of an unseen key-point of trunk or arms [s], at most the hold
-    time."""
+    """Longest prediction of an unseen key-point of trunk or arms [s], at most the hold time."""
 
     @property
     def stale(self) -> bool:

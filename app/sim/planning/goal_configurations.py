@@ -1,8 +1,7 @@
 """Joint configurations that bring the tool to a target: the goals of the planners.
 
-Damped least squares from random starts
-(Pinocchio) finds several configurations of any tilt, among which a planner may
-choose.
+Damped least squares from random starts (Pinocchio) finds several configurations of any tilt,
+among which a planner may choose.
 """
 
 import numpy as np

@@ -5,14 +5,12 @@ planners: RRT-Connect (the first path found), RRT* (Karaman and Frazzoli 2011; t
 its time allows, as in the source's comparison) and AORRTC (Wilson et al. 2025; almost-surely
 optimal RRT-Connect). Path length is in joint space [rad], Euclidean. OMPL is used only where
 the straight motion to the nearest goal is not free: no path is shorter than that (and AORRTC of
-2.0.1 returns paths that do not begin at the start where a goal can be reached straight).
-The result is always a :class:`MotionPlan` with a named ``outcome``; only malformed numbers
-raise.
+2.0.1 returns paths that do not begin at the start where a goal can be reached straight). The
+result is always a :class:`MotionPlan` with a named ``outcome``; only malformed numbers raise.
 
-Time: the search ends before its budget of wall time is spent, so that the path can be
-checked once more within it; a step of OMPL in progress, or a busy machine, makes it a few
-milliseconds longer. With ``max_poses`` it ends after that many poses instead, which makes
-plans repeatable.
+Time: the search ends before its budget of wall time is spent, so that the path can be checked
+once more within it; a step of OMPL in progress, or a busy machine, makes it a few milliseconds
+longer. With ``max_poses`` it ends after that many poses instead, which makes plans repeatable.
 
 Seeds: OMPL keeps one seed generator per process. It is set before each plan, and all of a
 plan's random generators are made new from it, under a lock, so equal queries with equal seeds
@@ -53,8 +51,7 @@ OUTCOMES = (
 """``solved``: a free path to a goal. ``approximate``: a free path that ends short of all goals.
 ``out-of-time``: no path within the budget. ``start-in-contact``, ``goal-in-contact``: the
 start, or every goal, is nearer to something than the margin. ``start-outside-limits``: of the
-joints.
-``no-goal``: no posture was given, or none within the limits."""
+joints. ``no-goal``: no posture was given, or none within the limits."""
 
 SAME = 1e-6
 """Difference below which two lengths, or two positions of a joint, are one [rad]."""

@@ -3,8 +3,7 @@
 A :class:`SafetyLayer` decides once per control period from the robot's state, the commanded
 trajectory and the people as last observed. It returns an override, the motion to execute and
 the cause. The rule and the proof that it holds are in ``safety/kernels/ssm.py``; the contact
-speeds of
-power and force limiting in ``contact_limits.py``. Not a certified safety function.
+speeds of power and force limiting in ``contact_limits.py``. Not a certified safety function.
 
 The layer keeps position, speed and acceleration limits; scaled motions may exceed jerk limits.
 From a measured state outside its limits, or one whose straight stop leaves them, it admits

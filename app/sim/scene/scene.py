@@ -1,8 +1,7 @@
 """Kernel data of a work cell: robot and people.
 
 The kernels take plain tuples of arrays (``robot/kernels/arm.py``,
-``people/kernels/people.py``); this file
-makes them from a :class:`~app.sim.cells.cell.Cell`.
+``people/kernels/people.py``); this file makes them from a :class:`~app.sim.cells.cell.Cell`.
 """
 
 from collections.abc import Sequence

@@ -1,9 +1,8 @@
 """Decision about the next sorting move, by a policy or the exact planner (docs/method.md 1).
 
 The policy selects the valid move of greatest Q. The planner decides without a policy, for
-shapes and goals outside the policy's training, and if
-:mod:`app.sim.sorting.progress_monitor` detects a loop or stall. The result names decision maker
-and reason, and ranks every valid move.
+shapes and goals outside the policy's training, and if :mod:`app.sim.sorting.progress_monitor`
+detects a loop or stall. The result names decision maker and reason, and ranks every valid move.
 """
 
 import time

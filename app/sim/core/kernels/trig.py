@@ -1,9 +1,8 @@
 """Sines and cosines without branches, compiled to vector instructions.
 
 The person has sixteen angles, the robot six; a call of the mathematical library per angle costs
-several times as much. Reduction to
-+-pi/4 in two parts (Cody and Waite), then the polynomials of Cephes (S. Moshier, 1989,
-``sin.c``). Tests show errors below 4e-16 for angles up to 100 rad.
+several times as much. Reduction to +-pi/4 in two parts (Cody and Waite), then the polynomials
+of Cephes (S. Moshier, 1989, ``sin.c``). Tests show errors below 4e-16 for angles up to 100 rad.
 """
 
 import math

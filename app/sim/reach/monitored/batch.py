@@ -1,10 +1,8 @@
 """The reach scenario under speed and separation monitoring.
 
 :class:`MonitoredReachBatch` is a :class:`~app.sim.reach.batch.ReachBatch` whose control cycles
-pass
-through the safety layer (``reach/monitored/kernels/step.py``); policies, planners and
-trainings use
-both alike. Its people may follow given tracks, such as those of ``crossings.py``.
+pass through the safety layer (``reach/monitored/kernels/step.py``); policies, planners and
+trainings use both alike. Its people may follow given tracks, such as those of ``crossings.py``.
 
 Source: docs/method.md 2.6 (last row) and 2.7.
 """
