@@ -1,8 +1,7 @@
 """Reading and checking work cells.
 
 checks        Everything that can be wrong with a work cell whose fields have the right types
-places        Where stations and people of a work cell stand: on the table, on an obstacle, on
-              the floor
+places        Support of stations and people: the table, an obstacle or the floor
 reachability  Whether the robot reaches a point of its cell, in a posture that touches nothing
 reader        Reading a work cell that anybody may have written: bytes in, a cell or all its
               faults out

@@ -1,7 +1,6 @@
 """Collision checks.
 
-checker        What planners ask about collisions: people as shapes at one moment, free poses
-               and motions
+checker        Collision queries of planners: people as shapes at one time, poses and motions
 contact        Contact and clearance of one state, for live cell, decisions, safety layer and
                planners
 fcl_recheck    Second opinion on whole trajectories: does FCL on the raw meshes find a contact?

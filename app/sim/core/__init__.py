@@ -2,8 +2,9 @@
 
 arrays              Array types of the simulator
 jit                 Compilation of kernels: cached on disk, and without reference counting
-kernel_cache        Where compiled kernels are kept between runs
-observation_layout  Where each group of features stands in an observation
+kernel_cache        Cache of compiled kernels between runs
+observation_layout  Slices of the groups of features in an observation
 out_of_range        An input outside the training range or the joint limits
+trained_policy      Interface common to all trained policies: their identity
 kernels/            Compiled random numbers and trigonometry
 """

@@ -1,7 +1,7 @@
 """Motion of people in the cell.
 
-human_motion_config  Configuration of the workers' motion, body sizes and yielding, and its
-                     data for the kernels
+human_motion_config  Configuration of the workers' motion, body sizes and yielding, and its data
+                     for the kernels
 off_task_motion      Off-task motion: people who stand about, look elsewhere, or reach over the
                      table
 pedestrian           Pedestrians as vertical cylinders: settings, and walks for tests and plots

@@ -4,9 +4,8 @@ batch          The reach scenario of thesis chapter 4: a robot reaches goals bes
                walk about
 crossings      People who cross between the robot and its goal: the episodes of ``reach-ssm``
 goal_sets      Training targets in a box of goals, and interpolation between them
-               (docs/method.md 2.4, 4)
 mixed_batch    Reach environments with different numbers of people, stepped together
-motion_types   Query and result of a motion decision of a reach policy (docs/method.md 2)
+motion_types   Query and result of a motion decision of a reach policy
 oracle_search  Oracle search: what is possible with knowledge of the future motion of people
 query_state    One state that a client sends, observed as the reach scenario's policies observe
                it

@@ -7,39 +7,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.sim.core.arrays import Vec
+from app.sim.core.trained_policy import TrainedPolicy
 from app.sim.reach.batch import GoalRule, ViewName
 from app.sim.robot.actions import ActionSettings
 
 
-class ReachKnown(Protocol):
+class ReachKnown(TrainedPolicy, Protocol):
     """Reach policy, as seen by the live world and planners."""
 
     @property
-    def checkpoint(self) -> str:
-        """SHA-256 of the checkpoint."""
-
-    @property
-    def title(self) -> str:
-        """Short text for people, such as ``"reach-td3, 7.7 M steps"``."""
-
-    @property
-    def cell(self) -> str:
-        """Name of the work cell it was trained for."""
-
-    @property
-    def cell_sha256(self) -> str:
-        """Identity of that cell's content (``Cell.sha256``)."""
-
-    @property
-    def view(self) -> "ViewName":
+    def view(self) -> ViewName:
         """Observation."""
 
     @property
-    def action(self) -> "ActionSettings":
+    def action(self) -> ActionSettings:
         """Meaning of its actions."""
 
     @property
-    def goals(self) -> "GoalRule":
+    def goals(self) -> GoalRule:
         """Region of its training goals."""
 
     @property

@@ -1,7 +1,6 @@
 """The robot: model, kinematics, capsules, joint limits, actions.
 
-actions             Which action a scenario uses: degree, bounds and meaning, in one place
-                    (docs/method.md 2.2)
+actions             Action types of the scenarios: degree, bounds and meaning
 capsules            Capsules that contain the collision meshes of the robot and its tool, for
                     the kernels
 measured_state      The robot's state as it was measured: a little outside its limits, or far

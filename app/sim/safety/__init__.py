@@ -2,10 +2,9 @@
 
 adversarial_trials  Falsification trials of the safety layer: many episodes with adversarial
                     people
-contact_limits      How fast a robot may touch which part of a person (power and force
-                    limiting)
-decision            Decision of the safety layer for one period, and the terms of the
-                    separation distance
+contact_limits      Speed limits of contact by body part (power and force limiting)
+decision            Decision of the safety layer for one period, and the terms of the separation
+                    distance
 layer               Speed and separation monitoring, and power and force limiting, for any
                     policy or planner
 separation_zone     The protective separation distance around the whole robot, as a zone on the

@@ -1,4 +1,4 @@
 """A cell as kernel arrays.
 
-scene  What the compiled kernels know of a work cell: its robot and its people
+scene  Kernel data of a work cell: robot and people
 """

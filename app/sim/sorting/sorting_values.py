@@ -5,33 +5,18 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from app.sim.core.trained_policy import TrainedPolicy
 from app.sim.sorting.state import SortingShape
 
 
-class SortingValues(Protocol):
+class SortingValues(TrainedPolicy, Protocol):
     """A learned policy as its values of all moves; safe to call from several threads.
 
     It was trained on goals that have each tower of its own colour, the largest at the bottom.
     """
 
     @property
-    def checkpoint(self) -> str:
-        """SHA-256 of the checkpoint."""
-
-    @property
-    def title(self) -> str:
-        """Short text for people, such as ``"sorting-e0-dqn, 2.0 M steps"``."""
-
-    @property
-    def cell(self) -> str:
-        """Name of the work cell it was trained for."""
-
-    @property
-    def cell_sha256(self) -> str:
-        """Identity of that cell's content (``Cell.sha256``)."""
-
-    @property
-    def shape(self) -> "SortingShape":
+    def shape(self) -> SortingShape:
         """The tasks it knows."""
 
     def values(self, obs: NDArray[np.uint8]) -> NDArray[np.float32]:

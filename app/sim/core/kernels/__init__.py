@@ -1,5 +1,5 @@
 """Compiled random numbers and trigonometry.
 
-rng   Counter-based random numbers: a stream per (seed, environment, episode), compiled
+rng   Counter-based random numbers: a stream per (seed, environment, episode)
 trig  Sines and cosines without branches, compiled to vector instructions
 """

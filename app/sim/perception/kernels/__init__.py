@@ -1,4 +1,4 @@
 """Compiled pose fit.
 
-pose_fit  Joint angles of a person from key-points (compiled)
+pose_fit  Joint angles of a person from key-points
 """

@@ -1,5 +1,4 @@
 """Compiled predictors.
 
-networks    Motion predictor: radius and path length of a pedestrian from its recent motion
-            (compiled)
+networks  Motion predictor: radius and path length of a pedestrian from its recent motion
 """

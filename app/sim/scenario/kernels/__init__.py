@@ -1,5 +1,5 @@
 """Compiled episode steps that the scenarios share.
 
-episode             State and step that the pick and reach scenarios share (compiled)
-person_observation  Motion of an observed person, as both scenarios extrapolate it (compiled)
+episode             State and step that the pick and reach scenarios share
+person_observation  Motion of an observed person, as both scenarios extrapolate it
 """

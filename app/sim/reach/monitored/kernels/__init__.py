@@ -1,5 +1,5 @@
 """Compiled monitored reach step.
 
-state  Data of the steps: accounts, command, results
-step   Steps of the reach scenario under speed and separation monitoring (compiled)
+state  Data of the reach steps under speed and separation monitoring: accounts, command, results
+step   Steps of the reach scenario under speed and separation monitoring
 """
