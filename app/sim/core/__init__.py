@@ -5,6 +5,6 @@ jit                 Compilation of kernels: cached on disk, and without referenc
 kernel_cache        Cache of compiled kernels between runs
 observation_layout  Slices of the groups of features in an observation
 out_of_range        An input outside the training range or the joint limits
-trained_policy      Interface common to all trained policies: their identity
+policy_identity     Interface common to all trained policies: their identity
 kernels/            Compiled random numbers and trigonometry
 """

@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.sim.core.arrays import Vec
-from app.sim.core.trained_policy import TrainedPolicy
+from app.sim.core.policy_identity import PolicyIdentity
 from app.sim.reach.batch import GoalRule, ViewName
 from app.sim.robot.actions import ActionSettings
 
 
-class ReachKnown(TrainedPolicy, Protocol):
+class ReachKnown(PolicyIdentity, Protocol):
     """Reach policy, as seen by the live world and planners."""
 
     @property

@@ -5,11 +5,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from app.sim.core.trained_policy import TrainedPolicy
+from app.sim.core.policy_identity import PolicyIdentity
 from app.sim.sorting.state import SortingShape
 
 
-class SortingValues(TrainedPolicy, Protocol):
+class SortingValues(PolicyIdentity, Protocol):
     """A learned policy as its values of all moves; safe to call from several threads.
 
     It was trained on goals that have each tower of its own colour, the largest at the bottom.

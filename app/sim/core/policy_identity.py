@@ -3,7 +3,7 @@
 from typing import Protocol
 
 
-class TrainedPolicy(Protocol):
+class PolicyIdentity(Protocol):
     """Identity of a trained policy."""
 
     @property

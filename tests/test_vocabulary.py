@@ -1,0 +1,67 @@
+"""Code, documents and page use the terms of ``docs/glossary.md``; a class name exists once."""
+
+import pytest
+
+from tools.check_vocabulary import banned, duplicates, in_python, in_text
+
+
+PENDING = (
+    "app/api/",
+    "app/policies/",
+    "app/sim/pick/",
+    "docs/results/",
+    "jobs/",
+    "tests/api/",
+    "tests/benchmarks/",
+    "tests/browser/",
+    "tests/cli/",
+    "tests/jobs/",
+    "tests/live/",
+    "tests/policies/",
+    "tests/sim/pick/",
+    "tests/store/",
+    "tests/tools/",
+    "tests/web/",
+    "tools/docs/",
+    "web/",
+)
+"""Folders that are not converted yet."""
+
+
+def test_no_banned_word_is_used() -> None:
+    assert [found for found in banned() if not found.startswith(PENDING)] == []
+
+
+def test_a_class_name_exists_once() -> None:
+    assert [found for found in duplicates() if not found.startswith("class Person:")] == []
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("the shipped sorter decides", ["sorter"]),
+        ("movers and controllers", ["movers"]),
+        ("`set-way` and joint_way_rad", ["way (set-way)", "way (joint_way_rad)"]),
+        ("one of five ways", ["ways"]),
+        ("by the way, a half-way stop in the robot's way", []),
+        ("always in a gateway, either way", []),
+        ("Who walks away is gone.", ["Who"]),
+        ("Who is it?", []),
+        ("beside people, held against FCL", ["held against"]),
+        ("stroke-dasharray and border-style", []),
+        ("nobody is near", []),
+        ("`nobody`", ["nobody"]),
+    ],
+)
+def test_words_and_phrases_of_text_are_found(text: str, found: list[str]) -> None:
+    assert sorted(in_text(text)) == sorted(found)
+
+
+def test_names_strings_and_comments_of_python_are_searched() -> None:
+    source = 'n_ways = 1  # told anew\nlabel = "twins"\naxis.plot(x, dashes=(4, 3))\n'
+    assert sorted(in_python(source)) == [
+        (1, "anew"),
+        (1, "told"),
+        (1, "ways (n_ways)"),
+        (2, "twins"),
+    ]
