@@ -4,7 +4,6 @@ import pytest
 
 from tools.check_vocabulary import banned, duplicates, in_python, in_text
 
-
 PENDING = (
     "app/api/",
     "app/policies/",
