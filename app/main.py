@@ -168,7 +168,7 @@ class Service:
             if self.parts.stopping.is_set():
                 return
             if damage is not None:
-                names.note(damage)
+                names.mark_damaged(damage)
 
 
 def start_world(
@@ -221,5 +221,5 @@ def publish_shipped(names: CheckpointNames) -> None:
         try:
             names.publish(alias, shipped(alias))
         except Damaged as error:
-            names.note(error)
+            names.mark_damaged(error)
             names.point(alias, sha256)

@@ -22,7 +22,7 @@ from app.sim.mocap.joint_centres import MEASURED
 from app.sim.mocap.read_options import NOTHING_STATED, ReadOptions
 from app.store.records import NewRecording, StoredRecording
 
-MAX_GLITCHES = 1000
+MAX_ARTIFACTS = 1000
 """Largest number of artifacts stored with their place; all are counted."""
 
 _SPREADS = ("wrists", "elbows", "pelvis", "wrists_at_fixed_height", "fixed_body")
@@ -78,7 +78,7 @@ def packed(
         options: Options with which the file was read.
     """
     detail = detail_of(found)
-    detail["artifacts"] = detail["artifacts"][:MAX_GLITCHES]
+    detail["artifacts"] = detail["artifacts"][:MAX_ARTIFACTS]
     detail["recorded"] = {
         "name": found.name,
         "size": asdict(found.size),

@@ -48,10 +48,11 @@ WORDS = re.compile(
 NAMES = re.compile(r"ways?|everyone|everybody|somebody|someone|nobody|dash|dashes|dashing")
 """Banned as identifiers and as parts of them."""
 KEPT = re.compile(
-    r"(?:one|two|half|right-of)-ways?|dashes(?==)|stroke-dash\w*|border-\w+|digital twins?",
+    r"(?:one|two|half|right-of)-ways?|dashes(?==)|setLineDash"
+    r"|stroke-dash\w*|border-\w+|digital twins?",
     re.IGNORECASE,
 )
-"""Names of others: of English, matplotlib (`dashes=`), SVG and CSS."""
+"""Names of others: of English, matplotlib (`dashes=`), Canvas 2D, SVG and CSS."""
 CLAUSE = "of by for to with beside than from at near and or as".replace(" ", "|")
 PHRASES = re.compile(
     r"\bfor want of\b|\bheld against\b"

@@ -87,7 +87,7 @@ class CheckpointNames:
         try:
             record, tensors = read_sound(self.store, self._aliases.get(name, name))
         except Damaged as error:
-            self.note(error)
+            self.mark_damaged(error)
             raise
         except NotFound:
             rule = "is no stored checkpoint: neither its SHA-256 nor an alias"
@@ -95,7 +95,7 @@ class CheckpointNames:
         self._damaged.pop(record.sha256, None)
         return record, tensors
 
-    def note(self, damage: Damaged) -> None:
+    def mark_damaged(self, damage: Damaged) -> None:
         """Remember that a checkpoint is damaged, until it is read undamaged."""
         if damage.sha256 not in self._damaged:
             logger.error("%s", damage.message)

@@ -43,7 +43,7 @@ def shown(value: object) -> str:
 def validation_member(error: Mapping[str, Any], body: type[BaseModel] | None) -> Member:
     """Return field, value, rule and choices of a validation error."""
     kind, context = str(error["type"]), error.get("ctx", {})
-    place, inside, way = without_inner_tags(error["loc"], body)
+    place, inside, inner = without_inner_tags(error["loc"], body)
     location, value = tuple(place), error.get("input")
     rule = str(error["msg"]).replace("Input should be ", "must be ")
     rule = rule.replace("an instance of Sequence", "a valid list")
@@ -61,7 +61,7 @@ def validation_member(error: Mapping[str, Any], body: type[BaseModel] | None) ->
         choices = _listed(context["expected"])
         rule = "must be one of the choices"
     elif kind == "extra_forbidden":
-        rule, choices = "is not a known field", known_fields(inside, way[:-1])
+        rule, choices = "is not a known field", known_fields(inside, inner[:-1])
     elif kind in ("too_short", "too_long"):
         side, bound = ("at least", "min") if kind == "too_short" else ("at most", "max")
         rule = f"must have {side} {context[bound + '_length']} items"
@@ -125,18 +125,18 @@ def without_inner_tags(
     Returns:
         The location; the model of the last tag, or the body's; the path inside that model.
     """
-    place, way = list(location[:1]), list[str | int]()
+    place, inner = list(location[:1]), list[str | int]()
     variants = dict[str, type[BaseModel]]()
     for part in location[1:]:
         if isinstance(part, str) and part in variants:
-            model, way, variants = variants[part], [], {}
+            model, inner, variants = variants[part], [], {}
             continue
         place.append(part)
-        way.append(part)
+        inner.append(part)
         if isinstance(part, str):
             field = model.model_fields.get(part) if model else None
             variants = _tagged(field.annotation) if field else {}
-    return place, model, way
+    return place, model, inner
 
 
 def _models(annotation: Any) -> Iterator[type[BaseModel]]:

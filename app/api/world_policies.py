@@ -1,7 +1,7 @@
 """Policies and recordings that commands to a live world name.
 
-A policy moves the arm in the cell it was trained in, and in sorting cells that differ from it
-in nothing but their stations (``sorting_cell.same_workspace``).
+A policy is valid in the cell it was trained in, and in sorting cells that differ from it only
+in their stations (``layout.require_workspace``).
 """
 
 import logging
@@ -27,12 +27,12 @@ logger = logging.getLogger(__name__)
 
 MAX_CHOICES = 20
 """Maximum number of choices in an error."""
-MAX_LOOKED_AT = 200
-"""Newest checkpoints that are looked through for one of a cell."""
+MAX_SEARCHED = 200
+"""Number of the newest checkpoints that are searched for one of a cell."""
 
 
 def load_for(command: LoadingCommand, cell: Cell, services: Services) -> object:
-    """Return the stored object that a command names; None where it names none.
+    """Return the stored object that a command names; None without a name.
 
     Raises:
         InvalidInput: Nothing has that name, or the recording has no such run.
@@ -51,9 +51,9 @@ def load_for(command: LoadingCommand, cell: Cell, services: Services) -> object:
             require_task_policy(policy, cell, services)
             return policy
         case SetSortingPolicy(checkpoint=str(name)):
-            sorter = services.sorting_policies.load(name)
-            require_sorting_policy(sorter, cell)
-            return sorter
+            sorting_policy = services.sorting_policies.load(name)
+            require_sorting_policy(sorting_policy, cell)
+            return sorting_policy
     return None
 
 
@@ -69,7 +69,7 @@ def _recording(command: SetMotion, services: Services) -> Recording:
 
 
 def require_task_policy(policy: TaskPolicy, cell: Cell, services: Services) -> None:
-    """Make sure that a policy may move the arm in a cell.
+    """Check that a policy is valid in a cell.
 
     Raises:
         CheckpointMismatch: It was trained elsewhere, or before a cell was changed.
@@ -86,7 +86,7 @@ def require_task_policy(policy: TaskPolicy, cell: Cell, services: Services) -> N
 
 
 def may_select_tasks(policy: TaskPolicy, cell: Cell, services: Services) -> bool:
-    """Whether a policy may move the arm in a cell."""
+    """Return whether a policy is valid in a cell."""
     try:
         require_task_policy(policy, cell, services)
     except CheckpointMismatch:
@@ -95,7 +95,7 @@ def may_select_tasks(policy: TaskPolicy, cell: Cell, services: Services) -> bool
 
 
 def task_policy_for(cell: Cell, services: Services) -> TaskPolicy | None:
-    """Return the newest policy of a cell; the default one goes first where it may act."""
+    """Return the policy of a cell: the default one where trained in it, else the newest."""
     default = services.task_policies.load(None)
     if default.cell == cell.name and may_select_tasks(default, cell, services):
         return default
@@ -106,8 +106,8 @@ def task_policy_for(cell: Cell, services: Services) -> TaskPolicy | None:
 def newest_for(
     cell: Cell, purpose: str, policies: PolicyRegistry[P], services: Services
 ) -> P | None:
-    """Return the newest policy that was trained in a cell for a purpose, damaged ones aside."""
-    for record in list_checkpoints(services.store, limit=MAX_LOOKED_AT).items:
+    """Return the newest policy that was trained in a cell for a purpose and is not damaged."""
+    for record in list_checkpoints(services.store, limit=MAX_SEARCHED).items:
         if purpose_of(record.manifest) == purpose and is_for(record.manifest, cell):
             try:
                 return policies.load(record.sha256)
@@ -116,29 +116,29 @@ def newest_for(
     return None
 
 
-def require_sorting_policy(sorter: SortingValues, cell: Cell) -> None:
-    """Make sure that a sorter knows tasks as large as a cell's.
+def require_sorting_policy(policy: SortingValues, cell: Cell) -> None:
+    """Check that a sorting policy was trained for tasks of the size of a cell.
 
     Raises:
-        InvalidInput: Nothing can be sorted in the cell.
-        CheckpointMismatch: It sorts tasks of another size.
+        InvalidInput: The cell is no sorting cell.
+        CheckpointMismatch: It was trained for another size.
     """
-    here, known = shape_of(cell), sorter.shape
+    here, known = shape_of(cell), policy.shape
     if here != known:
         text = "{0.n_cells} cells, {0.n_colours} colours, {0.n_sizes} sizes"
         raise CheckpointMismatch("shape", text.format(here), text.format(known))
 
 
 def sorting_policy_for(cell: Cell, services: Services) -> SortingValues | None:
-    """Return the shipped sorter of a cell; None leaves its moves to the exact planner."""
+    """Return the shipped sorting policy of a cell; None: the planner selects every move."""
     if cell.name not in SORTING_ALIASES or cell.name not in services.checkpoints.aliases:
         return None
-    sorter = services.sorting_policies.load(cell.name)
-    return sorter if is_sorting(cell) and sorter.shape == shape_of(cell) else None
+    policy = services.sorting_policies.load(cell.name)
+    return policy if is_sorting(cell) and policy.shape == shape_of(cell) else None
 
 
 def named_reach_policy(reference: str, cell: Cell, services: Services) -> TrainedReachPolicy:
-    """Return the reach policy that is named, ready to act in a cell.
+    """Return a reach policy by name, for a live world.
 
     Raises:
         InvalidInput: Nothing has that name.

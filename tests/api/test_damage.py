@@ -1,4 +1,4 @@
-"""Damaged weights decide nothing; whoever asks for them is told which they are."""
+"""Damaged checkpoints are never used, and errors name them."""
 
 import time
 from collections.abc import Iterator
@@ -88,7 +88,7 @@ def test_start_heals_shipped_checkpoints_and_names_the_others(service: TestClien
 
 
 @pytest.mark.parametrize(("column", "change"), PLACES.values(), ids=PLACES)
-def test_every_reader_of_a_damaged_checkpoint_is_told(
+def test_every_reader_of_a_damaged_checkpoint_gets_an_error(
     service: TestClient, data: Path, column: str, change: Change
 ) -> None:
     store = service.app.state.services.store  # type: ignore[attr-defined]

@@ -128,18 +128,18 @@ def places(value: Any) -> Iterator[tuple[Any, ...]]:
     for name, one in list(inner) + (
         [(0, value[0])] if isinstance(value, list) and value else []
     ):
-        for way in places(one):
-            yield (name, *way)
+        for keys in places(one):
+            yield (name, *keys)
 
 
-def with_value(body: Any, way: tuple[Any, ...], value: Any) -> Any:
-    if not way:
+def with_value(body: Any, keys: tuple[Any, ...], value: Any) -> Any:
+    if not keys:
         return value
     changed = copy.deepcopy(body)
     inner = changed
-    for part in way[:-1]:
+    for part in keys[:-1]:
         inner = inner[part]
-    inner[way[-1]] = value
+    inner[keys[-1]] = value
     return changed
 
 
@@ -202,9 +202,9 @@ def test_hostile_bodies_are_refused(
     for raw in RAW:
         answered(service, method, url, content=raw, headers=headers)
     for body in json_bodies(method, path):
-        for way in places(body):
+        for keys in places(body):
             for value in (*TEXTS, *NUMBERS, *OTHERS):
-                text = json.dumps(with_value(body, way, value))
+                text = json.dumps(with_value(body, keys, value))
                 answered(service, method, url, content=text, headers=headers)
 
 

@@ -84,7 +84,7 @@ def test_of_four_people_the_nearest_is_seen(client: TestClient, state: dict[str,
     assert values(answer) == values(alone)
 
 
-def test_nobody_is_answered(client: TestClient, state: dict[str, Any]) -> None:
+def test_request_without_people_is_answered(client: TestClient, state: dict[str, Any]) -> None:
     assert asked(client, state)["people"] == []
 
 
@@ -207,7 +207,7 @@ def test_velocities_are_missing_or_unusable_as_keypoints_are(
 
 
 @pytest.mark.parametrize(
-    ("points", "flag", "told"),
+    ("points", "flag", "implausible"),
     [
         ((1000.0 * np.array(POINTS)).tolist(), "foreign-frame", "millimetres"),
         ((np.array(POINTS) + [0.0, 0.0, 2.0]).tolist(), "foreign-frame", "over the floor"),
@@ -221,12 +221,12 @@ def test_velocities_are_missing_or_unusable_as_keypoints_are(
         ([[320.0 + k, 240.0] for k in range(25)], "never-seen", None),
     ],
 )
-def test_somebody_whose_place_is_not_known_is_answered_and_stops_the_robot(
-    client: TestClient, state: dict[str, Any], points: Any, flag: str, told: str | None
+def test_person_of_unknown_position_is_answered_and_stops_the_robot(
+    client: TestClient, state: dict[str, Any], points: Any, flag: str, implausible: str | None
 ) -> None:
     use = asked(client, state, WHOLE, {"keypoints": points})["people"][1]
     assert flag in use["flags"] and use["as_cylinder"] and use["age_s"] is None
-    assert told is None or told in use["implausible"]
+    assert implausible is None or implausible in use["implausible"]
     assert "never-seen" in use["flags"]
     question = {
         "cell": "shared-workspace",
@@ -295,7 +295,7 @@ def test_of_more_than_four_people_the_nearest_count_and_the_rest_is_named(
     )
 
 
-def test_people_are_told_by_their_places_among_many(client: TestClient) -> None:
+def test_people_are_identified_by_their_index_among_many(client: TestClient) -> None:
     question = {
         "cell": "shared-workspace",
         "robot": {"q": [0, -2.5, 2.0, 0, 0, 0], "qd": [0.4, 0, 0, 0, 0, 0]},

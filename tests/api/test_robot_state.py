@@ -195,7 +195,7 @@ def test_far_people_cost_no_decision_and_are_flagged(
         assert both["candidates"] == alone["candidates"]
 
 
-def test_key_points_of_somebody_far_away_keep_their_place(client: TestClient) -> None:
+def test_key_points_of_a_distant_person_keep_their_position(client: TestClient) -> None:
     points: list[Any] = [None] * 25
     for k, (x, y, z) in {
         0: (0.0, 1.33, 0.81),
@@ -242,7 +242,7 @@ def test_joints_of_a_person_somewhat_beyond_the_model_are_answered(
     assert answer["people"][0]["flags"] == flags
 
 
-def test_somebody_who_turned_round_several_times_is_as_somebody_who_did_not(
+def test_full_turns_of_a_person_have_no_effect(
     client: TestClient,
 ) -> None:
     q = [*STANDING["q"]]

@@ -118,14 +118,14 @@ def test_a_refused_frame_leaves_the_age_as_it_was() -> None:
     assert session.n_frames == 30
 
 
-def test_nobody_is_only_known_to_be_absent_while_frames_arrive() -> None:
+def test_absence_of_people_is_known_only_while_frames_arrive() -> None:
     session = fed(clock := Clock(), n_people=2)
     assert session.people().estimates[1].flags == ("never-seen",)
     clock.t += 1.0
     assert session.people().estimates[1].flags == ("never-seen", "stale")
 
 
-def test_before_the_first_frame_everybody_is_stale() -> None:
+def test_people_are_stale_before_the_first_frame() -> None:
     session = TrackerSessions(Clock()).open(CELL.name, 1, CELL.body, CELL.floor_z)
     known = session.people(5.0)
     assert known.t is None and known.observed == (None,)

@@ -151,8 +151,8 @@ def main() -> None:
     rows = [measured(policy, n, options.seed, seconds) for n in (3, 1000)]
     shipped = [name for name in SORTING_CELLS if name in pretrained.ALIASES]
     for name in shipped[:1]:
-        sorter = SortingPolicy(pretrained.load(name))
-        rows.append(measured_sorting("sorting", sorter, name, options.seed, seconds))
+        sorting_policy = SortingPolicy(pretrained.load(name))
+        rows.append(measured_sorting("sorting", sorting_policy, name, options.seed, seconds))
     if not shipped:
         rows.append(row_without("sorting", "no checkpoint that sorts is shipped"))
     largest = SORTING_CELLS[0]

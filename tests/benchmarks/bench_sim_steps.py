@@ -40,7 +40,7 @@ from tests.benchmarks.measure import (
     row,
     row_without,
 )
-from tests.benchmarks.mujoco_pick import INSTALLED, WAYS, MujocoPick
+from tests.benchmarks.mujoco_pick import INSTALLED, MODES, MujocoPick
 
 BENCH = "sim-steps"
 BATCH = 128
@@ -48,7 +48,7 @@ TICKS = 400
 """Steps of the person's motion that the FCL environment goes through."""
 MOMENTS = 1024
 """Moments of the recorded episodes that MuJoCo goes through."""
-MUJOCO = {way: f"mujoco/pick-{way}" for way in WAYS} | {"distances": "mujoco/pick"}
+MUJOCO = {mode: f"mujoco/pick-{mode}" for mode in MODES} | {"distances": "mujoco/pick"}
 UNIT = "env-steps/cpu-s"
 
 
@@ -110,8 +110,8 @@ def mujoco_peers(seed: int) -> Iterator[Subject]:
     """Yield MuJoCo's ways to measure, where it is installed."""
     if INSTALLED:
         q, human_q = recorded(seed)
-        for way, name in MUJOCO.items():
-            peer = MujocoPick(load_cell(), q, human_q, way)
+        for mode, name in MUJOCO.items():
+            peer = MujocoPick(load_cell(), q, human_q, mode)
             yield Subject(name=name, batch=1, run=peer.step)
 
 

@@ -26,7 +26,7 @@ from app.sim.robot.capsules import RobotCapsules, load_robot_capsules, self_pair
 from app.sim.robot.kernels.arm import FIRST_OVER_TABLE
 from app.sim.robot.ur10 import Robot
 
-WAYS = ("distances", "sensors", "contacts")
+MODES = ("distances", "sensors", "contacts")
 INSTALLED = importlib.util.find_spec("mujoco") is not None
 CUTOFF = 1e3
 """Distances up to this are asked for: all [m]."""
@@ -51,16 +51,16 @@ class MujocoPick:
         cell: Work cell.
         q: The robot's joints at each moment [rad], shape (n, 6).
         human_q: The person's joints at each moment [m, rad], shape (n, 18).
-        way: One of WAYS.
+        mode: One of MODES.
     """
 
-    def __init__(self, cell: Cell, q: Vec, human_q: Vec, way: str) -> None:
+    def __init__(self, cell: Cell, q: Vec, human_q: Vec, mode: str) -> None:
         import mujoco  # noqa: PLC0415 - a peer that need not be there
 
-        self._mujoco, self._way = mujoco, way
+        self._mujoco, self._mode = mujoco, mode
         capsules = load_robot_capsules(cell.robot.tool_length, cell.robot.tool_radius)
         self.pairs = _pairs(capsules)
-        model = mujoco.MjModel.from_xml_string(_scene(cell, capsules, self.pairs, way))
+        model = mujoco.MjModel.from_xml_string(_scene(cell, capsules, self.pairs, mode))
         self._model, self._data = model, mujoco.MjData(model)
         self._ids = [(model.geom(a).id, model.geom(b).id) for a, b in self.pairs]
         self._q, self._poses = q, [_mocap_poses(cell, row) for row in human_q]
@@ -70,7 +70,7 @@ class MujocoPick:
         """Go to the next moment; return the least distance [m] or whether anything touches."""
         self.place(self._tick)
         self._tick = (self._tick + 1) % len(self._q)
-        if self._way == "contacts":
+        if self._mode == "contacts":
             return self.touches()
         return float(min(self.distances()))
 
@@ -84,7 +84,7 @@ class MujocoPick:
     def distances(self) -> Sequence[float] | NDArray[np.float64]:
         """Return the distances of ``pairs`` [m]."""
         model, data = self._model, self._data
-        if self._way == "sensors":
+        if self._mode == "sensors":
             self._mujoco.mj_sensorPos(model, data)
             return np.asarray(data.sensordata)
         ask = self._mujoco.mj_geomDistance
@@ -104,18 +104,18 @@ def _pairs(capsules: RobotCapsules) -> list[tuple[str, str]]:
     return person + own + [(a, "table") for a in names[FIRST_OVER_TABLE:]]
 
 
-def _scene(cell: Cell, capsules: RobotCapsules, pairs: list[tuple[str, str]], way: str) -> str:
+def _scene(cell: Cell, capsules: RobotCapsules, pairs: list[tuple[str, str]], mode: str) -> str:
     """Return the scene in MuJoCo's own format."""
-    robot = _geoms(capsules, 0, way)
+    robot = _geoms(capsules, 0, mode)
     for joint, (place, turn, axis) in enumerate(JOINTS):
         robot += (
             f'<body pos="{_numbers(place)}" quat="{turn}"><joint type="hinge" axis="{axis}"/>'
-            + _geoms(capsules, joint + 1, way)
+            + _geoms(capsules, joint + 1, mode)
         )
     robot += "</body>" * len(JOINTS)
     ends = human.capsules(np.zeros(18), cell.body, cell.floor_z)
     half = 0.5 * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    touchable = _touchable(0, 1, way)
+    touchable = _touchable(0, 1, mode)
     person = "".join(
         f'<body mocap="true"><geom name="human_{name}" type="capsule" {touchable} '
         f'size="{_numbers((radius, length))}"/></body>'
@@ -123,7 +123,7 @@ def _scene(cell: Cell, capsules: RobotCapsules, pairs: list[tuple[str, str]], wa
             human.CAPSULE_NAMES, human.CAPSULE_RADII, half, strict=True
         )
     )
-    table = f'<geom name="table" type="plane" size="5 5 1" {_touchable(0, 2, way)}/>'
+    table = f'<geom name="table" type="plane" size="5 5 1" {_touchable(0, 2, mode)}/>'
     # What stands still is never tested against what is posed from outside, and neighbours are
     # not tested at all, unless a pair says so.
     asked = [(a, b) for a, b in pairs if a == capsules.name[0] or b in capsules.name]
@@ -131,24 +131,24 @@ def _scene(cell: Cell, capsules: RobotCapsules, pairs: list[tuple[str, str]], wa
     sensor = "".join(f'<distance geom1="{a}" geom2="{b}" cutoff="{CUTOFF}"/>' for a, b in pairs)
     return (
         f"<mujoco><worldbody>{table}{robot}{person}</worldbody>"
-        f"<contact>{contact if way == 'contacts' else ''}</contact>"
-        f"<sensor>{sensor if way == 'sensors' else ''}</sensor></mujoco>"
+        f"<contact>{contact if mode == 'contacts' else ''}</contact>"
+        f"<sensor>{sensor if mode == 'sensors' else ''}</sensor></mujoco>"
     )
 
 
-def _geoms(capsules: RobotCapsules, link: int, way: str) -> str:
+def _geoms(capsules: RobotCapsules, link: int, mode: str) -> str:
     """Return the capsules of one link."""
     return "".join(
         f'<geom name="{capsules.name[k]}" type="capsule" size="{float(capsules.radius[k])!r}" '
         f'fromto="{_numbers((*capsules.p0[k], *capsules.p1[k]))}" '
-        f"{_touchable(3 if k >= FIRST_OVER_TABLE else 1, 0, way)}/>"
+        f"{_touchable(3 if k >= FIRST_OVER_TABLE else 1, 0, mode)}/>"
         for k in np.flatnonzero(capsules.link == link)
     )
 
 
-def _touchable(kind: int, others: int, way: str) -> str:
+def _touchable(kind: int, others: int, mode: str) -> str:
     """Return with what MuJoCo's broad phase tests a shape; only contacts need it."""
-    kind, others = (kind, others) if way == "contacts" else (0, 0)
+    kind, others = (kind, others) if mode == "contacts" else (0, 0)
     return f'contype="{kind}" conaffinity="{others}"'
 
 

@@ -1,11 +1,9 @@
 ; The sorting task of docs/method.md 1.1 and 1.2 for classical planners.
 ;
-; Twins are counted, not named, and a move is a take and a put, which kept problems of ten objects
-; smallest of the ways tried. Which clutter cell an object lies in is left out: there are as
-; many cells as objects, so a free one never lacks, and only the risk of a pick depends on it.
-; Failed picks are left out as well: they change nothing, so the action is tried again; a plan
-; knows of no risk, and no twin is better than the other.
-; Levels serve as numbers as well; ``number`` itself is a word of PDDL.
+; Identical objects are counted, not named. A move is two actions (take, put), which kept problems
+; of ten objects smallest among the encodings tried. Clutter cells are omitted: there are as many
+; as objects, so that one is always free. Failed picks change nothing and are omitted as well;
+; plans do not consider risk. Levels serve as numbers; ``number`` is a word of PDDL.
 (define (domain sorting)
   (:requirements :strips :typing)
   (:types tower level code)

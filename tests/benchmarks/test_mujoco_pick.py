@@ -46,10 +46,10 @@ def by_kernels(q: np.ndarray, human_q: np.ndarray) -> Iterator[np.ndarray]:
         yield np.concatenate([near, robot.pair, [table_clearance(robot.columns)[0]]])
 
 
-@pytest.mark.parametrize("way", ["distances", "sensors"])
-def test_peer_measures_the_distances_that_the_kernels_measure(way: str) -> None:
+@pytest.mark.parametrize("mode", ["distances", "sensors"])
+def test_peer_measures_the_distances_that_the_kernels_measure(mode: str) -> None:
     q, human_q = postures()
-    peer = MujocoPick(CELL, q, human_q, way)
+    peer = MujocoPick(CELL, q, human_q, mode)
     for tick, wanted in enumerate(by_kernels(q, human_q)):
         peer.place(tick)
         found = np.array(peer.distances())

@@ -1,4 +1,4 @@
-"""A visitor drags the person into the robot's way and sees the robot choose another goal."""
+"""A visitor drags the person into the robot's offset and sees the robot choose another goal."""
 
 import time
 from collections.abc import Callable
@@ -67,10 +67,10 @@ def hand(server: str, name: str) -> np.ndarray:
     return np.array(human.joint_points(q, CELL.body)[f"hand_{name[0]}"])
 
 
-def drag(page: Page, camera: Camera, start: np.ndarray, way: np.ndarray) -> None:
-    """Drag the arrow of a hand's gizmo along one axis by ``way`` [m]."""
-    grip = start + GRIP_M * np.abs(np.sign(way))
-    (x0, y0), (x1, y1) = camera.project(grip), camera.project(grip + way)
+def drag(page: Page, camera: Camera, start: np.ndarray, offset: np.ndarray) -> None:
+    """Drag the arrow of a hand's gizmo along one axis by ``offset`` [m]."""
+    grip = start + GRIP_M * np.abs(np.sign(offset))
+    (x0, y0), (x1, y1) = camera.project(grip), camera.project(grip + offset)
     page.mouse.move(x0, y0)
     page.wait_for_timeout(400)
     page.mouse.down()

@@ -29,7 +29,7 @@ def show(server: str, cell: str) -> None:
     patient_http.put(world, json={"cell": cell}).raise_for_status()
 
 
-def test_line_puts_a_hand_in_the_way_and_stays_away_once_dismissed(
+def test_hint_places_a_hand_before_the_robot_and_stays_dismissed(
     open_page: Callable[..., Page], clean: str
 ) -> None:
     page = open_page(scene=False)

@@ -34,7 +34,7 @@ def override(page: Page) -> float:
     return float(shown or "nan")
 
 
-def test_visitor_opens_the_cell_sees_it_reach_and_gets_in_its_way(
+def test_visitor_opens_the_cell_sees_it_reach_and_obstructs_it(
     open_page: Callable[..., Page], server: str
 ) -> None:
     page = open_page(scene=False)

@@ -114,7 +114,7 @@ def test_scene_follows_into_other_cells_and_back_in_every_window(
     ids=["its canvas is gone", "its graphics context is lost", "it draws no more"],
 )
 @pytest.mark.usefixtures("shown")
-def test_scene_that_has_died_is_loaded_again_and_the_visitor_is_told(
+def test_failed_scene_is_reloaded_with_a_message(
     open_page: Callable[..., Page], harm: str
 ) -> None:
     page = open_page((500, 600))

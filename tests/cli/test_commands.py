@@ -214,16 +214,16 @@ def test_motion_files_are_asked_for_and_refused_by_protocol(
     clip: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["evaluate", "pick-mocap"]) == 2
-    assert "FILE = [] must hold at least one" in (told := capsys.readouterr().err)
-    assert "evaluate pick-mocap FILE ..." in told
+    assert "FILE = [] must hold at least one" in (printed := capsys.readouterr().err)
+    assert "evaluate pick-mocap FILE ..." in printed
     assert main(["evaluate", "pick-single", str(clip)]) == 2
-    told = capsys.readouterr().err
-    assert "wave.csv'] must not be given to pick-single" in told and "pick-mocap" in told
+    printed = capsys.readouterr().err
+    assert "wave.csv'] must not be given to pick-single" in printed and "pick-mocap" in printed
     assert main(["evaluate", "pick-mocap", str(clip.with_name("none.csv"))]) == 2
     assert "cannot be read: No such file" in capsys.readouterr().err
 
 
-def test_every_fault_of_every_bad_motion_file_is_told(
+def test_every_fault_of_every_bad_motion_file_is_reported(
     clip: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     torn, wrong = clip.with_name("torn.csv"), clip.with_name("wrong.txt")

@@ -290,7 +290,7 @@ def test_more_pipelined_requests_than_are_taken_end_the_connection(small: Small)
     assert small.peak_memory - before < MAX_GROWTH
 
 
-def test_an_answer_on_its_way_is_finished_before_a_refusal_ends_the_connection(
+def test_answer_in_progress_is_finished_before_a_refusal_ends_the_connection(
     small: Small,
 ) -> None:
     slow = b"GET /slow HTTP/1.1\r\n" + BEARER + b"\r\n"
@@ -319,7 +319,7 @@ def test_a_handshake_beyond_the_limits_of_websockets_is_refused(small: Small) ->
         assert refused.value.response.status_code == 431
 
 
-def test_idle_connections_give_way_to_new_ones() -> None:
+def test_idle_connections_are_closed_for_new_ones() -> None:
     n_clients = http_limits.MAX_CONNECTIONS + 40
     with serving() as small, ExitStack() as stack:
         idle = [stack.enter_context(small.connect()) for _ in range(n_clients)]

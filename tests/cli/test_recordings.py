@@ -23,10 +23,10 @@ def test_import_tells_frames_error_and_runs(
     clip: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["recordings", "import", str(clip)]) == 0
-    told = capsys.readouterr().out
-    assert "someone: 200 frames, 3.98 s, bvh in mm" in told
-    assert "0 artifacts" in told
-    assert "frames 0 to 199: 3.98 s" in told
+    printed = capsys.readouterr().out
+    assert "someone: 200 frames, 3.98 s, bvh in mm" in printed
+    assert "0 artifacts" in printed
+    assert "frames 0 to 199: 3.98 s" in printed
 
 
 def test_import_gives_the_same_as_data(clip: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -38,7 +38,7 @@ def test_import_gives_the_same_as_data(clip: Path, capsys: pytest.CaptureFixture
     assert found["body_m"]["forearm_r"] == pytest.approx(0.26)
 
 
-def test_bad_file_is_told_with_line_and_rule(
+def test_bad_file_is_reported_with_line_and_rule(
     clip: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     clip.write_text(clip.read_text().replace("Frames: 200", "Frames: 300"), encoding="utf-8")
@@ -62,14 +62,14 @@ def test_kept_recording_is_listed_shown_and_removed(
     assert main(["recordings", "list"]) == 0
     assert "no recording is stored" in capsys.readouterr().out
     assert main(["recordings", "import", str(clip), "--keep"]) == 0
-    told = capsys.readouterr().out
-    assert told.endswith("is stored as someone\n")
+    printed = capsys.readouterr().out
+    assert printed.endswith("is stored as someone\n")
     assert main(["recordings", "import", str(clip), "--keep", "--json"]) == 0
     assert not json.loads(capsys.readouterr().out)["new"]
     assert main(["recordings", "list"]) == 0
     assert "1 clean runs, wrists p99 0.0" in capsys.readouterr().out
     assert main(["recordings", "show", "someone"]) == 0
-    assert told.startswith(capsys.readouterr().out.strip())
+    assert printed.startswith(capsys.readouterr().out.strip())
     assert main(["recordings", "remove", "someone"]) == 0
     assert main(["recordings", "show", "someone"]) == 2
     assert "no recording 'someone'" in capsys.readouterr().err
@@ -146,7 +146,7 @@ def test_names_of_joints_and_columns_can_be_mapped(
         (["remove", "someone"], "there is no database at"),
     ],
 )
-def test_wrong_call_is_told(
+def test_wrong_call_is_reported(
     clip: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], text: str
 ) -> None:
     given = [one.replace("{clip}", str(clip)) for one in arguments]

@@ -39,7 +39,7 @@ def test_import_that_takes_too_long_is_ended_and_named(monkeypatch: pytest.Monke
         ImportProcess()(CLIP, *ASKED)
 
 
-def test_process_that_dies_is_told_and_its_last_words_are_logged(
+def test_process_that_dies_is_reported_and_its_output_is_logged(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setenv("PYTHONHOME", "/nowhere")  # no interpreter starts from there

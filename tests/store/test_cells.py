@@ -33,7 +33,7 @@ def test_cells_are_listed_by_name(store: Store) -> None:
     assert [record.name for record in cells.list_cells(store)] == ["a", "b", "c"]
 
 
-def test_cell_that_nobody_stored_is_not_found(store: Store) -> None:
+def test_unknown_cell_is_not_found(store: Store) -> None:
     with pytest.raises(NotFound):
         cells.get_cell(store, "kitchen")
     with pytest.raises(NotFound):

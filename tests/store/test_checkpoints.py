@@ -108,7 +108,7 @@ def test_list_of_a_job_shows_its_own(store: Store, claim: Claim) -> None:
     assert len(checkpoints.list_checkpoints(store).items) == 3
 
 
-def test_dropped_checkpoint_stays_while_somebody_names_it(store: Store, claim: Claim) -> None:
+def test_dropped_checkpoint_stays_while_it_is_referenced(store: Store, claim: Claim) -> None:
     other = second_job(store)
     for step, content in enumerate([b"lost", b"shared", b"named", b"imported"]):
         attempts.record_checkpoint(store, claim, step, policy(content))

@@ -71,7 +71,7 @@ def test_recording_of_a_removed_one_s_name_has_another_number(store: Store) -> N
     assert recordings.recording_number(store, "wave") > first
 
 
-def test_recording_that_nobody_stored_is_not_found(store: Store) -> None:
+def test_unknown_recording_is_not_found(store: Store) -> None:
     for read in (recordings.read_runs, recordings.recording_number):
         with pytest.raises(NotFound):
             read(store, "wave")

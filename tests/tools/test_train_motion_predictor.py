@@ -34,10 +34,10 @@ def test_a_moment_is_what_it_says() -> None:
 def test_the_shipped_networks_do_much_better_than_constant_motion_errors() -> None:
     net = new_motion_predictor()
     radius = errors(net.radius, OTHERS.radius_seen, OTHERS.radius)
-    way = errors(net.path, OTHERS.path_seen, OTHERS.path)
+    path_error = errors(net.path, OTHERS.path_seen, OTHERS.path)
     linear, constant = constant_motion_errors(OTHERS)
     assert (radius[5:] < 0.5 * linear[5:]).all()
-    assert (way[5:] < 0.6 * constant[5:]).all()
+    assert (path_error[5:] < 0.6 * constant[5:]).all()
 
 
 def test_learning_makes_the_errors_small() -> None:

@@ -80,7 +80,7 @@ def test_skinned_meshes_stay(server: ViewerServer, cell: str, life: Sequence[Com
             for _ in range(STEPS if isinstance(command, commands.SetAnthropometry) else 1):
                 world.step()
                 scene.draw(world.snapshot(), work_cell.robot.dt)
-            # What is sent late is never sent: a mesh that goes before its window was told.
+            # A mesh that is removed before its time window ends is never sent.
             server.scene.add_frame(f"/done/{k}")
             visitor.wait_for("FrameMessage", f"/done/{k}")
         kinds: dict[str, set[str]] = {}

@@ -1,4 +1,4 @@
-// One line over the scene for whoever sees it first: what to try, and a button that sets it up.
+// Hint over the scene on the first visit: what to try, and a button that sets it up.
 import { html, useState } from "./vendor/htm-preact-standalone.module.js";
 import { Icon } from "./icons.js";
 

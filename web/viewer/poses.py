@@ -57,13 +57,13 @@ def yaw_of(quaternion: Vec) -> float:
     return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
-def part_way(first: Vec, second: Vec, share: float) -> Vec:
-    """Return the rotation a share of the shortest way from ``first`` to ``second``, (3, 3).
+def interpolate_rotation(first: Vec, second: Vec, share: float) -> Vec:
+    """Return the rotation between two rotations on the shortest arc, shape (3, 3).
 
     Args:
         first: Rotation matrix at share 0, shape (3, 3).
         second: Rotation matrix at share 1, shape (3, 3).
-        share: Between 0 and 1.
+        share: Interpolation parameter, 0 to 1.
     """
     turn = first.T @ second
     w, x, y, z = orientation(turn)

@@ -99,11 +99,11 @@ async def stream(world: WorldDep, services: ServicesDep) -> AsyncIterator[Server
 def set_cell(world_id: str, body: WorldCell, services: ServicesDep) -> WorldSummary:
     """Stop the world and start it in a cell to pick and place, sort or reach in; streams end.
 
-    The policy is the one that is named, else the one that ships with the cell, else the newest
-    that was trained in it, else none: the robot rests. In a sorting cell the shipped policy may
-    act where the cell differs from its own in nothing but stations; the sorter is the one that
-    is named, else the one that ships with the cell, else the exact planner. In a cell with
-    goals to reach and no policy the robot goes straight to them.
+    The policy is the named one, else the shipped one of the cell, else the newest trained in
+    it, else none: the robot is idle. In a sorting cell the shipped policy may act where the
+    cell differs from its own only in stations; the sorting policy is the named one, else the
+    shipped one of the cell, else the exact planner. In a reach cell without a policy the robot
+    moves straight to its goals.
     """
     services.world(world_id)
     cell = services.cells.get(body.cell)
@@ -113,23 +113,23 @@ def set_cell(world_id: str, body: WorldCell, services: ServicesDep) -> WorldSumm
         if body.sorting_policy is not None:
             require_sorting_policy(services.sorting_policies.load(body.sorting_policy), cell)
         reference = body.checkpoint
-        pilot = (
+        reach_policy = (
             named_reach_policy(reference, cell, services)
             if reference
             else reach_policy_for(cell, services)
         )
-        return _replace_world(world_id, cell, None, None, pilot, services)
+        return _replace_world(world_id, cell, None, None, reach_policy, services)
     if body.checkpoint is None:
         policy = task_policy_for(cell, services)
     else:
         policy = services.task_policies.load(body.checkpoint)
         require_task_policy(policy, cell, services)
     if body.sorting_policy is None:
-        sorter = sorting_policy_for(cell, services)
+        sorting_policy = sorting_policy_for(cell, services)
     else:
-        sorter = services.sorting_policies.load(body.sorting_policy)
-        require_sorting_policy(sorter, cell)
-    return _replace_world(world_id, cell, policy, sorter, None, services)
+        sorting_policy = services.sorting_policies.load(body.sorting_policy)
+        require_sorting_policy(sorting_policy, cell)
+    return _replace_world(world_id, cell, policy, sorting_policy, None, services)
 
 
 def _replace_world(

@@ -160,30 +160,30 @@ def test_terms_add_up_to_the_distance_that_is_required(client: TestClient) -> No
         0.03,
     )
     assert one["reaction_time"] == pytest.approx(0.02 + 0.1 + 0.1)
-    way = one["human_speed"] * (one["reaction_time"] + one["stop_time"])
-    way += one["robot_speed"] * one["reaction_time"] + one["braking"] + 0.05 + 0.03
-    assert one["required"] == pytest.approx(way + one["protective_distance"])
+    distance = one["human_speed"] * (one["reaction_time"] + one["stop_time"])
+    distance += one["robot_speed"] * one["reaction_time"] + one["braking"] + 0.05 + 0.03
+    assert one["required"] == pytest.approx(distance + one["protective_distance"])
 
 
 def test_who_is_seen_to_walk_past_does_not_hold_the_robot_where_velocities_are_measured(
     client: TestClient,
 ) -> None:
-    def told(vy: float, **safety: object) -> dict[str, Any]:
+    def reply(vy: float, **safety: object) -> dict[str, Any]:
         walker = {**WALKER, "x": 0.0, "y": 1.12, "vx": 0.0, "vy": vy}
         answer = asked(client, people=[walker], safety=safety)
         found: dict[str, Any] = answer["safety"]
         return found
 
-    assumed, measured = told(0.0), told(0.0, use_measured_velocity=True)
+    assumed, measured = reply(0.0), reply(0.0, use_measured_velocity=True)
     assert assumed["override"] < measured["override"] == 1.0
     assert assumed["terms"]["human_speed"] == 1.6
     assert measured["terms"]["human_speed"] == pytest.approx(0.1)
-    toward = told(-1.0, use_measured_velocity=True, speed_change=0.3)
+    toward = reply(-1.0, use_measured_velocity=True, speed_change=0.3)
     assert toward["terms"]["human_speed"] == pytest.approx(1.3, abs=0.05)
     assert toward["override"] < 1.0
 
 
-def test_somebody_inside_the_robot_is_a_stop_with_monitoring_and_a_problem_without(
+def test_overlapping_person_is_a_stop_with_monitoring_and_a_problem_without(
     client: TestClient,
 ) -> None:
     robot, people = {"q": HOME, "qd": [0.05] * 6}, [FAR, INSIDE]
@@ -209,7 +209,7 @@ def test_several_people_of_any_kind_are_taken(client: TestClient) -> None:
     assert averaged["act"] != nearest["act"]
 
 
-def test_a_decision_is_played_ahead_unless_told_not_to(client: TestClient) -> None:
+def test_rollout_is_the_default_and_can_be_disabled(client: TestClient) -> None:
     there = asked(client)
     assert there["rollout"] is True
     alone = asked(client, rollout=False)
@@ -450,8 +450,8 @@ def test_a_socket_outlives_text_and_integers_that_nothing_takes(
 ) -> None:
     with client.websocket_connect(SOCKET) as one:
         one.send_text(json.dumps({**TASK, **change, "stamp": "s1"}))
-        told = one.receive_json()
-        assert (told["status"], told["field"], told["stamp"]) == (422, field, "s1")
+        reply = one.receive_json()
+        assert (reply["status"], reply["field"], reply["stamp"]) == (422, field, "s1")
         for text in ("[" * 60_000, '{"a": ' * 10_000, "[" * 100 + "]" * 100):
             one.send_text(text)
             assert one.receive_json()["status"] in (400, 422)

@@ -75,7 +75,7 @@ def test_goal_safety_and_people_are_changed(client: TestClient) -> None:
     until(client, lambda one: one["reach"]["goal"] != now["reach"]["goal"])
 
 
-def test_policy_is_named_and_asked_in_its_ways(client: TestClient) -> None:
+def test_policy_is_named_and_queried_in_its_inference_modes(client: TestClient) -> None:
     services: Services = client.app.state.services  # type: ignore[attr-defined]
     made = untrained_reach(width=32)
     put_checkpoint(

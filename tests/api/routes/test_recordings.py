@@ -120,7 +120,7 @@ def test_option_that_is_none_is_refused_with_the_choices(
     assert answer.json()["field"] == field and answer.json()["choices"]
 
 
-def test_joints_beyond_their_limits_are_told(client: TestClient) -> None:
+def test_joints_beyond_their_limits_are_reported(client: TestClient) -> None:
     q = working(100)
     q[:, 13] = Q_MAX[13] + 0.2
     answer = post(client, csv_text(q).encode(), file_name="bent.csv")
@@ -202,7 +202,7 @@ def test_file_that_is_no_recording_is_named_with_place_and_rule(
     assert client.get("/v1/recordings").json() == {"items": []}
 
 
-def test_unit_that_is_nobody_s_is_named(client: TestClient) -> None:
+def test_unknown_unit_is_named(client: TestClient) -> None:
     content = bvh_text(working(200), unit=0.000_001).encode()
     answer = post(client, content, file_name="tiny.bvh")
     assert answer.status_code == 422

@@ -15,7 +15,7 @@ from app.store.records import NewCheckpoint
 
 URL = "/v1/sorting"
 JSON = {"Content-Type": "application/json"}
-ALIAS = "untrained-sorter"
+ALIAS = "untrained-sorting"
 
 TASK: dict[str, Any] = {
     "cell": "sorting-e0",
@@ -28,11 +28,11 @@ TASK: dict[str, Any] = {
     ],
     "goal": {"red": ["large", "small"], "blue": ["medium"]},
 }
-"""Two blue objects stand in the way; of two large red ones the one in cell5 never fails."""
+"""Two blue objects stand in the parents; of two large red ones the one in cell5 never fails."""
 
 
 @pytest.fixture(scope="module")
-def sorter(client: TestClient) -> str:
+def checkpoint(client: TestClient) -> str:
     """A policy at the start of its training, in the store of the service."""
     preset = presets.resolve(
         "sorting-e0-dqn", {"networks": {"width": 16}, "learning": {"n_envs": 8}}
@@ -75,7 +75,7 @@ def planned(task: dict[str, Any]) -> dict[str, Any]:
     return {**task, "decider": "planner"}
 
 
-def test_planner_takes_what_is_in_the_way_first(client: TestClient) -> None:
+def test_planner_first_removes_blocks_above(client: TestClient) -> None:
     answer = asked(client, planned(TASK))
     assert (answer["by"], answer["why"], answer["solved"]) == ("planner", "asked", False)
     assert answer["move"]["object"] == "e"
@@ -127,10 +127,14 @@ def test_goal_and_objects_may_change_between_two_calls(client: TestClient) -> No
     assert answer["fewest_moves"] == 2
 
 
-def test_policy_decides_by_its_greatest_value(client: TestClient, sorter: str) -> None:
-    answer = asked(client, {**TASK, "checkpoint": sorter})
+def test_policy_decides_by_its_greatest_value(client: TestClient, checkpoint: str) -> None:
+    answer = asked(client, {**TASK, "checkpoint": checkpoint})
     values = [one["value"] for one in answer["moves"]]
-    assert (answer["by"], answer["why"], answer["checkpoint"]) == ("policy", "policy", sorter)
+    assert (answer["by"], answer["why"], answer["checkpoint"]) == (
+        "policy",
+        "policy",
+        checkpoint,
+    )
     assert values == sorted(values, reverse=True)
     assert answer["fewest_moves"] == 4
     by_alias = asked(client, {**TASK, "checkpoint": ALIAS})
@@ -149,7 +153,7 @@ def test_shipped_policy_of_the_cell_decides_where_none_is_named(client: TestClie
     assert deciders == ["policy"] * 4
 
 
-@pytest.mark.usefixtures("sorter")
+@pytest.mark.usefixtures("checkpoint")
 def test_planner_takes_over_and_the_goal_is_reached(client: TestClient) -> None:
     task: dict[str, Any] = {**TASK, "checkpoint": ALIAS}
     deciders = []
@@ -164,14 +168,14 @@ def test_planner_takes_over_and_the_goal_is_reached(client: TestClient) -> None:
     assert deciders[-1] in ("repeated", "attempts-exceeded")
 
 
-@pytest.mark.usefixtures("sorter")
+@pytest.mark.usefixtures("checkpoint")
 def test_without_the_record_nothing_is_remembered(client: TestClient) -> None:
     first, second = (asked(client, {**TASK, "checkpoint": ALIAS}) for _ in range(2))
     assert first["monitor"] == second["monitor"]
     assert first["moves"] == second["moves"]
 
 
-@pytest.mark.usefixtures("sorter")
+@pytest.mark.usefixtures("checkpoint")
 @pytest.mark.parametrize(
     ("goal", "field"),
     [
@@ -187,7 +191,7 @@ def test_goal_that_no_policy_was_trained_for_is_left_to_the_planner(
     assert [one["field"] for one in answer["outside"]] == [field]
 
 
-@pytest.mark.usefixtures("sorter")
+@pytest.mark.usefixtures("checkpoint")
 def test_failures_beyond_those_of_the_training_are_said(client: TestClient) -> None:
     task = {**TASK, "failure_map": {"cell7": 0.75}, "checkpoint": ALIAS}
     assert asked(client, task)["outside"] == [
@@ -195,7 +199,7 @@ def test_failures_beyond_those_of_the_training_are_said(client: TestClient) -> N
     ]
 
 
-@pytest.mark.usefixtures("sorter")
+@pytest.mark.usefixtures("checkpoint")
 def test_policy_of_another_size_of_task_leaves_it_to_the_planner(client: TestClient) -> None:
     layout = {"n_cells": 3, "colours": ["red", "blue"]}
     objects = [{"colour": "red", "size": "small", "at": "cell1"}]
@@ -233,9 +237,9 @@ def test_largest_task_is_answered(client: TestClient) -> None:
 def changed(path: str, value: Any) -> dict[str, Any]:
     """The task with one member replaced; ``path`` such as ``objects.0.at``."""
     task = copy.deepcopy(TASK)
-    *way, last = [int(part) if part.isdigit() else part for part in path.split(".")]
+    *parents, last = [int(part) if part.isdigit() else part for part in path.split(".")]
     place: Any = task
-    for part in way:
+    for part in parents:
         place = place[part]
     place[last] = value
     return task
@@ -319,7 +323,7 @@ def test_planner_and_a_checkpoint_at_once_are_refused(client: TestClient) -> Non
     assert problem["field"] == "checkpoint"
 
 
-@pytest.mark.usefixtures("sorter")
+@pytest.mark.usefixtures("checkpoint")
 @pytest.mark.parametrize(
     ("member", "value", "field"),
     [
@@ -344,14 +348,14 @@ def test_record_that_was_tampered_with_is_refused(
 
 
 def test_policy_that_sorts_is_refused_where_tasks_are_chosen(
-    client: TestClient, sorter: str
+    client: TestClient, checkpoint: str
 ) -> None:
     body = {
         "cell": "pick-and-place",
         "robot": {"q": [0.99, -2.33, 2.08, -1.32, -1.57, 0], "qd": [0.0] * 6},
         "people": [],
         "candidates": [{"id": "left", "position": [-0.5, 0.7, 0.12]}],
-        "checkpoint": sorter,
+        "checkpoint": checkpoint,
     }
     answer = client.post("/v1/task-selection", json=body)
     assert answer.status_code == 409
@@ -361,9 +365,9 @@ def test_policy_that_sorts_is_refused_where_tasks_are_chosen(
 
 
 def test_policy_that_sorts_is_refused_as_the_one_that_moves_an_arm(
-    client: TestClient, sorter: str
+    client: TestClient, checkpoint: str
 ) -> None:
-    command = {"tag": "set-policy", "checkpoint": sorter}
+    command = {"tag": "set-policy", "checkpoint": checkpoint}
     answer = client.post("/v1/worlds/main/commands", json=command)
     assert (answer.status_code, answer.json()["field"]) == (409, "purpose")
 

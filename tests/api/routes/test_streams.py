@@ -56,7 +56,7 @@ def test_stream_tells_of_the_people_without_their_joints(address: str) -> None:
     assert "q" not in person
 
 
-def test_stream_of_a_world_ends_when_it_is_started_anew(address: str) -> None:
+def test_stream_of_a_world_ends_when_it_is_restarted(address: str) -> None:
     with patient_http.stream("GET", f"{address}/v1/worlds/main/events") as response:
         stream = events(response)
         next(stream)

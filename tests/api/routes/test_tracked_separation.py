@@ -223,7 +223,7 @@ def test_a_tracker_of_another_frame_stops_the_robot(seen_before: bool) -> None:
     assert person.age_s == (pytest.approx(1.0) if seen_before else None)
 
 
-def test_somebody_far_away_does_not_make_a_hidden_person_forgotten() -> None:
+def test_distant_person_does_not_replace_a_hidden_one() -> None:
     scene = Scene(np.random.default_rng(6))
     scene.place = np.array([0.0, 1.6])
     scene.watch(30)
@@ -254,7 +254,7 @@ def test_an_arm_that_is_not_seen_is_monitored_wherever_it_can_reach() -> None:
     assert not decide_beside(scene).people[0].monitored_as_cylinder
 
 
-def test_a_silent_tracker_that_has_seen_nobody_stops_the_robot() -> None:
+def test_silent_tracker_without_observed_people_stops_the_robot() -> None:
     scene = Scene(np.random.default_rng(4))
     assert scene.session.n_frames == 0
     before = decide_beside(scene)

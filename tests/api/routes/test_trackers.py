@@ -70,7 +70,7 @@ def test_exchanged_people_keep_their_places_and_it_is_named(
         assert two["q"][0] == pytest.approx(one["q"][0], abs=0.05)
 
 
-def test_nobody_seen_goes_stale_and_that_is_said(client: TestClient, tracker: str) -> None:
+def test_empty_observation_becomes_stale(client: TestClient, tracker: str) -> None:
     fed(client, tracker, 10)
     gone = client.post(f"{tracker}/frames", json=frame(2.0)).json()["people"]
     assert all(one["stale"] and "stale" in one["flags"] for one in gone)
@@ -78,7 +78,7 @@ def test_nobody_seen_goes_stale_and_that_is_said(client: TestClient, tracker: st
     assert gone[0]["cylinder"]["radius"] > 1.5
 
 
-def test_before_anybody_is_seen_there_is_nobody(client: TestClient, tracker: str) -> None:
+def test_no_people_before_the_first_observation(client: TestClient, tracker: str) -> None:
     person = client.post(f"{tracker}/frames", json=frame(0.0)).json()["people"][0]
     assert person["flags"] == ["never-seen"]
     assert person["q"] is person["cylinder"] is person["age_s"] is None
@@ -154,7 +154,7 @@ def test_followed_people_can_be_named_in_a_decision(
         ({"tracker": "gone"}, "people[0].tracker", "no open tracker"),
     ],
 )
-def test_somebody_who_is_not_followed_is_refused(
+def test_person_that_is_not_tracked_is_refused(
     client: TestClient,
     tracker: str,
     state: dict[str, Any],
@@ -190,7 +190,7 @@ def test_a_frame_that_cannot_be_is_refused_and_leaves_no_trace(
     assert mine["n_frames"] == 12 and mine["t"] == before["t"]
 
 
-def test_more_people_than_are_followed_cost_nobody_anything(
+def test_people_beyond_the_limit_leave_tracked_ones_unchanged(
     client: TestClient, tracker: str
 ) -> None:
     fed(client, tracker, 5)
@@ -210,7 +210,7 @@ def test_more_people_than_are_followed_cost_nobody_anything(
     assert client.get(tracker).json()["unfollowed"] == answer["unfollowed"]
 
 
-def test_somebody_in_another_frame_is_told_and_others_are_followed(
+def test_person_in_another_frame_is_reported_and_others_are_tracked(
     client: TestClient, tracker: str
 ) -> None:
     fed(client, tracker, 5)

@@ -138,7 +138,7 @@ def drag_of_the_pelvis() -> bytes:
     )
 
 
-def test_one_viewer_too_many_is_told_why_and_gets_in_once_another_has_left(
+def test_viewer_beyond_the_limit_gets_the_reason_and_connects_once_another_has_left(
     address: str,
 ) -> None:
     with ExitStack() as stack:

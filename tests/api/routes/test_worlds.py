@@ -191,7 +191,7 @@ def test_unknown_world_is_not_found(client: TestClient) -> None:
         assert answer.json()["known"] == ["main"]
 
 
-def test_world_starts_anew_in_a_cell_of_the_user_s_own(client: TestClient) -> None:
+def test_world_restarts_in_a_cell_of_the_user(client: TestClient) -> None:
     client.post("/v1/cells", json=workshop.definition(title="Nobody has trained here"))
     try:
         answer = client.put(f"{WORLD}/cell", json={"cell": "workshop"})

@@ -26,7 +26,7 @@ def test_velocity_tells_where_a_walker_is_one_period_later(walkers: LivePedestri
         )
 
 
-def test_nobody_stays_for_good(walkers: LivePedestrians) -> None:
+def test_people_at_a_target_walk_on(walkers: LivePedestrians) -> None:
     last = walkers.cylinders[0, :2].copy()
     for _ in range(8):
         for _ in range(1500):
@@ -41,10 +41,10 @@ def test_dragged_person_follows_with_bounded_speed_and_arrives(
     walkers[0].drag(commands.MovePerson(pelvis=(0.5, 1.5, 0.0)))
     for _ in range(300):
         before = walkers.cylinders[0, :2].copy()
-        told = walkers[0].seen().qd[:2].copy()
+        velocity = walkers[0].seen().qd[:2].copy()
         walkers.move(DT)
         step = walkers.cylinders[0, :2] - before
-        assert np.allclose(step, told * DT, atol=1e-9)
+        assert np.allclose(step, velocity * DT, atol=1e-9)
         assert np.linalg.norm(step) <= DRAG_SPEED * DT + 1e-9
     assert np.allclose(walkers.cylinders[0, :2], (0.5, 1.5), atol=1e-3)
 

@@ -92,14 +92,14 @@ def test_people_stand_apart_at_the_start(world: LivePickWorld, cell: Cell, n: in
     assert min(gaps) > 0.0
 
 
-def test_everyone_has_stations_of_both_kinds_and_all_are_shared_out(cell: Cell) -> None:
+def test_people_have_stations_of_both_kinds_and_all_stations_are_assigned(cell: Cell) -> None:
     for n in (1, 2, 3, 4):
         places = [place_of(cell, k, n) for k in range(n)]
         assert all(one.stations_of("cube") and one.stations_of("dock") for one in places)
         assert {s.id for one in places for s in one.stations} == set(cell.station_ids)
 
 
-def test_ids_stay_when_somebody_leaves_and_are_given_again(cell: Cell) -> None:
+def test_ids_are_constant_and_reused_after_removal(cell: Cell) -> None:
     people = LiveWorkers(cell, seed=1)
     for _ in range(2):
         people.change(commands.AddPerson())
@@ -109,7 +109,7 @@ def test_ids_stay_when_somebody_leaves_and_are_given_again(cell: Cell) -> None:
     assert people.ids == (0, 1, 2)
 
 
-def test_nobody_jumps_when_somebody_comes_or_leaves(world: LivePickWorld) -> None:
+def test_people_move_continuously_when_one_comes_or_leaves(world: LivePickWorld) -> None:
     run(world, 60)
     for command in (
         commands.AddPerson(),
@@ -221,8 +221,8 @@ def test_recorded_motion_is_played_at_the_table_at_its_own_pace_and_size_of_path
         places.append(now.q[:2])
         yaws.append(now.q[2])
         times.append(now.motion.t_s)
-    ways = np.linalg.norm(np.array(places) - places[0], axis=1)
-    assert ways.max() == pytest.approx(0.3, abs=0.01)
+    distances = np.linalg.norm(np.array(places) - places[0], axis=1)
+    assert distances.max() == pytest.approx(0.3, abs=0.01)
     x, _, yaw = cell.human.home
     assert np.median(places, axis=0)[0] == pytest.approx(x, abs=0.02)
     assert np.min(places, axis=0)[1] == pytest.approx(cell.human.y_min, abs=0.02)
@@ -256,7 +256,7 @@ def test_recorded_motion_loops_without_a_jump(world: LivePickWorld) -> None:
     assert begun >= 2
 
 
-def test_recorded_path_that_leaves_the_area_is_told(world: LivePickWorld) -> None:
+def test_recorded_path_that_leaves_the_area_is_reported(world: LivePickWorld) -> None:
     play(world, walk=1.0)
     seen = [run(world, 1).people[0] for _ in range(39)]
     assert seen[0].motion is not None
@@ -265,7 +265,7 @@ def test_recorded_path_that_leaves_the_area_is_told(world: LivePickWorld) -> Non
     assert 0.2 < seen[0].motion.outside_share < 0.8
 
 
-def test_body_is_where_it_was_recorded_and_policies_are_told_the_limits(
+def test_body_follows_the_recording_and_policies_observe_the_limits(
     world: LivePickWorld,
 ) -> None:
     start = play(world, shoulder=3.5).people[0]
@@ -342,7 +342,7 @@ def test_fifth_person_is_refused(world: LivePickWorld) -> None:
         world.apply(commands.AddPerson())
 
 
-def test_nobody_can_be_moved_in_an_empty_cell(world: LivePickWorld) -> None:
+def test_people_commands_are_refused_in_an_empty_cell(world: LivePickWorld) -> None:
     world.apply(commands.RemovePerson(person=0))
     with pytest.raises(InvalidInput, match="empty"):
         world.apply(commands.SetMode(mode="manual"))

@@ -134,7 +134,7 @@ def test_speed_given_to_the_policy_is_the_speed_of_the_movement(world: LivePickW
     assert np.allclose(after.person_qd, (after.person_q - before.person_q) / 0.05)
 
 
-def test_contact_is_told_and_the_robot_starts_again_from_home(
+def test_contact_is_reported_and_the_robot_restarts_from_home(
     world: LivePickWorld, cell: Cell
 ) -> None:
     world.apply(commands.SetCandidates(ids=("cube2",)))

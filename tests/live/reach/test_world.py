@@ -69,7 +69,7 @@ def test_goal_that_follows_stays_until_it_is_dragged_away() -> None:
     assert until(world, lambda now: now.counters.reached == 2).reach.goal[0] == 0.4
 
 
-def test_goal_can_be_drawn_anew_while_the_robot_moves() -> None:
+def test_goal_can_be_drawn_again_while_the_robot_moves() -> None:
     world = empty_world()
     for _ in range(20):
         world.step()
@@ -92,7 +92,7 @@ def test_person_beside_the_robot_slows_it_down_and_the_message_says_by_how_much(
     assert (safety.person, safety.on) == (0, True)
 
 
-def test_robot_stops_before_a_person_who_stays_on_its_way_and_goes_on_afterwards() -> None:
+def test_robot_stops_before_a_standing_person_and_continues_afterwards() -> None:
     world = LiveReachWorld(CELL, None, seed=3)
     standing_at(world, 0.0, 0.9)
     stopped = until(world, lambda now: now.reach.safety.override == 0.0)
@@ -118,7 +118,7 @@ def test_person_who_walks_into_the_standing_robot_is_no_contact() -> None:
     assert "stands still" in after.message
 
 
-def test_without_the_layer_the_robot_runs_into_whom_it_does_not_see() -> None:
+def test_without_the_layer_the_robot_hits_an_unobserved_person() -> None:
     world = LiveReachWorld(CELL, None, seed=3)
     world.apply(SetSafety(on=False))
     world.apply(SetGoalMode(mode="follow"))
@@ -180,7 +180,7 @@ def test_same_seed_gives_the_same_run() -> None:
     assert ends[0].people[0].cylinder == ends[1].people[0].cylinder
 
 
-def test_reset_begins_anew_with_everything_at_zero() -> None:
+def test_reset_sets_time_and_counters_to_zero() -> None:
     world = empty_world()
     until(world, lambda now: now.counters.reached == 1)
     world.apply(commands.Reset())

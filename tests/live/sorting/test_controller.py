@@ -29,17 +29,17 @@ def test_duplicates_that_fail_as_rarely_are_options_and_riskier_ones_are_not(
 
 
 def test_block_that_was_not_reached_is_left_for_one_as_good(table: SortingTable) -> None:
-    sorter = SortController(None)
-    first = sorter.choose(table)
+    controller = SortController(None)
+    first = controller.choose(table)
     assert first is not None
-    sorter.avoid(first.move.pick)
-    second = sorter.choose(table)
+    controller.avoid(first.move.pick)
+    second = controller.choose(table)
     assert second is not None
     assert second.move.pick != first.move.pick
     assert second.move.place == RED
 
 
-def test_held_block_goes_on_while_its_way_is_as_short_as_any(table: SortingTable) -> None:
+def test_held_block_keeps_its_place_while_on_a_shortest_plan(table: SortingTable) -> None:
     table.lift(9)
     on = SortController(None).choose(table, Move(9, RED))
     assert on is not None

@@ -94,9 +94,7 @@ def test_held_block_whose_cell_was_taken_is_put_into_another() -> None:
     assert sorted(one.place for one in end.sorting.pieces) == ["cell0", "cell5"]
 
 
-def test_place_that_somebody_fills_while_the_robot_puts_a_block_down_is_not_used_twice() -> (
-    None
-):
+def test_place_occupied_during_placement_is_not_used_twice() -> None:
     world = empty_world()
     lay(world, {"cell5": "red-large", "cell9": "red-small"}, {"red": ("large",)})
     until(world, phase("place"))
@@ -131,7 +129,7 @@ def test_grasps_fail_as_often_as_the_cell_says() -> None:
     assert abs(failures / attempts - 0.37) < spread
 
 
-def test_limits_of_the_joints_hold_along_the_whole_way() -> None:
+def test_joint_limits_hold_along_the_whole_motion() -> None:
     world = empty_world()
     robot = world.cell.robot
     lay(world, {"cell2": "red-large", "cell9": "blue-small"}, {"red": ("large",)})
@@ -199,7 +197,7 @@ def test_duplicate_in_a_riskier_cell_is_left_and_the_message_says_so() -> None:
     )
 
 
-def test_planner_takes_over_from_a_sorter_that_goes_in_circles() -> None:
+def test_planner_replaces_a_policy_that_cycles() -> None:
     shape = SortingShape(n_cells=10, n_colours=2)
     to_blue = [Move(k, 11) for k in range(10)]
     back = [Move(11, k) for k in range(10)]

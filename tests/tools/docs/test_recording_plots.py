@@ -36,13 +36,13 @@ def test_errors_are_those_of_the_clean_frames_alone(found: ClipErrors) -> None:
     assert np.isfinite(wrist[[0, -1]]).all()
 
 
-def test_frames_beside_a_glitch_are_told_as_dropped(found: ClipErrors) -> None:
+def test_frames_beside_an_artifact_are_reported_as_dropped(found: ClipErrors) -> None:
     (artifact,) = found.artifacts
     before, after = found.dropped
     assert before[1] < found.times[artifact.first] < found.times[artifact.last] < after[0]
 
 
-def test_clip_that_is_drawn_has_a_glitch(found: ClipErrors, tmp_path: Path) -> None:
+def test_drawn_clip_has_an_artifact(found: ClipErrors, tmp_path: Path) -> None:
     clean = tmp_path / "clean.bvh"
     clean.write_text(with_leap(slice(0, 0)), encoding="utf-8")
     other = clip_errors(clean)

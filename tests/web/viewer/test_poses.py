@@ -1,7 +1,7 @@
 import numpy as np
 import pinocchio as pin
 
-from web.viewer.poses import orientation, part_way, upright, yaw_of
+from web.viewer.poses import interpolate_rotation, orientation, upright, yaw_of
 
 
 def rotations(n: int) -> np.ndarray:
@@ -20,12 +20,12 @@ def test_orientation_is_pinocchios_quaternion_with_w_first() -> None:
         assert abs(abs(np.dot(wxyz, [w, x, y, z])) - 1.0) < 1e-9
 
 
-def test_yaw_survives_the_way_to_viser_and_back() -> None:
+def test_yaw_survives_conversion_to_viser_and_back() -> None:
     for yaw in np.linspace(-3.1, 3.1, 25):
         assert abs(yaw_of(upright(yaw)) - yaw) < 1e-12
 
 
-def test_part_way_divides_the_angle() -> None:
+def test_interpolate_rotation_divides_the_angle() -> None:
     for matrix in rotations(50):
-        third = part_way(np.eye(3), matrix, 1.0 / 3.0)
+        third = interpolate_rotation(np.eye(3), matrix, 1.0 / 3.0)
         assert np.allclose(third @ third @ third, matrix, atol=1e-9)

@@ -64,8 +64,7 @@ _COLORS: Mapping[str, Rgb] = {
     "shoe_r": (33, 34, 38),
 }
 VESTS: tuple[Rgb, ...] = ((255, 116, 32), (196, 214, 48), (72, 164, 232), (232, 104, 168))
-"""Colours of the vests by which people are told apart, in the order of their ids; the same as
-VESTS in ``web/page/palette.js``."""
+"""Colours of vests by person id; the same as VESTS in ``web/page/palette.js``."""
 _BONES = {
     "head": "head",
     "helmet": "head",

@@ -29,7 +29,7 @@ class PersonView:
     Args:
         server: Where to draw.
         cell: Where the floor is.
-        person: Who is drawn.
+        person: Id of the person.
     """
 
     def __init__(self, server: viser.ViserServer, cell: Cell, person: PersonSnapshot) -> None:

@@ -19,7 +19,7 @@ import numpy as np
 from app.sim.human import model as human
 from app.sim.human.anthropometry import MEDIAN
 from app.sim.human.kernels import kinematics as lengths
-from web.viewer.poses import Vec, part_way
+from web.viewer.poses import Vec, interpolate_rotation
 
 Bones = dict[str, Vec]
 """T_world_bone by name, each of shape (4, 4)."""
@@ -44,9 +44,9 @@ BIND_Q.setflags(write=False)
 
 
 def _between(first: Vec, second: Vec, share: float) -> Vec:
-    """Return a frame at ``second``'s origin, turned by a share of the way from ``first``."""
+    """Return a frame at the origin of ``second`` with an interpolated rotation."""
     frame = second.copy()
-    frame[:3, :3] = part_way(first[:3, :3], second[:3, :3], share)
+    frame[:3, :3] = interpolate_rotation(first[:3, :3], second[:3, :3], share)
     return frame
 
 

@@ -6,7 +6,7 @@ import viser
 from web.viewer.poses import Vec
 from web.viewer.scene.stations_view import MARK
 
-DASHES = 14
+N_STROKES = 14
 
 
 class Arc:
@@ -21,7 +21,7 @@ class Arc:
     def __init__(self, server: viser.ViserServer, name: str, lift: float) -> None:
         self._lift = lift
         self._lines = server.scene.add_line_segments(
-            name, np.zeros((DASHES, 2, 3)), MARK, thickness=0.006, visible=False
+            name, np.zeros((N_STROKES, 2, 3)), MARK, thickness=0.006, visible=False
         )
         self._key: tuple[object, ...] = ()
 
@@ -41,14 +41,14 @@ class Arc:
 
 
 def dashes(start: Vec, end: Vec, lift: float) -> Vec:
-    """Return the dashes of an arc from ``start`` to ``end`` [m], shape (DASHES, 2, 3).
+    """Return the dashes of an arc from ``start`` to ``end`` [m], shape (N_STROKES, 2, 3).
 
     Args:
         start: Its beginning [m], shape (3,).
         end: Its end [m], shape (3,).
         lift: Greatest height over the straight line [m]; less where the ends are near.
     """
-    ends = (np.arange(DASHES)[:, None] + np.array([0.15, 0.75])) / DASHES
+    ends = (np.arange(N_STROKES)[:, None] + np.array([0.15, 0.75])) / N_STROKES
     line = start + ends[..., None] * (end - start)
     lift = min(lift, 0.35 * float(np.linalg.norm(end - start)))
     line[..., 2] += 4.0 * lift * ends * (1.0 - ends)

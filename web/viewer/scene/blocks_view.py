@@ -1,4 +1,4 @@
-"""The blocks in the scene: each is made once, moved while it lives, and clickable."""
+"""Blocks in the scene: created once, moved afterwards, clickable."""
 
 from collections.abc import Callable
 
@@ -10,8 +10,8 @@ from app.live.sorting.snapshot import PieceSnapshot
 from web.viewer.poses import Vec
 from web.viewer.scene.sorting_bodies import BLOCKS, block_body
 
-STILL_M = 2e-4
-"""A way that is not worth sending [m]."""
+MIN_SHIFT_M = 2e-4
+"""Shortest displacement that is sent to browsers [m]."""
 
 
 class BlocksView:
@@ -38,7 +38,7 @@ class BlocksView:
                 self._drawn[piece.id] = self._add(piece), piece.position
                 continue
             handle, before = self._drawn[piece.id]
-            if np.abs(piece.position - before).max() > STILL_M:
+            if np.abs(piece.position - before).max() > MIN_SHIFT_M:
                 handle.position = piece.position
                 self._drawn[piece.id] = handle, piece.position
 

@@ -71,7 +71,7 @@ class ReachScene:
         self._zone = _Zone(server, cell)
         self._gauge = _Gauge(server)
         self._trail = _Trail(server)
-        self._path = Arc(server, "/way", lift=0.05)
+        self._path = Arc(server, "/path", lift=0.05)
 
     def draw(self, snapshot: WorldSnapshot) -> None:
         """Show a snapshot; sends only what changed."""

@@ -144,7 +144,7 @@ def test_scene_says_that_the_layer_is_off(
     assert node(server, "/gauge/text").text == "no safety layer"
 
 
-def test_zone_is_gone_when_nobody_is_there(
+def test_zone_is_hidden_without_people(
     scene: CellScene, server: viser.ViserServer, world: LiveReachWorld
 ) -> None:
     world.apply(commands.RemovePerson(person=0))
