@@ -165,7 +165,6 @@ def read_rows(
     n_columns: int,
     n_rows: int | None,
     what: str,
-    separator: str | None = None,
 ) -> Vec:
     """Return a table of finite numbers, shape (n, n_columns).
 
@@ -174,7 +173,6 @@ def read_rows(
         n_columns: Number of values per line.
         n_rows: Number of lines stated in the head of the file; None if not stated.
         what: Required content of a line, for the message.
-        separator: Separator of numbers; None for white space.
 
     Raises:
         BadRecording: A line holds another number of values, or text.
@@ -185,10 +183,10 @@ def read_rows(
     faults: list[Fault] = []
     values = np.zeros((len(lines), n_columns))
     for k, (number, line) in enumerate(lines):
-        words = line.split(separator)
+        words = line.split()
         if len(words) != n_columns:
             rule = f"must hold {n_columns} numbers, {what}"
-            place, hint = f"line {number}", "" if separator else _comma_hint(line)
+            place, hint = f"line {number}", _comma_hint(line)
             faults.append(Fault(place=place, value=f"<{len(words)}>", rule=rule, hint=hint))
         else:
             try:

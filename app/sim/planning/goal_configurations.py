@@ -28,9 +28,8 @@ def goal_configurations(
     *,
     n_starts: int = 24,
     spread: float = 0.0,
-    tilt_max: float | None = None,
 ) -> Vec:
-    """Return configurations whose tcp is at a target, of any tilt up to a bound.
+    """Return configurations whose tcp is at a target, of any tilt.
 
     Args:
         arm: From ``scene.arm_of``.
@@ -38,7 +37,6 @@ def goal_configurations(
         rng: Source of the starts of the search and of points near the target.
         n_starts: Random starts; the first one is the cell's home.
         spread: Greatest distance of the tcp to the target [m]; success counts within 0.1 m.
-        tilt_max: Largest angle of the tool to the vertical [rad]; None for any.
 
     Returns:
         Configurations inside the joint limits that differ by at least APART [rad], shape
@@ -57,7 +55,7 @@ def goal_configurations(
             offset = rng.normal(size=3)
             point += spread * rng.uniform() ** (1.0 / 3.0) * offset / np.linalg.norm(offset)
         posture = _descend(robot, arm, point, q)
-        if posture is None or not _upright(robot, posture, tilt_max):
+        if posture is None:
             continue
         if all(np.abs(posture - other).max() > APART for other in found):
             found.append(posture)
@@ -79,9 +77,3 @@ def _descend(robot: Robot, arm: Arm, point: Vec, q: Vec) -> Vec | None:
             q[moving] + step, arm.limits.q_min[moving], arm.limits.q_max[moving]
         )
     return None
-
-
-def _upright(robot: Robot, q: Vec, tilt_max: float | None) -> bool:
-    if tilt_max is None:
-        return True
-    return bool(np.arccos(np.clip(-robot.tcp_pose(q)[2, 2], -1.0, 1.0)) <= tilt_max)

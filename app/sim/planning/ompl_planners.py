@@ -57,6 +57,10 @@ SAME = 1e-6
 """Difference below which two lengths, or two positions of a joint, are one [rad]."""
 LAST_LOOK_S = 0.004
 """Part of the budget kept to look at the path once more [s]; a quarter of it at most."""
+SHORTEN_SHARE = 0.15
+"""Part of the budget kept to shorten the path; RRT-Connect uses the whole remainder."""
+RANGE_RAD = 0.5
+"""Longest motion of a tree's branch [rad]."""
 MOST_KEPT = 6
 """Paths kept from while a planner runs."""
 _SEEDING = threading.Lock()
@@ -70,12 +74,8 @@ class PlanSettings:
     """One of PLANNERS."""
     budget_s: float = 1.0
     """Longest wall time [s], shortening included."""
-    shorten_share: float = 0.15
-    """Part of the budget kept to shorten the path; RRT-Connect gives it all that is left."""
     max_poses: int | None = None
     """End after so many poses looked at instead, whatever the time; for repeatable plans."""
-    range_rad: float = 0.5
-    """Longest motion of a tree's branch [rad]; 0 lets OMPL choose."""
     detour_rad: float = 1.5
     """Range of each joint beyond start and goals [rad], within the cell's limits."""
     n_joints: int = CONTROLLED
@@ -258,7 +258,7 @@ class _Query:
     def solve(self) -> _Found:
         """Run the planner, then shorten its path."""
         anytime = self._settings.planner != "rrt-connect"
-        share = 1.0 - self._settings.shorten_share if anytime else 1.0
+        share = 1.0 - SHORTEN_SHARE if anytime else 1.0
         algorithm = self._algorithm()
         algorithm.setProblemDefinition(self._problem)
         algorithm.setup()
@@ -308,8 +308,8 @@ class _Query:
     def _algorithm(self) -> Any:
         kinds = {"rrt-connect": og.RRTConnect, "rrt-star": og.RRTstar, "aorrtc": og.AORRTC}
         algorithm = kinds[self._settings.planner](self._info)
-        if self._settings.range_rad > 0.0:
-            algorithm.setRange(self._settings.range_rad)
+        if RANGE_RAD > 0.0:
+            algorithm.setRange(RANGE_RAD)
         return algorithm
 
     def _rows(self, found: Any) -> Vec:

@@ -33,8 +33,18 @@ from app.sim.robot.kernels.joints import JointState
 REPLAN_BUDGET_S = {"plan-once": 0.0, "replan-on-blocked": 0.2, "replan-every-cycle": 0.02}
 """Budget of later plans by role [s]; ours."""
 REDUCTION = 0.005
-"""Amount by which the margin is below the current clearance, where that is below the margin
-[m]: the robot may leave, and pass people no nearer than now."""
+"""Reduction of the margin below the current clearance, if that is below the margin [m], so that
+the robot can leave."""
+EXTRA_MARGIN = 0.02
+"""Distance beyond the margin in plans [m], so that new paths are not blocked."""
+CHECK_EVERY_S = 0.1
+"""Interval at which ``replan-on-blocked`` checks the rest of its path [s]."""
+BETTER_SHARE = 0.05
+"""Least share of the time left that a new path saves in ``replan-every-cycle``."""
+ARRIVED_RAD = 1e-3
+"""Largest joint distance to the end of the path at arrival [rad]."""
+LOST_RAD = 0.1
+"""Joint distance from the path that counts as lost [rad]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,20 +55,8 @@ class ReplanningSettings:
     """One of ROLES."""
     plan: PlanSettings = field(default_factory=PlanSettings)
     """Settings of the first plan."""
-    replan_budget_s: float | None = None
-    """Budget of later plans [s]; that of the role (REPLAN_BUDGET_S) if None."""
     margin: float = 0.05
     """Distance at which people block the path [m]."""
-    extra_margin: float = 0.02
-    """Distance beyond the margin that plans keep [m], so that new paths are not blocked."""
-    check_every_s: float = 0.1
-    """Interval at which ``replan-on-blocked`` checks the rest of its path [s]."""
-    better_share: float = 0.05
-    """Least share of the time left that a new path saves in ``replan-every-cycle``."""
-    arrived_rad: float = 1e-3
-    """Distance to the end of the path, greatest joint, that counts as arrived [rad]."""
-    lost_rad: float = 0.1
-    """Distance from the path, greatest joint, that counts as lost [rad]."""
 
 
 @dataclass(slots=True, kw_only=True)
@@ -67,19 +65,13 @@ class ReplanningReport:
 
     state: str = "waiting"
     """``waiting`` (no plan, at rest or braking), ``following``, ``braking`` (path
-    blocked), ``arrived``, or ``lost`` (farther from the path than ``lost_rad``, braking)."""
+    blocked), ``arrived``, or ``lost`` (farther from the path than LOST_RAD, braking)."""
     outcome: str = ""
     """Outcome of the last plan, one of ``ompl_planners.OUTCOMES``; empty before the first."""
     n_plans: int = 0
     """Number of plans."""
-    n_solved: int = 0
-    """Plans that found a path."""
     n_changes: int = 0
     """Switches to a new path."""
-    planning_s: float = 0.0
-    """Wall time spent planning [s]."""
-    longest_plan_s: float = 0.0
-    """Longest plan [s]."""
     blocked_s: float = 0.0
     """Time braking or at rest because the path was blocked [s]."""
     margin: float = 0.0
@@ -136,33 +128,29 @@ class ReplanningExecutor:
 
     def ask(self, people: Shapes, start: Vec, settings: PlanSettings) -> MotionPlan:
         """Plan from a configuration at rest [rad], shape (6,), among the current people."""
-        margin = self.settings.margin + self.settings.extra_margin
+        margin = self.settings.margin + EXTRA_MARGIN
         checker = self.checker(people, start, margin)
         answer = plan(checker, start, self.goals, settings, self.seed + self.report.n_plans)
         report = self.report
         report.outcome, report.margin = answer.outcome, checker.margin
-        report.n_plans, report.n_solved = report.n_plans + 1, report.n_solved + answer.solved
-        report.planning_s += answer.planning_s
-        report.longest_plan_s = max(report.longest_plan_s, answer.planning_s)
+        report.n_plans += 1
         return answer
 
     def again(self, people: Shapes, q: Vec, qd: Vec, t: float) -> None:
         """Plan from the end of a straight stop from a state; used after the budget."""
-        budget = self.settings.replan_budget_s
-        if budget is None:
-            budget = REPLAN_BUDGET_S[self.settings.role]
+        budget = REPLAN_BUDGET_S[self.settings.role]
         later = replace(self.settings.plan, budget_s=budget)
         answer = self.ask(people, stopping_point(q, qd, self.limits), later)
         if answer.solved:
             self.pending = (t + max(budget, self.arm.dt), answer)
 
     def checker(self, people: Shapes, q: Vec, margin: float) -> Checker:
-        """Return the checker for a margin [m], eased where the robot at ``q`` is nearer."""
+        """Return the checker for a margin [m], reduced where the robot at ``q`` is nearer."""
         clearance = Checker(self.arm, people).clearance(q).people_m
         return Checker(self.arm, people, max(0.0, min(margin, clearance - REDUCTION)))
 
     def is_blocked(self, people: Shapes, q: Vec) -> bool:
-        """Tell whether people are nearer to the rest of the path than the margin."""
+        """Return whether people are nearer to the rest of the path than the margin."""
         if self.path_follower is None:
             return True
         checker = self.checker(people, q, self.settings.margin)
@@ -175,11 +163,11 @@ class ReplanningExecutor:
         """Follow a plan from the present state if its motion is free and short enough.
 
         Args:
-            answer: A plan from where the robot was to stop.
+            answer: Plan from the configuration where the robot was to stop.
             q: Joint positions [rad], shape (6,).
             qd: Joint speeds [rad/s], shape (6,).
             people: People at this moment.
-            within_s: Longest motion taken [s].
+            within_s: Longest duration of the motion [s].
         """
         if not answer.solved:
             return False
@@ -197,16 +185,16 @@ class ReplanningExecutor:
         return False
 
     def _order(self, q: Vec, qd: Vec) -> Vec:
-        """Return the wanted speeds of the present state of affairs."""
+        """Return the target speeds for the present state of the executor."""
         report, path_follower = self.report, self.path_follower
         if path_follower is None:
             report.state = "waiting"
             return straight_stop(qd, self.limits)
-        if path_follower.error_rad > self.settings.lost_rad:
+        if path_follower.error_rad > LOST_RAD:
             report.state, self.path_follower = "lost", None
             return straight_stop(qd, self.limits)
-        near = float(np.abs(q - path_follower.timed.q[-1]).max()) <= self.settings.arrived_rad
-        if near and float(np.abs(qd).max()) <= self.settings.arrived_rad:
+        near = float(np.abs(q - path_follower.timed.q[-1]).max()) <= ARRIVED_RAD
+        if near and float(np.abs(qd).max()) <= ARRIVED_RAD:
             report.state = "arrived"
         else:
             report.state = "braking" if self.blocked else "following"
@@ -216,13 +204,13 @@ class ReplanningExecutor:
 
 
 def _once(follower: ReplanningExecutor, q: Vec, qd: Vec, people: Shapes, t: float) -> None:
-    """Leave the path as it is."""
+    """Keep the path."""
 
 
 def _on_blocked(
     follower: ReplanningExecutor, q: Vec, qd: Vec, people: Shapes, t: float
 ) -> None:
-    """Look at the rest of the path; plan again where it is blocked."""
+    """Check the rest of the path; replan if it is blocked."""
     if follower.report.state == "arrived":
         return
     if follower.pending is not None and t >= follower.pending[0] - 1e-9:
@@ -231,7 +219,7 @@ def _on_blocked(
             follower.turn_to(answer, q, qd, people)
     if t < follower.next_check - 1e-9:
         return
-    follower.next_check = t + follower.settings.check_every_s
+    follower.next_check = t + CHECK_EVERY_S
     follower.blocked = follower.is_blocked(people, q)
     if follower.blocked and follower.pending is None:
         follower.again(people, q, qd, t)
@@ -248,7 +236,7 @@ def _every_cycle(
         answer, follower.pending = follower.pending[1], None
         left = math.inf
         if follower.path_follower is not None and not follower.blocked:
-            left = follower.path_follower.remaining * (1.0 - follower.settings.better_share)
+            left = follower.path_follower.remaining * (1.0 - BETTER_SHARE)
         follower.turn_to(answer, q, qd, people, left)
     if follower.pending is None:
         after_q, after_qd = _after_period(follower, q, qd)

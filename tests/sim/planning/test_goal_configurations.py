@@ -34,14 +34,6 @@ def test_a_spread_stays_within_its_radius_and_is_used() -> None:
     assert np.mean(misses) > 0.02
 
 
-def test_a_bound_on_the_tilt_holds() -> None:
-    robot = Robot(ARM.lengths.tool)
-    rng = np.random.default_rng(0)
-    postures = goal_configurations(ARM, TARGET, rng, n_starts=60, tilt_max=0.8)
-    assert len(postures) >= 1
-    assert all(robot.tcp_pose(q)[2, 2] <= -np.cos(0.8) for q in postures)
-
-
 def test_out_of_reach_gives_no_posture() -> None:
     far = np.array([0.0, 2.5, 0.3])
     assert goal_configurations(ARM, far, np.random.default_rng(0)).shape == (0, 6)
