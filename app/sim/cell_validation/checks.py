@@ -1,8 +1,8 @@
-"""Everything that can be wrong with a work cell whose fields have the right types.
+"""Validation of a work cell whose fields have the right types.
 
-:func:`check_cell` goes through numbers (range, unit), order, overlap and reach, and returns all
-faults at once, each with place, value, rule and a hint. A check that builds on a number that is
-already at fault is left out: one mistake gives one fault.
+:func:`check_cell` checks numbers (range, unit), order, overlap and reach, and returns all
+faults, each with place, value, rule and a hint. Checks that depend on an invalid number are
+skipped, so that one mistake gives one fault.
 """
 
 import math

@@ -1,7 +1,4 @@
-"""Support of stations and people: the table, an obstacle or the floor.
-
-A part of ``checks.py``.
-"""
+"""Support of stations and people: the table, an obstacle or the floor."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -40,7 +37,7 @@ class Sound:
 
 
 def _over(box: Obstacle, point: Sequence[float]) -> bool:
-    """Tell whether a point lies over or in the footprint of an obstacle."""
+    """Return whether a point lies over or in the footprint of an obstacle."""
     c, s = math.cos(box.yaw), math.sin(box.yaw)
     x, y = point[0] - box.center[0], point[1] - box.center[1]
     along, across = abs(c * x + s * y), abs(c * y - s * x)
@@ -96,7 +93,7 @@ def _hangs(cell: Cell, station: Station, under: Sequence[Obstacle]) -> str:
 
 
 def _in_height(box: Obstacle, z: float) -> bool:
-    """Tell whether a height lies between bottom and top of an obstacle."""
+    """Return whether a height lies between bottom and top of an obstacle."""
     return abs(z - box.center[2]) < box.half_size[2]
 
 

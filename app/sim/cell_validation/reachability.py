@@ -1,12 +1,10 @@
-"""Whether the robot reaches a point of its cell, in a posture that touches nothing.
+"""Reachability of points of a cell by collision-free configurations.
 
-Postures are tested on the robot's capsules, as the simulator has them: against each other
-(``shapes.SELF_PAIRS``), against the table's plane, which the simulator takes as endless, and
-against the fixed obstacles. Capsules and boxes meet in python-fcl, so that nothing is compiled.
+The robot's capsules are checked against each other (``robot.capsules``), against the table's
+plane, which is infinite in the simulator, and against the fixed obstacles, all by python-fcl.
 
-The tool points down where a station is reached (closed form, ``kernels.kinematics``); a goal of
-docs/method.md 2.3 may be reached in any posture (damped least squares on Pinocchio's Jacobian
-from several starts).
+At stations the tool points down (closed form, ``kernels.kinematics``); goals of docs/method.md
+2.3 allow any orientation (damped least squares on Pinocchio's Jacobian from several starts).
 """
 
 from collections.abc import Iterator
@@ -60,7 +58,7 @@ class Reached:
     q: Vec | None
     """Joint positions [rad], shape (6,); None where no posture does it."""
     reason: str = ""
-    """Why none does, in words."""
+    """Reason why none does."""
 
 
 class Reach:

@@ -1,8 +1,8 @@
-"""Reading a work cell that anybody may have written: bytes in, a cell or all its faults out.
+"""Reader of work cells from untrusted bytes.
 
-Whatever the bytes are, the answer is a :class:`~app.sim.cells.cell.Cell` or one
-:class:`~app.errors.BadCell` that lists every fault found, each with place, value and rule.
-Where single stations, obstacles or people cannot be read, the rest is checked all the same.
+The result is a :class:`~app.sim.cells.cell.Cell`, or one :class:`~app.errors.BadCell` that
+lists all faults with place, value and rule. Unreadable stations, obstacles or people do not
+prevent the checks of the rest.
 """
 
 import copy
@@ -74,7 +74,7 @@ def read_cell(content: bytes) -> Cell:
     """Return the cell in a JSON file.
 
     Args:
-        content: The file, of whatever kind.
+        content: Content of the file.
 
     Raises:
         BadCell: It is no cell; the error lists every fault.

@@ -1,7 +1,7 @@
-"""Numbers of a work cell against the values they may have, with a guess at the unit meant.
+"""Bounds of the numbers of a work cell, with a guess of the unit.
 
-A length in millimetres or an angle in degrees is the most common mistake in a cell file, so a
-number outside its bounds is tried in these units too.
+Lengths in millimetres and angles in degrees are the most common mistakes, so numbers outside
+their bounds are also tried in these units.
 """
 
 import math

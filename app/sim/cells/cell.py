@@ -1,9 +1,8 @@
-"""Work cells as data: what stands where, who walks there, and the limits that hold.
+"""Work cells as data: objects, people and limits.
 
-A cell is a JSON file that a user may write; ``cell_file.read_cell`` reads it and
-``cell_checks.check_cell`` says everything that is wrong with it. Its fields are in
-``cell_parts`` and ``cell_people``. Frame: the robot's base, x right, y toward the
-person, z up, table top at z = 0. SI units, radians.
+A cell is a JSON file that users may write; ``app.sim.cell_validation`` reads and validates it.
+Frame: the robot's base, x right, y toward the person, z up, table top at z = 0. SI units,
+radians.
 
 Source: docs/method.md 2.1 and 2.3 (``shared-workspace``), 3.2 (``pick-and-place``), 1.1
 (``sorting-*``); coordinates that the source does not print are ours.
@@ -72,7 +71,7 @@ class Cell(CellData):
         """The first worker.
 
         Raises:
-            NotFound: Nobody works in this cell.
+            NotFound: The cell has no worker.
         """
         for person in self.workers:
             return person
@@ -130,7 +129,7 @@ def require_cell(cell: Cell, name: str, sha256: str) -> None:
     """Make sure that a policy was trained in this very cell.
 
     Args:
-        cell: The cell it shall act in.
+        cell: Work cell in which the policy acts.
         name: Name of the cell it was trained in.
         sha256: Identity of that cell's content.
 

@@ -1,7 +1,7 @@
-"""The parts of a work cell: table, obstacles, stations, goals, robot, safety, with their units.
+"""Parts of a work cell: table, obstacles, stations, goals, robot, safety.
 
-Each field says its unit in its description and the values it may have in its annotation
-(:class:`Within`, :class:`Each`); ``cell_numbers`` holds a cell against them.
+Each field states its unit in its description and its range in its annotation (:class:`Within`,
+:class:`Each`), which ``cell_validation/units.py`` checks.
 """
 
 from dataclasses import dataclass

@@ -1,7 +1,7 @@
-"""The people of a work cell: a worker with 18 joints, or one of three walking cylinders.
+"""People of a work cell: a worker with 18 joints, or one of three walking cylinders.
 
 Source: docs/method.md 2.1 (cylinders, with the constants of the authors' code as defaults) and
-3.4 (worker). Where a cylinder starts is not the cell's to say: it is a rule of the scenario.
+3.4 (worker). Initial positions of cylinders are part of the scenario, not of the cell.
 """
 
 from typing import Annotated, Literal

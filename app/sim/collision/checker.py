@@ -1,8 +1,7 @@
 """Collision queries of planners: people as shapes at one time, poses and motions.
 
-The checker uses the same compiled capsules as training (``collision/kernels/free.py``), so a
-planner and a policy meet the same robot, table and people. All that touches the kernels stands
-in :class:`Checker`.
+The checker uses the compiled capsules of training (``collision/kernels/free.py``), so that
+planners and policies have the same robot, table and people.
 """
 
 from dataclasses import dataclass, replace
@@ -122,13 +121,13 @@ class Checker:
         return Clearance(people_m=people, cell_m=cell, self_m=own)
 
     def edge_free(self, q0: Vec, q1: Vec) -> bool:
-        """Tell whether the straight joint motion between two positions [rad] is free."""
+        """Return whether the straight joint motion between two positions [rad] is free."""
         verdict, looked = free.edge_free(self.arm, q0, q1, self._obstacles, self._pose)
         self.n_poses += looked
         return bool(verdict)
 
     def path_free(self, path: Vec) -> bool:
-        """Tell whether a path of straight joint motions, shape (n, 6), is free."""
+        """Return whether a path of straight joint motions, shape (n, 6), is free."""
         return all(self.edge_free(a, b) for a, b in zip(path[:-1], path[1:], strict=True))
 
     def first_blocked(self, q: Vec, qd: Vec, first: int = 0) -> int:

@@ -170,7 +170,7 @@ def pedestrian_distances(arm: Arm, people: People, q: Vec, cylinders: Vec) -> Ve
 
     Args:
         arm: Robot in its cell.
-        people: Shared data; says how high the cylinders are.
+        people: Shared data with the height of cylinders.
         q: Joint positions [rad], shape (6,).
         cylinders: x, y and radius of each [m], shape (C, 3).
     """

@@ -1,8 +1,8 @@
-"""Second opinion on whole trajectories: does FCL on the raw meshes find a contact?
+"""Verification of whole trajectories by FCL on the raw meshes.
 
-Evaluation asks here whether the kernels missed one. To be fast enough for hundreds of episodes,
-capsule distances (plain numpy, not the kernels under test) sort out what is far apart; only
-pairs nearer than ``MARGIN`` go to the meshes.
+Evaluations use it to find contacts that the kernels missed. Capsule distances (plain numpy, not
+the kernels under test) exclude distant pairs; pairs nearer than ``MARGIN`` are checked on the
+meshes, which is fast enough for hundreds of episodes.
 """
 
 from collections.abc import Iterable
@@ -187,7 +187,7 @@ class Recheck:
         )
 
     def _suspects(self, near: _Near) -> set[tuple[str, str, Kind]]:
-        """Return the pairs of bodies of one row that the meshes are asked about."""
+        """Return the pairs of bodies of one row that are checked on meshes."""
         body_of = self._body_of
         pairs: set[tuple[str, str, Kind]] = set()
         for capsule, part in np.argwhere(near.person):

@@ -1,13 +1,11 @@
-"""The reference for contact: python-fcl on the UR10's real collision meshes.
+"""Reference collision checker: python-fcl on the UR10's collision meshes.
 
-Slow and exact, where the kernels are fast and conservative. Tests and the spot checks of
-evaluations (``fcl_recheck.py``) use it; training and live cells use the kernels alone. The
-checks of work cells use its obstacles and capsules. Two accuracies of the robot: ``raw`` (the
-triangles as they are, as a bounding volume tree) for verdicts, ``hull`` (convex hull of each
-link) where distances are wanted: a distance on raw meshes costs tens of milliseconds.
+Slow and exact, where the kernels are fast and conservative. Tests, the rechecks of evaluations
+(``fcl_recheck.py``) and the validation of work cells use it. The robot has two accuracies:
+``raw`` (triangles in a bounding volume tree) for contacts, and ``hull`` (convex hull of each
+link) for distances, which take tens of milliseconds on raw meshes.
 
-Raw meshes are surfaces: a body that lies wholly inside a link without crossing its surface is
-found by ``hull`` only.
+Raw meshes are surfaces: only ``hull`` finds a body wholly inside a link.
 """
 
 import math
@@ -72,7 +70,7 @@ class Distance:
 def collision_mesh(link: str) -> trimesh.Trimesh:
     """Load one link's collision mesh in the link's frame [m].
 
-    The URDF's ``ee_link`` carries a box without a mesh file, so links are asked for by name.
+    The URDF's ``ee_link`` carries a box without a mesh file, so links are read by name.
     """
     model = pin.buildModelFromUrdf(str(urdf_path()))
     geometry = pin.buildGeomFromUrdf(
@@ -148,7 +146,7 @@ def walker_name(number: int) -> str:
 
 
 def touch(a: Any, b: Any) -> bool:
-    """Tell whether two fcl objects touch."""
+    """Return whether two fcl objects touch."""
     return bool(fcl.collide(a, b, fcl.CollisionRequest(), fcl.CollisionResult()))
 
 
@@ -235,7 +233,7 @@ class CollisionReference:
         ]
 
     def self_collision(self, q: Vec) -> bool:
-        """Tell whether bodies of the robot that are not neighbours touch at ``q``."""
+        """Return whether bodies of the robot that are not neighbours touch at ``q``."""
         self.place_robot(q)
         return any(self.touching(link, body) for link, body, _ in self._self_pairs())
 
@@ -252,7 +250,7 @@ class CollisionReference:
         return best
 
     def touching(self, link: str, body: str) -> bool:
-        """Tell whether two bodies touch where they were placed last.
+        """Return whether two bodies touch at their last placement.
 
         Args:
             link: A body of the robot, one of BODY_NAMES.

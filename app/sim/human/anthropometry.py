@@ -30,7 +30,7 @@ STATURE = 1.72
 SPREADS = {"stature": 0.054, "arms": 0.04, "shoulders": 0.05}
 """Standard deviations, relative; arms and shoulders at given stature."""
 PERCENTILES = (1.0, 99.0)
-"""Range of percentiles that can be asked for."""
+"""Range of percentiles."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

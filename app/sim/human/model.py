@@ -1,9 +1,9 @@
 """The 18-DoF person of docs/method.md 3.4: names, limits, capsules and inverse kinematics.
 
-The arithmetic of the forward direction lives in ``human/kernels/kinematics.py``, compiled; this
-module names its numbers and adds the inverse: where must the joints be for a hand to be
-*there*. The torso leans and twists toward what the arm alone cannot reach, then each arm is
-solved in closed form; the elbow's free turn about the line shoulder-hand is the ``swivel``.
+``human/kernels/kinematics.py`` computes the forward kinematics; this module names its numbers
+and adds the inverse for targets of the palms. The torso leans and twists toward targets beyond
+the reach of the arm, then each arm is solved in closed form; the elbow's free rotation about
+the line shoulder-hand is the ``swivel``.
 """
 
 import math
@@ -94,7 +94,7 @@ class Posture:
     q: Vec
     """Joint positions inside the limits [m, rad], shape (18,)."""
     reached: bool
-    """Whether every asked-for hand is within 1 cm of its target."""
+    """Whether every requested hand is within 1 cm of its target."""
 
 
 def rest_posture(x: float, y: float, yaw: float) -> Vec:

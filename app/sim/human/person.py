@@ -26,7 +26,6 @@ class Person:
     """Growth rate of that cylinder's radius [m/s]; 0 if unknown."""
     past: Vec | None = None
     """Radius [m] and walking speed [m/s] of that cylinder 0.1 s, 0.2 s, ... ago, shape (n, 2),
-    n at most ``occupancy.N_PAST - 1``; None where nothing is remembered."""
+    n at most ``pedestrian.N_PAST - 1``; None without a history."""
     measured: bool = False
-    """Whether a safety layer may go by the velocity of that cylinder: it was measured, and is
-    not 0 because it is unknown."""
+    """Whether the velocity of that cylinder was measured, so that a safety layer may use it."""

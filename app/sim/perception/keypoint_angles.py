@@ -1,17 +1,14 @@
-"""The 18 joint angles of our person from key-points, in closed form.
+"""The 18 joint angles of a person from key-points, in closed form.
 
-Pelvis place from the mid-hip, its yaw from the hips; the torso's axes from mid-hip, neck and
-shoulders, split into the abdomen's three angles; the clavicles from shoulders and neck. Then
-each arm as a triangle shoulder - elbow - wrist of the model's lengths, so that the wrist is
-where it was seen, if it can be, for people of other sizes too; the seen elbow tells the turn of
-the triangle about the line to the wrist. A shoulder line that is turned against the hips is
-taken as a twist of the trunk; only what both shoulders share, and what they rise, is left to
-the clavicles.
+Pelvis position from the mid-hip, its yaw from the hips; abdomen angles from the torso's axes
+(mid-hip, neck, shoulders); clavicles from shoulders and neck. Each arm is a triangle shoulder -
+elbow - wrist with the model's lengths that meets the measured wrist, if possible; the measured
+elbow determines its rotation about the line to the wrist. A rotation of the shoulder line
+relative to the hips counts as twist of the trunk.
 
-What is missing keeps the angles it had, and is named. The arithmetic is compiled
-(``perception/kernels/pose_fit.py``); a recording, whose every joint is seen in every frame,
-goes through ``inverse_kinematics.py``, by the same formulas
-(``human/kernels/joint_angles.py``).
+Joints without key-points keep their angles and are named. The computation is compiled
+(``perception/kernels/pose_fit.py``) and shares its formulas (``human/kernels/joint_angles.py``)
+with the inverse kinematics of recordings (``inverse_kinematics.py``).
 
 Source: docs/method.md 2.8 and 3.4; the inverse of ``human/kernels/kinematics.py``.
 """

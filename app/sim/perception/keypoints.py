@@ -1,13 +1,12 @@
-"""Key-points of a depth camera in the layout BODY_25: names, sides, our body's own.
+"""Key-points in the layout BODY_25: names, sides, and those of the 18-DoF person.
 
 A frame is 25 points [m] in the cell's frame, NaN where a point is missing, as OpenPose with a
-depth image gives them (docs/method.md 2.8). ``keypoint_check.py`` checks frames from outside.
+depth image gives them (docs/method.md 2.8).
 
-:func:`keypoints_of` gives the key-points of our 18-DoF person. Shoulders, elbows, wrists, neck
-and mid-hip are joints of the model. The model has no face, knees or feet, so these are placed
-by proportion: the face rigid on the torso (the model's head does not turn), the hips half their
-distance to either side of the pelvis, and under each hip a straight upright leg, as its
-capsule, with the knee half-way and the foot pointing where the pelvis faces.
+:func:`keypoints_of` gives the key-points of the 18-DoF person. Shoulders, elbows, wrists, neck
+and mid-hip are joints of the model. Other points are placed by proportion: the face rigid on
+the torso, the hips to either side of the pelvis, and under each hip a straight upright leg with
+the knee half-way and the foot in the direction of the pelvis.
 
 Source: Cao et al., OpenPose (2019), output format BODY_25; docs/method.md 2.8.
 """
@@ -132,7 +131,7 @@ def faces_backward(points: Vec, group: Group) -> bool:
         points: Key-points [m], shape (25, 3), NaN where missing.
         group: ``"arms"`` or ``"legs"``; the face itself is never contradicted.
     """
-    if group == "face":  # Nose and ears decide, and they say nothing about themselves.
+    if group == "face":  # Nose and ears determine the sides of the face.
         return False
     if group == "arms":
         across = points[K["shoulder_l"]] - points[K["shoulder_r"]]

@@ -1,12 +1,12 @@
-"""A person from one frame of key-points, without history.
+"""Estimate of a person from one frame of key-points, without history.
 
-What is missing is not carried on from anywhere: those joints rest as they do in a person who
-stands (``held``), the cylinder widens to where they can be, and speeds are zero unless the
-key-points come with their own. For streams: ``multi_person_tracker.py``.
+Joints without key-points have the angles of a standing person (``held``), the cylinder widens
+to the reach of missing points, and speeds are zero unless the key-points have their own. For
+streams: ``multi_person_tracker.py``.
 
-Somebody is there, or there would be no frame. Where no key-point can be used (``never-seen``),
-or they are in another frame or unit (``foreign-frame``), the place is not known; the cylinder
-is then the widest there is, around the robot's base, so that monitoring stops the robot.
+A frame always shows a person. Without usable key-points (``never-seen``), or in another frame
+or unit (``foreign-frame``), the position is unknown; the cylinder then has the largest radius
+around the robot's base, so that monitoring stops the robot.
 """
 
 from dataclasses import replace

@@ -1,19 +1,16 @@
-"""One timeline for the frames of a tracker, from their stamps and their arrivals.
+"""Monotonic timeline of a tracker's frames from their stamps and arrivals.
 
-A tracker stamps frames by a clock of its own, which may be set, restart or send a wrong value.
-The service knows when each frame arrived. :class:`StampTimeline` maps stamps to a time that
-never runs backwards, under two rules:
+A tracker stamps frames by its own clock, which may be set, restart or send wrong values.
+:class:`StampTimeline` maps stamps to a time that never decreases, under two rules:
 
-- A frame continues the frame before if its stamp is later, by at most ``AHEAD_S`` more than the
-  time between their arrivals. A stamp outside of this window is not taken: the frame may be an
-  old one that was delivered late. After ``N_RESYNC`` such frames in a row that continue each
-  other, the clock has changed: the timeline goes on with the new stamps, and the time between
-  the last frame before and the first one after is that between their arrivals.
-- The time at which people were last seen is known from the arrival of that frame. A time from
+- A frame continues the previous one if its stamp is later, by at most ``AHEAD_S`` more than the
+  time between their arrivals. Other stamps are rejected, as the frame may be an old one that
+  was delivered late. After ``N_RESYNC`` such frames in a row that continue each other, the
+  clock has changed and the timeline continues with the new stamps.
+- The time of the last detection of people is known from the arrival of that frame. A time from
   the caller can make them older, never younger.
 
-A delay before the arrival can't be seen here; it belongs to ``tracker_delay`` of the safety
-settings.
+Delays before the arrival belong to ``tracker_delay`` of the safety settings.
 """
 
 import math

@@ -1,21 +1,20 @@
 """Sampling-based planners: OMPL with the project's collision checker (docs/method.md 2.6).
 
-A query asks for a path of straight joint motions from one posture to any of several. Three
-planners: RRT-Connect (the first path found), RRT* (Karaman and Frazzoli 2011; the shortest path
-its time allows, as in the source's comparison) and AORRTC (Wilson et al. 2025; almost-surely
-optimal RRT-Connect). Path length is in joint space [rad], Euclidean. OMPL is used only where
-the straight motion to the nearest goal is not free: no path is shorter than that (and AORRTC of
-2.0.1 returns paths that do not begin at the start where a goal can be reached straight). The
-result is always a :class:`MotionPlan` with a named ``outcome``; only malformed numbers raise.
+A query requests a path of straight joint motions from one configuration to any of several.
+Planners: RRT-Connect (the first path found), RRT* (Karaman and Frazzoli 2011; shortest path
+within the time, as in the source's comparison) and AORRTC (Wilson et al. 2025; almost-surely
+optimal RRT-Connect). Path length is Euclidean in joint space [rad]. OMPL is used only if the
+straight motion to the nearest goal, the shortest path, is not free (AORRTC of 2.0.1 returns
+paths that do not begin at the start in that case). The result is a :class:`MotionPlan` with a
+named ``outcome``; only malformed numbers raise.
 
-Time: the search ends before its budget of wall time is spent, so that the path can be checked
-once more within it; a step of OMPL in progress, or a busy machine, makes it a few milliseconds
-longer. With ``max_poses`` it ends after that many poses instead, which makes plans repeatable.
+The search ends before its budget of wall time, so that the path can be checked once more; a
+step of OMPL in progress may exceed it by a few milliseconds. With ``max_poses`` it ends after
+that many poses instead, which makes plans repeatable.
 
-Seeds: OMPL keeps one seed generator per process. It is set before each plan, and all of a
-plan's random generators are made new from it, under a lock, so equal queries with equal seeds
-and ``max_poses`` give equal plans, whatever was planned before. OMPL's own warning that it was
-seeded twice is silenced with the rest of its console output.
+OMPL has one seed generator per process. It is set before each plan under a lock, so that equal
+queries with equal seeds and ``max_poses`` give equal plans. OMPL's console output, such as the
+warning about repeated seeding, is disabled.
 """
 
 import threading
@@ -75,7 +74,7 @@ class PlanSettings:
     budget_s: float = 1.0
     """Longest wall time [s], shortening included."""
     max_poses: int | None = None
-    """End after so many poses looked at instead, whatever the time; for repeatable plans."""
+    """Number of checked poses after which planning ends instead; for repeatable plans."""
     detour_rad: float = 1.5
     """Range of each joint beyond start and goals [rad], within the cell's limits."""
     n_joints: int = CONTROLLED
@@ -181,7 +180,7 @@ class _Clock:
         self._start, self._n0 = time.perf_counter(), checker.n_poses
 
     def over(self, share: float = 1.0) -> bool:
-        """Tell whether this share of the budget is spent."""
+        """Return whether this share of the budget is spent."""
         if self._settings.max_poses is not None:
             return self._checker.n_poses - self._n0 >= share * self._settings.max_poses
         budget = self._settings.budget_s
@@ -217,8 +216,7 @@ class _Found:
 class _Query:
     """One query in OMPL's terms; lives as long as its plan.
 
-    What is asked after the budget is spent is answered "not free" at once, so that OMPL's inner
-    loops that know no budget come to their end too.
+    After the budget is spent every state is "not free", so that OMPL's inner loops end.
     """
 
     def __init__(
@@ -283,7 +281,7 @@ class _Query:
         return _Found("out-of-time", np.zeros((0, 6)))
 
     def _watch(self, share: float) -> bool:
-        """Tell whether the planner's part of the budget is spent; keep what it has found.
+        """Return whether the planner's part of the budget is spent; keep the path found.
 
         AORRTC shortens its paths in place, and one that the end of the budget catches in the
         middle of that may be in contact: then an earlier one is taken.
@@ -297,7 +295,7 @@ class _Query:
         return False
 
     def _reaches(self, path: Vec) -> bool:
-        """Tell whether a path leads from the start to a goal."""
+        """Return whether a path leads from the start to a goal."""
         ends = np.abs(path[-1] - self._goals).max(axis=1).min()
         return bool(np.abs(path[0] - self._start).max() <= SAME and ends <= SAME)
 

@@ -11,7 +11,7 @@ Planning takes time: a path planned at ``t`` is used from ``t`` plus the budget 
 period), and checked again among the people at that time. The first plan is free of charge: the
 robot is at rest and the episode has not begun. New paths begin where a straight stop from the
 current state ends; the timed motion turns toward them without standing still where possible
-(``time_scaling``). Without a plan the robot brakes to rest, and the report says so.
+(``time_parameterization.py``). Without a plan the robot brakes to rest, and the report says so.
 """
 
 import math

@@ -1,24 +1,21 @@
-"""From a path of straight joint motions to one timed within the limits, in exact pieces.
+"""Time parameterization of a path of straight joint motions, in polynomial segments.
 
 The time law is linear segments with parabolic blends (Craig, *Introduction to Robotics*,
 section 7.3; LSPB) on the grid of the control period ``dt``: along segment i all joints move at
 constant speed ``v_i = D_i / T_i``; about corner i the speeds change evenly from ``v_{i-1}`` to
 ``v_i`` during ``b_i`` whole periods; the constant part lasts ``m_i`` whole periods, so that
 ``T_i = (m_i + (b_i + b_{i+1}) / 2) dt``. Every period is therefore one polynomial of degree 2,
-a bounded polynomial action (docs/method.md 2.2) like those of a policy. The ``b_i`` are the
-least with
+a bounded action (docs/method.md 2.2) like those of a policy. The ``b_i`` are the least with
 
     |v_i| <= qd_max   and   |v_i - v_{i-1}| <= qdd_max b_i dt   for every joint,
 
-found by lengthening the blends that are too short until none is. A blend leaves the path near
-its corner, by ``|v_i - v_{i-1}| b_i dt / 8`` at most; where that is in contact, the motion
-stops at the corner instead. A robot in motion begins with a blend: the first corner is the end
-of its straight stop.
+found by lengthening the blends that are too short. A blend leaves the path near its corner by
+at most ``|v_i - v_{i-1}| b_i dt / 8``; if that is in contact, the motion stops at the corner. A
+robot in motion begins with a blend: the first corner is the end of its straight stop.
 
-Not the time-optimal parametrisation of the path: speeds are constant along a segment and
-durations whole periods. On straight lines between few corners little is lost. TOPP-RA's wheel
-(toppra 0.6.10, MIT) exists for x86-64 Linux only, brings Matplotlib, and keeps limits at its
-grid points, not in pieces of the control period.
+The result is not time-optimal: speeds are constant along a segment and durations whole periods,
+which costs little on straight lines between few corners. TOPP-RA (toppra 0.6.10) has wheels for
+x86-64 Linux only, requires Matplotlib, and keeps limits only at its grid points.
 """
 
 import math

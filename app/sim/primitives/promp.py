@@ -187,7 +187,7 @@ def of_weights(
 
 
 def _checked(demonstrations: Sequence[Vec], durations: Vec, n_basis: int) -> list[Vec]:
-    """Return the demonstrations as arrays, or say which one breaks which rule."""
+    """Return the demonstrations as arrays, validated."""
     if len(demonstrations) == 0 or len(demonstrations) != len(durations):
         rule = f"must be at least one and as many as durations ({len(durations)})"
         raise InvalidInput("demonstrations", len(demonstrations), rule)

@@ -1,14 +1,14 @@
-"""Samples of a movement primitive: motions that meet via points and keep the joint limits.
+"""Samples of a movement primitive that meet via points and keep the joint limits.
 
-Joint limits: a draw that leaves them is *rejected*, so that what is kept follows the normal
-distribution cut off at the limits. After ``tries`` draws one is *projected* instead: where a
-joint leaves its limits most, the limit becomes a via point, again and again.
+A draw beyond joint limits is *rejected*, so that samples follow the normal distribution
+truncated at the limits. After ``tries`` draws one is *projected* instead: the limit becomes a
+via point where a joint exceeds it most, repeatedly.
 
-Joint via points are linear and met at once, by Matheron's rule; each draw then goes its own
-path to the places of the body (``via_points.meet``).
+Joint via points are linear and met by Matheron's rule; body via points are met for each draw
+(``via_points.meet``).
 
 Source: docs/method.md 3.4; Paraschos et al. 2018, section 3.3; Wilson et al., "Pathwise
-conditioning of Gaussian processes", JMLR 22, 2021. Deviates: the source's primitives know no
+conditioning of Gaussian processes", JMLR 22, 2021. Deviates: the source's primitives have no
 joint limits.
 """
 
@@ -38,7 +38,7 @@ from app.sim.primitives.via_points import (
 )
 
 GRID = np.linspace(0.0, 1.0, 121)
-"""Phases at which joint limits are looked at."""
+"""Phases at which joint limits are checked."""
 
 AnyVia = TypeVar("AnyVia", JointVia, PointVia)
 
@@ -149,7 +149,7 @@ def _linear_part(
 
 
 def _drawn(via: AnyVia, rng: np.random.Generator) -> AnyVia:
-    """Return a via point moved by a draw of its own covariance; exact ones stay."""
+    """Return a via point moved by a draw from its covariance; exact ones stay."""
     if via.cov is None:
         return via
     if isinstance(via, JointVia):

@@ -1,14 +1,13 @@
-"""The robot's state as it was measured: a little outside its limits, or far outside.
+"""Validation of a measured robot state slightly or far outside its limits.
 
-A drive that is commanded 0.999997 of its speed limit is measured beyond it about every second
-time. Such a state is answered: it is flagged, policies see it clamped to the limits, and the
-commanded piece starts at the measured positions and speeds and leads back inside as fast as the
-acceleration limits allow. Speed and separation monitoring takes the measured state itself, so
-that distances, stop times and stop distances are those of the robot as it is. Accelerations are
-commanded, so that a piece of a jerk-limited policy starts at the clamped one.
+A drive commanded at 0.999997 of its speed limit is measured beyond it half of the time. Such a
+state is accepted and flagged: policies observe it clamped to the limits, and the commanded
+segment starts at the measured positions and speeds and returns inside at the acceleration
+limits. Speed and separation monitoring uses the measured state, so that distances, stop times
+and stop distances are correct. Accelerations are commanded, so a segment of a jerk-limited
+policy starts at the clamped one.
 
-Far outside, the numbers are no state of this robot: they are refused, with a hint where they
-look like degrees, or like a joint that is a whole turn away.
+A state far outside is rejected, with a hint at degrees or joints off by a whole turn.
 """
 
 import math

@@ -136,7 +136,7 @@ def run_trial(
         first: Number of the first episode.
 
     Raises:
-        InvalidInput: There are no episodes, or nobody is there.
+        InvalidInput: The number of episodes or of people is 0.
     """
     if n_episodes < 1:
         raise InvalidInput("episodes", n_episodes, "must be at least 1")

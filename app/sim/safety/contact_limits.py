@@ -1,16 +1,15 @@
 """Speed limits of contact by body part (power and force limiting).
 
-A free part of the body and the robot are two masses with a spring between them. All energy of
-their relative motion goes into the spring, so the contact force stays below ``F`` for speeds up
-to ``v = F / sqrt(mu k)``, with the part's stiffness ``k`` and the reduced mass
-``1/mu = 1/m_H + 1/m_R``; the robot counts with ``m_R = M/2 + m_L``, half of its moving mass
-and its load. A pressure limit ``p`` over a contact area ``a`` is a force ``p a``; the lesser
-counts. The speed is relative; as usual only the robot's is counted, as if the person stood.
+A free body part and the robot are two masses with a spring between them. If all energy of their
+relative motion goes into the spring, the contact force stays below ``F`` for speeds up to
+``v = F / sqrt(mu k)``, with the part's stiffness ``k`` and the reduced mass
+``1/mu = 1/m_H + 1/m_R``, where ``m_R = M/2 + m_L`` is half of the robot's moving mass and its
+load. A pressure limit ``p`` over a contact area ``a`` is a force ``p a``; the lesser counts.
+The relative speed is taken as the robot's speed, with the person at rest.
 
 Source: ISO/TS 15066:2016, annex A: table A.2 (forces, pressures, factors of transient contact)
 and A.3 (masses, stiffnesses), eq. (A.3) to (A.6). The limits are those of the onset of pain.
-Before anybody relies on a figure it is to be checked against the text of the standard, which is
-not freely available.
+Verify figures against the text of the standard, which is not freely available.
 """
 
 import math

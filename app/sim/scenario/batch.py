@@ -1,10 +1,8 @@
-"""Many environments of one scenario, stepped together by one thread.
+"""Batch of environments of one scenario, stepped by one thread.
 
-Buffers, resets and steps that the pick and reach scenarios share, around the kernels of
-``pick/kernels/episode.py`` and ``reach/kernels/episode.py``. A step calls up to three kernels:
-all environments
-move, are observed, and those whose episode ended are reset. One kernel for all three would be
-compiled once for each place that calls it.
+Buffers, resets and steps common to the pick and reach scenarios, around the kernels of
+``pick/kernels/episode.py`` and ``reach/kernels/episode.py``. A step calls up to three kernels,
+for motion, observation and resets; a single kernel would be compiled once per call site.
 """
 
 from abc import ABC, abstractmethod

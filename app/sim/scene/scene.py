@@ -42,7 +42,7 @@ that vary, that are constant per episode, or with a given speed."""
 NO_CYLINDERS = np.zeros((0, 3))
 """Cylinders of a cell without walkers."""
 FAR_AWAY = (0.0, 4.0, -np.pi / 2.0)
-"""Pelvis of the person assumed where nobody is there: out of everyone's reach [m, rad]."""
+"""Pelvis of the person assumed in an empty cell, out of reach [m, rad]."""
 
 
 def require_finite(name: str, values: NDArray[np.floating]) -> None:

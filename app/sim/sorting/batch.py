@@ -126,7 +126,7 @@ def new_rows(shape: SortingShape, n_envs: int, fail: Vec) -> kernel.SortingRows:
 
 
 def _check_sizes(settings: SortingSettings, shape: SortingShape) -> None:
-    """Raise InvalidInput where more objects are asked for than there are, or fit."""
+    """Raise InvalidInput if settings have more objects than exist, or fit."""
     most = settings.n_objects or shape.n_cells
     for name, value, limit in (
         ("n_objects", settings.n_objects, shape.n_cells),

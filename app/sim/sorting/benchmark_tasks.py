@@ -68,7 +68,7 @@ class SortingTest:
     expected: str
     """Expected behaviour."""
     safer_duplicates: bool = False
-    """Whether each pick shall take the safer one of two such objects."""
+    """Whether each pick should select the safer of two duplicates."""
     interferences: tuple[Interference, ...] = ()
     """Interferences in order."""
     n_added: int = 0
@@ -79,7 +79,7 @@ class SortingTest:
     """Sizes it needs."""
 
     def fits(self, shape: SortingShape) -> bool:
-        """Tell whether a task is large enough for this test."""
+        """Return whether a task is large enough for this test."""
         enough = shape.n_colours >= self.min_colours and shape.n_sizes >= self.min_sizes
         return enough and shape.n_cells >= self.n_objects + self.n_added
 
@@ -223,7 +223,7 @@ def _add_alternative(state: SortingState, shape: SortingShape, rng: Generator) -
 
 
 def _touches_sorted(towers: Codes, goal: Codes) -> bool:
-    """Tell whether an object that is on a tower must leave it for a goal."""
+    """Return whether an object that is on a tower must leave it for a goal."""
     return bool(((towers != NULL) & (towers != goal)).any())
 
 

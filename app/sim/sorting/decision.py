@@ -86,8 +86,8 @@ def outside_goal(goal: Codes, shape: SortingShape) -> tuple[OutsideGoal, ...]:
     """Return the objects of a goal that goals met in training never ask for.
 
     Args:
-        goal: What the towers shall be, shape (C, K).
-        shape: How large the task is.
+        goal: Goal of the towers, shape (C, K).
+        shape: Shape of the task.
     """
     towers, levels = np.nonzero(goal)
     found = []

@@ -1,12 +1,12 @@
-"""The geometry of a sorting cell: where blocks lie, where the tool goes, what people do there.
+"""Geometry of a sorting cell: blocks, tool positions, and the work of people.
 
-Blocks are as high as a level of the towers and narrower than the clutter's cells. A station's
-point is where the tcp is when the magnet touches the top of the block there; the pick policy
+Blocks are as high as a level of the towers and narrower than the clutter's cells. The point of
+a station is that of the tcp when the magnet touches the top of the block; the pick policy
 brings the tool to APPROACH_M above it.
 
-To the pick scenario (``pick.py``, ``primitive_library.py``) a sorting cell is one whose clutter
-cells are cubes and whose towers are docks (:func:`reaching_cell`): so people work there, and so
-policies can be trained and measured there.
+For the pick scenario (``pick.py``, ``primitive_library.py``) a sorting cell is one whose
+clutter cells are cubes and whose towers are docks (:func:`reaching_cell`), for the work of
+people and for training and evaluation of policies.
 """
 
 from functools import lru_cache
@@ -72,7 +72,7 @@ def require_workspace(cell: Cell, trained: Cell) -> None:
     """Make sure that a policy of another cell may act in a sorting cell.
 
     Args:
-        cell: The cell it shall act in.
+        cell: Work cell in which the policy acts.
         trained: The cell it was trained in.
 
     Raises:

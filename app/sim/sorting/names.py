@@ -1,7 +1,7 @@
-"""Names of a sorting task's colours, sizes and places, and states written in them.
+"""Names of colours, sizes and positions of a sorting task, and states written in them.
 
-Programs say ``red``, ``large``, ``cell3``; kernels and networks see codes and positions
-(``state.py``). What does not fit is refused in the caller's own words.
+The API uses ``red``, ``large``, ``cell3``; kernels and networks use codes and positions
+(``state.py``). Errors name values in the caller's terms.
 """
 
 from collections.abc import Mapping, Sequence
@@ -48,14 +48,14 @@ class SortingNames:
         return self.cells + self.towers
 
     def kind(self, code: int) -> str:
-        """Return an object in words: ``large red``."""
+        """Return the name of an object: ``large red``."""
         size, colour = self.shape.size_of(code), self.shape.colour_of(code)
         return f"{self.sizes[size]} {self.colours[colour]}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NamedObject:
-    """One object in words."""
+    """Names of one object."""
 
     colour: str
     """One of the task's colours."""
@@ -123,7 +123,7 @@ def state_from_names(
         names: The words of the task.
         objects: Positions of the objects.
         goal: Colour (None: the tower's own) and size by level, from the bottom, by tower.
-            Towers that are not named shall be empty.
+            Towers that are not named are empty.
         fail: Failure probability of a pick from each clutter cell, shape (K,).
 
     Raises:

@@ -1,7 +1,7 @@
 """Counter-based random numbers: a stream per (seed, environment, episode), compiled.
 
 A stream is a splitmix64 sequence whose start is a hash of its key, so that an episode draws the
-same numbers whether its environment runs alone or in a batch, and in whatever order.
+same numbers alone, in a batch, and in any order.
 
 Source: Steele, Lea, Flood, *Fast splittable pseudorandom number generators* (OOPSLA 2014).
 """
@@ -37,11 +37,11 @@ def start_stream(seed: int, env: int, episode: int, state: State) -> None:
 
 @kernel()
 def split_stream(state: State, branch: int, child: State) -> None:
-    """Set ``child``, shape (1,), to a stream of its own; advances ``state`` by one draw.
+    """Set ``child``, shape (1,), to an independent stream; advances ``state`` by one draw.
 
     Args:
         state: Stream to branch off from.
-        branch: Number of the branch; different ones differ whatever ``state`` holds.
+        branch: Number of the branch; different branches give different streams.
         child: Filled.
     """
     state[0] = state[0] + _GOLDEN

@@ -1,16 +1,16 @@
-"""From directions of limbs to the angles of the 18-DoF person, compiled.
+"""Joint angles of the 18-DoF person from directions of limbs, compiled.
 
-The inverse of ``human/kernels/kinematics.py``, part by part; used for key-points
-(``pose_fit.py``) and
-for recordings (``inverse_kinematics.py``). With the torso's axes x, y, z seen from the pelvis,
+The inverse of ``human/kernels/kinematics.py`` by body part; used for key-points
+(``pose_fit.py``) and recordings (``inverse_kinematics.py``). With the torso's axes x, y, z in
+the frame of the pelvis,
 
     Ry(flex) Rx(side) Rz(twist):  flex = atan2(z_x, z_z),  side = -asin(z_y),
                                   twist = atan2(x_y, y_y);
 
-an upper arm of direction u in the torso has flexion ``atan2(u_x, -u_z)`` and is lifted to the
-left by ``asin(u_y)`` (abduction on the left, minus abduction on the right); its rotation brings
-the arm's first axis to where the elbow bends. (flex, abduct, rotate) and (flex + pi, pi -
-abduct, rotate + pi) turn an arm alike.
+an upper arm of direction u in the torso has flexion ``atan2(u_x, -u_z)`` and lateral elevation
+``asin(u_y)`` (abduction on the left, minus abduction on the right); its rotation aligns the
+arm's first axis with the elbow's bend. (flex, abduct, rotate) and (flex + pi, pi - abduct,
+rotate + pi) are the same orientation.
 
 Source: docs/method.md 3.4.
 """

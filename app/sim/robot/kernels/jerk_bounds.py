@@ -1,7 +1,7 @@
 """Bounds of cubic, jerk-limited trajectories of one joint, compiled (docs/method.md 2.2).
 
 During one period of length ``T`` a joint follows ``q(x) = q + qd x + qdd/2 x^2 + j/6 x^3``. The
-free number is the jerk ``j``, six times the leading coefficient; acceleration goes on from
+free number is the jerk ``j``, six times the leading coefficient; acceleration continues from
 period to period. With the limits ``A`` of acceleration and ``J`` of jerk, the admissible jerks
 are an interval. Its ends are the last jerks after which a braking manoeuvre still comes to rest
 inside all limits; they are found by bisection on what that manoeuvre exceeds.

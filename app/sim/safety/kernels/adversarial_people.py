@@ -199,7 +199,7 @@ def blend(a: Vec, b: Vec, part: float, out: Vec) -> None:
 def advance_workers(
     people: People, trial: Trial, mode: int, t: float, dt: float, work: TrialWorkspace
 ) -> None:
-    """Write the workers after the period, nobody faster than the trial's speed."""
+    """Write the workers after the period, at most at the trial's speed."""
     most, runs = BELOW * trial.human_speed * dt, mode != SCRIPT and t >= work.plan[2]
     if runs:
         for w in range(work.time.shape[0]):
@@ -230,7 +230,7 @@ def advance_workers(
 def advance_cylinders(
     people: People, trial: Trial, mode: int, t: float, dt: float, work: TrialWorkspace
 ) -> None:
-    """Write the walkers after the period, nobody faster than the trial's speed."""
+    """Write the walkers after the period, at most at the trial's speed."""
     most, runs = BELOW * trial.human_speed * dt, mode != SCRIPT and t >= work.plan[2]
     for k in range(work.cylinders0.shape[0]):
         old, new, rows = work.cylinders0[k], work.cylinders1[k], work.state.walkers.rows

@@ -235,7 +235,7 @@ def _interval_clear(
     b: int,
     space: SsmWorkspace,
 ) -> tuple[bool, float]:
-    """Return whether the robot meets nobody too fast between two nodes.
+    """Return whether the robot keeps contact speed limits between two nodes.
 
     Args:
         rule: Assumptions.
@@ -279,7 +279,7 @@ def segment_clear(
     segment: PathSegment,
     space: SsmWorkspace,
 ) -> bool:
-    """Return whether the robot meets nobody too fast on one segment of a path.
+    """Return whether the robot keeps contact speed limits on one segment of a path.
 
     Args:
         arm: Robot in its cell.

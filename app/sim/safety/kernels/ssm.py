@@ -92,7 +92,7 @@ N_HALVINGS = 4
 def _trivially_separated(
     rule: SeparationRule, distance: float, age: float, later: float, space: SsmWorkspace
 ) -> bool:
-    """Return whether nobody can meet a robot that moves no farther than ``distance``.
+    """Return whether no person can reach a robot that moves at most ``distance``.
 
     Args:
         rule: Assumptions.

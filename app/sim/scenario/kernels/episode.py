@@ -39,7 +39,7 @@ option features; all that and the people as a set."""
 SUCCESS_DISTANCE = 0.1
 """tcp to target [m], thesis 4.3 and 5.3.1."""
 START_TRIES = 200
-"""Starts drawn before the last one is taken whatever its clearance."""
+"""Draws of a start, of which the last is used with any clearance."""
 MAX_CANDIDATES = 3
 """Most targets that an episode of the pick scenario offers (docs/method.md 3.6)."""
 NO_TARGET = -1

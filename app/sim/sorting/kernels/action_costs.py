@@ -38,7 +38,7 @@ def attempts_by_move(
 
     Args:
         objects: Positions of the objects; restored at the end.
-        task: What is asked for.
+        task: Goal and failure probabilities.
         moves: Valid moves as positions to pick and to place, shape (n, 2).
         most: States of the planner, over all moves, beyond which nothing is written.
         work: Work space of the shape.

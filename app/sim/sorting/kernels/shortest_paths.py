@@ -101,7 +101,7 @@ def new_shortest_paths(n_cells: int, n_colours: int, n_sizes: int) -> ShortestPa
 
 @kernel()
 def _stands(codes: Bytes, lowest: int, end: int, code: int) -> bool:
-    """Tell whether ``code`` is at one of the levels ``lowest .. end - 1``."""
+    """Return whether ``code`` is at one of the levels ``lowest .. end - 1``."""
     for level in range(lowest, end):
         if codes[level] == code:
             return True
@@ -112,7 +112,7 @@ def _stands(codes: Bytes, lowest: int, end: int, code: int) -> bool:
 def _lends(
     a: int, towers: Bytes, heights: Ints, goal: Bytes, goal_heights: Ints, p: ShortestPaths
 ) -> bool:
-    """Tell whether tower ``a`` might lend its object at level ``cut`` (module docstring)."""
+    """Return whether tower ``a`` might lend its object at level ``cut`` (module docstring)."""
     code = goal[a, p.cut[a]]
     for b in range(len(p.cut)):
         if b == a or not _stands(goal[b], p.cut[b], goal_heights[b], code):
@@ -371,14 +371,14 @@ def _search_from(index: int, still: int, code: int, found: int, p: ShortestPaths
 
 @kernel()
 def ties_on_tower(index: int, still: int, code: int, p: ShortestPaths) -> bool:
-    """Tell whether a removed object may as well be put on a tower where it is not wanted.
+    """Return whether a tower that does not need a removed object is as good as the clutter.
 
-    There it is as good as in the clutter if, in some shortest plan, an object of its code is
-    placed from the clutter before that tower is touched: then it comes from the tower instead.
+    It is if some shortest plan places an object of its code from the clutter before that tower
+    changes; the object then comes from the tower instead.
 
     Args:
         index: State after the removal to the clutter, on a shortest plan.
-        still: The tower it would be put on.
+        still: Tower on which it is put.
         code: The object.
         p: The states, ``table`` filled.
     """

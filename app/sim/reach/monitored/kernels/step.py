@@ -1,11 +1,12 @@
 """Steps of the reach scenario under speed and separation monitoring (compiled).
 
-A control cycle is that of ``reach.py`` with the safety layer between command and robot: the
-commanded segment passes through ``ssm.decide``, and the admitted motion is executed. People
-move as without the layer, or along given tracks of cylinders. Contacts with people between the
-ends of a cycle are found by conservative advancement along the executed motion
-(``safety_trial.first_contact``), and the speed of the touching link tells whether the robot was
-moving. Contact of the robot with its cell or itself is checked at the ends of cycles.
+A control cycle is that of ``reach/kernels/episode.py`` with the safety layer between command
+and robot: the commanded segment passes through ``ssm.decide``, and the admitted motion is
+executed. People move as without the layer, or along given tracks of cylinders. Contacts with
+people between the ends of a cycle are found by conservative advancement along the executed
+motion (``adversarial_trials.first_contact``), and the speed of the touching link tells whether
+the robot was moving. Contact of the robot with its cell or itself is checked at the ends of
+cycles.
 
 Source: docs/method.md 2.6 (last row) and 2.7.
 """
