@@ -37,7 +37,7 @@ FIELDS_OF_KIND = {
 
 
 def check_cell(cell: Cell, known: Sequence[Fault] = ()) -> list[Fault]:
-    """Return everything that is wrong with a cell; nothing where all is well.
+    """Return all faults of a cell.
 
     Args:
         cell: Work cell.

@@ -45,7 +45,7 @@ def _over(box: Obstacle, point: Sequence[float]) -> bool:
 
 
 def places(sound: Sound) -> Iterator[Fault]:
-    """Stations on the table or on an obstacle, in none; people off table and obstacles."""
+    """Check that stations are supported and free, and people clear of table and obstacles."""
     for station in sound.stations:
         place, value = f"stations.{station.id}.position", shown(station.position)
         under = [box for box in sound.obstacles if _over(box, station.position)]
@@ -108,7 +108,7 @@ def _table_text(cell: Cell) -> str:
 
 
 def _standing(sound: Sound) -> Iterator[Fault]:
-    """Workers stand beside the table; a cylinder stands for arms too and may cross it."""
+    """Check that workers stand beside the table; cylinders include arms and may cross it."""
     table = sound.cell.table
     for index, person in sound.people:
         if not isinstance(person, Worker):
@@ -139,7 +139,7 @@ def _standing(sound: Sound) -> Iterator[Fault]:
 
 
 def _facing(cell: Cell, worker: Worker, place: str) -> Iterator[Fault]:
-    """A worker at home looks at the table, not away from it."""
+    """Check that a worker at home faces the table."""
     table, (x, y, yaw) = cell.table, worker.home
     to_x = min(table.x_max, max(table.x_min, x)) - x
     to_y = min(table.y_max, max(table.y_min, y)) - y

@@ -81,7 +81,7 @@ class Reach:
         self._longest = LONGEST_REACH + max(mount.tool_length - 0.12, 0.0)
 
     def touching(self, q: Vec) -> Iterator[Touching]:
-        """Yield everything the robot touches at joint positions ``q`` [rad], shape (6,)."""
+        """Yield the contacts of the robot at joint positions ``q`` [rad], shape (6,)."""
         shapes, names = self._capsules, self._capsules.name
         poses = self._robot.link_poses(np.asarray(q, dtype=np.float64))
         for k, body in enumerate(self._bodies):
@@ -100,7 +100,7 @@ class Reach:
                     yield Touching(link=names[k], kind="obstacle", other=name)
 
     def tool_down(self, point: Vec) -> Reached:
-        """Look for the posture with the tool pointing down at ``point`` [m], shape (3,)."""
+        """Find the configuration with the tool pointing down at ``point`` [m], shape (3,)."""
         q = self._robot.ik_vertical(point, self._q_min, self._q_max)
         if q is None:
             return Reached(q=None, reason=self._why_not(point))
@@ -117,7 +117,7 @@ class Reach:
         return f"it lies {far:.2f} m from the robot's base, {side} it at that height"
 
     def any_posture(self, point: Vec, seed: int = 0) -> Reached:
-        """Look for any posture with the tcp at ``point`` [m], shape (3,).
+        """Find any configuration with the tcp at ``point`` [m], shape (3,).
 
         Args:
             point: Target of the tcp [m].
@@ -142,7 +142,7 @@ class Reach:
         return Reached(q=None, reason=reason)
 
     def _solve(self, point: Vec, start: Vec) -> Vec | None:
-        """Go from ``start`` toward ``point`` by damped least squares; None where it fails."""
+        """Return the result of damped least squares from ``start``; None if it fails."""
         q = start.copy()
         for _ in range(N_STEPS):
             error = point - self._robot.tcp_pose(q)[:3, 3]

@@ -130,7 +130,7 @@ def _is_deep(raw: dict[str, Any]) -> bool:
 
 
 def _cut(raw: dict[str, Any]) -> Iterator[Fault]:
-    """Shorten lists that are too long, so that no answer is endless."""
+    """Truncate lists that are too long."""
     for name, most in LIMITS.items():
         items = raw.get(name)
         if isinstance(items, list) and len(items) > most:
@@ -148,7 +148,7 @@ def _pairs(pairs: list[tuple[str, Any]]) -> _Object:
 
 
 def _tree_faults(node: object, place: str) -> Iterator[Fault]:
-    """Find keys given twice and text that is none, anywhere."""
+    """Return the faults of repeated keys and of invalid text."""
     if isinstance(node, str) and not _is_text(node):
         yield Fault(place=place, value=ascii(node)[:MAX_SHOWN], rule="must be text")
     if isinstance(node, _Object):
@@ -177,7 +177,7 @@ def _item(value: object, index: int) -> str:
 
 
 def _validate(raw: dict[str, Any]) -> tuple[Cell | None, list[Fault]]:
-    """Return the cell, or what is left of it, and the faults of its types."""
+    """Return the readable parts of a cell and the faults of types."""
     try:
         return _model(raw), []
     except ValidationError as error:
@@ -197,7 +197,7 @@ def _model(raw: dict[str, Any]) -> Cell:
 
 
 def _without(raw: dict[str, Any], places: Sequence[tuple[Any, ...]]) -> dict[str, Any] | None:
-    """Return the cell without the parts that cannot be read; None where too little is left.
+    """Return the cell without unreadable parts; None if required parts are missing.
 
     Fields of robot and table that cannot be read take the values of a shipped cell, so that
     their neighbours can be checked; ``check_cell`` excludes them.
@@ -224,7 +224,7 @@ def _without(raw: dict[str, Any], places: Sequence[tuple[Any, ...]]) -> dict[str
 
 
 def _replace(part: dict[str, Any], name: str, spare: Any) -> None:
-    """Put a shipped cell's value where ``name`` cannot be read; drop what is no field."""
+    """Replace an unreadable field by the value of a shipped cell; drop unknown fields."""
     part.pop(name, None)
     if name in spare:
         part[name] = spare[name]

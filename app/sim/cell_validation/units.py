@@ -23,7 +23,7 @@ def shown(value: object) -> str:
 
 
 def unit_hint(value: float, within: Within) -> str:
-    """Say which unit a number outside its bounds is probably in; empty where unclear."""
+    """Return a hint about the unit of a number outside its bounds; empty if unclear."""
     if within.unit.startswith("rad") and within.low <= math.radians(value) <= within.high:
         unit = within.unit.replace("rad", "degrees", 1)
         return f"looks like {unit}: in {within.unit} that is {math.radians(value):.4g}"
@@ -38,7 +38,7 @@ def unit_hint(value: float, within: Within) -> str:
 
 
 def numbers(model: BaseModel, place: str = "") -> Iterator[Fault]:
-    """Hold every number of a model, and of the models in it, against its bounds.
+    """Return the faults of all numbers of a model and of its parts against their bounds.
 
     Args:
         model: A cell, or a part of one.

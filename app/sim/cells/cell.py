@@ -120,13 +120,13 @@ class Cell(CellData):
 
     @property
     def sha256(self) -> str:
-        """Identity of its content, 64 hexadecimal digits: any change of a field changes it."""
+        """SHA-256 of the content, 64 hexadecimal digits."""
         text = json.dumps(self.model_dump(mode="json"), sort_keys=True, separators=(",", ":"))
         return hashlib.sha256(text.encode()).hexdigest()
 
 
 def require_cell(cell: Cell, name: str, sha256: str) -> None:
-    """Make sure that a policy was trained in this very cell.
+    """Raise unless a policy was trained in this cell.
 
     Args:
         cell: Work cell in which the policy acts.
@@ -144,7 +144,7 @@ def require_cell(cell: Cell, name: str, sha256: str) -> None:
 
 
 def lacks_stations(cell: Cell) -> str | None:
-    """Say what a cell lacks to be simulated as a pick scenario; None where nothing."""
+    """Return the missing parts for the pick scenario; None if complete."""
     if not cell.stations_of("cube") or not cell.stations_of("dock"):
         return "needs at least one station of kind cube and one of kind dock"
     return None

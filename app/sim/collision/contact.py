@@ -91,7 +91,7 @@ def contact(
     cylinders: tuple[Vec, Vec] = (NO_CYLINDERS, NO_CYLINDERS),
     sizes: Vec | tuple[Vec, Vec] | None = None,
 ) -> Contact:
-    """Test one control period for contact, between its ends too.
+    """Check one control period for contact, including between its ends.
 
     Args:
         arm: Robot in its cell.

@@ -51,7 +51,7 @@ class Trajectory:
 
     @property
     def walkers(self) -> Vec:
-        """The cylinders, shape (n_steps, C, 3), also where there are none."""
+        """Cylinders, shape (n_steps, C, 3); C may be 0."""
         return np.zeros((len(self.q_robot), 0, 3)) if self.cylinders is None else self.cylinders
 
     def size(self, row: int, cell: Cell) -> Vec:
@@ -139,7 +139,7 @@ class Recheck:
         ]
 
     def first_contact(self, trajectory: Trajectory) -> FirstContact | None:
-        """Return the first row of a trajectory in which raw meshes touch anything."""
+        """Return the first row of a trajectory with contact of raw meshes."""
         near = self._near(trajectory)
         rows = near.person.any((1, 2)) | near.cell.any(1) | near.itself.any(1)
         rows |= near.walkers.any((1, 2))
@@ -153,7 +153,7 @@ class Recheck:
         return None
 
     def _near(self, trajectory: Trajectory) -> _Near:
-        """Tell which capsules come nearer than MARGIN, for each row of the trajectory."""
+        """Return the pairs of capsules nearer than MARGIN, per row of the trajectory."""
         cell, radius = self._cell, self._capsules.radius
         a0, a1 = robot_ends(self._robot, self._capsules, trajectory.q_robot)
         ends = np.stack(
@@ -178,7 +178,7 @@ class Recheck:
         return _Near(near_person, near_cell, near_self, self._near_walkers(trajectory, a0, a1))
 
     def _near_walkers(self, trajectory: Trajectory, a0: Vec, a1: Vec) -> Pairs:
-        """Tell which capsules come near which cylinder, seen from above; height is left out."""
+        """Return the pairs of capsules and cylinders near each other in plan view."""
         flat, walkers = np.array([1.0, 1.0, 0.0]), trajectory.walkers
         axes = (walkers * flat)[:, None]
         gap = segment_distances((a0 * flat)[:, :, None], (a1 * flat)[:, :, None], axes, axes)

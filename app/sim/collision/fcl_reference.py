@@ -101,7 +101,7 @@ def hull_of(mesh: trimesh.Trimesh) -> Any:
 
 
 def place_capsule(body: Any, p0: Vec, p1: Vec) -> None:
-    """Move an ``fcl.Capsule``, which lies along its own z, between two points [m]."""
+    """Place an ``fcl.Capsule`` between two points [m]."""
     x, y, z = (p1 - p0 if p1[2] >= p0[2] else p0 - p1).tolist()
     length = math.hypot(x, y, z)
     # Quaternion (w, x, y, z) of the shortest turn from z to the axis.
@@ -172,7 +172,7 @@ class CollisionReference:
         self.set_person(cell.body)
 
     def set_person(self, size: Vec) -> None:
-        """Exchange the person for one of another size [m], shape (12,)."""
+        """Set the size of the person [m], shape (12,)."""
         self._size = size
         ends = human.capsules(np.zeros(18), size, self._cell.floor_z)
         self._person = {
@@ -202,7 +202,7 @@ class CollisionReference:
             place_capsule(body, p0, p1)
 
     def place_walkers(self, cylinders: Vec) -> None:
-        """Put the cell's walking cylinders at x, y with a radius [m], shape (C, 3).
+        """Place the walking cylinders: x, y and radius [m], shape (C, 3).
 
         As in the kernels they stand on the floor, all as high as the highest of the cell.
         """

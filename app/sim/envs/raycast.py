@@ -155,7 +155,7 @@ class Raycaster:
         return np.asarray(255.0 * np.clip(mean, 0.0, 1.0) ** (1 / 2.2) + 0.5, dtype=np.uint8)
 
     def _paint(self, hits: _Hits, solids: Sequence[Solid]) -> None:
-        """Add solids to what the rays hit."""
+        """Add the hits of solids."""
         for solid in solids:
             part = self._window(solid)
             near, facing = self._cast(solid, part)
@@ -182,7 +182,7 @@ class Raycaster:
     def _shade(
         self, hits: _Hits, lit: Floats, solids: Sequence[Solid], rows: Rows | None
     ) -> None:
-        """Write 0 into ``lit`` where a solid keeps the light off, one ray per pixel.
+        """Write 0 to ``lit`` for pixels in the shadow of a solid.
 
         Args:
             hits: Hits of the camera's rays.
@@ -233,7 +233,7 @@ class Raycaster:
         return np.asarray(colour, dtype=np.float32)
 
     def _veil(self, solid: Solid, colour: Floats, t: Floats) -> None:
-        """Lay a translucent solid over what is behind it."""
+        """Blend a translucent solid with the background."""
         part = self._window(solid)
         near, normal = self._cast(solid, part)
         first = near < t[part]
@@ -250,5 +250,5 @@ def _blurred(image: Floats) -> Floats:
 
 
 def _inside(u: Floats, v: Floats, low: Floats, high: Floats) -> Rows:
-    """Return which points of a plane lie within a rectangle."""
+    """Return whether points of a plane lie within a rectangle."""
     return np.flatnonzero((u > low[0]) & (u < high[0]) & (v > low[1]) & (v < high[1]))

@@ -21,11 +21,11 @@ class Solid(Protocol):
 
     @property
     def colour(self) -> Rgb:
-        """Its colour."""
+        """Colour."""
 
     @property
     def opacity(self) -> float:
-        """1 for a solid that hides what is behind it; less shines through, without shadow."""
+        """Opacity: 1 for solids; below 1 translucent, without shadow."""
 
     def corners(self) -> Floats:
         """Return the corners of a box around it [m], shape (8, 3)."""

@@ -41,7 +41,7 @@ class SortingTask:
         return np.asarray(given).reshape(-1)
 
     def cut(self, ended: Rows) -> Mask:
-        """Return which of these outcomes truncate an episode, shape (n_envs,)."""
+        """Return whether outcomes truncate an episode, shape (n_envs,)."""
         late: Mask = ended == TIMEOUT
         return late
 
@@ -164,7 +164,7 @@ class SortingEnv(SingleEnv):
         super().__init__(SortingTask(chosen, self.batch), render_mode, RENDER_FPS)
 
     def action_masks(self) -> NDArray[np.bool_]:
-        """Return which moves would change something, shape (n_actions,)."""
+        """Return whether each move changes the state, shape (n_actions,)."""
         mask: NDArray[np.bool_] = self.batch.masks()[0].copy()
         return mask
 
@@ -200,5 +200,5 @@ class SortingVectorEnv(BatchVectorEnv):
         super().__init__(task, render_mode, RENDER_FPS, autoreset_mode, max_episode_steps)
 
     def action_masks(self) -> NDArray[np.bool_]:
-        """Return which moves would change something, shape (num_envs, n_actions)."""
+        """Return whether each move changes the state, shape (num_envs, n_actions)."""
         return self.batch.masks().copy()

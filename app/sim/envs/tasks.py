@@ -34,7 +34,7 @@ class Result(Protocol):
 
     @property
     def obs(self) -> NDArray[Any]:
-        """Observations, of new episodes where one ended, shape (n_envs, obs_size)."""
+        """Observations, shape (n_envs, obs_size); of the new episode if one ended."""
 
     @property
     def last_obs(self) -> NDArray[Any]:
@@ -46,7 +46,7 @@ class Result(Protocol):
 
     @property
     def ended(self) -> Rows:
-        """Outcome of the episodes that ended now, 0 elsewhere, shape (n_envs,)."""
+        """Outcomes of the episodes that ended in this step, otherwise 0, shape (n_envs,)."""
 
 
 class SteppedBatch(Protocol):
@@ -97,7 +97,7 @@ class SteppedTask(Protocol):
         """Return actions as the batch takes them."""
 
     def cut(self, ended: Rows) -> Mask:
-        """Return which of these outcomes truncate an episode, shape (n_envs,)."""
+        """Return whether outcomes truncate an episode, shape (n_envs,)."""
 
 
 class BatchTask(SteppedTask, Protocol):
@@ -139,7 +139,7 @@ class ArmTask:
         return np.asarray(given, dtype=np.float32).reshape(shape)
 
     def cut(self, ended: Rows) -> Mask:
-        """Return which of these outcomes truncate an episode, shape (n_envs,)."""
+        """Return whether outcomes truncate an episode, shape (n_envs,)."""
         late: Mask = (ended == TIMEOUT) & (not self._sees_time)
         return late
 
@@ -172,7 +172,7 @@ class RobotTask(ArmTask):
         }
 
     def picture(self, row: int) -> Image:
-        """Return an image of one cell."""
+        """Return an image of one environment."""
         cell, state = self.batch.cell, self.batch.state
         people = people_solids(cell, state.people, row)
         return picture(cell, state.q[row], people, target_solids(state.goal[row]))
@@ -183,12 +183,12 @@ def _box(bound: float, n: int) -> spaces.Space[Any]:
 
 
 def cell_of(cell: str | Cell) -> Cell:
-    """Return a work cell given by name or as it is."""
+    """Return a work cell, given by name or directly."""
     return load_cell(cell) if isinstance(cell, str) else cell
 
 
 def settings_with(settings: Settings, people: Sequence[HumanKind] | None) -> Settings:
-    """Return settings with other people, or as they are where ``people`` is None."""
+    """Return settings with other people; unchanged if ``people`` is None."""
     return settings if people is None else replace(settings, people=tuple(people))
 
 
@@ -209,7 +209,7 @@ def check_render_mode(mode: str | None) -> str | None:
 
 
 def next_episode(batch: Batch, rows: Rows, seed: int | None, episode: int | None) -> None:
-    """Number the episodes that start now in some rows, and start them.
+    """Number and start the next episodes of some rows.
 
     Args:
         batch: Batch of the rows.

@@ -124,7 +124,7 @@ class BatchVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         next_episode(self._task.batch, np.flatnonzero(chosen), seed, episode)
 
     def step(self, actions: NDArray[Any]) -> Steps:
-        """Move every cell through one control period, or make an attempt in every task.
+        """Execute one control cycle, or one attempt of the sorting task, in every environment.
 
         Args:
             actions: See the action space.

@@ -169,7 +169,7 @@ def nearest_parts(a: Vec, b: Vec, first: int, last: int, out: Vec, part: Vec) ->
 
 @kernel()
 def least(values: Vec) -> tuple[float, int]:
-    """Return the least of some values and its place; (FAR, 0) where there are none."""
+    """Return the least value and its index; (FAR, 0) without values."""
     best, place = FAR, 0
     for j in range(values.shape[0]):
         if values[j] < best:

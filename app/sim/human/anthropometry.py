@@ -119,7 +119,7 @@ def percentile_body(
 
 
 def _factor(name: str, percentile: float) -> float:
-    """Return by how much a measure of a percentile differs from the median, 1 at the median."""
+    """Return the ratio of a measure at a percentile to the median."""
     low, high = PERCENTILES
     if not low <= percentile <= high:
         raise InvalidInput(name, percentile, f"must be a percentile in {interval(low, high)}")

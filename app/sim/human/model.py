@@ -174,7 +174,7 @@ def solve_hands(
     pelvis: tuple[float, float, float] | None = None,
     swivel: float = 0.35,
 ) -> Posture:
-    """Place pelvis and hands, the torso following.
+    """Place pelvis and hands; the torso follows.
 
     Continuous in its inputs, so that a dragged gizmo moves the person smoothly. A hand without
     a target keeps its arm's joints.
@@ -283,7 +283,7 @@ def _solve_arm(q: Vec, size: Vec, hand: str, target: Vec, swivel: float) -> Vec:
 
 
 def _elbow_pole(torso: Vec, line: Vec, side: float, swivel: float) -> Vec:
-    """Return the unit vector, normal to ``line``, toward which the elbow points."""
+    """Return the unit vector from ``line`` to the elbow, normal to the line."""
     down = -torso[:, 2] - 0.3 * torso[:, 0]
     down = down - (down @ line) * line
     if np.linalg.norm(down) < 1e-6:

@@ -66,7 +66,7 @@ class PointFilter:
         self._cov = np.zeros((n, 3))  # position, position-speed, speed
 
     def known(self, t: float) -> NDArray[np.bool_]:
-        """Return which points were measured within the hold time before ``t`` [s], (n,)."""
+        """Return whether points were measured within the hold time before ``t`` [s], (n,)."""
         return np.asarray(t - self.seen_at <= self.settings.hold_s + 1e-9)
 
     def at(self, t: float) -> tuple[Vec, Vec]:
@@ -84,7 +84,7 @@ class PointFilter:
         return e, tau * (1.0 - e)
 
     def gate(self, t: float, points: Vec) -> NDArray[np.bool_]:
-        """Return which measurements to reject for their distance to the prediction, shape (n,).
+        """Return whether measurements are too far from the prediction, shape (n,).
 
         The gate widens while a point is unseen, but not while its measurements are rejected.
 

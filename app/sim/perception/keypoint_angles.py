@@ -56,7 +56,7 @@ def joint_angles(points: Vec, q_before: Vec, size: Vec) -> tuple[Vec, Mask]:
 def joint_motion(
     points: Vec, speeds: Vec, q_before: Vec, size: Vec, qd_max: float
 ) -> tuple[Vec, Vec, Mask]:
-    """Return joint positions, joint speeds and which are held, each of shape (18,).
+    """Return joint positions, joint speeds and held joints, each of shape (18,).
 
     Joint speeds are the derivative of the positions along the key-points' speeds.
 

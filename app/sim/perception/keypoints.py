@@ -106,7 +106,7 @@ def swap_sides(values: Vec, group: Group) -> Vec:
 
 
 def swapped_against(points: Vec, expected: Vec, group: Group, margin: float = 0.08) -> bool:
-    """Return whether a group fits what was expected better with its sides exchanged.
+    """Return whether a group fits the prediction better with exchanged sides.
 
     Args:
         points: Key-points seen [m], shape (25, 3), NaN where missing.

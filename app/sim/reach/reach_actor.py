@@ -29,11 +29,11 @@ class ReachKnown(PolicyIdentity, Protocol):
 
     @property
     def targets(self) -> Vec | None:
-        """The goals it was trained on [m], shape (n, 3); None for a whole box."""
+        """Training goals [m], shape (n, 3); None for a whole box."""
 
 
 class ReachActor(ReachKnown, Protocol):
-    """Brings the tcp to a goal beside people; safe to call from several threads."""
+    """Reach policy; safe to call from several threads."""
 
     @property
     def trained_range(self) -> Mapping[str, Mapping[str, Sequence[float]]]:

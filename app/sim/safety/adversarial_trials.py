@@ -102,7 +102,7 @@ class TrialResult:
 
     @property
     def stopped_share(self) -> float:
-        """Share of all periods in which the robot stood or braked to stand."""
+        """Share of all periods in which the robot was stopped."""
         return float(self.rows[:, STOPPED].sum() / self.rows[:, STEPS].sum())
 
     @property

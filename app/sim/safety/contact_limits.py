@@ -128,5 +128,5 @@ def capsule_speeds(robot_mass: float, contact_area: float) -> Vec:
 
 
 def cylinder_speed(robot_mass: float, contact_area: float) -> float:
-    """Return that of a cylinder, which may hide any part: the most delicate region's [m/s]."""
+    """Return the limit of a cylinder: that of the most sensitive region [m/s]."""
     return min(contact_speed(region, robot_mass, contact_area) for region in REGIONS.values())

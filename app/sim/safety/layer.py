@@ -136,7 +136,7 @@ def safety_settings(cell: Cell) -> SafetySettings:
 
 
 def contact_speeds(settings: SafetySettings, n_columns: int, n_cylinders: int) -> Vec:
-    """Return the speed at which each part of the people may be touched [m/s].
+    """Return the admissible contact speed of each part of the people [m/s].
 
     Args:
         settings: Assumptions; without power and force limiting nothing may be touched.

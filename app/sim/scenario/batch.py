@@ -105,7 +105,7 @@ class EnvBatch(ABC):
 
     @property
     def obs(self) -> NDArray[np.float32]:
-        """Observations as they were last written, (n_envs, obs_size)."""
+        """Last observations, (n_envs, obs_size)."""
         return self._obs
 
     def reset(self, seed: int | None = None) -> NDArray[np.float32]:

@@ -46,7 +46,7 @@ FAR_AWAY = (0.0, 4.0, -np.pi / 2.0)
 
 
 def require_finite(name: str, values: NDArray[np.floating]) -> None:
-    """Raise SimulationError for NaN and infinity, which the contact test would pass over."""
+    """Raise SimulationError for NaN and infinity, which contact tests do not detect."""
     if not np.isfinite(values).all():
         raise SimulationError(f"{name} = {values.tolist()} must be finite")
 
@@ -101,7 +101,7 @@ def with_people(cell: Cell, kinds: Sequence[HumanKind]) -> Cell:
 
 
 def _cylinder_of(cell: Cell, kind: HumanKind) -> CylinderPerson:
-    """Return a cylinder of a kind that walks where a cell's first person may be."""
+    """Return a cylinder of a kind with the walking area of the cell's first person."""
     where = cell.people[0] if cell.people else PedestrianSettings()
     area = {name: getattr(where, name) for name in ("x_min", "x_max", "y_min", "y_max")}
     if kind == "walker":

@@ -187,17 +187,17 @@ class SortingBatch:
 
     @property
     def obs(self) -> Obs:
-        """Observations as they were last written, (n_envs, obs_size)."""
+        """Last observations, (n_envs, obs_size)."""
         return self._obs
 
     @property
     def episode(self) -> NDArray[np.int64]:
-        """Numbers of the present episodes, (n_envs,); those that start next are set here."""
+        """Numbers of the present episodes, (n_envs,); set them to choose the next ones."""
         return self.rows.episode
 
     @property
     def horizon(self) -> int:
-        """Attempts after which an episode is cut off."""
+        """Attempts after which an episode is truncated."""
         return round(self.settings.horizon_factor * self.shape.n_cells)
 
     def _rules(self) -> kernel.SortingRules:
@@ -276,7 +276,7 @@ class SortingBatch:
         return SortingStep(obs=self._obs, last_obs=self._last, rew=self._rew, ended=self._ended)
 
     def masks(self) -> NDArray[np.bool_]:
-        """Return which moves change something, shape (n_envs, n_actions); overwritten."""
+        """Return whether each move changes the state, shape (n_envs, n_actions); reused."""
         kernel.masks_of(self.rows, self._masks)
         return self._masks
 
@@ -293,7 +293,7 @@ class SortingBatch:
             counter[e] = 0
 
     def change(self, e: int, state: SortingState) -> None:
-        """Put row ``e`` into another state, as a person would; the counters go on.
+        """Set the state of row ``e``, as by a person; counters continue.
 
         Raises:
             InvalidInput: The state does not fit.
@@ -339,7 +339,7 @@ def observe(state: SortingState) -> Obs:
 
 
 def valid_moves(state: SortingState, shape: SortingShape) -> NDArray[np.bool_]:
-    """Return which moves change something, shape (n_actions,)."""
+    """Return whether each move changes the state, shape (n_actions,)."""
     there, towers = state.clutter != NULL, state.heights > 0
     across = towers[:, None] & ~np.eye(shape.n_colours, dtype=np.bool_)
     return np.concatenate(

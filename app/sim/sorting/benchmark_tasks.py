@@ -103,7 +103,7 @@ def _objects(codes: NDArray[np.int8]) -> NDArray[np.int8]:
 def _scattered(
     codes: NDArray[np.int64], goal: Codes, shape: SortingShape, fail: Vec, rng: Generator
 ) -> SortingState:
-    """Return objects in random clutter cells and nothing sorted."""
+    """Return a state with all objects in random clutter cells."""
     clutter = np.zeros(shape.n_cells, dtype=np.int8)
     clutter[rng.permutation(shape.n_cells)[: len(codes)]] = codes
     return replace(empty_state(shape), clutter=clutter, goal=goal, fail=fail.copy())
@@ -189,7 +189,7 @@ def add_to_clutter(state: SortingState, code: int, rng: Generator) -> SortingSta
 
 
 def _add_below(state: SortingState, shape: SortingShape, rng: Generator) -> SortingState:
-    """Add an object that is larger than the top of its tower, and ask for it as well.
+    """Add an object larger than the top of its tower to state and goal.
 
     Raises:
         InvalidInput: Nothing sorted could have a larger object below it, or there is no room.
@@ -208,7 +208,7 @@ def _add_below(state: SortingState, shape: SortingShape, rng: Generator) -> Sort
 
 
 def _add_alternative(state: SortingState, shape: SortingShape, rng: Generator) -> SortingState:
-    """Add a duplicate of an object that the towers still lack.
+    """Add a duplicate of an object that is missing on the towers.
 
     Raises:
         InvalidInput: They lack nothing, or there is no room.
@@ -228,7 +228,7 @@ def _touches_sorted(towers: Codes, goal: Codes) -> bool:
 
 
 def _change_goal(state: SortingState, shape: SortingShape, rng: Generator) -> SortingState:
-    """Ask for as many other objects, such that some that are sorted must move again."""
+    """Change the goal so that some sorted objects must move again."""
     there = np.concatenate([_objects(state.clutter), _objects(state.towers)])
     n_goal = len(_objects(state.goal))
     for _ in range(DRAWS):
@@ -241,7 +241,7 @@ def _change_goal(state: SortingState, shape: SortingShape, rng: Generator) -> So
 def _ask_for_another_colour(
     state: SortingState, shape: SortingShape, rng: Generator
 ) -> SortingState:
-    """Ask for three objects of a colour that is not in the goal as well.
+    """Add three objects of another colour to the goal.
 
     Raises:
         InvalidInput: The clutter holds no three of such a colour.

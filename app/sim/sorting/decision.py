@@ -173,13 +173,13 @@ def takes_time(shape: SortingShape) -> bool:
 
 
 def valid_actions(state: SortingState, shape: SortingShape) -> list[int]:
-    """Return the moves that change something, by their numbers."""
+    """Return the numbers of the moves that change the state."""
     found: list[int] = np.flatnonzero(valid_moves(state, shape)).tolist()
     return found
 
 
 def warm_up(policy: SortingValues | None = None) -> None:
-    """Compile what a decision needs, before the first one; a policy decides once for that."""
+    """Compile the kernels of decisions by one decision of a policy."""
     shape = SortingShape(n_cells=2, n_colours=1) if policy is None else policy.shape
     state = empty_state(shape)
     state.clutter[0] = state.goal[0, 0] = shape.code(0, 0)

@@ -26,12 +26,12 @@ HALF_WIDTHS = (0.02, 0.03, 0.04)
 
 
 def is_sorting(cell: Cell) -> bool:
-    """Whether there is something to sort in a cell."""
+    """Return whether a cell is a sorting cell."""
     return bool(cell.stations_of("clutter")) and bool(cell.stations_of("cluster"))
 
 
 def lacks_for_tasks(cell: Cell) -> str | None:
-    """Say what a cell lacks to be trained to sort in; None where nothing."""
+    """Return the missing parts for training of a sorting policy; None if complete."""
     if not is_sorting(cell):
         return "needs at least one station of kind clutter and one of kind cluster"
     clutter, towers = cell.stations_of("clutter"), cell.stations_of("cluster")
@@ -41,7 +41,7 @@ def lacks_for_tasks(cell: Cell) -> str | None:
 
 
 def lacks_for_sorting(cell: Cell) -> str | None:
-    """Say what a cell lacks to be shown as a live sorting cell; None where nothing."""
+    """Return the missing parts for a live sorting cell; None if complete."""
     clutter, towers = cell.stations_of("clutter"), cell.stations_of("cluster")
     if (lack := lacks_for_tasks(cell)) is not None:
         return lack
@@ -59,7 +59,7 @@ def lacks_for_sorting(cell: Cell) -> str | None:
 
 
 def same_workspace(one: Cell, other: Cell) -> bool:
-    """Whether two cells differ in nothing but their stations.
+    """Return whether two cells differ only in their stations.
 
     Robot, limits, tool, table, obstacles and people agree. A policy that goes to any point it
     is given may then act in both; points outside what it was trained on are flagged.
@@ -69,7 +69,7 @@ def same_workspace(one: Cell, other: Cell) -> bool:
 
 
 def require_workspace(cell: Cell, trained: Cell) -> None:
-    """Make sure that a policy of another cell may act in a sorting cell.
+    """Raise unless a policy of another cell may act in a sorting cell.
 
     Args:
         cell: Work cell in which the policy acts.

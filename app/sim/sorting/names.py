@@ -147,7 +147,7 @@ def state_from_names(
 
 
 def fail_with(names: SortingNames, own: Vec, changes: Mapping[str, float]) -> Vec:
-    """Return failure probabilities with those that a caller gives in place of the cell's own.
+    """Return the failure probabilities of a cell, replaced by stated ones.
 
     Args:
         names: The words of the task.

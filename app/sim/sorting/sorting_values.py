@@ -10,14 +10,14 @@ from app.sim.sorting.state import SortingShape
 
 
 class SortingValues(PolicyIdentity, Protocol):
-    """A learned policy as its values of all moves; safe to call from several threads.
+    """Sorting policy by its values of all moves; safe to call from several threads.
 
     It was trained on goals that have each tower of its own colour, the largest at the bottom.
     """
 
     @property
     def shape(self) -> SortingShape:
-        """The tasks it knows."""
+        """Shape of its tasks."""
 
     def values(self, obs: NDArray[np.uint8]) -> NDArray[np.float32]:
         """Return Q of every move, valid or not.

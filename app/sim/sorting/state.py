@@ -164,7 +164,7 @@ class SortingState:
 
     @property
     def solved(self) -> bool:
-        """Whether every tower is as the goal asks."""
+        """Whether every tower equals its goal."""
         return bool((self.towers == self.goal).all())
 
 

@@ -83,7 +83,7 @@ def sweep(
     robot: RobotPose,
     crowd: PeopleGeometry,
 ) -> tuple[int, float]:
-    """Test one whole period for contact, between its ends too.
+    """Check one period for contact, including between its ends.
 
     Args:
         arm: Robot in its cell.

@@ -187,7 +187,7 @@ def points_and_frames(q: Vec, size: Vec, trig: Vec, points: Vec, frames: Vec) ->
 
 @kernel(inline="always")
 def _between(out: Vec, k: int, points: Vec, start: int, end: int) -> None:
-    """Write the capsule from one point to another into column ``k``."""
+    """Write the capsule between two points to column ``k``."""
     for i in range(3):
         out[i, k] = points[start, i]
         out[3 + i, k] = points[end, i] - points[start, i]

@@ -209,7 +209,7 @@ def start_pedestrian(
 def advance_pedestrian(
     rules: PedestrianRules, state: PedestrianState, e: int, p: int, dt: float
 ) -> None:
-    """Move one walker on by one control period, never past its target.
+    """Move one walker by one control period, at most to its target.
 
     Args:
         rules: Motion of the walkers.
@@ -243,7 +243,7 @@ def advance_pedestrian(
 
 @kernel(inline="always")
 def remember(rows: Vec, e: int, p: int, dt: float) -> None:
-    """Let the past of a walker grow older, and add the moment that is now when it is time.
+    """Age the history of a walker and add a sample when due.
 
     Args:
         rows: State of all walkers, shape (n_envs, W, N_STATE).
@@ -263,7 +263,7 @@ def remember(rows: Vec, e: int, p: int, dt: float) -> None:
 
 @kernel()
 def remember_as_now(rows: Vec, e: int, p: int) -> None:
-    """Set a walker's past as if it had always been as it is now."""
+    """Set the history of a walker to its present values."""
     rows[e, p, AGE] = 0.0
     for k in range(N_PAST):
         rows[e, p, PAST_RADIUS + k] = rows[e, p, R]
@@ -272,7 +272,7 @@ def remember_as_now(rows: Vec, e: int, p: int) -> None:
 
 @kernel()
 def _remember_before(rule: Vec, rows: Vec, e: int, p: int) -> None:
-    """Set the past of a walker as it was before it started."""
+    """Set the history of a walker before its start."""
     rows[e, p, AGE] = 0.0
     for k in range(N_PAST):
         t = -k * PAST_S
@@ -282,7 +282,7 @@ def _remember_before(rule: Vec, rows: Vec, e: int, p: int) -> None:
 
 @kernel()
 def _arrive(rules: PedestrianRules, state: PedestrianState, e: int, p: int) -> None:
-    """Stay at the target for good, or go on to a new one."""
+    """Stay at the target for the rest of the episode, or draw a new one."""
     own = state.stream[e, p]
     if uniform(own) < rules.rows[p, P_STAY]:
         state.rows[e, p, GAIT] = STAYING
@@ -292,7 +292,7 @@ def _arrive(rules: PedestrianRules, state: PedestrianState, e: int, p: int) -> N
 
 @kernel()
 def _go_on(rules: PedestrianRules, state: PedestrianState, e: int, p: int) -> None:
-    """Perhaps leave the target at which the walker stays."""
+    """Leave the target with a given probability."""
     own = state.stream[e, p]
     if uniform(own) < rules.rows[p, P_GO_ON]:
         state.rows[e, p, GAIT] = WALKING
@@ -301,7 +301,7 @@ def _go_on(rules: PedestrianRules, state: PedestrianState, e: int, p: int) -> No
 
 @kernel()
 def _drawn_inside(own: State, low: float, high: float, margin: float) -> float:
-    """Draw from a range less a margin at both ends, or from its middle where none is left."""
+    """Draw from a range less a margin at both ends; from its middle if that is empty."""
     margin = min(margin, 0.5 * (high - low))
     return _between(own, low + margin, high - margin)
 
@@ -341,7 +341,7 @@ def _speed(rule: Vec, rows: Vec, e: int, p: int, t: float) -> float:
 
 @kernel(inline="always")
 def _set_velocity(rule: Vec, rows: Vec, e: int, p: int, t: float) -> None:
-    """Write the velocity from ``t`` on, for one period."""
+    """Write the velocity of the period from ``t``."""
     speed = _speed(rule, rows, e, p, t)
     rows[e, p, VX] = speed * rows[e, p, COURSE_X]
     rows[e, p, VY] = speed * rows[e, p, COURSE_Y]

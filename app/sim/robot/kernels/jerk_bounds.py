@@ -119,7 +119,7 @@ def ramp_steps(qdd: float, y: float, acc: float, step: float, dt: float) -> floa
 
 @kernel(error_model="numpy")
 def lowest_turn(qd: float, qdd: float, jerk: float, longest: float) -> float:
-    """Return the displacement at which a joint that goes down turns up [rad].
+    """Return the displacement at which a joint that moves down reverses [rad].
 
     Args:
         qd: Speed [rad/s], negative.
@@ -136,7 +136,7 @@ def lowest_turn(qd: float, qdd: float, jerk: float, longest: float) -> float:
 def _from_above(
     qd: float, qdd: float, y: float, acc: float, jerk: float, dt: float
 ) -> tuple[float, float, float, float]:
-    """Return the manoeuvre's extremes where it comes to rest from positive speeds.
+    """Return the manoeuvre's extremes if it comes to rest from positive speed.
 
     Arguments and results as :func:`manoeuvre_extremes`, and ``y`` [rad/s]. The end is the
     highest point; the lowest is where the joint turns up, if it goes down at first. The sums
@@ -236,7 +236,7 @@ def period_extremes(
 
 @kernel(error_model="numpy")
 def excesses(j: float, at: AxisState, to: AxisLimits) -> tuple[float, float]:
-    """Return by how much a jerk for one period, then braking, exceeds the limits.
+    """Return the excess over limits of a jerk for one period with braking afterwards.
 
     Args:
         j: Jerk of this period [rad/s^3].
@@ -270,7 +270,7 @@ def farthest_jerk(
     at: AxisState,
     to: AxisLimits,
 ) -> float:
-    """Return the last admissible jerk on the way from braking to a wanted one [rad/s^3].
+    """Return the admissible jerk nearest to a target, searched from braking [rad/s^3].
 
     Bisection, with the cut where a straight line through the excesses (one of them halved when
     the same end stays twice) crosses zero; every third cut is in the middle. What is returned

@@ -230,7 +230,7 @@ def _greatest_override(
     path: JointPath,
     space: SsmWorkspace,
 ) -> float:
-    """Return the greatest admissible override of those tried; 0 where there is none."""
+    """Return the greatest admissible override among the candidates; 0 without any."""
     if admissible(arm, rule, latency, people, path, 1.0, space):
         return 1.0
     qdd_max = arm.limits.qdd_max

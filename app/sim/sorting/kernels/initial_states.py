@@ -45,7 +45,7 @@ def _size(rng: random.State, n: int, even: bool) -> int:
 
 @kernel()
 def write_goal(rows: SortingRows, rules: SortingRules, e: int, wanted: Ints) -> None:
-    """Make the goal of objects by code, each on its colour's tower, the largest at the bottom.
+    """Write the goal of objects, on the tower of their colour, the largest at the bottom.
 
     Args:
         rows: Rows.
@@ -68,7 +68,7 @@ def write_goal(rows: SortingRows, rules: SortingRules, e: int, wanted: Ints) -> 
 
 @kernel()
 def draw_codes(rng: random.State, there: Ints, n: int, wanted: Ints) -> None:
-    """Draw ``n`` of the objects that are there, without putting back.
+    """Draw ``n`` objects without replacement.
 
     Args:
         rng: Random stream.
@@ -103,7 +103,7 @@ def _clear(rows: SortingRows, e: int) -> None:
 
 @kernel()
 def _build(rows: SortingRows, e: int, rng: random.State, n_done: int, rest: Ints) -> None:
-    """Put ``n_done`` objects of the goal in place, at random towers; take them off ``rest``."""
+    """Place ``n_done`` objects of the goal on random towers; remove them from ``rest``."""
     for _ in range(n_done):
         left = 0
         for c in range(rows.goal.shape[1]):
@@ -121,7 +121,7 @@ def _build(rows: SortingRows, e: int, rng: random.State, n_done: int, rest: Ints
 
 @kernel()
 def _scatter(rows: SortingRows, e: int, rng: random.State, n_junk: int, rest: Ints) -> None:
-    """Put ``n_junk`` objects on towers at random, all others into the clutter."""
+    """Place ``n_junk`` objects on random towers, all others in the clutter."""
     n_rest = 0
     for code in range(1, rest.shape[0]):
         n_rest += rest[code]

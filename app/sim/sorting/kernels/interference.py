@@ -24,7 +24,7 @@ GOAL_TRIES = 20
 
 @kernel()
 def _count(rows: SortingRows, e: int, there: Ints) -> int:
-    """Count the objects of row ``e`` by code; return how many there are."""
+    """Count the objects of row ``e`` by code; return the total."""
     for code in range(there.shape[0]):
         there[code] = 0
     total = 0
@@ -93,7 +93,7 @@ def _change_goal(rows: SortingRows, rules: SortingRules, e: int, rng: random.Sta
 
 @kernel()
 def interfere(rows: SortingRows, rules: SortingRules, e: int) -> None:
-    """Let a person do one of the four things in row ``e``, where that is possible."""
+    """Apply one of the four interferences to row ``e``, if possible."""
     rng = rows.rng[e]
     kind = random.below(rng, 4)
     rows.interferences[e] += 1

@@ -102,7 +102,7 @@ def new_work(n_cells: int, n_colours: int, n_sizes: int) -> PlannerWork:
 
 @kernel()
 def copy_objects(source: Objects, target: Objects) -> None:
-    """Copy where the objects are."""
+    """Copy the positions of the objects."""
     for k in range(len(source.clutter)):
         target.clutter[k] = source.clutter[k]
     for c in range(len(source.heights)):
@@ -139,7 +139,7 @@ def _locate(objects: Objects, task: Task, p: ShortestPaths) -> None:
 
 @kernel()
 def _apply_action(action: int, objects: Objects, task: Task, work: PlannerWork) -> bool:
-    """Carry an action out, and note the towers' progress.
+    """Execute an action and update the towers' progress.
 
     Returns:
         Whether the states had to be written again: an object waits on a tower.
@@ -225,7 +225,7 @@ def _next_free(last: int, clutter: Bytes, fail: Vec) -> int:
 
 @kernel()
 def _try_cells(c: int, best: float, task: Task, work: PlannerWork) -> tuple[int, float]:
-    """Try to put the top of a tower into the best free cells, and into the worst one.
+    """Evaluate the best free cells and the worst one for the top of a tower.
 
     Args:
         c: The tower.
@@ -255,7 +255,7 @@ def _try_cells(c: int, best: float, task: Task, work: PlannerWork) -> tuple[int,
 
 @kernel()
 def _waiting(c: int, removed: int, p: ShortestPaths) -> int:
-    """Return a tower where the top of another may wait at no cost, -1 where none is.
+    """Return a tower that can hold the top of another at no cost; -1 without one.
 
     Args:
         c: The other tower.
@@ -350,7 +350,7 @@ def plan_state(objects: Objects, task: Task, work: PlannerWork) -> tuple[int, fl
 
 @kernel(nogil=True)
 def plan_by_rules(objects: Objects, task: Task, work: PlannerWork) -> tuple[int, float]:
-    """Plan one state by the rules alone: as many moves, sometimes a few more attempts.
+    """Plan one state by the rules alone: same number of moves, possibly more attempts.
 
     Args:
         objects: Positions of the objects.

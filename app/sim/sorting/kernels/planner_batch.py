@@ -66,7 +66,7 @@ def plan_rows(tasks: TaskBatch, work: PlannerWork, best: Ints, fewest: Ints) -> 
 
 @kernel(nogil=True)
 def mark_rows(tasks: TaskBatch, work: PlannerWork, first: NDArray[np.bool_]) -> None:
-    """Mark the actions with which plans of the fewest moves begin, for every task.
+    """Mark the first actions of shortest plans, for every task.
 
     Args:
         tasks: States and goals.

@@ -47,13 +47,13 @@ def move_cost(weights: SortingWeights) -> float:
 
 @kernel(inline="always")
 def empty_cost(empty: bool, weights: SortingWeights) -> float:
-    """Return the cost of picking where nothing is."""
+    """Return the cost of picking from an empty position."""
     return weights.empty if empty else 0.0
 
 
 @kernel(inline="always")
 def stuck_cost(stuck: bool, weights: SortingWeights) -> float:
-    """Return the cost of putting an object back where it was."""
+    """Return the cost of returning an object to its position."""
     return weights.stuck if stuck else 0.0
 
 

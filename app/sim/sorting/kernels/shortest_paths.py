@@ -152,7 +152,7 @@ def _find_cuts(
 
 @kernel()
 def _add(held: NDArray[np.int16], source: int, target: int, code: int) -> None:
-    """Write what is held at ``target``: as at ``source``, and one object more."""
+    """Write the held objects at ``target``: those at ``source`` and one more."""
     for x in range(held.shape[1]):
         held[target, x] = held[source, x]
     held[target, code] += 1
@@ -188,7 +188,7 @@ def _lay_tower(c: int, tower: Bytes, goal: Bytes, goal_height: int, p: ShortestP
 def _can_be_met(
     clutter: Bytes, towers: Bytes, heights: Ints, goal: Bytes, goal_heights: Ints, total: Ints
 ) -> bool:
-    """Count the objects of each code; tell whether they are enough and not too many."""
+    """Count the objects of each code; return whether the goal is feasible."""
     for x in range(len(total)):
         total[x] = 0
     for code in clutter:
@@ -243,7 +243,7 @@ def lay_out(
 
 @kernel()
 def _count_left(c: int, at: Ints, p: ShortestPaths) -> None:
-    """Write ``left`` of tower ``c`` and those before it, the first one excepted."""
+    """Write ``left`` of the towers up to ``c``, except the first."""
     for d in range(c, 0, -1):
         for x in range(p.left.shape[1]):
             p.left[d, x] = p.left[d + 1, x] - p.held[d, at[d], x]
@@ -251,7 +251,7 @@ def _count_left(c: int, at: Ints, p: ShortestPaths) -> None:
 
 @kernel()
 def _fewest_from(index: int, at: Ints, p: ShortestPaths) -> int:
-    """Return the fewest moves from a state by what is known of its successors."""
+    """Return the fewest moves from a state, by those of its successors."""
     best = FAR
     for c in range(len(at)):
         want = p.want[c, at[c]]
@@ -270,7 +270,7 @@ def _fewest_from(index: int, at: Ints, p: ShortestPaths) -> int:
 
 @kernel()
 def _sweep(size: int, at: Ints, p: ShortestPaths) -> bool:
-    """Improve all states once, from the goal on; tell whether any has become better."""
+    """Improve all states once, from the goal; return whether any changed."""
     better = False
     for c in range(len(at)):
         at[c] = p.n[c] - 1
@@ -330,7 +330,7 @@ def in_clutter(index: int, code: int, p: ShortestPaths) -> int:
 
 @kernel()
 def _meet(index: int, found: int, p: ShortestPaths) -> int:
-    """Note a state to be searched, once; return how many there are."""
+    """Add a state to the search, once; return the number of states."""
     if p.seen[index] == 0:
         p.seen[index] = 1
         p.line[found] = index
@@ -340,7 +340,7 @@ def _meet(index: int, found: int, p: ShortestPaths) -> int:
 
 @kernel()
 def _search_from(index: int, still: int, code: int, found: int, p: ShortestPaths) -> int:
-    """Note the states that shortest plans reach from one while tower ``still`` stands.
+    """Add the states on shortest plans from one while tower ``still`` is unchanged.
 
     Returns:
         Number of states noted; -1 where ``code`` may be placed from the clutter here.

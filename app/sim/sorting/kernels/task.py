@@ -41,7 +41,7 @@ class SortingRules(NamedTuple):
     n_sizes: int
     """Number of sizes."""
     horizon: int
-    """Attempts after which an episode is cut off."""
+    """Attempts after which an episode is truncated."""
     disturbed_share: float
     """Share of episodes that start with junk on the towers and goals partly built."""
     solved_episodes: float
@@ -101,7 +101,7 @@ class SortingRows(NamedTuple):
 
 @kernel()
 def is_solved(rows: SortingRows, e: int) -> bool:
-    """Whether every tower of row ``e`` is as the goal asks."""
+    """Return whether every tower of row ``e`` equals its goal."""
     for c in range(rows.towers.shape[1]):
         if rows.heights[e, c] != rows.goal_heights[e, c]:
             return False
@@ -113,14 +113,14 @@ def is_solved(rows: SortingRows, e: int) -> bool:
 
 @kernel()
 def push(rows: SortingRows, e: int, c: int, code: int) -> None:
-    """Put an object on tower ``c``."""
+    """Place an object on tower ``c``."""
     rows.towers[e, c, rows.heights[e, c]] = code
     rows.heights[e, c] += 1
 
 
 @kernel()
 def pop(rows: SortingRows, e: int, c: int) -> int:
-    """Take the top object off tower ``c``, which is not empty; return its code."""
+    """Remove the top object of tower ``c``, which is not empty; return its code."""
     rows.heights[e, c] -= 1
     level = rows.heights[e, c]
     code = int(rows.towers[e, c, level])
@@ -130,7 +130,7 @@ def pop(rows: SortingRows, e: int, c: int) -> int:
 
 @kernel()
 def nth_cell(rows: SortingRows, e: int, wanted: int, occupied: bool) -> int:
-    """Return the ``wanted``-th occupied or free clutter cell, from 0; -1 where none is."""
+    """Return the ``wanted``-th occupied or free clutter cell, from 0; -1 without one."""
     seen = 0
     for k in range(rows.clutter.shape[1]):
         if (rows.clutter[e, k] != 0) == occupied:
@@ -154,7 +154,7 @@ def n_cells(rows: SortingRows, e: int, occupied: bool) -> int:
 def attempt(
     rows: SortingRows, rules: SortingRules, weights: SortingWeights, e: int, action: int
 ) -> float:
-    """Carry out one attempt in row ``e``; return the reward without distance and success."""
+    """Execute one attempt in row ``e``; return the reward without distance and success."""
     n, n_towers = rows.clutter.shape[1], rows.towers.shape[1]
     rng = rows.rng[e]
     empty = stuck = failed = back = False
@@ -204,7 +204,7 @@ def attempt(
 
 @kernel()
 def write_mask(rows: SortingRows, e: int, mask: NDArray[np.bool_]) -> None:
-    """Mark the moves that would change something, shape (n_actions,)."""
+    """Mark the moves that change the state, shape (n_actions,)."""
     n, n_towers = rows.clutter.shape[1], rows.towers.shape[1]
     for k in range(n):
         there = rows.clutter[e, k] != 0
@@ -232,7 +232,7 @@ def write_obs(rows: SortingRows, e: int, out: NDArray[np.uint8]) -> None:
 def step_reward(
     rows: SortingRows, rules: SortingRules, weights: SortingWeights, e: int
 ) -> float:
-    """Set how row ``e`` stands after an attempt; return the rest of the reward."""
+    """Set the outcome of row ``e`` after an attempt; return the rest of the reward."""
     solved = is_solved(rows, e)
     if solved:
         rows.outcome[e] = SUCCESS

@@ -28,7 +28,7 @@ NONE = -1
 
 @kernel()
 def safest_cell(code: int, clutter: Bytes, fail: Vec) -> int:
-    """Return the least risky cell that holds a code (0: a free one), -1 where none does."""
+    """Return the least risky cell that holds a code (0: a free one), -1 without one."""
     best = -1
     for k in range(len(clutter)):
         if clutter[k] == code and (best < 0 or fail[k] < fail[best]):
@@ -38,7 +38,7 @@ def safest_cell(code: int, clutter: Bytes, fail: Vec) -> int:
 
 @kernel()
 def worst_free(clutter: Bytes, fail: Vec) -> int:
-    """Return the most risky free cell, -1 where none is free."""
+    """Return the most risky free cell, -1 without one."""
     worst = -1
     for k in range(len(clutter)):
         if clutter[k] == 0 and (worst < 0 or fail[k] > fail[worst]):
@@ -59,7 +59,7 @@ def still_wanted(code: int, goal: Bytes, goal_heights: Ints, p: ShortestPaths) -
 
 @kernel()
 def _next_risk(code: int, wanted: int, clutter: Bytes, fail: Vec, free: int) -> float:
-    """Return the risk that one object more in the clutter adds, -1 where it adds none.
+    """Return the additional risk of one more object in the clutter, -1 for none.
 
     With ``wanted`` picks to come, the object in the cell ``free`` and its duplicates serve
     them, the least risky first: what counts is the risk of the last one.
@@ -79,7 +79,7 @@ def _next_risk(code: int, wanted: int, clutter: Bytes, fail: Vec, free: int) -> 
 
 @kernel()
 def _cell_for(code: int, wanted: int, clutter: Bytes, fail: Vec) -> int:
-    """Return the cell for a removed object: the best one if it will be picked there."""
+    """Return the cell for a removed object: the best one if it is picked again."""
     free = safest_cell(0, clutter, fail)
     if free < 0:
         return -1
@@ -91,7 +91,7 @@ def _cell_for(code: int, wanted: int, clutter: Bytes, fail: Vec) -> int:
 
 @kernel()
 def _transfer(index: int, p: ShortestPaths) -> int:
-    """Return a tower-to-tower move of a shortest plan as ``c * C + d``, -1 where none is."""
+    """Return a tower-to-tower move of a shortest plan as ``c * C + d``, -1 without one."""
     n_towers = len(p.at)
     for c in range(n_towers):
         top = p.top[c, p.at[c]]
@@ -124,7 +124,7 @@ def _placement(index: int, clutter: Bytes, fail: Vec, p: ShortestPaths) -> int:
 def _removal(
     index: int, clutter: Bytes, goal: Bytes, goal_heights: Ints, fail: Vec, p: ShortestPaths
 ) -> int:
-    """Return the least risky removal of a shortest plan as an action, -1 where none is."""
+    """Return the action of the least risky removal of a shortest plan, -1 without one."""
     n_cells, n_towers = len(clutter), len(p.at)
     best, least = NONE, 2.0
     free = safest_cell(0, clutter, fail)
@@ -170,7 +170,7 @@ def choose(clutter: Bytes, goal: Bytes, goal_heights: Ints, fail: Vec, p: Shorte
 
 @kernel()
 def mark_first(clutter: Bytes, p: ShortestPaths, first: NDArray[np.bool_]) -> None:
-    """Mark every action with which some shortest plan begins.
+    """Mark the first actions of shortest plans.
 
     Args:
         clutter: Objects in the cells, shape (K,).

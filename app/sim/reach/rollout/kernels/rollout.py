@@ -253,7 +253,7 @@ def _collides(arm: Arm, clearance: float, work: RolloutWorkspace) -> bool:
 def _margin_left(
     world: ReachCell, clearance: float, t: float, share: float, work: RolloutWorkspace
 ) -> float:
-    """Return the clearance to people beyond what they must keep [m].
+    """Return the clearance to people beyond the required distance [m].
 
     Args:
         world: Shared data.
