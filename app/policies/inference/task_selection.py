@@ -103,18 +103,22 @@ class ValueNetworks:
             return act.numpy(), self.critic.least(rows, act).numpy()
 
 
-def choose(values: NDArray[np.floating], previous: int | None, hysteresis: float) -> int:
-    """Return the index of the chosen candidate.
+def select(
+    values: NDArray[np.floating], previous: NDArray[np.int64] | int | None, hysteresis: float
+) -> NDArray[np.int64]:
+    """Return the index of the selected candidate, shape (...,).
 
     Args:
-        values: Value of each candidate, shape (n,).
-        previous: Index chosen last; None chooses afresh.
-        hysteresis: Margin by which another must be better.
+        values: Value of each candidate, shape (..., n); -inf where there is none.
+        previous: Index selected last, shape (...,); None: none.
+        hysteresis: Margin by which another candidate must be better; 0 is the source's rule.
     """
-    best = int(np.argmax(values))
-    if previous is None or values[best] > values[previous] + hysteresis:
+    best: NDArray[np.int64] = values.argmax(axis=-1)
+    if previous is None:
         return best
-    return previous
+    last = np.expand_dims(previous, -1)
+    gain = values.max(axis=-1) - np.take_along_axis(values, last, axis=-1)[..., 0]
+    return np.where(gain > hysteresis, best, previous)
 
 
 class TaskChooser(TrainedPolicy):
@@ -181,7 +185,7 @@ class TaskChooser(TrainedPolicy):
         )
         act, values = self._networks.act_and_value(obs)
         last = ids.index(previous) if previous in ids else None
-        index = choose(values, last, self._hysteresis)
+        index = int(select(values, last, self._hysteresis))
         qd_target = self._speeds(q, qd, act)
         return Decision(
             chosen=ids[index],

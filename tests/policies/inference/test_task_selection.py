@@ -8,7 +8,7 @@ import pytest
 from app.errors import CheckpointMismatch, InvalidInput
 from app.policies.checkpoints import pretrained
 from app.policies.checkpoints.checkpoint import Checkpoint
-from app.policies.inference.task_selection import TaskChooser, choose
+from app.policies.inference.task_selection import TaskChooser, select
 from app.sim.cells.cell import load_cell
 from app.sim.human import model as human
 from app.sim.human.anthropometry import percentile_body
@@ -82,9 +82,9 @@ def test_a_hand_on_one_of_two_equally_near_cubes_turns_the_choice(
 
 def test_hysteresis_keeps_the_previous_choice_until_another_is_clearly_better():
     values = np.array([1.0, 1.15])
-    assert choose(values, None, 0.2) == 1
-    assert choose(values, 0, 0.2) == 0
-    assert choose(np.array([1.0, 1.3]), 0, 0.2) == 1
+    assert select(values, None, 0.2) == 1
+    assert select(values, 0, 0.2) == 0
+    assert select(np.array([1.0, 1.3]), 0, 0.2) == 1
 
 
 def test_speeds_stay_inside_the_limits(chooser):

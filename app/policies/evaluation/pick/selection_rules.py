@@ -1,8 +1,9 @@
-"""Selection rules: the critic's with hysteresis, and rules to compare it with (METHOD 3.6)."""
+"""Selection rules: critic with hysteresis, and baselines (docs/method.md 3.6)."""
 
 import numpy as np
 
 from app.policies.evaluation.pick.episodes import Index, Rule, View
+from app.policies.inference.task_selection import select
 
 
 def _n_candidates(view: View) -> Index:
@@ -11,15 +12,10 @@ def _n_candidates(view: View) -> Index:
 
 
 def critic(hysteresis: float) -> Rule:
-    """Return the critic's rule, applied at every step; hysteresis 0 is the source's rule."""
+    """Return the critic's rule, applied at every step."""
 
     def rule(view: View) -> Index:
-        best: Index = view.values.argmax(axis=1)
-        if view.first:
-            return best
-        rows = np.arange(len(best))
-        gain = view.values[rows, best] - view.values[rows, view.chosen]
-        return np.where(gain > hysteresis, best, view.chosen)
+        return select(view.values, None if view.first else view.chosen, hysteresis)
 
     return rule
 
