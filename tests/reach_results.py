@@ -39,7 +39,7 @@ def row(name: str, n: int, failed: float, **more: Any) -> Json:
 def result(
     protocol: str, rows: list[Json], stated: list[Json] | None = None, **more: Any
 ) -> Json:
-    stated = stated or [{"asked": "direct", "people": ["walker"]} for _ in rows]
+    stated = stated or [{"inference_mode": "direct", "people": ["walker"]} for _ in rows]
     return {
         "protocol": protocol,
         "checkpoint": "f" * 64,
@@ -82,9 +82,9 @@ def targets(seed: int = 5) -> Json:
         "targets": cells,
     }
     rows = [
-        row("clearance", 5400, 0.019, begun_in_contact=wilson(0, 5400), **more),
-        row("uniform", 5400, 0.071, begun_in_contact=wilson(285, 5400), **more),
-        row("authors", 5400, 0.083, begun_in_contact=wilson(270, 5400), **more),
+        row("clearance", 5400, 0.019, initial_contact=wilson(0, 5400), **more),
+        row("uniform", 5400, 0.071, initial_contact=wilson(285, 5400), **more),
+        row("authors", 5400, 0.083, initial_contact=wilson(270, 5400), **more),
     ]
     return result("reach-targets", rows)
 
@@ -102,25 +102,28 @@ def random_goals(shift: float = 0.0, methods: tuple[str, ...] = ("direct",)) -> 
         rows.append(row(f"{method}-25s", 5000, 0.012 + worse))
     asked = ["direct", *(method for method in methods for _ in range(2))]
     return result(
-        "reach-random", rows, [{"asked": method, "people": ["walker"]} for method in asked]
+        "reach-random",
+        rows,
+        [{"inference_mode": method, "people": ["walker"]} for method in asked],
     )
 
 
 def people() -> Json:
     rows, stated = [], []
     for n in range(5):
-        for method in ("direct", "averaged") if n > 1 else ("direct",):
+        for method in ("direct", "distance-weighted") if n > 1 else ("direct",):
             name = f"{n}-people" + (f"-{method}" if n > 1 else "")
             failed = 0.019 * n * (1.0 if method == "direct" else 1.3)
             rows.append(row(name, 1000, failed, starts_redrawn=0.07 * n))
-            stated.append({"asked": method, "people": ["walker"] * n})
+            stated.append({"inference_mode": method, "people": ["walker"] * n})
     return result("reach-people", rows, stated)
 
 
 def speeds() -> Json:
     rows = [row(f"{speed:g}-m-s", 1000, 0.01 + 0.02 * speed) for speed in SPEEDS]
     stated = [
-        {"asked": "direct", "people": ["fixed-speed"], "speed_m_s": speed} for speed in SPEEDS
+        {"inference_mode": "direct", "people": ["fixed-speed"], "speed_m_s": speed}
+        for speed in SPEEDS
     ]
     return result("reach-speeds", rows, stated)
 
@@ -193,7 +196,7 @@ def ceiling() -> Json:
         "solvable": wilson(5330, 5400),
         "never": wilson(8, 5400),
         "undecided": wilson(62, 5400),
-        "replays": 123456,
+        "resimulations": 123456,
         "worst_targets": [{"goal": [0.1, 1.0, 0.1], "solvable": 0.9}],
     }
     return result("reach-oracle", [one])

@@ -8,7 +8,7 @@ from app.sim.robot.kernels.kinematics import ik_vertical_batch
 
 
 class Straight:
-    """Moves every robot straight to its goal, whoever stands in the way."""
+    """Moves every robot straight to its goal and ignores people."""
 
     def __init__(self, gain: float = 3.0) -> None:
         self._gain = gain

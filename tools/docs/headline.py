@@ -77,8 +77,9 @@ def lines(results: Path) -> list[list[str]] | None:
             "reach under SSM, crossing people, measured velocity",
             "robot brought to standstill",
             f"{rollout['n']:,}",
-            f"{percent(_opposite(rollout['never_held']))}; {rollout['time_s']['mean']:.2f} s",
-            f"RRT*: {share(_opposite(planner['never_held']))}; "
+            f"{percent(_opposite(rollout['never_at_standstill']))}; "
+            f"{rollout['time_s']['mean']:.2f} s",
+            f"RRT*: {share(_opposite(planner['never_at_standstill']))}; "
             f"{planner['time_s']['mean']:.2f} s",
         ],
         [

@@ -87,13 +87,12 @@ def train_missing(root: Path, names: Sequence[str], seeds: Sequence[int]) -> Non
                 record(preset, seed, folder)
 
 
-def played(policy: Checkpoint, per_target: int) -> Json:
+def evaluated(policy: Checkpoint, per_target: int) -> Json:
     """Return rates of outcomes and training cost of a policy."""
-    bench = ReachBench(policy, SEED)
-    goals = bench.target_goals(per_target * len(bench.targets))
+    rates = ReachBench(policy, SEED).on_targets(per_target).rates()
     return {
-        "rates": bench.play(bench.usual, goals).rates(),
-        "n": len(goals),
+        "rates": rates,
+        "n": rates["n"],
         "cpu_min": policy.manifest["cpu_s"] / 60.0,
         "updates": policy.manifest["updates"],
     }
@@ -136,7 +135,7 @@ def measured(root: Path, seeds: Sequence[int], per_target: int) -> list[Json]:
     """
     runs = {
         name: [
-            played(found, per_target)
+            evaluated(found, per_target)
             for seed in seeds
             if (found := policy_of(folder_of(root, name, seed))) is not None
         ]

@@ -42,9 +42,7 @@ def lines(path: Path) -> list[Json]:
 
 def point_of(checkpoint: Checkpoint, per_target: int) -> Json:
     """Return the rates of outcomes of a policy over all targets."""
-    bench = ReachBench(checkpoint, SEED)
-    goals = bench.target_goals(per_target * len(bench.targets))
-    rates = bench.play(bench.usual, goals).rates()
+    rates = ReachBench(checkpoint, SEED).on_targets(per_target).rates()
     return {name: rates[name]["mean"] for name in ENDS}
 
 

@@ -64,7 +64,7 @@ def _people(axis: Axes, results: Sequence[Json]) -> None:
     shown = [
         (*MODES[mode][1:], PEOPLE.get(mode, MODES[mode][0]), _by_people(results[0], mode))
         for mode in dict.fromkeys(
-            one["asked"] for one in results[0]["settings"]["rows"].values()
+            one["inference_mode"] for one in results[0]["settings"]["rows"].values()
         )
     ]
     for other in results[1:]:  # one inference mode per further policy
@@ -90,27 +90,29 @@ def _people(axis: Axes, results: Sequence[Json]) -> None:
 
 def _by_people(result: Json, mode: str) -> list[tuple[int, Json]]:
     """Return pairs of number of people and success in one inference mode."""
-    asked = result["settings"]["rows"]
+    stated = result["settings"]["rows"]
     return [
-        (len(asked[row["name"]]["people"]), row["success"])
+        (len(stated[row["name"]]["people"]), row["success"])
         for row in result["results"]
-        if asked[row["name"]]["asked"] == mode or _for_all(asked[row["name"]], mode)
+        if stated[row["name"]]["inference_mode"] == mode or _for_all(stated[row["name"]], mode)
     ]
 
 
 def _for_all(row: Json, mode: str) -> bool:
     """Return whether a row counts for a mode that differs only beside more people."""
     n = len(row["people"])
-    return n == 0 or (n == 1 and row["asked"] == "direct" and not mode.endswith("-rollout"))
+    return n == 0 or (
+        n == 1 and row["inference_mode"] == "direct" and not mode.endswith("-rollout")
+    )
 
 
 def _speeds(axis: Axes, result: Json) -> None:
-    asked, rows = result["settings"]["rows"], result["results"]
-    speeds = list(dict.fromkeys(one["speed_m_s"] for one in asked.values()))
+    stated, rows = result["settings"]["rows"], result["results"]
+    speeds = list(dict.fromkeys(one["speed_m_s"] for one in stated.values()))
     ahead = [row["name"].endswith("-rollout") for row in rows]
     shift, width = (0.2, 0.36) if any(ahead) else (0.0, 0.6)
     for row, rollout in zip(rows, ahead, strict=True):
-        x = speeds.index(asked[row["name"]]["speed_m_s"]) + (shift if rollout else -shift)
+        x = speeds.index(stated[row["name"]]["speed_m_s"]) + (shift if rollout else -shift)
         collision, timeout = row["collision"]["mean"], row["timeout"]["mean"]
         axis.bar(x, collision, color=RED, width=width)
         axis.bar(x, timeout, bottom=collision, color=GREY, width=width)

@@ -137,7 +137,7 @@ def start_rules(result: Json) -> Figure:
             value = row[kind]["mean"]
             left.barh(k, value, left=start, color=colour, height=0.55)
             start += value
-        if contact := row["begun_in_contact"]["mean"]:
+        if contact := row["initial_contact"]["mean"]:
             left.plot([contact, contact], [k - 0.37, k + 0.37], color=INK, lw=2)
         left.text(start, k, f"  {100.0 * row['success']['mean']:.1f} % success", va="center")
     left.set_yticks(range(len(rows)), [names.get(row["name"], row["name"]) for row in rows])

@@ -16,7 +16,7 @@ from typing import Any
 
 import torch
 
-from app.policies.evaluation.reach.bench import ReachBench, direct_ways, ending
+from app.policies.evaluation.reach.bench import ReachBench, suffix_of
 from app.provenance import describe
 from tools.docs.reach_curves import lines
 from tools.docs.training_curves import read
@@ -39,10 +39,11 @@ def rows_of(folder: Path, seed: int, per_target: int) -> tuple[str, list[Json]]:
         one["cpu_s"] / 60.0 for one in points if (one["success"] or 0.0) >= THESIS_SUCCESS
     ]
     bench = ReachBench(checkpoint, seed)
-    goals, rows = bench.target_goals(per_target * len(bench.targets)), []
-    for mode in direct_ways(bench.actor):
-        played = bench.play(bench.usual, goals, mode)
-        row = played.row(f"seed-{manifest['seed']}{ending(mode)}")
+    rows = []
+    for mode in bench.direct_modes:
+        row = bench.on_targets(per_target, mode).row(
+            f"seed-{manifest['seed']}{suffix_of(mode)}"
+        )
         spent = {"cpu_min": manifest["cpu_s"] / 60.0, "updates": manifest["updates"]}
         rows.append({**row, **spent, "to_source_min": passed[0] if passed else None})
     return checkpoint.sha256, rows

@@ -32,7 +32,7 @@ PURPLE, INK = "#7c5aa6", "#374151"
 MODES = {
     "direct": ("direct", BLUE, "o"),
     "interpolated": ("interpolated", ORANGE, "s"),
-    "averaged": ("distance-weighted", ORANGE, "s"),
+    "distance-weighted": ("distance-weighted", ORANGE, "s"),
     "set": ("set encoding", PURPLE, "^"),
     "direct-rollout": ("direct, rollout", GREEN, "D"),
     "interpolated-rollout": ("interpolated, rollout", PURPLE, "^"),

@@ -23,7 +23,7 @@ COLUMNS: Mapping[str, Mapping[str, str]] = {
     "reach-targets": {
         **RATES,
         **TIMES,
-        "begun_in_contact": "initial contact",
+        "initial_contact": "initial contact",
         "worst": "worst target (x, y, height [m])",
     },
     "reach-seeds": {
@@ -72,7 +72,7 @@ COLUMNS: Mapping[str, Mapping[str, str]] = {
         "never": "proven unsolvable",
         "undecided": "undecided",
         "doomed": "every candidate collided",
-        "replays": "simulated candidates",
+        "resimulations": "simulated candidates",
     },
     "reach-ssm": {
         "n": "n",
@@ -81,11 +81,11 @@ COLUMNS: Mapping[str, Mapping[str, str]] = {
         "time_capped_s": "time, failures as 20 s [s]",
         "below_half_s": "override below 50 % [s]",
         "stopped_s": "override 0 [s]",
-        "held_s": "at standstill [s]",
+        "standstill_stopped_s": "at standstill [s]",
         "never_stopped": "override never 0",
-        "never_held": "never at standstill",
-        "joint_way_rad": "joint path [rad]",
-        "tool_way_m": "tool path [m]",
+        "never_at_standstill": "never at standstill",
+        "joint_path_rad": "joint path [rad]",
+        "tool_path_m": "tool path [m]",
         "contacts_moving": "contacts, robot moving",
         "contacts_at_rest": "contacts, robot at standstill",
         "contacts_cell": "contacts with the cell",

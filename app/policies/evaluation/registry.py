@@ -1,4 +1,4 @@
-"""All protocols by name, as the command line and evaluation jobs know them."""
+"""Evaluation protocols by name, for the command line and evaluation jobs."""
 
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -9,30 +9,16 @@ from app.errors import InvalidInput, NotFound
 from app.policies.checkpoints.checkpoint import CHOOSING, REACHING, SORTING, Checkpoint, task_of
 from app.policies.evaluation.pick import people, tracker
 from app.policies.evaluation.pick import tasks as pick
-from app.policies.evaluation.reach import (
-    oracle as reach_ceiling,
-)
-from app.policies.evaluation.reach import (
-    people as reach_people,
-)
-from app.policies.evaluation.reach import (
-    random_goals as reach_random,
-)
-from app.policies.evaluation.reach import (
-    smoothness as reach_smoothness,
-)
-from app.policies.evaluation.reach import (
-    ssm as reach_ssm,
-)
-from app.policies.evaluation.reach import (
-    targets as reach_targets,
-)
-from app.policies.evaluation.reach import (
-    tracker as reach_tracker,
-)
+from app.policies.evaluation.reach.oracle import run_oracle
+from app.policies.evaluation.reach.people import run_constant, run_people, run_speeds
+from app.policies.evaluation.reach.random_goals import run_random
+from app.policies.evaluation.reach.smoothness import run_smoothness
+from app.policies.evaluation.reach.ssm import run_ssm
+from app.policies.evaluation.reach.targets import run_targets
+from app.policies.evaluation.reach.tracker import run_tracker
 from app.policies.evaluation.rows import OnRow, ignore_row
-from app.policies.evaluation.safety import ssm as safety
-from app.policies.evaluation.sorting import runs as sorting
+from app.policies.evaluation.safety.ssm import run_safety
+from app.policies.evaluation.sorting.runs import run_grid, run_tests
 from app.sim.mocap.importer import Motion
 
 Protocol = Callable[..., dict[str, Any]]
@@ -45,40 +31,40 @@ PROTOCOLS: Mapping[str, Protocol] = MappingProxyType(
         "pick-people": people.run_people,
         "pick-yielding": people.run_yielding,
         "pick-mocap": people.run_mocap,
-        "safety-ssm": safety.run_safety,
-        "sorting-grid": sorting.run_grid,
-        "sorting-tests": sorting.run_tests,
-        "reach-targets": reach_targets.run_targets,
-        "reach-random": reach_random.run_random,
-        "reach-constant": reach_people.run_constant,
-        "reach-speeds": reach_people.run_speeds,
-        "reach-smoothness": reach_smoothness.run_smoothness,
-        "reach-people": reach_people.run_people,
-        "reach-tracker": reach_tracker.run_tracker,
-        "reach-ssm": reach_ssm.run_ssm,
-        "reach-oracle": reach_ceiling.run_oracle,
+        "safety-ssm": run_safety,
+        "sorting-grid": run_grid,
+        "sorting-tests": run_tests,
+        "reach-targets": run_targets,
+        "reach-random": run_random,
+        "reach-constant": run_constant,
+        "reach-speeds": run_speeds,
+        "reach-smoothness": run_smoothness,
+        "reach-people": run_people,
+        "reach-tracker": run_tracker,
+        "reach-ssm": run_ssm,
+        "reach-oracle": run_oracle,
     }
 )
 """Protocol by name; each takes a checkpoint, ``episodes``, ``seed`` and ``on_row``."""
 WITH_MOTIONS = frozenset({"pick-mocap"})
 """Protocols that take recorded motion."""
 WITH_OR_WITHOUT_MOTIONS = frozenset({"reach-ssm"})
-"""Protocols that may be given recorded motion."""
+"""Protocols with optional recorded motion."""
 WITHOUT_CHECKPOINT = frozenset({"safety-ssm"})
-"""Protocols in which no policy takes part."""
+"""Protocols without a policy."""
 OF_SORTING = frozenset(name for name in PROTOCOLS if name.startswith("sorting-"))
-"""Protocols of policies that sort."""
+"""Protocols of sorting policies."""
 OF_REACHING = frozenset(name for name in PROTOCOLS if name.startswith("reach-"))
-"""Protocols of policies that reach goals; all others are of policies that choose and pick."""
+"""Protocols of reach policies; all others are of pick policies."""
 MAX_EPISODES = 100_000
-"""Most episodes of one evaluation."""
+"""Maximum number of episodes of one evaluation."""
 MAX_SORTING_EPISODES = 10_000
-"""Most episodes of one pair or one test of the sorting task."""
+"""Maximum number of episodes of one pair or one test of the sorting task."""
 FEWER_EPISODES: Mapping[str, int] = MappingProxyType(
     {**dict.fromkeys(OF_SORTING, MAX_SORTING_EPISODES), "reach-targets": 2_000}
     | {"reach-smoothness": 5_000, "reach-ssm": 20_000, "reach-oracle": 200}
 )
-"""Most episodes of protocols that count them per pair or target, or keep whole paths."""
+"""Maximum number of episodes where they count per pair or target, or paths are stored."""
 
 
 def evaluate(
@@ -94,17 +80,16 @@ def evaluate(
 
     Args:
         name: Name of the protocol.
-        checkpoint: What is evaluated; None only where no policy takes part.
-        episodes: Number of episodes; the protocol's own number by default.
+        checkpoint: Policy; None only for protocols without one.
+        episodes: Number of episodes; by default that of the protocol.
         seed: Seed of the episodes.
-        motions: Runs of recorded motion, for the protocols that take them.
-        on_row: Told of each row of the result once it is known.
+        motions: Recorded motion, for protocols that use it.
+        on_row: Callback for each finished row of the result.
 
     Raises:
         NotFound: No protocol has that name.
-        InvalidInput: The number of episodes or the seed cannot be used, there is no
-            checkpoint, it is of another scenario, or there are motions where none are taken
-            or none where some are.
+        InvalidInput: The number of episodes or the seed is out of range, the checkpoint is
+            missing or of another scenario, or recorded motion is missing or not used.
     """
     if name not in PROTOCOLS:
         raise NotFound("protocol", name, tuple(PROTOCOLS))
@@ -132,12 +117,12 @@ def evaluate(
 
 
 def default_checkpoint(name: str) -> str:
-    """Return the alias of the checkpoint that a protocol measures unless another is named."""
+    """Return the alias of a protocol's default checkpoint."""
     return {SORTING: "sorting-e0", REACHING: "reach", CHOOSING: "pick"}[_task_measured(name)]
 
 
 def most_episodes(name: str) -> int:
-    """Return how many episodes a protocol runs at most; of each pair, test or target."""
+    """Return the maximum number of episodes of a protocol; of each pair, test or target."""
     return FEWER_EPISODES.get(name, MAX_EPISODES)
 
 
@@ -149,14 +134,14 @@ _POLICIES = {
 
 
 def _task_measured(name: str) -> str:
-    """Return what the policies that a protocol measures are for."""
+    """Return the purpose of the policies that a protocol evaluates."""
     if name in OF_SORTING:
         return SORTING
     return REACHING if name in OF_REACHING else CHOOSING
 
 
 def _check_task(name: str, checkpoint: Checkpoint | None) -> None:
-    """Check that a checkpoint is of the scenario that a protocol measures."""
+    """Check that a checkpoint is of the scenario of a protocol."""
     if checkpoint is None or name in WITHOUT_CHECKPOINT:
         return
     wanted, actual = _task_measured(name), task_of(checkpoint)
@@ -172,24 +157,24 @@ def _check_task(name: str, checkpoint: Checkpoint | None) -> None:
 def check_motions(
     name: str, given: Sequence[str], field: str = "motions", how: str = ""
 ) -> None:
-    """Check that motions are given where a protocol takes them, and nowhere else.
+    """Check that recorded motion is given to protocols that use it, and to no others.
 
     Args:
         name: Name of the protocol.
-        given: Names of the motions.
-        field: What the caller calls them.
-        how: How they are given, for the message.
+        given: Names of the recordings.
+        field: Name of the field in the caller's input.
+        how: Hint for the message: how recordings are given.
 
     Raises:
-        InvalidInput: There are some where none are taken, or none.
+        InvalidInput: Recorded motion is missing, or given to a protocol without it.
     """
     if name in WITH_MOTIONS and not given:
-        told = f": {how}" if how else ""
-        raise InvalidInput(field, [], f"must hold at least one motion for {name}{told}")
-    taking = WITH_MOTIONS | WITH_OR_WITHOUT_MOTIONS
-    if name not in taking and given:
+        hint = f": {how}" if how else ""
+        raise InvalidInput(field, [], f"must hold at least one motion for {name}{hint}")
+    using = WITH_MOTIONS | WITH_OR_WITHOUT_MOTIONS
+    if name not in using and given:
         rule = f"must not be given to {name}, which takes no recorded motion"
-        raise InvalidInput(field, list(given[:3]), rule, sorted(taking))
+        raise InvalidInput(field, list(given[:3]), rule, sorted(using))
 
 
 def _identity(checkpoint: Checkpoint | None) -> dict[str, str]:

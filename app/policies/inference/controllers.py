@@ -3,9 +3,10 @@
 A mode is a set of three independent switches (docs/method.md 2.4):
 
 interpolated   mean of the policy's actions for the training targets around the goal
-averaged       distance-weighted mean over people of its actions beside each of them alone;
+distance-weighted
+               mean over people of its actions beside each of them alone, weighted by distance;
                otherwise the nearest person is observed
-ahead          rollout policy improvement of the resulting action (``rollout.py``)
+rollout        rollout policy improvement of the resulting action (``rollout.py``)
 
 Source: for several people the outlook of thesis 4.5, "deploying a policy for each person inside
 the robot workspace and then averaging the action based on the distance between human and
@@ -37,12 +38,12 @@ class InferenceMode(StrEnum):
 
     DIRECT = "direct"
     INTERPOLATED = "interpolated"
-    AVERAGED = "averaged"
-    AVERAGED_INTERPOLATED = "averaged-interpolated"
+    DISTANCE_WEIGHTED = "distance-weighted"
+    DISTANCE_WEIGHTED_INTERPOLATED = "distance-weighted-interpolated"
     DIRECT_ROLLOUT = "direct-rollout"
     INTERPOLATED_ROLLOUT = "interpolated-rollout"
-    AVERAGED_ROLLOUT = "averaged-rollout"
-    AVERAGED_INTERPOLATED_ROLLOUT = "averaged-interpolated-rollout"
+    DISTANCE_WEIGHTED_ROLLOUT = "distance-weighted-rollout"
+    DISTANCE_WEIGHTED_INTERPOLATED_ROLLOUT = "distance-weighted-interpolated-rollout"
 
     @property
     def interpolated(self) -> bool:
@@ -50,9 +51,9 @@ class InferenceMode(StrEnum):
         return "interpolated" in self.value
 
     @property
-    def averaged(self) -> bool:
-        """Whether actions are averaged over people."""
-        return "averaged" in self.value
+    def distance_weighted(self) -> bool:
+        """Whether actions are averaged over people, weighted by distance."""
+        return "distance-weighted" in self.value
 
     @property
     def rollout(self) -> bool:
@@ -221,7 +222,7 @@ def controller_of(actor: ReachActor, mode: str | None = None) -> Controller:
         raise InvalidInput("inference_mode", mode, "must be a mode", tuple(InferenceMode))
     chosen = InferenceMode(mode)
     query = Interpolated(actor) if chosen.interpolated else Direct(actor)
-    base = DistanceWeighted(query) if chosen.averaged else query
+    base = DistanceWeighted(query) if chosen.distance_weighted else query
     return RolloutController(base, actor) if chosen.rollout else base
 
 

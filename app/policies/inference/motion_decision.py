@@ -260,7 +260,7 @@ class MotionDecider:
             used = mix.weights[0] > 0.0
             places, shares = around[0][used], mix.weights[0][used]
         weights = [float(who == nearest) for who in range(len(apart))]
-        if question.beside == "averaged" and len(apart) > 1:
+        if question.beside == "distance-weighted" and len(apart) > 1:
             # The nearest first: answers are rounded by their place in the batch.
             counts = person_weights(apart[None])[0]
             first, weights = apart.argsort(), counts.tolist()

@@ -14,7 +14,7 @@ from app.sim.safety.layer import SafetySettings
 MotionMode = Literal["interpolated", "direct"]
 """Interpolation between training targets, or the policy queried for the goal itself."""
 MOTION_MODES: tuple[MotionMode, ...] = get_args(MotionMode)
-Beside = Literal["nearest", "averaged"]
+Beside = Literal["nearest", "distance-weighted"]
 """Several people: observe the nearest, or average the actions beside each of them."""
 BESIDES: tuple[Beside, ...] = get_args(Beside)
 

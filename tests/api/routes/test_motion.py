@@ -201,12 +201,12 @@ def test_several_people_of_any_kind_are_taken(client: TestClient) -> None:
     people = [FAR, STANDING, WALKER, {**FAR, "x": 0.9}]
     nearest = asked(client, people=people, rollout=False)
     assert sum(one["seen"] for one in nearest["people"]) == 1
-    averaged = asked(client, people=people, beside="averaged", rollout=False)
-    weights = [one["weight"] for one in averaged["people"]]
+    weighted = asked(client, people=people, beside="distance-weighted", rollout=False)
+    weights = [one["weight"] for one in weighted["people"]]
     assert sum(weights) == pytest.approx(1.0) and min(weights) > 0.0
-    seen = [one["seen"] for one in averaged["people"]].index(True)
+    seen = [one["seen"] for one in weighted["people"]].index(True)
     assert weights[seen] == max(weights)
-    assert averaged["act"] != nearest["act"]
+    assert weighted["act"] != nearest["act"]
 
 
 def test_rollout_is_the_default_and_can_be_disabled(client: TestClient) -> None:

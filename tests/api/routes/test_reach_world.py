@@ -85,7 +85,7 @@ def test_policy_is_named_and_queried_in_its_inference_modes(client: TestClient) 
     assert send(client, tag="set-policy", checkpoint=made.sha256).status_code == 202
     acting = until(client, lambda one: one["checkpoint"] == made.sha256)
     assert acting["reach"]["inference_mode"] == "interpolated-rollout"
-    assert "averaged" in acting["reach"]["inference_modes"]
+    assert "distance-weighted" in acting["reach"]["inference_modes"]
     assert send(client, tag="set-inference-mode", inference_mode="direct").status_code == 202
     until(client, lambda one: one["reach"]["inference_mode"] == "direct")
     refused = send(client, tag="set-inference-mode", inference_mode="sideways").json()

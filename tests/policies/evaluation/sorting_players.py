@@ -1,4 +1,4 @@
-"""Who plays the sorting task in tests: as well as can be, badly in a known way, untrained."""
+"""Sorting policies of tests: optimal, bad in a known manner, or untrained."""
 
 from collections.abc import Callable
 from itertools import count

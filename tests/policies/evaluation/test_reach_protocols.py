@@ -1,4 +1,4 @@
-"""The protocols of the reach scenario, run with the shipped policy."""
+"""Tests of the protocols of the reach scenario with the shipped policy."""
 
 import json
 from functools import cache
@@ -12,7 +12,7 @@ from app.policies.evaluation.reach import episodes as reach_episodes
 from app.policies.evaluation.reach.people import SPEEDS, at_speed
 from app.policies.evaluation.reach.random_goals import RINGS
 from app.policies.evaluation.reach.targets import STARTS
-from app.policies.evaluation.reach.tracker import LOOKED_AHEAD, ROWS
+from app.policies.evaluation.reach.tracker import ROLLOUT_ROWS, ROWS
 from app.policies.evaluation.registry import OF_REACHING, evaluate
 from app.sim.cells.cell import load_cell
 from tests.policies.untrained import shipped_as, untrained_reach
@@ -35,24 +35,24 @@ def few_rows(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @cache
 def run(name: str) -> tuple[dict, list]:
-    """Return the result of a protocol and the rows it told of; each is run once."""
-    told: list = []
+    """Return the result of a protocol and the reported rows; each protocol is run once."""
+    reported: list = []
     result = evaluate(
         name,
         pretrained.load("reach"),
         episodes=EPISODES.get(name, N),
         seed=5,
-        on_row=lambda *what: told.append(what),
+        on_row=lambda *what: reported.append(what),
     )
-    return result, told
+    return result, reported
 
 
 @pytest.mark.parametrize("name", MEASURED)
 def test_a_result_is_json_and_states_the_rules_of_each_row(name: str) -> None:
-    result, told = run(name)
+    result, reported = run(name)
     rows = json.loads(json.dumps(result, allow_nan=False))["results"]
-    assert [one for _, _, one in told] == result["results"]
-    assert [(done, total) for done, total, _ in told] == [
+    assert [one for _, _, one in reported] == result["results"]
+    assert [(done, total) for done, total, _ in reported] == [
         (k + 1, len(rows)) for k in range(len(rows))
     ]
     stated = result["settings"]["rows"]
@@ -86,21 +86,21 @@ def test_every_target_is_counted_under_each_rule_of_starting() -> None:
         for kind in ("success", "collision"):
             assert sum(one[kind] for one in ends) == round(row[kind]["mean"] * 108)
     first, uniform, authors = result["results"][:3]
-    assert first["begun_in_contact"]["mean"] == 0.0 and first["starts_redrawn"] > 0.0
+    assert first["initial_contact"]["mean"] == 0.0 and first["starts_redrawn"] > 0.0
     assert uniform["starts_redrawn"] == 0.0
     assert "reached_after_contact" in authors
     assert result["fcl_recheck"]["missed_contacts"] == 0
 
 
-def test_random_goals_are_reached_by_every_way_the_policy_allows() -> None:
+def test_random_goals_have_a_row_per_inference_mode_and_limit() -> None:
     on_grid, _ = run("reach-random")
     in_box = evaluate("reach-random", shipped_as(goals="box"), episodes=N, seed=5)
     names = [row["name"] for row in in_box["results"]]
     assert names[:4] == ["targets", "targets-rollout", "direct", "direct-25s"]
     assert names[4:] == ["direct-rollout", "direct-rollout-25s"]
-    ways = ["direct", "interpolated", "direct-rollout", "interpolated-rollout"]
+    modes = ["direct", "interpolated", "direct-rollout", "interpolated-rollout"]
     names = [row["name"] for row in on_grid["results"]][2:]
-    assert names == [f"{way}{limit}" for way in ways for limit in ("", "-25s")]
+    assert names == [f"{mode}{limit}" for mode in modes for limit in ("", "-25s")]
     direct = in_box["results"][2]
     assert sum(one["n"] for one in direct["between"]) == N
     assert all(
@@ -115,8 +115,8 @@ def test_zero_to_four_walkers_are_there_and_make_it_harder() -> None:
     people = [len(one["people"]) for one in result["settings"]["rows"].values()]
     assert sorted(set(people)) == [0, 1, 2, 3, 4]
     rows = {row["name"]: row for row in result["results"]}
-    nobody, four = rows["0-people"], rows["4-people-direct"]
-    assert nobody["success"]["mean"] == 1.0
+    empty, four = rows["0-people"], rows["4-people-direct"]
+    assert empty["success"]["mean"] == 1.0
     assert four["collision"]["mean"] > 0.0
 
 
@@ -136,7 +136,7 @@ def test_people_of_a_given_speed_walk_at_it() -> None:
 def test_a_row_per_tracker_stands_beside_the_exact_state() -> None:
     result, _ = run("reach-tracker")
     names = [row["name"] for row in result["results"]]
-    assert names == ["exact", *ROWS, *(f"{name}-rollout" for name in LOOKED_AHEAD)]
+    assert names == ["exact", *ROWS, *(f"{name}-rollout" for name in ROLLOUT_ROWS)]
     errors = [row["axis_error_median_mm"] for row in result["results"][1:]]
     assert np.all(np.diff(errors[:4]) > 0.0)
 
@@ -151,8 +151,8 @@ def test_a_jerk_limited_policy_is_measured_as_such() -> None:
 
 
 @pytest.mark.parametrize("name", ["reach-speeds", "reach-tracker"])
-def test_a_cell_where_nobody_walks_is_refused(name: str) -> None:
+def test_a_cell_without_a_pedestrian_is_refused(name: str) -> None:
     cell = load_cell("shared-workspace").model_copy(update={"name": "empty", "people": ()})
-    with pytest.raises(InvalidInput, match="somebody who walks about") as caught:
+    with pytest.raises(InvalidInput, match="a cell with a pedestrian") as caught:
         evaluate(name, untrained_reach(width=16, cell=cell), episodes=2)
     assert (caught.value.field, caught.value.value) == ("checkpoint", "empty")

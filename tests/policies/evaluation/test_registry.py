@@ -1,4 +1,4 @@
-"""What a protocol can be given, and what it tells."""
+"""Tests of the registry: inputs and reported rows of protocols."""
 
 import pytest
 
@@ -38,14 +38,14 @@ def test_motions_are_refused_where_none_are_taken(name):
 
 
 @pytest.mark.parametrize("name", ["pick-single", "pick-choice", "safety-ssm"])
-def test_rows_are_told_in_order_and_are_those_of_the_result(name):
-    told = []
+def test_rows_are_reported_in_order_and_are_those_of_the_result(name):
+    reported = []
     result = evaluate(
-        name, pretrained.load("pick"), episodes=4, on_row=lambda *what: told.append(what)
+        name, pretrained.load("pick"), episodes=4, on_row=lambda *what: reported.append(what)
     )
     n = len(result["results"])
-    assert [(done, total) for done, total, _ in told] == [(k + 1, n) for k in range(n)]
-    assert [row for _, _, row in told] == result["results"]
+    assert [(done, total) for done, total, _ in reported] == [(k + 1, n) for k in range(n)]
+    assert [row for _, _, row in reported] == result["results"]
 
 
 @pytest.mark.parametrize("name", sorted(OF_SORTING))
@@ -103,5 +103,7 @@ def test_a_sorting_result_states_task_policy_and_seed(name, n_rows):
     )
     if name == "sorting-grid":
         assert len(result["results"][0]["pairs"]) == settings["pairs"] == 55
-    handed = [row for row in result["results"] if row["name"].endswith("-planner-fallback")]
-    assert all(row["success"]["mean"] == 1.0 for row in handed)
+    with_fallback = [
+        row for row in result["results"] if row["name"].endswith("-planner-fallback")
+    ]
+    assert all(row["success"]["mean"] == 1.0 for row in with_fallback)

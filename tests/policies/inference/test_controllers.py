@@ -102,7 +102,7 @@ def test_only_policies_that_kernels_simulate_allow_rollouts() -> None:
     assert inference_modes_of(RandomActor()) == tuple(
         mode for mode in InferenceMode if not mode.rollout
     )
-    assert inference_modes_of(RandomActor("box")) == ("direct", "averaged")
+    assert inference_modes_of(RandomActor("box")) == ("direct", "distance-weighted")
 
 
 @pytest.mark.parametrize("how", inference_modes_of(RandomActor()))
@@ -123,15 +123,15 @@ def test_beside_one_person_averaging_changes_nothing(
 ) -> None:
     batch, actor = batch_of(people), RandomActor()
     send(batch, random_goals(12))
-    averaged = "averaged" if inner == "direct" else "averaged-interpolated"
+    weighted = "distance-weighted" if inner == "direct" else "distance-weighted-interpolated"
     np.testing.assert_array_equal(
-        controller_of(actor, averaged).acts(batch), controller_of(actor, inner).acts(batch)
+        controller_of(actor, weighted).acts(batch), controller_of(actor, inner).acts(batch)
     )
 
 
 def test_averaged_is_the_mean_of_actions_beside_each_person_alone() -> None:
     batch, actor = batch_of(("walker", "constant", "fixed-speed")), RandomActor()
-    found, rows = controller_of(actor, "averaged").acts(batch), np.arange(12)
+    found, rows = controller_of(actor, "distance-weighted").acts(batch), np.arange(12)
     weights = person_weights(batch.person_distances(rows))
     mean = np.zeros((12, 6))
     for who in range(3):

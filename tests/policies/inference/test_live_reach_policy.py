@@ -26,7 +26,12 @@ def policy() -> ReachPolicy:
 
 def test_policy_without_targets_cannot_be_interpolated() -> None:
     pilot = TrainedReachPolicy(ReachPolicy(untrained_reach(width=32, goals="box")))
-    assert pilot.inference_modes == ("direct", "averaged", "direct-rollout", "averaged-rollout")
+    assert pilot.inference_modes == (
+        "direct",
+        "distance-weighted",
+        "direct-rollout",
+        "distance-weighted-rollout",
+    )
 
 
 def test_live_state_is_seen_as_the_batch_sees_it(policy: ReachPolicy) -> None:
@@ -108,7 +113,7 @@ def test_policy_moves_the_robot_of_a_live_cell_with_any_number_of_people(
     )
     assert shown.reach.inference_modes == pilot.inference_modes
     world.apply(commands.AddPerson())
-    world.apply(SetInferenceMode(inference_mode="averaged-interpolated"))
+    world.apply(SetInferenceMode(inference_mode="distance-weighted-interpolated"))
     world.step()
     for id in (0, 1):
         world.apply(commands.RemovePerson(person=id))

@@ -114,7 +114,7 @@ def test_people_may_come_in_any_order() -> None:
     batch = driven(4, ("worker", "walker", "constant"))
     asked, one = told(batch, 1), decider()
     turned = replace(asked, people=asked.people[::-1])
-    for beside in ("nearest", "averaged"):
+    for beside in ("nearest", "distance-weighted"):
         first = one.decide(replace(asked, beside=beside))
         second = one.decide(replace(turned, beside=beside))
         np.testing.assert_allclose(first.act, second.act, atol=1e-12)
@@ -126,10 +126,10 @@ def test_people_may_come_in_any_order() -> None:
 
 def test_averaged_is_what_the_mover_does() -> None:
     batch, actor = driven(5, ("walker", "constant", "fixed-speed")), RandomActor()
-    expected = controller_of(actor, "averaged-interpolated").acts(batch)
+    expected = controller_of(actor, "distance-weighted-interpolated").acts(batch)
     decide = MotionDecider(actor, CELL).decide
     for e in np.flatnonzero(batch.state.outcome == 0):
-        decision = decide(replace(told(batch, e), beside="averaged"))
+        decision = decide(replace(told(batch, e), beside="distance-weighted"))
         np.testing.assert_allclose(decision.act, expected[e], atol=2e-6)
         assert sum(one.weight for one in decision.met) == pytest.approx(1.0)
 
@@ -273,7 +273,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"elapsed_s": float("nan")}, "elapsed_s"),
     ({"age_s": float("inf")}, "age_s"),
     ({"inference_mode": "around"}, "choices: interpolated, direct"),
-    ({"beside": "farthest"}, "choices: nearest, averaged"),
+    ({"beside": "farthest"}, "choices: nearest, distance-weighted"),
     ({"people": (FAR_PERSON,) * 5}, "at most 4"),
     ({"people": (Person(q=np.full(18, np.nan), qd=np.zeros(18)),)}, r"people\[0\]\.q\[0\]"),
     ({"people": (person_from_cylinder(0.0, 1.0, 99.0, 0.0, 0.3),)}, r"people\[0\]\.qd\[0\]"),
@@ -366,7 +366,7 @@ def random_question(rng: np.random.Generator) -> MotionQuestion:
         qd=rng.uniform(-1, 1, 6) * mount.qd_max,
         goal=rng.uniform([-0.5, 0.6, 0.1], [0.5, 1.0, 0.5]),
         people=people,
-        beside="averaged" if rng.uniform() < 0.5 else "nearest",
+        beside="distance-weighted" if rng.uniform() < 0.5 else "nearest",
         safety=SafetySettings(),
     )
 

@@ -5,7 +5,7 @@ import pytest
 
 from app.errors import InvalidInput
 from app.policies.checkpoints import pretrained
-from app.policies.evaluation.reach.episodes import play, target_goals
+from app.policies.evaluation.reach.episodes import run_episodes, target_goals
 from app.policies.inference.controllers import controller_of, inference_modes_of
 from app.policies.inference.reach_policy import ReachPolicy
 from app.policies.inference.rollout import CANDIDATES, POLICY, RolloutImprovement, can_roll_out
@@ -251,7 +251,10 @@ def test_rollouts_reduce_collisions() -> None:
     goals = target_goals(ACTOR.targets, 270)
     settings = batch_of(1, "walker", "walker").settings
     modes = ("direct", "direct-rollout")
-    ends = [play(CELL, settings, controller_of(ACTOR, how), goals, 5).outcome for how in modes]
+    ends = [
+        run_episodes(CELL, settings, controller_of(ACTOR, how), goals, 5).outcome
+        for how in modes
+    ]
     without, with_rollout = ((end == COLLISION).sum() for end in ends)
     assert with_rollout < without
     assert (ends[1] == SUCCESS).mean() >= (ends[0] == SUCCESS).mean()

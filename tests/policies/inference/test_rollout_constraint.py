@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from app.policies.checkpoints import pretrained
-from app.policies.evaluation.reach.ssm import Comparison
+from app.policies.evaluation.reach.ssm_crossings import Comparison
 from app.policies.inference.controllers import RolloutController, controller_of
 from app.policies.inference.motion_decision import MotionDecider
 from app.policies.inference.reach_policy import ReachPolicy
@@ -114,7 +114,7 @@ def test_constraint_reduces_stops_and_contacts_beside_crossing_people() -> None:
     comparison = Comparison(CELL, crossings(CELL, 12, seed=77), settings, MEASURED, seed=11)
     direct = controller_of(ACTOR, "direct")
     agnostic, aware = (
-        comparison.policy(RolloutController(direct, ACTOR, layer)).runs
+        comparison.policy(RolloutController(direct, ACTOR, layer)).episodes
         for layer in (NO_CONSTRAINT, ssm_constraint_of(MEASURED, DT))
     )
     assert aware.arrived.all() and not aware.touched_moving.any()

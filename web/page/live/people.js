@@ -43,7 +43,7 @@ export function People({ world, send, children }) {
           data-action="add-person" onClick=${() => send({ tag: "add-person" })}>
           <${Icon} name="plus" />Add</button>`}
       </div>
-      ${tracked && !world.reach?.inference_mode.includes("averaged") && html`<p class="dock-hint" title="This policy knows one person at a time.">
+      ${tracked && !world.reach?.inference_mode.includes("distance-weighted") && html`<p class="dock-hint" title="This policy knows one person at a time.">
         The policy sees the nearest: ${nameOf(tracked.id)}.</p>`}
       <span class="spacer"></span>
       ${children}

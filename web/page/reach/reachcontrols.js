@@ -28,10 +28,10 @@ const AHEAD = [
 export function ReachControls({ world, send }) {
   const { goal_mode: mode, safety, inference_mode: current, inference_modes: modes } = world.reach;
   const between = current.includes("interpolated");
-  const averaged = current.includes("averaged");
+  const weighted = current.includes("distance-weighted");
   const ahead = current.endsWith("-rollout");
   const ask = (all, mixed, played) => {
-    const asked = [all && "averaged", mixed && "interpolated"].filter(Boolean).join("-") || "direct";
+    const asked = [all && "distance-weighted", mixed && "interpolated"].filter(Boolean).join("-") || "direct";
     send({ tag: "set-inference-mode", inference_mode: played ? `${asked}-rollout` : asked });
   };
   return html`<div class="dock-row dock-wrap">
@@ -46,14 +46,14 @@ export function ReachControls({ world, send }) {
     ${modes.includes("interpolated") && html`<span class="dock-pair">
       <span class="dock-label dock-label-free" id="between-label">Target interpolation</span>
       <${Segmented} labelledby="between-label" mark=${marked("between")} value=${between} items=${BETWEEN}
-        onPick=${(one) => ask(averaged, one, ahead)} /></span>`}
+        onPick=${(one) => ask(weighted, one, ahead)} /></span>`}
     ${modes.includes("direct-rollout") && html`<span class="dock-pair">
       <span class="dock-label dock-label-free" id="ahead-label">Rollout check (1 s)</span>
       <${Segmented} labelledby="ahead-label" mark=${marked("ahead")} value=${ahead} items=${AHEAD}
-        onPick=${(one) => ask(averaged, between, one)} /></span>`}
-    ${modes.includes("averaged") && world.people.length > 1 && html`<span class="dock-pair">
+        onPick=${(one) => ask(weighted, between, one)} /></span>`}
+    ${modes.includes("distance-weighted") && world.people.length > 1 && html`<span class="dock-pair">
       <span class="dock-label dock-label-free" id="beside-label">Policy sees</span>
-      <${Segmented} labelledby="beside-label" mark=${marked("beside")} value=${averaged} items=${BESIDE}
+      <${Segmented} labelledby="beside-label" mark=${marked("beside")} value=${weighted} items=${BESIDE}
         onPick=${(one) => ask(one, between, ahead)} /></span>`}
   </div>`;
 }

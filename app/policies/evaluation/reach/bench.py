@@ -1,23 +1,23 @@
-"""What the protocols of the reach scenario share: a policy, its cell, its rules, its rows.
+"""Evaluate one checkpoint of the reach scenario under several rules.
 
-Every row states its rules (``stated_rules``), for they move results by points: how episodes
-start, how long they may last, who is there, and by which way the policy is asked.
+Every row of a result states its rules (``stated_rules``), because they change results by
+several points: initial states, time limit, people and inference mode.
 """
 
-from dataclasses import asdict
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from typing import Any
-
-import numpy as np
 
 from app.errors import InvalidInput
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.evaluation.reach.episodes import (
-    REPORTED_TIME_LEFT_S,
+    MAX_TIME_LEFT_S,
     ReachEpisodes,
-    play,
+    goal_box,
     random_goals,
     recheck_contacts,
+    run_episodes,
     target_goals,
 )
 from app.policies.evaluation.rows import OnRow, ignore_row
@@ -38,53 +38,72 @@ from app.sim.scenario.kernels.episode import SUCCESS_DISTANCE
 Json = dict[str, Any]
 
 
-def goal_ways(actor: ReachPolicy) -> tuple[InferenceMode, ...]:
-    """Return the ways of asking a policy for goals between those it was trained on."""
-    return tuple(mode for mode in inference_modes_of(actor) if not mode.averaged)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Variant:
+    """Episodes of one result row."""
+
+    name: str
+    """Name of the row."""
+    settings: ReachSettings
+    """Rules of the episodes."""
+    goals: Vec
+    """Goal of each episode [m], shape (n, 3)."""
+    goal_set: str = "grid"
+    """Set of the goals, stated with the row."""
+    mode: InferenceMode = InferenceMode.DIRECT
+    """Inference mode."""
+    cell: Cell | None = None
+    """Work cell; None: the cell of the checkpoint."""
+    controller: Controller | None = None
+    """Controller of the robots; None: the policy in its inference mode."""
+    stated: Mapping[str, Any] = field(default_factory=dict)
+    """Further rules stated with the row."""
 
 
-def direct_ways(actor: ReachPolicy) -> tuple[InferenceMode, ...]:
-    """Return the ways of asking a policy for the goal itself: alone, and looking ahead."""
-    return tuple(
-        mode for mode in inference_modes_of(actor) if not (mode.averaged or mode.interpolated)
-    )
+Measure = Callable[[Variant, ReachEpisodes], Json]
+"""Further measures of a row."""
 
 
-def ending(mode: InferenceMode) -> str:
-    """Return what the names of rows end with: nothing for the policy alone."""
+def no_measures(_variant: Variant, _episodes: ReachEpisodes) -> Json:
+    """Return no further measures."""
+    return {}
+
+
+def suffix_of(mode: InferenceMode) -> str:
+    """Return the suffix of row names: empty without rollout."""
     return ROLLOUT if mode.rollout else ""
 
 
-def walker_of(cell: Cell) -> CylinderPerson:
-    """Return the first person of a cell who walks about as a cylinder.
+def pedestrian_of(cell: Cell) -> CylinderPerson:
+    """Return the first pedestrian of a cell.
 
     Raises:
-        InvalidInput: There is none.
+        InvalidInput: The cell has no pedestrian.
     """
     if not cell.cylinders:
-        rule = "must have been trained in a cell with somebody who walks about"
+        rule = "must have been trained in a cell with a pedestrian"
         raise InvalidInput("checkpoint", cell.name, rule)
     return cell.cylinders[0]
 
 
 class ReachBench:
-    """Evaluates one checkpoint under varied rules.
+    """Evaluate one checkpoint under several rules.
 
     Args:
-        checkpoint: What acts.
-        seed: Seed of the episodes; use one that nothing was tuned on.
-        on_row: Told of each row once it is known.
+        checkpoint: Policy.
+        seed: Seed of the episodes; use one that was not used for tuning.
+        on_row: Callback for each finished row.
     """
 
     def __init__(self, checkpoint: Checkpoint, seed: int, on_row: OnRow = ignore_row) -> None:
         self.actor = ReachPolicy(checkpoint)
         self.cell = cell_of(checkpoint.manifest)
-        region = goal_region_of(self.cell)
-        self.targets: Vec = region.targets()
-        middle, half = np.array(region.center), 0.5 * np.array(region.size)
-        self.low, self.high = middle - half, middle + half
-        self.n_rows = 1
-        """How many rows the result will have."""
+        self.targets: Vec = goal_region_of(self.cell).targets()
+        modes = inference_modes_of(self.actor)
+        self.goal_modes = tuple(mode for mode in modes if not mode.distance_weighted)
+        """Inference modes for goals between the training targets."""
+        self.direct_modes = tuple(mode for mode in self.goal_modes if not mode.interpolated)
+        """Inference modes that query the policy for the goal itself."""
         self._seed, self._on_row = seed, on_row
         self._rows: list[Json] = []
         self._stated: dict[str, Json] = {}
@@ -92,7 +111,7 @@ class ReachBench:
 
     @property
     def usual(self) -> ReachSettings:
-        """The rules unless a row says otherwise: grid, start clearance 0.05 m, 5 s."""
+        """Default rules: grid, start clearance 0.05 m, 5 s."""
         return ReachSettings(
             action=self.actor.action,
             observation=self.actor.view,
@@ -102,71 +121,67 @@ class ReachBench:
         )
 
     def target_goals(self, n: int) -> Vec:
-        """Return the goals of ``n`` episodes round all targets [m], shape (n, 3)."""
+        """Return the goals of ``n`` episodes that cycle through the targets [m], (n, 3)."""
         return target_goals(self.targets, n)
 
     def random_goals(self, n: int) -> Vec:
-        """Return ``n`` goals anywhere in the box [m], shape (n, 3)."""
-        return random_goals(self.low, self.high, n, self._seed)
+        """Return ``n`` random goals in the box [m], shape (n, 3)."""
+        return random_goals(*goal_box(self.cell), n, self._seed)
 
-    def play(
-        self,
-        settings: ReachSettings,
-        goals: Vec,
-        how: InferenceMode = InferenceMode.DIRECT,
-        *,
-        cell: Cell | None = None,
-        controller: Controller | None = None,
+    def run(self, variant: Variant) -> ReachEpisodes:
+        """Run one episode per goal of a variant."""
+        controller = variant.controller or controller_of(self.actor, variant.mode)
+        cell = variant.cell or self.cell
+        return run_episodes(cell, variant.settings, controller, variant.goals, self._seed)
+
+    def on_targets(
+        self, per_target: int, mode: InferenceMode = InferenceMode.DIRECT
     ) -> ReachEpisodes:
-        """Play an episode per goal.
+        """Run the episodes of the row ``clearance`` of ``reach-targets``."""
+        goals = self.target_goals(per_target * len(self.targets))
+        return self.run(Variant(name="clearance", settings=self.usual, goals=goals, mode=mode))
+
+    def measure(self, variants: Sequence[Variant], more: Measure = no_measures) -> None:
+        """Run variants and add the row of each.
 
         Args:
-            settings: Rules.
-            goals: Goal of each episode [m], shape (n, 3).
-            how: By which way the policy is asked.
-            cell: Work cell, where it is not the checkpoint's.
-            controller: Controller in place of the inference mode; None: that of `how`.
+            variants: All rows of the result.
+            more: Further measures of each row.
         """
-        asked = controller or controller_of(self.actor, how)
-        return play(cell or self.cell, settings, asked, goals, self._seed)
+        for variant in variants:
+            episodes = self.run(variant)
+            row = {**episodes.row(variant.name), **more(variant, episodes)}
+            self.add(row, variant, len(variants))
 
-    def recheck(
-        self, settings: ReachSettings, goals: Vec, how: InferenceMode = InferenceMode.DIRECT
-    ) -> None:
-        """Ask FCL about the poses of the first episodes; the result will say what it found."""
-        asked = controller_of(self.actor, how)
-        self._recheck = recheck_contacts(self.cell, settings, asked, goals, self._seed)
+    def recheck(self, variant: Variant) -> None:
+        """Check the poses of a variant's first episodes with FCL; the result states them."""
+        controller = controller_of(self.actor, variant.mode)
+        self._recheck = recheck_contacts(
+            self.cell, variant.settings, controller, variant.goals, self._seed
+        )
 
-    def add(
-        self,
-        row: Json,
-        settings: ReachSettings,
-        goals: str,
-        how: InferenceMode = InferenceMode.DIRECT,
-        *,
-        cell: Cell | None = None,
-        **more: Any,
-    ) -> None:
-        """Add a row and what it states of its rules.
+    def add(self, row: Json, variant: Variant, n_rows: int = 1) -> None:
+        """Add a row and its rules.
 
         Args:
-            row: With its name.
-            settings: Its rules.
-            goals: Where its goals were, in words.
-            how: By which way the policy was asked.
-            cell: Work cell, where it is not the checkpoint's.
-            more: What else it states.
+            row: Measures, with the name.
+            variant: Rules.
+            n_rows: Number of rows of the result.
         """
-        rules = stated_rules(cell or self.cell, settings)
-        self._stated[row["name"]] = {**rules, "goals": goals, "asked": how, **more}
+        self._stated[row["name"]] = {
+            **stated_rules(variant.cell or self.cell, variant.settings),
+            "goals": variant.goal_set,
+            "inference_mode": variant.mode,
+            **variant.stated,
+        }
         self._rows.append(row)
-        self._on_row(len(self._rows), self.n_rows, row)
+        self._on_row(len(self._rows), n_rows, row)
 
     def result(self, **more: Any) -> Json:
-        """Return the whole result.
+        """Return the result.
 
         Args:
-            more: What else the settings state.
+            more: Further settings to state.
         """
         found = {} if self._recheck is None else {"fcl_recheck": self._recheck}
         return {
@@ -175,7 +190,7 @@ class ReachBench:
                 "cell": self.cell.name,
                 "base_height_m": self.cell.table.height,
                 "success_distance_m": SUCCESS_DISTANCE,
-                "time_told_s": REPORTED_TIME_LEFT_S,
+                "max_time_left_s": MAX_TIME_LEFT_S,
                 "trained_goals": self.actor.goals,
                 "observation": self.actor.view,
                 "action": asdict(self.actor.action),

@@ -1,20 +1,20 @@
 """Protocol ``reach-oracle``: upper bound of success by search with a known future.
 
-The episodes are those of ``reach-targets`` (54 targets x 100, start clearance 0.05 m, 5 s): the
-same people, the same motion. What the policy does not solve is replayed, moved differently each
-time (``app/sim/reach/oracle_search.py``), until a replay reaches the goal or the search ends.
-So
-``solvable`` is a lower bound on what is possible, and no causal policy need reach it: a replay
-knows what the person will do. ``never`` are episodes for which it is shown that nobody could
-have solved them; the ``undecided`` rest is neither. ``doomed`` are episodes in which every
-replay, retreats among them, ended in a collision: an upper bound on what cannot be avoided.
+The episodes are those of ``reach-targets`` (54 targets x 100, start clearance 0.05 m, 5 s) with
+the same people. Episodes that the policy does not solve are resimulated with other robot
+motions (``app/sim/reach/oracle_search.py``) until one reaches the goal or the search ends.
+``solvable`` is a lower bound on the share of solvable episodes; a causal policy cannot be
+expected to reach it, because a resimulation knows the future motion of people. ``never`` are
+episodes that are proven unsolvable; the rest is ``undecided``. ``doomed`` are episodes in which
+every resimulation, including retreats, ended in a collision: an upper bound on the share of
+unavoidable collisions.
 
 ==============  ==============================================================================
-stage           replays of each episode that is not solved yet
+stage           resimulations of each unsolved episode
 ==============  ==============================================================================
 ``policy``      the policy by itself
-``scripted``    to a random posture, later straight to the goal: 64, then 256
-``disturbed``   to a random posture, later the policy with noise: 32
+``scripted``    to a random configuration, later straight to the goal: 64, then 256
+``disturbed``   to a random configuration, later the policy with noise: 32
 ``long``        scripted again: 2048
 ==============  ==============================================================================
 
@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 
 from app.policies.checkpoints.checkpoint import Checkpoint
-from app.policies.evaluation.reach.bench import ReachBench
+from app.policies.evaluation.reach.bench import ReachBench, Variant
 from app.policies.evaluation.reach.episodes import N_ENVS
 from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.evaluation.statistics import wilson
@@ -48,17 +48,17 @@ Json = dict[str, Any]
 PER_TARGET = 100
 """Episodes of each target (METHOD 2.6)."""
 SCRIPTED = (64, 256)
-"""Scripted replays of each episode in the first two rounds."""
+"""Scripted resimulations of each episode in the first two rounds."""
 DISTURBED = 32
 """Resimulations of the policy."""
 LONG = 2048
-"""Scripted replays in the last round."""
+"""Scripted resimulations in the last round."""
 SOONEST_TRIES = 256
-"""Resimulations in an empty cell, which give the least time to a target."""
+"""Resimulations in an empty cell, for the shortest time to a target."""
 
 
 def started(cell: Cell, settings: ReachSettings, goals: Vec, seed: int) -> ReachBatch:
-    """Return a batch whose rows are the first states of the episodes ``play`` would play.
+    """Return a batch with the first states of the episodes of ``run_episodes``.
 
     Args:
         cell: Work cell.
@@ -79,7 +79,7 @@ def started(cell: Cell, settings: ReachSettings, goals: Vec, seed: int) -> Reach
 
 
 def soonest_arrivals(cell: Cell, settings: ReachSettings, goals: Vec, seed: int) -> Vec:
-    """Return when the tcp could be at each goal at the soonest, with nobody there [s]."""
+    """Return the earliest time of the TCP at each goal without people [s]."""
     different, which = np.unique(goals, axis=0, return_inverse=True)
     rules = ReachSettings(people=(), action=settings.action, time_limit_s=settings.time_limit_s)
     alone = ReachBatch(cell, len(different), seed, rules)
@@ -90,30 +90,30 @@ def soonest_arrivals(cell: Cell, settings: ReachSettings, goals: Vec, seed: int)
     return np.asarray(search.resimulations.soonest[which])
 
 
-class Ceiling:
-    """The search over one set of episodes.
+class StagedSearch:
+    """Oracle search in stages over one set of episodes.
 
     Args:
         batch: From :func:`started`.
         seed: Seed of the search.
-        on_row: Told of each stage.
-        n_stages: How many there will be.
+        n_stages: Number of rows reported.
+        on_row: Callback for each finished stage.
     """
 
     def __init__(self, batch: ReachBatch, seed: int, n_stages: int, on_row: OnRow) -> None:
         self.search, self._n_stages, self._on_row = OracleSearch(batch, seed), n_stages, on_row
         self.rows: list[Json] = []
 
-    def stage(self, name: str, replay: Callable[[], None]) -> None:
-        """Run a stage and tell what is solved after it."""
-        replay()
+    def stage(self, name: str, resimulate: Callable[[], None]) -> None:
+        """Run a stage and report the episodes solved so far."""
+        resimulate()
         found = self.search.resimulations
         row = {
             "name": name,
             "n": self.search.n,
             "solved": wilson(int((found.reached > 0).sum()), self.search.n),
             "doomed": wilson(int((found.untouched == 0).sum()), self.search.n),
-            "replays": int(found.n.sum()),
+            "resimulations": int(found.n.sum()),
         }
         self.rows.append(row)
         self._on_row(len(self.rows), self._n_stages, row)
@@ -134,7 +134,7 @@ class Ceiling:
 
 
 def verdict(search: OracleSearch, never: Any, targets: Vec, goals: Vec) -> Json:
-    """Return what is solvable, what never was, and what nobody knows, with intervals."""
+    """Return the shares of solvable, unsolvable and undecided episodes with intervals."""
     n, solved = search.n, search.resimulations.reached > 0
     undecided = ~solved & ~never
     worst = []
@@ -150,7 +150,7 @@ def verdict(search: OracleSearch, never: Any, targets: Vec, goals: Vec) -> Json:
         "never": wilson(int((never & ~solved).sum()), n),
         "undecided": wilson(int(undecided.sum()), n),
         "doomed": wilson(int((search.resimulations.untouched == 0).sum()), n),
-        "replays": int(search.resimulations.n.sum()),
+        "resimulations": int(search.resimulations.n.sum()),
         "worst_targets": worst[:5],
     }
 
@@ -158,21 +158,21 @@ def verdict(search: OracleSearch, never: Any, targets: Vec, goals: Vec) -> Json:
 def run_oracle(
     checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> Json:
-    """Search for what was possible in the episodes of ``reach-targets``.
+    """Search for solutions of the episodes of ``reach-targets``.
 
     Args:
-        checkpoint: Policy whose replays the search begins with.
+        checkpoint: Policy of the first resimulations.
         episodes: Number of episodes of each target, by default 100.
         seed: Seed of the episodes.
-        on_row: Told of each stage once it is known.
+        on_row: Callback for each finished stage.
     """
     bench = ReachBench(checkpoint, seed)
     goals = bench.target_goals((episodes or PER_TARGET) * len(bench.targets))
     cell, settings = bench.cell, bench.usual
     batch = started(cell, settings, goals, seed)
     n_stages = len(SCRIPTED) + 4
-    ceiling = Ceiling(batch, seed, n_stages, on_row)
-    ceiling.run(controller_of(bench.actor, "direct"))
+    search = StagedSearch(batch, seed, n_stages, on_row)
+    search.run(controller_of(bench.actor, "direct"))
     arm = batch.arm
     soonest = soonest_arrivals(cell, settings, goals, seed)
     base = load_robot_capsules(cell.robot.tool_length, cell.robot.tool_radius).radius[0]
@@ -180,8 +180,11 @@ def run_oracle(
     never = provably_unsolvable(
         walks, goals, soonest, arm.dt, cell.robot.tool_radius, float(base)
     )
-    row = verdict(ceiling.search, never, bench.targets, goals)
+    row = verdict(search.search, never, bench.targets, goals)
     on_row(n_stages, n_stages, row)
-    bench.add(row, settings, "training targets in turn")
+    variant = Variant(
+        name="oracle", settings=settings, goals=goals, goal_set="training targets in turn"
+    )
+    bench.add(row, variant)
     result = bench.result(search_seed=seed, soonest_tries=SOONEST_TRIES)
-    return {**result, "stages": ceiling.rows}
+    return {**result, "stages": search.rows}

@@ -1,19 +1,18 @@
-"""Protocol ``reach-random``: goals anywhere in the box, which no grid holds.
+"""Protocol ``reach-random``: random goals in the box, between the training targets.
 
-The same 5000 goals and people, whichever checkpoint is asked and however. A policy takes the
-goal as an input, so each can be asked directly; one that was trained on a set of targets can
-also be asked at those around the goal, and its actions interpolated.
+All checkpoints and inference modes have the same 5000 goals and people. Each policy can be
+queried for the goal itself (``direct``); a policy trained on a set of targets also for the
+targets around the goal, with interpolated actions.
 
-====================  ======================================================================
-``targets``           the grid's targets instead, asked directly, the same people, 5 s
-``WAY``, ``WAY-25s``  random goals by each way that the checkpoint allows, 5 s and 25 s
-``...-rollout``         the same looking ahead with the policy (``rollout.py``)
-====================  ======================================================================
+========================  ==================================================================
+``targets``               goals of the grid, queried directly, beside the same people, 5 s
+``MODE``, ``MODE-25s``    random goals in each inference mode of the policy, 5 s and 25 s
+``...-rollout``           the same with rollout policy improvement (``rollout.py``)
+========================  ==================================================================
 
-``between`` groups the episodes of 5 s by the way from their goals to the nearest target.
-``against_targets`` is the difference of the success rates, episode by episode beside the same
-people, with its 95 % interval. In 25 s a policy is told 5 s until no more are left: more it
-never met.
+``between`` groups the episodes of 5 s by the distance of their goals to the nearest target.
+``against_targets`` is the paired difference of success rates with its 95 % interval. The
+remaining time that the policy observes is at most 5 s, as in training.
 
 Source: thesis 4.4.3; METHOD 2.4 and 2.6.
 """
@@ -25,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from app.policies.checkpoints.checkpoint import Checkpoint
-from app.policies.evaluation.reach.bench import ReachBench, direct_ways, ending, goal_ways
+from app.policies.evaluation.reach.bench import ReachBench, Variant, suffix_of
 from app.policies.evaluation.reach.episodes import ReachEpisodes, against
 from app.policies.evaluation.rows import OnRow, ignore_row
 from app.sim.core.arrays import Vec
@@ -33,15 +32,17 @@ from app.sim.core.arrays import Vec
 DEFAULT_EPISODES = 5000
 """METHOD 2.6."""
 LIMITS_S = (5.0, 25.0)
-"""Longest episodes."""
+"""Time limits [s]."""
 RINGS = (0.0, 0.06, 0.09, 0.11, 0.13, 0.18)
-"""Bounds of the ways to the nearest target by which episodes are grouped [m]."""
+"""Bounds of the groups by distance to the nearest target [m]."""
 
 
 def between(episodes: ReachEpisodes, targets: Vec) -> list[dict[str, Any]]:
-    """Return how episodes ended, by the way from their goals to the nearest target."""
-    ways = np.linalg.norm(episodes.goals[:, None] - targets, axis=2).min(axis=1)
-    groups = [(low, high, (low <= ways) & (ways < high)) for low, high in pairwise(RINGS)]
+    """Return the rates of outcomes by the distance of goals to the nearest target."""
+    distances = np.linalg.norm(episodes.goals[:, None] - targets, axis=2).min(axis=1)
+    groups = [
+        (low, high, (low <= distances) & (distances < high)) for low, high in pairwise(RINGS)
+    ]
     return [
         {"low_m": low, "high_m": high, **episodes.rates(which)}
         for low, high, which in groups
@@ -52,32 +53,44 @@ def between(episodes: ReachEpisodes, targets: Vec) -> list[dict[str, Any]]:
 def run_random(
     checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> dict[str, Any]:
-    """Evaluate on goals anywhere in the box.
+    """Evaluate on random goals in the box.
 
     Args:
-        checkpoint: What acts.
+        checkpoint: Policy.
         episodes: Number of episodes of each row, by default 5000.
-        seed: Seed of goals and people; use one that nothing was tuned on.
-        on_row: Told of each row once it is known.
+        seed: Seed of goals and people; use one that was not used for tuning.
+        on_row: Callback for each finished row.
     """
     bench, n = ReachBench(checkpoint, seed, on_row), episodes or DEFAULT_EPISODES
-    ways, there = goal_ways(bench.actor), direct_ways(bench.actor)
-    bench.n_rows = len(there) + len(LIMITS_S) * len(ways)
-    at_targets = {}
-    for how in there:
-        played = bench.play(bench.usual, bench.target_goals(n), how)
-        at_targets[ending(how)] = played
-        bench.add(played.row("targets" + ending(how)), bench.usual, "grid", how)
-    goals = bench.random_goals(n)
-    for how in ways:
-        for limit in LIMITS_S:
-            settings = replace(bench.usual, time_limit_s=limit)
-            played = bench.play(settings, goals, how)
-            usual = limit == bench.usual.time_limit_s
-            row = played.row(how if usual else f"{how}-{limit:g}s")
-            if usual:
-                row["against_targets"] = against(played, at_targets[ending(how)])
-                row["between"] = between(played, bench.targets)
-            bench.add(row, settings, "box", how)
-    bench.recheck(bench.usual, goals, ways[-1])
+    usual, grid, goals = bench.usual, bench.target_goals(n), bench.random_goals(n)
+    at_targets: dict[str, ReachEpisodes] = {}
+
+    def compared(variant: Variant, episodes: ReachEpisodes) -> dict[str, Any]:
+        """Return the comparison with the targets for random goals within the usual time."""
+        if variant.goal_set == "grid":
+            at_targets[suffix_of(variant.mode)] = episodes
+        if variant.goal_set == "grid" or variant.settings != usual:
+            return {}
+        return {
+            "against_targets": against(episodes, at_targets[suffix_of(variant.mode)]),
+            "between": between(episodes, bench.targets),
+        }
+
+    variants = [
+        Variant(name="targets" + suffix_of(mode), settings=usual, goals=grid, mode=mode)
+        for mode in bench.direct_modes
+    ]
+    variants += [
+        Variant(
+            name=mode if limit == usual.time_limit_s else f"{mode}-{limit:g}s",
+            settings=replace(usual, time_limit_s=limit),
+            goals=goals,
+            goal_set="box",
+            mode=mode,
+        )
+        for mode in bench.goal_modes
+        for limit in LIMITS_S
+    ]
+    bench.measure(variants, compared)
+    bench.recheck(variants[-2])
     return bench.result()

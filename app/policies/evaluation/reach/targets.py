@@ -1,21 +1,21 @@
-"""Protocol ``reach-targets``: every training target of the source, beside one walking person.
+"""Protocol ``reach-targets``: every training target of the source, beside one pedestrian.
 
-54 targets x 100 episodes in each row, the same people and goals but for how people may start:
+54 targets x 100 episodes in each row, with the same people and goals and different start rules:
 
 =============  =============================================================================
-``clearance``  at least 0.05 m from the robot; what all other protocols use
-``uniform``    anywhere; some episodes begin in contact, which no policy can help
-``authors``    as in the authors' public code: anywhere, they walk a little differently, and
-               an episode goes on after a contact
+``clearance``  at least 0.05 m from the robot, as in all other protocols
+``uniform``    anywhere; no policy can solve an episode that begins in contact
+``authors``    as in the authors' public code: anywhere, with a slightly different walk, and
+               episodes continue after a contact
 =============  =============================================================================
 
-``-rollout`` are the same looking ahead (``rollout.py``), where the policy can.
+Rows ``-rollout`` use rollout policy improvement (``rollout.py``), where the policy allows it.
 
 An episode with a contact is no success in any row; ``reached_after_contact`` is the share that
-came to the goal all the same.
+reached the goal afterwards.
 
-Source: thesis 4.4.3, figs 4.5 and 4.6; METHOD 2.6. Deviates: the source does not say how its
-people may start.
+Source: thesis 4.4.3, figs 4.5 and 4.6; METHOD 2.6. Deviates: the source does not state the
+start rule of its people.
 """
 
 from dataclasses import replace
@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from app.policies.checkpoints.checkpoint import Checkpoint
-from app.policies.evaluation.reach.bench import ReachBench, direct_ways, ending
+from app.policies.evaluation.reach.bench import ReachBench, Variant, suffix_of
 from app.policies.evaluation.reach.episodes import ReachEpisodes
 from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.evaluation.statistics import wilson
@@ -37,19 +37,19 @@ PER_TARGET = 100
 """Episodes of each target (METHOD 2.6)."""
 STARTS: tuple[StartRule, ...] = ("clearance", "uniform", "authors")
 END_STEP_S = 0.1
-"""Intervals in which ends are counted [s]."""
+"""Width of the time intervals in which ends are counted [s]."""
 N_WORST = 5
-"""Targets that are named as the worst."""
+"""Number of targets listed as the worst."""
 Json = dict[str, Any]
 
 
 def by_target(episodes: ReachEpisodes, targets: Vec, base_height: float) -> list[Json]:
-    """Return how the episodes of each target ended.
+    """Return the rates of outcomes of each target.
 
     Args:
         episodes: Episodes with goals among the targets.
-        targets: In the robot's base frame [m], shape (n, 3).
-        base_height: Of the robot's base above the floor [m].
+        targets: Targets in the robot's base frame [m], shape (n, 3).
+        base_height: Height of the robot's base above the floor [m].
     """
     of_target = (episodes.goals[:, None] == targets).all(axis=2)
     return [
@@ -72,7 +72,7 @@ def worst_of(cells: list[Json]) -> list[Json]:
 
 
 def ends_over_time(episodes: ReachEpisodes) -> list[Json]:
-    """Return how many episodes ended by success and by collision in each interval of time."""
+    """Return the numbers of successes and collisions in each time interval."""
     edges = np.arange(0.0, episodes.limit_s + 0.5 * END_STEP_S, END_STEP_S)
     times = [episodes.duration_s[episodes.outcome == end] for end in (SUCCESS, COLLISION)]
     won, hit = (np.histogram(part - 1e-9, edges)[0].tolist() for part in times)
@@ -83,7 +83,7 @@ def ends_over_time(episodes: ReachEpisodes) -> list[Json]:
 
 
 def reached_after_contact(episodes: ReachEpisodes) -> dict[str, float]:
-    """Return the share of episodes that came to the goal although there was a contact."""
+    """Return the share of episodes that reached the goal after a contact."""
     early = episodes.duration_s < episodes.limit_s - 1e-6
     reached = (episodes.outcome == COLLISION) & early
     return wilson(int(reached.sum()), len(reached))
@@ -92,33 +92,39 @@ def reached_after_contact(episodes: ReachEpisodes) -> dict[str, float]:
 def run_targets(
     checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> Json:
-    """Evaluate on all targets of the grid, under three rules of starting.
+    """Evaluate on all targets of the grid under three start rules.
 
     Args:
-        checkpoint: What acts.
+        checkpoint: Policy.
         episodes: Number of episodes of each target, by default 100.
-        seed: Seed of the episodes; use one that nothing was tuned on.
-        on_row: Told of each row once it is known.
+        seed: Seed of the episodes; use one that was not used for tuning.
+        on_row: Callback for each finished row.
     """
     bench = ReachBench(checkpoint, seed, on_row)
-    ways = direct_ways(bench.actor)
-    bench.n_rows = len(ways) * len(STARTS)
     per_target = episodes or PER_TARGET
     goals = bench.target_goals(per_target * len(bench.targets))
-    for how, start in product(ways, STARTS):
-        settings = replace(bench.usual, start=start, collision_ends=start != "authors")
-        played = bench.play(settings, goals, how)
-        cells = by_target(played, bench.targets, bench.cell.table.height)
-        row = {
-            **played.row(start + ending(how)),
-            "begun_in_contact": played.begun_in_contact(),
-            "starts_redrawn": float(np.mean(played.redrawn > 0)),
+
+    def by_targets(variant: Variant, episodes: ReachEpisodes) -> Json:
+        cells = by_target(episodes, bench.targets, bench.cell.table.height)
+        continued = not variant.settings.collision_ends
+        return {
+            "initial_contact": episodes.initial_contact(),
+            "starts_redrawn": float(np.mean(episodes.redrawn > 0)),
             "worst": worst_of(cells),
-            "ends": ends_over_time(played),
+            "ends": ends_over_time(episodes),
             "targets": cells,
+            **({"reached_after_contact": reached_after_contact(episodes)} if continued else {}),
         }
-        if not settings.collision_ends:
-            row["reached_after_contact"] = reached_after_contact(played)
-        bench.add(row, settings, "grid", how)
-    bench.recheck(bench.usual, goals, ways[-1])
+
+    variants = [
+        Variant(
+            name=start + suffix_of(mode),
+            settings=replace(bench.usual, start=start, collision_ends=start != "authors"),
+            goals=goals,
+            mode=mode,
+        )
+        for mode, start in product(bench.direct_modes, STARTS)
+    ]
+    bench.measure(variants, by_targets)
+    bench.recheck(variants[-len(STARTS)])
     return {"episodes": per_target, **bench.result(targets=len(bench.targets))}

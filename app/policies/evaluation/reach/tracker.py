@@ -1,21 +1,20 @@
-"""Protocol ``reach-tracker``: what a policy loses when it sees people through a tracker.
+"""Protocol ``reach-tracker``: a policy that observes people through a tracker.
 
-Every row plays the same episodes round the grid's targets; contacts are with the true people,
-and only what the policy sees differs: cylinders measured at 30 Hz, filtered and predicted to
-now (``app/sim/perception/cylinder_sensor_model.py``).
+All rows run the same episodes on the targets of the grid with contacts of the true people. They
+differ in the observation: cylinders measured at 30 Hz, filtered and predicted to the current
+time (``app/sim/perception/cylinder_sensor_model.py``).
 
 ========================  ==================================================================
 ``exact``                 the true state
-``30hz``                  measured at 30 Hz, handed over at once
-``100ms``                 handed over 100 ms late
-``100ms-noise``           and 20 mm of noise on x, y and radius of every frame
-``200ms-noise``           the same, 200 ms late
-``100ms-not-predicted``   the newest frame taken for now
+``30hz``                  measured at 30 Hz without latency
+``100ms``                 latency of 100 ms
+``100ms-noise``           the same with 20 mm of noise on x, y and radius of every frame
+``200ms-noise``           the same with a latency of 200 ms
+``100ms-not-predicted``   newest frame without prediction
 ========================  ==================================================================
 
-Source: METHOD 2.8 (30 Hz). Noise, latencies and filter are ours. Deviates: its cylinder comes
-from a body's key-points; the people of this scenario are cylinders themselves, and are measured
-as such.
+Source: METHOD 2.8 (30 Hz). Noise, latencies and filter are ours. Deviates: the source computes
+cylinders from key-points of a body; the people of this scenario are measured as cylinders.
 """
 
 from dataclasses import asdict, dataclass
@@ -25,7 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.policies.checkpoints.checkpoint import Checkpoint
-from app.policies.evaluation.reach.bench import ReachBench, direct_ways, ending, walker_of
+from app.policies.evaluation.reach.bench import ReachBench, Variant, pedestrian_of, suffix_of
+from app.policies.evaluation.reach.episodes import ReachEpisodes
 from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.inference.controllers import Controller, controller_of
 from app.sim.core.arrays import Vec
@@ -34,20 +34,20 @@ from app.sim.perception.cylinder_sensor_model import CylinderSensorModel, Cylind
 from app.sim.reach.batch import ReachBatch
 
 DEFAULT_EPISODES = 5400
-"""As many as ``reach-targets`` plays."""
-THINNEST = 0.05
-"""Least radius that is ever seen [m]."""
+"""As in ``reach-targets``."""
+MIN_RADIUS = 0.05
+"""Minimum observed radius [m]."""
 RATE_HZ = 30.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CylinderSensorRow:
-    """How one row of the result sees people."""
+    """Observation model of one result row."""
 
     tracker: CylinderSensorSettings
-    """How good the tracker is."""
+    """Latency and noise."""
     predicted: bool = True
-    """Whether people are predicted to now, or taken as in the newest frame."""
+    """Whether people are predicted from the newest frame to the current time."""
 
 
 def _late(latency_s: float, noise: float = 0.0) -> CylinderSensorSettings:
@@ -61,17 +61,17 @@ ROWS = {
     "200ms-noise": CylinderSensorRow(tracker=_late(0.2, 0.02)),
     "100ms-not-predicted": CylinderSensorRow(tracker=_late(0.1), predicted=False),
 }
-"""The rows beside ``exact``."""
-LOOKED_AHEAD = ("30hz", "100ms-noise")
-"""Those that are also played looking ahead, where the policy can."""
+"""Rows other than ``exact``."""
+ROLLOUT_ROWS = ("30hz", "100ms-noise")
+"""Rows that are also measured with rollout, where the policy allows it."""
 
 
 class CylinderObserver:
-    """Asks another controller about people as a tracker knows them; made again for every run.
+    """Controller whose policy observes people through a tracker, for one run.
 
     Args:
         controller: Controller of the robots.
-        row: How people are seen.
+        row: Observation model.
         seed: Seed of the disturbances.
     """
 
@@ -81,10 +81,10 @@ class CylinderObserver:
         self._rng = np.random.default_rng([seed, 1])
         self._past: Vec | None = None
         self.errors: list[Vec] = []
-        """Distance of seen and true axes at every step of every row [m]."""
+        """Distance of observed and true axes at each step of each environment [m]."""
 
     def acts(self, batch: ReachBatch) -> NDArray[np.float32]:
-        """Return the actions of all rows, shape (n_envs, 6)."""
+        """Return the actions of all environments, shape (n_envs, 6)."""
         state, t = batch.state, batch.state.elapsed
         rows = state.people.walkers.rows
         true = rows[:, :, [X, Y, R]]
@@ -96,19 +96,19 @@ class CylinderObserver:
         later, every = np.flatnonzero(t > 0.0), np.arange(batch.n_envs)
         self._tracker.look(later, t[later], true[later])
         seen, change = self._tracker.seen(every, predicted=self._row.predicted)
-        seen[:, :, 2] = np.maximum(seen[:, :, 2], THINNEST)
+        seen[:, :, 2] = np.maximum(seen[:, :, 2], MIN_RADIUS)
         self.errors.append(np.linalg.norm(seen[:, :, :2] - true[:, :, :2], axis=2).ravel())
-        return self._ask(batch, fresh, seen, change)
+        return self._query(batch, fresh, seen, change)
 
-    def _ask(
+    def _query(
         self, batch: ReachBatch, fresh: NDArray[np.int64], seen: Vec, change: Vec
     ) -> NDArray[np.float32]:
-        """Ask about people elsewhere, and put them back where they are."""
+        """Query the controller with observed people, then restore the true ones."""
         people, clear = batch.state.people, batch.state.clear
         kept = people.walkers.rows.copy(), people.cylinders.copy(), clear.copy()
         people.walkers.rows[:, :, [X, Y, R]] = seen
         people.walkers.rows[:, :, [VX, VY, GROWTH]] = change
-        people.walkers.rows[:, :, AGE:] = self._remembered(
+        people.walkers.rows[:, :, AGE:] = self._history(
             fresh, people.walkers.rows, batch.arm.dt
         )
         people.cylinders[:] = seen
@@ -117,14 +117,14 @@ class CylinderObserver:
         people.walkers.rows[:], people.cylinders[:], clear[:] = kept
         return act
 
-    def _remembered(self, fresh: NDArray[np.int64], rows: Vec, dt: float) -> Vec:
-        """Return what is remembered of everybody, all as the tracker knew them.
+    def _history(self, fresh: NDArray[np.int64], rows: Vec, dt: float) -> Vec:
+        """Return the observed history of all people.
 
-        What lies before an episode was measured with the tracker's noise.
+        The history before an episode contains the tracker's noise.
 
         Args:
-            fresh: Cells whose episode starts, shape (k,).
-            rows: Walkers as the tracker knows them now, (n, n_people, N_STATE).
+            fresh: Environments whose episode starts, shape (k,).
+            rows: Observed pedestrians, shape (n, n_people, N_STATE).
             dt: Control period [s].
         """
         past = self._past
@@ -147,29 +147,41 @@ class CylinderObserver:
 def run_tracker(
     checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> dict[str, Any]:
-    """Evaluate round all targets beside people seen by a tracker.
+    """Evaluate on all targets with people observed through a tracker.
 
     Args:
-        checkpoint: What acts.
+        checkpoint: Policy.
         episodes: Number of episodes of each row, by default 5400.
         seed: Seed of the episodes and of the disturbances.
-        on_row: Told of each row once it is known.
+        on_row: Callback for each finished row.
 
     Raises:
-        InvalidInput: Nobody walks about in the checkpoint's cell.
+        InvalidInput: The checkpoint's cell has no pedestrian.
     """
     bench = ReachBench(checkpoint, seed, on_row)
-    ways = direct_ways(bench.actor)
-    rows = [(how, name) for how in ways for name in (LOOKED_AHEAD if ending(how) else ROWS)]
-    bench.n_rows = 1 + len(rows)
-    walker_of(bench.cell)
+    pedestrian_of(bench.cell)
     goals = bench.target_goals(episodes or DEFAULT_EPISODES)
-    bench.add(bench.play(bench.usual, goals).row("exact"), bench.usual, "grid")
-    for how, name in rows:
-        tracked = ROWS[name]
-        controller = CylinderObserver(controller_of(bench.actor, how), tracked, seed)
-        row = bench.play(bench.usual, goals, controller=controller).row(name + ending(how))
-        median, p95 = np.percentile(1e3 * np.concatenate(controller.errors), [50, 95]).tolist()
-        row |= {"axis_error_median_mm": median, "axis_error_p95_mm": p95}
-        bench.add(row, bench.usual, "grid", how, tracker=asdict(tracked))
+    variants = [Variant(name="exact", settings=bench.usual, goals=goals)]
+    variants += [
+        Variant(
+            name=name + suffix_of(mode),
+            settings=bench.usual,
+            goals=goals,
+            mode=mode,
+            controller=CylinderObserver(controller_of(bench.actor, mode), ROWS[name], seed),
+            stated={"tracker": asdict(ROWS[name])},
+        )
+        for mode in bench.direct_modes
+        for name in (ROLLOUT_ROWS if mode.rollout else ROWS)
+    ]
+    bench.measure(variants, axis_errors)
     return bench.result()
+
+
+def axis_errors(variant: Variant, _episodes: ReachEpisodes) -> dict[str, Any]:
+    """Return median and 95th percentile of the distance of observed and true axes [mm]."""
+    if not isinstance(variant.controller, CylinderObserver):
+        return {}
+    errors = 1e3 * np.concatenate(variant.controller.errors)
+    median, p95 = np.percentile(errors, [50, 95]).tolist()
+    return {"axis_error_median_mm": median, "axis_error_p95_mm": p95}

@@ -31,7 +31,7 @@ from app.sim.safety.layer import SafetySettings, safety_settings
 
 DEFAULT_EPISODES = 100_000
 OUTSIDE_SHARE = 10
-"""Ratio of the episodes inside the assumptions to those of every other row."""
+"""Ratio of the episodes of ``inside`` to those of every other row."""
 FAST_HANDS = 2.5
 """Speed of trained hands, 2 to 2.7 m/s; above the usual assumption [m/s]."""
 LATE = 0.1

@@ -2,9 +2,8 @@
 
 benchmark_tasks   Protocol ``sorting-tests``: many episodes of each benchmark task of the
                   thesis (3.4.3)
-curve             Learning curves by the source's protocol: every pair (K_E, K_G), greedily, no
-                  hand-over
-episodes          Runs sorting episodes to their ends, greedily, and counts what they cost
+curve             Learning curves by the source's protocol: every pair (K_E, K_G), greedy
+episodes          Run sorting episodes to their ends and count moves, attempts and risks
 grid              Protocol ``sorting-grid``: every pair of object and goal numbers (METHOD 1.5)
 optimal_baseline  Optimal baseline of sorting episodes: the exact planner's moves and expected
                   attempts

@@ -1,9 +1,9 @@
 """Protocol ``sorting-tests``: many episodes of each benchmark task of the thesis (3.4.3).
 
 Rows ``test-1`` to ``test-6`` are the policy alone; in ``test-1-planner-fallback`` etc. the
-exact planner takes over from a cycling policy. Picks fail as the work cell says. An episode
-is a success when the last goal is reached, and ``fewest`` when no part of it took a move more
-than the exact planner needs. Each part has 4 K attempts.
+exact planner replaces a cycling policy. Picks fail with the probabilities of the work cell. An
+episode is a success when the last goal is reached, and counts in ``fewest`` when every part of
+it took as few moves as the exact planner. Each part has 4 K attempts.
 
 Source: thesis 3.4.3, METHOD 1.5. Deviates: the source shows one run of each.
 """
@@ -22,7 +22,7 @@ from app.policies.evaluation.sorting.episodes import (
     SortingEpisodes,
     Values,
     greedy,
-    run_episodes,
+    run_with_fallback,
 )
 from app.policies.evaluation.sorting.grid import settings_of, share
 from app.policies.evaluation.statistics import mean_of, wilson
@@ -34,13 +34,13 @@ from app.sim.sorting.state import SortingShape
 DEFAULT_EPISODES = 1000
 
 
-class Person:
-    """The person of a test, in every row of a batch; made again for every run.
+class ScriptedInterferences:
+    """Interferences of a test's person in all environments of one run.
 
     Args:
-        test: The test.
-        n: Number of rows.
-        seed: Seed; what is done in row ``e`` is fixed by (seed, test, e).
+        test: Test.
+        n: Number of environments.
+        seed: Seed; the interferences of environment ``e`` are fixed by (seed, test, e).
     """
 
     def __init__(self, test: SortingTest, n: int, seed: int) -> None:
@@ -55,12 +55,12 @@ class Person:
         )
 
     def due(self, which: Index, moves: Index, solved: Flags) -> Flags:
-        """Tell in which rows the next interference comes now; at a goal it always does."""
+        """Return the environments with an interference now; at a goal there always is one."""
         after = self._after[self._next[which]]
         return np.asarray(~np.isnan(after) & (solved | (moves >= after)))
 
     def interfere(self, batch: SortingBatch, e: int) -> None:
-        """Do to row ``e`` what comes next."""
+        """Apply the next interference to environment ``e``."""
         k = int(self._next[e])
         rng = _random(self._test, self._seed, e, 1 + k)
         change = self._test.interferences[k].change
@@ -73,7 +73,7 @@ def _random(test: SortingTest, seed: int, e: int, part: int) -> np.random.Genera
 
 
 def start_test(batch: SortingBatch, test: SortingTest, fail: Vec, seed: int) -> None:
-    """Put every row of a batch at a start of a test."""
+    """Set every environment of a batch to a start of a test."""
     batch.reset()
     for e in range(batch.n_envs):
         batch.put(e, test.start(batch.shape, fail, _random(test, seed, e, 0)))
@@ -82,17 +82,17 @@ def start_test(batch: SortingBatch, test: SortingTest, fail: Vec, seed: int) -> 
 def run_test(
     test: SortingTest, choose: Chooser, shape: SortingShape, fail: Vec, n: int, seed: int
 ) -> tuple[SortingEpisodes, SortingEpisodes]:
-    """Return the episodes of a test by a policy alone, and with hand-over."""
+    """Return the episodes of a test without and with planner fallback."""
     batch = SortingBatch(shape, fail, n, seed, SortingSettings(horizon_factor=ENDLESS))
-    start_test(batch, test, fail, seed)
-    alone = run_episodes(batch, choose, script=Person(test, n, seed))
-    called = alone.planner_fallback
-    if not called.any():
-        return alone, alone
-    start_test(batch, test, fail, seed)
-    script = Person(test, n, seed)
-    again = run_episodes(batch, choose, script=script, obey=True, only=called)
-    return alone, alone.with_those(again, called)
+
+    def started() -> SortingBatch:
+        start_test(batch, test, fail, seed)
+        return batch
+
+    def script() -> ScriptedInterferences:
+        return ScriptedInterferences(test, n, seed)
+
+    return run_with_fallback(started, choose, script)
 
 
 def row_of(name: str, episodes: SortingEpisodes) -> dict[str, Any]:
@@ -122,15 +122,15 @@ def trials(
     seed: int,
     on_row: OnRow = ignore_row,
 ) -> dict[str, Any]:
-    """Put a policy to the tests; those that need a larger task are left out.
+    """Evaluate a policy on the tests; tests that need a larger task are left out.
 
     Args:
         values: Q of every move, from observations.
-        shape: How large the task is.
+        shape: Size of the task.
         fail: Failure probabilities of the clutter cells, shape (K,).
         episodes: Number of episodes per test, by default 1000.
-        seed: Seed of the episodes; use one that nothing was tuned on.
-        on_row: Told of each row once it is known.
+        seed: Seed of the episodes; use one that was not used for tuning.
+        on_row: Callback for each finished row.
 
     Raises:
         InvalidInput: The task is too small for all six.
@@ -139,13 +139,13 @@ def trials(
     fitting = [test for test in TESTS if test.fits(shape)]
     if not fitting:
         raise InvalidInput("n_cells", shape.n_cells, "must be enough for one of the six tests")
-    alone, handed = [], []
+    alone, with_fallback = [], []
     for test in fitting:
         one, other = run_test(test, greedy(values), shape, fail, n, seed)
         alone.append(row_of(test.name, one))
-        handed.append(row_of(f"{test.name}-planner-fallback", other))
+        with_fallback.append(row_of(f"{test.name}-planner-fallback", other))
         on_row(len(alone), 2 * len(fitting), alone[-1])
-    for k, row in enumerate(handed):
+    for k, row in enumerate(with_fallback):
         on_row(len(alone) + k + 1, 2 * len(fitting), row)
     return {
         "episodes": n,
@@ -153,5 +153,5 @@ def trials(
             **settings_of(shape, fail),
             "left_out": [test.name for test in TESTS if test not in fitting],
         },
-        "results": [*alone, *handed],
+        "results": [*alone, *with_fallback],
     }

@@ -1,4 +1,4 @@
-"""Learning curves by the source's protocol: every pair (K_E, K_G), greedily, no hand-over.
+"""Learning curves by the source's protocol: every pair (K_E, K_G), greedy, without fallback.
 
 Source: thesis 3.4.2 and fig. 3.1, METHOD 1.5: every 50,000 steps, 500 episodes of every pair on
 e0 and 100 on e1.
@@ -14,7 +14,7 @@ from app.sim.sorting.state import SortingShape
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CurvePoint:
-    """How good a policy is over all pairs, each counted alike."""
+    """Success and return of a policy over all pairs, with equal weights."""
 
     success: float
     """Success rate."""
@@ -25,7 +25,7 @@ class CurvePoint:
 
 
 def curve_episodes(shape: SortingShape) -> int:
-    """Return how many episodes per pair the source runs for a point of its curves."""
+    """Return the source's number of episodes per pair for one point of its curves."""
     return 500 if shape.n_cells <= SMALL else 100
 
 
@@ -38,11 +38,11 @@ def curve_point(
     *,
     disturbed: float = 0.0,
 ) -> CurvePoint:
-    """Evaluate every pair.
+    """Evaluate a policy on every pair.
 
     Args:
         values: Q of every move, from observations.
-        shape: How large the task is.
+        shape: Size of the task.
         fail: Failure probabilities of the clutter cells, shape (K,).
         episodes_per_pair: Episodes of each pair; :func:`curve_episodes` gives the source's.
         seed: Seed of the episodes.

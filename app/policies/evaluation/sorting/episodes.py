@@ -1,12 +1,12 @@
-"""Runs sorting episodes to their ends, greedily, and counts what they cost.
+"""Run sorting episodes to their ends and count moves, attempts and risks.
 
-Every episode is a row of a batch; a policy is asked only about rows that still run. Episode
-``k`` of a seed starts the same whoever decides. With hand-over, an episode that calls for it is
-run once more with the rule in force: a policy decides the same again, so all others are what
-they were without.
+Each episode is one environment of a batch; a policy is queried for running environments only.
+Episode ``k`` of a seed has the same start for every policy. Episodes that trigger the planner
+fallback are run a second time with it; a policy is deterministic, so that all others are the
+same with and without it.
 
-A pick is *riskier* when a cell that is less likely to fail holds the same object. The fewest
-moves are the exact planner's, for the very start; failed picks are attempts, never moves.
+A pick is *riskier* if a cell with a lower failure probability holds an identical object. The
+fewest moves are those of the exact planner; failed picks are attempts, not moves.
 
 Source: METHOD 1.2, 1.5.
 """
@@ -28,35 +28,35 @@ Flags = NDArray[np.bool_]
 Values = Callable[[NDArray[np.uint8]], NDArray[np.float32]]
 """Q of every move from observations (n, obs_size), shape (n, n_actions)."""
 Chooser = Callable[[SortingBatch, Index], Index]
-"""Chooses the moves of some rows of a batch."""
+"""Selects the moves of some environments of a batch."""
 HORIZON_FACTOR = SortingSettings().horizon_factor
-"""Attempts per clutter cell after which an episode is cut off; counted again where a person
-interferes and at a hand-over."""
+"""Attempts per clutter cell until an episode ends; the count restarts at an interference and at
+a planner fallback."""
 ENDLESS = 1e6
-"""Horizon factor of the batch itself: the end is decided here."""
+"""Horizon factor of the batch itself; this module ends the episodes."""
 
 
 class Script(Protocol):
-    """What people do during the episodes of a batch."""
+    """Interferences of people during the episodes of a batch."""
 
     def due(self, which: Index, moves: Index, solved: Flags) -> Flags:
-        """Tell in which rows somebody interferes now.
+        """Return the environments with an interference now.
 
         Args:
-            which: Rows that just made an attempt.
-            moves: Moves in each since the start or the last interference, same shape.
-            solved: Whether each is at its goal, same shape.
+            which: Environments that just made an attempt, shape (k,).
+            moves: Moves of each since the start or the last interference, shape (k,).
+            solved: Whether each is at its goal, shape (k,).
         """
 
     def interfere(self, batch: SortingBatch, e: int) -> None:
-        """Change row ``e``, which then runs on."""
+        """Change environment ``e``, whose episode continues."""
 
 
 class Undisturbed:
-    """Nobody interferes."""
+    """Script without interferences."""
 
     def due(self, which: Index, moves: Index, solved: Flags) -> Flags:
-        """Tell that nobody interferes anywhere."""
+        """Return False for all environments."""
         del moves, solved
         return np.zeros(len(which), dtype=np.bool_)
 
@@ -66,35 +66,35 @@ class Undisturbed:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SortingEpisodes:
-    """What a set of episodes came to; every array has the shape (n,)."""
+    """Results of a set of episodes; every array has the shape (n,)."""
 
     success: Flags
-    """Whether the goal was reached, the last one where it changed."""
+    """Whether the goal was reached, the last one if it changed."""
     rewards: NDArray[np.float64]
     """Sum of rewards, not discounted."""
     moves: Index
-    """Attempts that changed something."""
+    """Attempts that moved an object."""
     fewest: Index
-    """Moves the exact planner needs, over all parts of the episode."""
+    """Moves of the exact planner, over all parts of the episode."""
     attempts: Index
     """All attempts."""
     expected: NDArray[np.float64]
-    """Attempts the exact planner expects, over all parts of the episode."""
+    """Expected attempts of the exact planner, over all parts of the episode."""
     picks: Index
-    """Attempts that picked from the clutter."""
+    """Attempts to pick from the clutter."""
     failed: Index
-    """Of these, the ones that failed."""
+    """Failed picks."""
     choices: Index
-    """Of the picks, those with duplicates of different risk to choose from."""
+    """Picks among duplicates of different risk."""
     riskier: Index
-    """Of these, those that did not take the least risky duplicate."""
+    """Picks of a duplicate other than the least risky one."""
     planner_fallback: Flags
-    """Whether the rule called for the exact planner."""
+    """Whether the progress monitor triggered the planner fallback."""
     repeated: Flags
-    """Whether it did so because a state came back."""
+    """Whether a repeated state was the reason."""
 
-    def with_those(self, other: Self, where: Flags) -> Self:
-        """Return these episodes with some of another run in their place."""
+    def replaced(self, other: Self, where: Flags) -> Self:
+        """Return these episodes with those of another run where ``where`` is true."""
         taken = {
             one.name: np.where(where, getattr(other, one.name), getattr(self, one.name))
             for one in fields(self)
@@ -102,7 +102,7 @@ class SortingEpisodes:
         return replace(self, **taken)
 
     def part(self, where: Any) -> Self:
-        """Return some of these episodes."""
+        """Return selected episodes."""
         return replace(
             self, **{one.name: getattr(self, one.name)[where] for one in fields(self)}
         )
@@ -117,7 +117,7 @@ def joined(parts: list[SortingEpisodes]) -> SortingEpisodes:
 
 
 def greedy(values: Values) -> Chooser:
-    """Return who takes the valid move of the greatest value."""
+    """Return the policy that selects the valid move with the greatest value."""
 
     def choose(batch: SortingBatch, which: Index) -> Index:
         q = values(batch.observations()[which])
@@ -127,20 +127,21 @@ def greedy(values: Values) -> Chooser:
 
 
 class _Run:
-    """One run of all rows of a started batch.
+    """One run of all environments of a batch.
 
     Args:
-        batch: Started, and with a horizon that is never reached.
-        choose: Who decides.
-        script: What people do.
-        obey: Whether the planner takes over where the rule calls for it.
+        batch: Environments at their starts, with the horizon factor ENDLESS.
+        choose: Policy.
+        script: Interferences.
+        fallback: Whether the exact planner replaces the policy after a planner fallback.
     """
 
     def __init__(
-        self, batch: SortingBatch, choose: Chooser, script: Script, obey: bool
+        self, batch: SortingBatch, choose: Chooser, script: Script, fallback: bool
     ) -> None:
         n = batch.n_envs
-        self._batch, self._choose, self._script, self._obey = batch, choose, script, obey
+        self._batch, self._choose, self._script = batch, choose, script
+        self._fallback = fallback
         self._horizon = round(HORIZON_FACTOR * batch.shape.n_cells)
         self._monitor = BatchProgressMonitor(n)
         self._since = np.zeros(n, dtype=np.int64)
@@ -155,15 +156,15 @@ class _Run:
         return np.flatnonzero(self._batch.rows.outcome == RUNNING)
 
     def _begin(self, which: Index) -> None:
-        """Begin a part of an episode: its start, or what a person made of it."""
+        """Begin a part of episodes, at the start or after an interference."""
         fewest, attempts = measure(self._batch, which)
         self._counts["fewest"][which] += fewest
         self._expected[which] += attempts
         self._since[which], self._moves_before[which] = 0, self._batch.rows.moves[which]
         self._monitor.begin(which, state_keys(self._batch.rows, which), attempts)
 
-    def to_the_end(self) -> SortingEpisodes:
-        """Make attempts until every row has ended."""
+    def run(self) -> SortingEpisodes:
+        """Make attempts until every episode has ended."""
         while len(which := self._running()):
             self._attempt(which)
         rows = self._batch.rows
@@ -196,7 +197,7 @@ class _Run:
 
     def _decide(self, which: Index) -> Index:
         act = np.zeros(len(which), dtype=np.int64)
-        over = self._monitor.planner_fallback[which] & self._obey
+        over = self._monitor.planner_fallback[which] & self._fallback
         if (~over).any():
             act[~over] = self._choose(self._batch, which[~over])
         if over.any():
@@ -204,7 +205,7 @@ class _Run:
         return act
 
     def _count_picks(self, which: Index, act: Index) -> Flags:
-        """Count picks from the clutter and what they left; return which moves are picks."""
+        """Count picks from the clutter and their risks; return which moves are picks."""
         rows, shape = self._batch.rows, self._batch.shape
         picked = act < shape.n_cells * shape.n_colours
         from_clutter, cells = which[picked], act[picked] // shape.n_colours
@@ -219,7 +220,7 @@ class _Run:
         return np.asarray(picked)
 
     def _disturb(self, which: Index) -> None:
-        """Let people interfere; what was left to do before is no longer asked for."""
+        """Apply interferences; the rest of the previous part is removed from the minimum."""
         rows = self._batch.rows
         moves = rows.moves[which] - self._moves_before[which]
         due = which[self._script.due(which, moves, rows.outcome[which] == SUCCESS)]
@@ -233,16 +234,16 @@ class _Run:
         self._begin(due)
 
     def _observe(self, which: Index, moved: Flags) -> None:
-        """Take in what the attempts gave, in rows that go on as they did."""
+        """Update the progress monitor in running environments without interference."""
         rows = self._batch.rows
         same = (rows.outcome[which] == RUNNING) & (self._since[which] > 0)
-        looked = which[same]
+        observed = which[same]
         called, repeated = self._monitor.observe_transitions(
-            looked, state_keys(rows, looked), moved[same]
+            observed, state_keys(rows, observed), moved[same]
         )
         self._called[called] = True
         self._repeated[called[repeated]] = True
-        if self._obey:
+        if self._fallback:
             self._since[called] = 0
 
 
@@ -251,18 +252,38 @@ def run_episodes(
     choose: Chooser,
     *,
     script: Script | None = None,
-    obey: bool = False,
+    fallback: bool = False,
     only: Flags | None = None,
 ) -> SortingEpisodes:
-    """Run the episodes of a batch that :func:`endless_batch` gave and somebody started.
+    """Run the episodes of a batch to their ends.
 
     Args:
-        batch: Rows at their starts.
-        choose: Who decides.
-        script: What people do; by default nobody does anything.
-        obey: Whether the exact planner takes over where the rule calls for it.
-        only: Rows that are run, shape (n_envs,); the others count as lost at once.
+        batch: Environments at their starts, with the horizon factor ENDLESS.
+        choose: Policy.
+        script: Interferences; none by default.
+        fallback: Whether the exact planner replaces the policy after a planner fallback.
+        only: Environments to run, shape (n_envs,); the others time out at once.
     """
     if only is not None:
         batch.rows.outcome[~only] = TIMEOUT
-    return _Run(batch, choose, script or Undisturbed(), obey).to_the_end()
+    return _Run(batch, choose, script or Undisturbed(), fallback).run()
+
+
+def run_with_fallback(
+    started: Callable[[], SortingBatch],
+    choose: Chooser,
+    script: Callable[[], Script] = Undisturbed,
+) -> tuple[SortingEpisodes, SortingEpisodes]:
+    """Return the same episodes without and with planner fallback.
+
+    Args:
+        started: Returns the batch with all environments at their starts.
+        choose: Policy.
+        script: Returns the interferences of one run.
+    """
+    alone = run_episodes(started(), choose, script=script())
+    called = alone.planner_fallback
+    if not called.any():
+        return alone, alone
+    again = run_episodes(started(), choose, script=script(), fallback=True, only=called)
+    return alone, alone.replaced(again, called)

@@ -1,23 +1,24 @@
 """Protocol ``sorting-grid``: every pair of object and goal numbers (METHOD 1.5).
 
-For every pair ``1 <= K_G <= K_E <= K``, the same episodes in every row of a kind:
+For every pair ``1 <= K_G <= K_E <= K``, with the same episodes in all rows of one start:
 
-=======================  ===================================================================
-``clean``                the policy alone, from starts with everything in the clutter
-``disturbed``            the same from starts with junk on towers and goals partly built
-``clean-planner-fallback``       the policy until it goes in circles, then the exact planner
-``disturbed-planner-fallback``   the same from disturbed starts
-``clean-planner``        the exact planner alone, a yardstick
-``disturbed-planner``    the same from disturbed starts
-=======================  ===================================================================
+==============================  ============================================================
+``clean``                       the policy alone, from starts with everything in the clutter
+``disturbed``                   the same from starts with junk on towers and partly built goals
+``clean-planner-fallback``      the policy until it cycles, then the exact planner
+``disturbed-planner-fallback``  the same from disturbed starts
+``clean-planner``               the exact planner alone: the optimal baseline
+``disturbed-planner``           the same from disturbed starts
+==============================  ============================================================
 
-Episodes are cut off after 4 K attempts; a hand-over counts them again.
+Episodes end after 4 K attempts; a planner fallback restarts the count.
 
-Source: thesis 3.4.2, fig. 3.2. Deviates: disturbed starts, hand-over and yardstick are ours.
+Source: thesis 3.4.2, fig. 3.2. Deviates: disturbed starts, planner fallback and optimal
+baseline are ours.
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,7 @@ from app.policies.evaluation.sorting.episodes import (
     greedy,
     joined,
     run_episodes,
+    run_with_fallback,
 )
 from app.policies.evaluation.sorting.optimal_baseline import choose_by_planner
 from app.policies.evaluation.sorting.pairs import SMALL, grid_batches, pairs_of
@@ -42,56 +44,47 @@ from app.sim.sorting.state import SortingShape
 
 STARTS: Mapping[str, float] = {"clean": 0.0, "disturbed": 1.0}
 """Share of disturbed starts by the kind of row."""
-WHO = ("", "-planner-fallback", "-planner")
-"""Who decides, as the end of a row's name."""
+DECIDERS = ("", "-planner-fallback", "-planner")
+"""Suffixes of row names: policy, policy with planner fallback, exact planner."""
 
 
 def episodes_for(shape: SortingShape) -> int:
-    """Return how many episodes per pair are run by default."""
+    """Return the default number of episodes per pair."""
     return 1000 if shape.n_cells <= SMALL else 300
 
 
 def least_success(shape: SortingShape) -> float:
-    """Return the success rate below which no pair may be."""
+    """Return the required success rate of each pair."""
     return 0.99 if shape.n_cells <= SMALL else 0.98
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Kind:
-    """Episodes of one kind of start, by everybody who decides."""
+def run_kind(batches: Iterable[SortingBatch], choose: Chooser) -> tuple[SortingEpisodes, ...]:
+    """Return the episodes of batches for each of DECIDERS.
 
-    alone: SortingEpisodes
-    """The policy."""
-    handed: SortingEpisodes
-    """The policy, with hand-over."""
-    planned: SortingEpisodes
-    """The exact planner."""
-
-
-def run_kind(batches: Iterable[SortingBatch], choose: Chooser) -> Kind:
-    """Run started batches by a policy, with hand-over, and by the exact planner."""
-    alone, handed, planned = [], [], []
+    Args:
+        batches: Batches at their starts.
+        choose: Policy.
+    """
+    found = []
     for batch in batches:
-        alone.append(run_episodes(batch, choose))
-        handed.append(alone[-1])
-        called = alone[-1].planner_fallback
-        if called.any():
+
+        def restarted(batch: SortingBatch = batch) -> SortingBatch:
             batch.reset()
-            again = run_episodes(batch, choose, obey=True, only=called)
-            handed[-1] = alone[-1].with_those(again, called)
-        batch.reset()
-        planned.append(run_episodes(batch, choose_by_planner))
-    return Kind(alone=joined(alone), handed=joined(handed), planned=joined(planned))
+            return batch
+
+        policy = run_with_fallback(restarted, choose)
+        found.append((*policy, run_episodes(restarted(), choose_by_planner)))
+    return tuple(joined(list(episodes)) for episodes in zip(*found, strict=True))
 
 
 def row_of(name: str, episodes: SortingEpisodes, pairs: Index, least: float) -> dict[str, Any]:
     """Return a row of the result.
 
     Args:
-        name: Of the row.
-        episodes: As many of each pair, in the order of ``pairs``.
-        pairs: Every (K_E, K_G), shape (n_pairs, 2).
-        least: Success rate below which no pair may be.
+        name: Name of the row.
+        episodes: Equal numbers of episodes of each pair, in the order of ``pairs``.
+        pairs: All (K_E, K_G), shape (n_pairs, 2).
+        least: Required success rate of each pair.
     """
     n, won = len(episodes.success), episodes.success
     each = np.arange(n).reshape(len(pairs), -1)
@@ -127,9 +120,9 @@ def row_of(name: str, episodes: SortingEpisodes, pairs: Index, least: float) -> 
 def pair_of(
     n_objects: int, n_goal: int, episodes: SortingEpisodes, least: float
 ) -> dict[str, Any]:
-    """Return what the heat maps show of a pair, and whether it is below ``least``.
+    """Return success and return of a pair, and whether its success rate is below ``least``.
 
-    It is when the upper bound of its success rate is.
+    The comparison uses the upper bound of the success rate.
     """
     success = wilson(int(episodes.success.sum()), len(episodes.success))
     return {
@@ -142,7 +135,7 @@ def pair_of(
 
 
 def share(hits: Index, of: Index) -> dict[str, float] | None:
-    """Return a rate over all episodes together, or None where there is nothing to count."""
+    """Return a rate over all episodes; None if ``of`` is zero."""
     total = int(of.sum())
     return wilson(int(hits.sum()), total) if total else None
 
@@ -159,21 +152,21 @@ def grid(
 
     Args:
         values: Q of every move, from observations.
-        shape: How large the task is.
+        shape: Size of the task.
         fail: Failure probabilities of the clutter cells, shape (K,).
         episodes: Number of episodes per pair and row; by default 1000 for up to 10 cells and
             300 for more.
-        seed: Seed of the episodes; use one that nothing was tuned on.
-        on_row: Told of each row once it is known.
+        seed: Seed of the episodes; use one that was not used for tuning.
+        on_row: Callback for each finished row.
     """
     per_pair = episodes or episodes_for(shape)
     pairs, least, choose = pairs_of(shape), least_success(shape), greedy(values)
     rows: list[dict[str, Any]] = []
     for start, disturbed in STARTS.items():
         found = run_kind(grid_batches(shape, fail, per_pair, seed, disturbed), choose)
-        for end, part in zip(WHO, (found.alone, found.handed, found.planned), strict=True):
+        for end, part in zip(DECIDERS, found, strict=True):
             rows.append(row_of(start + end, part, pairs, least))
-            on_row(len(rows), len(WHO) * len(STARTS), rows[-1])
+            on_row(len(rows), len(DECIDERS) * len(STARTS), rows[-1])
     return {
         "episodes": per_pair,
         "settings": {
@@ -186,7 +179,7 @@ def grid(
 
 
 def settings_of(shape: SortingShape, fail: Vec) -> dict[str, Any]:
-    """Return what a result states of its episodes."""
+    """Return the settings stated with a result."""
     return {
         **asdict(shape),
         "horizon_attempts": round(HORIZON_FACTOR * shape.n_cells),

@@ -21,25 +21,25 @@ def _work(shape: SortingShape) -> PlannerWork:
 
 
 def measure(batch: SortingBatch, which: Index) -> tuple[Index, NDArray[np.float64]]:
-    """Return the fewest moves to the goal and the attempts to be expected, shape (m,) each.
+    """Return the fewest moves to the goal and the expected attempts, shape (m,) each.
 
     Args:
         batch: Tasks.
-        which: Rows that are measured, shape (m,).
+        which: Environments, shape (m,).
 
     Raises:
-        SimulationError: A goal that the objects cannot meet.
+        SimulationError: The objects of an environment cannot form its goal.
     """
     fewest, attempts = np.zeros(len(which), dtype=np.int64), np.zeros(len(which))
     measure_rows(batch.rows, which, _work(batch.shape), fewest, attempts)
     if (fewest < 0).any():
         e = int(which[fewest.argmin()])
-        raise SimulationError(f"row {e} of seed {batch.seed}: its goal cannot be met")
+        raise SimulationError(f"environment {e} of seed {batch.seed}: goal is unreachable")
     return fewest, attempts
 
 
 def choose_by_planner(batch: SortingBatch, which: Index) -> Index:
-    """Choose the moves of some rows as the exact planner does; none of them at its goal."""
+    """Select the moves of the exact planner in environments that are not at their goals."""
     rows, best = batch.rows, np.zeros(len(which), dtype=np.int64)
     tasks = TaskBatch(
         clutter=rows.clutter[which],

@@ -1,4 +1,4 @@
-"""Episodes of every pair (K_E, K_G): so many objects, of which so many are in the goal.
+"""Episodes of every pair (K_E, K_G): numbers of objects, and of objects in the goal.
 
 Source: METHOD 1.5.
 """
@@ -13,9 +13,9 @@ from app.sim.sorting.batch import SortingBatch, SortingSettings
 from app.sim.sorting.state import SortingShape
 
 CHUNK = 4000
-"""Episodes that are run together."""
+"""Maximum number of environments of a batch."""
 SMALL = 10
-"""Clutter cells up to which the figures of the smaller task hold."""
+"""Maximum number of clutter cells of the smaller task."""
 
 
 def pairs_of(shape: SortingShape) -> Index:
@@ -27,7 +27,7 @@ def pairs_of(shape: SortingShape) -> Index:
 def grid_batches(
     shape: SortingShape, fail: Vec, per_pair: int, seed: int, disturbed: float
 ) -> Iterator[SortingBatch]:
-    """Give batches that together hold ``per_pair`` episodes of every pair, in their order."""
+    """Yield batches with ``per_pair`` episodes of every pair, in the order of the pairs."""
     pairs = np.repeat(pairs_of(shape), per_pair, axis=0)
     settings = SortingSettings(horizon_factor=ENDLESS, disturbed_share=disturbed)
     for first in range(0, len(pairs), CHUNK):

@@ -1,9 +1,10 @@
 """Protocols ``sorting-grid`` and ``sorting-tests`` of a checkpoint (METHOD 1.5).
 
-What they measure is told in ``grid.py`` and ``benchmark_tasks.py``. The task and its
-failure probabilities are those of the cell the policy was trained in.
+``grid.py`` and ``benchmark_tasks.py`` define the rows. The task and its failure probabilities
+are those of the policy's training cell.
 """
 
+from collections.abc import Callable
 from typing import Any
 
 from app.policies.checkpoints.checkpoint import Checkpoint
@@ -21,16 +22,13 @@ def run_grid(
     """Evaluate a sorting policy on every pair (K_E, K_G).
 
     Args:
-        checkpoint: What decides.
+        checkpoint: Policy.
         episodes: Number of episodes per pair and row, by default 1000 for up to 10 cells and
             300 for more.
-        seed: Seed of the episodes; use one that nothing was tuned on.
-        on_row: Told of each row once it is known.
+        seed: Seed of the episodes; use one that was not used for tuning.
+        on_row: Callback for each finished row.
     """
-    policy = SortingPolicy(checkpoint)
-    fail = fail_of(cell_of(checkpoint.manifest))
-    found = grid(policy.values, policy.shape, fail, episodes, seed, on_row)
-    return {**found, "settings": {"cell": policy.cell, **found["settings"]}}
+    return _run(grid, checkpoint, episodes, seed, on_row)
 
 
 def run_tests(
@@ -39,12 +37,23 @@ def run_tests(
     """Evaluate a sorting policy in the six tests.
 
     Args:
-        checkpoint: What decides.
+        checkpoint: Policy.
         episodes: Number of episodes per test, by default 1000.
-        seed: Seed of the episodes; use one that nothing was tuned on.
-        on_row: Told of each row once it is known.
+        seed: Seed of the episodes; use one that was not used for tuning.
+        on_row: Callback for each finished row.
     """
+    return _run(trials, checkpoint, episodes, seed, on_row)
+
+
+def _run(
+    protocol: Callable[..., dict[str, Any]],
+    checkpoint: Checkpoint,
+    episodes: int | None,
+    seed: int,
+    on_row: OnRow,
+) -> dict[str, Any]:
+    """Run a protocol with the task of a checkpoint; the result states the cell."""
     policy = SortingPolicy(checkpoint)
     fail = fail_of(cell_of(checkpoint.manifest))
-    found = trials(policy.values, policy.shape, fail, episodes, seed, on_row)
+    found = protocol(policy.values, policy.shape, fail, episodes, seed, on_row)
     return {**found, "settings": {"cell": policy.cell, **found["settings"]}}

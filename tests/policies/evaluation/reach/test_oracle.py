@@ -1,11 +1,16 @@
-"""The ceiling is at or above the policy, of the very episodes that ``reach-targets`` plays."""
+"""Tests of the oracle search over the episodes of ``reach-targets``."""
 
 import numpy as np
 import pytest
 
-from app.policies.evaluation.reach import oracle as reach_ceiling
-from app.policies.evaluation.reach.episodes import play, target_goals
-from app.policies.evaluation.reach.oracle import Ceiling, soonest_arrivals, started, verdict
+from app.policies.evaluation.reach import oracle as reach_oracle
+from app.policies.evaluation.reach.episodes import run_episodes, target_goals
+from app.policies.evaluation.reach.oracle import (
+    StagedSearch,
+    soonest_arrivals,
+    started,
+    verdict,
+)
 from app.policies.evaluation.registry import evaluate
 from app.sim.cells.cell import load_cell
 from app.sim.reach.batch import ReachSettings, goal_region_of
@@ -19,46 +24,48 @@ TARGETS = goal_region_of(CELL).targets()
 RULES = ReachSettings()
 
 
-def test_the_first_states_are_those_of_the_episodes_played():
+def test_the_first_states_are_those_of_the_episodes():
     goals = target_goals(TARGETS, 530)
     search = OracleSearch(started(CELL, RULES, goals, 6), 1, 600)
     search.undisturbed(Straight().acts)
-    played = play(CELL, RULES, Straight(), goals, 6)
-    np.testing.assert_array_equal(search.resimulations.reached > 0, played.outcome == SUCCESS)
+    found = run_episodes(CELL, RULES, Straight(), goals, 6)
+    np.testing.assert_array_equal(search.resimulations.reached > 0, found.outcome == SUCCESS)
 
 
 @pytest.fixture
 def short(monkeypatch) -> None:
-    monkeypatch.setattr(reach_ceiling, "SCRIPTED", (6, 6))
-    monkeypatch.setattr(reach_ceiling, "DISTURBED", 2)
-    monkeypatch.setattr(reach_ceiling, "LONG", 6)
-    monkeypatch.setattr(reach_ceiling, "SOONEST_TRIES", 8)
+    monkeypatch.setattr(reach_oracle, "SCRIPTED", (6, 6))
+    monkeypatch.setattr(reach_oracle, "DISTURBED", 2)
+    monkeypatch.setattr(reach_oracle, "LONG", 6)
+    monkeypatch.setattr(reach_oracle, "SOONEST_TRIES", 8)
 
 
 @pytest.mark.usefixtures("short")
 def test_every_stage_solves_as_much_or_more():
-    goals, told = target_goals(TARGETS, 54), []
-    ceiling = Ceiling(started(CELL, RULES, goals, 6), 1, 5, lambda *row: told.append(row))
-    ceiling.run(Straight())
-    solved = [row["solved"]["mean"] for row in ceiling.rows]
+    goals, reported = target_goals(TARGETS, 54), []
+    staged = StagedSearch(
+        started(CELL, RULES, goals, 6), 1, 5, lambda *row: reported.append(row)
+    )
+    staged.run(Straight())
+    solved = [row["solved"]["mean"] for row in staged.rows]
     assert solved == sorted(solved)
     assert solved[-1] > solved[0] + 0.05
-    assert [row["name"] for row in ceiling.rows] == [row["name"] for _, _, row in told]
+    assert [row["name"] for row in staged.rows] == [row["name"] for _, _, row in reported]
     never = np.zeros(54, dtype=bool)
-    row = verdict(ceiling.search, never, TARGETS, goals)
+    row = verdict(staged.search, never, TARGETS, goals)
     assert row["solvable"]["mean"] + row["undecided"]["mean"] == pytest.approx(1.0)
     assert row["doomed"]["mean"] <= 1.0 - row["solvable"]["mean"] + 1e-9
 
 
 @pytest.mark.usefixtures("short")
-def test_nobody_arrives_sooner_than_with_nobody_there():
+def test_earliest_arrivals_without_people_are_plausible():
     goals = target_goals(TARGETS, 54)
     soonest = soonest_arrivals(CELL, RULES, goals, 6)
     assert (soonest > 0.3).all() and (soonest < 4.0).all()
 
 
 @pytest.mark.usefixtures("short")
-def test_the_protocol_tells_what_is_possible():
+def test_the_protocol_reports_solvable_episodes():
     result = evaluate("reach-oracle", untrained_reach(width=16), episodes=1, seed=6)
     (row,) = result["results"]
     assert row["n"] == result["episodes"] == 54

@@ -1,4 +1,4 @@
-"""What is measured of paths: limits, and jumps where pieces meet."""
+"""Tests of measures of joint trajectories: limits, and steps at segment boundaries."""
 
 from dataclasses import replace
 
@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 from app.policies.evaluation.reach.episodes import target_goals
-from app.policies.evaluation.reach.smoothness import Paths, drive, measure, shown_episode
+from app.policies.evaluation.reach.smoothness import (
+    Paths,
+    measure,
+    record_paths,
+    shown_episode,
+)
 from app.sim.cells.cell import load_cell
 from app.sim.reach.batch import ReachBatch, ReachSettings
 from app.sim.robot.actions import ActionSettings
@@ -20,7 +25,7 @@ GOALS = target_goals(CELL.goal_region.targets(), 20)
 def driven(degree: int) -> tuple[Paths, ReachBatch]:
     settings = ReachSettings(action=ActionSettings(degree=degree))
     batch = ReachBatch(CELL, len(GOALS), 5, settings)
-    return drive(batch, Straight(), GOALS), batch
+    return record_paths(batch, Straight(), GOALS), batch
 
 
 @pytest.fixture(scope="module", params=[2, 3])

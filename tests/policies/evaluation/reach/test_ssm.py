@@ -1,4 +1,4 @@
-"""Policies and planners are compared on equal terms, and every run is counted."""
+"""Tests of the comparison of policies and planners under the safety layer."""
 
 from dataclasses import replace
 
@@ -7,15 +7,14 @@ import pytest
 
 from app.policies.checkpoints import pretrained
 from app.policies.evaluation.reach import ssm as reach_ssm
-from app.policies.evaluation.reach.ssm import (
-    CAP_S,
+from app.policies.evaluation.reach.ssm_crossings import (
+    DEFAULT_SETTINGS,
     PLANNERS,
     Comparison,
-    against,
-    best_replays,
-    course_row,
-    picked,
+    ComparisonSettings,
+    best_resimulations,
 )
+from app.policies.evaluation.reach.ssm_rows import against, crossing_row, selected
 from app.policies.evaluation.registry import evaluate
 from app.sim.cells.cell import load_cell
 from app.sim.planning.ompl_planners import PlanSettings
@@ -26,6 +25,7 @@ from tests.policies.straight_controller import Straight
 from tests.sim.recorded_motion import recorded
 
 CELL = load_cell("shared-workspace")
+LIMIT_S = DEFAULT_SETTINGS.time_limit_s
 
 
 @pytest.fixture(scope="module")
@@ -39,69 +39,74 @@ def straight(comparison):
 
 
 def test_every_run_counts_and_the_layer_keeps_every_link_in_motion_apart(straight):
-    row = course_row("policy", straight.runs)
+    row = crossing_row("policy", straight.episodes, LIMIT_S)
     assert row["n"] == 6
     assert row["contacts_moving"] == 0
     assert row["contacts"] == row["contacts_at_rest"]
-    late = 6 - int(straight.runs.arrived.sum())
-    total = straight.runs.seconds[straight.runs.arrived].sum() + late * CAP_S
+    late = 6 - int(straight.episodes.arrived.sum())
+    total = straight.episodes.seconds[straight.episodes.arrived].sum() + late * LIMIT_S
     assert row["time_capped_s"]["mean"] == pytest.approx(total / 6)
     assert row["below_half_s"]["mean"] >= row["stopped_s"]["mean"] > 0.0
-    assert row["stopped_s"]["mean"] >= row["held_s"]["mean"] > 0.0
-    assert row["never_held"]["mean"] >= row["never_stopped"]["mean"]
+    assert row["stopped_s"]["mean"] >= row["standstill_stopped_s"]["mean"] > 0.0
+    assert row["never_at_standstill"]["mean"] >= row["never_stopped"]["mean"]
 
 
-def test_the_overrides_told_are_those_counted(straight):
-    for number, course in enumerate(straight.overrides):
-        assert (course <= 0.0).sum() * 0.02 == pytest.approx(straight.runs.stopped_s[number])
-        assert len(course) * 0.02 == pytest.approx(straight.runs.seconds[number])
+def test_the_overrides_are_those_counted(straight):
+    for number, overrides in enumerate(straight.overrides):
+        assert (overrides <= 0.0).sum() * 0.02 == pytest.approx(
+            straight.episodes.stopped_s[number]
+        )
+        assert len(overrides) * 0.02 == pytest.approx(straight.episodes.seconds[number])
 
 
-def test_with_nobody_there_it_is_never_slowed(comparison):
-    runs = comparison.policy(Straight(), alone=True).runs
+def test_without_people_the_robot_is_never_slowed(comparison):
+    runs = comparison.policy(Straight(), no_person=True).episodes
     assert runs.arrived.all()
-    assert course_row("alone", runs)["never_stopped"]["mean"] == 1.0
+    assert crossing_row("policy-no-person", runs, LIMIT_S)["never_stopped"]["mean"] == 1.0
 
 
-def test_hindsight_takes_the_soonest_run_that_nobody_touches(comparison, straight):
-    found = best_replays(comparison, 12, np.random.default_rng(2))
+def test_the_oracle_takes_the_earliest_run_without_contact(comparison, straight):
+    found = best_resimulations(comparison, 12, np.random.default_rng(2))
     best, free = found["oracle"], found["oracle-least-stopped"]
     assert free.arrived.all()
     assert (free.stopped_s <= best.stopped_s + 1e-3 * best.seconds + 1e-9).all()
     assert free.stopped_s.sum() < best.stopped_s.sum()
-    alone = comparison.policy(Straight(), alone=True).runs
+    undisturbed = comparison.policy(Straight(), no_person=True).episodes
     assert best.arrived.all() and not best.touched_at_rest.any()
-    assert straight.runs.touched_at_rest.any()
-    assert (best.seconds > 0.7 * alone.seconds).all()
+    assert straight.episodes.touched_at_rest.any()
+    assert (best.seconds > 0.7 * undisturbed.seconds).all()
 
 
-def test_a_saving_is_paired_and_counts_who_does_not_arrive(straight):
-    same = against(straight.runs, straight.runs)
+def test_a_saving_is_paired_and_counts_runs_that_do_not_arrive(straight):
+    same = against(straight.episodes, straight.episodes, LIMIT_S)
     assert same["all"]["saved_s"]["mean"] == 0.0
     assert same["all"]["n"] == 6
-    half = picked(straight.runs, np.arange(3))
-    assert against(half, half)["all"]["n"] == 3
+    half = selected(straight.episodes, np.arange(3))
+    assert against(half, half, LIMIT_S)["all"]["n"] == 3
 
 
 def test_the_protocol_runs_policy_planners_recordings_and_random_episodes(monkeypatch):
-    monkeypatch.setattr(reach_ssm, "N_HINDSIGHT", 4)
     short = PlanSettings(planner="rrt-star", budget_s=0.02)
     few = {
         name: replace(PLANNERS[name], plan=short)
         for name in ("rrtstar-once", "replan-every-cycle")
     }
-    monkeypatch.setattr(reach_ssm, "PLANNERS", few)
-    monkeypatch.setattr(reach_ssm, "ALONE", few["rrtstar-once"])
-    monkeypatch.setattr(reach_ssm, "CAP_S", 3.0)
+    settings = ComparisonSettings(
+        planners=few,
+        without_people=few["rrtstar-once"],
+        n_resimulations=4,
+        time_limit_s=3.0,
+    )
+    monkeypatch.setattr(reach_ssm, "SETTINGS", settings)
     monkeypatch.setattr(reach_ssm, "RANDOM_S", 0.5)
-    told = []
+    reported = []
     result = evaluate(
         "reach-ssm",
         pretrained.load("reach"),
         episodes=2,
         seed=3,
         motions=[recorded(4.0, walk=2.4, turn=0.0)],
-        on_row=lambda *row: told.append(row),
+        on_row=lambda *row: reported.append(row),
     )
     names = [row["name"] for row in result["results"]]
     assert names[:4] == ["policy", "policy-rollout", "rrtstar-once", "replan-every-cycle"]
@@ -115,7 +120,7 @@ def test_the_protocol_runs_policy_planners_recordings_and_random_episodes(monkey
         and "policy-rollout-recorded-directed" in names
     )
     assert names[-3:] == ["random", "random-still", "random-directed"]
-    assert [total for _, total, _ in told] == [len(names)] * len(names)
+    assert [total for _, total, _ in reported] == [len(names)] * len(names)
     assert all(
         row["contacts_moving"] == 0 for row in result["results"] if "no-ssm" not in row["name"]
     )

@@ -1,4 +1,4 @@
-"""What a policy is shown of people behind a tracker, and that they stay where they are."""
+"""Tests of policies that observe people through a tracker."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ N = 8
 
 
 class Watching(Straight):
-    """Notes what it is shown."""
+    """Controller that records what it observes."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -32,7 +32,7 @@ class Watching(Straight):
 def watched(
     row: CylinderSensorRow | None, steps: int = 40
 ) -> tuple[Watching, np.ndarray, ReachBatch]:
-    """Run some steps; returns who watched, and where the people really were."""
+    """Run some steps; return the controller, the true people and the batch."""
     batch = ReachBatch(load_cell("shared-workspace"), N, 5, ReachSettings())
     batch.reset()
     watching, true = Watching(), []
@@ -72,14 +72,14 @@ def test_prediction_beats_the_newest_frame() -> None:
     assert off(*watched(ROWS["100ms"])[:2]) < off(*watched(ROWS["100ms-not-predicted"])[:2])
 
 
-def test_distances_are_told_to_the_people_that_are_shown() -> None:
+def test_clearances_are_those_to_the_observed_people() -> None:
     watching, _, _ = watched(ROWS["200ms-noise"])
     exact, _, _ = watched(None)
     assert not np.allclose(watching.clear[-1], exact.clear[-1], atol=1e-3)
     assert not np.array_equal(watching.obs[0], exact.obs[0])
 
 
-def test_who_does_not_look_moves_as_if_there_were_no_tracker() -> None:
+def test_a_controller_without_observation_moves_as_without_tracker() -> None:
     _, _, seen = watched(ROWS["200ms-noise"])
     _, _, alone = watched(None)
     np.testing.assert_array_equal(seen.state.q, alone.state.q)

@@ -1,11 +1,11 @@
-"""The six tests as a protocol: who passes them, and what the person does when."""
+"""Tests of the six benchmark tasks: success, and interferences of the script."""
 
 import numpy as np
 import pytest
 
 from app.errors import InvalidInput
 from app.policies.evaluation.sorting.benchmark_tasks import (
-    Person,
+    ScriptedInterferences,
     row_of,
     run_test,
     start_test,
@@ -24,8 +24,8 @@ FAIL = np.linspace(0.0, 0.4, 10)
 
 @pytest.mark.parametrize("test", TESTS, ids=lambda test: test.name)
 def test_the_exact_planner_passes_with_the_fewest_moves(test):
-    alone, handed = run_test(test, choose_by_planner, SHAPE, FAIL, 60, 4)
-    for found in (alone, handed):
+    alone, with_fallback = run_test(test, choose_by_planner, SHAPE, FAIL, 60, 4)
+    for found in (alone, with_fallback):
         assert found.success.all()
         assert np.array_equal(found.moves, found.fewest)
         assert found.riskier.sum() == 0
@@ -38,7 +38,7 @@ def test_the_person_does_everything_once_and_a_goal_is_not_the_end_before(name):
     batch = SortingBatch(SHAPE, FAIL, n, 4, SortingSettings(horizon_factor=ENDLESS))
     start_test(batch, test, FAIL, 4)
     before = [batch.state_of(e) for e in range(n)]
-    found = run_episodes(batch, choose_by_planner, script=Person(test, n, 4))
+    found = run_episodes(batch, choose_by_planner, script=ScriptedInterferences(test, n, 4))
     for e in range(n):
         after = batch.state_of(e)
         assert after.solved
@@ -48,18 +48,18 @@ def test_the_person_does_everything_once_and_a_goal_is_not_the_end_before(name):
 
 
 def test_the_person_comes_after_so_many_moves_or_at_the_goal():
-    person = Person(sorting_test("test-5"), 4, 1)
+    script = ScriptedInterferences(sorting_test("test-5"), 4, 1)
     which, moves = np.arange(4), np.array([0, 1, 0, 3])
-    due = person.due(which, moves, np.array([False, False, True, False]))
+    due = script.due(which, moves, np.array([False, False, True, False]))
     assert due.tolist() == [False, True, True, True]
-    person._next[:] = 1
-    due = person.due(which, moves, np.array([False, False, True, False]))
+    script._next[:] = 1
+    due = script.due(which, moves, np.array([False, False, True, False]))
     assert due.tolist() == [False, False, True, False]
-    person._next[:] = 2
-    assert not person.due(which, moves, np.ones(4, dtype=bool)).any()
+    script._next[:] = 2
+    assert not script.due(which, moves, np.ones(4, dtype=bool)).any()
 
 
-def test_who_takes_the_riskier_duplicate_is_seen_in_the_third_test():
+def test_riskier_duplicates_are_counted_in_the_third_test():
     choose = greedy(values_of(riskily, SHAPE))
     row = row_of("test-3", run_test(sorting_test("test-3"), choose, SHAPE, FAIL, 20, 4)[0])
     assert row["success"]["mean"] == row["fewest"]["mean"] == 1.0
@@ -84,16 +84,16 @@ def test_a_move_too_many_in_any_part_is_not_the_fewest():
     assert found.moves[0] > found.fewest[0]
 
 
-def test_rows_are_told_in_order_and_hand_over_ends_what_goes_in_circles():
-    told = []
+def test_rows_are_reported_in_order_and_the_fallback_ends_cycles():
+    reported = []
     found = trials(
-        values_of(in_circles, SHAPE), SHAPE, FAIL, 4, 6, lambda *what: told.append(what)
+        values_of(in_circles, SHAPE), SHAPE, FAIL, 4, 6, lambda *what: reported.append(what)
     )
     names = [test.name for test in TESTS]
     rows = {row["name"]: row for row in found["results"]}
     assert list(rows) == names + [f"{name}-planner-fallback" for name in names]
-    assert [(done, total) for done, total, _ in told] == [(k + 1, 12) for k in range(12)]
-    assert [row for _, _, row in told] == found["results"]
+    assert [(done, total) for done, total, _ in reported] == [(k + 1, 12) for k in range(12)]
+    assert [row for _, _, row in reported] == found["results"]
     for name in names:
         assert rows[name]["success"]["mean"] == 0.0
         assert rows[f"{name}-planner-fallback"]["success"]["mean"] == 1.0

@@ -32,9 +32,9 @@ def batch_of(n: int, fail=FAIL, **settings) -> SortingBatch:
     return batch
 
 
-def played(choice, n=200, obey=False, **settings) -> SortingEpisodes:
+def played(choice, n=200, fallback=False, **settings) -> SortingEpisodes:
     batch = batch_of(n, **settings)
-    return run_episodes(batch, greedy(values_of(choice, SHAPE)), obey=obey)
+    return run_episodes(batch, greedy(values_of(choice, SHAPE)), fallback=fallback)
 
 
 @pytest.mark.parametrize("disturbed", [0.0, 1.0])
@@ -95,8 +95,8 @@ def test_a_policy_in_circles_runs_out_of_attempts():
     assert found.planner_fallback[lost].all() and found.repeated[lost].any()
 
 
-def test_with_hand_over_the_planner_ends_what_went_in_circles():
-    found = played(in_circles, n=30, obey=True, n_objects=4)
+def test_the_planner_fallback_ends_cycles():
+    found = played(in_circles, n=30, fallback=True, n_objects=4)
     assert found.success.all()
     assert found.planner_fallback.sum() > 20 and found.repeated.any()
     assert (found.moves[found.repeated] > found.fewest[found.repeated]).all()
@@ -113,7 +113,7 @@ def test_only_the_rows_asked_for_are_run():
 def test_episodes_are_joined_and_replaced_by_row():
     one, other = played(exactly, n=6), played(in_circles, n=6, n_objects=4)
     where = np.arange(6) < 2
-    mixed = one.with_those(other, where)
+    mixed = one.replaced(other, where)
     assert mixed.attempts.tolist() == [*other.attempts[:2], *one.attempts[2:]]
     both = joined([one, other])
     assert np.array_equal(both.part(slice(6, 12)).moves, other.moves)

@@ -74,7 +74,7 @@ def test_riskier_picks_are_a_share_of_all_picks():
     assert row["riskier_pick"]["mean"] == 3 / 15
 
 
-def test_where_nobody_wins_there_is_no_ratio_and_without_picks_no_share():
+def test_without_success_there_is_no_ratio_and_without_picks_no_share():
     lost = np.zeros(4, dtype=bool)
     row = row_of("clean", episodes(success=lost), PAIRS, 0.99)
     assert row["moves_over_minimum"] is None and row["attempts_over_expected"] is None
@@ -110,15 +110,17 @@ def test_episodes_are_the_same_however_they_are_cut_into_batches(monkeypatch):
     assert np.array_equal(whole.attempts, np.concatenate([one.attempts for one in parts]))
 
 
-def test_rows_are_told_in_order_and_the_planner_needs_no_hand_over():
-    told = []
-    found = grid(values_of(exactly, SHAPE), SHAPE, FAIL, 3, 5, lambda *what: told.append(what))
+def test_rows_are_reported_in_order_and_the_planner_needs_no_fallback():
+    reported = []
+    found = grid(
+        values_of(exactly, SHAPE), SHAPE, FAIL, 3, 5, lambda *what: reported.append(what)
+    )
     names = [
         f"{a}{b}" for a in ("clean", "disturbed") for b in ("", "-planner-fallback", "-planner")
     ]
     assert [row["name"] for row in found["results"]] == names
-    assert [(done, total) for done, total, _ in told] == [(k + 1, 6) for k in range(6)]
-    assert [row for _, _, row in told] == found["results"]
+    assert [(done, total) for done, total, _ in reported] == [(k + 1, 6) for k in range(6)]
+    assert [row for _, _, row in reported] == found["results"]
     for row in found["results"]:
         assert (row["n"], row["success"]["mean"], row["exactly_minimal"]["mean"]) == (30, 1, 1)
         assert row["repeated"]["mean"] == row["riskier_pick"]["mean"] == 0.0
@@ -126,15 +128,17 @@ def test_rows_are_told_in_order_and_the_planner_needs_no_hand_over():
     assert found["settings"]["horizon_attempts"] == 16
 
 
-def test_with_hand_over_every_goal_is_reached_by_whoever_goes_in_circles():
+def test_with_fallback_a_cycling_policy_reaches_every_goal():
     found = grid(values_of(in_circles, SHAPE), SHAPE, FAIL, 3, 5)["results"]
     rows = {row["name"]: row for row in found}
     for start in ("clean", "disturbed"):
-        alone, handed = rows[start], rows[f"{start}-planner-fallback"]
+        alone, with_fallback = rows[start], rows[f"{start}-planner-fallback"]
         assert alone["success"]["mean"] < 0.5
-        assert handed["success"]["mean"] == 1.0
-        assert handed["planner_fallback"]["mean"] == alone["planner_fallback"]["mean"] > 0.5
-        assert handed["moves_over_minimum"]["mean"] > 1.1
+        assert with_fallback["success"]["mean"] == 1.0
+        assert (
+            with_fallback["planner_fallback"]["mean"] == alone["planner_fallback"]["mean"] > 0.5
+        )
+        assert with_fallback["moves_over_minimum"]["mean"] > 1.1
 
 
 def test_the_curve_counts_every_pair_alike():

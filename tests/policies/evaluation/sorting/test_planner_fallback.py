@@ -1,9 +1,9 @@
-"""The hand-over of many tasks at once decides as the rule for one task does."""
+"""Tests that the batched progress monitor agrees with the monitor of one task."""
 
 import numpy as np
 import pytest
 
-from app.policies.evaluation.sorting.benchmark_tasks import Person, start_test
+from app.policies.evaluation.sorting.benchmark_tasks import ScriptedInterferences, start_test
 from app.policies.evaluation.sorting.episodes import ENDLESS, greedy, run_episodes
 from app.policies.evaluation.sorting.planner_fallback import state_keys
 from app.sim.sorting.batch import SortingBatch, SortingSettings, apply
@@ -73,7 +73,7 @@ def test_every_verdict_is_that_of_the_rule_for_one_task(name):
         batch.asked.update(which.tolist())
         return choose(rows, which)
 
-    found = run_episodes(batch, asked, script=Person(test, n, 7), obey=True)
+    found = run_episodes(batch, asked, script=ScriptedInterferences(test, n, 7), fallback=True)
     single, together = np.array(batch.verdicts).T
     assert np.array_equal(single, together)
     assert 0 < single.sum() < len(single)

@@ -1,0 +1,256 @@
+"""Policies, planners and an oracle on the same crossings under the safety layer."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.policies.evaluation.reach.episodes import run_to_end
+from app.policies.evaluation.reach.ssm_rows import joined, selected
+from app.policies.inference.controllers import Controller
+from app.sim.cells.cell import Cell
+from app.sim.core.arrays import Vec
+from app.sim.planning.ompl_planners import PlanSettings
+from app.sim.planning.replanning import ReplanningSettings
+from app.sim.reach.batch import ReachBatch, ReachSettings
+from app.sim.reach.crossings import CrossingSet
+from app.sim.reach.monitored.batch import (
+    MonitoredEpisodes,
+    MonitoredReachBatch,
+    MonitoringSettings,
+)
+from app.sim.reach.monitored.planners import drive_planner, postures_of
+from app.sim.reach.oracle_search import sample_detours, toward
+from app.sim.robot.actions import ActionSettings
+from app.sim.robot.kernels.arm import Arm
+from app.sim.safety.layer import SafetySettings
+from app.sim.scene.scene import arm_of
+
+MARGIN = 0.05
+"""Distance of planned paths to people [m]: of 0.05 and 0.35 the one with which RRT* and
+RRT-Connect arrived earlier on 20 crossings of another seed (77)."""
+ASIDE = (-2.0, 2.0, 0.2)
+"""x, y, radius of the person in rows without people [m]: far corner of the walking area of
+METHOD 2.1. The cell is not empty, because training may contain no empty cell."""
+LONGEST_WAIT = 8.0
+"""Latest time at which a resimulation turns to its goal [s]."""
+PLANNERS: Mapping[str, ReplanningSettings] = {
+    "rrtstar-once": ReplanningSettings(
+        role="plan-once", margin=MARGIN, plan=PlanSettings(planner="rrt-star", budget_s=1.0)
+    ),
+    "rrtconnect-blocked": ReplanningSettings(
+        role="replan-on-blocked", margin=MARGIN, plan=PlanSettings(planner="rrt-connect")
+    ),
+    "aorrtc-blocked": ReplanningSettings(
+        role="replan-on-blocked", margin=MARGIN, plan=PlanSettings(planner="aorrtc")
+    ),
+    "replan-every-cycle": ReplanningSettings(
+        role="replan-every-cycle", margin=MARGIN, plan=PlanSettings(planner="rrt-connect")
+    ),
+}
+"""Planners by row."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ComparisonSettings:
+    """Planners and limits of a comparison."""
+
+    planners: Mapping[str, ReplanningSettings]
+    """Planners by row."""
+    without_people: ReplanningSettings
+    """Planner of the rows without people."""
+    n_resimulations: int = 128
+    """Resimulations of each crossing by the oracle."""
+    time_limit_s: float = 20.0
+    """Time limit of a crossing [s]."""
+
+
+DEFAULT_SETTINGS = ComparisonSettings(
+    planners=PLANNERS,
+    without_people=ReplanningSettings(
+        role="plan-once", plan=PlanSettings(planner="rrt-star", budget_s=0.2)
+    ),
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CrossingRuns:
+    """Runs of one row."""
+
+    episodes: MonitoredEpisodes
+    """Result of each run."""
+    overrides: list[Vec]
+    """Override in [0, 1] of every period of each run; empty for the oracle."""
+
+
+def run_monitored(batch: MonitoredReachBatch, controller: Controller) -> CrossingRuns:
+    """Run the episodes of a batch that was reset to their ends."""
+    found: list[Vec] = []
+    run_to_end(
+        batch, controller, after=lambda: found.append(batch.override.copy()), features=False
+    )
+    episodes, every = batch.runs(), np.array(found)
+    periods = np.round(episodes.seconds / batch.arm.dt).astype(int)
+    overrides = [every[:n, k] for k, n in enumerate(periods)]
+    return CrossingRuns(episodes=episodes, overrides=overrides)
+
+
+class Comparison:
+    """Runs of policies, planners and the oracle over one set of crossings.
+
+    Args:
+        cell: Work cell.
+        crossed: Crossings.
+        reach: Action and observation of the policy; time limit and people are replaced.
+        safety: Assumptions of the safety layer.
+        seed: Seed of planners and oracle.
+        settings: Planners and limits.
+    """
+
+    def __init__(
+        self,
+        cell: Cell,
+        crossed: CrossingSet,
+        reach: ReachSettings,
+        safety: SafetySettings,
+        seed: int,
+        settings: ComparisonSettings = DEFAULT_SETTINGS,
+    ) -> None:
+        self.cell, self.crossed, self.safety, self.seed = cell, crossed, safety, seed
+        self.settings = settings
+        self._reach = replace(
+            reach, people=("walker",), time_limit_s=settings.time_limit_s, start="uniform"
+        )
+        self._configurations: list[Vec] | None = None
+
+    def batch(self, *, no_person: bool = False, monitored: bool = True) -> MonitoredReachBatch:
+        """Return a batch at the start of all crossings.
+
+        Args:
+            no_person: Whether the person stands aside.
+            monitored: Whether the safety layer acts.
+        """
+        aside = np.tile(np.array(ASIDE), (len(self.crossed.goals), 2, 1))
+        tracks = aside if no_person else self.crossed.tracks
+        monitoring = MonitoringSettings(active=monitored, rest_ends=False)
+        return self._batch(tracks, self.crossed.goals, self._reach, monitoring)
+
+    def copies(self, number: int, n: int) -> MonitoredReachBatch:
+        """Return a batch of ``n`` copies of one crossing; actions are joint speeds."""
+        tracks = np.repeat(self.crossed.tracks[number][None], n, axis=0)
+        goals = np.repeat(self.crossed.goals[number][None], n, axis=0)
+        reach = replace(self._reach, action=ActionSettings())
+        return self._batch(tracks, goals, reach, MonitoringSettings(rest_ends=False))
+
+    def _batch(
+        self, tracks: Vec, goals: Vec, reach: ReachSettings, monitoring: MonitoringSettings
+    ) -> MonitoredReachBatch:
+        n = len(goals)
+        batch = MonitoredReachBatch(
+            self.cell, n, self.seed, reach, self.safety, monitoring, tracks=tracks
+        )
+        batch.reset()
+        batch.set_goals(np.arange(n), goals)
+        return batch
+
+    def configurations(self) -> list[Vec]:
+        """Return the configurations at each goal for planners and resimulations [rad]."""
+        if self._configurations is None:
+            arm = arm_of(self.cell)
+            self._configurations = postures_of(arm, self.crossed.goals, self.seed)
+        return self._configurations
+
+    def policy(self, controller: Controller, *, no_person: bool = False) -> CrossingRuns:
+        """Run a policy over all crossings."""
+        return run_monitored(self.batch(no_person=no_person), controller)
+
+    def planner(
+        self,
+        settings: ReplanningSettings,
+        *,
+        no_person: bool = False,
+        blind: bool = False,
+        monitored: bool = True,
+    ) -> CrossingRuns:
+        """Run a planner over all crossings; a blind one ignores people."""
+        batch = self.batch(no_person=no_person, monitored=monitored)
+        overrides, _ = drive_planner(
+            batch, self.configurations(), settings, self.seed + 1, blind=blind
+        )
+        return CrossingRuns(episodes=batch.runs(), overrides=overrides)
+
+    def run(
+        self, controllers: Mapping[str, Controller]
+    ) -> dict[str, Callable[[], CrossingRuns]]:
+        """Return the runs of policies and planners by row, each started when called.
+
+        Args:
+            controllers: Policies by row.
+        """
+        runs: dict[str, Callable[[], CrossingRuns]] = {
+            name: partial(self.policy, controller) for name, controller in controllers.items()
+        }
+        for name, settings in self.settings.planners.items():
+            runs[name] = partial(self.planner, settings)
+        runs["policy-no-person"] = partial(self.policy, controllers["policy"], no_person=True)
+        planner = partial(self.planner, self.settings.without_people)
+        runs["planner-no-person"] = partial(planner, no_person=True)
+        runs["planner-no-ssm"] = partial(planner, blind=True, monitored=False)
+        return runs
+
+
+class _Detours:
+    """Controller to a first configuration until some time, then to a last one.
+
+    Args:
+        arm: Robot.
+        first: First configurations [rad], shape (n, 6).
+        until: Times of the change [s], shape (n,).
+        last: Last configurations [rad], shape (n, 6).
+    """
+
+    def __init__(self, arm: Arm, first: Vec, until: Vec, last: Vec) -> None:
+        self._arm, self._first, self._until, self._last = arm, first, until, last
+        self._k = 0
+
+    def acts(self, batch: ReachBatch) -> NDArray[np.float32]:
+        """Return the actions of all environments, shape (n_envs, 6)."""
+        early = self._k * self._arm.dt < self._until
+        self._k += 1
+        aim = np.where(early[:, None], self._first, self._last)
+        return toward(self._arm, batch.state.q, aim)
+
+
+def best_resimulations(
+    comparison: Comparison, n_each: int, rng: np.random.Generator
+) -> dict[str, MonitoredEpisodes]:
+    """Return the best resimulations of each crossing under the safety layer, by row.
+
+    If no resimulation of a crossing arrives untouched, the first one represents it; the
+    least-stopped one only has to arrive.
+
+    Args:
+        comparison: Crossings.
+        n_each: Resimulations of each crossing.
+        rng: Random numbers of the resimulations.
+    """
+    earliest, least_stopped = [], []
+    for number, configurations in enumerate(comparison.configurations()):
+        batch = comparison.copies(number, n_each)
+        first, until = sample_detours(batch.arm, rng, n_each, LONGEST_WAIT)
+        until[0] = 0.0
+        last = configurations[rng.integers(len(configurations), size=n_each)]
+        run_to_end(batch, _Detours(batch.arm, first, until, last), features=False)
+        runs = batch.runs()
+        good = runs.arrived & ~runs.touched_at_rest
+        earliest.append(_least(runs, np.where(good, runs.seconds, np.inf)))
+        stops = runs.stopped_s + 1e-3 * runs.seconds
+        least_stopped.append(_least(runs, np.where(runs.arrived, stops, np.inf)))
+    return {"oracle": joined(earliest), "oracle-least-stopped": joined(least_stopped)}
+
+
+def _least(runs: MonitoredEpisodes, cost: Vec) -> MonitoredEpisodes:
+    """Return the run with the least cost."""
+    return selected(runs, np.argmin(cost, keepdims=True))

@@ -1,0 +1,127 @@
+"""Rows and comparisons of ``reach-ssm``, from episodes under the safety layer."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.policies.evaluation.statistics import mean_of, wilson
+from app.sim.reach.monitored.batch import MonitoredEpisodes
+
+Json = dict[str, Any]
+
+
+def crossing_row(name: str, runs: MonitoredEpisodes, time_limit_s: float) -> Json:
+    """Return the result row of crossings; `ssm.py` defines the measures.
+
+    Args:
+        name: Name of the row.
+        runs: Runs of all crossings.
+        time_limit_s: Time of runs that do not arrive in ``time_capped_s`` [s].
+    """
+    n, arrived = len(runs.arrived), runs.arrived
+    return {
+        "name": name,
+        "n": n,
+        "arrived": wilson(int(arrived.sum()), n),
+        "time_s": _spread(runs.seconds[arrived]),
+        "time_capped_s": _spread(np.where(arrived, runs.seconds, time_limit_s)),
+        "time_untouched_s": _spread(runs.seconds[arrived & ~runs.touched_at_rest]),
+        "below_half_s": _spread(runs.below_half_s),
+        "stopped_s": _spread(runs.stopped_s),
+        "standstill_s": _spread(runs.standstill_s),
+        "standstill_stopped_s": _spread(runs.standstill_stopped_s),
+        "never_stopped": wilson(int((runs.stopped_s == 0.0).sum()), n),
+        "never_at_standstill": wilson(int((runs.standstill_stopped_s == 0.0).sum()), n),
+        "joint_path_rad": _spread(runs.joint_path[arrived]),
+        "tool_path_m": _spread(runs.tool_path[arrived]),
+        **_contacts(runs),
+    }
+
+
+def random_row(name: str, runs: MonitoredEpisodes) -> Json:
+    """Return the result row of random episodes."""
+    n = len(runs.arrived)
+    touched = runs.touched_moving | runs.touched_at_rest | runs.touched_cell
+    return {
+        "name": name,
+        "n": n,
+        "success": wilson(int(runs.arrived.sum()), n),
+        "contact": wilson(int(touched.sum()), n),
+        "moving_rate": wilson(int(runs.touched_moving.sum()), n),
+        "timeout": wilson(int((~runs.arrived & ~touched).sum()), n),
+        "time_s": _spread(runs.seconds[runs.arrived]),
+        **_contacts(runs),
+    }
+
+
+def _contacts(runs: MonitoredEpisodes) -> Json:
+    """Return numbers of contacts with the moving and the stationary robot."""
+    return {
+        "contacts": int((runs.touched_moving | runs.touched_at_rest).sum()),
+        "contacts_moving": int(runs.touched_moving.sum()),
+        "contacts_at_rest": int(runs.touched_at_rest.sum()),
+        "contacts_cell": int(runs.touched_cell.sum()),
+        "fastest_link_m_s": float(runs.link_speed[runs.touched_moving].max(initial=0.0)),
+        "fastest_person_m_s": float(runs.person_speed.max(initial=0.0)),
+    }
+
+
+def _spread(values: NDArray[np.floating]) -> dict[str, float] | None:
+    """Return mean, standard deviation and 95 % interval; None without values."""
+    found = mean_of(values)
+    if found is None:
+        return None
+    return {**found, "sd": float(values.std(ddof=1)) if len(values) > 1 else 0.0}
+
+
+def against(one: MonitoredEpisodes, other: MonitoredEpisodes, time_limit_s: float) -> Json:
+    """Return the time saved by ``one`` against ``other``, paired by crossing.
+
+    ``all`` covers all runs, with the time limit for runs that do not arrive; ``untouched`` the
+    runs in which both arrive and neither is touched. ``share`` is relative to the other's mean
+    time.
+
+    Args:
+        one: Runs of all crossings.
+        other: Runs of the same crossings.
+        time_limit_s: Time of runs that do not arrive [s].
+    """
+    untouched = one.arrived & other.arrived & ~one.touched_at_rest & ~other.touched_at_rest
+    times = [np.where(runs.arrived, runs.seconds, time_limit_s) for runs in (one, other)]
+
+    def saving(which: NDArray[np.bool_]) -> Json | None:
+        if not which.any():
+            return None
+        less = mean_of(times[1][which] - times[0][which])
+        scale = float(times[1][which].mean())
+        share = {key: value / scale for key, value in (less or {}).items()}
+        return {"n": int(which.sum()), "saved_s": less, "share": share}
+
+    every = np.ones(len(untouched), dtype=np.bool_)
+    return {"all": saving(every), "untouched": saving(untouched)}
+
+
+def arrival_times(runs: MonitoredEpisodes) -> list[float | None]:
+    """Return the time of each run to the goal [s]; None where it was not reached."""
+    return [
+        round(float(seconds), 2) if arrived else None
+        for seconds, arrived in zip(runs.seconds, runs.arrived, strict=True)
+    ]
+
+
+def joined(parts: Sequence[MonitoredEpisodes]) -> MonitoredEpisodes:
+    """Return several sets of runs as one."""
+    names = MonitoredEpisodes.__dataclass_fields__
+    values: Any = {
+        name: np.concatenate([getattr(part, name) for part in parts]) for name in names
+    }
+    return MonitoredEpisodes(**values)
+
+
+def selected(runs: MonitoredEpisodes, which: NDArray[np.int64]) -> MonitoredEpisodes:
+    """Return the runs with the given indices."""
+    names = MonitoredEpisodes.__dataclass_fields__
+    values: Any = {name: getattr(runs, name)[which] for name in names}
+    return MonitoredEpisodes(**values)
