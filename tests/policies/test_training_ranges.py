@@ -17,7 +17,7 @@ def test_people_who_are_not_there_widen_no_range() -> None:
     assert set(known) == {"q", "qd", "goal", "human_q", "human_qd"}
 
 
-def test_a_cell_in_which_nobody_is_ever_met_has_no_range_of_people() -> None:
+def test_a_cell_without_people_has_no_range_of_people() -> None:
     ranges, work = Ranges(None), HumanMotionConfig(absent=1.0)
     batch = PickBatch(load_cell(), 8, 1, PickSettings(work=work))
     batch.reset()

@@ -1,9 +1,10 @@
-"""Replay memory with priorities and n-step returns, in one buffer.
+"""Replay buffer with priorities and n-step returns.
 
-Transitions lie in Stable-Baselines3's arrays, one column per environment. A transition is drawn
-with a chance in proportion to ``priority ** alpha`` (a sum tree, in compiled code) and weighted
-by ``(1 / (size * chance)) ** beta`` over the greatest weight in the batch; its return is summed
-over ``n_steps`` at the moment it is drawn, cut where the episode ended or the buffer's head is.
+Transitions are stored in Stable-Baselines3's arrays, one column per environment. A transition
+is sampled with probability proportional to ``priority ** alpha`` (compiled sum tree) and has
+the importance weight ``(1 / (size * probability)) ** beta``, divided by the greatest weight of
+the minibatch. Returns are summed over at most ``n_steps`` when a transition is sampled, up to
+the end of the episode or the head of the buffer.
 
 Source: Schaul et al., *Prioritized experience replay* (2016); METHOD 1.4. Stable-Baselines3
 ignores its own ``n_steps`` where a buffer class is given, so one buffer must do both.
@@ -36,7 +37,7 @@ class ReplaySamples(NamedTuple):
     next_observations: torch.Tensor
     """Where the sums end, (B, obs_size)."""
     discounts: torch.Tensor
-    """What the value there is multiplied by; 0 where the episode terminated, (B,)."""
+    """Factor of the value there; 0 where the episode terminated, (B,)."""
     weights: torch.Tensor
     """Importance weights, the greatest 1, (B,)."""
     indices: Ints
@@ -45,7 +46,7 @@ class ReplaySamples(NamedTuple):
 
 @kernel()
 def _set_priority(tree: Floats, leaf: int, value: float) -> None:
-    """Set a leaf of the sum tree, shape (2 * leaves,), and the sums above it."""
+    """Set a leaf of the sum tree, shape (2 * leaves,), and update the sums above it."""
     node = leaf + tree.shape[0] // 2
     tree[node] = value
     node //= 2
@@ -56,7 +57,7 @@ def _set_priority(tree: Floats, leaf: int, value: float) -> None:
 
 @kernel()
 def _find(tree: Floats, mass: float) -> int:
-    """Return the leaf in which the running sum passes ``mass``."""
+    """Return the leaf at which the cumulative sum exceeds ``mass``."""
     node: int = 1
     leaves: int = tree.shape[0] // 2
     while node < leaves:
@@ -76,7 +77,7 @@ def set_priorities(tree: Floats, leaves: Ints, values: Floats) -> None:
 
 @kernel(nogil=True)
 def draw(tree: Floats, rng: random.State, leaves: Ints, chances: Floats) -> None:
-    """Draw leaves, one from each equal part of the total, and say how likely each was."""
+    """Sample one leaf from each equal part of the total, with its probability."""
     total, n = tree[1], leaves.shape[0]
     for i in range(n):
         leaves[i] = _find(tree, (i + random.uniform(rng)) / n * total)
@@ -97,20 +98,20 @@ def sum_returns(
     discounts: Floats,
     last: Ints,
 ) -> None:
-    """Sum rewards from each drawn transition on.
+    """Compute n-step returns of sampled transitions.
 
     Args:
-        leaves: Drawn transitions, ``row * n_envs + environment``.
+        leaves: Sampled transitions, ``row * n_envs + environment``.
         n_envs: Number of environments.
-        head: Row that is written next; sums do not run over it.
-        n_steps: Most steps of a sum.
-        gamma: Discount.
-        rewards: Shape (rows, n_envs).
+        head: Row that is written next; sums end before it.
+        n_steps: Maximum number of steps.
+        gamma: Discount factor.
+        rewards: Rewards, shape (rows, n_envs).
         dones: 1 where an episode ended, shape (rows, n_envs).
-        timeouts: 1 where it was cut off, shape (rows, n_envs).
-        returns: Filled with the sums.
-        discounts: Filled with what the value at the end is multiplied by.
-        last: Filled with the row whose next observation is the end of the sum.
+        timeouts: 1 where it was truncated, shape (rows, n_envs).
+        returns: Returns, filled.
+        discounts: Factors of the value after the last step, filled.
+        last: Rows of the last step, filled.
     """
     for i in range(leaves.shape[0]):
         row, env = leaves[i] // n_envs, leaves[i] % n_envs
@@ -131,18 +132,18 @@ def sum_returns(
 
 
 class PrioritisedReplay(ReplayBuffer):
-    """Stable-Baselines3's buffer, with priorities and n-step returns.
+    """Stable-Baselines3's buffer with priorities and n-step returns.
 
     Args:
-        buffer_size: Transitions it holds.
+        buffer_size: Capacity in transitions.
         observation_space: Space of observations.
         action_space: Space of actions.
-        device: Where minibatches go.
+        device: Device of minibatches.
         n_envs: Number of environments.
-        n_steps: Most steps of a return.
-        gamma: Discount.
-        alpha: Exponent of the priorities; 0 draws evenly.
-        seed: Seed of what is drawn.
+        n_steps: Maximum number of steps of a return.
+        gamma: Discount factor.
+        alpha: Exponent of the priorities; 0 samples uniformly.
+        seed: Seed of the sampling.
     """
 
     def __init__(
@@ -177,13 +178,13 @@ class PrioritisedReplay(ReplayBuffer):
         done: NDArray[Any],
         infos: list[dict[str, Any]],
     ) -> None:
-        """Add one transition per environment, with the greatest priority so far."""
+        """Add one transition per environment with the greatest priority so far."""
         leaves = self.pos * self.n_envs + np.arange(self.n_envs)
         super().add(obs, next_obs, action, reward, done, infos)
         set_priorities(self._tree, leaves, np.full(self.n_envs, self._greatest))
 
     def draw(self, batch_size: int, beta: float) -> ReplaySamples:
-        """Draw a minibatch.
+        """Sample a minibatch.
 
         Args:
             batch_size: Number of transitions.

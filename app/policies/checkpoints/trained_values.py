@@ -1,7 +1,7 @@
-"""What a reach policy met in training, to flag what lies outside of it.
+"""Training range of a reach policy, to flag inputs outside it.
 
-A checkpoint's manifest says the least and the greatest value of every state variable. A person
-whom the policy sees otherwise than given (far away, say) is compared as given.
+The manifest of a checkpoint states minimum and maximum of every state variable. People are
+compared as given, also where the policy observes them differently (as far away, for example).
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -13,23 +13,23 @@ from app.sim.core.out_of_range import OutsideField
 from app.sim.human.person import Person
 
 SLACK = 0.02
-"""Inputs this far outside what was met in training are not flagged [m, rad or per second]."""
+"""Tolerance of the training range [m, rad or per second]."""
 HUMAN = ("x", "y", "vx", "vy", "r", "growth")
-"""What a policy sees of a person."""
+"""Observed variables of a person."""
 ROBOT = (
     *(f"robot.q[{j}]" for j in range(6)),
     *(f"robot.qd[{j}]" for j in range(6)),
     *("goal.x", "goal.y", "goal.z"),
 )
-"""What messages call the numbers of ``q``, ``qd`` and ``goal`` of a ``trained_range``."""
+"""Names of ``q``, ``qd`` and ``goal`` of a ``trained_range`` in messages."""
 _SIZES = {"q": 6, "qd": 6, "goal": 3, "human": len(HUMAN)}
 
 Seen = tuple[int | None, Vec]
-"""A person, bodies first, or None for nobody, and the cylinder a policy saw, shape (6,)."""
+"""Index of a person, bodies first, or None, and the observed cylinder, shape (6,)."""
 
 
 class TrainedValues:
-    """Least and greatest values met in training; infinite where unknown.
+    """Minimum and maximum values of training; infinite if unknown.
 
     Args:
         ranges: ``trained_range`` of the manifest: ``low`` and ``high`` of each variable.
@@ -49,12 +49,12 @@ class TrainedValues:
     def outside(
         self, state: Vec, seen: Iterable[Seen], order: Sequence[int]
     ) -> tuple[OutsideField, ...]:
-        """Return what lies outside, each field once.
+        """Return the inputs outside the training range, each field once.
 
         Args:
             state: q [rad], qd [rad/s] and goal [m], shape (15,).
-            seen: People as the policy saw them.
-            order: Their numbers in the question, bodies first.
+            seen: Observed people.
+            order: Their indices in the query, bodies first.
         """
         found = [one for who, view in seen for one in self._of(state, who, view, order)]
         return tuple(dict.fromkeys(found))
@@ -62,7 +62,7 @@ class TrainedValues:
     def _of(
         self, state: Vec, who: int | None, seen: Vec, order: Sequence[int]
     ) -> list[OutsideField]:
-        """Return what of the state, and of a person or nobody, lies outside."""
+        """Return the variables of the state and of one person outside the range."""
         values = np.concatenate((state, seen))
         inside = (self._least <= values) & (values <= self._most)
         if inside.all():
@@ -86,18 +86,18 @@ class TrainedValues:
         return found
 
 
-def as_told(
-    seen: Iterable[Seen], told: Sequence[Person], viewed: Sequence[Person]
+def as_given(
+    seen: Iterable[Seen], given: Sequence[Person], viewed: Sequence[Person]
 ) -> list[Seen]:
-    """Return who was seen, with the numbers that were told where the policy saw others.
+    """Return observed people with the given values where the policy observed others.
 
     Args:
-        seen: As the policy saw them.
-        told: The people as given.
-        viewed: The same people as policies know them.
+        seen: Observed people.
+        given: People of the query.
+        viewed: The same people as policies observe them.
     """
     return [
-        (who, view if who is None else view + _cylinder(told[who]) - _cylinder(viewed[who]))
+        (who, view if who is None else view + _cylinder(given[who]) - _cylinder(viewed[who]))
         for who, view in seen
     ]
 

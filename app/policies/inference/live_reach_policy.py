@@ -18,10 +18,10 @@ from app.sim.safety.layer import SafetySettings
 
 
 class TrainedReachPolicy:
-    """One policy and its controllers; used by one thread at a time.
+    """One policy and its controllers by inference mode; for one thread at a time.
 
     Args:
-        actor: The policy.
+        actor: Policy.
     """
 
     def __init__(self, actor: ReachActor) -> None:
@@ -37,37 +37,37 @@ class TrainedReachPolicy:
 
     @property
     def title(self) -> str:
-        """Short text for people."""
+        """Short description."""
         return self._actor.title
 
     @property
     def cell(self) -> str:
-        """Name of the work cell it was trained for."""
+        """Name of the training cell."""
         return self._actor.cell
 
     @property
     def cell_sha256(self) -> str:
-        """Identity of that cell's content."""
+        """Identity of the training cell's content."""
         return self._actor.cell_sha256
 
     @property
     def view(self) -> ViewName:
-        """What it sees."""
+        """Kind of observation."""
         return self._actor.view
 
     @property
     def action(self) -> ActionSettings:
-        """What its actions mean."""
+        """Meaning of the actions."""
         return self._actor.action
 
     @property
     def goals(self) -> GoalRule:
-        """Where the goals of its training were drawn from."""
+        """Set of the training goals."""
         return self._actor.goals
 
     @property
     def targets(self) -> Vec | None:
-        """The goals it was trained on [m], shape (n, 3); None for a whole box."""
+        """Training targets [m], shape (n, 3); None for a whole box."""
         return self._actor.targets
 
     @property
@@ -83,7 +83,7 @@ class TrainedReachPolicy:
         Args:
             batch: Robots, people and goals.
             inference_mode: One of ``inference_modes``.
-            safety: What the safety layer assumes that they go through; None without one.
+            safety: Assumptions of the safety layer; None without one.
         """
         controller = self._controllers[inference_mode]
         if isinstance(controller, RolloutController):

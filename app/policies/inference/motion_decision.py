@@ -1,9 +1,9 @@
-"""The next piece of motion toward a goal beside people (METHOD 2.2, 2.4, 2.7).
+"""Next trajectory segment toward a goal beside people (docs/method.md 2.2, 2.4, 2.7).
 
-State, people and goal in, one polynomial per joint out: the policy's action, interpolated
-between its training targets where the goal lies between them, turned into the piece that keeps
-every limit, and the override at which speed and separation monitoring lets it run. Nothing is
-remembered from one call to the next: the speeds hold all that the next period needs.
+A decision queries the policy for an action, optionally interpolated between training targets
+and improved by rollouts, converts it to the segment that keeps all limits, and computes the
+override of speed and separation monitoring. Decisions are stateless: the joint speeds contain
+all that the next period needs.
 """
 
 import math
@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from app.errors import InvalidInput
-from app.policies.checkpoints.trained_values import Seen, TrainedValues, as_told
+from app.policies.checkpoints.trained_values import Seen, TrainedValues, as_given
 from app.policies.inference.controllers import person_weights
 from app.policies.inference.rollout import (
     CANDIDATES,
@@ -59,18 +59,19 @@ from app.sim.safety.layer import SafetyLayer, SafetySettings
 from app.sim.scene.scene import FAR_AWAY, arm_of
 
 _FAR = np.full(3, 10.0)
-Told = tuple[SafetyDecision | None, int | None, SeparationTerms | None]
+Monitored = tuple[SafetyDecision | None, int | None, SeparationTerms | None]
+"""Decision of the safety layer, index of the decisive person, and terms of S_p."""
 
 
 class MotionDecider:
-    """Says how to move by one policy; safe to call from several threads.
+    """Decide motions by one policy; safe to call from several threads.
 
     Args:
-        actor: The policy.
-        cell: The cell it was trained in.
+        actor: Policy.
+        cell: Training cell of the policy.
 
     Raises:
-        CheckpointMismatch: It was trained in another cell.
+        CheckpointMismatch: The policy was trained in another cell.
         InvalidInput: The cell has no goals.
     """
 
@@ -78,14 +79,14 @@ class MotionDecider:
         require_cell(cell, actor.cell, actor.cell_sha256)
         self.actor, self.cell, self.arm = actor, cell, arm_of(cell)
         self._between = Interpolation(actor) if interpolates(actor) else None
-        self._able = can_roll_out(actor)
+        self._can_roll_out = can_roll_out(actor)
         self._rule = actor.action.rule()
         self._advance: Callable[..., bool] | None = None
         self._limits = StateLimits(self.arm, limits_jerk=actor.action.degree == 3)
-        self._met = TrainedValues(actor.trained_range)
+        self._trained = TrainedValues(actor.trained_range)
         self._stages: dict[tuple[int, int], QueryState] = {}
         self._last: dict[tuple[int, int], QueryState] = {}
-        self._aheads: dict[QueryState, RolloutImprovement] = {}
+        self._improvements: dict[QueryState, RolloutImprovement] = {}
         self._layer = SafetyLayer(self.arm, SafetySettings())
         self._busy = threading.Lock()
 
@@ -95,17 +96,18 @@ class MotionDecider:
         return self.actor.checkpoint
 
     def decide(self, question: MotionQuestion) -> MotionDecision:
-        """Return the next piece of motion.
+        """Return the next trajectory segment.
 
         Raises:
-            InvalidInput: A number that no answer can be given for; somebody inside the robot,
-                unless monitoring stops it.
-            GoalOutside: Interpolation is asked for a goal outside the training targets.
+            InvalidInput: A number is out of range, or a person overlaps the robot without
+                monitoring.
+            GoalOutside: The goal of an interpolated action lies outside the training targets.
         """
         started = time.perf_counter()
         robot, goal = self._numbers(question)
         people = checked_people(question.people)
-        way, looks = self._way(question.inference_mode), self._looks(question.rollout)
+        mode = self._mode(question.inference_mode)
+        rollout = self._rollout(question.rollout)
         order = _bodies_first(people)
         known = [people[i] for i in order]
         with self._busy:
@@ -116,29 +118,29 @@ class MotionDecider:
             distance, shapes = math.dist(stage.tcp, goal), stage.shapes
             if question.safety is None:
                 _require_apart(apart, order)
-            # Distances and monitoring go by what was measured, the policy by what it knows.
+            # Distances and monitoring use measured people, the policy clipped ones.
             viewed = [as_known(person) for person in known]
             if robot.outside or any(a is not b for a, b in zip(known, viewed, strict=True)):
                 stage.load(robot.clamped, viewed, time_left)
             nearest = int(stage.distances.argmin()) if order else None
-            act, targets, weights, seen = self._act(stage, question, goal, way)
-            began = self._improve(stage, question, goal, act) if looks else None
-            piece, unfeasible = self._piece(robot, act)
+            act, targets, weights, seen = self._act(stage, question, goal, mode)
+            candidate = self._improve(stage, question, goal, act) if rollout else None
+            segment, unfeasible = self._segment(robot, act)
             shapes, places = self._observed(question.observed, robot) or (shapes, order)
-            safe, terms_of, terms = self._monitored(question, robot, piece, shapes, places)
+            safe, terms_of, terms = self._monitored(question, robot, segment, shapes, places)
             state = np.concatenate((robot.clamped.q, robot.clamped.qd, goal))
-            outside = self._met.outside(state, as_told(seen, known, viewed), order)
+            outside = self._trained.outside(state, as_given(seen, known, viewed), order)
         met = [
             PersonWeight(separation=d, weight=w) for d, w in zip(apart, weights, strict=True)
         ]
         place = sorted(range(len(order)), key=order.__getitem__)
         return MotionDecision(
             act=act,
-            rollout=looks,
-            candidate=began,
-            piece=piece,
+            rollout=rollout,
+            candidate=candidate,
+            piece=segment,
             unfeasible=unfeasible,
-            inference_mode=way,
+            inference_mode=mode,
             targets=targets,
             met=tuple(met[i] for i in place),
             seen=None if nearest is None else order[nearest],
@@ -155,7 +157,7 @@ class MotionDecider:
         )
 
     def warm_up(self) -> None:
-        """Compile what a decision needs, before the first one is asked for."""
+        """Compile the kernels of decisions before the first query."""
         q, goal = self.arm.home.copy(), np.array(goal_region_of(self.cell).center)
         people = (
             Person(q=human.rest_posture(*FAR_AWAY), qd=np.zeros(18)),
@@ -175,7 +177,7 @@ class MotionDecider:
             )
 
     def _numbers(self, question: MotionQuestion) -> tuple[MeasuredState, Vec]:
-        """Return the robot's state and the goal once they keep their rules."""
+        """Return the checked state of the robot and the checked goal."""
         if question.qdd is None and self.actor.action.degree == 3:
             rule = "must be given: this policy limits jerk, which needs the accelerations"
             raise InvalidInput("robot.qdd", None, rule)
@@ -191,7 +193,7 @@ class MotionDecider:
             raise InvalidInput("beside", question.beside, "must name a rule", BESIDES)
         return robot, goal
 
-    def _way(self, asked: MotionMode | None) -> MotionMode:
+    def _mode(self, asked: MotionMode | None) -> MotionMode:
         if asked is None:
             return "direct" if self._between is None else "interpolated"
         if asked not in MOTION_MODES:
@@ -201,34 +203,34 @@ class MotionDecider:
             raise InvalidInput("inference_mode", asked, rule, ("direct",))
         return asked
 
-    def _looks(self, asked: bool | None) -> bool:
-        if asked and not self._able:
-            rule = "needs a policy that sees forecasts of people, with two hidden layers"
+    def _rollout(self, asked: bool | None) -> bool:
+        if asked and not self._can_roll_out:
+            rule = "needs a policy with option features and two hidden layers"
             raise InvalidInput("rollout", True, rule, ("false",))
-        return self._able if asked is None else asked
+        return self._can_roll_out if asked is None else asked
 
     def _improve(
         self, stage: QueryState, question: MotionQuestion, goal: Vec, act: Vec
     ) -> str | None:
-        """Play an action ahead; change it where another way is better, and return its name."""
-        if stage not in self._aheads:
-            self._aheads[stage] = RolloutImprovement(self.actor)
-        ahead = self._aheads[stage]
-        ahead.forget()
-        ahead.constraint = ssm_constraint_of(question.safety, self.arm.dt, question.age_s)
+        """Improve an action in place by rollouts; return the candidate, None for the policy."""
+        if stage not in self._improvements:
+            self._improvements[stage] = RolloutImprovement(self.actor)
+        improvement = self._improvements[stage]
+        improvement.forget()
+        improvement.constraint = ssm_constraint_of(question.safety, self.arm.dt, question.age_s)
         state = stage.state
         state.goal[0], state.elapsed[0] = goal, question.elapsed_s
-        played = act[None].astype(np.float32)
-        chosen = int(ahead.improve(stage, played)[0])
+        improved = act[None].astype(np.float32)
+        chosen = int(improvement.improve(stage, improved)[0])
         if chosen == POLICY:
             return None
-        act[:] = played[0]
+        act[:] = improved[0]
         return CANDIDATES[chosen]
 
     def _observed(
         self, observed: Sequence[Person] | None, robot: MeasuredState
     ) -> tuple[Shapes, list[int]] | None:
-        """Return people as last observed, bodies first, and their places; None: as seen."""
+        """Return people as last observed, bodies first, and their places; None if not given."""
         if observed is None:
             return None
         people = checked_people(observed)
@@ -248,20 +250,20 @@ class MotionDecider:
         return stages[kinds]
 
     def _act(
-        self, stage: QueryState, question: MotionQuestion, goal: Vec, way: MotionMode
+        self, stage: QueryState, question: MotionQuestion, goal: Vec, mode: MotionMode
     ) -> tuple[Vec, tuple[TargetWeight, ...], list[float], list[Seen]]:
-        """Return action, targets, weights of the people and who was seen, as what."""
+        """Return action, targets, weights of the people, and the observed people."""
         apart = stage.distances
         nearest = int(apart.argmin()) if len(apart) else None
         places, shares = goal[None], np.ones(1)
-        if way == "interpolated":
+        if mode == "interpolated":
             assert self._between is not None
             mix, around = self._between.around(goal[None])
             used = mix.weights[0] > 0.0
             places, shares = around[0][used], mix.weights[0][used]
         weights = [float(who == nearest) for who in range(len(apart))]
         if question.beside == "distance-weighted" and len(apart) > 1:
-            # The nearest first: answers are rounded by their place in the batch.
+            # The nearest first: rounding depends on the place in the batch.
             counts = person_weights(apart[None])[0]
             first, weights = apart.argsort(), counts.tolist()
             obs = np.empty((len(first), len(places), stage.obs_size), dtype=np.float32)
@@ -276,15 +278,15 @@ class MotionDecider:
             acts = self.actor.acts(stage.observe(places))
             seen, shares_of_acts = [(nearest, stage.seen.copy())], shares
         targets: tuple[TargetWeight, ...] = ()
-        if way == "interpolated":
+        if mode == "interpolated":
             targets = tuple(
                 TargetWeight(position=(x, y, z), weight=w)
                 for (x, y, z), w in zip(places.tolist(), shares.tolist(), strict=True)
             )
         return shares_of_acts @ acts.astype(np.float64), targets, weights, seen
 
-    def _piece(self, robot: MeasuredState, act: Vec) -> tuple[TrajectorySegment, bool]:
-        """Return the commanded piece from the measured state, and whether it is unfeasible."""
+    def _segment(self, robot: MeasuredState, act: Vec) -> tuple[TrajectorySegment, bool]:
+        """Return the commanded segment, and whether a joint had no admissible coefficient."""
         arm, (q, qd, _) = self.arm, robot.measured
         act, limits = returning(arm, q, act)
         c, d, q1, qd1, qdd1 = np.empty((5, 6))
@@ -300,39 +302,39 @@ class MotionDecider:
         self,
         question: MotionQuestion,
         robot: MeasuredState,
-        piece: TrajectorySegment,
+        segment: TrajectorySegment,
         people: Shapes,
         order: Sequence[int],
-    ) -> Told:
-        """Return what monitoring executes, and the terms for one person."""
+    ) -> Monitored:
+        """Return the decision of the safety layer and the terms of the decisive person."""
         settings = question.safety
         if settings is None:
             return None, None, None
         q, qd, _ = robot.measured
         if settings != self._layer.settings:
             self._layer = SafetyLayer(self.arm, settings)
-        safe = self._layer.decide(q, qd, piece.c, piece.d, people, question.age_s)
-        told = self._layer.terms(safe, qd, people, question.age_s)
-        if told is None:
+        safe = self._layer.decide(q, qd, segment.c, segment.d, people, question.age_s)
+        decisive = self._layer.terms(safe, qd, people, question.age_s)
+        if decisive is None:
             return safe, None, None
-        return safe, order[told[0]], told[1]
+        return safe, order[decisive[0]], decisive[1]
 
     def _beyond_reach(self, goal: Vec) -> float:
-        """Return by how much a goal is farther away than the arm is long [m]."""
+        """Return the distance of a goal beyond the reach of the arm [m]; 0 within reach."""
         longest = LONGEST_REACH + max(self.arm.lengths.tool - 0.12, 0.0)
         return max(0.0, math.dist(goal, SHOULDER) - longest)
 
 
 def _bodies_first(people: Sequence[Person]) -> list[int]:
-    """Return the numbers of people with joint angles, then of cylinders."""
+    """Return the indices of people with joint angles, then of cylinders."""
     return sorted(range(len(people)), key=lambda i: people[i].cylinder is not None)
 
 
 def _require_apart(apart: Sequence[float], order: Sequence[int]) -> None:
-    """Raise where somebody is inside the robot.
+    """Check that no person overlaps the robot.
 
     Raises:
-        InvalidInput: Somebody is.
+        InvalidInput: A person overlaps the robot.
     """
     for who, distance in zip(order, apart, strict=True):
         if distance <= 0.0:

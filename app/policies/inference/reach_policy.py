@@ -29,8 +29,7 @@ from app.sim.people.kernels.people import MAX_PEOPLE
 from app.sim.prediction.kernels.networks import Network
 from app.sim.reach.batch import N_ACT, GoalRule, ViewName, goal_region_of
 from app.sim.reach.goal_sets import halton_targets
-from app.sim.reach.kernels import option_features as reach_ways
-from app.sim.reach.kernels import people_set as reach_crowd
+from app.sim.reach.kernels import option_features, people_set
 from app.sim.reach.kernels.observation import BASE_START, N_FEATURES, SIZES, STATE_SIZES
 from app.sim.reach.rollout.kernels.actor import FEW, act_batch, new_compiled_actor
 from app.sim.robot.actions import ActionSettings
@@ -38,14 +37,14 @@ from app.sim.robot.actions import ActionSettings
 LAYOUTS = {
     "features": [[name, size] for name, size in SIZES],
     "state": [[name, size] for name, size in STATE_SIZES],
-    "forecast": [[name, size] for name, size in (*SIZES, *reach_ways.SIZES)],
+    "forecast": [[name, size] for name, size in (*SIZES, *option_features.SIZES)],
     "people-set": [
-        [name, size] for name, size in (*SIZES, *reach_ways.SIZES, *reach_crowd.SIZES)
+        [name, size] for name, size in (*SIZES, *option_features.SIZES, *people_set.SIZES)
     ],
 }
 """Names and sizes of the groups of each kind of observation, as manifests carry them."""
 PEOPLE_SET = CrowdShape(
-    N_FEATURES + reach_ways.N_OPTION_FEATURES, MAX_PEOPLE, reach_crowd.N_BLOCK
+    N_FEATURES + option_features.N_OPTION_FEATURES, MAX_PEOPLE, people_set.N_BLOCK
 )
 """Where everybody stands as a set in the observation of that name."""
 MAX_LAYERS = 16
@@ -59,19 +58,19 @@ Layer = tuple[Floats, Floats]
 
 
 def is_reach(checkpoint: Checkpoint) -> bool:
-    """Tell whether a checkpoint's policy reaches goals beside people."""
+    """Return whether a checkpoint is a reach policy."""
     return task_of(checkpoint) == REACHING
 
 
 class ReachPolicy(TrainedPolicy):
-    """Says how to move toward a goal; safe to call from several threads.
+    """Reach policy of a checkpoint; safe to call from several threads.
 
     Args:
         checkpoint: A ``policy`` checkpoint of a reach preset.
 
     Raises:
-        CheckpointMismatch: It is for another task, network or layout.
-        InvalidInput: Its preset names an unknown rule.
+        CheckpointMismatch: The checkpoint has another task, network or layout.
+        InvalidInput: The preset names an unknown rule.
     """
 
     def __init__(self, checkpoint: Checkpoint) -> None:
@@ -80,14 +79,14 @@ class ReachPolicy(TrainedPolicy):
         preset = read_config(ReachPreset, manifest["preset"], "manifest.preset")
         super().__init__(checkpoint)
         self.view: ViewName = preset.episode.observation
-        """What it sees."""
+        """Kind of observation."""
         expect_layout(checkpoint, LAYOUTS[self.view], N_ACT)
         self.goals: GoalRule = preset.episode.goals
-        """Where the goals of its training were drawn from."""
+        """Set of the training goals."""
         self.action: ActionSettings = preset.action.settings
-        """What its actions mean (METHOD 2.2)."""
+        """Meaning of the actions (docs/method.md 2.2)."""
         self.targets: Vec | None = None
-        """The goals it was trained on [m], shape (n, 3); None for a whole box."""
+        """Training targets [m], shape (n, 3); None for a whole box."""
         if self.goals == "grid":
             self.targets = goal_region_of(self._cell).targets()
         elif self.goals == "halton":
@@ -106,7 +105,7 @@ class ReachPolicy(TrainedPolicy):
 
     @property
     def trained_range(self) -> Mapping[str, Mapping[str, list[float]]]:
-        """Least and greatest value of each state variable met in training."""
+        """Minimum and maximum of each state variable in training."""
         ranges: Mapping[str, Mapping[str, list[float]]] = self._checkpoint.manifest[
             "trained_range"
         ]
@@ -132,7 +131,7 @@ class ReachPolicy(TrainedPolicy):
                 "obs", list(obs.shape), f"must have the shape ['n', {self.n_obs}]"
             )
         if self._few is not None and len(obs) <= FEW:
-            return self._answered(self._few, obs)
+            return self._compiled_acts(self._few, obs)
         rows = _hidden(self._with_crowd(obs), self._layers[:-1])
         weight, bias = self._layers[-1]
         rows = rows @ weight
@@ -142,8 +141,8 @@ class ReachPolicy(TrainedPolicy):
             rows += np.arctanh(np.float32(BASE_WEIGHT) * base)
         return cast(NDArray[np.float32], np.tanh(rows, out=rows))
 
-    def _answered(self, network: Network, obs: Floats) -> Floats:
-        """Return what :meth:`acts` does, by the kernel."""
+    def _compiled_acts(self, network: Network, obs: Floats) -> Floats:
+        """Return the actions of :meth:`acts`, computed by the kernel."""
         seen = np.ascontiguousarray(obs, dtype=np.float32)
         acts = np.empty((len(seen), N_ACT), dtype=np.float32)
         arguments = new_compiled_actor(network, BASE_WEIGHT), seen, acts
@@ -153,7 +152,7 @@ class ReachPolicy(TrainedPolicy):
         return acts
 
     def _with_crowd(self, obs: Floats) -> Floats:
-        """Return what the first layer sees: people as a set are described as one."""
+        """Return the input of the first layer, with encoded people."""
         if not self._crowd:
             return obs
         blocks = obs[:, PEOPLE_SET.first :].reshape(-1, PEOPLE_SET.n_people, PEOPLE_SET.n_block)
@@ -162,7 +161,7 @@ class ReachPolicy(TrainedPolicy):
 
 
 def _hidden(rows: Floats, layers: tuple[Layer, ...]) -> Floats:
-    """Return what rectified layers make of rows, whose last axis they see."""
+    """Return the outputs of rectified layers over the last axis."""
     for weight, bias in layers:
         rows = rows @ weight
         rows += bias
@@ -177,12 +176,12 @@ def _layers_of(
 
     Args:
         arrays: Tensors of a checkpoint.
-        name: What the names of its tensors start with.
-        n_in: Numbers it sees.
-        n_out: Numbers it says.
+        name: Prefix of the tensor names.
+        n_in: Input size.
+        n_out: Output size.
 
     Raises:
-        CheckpointMismatch: The tensors do not make such a network.
+        CheckpointMismatch: The tensors do not form such a network.
     """
     layers: list[Layer] = []
     for number in range(MAX_LAYERS):

@@ -25,18 +25,18 @@ from app.sim.sorting.state import SortingShape
 
 
 def is_sorting(checkpoint: Checkpoint) -> bool:
-    """Tell whether a checkpoint sorts."""
+    """Return whether a checkpoint is a sorting policy."""
     return purpose_of(checkpoint.manifest) == SORTING
 
 
 class SortingPolicy(TrainedPolicy):
-    """Values the moves of the sorting task; safe to call from several threads.
+    """Sorting policy of a checkpoint; safe to call from several threads.
 
     Args:
         checkpoint: A ``policy`` checkpoint of a sorting preset.
 
     Raises:
-        CheckpointMismatch: It is for another task, network or layout.
+        CheckpointMismatch: The checkpoint has another task, network or layout.
     """
 
     def __init__(self, checkpoint: Checkpoint) -> None:
@@ -45,7 +45,7 @@ class SortingPolicy(TrainedPolicy):
         preset = read_config(SortingPreset, manifest["preset"], "manifest.preset")
         super().__init__(checkpoint)
         self.shape: SortingShape = shape_of(self._cell)
-        """Size of the tasks it knows."""
+        """Size of the tasks."""
         expect_layout(checkpoint, layout_of(self.shape), self.shape.n_actions)
         self._network = NETWORKS[preset.networks.kind](self.shape, preset.networks.width)
         try:
@@ -61,7 +61,7 @@ class SortingPolicy(TrainedPolicy):
             obs: Observations as ``sorting.observe`` makes them, shape (n, obs_size).
 
         Raises:
-            InvalidInput: They have another shape.
+            InvalidInput: The shape is another one.
         """
         if obs.ndim != 2 or obs.shape[1] != self.shape.obs_size:
             wanted = ["n", self.shape.obs_size]

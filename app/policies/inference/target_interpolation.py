@@ -15,7 +15,7 @@ from app.sim.reach.goal_sets import InterpolationWeights, TargetInterpolation, i
 from app.sim.reach.reach_actor import ReachActor
 
 INTERPOLATING = ("grid", "halton")
-"""Rules of goals that leave targets to interpolate between."""
+"""Sets of training goals with targets to interpolate between."""
 
 
 def interpolates(actor: ReachActor) -> bool:
@@ -47,7 +47,7 @@ class Interpolation:
 
         Args:
             goals: [m], shape (n, 3).
-            field: What messages call a goal.
+            field: Name of the goal in messages.
 
         Returns:
             Numbers and weights, shape (n, K), and positions [m], shape (n, K, 3).
@@ -59,10 +59,10 @@ class Interpolation:
         return mix, self.cells.targets[mix.which]
 
     def acts(self, obs: NDArray[np.float32], mix: InterpolationWeights) -> NDArray[np.float32]:
-        """Return the mean actions, shape (n, 6); targets without weight are not asked for.
+        """Return the mean actions, shape (n, 6); targets without weight are not queried.
 
         Args:
-            obs: What is observed for each target, shape (n, K, obs_size).
+            obs: Observations of each target, shape (n, K, obs_size).
             mix: Their weights.
         """
         used = mix.weights > 0.0

@@ -1,9 +1,9 @@
-"""The critic's choice among geometric tasks (METHOD 3.1).
+"""Task selection by the critic (docs/method.md 3.1).
 
-``R_i = Q(s_i, pi(s_i))`` for every candidate, the smaller of both critics, and the best one is
-taken; with hysteresis the previous choice is kept unless another is better by a margin, so that
-the robot does not dither. The same object decides for the HTTP route and the live cell, and the
-evaluations use the same networks and values.
+``R_i = Q(s_i, pi(s_i))`` for every candidate, with the smaller of both critics; the candidate
+with the greatest value is selected. With hysteresis the previous target is kept unless another
+one is better by a margin, which prevents oscillation. HTTP route, live cell and evaluations use
+the same networks.
 
 Source: thesis eq. (5.1)-(5.7). Deviates: hysteresis is ours; 0 gives the source's rule.
 """
@@ -48,21 +48,21 @@ from app.sim.robot.measured_state import StateLimits
 from app.sim.scene.scene import FAR_AWAY, arm_of, people_of
 
 HYSTERESIS = 0.2
-"""By how much another candidate's value must be better before the choice changes."""
+"""Margin of the value by which another candidate must be better."""
 LONGEST_S = 60.0
-"""Most time left that the policy sees [s]."""
+"""Maximum observed remaining time [s]."""
 MAX_CANDIDATES = 1000
-"""Most candidates taken at once."""
+"""Maximum number of candidates of one query."""
 
-_NOBODY = Person(q=human.rest_posture(*FAR_AWAY), qd=np.zeros(18))
-"""Who is seen where nobody is."""
+_FAR_PERSON = Person(q=human.rest_posture(*FAR_AWAY), qd=np.zeros(18))
+"""Observed person of an empty cell."""
 
 
 def pick_preset_of(checkpoint: Checkpoint) -> PickPreset:
     """Return the training configuration of a checkpoint of the pick scenario.
 
     Raises:
-        InvalidInput: It is no such configuration.
+        InvalidInput: The checkpoint has another purpose or an invalid configuration.
     """
     require_purpose(checkpoint, CHOOSING)
     return read_config(PickPreset, checkpoint.manifest["preset"], "manifest.preset")
@@ -75,7 +75,7 @@ class ValueNetworks:
         checkpoint: A ``policy`` checkpoint.
 
     Raises:
-        CheckpointMismatch: It was trained on another layout of observations or actions.
+        CheckpointMismatch: The layout of observations or actions is another one.
     """
 
     def __init__(self, checkpoint: Checkpoint) -> None:
@@ -126,8 +126,8 @@ class TaskChooser(TrainedPolicy):
 
     Args:
         checkpoint: A ``policy`` checkpoint.
-        cell: The work cell it shall decide in; by default the one it was trained in.
-        hysteresis: Margin before the choice changes.
+        cell: Work cell of the decisions; by default the training cell.
+        hysteresis: Margin by which another candidate must be better.
 
     Raises:
         CheckpointMismatch: The checkpoint is for another cell or layout.
@@ -159,11 +159,11 @@ class TaskChooser(TrainedPolicy):
         previous: str | None = None,
         time_left_s: float = 10.0,
     ) -> Decision:
-        """Choose one candidate; see :class:`~app.sim.pick.task_policy.TaskPolicy`.
+        """Select one candidate; see :class:`~app.sim.pick.task_policy.TaskPolicy`.
 
-        The checkpoint knows one person: it sees the one nearest to the robot, in the person's
-        own size (``observed_people.py``). The others count for nothing in this choice, and nor
-        does anybody who is farther away than policies know people to be.
+        The policy observes one person, the nearest to the robot, with the person's body size
+        (``observed_people.py``). Other people, and people farther away than any in training,
+        do not influence the selection.
         """
         started = time.perf_counter()
         robot_state = self._limits.take(q, qd)
@@ -202,35 +202,35 @@ class TaskChooser(TrainedPolicy):
         )
 
     def _speeds(self, q: Vec, qd: Vec, act: NDArray[np.float32]) -> Vec:
-        """Return the joint speeds that actions, shape (n, 5), ask for [rad/s], shape (n, 6)."""
+        """Return the joint speeds of actions, shape (n, 5) [rad/s], shape (n, 6)."""
         if self.action.meaning == "coefficient":
-            pieces = (
+            segments = (
                 step_robot(self._arm, q, qd, np.zeros(6), row, self.action) for row in act
             )
-            return np.stack([piece.qd for piece in pieces])
+            return np.stack([segment.qd for segment in segments])
         speeds = np.zeros((len(act), 6))
         speeds[:, :CONTROLLED] = act * self._arm.limits.qd_max[:CONTROLLED]
         return speeds
 
     def _nearest(self, q: Vec, people: Sequence[Person]) -> tuple[int | None, Person]:
-        """Return which person is seen, as policies know people; nobody where all are far."""
+        """Return index and state of the observed person; a far person if none is near."""
         known = checked_people(people)
         near = [i for i, person in enumerate(known) if not is_far(person)]
         found = nearest_index(self._arm, self._people, q, [known[i] for i in near])
         if found is None:
-            return None, _NOBODY
+            return None, _FAR_PERSON
         return near[found], as_known(known[near[found]])
 
 
 class _TrainedRanges:
-    """What a checkpoint met in training, to flag what lies outside."""
+    """Training range of a checkpoint, to flag inputs outside it."""
 
     SLACK = 0.02
-    """Values this far outside [m, rad or per second] are not flagged."""
+    """Tolerance of the training range [m, rad or per second]."""
 
     def __init__(self, checkpoint: Checkpoint) -> None:
         ranges = checkpoint.manifest["trained_range"]
-        self._met_nobody = pick_preset_of(checkpoint).people.human_absent > 0.0
+        self._trained_without_people = pick_preset_of(checkpoint).people.human_absent > 0.0
         self._low = {name: np.array(entry["low"]) for name, entry in ranges.items()}
         self._high = {name: np.array(entry["high"]) for name, entry in ranges.items()}
 
@@ -242,7 +242,7 @@ class _TrainedRanges:
             *self._outside("q", q, "robot.q", robot.JOINT_NAMES),
             *self._outside("qd", qd, "robot.qd", robot.JOINT_NAMES),
         )
-        if index is None and self._met_nobody:
+        if index is None and self._trained_without_people:
             return alone
         return (
             *alone,

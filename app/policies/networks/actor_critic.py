@@ -1,9 +1,9 @@
-"""The networks of TD3: actors, and critics with layer normalisation.
+"""Networks of TD3: actors, and critics with layer normalisation.
 
-The residual actor adds to a base motion that is part of the observation,
-``tanh(atanh(0.9 base) + net)``; its last layer starts near zero, so that the untrained policy
-is the straight joint move. The plain actor has no base: untrained, it holds still. These plain
-modules decide in the service; ``td3.py`` trains the same modules inside Stable-Baselines3.
+The residual actor corrects the action of a nominal controller, which is part of the
+observation: ``tanh(atanh(0.9 base) + net)``. Its last layer is initialised near zero, so that
+the untrained policy is the nominal controller; an untrained plain actor does not move.
+``td3.py`` trains these modules in Stable-Baselines3; inference uses them directly.
 
 Source: thesis section 5.3.4 (TD3); Lillicrap et al. 2016 and Fujimoto et al. 2018 for the
 losses. Deviates: the residual action and layer normalisation are ours.
@@ -20,32 +20,32 @@ from app.sim.pick.kernels.observation import BASE_START, N_FEATURES
 from app.sim.robot.kernels.arm import CONTROLLED
 
 BASE_WEIGHT = 0.9
-"""Share of the full speed the base motion may ask for, so that atanh stays finite."""
+"""Factor on the nominal action, which keeps atanh finite."""
 FIRST_RESIDUAL = 0.05
 """Factor on the initial weights of the actor's last layer."""
 CROWD_WIDTH = 64
-"""Numbers by which networks that see everybody as a set describe the set."""
+"""Number of features of the set encoding."""
 
 
 class CrowdShape(NamedTuple):
-    """Where people stand as a set in an observation (``reach/kernels/people_set.py``)."""
+    """Position of the people set in an observation (``reach/kernels/people_set.py``)."""
 
     first: int
-    """Numbers before them."""
+    """Index of the first block."""
     n_people: int
-    """Blocks, one for each person."""
+    """Number of blocks, one per person."""
     n_block: int
-    """Numbers of a block, of which the first is 1, or 0 where nobody is."""
+    """Length of a block; its first number is 1 if the person is present, otherwise 0."""
 
 
 class CrowdEncoder(nn.Module):
-    """Replaces the blocks of all people in an observation by CROWD_WIDTH numbers.
+    """Set encoding: replaces the blocks of all people in an observation by CROWD_WIDTH numbers.
 
-    Each block goes through the same layers; of everybody who is there the greatest of each
-    number counts, so that neither order nor number of people matters.
+    Each block passes through the same layers; the maximum over present people is invariant to
+    their order and number.
 
     Args:
-        shape: Where the blocks are.
+        shape: Position of the blocks.
 
     Source: Zaheer et al., *Deep sets* (2017); the maximum as in Qi et al., *PointNet* (2017).
     """
@@ -56,7 +56,7 @@ class CrowdEncoder(nn.Module):
         self.block = nn.Sequential(*hidden(shape.n_block, CROWD_WIDTH, 2))
 
     def forward(self, rows: torch.Tensor) -> torch.Tensor:
-        """Return rows, shape (n, first + CROWD_WIDTH + rest), of (n, first + all + rest)."""
+        """Return observations with encoded people, shape (n, first + CROWD_WIDTH + rest)."""
         first, n_people, n_block = self._shape
         last = first + n_people * n_block
         blocks = rows[:, first:last].reshape(-1, n_people, n_block)
@@ -65,22 +65,22 @@ class CrowdEncoder(nn.Module):
 
 
 def _seen(crowd: CrowdShape | None, n_obs: int) -> tuple[int, list[nn.Module]]:
-    """Return the numbers that the first layer sees, and what stands before it."""
+    """Return the input size of the first layer, and the modules before it."""
     if crowd is None:
         return n_obs, []
     return n_obs - crowd.n_people * crowd.n_block + CROWD_WIDTH, [CrowdEncoder(crowd)]
 
 
 class ResidualActor(nn.Module):
-    """Maps observations to actions in [-1, 1], on top of a base motion among what it sees.
+    """Map observations to actions in [-1, 1] as corrections of a nominal action.
 
     Args:
         width: Units per hidden layer.
-        n_obs: Numbers it sees, the first ones of an observation.
-        n_act: Numbers of an action.
-        base: Where in an observation the base motion starts.
-        layers: Hidden layers.
-        crowd: Where people stand as a set; None: nowhere.
+        n_obs: Input size: length of the observation's part that the actor uses.
+        n_act: Length of an action.
+        base: Index of the nominal action in an observation.
+        layers: Number of hidden layers.
+        crowd: Position of the people set; None without one.
     """
 
     def __init__(
@@ -110,14 +110,14 @@ class ResidualActor(nn.Module):
 
 
 class PlainActor(nn.Module):
-    """Maps observations to actions in [-1, 1], with no motion to start from.
+    """Map observations to actions in [-1, 1] without a nominal action.
 
     Args:
         width: Units per hidden layer.
-        n_obs: Numbers it sees, the first ones of an observation.
-        n_act: Numbers of an action.
-        layers: Hidden layers.
-        crowd: Where people stand as a set; None: nowhere.
+        n_obs: Input size: length of the observation's part that the actor uses.
+        n_act: Length of an action.
+        layers: Number of hidden layers.
+        crowd: Position of the people set; None without one.
     """
 
     def __init__(
@@ -143,7 +143,7 @@ class PlainActor(nn.Module):
 
 
 def hidden(n_in: int, width: int, layers: int, normed: bool = False) -> list[nn.Module]:
-    """Return hidden layers of rectified units, each normalised or none."""
+    """Return hidden layers of rectified units, with layer normalisation if ``normed``."""
     made: list[nn.Module] = []
     for layer in range(layers):
         made.append(nn.Linear(width if layer else n_in, width))
@@ -154,16 +154,16 @@ def hidden(n_in: int, width: int, layers: int, normed: bool = False) -> list[nn.
 
 
 class QNetwork(nn.Sequential):
-    """Maps (observation, action) to one value, or several.
+    """Map observation and action to one or several values.
 
     Args:
         width: Units per hidden layer.
         n_obs: Length of observations.
-        n_act: Numbers of an action.
-        layers: Hidden layers.
-        normed: Whether they are normalised.
-        n_values: Values.
-        crowd: Where people stand as a set; None: nowhere.
+        n_act: Length of an action.
+        layers: Number of hidden layers.
+        normed: Whether hidden layers are normalised.
+        n_values: Number of values.
+        crowd: Position of the people set; None without one.
     """
 
     def __init__(
@@ -187,12 +187,12 @@ class Critics(nn.Module):
     Args:
         width: Units per hidden layer.
         n_obs: Length of observations.
-        n_act: Numbers of an action.
+        n_act: Length of an action.
         n_critics: Number of value functions.
-        layers: Hidden layers of each.
-        normed: Whether they are normalised.
-        n_values: Values that each says.
-        crowd: Where people stand as a set; None: nowhere.
+        layers: Number of hidden layers of each.
+        normed: Whether hidden layers are normalised.
+        n_values: Number of values of each.
+        crowd: Position of the people set; None without one.
     """
 
     def __init__(
@@ -218,15 +218,15 @@ class Critics(nn.Module):
         return tuple(q(both) for q in self.children())
 
     def least(self, obs: torch.Tensor, act: torch.Tensor) -> torch.Tensor:
-        """Return the smallest of all values, shape (n,): the cautious estimate."""
+        """Return the minimum over the value functions, shape (n,)."""
         return reduce(torch.minimum, self.forward(obs, act)).squeeze(1)
 
     def targets(self, obs: torch.Tensor, act: torch.Tensor) -> torch.Tensor:
-        """Return the values that targets are made of, shape (n, 1): the smallest."""
+        """Return the values for temporal-difference targets, shape (n, 1): the minimum."""
         return self.least(obs, act).unsqueeze(1)
 
     def first(self, obs: torch.Tensor, act: torch.Tensor) -> torch.Tensor:
-        """Return the first value, shape (n, 1), which an actor climbs."""
+        """Return the value that the actor maximises, shape (n, 1): the first function's."""
         value: torch.Tensor = next(self.children())(torch.cat([obs, act], dim=1))
         return value
 
@@ -237,13 +237,13 @@ class Critics(nn.Module):
         target: torch.Tensor,
         weights: torch.Tensor | None,
     ) -> tuple[torch.Tensor, torch.Tensor]:
-        """Return the sum of all squared errors' means, and errors of each row, (n,).
+        """Return the sum of mean squared errors, and mean absolute errors, shape (n,).
 
         Args:
-            obs: Observations, (n, n_obs).
-            act: Actions, (n, n_act).
-            target: What they should say, (n, 1).
-            weights: Importance weights, (n, 1); None: all equal.
+            obs: Observations, shape (n, n_obs).
+            act: Actions, shape (n, n_act).
+            target: Target values, shape (n, 1).
+            weights: Importance weights, shape (n, 1); None for equal weights.
         """
         values = [value.float() for value in self.forward(obs, act)]
         if weights is None:

@@ -1,12 +1,12 @@
-"""A linear layer over one-hot codes, without the zeros: compiled, with its gradient.
+"""Sparse linear layer over one-hot codes, compiled, with its gradient.
 
-A row of ``P`` codes in ``0 .. n_codes - 1``, each written as a one-hot vector, times a matrix
-is the sum of ``P`` of the matrix's rows. Code 0 stands for a free place and is by far the most
-frequent one, so the sum starts from all places free and changes only what is not::
+The product of ``P`` one-hot vectors, with codes in ``0 .. n_codes - 1``, and a matrix is the
+sum of ``P`` rows of the matrix. Code 0 denotes a free place and is the most frequent one; the
+sum therefore starts from free places and adds the differences of the others::
 
     y = sum_p W[p, 0] + sum_{p: code_p > 0} (W[p, code_p] - W[p, 0])
 
-The function and its weights are those of the plain product, rounded otherwise.
+Function and weights are those of the dense product up to rounding.
 """
 
 from typing import Any
@@ -24,13 +24,13 @@ Codes = NDArray[np.uint8]
 
 @kernel(nogil=True, fastmath=True)
 def sum_rows(codes: Codes, n_codes: int, weight: Floats, out: Floats) -> None:
-    """Add to each row of ``out`` what its codes change against free places.
+    """Add the differences of occupied to free places to each row of ``out``.
 
     Args:
-        codes: Shape (n, P).
-        n_codes: Codes a place may have.
+        codes: Codes, shape (n, P).
+        n_codes: Number of codes of a place.
         weight: One row per place and code, shape (P * n_codes, width).
-        out: Changed, shape (n, width).
+        out: Sums, changed in place, shape (n, width).
     """
     for i in range(codes.shape[0]):
         for p in range(codes.shape[1]):
@@ -43,14 +43,14 @@ def sum_rows(codes: Codes, n_codes: int, weight: Floats, out: Floats) -> None:
 
 @kernel(nogil=True, fastmath=True)
 def add_gradient(codes: Codes, n_codes: int, above: Floats, total: Floats, out: Floats) -> None:
-    """Write the gradient of :func:`sum_rows`' result with respect to the matrix.
+    """Write the gradient of the layer with respect to the matrix.
 
     Args:
-        codes: Shape (n, P).
-        n_codes: Codes a place may have.
-        above: Gradient with respect to the result, shape (n, width).
-        total: Its sum over rows, shape (width,).
-        out: Filled, shape (P * n_codes, width).
+        codes: Codes, shape (n, P).
+        n_codes: Number of codes of a place.
+        above: Gradient with respect to the layer's output, shape (n, width).
+        total: Sum of ``above`` over rows, shape (width,).
+        out: Gradient, filled, shape (P * n_codes, width).
     """
     for p in range(codes.shape[1]):
         for k in range(p * n_codes, (p + 1) * n_codes):
@@ -89,13 +89,13 @@ class _Product(torch.autograd.Function):
 
 
 class OneHotLinear(nn.Module):
-    """Maps codes, and plain numbers beside them, linearly.
+    """Linear layer over one-hot codes and plain numbers.
 
     Args:
-        n_places: Codes of a row, P.
-        n_codes: Codes a place may have; 0 is a free place.
-        n_plain: Plain numbers of a row.
-        width: Units.
+        n_places: Number of codes, P.
+        n_codes: Number of codes of a place; 0 is a free place.
+        n_plain: Number of plain numbers.
+        width: Number of outputs.
     """
 
     def __init__(self, n_places: int, n_codes: int, n_plain: int, width: int) -> None:

@@ -92,7 +92,7 @@ class SharedNetwork(nn.Module):
     relative: Tensor
     """Codes as each tower counts colours, (C, n_types + 1)."""
     absolute: Tensor
-    """The way back, (C, n_types + 1)."""
+    """The inverse mapping, (C, n_types + 1)."""
 
     def __init__(self, shape: SortingShape, width: int) -> None:
         super().__init__()

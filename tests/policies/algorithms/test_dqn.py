@@ -91,7 +91,7 @@ def test_the_margin_asks_one_best_move_to_be_worth_more(values, short):
     assert float(large_margin_loss(torch.tensor([values]), best, 0.1)) == pytest.approx(short)
 
 
-def test_several_best_moves_need_not_be_told_apart():
+def test_several_best_moves_need_no_margin_between_them():
     best = torch.tensor([[True, True, False]])
     values = torch.tensor([[0.1, 1.0, 0.5]])
     assert float(large_margin_loss(values, best, 0.1)) == 0.0

@@ -46,7 +46,7 @@ def test_policy_refuses_another_cell_and_a_changed_one(own_policy):
         TaskChooser(own_policy, workshop.cell(title="Changed"))
 
 
-def test_policy_of_a_cell_is_told_by_its_manifest(own_policy):
+def test_manifest_states_the_cell_of_a_policy(own_policy):
     shipped = pretrained.load("pick").manifest
     assert is_for(own_policy.manifest, workshop.cell())
     assert not is_for(own_policy.manifest, workshop.cell(title="Changed"))

@@ -25,8 +25,8 @@ def policy() -> ReachPolicy:
 
 
 def test_policy_without_targets_cannot_be_interpolated() -> None:
-    pilot = TrainedReachPolicy(ReachPolicy(untrained_reach(width=32, goals="box")))
-    assert pilot.inference_modes == (
+    live = TrainedReachPolicy(ReachPolicy(untrained_reach(width=32, goals="box")))
+    assert live.inference_modes == (
         "direct",
         "distance-weighted",
         "direct-rollout",
@@ -35,17 +35,17 @@ def test_policy_without_targets_cannot_be_interpolated() -> None:
 
 
 def test_live_state_is_seen_as_the_batch_sees_it(policy: ReachPolicy) -> None:
-    pilot = TrainedReachPolicy(policy)
+    live = TrainedReachPolicy(policy)
     batch = ReachBatch(CELL, 1, 11, ReachSettings(observation=policy.view))
     batch.reset()
     for _ in range(5):
         batch.step(np.full((1, 6), 0.3, dtype=np.float32))
-    world = LiveReachWorld(CELL, pilot, seed=1)
-    robot, driver = world.robot, ReachController(CELL, pilot)
+    world = LiveReachWorld(CELL, live, seed=1)
+    robot, driver = world.robot, ReachController(CELL, live)
     state = batch.state
     robot.q, robot.qd, robot.qdd = state.q[0], state.qd[0], state.qdd[0]
-    for way in pilot.inference_modes:
-        driver.inference_mode = way
+    for mode in live.inference_modes:
+        driver.inference_mode = mode
         act = driver.act(
             robot,
             state.people.walkers.rows[0],
@@ -55,46 +55,46 @@ def test_live_state_is_seen_as_the_batch_sees_it(policy: ReachPolicy) -> None:
             float(state.elapsed[0]),
             None,
         )
-        assert np.allclose(act, controller_of(policy, way).acts(batch)[0], atol=1e-6)
+        assert np.allclose(act, controller_of(policy, mode).acts(batch)[0], atol=1e-6)
 
 
 class Noting(TrainedReachPolicy):
-    """Notes what it is told about time."""
+    """Record the observed times."""
 
     def __init__(self, actor: ReachPolicy) -> None:
         super().__init__(actor)
-        self.told: list[tuple[float, float]] = []
+        self.times: list[tuple[float, float]] = []
 
     def acts(
-        self, batch: ReachBatch, way: str, safety: SafetySettings | None
+        self, batch: ReachBatch, mode: str, safety: SafetySettings | None
     ) -> NDArray[np.float32]:
-        self.told.append((float(batch.state.elapsed[0]), float(batch.state.time_left[0])))
-        return super().acts(batch, way, safety)
+        self.times.append((float(batch.state.elapsed[0]), float(batch.state.time_left[0])))
+        return super().acts(batch, mode, safety)
 
 
 @pytest.mark.parametrize(("on", "measured"), [(True, True), (True, False), (False, True)])
-def test_looking_ahead_is_told_of_the_layer_that_is_obeyed(
+def test_the_rollout_knows_the_active_safety_layer(
     policy: ReachPolicy, on: bool, measured: bool
 ) -> None:
-    pilot = TrainedReachPolicy(policy)
-    world = LiveReachWorld(CELL, pilot, seed=1)
+    live = TrainedReachPolicy(policy)
+    world = LiveReachWorld(CELL, live, seed=1)
     world.apply(SetInferenceMode(inference_mode="direct-rollout"))
     world.apply(SetSafety(on=on, use_measured_velocity=measured))
-    controller = pilot._controllers["direct-rollout"]
+    controller = live._controllers["direct-rollout"]
     assert isinstance(controller, RolloutController)
     assert (controller.layer != NO_CONSTRAINT) == (on and measured)
 
 
-def test_under_the_layer_the_policy_has_its_usual_time_and_looking_ahead_the_true_one(
+def test_under_the_layer_remaining_time_is_constant_and_elapsed_time_true(
     policy: ReachPolicy,
 ) -> None:
-    pilot = Noting(policy)
-    world = LiveReachWorld(CELL, pilot, seed=1)
+    live = Noting(policy)
+    world = LiveReachWorld(CELL, live, seed=1)
     world.apply(SetInferenceMode(inference_mode="direct"))
-    pilot.told.clear()
-    while world.snapshot().status == "moving" and len(pilot.told) < 90:
+    live.times.clear()
+    while world.snapshot().status == "moving" and len(live.times) < 90:
         world.step()
-    elapsed, left = np.array(pilot.told).T
+    elapsed, left = np.array(live.times).T
     assert len(elapsed) > 60
     np.testing.assert_allclose(np.diff(elapsed), CELL.robot.dt, atol=1e-9)
     assert (left == TIME_LIMIT_S).all()
@@ -103,15 +103,15 @@ def test_under_the_layer_the_policy_has_its_usual_time_and_looking_ahead_the_tru
 def test_policy_moves_the_robot_of_a_live_cell_with_any_number_of_people(
     policy: ReachPolicy,
 ) -> None:
-    pilot = TrainedReachPolicy(policy)
+    live = TrainedReachPolicy(policy)
     world = LiveReachWorld(CELL, None, seed=1)
-    world.apply(SetPolicy(checkpoint=None).with_loaded(pilot))
+    world.apply(SetPolicy(checkpoint=None).with_loaded(live))
     shown = world.snapshot()
     assert (shown.checkpoint, shown.reach.inference_mode) == (
-        pilot.checkpoint,
+        live.checkpoint,
         "interpolated-rollout",
     )
-    assert shown.reach.inference_modes == pilot.inference_modes
+    assert shown.reach.inference_modes == live.inference_modes
     world.apply(commands.AddPerson())
     world.apply(SetInferenceMode(inference_mode="distance-weighted-interpolated"))
     world.step()
@@ -129,8 +129,8 @@ def test_goals_jump_among_the_targets_unless_the_policy_is_interpolated(
 ) -> None:
     world = LiveReachWorld(CELL, TrainedReachPolicy(policy), seed=1)
     on_target = []
-    for way in ("direct", "interpolated"):
-        world.apply(SetInferenceMode(inference_mode=way))
+    for mode in ("direct", "interpolated"):
+        world.apply(SetInferenceMode(inference_mode=mode))
         world._goal.jump()
         on_target.append(world.snapshot().reach.on_target)
     assert on_target == [True, False]

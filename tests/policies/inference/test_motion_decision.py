@@ -59,8 +59,8 @@ def driven(n_envs: int, people: tuple[str, ...], **other: Any) -> ReachBatch:
     return batch
 
 
-def told(batch: ReachBatch, e: int) -> MotionQuestion:
-    """The state of one cell, as somebody else would tell it."""
+def question_of(batch: ReachBatch, e: int) -> MotionQuestion:
+    """Return the query with the state of one environment."""
     state, rows = batch.state, batch.state.people
     people = [
         Person(q=q.copy(), qd=qd.copy()) for q, qd in zip(rows.q[e], rows.qd[e], strict=True)
@@ -77,9 +77,9 @@ def told(batch: ReachBatch, e: int) -> MotionQuestion:
     )
 
 
-def remembered(batch: ReachBatch, e: int) -> MotionQuestion:
-    """The state of one cell with what is remembered of its walkers."""
-    asked, rows = told(batch, e), batch.state.people.walkers.rows[e]
+def with_history(batch: ReachBatch, e: int) -> MotionQuestion:
+    """Return the query of one environment with the history of its pedestrians."""
+    asked, rows = question_of(batch, e), batch.state.people.walkers.rows[e]
     past = [
         np.stack([row[k : k + N_PAST] for k in (PAST_RADIUS, PAST_SPEED)], axis=1)[1:]
         for row in rows
@@ -88,17 +88,17 @@ def remembered(batch: ReachBatch, e: int) -> MotionQuestion:
     return replace(asked, people=people)
 
 
-@pytest.mark.parametrize("way", ["interpolated", "direct"])
+@pytest.mark.parametrize("mode", ["interpolated", "direct"])
 @pytest.mark.parametrize(
     "people", [(), ("walker",), ("walker", "constant"), ("worker", "walker")]
 )
-def test_one_state_gives_the_action_and_piece_that_training_gives(
-    people: tuple[str, ...], way: str
+def test_one_state_gives_the_action_and_segment_of_training(
+    people: tuple[str, ...], mode: str
 ) -> None:
     batch, actor = driven(6, people), RandomActor()
     running = np.flatnonzero(batch.state.outcome == 0)
-    expected, decide = controller_of(actor, way).acts(batch), MotionDecider(actor, CELL).decide
-    found = {int(e): decide(replace(told(batch, e), inference_mode=way)) for e in running}
+    expected, decide = controller_of(actor, mode).acts(batch), MotionDecider(actor, CELL).decide
+    found = {int(e): decide(replace(question_of(batch, e), inference_mode=mode)) for e in running}
     clear, distance = batch.state.clear.copy(), batch.state.distance.copy()
     batch.step(expected, auto_reset=False)
     assert len(found) > 2
@@ -112,7 +112,7 @@ def test_one_state_gives_the_action_and_piece_that_training_gives(
 
 def test_people_may_come_in_any_order() -> None:
     batch = driven(4, ("worker", "walker", "constant"))
-    asked, one = told(batch, 1), decider()
+    asked, one = question_of(batch, 1), decider()
     turned = replace(asked, people=asked.people[::-1])
     for beside in ("nearest", "distance-weighted"):
         first = one.decide(replace(asked, beside=beside))
@@ -124,12 +124,12 @@ def test_people_may_come_in_any_order() -> None:
         assert first.seen == 2 - second.seen
 
 
-def test_averaged_is_what_the_mover_does() -> None:
+def test_distance_weighted_actions_equal_those_of_the_controller() -> None:
     batch, actor = driven(5, ("walker", "constant", "fixed-speed")), RandomActor()
     expected = controller_of(actor, "distance-weighted-interpolated").acts(batch)
     decide = MotionDecider(actor, CELL).decide
     for e in np.flatnonzero(batch.state.outcome == 0):
-        decision = decide(replace(told(batch, e), beside="distance-weighted"))
+        decision = decide(replace(question_of(batch, e), beside="distance-weighted"))
         np.testing.assert_allclose(decision.act, expected[e], atol=2e-6)
         assert sum(one.weight for one in decision.met) == pytest.approx(1.0)
 
@@ -145,13 +145,13 @@ def test_weights_of_targets_sum_to_one_and_give_the_goal_back() -> None:
 
 
 @pytest.mark.parametrize("goals", ["grid", "halton"])
-def test_at_a_training_target_both_ways_are_one(goals: str) -> None:
+def test_at_a_training_target_both_modes_agree(goals: str) -> None:
     one, region = decider(goals), CELL.goal_region
     targets = region.targets() if goals == "grid" else halton_targets(region)
     for target in targets[::7]:
         found = [
-            one.decide(question(goal=target, inference_mode=way))
-            for way in ("interpolated", "direct")
+            one.decide(question(goal=target, inference_mode=mode))
+            for mode in ("interpolated", "direct")
         ]
         np.testing.assert_array_equal(found[0].act, found[1].act)
         assert [target.weight for target in found[0].targets] == [1.0]
@@ -164,9 +164,9 @@ def test_interpolation_refuses_goals_outside_and_direct_flags_them() -> None:
         decider(trained_range=trained).decide(far)
     (axis,) = caught.value.problem()["outside"]
     assert (axis["axis"], axis["by_m"]) == ("y", pytest.approx(0.6))
-    for goals, way in (("grid", "direct"), ("box", None)):
+    for goals, mode in (("grid", "direct"), ("box", None)):
         decision = decider(goals, trained_range=trained).decide(
-            replace(far, inference_mode=way)
+            replace(far, inference_mode=mode)
         )
         assert [one.field for one in decision.outside] == ["goal.y"]
         assert decision.inference_mode == "direct"
@@ -197,7 +197,7 @@ def test_people_inside_the_robot_are_refused_without_monitoring() -> None:
 
 
 @pytest.mark.parametrize("speed", [0.0, 0.6])
-def test_with_monitoring_somebody_inside_the_robot_is_a_stop(speed: float) -> None:
+def test_with_monitoring_a_person_inside_the_robot_is_a_stop(speed: float) -> None:
     qd, people = np.full(6, speed), (FAR_PERSON, inside_robot())
     asked = question(qd=qd, people=people, safety=SafetySettings())
     decision = decider().decide(asked)
@@ -221,9 +221,9 @@ def test_monitoring_tells_the_terms_that_make_up_the_distance() -> None:
     assert decision.safe.override < 1.0 and decision.safe.person == 0
     assert terms.reaction_time == pytest.approx(0.02 + 0.1 + 0.04)
     assert terms.stop_time == pytest.approx(0.1)
-    way = 1.2 * (terms.reaction_time + 0.1) + terms.robot_speed * terms.reaction_time
-    way += terms.robot_speed * 0.1 / 2 + 0.05 + 0.02 + 0.3
-    assert terms.required == pytest.approx(way) == decision.safe.required
+    mode = 1.2 * (terms.reaction_time + 0.1) + terms.robot_speed * terms.reaction_time
+    mode += terms.robot_speed * 0.1 / 2 + 0.05 + 0.02 + 0.3
+    assert terms.required == pytest.approx(mode) == decision.safe.required
     assert terms.separation == pytest.approx(decision.met[0].separation, abs=1e-9)
 
 
@@ -243,8 +243,8 @@ def test_far_from_people_monitoring_leaves_the_piece_as_it_is() -> None:
     np.testing.assert_array_equal(decision.safe.q, decision.piece.q)
     assert decision.terms is not None and decision.terms_of == 0
     assert decision.terms.separation > decision.terms.required
-    nobody = decider().decide(question(people=(), safety=SafetySettings()))
-    assert nobody.terms is None and nobody.seen is None
+    no_people = decider().decide(question(people=(), safety=SafetySettings()))
+    assert no_people.terms is None and no_people.seen is None
 
 
 def test_a_policy_that_limits_jerk_needs_accelerations() -> None:
@@ -294,13 +294,13 @@ def test_a_policy_of_a_box_cannot_be_asked_to_interpolate() -> None:
 
 
 def test_a_policy_that_cannot_look_ahead_says_so() -> None:
-    with pytest.raises(InvalidInput, match="sees forecasts") as refused:
+    with pytest.raises(InvalidInput, match="option features") as refused:
         decider().decide(question(rollout=True))
     assert refused.value.field == "rollout"
     assert decider().decide(question()).rollout is False
 
 
-def test_looking_ahead_answers_whatever_is_told() -> None:
+def test_rollouts_answer_any_valid_query() -> None:
     rng = np.random.default_rng(6)
     one = MotionDecider(ReachPolicy(pretrained.load("reach")), CELL)
     began = 0
@@ -317,7 +317,7 @@ def test_an_answer_does_not_hang_on_what_was_asked_before() -> None:
     rng = np.random.default_rng(6)
     questions = [random_question(rng) for _ in range(40)]
     questions += [
-        remembered(batch, e) for e in np.flatnonzero(batch.state.outcome == 0).tolist()
+        with_history(batch, e) for e in np.flatnonzero(batch.state.outcome == 0).tolist()
     ]
     one = MotionDecider(actor, CELL)
     for k, asked in enumerate(questions):
@@ -326,7 +326,7 @@ def test_an_answer_does_not_hang_on_what_was_asked_before() -> None:
         assert np.array_equal(one.decide(late).act, first.act)
 
 
-def test_who_has_sought_the_goal_for_long_tries_other_ways() -> None:
+def test_after_a_long_time_further_candidates_are_simulated() -> None:
     rng = np.random.default_rng(6)
     one = MotionDecider(ReachPolicy(pretrained.load("reach")), CELL)
     tried = 0
@@ -337,7 +337,7 @@ def test_who_has_sought_the_goal_for_long_tries_other_ways() -> None:
     assert tried > 0
 
 
-def test_the_policy_is_told_of_no_more_time_than_it_met() -> None:
+def test_the_observed_remaining_time_is_at_most_that_of_training() -> None:
     one = MotionDecider(ReachPolicy(pretrained.load("reach")), CELL)
     acts = [one.decide(question(time_left_s=left)).act for left in (2.0, 5.0, 25.0)]
     assert np.array_equal(acts[1], acts[2])
@@ -384,7 +384,7 @@ def keeps_limits(decision: MotionDecision, asked: MotionQuestion) -> bool:
     )
 
 
-def test_whatever_state_is_told_the_answer_is_finite_and_keeps_limits() -> None:
+def test_any_valid_state_gives_a_finite_answer_within_limits() -> None:
     rng, one = np.random.default_rng(4), decider()
     stopped = 0
     for _ in range(150):

@@ -76,7 +76,7 @@ def test_it_says_what_it_is(checkpoint):
 
 
 @pytest.mark.parametrize("kind", ["residual", "plain"])
-def test_people_as_a_set_have_no_order_and_nobody_counts_for_nothing(kind):
+def test_the_set_encoding_ignores_order_and_absent_people(kind):
     checkpoint = untrained_reach(seed=4, width=48, actor=kind, observation="people-set")
     policy = ReachPolicy(checkpoint)
     preset = reach_preset(width=48, actor=kind, observation="people-set")

@@ -36,6 +36,6 @@ def test_only_policies_with_targets_interpolate() -> None:
         Interpolation(RandomActor("box"))
 
 
-def test_messages_call_the_goal_as_they_are_told() -> None:
+def test_messages_use_the_given_field_of_the_goal() -> None:
     with pytest.raises(GoalOutside, match=r"^goals\[3\] = "):
         Interpolation(RandomActor()).around(np.array([[9.0, 0.8, 0.3]]), "goals[3]")

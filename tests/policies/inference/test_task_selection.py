@@ -137,12 +137,12 @@ def test_the_size_of_the_person_counts(chooser):
     assert values[0] == values[1] != values[2]
 
 
-def test_nobody_in_the_cell_is_answered(chooser):
+def test_an_empty_cell_is_answered(chooser):
     decision = chooser.decide(HOME, np.zeros(6), [], cubes("cube0"))
     assert (decision.seen, decision.outside) == (None, ())  # It was trained beside nobody too.
 
 
-def test_a_policy_that_never_met_nobody_says_so():
+def test_an_empty_cell_is_flagged_if_training_had_none():
     checkpoint = pretrained.load("pick")
     preset = checkpoint.manifest["preset"]
     preset = {**preset, "people": {**preset["people"], "human_absent": 0.0}}

@@ -90,7 +90,7 @@ def test_the_monitored_preset_trains_and_is_counted_under_the_layer():
     assert (batch.state.clear[:, 0] >= 0.8).all()
 
 
-def test_monitoring_nobody_is_refused():
+def test_monitoring_without_people_is_refused():
     with pytest.raises(
         InvalidInput, match=r"overrides\.episode\.safety = 'ssm' needs n_people above 0"
     ):

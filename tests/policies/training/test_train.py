@@ -24,11 +24,11 @@ def test_the_curve_lies_on_the_grid_and_counts_updates(tiny_run):
     assert tiny_run.progress[-1].time_left_s == 0.0
 
 
-def test_time_left_is_told_from_the_first_updates_on(tiny_run):
-    told = [point.time_left_s is not None for point in tiny_run.progress]
-    assert told == [point.updates > 0 for point in tiny_run.progress]
-    assert told[0] is False
-    assert all(told[1:])
+def test_remaining_time_is_reported_from_the_first_updates_on(tiny_run):
+    reported = [point.time_left_s is not None for point in tiny_run.progress]
+    assert reported == [point.updates > 0 for point in tiny_run.progress]
+    assert reported[0] is False
+    assert all(reported[1:])
 
 
 def test_rates_of_a_point_sum_to_one_where_episodes_ended(tiny_run):
@@ -96,14 +96,14 @@ def test_a_policy_checkpoint_does_not_resume(tiny_preset, tiny_run):
 
 @pytest.fixture(scope="module")
 def body_policy():
-    """A policy that is told the size of the person, hardly trained."""
+    """A policy that is reported the size of the person, hardly trained."""
     preset = preset_of(
         "pick-td3", {**TINY, "learning.total_steps": 1024, "episode.observation": "body"}
     )
     return Recorder().run(preset).checkpoint
 
 
-def test_a_policy_that_is_told_the_size_decides_by_it(body_policy, tiny_run):
+def test_a_policy_that_observes_the_size_decides_by_it(body_policy, tiny_run):
     networks = ValueNetworks(body_policy)
     assert networks.n_obs == N_WITH_BODY
     assert ValueNetworks(tiny_run.result.checkpoint).n_obs == N_FEATURES
@@ -115,7 +115,7 @@ def test_a_policy_that_is_told_the_size_decides_by_it(body_policy, tiny_run):
     assert value[0] != value[1] and not np.array_equal(act[0], act[1])
 
 
-def test_a_policy_that_is_told_the_size_decides_beside_small_and_large_people(body_policy):
+def test_a_policy_that_observes_the_size_decides_beside_small_and_large_people(body_policy):
     cell, chooser, values = load_cell(), TaskChooser(body_policy), []
     q, rest = np.array(cell.robot.home_q), human.rest_posture(*cell.human.home)
     candidates = [Candidate(id=s.id, position=s.position) for s in cell.stations[:3]]
