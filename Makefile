@@ -81,10 +81,10 @@ docs: $(VENV)/dev.stamp ## build the site of the documents in build/site, strict
 
 tables: $(VENV)/dev.stamp ## write the tables of README, docs and model cards from docs/results
 	@$(PY) -m tools.docs.tables
-	@$(PY) -m tools.docs.world_page --page
+	@$(PY) -m tools.docs.world.page --page
 
 world: $(VENV)/dev.stamp ## measure, draw and write docs/world.md
-	@$(PY) -m tools.docs.world_page
+	@$(PY) -m tools.docs.world.page
 
 lock: $(VENV)/dev.stamp ## resolve the lock files (UPGRADE=--upgrade: newest versions)
 	@$(PIP) install --quiet uv==$(UV)

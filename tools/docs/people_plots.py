@@ -26,7 +26,7 @@ from app.sim.primitives.demonstrations import PHASES, STYLES, between, draw_keyf
 from app.sim.primitives.library_file import FILE, HANDS, load_primitives, read_header
 from app.sim.primitives.primitive_library import MotionLibrary, motion_library
 from tests.sim.library_motions import SegmentMotion, random_segment, random_segments
-from tools.docs.world_plots import BLUE, GREEN, GREY, LIGHT, ORANGE, panels, save
+from tools.docs.world.plots import BLUE, GREEN, GREY, LIGHT, ORANGE, panels, save
 
 ROOT = Path(__file__).resolve().parents[2]
 

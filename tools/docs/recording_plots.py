@@ -36,7 +36,7 @@ from app.sim.mocap.joint_centres import (
     model_points,
 )
 from app.sim.mocap.skeletons import body_track
-from tools.docs.world_plots import BLUE, GREEN, GREY, ORANGE, RED, panels, save
+from tools.docs.world.plots import BLUE, GREEN, GREY, ORANGE, RED, panels, save
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -16,8 +16,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from tools.docs import headline, reach_tables
-from tools.docs.sorting_tables import is_sorting, lines_of
+from tools.docs import headline
+from tools.docs.reach import tables as reach_tables
+from tools.docs.sorting.tables import is_sorting, lines_of
 
 ROOT = Path(__file__).resolve().parents[2]
 

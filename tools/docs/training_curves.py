@@ -4,8 +4,8 @@
         [--set FIELD=VALUE]
 
 The folder contains ``curve.jsonl``, one line per point (steps, updates, CPU seconds, success
-and return of greedy episodes), and one policy per checkpoint; ``sorting_curves.py`` and
-``reach_curves.py`` evaluate them. An interrupted run is resumed.
+and return of greedy episodes), and one policy per checkpoint; ``sorting/curves.py`` and
+``reach/curves.py`` evaluate them. An interrupted run is resumed.
 """
 
 import argparse

@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from tools.docs.reach_tables import DIRECTED
+from tools.docs.reach.tables import DIRECTED
 from tools.docs.tables import BLOCK, HEADLINE, ROOT, conditions, header, pages, render, table
 
 RATE = {"mean": 0.9712, "low": 0.959, "high": 0.98}

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 
-from tools.docs.world_plots import BLUE, GREEN, GREY, ORANGE, RED, panels, save
+from tools.docs.world.plots import BLUE, GREEN, GREY, ORANGE, RED, panels, save
 
 __all__ = [
     "BLUE",

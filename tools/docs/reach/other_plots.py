@@ -1,6 +1,6 @@
 """Pictures of the reach results: several people, trackers, smoothness, learning curves.
 
-Called by ``reach_plots.py``.
+Called by ``reach/plots.py``.
 """
 
 from collections.abc import Callable, Sequence
@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter
 
-from tools.docs.reach_style import (
+from tools.docs.reach.style import (
     BLUE,
     GREEN,
     GREY,

@@ -1,6 +1,6 @@
 """Draw the pictures of ``docs/results/reach.md`` from ``docs/results/reach*.json``.
 
-    python -m tools.docs.reach_plots
+    python -m tools.docs.reach.plots
 
 Writes ``docs/img/reach/*.png``: heat maps of success and collisions over the targets at three
 heights (thesis fig. 4.5 and 4.6), episode durations, goals between targets, other people and
@@ -18,8 +18,8 @@ from matplotlib.axes import Axes
 from matplotlib.colors import Colormap, LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
 
-from tools.docs.reach_other_plots import curves, others, smoothness
-from tools.docs.reach_style import (
+from tools.docs.reach.other_plots import curves, others, smoothness
+from tools.docs.reach.style import (
     BLUE,
     GREEN,
     GREY,
@@ -34,9 +34,9 @@ from tools.docs.reach_style import (
     percent,
     save,
 )
-from tools.docs.reach_tables import policy_of, siblings
+from tools.docs.reach.tables import policy_of, siblings
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 
 RESULTS, IMAGES = ROOT / "docs/results", ROOT / "docs/img/reach"
 FLOOR, CEILING = 0.90, 0.10

@@ -1,6 +1,6 @@
 """Ablation study of ``reach-td3``: one change at a time, several training seeds.
 
-    python -m tools.docs.reach_ablation FOLDER [--seeds 1 2 3] [--only NAME ...] [--measure]
+    python -m tools.docs.reach.ablation FOLDER [--seeds 1 2 3] [--only NAME ...] [--measure]
 
 Trains ``reach-td3`` and each variant in CHANGES for 1.28 million steps into ``FOLDER/NAME-
 SEED``; completed runs are skipped, interrupted runs are restarted. The final policy of each
@@ -30,10 +30,10 @@ from app.policies.configs import presets
 from app.policies.evaluation.reach.bench import ReachBench
 from app.provenance import describe
 from tools.docs.augmentation_study import over_seeds
-from tools.docs.reach_curves import ENDS
+from tools.docs.reach.curves import ENDS
 from tools.docs.training_curves import read_if_there, record
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 
 RESULTS = ROOT / "docs/results/reach-ablation.json"
 BASE = "reach-td3"
@@ -161,7 +161,7 @@ def main() -> None:
         return
     result = {
         "protocol": "reach-ablation",
-        "command": "python -m tools.docs.reach_ablation FOLDER --measure",
+        "command": "python -m tools.docs.reach.ablation FOLDER --measure",
         "policy": BASE,
         "seed": SEED,
         "episodes": options.episodes,

@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 
 from tests.policies.evaluation.sorting_players import untrained
-from tools.docs import sorting_curves, sorting_plots
-from tools.docs.sorting_curves import curve_of_run, curve_of_stock, merged
-from tools.docs.sorting_plots import TASKS, colour_of, grids
+from tools.docs.learning_curves import merged
+from tools.docs.sorting import curves as sorting_curves
+from tools.docs.sorting import plots as sorting_plots
+from tools.docs.sorting.curves import curve_of_run, curve_of_stock
+from tools.docs.sorting.plots import TASKS, colour_of, grids
 from tools.docs.tables import table
-from tools.docs.world_plots import BLUE, GREEN, GREY, ORANGE
+from tools.docs.world.plots import BLUE, GREEN, GREY, ORANGE
 
 MACHINE = {"cpu": "Some CPU", "cores": 2, "commit": "0123456789ab"}
 

@@ -1,8 +1,8 @@
-"""``tools/docs/reach_ssm_plots.py`` draws what is in the result, to its scale."""
+"""``tools/docs/reach/ssm_plots.py`` draws what is in the result, to its scale."""
 
 import numpy as np
 
-from tools.docs.reach_ssm_plots import arrivals, override
+from tools.docs.reach.ssm_plots import arrivals, override
 
 
 def test_the_override_is_drawn_in_percent_until_each_arrives():

@@ -1,6 +1,6 @@
 """Evaluate several training seeds of one preset on all targets.
 
-    python -m tools.docs.reach_seeds RUN ... [--seed N] [--episodes N]
+    python -m tools.docs.reach.seeds RUN ... [--seed N] [--episodes N]
 
 A RUN is a folder written by ``training_curves.py``. Its last policy is evaluated on the row
 ``clearance`` of ``reach-targets``, with and without rollout, beside the same people. The result
@@ -18,10 +18,10 @@ import torch
 
 from app.policies.evaluation.reach.bench import ReachBench, suffix_of
 from app.provenance import describe
-from tools.docs.reach_curves import lines
+from tools.docs.learning_curves import lines
 from tools.docs.training_curves import read
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 
 RESULTS = ROOT / "docs/results/reach-seeds.json"
 THESIS_SUCCESS = 0.9176
@@ -60,7 +60,7 @@ def main() -> None:
     found = [rows_of(folder, options.seed, options.episodes) for folder in options.runs]
     result = {
         "protocol": "reach-seeds",
-        "command": "python -m tools.docs.reach_seeds RUN ...",
+        "command": "python -m tools.docs.reach.seeds RUN ...",
         "policy": "reach-td3",
         "checkpoints": [name for name, _ in found],
         "seed": options.seed,

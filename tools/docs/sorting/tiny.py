@@ -1,6 +1,6 @@
 """Solve a small sorting task by value iteration, tabular Q-learning and the DQN.
 
-    python -m tools.docs.sorting_tiny [--seed 3]
+    python -m tools.docs.sorting.tiny [--seed 3]
 
 Writes ``docs/results/sorting-tiny.json`` and the tables of ``docs/sorting-tiny.md``. The task
 has two clutter slots, two colours and two sizes; its reachable states are enumerated.
@@ -37,7 +37,7 @@ from app.sim.sorting.kernels.reward import SortingWeights, distance_cost
 from app.sim.sorting.planner import solve
 from app.sim.sorting.state import SortingShape, SortingState
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 
 RESULTS, PAGE = ROOT / "docs/results/sorting-tiny.json", ROOT / "docs/sorting-tiny.md"
 SHAPE = SortingShape(n_cells=2, n_colours=2, n_sizes=2)

@@ -1,6 +1,6 @@
 """Measurements of ``docs/world.md``: numbers for its JSON file, arrays for its pictures.
 
-Seeded. Called by ``world_page.py``.
+Seeded. Called by ``world/page.py``.
 """
 
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""How ``tools/docs/reach_ablation.py`` varies the recipe and puts seeds together."""
+"""How ``tools/docs/reach/ablation.py`` varies the recipe and puts seeds together."""
 
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ from app.policies.configs import presets
 from app.policies.configs.fields import entries
 from app.policies.evaluation.statistics import wilson
 from tools.docs.augmentation_study import over_seeds
-from tools.docs.reach_ablation import BASE, CHANGES, SHORT, folder_of, measured, row_of, welch
+from tools.docs.reach.ablation import BASE, CHANGES, SHORT, folder_of, measured, row_of, welch
 
 
 def run(success: float, *, cpu_min: float) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from app.sim.people.pedestrian import PedestrianSettings, Walk
 from app.sim.robot.capsules import TOOL
 from app.sim.robot.kernels.arm import Arm
 from tests.sim.mesh_gap import Gap
-from tools.docs.world_measures import EXTENT, Episode, ReachMap
+from tools.docs.world.measures import EXTENT, Episode, ReachMap
 
 BLUE, ORANGE, GREEN, RED, GREY = "#2563a8", "#d97706", "#2a9d6f", "#b3261e", "#8a8f98"
 LIGHT = "#e6e8eb"

@@ -1,6 +1,6 @@
 """Draw the pictures of ``docs/results/sorting.md`` from ``docs/results/sorting-*.json``.
 
-    python -m tools.docs.sorting_plots
+    python -m tools.docs.sorting.plots
 
 Writes ``docs/img/sorting/grid-e0.png`` and ``grid-e1.png``, heat maps of success and return
 over all pairs (K_E, K_G) as in thesis fig. 3.2, and ``curves-e0.png`` and ``curves-e1.png``,
@@ -20,9 +20,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter, PercentFormatter
 from numpy.typing import NDArray
 
-from tools.docs.world_plots import BLUE, GREEN, GREY, ORANGE, RED, panels, save
+from tools.docs.world.plots import BLUE, GREEN, GREY, ORANGE, RED, panels, save
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 
 RESULTS, IMAGES = ROOT / "docs/results", ROOT / "docs/img/sorting"
 TASKS = ("e0", "e1")

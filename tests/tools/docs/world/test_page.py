@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tools.docs.world_page import IMAGES, PAGE, RESULTS, page, values
+from tools.docs.world.page import IMAGES, PAGE, RESULTS, page, values
 
 
 def read(name: str) -> dict:

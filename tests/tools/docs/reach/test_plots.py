@@ -8,14 +8,15 @@ import numpy as np
 import pytest
 
 from tests import reach_results as made
-from tools.docs import reach_curves, reach_plots
-from tools.docs.reach_curves import merged
-from tools.docs.reach_other_plots import colour_of
-from tools.docs.reach_tables import COLUMNS, is_reach, lines_of, siblings
+from tools.docs.learning_curves import merged
+from tools.docs.reach import curves as reach_curves
+from tools.docs.reach import plots as reach_plots
+from tools.docs.reach.other_plots import colour_of
+from tools.docs.reach.tables import COLUMNS, is_reach, lines_of, siblings
 from tools.docs.tables import BLOCK, render, table
-from tools.docs.world_plots import BLUE, ORANGE
+from tools.docs.world.plots import BLUE, ORANGE
 
-PAGE = (Path(__file__).resolve().parents[3] / "docs/results/reach.md").read_text(
+PAGE = (Path(__file__).resolve().parents[4] / "docs/results/reach.md").read_text(
     encoding="utf-8"
 )
 

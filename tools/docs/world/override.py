@@ -18,7 +18,7 @@ from app.sim.pick.batch import step_robot
 from app.sim.robot.ur10 import Robot
 from app.sim.safety.layer import SafetyLayer, safety_settings
 from app.sim.scene.scene import NO_CYLINDERS, arm_of, people_of
-from tools.docs.world_plots import BLUE, GREY, RED, WIDTH
+from tools.docs.world.plots import BLUE, GREY, RED, WIDTH
 
 Json = dict[str, Any]
 CUBES = ("cube0", "cube5")

@@ -1,6 +1,6 @@
 """Draw policy and planners under speed and separation monitoring.
 
-    python -m tools.docs.reach_ssm_plots
+    python -m tools.docs.reach.ssm_plots
 
 Reads ``docs/results/reach-ssm.json``; writes ``docs/img/reach/override.png``, the speed
 override over time in one crossing (thesis fig. 4.9), and ``docs/img/reach/arrivals.png``, the
@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from tools.docs.world_plots import BLUE, GREEN, GREY, ORANGE, RED, panels, save
+from tools.docs.world.plots import BLUE, GREEN, GREY, ORANGE, RED, panels, save
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 
 RESULT = ROOT / "docs/results/reach-ssm.json"
 IMAGES = ROOT / "docs/img/reach"

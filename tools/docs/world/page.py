@@ -1,7 +1,7 @@
 """Validate the simulator: measure, draw and write ``docs/world.md``.
 
-    python -m tools.docs.world_page          measure, draw and write
-    python -m tools.docs.world_page --page   write the text only, from ``docs/results``
+    python -m tools.docs.world.page          measure, draw and write
+    python -m tools.docs.world.page --page   write the text only, from ``docs/results``
 
 Writes ``docs/results/world.json``, ``docs/img/world/*.png`` and the page, which is the text of
 ``tools/docs/world.template.md`` with these numbers and with tables from ``docs/results``.
@@ -15,10 +15,12 @@ from pathlib import Path
 from typing import Any
 
 from app.provenance import describe
-from tools.docs import world_measures, world_override, world_plots
 from tools.docs.tables import render
+from tools.docs.world import measures as world_measures
+from tools.docs.world import override as world_override
+from tools.docs.world import plots as world_plots
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 
 SEED = 11
 RESULTS, IMAGES = ROOT / "docs/results", ROOT / "docs/img/world"

@@ -1,0 +1,78 @@
+"""Collect learning curves of trainings and of other learners into a result file.
+
+``training_curves.py`` writes the runs. A curve of the same task, preset and seed replaces the
+one in the file; other curves are kept.
+"""
+
+import argparse
+import json
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from app.policies.checkpoints.checkpoint import Checkpoint
+from app.provenance import describe
+from tools.docs.training_curves import read
+
+Json = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CurveStudy:
+    """Learning curves of one scenario."""
+
+    results: Path
+    """Result file."""
+    command: str
+    """Command stated in the result."""
+    seed: int
+    """Seed of the episodes."""
+    of_run: Callable[[Path, int | None], Json]
+    """Return the curve of a run; the number may replace that of the episodes."""
+    of_stock: Callable[[str, Path], Json]
+    """Return the curve of another learner from its name and a JSON Lines file."""
+
+
+def lines(path: Path) -> list[Json]:
+    """Return the objects of a JSON Lines file."""
+    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines() if line]
+
+
+def policies(folder: Path) -> Iterator[Checkpoint]:
+    """Yield the stored policies of a run in the order of their steps."""
+    for path in sorted(folder.glob("step-*.json")):
+        yield read(path)
+
+
+def merged(found: Sequence[Json], new: Sequence[Json]) -> list[Json]:
+    """Return curves with those of the same task, name and seed replaced, in order."""
+    by_key = {
+        (one.get("task", ""), one["name"], one["seed"] or 0): one for one in [*found, *new]
+    }
+    return [by_key[key] for key in sorted(by_key)]
+
+
+def collect(study: CurveStudy, title: str) -> None:
+    """Evaluate the runs named on the command line and write their curves."""
+    parser = argparse.ArgumentParser(description=title)
+    parser.add_argument("runs", nargs="*", type=Path, metavar="RUN")
+    parser.add_argument("--stock", action="append", default=[], metavar="NAME=FILE")
+    parser.add_argument("--episodes", type=int, help="per target or pair")
+    options = parser.parse_args()
+    torch.set_num_threads(1)
+    new = [study.of_run(folder, options.episodes) for folder in options.runs]
+    for one in options.stock:
+        name, _, file = one.partition("=")
+        new.append(study.of_stock(name, Path(file)))
+    path = study.results
+    found = json.loads(path.read_text(encoding="utf-8"))["curves"] if path.exists() else []
+    result = {
+        "command": study.command,
+        "seed": study.seed,
+        "curves": merged(found, new),
+        "machine": describe(),
+    }
+    path.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")

@@ -1,0 +1,1 @@
+"""Tables, pictures and studies of the sorting scenario."""

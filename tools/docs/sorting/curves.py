@@ -1,0 +1,82 @@
+"""Collect learning curves of the sorting task, evaluated as in docs/method.md 1.5.
+
+    python -m tools.docs.sorting.curves RUN ... [--stock CELL=FILE.jsonl] [--episodes N]
+
+A RUN is a folder written by ``training_curves.py``. Each stored policy is evaluated greedily
+and without planner fallback on each pair (K_E, K_G): 500 episodes per pair on e0, 100 on e1,
+or ``--episodes``. ``--stock`` adds the output of ``tests/benchmarks/stock_dqn.py``. Writes
+``docs/results/sorting-curves.json`` (drawn by ``sorting/plots.py``).
+
+A curve has ``played``, the greedy evaluations during training, and ``pairs``, one point per
+stored policy.
+"""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from app.policies.checkpoints.trained_cell import cell_of
+from app.policies.configs import presets
+from app.policies.evaluation.sorting.curve import curve_episodes, curve_point
+from app.policies.inference.sorting_policy import SortingPolicy
+from app.sim.sorting.batch import fail_of
+from tools.docs.learning_curves import CurveStudy, collect, lines, policies
+
+RESULTS = Path(__file__).resolve().parents[3] / "docs/results/sorting-curves.json"
+SEED = 77
+"""Seed of the episodes; not used in training."""
+STOCK = "stock Stable-Baselines3 DQN"
+Json = dict[str, Any]
+
+
+def curve_of_run(folder: Path, episodes: int | None) -> Json:
+    """Return the curve of a training: its points, and its policies on all pairs."""
+    points = lines(folder / "curve.jsonl")
+    spent = {one["step"]: one["cpu_s"] for one in points}
+    first = points[0]
+    cell = presets.get(first["preset"]).cell
+    named = {"task": cell, "name": first["preset"], "seed": first.get("seed", 1)}
+    pairs = []
+    for checkpoint in policies(folder):
+        manifest = checkpoint.manifest
+        policy, fail = SortingPolicy(checkpoint), fail_of(cell_of(manifest))
+        n = episodes or curve_episodes(policy.shape)
+        point = curve_point(policy.values, policy.shape, fail, n, SEED)
+        named = {
+            "task": manifest["cell"],
+            "name": manifest["preset"]["name"],
+            "seed": manifest["seed"],
+            "episodes_per_pair": n,
+        }
+        step = manifest["step"]
+        pairs.append({"step": step, "cpu_s": spent.get(step), **asdict(point)})
+    played = [_point(one, one["step"], one["reward"]) for one in points]
+    return {**named, "played": played, "pairs": pairs}
+
+
+def curve_of_stock(cell: str, path: Path) -> Json:
+    """Return the curve of the stock learner; its points are its own evaluations."""
+    points = [_point(one, one["env_steps"], one["return"]) for one in lines(path)]
+    return {"task": cell, "name": STOCK, "seed": None, "played": points, "pairs": []}
+
+
+def _point(one: Json, step: int, mean_return: float) -> Json:
+    return {
+        "step": step,
+        "cpu_s": one["cpu_s"],
+        "success": one["success"],
+        "mean_return": mean_return,
+    }
+
+
+if __name__ == "__main__":
+    collect(
+        CurveStudy(
+            results=RESULTS,
+            command="python -m tools.docs.sorting.curves RUN ...",
+            seed=SEED,
+            of_run=curve_of_run,
+            of_stock=curve_of_stock,
+        ),
+        "Collect learning curves of sorting.",
+    )

@@ -1,0 +1,1 @@
+"""Validation of the simulator: measures, pictures and page."""
