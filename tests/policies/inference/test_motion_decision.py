@@ -98,7 +98,9 @@ def test_one_state_gives_the_action_and_segment_of_training(
     batch, actor = driven(6, people), RandomActor()
     running = np.flatnonzero(batch.state.outcome == 0)
     expected, decide = controller_of(actor, mode).acts(batch), MotionDecider(actor, CELL).decide
-    found = {int(e): decide(replace(question_of(batch, e), inference_mode=mode)) for e in running}
+    found = {
+        int(e): decide(replace(question_of(batch, e), inference_mode=mode)) for e in running
+    }
     clear, distance = batch.state.clear.copy(), batch.state.distance.copy()
     batch.step(expected, auto_reset=False)
     assert len(found) > 2
