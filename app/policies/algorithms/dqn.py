@@ -7,7 +7,7 @@ planner marks all optimal moves, and a large-margin loss raises one of them abov
 The double target is ``r + gamma^n Q_target(s', argmax_a Q_online(s', a))``.
 
 Source: van Hasselt, Guez, Silver, *Deep reinforcement learning with double Q-learning* (2016);
-Hester et al., *Deep Q-learning from demonstrations* (2018); METHOD 1.4 with its corrections.
+Hester et al., *Deep Q-learning from demonstrations* (2018); docs/method.md 1.4, corrected.
 Deviates: labels mark sets of moves, in the states that the learner visits (as in Ross, Gordon,
 Bagnell, *A reduction of imitation learning to no-regret online learning*, 2011).
 """

@@ -6,8 +6,8 @@ the importance weight ``(1 / (size * probability)) ** beta``, divided by the gre
 the minibatch. Returns are summed over at most ``n_steps`` when a transition is sampled, up to
 the end of the episode or the head of the buffer.
 
-Source: Schaul et al., *Prioritized experience replay* (2016); METHOD 1.4. Stable-Baselines3
-ignores its own ``n_steps`` where a buffer class is given, so one buffer must do both.
+Source: Schaul et al., *Prioritized experience replay* (2016); docs/method.md 1.4.
+Stable-Baselines3 ignores ``n_steps`` if a buffer class is given, so that one buffer does both.
 """
 
 from typing import Any, NamedTuple

@@ -1,8 +1,9 @@
 """A trained policy of the reach scenario, for inference.
 
-Its network is read from the checkpoint's tensors and run by numpy, for few states by a kernel:
-a library's overhead costs more than they do. Source: METHOD 2.2 to 2.4; the tensors are data,
-see ``checkpoint.py``.
+The network is evaluated from the checkpoint's tensors by numpy, and by a kernel for few states,
+because the overhead of a library exceeds the computation.
+
+Source: docs/method.md 2.2 to 2.4.
 """
 
 from collections.abc import Callable, Mapping

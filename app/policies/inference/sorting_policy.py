@@ -1,6 +1,6 @@
 """A trained sorting network, for inference.
 
-Source: METHOD 1.4; the tensors are data, see ``checkpoint.py``.
+Source: docs/method.md 1.4; the tensors are data, see ``checkpoint.py``.
 """
 
 import numpy as np

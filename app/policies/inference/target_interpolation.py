@@ -1,7 +1,8 @@
-"""Actions for goals between training targets: the weighted mean of those for targets around.
+"""Interpolation of actions for goals between training targets.
 
-Trilinear among the eight corners of a grid's cell (METHOD 2.4), barycentric among the four of
-a Halton set's tetrahedron. At a target it is the policy's own action.
+Weights are trilinear among the eight corners of a grid cell (docs/method.md 2.4), barycentric
+among the four corners of a tetrahedron of a Halton set. At a target the result is the policy's
+action.
 
 Source: (4.29); Halton, the outlook of thesis 4.5.
 """

@@ -11,7 +11,7 @@ says value and slope per type and tower, and never prefers the riskier of two du
 Both are dueling: ``Q = V + A - mean A``; ours takes the mean over the moves that are valid and
 puts all others out of the question, in exploration, targets and prediction alike.
 
-Source: METHOD 1.4; Wang et al., *Dueling network architectures* (2016).
+Source: docs/method.md 1.4; Wang et al., *Dueling network architectures* (2016).
 """
 
 from collections.abc import Mapping

@@ -3,7 +3,7 @@
 episodes         Run pick episodes to their ends under a selection rule
 people           Protocols ``pick-people``, ``pick-mocap``, ``pick-yielding``: other people
 recorded_people  Record poses of robot and people, and check them again with FCL
-selection_rules  Selection rules: the critic's with hysteresis, and rules to compare it with
-tasks            Protocols ``pick-single`` and ``pick-choice`` (METHOD 3.6)
+selection_rules  Selection rules: the critic's with hysteresis, and others
+tasks            Protocols ``pick-single`` and ``pick-choice`` (docs/method.md 3.6)
 tracker          Protocol ``pick-tracker``: people observed through a tracker
 """

@@ -11,8 +11,8 @@ the 5th and of the 95th percentile; a worker and a pedestrian; synthetic reaches
 
 Each row also states how often the same people touch a robot that never moves.
 
-Source: METHOD 3.4 and 4 (several people; a model whose dimensions are known; a human that
-reacts).
+Source: docs/method.md 3.4 and 4 (several people; a model whose dimensions are known; a human
+that reacts).
 """
 
 from collections.abc import Mapping, Sequence

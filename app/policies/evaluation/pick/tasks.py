@@ -1,4 +1,4 @@
-"""Protocols ``pick-single`` and ``pick-choice`` (METHOD 3.6).
+"""Protocols ``pick-single`` and ``pick-choice`` (docs/method.md 3.6).
 
 Timeout 10 s, start clearance 0.05 m, starts mixed evenly over home, cubes and docks, person
 with postures that do not occur in training. The result states the hand speeds of the person.

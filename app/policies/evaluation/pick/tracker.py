@@ -14,7 +14,7 @@ has its own tracker and estimator; the tracker starts before the episode does.
 ``100ms-noise-missing``   100 ms, 20 mm noise per axis, 20 % of the key-points missing
 ========================  ==================================================================
 
-Source: METHOD 2.8 (30 Hz). Noise, share and latencies are ours.
+Source: docs/method.md 2.8 (30 Hz). Noise, share and latencies are ours.
 """
 
 from collections.abc import Callable

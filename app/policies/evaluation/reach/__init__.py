@@ -6,7 +6,7 @@ oracle         Protocol ``reach-oracle``: upper bound of success by search with 
 people         Protocols ``reach-people``, ``reach-constant`` and ``reach-speeds``: other people
 random_goals   Protocol ``reach-random``: random goals between the training targets
 smoothness     Protocol ``reach-smoothness``: joint trajectories of whole episodes
-ssm            Protocol ``reach-ssm``: a policy and planners under the same safety layer
+ssm            Protocol ``reach-ssm``: a policy and planners under one safety layer
 ssm_crossings  Policies, planners and an oracle on the same crossings under the safety layer
 ssm_rows       Rows and comparisons of ``reach-ssm``
 targets        Protocol ``reach-targets``: every training target, beside one pedestrian

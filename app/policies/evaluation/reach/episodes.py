@@ -4,7 +4,7 @@ Episode ``i`` of a seed runs in environment ``i mod N_ENVS`` of a batch as its e
 ``i // N_ENVS``. Its goal, its people and their motion do not depend on the controller, the time
 limit or the number of episodes.
 
-Source: METHOD 2.3 and 2.6.
+Source: docs/method.md 2.3 and 2.6.
 """
 
 from collections.abc import Callable

@@ -18,7 +18,7 @@ stage           resimulations of each unsolved episode
 ``long``        scripted again: 2048
 ==============  ==============================================================================
 
-Source: METHOD 2.6; the trials' figure is 98.7 %.
+Source: docs/method.md 2.6; the trials' figure is 98.7 %.
 """
 
 from collections.abc import Callable
@@ -46,7 +46,7 @@ from app.sim.robot.capsules import load_robot_capsules
 
 Json = dict[str, Any]
 PER_TARGET = 100
-"""Episodes of each target (METHOD 2.6)."""
+"""Episodes of each target (docs/method.md 2.6)."""
 SCRIPTED = (64, 256)
 """Scripted resimulations of each episode in the first two rounds."""
 DISTURBED = 32

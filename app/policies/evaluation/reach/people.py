@@ -4,12 +4,12 @@
 for each of them with distance-weighted actions.
 ``reach-constant``: speed and radius constant in each episode, beside the usual pedestrian.
 ``reach-speeds``: a person of 0.25, 0.5 and 1.0 m/s; the limits of speed do not apply, because
-0.25 m/s would count as standing still (METHOD 2.1).
+0.25 m/s would count as standing still (docs/method.md 2.1).
 
 Rows ``-rollout`` use rollout policy improvement (``rollout.py``) with all people. The episodes
 cycle through the targets of the grid; all rows have the same goals.
 
-Source: thesis 4.4.3; METHOD 2.6, and 4 for several people.
+Source: thesis 4.4.3; docs/method.md 2.6, and 4 for several people.
 """
 
 from dataclasses import replace
@@ -26,7 +26,7 @@ from app.sim.people.kernels.people import MAX_PEOPLE
 from app.sim.scene.scene import HumanKind
 
 DEFAULT_EPISODES = 1000
-"""METHOD 2.6."""
+"""docs/method.md 2.6."""
 TARGET_EPISODES = 5400
 """Episodes of each row of ``reach-constant``, as in ``reach-targets``."""
 ONE_PERSON_MODES = (InferenceMode.DIRECT, InferenceMode.DIRECT_ROLLOUT)
@@ -39,7 +39,7 @@ SEVERAL_PEOPLE_MODES = (
 KINDS: tuple[HumanKind, ...] = ("walker", "constant")
 """Usual pedestrians, and pedestrians of one speed and radius per episode."""
 SPEEDS = (0.25, 0.5, 1.0)
-"""Speeds of people [m/s] (METHOD 2.6)."""
+"""Speeds of people [m/s] (docs/method.md 2.6)."""
 
 
 def modes_beside(n_people: int) -> tuple[InferenceMode, ...]:

@@ -14,7 +14,7 @@ targets around the goal, with interpolated actions.
 ``against_targets`` is the paired difference of success rates with its 95 % interval. The
 remaining time that the policy observes is at most 5 s, as in training.
 
-Source: thesis 4.4.3; METHOD 2.4 and 2.6.
+Source: thesis 4.4.3; docs/method.md 2.4 and 2.6.
 """
 
 from dataclasses import replace
@@ -30,7 +30,7 @@ from app.policies.evaluation.rows import OnRow, ignore_row
 from app.sim.core.arrays import Vec
 
 DEFAULT_EPISODES = 5000
-"""METHOD 2.6."""
+"""docs/method.md 2.6."""
 LIMITS_S = (5.0, 25.0)
 """Time limits [s]."""
 RINGS = (0.0, 0.06, 0.09, 0.11, 0.13, 0.18)

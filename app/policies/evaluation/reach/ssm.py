@@ -1,4 +1,4 @@
-"""Protocol ``reach-ssm``: a policy and planners under the same safety layer (METHOD 2.6).
+"""Protocol ``reach-ssm``: a policy and planners under one safety layer (docs/method.md 2.6).
 
 A person crosses between the robot at home and its goal (``app/sim/reach/crossings.py``: 200
 crossings fixed before any tuning, and as many recorded crossings as are given). All rows have
@@ -38,9 +38,9 @@ robot: such a run is counted in ``contacts_at_rest`` and continues after they ha
 includes the time with override 0, ``stopped_s``; ``standstill_stopped_s`` excludes braking.
 Planners, like policies, arrive when the TCP is within 0.1 m of the goal.
 
-``random`` are random goals beside pedestrians (METHOD 2.1) for at most RANDOM_S with the policy
-under each layer; ``random-still`` is the same with a robot that stays at home. Both count
-contacts with a moving and with a stationary robot.
+``random`` are random goals beside pedestrians (docs/method.md 2.1) for at most RANDOM_S with
+the policy under each layer; ``random-still`` is the same with a robot that stays at home. Both
+count contacts with a moving and with a stationary robot.
 """
 
 from collections.abc import Mapping, Sequence
@@ -94,7 +94,7 @@ DIRECTED = "-directed"
 SETTINGS = DEFAULT_SETTINGS
 RANDOM_EPISODES = 10_000
 RANDOM_S = 25.0
-"""Time limit of a random episode [s], the longer one of METHOD 2.6."""
+"""Time limit of a random episode [s], the longer one of docs/method.md 2.6."""
 N_RECORDED = 60
 """Number of recorded crossings."""
 

@@ -33,7 +33,7 @@ MARGIN = 0.05
 RRT-Connect arrived earlier on 20 crossings of another seed (77)."""
 ASIDE = (-2.0, 2.0, 0.2)
 """x, y, radius of the person in rows without people [m]: far corner of the walking area of
-METHOD 2.1. The cell is not empty, because training may contain no empty cell."""
+docs/method.md 2.1. The cell is not empty, because training may contain no empty cell."""
 LONGEST_WAIT = 8.0
 """Latest time at which a resimulation turns to its goal [s]."""
 PLANNERS: Mapping[str, ReplanningSettings] = {

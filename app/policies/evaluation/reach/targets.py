@@ -14,8 +14,8 @@ Rows ``-rollout`` use rollout policy improvement (``rollout.py``), where the pol
 An episode with a contact is no success in any row; ``reached_after_contact`` is the share that
 reached the goal afterwards.
 
-Source: thesis 4.4.3, figs 4.5 and 4.6; METHOD 2.6. Deviates: the source does not state the
-start rule of its people.
+Source: thesis 4.4.3, figs 4.5 and 4.6; docs/method.md 2.6. Deviates: the source does not state
+the start rule of its people.
 """
 
 from dataclasses import replace
@@ -34,7 +34,7 @@ from app.sim.reach.batch import StartRule
 from app.sim.scenario.kernels.episode import COLLISION, SUCCESS
 
 PER_TARGET = 100
-"""Episodes of each target (METHOD 2.6)."""
+"""Episodes of each target (docs/method.md 2.6)."""
 STARTS: tuple[StartRule, ...] = ("clearance", "uniform", "authors")
 END_STEP_S = 0.1
 """Width of the time intervals in which ends are counted [s]."""

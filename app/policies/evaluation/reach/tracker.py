@@ -13,8 +13,9 @@ time (``app/sim/perception/cylinder_sensor_model.py``).
 ``100ms-not-predicted``   newest frame without prediction
 ========================  ==================================================================
 
-Source: METHOD 2.8 (30 Hz). Noise, latencies and filter are ours. Deviates: the source computes
-cylinders from key-points of a body; the people of this scenario are measured as cylinders.
+Source: docs/method.md 2.8 (30 Hz). Noise, latencies and filter are ours. Deviates: the source
+computes cylinders from key-points of a body; the people of this scenario are measured as
+cylinders.
 """
 
 from dataclasses import asdict, dataclass

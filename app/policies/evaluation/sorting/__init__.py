@@ -4,12 +4,12 @@ benchmark_tasks   Protocol ``sorting-tests``: many episodes of each benchmark ta
                   thesis (3.4.3)
 curve             Learning curves by the source's protocol: every pair (K_E, K_G), greedy
 episodes          Run sorting episodes to their ends and count moves, attempts and risks
-grid              Protocol ``sorting-grid``: every pair of object and goal numbers (METHOD 1.5)
+grid              Protocol ``sorting-grid``: every pair of object and goal numbers
 optimal_baseline  Optimal baseline of sorting episodes: the exact planner's moves and expected
                   attempts
 pairs             Episodes of every pair (K_E, K_G): so many objects, of which so many are in
                   the goal
 planner_fallback  Progress monitor (``app/sim/sorting/progress_monitor.py``) of many sorting
                   tasks at once
-runs              Protocols ``sorting-grid`` and ``sorting-tests`` of a checkpoint (METHOD 1.5)
+runs              Protocols ``sorting-grid`` and ``sorting-tests`` of a checkpoint
 """

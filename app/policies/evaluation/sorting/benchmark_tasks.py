@@ -5,7 +5,7 @@ exact planner replaces a cycling policy. Picks fail with the probabilities of th
 episode is a success when the last goal is reached, and counts in ``fewest`` when every part of
 it took as few moves as the exact planner. Each part has 4 K attempts.
 
-Source: thesis 3.4.3, METHOD 1.5. Deviates: the source shows one run of each.
+Source: thesis 3.4.3, docs/method.md 1.5. Deviates: the source shows one run of each.
 """
 
 from typing import Any

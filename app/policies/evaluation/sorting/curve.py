@@ -1,7 +1,7 @@
 """Learning curves by the source's protocol: every pair (K_E, K_G), greedy, without fallback.
 
-Source: thesis 3.4.2 and fig. 3.1, METHOD 1.5: every 50,000 steps, 500 episodes of every pair on
-e0 and 100 on e1.
+Source: thesis 3.4.2 and fig. 3.1, docs/method.md 1.5: every 50,000 steps, 500 episodes of every
+pair on e0 and 100 on e1.
 """
 
 from dataclasses import dataclass

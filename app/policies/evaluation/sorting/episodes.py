@@ -8,7 +8,7 @@ same with and without it.
 A pick is *riskier* if a cell with a lower failure probability holds an identical object. The
 fewest moves are those of the exact planner; failed picks are attempts, not moves.
 
-Source: METHOD 1.2, 1.5.
+Source: docs/method.md 1.2, 1.5.
 """
 
 from collections.abc import Callable

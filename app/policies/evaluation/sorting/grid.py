@@ -1,4 +1,4 @@
-"""Protocol ``sorting-grid``: every pair of object and goal numbers (METHOD 1.5).
+"""Protocol ``sorting-grid``: every pair of object and goal numbers (docs/method.md 1.5).
 
 For every pair ``1 <= K_G <= K_E <= K``, with the same episodes in all rows of one start:
 

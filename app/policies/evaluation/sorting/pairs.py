@@ -1,6 +1,6 @@
 """Episodes of every pair (K_E, K_G): numbers of objects, and of objects in the goal.
 
-Source: METHOD 1.5.
+Source: docs/method.md 1.5.
 """
 
 from collections.abc import Iterator

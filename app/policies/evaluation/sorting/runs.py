@@ -1,4 +1,4 @@
-"""Protocols ``sorting-grid`` and ``sorting-tests`` of a checkpoint (METHOD 1.5).
+"""Protocols ``sorting-grid`` and ``sorting-tests`` of a checkpoint (docs/method.md 1.5).
 
 ``grid.py`` and ``benchmark_tasks.py`` define the rows. The task and its failure probabilities
 are those of the policy's training cell.
