@@ -3,9 +3,9 @@
 dqn                 DQN on Stable-Baselines3, extended at its extension points
 exploration         Exploration in parallel environments: noise with a scale per environment,
                     and options
-prioritized_replay  Replay memory with priorities and n-step returns, in one buffer
-quantiles           Distributional critics: each says quantiles of the return, and targets
-                    leave out the highest
+prioritized_replay  Replay buffer with priorities and n-step returns
+quantiles           Truncated quantile critics: distributional critics without the highest
+                    quantiles in targets
 td3                 TD3 on Stable-Baselines3, extended at its extension points
 vecenv              A batch as Stable-Baselines3's ``VecEnv``, for every scenario
 """

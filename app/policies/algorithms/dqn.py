@@ -192,12 +192,12 @@ class SortingDQN(DQN):
 
 
 def large_margin_loss(values: Tensor, best: Tensor, margin: float) -> Tensor:
-    """Return by how much the best moves fall short of all others by a margin, on average.
+    """Return the mean large-margin loss: a best move must exceed all others by ``margin``.
 
     Args:
-        values: Values of all moves, (n, n_actions).
-        best: Which are best, (n, n_actions); at least one in every row.
-        margin: By how much they shall be worth more.
+        values: Values of all moves, shape (n, n_actions).
+        best: Whether a move is best, shape (n, n_actions); at least one in every row.
+        margin: Required difference of values.
     """
     of_best = values.masked_fill(~best, NEVER).amax(dim=1)
     of_others = (values + margin).masked_fill(best, NEVER).amax(dim=1)

@@ -35,7 +35,7 @@ class ReplaySamples(NamedTuple):
     rewards: torch.Tensor
     """Discounted sums of rewards, (B,)."""
     next_observations: torch.Tensor
-    """Where the sums end, (B, obs_size)."""
+    """Observations at the end of the sums, (B, obs_size)."""
     discounts: torch.Tensor
     """Factor of the value there; 0 where the episode terminated, (B,)."""
     weights: torch.Tensor

@@ -1,12 +1,11 @@
-"""Distributional critics: each says quantiles of the return, and targets leave out the highest.
+"""Truncated quantile critics: distributional critics without the highest quantiles in targets.
 
-The quantiles of all critics for the next state are put together and sorted; the highest are
-left out against overestimation, and every critic's quantiles learn from all that remain by the
-quantile Huber loss.
+The quantiles of all critics for the next state are pooled; the highest are dropped to reduce
+overestimation. The remaining ones are the targets of every critic under the quantile Huber
+loss.
 
 Source: Kuznetsov et al., *Controlling overestimation bias with truncated mixture of continuous
-distributional quantile critics* (2020). Deviates: TD3's actor in place of one that seeks
-entropy.
+distributional quantile critics* (2020). Deviates: the actor of TD3 in place of that of SAC.
 """
 
 from typing import Any
@@ -21,18 +20,18 @@ from app.sim.core.jit import FAST, kernel
 
 
 class QuantileCritics(Critics):
-    """Critics that say ``n_quantiles`` values each.
+    """Critics with ``n_quantiles`` quantiles of the return each.
 
     Args:
         width: Units per hidden layer.
         n_obs: Length of observations.
-        n_act: Numbers of an action.
+        n_act: Length of an action.
         n_critics: Number of critics.
-        layers: Hidden layers of each.
-        normed: Whether they are normalised.
-        n_quantiles: Quantiles of each.
-        dropped: Highest quantiles that targets leave out, per critic.
-        crowd: Where people stand as a set; None: nowhere.
+        layers: Number of hidden layers of each.
+        normed: Whether hidden layers are normalised.
+        n_quantiles: Number of quantiles of each.
+        dropped: Number of highest quantiles dropped in targets, per critic.
+        crowd: Position of the people set; None without one.
     """
 
     def __init__(
@@ -51,28 +50,28 @@ class QuantileCritics(Critics):
         self._kept = n_critics * (n_quantiles - dropped)
 
     def targets(self, obs: Tensor, act: Tensor) -> Tensor:
-        """Return the values that targets are made of, shape (B, K): all but the highest.
+        """Return the quantiles for targets, shape (B, K): all but the highest.
 
-        They are in no order, and no gradients come through.
+        They are unordered and without gradient.
         """
         together = torch.cat(self.forward(obs, act), dim=1).float().numpy()
         apart = np.partition(together, self._kept - 1, axis=1)
         return torch.from_numpy(apart[:, : self._kept])
 
     def first(self, obs: Tensor, act: Tensor) -> Tensor:
-        """Return the mean of all quantiles, shape (B, 1), which an actor climbs."""
+        """Return the value that the actor maximises, shape (B, 1): the mean quantile."""
         return torch.cat(self.forward(obs, act), dim=1).mean(dim=1, keepdim=True)
 
     def loss(
         self, obs: Tensor, act: Tensor, target: Tensor, weights: Tensor | None
     ) -> tuple[Tensor, Tensor]:
-        """Return the quantile Huber loss of all critics, and errors of their means, (B,).
+        """Return the quantile Huber loss of all critics, and errors of their means, shape (B,).
 
         Args:
-            obs: Observations, (B, n_obs).
-            act: Actions, (B, n_act).
-            target: What they should say, (B, K).
-            weights: Importance weights, (B, 1); None: all equal.
+            obs: Observations, shape (B, n_obs).
+            act: Actions, shape (B, n_act).
+            target: Target values, shape (B, K).
+            weights: Importance weights, shape (B, 1); None for equal weights.
         """
         shares = torch.full((len(obs),), 1.0 / len(obs))
         if weights is not None:
@@ -84,19 +83,19 @@ class QuantileCritics(Critics):
 
 
 def quantile_loss(quantiles: Tensor, target: Tensor, shares: Tensor) -> Tensor:
-    """Return the quantile Huber loss (threshold 1) of rows.
+    """Return the weighted sum of quantile Huber losses (threshold 1).
 
     Args:
-        quantiles: What a critic says, (B, n).
-        target: Samples that they should be quantiles of, (B, K).
-        shares: What each row counts, (B,).
+        quantiles: Quantiles of a critic, shape (B, n).
+        target: Samples of the target distribution, shape (B, K).
+        shares: Weight of each row, shape (B,).
     """
     loss: Tensor = _QuantileLoss.apply(quantiles, target, shares)  # type: ignore[no-untyped-call]
     return loss
 
 
 class _QuantileLoss(torch.autograd.Function):
-    """The loss and its gradient in one compiled pass: pairs of values are never stored."""
+    """Loss and gradient in one compiled pass, without storing pairs of values."""
 
     @staticmethod
     def forward(ctx: Any, quantiles: Tensor, target: Tensor, shares: Tensor) -> Tensor:

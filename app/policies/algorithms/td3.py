@@ -31,7 +31,7 @@ from app.policies.networks.actor_critic import Critics
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Networks:
-    """How the networks of a training are made."""
+    """Factories of the networks of a training."""
 
     actor: Callable[[], nn.Module]
     """Returns a new actor."""
@@ -115,7 +115,7 @@ class BatchTD3(TD3):
         env: The environments.
         seed: Seed of networks and replay.
         exploration: Perturbs the actions.
-        networks: How actor and critics are made.
+        networks: Factories of actor and critics.
     """
 
     def __init__(

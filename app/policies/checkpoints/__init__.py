@@ -1,11 +1,9 @@
 """Checkpoint files and what they state.
 
-checkpoint      The checkpoint format: tensors as safetensors, everything else as a JSON
-                manifest
-model_state     What a checkpoint holds of a model under training: networks, optimisers,
-                versions
-trained_cell    The work cell that a checkpoint was trained in
+checkpoint      Checkpoint format: tensors as safetensors, everything else as a JSON manifest
+model_state     Tensors of networks and optimisers in checkpoints, and versions of packages
+trained_cell    Training cell of a checkpoint
 trained_values  Training range of a reach policy, to flag inputs outside it
-training_range  Least and greatest value of every state variable met in training, for manifests
-pretrained/     The shipped checkpoints, each as tensors, manifest and model card of one name
+training_range  Minimum and maximum of every state variable in training, for manifests
+pretrained/     Shipped checkpoints: tensors, manifest and model card of each
 """

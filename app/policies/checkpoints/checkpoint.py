@@ -1,9 +1,9 @@
-"""The checkpoint format: tensors as safetensors, everything else as a JSON manifest.
+"""Checkpoint format: tensors as safetensors, everything else as a JSON manifest.
 
-Nothing here is ever unpickled: a checkpoint is data, never code. Two kinds exist: ``policy``
-(actor and critics; decides, is shipped and downloaded) and ``resume`` (also target networks and
-optimiser moments; continues an interrupted training). The id of a checkpoint is the SHA-256 of
-its canonical manifest followed by its tensors.
+Loading never executes code, because nothing is unpickled. The kind ``policy`` contains actor
+and critics; ``resume`` also contains target networks and optimiser moments, to continue an
+interrupted training. The id of a checkpoint is the SHA-256 of its canonical manifest followed
+by its tensors.
 """
 
 import math
@@ -23,11 +23,11 @@ from app.errors import CheckpointMismatch, InvalidInput
 
 FORMAT = "tandem-checkpoint/1"
 MAX_BYTES = 16 * 1024 * 1024
-"""Largest tensors blob of a policy [bytes]; a database row holds it."""
+"""Maximum size of the tensors of a policy [bytes], stored in one database row."""
 MAX_RESUME_BYTES = 4 * MAX_BYTES
-"""The same of what resumes a training: target networks and two moments come to the networks."""
+"""Maximum size for ``resume``, with target networks and two moments."""
 CHOOSING, REACHING, SORTING = "choosing tasks", "reaching goals", "sorting"
-"""What policies are for."""
+"""Purposes of policies."""
 REQUIRED = {
     "format": str,
     "kind": str,
@@ -49,7 +49,7 @@ class Checkpoint:
     """A manifest and its tensors."""
 
     manifest: dict[str, Any]
-    """What the tensors are; JSON."""
+    """Description of the tensors; JSON."""
     tensors: bytes
     """safetensors file."""
 
@@ -62,7 +62,7 @@ class Checkpoint:
         """Return the tensors by name.
 
         Raises:
-            InvalidInput: The bytes are no safetensors file, or hold non-finite numbers.
+            InvalidInput: The bytes are no safetensors file, or contain non-finite numbers.
         """
         try:
             arrays = load_tensors(self.tensors)
@@ -81,11 +81,11 @@ def pack(manifest: dict[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Checkp
 
 
 def load(manifest: object, tensors: bytes) -> Checkpoint:
-    """Return a checkpoint from data that may come from anyone.
+    """Return a checkpoint from untrusted data.
 
     Raises:
         InvalidInput: A field is missing, of a wrong type, or the tensors are too large.
-        CheckpointMismatch: It is of another format.
+        CheckpointMismatch: The format is another one.
     """
     if not isinstance(manifest, dict):
         raise InvalidInput("manifest", type(manifest).__name__, "must be a JSON object")
@@ -129,10 +129,10 @@ def _check_ranges(ranges: dict[str, Any]) -> None:
 
 
 def expect_layout(checkpoint: Checkpoint, layout: list[list[Any]], act_size: int) -> None:
-    """Check that a checkpoint's networks fit this program's observation and action.
+    """Check that a checkpoint's networks fit the layout of observations and actions.
 
     Raises:
-        CheckpointMismatch: They were trained on another layout.
+        CheckpointMismatch: The networks have another layout.
     """
     if checkpoint.manifest["layout"] != layout:
         raise CheckpointMismatch("layout", layout, checkpoint.manifest["layout"])
@@ -141,9 +141,9 @@ def expect_layout(checkpoint: Checkpoint, layout: list[list[Any]], act_size: int
 
 
 def purpose_of(manifest: Mapping[str, Any]) -> str:
-    """Return what a checkpoint's policy is for, by what it sees.
+    """Return the purpose of a policy from its observation layout.
 
-    It sorts if it sees towers, and reaches goals if people are cylinders to it.
+    Towers are observed by sorting policies, cylinders of people by reach policies.
     """
     layout = manifest.get("layout")
     entries = layout if isinstance(layout, list) else []
@@ -154,15 +154,15 @@ def purpose_of(manifest: Mapping[str, Any]) -> str:
 
 
 def task_of(checkpoint: Checkpoint) -> str:
-    """Return what a checkpoint's policy is for."""
+    """Return the purpose of a checkpoint's policy."""
     return purpose_of(checkpoint.manifest)
 
 
 def require_purpose(checkpoint: Checkpoint, purpose: str) -> None:
-    """Make sure that a checkpoint's policy is for what it is asked to do.
+    """Check the purpose of a checkpoint's policy.
 
     Raises:
-        CheckpointMismatch: It is for something else.
+        CheckpointMismatch: The purpose is another one.
     """
     if (actual := purpose_of(checkpoint.manifest)) != purpose:
         raise CheckpointMismatch("purpose", purpose, actual)

@@ -1,4 +1,4 @@
-"""What a checkpoint holds of a model under training: networks, optimisers, versions."""
+"""Tensors of networks and optimisers in checkpoints, and versions of packages."""
 
 import platform
 from collections.abc import Mapping
@@ -33,7 +33,7 @@ def restore(
     modules: Mapping[str, torch.nn.Module],
     optimizers: Mapping[str, torch.optim.Optimizer],
 ) -> None:
-    """Put tensors and moments of a checkpoint back where they came from."""
+    """Load tensors and moments of a checkpoint into networks and optimisers."""
     for name, module in modules.items():
         module.load_state_dict(under(arrays, name))
     for name, optimizer in optimizers.items():

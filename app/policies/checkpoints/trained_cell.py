@@ -1,8 +1,7 @@
-"""The work cell that a checkpoint was trained in.
+"""Training cell of a checkpoint.
 
-A shipped cell goes by its name; a cell of the user's own travels with the checkpoint, so that
-the policy can be evaluated and compared with what stands there now, whatever became of the
-stored cell.
+The manifest names a shipped cell, and contains the definition of any other cell, so that the
+policy can be evaluated even if the stored cell was changed or deleted.
 """
 
 import json
@@ -18,24 +17,24 @@ DEFINITION = "cell_definition"
 
 
 def manifest_fields(cell: Cell) -> dict[str, Any]:
-    """Return what a manifest says of the cell trained in."""
+    """Return the manifest fields of a training cell."""
     shipped = cell.name in cell_names() and load_cell(cell.name) == cell
     return {"cell": cell.name} | ({} if shipped else {DEFINITION: cell.definition()})
 
 
 def is_for(manifest: Mapping[str, Any], cell: Cell) -> bool:
-    """Tell whether a checkpoint was trained in this very cell."""
+    """Return whether a checkpoint was trained in exactly this cell."""
     fields = {"cell": cell.name, DEFINITION: manifest_fields(cell).get(DEFINITION)}
     return all(manifest.get(name) == value for name, value in fields.items())
 
 
 def cell_of(manifest: Mapping[str, Any]) -> Cell:
-    """Return the cell that a checkpoint's manifest names or carries.
+    """Return the training cell from a manifest.
 
     Raises:
-        NotFound: It names a cell that is not shipped and carries none.
-        BadCell: What it carries is no sound cell.
-        CheckpointMismatch: It names one cell and carries another.
+        NotFound: The manifest names a cell that is not shipped, without a definition.
+        BadCell: The definition is invalid.
+        CheckpointMismatch: The definition has another name.
     """
     name = str(manifest["cell"])
     if DEFINITION not in manifest:

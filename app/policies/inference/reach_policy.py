@@ -47,12 +47,12 @@ LAYOUTS = {
 PEOPLE_SET = CrowdShape(
     N_FEATURES + option_features.N_OPTION_FEATURES, MAX_PEOPLE, people_set.N_BLOCK
 )
-"""Where everybody stands as a set in the observation of that name."""
+"""Position of the people set in the observation of that name."""
 MAX_LAYERS = 16
 """Most layers of a network taken from a checkpoint."""
 
 ACTOR_LAYERS, CROWD_LAYERS = "actor.net", "actor.crowd.0.block"
-"""What the names of an actor's tensors start with."""
+"""Prefix of the names of an actor's tensors."""
 
 Floats = NDArray[np.float32]
 Layer = tuple[Floats, Floats]

@@ -1,4 +1,4 @@
-"""The shipped checkpoints, each as tensors, manifest and model card of one name."""
+"""Shipped checkpoints: tensors, manifest and model card of each."""
 
 import json
 from importlib import resources
@@ -22,8 +22,8 @@ def load(alias: str) -> Checkpoint:
     """Return a shipped checkpoint.
 
     Raises:
-        NotFound: None is shipped under that alias.
-        Damaged: The package's file is not the one that was shipped.
+        NotFound: No shipped checkpoint has that alias.
+        Damaged: The file of the package is not the shipped one.
     """
     if alias not in ALIASES:
         raise NotFound("shipped checkpoint", alias, ALIASES)
@@ -34,6 +34,6 @@ def load(alias: str) -> Checkpoint:
         if found.sha256 == SHA256[alias]:
             return found
     except (OSError, ValueError, ServiceError):
-        pass  # what cannot be read is damaged as well
+        pass  # an unreadable file is damaged, too
     remedy = "install the package again"
     raise Damaged("shipped checkpoint", alias, remedy, SHA256[alias])
