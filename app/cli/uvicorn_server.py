@@ -8,13 +8,11 @@ import socket
 from collections.abc import Awaitable, Callable
 from types import FrameType
 
-import torch
 import uvicorn
 from fastapi import FastAPI
 
 from app.cli.http_limits import LimitedHttp
 from app.cli.preflight import address_of
-from app.main import create_app
 from app.settings import Settings
 
 GRACE_S = 3
@@ -73,6 +71,10 @@ def run(settings: Settings, sock: socket.socket, report: Callable[[str], None]) 
         report: Called with the address at the start and once the service is ready, or with the
             reason why it cannot decide.
     """
+    import torch
+
+    from app.main import create_app
+
     report(f"Tandem starts: {address_of(sock)}")
     # More threads do not speed up networks this small; waiting for a busy core costs 0.3 s.
     torch.set_num_threads(1)

@@ -1,6 +1,7 @@
 """Limits of the HTTP connection, asked of a server in a process of its own."""
 
 import json
+import os
 import re
 import socket
 import subprocess
@@ -23,6 +24,7 @@ from tests.small_service import LARGE, TOKEN
 ROOT = Path(__file__).parents[2]
 MIB = 1024 * 1024
 MAX_GROWTH = 12 * MIB
+LIMIT_S = 3.0
 BEARER = f"Host: here\r\nAuthorization: Bearer {TOKEN}\r\n".encode()
 NAME = b"GET /name?x=1 HTTP/1.1\r\n" + BEARER
 POST = b"POST /length HTTP/1.1\r\n" + BEARER
@@ -89,10 +91,12 @@ def problem_of(answer: bytes) -> str:
 
 
 @contextmanager
-def serving() -> Iterator[Small]:
+def serving(**limits_s: float) -> Iterator[Small]:
+    """Run the server with other time limits [s], by name in ``http_limits``."""
     process = subprocess.Popen(
         [sys.executable, "-m", "tests.small_service"],
         cwd=ROOT,
+        env=os.environ | {name: str(value) for name, value in limits_s.items()},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -110,6 +114,13 @@ def serving() -> Iterator[Small]:
 @pytest.fixture(scope="module")
 def small() -> Iterator[Small]:
     with serving() as one:
+        yield one
+
+
+@pytest.fixture(scope="module")
+def strict() -> Iterator[Small]:
+    """A server with short time limits."""
+    with serving(HEAD_S=LIMIT_S, BODY_S=LIMIT_S) as one:
         yield one
 
 
@@ -192,12 +203,12 @@ def drip(client: socket.socket, byte: bytes) -> bytes:
     raise AssertionError("the server takes it without end")
 
 
-def test_what_is_too_slow_ends(small: Small) -> None:
+def test_what_is_too_slow_ends(strict: Small) -> None:
     """Silence, a head and a body that stop or drip, on new and on used connections."""
     answers: dict[str, bytes] = {}
 
     def ask(name: str, first: bytes, byte: bytes) -> None:
-        with small.connect() as client:
+        with strict.connect() as client:
             client.sendall(first)
             if first.startswith(NAME):
                 one_answer(client)
@@ -229,15 +240,15 @@ def test_what_is_too_slow_ends(small: Small) -> None:
     assert statuses.pop("drips a body that is refused") == 401
     assert set(statuses.values()) == {408}, statuses
     assert len(statuses) == len(cases) - 3
-    assert status_of(small.ask(NAME + LAST)) == 200
+    assert status_of(strict.ask(NAME + LAST)) == 200
 
 
-def test_a_slow_answer_and_an_idle_socket_are_not_taken_for_slow_clients(small: Small) -> None:
+def test_a_slow_answer_and_an_idle_socket_are_not_taken_for_slow_clients(strict: Small) -> None:
     with connect(
-        f"ws://127.0.0.1:{small.port}/echo",
+        f"ws://127.0.0.1:{strict.port}/echo",
         additional_headers={"Authorization": f"Bearer {TOKEN}"},
     ) as echo:
-        time.sleep(http_limits.HEAD_S + 1.0)
+        time.sleep(LIMIT_S + 1.0)
         echo.send("still here")
         assert echo.recv() == "still here"
 
@@ -332,11 +343,8 @@ def test_idle_connections_are_closed_for_new_ones() -> None:
         assert status_of(rest_of(idle[-1])) == 200
 
 
-def test_a_client_that_reads_nothing_holds_an_answer_only_for_a_while(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setenv("DRAIN_S", "1")
-    with serving() as small, small.connect() as client:
+def test_a_client_that_reads_nothing_holds_an_answer_only_for_a_while() -> None:
+    with serving(DRAIN_S=1.0) as small, small.connect() as client:
         client.sendall(b"GET /large HTTP/1.1\r\n" + BEARER + b"\r\n")
         time.sleep(3.0)
         assert len(rest_of(client)) < len(LARGE)
