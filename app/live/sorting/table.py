@@ -105,11 +105,7 @@ class SortingTable:
         return self.towers[position - k][-1] if self.towers[position - k] else None
 
     def place_of(self, block: Block) -> tuple[int, int]:
-        """Return position and level of a block.
-
-        Raises:
-            InvalidInput: The block is held or not on the table.
-        """
+        """Return position and level of a block that is not held."""
         for k, one in enumerate(self.clutter):
             if one == block:
                 return k, 0
