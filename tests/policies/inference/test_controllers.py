@@ -129,7 +129,7 @@ def test_beside_one_person_averaging_changes_nothing(
     )
 
 
-def test_averaged_is_the_mean_of_actions_beside_each_person_alone() -> None:
+def test_distance_weighted_is_the_mean_of_actions_beside_each_person_alone() -> None:
     batch, actor = batch_of(("walker", "constant", "fixed-speed")), RandomActor()
     found, rows = controller_of(actor, "distance-weighted").acts(batch), np.arange(12)
     weights = person_weights(batch.person_distances(rows))

@@ -5,7 +5,7 @@ several points: initial states, time limit, people and inference mode.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from app.errors import InvalidInput
@@ -120,6 +120,13 @@ class ReachBench:
             time_limit_s=5.0,
         )
 
+    def variant(
+        self, name: str, goals: Vec, mode: InferenceMode = InferenceMode.DIRECT, **rules: Any
+    ) -> Variant:
+        """Return a variant with the default rules except ``rules``."""
+        settings = replace(self.usual, **rules)
+        return Variant(name=name, settings=settings, goals=goals, mode=mode)
+
     def target_goals(self, n: int) -> Vec:
         """Return the goals of ``n`` episodes that cycle through the targets [m], (n, 3)."""
         return target_goals(self.targets, n)
@@ -139,7 +146,7 @@ class ReachBench:
     ) -> ReachEpisodes:
         """Run the episodes of the row ``clearance`` of ``reach-targets``."""
         goals = self.target_goals(per_target * len(self.targets))
-        return self.run(Variant(name="clearance", settings=self.usual, goals=goals, mode=mode))
+        return self.run(self.variant("clearance", goals, mode))
 
     def measure(self, variants: Sequence[Variant], more: Measure = no_measures) -> None:
         """Run variants and add the row of each.

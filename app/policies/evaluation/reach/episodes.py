@@ -172,7 +172,7 @@ def run_episodes(
 
 def run_to_end(
     batch: ReachBatch,
-    controller: Controller,
+    acts: Callable[[Any], NDArray[np.float32]],
     *,
     before: Callable[[Index], object] = lambda _envs: None,
     after: Callable[[], object] = lambda: None,
@@ -182,14 +182,14 @@ def run_to_end(
 
     Args:
         batch: Environments at the start of their episodes.
-        controller: Controller of the robots.
+        acts: Returns the actions of a batch, shape (n_envs, 6).
         before: Called before each step with the running environments, shape (k,).
         after: Called after each step.
         features: Whether steps compute the features of observations.
     """
     while (envs := np.flatnonzero(batch.state.outcome == kernel.RUNNING)).size:
         before(envs)
-        batch.step(controller.acts(batch), auto_reset=False, features=features)
+        batch.step(acts(batch), auto_reset=False, features=features)
         after()
 
 
@@ -205,7 +205,7 @@ def recheck_contacts(
     trace = Trace(batch, n, RECHECK_PARTS)
     batch.reset()
     batch.set_goals(np.arange(n), goals[:n])
-    run_to_end(batch, controller, before=trace.before, after=trace.after)
+    run_to_end(batch, controller.acts, before=trace.before, after=trace.after)
     return recheck(batch.cell, trace.trajectories())
 
 

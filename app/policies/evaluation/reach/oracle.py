@@ -22,13 +22,14 @@ Source: docs/method.md 2.6; the trials' figure is 98.7 %.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from app.policies.checkpoints.checkpoint import Checkpoint
-from app.policies.evaluation.reach.bench import ReachBench, Variant
+from app.policies.evaluation.reach.bench import ReachBench
 from app.policies.evaluation.reach.episodes import N_ENVS
 from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.evaluation.statistics import wilson
@@ -182,9 +183,7 @@ def run_oracle(
     )
     row = verdict(search.search, never, bench.targets, goals)
     on_row(n_stages, n_stages, row)
-    variant = Variant(
-        name="oracle", settings=settings, goals=goals, goal_set="training targets in turn"
-    )
+    variant = replace(bench.variant("oracle", goals), goal_set="training targets in turn")
     bench.add(row, variant)
     result = bench.result(search_seed=seed, soonest_tries=SOONEST_TRIES)
     return {**result, "stages": search.rows}

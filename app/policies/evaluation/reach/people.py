@@ -17,7 +17,7 @@ from itertools import product
 from typing import Any
 
 from app.policies.checkpoints.checkpoint import Checkpoint
-from app.policies.evaluation.reach.bench import ReachBench, Variant, pedestrian_of, suffix_of
+from app.policies.evaluation.reach.bench import ReachBench, pedestrian_of, suffix_of
 from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.inference.controllers import InferenceMode, inference_modes_of
 from app.sim.cells.cell import Cell
@@ -29,24 +29,16 @@ DEFAULT_EPISODES = 1000
 """docs/method.md 2.6."""
 TARGET_EPISODES = 5400
 """Episodes of each row of ``reach-constant``, as in ``reach-targets``."""
-ONE_PERSON_MODES = (InferenceMode.DIRECT, InferenceMode.DIRECT_ROLLOUT)
-SEVERAL_PEOPLE_MODES = (
-    InferenceMode.DIRECT,
-    InferenceMode.DISTANCE_WEIGHTED,
-    InferenceMode.DIRECT_ROLLOUT,
-)
-"""Inference modes for several people; ``direct`` observes the nearest."""
+MODES = {
+    InferenceMode.DIRECT: 0,
+    InferenceMode.DISTANCE_WEIGHTED: 2,
+    InferenceMode.DIRECT_ROLLOUT: 1,
+}
+"""Inference modes, and the number of people from which each differs from ``direct``."""
 KINDS: tuple[HumanKind, ...] = ("walker", "constant")
 """Usual pedestrians, and pedestrians of one speed and radius per episode."""
 SPEEDS = (0.25, 0.5, 1.0)
 """Speeds of people [m/s] (docs/method.md 2.6)."""
-
-
-def modes_beside(n_people: int) -> tuple[InferenceMode, ...]:
-    """Return the inference modes that differ beside ``n_people``."""
-    if n_people == 0:
-        return (InferenceMode.DIRECT,)
-    return ONE_PERSON_MODES if n_people == 1 else SEVERAL_PEOPLE_MODES
 
 
 def run_people(
@@ -64,21 +56,20 @@ def run_people(
     goals = bench.target_goals(episodes or DEFAULT_EPISODES)
     allowed = inference_modes_of(bench.actor)
     variants = [
-        Variant(
-            name=f"{n}-people" + (f"-{mode}" if n > 1 else suffix_of(mode)),
-            settings=replace(bench.usual, people=KINDS[:1] * n),
-            goals=goals,
-            mode=mode,
+        bench.variant(
+            f"{n}-people" + (f"-{mode}" if n > 1 else suffix_of(mode)),
+            goals,
+            mode,
+            people=KINDS[:1] * n,
         )
         for n in range(MAX_PEOPLE + 1)
-        for mode in modes_beside(n)
-        if mode in allowed
+        for mode, least in MODES.items()
+        if n >= least and mode in allowed
     ]
     bench.measure(
         variants, lambda _, episodes: {"starts_redrawn": float((episodes.redrawn > 0).mean())}
     )
-    two = replace(bench.usual, people=KINDS[:1] * 2)
-    bench.recheck(Variant(name="recheck", settings=two, goals=goals))
+    bench.recheck(bench.variant("recheck", goals, people=KINDS[:1] * 2))
     return bench.result()
 
 
@@ -97,12 +88,7 @@ def run_constant(
     goals = bench.target_goals(episodes or TARGET_EPISODES)
     bench.measure(
         [
-            Variant(
-                name=kind + suffix_of(mode),
-                settings=replace(bench.usual, people=(kind,)),
-                goals=goals,
-                mode=mode,
-            )
+            bench.variant(kind + suffix_of(mode), goals, mode, people=(kind,))
             for mode, kind in product(bench.direct_modes, KINDS)
         ]
     )
@@ -124,11 +110,10 @@ def run_speeds(
     goals = bench.target_goals(episodes or DEFAULT_EPISODES)
     bench.measure(
         [
-            Variant(
-                name=f"{speed:g}-m-s{suffix_of(mode)}",
-                settings=replace(bench.usual, people=("fixed-speed",)),
-                goals=goals,
-                mode=mode,
+            replace(
+                bench.variant(
+                    f"{speed:g}-m-s{suffix_of(mode)}", goals, mode, people=("fixed-speed",)
+                ),
                 cell=at_speed(bench.cell, speed),
                 stated={"speed_m_s": speed},
             )

@@ -18,7 +18,7 @@ Source: thesis 4.4.3; docs/method.md 2.4 and 2.6.
 """
 
 from dataclasses import replace
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
@@ -77,20 +77,12 @@ def run_random(
         }
 
     variants = [
-        Variant(name="targets" + suffix_of(mode), settings=usual, goals=grid, mode=mode)
-        for mode in bench.direct_modes
+        bench.variant("targets" + suffix_of(mode), grid, mode) for mode in bench.direct_modes
     ]
-    variants += [
-        Variant(
-            name=mode if limit == usual.time_limit_s else f"{mode}-{limit:g}s",
-            settings=replace(usual, time_limit_s=limit),
-            goals=goals,
-            goal_set="box",
-            mode=mode,
-        )
-        for mode in bench.goal_modes
-        for limit in LIMITS_S
-    ]
+    for mode, limit in product(bench.goal_modes, LIMITS_S):
+        name = mode if limit == usual.time_limit_s else f"{mode}-{limit:g}s"
+        variant = bench.variant(name, goals, mode, time_limit_s=limit)
+        variants.append(replace(variant, goal_set="box"))
     bench.measure(variants, compared)
     bench.recheck(variants[-2])
     return bench.result()

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.policies.checkpoints.checkpoint import Checkpoint
-from app.policies.evaluation.reach.bench import ReachBench, Variant
+from app.policies.evaluation.reach.bench import ReachBench
 from app.policies.evaluation.reach.episodes import run_to_end
 from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.evaluation.statistics import wilson
@@ -77,7 +77,7 @@ def record_paths(batch: ReachBatch, controller: Controller, goals: Vec) -> Paths
         running[:] = state.outcome == kernel.RUNNING
 
     record()
-    run_to_end(batch, controller, after=record)
+    run_to_end(batch, controller.acts, after=record)
     q, qd, qdd, clearance, distance = (
         np.array([period[i] for period in kept]) for i in range(5)
     )
@@ -200,6 +200,6 @@ def run_smoothness(
         "success": wilson(int((paths.outcome == kernel.SUCCESS).sum()), n),
         **measure(paths, settings.action.degree, batch.arm),
     }
-    bench.add(row, Variant(name=str(row["name"]), settings=settings, goals=goals))
+    bench.add(row, bench.variant("", goals))
     limits = {name: getattr(batch.arm.limits, name).tolist() for name in ("q_min", "q_max")}
     return {**bench.result(limits=limits), "example": shown_episode(paths, batch.arm.dt)}

@@ -48,7 +48,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from app.policies.checkpoints import pretrained
 from app.policies.checkpoints.checkpoint import Checkpoint
@@ -76,13 +75,14 @@ from app.policies.inference.reach_policy import ReachPolicy
 from app.policies.inference.rollout import NO_CONSTRAINT, can_roll_out, ssm_constraint_of
 from app.sim.cells.cell import Cell
 from app.sim.mocap.importer import Motion
-from app.sim.reach.batch import ReachBatch, ReachSettings
+from app.sim.reach.batch import ReachSettings
 from app.sim.reach.crossings import N_CROSSINGS, SEED, crossings, recorded_crossings
 from app.sim.reach.monitored.batch import (
     HORIZON_S,
     MonitoredEpisodes,
     MonitoredReachBatch,
 )
+from app.sim.reach.oracle_search import Acts
 from app.sim.safety.layer import SafetySettings, safety_settings
 from app.sim.scenario.kernels.episode import TIMEOUT
 
@@ -110,14 +110,6 @@ class _Rows:
         """Add a row."""
         self.rows.append(row)
         self._on_row(len(self.rows), self._total, row)
-
-
-class _Still:
-    """Controller of a robot that does not move."""
-
-    def acts(self, batch: ReachBatch) -> NDArray[np.float32]:
-        """Return zero speeds, shape (n_envs, 6)."""
-        return np.zeros((batch.n_envs, 6), dtype=np.float32)
 
 
 def controllers_by_row(
@@ -154,14 +146,14 @@ def compare(
 
 
 def random_episodes(
-    cell: Cell, batch: MonitoredReachBatch, controller: Controller, n: int, seed: int
+    cell: Cell, batch: MonitoredReachBatch, acts: Acts, n: int, seed: int
 ) -> MonitoredEpisodes:
     """Run ``n`` episodes of ``reach-random`` under the safety layer.
 
     Args:
         cell: Work cell.
         batch: N_ENVS environments.
-        controller: Controller of the robots.
+        acts: Returns the actions of the batch.
         n: Number of episodes.
         seed: Seed of the goals.
     """
@@ -172,7 +164,7 @@ def random_episodes(
         batch.restart()
         batch.set_goals(np.arange(len(some)), some)
         batch.state.outcome[len(some) :] = TIMEOUT
-        runs = run_monitored(batch, controller).episodes
+        runs = run_monitored(batch, acts).episodes
         found.append(selected(runs, np.arange(len(some))))
     return joined(found)
 
@@ -223,15 +215,15 @@ def run_ssm(
                 }
                 result["example"][layer] = example_of(found, cell.robot.dt)
     policy = controllers[""]["policy"]
-    trials: dict[str, tuple[Controller, SafetySettings]] = {
-        "random": (policy, layers[""]),
-        "random-still": (_Still(), layers[""]),
-        "random" + DIRECTED: (policy, layers[DIRECTED]),
+    trials: dict[str, tuple[Acts, SafetySettings]] = {
+        "random": (policy.acts, layers[""]),
+        "random-still": (lambda batch: np.zeros((batch.n_envs, 6), np.float32), layers[""]),
+        "random" + DIRECTED: (policy.acts, layers[DIRECTED]),
     }
     longer = replace(reach, time_limit_s=RANDOM_S)
-    for name, (controller, safety) in trials.items():
+    for name, (acts, safety) in trials.items():
         batch = MonitoredReachBatch(cell, N_ENVS, seed, longer, safety)
-        rows.add(random_row(name, random_episodes(cell, batch, controller, n_random, seed)))
+        rows.add(random_row(name, random_episodes(cell, batch, acts, n_random, seed)))
     return {
         "settings": stated(assumed, n, [motion.source for motion in motions]),
         "results": rows.rows,

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import count
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,7 @@ from app.sim.reach.monitored.batch import (
     MonitoringSettings,
 )
 from app.sim.reach.monitored.planners import drive_planner, postures_of
-from app.sim.reach.oracle_search import sample_detours, toward
+from app.sim.reach.oracle_search import Acts, sample_detours, toward
 from app.sim.robot.actions import ActionSettings
 from app.sim.robot.kernels.arm import Arm
 from app.sim.safety.layer import SafetySettings
@@ -85,12 +86,10 @@ class CrossingRuns:
     """Override in [0, 1] of every period of each run; empty for the oracle."""
 
 
-def run_monitored(batch: MonitoredReachBatch, controller: Controller) -> CrossingRuns:
+def run_monitored(batch: MonitoredReachBatch, acts: Acts) -> CrossingRuns:
     """Run the episodes of a batch that was reset to their ends."""
     found: list[Vec] = []
-    run_to_end(
-        batch, controller, after=lambda: found.append(batch.override.copy()), features=False
-    )
+    run_to_end(batch, acts, after=lambda: found.append(batch.override.copy()), features=False)
     episodes, every = batch.runs(), np.array(found)
     periods = np.round(episodes.seconds / batch.arm.dt).astype(int)
     overrides = [every[:n, k] for k, n in enumerate(periods)]
@@ -164,7 +163,7 @@ class Comparison:
 
     def policy(self, controller: Controller, *, no_person: bool = False) -> CrossingRuns:
         """Run a policy over all crossings."""
-        return run_monitored(self.batch(no_person=no_person), controller)
+        return run_monitored(self.batch(no_person=no_person), controller.acts)
 
     def planner(
         self,
@@ -201,28 +200,6 @@ class Comparison:
         return runs
 
 
-class _Detours:
-    """Controller to a first configuration until some time, then to a last one.
-
-    Args:
-        arm: Robot.
-        first: First configurations [rad], shape (n, 6).
-        until: Times of the change [s], shape (n,).
-        last: Last configurations [rad], shape (n, 6).
-    """
-
-    def __init__(self, arm: Arm, first: Vec, until: Vec, last: Vec) -> None:
-        self._arm, self._first, self._until, self._last = arm, first, until, last
-        self._k = 0
-
-    def acts(self, batch: ReachBatch) -> NDArray[np.float32]:
-        """Return the actions of all environments, shape (n_envs, 6)."""
-        early = self._k * self._arm.dt < self._until
-        self._k += 1
-        aim = np.where(early[:, None], self._first, self._last)
-        return toward(self._arm, batch.state.q, aim)
-
-
 def best_resimulations(
     comparison: Comparison, n_each: int, rng: np.random.Generator
 ) -> dict[str, MonitoredEpisodes]:
@@ -242,13 +219,24 @@ def best_resimulations(
         first, until = sample_detours(batch.arm, rng, n_each, LONGEST_WAIT)
         until[0] = 0.0
         last = configurations[rng.integers(len(configurations), size=n_each)]
-        run_to_end(batch, _Detours(batch.arm, first, until, last), features=False)
+        run_to_end(batch, _detours(batch.arm, first, until, last), features=False)
         runs = batch.runs()
         good = runs.arrived & ~runs.touched_at_rest
         earliest.append(_least(runs, np.where(good, runs.seconds, np.inf)))
         stops = runs.stopped_s + 1e-3 * runs.seconds
         least_stopped.append(_least(runs, np.where(runs.arrived, stops, np.inf)))
     return {"oracle": joined(earliest), "oracle-least-stopped": joined(least_stopped)}
+
+
+def _detours(arm: Arm, first: Vec, until: Vec, last: Vec) -> Acts:
+    """Return actions to first configurations until some times [s], then to the last ones."""
+    cycle = count()
+
+    def acts(batch: ReachBatch) -> NDArray[np.float32]:
+        early = next(cycle) * arm.dt < until
+        return toward(arm, batch.state.q, np.where(early[:, None], first, last))
+
+    return acts
 
 
 def _least(runs: MonitoredEpisodes, cost: Vec) -> MonitoredEpisodes:

@@ -18,7 +18,6 @@ Source: thesis 4.4.3, figs 4.5 and 4.6; docs/method.md 2.6. Deviates: the source
 the start rule of its people.
 """
 
-from dataclasses import replace
 from itertools import product
 from typing import Any
 
@@ -117,11 +116,12 @@ def run_targets(
         }
 
     variants = [
-        Variant(
-            name=start + suffix_of(mode),
-            settings=replace(bench.usual, start=start, collision_ends=start != "authors"),
-            goals=goals,
-            mode=mode,
+        bench.variant(
+            start + suffix_of(mode),
+            goals,
+            mode,
+            start=start,
+            collision_ends=start != "authors",
         )
         for mode, start in product(bench.direct_modes, STARTS)
     ]

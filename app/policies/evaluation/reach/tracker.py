@@ -18,7 +18,7 @@ computes cylinders from key-points of a body; the people of this scenario are me
 cylinders.
 """
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -162,13 +162,10 @@ def run_tracker(
     bench = ReachBench(checkpoint, seed, on_row)
     pedestrian_of(bench.cell)
     goals = bench.target_goals(episodes or DEFAULT_EPISODES)
-    variants = [Variant(name="exact", settings=bench.usual, goals=goals)]
+    variants = [bench.variant("exact", goals)]
     variants += [
-        Variant(
-            name=name + suffix_of(mode),
-            settings=bench.usual,
-            goals=goals,
-            mode=mode,
+        replace(
+            bench.variant(name + suffix_of(mode), goals, mode),
             controller=CylinderObserver(controller_of(bench.actor, mode), ROWS[name], seed),
             stated={"tracker": asdict(ROWS[name])},
         )
