@@ -11,7 +11,8 @@ from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
 from app.sim.human import model as human
 from app.sim.human.person import Person
-from app.sim.pick.task_policy import Candidate, Decision
+from app.sim.pick.kernels.grasp import DESCEND, LIFT, GraspRules
+from app.sim.pick.task_policy import NOT_BEGUN, Candidate, Decision, PickProgress
 from app.sim.robot.actions import ActionSettings
 from app.sim.robot.kernels import kinematics
 from app.sim.scene.scene import arm_of
@@ -21,6 +22,7 @@ class StraightPolicy:
     checkpoint = "0" * 64
     title = "straight moves"
     action = ActionSettings()
+    grasp = GraspRules()
 
     def __init__(self, cell: Cell) -> None:
         self.cell, self.cell_sha256 = cell.name, cell.sha256
@@ -34,11 +36,18 @@ class StraightPolicy:
         candidates: Sequence[Candidate],
         *,
         previous: str | None = None,
+        progress: PickProgress = NOT_BEGUN,
         time_left_s: float = 10.0,
+        objective: str = "value",
     ) -> Decision:
         goals = np.array([candidate.position for candidate in candidates])
+        ids = [candidate.id for candidate in candidates]
+        last = ids.index(previous) if previous in ids else None
+        wanted = goals.copy()
+        if last is not None and progress.phase == DESCEND:
+            wanted[last, 2] -= self.grasp.depth
         arm = self._arm
-        postures, reachable = kinematics.ik_vertical_batch(arm.lengths, arm.limits, goals)
+        postures, reachable = kinematics.ik_vertical_batch(arm.lengths, arm.limits, wanted)
         hands = [np.full(3, np.inf)]
         for person in people:
             size = self._size if person.size is None else person.size
@@ -47,6 +56,8 @@ class StraightPolicy:
         near = np.linalg.norm(goals[:, None] - np.stack(hands), axis=2).min(axis=1)
         values = 4.0 - np.abs(postures - q).max(axis=1) - 4.0 * np.exp(-((near / 0.2) ** 2))
         index = int(values.argmax())
+        if last is not None and progress.phase == LIFT:
+            index = last
         speed = np.clip(2.5 * (postures - q), -arm.limits.qd_max, arm.limits.qd_max)
         return Decision(
             chosen=candidates[index].id,

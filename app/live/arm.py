@@ -11,8 +11,10 @@ import numpy as np
 from app.sim.cells.cell import Cell
 from app.sim.collision.contact import Contact, contact, pedestrian_distances, worker_distances
 from app.sim.core.arrays import Vec
+from app.sim.core.jit import FAR
 from app.sim.human.kernels import kinematics as body
 from app.sim.pick import batch as pick
+from app.sim.pick.kernels.grasp import ToolState
 from app.sim.robot.actions import ActionSettings
 from app.sim.robot.kernels import kinematics
 from app.sim.robot.kernels.joints import JointPath
@@ -21,6 +23,8 @@ from app.sim.scene.scene import arm_of, people_of
 
 GAIN = 3.0
 """Proportional gain from joint error to joint speed [1/s]."""
+AT_REST = 0.01
+"""Joint speed below which the robot counts as at rest [rad/s]."""
 
 
 class HumanGeometry(NamedTuple):
@@ -166,6 +170,21 @@ class LiveArm:
         kinematics.link_poses(self.arm.lengths, self.q, rotations, origins)
         kinematics.tcp_point(self.arm.lengths, rotations, origins, point)
         return point
+
+    @property
+    def moves(self) -> bool:
+        """Whether a joint moves faster than a resting robot's would."""
+        return bool(np.abs(self.qd).max() > AT_REST)
+
+    def tool(self, point: Vec) -> ToolState:
+        """Return the tool and the separation distance, for the phases of a pick.
+
+        Args:
+            point: Target of the tool [m], shape (3,).
+        """
+        _, tilt, speed, _ = pick.tool_state(self.arm, self.q, self.qd, point)
+        clearance = FAR if self.clearance_m is None else self.clearance_m
+        return ToolState(self.tcp(), tilt, speed, clearance)
 
     def reached(self, point: Vec) -> bool:
         """Return whether the tool is at a point [m], vertical and slow (pick scenario)."""

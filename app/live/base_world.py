@@ -7,6 +7,7 @@ period, and the policy decides again (docs/method.md 3.1). Pure numpy: no thread
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any, Generic, Protocol, TypeVar
 
 from app.errors import ServiceError
@@ -15,6 +16,7 @@ from app.live.arm import HumanGeometry, LiveArm, PeopleInCell
 from app.live.command_checks import Command, check
 from app.live.read_model import frozen
 from app.live.snapshot import (
+    PICK_PHASES,
     CandidateSnapshot,
     ContactSnapshot,
     Counters,
@@ -27,7 +29,7 @@ from app.sim.collision.contact import Contact
 from app.sim.core.arrays import Vec
 from app.sim.human.person import Person
 from app.sim.pick import batch as pick
-from app.sim.pick.task_policy import Candidate, Decision, TaskPolicy
+from app.sim.pick.task_policy import NOT_BEGUN, Candidate, Decision, TaskPolicy
 
 TIME_LIMIT_S = 20.0
 """Time limit of one motion of the policy [s] (thesis table 5.2)."""
@@ -112,6 +114,10 @@ class BaseWorld(ABC, Generic[P]):
         self.decision: Decision | None = None
         self.decided_s: float | None = None
         self.previous: str | None = None
+        self.progress = NOT_BEGUN
+        """Progress of the pick of the last choice."""
+        self.decided_from = NOT_BEGUN
+        """Progress at the last decision."""
         self.t = 0.0
         self.tick = 0
         self._note, self._note_until = "", -1.0
@@ -271,7 +277,7 @@ class BaseWorld(ABC, Generic[P]):
             body=found.part if found.kind == "human" else _TOUCHED[found.kind],
             person=self._touched_person(found),
         )
-        self.count(contacts=1)
+        self.count(contacts=1, contacts_at_rest=int(not self.robot.moves))
         self.robot.halt()
         self.enter("contact")
 
@@ -283,24 +289,18 @@ class BaseWorld(ABC, Generic[P]):
             index = len(self.people.geometry.q) + found.walker
         return None if index is None else self.people.ids[index]
 
-    def count(
-        self, *, reached: int = 0, timeouts: int = 0, contacts: int = 0, switches: int = 0
-    ) -> None:
-        """Add to the counters."""
+    def count(self, **events: int) -> None:
+        """Add events to the counters, by the names of :class:`Counters`."""
         so_far = self.counters
-        self.counters = Counters(
-            reached=so_far.reached + reached,
-            contacts=so_far.contacts + contacts,
-            timeouts=so_far.timeouts + timeouts,
-            switches=so_far.switches + switches,
-        )
+        added = {name: getattr(so_far, name) + n for name, n in events.items()}
+        self.counters = replace(so_far, **added)
 
     # Deciding.
 
     def begin_motion(self) -> None:
         """Start a new motion of the policy, with the whole time limit and no decision."""
         self.time_left = TIME_LIMIT_S
-        self.decision = None
+        self.decision, self.progress = None, NOT_BEGUN
 
     def query(self, offered: tuple[Candidate, ...]) -> str | None:
         """Query the policy for the present state; return the previous choice if it changed."""
@@ -318,12 +318,16 @@ class BaseWorld(ABC, Generic[P]):
                 [person.seen() for person in self.people],
                 offered,
                 previous=self.previous,
+                progress=self.progress,
                 time_left_s=self.time_left,
             )
         except ServiceError as error:
             self.set_message(error.message)
             return None
         self.decision, self.decided_s = decision, self.t
+        self.decided_from = self.progress
+        if decision.chosen != self.previous:
+            self.progress = NOT_BEGUN
         if self.previous is None or decision.chosen == self.previous:
             return None
         self.count(switches=1)
@@ -346,10 +350,16 @@ class BaseWorld(ABC, Generic[P]):
 
     def _candidate(self, index: int, candidate: Candidate) -> CandidateSnapshot:
         decision = self.decision
+        outcome = None
+        if decision is not None and decision.outcomes is not None:
+            outcome = decision.outcomes[index]
         return CandidateSnapshot(
             id=candidate.id,
             position=frozen(candidate.position),
             value=None if decision is None else decision.values[index],
+            success=None if outcome is None else outcome.success,
+            contact=None if outcome is None else outcome.contact,
+            time_s=None if outcome is None else outcome.time_s,
             chosen=decision is not None and decision.index == index,
             reachable=None if decision is None else decision.reachable[index],
             outside=() if decision is None else decision.outside_candidates[index],
@@ -383,6 +393,8 @@ class BaseWorld(ABC, Generic[P]):
             chosen=None if decision is None else decision.chosen,
             previous=self.previous,
             time_left_s=self.time_left,
+            phase=PICK_PHASES[self.decided_from.phase],
+            closing_s=self.decided_from.closing_s,
             outside=() if decision is None else decision.outside,
             clearance_m=self.robot.clearance_m,
             contact=self.contact,

@@ -15,6 +15,9 @@ from app.sim.core.arrays import Vec
 from app.sim.core.out_of_range import OutsideField
 from app.sim.pick.case_verdict import Verdict
 
+PickPhase = Literal["approach", "descend", "lift"]
+PICK_PHASES: tuple[PickPhase, ...] = ("approach", "descend", "lift")
+"""Phases of a pick, by their numbers in ``pick/kernels/grasp.py``."""
 Status = Literal[
     "moving",
     "picking",
@@ -26,9 +29,9 @@ Status = Literal[
     "solved",
     "reached",
 ]
-"""``picking``: the target is reached, the tool goes down and up again; ``blocked``: the robot
-waits at home for a person to leave. In ``picking``, ``contact`` and ``case done`` the last
-decision stays; in ``moving`` it belongs to the present state. In a sorting cell ``picking`` is
+"""``picking``: the tool descends to an object, closes and comes up; ``blocked``: the robot
+waits at home for a person to leave. In ``contact`` and ``case done`` the last decision stays;
+in ``moving`` and ``picking`` it belongs to the present state. In a sorting cell ``picking`` is
 ``grasp`` and ``place``, and ``solved`` means that every tower matches the goal. In a reach cell
 ``reached`` means that the tool is at the goal."""
 
@@ -43,6 +46,12 @@ class CandidateSnapshot(ReadModel):
     """target of the tool centre point, robot base frame [m]"""
     value: float | None
     """Q(s, π(s)), expected discounted reward; null without a decision"""
+    success: float | None
+    """probability of success; null where the checkpoint predicts none"""
+    contact: float | None
+    """probability of a contact"""
+    time_s: float | None
+    """expected time to success [s]"""
     chosen: bool
     """whether the robot moves there"""
     reachable: bool | None
@@ -165,9 +174,13 @@ class Counters(ReadModel):
     """Events since the last reset."""
 
     reached: int = 0
-    """targets reached"""
+    """targets reached; in a pick cell objects lifted or set down"""
+    broken_off: int = 0
+    """picks broken off during the descent"""
     contacts: int = 0
     """episodes that ended in a contact"""
+    contacts_at_rest: int = 0
+    """those of them with the robot at rest"""
     timeouts: int = 0
     """episodes that reached the time limit"""
     switches: int = 0
@@ -252,6 +265,10 @@ class WorldSnapshot(ReadModel):
     """choice one tick earlier, as observed by the policy"""
     time_left_s: float
     """time left in the episode, as observed by the policy [s]"""
+    phase: PickPhase = "approach"
+    """phase of the pick, as observed by the policy"""
+    closing_s: float = 0.0
+    """time for which the gripper has been closing, as observed by the policy [s]"""
     tcp: Numbers
     """tool centre point, robot base frame [m]"""
 

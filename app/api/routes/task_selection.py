@@ -37,7 +37,9 @@ async def choose(request: TaskSelectionRequest, services: ServicesDep) -> TaskSe
         qd,
         candidates=candidates,
         previous=request.previous,
+        progress=request.progress,
         time_left_s=request.time_left_s,
+        objective=request.objective,
     )
 
     def answer() -> TaskSelection:

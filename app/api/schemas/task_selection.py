@@ -15,7 +15,13 @@ from app.errors import InvalidInput
 from app.sim.core.arrays import Vec
 from app.sim.core.out_of_range import OutsideField
 from app.sim.perception.multi_person_tracker import MAX_SKELETONS
-from app.sim.pick.task_policy import Candidate, Decision
+from app.sim.pick.task_policy import (
+    Candidate,
+    Decision,
+    Objective,
+    OutcomeEstimate,
+    PickProgress,
+)
 
 MAX_CANDIDATES = 1000
 FrameName = Literal["robot-base", "base_link"]
@@ -56,9 +62,22 @@ class TaskSelectionRequest(Body):
     previous: str | None = Field(
         None, max_length=128, description="last chosen id, for hysteresis; null: none"
     )
+    phase: Literal["approach", "descend", "lift"] = Field(
+        "approach",
+        description="phase of the pick of `previous`: `approach` of the point over the object, "
+        "`descend` to it and close the gripper, `lift` it; while it is lifted it stays chosen",
+    )
+    closing_s: Annotated[float, Field(ge=0.0, le=60.0)] = Field(
+        0.0, description="time for which the tool has been held at the object [s]"
+    )
     time_left_s: Annotated[float, Field(ge=-1e9, le=1e9)] = Field(
         10.0,
         description="time left to reach the target [s]; clamped to 0 to 60 for the policy",
+    )
+    objective: Objective = Field(
+        "value",
+        description="the choice maximises the critic's `value` with hysteresis, as in the "
+        "thesis, or the probability of `success`, or minimises the expected `time` per success",
     )
     checkpoint: str | None = Field(
         None, max_length=64, description="SHA-256 or alias; the shipped policy if null"
@@ -77,6 +96,13 @@ class TaskSelectionRequest(Body):
             tuple(
                 Candidate(id=one.id, position=np.array(one.position)) for one in self.candidates
             ),
+        )
+
+    @property
+    def progress(self) -> PickProgress:
+        """Progress of the pick of ``previous``."""
+        return PickProgress(
+            phase=("approach", "descend", "lift").index(self.phase), closing_s=self.closing_s
         )
 
     def _check_ids_are_unique(self) -> None:
@@ -109,12 +135,41 @@ class Action(Answer):
     qd_target: Vector6 = Field(description="target joint speeds [rad/s]")
 
 
+class Probability(Answer):
+    """A probability with its 95 % interval."""
+
+    mean: float
+    low: float
+    high: float
+
+
+class Outcome(Answer):
+    """Predicted outcome of a candidate, if it is pursued within the time left."""
+
+    success: Probability
+    contact: Probability
+    time_s: float = Field(description="expected time to success [s]")
+
+    @classmethod
+    def from_domain(cls, outcome: OutcomeEstimate) -> Self:
+        """Return the schema of the prediction."""
+        (low, high), (least, most) = outcome.success_interval, outcome.contact_interval
+        return cls(
+            success=Probability(mean=outcome.success, low=low, high=high),
+            contact=Probability(mean=outcome.contact, low=least, high=most),
+            time_s=outcome.time_s,
+        )
+
+
 class CandidateValue(Answer):
     """The critic's value of a candidate."""
 
     id: str
     value: float = Field(description="expected discounted reward Q(s, pi(s))")
     chosen: bool
+    outcome: Outcome | None = Field(
+        description="probabilities and time; null where the checkpoint predicts none"
+    )
     reachable: bool = Field(description="whether a configuration with vertical tool exists")
     action: Action
     outside: list[Outside] = Field(description="coordinates outside the training range")
@@ -150,6 +205,9 @@ class TaskSelection(Answer):
                     id=candidate.id,
                     value=decision.values[index],
                     chosen=index == decision.index,
+                    outcome=None
+                    if decision.outcomes is None
+                    else Outcome.from_domain(decision.outcomes[index]),
                     reachable=decision.reachable[index],
                     action=Action(qd_target=decision.qd_target[index].tolist()),
                     outside=[

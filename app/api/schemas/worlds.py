@@ -13,6 +13,8 @@ from app.live.snapshot import WorldSnapshot
 SNAPSHOT = TypeAdapter(WorldSnapshot)
 ONLY_FULL: dict[str, Any] = {
     "previous": True,
+    "phase": True,
+    "closing_s": True,
     "time_left_s": True,
     "tcp": True,
     "people": {"__all__": {"q", "qd", "size"}},
@@ -120,6 +122,9 @@ def decision_input(snapshot: WorldSnapshot) -> TaskSelectionRequest | None:
             for one in snapshot.candidates
         ],
         previous=snapshot.previous,
+        phase=snapshot.phase,
+        closing_s=snapshot.closing_s,
+        objective="value",
         time_left_s=max(snapshot.time_left_s, 0.0),
         checkpoint=snapshot.checkpoint,
     )

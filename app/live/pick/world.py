@@ -1,9 +1,9 @@
 """Live pick-and-place world.
 
-A policy that knows a single person sees the nearest one. A reached target is picked up (the
-tool goes down and up again by inverse kinematics within the same limits), leaves the candidates
-until all have been picked, and the next episode continues from there. A contact is shown for
-two seconds; then the robot starts again from home.
+The policy moves the robot in all phases of a pick (``sim/pick/kernels/grasp.py``). A picked
+station leaves the candidates until all have been picked, and the next pick continues from
+there; a pick that was broken off stays a candidate. A contact is shown for two seconds; then
+the robot starts again from home.
 """
 
 import numpy as np
@@ -16,15 +16,11 @@ from app.live.people.workers import LiveWorkers
 from app.live.pick import explanation
 from app.live.snapshot import Status, WorldSnapshot
 from app.sim.cells.cell import Cell
-from app.sim.core.arrays import Vec
+from app.sim.core.arrays import Vec, as_kernel_array
 from app.sim.pick.case_verdict import CaseRun, Verdict, judge
 from app.sim.pick.cases import Case, find_case
-from app.sim.pick.task_policy import Candidate, Decision, TaskPolicy
-
-PICK_HEIGHT = 0.065
-"""Height of the tcp over the table when the fingers close [m]."""
-PICK_S = (0.9, 1.3, 2.0)
-"""Times at which the tool is down, the fingers have closed, the tool is up again [s]."""
+from app.sim.pick.kernels.grasp import APPROACH, DESCEND, next_phase
+from app.sim.pick.task_policy import Candidate, Decision, PickProgress, TaskPolicy
 
 
 class LivePickWorld(BaseWorld[LiveWorkers]):
@@ -64,11 +60,8 @@ class LivePickWorld(BaseWorld[LiveWorkers]):
             return self.robot.home
         return self._configuration_over(self._case.robot_start)
 
-    def _configuration_over(self, station: str, height: float | None = None) -> Vec:
-        position = np.array(self.cell.station(station).position)
-        if height is not None:
-            position[2] = height
-        return self.robot.configuration_at(position)[0]
+    def _configuration_over(self, station: str) -> Vec:
+        return self.robot.configuration_at(np.array(self.cell.station(station).position))[0]
 
     def _begin(self, status: Status = "moving") -> None:
         self.enter(status)
@@ -128,54 +121,61 @@ class LivePickWorld(BaseWorld[LiveWorkers]):
 
     # Time.
 
+    def _after_period(self) -> None:
+        if self.status in ("moving", "picking"):
+            self._decide()
+
     def _move_robot(self, before: HumanGeometry) -> None:
-        straight = self.status == "picking"
-        found = self.robot.advance(self._action(), self.people, before, straight=straight)
+        act = np.zeros(5)
+        if self.decision is not None:
+            act = np.asarray(self.decision.actions[self.decision.index], dtype=np.float64)
+        found = self.robot.advance(act, self.people, before)
         if found.kind != "none":
             self.note_contact(found)
             self._run = self._run.finish("contact", self.t)
-        elif self.status == "picking":
-            self._finish_pick()
         elif self.decision is not None:
             self.time_left -= self.robot.dt
-            self._end_episode(self.decision)
+            if self._advance_pick(self.decision):
+                self._finish_pick(self.decision.chosen)
+            elif self.time_left <= 0.0:
+                self.count(timeouts=1)
+                self._run = self._run.finish("timeout", self.t)
+                self._begin("moving" if self._case is None else "case done")
 
-    def _action(self) -> Vec:
-        """Return joint speeds over their limits, in [-1, 1], shape (5,)."""
-        if self.status == "picking" and self._goal is not None:
-            down = self.status_s < PICK_S[1]
-            configuration = self._configuration_over(self._goal, PICK_HEIGHT if down else None)
-            return self.robot.toward(configuration)
-        if self.decision is not None:
-            return np.asarray(self.decision.actions[self.decision.index], dtype=np.float64)
-        return np.zeros(5)
+    def _advance_pick(self, decision: Decision) -> bool:
+        """Enter the phase that follows; return whether the pick has succeeded."""
+        target = self.offered[decision.index].position
+        assert self.policy is not None
+        rules, before = self.policy.grasp, self.progress
+        if rules.depth == 0.0:
+            return self.robot.reached(target)
+        tool = self.robot.tool(target)
+        phase, closing, lifted = next_phase(
+            rules, before.phase, before.closing_s, as_kernel_array(target), tool, self.robot.dt
+        )
+        self.progress = PickProgress(phase=phase, closing_s=closing)
+        if before.phase == DESCEND and phase == APPROACH:
+            self.count(broken_off=1)
+        status: Status = "moving" if phase == APPROACH else "picking"
+        if status != self.status:
+            self.enter(status)
+        return lifted
 
-    def _end_episode(self, decision: Decision) -> None:
-        """End the episode if the target is reached or the time limit has passed."""
-        if self.robot.reached(self.offered[decision.index].position):
-            self.count(reached=1)
-            self._goal = decision.chosen
-            self.enter("picking")
-        elif self.time_left <= 0.0:
-            self.count(timeouts=1)
-            self._run = self._run.finish("timeout", self.t)
-            self._begin("moving" if self._case is None else "case done")
-
-    def _finish_pick(self) -> None:
-        if self.status_s < PICK_S[2] and not self.near:
-            return
+    def _finish_pick(self, station: str) -> None:
+        self.count(reached=1)
+        self._goal = station
         if self._case is not None:
             self.status = "case done"
             self._run = self._run.finish("reached", self.t)
         else:
-            self._note_picked(self._goal)
+            self._note_picked(station)
             self._begin()
 
-    def _note_picked(self, reached: str | None) -> None:
+    def _note_picked(self, station: str) -> None:
         """Remove a picked station from the candidates until all have been picked."""
-        self._picked.add(reached or "")
+        self._picked.add(station)
         if self._picked.issuperset(self._selected):
-            self._picked = {reached or ""}
+            self._picked = {station}
 
     def _end_contact(self) -> None:
         if self._case is None:
@@ -197,6 +197,8 @@ class LivePickWorld(BaseWorld[LiveWorkers]):
         if self.decision is None:
             return
         self._run = self._run.choose(self.t, self.decision.chosen)
+        if self.status == "picking" and self.progress.phase == APPROACH:
+            self.enter("moving")  # another target
         if left is not None:
             names = tuple(candidate.id for candidate in self.offered)
             self.set_message(
@@ -216,9 +218,9 @@ class LivePickWorld(BaseWorld[LiveWorkers]):
     def _message(self, status: Status) -> str:
         if status == "contact" and self.contact is not None:
             return status_messages.touched(self.contact, final=self._case is not None)
-        if self.note is not None and status in ("moving", "no policy"):
+        if self.note is not None and status in ("moving", "picking", "no policy"):
             return self.note
-        if status == "moving" and self.decision is not None:
+        if status in ("moving", "picking") and self.decision is not None:
             names = tuple(candidate.id for candidate in self.offered)
             return explanation.going(self.decision, names, self._label)
         if status == "case done" and self._case is not None:
@@ -237,7 +239,7 @@ class LivePickWorld(BaseWorld[LiveWorkers]):
         return self._snapshot(
             status,
             self._message(status),
-            gripping=status == "picking" and self.status_s >= PICK_S[0],
+            gripping=status == "picking" and self.progress.closing_s > 0.0,
             selected=self._selected,
             case=None if self._case is None else self._case.id,
             verdict=self._verdict(),

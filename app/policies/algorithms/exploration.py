@@ -3,7 +3,8 @@
 The scale of the AR(1) noise grows from 0 in the first, greedy environments to ``sigma_max`` in
 the last. In half of the noisy environments a random *option* takes over from time to time, for
 4 to 29 control cycles: hold still, move home, move to a configuration nearby or to that of
-another task. Options reach states near people that the policy alone would not visit.
+another task; in picks, half of the time, move straight to the target. Options reach states near
+people that the policy alone would not visit, and leave states in which it hesitates.
 
 Deviates: the thesis explores by parameter-space noise (section 5.3.4) and by an
 Ornstein-Uhlenbeck process (table 4.2), which is here too.
@@ -18,9 +19,14 @@ from numpy.typing import NDArray
 from app.policies.configs.td3 import NoiseExploration
 from app.sim.core.arrays import Vec
 from app.sim.pick.batch import PickBatch
+from app.sim.pick.kernels.grasp import APPROACH
 from app.sim.scenario.kernels.person_observation import BASE_GAIN
 
 HOLD, HOME, NEARBY, ELSEWHERE = range(4)
+STRAIGHT_ON = 0.5
+"""Share of the options that move straight to the target, as the base motion does."""
+GRASP_NOISE = 0.2
+"""Scale of the noise while an object is grasped: holding still is part of the task."""
 OPTION_STEPS = (4, 30)
 """Shortest duration of an option and end of the range [control cycles]."""
 
@@ -114,6 +120,7 @@ class OptionExploration:
         self._noise, self._batch, self._rng = noise, batch, rng
         self._configurations, self._rate = configurations, rate
         self.n_greedy = noise.n_greedy
+        self._straight_on = batch.settings.grasp.depth > 0.0
         envs = np.arange(batch.n_envs)
         self._may_option = (envs >= self.n_greedy) & (envs % 2 == 0)
         self._left = np.zeros(batch.n_envs, dtype=np.int64)
@@ -122,7 +129,10 @@ class OptionExploration:
     def apply(self, act: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return perturbed actions, shape (n_envs, n_act)."""
         noisy = self._noise.apply(act)
+        grasping = self._batch.state.phase != APPROACH
+        noisy[grasping] = act[grasping] + GRASP_NOISE * (noisy - act)[grasping]
         self._start_options()
+        self._left[grasping] = 0
         active = self._left > 0
         if active.any():
             noisy[active] = self._toward_goals()[active]
@@ -138,6 +148,8 @@ class OptionExploration:
     def _draw_goal(self, env: int) -> Vec:
         n = self._batch.n_act
         q = self._batch.state.q[env, :n]
+        if self._straight_on and self._rng.random() < STRAIGHT_ON:
+            return self._batch.state.q_goal[env, :n].copy()
         kind = self._rng.integers(4)
         if kind == HOLD:
             return q.copy()

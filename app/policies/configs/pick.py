@@ -23,6 +23,8 @@ from app.policies.configs.td3 import (
     NoiseExploration,
     TD3Learning,
 )
+from app.sim.pick.kernels.grasp import REACH_ONLY as GRASP_NOTHING
+from app.sim.pick.kernels.grasp import GraspRules
 
 
 class PickExploration(NoiseExploration):
@@ -34,8 +36,11 @@ class PickExploration(NoiseExploration):
 class PickEpisode(FieldGroup):
     """Starts, ends and observations of episodes."""
 
+    task: Literal["pick", "reach"] = choice(
+        "pick", "Task: descend, close and lift at the target, or only reach it"
+    )
     time_limit_s: float = number(20.0, 1.0, 60.0, "s", "Time limit")
-    short_limit_s: float = number(10.0, 1.0, 60.0, "s", "Time limit of short episodes")
+    short_limit_s: float = number(12.0, 1.0, 60.0, "s", "Time limit of short episodes")
     short_share: float = number(0.5, 0.0, 1.0, "", "Share of short episodes")
     start_clearance_m: float = number(
         0.05, 0.0, 1.0, "m", "Start clearance: least distance of robot and people"
@@ -46,17 +51,34 @@ class PickEpisode(FieldGroup):
     on_path_share: float = number(
         0.15, 0.0, 1.0, "", "Share of episodes that start part of the path to the target"
     )
-    observation: Literal["features", "body"] = choice(
-        "features", "Observation: features, or also the anthropometry of the person"
+    at_target_share: float = number(
+        0.1, 0.0, 1.0, "", "Share of episodes that start at the target"
     )
+    anywhere_share: float = number(
+        0.2, 0.0, 1.0, "", "Share of targets and of starts drawn away from the stations"
+    )
+    observation: Literal["features", "body", "phase", "two-people"] = choice(
+        "two-people",
+        "Observation: features of one person; also the anthropometry; also the phase of the "
+        "pick; also a second person",
+    )
+
+    @property
+    def grasp(self) -> GraspRules:
+        """The phases of the task, for the scenario."""
+        return GraspRules() if self.task == "pick" else GRASP_NOTHING
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        """Check the time limits against each other.
+        """Check the time limits against each other, and the observation against the task.
 
         Raises:
-            InvalidInput: The short limit is the longer one.
+            InvalidInput: The short limit is the longer one, or a pick has no phase.
         """
+        sees_phase = self.observation in ("phase", "two-people")
+        if sees_phase != (self.task == "pick"):
+            rule = f"must {'not ' if sees_phase else ''}contain the phase: task = {self.task}"
+            raise InvalidInput("episode.observation", self.observation, rule)
         if self.short_limit_s > self.time_limit_s:
             rule = f"must not exceed time_limit_s = {digits(self.time_limit_s)} s"
             raise InvalidInput("episode.short_limit_s", self.short_limit_s, rule)
@@ -74,8 +96,14 @@ class PickPeople(FieldGroup):
         "sampled", "Augmentation: primitives are sampled, or demonstrations replayed"
     )
     human_absent: float = number(0.35, 0.0, 1.0, "", "Share of absent people per episode")
-    human_off_task: float = number(0.2, 0.0, 1.0, "", "Share of people who are off task")
-    human_pace: float = number(1.0, 0.2, 2.0, "", "Pace: 1 is the pace of the primitives")
+    human_off_task: float = number(0.3, 0.0, 1.0, "", "Share of people who are off task")
+    human_at_rest: float = number(
+        0.25, 0.0, 1.0, "", "Share of people who stand still for 5 to 20 s of an episode"
+    )
+    human_pace: float = number(0.6, 0.2, 2.0, "", "Pace: 1 is the pace of the primitives")
+    human_pace_max: float = number(
+        2.0, 0.2, 4.0, "", "Greatest pace: a person's is drawn per episode, from human_pace on"
+    )
     human_yielding: float = number(0.0, 0.0, 1.0, "", "Yielding to the robot: 0 ignores it")
 
 
@@ -85,7 +113,7 @@ class PickReward(FieldGroup):
     c_d: float = number(1.0, 0.0, 10.0, "1/m", "Progress reward weight c_d")
     c_th: float = number(0.25, 0.0, 10.0, "1/rad", "Uprightness weight c_th")
     c_c: float = number(5.0, 0.0, 100.0, "", "Collision cost c_c")
-    c_step: float = number(0.005, 0.0, 1.0, "", "Time cost c_step: per control cycle")
+    c_step: float = number(0.02, 0.0, 1.0, "", "Time cost c_step: per control cycle")
     c_v: float = number(0.0, 0.0, 10.0, "s/m", "Speed cost c_v: TCP speed near the target")
     d_v: float = number(0.1, 0.0, 1.0, "m", "Range d_v of the speed cost")
     c_s: float = number(4.0, 0.0, 100.0, "", "Success bonus c_s")
@@ -110,3 +138,21 @@ class PickPreset(TrainingConfig):
     people: PickPeople = PickPeople()
     action: ActionConfig = ActionConfig()
     reward: PickReward = PickReward()
+
+
+REACH_ONLY = PickPreset(
+    name="pick-reach-td3",
+    episode=PickEpisode(
+        task="reach",
+        short_limit_s=10.0,
+        at_target_share=0.0,
+        anywhere_share=0.0,
+        observation="features",
+    ),
+    people=PickPeople(
+        human_off_task=0.2, human_at_rest=0.0, human_pace=1.0, human_pace_max=1.0
+    ),
+    reward=PickReward(c_step=0.005),
+)
+"""The task without a grasp: a target counts when it is reached, as in the thesis."""
+PICK_PRESETS = (PickPreset(), REACH_ONLY)

@@ -12,14 +12,14 @@ from typing import Any
 
 from app.errors import InvalidInput, NotFound
 from app.policies.configs.fields import read_config
-from app.policies.configs.pick import PickPreset
+from app.policies.configs.pick import PICK_PRESETS, PickPreset
 from app.policies.configs.reach import REACH_PRESETS, ReachPreset
 from app.policies.configs.sorting import SORTING_PRESETS, SortingPreset
 
 Preset = PickPreset | ReachPreset | SortingPreset
 
 PRESETS: Mapping[str, Preset] = MappingProxyType(
-    {one.name: one for one in (PickPreset(), *REACH_PRESETS, *SORTING_PRESETS)}
+    {one.name: one for one in (*PICK_PRESETS, *REACH_PRESETS, *SORTING_PRESETS)}
 )
 """Every preset by name."""
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from app.errors import InvalidInput, NotFound
 from app.policies.checkpoints.checkpoint import CHOOSING, REACHING, SORTING, Checkpoint, task_of
+from app.policies.evaluation.pick import cases as pick_cases
 from app.policies.evaluation.pick import people, tracker
 from app.policies.evaluation.pick import tasks as pick
 from app.policies.evaluation.reach.oracle import run_oracle
@@ -27,6 +28,9 @@ PROTOCOLS: Mapping[str, Protocol] = MappingProxyType(
     {
         "pick-single": pick.run_single,
         "pick-choice": pick.run_choice,
+        "pick-choice-hard": pick.run_choice_hard,
+        "pick-cases": pick_cases.run_cases,
+        "pick-rest": people.run_rest,
         "pick-tracker": tracker.run_tracker,
         "pick-people": people.run_people,
         "pick-yielding": people.run_yielding,

@@ -33,3 +33,20 @@ def mean_of(values: ArrayLike) -> dict[str, float] | None:
     mean, error = float(x.mean()), float(x.std(ddof=1)) / len(x) ** 0.5 if len(x) > 1 else 0.0
     low, high = norm.interval(0.95, loc=mean, scale=error) if error else (mean, mean)
     return {"mean": mean, "low": float(low), "high": float(high)}
+
+
+def mcnemar(first: ArrayLike, second: ArrayLike) -> dict[str, float]:
+    """Compare two success rates on the same episodes by McNemar's exact test.
+
+    Args:
+        first: Whether each episode succeeded under the first condition, shape (n,).
+        second: The same under the second one.
+
+    Returns:
+        Episodes that only the first won, those that only the second won, and the two-sided
+        p-value of equal rates.
+    """
+    a, b = np.asarray(first, dtype=bool), np.asarray(second, dtype=bool)
+    gained, lost = int((a & ~b).sum()), int((~a & b).sum())
+    p = binomtest(gained, gained + lost).pvalue if gained + lost else 1.0
+    return {"only_first": gained, "only_second": lost, "p": float(p)}

@@ -26,6 +26,7 @@ from app.policies.checkpoints.model_state import under
 from app.policies.configs.fields import read_config
 from app.policies.configs.pick import PickPreset
 from app.policies.inference.trained_policy import TrainedPolicy
+from app.policies.networks.outcome import OutcomeHead
 from app.policies.networks.pick import LAYOUTS, actor_of, critics_for
 from app.sim.cells.cell import Cell, require_cell
 from app.sim.core.arrays import Vec
@@ -39,8 +40,16 @@ from app.sim.perception.observed_people import (
     is_far,
     nearest_index,
 )
-from app.sim.pick.batch import observe, step_robot
-from app.sim.pick.task_policy import Candidate, Decision
+from app.sim.pick.batch import TaskView, observe, step_robot
+from app.sim.pick.kernels.grasp import LIFT, GraspRules
+from app.sim.pick.task_policy import (
+    NOT_BEGUN,
+    Candidate,
+    Decision,
+    Objective,
+    OutcomeEstimate,
+    PickProgress,
+)
 from app.sim.robot import ur10 as robot
 from app.sim.robot.actions import ActionSettings
 from app.sim.robot.kernels.arm import CONTROLLED
@@ -49,6 +58,8 @@ from app.sim.scene.scene import FAR_AWAY, arm_of, people_of
 
 HYSTERESIS = 0.2
 """Margin of the value by which another candidate must be better."""
+LEAST_SUCCESS = 0.01
+"""Least probability of success that an expected time is divided by."""
 LONGEST_S = 60.0
 """Maximum observed remaining time [s]."""
 MAX_CANDIDATES = 1000
@@ -83,15 +94,47 @@ class ValueNetworks:
         expect_layout(checkpoint, LAYOUTS[preset.episode.observation], CONTROLLED)
         self.n_obs = sum(size for _, size in checkpoint.manifest["layout"])
         """Length of the observations."""
-        self.actor = actor_of(preset.networks, self.n_obs)
-        self.critic = critics_for(preset.networks, self.n_obs)
+        self.actor = actor_of(preset, self.n_obs)
+        self.critic = critics_for(preset, self.n_obs)
         arrays = checkpoint.arrays()
-        for name, module in (("actor", self.actor), ("critic", self.critic)):
+        self.outcome: OutcomeHead | None = None
+        parts: dict[str, torch.nn.Module] = {"actor": self.actor, "critic": self.critic}
+        if "outcome.mean" in arrays:
+            self.outcome = parts["outcome"] = OutcomeHead(self.n_obs)
+        for name, module in parts.items():
             try:
                 module.load_state_dict(under(arrays, name))
             except RuntimeError as error:
                 raise CheckpointMismatch("tensors", f"those of {name}", str(error)) from error
             module.eval()
+
+    def outcomes(
+        self, obs: NDArray[np.float32], values: NDArray[np.float32]
+    ) -> tuple[OutcomeEstimate, ...] | None:
+        """Return the predicted outcomes of observations; None without such a network.
+
+        Args:
+            obs: Observations, shape (n, n_obs).
+            values: The critic's values, shape (n,).
+        """
+        if self.outcome is None:
+            return None
+        with torch.inference_mode():
+            found = self.outcome.predict(torch.as_tensor(obs), torch.as_tensor(values))
+        low = (found.probability - found.spread).clamp(0.0, 1.0).tolist()
+        high = (found.probability + found.spread).clamp(0.0, 1.0).tolist()
+        return tuple(
+            OutcomeEstimate(
+                success=mean[0],
+                success_interval=(least[0], most[0]),
+                contact=mean[1],
+                contact_interval=(least[1], most[1]),
+                time_s=time_s,
+            )
+            for mean, least, most, time_s in zip(
+                found.probability.tolist(), low, high, found.time_s.tolist(), strict=True
+            )
+        )
 
     def act_and_value(
         self, obs: NDArray[np.float32]
@@ -141,6 +184,8 @@ class TaskChooser(TrainedPolicy):
             require_cell(cell, self.cell, self.cell_sha256)
         self.action: ActionSettings = pick_preset_of(checkpoint).action.settings
         """Meaning of the actions (docs/method.md 2.2)."""
+        self.grasp: GraspRules = pick_preset_of(checkpoint).episode.grasp
+        """Phases of a pick."""
         self._hysteresis = hysteresis
         self._networks = ValueNetworks(checkpoint)
         self._arm, self._people = arm_of(self._cell), people_of(self._cell)
@@ -157,35 +202,42 @@ class TaskChooser(TrainedPolicy):
         candidates: Sequence[Candidate],
         *,
         previous: str | None = None,
+        progress: PickProgress = NOT_BEGUN,
         time_left_s: float = 10.0,
+        objective: Objective = "value",
     ) -> Decision:
         """Select one candidate; see :class:`~app.sim.pick.task_policy.TaskPolicy`.
 
-        The policy observes one person, the nearest to the robot, with the person's body size
-        (``observed_people.py``). Other people, and people farther away than any in training,
-        do not influence the selection.
+        People farther away than in training are not observed (``observed_people.py``). Of the
+        others, policies for one person observe the one nearest to the robot; the shipped one
+        observes also the one nearest to the candidate.
         """
         started = time.perf_counter()
         robot_state = self._limits.take(q, qd)
         q, qd, _ = robot_state.clamped
-        seen, person = self._nearest(robot_state.measured.q, people)
+        observed = self._observed(robot_state.measured.q, people)
         ids, goals = _check_candidates(candidates)
+        last = ids.index(previous) if previous in ids else None
         if not np.isfinite(time_left_s):
             raise InvalidInput("time_left_s", time_left_s, "must be finite [s]")
         time_left_s = min(LONGEST_S, max(0.0, time_left_s))
+        task = TaskView(
+            n_obs=self._networks.n_obs,
+            grasp=self.grasp,
+            current=last,
+            phase=progress.phase,
+            closing_s=progress.closing_s,
+        )
+        people_arrays = _arrays(observed, self._people.bodies[0])
         obs, reachable = observe(
-            self._arm,
-            self._people,
-            q,
-            qd,
-            (person.q, person.qd, person.size),
-            goals,
-            time_left_s,
-            self._networks.n_obs,
+            self._arm, self._people, (q, qd), people_arrays, goals, time_left_s, task
         )
         act, values = self._networks.act_and_value(obs)
-        last = ids.index(previous) if previous in ids else None
-        index = int(select(values, last, self._hysteresis))
+        outcomes = self._networks.outcomes(obs, values)
+        index = self._choose(objective, values, outcomes, last)
+        if last is not None and progress.phase == LIFT:
+            index = last
+        seen, person = observed[0]
         qd_target = self._speeds(q, qd, act)
         return Decision(
             chosen=ids[index],
@@ -196,10 +248,30 @@ class TaskChooser(TrainedPolicy):
             reachable=tuple(bool(flag) for flag in reachable),
             outside=robot_state.outside + self._ranges.of_state(q, qd, person, seen),
             outside_candidates=tuple(self._ranges.of_goal(goal) for goal in goals),
+            outcomes=outcomes,
             checkpoint=self.checkpoint,
             elapsed_ms=1e3 * (time.perf_counter() - started),
             seen=seen,
         )
+
+    def _choose(
+        self,
+        objective: Objective,
+        values: NDArray[np.float32],
+        outcomes: tuple[OutcomeEstimate, ...] | None,
+        last: int | None,
+    ) -> int:
+        """Return the index of the best candidate under an objective."""
+        if objective == "value":
+            return int(select(values, last, self._hysteresis))
+        if outcomes is None:
+            rule = "needs a checkpoint with outcome probabilities"
+            raise InvalidInput("objective", objective, rule, ("value",))
+        if objective == "success":
+            scores = [one.success for one in outcomes]
+        else:
+            scores = [-one.time_s / max(one.success, LEAST_SUCCESS) for one in outcomes]
+        return int(np.argmax(scores))
 
     def _speeds(self, q: Vec, qd: Vec, act: NDArray[np.float32]) -> Vec:
         """Return the joint speeds of actions, shape (n, 5) [rad/s], shape (n, 6)."""
@@ -212,14 +284,23 @@ class TaskChooser(TrainedPolicy):
         speeds[:, :CONTROLLED] = act * self._arm.limits.qd_max[:CONTROLLED]
         return speeds
 
-    def _nearest(self, q: Vec, people: Sequence[Person]) -> tuple[int | None, Person]:
-        """Return index and state of the observed person; a far person if none is near."""
+    def _observed(self, q: Vec, people: Sequence[Person]) -> list[tuple[int | None, Person]]:
+        """Return number and state of the observed people, the nearest to the robot first."""
         known = checked_people(people)
         near = [i for i, person in enumerate(known) if not is_far(person)]
-        found = nearest_index(self._arm, self._people, q, [known[i] for i in near])
-        if found is None:
-            return None, _FAR_PERSON
-        return near[found], as_known(known[near[found]])
+        first = nearest_index(self._arm, self._people, q, [known[i] for i in near])
+        if first is None:
+            return [(None, _FAR_PERSON)]
+        ordered = [near.pop(first), *near]
+        return [(i, as_known(known[i])) for i in ordered]
+
+
+def _arrays(observed: list[tuple[int | None, Person]], body: Vec) -> tuple[Vec, Vec, Vec]:
+    """Return joints, joint speeds and body dimensions of people, shape (P, ...) each."""
+    people = [person for _, person in observed]
+    sizes = [body if person.size is None else person.size for person in people]
+    q, qd = (np.stack([getattr(one, name) for one in people]) for name in ("q", "qd"))
+    return q, qd, np.stack(sizes)
 
 
 class _TrainedRanges:

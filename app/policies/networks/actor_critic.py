@@ -38,6 +38,17 @@ class CrowdShape(NamedTuple):
     """Length of a block; its first number is 1 if the person is present, otherwise 0."""
 
 
+class Fade(NamedTuple):
+    """Fading of a residual with the distance to people, in units of the observation."""
+
+    place: int
+    """Index of the distance to the nearest person in an observation."""
+    full: float
+    """Distance below which the residual counts fully."""
+    zero: float
+    """Distance beyond which the base motion acts alone."""
+
+
 class CrowdEncoder(nn.Module):
     """Set encoding: replaces the blocks of all people in an observation by CROWD_WIDTH numbers.
 
@@ -81,6 +92,7 @@ class ResidualActor(nn.Module):
         base: Index of the nominal action in an observation.
         layers: Number of hidden layers.
         crowd: Position of the people set; None without one.
+        fade: Fading of the residual away from people; None without one.
     """
 
     def __init__(
@@ -91,6 +103,7 @@ class ResidualActor(nn.Module):
         base: int = BASE_START,
         layers: int = 2,
         crowd: CrowdShape | None = None,
+        fade: Fade | None = None,
     ) -> None:
         super().__init__()
         n_seen, before = _seen(crowd, n_obs)
@@ -100,13 +113,18 @@ class ResidualActor(nn.Module):
             last.bias.zero_()
         self.crowd = nn.Sequential(*before)
         self.net = nn.Sequential(*hidden(n_seen, width, layers), last)
-        self.n_obs, self.base = n_obs, slice(base, base + n_act)
+        self.n_obs, self.base, self.fade = n_obs, slice(base, base + n_act), fade
 
     def forward(self, obs: torch.Tensor) -> torch.Tensor:
         """Return actions, shape (n, n_act), for observations, shape (n, n_obs or more)."""
         base = obs[:, self.base].clamp(-1.0, 1.0)
         residual = self.net(self.crowd(obs[:, : self.n_obs]))
-        return torch.tanh(residual + torch.atanh(BASE_WEIGHT * base))
+        act = torch.tanh(residual + torch.atanh(BASE_WEIGHT * base))
+        if self.fade is None:
+            return act
+        clearance = obs[:, self.fade.place : self.fade.place + 1]
+        share = (self.fade.zero - clearance) / (self.fade.zero - self.fade.full)
+        return torch.lerp(base, act, share.clamp(0.0, 1.0))
 
 
 class PlainActor(nn.Module):

@@ -8,8 +8,11 @@ from numpy.typing import NDArray
 from app.policies.algorithms.exploration import OptionExploration, PerEnvAR1Noise
 from app.policies.algorithms.td3 import Networks
 from app.policies.checkpoints.checkpoint import Checkpoint
+from app.policies.checkpoints.model_state import under
 from app.policies.configs.pick import PickPeople, PickPreset
+from app.policies.networks.outcome import OutcomeHead
 from app.policies.networks.pick import LAYOUTS, actor_of, critics_for
+from app.policies.training.outcome import collect, fit
 from app.policies.training.reporter import Callbacks, Reporter
 from app.policies.training.run import TrainingRun
 from app.policies.training.td3 import TD3Scenario, TrainingMonitor, first_step, start_td3
@@ -22,6 +25,13 @@ from app.sim.pick.batch import OUTCOMES, PickBatch, PickSettings
 from app.sim.pick.kernels.reward import RewardWeights
 from app.sim.robot.kernels.arm import CONTROLLED
 from app.sim.scene.scene import HumanKind
+
+OUTCOME_SEED = 7_000_003
+"""Added to the seed of a training for the episodes that outcomes are fitted to."""
+OUTCOME_SHARE = 0.15
+"""Steps of these episodes, relative to the training."""
+MIN_EPISODES = 100
+"""Fewest ended episodes that outcomes are fitted to."""
 
 
 def visited_states(batch: PickBatch) -> dict[str, Vec]:
@@ -45,6 +55,8 @@ def work_of(people: PickPeople, seed: int = 0) -> HumanMotionConfig:
         motion=people.human_motion,
         seed=seed,
         pace=people.human_pace,
+        pace_max=max(people.human_pace, people.human_pace_max),
+        at_rest=people.human_at_rest,
         yielding=people.human_yielding,
         off_task=people.human_off_task,
         absent=people.human_absent,
@@ -63,6 +75,9 @@ def settings_of(preset: PickPreset) -> PickSettings:
         start_clearance_m=episode.start_clearance_m,
         target_jitter_m=episode.target_jitter_m,
         on_path_share=episode.on_path_share,
+        at_target_share=episode.at_target_share,
+        anywhere_share=episode.anywhere_share,
+        grasp=episode.grasp,
         people=None if n_people == 1 else (worker,) * n_people,
         work=work_of(preset.people),
         observation=episode.observation,
@@ -77,22 +92,57 @@ def start(
     """Return a training; see :func:`~app.policies.training.td3.start_td3`."""
     first = seed + first_step(resume)
     batch = PickBatch(cell, preset.learning.n_envs, first, settings_of(preset))
-    rng, config, sizes = np.random.default_rng(first), preset.exploration, preset.networks
+    rng, config = np.random.default_rng(first), preset.exploration
     noise = PerEnvAR1Noise((batch.n_envs, CONTROLLED), batch.arm.dt, config, rng)
     stations = batch.world.station_q
     scenario = TD3Scenario(
         task=ArmTask(batch, sees_time=True),
         exploration=OptionExploration(noise, batch, stations, config.option_rate, rng),
         networks=Networks(
-            actor=lambda: actor_of(sizes, batch.obs_size),
-            critic=lambda: critics_for(sizes, batch.obs_size),
-            width=sizes.width,
+            actor=lambda: actor_of(preset, batch.obs_size),
+            critic=lambda: critics_for(preset, batch.obs_size),
+            width=preset.networks.width,
         ),
         layout=LAYOUTS[preset.episode.observation],
         act_size=CONTROLLED,
         visited_states=lambda: visited_states(batch),
     )
     return start_td3(preset, seed, resume, cell, scenario)
+
+
+def fit_outcomes(
+    preset: PickPreset, seed: int, cell: Cell, policy: Checkpoint
+) -> OutcomeHead | None:
+    """Return the outcome probabilities of a trained policy.
+
+    Args:
+        preset: Training configuration.
+        seed: Seed of the training.
+        cell: Work cell of the training.
+        policy: The trained policy.
+
+    Returns:
+        The ensemble; None where too few episodes ended to fit one.
+    """
+    settings, learning = settings_of(preset), preset.learning
+    batch = PickBatch(cell, learning.n_envs, seed + OUTCOME_SEED, settings)
+    actor = actor_of(preset, batch.obs_size)
+    critic = critics_for(preset, batch.obs_size)
+    arrays = policy.arrays()
+    actor.load_state_dict(under(arrays, "actor"))
+    critic.load_state_dict(under(arrays, "critic"))
+    n_steps = round(OUTCOME_SHARE * learning.total_steps) // learning.n_envs
+    data = collect(batch, actor, critic, n_steps, seed)
+    return fit(data, seed) if len(np.unique(data.episode)) >= MIN_EPISODES else None
+
+
+def add_outcomes(
+    run: TrainingRun, preset: PickPreset, seed: int, cell: Cell, policy: Checkpoint
+) -> None:
+    """Fit the outcome probabilities of a finished policy and add them to its checkpoint."""
+    head = fit_outcomes(preset, seed, cell, policy)
+    if head is not None:
+        run.add("outcome", head)
 
 
 class PickReporter(Reporter):

@@ -26,8 +26,8 @@ REFILL_STEPS = 51_200
 class Parts:
     """What a checkpoint is made of."""
 
-    policy: Mapping[str, torch.nn.Module]
-    """Networks that decide, by name."""
+    policy: dict[str, torch.nn.Module]
+    """Networks of the policy, by name."""
     targets: Mapping[str, torch.nn.Module]
     """Networks that only training needs."""
     optimizers: Mapping[str, torch.optim.Optimizer]
@@ -87,6 +87,10 @@ class TrainingRun:
     def cpu_s(self) -> float:
         """CPU time of the training so far, earlier attempts included [s]."""
         return self._cpu_before + time.process_time() - self._cpu_start - self._untimed
+
+    def add(self, name: str, network: torch.nn.Module) -> None:
+        """Add a network to the policy's checkpoints."""
+        self._parts.policy[name] = network
 
     def leave_out(self, cpu_s: float) -> None:
         """Do not count CPU time that went into measuring, not into training [s]."""

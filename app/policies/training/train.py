@@ -11,6 +11,7 @@ from collections.abc import Callable
 import torch
 
 from app.policies.checkpoints.checkpoint import Checkpoint
+from app.policies.configs.pick import PickPreset
 from app.policies.configs.presets import Preset
 from app.policies.configs.reach import ReachPreset
 from app.policies.configs.sorting import SortingPreset
@@ -74,6 +75,10 @@ def train(
     if left > 0:
         run.model.learn(left, callback=reporter, reset_num_timesteps=resume is None)
     policy, state = run.checkpoints()
-    if run.step % preset.learning.checkpoint_steps:
+    if not reporter.stopped and isinstance(preset, PickPreset):
+        pick_training.add_outcomes(run, preset, seed, place, policy)
+        policy, _ = run.checkpoints()
+        on_checkpoint(run.step, policy, state)
+    elif run.step % preset.learning.checkpoint_steps:
         on_checkpoint(run.step, policy, state)
     return TrainResult(checkpoint=policy, step=run.step, stopped=reporter.stopped)

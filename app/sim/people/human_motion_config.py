@@ -48,12 +48,17 @@ class HumanMotionConfig:
     """Seed of postures and primitive samples."""
     pace: float = 1.0
     """Speed relative to the scripts."""
+    pace_max: float | None = None
+    """Greatest pace; each worker's is drawn per episode from ``pace`` on, lower ones more often
+    (quadratically). None: ``pace``."""
     yielding: float = 0.0
     """Degree of yielding to the arm, from 0 (none) to 1."""
     off_task: float = 0.0
     """Share of workers with off-task motion, drawn per episode."""
     absent: float = 0.0
     """Share of absent workers, drawn per episode."""
+    at_rest: float = 0.0
+    """Share of workers that stand still for 5 to 20 s of an episode, in any posture."""
     bodies: tuple[BodySize, ...] | None = None
     """Body sizes, drawn per episode; None: ``primitive_library.BODIES``, or the cell's own
     person for synthetic reaches."""
@@ -68,11 +73,15 @@ class HumanMotionConfig:
     def __post_init__(self) -> None:
         if self.motion not in MOTIONS:
             raise InvalidInput("motion", self.motion, "must be a motion source", MOTIONS)
-        for name in ("yielding", "off_task", "absent"):
+        for name in ("yielding", "off_task", "absent", "at_rest"):
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise InvalidInput(name, getattr(self, name), "must lie in [0, 1]")
         if not (np.isfinite(self.pace) and self.pace > 0.0):
             raise InvalidInput("pace", self.pace, "must be above 0")
+        if self.pace_max is not None and not self.pace <= self.pace_max < math.inf:
+            raise InvalidInput(
+                "pace_max", self.pace_max, f"must be at least pace = {self.pace}"
+            )
         if self.bodies is not None and not self.bodies:
             raise InvalidInput("bodies", 0, "must hold at least one size, or be None")
         if self.motion == "recorded" and not self.recorded:
@@ -94,7 +103,11 @@ def with_human_motion(shared: People, cell: Cell, settings: HumanMotionConfig) -
         settings: Configuration.
     """
     shared = shared._replace(
-        pace=settings.pace, yielding=settings.yielding, absent_share=settings.absent
+        pace=settings.pace,
+        pace_max=settings.pace if settings.pace_max is None else settings.pace_max,
+        yielding=settings.yielding,
+        absent_share=settings.absent,
+        rest_share=settings.at_rest,
     )
     if settings.motion == "recorded":
         tracks, lengths = tracks_of(settings.recorded, cell.floor_z)

@@ -20,9 +20,12 @@ from app.sim.people.human_motion_config import USUAL, HumanMotionConfig
 from app.sim.people.kernels.motion import record_palms
 from app.sim.people.kernels.people import People, new_people_geometry
 from app.sim.pick.kernels import episode
+from app.sim.pick.kernels.grasp import DESCEND, REACH_ONLY, GraspRules
 from app.sim.pick.kernels.observation import (
     N_FEATURES,
+    N_PICK,
     N_WITH_BODY,
+    N_WITH_PHASE,
     PickQuery,
     new_pick_observation_workspace,
     observe_batch,
@@ -45,16 +48,22 @@ from app.sim.scene.scene import (
     with_people,
 )
 
+Flags = NDArray[np.bool_]
 OUTCOMES = ("running", "success", "collision", "timeout", "unfeasible")
 StartRule = Literal["clearance", "uniform"]
 DEFAULT_ACTION = ActionSettings()
+BOX_MARGIN = (0.1, 0.1, 0.02)
+"""Margin of the box of other targets around the stations [m]."""
 VIEWS = {
     "state": (PLAIN, episode.N_PLAIN),
     "features": (FEATURES, N_FEATURES),
     "body": (FEATURES, N_WITH_BODY),
+    "phase": (FEATURES, N_WITH_PHASE),
+    "two-people": (FEATURES, N_PICK),
 }
 """Contents and lengths of observations: the raw state of (5.8); the raw state and features;
-those and the person's body dimensions."""
+those and the person's body dimensions; those and the phase of a pick; that and a second
+person."""
 DEFAULT_WEIGHTS = RewardWeights(
     c_d=0.5, c_th=0.5, c_c=1.0, c_step=0.02, c_v=1.0, d_v=0.1, c_s=1.0, gamma=1.0
 )
@@ -77,6 +86,12 @@ class PickSettings:
     """Targets are drawn from a box of this half width around their station [m]."""
     on_path_share: float = 0.0
     """Share of episodes that start between the start configuration and the target."""
+    at_target_share: float = 0.0
+    """Share of episodes that start at the target."""
+    anywhere_share: float = 0.0
+    """Shares of targets and of starts drawn from the reachable box, not from the stations."""
+    grasp: GraspRules = field(default=REACH_ONLY)
+    """Phases of a pick; by default a target counts when it is reached."""
     n_candidates: tuple[int, int] = (1, 1)
     """Fewest and most targets offered per episode."""
     people: tuple[HumanKind, ...] | None = None
@@ -88,9 +103,8 @@ class PickSettings:
     ``uniform`` (anywhere, even in contact)."""
     action: ActionSettings = field(default=DEFAULT_ACTION)
     """Action type (docs/method.md 2.2)."""
-    observation: Literal["features", "state", "body"] = "features"
-    """Observation: the raw state of (5.8), the raw state and features, or the person's body
-    dimensions too."""
+    observation: Literal["features", "state", "body", "phase", "two-people"] = "features"
+    """Contents of observations, a key of ``VIEWS``."""
     weights: RewardWeights = field(default=DEFAULT_WEIGHTS)
     """Reward coefficients (docs/method.md 3.3)."""
 
@@ -117,7 +131,9 @@ def _world_of(cell: Cell, settings: PickSettings) -> episode.PickCell:
     )
 
 
-def _rules_of(settings: PickSettings) -> episode.PickRules:
+def _rules_of(settings: PickSettings, stations: Vec) -> episode.PickRules:
+    box = np.stack([stations.min(axis=0), stations.max(axis=0)])
+    box += np.outer((-1.0, 1.0), BOX_MARGIN)
     return episode.PickRules(
         time_limit=settings.time_limit_s,
         short_limit=settings.short_limit_s,
@@ -125,6 +141,9 @@ def _rules_of(settings: PickSettings) -> episode.PickRules:
         start_clearance=settings.start_clearance_m if settings.start == "clearance" else -FAR,
         target_jitter=settings.target_jitter_m,
         on_path_share=settings.on_path_share,
+        at_target_share=settings.at_target_share,
+        anywhere_share=settings.anywhere_share,
+        box=box,
         n_candidates_min=settings.n_candidates[0],
         n_candidates_max=settings.n_candidates[1],
     )
@@ -152,7 +171,12 @@ class PickBatch(EnvBatch):
         self.settings, world = settings, _world_of(self.cell, settings)
         super().__init__(
             world,
-            episode.PickTask(_rules_of(settings), settings.action.rule(), settings.weights),
+            episode.PickTask(
+                _rules_of(settings, world.stations),
+                settings.grasp,
+                settings.action.rule(),
+                settings.weights,
+            ),
             new_people_state(self.cell, world.people, n_envs),
             n_envs=n_envs,
             n_act=CONTROLLED,
@@ -163,52 +187,125 @@ class PickBatch(EnvBatch):
         self._sight = new_pick_observation_workspace()
 
     def _observe(self, envs: Indices, out: NDArray[np.float32]) -> None:
+        shared = self.world, self.settings.grasp, self.state
         work = self._work, self._sight
-        self._call(episode.observe_rows, self.world, self.state, envs, *work, self._view, out)
+        self._call(episode.observe_rows, *shared, envs, *work, self._view, out)
 
     def set_goals(self, envs: Indices, goals: Vec) -> None:
         """Set new targets [m], shape (len(envs), 3), in some environments."""
+        shared = self.world, self.settings.grasp, self.state
         for e, goal in zip(envs, goals, strict=True):
-            episode.set_goal(
-                self.world, self.state, int(e), as_kernel_array(goal), self._work.robot
-            )
+            episode.set_goal(*shared, int(e), as_kernel_array(goal), self._work.robot)
+
+    def set_starts(self, q: Vec) -> None:
+        """Put the robots at rest at other starts [rad], shape (n_envs, 6)."""
+        shared = self.world, self.settings.grasp, self.state
+        self.state.q[:], self.state.qd[:], self.state.qdd[:] = q, 0.0, 0.0
+        episode.measure_starts(*shared, self._work)
+
+
+def target_configurations(arm: Arm, grasp: GraspRules, goals: Vec) -> tuple[Vec, Vec, Flags]:
+    """Return the vertical-tool configurations at n targets and at their objects.
+
+    Args:
+        arm: From :func:`~app.sim.scene.scene.arm_of`.
+        grasp: Phases of a pick.
+        goals: Targets [m], shape (n, 3).
+
+    Returns:
+        Configurations at the targets and at the objects [rad], shape (n, 6) each, and whether
+        both are reachable, (n,).
+    """
+    low = goals - (0.0, 0.0, grasp.depth)
+    q_goals, over = kinematics.ik_vertical_batch(arm.lengths, arm.limits, goals)
+    q_grasps, at = kinematics.ik_vertical_batch(arm.lengths, arm.limits, low)
+    return q_goals, q_grasps, over & at
+
+
+def queries(
+    grasp: GraspRules,
+    robot: tuple[Vec, Vec],
+    people: tuple[Vec, Vec, Vec],
+    targets: tuple[Vec, Vec, Vec],
+    progress: tuple[Indices, Vec],
+) -> PickQuery:
+    """Return n states with the target of each one's phase.
+
+    Args:
+        grasp: Phases of a pick.
+        robot: Joint positions [rad] and speeds [rad/s], shape (n, 6) each.
+        people: Joint positions [m, rad] and speeds [m/s, rad/s], shape (n, P, 18) each, and
+            body dimensions [m], shape (n, P, body.N_SIZE).
+        targets: Targets [m], shape (n, 3), and the configurations at them and at their objects
+            [rad], shape (n, 6) each.
+        progress: Phase of the pick and closing time [s], shape (n,) each.
+    """
+    (goals, q_goals, q_grasps), (phase, closing) = targets, progress
+    low = phase == DESCEND
+    points = goals - np.outer(low, (0.0, 0.0, grasp.depth))
+    wanted = np.where(low[:, None], q_grasps, q_goals)
+    human_q, human_qd, size = people
+    share = closing / grasp.close_s
+    return PickQuery(*robot, human_q, human_qd, size, points, wanted, q_grasps, phase, share)
 
 
 def observe(
     arm: Arm,
     people: People,
-    q: Vec,
-    qd: Vec,
-    person: tuple[Vec, Vec, Vec | None],
+    robot: tuple[Vec, Vec],
+    seen: tuple[Vec, Vec, Vec],
     goals: Vec,
     time_left_s: float,
-    n_obs: int = N_FEATURES,
-) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    task: "TaskView",
+) -> tuple[NDArray[np.float32], Flags]:
     """Return the observation of one state for each of n targets.
 
     Args:
         arm: From :func:`~app.sim.scene.scene.arm_of`.
         people: From :func:`~app.sim.scene.scene.people_of`.
-        q: Robot joint positions [rad], shape (6,).
-        qd: Robot joint speeds [rad/s], shape (6,).
-        person: The person's joint positions [m, rad] and speeds [m/s, rad/s], shape (18,), and
-            body dimensions [m], shape (body.N_SIZE,); None for those of the cell's person.
+        robot: Joint positions [rad] and speeds [rad/s], shape (6,) each.
+        seen: Joint positions [m, rad] and speeds [m/s, rad/s] of P people, the one nearest to
+            the robot first, shape (P, 18) each, and body dimensions [m], (P, body.N_SIZE).
         goals: Targets [m], shape (n, 3).
         time_left_s: Time left [s].
-        n_obs: N_FEATURES, or N_WITH_BODY for networks that observe the body dimensions.
+        task: What is observed of the task.
 
     Returns:
-        Observations, shape (n, n_obs), and whether each target is reachable, (n,).
+        Observations, shape (n, task.n_obs), and whether each target is reachable, (n,).
     """
     n, targets = len(goals), as_kernel_array(goals)
-    q_goals, reachable = kinematics.ik_vertical_batch(arm.lengths, arm.limits, targets)
-    human_q, human_qd, size = person
-    one = (q, qd, human_q, human_qd, people.bodies[0] if size is None else size)
-    tiled = (np.tile(as_kernel_array(value), (n, 1)) for value in one)
-    states = PickQuery._make((*tiled, targets, q_goals))
-    obs, left = np.empty((n, n_obs), dtype=np.float32), np.full(n, float(time_left_s))
+    q_goals, q_grasps, reachable = target_configurations(arm, task.grasp, targets)
+    q, qd = (np.tile(as_kernel_array(value), (n, 1)) for value in robot)
+    tiled = [np.tile(as_kernel_array(value), (n, 1, 1)) for value in seen]
+    phase, closing = np.zeros(n, dtype=np.int64), np.zeros(n)
+    if task.current is not None:
+        phase[task.current], closing[task.current] = task.phase, task.closing_s
+    states = queries(
+        task.grasp,
+        (q, qd),
+        (tiled[0], tiled[1], tiled[2]),
+        (targets, q_goals, q_grasps),
+        (phase, closing),
+    )
+    obs, left = np.empty((n, task.n_obs), dtype=np.float32), np.full(n, float(time_left_s))
     observe_batch(arm, people.floor_z, states, left, obs)
     return obs, reachable
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TaskView:
+    """Observation and progress of a task, for :func:`observe`."""
+
+    n_obs: int = N_FEATURES
+    """Length of an observation, one of those in ``VIEWS``."""
+    grasp: GraspRules = field(default=REACH_ONLY)
+    """Phases of a pick."""
+    current: int | None = None
+    """Number of the target that is being picked."""
+    phase: int = 0
+    """Phase of that pick."""
+    closing_s: float = 0.0
+    """Its closing time [s]."""
 
 
 def step_robot(

@@ -51,6 +51,8 @@ class Case:
     """Least and largest number of target switches; None for no limit."""
     palm_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Palm relative to its stations [m]."""
+    delay_s: float = 0.4
+    """Rest of the person before the move [s]."""
     pelvis_x: tuple[float | None, float | None] = (None, None)
     """The person's x at the start and at the end [m]; None follows the palm."""
 
@@ -143,7 +145,7 @@ def script_of(cell: Cell, case: Case) -> ReachScript:
     """Return the person's movement in a case study."""
     places = [case.human_from, case.human_to or case.human_from]
     palms = [np.add(cell.station(place).position, case.palm_offset) for place in places]
-    return reach_script(cell, case.hand, (palms[0], palms[1]), case.pelvis_x)
+    return reach_script(cell, case.hand, (palms[0], palms[1]), case.pelvis_x, case.delay_s)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

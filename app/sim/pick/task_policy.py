@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from app.sim.core.arrays import Vec
 from app.sim.core.out_of_range import OutsideField
 from app.sim.human.person import Person
+from app.sim.pick.kernels.grasp import APPROACH, GraspRules
 from app.sim.robot.actions import ActionSettings
 
 
@@ -21,6 +22,27 @@ class Candidate:
     """Name given by the caller, unique among the candidates."""
     position: Vec
     """Point the tcp must reach, robot base frame [m], shape (3,)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OutcomeEstimate:
+    """Predicted outcome of a candidate if it is pursued within the time left."""
+
+    success: float
+    """Probability of success."""
+    success_interval: tuple[float, float]
+    """Its 95 % interval."""
+    contact: float
+    """Probability of a contact."""
+    contact_interval: tuple[float, float]
+    """Its 95 % interval."""
+    time_s: float
+    """Expected time to success [s]."""
+
+
+Objective = Literal["value", "success", "time"]
+"""Objective of a choice: the critic's value (thesis eq. 5.6), the probability of success, or
+the expected time per success."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,8 +69,24 @@ class Decision:
     """SHA-256 of the checkpoint that decided."""
     elapsed_ms: float
     """Time the decision took [ms]."""
+    outcomes: tuple[OutcomeEstimate, ...] | None = None
+    """Predicted outcome of each candidate; None where the checkpoint predicts none."""
     seen: int | None = None
     """Which of the people a policy for one person saw: the nearest; None for nobody."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PickProgress:
+    """Progress of a pick that has begun."""
+
+    phase: int
+    """Phase of the pick: APPROACH, DESCEND or LIFT of ``kernels/grasp.py``."""
+    closing_s: float
+    """Time for which the tool has been held at the object [s]."""
+
+
+NOT_BEGUN = PickProgress(phase=APPROACH, closing_s=0.0)
+"""Progress before the descent."""
 
 
 class TaskPolicy(Protocol):
@@ -61,6 +99,10 @@ class TaskPolicy(Protocol):
     @property
     def action(self) -> "ActionSettings":
         """What its actions mean."""
+
+    @property
+    def grasp(self) -> GraspRules:
+        """Phases of a pick; ``depth`` 0 where targets are only reached."""
 
     @property
     def title(self) -> str:
@@ -82,7 +124,9 @@ class TaskPolicy(Protocol):
         candidates: Sequence[Candidate],
         *,
         previous: str | None = None,
+        progress: PickProgress = NOT_BEGUN,
         time_left_s: float = 10.0,
+        objective: Objective = "value",
     ) -> Decision:
         """Choose one candidate.
 
@@ -93,7 +137,10 @@ class TaskPolicy(Protocol):
                 the one nearest to the robot.
             candidates: What may be chosen, at least one.
             previous: The candidate chosen last, for hysteresis; None chooses afresh.
+            progress: Progress of the pick of ``previous``. While an object is lifted the
+                choice stays with it.
             time_left_s: Time left to reach a candidate [s].
+            objective: Objective of the choice. Hysteresis applies to values only.
 
         Raises:
             InvalidInput: A value that no answer can be given for.

@@ -161,10 +161,9 @@ class EnvBatch(ABC):
 
     def _start(self, envs: Indices) -> None:
         """Start episodes in some environments."""
-        rules, reset = self._task.rules, self._kernel.reset_rows
-        self._call(
-            reset, self.world, rules, self.seed, self._first, self.state, envs, self._work
-        )
+        first = self.seed, self._first
+        reset = self._kernel.reset_rows
+        self._call(reset, self.world, self._task, *first, self.state, envs, self._work)
 
     def _move(self, act: NDArray[np.float32]) -> None:
         """Step every running environment; fill rewards and outcomes."""

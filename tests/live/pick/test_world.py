@@ -5,11 +5,11 @@ from pydantic import ValidationError
 from app.errors import InvalidInput
 from app.live import commands
 from app.live.pick.world import LivePickWorld
-from app.live.snapshot import WorldSnapshot
+from app.live.snapshot import PICK_PHASES, WorldSnapshot
 from app.sim.cells.cell import Cell, load_cell
 from app.sim.human import model as human
 from app.sim.human.person import Person
-from app.sim.pick.task_policy import Candidate
+from app.sim.pick.task_policy import Candidate, PickProgress
 from tests.straight_policy import StraightPolicy
 
 
@@ -51,8 +51,9 @@ def test_robot_reaches_a_candidate_and_the_next_episode_offers_the_others(
 ) -> None:
     world.apply(commands.SetCandidates(ids=("cube1", "cube4")))
     first = until(world, "picking")
-    assert first.counters.reached == 1
+    assert first.counters.reached == 0
     after = until(world, "moving")
+    assert after.counters.reached == 1
     assert [c.id for c in after.candidates] == [
         n for n in ("cube1", "cube4") if n != first.chosen
     ]
@@ -71,6 +72,27 @@ def test_tool_goes_down_to_the_cube_and_closes_before_the_next_episode(
     assert closed
 
 
+def test_a_hand_over_the_cube_breaks_the_pick_off_and_it_stays_a_candidate(
+    world: LivePickWorld, cell: Cell
+) -> None:
+    world.apply(commands.SetCandidates(ids=("cube2",)))
+    until(world, "picking")
+    x, y, z = cell.station("cube2").position
+    world.apply(commands.MovePerson(pelvis=(x, 1.15, -1.57), right=(x, y + 0.14, z + 0.1)))
+    after = until(world, "moving")
+    assert after.counters.broken_off == 1
+    assert after.counters.reached == 0
+    assert [one.id for one in after.candidates] == ["cube2"]
+
+
+def test_contacts_are_counted_apart_while_the_robot_is_at_rest(world: LivePickWorld) -> None:
+    world.apply(commands.SetCandidates(ids=()))
+    x, y, z = world.snapshot().tcp
+    world.apply(commands.MovePerson(pelvis=(x, 1.15, -1.57), right=(x, y, z)))
+    hit = until(world, "contact")
+    assert (hit.counters.contacts, hit.counters.contacts_at_rest) == (1, 1)
+
+
 def test_decision_in_a_snapshot_is_the_one_for_its_own_state(
     world: LivePickWorld, cell: Cell
 ) -> None:
@@ -81,6 +103,9 @@ def test_decision_in_a_snapshot_is_the_one_for_its_own_state(
         [Person(q=one.q, qd=one.qd, size=one.size) for one in snapshot.people],
         [Candidate(id=c.id, position=c.position) for c in snapshot.candidates],
         previous=snapshot.previous,
+        progress=PickProgress(
+            phase=PICK_PHASES.index(snapshot.phase), closing_s=snapshot.closing_s
+        ),
         time_left_s=snapshot.time_left_s,
     )
     assert again.chosen == snapshot.chosen

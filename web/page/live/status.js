@@ -76,7 +76,8 @@ export function SmallPrint({ world }) {
   const outside = world.outside ?? [];
   return html`<section class="card small-print" aria-label="Counters and provenance">
     <dl class="tiles">
-      ${[["reached", "Reached"], ["contacts", "Contacts"], ["timeouts", "Timed out"],
+      ${[["reached", "Picked"], ["broken_off", "Broken off"], ["contacts", "Contacts"],
+        ["contacts_at_rest", "Of these at rest"], ["timeouts", "Timed out"],
         ["switches", "Target switches"]].map(([key, label]) => html`<div key=${key}>
           <dt>${label}</dt><dd data-counter=${key}>${counters[key] ?? 0}</dd></div>`)}
     </dl>

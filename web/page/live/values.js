@@ -22,7 +22,7 @@ export function Values({ world, cell, history, colourOf, labelOf }) {
         <span class="tip tip-left" role="tooltip" id="values-help">The critic estimates the expected
           discounted reward of moving to each candidate now: reaching it is rewarded, delay and
           contact cost. The highest value is chosen; a small bonus for the present target prevents
-          oscillation.</span>
+          oscillation. The percentage is the probability of success, fitted to outcomes.</span>
       </span>
     </header>
     ${rows.length === 0
@@ -70,6 +70,8 @@ function Bar({ candidate, chosen, isChosen, colour, label, rank, scale }) {
       <i class="bar-fill" style=${bar}></i>
     </span>
     <span class="bar-value">${format.value(value)}</span>
+    <span class="bar-odds" data-role="success">${Number.isFinite(candidate.success)
+      && `${Math.round(100 * candidate.success)} %`}</span>
     <span class="bar-rank" aria-label=${rank && `rank ${rank}`}>${rank && `${rank}.`}</span>
     <span class="bar-note">${note(isChosen, reachable, outside)}</span>
     <span class="tip" role="tooltip" id=${`tip-${id}`}>${explain(candidate, chosen, label)}</span>
@@ -88,7 +90,8 @@ function note(isChosen, reachable, outside) {
   return "";
 }
 
-function explain({ id, value, reachable, outside = [] }, chosen, label) {
+function explain({ id, value, reachable, success, contact, time_s: time, outside = [] }, chosen,
+  label) {
   const parts = [];
   if (Number.isFinite(value)) {
     parts.push(`Expected discounted reward of moving to ${label} now: ` +
@@ -100,6 +103,10 @@ function explain({ id, value, reachable, outside = [] }, chosen, label) {
         : `${format.value(gap)} more than the chosen one: not enough to switch yet.`);
     } else if (chosen?.id === id) parts.push("It is the present target.");
   } else parts.push(`No value for ${label} yet.`);
+  if (Number.isFinite(success)) {
+    parts.push(`Probability of success ${Math.round(100 * success)} %, of a contact `
+      + `${Math.round(100 * contact)} %; expected time ${format.number(time, 1)} s.`);
+  }
   if (reachable === false) parts.push("No configuration with the tool pointing down reaches it.");
   for (const o of outside) parts.push(`Out of distribution: ${outsideText(o).join(" ")}.`);
   return parts.join(" ");

@@ -16,13 +16,29 @@ from app.policies.evaluation.statistics import wilson
 from app.policies.inference.task_selection import ValueNetworks
 from app.sim.cells.cell import Cell
 from app.sim.collision.fcl_recheck import Trajectory
+from app.sim.core.observation_layout import slices_of
 from app.sim.people.human_motion_config import HumanMotionConfig
 from app.sim.people.kernels.people import new_people_geometry, see_rows
-from app.sim.pick.batch import OUTCOMES, PickBatch, PickSettings
-from app.sim.pick.kernels.observation import LAYOUT, PickQuery, observe_batch
+from app.sim.pick.batch import (
+    OUTCOMES,
+    PickBatch,
+    PickSettings,
+    queries,
+    target_configurations,
+)
+from app.sim.pick.kernels.grasp import APPROACH, LIFT
+from app.sim.pick.kernels.observation import (
+    DISTANCE_SCALE,
+    LAYOUT,
+    N_PICK,
+    PICK_SIZES,
+    observe_batch,
+)
 from app.sim.scenario.kernels import episode as kernel
 
 Index = NDArray[np.int64]
+SECOND_GOAL = slices_of(PICK_SIZES)["second_goal_clearance"].start
+"""Index of the clearance of the second person at the object."""
 EVALUATION_LIBRARY = 1_000_003
 """Seed of the person's postures in evaluations; training uses 0, so these were never seen."""
 
@@ -34,7 +50,10 @@ class View:
     values: NDArray[np.float32]
     """Critic's value of each candidate, -inf where there are fewer, shape (n, k)."""
     distances: NDArray[np.float64]
-    """Distance from the TCP to each candidate [half m], inf where there are fewer, (n, k)."""
+    """Distance from tcp to each candidate [m], inf where there are fewer, shape (n, k)."""
+    clearances: NDArray[np.float64]
+    """Clearance to people of the configuration at each candidate's object [m], -inf where there
+    are fewer, shape (n, k)."""
     chosen: Index
     """Candidate pursued so far, shape (n,); undefined at the first step."""
     first: bool
@@ -48,14 +67,14 @@ Rule = Callable[[View], Index]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sight:
-    """Observed person of each running environment."""
+    """The observed people of each running environment, the nearest to the robot first."""
 
     q: NDArray[np.float64]
-    """Joint positions [m, rad], shape (n, 18)."""
+    """Joint positions [m, rad], shape (n, P, 18)."""
     qd: NDArray[np.float64]
-    """Joint speeds [m/s, rad/s], shape (n, 18)."""
+    """Joint speeds [m/s, rad/s], shape (n, P, 18)."""
     size: NDArray[np.float64]
-    """Size [m], shape (n, 12)."""
+    """Body dimensions [m], shape (n, P, 12)."""
 
 
 Seen = Callable[[PickBatch, Index], Sight]
@@ -63,20 +82,22 @@ Seen = Callable[[PickBatch, Index], Sight]
 
 
 def seen_exactly(batch: PickBatch, rows: Index) -> Sight:
-    """Return the true state of the person nearest to each robot; far away if there is none.
+    """Return the people of each environment as they are, the nearest to its robot first.
 
-    Joint angles beyond the model's limits, which occur in recorded motion, are clipped to the
-    limits, as in the live cell.
+    Angles beyond the limits of the model, as in recordings, are clipped to them, as in the live
+    cell.
     """
     shared, state, n = batch.world.people, batch.state, len(rows)
+    n_workers, n_cylinders = state.people.q.shape[1], state.people.cylinders.shape[1]
+    n_people = max(1, n_workers + n_cylinders)
     seen = Sight(
-        q=np.empty((n, 18)), qd=np.empty((n, 18)), size=np.empty((n, shared.bodies.shape[1]))
+        q=np.empty((n, n_people, 18)),
+        qd=np.empty((n, n_people, 18)),
+        size=np.empty((n, n_people, shared.bodies.shape[1])),
     )
-    crowd = new_people_geometry(
-        shared, state.people.q.shape[1], state.people.cylinders.shape[1]
-    )
-    see_rows(shared, state.people, state.robot, rows, crowd, seen.q, seen.qd, seen.size)
-    np.clip(seen.q[:, 3:], shared.limits[0, 3:], shared.limits[1, 3:], out=seen.q[:, 3:])
+    geometry = new_people_geometry(shared, n_workers, n_cylinders)
+    see_rows(shared, state.people, state.robot, rows, geometry, seen.q, seen.qd, seen.size)
+    np.clip(seen.q[..., 3:], shared.limits[0, 3:], shared.limits[1, 3:], out=seen.q[..., 3:])
     return seen
 
 
@@ -93,11 +114,17 @@ class Episodes:
     trajectories: tuple[Trajectory, ...]
     """Robot and each worker of the recorded episodes."""
 
+    @property
+    def won(self) -> NDArray[np.bool_]:
+        """Whether each episode succeeded, shape (n,)."""
+        success: NDArray[np.bool_] = self.outcome == kernel.SUCCESS
+        return success
+
     def row(self, name: str) -> dict[str, object]:
         """Return the result row of these episodes, rates with 95 % intervals."""
         n = len(self.outcome)
         counts = np.bincount(self.outcome, minlength=len(OUTCOMES))
-        won = self.outcome == kernel.SUCCESS
+        won = self.won
         unfeasible = int(counts[kernel.UNFEASIBLE])
         return {
             "name": name,
@@ -112,7 +139,9 @@ class Episodes:
 
 
 def settings_for(n_candidates: tuple[int, int], preset: PickPreset) -> PickSettings:
-    """Return the settings of evaluations: 10 s, start clearance 0.05 m, people of the library.
+    """Return the settings of evaluations: start clearance 0.05 m, people of the library.
+
+    The time limit is 10 s, and 2 s more where an object is picked up.
 
     Postures and samples of these people do not occur in training. They do not yield to the
     robot, even if the checkpoint was trained beside yielding people.
@@ -121,11 +150,13 @@ def settings_for(n_candidates: tuple[int, int], preset: PickPreset) -> PickSetti
         n_candidates: Minimum and maximum number of targets offered.
         preset: Training configuration of the checkpoint.
     """
+    grasp = preset.episode.grasp
     return PickSettings(
-        time_limit_s=10.0,
+        time_limit_s=10.0 if grasp.depth == 0.0 else 12.0,
         start_clearance_m=0.05,
         n_candidates=n_candidates,
-        work=HumanMotionConfig(seed=EVALUATION_LIBRARY, pace=preset.people.human_pace),
+        grasp=grasp,
+        work=HumanMotionConfig(seed=EVALUATION_LIBRARY),
         action=preset.action.settings,
     )
 
@@ -151,17 +182,28 @@ class Evaluator:
     ) -> None:
         self._networks = networks
         self.batch = PickBatch(cell, n_episodes, seed, settings)
+        world, grasp = self.batch.world, settings.grasp
+        found = target_configurations(self.batch.arm, grasp, world.stations)
+        self._station_q, self._grasp_q, _ = found
 
-    def run(self, rule: Rule, n_recorded: int = 0, seen: Seen = seen_exactly) -> Episodes:
+    def run(
+        self,
+        rule: Rule,
+        n_recorded: int = 0,
+        seen: Seen = seen_exactly,
+        start: Callable[[PickBatch], None] = lambda _batch: None,
+    ) -> Episodes:
         """Run all episodes under a rule; record poses of the first ``n_recorded``.
 
         Args:
             rule: Selection rule.
             n_recorded: Number of episodes with recorded poses.
             seen: Observation model; a stateful one serves one run only.
+            start: Changes the starts of the episodes.
         """
         batch, n = self.batch, self.batch.n_envs
         batch.reset()
+        start(batch)
         chosen, switches = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
         act = np.zeros((n, 5), dtype=np.float32)
         trace = Trace(batch, n_recorded)
@@ -169,6 +211,8 @@ class Evaluator:
         while (rows := np.flatnonzero(batch.state.outcome == kernel.RUNNING)).size:
             actions, view = self._view(rows, chosen[rows], first, seen)
             choice = rule(view)
+            lifting = batch.state.phase[rows] == LIFT  # an object in hand is lifted first
+            choice = np.where(lifting, chosen[rows], choice)
             if not first:
                 switches[rows] += choice != chosen[rows]
             chosen[rows], first = choice, False
@@ -197,14 +241,14 @@ class Evaluator:
         env, station = rows[owner], stations[owner, place]
         sight = seen(batch, rows)
         obs = np.empty((len(env), self._networks.n_obs), dtype=np.float32)
-        states = PickQuery(
-            state.q[env],
-            state.qd[env],
-            sight.q[owner],
-            sight.qd[owner],
-            sight.size[owner],
-            batch.world.stations[station],
-            batch.world.station_q[station],
+        current = place == chosen[owner]
+        phase = np.where(current, state.phase[env], APPROACH)
+        states = queries(
+            batch.settings.grasp,
+            (state.q[env], state.qd[env]),
+            (sight.q[owner], sight.qd[owner], sight.size[owner]),
+            (batch.world.stations[station], self._station_q[station], self._grasp_q[station]),
+            (phase, np.where(phase != APPROACH, state.closing[env], 0.0)),
         )
         floor_z = batch.world.people.floor_z
         observe_batch(batch.arm, floor_z, states, state.time_left[env], obs)
@@ -213,7 +257,24 @@ class Evaluator:
         values = np.full((len(rows), width), -np.inf, dtype=np.float32)
         distances = np.full((len(rows), width), np.inf)
         actions[owner, place], values[owner, place] = act, value
-        to_goal = obs[:, LAYOUT["goal_minus_tcp"]]
-        distances[owner, place] = np.linalg.norm(to_goal, axis=1)
-        view = View(values=values, distances=distances, chosen=chosen, first=first, rows=rows)
+        away = batch.world.stations[station] - obs[:, LAYOUT["tcp"]]
+        distances[owner, place] = np.linalg.norm(away, axis=1)
+        clearances = np.full((len(rows), width), -np.inf)
+        clearances[owner, place] = goal_clearance(obs)
+        view = View(
+            values=values,
+            distances=distances,
+            clearances=clearances,
+            chosen=chosen,
+            first=first,
+            rows=rows,
+        )
         return actions, view
+
+
+def goal_clearance(obs: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Return the clearance at the object that observations state [m], shape (n,)."""
+    least = obs[:, LAYOUT["goal_clearance"].start].astype(np.float64)
+    if obs.shape[1] == N_PICK:
+        least = np.minimum(least, obs[:, SECOND_GOAL])
+    return DISTANCE_SCALE * least

@@ -25,17 +25,18 @@ from app.errors import InvalidInput
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.evaluation.pick import selection_rules as choice_rules
-from app.policies.evaluation.pick.episodes import Evaluator, settings_for
+from app.policies.evaluation.pick.episodes import Episodes, Evaluator, settings_for
 from app.policies.evaluation.pick.tasks import settings_of
 from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.evaluation.statistics import wilson
 from app.policies.inference.task_selection import HYSTERESIS, ValueNetworks, pick_preset_of
+from app.sim.collision.contact import clearance
 from app.sim.human.anthropometry import percentile_body
 from app.sim.mocap.importer import Motion
 from app.sim.people.human_motion_config import HumanMotionConfig, at_the_table
 from app.sim.pick.batch import PickBatch, PickSettings
 from app.sim.robot.kernels.arm import CONTROLLED
-from app.sim.scenario.kernels.episode import COLLISION, RUNNING
+from app.sim.scenario.kernels.episode import COLLISION, RUNNING, TIMEOUT
 from app.sim.scene.scene import HumanKind
 
 DEFAULT_EPISODES = 1000
@@ -44,6 +45,10 @@ YIELDING_LEVELS = (0.0, 0.5, 1.0)
 """Strengths of yielding."""
 MAX_RECORDED_S = 36_000
 """Maximum duration of recorded motion in one evaluation [s]; its tracks take 274 MB."""
+STILL_PACE = 1e-6
+"""Pace of people who stand still."""
+ALONE_M = 0.5
+"""Clearance beyond which nobody is near the robot [m]."""
 SMALL, LARGE = 5.0, 95.0
 """Percentiles of stature; arms and shoulders scale with it."""
 
@@ -121,6 +126,61 @@ def run_people(
     rows |= {"worker-and-walker": beside(worker, "walker")}
     rows |= {"first-reaches": replace(usual, work=replace(usual.work, motion="reaches"))}
     return bench.all(rows)
+
+
+def run_rest(
+    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
+) -> dict[str, Any]:
+    """Evaluate one random target beside people who stand still in any posture.
+
+    A timeout is *blocked* where the configuration at the object is closer to the person than a
+    grasp permits, and *alone* where nobody is within ALONE_M of the robot.
+
+    Args:
+        checkpoint: Policy and critic.
+        episodes: Number of episodes of each row, by default 1000.
+        seed: Seed of the episodes.
+        on_row: Callback for each finished row.
+    """
+    usual = settings_for((1, 1), pick_preset_of(checkpoint))
+    networks, cell = ValueNetworks(checkpoint), cell_of(checkpoint.manifest)
+    still = replace(usual.work, pace=STILL_PACE)
+    rows = {
+        "library": still,
+        "off-task": replace(still, off_task=1.0),
+        "reaches": replace(still, motion="reaches"),
+        "stops": replace(usual.work, at_rest=1.0, off_task=0.5),
+    }
+    results = []
+    for name, work in rows.items():
+        settings = replace(usual, work=work)
+        evaluator = Evaluator(networks, cell, episodes or DEFAULT_EPISODES, seed, settings)
+        run = evaluator.run(choice_rules.fixed(0))
+        row = run.row(name) | _timeouts(evaluator.batch, run)
+        results.append(row)
+        on_row(len(results), len(rows), row)
+    return {"settings": settings_of(evaluator), "results": results}
+
+
+def _timeouts(batch: PickBatch, run: Episodes) -> dict[str, dict[str, float]]:
+    """Return the rates of timeouts with a blocked target and with nobody near."""
+    n, state = batch.n_envs, batch.state
+    late = np.flatnonzero(run.outcome == TIMEOUT)
+    q_goals = state.q_grasp[late]
+    blocked = sum(
+        clearance(
+            batch.arm,
+            batch.world.people,
+            q,
+            state.people.q[e],
+            state.people.cylinders[e],
+            state.people.size[e],
+        ).people_m
+        < batch.settings.grasp.start_clearance
+        for e, q in zip(late, q_goals, strict=True)
+    )
+    alone = int((state.clear[late, 0] > ALONE_M).sum())
+    return {"timeout_blocked": wilson(int(blocked), n), "timeout_alone": wilson(alone, n)}
 
 
 def run_yielding(

@@ -26,6 +26,18 @@ def nearest(view: View) -> Index:
     return choice
 
 
+def clearest(view: View) -> Index:
+    """Choose, at every step, the candidate with the most clearance to the observed people."""
+    choice: Index = view.clearances.argmax(axis=1)
+    return choice
+
+
+def critic_once(view: View) -> Index:
+    """Choose by the critic at the start and keep that choice."""
+    best: Index = view.values.argmax(axis=1)
+    return best if view.first else view.chosen
+
+
 def at_random(seed: int, n_episodes: int) -> Rule:
     """Return the rule that selects a random candidate at the start and keeps it."""
     draw = np.random.default_rng(seed).random(n_episodes)

@@ -5,8 +5,8 @@ with postures that do not occur in training. The result states the hand speeds o
 FCL checks the poses of the first 200 episodes on the raw meshes for missed contacts.
 """
 
-from collections.abc import Callable, Mapping
-from dataclasses import asdict
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict, replace
 
 import numpy as np
 
@@ -16,20 +16,28 @@ from app.policies.evaluation.pick import selection_rules as choice_rules
 from app.policies.evaluation.pick.episodes import Episodes, Evaluator, Rule, settings_for
 from app.policies.evaluation.pick.recorded_people import recheck
 from app.policies.evaluation.rows import OnRow, ignore_row
+from app.policies.evaluation.statistics import mcnemar
 from app.policies.inference.task_selection import HYSTERESIS, ValueNetworks, pick_preset_of
 from app.sim.pick.batch import OUTCOMES, hand_speeds
 from app.sim.scenario.kernels import episode as kernel
-from app.sim.scene.scene import kinds_of
+from app.sim.scene.scene import HumanKind, kinds_of
 
 DEFAULT_EPISODES = 1000
 N_RECHECKED = 200
 """Number of episodes checked again with FCL."""
+CRITIC = "critic"
 OTHER_RULES: Mapping[str, Callable[[int, int], Rule]] = {
     "critic-each-step": lambda _seed, _n: choice_rules.critic(0.0),
+    "critic-once": lambda _seed, _n: choice_rules.critic_once,
     "nearest": lambda _seed, _n: choice_rules.nearest,
+    "clearest": lambda _seed, _n: choice_rules.clearest,
     "random": choice_rules.at_random,
 }
 """Rules compared with the critic's, made from seed and number of episodes."""
+ORACLE = "oracle"
+PAIR: tuple[HumanKind, ...] = ("worker", "worker")
+FASTER = 1.4
+"""Speed of faster people, relative to the library's."""
 
 
 def evaluator_of(
@@ -50,6 +58,7 @@ def settings_of(evaluator: Evaluator) -> dict[str, object]:
         "start": settings.start,
         "start_clearance_m": settings.start_clearance_m,
         "action": asdict(settings.action),
+        "grasp": settings.grasp._asdict() if settings.grasp.depth else "reach only",
         "starts_redrawn_share": float((state.n_redrawn > 0).mean()),
         "candidates": list(settings.n_candidates),
         **hand_speeds(evaluator.batch),
@@ -78,44 +87,119 @@ def run_single(
     }
 
 
+class ChoiceRun:
+    """Episodes of one setting under all selection rules.
+
+    Args:
+        evaluator: Episodes with 2 or 3 candidates.
+        seed: Seed of the random rule.
+        name: Name of the setting, first in the names of the rows; may be empty.
+    """
+
+    def __init__(self, evaluator: Evaluator, seed: int, name: str = "") -> None:
+        self._evaluator, self._seed = evaluator, seed
+        self._prefix = f"{name} " if name else ""
+        self._runs: dict[str, Episodes] = {}
+
+    def rows(self, n_recorded: int = 0) -> Iterator[dict[str, object]]:
+        """Run the rules and yield their rows, the oracle's last."""
+        n = self._evaluator.batch.n_envs
+        rules = {CRITIC: choice_rules.critic(HYSTERESIS)}
+        rules |= {name: rule(self._seed, n) for name, rule in OTHER_RULES.items()}
+        for name, rule in rules.items():
+            recorded = n_recorded if name == CRITIC else 0
+            self._runs[name] = self._evaluator.run(rule, recorded)
+            yield self._runs[name].row(self._prefix + name)
+        runs = [self._evaluator.run(choice_rules.fixed(k)) for k in range(3)]
+        self._runs[ORACLE] = _oracle(runs)
+        yield self._runs[ORACLE].row(self._prefix + ORACLE)
+
+    @property
+    def critic(self) -> Episodes:
+        """The episodes under the critic's choice."""
+        return self._runs[CRITIC]
+
+    def paired(self) -> list[dict[str, object]]:
+        """Return the critic's choice against each other rule on the same episodes."""
+        gain = self._runs[ORACLE].won.mean() - self._runs["nearest"].won.mean()
+        others = [name for name in self._runs if name != CRITIC]
+        return [
+            {
+                "name": f"{self._prefix}{CRITIC} - {name}",
+                "difference": float(self.critic.won.mean() - self._runs[name].won.mean()),
+                **mcnemar(self.critic.won, self._runs[name].won),
+            }
+            | ({"oracle_gain": float(gain)} if name == "nearest" else {})
+            for name in others
+        ]
+
+
 def run_choice(
     checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> dict[str, object]:
-    """Evaluate task selection among 2-3 random targets and compare selection rules.
+    """Evaluate the selection among 2-3 random targets, with other rules on the same episodes.
 
     Args:
-        checkpoint: Policy and critic.
+        checkpoint: Checkpoint of the policy and its critic.
         episodes: Number of episodes, by default 1000.
         seed: Seed of the episodes; use one that was not used for tuning.
-        on_row: Callback for each finished row.
+        on_row: Called with each finished row.
     """
     evaluator = evaluator_of(checkpoint, (2, 3), episodes, seed)
-    n = evaluator.batch.n_envs
-    with_hysteresis = evaluator.run(choice_rules.critic(HYSTERESIS), min(N_RECHECKED, n))
-    rows = [with_hysteresis.row("critic")]
-    on_row(1, 2 + len(OTHER_RULES), rows[-1])
-    for name, rule in OTHER_RULES.items():
-        rows.append(evaluator.run(rule(seed, n)).row(name))
-        on_row(len(rows), 2 + len(OTHER_RULES), rows[-1])
-    rows.append(_oracle([evaluator.run(choice_rules.fixed(k)) for k in range(3)]))
-    on_row(len(rows), len(rows), rows[-1])
+    run, rows = ChoiceRun(evaluator, seed), []
+    for row in run.rows(min(N_RECHECKED, evaluator.batch.n_envs)):
+        rows.append(row)
+        on_row(len(rows), len(OTHER_RULES) + 2, row)
     return {
         "settings": {**settings_of(evaluator), "hysteresis": HYSTERESIS},
         "results": rows,
-        "fcl_recheck": recheck(evaluator.batch.cell, with_hysteresis.trajectories),
+        "paired": run.paired(),
+        "fcl_recheck": recheck(evaluator.batch.cell, run.critic.trajectories),
     }
 
 
-def _oracle(runs: list[Episodes]) -> dict[str, object]:
-    """Return the row of the best fixed candidate of each episode, selected afterwards."""
+def run_choice_hard(
+    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
+) -> dict[str, object]:
+    """Evaluate the selection beside two people, faster people, and two faster people.
+
+    Args:
+        checkpoint: Checkpoint of the policy and its critic.
+        episodes: Number of episodes of each setting, by default 1000.
+        seed: Seed of the episodes; use one that was not used for tuning.
+        on_row: Called with each finished row.
+    """
+    usual = settings_for((2, 3), pick_preset_of(checkpoint))
+    fast = replace(usual, work=replace(usual.work, pace=FASTER))
+    settings = {
+        "two-people": replace(usual, people=PAIR),
+        "faster": fast,
+        "two-people-faster": replace(fast, people=PAIR),
+    }
+    networks, cell = ValueNetworks(checkpoint), cell_of(checkpoint.manifest)
+    rows: list[dict[str, object]] = []
+    paired: list[dict[str, object]] = []
+    stated: dict[str, object] = {"hysteresis": HYSTERESIS}
+    for name, one in settings.items():
+        evaluator = Evaluator(networks, cell, episodes or DEFAULT_EPISODES, seed, one)
+        run = ChoiceRun(evaluator, seed, name)
+        for row in run.rows():
+            rows.append(row)
+            on_row(len(rows), len(settings) * (len(OTHER_RULES) + 2), row)
+        paired += run.paired()
+        stated[name] = {**settings_of(evaluator), "pace": one.work.pace}
+    return {"settings": stated, "results": rows, "paired": paired}
+
+
+def _oracle(runs: list[Episodes]) -> Episodes:
+    """Return the episodes with the best fixed candidate each, known only afterwards."""
     rank = np.zeros(len(OUTCOMES))
     rank[[kernel.TIMEOUT, kernel.UNFEASIBLE, kernel.COLLISION]] = 1, 2, 3
     badness = np.stack([1e3 * rank[run.outcome] + run.duration_s for run in runs])
     best, rows = badness.argmin(axis=0), np.arange(badness.shape[1])
-    pooled = Episodes(
+    return Episodes(
         outcome=np.stack([run.outcome for run in runs])[best, rows],
         duration_s=np.stack([run.duration_s for run in runs])[best, rows],
         switches=np.zeros(len(rows), dtype=np.int64),
         trajectories=(),
     )
-    return pooled.row("oracle")

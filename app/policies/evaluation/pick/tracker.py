@@ -117,14 +117,14 @@ class KeypointObserver:
             self._before = t.copy(), people.q[:, 0].copy(), people.qd[:, 0].copy()
         t0, q0, qd0 = self._before
         seen = Sight(
-            q=np.empty((len(rows), 18)),
-            qd=np.empty((len(rows), 18)),
-            size=people.size[rows, 0].copy(),
+            q=np.empty((len(rows), 1, 18)),
+            qd=np.empty((len(rows), 1, 18)),
+            size=people.size[rows, :1].copy(),
         )
         for k, e in enumerate(rows.tolist()):
             motion = between(t0[e], q0[e], qd0[e], float(t[e]), people.q[e, 0], people.qd[e, 0])
-            seen.q[k], seen.qd[k] = self._look(batch, e, float(t[e]), motion)
-            self._measure(seen.q[k], people.q[e, 0], seen.size[k])
+            seen.q[k, 0], seen.qd[k, 0] = self._look(batch, e, float(t[e]), motion)
+            self._measure(seen.q[k, 0], people.q[e, 0], seen.size[k, 0])
         self._before = t.copy(), people.q[:, 0].copy(), people.qd[:, 0].copy()
         return seen
 

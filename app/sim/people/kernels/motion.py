@@ -33,6 +33,28 @@ from app.sim.primitives.kernels.primitives import (
 )
 from app.sim.primitives.kernels.script import Moves, draw_script, move_at
 
+REST_AFTER = (-3.0, 5.0)
+"""Range of the time at which a worker stands still [s]; below 0: from the start on."""
+REST_S = (5.0, 20.0)
+"""Range of the time for which a worker stands still [s]."""
+
+
+@kernel(inline="always")
+def _rests(rest: Vec, dt: float) -> bool:
+    """Return whether a worker stands still in the period to come, and count its time down.
+
+    Args:
+        rest: Time until the worker stands still, and time left of that [s], shape (2,).
+        dt: Period [s].
+    """
+    if rest[1] <= 0.0:
+        return False
+    if rest[0] > 0.0:
+        rest[0] -= dt
+        return False
+    rest[1] -= dt
+    return True
+
 
 @kernel(inline="always")
 def worker_at(
@@ -117,6 +139,15 @@ def _draw_work(people: People, state: PeopleState, e: int, w: int, rng: random.S
         draw_script_of(people, state, e, w, who, -1, rng)
         varied = people.source == REACHES or people.primitive_library.varied
         state.clock[e, w] = 12.0 * random.uniform(rng) if varied else 0.0
+    state.pace[e, w] = people.pace
+    if people.pace_max > people.pace:
+        state.pace[e, w] += random.uniform(rng) ** 2 * (people.pace_max - people.pace)
+    state.rest[e, w, 0], state.rest[e, w, 1] = 0.0, 0.0
+    if people.rest_share > 0.0 and random.uniform(rng) < people.rest_share:
+        state.rest[e, w, 0] = REST_AFTER[0] + random.uniform(rng) * (
+            REST_AFTER[1] - REST_AFTER[0]
+        )
+        state.rest[e, w, 1] = REST_S[0] + random.uniform(rng) * (REST_S[1] - REST_S[0])
     state.body[e, w], state.move[e, w], state.near[e, w] = who, 0, FAR
     copy_values(people.bodies[who], state.size[e, w])
     for i in range(4):
@@ -158,7 +189,7 @@ def start_people(
     """Draw the human motion of an episode and place all people at its start."""
     for w in range(state.q.shape[1]):
         _draw_work(people, state, e, w, rng)
-        worker_at(people, state, e, w, state.clock[e, w], people.pace, geometry.away)
+        worker_at(people, state, e, w, state.clock[e, w], state.pace[e, w], geometry.away)
     for k in range(state.cylinders.shape[1]):
         start_pedestrian(people.walkers, state.walkers, e, k, rng)
         _copy_cylinder(state, e, k)
@@ -181,7 +212,7 @@ def advance_people(
     """
     for w in range(state.q.shape[1]):
         strength = people.yielding * closeness(state.near[e, w])
-        rate = people.pace * (1.0 - strength)
+        rate = 0.0 if _rests(state.rest[e, w], dt) else state.pace[e, w] * (1.0 - strength)
         state.clock[e, w] += rate * dt
         worker_at(people, state, e, w, state.clock[e, w], rate, away)
         if people.yielding > 0.0:

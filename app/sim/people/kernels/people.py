@@ -76,12 +76,16 @@ class People(NamedTuple):
     """Probability that a worker follows a track in an episode."""
     absent_share: float
     """Probability that a worker is absent in an episode."""
+    rest_share: float
+    """Probability that a worker stands still for a while in an episode."""
     limits: Vec
     """Lower and upper joint limits of a worker [m, rad], shape (2, 18)."""
     yielding: float
     """Degree of yielding to the arm, from 0 to 1."""
     pace: float
-    """Speed of the workers relative to their scripts."""
+    """Least speed of the workers relative to their scripts."""
+    pace_max: float
+    """Greatest speed of the workers; each worker's is drawn per episode."""
     walkers: PedestrianRules
     """Rules of the pedestrians."""
     no_person: Vec
@@ -103,6 +107,10 @@ class PeopleState(NamedTuple):
     """Capsules of the workers, shape (n_envs, 9, n)."""
     clock: Vec
     """Time in each worker's script or track [s], shape (n_envs, W)."""
+    pace: Vec
+    """Speed of each worker relative to its script, shape (n_envs, W)."""
+    rest: Vec
+    """Time until each worker stands still, and time left of that [s], (n_envs, W, 2)."""
     near: Vec
     """Clearance of each worker to the robot in the last contact test [m], (n_envs, W)."""
     lean: Vec
@@ -156,12 +164,6 @@ class PeopleGeometry(NamedTuple):
     """The robot's joints within the period [rad], shape (6,)."""
     away: Vec
     """Distances of a segment's sample from its two ends [m, rad], shape (36,)."""
-    seen_q: Vec
-    """Joints of the observed person [m, rad], shape (18,)."""
-    seen_qd: Vec
-    """Joint speeds of the observed person [m/s, rad/s], shape (18,)."""
-    seen_size: Vec
-    """Size of the observed person [m], shape (body.N_SIZE,)."""
     stack_end: Vec
     """Ends of the pending intervals of the contact test [s], shape (DEEPEST,)."""
     stack_clear: Vec
@@ -184,9 +186,6 @@ def new_people_geometry(people: People, n_workers: int, n_pedestrians: int) -> P
         np.empty((n_pedestrians, 3)),
         np.empty(6),
         np.empty(36),
-        np.empty(18),
-        np.empty(18),
-        people.bodies[0].copy(),
         np.empty(DEEPEST),
         np.empty((DEEPEST, 3)),
     )
@@ -300,14 +299,21 @@ def nearest_person(people: People, robot: Vec, geometry: PeopleGeometry) -> int:
 
 
 @kernel(inline="always")
-def see_nearest(
-    people: People, state: PeopleState, e: int, robot: Vec, geometry: PeopleGeometry
+def see_people(
+    people: People,
+    state: PeopleState,
+    e: int,
+    robot: Vec,
+    geometry: PeopleGeometry,
+    q: Vec,
+    qd: Vec,
+    size: Vec,
 ) -> None:
-    """Write the person nearest to the robot to ``seen_q``, ``seen_qd`` and ``seen_size``.
+    """Write the people of an environment, the one nearest to the robot first.
 
     A pedestrian is observed as a person standing in the cylinder and facing the robot's base;
-    no person, as a person beyond any interaction. A policy for one 18-DoF person thereby
-    works with any people.
+    no person, as a person beyond any interaction. A policy for 18-DoF people thereby works
+    with any people.
 
     Args:
         people: Shared data.
@@ -315,21 +321,36 @@ def see_nearest(
         e: Environment.
         robot: The robot's capsules as columns, shape (9, n).
         geometry: The people, placed as they are now.
+        q: Filled with joints [m, rad], shape (P, 18); P is the number of people, at least 1.
+        qd: Filled with joint speeds [m/s, rad/s], shape (P, 18).
+        size: Filled with the sizes [m], shape (P, body.N_SIZE).
     """
-    who, n_workers = nearest_person(people, robot, geometry), state.q.shape[1]
-    if 0 <= who < n_workers:
+    first = max(0, nearest_person(people, robot, geometry))
+    for place in range(q.shape[0]):
+        who = first if place == 0 else (place - 1 if place - 1 < first else place)
+        _write_person(people, state, e, who, q[place], qd[place], size[place])
+
+
+@kernel(inline="always")
+def _write_person(
+    people: People, state: PeopleState, e: int, who: int, q: Vec, qd: Vec, size: Vec
+) -> None:
+    """Write one person, workers first; a pedestrian as a person who faces the robot's base."""
+    n_workers = state.q.shape[1]
+    if who < n_workers:
         for j in range(18):
-            geometry.seen_q[j], geometry.seen_qd[j] = state.q[e, who, j], state.qd[e, who, j]
-        copy_values(state.size[e, who], geometry.seen_size)
+            q[j], qd[j] = state.q[e, who, j], state.qd[e, who, j]
+        copy_values(state.size[e, who], size)
         return
-    copy_values(people.bodies[0], geometry.seen_size)
+    copy_values(people.bodies[0], size)
     for j in range(18):
-        geometry.seen_q[j], geometry.seen_qd[j] = people.no_person[j], 0.0
-    if who >= 0:
-        rows, k = state.walkers.rows, who - n_workers
+        q[j], qd[j] = people.no_person[j], 0.0
+    k = who - n_workers
+    if k < state.cylinders.shape[1]:
+        rows = state.walkers.rows
         x, y = rows[e, k, X], rows[e, k, Y]
-        geometry.seen_q[0], geometry.seen_q[1], geometry.seen_q[2] = x, y, math.atan2(-y, -x)
-        geometry.seen_qd[0], geometry.seen_qd[1] = rows[e, k, VX], rows[e, k, VY]
+        q[0], q[1], q[2] = x, y, math.atan2(-y, -x)
+        qd[0], qd[1] = rows[e, k, VX], rows[e, k, VY]
 
 
 @kernel()
@@ -343,7 +364,7 @@ def see_rows(
     qd: Vec,
     size: Vec,
 ) -> None:
-    """Write the nearest person of some environments (:func:`see_nearest`).
+    """Write the people of some environments (:func:`see_people`).
 
     Args:
         people: Shared data.
@@ -351,14 +372,11 @@ def see_rows(
         robots: The robots' capsules, shape (n_envs, 9, n).
         rows: Indices of the environments, shape (k,).
         geometry: Work space.
-        q: Filled with joints [m, rad], shape (k, 18).
-        qd: Filled with joint speeds [m/s, rad/s], shape (k, 18).
-        size: Filled with the sizes [m], shape (k, body.N_SIZE).
+        q: Filled with joints [m, rad], shape (k, P, 18).
+        qd: Filled with joint speeds [m/s, rad/s], shape (k, P, 18).
+        size: Filled with the sizes [m], shape (k, P, body.N_SIZE).
     """
     for k in range(rows.shape[0]):
         e = rows[k]
         place_people(people, state, e, geometry)
-        see_nearest(people, state, e, robots[e], geometry)
-        copy_values(geometry.seen_q, q[k])
-        copy_values(geometry.seen_qd, qd[k])
-        copy_values(geometry.seen_size, size[k])
+        see_people(people, state, e, robots[e], geometry, q[k], qd[k], size[k])

@@ -13,7 +13,16 @@ from app.sim.core.jit import kernel
 from app.sim.core.kernels import rng as random
 from app.sim.geometry.capsules import copy_values
 from app.sim.people.kernels.motion import start_people
-from app.sim.people.kernels.people import People, place_people, see_nearest
+from app.sim.people.kernels.people import People, place_people, see_people
+from app.sim.pick.kernels.grasp import (
+    APPROACH,
+    DESCEND,
+    GraspRules,
+    ToolState,
+    distance_left,
+    next_phase,
+    target_height,
+)
 from app.sim.pick.kernels.observation import PickObservationWorkspace, PickQuery, observe
 from app.sim.pick.kernels.reward import RewardWeights, reward
 from app.sim.robot.kernels import kinematics
@@ -52,6 +61,10 @@ SUCCESS_TILT = 0.2
 """Largest angle of the tool axis to the vertical [rad], thesis 5.3.1."""
 SUCCESS_SPEED = 0.1
 """Largest tcp speed [m/s], thesis 5.3.1."""
+HIGHER = 0.35
+"""Largest height of other starts above the box of targets [m]."""
+WRIST_SPREAD = 0.3
+"""Largest turn of the wrist joints of other starts [rad]."""
 
 
 class PickCell(NamedTuple):
@@ -84,6 +97,12 @@ class PickRules(NamedTuple):
     """Half width of the box around a station from which targets are drawn [m]."""
     on_path_share: float
     """Share of episodes that start between the start configuration and the target."""
+    at_target_share: float
+    """Share of episodes that start at the target, ready to descend."""
+    anywhere_share: float
+    """Shares of targets and of starts drawn from ``box`` and not from the stations."""
+    box: Vec
+    """Corners of the box of other targets and starts [m], shape (2, 3)."""
     n_candidates_min: int
     """Fewest targets offered."""
     n_candidates_max: int
@@ -95,6 +114,8 @@ class PickTask(NamedTuple):
 
     rules: PickRules
     """Starts and ends."""
+    grasp: GraspRules
+    """Phases of a pick."""
     action: ActionRule
     """Action type and bounds."""
     weights: RewardWeights
@@ -102,14 +123,38 @@ class PickTask(NamedTuple):
 
 
 @kernel()
-def set_goal(world: PickCell, state: EpisodeState, e: int, goal: Vec, robot: RobotPose) -> None:
-    """Set a new target [m], shape (3,), in environment ``e`` and measure the distance to it."""
-    arm = world.arm
+def set_goal(
+    world: PickCell,
+    grasp: GraspRules,
+    state: EpisodeState,
+    e: int,
+    goal: Vec,
+    robot: RobotPose,
+) -> None:
+    """Set the target [m], shape (3,), in environment ``e`` and measure the distance to it.
+
+    Another target than the present one is approached anew; the same one changes nothing.
+    """
+    same = True
     for i in range(3):
+        same = same and state.goal[e, i] == goal[i]
         state.goal[e, i] = goal[i]
-    kinematics.ik_vertical(arm.lengths, arm.limits, goal, state.q_goal[e])
-    place_robot(arm, state.q[e], robot)
-    state.distance[e] = distance_to(goal, robot)
+    if not same:
+        _start_pick(world.arm, grasp, state, e)
+    place_robot(world.arm, state.q[e], robot)
+    state.distance[e] = distance_left(grasp, state.phase[e], state.goal[e], robot.tcp)
+
+
+@kernel(inline="always")
+def _start_pick(arm: Arm, grasp: GraspRules, state: EpisodeState, e: int) -> bool:
+    """Start the approach of a target; return whether target and object can be reached."""
+    state.phase[e], state.closing[e] = APPROACH, 0.0
+    goal = state.goal[e]
+    reached: bool = kinematics.ik_vertical(arm.lengths, arm.limits, goal, state.q_goal[e])
+    goal[2] -= grasp.depth
+    low: bool = kinematics.ik_vertical(arm.lengths, arm.limits, goal, state.q_grasp[e])
+    goal[2] += grasp.depth
+    return reached and low
 
 
 @kernel()
@@ -132,30 +177,70 @@ def _draw_candidates(
         state.candidates[e, i] = station
 
 
+@kernel(inline="always")
+def _draw_point(rules: PickRules, rng: random.State, point: Vec) -> None:
+    """Draw a point from the box of other targets and starts [m], shape (3,)."""
+    for i in range(3):
+        low, high = rules.box[0, i], rules.box[1, i]
+        point[i] = low + (high - low) * random.uniform(rng)
+
+
 @kernel()
-def _draw_start(
-    world: PickCell, rules: PickRules, state: EpisodeState, e: int, rng: random.State
+def _draw_configuration(
+    world: PickCell, rules: PickRules, point: Vec, q: Vec, rng: random.State
 ) -> None:
-    """Draw the robot's start: home, a cube or a dock in equal shares, never a candidate."""
+    """Draw a configuration with the tool over a point of the box, tilted a little.
+
+    Args:
+        world: Shared data.
+        rules: Starts of episodes.
+        point: Work space, shape (3,).
+        q: Filled with the configuration [rad], shape (6,).
+        rng: Random stream.
+    """
+    _draw_point(rules, rng, point)
+    point[2] += HIGHER * random.uniform(rng)
+    kinematics.ik_vertical(world.arm.lengths, world.arm.limits, point, q)
+    for j in range(3, CONTROLLED):
+        q[j] += WRIST_SPREAD * (2.0 * random.uniform(rng) - 1.0)
+
+
+@kernel()
+def _draw_station(world: PickCell, candidates: Indices, q: Vec, rng: random.State) -> None:
+    """Write the configuration at home, a cube or a dock in equal shares, not at a candidate."""
     n_stations = world.stations.shape[0]
     while True:
         kind = random.below(rng, 3)
         if kind == 0:
-            copy_values(world.arm.home, state.q[e])
+            copy_values(world.arm.home, q)
             break
         station = random.below(rng, world.n_cubes)
         if kind == 2:
             station = world.n_cubes + random.below(rng, n_stations - world.n_cubes)
         offered = False
         for i in range(MAX_CANDIDATES):
-            offered = offered or state.candidates[e, i] == station
+            offered = offered or candidates[i] == station
         if not offered:
-            copy_values(world.station_q[station], state.q[e])
+            copy_values(world.station_q[station], q)
             break
+
+
+@kernel()
+def _draw_start(
+    world: PickCell, rules: PickRules, state: EpisodeState, e: int, work: StepWorkspace
+) -> None:
+    """Draw the robot's start: at a station or anywhere, on the path to the target or at it."""
+    rng, q = work.rng, state.q[e]
+    _draw_station(world, state.candidates[e], q, rng)
+    if rules.anywhere_share > 0.0 and random.uniform(rng) < rules.anywhere_share:
+        _draw_configuration(world, rules, work.robot.tcp, q, rng)
+    part = 0.0
     if random.uniform(rng) < rules.on_path_share:
-        u = random.uniform(rng)
-        for j in range(CONTROLLED):
-            state.q[e, j] += u * (state.q_goal[e, j] - state.q[e, j])
+        part = random.uniform(rng)
+    if rules.at_target_share > 0.0 and random.uniform(rng) < rules.at_target_share:
+        part = 1.0
+    for j in range(CONTROLLED):
+        q[j] += part * (state.q_goal[e, j] - q[j])
     for j in range(6):
         state.qd[e, j], state.qdd[e, j] = 0.0, 0.0
 
@@ -163,7 +248,7 @@ def _draw_start(
 @kernel(inline="always")
 def reset_env(
     world: PickCell,
-    rules: PickRules,
+    task: PickTask,
     seed: int,
     first_env: int,
     state: EpisodeState,
@@ -171,17 +256,23 @@ def reset_env(
     work: StepWorkspace,
 ) -> None:
     """Start the next episode of environment ``e``."""
-    rng = work.rng
+    rng, rules, grasp = work.rng, task.rules, task.grasp
     random.start_stream(seed, first_env + e, state.episode[e], rng)
     _draw_candidates(world, rules, state, e, rng)
     goal, arm = state.goal[e], world.arm
     copy_values(world.stations[state.candidates[e, 0]], goal)
     for i in range(3):
-        goal[i] += rules.target_jitter * (2.0 * random.uniform(rng) - 1.0)
-    kinematics.ik_vertical(arm.lengths, arm.limits, goal, state.q_goal[e])
+        low = i == 2 and grasp.depth > 0.0  # the object stays over the table
+        spread = 0.5 * rules.target_jitter if low else rules.target_jitter
+        goal[i] += spread * (2.0 * random.uniform(rng) - 1.0)
+    if rules.anywhere_share > 0.0 and random.uniform(rng) < rules.anywhere_share:
+        _draw_point(rules, rng, goal)
+    if not _start_pick(arm, grasp, state, e):
+        copy_values(world.stations[state.candidates[e, 0]], goal)
+        _start_pick(arm, grasp, state, e)
     short = random.uniform(rng) < rules.short_share
     for attempt in range(START_TRIES):
-        _draw_start(world, rules, state, e, rng)
+        _draw_start(world, rules, state, e, work)
         place_robot(arm, state.q[e], work.robot)
         start_people(world.people, state.people, e, rng, work.crowd)
         measure(arm, world.people, state, e, work)
@@ -191,6 +282,21 @@ def reset_env(
             break
     state.tilt[e] = robot_tilt(work.robot)
     begin(state, e, rules.short_limit if short else rules.time_limit, work)
+    state.distance[e] = distance_left(grasp, APPROACH, goal, work.robot.tcp)
+
+
+@kernel()
+def measure_starts(
+    world: PickCell, grasp: GraspRules, state: EpisodeState, work: StepWorkspace
+) -> None:
+    """Measure clearances, tilts and distances of all environments at their starts."""
+    for e in range(state.q.shape[0]):
+        place_robot(world.arm, state.q[e], work.robot)
+        place_people(world.people, state.people, e, work.crowd)
+        measure(world.arm, world.people, state, e, work)
+        state.tilt[e] = robot_tilt(work.robot)
+        begin(state, e, state.time_left[e], work)
+        state.distance[e] = distance_left(grasp, APPROACH, state.goal[e], work.robot.tcp)
 
 
 @kernel()
@@ -211,12 +317,20 @@ def step_env(
     """Step environment ``e``, set its outcome and return the reward."""
     action, weights, robot = task.action, task.weights, work.robot
     collided, unfeasible = move(world.arm, world.people, action, state, e, act, work)
-    d_old, tilt_old = state.distance[e], state.tilt[e]
-    d, tilt = distance_to(state.goal[e], robot), robot_tilt(robot)
-    state.distance[e], state.tilt[e] = d, tilt
+    grasp, goal, d_old, tilt_old = task.grasp, state.goal[e], state.distance[e], state.tilt[e]
+    d, tilt = distance_to(goal, robot), robot_tilt(robot)
     near = max(SUCCESS_DISTANCE, weights.d_v)
     speed = tcp_speed(robot, work.qd) if d <= near else 0.0
-    success = not collided and succeeded(d, tilt, speed)
+    if grasp.depth > 0.0:
+        tool = ToolState(robot.tcp, tilt, speed, state.clear[e, 0])
+        phase, closing, lifted = next_phase(
+            grasp, state.phase[e], state.closing[e], goal, tool, world.arm.dt
+        )
+        state.phase[e], state.closing[e] = phase, closing
+        success, d = not collided and lifted, distance_left(grasp, phase, goal, robot.tcp)
+    else:
+        success = not collided and succeeded(d, tilt, speed)
+    state.distance[e], state.tilt[e] = d, tilt
     if collided:
         state.outcome[e] = COLLISION
     elif success:
@@ -231,6 +345,7 @@ def step_env(
 @kernel(nogil=True)
 def observe_rows(
     world: PickCell,
+    grasp: GraspRules,
     state: EpisodeState,
     envs: Indices,
     work: StepWorkspace,
@@ -238,10 +353,13 @@ def observe_rows(
     view: int,
     out: Obs,
 ) -> None:
-    """Write the observations of some environments; of several people the nearest is observed.
+    """Write the observations of some environments.
+
+    The raw state and the views for one person observe the person nearest to the robot.
 
     Args:
         world: Shared data.
+        grasp: Phases of a pick.
         state: Environments.
         envs: Numbers of the environments, shape (k,).
         work: Work space.
@@ -249,37 +367,45 @@ def observe_rows(
         view: PLAIN (the state of (5.8), ``N_PLAIN`` numbers) or FEATURES.
         out: Filled, shape (k, F).
     """
-    crowd = work.crowd
+    crowd, people = work.crowd, world.people
+    n_people = max(1, state.people.q.shape[1] + state.people.cylinders.shape[1])
+    human_q, human_qd = sight.human_q[:n_people], sight.human_qd[:n_people]
+    size, point = sight.human_size[:n_people], sight.point
     for k in range(envs.shape[0]):
         e, row = envs[k], out[k]
         place_robot(world.arm, state.q[e], work.robot)
-        place_people(world.people, state.people, e, crowd)
-        see_nearest(world.people, state.people, e, work.robot.columns, crowd)
+        place_people(people, state.people, e, crowd)
+        see_people(people, state.people, e, work.robot.columns, crowd, human_q, human_qd, size)
         if view == PLAIN:
             for j in range(6):
                 row[j], row[6 + j] = state.q[e, j], state.qd[e, j]
             for j in range(18):
-                row[12 + j], row[30 + j] = crowd.seen_q[j], crowd.seen_qd[j]
+                row[12 + j], row[30 + j] = human_q[0, j], human_qd[0, j]
             for i in range(3):
                 row[48 + i] = state.goal[e, i]
             continue
+        phase, goal = state.phase[e], state.goal[e]
+        point[0], point[1] = goal[0], goal[1]
+        point[2] = target_height(grasp, phase, goal)
         observed = PickQuery(
             state.q[e],
             state.qd[e],
-            crowd.seen_q,
-            crowd.seen_qd,
-            crowd.seen_size,
-            state.goal[e],
-            state.q_goal[e],
+            human_q,
+            human_qd,
+            size,
+            point,
+            state.q_grasp[e] if phase == DESCEND else state.q_goal[e],
+            state.q_grasp[e],
+            phase,
+            state.closing[e] / grasp.close_s,
         )
-        floor, left = world.people.floor_z, state.time_left[e]
-        observe(world.arm, floor, observed, left, work.robot, sight, row)
+        observe(world.arm, people.floor_z, observed, state.time_left[e], work.robot, sight, row)
 
 
 @kernel(nogil=True)
 def reset_rows(
     world: PickCell,
-    rules: PickRules,
+    task: PickTask,
     seed: int,
     first_env: int,
     state: EpisodeState,
@@ -288,7 +414,7 @@ def reset_rows(
 ) -> None:
     """Start an episode in some environments, shape (k,)."""
     for e in envs:
-        reset_env(world, rules, seed, first_env, state, e, work)
+        reset_env(world, task, seed, first_env, state, e, work)
 
 
 @kernel(nogil=True)

@@ -5,14 +5,16 @@ the base controller, the distances of four groups of links to the person, and cl
 extrapolated at constant velocity. All follow from the state (docs/method.md 3.3: q, qd of robot
 and person, target) and the time left; there is no hidden history. ``LAYOUT`` gives the slice of
 each group. The person's body dimensions affect positions and clearances; ``BODY_SIZES`` adds
-them explicitly (docs/method.md 4).
+them explicitly (docs/method.md 4). Picks add the phase (``PHASE_SIZES``) and a second person
+(``PICK_SIZES``): the first is the one nearest to the robot, the second, of the others, the one
+with a hand or the pelvis nearest to the target.
 
 Source: (5.8) for the raw state. Deviates: features are added, because the raw state learned far
 more slowly (1 % against 90 % after 2.7 k updates in trials beside the pedestrian).
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -80,6 +82,39 @@ BODY_SIZES = (*SIZES, ("body", body.N_SIZE))
 """Groups of the observation that includes the person's body dimensions."""
 N_WITH_BODY = N_FEATURES + body.N_SIZE
 """Length of that observation."""
+PHASE_SIZES = (*SIZES, ("phase", 3), ("closing", 1), ("near_clearance", 1))
+"""Groups of the observation of a pick beside one person."""
+N_WITH_PHASE = sum(size for _, size in PHASE_SIZES)
+"""Length of that observation."""
+PICK_SIZES = (
+    *PHASE_SIZES,
+    ("second_present", 1),
+    ("second_pelvis", 3),
+    ("second_hands_and_elbows", 24),
+    ("second_hand_velocities", 6),
+    ("second_clearance", 1),
+    ("second_look_ahead_still", 3),
+    ("second_look_ahead_base", 3),
+    ("second_goal_clearance", 4),
+)
+"""Groups of the observation of a pick beside several people."""
+N_PICK = sum(size for _, size in PICK_SIZES)
+"""Length of that observation."""
+(PRESENT, PELVIS, SECOND_ARMS, SECOND_CLEARANCE) = (
+    slices_of(PICK_SIZES)[name].start
+    for name in (
+        "second_present",
+        "second_pelvis",
+        "second_hands_and_elbows",
+        "second_clearance",
+    )
+)
+CLOSE_SCALE = 0.1
+"""Unit of the clearance that decides on a grasp [m]; it is clipped at one unit."""
+MAX_PEOPLE = 4
+"""Most people in a cell."""
+PRESENT_WITHIN = 4.0
+"""Distance from the robot's base beyond which nobody is observed as a second person [m]."""
 BASE_START = LAYOUT["base"].start
 """Index of the base motion, for the residual action."""
 (ARMS, MOTION, SCALARS, NEAREST, STILL_AHEAD, BASE_AHEAD, AT_GOAL_AHEAD) = (
@@ -121,29 +156,37 @@ FIRST_PART, LAST_PART = body.C_ABDOMEN, body.C_HAND_L
 
 
 class PickQuery(NamedTuple):
-    """A state of robot, person and target; or n states, with a leading axis of n."""
+    """A state of robot, people and target; or n states, with a leading axis of n."""
 
     q: Vec
     """Joint positions [rad], shape (6,)."""
     qd: Vec
     """Joint speeds [rad/s], shape (6,)."""
     human_q: Vec
-    """The person's joint positions [m, rad], shape (18,)."""
+    """Joint positions of P people, the nearest first [m, rad], shape (P, 18)."""
     human_qd: Vec
-    """The person's joint speeds [m/s, rad/s], shape (18,)."""
+    """Their joint speeds [m/s, rad/s], shape (P, 18)."""
     size: Vec
-    """The person's body dimensions [m], shape (body.N_SIZE,)."""
+    """Their body dimensions [m], shape (P, body.N_SIZE)."""
     goal: Vec
-    """Target of the tcp [m], shape (3,)."""
+    """Target of the tcp in this phase [m], shape (3,)."""
     q_goal: Vec
     """Vertical-tool configuration at the target [rad], shape (6,)."""
+    q_grasp: Vec
+    """The same at the object [rad], shape (6,); that at the target where nothing is grasped."""
+    phase: Any
+    """Phase of the pick (``grasp.py``), 0 where nothing is grasped."""
+    closing: Any
+    """Share of the closing time that has passed, 0 to 1."""
 
 
 class PickObservationWorkspace(NamedTuple):
     """Work space of one observation."""
 
     person: PersonWorkspace
-    """The observed person, now and extrapolated."""
+    """The first person, now and extrapolated."""
+    second: PersonWorkspace
+    """The second person, likewise."""
     lanes: Vec
     """Coarse capsules of the robot in three configurations, shape (9, N_LANES)."""
     gap: Vec
@@ -160,12 +203,21 @@ class PickObservationWorkspace(NamedTuple):
     """The base motion, shape (6,)."""
     gap_vector: Vec
     """From robot to person [m], shape (3,)."""
+    human_q: Vec
+    """Joint positions of the people [m, rad], shape (MAX_PEOPLE, 18)."""
+    human_qd: Vec
+    """Their joint speeds [m/s, rad/s], shape (MAX_PEOPLE, 18)."""
+    human_size: Vec
+    """Their body dimensions [m], shape (MAX_PEOPLE, body.N_SIZE)."""
+    point: Vec
+    """Target of the tcp in the present phase [m], shape (3,)."""
 
 
 def new_pick_observation_workspace() -> PickObservationWorkspace:
     """Return work space for one observation at a time."""
     return PickObservationWorkspace(
         person=new_person_workspace(),
+        second=new_person_workspace(),
         lanes=new_columns(
             N_LANES, np.tile(COARSE_RADIUS, 3), np.tile((COARSE_SPAN**2).sum(axis=1), 3)
         ),
@@ -176,6 +228,10 @@ def new_pick_observation_workspace() -> PickObservationWorkspace:
         q=np.zeros(6),
         base=np.zeros(6),
         gap_vector=np.zeros(3),
+        human_q=np.zeros((MAX_PEOPLE, 18)),
+        human_qd=np.zeros((MAX_PEOPLE, 18)),
+        human_size=np.zeros((MAX_PEOPLE, body.N_SIZE)),
+        point=np.zeros(3),
     )
 
 
@@ -224,7 +280,7 @@ def _scaled(d: float) -> float:
 
 @kernel(inline="always")
 def _write_joints(arm: Arm, state: PickQuery, out: Obs) -> None:
-    q, qd, human_q = state.q, state.qd, state.human_q
+    q, qd, human_q = state.q, state.qd, state.human_q[0]
     for j in range(CONTROLLED):
         out[j] = q[j] / math.pi
         out[5 + j] = qd[j] / arm.limits.qd_max[j]
@@ -232,7 +288,7 @@ def _write_joints(arm: Arm, state: PickQuery, out: Obs) -> None:
         out[15 + j] = math.cos(q[j])
     for j in range(18):
         out[20 + j] = human_q[j]
-        out[38 + j] = 0.5 * state.human_qd[j]
+        out[38 + j] = 0.5 * state.human_qd[0, j]
     out[21] = human_q[1] - 1.25
     out[22] = (human_q[2] + 1.5 * math.pi) % (2.0 * math.pi) - math.pi
 
@@ -289,6 +345,97 @@ def _write_nearest(work: PickObservationWorkspace, k: int, out: Obs) -> float:
 
 
 @kernel(inline="always")
+def _write_phase(state: PickQuery, clearance: float, out: Obs) -> None:
+    """Write the phase of the pick, the share of closing and the near clearance."""
+    for phase in range(3):
+        out[N_FEATURES + phase] = 1.0 if state.phase == phase else 0.0
+    out[N_FEATURES + 3] = state.closing
+    out[N_FEATURES + 4] = min(1.0, clearance / CLOSE_SCALE)
+
+
+@kernel(inline="always")
+def _place_second(floor_z: float, state: PickQuery, work: PickObservationWorkspace) -> int:
+    """Place the second person; return the number of that person, 0 where there is none.
+
+    Of the people after the first it is the one with a hand or the pelvis nearest to the target.
+    """
+    second, goal, person = 0, state.goal, work.second
+    best, placed = PRESENT_WITHIN, 0
+    for w in range(1, state.human_q.shape[0]):
+        x, y = state.human_q[w, 0], state.human_q[w, 1]
+        if math.hypot(x, y) > PRESENT_WITHIN:
+            continue
+        place_person(floor_z, state.human_q[w], state.human_qd[w], state.size[w], person)
+        placed = w
+        distance = math.hypot(x - goal[0], y - goal[1])
+        for point in (body.HAND_R, body.HAND_L):
+            dx = person.points[point, 0] - goal[0]
+            dy = person.points[point, 1] - goal[1]
+            distance = min(distance, math.hypot(dx, dy))
+        if second == 0 or distance < best:
+            best, second = distance, w
+    if second != placed:
+        q, qd = state.human_q[second], state.human_qd[second]
+        place_person(floor_z, q, qd, state.size[second], person)
+    return second
+
+
+@kernel(inline="always")
+def _write_second(
+    state: PickQuery, second: int, tcp: Vec, person: PersonWorkspace, out: Obs
+) -> None:
+    """Write position, arms and hand velocities of the second person, 0 where there is none."""
+    out[PRESENT] = 1.0 if second > 0 else 0.0
+    if second == 0:
+        for k in range(PELVIS, SECOND_CLEARANCE):
+            out[k] = 0.0
+        return
+    q, goal, k = state.human_q[second], state.goal, SECOND_ARMS
+    out[PELVIS], out[PELVIS + 1] = q[0], q[1] - 1.25
+    out[PELVIS + 2] = (q[2] + 1.5 * math.pi) % (2.0 * math.pi) - math.pi
+    for point in (body.HAND_R, body.HAND_L, body.ELBOW_R, body.ELBOW_L):
+        for i in range(3):
+            out[k + i] = person.points[point, i] - tcp[i]
+            out[k + 3 + i] = person.points[point, i] - goal[i]
+        k += 6
+    for point in (body.HAND_R, body.HAND_L):
+        for i in range(3):
+            out[k + i] = (person.points_later[point, i] - person.points[point, i]) / TICK
+        k += 3
+
+
+@kernel(inline="always")
+def _write_clearances(work: PickObservationWorkspace, place: int, i: int, out: Obs) -> None:
+    """Write the clearances of the three configurations at horizon ``i`` from ``place`` on."""
+    out[place + i] = _lane_clearance(STILL, work)
+    out[place + 3 + i] = _lane_clearance(ALONG_BASE, work)
+    out[place + 7 + i] = _lane_clearance(AT_GOAL, work)
+
+
+@kernel(inline="always")
+def _write_look_ahead(
+    arm: Arm, state: PickQuery, second: int, work: PickObservationWorkspace, out: Obs
+) -> None:
+    """Write the clearances to the observed people at all horizons."""
+    q, q_goal, base = state.q, state.q_goal, work.base
+    person, other = work.person, work.second
+    work.q[5] = q[5]
+    for i in range(3):
+        for j in range(CONTROLLED):
+            step = base[j] * arm.limits.qd_max[j] * HORIZONS[i]
+            limit = abs(q_goal[j] - q[j])
+            work.q[j] = q[j] + min(limit, max(-limit, step))
+        _place_lanes(arm, work.q, ALONG_BASE, work)
+        extrapolate_capsules(person.now, person.later, HORIZONS[i], person.moved)
+        nearest_parts(work.lanes, person.moved, FIRST_PART, LAST_PART, work.gap, work.part)
+        _write_clearances(work, STILL_AHEAD, i, out)
+        if second > 0:
+            extrapolate_capsules(other.now, other.later, HORIZONS[i], other.moved)
+            nearest_parts(work.lanes, other.moved, FIRST_PART, LAST_PART, work.gap, work.part)
+            _write_clearances(work, SECOND_CLEARANCE + 1, i, out)
+
+
+@kernel(inline="always")
 def observe(
     arm: Arm,
     floor_z: float,
@@ -298,7 +445,7 @@ def observe(
     work: PickObservationWorkspace,
     out: Obs,
 ) -> None:
-    """Write the observation of one state, one person and one target.
+    """Write the observation of one state and one target.
 
     Args:
         arm: Robot in its cell.
@@ -307,13 +454,14 @@ def observe(
         time_left: Time left to reach the target [s].
         robot: The robot, placed at ``state.q``.
         work: Work space.
-        out: Filled, shape (N_FEATURES,) or (N_WITH_BODY,).
+        out: Filled, shape (N_FEATURES,), (N_WITH_BODY,), (N_WITH_PHASE,) or (N_PICK,).
     """
-    if out.shape[0] > N_FEATURES:
+    n_obs, second = out.shape[0], 0
+    if n_obs == N_WITH_BODY:
         for i in range(body.N_SIZE):
-            out[N_FEATURES + i] = state.size[i]
+            out[N_FEATURES + i] = state.size[0, i]
     q, goal, q_goal, person = state.q, state.goal, state.q_goal, work.person
-    place_person(floor_z, state.human_q, state.human_qd, state.size, person)
+    place_person(floor_z, state.human_q[0], state.human_qd[0], state.size[0], person)
     _write_joints(arm, state, out)
     _write_tool(state.qd, goal, robot, out)
     _write_human_arms(person, robot, goal, out)
@@ -328,22 +476,41 @@ def observe(
     out[SCALARS + 1] = robot_tilt(robot)
     out[SCALARS + 3] = time_left / TIME_SCALE
     place_capsules(robot.rot, robot.pos, COARSE_LINK, COARSE_P0, COARSE_SPAN, STILL, work.lanes)
-    _place_lanes(arm, q_goal, AT_GOAL, work)
+    _place_lanes(arm, state.q_grasp, AT_GOAL, work)
     nearest_parts(work.lanes, person.now, FIRST_PART, LAST_PART, work.gap, work.part)
-    out[SCALARS + 2] = _scaled(_write_nearest(work, NEAREST, out))
+    clearance = _write_nearest(work, NEAREST, out)
+    out[SCALARS + 2] = _scaled(clearance)
     out[AT_GOAL_AHEAD] = _lane_clearance(AT_GOAL, work)
-    work.q[5] = q[5]
-    for i in range(3):
-        for j in range(CONTROLLED):
-            step = base[j] * arm.limits.qd_max[j] * HORIZONS[i]
-            limit = abs(q_goal[j] - q[j])
-            work.q[j] = q[j] + min(limit, max(-limit, step))
-        _place_lanes(arm, work.q, ALONG_BASE, work)
-        extrapolate_capsules(person.now, person.later, HORIZONS[i], person.moved)
-        nearest_parts(work.lanes, person.moved, FIRST_PART, LAST_PART, work.gap, work.part)
-        out[STILL_AHEAD + i] = _lane_clearance(STILL, work)
-        out[BASE_AHEAD + i] = _lane_clearance(ALONG_BASE, work)
-        out[AT_GOAL_AHEAD + 1 + i] = _lane_clearance(AT_GOAL, work)
+    if n_obs == N_WITH_PHASE or n_obs == N_PICK:
+        _write_phase(state, clearance, out)
+    if n_obs == N_PICK:
+        second = _place_second(floor_z, state, work)
+        _write_second(state, second, tcp, work.second, out)
+        for k in range(SECOND_CLEARANCE, N_PICK):
+            out[k] = FARTHEST / DISTANCE_SCALE
+    if second > 0:
+        now = work.second.now
+        nearest_parts(work.lanes, now, FIRST_PART, LAST_PART, work.gap, work.part)
+        out[SECOND_CLEARANCE] = _lane_clearance(STILL, work)
+        out[SECOND_CLEARANCE + 7] = _lane_clearance(AT_GOAL, work)
+    _write_look_ahead(arm, state, second, work, out)
+
+
+@kernel(inline="always")
+def query_at(states: PickQuery, i: int) -> PickQuery:
+    """Return state ``i`` of n states."""
+    return PickQuery(
+        states.q[i],
+        states.qd[i],
+        states.human_q[i],
+        states.human_qd[i],
+        states.size[i],
+        states.goal[i],
+        states.q_goal[i],
+        states.q_grasp[i],
+        states.phase[i],
+        states.closing[i],
+    )
 
 
 @kernel()
@@ -359,16 +526,7 @@ def observe_states(
     """Apply :func:`observe` to n states; ``robot`` and ``work`` are work space."""
     for i in range(states.q.shape[0]):
         place_robot(arm, states.q[i], robot)
-        state = PickQuery(
-            states.q[i],
-            states.qd[i],
-            states.human_q[i],
-            states.human_qd[i],
-            states.size[i],
-            states.goal[i],
-            states.q_goal[i],
-        )
-        observe(arm, floor_z, state, time_left[i], robot, work, out[i])
+        observe(arm, floor_z, query_at(states, i), time_left[i], robot, work, out[i])
 
 
 def observe_batch(
@@ -381,7 +539,7 @@ def observe_batch(
         floor_z: Height of the floor [m].
         states: The states, arrays of shape (n, ...).
         time_left: Time left in each [s], shape (n,).
-        out: Filled, shape (n, N_FEATURES) or (n, N_WITH_BODY).
+        out: Filled, shape (n, length of an observation).
     """
     work = new_pick_observation_workspace()
     observe_states(arm, floor_z, states, time_left, new_robot_pose(arm), work, out)

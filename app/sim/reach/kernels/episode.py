@@ -187,7 +187,7 @@ def step_env(
 @kernel(nogil=True)
 def reset_rows(
     world: ReachCell,
-    rules: ReachRules,
+    task: ReachTask,
     seed: int,
     first_env: int,
     state: EpisodeState,
@@ -196,7 +196,7 @@ def reset_rows(
 ) -> None:
     """Start an episode in some environments, shape (k,)."""
     for e in envs:
-        reset_env(world, rules, seed, first_env, state, e, work)
+        reset_env(world, task.rules, seed, first_env, state, e, work)
 
 
 @kernel(nogil=True)

@@ -65,6 +65,12 @@ class EpisodeState(NamedTuple):
     """Reach: number of the goal among the targets, or NO_TARGET, shape (n_envs,)."""
     q_goal: Vec
     """Pick: vertical-tool configuration at the target [rad], shape (n_envs, 6)."""
+    q_grasp: Vec
+    """Pick: vertical-tool configuration at the object [rad], shape (n_envs, 6)."""
+    phase: Indices
+    """Pick: phase of the grasp (``pick/kernels/grasp.py``), shape (n_envs,)."""
+    closing: Vec
+    """Pick: time for which the gripper has been closing [s], shape (n_envs,)."""
     candidates: Indices
     """Pick: stations offered, -1 where there are fewer, shape (n_envs, MAX_CANDIDATES)."""
     time_left: Vec
@@ -72,7 +78,7 @@ class EpisodeState(NamedTuple):
     elapsed: Vec
     """Time since the start [s], shape (n_envs,)."""
     distance: Vec
-    """tcp to target [m], shape (n_envs,)."""
+    """tcp to target, in picks with the descent and lift to come [m], shape (n_envs,)."""
     tilt: Vec
     """Pick: angle of the tool axis to the vertical [rad], shape (n_envs,)."""
     touched: Indices
@@ -105,6 +111,9 @@ def new_episode_state(arm: Arm, people: PeopleState, n_envs: int) -> EpisodeStat
         goal=numbers(3),
         target=counts(),
         q_goal=numbers(6),
+        q_grasp=numbers(6),
+        phase=counts(),
+        closing=numbers(),
         candidates=counts(MAX_CANDIDATES),
         time_left=numbers(),
         elapsed=numbers(),

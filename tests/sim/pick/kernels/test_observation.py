@@ -1,12 +1,24 @@
 """What the networks see: the layout, and values checked against the models."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from app.sim.cells.cell import Cell, load_cell
+from app.sim.core.observation_layout import slices_of
 from app.sim.human import model as human
 from app.sim.pick import batch as pick
-from app.sim.pick.kernels.observation import DISTANCE_SCALE, LAYOUT, N_FEATURES
+from app.sim.pick.batch import TaskView
+from app.sim.pick.kernels.grasp import DESCEND, GraspRules
+from app.sim.pick.kernels.observation import (
+    DISTANCE_SCALE,
+    LAYOUT,
+    N_FEATURES,
+    N_PICK,
+    N_WITH_PHASE,
+    PICK_SIZES,
+)
 from app.sim.robot.ur10 import Robot
 from app.sim.scene.scene import arm_of, people_of
 
@@ -28,11 +40,12 @@ def state(cell: Cell) -> dict[str, np.ndarray]:
     }
 
 
-def seen(cell: Cell, **changes: np.ndarray) -> np.ndarray:
+def seen(cell: Cell, **changes: Any) -> np.ndarray:
     at = state(cell) | changes
-    person = at["human_q"], at["human_qd"], at.get("size")
-    robot = at["q"], at["qd"]
-    return pick.observe(arm_of(cell), people_of(cell), *robot, person, at["goals"], 7.0)[0]
+    human_q, human_qd = np.atleast_2d(at["human_q"]), np.atleast_2d(at["human_qd"])
+    people = human_q, human_qd, np.tile(cell.body, (len(human_q), 1))
+    robot, task = (at["q"], at["qd"]), at.get("task", TaskView())
+    return pick.observe(arm_of(cell), people_of(cell), robot, people, at["goals"], 7.0, task)[0]
 
 
 def test_layout_covers_the_observation_without_gap_or_overlap() -> None:
@@ -106,3 +119,57 @@ def test_seen_values_stay_within_a_few_units(cell: Cell) -> None:
         obs = batch.step(np.ones((200, 5), dtype=np.float32)).obs
         assert np.isfinite(obs).all()
         assert np.abs(obs).max() < 15.0
+
+
+PICK = slices_of(PICK_SIZES)
+
+
+def picking(**changes: Any) -> TaskView:
+    return TaskView(n_obs=N_PICK, grasp=GraspRules(), **changes)
+
+
+def test_a_pick_adds_to_the_features_of_a_reach(cell: Cell) -> None:
+    reach, both = seen(cell), seen(cell, task=picking())
+    other = np.setdiff1d(np.arange(N_FEATURES), np.arange(N_FEATURES)[LAYOUT["goal_clearance"]])
+    np.testing.assert_array_equal(both[:, other], reach[:, other])
+    np.testing.assert_array_equal(both[:, PICK["phase"]], [[1, 0, 0]] * len(reach))
+
+
+def test_in_the_descent_the_target_is_the_object(cell: Cell) -> None:
+    over = seen(cell, task=picking())
+    low = seen(cell, task=picking(current=1, phase=DESCEND, closing_s=0.5))
+    np.testing.assert_array_equal(np.delete(low, 1, axis=0), np.delete(over, 1, axis=0))
+    goal = over[1, LAYOUT["goal_minus_tcp"]] - [0, 0, 2.0 * GraspRules().depth]
+    np.testing.assert_allclose(low[1, LAYOUT["goal_minus_tcp"]], goal, atol=1e-6)
+    np.testing.assert_array_equal(low[1, PICK["phase"]], [0, 1, 0])
+    assert low[1, PICK["closing"]] == pytest.approx(0.5 / GraspRules().close_s)
+
+
+def test_the_second_person_is_the_one_nearer_to_the_target(cell: Cell) -> None:
+    first = human.rest_posture(0.0, 1.2, -1.57)
+    left, right = (human.rest_posture(x, 1.3, -1.57) for x in (-0.6, 0.6))
+    goals = np.array([[-0.5, 0.7, 0.12], [0.5, 0.7, 0.12]])
+    obs = seen(
+        cell,
+        human_q=np.stack([first, left, right]),
+        human_qd=np.zeros((3, 18)),
+        goals=goals,
+        task=picking(),
+    )
+    np.testing.assert_array_equal(obs[:, PICK["second_present"]], 1.0)
+    np.testing.assert_allclose(obs[:, PICK["second_pelvis"]][:, 0], [-0.6, 0.6], atol=1e-6)
+    alone = seen(cell, human_q=left, human_qd=np.zeros(18), goals=goals, task=picking())
+    np.testing.assert_allclose(
+        obs[0, PICK["second_goal_clearance"]], alone[0, LAYOUT["goal_clearance"]], atol=1e-6
+    )
+    for name in ("second_look_ahead_still", "second_look_ahead_base"):
+        one = name.removeprefix("second_")
+        np.testing.assert_allclose(obs[0, PICK[name]], alone[0, LAYOUT[one]], atol=1e-6)
+
+
+def test_without_a_second_person_nothing_of_one_is_observed(cell: Cell) -> None:
+    row = seen(cell, task=picking())[0]
+    assert not row[PICK["second_present"].start : PICK["second_clearance"].start].any()
+    np.testing.assert_array_equal(row[PICK["second_clearance"].start :], 3.0)
+    one = seen(cell, task=TaskView(n_obs=N_WITH_PHASE, grasp=GraspRules()))[0]
+    np.testing.assert_array_equal(row[:N_WITH_PHASE], one)

@@ -1,0 +1,88 @@
+"""Probabilities of the outcomes of a pick, and its expected time.
+
+An ensemble of small networks maps an observation, and the critic's value of it, to the
+probabilities of success, contact and timeout under the policy, and to the time to success. Its
+inputs are standardised by the data it was fitted to. The spread of the ensemble, widened by the
+factor that held on data apart, is the interval of a probability.
+
+Source: ours. Lakshminarayanan et al., *Simple and scalable predictive uncertainty estimation
+using deep ensembles* (2017). The thesis shows the critic's values only.
+"""
+
+from typing import NamedTuple
+
+import torch
+from torch import nn
+
+from app.policies.networks.actor_critic import hidden
+
+MEMBERS = 3
+"""Networks of the ensemble."""
+WIDTH = 64
+"""Units per hidden layer."""
+OUTCOMES = ("success", "contact", "timeout")
+"""Outcomes, in the order of the probabilities."""
+CLIP = 6.0
+"""Bound of a standardised input."""
+N_OUT = len(OUTCOMES) + 1
+"""Outputs of a network: a logit per outcome, and the time to success [s]."""
+
+
+class OutcomePrediction(NamedTuple):
+    """Prediction for n observations."""
+
+    probability: torch.Tensor
+    """Probability of each outcome, shape (n, 3)."""
+    spread: torch.Tensor
+    """Half width of the 95 % interval of each, shape (n, 3)."""
+    time_s: torch.Tensor
+    """Expected time to success [s], shape (n,)."""
+
+
+class OutcomeHead(nn.Module):
+    """Ensemble that predicts the outcome of a pick.
+
+    Args:
+        n_obs: Length of observations.
+    """
+
+    mean: torch.Tensor
+    """Mean of each input, shape (n_obs + 1,)."""
+    scale: torch.Tensor
+    """Standard deviation of each input, shape (n_obs + 1,)."""
+    widen: torch.Tensor
+    """Factor of the spread, shape (1,)."""
+
+    def __init__(self, n_obs: int) -> None:
+        super().__init__()
+        self.register_buffer("mean", torch.zeros(n_obs + 1))
+        self.register_buffer("scale", torch.ones(n_obs + 1))
+        self.register_buffer("widen", torch.ones(1))
+        self.members = nn.ModuleList(
+            nn.Sequential(*hidden(n_obs + 1, WIDTH, 2), nn.Linear(WIDTH, N_OUT))
+            for _ in range(MEMBERS)
+        )
+
+    def standardised(self, obs: torch.Tensor, value: torch.Tensor) -> torch.Tensor:
+        """Return inputs of the members, shape (n, n_obs + 1).
+
+        Args:
+            obs: Observations, shape (n, n_obs).
+            value: The critic's values, shape (n,).
+        """
+        both = torch.cat([obs, value.unsqueeze(1)], dim=1)
+        return ((both - self.mean) / self.scale).clamp(-CLIP, CLIP)
+
+    def forward(self, obs: torch.Tensor, value: torch.Tensor) -> torch.Tensor:
+        """Return the outputs of all members, shape (MEMBERS, n, N_OUT)."""
+        rows = self.standardised(obs, value)
+        return torch.stack([member(rows) for member in self.members])
+
+    def predict(self, obs: torch.Tensor, value: torch.Tensor) -> OutcomePrediction:
+        """Return the prediction for observations, shape (n, n_obs), and values, shape (n,)."""
+        out = self(obs, value)
+        each = torch.softmax(out[..., : len(OUTCOMES)], dim=-1)
+        spread = 1.96 * self.widen * each.std(dim=0)
+        return OutcomePrediction(
+            each.mean(dim=0), spread, out[..., -1].mean(dim=0).clamp_min(0)
+        )

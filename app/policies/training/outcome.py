@@ -1,0 +1,163 @@
+"""Fit of the outcome probabilities of a pick to episodes of the finished policy.
+
+The policy acts greedily in the environments of its training. At random steps the observation is
+kept; when the episode ends it is labelled with the outcome and the time that was left to it.
+Each member of the ensemble learns from a bootstrap sample of the episodes.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch.nn import functional
+
+from app.policies.networks.actor_critic import Critics, ResidualActor
+from app.policies.networks.outcome import MEMBERS, OUTCOMES, OutcomeHead
+from app.sim.pick.batch import PickBatch
+from app.sim.scenario.kernels.episode import COLLISION, SUCCESS, TIMEOUT
+
+LABELS = {SUCCESS: 0, COLLISION: 1, TIMEOUT: 2}
+"""Place among the probabilities of each outcome of an episode."""
+KEEP = 0.05
+"""Share of the steps that are kept; first steps are always kept."""
+EPOCHS, BATCH, RATE, DECAY = 12, 1024, 1e-3, 1e-3
+"""Passes over the data, size of a minibatch, learning rate and weight decay."""
+TIME_WEIGHT = 0.05
+"""Weight of the error of the time, relative to the cross-entropy."""
+
+
+class OutcomeData(NamedTuple):
+    """Labelled observations."""
+
+    obs: NDArray[np.float32]
+    """Observations, shape (n, n_obs)."""
+    value: NDArray[np.float32]
+    """The critic's values, shape (n,)."""
+    label: NDArray[np.int64]
+    """Outcome of the episode, shape (n,)."""
+    time_s: NDArray[np.float32]
+    """Time from the observation to the end [s], shape (n,)."""
+    episode: NDArray[np.int64]
+    """Number of the episode, shape (n,)."""
+
+
+def collect(
+    batch: PickBatch, actor: ResidualActor, critic: Critics, n_steps: int, seed: int
+) -> OutcomeData:
+    """Return labelled observations of episodes under a greedy policy.
+
+    Args:
+        batch: Environments.
+        actor: The policy.
+        critic: Its critics.
+        n_steps: Steps of all environments.
+        seed: Seed of the steps that are kept.
+    """
+    rng, n = np.random.default_rng(seed), batch.n_envs
+    batch.reset()
+    kept: list[list[tuple[NDArray[np.float32], float, float]]] = [[] for _ in range(n)]
+    rows: list[tuple[NDArray[np.float32], float, int, float, int]] = []
+    episode, dt = np.arange(n), batch.arm.dt
+    for _ in range(n_steps):
+        with torch.inference_mode():
+            obs = torch.as_tensor(batch.obs)
+            act = actor(obs)
+            value = critic.least(obs, act).numpy()
+        first = batch.state.elapsed < 0.5 * dt
+        for e in np.flatnonzero(first | (rng.random(n) < KEEP)).tolist():
+            sample = batch.obs[e].copy(), float(value[e]), float(batch.state.elapsed[e])
+            kept[e].append(sample)
+        elapsed = batch.state.elapsed + dt
+        ended = batch.step(act.numpy()).ended
+        for e in np.flatnonzero(ended).tolist():
+            label = LABELS[int(ended[e])]
+            rows += [(o, v, label, elapsed[e] - t, int(episode[e])) for o, v, t in kept[e]]
+            kept[e], episode[e] = [], episode[e] + n
+    if not rows:
+        none = np.zeros(0, dtype=np.float32)
+        return OutcomeData(batch.obs[:0], none, none.astype(int), none, none.astype(int))
+    obs_, value_, label_, time_, episode_ = zip(*rows, strict=True)
+    return OutcomeData(
+        np.stack(obs_),
+        np.array(value_, dtype=np.float32),
+        np.array(label_),
+        np.array(time_, dtype=np.float32),
+        np.array(episode_),
+    )
+
+
+def fit(data: OutcomeData, seed: int) -> OutcomeHead:
+    """Return the ensemble fitted to labelled observations.
+
+    A tenth of the episodes is kept apart: on them the spread is widened until the rates of
+    outcomes lie inside the intervals.
+
+    Args:
+        data: Labelled observations.
+        seed: Seed of weights, bootstrap and order.
+    """
+    torch.manual_seed(seed)
+    rng = np.random.default_rng(seed)
+    names = np.unique(data.episode)
+    apart = np.isin(data.episode, rng.choice(names, len(names) // 10, replace=False))
+    head = OutcomeHead(data.obs.shape[1])
+    both = torch.as_tensor(np.column_stack([data.obs, data.value]))
+    head.mean.copy_(both.mean(dim=0))
+    head.scale.copy_(both.std(dim=0) + 1e-3)
+    rest = names[~np.isin(names, data.episode[apart])]
+    for member in range(MEMBERS):
+        drawn = rng.choice(rest, len(rest))
+        weight = np.bincount(np.searchsorted(names, drawn), minlength=len(names))
+        _fit_member(head, member, data, weight[np.searchsorted(names, data.episode)], rng)
+    _widen(head, data, apart)
+    return head.eval()
+
+
+def _fit_member(
+    head: OutcomeHead,
+    member: int,
+    data: OutcomeData,
+    weight: NDArray[np.int64],
+    rng: np.random.Generator,
+) -> None:
+    """Fit one member to the observations of a bootstrap sample."""
+    network = head.members[member]
+    optimizer = torch.optim.AdamW(network.parameters(), lr=RATE, weight_decay=DECAY)
+    rows = np.repeat(np.arange(len(weight)), weight)
+    inputs = head.standardised(torch.as_tensor(data.obs), torch.as_tensor(data.value))
+    label, time_s = torch.as_tensor(data.label), torch.as_tensor(data.time_s)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(
+        optimizer, RATE, total_steps=EPOCHS * max(1, len(rows) // BATCH) + 1
+    )
+    for _ in range(EPOCHS):
+        rng.shuffle(rows)
+        for first in range(0, len(rows) - BATCH + 1, BATCH):
+            one = torch.as_tensor(rows[first : first + BATCH])
+            out = network(inputs[one])
+            loss = functional.cross_entropy(out[:, : len(OUTCOMES)], label[one])
+            won = label[one] == 0
+            if won.any():
+                error = functional.smooth_l1_loss(out[won, -1], time_s[one][won])
+                loss = loss + TIME_WEIGHT * error
+            optimizer.zero_grad()
+            loss.backward()  # type: ignore[no-untyped-call]
+            optimizer.step()
+            schedule.step()
+
+
+def _widen(head: OutcomeHead, data: OutcomeData, apart: NDArray[np.bool_]) -> None:
+    """Widen the spread until the calibration error on other episodes lies inside it."""
+    with torch.inference_mode():
+        found = head.predict(
+            torch.as_tensor(data.obs[apart]), torch.as_tensor(data.value[apart])
+        )
+    probability, spread = found.probability[:, 0].numpy(), found.spread[:, 0].numpy()
+    won = data.label[apart] == 0
+    order = np.argsort(probability)
+    ratios = [
+        abs(won[part].mean() - probability[part].mean()) / max(spread[part].mean(), 1e-3)
+        for part in np.array_split(order, 10)
+        if len(part)
+    ]
+    head.widen.fill_(max(1.0, float(np.quantile(ratios, 0.9))))
