@@ -8,7 +8,7 @@ instead (``off_task_motion.py``).
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal
 
@@ -32,6 +32,9 @@ TRACK_DT = 0.02
 """Sampling step of tracks [s]; 50 Hz, above the bandwidth of hand motion."""
 NEEDED_S = 10.0
 """Desired length of a track after the start of an episode [s]."""
+LOOPED_S = 22.0
+"""Length to which shorter recorded runs are played back and forth [s]: the longest episode of
+an evaluation from any place of the first run."""
 N_OFF_TASK = 24
 """Number of off-task motions, one minute each."""
 NO_TRACKS = Tracks(np.zeros((1, 19)), np.array([[0, 1, -1]]), TRACK_DT, 0.0)
@@ -69,6 +72,9 @@ class HumanMotionConfig:
     """Keyframes per body, place and hand."""
     recorded: tuple[Motion, ...] = ()
     """Runs placed in the cell, for ``recorded``."""
+    loop: bool = True
+    """Whether recorded runs shorter than an episode are played back and forth; otherwise the
+    person rests at the end."""
 
     def __post_init__(self) -> None:
         if self.motion not in MOTIONS:
@@ -110,7 +116,10 @@ def with_human_motion(shared: People, cell: Cell, settings: HumanMotionConfig) -
         rest_share=settings.at_rest,
     )
     if settings.motion == "recorded":
-        tracks, lengths = tracks_of(settings.recorded, cell.floor_z)
+        runs = settings.recorded
+        if settings.loop:
+            runs = tuple(back_and_forth(run, LOOPED_S) for run in runs)
+        tracks, lengths = tracks_of(runs, cell.floor_z)
         return shared._replace(tracks=tracks, track_share=1.0, bodies=lengths)
     if settings.off_task > 0.0:
         tracks, _ = tracks_of(off_task_recordings(cell, settings.seed), cell.floor_z)
@@ -195,6 +204,28 @@ def tracks_of(motions: Sequence[Motion], floor_z: float) -> tuple[Tracks, Vec]:
         NEEDED_S,
     )
     return tracks, np.stack([motion.size.vector(floor_z) for motion in motions])
+
+
+def back_and_forth(run: Motion, seconds: float) -> Motion:
+    """Return a run that is played forward and backward until it lasts ``seconds`` [s]."""
+    length = float(run.times[-1])
+    if length >= seconds or length <= 0.0:
+        return run
+    n = math.ceil(seconds / length)
+    back = slice(-2, None, -1)
+    q, pelvis_z, times = [run.q], [run.pelvis_z], [run.times]
+    for k in range(1, n):
+        part = slice(1, None) if k % 2 == 0 else back
+        elapsed = run.times[1:] if k % 2 == 0 else length - run.times[back]
+        q.append(run.q[part])
+        pelvis_z.append(run.pelvis_z[part])
+        times.append(k * length + elapsed)
+    return replace(
+        run,
+        q=np.concatenate(q),
+        pelvis_z=np.concatenate(pelvis_z),
+        times=np.concatenate(times),
+    )
 
 
 def at_the_table(motion: Motion, cell: Cell) -> Motion:

@@ -1,7 +1,7 @@
-"""Whether what happened in a case study is what it is for: expected, observed, verdict.
+"""Verdict on a run of a case study: expected, observed, as expected or not.
 
-The one rule for the live cell and for whoever evaluates the case studies. It looks at the whole
-run: which goal was chosen first, every change of mind, and how the run ended.
+The live cell and the evaluation of the case studies share this rule. It considers the whole
+run: the first choice, the target switches, and the end.
 """
 
 from collections.abc import Callable
@@ -13,8 +13,7 @@ from app.sim.pick.cases import Case
 Label = Callable[[str], str]
 """Maps a station id to its name for people."""
 End = Literal["reached", "contact", "timeout"]
-"""How a run ended; ``reached``: the tool came over its goal, and touched nothing until the
-robot was through with it."""
+"""End of a run; ``reached``: the object was lifted or set down without contact."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,7 +31,7 @@ class CaseRun:
     """What happened in a case study so far."""
 
     choices: tuple[TargetChoice, ...] = ()
-    """The first choice and every change of mind, in order."""
+    """The first choice and every target switch, in order."""
     end: End | None = None
     """How it ended; None while it runs."""
     end_s: float | None = None
@@ -60,13 +59,13 @@ class Verdict:
     as_expected: bool | None
     """The verdict; None while it is open."""
     choices: tuple[TargetChoice, ...] = ()
-    """In a case study, the first choice and every change of mind."""
+    """In a case study, the first choice and every target switch."""
 
 
 def is_as_expected(case: Case, run: CaseRun) -> bool | None:
     """Return whether a run shows what its case study is for; None while it is open.
 
-    It does where the first choice, the number of changes of mind and the goal it ended at
+    It does where the first choice, the number of target switches and the last goal
     are those of the case, and the run ended without contact and in time.
     """
     if run.end is None:
@@ -94,13 +93,13 @@ def judge(case: Case, run: CaseRun, label: Label) -> Verdict:
 
 
 def _expected(case: Case, label: Label) -> str:
-    parts = [] if case.first is None else [f"goes for {label(case.first)} first"]
+    parts = [] if case.first is None else [f"selects {label(case.first)} first"]
     if case.switches != (0, None):
         parts.append(
             {
-                (0, 0): "does not change its mind",
-                (1, 1): "changes its mind once",
-                (1, None): "changes its mind at least once",
+                (0, 0): "does not switch",
+                (1, 1): "switches once",
+                (1, None): "switches at least once",
             }[case.switches]
         )
     return f"The robot {_joined([*parts, f'ends at {label(case.expected)}'])}."
@@ -108,20 +107,20 @@ def _expected(case: Case, label: Label) -> str:
 
 def _observed(run: CaseRun, label: Label) -> str:
     if not run.choices:
-        return "The robot has chosen nothing yet."
+        return "The robot has selected nothing yet."
     first, *later = run.choices
-    parts = [f"went for {label(first.goal)} first"]
+    parts = [f"selected {label(first.goal)} first"]
     if later:
         turns = [f"to {label(one.goal)} at {one.t_s:.1f} s" for one in later]
-        parts.append(f"changed its mind {_joined(turns)}")
+        parts.append(f"switched {_joined(turns)}")
     elif run.end is not None:
-        parts.append("did not change its mind")
+        parts.append("did not switch")
     if run.end is None:
         return f"The robot {_joined(parts)}."
     ends = {
-        "reached": f"reached {label(run.choices[-1].goal)}",
+        "reached": f"picked {label(run.choices[-1].goal)}",
         "contact": "was in contact",
-        "timeout": "ran out of time",
+        "timeout": "timed out",
     }
     return f"The robot {_joined([*parts, f'{ends[run.end]} at {run.end_s:.1f} s'])}."
 

@@ -73,19 +73,19 @@ CASES = (
         expected="cube4",
         first="cube4",
         switches=(0, 0),
-        palm_offset=(0.02, 0.16, 0.02),
+        palm_offset=(0.02, 0.22, 0.02),
     ),
     Case(
         id="case-2",
         title="Farther, clear of the hand",
         text=(
-            "The right hand stays on cube 1, the nearer goal; the robot should end at cube 0, "
+            "The right hand stays on cube 2, the nearer goal; the robot should end at cube 0, "
             "the farther and free one."
         ),
-        robot_start="cube2",
-        goals=("cube0", "cube1"),
+        robot_start="cube3",
+        goals=("cube0", "cube2"),
         hand="r",
-        human_from="cube1",
+        human_from="cube2",
         human_to=None,
         expected="cube0",
     ),
@@ -108,18 +108,18 @@ CASES = (
         id="case-4",
         title="Single switch, no oscillation",
         text=(
-            "The right arm moves from dock 1 to cube 0, across the path to cube 1; the robot "
-            "should start for cube 1, switch to dock 0 and stay with it."
+            "The right arm moves from cube 0 to cube 4, the nearer goal; the robot should "
+            "start for cube 4, switch to cube 2 and stay with it."
         ),
-        robot_start="cube3",
-        goals=("cube1", "dock0"),
+        robot_start="cube5",
+        goals=("cube2", "cube4"),
         hand="r",
-        human_from="dock1",
-        human_to="cube0",
-        expected="dock0",
-        first="cube1",
+        human_from="cube0",
+        human_to="cube4",
+        expected="cube2",
+        first="cube4",
         switches=(1, 1),
-        pelvis_x=(None, 0.3),
+        delay_s=0.1,
     ),
 )
 

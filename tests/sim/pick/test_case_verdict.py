@@ -1,4 +1,4 @@
-"""A case study is judged by its whole run: first choice, changes of mind, end."""
+"""A case study is judged by its whole run: first choice, target switches, end."""
 
 from collections.abc import Sequence
 
@@ -31,16 +31,16 @@ def run_of(goals: Sequence[str], end: End | None = "reached") -> CaseRun:
         ("case-1", ["cube4"], "timeout", False),
         ("case-1", ["cube4"], None, None),
         ("case-2", ["cube0"], "reached", True),
-        ("case-2", ["cube1", "cube0"], "reached", True),
-        ("case-2", ["cube1"], "reached", False),
+        ("case-2", ["cube2", "cube0"], "reached", True),
+        ("case-2", ["cube2"], "reached", False),
         ("case-3", ["cube0", "cube1"], "reached", True),
         ("case-3", ["cube1", "cube0", "cube1"], "reached", True),
         ("case-3", ["cube1"], "reached", False),
-        ("case-4", ["cube1", "dock0"], "reached", True),
-        ("case-4", ["dock0"], "reached", False),
-        ("case-4", ["cube1", "dock0", "cube1", "dock0"], "reached", False),
-        ("case-4", ["cube1", "dock0", "cube1"], "reached", False),
-        ("case-4", ["cube1", "dock0"], "contact", False),
+        ("case-4", ["cube4", "cube2"], "reached", True),
+        ("case-4", ["cube2"], "reached", False),
+        ("case-4", ["cube4", "cube2", "cube4", "cube2"], "reached", False),
+        ("case-4", ["cube4", "cube2", "cube4"], "reached", False),
+        ("case-4", ["cube4", "cube2"], "contact", False),
         ("case-4", [], "timeout", False),
     ],
 )
@@ -50,26 +50,25 @@ def test_whole_run_is_judged_and_not_its_end_alone(
     assert is_as_expected(find_case(case), run_of(goals, end)) is agrees
 
 
-def test_same_choice_again_is_no_change_of_mind_and_nothing_counts_after_the_end() -> None:
+def test_same_choice_again_is_no_switch_and_nothing_counts_after_the_end() -> None:
     run = run_of(["cube1", "cube1", "dock0"])
-    assert [one.goal for one in run.choices] == ["cube1", "dock0"]
+    assert [one.goal for one in run.choices] == ["cube4", "cube2"]
     assert run.choose(9.0, "cube1") is run
     assert run.finish("contact", 9.0) is run
 
 
 def test_verdict_tells_order_and_times_of_what_was_chosen() -> None:
-    verdict = judge(find_case("case-4"), run_of(["cube1", "dock0"]), str)
+    verdict = judge(find_case("case-4"), run_of(["cube4", "cube2"]), str)
     assert verdict.expected == (
-        "The robot goes for cube1 first, changes its mind once and ends at dock0."
+        "The robot selects cube4 first, switches once and ends at cube2."
     )
     assert verdict.observed == (
-        "The robot went for cube1 first, changed its mind to dock0 at 1.0 s"
-        " and reached dock0 at 2.0 s."
+        "The robot selected cube4 first, switched to cube2 at 1.0 s and picked cube2 at 2.0 s."
     )
     assert verdict.as_expected is True
 
 
-def test_live_case_is_judged_when_it_is_done_and_anew_under_another_policy() -> None:
+def test_live_case_is_judged_when_it_is_done_and_again_under_another_policy() -> None:
     cell = load_cell()
     world = LivePickWorld(cell, StraightPolicy(cell), seed=2)
     assert world.snapshot().verdict is None
@@ -88,7 +87,7 @@ def test_live_case_is_judged_when_it_is_done_and_anew_under_another_policy() -> 
     assert chosen[0] in find_case("case-4").goals
     assert len(chosen) == 1 + now.counters.switches
     reached = now.counters.reached == 1 and now.contact is None
-    assert now.verdict.as_expected is (reached and chosen == ["cube1", "dock0"])
+    assert now.verdict.as_expected is (reached and chosen == ["cube4", "cube2"])
     assert ("not as expected" in now.message) is (reached and not now.verdict.as_expected)
     world.apply(commands.SetPolicy(checkpoint="straight").with_loaded(StraightPolicy(cell)))
     again = world.snapshot()

@@ -114,7 +114,7 @@ def _evaluator(
     rng = np.random.default_rng([seed, len(case.id), ord(case.id[-1])])
     settings = settings_for((2, 2), pick_preset_of(checkpoint))
     motions = tuple(_motion(cell, case, rng, number) for number in range(n))
-    work = HumanMotionConfig(motion="recorded", recorded=motions)
+    work = HumanMotionConfig(motion="recorded", recorded=motions, loop=False)
     settings = replace(settings, work=work, start="uniform")
     evaluator = Evaluator(networks, cell, n, seed, settings)
     world = evaluator.batch.world

@@ -133,7 +133,7 @@ def set_goal(
 ) -> None:
     """Set the target [m], shape (3,), in environment ``e`` and measure the distance to it.
 
-    Another target than the present one is approached anew; the same one changes nothing.
+    Another target than the present one restarts the approach; the same one changes nothing.
     """
     same = True
     for i in range(3):

@@ -37,7 +37,7 @@ def after(
     return next_phase(RULES, phase, closing, GOAL, tool, DT)
 
 
-def test_descent_starts_at_the_target_upright_slow_and_with_nobody_near() -> None:
+def test_descent_starts_at_the_target_upright_slow_and_away_from_people() -> None:
     assert after(APPROACH, 0.02)[0] == DESCEND
     assert after(APPROACH, 0.04)[0] == APPROACH
     assert after(APPROACH, 0.0, aside=0.04)[0] == APPROACH
@@ -75,7 +75,7 @@ def test_distance_left_is_continuous_where_the_phase_changes_as_planned() -> Non
     assert distance_left(RULES, LIFT, GOAL, GOAL) == 0.0
 
 
-def test_base_motion_picks_every_object_where_nobody_is() -> None:
+def test_base_motion_picks_every_object_in_an_empty_cell() -> None:
     """And the grasp takes the 2 s that the cell states."""
     settings = PickSettings(
         time_limit_s=12.0, people=(), grasp=RULES, anywhere_share=0.3, observation="phase"
@@ -90,7 +90,7 @@ def test_base_motion_picks_every_object_where_nobody_is() -> None:
     assert 1.8 < grasping.min() < grasping.max() < 2.4
 
 
-def test_the_same_target_goes_on_with_a_pick_and_another_one_starts_anew() -> None:
+def test_the_same_target_continues_a_pick_and_another_one_restarts_it() -> None:
     settings = PickSettings(people=(), grasp=RULES, observation="phase")
     batch = PickBatch(load_cell(), 2, 5, settings)
     batch.reset()
