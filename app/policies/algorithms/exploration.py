@@ -19,14 +19,11 @@ from numpy.typing import NDArray
 from app.policies.configs.td3 import NoiseExploration
 from app.sim.core.arrays import Vec
 from app.sim.pick.batch import PickBatch
-from app.sim.pick.kernels.grasp import APPROACH
 from app.sim.scenario.kernels.person_observation import BASE_GAIN
 
 HOLD, HOME, NEARBY, ELSEWHERE = range(4)
 STRAIGHT_ON = 0.5
 """Share of the options that move straight to the target, as the base motion does."""
-GRASP_NOISE = 0.2
-"""Scale of the noise while an object is grasped: holding still is part of the task."""
 OPTION_STEPS = (4, 30)
 """Shortest duration of an option and end of the range [control cycles]."""
 
@@ -129,10 +126,7 @@ class OptionExploration:
     def apply(self, act: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return perturbed actions, shape (n_envs, n_act)."""
         noisy = self._noise.apply(act)
-        grasping = self._batch.state.phase != APPROACH
-        noisy[grasping] = act[grasping] + GRASP_NOISE * (noisy - act)[grasping]
         self._start_options()
-        self._left[grasping] = 0
         active = self._left > 0
         if active.any():
             noisy[active] = self._toward_goals()[active]

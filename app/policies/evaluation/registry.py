@@ -7,8 +7,8 @@ from typing import Any
 
 from app.errors import InvalidInput, NotFound
 from app.policies.checkpoints.checkpoint import CHOOSING, REACHING, SORTING, Checkpoint, task_of
+from app.policies.evaluation.pick import calibration, people, tracker
 from app.policies.evaluation.pick import cases as pick_cases
-from app.policies.evaluation.pick import people, tracker
 from app.policies.evaluation.pick import tasks as pick
 from app.policies.evaluation.reach.oracle import run_oracle
 from app.policies.evaluation.reach.people import run_constant, run_people, run_speeds
@@ -31,6 +31,7 @@ PROTOCOLS: Mapping[str, Protocol] = MappingProxyType(
         "pick-choice-hard": pick.run_choice_hard,
         "pick-cases": pick_cases.run_cases,
         "pick-rest": people.run_rest,
+        "risk-calibration": calibration.run_calibration,
         "pick-tracker": tracker.run_tracker,
         "pick-people": people.run_people,
         "pick-yielding": people.run_yielding,
@@ -52,7 +53,7 @@ PROTOCOLS: Mapping[str, Protocol] = MappingProxyType(
 """Protocol by name; each takes a checkpoint, ``episodes``, ``seed`` and ``on_row``."""
 WITH_MOTIONS = frozenset({"pick-mocap"})
 """Protocols that take recorded motion."""
-WITH_OR_WITHOUT_MOTIONS = frozenset({"reach-ssm"})
+WITH_OR_WITHOUT_MOTIONS = frozenset({"reach-ssm", "risk-calibration"})
 """Protocols with optional recorded motion."""
 WITHOUT_CHECKPOINT = frozenset({"safety-ssm"})
 """Protocols without a policy."""

@@ -108,6 +108,21 @@ class ValueNetworks:
                 raise CheckpointMismatch("tensors", f"those of {name}", str(error)) from error
             module.eval()
 
+    def predict(
+        self, obs: NDArray[np.float32], values: NDArray[np.float32]
+    ) -> NDArray[np.float32] | None:
+        """Return probabilities of success and contact and their half widths, shape (n, 4).
+
+        Args:
+            obs: Observations, shape (n, n_obs).
+            values: The critic's values, shape (n,).
+        """
+        if self.outcome is None:
+            return None
+        with torch.inference_mode():
+            found = self.outcome.predict(torch.as_tensor(obs), torch.as_tensor(values))
+            return torch.cat([found.probability[:, :2], found.spread[:, :2]], dim=1).numpy()
+
     def outcomes(
         self, obs: NDArray[np.float32], values: NDArray[np.float32]
     ) -> tuple[OutcomeEstimate, ...] | None:

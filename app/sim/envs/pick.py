@@ -9,12 +9,12 @@ from app.sim.cells.cell import Cell
 from app.sim.envs.single_env import SingleEnv
 from app.sim.envs.tasks import RobotTask, cell_of, frames_per_s, settings_with
 from app.sim.envs.vector_env import BatchVectorEnv
-from app.sim.pick.batch import PickBatch, PickSettings
+from app.sim.pick.batch import WHOLE_PICK, PickBatch, PickSettings
 from app.sim.scene.scene import HumanKind
 
 
 class PickEnv(SingleEnv):
-    """A UR10 reaches for cubes and docks beside people, usually beside one worker.
+    """A UR10 picks cubes, or sets them down at docks, beside people, usually one worker.
 
     | id | people |
     |----|--------|
@@ -28,8 +28,11 @@ class PickEnv(SingleEnv):
     ``gymnasium.make_vec`` returns a :class:`PickVectorEnv`.
 
     ## Task
-    Bring the tool within 0.1 m of the target, its axis within 0.2 rad of the vertical, slower
-    than 0.1 m/s, without touching a person, the table or itself.
+    Bring the tool over the object, descend, hold it there while the gripper closes, and come up
+    again, without touching a person, the table or itself; ``pick/kernels/grasp.py`` has the
+    phases. ``PickSettings(grasp=REACH_ONLY)``, the default of the settings, is the task of the
+    thesis: bring the tool within 0.1 m of the target, its axis within 0.2 rad of the vertical,
+    slower than 0.1 m/s.
 
     ## Action space
     ``Box(-1, 1, (5,), float32)``: desired speeds of the first five joints at the end of the
@@ -47,9 +50,8 @@ class PickEnv(SingleEnv):
     | 4     | wrist 2        | -6.2 .. 6.2               |
 
     ## Observation space
-    ``Box(-100, 100, (N_FEATURES,), float32)``; ``app.sim.pick.kernels.observation.LAYOUT`` has
-    the
-    slice of each group:
+    ``Box(-100, 100, (N_PICK,), float32)``; ``app.sim.pick.kernels.observation.PICK_SIZES`` has
+    the size of each group:
 
     | group | size | content |
     |-------|------|---------|
@@ -62,11 +64,15 @@ class PickEnv(SingleEnv):
     | distance_tilt_clearance_time | 4 | distance, tilt, clearance to the person, time left |
     | nearest_by_group | 16 | distance and direction of the person, four groups of links |
     | look_ahead_still, look_ahead_base | 2 x 3 | clearances in 0.25, 0.5 and 1 s |
-    | goal_clearance | 4 | clearance of the target's configuration, now and then |
+    | goal_clearance | 4 | clearance of the configuration at the object, now and then |
+    | phase, closing, near_clearance | 3 + 2 | phase, closing time, clearance up to 0.1 m |
+    | second_... | 45 | presence, position, arms and clearances of a second person |
 
-    The nearest person is observed; a cylinder as a person standing in it, an empty cell as a
-    person far away. ``PickSettings(observation="state")`` is the raw state (5.8), 51 numbers:
-    q, qd of the robot (2 x 6) and the person (2 x 18) [rad, rad/s, m, m/s], target [m].
+    The person nearest to the robot is observed, and of the others the one nearest to the
+    target; a cylinder as a person standing in it, an empty cell as a person far away.
+    ``PickSettings(observation="features")`` ends before the phase, for a task without grasp:
+    ``N_FEATURES`` numbers. ``PickSettings(observation="state")`` is the raw state (5.8), 51
+    numbers: q, qd of the robot (2 x 6) and the person (2 x 18) [rad, rad/s, m, m/s], target [m].
     ``PickSettings(observation="body")`` adds the body dimensions of the observed person, 12
     numbers: ``app.sim.human.anthropometry.NAMES`` [m], the present height of the pelvis, and
     the girth;
@@ -83,7 +89,7 @@ class PickEnv(SingleEnv):
     drawn again, unless ``settings.start`` is ``uniform``.
 
     ## End
-    Success, collision and timeout (20 s) *terminate*: the time left is observed, so a timeout
+    Success, collision and timeout (12 s) *terminate*: the time left is observed, so a timeout
     is part of the task. Without it (``observation="state"``) a timeout *truncates*.
     ``info["outcome"]`` names the outcome; myopic bounds add *unfeasible*.
 
@@ -114,7 +120,7 @@ class PickEnv(SingleEnv):
         first_env: int = 0,
         render_mode: str | None = None,
     ) -> None:
-        chosen = settings_with(settings or PickSettings(), people)
+        chosen = settings_with(settings or WHOLE_PICK, people)
         self.batch = PickBatch(cell_of(cell), 1, 0, chosen, first_env)
         task = RobotTask(self.batch, sees_time=chosen.observation != "state")
         super().__init__(task, render_mode, frames_per_s(self.batch.cell))
@@ -145,7 +151,7 @@ class PickVectorEnv(BatchVectorEnv):
         max_episode_steps: int | None = None,
         render_mode: str | None = None,
     ) -> None:
-        chosen = settings_with(settings or PickSettings(), people)
+        chosen = settings_with(settings or WHOLE_PICK, people)
         self.batch = PickBatch(cell_of(cell), num_envs, 0, chosen, first_env)
         task = RobotTask(self.batch, sees_time=chosen.observation != "state")
         fps = frames_per_s(self.batch.cell)

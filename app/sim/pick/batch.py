@@ -109,6 +109,10 @@ class PickSettings:
     """Reward coefficients (docs/method.md 3.3)."""
 
 
+WHOLE_PICK = PickSettings(time_limit_s=12.0, grasp=GraspRules(), observation="two-people")
+"""Approach, grasp and lift, observed with the phase and two people."""
+
+
 def _world_of(cell: Cell, settings: PickSettings) -> episode.PickCell:
     if (lack := lacks_stations(cell)) is not None:
         raise InvalidInput("cell", cell.name, f"cannot be used for picking: it {lack}")

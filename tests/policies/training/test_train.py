@@ -12,7 +12,7 @@ from app.sim.cells.cell import load_cell
 from app.sim.human import model as human
 from app.sim.human.anthropometry import percentile_body
 from app.sim.human.person import Person
-from app.sim.pick.kernels.observation import N_FEATURES, N_WITH_BODY
+from app.sim.pick.kernels.observation import N_FEATURES, N_PICK, N_WITH_BODY
 from app.sim.pick.task_policy import Candidate
 from tests.policies.conftest import TINY, Recorder, preset_of
 
@@ -98,7 +98,7 @@ def test_a_policy_checkpoint_does_not_resume(tiny_preset, tiny_run):
 def body_policy():
     """A policy that is reported the size of the person, hardly trained."""
     preset = preset_of(
-        "pick-td3", {**TINY, "learning.total_steps": 1024, "episode.observation": "body"}
+        "pick-reach-td3", {**TINY, "learning.total_steps": 1024, "episode.observation": "body"}
     )
     return Recorder().run(preset).checkpoint
 
@@ -106,7 +106,7 @@ def body_policy():
 def test_a_policy_that_observes_the_size_decides_by_it(body_policy, tiny_run):
     networks = ValueNetworks(body_policy)
     assert networks.n_obs == N_WITH_BODY
-    assert ValueNetworks(tiny_run.result.checkpoint).n_obs == N_FEATURES
+    assert ValueNetworks(tiny_run.result.checkpoint).n_obs == N_PICK
     assert body_policy.manifest["layout"][-1] == ["body", 12]
     obs = np.random.default_rng(4).normal(0.0, 0.3, N_WITH_BODY).astype(np.float32)
     obs = np.stack([obs, obs])

@@ -12,7 +12,7 @@ from app.sim.cells.cell import load_cell
 from app.sim.envs.pick import PickEnv, PickVectorEnv
 from app.sim.human.anthropometry import MEDIAN, percentile_body
 from app.sim.people.human_motion_config import HumanMotionConfig
-from app.sim.pick.batch import PickBatch, PickSettings
+from app.sim.pick.batch import WHOLE_PICK, PickBatch, PickSettings
 from app.sim.pick.kernels.observation import N_FEATURES, N_WITH_BODY
 
 
@@ -38,7 +38,7 @@ def test_environment_passes_stable_baselines3s_check() -> None:
 
 
 def test_episodes_equal_row_zero_of_a_batch_bit_for_bit() -> None:
-    env, batch = PickEnv(), PickBatch(load_cell(), 5, 9, PickSettings())
+    env, batch = PickEnv(), PickBatch(load_cell(), 5, 9, WHOLE_PICK)
     expected, (obs, _) = batch.reset(), env.reset(seed=9)
     for act in actions(900):
         np.testing.assert_array_equal(obs, expected[0])

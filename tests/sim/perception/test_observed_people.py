@@ -17,7 +17,7 @@ from app.sim.perception.observed_people import (
     nearest_index,
     person_from_cylinder,
 )
-from app.sim.pick.batch import PickBatch, PickSettings, observe
+from app.sim.pick.batch import PickBatch, PickSettings, TaskView, observe
 from app.sim.pick.kernels.observation import N_FEATURES
 from app.sim.scene.scene import NO_CYLINDERS, arm_of, people_of
 
@@ -56,11 +56,15 @@ def test_the_person_seen_is_the_one_a_batch_sees() -> None:
         found, _ = observe(
             batch.arm,
             batch.world.people,
-            state.q[e],
-            state.qd[e],
-            (people[index].q, people[index].qd, people[index].size),
+            (state.q[e], state.qd[e]),
+            (
+                people[index].q[None],
+                people[index].qd[None],
+                np.asarray(people[index].size)[None],
+            ),
             state.goal[e][None],
             state.time_left[e],
+            TaskView(),
         )
         assert found.shape == (1, N_FEATURES)
         np.testing.assert_allclose(found[0], obs[e], atol=1e-5)

@@ -10,7 +10,7 @@ from app.sim.collision.fcl_recheck import Recheck, Trajectory
 from app.sim.collision.kernels import contact as contact_kernel
 from app.sim.human import model as human
 from app.sim.pick import batch as pick
-from app.sim.pick.batch import OUTCOMES, PickBatch, PickSettings
+from app.sim.pick.batch import OUTCOMES, PickBatch, PickSettings, TaskView
 from app.sim.pick.kernels import observation as features
 from app.sim.pick.kernels.observation import LAYOUT
 from app.sim.robot.kernels import actions
@@ -150,11 +150,11 @@ def test_single_state_functions_do_what_the_batch_does(cell: Cell) -> None:
             seen, _ = pick.observe(
                 batch.arm,
                 people,
-                piece.q,
-                piece.qd,
-                (state.people.q[e, 0], state.people.qd[e, 0], state.people.size[e, 0]),
+                (piece.q, piece.qd),
+                (state.people.q[e], state.people.qd[e], state.people.size[e]),
                 state.goal[e : e + 1],
                 state.time_left[e],
+                TaskView(),
             )
             np.testing.assert_array_equal(seen[0], result.obs[e])
 
@@ -204,7 +204,8 @@ def test_read_only_integer_and_strided_inputs_compile_nothing_again(cell: Cell) 
     def use() -> None:
         pick.step_robot(arm, q, zero, zero, zero[:5])
         contact(arm, people, JointPath(q, zero, zero, zero), (person[None], person[None]))
-        pick.observe(arm, people, q, zero, (person, np.zeros(18), None), goals[::2], 10)
+        seen = person[None], np.zeros((1, 18)), people.bodies
+        pick.observe(arm, people, (q, zero), seen, goals[::2], 10, TaskView())
         pick.tool_state(arm, q, zero, goals[0])
         human.capsules(person, cell.body, cell.floor_z)
 

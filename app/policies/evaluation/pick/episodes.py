@@ -58,6 +58,9 @@ class View:
     """Candidate pursued so far, shape (n,); undefined at the first step."""
     first: bool
     """Whether this is the first step."""
+    outcomes: NDArray[np.float64] | None
+    """Probabilities of success and contact and the half widths of their intervals, 0 where
+    there are fewer candidates, shape (n, k, 4); None where the checkpoint predicts none."""
     rows: Index
     """Indices of the environments, shape (n,)."""
 
@@ -192,6 +195,7 @@ class Evaluator:
         n_recorded: int = 0,
         seen: Seen = seen_exactly,
         start: Callable[[PickBatch], None] = lambda _batch: None,
+        predicts: bool = False,
     ) -> Episodes:
         """Run all episodes under a rule; record poses of the first ``n_recorded``.
 
@@ -200,6 +204,7 @@ class Evaluator:
             n_recorded: Number of episodes with recorded poses.
             seen: Observation model; a stateful one serves one run only.
             start: Changes the starts of the episodes.
+            predicts: Whether the rule reads the predicted outcomes.
         """
         batch, n = self.batch, self.batch.n_envs
         batch.reset()
@@ -209,7 +214,7 @@ class Evaluator:
         trace = Trace(batch, n_recorded)
         first = True
         while (rows := np.flatnonzero(batch.state.outcome == kernel.RUNNING)).size:
-            actions, view = self._view(rows, chosen[rows], first, seen)
+            actions, view = self._view(rows, chosen[rows], first, seen, predicts)
             choice = rule(view)
             lifting = batch.state.phase[rows] == LIFT  # an object in hand is lifted first
             choice = np.where(lifting, chosen[rows], choice)
@@ -230,7 +235,7 @@ class Evaluator:
         )
 
     def _view(
-        self, rows: Index, chosen: Index, first: bool, seen: Seen
+        self, rows: Index, chosen: Index, first: bool, seen: Seen, predicts: bool
     ) -> tuple[NDArray[np.float32], View]:
         """Return the policy's action for each candidate, (n, k, 5), and the rule's input."""
         batch, state = self.batch, self.batch.state
@@ -261,8 +266,14 @@ class Evaluator:
         distances[owner, place] = np.linalg.norm(away, axis=1)
         clearances = np.full((len(rows), width), -np.inf)
         clearances[owner, place] = goal_clearance(obs)
+        predicted = self._networks.predict(obs, value) if predicts else None
+        outcomes = None
+        if predicted is not None:
+            outcomes = np.zeros((len(rows), width, 4))
+            outcomes[owner, place] = predicted
         view = View(
             values=values,
+            outcomes=outcomes,
             distances=distances,
             clearances=clearances,
             chosen=chosen,

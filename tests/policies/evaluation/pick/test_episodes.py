@@ -39,9 +39,11 @@ def test_the_nearest_of_several_workers_is_seen_in_their_own_size():
         ]
         nearest = int(np.argmin(clearances))
         seen.add(nearest)
-        np.testing.assert_array_equal(sight.q[k], people.q[e, nearest])
-        np.testing.assert_array_equal(sight.qd[k], people.qd[e, nearest])
-        np.testing.assert_array_equal(sight.size[k], people.size[e, nearest])
+        others = [w for w in range(3) if w != nearest]
+        np.testing.assert_array_equal(sight.q[k, 1:], people.q[e, others])
+        np.testing.assert_array_equal(sight.q[k, 0], people.q[e, nearest])
+        np.testing.assert_array_equal(sight.qd[k, 0], people.qd[e, nearest])
+        np.testing.assert_array_equal(sight.size[k, 0], people.size[e, nearest])
     assert seen == {0, 1, 2}
 
 
@@ -49,8 +51,8 @@ def test_an_empty_cell_is_observed_as_a_person_far_away():
     batch = PickBatch(load_cell(), 2, 7, PickSettings(people=()))
     batch.reset()
     sight = seen_exactly(batch, np.arange(2))
-    np.testing.assert_array_equal(sight.q, np.tile(batch.world.people.no_person, (2, 1)))
-    assert sight.q[0, 1] > 3.0 and not sight.qd.any()
+    np.testing.assert_array_equal(sight.q, np.tile(batch.world.people.no_person, (2, 1, 1)))
+    assert sight.q[0, 0, 1] > 3.0 and not sight.qd.any()
 
 
 def test_an_angle_beyond_its_limit_is_observed_as_the_limit():
@@ -61,8 +63,8 @@ def test_an_angle_beyond_its_limit_is_observed_as_the_limit():
     batch = PickBatch(cell, 3, 7, PickSettings(work=work))
     batch.reset()
     sight = seen_exactly(batch, np.arange(3))
-    np.testing.assert_array_equal(sight.q[:, 13], human.Q_MAX[13])
-    others = np.delete(sight.q, 13, axis=1)
+    np.testing.assert_array_equal(sight.q[:, 0, 13], human.Q_MAX[13])
+    others = np.delete(sight.q[:, 0], 13, axis=1)
     np.testing.assert_array_equal(others, np.delete(batch.state.people.q[:, 0], 13, axis=1))
 
 

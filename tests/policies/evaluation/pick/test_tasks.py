@@ -29,6 +29,8 @@ def view(values, chosen, first=False):
     return View(
         values=values,
         distances=np.where(np.isfinite(values), np.arange(values.shape[1])[None] + 1.0, np.inf),
+        outcomes=None,
+        clearances=np.where(np.isfinite(values), 0.1 - 0.01 * values, -np.inf),
         chosen=np.array(chosen),
         first=first,
         rows=np.arange(n),

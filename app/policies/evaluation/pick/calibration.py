@@ -1,0 +1,167 @@
+"""Protocol ``risk-calibration``: whether predicted probabilities of outcomes agree with rates.
+
+Each row has people of one kind. In every episode one random target is pursued; at the start and
+at one random step the probabilities of success and contact are compared with the outcome. The
+expected calibration error (ECE) is the mean absolute difference of probability and rate over
+ten bins of equal counts; ``ece_floor`` is what calibrated predictions show by chance with these
+counts. The Brier score stands beside that of a constant, and AUC tells how well the probability
+ranks episodes.
+
+Source: Guo et al., *On calibration of modern neural networks* (2017); Brier (1950).
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import rankdata
+
+from app.errors import InvalidInput
+from app.policies.checkpoints.checkpoint import Checkpoint
+from app.policies.checkpoints.trained_cell import cell_of
+from app.policies.evaluation.pick.episodes import Evaluator, View, settings_for
+from app.policies.evaluation.pick.tasks import FASTER, PAIR, settings_of
+from app.policies.evaluation.rows import OnRow, ignore_row
+from app.policies.inference.task_selection import ValueNetworks, pick_preset_of
+from app.sim.mocap.importer import Motion
+from app.sim.people.human_motion_config import at_the_table
+from app.sim.pick.batch import PickSettings
+from app.sim.scenario.kernels.episode import COLLISION, SUCCESS
+
+DEFAULT_EPISODES = 2000
+BINS = 10
+"""Bins of equal counts."""
+LATEST_S = 4.0
+"""Latest time at which a prediction is taken [s]."""
+Float = NDArray[np.float64]
+
+
+class _Predictions:
+    """Selection rule of one target that keeps predictions at the start and at a random step."""
+
+    def __init__(self, n: int, dt: float, seed: int) -> None:
+        self._at = np.random.default_rng(seed).integers(1, round(LATEST_S / dt), n)
+        self._step = 0
+        self.rows: list[NDArray[np.int64]] = []
+        self.predictions: list[Float] = []
+        """Probabilities of success and contact, half widths of their intervals, (k, 4)."""
+
+    def __call__(self, view: View) -> NDArray[np.int64]:
+        wanted = (
+            np.ones(len(view.rows), dtype=bool)
+            if view.first
+            else self._at[view.rows] == self._step
+        )
+        self._step += 1
+        if wanted.any() and view.outcomes is not None:
+            self.rows.append(view.rows[wanted])
+            self.predictions.append(view.outcomes[wanted, 0])
+        return np.zeros(len(view.rows), dtype=np.int64)
+
+
+def run_calibration(
+    checkpoint: Checkpoint,
+    *,
+    episodes: int | None,
+    seed: int,
+    motions: Sequence[Motion] = (),
+    on_row: OnRow = ignore_row,
+) -> dict[str, Any]:
+    """Compare predicted probabilities with rates, for each kind of people by itself.
+
+    Args:
+        checkpoint: Policy with outcome probabilities.
+        episodes: Number of episodes of each row, by default 2000.
+        seed: Seed of the episodes.
+        motions: Runs of recorded motion, for a row beside recorded people.
+        on_row: Callback for each finished row.
+
+    Raises:
+        InvalidInput: The checkpoint predicts no outcomes.
+    """
+    networks, cell = ValueNetworks(checkpoint), cell_of(checkpoint.manifest)
+    if networks.outcome is None:
+        raise InvalidInput("checkpoint", checkpoint.sha256[:12], "must predict outcomes")
+    usual = settings_for((1, 1), pick_preset_of(checkpoint))
+    kinds: dict[str, PickSettings] = {
+        "library": usual,
+        "faster": replace(usual, work=replace(usual.work, pace=FASTER)),
+        "two-people": replace(usual, people=PAIR),
+        "off-task": replace(usual, work=replace(usual.work, off_task=1.0)),
+        "stops": replace(usual, work=replace(usual.work, at_rest=1.0)),
+    }
+    if motions:
+        placed = tuple(at_the_table(motion, cell) for motion in motions)
+        work = replace(usual.work, motion="recorded", recorded=placed)
+        kinds["recorded"] = replace(usual, work=work)
+    n, rows, stated = episodes or DEFAULT_EPISODES, [], {}
+    for name, settings in kinds.items():
+        evaluator = Evaluator(networks, cell, n, seed, settings)
+        rule = _Predictions(n, evaluator.batch.arm.dt, seed)
+        run = evaluator.run(rule, predicts=True)
+        kept = np.concatenate(rule.rows)
+        found = np.concatenate(rule.predictions)
+        row: dict[str, Any] = {"name": name, "n": n, "predictions": len(kept)}
+        for k, (what, outcome) in enumerate((("success", SUCCESS), ("contact", COLLISION))):
+            happened = run.outcome[kept] == outcome
+            row[what] = calibration(found[:, k], found[:, 2 + k], happened, seed)
+        rows.append(row)
+        stated[name] = settings_of(evaluator)
+        on_row(len(rows), len(kinds), row)
+    return {"settings": stated, "results": rows}
+
+
+def calibration(
+    probability: Float, spread: Float, happened: NDArray[np.bool_], seed: int
+) -> dict[str, Any]:
+    """Return measures of calibration of predicted probabilities.
+
+    Args:
+        probability: Predictions, shape (n,).
+        spread: Half widths of their 95 % intervals, shape (n,).
+        happened: Whether each event happened, shape (n,).
+        seed: Seed of the chance level.
+    """
+    order = np.argsort(probability, kind="stable")
+    parts = np.array_split(order, BINS)
+    chance = np.random.default_rng(seed).random((200, len(probability))) < probability
+    floor = [_ece(probability, one, parts) for one in chance]
+    rate = happened.mean()
+    bins = [
+        {
+            "probability": float(probability[part].mean()),
+            "rate": float(happened[part].mean()),
+            "n": len(part),
+            "spread": float(spread[part].mean()),
+        }
+        for part in parts
+    ]
+    return {
+        "rate": float(rate),
+        "mean": float(probability.mean()),
+        "ece": _ece(probability, happened, parts),
+        "ece_floor": float(np.mean(floor)),
+        "brier": float(((probability - happened) ** 2).mean()),
+        "brier_constant": float(rate * (1.0 - rate)),
+        "auc": _auc(probability, happened),
+        "bins": bins,
+    }
+
+
+def _ece(
+    probability: Float, happened: NDArray[np.bool_], parts: list[NDArray[np.int64]]
+) -> float:
+    errors = [abs(probability[one].mean() - happened[one].mean()) * len(one) for one in parts]
+    return float(sum(errors) / len(probability))
+
+
+def _auc(probability: Float, happened: NDArray[np.bool_]) -> float | None:
+    """Return the area under the ROC curve; None where all outcomes are equal."""
+    positive = int(happened.sum())
+    negative = len(happened) - positive
+    if not positive or not negative:
+        return None
+    ranks = rankdata(probability)[happened].sum()
+    return float((ranks - positive * (positive + 1) / 2) / (positive * negative))
