@@ -72,7 +72,8 @@ class PickEnv(SingleEnv):
     target; a cylinder as a person standing in it, an empty cell as a person far away.
     ``PickSettings(observation="features")`` ends before the phase, for a task without grasp:
     ``N_FEATURES`` numbers. ``PickSettings(observation="state")`` is the raw state (5.8), 51
-    numbers: q, qd of the robot (2 x 6) and the person (2 x 18) [rad, rad/s, m, m/s], target [m].
+    numbers: q, qd of the robot (2 x 6) and the person (2 x 18) [rad, rad/s, m, m/s], and the
+    target [m].
     ``PickSettings(observation="body")`` adds the body dimensions of the observed person, 12
     numbers: ``app.sim.human.anthropometry.NAMES`` [m], the present height of the pelvis, and
     the girth;
