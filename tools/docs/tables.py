@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from tools.docs import headline
+from tools.docs import headline, pick_tables
 from tools.docs.reach import tables as reach_tables
 from tools.docs.sorting.tables import is_sorting, lines_of
 
@@ -76,10 +76,15 @@ def table(result: Json, others: Sequence[Json] = ()) -> str:
         return _markdown(reach_tables.lines_of([result, *others]), result, others)
     if is_sorting(result):
         return _markdown(lines_of(result), result)
+    if pick_tables.has_own_table(result):
+        return _markdown(pick_tables.lines_of(result), result)
     rows: list[Json] = result["results"]
     columns = list(dict.fromkeys(key for row in rows for key in row if key != "name"))
     head = ["", *(header(key) for key in columns)]
     lines = [[f"`{row['name']}`", *(cell(row.get(key)) for key in columns)] for row in rows]
+    if "paired" in result:
+        pairs = _table(pick_tables.pairs_of(result))
+        return f"{_table([head, *lines])}\n\n{pairs}\n\n{origin(result)}"
     return _markdown([head, *lines], result)
 
 
