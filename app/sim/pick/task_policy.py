@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from app.sim.core.arrays import Vec
 from app.sim.core.out_of_range import OutsideField
+from app.sim.core.policy_identity import PolicyIdentity
 from app.sim.human.person import Person
 from app.sim.pick.kernels.grasp import APPROACH, GraspRules
 from app.sim.robot.actions import ActionSettings
@@ -16,12 +17,12 @@ from app.sim.robot.actions import ActionSettings
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Candidate:
-    """One geometric task the robot may choose: bring the tool to ``position``."""
+    """One geometric task: bring the tool to ``position``, or pick the object below it."""
 
     id: str
-    """Name given by the caller, unique among the candidates."""
+    """Name, unique among the candidates."""
     position: Vec
-    """Point the tcp must reach, robot base frame [m], shape (3,)."""
+    """Target of the tcp in the robot base frame [m], shape (3,)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,32 +48,32 @@ the expected time per success."""
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Decision:
-    """The critic's choice among candidates, with all that explains it (METHOD 3.1)."""
+    """Selection among candidates with its explanation (docs/method.md 3.1)."""
 
     chosen: str
     """Id of the chosen candidate."""
     index: int
-    """Its place in the list of candidates."""
+    """Its index."""
     values: tuple[float, ...]
-    """``Q(s_i, pi(s_i))`` of every candidate, discounted reward."""
+    """Value ``Q(s_i, pi(s_i))`` of each candidate: expected discounted reward."""
     actions: NDArray[np.float32]
-    """The policy's action for every candidate in [-1, 1], shape (n, 5)."""
+    """Action for each candidate in [-1, 1], shape (n, 5)."""
     qd_target: Vec
-    """The joint speeds these actions ask for [rad/s], shape (n, 6)."""
+    """Joint speeds of these actions [rad/s], shape (n, 6)."""
     reachable: tuple[bool, ...]
-    """Whether inverse kinematics finds a vertical-tool posture at each candidate."""
+    """Whether a configuration with vertical tool exists for each candidate."""
     outside: tuple[OutsideField, ...]
-    """Fields of the state outside the joints' limits or the training range."""
+    """Fields of the state outside the joint limits or the training range."""
     outside_candidates: tuple[tuple[OutsideField, ...], ...]
     """The same for each candidate's position."""
     checkpoint: str
-    """SHA-256 of the checkpoint that decided."""
+    """SHA-256 of the checkpoint."""
     elapsed_ms: float
-    """Time the decision took [ms]."""
+    """Duration of the decision [ms]."""
     outcomes: tuple[OutcomeEstimate, ...] | None = None
     """Predicted outcome of each candidate; None where the checkpoint predicts none."""
     seen: int | None = None
-    """Which of the people a policy for one person saw: the nearest; None for nobody."""
+    """Index of the observed person nearest to the robot; None without people."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,32 +90,16 @@ NOT_BEGUN = PickProgress(phase=APPROACH, closing_s=0.0)
 """Progress before the descent."""
 
 
-class TaskPolicy(Protocol):
-    """Chooses among candidates and says how to move; safe to call from several threads."""
+class TaskPolicy(PolicyIdentity, Protocol):
+    """Selects a candidate and moves the robot toward it; safe to call from several threads."""
 
     @property
-    def checkpoint(self) -> str:
-        """SHA-256 of the checkpoint."""
-
-    @property
-    def action(self) -> "ActionSettings":
-        """What its actions mean."""
+    def action(self) -> ActionSettings:
+        """Type of the actions."""
 
     @property
     def grasp(self) -> GraspRules:
         """Phases of a pick; ``depth`` 0 where targets are only reached."""
-
-    @property
-    def title(self) -> str:
-        """Short text for people, such as ``"pick-td3, 2.0 M steps"``."""
-
-    @property
-    def cell(self) -> str:
-        """Name of the work cell it was trained for."""
-
-    @property
-    def cell_sha256(self) -> str:
-        """Identity of that cell's content (``Cell.sha256``)."""
 
     def decide(
         self,

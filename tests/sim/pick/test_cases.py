@@ -1,4 +1,4 @@
-"""The layout of the cell shows what the four case studies are about (METHOD 3.6)."""
+"""The layout of the cell shows what the four case studies are about (docs/method.md 3.6)."""
 
 import pytest
 
