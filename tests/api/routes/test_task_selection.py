@@ -177,3 +177,19 @@ def test_deeply_nested_json_is_refused(client: TestClient) -> None:
 def test_service_goes_on_after_bad_input(client: TestClient, state: dict[str, Any]) -> None:
     refused(client, "{}")
     assert client.post(URL, json=state).status_code == 200
+
+
+def test_progress_objective_and_probabilities_go_over_the_wire(
+    client: TestClient, state: dict[str, Any]
+) -> None:
+    last = state["candidates"][-1]["id"]
+    body = {**state, "previous": last, "phase": "lift", "closing_s": 1.25}
+    assert client.post(URL, json=body).json()["chosen"] == last
+    answer = client.post(URL, json={**state, "objective": "success"}).json()
+    rates = {one["id"]: one["outcome"]["success"] for one in answer["candidates"]}
+    assert answer["chosen"] == max(rates, key=lambda name: rates[name]["mean"])
+    for one in rates.values():
+        assert 0.0 <= one["low"] <= one["mean"] <= one["high"] <= 1.0
+    assert refused(client, {**state, "objective": "luck"})["field"] == "objective"
+    assert refused(client, {**state, "phase": "hover"})["field"] == "phase"
+    assert refused(client, {**state, "closing_s": -1.0})["field"] == "closing_s"

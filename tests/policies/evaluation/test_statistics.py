@@ -1,8 +1,8 @@
-"""Wilson intervals against published values."""
+"""Wilson intervals and McNemar's test against published values."""
 
 import pytest
 
-from app.policies.evaluation.statistics import wilson
+from app.policies.evaluation.statistics import mcnemar, wilson
 
 
 def test_the_interval_matches_a_published_example():
@@ -22,3 +22,12 @@ def test_extreme_rates_stay_between_zero_and_one():
 def test_impossible_counts_are_refused(hits, n):
     with pytest.raises(ValueError, match="0 <= hits <= n"):
         wilson(hits, n)
+
+
+def test_mcnemar_counts_the_pairs_that_differ():
+    """Two-sided binomial test of 9 against 1: p = 22 / 1024."""
+    first, second = [True] * 9 + [False] + [True] * 5, [False] * 9 + [True] + [True] * 5
+    found = mcnemar(first, second)
+    assert (found["only_first"], found["only_second"]) == (9, 1)
+    assert found["p"] == pytest.approx(22 / 1024)
+    assert mcnemar(first, first) == {"only_first": 0, "only_second": 0, "p": 1.0}

@@ -13,7 +13,8 @@ from app.sim.cells.cell import load_cell
 from app.sim.human import model as human
 from app.sim.human.anthropometry import percentile_body
 from app.sim.human.person import Person
-from app.sim.pick.task_policy import Candidate
+from app.sim.pick.kernels.grasp import LIFT
+from app.sim.pick.task_policy import Candidate, PickProgress
 from app.sim.robot.ur10 import Robot
 
 CELL = load_cell("pick-and-place")
@@ -200,3 +201,44 @@ def test_a_checkpoint_of_another_layout_is_refused():
     changed = Checkpoint({**shipped.manifest, "layout": [["q", 6]]}, shipped.tensors)
     with pytest.raises(CheckpointMismatch, match="layout"):
         TaskChooser(changed, CELL)
+
+
+def test_an_object_in_hand_stays_chosen_while_it_is_lifted(chooser):
+    state = HOME, np.zeros(6), [person()], cubes("cube0", "cube3", "dock1")
+    best = chooser.decide(*state).chosen
+    for name in ("cube0", "cube3", "dock1"):
+        lifting = PickProgress(phase=LIFT, closing_s=1.25)
+        assert chooser.decide(*state, previous=name, progress=lifting).chosen == name
+    other = next(name for name in ("cube0", "cube3", "dock1") if name != best)
+    assert chooser.decide(*state, previous=other).chosen in (best, other)
+
+
+def test_probabilities_are_answered_and_may_be_the_objective(chooser):
+    state = HOME, np.zeros(6), [person()], cubes("cube0", "cube3", "dock1")
+    decision = chooser.decide(*state)
+    assert decision.outcomes is not None
+    for one in decision.outcomes:
+        low, high = one.success_interval
+        assert 0.0 <= low <= one.success <= high <= 1.0
+        assert one.success + one.contact <= 1.0 + 1e-6
+        assert 0.0 < one.time_s < 20.0
+    success = [one.success for one in decision.outcomes]
+    times = [one.time_s / max(one.success, 0.01) for one in decision.outcomes]
+    assert chooser.decide(*state, objective="success").index == int(np.argmax(success))
+    assert chooser.decide(*state, objective="time").index == int(np.argmin(times))
+
+
+def test_a_second_person_counts_for_the_candidate_it_stands_at(chooser):
+    palm = np.array(CELL.station("cube5").position)
+    stand = human.rest_posture(palm[0] + 0.1, 1.15, -np.pi / 2)
+    posture = human.reach("r", palm, stand, CELL.body)
+    near = person(-0.2, 1.25)
+    alone = chooser.decide(HOME, np.zeros(6), [near], cubes("cube0", "cube5"))
+    beside = chooser.decide(
+        HOME,
+        np.zeros(6),
+        [near, Person(q=posture.q, qd=np.zeros(18))],
+        cubes("cube0", "cube5"),
+    )
+    assert beside.values[1] < alone.values[1] - 0.25
+    assert beside.chosen == "cube0"

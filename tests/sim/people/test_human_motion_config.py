@@ -14,6 +14,7 @@ from app.sim.people.human_motion_config import (
     TRACK_DT,
     HumanMotionConfig,
     at_the_table,
+    back_and_forth,
     tracks_of,
 )
 from app.sim.people.kernels.people import ABSENT
@@ -296,3 +297,46 @@ def test_an_absent_person_looks_like_an_empty_cell() -> None:
     empty = PickBatch(load_cell(), 4, 5, PickSettings(people=()))
     person = slice(LAYOUT["human_q"].start, LAYOUT["human_qd"].stop)
     np.testing.assert_allclose(away.reset()[:, person], empty.reset()[:, person])
+
+
+def test_people_at_rest_stand_still_for_a_while_in_the_posture_they_have() -> None:
+    work = HumanMotionConfig(at_rest=1.0)
+    batch = PickBatch(load_cell(), 60, 7, PickSettings(time_limit_s=30.0, work=work))
+    batch.reset()
+    still = np.zeros((60, 5), dtype=np.float32)
+    stands, moves = np.zeros(60), np.zeros(60)
+    for _ in range(590):
+        q = batch.state.people.q[:, 0].copy()
+        live = batch.state.outcome == 0
+        batch.step(still, auto_reset=False, features=False)
+        moved = (batch.state.people.q[:, 0] != q).any(axis=1)
+        rests = ~moved & ~batch.state.people.qd[:, 0].any(axis=1)
+        stands, moves = stands + 0.05 * (live & rests), moves + 0.05 * (live & moved)
+    whole = batch.state.outcome != 2
+    assert whole.sum() > 20
+    assert (stands[whole] >= 4.9).all()
+    assert np.median(moves[whole]) > 2.0
+
+
+def test_speeds_of_people_are_drawn_between_the_two_paces() -> None:
+    work = HumanMotionConfig(pace=0.6, pace_max=2.0)
+    batch = PickBatch(load_cell(), 400, 7, PickSettings(work=work))
+    batch.reset()
+    pace = batch.state.people.pace[:, 0]
+    assert 0.6 <= pace.min() < 0.65 and 1.8 < pace.max() <= 2.0
+    assert np.median(pace) == pytest.approx(0.6 + 1.4 / 4, abs=0.06)
+    with pytest.raises(InvalidInput, match="pace_max"):
+        HumanMotionConfig(pace=1.0, pace_max=0.5)
+
+
+def test_a_short_run_is_played_forward_and_backward() -> None:
+    run = run_of(working(40))
+    looped = back_and_forth(run, 5.0)
+    assert looped.times[-1] >= 5.0
+    assert (np.diff(looped.times) > 0.0).all()
+    n = len(run.times)
+    np.testing.assert_array_equal(looped.q[:n], run.q)
+    np.testing.assert_array_equal(looped.q[n : 2 * n - 1], run.q[-2::-1])
+    step = np.abs(np.diff(run.q, axis=0)).max()
+    assert np.abs(np.diff(looped.q, axis=0)).max() <= step + 1e-12
+    assert back_and_forth(run, 0.5 * run.times[-1]) is run

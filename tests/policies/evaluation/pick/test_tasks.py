@@ -100,3 +100,49 @@ def test_the_observation_model_sees_running_rows_only_and_changes_episodes(evalu
     assert not np.array_equal(
         blind.duration_s, evaluator.run(choice_rules.critic(0.2)).duration_s
     )
+
+
+def test_clearest_and_once_follow_clearances_and_the_first_choice():
+    seen = view([[1.0, 2.0, -np.inf]], [0])
+    assert choice_rules.clearest(seen).tolist() == [0]
+    assert choice_rules.critic_once(seen).tolist() == [0]
+    assert choice_rules.critic_once(view([[1.0, 2.0, -np.inf]], [0], first=True)).tolist() == [
+        1
+    ]
+
+
+def test_choices_are_compared_on_the_same_episodes():
+    result = evaluate("pick-choice", pretrained.load("pick"), episodes=30, seed=5)
+    names = [row["name"] for row in result["results"]]
+    assert names[0] == "critic" and names[-1] == "oracle"
+    rate = {row["name"]: row["success"]["mean"] for row in result["results"]}
+    assert [row["name"] for row in result["paired"]] == [f"critic - {one}" for one in names[1:]]
+    for row, name in zip(result["paired"], names[1:], strict=True):
+        assert row["difference"] == pytest.approx(rate["critic"] - rate[name])
+        assert row["only_first"] - row["only_second"] == round(30 * row["difference"])
+    assert rate["oracle"] >= max(rate.values())
+    assert result["settings"]["grasp"]["close_s"] == 1.25
+
+
+def test_cases_count_each_clause_and_keep_the_values_over_time():
+    result = evaluate("pick-cases", pretrained.load("pick"), episodes=6, seed=5)
+    assert [row["name"] for row in result["results"]] == [f"case-{k}" for k in (1, 2, 3, 4)]
+    for row in result["results"]:
+        least = min(row[clause]["mean"] for clause in ("first", "switches", "end", "success"))
+        assert row["as_expected"]["mean"] <= least
+        curve = result["curves"][row["name"]]
+        assert curve["t_s"][0] == 0.0 and curve["running"][0] == 1.0
+        assert {len(goal) for goal in curve["values"].values()} == {len(curve["t_s"])}
+
+
+def test_people_at_rest_do_not_move_and_timeouts_are_told_apart():
+    result = evaluate("pick-rest", pretrained.load("pick"), episodes=10, seed=5)
+    assert [row["name"] for row in result["results"]] == [
+        "library",
+        "off-task",
+        "reaches",
+        "stops",
+    ]
+    for row in result["results"]:
+        assert row["timeout_blocked"]["mean"] <= row["timeout"]["mean"]
+        assert row["timeout_alone"]["mean"] <= row["timeout"]["mean"]

@@ -1,0 +1,59 @@
+"""Measures of calibration against cases with a known answer."""
+
+import numpy as np
+import pytest
+
+from app.errors import InvalidInput
+from app.policies.checkpoints import checkpoint as formats
+from app.policies.checkpoints import pretrained
+from app.policies.evaluation.pick.calibration import calibration
+from app.policies.evaluation.registry import evaluate
+
+
+def drawn(n: int = 20_000):
+    rng = np.random.default_rng(3)
+    probability = rng.uniform(0.05, 0.95, n)
+    return probability, rng.random(n) < probability
+
+
+def test_calibrated_probabilities_have_an_error_at_the_level_of_chance():
+    probability, happened = drawn()
+    found = calibration(probability, np.full(len(probability), 0.02), happened, 1)
+    assert found["ece"] < 2.0 * found["ece_floor"] < 0.02
+    assert found["brier"] < found["brier_constant"] - 0.05
+    assert found["auc"] == pytest.approx(0.8, abs=0.03)
+
+
+def test_shifted_probabilities_have_that_error():
+    probability, happened = drawn()
+    found = calibration(np.clip(probability + 0.1, 0, 1), np.zeros(20_000), happened, 1)
+    assert found["ece"] == pytest.approx(0.1, abs=0.02)
+
+
+def test_ranks_of_a_perfect_and_of_a_useless_prediction():
+    happened = np.arange(100) >= 40
+    perfect = calibration(happened.astype(float), np.zeros(100), happened, 1)
+    assert (perfect["auc"], perfect["brier"], perfect["ece"]) == (1.0, 0.0, 0.0)
+    useless = calibration(np.full(100, 0.6), np.zeros(100), happened, 1)
+    assert useless["auc"] == 0.5
+    assert useless["brier"] == pytest.approx(useless["brier_constant"])
+
+
+def test_a_checkpoint_without_probabilities_is_refused():
+    shipped = pretrained.load("pick")
+    arrays = shipped.arrays()
+    plain = {name: one for name, one in arrays.items() if not name.startswith("outcome.")}
+    assert len(plain) < len(arrays)
+    with pytest.raises(InvalidInput, match="must predict outcomes"):
+        evaluate("risk-calibration", formats.pack(shipped.manifest, plain), episodes=5)
+
+
+def test_every_kind_of_people_has_a_row_with_both_outcomes():
+    result = evaluate("risk-calibration", pretrained.load("pick"), episodes=60, seed=5)
+    names = [row["name"] for row in result["results"]]
+    assert names == ["library", "faster", "two-people", "off-task", "stops"]
+    for row in result["results"]:
+        assert 60 <= row["predictions"] <= 120
+        for what in ("success", "contact"):
+            assert sum(one["n"] for one in row[what]["bins"]) == row["predictions"]
+            assert 0.0 <= row[what]["mean"] <= 1.0

@@ -1,0 +1,48 @@
+"""The outcome head: what it predicts, and that it learns rates from episodes."""
+
+import numpy as np
+import pytest
+import torch
+
+from app.policies.networks.actor_critic import Fade, ResidualActor
+from app.policies.networks.outcome import OutcomeHead
+from app.policies.training.outcome import OutcomeData, fit
+
+
+def test_probabilities_sum_to_one_and_times_are_not_negative() -> None:
+    torch.manual_seed(1)
+    found = OutcomeHead(10).predict(torch.randn(50, 10), torch.randn(50))
+    assert torch.allclose(found.probability.sum(dim=1), torch.ones(50))
+    assert (found.spread >= 0.0).all() and (found.time_s >= 0.0).all()
+
+
+def test_a_fit_recovers_a_rate_that_depends_on_one_input() -> None:
+    rng, n = np.random.default_rng(2), 20_000
+    obs = rng.normal(size=(n, 4)).astype(np.float32)
+    chance = 1.0 / (1.0 + np.exp(-2.0 * obs[:, 1]))
+    label = np.where(rng.random(n) < chance, 0, 1)
+    value = np.zeros(n, dtype=np.float32)
+    time_s = np.full(n, 3.0, dtype=np.float32)
+    data = OutcomeData(obs, value, label, time_s, np.arange(n))
+    head = fit(data, seed=1)
+    probe = torch.zeros(3, 4)
+    probe[:, 1] = torch.tensor([-1.0, 0.0, 1.0])
+    with torch.inference_mode():
+        found = head.predict(probe, torch.zeros(3))
+    expected = 1.0 / (1.0 + np.exp(-2.0 * probe[:, 1].numpy()))
+    np.testing.assert_allclose(found.probability[:, 0].numpy(), expected, atol=0.05)
+    assert found.probability[:, 2].max() < 0.02
+    np.testing.assert_allclose(found.time_s.numpy(), 3.0, atol=0.3)
+
+
+@pytest.mark.parametrize(("distance", "share"), [(0.2, 1.0), (0.9, 0.5), (1.5, 0.0)])
+def test_the_residual_fades_with_the_distance_to_people(distance: float, share: float) -> None:
+    torch.manual_seed(3)
+    free = ResidualActor(16, 12, n_act=2, base=4)
+    torch.manual_seed(3)
+    faded = ResidualActor(16, 12, n_act=2, base=4, fade=Fade(7, 0.8, 1.0))
+    obs = torch.randn(5, 12)
+    obs[:, 4:6] = obs[:, 4:6].clamp(-0.9, 0.9)
+    obs[:, 7] = distance
+    expected = share * free(obs) + (1.0 - share) * obs[:, 4:6]
+    torch.testing.assert_close(faded(obs), expected)
