@@ -2,7 +2,8 @@
 
 from app.live.status_messages import Label
 from app.sim.pick.case_verdict import Verdict
-from app.sim.pick.task_policy import Decision
+from app.sim.pick.kernels.grasp import LIFT
+from app.sim.pick.task_policy import Decision, PickProgress
 
 
 def switched(
@@ -25,6 +26,14 @@ def going(decision: Decision, names: tuple[str, ...], label: Label) -> str:
         return text + "."
     second = max(others, key=lambda i: decision.values[i])
     return f"{text}; next: {label(names[second])} ({decision.values[second]:.2f})."
+
+
+def picking(decision: Decision, progress: PickProgress, label: Label) -> str:
+    """Return the station of the pick and its phase."""
+    if progress.phase == LIFT:
+        return f"At {label(decision.chosen)}: lifting."
+    done = "closing the gripper" if progress.closing_s > 0.0 else "descending"
+    return f"At {label(decision.chosen)}: {done}."
 
 
 def case_ended(verdict: Verdict, goal: str | None, label: Label) -> str:

@@ -220,7 +220,9 @@ class LivePickWorld(BaseWorld[LiveWorkers]):
             return status_messages.touched(self.contact, final=self._case is not None)
         if self.note is not None and status in ("moving", "picking", "no policy"):
             return self.note
-        if status in ("moving", "picking") and self.decision is not None:
+        if status == "picking" and self.decision is not None:
+            return explanation.picking(self.decision, self.progress, self._label)
+        if status == "moving" and self.decision is not None:
             names = tuple(candidate.id for candidate in self.offered)
             return explanation.going(self.decision, names, self._label)
         if status == "case done" and self._case is not None:
