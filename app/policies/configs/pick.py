@@ -125,7 +125,7 @@ class PickPreset(TrainingConfig):
     name: str = "pick-td3"
     cell: CellName = "pick-and-place"
     learning: TD3Learning = TD3Learning(
-        total_steps=4_608_000,
+        total_steps=9_216_000,
         batch_size=512,
         lr_end=3e-5,
         gamma=0.993,
