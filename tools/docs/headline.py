@@ -12,6 +12,7 @@ Json = dict[str, Any]
 FILES = (
     "pick-single",
     "pick-choice",
+    "pick-choice-hard",
     "reach-targets",
     "reach-ssm",
     "sorting-grid-e1",
@@ -19,7 +20,11 @@ FILES = (
 )
 DIRECTED = "-directed"
 """Suffix of the rows of ``reach-ssm`` under the layer with measured velocities."""
-THESIS = {"pick-single": "75 %", "pick-choice": "about 90 %", "reach-targets": "91.76 %"}
+THESIS = {
+    "pick-single": "75 % (arrival)",
+    "pick-choice": "about 90 % (arrival)",
+    "reach-targets": "91.76 %",
+}
 """Success rates that the thesis reports."""
 
 
@@ -47,24 +52,32 @@ def lines(results: Path) -> list[list[str]] | None:
             return None
         rows = json.loads(path.read_text(encoding="utf-8"))["results"]
         found[name] = {row["name"]: row for row in rows}
-    pick, choice, reach, ssm, sorting, safety = (found[name] for name in FILES)
+    pick, choice, hard, reach, ssm, sorting, safety = (found[name] for name in FILES)
     rollout, planner = ssm[f"policy-rollout{DIRECTED}"], ssm[f"rrtstar-once{DIRECTED}"]
     return [
         ["task", "measure", "n", "Tandem", "baseline"],
         [
             "[pick](docs/results/pick.md), one target",
-            "success",
+            "object lifted",
             f"{pick['policy']['n']:,}",
             percent(pick["policy"]["success"]),
             f"thesis: {THESIS['pick-single']}",
         ],
         [
             "pick, selection among 2 or 3 targets",
-            "success",
+            "object lifted",
             f"{choice['critic']['n']:,}",
             percent(choice["critic"]["success"]),
             f"nearest: {share(choice['nearest']['success'])}, "
             f"oracle: {share(choice['oracle']['success'])}, thesis: {THESIS['pick-choice']}",
+        ],
+        [
+            "the same beside two people",
+            "object lifted",
+            f"{hard['two-people critic']['n']:,}",
+            percent(hard["two-people critic"]["success"]),
+            f"nearest: {share(hard['two-people nearest']['success'])}, "
+            f"oracle: {share(hard['two-people oracle']['success'])}",
         ],
         [
             "[reach](docs/results/reach.md), 54 targets",

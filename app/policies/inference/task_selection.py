@@ -42,6 +42,7 @@ from app.sim.perception.observed_people import (
 )
 from app.sim.pick.batch import TaskView, observe, step_robot
 from app.sim.pick.kernels.grasp import LIFT, GraspRules
+from app.sim.pick.kernels.observation import OBSERVED
 from app.sim.pick.task_policy import (
     NOT_BEGUN,
     Candidate,
@@ -56,7 +57,7 @@ from app.sim.robot.kernels.arm import CONTROLLED
 from app.sim.robot.measured_state import StateLimits
 from app.sim.scene.scene import FAR_AWAY, arm_of, people_of
 
-HYSTERESIS = 0.2
+HYSTERESIS = 0.5
 """Margin of the value by which another candidate must be better."""
 LEAST_SUCCESS = 0.01
 """Least probability of success that an expected time is divided by."""
@@ -300,14 +301,16 @@ class TaskChooser(TrainedPolicy):
         return speeds
 
     def _observed(self, q: Vec, people: Sequence[Person]) -> list[tuple[int | None, Person]]:
-        """Return number and state of the observed people, the nearest to the robot first."""
+        """Return index and state of the observed people, the nearest to the robot first.
+
+        At least two; a missing one is a person far away.
+        """
         known = checked_people(people)
         near = [i for i, person in enumerate(known) if not is_far(person)]
         first = nearest_index(self._arm, self._people, q, [known[i] for i in near])
-        if first is None:
-            return [(None, _FAR_PERSON)]
-        ordered = [near.pop(first), *near]
-        return [(i, as_known(known[i])) for i in ordered]
+        ordered = [] if first is None else [near.pop(first), *near]
+        found: list[tuple[int | None, Person]] = [(i, as_known(known[i])) for i in ordered]
+        return found + [(None, _FAR_PERSON)] * max(0, OBSERVED - len(found))
 
 
 def _arrays(observed: list[tuple[int | None, Person]], body: Vec) -> tuple[Vec, Vec, Vec]:

@@ -31,6 +31,7 @@ from app.sim.pick.kernels.observation import (
     DISTANCE_SCALE,
     LAYOUT,
     N_PICK,
+    OBSERVED,
     PICK_SIZES,
     observe_batch,
 )
@@ -70,7 +71,10 @@ Rule = Callable[[View], Index]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sight:
-    """The observed people of each running environment, the nearest to the robot first."""
+    """Observed people of each running environment, the nearest to the robot first.
+
+    At least two; a missing one is a person far away.
+    """
 
     q: NDArray[np.float64]
     """Joint positions [m, rad], shape (n, P, 18)."""
@@ -92,7 +96,7 @@ def seen_exactly(batch: PickBatch, rows: Index) -> Sight:
     """
     shared, state, n = batch.world.people, batch.state, len(rows)
     n_workers, n_cylinders = state.people.q.shape[1], state.people.cylinders.shape[1]
-    n_people = max(1, n_workers + n_cylinders)
+    n_people = max(OBSERVED, n_workers + n_cylinders)
     seen = Sight(
         q=np.empty((n, n_people, 18)),
         qd=np.empty((n, n_people, 18)),

@@ -111,6 +111,8 @@ N_PICK = sum(size for _, size in PICK_SIZES)
 )
 CLOSE_SCALE = 0.1
 """Unit of the clearance that decides on a grasp [m]; it is clipped at one unit."""
+OBSERVED = 2
+"""People in an observation; a missing one is given as a person far away."""
 MAX_PEOPLE = 4
 """Most people in a cell."""
 PRESENT_WITHIN = 4.0

@@ -51,7 +51,7 @@ def test_an_empty_cell_is_observed_as_a_person_far_away():
     batch = PickBatch(load_cell(), 2, 7, PickSettings(people=()))
     batch.reset()
     sight = seen_exactly(batch, np.arange(2))
-    np.testing.assert_array_equal(sight.q, np.tile(batch.world.people.no_person, (2, 1, 1)))
+    np.testing.assert_array_equal(sight.q, np.tile(batch.world.people.no_person, (2, 2, 1)))
     assert sight.q[0, 0, 1] > 3.0 and not sight.qd.any()
 
 

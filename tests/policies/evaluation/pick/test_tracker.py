@@ -84,7 +84,7 @@ def test_a_tracker_without_frames_shows_no_person(evaluator):
     evaluator.batch.reset()
     seen = look(evaluator.batch, np.arange(N))
     no_person = evaluator.batch.world.people.no_person
-    np.testing.assert_array_equal(seen.q, np.tile(no_person, (N, 1, 1)))
+    np.testing.assert_array_equal(seen.q, np.tile(no_person, (N, 2, 1)))
     assert not seen.qd.any()
 
 
