@@ -135,7 +135,7 @@ def test_cases_count_each_clause_and_keep_the_values_over_time():
         assert {len(goal) for goal in curve["values"].values()} == {len(curve["t_s"])}
 
 
-def test_people_at_rest_do_not_move_and_timeouts_are_told_apart():
+def test_people_at_rest_do_not_move_and_timeouts_have_their_causes():
     result = evaluate("pick-rest", pretrained.load("pick"), episodes=10, seed=5)
     assert [row["name"] for row in result["results"]] == [
         "library",
