@@ -42,7 +42,7 @@ from app.sim.perception.observed_people import (
 )
 from app.sim.pick.batch import TaskView, observe, step_robot
 from app.sim.pick.kernels.grasp import LIFT, GraspRules
-from app.sim.pick.kernels.observation import OBSERVED
+from app.sim.pick.kernels.observation import OBSERVED, PRESENT_WITHIN
 from app.sim.pick.task_policy import (
     NOT_BEGUN,
     Candidate,
@@ -309,8 +309,14 @@ class TaskChooser(TrainedPolicy):
         near = [i for i, person in enumerate(known) if not is_far(person)]
         first = nearest_index(self._arm, self._people, q, [known[i] for i in near])
         ordered = [] if first is None else [near.pop(first), *near]
+        ordered = ordered[:1] + [i for i in ordered[1:] if _counts_as_second(known[i])]
         found: list[tuple[int | None, Person]] = [(i, as_known(known[i])) for i in ordered]
         return found + [(None, _FAR_PERSON)] * max(0, OBSERVED - len(found))
+
+
+def _counts_as_second(person: Person) -> bool:
+    """Return whether a person is near enough to be observed as a second person."""
+    return bool(np.hypot(person.q[0], person.q[1]) <= PRESENT_WITHIN)
 
 
 def _arrays(observed: list[tuple[int | None, Person]], body: Vec) -> tuple[Vec, Vec, Vec]:

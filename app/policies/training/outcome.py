@@ -15,10 +15,11 @@ from torch.nn import functional
 from app.policies.networks.actor_critic import Critics, ResidualActor
 from app.policies.networks.outcome import MEMBERS, OUTCOMES, OutcomeHead
 from app.sim.pick.batch import PickBatch
-from app.sim.scenario.kernels.episode import COLLISION, SUCCESS, TIMEOUT
+from app.sim.scenario.kernels.episode import COLLISION, SUCCESS, TIMEOUT, UNFEASIBLE
 
-LABELS = {SUCCESS: 0, COLLISION: 1, TIMEOUT: 2}
-"""Place among the probabilities of each outcome of an episode."""
+LABELS = {SUCCESS: 0, COLLISION: 1, TIMEOUT: 2, UNFEASIBLE: 2}
+"""Place among the probabilities of each outcome of an episode; unfeasible ends count as
+timeouts."""
 KEEP = 0.05
 """Share of the steps that are kept; first steps are always kept."""
 EPOCHS, BATCH, RATE, DECAY = 12, 1024, 1e-3, 1e-3

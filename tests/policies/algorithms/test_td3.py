@@ -14,7 +14,7 @@ from app.policies.training import reach as reach_training
 from app.policies.training.run import TrainingRun
 from app.sim.cells.cell import load_cell
 from app.sim.pick.batch import PickBatch, PickSettings
-from app.sim.pick.kernels.observation import LAYOUT, N_FEATURES
+from app.sim.pick.kernels.observation import LAYOUT, N_FEATURES, N_PICK
 from tests.policies.conftest import preset_of
 
 
@@ -58,7 +58,7 @@ def test_the_actor_stays_frozen_while_the_critics_learn(model, tiny_preset):
 
 
 def test_stable_baselines_trains_the_same_modules_that_decide(model):
-    obs = torch.randn(4, N_FEATURES)
+    obs = torch.randn(4, N_PICK)
     act = model.actor(obs)
     assert torch.equal(act, model.actor.mu(obs))
     assert torch.equal(model.critic(obs, act)[0], critics_of(model.critic)(obs, act)[0])
@@ -75,7 +75,7 @@ def test_greedy_rows_explore_nothing_and_noise_grows_with_the_row(model):
 
 def test_critics_learn_the_value_of_an_episode_that_ends_at_once(model):
     """With done = 1 everywhere the value is the reward, whatever the networks say."""
-    obs = np.random.default_rng(0).normal(size=(16, N_FEATURES)).astype(np.float32)
+    obs = np.random.default_rng(0).normal(size=(16, N_PICK)).astype(np.float32)
     act, reward = np.zeros((16, 5), dtype=np.float32), np.full(16, 2.5, dtype=np.float32)
     for _ in range(40):
         model.replay_buffer.add(obs, obs, act, reward, np.ones(16), [{} for _ in range(16)])

@@ -31,7 +31,7 @@ def test_a_fit_recovers_a_rate_that_depends_on_one_input() -> None:
         found = head.predict(probe, torch.zeros(3))
     expected = 1.0 / (1.0 + np.exp(-2.0 * probe[:, 1].numpy()))
     np.testing.assert_allclose(found.probability[:, 0].numpy(), expected, atol=0.05)
-    assert found.probability[:, 2].max() < 0.02
+    assert found.probability[:, 2].max() < 0.05
     np.testing.assert_allclose(found.time_s.numpy(), 3.0, atol=0.3)
 
 

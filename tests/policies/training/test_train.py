@@ -128,9 +128,9 @@ def test_a_policy_that_observes_the_size_decides_beside_small_and_large_people(b
     assert np.isfinite(values).all() and values[0] != values[1]
 
 
-@pytest.mark.parametrize("kind", ["features", "body"])
+@pytest.mark.parametrize("kind", ["features", "phase"])
 def test_a_checkpoint_of_another_layout_is_refused(body_policy, tiny_run, kind):
-    policy = {"features": body_policy, "body": tiny_run.result.checkpoint}[kind]
+    policy = {"features": body_policy, "phase": tiny_run.result.checkpoint}[kind]
     other = {**policy.manifest, "layout": LAYOUTS[kind]}
     with pytest.raises(CheckpointMismatch, match="layout"):
         ValueNetworks(dataclasses.replace(policy, manifest=other))

@@ -102,7 +102,8 @@ def test_every_track_is_played_with_the_body_that_was_recorded(cell: Cell) -> No
 
 def test_past_the_end_of_a_track_the_person_stands_still(cell: Cell) -> None:
     run = at_the_table(run_of(working(60)), cell)
-    batch = batch_of(cell, HumanMotionConfig(motion="recorded", recorded=(run,)))
+    work = HumanMotionConfig(motion="recorded", recorded=(run,), loop=False)
+    batch = batch_of(cell, work)
     assert (batch.state.people.clock == 0.0).all()
     stand(batch, 40)
     running = batch.state.outcome == OUTCOMES.index("running")
@@ -143,7 +144,7 @@ def test_a_hand_that_sinks_past_the_tool_within_one_period_is_a_contact(cell: Ce
     height = np.full(60, -0.3)
     height[0] = 0.45
     run = run_of(np.tile(q, (60, 1)), pelvis_z=height)
-    work = HumanMotionConfig(motion="recorded", recorded=(run,))
+    work = HumanMotionConfig(motion="recorded", recorded=(run,), loop=False)
     batch = batch_of(cell, work, start="uniform")
     at_home = (batch.state.q == home).all(axis=1)
     np.testing.assert_allclose(batch.state.clear[at_home, 0], gaps[0])

@@ -60,7 +60,11 @@ def test_the_person_seen_is_the_one_a_batch_sees() -> None:
             (
                 people[index].q[None],
                 people[index].qd[None],
-                np.asarray(people[index].size)[None],
+                (
+                    batch.world.people.bodies
+                    if people[index].size is None
+                    else people[index].size[None]
+                ),
             ),
             state.goal[e][None],
             state.time_left[e],

@@ -33,6 +33,7 @@ from app.sim.pick.kernels.observation import (
     N_PICK,
     OBSERVED,
     PICK_SIZES,
+    PRESENT_WITHIN,
     observe_batch,
 )
 from app.sim.scenario.kernels import episode as kernel
@@ -104,6 +105,8 @@ def seen_exactly(batch: PickBatch, rows: Index) -> Sight:
     )
     geometry = new_people_geometry(shared, n_workers, n_cylinders)
     see_rows(shared, state.people, state.robot, rows, geometry, seen.q, seen.qd, seen.size)
+    far = np.hypot(seen.q[:, 1:, 0], seen.q[:, 1:, 1]) > PRESENT_WITHIN
+    seen.q[:, 1:][far], seen.qd[:, 1:][far] = shared.no_person, 0.0
     np.clip(seen.q[..., 3:], shared.limits[0, 3:], shared.limits[1, 3:], out=seen.q[..., 3:])
     return seen
 

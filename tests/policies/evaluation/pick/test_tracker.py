@@ -91,8 +91,8 @@ def test_a_tracker_without_frames_shows_no_person(evaluator):
 def test_only_running_rows_are_looked_at(evaluator):
     look = KeypointObserver(ROWS["33ms"], 1)
     evaluator.batch.reset()
-    assert look(evaluator.batch, np.arange(N)).q.shape == (N, 18)
-    assert look(evaluator.batch, np.array([1, 4])).q.shape == (2, 18)
+    assert look(evaluator.batch, np.arange(N)).q.shape == (N, 2, 18)
+    assert look(evaluator.batch, np.array([1, 4])).q.shape == (2, 2, 18)
     assert len(look.wrist_errors) == 2 * (N + 2)
 
 
