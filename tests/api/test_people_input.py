@@ -283,6 +283,7 @@ def test_of_more_than_four_people_the_nearest_count_and_the_rest_is_named(
     crowd: list[Any] = [{"x": 0.5 * k, "y": 5.0, "vx": 0, "vy": 0, "r": 0.3} for k in range(7)]
     farther = {**WHOLE, "q": [0.0, 4.0, *WHOLE["q"][2:]]}
     people = [*crowd[:4], farther, *crowd[4:], WHOLE, {"keypoints": POINTS}]
+    state = {**state, "robot": {"q": CELL.robot.home_q, "qd": [0.0] * 6}}
     answer = asked(client, state, *people)
     near = asked(client, state, crowd[0], farther, WHOLE, {"keypoints": POINTS})
     assert values(answer) == values(near)

@@ -80,7 +80,7 @@ def test_critics_learn_the_value_of_an_episode_that_ends_at_once(model):
     for _ in range(40):
         model.replay_buffer.add(obs, obs, act, reward, np.ones(16), [{} for _ in range(16)])
     model._setup_learn(10_000)
-    for _ in range(300):
+    for _ in range(900):
         model.train(1, 64)
     q1, _ = model.critic(torch.as_tensor(obs), torch.as_tensor(act))
     assert q1.detach().numpy() == pytest.approx(2.5, abs=0.2)

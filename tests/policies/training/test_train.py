@@ -46,7 +46,7 @@ def test_a_training_counts_episodes_that_end_unfeasible():
         "learning.total_steps": 12 * TINY["learning.total_steps"],
     }
     recorder = Recorder()
-    recorder.run(preset_of("pick-td3", overrides))
+    recorder.run(preset_of("pick-reach-td3", overrides))
     ended = [point for point in recorder.progress if point.episodes]
     shares = [point.success + point.collision + point.timeout for point in ended]
     assert min(shares) < 1.0 and max(shares) <= 1.0 + 1e-12

@@ -53,6 +53,7 @@ def test_the_person_seen_is_the_one_a_batch_sees() -> None:
         index = nearest_index(batch.arm, batch.world.people, state.q[e], people)
         assert index is not None
         seen.add(index)
+        size = people[index].size
         found, _ = observe(
             batch.arm,
             batch.world.people,
@@ -60,11 +61,7 @@ def test_the_person_seen_is_the_one_a_batch_sees() -> None:
             (
                 people[index].q[None],
                 people[index].qd[None],
-                (
-                    batch.world.people.bodies
-                    if people[index].size is None
-                    else people[index].size[None]
-                ),
+                batch.world.people.bodies if size is None else size[None],
             ),
             state.goal[e][None],
             state.time_left[e],

@@ -120,8 +120,9 @@ class KeypointObserver:
         seen = Sight(
             q=np.tile(batch.world.people.no_person, (len(rows), OBSERVED, 1)),
             qd=np.zeros((len(rows), OBSERVED, 18)),
-            size=np.repeat(people.size[rows, :1], OBSERVED, axis=1),
+            size=np.tile(batch.world.people.bodies[0], (len(rows), OBSERVED, 1)),
         )
+        seen.size[:, 0] = people.size[rows, 0]
         for k, e in enumerate(rows.tolist()):
             motion = between(t0[e], q0[e], qd0[e], float(t[e]), people.q[e, 0], people.qd[e, 0])
             seen.q[k, 0], seen.qd[k, 0] = self._look(batch, e, float(t[e]), motion)

@@ -38,7 +38,7 @@ def misses(evaluator, row, seed=1):
 
     def compared(batch, rows):
         seen, true = look(batch, rows), seen_exactly(batch, rows)
-        found.extend(np.abs(seen.q - true.q).max(axis=1))
+        found.extend(np.abs(seen.q - true.q).max(axis=(1, 2)))
         np.testing.assert_array_equal(seen.size, true.size)
         return seen
 
