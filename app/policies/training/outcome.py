@@ -128,6 +128,9 @@ def _fit_member(
     rows = np.repeat(np.arange(len(weight)), weight)
     inputs = head.standardised(torch.as_tensor(data.obs), torch.as_tensor(data.value))
     label, time_s = torch.as_tensor(data.label), torch.as_tensor(data.time_s)
+    if (label == 0).any():
+        with torch.no_grad():
+            network[-1].bias[-1] = time_s[label == 0].mean()  # type: ignore[index]
     schedule = torch.optim.lr_scheduler.OneCycleLR(
         optimizer, RATE, total_steps=EPOCHS * max(1, len(rows) // BATCH) + 1
     )
