@@ -26,7 +26,7 @@ from app.policies.checkpoints.model_state import under
 from app.policies.configs.fields import read_config
 from app.policies.configs.pick import PickPreset
 from app.policies.inference.trained_policy import TrainedPolicy
-from app.policies.networks.outcome import OutcomeHead
+from app.policies.networks.outcome import OutcomeHead, OutcomePrediction
 from app.policies.networks.pick import LAYOUTS, actor_of, critics_for
 from app.sim.cells.cell import Cell, require_cell
 from app.sim.core.arrays import Vec
@@ -111,22 +111,7 @@ class ValueNetworks:
 
     def predict(
         self, obs: NDArray[np.float32], values: NDArray[np.float32]
-    ) -> NDArray[np.float32] | None:
-        """Return probabilities of success and contact and their half widths, shape (n, 4).
-
-        Args:
-            obs: Observations, shape (n, n_obs).
-            values: The critic's values, shape (n,).
-        """
-        if self.outcome is None:
-            return None
-        with torch.inference_mode():
-            found = self.outcome.predict(torch.as_tensor(obs), torch.as_tensor(values))
-            return torch.cat([found.probability[:, :2], found.spread[:, :2]], dim=1).numpy()
-
-    def outcomes(
-        self, obs: NDArray[np.float32], values: NDArray[np.float32]
-    ) -> tuple[OutcomeEstimate, ...] | None:
+    ) -> OutcomePrediction | None:
         """Return the predicted outcomes of observations; None without such a network.
 
         Args:
@@ -136,21 +121,7 @@ class ValueNetworks:
         if self.outcome is None:
             return None
         with torch.inference_mode():
-            found = self.outcome.predict(torch.as_tensor(obs), torch.as_tensor(values))
-        low = (found.probability - found.spread).clamp(0.0, 1.0).tolist()
-        high = (found.probability + found.spread).clamp(0.0, 1.0).tolist()
-        return tuple(
-            OutcomeEstimate(
-                success=mean[0],
-                success_interval=(least[0], most[0]),
-                contact=mean[1],
-                contact_interval=(least[1], most[1]),
-                time_s=time_s,
-            )
-            for mean, least, most, time_s in zip(
-                found.probability.tolist(), low, high, found.time_s.tolist(), strict=True
-            )
-        )
+            return self.outcome.predict(torch.as_tensor(obs), torch.as_tensor(values))
 
     def act_and_value(
         self, obs: NDArray[np.float32]
@@ -160,6 +131,24 @@ class ValueNetworks:
             rows = torch.as_tensor(obs)
             act = self.actor(rows)
             return act.numpy(), self.critic.least(rows, act).numpy()
+
+
+def estimates(predicted: OutcomePrediction) -> tuple[OutcomeEstimate, ...]:
+    """Return predicted outcomes one by one, with the intervals of their probabilities."""
+    low = (predicted.probability - predicted.spread).clamp(0.0, 1.0).tolist()
+    high = (predicted.probability + predicted.spread).clamp(0.0, 1.0).tolist()
+    return tuple(
+        OutcomeEstimate(
+            success=mean[0],
+            success_interval=(least[0], most[0]),
+            contact=mean[1],
+            contact_interval=(least[1], most[1]),
+            time_s=time_s,
+        )
+        for mean, least, most, time_s in zip(
+            predicted.probability.tolist(), low, high, predicted.time_s.tolist(), strict=True
+        )
+    )
 
 
 def select(
@@ -249,7 +238,8 @@ class TaskChooser(TrainedPolicy):
             self._arm, self._people, (q, qd), people_arrays, goals, time_left_s, task
         )
         act, values = self._networks.act_and_value(obs)
-        outcomes = self._networks.outcomes(obs, values)
+        predicted = self._networks.predict(obs, values)
+        outcomes = None if predicted is None else estimates(predicted)
         index = self._choose(objective, values, outcomes, last)
         if last is not None and progress.phase == LIFT:
             index = last

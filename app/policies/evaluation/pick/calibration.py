@@ -22,11 +22,11 @@ from app.errors import InvalidInput
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.evaluation.pick.episodes import Evaluator, View, settings_for
+from app.policies.evaluation.pick.people import beside_recordings
 from app.policies.evaluation.pick.tasks import FASTER, PAIR, settings_of
 from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.inference.task_selection import ValueNetworks, pick_preset_of
 from app.sim.mocap.importer import Motion
-from app.sim.people.human_motion_config import at_the_table
 from app.sim.pick.batch import PickSettings
 from app.sim.scenario.kernels.episode import COLLISION, SUCCESS
 
@@ -79,7 +79,7 @@ def run_calibration(
         on_row: Callback for each finished row.
 
     Raises:
-        InvalidInput: The checkpoint predicts no outcomes.
+        InvalidInput: The checkpoint predicts no outcomes, or there is too much recorded motion.
     """
     networks, cell = ValueNetworks(checkpoint), cell_of(checkpoint.manifest)
     if networks.outcome is None:
@@ -93,9 +93,7 @@ def run_calibration(
         "stops": replace(usual, work=replace(usual.work, at_rest=1.0)),
     }
     if motions:
-        placed = tuple(at_the_table(motion, cell) for motion in motions)
-        work = replace(usual.work, motion="recorded", recorded=placed)
-        kinds["recorded"] = replace(usual, work=work)
+        kinds["recorded"] = beside_recordings(usual, motions, cell)
     n, rows, stated = episodes or DEFAULT_EPISODES, [], {}
     for name, settings in kinds.items():
         evaluator = Evaluator(networks, cell, n, seed, settings)

@@ -277,7 +277,8 @@ class Evaluator:
         outcomes = None
         if predicted is not None:
             outcomes = np.zeros((len(rows), width, 4))
-            outcomes[owner, place] = predicted
+            both = np.hstack([predicted.probability[:, :2], predicted.spread[:, :2]])
+            outcomes[owner, place] = both
         view = View(
             values=values,
             outcomes=outcomes,

@@ -30,6 +30,7 @@ from app.policies.evaluation.pick.tasks import settings_of
 from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.evaluation.statistics import wilson
 from app.policies.inference.task_selection import HYSTERESIS, ValueNetworks, pick_preset_of
+from app.sim.cells.cell import Cell
 from app.sim.collision.contact import clearance
 from app.sim.human.anthropometry import percentile_body
 from app.sim.mocap.importer import Motion
@@ -205,6 +206,22 @@ def run_yielding(
     )
 
 
+def beside_recordings(
+    settings: PickSettings, motions: Sequence[Motion], cell: Cell
+) -> PickSettings:
+    """Return settings with recorded people, placed at the table of a cell.
+
+    Raises:
+        InvalidInput: There is more than ``MAX_RECORDED_S`` of motion.
+    """
+    seconds = sum(float(motion.times[-1]) for motion in motions)
+    if seconds > MAX_RECORDED_S:
+        rule = f"s of recorded motion are too much: at most {MAX_RECORDED_S} s per evaluation"
+        raise InvalidInput("motions", round(seconds), rule)
+    placed = tuple(at_the_table(motion, cell) for motion in motions)
+    return replace(settings, work=replace(settings.work, motion="recorded", recorded=placed))
+
+
 def run_mocap(
     checkpoint: Checkpoint,
     *,
@@ -225,24 +242,17 @@ def run_mocap(
     Raises:
         InvalidInput: There is no recorded motion, or more than ``MAX_RECORDED_S``.
     """
-    seconds = sum(float(motion.times[-1]) for motion in motions)
     if not motions:
         raise InvalidInput("motions", 0, "must hold at least one recording")
-    if seconds > MAX_RECORDED_S:
-        rule = f"s of recorded motion are too much: at most {MAX_RECORDED_S} s per evaluation"
-        raise InvalidInput("motions", round(seconds), rule)
     bench = _Bench(checkpoint, episodes, seed, on_row)
-    usual = bench.usual
-    placed = tuple(at_the_table(motion, bench.cell) for motion in motions)
-
-    def beside(some: tuple[Motion, ...]) -> PickSettings:
-        return replace(usual, work=replace(usual.work, motion="recorded", recorded=some))
-
-    files = sorted({motion.name for motion in placed})
-    rows = {"library": usual, "recorded": beside(placed)}
+    usual, cell = bench.usual, bench.cell
+    files = sorted({motion.name for motion in motions})
+    rows = {"library": usual, "recorded": beside_recordings(usual, motions, cell)}
     if len(files) > 1:
         rows |= {
-            f"recorded {name}": beside(tuple(m for m in placed if m.name == name))
+            f"recorded {name}": beside_recordings(
+                usual, [one for one in motions if one.name == name], cell
+            )
             for name in files
         }
     result = bench.all(rows)
