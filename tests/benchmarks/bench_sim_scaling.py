@@ -27,9 +27,8 @@ from app.sim.cells.cell import load_cell
 from app.sim.core.arrays import as_kernel_array, as_kernel_index
 from app.sim.geometry.capsules import new_columns
 from app.sim.human.kernels.kinematics import N_CAPSULES
-from app.sim.pick.batch import DEFAULT_ACTION, DEFAULT_WEIGHTS, PickBatch, PickSettings
+from app.sim.pick.batch import PickBatch, PickSettings, observation_workspace_of
 from app.sim.pick.kernels import episode as pick
-from app.sim.pick.kernels.observation import new_pick_observation_workspace
 from app.sim.robot.capsules import load_robot_capsules
 from app.sim.robot.kernels.arm import FIRST_OVER_TABLE, Arm
 from app.sim.scenario.kernels.episode import PLAIN, new_step_workspace
@@ -131,22 +130,21 @@ def with_robot(pieces: int, seed: int) -> tuple[Subject, Row]:
     world = batch.world._replace(arm=arm)
     state = batch.state._replace(robot=np.repeat(arm.columns[None], BATCH, axis=0))
     work = new_step_workspace(arm, world.people, state.people)
-    sight = new_pick_observation_workspace()
-    rules = pick.PickRules(20.0, 10.0, 0.0, 0.05, 0.0, 0.0, 1, 1)
-    task = pick.PickTask(rules, DEFAULT_ACTION.rule(), DEFAULT_WEIGHTS)
+    sight = observation_workspace_of(batch.cell)
+    task = batch._task
     obs = np.zeros((BATCH, pick.N_PLAIN), dtype=np.float32)
     rew = np.zeros(BATCH, dtype=np.float32)
     ended, turn = np.zeros(BATCH, dtype=np.int64), acts(BATCH, seed)
     every = np.arange(BATCH)
-    pick.reset_rows(world, rules, seed, 0, state, every, work)
+    pick.reset_rows(world, task, seed, 0, state, every, work)
 
     def step() -> None:
         pick.step_batch(world, task, state, work, next(turn), rew, ended)
-        pick.observe_rows(world, state, every, work, sight, PLAIN, obs)
+        pick.observe_rows(world, task.grasp, state, every, work, sight, PLAIN, obs)
         done = np.flatnonzero(ended)
         if len(done):
             state.episode[done] += 1
-            pick.reset_rows(world, rules, seed, 0, state, done, work)
+            pick.reset_rows(world, task, seed, 0, state, done, work)
 
     name = f"pick/capsules-{len(arm.link)}"
     return Subject(name=name, batch=BATCH, run=step), capsules_soa(arm, 1, N_CAPSULES)

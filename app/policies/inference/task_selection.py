@@ -40,9 +40,8 @@ from app.sim.perception.observed_people import (
     is_far,
     nearest_index,
 )
-from app.sim.pick.batch import TaskView, observe, step_robot
+from app.sim.pick.batch import TaskView, observation_workspace_of, observe, step_robot
 from app.sim.pick.kernels.grasp import LIFT, GraspRules
-from app.sim.pick.kernels.observation import OBSERVED, PRESENT_WITHIN
 from app.sim.pick.task_policy import (
     NOT_BEGUN,
     Candidate,
@@ -194,6 +193,7 @@ class TaskChooser(TrainedPolicy):
         self._hysteresis = hysteresis
         self._networks = ValueNetworks(checkpoint)
         self._arm, self._people = arm_of(self._cell), people_of(self._cell)
+        self._sight = observation_workspace_of(self._cell)
         self._limits, self._ranges = (
             StateLimits(self._arm, limits_jerk=False),
             _TrainedRanges(checkpoint),
@@ -233,10 +233,9 @@ class TaskChooser(TrainedPolicy):
             phase=progress.phase,
             closing_s=progress.closing_s,
         )
+        shared = self._arm, self._people, self._sight
         people_arrays = _arrays(observed, self._people.bodies[0])
-        obs, reachable = observe(
-            self._arm, self._people, (q, qd), people_arrays, goals, time_left_s, task
-        )
+        obs, reachable = observe(*shared, (q, qd), people_arrays, goals, time_left_s, task)
         act, values = self._networks.act_and_value(obs)
         predicted = self._networks.predict(obs, values)
         outcomes = None if predicted is None else estimates(predicted)
@@ -293,20 +292,14 @@ class TaskChooser(TrainedPolicy):
     def _observed(self, q: Vec, people: Sequence[Person]) -> list[tuple[int | None, Person]]:
         """Return index and state of the observed people, the nearest to the robot first.
 
-        At least two; a missing one is a person far away.
+        In an empty cell it is a person far away.
         """
         known = checked_people(people)
         near = [i for i, person in enumerate(known) if not is_far(person)]
         first = nearest_index(self._arm, self._people, q, [known[i] for i in near])
-        ordered = [] if first is None else [near.pop(first), *near]
-        ordered = ordered[:1] + [i for i in ordered[1:] if _counts_as_second(known[i])]
-        found: list[tuple[int | None, Person]] = [(i, as_known(known[i])) for i in ordered]
-        return found + [(None, _FAR_PERSON)] * max(0, OBSERVED - len(found))
-
-
-def _counts_as_second(person: Person) -> bool:
-    """Return whether a person is near enough to be observed as a second person."""
-    return bool(np.hypot(person.q[0], person.q[1]) <= PRESENT_WITHIN)
+        if first is None:
+            return [(None, _FAR_PERSON)]
+        return [(i, as_known(known[i])) for i in (near.pop(first), *near)]
 
 
 def _arrays(observed: list[tuple[int | None, Person]], body: Vec) -> tuple[Vec, Vec, Vec]:

@@ -16,6 +16,7 @@ from app.sim.cells.cell import Cell, lacks_stations
 from app.sim.core.arrays import Vec, as_kernel_array
 from app.sim.core.jit import FAR
 from app.sim.core.kernels.rng import start_stream
+from app.sim.human import model as human
 from app.sim.people.human_motion_config import USUAL, HumanMotionConfig
 from app.sim.people.kernels.motion import record_palms
 from app.sim.people.kernels.people import People, new_people_geometry
@@ -26,6 +27,7 @@ from app.sim.pick.kernels.observation import (
     N_PICK,
     N_WITH_BODY,
     N_WITH_PHASE,
+    PickObservationWorkspace,
     PickQuery,
     new_pick_observation_workspace,
     observe_batch,
@@ -40,6 +42,7 @@ from app.sim.robot.trajectory_segment import TrajectorySegment
 from app.sim.scenario.batch import EnvBatch
 from app.sim.scenario.kernels.episode import FEATURES, PLAIN, Indices, distance_to
 from app.sim.scene.scene import (
+    FAR_AWAY,
     HumanKind,
     arm_of,
     new_people_state,
@@ -188,7 +191,7 @@ class PickBatch(EnvBatch):
             first_env=first_env,
             view=VIEWS[settings.observation],
         )
-        self._sight = new_pick_observation_workspace()
+        self._sight = observation_workspace_of(self.cell)
 
     def _observe(self, envs: Indices, out: NDArray[np.float32]) -> None:
         shared = self.world, self.settings.grasp, self.state
@@ -206,6 +209,12 @@ class PickBatch(EnvBatch):
         shared = self.world, self.settings.grasp, self.state
         self.state.q[:], self.state.qd[:], self.state.qdd[:] = q, 0.0, 0.0
         episode.measure_starts(*shared, self._work)
+
+
+def observation_workspace_of(cell: Cell) -> PickObservationWorkspace:
+    """Return work space for observations in a cell, one at a time."""
+    far = human.rest_posture(*FAR_AWAY)
+    return new_pick_observation_workspace(cell.floor_z, far, as_kernel_array(cell.body))
 
 
 def target_configurations(arm: Arm, grasp: GraspRules, goals: Vec) -> tuple[Vec, Vec, Flags]:
@@ -256,6 +265,7 @@ def queries(
 def observe(
     arm: Arm,
     people: People,
+    sight: PickObservationWorkspace,
     robot: tuple[Vec, Vec],
     seen: tuple[Vec, Vec, Vec],
     goals: Vec,
@@ -267,6 +277,7 @@ def observe(
     Args:
         arm: From :func:`~app.sim.scene.scene.arm_of`.
         people: From :func:`~app.sim.scene.scene.people_of`.
+        sight: From :func:`observation_workspace_of`.
         robot: Joint positions [rad] and speeds [rad/s], shape (6,) each.
         seen: Joint positions [m, rad] and speeds [m/s, rad/s] of P people, the one nearest to
             the robot first, shape (P, 18) each, and body dimensions [m], (P, body.N_SIZE).
@@ -292,7 +303,7 @@ def observe(
         (phase, closing),
     )
     obs, left = np.empty((n, task.n_obs), dtype=np.float32), np.full(n, float(time_left_s))
-    observe_batch(arm, people.floor_z, states, left, obs)
+    observe_batch(arm, people.floor_z, states, left, sight, obs)
     return obs, reachable
 
 

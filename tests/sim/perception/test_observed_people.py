@@ -17,7 +17,13 @@ from app.sim.perception.observed_people import (
     nearest_index,
     person_from_cylinder,
 )
-from app.sim.pick.batch import PickBatch, PickSettings, TaskView, observe
+from app.sim.pick.batch import (
+    PickBatch,
+    PickSettings,
+    TaskView,
+    observation_workspace_of,
+    observe,
+)
 from app.sim.pick.kernels.observation import N_FEATURES
 from app.sim.scene.scene import NO_CYLINDERS, arm_of, people_of
 
@@ -57,6 +63,7 @@ def test_the_person_seen_is_the_one_a_batch_sees() -> None:
         found, _ = observe(
             batch.arm,
             batch.world.people,
+            observation_workspace_of(batch.cell),
             (state.q[e], state.qd[e]),
             (
                 people[index].q[None],

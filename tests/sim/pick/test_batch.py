@@ -150,6 +150,7 @@ def test_single_state_functions_do_what_the_batch_does(cell: Cell) -> None:
             seen, _ = pick.observe(
                 batch.arm,
                 people,
+                batch._sight,
                 (piece.q, piece.qd),
                 (state.people.q[e], state.people.qd[e], state.people.size[e]),
                 state.goal[e : e + 1],
@@ -200,12 +201,13 @@ def test_read_only_integer_and_strided_inputs_compile_nothing_again(cell: Cell) 
     arm, people = arm_of(cell), people_of(cell)
     person = human.rest_posture(*cell.human.home)
     q, zero, goals = arm.home.copy(), np.zeros(6), cell.positions()
+    sight = pick.observation_workspace_of(cell)
 
     def use() -> None:
         pick.step_robot(arm, q, zero, zero, zero[:5])
         contact(arm, people, JointPath(q, zero, zero, zero), (person[None], person[None]))
         seen = person[None], np.zeros((1, 18)), people.bodies
-        pick.observe(arm, people, (q, zero), seen, goals[::2], 10, TaskView())
+        pick.observe(arm, people, sight, (q, zero), seen, goals[::2], 10, TaskView())
         pick.tool_state(arm, q, zero, goals[0])
         human.capsules(person, cell.body, cell.floor_z)
 

@@ -23,6 +23,7 @@ from app.sim.pick.batch import (
     OUTCOMES,
     PickBatch,
     PickSettings,
+    observation_workspace_of,
     queries,
     target_configurations,
 )
@@ -31,9 +32,7 @@ from app.sim.pick.kernels.observation import (
     DISTANCE_SCALE,
     LAYOUT,
     N_PICK,
-    OBSERVED,
     PICK_SIZES,
-    PRESENT_WITHIN,
     observe_batch,
 )
 from app.sim.scenario.kernels import episode as kernel
@@ -72,10 +71,7 @@ Rule = Callable[[View], Index]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sight:
-    """Observed people of each running environment, the nearest to the robot first.
-
-    At least two; a missing one is a person far away.
-    """
+    """Observed people of each running environment, the nearest to the robot first."""
 
     q: NDArray[np.float64]
     """Joint positions [m, rad], shape (n, P, 18)."""
@@ -97,7 +93,7 @@ def seen_exactly(batch: PickBatch, rows: Index) -> Sight:
     """
     shared, state, n = batch.world.people, batch.state, len(rows)
     n_workers, n_cylinders = state.people.q.shape[1], state.people.cylinders.shape[1]
-    n_people = max(OBSERVED, n_workers + n_cylinders)
+    n_people = max(1, n_workers + n_cylinders)
     seen = Sight(
         q=np.empty((n, n_people, 18)),
         qd=np.empty((n, n_people, 18)),
@@ -105,8 +101,6 @@ def seen_exactly(batch: PickBatch, rows: Index) -> Sight:
     )
     geometry = new_people_geometry(shared, n_workers, n_cylinders)
     see_rows(shared, state.people, state.robot, rows, geometry, seen.q, seen.qd, seen.size)
-    far = np.hypot(seen.q[:, 1:, 0], seen.q[:, 1:, 1]) > PRESENT_WITHIN
-    seen.q[:, 1:][far], seen.qd[:, 1:][far] = shared.no_person, 0.0
     np.clip(seen.q[..., 3:], shared.limits[0, 3:], shared.limits[1, 3:], out=seen.q[..., 3:])
     return seen
 
@@ -192,6 +186,7 @@ class Evaluator:
     ) -> None:
         self._networks = networks
         self.batch = PickBatch(cell, n_episodes, seed, settings)
+        self._sight = observation_workspace_of(self.batch.cell)
         world, grasp = self.batch.world, settings.grasp
         found = target_configurations(self.batch.arm, grasp, world.stations)
         self._station_q, self._grasp_q, _ = found
@@ -262,8 +257,8 @@ class Evaluator:
             (batch.world.stations[station], self._station_q[station], self._grasp_q[station]),
             (phase, np.where(phase != APPROACH, state.closing[env], 0.0)),
         )
-        floor_z = batch.world.people.floor_z
-        observe_batch(batch.arm, floor_z, states, state.time_left[env], obs)
+        floor_z, left = batch.world.people.floor_z, state.time_left[env]
+        observe_batch(batch.arm, floor_z, states, left, self._sight, obs)
         act, value = self._networks.act_and_value(obs)
         actions = np.zeros((len(rows), width, act.shape[1]), dtype=np.float32)
         values = np.full((len(rows), width), -np.inf, dtype=np.float32)

@@ -33,7 +33,6 @@ from app.sim.human import model as human
 from app.sim.perception.keypoint_sensor_model import KeypointSensorModel, KeypointSensorSettings
 from app.sim.perception.person_estimator import PersonEstimator
 from app.sim.pick.batch import PickBatch
-from app.sim.pick.kernels.observation import OBSERVED
 
 DEFAULT_EPISODES = 300
 RATE_HZ = 30.0
@@ -118,11 +117,10 @@ class KeypointObserver:
             self._before = t.copy(), people.q[:, 0].copy(), people.qd[:, 0].copy()
         t0, q0, qd0 = self._before
         seen = Sight(
-            q=np.tile(batch.world.people.no_person, (len(rows), OBSERVED, 1)),
-            qd=np.zeros((len(rows), OBSERVED, 18)),
-            size=np.tile(batch.world.people.bodies[0], (len(rows), OBSERVED, 1)),
+            q=np.empty((len(rows), 1, 18)),
+            qd=np.empty((len(rows), 1, 18)),
+            size=people.size[rows, :1].copy(),
         )
-        seen.size[:, 0] = people.size[rows, 0]
         for k, e in enumerate(rows.tolist()):
             motion = between(t0[e], q0[e], qd0[e], float(t[e]), people.q[e, 0], people.qd[e, 0])
             seen.q[k, 0], seen.qd[k, 0] = self._look(batch, e, float(t[e]), motion)

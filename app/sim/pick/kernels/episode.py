@@ -23,12 +23,7 @@ from app.sim.pick.kernels.grasp import (
     next_phase,
     target_height,
 )
-from app.sim.pick.kernels.observation import (
-    OBSERVED,
-    PickObservationWorkspace,
-    PickQuery,
-    observe,
-)
+from app.sim.pick.kernels.observation import PickObservationWorkspace, PickQuery, observe
 from app.sim.pick.kernels.reward import RewardWeights, reward
 from app.sim.robot.kernels import kinematics
 from app.sim.robot.kernels.actions import MYOPIC, ActionRule
@@ -373,7 +368,7 @@ def observe_rows(
         out: Filled, shape (k, F).
     """
     crowd, people = work.crowd, world.people
-    n_people = max(OBSERVED, state.people.q.shape[1] + state.people.cylinders.shape[1])
+    n_people = max(1, state.people.q.shape[1] + state.people.cylinders.shape[1])
     human_q, human_qd = sight.human_q[:n_people], sight.human_qd[:n_people]
     size, point = sight.human_size[:n_people], sight.point
     for k in range(envs.shape[0]):

@@ -1,5 +1,7 @@
 """Tests of pick episodes: the observed person and recorded trajectories."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,13 +9,15 @@ from app.policies.checkpoints import pretrained
 from app.policies.configs.pick import PickPreset
 from app.policies.evaluation.pick import selection_rules as choice_rules
 from app.policies.evaluation.pick.episodes import Evaluator, seen_exactly, settings_for
-from app.policies.inference.task_selection import ValueNetworks
+from app.policies.inference.task_selection import TaskChooser, ValueNetworks
 from app.sim.cells.cell import load_cell
 from app.sim.collision.contact import clearance
 from app.sim.human import model as human
 from app.sim.human.anthropometry import percentile_body
+from app.sim.human.person import Person
 from app.sim.people.human_motion_config import HumanMotionConfig, at_the_table
-from app.sim.pick.batch import PickBatch, PickSettings
+from app.sim.pick.batch import WHOLE_PICK, PickBatch, PickSettings
+from app.sim.pick.task_policy import Candidate
 from tests.sim.recorded_person import working
 from tests.sim.working_people import run_of
 
@@ -51,8 +55,48 @@ def test_an_empty_cell_is_observed_as_a_person_far_away():
     batch = PickBatch(load_cell(), 2, 7, PickSettings(people=()))
     batch.reset()
     sight = seen_exactly(batch, np.arange(2))
-    np.testing.assert_array_equal(sight.q, np.tile(batch.world.people.no_person, (2, 2, 1)))
+    np.testing.assert_array_equal(sight.q, np.tile(batch.world.people.no_person, (2, 1, 1)))
     assert sight.q[0, 0, 1] > 3.0 and not sight.qd.any()
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_batch_evaluation_and_service_value_people_alike(workers):
+    """Beside one person, and beside two; the second stands beyond 4 m."""
+    checkpoint, cell, n = pretrained.load("pick"), load_cell(), 4
+    networks, chooser = ValueNetworks(checkpoint), TaskChooser(checkpoint)
+    settings = replace(WHOLE_PICK, people=("worker",) * workers, n_candidates=(2, 2))
+    evaluator, views = Evaluator(networks, cell, n, 7, settings), []
+
+    def move_away(batch):
+        batch.state.people.q[:, 1:] = human.rest_posture(2.4, 3.3, -2.0)
+
+    def recorded(view):
+        views.append(view.values)
+        return choice_rules.fixed(0)(view)
+
+    evaluator.run(recorded, start=move_away)
+    batch = evaluator.batch
+    state = batch.state
+    batch.reset()
+    move_away(batch)
+    obs = batch._look(np.arange(n))
+    np.testing.assert_allclose(networks.act_and_value(obs)[1], views[0][:, 0], atol=1e-5)
+    ids = [station.id for station in cell.pick_stations]
+    for e in range(n):
+        people = [
+            Person(q=q, qd=qd, size=size)
+            for q, qd, size in zip(
+                state.people.q[e], state.people.qd[e], state.people.size[e], strict=True
+            )
+        ]
+        offered = [
+            Candidate(id=ids[k], position=batch.world.stations[k])
+            for k in state.candidates[e, :2]
+        ]
+        decision = chooser.decide(
+            state.q[e], state.qd[e], people, offered, time_left_s=state.time_left[e]
+        )
+        np.testing.assert_allclose(decision.values, views[0][e], atol=1e-5)
 
 
 def test_an_angle_beyond_its_limit_is_observed_as_the_limit():

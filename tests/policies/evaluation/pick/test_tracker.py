@@ -84,15 +84,15 @@ def test_a_tracker_without_frames_shows_no_person(evaluator):
     evaluator.batch.reset()
     seen = look(evaluator.batch, np.arange(N))
     no_person = evaluator.batch.world.people.no_person
-    np.testing.assert_array_equal(seen.q, np.tile(no_person, (N, 2, 1)))
+    np.testing.assert_array_equal(seen.q, np.tile(no_person, (N, 1, 1)))
     assert not seen.qd.any()
 
 
 def test_only_running_rows_are_looked_at(evaluator):
     look = KeypointObserver(ROWS["33ms"], 1)
     evaluator.batch.reset()
-    assert look(evaluator.batch, np.arange(N)).q.shape == (N, 2, 18)
-    assert look(evaluator.batch, np.array([1, 4])).q.shape == (2, 2, 18)
+    assert look(evaluator.batch, np.arange(N)).q.shape == (N, 1, 18)
+    assert look(evaluator.batch, np.array([1, 4])).q.shape == (2, 1, 18)
     assert len(look.wrist_errors) == 2 * (N + 2)
 
 

@@ -45,7 +45,8 @@ def seen(cell: Cell, **changes: Any) -> np.ndarray:
     human_q, human_qd = np.atleast_2d(at["human_q"]), np.atleast_2d(at["human_qd"])
     people = human_q, human_qd, np.tile(cell.body, (len(human_q), 1))
     robot, task = (at["q"], at["qd"]), at.get("task", TaskView())
-    return pick.observe(arm_of(cell), people_of(cell), robot, people, at["goals"], 7.0, task)[0]
+    shared = arm_of(cell), people_of(cell), pick.observation_workspace_of(cell)
+    return pick.observe(*shared, robot, people, at["goals"], 7.0, task)[0]
 
 
 def test_layout_covers_the_observation_without_gap_or_overlap() -> None:
@@ -156,7 +157,6 @@ def test_the_second_person_is_the_one_nearer_to_the_target(cell: Cell) -> None:
         goals=goals,
         task=picking(),
     )
-    np.testing.assert_array_equal(obs[:, PICK["second_present"]], 1.0)
     np.testing.assert_allclose(obs[:, PICK["second_pelvis"]][:, 0], [-0.6, 0.6], atol=1e-6)
     alone = seen(cell, human_q=left, human_qd=np.zeros(18), goals=goals, task=picking())
     np.testing.assert_allclose(
@@ -167,9 +167,17 @@ def test_the_second_person_is_the_one_nearer_to_the_target(cell: Cell) -> None:
         np.testing.assert_allclose(obs[0, PICK[name]], alone[0, LAYOUT[one]], atol=1e-6)
 
 
-def test_without_a_second_person_nothing_of_one_is_observed(cell: Cell) -> None:
-    row = seen(cell, task=picking())[0]
-    assert not row[PICK["second_present"].start : PICK["second_clearance"].start].any()
+def test_without_a_second_person_within_4_m_one_far_away_is_observed(cell: Cell) -> None:
+    row, at = seen(cell, task=picking())[0], state(cell)
     np.testing.assert_array_equal(row[PICK["second_clearance"].start :], 3.0)
+    np.testing.assert_allclose(row[PICK["second_pelvis"]], [0.0, 2.75, 0.0], atol=1e-6)
+    for x, y in ((3.0, 2.9), (0.0, 4.0)):
+        two = np.stack([at["human_q"], human.rest_posture(x, y, 0.5)])
+        moving = np.stack([at["human_qd"], np.ones(18)])
+        beside = seen(cell, human_q=two, human_qd=moving, task=picking())[0]
+        np.testing.assert_array_equal(beside, row)
+    two[1, 1] = 3.9
+    beside = seen(cell, human_q=two, human_qd=moving, task=picking())[0]
+    np.testing.assert_allclose(beside[PICK["second_pelvis"]][1], 2.65, atol=1e-6)
     one = seen(cell, task=TaskView(n_obs=N_WITH_PHASE, grasp=GraspRules()))[0]
     np.testing.assert_array_equal(row[:N_WITH_PHASE], one)
