@@ -18,6 +18,7 @@ from app.api.routes import (
     health,
     jobs,
     motion,
+    plan,
     presets,
     recordings,
     reference,
@@ -64,6 +65,7 @@ def build_app(*, lifespan: Lifespan, static: Path, token: str | None, version: s
     for part in (
         task_selection,
         sorting,
+        plan,
         motion,
         trackers,
         worlds,

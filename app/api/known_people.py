@@ -40,6 +40,7 @@ from app.sim.perception.observed_people import (
 )
 from app.sim.perception.person_estimator import PersonEstimate
 from app.sim.perception.single_frame import estimate_once
+from app.sim.pick.task_policy import Decision
 from app.sim.scene.scene import arm_of, people_of
 
 _PERSON = re.compile(r"^people\[(\d+)\]")
@@ -91,6 +92,58 @@ def known_people(
     return tuple(
         _known(entry, f"people[{i}].", cell, trackers) for i, entry in enumerate(entries)
     )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PeopleForPolicy:
+    """The people of a request that a policy may observe: at most four, the nearest."""
+
+    known: tuple[KnownPerson, ...]
+    """All people of the request."""
+    places: tuple[int, ...]
+    """Index in the request of each person that a policy may observe."""
+    people: tuple[Person, ...]
+    """Their states."""
+
+    def in_request(self, decision: Decision) -> Decision:
+        """Return a decision about them with the request's indices of people."""
+        seen = decision.seen
+        return replace(
+            decision,
+            seen=None if seen is None else self.places[seen],
+            outside=renumbered(decision.outside, self.places),
+        )
+
+    def uses(self, seen: int | None) -> list[PersonUse]:
+        """Return the use of each person of the request.
+
+        Args:
+            seen: Index in the request of the observed person nearest to the robot.
+        """
+        return [
+            one.use(i == seen, one.person is not None and i not in self.places)
+            for i, one in enumerate(self.known)
+        ]
+
+
+def people_for_policy(
+    entries: Sequence[PersonInput], cell: Cell, trackers: TrackerSessions, q: Vec
+) -> PeopleForPolicy:
+    """Return the people of a request that a policy may observe.
+
+    Args:
+        entries: People of the request.
+        cell: The work cell.
+        trackers: Open trackers.
+        q: The robot's joint positions [rad], shape (6,).
+
+    Raises:
+        InvalidInput: An impossible person, with its place.
+    """
+    known = known_people(entries, cell, trackers)
+    present = {i: one.person for i, one in enumerate(known) if one.person is not None}
+    places = tuple(nearest_places(present, cell, q))
+    return PeopleForPolicy(known=known, places=places, people=tuple(present[i] for i in places))
 
 
 def nearest_places(people: Mapping[int, Person], cell: Cell, q: Vec) -> list[int]:

@@ -6,6 +6,7 @@ health          Liveness and readiness, for monitors
 jobs            Training and evaluation as jobs: post, list, cancel, follow
 motion          Motion decisions: the next trajectory segment toward a goal (thesis chapter
                 4)
+plan            Next move of a sorting task with its motion, by the pick policy's critic
 presets         Presets of training jobs, with the limits of every field
 recordings      Recordings of human motion: import a file, list, show, remove
 reference       ``/docs``: the API description as one static page without external scripts

@@ -3,13 +3,12 @@
 Source: docs/method.md 3.1.
 """
 
-from dataclasses import replace
 from functools import partial
 
 from fastapi import APIRouter
 from starlette.concurrency import run_in_threadpool
 
-from app.api.known_people import known_people, nearest_places, renumbered, take_time
+from app.api.known_people import people_for_policy, take_time
 from app.api.schemas.task_selection import TaskSelection, TaskSelectionRequest
 from app.api.services import ServicesDep
 from app.api.world_policies import require_task_policy
@@ -43,20 +42,10 @@ async def choose(request: TaskSelectionRequest, services: ServicesDep) -> TaskSe
     )
 
     def answer() -> TaskSelection:
-        people = known_people(request.people, cell, services.trackers)
-        present = {i: one.person for i, one in enumerate(people) if one.person is not None}
-        seen = nearest_places(present, cell, q)
+        people = people_for_policy(request.people, cell, services.trackers, q)
         with request.robot.faults_in_place():
-            decision = decide([present[i] for i in seen])
-        decision = replace(
-            decision,
-            seen=None if decision.seen is None else seen[decision.seen],
-            outside=renumbered(decision.outside, seen),
-        )
-        uses = [
-            one.use(i == decision.seen, i in present and i not in seen)
-            for i, one in enumerate(people)
-        ]
+            decision = people.in_request(decide(people.people))
+        uses = people.uses(decision.seen)
         return TaskSelection.from_domain(decision, candidates, uses, request.stamp)
 
     long = len(candidates) > MAX_INLINE_CANDIDATES or take_time(request.people)

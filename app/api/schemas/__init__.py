@@ -7,6 +7,7 @@ jobs            Jobs as they are shown
 motion          ``POST /v1/motion``: state, people and goal in, the next trajectory segment out
 numbers         Base classes and number types of the schemas
 people          People in a request, and their use by a policy
+plan            ``POST /v1/plan``: sorting task, robot and people in; next move and motion out
 presets         Presets with the declarations of their fields, as the training form needs them
 recordings      Recordings of human motion as they are shown
 robot_state     Joints of the robot in a request: base to wrist 3, or in any order by name

@@ -36,6 +36,17 @@ MOTION: dict[str, Any] = {
     "people": [{"x": 0.3, "y": 1.6, "vx": 0.0, "vy": -0.5, "r": 0.3}],
     "goal": [0.05, 0.75, 0.31],
 }
+PLAN: dict[str, Any] = {
+    "cell": "sorting-e0",
+    "robot": {"q": [0.99, -2.33, 2.08, -1.32, -1.57, 0.0], "qd": [0.0] * 6},
+    "people": [{"keypoints": KEYPOINTS}],
+    "objects": [
+        {"id": "a", "colour": "red", "size": "large", "at": "cell5"},
+        {"id": "b", "colour": "red", "size": "large", "at": "cell9"},
+        {"id": "c", "colour": "red", "size": "small", "at": "cell7"},
+    ],
+    "goal": {"red": ["large", "small"]},
+}
 FRAME: dict[str, Any] = {"t": 12.3, "people": [{"keypoints": KEYPOINTS}]}
 
 

@@ -141,9 +141,9 @@ class SegmentPublic(Answer):
     qdd: Vector6 = Field(description="joint accelerations there [rad/s^2]")
 
     @classmethod
-    def commanded(cls, piece: TrajectorySegment, question: MotionQuestion, dt: float) -> Self:
-        """Return the segment commanded by the policy."""
-        parts = [question.q, question.qd, piece.c]
+    def commanded(cls, piece: TrajectorySegment, q: Vec, qd: Vec, dt: float) -> Self:
+        """Return the segment commanded by the policy from joint positions and speeds."""
+        parts = [q, qd, piece.c]
         if piece.d.any():
             parts.append(piece.d)
         return cls(
@@ -250,7 +250,10 @@ class MotionAnswer(Answer):
         stamp: Stamp,
     ) -> Self:
         """Return the answer of a decision."""
-        segment, safe = SegmentPublic.commanded(decision.piece, question, dt), decision.safe
+        segment, safe = (
+            SegmentPublic.commanded(decision.piece, question.q, question.qd, dt),
+            decision.safe,
+        )
         commanded = segment
         if safe is not None and safe.override < 1.0:
             segment = SegmentPublic.executed(safe, question, dt)

@@ -117,18 +117,9 @@ class SortingRecord(Body):
         )
 
 
-class SortingRequest(Body):
-    """State of a sorting task."""
+class SortingFields(Body):
+    """Objects, goal and failure probabilities of a sorting task."""
 
-    cell: str | None = Field(
-        None,
-        max_length=64,
-        description="name of the work cell; or `layout`",
-        examples=["sorting-e0"],
-    )
-    layout: SortingLayout | None = Field(
-        None, description="a task without a work cell, in place of `cell`"
-    )
     objects: list[SortingObject] = Field(
         max_length=MAX_CELLS,
         description="all objects, at most one per clutter cell of the task",
@@ -144,6 +135,42 @@ class SortingRequest(Body):
         max_length=MAX_CELLS,
         description="failure probability of a pick by clutter cell, 0 to 0.99; the work "
         "cell's, or 0, for other cells",
+    )
+
+    def state_of(self, names: SortingNames, fail: Vec) -> SortingState:
+        """Return the state.
+
+        Args:
+            names: Names of the task.
+            fail: The cell's failure probabilities, shape (K,).
+
+        Raises:
+            InvalidInput: An impossible state, with the field.
+        """
+        goal = {
+            tower: [(one.colour, one.size) for one in wanted]
+            for tower, wanted in self.goal.items()
+        }
+        objects = [one.to_domain() for one in self.objects]
+        return state_from_names(names, objects, goal, fail_with(names, fail, self.failure_map))
+
+    @property
+    def ids(self) -> "Ids":
+        """Names of the objects, by station and level."""
+        return {(one.at, one.level): one.id for one in self.objects}
+
+
+class SortingRequest(SortingFields):
+    """State of a sorting task."""
+
+    cell: str | None = Field(
+        None,
+        max_length=64,
+        description="name of the work cell; or `layout`",
+        examples=["sorting-e0"],
+    )
+    layout: SortingLayout | None = Field(
+        None, description="a task without a work cell, in place of `cell`"
     )
     monitor: SortingRecord | None = Field(
         None, description="`monitor` of the last answer in the same task; null at its start"
@@ -170,12 +197,7 @@ class SortingRequest(Body):
         if self.decider == "planner" and self.checkpoint is not None:
             rule = "must be null where the planner decides"
             raise InvalidInput("checkpoint", self.checkpoint, rule)
-        goal = {
-            tower: [(one.colour, one.size) for one in wanted]
-            for tower, wanted in self.goal.items()
-        }
-        objects = [one.to_domain() for one in self.objects]
-        return state_from_names(names, objects, goal, fail_with(names, fail, self.failure_map))
+        return self.state_of(names, fail)
 
 
 class SortingPlace(Answer):
@@ -245,12 +267,12 @@ class SortingAnswer(Answer):
         outside: Sequence[OutsideTraining],
     ) -> Self:
         """Return the answer of a decision in a state."""
-        ids = {(one.at, one.level): one.id for one in request.objects}
+        ids = request.ids
         moves = [_valued(one, state, names, ids) for one in decision.ranked]
         monitor = decision.monitor
         return cls(
             solved=decision.solved,
-            move=_move(decision.move, state, names, ids) if decision.move else None,
+            move=move_of(decision.move, state, names, ids) if decision.move else None,
             by=decision.by,
             why=decision.why,
             because=REASONS[decision.why],
@@ -311,13 +333,21 @@ def _size_of(shape: SortingShape) -> str:
     return f"{shape.n_cells} cells, {shape.n_colours} colours, {shape.n_sizes} sizes"
 
 
-def _move(move: Move, state: SortingState, names: SortingNames, ids: Ids) -> SortingMove:
+def move_of(move: Move, state: SortingState, names: SortingNames, ids: Ids) -> SortingMove:
+    """Return a move in the words of the task; a move back ends where it began.
+
+    Args:
+        move: The move.
+        state: The state before it.
+        names: Names of the task.
+        ids: Names of the objects.
+    """
     pick = _place(move.pick, state, names, top=True)
     tower = move.pick - names.shape.n_cells
     code = int(state.clutter[move.pick] if tower < 0 else state.towers[tower, pick.level or 0])
     return SortingMove(
         pick=pick,
-        place=_place(move.place, state, names, top=False),
+        place=_place(move.place, state, names, top=move.place == move.pick),
         object=ids.get((pick.station, pick.level)),
         colour=names.colours[names.shape.colour_of(code)],
         size=names.sizes[names.shape.size_of(code)],
@@ -338,5 +368,5 @@ def _place(
 def _valued(
     one: RankedMove, state: SortingState, names: SortingNames, ids: Ids
 ) -> SortingValue:
-    move = _move(one.move, state, names, ids)
+    move = move_of(one.move, state, names, ids)
     return SortingValue(**dict(move), value=one.value, fewest=one.fewest)

@@ -5,6 +5,7 @@ live_reach_policy     A reach policy in the live cell, with all its inference mo
 motion_decision       Next trajectory segment toward a goal beside people
 reach_policy          A trained policy of the reach scenario, for inference
 rollout               Rollout policy improvement of a trained reach policy
+sorting_plan          Next move of a sorting task together with its motion (docs/method.md 3.1)
 sorting_policy        A trained sorting network, for inference
 target_interpolation  Interpolation of actions for goals between training targets
 task_selection        Task selection by the critic (docs/method.md 3.1)

@@ -1,0 +1,48 @@
+"""Next move of a sorting task with its motion, by the pick policy's critic.
+
+Source: docs/method.md 3.1.
+"""
+
+from dataclasses import replace
+
+from fastapi import APIRouter
+from starlette.concurrency import run_in_threadpool
+
+from app.api.known_people import people_for_policy
+from app.api.schemas.plan import PlanAnswer, PlanRequest
+from app.api.services import ServicesDep
+from app.api.world_policies import require_task_policy
+from app.policies.inference.sorting_plan import SortingPlanner
+from app.sim.sorting.batch import fail_of
+from app.sim.sorting.names import names_of
+
+router = APIRouter(prefix="/v1/plan", tags=["deciding"])
+
+
+@router.post("", summary="Choose the next move of a sorting task and its motion")
+async def plan(request: PlanRequest, services: ServicesDep) -> PlanAnswer:
+    """Return the next move, its motion and every move that the choice was among.
+
+    The exact planner gives the moves that it expects to take about as many attempts; among them
+    the pick policy chooses, beside the people as they are now.
+    """
+    services.readiness.require()
+    cell = await services.known_cell(request.cell)
+    names, fail = names_of(cell), fail_of(cell)
+    policy = services.task_policies.loaded(request.checkpoint)
+    if policy is None:
+        policy = await run_in_threadpool(services.task_policies.load, request.checkpoint)
+    require_task_policy(policy, cell, services)
+
+    def answer() -> PlanAnswer:
+        q = request.robot.joints(request.robot.q)
+        people = people_for_policy(request.people, cell, services.trackers, q)
+        query = request.to_domain(names, fail, people.people)
+        with request.robot.faults_in_place():
+            found = SortingPlanner(policy, cell).plan(query)
+        if found.decision is not None:
+            found = replace(found, decision=people.in_request(found.decision))
+        uses = people.uses(None if found.decision is None else found.decision.seen)
+        return PlanAnswer.from_domain(found, query, request, names, uses)
+
+    return await run_in_threadpool(answer)
