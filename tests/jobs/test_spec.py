@@ -103,7 +103,7 @@ def test_evaluation_beside_recorded_people_names_stored_recordings() -> None:
 
 @pytest.mark.parametrize(
     ("protocol", "checkpoint"),
-    [("pick-single", "pick"), ("sorting-grid", "sorting-e0"), ("sorting-tests", "sorting-e0")],
+    [("pick-single", "pick"), ("sorting-grid", "sorting-e0"), ("sorting-people", "pick")],
 )
 def test_default_checkpoint_is_the_protocols_own(protocol: str, checkpoint: str) -> None:
     job = parse_spec({"kind": "evaluate", "protocol": protocol, "seed": 11}).new_job()

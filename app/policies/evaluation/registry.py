@@ -19,6 +19,7 @@ from app.policies.evaluation.reach.targets import run_targets
 from app.policies.evaluation.reach.tracker import run_tracker
 from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.evaluation.safety.ssm import run_safety
+from app.policies.evaluation.sorting.people import run_sorting_people
 from app.policies.evaluation.sorting.runs import run_grid, run_tests
 from app.sim.mocap.importer import Motion
 
@@ -39,6 +40,7 @@ PROTOCOLS: Mapping[str, Protocol] = MappingProxyType(
         "safety-ssm": run_safety,
         "sorting-grid": run_grid,
         "sorting-tests": run_tests,
+        "sorting-people": run_sorting_people,
         "reach-targets": run_targets,
         "reach-random": run_random,
         "reach-constant": run_constant,
@@ -57,8 +59,8 @@ WITH_OR_WITHOUT_MOTIONS = frozenset({"reach-ssm", "risk-calibration"})
 """Protocols with optional recorded motion."""
 WITHOUT_CHECKPOINT = frozenset({"safety-ssm"})
 """Protocols without a policy."""
-OF_SORTING = frozenset(name for name in PROTOCOLS if name.startswith("sorting-"))
-"""Protocols of sorting policies."""
+OF_SORTING = frozenset({"sorting-grid", "sorting-tests"})
+"""Protocols of sorting policies; the pick policy executes full tasks."""
 OF_REACHING = frozenset(name for name in PROTOCOLS if name.startswith("reach-"))
 """Protocols of reach policies; all others are of pick policies."""
 MAX_EPISODES = 100_000
@@ -68,6 +70,7 @@ MAX_SORTING_EPISODES = 10_000
 FEWER_EPISODES: Mapping[str, int] = MappingProxyType(
     {**dict.fromkeys(OF_SORTING, MAX_SORTING_EPISODES), "reach-targets": 2_000}
     | {"reach-smoothness": 5_000, "reach-ssm": 20_000, "reach-oracle": 200}
+    | {"sorting-people": 2_000}
 )
 """Maximum number of episodes where they count per pair or target, or paths are stored."""
 

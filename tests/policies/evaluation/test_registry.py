@@ -65,6 +65,12 @@ def test_a_policy_that_sorts_is_no_policy_that_picks():
     assert set(found.value.choices) == OF_SORTING
 
 
+def test_full_sorting_tasks_are_executed_by_a_policy_that_picks():
+    assert default_checkpoint("sorting-people") == "pick"
+    with pytest.raises(InvalidInput, match="must be a policy that picks for sorting-people"):
+        evaluate("sorting-people", untrained(), episodes=1)
+
+
 @pytest.mark.parametrize("name", ["pick-single", "sorting-grid"])
 def test_a_policy_that_reaches_neither_picks_nor_sorts(name):
     with pytest.raises(InvalidInput, match=f"must be a policy that .* for {name}") as found:

@@ -37,6 +37,22 @@ TESTS: Mapping[str, str] = {
 }
 """Measures of the six benchmark tasks and their column headers."""
 
+FULL_TASKS: Mapping[str, str] = {
+    "n": "n",
+    "finished": "finished",
+    "without_moving_contact": "finished without contact of the moving robot",
+    "moving_contacts": "contacts of the moving robot per task",
+    "contacts_at_rest": "contacts at rest per task",
+    "late_motions": "motions at the time limit per task",
+    "grasps": "grasps per task",
+    "options_per_grasp": "objects to choose among",
+    "cycle_time_s": "cycle time [s]",
+}
+"""Measures of full tasks beside a person and their row headers."""
+COUNTS = frozenset(
+    {"moving_contacts", "contacts_at_rest", "late_motions", "grasps", "cycle_time_s"}
+)
+"""Measures that are means of counts or times, not rates."""
 
 NO_POLICY = "no policy is trained for this size"
 """Note of the benchmark for sizes without a checkpoint."""
@@ -53,6 +69,8 @@ def lines_of(result: Json) -> list[list[str]]:
     rows: list[Json] = result["results"]
     if result.get("bench") == "sorting":
         return decisions(rows)
+    if result["protocol"] == "sorting-people":
+        return full_tasks(result)
     if result["protocol"] != "sorting-grid":
         head = ["", *TESTS.values()]
         return [
@@ -67,6 +85,16 @@ def lines_of(result: Json) -> list[list[str]]:
             [text.format(least=least), *(shown(row, key) for row in rows)]
             for key, text in GRID.items()
         ),
+    ]
+
+
+def full_tasks(result: Json) -> list[list[str]]:
+    """Return the table of full tasks: one column per order rule, then paired differences."""
+    columns: list[Json] = [*result["results"], *result["paired"]]
+    head = ["", *(f"`{row['name']}`" for row in columns)]
+    return [
+        head,
+        *([text, *(shown(row, key) for row in columns)] for key, text in FULL_TASKS.items()),
     ]
 
 
@@ -108,9 +136,12 @@ def shown(row: Json, key: str) -> str:
         return ""
     if isinstance(value, dict):
         scale, unit, digits = (1.0, "", 4) if key in RATIOS else (100.0, " %", 2)
+        if key in COUNTS:
+            scale, unit, digits = 1.0, "", 2
         mean, low, high = (
             f"{scale * value[one]:.{digits}f}" for one in ("mean", "low", "high")
         )
         where = f" at {value['n_objects']}, {value['n_goal']}" if "n_objects" in value else ""
-        return f"{mean}{unit} ({low}-{high}){where}"
+        to = "-" if value["low"] >= 0.0 else " to "
+        return f"{mean}{unit} ({low}{to}{high}){where}"
     return f"{value:.3f}" if isinstance(value, float) else f"{value:,}"

@@ -81,6 +81,20 @@ def test_the_table_of_the_six_tests_has_a_line_per_row() -> None:
     assert "evaluate sorting-tests`" in lines[-1]
 
 
+def test_the_table_of_full_tasks_has_a_column_per_rule_and_per_difference() -> None:
+    cycle = {"mean": 101.4, "low": 99.9, "high": 102.9}
+    less = {"mean": -3.5, "low": -5.6, "high": -1.4}
+    row = {"name": "critic", "n": 300, "finished": rate(1.0), "cycle_time_s": cycle}
+    pair = {"name": "critic - planner", "n": 300, "cycle_time_s": less}
+    settings = {"cell": "sorting-e0"}
+    shown = table(
+        result(protocol="sorting-people", results=[row], paired=[pair], settings=settings)
+    ).splitlines()
+    assert shown[0] == "|  | `critic` | `critic - planner` |"
+    assert shown[3] == "| finished | 100.00 % (99.90-100.00) |  |"
+    assert "| cycle time [s] | 101.40 (99.90-102.90) | -3.50 (-5.60 to -1.40) |" in shown
+
+
 def test_grids_hold_every_pair_and_nothing_else() -> None:
     success, returns = grids(grid_row("clean"))
     assert np.isfinite(success).sum() == np.isfinite(returns).sum() == 6

@@ -1,0 +1,369 @@
+"""Protocol ``sorting-people``: full sorting tasks beside a working person.
+
+Ten objects are sorted in ``sorting-e0`` by the pick policy, which executes every grasp and
+every placement as a whole pick (approach, descent, closing or opening gripper, lift). The cell
+differs from that of the policy only in its stations; clutter cells and towers are its cubes and
+docks. Blocks are no obstacles, as in the live cell. All tasks run side by side in one batch;
+the person works on and does not avoid the robot.
+
+After a contact the robot stops, waits until the person is away and begins its motion again. A
+motion that reaches the time limit begins again, too, with the choice of the order rule. A task
+that is not finished within ``LIMIT_S`` has failed.
+
+Each order rule (``order_rules.py``) runs the same tasks, with the same people and grasps.
+
+Source: docs/method.md 3.1, 3.6 and 4 (the critic's values for the symbolic choice). Ours.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.policies.checkpoints.checkpoint import Checkpoint
+from app.policies.checkpoints.trained_cell import cell_of
+from app.policies.evaluation.pick.episodes import Sight, seen_exactly, settings_for
+from app.policies.evaluation.rows import OnRow, ignore_row
+from app.policies.evaluation.sorting.order_rules import (
+    ORDER_RULES,
+    OrderRule,
+    OrderView,
+    critic,
+)
+from app.policies.evaluation.sorting.task_states import NOTHING, TaskStates
+from app.policies.evaluation.statistics import mean_of, wilson
+from app.policies.inference.task_selection import HYSTERESIS, ValueNetworks, pick_preset_of
+from app.sim.cells.cell import Cell, load_cell
+from app.sim.collision.contact import clearance
+from app.sim.core.arrays import Vec
+from app.sim.core.kernels import rng as random
+from app.sim.people.kernels.motion import draw_script_of
+from app.sim.people.kernels.people import SCRIPTED
+from app.sim.pick.batch import (
+    PickBatch,
+    PickSettings,
+    observation_workspace_of,
+    queries,
+    target_configurations,
+)
+from app.sim.pick.kernels.grasp import APPROACH, LIFT
+from app.sim.pick.kernels.observation import (
+    LAYOUT,
+    observe_batch,
+)
+from app.sim.robot.kernels.arm import CONTROLLED, new_robot_pose, place_robot
+from app.sim.scenario.kernels.episode import COLLISION, RUNNING, SUCCESS, TIMEOUT
+from app.sim.sorting.layout import APPROACH_M, above, reaching_cell, require_workspace
+from app.sim.sorting.near_optimal_moves import MARGIN
+
+Index = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+People = tuple[Vec, Vec, Vec]
+"""Joints, joint speeds and body dimensions of the people that each of n robots observes."""
+
+CELL = "sorting-e0"
+DEFAULT_TASKS = 300
+N_OBJECTS = 10
+LIMIT_S = 600.0
+"""Time after which a task has failed [s]."""
+AT_REST = 0.01
+"""Joint speed below which the robot counts as at rest [rad/s]."""
+PLACE_TIME_S = 10.0
+"""Time left of a motion that is valued before its object is picked [s]."""
+PAUSE_S = 1.0
+"""Pause of a person between two scripts [s]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FullTasks:
+    """Results of n full tasks under one order rule; arrays of shape (n,)."""
+
+    finished: Flags
+    """Whether the goal was reached within ``LIMIT_S``."""
+    cycle_s: NDArray[np.float64]
+    """Time to the goal, or ``LIMIT_S`` [s]."""
+    moving: Index
+    """Contacts of the moving robot."""
+    resting: Index
+    """Contacts of the robot at rest."""
+    attempts: Index
+    """Grasps."""
+    late: Index
+    """Motions that reached the time limit."""
+    options: Index
+    """Objects to choose among, summed over the grasps."""
+
+    def row(self, name: str) -> dict[str, Any]:
+        """Return the result row of these tasks, with 95 % intervals."""
+        n = len(self.finished)
+        free = int(((self.moving == 0) & self.finished).sum())
+        return {
+            "name": name,
+            "n": n,
+            "finished": wilson(int(self.finished.sum()), n),
+            "without_moving_contact": wilson(free, n),
+            "moving_contacts": mean_of(self.moving),
+            "contacts_at_rest": mean_of(self.resting),
+            "late_motions": mean_of(self.late),
+            "grasps": mean_of(self.attempts),
+            "options_per_grasp": float(self.options.sum() / self.attempts.sum()),
+            "cycle_time_s": mean_of(self.cycle_s[self.finished]),
+        }
+
+
+def _of(sight: Sight, rows: Index) -> People:
+    """Return the people that some rows observe."""
+    return sight.q[rows], sight.qd[rows], sight.size[rows]
+
+
+class SortingBesidePeople:
+    """Full tasks of one seed, run once per order rule.
+
+    Args:
+        networks: Actor and critics.
+        cell: Sorting cell.
+        settings: Settings of the picks.
+        n_tasks: Number of tasks.
+        seed: Seed of tasks, grasps and people.
+    """
+
+    def __init__(
+        self,
+        networks: ValueNetworks,
+        cell: Cell,
+        settings: PickSettings,
+        n_tasks: int,
+        seed: int,
+    ) -> None:
+        self._networks, self._seed = networks, seed
+        self.batch = PickBatch(reaching_cell(cell), n_tasks, seed, settings)
+        self.tasks = TaskStates(cell, n_tasks, N_OBJECTS, seed)
+        grasp = settings.grasp
+        self._goals = above(self.tasks.points, grasp.depth or APPROACH_M)
+        found = target_configurations(self.batch.arm, grasp, self._goals)
+        self._q_goals, self._q_grasps, _ = found
+        self._sight = observation_workspace_of(self.batch.cell)
+
+    def run(self, rule: OrderRule) -> FullTasks:
+        """Run all tasks under an order rule."""
+        batch, n = self.batch, self.batch.n_envs
+        self._begin()
+        act = np.zeros((n, CONTROLLED), dtype=np.float32)
+        while (rows := self._running()).size:
+            self._release()
+            going = rows[~self._waiting[rows]]
+            act[:] = 0.0
+            if going.size:
+                act[going] = self._steer(going, rule)
+            before = np.abs(batch.state.qd).max(axis=1)
+            batch.step(act, auto_reset=False, features=False)
+            self._settle(rows, before)
+            self._renew_scripts(rows)
+        state, tasks = batch.state, self.tasks
+        finished = state.outcome == SUCCESS
+        return FullTasks(
+            finished=finished,
+            cycle_s=np.where(finished, state.elapsed, LIMIT_S),
+            moving=self._moving,
+            resting=self._resting,
+            attempts=tasks.attempts.copy(),
+            late=self._late,
+            options=tasks.options.copy(),
+        )
+
+    def _begin(self) -> None:
+        """Start all tasks, with the robots at home."""
+        batch, n = self.batch, self.batch.n_envs
+        batch.reset()
+        batch.set_starts(np.tile(batch.arm.home, (n, 1)))
+        self.tasks.begin()
+        self._scripts = np.zeros(n, dtype=np.int64)
+        self._chosen, self._waiting = np.full(n, -1), np.zeros(n, dtype=np.bool_)
+        self._moving, self._resting, self._late = (np.zeros(n, np.int64) for _ in range(3))
+        for e in range(n):
+            self._begin_motion(e)
+
+    def _running(self) -> Index:
+        state = self.batch.state
+        return np.flatnonzero((state.outcome == RUNNING) & (state.elapsed < LIMIT_S))
+
+    def _begin_motion(self, e: int) -> None:
+        """Begin a motion of one task, with the whole time limit and no choice."""
+        state = self.batch.state
+        state.phase[e], state.closing[e] = APPROACH, 0.0
+        state.time_left[e] = self.batch.settings.time_limit_s
+        state.outcome[e], self._chosen[e] = RUNNING, -1
+
+    # Choice and motion.
+
+    def _steer(self, rows: Index, rule: OrderRule) -> NDArray[np.float32]:
+        """Choose the targets of tasks and return the policy's actions, shape (n, 5)."""
+        state, tasks = self.batch.state, self.tasks
+        counts = np.array([len(tasks.targets[e]) for e in rows])
+        owner = np.repeat(np.arange(len(rows)), counts)
+        point = np.concatenate([tasks.targets[e] for e in rows])
+        place = np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)
+        env, sight = rows[owner], seen_exactly(self.batch, rows)
+        phase = np.where(place == self._chosen[env], state.phase[env], APPROACH)
+        progress = phase, np.where(phase != APPROACH, state.closing[env], 0.0)
+        robot, left = (state.q[env], state.qd[env]), state.time_left[env]
+        obs = self._observe(robot, _of(sight, owner), point, progress, left)
+        act, value = self._networks.act_and_value(obs)
+        later = np.flatnonzero((tasks.held[env] == NOTHING) & (counts[owner] > 1))
+        if rule is critic and later.size:
+            ends = np.concatenate([tasks.places[e] for e in rows])[later]
+            value = value.copy()
+            value[later] += self._place_values(point[later], ends, _of(sight, owner[later]))
+        shape = (len(rows), int(counts.max()))
+        values, distances = np.full(shape, -np.inf, np.float32), np.full(shape, np.inf)
+        actions, points = np.zeros((*shape, CONTROLLED), np.float32), np.zeros(shape, np.int64)
+        away = self._goals[point] - obs[:, LAYOUT["tcp"]]
+        distances[owner, place] = np.linalg.norm(away, axis=1)
+        values[owner, place], actions[owner, place], points[owner, place] = value, act, point
+        before = self._chosen[rows]
+        choice = rule(OrderView(values=values, distances=distances, chosen=before))
+        lifting = (state.phase[rows] == LIFT) & (before >= 0)
+        choice = np.where(lifting, before, choice)
+        self._chosen[rows] = choice
+        mine = np.arange(len(rows))
+        self.batch.set_goals(rows, self._goals[points[mine, choice]])
+        return actions[mine, choice]
+
+    def _place_values(self, picks: Index, places: Index, people: People) -> NDArray[np.float32]:
+        """Return the value of the motion from over each object to its place, shape (n,)."""
+        n, q = len(picks), self._q_goals[picks]
+        progress, left = (np.zeros(n, np.int64), np.zeros(n)), np.full(n, PLACE_TIME_S)
+        obs = self._observe((q, np.zeros_like(q)), people, places, progress, left)
+        return self._networks.act_and_value(obs)[1]
+
+    def _observe(
+        self,
+        robot: tuple[Vec, Vec],
+        people: People,
+        points: Index,
+        progress: tuple[Index, Vec],
+        left: Vec,
+    ) -> NDArray[np.float32]:
+        """Return the observations of n robots, each with one point as target."""
+        batch = self.batch
+        targets = self._goals[points], self._q_goals[points], self._q_grasps[points]
+        states = queries(batch.settings.grasp, robot, people, targets, progress)
+        obs = np.empty((len(points), self._networks.n_obs), dtype=np.float32)
+        floor_z = batch.world.people.floor_z
+        observe_batch(batch.arm, floor_z, states, left, self._sight, obs)
+        return obs
+
+    # Events.
+
+    def _settle(self, rows: Index, before: NDArray[np.float64]) -> None:
+        """Count the events of a period and begin the motions that follow.
+
+        Args:
+            rows: Tasks that ran in the period.
+            before: Largest joint speed of each robot before it [rad/s], shape (n_tasks,).
+        """
+        state = self.batch.state
+        outcome = state.outcome[rows].copy()
+        for e in rows[outcome == SUCCESS].tolist():
+            if not self.tasks.advance(e, int(self._chosen[e])):
+                self._begin_motion(e)
+        for e in rows[outcome == TIMEOUT].tolist():
+            self._late[e] += 1
+            self._begin_motion(e)
+        for e in rows[outcome == COLLISION].tolist():
+            self._stop(e, max(float(before[e]), float(np.abs(state.qd[e]).max())))
+
+    def _stop(self, e: int, speed: float) -> None:
+        """Stop the robot of one task after a contact at a joint speed [rad/s]."""
+        state = self.batch.state
+        if not self._waiting[e]:
+            counts = self._moving if speed > AT_REST else self._resting
+            counts[e] += 1
+        self._waiting[e] = True
+        state.qd[e], state.qdd[e] = 0.0, 0.0
+        self._begin_motion(e)
+
+    def _release(self) -> None:
+        """Let robots move again that are free of contact; place at home those beside no one."""
+        batch, state = self.batch, self.batch.state
+        for e in np.flatnonzero(self._waiting).tolist():
+            people = state.people
+            found = clearance(
+                batch.arm,
+                batch.world.people,
+                state.q[e],
+                people.q[e],
+                people.cylinders[e],
+                people.size[e],
+            )
+            if min(found.cell_m, found.self_m) <= 0.0:
+                pose = new_robot_pose(batch.arm)
+                place_robot(batch.arm, batch.arm.home, pose)
+                state.q[e], state.robot[e] = batch.arm.home, pose.columns
+            state.clear[e] = found.people_m, found.cell_m, found.self_m
+            self._waiting[e] = found.people_m < batch.settings.grasp.start_clearance
+
+    def _renew_scripts(self, rows: Index) -> None:
+        """Draw another script for workers whose script has ended."""
+        shared, people = self.batch.world.people, self.batch.state.people
+        last = people.n_moves[rows] - 1
+        over = np.take_along_axis(people.start[rows], last[..., None], 2)
+        over += np.take_along_axis(people.duration[rows], last[..., None], 2)
+        due = (people.clock[rows] > over[..., 0] + PAUSE_S) & (people.track[rows] == SCRIPTED)
+        for i, w in np.argwhere(due).tolist():
+            e, stream = int(rows[i]), np.zeros(1, dtype=np.uint64)
+            self._scripts[e] += 1
+            random.start_stream(self._seed, e, 1_000_000 + int(self._scripts[e]), stream)
+            first = int(people.chosen[e, w, people.n_moves[e, w]])
+            draw_script_of(shared, people, e, w, int(people.body[e, w]), first, stream)
+            people.clock[e, w] = 0.0
+
+
+def run_sorting_people(
+    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
+) -> dict[str, Any]:
+    """Evaluate full sorting tasks beside a working person under every order rule.
+
+    Args:
+        checkpoint: Pick policy and its critic.
+        episodes: Number of tasks, by default 300.
+        seed: Seed of tasks, grasps and people.
+        on_row: Callback for each finished row.
+    """
+    cell, preset = load_cell(CELL), pick_preset_of(checkpoint)
+    require_workspace(cell, cell_of(checkpoint.manifest))
+    settings = replace(settings_for((1, 1), preset), start_clearance_m=0.05)
+    n = episodes or DEFAULT_TASKS
+    bench = SortingBesidePeople(ValueNetworks(checkpoint), cell, settings, n, seed)
+    runs: dict[str, FullTasks] = {}
+    rows: list[dict[str, Any]] = []
+    for name, rule in ORDER_RULES.items():
+        runs[name] = bench.run(rule)
+        rows.append(runs[name].row(name))
+        on_row(len(rows), len(ORDER_RULES), rows[-1])
+    return {
+        "settings": {
+            "cell": CELL,
+            "objects": N_OBJECTS,
+            "limit_s": LIMIT_S,
+            "motion_limit_s": settings.time_limit_s,
+            "margin_attempts": MARGIN,
+            "hysteresis": HYSTERESIS,
+        },
+        "results": rows,
+        "paired": [
+            _paired(runs["critic"], runs[name], name) for name in ("planner", "nearest")
+        ],
+    }
+
+
+def _paired(first: FullTasks, other: FullTasks, name: str) -> dict[str, Any]:
+    """Return the differences between the critic and another rule on the same tasks."""
+    both = first.finished & other.finished
+    return {
+        "name": f"critic - {name}",
+        "n": int(both.sum()),
+        "cycle_time_s": mean_of((first.cycle_s - other.cycle_s)[both]),
+        "moving_contacts": mean_of((first.moving - other.moving)[both]),
+    }
